@@ -24,7 +24,7 @@ GENERATOR = runpy.run_path(str(DOCS / "generate.py"))
 REFERENCE = {name: page() for name, page in GENERATOR["PAGES"].items()}
 EVERY_PAGE = pytest.mark.parametrize("page", pages(), ids=name_of)
 # Those of `lupin-twin fleet` beside the bridge's.
-FLEET_ROUTES = {"/api/sites", "/ws/sites"}
+FLEET_ROUTES = {"/api/sites", "/ws/sites", "/api/compare"}
 # What the docs show of other programs.
 FOREIGN_OPTIONS = {
     "--find-links",

@@ -55,8 +55,8 @@ const TABLE: Table = {
   ],
   // The page over all greenhouses, a bundle of its own.
   fleet: [
-    ...['words', 'strings', 'clock', 'contract', 'connection', 'ui', 'styles'],
-    ...['npm:react', 'npm:react-dom'],
+    ...['words', 'strings', 'clock', 'contract', 'connection', 'domain', 'store', 'alarms'],
+    ...['charts', 'ui', 'styles', 'npm:react', 'npm:react-dom', 'npm:uplot'],
   ],
   main: ['styles', 'strings', 'store', 'alarms', 'ui', 'npm:react', 'npm:react-dom'],
   // For tests alone: no part above names it.

@@ -20,6 +20,7 @@ from contextlib import ExitStack
 from pathlib import Path
 from urllib.parse import urlsplit
 
+from lupin_twin.journal.rows import Row
 from tests.bench.live_parts import Clients, Seen
 from tests.support.archive import Archive, forwarder
 from tests.support.fleet import fleet, write
@@ -85,8 +86,9 @@ def main(arguments: Sequence[str] = ()) -> None:
         archive.add_user("page", "lupin_page")
         journal, now_ns = folder / "gh0", time.time_ns()
         values = dict.fromkeys(SENSORS, 20.0)
-        rows = [pin(str(tag), now_ns - 600 * SECOND, float(tag)) for tag in range(TAGS)]
-        write(journal, rows + [scan(str(tag), now_ns - SECOND, **values) for tag in range(TAGS)])
+        rows: list[Row] = [pin(str(tag), now_ns - 600 * SECOND, float(tag)) for tag in range(TAGS)]
+        rows += [scan(str(tag), now_ns - SECOND, **values) for tag in range(TAGS)]  # type: ignore[arg-type]
+        write(journal, rows)
         stack.enter_context(forwarder(archive, journal))
         pages = [
             stack.enter_context(fleet(archive, "--max-clients", "8000")) for _ in range(REPLICAS)

@@ -12,8 +12,12 @@ from playwright.sync_api import Browser, expect
 from playwright.sync_api import Page as BrowserPage
 
 from tests.support.archive import Archive, forward_once, forwarder
-from tests.support.fleet import Page, fleet, scans_lately, write
+from tests.support.fleet import Page, fleet, scans_lately, wall, write
+from tests.support.journal import scan
 from tests.support.postgres import server
+from tests.support.processes import lupin_twin
+
+HOUR_NS = 3_600_000_000_000
 
 
 @contextmanager
@@ -60,7 +64,7 @@ def test_the_worst_first_and_a_click_away(
 ) -> None:
     with three_sites(archive, tmp_path) as served:
         with opened(browser, served.url) as page:
-            names = page.locator(".fleet-site h2")
+            names = page.locator(".fleet-name")
             expect(names).to_have_text(["warm", "silent", "gh1"])
             cards = page.locator(".fleet-site")
             expect(cards.nth(0)).to_contain_text("Critical")
@@ -69,6 +73,9 @@ def test_the_worst_first_and_a_click_away(
             expect(cards.nth(1)).to_contain_text("Last known: Healthy, No alarms")
             expect(cards.nth(1)).not_to_have_attribute("data-health", "healthy")
             expect(cards.nth(2)).to_contain_text("No alarms")
+            # Nobody says where the rows come from; with two groups at least, there are headings.
+            expect(page.locator(".fleet-origin")).to_have_count(0)
+            expect(page.locator(".fleet-group")).to_have_count(0)
             picture(page, "light")
             page.keyboard.press("/")
             page.keyboard.type("wa")
@@ -100,6 +107,134 @@ def test_the_worst_first_and_a_click_away(
             picture(page, "kiosk")
 
 
+def test_alarms_of_all_greenhouses_are_counted_listed_and_a_click_away(
+    browser: Browser, archive: Archive, tmp_path: Path
+) -> None:
+    with three_sites(archive, tmp_path) as served:
+        with opened(browser, served.url) as page:
+            expect(page).to_have_title("(5) Greenhouses")
+            page.get_by_role("button", name="Alarms 5").click()
+            rows = page.locator(".fleet-alarm-list li")
+            expect(rows).to_have_count(5)
+            expect(rows.first).to_contain_text("warm")
+            expect(rows.first).to_contain_text("Critical")
+            expect(rows.first).to_contain_text("Temperature above 35")
+            picture(page, "alarms")
+            # The filters are those of the cards.
+            page.get_by_role("searchbox").fill("gh1")
+            expect(rows).to_have_count(0)
+            expect(page.get_by_role("main")).to_contain_text("No alarms")
+            expect(page).to_have_title("(5) Greenhouses")
+            page.get_by_role("searchbox").fill("warm")
+            expect(rows).to_have_count(5)
+            # What is over leaves the cards, the count, the title and the list.
+            now_ns = wall().stamp_ns
+            journal = tmp_path / "warm.sqlite"
+            write(journal, [scan("0", now_ns + n, temperature=22.0) for n in range(3)])
+            expect(page).to_have_title("(4) Greenhouses")
+            expect(page.get_by_role("button", name="Alarms 4")).to_be_visible()
+            expect(rows).to_have_count(4)
+            tag = rows.first.locator("span", has_text=re.compile(r"^Tag \d$")).inner_text()
+            rows.first.get_by_role("link").click()
+            expect(page).to_have_url(re.compile(r"/sites/warm/.*#.*at=\d+"))
+            # Its card, and as of then.
+            expect(page.get_by_role("complementary", name=tag)).to_be_visible()
+            expect(page.locator(".app")).to_have_attribute("data-past", "true")
+            picture(page, "alarm-site")
+        phone = {"width": 390, "height": 800}
+        with opened(browser, served.url, viewport=phone) as page:
+            page.get_by_role("button", name="Alarms 4").click()
+            expect(page.locator(".fleet-alarm-list li")).to_have_count(4)
+            assert page.evaluate("document.documentElement.scrollWidth") <= 390
+            picture(page, "alarms-phone")
+        with opened(browser, f"{served.url}?kiosk") as page:
+            expect(page.get_by_role("banner")).to_contain_text("4 alarms")
+
+
+def test_one_sensor_of_several_greenhouses_the_outlier_first(
+    browser: Browser, archive: Archive, tmp_path: Path
+) -> None:
+    temperatures = {"gh1": 20.0, "gh2": 21.0, "gh3": 22.0, "odd": 33.0}
+    for site, temperature in temperatures.items():
+        journal = tmp_path / f"{site}.sqlite"
+        now_ns = wall().stamp_ns
+        write(
+            journal,
+            [
+                scan("0", now_ns - hours * HOUR_NS, temperature=temperature + hours % 5)
+                for hours in range(20, 0, -1)
+            ],
+        )
+        forward_once(archive.of_site(site), journal)
+    with fleet(archive) as served:
+        for site in temperatures:
+            served.site(site, active_alarms=0 if site != "odd" else 1)
+        with opened(browser, served.url) as page:
+            page.get_by_role("button", name="Compare").click()
+            rows = page.locator(".fleet-table tbody tr")
+            expect(rows.locator("th")).to_have_text(["odd", "gh1", "gh2", "gh3"])
+            expect(rows.first).to_contain_text("35.0\u00a0°C")
+            expect(rows.first).to_contain_text("11.5\u00a0°C")
+            expect(page.get_by_test_id("plot").locator("canvas")).to_be_visible()
+            expect(page.get_by_role("checkbox", name="Draw odd")).to_be_checked()
+            expect(page.get_by_role("checkbox", name="Draw gh3")).not_to_be_checked()
+            page.get_by_role("checkbox", name="Draw gh3").check()
+            expect(page.get_by_role("checkbox", name="Draw gh3")).to_be_checked()
+            picture(page, "compare")
+            # The same choice of greenhouses as for the cards.
+            page.get_by_role("searchbox").fill("gh")
+            expect(rows.locator("th")).to_have_text(["gh1", "gh3", "gh2"])
+            page.get_by_role("button", name="Last week").click()
+            expect(rows.locator("th")).to_have_text(["gh1", "gh3", "gh2"])
+            page.get_by_label("Sensor").select_option("Humidity")
+            expect(rows.locator("td").nth(1)).to_have_text("–")
+        phone = {"width": 390, "height": 800}
+        with opened(browser, served.url, viewport=phone, color_scheme="dark") as page:
+            page.get_by_role("button", name="Compare").click()
+            expect(page.locator(".fleet-table tbody tr")).to_have_count(4)
+            assert page.evaluate("document.documentElement.scrollWidth") <= 390
+            picture(page, "compare-phone")
+
+
+def test_groups_fold_and_can_be_chosen(browser: Browser, archive: Archive) -> None:
+    archive.do(
+        "INSERT INTO site VALUES ('north-1', 'Noord 1'), ('north-2', ''), ('south-1', ''),"
+        " ('south-2', ''), ('alone', '')"
+    )
+    with fleet(archive) as served:
+        served.site("south-2")
+        with opened(browser, served.url) as page:
+            names = page.locator(".fleet-name")
+            groups = page.locator(".fleet-group")
+            expect(groups.locator("h2")).to_have_text(["Other greenhouses", "north", "south"])
+            expect(names).to_have_text(["alone", "Noord 1", "north-2", "south-1", "south-2"])
+            groups.nth(1).locator("summary").click()
+            expect(names.nth(1)).to_be_hidden()
+            expect(names.nth(3)).to_be_visible()
+            page.get_by_label("Group").select_option("south")
+            expect(names).to_have_text(["south-1", "south-2"])
+            expect(page.get_by_role("status")).to_have_text("2 of 5 greenhouses shown")
+            picture(page, "groups")
+        with opened(browser, f"{served.url}?kiosk&group=north") as page:
+            expect(page.locator(".fleet-name")).to_have_text(["Noord 1", "north-2"])
+
+
+def test_a_demo_says_that_it_is_simulated(
+    browser: Browser, archive: Archive, domain: int, tmp_path: Path
+) -> None:
+    words = ("--site", "gh1", "--archive-url", archive.url())
+    with (
+        lupin_twin(domain, "demo", *words, XDG_STATE_HOME=str(tmp_path)),
+        fleet(archive) as served,
+    ):
+        served.site("gh1", origin="simulated", is_live=True)
+        with opened(browser, served.url) as page:
+            expect(page.locator(".fleet-site")).to_contain_text("Simulated")
+            picture(page, "simulated")
+            page.locator(".fleet-name").click()
+            expect(page.get_by_test_id("origin")).to_contain_text("Simulated")
+
+
 def test_an_archive_without_greenhouses_and_one_that_is_down(browser: Browser) -> None:
     with server() as own:
         archive = Archive(own)
@@ -120,16 +255,15 @@ def test_an_archive_without_greenhouses_and_one_that_is_down(browser: Browser) -
 
 def test_a_thousand_are_shown_without_delay(browser: Browser, archive: Archive) -> None:
     archive.do(
-        "INSERT INTO site SELECT 'gh' || n, '' FROM generate_series(1, 1000) AS n;"
-        "INSERT INTO forwarder SELECT 'gh' || n, 'm', 1, now(), now() + INTERVAL '1 hour'"
-        " FROM generate_series(1, 1000) AS n"
+        "INSERT INTO site SELECT 'gh' || n % 9 || '-' || n, '' FROM generate_series(1, 1000) AS n;"
+        "INSERT INTO forwarder SELECT site, 'm', 1, now(), now() + INTERVAL '1 hour' FROM site"
     )
     with fleet(archive) as served:
-        served.site("gh1000", is_live=True)
+        served.site("gh1-1000", is_live=True)
         begun = "performance.now()"
         with opened(browser, served.url) as page:
             expect(page.locator(".fleet-site")).to_have_count(1000)
             print("painted after", page.evaluate(begun), "ms")
-            page.get_by_role("searchbox").fill("gh77")
-            expect(page.locator(".fleet-site")).to_have_count(11)
             picture(page, "thousand")
+            page.get_by_role("searchbox").fill("-77")
+            expect(page.locator(".fleet-site")).to_have_count(11)

@@ -7,6 +7,7 @@ from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+from lupin_twin.core.diagnostics import Origin
 from lupin_twin.core.journal_condition import Condition, JournalState
 from lupin_twin.core.state import Bloom, Flower, Pose, Reading
 from lupin_twin.journal.file import JournalFile
@@ -125,10 +126,15 @@ def is_whole(path: Path) -> bool:
 
 @contextmanager
 def recording(
-    path: Path, now: Clock = CLOCK, *, limits: Limits = LIMITS, max_weight: int = MAX_WEIGHT
+    path: Path,
+    now: Clock = CLOCK,
+    *,
+    limits: Limits = LIMITS,
+    max_weight: int = MAX_WEIGHT,
+    origin: Origin = "robot",
 ) -> Iterator[Journal]:
     """A journal at work, its clock begun."""
-    journal = Journal(path, "/test/lupin_twin", limits, max_weight)
+    journal = Journal(path, "/test/lupin_twin", limits, max_weight, origin=origin)
     try:
         journal.begin(now, 32)
         yield journal

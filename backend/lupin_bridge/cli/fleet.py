@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import gc
 import logging
 import os
 from collections.abc import Sequence
@@ -11,20 +10,15 @@ from contextlib import closing
 from dataclasses import replace
 
 from lupin_bridge.access.middleware import Access
-from lupin_bridge.access.policy import Proxies, exposure
+from lupin_bridge.access.policy import Proxies
 from lupin_bridge.archive.database import ArchiveError, UsageError, check_url
+from lupin_bridge.cli.serving import open_listener, serve
 from lupin_bridge.cli.supervisor import Supervisor
 from lupin_bridge.fleet.app import Fleet, create_fleet_app
 from lupin_bridge.fleet.site_log import open_archive
 from lupin_bridge.judge.options import Criteria
 from lupin_bridge.serving.admission import Limits
-from lupin_bridge.serving.server import (
-    BridgeServer,
-    address_of,
-    allow_connections,
-    check_pair,
-    listen,
-)
+from lupin_bridge.serving.server import BridgeServer, allow_connections
 from lupin_bridge.settings import Secrets, SettingError, Settings, option, variable
 
 log = logging.getLogger("lupin_bridge")
@@ -56,22 +50,11 @@ def run(settings: Settings, secrets: Secrets, ros_args: Sequence[str]) -> None:
     access = Access.of(settings, secrets.token)
     proxies = Proxies.of(settings)
     criteria = Criteria.of(settings)
-    if settings.tls_cert:
-        check_pair(settings.tls_cert, settings.tls_key)
     asyncio.run(_run(settings, access, proxies, criteria))
 
 
 async def _run(settings: Settings, access: Access, proxies: Proxies, criteria: Criteria) -> None:
-    try:
-        listener = listen(settings.host, settings.port)
-    except OSError as error:
-        raise SettingError(
-            f"cannot listen on {settings.host} port {settings.port}: {error.strerror}"
-        ) from error
-    for warning in exposure(
-        listener.getsockname()[0], has_token=access.credentials is not None, has_tls=access.secure
-    ):
-        log.warning("%s", warning)
+    listener = open_listener(settings, access)
     await asyncio.to_thread(_say_what_is_wrong, settings.archive_url)
     settings = replace(settings, max_clients=allow_connections(settings.max_clients))
     # For the process that reads; not on its command line, which others can read.
@@ -87,16 +70,9 @@ async def _run(settings: Settings, access: Access, proxies: Proxies, criteria: C
 
     server = BridgeServer(app, settings, announce_shutdown, limits)
     await fleet.start()
-    gc.collect()
-    gc.freeze()
-    url = address_of(listener, "https" if access.secure else "http")
-    print(f"lupin-twin: {url}", flush=True)  # noqa: T201  # for people and scripts
-    supervisor.ready(f"serving {url}")
-    living = asyncio.create_task(supervisor.keep_alive(lambda: None), name="watchdog")
     try:
-        await server.serve(sockets=[listener])
+        await serve(server, listener, settings, supervisor, lambda: None)
     finally:
-        living.cancel()
         await fleet.stop()
 
 

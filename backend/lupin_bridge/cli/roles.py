@@ -3,11 +3,8 @@
 from __future__ import annotations
 
 import asyncio
-import gc
 import logging
 import os
-import signal
-import socket
 import subprocess
 import sys
 import tempfile
@@ -17,12 +14,13 @@ from dataclasses import replace
 from pathlib import Path
 
 from lupin_bridge.access.middleware import Access
-from lupin_bridge.access.policy import Proxies, exposure
+from lupin_bridge.access.policy import Proxies
 from lupin_bridge.app import create_app, has_page
 from lupin_bridge.archive import child
 from lupin_bridge.bags.recording import RecordingError
 from lupin_bridge.bridge import Bridge
 from lupin_bridge.cli import demo
+from lupin_bridge.cli.serving import open_listener, serve
 from lupin_bridge.cli.supervisor import Supervisor
 from lupin_bridge.feed.local import LocalTwin
 from lupin_bridge.feed.ros_thread import RosStartError
@@ -33,14 +31,7 @@ from lupin_bridge.notify.channels import Channels
 from lupin_bridge.notify.destinations import Targets
 from lupin_bridge.routes.pages import HOW_TO_BUILD
 from lupin_bridge.serving.admission import Limits
-from lupin_bridge.serving.server import (
-    BridgeServer,
-    Certificates,
-    address_of,
-    allow_connections,
-    check_pair,
-    listen,
-)
+from lupin_bridge.serving.server import BridgeServer, allow_connections
 from lupin_bridge.settings import Secrets, SettingError, Settings
 from lupin_bridge.stream.status import STALE_AFTER_S
 from lupin_twin.core.parameters import ParameterError, World
@@ -106,15 +97,7 @@ async def _run(
     criteria = Criteria.of(settings)
     targets = Targets.of(settings, secrets)
     child.check(settings, role)
-    if settings.tls_cert:
-        check_pair(settings.tls_cert, settings.tls_key)
-    try:
-        listener = listen(settings.host, settings.port)
-    except OSError as error:
-        raise SettingError(
-            f"cannot listen on {settings.host} port {settings.port}: {error.strerror}"
-        ) from error
-    _warn_of_exposure(listener, access)
+    listener = open_listener(settings, access)
     if not has_page():
         log.warning("the page was not built, / says so: %s", HOW_TO_BUILD)
     settings = replace(settings, max_clients=allow_connections(settings.max_clients))
@@ -133,23 +116,11 @@ async def _run(
 
     server = BridgeServer(app, settings, announce_shutdown, limits)
     await bridge.start()
-    # The 100,000 objects of all modules are here to stay. Each full collection would walk through
-    # them, 30 to 50 ms during which nobody is served.
-    gc.collect()
-    gc.freeze()
     feeder = None if feed is None else Feeder(feed, lambda: server.should_exit)
     forwarding = child.Forwarding(settings, lambda: source.journal().path)
-    url = address_of(listener, "https" if access.secure else "http")
-    print(f"lupin-twin: {url}", flush=True)  # noqa: T201  # for people and scripts
-    supervisor.ready(f"serving {url}")
-    living = asyncio.create_task(supervisor.keep_alive(lambda: ailment(source)), name="watchdog")
-    renewal = _follow_certificates(settings, server)
     try:
-        await server.serve(sockets=[listener])
+        await serve(server, listener, settings, supervisor, lambda: ailment(source))
     finally:
-        living.cancel()
-        if renewal is not None:
-            renewal.cancel()
         if feeder is not None:
             feeder.terminate()
         fed = [] if feeder is None else [feeder.wait()]
@@ -166,25 +137,6 @@ def _source_of(
     own_args = [] if feed is None else feed.twin_args
     world = World() if feed is None else feed.world
     return LocalTwin(ros_args=[*own_args, *ros_args], timeout_s=timeout_s, world=world)
-
-
-def _follow_certificates(settings: Settings, server: BridgeServer) -> asyncio.Task[None] | None:
-    """Renew the certificate when its files change, and at once at SIGHUP."""
-    server.config.load()
-    if server.config.ssl is None:
-        return None
-    certificates = Certificates(settings.tls_cert, settings.tls_key, server.config.ssl)
-    asyncio.get_running_loop().add_signal_handler(signal.SIGHUP, certificates.look)
-    return asyncio.create_task(certificates.watch(), name="certificates")
-
-
-def _warn_of_exposure(listener: socket.socket, access: Access) -> None:
-    for warning in exposure(
-        listener.getsockname()[0],
-        has_token=access.credentials is not None,
-        has_tls=access.secure,
-    ):
-        log.warning("%s", warning)
 
 
 class Feeder:

@@ -249,11 +249,9 @@ class TwinSource(ABC):
         They come in lots, each through `write`, which is called in another process. None: all tags,
         all sensors.
         """
-        export: bytes | None = pickle.dumps(Export(start_ns, end_ns, tag_id, sensor_type))
-        while export is not None:
-            export, lots = await self.ask(ExportStep(export, write), STRETCH_S)
-            for lot in lots:
-                yield lot
+        period = Export(start_ns, end_ns, tag_id, sensor_type)
+        async for lot in exported(lambda step: self.ask(step, STRETCH_S), period, write):
+            yield lot
 
     async def _in_time(self, answer: Awaitable[ResultT]) -> ResultT:
         try:
@@ -272,3 +270,19 @@ def ailment(source: TwinSource) -> str | None:
     if source.stuck_s >= STUCK_AFTER_S:
         return f"The ROS thread has been stuck in a callback for {source.stuck_s:.0f} s. Restart."
     return None
+
+
+async def exported(
+    ask: Callable[[ExportStep[ResultT]], Awaitable[tuple[bytes | None, Sequence[ResultT]]]],
+    period: Export,
+    write: Callable[[Sequence[PastRow]], ResultT],
+) -> AsyncGenerator[ResultT]:
+    """The rows of a period, lot by lot through `write`; the next ones are asked for as it is taken.
+
+    `ask` asks the process that looks back.
+    """
+    export: bytes | None = pickle.dumps(period)
+    while export is not None:
+        export, lots = await ask(ExportStep(export, write))
+        for lot in lots:
+            yield lot

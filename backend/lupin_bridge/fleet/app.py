@@ -22,30 +22,37 @@ from lupin_bridge.access.policy import BehindProxies, Proxies
 from lupin_bridge.app import STATIC_FOLDER, create_app
 from lupin_bridge.bridge import Bridge
 from lupin_bridge.feed.past_process import PastProcess
+from lupin_bridge.feed.query import Now
+from lupin_bridge.feed.shared_work import Shared
 from lupin_bridge.field import query as field_query
+from lupin_bridge.fleet.compare import COMPARE_S, Compare, OfSites, answer_of, chosen, compare
 from lupin_bridge.fleet.export import respond_sites
-from lupin_bridge.fleet.overview import SitesFrame, archive_json, etag, site_json
+from lupin_bridge.fleet.overview import SitesFrame, alarms_json, archive_json, etag, site_json
 from lupin_bridge.fleet.pages import Opened, SitePages, Sites
 from lupin_bridge.fleet.source import SiteTwin
 from lupin_bridge.fleet.watching import Watching
 from lupin_bridge.judge.options import Criteria
 from lupin_bridge.metrics import CONTENT_TYPE
 from lupin_bridge.past.export import CSV, PARQUET
-from lupin_bridge.routes import pages
+from lupin_bridge.query_string import read
+from lupin_bridge.routes import pages, status
 from lupin_bridge.routes.answers import (
     NEVER_STORE,
     add_refusals,
     error_response,
     json_response,
     list_header,
+    respond,
 )
 from lupin_bridge.routes.sockets import has_place, next_message
-from lupin_bridge.serving.admission import REVALIDATE, Admission, AnswerCache, Limits
+from lupin_bridge.serving.admission import REVALIDATE, Admission, Answer, AnswerCache, Limits
 from lupin_bridge.serving.middleware import PieceByPiece
 from lupin_bridge.serving.ws_protocol import CONNECTION_KEY, Connection
 from lupin_bridge.settings import Settings
 from lupin_bridge.stream.hub import Client, Hub
 from lupin_bridge.stream.status import Status
+from lupin_twin.core.journal_condition import UNKNOWN
+from lupin_twin.core.past import PastRefused
 from lupin_twin.runtime.workers import Workers
 
 log = logging.getLogger(__name__)
@@ -56,9 +63,12 @@ _CACHE_BYTES: Final = 4_000_000
 # No browser gets more frames than one in so many seconds; and one at least in so many.
 _FRAME_S: Final = 1.0
 _HEARTBEAT_S: Final = 5.0
-# What a browser signs in by, as everywhere.
-_SIGN_IN: Final = frozenset(
-    {"/api/signin", "/api/signout", "/api/session", "/signin", "/signin.css", "/signin.js"}
+# What a browser signs in by, and the sensors in force.
+_AS_EVERYWHERE: Final = frozenset(
+    {
+        *("/api/signin", "/api/signout", "/api/session", "/signin", "/signin.css", "/signin.js"),
+        "/api/sensors",
+    }
 )
 
 
@@ -99,6 +109,9 @@ class Fleet:
             return Opened(source, bridge, app, ready)
 
         self.pages = SitePages(make, lambda: self.watching.sites, limits.open_sites)
+        # What `routes.answers` needs of a bridge, too.
+        self.cache = AnswerCache()
+        self.answering: Shared[Answer] = Shared()
         self._frame: SitesFrame | None = None
         self._framed_s = -math.inf
         self._push_timer: asyncio.TimerHandle | None = None
@@ -163,6 +176,13 @@ class Fleet:
         if self._frame is None:
             self._push()
 
+    # --- several sites ------------------------------------------------------------------------
+
+    async def compare(self, query: Compare) -> Answer:
+        """The answer of `/api/compare`."""
+        answer: Answer = await self.past.ask(query, Now(0, "", UNKNOWN), COMPARE_S)  # type: ignore[arg-type]  # see `reader`
+        return answer
+
     async def _tidy(self) -> None:
         while True:
             await asyncio.sleep(_TIDY_S)
@@ -209,9 +229,13 @@ def create_fleet_app(
         openapi_url=None,
     )
     app.state.access = access
-    _add_routes(app, fleet)
-    signin = (route for route in pages.router.routes if getattr(route, "path", "") in _SIGN_IN)
-    app.router.routes.extend(signin)
+    app.state.bridge = fleet
+    add_refusals(app)
+    _add_overview(app, fleet)
+    _add_answers(app, fleet)
+    _add_probes(app, fleet)
+    every = (*pages.router.routes, *status.router.routes)
+    app.router.routes.extend(it for it in every if getattr(it, "path", "") in _AS_EVERYWHERE)
     # The last one added is the first to be asked.
     app.add_middleware(Sites, pages=fleet.pages)
     app.add_middleware(PieceByPiece)
@@ -242,7 +266,7 @@ async def _not_found(request: Request, _error: Exception) -> Response:
     return error_response(f"there is nothing at {request.url.path[:128]!r}", 404)
 
 
-def _add_routes(app: FastAPI, fleet: Fleet) -> None:
+def _add_overview(app: FastAPI, fleet: Fleet) -> None:
     @app.api_route("/api/sites", methods=["GET", "HEAD"])
     async def sites(request: Request) -> Response:
         """Every site of the archive, by name."""
@@ -251,10 +275,6 @@ def _add_routes(app: FastAPI, fleet: Fleet) -> None:
         if field_query.matches(list_header(request, "if-none-match"), tag.removeprefix("W/")):
             return Response(status_code=304, headers={"ETag": tag, **REVALIDATE})
         return json_response(fleet.body(), 200, {"ETag": tag, **REVALIDATE})
-
-    for kind in (CSV, PARQUET):
-        path = f"/api/export.{kind.name}"
-        app.api_route(path, methods=["GET", "HEAD"])(partial(respond_sites, fleet, kind))
 
     @app.websocket("/ws/sites")
     async def ws_sites(websocket: WebSocket) -> None:
@@ -279,6 +299,46 @@ def _add_routes(app: FastAPI, fleet: Fleet) -> None:
             connection.on_writable = None
             fleet.hub.leave(client)
 
+
+def _add_answers(app: FastAPI, fleet: Fleet) -> None:
+    """Routes over several sites at once."""
+    for kind in (CSV, PARQUET):
+        path = f"/api/export.{kind.name}"
+        app.api_route(path, methods=["GET", "HEAD"])(partial(respond_sites, fleet, kind))
+
+    @app.api_route("/api/alarms", methods=["GET", "HEAD"])
+    async def alarms(request: Request) -> Response:
+        """Active alarms of all sites, the worst first."""
+        given = read(OfSites, request.query_params.multi_items(), PastRefused)
+        watching = fleet.watching
+        names = chosen(given.sites, watching.sites)
+        key = ("alarms", watching.looks, watching.archive.is_reachable, *names)
+
+        async def compute() -> Answer:
+            with fleet.admission.computing(client_of(request)):
+                body = alarms_json((watching.sites[name] for name in names), watching.archive)
+                answer = answer_of(body)
+            fleet.cache.put(key, answer)
+            return answer
+
+        return await respond(request, key, compute)
+
+    @app.api_route("/api/compare", methods=["GET", "HEAD"])
+    async def compared(request: Request) -> Response:
+        """One sensor of several sites."""
+        watching = fleet.watching
+        names = {site: it.name or site for site, it in watching.sites.items()}
+        parameters = request.query_params.multi_items()
+        query = compare(parameters, names, watching.now_ns, fleet.criteria.sensors)
+
+        async def compute() -> Answer:
+            with fleet.admission.computing(client_of(request), is_large=True):
+                return await fleet.compare(query)
+
+        return await respond(request, query, compute)
+
+
+def _add_probes(app: FastAPI, fleet: Fleet) -> None:
     @app.api_route("/healthz", methods=["GET", "HEAD"])
     async def healthz() -> Response:
         """The process is alive, whatever becomes of the archive."""

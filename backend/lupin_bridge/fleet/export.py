@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import AsyncGenerator, Callable, Iterable
+from collections.abc import AsyncGenerator, Awaitable, Callable, Iterable
 from contextlib import aclosing
 from functools import partial
-from typing import Protocol
+from typing import Any, Protocol
 
 from fastapi import Request, Response
 
-from lupin_bridge.feed.past_child import Now
 from lupin_bridge.feed.past_process import PastProcess
+from lupin_bridge.feed.query import ExportStep, Now
+from lupin_bridge.feed.source import exported
 from lupin_bridge.fleet.overview import Site
 from lupin_bridge.fleet.watching import Watching
 from lupin_bridge.judge.options import Criteria
@@ -21,6 +22,7 @@ from lupin_bridge.routes.answers import error_response
 from lupin_bridge.routes.export import Exporting, end_of, respond_export
 from lupin_twin.core.journal_condition import Condition, JournalState
 from lupin_twin.core.past import seconds
+from lupin_twin.journal.queries import STRETCH_S, Export
 
 
 class ExportingSites(Exporting, Protocol):
@@ -42,7 +44,7 @@ async def respond_sites(fleet: ExportingSites, kind: ExportFormat, request: Requ
             return error_response(detail, 404)
     named = [site for site in sites if isinstance(site, Site)]
     end_ns = end_of(period, None)
-    query = (period.start_ns, end_ns, period.tag_id, period.sensor_type)
+    query = Export(period.start_ns, end_ns, period.tag_id, period.sensor_type)
     heard_ns = min((site.heard_ns for site in named), default=0)
     return await respond_export(
         request,
@@ -58,16 +60,16 @@ async def respond_sites(fleet: ExportingSites, kind: ExportFormat, request: Requ
 
 
 async def _rows(
-    fleet: ExportingSites,
-    sites: Iterable[str],
-    query: tuple[int, int, str | None, str | None],
-    pack: Callable[..., bytes],
+    fleet: ExportingSites, sites: Iterable[str], period: Export, pack: Callable[..., bytes]
 ) -> AsyncGenerator[bytes]:
-    """The rows of one site after the other, see `PastProcess.rows`; each lot through `pack`."""
+    """The rows of one site after the other, see `exported`; each lot through `pack`."""
     for site in sites:
         log = Condition(JournalState.RECORDING, path=site, journal_id=site)
         now = Now(fleet.watching.now_ns, "", log)
-        own = partial(pack, site=site)
-        async with aclosing(fleet.past.rows(query, own, lambda now=now: now)) as lots:  # type: ignore[misc]
+
+        def ask(step: ExportStep[bytes], now: Now = now) -> Awaitable[Any]:
+            return fleet.past.ask(step, now, STRETCH_S)
+
+        async with aclosing(exported(ask, period, partial(pack, site=site))) as lots:
             async for lot in lots:
                 yield lot

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import heapq
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from hashlib import blake2b
 from typing import Any, Final
@@ -12,6 +13,7 @@ import orjson
 from lupin_bridge.judge.verdict import Verdict
 from lupin_bridge.stream.frames import text_frame
 from lupin_bridge.stream.state_json import stamp
+from lupin_twin.core.diagnostics import Origin
 
 # A forwarder says every two seconds that it lives; this long after the last time it counts as gone.
 LIVE_S: Final = 10.0
@@ -21,9 +23,11 @@ LIVE_S: Final = 10.0
 class Site:
     """A site as its log and its forwarder have it. Times are ns of the archive's clock.
 
+    `origin` is where what it reports comes from, as far as its log says.
     `last_seq` grows with every row, `heard_ns` is when the forwarder was heard last, 0: never.
     `last_received_ns` is when the twin received its newest row, by the clock of its machine.
-    `verdict` and `active_alarms` are None while they are being worked out.
+    `verdict` and `active_alarms` are None while they are being worked out; `alarms` are the worst
+    of the active ones, as in `/api/alarms`.
     """
 
     site: str
@@ -34,6 +38,8 @@ class Site:
     last_received_ns: int | None = None
     verdict: Verdict | None = None
     active_alarms: int | None = None
+    origin: Origin = "unknown"
+    alarms: tuple[dict[str, Any], ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,6 +63,7 @@ def site_json(site: Site, archive: Archive, now_ns: int) -> dict[str, Any]:
         "last_received": None if site.last_received_ns is None else stamp(site.last_received_ns),
         "lag_s": None if not site.heard_ns else round(max(0, now_ns - site.heard_ns) / 1e9, 1),
         "is_live": is_live,
+        "origin": site.origin,
     }
 
 
@@ -70,13 +77,44 @@ def etag(sites: Mapping[str, Site], archive: Archive) -> str:
 def _lasting(site: Site) -> tuple[object, ...]:
     return (
         *(site.site, site.name, site.last_seq, site.is_live),
-        *(site.verdict, site.active_alarms, site.last_received_ns),
+        *(site.verdict, site.active_alarms, site.last_received_ns, site.origin),
     )
 
 
 def is_news(before: Site | None, now: Site) -> bool:
     """Whether browsers have to be told of a site; that it still lives is none."""
     return before is None or _lasting(before) != _lasting(now)
+
+
+# Of an answer; who has more to look at begins with the worst.
+MAX_LISTED: Final = 200
+_ORDER: Final = {verdict: index for index, verdict in enumerate(Verdict)}
+
+
+def alarms_json(sites: Iterable[Site], archive: Archive) -> dict[str, Any]:
+    """`/api/alarms`: active ones, the worst first, then the newest; of silent sites the last known.
+
+    `total` counts those too that are left out.
+    """
+    every = list(sites)
+    found = [
+        {
+            "site": site.site,
+            "name": site.name or site.site,
+            "is_live": site.is_live and archive.is_reachable,
+            **alarm,
+        }
+        for site in every
+        for alarm in site.alarms
+    ]
+    worst = heapq.nsmallest(MAX_LISTED, found, key=_worst_first)
+    return {"alarms": worst, "total": sum(site.active_alarms or 0 for site in every)}
+
+
+def _worst_first(alarm: Mapping[str, Any]) -> tuple[Any, ...]:
+    raised = alarm["raised_at"]
+    verdict = _ORDER[Verdict(alarm["reason"]["verdict"])]
+    return verdict, -raised["sec"], -raised["nanosec"], alarm["site"], alarm["id"]
 
 
 class SitesFrame:

@@ -17,8 +17,10 @@ from lupin_bridge.archive.database import ArchiveError, explained
 from lupin_bridge.feed import past_child
 from lupin_bridge.feed.past_child import Child, Search
 from lupin_bridge.feed.query import Now, Question, Work
+from lupin_bridge.fleet.compare import COMPARE_S, Compare
 from lupin_bridge.fleet.site_log import SiteConnection, open_archive
 from lupin_bridge.settings import variable
+from lupin_twin.core.diagnostics import Origin, origin_of
 from lupin_twin.core.history import History, TagHistory
 from lupin_twin.core.past import NotRemembered
 from lupin_twin.core.state import Snapshot
@@ -27,7 +29,7 @@ from lupin_twin.journal.fold import state_at
 from lupin_twin.journal.retention import Stretches, kept
 from lupin_twin.journal.rows import newest_of_tag
 from lupin_twin.journal.runs import FOREVER_NS, runs, span_at
-from lupin_twin.journal.schema import DamagedFile
+from lupin_twin.journal.schema import ORIGIN, DamagedFile
 from lupin_twin.runtime.journal_queries import Recall
 from lupin_twin.runtime.memory import write_of
 from lupin_twin.runtime.workers import ShouldStop
@@ -53,11 +55,13 @@ class Latest:
 class Reported:
     """All tags as of the site's time now; what is kept of the past, and what of it is simulated.
 
-    `is_walls`: that time is the wall's, so it goes on also while nothing comes.
+    `is_walls`: that time is the wall's, so it goes on also while nothing comes. `origin` is where
+    observations come from.
     """
 
     snapshot: Snapshot
     is_walls: bool
+    origin: Origin
     kept_ns: Stretches
     simulated_ns: tuple[int, int] | None
 
@@ -75,10 +79,12 @@ class ArchiveChild(Child):
     def __init__(self) -> None:
         super().__init__(ArchiveRecall)
 
-    def _search(self, question: Question[Any] | Latest | OfTag, now: Now) -> Search:
+    def _search(self, question: Question[Any] | Latest | OfTag | Compare, now: Now) -> Search:
         site = now.condition.path
         if isinstance(question, Latest | OfTag):
             return lambda connection, _: _done(_of_site(SiteConnection(connection, site), question))
+        if isinstance(question, Compare):
+            return lambda connection, _: _compared(question, connection)
         found = super()._search(question, now)
         return lambda connection, stop: found(_as_journal(connection, site), stop)
 
@@ -89,6 +95,11 @@ def _as_journal(connection: Any, site: str) -> sqlite3.Connection:
 
 def _done(found: Any) -> Work[Any]:
     return Work(0.0, lambda _: found)
+
+
+def _compared(query: Compare, connection: Any) -> Work[Any]:
+    found = query.read(connection)
+    return Work(COMPARE_S, lambda _: query.answer(found))
 
 
 def _of_site(log: SiteConnection, asked: Latest | OfTag) -> Reported | TagHistory:
@@ -112,6 +123,7 @@ def _latest(log: SiteConnection, asked: Latest) -> Reported:
     return Reported(
         Snapshot(max(now_ns, stamp_ns or 0), asked.frame_id, known.tags),
         is_walls,
+        origin_of(log.meta(ORIGIN) or "", is_simulated=not is_walls),
         kept(journal),
         None if found is None else (found.start_ns, found.end_ns),
     )

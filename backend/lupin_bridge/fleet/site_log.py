@@ -29,6 +29,10 @@ class SiteConnection:
         """A cursor; its rows come as tuples."""
         return SiteLog(self.connection, self.site).execute(sql, values)
 
+    def meta(self, key: str) -> str | None:
+        """See `SiteLog`."""
+        return SiteLog(self.connection, self.site).meta(key)
+
     def transaction(self) -> Any:
         """See psycopg."""
         return self.connection.transaction()

@@ -167,6 +167,7 @@ class SiteTwin(TwinSource):
             self.revision(),
             journal=self._condition(reported),
             rules=self._rules,
+            origin=reported.origin,
             input_problems=(problem,) if problem else (),
             silent_s=0.0 if is_live else ago_s,
         )

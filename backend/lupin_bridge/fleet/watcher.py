@@ -7,6 +7,7 @@ changed, by the judge that every bridge has, from the rows that have come since.
 
 from __future__ import annotations
 
+import heapq
 import logging
 import os
 import signal
@@ -20,6 +21,7 @@ from typing import Any, Final
 
 import orjson
 
+from lupin_bridge.alarms.ledger import worst_first
 from lupin_bridge.archive.database import CHANNEL, ArchiveError, explained
 from lupin_bridge.fleet.overview import LIVE_S, Site
 from lupin_bridge.fleet.site_log import SiteConnection, open_archive
@@ -29,11 +31,14 @@ from lupin_bridge.judge.options import Criteria
 from lupin_bridge.judge.verdict import Verdict
 from lupin_bridge.serving.admission import Limits
 from lupin_bridge.settings import Settings
+from lupin_bridge.stream.health_json import alarm_json
+from lupin_twin.core.diagnostics import origin_of
 from lupin_twin.core.state import Snapshot, TagState
 from lupin_twin.core.writes import RecentRequest, WritesRequest
 from lupin_twin.journal.fold import state_at
 from lupin_twin.journal.follow import recent, writes
 from lupin_twin.journal.runs import FOREVER_NS, runs, span_at
+from lupin_twin.journal.schema import ORIGIN
 
 log = logging.getLogger(__name__)
 
@@ -46,6 +51,8 @@ _JUDGING_S: Final = 1.0
 # What grows old does so by itself; how soon that is said.
 _AGE_S: Final = 10.0
 _LOT: Final = 2_000
+# Of a site, the worst; all of them are on its own page.
+MAX_ALARMS: Final = 20
 # As many as a bridge reads of the past, see `alarms.feed`.
 _REACH_COUNT: Final = 300_000
 _RETRY_S: Final = 1.0
@@ -54,16 +61,20 @@ _FACTS: Final = (
     "SELECT site.site, site.name, coalesce(CAST(extract(epoch FROM heard_at) * 1e9 AS BIGINT), 0),"
     " coalesce(heard_at > now() - make_interval(secs => %s), false),"
     " coalesce((SELECT seq_offset + forwarded_seq FROM epoch WHERE epoch.site = site.site"
-    " ORDER BY epoch DESC LIMIT 1), 0)"
+    " ORDER BY epoch DESC LIMIT 1), 0),"
+    " (SELECT value FROM meta WHERE meta.site = site.site AND key = %s),"
+    # By a clock that is simulated, no robot works.
+    " coalesce((SELECT is_simulated FROM run WHERE run.site = site.site"
+    " ORDER BY run DESC LIMIT 1) = 1, false)"
     " FROM site LEFT JOIN forwarder ON forwarder.site = site.site ORDER BY site.site"
 )
 _NEWEST: Final = (
-    "(SELECT arrival_ns FROM {0} WHERE {0}.site = asked.site ORDER BY seq DESC LIMIT 1)"
+    "(SELECT arrival_ns FROM {0} WHERE {0}.site = wanted.site ORDER BY seq DESC LIMIT 1)"
 )
 _RECEIVED: Final = (
-    "SELECT asked.site, greatest("  # noqa: S608  # constants
+    "SELECT wanted.site, greatest("  # noqa: S608  # constants
     + ", ".join(_NEWEST.format(table) for table in ("scan", "look", "place"))
-    + ") FROM unnest(%s::text[]) AS asked (site)"
+    + ") FROM unnest(%s::text[]) AS wanted (site)"
 )
 _NOW: Final = "SELECT CAST(extract(epoch FROM now()) * 1e9 AS BIGINT)"
 
@@ -97,10 +108,16 @@ class Watcher:
         execute = self._connection.execute
         ((now_ns,),) = execute(_NOW).fetchall()
         before, self.sites = self.sites, {}
-        for site, name, heard_ns, is_live, last_seq in execute(_FACTS, (LIVE_S,)).fetchall():
+        for site, *facts in execute(_FACTS, (LIVE_S, ORIGIN)).fetchall():
+            name, heard_ns, is_live, last_seq, origin, is_simulated = facts
             known = before.get(site, Site(site))
             self.sites[site] = replace(
-                known, name=name, heard_ns=heard_ns, is_live=is_live, last_seq=last_seq
+                known,
+                name=name,
+                heard_ns=heard_ns,
+                is_live=is_live,
+                last_seq=last_seq,
+                origin=origin_of(origin or "", is_simulated=is_simulated),
             )
         grown = [
             name
@@ -154,7 +171,9 @@ class Watcher:
                 log.exception("site %s cannot be judged: its status is unknown", name)
             # Tried again from its first row on, when others are judged for their age.
             self._judged[name] = _Judged(self._judge_of(), is_failing=True)
-            self.sites[name] = replace(self.sites[name], verdict=None, active_alarms=None)
+            self.sites[name] = replace(
+                self.sites[name], verdict=None, active_alarms=None, alarms=()
+            )
         else:
             judged.is_failing = False
 
@@ -171,8 +190,7 @@ class Watcher:
             return
         # A simulation's time stands between two looks.
         moment_ns = judged.snapshot.stamp_ns if judged.is_simulated else now_ns
-        said = judged.judge.see(replace(judged.snapshot, stamp_ns=moment_ns))
-        alarms = site.active_alarms
+        judgement = judged.judge.see(replace(judged.snapshot, stamp_ns=moment_ns))
         if judged.is_caught_up:
             reach_ns = int(Limits().alarm_days * 86_400e9)
             found = (
@@ -180,9 +198,11 @@ class Watcher:
                 if judged.follower is None
                 else judged.follower.found(moment_ns, max(0, moment_ns - reach_ns)).alarms
             )
-            alarms = sum(alarm.is_active for alarm in found)
+            active = [alarm for alarm in found if alarm.is_active]
+            worst = heapq.nsmallest(MAX_ALARMS, active, key=worst_first)
+            site = replace(site, active_alarms=len(active), alarms=tuple(map(alarm_json, worst)))
         judged.judged_s = time.monotonic()
-        self.sites[name] = replace(site, verdict=said.house.verdict, active_alarms=alarms)
+        self.sites[name] = replace(site, verdict=judgement.house.verdict)
 
     def _read(self, log: Any, judged: _Judged) -> None:
         span = span_at(runs(log.execute), FOREVER_NS)
@@ -199,12 +219,12 @@ class Watcher:
             judged.judge.learn(recent(log, RecentRequest(newest_ns)))
 
     def _follow(self, log: Any, judged: _Judged) -> None:
-        asked = WritesRequest(judged.after, Limits().alarm_days * 86_400, _REACH_COUNT, _LOT)
-        past = writes(log, asked)
+        request = WritesRequest(judged.after, Limits().alarm_days * 86_400, _REACH_COUNT, _LOT)
+        past = writes(log, request)
         if judged.follower is None or judged.follower.spans != past.spans:
             if judged.follower is not None:
                 judged.follower, judged.after, judged.is_caught_up = None, 0, False
-                past = writes(log, replace(asked, after=0))
+                past = writes(log, replace(request, after=0))
             day = self._criteria.day
             judged.follower = Follower(
                 self._criteria.sensors,
@@ -246,17 +266,17 @@ def _watch(connection: Any, criteria: Criteria) -> None:
     try:
         with suppress(psycopg.errors.ReadOnlySqlTransaction):
             connection.execute(f"LISTEN {CHANNEL}")  # a standby knows no such thing
-        told: dict[str, Site] = {}
+        reported: dict[str, Site] = {}
         is_first = True
         while True:
             now_ns = watcher.look()
-            told = _tell(watcher, told, now_ns, is_first=is_first)
+            reported = _report(watcher, reported, now_ns, is_first=is_first)
             is_first = False
             until_s = time.monotonic() + _JUDGING_S
             for _ in watcher.judge(now_ns):
                 if time.monotonic() >= until_s:
                     break
-            told = _tell(watcher, told, now_ns)
+            reported = _report(watcher, reported, now_ns)
             if not watcher.has_more():
                 _wait(connection)
     except psycopg.Error as error:
@@ -265,19 +285,19 @@ def _watch(connection: Any, criteria: Criteria) -> None:
 
 def _wait(connection: Any) -> None:
     """Until somebody says that there is something new, or it is time to look."""
-    is_told = False
+    is_notified = False
     for _ in connection.notifies(timeout=LOOK_S, stop_after=1):
-        is_told = True
-    if is_told:
+        is_notified = True
+    if is_notified:
         for _ in connection.notifies(timeout=_GATHER_S):
             pass
 
 
-def _tell(
-    watcher: Watcher, told: dict[str, Site], now_ns: int, *, is_first: bool = False
+def _report(
+    watcher: Watcher, reported: dict[str, Site], now_ns: int, *, is_first: bool = False
 ) -> dict[str, Site]:
-    news = [site for name, site in watcher.sites.items() if told.get(name) != site]
-    gone = [name for name in told if name not in watcher.sites]
+    news = [site for name, site in watcher.sites.items() if reported.get(name) != site]
+    gone = [name for name in reported if name not in watcher.sites]
     _write({"now_ns": now_ns, "is_whole": is_first, "sites": news, "gone": gone})
     return dict(watcher.sites)
 
@@ -290,7 +310,8 @@ def _write(line: dict[str, Any]) -> None:
 def read_site(found: dict[str, Any]) -> Site:
     """A site of a line."""
     verdict = found.pop("verdict")
-    return Site(**found, verdict=None if verdict is None else Verdict(verdict))
+    alarms = tuple(found.pop("alarms"))
+    return Site(**found, alarms=alarms, verdict=None if verdict is None else Verdict(verdict))
 
 
 def _end_with_input() -> None:

@@ -1,4 +1,4 @@
-"""The parent's end of the process that watches the archive: started, heard, started again.
+"""The parent's end of the process that watches the archive: started, read, started again.
 
 Holds the newest overview and says what is new of it. Belongs to the event loop.
 """
@@ -50,7 +50,7 @@ class Watching:
         self._on_news = on_news
         # What an archive's clock is ahead of this process's steady one.
         self._ahead_ns = time.time_ns() - time.monotonic_ns()
-        self._heard_s = time.monotonic()
+        self._answered_s = time.monotonic()
         self._settings = orjson.dumps({name: getattr(settings, name) for name in _NEEDED})
         self._process: asyncio.subprocess.Process | None = None
         self._tasks: list[asyncio.Task[None]] = []
@@ -62,7 +62,7 @@ class Watching:
 
     def start(self) -> None:
         """Begin to watch."""
-        self._heard_s = time.monotonic()
+        self._answered_s = time.monotonic()
         self._tasks = [
             asyncio.create_task(self._keep(), name="watching"),
             asyncio.create_task(self._mind(), name="minding"),
@@ -113,12 +113,12 @@ class Watching:
         while True:
             await asyncio.sleep(_LOOK_S)
             patience_s = STUCK_S if self.looks else _START_S
-            if time.monotonic() - self._heard_s >= patience_s:
+            if time.monotonic() - self._answered_s >= patience_s:
                 self._down(f"the archive has not answered for {STUCK_S:g} s")
 
     def _take(self, line: bytes) -> None:
         found = orjson.loads(line)
-        self._heard_s = time.monotonic()
+        self._answered_s = time.monotonic()
         self.looks += 1
         if "down" in found:
             self._down(found["down"])

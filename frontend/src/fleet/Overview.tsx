@@ -1,23 +1,30 @@
-/** All greenhouses, the worst first. */
-import { memo, useDeferredValue, useEffect, useMemo, useRef, useState, type JSX } from 'react';
+/** All greenhouses, the worst first; their alarms; and one sensor of several beside each other. */
+import {
+  lazy,
+  Suspense,
+  useDeferredValue,
+  useEffect,
+  useMemo,
+  useRef,
+  useState,
+  type JSX,
+} from 'react';
 
-import { timeOfDay } from '../clock';
-import { LOCALE, S } from '../strings';
-import { HealthMark } from '../ui/HealthMark';
+import { S } from '../strings';
 import type { FleetWords } from '../words/fleet';
+import { Cards, filterText } from './Cards';
 import type { Seen } from './follow';
-import { chosen, countsOf, FILTERS, type Filter, type Site, type Time } from './sites';
+import { alarmCount, chosen, countsOf, FILTERS, groupNames, type Filter } from './sites';
+import { ms, timeText } from './times';
 
-const clockTime = new Intl.DateTimeFormat(LOCALE, { timeStyle: 'medium' });
-const dateAndTime = new Intl.DateTimeFormat(LOCALE, { dateStyle: 'medium', timeStyle: 'short' });
-const DAY_MS = 86_400_000;
+// Loaded when somebody asks for them.
+const Alarms = lazy(() => import('./Alarms'));
+const Compare = lazy(() => import('./Compare'));
 
-/** Of today the time of day is enough. */
-function timeText(at: number): string {
-  return (Math.abs(timeOfDay() - at) < DAY_MS / 2 ? clockTime : dateAndTime).format(at);
-}
+const VIEWS = ['sites', 'alarms', 'compare'] as const;
+type View = (typeof VIEWS)[number];
 
-const ms = ({ sec, nanosec }: Time): number => sec * 1000 + nanosec / 1e6;
+const asked = new URLSearchParams(window.location.search);
 
 interface Props {
   readonly seen: Seen;
@@ -26,12 +33,21 @@ interface Props {
 }
 
 export function Overview({ seen, words, isKiosk }: Props): JSX.Element {
+  const [view, setView] = useState<View>('sites');
   const [filter, setFilter] = useState<Filter>('all');
   const [search, setSearch] = useState('');
+  const [group, setGroup] = useState(asked.get('group') ?? '');
   const field = useRef<HTMLInputElement>(null);
   const sites = useDeferredValue(seen.sites);
   const counts = useMemo(() => countsOf(sites.values()), [sites]);
-  const shown = useMemo(() => chosen(sites, filter, search), [sites, filter, search]);
+  const alarms = useMemo(() => alarmCount(sites.values()), [sites]);
+  const names = groupNames(sites.values()).join();
+  const groups = useMemo(() => (names ? names.split(',') : []), [names]);
+  const shown = useMemo(() => chosen(sites, filter, search, group), [sites, filter, search, group]);
+
+  useEffect(() => {
+    document.title = alarms === 0 ? words.title : S.alarmsTitle(alarms, words.title);
+  }, [alarms, words]);
 
   useEffect(() => {
     const onKey = (event: KeyboardEvent): void => {
@@ -49,8 +65,33 @@ export function Overview({ seen, words, isKiosk }: Props): JSX.Element {
     <div className="fleet" data-kiosk={isKiosk}>
       <header className="fleet-head">
         <h1>{words.title}</h1>
+        {isKiosk && (
+          <span className="fleet-alarms" data-any={alarms > 0}>
+            {alarms === 0 ? words.noAlarms : words.alarms(alarms)}
+          </span>
+        )}
         {!isKiosk && (
           <>
+            <nav className="fleet-filters">
+              {VIEWS.map((each) => (
+                <button
+                  key={each}
+                  type="button"
+                  aria-pressed={view === each}
+                  onClick={() => {
+                    setView(each);
+                  }}
+                >
+                  {each === 'alarms' ? S.alarms : words[each]}
+                  {each === 'alarms' && (
+                    <>
+                      {' '}
+                      <span className="fleet-count">{alarms}</span>
+                    </>
+                  )}
+                </button>
+              ))}
+            </nav>
             <input
               ref={field}
               type="search"
@@ -63,6 +104,21 @@ export function Overview({ seen, words, isKiosk }: Props): JSX.Element {
                 setSearch(event.target.value);
               }}
             />
+            {groups.length > 0 && (
+              <select
+                className="fleet-search"
+                aria-label={words.group}
+                value={groups.includes(group) ? group : ''}
+                onChange={(event) => {
+                  setGroup(event.target.value);
+                }}
+              >
+                <option value="">{words.allGroups}</option>
+                {groups.map((name) => (
+                  <option key={name}>{name}</option>
+                ))}
+              </select>
+            )}
             <div className="fleet-filters" role="group" aria-label={words.filter}>
               {FILTERS.map((each) => (
                 <button
@@ -81,26 +137,26 @@ export function Overview({ seen, words, isKiosk }: Props): JSX.Element {
         )}
       </header>
       <Trouble seen={seen} words={words} />
-      <main aria-label={words.list}>
+      <main aria-label={view === 'alarms' ? words.alarmList : words.list}>
         <p className="unseen" role="status">
-          {search || filter !== 'all' ? words.shown(shown.length, sites.size) : ''}
+          {search || group || filter !== 'all' ? words.shown(shown.length, sites.size) : ''}
         </p>
         {shown.length === 0 ? (
           <p className="fleet-empty">{nothingText(seen, words)}</p>
+        ) : view === 'sites' ? (
+          <Cards shown={shown} groups={groups} words={words} />
         ) : (
-          <ul className="fleet-sites">
-            {shown.map((site) => (
-              <SiteCard key={site.site} site={site} words={words} />
-            ))}
-          </ul>
+          <Suspense fallback={<p className="fleet-empty">{words.connecting}</p>}>
+            {view === 'alarms' ? (
+              <Alarms shown={shown} words={words} />
+            ) : (
+              <Compare shown={shown} words={words} />
+            )}
+          </Suspense>
         )}
       </main>
     </div>
   );
-}
-
-function filterText(filter: Filter, words: FleetWords): string {
-  return filter === 'all' || filter === 'silent' ? words[filter] : S.health[filter];
 }
 
 function nothingText({ archive, sites }: Seen, words: FleetWords): string {
@@ -126,53 +182,4 @@ function Trouble({ seen, words }: { seen: Seen; words: FleetWords }): JSX.Elemen
       {detail && <span lang="en">{detail}</span>}
     </div>
   );
-}
-
-const SiteCard = memo(function SiteCard({
-  site,
-  words,
-}: {
-  site: Site;
-  words: FleetWords;
-}): JSX.Element {
-  const { name, verdict, last_verdict: last, is_live: isLive } = site;
-  return (
-    <li className="fleet-site" data-health={verdict} data-live={isLive}>
-      <a href={`sites/${encodeURIComponent(site.site)}/${window.location.search}`}>
-        <h2>{name}</h2>
-        {isLive ? (
-          <HealthMark verdict={verdict} />
-        ) : (
-          <span className="fleet-silent">{silentText(site, words)}</span>
-        )}
-        {isLive && last === null && <span className="fleet-line">{words.judging}</span>}
-        {!isLive && last !== null && (
-          <span className="fleet-line">
-            {words.lastKnown(S.health[last], alarmsText(site, words))}
-          </span>
-        )}
-        {isLive && (
-          <span className="fleet-alarms" data-any={(site.active_alarms ?? 0) > 0}>
-            {alarmsText(site, words)}
-          </span>
-        )}
-        <span className="fleet-line">
-          {site.last_received
-            ? words.received(timeText(ms(site.last_received)))
-            : words.nothingReceived}
-        </span>
-      </a>
-    </li>
-  );
-});
-
-function silentText({ lag_s: lag }: Site, words: FleetWords): string {
-  return lag === null
-    ? words.neverForwarded
-    : words.silentSince(timeText(Math.round((timeOfDay() - lag * 1000) / 1000) * 1000));
-}
-
-function alarmsText({ active_alarms: count }: Site, words: FleetWords): string {
-  if (count === null) return words.alarmsBeingRead;
-  return count === 0 ? words.noAlarms : words.alarms(count);
 }

@@ -6,8 +6,9 @@ import '../styles/base.css';
 import '../styles/health.css';
 import '../styles/fleet.css';
 import { LANGUAGE } from '../strings';
+import { ErrorBoundary } from '../ui/ErrorBoundary';
 import { fleetWordsOf } from '../words/fleet';
-import { follow } from './follow';
+import { follow, type Seen } from './follow';
 import { Overview } from './Overview';
 
 const words = fleetWordsOf(LANGUAGE);
@@ -28,20 +29,15 @@ if (element) {
   const address = new URL('ws/sites', window.location.href);
   address.protocol = address.protocol.replace('http', 'ws');
   address.search = address.hash = '';
-  follow(address.href, (seen) => {
+  const show = (seen: Seen): void => {
     root.render(
       <StrictMode>
-        <Overview seen={seen} words={words} isKiosk={isKiosk} />
+        <ErrorBoundary kiosk={isKiosk}>
+          <Overview seen={seen} words={words} isKiosk={isKiosk} />
+        </ErrorBoundary>
       </StrictMode>,
     );
-  });
-  root.render(
-    <StrictMode>
-      <Overview
-        seen={{ sites: new Map(), archive: null, lostAt: null }}
-        words={words}
-        isKiosk={isKiosk}
-      />
-    </StrictMode>,
-  );
+  };
+  follow(address.href, show);
+  show({ sites: new Map(), archive: null, lostAt: null });
 }

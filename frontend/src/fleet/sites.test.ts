@@ -1,6 +1,16 @@
 import { expect, test } from 'vitest';
 
-import { chosen, countsOf, parseSites, withFrame, type Site, type SitesFrame } from './sites';
+import {
+  alarmCount,
+  chosen,
+  countsOf,
+  grouped,
+  groupNames,
+  parseSites,
+  withFrame,
+  type Site,
+  type SitesFrame,
+} from './sites';
 
 const site = (name: string, more: Partial<Site> = {}): Site => ({
   site: name,
@@ -11,6 +21,7 @@ const site = (name: string, more: Partial<Site> = {}): Site => ({
   last_received: { sec: 1_700_000_000, nanosec: 0 },
   lag_s: 0.5,
   is_live: true,
+  origin: 'robot',
   ...more,
 });
 const frame = (sites: readonly Site[], more: Partial<SitesFrame> = {}): SitesFrame => ({
@@ -34,6 +45,36 @@ test('the worst come first, then the most alarms, then as people count', () => {
   );
   const shown = chosen(sites, 'all', '').map(({ name }) => name);
   expect(shown).toEqual(['worst', 'a', 'b', 'dark', 'gh2', 'gh10']);
+});
+
+test('sites that share the part of their names before the first hyphen are a group', () => {
+  const sites = of(
+    site('north-1'),
+    site('north-2', { verdict: 'critical', active_alarms: 3 }),
+    site('south-1-a', { verdict: 'stressed', active_alarms: null }),
+    site('south-2'),
+    site('rose-house'),
+    site('gh1'),
+  );
+  const known = groupNames(sites.values());
+  expect(known).toEqual(['north', 'south']);
+  const groups = grouped(chosen(sites, 'all', ''), known);
+  // The worst site decides, and whatever stands alone is together.
+  expect(groups.map((group) => [group.name, group.sites.map(({ site: id }) => id)])).toEqual([
+    ['north', ['north-2', 'north-1']],
+    ['south', ['south-1-a', 'south-2']],
+    ['', ['gh1', 'rose-house']],
+  ]);
+  expect(chosen(sites, 'all', '', 'north').map(({ site: id }) => id)).toEqual([
+    'north-2',
+    'north-1',
+  ]);
+  expect(alarmCount(sites.values())).toBe(3);
+});
+
+test('one group alone is none', () => {
+  expect(groupNames(of(site('gh-1'), site('gh-2')).values())).toEqual([]);
+  expect(groupNames(of(site('gh-1'), site('gh-2'), site('x')).values())).toEqual(['gh']);
 });
 
 test('search and filter go together', () => {

@@ -17,6 +17,8 @@ export interface Site {
   readonly last_received: Time | null;
   readonly lag_s: number | null;
   readonly is_live: boolean;
+  /** Where what it reports comes from. */
+  readonly origin: string;
 }
 
 export interface Archive {
@@ -55,7 +57,8 @@ function isSite(value: unknown): value is Site {
     typeof value['site'] === 'string' &&
     typeof value['name'] === 'string' &&
     VERDICTS.includes(value['verdict']) &&
-    typeof value['is_live'] === 'boolean'
+    typeof value['is_live'] === 'boolean' &&
+    typeof value['origin'] === 'string'
   );
 }
 
@@ -109,11 +112,52 @@ function worstFirst(a: Site, b: Site): number {
   );
 }
 
-/** The sites to show, the worst first. */
-export function chosen(sites: Sites, filter: Filter, search: string): readonly Site[] {
+/** All active alarms of some sites. */
+export const alarmCount = (sites: Iterable<Site>): number =>
+  [...sites].reduce((sum, { active_alarms: count }) => sum + (count ?? 0), 0);
+
+/** What a site shares with others: its name up to the first "-"; none: it stands alone. */
+const prefixOf = ({ site }: Site): string => (site.includes('-') ? (site.split('-')[0] ?? '') : '');
+
+/** The groups that there are, by name; a single one would say nothing. */
+export function groupNames(sites: Iterable<Site>): readonly string[] {
+  const counts = new Map<string, number>();
+  let all = 0;
+  for (const site of sites) {
+    all += 1;
+    const prefix = prefixOf(site);
+    if (prefix) counts.set(prefix, (counts.get(prefix) ?? 0) + 1);
+  }
+  const found = [...counts].filter(([, count]) => count > 1 && count < all);
+  return found.map(([name]) => name).sort(names.compare);
+}
+
+export interface Group {
+  /** Empty: those of no group. */
+  readonly name: string;
+  readonly sites: readonly Site[];
+}
+
+/** Sites in their groups, in the order in which the first of each comes. */
+export function grouped(shown: readonly Site[], known: readonly string[]): readonly Group[] {
+  const groups = new Map<string, Site[]>();
+  const isKnown = new Set(known);
+  for (const site of shown) {
+    const prefix = prefixOf(site);
+    const name = isKnown.has(prefix) ? prefix : '';
+    const there = groups.get(name);
+    if (there) there.push(site);
+    else groups.set(name, [site]);
+  }
+  return [...groups].map(([name, sites]) => ({ name, sites }));
+}
+
+/** The sites to show, the worst first; of one group, unless that is empty. */
+export function chosen(sites: Sites, filter: Filter, search: string, group = ''): readonly Site[] {
   const wanted = search.trim().toLowerCase();
   return [...sites.values()]
     .filter((site) => filter === 'all' || filterOf(site) === filter)
+    .filter((site) => !group || prefixOf(site) === group)
     .filter(
       ({ site, name }) =>
         !wanted || name.toLowerCase().includes(wanted) || site.toLowerCase().includes(wanted),

@@ -26,7 +26,7 @@ def test_a_site_that_is_forwarded_is_live_and_judged(archive: Archive, journal: 
         found = page.site(is_live=True, verdict="healthy", active_alarms=0)
     assert found.keys() == {
         "site", "name", "verdict", "last_verdict", "active_alarms", "last_received", "lag_s",
-        "is_live",
+        "is_live", "origin",
     }  # fmt: skip
     assert abs(found["last_received"]["sec"] - time.time()) < 120
     assert 0 <= found["lag_s"] < 10

@@ -42,6 +42,7 @@ from lupin_twin.journal.salvage import quarantine, salvage
 from lupin_twin.journal.schema import (
     FILE_ERRORS,
     LOCAL_SITE,
+    ORIGIN,
     get_meta,
     open_writer,
     says_damaged,
@@ -156,6 +157,11 @@ class JournalFile:
             for run in self._runs():
                 note_lost(self._connection, run.root, self._last(run).stamp_ns)
             self._connection.execute("DELETE FROM meta WHERE key = ?", (_SALVAGE,))
+
+    def note_origin(self, origin: str) -> None:
+        """Have it in the file where what is recorded from now on comes from."""
+        if get_meta(self._connection, ORIGIN) != origin:
+            set_meta(self._connection, ORIGIN, origin)
 
     # --- runs ---------------------------------------------------------------------------------
 

@@ -318,6 +318,9 @@ def _own_tables() -> frozenset[bytes]:
         return frozenset(sql for (sql,) in new.execute(_SCHEMA))
 
 
+# A fact: where what is recorded comes from, see `core.diagnostics.Origin`.
+ORIGIN: Final = "origin"
+
 # --- one site's rows ------------------------------------------------------------------------------
 
 

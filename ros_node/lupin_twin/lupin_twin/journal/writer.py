@@ -18,6 +18,7 @@ from itertools import islice
 from pathlib import Path
 from typing import Final, NamedTuple
 
+from lupin_twin.core.diagnostics import Origin
 from lupin_twin.core.journal_condition import Condition, JournalState
 from lupin_twin.journal.appending import Stretch
 from lupin_twin.journal.beside import InUse, Lock
@@ -149,7 +150,8 @@ class _Era(NamedTuple):
 class Journal:
     """Records from construction to `close`. Every method is for the thread that hands over.
 
-    `is_temporary`: the file's folder is its own and goes at the end.
+    `origin` is where what is recorded comes from. `is_temporary`: the file's folder is its own and
+    goes at the end.
     """
 
     def __init__(
@@ -159,10 +161,12 @@ class Journal:
         limits: Limits,
         max_weight: int = MAX_WEIGHT,
         *,
+        origin: Origin = "robot",
         is_temporary: bool = False,
     ) -> None:
         self._path = path
         self._holder = holder
+        self._origin = origin
         self._limits = limits
         self._is_temporary = is_temporary
         self._pending = Pending(max_weight)
@@ -296,6 +300,7 @@ class Journal:
         try:
             self._is_sound = True
             self._quarantined = file.quarantined or self._quarantined
+            file.note_origin(self._origin)
             self._simulated = file.simulated
             self._journal_id = file.journal_id
             if self._runs:

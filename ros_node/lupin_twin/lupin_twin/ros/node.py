@@ -170,9 +170,8 @@ class TwinNode(AdjustableNode):
             raise ParameterError(
                 f"parameter journal is empty, and there is no home to keep one in: {error}"
             ) from error
-        journal = open_journal(
-            path, self.get_fully_qualified_name(), p.journal_days, p.journal_max_mb
-        )
+        name = self.get_fully_qualified_name()
+        journal = open_journal(path, name, p.journal_days, p.journal_max_mb, self._world.origin)
         return Memory(self.store, self.history, journal, p.buffer_len)
 
     def _connect(self) -> None:

@@ -20,6 +20,7 @@ from pathlib import Path
 from typing import Final, NamedTuple
 
 from lupin_twin.core import ingest
+from lupin_twin.core.diagnostics import Origin
 from lupin_twin.core.drops import MAX_TEXT_LENGTH, Drop
 from lupin_twin.core.history import KIND_FLOWER, KIND_TAG_READING, History
 from lupin_twin.core.ingest import Pin
@@ -292,16 +293,19 @@ class Memory:
         return self._take(self._journal.take_restored(_START_WAIT_S), now)
 
 
-def open_journal(path: Path | None, holder: str, days: float, max_mb: float) -> Journal:
+def open_journal(
+    path: Path | None, holder: str, days: float, max_mb: float, origin: Origin = "robot"
+) -> Journal:
     """A journal at work; without a path it is in a temporary file, gone at the end.
 
-    `holder` names this process to others.
+    `holder` names this process to others; `origin` is where what it records comes from.
     """
     limits = Limits(days, int(max_mb * 1e6))
     if path is not None:
-        return Journal(path, holder, limits)
+        return Journal(path, holder, limits, origin=origin)
     folder = Path(tempfile.mkdtemp(prefix="lupin-twin-"))
-    return Journal(folder / "journal.sqlite", holder, limits, is_temporary=True)
+    file = folder / "journal.sqlite"
+    return Journal(file, holder, limits, origin=origin, is_temporary=True)
 
 
 def _moved(early: _Early, by_ns: int) -> _Early:

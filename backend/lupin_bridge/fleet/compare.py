@@ -1,0 +1,208 @@
+"""One sensor of several sites on one time axis, in whole hours; the outlier first.
+
+A site's value in a bucket is the mean of all its readings there, whatever their tag. Hours are what
+the log has counted already: reading by reading, a week of fifty sites would take a minute.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from hashlib import blake2b
+from typing import Annotated, Any, Final
+
+import numpy as np
+import orjson
+from annotated_types import Interval
+
+from lupin_bridge.judge.derived import DAILY, DERIVED
+from lupin_bridge.judge.ranges import Sensors
+from lupin_bridge.past import query as past_query
+from lupin_bridge.past.query import OfPeriod, Parameters
+from lupin_bridge.query_string import Name, needed, parameter, read
+from lupin_bridge.serving.admission import REVALIDATE, Answer
+from lupin_bridge.stream.state_json import stamp
+from lupin_twin.core.past import HOUR_NS, Grid, NotRemembered, PastRefused, grid
+from lupin_twin.core.state import NANOSECONDS_PER_SECOND
+
+MAX_SITES: Final = 50
+MAX_DAYS: Final = 31
+MAX_POINTS: Final = 500
+# As a chart of a laptop's width has room for; of a week, each hour.
+_POINTS: Final = 168
+_DAY_NS: Final = 24 * HOUR_NS
+# At worst, s of one core: to read what is compared, and to write it.
+COMPARE_S: Final = 2.0
+# Over sites, in each bucket: between the outer two lies the middle half of them.
+_QUANTILES: Final = (0.25, 0.5, 0.75)
+# Enough for any sensor, and the same however the sums were added up.
+_DIGITS: Final = 9
+
+_HOURS: Final = """
+SELECT site, (hour - %(origin)s) / %(width)s AS bucket, sum(CAST(n ->> place AS BIGINT)),
+    sum(CAST(total ->> place AS DOUBLE PRECISION))
+FROM hour JOIN (
+    SELECT site, series, array_position(
+        ARRAY(SELECT json_array_elements_text(CAST(sensors AS json))), %(sensor)s) - 1 AS place
+    FROM series WHERE site = ANY(%(sites)s) AND kind = 0
+) AS of_sensor USING (site, series)
+WHERE place IS NOT NULL AND hour >= %(origin)s AND hour < %(last)s GROUP BY site, bucket
+"""
+
+
+@dataclass(frozen=True, slots=True)
+class OfSites:
+    """The parameters of `/api/alarms`."""
+
+    sites: str | None = parameter("names with commas between them; default: all")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class OfCompare(OfPeriod):
+    """The parameters of `/api/compare`."""
+
+    sensor_type: Name = needed("name of a sensor, as in a reading")
+    sites: str | None = parameter(f"names with commas between them, {MAX_SITES} at most")
+    points: Annotated[int, Interval(ge=1, le=MAX_POINTS)] = parameter(
+        "at most so many buckets, each of whole hours", _POINTS
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class Compare:
+    """What is compared: `sites` are pairs of a site and its name, `steps` have whole hours."""
+
+    sensor_type: str
+    sites: tuple[tuple[str, str], ...]
+    steps: Grid
+    unit: str
+
+    def read(self, connection: Any) -> Sequence[tuple[str, int, int, float]]:
+        """The count and sum of readings, by site and bucket."""
+        steps = self.steps
+        query = {
+            "sensor": self.sensor_type,
+            "sites": [site for site, _ in self.sites],
+            "origin": steps.start_ns // HOUR_NS,
+            "last": steps.end_ns // HOUR_NS,
+            "width": steps.bucket_ns // HOUR_NS,
+        }
+        found: Sequence[tuple[str, int, int, float]] = connection.execute(_HOURS, query).fetchall()
+        return found
+
+    def answer(self, found: Sequence[tuple[str, int, int, float]]) -> Answer:
+        """The answer of what was read."""
+        return answer_of(self._body(_means(self, found)))
+
+    def _body(self, means: Mapping[str, np.ndarray[Any, np.dtype[np.float64]]]) -> dict[str, Any]:
+        steps = self.steps
+        every = np.stack([means[site] for site, _ in self.sites])
+        quantiles = np.full((len(_QUANTILES), every.shape[1]), math.nan)
+        known = ~np.isnan(every).all(axis=0)
+        quantiles[:, known] = np.nanquantile(every[:, known], _QUANTILES, axis=0)
+        low, median, high = quantiles
+        entries: list[dict[str, Any]] = []
+        for site, name in self.sites:
+            own = means[site][~np.isnan(means[site])]
+            away = (means[site] - median)[~np.isnan(means[site])]
+            entries.append(
+                {
+                    "site": site,
+                    "name": name,
+                    "mean": _number(own.mean()) if own.size else None,
+                    # Also what is too warm by day and too cold by night is an outlier.
+                    "deviation": _number(math.sqrt((away**2).mean())) if own.size else None,
+                    "means": _numbers(means[site]),
+                }
+            )
+        entries.sort(key=_outlier_first)
+        return {
+            "sensor_type": self.sensor_type,
+            "unit": self.unit,
+            "from": stamp(steps.start_ns),
+            "to": stamp(steps.end_ns),
+            "bucket_s": steps.bucket_ns / NANOSECONDS_PER_SECOND,
+            "low": _numbers(low),
+            "median": _numbers(median),
+            "high": _numbers(high),
+            "sites": entries,
+        }
+
+
+def compare(
+    parameters: Parameters, known: Mapping[str, str], now_ns: int, sensors: Sensors
+) -> Compare:
+    """The query of `/api/compare`; `known` has the names of all sites.
+
+    Raises:
+        NotRemembered: see `chosen`.
+        PastRefused: see `past.query.period`; too many sites, too long a period, a derived quantity.
+
+    """
+    given = read(OfCompare, parameters, PastRefused)
+    period = past_query.period(OfCompare, parameters, now_ns)
+    if given.sensor_type in DERIVED or given.sensor_type in DAILY:
+        raise PastRefused(
+            f"sensor_type is {given.sensor_type!r}, which is derived: measured ones are compared"
+        )
+    names = chosen(given.sites, known)
+    if len(names) > MAX_SITES:
+        raise PastRefused(f"sites are {len(names)}, the limit is {MAX_SITES}: name some")
+    end_ns = period.end_ns or now_ns
+    start_ns = period.start_ns if given.from_ is not None else max(0, end_ns - _DAY_NS)
+    if end_ns - start_ns > MAX_DAYS * _DAY_NS:
+        days = (end_ns - start_ns) / _DAY_NS
+        raise PastRefused(f"from and to are {days:.1f} days apart, the limit is {MAX_DAYS}")
+    steps = grid(start_ns, max(end_ns, start_ns + 1), given.points, HOUR_NS)
+    sites = tuple((site, known[site]) for site in names)
+    return Compare(given.sensor_type, sites, steps, sensors.named(given.sensor_type).unit)
+
+
+def answer_of(found: dict[str, Any]) -> Answer:
+    """A JSON body whose ETag is that of its content."""
+    body = orjson.dumps(found)
+    etag = f'"{blake2b(body, digest_size=12).hexdigest()}"'
+    return Answer(body, "application/json", {"ETag": etag, **REVALIDATE})
+
+
+def chosen(text: str | None, known: Mapping[str, object]) -> list[str]:
+    """The sites that are named with commas between them; all, if none is.
+
+    Raises:
+        NotRemembered: one is not in the archive.
+
+    """
+    if text is None:
+        return list(known)
+    names = text.split(",")
+    for name in names:
+        if name not in known:
+            why = f"there is no site {name[:64]!r} in the archive ({len(known)} others are)"
+            raise NotRemembered(why, is_lasting=True)
+    return sorted({*names})
+
+
+def _means(
+    query: Compare, found: Sequence[tuple[str, int, int, float]]
+) -> dict[str, np.ndarray[Any, np.dtype[np.float64]]]:
+    steps = query.steps
+    count = -(-(steps.end_ns - steps.start_ns) // steps.bucket_ns)
+    means = {site: np.full(count, math.nan) for site, _ in query.sites}
+    for site, bucket, n, total in found:
+        if n:
+            means[site][bucket] = total / float(n)
+    return means
+
+
+def _outlier_first(entry: Mapping[str, Any]) -> tuple[float, str]:
+    deviation = entry["deviation"]
+    return math.inf if deviation is None else -deviation, entry["site"]
+
+
+def _number(value: float) -> float | None:
+    return float(f"{value:.{_DIGITS}g}") if math.isfinite(value) else None
+
+
+def _numbers(values: Any) -> list[float | None]:
+    return [_number(value) for value in values]

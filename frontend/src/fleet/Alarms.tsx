@@ -1,0 +1,111 @@
+/** Active alarms of the greenhouses that are shown, the worst first. */
+import { useMemo, type JSX } from 'react';
+
+import { valuesOf, whenText, whereText, type Speech } from '../alarms/words';
+import { timeOfDay } from '../clock';
+import { boolean, count, list, object } from '../contract/check';
+import { ALARM, TEXT } from '../contract/shapes';
+import type { Alarm } from '../contract/types';
+import { secondsOf } from '../domain/rostime';
+import { S } from '../strings';
+import { HealthMark } from '../ui/HealthMark';
+import type { FleetWords } from '../words/fleet';
+import { alarmCount, type Site } from './sites';
+import { useAnswer } from './useAnswer';
+import { useSpeech } from './useSpeech';
+
+interface SiteAlarm extends Alarm {
+  readonly site: string;
+  readonly name: string;
+  readonly is_live: boolean;
+}
+
+const MOST = 200;
+/** So many names are in one address; of more, all alarms are asked for. */
+const MOST_NAMED = 50;
+const EVERY_MS = 10_000;
+
+const FIELDS = object({ site: TEXT, name: TEXT, is_live: boolean });
+const ALARMS = object({
+  alarms: list((value) => FIELDS(value) ?? ALARM(value), MOST),
+  total: count,
+});
+
+interface Props {
+  readonly shown: readonly Site[];
+  readonly words: FleetWords;
+}
+
+export default function Alarms({ shown, words }: Props): JSX.Element {
+  const speech = useSpeech();
+  const having = shown.filter((site) => (site.active_alarms ?? 0) > 0);
+  const named = having.length <= MOST_NAMED ? having.map(({ site }) => site) : [];
+  const path = named.length > 0 ? `api/alarms?sites=${named.join(',')}` : 'api/alarms';
+  // Another count, another list.
+  const news = having.map((site) => `${site.site} ${site.active_alarms ?? 0}`).join();
+  const { value, trouble } = useAnswer<{ alarms: readonly SiteAlarm[] }>(
+    path,
+    ALARMS,
+    EVERY_MS,
+    news,
+  );
+  const rows = useMemo(() => {
+    const sites = new Set(shown.map(({ site }) => site));
+    return value?.alarms.filter(({ site }) => sites.has(site)) ?? [];
+  }, [value, shown]);
+  const all = alarmCount(shown);
+  const isRead = shown.every((site) => site.active_alarms !== null);
+  return (
+    <>
+      {trouble && <p className="fleet-note">{words.notFetched(trouble)}</p>}
+      {all === 0 && (
+        <p className="fleet-empty">{isRead ? words.noAlarms : words.alarmsBeingRead}</p>
+      )}
+      <ul className="fleet-alarm-list">
+        {rows.map((alarm) => (
+          <Row key={`${alarm.site} ${alarm.id}`} alarm={alarm} speech={speech} words={words} />
+        ))}
+      </ul>
+      {value && rows.length < all && (
+        <p className="fleet-note">{words.moreAlarms(all - rows.length)}</p>
+      )}
+    </>
+  );
+}
+
+function Row({
+  alarm,
+  speech,
+  words,
+}: {
+  alarm: SiteAlarm;
+  speech: Speech;
+  words: FleetWords;
+}): JSX.Element {
+  const raised = secondsOf(alarm.raised_at);
+  const { what, worst } = valuesOf(alarm, speech, null);
+  return (
+    <li data-live={alarm.is_live}>
+      <a href={linkOf(alarm, raised)}>
+        <HealthMark verdict={alarm.reason.verdict} />
+        <strong className="fleet-alarm-site">{alarm.name}</strong>
+        <span>{whereText(alarm)}</span>
+        <span className="fleet-alarm-what">
+          {what}
+          {worst !== null && `, ${worst}`}
+        </span>
+        <span className="fleet-line">
+          {S.alarmSince(whenText(raised, timeOfDay() / 1000), null)}
+          {!alarm.is_live && ` (${words.wasLive})`}
+        </span>
+      </a>
+    </li>
+  );
+}
+
+/** The page of its site as it was then, with the tag's card open. */
+function linkOf({ site, tag_id: tag }: SiteAlarm, raised: number): string {
+  const parts = new URLSearchParams({ at: String(raised) });
+  if (tag) parts.set('tag', tag);
+  return `sites/${encodeURIComponent(site)}/${window.location.search}#${parts.toString()}`;
+}

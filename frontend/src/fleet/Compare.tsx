@@ -1,0 +1,231 @@
+/** One sensor of several greenhouses on one time axis: the outlier first. */
+import 'uplot/dist/uPlot.min.css';
+import '../styles/charts.css';
+
+import { useEffect, useLayoutEffect, useMemo, useRef, useState, type JSX } from 'react';
+
+import type { Speech } from '../alarms/words';
+import { lookOf } from '../charts/looks';
+import type { PlotModel } from '../charts/model';
+import { createPlot, type Plot } from '../charts/plot';
+import { timeOfDay } from '../clock';
+import { numberText, readingText } from '../domain/format';
+import { spanOf as periodSpan } from '../domain/period';
+import { rosText } from '../domain/rostime';
+import { isMeasured, type Sensor } from '../domain/sensors';
+import { differenceToShown, unitOf } from '../domain/units';
+import { S } from '../strings';
+import type { FleetWords } from '../words/fleet';
+import {
+  COMPARED,
+  linesOf,
+  MEDIAN_LOOK,
+  MOST_DRAWN,
+  MOST_SITES,
+  spanOf,
+  valueAt,
+  type Compared,
+  type ComparedSite,
+} from './compared';
+import type { Site } from './sites';
+import { useAnswer } from './useAnswer';
+import { useSpeech } from './useSpeech';
+
+const PERIODS = ['day', 'week', 'month'] as const;
+type Period = (typeof PERIODS)[number];
+
+const EVERY_MS = 60_000;
+const HEIGHT = 320;
+/** Drawn unless others are chosen. */
+const DRAWN = 3;
+
+interface Props {
+  readonly shown: readonly Site[];
+  readonly words: FleetWords;
+}
+
+export default function Compare({ shown, words }: Props): JSX.Element {
+  const speech = useSpeech();
+  const { sensors, unit } = speech;
+  const [name, setName] = useState('temperature');
+  const [period, setPeriod] = useState<Period>('day');
+  const [picked, setPicked] = useState<readonly string[] | null>(null);
+  const [at, setAt] = useState<number | null>(null);
+  const compared = shown.slice(0, MOST_SITES);
+  // By name: where the worst one moves, the question stays.
+  const sites = compared.map(({ site }) => site).sort();
+  const hour = Math.floor(timeOfDay() / 3_600_000) * 3600;
+  const { from } = periodSpan({ kind: period }, hour, null);
+  const path = `api/compare?sensor_type=${encodeURIComponent(name)}&from=${from}&sites=${sites.join(',')}`;
+  const { value: found, trouble } = useAnswer<Compared>(path, COMPARED, EVERY_MS);
+  const drawn = useMemo(
+    () => picked ?? found?.sites.slice(0, DRAWN).map(({ site }) => site) ?? [],
+    [picked, found],
+  );
+  const model = useMemo(
+    () =>
+      found && {
+        ...{ sensor: sensors.named(found.sensor_type), unit, span: spanOf(found), moment: null },
+        lines: linesOf(found, drawn, words.median),
+      },
+    [found, drawn, sensors, unit, words],
+  );
+  const toggle = (site: string): void => {
+    setPicked(drawn.includes(site) ? drawn.filter((each) => each !== site) : [...drawn, site]);
+  };
+  return (
+    <section className="fleet-compare" aria-label={words.compare}>
+      <div className="fleet-head">
+        <select
+          className="fleet-search"
+          aria-label={S.sensors}
+          value={name}
+          onChange={(event) => {
+            setName(event.target.value);
+          }}
+        >
+          {sensors.all.filter(isMeasured).map((each) => (
+            <option key={each.name} value={each.name}>
+              {each.label}
+            </option>
+          ))}
+        </select>
+        <div className="fleet-filters" role="group" aria-label={S.timebarPeriod}>
+          {PERIODS.map((each) => (
+            <button
+              key={each}
+              type="button"
+              aria-pressed={period === each}
+              onClick={() => {
+                setPeriod(each);
+              }}
+            >
+              {S.timebarPeriods[each]}
+            </button>
+          ))}
+        </div>
+        {compared.length < shown.length && (
+          <p className="fleet-note">{words.someCompared(compared.length, shown.length)}</p>
+        )}
+      </div>
+      {trouble && <p className="fleet-note">{words.notFetched(trouble)}</p>}
+      {!found && !trouble && <p className="fleet-empty">{S.chartLoading}</p>}
+      {found && model && (
+        <>
+          <Chart model={model} onPoint={setAt} />
+          <p className="fleet-line">
+            <Look place={MEDIAN_LOOK} /> {words.median}
+          </p>
+          <table className="fleet-table">
+            <thead>
+              <tr>
+                <th scope="col" />
+                <th scope="col">{words.sites}</th>
+                <th scope="col">{at === null ? S.chartColumns.mean : rosText(at)}</th>
+                <th scope="col" title={words.deviationHint}>
+                  {words.deviation}
+                </th>
+              </tr>
+            </thead>
+            <tbody>
+              {found.sites.map((site) => (
+                <tr key={site.site}>
+                  <td>
+                    <label className="fleet-draw">
+                      <input
+                        type="checkbox"
+                        aria-label={words.draw(site.name)}
+                        checked={drawn.includes(site.site)}
+                        disabled={!drawn.includes(site.site) && drawn.length >= MOST_DRAWN}
+                        onChange={() => {
+                          toggle(site.site);
+                        }}
+                      />
+                      <Look place={drawn.indexOf(site.site)} />
+                    </label>
+                  </td>
+                  <th scope="row">
+                    <a href={linkOf(site, name)}>{site.name}</a>
+                  </th>
+                  <td>{readingOrNone(model.sensor, valueAt(found, site, at), speech)}</td>
+                  <td>{deviationText(model.sensor, site, speech)}</td>
+                </tr>
+              ))}
+            </tbody>
+          </table>
+        </>
+      )}
+    </section>
+  );
+}
+
+/** A piece of a line. */
+function Look({ place }: { place: number }): JSX.Element | null {
+  if (place < 0) return null;
+  const { colour, dash } = lookOf(place);
+  return (
+    <svg className="fleet-look" width={30} height={3} aria-hidden="true">
+      <path
+        d="M0 1.5H30"
+        stroke={`var(--chart-${colour + 1})`}
+        strokeWidth={2.5}
+        strokeDasharray={dash.join(' ')}
+      />
+    </svg>
+  );
+}
+
+const linkOf = ({ site }: ComparedSite, sensor: string): string =>
+  `sites/${encodeURIComponent(site)}/${window.location.search}#sensor=${encodeURIComponent(sensor)}`;
+
+const readingOrNone = (sensor: Sensor, value: number | null, { unit }: Speech): string =>
+  value === null ? S.chartNothing : readingText(sensor, value, unit);
+
+function deviationText(sensor: Sensor, { deviation }: ComparedSite, { unit }: Speech): string {
+  if (deviation === null) return S.chartNothing;
+  return `${numberText(differenceToShown(sensor, deviation, unit))}\u00a0${unitOf(sensor, unit)}`;
+}
+
+function Chart({
+  model,
+  onPoint,
+}: {
+  model: PlotModel;
+  onPoint: (at: number | null) => void;
+}): JSX.Element {
+  const place = useRef<HTMLDivElement>(null);
+  const plot = useRef<Plot | null>(null);
+  const [width, setWidth] = useState(0);
+  useLayoutEffect(() => {
+    const element = place.current;
+    if (!element) return undefined;
+    const none = (): void => undefined;
+    const mine = createPlot(element, { onPoint, onPick: none, onZoom: none });
+    plot.current = mine;
+    const resize = new ResizeObserver(([entry]) => {
+      if (entry) setWidth(Math.floor(entry.contentRect.width));
+    });
+    resize.observe(element);
+    const system = window.matchMedia('(prefers-color-scheme: dark)');
+    system.addEventListener('change', mine.recolour);
+    return () => {
+      plot.current = null;
+      system.removeEventListener('change', mine.recolour);
+      resize.disconnect();
+      mine.destroy();
+    };
+  }, [onPoint]);
+  useEffect(() => {
+    if (width > 0) plot.current?.show(model, { width, height: HEIGHT });
+  }, [model, width]);
+  return (
+    <div
+      ref={place}
+      className="plot-place"
+      role="img"
+      aria-label={S.chartOf(model.sensor.label)}
+      style={{ height: HEIGHT }}
+      data-testid="plot"
+    />
+  );
+}

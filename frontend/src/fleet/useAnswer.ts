@@ -1,0 +1,49 @@
+/** An answer of the server that is kept up to date while the page is looked at. */
+import { useEffect, useState } from 'react';
+
+import { get, read } from '../contract/api';
+import type { Check } from '../contract/check';
+
+export interface Fetched<T> {
+  /** The last one that came; null: none yet. */
+  readonly value: T | null;
+  /** Why there is no newer one; empty: there is. */
+  readonly trouble: string;
+}
+
+/** What is asked for changes faster than anybody reads. */
+const SETTLE_MS = 300;
+
+/** Asks at once, when `path` or `news` is another, and every so many ms. `check` has to be one. */
+export function useAnswer<T>(
+  path: string,
+  check: Check,
+  everyMs: number,
+  news: unknown = null,
+): Fetched<T> {
+  const [fetched, setFetched] = useState<Fetched<T>>({ value: null, trouble: '' });
+  useEffect(() => {
+    const leaving = new AbortController();
+    let timer: ReturnType<typeof setTimeout> | undefined;
+    const ask = async (): Promise<void> => {
+      try {
+        if (document.visibilityState === 'visible') {
+          const response = await get(path, leaving.signal);
+          const value = await read<T>('answer', check, response);
+          setFetched({ value, trouble: '' });
+        }
+      } catch (error) {
+        if (leaving.signal.aborted) return;
+        const trouble = error instanceof Error ? error.message : String(error);
+        setFetched(({ value }) => ({ value, trouble }));
+      }
+      if (!leaving.signal.aborted) timer = setTimeout(() => void ask(), everyMs);
+    };
+    timer = setTimeout(() => void ask(), SETTLE_MS);
+    return () => {
+      clearTimeout(timer);
+      leaving.abort();
+    };
+  }, [path, check, everyMs, news]);
+  return fetched;
+}

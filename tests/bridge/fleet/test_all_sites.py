@@ -1,0 +1,229 @@
+"""Alarms of all sites, the worst first; one sensor of several, the outlier first."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from lupin_bridge.fleet.overview import MAX_LISTED
+from lupin_bridge.fleet.watcher import MAX_ALARMS
+from lupin_twin.journal.rows import Row
+from tests.support.archive import Archive, forward_once
+from tests.support.fleet import Page, fleet, scans_lately, wall, write
+from tests.support.journal import SECOND, scan
+from tests.support.waiting import wait_for
+
+HOUR_S = 3600
+
+
+def forward(archive: Archive, folder: Path, sites: Mapping[str, Iterable[Row]]) -> None:
+    """Each from a journal of its own."""
+    for site, rows in sites.items():
+        journal = folder / f"{site}.sqlite"
+        write(journal, list(rows))
+        forward_once(archive.of_site(site), journal)
+
+
+def alarms(page: Page, sites: str = "") -> dict[str, Any]:
+    answer = page.http.get("/api/alarms", params={"sites": sites} if sites else {})
+    assert answer.status_code == 200, answer.text
+    found: dict[str, Any] = answer.json()
+    return found
+
+
+def test_alarms_of_all_sites_the_worst_first(archive: Archive, tmp_path: Path) -> None:
+    forward(
+        archive,
+        tmp_path,
+        {
+            "gh1": scans_lately(temperature=28.0, tags=2),
+            "gh2": scans_lately(temperature=45.0, tags=1),
+            "well": scans_lately(temperature=22.0),
+        },
+    )
+    with fleet(archive) as page:
+        page.site("gh1", active_alarms=2)
+        page.site("gh2", active_alarms=1)
+        page.site("well", active_alarms=0)
+        found = alarms(page)
+        said = [(it["site"], it["tag_id"], it["reason"]["verdict"]) for it in found["alarms"]]
+        assert said[0] == ("gh2", "0", "critical")
+        assert sorted(said[1:]) == [("gh1", "0", "stressed"), ("gh1", "1", "stressed")]
+        assert found["total"] == sum(site["active_alarms"] for site in page.sites().values())
+        # The newest first among equals.
+        raised = [it["raised_at"] for it in found["alarms"][1:]]
+        assert raised == sorted(raised, key=lambda at: (-at["sec"], -at["nanosec"]))
+        # As the site itself has it, with who it is of in front.
+        first = dict(found["alarms"][0])
+        assert (first.pop("site"), first.pop("name")) == ("gh2", "gh2")
+        assert first.pop("is_live") in (True, False)
+        wait_for(
+            lambda: first in page.http.get("/sites/gh2/api/alarms").json()["alarms"],
+            f"the same alarm below its site's path: {first}",
+        )
+        assert [it["site"] for it in alarms(page, "gh1,well")["alarms"]] == ["gh1", "gh1"]
+        assert alarms(page, "well") == {"alarms": [], "total": 0}
+
+
+def test_alarms_that_are_over_are_gone_and_the_etag_says_so(
+    archive: Archive, tmp_path: Path
+) -> None:
+    forward(archive, tmp_path, {"gh1": scans_lately(temperature=45.0, tags=1)})
+    with fleet(archive) as page:
+        page.site(active_alarms=1)
+        etag = page.http.get("/api/alarms").headers["etag"]
+        again = page.http.get("/api/alarms", headers={"If-None-Match": etag})
+        assert again.status_code == 304
+        now_ns = wall().stamp_ns
+        cool = [scan("0", now_ns + at, temperature=22.0) for at in range(3)]
+        forward(archive, tmp_path, {"gh1": cool})
+        page.site(active_alarms=0)
+        assert alarms(page) == {"alarms": [], "total": 0}
+
+
+def test_there_are_so_many_of_a_site_and_in_all_and_the_rest_is_counted(
+    archive: Archive, tmp_path: Path
+) -> None:
+    many = MAX_LISTED // MAX_ALARMS + 1
+    hot = {f"gh{n}": scans_lately(temperature=45.0, tags=MAX_ALARMS + 1) for n in range(many)}
+    forward(archive, tmp_path, hot)
+    with fleet(archive) as page:
+        for site in hot:
+            page.site(site, active_alarms=MAX_ALARMS + 1)
+        found = alarms(page)
+        assert len(found["alarms"]) == MAX_LISTED
+        assert found["total"] == many * (MAX_ALARMS + 1)
+        assert len(alarms(page, "gh1")["alarms"]) == MAX_ALARMS
+
+
+# --- comparing ------------------------------------------------------------------------------------
+
+
+def hours_ago(hours: int, temperature: float, tags: int = 2) -> list[Row]:
+    """A scan of each tag in the middle of an hour, so many hours before this one."""
+    middle_s = (int(time.time()) // HOUR_S - hours) * HOUR_S + HOUR_S // 2
+    return [
+        scan(str(tag), middle_s * SECOND + tag, temperature=temperature + tag, humidity=60.0)
+        for tag in range(tags)
+    ]
+
+
+def day(temperature: float) -> list[Row]:
+    return [row for hours in (3, 2, 1) for row in hours_ago(hours, temperature)]
+
+
+def compared(page: Page, **query: str) -> dict[str, Any]:
+    answer = page.http.get("/api/compare", params={"sensor_type": "temperature", **query})
+    assert answer.status_code == 200, answer.text
+    found: dict[str, Any] = answer.json()
+    return found
+
+
+def known(values: list[float | None]) -> list[float]:
+    return [value for value in values if value is not None]
+
+
+def test_one_sensor_of_several_sites_the_outlier_first(archive: Archive, tmp_path: Path) -> None:
+    sites = {"a": day(20.0), "b": day(21.0), "c": day(22.0), "odd": day(35.0), "empty": []}
+    sites["empty"] = [scan("0", wall().stamp_ns - SECOND, humidity=50.0)]
+    forward(archive, tmp_path, sites)
+    with fleet(archive) as page:
+        for site in sites:
+            page.site(site)
+        found = compared(page)
+        assert [it["site"] for it in found["sites"]] == ["odd", "a", "b", "c", "empty"]
+        assert found["unit"] == "°C"
+        assert found["bucket_s"] == HOUR_S
+        odd, empty = found["sites"][0], found["sites"][-1]
+        # Two tags, of which one is a degree warmer.
+        assert known(odd["means"]) == [35.5, 35.5, 35.5]
+        assert odd["mean"] == 35.5
+        assert odd["deviation"] == pytest.approx(35.5 - 22.0)
+        assert (empty["mean"], empty["deviation"], known(empty["means"])) == (None, None, [])
+        # numpy's linear quantiles of 20.5, 21.5, 22.5, 35.5.
+        assert known(found["median"]) == [22.0] * 3
+        assert known(found["low"]) == pytest.approx([21.25] * 3)
+        assert known(found["high"]) == pytest.approx([25.75] * 3)
+        start_s, end_s = found["from"]["sec"], found["to"]["sec"]
+        assert len(found["median"]) == (end_s - start_s) / HOUR_S
+        places = [n for n, value in enumerate(odd["means"]) if value is not None]
+        this_hour_s = int(time.time()) // HOUR_S * HOUR_S
+        assert [this_hour_s - (start_s + n * HOUR_S) for n in places] == pytest.approx(
+            [3 * HOUR_S, 2 * HOUR_S, HOUR_S], abs=HOUR_S
+        )
+
+
+def test_what_is_compared_can_be_chosen(archive: Archive, tmp_path: Path) -> None:
+    forward(archive, tmp_path, {"a": day(20.0), "b": day(30.0), "c": day(25.0)})
+    with fleet(archive) as page:
+        for site in ("a", "b", "c"):
+            page.site(site)
+        two = compared(page, sites="b,a")
+        assert [it["site"] for it in two["sites"]] == ["a", "b"]
+        assert known(two["median"]) == [25.5] * 3
+        humid = page.http.get("/api/compare", params={"sensor_type": "humidity"}).json()
+        assert {it["mean"] for it in humid["sites"]} == {60.0}
+        now_s = int(time.time())
+        # The hour before this one, alone.
+        last = compared(page, **{"from": str(now_s // HOUR_S * HOUR_S - HOUR_S), "points": "1"})
+        assert len(last["median"]) == 1
+        assert math.isclose(last["sites"][0]["mean"], known(last["sites"][0]["means"])[0])
+        etag = page.http.get("/api/compare?sensor_type=humidity&to=2000000000&from=1999990000")
+        again = page.http.get(str(etag.url), headers={"If-None-Match": etag.headers["etag"]})
+        assert again.status_code == 304
+
+
+@pytest.mark.parametrize(
+    ("route", "said"),
+    [
+        ("alarms?site=gh1", "parameter 'site' is unknown, expected sites"),
+        ("compare", "sensor_type"),
+        ("compare?sensor_type=vpd", "sensor_type is 'vpd', which is derived"),
+        ("compare?sensor_type=a&points=501", "points is '501'"),
+        ("compare?sensor_type=a&from=0&to=2678401", "31.0 days apart, the limit is 31"),
+        ("compare?sensor_type=a&from=5&to=4", "to is 4.000000000 s, before from"),
+        ("compare?sensor_type=a&from=soon", "from is 'soon'"),
+    ],
+)
+def test_bad_queries_are_refused_in_a_line(
+    archive: Archive, tmp_path: Path, route: str, said: str
+) -> None:
+    forward(archive, tmp_path, {"gh1": scans_lately()})
+    with fleet(archive) as page:
+        page.site("gh1")
+        answer = page.http.get(f"/api/{route}")
+        assert answer.status_code == 400
+        assert said in answer.json()["detail"]
+
+
+@pytest.mark.parametrize("route", ["alarms?sites=", "compare?sensor_type=temperature&sites=gh1,"])
+def test_a_site_that_is_not_there_is_named(archive: Archive, route: str) -> None:
+    archive.do("INSERT INTO site VALUES ('gh1', '')")
+    with fleet(archive) as page:
+        page.site("gh1")
+        answer = page.http.get(f"/api/{route}nowhere")
+        assert answer.status_code == 404
+        assert answer.json()["detail"] == "there is no site 'nowhere' in the archive (1 others are)"
+
+
+def test_more_sites_than_can_be_compared_are_refused(archive: Archive) -> None:
+    archive.do("INSERT INTO site SELECT 'gh' || n, '' FROM generate_series(1, 51) AS n")
+    with fleet(archive) as page:
+        wait_for(lambda: len(page.sites()) == 51, "51 sites")
+        answer = page.http.get("/api/compare?sensor_type=temperature")
+        assert answer.status_code == 400
+        assert "sites are 51, the limit is 50" in answer.json()["detail"]
+
+
+def test_the_sensors_in_force_are_those_of_a_bridge(archive: Archive, tmp_path: Path) -> None:
+    forward(archive, tmp_path, {"gh1": scans_lately()})
+    with fleet(archive) as page:
+        page.site("gh1")
+        sensors = page.http.get("/api/sensors")
+        assert sensors.json()["sensors"]["temperature"]["unit"] == "°C"
+        assert sensors.content == page.http.get("/sites/gh1/api/sensors").content

@@ -24,7 +24,6 @@ export const CHARTS: In<typeof ENGLISH> = {
   chartMissingShort: 'Kein Verlauf: Dieser Zwilling zeichnet nichts auf.',
   chartNoTime: 'Der Zwilling kennt noch keine Zeit und damit keine Vergangenheit.',
   chartNoSensors: 'Dieser Messpunkt hat keinen Sensor.',
-  chartNoTags: 'Kein Messpunkt hat diesen Sensor.',
   chartTable: 'Als Tabelle zeigen',
   chartPlots: 'Als Verlauf zeigen',
   chartZoomIn: 'Vergrößern',
@@ -35,9 +34,6 @@ export const CHARTS: In<typeof ENGLISH> = {
   chartAddTag: 'Messpunkt hinzufügen',
   chartRemoveTag: (tag) => `Messpunkt ${tag} aus dem Verlauf entfernen`,
   chartWhich: 'Tabelle von',
-  chartKeys: { ideal: 'ideal', range: 'kleinster bis größter', gap: 'es kam nichts' },
-  chartFailure: 'fehlgeschlagener Versuch',
-  chartLook: 'Blütenkontrolle',
   chartHint: 'Ziehen: vergrößern. Klicken: das Haus zu dieser Zeit.',
   chartTableCaption: (label, sensor, span) => `${label}, ${sensor}, ${span}`,
   chartColumns: {

@@ -28,7 +28,6 @@ export const CHARTS = {
   chartMissingShort: 'No chart: this twin records nothing.',
   chartNoTime: 'The twin has no time yet, and so no past.',
   chartNoSensors: 'This tag has no sensor.',
-  chartNoTags: 'No tag has this sensor.',
   chartTable: 'Show as table',
   chartPlots: 'Show as charts',
   chartZoomIn: 'Zoom in',
@@ -39,9 +38,6 @@ export const CHARTS = {
   chartAddTag: 'Add a tag',
   chartRemoveTag: (tag: string): string => `Remove tag ${tag} from the chart`,
   chartWhich: 'Table of',
-  chartKeys: { ideal: 'ideal', range: 'lowest to highest', gap: 'nothing came' },
-  chartFailure: 'failed try',
-  chartLook: 'look at the flowers',
   chartHint: 'Drag: zoom. Click: the greenhouse as of then.',
   chartTableCaption: (label: string, sensor: string, span: string): string =>
     `${label}, ${sensor}, ${span}`,

@@ -24,7 +24,6 @@ export const CHARTS: In<typeof ENGLISH> = {
   chartMissingShort: 'Sin gráfica: este gemelo no registra nada.',
   chartNoTime: 'El gemelo aún no sabe la hora y, por tanto, no tiene pasado.',
   chartNoSensors: 'Este punto no tiene sensores.',
-  chartNoTags: 'Ningún punto tiene este sensor.',
   chartTable: 'Mostrar como tabla',
   chartPlots: 'Mostrar como gráfica',
   chartZoomIn: 'Acercar',
@@ -35,9 +34,6 @@ export const CHARTS: In<typeof ENGLISH> = {
   chartAddTag: 'Añadir un punto',
   chartRemoveTag: (tag) => `Quitar el punto ${tag} de la gráfica`,
   chartWhich: 'Tabla de',
-  chartKeys: { ideal: 'ideal', range: 'de mínimo a máximo', gap: 'no llegó nada' },
-  chartFailure: 'intento fallido',
-  chartLook: 'revisión de flores',
   chartHint: 'Arrastrar: acercar. Clic: el invernadero en ese momento.',
   chartTableCaption: (label, sensor, span) => `${label}, ${sensor}, ${span}`,
   chartColumns: {

@@ -24,7 +24,6 @@ export const CHARTS: In<typeof ENGLISH> = {
   chartMissingShort: 'Geen grafiek: deze tweeling legt niets vast.',
   chartNoTime: 'De tweeling weet nog geen tijd, en heeft dus geen verleden.',
   chartNoSensors: 'Dit meetpunt heeft geen sensor.',
-  chartNoTags: 'Geen meetpunt heeft deze sensor.',
   chartTable: 'Als tabel tonen',
   chartPlots: 'Als grafiek tonen',
   chartZoomIn: 'Inzoomen',
@@ -35,9 +34,6 @@ export const CHARTS: In<typeof ENGLISH> = {
   chartAddTag: 'Meetpunt toevoegen',
   chartRemoveTag: (tag) => `Meetpunt ${tag} uit de grafiek halen`,
   chartWhich: 'Tabel van',
-  chartKeys: { ideal: 'ideaal', range: 'laagste tot hoogste', gap: 'er kwam niets' },
-  chartFailure: 'mislukte poging',
-  chartLook: 'bloemcontrole',
   chartHint: 'Slepen: inzoomen. Klikken: de kas op dat moment.',
   chartTableCaption: (label, sensor, span) => `${label}, ${sensor}, ${span}`,
   chartColumns: {

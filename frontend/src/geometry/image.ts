@@ -1,5 +1,5 @@
 import type { OccupancyGrid } from '../contract/types';
-import { mapPoint, type Bounds, type MapPoint, type View } from './coordinates';
+import { mapPoint, type MapPoint, type View } from './coordinates';
 
 /** Canvas transform (a, b, c, d, e, f) as CanvasRenderingContext2D.setTransform takes it. */
 export type Affine = readonly [number, number, number, number, number, number];

@@ -55,6 +55,15 @@ export const ALARMS: In<typeof ENGLISH> = {
   alarmsNew: (count) => `${count} nieuw`,
   alarmsNewHint: 'De volgorde blijft zolang u in de lijst bent. Nieuwe tonen',
   alarmMore: (count) => `Nog ${count} tonen`,
+  alarmFilter: 'Alarmen filteren',
+  alarmFilterHint: 'meetpunt, oorzaak …',
+  alarmOrder: 'Volgorde',
+  alarmOrders: { cause: 'Per oorzaak', newest: 'Nieuwste eerst', tag: 'Per meetpunt' },
+  alarmSaveCsv: 'Alarmen opslaan als CSV',
+  alarmsNoMatch: 'Geen alarm past bij het filter.',
+  alarmCount: (count) => counted(count, 'alarm', 'alarmen'),
+  alarmTags: (tags, more) =>
+    `${tags.length === 1 ? 'Meetpunt' : 'Meetpunten'} ${tags.join(', ')}${more > 0 ? ` en nog ${more}` : ''}`,
   alarmsNone: 'Geen alarm actief',
   alarmsNoneHint:
     'Een alarm komt als er bij twee metingen na elkaar iets niet klopt. Bij een plaag, of als de kas niets meer stuurt, komt het meteen.',

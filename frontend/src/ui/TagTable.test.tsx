@@ -63,8 +63,8 @@ describe('table', () => {
     expect(row('10').dataset['health']).toBe('critical');
     expect(row('2').dataset['health']).toBe('unknown');
     const why = row('9').querySelector('.cell-health');
-    expect(why?.getAttribute('title')).toBe('Humidity: the sensor gives no value');
-    expect(why?.textContent).toBe('Stressed: Humidity: the sensor gives no value');
+    expect(why?.getAttribute('title')).toBe('Humidity: the sensor returns no value');
+    expect(why?.textContent).toBe('Stressed: Humidity: the sensor returns no value');
   });
 
   test('sorts by a column, up and down, and says so', () => {
@@ -146,7 +146,7 @@ describe('table', () => {
       });
     });
     expect(trends()).toEqual([
-      '\u2197 Temperature against an hour ago: +1.5\u00a0°C',
+      '\u2197 Temperature compared with an hour ago: +1.5\u00a0°C',
       '– no reading an hour ago',
     ]);
     // An answer of long ago is none.

@@ -178,7 +178,7 @@ test('it is of now, and says so while another moment is shown', () => {
     receive({ type: 'past', past: { at: 50, house: NO_HOUSE } });
   });
   expect(notes()).toEqual(['now']);
-  expect(screen.getByText(/alarms of now.*sim 00:00:50/)).toBeTruthy();
+  expect(screen.getByText(/current alarms.*sim 00:00:50/)).toBeTruthy();
   expect(group('active')).toHaveLength(1);
 });
 

@@ -3,6 +3,7 @@ import { useState, type JSX } from 'react';
 import {
   alarmsCsv,
   arranged,
+  causeFacts,
   filtered,
   ORDERS,
   type Block,
@@ -211,6 +212,7 @@ function CauseHeading({
           <span>
             <strong>{cause}</strong> · {S.alarmCount(items.length)}
           </span>
+          <span className="alarm-facts">{texts.join(', ')}</span>
           <span className="alarm-facts faint">
             {S.alarmTags(named, tags.length - named.length)}
           </span>

@@ -74,7 +74,7 @@ export const ALARMS: In<typeof ENGLISH> = {
   alarmsHeard: (since) =>
     `Es wird nichts aufgezeichnet: Alarme von vor ${since} sind nicht bekannt.`,
   alarmsLost: (clock) => `Stand von ${clock}. Was seither kam, ist nicht bekannt.`,
-  alarmsOfNow: (moment) => `Das sind die Alarme von jetzt. Der Rest der Seite zeigt ${moment}.`,
+  alarmsOfNow: (moment) => `Das sind die aktuellen Alarme. Der Rest der Seite zeigt ${moment}.`,
   alarmsMine: '„Quittiert“ und „zurückgestellt“ gelten nur in diesem Browser.',
 
   alarmTell: 'Alarme melden',

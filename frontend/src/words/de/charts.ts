@@ -14,9 +14,9 @@ export const CHARTS: In<typeof ENGLISH> = {
     `zwischen ${low} und ${high}, ${gaps === 0 ? 'keine Lücke' : counted(gaps, 'Lücke', 'Lücken')}.`,
   chartEmpty: 'Kein Messwert in diesem Zeitraum.',
   chartNothing: '–',
-  chartLoading: 'Die Vergangenheit kommt gleich',
+  chartLoading: 'Die Vergangenheit wird geladen',
   chartFailed: (reason) => `Die Vergangenheit konnte nicht geladen werden: ${reason}`,
-  chartMissing: 'Dieser Zwilling bewahrt keine Vergangenheit auf.',
+  chartMissing: 'Dieser Zwilling zeichnet nichts auf.',
   chartMissingHint:
     'Verläufe brauchen eine Aufzeichnung. Bis dahin zeigt der Messpunkt nur seine letzten Messungen.',
   chartMissingMore:
@@ -34,7 +34,7 @@ export const CHARTS: In<typeof ENGLISH> = {
   chartAddTag: 'Messpunkt hinzufügen',
   chartRemoveTag: (tag) => `Messpunkt ${tag} aus dem Verlauf entfernen`,
   chartWhich: 'Tabelle von',
-  chartHint: 'Ziehen: vergrößern. Klicken: das Haus zu dieser Zeit.',
+  chartHint: 'Ziehen zum Vergrößern; klicken, um zu dieser Zeit zu springen.',
   chartTableCaption: (label, sensor, span) => `${label}, ${sensor}, ${span}`,
   chartColumns: {
     time: 'Zeit',
@@ -46,8 +46,8 @@ export const CHARTS: In<typeof ENGLISH> = {
     max: 'Größter',
     event: 'Ereignis',
   },
-  chartGap: (length) => `${length} lang kam nichts`,
-  missing: { not_kept: 'nicht mehr aufbewahrt', not_recorded: 'nicht aufgezeichnet' },
+  chartGap: (length) => `${length} lang keine Daten`,
+  missing: { not_kept: 'nicht mehr gespeichert', not_recorded: 'nicht aufgezeichnet' },
   chartFailures: (count) => counted(count, 'fehlgeschlagener Versuch', 'fehlgeschlagene Versuche'),
   chartLooks: (count) => counted(count, 'Blütenkontrolle', 'Blütenkontrollen'),
 };

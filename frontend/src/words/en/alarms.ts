@@ -81,7 +81,7 @@ export const ALARMS = {
   alarmsLost: (clock: string): string =>
     `As last received at ${clock}. What has happened since is not known.`,
   alarmsOfNow: (moment: string): string =>
-    `These are the alarms of now. The rest of the page shows ${moment}.`,
+    `These are the current alarms. The rest of the page shows ${moment}.`,
   alarmsMine: '“Acknowledged” and “shelved” apply in this browser only.',
 
   alarmTell: 'Notify me of alarms',

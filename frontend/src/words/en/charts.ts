@@ -19,10 +19,10 @@ export const CHARTS = {
     `between ${low} and ${high}, ${gaps === 0 ? 'no gap' : counted(gaps, 'gap', 'gaps')}.`,
   chartEmpty: 'No reading in this period.',
   chartNothing: '–',
-  chartLoading: 'The past is on its way',
-  chartFailed: (reason: string): string => `The past could not be fetched: ${reason}`,
-  chartMissing: 'This twin keeps no past.',
-  chartMissingHint: 'Charts need its recording. Until then the card shows the last scans alone.',
+  chartLoading: 'Loading the past',
+  chartFailed: (reason: string): string => `The past could not be loaded: ${reason}`,
+  chartMissing: 'This twin records nothing.',
+  chartMissingHint: 'Charts need a recording. Until then, the card shows only the last scans.',
   chartMissingMore:
     'Start the twin without “journal:=off”, or name a file in the parameter “journal”.',
   chartMissingShort: 'No chart: this twin records nothing.',
@@ -38,7 +38,7 @@ export const CHARTS = {
   chartAddTag: 'Add a tag',
   chartRemoveTag: (tag: string): string => `Remove tag ${tag} from the chart`,
   chartWhich: 'Table of',
-  chartHint: 'Drag: zoom. Click: the greenhouse as of then.',
+  chartHint: 'Drag to zoom; click to go to that time.',
   chartTableCaption: (label: string, sensor: string, span: string): string =>
     `${label}, ${sensor}, ${span}`,
   chartColumns: {
@@ -51,9 +51,8 @@ export const CHARTS = {
     max: 'Highest',
     event: 'Event',
   },
-  chartGap: (length: string): string => `nothing came for ${length}`,
-  missing: { not_kept: 'no longer kept', not_recorded: 'not recorded' },
-  chartFailures: (count: number): string => counted(count, 'failed try', 'failed tries'),
-  chartLooks: (count: number): string =>
-    counted(count, 'look at the flowers', 'looks at the flowers'),
+  chartGap: (length: string): string => `no data for ${length}`,
+  missing: { not_kept: 'no longer stored', not_recorded: 'not recorded' },
+  chartFailures: (count: number): string => counted(count, 'failed attempt', 'failed attempts'),
+  chartLooks: (count: number): string => counted(count, 'flower inspection', 'flower inspections'),
 } as const;

@@ -74,7 +74,7 @@ export const ALARMS: In<typeof ENGLISH> = {
   alarmsLost: (clock) =>
     `Según lo último recibido a las ${clock}. Lo ocurrido desde entonces no se conoce.`,
   alarmsOfNow: (moment) =>
-    `Estas son las alarmas de ahora. El resto de la página muestra ${moment}.`,
+    `Estas son las alarmas actuales. El resto de la página muestra ${moment}.`,
   alarmsMine: '«Reconocida» y «aplazada» valen solo en este navegador.',
 
   alarmTell: 'Avisarme de las alarmas',

@@ -14,9 +14,9 @@ export const CHARTS: In<typeof ENGLISH> = {
     `entre ${low} y ${high}, ${gaps === 0 ? 'sin huecos' : counted(gaps, 'hueco', 'huecos')}.`,
   chartEmpty: 'No hay lecturas en este periodo.',
   chartNothing: '–',
-  chartLoading: 'El pasado está en camino',
-  chartFailed: (reason) => `No se pudo obtener el pasado: ${reason}`,
-  chartMissing: 'Este gemelo no guarda el pasado.',
+  chartLoading: 'Cargando el pasado',
+  chartFailed: (reason) => `No se pudo cargar el pasado: ${reason}`,
+  chartMissing: 'Este gemelo no registra nada.',
   chartMissingHint:
     'Las gráficas necesitan un registro. Hasta entonces la ficha muestra solo las últimas mediciones.',
   chartMissingMore:
@@ -34,7 +34,7 @@ export const CHARTS: In<typeof ENGLISH> = {
   chartAddTag: 'Añadir un punto',
   chartRemoveTag: (tag) => `Quitar el punto ${tag} de la gráfica`,
   chartWhich: 'Tabla de',
-  chartHint: 'Arrastrar: acercar. Clic: el invernadero en ese momento.',
+  chartHint: 'Arrastre para acercar; haga clic para ir a ese momento.',
   chartTableCaption: (label, sensor, span) => `${label}, ${sensor}, ${span}`,
   chartColumns: {
     time: 'Hora',
@@ -46,7 +46,7 @@ export const CHARTS: In<typeof ENGLISH> = {
     max: 'Máximo',
     event: 'Suceso',
   },
-  chartGap: (length) => `no llegó nada durante ${length}`,
+  chartGap: (length) => `sin datos durante ${length}`,
   missing: { not_kept: 'ya no se conserva', not_recorded: 'sin registro' },
   chartFailures: (count) => counted(count, 'intento fallido', 'intentos fallidos'),
   chartLooks: (count) => counted(count, 'revisión de flores', 'revisiones de flores'),

@@ -71,7 +71,7 @@ export const ALARMS: In<typeof ENGLISH> = {
   alarmsStarting: 'Het verleden wordt nog gelezen: er kunnen alarmen bijkomen.',
   alarmsHeard: (since) => `Er wordt niets opgenomen: alarmen van voor ${since} zijn niet bekend.`,
   alarmsLost: (clock) => `Stand van ${clock}. Wat er sindsdien kwam, is niet bekend.`,
-  alarmsOfNow: (moment) => `Dit zijn de alarmen van nu. De rest van de pagina toont ${moment}.`,
+  alarmsOfNow: (moment) => `Dit zijn de huidige alarmen. De rest van de pagina toont ${moment}.`,
   alarmsMine: '“Bevestigd” en “uitgesteld” gelden alleen in deze browser.',
 
   alarmTell: 'Alarmen melden',

@@ -14,9 +14,9 @@ export const CHARTS: In<typeof ENGLISH> = {
     `tussen ${low} en ${high}, ${gaps === 0 ? 'geen gat' : counted(gaps, 'gat', 'gaten')}.`,
   chartEmpty: 'Geen meetwaarde in deze periode.',
   chartNothing: '–',
-  chartLoading: 'Het verleden komt eraan',
-  chartFailed: (reason) => `Het verleden kon niet worden opgehaald: ${reason}`,
-  chartMissing: 'Deze tweeling bewaart geen verleden.',
+  chartLoading: 'Het verleden wordt geladen',
+  chartFailed: (reason) => `Het verleden kon niet worden geladen: ${reason}`,
+  chartMissing: 'Deze tweeling legt niets vast.',
   chartMissingHint:
     'Grafieken hebben vastgelegde gegevens nodig. Tot die er zijn, staan hier alleen de laatste metingen.',
   chartMissingMore:
@@ -34,7 +34,7 @@ export const CHARTS: In<typeof ENGLISH> = {
   chartAddTag: 'Meetpunt toevoegen',
   chartRemoveTag: (tag) => `Meetpunt ${tag} uit de grafiek halen`,
   chartWhich: 'Tabel van',
-  chartHint: 'Slepen: inzoomen. Klikken: de kas op dat moment.',
+  chartHint: 'Sleep om in te zoomen; klik om naar dat moment te gaan.',
   chartTableCaption: (label, sensor, span) => `${label}, ${sensor}, ${span}`,
   chartColumns: {
     time: 'Tijd',
@@ -46,7 +46,7 @@ export const CHARTS: In<typeof ENGLISH> = {
     max: 'Hoogste',
     event: 'Gebeurtenis',
   },
-  chartGap: (length) => `${length} lang kwam er niets`,
+  chartGap: (length) => `${length} lang geen gegevens`,
   missing: { not_kept: 'niet meer bewaard', not_recorded: 'niet vastgelegd' },
   chartFailures: (count) => counted(count, 'mislukte poging', 'mislukte pogingen'),
   chartLooks: (count) => counted(count, 'bloemcontrole', 'bloemcontroles'),

@@ -213,6 +213,9 @@ def test_an_empty_house_says_what_to_do_beside_the_controls_and_in_the_table(
         expect(hmi.test_id("notice")).to_have_attribute("data-notice", "no-tags")
         hmi.expect_parts()
         expect_in_reach(hmi, ".map-controls button")
+        hmi.test_id("notice").locator("summary").click()
+        expect(hmi.test_id("notice").locator("details")).to_have_attribute("open", "")
+        hmi.test_id("notice").locator("summary").click()
         notice, controls, frame = places(
             hmi, "[data-testid=notice]", ".map-controls", "[data-testid=map]"
         )

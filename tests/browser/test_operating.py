@@ -111,7 +111,7 @@ def test_a_bound_that_cannot_be_says_so_and_does_not_stay(hmi: Hmi) -> None:
 def test_columns_sort_both_ways_and_say_so(hmi: Hmi) -> None:
     header = hmi.page.locator("th[data-column=temperature]")
     expect(header).to_have_attribute("aria-sort", "none")
-    expect(hmi.page.locator("th[data-column=tag]")).to_have_attribute("aria-sort", "ascending")
+    expect(hmi.page.locator("th[data-column=health]")).to_have_attribute("aria-sort", "descending")
 
     header.get_by_role("button").click()
     expect(header).to_have_attribute("aria-sort", "ascending")
@@ -327,11 +327,11 @@ def test_single_keys_choose_sensors_and_tags_unless_somebody_types(hmi: Hmi) -> 
     hmi.page.keyboard.press("3")
     expect(hmi.test_id("legend")).to_contain_text("CO₂ ppm")
     hmi.page.keyboard.press("n")
-    expect(hmi.card("1")).to_be_visible()
+    expect(hmi.card("10")).to_be_visible()
     hmi.page.keyboard.press("n")
-    expect(hmi.card("2")).to_be_visible()
+    expect(hmi.card("failed")).to_be_visible()
     hmi.page.keyboard.press("p")
-    expect(hmi.card("1")).to_be_visible()
+    expect(hmi.card("10")).to_be_visible()
     hmi.page.keyboard.press("/")
     field = hmi.page.get_by_role("searchbox")
     expect(field).to_be_focused()

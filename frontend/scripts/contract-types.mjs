@@ -30,7 +30,11 @@ for (const name of used) {
   }
 }
 const schemas = Object.fromEntries(Object.entries(all).filter(([name]) => used.has(name)));
-const document = JSON.stringify({ ...source, paths: {}, components: { schemas } });
+// Titles repeat the names, and what a schema is for stands in openapi.json.
+/** @type {(key: string, value: unknown) => unknown} */
+const bare = (key, value) =>
+  typeof value === 'string' && /^(title|description)$/.test(key) ? undefined : value;
+const document = JSON.stringify({ ...source, paths: {}, components: { schemas } }, bare);
 const fresh = BANNER + astToString(await openapiTS(document, { immutable: true }));
 
 if (process.argv.includes('--check')) {

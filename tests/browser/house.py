@@ -10,8 +10,8 @@ from tests.support.messages import discovered, look, occupancy_grid, pose, scan
 from tests.support.waiting import wait_for
 from tests.support.web import Bridge
 
-# Numbers in their order, then names.
-TAGS = ("1", "2", "3", "9", "10", "failed", "seen")
+# As the table has them: the worst first, of equals numbers in their order, then names.
+TAGS = ("10", "failed", "3", "seen", "1", "2", "9")
 
 
 def observations() -> list[Any]:

@@ -107,7 +107,7 @@ def test_a_failed_scan_is_listed_and_says_so_until_it_succeeds(
     expect(row.locator(".cell-age")).to_have_text("never")
     tried = row.locator(".tried")
     # Minutes, where a busy machine takes so long.
-    expect(tried).to_have_text(re.compile(r"^tried \d+\s(s|min) ago, not decoded$"))
+    expect(tried).to_have_text(re.compile(r"^tried \d+\s(s|min) ago: not decoded$"))
     shared.peer.observe(scan("tried", {"temperature": 21.0}, at=(2, 2)))
     expect(row).to_have_attribute("data-pinned", "true")
     expect(hmi.cell("tried", "temperature")).to_have_text("21.0")
@@ -136,7 +136,7 @@ def test_a_look_at_the_flowers_makes_no_reading_young(open_page: OpenPage) -> No
         expect(age).to_have_text(re.compile(r"^2\sh 1\smin"))
         expect(card.locator("[data-sensor=co2] .age")).to_have_text(re.compile(r"^10\smin$"))
         expect(card).to_contain_text(re.compile(r"Flowers seen\s?2\ss"))
-        expect(card.get_by_role("region", name="Last tries").locator("li")).to_have_count(3)
+        expect(card.get_by_role("region", name="Last attempts").locator("li")).to_have_count(3)
 
 
 def test_a_discovered_tag_has_a_pin_and_was_never_observed(
@@ -192,7 +192,7 @@ def test_what_comes_behind_the_first_view_is_asked_for_until_it_is_there(
     hmi.go()
     expect(hmi.row("first")).to_be_attached()
     trouble = hmi.page.locator("[data-trouble=parts]")
-    expect(trouble).to_contain_text("Part of the page has not arrived.")
+    expect(trouble).to_contain_text("Part of the page has not loaded.")
     hmi.page.unroute("**/assets/behind-*.js")
     expect(hmi.test_id("timebar")).to_be_visible()
     expect(trouble).to_have_count(0)

@@ -184,7 +184,7 @@ def test_the_table_says_what_the_api_says(garden: Garden, open_page: OpenPage) -
         assert f"|{each['value']:.1f}\u00a0°C|" in row["text"]
     kinds = [row["kind"] for row in found]
     assert (kinds.count("gap"), kinds.count("failure"), kinds.count("look")) == (1, 1, 1)
-    assert any("nothing came for" in row["text"] for row in found if row["kind"] == "gap")
+    assert any("no data for" in row["text"] for row in found if row["kind"] == "gap")
 
 
 def test_many_are_buckets_and_a_drag_brings_readings(garden: Garden, open_page: OpenPage) -> None:

@@ -255,7 +255,7 @@ def test_a_wall_screen_that_fails_comes_back_by_itself(house: Bridge, open_page:
     wall.allow_noise("no more canvas")
     wall.page.evaluate(BREAK)
     wall.page.set_viewport_size({"width": 1000, "height": 700})
-    expect(wall.test_id("failed-page")).to_contain_text("loaded anew by itself")
+    expect(wall.test_id("failed-page")).to_contain_text("reloads automatically")
     wall.expect_samples(3)
     assert wall.page.evaluate("window.stayed") is None
     assert json.loads(wall.page.evaluate("sessionStorage['lupin-twin.reload']"))["failures"] == 1

@@ -135,7 +135,7 @@ def test_a_phone_has_the_facts_and_a_fixed_range_leaves_the_title_alone(
 ) -> None:
     hmi = open_at((PHONE["width"], PHONE["height"]))
     legend = hmi.test_id("legend")
-    expect(legend.get_by_text("not known", exact=False).locator("visible=true")).to_have_count(1)
+    expect(legend.get_by_text("no data", exact=False).locator("visible=true")).to_have_count(1)
     expect(legend).to_contain_text("3 tags contribute")
     hmi.go("sensor=soil_moisture&colour=value")
     hmi.page.get_by_role("radio", name="Fixed").check()
@@ -156,7 +156,7 @@ def test_a_longer_word_about_the_house_does_not_move_the_table(
         hmi = open_page(running.url, viewport={"width": width, "height": height})
         show(hmi, "Tags")
         expect(hmi.test_id("health-driver")).to_have_text(
-            "Every judged reading lies within its ideal range"
+            "All assessed readings are within their ideal ranges"
         )
         # Late ones take room from the table, and so does a word about a server that is late.
         hmi.expect_parts()
@@ -223,6 +223,9 @@ def test_an_empty_house_says_what_to_do_beside_the_controls_and_in_the_table(
         expect(hmi.test_id("notice")).to_have_attribute("data-notice", "no-tags")
         hmi.expect_parts()
         expect_in_reach(hmi, ".map-controls button")
+        hmi.test_id("notice").locator("summary").click()
+        expect(hmi.test_id("notice").locator("details")).to_have_attribute("open", "")
+        hmi.test_id("notice").locator("summary").click()
         notice, controls, frame = places(
             hmi, "[data-testid=notice]", ".map-controls", "[data-testid=map]"
         )
@@ -232,7 +235,7 @@ def test_an_empty_house_says_what_to_do_beside_the_controls_and_in_the_table(
         tabs = hmi.page.locator(".pane-tabs")
         if tabs.is_visible():
             tabs.get_by_role("button", name="Tags").click()
-        expect(hmi.test_id("empty-table")).to_contain_text("send it on its round")
+        expect(hmi.test_id("empty-table")).to_contain_text("start its patrol")
     running.peer.observe(scan("1", {"temperature": 22.0}, at=(1, 1)))
     for hmi in pages:
         expect(hmi.row("1")).to_be_visible()
@@ -423,5 +426,5 @@ def test_the_page_speaks_as_the_browser_the_address_or_the_menu_says(
 
     # What is not spoken is said, in words that whoever asked may know.
     hmi.go(query="?lang=xx")
-    expect(hmi.test_id("troubles")).to_have_text(re.compile("does not speak “xx”"))
+    expect(hmi.test_id("troubles")).to_have_text(re.compile("is not available in “xx”"))
     expect(hmi.page.locator("html")).to_have_attribute("lang", "en")

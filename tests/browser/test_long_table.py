@@ -137,3 +137,13 @@ def test_rows_are_equally_high_whatever_they_hold(open_house: OpenHouse) -> None
         "rows => rows.map(row => row.getBoundingClientRect().height)"
     )
     assert len(set(heights)) == 1
+
+
+def test_a_filter_shows_its_first_match(open_house: OpenHouse) -> None:
+    hmi = open_house()
+    frame = hmi.page.locator(".table-scroll")
+    frame.evaluate("(e) => { e.scrollTop = e.scrollHeight; }")
+    expect(hmi.row(str(TAGS))).to_be_in_viewport()
+    hmi.page.get_by_role("searchbox").fill("99")
+    expect(hmi.row("99")).to_be_in_viewport()
+    assert frame.evaluate("(e) => e.scrollTop") == 0

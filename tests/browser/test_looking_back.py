@@ -187,7 +187,7 @@ def test_the_end_of_the_bar_is_now_and_before_memory_there_is_nothing(
     press_at(page, 0.01)
     notice = page.test_id("notice")
     expect(notice).to_have_attribute("data-notice", "past-nothing")
-    expect(notice).to_contain_text("What is remembered begins at")
+    expect(notice).to_contain_text("Recorded data begins at")
     assert page.rows() == []
     page.page.get_by_role("button", name="Back to live").click()
     expect_now(page)
@@ -317,7 +317,7 @@ def test_an_answer_that_fails_is_told_and_nothing_stands_for_it(page: Hmi, hour:
     page.page.route(STATE, lambda route: route.fulfill(status=503, json={"detail": "too busy"}))
     press_at(page, 0.6)
     trouble = page.test_id("troubles").locator("[data-trouble=past]")
-    expect(trouble).to_contain_text("could not be fetched")
+    expect(trouble).to_contain_text("could not be loaded")
     expect(trouble).to_contain_text("too busy")
     assert moment(page) == first
     page.page.unroute(STATE)
@@ -338,8 +338,8 @@ def test_a_twin_without_a_memory_says_so_and_how_to_have_one(
     hmi.go()
     bar = hmi.test_id("timebar")
     expect(bar).to_have_attribute("data-state", "off")
-    expect(bar).to_contain_text("this twin remembers nothing")
-    expect(bar).to_contain_text("Whoever runs the twin can turn the recording on")
+    expect(bar).to_contain_text("this twin records nothing")
+    expect(bar).to_contain_text("Recording is turned on where the twin is started")
     expect(bar).not_to_contain_text("journal")  # plain words
     expect(hmi.cell("a", "temperature")).to_have_text("25.5")
     hmi.go(f"at={hour.begun_s + 600}")
@@ -363,8 +363,8 @@ def test_a_lost_connection_is_told_and_the_past_stays(page: Hmi, hour: Hour) -> 
     page.page.clock.fast_forward(20_000)
     page.expect_phase("reconnecting")
     banner = page.test_id("frozen")
-    expect(banner).to_contain_text("Live data have stopped")
-    expect(banner).to_contain_text("What is shown is past, and stays")
+    expect(banner).to_contain_text("Live data has stopped")
+    expect(banner).to_contain_text("The past that is shown is not affected")
     expect(page.cell("a", "temperature")).to_have_text(then)
     expect(page.page.locator("canvas[data-layer=pins]")).to_have_css("opacity", "1")
     page.page.context.set_offline(False)
@@ -385,7 +385,7 @@ def test_what_becomes_critical_meanwhile_is_told_and_leads_to_now(page: Hmi, hou
     # The list is that of now, and says so.
     expect(page.page).to_have_title(re.compile(r"^\(1\) .* \(past\) · Lupin twin$"))
     page.page.keyboard.press("a")
-    expect(page.page.locator("[data-note=now]")).to_contain_text("These are the alarms of now")
+    expect(page.page.locator("[data-note=now]")).to_contain_text("These are the current alarms")
     expect(page.page.locator("[data-group=active] li")).to_contain_text("Tag c")
     page.page.locator(".list-choice label").first.click()
     assert moment(page) is not None
@@ -414,7 +414,7 @@ def test_the_estimate_says_plus_or_minus_what_now_and_then_and_in_its_link(
     hmi = open_page(hour.bridge.url, "period=hour", color_scheme="dark", bypass_csp=True)
     hmi.expect_samples(3)
     hmi.test_id("heat-legend").select_option("estimate")
-    expect(hmi.test_id("estimate-key")).to_contain_text("Hatched where it may be off by more")
+    expect(hmi.test_id("estimate-key")).to_contain_text("Hatched: may be off by more")
     expect(hmi.test_id("foretold")).to_be_visible()
     # The error alone, which is said also where a house that has just jumped is not known.
     hmi.test_id("heat-legend").select_option("error")
@@ -437,3 +437,25 @@ def test_the_estimate_says_plus_or_minus_what_now_and_then_and_in_its_link(
     )
     theirs.test_id("heat-legend").select_option("error")
     expect(theirs.test_id("error-scale")).to_be_visible()
+
+
+@pytest.mark.parametrize("width", [360, 390])
+def test_a_phone_has_the_menu_and_every_count_on_its_screen(
+    hour: Hour, open_page: OpenPage, width: int
+) -> None:
+    hmi = open_page(
+        hour.bridge.url, f"at={hour.begun_s + 700}", viewport={"width": width, "height": 740}
+    )
+    expect(hmi.app).to_have_attribute("data-past", "true")
+    hmi.expect_parts()
+    # As wide as the words of a simulation make it.
+    hmi.page.evaluate(
+        """() => document.querySelector('.past-header').insertAdjacentHTML('afterend',
+             '<div class="origin"><span class="origin-word">Simulated</span></div>')"""
+    )
+    for each in (
+        hmi.page.get_by_role("button", name="Menu"),
+        *hmi.page.locator(".pane-tabs button").all(),
+    ):
+        expect(each).to_be_in_viewport(ratio=1)
+        assert each.evaluate("(e) => e.scrollWidth <= e.clientWidth")

@@ -102,7 +102,7 @@ def test_back_closes_the_card_and_undoes_nothing_else(house: Bridge, open_page: 
 def test_a_link_to_a_tag_that_is_not_there_says_so(house: Bridge, open_page: OpenPage) -> None:
     hmi = open_page(house.url, "tag=nobody")
     hmi.expect_rows(*TAGS)
-    expect(hmi.card("nobody")).to_contain_text("does not list this tag")
+    expect(hmi.card("nobody")).to_contain_text("does not have this tag")
 
 
 def test_a_link_of_nonsense_is_the_whole_house(house: Bridge, open_page: OpenPage) -> None:
@@ -306,7 +306,7 @@ def test_paper_has_every_row_says_when_and_is_light(house: Bridge, open_page: Op
     # The house follows /clock.
     taken = rf"^As of {moment} \(Simulated time\), printed {moment} ?"
     expect(line).to_have_text(
-        re.compile(rf"{taken}Temperature against its ideal 18\.0 – 26\.0\s°C$")
+        re.compile(rf"{taken}Temperature compared with its ideal range 18\.0 – 26\.0\s°C$")
     )
     expect(line).to_be_visible()
     # Of a PDF each canvas must be a group of its own, or the clearing of one whitens those below.

@@ -9,7 +9,7 @@ import type { TwinTagState } from '../contract/types';
 import type { Span } from '../domain/period';
 import { marksOf, seriesOf } from '../domain/series';
 import { createStore } from '../store/create';
-import { createRefresher } from '../store/refresher';
+import { createFetcher } from '../store/fetcher';
 import {
   NOTHING_FED,
   pairKey,
@@ -57,13 +57,12 @@ export function createFeed(): Feed {
   let pairs: readonly Pair[] = [];
   let group = '';
 
-  const refresher = createRefresher<Fetched>({
-    intervalMs: INTERVAL_MS,
+  const fetcher = createFetcher<Fetched>({
+    paceMs: INTERVAL_MS,
     onValue: (fetched) => {
       store.dispatch((fed) => withFetched(fed, fetched));
     },
-    onError: (error) => {
-      const message = error instanceof Error ? error.message : String(error);
+    onError: (message, _, error) => {
       const isMissing = error instanceof Refusal && error.status === 404;
       store.dispatch((fed) => ({ ...fed, state: isMissing ? 'missing' : 'failed', message }));
     },
@@ -74,7 +73,7 @@ export function createFeed(): Feed {
     subscribe: store.subscribe,
     want: (wanted) => {
       if (!wanted) {
-        refresher.want(null);
+        fetcher.want(null);
         pairs = [];
         group = '';
         return;
@@ -86,7 +85,7 @@ export function createFeed(): Feed {
         store.dispatch((fed) => withOnly(fed, wanted.pairs));
       }
       const turn = Math.floor(wanted.span.to / askAgainS(wanted.span));
-      refresher.want({
+      fetcher.want({
         key: `${group}\u0001${wanted.epoch}\u0001${turn}`,
         group,
         run: (signal) => fetchAll(wanted, signal),

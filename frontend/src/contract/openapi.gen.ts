@@ -4,904 +4,322 @@ export type paths = Record<string, never>;
 export type webhooks = Record<string, never>;
 export interface components {
     schemas: {
-        /**
-         * Advice
-         * @description `/api/estimate/advice`: where another tag helps most, the best place first.
-         */
         readonly Advice: {
-            /** Sensor Type */
             readonly sensor_type: string;
-            /** Places */
             readonly places: readonly components["schemas"]["AdvisedPlace"][];
         };
-        /**
-         * AdvisedPlace
-         * @description Where another tag helps; m, map frame.
-         */
         readonly AdvisedPlace: {
-            /** X */
             readonly x: number;
-            /** Y */
             readonly y: number;
-            /**
-             * Error Ratio
-             * @description the error with a tag there, and at the places before it, without: 1
-             */
             readonly error_ratio: number;
         };
-        /**
-         * Alarm
-         * @description One episode: what was wrong, where, from when to when, and how bad at worst.
-         *
-         *     It follows from what was observed and from the ranges: the same in every replica and after
-         *     every restart.
-         */
         readonly Alarm: {
-            /**
-             * Id
-             * @description opaque; made of what, where and since when
-             */
             readonly id: string;
-            /** @description as it was when the alarm was raised */
             readonly reason: components["schemas"]["HealthReason"];
-            /**
-             * Tag Id
-             * @description empty: the greenhouse
-             */
             readonly tag_id: string;
-            /** @description ROS time */
             readonly raised_at: components["schemas"]["Time"];
-            /** @description ROS time; null: it is active */
             readonly cleared_at: components["schemas"]["Time"] | null;
-            /**
-             * Worst
-             * @description the value farthest beyond its limit, sensor's unit; of a pest the most that were counted; null: there is no such value
-             */
             readonly worst: number | null;
         };
-        /**
-         * Alarms
-         * @description `/api/alarms`: what the past and now give.
-         *
-         *     `starting`: the past is still being read; `heard`: no journal is kept, and only what this
-         *     process received since its start is in it.
-         */
         readonly Alarms: {
-            /**
-             * Alarms
-             * @description newest first
-             */
             readonly alarms: readonly components["schemas"]["Alarm"][];
-            /**
-             * Source
-             * @enum {string}
-             */
+            /** @enum {string} */
             readonly source: "starting" | "journal" | "heard";
-            /** @description ROS time from which on alarms are known; null: not yet */
             readonly since: components["schemas"]["Time"] | null;
         };
-        /**
-         * Bucket
-         * @description The readings of a stretch of `bucket_s`; only finite ones count.
-         */
         readonly Bucket: {
             readonly start: components["schemas"]["Time"];
-            /** N */
             readonly n: number;
-            /** Mean */
             readonly mean: number;
-            /** Min */
             readonly min: number;
-            /** Max */
             readonly max: number;
         };
-        /**
-         * ClockRun
-         * @description A run of the clock: a simulated one that starts over begins another.
-         */
         readonly ClockRun: {
             readonly from: components["schemas"]["Time"];
             readonly to: components["schemas"]["Time"];
-            /** Is Simulated */
             readonly is_simulated: boolean;
         };
-        /**
-         * Day
-         * @description Whether the ranges of the day hold or those of the night, and what says so.
-         */
         readonly Day: {
-            /** Is Day */
             readonly is_day: boolean;
-            /**
-             * Source
-             * @enum {string}
-             */
+            /** @enum {string} */
             readonly source: "light" | "clock" | "assumed";
         };
-        /**
-         * EstimateQualities
-         * @description `/api/estimate/quality`: by sensor.
-         */
         readonly EstimateQualities: {
-            /** Sensors */
             readonly sensors: {
                 readonly [key: string]: components["schemas"]["EstimateQuality"];
             };
         };
-        /**
-         * EstimateQuality
-         * @description How often a sensor's estimates were right; a day is one of the twin's `day_length_s`.
-         */
         readonly EstimateQuality: {
-            /** @description null: no model was fitted yet */
             readonly fitted_at: components["schemas"]["Time"] | null;
-            /**
-             * Fit Problem
-             * @description why the last fit came to nothing; empty: it did not
-             */
             readonly fit_problem: string;
-            /** @description the counts are since then; null: none yet */
             readonly graded_since: components["schemas"]["Time"] | null;
             readonly day: components["schemas"]["Graded"];
             readonly week: components["schemas"]["Graded"];
-            /**
-             * Share Day
-             * @description inside of scans; null: there are none
-             */
             readonly share_day: number | null;
-            /** Share Week */
             readonly share_week: number | null;
-            /**
-             * Is Trusted
-             * @description false: a share is under 0.8, the intervals are too narrow; null: fewer than 40 scans could be held against other tags, so nothing is said
-             */
             readonly is_trusted: boolean | null;
         };
-        /**
-         * ExpectedReading
-         * @description A tag's newest reading beside what all others say of it; sensor's unit.
-         */
         readonly ExpectedReading: {
-            /** Measured */
             readonly measured: number;
             readonly observed_at: components["schemas"]["Time"];
-            /** Expected */
             readonly expected: number;
-            /**
-             * Expected Sd
-             * @description a reading's noise included
-             */
             readonly expected_sd: number;
-            /**
-             * Z
-             * @description how far its last readings are off together, in sds
-             */
             readonly z: number;
-            /**
-             * Offset
-             * @description by how much they are off
-             */
             readonly offset: number;
-            /**
-             * Left Out
-             * @description the sensor has changed: the estimate does without what it read since then
-             */
             readonly left_out: boolean;
         };
-        /**
-         * ExpectedTags
-         * @description `/api/estimate/tags`: what was expected of each tag with a place, as of a moment.
-         */
         readonly ExpectedTags: {
-            /** Sensor Type */
             readonly sensor_type: string;
             readonly at: components["schemas"]["Time"];
-            /** Tags */
             readonly tags: {
                 readonly [key: string]: components["schemas"]["ExpectedReading"];
             };
         };
-        /**
-         * FieldQuality
-         * @description What an honest map should also tell: its leave-one-out error and how much of it is known.
-         */
         readonly FieldQuality: {
-            /** Sensor Type */
             readonly sensor_type: string;
-            /** Unit */
             readonly unit: string;
-            /**
-             * Sample Count
-             * @description tags that contribute: pinned, with a finite reading
-             */
             readonly sample_count: number;
-            /**
-             * Judged Count
-             * @description of those, the ones with another in reach
-             */
             readonly judged_count: number;
-            /**
-             * Rmse
-             * @description sensor's unit; null: no tag could be judged
-             */
             readonly rmse: number | null;
             readonly worst: components["schemas"]["TagError"] | null;
-            /**
-             * Painted Share
-             * @description cells that are known, 0 to 1
-             */
             readonly painted_share: number;
-            /**
-             * Far Off Tags
-             * @description tags too far from the others for a map: no default box goes as far
-             */
             readonly far_off_tags: readonly string[];
         };
-        /**
-         * FlowerPoint
-         * @description One flower of the latest look.
-         */
         readonly FlowerPoint: {
             readonly position: components["schemas"]["Point"];
-            /** Height M */
             readonly height_m: number | null;
-            /** Species */
             readonly species: string;
-            /** Confidence */
             readonly confidence: number | null;
-            /** Anomaly */
             readonly anomaly: boolean;
         };
-        /**
-         * Graded
-         * @description New scans that were predicted without their tag, and those in the interval for 9 of 10.
-         */
         readonly Graded: {
-            /** Scans */
             readonly scans: number;
-            /** Inside */
             readonly inside: number;
         };
-        /**
-         * Header
-         * @description When, and in which frame the positions are.
-         */
         readonly Header: {
             readonly stamp: components["schemas"]["Time"];
-            /** Frame Id */
             readonly frame_id: string;
         };
-        /**
-         * HealthReason
-         * @description Why a tag, or the greenhouse, has its verdict.
-         *
-         *     The last two are the greenhouse's. `silent`: nothing comes from the twin, or its clock does
-         *     not run. `stopped`: no tag was scanned for longer than the patrol's own rhythm allows.
-         */
         readonly HealthReason: {
-            /**
-             * Kind
-             * @enum {string}
-             */
+            /** @enum {string} */
             readonly kind: "range" | "reading_failed" | "scan_failed" | "pest" | "old" | "changed" | "silent" | "stopped";
-            /**
-             * Verdict
-             * @enum {string}
-             */
+            /** @enum {string} */
             readonly verdict: "critical" | "stressed" | "unknown" | "healthy";
-            /**
-             * Sensor
-             * @description empty: all of the tag's, or none
-             */
             readonly sensor: string;
-            /**
-             * Value
-             * @description sensor's unit; of a pest how many were counted, of scan_failed the status
-             */
             readonly value: number | null;
-            /**
-             * Limit
-             * @description the bound that was passed, sensor's unit; of old how long readings hold, s
-             */
             readonly limit: number | null;
-            /** @description ROS time of the observation that began it, of old the last one; null: none */
             readonly since: components["schemas"]["Time"] | null;
         };
-        /**
-         * History
-         * @description One sensor of one tag over a period: `readings`, or `buckets` where they are too many.
-         */
         readonly History: {
             readonly from: components["schemas"]["Time"];
             readonly to: components["schemas"]["Time"];
-            /** Tag Id */
             readonly tag_id: string;
-            /** Sensor Type */
             readonly sensor_type: string;
-            /** Unit */
             readonly unit: string;
-            /** Is Bucketed */
             readonly is_bucketed: boolean;
-            /**
-             * Bucket S
-             * @description s, length of a bucket; null: these are readings
-             */
             readonly bucket_s: number | null;
-            /**
-             * Readings
-             * @description oldest first
-             */
             readonly readings: readonly components["schemas"]["HistoryReading"][];
-            /**
-             * Buckets
-             * @description oldest first; one without a reading is absent
-             */
             readonly buckets: readonly components["schemas"]["Bucket"][];
-            /**
-             * Gaps
-             * @description no reading for longer than three times what is usual here: draw no line
-             */
             readonly gaps: readonly components["schemas"]["lupin_bridge__past__schema__Stretch"][];
-            /** @description all that was received before this is in the journal; null: not known */
             readonly complete_to: components["schemas"]["Time"] | null;
-            /** @description from here on every single reading and event is kept; null: not known */
             readonly kept_from: components["schemas"]["Time"] | null;
         };
-        /**
-         * HistoryReading
-         * @description One past value of a sensor.
-         */
         readonly HistoryReading: {
             readonly stamp: components["schemas"]["Time"];
-            /** Value */
             readonly value: number | null;
         };
-        /**
-         * HouseHealth
-         * @description The greenhouse is its worst tag; unknown where more than half of its tags are.
-         */
         readonly HouseHealth: {
-            /**
-             * Verdict
-             * @enum {string}
-             */
+            /** @enum {string} */
             readonly verdict: "critical" | "stressed" | "unknown" | "healthy";
-            /**
-             * Reasons
-             * @description worst first; absent: none
-             */
             readonly reasons?: readonly components["schemas"]["HealthReason"][];
             readonly day: components["schemas"]["Day"];
             readonly patrol: components["schemas"]["Patrol"];
         };
-        /**
-         * Journal
-         * @description How the twin's journal does. Only while it is `recording` is everything kept.
-         */
         readonly Journal: {
-            /**
-             * State
-             * @description unknown: the twin does not say
-             * @enum {string}
-             */
+            /** @enum {string} */
             readonly state: "unknown" | "off" | "starting" | "upgrading" | "recording" | "slow" | "failing" | "doubting" | "in_use" | "foreign";
-            /**
-             * Detail
-             * @description for a person to read
-             */
             readonly detail: string;
-            /**
-             * Set Aside
-             * @description the last damaged file, by its new name; empty: none
-             */
             readonly set_aside: string;
-            /** @description what no robot observed: the past that a demo's journal begins with */
             readonly simulated: components["schemas"]["Stretch"] | null;
         };
-        /**
-         * Judgement
-         * @description `/api/health`, and `health` in frames: in a delta only the tags whose health has changed.
-         */
         readonly Judgement: {
             readonly house: components["schemas"]["HouseHealth"];
-            /** Tags */
             readonly tags: {
                 readonly [key: string]: components["schemas"]["TagHealth"];
             };
         };
-        /**
-         * MapMetaData
-         * @description Size and place of the occupancy grid; resolution in m a cell.
-         */
         readonly MapMetaData: {
             readonly map_load_time: components["schemas"]["Time"];
-            /** Resolution */
             readonly resolution: number;
-            /** Width */
             readonly width: number;
-            /** Height */
             readonly height: number;
             readonly origin: components["schemas"]["Pose"];
         };
-        /**
-         * OccupancyGrid
-         * @description The map without its cells (those are the picture at `/api/map.png`).
-         */
         readonly OccupancyGrid: {
             readonly header: components["schemas"]["Header"];
             readonly info: components["schemas"]["MapMetaData"];
         };
-        /**
-         * Outward
-         * @description How a channel of notifications does: MQTT, the webhook.
-         */
         readonly Outward: {
-            /**
-             * Channel
-             * @enum {string}
-             */
+            /** @enum {string} */
             readonly channel: "mqtt" | "webhook";
-            /** Is Failing */
             readonly is_failing: boolean;
-            /**
-             * Detail
-             * @description what is wrong, for a person to read; empty: nothing
-             */
             readonly detail: string;
         };
-        /**
-         * PastAttempt
-         * @description One scan or look, with success or without.
-         */
         readonly PastAttempt: {
             readonly stamp: components["schemas"]["Time"];
-            /**
-             * Status
-             * @description as in lupin_msgs/Observation: 0 is OK
-             */
             readonly status: number;
-            /**
-             * Status Detail
-             * @description why the status is not OK, for a person to read
-             */
             readonly status_detail: string;
-            /**
-             * Kind
-             * @description as in lupin_msgs/Observation: 0 scan, 1 look; null: a twin elsewhere does not tell it of a try that failed
-             */
             readonly kind: number | null;
         };
-        /**
-         * Patrol
-         * @description What the greenhouse is doing; nothing of it is a verdict.
-         */
         readonly Patrol: {
-            /**
-             * Interval S
-             * @description median of the last intervals between scans, whatever tag they were of; null: fewer than two are known
-             */
             readonly interval_s: number | null;
-            /** @description ROS time; null: none is known */
             readonly last_scan: components["schemas"]["Time"] | null;
-            /**
-             * Overdue
-             * @description tags none of whose readings holds any more, or without any
-             */
             readonly overdue: number;
         };
-        /**
-         * Point
-         * @description Metres in the map frame: x right, y up, z above the floor.
-         */
         readonly Point: {
-            /** X */
             readonly x: number | null;
-            /** Y */
             readonly y: number | null;
-            /** Z */
             readonly z: number | null;
         };
-        /**
-         * Polygon
-         * @description Outline in the map frame, metres.
-         */
         readonly Polygon: {
-            /** Points */
             readonly points: readonly components["schemas"]["Point"][];
         };
-        /**
-         * Pose
-         * @description Position and orientation in the map frame.
-         */
         readonly Pose: {
             readonly position: components["schemas"]["Point"];
             readonly orientation: components["schemas"]["Quaternion"];
         };
-        /**
-         * Quaternion
-         * @description Orientation; `w == 0` in a tag's pose means that the tag has no pose.
-         */
         readonly Quaternion: {
-            /** X */
             readonly x: number | null;
-            /** Y */
             readonly y: number | null;
-            /** Z */
             readonly z: number | null;
-            /** W */
             readonly w: number | null;
         };
-        /**
-         * RecentDrop
-         * @description Messages of the last minutes that the twin dropped or lost, for one reason.
-         */
         readonly RecentDrop: {
-            /** Reason */
             readonly reason: string;
-            /**
-             * Message
-             * @description the last of them, for a person to read
-             */
             readonly message: string;
-            /** Count */
             readonly count: number;
         };
-        /**
-         * SensorHistory
-         * @description The past values of one sensor at one tag, oldest first.
-         */
         readonly SensorHistory: {
-            /** Name */
             readonly name: string;
-            /** Values */
             readonly values: readonly components["schemas"]["HistoryReading"][];
         };
-        /**
-         * SensorReading
-         * @description Latest value of one sensor, in its unit; null: the sensor gave NaN or infinity.
-         */
         readonly SensorReading: {
-            /** Name */
             readonly name: string;
-            /** Value */
             readonly value: number | null;
-            /** @description ROS time; null: the twin does not tell; absent: as of the reading before it, of the first the tag's last_observed. Its age is stale_seconds of the tag, and what last_observed is later */
             readonly observed_at?: components["schemas"]["Time"] | null;
         };
-        /**
-         * StatusFrame
-         * @description WebSocket frame, and the body of `/readyz`: whether the twin behind the bridge is alive.
-         */
         readonly StatusFrame: {
-            /**
-             * Type
-             * @constant
-             */
+            /** @constant */
             readonly type: "status";
-            /**
-             * Twin
-             * @enum {string}
-             */
+            /** @enum {string} */
             readonly twin: "live" | "offline";
-            /**
-             * Reason
-             * @description paused: simulated time stands on purpose, the twin is live; no_clock, clock_stopped: the twin's time does not run; clock_doubted: it contradicts the journal; no age is known then, and the twin counts as offline
-             * @enum {string}
-             */
+            /** @enum {string} */
             readonly reason: "live" | "paused" | "no_clock" | "clock_stopped" | "clock_doubted" | "never_seen" | "stale" | "thread_dead" | "shutting_down";
-            /**
-             * Message
-             * @description for a person to read
-             */
             readonly message: string;
-            /**
-             * State Age Seconds
-             * @description s since the bridge got its last state, by its own clock; null: never
-             */
             readonly state_age_seconds: number | null;
-            /**
-             * Has Map
-             * @description false: /api/map answers 404, no map has come yet
-             */
             readonly has_map: boolean;
-            /**
-             * Origin
-             * @description where what was observed comes from, as the twin says; sim_time: it goes by /clock, so from a simulation, or a recording that is played
-             * @enum {string}
-             */
+            /** @enum {string} */
             readonly origin: "unknown" | "robot" | "simulated" | "recorded" | "sim_time";
-            /**
-             * Input Problems
-             * @description why the twin does not hear all that is published for it, with the remedy
-             */
             readonly input_problems: readonly string[];
-            /**
-             * Drops
-             * @description what the twin dropped recently, by reason
-             */
             readonly drops: readonly components["schemas"]["RecentDrop"][];
             readonly journal: components["schemas"]["Journal"];
-            /**
-             * Outward
-             * @description those that the operator has set up
-             */
             readonly outward: readonly components["schemas"]["Outward"][];
         };
-        /**
-         * TagError
-         * @description One tag's reading against what the other tags say of its place.
-         */
         readonly TagError: {
-            /** Tag Id */
             readonly tag_id: string;
-            /** Measured */
             readonly measured: number;
-            /** Predicted */
             readonly predicted: number;
-            /**
-             * Error
-             * @description predicted less measured, sensor's unit
-             */
             readonly error: number;
         };
-        /**
-         * TagHealth
-         * @description The verdict of a tag: that of its worst reason; healthy: something recent was judged.
-         */
         readonly TagHealth: {
-            /**
-             * Verdict
-             * @enum {string}
-             */
+            /** @enum {string} */
             readonly verdict: "critical" | "stressed" | "unknown" | "healthy";
-            /**
-             * Reasons
-             * @description worst first; absent: none
-             */
             readonly reasons?: readonly components["schemas"]["HealthReason"][];
         };
-        /**
-         * TagHistory
-         * @description The last scans and tries of one tag (as many of each as the twin's `buffer_len`).
-         */
         readonly TagHistory: {
-            /** Tag Id */
             readonly tag_id: string;
-            /**
-             * Is Known
-             * @description false: this twin does not tell what was observed when (no /twin/times)
-             */
             readonly is_known: boolean;
-            /** Sensors */
             readonly sensors: readonly components["schemas"]["SensorHistory"][];
-            /**
-             * Tries
-             * @description oldest first
-             */
             readonly tries: readonly components["schemas"]["PastAttempt"][];
         };
-        /**
-         * Time
-         * @description ROS time; seconds since the epoch on hardware, since the start in simulation.
-         */
         readonly Time: {
-            /** Sec */
             readonly sec: number;
-            /** Nanosec */
             readonly nanosec: number;
         };
-        /**
-         * Timeline
-         * @description What happened over a period, and what of the past is remembered at all.
-         */
         readonly Timeline: {
             readonly from: components["schemas"]["Time"];
             readonly to: components["schemas"]["Time"];
-            /**
-             * Bucket S
-             * @description s, length of a bucket
-             */
             readonly bucket_s: number;
-            /** @description what is remembered at all; null: nothing is */
             readonly reach: components["schemas"]["lupin_bridge__past__schema__Stretch"] | null;
-            /**
-             * Buckets
-             * @description oldest first; one in which nothing happened is absent
-             */
             readonly buckets: readonly components["schemas"]["TimelineBucket"][];
-            /**
-             * Silences
-             * @description stretches in which nothing was tried
-             */
             readonly silences: readonly components["schemas"]["lupin_bridge__past__schema__Stretch"][];
-            /**
-             * Runs
-             * @description the runs of the clock that meet this period
-             */
             readonly runs: readonly components["schemas"]["ClockRun"][];
-            /** @description all that was received before this is in the journal; null: not known */
             readonly complete_to: components["schemas"]["Time"] | null;
-            /** @description from here on every single reading and event is kept; null: not known */
             readonly kept_from: components["schemas"]["Time"] | null;
         };
-        /**
-         * TimelineBucket
-         * @description What happened within `bucket_s`.
-         */
         readonly TimelineBucket: {
             readonly start: components["schemas"]["Time"];
-            /**
-             * Scans
-             * @description tries at sensors that succeeded
-             */
             readonly scans: number;
-            /**
-             * Failures
-             * @description tries that failed, looks too
-             */
             readonly failures: number;
-            /**
-             * Looks
-             * @description looks that saw the flowers
-             */
             readonly looks: number;
-            /**
-             * Pests Seen
-             * @description looks with an anomaly where the look before had none
-             */
             readonly pests_seen: number;
-            /**
-             * Pests Cleared
-             * @description looks without one where the look before had one
-             */
             readonly pests_cleared: number;
         };
-        /**
-         * TwinState
-         * @description The whole greenhouse at one moment.
-         */
         readonly TwinState: {
             readonly header: components["schemas"]["Header"];
-            /** Tags */
             readonly tags: readonly components["schemas"]["TwinTagState"][];
         };
-        /**
-         * TwinTagState
-         * @description Everything that the twin knows about one tag.
-         */
         readonly TwinTagState: {
-            /** Tag Id */
             readonly tag_id: string;
-            /** @description orientation.w == 0: the tag has no pose, place no pin */
             readonly pose: components["schemas"]["Pose"];
-            /** Readings */
             readonly readings: readonly components["schemas"]["SensorReading"][];
-            /** @description ROS time; 0: discovered and never observed */
             readonly last_observed: components["schemas"]["Time"];
-            /**
-             * Stale Seconds
-             * @description s since last_observed, at header.stamp in a frame and now in an HTTP answer; never negative; null: never observed
-             */
             readonly stale_seconds: number | null;
-            /** Species */
             readonly species: string;
-            /** Species Confidence */
             readonly species_confidence: number | null;
-            /** Anomaly */
             readonly anomaly: boolean;
-            /** Flower Count */
             readonly flower_count: number;
-            /** Bug Count */
             readonly bug_count: number;
-            /** Flowers */
             readonly flowers: readonly components["schemas"]["FlowerPoint"][];
             readonly box_footprint: components["schemas"]["Polygon"];
-            /** @description ROS time at which the flowers were last seen; absent: never, or not known */
             readonly looked_at?: components["schemas"]["Time"] | null;
-            /** @description ROS time of the latest scan or look, with success or without; null: none, or not known; absent, and so are the next two: it was OK, at last_observed */
             readonly last_try?: components["schemas"]["Time"] | null;
-            /**
-             * Last Try Status
-             * @description of the last try, as in lupin_msgs/Observation: 0 OK, 1 unreachable, 2 scan failed, 3 skipped; null: as last_try
-             */
             readonly last_try_status?: number | null;
-            /**
-             * Last Try Detail
-             * @description why the last try was not OK, for a person to read
-             */
             readonly last_try_detail?: string;
         };
-        /**
-         * Stretch
-         * @description A stretch of time, `from` <= t < `to`.
-         */
         readonly lupin_bridge__past__schema__Stretch: {
             readonly from: components["schemas"]["Time"];
             readonly to: components["schemas"]["Time"];
         };
-        /**
-         * StateFrame
-         * @description WebSocket frame: the state. `seq` grows by one a frame; a gap tells what was skipped.
-         */
         readonly StateFrame: {
-            /**
-             * Type
-             * @constant
-             */
+            /** @constant */
             readonly type: "state";
-            /** Seq */
             readonly seq: number;
-            /**
-             * Revision
-             * @description opaque; changes exactly when a field could
-             */
             readonly revision: string;
             readonly state: components["schemas"]["TwinState"];
             readonly health: components["schemas"]["Judgement"];
         };
-        /**
-         * DeltaFrame
-         * @description WebSocket frame (`?delta=1`): what is not as in the frame numbered `base`.
-         *
-         *     A client that has `base` replaces the `changed` tags, appends those it did not know, in this
-         *     order, and drops the `removed` ones. In an unchanged tag, its age is `header.stamp` less its
-         *     `last_observed`. A client that skipped a frame gets a full `StateFrame` instead.
-         */
         readonly DeltaFrame: {
-            /**
-             * Type
-             * @constant
-             */
+            /** @constant */
             readonly type: "delta";
-            /** Seq */
             readonly seq: number;
-            /** Base */
             readonly base: number;
-            /**
-             * Revision
-             * @description opaque; changes exactly when a field could
-             */
             readonly revision: string;
             readonly header: components["schemas"]["Header"];
-            /** Changed */
             readonly changed: readonly components["schemas"]["TwinTagState"][];
-            /**
-             * Removed
-             * @description tag_ids; a restarted twin knows fewer tags
-             */
             readonly removed: readonly string[];
-            /** @description the greenhouse, and the tags whose verdict changed */
             readonly health: components["schemas"]["Judgement"];
         };
-        /**
-         * Stretch
-         * @description From one moment of ROS time to another.
-         */
         readonly Stretch: {
             readonly start: components["schemas"]["Time"];
             readonly end: components["schemas"]["Time"];
         };
-        /**
-         * AlarmsFrame
-         * @description WebSocket frame: the active alarms and those raised or cleared within 24 h, on any change.
-         */
         readonly AlarmsFrame: {
-            /**
-             * Alarms
-             * @description newest first
-             */
             readonly alarms: readonly components["schemas"]["Alarm"][];
-            /**
-             * Source
-             * @enum {string}
-             */
+            /** @enum {string} */
             readonly source: "starting" | "journal" | "heard";
-            /** @description ROS time from which on alarms are known; null: not yet */
             readonly since: components["schemas"]["Time"] | null;
-            /**
-             * Type
-             * @constant
-             */
+            /** @constant */
             readonly type: "alarms";
         };
     };

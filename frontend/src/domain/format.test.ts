@@ -9,6 +9,7 @@ import {
   rangeText,
   readingText,
   shortAgeText,
+  valueText,
 } from './format';
 import { sensorNamed } from '../testing/sensors';
 
@@ -65,4 +66,16 @@ test('a range has its unit once, and none is a dash', () => {
 
 test('a moment has its date, in an order that sorts', () => {
   expect(momentText(new Date(2026, 4, 1, 9, 3, 2).getTime())).toBe('2026-05-01 09:03:02');
+});
+
+test.each([
+  [0.0001, '0.00010'],
+  [0.0014, '0.0014'],
+  [0.042, '0.042'],
+  [0.25, '0.25'],
+  [-0.0004, '\u22120.00040'],
+  [0, '0.0'],
+])('%d of a sensor that nobody knows reads %s, and never as nothing', (value, text) => {
+  expect(valueText(sensorNamed('spin'), value, 'C')).toBe(text);
+  expect(valueText(sensorNamed('temperature'), value, 'C')).toMatch(/^.?\d\.\d\d?$/);
 });

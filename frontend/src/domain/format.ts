@@ -47,7 +47,14 @@ export function digitsApart(
 
 /** A reading without its unit. */
 export function valueText(sensor: Sensor, value: number, unit: TemperatureUnit, more = 0): string {
-  return numberText(toShown(sensor, value, unit), more);
+  const given = toShown(sensor, value, unit);
+  return numberText(given, more + (sensor.unit === '' ? digitsOfSmall(given) : 0));
+}
+
+/** Of a sensor that nobody knows two digits of a small value, which would read as nothing else. */
+function digitsOfSmall(value: number): number {
+  const size = Math.abs(value);
+  return size === 0 || size >= 0.1 ? 0 : Math.min(MOST_MORE, Math.ceil(-Math.log10(size)) - 1);
 }
 
 /** A reading with its unit, held together by a no-break space. */

@@ -35,7 +35,7 @@ describe('a reason in words', () => {
     [
       { kind: 'reading_failed', sensor: 'humidity', value: null } as const,
       60,
-      'Humidity: the sensor gives no value',
+      'Humidity: the sensor returns no value',
     ],
     [
       { kind: 'scan_failed', sensor: '', value: 1, limit: null } as const,
@@ -49,32 +49,36 @@ describe('a reason in words', () => {
     ],
     [{ kind: 'pest', sensor: '', value: 3, limit: null } as const, 5, '3 pests seen'],
     [{ kind: 'pest', sensor: '', value: 0, limit: null } as const, 5, 'Pest seen'],
-    [{ ...old, limit: 1_800 }, 345_600, `Not scanned for 4${NBSP}d (readings hold 30${NBSP}min)`],
+    [
+      { ...old, limit: 1_800 },
+      345_600,
+      `Not scanned for 4${NBSP}d (readings are valid for 30${NBSP}min)`,
+    ],
     [
       { ...old, limit: 86_400, sensor: 'soil_moisture' },
       90_000,
-      `Soil moisture: no reading for 1${NBSP}d (readings hold 1${NBSP}d)`,
+      `Soil moisture: no reading for 1${NBSP}d (readings are valid for 1${NBSP}d)`,
     ],
-    [{ ...old, limit: 600 }, null, `Not scanned lately (readings hold 10${NBSP}min)`],
+    [{ ...old, limit: 600 }, null, `Not scanned lately (readings are valid for 10${NBSP}min)`],
     [
       { ...old, limit: 5_400, since: null },
       null,
-      `No scan whose time is known (readings hold 1${NBSP}h 30${NBSP}min)`,
+      `No scan with a known time (readings are valid for 1${NBSP}h 30${NBSP}min)`,
     ],
     [
       { kind: 'changed', value: 22, limit: null } as const,
       null,
-      `Temperature 22.0${NBSP}°C, changed against its own past and its neighbours`,
+      `Temperature 22.0${NBSP}°C: possible sensor fault`,
     ],
     [
       { kind: 'silent', sensor: '', value: null, limit: null } as const,
       null,
-      'The twin is silent: what was heard last says nothing about now',
+      'The twin is silent: its last data says nothing about now',
     ],
     [
       { kind: 'stopped', sensor: '', value: null, limit: null } as const,
       null,
-      'No tag is being scanned: the robot has stopped, or is not heard',
+      'No tag is being scanned: the robot has stopped, or its data is lost',
     ],
     [{ kind: 'door_open' as never, sensor: '', value: null, limit: null }, null, 'door open'],
   ] as const)('%o', (over, age, told) => {

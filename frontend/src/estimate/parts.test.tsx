@@ -94,7 +94,7 @@ describe('legend', () => {
     showField(estimated([22.4], [0.5]));
     render(<Legend kiosk={false} />);
     expect((await screen.findByTestId('foretold')).textContent).toBe(
-      '9 of 10 scans lay where the other tags put them',
+      '9 of 10 scans were within the predicted range',
     );
     expect(text('estimate-key')).toContain(`off by more than ±1.6${NBSP}°C`);
     expect(text('legend')).toContain('Last day: 412 of 458 scans, last week: 2900 of 3200 scans.');
@@ -111,7 +111,7 @@ describe('legend', () => {
     showField(estimated([22.4], [0.5]));
     render(<EstimateFacts />);
     const told = await screen.findByTestId('foretold');
-    expect(told.textContent).toBe('7 of 9 scans lay where the other tags put them');
+    expect(told.textContent).toBe('7 of 9 scans were within the predicted range');
   });
 
   test('warns where too few scans lay inside', async () => {
@@ -119,8 +119,8 @@ describe('legend', () => {
     showField(estimated([22.4], [0.5]));
     render(<EstimateFacts />);
     const warning = await screen.findByTestId('estimate-warning');
-    expect(warning.textContent).toContain('Do not rely on the ±');
-    expect(warning.textContent).toContain('only 4 of 10 scans lay');
+    expect(warning.textContent).toContain('Error range is too narrow');
+    expect(warning.textContent).toContain('only 4 of 10 scans were');
   });
 
   test('says neither where the twin cannot tell', async () => {
@@ -133,7 +133,7 @@ describe('legend', () => {
 
   test.each([
     [404, grade(), 'This twin makes no estimate'],
-    [503, grade(), 'There is no estimate just now'],
+    [503, grade(), 'No estimate at the moment'],
     [503, grade({ fitted_at: null, share_day: null }), 'it needs ten scans of a sensor'],
   ])('refused with %d it says why the nearest readings are shown', async (status, said, words) => {
     grades = { temperature: said };
@@ -176,8 +176,10 @@ describe('card', () => {
     showTags(tags, judgement({ '7': [changed] }));
     expected = { '7': expectedReading({ expected: 19, left_out: true }) };
     card();
-    await screen.findByText('Temperature changed: left out of the estimate');
-    expect(text('card-estimate')).toContain('Humidity changed: left out of the estimate');
+    await screen.findByText('Temperature: possible sensor fault, not used in the estimate');
+    expect(text('card-estimate')).toContain(
+      'Humidity: possible sensor fault, not used in the estimate',
+    );
   });
 });
 
@@ -216,12 +218,12 @@ describe('where another tag would help', () => {
       receive({ type: 'past', past: { at: 5, house: store.get().twin.latest } });
       act({ type: 'moment', moment: 5 });
     });
-    expect(text('advice-note')).toBe('Where another tag would help is known of now alone');
+    expect(text('advice-note')).toBe('Suggestions for another tag are for now only');
   });
 
   test('a twin that has no such service says so', async () => {
     places = null;
     render(<AdviceMarks />);
-    await screen.findByText('Where another tag would help is not known: no such service');
+    await screen.findByText('No suggestion for another tag: no such service');
   });
 });

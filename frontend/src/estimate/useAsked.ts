@@ -1,7 +1,7 @@
 import { useEffect, useState } from 'react';
 
 import { useApp } from '../store/app';
-import { createRefresher } from '../store/refresher';
+import { createFetcher } from '../store/fetcher';
 import type { Fetched } from '../store/twin';
 
 /** What the twin says of its estimate changes slowly. */
@@ -20,13 +20,12 @@ export function useAsked<T>(ask: (sensor: string, signal: AbortSignal) => Promis
   useEffect(() => {
     if (!isOpen) return undefined;
     let ticks = 0;
-    const refresher = createRefresher<T>({
-      intervalMs: EVERY_MS,
+    const fetcher = createFetcher<T>({
+      paceMs: EVERY_MS,
       onValue: (value) => {
         setAnswer({ of: sensor, got: { value, state: 'ready', message: '' } });
       },
-      onError: (error) => {
-        const message = error instanceof Error ? error.message : String(error);
+      onError: (message) => {
         setAnswer((last) => ({
           of: sensor,
           got: {
@@ -38,7 +37,7 @@ export function useAsked<T>(ask: (sensor: string, signal: AbortSignal) => Promis
       },
     });
     const want = (): void => {
-      refresher.want({
+      fetcher.want({
         key: String(ticks),
         group: sensor,
         run: (signal) => ask(sensor, signal),
@@ -49,7 +48,7 @@ export function useAsked<T>(ask: (sensor: string, signal: AbortSignal) => Promis
     const timer = setInterval(want, EVERY_MS);
     return () => {
       clearInterval(timer);
-      refresher.want(null);
+      fetcher.want(null);
     };
   }, [ask, sensor, isOpen]);
   return answer?.of === sensor ? answer.got : { value: null, state: 'waiting', message: '' };

@@ -1,7 +1,7 @@
 import { describe, expect, test } from 'vitest';
 
 import { mapPoint, toCanvas } from './coordinates';
-import { imageToCanvas, mapPlacement, opaqueBox, pixelBoxCorners, union, yawOf } from './image';
+import { imageToCanvas, mapPlacement, opaqueBox, pixelBoxCorners, yawOf } from './image';
 
 const view = { x: 200, y: 500, scale: 40 };
 const upright = { originX: -1, originY: 2, yaw: 0, resolution: 0.5, width: 4, height: 6 };
@@ -82,12 +82,4 @@ test('the known part of a picture', () => {
   rgba[(2 * 5 + 3) * 4 + 3] = 1;
   expect(opaqueBox(rgba, 5, 4)).toEqual({ left: 2, top: 1, right: 4, bottom: 3 });
   expect(opaqueBox(new Uint8ClampedArray(16), 2, 2)).toBeNull();
-});
-
-test('union of bounds', () => {
-  const a = { minX: 0, minY: 0, maxX: 1, maxY: 1 };
-  const b = { minX: -1, minY: 0.5, maxX: 0.5, maxY: 3 };
-  expect(union(a, b)).toEqual({ minX: -1, minY: 0, maxX: 1, maxY: 3 });
-  expect(union(a, null)).toBe(a);
-  expect(union(null, b)).toBe(b);
 });

@@ -1,5 +1,5 @@
 import type { OccupancyGrid } from '../contract/types';
-import { mapPoint, type Bounds, type MapPoint, type View } from './coordinates';
+import { mapPoint, type MapPoint, type View } from './coordinates';
 
 /** Canvas transform (a, b, c, d, e, f) as CanvasRenderingContext2D.setTransform takes it. */
 export type Affine = readonly [number, number, number, number, number, number];
@@ -107,15 +107,4 @@ export function opaqueBox(
     }
   }
   return left < right ? { left, top, right, bottom } : null;
-}
-
-export function union(a: Bounds | null, b: Bounds | null): Bounds | null {
-  if (!a) return b;
-  if (!b) return a;
-  return {
-    minX: Math.min(a.minX, b.minX),
-    minY: Math.min(a.minY, b.minY),
-    maxX: Math.max(a.maxX, b.maxX),
-    maxY: Math.max(a.maxY, b.maxY),
-  };
 }

@@ -10,7 +10,7 @@ import { receive, store, type AppState } from './app';
 import { fetchHeat, sourceOf } from './heat';
 import { ASSUMED_MARGIN_M, fieldResolution } from './loaders';
 import { rosNow, selectNewest, selectShown } from './moment';
-import { createSeeker, type Wish } from './seeker';
+import { createFetcher, DRAG_PACE_MS, type Wish } from './fetcher';
 import { NOTHING, type Difference } from './twin';
 
 /** Live, the other moment moves on with now; this far at once, seconds. */
@@ -18,12 +18,13 @@ const STEP_S = 10;
 const TICK_MS = 2_000;
 
 export function startDifference(): () => void {
-  const seeker = createSeeker<Difference>({
+  const fetcher = createFetcher<Difference>({
+    paceMs: DRAG_PACE_MS,
+    isDragged: true,
     onValue: (value) => {
       receive({ type: 'difference', difference: { value, state: 'ready', message: '' } });
     },
-    onError: (error) => {
-      const message = error instanceof Error ? error.message : String(error);
+    onError: (message) => {
       receive({ type: 'difference', difference: { value: null, state: 'failed', message } });
     },
   });
@@ -33,7 +34,7 @@ export function startDifference(): () => void {
     const { compare, sensor } = state.view;
     const { difference } = state.twin;
     if (compare === null) {
-      seeker.want(null);
+      fetcher.want(null);
       if (difference !== NOTHING) receive({ type: 'difference', difference: NOTHING });
       return;
     }
@@ -42,7 +43,7 @@ export function startDifference(): () => void {
     before = state;
     if (isOther && difference !== NOTHING) receive({ type: 'difference', difference: NOTHING });
     const wish = wishFor(state, compare);
-    if (wish) seeker.want(wish);
+    if (wish) fetcher.want(wish);
   };
   update();
   let seen = store.get();
@@ -61,7 +62,7 @@ export function startDifference(): () => void {
   return () => {
     stop();
     clearInterval(timer);
-    seeker.want(null);
+    fetcher.want(null);
   };
 }
 

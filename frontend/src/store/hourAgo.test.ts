@@ -52,11 +52,11 @@ test('an hour before now is asked for once, and again after some minutes', async
   expect(asked).toHaveLength(1);
   expect(Math.round(Number(asked[0]))).toBe(NOW_S - 3_600);
   hear(NOW_S + 302);
-  await pass(10);
+  await pass(1_000);
   expect(asked).toHaveLength(2);
 });
 
-test('another moment is asked for once it stays', async () => {
+test('of the moments that somebody drags through, few are fetched, and the last', async () => {
   stop = startHourAgo();
   await pass(10);
   for (const moment of [50_000, 50_100, 50_200]) {
@@ -72,21 +72,20 @@ test('nobody asks for a trend that nobody wants to see, nor for what was before 
   prefer({ hidden: ['trend'] });
   stop = startHourAgo();
   await pass(1_000);
-  prefer({ hidden: [] });
   hear(3_599);
+  prefer({ hidden: [] });
   await pass(1_000);
   expect(asked).toEqual([]);
 });
 
-test('a twin that keeps no past is asked again after a minute, not with each frame', async () => {
+test('a twin that keeps no past is asked again after a while, not with each frame', async () => {
   answers = false;
   stop = startHourAgo();
   await pass(10);
   answers = true;
   hear(NOW_S + 1);
-  await pass(50_000);
+  await pass(1_500);
   expect(asked).toEqual([]);
-  hear(NOW_S + 2);
-  await pass(11_000);
+  await pass(1_000);
   expect(asked).toHaveLength(1);
 });

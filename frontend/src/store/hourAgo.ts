@@ -1,4 +1,4 @@
-/** The house an hour before what is shown, for the table's trends: one question now and then. */
+/** The house an hour before what is shown, for the table's trends: one request now and then. */
 import { now } from '../clock';
 import { fetchStateAt } from '../contract/past';
 import type { TagHealth } from '../contract/types';
@@ -7,15 +7,14 @@ import { TREND_S, type TagThen } from '../domain/trend';
 import { snapshotOf } from '../domain/twin';
 import { store, type AppState } from './app';
 import { createStore } from './create';
+import { createFetcher } from './fetcher';
 import { rosNow, selectNewest, selectShown, selectSnapshot } from './moment';
 import { isColumnShown } from './settings';
 
 /** An answer serves for so long, seconds of the twin's time: less than anybody sees in a trend. */
 const SERVES_S = 300;
-/** After a question without an answer, ms. */
-const RETRY_MS = 60_000;
-/** Whoever drags through time is not asked for at each step, ms. */
-const SETTLE_MS = 600;
+/** Whoever drags through time does not fetch it at each step, ms. */
+const PACE_MS = 1_000;
 
 export interface HourAgo {
   /** The moment that it lies an hour before, ROS seconds. */
@@ -26,13 +25,6 @@ export interface HourAgo {
 export const hourAgo = createStore<HourAgo | null, HourAgo | null>(null, (_, next) => next);
 
 const NOT_JUDGED: TagHealth = { verdict: 'unknown', reasons: [] };
-
-const serves = (of: number, base: number, isPast: boolean): boolean =>
-  Math.abs(base - of) <= (isPast ? 1 : SERVES_S);
-
-/** The moment that is shown, ROS seconds; null: there is none yet. */
-const baseOf = (state: AppState): number | null =>
-  selectShown(state).moment ?? rosNow(state, now());
 
 /** What was known an hour before what is shown, by the state's own stamp; null: not known. */
 export function selectHourAgo(state: AppState, last: HourAgo | null): HourAgo | null {
@@ -53,74 +45,39 @@ export function selectHourAgoNow(state: AppState, last: HourAgo | null): HourAgo
 }
 
 export function startHourAgo(): () => void {
-  let asking: AbortController | null = null;
-  let asked: number | null = null;
-  let notBefore = 0;
-  let settling: ReturnType<typeof setTimeout> | undefined;
-  let waitingFor: number | 'now' | null = null;
-
-  const ask = (base: number): void => {
-    asking?.abort();
-    const mine = new AbortController();
-    asking = mine;
-    asked = base;
-    fetchStateAt(Math.max(0, base - TREND_S), mine.signal).then(
-      (latest) => {
-        if (mine.signal.aborted) return;
-        asking = null;
-        const { tags } = snapshotOf(latest, 0, null);
-        const known = tags.map((tag): [string, TagThen] => [
-          tag.id,
-          { tag, health: latest.health.tags[tag.id] ?? NOT_JUDGED },
-        ]);
-        hourAgo.dispatch({ of: base, tags: new Map(known) });
-      },
-      () => {
-        if (mine.signal.aborted) return;
-        asking = null;
-        // A twin without a past stays without: it is asked again, and nobody is told.
-        notBefore = now() + RETRY_MS;
-      },
-    );
-  };
-
-  const rest = (): void => {
-    clearTimeout(settling);
-    waitingFor = null;
-  };
-
+  const fetcher = createFetcher<HourAgo>({
+    paceMs: PACE_MS,
+    onValue: hourAgo.dispatch,
+    // The table and the alarms do without.
+    onError: () => undefined,
+  });
   const update = (): void => {
     const state = store.get();
-    const base = baseOf(state);
-    const isPast = selectShown(state).moment !== null;
-    const serving = [hourAgo.get()?.of, asking ? asked : null].some(
-      (of) => of != null && base !== null && serves(of, base, isPast),
-    );
+    const { moment } = selectShown(state);
+    const base = moment ?? rosNow(state, now());
     const isSeen = isColumnShown(state.settings, 'trend') || state.view.list === 'alarms';
-    const isWanted = base !== null && base >= TREND_S && isSeen;
-    if (!isWanted || serving) {
-      rest();
+    if (base === null || base < TREND_S || !isSeen) {
+      fetcher.want(null);
       return;
     }
-    const wish = isPast ? base : 'now';
-    // A frame a second puts nothing off; another moment does.
-    if (wish === waitingFor) return;
-    rest();
-    waitingFor = wish;
-    const wait = Math.max(isPast ? SETTLE_MS : 0, notBefore - now());
-    settling = setTimeout(() => {
-      waitingFor = null;
-      const later = baseOf(store.get());
-      if (later !== null) ask(later);
-    }, wait);
+    fetcher.want({
+      key: moment === null ? `now ${Math.floor(base / SERVES_S)}` : `at ${moment}`,
+      run: (signal) =>
+        fetchStateAt(base - TREND_S, signal).then((latest) => {
+          const { tags } = snapshotOf(latest, 0, null);
+          const known = tags.map((tag): [string, TagThen] => [
+            tag.id,
+            { tag, health: latest.health.tags[tag.id] ?? NOT_JUDGED },
+          ]);
+          return { of: base, tags: new Map(known) };
+        }),
+    });
   };
-
   update();
   const stop = store.subscribe(update);
   return () => {
     stop();
-    rest();
-    asking?.abort();
+    fetcher.want(null);
     hourAgo.dispatch(null);
   };
 }

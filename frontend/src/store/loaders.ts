@@ -8,7 +8,7 @@ import { loadMap, type MapPicture } from './picture';
 import { receive, store, type AppState } from './app';
 import { fetchHeat, sourceOf, type Source } from './heat';
 import { selectNewest } from './moment';
-import { createRefresher, type Task } from './refresher';
+import { createFetcher, type Wish } from './fetcher';
 import { NOTHING } from './twin';
 
 const FIELD_INTERVAL_MS = 500;
@@ -25,28 +25,28 @@ const MAX_CELLS = 60_000;
 const DEFAULT_RESOLUTION_M = 0.1;
 
 export function startLoaders(): () => void {
-  const field = createRefresher<Field>({
-    intervalMs: FIELD_INTERVAL_MS,
+  const field = createFetcher<Field>({
+    paceMs: FIELD_INTERVAL_MS,
     onValue: (value) => {
       receive({ type: 'field', field: { value, state: 'ready', message: '' } });
     },
-    onError: (error) => {
+    onError: (message) => {
       const { value } = selectNewest(store.get()).field;
-      receive({ type: 'field', field: { value, state: 'failed', message: reason(error) } });
+      receive({ type: 'field', field: { value, state: 'failed', message } });
     },
   });
-  const map = createRefresher<MapPicture>({
-    intervalMs: MAP_INTERVAL_MS,
+  const map = createFetcher<MapPicture>({
+    paceMs: MAP_INTERVAL_MS,
     onValue: (value) => {
       receive({ type: 'map', map: { value, state: 'ready', message: '' } });
     },
-    onError: (error) => {
+    onError: (message) => {
       const { value } = selectNewest(store.get()).map;
-      receive({ type: 'map', map: { value, state: 'failed', message: reason(error) } });
+      receive({ type: 'map', map: { value, state: 'failed', message } });
     },
   });
-  const quality = createRefresher<FieldQuality | null>({
-    intervalMs: QUALITY_INTERVAL_MS,
+  const quality = createFetcher<FieldQuality | null>({
+    paceMs: QUALITY_INTERVAL_MS,
     onValue: (value) => {
       receive({ type: 'quality', quality: value });
     },
@@ -139,14 +139,14 @@ function fieldTask(
   source: Source,
   ticks: number,
   snapshot: Snapshot | null,
-): Task<Field> | null {
+): Wish<Field> | null {
   if (!boundsOfPins(snapshot)) return null;
   const resolution = fieldResolution(snapshot);
   const isEstimate = source === 'estimate';
   return {
     key: [base, sensor, resolution, source, isEstimate ? ticks : ''].join('|'),
     group: `${sensor}|${source}`,
-    ...(isEstimate ? { intervalMs: ESTIMATE_INTERVAL_MS } : {}),
+    ...(isEstimate ? { paceMs: ESTIMATE_INTERVAL_MS } : {}),
     run: (signal) => fetchHeat(source, { sensor, resolution }, signal),
   };
 }
@@ -167,8 +167,4 @@ export function fieldResolution(snapshot: Snapshot | null): number {
     },
     MAX_CELLS,
   );
-}
-
-function reason(error: unknown): string {
-  return error instanceof Error ? error.message : String(error);
 }

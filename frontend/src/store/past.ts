@@ -7,7 +7,7 @@ import { receive, store, type AppState } from './app';
 import { fetchHeat, sourceOf, type Source } from './heat';
 import { fieldResolution } from './loaders';
 import { selectNewest, selectPast } from './moment';
-import { createSeeker, type Wish } from './seeker';
+import { createFetcher, DRAG_PACE_MS, type Wish } from './fetcher';
 import { NO_HOUSE, NOTHING, type Fetched, type Past } from './twin';
 
 /**
@@ -69,13 +69,14 @@ export function startPast(): () => void {
     );
   };
 
-  const seeker = createSeeker<Came>({
+  const fetcher = createFetcher<Came>({
+    paceMs: DRAG_PACE_MS,
+    isDragged: true,
     onValue: show,
-    onError: (error, isLasting) => {
+    onError: (message, isLasting) => {
       const { moment } = store.get().view;
       if (moment === null) return;
       if (selectPast(store.get()) === null || isLasting) showNothing(moment);
-      const message = error instanceof Error ? error.message : String(error);
       receive({ type: 'past-fault', fault: { at: moment, message, isLasting } });
     },
   });
@@ -91,7 +92,7 @@ export function startPast(): () => void {
       clearTimeout(patience);
       patience = undefined;
       forgetQuality();
-      seeker.want(null);
+      fetcher.want(null);
       if (past) receive({ type: 'past', past: null });
       return;
     }
@@ -108,7 +109,7 @@ export function startPast(): () => void {
     const { epoch, socket } = state.twin.connection;
     // Each connection asks anew: another server may be behind it, or more was heard meanwhile.
     if (socket.kind === 'open') heardOn = epoch;
-    seeker.want(wishFor(state, moment, heardOn));
+    fetcher.want(wishFor(state, moment, heardOn));
   };
   update();
   const stop = store.subscribe(update);
@@ -116,7 +117,7 @@ export function startPast(): () => void {
     stop();
     clearTimeout(patience);
     forgetQuality();
-    seeker.want(null);
+    fetcher.want(null);
   };
 }
 

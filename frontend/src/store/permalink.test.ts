@@ -140,6 +140,9 @@ describe('permalink', () => {
     );
     const tag = { column: 'tag', descending: true };
     expect(toFragment({ ...DEFAULT_VIEW, sort: tag })).toBe('sort=-tag');
+    const upwards = { column: 'tag', descending: false };
+    expect(toFragment({ ...DEFAULT_VIEW, sort: upwards })).toBe('sort=tag');
+    expect(fromFragment('sort=tag').sort).toEqual(upwards);
   });
 
   test('a filter is as long as one can type', () => {

@@ -61,7 +61,8 @@ export function toFragment(view: Linked): string {
     parts.set('layers', LAYERS.filter((layer) => view.layers.has(layer)).join(','));
   }
   const { column, descending } = view.sort;
-  if (column !== DEFAULT_VIEW.sort.column || descending) {
+  const usual = DEFAULT_VIEW.sort;
+  if (column !== usual.column || descending !== usual.descending) {
     parts.set('sort', `${descending ? '-' : ''}${column}`);
   }
   if (view.filter !== '') parts.set('filter', view.filter);

@@ -6,7 +6,7 @@ import { endsNow, spanOf, type Period, type Span } from '../domain/period';
 import { timelineOf } from '../domain/timeline';
 import { receive, store } from './app';
 import { rosNow, selectNewest } from './moment';
-import { createRefresher } from './refresher';
+import { createFetcher } from './fetcher';
 import { NOT_ASKED, type Remembered } from './twin';
 
 /** Enough for the widest bar: a bucket is two or three pixels there. */
@@ -39,14 +39,13 @@ export function startRemembered(): () => void {
   let group = '';
   /** The connection whose server keeps nothing. */
   let offSince = -1;
-  const refresher = createRefresher<Remembered>({
-    intervalMs: INTERVAL_MS,
+  const fetcher = createFetcher<Remembered>({
+    paceMs: INTERVAL_MS,
     onValue: (remembered) => {
       receive({ type: 'remembered', remembered });
     },
-    onError: (error) => {
+    onError: (message) => {
       const { value } = store.get().twin.remembered;
-      const message = error instanceof Error ? error.message : String(error);
       receive({ type: 'remembered', remembered: { value, state: 'failed', message } });
     },
   });
@@ -64,7 +63,7 @@ export function startRemembered(): () => void {
       // What is known of another period is of no use; how far memory reaches stays true.
       if (value) receive({ type: 'remembered', remembered: NOT_ASKED });
     }
-    refresher.want({
+    fetcher.want({
       key: `${epoch}|${group}|${turnOf(period, nowS)}`,
       group,
       run: (signal) =>
@@ -93,6 +92,6 @@ export function startRemembered(): () => void {
   return () => {
     stop();
     clearInterval(timer);
-    refresher.want(null);
+    fetcher.want(null);
   };
 }

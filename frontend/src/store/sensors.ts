@@ -3,15 +3,15 @@ import { fetchSensors } from '../contract/api';
 import type { SensorsFile } from '../contract/types';
 import { cataloguesOf } from '../domain/sensors';
 import { act, receive, store } from './app';
-import { createRefresher } from './refresher';
+import { createFetcher } from './fetcher';
 import { DEFAULT_VIEW } from './view';
 
 const INTERVAL_MS = 500;
 
 export function startSensors(): () => void {
   let known = '';
-  const sensors = createRefresher<SensorsFile>({
-    intervalMs: INTERVAL_MS,
+  const sensors = createFetcher<SensorsFile>({
+    paceMs: INTERVAL_MS,
     onValue: (file) => {
       const text = JSON.stringify(file);
       // The browser asks with its ETag, and mostly is told that it has it: nothing follows then.
@@ -25,9 +25,8 @@ export function startSensors(): () => void {
       const isChosen = sensor !== DEFAULT_VIEW.sensor || sensor in file.sensors;
       if (first && !isChosen) act({ type: 'sensor', sensor: first.name });
     },
-    onError: (error) => {
+    onError: (message) => {
       // What was in force before goes on: a bridge that is away has no other ranges.
-      const message = error instanceof Error ? error.message : String(error);
       if (known === '') {
         receive({ type: 'sensors', sensors: { value: null, state: 'failed', message } });
       }

@@ -90,7 +90,8 @@ export const DEFAULT_VIEW: ViewState = {
   colouring: 'ideal',
   ranges: new Map(),
   camera: null,
-  sort: { column: 'tag', descending: false },
+  // The worst first.
+  sort: { column: 'health', descending: true },
   filter: '',
   health: null,
   pane: 'map',

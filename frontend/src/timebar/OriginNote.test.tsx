@@ -44,7 +44,7 @@ test('of a robot, or of who does not say, there is nothing to tell', () => {
 
 test('a simulation is live, and told at first sight; one by /clock is not green', () => {
   shows('simulated');
-  expect(screen.getByTestId('origin').textContent).toMatch(/^SimulatedNo robot is at work/);
+  expect(screen.getByTestId('origin').textContent).toMatch(/^SimulatedNo real robot/);
   expect(badge().textContent).toBe('Connection: Live');
   expect(badge().dataset['ofNow']).toBe('true');
   shows('sim_time');
@@ -55,14 +55,14 @@ test('a simulation is live, and told at first sight; one by /clock is not green'
 
 test('a recording is never live: header, badge, frame and the way back say so, and of when', () => {
   shows('recorded');
-  expect(screen.getByTestId('origin').textContent).toMatch(/^Recording.*nothing here is of now/);
+  expect(screen.getByTestId('origin').textContent).toMatch(/^Recording.*nothing here is current/);
   expect(screen.getByTestId('origin').querySelector('strong')?.textContent).toMatch(/^sim 00:00:/);
   expect(badge().textContent).toBe('Connection: Playing');
   expect(badge().dataset['ofNow']).toBe('false');
   expect(screen.getByTestId('recorded-frame').textContent).toMatch(/^Recording: sim 00:00:/);
   expect(screen.getByRole('button').textContent).toBe('Back to the recording');
   shows('recorded', 'paused');
-  expect(badge().textContent).toBe('Connection: Stands still');
+  expect(badge().textContent).toBe('Connection: Paused');
   expect(document.body.textContent).not.toMatch(/live/i);
   flush(goLost);
   expect(badge().textContent).toBe('Connection: Reconnecting');

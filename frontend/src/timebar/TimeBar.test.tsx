@@ -175,13 +175,13 @@ test('a twin that remembers nothing says so, and how to change it', () => {
   });
   render(<TimeBar />);
   const bar = screen.getByTestId('timebar');
-  expect(bar.textContent).toContain('this twin remembers nothing');
+  expect(bar.textContent).toContain('this twin records nothing');
   // Plain words: neither a parameter nor what the bridge said.
   expect(bar.textContent).not.toMatch(/journal/);
   expect(screen.queryByRole('slider')).toBeNull();
 });
 
-test('what could not be fetched is told, beside what is known', () => {
+test('what could not be loaded is told, beside what is known', () => {
   const { remembered } = store.get().twin;
   receive({
     type: 'remembered',

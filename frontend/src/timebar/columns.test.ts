@@ -97,3 +97,13 @@ test('the column under a point', () => {
   expect(columnAt(columns, 9.9)?.start).toBe(100);
   expect(columnAt(columns, 10)).toBeUndefined();
 });
+
+test('no column goes on beyond the end of the bar', () => {
+  const { from, to, width } = AXIS;
+  const [last] = columnsOf(
+    timelineWith({ buckets: [bucket(to - 1, { scans: 1 })], bucketS: (to - from) / 4 }),
+    AXIS,
+  );
+  expect(last?.end).toBe(to);
+  expect((last?.x ?? 0) + (last?.width ?? 0)).toBeLessThanOrEqual(width + 1);
+});

@@ -41,11 +41,13 @@ export function columnsOf({ buckets, bucketS }: Timeline, axis: Axis): readonly 
   const most = Math.max(1, ...all.map(({ scans, failures }) => Math.max(scans, failures)));
   return all.map((sum) => {
     const x = xOf(axis, sum.start);
+    // None beyond the end of the bar, which is mostly now.
+    const end = Math.min(sum.start + wide, axis.to);
     return {
       ...sum,
-      end: sum.start + wide,
+      end,
       x,
-      width: xOf(axis, sum.start + wide) - x,
+      width: Math.max(1, xOf(axis, end) - x),
       scanHeight: height(sum.scans, most),
       failureHeight: height(sum.failures, most),
     };

@@ -54,7 +54,7 @@ export function drawBar(surface: Surface, bar: Bar, palette: BarPalette): void {
   context.strokeStyle = palette.muted;
   context.lineWidth = 1;
   line(context, 0, BASE_PX + 0.5, axis.width, BASE_PX + 0.5);
-  drawColumns(context, bar.columns, palette);
+  drawColumns(context, bar.columns, axis.width, palette);
   for (const x of timeline ? runStarts(timeline, axis) : []) drawRunStart(context, x, palette);
   context.restore();
 }
@@ -111,6 +111,7 @@ function drawTicks(context: CanvasRenderingContext2D, bar: Bar, palette: BarPale
 function drawColumns(
   context: CanvasRenderingContext2D,
   columns: readonly Column[],
+  axisWidth: number,
   palette: BarPalette,
 ): void {
   for (const { x, width, scanHeight, failureHeight, pestsSeen, pestsCleared } of columns) {
@@ -128,7 +129,8 @@ function drawColumns(
       context.fillStyle = palette.failure;
       context.fillRect(x, BASE_PX + 1, inner, Math.max(3, failureHeight * (FAILURES_PX - 1)));
     }
-    const middle = x + width / 2;
+    // Whole, also at the end of the bar.
+    const middle = Math.min(x + width / 2, axisWidth - 5);
     if (pestsSeen > 0) drawPest(context, middle, palette);
     // Where both lie in one column, the one that needs somebody is on top.
     else if (pestsCleared > 0) drawCleared(context, middle, palette);

@@ -53,7 +53,7 @@ describe('one end of a fixed range', () => {
 
   test.each([
     ['99', 'too high'],
-    ['', 'No number: not in use'],
+    ['', 'Not a number: not applied'],
   ])('“%s” says why it is not in use, and gives way on leaving', (text, why) => {
     type(text);
     expect(field().getAttribute('aria-invalid')).toBe('true');

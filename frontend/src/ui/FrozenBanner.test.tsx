@@ -36,8 +36,8 @@ test('a lost connection: frozen, since when, and a way to try now', () => {
 });
 
 test.each([
-  ['stale', /fallen silent/, /published on \/twin\/state/],
-  ['never_seen', /has not heard/, /same ROS domain/],
+  ['stale', /stopped sending/, /published on \/twin\/state/],
+  ['never_seen', /has received nothing/, /same ROS domain/],
   ['thread_dead', /restarted/, /ROS thread/],
   ['shutting_down', /shutting down/, null],
 ] as const)('twin offline, %s: the reason in words, the machines behind', (reason, words, more) => {
@@ -79,8 +79,8 @@ test('behind a look back: live data have stopped, and what is shown stays', () =
       <ConnectionBadge />
     </>,
   );
-  expect(text()).toContain('Live data have stopped.');
-  expect(text()).toContain('What is shown is past, and stays.');
+  expect(text()).toContain('Live data has stopped.');
+  expect(text()).toContain('The past that is shown is not affected.');
   expect(text()).not.toContain('frozen');
   expect(screen.getByTestId('connection').textContent).toContain('Past · reconnecting');
 });

@@ -38,18 +38,18 @@ test('counts the tags by verdict, and filters by one', () => {
 test('all is well, hardly anything is known, and nothing is', () => {
   showTags(TAGS, judgement({ 1: 'healthy', 5: 'healthy' }));
   render(<HealthSummary kiosk={false} />);
-  expect(driver().textContent).toMatch(/^Every judged reading/);
+  expect(driver().textContent).toMatch(/^All assessed readings/);
   const few = judgement({ 1: 'unknown', 5: 'unknown' });
   act(() => {
     showTags(TAGS, few);
   });
   expect(house().dataset['health']).toBe('unknown');
   expect(driver().textContent).toMatch(/^More than half/);
-  // Not "nothing is known": its other sensors may well read.
+  // Not "": its other sensors may well read.
   act(() => {
     showTags(TAGS, judgement({ 1: 'healthy', 5: 'unknown' }));
   });
-  expect(driver().textContent).toBe('1 tag cannot be judged');
+  expect(driver().textContent).toBe('1 tag cannot be assessed');
   act(() => {
     showTags([]);
   });
@@ -68,7 +68,7 @@ test('beside an active alarm, healthy says why', () => {
   act(() => {
     tellAlarms(alarm('a', { cleared: 950 }));
   });
-  expect(driver().textContent).toMatch(/^Every judged reading/);
+  expect(driver().textContent).toMatch(/^All assessed readings/);
   stop();
 });
 
@@ -82,9 +82,9 @@ test('a house that is not heard of is unknown, whatever was said last', () => {
 });
 
 test.each([
-  [true, 'light', 'Judged by the ranges for the day: so the light in the greenhouse says'],
-  [false, 'clock', 'Judged by the ranges for the night: so the clock says, for no light'],
-  [true, 'assumed', 'Judged by the ranges for the day: assumed'],
+  [true, 'light', 'The ranges for the day apply: by the light in the greenhouse'],
+  [false, 'clock', 'The ranges for the night apply: by the clock, as no light'],
+  [true, 'assumed', 'The ranges for the day apply: assumed'],
 ] as const)('whose ranges hold is said: day %s, by %s', (is_day, source, told) => {
   showTags(TAGS, judgement({}, { is_day, source }));
   render(<HealthSummary kiosk={false} />);

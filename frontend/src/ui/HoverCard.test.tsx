@@ -53,7 +53,7 @@ describe('card of the pin under the mouse', () => {
     point('7');
     const text = card()?.textContent;
     expect(text).toContain('Tag 7Critical');
-    expect(text).toContain('2 pests seenCO₂: the sensor gives no value1 more');
+    expect(text).toContain('2 pests seenCO₂: the sensor returns no value1 more');
     expect(text).toMatch(
       /Temperature40\.0\u00a0°C too high by 14\.0\u00a0°C \d\u00a0sHumidity60\.0\u00a0% ideal \d\u00a0sCO₂failed +\d\u00a0s/,
     );

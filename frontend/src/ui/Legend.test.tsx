@@ -27,7 +27,7 @@ describe('legend', () => {
     expect(at('range-low')).toBe('12.0');
     expect(at('range-high')).toBe('30.0\u00a0°C');
     expect(at('sample-count')).toBe('9 tags contribute');
-    expect(at('legend')).toMatch(/No colour: the minimum. Hatched: not known/);
+    expect(at('legend')).toMatch(/No colour: minimum. Hatched: no data/);
   });
 
   test('shows the error where the server gives one, and nothing where it does not', () => {
@@ -48,10 +48,10 @@ describe('legend', () => {
     });
     prefer({ unit: 'F' });
     rerender(<Legend kiosk={false} />);
-    expect(at('rmse')).toBe('typically off by ±2.7\u00a0°F');
+    expect(at('rmse')).toBe('Typical error 2.7\u00a0°F');
   });
 
-  test('says what is too old to say, by both colourings, and of no moment when nothing was', () => {
+  test('says what is readings too old, by both colourings, and of no moment when nothing was', () => {
     const { rerender } = render(<Legend kiosk={false} />);
     expect(screen.queryByTestId('legend-old')).toBeNull();
     const { field } = store.get().twin.latest;
@@ -62,7 +62,7 @@ describe('legend', () => {
     for (const colouring of ['ideal', 'value'] as const) {
       act({ type: 'colouring', colouring });
       rerender(<Legend kiosk={false} />);
-      expect(at('legend-old')).toBe(' Faint and hatched: too old to say');
+      expect(at('legend-old')).toBe(' Faint and hatched: readings too old');
     }
     const { latest } = store.get().twin;
     receive({ type: 'past', past: { at: 50, house: { ...latest, health: NOBODY } } });
@@ -81,7 +81,7 @@ describe('legend', () => {
     showTags([wireTag({ readings: readings({ humidity: 60 }) })]);
     act({ type: 'sensor', sensor: 'humidity' });
     render(<Legend kiosk={false} />);
-    expect(at('sample-count')).toBe('The heat map is on its way');
+    expect(at('sample-count')).toBe('Loading the heat map');
   });
 
   test('tells what the colours mean against the ideal, and has one click to either', () => {
@@ -143,7 +143,7 @@ describe('legend', () => {
       'Stressed',
       'Unknown',
       'Healthy',
-      'has no such sensor',
+      'no such sensor',
       'sensor failed',
       'pest seen',
     ]);

@@ -78,7 +78,7 @@ export function Legend({ kiosk }: { kiosk: boolean }): JSX.Element {
               <HatchedSign /> {isIdeal ? S.legendHatched : S.legendTransparent}
             </span>
             <span className="legend-note short">
-              <HatchedSign /> {isIdeal ? S.legendHatchedShort : S.legendTransparentShort}
+              <HatchedSign /> {isIdeal ? S.legendHatched : S.legendTransparentShort}
             </span>
           </>
         )}
@@ -126,7 +126,7 @@ function Quality({
   const { rmse, worst } = quality;
   if (rmse === null) return null;
   const error = (value: number): string =>
-    `±${numberText(differenceToShown(sensor, Math.abs(value), unit))}\u00a0${unitOf(sensor, unit)}`;
+    `${numberText(differenceToShown(sensor, Math.abs(value), unit))}\u00a0${unitOf(sensor, unit)}`;
   const atWorst = worst
     ? ` ${S.legendErrorWorst(shown(worst.tag_id, 24), error(worst.error))}`
     : '';

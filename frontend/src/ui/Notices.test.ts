@@ -37,7 +37,7 @@ describe('the most basic lack is told first', () => {
     expect(noticeFor(store.get())).toMatchObject({
       id: 'no-twin',
       title: 'No tags yet',
-      hint: expect.stringContaining('does not know the time') as string,
+      hint: expect.stringContaining('has no time yet') as string,
     });
   });
 
@@ -57,7 +57,7 @@ describe('the most basic lack is told first', () => {
     expect(id()).toBe('no-map');
   });
 
-  test('a field that could not be fetched, with the server’s reason', () => {
+  test('a field that could not be loaded, with the server’s reason', () => {
     receive({ type: 'field', field: { value: null, state: 'failed', message: 'too many cells' } });
     expect(noticeFor(store.get())?.title).toContain('too many cells');
   });
@@ -79,7 +79,7 @@ describe('of a moment in the past', () => {
     come(NO_HOUSE);
     expect(noticeFor(store.get())).toMatchObject({
       id: 'past-fetching',
-      title: 'Fetching sim 01:23:45',
+      title: 'Loading sim 01:23:45',
       large: true,
     });
   });
@@ -90,24 +90,22 @@ describe('of a moment in the past', () => {
     expect(noticeFor(store.get())).toMatchObject({ id: 'past-failed', hint: 'no journal is kept' });
   });
 
-  test('of which nothing is known, it says since when anything is', () => {
+  test('of which , it says since when anything is', () => {
     come({ ...NO_HOUSE, snapshot: snapshot([]) });
     expect(noticeFor(store.get())).toMatchObject({
       id: 'past-nothing',
-      hint: 'Nothing is remembered yet.',
+      hint: 'Nothing has been recorded yet.',
     });
     const value = timelineOf(wireTimeline({ from: 7_200, to: 9_000 }), 9_000);
     receive({ type: 'remembered', remembered: { value, state: 'ready', message: '' } });
-    expect(noticeFor(store.get())?.hint).toBe('What is remembered begins at sim 02:00:00.');
+    expect(noticeFor(store.get())?.hint).toBe('Recorded data begins at sim 02:00:00.');
   });
 
   test('that the journal does not have all of is not said to have been empty', () => {
     come({ ...NO_HOUSE, snapshot: { ...snapshot([]), isWhole: false } });
     const value = timelineOf(wireTimeline({ from: 0, to: 9_000 }), 9_000);
     receive({ type: 'remembered', remembered: { value, state: 'ready', message: '' } });
-    expect(noticeFor(store.get())?.hint).toBe(
-      'What the twin received then is no longer kept, or not recorded yet.',
-    );
+    expect(noticeFor(store.get())?.hint).toBe('This is no longer stored, or was not recorded yet.');
   });
 
   test('with tags there is nothing to say', () => {

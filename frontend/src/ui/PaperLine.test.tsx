@@ -26,7 +26,7 @@ test('paper says when it was, when it was printed, and what is on it', () => {
   });
   const when = 'As of 1 May 2026, 14:03:22, printed 1 May 2026, 14:04:27';
   const line = (): string => screen.getByTestId('paper-line').textContent;
-  expect(line()).toBe(`${when} Temperature against its ideal 18.0 – 26.0\u00a0°C`);
+  expect(line()).toBe(`${when} Temperature compared with its ideal range 18.0 – 26.0\u00a0°C`);
   flush(() => {
     act({ type: 'colouring', colouring: 'value' });
   });

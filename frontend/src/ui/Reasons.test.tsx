@@ -39,10 +39,10 @@ const WORDS: Readonly<Record<Verdict, string>> = {
 /** What has to be read in the words for each kind. */
 const SAYS: Readonly<Record<HealthReason['kind'], RegExp>> = {
   range: /, (below|above) [\d.]+( \(critical\))?$/,
-  reading_failed: /: (the sensor gives no value|no sensor that works reads this)$/,
+  reading_failed: /: (the sensor returns no value|not a plausible value)$/,
   scan_failed: /^Last scan failed: (not reachable|not decoded)/,
   pest: /^(\d+ pests?|Pest) seen$/,
-  old: /(^Not scanned|^No scan|: no(t| reading) ).* \(readings hold 10\u00a0min\)$/,
+  old: /(^Not scanned|^No scan|: no(t| reading) ).* \(readings are valid for 10\u00a0min\)$/,
   changed: /changed/,
   silent: /silent/,
   stopped: /stopped/,
@@ -83,7 +83,7 @@ test.each(CASES)('$name', (state) => {
     expect(line?.querySelector('.health-mark')?.getAttribute('data-health')).toBe(verdict);
     if (kind !== 'range' || value === null || limit === null) continue;
     expect(line?.textContent).toContain(value < limit ? 'below' : 'above');
-    // The reading that is out of its range is marked where it stands, and no other one.
+    // The reading that is out of range is marked where it stands, and no other one.
     const marks = [...(row?.querySelectorAll('.beyond') ?? [])];
     const cell = row?.querySelector(`[data-sensor="${sensor}"]`);
     if (state.readings[sensor]) expect(marks.some((mark) => cell?.contains(mark))).toBe(true);

@@ -80,7 +80,7 @@ describe('card', () => {
 
   test('a tag that a link names and nobody knows', () => {
     render(<TagCard tagId="404" />);
-    expect(screen.getByTestId('tag-card').textContent).toContain('does not list this tag');
+    expect(screen.getByTestId('tag-card').textContent).toContain('does not have this tag');
   });
 
   test('draws the history that the server has', async () => {
@@ -109,10 +109,10 @@ describe('card', () => {
     render(<TagCard tagId="7" />);
     const line = await screen.findByRole('img', { name: /Last 2 readings, between 9\.0/ });
     expect(line.querySelector('polyline')).not.toBeNull();
-    const tries = screen.getByRole('region', { name: 'Last tries' });
+    const tries = screen.getByRole('region', { name: 'Last attempts' });
     const told = [...tries.querySelectorAll('li')].map((each) => each.textContent);
     expect(told).toHaveLength(2);
-    expect(told[0]).toMatch(/trynot decoded blurred$/);
+    expect(told[0]).toMatch(/attemptnot decoded blurred$/);
     expect(told[1]).toMatch(/scanOK$/);
   });
 
@@ -120,7 +120,7 @@ describe('card', () => {
     const none = { tag_id: '7', is_known: false, sensors: [], tries: [] };
     vi.stubGlobal('fetch', () => Promise.resolve(Response.json(none)));
     render(<TagCard tagId="7" />);
-    expect(await screen.findByText('This twin tells no history.')).toBeTruthy();
+    expect(await screen.findByText('This twin provides no history.')).toBeTruthy();
   });
 
   test('each reading is as old as it is itself, and the look at the flowers apart', () => {
@@ -144,7 +144,7 @@ describe('card', () => {
     expect(own('temperature')?.textContent).toContain('2\u00a0h 0\u00a0min');
     expect(own('temperature')?.dataset['age']).toBe('old');
     expect(own('co2')?.textContent).toContain('not known');
-    expect(screen.getByTestId('tag-card').textContent).toContain('Flowers seen');
+    expect(screen.getByTestId('tag-card').textContent).toContain('Flowers inspected');
   });
 
   test('a try that came to nothing is told with its reason', () => {
@@ -166,7 +166,7 @@ describe('card', () => {
     });
     render(<TagCard tagId="7" />);
     const { textContent } = screen.getByTestId('tag-card');
-    expect(textContent).toContain('tried 3\u00a0min ago, not decoded');
+    expect(textContent).toContain('tried 3\u00a0min ago: not decoded');
     expect(textContent).toContain('no tag in the picture');
   });
 });

@@ -74,10 +74,18 @@ export const TagRow = memo(function TagRow({
       {has('health') && (
         <td className="cell-health" title={why}>
           <HealthMark verdict={health.verdict} />
-          {why !== '' && (
+          {(why !== '' || tag.failedTry) && (
             <>
               <span className="unseen">: </span>
-              <span className="why">{why}</span>
+              <span className="why">
+                {tag.failedTry && (
+                  <span className="tried">
+                    <Tried failed={tag.failedTry} />
+                  </span>
+                )}
+                {tag.failedTry && why !== '' && '; '}
+                {why}
+              </span>
             </>
           )}
         </td>
@@ -115,11 +123,6 @@ export const TagRow = memo(function TagRow({
             </>
           ) : (
             <span className="faint">{S.noSensor}</span>
-          )}
-          {tag.failedTry && (
-            <span className="tried">
-              <Tried failed={tag.failedTry} />
-            </span>
           )}
         </td>
       )}

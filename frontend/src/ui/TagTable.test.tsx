@@ -44,10 +44,27 @@ const press = (name: RegExp): void => {
 describe('table', () => {
   test('lists every tag, also one without a pin that nobody observed', () => {
     render(<TagTable />);
-    expect(order()).toEqual(['2', '9', '10']);
+    // The worst first.
+    expect(order()).toEqual(['10', '9', '2']);
     expect(row('2').dataset['pinned']).toBe('false');
     expect(row('2').textContent).toContain('No pin');
     expect(row('2').textContent).toContain('never');
+  });
+
+  test('no row moves below a pointer, and all do once it has left', () => {
+    render(<TagTable />);
+    const body = row('2').parentElement ?? document.body;
+    fireEvent.pointerEnter(body);
+    flush(() => {
+      showTags(
+        ['2', '9', '10'].map((tag_id) => wireTag({ tag_id })),
+        judgement({ 2: [reason({})] }),
+      );
+    });
+    expect(row('2').dataset['health']).toBe('critical');
+    expect(order()).toEqual(['10', '9', '2']);
+    fireEvent.pointerLeave(body);
+    expect(order()).toEqual(['2', '9', '10']);
   });
 
   test('shows readings, a failed sensor, species with confidence, pest and health', () => {
@@ -63,13 +80,13 @@ describe('table', () => {
     expect(row('10').dataset['health']).toBe('critical');
     expect(row('2').dataset['health']).toBe('unknown');
     const why = row('9').querySelector('.cell-health');
-    expect(why?.getAttribute('title')).toBe('Humidity: the sensor gives no value');
-    expect(why?.textContent).toBe('Stressed: Humidity: the sensor gives no value');
+    expect(why?.getAttribute('title')).toBe('Humidity: the sensor returns no value');
+    expect(why?.textContent).toBe('Stressed: Humidity: the sensor returns no value');
   });
 
   test('sorts by a column, up and down, and says so', () => {
     render(<TagTable />);
-    expect(head(/^Tag/).getAttribute('aria-sort')).toBe('ascending');
+    expect(head(/^Health/).getAttribute('aria-sort')).toBe('descending');
     press(/^Temperature/);
     expect(head(/^Temperature/).getAttribute('aria-sort')).toBe('ascending');
     expect(head(/^Tag/).getAttribute('aria-sort')).toBe('none');
@@ -146,7 +163,7 @@ describe('table', () => {
       });
     });
     expect(trends()).toEqual([
-      '\u2197 Temperature against an hour ago: +1.5\u00a0°C',
+      '\u2197 Temperature compared with an hour ago: +1.5\u00a0°C',
       '– no reading an hour ago',
     ]);
     // An answer of long ago is none.

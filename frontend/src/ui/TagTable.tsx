@@ -14,7 +14,7 @@ import type { Sensor } from '../domain/sensors';
 import { shown } from '../domain/text';
 import { unitOf } from '../domain/units';
 import { act, store, useApp } from '../store/app';
-import { selectCatalogue, selectRows, selectShownColumns } from '../store/derived';
+import { selectCatalogue, selectShownColumns } from '../store/derived';
 import { useSelected } from '../store/create';
 import { hourAgo, selectHourAgo } from '../store/hourAgo';
 import { selectTags } from '../store/moment';
@@ -23,6 +23,7 @@ import { S } from '../strings';
 import { Icon } from '../widgets/Icon';
 import { TagRow } from './TagRow';
 import { useChosenInSight } from './chosenInSight';
+import { useHeldRows } from './useHeldRows';
 import { partsOf, SHORT_TABLE, useVisibleRows } from './visibleRows';
 
 /** Beside the tag's own, and those of sensors. */
@@ -36,7 +37,7 @@ export function TagTable(): JSX.Element {
   const selected = useApp((state) => state.view.selected);
   const hovered = useApp((state) => state.view.hovered);
   const unit = useApp((state) => state.settings.unit);
-  const rows = useApp(selectRows);
+  const { rows, ...hold } = useHeldRows();
   const hasTags = useApp((state) => selectTags(state).length > 0);
   const density = useApp((state) => state.settings.density);
   const hidden = useApp((state) => state.settings.hidden);
@@ -115,7 +116,7 @@ export function TagTable(): JSX.Element {
           )}
         </tr>
       </thead>
-      <tbody ref={body}>
+      <tbody ref={body} {...hold}>
         {partsOf(rows.length, sight, single).map((part, place) => {
           if (part.kind === 'gap') {
             const height = part.rows * sight.rowHeight;

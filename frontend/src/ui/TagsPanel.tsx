@@ -1,4 +1,4 @@
-import type { JSX } from 'react';
+import { useEffect, useRef, type JSX } from 'react';
 
 import { act, useApp } from '../store/app';
 import { selectRows } from '../store/derived';
@@ -28,16 +28,35 @@ export function TagsPanel({ kiosk }: { kiosk: boolean }): JSX.Element {
       ) : (
         <>
           <FilterBar />
-          {/* Scrolls by itself, so the keyboard must be able to reach it. */}
-          {/* eslint-disable-next-line jsx-a11y/no-noninteractive-tabindex */}
-          <div className="table-scroll" role="region" aria-label={S.tableCaption} tabIndex={0}>
-            <TagTable />
-            <PaperRest />
-            <EmptyTable />
-          </div>
+          <Rows />
         </>
       )}
     </section>
+  );
+}
+
+/** The table in a frame of its own. What is filtered anew is shown from its first row. */
+function Rows(): JSX.Element {
+  const filter = useApp(({ view }) => view.filter);
+  const status = useApp(({ view }) => view.health);
+  const frame = useRef<HTMLDivElement>(null);
+  useEffect(() => {
+    if (frame.current) frame.current.scrollTop = 0;
+  }, [filter, status]);
+  return (
+    // Scrolls by itself, so the keyboard must be able to reach it.
+    <div
+      ref={frame}
+      className="table-scroll"
+      role="region"
+      aria-label={S.tableCaption}
+      // eslint-disable-next-line jsx-a11y/no-noninteractive-tabindex
+      tabIndex={0}
+    >
+      <TagTable />
+      <PaperRest />
+      <EmptyTable />
+    </div>
   );
 }
 

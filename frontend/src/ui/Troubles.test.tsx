@@ -41,7 +41,7 @@ test('a part of the page that has not arrived is told', () => {
   flush(() => {
     later.dispatch({ parts: null, isLate: true });
   });
-  expect(lines()).toEqual([expect.stringMatching(/^Part of the page has not arrived\. Cards/)]);
+  expect(lines()).toEqual([expect.stringMatching(/^Part of the page has not loaded\. Cards/)]);
   flush(() => {
     later.dispatch({ parts: null, isLate: false });
   });
@@ -57,7 +57,7 @@ test('what the twin dropped is told with its count, and a pause as one', () => {
   );
   render(<Troubles />);
   expect(lines()).toEqual([
-    'Time is paused. The simulation, or the recording, stands still, and so do all ages.',
+    'Time is paused. The simulation or recording is paused, so ages do not increase.',
     'The twin dropped 12 messages in the last minutes. The last: frame odom, expected map',
   ]);
 });
@@ -67,8 +67,8 @@ test('what the twin does not hear is told with the remedy, to its end', () => {
   goLive(status({ input_problems: [`${why}; use TRANSIENT_LOCAL`, 'nothing has come yet'] }));
   render(<Troubles />);
   expect(lines()).toEqual([
-    `The twin does not hear all that is published for it. ${why}; use TRANSIENT_LOCAL.`,
-    'The twin does not hear all that is published for it. Nothing has come yet.',
+    `The twin does not receive everything that is published for it. ${why}; use TRANSIENT_LOCAL.`,
+    'The twin does not receive everything that is published for it. Nothing has come yet.',
   ]);
 });
 
@@ -76,7 +76,7 @@ test('a recording stands still because it is paused, or over', () => {
   goLive(status({ reason: 'paused', origin: 'recorded' }));
   render(<Troubles />);
   expect(lines()).toEqual([
-    'The recording stands still. It is paused or has come to its end, and no age goes on.',
+    'The recording is paused. It is paused or has ended, so ages do not increase.',
   ]);
 });
 
@@ -93,21 +93,25 @@ const journal = (over: Partial<Journal>): void => {
 };
 
 test.each([
-  ['failing', 'Nothing is being recorded.', /Database or disk is full\. The twin goes on,/],
-  ['slow', 'The recording lags behind.', /What waits is written as the disk keeps up/],
-  ['upgrading', 'The recording of an older version is being upgraded.', /it may take minutes/],
+  ['failing', 'Nothing is being recorded.', /Database or disk is full\. The twin keeps running/],
+  ['slow', 'Recording is behind.', /Data waits in memory/],
+  ['upgrading', 'The recording of an older version is being upgraded.', /which may take minutes/],
   [
     'doubting',
     'Nothing is being recorded: the clock contradicts the recording.',
-    /once the clock is right/,
+    /when the clock is right/,
   ],
-  ['in_use', 'This twin does not record: another one does.', /Stop one of them, or give/],
+  [
+    'in_use',
+    'This twin is not recording: another twin uses its file.',
+    /Stop one of them, or give/,
+  ],
   [
     'foreign',
-    "This twin does not record: its file is somebody else's.",
+    'This twin is not recording: its file belongs to another program.',
     /Give the twin another file/,
   ],
-  ['off', 'Nothing is recorded.', /After a restart the twin knows nothing of before/],
+  ['off', 'Nothing is recorded.', /After a restart, all earlier data is lost/],
 ] as const)('a journal that is %s is told, with why and what to do', (state, title, hint) => {
   render(<Troubles />);
   journal({ state, detail: 'database or disk is full' });
@@ -135,15 +139,15 @@ test('a damaged journal that was set aside is told by its name', () => {
   render(<Troubles />);
   journal({ set_aside: '/home/x/j.sqlite.damaged-20261121T141500Z' });
   expect(lines()).toEqual([
-    'A damaged recording was set aside. What could be read of it was kept, and recording goes on. ' +
-      'The old file is /home/x/j.sqlite.damaged-20261121T141500Z.',
+    'A damaged recording was quarantined. Readable data was kept, and recording continues. ' +
+      'The damaged file is /home/x/j.sqlite.damaged-20261121T141500Z.',
   ]);
 });
 
 test.each([
-  ['mqtt', 'Home automation (MQTT) is not being told. '],
-  ['webhook', 'Alarms are not being passed on (webhook). '],
-  ['constructor', 'constructor is not being told. '],
+  ['mqtt', 'Home automation (MQTT) receives no updates. '],
+  ['webhook', 'The webhook receives no alarms. '],
+  ['constructor', 'constructor receives no updates. '],
 ])('that %s does not reach its receiver is told until it does', (channel, title) => {
   render(<Troubles />);
   const outward = (isFailing: boolean, detail: string): void => {
@@ -156,7 +160,7 @@ test.each([
   outward(true, 'connection refused (mqtt://broker.lan:1883)');
   expect(lines()).toEqual([
     `${title}Connection refused (mqtt://broker.lan:1883). ` +
-      'It is tried again and again; this page is not affected.',
+      'The server keeps trying. This page is not affected.',
   ]);
   outward(true, 'no answer within 10 s');
   expect(lines()[0]).toContain('No answer within 10 s.');
@@ -164,12 +168,12 @@ test.each([
   expect(lines()).toEqual([]);
 });
 
-test('a moment that could not be fetched, and which one is shown instead', () => {
+test('a moment that could not be loaded, and which one is shown instead', () => {
   receive({ type: 'past', past: { at: 5_025, house: NO_HOUSE } });
   act({ type: 'moment', moment: 3_600 });
   receive({ type: 'past-fault', fault: { at: 3_600, message: 'too busy', isLasting: false } });
   render(<Troubles />);
   expect(lines()).toEqual([
-    'sim 01:00:00 could not be fetched. Shown is sim 01:23:45; it is tried again. too busy',
+    'sim 01:00:00 could not be loaded. Showing sim 01:23:45 while the page retries. too busy',
   ]);
 });

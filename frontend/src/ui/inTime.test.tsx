@@ -29,6 +29,6 @@ test('one that does not come says so, and what is beside it stays', async () => 
       <p>the map</p>
     </>,
   );
-  expect((await screen.findByRole('status')).textContent).toContain('Load the page again');
+  expect((await screen.findByRole('status')).textContent).toContain('Reload the page');
   expect(screen.getByText('the map')).toBeTruthy();
 });

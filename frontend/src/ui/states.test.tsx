@@ -64,7 +64,7 @@ const LANGUAGES: Readonly<Record<'en' | 'de', Language>> = {
     sides: ['below', 'above'],
     says: {
       range: /\d.*, (below|above) \d/,
-      reading_failed: /the sensor gives no value$/,
+      reading_failed: /the sensor returns no value$/,
       scan_failed: /^Last scan failed: (not reachable|not decoded)/,
       pest: /^\d+ pests? seen$/,
       old: /[Nn]ot scanned|[Nn]o scan|no reading/,
@@ -96,11 +96,11 @@ const LANGUAGES: Readonly<Record<'en' | 'de', Language>> = {
     says: {
       range: /\d.*, (unter|über) \d/,
       reading_failed: /Der Sensor liefert keinen Wert$/,
-      scan_failed: /^Letzte Messung gescheitert: (nicht erreichbar|nicht erkannt|nicht lesbar)/,
+      scan_failed: /^Letzte Messung fehlgeschlagen: (nicht erreichbar|nicht erkannt|nicht lesbar)/,
       pest: /^\d+ Schädlinge? gesehen$/,
       old: /gemessen|kein Messwert|[Kk]eine Messung/,
       changed: /verändert/,
-      silent: /Zwilling schweigt/,
+      silent: /Zwilling sendet nicht/,
       stopped: /kein Messpunkt mehr gemessen/,
     },
     alarms: { range: /(unter|über) \d/, pest: /^Schädling gesehen, jetzt \d+ \(kritisch\)$/ },

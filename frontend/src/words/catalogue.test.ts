@@ -29,16 +29,16 @@ const english = saidBy({ ...ENGLISH, ...ESTIMATE }, parameters);
 const SAME: Readonly<Record<string, readonly string[]>> = {
   de: [
     ...['phase.live', 'timebarLive', 'keys.time.3.1', 'themes.system', 'tried.ok', 'sensors'],
-    ...['cardPosition', 'chartKeys.ideal', 'rangeAuto', 'saveCsvShort', 'fileName'],
-    ...['keys.global.12.0', 'idealParts.any', 'colourings.ideal'],
+    ...['cardPosition', 'rangeAuto', 'saveCsvShort', 'fileName'],
+    ...['keys.global.12.0', 'idealParts.any', 'colourings.ideal', 'differenceTimes'],
   ],
   nl: [
-    ...['phase.live', 'timebarLive', 'keys.time.3.1', 'menu', 'tried.ok', 'sensors'],
-    ...['rangeAuto', 'saveCsvShort', 'fileName'],
+    ...['phase.live', 'timebarLive', 'keys.time.3.1', 'menu', 'tried.ok', 'sensors', 'alarmCount'],
+    ...['rangeAuto', 'saveCsvShort', 'fileName', 'trend'],
     ...['keys.global.12.0', 'keys.map.3.0', 'keys.time.1.0', 'keys.time.2.0', 'keys.time.3.0'],
   ],
   es: [
-    ...['tried.ok', 'sensors', 'chartKeys.ideal', 'rangeAuto', 'saveCsvShort', 'fileName'],
+    ...['tried.ok', 'sensors', 'rangeAuto', 'saveCsvShort', 'fileName'],
     ...['keys.global.12.0', 'idealParts.any', 'colourings.ideal'],
   ],
 };

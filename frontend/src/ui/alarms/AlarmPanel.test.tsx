@@ -178,7 +178,7 @@ test('it is of now, and says so while another moment is shown', () => {
     receive({ type: 'past', past: { at: 50, house: NO_HOUSE } });
   });
   expect(notes()).toEqual(['now']);
-  expect(screen.getByText(/alarms of now.*sim 00:00:50/)).toBeTruthy();
+  expect(screen.getByText(/current alarms.*sim 00:00:50/)).toBeTruthy();
   expect(group('active')).toHaveLength(1);
 });
 
@@ -186,9 +186,40 @@ test('of many a hundred at a time', () => {
   tell(...Array.from({ length: 150 }, (_, at) => alarm(`a${at}`, { tag_id: String(at) })));
   // By their text: to look for a role among hundreds of buttons takes seconds here.
   expect(screen.getByText('Active (150)')).toBeTruthy();
+  expect(group('active')).toHaveLength(0);
+  fireEvent.click(screen.getByText(/150 alarms/));
   expect(group('active')).toHaveLength(100);
   fireEvent.click(screen.getByText('Show 50 more'));
   expect(group('active')).toHaveLength(150);
+});
+
+test('many of one cause are one heading, which is acknowledged as one and names the worst', () => {
+  const bad = Array.from({ length: 5 }, (_, at) => alarm(`a${at}`, { tag_id: String(at) }));
+  tell(...bad, alarm('b', { tag_id: '9', reason: { sensor: 'humidity', verdict: 'stressed' } }));
+  expect(group('active')).toHaveLength(1);
+  const heading = screen.getByRole('button', { name: /^Critical\s*Temperature too low/ });
+  expect(heading.textContent).toContain('5 alarms');
+  expect(heading.textContent).toContain('Tags 0, 1, 2, 3, 4');
+  press('Acknowledge: Temperature too low');
+  fireEvent.click(heading);
+  expect(group('active').map(({ dataset }) => dataset['acknowledged'])).toEqual([
+    ...Array<string>(5).fill('true'),
+    'false',
+  ]);
+  press('Undo');
+  expect(first('active').dataset['acknowledged']).toBe('false');
+});
+
+test('what is filtered away is not acknowledged with all', () => {
+  tell(alarm('a', { tag_id: '5' }), alarm('b', { tag_id: '6' }));
+  fireEvent.change(screen.getByLabelText('Filter alarms'), { target: { value: 'tag 6' } });
+  expect(group('active').map(({ dataset }) => dataset['where'])).toEqual(['6']);
+  expect(screen.getByRole('heading').textContent).toBe('Active (2)');
+  press('Acknowledge all');
+  fireEvent.change(screen.getByLabelText('Filter alarms'), { target: { value: '' } });
+  expect(group('active').map(({ dataset }) => dataset['acknowledged'])).toEqual(['false', 'true']);
+  fireEvent.change(screen.getByLabelText('Filter alarms'), { target: { value: 'humidity' } });
+  expect(screen.getByText('No alarm matches the filter.')).toBeTruthy();
 });
 
 test('nothing makes itself heard unless it is wished, and what cannot says why', () => {

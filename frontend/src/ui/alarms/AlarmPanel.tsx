@@ -1,12 +1,29 @@
 import { useState, type JSX } from 'react';
 
+import {
+  alarmsCsv,
+  arranged,
+  causeFacts,
+  filtered,
+  ORDERS,
+  type Block,
+  type Order,
+} from '../../alarms/arrange';
 import type { Item } from '../../alarms/list';
 import { acknowledgeAlarms } from '../../alarms/own';
+import { selectNow, selectSpeech } from '../../alarms/speech';
 import { alarmList } from '../../alarms/watch';
+import { now, timeOfDay } from '../../clock';
+import { shown as shownText } from '../../domain/text';
+import { fileName, save } from '../../export/save';
+import { store, useApp } from '../../store/app';
 import { useSelected } from '../../store/create';
+import { rosNow } from '../../store/moment';
+import { LONGEST_FILTER } from '../../store/view';
 import { S } from '../../strings';
 import { Disclosure } from '../../widgets/Disclosure';
 import { Icon } from '../../widgets/Icon';
+import { HealthMark } from '../HealthMark';
 import { AlarmNotes } from './AlarmNotes';
 import { AlarmRow, type GroupName } from './AlarmRow';
 import { DoneLine } from './DoneLine';
@@ -15,26 +32,79 @@ import { once } from './once';
 import { TellMe } from './TellMe';
 import { useHeldOrder } from './useHeldOrder';
 
-/** Rows of one group at first, and so many more with each wish for more. */
+/** Rows of one block at first, and so many more with each wish for more. */
 const MOST_ROWS = 100;
+/** Tags that a cause names. */
+const MOST_TAGS = 6;
+
+const unacknowledged = (items: readonly Item[]): readonly Item[] =>
+  items.filter(({ isAcknowledged }) => !isAcknowledged);
 
 /** The alarms of now, beside the map: active, shelved, and resolved. */
 export function AlarmPanel(): JSX.Element {
-  const list = useSelected(alarmList, (it) => it);
-  const { active, shelved, resolved } = list;
-  const unacknowledged = [...active, ...resolved].filter(({ isAcknowledged }) => !isAcknowledged);
-  const hasAny = active.length + shelved.length > 0;
-  const { shown, added, release, ...hold } = useHeldOrder(list);
+  const all = useSelected(alarmList, (it) => it);
+  const speech = useApp(selectSpeech);
+  const [filter, setFilter] = useState('');
+  const [order, setOrder] = useState<Order>('cause');
+  const { shown, added, release, ...hold } = useHeldOrder(all);
+  const seen = filtered(shown, filter, speech);
+  const waiting = unacknowledged([...seen.active, ...seen.resolved]);
+  const count = seen.active.length + seen.shelved.length + seen.resolved.length;
+  const hasAny = all.active.length + all.shelved.length > 0;
   return (
     <>
-      <div className="filter-bar">
+      <div className="filter-bar alarm-bar">
         <ListChoice />
+        <label className="search">
+          <span className="unseen">{S.alarmFilter}</span>
+          <Icon name="search" size={18} />
+          <input
+            type="search"
+            value={filter}
+            placeholder={S.alarmFilterHint}
+            autoComplete="off"
+            spellCheck={false}
+            maxLength={LONGEST_FILTER}
+            onChange={(event) => {
+              setFilter(event.target.value);
+            }}
+          />
+        </label>
+        <select
+          aria-label={S.alarmOrder}
+          value={order}
+          onChange={(event) => {
+            setOrder(event.target.value as Order);
+          }}
+        >
+          {ORDERS.map((each) => (
+            <option key={each} value={each}>
+              {S.alarmOrders[each]}
+            </option>
+          ))}
+        </select>
+        <button
+          type="button"
+          className="text-button"
+          title={S.alarmSaveCsv}
+          onClick={() => {
+            const text = alarmsCsv(filtered(alarmList.get(), filter, speech), speech, (alarm) =>
+              selectNow(store.get(), alarm),
+            );
+            const blob = new Blob([text], { type: 'text/csv;charset=utf-8' });
+            save(blob, fileName('alarms', 'csv', timeOfDay()));
+          }}
+        >
+          <Icon name="download" size={18} /> <span className="csv-word">{S.saveCsvShort}</span>
+        </button>
+      </div>
+      <DoneLine added={added.length} onShow={release}>
         <button
           type="button"
           className="text-button all-seen"
-          disabled={unacknowledged.length === 0}
+          disabled={waiting.length === 0}
           onClick={once(() => {
-            acknowledgeAlarms(unacknowledged);
+            acknowledgeAlarms(waiting);
           })}
         >
           <Icon name="check" size={18} /> {S.alarmAcknowledgeAll}
@@ -42,8 +112,7 @@ export function AlarmPanel(): JSX.Element {
         <Disclosure label={S.alarmTell} button={<Icon name="bell" />} className="tell-me">
           <TellMe />
         </Disclosure>
-      </div>
-      <DoneLine added={added.length} onShow={release} />
+      </DoneLine>
       <div
         className="alarms"
         id={ALARMS_ID}
@@ -56,47 +125,112 @@ export function AlarmPanel(): JSX.Element {
         {...hold}
       >
         <AlarmNotes isEmpty={!hasAny} />
-        <Group name="active" items={shown.active} count={active.length} />
-        <Group name="shelved" items={shown.shelved} count={shelved.length} />
-        <Group name="resolved" items={shown.resolved} count={resolved.length} />
+        {filter !== '' && count === 0 && <p className="faint">{S.alarmsNoMatch}</p>}
+        {(['active', 'shelved', 'resolved'] as const).map(
+          (name) =>
+            seen[name].length > 0 && (
+              <section key={name} data-group={name}>
+                {/* As elsewhere in the page, whatever order is held. */}
+                <h3>{S.alarmGroups[name](all[name].length)}</h3>
+                {arranged(seen[name], order, speech).map((block) => (
+                  <Rows key={block.key} block={block} group={name} />
+                ))}
+              </section>
+            ),
+        )}
         {hasAny && <p className="alarms-mine faint">{S.alarmsMine}</p>}
       </div>
     </>
   );
 }
 
-function Group({
-  name,
-  items,
-  count,
-}: {
-  name: GroupName;
-  items: readonly Item[];
-  /** As elsewhere in the page, whatever order is held. */
-  count: number;
-}): JSX.Element | null {
+/** Alarms in a row; many of one cause are opened by their heading. */
+function Rows({ block: { cause, items }, group }: { block: Block; group: GroupName }): JSX.Element {
   const [most, setMost] = useState(MOST_ROWS);
-  if (items.length === 0) return null;
+  const [isOpen, setOpen] = useState(false);
   const rest = items.length - most;
   return (
-    <section data-group={name}>
-      <h3>{S.alarmGroups[name](count)}</h3>
-      <ul>
-        {items.slice(0, most).map((item) => (
-          <AlarmRow key={item.alarm.id} item={item} group={name} />
-        ))}
-      </ul>
-      {rest > 0 && (
+    <>
+      {cause !== null && (
+        <CauseHeading
+          cause={cause}
+          items={items}
+          isOpen={isOpen}
+          onToggle={() => {
+            setOpen(!isOpen);
+          }}
+        />
+      )}
+      {(isOpen || cause === null) && (
+        <>
+          <ul data-caused={cause !== null}>
+            {items.slice(0, most).map((item) => (
+              <AlarmRow key={item.alarm.id} item={item} group={group} />
+            ))}
+          </ul>
+          {rest > 0 && (
+            <button
+              type="button"
+              className="text-button"
+              onClick={() => {
+                setMost(most + MOST_ROWS);
+              }}
+            >
+              {S.alarmMore(Math.min(rest, MOST_ROWS))}
+            </button>
+          )}
+        </>
+      )}
+    </>
+  );
+}
+
+/** What is wrong at many tags, how bad it is there, and at which. */
+function CauseHeading({
+  cause,
+  items,
+  isOpen,
+  onToggle,
+}: {
+  cause: string;
+  items: readonly Item[];
+  isOpen: boolean;
+  onToggle: () => void;
+}): JSX.Element | null {
+  const speech = useApp(selectSpeech);
+  const [worst] = items;
+  if (!worst) return null;
+  const texts = causeFacts(items, speech, rosNow(store.get(), now()));
+  const waiting = unacknowledged(items);
+  const tags = [...new Set(items.map(({ alarm }) => alarm.tag_id))].filter(Boolean);
+  const named = tags.slice(0, MOST_TAGS).map((id) => shownText(id, 16));
+  return (
+    <div className="alarm-cause" data-cause={cause} data-health={worst.verdict}>
+      <button type="button" className="alarm-go" aria-expanded={isOpen} onClick={onToggle}>
+        <HealthMark verdict={worst.verdict} word={false} />
+        <span className="alarm-text">
+          <span>
+            <strong>{cause}</strong> · {S.alarmCount(items.length)}
+          </span>
+          <span className="alarm-facts">{texts.join(', ')}</span>
+          <span className="alarm-facts faint">
+            {S.alarmTags(named, tags.length - named.length)}
+          </span>
+        </span>
+        <Icon name={isOpen ? 'minus' : 'plus'} size={14} />
+      </button>
+      <div className="alarm-tools">
         <button
           type="button"
-          className="text-button"
-          onClick={() => {
-            setMost(most + MOST_ROWS);
-          }}
+          disabled={waiting.length === 0}
+          aria-label={S.alarmAcknowledgeOf(cause)}
+          onClick={once(() => {
+            acknowledgeAlarms(waiting);
+          })}
         >
-          {S.alarmMore(Math.min(rest, MOST_ROWS))}
+          {S.alarmAcknowledgeAll}
         </button>
-      )}
-    </section>
+      </div>
+    </div>
   );
 }

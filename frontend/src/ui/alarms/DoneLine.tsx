@@ -1,4 +1,4 @@
-import type { JSX } from 'react';
+import type { JSX, ReactNode } from 'react';
 
 import { done, undo } from '../../alarms/own';
 import { useSelected } from '../../store/create';
@@ -9,27 +9,33 @@ import { once } from './once';
 export function DoneLine({
   added,
   onShow,
+  children,
 }: {
   /** Alarms that are new and not listed yet. */
   added: number;
   onShow: () => void;
+  /** What can be done to the whole list. */
+  children: ReactNode;
 }): JSX.Element {
   const last = useSelected(done, (it) => it);
   return (
-    <div className="alarm-line" role="status" data-testid="alarm-line">
-      {added > 0 && (
-        <button type="button" data-line="new" title={S.alarmsNewHint} onClick={onShow}>
-          {S.alarmsNew(added)}
-        </button>
-      )}
-      {last && (
-        <span data-line="done">
-          {S.alarmDone[last.what](last.count)}{' '}
-          <button type="button" onClick={once(undo)}>
-            {S.alarmUndo}
+    <div className="alarm-line">
+      {children}
+      <div className="alarm-news" role="status" data-testid="alarm-line">
+        {added > 0 && (
+          <button type="button" data-line="new" title={S.alarmsNewHint} onClick={onShow}>
+            {S.alarmsNew(added)}
           </button>
-        </span>
-      )}
+        )}
+        {last && (
+          <span data-line="done">
+            {S.alarmDone[last.what](last.count)}{' '}
+            <button type="button" onClick={once(undo)}>
+              {S.alarmUndo}
+            </button>
+          </span>
+        )}
+      </div>
     </div>
   );
 }

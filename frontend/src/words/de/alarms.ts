@@ -57,6 +57,15 @@ export const ALARMS: In<typeof ENGLISH> = {
   alarmsNew: (count) => `${count} neu`,
   alarmsNewHint: 'Die Reihenfolge bleibt, solange Sie in der Liste sind. Neue zeigen',
   alarmMore: (count) => `${count} weitere zeigen`,
+  alarmFilter: 'Alarme filtern',
+  alarmFilterHint: 'Messpunkt, Ursache …',
+  alarmOrder: 'Reihenfolge',
+  alarmOrders: { cause: 'Nach Ursache', newest: 'Neueste zuerst', tag: 'Nach Messpunkt' },
+  alarmSaveCsv: 'Alarme als CSV speichern',
+  alarmsNoMatch: 'Kein Alarm passt zum Filter.',
+  alarmCount: (count) => counted(count, 'Alarm', 'Alarme'),
+  alarmTags: (tags, more) =>
+    `${tags.length === 1 ? 'Messpunkt' : 'Messpunkte'} ${tags.join(', ')}${more > 0 ? ` und ${more} weitere` : ''}`,
   alarmsNone: 'Kein Alarm steht an',
   alarmsNoneHint:
     'Ein Alarm kommt, wenn bei zwei Messungen nacheinander etwas nicht stimmt. Bei einem Schädling, oder wenn aus dem Gewächshaus nichts kommt, kommt er sofort.',
@@ -65,7 +74,7 @@ export const ALARMS: In<typeof ENGLISH> = {
   alarmsHeard: (since) =>
     `Es wird nichts aufgezeichnet: Alarme von vor ${since} sind nicht bekannt.`,
   alarmsLost: (clock) => `Stand von ${clock}. Was seither kam, ist nicht bekannt.`,
-  alarmsOfNow: (moment) => `Das sind die Alarme von jetzt. Der Rest der Seite zeigt ${moment}.`,
+  alarmsOfNow: (moment) => `Das sind die aktuellen Alarme. Der Rest der Seite zeigt ${moment}.`,
   alarmsMine: '„Quittiert“ und „zurückgestellt“ gelten nur in diesem Browser.',
 
   alarmTell: 'Alarme melden',

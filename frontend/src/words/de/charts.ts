@@ -14,9 +14,9 @@ export const CHARTS: In<typeof ENGLISH> = {
     `zwischen ${low} und ${high}, ${gaps === 0 ? 'keine Lücke' : counted(gaps, 'Lücke', 'Lücken')}.`,
   chartEmpty: 'Kein Messwert in diesem Zeitraum.',
   chartNothing: '–',
-  chartLoading: 'Die Vergangenheit kommt gleich',
+  chartLoading: 'Die Vergangenheit wird geladen',
   chartFailed: (reason) => `Die Vergangenheit konnte nicht geladen werden: ${reason}`,
-  chartMissing: 'Dieser Zwilling bewahrt keine Vergangenheit auf.',
+  chartMissing: 'Dieser Zwilling zeichnet nichts auf.',
   chartMissingHint:
     'Verläufe brauchen eine Aufzeichnung. Bis dahin zeigt der Messpunkt nur seine letzten Messungen.',
   chartMissingMore:
@@ -24,7 +24,6 @@ export const CHARTS: In<typeof ENGLISH> = {
   chartMissingShort: 'Kein Verlauf: Dieser Zwilling zeichnet nichts auf.',
   chartNoTime: 'Der Zwilling kennt noch keine Zeit und damit keine Vergangenheit.',
   chartNoSensors: 'Dieser Messpunkt hat keinen Sensor.',
-  chartNoTags: 'Kein Messpunkt hat diesen Sensor.',
   chartTable: 'Als Tabelle zeigen',
   chartPlots: 'Als Verlauf zeigen',
   chartZoomIn: 'Vergrößern',
@@ -35,10 +34,7 @@ export const CHARTS: In<typeof ENGLISH> = {
   chartAddTag: 'Messpunkt hinzufügen',
   chartRemoveTag: (tag) => `Messpunkt ${tag} aus dem Verlauf entfernen`,
   chartWhich: 'Tabelle von',
-  chartKeys: { ideal: 'ideal', range: 'kleinster bis größter', gap: 'es kam nichts' },
-  chartFailure: 'fehlgeschlagener Versuch',
-  chartLook: 'Blütenkontrolle',
-  chartHint: 'Ziehen: vergrößern. Klicken: das Haus zu dieser Zeit.',
+  chartHint: 'Ziehen zum Vergrößern; klicken, um zu dieser Zeit zu springen.',
   chartTableCaption: (label, sensor, span) => `${label}, ${sensor}, ${span}`,
   chartColumns: {
     time: 'Zeit',
@@ -50,8 +46,8 @@ export const CHARTS: In<typeof ENGLISH> = {
     max: 'Größter',
     event: 'Ereignis',
   },
-  chartGap: (length) => `${length} lang kam nichts`,
-  missing: { not_kept: 'nicht mehr aufbewahrt', not_recorded: 'nicht aufgezeichnet' },
+  chartGap: (length) => `${length} lang keine Daten`,
+  missing: { not_kept: 'nicht mehr gespeichert', not_recorded: 'nicht aufgezeichnet' },
   chartFailures: (count) => counted(count, 'fehlgeschlagener Versuch', 'fehlgeschlagene Versuche'),
   chartLooks: (count) => counted(count, 'Blütenkontrolle', 'Blütenkontrollen'),
 };

@@ -16,9 +16,9 @@ export const HEALTH: In<typeof ENGLISH> = {
       `${reading}, ${side} ${limit}${isCritical ? ' (kritisch)' : ''}`,
     beyond: (sensor, side, limit) => `${sensor} ${side} ${limit}`,
     readingFailed: (sensor) => `${sensor}: Der Sensor liefert keinen Wert`,
-    implausible: (reading) => `${reading}: Das misst kein heiler Sensor`,
+    implausible: (reading) => `${reading}: kein plausibler Wert`,
     scanFailed: (outcome, age) =>
-      `Letzte Messung gescheitert: ${outcome}${age === null ? '' : `, vor ${age}`}`,
+      `Letzte Messung fehlgeschlagen: ${outcome}${age === null ? '' : `, vor ${age}`}`,
     pest: (count) =>
       count > 0 ? `${counted(count, 'Schädling', 'Schädlinge')} gesehen` : 'Schädling gesehen',
     old: (sensor, age, holds, isDated) => {
@@ -33,14 +33,13 @@ export const HEALTH: In<typeof ENGLISH> = {
           : sensor === ''
             ? `Seit ${age} nicht gemessen`
             : `seit ${age} kein Messwert`;
-      return `${sensor === '' ? '' : `${sensor}: `}${since}${holds === null ? '' : ` (Messwerte gelten ${holds})`}`;
+      return `${sensor === '' ? '' : `${sensor}: `}${since}${holds === null ? '' : ` (Messwerte gelten ${holds} lang)`}`;
     },
     outOfRange: 'außerhalb des Bereichs',
-    changed: (reading) =>
-      `${reading}, verändert gegenüber den eigenen früheren Werten und den Nachbarn`,
-    silent: 'Der Zwilling schweigt: Was zuletzt gehört wurde, sagt nichts über jetzt',
+    changed: (reading) => `${reading}: möglicher Sensorfehler`,
+    silent: 'Der Zwilling sendet nicht: Seine letzten Daten sagen nichts über jetzt',
     stopped:
-      'Es wird kein Messpunkt mehr gemessen: Der Roboter steht, oder man hört nichts von ihm',
+      'Es wird kein Messpunkt mehr gemessen: Der Roboter steht, oder seine Daten kommen nicht an',
     other: (kind, sensor) => (sensor === '' ? kind : `${sensor}: ${kind}`),
   },
   reasonsLabel: 'Warum',
@@ -50,15 +49,15 @@ export const HEALTH: In<typeof ENGLISH> = {
   healthSomeUnknown: (count) =>
     `${counted(count, 'Messpunkt lässt', 'Messpunkte lassen')} sich nicht beurteilen`,
   healthDay: (isDay, source) =>
-    `Beurteilt nach den Bereichen für ${isDay ? 'den Tag' : 'die Nacht'}: ${source}`,
+    `Es gelten die Bereiche für ${isDay ? 'den Tag' : 'die Nacht'}: ${source}`,
   healthDaySource: {
-    light: 'So sagt es das Licht im Haus',
-    clock: 'So sagt es die Uhr, denn Licht wird nicht gemessen',
-    assumed: 'angenommen, denn weder Licht noch Uhr geben Auskunft',
+    light: 'nach dem Licht im Gewächshaus',
+    clock: 'nach der Uhr, da kein Licht gemessen wird',
+    assumed: 'angenommen, da weder Licht noch Uhrzeit bekannt sind',
   },
   idealParts: { any: 'ideal', day: 'ideal am Tag', night: 'ideal bei Nacht' },
   healthIdeal: (ideal, low, high, unit) => `${ideal} ${low} bis ${high} ${unit}`.trim(),
-  healthAllWell: 'Jeder beurteilte Messwert liegt im Idealbereich',
+  healthAllWell: 'Alle beurteilten Messwerte liegen im Idealbereich',
   healthDespite: (alarms) =>
     alarms === 1
       ? '1 Alarm steht noch an: Zwei gute Messungen beheben ihn'
@@ -76,7 +75,7 @@ export const HEALTH: In<typeof ENGLISH> = {
   attention: 'Braucht Aufmerksamkeit',
   attentionNone: 'Nichts braucht Aufmerksamkeit',
   attentionNoneKnown: (unknown) =>
-    `Soweit bekannt, braucht nichts Aufmerksamkeit; über ${counted(unknown, 'Messpunkt', 'Messpunkte')} ist nichts bekannt`,
+    `Soweit bekannt, braucht nichts Aufmerksamkeit; keine Daten für ${counted(unknown, 'Messpunkt', 'Messpunkte')}`,
   attentionMore: (count) => `+ ${count} weitere`,
 
   tooLow: (by) => (by === null ? 'zu niedrig' : `zu niedrig um ${by}`),

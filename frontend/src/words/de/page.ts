@@ -11,12 +11,12 @@ export const PAGE: In<typeof ENGLISH> = {
 
   language: 'Sprache',
   languageUnknown: (asked) =>
-    `„${asked}“ spricht diese Seite nicht: Sie wird auf Englisch angezeigt.`,
+    `Diese Seite gibt es nicht auf „${asked}“. Sie wird auf Englisch angezeigt.`,
   languageMissing: (name) =>
     `${name} konnte nicht geladen werden: Die Seite wird auf Englisch angezeigt.`,
-  partsLate: 'Ein Teil der Seite ist nicht angekommen.',
+  partsLate: 'Ein Teil der Seite ist nicht geladen.',
   partsLateHint:
-    'Karten, Listen und Zeitleiste kommen, sobald der Server antwortet; er wird immer wieder gefragt.',
+    'Karten, Listen und Zeitleiste erscheinen, sobald der Server antwortet. Die Seite versucht es weiter.',
 
   phase: {
     connecting: 'Verbindet',
@@ -33,20 +33,20 @@ export const PAGE: In<typeof ENGLISH> = {
   frozenWhy: {
     stale: 'Die Verbindung besteht, aber es kommt nichts mehr an.',
     reconnecting:
-      'Die Verbindung zum Server ist unterbrochen; es geht von selbst weiter, sobald sie wieder steht.',
+      'Die Verbindung zum Server ist unterbrochen; die Seite verbindet sich von selbst wieder.',
     connecting: 'Warten auf Antwort des Servers.',
     live: '',
-    offline: 'Der Server antwortet, aber der Zwilling dahinter nicht.',
+    offline: 'Der Server antwortet, der Zwilling aber nicht.',
   },
   offlineWhy: {
     live: '',
     paused: '',
-    no_clock: 'Der Zwilling kennt die Uhrzeit noch nicht und damit auch nicht das Alter der Werte.',
-    clock_stopped:
-      'Die Uhr des Zwillings ist stehen geblieben. Wie alt die Werte sind, ist nicht bekannt.',
-    clock_doubted: 'Die Uhr des Zwillings geht falsch. Wie alt die Werte sind, ist nicht bekannt.',
-    never_seen: 'Der Server hat noch von keinem Zwilling gehört. Ist er eingeschaltet?',
-    stale: 'Der Zwilling meldet sich nicht mehr. Bitte prüfen, ob er noch läuft.',
+    no_clock: 'Der Zwilling hat noch keine Uhrzeit; das Alter der Werte ist unbekannt.',
+    clock_stopped: 'Die Uhr des Zwillings ist stehen geblieben. Das Alter der Werte ist unbekannt.',
+    clock_doubted: 'Die Uhr des Zwillings geht falsch. Das Alter der Werte ist unbekannt.',
+    never_seen:
+      'Der Server hat noch keine Daten von einem Zwilling. Ist der Zwilling eingeschaltet?',
+    stale: 'Der Zwilling sendet nicht mehr. Bitte prüfen, ob er läuft.',
     thread_dead: 'Der Server hat den Kontakt zum Zwilling verloren und muss neu gestartet werden.',
     shutting_down: 'Der Server wird gerade beendet.',
   },
@@ -68,67 +68,68 @@ export const PAGE: In<typeof ENGLISH> = {
       : `${count} Nachrichten vom Server waren nicht lesbar und wurden verworfen.`,
   unreadLast: (why) => `Die letzte: ${why}`,
   paused: 'Die Zeit ist angehalten.',
-  pausedHint: 'Die Simulation oder die Aufzeichnung steht still, und kein Messwert altert.',
-  inputProblem: 'Der Zwilling hört nicht alles, was für ihn veröffentlicht wird.',
+  pausedHint: 'Simulation oder Aufzeichnung sind angehalten; das Alter der Werte wächst nicht.',
+  inputProblem: 'Der Zwilling empfängt nicht alles, was für ihn veröffentlicht wird.',
   drops: (count) =>
     `Der Zwilling hat in den letzten Minuten ${counted(count, 'Nachricht', 'Nachrichten')} verworfen.`,
   dropsLast: (message) => `Die letzte: ${message}`,
   journal: {
     off: {
       title: 'Es wird nichts aufgezeichnet.',
-      hint: 'Nach einem Neustart weiß der Zwilling nichts mehr von vorher.',
+      hint: 'Nach einem Neustart sind alle früheren Daten verloren.',
     },
     slow: {
       title: 'Die Aufzeichnung kommt nicht nach.',
-      hint: 'Was wartet, wird geschrieben, sobald der Datenträger wieder nachkommt; bei Stromausfall wäre es verloren.',
+      hint: 'Daten warten im Speicher, bis der Datenträger nachkommt. Bei Stromausfall gehen sie verloren.',
     },
     failing: {
       title: 'Die Aufzeichnung schlägt fehl.',
-      hint: 'Der Zwilling läuft weiter, versucht es immer wieder und schreibt alles, was wartet, sobald er kann: Bitte Platz schaffen oder den Datenträger prüfen.',
+      hint: 'Der Zwilling läuft weiter und versucht es immer wieder. Bitte Platz schaffen oder den Datenträger prüfen.',
     },
     upgrading: {
       title: 'Die Aufzeichnung einer älteren Version wird umgestellt.',
-      hint: 'Was beobachtet wird, ist zu sehen und wartet. Was vorher bekannt war, ist wieder da, sobald das getan ist; das kann Minuten dauern.',
+      hint: 'Neue Daten sind zu sehen und warten. Frühere Daten sind nach der Umstellung wieder da; das kann Minuten dauern.',
     },
     doubting: {
       title: 'Es wird nichts aufgezeichnet: Die Uhr widerspricht der Aufzeichnung.',
-      hint: 'Was beobachtet wird, ist zu sehen und wartet. Es wird geschrieben, sobald die Uhr stimmt, oder nach zehn Minuten, wie es ist.',
+      hint: 'Neue Daten sind zu sehen und warten. Sie werden aufgezeichnet, sobald die Uhr stimmt, spätestens nach zehn Minuten.',
     },
     in_use: {
-      title: 'Dieser Zwilling zeichnet nicht auf: Ein anderer tut es bereits.',
+      title: 'Dieser Zwilling zeichnet nicht auf: Ein anderer nutzt seine Datei.',
       hint: 'Einen der beiden beenden oder diesem eine eigene Datei geben.',
     },
     foreign: {
-      title: 'Dieser Zwilling zeichnet nicht auf: Seine Datei gehört jemand anderem.',
+      title: 'Dieser Zwilling zeichnet nicht auf: Seine Datei gehört zu einem anderen Programm.',
       hint: 'Darin wurde nichts verändert. Dem Zwilling eine andere Datei geben oder diese verschieben.',
     },
   },
   outward: {
-    mqtt: 'Die Hausautomation (MQTT) erfährt nichts.',
-    webhook: 'Alarme werden nicht weitergegeben (Webhook).',
+    mqtt: 'Die Hausautomation (MQTT) empfängt keine Daten.',
+    webhook: 'Der Webhook empfängt keine Alarme.',
   },
-  outwardOther: (channel) => `${channel} erfährt nichts.`,
-  outwardHint: 'Es wird immer wieder versucht; diese Seite ist nicht betroffen.',
+  outwardOther: (channel) => `${channel} empfängt keine Daten.`,
+  outwardHint: 'Der Server versucht es weiter. Diese Seite ist nicht betroffen.',
   journalMore: 'Die Datei nennt der Parameter „journal“ des Zwillings; „off“ zeichnet nichts auf.',
   origin: { simulated: 'Simuliert', recorded: 'Aufzeichnung', sim_time: 'Simulierte Zeit' },
   originHint: {
-    simulated: 'Hier arbeitet kein Roboter: Haus, Pflanzen und Messwerte sind erfunden.',
-    recorded: 'Hier wird eine Aufzeichnung abgespielt: Nichts davon ist von jetzt.',
+    simulated: 'Kein echter Roboter: Gewächshaus, Pflanzen und Messwerte sind simuliert.',
+    recorded: 'Eine Aufzeichnung wird abgespielt: Nichts davon ist live.',
     sim_time:
-      'Die Zeit ist nicht die der Uhr an der Wand: Was zu sehen ist, kommt aus einer Simulation oder aus einer Aufzeichnung, die abgespielt wird.',
+      'Das ist nicht die wirkliche Zeit: Die Daten stammen aus einer Simulation oder einer Aufzeichnung.',
   },
-  recordedIs: { playing: 'Läuft', paused: 'Steht still' },
-  recordedPaused: 'Die Aufzeichnung steht still.',
-  recordedPausedHint: 'Sie ist angehalten oder zu Ende, und kein Messwert altert.',
+  recordedIs: { playing: 'Läuft', paused: 'Angehalten' },
+  recordedPaused: 'Die Aufzeichnung ist angehalten.',
+  recordedPausedHint: 'Sie ist angehalten oder zu Ende; das Alter der Werte wächst nicht.',
   simulated: 'Simuliert.',
   simulatedHint: (until) =>
-    `Das hat kein Roboter beobachtet: Die Vorführung begann mit erfundenen Tagen bis ${until}.`,
-  setAside: 'Eine beschädigte Aufzeichnung wurde beiseitegelegt.',
+    `Das hat kein Roboter gemessen: Die Demo beginnt mit simulierten Tagen bis ${until}.`,
+  setAside: 'Eine beschädigte Aufzeichnung wurde in Quarantäne genommen.',
   setAsideHint: (name) =>
-    `Was noch lesbar war, wurde übernommen, und es wird weiter aufgezeichnet. Die alte Datei ist ${name}.`,
+    `Lesbare Daten wurden übernommen, die Aufzeichnung läuft weiter. Die beschädigte Datei ist ${name}.`,
   failedTitle: 'Diese Seite ist ausgefallen',
-  failedHint: 'Was sie zeigt, ist nicht verlässlich. Zwilling und Server sind nicht betroffen.',
-  failedAgain: 'Sie wird von selbst neu geladen.',
+  failedHint:
+    'Verlassen Sie sich nicht auf ihre Anzeige. Zwilling und Server sind nicht betroffen.',
+  failedAgain: 'Sie lädt sich von selbst neu.',
   reload: 'Neu laden',
 
   menu: 'Menü',
@@ -146,7 +147,7 @@ export const PAGE: In<typeof ENGLISH> = {
   kioskLeave: 'Verlassen',
   cycleNext: (sensor, time) => `danach: ${sensor} in ${time}`,
   cycleRefused: (asked, least, most) =>
-    `cycle=${asked} gilt nicht: möglich sind ${least} bis ${most} Sekunden.`,
+    `cycle=${asked} wird ignoriert: möglich sind ${least} bis ${most} Sekunden.`,
   help: 'Tastenkürzel',
   signOut: 'Abmelden',
   signOutFailed: (reason) => `Sie sind noch angemeldet: ${reason}`,
@@ -158,19 +159,19 @@ export const PAGE: In<typeof ENGLISH> = {
   emptyUnreachableHint:
     'Bitte prüfen, ob er eingeschaltet ist. Die Seite versucht es von selbst weiter.',
   emptyUnreachableMore:
-    'Der Server ist die Bridge: „lupin-twin serve“ auf dem Roboter oder „make run“ für die Vorführung.',
+    'Der Server ist die Bridge: „lupin-twin serve“ auf dem Roboter oder „make run“ für die Demo.',
   emptyNoTwin: 'Noch kein Zwilling',
   emptyNoTags: 'Noch keine Messpunkte',
   emptyNoTagsHint:
-    'Der Zwilling läuft und wartet. Messpunkte erscheinen, wenn der Roboter einen findet oder ' +
-    'abliest: Schicken Sie ihn auf seine Runde.',
+    'Der Zwilling läuft. Messpunkte erscheinen, sobald der Roboter sie findet oder misst: ' +
+    'Schicken Sie ihn auf seine Runde.',
   emptyNoTagsMore: '„lupin-twin demo“ zeigt eine simulierte Runde.',
   emptyNoPins: 'Noch kein Messpunkt hat eine Position',
   emptyNoPinsHint:
     'Alle Messpunkte stehen in der Tabelle; mit der ersten gelungenen Messung kommen sie auf die Karte.',
   emptyNoReading: (sensor) => `Noch kein Messpunkt auf der Karte hat einen Messwert: ${sensor}`,
   emptyNoReadingHint:
-    'Wählen Sie einen anderen Sensor, oder warten Sie, bis der Roboter mehr abgelesen hat.',
+    'Wählen Sie einen anderen Sensor, oder warten Sie, bis der Roboter weitere gemessen hat.',
   emptyNoMap: 'Noch kein Grundriss: Der Roboter hat seine Karte nicht geschickt.',
   emptyNoMapMore: 'Der Grundriss ist die SLAM-Karte des Roboters, die auf /map kommt.',
 

@@ -62,6 +62,15 @@ export const ALARMS = {
   alarmsNew: (count: number): string => `${count} new`,
   alarmsNewHint: 'The order is held while you are in the list. Show what is new',
   alarmMore: (count: number): string => `Show ${count} more`,
+  alarmFilter: 'Filter alarms',
+  alarmFilterHint: 'tag, cause …',
+  alarmOrder: 'Order',
+  alarmOrders: { cause: 'By cause', newest: 'Newest first', tag: 'By tag' },
+  alarmSaveCsv: 'Save alarms as CSV',
+  alarmsNoMatch: 'No alarm matches the filter.',
+  alarmCount: (count: number): string => counted(count, 'alarm', 'alarms'),
+  alarmTags: (tags: readonly string[], more: number): string =>
+    `${tags.length === 1 ? 'Tag' : 'Tags'} ${tags.join(', ')}${more > 0 ? ` and ${more} more` : ''}`,
   alarmsNone: 'No alarm is active',
   alarmsNoneHint:
     'An alarm is raised when something is wrong in two scans in a row. A pest, or a silent greenhouse, raises one at once.',
@@ -72,7 +81,7 @@ export const ALARMS = {
   alarmsLost: (clock: string): string =>
     `As last received at ${clock}. What has happened since is not known.`,
   alarmsOfNow: (moment: string): string =>
-    `These are the alarms of now. The rest of the page shows ${moment}.`,
+    `These are the current alarms. The rest of the page shows ${moment}.`,
   alarmsMine: '“Acknowledged” and “shelved” apply in this browser only.',
 
   alarmTell: 'Notify me of alarms',

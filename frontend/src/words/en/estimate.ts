@@ -4,40 +4,40 @@ import { counted } from './counted';
 export const ESTIMATE = {
   about: 'What ± means',
   aboutText:
-    'Of ten values of the estimate, nine should be off by no more than the ± (a 90 % ' +
-    'interval). It counts how far away and how old each reading is, and how the greenhouse goes ' +
-    'through its day: the longer nobody measures, the larger the ±.',
-  onItsWay: 'The estimate is on its way',
-  noService: 'This twin makes no estimate: shown are the nearest readings',
-  noneNow: 'There is no estimate just now: shown are the nearest readings',
+    'Nine of ten estimated values should be off by no more than the ± (a 90 % interval). It ' +
+    'depends on how far away and how old the readings are, and on the time of day: the longer ' +
+    'nothing is measured, the larger the ±.',
+  onItsWay: 'Loading the estimate',
+  noService: 'This twin makes no estimate: the nearest readings are shown',
+  noneNow: 'No estimate at the moment: the nearest readings are shown',
   noModel: 'No estimate yet: it needs ten scans of a sensor',
   noSensor: 'No tag measures this, so there is nothing to estimate',
   unsure: (error: string): string =>
-    `Hatched where it may be off by more than ±${error}, the denser the more. No colour: not known`,
+    `Hatched: may be off by more than ±${error}, the denser the more. No colour: no data`,
   /** Beside the colours of the error. */
-  errorOf: (sensor: string): string => `${sensor}: how far off the estimate may be`,
+  errorOf: (sensor: string): string => `${sensor}: uncertainty of the estimate`,
   foretold: (inside: number, scans: number): string =>
-    `${inside} of ${counted(scans, 'scan', 'scans')} lay where the other tags put them`,
+    `${inside} of ${counted(scans, 'scan', 'scans')} were within the predicted range`,
   foretoldNone: 'No scan has been compared with it yet',
   foretoldDay: (inside: number, scans: number): string =>
     `Last day: ${inside} of ${counted(scans, 'scan', 'scans')}`,
   foretoldWeek: (inside: number, scans: number): string =>
     `last week: ${inside} of ${counted(scans, 'scan', 'scans')}`,
-  fitProblem: (reason: string): string => `Learning the greenhouse is not going well: ${reason}`,
+  fitProblem: (reason: string): string => `The model does not fit this greenhouse well: ${reason}`,
   notTrusted: (count: number): string =>
-    `Do not rely on the ±: only ${count} of 10 scans lay where the other tags put them, not 9.`,
+    `Error range is too narrow: only ${count} of 10 scans were within it, not 9.`,
   near: (count: number): string =>
     count === 0 ? 'no tag near' : counted(count, 'tag near', 'tags near'),
   oldest: (age: string): string => `oldest reading ${age}`,
   expected: (measured: string, expected: string): string =>
     `measured ${measured}, expected ${expected}`,
-  leftOut: (sensor: string): string => `${sensor} changed: left out of the estimate`,
+  leftOut: (sensor: string): string => `${sensor}: possible sensor fault, not used in the estimate`,
   advice: 'Where another tag would help',
   advised: (place: string, percent: string, isFirst: boolean): string =>
     isFirst
-      ? `${place}: a tag here takes the error of the whole map to ${percent} of what it is now`
-      : `${place}: a tag here and at each mark before it take the error of the whole map to ${percent} of what it is now`,
+      ? `${place}: a tag here reduces the error of the whole map to ${percent} of the present`
+      : `${place}: tags here and at each mark before it reduce the error of the whole map to ${percent} of the present`,
   adviceNone: 'No place is known where another tag would help',
-  adviceFailed: (reason: string): string => `Where another tag would help is not known: ${reason}`,
-  adviceNow: 'Where another tag would help is known of now alone',
+  adviceFailed: (reason: string): string => `No suggestion for another tag: ${reason}`,
+  adviceNow: 'Suggestions for another tag are for now only',
 } as const;

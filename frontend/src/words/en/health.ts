@@ -15,8 +15,8 @@ export const HEALTH = {
       `${reading}, ${side} ${limit}${isCritical ? ' (critical)' : ''}`,
     /** What is wrong, whatever the value is by now. */
     beyond: (sensor: string, side: string, limit: string): string => `${sensor} ${side} ${limit}`,
-    readingFailed: (sensor: string): string => `${sensor}: the sensor gives no value`,
-    implausible: (reading: string): string => `${reading}: no sensor that works reads this`,
+    readingFailed: (sensor: string): string => `${sensor}: the sensor returns no value`,
+    implausible: (reading: string): string => `${reading}: not a plausible value`,
     scanFailed: (outcome: string, age: string | null): string =>
       `Last scan failed: ${outcome}${age === null ? '' : `, ${age} ago`}`,
     pest: (count: number): string =>
@@ -25,44 +25,44 @@ export const HEALTH = {
     old: (sensor: string, age: string | null, holds: string | null, isDated: boolean): string => {
       const since = !isDated
         ? sensor === ''
-          ? 'No scan whose time is known'
-          : 'no reading whose time is known'
+          ? 'No scan with a known time'
+          : 'no reading with a known time'
         : age === null
           ? `${sensor === '' ? 'Not' : 'not'} scanned lately`
           : sensor === ''
             ? `Not scanned for ${age}`
             : `no reading for ${age}`;
-      return `${sensor === '' ? '' : `${sensor}: `}${since}${holds === null ? '' : ` (readings hold ${holds})`}`;
+      return `${sensor === '' ? '' : `${sensor}: `}${since}${holds === null ? '' : ` (readings are valid for ${holds})`}`;
     },
-    outOfRange: 'out of its range',
-    changed: (reading: string): string =>
-      `${reading}, changed against its own past and its neighbours`,
-    silent: 'The twin is silent: what was heard last says nothing about now',
-    stopped: 'No tag is being scanned: the robot has stopped, or is not heard',
+    outOfRange: 'out of range',
+    changed: (reading: string): string => `${reading}: possible sensor fault`,
+    silent: 'The twin is silent: its last data says nothing about now',
+    stopped: 'No tag is being scanned: the robot has stopped, or its data is lost',
     other: (kind: string, sensor: string): string => (sensor === '' ? kind : `${sensor}: ${kind}`),
   },
   reasonsLabel: 'Why',
   healthHeading: 'Greenhouse status',
   healthDriver: (tag: string, reason: string): string => `Tag ${tag}: ${reason}`,
   healthMostUnknown: 'More than half of the tags are unknown',
-  healthSomeUnknown: (count: number): string => `${counted(count, 'tag', 'tags')} cannot be judged`,
+  healthSomeUnknown: (count: number): string =>
+    `${counted(count, 'tag', 'tags')} cannot be assessed`,
   healthDay: (isDay: boolean, source: string): string =>
-    `Judged by the ranges for the ${isDay ? 'day' : 'night'}: ${source}`,
+    `The ranges for the ${isDay ? 'day' : 'night'} apply: ${source}`,
   healthDaySource: {
-    light: 'so the light in the greenhouse says',
-    clock: 'so the clock says, for no light is measured',
-    assumed: 'assumed, for neither light nor clock tells',
+    light: 'by the light in the greenhouse',
+    clock: 'by the clock, as no light is measured',
+    assumed: 'assumed, as neither light nor time is known',
   },
   /** "any": by day and by night it is the same. */
   idealParts: { any: 'ideal', day: 'ideal by day', night: 'ideal by night' },
   healthIdeal: (ideal: string, low: string, high: string, unit: string): string =>
     `${ideal} ${low} to ${high} ${unit}`.trim(),
-  healthAllWell: 'Every judged reading lies within its ideal range',
+  healthAllWell: 'All assessed readings are within their ideal ranges',
   healthDespite: (alarms: number): string =>
     alarms === 1
       ? '1 alarm is still active: two good scans resolve it'
       : `${alarms} alarms are still active: two good scans resolve each`,
-  healthNothing: 'No reading to judge yet',
+  healthNothing: 'No reading to assess yet',
   healthFilter: ', show only these tags',
   houseRhythm: (interval: string): string => `a scan every ${interval}`,
   houseLast: (age: string): string => `last scan ${age} ago`,
@@ -75,7 +75,7 @@ export const HEALTH = {
   attention: 'Needs attention',
   attentionNone: 'Nothing needs attention',
   attentionNoneKnown: (unknown: number): string =>
-    `Nothing known needs attention; of ${counted(unknown, 'tag', 'tags')} nothing is known`,
+    `Nothing known needs attention; no data for ${counted(unknown, 'tag', 'tags')}`,
   attentionMore: (count: number): string => `+ ${count} more`,
 
   tooLow: (by: string | null): string => (by === null ? 'too low' : `too low by ${by}`),

@@ -9,12 +9,12 @@ export const PAGE = {
 
   language: 'Language',
   languageUnknown: (asked: string): string =>
-    `The page does not speak “${asked}”: it is shown in English.`,
+    `This page is not available in “${asked}”. It is shown in English.`,
   languageMissing: (name: string): string =>
-    `${name} could not be loaded: the page is shown in English.`,
-  partsLate: 'Part of the page has not arrived.',
+    `${name} could not be loaded. The page is shown in English.`,
+  partsLate: 'Part of the page has not loaded.',
   partsLateHint:
-    'Cards, lists and the time bar come as soon as the server answers; it is asked again and again.',
+    'Cards, lists and the time bar appear when the server responds. The page keeps trying.',
 
   phase: {
     connecting: 'Connecting',
@@ -29,32 +29,32 @@ export const PAGE = {
   frozenSince: (clock: string): string => `Readings are frozen. Last data at ${clock}`,
   agoSuffix: (age: string): string => `${age} ago`,
   frozenWhy: {
-    stale: 'The connection is open, but nothing comes through it any more.',
-    reconnecting: 'The connection to the server is lost; the page resumes by itself.',
-    connecting: 'Waiting for the server to answer.',
+    stale: 'The connection is open, but no data arrives.',
+    reconnecting: 'Connection to the server lost. The page reconnects automatically.',
+    connecting: 'Waiting for the server to respond.',
     live: '',
-    offline: 'The server answers, but the twin behind it does not.',
+    offline: 'The server responds, but the twin does not.',
   },
   offlineWhy: {
     live: '',
     paused: '',
-    no_clock: 'The twin does not know the time yet, and so not how old the readings are.',
-    clock_stopped: 'The twin’s clock has stopped. How old the readings are is not known.',
-    clock_doubted: 'The twin’s clock is wrong. How old the readings are is not known.',
-    never_seen: 'The server has not heard from any twin yet. Is it switched on?',
-    stale: 'The twin has fallen silent. Check that it still runs.',
-    thread_dead: 'The server has lost touch with the twin and has to be restarted.',
+    no_clock: 'The twin has no time yet, so the age of the readings is unknown.',
+    clock_stopped: 'The twin’s clock has stopped. The age of the readings is unknown.',
+    clock_doubted: 'The twin’s clock is wrong. The age of the readings is unknown.',
+    never_seen: 'The server has received nothing from a twin yet. Is the twin switched on?',
+    stale: 'The twin has stopped sending. Check that it is running.',
+    thread_dead: 'The server has lost the twin and must be restarted.',
     shutting_down: 'The server is shutting down.',
   },
   /** For whoever looks after the machines; empty: there is nothing to add. */
   offlineMore: {
     live: '',
     paused: '',
-    no_clock: 'The twin runs with simulated time, and nothing comes on /clock.',
-    clock_stopped: 'The twin runs with simulated time, and nothing comes on /clock any more.',
-    clock_doubted: 'It is earlier than what is recorded: set it.',
-    never_seen: 'Twin and bridge have to run in the same ROS domain (ROS_DOMAIN_ID).',
-    stale: 'The bridge runs, but nothing is published on /twin/state any more.',
+    no_clock: 'The twin uses simulated time, but nothing is published on /clock.',
+    clock_stopped: 'The twin uses simulated time, but /clock has stopped.',
+    clock_doubted: 'It is earlier than the recording: set the clock.',
+    never_seen: 'Twin and bridge must use the same ROS domain (ROS_DOMAIN_ID).',
+    stale: 'The bridge is running, but nothing is published on /twin/state.',
     thread_dead: 'The bridge’s ROS thread has ended; its log says why.',
     shutting_down: '',
   },
@@ -65,8 +65,8 @@ export const PAGE = {
       : `${count} messages from the server could not be read and were dropped.`,
   unreadLast: (why: string): string => `The last: ${why}`,
   paused: 'Time is paused.',
-  pausedHint: 'The simulation, or the recording, stands still, and so do all ages.',
-  inputProblem: 'The twin does not hear all that is published for it.',
+  pausedHint: 'The simulation or recording is paused, so ages do not increase.',
+  inputProblem: 'The twin does not receive everything that is published for it.',
   drops: (count: number): string =>
     `The twin dropped ${counted(count, 'message', 'messages')} in the last minutes.`,
   dropsLast: (message: string): string => `The last: ${message}`,
@@ -74,61 +74,60 @@ export const PAGE = {
   journal: {
     off: {
       title: 'Nothing is recorded.',
-      hint: 'After a restart the twin knows nothing of before.',
+      hint: 'After a restart, all earlier data is lost.',
     },
     slow: {
-      title: 'The recording lags behind.',
-      hint: 'What waits is written as the disk keeps up again; a power cut would lose it.',
+      title: 'Recording is behind.',
+      hint: 'Data waits in memory until the disk catches up. A power cut would lose it.',
     },
     failing: {
       title: 'Nothing is being recorded.',
-      hint: 'The twin goes on, tries again and again, and writes what waits once it can: make room, or see to the disk.',
+      hint: 'The twin keeps running and retrying. Free disk space, or check the disk.',
     },
     upgrading: {
       title: 'The recording of an older version is being upgraded.',
-      hint: 'What is observed is shown and waits. What was known before is there as soon as that is done; it may take minutes.',
+      hint: 'New data is shown and waits. Earlier data returns when the upgrade is done, which may take minutes.',
     },
     doubting: {
       title: 'Nothing is being recorded: the clock contradicts the recording.',
-      hint: 'What is observed is shown and waits. It is written once the clock is right, or after ten minutes as it is.',
+      hint: 'New data is shown and waits. It is recorded when the clock is right, or after ten minutes as it is.',
     },
     in_use: {
-      title: 'This twin does not record: another one does.',
+      title: 'This twin is not recording: another twin uses its file.',
       hint: 'Stop one of them, or give this one a file of its own.',
     },
     foreign: {
-      title: "This twin does not record: its file is somebody else's.",
+      title: 'This twin is not recording: its file belongs to another program.',
       hint: 'Nothing in it was changed. Give the twin another file, or move this one.',
     },
   },
   /** What to tell of a channel by which others are told, and are not. */
   outward: {
-    mqtt: 'Home automation (MQTT) is not being told.',
-    webhook: 'Alarms are not being passed on (webhook).',
+    mqtt: 'Home automation (MQTT) receives no updates.',
+    webhook: 'The webhook receives no alarms.',
   },
-  outwardOther: (channel: string): string => `${channel} is not being told.`,
-  outwardHint: 'It is tried again and again; this page is not affected.',
+  outwardOther: (channel: string): string => `${channel} receives no updates.`,
+  outwardHint: 'The server keeps trying. This page is not affected.',
   journalMore: 'The file is named by the twin’s parameter “journal”; “off” records nothing.',
   /** What the twin observes where that is no robot's, or not of now. */
   origin: { simulated: 'Simulated', recorded: 'Recording', sim_time: 'Simulated time' },
   originHint: {
-    simulated: 'No robot is at work: greenhouse, plants and readings are made up.',
-    recorded: 'A recording is being played: nothing here is of now.',
-    sim_time:
-      'The time is not that of the clock on the wall: what is shown comes from a simulation, or from a recording that is played.',
+    simulated: 'No real robot: greenhouse, plants and readings are simulated.',
+    recorded: 'A recording is playing: nothing here is current.',
+    sim_time: 'This is not real time: the data comes from a simulation or a recording.',
   },
-  recordedIs: { playing: 'Playing', paused: 'Stands still' },
-  recordedPaused: 'The recording stands still.',
-  recordedPausedHint: 'It is paused or has come to its end, and no age goes on.',
+  recordedIs: { playing: 'Playing', paused: 'Paused' },
+  recordedPaused: 'The recording is paused.',
+  recordedPausedHint: 'It is paused or has ended, so ages do not increase.',
   simulated: 'Simulated.',
   simulatedHint: (until: string): string =>
-    `No robot observed this: the demo began with days made up until ${until}.`,
-  setAside: 'A damaged recording was set aside.',
+    `No robot observed this: the demo starts with simulated days, up to ${until}.`,
+  setAside: 'A damaged recording was quarantined.',
   setAsideHint: (name: string): string =>
-    `What could be read of it was kept, and recording goes on. The old file is ${name}.`,
+    `Readable data was kept, and recording continues. The damaged file is ${name}.`,
   failedTitle: 'The page has failed',
-  failedHint: 'What it shows is not to be relied on. The twin and the server are not affected.',
-  failedAgain: 'It is loaded anew by itself.',
+  failedHint: 'Do not rely on what it shows. The twin and the server are not affected.',
+  failedAgain: 'It reloads automatically.',
   reload: 'Reload',
 
   menu: 'Menu',
@@ -146,23 +145,22 @@ export const PAGE = {
   kioskLeave: 'Leave',
   cycleNext: (sensor: string, time: string): string => `next: ${sensor} in ${time}`,
   cycleRefused: (asked: string, least: number, most: number): string =>
-    `cycle=${asked} is not in use: it takes ${least} to ${most} seconds.`,
+    `cycle=${asked} is ignored: use ${least} to ${most} seconds.`,
   help: 'Keyboard shortcuts',
   signOut: 'Sign out',
   signOutFailed: (reason: string): string => `You are still signed in: ${reason}`,
   exportFailed: (reason: string): string => `Nothing was saved: ${reason}`,
 
   emptyConnecting: 'Connecting to the server',
-  emptyConnectingHint: 'The greenhouse appears as soon as it answers.',
-  emptyUnreachable: 'The server does not answer',
-  emptyUnreachableHint: 'Check that it is switched on. The page keeps trying by itself.',
+  emptyConnectingHint: 'The greenhouse appears when the server responds.',
+  emptyUnreachable: 'The server is not responding',
+  emptyUnreachableHint: 'Check that it is switched on. The page keeps trying.',
   emptyUnreachableMore:
     'The server is the bridge: “lupin-twin serve” on the robot, or “make run” for the demo.',
   emptyNoTwin: 'No twin yet',
   emptyNoTags: 'No tags yet',
   emptyNoTagsHint:
-    'The twin is running and waits. Tags appear when the robot finds or scans one: send it on ' +
-    'its round.',
+    'The twin is running. Tags appear when the robot finds or scans them: ' + 'start its patrol.',
   emptyNoTagsMore: '“lupin-twin demo” shows a simulated patrol.',
   emptyNoPins: 'No tag has a position yet',
   emptyNoPinsHint: 'All tags are listed in the table; a pin appears with the first good scan.',
@@ -187,7 +185,7 @@ export const PAGE = {
       ['A', 'Alarms'],
       ['C', 'Charts of the chosen tag'],
       ['L', 'Back to live'],
-      ['Space', 'Play the past, or pause'],
+      ['Space', 'Play or pause the past'],
       ['U', '°C or °F'],
       ['T', 'Light or dark'],
       ['Esc', 'Close, then back to live'],
@@ -209,7 +207,7 @@ export const PAGE = {
 
   paper: (taken: string, printed: string): string => `As of ${taken}, printed ${printed}`,
   paperRest: (printed: number, all: number): string =>
-    `Printed are the first ${printed} of ${all} tags. The table as CSV has all of them.`,
+    `The first ${printed} of ${all} tags are printed. The CSV file has all of them.`,
   paperRange: (sensor: string, range: string): string => `${sensor} ${range}`,
   fileName: (kind: string, stamp: string): string => `lupin-twin-${kind}-${stamp}`,
   asOf: (moment: string): string => `as of ${moment}`,

@@ -56,6 +56,15 @@ export const ALARMS: In<typeof ENGLISH> = {
   alarmsNew: (count) => counted(count, 'nueva', 'nuevas'),
   alarmsNewHint: 'El orden se mantiene mientras esté en la lista. Mostrar las nuevas',
   alarmMore: (count) => `Mostrar ${count} más`,
+  alarmFilter: 'Filtrar alarmas',
+  alarmFilterHint: 'punto, causa …',
+  alarmOrder: 'Orden',
+  alarmOrders: { cause: 'Por causa', newest: 'Las más recientes', tag: 'Por punto' },
+  alarmSaveCsv: 'Guardar alarmas como CSV',
+  alarmsNoMatch: 'Ninguna alarma coincide con el filtro.',
+  alarmCount: (count) => counted(count, 'alarma', 'alarmas'),
+  alarmTags: (tags, more) =>
+    `${tags.length === 1 ? 'Punto' : 'Puntos'} ${tags.join(', ')}${more > 0 ? ` y ${more} más` : ''}`,
   alarmsNone: 'Ninguna alarma activa',
   alarmsNoneHint:
     'Una alarma salta cuando algo va mal en dos mediciones seguidas. Con una plaga, o si no llega nada del invernadero, salta de inmediato.',
@@ -65,7 +74,7 @@ export const ALARMS: In<typeof ENGLISH> = {
   alarmsLost: (clock) =>
     `Según lo último recibido a las ${clock}. Lo ocurrido desde entonces no se conoce.`,
   alarmsOfNow: (moment) =>
-    `Estas son las alarmas de ahora. El resto de la página muestra ${moment}.`,
+    `Estas son las alarmas actuales. El resto de la página muestra ${moment}.`,
   alarmsMine: '«Reconocida» y «aplazada» valen solo en este navegador.',
 
   alarmTell: 'Avisarme de las alarmas',

@@ -16,7 +16,7 @@ export const HEALTH: In<typeof ENGLISH> = {
       `${reading}, ${side} ${limit}${isCritical ? ' (crítico)' : ''}`,
     beyond: (sensor, side, limit) => `${sensor} ${side} ${limit}`,
     readingFailed: (sensor) => `${sensor}: el sensor no da ningún valor`,
-    implausible: (reading) => `${reading}: ningún sensor sano mide esto`,
+    implausible: (reading) => `${reading}: valor no plausible`,
     scanFailed: (outcome, age) =>
       `Última medición fallida: ${outcome}${age === null ? '' : `, hace ${age}`}`,
     pest: (count) =>
@@ -33,34 +33,34 @@ export const HEALTH: In<typeof ENGLISH> = {
           : sensor === ''
             ? `Sin medir desde hace ${age}`
             : `sin lectura desde hace ${age}`;
-      return `${sensor === '' ? '' : `${sensor}: `}${since}${holds === null ? '' : ` (las lecturas valen ${holds})`}`;
+      return `${sensor === '' ? '' : `${sensor}: `}${since}${holds === null ? '' : ` (las lecturas valen durante ${holds})`}`;
     },
     outOfRange: 'fuera de su rango',
-    changed: (reading) => `${reading}, ha cambiado respecto a su pasado y a sus vecinos`,
-    silent: 'El gemelo calla: lo último que se oyó no dice nada de ahora',
-    stopped: 'No se mide ningún punto: el robot se ha parado o no se le oye',
+    changed: (reading) => `${reading}: posible fallo del sensor`,
+    silent: 'El gemelo no envía nada: sus últimos datos no dicen nada de ahora',
+    stopped: 'No se mide ningún punto: el robot se ha parado o no llegan sus datos',
     other: (kind, sensor) => (sensor === '' ? kind : `${sensor}: ${kind}`),
   },
   reasonsLabel: 'Por qué',
   healthHeading: 'Estado del invernadero',
   healthDriver: (tag, reason) => `Punto ${tag}: ${reason}`,
   healthMostUnknown: 'De más de la mitad de los puntos no se sabe nada',
-  healthSomeUnknown: (count) => `No se puede juzgar ${counted(count, 'punto', 'puntos')}`,
+  healthSomeUnknown: (count) => `No se puede evaluar ${counted(count, 'punto', 'puntos')}`,
   healthDay: (isDay, source) =>
-    `Juzgado según los rangos ${isDay ? 'del día' : 'de la noche'}: ${source}`,
+    `Se aplican los rangos ${isDay ? 'del día' : 'de la noche'}: ${source}`,
   healthDaySource: {
-    light: 'así lo indica la luz del invernadero',
-    clock: 'así lo indica el reloj, pues no se mide la luz',
-    assumed: 'se supone, pues no lo indican ni la luz ni el reloj',
+    light: 'según la luz del invernadero',
+    clock: 'según el reloj, pues no se mide la luz',
+    assumed: 'se supone, pues no se conocen ni la luz ni la hora',
   },
   idealParts: { any: 'ideal', day: 'ideal de día', night: 'ideal de noche' },
   healthIdeal: (ideal, low, high, unit) => `${ideal} de ${low} a ${high} ${unit}`.trim(),
-  healthAllWell: 'Todas las lecturas juzgadas están en su rango ideal',
+  healthAllWell: 'Todas las lecturas evaluadas están en su rango ideal',
   healthDespite: (alarms) =>
     alarms === 1
       ? 'Aún hay 1 alarma activa: dos mediciones buenas la resuelven'
       : `Aún hay ${alarms} alarmas activas: dos mediciones buenas resuelven cada una`,
-  healthNothing: 'Aún no hay lecturas que juzgar',
+  healthNothing: 'Aún no hay lecturas que evaluar',
   healthFilter: ', mostrar solo estos puntos',
   houseRhythm: (interval) => `una lectura cada ${interval}`,
   houseLast: (age) => `última lectura hace ${age}`,
@@ -73,7 +73,7 @@ export const HEALTH: In<typeof ENGLISH> = {
   attention: 'Requiere atención',
   attentionNone: 'Nada requiere atención',
   attentionNoneKnown: (unknown) =>
-    `Que se sepa, nada requiere atención; de ${counted(unknown, 'punto', 'puntos')} no se sabe nada`,
+    `Que se sepa, nada requiere atención; sin datos de ${counted(unknown, 'punto', 'puntos')}`,
   attentionMore: (count) => `+ ${count} más`,
 
   tooLow: (by) => (by === null ? 'demasiado bajo' : `demasiado bajo por ${by}`),

@@ -10,11 +10,11 @@ export const PAGE: In<typeof ENGLISH> = {
   more: 'Más detalles',
 
   language: 'Idioma',
-  languageUnknown: (asked) => `Esta página no habla «${asked}»: se muestra en inglés.`,
+  languageUnknown: (asked) => `Esta página no está disponible en «${asked}». Se muestra en inglés.`,
   languageMissing: (name) => `No se pudo cargar ${name}: la página se muestra en inglés.`,
-  partsLate: 'Una parte de la página no ha llegado.',
+  partsLate: 'Una parte de la página no se ha cargado.',
   partsLateHint:
-    'Las fichas, las listas y la barra de tiempo aparecerán en cuanto el servidor responda; se le pregunta una y otra vez.',
+    'Las fichas, las listas y la barra de tiempo aparecerán cuando el servidor responda. La página lo sigue intentando.',
 
   phase: {
     connecting: 'Conectando',
@@ -29,20 +29,20 @@ export const PAGE: In<typeof ENGLISH> = {
   frozenSince: (clock) => `Las lecturas están congeladas. Últimos datos a las ${clock}`,
   agoSuffix: (age) => `hace ${age}`,
   frozenWhy: {
-    stale: 'La conexión está abierta, pero ya no llega nada por ella.',
-    reconnecting: 'Se ha perdido la conexión con el servidor; la página continuará por sí sola.',
+    stale: 'La conexión está abierta, pero no llegan datos.',
+    reconnecting: 'Se ha perdido la conexión con el servidor; la página se reconecta sola.',
     connecting: 'Esperando la respuesta del servidor.',
     live: '',
-    offline: 'El servidor responde, pero el gemelo que hay detrás no.',
+    offline: 'El servidor responde, pero el gemelo no.',
   },
   offlineWhy: {
     live: '',
     paused: '',
-    no_clock: 'El gemelo aún no sabe la hora y, por tanto, tampoco la antigüedad de las lecturas.',
-    clock_stopped: 'El reloj del gemelo se ha parado. No se sabe la antigüedad de las lecturas.',
-    clock_doubted: 'El reloj del gemelo no va bien. No se sabe la antigüedad de las lecturas.',
-    never_seen: 'El servidor aún no sabe de ningún gemelo. ¿Está encendido?',
-    stale: 'El gemelo ya no da señales. Compruebe que sigue en marcha.',
+    no_clock: 'El gemelo aún no tiene hora; se desconoce la antigüedad de las lecturas.',
+    clock_stopped: 'El reloj del gemelo se ha parado. Se desconoce la antigüedad de las lecturas.',
+    clock_doubted: 'El reloj del gemelo no va bien. Se desconoce la antigüedad de las lecturas.',
+    never_seen: 'El servidor aún no ha recibido nada de un gemelo. ¿Está encendido el gemelo?',
+    stale: 'El gemelo ha dejado de enviar. Compruebe que está en marcha.',
     thread_dead: 'El servidor ha perdido el contacto con el gemelo y hay que reiniciarlo.',
     shutting_down: 'El servidor se está apagando.',
   },
@@ -65,34 +65,34 @@ export const PAGE: In<typeof ENGLISH> = {
       : `${count} mensajes del servidor no se pudieron leer y se descartaron.`,
   unreadLast: (why) => `El último: ${why}`,
   paused: 'El tiempo está en pausa.',
-  pausedHint: 'La simulación o la grabación está parada, y nada envejece.',
-  inputProblem: 'El gemelo no oye todo lo que se publica para él.',
+  pausedHint: 'La simulación o la grabación está en pausa; la antigüedad no aumenta.',
+  inputProblem: 'El gemelo no recibe todo lo que se publica para él.',
   drops: (count) =>
     `El gemelo ha descartado ${counted(count, 'mensaje', 'mensajes')} en los últimos minutos.`,
   dropsLast: (message) => `El último: ${message}`,
   journal: {
     off: {
       title: 'No se guarda ningún registro.',
-      hint: 'Tras un reinicio, el gemelo no sabrá nada de lo anterior.',
+      hint: 'Tras un reinicio, se pierden todos los datos anteriores.',
     },
     slow: {
       title: 'El registro va con retraso.',
-      hint: 'Lo pendiente se escribirá cuando el disco dé abasto; un corte de luz lo perdería.',
+      hint: 'Los datos esperan en memoria hasta que el disco dé abasto. Un corte de luz los perdería.',
     },
     failing: {
       title: 'El registro está fallando.',
-      hint: 'El gemelo sigue, lo intenta una y otra vez y escribirá lo pendiente en cuanto pueda: haga sitio o revise el disco.',
+      hint: 'El gemelo sigue en marcha y lo sigue intentando. Libere espacio o revise el disco.',
     },
     upgrading: {
       title: 'El registro de una versión anterior se está actualizando.',
-      hint: 'Lo observado se muestra y espera. Lo que se sabía antes vuelve en cuanto termine; puede tardar minutos.',
+      hint: 'Los datos nuevos se muestran y esperan. Los anteriores vuelven al terminar; puede tardar minutos.',
     },
     doubting: {
       title: 'No se registra nada: el reloj contradice al registro.',
-      hint: 'Lo observado se muestra y espera. Se escribirá cuando el reloj esté en hora o, tras diez minutos, tal como está.',
+      hint: 'Los datos nuevos se muestran y esperan. Se registran cuando el reloj esté en hora o, como tarde, a los diez minutos.',
     },
     in_use: {
-      title: 'Este gemelo no registra: ya lo hace otro.',
+      title: 'Este gemelo no registra: otro usa su archivo.',
       hint: 'Detenga uno de los dos o dé a este un archivo propio.',
     },
     foreign: {
@@ -101,29 +101,28 @@ export const PAGE: In<typeof ENGLISH> = {
     },
   },
   outward: {
-    mqtt: 'La domótica (MQTT) no recibe nada.',
-    webhook: 'Las alarmas no se transmiten (webhook).',
+    mqtt: 'La domótica (MQTT) no recibe datos.',
+    webhook: 'El webhook no recibe alarmas.',
   },
-  outwardOther: (channel) => `${channel} no recibe nada.`,
-  outwardHint: 'Se sigue intentando; esta página no está afectada.',
+  outwardOther: (channel) => `${channel} no recibe datos.`,
+  outwardHint: 'El servidor lo sigue intentando. Esta página no está afectada.',
   journalMore:
     'El archivo lo indica el parámetro «journal» del gemelo; con «off» no se registra nada.',
   origin: { simulated: 'Simulado', recorded: 'Grabación', sim_time: 'Tiempo simulado' },
   originHint: {
-    simulated: 'Aquí no trabaja ningún robot: invernadero, plantas y lecturas son inventados.',
-    recorded: 'Se está reproduciendo una grabación: nada de esto es de ahora.',
-    sim_time:
-      'La hora no es la del reloj de pared: lo que se ve viene de una simulación o de una grabación que se reproduce.',
+    simulated: 'No hay robot real: invernadero, plantas y lecturas son simulados.',
+    recorded: 'Se reproduce una grabación: nada de esto es en directo.',
+    sim_time: 'No es la hora real: los datos vienen de una simulación o de una grabación.',
   },
-  recordedIs: { playing: 'En marcha', paused: 'Parada' },
-  recordedPaused: 'La grabación está parada.',
-  recordedPausedHint: 'Está en pausa o ha llegado a su fin, y nada envejece.',
+  recordedIs: { playing: 'En marcha', paused: 'En pausa' },
+  recordedPaused: 'La grabación está en pausa.',
+  recordedPausedHint: 'Está en pausa o ha terminado; la antigüedad no aumenta.',
   simulated: 'Simulado.',
   simulatedHint: (until) =>
-    `Ningún robot ha observado esto: la demostración empezó con días inventados hasta ${until}.`,
-  setAside: 'Se ha apartado un registro dañado.',
+    `Ningún robot ha medido esto: la demostración empieza con días simulados, hasta ${until}.`,
+  setAside: 'Se ha puesto en cuarentena un registro dañado.',
   setAsideHint: (name) =>
-    `Se ha conservado lo que se pudo leer y el registro continúa. El archivo antiguo es ${name}.`,
+    `Se han conservado los datos legibles y el registro continúa. El archivo dañado es ${name}.`,
   failedTitle: 'La página ha fallado',
   failedHint: 'No se fíe de lo que muestra. Ni el gemelo ni el servidor están afectados.',
   failedAgain: 'Se vuelve a cargar por sí sola.',
@@ -144,7 +143,7 @@ export const PAGE: In<typeof ENGLISH> = {
   kioskLeave: 'Salir',
   cycleNext: (sensor, time) => `después: ${sensor} en ${time}`,
   cycleRefused: (asked, least, most) =>
-    `cycle=${asked} no se usa: vale de ${least} a ${most} segundos.`,
+    `cycle=${asked} se ignora: use de ${least} a ${most} segundos.`,
   help: 'Atajos de teclado',
   signOut: 'Cerrar sesión',
   signOutFailed: (reason) => `La sesión sigue abierta: ${reason}`,
@@ -159,14 +158,14 @@ export const PAGE: In<typeof ENGLISH> = {
   emptyNoTwin: 'Aún no hay gemelo',
   emptyNoTags: 'Aún no hay puntos de medida',
   emptyNoTagsHint:
-    'El gemelo está en marcha y espera. Los puntos aparecen cuando el robot encuentra o lee uno: ' +
+    'El gemelo está en marcha. Los puntos aparecen cuando el robot los encuentra o los mide: ' +
     'mándelo a hacer su ronda.',
   emptyNoTagsMore: '«lupin-twin demo» muestra una ronda simulada.',
   emptyNoPins: 'Ningún punto tiene posición todavía',
   emptyNoPinsHint:
     'Todos los puntos están en la tabla; con la primera medición lograda aparecen en el mapa.',
   emptyNoReading: (sensor) => `Ningún punto del mapa tiene aún una lectura: ${sensor}`,
-  emptyNoReadingHint: 'Elija otro sensor o espere a que el robot lea más puntos.',
+  emptyNoReadingHint: 'Elija otro sensor o espere a que el robot mida más puntos.',
   emptyNoMap: 'Aún no hay plano: el robot no ha enviado su mapa.',
   emptyNoMapMore: 'El plano es el mapa SLAM del robot, que llega por /map.',
 

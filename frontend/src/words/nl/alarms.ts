@@ -55,6 +55,15 @@ export const ALARMS: In<typeof ENGLISH> = {
   alarmsNew: (count) => `${count} nieuw`,
   alarmsNewHint: 'De volgorde blijft zolang u in de lijst bent. Nieuwe tonen',
   alarmMore: (count) => `Nog ${count} tonen`,
+  alarmFilter: 'Alarmen filteren',
+  alarmFilterHint: 'meetpunt, oorzaak …',
+  alarmOrder: 'Volgorde',
+  alarmOrders: { cause: 'Per oorzaak', newest: 'Nieuwste eerst', tag: 'Per meetpunt' },
+  alarmSaveCsv: 'Alarmen opslaan als CSV',
+  alarmsNoMatch: 'Geen alarm past bij het filter.',
+  alarmCount: (count) => counted(count, 'alarm', 'alarmen'),
+  alarmTags: (tags, more) =>
+    `${tags.length === 1 ? 'Meetpunt' : 'Meetpunten'} ${tags.join(', ')}${more > 0 ? ` en nog ${more}` : ''}`,
   alarmsNone: 'Geen alarm actief',
   alarmsNoneHint:
     'Een alarm komt als er bij twee metingen na elkaar iets niet klopt. Bij een plaag, of als de kas niets meer stuurt, komt het meteen.',
@@ -62,7 +71,7 @@ export const ALARMS: In<typeof ENGLISH> = {
   alarmsStarting: 'Het verleden wordt nog gelezen: er kunnen alarmen bijkomen.',
   alarmsHeard: (since) => `Er wordt niets opgenomen: alarmen van voor ${since} zijn niet bekend.`,
   alarmsLost: (clock) => `Stand van ${clock}. Wat er sindsdien kwam, is niet bekend.`,
-  alarmsOfNow: (moment) => `Dit zijn de alarmen van nu. De rest van de pagina toont ${moment}.`,
+  alarmsOfNow: (moment) => `Dit zijn de huidige alarmen. De rest van de pagina toont ${moment}.`,
   alarmsMine: '“Bevestigd” en “uitgesteld” gelden alleen in deze browser.',
 
   alarmTell: 'Alarmen melden',

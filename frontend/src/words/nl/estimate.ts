@@ -6,41 +6,40 @@ import { counted } from './counted';
 export const ESTIMATE: In<typeof ENGLISH> = {
   about: 'Wat ± betekent',
   aboutText:
-    'Van tien geschatte waarden horen er negen er niet meer dan de ± naast te zitten (een ' +
-    '90%-interval). De schatting houdt rekening met hoe ver weg en hoe oud elke meetwaarde is en ' +
-    'hoe de kas door de dag gaat: hoe langer niemand meet, hoe groter de ±.',
-  onItsWay: 'De schatting komt eraan',
+    'Negen van de tien geschatte waarden horen er hoogstens de ± naast te zitten (een ' +
+    '90%-interval). Die hangt af van afstand en ouderdom van de metingen en van het tijdstip: hoe ' +
+    'langer er niet wordt gemeten, hoe groter de ±.',
+  onItsWay: 'De schatting wordt geladen',
   noService: 'Deze tweeling maakt geen schatting: getoond worden de dichtstbijzijnde waarden',
   noneNow: 'Er is nu geen schatting: getoond worden de dichtstbijzijnde waarden',
   noModel: 'Nog geen schatting: er zijn tien metingen van een sensor nodig',
   noSensor: 'Geen meetpunt meet dit, er valt niets te schatten',
   unsure: (error) =>
-    `Gearceerd waar ze er meer dan ±${error} naast kan zitten, hoe dichter hoe meer. Geen kleur: niet bekend`,
-  errorOf: (sensor) => `${sensor}: hoe ver de schatting ernaast kan zitten`,
+    `Gearceerd: kan er meer dan ±${error} naast zitten, hoe dichter hoe meer. Geen kleur: geen gegevens`,
+  errorOf: (sensor) => `${sensor}: onzekerheid van de schatting`,
   foretold: (inside, scans) =>
-    `${inside} van ${counted(scans, 'meting', 'metingen')} waar de andere meetpunten ze verwachtten`,
+    `${inside} van ${counted(scans, 'meting', 'metingen')} binnen het voorspelde bereik`,
   foretoldNone: 'Er is nog geen meting mee vergeleken',
   foretoldDay: (inside, scans) =>
     `Laatste dag: ${inside} van ${counted(scans, 'meting', 'metingen')}`,
   foretoldWeek: (inside, scans) =>
     `laatste week: ${inside} van ${counted(scans, 'meting', 'metingen')}`,
-  fitProblem: (reason) => `De kas leren kennen lukt niet goed: ${reason}`,
+  fitProblem: (reason) => `Het model past niet goed bij deze kas: ${reason}`,
   notTrusted: (count) =>
-    `Vertrouw niet op de ±: maar ${count} van de 10 metingen lagen waar de andere ` +
-    'meetpunten ze verwachtten, geen 9.',
+    `Foutmarge te smal: maar ${count} van de 10 metingen lagen erbinnen, geen 9.`,
   near: (count) =>
     count === 0
       ? 'geen meetpunt in de buurt'
       : counted(count, 'meetpunt in de buurt', 'meetpunten in de buurt'),
   oldest: (age) => `oudste meetwaarde ${age}`,
   expected: (measured, expected) => `gemeten ${measured}, verwacht ${expected}`,
-  leftOut: (sensor) => `${sensor} is veranderd: weggelaten uit de schatting`,
+  leftOut: (sensor) => `${sensor}: mogelijke sensorfout, niet in de schatting gebruikt`,
   advice: 'Waar nog een meetpunt helpt',
   advised: (place, percent, isFirst) =>
     isFirst
-      ? `${place}: een meetpunt hier brengt de fout van de hele kaart naar ${percent} van nu`
-      : `${place}: meetpunten hier en bij elke markering ervoor brengen de fout van de hele kaart naar ${percent} van nu`,
+      ? `${place}: een meetpunt hier verlaagt de fout van de hele kaart tot ${percent} van nu`
+      : `${place}: meetpunten hier en bij elke markering ervoor verlagen de fout van de hele kaart tot ${percent} van nu`,
   adviceNone: 'Er is geen plek bekend waar nog een meetpunt helpt',
-  adviceFailed: (reason) => `Waar nog een meetpunt helpt is niet bekend: ${reason}`,
-  adviceNow: 'Waar nog een meetpunt helpt is alleen voor nu bekend',
+  adviceFailed: (reason) => `Geen voorstel voor nog een meetpunt: ${reason}`,
+  adviceNow: 'Voorstellen voor nog een meetpunt zijn er alleen voor nu',
 };

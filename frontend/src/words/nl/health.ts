@@ -16,7 +16,7 @@ export const HEALTH: In<typeof ENGLISH> = {
       `${reading}, ${side} ${limit}${isCritical ? ' (kritiek)' : ''}`,
     beyond: (sensor, side, limit) => `${sensor} ${side} ${limit}`,
     readingFailed: (sensor) => `${sensor}: de sensor geeft geen waarde`,
-    implausible: (reading) => `${reading}: dat meet geen goede sensor`,
+    implausible: (reading) => `${reading}: geen plausibele waarde`,
     scanFailed: (outcome, age) =>
       `Laatste meting mislukt: ${outcome}${age === null ? '' : `, ${age} geleden`}`,
     pest: (count) =>
@@ -33,13 +33,13 @@ export const HEALTH: In<typeof ENGLISH> = {
           : sensor === ''
             ? `Al ${age} niet gemeten`
             : `al ${age} geen meetwaarde`;
-      return `${sensor === '' ? '' : `${sensor}: `}${since}${holds === null ? '' : ` (meetwaarden gelden ${holds})`}`;
+      return `${sensor === '' ? '' : `${sensor}: `}${since}${holds === null ? '' : ` (meetwaarden zijn ${holds} geldig)`}`;
     },
     outOfRange: 'buiten het bereik',
-    changed: (reading) => `${reading}, veranderd ten opzichte van het eigen verleden en de buren`,
-    silent: 'De tweeling zwijgt: wat het laatst is gehoord, zegt niets over nu',
+    changed: (reading) => `${reading}: mogelijke sensorfout`,
+    silent: 'De tweeling stuurt niets: de laatste gegevens zeggen niets over nu',
     stopped:
-      'Er wordt geen meetpunt meer gemeten: de robot staat stil, of er is niets van hem te horen',
+      'Er wordt geen meetpunt meer gemeten: de robot staat stil, of zijn gegevens komen niet aan',
     other: (kind, sensor) => (sensor === '' ? kind : `${sensor}: ${kind}`),
   },
   reasonsLabel: 'Waarom',
@@ -48,16 +48,15 @@ export const HEALTH: In<typeof ENGLISH> = {
   healthMostUnknown: 'Van meer dan de helft van de meetpunten is niets bekend',
   healthSomeUnknown: (count) =>
     `${counted(count, 'meetpunt is', 'meetpunten zijn')} niet te beoordelen`,
-  healthDay: (isDay, source) =>
-    `Beoordeeld naar het bereik voor ${isDay ? 'de dag' : 'de nacht'}: ${source}`,
+  healthDay: (isDay, source) => `Het bereik voor ${isDay ? 'de dag' : 'de nacht'} geldt: ${source}`,
   healthDaySource: {
-    light: 'dat zegt het licht in de kas',
-    clock: 'dat zegt de klok, want licht wordt niet gemeten',
-    assumed: 'aangenomen, want licht noch klok geeft uitsluitsel',
+    light: 'naar het licht in de kas',
+    clock: 'naar de klok, want er wordt geen licht gemeten',
+    assumed: 'aangenomen, want licht en tijd zijn onbekend',
   },
   idealParts: { any: 'ideaal', day: 'ideaal overdag', night: 'ideaal ’s nachts' },
   healthIdeal: (ideal, low, high, unit) => `${ideal} ${low} tot ${high} ${unit}`.trim(),
-  healthAllWell: 'Elke beoordeelde meetwaarde ligt binnen het ideale bereik',
+  healthAllWell: 'Alle beoordeelde meetwaarden liggen binnen het ideale bereik',
   healthDespite: (alarms) =>
     alarms === 1
       ? '1 alarm is nog actief: twee goede metingen lossen het op'
@@ -75,7 +74,7 @@ export const HEALTH: In<typeof ENGLISH> = {
   attention: 'Vraagt aandacht',
   attentionNone: 'Niets vraagt aandacht',
   attentionNoneKnown: (unknown) =>
-    `Voor zover bekend vraagt niets aandacht; van ${counted(unknown, 'meetpunt', 'meetpunten')} is niets bekend`,
+    `Voor zover bekend vraagt niets aandacht; geen gegevens van ${counted(unknown, 'meetpunt', 'meetpunten')}`,
   attentionMore: (count) => `+ nog ${count}`,
 
   tooLow: (by) => (by === null ? 'te laag' : `te laag met ${by}`),

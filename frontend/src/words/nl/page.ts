@@ -11,12 +11,12 @@ export const PAGE: In<typeof ENGLISH> = {
 
   language: 'Taal',
   languageUnknown: (asked) =>
-    `Deze pagina spreekt geen “${asked}”: ze wordt in het Engels getoond.`,
+    `Deze pagina is er niet in “${asked}”. Ze wordt in het Engels getoond.`,
   languageMissing: (name) =>
     `${name} kon niet worden geladen: de pagina wordt in het Engels getoond.`,
-  partsLate: 'Een deel van de pagina is niet aangekomen.',
+  partsLate: 'Een deel van de pagina is niet geladen.',
   partsLateHint:
-    'Kaarten, lijsten en de tijdbalk komen zodra de server antwoordt; hij wordt steeds opnieuw gevraagd.',
+    'Kaarten, lijsten en de tijdbalk verschijnen zodra de server antwoordt. De pagina blijft het proberen.',
 
   phase: {
     connecting: 'Verbinden',
@@ -31,22 +31,23 @@ export const PAGE: In<typeof ENGLISH> = {
   frozenSince: (clock) => `De meetwaarden staan stil. Laatste gegevens om ${clock}`,
   agoSuffix: (age) => `${age} geleden`,
   frozenWhy: {
-    stale: 'De verbinding is er, maar er komt niets meer door.',
-    reconnecting: 'De verbinding met de server is verbroken; de pagina gaat vanzelf weer verder.',
+    stale: 'De verbinding is er, maar er komen geen gegevens binnen.',
+    reconnecting:
+      'De verbinding met de server is verbroken; de pagina maakt vanzelf opnieuw verbinding.',
     connecting: 'Wachten op antwoord van de server.',
     live: '',
-    offline: 'De server antwoordt, maar de tweeling erachter niet.',
+    offline: 'De server antwoordt, maar de tweeling niet.',
   },
   offlineWhy: {
     live: '',
     paused: '',
-    no_clock: 'De tweeling weet nog niet hoe laat het is, en dus niet hoe oud de meetwaarden zijn.',
+    no_clock: 'De tweeling heeft nog geen tijd; de ouderdom van de meetwaarden is onbekend.',
     clock_stopped:
-      'De klok van de tweeling staat stil. Hoe oud de meetwaarden zijn, is niet bekend.',
+      'De klok van de tweeling staat stil. De ouderdom van de meetwaarden is onbekend.',
     clock_doubted:
-      'De klok van de tweeling loopt verkeerd. Hoe oud de meetwaarden zijn, is niet bekend.',
-    never_seen: 'De server heeft nog van geen tweeling gehoord. Staat hij aan?',
-    stale: 'De tweeling laat niets meer horen. Controleer of hij nog draait.',
+      'De klok van de tweeling loopt verkeerd. De ouderdom van de meetwaarden is onbekend.',
+    never_seen: 'De server heeft nog niets van een tweeling ontvangen. Staat de tweeling aan?',
+    stale: 'De tweeling stuurt niets meer. Controleer of hij draait.',
     thread_dead:
       'De server heeft het contact met de tweeling verloren en moet opnieuw worden gestart.',
     shutting_down: 'De server wordt afgesloten.',
@@ -69,65 +70,64 @@ export const PAGE: In<typeof ENGLISH> = {
       : `${count} berichten van de server waren onleesbaar en zijn weggegooid.`,
   unreadLast: (why) => `Het laatste: ${why}`,
   paused: 'De tijd staat stil.',
-  pausedHint: 'De simulatie of de opname staat stil, en niets wordt ouder.',
-  inputProblem: 'De tweeling hoort niet alles wat voor hem wordt gepubliceerd.',
+  pausedHint: 'De simulatie of opname is gepauzeerd; de ouderdom loopt niet op.',
+  inputProblem: 'De tweeling ontvangt niet alles wat voor hem wordt gepubliceerd.',
   drops: (count) =>
     `De tweeling heeft de afgelopen minuten ${counted(count, 'bericht', 'berichten')} weggegooid.`,
   dropsLast: (message) => `Het laatste: ${message}`,
   journal: {
     off: {
       title: 'Er wordt niets vastgelegd.',
-      hint: 'Na een herstart weet de tweeling niets meer van ervoor.',
+      hint: 'Na een herstart zijn alle eerdere gegevens weg.',
     },
     slow: {
       title: 'Het vastleggen loopt achter.',
-      hint: 'Wat wacht, wordt geschreven zodra de schijf het weer bijhoudt; bij stroomuitval gaat het verloren.',
+      hint: 'Gegevens wachten in het geheugen tot de schijf bijblijft. Bij stroomuitval gaan ze verloren.',
     },
     failing: {
       title: 'Het vastleggen mislukt.',
-      hint: 'De tweeling gaat door, blijft het proberen en schrijft wat wacht zodra het kan: maak ruimte vrij of kijk de schijf na.',
+      hint: 'De tweeling draait door en blijft het proberen. Maak ruimte vrij of controleer de schijf.',
     },
     upgrading: {
       title: 'De opname van een oudere versie wordt omgezet.',
-      hint: 'Wat wordt waargenomen, is te zien en wacht. Wat eerder bekend was, is er weer zodra dat klaar is; dat kan minuten duren.',
+      hint: 'Nieuwe gegevens zijn te zien en wachten. Eerdere gegevens zijn er weer na het omzetten; dat kan minuten duren.',
     },
     doubting: {
       title: 'Er wordt niets vastgelegd: de klok spreekt de opname tegen.',
-      hint: 'Wat wordt waargenomen, is te zien en wacht. Het wordt geschreven zodra de klok klopt, of na tien minuten zoals het is.',
+      hint: 'Nieuwe gegevens zijn te zien en wachten. Ze worden vastgelegd zodra de klok klopt, uiterlijk na tien minuten.',
     },
     in_use: {
-      title: 'Deze tweeling legt niets vast: een andere doet het al.',
+      title: 'Deze tweeling legt niets vast: een andere gebruikt zijn bestand.',
       hint: 'Stop een van beide, of geef deze een eigen bestand.',
     },
     foreign: {
-      title: 'Deze tweeling legt niets vast: zijn bestand is van iemand anders.',
+      title: 'Deze tweeling legt niets vast: zijn bestand hoort bij een ander programma.',
       hint: 'Er is niets in veranderd. Geef de tweeling een ander bestand, of verplaats dit.',
     },
   },
   outward: {
-    mqtt: 'De domotica (MQTT) krijgt niets door.',
-    webhook: 'Alarmen worden niet doorgegeven (webhook).',
+    mqtt: 'De domotica (MQTT) ontvangt geen gegevens.',
+    webhook: 'De webhook ontvangt geen alarmen.',
   },
-  outwardOther: (channel) => `${channel} krijgt niets door.`,
-  outwardHint: 'Het wordt steeds opnieuw geprobeerd; deze pagina heeft er geen last van.',
+  outwardOther: (channel) => `${channel} ontvangt geen gegevens.`,
+  outwardHint: 'De server blijft het proberen. Deze pagina heeft er geen last van.',
   journalMore:
     'Het bestand staat in de parameter “journal” van de tweeling; “off” legt niets vast.',
   origin: { simulated: 'Gesimuleerd', recorded: 'Opname', sim_time: 'Gesimuleerde tijd' },
   originHint: {
-    simulated: 'Hier werkt geen robot: kas, planten en metingen zijn verzonnen.',
-    recorded: 'Er wordt een opname afgespeeld: niets hiervan is van nu.',
-    sim_time:
-      'De tijd is niet die van de klok aan de muur: wat te zien is, komt uit een simulatie of uit een opname die wordt afgespeeld.',
+    simulated: 'Geen echte robot: kas, planten en metingen zijn gesimuleerd.',
+    recorded: 'Er wordt een opname afgespeeld: niets hiervan is live.',
+    sim_time: 'Dit is niet de echte tijd: de gegevens komen uit een simulatie of een opname.',
   },
-  recordedIs: { playing: 'Speelt af', paused: 'Staat stil' },
-  recordedPaused: 'De opname staat stil.',
-  recordedPausedHint: 'Ze is gepauzeerd of afgelopen, en niets wordt ouder.',
+  recordedIs: { playing: 'Speelt af', paused: 'Gepauzeerd' },
+  recordedPaused: 'De opname is gepauzeerd.',
+  recordedPausedHint: 'Ze is gepauzeerd of afgelopen; de ouderdom loopt niet op.',
   simulated: 'Gesimuleerd.',
   simulatedHint: (until) =>
-    `Geen robot heeft dit waargenomen: de demo begon met verzonnen dagen tot ${until}.`,
-  setAside: 'Een beschadigde opname is opzijgezet.',
+    `Geen robot heeft dit gemeten: de demo begint met gesimuleerde dagen, tot ${until}.`,
+  setAside: 'Een beschadigde opname is in quarantaine gezet.',
   setAsideHint: (name) =>
-    `Wat nog leesbaar was, is bewaard, en het vastleggen gaat door. Het oude bestand is ${name}.`,
+    `Leesbare gegevens zijn bewaard en het vastleggen gaat door. Het beschadigde bestand is ${name}.`,
   failedTitle: 'Deze pagina is vastgelopen',
   failedHint: 'Vertrouw niet op wat ze toont. De tweeling en de server hebben er geen last van.',
   failedAgain: 'Ze wordt vanzelf opnieuw geladen.',
@@ -148,7 +148,7 @@ export const PAGE: In<typeof ENGLISH> = {
   kioskLeave: 'Verlaten',
   cycleNext: (sensor, time) => `daarna: ${sensor} over ${time}`,
   cycleRefused: (asked, least, most) =>
-    `cycle=${asked} geldt niet: mogelijk is ${least} tot ${most} seconden.`,
+    `cycle=${asked} wordt genegeerd: mogelijk is ${least} tot ${most} seconden.`,
   help: 'Sneltoetsen',
   signOut: 'Afmelden',
   signOutFailed: (reason) => `U bent nog aangemeld: ${reason}`,
@@ -163,14 +163,14 @@ export const PAGE: In<typeof ENGLISH> = {
   emptyNoTwin: 'Nog geen tweeling',
   emptyNoTags: 'Nog geen meetpunten',
   emptyNoTagsHint:
-    'De tweeling draait en wacht. Meetpunten verschijnen zodra de robot er een vindt of uitleest: ' +
+    'De tweeling draait. Meetpunten verschijnen zodra de robot ze vindt of meet: ' +
     'stuur hem op zijn ronde.',
   emptyNoTagsMore: '“lupin-twin demo” toont een gesimuleerde ronde.',
   emptyNoPins: 'Nog geen meetpunt heeft een positie',
   emptyNoPinsHint:
     'Alle meetpunten staan in de tabel; na de eerste geslaagde meting komen ze op de kaart.',
   emptyNoReading: (sensor) => `Nog geen meetpunt op de kaart heeft een meetwaarde: ${sensor}`,
-  emptyNoReadingHint: 'Kies een andere sensor, of wacht tot de robot meer heeft uitgelezen.',
+  emptyNoReadingHint: 'Kies een andere sensor, of wacht tot de robot meer heeft gemeten.',
   emptyNoMap: 'Nog geen plattegrond: de robot heeft zijn kaart niet gestuurd.',
   emptyNoMapMore: 'De plattegrond is de SLAM-kaart van de robot, die op /map komt.',
 

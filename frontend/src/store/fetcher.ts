@@ -1,50 +1,63 @@
 /**
- * Fetches whatever is wanted just now, while somebody drags: the newest wish wins, what comes
- * late is passed over, and nothing queues. Wishes that cannot be had in time are dropped.
+ * Fetches what is wanted just now: the latest wish wins, nothing queues, and a failure is tried
+ * again, ever more slowly.
  */
 import { now } from '../clock';
 import { Refusal } from '../contract/api';
 
-/** So many fetches at once: the next is on its way while one is being answered. */
-const MOST_RUNNING = 2;
-/** Shortest time between two starts: a dozen a second, which a server of this kind allows. */
-const PACE_MS = 80;
+/** While somebody drags: a dozen starts a second, which a server of this kind allows. */
+export const DRAG_PACE_MS = 80;
+/** While somebody drags, so many at once: the next is on its way while one is being answered. */
+const MOST_DRAGGED = 2;
 /** A wish that has stood for so long is what the operator has come to; older fetches then end. */
 const SETTLED_MS = 250;
 /** A fetch that takes longer has failed. */
-const TIMEOUT_MS = 20_000;
-/** What has come is used again for so long: the past may still change when something is heard late. */
+const TIMEOUT_MS = 30_000;
+/** While somebody drags, an answer serves again for so long: late readings may still change the past. */
 const KEEP_MS = 30_000;
 const MOST_KEPT = 60;
-/** After a failure nothing is asked for so long at least. */
+/** After a failure nothing is fetched for so long at least. */
 const CALM_MS = 500;
 const RETRY_FIRST_MS = 2_000;
 const RETRY_LONGEST_MS = 30_000;
 
 /** Something to fetch. */
 export interface Wish<T> {
-  /** What it depends on; of two wishes with one key the first will do. */
+  /** What it depends on; a wish with the key of the one before brings nothing new. */
   readonly key: string;
+  /** A wish of another group takes over at once; those of one group keep the pace. */
+  readonly group?: string;
+  /** In place of the fetcher's own pace, ms. */
+  readonly paceMs?: number;
   readonly run: (signal: AbortSignal) => Promise<T>;
 }
 
-export interface SeekerOptions<T> {
-  /** Something that was wanted, and nothing older than what was told before. */
+export interface FetcherOptions<T> {
+  /** Shortest time between two starts, ms. */
+  readonly paceMs: number;
+  /** For a wish that somebody drags: two fetches at once, and answers that serve again. */
+  readonly isDragged?: boolean;
+  /** Something that was wanted, and nothing older than the value before. */
   readonly onValue: (value: T) => void;
   /** What is wanted cannot be had; unless `isLasting`, it is tried again. */
-  readonly onError: (error: unknown, isLasting: boolean) => void;
+  readonly onError: (message: string, isLasting: boolean, error: unknown) => void;
 }
 
-export interface Seeker<T> {
+export interface Fetcher<T> {
   /** Null: nothing any more; all that is under way ends. */
   readonly want: (wish: Wish<T> | null) => void;
 }
 
-/** A refusal that asking again does not change: what is asked, or that nothing is kept. */
-const isLasting = (error: unknown): boolean =>
+/** A refusal that the same request gets again. */
+const isRefused = (error: unknown): boolean =>
   error instanceof Refusal && (error.status === 400 || error.status === 404);
 
-export function createSeeker<T>(options: SeekerOptions<T>): Seeker<T> {
+export function createFetcher<T>({
+  paceMs,
+  isDragged = false,
+  onValue,
+  onError,
+}: FetcherOptions<T>): Fetcher<T> {
   interface Running {
     readonly key: string;
     readonly order: number;
@@ -52,9 +65,9 @@ export function createSeeker<T>(options: SeekerOptions<T>): Seeker<T> {
   }
   let wanted: Wish<T> | null = null;
   let wantedSince = 0;
-  /** The key that was told of last, and the order of the wish that it was. */
-  let told: string | null = null;
-  let toldOrder = 0;
+  /** The key whose value was handed on last, and the order of the wish that it was. */
+  let done: string | null = null;
+  let doneOrder = 0;
   let order = 0;
   let running: readonly Running[] = [];
   let startedAt = -Infinity;
@@ -65,20 +78,19 @@ export function createSeeker<T>(options: SeekerOptions<T>): Seeker<T> {
   let timer: ReturnType<typeof setTimeout> | undefined;
   const kept = new Map<string, { readonly value: T; readonly since: number }>();
 
-  const end = (which: (each: Running) => boolean): void => {
+  const end = (which: (each: Running) => boolean = () => true): void => {
     for (const each of running.filter(which)) each.abort.abort();
     running = running.filter((each) => !which(each));
   };
 
-  const tell = (key: string, mine: number, value: T): void => {
-    const isWanted = key === wanted?.key;
-    if (mine < toldOrder && !isWanted) return;
-    told = key;
-    toldOrder = Math.max(toldOrder, mine);
+  const handOn = (key: string, mine: number, value: T): void => {
+    if (mine < doneOrder && key !== wanted?.key) return;
+    done = key;
+    doneOrder = Math.max(doneOrder, mine);
     failures = 0;
     // Nobody waits any more for what was wanted before this.
     end((each) => each.order < mine && each.key !== wanted?.key);
-    options.onValue(value);
+    onValue(value);
   };
 
   const keep = (key: string, value: T): void => {
@@ -93,24 +105,23 @@ export function createSeeker<T>(options: SeekerOptions<T>): Seeker<T> {
   /** Starts what is wanted, or looks again when it may be started. */
   const pump = (): void => {
     clearTimeout(timer);
-    if (!wanted || wanted.key === told) return;
+    if (!wanted || wanted.key === done) return;
     const { key } = wanted;
     const at = now();
     if (running.some((each) => each.key === key)) return;
-    const notBefore = Math.max(calmUntil, retryAt, startedAt + PACE_MS);
-    if (running.length >= MOST_RUNNING) {
+    if (running.length >= (isDragged ? MOST_DRAGGED : 1)) {
+      // What keeps the pace waits for its answer.
+      if (!isDragged) return;
       const settled = wantedSince + SETTLED_MS;
       if (at < settled) {
         timer = setTimeout(pump, settled - at);
         return;
       }
-      end(() => true);
+      end();
     }
-    if (at < notBefore) {
-      timer = setTimeout(pump, notBefore - at);
-      return;
-    }
-    start(wanted);
+    const notBefore = Math.max(calmUntil, retryAt, startedAt + (wanted.paceMs ?? paceMs));
+    if (at < notBefore) timer = setTimeout(pump, notBefore - at);
+    else start(wanted);
   };
 
   const start = (wish: Wish<T>): void => {
@@ -130,21 +141,21 @@ export function createSeeker<T>(options: SeekerOptions<T>): Seeker<T> {
     wish.run(abort.signal).then(
       (value) => {
         if (isOver()) return;
-        keep(wish.key, value);
-        tell(wish.key, mine.order, value);
+        if (isDragged) keep(wish.key, value);
+        handOn(wish.key, mine.order, value);
         pump();
       },
       (error: unknown) => {
         if (isOver()) return;
-        const lasting = isLasting(error);
-        const askedMs = error instanceof Refusal ? (error.retryAfterS ?? 0) * 1_000 : 0;
-        calmUntil = now() + Math.max(CALM_MS, askedMs);
+        const isLasting = isDragged && isRefused(error);
+        const waitMs = error instanceof Refusal ? (error.retryAfterS ?? 0) * 1_000 : 0;
+        calmUntil = now() + Math.max(CALM_MS, waitMs);
         // What nobody wants any more needs no second try.
-        if (wanted?.key === wish.key) {
-          if (lasting) told = wish.key;
+        if (wanted?.key === wish.key || !isDragged) {
+          if (isLasting) done = wish.key;
           retryAt = now() + Math.min(RETRY_LONGEST_MS, RETRY_FIRST_MS * 2 ** failures);
           failures += 1;
-          options.onError(error, lasting);
+          onError(error instanceof Error ? error.message : String(error), isLasting, error);
         }
         pump();
       },
@@ -153,24 +164,25 @@ export function createSeeker<T>(options: SeekerOptions<T>): Seeker<T> {
 
   return {
     want: (wish) => {
-      if (wish?.key === wanted?.key) return;
+      if (wish?.key === wanted?.key && wish?.group === wanted?.group) return;
+      const isOther = !wish || wish.group !== wanted?.group;
       wanted = wish;
       wantedSince = now();
-      failures = 0;
-      retryAt = -Infinity;
-      if (!wish) {
+      if (isOther || isDragged) {
+        failures = 0;
+        retryAt = -Infinity;
+      }
+      if (isOther) {
         clearTimeout(timer);
-        end(() => true);
+        end();
         kept.clear();
-        told = null;
-        return;
+        done = null;
+        startedAt = -Infinity;
       }
+      if (!wish) return;
       const known = kept.get(wish.key);
-      if (known && now() - known.since < KEEP_MS) {
-        tell(wish.key, ++order, known.value);
-        return;
-      }
-      pump();
+      if (known && now() - known.since < KEEP_MS) handOn(wish.key, ++order, known.value);
+      else pump();
     },
   };
 }

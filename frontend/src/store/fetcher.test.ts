@@ -1,13 +1,13 @@
 import { afterEach, beforeEach, describe, expect, test, vi } from 'vitest';
 
 import { Refusal } from '../contract/api';
-import { createSeeker, type Seeker, type Wish } from './seeker';
+import { createFetcher, DRAG_PACE_MS, type Fetcher, type Wish } from './fetcher';
 
 let told: string[];
 let errors: { message: string; isLasting: boolean }[];
 let started: string[];
 let fetches: Map<string, { resolve: () => void; reject: (error: Error) => void; over: boolean }>;
-let seeker: Seeker<string>;
+let fetcher: Fetcher<string>;
 
 beforeEach(() => {
   vi.useFakeTimers();
@@ -15,20 +15,25 @@ beforeEach(() => {
   errors = [];
   started = [];
   fetches = new Map();
-  seeker = createSeeker<string>({
-    onValue: (value) => told.push(value),
-    onError: (error, isLasting) => errors.push({ message: (error as Error).message, isLasting }),
-  });
+  fetcher = make({ paceMs: DRAG_PACE_MS, isDragged: true });
 });
 afterEach(async () => {
-  seeker.want(null);
+  fetcher.want(null);
   await vi.advanceTimersByTimeAsync(0);
   expect(vi.getTimerCount()).toBe(0);
   vi.useRealTimers();
 });
 
-const wish = (key: string): Wish<string> => ({
+const make = (options: { paceMs: number; isDragged?: boolean }): Fetcher<string> =>
+  createFetcher<string>({
+    ...options,
+    onValue: (value) => told.push(value),
+    onError: (message, isLasting) => errors.push({ message, isLasting }),
+  });
+
+const wish = (key: string, group?: string): Wish<string> => ({
   key,
+  ...(group === undefined ? {} : { group }),
   run: (signal) =>
     new Promise((resolve, reject) => {
       started.push(key);
@@ -57,7 +62,7 @@ const fail = async (key: string, error: Error): Promise<void> => {
 const open = (): string[] => [...fetches].filter(([, { over }]) => !over).map(([key]) => key);
 
 test('the first wish is fetched at once', async () => {
-  seeker.want(wish('a'));
+  fetcher.want(wish('a'));
   expect(started).toEqual(['a']);
   await answer('a');
   expect(told).toEqual(['a']);
@@ -66,7 +71,7 @@ test('the first wish is fetched at once', async () => {
 describe('while somebody drags', () => {
   test('two fetches run, the newest wish is the next, and those between are dropped', async () => {
     for (const key of ['a', 'b', 'c', 'd', 'e']) {
-      seeker.want(wish(key));
+      fetcher.want(wish(key));
       await pass(100);
     }
     expect(started).toEqual(['a', 'b']);
@@ -79,7 +84,7 @@ describe('while somebody drags', () => {
 
   test('a dozen a second are started, however fast the answers are', async () => {
     for (let index = 0; index < 100; index++) {
-      seeker.want(wish(`${index}`));
+      fetcher.want(wish(`${index}`));
       await pass(10);
       for (const key of open()) await answer(key);
     }
@@ -91,19 +96,19 @@ describe('while somebody drags', () => {
   });
 
   test('what is overtaken is never told, and its fetch ends', async () => {
-    seeker.want(wish('a'));
+    fetcher.want(wish('a'));
     await pass(100);
-    seeker.want(wish('b'));
+    fetcher.want(wish('b'));
     await answer('b');
     expect(fetches.get('a')?.over).toBe(true);
     expect(told).toEqual(['b']);
   });
 
   test('but what is wanted again goes on, and is told', async () => {
-    seeker.want(wish('a'));
+    fetcher.want(wish('a'));
     await pass(100);
-    seeker.want(wish('b'));
-    seeker.want(wish('a'));
+    fetcher.want(wish('b'));
+    fetcher.want(wish('a'));
     await answer('b');
     expect(told).toEqual(['b']);
     await answer('a');
@@ -113,7 +118,7 @@ describe('while somebody drags', () => {
 
   test('where it comes to rest, slow fetches of what was passed end', async () => {
     for (const key of ['a', 'b', 'c']) {
-      seeker.want(wish(key));
+      fetcher.want(wish(key));
       await pass(100);
     }
     expect(open()).toEqual(['a', 'b']);
@@ -125,46 +130,46 @@ describe('while somebody drags', () => {
 });
 
 test('what came a moment ago is there at once, but not for ever', async () => {
-  seeker.want(wish('a'));
+  fetcher.want(wish('a'));
   await answer('a');
   await pass(100);
-  seeker.want(wish('b'));
+  fetcher.want(wish('b'));
   await answer('b');
-  seeker.want(wish('a'));
+  fetcher.want(wish('a'));
   expect(told).toEqual(['a', 'b', 'a']);
   expect(started).toEqual(['a', 'b']);
   await pass(31_000);
-  seeker.want(wish('b'));
+  fetcher.want(wish('b'));
   expect(started).toEqual(['a', 'b', 'b']);
 });
 
 test('so many are kept, and the oldest goes', async () => {
   for (let index = 0; index <= 60; index++) {
-    seeker.want(wish(`${index}`));
+    fetcher.want(wish(`${index}`));
     await pass(100);
     await answer(`${index}`);
   }
-  seeker.want(wish('1'));
+  fetcher.want(wish('1'));
   expect(told.at(-1)).toBe('1');
-  seeker.want(wish('0'));
+  fetcher.want(wish('0'));
   await pass(100);
   expect(started.filter((key) => key === '0' || key === '1')).toEqual(['0', '1', '0']);
 });
 
 test('nothing wanted ends all, and leaves nothing behind', async () => {
-  seeker.want(wish('a'));
-  seeker.want(null);
+  fetcher.want(wish('a'));
+  fetcher.want(null);
   expect(open()).toEqual([]);
   await pass(60_000);
   expect([told, errors]).toEqual([[], []]);
-  seeker.want(wish('a'));
+  fetcher.want(wish('a'));
   await answer('a');
   expect(told).toEqual(['a']);
 });
 
 describe('a failure', () => {
   test('is told, and tried again ever more slowly', async () => {
-    seeker.want(wish('a'));
+    fetcher.want(wish('a'));
     for (const pause of [2_000, 4_000, 8_000]) {
       await fail('a', new Error('down'));
       const before = started.length;
@@ -179,7 +184,7 @@ describe('a failure', () => {
   });
 
   test.each([400, 404])('that will last (%i) is not tried again', async (status) => {
-    seeker.want(wish('a'));
+    fetcher.want(wish('a'));
     await fail('a', new Refusal(status, 'never'));
     await pass(120_000);
     expect(errors).toEqual([{ message: 'never', isLasting: true }]);
@@ -187,13 +192,13 @@ describe('a failure', () => {
   });
 
   test('of what nobody wants any more is no news, but a server that asks for peace gets it', async () => {
-    seeker.want(wish('a'));
+    fetcher.want(wish('a'));
     await pass(100);
-    seeker.want(wish('b'));
+    fetcher.want(wish('b'));
     await fail('a', new Refusal(429, 'too much', 3));
     expect(errors).toEqual([]);
     await answer('b');
-    seeker.want(wish('c'));
+    fetcher.want(wish('c'));
     await pass(2_800);
     expect(started).toEqual(['a', 'b']);
     await pass(200);
@@ -201,8 +206,56 @@ describe('a failure', () => {
   });
 
   test('is also that no answer comes', async () => {
-    seeker.want(wish('a'));
-    await pass(20_000);
+    fetcher.want(wish('a'));
+    await pass(30_000);
     expect(errors).toEqual([{ message: 'no answer came in time', isLasting: false }]);
+  });
+});
+
+describe('what keeps itself up to date', () => {
+  beforeEach(() => {
+    fetcher = make({ paceMs: 500 });
+  });
+
+  test('is fetched at once, and never again for the same key', async () => {
+    fetcher.want(wish('1'));
+    expect(started).toEqual(['1']);
+    await answer('1');
+    fetcher.want(wish('1'));
+    await pass(10_000);
+    expect([started, told]).toEqual([['1'], ['1']]);
+  });
+
+  test('costs one fetch a pace, however often it changes, and the last change is fetched', async () => {
+    for (const key of ['1', '2', '3', '4']) fetcher.want(wish(key));
+    await answer('1');
+    expect(started).toEqual(['1']);
+    await pass(500);
+    expect(started).toEqual(['1', '4']);
+    await answer('4');
+    expect(told).toEqual(['1', '4']);
+  });
+
+  test('gives way to another group at once', async () => {
+    fetcher.want(wish('1', 'temperature'));
+    fetcher.want(wish('2', 'humidity'));
+    expect(open()).toEqual(['2']);
+    expect(started).toEqual(['1', '2']);
+    await answer('2');
+    expect(told).toEqual(['2']);
+  });
+
+  test('is tried again ever more slowly, though it has changed meanwhile and though it was refused', async () => {
+    for (const [index, pause] of [2_000, 4_000, 8_000].entries()) {
+      fetcher.want(wish(`${index}`));
+      await pass(0);
+      await fail(`${index}`, new Refusal(404, 'not yet'));
+      fetcher.want(wish(`${index + 1}`));
+      await pass(pause - 1);
+      expect(started).toHaveLength(index + 1);
+      await pass(1);
+      expect(started).toHaveLength(index + 2);
+    }
+    expect(errors).toHaveLength(3);
   });
 });

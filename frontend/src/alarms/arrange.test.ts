@@ -1,0 +1,85 @@
+import { expect, test } from 'vitest';
+
+import { alarm } from '../testing/alarms';
+import { CATALOGUE } from '../testing/sensors';
+import { alarmsCsv, arranged, causeFacts, filtered } from './arrange';
+import { NOTHING_KEPT, shelve } from './kept';
+import { listOf } from './list';
+
+const speech = { sensors: CATALOGUE, unit: 'C' } as const;
+const AT = 1_800_000_000_000;
+
+const cold = (tag: number) => alarm(`cold${tag}`, { tag_id: String(tag), raised: 100 + tag });
+const hot = (tag: number) =>
+  alarm(`hot${tag}`, {
+    tag_id: String(tag),
+    raised: 50 + tag,
+    reason: { value: 40, limit: 35, verdict: 'stressed' },
+  });
+const many = (one: typeof cold, count: number) =>
+  Array.from({ length: count }, (_, index) => one(index + 1));
+const active = (...alarms: ReturnType<typeof alarm>[]) =>
+  listOf(alarms, NOTHING_KEPT, null, AT).active;
+
+test('many of one cause stand together, the worst cause first; a few stand by themselves', () => {
+  const blocks = arranged(active(...many(hot, 6), ...many(cold, 5)), 'cause', speech);
+  expect(blocks.map(({ cause, items }) => [cause, items.length])).toEqual([
+    ['Temperature too low', 5],
+    ['Temperature too high', 6],
+  ]);
+  const loose = arranged(active(...many(hot, 4), ...many(cold, 4)), 'cause', speech);
+  expect(loose.map(({ cause, items }) => [cause, items.length])).toEqual([[null, 8]]);
+});
+
+test('of a cause the value farthest beyond, and since when one has been active', () => {
+  const items = listOf(
+    [
+      { ...cold(1), worst: 4.2 },
+      { ...cold(2), worst: 5.5 },
+      { ...cold(3), cleared_at: { sec: 120, nanosec: 0 }, worst: 3.1 },
+    ],
+    NOTHING_KEPT,
+    null,
+    AT,
+  );
+  expect(causeFacts([...items.active, ...items.resolved], speech, null)).toEqual([
+    'worst 3.1\u00a0°C',
+    'since sim 00:01:41',
+  ]);
+  expect(causeFacts(items.resolved, speech, null)).toEqual(['worst 3.1\u00a0°C']);
+});
+
+test('the newest first, or by tag: in one row', () => {
+  const items = active(cold(10), hot(2), cold(3));
+  const tags = (order: 'newest' | 'tag') =>
+    arranged(items, order, speech).map((block) => block.items.map(({ alarm: it }) => it.tag_id));
+  expect(tags('newest')).toEqual([['10', '3', '2']]);
+  expect(tags('tag')).toEqual([['2', '3', '10']]);
+});
+
+test.each([
+  ['tag 3 low', ['cold3']],
+  ['HIGH', ['hot2']],
+  ['critical', ['cold3']],
+  ['  ', ['cold3', 'hot2']],
+  ['humidity', []],
+])('%j finds %j', (text, ids) => {
+  const list = listOf([cold(3), hot(2)], NOTHING_KEPT, null, AT);
+  expect(filtered(list, text, speech).active.map(({ alarm: it }) => it.id)).toEqual(ids);
+});
+
+test('as a file: each state, values in the unit of the page, and no formula', () => {
+  const evil = alarm('a', { tag_id: '=1+1', raised: 0, worst: 4.2 });
+  const rated = { alarm: evil, verdict: 'critical' } as const;
+  const kept = shelve(NOTHING_KEPT, rated, AT + 60_000, 'fan, off');
+  const list = listOf([evil, alarm('b', { cleared: 960 })], kept, 1_000, AT);
+  const [head, shelved, resolved] = alarmsCsv(list, { ...speech, unit: 'F' }, () => null)
+    .slice(1)
+    .split('\r\n');
+  expect(head?.split(',')).toHaveLength(16);
+  expect(shelved).toBe(
+    "shelved,,critical,'=1+1,range,temperature,°F,50,,39.56,43.88,1970-01-01T00:00:00.000Z,,no," +
+      `${new Date(AT + 60_000).toISOString()},"fan, off"`,
+  );
+  expect(resolved).toMatch(/^resolved,,critical,1,.*1970-01-01T00:16:00.000Z,no,,$/);
+});

@@ -1,0 +1,138 @@
+/** The list of alarms as somebody wants to see it: filtered, sorted, grouped by cause; and as a file. Pure. */
+import type { Alarm, WireTime } from '../contract/types';
+import { csv, type Cell } from '../domain/csv';
+import { isOfRange, sideOf } from '../domain/health';
+import { secondsOf } from '../domain/rostime';
+import { shown } from '../domain/text';
+import { compareIds } from '../domain/twin';
+import { toShown, unitOf } from '../domain/units';
+import { S } from '../strings';
+import type { AlarmList, Item } from './list';
+import type { Now } from './now';
+import { nameText, valuesOf, whatText, whenText, type Speech } from './words';
+
+export const ORDERS = ['cause', 'newest', 'tag'] as const;
+/** By cause the worst comes first. */
+export type Order = (typeof ORDERS)[number];
+
+/** More alarms than this of one cause stand below one heading. */
+const MOST_LOOSE = 4;
+
+/** Alarms in a row; with a cause they are many, all of that cause. */
+export interface Block {
+  readonly key: string;
+  readonly cause: string | null;
+  readonly items: readonly Item[];
+}
+
+/** Those in whose words all of the text's occur. */
+export function filtered(list: AlarmList, text: string, speech: Speech): AlarmList {
+  const words = text.toLowerCase().split(/\s+/).filter(Boolean);
+  if (words.length === 0) return list;
+  const has = ({ alarm, verdict }: Item): boolean => {
+    const all = `${nameText(alarm, speech)} ${causeText(alarm, speech)} ${S.health[verdict]}`;
+    return words.every((word) => all.toLowerCase().includes(word));
+  };
+  return {
+    active: list.active.filter(has),
+    shelved: list.shelved.filter(has),
+    resolved: list.resolved.filter(has),
+  };
+}
+
+/** `items` come the worst first, or what was resolved last. */
+export function arranged(items: readonly Item[], order: Order, speech: Speech): readonly Block[] {
+  if (order !== 'cause') {
+    const by =
+      order === 'newest'
+        ? (a: Item, b: Item) => secondsOf(b.alarm.raised_at) - secondsOf(a.alarm.raised_at)
+        : (a: Item, b: Item) => compareIds(a.alarm.tag_id, b.alarm.tag_id);
+    return [{ key: order, cause: null, items: [...items].sort(by) }];
+  }
+  const causes = new Map<string, readonly Item[]>();
+  for (const item of items) {
+    const cause = causeOf(item.alarm);
+    causes.set(cause, [...(causes.get(cause) ?? []), item]);
+  }
+  const blocks: Block[] = [];
+  for (const [cause, own] of causes) {
+    const [first] = own;
+    const before = blocks.at(-1);
+    if (first && own.length > MOST_LOOSE) {
+      blocks.push({ key: cause, cause: causeText(first.alarm, speech), items: own });
+    } else if (before?.cause === null) {
+      blocks[blocks.length - 1] = { ...before, items: [...before.items, ...own] };
+    } else {
+      blocks.push({ key: `from ${cause}`, cause: null, items: own });
+    }
+  }
+  return blocks;
+}
+
+/** What is wrong, wherever it is and by whatever limit. */
+const causeOf = ({ reason }: Alarm): string =>
+  [reason.kind, reason.sensor, isOfRange(reason) ? sideOf(reason) : ''].join('|');
+
+function causeText(alarm: Alarm, speech: Speech): string {
+  const { reason } = alarm;
+  if (!isOfRange(reason)) return whatText(alarm, speech);
+  const beyond = sideOf(reason) === 'below' ? S.tooLow(null) : S.tooHigh(null);
+  return `${shown(speech.sensors.named(reason.sensor).label, 32)} ${beyond}`;
+}
+
+/** Of many alarms of one cause: the worst value, and since when while one is active. */
+export function causeFacts(
+  items: readonly Item[],
+  speech: Speech,
+  nowS: number | null,
+): readonly string[] {
+  const alarms = items.map(({ alarm }) => alarm);
+  const value = ({ worst, reason }: Alarm): number => worst ?? reason.value ?? NaN;
+  const isBelow = alarms.some(({ reason }) => isOfRange(reason) && sideOf(reason) === 'below');
+  const [first] = [...alarms].sort((a, b) => (isBelow ? value(a) - value(b) : value(b) - value(a)));
+  const begins = alarms
+    .filter((alarm) => alarm.cleared_at === null)
+    .map(({ raised_at }) => secondsOf(raised_at));
+  const worst = first ? valuesOf(first, speech, null).worst : null;
+  return [
+    ...(worst === null ? [] : [worst]),
+    ...(begins.length === 0 ? [] : [S.alarmSince(whenText(Math.min(...begins), nowS), null)]),
+  ];
+}
+
+const iso = (at: WireTime | null): string | null =>
+  at && new Date(secondsOf(at) * 1000).toISOString();
+
+/** As a file for programs: named the same in every language, values in the units that the page shows. */
+export function alarmsCsv(
+  list: AlarmList,
+  { sensors, unit }: Speech,
+  nowOf: (alarm: Alarm) => Now | null,
+): string {
+  const header = [
+    ...['state', 'severity now', 'severity at worst', 'tag', 'cause', 'sensor', 'unit', 'limit'],
+    ...['now', 'worst', 'first', 'raised [UTC]', 'cleared [UTC]'],
+    ...['acknowledged', 'shelved until [UTC]', 'shelved because'],
+  ];
+  const lines = (['active', 'shelved', 'resolved'] as const).flatMap((state) =>
+    list[state].map(({ alarm, verdict, isAcknowledged, shelf }): Cell[] => {
+      const { reason, worst } = alarm;
+      const sensor = sensors.named(reason.sensor);
+      const current = nowOf(alarm);
+      const value = (given: number | null): Cell =>
+        given === null || !Number.isFinite(given)
+          ? null
+          : Number((reason.sensor === '' ? given : toShown(sensor, given, unit)).toPrecision(7));
+      return [
+        ...[state, current?.kind === 'known' ? current.verdict : null, verdict],
+        ...[alarm.tag_id || null, reason.kind, reason.sensor || null],
+        ...[reason.sensor === '' ? null : unitOf(sensor, unit), value(reason.limit)],
+        value(current?.kind === 'known' ? current.value : null),
+        ...[value(worst), value(reason.value), iso(alarm.raised_at), iso(alarm.cleared_at)],
+        isAcknowledged ? 'yes' : 'no',
+        ...[shelf && new Date(shelf.until).toISOString(), shelf?.reason || null],
+      ];
+    }),
+  );
+  return csv([header, ...lines]);
+}

@@ -13,10 +13,13 @@ from typing import TYPE_CHECKING, Any, TypeVar
 from lupin_bridge.feed.past_child import Now
 from lupin_bridge.feed.past_process import PastProcess
 from lupin_bridge.feed.query import Itself, Question
+from lupin_bridge.feed.source import ELSEWHERE
+from lupin_twin.core.notes import Note, NotesRequest, NotesUnwritable, PastNotes
 from lupin_twin.core.past import PastRow, SeriesPast, SeriesRequest
 from lupin_twin.core.state import Snapshot
 from lupin_twin.core.writes import PastWrite, PastWrites, RecentRequest, WritesRequest
 from lupin_twin.journal.follow import WRITES_S
+from lupin_twin.journal.notes import NOTES_S
 from lupin_twin.journal.queries import SERIES_S
 
 if TYPE_CHECKING:  # `fleet` reads logs without ROS
@@ -86,6 +89,17 @@ class LogReader(ABC):
     async def writes(self, request: WritesRequest) -> PastWrites:
         """See `TwinSource`."""
         return await self.ask(Itself(request), WRITES_S)
+
+    async def notes(self, request: NotesRequest) -> PastNotes:
+        """See `TwinSource`."""
+        return await self.ask(Itself(request), NOTES_S)
+
+    # Only the process that keeps the journal writes it.
+    writes_notes = False
+
+    async def write_note(self, note: Note) -> Note:
+        """See `TwinSource`."""
+        raise NotesUnwritable(f"the note of {note.by} cannot be written: {ELSEWHERE}")
 
     async def rows(
         self,

@@ -25,10 +25,12 @@ from typing import Any, Final
 
 from lupin_bridge.feed.query import WRITE_ROW_S, Question, Work
 from lupin_twin.core.journal_condition import UNKNOWN, Condition
+from lupin_twin.core.notes import NotesRequest
 from lupin_twin.core.past import NotRemembered, PastRow, SeriesRequest, check_moment
 from lupin_twin.core.writes import RecentRequest, WritesRequest
 from lupin_twin.journal.fold import state_at
 from lupin_twin.journal.follow import recent, writes
+from lupin_twin.journal.notes import notes
 from lupin_twin.journal.queries import Export, lots, series
 from lupin_twin.runtime.journal_queries import Recall
 from lupin_twin.runtime.workers import SMALL_S, ShouldStop, Workers
@@ -220,6 +222,9 @@ class Child:
                     continue
                 if isinstance(need, WritesRequest):
                     need = looking.send(writes(connection, need))
+                    continue
+                if isinstance(need, NotesRequest):
+                    need = looking.send(notes(connection, need))
                     continue
                 if isinstance(need, RecentRequest):
                     check_moment(need.at_ns, now.stamp_ns)

@@ -10,6 +10,7 @@ from collections.abc import Callable, Generator
 from dataclasses import dataclass
 from typing import Any, Final, Generic, Protocol, TypeVar
 
+from lupin_twin.core.notes import NotesRequest
 from lupin_twin.core.past import SeriesRequest
 from lupin_twin.core.writes import RecentRequest, WritesRequest
 from lupin_twin.runtime.workers import ShouldStop
@@ -17,9 +18,9 @@ from lupin_twin.runtime.workers import ShouldStop
 ResultT = TypeVar("ResultT")
 
 # A moment, ns of ROS time, which `Snapshot` answers; a series, which `SeriesPast` does; what was
-# recent at a moment, which a tuple of `PastWrite` does; or what was received, which `PastWrites`
-# does: only a journal knows that.
-Need = int | SeriesRequest | RecentRequest | WritesRequest
+# recent at a moment, which a tuple of `PastWrite` does; what was received, which `PastWrites` does;
+# or what people said, which `PastNotes` does: only a journal knows that.
+Need = int | SeriesRequest | RecentRequest | WritesRequest | NotesRequest
 # What is known as of then crosses by itself, so it is of any type.
 Found = Any
 # What writing a row of an export takes, roughly and at worst, s.

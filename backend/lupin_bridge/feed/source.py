@@ -15,6 +15,7 @@ from lupin_twin.core.diagnostics import Origin
 from lupin_twin.core.drops import Counts, Recent
 from lupin_twin.core.history import TagHistory
 from lupin_twin.core.journal_condition import UNKNOWN, Condition
+from lupin_twin.core.notes import Note, NotesRequest, PastNotes
 from lupin_twin.core.past import PastRow, SeriesPast, SeriesRequest
 from lupin_twin.core.state import Snapshot
 from lupin_twin.core.writes import PastWrites, WritesRequest
@@ -29,6 +30,12 @@ ResultT = TypeVar("ResultT")
 
 # What a callback may take at worst, on a slow machine: the largest state there is takes a second.
 STUCK_AFTER_S: Final = 10.0
+
+
+ELSEWHERE: Final = (
+    "this bridge only reads the log; notes are written at the bridge of the process that keeps the "
+    "journal, `lupin-twin serve`"
+)
 
 
 class TwinUnavailableError(RuntimeError):
@@ -197,6 +204,21 @@ class TwinSource(Protocol):
 
     async def writes(self, request: WritesRequest) -> PastWrites:
         """What was heard, scan by scan and look by look, in the order of hearing."""
+
+    async def notes(self, request: NotesRequest) -> PastNotes:
+        """What people said."""
+
+    @property
+    def writes_notes(self) -> bool:
+        """Whether notes can be written here: by the process that keeps the journal."""
+
+    async def write_note(self, note: Note) -> Note:
+        """Write a note; returns it with its id once it is in the journal.
+
+        Raises:
+            NotesUnwritable: it was not written.
+
+        """
 
     def rows(
         self,

@@ -30,7 +30,13 @@ from lupin_bridge.fleet.watching import Watching
 from lupin_bridge.judge.options import Criteria
 from lupin_bridge.metrics import CONTENT_TYPE
 from lupin_bridge.routes import pages
-from lupin_bridge.routes.answers import NEVER_STORE, error_response, json_response, list_header
+from lupin_bridge.routes.answers import (
+    NEVER_STORE,
+    add_refusals,
+    error_response,
+    json_response,
+    list_header,
+)
 from lupin_bridge.routes.sockets import has_place, next_message
 from lupin_bridge.serving.admission import REVALIDATE, Limits
 from lupin_bridge.serving.middleware import EndsAtShutdown, PieceByPiece, Shutdown
@@ -296,6 +302,7 @@ def create_fleet_app(
     if page.is_file():
         app.mount("/assets", StaticFiles(directory=static_folder / "assets"), name="assets")
     app.add_exception_handler(404, _not_found)
+    add_refusals(app)
     return app
 
 

@@ -43,6 +43,7 @@ ROUTES = {
     "/api/export.csv": True,
     "/api/health": True,
     "/api/alarms": True,
+    "/api/notes": True,
     "/api/sensors": True,
     "/api/map": True,
     "/api/map.png": True,

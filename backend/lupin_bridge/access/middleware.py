@@ -323,7 +323,7 @@ class AccessControl:
                 return person
         self._guesses.take(client, now_s)
         log.warning("wrong token from %s", client)
-        return _unauthorized("this is no token of the bridge, expected Authorization: Bearer")
+        return _unauthorized("this is not the bridge's token, expected Authorization: Bearer")
 
 
 def _without_cookies(scope: Scope) -> Scope:

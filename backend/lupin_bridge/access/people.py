@@ -37,7 +37,7 @@ ResultT = TypeVar("ResultT")
 MAX_WAITING: Final = 8
 
 
-# Sign-ins that an address may try at once, and a minute from then on.
+# Sign-ins that an address may try in vain at once, and a minute from then on.
 TRY_BURST: Final = 10
 TRIES_PER_MINUTE: Final = 10
 
@@ -139,16 +139,17 @@ class People:
             AccountError: the file cannot be read.
 
         """
-        # Before it is looked at, so that many at once are no more than one behind the other.
-        wait_s = self._tries.take(address, time.monotonic())
+        # Many at once are no more than the few that wait for the thread.
+        wait_s = self._tries.wait_s(address, time.monotonic())
         if wait_s > 0.0:
             raise PeopleBusy(
-                f"{address} has tried to sign in more than {TRY_BURST} times and "
+                f"{address} has tried to sign in in vain more than {TRY_BURST} times and "
                 f"{TRIES_PER_MINUTE} a minute: try again in {math.ceil(wait_s)} s",
                 wait_s,
             )
         person = await self._check(name, password)
         if person is None:
+            self._tries.take(address, time.monotonic())
             log.warning("a sign-in as %r from %s was refused", name[:64], address)
         return person
 

@@ -13,7 +13,7 @@ from collections.abc import Sequence
 from typing import NoReturn
 
 from lupin_bridge import __version__, logs
-from lupin_bridge.cli import archive, journal
+from lupin_bridge.cli import archive, journal, people
 from lupin_bridge.cli.configuration import (
     CONFIG_VARIABLE,
     settings_from,
@@ -42,6 +42,10 @@ def main(argv: Sequence[str] | None = None) -> int:
         if ros_args:
             _fail(f"{options.role} takes no arguments of ROS")
         return archive.run(options, os.environ)
+    if options.role in {"user", "token", "audit"}:
+        if ros_args:
+            _fail(f"{options.role} takes no arguments of ROS")
+        return people.run(options, os.environ)
     play_args = _play_args(options)
     try:
         settings = _settings_from(options)
@@ -217,6 +221,7 @@ def parser() -> argparse.ArgumentParser:
             )
     journal.add_parser(roles)
     archive.add_parsers(roles)
+    people.add_parsers(roles)
     return made
 
 

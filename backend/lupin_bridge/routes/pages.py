@@ -105,7 +105,9 @@ def render(document: dict[str, Any], base_url: str) -> str:
     """An OpenAPI document as one HTML page: routes, parameters, answers, and lines for curl."""
     info = document["info"]
     routes = "".join(
-        _route(path, operations["get"], base_url) for path, operations in document["paths"].items()
+        _route(method.upper(), path, operation, base_url)
+        for path, operations in document["paths"].items()
+        for method, operation in operations.items()
     )
     schemas = "".join(
         _schema(name, described) for name, described in document["components"]["schemas"].items()
@@ -122,7 +124,7 @@ def render(document: dict[str, Any], base_url: str) -> str:
     )
 
 
-def _route(path: str, operation: dict[str, Any], base_url: str) -> str:
+def _route(method: str, path: str, operation: dict[str, Any], base_url: str) -> str:
     parameters = operation.get("parameters", [])
     required = [p for p in parameters if p.get("required") and p["in"] == "query"]
     query = "&".join(f"{p['name']}=…" for p in required)
@@ -138,9 +140,9 @@ def _route(path: str, operation: dict[str, Any], base_url: str) -> str:
     )
     url = f"{base_url}{path}{'?' + query if query else ''}"
     return (
-        f"<section><h3><code>GET {escape(path)}</code></h3>"
+        f"<section><h3><code>{method} {escape(path)}</code></h3>"
         f"<p>{escape(operation.get('summary', ''))}. {escape(operation.get('description', ''))}</p>"
-        f"<pre>curl '{escape(url)}'</pre>"
+        f"<pre>curl {'' if method == 'GET' else f'-X {method} '}'{escape(url)}'</pre>"
         + (f"<table border='1'>{rows}</table>" if rows else "")
         + f"<ul>{answers}</ul></section>"
     )

@@ -58,6 +58,28 @@ export interface components {
              * @description the value farthest beyond its limit, sensor's unit; of a pest the most that were counted; null: there is no such value
              */
             readonly worst: number | null;
+            /**
+             * Acknowledged By
+             * @description a name; absent: nobody has
+             * @default null
+             */
+            readonly acknowledged_by: string | null;
+            /**
+             * @description ROS time
+             * @default null
+             */
+            readonly acknowledged_at: components["schemas"]["Time"] | null;
+            /**
+             * Shelved By
+             * @description a name; absent: it is not shelved
+             * @default null
+             */
+            readonly shelved_by: string | null;
+            /**
+             * @description ROS time
+             * @default null
+             */
+            readonly shelved_until: components["schemas"]["Time"] | null;
         };
         /**
          * Alarms

@@ -223,7 +223,7 @@ class Journal:
         """Hand a note over; the future has it with its id, or `NotesUnwritable`, soon."""
         written = self._notes.put(note)
         self._pending.arrived.set()
-        if self._stop.is_set() or self._reported.state not in _WELL:
+        if self._stop.is_set() or self._reported.state not in (*_WELL, JournalState.STARTING):
             self._notes.refuse(self._reported.detail)
         return written
 

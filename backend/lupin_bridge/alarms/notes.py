@@ -25,8 +25,8 @@ log = logging.getLogger(__name__)
 LOOK_S: Final = 1.0
 OF_ALARM: Final = "alarm:"
 # Notes that one name may write at once, and a minute from then on.
-NOTE_BURST: Final = 60
-NOTES_PER_MINUTE: Final = 30
+NOTE_BURST: Final = 300
+NOTES_PER_MINUTE: Final = 60
 _ORDER: Final = {verdict: index for index, verdict in enumerate(Verdict)}
 
 

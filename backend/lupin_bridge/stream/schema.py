@@ -210,10 +210,14 @@ class Alarm(Contract):
         description="the value farthest beyond its limit, sensor's unit; of a pest the most that "
         "were counted; null: there is no such value"
     )
-    acknowledged_by: str | None = Field(default=None, description="a name; absent: nobody has")
-    acknowledged_at: Time | None = Field(default=None, description="ROS time")
-    shelved_by: str | None = Field(default=None, description="a name; absent: it is not shelved")
-    shelved_until: Time | None = Field(default=None, description="ROS time")
+    acknowledged_by: str | None = Field(
+        default_factory=lambda: None, description="who; absent: nobody has"
+    )
+    acknowledged_at: Time | None = Field(default_factory=lambda: None, description="ROS time")
+    shelved_by: str | None = Field(
+        default_factory=lambda: None, description="who; absent: it is not shelved"
+    )
+    shelved_until: Time | None = Field(default_factory=lambda: None, description="ROS time")
 
 
 class Alarms(Contract):

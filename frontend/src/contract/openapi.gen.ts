@@ -60,26 +60,18 @@ export interface components {
             readonly worst: number | null;
             /**
              * Acknowledged By
-             * @description a name; absent: nobody has
-             * @default null
+             * @description who; absent: nobody has
              */
-            readonly acknowledged_by: string | null;
-            /**
-             * @description ROS time
-             * @default null
-             */
-            readonly acknowledged_at: components["schemas"]["Time"] | null;
+            readonly acknowledged_by?: string | null;
+            /** @description ROS time */
+            readonly acknowledged_at?: components["schemas"]["Time"] | null;
             /**
              * Shelved By
-             * @description a name; absent: it is not shelved
-             * @default null
+             * @description who; absent: it is not shelved
              */
-            readonly shelved_by: string | null;
-            /**
-             * @description ROS time
-             * @default null
-             */
-            readonly shelved_until: components["schemas"]["Time"] | null;
+            readonly shelved_by?: string | null;
+            /** @description ROS time */
+            readonly shelved_until?: components["schemas"]["Time"] | null;
         };
         /**
          * Alarms
@@ -446,6 +438,51 @@ export interface components {
             readonly origin: components["schemas"]["Pose"];
         };
         /**
+         * Note
+         * @description What somebody said; it is never changed. Times are ROS time.
+         */
+        readonly Note: {
+            /**
+             * Id
+             * @description opaque
+             */
+            readonly id: string;
+            /**
+             * Kind
+             * @enum {string}
+             */
+            readonly kind: "acknowledge" | "shelve" | "comment";
+            /** Subject */
+            readonly subject: string;
+            /** Text */
+            readonly text: string;
+            /** @description of shelve; null: it is not shelved any more */
+            readonly until: components["schemas"]["Time"] | null;
+            readonly made_at: components["schemas"]["Time"];
+            /**
+             * By
+             * @description name of an account or of a token
+             */
+            readonly by: string;
+            /**
+             * Withdrawn By
+             * @description null: it stands
+             */
+            readonly withdrawn_by: string | null;
+            readonly withdrawn_at: components["schemas"]["Time"] | null;
+        };
+        /**
+         * Notes
+         * @description `/api/notes`.
+         */
+        readonly Notes: {
+            /**
+             * Notes
+             * @description newest first
+             */
+            readonly notes: readonly components["schemas"]["Note"][];
+        };
+        /**
          * OccupancyGrid
          * @description The map without its cells (those are the picture at `/api/map.png`).
          */
@@ -589,6 +626,34 @@ export interface components {
             readonly value: number | null;
             /** @description ROS time; null: the twin does not tell; absent: as of the reading before it, of the first the tag's last_observed. Its age is stale_seconds of the tag, and what last_observed is later */
             readonly observed_at?: components["schemas"]["Time"] | null;
+        };
+        /**
+         * Session
+         * @description `/api/session`: who makes the request, and whether `/api/signout` would end a session.
+         */
+        readonly Session: {
+            /** Can Sign Out */
+            readonly can_sign_out: boolean;
+            /**
+             * Seconds Left
+             * @description of the session; null: there is none
+             */
+            readonly seconds_left: number | null;
+            /**
+             * Name
+             * @description null: nobody that is known by name
+             */
+            readonly name: string | null;
+            /**
+             * Role
+             * @enum {string}
+             */
+            readonly role: "viewer" | "operator" | "admin";
+            /**
+             * Can Write Notes
+             * @description whether `POST /api/notes` is for them, and is here
+             */
+            readonly can_write_notes: boolean;
         };
         /**
          * StatusFrame

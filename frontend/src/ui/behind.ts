@@ -8,6 +8,7 @@ import '../styles/timebar.css';
 
 export { startBadge } from '../alarms/badge';
 export { startNotify } from '../alarms/notify';
+export { startPeople } from '../alarms/people';
 export { startSound } from '../alarms/sound';
 export { saveTable } from '../export/actions';
 export { startDifference } from '../store/difference';

@@ -14,6 +14,7 @@ import { ALARMS_ID, ListChoice } from './ListChoice';
 import { once } from './once';
 import { TellMe } from './TellMe';
 import { useHeldOrder } from './useHeldOrder';
+import { WhoseWord } from './WhoseWord';
 
 /** Rows of one group at first, and so many more with each wish for more. */
 const MOST_ROWS = 100;
@@ -59,7 +60,7 @@ export function AlarmPanel(): JSX.Element {
         <Group name="active" items={shown.active} count={active.length} />
         <Group name="shelved" items={shown.shelved} count={shelved.length} />
         <Group name="resolved" items={shown.resolved} count={resolved.length} />
-        {hasAny && <p className="alarms-mine faint">{S.alarmsMine}</p>}
+        {hasAny && <WhoseWord />}
       </div>
     </>
   );

@@ -69,7 +69,7 @@ async def _run(settings: Settings, access: Access, proxies: Proxies, criteria: C
             f"cannot listen on {settings.host} port {settings.port}: {error.strerror}"
         ) from error
     for warning in exposure(
-        listener.getsockname()[0], has_token=access.credentials is not None, has_tls=access.secure
+        listener.getsockname()[0], has_token=access.is_closed, has_tls=access.secure
     ):
         log.warning("%s", warning)
     await asyncio.to_thread(_say_what_is_wrong, settings.archive_url)

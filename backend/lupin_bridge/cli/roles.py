@@ -181,7 +181,7 @@ def _follow_certificates(settings: Settings, server: BridgeServer) -> asyncio.Ta
 def _warn_of_exposure(listener: socket.socket, access: Access) -> None:
     for warning in exposure(
         listener.getsockname()[0],
-        has_token=access.credentials is not None,
+        has_token=access.is_closed,
         has_tls=access.secure,
     ):
         log.warning("%s", warning)

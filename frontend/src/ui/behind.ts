@@ -8,7 +8,6 @@ import '../styles/timebar.css';
 
 export { startBadge } from '../alarms/badge';
 export { startNotify } from '../alarms/notify';
-export { startPeople } from '../alarms/people';
 export { startSound } from '../alarms/sound';
 export { saveTable } from '../export/actions';
 export { startDifference } from '../store/difference';
@@ -17,6 +16,7 @@ export { startRemembered } from '../store/remembered';
 export { TimeBar } from '../timebar/TimeBar';
 export { AlarmPanel } from './alarms/AlarmPanel';
 export { Meanwhile } from './alarms/Meanwhile';
+export { startPeople } from './alarms/people';
 export { AttentionList } from './AttentionList';
 export { CompareControl } from './CompareControl';
 export { DifferenceLegend } from './DifferenceLegend';

@@ -1,8 +1,7 @@
 /** The words about people, which come with what shows them; few, so all languages in one place. */
-import { LANGUAGE } from '../strings';
 import type { Language } from './languages';
 
-const WORDS = {
+export const PEOPLE = {
   en: {
     shared: (name: string): string =>
       `Signed in as ${name}: what you acknowledge or shelve, everybody sees.`,
@@ -36,5 +35,3 @@ const WORDS = {
     failed: (why: string): string => `No se ha guardado: ${why}`,
   },
 } as const satisfies Record<Language, unknown>;
-
-export const P = WORDS[LANGUAGE];

@@ -1,12 +1,11 @@
 import type { JSX } from 'react';
 
-import { person } from '../../alarms/people';
 import type { Alarm } from '../../contract/types';
 import { clockText } from '../../domain/format';
 import { secondsOf } from '../../domain/rostime';
 import { useSelected } from '../../store/create';
 import { S } from '../../strings';
-import { P } from '../../words/people';
+import { P, person } from './people';
 
 /** Below the list: whether what is done here is this browser's own, or everybody's. */
 export function WhoseWord(): JSX.Element {

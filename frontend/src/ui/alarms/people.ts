@@ -3,17 +3,20 @@
  * is kept in `own` as well, so that the list, its sound and its counts know it; where nobody has
  * signed in, that stays this browser's own.
  */
-import { now, timeOfDay } from '../clock';
-import { fetchSession, postNote, withdrawNote } from '../contract/people';
-import type { Alarm, Session } from '../contract/types';
-import { secondsOf } from '../domain/rostime';
-import { store } from '../store/app';
-import { createStore } from '../store/create';
-import { rosNow } from '../store/moment';
-import { say } from '../ui/toast';
-import { P } from '../words/people';
-import { whatOf, type Kept } from './kept';
-import { acting, own } from './own';
+import { now, timeOfDay } from '../../clock';
+import { fetchSession, postNote, withdrawNote } from '../../contract/people';
+import type { Alarm, Session } from '../../contract/types';
+import { secondsOf } from '../../domain/rostime';
+import { store } from '../../store/app';
+import { createStore } from '../../store/create';
+import { rosNow } from '../../store/moment';
+import { say } from '../toast';
+import { LANGUAGE } from '../../strings';
+import { PEOPLE } from '../../words/people';
+import { whatOf, type Kept } from '../../alarms/kept';
+import { acting, own } from '../../alarms/own';
+
+export const P = PEOPLE[LANGUAGE];
 
 /** Who is signed in; null: not known yet. */
 export const person = createStore<Session | null, Session | null>(null, (_, next) => next);

@@ -102,6 +102,20 @@ def test_a_copy_gets_each_once_and_in_its_place_among_the_scans(tmp_path: Path, 
     assert select(target, "SELECT count(*) FROM scan") == [(3,)]
 
 
+def test_an_id_of_somebody_elses_keeps_nobody_from_writing(tmp_path: Path) -> None:
+    path = tmp_path / "j.sqlite"
+    with opened(path) as file:
+        file.put_note(note("ours"))
+        for name in ("zz", "", "f" * 24, "\u0660" * 24):
+            file._connection.execute(
+                "INSERT INTO note VALUES ('local', ?, 0, '', 'comment', 'site', '', NULL)", (name,)
+            )
+    with opened(path) as file:
+        assert number_of(file.put_note(note("again")).id) == 2
+    with closing(open_reader(path)) as connection:
+        assert follow.read(connection, 0).last == 2
+
+
 def test_a_note_is_refused_where_nothing_can_be_written_and_nobody_waits(tmp_path: Path) -> None:
     folder = tmp_path / "not a folder"
     folder.write_text("")

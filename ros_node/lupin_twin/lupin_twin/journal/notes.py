@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import secrets
 import sqlite3
 from collections import deque
@@ -16,6 +17,9 @@ from lupin_twin.journal.schema import LOCAL_SITE, SiteLog
 # An id is the number of the write, in hexadecimal digits that sort as it does, and digits of
 # chance: an archive has the notes of several journals of one site, whose numbers are the same.
 _DIGITS: Final = 16
+_OURS: Final = re.compile(rf"[0-9a-f]{{{_DIGITS}}}", re.ASCII)
+# No log counts so far; SQLite counts to twice that.
+_MOST: Final = 2**62
 _COUNT: Final = "SELECT count(*) FROM note WHERE site = :site"
 _NEWEST: Final = (
     "SELECT id, made_at_ns, made_by, kind, subject, text, until_ns FROM note WHERE site = :site"
@@ -31,21 +35,18 @@ def id_behind(number: int) -> str:
 
 
 def number_of(note_id: str) -> int:
-    """The number of the write.
-
-    Raises:
-        ValueError: it is no id.
-
-    """
-    return int(note_id[:_DIGITS], 16)
+    """The number of the write; 0: somebody else has given the id."""
+    if _OURS.match(note_id) is None:
+        return 0
+    number = int(note_id[:_DIGITS], 16)
+    return number if number < _MOST else 0
 
 
 def last_number(connection: sqlite3.Connection) -> int:
     """The number of this twin's last note; 0: there is none."""
-    (last,) = connection.execute(
-        "SELECT max(id) FROM note WHERE site = ?", (LOCAL_SITE,)
-    ).fetchone()
-    return 0 if last is None else number_of(last)
+    # Downwards, past those of somebody else.
+    found = connection.execute("SELECT id FROM note WHERE site = ? ORDER BY id DESC", (LOCAL_SITE,))
+    return next((number for (text,) in found if (number := number_of(text))), 0)
 
 
 def put_note(connection: sqlite3.Connection, number: int, note: Note) -> Note:

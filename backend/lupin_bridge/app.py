@@ -18,16 +18,26 @@ from lupin_bridge import __version__
 from lupin_bridge.access.middleware import Access, AccessControl, ReadOnly
 from lupin_bridge.access.policy import BehindProxies, Proxies
 from lupin_bridge.bridge import Bridge
-from lupin_bridge.routes import estimate, export, field, pages, past, sockets, state, status
+from lupin_bridge.routes import (
+    estimate,
+    export,
+    field,
+    notes,
+    pages,
+    past,
+    sockets,
+    state,
+    status,
+)
 from lupin_bridge.routes.answers import add_refusals, error_response
 from lupin_bridge.serving.middleware import Metered, PieceByPiece
-from lupin_bridge.stream import schema
+from lupin_bridge.stream import people_schema, schema
 
 STATIC_FOLDER = Path(__file__).parent / "static"
 GUIDE_FOLDER = Path(__file__).parent / "guide"
 
 # Every module whose `router` has routes.
-ROUTED = (state, sockets, field, estimate, past, export, status, pages)
+ROUTED = (state, sockets, field, estimate, past, export, status, notes, pages)
 
 
 def has_page(static_folder: Path = STATIC_FOLDER) -> bool:
@@ -82,7 +92,7 @@ def create_app(
 
 
 _DESCRIPTION = """
-Read-only: every route answers GET and HEAD alone (sign-in and sign-out of a browser: POST).
+Nothing here writes to ROS: every route answers GET and HEAD alone, but notes and sign-in.
 Positions are metres in the map frame, values are in the sensor's unit, what is not known is null.
 `/ws/state` is a WebSocket that sends `StateFrame`, `StatusFrame` and `AlarmsFrame` as JSON text:
 the current ones at once, then every change. A bridge with a token (`LUPIN_TOKEN`) wants it as
@@ -106,6 +116,7 @@ FRAMES = (
     schema.StatusFrame,
     schema.AlarmsFrame,
     schema.Alarms,
+    people_schema.NoteDraft,
 )
 
 

@@ -15,6 +15,7 @@ from typing import Final
 from lupin_bridge.alarms.board import AlarmBoard, Board
 from lupin_bridge.alarms.feed import AlarmFeed
 from lupin_bridge.alarms.ledger import Change
+from lupin_bridge.alarms.notes import NoteBoard, notes_of_alarms
 from lupin_bridge.feed.estimates import EstimateFollower, Reports
 from lupin_bridge.feed.shared_work import Shared
 from lupin_bridge.feed.source import TwinSource, TwinUpdate
@@ -37,6 +38,7 @@ from lupin_bridge.stream.status import Liveness, Status
 from lupin_bridge.viewers.foxglove_session import Offer
 from lupin_twin.core.diagnostics import Origin
 from lupin_twin.core.drops import LATE, LOST, Reason
+from lupin_twin.core.notes import Note
 from lupin_twin.core.state import NANOSECONDS_PER_SECOND, Snapshot
 from lupin_twin.runtime.workers import Workers
 
@@ -109,6 +111,8 @@ class Bridge:
         self._alarm_feed = AlarmFeed(
             source, self.criteria, self.alarms, lambda: self.ros_time_ns, limits.alarm_days
         )
+        self._has_alarms = asyncio.Event()
+        self.notes = NoteBoard(source, self._has_alarms.set)
         self.outward = outward or Channels()
         self.http_answers: Counter[str] = Counter()
         self.metrics = Metrics(self._measure, self._count)
@@ -123,7 +127,6 @@ class Bridge:
         self._push_timer: asyncio.TimerHandle | None = None
         self._watch: asyncio.Task[None] | None = None
         self._learning: asyncio.Task[None] | None = None
-        self._has_alarms = asyncio.Event()
         self._publishing_alarms: asyncio.Task[None] | None = None
 
     async def start(self) -> None:
@@ -148,7 +151,7 @@ class Bridge:
                 task.cancel()
                 with contextlib.suppress(asyncio.CancelledError):
                     await task
-        await self._alarm_feed.stop()
+        await asyncio.gather(self._alarm_feed.stop(), self.notes.stop())
         await self._estimates.stop()
         if self._push_timer is not None:
             self._push_timer.cancel()
@@ -358,6 +361,8 @@ class Bridge:
         self._pushed, self._pushed_s = state, now_s
         self._publish_status()
         # A source answers once it has started, which it may not have as it tells its first state.
+        if self._watch is not None:
+            self.notes.start()
         if self._watch is not None and self._learning is None and state.snapshot.tags:
             work = learn_recent(self.source, self._judge, state.snapshot)
             self._learning = asyncio.create_task(work, name="recent")
@@ -388,12 +393,7 @@ class Bridge:
         while True:
             await self._has_alarms.wait()
             self._has_alarms.clear()
-            now, now_ns = self.alarms.now, self.ros_time_ns
-
-            def write(_: object, now: Board = now, now_ns: int | None = now_ns) -> bytes:
-                shown = alarms_in_frame(now.page, now_ns)
-                return text_frame(alarms_frame(shown, now.source, now.since_ns))
-
+            write = self._alarms_writer(self.alarms.now, self.ros_time_ns, self.notes.notes or ())
             try:
                 wire = await asyncio.wrap_future(self.source.workers.submit(write, ALARMS_S))
                 self.hub.publish_alarms(wire, self._clock())
@@ -402,6 +402,17 @@ class Bridge:
                 continue
             # Of many alarms that change all the time, no more is sent than a browser can take.
             await asyncio.sleep(max(ALARMS_REST_S, len(wire) / ALARM_BYTES_PER_S))
+
+    @staticmethod
+    def _alarms_writer(
+        now: Board, now_ns: int | None, notes: tuple[Note, ...]
+    ) -> Callable[[object], bytes]:
+        def write(_: object) -> bytes:
+            said = notes_of_alarms(now.alarms, notes, now_ns)
+            shown = alarms_in_frame(now.page, now_ns)
+            return text_frame(alarms_frame(shown, now.source, now.since_ns, said))
+
+        return write
 
     def _on_death(self) -> None:
         self.liveness.thread_dead = True

@@ -45,6 +45,12 @@ class Settings:
     token_file: str = _setting(
         "", "access", "file with the token that readers have to know, a line of text"
     )
+    accounts: str = _setting(
+        "",
+        "access",
+        "file of accounts and API tokens, which `lupin-twin user` and `token` make; empty: "
+        "accounts.sqlite in the folder of this user's journals",
+    )
     allow_host: tuple[str, ...] = _setting(
         (),
         "access",
@@ -61,6 +67,11 @@ class Settings:
         "behind a proxy",
         "address or network of a reverse proxy whose X-Forwarded-For and X-Forwarded-Proto are "
         "believed, such as 127.0.0.1 or 10.0.0.0/24; may be given more than once",
+    )
+    proxy_user_header: str = _setting(
+        "",
+        "behind a proxy",
+        "header in which such a proxy names who has signed in there, such as Remote-User",
     )
     path_prefix: str = _setting(
         "", "behind a proxy", "path that a proxy serves the bridge below, such as /gh1"

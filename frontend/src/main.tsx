@@ -69,6 +69,7 @@ void loadParts().then((parts) => {
   parts.startBadge();
   parts.startSound();
   parts.startNotify();
+  parts.startPeople();
   if (kiosk) {
     parts.startLeaving();
   } else {

@@ -18,15 +18,18 @@ DOCUMENT: dict[str, Any] = json.loads(document())
 
 def test_it_lists_every_route_of_the_contract_and_none_besides() -> None:
     described = {route for route, documented in ROUTES.items() if documented}
+    # For people alone: see test_people.
+    described |= {"/api/notes/{note_id}", "/api/audit"}
     assert set(DOCUMENT["paths"]) == described
 
 
-def test_every_route_is_described_for_get_alone() -> None:
+def test_every_route_is_described_for_get_alone_but_notes() -> None:
+    written = {"/api/notes": ["get", "post"], "/api/notes/{note_id}": ["delete"]}
     for path, operations in DOCUMENT["paths"].items():
-        assert list(operations) == ["get"], path
-        operation = operations["get"]
-        assert operation["summary"], path
-        assert all(answer["description"] for answer in operation["responses"].values()), path
+        assert list(operations) == written.get(path, ["get"]), path
+        for operation in operations.values():
+            assert operation["summary"], path
+            assert all(answer["description"] for answer in operation["responses"].values()), path
 
 
 def test_every_parameter_is_described() -> None:

@@ -44,6 +44,7 @@ ROUTES = {
     "/api/export.parquet": True,
     "/api/health": True,
     "/api/alarms": True,
+    "/api/notes": True,
     "/api/sensors": True,
     "/api/map": True,
     "/api/map.png": True,

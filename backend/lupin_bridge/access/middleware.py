@@ -19,6 +19,7 @@ from starlette.requests import HTTPConnection
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from websockets.frames import CloseCode
 
+from lupin_bridge.access.accounts import AccountError, Person, accounts_path
 from lupin_bridge.access.credentials import (
     BrowserSession,
     CookieTooLong,
@@ -26,7 +27,15 @@ from lupin_bridge.access.credentials import (
     Sessions,
     cookies_of,
 )
-from lupin_bridge.access.policy import AccessPolicy, HostError, OriginError, RequestSource, path_of
+from lupin_bridge.access.people import People
+from lupin_bridge.access.policy import (
+    PROXY_USER_KEY,
+    AccessPolicy,
+    HostError,
+    OriginError,
+    RequestSource,
+    path_of,
+)
 from lupin_bridge.rate_limit import RateLimit
 from lupin_bridge.serving.admission import client_key
 from lupin_bridge.serving.ws_protocol import CONNECTION_KEY, Connection
@@ -35,10 +44,16 @@ from lupin_bridge.settings import SettingError, Settings
 log = logging.getLogger(__name__)
 
 _READS: Final = ("GET", "HEAD")
-# Where a session begins and ends. A form, a link or a picture of a foreign page can ask for these
-# too, with the browser's cookie, but none of them can send a header of its own: for that, a script
-# has to ask first (CORS preflight), and is not given leave.
-POSTED: Final = frozenset({"/api/signin", "/api/signout"})
+# Where a session begins and ends, and people say something. A form, a link or a picture of a
+# foreign page can ask for these too, with the browser's cookie, but none of them can send a header
+# of its own: for that, a script has to ask first (CORS preflight), and is not given leave.
+SIGN_IN: Final = "/api/signin"
+NOTES: Final = "/api/notes"
+_METHODS: Final = {
+    SIGN_IN: ("POST",),
+    "/api/signout": ("POST",),
+    NOTES: (*_READS, "POST"),
+}
 OWN_HEADER: Final = "X-Lupin-Twin"
 
 # The page loads nothing from elsewhere, is framed by nobody, and runs no inline script. No other
@@ -60,7 +75,7 @@ _SECURITY_HEADERS: Final = {
 
 
 class ReadOnly:
-    """ASGI middleware: reads only, but for sign-in and sign-out, and the headers on everything."""
+    """ASGI middleware: reads only, but for sign-in and notes, and the headers on everything."""
 
     def __init__(self, app: ASGIApp) -> None:
         self._app = app
@@ -73,15 +88,19 @@ class ReadOnly:
 
         send = with_security_headers(send)
         method = scope["method"]
-        methods = ("POST",) if path_of(scope) in POSTED else _READS
+        methods = _methods_of(path_of(scope))
         if method not in methods:
             detail = f"method {method[:16]} is not allowed here, use {' or '.join(methods)}"
             await _Refusal(405, detail, {"allow": ", ".join(methods)}).send(scope, receive, send)
-        elif method == "POST" and OWN_HEADER not in Headers(scope=scope):
+        elif method not in _READS and OWN_HEADER not in Headers(scope=scope):
             detail = f"{method} without the header {OWN_HEADER}, expected any value"
             await _Refusal(403, detail).send(scope, receive, send)
         else:
             await self._app(scope, receive, send)
+
+
+def _methods_of(path: str) -> tuple[str, ...]:
+    return ("DELETE",) if path.startswith(f"{NOTES}/") else _METHODS.get(path, _READS)
 
 
 def with_security_headers(send: Send) -> Send:
@@ -104,6 +123,10 @@ _LANGUAGE: Final = re.compile(r"[A-Za-z]{2,3}(?:-[A-Za-z0-9]{1,8}){0,2}")
 
 # In a request's state: the session that it was let in by, where it was one.
 SESSION_KEY: Final = "session"
+# And who makes it, where that is known.
+PERSON_KEY: Final = "person"
+# So soon after an account or its session has ended, what it has open ends too.
+_LOOK_S: Final = 2.0
 
 # Path and query. The longest that means something has a tag's name of a few hundred; each segment
 # of a path is looked for on the disk, and each parameter is taken apart.
@@ -118,7 +141,7 @@ _PREFLIGHT_MAX_AGE_S: Final = "600"
 
 @dataclass(frozen=True, slots=True)
 class Access:
-    """Who may read: the hosts and origins, and the token if there is one.
+    """Who may read: the hosts and origins, the token if there is one, and people if there are any.
 
     `secure`: the bridge serves TLS itself, so that its cookie may demand it.
     """
@@ -127,6 +150,12 @@ class Access:
     credentials: Credentials | None = None
     secure: bool = False
     sessions: Sessions = field(default_factory=Sessions)
+    people: People | None = None
+
+    @property
+    def is_closed(self) -> bool:
+        """Whether whoever reads needs a right to."""
+        return self.credentials is not None or (self.people is not None and self.people.is_on)
 
     @classmethod
     def of(cls, settings: Settings, token: str | None) -> Self:
@@ -147,6 +176,7 @@ class Access:
             policy,
             None if token is None else Credentials(token, called),
             secure=bool(settings.tls_cert),
+            people=People(accounts_path(settings), settings.proxy_user_header),
         )
 
 
@@ -179,8 +209,14 @@ class AccessControl:
             refusal = _Refusal(403, decision.refusal)
         elif decision.foreign is not None and _is_preflight(request):
             refusal = _Refusal(204, "", _PREFLIGHT_HEADERS)
+        elif decision.foreign is not None and scope.get("method", "GET") not in _READS:
+            refusal = _Refusal(403, "pages of another origin may read here, and no more")
         else:
-            checked = self._check_credentials(request)
+            try:
+                checked = self._check_credentials(request)
+            except AccountError as error:
+                log.warning("%s: nobody is let in", error)
+                checked = _Refusal(503, "the accounts cannot be read", {"retry-after": "5"})
             if not isinstance(checked, _Refusal):
                 await self._pass_on(checked, scope, receive, send)
                 return
@@ -188,9 +224,12 @@ class AccessControl:
         await refusal.send(scope, receive, send)
 
     async def _pass_on(
-        self, session: BrowserSession | None, scope: Scope, receive: Receive, send: Send
+        self, session: BrowserSession | Person | None, scope: Scope, receive: Receive, send: Send
     ) -> None:
         scope = _without_cookies(scope)
+        if isinstance(session, Person):
+            await self._pass_on_person(session, scope, receive, send)
+            return
         if session is None:
             await self._app(scope, receive, send)
             return
@@ -210,36 +249,62 @@ class AccessControl:
         finally:
             timer.cancel()
 
-    def _check_credentials(self, request: HTTPConnection) -> _Refusal | BrowserSession | None:
-        """The session that the request is let in by, None: by another right, or why it is not."""
-        credentials = self._access.credentials
-        path = path_of(request.scope)
-        if credentials is None or path in OPEN_PATHS:
+    async def _pass_on_person(
+        self, person: Person, scope: Scope, receive: Receive, send: Send
+    ) -> None:
+        scope["state"] = {**scope.get("state", {}), PERSON_KEY: person}
+        if scope["type"] == "http":
+            await self._app(scope, receive, send)
+            return
+        looking = asyncio.create_task(self._end_with(person, scope["state"][CONNECTION_KEY]))
+        try:
+            await self._app(scope, receive, send)
+        finally:
+            looking.cancel()
+
+    async def _end_with(self, person: Person, connection: Connection) -> None:
+        people = self._access.people
+        try:
+            while people is not None and people.still(person):
+                await asyncio.sleep(_LOOK_S)
+        except AccountError as error:
+            log.warning("%s: what %s had open is closed", error, person.name)
+        connection.dismiss(CloseCode.POLICY_VIOLATION, "the session has ended: sign in again")
+
+    def _check_credentials(
+        self, request: HTTPConnection
+    ) -> _Refusal | BrowserSession | Person | None:
+        """The right that the request is let in by, None: it needs none, or why it is not."""
+        path, people = path_of(request.scope), self._access.people
+        if path in OPEN_PATHS or not self._access.is_closed:
             return None
+        named = request.scope.get("state", {}).get(PROXY_USER_KEY)
         header = request.headers.get("authorization")
+        if people is not None and named is not None:
+            return people.by_proxy(named) or _unauthorized("the proxy names nobody who can be")
         if header is not None:
-            return self._check_header(credentials, header, client_of(request))
+            return self._check_header(header, client_of(request))
+        if path == SIGN_IN and people is not None and people.has_file:
+            return None  # by name and password, which the route looks at
         # A cookie is no guess: it cannot be made without the token, however often one tries.
         try:
-            values = cookies_of(credentials.cookie_name, request.scope["headers"])
+            right = self._right_by_cookie(request)
         except CookieTooLong as error:
             return _Refusal(431, str(error))
-        for value in values:
-            session = credentials.session_of(value, time.time())
-            if session is not None and not self._access.sessions.has_ended(session):
-                return session
-        if _wants_page(request):
-            # Relative, for a bridge behind a path prefix.
-            location = "../" * (path.count("/") - 1) + "signin"
-            language = request.query_params.get("lang", "")
-            if _LANGUAGE.fullmatch(language):
-                location += f"?lang={language}"
-            return _Refusal(303, "sign in first", {"location": location})
-        return _unauthorized(
-            "a token is needed: send it as Authorization: Bearer, or sign in at /signin"
-        )
+        return right or _sign_in_first(request)
 
-    def _check_header(self, credentials: Credentials, header: str, client: str) -> _Refusal | None:
+    def _right_by_cookie(self, request: HTTPConnection) -> BrowserSession | Person | None:
+        credentials, people = self._access.credentials, self._access.people
+        if credentials is not None:
+            for value in cookies_of(credentials.cookie_name, request.scope["headers"]):
+                session = credentials.session_of(value, time.time())
+                if session is not None and not self._access.sessions.has_ended(session):
+                    return session
+        if people is None or not people.has_file:
+            return None
+        return people.by_cookies(cookies_of(people.cookie_name(), request.scope["headers"]))
+
+    def _check_header(self, header: str, client: str) -> _Refusal | Person | None:
         now_s = time.monotonic()
         wait_s = self._guesses.wait_s(client, now_s)
         if wait_s > 0.0:
@@ -249,8 +314,14 @@ class AccessControl:
                 "a minute: no token is looked at until Retry-After",
                 {"retry-after": str(math.ceil(wait_s))},
             )
-        if credentials.accepts_header(header):
+        credentials, people = self._access.credentials, self._access.people
+        if credentials is not None and credentials.accepts_header(header):
             return None
+        scheme, _, token = header.partition(" ")
+        if people is not None and scheme.lower() == "bearer":
+            person = people.by_token(token.strip())
+            if person is not None:
+                return person
         self._guesses.take(client, now_s)
         log.warning("wrong token from %s", client)
         return _unauthorized("this is not the bridge's token, expected Authorization: Bearer")
@@ -303,6 +374,19 @@ _PREFLIGHT_HEADERS: Final = {
 
 def _unauthorized(detail: str) -> _Refusal:
     return _Refusal(401, detail, {"www-authenticate": 'Bearer realm="lupin-twin"'})
+
+
+def _sign_in_first(request: HTTPConnection) -> _Refusal:
+    if _wants_page(request):
+        # Relative, for a bridge behind a path prefix.
+        location = "../" * (path_of(request.scope).count("/") - 1) + "signin"
+        language = request.query_params.get("lang", "")
+        if _LANGUAGE.fullmatch(language):
+            location += f"?lang={language}"
+        return _Refusal(303, "sign in first", {"location": location})
+    return _unauthorized(
+        "a token is needed: send it as Authorization: Bearer, or sign in at /signin"
+    )
 
 
 def _source_of(request: HTTPConnection) -> RequestSource:

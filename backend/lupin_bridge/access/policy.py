@@ -40,16 +40,23 @@ from lupin_bridge.settings import SettingError, Settings
 
 # RFC 3986: a path of plain segments, none of which is "." or "..", without a slash at its end.
 _PATH_PREFIX: Final = re.compile(r"(?:/(?!\.{1,2}(?:/|$))[A-Za-z0-9._~-]+)+")
+_HEADER: Final = re.compile(r"[A-Za-z][A-Za-z0-9-]{0,63}")
+# In a request's state: whom a trusted proxy names.
+PROXY_USER_KEY: Final = "proxy_user"
 # "10.0.0.7:1234" and "[fd00::7]:1234", as some proxies write an address.
 _WITH_PORT: Final = re.compile(r"\[(?P<v6>[^\]]+)\](?::\d+)?|(?P<v4>[\d.]+):\d+")
 
 
 @dataclass(frozen=True, slots=True)
 class Proxies:
-    """The proxies whose headers count, and the path that the bridge is below ("": none)."""
+    """The proxies whose headers count, and the path that the bridge is below ("": none).
+
+    `user_header` is the one in which they name the person ("": none).
+    """
 
     proxies: tuple[IPv4Network | IPv6Network, ...] = ()
     path_prefix: str = ""
+    user_header: str = ""
 
     @classmethod
     def of(cls, settings: Settings) -> Self:
@@ -65,8 +72,20 @@ class Proxies:
                 f"{settings.called('path_prefix')} is {prefix[:128]!r}, must be a path such as "
                 "/gh1, without a slash at its end"
             )
+        header = settings.proxy_user_header
+        if header and _HEADER.fullmatch(header) is None:
+            raise SettingError(
+                f"{settings.called('proxy_user_header')} is {header[:128]!r}, must be a header's "
+                "name, such as Remote-User"
+            )
+        if header and not settings.trusted_proxy:
+            raise SettingError(
+                f"{settings.called('proxy_user_header')} is given without --trusted-proxy: nobody "
+                "is believed"
+            )
         called = settings.called("trusted_proxy")
-        return cls(tuple(_network(text, called) for text in settings.trusted_proxy), prefix)
+        proxies = tuple(_network(text, called) for text in settings.trusted_proxy)
+        return cls(proxies, prefix, header)
 
     def trusts(self, address: str) -> bool:
         """Whether this is a proxy whose headers count."""
@@ -103,7 +122,12 @@ class BehindProxies:
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Pass the request on with its client, scheme and path."""
         if scope["type"] in ("http", "websocket"):
-            scope = {**scope, **self._forwarded(scope), **self._path(scope)}
+            scope = {
+                **scope,
+                **self._forwarded(scope),
+                **self._path(scope),
+                **self._user(scope),
+            }
         await self._app(scope, receive, send)
 
     def _forwarded(self, scope: Scope) -> dict[str, object]:
@@ -119,6 +143,19 @@ class BehindProxies:
             is_socket = scope["type"] == "websocket"
             forwarded["scheme"] = proto.replace("http", "ws") if is_socket else proto
         return forwarded
+
+    def _user(self, scope: Scope) -> dict[str, object]:
+        """Whom the proxy names, in the state; the header itself goes, whoever sent it."""
+        header = self._proxies.user_header.lower().encode()
+        if not header:
+            return {}
+        named = [value for name, value in scope["headers"] if name == header]
+        others = [line for line in scope["headers"] if line[0] != header]
+        if not named or not self._proxies.trusts((scope.get("client") or ("", 0))[0]):
+            return {"headers": others}
+        # A proxy that adds its line to the client's, and does not replace it, names two.
+        name = named[0].decode("latin-1").strip() if len(named) == 1 else ""
+        return {"headers": others, "state": {**scope.get("state", {}), PROXY_USER_KEY: name}}
 
     def _path(self, scope: Scope) -> dict[str, object]:
         prefix = self._proxies.path_prefix

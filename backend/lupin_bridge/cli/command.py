@@ -13,7 +13,7 @@ from collections.abc import Sequence
 from typing import NoReturn
 
 from lupin_bridge import __version__, logs
-from lupin_bridge.cli import archive, import_csv, journal
+from lupin_bridge.cli import archive, import_csv, journal, people
 from lupin_bridge.cli.configuration import (
     CONFIG_VARIABLE,
     settings_from,
@@ -33,6 +33,9 @@ _WITHOUT_ROS = {
     "import": import_csv.run,
     "archive": archive.run,
     "forward": archive.run,
+    "user": people.run,
+    "token": people.run,
+    "audit": people.run,
 }
 
 
@@ -229,6 +232,7 @@ def parser() -> argparse.ArgumentParser:
     adapt.add_options(
         roles.add_parser("adapt", help=adapt.HELP, description=adapt.HELP, allow_abbrev=False)
     )
+    people.add_parsers(roles)
     return made
 
 

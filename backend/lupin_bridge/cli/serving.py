@@ -34,7 +34,7 @@ def open_listener(settings: Settings, access: Access) -> socket.socket:
             f"cannot listen on {settings.host} port {settings.port}: {error.strerror}"
         ) from error
     for warning in exposure(
-        listener.getsockname()[0], has_token=access.credentials is not None, has_tls=access.secure
+        listener.getsockname()[0], has_token=access.is_closed, has_tls=access.secure
     ):
         log.warning("%s", warning)
     return listener

@@ -17,6 +17,7 @@ from lupin_bridge.feed.shared_work import Shared
 from lupin_bridge.feed.source import CacheCounts, RevisedGrid, TwinUpdate
 from lupin_twin.core.history import TagHistory
 from lupin_twin.core.journal_condition import Condition
+from lupin_twin.core.notes import Note
 from lupin_twin.core.parameters import World
 from lupin_twin.core.past import NotRemembered
 from lupin_twin.core.state import NANOSECONDS_PER_SECOND, Snapshot
@@ -126,6 +127,16 @@ class LocalTwin(RosSource[TwinNode, TwinUpdate]):
     async def history(self, tag_id: str) -> TagHistory | None:
         """The last `buffer_len` scans, and as many tries, of a tag."""
         return await self._in_time(self.thread.call(lambda node: node.history_of(tag_id)))
+
+    writes_notes = True
+
+    async def write_note(self, note: Note) -> Note:
+        """Through the node's journal, whose thread writes it."""
+        return await self._in_time(self._write_note(note))
+
+    async def _write_note(self, note: Note) -> Note:
+        writing = await self.thread.call(lambda node: node.memory.write_note(note))
+        return await asyncio.wrap_future(writing)
 
     @property
     def now_ns(self) -> int:

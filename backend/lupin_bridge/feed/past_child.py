@@ -23,10 +23,12 @@ from typing import IO, Any, Final
 
 from lupin_bridge.feed.query import Now, Question, Work
 from lupin_twin.core.journal_condition import UNKNOWN
+from lupin_twin.core.notes import NotesRequest
 from lupin_twin.core.past import SeriesRequest, check_moment
 from lupin_twin.core.writes import RecentRequest, WritesRequest
 from lupin_twin.journal.fold import state_at
 from lupin_twin.journal.follow import recent, writes
+from lupin_twin.journal.notes import notes
 from lupin_twin.journal.queries import Export, series
 from lupin_twin.runtime.journal_queries import Recall
 from lupin_twin.runtime.workers import ShouldStop
@@ -140,6 +142,8 @@ def _found(need: Any, now: Now, log: sqlite3.Connection) -> Any:
             return series(log, need, now.stamp_ns)
         case WritesRequest():
             return writes(log, need)
+        case NotesRequest():
+            return notes(log, need)
         case Export():
             return need.step(log)
         case RecentRequest():

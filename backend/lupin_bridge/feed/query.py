@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from typing import Any, Final, Generic, Protocol, TypeVar
 
 from lupin_twin.core.journal_condition import Condition
+from lupin_twin.core.notes import NotesRequest
 from lupin_twin.core.past import PastRow, SeriesRequest
 from lupin_twin.core.writes import RecentRequest, WritesRequest
 from lupin_twin.journal.queries import Export, lots
@@ -21,8 +22,9 @@ ResultT = TypeVar("ResultT")
 
 # A moment, ns of ROS time, which `Snapshot` answers; a series, which `SeriesPast` does; what was
 # recent at a moment, which a tuple of `PastWrite` does; what was received, which `PastWrites` does;
-# the next step of an export, which a list of `PastRow` does.
-Need = int | SeriesRequest | RecentRequest | WritesRequest | Export
+# what people said, which `PastNotes` does; the next step of an export, which a list of `PastRow`
+# does.
+Need = int | SeriesRequest | RecentRequest | WritesRequest | NotesRequest | Export
 # What is known as of then crosses by itself, so it is of any type.
 Found = Any
 # What writing a row of an export takes, roughly and at worst, s.

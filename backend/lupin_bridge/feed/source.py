@@ -19,6 +19,7 @@ from lupin_twin.core.diagnostics import Origin
 from lupin_twin.core.drops import Counts, Recent
 from lupin_twin.core.history import TagHistory
 from lupin_twin.core.journal_condition import UNKNOWN, Condition
+from lupin_twin.core.notes import Note, NotesRequest, NotesUnwritable, PastNotes
 from lupin_twin.core.past import NotRemembered, PastRow
 from lupin_twin.core.state import Snapshot
 from lupin_twin.core.writes import PastWrites, WritesRequest
@@ -27,6 +28,7 @@ from lupin_twin.field.engine import FieldRequest, FieldRules
 from lupin_twin.field.explored import OccupancyMap
 from lupin_twin.field.grid import FieldGrid
 from lupin_twin.journal.follow import WRITES_S
+from lupin_twin.journal.notes import NOTES_S
 from lupin_twin.journal.queries import STRETCH_S, Export
 from lupin_twin.runtime.estimate_rounds import Report, ReportRequest
 from lupin_twin.runtime.workers import Workers
@@ -35,6 +37,12 @@ ResultT = TypeVar("ResultT")
 
 # What a callback may take at worst, on a slow machine: the largest state there is takes a second.
 STUCK_AFTER_S: Final = 10.0
+
+
+ELSEWHERE: Final = (
+    "this bridge only reads the log; notes are written at the bridge of the process that keeps the "
+    "journal, `lupin-twin serve`"
+)
 
 
 class TwinUnavailableError(RuntimeError):
@@ -235,6 +243,22 @@ class TwinSource(ABC):
     async def writes(self, request: WritesRequest) -> PastWrites:
         """What was heard, scan by scan and look by look, in the order of hearing."""
         return await self.ask(Itself(request), WRITES_S)
+
+    async def notes(self, request: NotesRequest) -> PastNotes:
+        """What people said."""
+        return await self.ask(Itself(request), NOTES_S)
+
+    # Only the process that keeps the journal writes it.
+    writes_notes = False
+
+    async def write_note(self, note: Note) -> Note:
+        """Write a note; returns it with its id once it is in the journal.
+
+        Raises:
+            NotesUnwritable: it was not written.
+
+        """
+        raise NotesUnwritable(f"the note of {note.by} cannot be written: {ELSEWHERE}")
 
     async def rows(
         self,

@@ -141,6 +141,13 @@ class OfAlarms(OfPeriod):
 
 
 @dataclass(frozen=True, slots=True)
+class OfNotes(OfPeriod):
+    """The parameters of `/api/notes`."""
+
+    subject: str | None = parameter("of this alone: `alarm:ID`, `tag:ID` or `site`; default: all")
+
+
+@dataclass(frozen=True, slots=True)
 class OfExport(OfPeriod):
     """The parameters of an export."""
 
@@ -229,6 +236,16 @@ def period(kind: type[OfPeriod], parameters: Parameters, now_ns: int | None) -> 
             active = None if given.active is None else given.active == "1"
             return PeriodQuery(start_ns, end_ns, active=active)
     return PeriodQuery(start_ns, end_ns)
+
+
+def subject(parameters: Parameters) -> str | None:
+    """The subject of `/api/notes`.
+
+    Raises:
+        PastRefused: see `history`.
+
+    """
+    return read(OfNotes, parameters, PastRefused).subject
 
 
 def _period(given: OfPeriod | OfHistory, now_ns: int | None) -> tuple[int, int]:

@@ -14,9 +14,11 @@ from typing import Any, Final, Protocol, TypeVar, cast
 
 import orjson
 from fastapi import APIRouter, FastAPI, Request, Response
+from pydantic import BaseModel, ValidationError
 from starlette.types import Receive, Scope, Send
 
-from lupin_bridge.access.middleware import client_of
+from lupin_bridge.access.accounts import AccountError, Person
+from lupin_bridge.access.middleware import PERSON_KEY, client_of
 from lupin_bridge.bridge import Bridge
 from lupin_bridge.feed.source import TwinTimeoutError, TwinUnavailableError
 from lupin_bridge.field import query as field_query
@@ -31,12 +33,15 @@ from lupin_bridge.past.plans import (
 )
 from lupin_bridge.serving.admission import REVALIDATE, AdmissionError, Answer, BusyError, Limits
 from lupin_bridge.stream import schema
+from lupin_twin.core.notes import NotesUnwritable
 from lupin_twin.core.past import NotRemembered, PastRefused
 from lupin_twin.field.idw import never
 from lupin_twin.runtime.workers import SMALL_S, ShouldStop
 
 NEVER_STORE: Final = {"Cache-Control": "no-store"}
 NO_TWIN: Final = "no twin has been heard yet"
+# For the few kB of a body.
+BODY_S: Final = 5.0
 # nginx's "client closed request"; nobody receives it.
 CLIENT_GONE: Final = 499
 # Shorter work is done on the loop: to hand it to a worker takes longer.
@@ -56,6 +61,7 @@ NOT_REMEMBERED: Final[dict[int | str, dict[str, Any]]] = {
 }
 
 ResultT = TypeVar("ResultT")
+ModelT = TypeVar("ModelT", bound=BaseModel)
 RouteT = TypeVar("RouteT", bound=Callable[..., Any])
 
 
@@ -81,6 +87,45 @@ def bridge_of(request: Request) -> Bridge:
     return cast("Bridge", request.app.state.bridge)
 
 
+def person_of(request: Request) -> Person | None:
+    """Who makes a request, where that is known."""
+    found: Person | None = request.scope["state"].get(PERSON_KEY)
+    return found
+
+
+class BodyRefused(Exception):
+    """A body that is not what the route takes; the message names field, value and limit."""
+
+    def __init__(self, message: str, status: int = 400) -> None:
+        super().__init__(message)
+        self.status = status
+
+
+async def read_body(request: Request, model: type[ModelT]) -> ModelT:
+    """A request's JSON body, which the server holds to a few kB.
+
+    Raises:
+        BodyRefused: no JSON, not the model's, or not there within `BODY_S`.
+
+    """
+    media_type = request.headers.get("content-type", "").partition(";")[0].strip().lower()
+    if media_type != "application/json":
+        raise BodyRefused(f"Content-Type is {media_type[:64]!r}, expected application/json", 415)
+    try:
+        async with asyncio.timeout(BODY_S):
+            body = await request.body()
+    except TimeoutError:
+        raise BodyRefused(f"the body was not there within {BODY_S:g} s", 408) from None
+    try:
+        return model.model_validate(orjson.loads(body))
+    except orjson.JSONDecodeError as error:
+        raise BodyRefused(f"the body is no JSON: {error}") from None
+    except ValidationError as error:
+        first = error.errors(include_url=False, include_input=False, include_context=False)[0]
+        name, why = ".".join(map(str, first["loc"])) or "the body", first["msg"]
+        raise BodyRefused(f"{name[:64]}: {why[0].lower()}{why[1:]}") from None
+
+
 def list_header(request: Request, name: str) -> str:
     """All lines of a header that is a list, as one (RFC 9110, section 5.3)."""
     return ", ".join(request.headers.getlist(name))
@@ -100,7 +145,10 @@ def error_response(
     return json_response(orjson.dumps({"detail": detail}), status_code, headers)
 
 
-REFUSALS: Final = (AdmissionError, NotRemembered, NoSuchTag, PastRefused, TwinUnavailableError)
+REFUSALS: Final = (
+    *(AdmissionError, NotRemembered, NoSuchTag, PastRefused, TwinUnavailableError),
+    *(AccountError, BodyRefused, NotesUnwritable),
+)
 
 
 def add_refusals(app: FastAPI) -> None:
@@ -124,6 +172,10 @@ def refusal(error: Exception) -> Response:
             status, headers = (404, None) if error.is_lasting else (503, retry)
         case NoSuchTag():
             status = 404
+        case BodyRefused():
+            status = error.status
+        case AccountError() | NotesUnwritable():
+            status, headers = 503, retry
         case TwinTimeoutError():
             status = 504
         case TwinUnavailableError():

@@ -17,8 +17,10 @@ from starlette.responses import RedirectResponse
 from starlette.staticfiles import StaticFiles
 from starlette.types import Scope
 
+from lupin_bridge.access import accounts
 from lupin_bridge.access.credentials import SESSION_S, BrowserSession
-from lupin_bridge.access.middleware import CONTENT_POLICY, SESSION_KEY, Access
+from lupin_bridge.access.middleware import CONTENT_POLICY, SESSION_KEY, Access, client_of
+from lupin_bridge.access.people import People
 from lupin_bridge.bridge import Bridge
 from lupin_bridge.routes.answers import (
     NEVER_STORE,
@@ -26,11 +28,13 @@ from lupin_bridge.routes.answers import (
     error_response,
     json_response,
     list_header,
+    person_of,
+    read_body,
     read_route,
     respond,
 )
 from lupin_bridge.serving.admission import REVALIDATE
-from lupin_bridge.stream import schema
+from lupin_bridge.stream import people_schema
 
 router = APIRouter()
 # In the application only where the page was not built.
@@ -101,7 +105,9 @@ def render(document: dict[str, Any], base_url: str) -> str:
     """An OpenAPI document as one HTML page: routes, parameters, answers, and lines for curl."""
     info = document["info"]
     routes = "".join(
-        _route(path, operations["get"], base_url) for path, operations in document["paths"].items()
+        _route(method.upper(), path, operation, base_url)
+        for path, operations in document["paths"].items()
+        for method, operation in operations.items()
     )
     schemas = "".join(
         _schema(name, described) for name, described in document["components"]["schemas"].items()
@@ -118,7 +124,7 @@ def render(document: dict[str, Any], base_url: str) -> str:
     )
 
 
-def _route(path: str, operation: dict[str, Any], base_url: str) -> str:
+def _route(method: str, path: str, operation: dict[str, Any], base_url: str) -> str:
     parameters = operation.get("parameters", [])
     required = [p for p in parameters if p.get("required") and p["in"] == "query"]
     query = "&".join(f"{p['name']}=…" for p in required)
@@ -134,9 +140,9 @@ def _route(path: str, operation: dict[str, Any], base_url: str) -> str:
     )
     url = f"{base_url}{path}{'?' + query if query else ''}"
     return (
-        f"<section><h3><code>GET {escape(path)}</code></h3>"
+        f"<section><h3><code>{method} {escape(path)}</code></h3>"
         f"<p>{escape(operation.get('summary', ''))}. {escape(operation.get('description', ''))}</p>"
-        f"<pre>curl '{escape(url)}'</pre>"
+        f"<pre>curl {'' if method == 'GET' else f'-X {method} '}'{escape(url)}'</pre>"
         + (f"<table border='1'>{rows}</table>" if rows else "")
         + f"<ul>{answers}</ul></section>"
     )
@@ -243,14 +249,17 @@ _SIGNIN_FOLDER: Final = Path(__file__).parent / "signin_page"
 
 @router.post("/api/signin", include_in_schema=False)
 async def sign_in(request: Request) -> Response:
-    """Trade the token, which `AccessControl` has looked at, for a session cookie.
+    """Trade a token, which `AccessControl` has looked at, or a password for a session cookie.
 
     For the page below: programs send `Authorization: Bearer` with every request instead.
     """
-    access = _access_of(request)
-    if access.credentials is None:
+    access, person = _access_of(request), person_of(request)
+    if not access.is_closed:
         return error_response("this bridge asks for no token: there is nothing to sign in to", 404)
-    if "authorization" not in request.headers:  # a session must not renew itself
+    has_token = "authorization" in request.headers
+    if access.people is not None and access.people.has_file and (person or not has_token):
+        return await _sign_in_person(request, access.people, person if has_token else None)
+    if access.credentials is None or not has_token:  # a session must not renew itself
         return error_response(
             "send the token as Authorization: Bearer", 401, {"WWW-Authenticate": "Bearer"}
         )
@@ -267,7 +276,9 @@ async def sign_in(request: Request) -> Response:
 @router.post("/api/signout", include_in_schema=False)
 async def sign_out(request: Request) -> Response:
     """End the session that the request comes with, and everything that it has open."""
-    access = _access_of(request)
+    access, person = _access_of(request), person_of(request)
+    if access.people is not None and person is not None:
+        return await _sign_out_person(request, access.people, person)
     if access.credentials is None:
         return error_response("this bridge asks for no token: there is nothing to sign out of", 404)
     session = _session_of(request)
@@ -281,27 +292,68 @@ async def sign_out(request: Request) -> Response:
 @read_route(
     router,
     "/api/session",
-    summary="Is this a session that can be signed out of?",
-    responses={200: {"model": schema.Session}},
+    summary="Who makes the request, and is this a session that can be signed out of?",
+    responses={200: {"model": people_schema.Session}},
 )
 async def session_route(request: Request) -> Response:
-    """Whether the request came with a session, and how long that still lasts."""
-    session = _session_of(request)
-    left_s = None if session is None else max(0.0, session.ends_s - time.time())
-    body = {"can_sign_out": session is not None, "seconds_left": left_s}
+    """Who makes the request, and how long a session that it came with still lasts."""
+    session, person = _session_of(request), person_of(request)
+    ends_s = None if session is None else session.ends_s
+    if person is not None and person.session:
+        ends_s = person.ends_at_s
+    bridge: Bridge | None = getattr(request.app.state, "bridge", None)
+    is_writer = bridge is not None and bridge.source.writes_notes
+    body = {
+        "can_sign_out": ends_s is not None,
+        "seconds_left": None if ends_s is None else max(0.0, ends_s - time.time()),
+        "name": None if person is None else person.name,
+        "role": "viewer" if person is None else person.role,
+        "can_write_notes": is_writer and person is not None and person.may("operator"),
+    }
     return json_response(orjson.dumps(body))
+
+
+async def _sign_in_person(
+    request: Request, people: People, person: accounts.Person | None
+) -> Response:
+    """Begin a session: of the token that the request came with, or of an account."""
+    address = client_of(request)
+    if person is None:
+        given = await read_body(request, people_schema.SignIn)
+        found = await people.check(given.name, given.password, address)
+        if found is None:
+            return error_response("there is no such account, or the password is another", 401)
+        person = found
+    cookie = await people.sign_in(person.name, address)
+    response = Response(status_code=204, headers=NEVER_STORE)
+    response.set_cookie(
+        people.cookie_name(), cookie, max_age=accounts.SESSION_S, **_place_of(request)
+    )
+    return response
+
+
+async def _sign_out_person(request: Request, people: People, person: accounts.Person) -> Response:
+    if person.session:
+        await people.sign_out(person, client_of(request))
+    response = Response(status_code=204, headers=NEVER_STORE)
+    if people.has_file:
+        response.delete_cookie(people.cookie_name(), **_place_of(request))
+    return response
 
 
 @read_route(router, "/signin", include_in_schema=False)
 async def page(request: Request) -> Response:
-    """The page; without a token, on to the HMI."""
-    if _access_of(request).credentials is None:
+    """The page; where nobody needs to sign in, on to the HMI."""
+    access = _access_of(request)
+    if not access.is_closed:
         return Response(status_code=303, headers={"Location": "./", **NEVER_STORE})
     language = language_of(
         request.query_params.get("lang"), list_header(request, "accept-language"), _words()
     )
     headers = {**REVALIDATE, "Content-Language": language, "Vary": "Accept-Language"}
-    return Response(_page_in(language), headers=headers, media_type="text/html; charset=utf-8")
+    has_accounts = access.people is not None and access.people.has_file
+    page = _page_in(language, has_accounts=has_accounts)
+    return Response(page, headers=headers, media_type="text/html; charset=utf-8")
 
 
 @read_route(router, "/signin.css", include_in_schema=False)
@@ -354,9 +406,12 @@ def _words() -> dict[str, dict[str, str]]:
 
 
 @cache
-def _page_in(language: str) -> str:
+def _page_in(language: str, *, has_accounts: bool) -> str:
     words = {key: escape(text) for key, text in _words()[language].items()}
-    return _read_file("signin.html").decode().format(lang=language, **words)
+    if has_accounts:
+        words |= {"token": words["password"], "wrong": words["wrong_person"]}
+    page = _read_file("signin.html").decode()
+    return page.format(lang=language, hidden="" if has_accounts else "hidden", **words)
 
 
 @cache

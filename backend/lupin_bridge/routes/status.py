@@ -14,6 +14,7 @@ import orjson
 from fastapi import APIRouter, Request, Response
 
 from lupin_bridge.access.middleware import client_of
+from lupin_bridge.alarms.notes import notes_of_alarms
 from lupin_bridge.feed.source import ailment
 from lupin_bridge.judge.alarm import Alarm, reasons_of_days
 from lupin_bridge.metrics import CONTENT_TYPE
@@ -230,16 +231,19 @@ async def alarms_route(request: Request) -> Response:
     board = bridge.alarms.now
     alarms = board.active if query.active else board.alarms
 
+    notes, now_ns = bridge.notes.notes or (), bridge.ros_time_ns
+
     def body() -> bytes:
         found = list(islice(filter(_is_in(query), alarms), MAX_ALARMS))
-        return orjson.dumps(alarms_body(found, board.source, board.since_ns))
+        said = notes_of_alarms(board.alarms, notes, now_ns)
+        return orjson.dumps(alarms_body(found, board.source, board.since_ns, said))
 
     async def compute() -> Answer:
         with bridge.admission.computing(client_of(request)):
             text = await on_worker(bridge, lambda _: body(), len(alarms) * _WRITE_ALARM_S)
         return Answer(text, "application/json", NEVER_STORE)
 
-    return await respond(request, ("alarms", board.number, query), compute)
+    return await respond(request, ("alarms", board.number, bridge.notes.number, query), compute)
 
 
 def _is_in(query: PeriodQuery) -> Callable[[Alarm], bool]:

@@ -5,12 +5,13 @@ Pure. A tag's text is kept until its health is another: it stays the same for ho
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from itertools import islice
 from typing import Any, Final, Protocol
 
 import orjson
 
+from lupin_bridge.alarms.notes import AlarmNotes
 from lupin_bridge.judge.alarm import Alarm
 from lupin_bridge.judge.judging import Judged
 from lupin_bridge.judge.scan_interval import Patrol
@@ -19,9 +20,9 @@ from lupin_bridge.stream.state_json import stamp
 from lupin_twin.core.state import NANOSECONDS_PER_SECOND
 
 
-def alarm_json(alarm: Alarm) -> dict[str, Any]:
-    """`schema.Alarm`."""
-    return {
+def alarm_json(alarm: Alarm, said: AlarmNotes | None = None) -> dict[str, Any]:
+    """`schema.Alarm`; what nobody said is left out."""
+    found = {
         "id": alarm.id,
         "reason": reason_json(alarm.reason),
         "tag_id": alarm.tag_id,
@@ -29,12 +30,27 @@ def alarm_json(alarm: Alarm) -> dict[str, Any]:
         "cleared_at": None if alarm.cleared_at_ns is None else stamp(alarm.cleared_at_ns),
         "worst": alarm.worst,
     }
+    if said is not None and said.acknowledged is not None:
+        found["acknowledged_by"] = said.acknowledged.by
+        found["acknowledged_at"] = stamp(said.acknowledged.made_at_ns)
+    if said is not None and said.shelved is not None:
+        found["shelved_by"] = said.shelved.by
+        found["shelved_until"] = stamp(said.shelved.until_ns or 0)
+    return found
 
 
-def alarms_body(alarms: Iterable[Alarm], source: str, since_ns: int | None) -> dict[str, Any]:
-    """`schema.Alarms`."""
+_NOTHING: Final[Mapping[str, AlarmNotes]] = {}
+
+
+def alarms_body(
+    alarms: Iterable[Alarm],
+    source: str,
+    since_ns: int | None,
+    said: Mapping[str, AlarmNotes] = _NOTHING,
+) -> dict[str, Any]:
+    """`schema.Alarms`; `said` is by the alarm's id."""
     return {
-        "alarms": [alarm_json(alarm) for alarm in alarms],
+        "alarms": [alarm_json(alarm, said.get(alarm.id)) for alarm in alarms],
         "source": source,
         "since": None if since_ns is None else stamp(since_ns),
     }
@@ -72,9 +88,14 @@ def alarms_in_frame(page: AlarmLists, now_ns: int | None) -> list[Alarm]:
     return sorted((*active, *over), key=lambda alarm: (-alarm.raised_at_ns, alarm.id))
 
 
-def alarms_frame(alarms: Iterable[Alarm], source: str, since_ns: int | None) -> bytes:
+def alarms_frame(
+    alarms: Iterable[Alarm],
+    source: str,
+    since_ns: int | None,
+    said: Mapping[str, AlarmNotes] = _NOTHING,
+) -> bytes:
     """`schema.AlarmsFrame` as JSON text."""
-    return orjson.dumps({"type": "alarms", **alarms_body(alarms, source, since_ns)})
+    return orjson.dumps({"type": "alarms", **alarms_body(alarms, source, since_ns, said)})
 
 
 class HealthJson:

@@ -210,6 +210,14 @@ class Alarm(Contract):
         description="the value farthest beyond its limit, sensor's unit; of a pest the most that "
         "were counted; null: there is no such value"
     )
+    acknowledged_by: str | None = Field(
+        default_factory=lambda: None, description="who; absent: nobody has"
+    )
+    acknowledged_at: Time | None = Field(default_factory=lambda: None, description="ROS time")
+    shelved_by: str | None = Field(
+        default_factory=lambda: None, description="who; absent: it is not shelved"
+    )
+    shelved_until: Time | None = Field(default_factory=lambda: None, description="ROS time")
 
 
 class Alarms(Contract):
@@ -434,13 +442,6 @@ class Health(Contract):
     ok: bool
     message: str
     callback_errors: int
-
-
-class Session(Contract):
-    """`/api/session`: whether `/api/signout` would end it, and how long it lasts otherwise, s."""
-
-    can_sign_out: bool
-    seconds_left: float | None
 
 
 class ErrorMessage(Contract):

@@ -32,6 +32,9 @@ export interface Done {
 /** The last action, as long as it can be undone; null: there is none. */
 export const done = createStore<Done | null, Done | null>(null, (_, next) => next);
 
+/** Told of what is done here, with what was kept before and after; null: it stays here. */
+export const acting: { tell: ((before: Kept, next: Kept) => void) | null } = { tell: null };
+
 let timer: ReturnType<typeof setTimeout> | undefined;
 
 function setDone(action: Done | null): void {
@@ -44,6 +47,7 @@ function change(what: Done['what'], count: number, next: Kept): void {
   const before = own.get();
   own.dispatch(next);
   setDone({ what, count, before });
+  acting.tell?.(before, next);
 }
 
 export const acknowledgeAlarms = (items: readonly Rated[]): void => {
@@ -67,8 +71,10 @@ export function undo(): void {
   const last = done.get();
   if (!last) return;
   const { acknowledged, shelved } = last.before;
-  own.dispatch({ ...own.get(), acknowledged, shelved });
+  const now = own.get();
+  own.dispatch({ ...now, acknowledged, shelved });
   setDone(null);
+  acting.tell?.(now, own.get());
 }
 
 export const preferTold = (way: Partial<Pick<Kept, 'sound' | 'notify'>>): void => {

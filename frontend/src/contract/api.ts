@@ -1,5 +1,5 @@
 /** The bridge's routes. Addresses are relative to the page, so any path prefix works. */
-import { HISTORY, MAP, QUALITY, SENSORS, SESSION } from './bodies';
+import { HISTORY, MAP, QUALITY, SENSORS } from './bodies';
 import type { Check } from './check';
 import { parseNpy } from './npy';
 import type { Field, FieldQuality, OccupancyGrid, SensorsFile, TagHistory } from './types';
@@ -39,7 +39,7 @@ export async function get(
   return ask(path, { signal, cache: 'no-cache', ...(headers ? { headers } : {}) });
 }
 
-async function ask(path: string, init: RequestInit): Promise<Response> {
+export async function ask(path: string, init: RequestInit): Promise<Response> {
   const response = await fetch(route(path), init);
   if (!response.ok) {
     const wait = Number(response.headers.get('Retry-After') ?? NaN);
@@ -160,16 +160,4 @@ export async function fetchSensors(signal: AbortSignal): Promise<SensorsFile> {
 export async function fetchHistory(tagId: string, signal: AbortSignal): Promise<TagHistory> {
   const response = await get(`api/tags/${encodeURIComponent(tagId)}/history`, signal);
   return read<TagHistory>('history', HISTORY, response);
-}
-
-/** Whether there is a session to sign out of: not where no token is asked for. */
-export async function canSignOut(signal: AbortSignal): Promise<boolean> {
-  const response = await get('api/session', signal);
-  return (await read<{ can_sign_out: boolean }>('session', SESSION, response)).can_sign_out;
-}
-
-/** Ends the session, and with it the sockets that it has open. */
-export async function signOut(): Promise<void> {
-  // A header of our own: no form and no picture of another page can send one.
-  await ask('api/signout', { method: 'POST', headers: { 'X-Lupin-Twin': '1' } });
 }

@@ -17,8 +17,6 @@ import { MAX_SENSORS, POSE, TEXT, TIME } from './shapes';
 /** More scans than any twin keeps of one tag in memory. */
 const MAX_SCANS = 20_000;
 
-export const SESSION = object({ can_sign_out: boolean });
-
 export const MAP = object({
   info: object({ resolution: number, width: count, height: count, origin: POSE }),
 });

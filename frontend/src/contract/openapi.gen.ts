@@ -20,6 +20,10 @@ export interface components {
             readonly raised_at: components["schemas"]["Time"];
             readonly cleared_at: components["schemas"]["Time"] | null;
             readonly worst: number | null;
+            readonly acknowledged_by?: string | null;
+            readonly acknowledged_at?: components["schemas"]["Time"] | null;
+            readonly shelved_by?: string | null;
+            readonly shelved_until?: components["schemas"]["Time"] | null;
         };
         readonly Alarms: {
             readonly alarms: readonly components["schemas"]["Alarm"][];
@@ -155,6 +159,21 @@ export interface components {
             readonly height: number;
             readonly origin: components["schemas"]["Pose"];
         };
+        readonly Note: {
+            readonly id: string;
+            /** @enum {string} */
+            readonly kind: "acknowledge" | "shelve" | "comment";
+            readonly subject: string;
+            readonly text: string;
+            readonly until: components["schemas"]["Time"] | null;
+            readonly made_at: components["schemas"]["Time"];
+            readonly by: string;
+            readonly withdrawn_by: string | null;
+            readonly withdrawn_at: components["schemas"]["Time"] | null;
+        };
+        readonly Notes: {
+            readonly notes: readonly components["schemas"]["Note"][];
+        };
         readonly OccupancyGrid: {
             readonly header: components["schemas"]["Header"];
             readonly info: components["schemas"]["MapMetaData"];
@@ -207,6 +226,14 @@ export interface components {
             readonly name: string;
             readonly value: number | null;
             readonly observed_at?: components["schemas"]["Time"] | null;
+        };
+        readonly Session: {
+            readonly can_sign_out: boolean;
+            readonly seconds_left: number | null;
+            readonly name: string | null;
+            /** @enum {string} */
+            readonly role: "viewer" | "operator" | "admin";
+            readonly can_write_notes: boolean;
         };
         readonly StatusFrame: {
             /** @constant */

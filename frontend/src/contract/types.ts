@@ -43,6 +43,9 @@ export type History = Schemas['History'];
 export type Timeline = Schemas['Timeline'];
 /** One episode of something wrong at a tag, or in the house. */
 export type Alarm = Schemas['Alarm'];
+/** Who is signed in, and what they said. */
+export type Session = Schemas['Session'];
+export type Notes = Schemas['Notes'];
 export type AlarmsFrame = Schemas['AlarmsFrame'];
 export type Alarms = Schemas['Alarms'];
 export type HealthReason = Schemas['HealthReason'];

@@ -1,6 +1,8 @@
 import { useEffect, useState, type JSX } from 'react';
 
-import { canSignOut, route, signOut } from '../contract/api';
+import { route } from '../contract/api';
+import { fetchSession, signOut } from '../contract/people';
+import type { Session } from '../contract/types';
 import { S } from '../strings';
 import { say } from './toast';
 
@@ -12,17 +14,17 @@ export function SignOut({
   close: () => void;
   leave?: (url: URL) => void;
 }): JSX.Element | null {
-  const [isOffered, setOffered] = useState(false);
+  const [session, setSession] = useState<Session | null>(null);
   useEffect(() => {
     const abort = new AbortController();
-    canSignOut(abort.signal).then(setOffered, () => {
+    fetchSession(abort.signal).then(setSession, () => {
       // Without an answer there is nothing to offer.
     });
     return () => {
       abort.abort();
     };
   }, []);
-  if (!isOffered) return null;
+  if (!session?.can_sign_out) return null;
   const end = async (): Promise<void> => {
     close();
     try {
@@ -37,6 +39,12 @@ export function SignOut({
     <li>
       <button type="button" onClick={() => void end()}>
         {S.signOut}
+        {session.name && (
+          <>
+            {' '}
+            <bdi data-testid="person">({session.name})</bdi>
+          </>
+        )}
       </button>
     </li>
   );

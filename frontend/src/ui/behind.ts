@@ -16,6 +16,7 @@ export { startRemembered } from '../store/remembered';
 export { TimeBar } from '../timebar/TimeBar';
 export { AlarmPanel } from './alarms/AlarmPanel';
 export { Meanwhile } from './alarms/Meanwhile';
+export { startPeople } from './alarms/people';
 export { AttentionList } from './AttentionList';
 export { CompareControl } from './CompareControl';
 export { DifferenceLegend } from './DifferenceLegend';

@@ -149,7 +149,10 @@ def test_an_allowed_page_may_ask_before_it_sends_a_token(open_bridge: Served) ->
 
 
 def test_an_allowed_page_cannot_write_either(open_bridge: Served) -> None:
-    assert open_bridge.get("/api/state", {"Origin": PANEL}, method="POST").status_code == 405
+    for path in ("/api/state", "/api/notes", "/api/signin"):
+        answer = open_bridge.post(path, {"Origin": PANEL})
+        assert answer.status_code == 403
+        assert "may read here, and no more" in refusal_of(answer)
 
 
 def test_a_picture_in_a_foreign_page_is_not_even_computed(open_bridge: Served) -> None:

@@ -12,8 +12,11 @@ from pathlib import Path
 import psycopg
 import pytest
 
+from lupin_bridge.fleet.site_log import SiteConnection
+from lupin_twin.core.notes import NotesRequest
 from lupin_twin.core.past import SeriesRequest
 from lupin_twin.journal.beside import mark_of
+from lupin_twin.journal.notes import notes
 from lupin_twin.journal.queries import series
 from lupin_twin.journal.rebuild import vacuum
 from lupin_twin.journal.retention import Limits, forget
@@ -263,6 +266,11 @@ def test_notes_and_what_they_say_anew(archive: Archive, journal: Path) -> None:
         forward_once(archive, journal)
         assert archive.rows() == rows_of(journal)
     assert archive.rows()["note"] == [("n1", 1, "anna", "comment", "tag:7", "watered", 5)]
+    with closing(open_reader(journal)) as here, psycopg.connect(archive.owner) as there:
+        there.autocommit = True
+        found = notes(SiteConnection(there, "gh1"), NotesRequest())
+        assert found.notes == notes(here, NotesRequest()).notes
+        assert notes(SiteConnection(there, "gh2"), NotesRequest()).notes == ()
 
 
 def test_what_is_received_is_in_the_archive_soon(archive: Archive, journal: Path) -> None:

@@ -275,9 +275,11 @@ def test_no_other_page_signs_anybody_out(
 
 def test_a_page_is_told_whether_it_can_sign_out(closed: Served) -> None:
     told = closed.get("/api/session", session(closed)).json()
+    assert (told["name"], told["role"], told["can_write_notes"]) == (None, "viewer", False)
     assert told["can_sign_out"]
     assert SESSION_S - 600 < told["seconds_left"] <= SESSION_S
-    program = {"can_sign_out": False, "seconds_left": None}
+    nobody = {"name": None, "role": "viewer", "can_write_notes": False}
+    program = {"can_sign_out": False, "seconds_left": None, **nobody}
     assert closed.get("/api/session", BEARER).json() == program
     assert closed.get("/api/session").status_code == 401
     with served() as live:

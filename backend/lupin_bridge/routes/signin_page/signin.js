@@ -1,7 +1,8 @@
-// Trades the token for a session cookie. The token travels in a header and is kept nowhere.
+// Trades a token, or a name and its password, for a session cookie. Neither is kept anywhere.
 
 const form = document.querySelector('form');
-const input = document.querySelector('input');
+const person = document.querySelector('#name');
+const input = document.querySelector('#token');
 const button = document.querySelector('button');
 const message = document.querySelector('#message');
 
@@ -17,19 +18,30 @@ const reasonOf = async (response) => {
   return body.detail ?? words.refused.replace('%', response.status);
 };
 
+/** By a name and a password; without a name it is a token. */
+const requestOf = (name, secret) =>
+  name
+    ? {
+        headers: { 'Content-Type': 'application/json', 'X-Lupin-Twin': '1' },
+        body: JSON.stringify({ name, password: secret }),
+      }
+    : { headers: { Authorization: `Bearer ${secret}`, 'X-Lupin-Twin': '1' } };
+
 const signIn = async () => {
-  const token = input.value.trim();
-  if (!/^[\w.~+/-]+=*$/.test(token)) {
+  const name = person.value.trim();
+  const secret = name ? input.value : input.value.trim();
+  if (!name && !/^[\w.~+/-]+=*$/.test(secret)) {
     return words.odd;
   }
-  const headers = { Authorization: `Bearer ${token}`, 'X-Lupin-Twin': '1' };
-  const response = await fetch('api/signin', { method: 'POST', headers });
+  const response = await fetch('api/signin', { method: 'POST', ...requestOf(name, secret) });
   if (response.ok) {
     enter();
     return '';
   }
   return response.status === 401 ? words.wrong : reasonOf(response);
 };
+
+(person.hidden ? input : person).focus();
 
 form.addEventListener('submit', (event) => {
   event.preventDefault();

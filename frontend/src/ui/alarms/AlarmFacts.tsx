@@ -16,6 +16,7 @@ import { S } from '../../strings';
 import { useTicking } from '../../widgets/useNow';
 import { HealthMark } from '../HealthMark';
 import { ARROWS } from '../TrendLine';
+import { WhoAcknowledged } from './WhoseWord';
 
 interface ValuesNow extends Values {
   readonly state: Now | null;
@@ -65,6 +66,7 @@ export function AlarmFacts({
           {S.alarmShelved(clockText(shelf.until), shelf.reason)}
         </span>
       )}
+      <WhoAcknowledged alarm={alarm} />
     </>
   );
 }

@@ -31,6 +31,7 @@ import { ALARMS_ID, ListChoice } from './ListChoice';
 import { once } from './once';
 import { TellMe } from './TellMe';
 import { useHeldOrder } from './useHeldOrder';
+import { WhoseWord } from './WhoseWord';
 
 /** Rows of one block at first, and so many more with each wish for more. */
 const MOST_ROWS = 100;
@@ -138,7 +139,7 @@ export function AlarmPanel(): JSX.Element {
               </section>
             ),
         )}
-        {hasAny && <p className="alarms-mine faint">{S.alarmsMine}</p>}
+        {hasAny && <WhoseWord />}
       </div>
     </>
   );

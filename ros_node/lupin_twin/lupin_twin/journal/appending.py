@@ -19,6 +19,7 @@ from typing import Final, NamedTuple
 from lupin_twin.core.state import Flower
 from lupin_twin.journal.beside import Lock
 from lupin_twin.journal.hours import WrittenInspection, WrittenScan, count
+from lupin_twin.journal.notes import last_number
 from lupin_twin.journal.rows import (
     KIND_FLOWER,
     InspectionRow,
@@ -92,6 +93,7 @@ class Appender:
         self.last_seq = max(
             int(get_meta(connection, PURGED_SEQ) or 0),
             int(get_meta(connection, LAST_SEQ) or 0),
+            last_number(connection),
             *(connection.execute(text).fetchone()[0] for text in newest),
             *(row[0] - 1 for row in connection.execute("SELECT begun_seq FROM run")),
         )

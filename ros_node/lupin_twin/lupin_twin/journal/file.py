@@ -11,10 +11,12 @@ from itertools import groupby
 from pathlib import Path
 from typing import Final
 
+from lupin_twin.core.notes import Note
 from lupin_twin.journal.appending import Appender, Stretch, copy_known, simulated
 from lupin_twin.journal.beside import Syncing, forwarded_seq
 from lupin_twin.journal.checking import find_damage
 from lupin_twin.journal.fold import Restored, copies, fold
+from lupin_twin.journal.notes import put_note
 from lupin_twin.journal.retention import (
     Limits,
     Stretches,
@@ -314,6 +316,17 @@ class JournalFile:
         if self._kept and any(row.stamp_ns < self._kept[0][0] for _, row in rows):
             self._kept = None
         return written
+
+    def put_note(self, note: Note) -> Note:
+        """Write what somebody said; returns it with its id.
+
+        Raises:
+            sqlite3.Error, OSError: it was not written.
+
+        """
+        with self._transaction():
+            self._appender.last_seq += 1
+            return put_note(self._connection, self._appender.last_seq, note)
 
     def note_lost(self, run: Run, at_ns: int) -> None:
         """Have it in the file that some of what was received up to a moment never came here."""

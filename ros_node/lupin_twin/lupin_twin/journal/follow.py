@@ -31,6 +31,7 @@ from lupin_twin.core.writes import (
 from lupin_twin.journal.appending import PURGED_SEQ
 from lupin_twin.journal.checking import WRITTEN
 from lupin_twin.journal.hours import count_rows
+from lupin_twin.journal.notes import id_behind, number_of
 from lupin_twin.journal.retention import Stretches, kept
 from lupin_twin.journal.rows import KIND_FLOWER, STATUS_OK, numbers_of, sensor_names
 from lupin_twin.journal.runs import runs, span_at, spans
@@ -48,11 +49,13 @@ from lupin_twin.journal.schema import (
 MAX_ROWS: Final = 2_000
 _MAX_BYTES: Final = 1_000_000
 # In the order in which rows of one number belong.
-_NUMBERED: Final = ("series", "scan", "look", "place")
+_NUMBERED: Final = ("series", "scan", "look", "place", "note")
 _FACTS: Final = ("purged_ns:", "lost_ns:", PURGED_SEQ, "simulated_")
 _FOLLOWED: Final = "followed_seq"
 _COMPLETE: Final = "followed_to_ns"
-_COLUMNS: Final = {"run": 7, "meta": 2, "series": 5, "scan": 11, "look": 16, "place": 13}
+_COLUMNS: Final = {
+    "run": 7, "meta": 2, "series": 5, "scan": 11, "look": 16, "place": 13, "note": 7,
+}  # fmt: skip
 
 
 class Lot(NamedTuple):
@@ -88,7 +91,7 @@ def read(connection: sqlite3.Connection, after: int, most: int = MAX_ROWS) -> Lo
         texts = [_text("run", row) for row in _all(log, "run")]
         texts += [_text("meta", row) for row in _all(log, "meta") if row[1].startswith(_FACTS)]
         found = [
-            (row[1], rank, row)
+            (number_of(row[1]) if table == "note" else row[1], rank, row)
             for rank, table in enumerate(_NUMBERED)
             for row in _behind(log, table, after, most)
         ]
@@ -175,12 +178,12 @@ def _all(log: SiteLog, table: str) -> list[tuple[Any, ...]]:
 
 
 def _behind(log: SiteLog, table: str, after: int, most: int) -> list[tuple[Any, ...]]:
-    number = "series" if table == "series" else "seq"
+    number = {"series": "series", "note": "id"}.get(table, "seq")
     return list(
         log.execute(
             f"SELECT * FROM {table} WHERE site = :site AND {number} > :after"
             f" ORDER BY {number} LIMIT :most",
-            {"after": after, "most": most + 1},
+            {"after": id_behind(after) if table == "note" else after, "most": most + 1},
         ).fetchall()
     )
 

@@ -5,12 +5,13 @@ Times are ns: stamps ROS time, arrivals wall time.
 
 `seq` is one sequence over scan, look and place, in the order in which things were received; the
 number of a series is the seq of its first write. Inspections have one too, of kind 1 without
-sensors. A failed attempt is a scan with another status than 0, a failed inspection of flowers one
-of that series. `own_stamp_ns` is the stamp that was sent, where that could not be true (from the
-future; 0: none), NULL where it is `stamp_ns`, and -1 in a copy that is known by no stamp. A copy
-(`is_copy`) is what was known as a run or a step began; `begun_seq` is its first. A step is a row of
-`run` that `joins` another: the same run, whose clock was set a little. Rows refer to the run, never
-to the step. `ended_stamp_ns` is NULL in the run that goes on, and in a step.
+sensors; the id of a note begins with its own. A failed attempt is a scan with another status than
+0, a failed inspection of flowers one of that series. `own_stamp_ns` is the stamp that was sent,
+where that could not be true (from the future; 0: none), NULL where it is `stamp_ns`, and -1 in a
+copy that is known by no stamp. A copy (`is_copy`) is what was known as a run or a step began;
+`begun_seq` is its first. A step is a row of `run` that `joins` another: the same run, whose clock
+was set a little. Rows refer to the run, never to the step. `ended_stamp_ns` is NULL in the run that
+goes on, and in a step.
 
 What follows from the rows is written with them, copies left out, and outlives them (see `hours`).
 `hour` has the finite readings of each sensor, in the order of `sensors`, as JSON lists: how many,

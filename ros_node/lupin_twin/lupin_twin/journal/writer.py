@@ -13,6 +13,7 @@ import threading
 import time
 from collections import deque
 from collections.abc import Sequence
+from concurrent.futures import Future
 from dataclasses import replace
 from itertools import islice
 from pathlib import Path
@@ -20,10 +21,12 @@ from typing import Final, NamedTuple
 
 from lupin_twin.core.diagnostics import Origin
 from lupin_twin.core.journal_condition import Condition, JournalState
+from lupin_twin.core.notes import Note
 from lupin_twin.journal.appending import Stretch
 from lupin_twin.journal.beside import InUse, Lock
 from lupin_twin.journal.file import JournalFile
 from lupin_twin.journal.fold import Restored
+from lupin_twin.journal.notes import NoteQueue
 from lupin_twin.journal.rebuild import is_version3, upgrade
 from lupin_twin.journal.retention import Limits, Stretches
 from lupin_twin.journal.rows import Row, weight
@@ -130,7 +133,6 @@ _IDLE_S: Final = 1.0
 # Readers have a file quarantined no oftener: were it their fault, copies would fill the disk.
 _HEAL_EVERY_S: Final = 86_400.0
 
-
 _WELL: Final = (JournalState.RECORDING, JournalState.OFF)
 _HEALED_IN: Final = (*_WELL, JournalState.FAILING)
 
@@ -170,6 +172,7 @@ class Journal:
         self._limits = limits
         self._is_temporary = is_temporary
         self._pending = Pending(max_weight)
+        self._notes = NoteQueue()
         self._eras: list[_Era] = []
         self._stop = threading.Event()
         self._was_tried = threading.Event()
@@ -219,6 +222,14 @@ class Journal:
         """
         at_ns = row.stamp_ns if at_ns is None else at_ns
         self._pending.put(Entry(len(self._eras), row, time.monotonic(), at_ns))
+
+    def write_note(self, note: Note) -> Future[Note]:
+        """Hand a note over; the future has it with its id, or `NotesUnwritable`, soon."""
+        written = self._notes.put(note)
+        self._pending.arrived.set()
+        if self._stop.is_set() or self._reported.state not in (*_WELL, JournalState.STARTING):
+            self._notes.refuse(self._reported.detail)
+        return written
 
     def take_restored(self, wait_s: float = 0.0) -> Restored | None:
         """What was known before, once; None if that is not there (yet).
@@ -278,6 +289,7 @@ class Journal:
                 break
             except Exception as error:  # noqa: BLE001  # the twin goes on, whatever it is
                 self._report_failure(error)
+                self._notes.refuse(self._reported.detail)
                 self._was_tried.set()
                 if says_damaged(error):
                     self._is_sound = False
@@ -311,6 +323,7 @@ class Journal:
                 self._see_damage()
                 self._catch_up(file)
                 self._write(file, all_that_waits=is_last)
+                self._notes.write(file.put_note)
                 has_more = not is_last and file.look_after(may_purge=bool(self._runs))
                 self._kept = file.kept()
                 self._holds_older = file.holds_older

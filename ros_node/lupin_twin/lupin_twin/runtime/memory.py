@@ -14,6 +14,7 @@ import tempfile
 import time
 from collections import deque
 from collections.abc import Callable, Mapping
+from concurrent.futures import Future
 from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
@@ -25,6 +26,7 @@ from lupin_twin.core.drops import MAX_TEXT_LENGTH, Drop
 from lupin_twin.core.history import KIND_FLOWER, KIND_TAG_READING, History
 from lupin_twin.core.ingest import Pin
 from lupin_twin.core.journal_condition import Condition
+from lupin_twin.core.notes import Note
 from lupin_twin.core.state import Inspection, Scan, TwinStore
 from lupin_twin.journal.fold import Restored
 from lupin_twin.journal.retention import Limits
@@ -194,6 +196,10 @@ class Memory:
             return condition
         last_ns = self._doubt.last_ns
         return replace(condition, waiting=len(early), lost=self._lost, complete_ns=last_ns)
+
+    def write_note(self, note: Note) -> Future[Note]:
+        """Have it in the journal; see there."""
+        return self._journal.write_note(note)
 
     def heal(self, damage: str) -> None:
         """Have a journal in which somebody has met damage set aside; from any thread."""

@@ -1,0 +1,359 @@
+"""The file of accounts, tokens, sessions and the audit trail: SQLite, apart from every journal.
+
+Nothing of it is exported, followed or forwarded. A password is kept as its argon2id hash (RFC 9106,
+by argon2-cffi), a token and a session's cookie as SHA-256: they are 256 random bits, so nothing
+slower is needed, and finding one by its hash takes no time that tells anything of it.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import secrets
+import sqlite3
+from collections.abc import Iterator
+from contextlib import closing, contextmanager
+from dataclasses import dataclass
+from hashlib import sha256
+from pathlib import Path
+from typing import Final, Literal, NamedTuple
+from urllib.parse import quote
+
+from lupin_bridge.settings import Settings, one_of
+from lupin_twin.runtime.memory import state_folder
+
+Role = Literal["viewer", "operator", "admin"]
+# What each may, the ones before it may too.
+ROLES: Final[tuple[Role, ...]] = ("viewer", "operator", "admin")
+Kind = Literal["account", "token"]
+
+# A shift: whoever takes over a control room's screen signs in by a name of their own.
+SESSION_S: Final = 12 * 3600
+_MAX_SESSIONS: Final = 20
+_MAX_AUDITED: Final = 100_000
+MIN_PASSWORD: Final = 10
+MAX_PASSWORD: Final = 512
+
+_VERSION: Final = 1
+_APPLICATION_ID: Final = 0x4C555041  # "LUPA"
+_TABLES: Final = """
+BEGIN;
+CREATE TABLE meta (key TEXT PRIMARY KEY, value TEXT NOT NULL) STRICT;
+CREATE TABLE person (
+    name TEXT PRIMARY KEY, kind TEXT NOT NULL, role TEXT NOT NULL, secret TEXT NOT NULL,
+    made_at_s INTEGER NOT NULL
+) STRICT;
+CREATE UNIQUE INDEX person_of ON person (secret) WHERE kind = 'token';
+CREATE TABLE session (
+    id TEXT PRIMARY KEY, name TEXT NOT NULL REFERENCES person ON DELETE CASCADE,
+    ends_at_s INTEGER NOT NULL
+) STRICT;
+CREATE INDEX session_of ON session (name);
+CREATE TABLE audit (
+    number INTEGER PRIMARY KEY AUTOINCREMENT, at_s INTEGER NOT NULL, who TEXT NOT NULL,
+    what TEXT NOT NULL, subject TEXT NOT NULL, address TEXT NOT NULL
+) STRICT;
+INSERT INTO meta VALUES ('id', lower(hex(randomblob(8))));
+"""
+_NAME: Final = re.compile(r"[A-Za-z0-9][A-Za-z0-9._@+-]{0,63}")
+_OF_SESSION: Final = (
+    "SELECT person.name, role, ends_at_s FROM session JOIN person USING (name)"
+    " WHERE id = ? AND ends_at_s > ?"
+)
+
+
+class AccountError(Exception):
+    """It cannot be done; the message is the one line that says why."""
+
+
+@dataclass(frozen=True, slots=True)
+class Person:
+    """Who makes a request, what they may, and how that is known.
+
+    `session` is its id in the file; `ends_at_s` when it ends, s since the epoch.
+    """
+
+    name: str
+    role: Role
+    by: Literal["account", "token", "proxy"] = "account"
+    session: str = ""
+    ends_at_s: int = 0
+
+    def may(self, role: Role) -> bool:
+        """Whether that role's rights are among theirs."""
+        return ROLES.index(self.role) >= ROLES.index(role)
+
+
+class Listed(NamedTuple):
+    """An account or a token as it is listed."""
+
+    name: str
+    role: str
+    made_at_s: int
+
+
+class Audited(NamedTuple):
+    """Who did what to what, from where, and when: s since the epoch."""
+
+    at_s: int
+    who: str
+    what: str
+    subject: str
+    address: str
+
+
+def accounts_path(settings: Settings) -> Path:
+    """The file, be it there or not."""
+    if settings.accounts:
+        return Path(settings.accounts).expanduser().absolute()
+    try:
+        return state_folder(os.environ) / "accounts.sqlite"
+    except RuntimeError:  # no home, so there never is one
+        return Path(os.devnull) / "accounts.sqlite"
+
+
+def is_name(text: str) -> bool:
+    """Whether it can be the name of a person or token."""
+    return _NAME.fullmatch(text) is not None
+
+
+def check_name(name: str) -> None:
+    """Refuse what can be no name.
+
+    Raises:
+        AccountError: it cannot.
+
+    """
+    if not is_name(name):
+        raise AccountError(
+            f"the name is {name[:80]!r}, must be 1 to 64 letters, digits and ._@+-, and begin with "
+            "a letter or digit"
+        )
+
+
+def check_password(password: str) -> None:
+    """Refuse what is too short or too long.
+
+    Raises:
+        AccountError: it is.
+
+    """
+    if not MIN_PASSWORD <= len(password) <= MAX_PASSWORD:
+        raise AccountError(
+            f"the password has {len(password)} characters, must have {MIN_PASSWORD} to "
+            f"{MAX_PASSWORD}"
+        )
+
+
+def make_file(path: Path) -> None:
+    """Have the file there, for its owner alone.
+
+    Raises:
+        AccountError: it cannot be made, or is something else.
+
+    """
+    try:
+        path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
+        os.close(os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o600))
+        with closing(sqlite3.connect(path, isolation_level=None)) as connection:
+            if connection.execute("PRAGMA page_count").fetchone() == (0,):
+                connection.execute("PRAGMA journal_mode = WAL")
+                connection.executescript(
+                    f"{_TABLES} PRAGMA user_version = {_VERSION};"
+                    f" PRAGMA application_id = {_APPLICATION_ID}; COMMIT;"
+                )
+    except (OSError, sqlite3.Error) as error:
+        raise AccountError(f"the file of accounts {path} cannot be made: {error}") from error
+
+
+class Accounts:
+    """The open file, in one thread; `is_writer` may change it.
+
+    Raises:
+        AccountError: it is not there, cannot be read, or is something else.
+
+    """
+
+    def __init__(self, path: Path, *, is_writer: bool = False) -> None:
+        # A reader too is opened for writing: it may be the first, and the log needs its index.
+        try:
+            self._connection = sqlite3.connect(
+                f"file:{quote(os.fsencode(path))}?mode=rw", uri=True, isolation_level=None
+            )
+        except sqlite3.Error as error:
+            raise AccountError(f"the file of accounts {path} cannot be opened: {error}") from error
+        try:
+            execute = self._connection.execute
+            self._check_identity(path)
+            execute("PRAGMA foreign_keys = ON")
+            execute("PRAGMA synchronous = FULL")
+            execute("PRAGMA secure_delete = ON")
+            execute(f"PRAGMA query_only = {int(not is_writer)}")
+            (self.id,) = execute("SELECT value FROM meta WHERE key = 'id'").fetchone()
+        except sqlite3.Error as error:
+            self._connection.close()
+            raise AccountError(f"the file of accounts cannot be read: {error}") from error
+        except AccountError:
+            self._connection.close()
+            raise
+
+    def _check_identity(self, path: Path) -> None:
+        execute = self._connection.execute
+        if execute("PRAGMA application_id").fetchone() != (_APPLICATION_ID,):
+            raise AccountError(f"{path} is no file of accounts")
+        (version,) = execute("PRAGMA user_version").fetchone()
+        if version != _VERSION:
+            raise AccountError(f"{path} is of version {version}, this is {_VERSION}")
+
+    def close(self) -> None:
+        """Let go of it."""
+        self._connection.close()
+
+    @contextmanager
+    def _writing(self) -> Iterator[sqlite3.Connection]:
+        """All or nothing; what the disk says is said."""
+        connection = self._connection
+        try:
+            connection.execute("BEGIN IMMEDIATE")
+            try:
+                yield connection
+                connection.execute("COMMIT")
+            except BaseException:
+                if connection.in_transaction:
+                    connection.execute("ROLLBACK")
+                raise
+        except sqlite3.Error as error:
+            raise AccountError(f"the file of accounts cannot be written: {error}") from error
+
+    # --- accounts and tokens ------------------------------------------------------------------
+
+    def add(self, name: str, kind: Kind, role: Role, secret: str, *, by: str, now_s: int) -> None:
+        """Add an account (`secret`: its password's hash, "": it signs in elsewhere) or a token.
+
+        Raises:
+            AccountError: there is one of that name, or it cannot be written.
+
+        """
+        check_name(name)
+        if role not in ROLES:
+            raise AccountError(f"the role is {role[:64]!r}, expected {one_of(ROLES)}")
+        with self._writing() as connection:
+            found = connection.execute("SELECT kind FROM person WHERE name = ?", (name,)).fetchone()
+            if found is not None:
+                raise AccountError(f"there is {found[0]} {name!r} already: remove it first")
+            row = (name, kind, role, secret, now_s)
+            connection.execute("INSERT INTO person VALUES (?, ?, ?, ?, ?)", row)
+            _audit(connection, Audited(now_s, by, f"add {kind}", f"{name} {role}", ""))
+
+    def remove(self, name: str, kind: Kind, *, by: str, now_s: int) -> None:
+        """Remove an account or a token, and end its sessions.
+
+        Raises:
+            AccountError: there is none, or it cannot be written.
+
+        """
+        with self._writing() as connection:
+            gone = connection.execute(
+                "DELETE FROM person WHERE name = ? AND kind = ?", (name, kind)
+            ).rowcount
+            if not gone:
+                raise AccountError(f"there is no {kind} {name[:64]!r}")
+            _audit(connection, Audited(now_s, by, f"remove {kind}", name, ""))
+
+    def listed(self, kind: Kind) -> list[Listed]:
+        """All accounts or tokens, by name."""
+        found = self._connection.execute(
+            "SELECT name, role, made_at_s FROM person WHERE kind = ? ORDER BY name", (kind,)
+        )
+        return [Listed(*row) for row in found]
+
+    # --- who is it ----------------------------------------------------------------------------
+
+    def of_name(self, name: str) -> tuple[Person, str] | None:
+        """An account and its password's hash."""
+        found = self._connection.execute(
+            "SELECT role, secret FROM person WHERE name = ? AND kind = 'account'", (name,)
+        ).fetchone()
+        return None if found is None else (Person(name, found[0]), found[1])
+
+    def of_token(self, secret: str) -> Person | None:
+        """Whose token it is, by its digest."""
+        found = self._connection.execute(
+            "SELECT name, role FROM person WHERE secret = ? AND kind = 'token'", (secret,)
+        ).fetchone()
+        return None if found is None else Person(found[0], found[1], by="token")
+
+    def has_token(self, person: Person) -> bool:
+        """Whether a token of that name and role is still there."""
+        return any(it[:2] == (person.name, person.role) for it in self.listed("token"))
+
+    def of_session(self, session: str, now_s: float) -> Person | None:
+        """Whose session it is, by its id in the file; None: it has ended."""
+        found = self._connection.execute(_OF_SESSION, (session, int(now_s))).fetchone()
+        if found is None:
+            return None
+        return Person(found[0], found[1], session=session, ends_at_s=found[2])
+
+    # --- sessions, and what was done ----------------------------------------------------------
+
+    def begin_session(self, name: str, address: str, now_s: int) -> str:
+        """A new session of an account or token, as its cookie has it.
+
+        Raises:
+            AccountError: it has gone meanwhile, or nothing can be written.
+
+        """
+        cookie = secrets.token_urlsafe(32)
+        with self._writing() as connection:
+            connection.execute("DELETE FROM session WHERE ends_at_s <= ?", (now_s,))
+            # Of one whose password many know, the oldest ends.
+            connection.execute(
+                "DELETE FROM session WHERE id IN (SELECT id FROM session WHERE name = ?"
+                " ORDER BY ends_at_s DESC LIMIT -1 OFFSET ?)",
+                (name, _MAX_SESSIONS - 1),
+            )
+            row = (digest(cookie), name, now_s + SESSION_S)
+            connection.execute("INSERT INTO session VALUES (?, ?, ?)", row)
+            _audit(connection, Audited(now_s, name, "sign in", "", address))
+        return cookie
+
+    def end_session(self, person: Person, address: str, now_s: int) -> None:
+        """End it.
+
+        Raises:
+            AccountError: it cannot be written.
+
+        """
+        with self._writing() as connection:
+            connection.execute("DELETE FROM session WHERE id = ?", (person.session,))
+            _audit(connection, Audited(now_s, person.name, "sign out", "", address))
+
+    def note(self, done: Audited) -> None:
+        """Have it in the audit trail.
+
+        Raises:
+            AccountError: it cannot be written.
+
+        """
+        with self._writing() as connection:
+            _audit(connection, done)
+
+    def audited(self, most: int = -1) -> list[Audited]:
+        """The audit trail, newest first."""
+        found = self._connection.execute(
+            "SELECT at_s, who, what, subject, address FROM audit ORDER BY number DESC LIMIT ?",
+            (most,),
+        )
+        return [Audited(*row) for row in found]
+
+
+def digest(secret: str) -> str:
+    """As which a token or a session's cookie is kept."""
+    return sha256(secret.encode()).hexdigest()
+
+
+def _audit(connection: sqlite3.Connection, done: Audited) -> None:
+    connection.execute("INSERT INTO audit VALUES (NULL, ?, ?, ?, ?, ?)", done)
+    connection.execute(
+        "DELETE FROM audit WHERE number <= (SELECT max(number) FROM audit) - ?", (_MAX_AUDITED,)
+    )

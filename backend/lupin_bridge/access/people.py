@@ -1,0 +1,270 @@
+"""Who makes a request, by the file of accounts. Belongs to the event loop.
+
+What reads the file does so at once, some 20 µs. What writes it, or reckons a password, does so on
+one thread: argon2 takes 64 MB and a tenth of a second on purpose, so one at a time, and few wait.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import math
+import secrets
+import sqlite3
+import time
+from collections.abc import Callable, Iterable
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import closing
+from pathlib import Path
+from typing import Any, Final, TypeVar
+
+from lupin_bridge.access.accounts import (
+    MAX_PASSWORD,
+    AccountError,
+    Accounts,
+    Audited,
+    Person,
+    digest,
+    is_name,
+)
+from lupin_bridge.rate_limit import RateLimit
+from lupin_bridge.serving.admission import AdmissionError
+
+log = logging.getLogger(__name__)
+
+ResultT = TypeVar("ResultT")
+
+# Passwords and writes that wait for the thread.
+MAX_WAITING: Final = 8
+
+
+# Sign-ins that an address may try in vain at once, and a minute from then on.
+TRY_BURST: Final = 10
+TRIES_PER_MINUTE: Final = 10
+
+
+class PeopleBusy(AdmissionError):
+    """Too many sign-ins wait already, or one client tries too many."""
+
+
+class People:
+    """`path` is the file of accounts; until it is there nobody has one. Once it was, it must be.
+
+    `user_header` is the header in which a trusted proxy names the person ("": none does).
+    """
+
+    def __init__(self, path: Path, user_header: str = "") -> None:
+        self._path = path
+        self.user_header = user_header
+        self._accounts: Accounts | None = None
+        self._inode = 0
+        self._thread = ThreadPoolExecutor(1, thread_name_prefix="accounts")
+        self._waiting = 0
+        self._tries = RateLimit(TRIES_PER_MINUTE / 60.0, TRY_BURST)
+
+    @property
+    def is_on(self) -> bool:
+        """Whether whoever reads has to say who they are."""
+        return bool(self._accounts or self.user_header or self._path.exists())
+
+    @property
+    def has_file(self) -> bool:
+        """Whether anybody can sign in here."""
+        return self._accounts is not None or self._path.exists()
+
+    def cookie_name(self) -> str:
+        """Browsers keep one jar for all ports of a host, so each file has a cookie of its own.
+
+        Raises:
+            AccountError: the file cannot be read.
+
+        """
+        return f"lupin_person_{self._file().id[:8]}"
+
+    def by_cookies(self, cookies: Iterable[str]) -> Person | None:
+        """Whose session one of the cookies is.
+
+        Raises:
+            AccountError: the file cannot be read.
+
+        """
+        names, now_s = [digest(cookie) for cookie in cookies], time.time()
+
+        def find(accounts: Accounts) -> Person | None:
+            found = (accounts.of_session(name, now_s) for name in names)
+            return next((person for person in found if person is not None), None)
+
+        return self._ask(find)
+
+    def by_token(self, token: str) -> Person | None:
+        """Whose token it is.
+
+        Raises:
+            AccountError: the file cannot be read.
+
+        """
+        return self._ask(lambda it: it.of_token(digest(token))) if self.has_file else None
+
+    def by_proxy(self, name: str) -> Person | None:
+        """Whom a trusted proxy names; without an account of that name they only read.
+
+        Raises:
+            AccountError: the file cannot be read.
+
+        """
+        if not is_name(name):
+            return None
+        found = self._ask(lambda it: it.of_name(name)) if self.has_file else None
+        return Person(name, "viewer" if found is None else found[0].role, by="proxy")
+
+    def still(self, person: Person) -> bool:
+        """Whether a session or token is what it was as its connection began.
+
+        Raises:
+            AccountError: the file cannot be read.
+
+        """
+        if person.by == "proxy":
+            return self.by_proxy(person.name) == person
+        if person.session:
+            return self._ask(lambda it: it.of_session(person.session, time.time())) == person
+        return self._ask(lambda it: it.has_token(person))
+
+    async def check(self, name: str, password: str, address: str) -> Person | None:
+        """Who signs in; None: there is no such account, or the password is another.
+
+        Both take the same time.
+
+        Raises:
+            PeopleBusy: too many wait, or too many were wrong from that address.
+            AccountError: the file cannot be read.
+
+        """
+        # Many at once are no more than the few that wait for the thread.
+        wait_s = self._tries.wait_s(address, time.monotonic())
+        if wait_s > 0.0:
+            raise PeopleBusy(
+                f"{address} has tried to sign in in vain more than {TRY_BURST} times and "
+                f"{TRIES_PER_MINUTE} a minute: try again in {math.ceil(wait_s)} s",
+                wait_s,
+            )
+        person = await self._check(name, password)
+        if person is None:
+            self._tries.take(address, time.monotonic())
+            log.warning("a sign-in as %r from %s was refused", name[:64], address)
+        return person
+
+    async def _check(self, name: str, password: str) -> Person | None:
+        if not is_name(name) or len(password) > MAX_PASSWORD:
+            return None
+        known = self._ask(lambda it: it.of_name(name))
+        is_right = await self._on_thread(lambda: verify(known[1] if known else "", password))
+        return known[0] if known is not None and is_right else None
+
+    async def sign_in(self, name: str, address: str) -> str:
+        """Begin a session; returns its cookie.
+
+        Raises:
+            PeopleBusy, AccountError: see `write`.
+
+        """
+        return await self.write(lambda it, now_s: it.begin_session(name, address, now_s))
+
+    async def sign_out(self, person: Person, address: str) -> None:
+        """End the session that a request came with.
+
+        Raises:
+            PeopleBusy, AccountError: see `write`.
+
+        """
+        await self.write(lambda it, now_s: it.end_session(person, address, now_s))
+
+    async def note(self, who: str, what: str, subject: str, address: str) -> None:
+        """Have it in the audit trail.
+
+        Raises:
+            PeopleBusy, AccountError: see `write`.
+
+        """
+        await self.write(lambda it, now_s: it.note(Audited(now_s, who, what, subject, address)))
+
+    async def audited(self, most: int) -> list[Audited]:
+        """The newest of the audit trail.
+
+        Raises:
+            PeopleBusy, AccountError: see `write`.
+
+        """
+        return await self.write(lambda it, _: it.audited(most))
+
+    async def write(self, work: Callable[[Accounts, int], ResultT]) -> ResultT:
+        """What `work(accounts, now_s)` gives, on the thread.
+
+        Raises:
+            PeopleBusy: too many wait.
+            AccountError: the file cannot be read or written.
+
+        """
+
+        def do() -> ResultT:
+            with closing(Accounts(self._path, is_writer=True)) as accounts:
+                return work(accounts, int(time.time()))
+
+        return await self._on_thread(do)
+
+    async def _on_thread(self, work: Callable[[], ResultT]) -> ResultT:
+        if self._waiting >= MAX_WAITING:
+            raise PeopleBusy(f"{MAX_WAITING} sign-ins wait already: try again in a moment", 2.0)
+        self._waiting += 1
+        doing = self._thread.submit(work)
+        # Not when the client has left: until the thread is free again.
+        waiting = asyncio.wrap_future(doing)
+        waiting.add_done_callback(self._done)
+        return await asyncio.shield(waiting)
+
+    def _done(self, doing: asyncio.Future[Any]) -> None:
+        self._waiting -= 1
+        if not doing.cancelled():
+            doing.exception()  # of a client that has left nobody looks at it
+
+    def _ask(self, work: Callable[[Accounts], ResultT]) -> ResultT:
+        try:
+            return work(self._file())
+        except sqlite3.Error as error:
+            raise AccountError(f"the file of accounts cannot be read: {error}") from error
+
+    def _file(self) -> Accounts:
+        try:
+            inode = self._path.stat().st_ino
+        except OSError as error:
+            raise AccountError(f"the file of accounts {self._path}: {error.strerror}") from error
+        if self._accounts is None or inode != self._inode:
+            found = Accounts(self._path)
+            if self._accounts is not None:
+                self._accounts.close()
+            self._accounts, self._inode = found, inode
+        return self._accounts
+
+
+def hashed(password: str) -> str:
+    """A password as it is kept."""
+    from argon2 import PasswordHasher  # noqa: PLC0415  # few ever sign in
+
+    return PasswordHasher().hash(password)
+
+
+_nobodys: list[str] = []
+
+
+def verify(kept: str, password: str) -> bool:
+    """Whether it is the password; of an account without one it never is, in the same time."""
+    from argon2 import PasswordHasher  # noqa: PLC0415  # as above
+    from argon2.exceptions import InvalidHashError, VerificationError  # noqa: PLC0415
+
+    if not _nobodys:
+        _nobodys.append(hashed(secrets.token_hex()))
+    try:
+        PasswordHasher().verify(kept or _nobodys[0], password)
+    except (VerificationError, InvalidHashError):
+        return False
+    return bool(kept)

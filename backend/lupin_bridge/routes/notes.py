@@ -1,0 +1,290 @@
+"""What people say of alarms, tags and the greenhouse: written, withdrawn, read; and the audit."""
+
+from __future__ import annotations
+
+import logging
+import time
+from collections.abc import Mapping
+from contextlib import suppress
+from typing import Any, Final
+
+import orjson
+from fastapi import APIRouter, Request, Response
+
+from lupin_bridge.access.accounts import AccountError, Person
+from lupin_bridge.access.middleware import Access, client_of
+from lupin_bridge.alarms.notes import NOTE_BURST, NOTES_PER_MINUTE
+from lupin_bridge.bridge import Bridge
+from lupin_bridge.feed.source import ELSEWHERE, TwinUnavailableError
+from lupin_bridge.judge.verdict import Verdict
+from lupin_bridge.past import query as past_query
+from lupin_bridge.past.query import moment
+from lupin_bridge.query_string import parameters_of
+from lupin_bridge.routes.answers import (
+    NEVER_STORE,
+    NO_TWIN,
+    NOT_REMEMBERED,
+    TOO_MUCH,
+    BodyRefused,
+    bridge_of,
+    error_response,
+    json_response,
+    person_of,
+    read_body,
+    read_route,
+    respond,
+)
+from lupin_bridge.serving.admission import AdmissionError, Answer, ClientLimitError
+from lupin_bridge.stream import people_schema, schema
+from lupin_bridge.stream.state_json import stamp
+from lupin_twin.core.notes import (
+    COMMENT,
+    SHELVE,
+    WITHDRAW,
+    WITHDRAWN,
+    Note,
+    withdrawals,
+)
+from lupin_twin.core.past import NotRemembered, PastRefused
+from lupin_twin.core.state import NANOSECONDS_PER_SECOND
+
+log = logging.getLogger(__name__)
+
+router = APIRouter()
+
+MAX_LISTED: Final = 2_000
+MAX_AUDITED: Final = 2_000
+# For how long at most an alarm is shelved, a critical one and others.
+CRITICAL_SHELF_S: Final = 3_600
+SHELF_S: Final = 8 * 3_600
+# A page's clock may be so much ahead: it asks for an hour from its own now.
+_SLACK_S: Final = 10
+
+_WRITE_ANSWERS: Final[dict[int | str, dict[str, Any]]] = {
+    **{
+        code: {"model": schema.ErrorMessage, "description": what}
+        for code, what in {
+            400: "refused; detail says why",
+            403: "it takes an account with the role operator",
+            404: "there is no such alarm, tag or note",
+            405: "this bridge only reads the log",
+            503: "it was not written",
+        }.items()
+    },
+    **TOO_MUCH,
+}
+
+
+@read_route(
+    router,
+    "/api/notes",
+    summary="What people said of alarms, tags and the greenhouse",
+    responses={200: {"model": people_schema.Notes}, **NOT_REMEMBERED},
+    openapi_extra={"parameters": parameters_of(past_query.OfNotes)},
+)
+async def notes_route(request: Request) -> Response:
+    """The newest first and 2,000 at most, withdrawn ones too; the same in every replica."""
+    bridge = bridge_of(request)
+    asked = request.query_params.multi_items()
+    subject = past_query.subject(asked)
+    period = past_query.period(past_query.OfNotes, asked, bridge.ros_time_ns)
+    notes = _known(bridge)
+
+    async def compute() -> Answer:
+        gone = withdrawals(notes)
+        found = [
+            note_json(note, gone)
+            for note in reversed(notes)
+            if note.kind != WITHDRAW
+            and subject in {None, note.subject}
+            and period.start_ns <= note.made_at_ns
+            and (not period.end_ns or note.made_at_ns < period.end_ns)
+        ]
+        body = orjson.dumps({"notes": found[:MAX_LISTED]})
+        return Answer(body, "application/json", NEVER_STORE)
+
+    return await respond(request, ("notes", bridge.notes.number, period, subject), compute)
+
+
+@router.post(
+    "/api/notes",
+    summary="Acknowledge or shelve an alarm, or comment on something",
+    status_code=201,
+    response_class=Response,
+    responses={201: {"model": people_schema.Note}, **_WRITE_ANSWERS},
+    openapi_extra={
+        "requestBody": {
+            "required": True,
+            "content": {"application/json": {"schema": {"$ref": "#/components/schemas/NoteDraft"}}},
+        }
+    },
+)
+async def write_note(request: Request) -> Response:
+    """By an account with the role operator. Of two words on one alarm the later one stands."""
+    bridge = bridge_of(request)
+    person = _writer(request, bridge)
+    if isinstance(person, Response):
+        return person
+    draft = await read_body(request, people_schema.NoteDraft)
+    note = await _write(request, bridge, _checked(draft, person, bridge))
+    return json_response(orjson.dumps(note_json(note, {})), 201)
+
+
+@router.delete(
+    "/api/notes/{note_id}",
+    summary="Withdraw a note: it is kept, with who withdrew it and when",
+    response_class=Response,
+    responses={200: {"model": people_schema.Note}, **_WRITE_ANSWERS},
+)
+async def withdraw_note(request: Request, note_id: str) -> Response:
+    """By its author or an admin."""
+    bridge = bridge_of(request)
+    person = _writer(request, bridge)
+    if isinstance(person, Response):
+        return person
+    notes = _known(bridge)
+    note = next((note for note in notes if note.id == note_id), None)
+    if note is None or note.kind == WITHDRAW:
+        return error_response(f"there is no note {note_id[:64]!r}", 404)
+    if note.by != person.name and not person.may("admin"):
+        return error_response(f"the note is by {note.by}: they withdraw it, or an admin", 403)
+    gone = withdrawals(notes)
+    if note.id not in gone:
+        draft = Note("", _now_ns(bridge), person.name, WITHDRAW, f"{WITHDRAWN}{note.id}")
+        gone = {note.id: await _write(request, bridge, draft)}
+    return json_response(orjson.dumps(note_json(note, gone)))
+
+
+def note_json(note: Note, gone: Mapping[str, Note]) -> dict[str, Any]:
+    """`people_schema.Note`; `gone` as `withdrawals` has it."""
+    by = gone.get(note.id)
+    return {
+        "id": note.id,
+        "kind": note.kind,
+        "subject": note.subject,
+        "text": note.text,
+        "until": None if note.until_ns is None else stamp(note.until_ns),
+        "made_at": stamp(note.made_at_ns),
+        "by": note.by,
+        "withdrawn_by": None if by is None else by.by,
+        "withdrawn_at": None if by is None else stamp(by.made_at_ns),
+    }
+
+
+# --- who may, and what ------------------------------------------------------------------------
+
+
+def _writer(request: Request, bridge: Bridge) -> Person | Response:
+    """Who writes, or why they do not."""
+    person = person_of(request)
+    if person is None:
+        return error_response(
+            "notes are written by people: sign in with an account of the role operator "
+            "(`lupin-twin user add`)",
+            403,
+        )
+    if not person.may("operator"):
+        return error_response(f"{person.name} is a {person.role}, notes take an operator", 403)
+    if not bridge.source.writes_notes:
+        return error_response(ELSEWHERE, 405, {"Allow": "GET, HEAD", **NEVER_STORE})
+    return person
+
+
+def _known(bridge: Bridge) -> tuple[Note, ...]:
+    notes = bridge.notes.notes
+    if notes is None:
+        raise TwinUnavailableError("the notes have not been read yet")
+    return notes
+
+
+def _now_ns(bridge: Bridge) -> int:
+    now_ns = bridge.ros_time_ns
+    if now_ns is None:
+        raise TwinUnavailableError(f"{NO_TWIN}: a note is made at a moment of its clock")
+    return now_ns
+
+
+def _checked(draft: people_schema.NoteDraft, person: Person, bridge: Bridge) -> Note:
+    """The note, if it can be one."""
+    now_ns = _now_ns(bridge)
+    kind, _, name = draft.subject.partition(":")
+    until_ns = None
+    if kind == "alarm":
+        alarm = next((it for it in bridge.alarms.now.alarms if it.id == name), None)
+        if alarm is None:
+            raise BodyRefused(f"subject: there is no alarm {name[:64]!r}", 404)
+        if draft.kind == SHELVE:
+            is_critical = alarm.reason.verdict is Verdict.CRITICAL
+            until_ns = _shelf_end(draft, now_ns, is_critical=is_critical)
+    elif kind == "tag":
+        latest = bridge.latest
+        if latest is None or all(tag.tag_id != name for tag in latest.snapshot.tags):
+            raise BodyRefused(f"subject: there is no tag {name[:64]!r}", 404)
+    elif draft.subject != "site":
+        raise BodyRefused(f"subject is {draft.subject[:64]!r}, expected alarm:ID, tag:ID or site")
+    if draft.kind != COMMENT and kind != "alarm":
+        raise BodyRefused(f"kind is {draft.kind!r}, which is for alarms: expected comment")
+    if draft.kind != SHELVE and draft.until is not None:
+        raise BodyRefused("until is for the kind shelve")
+    if draft.kind == COMMENT and not draft.text:
+        raise BodyRefused("text is empty, a comment has one")
+    return Note("", now_ns, person.name, draft.kind, draft.subject, draft.text, until_ns)
+
+
+def _shelf_end(draft: people_schema.NoteDraft, now_ns: int, *, is_critical: bool) -> int | None:
+    if "until" not in draft.model_fields_set:
+        raise BodyRefused("until is missing: a moment, or null where it is not shelved any more")
+    if draft.until is None:
+        return None
+    if is_critical and not draft.text:
+        raise BodyRefused("text is empty: to shelve a critical alarm takes a reason")
+    until_ns = moment("until", draft.until)
+    longest_s = CRITICAL_SHELF_S if is_critical else SHELF_S
+    last_ns = now_ns + longest_s * NANOSECONDS_PER_SECOND
+    if not now_ns < until_ns <= last_ns + _SLACK_S * NANOSECONDS_PER_SECOND:
+        what = "a critical alarm" if is_critical else "an alarm"
+        left_s = (until_ns - now_ns) / NANOSECONDS_PER_SECOND
+        raise BodyRefused(
+            f"until is in {left_s:.0f} s, {what} is shelved for more than 0 and at most "
+            f"{longest_s} s"
+        )
+    return min(until_ns, last_ns)
+
+
+async def _write(request: Request, bridge: Bridge, note: Note) -> Note:
+    wait_s = bridge.notes.pace.take(note.by, time.monotonic())
+    if wait_s > 0.0:
+        raise ClientLimitError(
+            f"{note.by} has written more than {NOTE_BURST} notes and {NOTES_PER_MINUTE} a minute",
+            wait_s,
+        )
+    access: Access = request.app.state.access
+    written = await bridge.source.write_note(note)
+    # It is in the log: whatever becomes of the rest, nobody is told that it is not.
+    with suppress(NotRemembered, PastRefused, TwinUnavailableError):
+        await bridge.notes.look()
+    if access.people is not None and access.people.has_file:
+        try:
+            await access.people.note(note.by, note.kind, note.subject, client_of(request))
+        except (AccountError, AdmissionError) as error:
+            log.warning("the note %s is not in the audit trail: %s", written.id, error)
+    return written
+
+
+@read_route(
+    router,
+    "/api/audit",
+    summary="Who signed in, and who changed what",
+    responses={
+        200: {"model": people_schema.Audit},
+        403: {"model": schema.ErrorMessage, "description": "it takes the role admin"},
+        503: {"model": schema.ErrorMessage, "description": "the accounts cannot be read"},
+    },
+)
+async def audit_route(request: Request) -> Response:
+    """The newest first and 2,000 at most; all of it: `lupin-twin audit`."""
+    access, person = request.app.state.access, person_of(request)
+    if person is None or not person.may("admin") or access.people is None:
+        return error_response("the audit trail is for the role admin", 403)
+    found = await access.people.audited(MAX_AUDITED)
+    return json_response(orjson.dumps({"audit": [row._asdict() for row in found]}))

@@ -1,0 +1,91 @@
+"""What the routes of people carry, as types; see `schema`."""
+
+from __future__ import annotations
+
+from typing import Annotated, Final, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, StringConstraints
+
+from lupin_bridge.stream.schema import Contract, Time
+
+# Of a note, characters; no control character but tab and newline is in it.
+MAX_TEXT: Final = 500
+_Text = Annotated[
+    str,
+    StringConstraints(
+        max_length=MAX_TEXT, strip_whitespace=True, pattern=r"^[^\x00-\x08\x0b-\x1f\x7f-\x9f]*$"
+    ),
+]
+Role = Literal["viewer", "operator", "admin"]
+
+
+class _Given(BaseModel):
+    model_config = ConfigDict(extra="forbid", strict=True)
+
+
+class SignIn(_Given):
+    """The body of `POST /api/signin`, of an account."""
+
+    name: str
+    password: str
+
+
+class NoteDraft(_Given):
+    """The body of `POST /api/notes`."""
+
+    kind: Literal["acknowledge", "shelve", "comment"]
+    subject: str = Field(
+        max_length=300, description="`alarm:` and its id, `tag:` and its id, or `site`"
+    )
+    text: _Text = Field(default="", description=f"at most {MAX_TEXT} characters")
+    until: str | None = Field(
+        default=None,
+        max_length=64,
+        description="of shelve: as `at`; null: it is not shelved any more",
+    )
+
+
+class Note(Contract):
+    """What somebody said; it is never changed. Times are ROS time."""
+
+    id: str = Field(description="opaque")
+    kind: Literal["acknowledge", "shelve", "comment"]
+    subject: str
+    text: str
+    until: Time | None = Field(description="of shelve; null: it is not shelved any more")
+    made_at: Time
+    by: str = Field(description="name of an account or of a token")
+    withdrawn_by: str | None = Field(description="null: it stands")
+    withdrawn_at: Time | None
+
+
+class Notes(Contract):
+    """`/api/notes`."""
+
+    notes: list[Note] = Field(description="newest first")
+
+
+class Session(Contract):
+    """`/api/session`: who makes the request, and whether `/api/signout` would end a session."""
+
+    can_sign_out: bool
+    seconds_left: float | None = Field(description="of the session; null: there is none")
+    name: str | None = Field(description="null: nobody that is known by name")
+    role: Role
+    can_write_notes: bool = Field(description="whether `POST /api/notes` is for them, and is here")
+
+
+class AuditRow(Contract):
+    """Who did what to what, from where, and when."""
+
+    at_s: int = Field(description="s since the epoch, by the wall's clock")
+    who: str
+    what: str
+    subject: str
+    address: str
+
+
+class Audit(Contract):
+    """`/api/audit`."""
+
+    audit: list[AuditRow] = Field(description="newest first")

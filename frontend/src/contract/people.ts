@@ -1,0 +1,48 @@
+/** The bridge's routes for people: who is signed in, and what they say. */
+import { ask, get, read } from './api';
+import { boolean, list, object, text } from './check';
+import type { Notes, Session } from './types';
+
+/** More than the bridge sends, of notes and of characters. */
+const MOST = 10_000;
+const SESSION = object({ can_sign_out: boolean });
+const NOTES = object({ notes: list(object({ id: text(MOST), kind: text(MOST) }), MOST) });
+
+/** A header of our own: no form and no picture of another page can send one. */
+const OWN = { 'X-Lupin-Twin': '1' };
+
+export async function fetchSession(signal: AbortSignal): Promise<Session> {
+  return read<Session>('session', SESSION, await get('api/session', signal));
+}
+
+/** Ends the session, and with it the sockets that it has open. */
+export async function signOut(): Promise<void> {
+  await ask('api/signout', { method: 'POST', headers: OWN });
+}
+
+export interface Draft {
+  readonly kind: 'acknowledge' | 'shelve' | 'comment';
+  readonly subject: string;
+  readonly text?: string;
+  /** Of shelve: ROS seconds; null: it is not shelved any more. */
+  readonly until?: string | null;
+}
+
+export async function postNote(note: Draft): Promise<void> {
+  await ask('api/notes', {
+    method: 'POST',
+    headers: { ...OWN, 'Content-Type': 'application/json' },
+    body: JSON.stringify(note),
+  });
+}
+
+/** Takes the word back that stands of a subject, if there is one. */
+export async function withdrawNote(kind: Draft['kind'], subject: string): Promise<void> {
+  const query = new URLSearchParams({ subject }).toString();
+  const response = await get(`api/notes?${query}`, new AbortController().signal);
+  const { notes } = await read<Notes>('notes', NOTES, response);
+  const note = notes.find((each) => each.kind === kind && each.withdrawn_by === null);
+  if (note) {
+    await ask(`api/notes/${encodeURIComponent(note.id)}`, { method: 'DELETE', headers: OWN });
+  }
+}

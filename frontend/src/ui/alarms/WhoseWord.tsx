@@ -1,0 +1,30 @@
+import type { JSX } from 'react';
+
+import type { Alarm } from '../../contract/types';
+import { clockText } from '../../domain/format';
+import { secondsOf } from '../../domain/rostime';
+import { useSelected } from '../../store/create';
+import { S } from '../../strings';
+import { P, person } from './people';
+
+/** Below the list: whether what is done here is this browser's own, or everybody's. */
+export function WhoseWord(): JSX.Element {
+  const who = useSelected(person, (it) => it);
+  const name = who?.name;
+  return (
+    <p className="alarms-mine faint">
+      {!name ? S.alarmsMine : who.can_write_notes ? P.shared(name) : P.reads(name)}
+    </p>
+  );
+}
+
+/** Who acknowledged an alarm, and when, where a name is known. */
+export function WhoAcknowledged({ alarm }: { alarm: Alarm }): JSX.Element | null {
+  const { acknowledged_by: name, acknowledged_at: at } = alarm;
+  if (!name || !at) return null;
+  return (
+    <span className="alarm-facts faint" data-fact="by">
+      {P.acknowledged(name, clockText(secondsOf(at) * 1000))}
+    </span>
+  );
+}

@@ -1,0 +1,125 @@
+import { afterEach, beforeEach, expect, test, vi } from 'vitest';
+
+import { alarm, tellAlarms } from '../../testing/alarms';
+import { NOTHING_KEPT, whatOf } from '../../alarms/kept';
+import { acknowledgeAlarms, own, undo } from '../../alarms/own';
+import { merged, person, startPeople, wordsFor } from './people';
+
+const COLD = alarm('cold');
+const STAMP = { sec: 1_000, nanosec: 0 };
+const SAID = { ...COLD, acknowledged_by: 'anna', acknowledged_at: STAMP };
+const SHELVED = { ...COLD, shelved_by: 'bert', shelved_until: STAMP };
+const until = (): number => 60_000;
+const never = new Set<string>();
+
+test('what somebody else acknowledged is acknowledged here, until it is withdrawn', () => {
+  const first = merged(NOTHING_KEPT, [SAID], never, false, until);
+  expect([...first.kept.acknowledged.keys()]).toEqual(['cold']);
+  const same = merged(first.kept, [SAID], first.told, false, until);
+  expect(same.kept).toBe(first.kept);
+  const gone = merged(first.kept, [COLD], first.told, false, until);
+  expect(gone.kept.acknowledged.size).toBe(0);
+});
+
+test('what a viewer did stays theirs; of an operator only what the bridge knows holds', () => {
+  const local = merged(NOTHING_KEPT, [SAID], never, false, until).kept;
+  expect(merged(local, [COLD], never, false, until).kept).toBe(local);
+  expect(merged(local, [COLD], never, true, until).kept.acknowledged.size).toBe(0);
+});
+
+test('a shelf is taken over with who shelved, and goes with their word', () => {
+  const { kept, told } = merged(NOTHING_KEPT, [SHELVED], never, false, until);
+  expect(kept.shelved.get(whatOf(COLD))).toMatchObject({ until: 60_000, reason: 'bert' });
+  const near = merged(kept, [SHELVED], told, false, () => 61_000);
+  expect(near.kept).toBe(kept);
+  expect(merged(kept, [COLD], told, false, until).kept.shelved.size).toBe(0);
+});
+
+interface Asked {
+  readonly method: string;
+  readonly path: string;
+  readonly body: unknown;
+}
+
+let asked: Asked[] = [];
+let status = 201;
+
+beforeEach(() => {
+  asked = [];
+  status = 201;
+  own.dispatch(NOTHING_KEPT);
+  const note = { id: 'n1', kind: 'acknowledge', withdrawn_by: null };
+  vi.stubGlobal('fetch', (url: URL, { method = 'GET', body }: RequestInit) => {
+    const path = `${url.pathname}${url.search}`;
+    asked.push({ method, path, body: typeof body === 'string' ? JSON.parse(body) : null });
+    if (path === '/api/session') {
+      return Promise.resolve(
+        Response.json({
+          can_sign_out: true,
+          name: 'anna',
+          role: 'operator',
+          can_write_notes: true,
+        }),
+      );
+    }
+    return Promise.resolve(Response.json(method === 'GET' ? { notes: [note] } : note, { status }));
+  });
+});
+
+const stops: (() => void)[] = [];
+afterEach(() => {
+  for (const stop of stops.splice(0)) stop();
+});
+
+const signedIn = async (): Promise<void> => {
+  stops.push(startPeople());
+  await vi.waitFor(() => {
+    expect(person.get()?.name).toBe('anna');
+  });
+  asked = [];
+};
+
+test('what is done here is said to the bridge, and taken back there', async () => {
+  await signedIn();
+  tellAlarms(COLD);
+  acknowledgeAlarms([{ alarm: COLD, verdict: 'stressed' }]);
+  await vi.waitFor(() => {
+    expect(asked).toEqual([
+      { method: 'POST', path: '/api/notes', body: { kind: 'acknowledge', subject: 'alarm:cold' } },
+    ]);
+  });
+  tellAlarms(SAID);
+  undo();
+  await vi.waitFor(() => {
+    expect(asked.slice(1).map(({ method, path }) => `${method} ${path}`)).toEqual([
+      'GET /api/notes?subject=alarm%3Acold',
+      'DELETE /api/notes/n1',
+    ]);
+  });
+});
+
+test('what the bridge refuses does not hold here either', async () => {
+  await signedIn();
+  tellAlarms(COLD);
+  status = 503;
+  acknowledgeAlarms([{ alarm: COLD, verdict: 'stressed' }]);
+  await vi.waitFor(() => {
+    expect(own.get().acknowledged.size).toBe(0);
+  });
+  expect(asked).toHaveLength(1);
+});
+
+test('a shelf is said with its reason and its end by the clock of the twin', async () => {
+  const shelf = { verdict: 'critical', until: 5_000, reason: 'sprayed' } as const;
+  const kept = { ...NOTHING_KEPT, shelved: new Map([[whatOf(COLD), shelf]]) };
+  const words = [
+    ...wordsFor(NOTHING_KEPT, kept, [COLD], (at) => at / 1000),
+    ...wordsFor(kept, NOTHING_KEPT, [COLD], () => null),
+  ];
+  for (const word of words) await word();
+  const subject = 'alarm:cold';
+  expect(asked.map(({ body }) => body)).toEqual([
+    { kind: 'shelve', subject, text: 'sprayed', until: '5.000' },
+    { kind: 'shelve', subject, until: null },
+  ]);
+});

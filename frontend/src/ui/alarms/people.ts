@@ -1,0 +1,158 @@
+/**
+ * What people have said of alarms, by the bridge, and what is done here, to it. What stands there
+ * is kept in `own` as well, so that the list, its sound and its counts know it; where nobody has
+ * signed in, that stays this browser's own.
+ */
+import { now, timeOfDay } from '../../clock';
+import { fetchSession, postNote, withdrawNote } from '../../contract/people';
+import type { Alarm, Session } from '../../contract/types';
+import { secondsOf } from '../../domain/rostime';
+import { store } from '../../store/app';
+import { createStore } from '../../store/create';
+import { rosNow } from '../../store/moment';
+import { say } from '../toast';
+import { LANGUAGE } from '../../strings';
+import { PEOPLE } from '../../words/people';
+import { whatOf, type Kept } from '../../alarms/kept';
+import { acting, own } from '../../alarms/own';
+
+export const P = PEOPLE[LANGUAGE];
+
+/** Who is signed in; null: not known yet. */
+export const person = createStore<Session | null, Session | null>(null, (_, next) => next);
+
+/** What was said here and is not there yet: until it is, the bridge's word is an older one. */
+let pending = 0;
+/** Alarms that somebody acknowledged by the bridge's word, and shelves of which that tells. */
+let told: ReadonlySet<string> = new Set();
+
+/** A shelf's end is told in whole ROS seconds and kept by this browser's clock: near is the same. */
+const SAME_MS = 3_000;
+
+/** `kept`, and what the bridge says. `isWriter`: what it does not say does not hold here either. */
+export function merged(
+  kept: Kept,
+  alarms: readonly Alarm[],
+  toldBefore: ReadonlySet<string>,
+  isWriter: boolean,
+  untilOf: (alarm: Alarm) => number | null,
+): { kept: Kept; told: ReadonlySet<string> } {
+  const acknowledged = new Map(kept.acknowledged);
+  const shelved = new Map(kept.shelved);
+  const toldNow = new Set<string>();
+  let isSame = true;
+  for (const alarm of alarms) {
+    const { id, acknowledged_at: at, shelved_by: by, reason } = alarm;
+    const { verdict } = reason;
+    const what = whatOf(alarm);
+    if (at) {
+      toldNow.add(id);
+      isSame &&= acknowledged.has(id);
+      if (!acknowledged.has(id)) acknowledged.set(id, { verdict, at: timeOfDay() });
+    } else if (isWriter || toldBefore.has(id)) {
+      isSame &&= !acknowledged.delete(id);
+    }
+    if (alarm.cleared_at !== null) continue;
+    const until = untilOf(alarm);
+    const shelf = shelved.get(what);
+    if (by && until !== null) {
+      toldNow.add(what);
+      if (shelf && Math.abs(shelf.until - until) < SAME_MS) continue;
+      isSame = false;
+      shelved.set(what, { verdict, until, reason: by });
+    } else if (isWriter || toldBefore.has(what)) {
+      isSame &&= !shelved.delete(what);
+    }
+  }
+  return { kept: isSame ? kept : { ...kept, acknowledged, shelved }, told: toldNow };
+}
+
+const alarmsNow = (): readonly Alarm[] => store.get().twin.alarms?.alarms ?? [];
+
+/** When a shelf ends by this browser's clock, ms since the epoch. */
+function endOf(alarm: Alarm): number | null {
+  const nowS = rosNow(store.get(), now());
+  if (!alarm.shelved_until || nowS === null) return null;
+  return Math.floor(timeOfDay() + (secondsOf(alarm.shelved_until) - nowS) * 1000);
+}
+
+function take(): void {
+  if (pending > 0 || store.get().twin.alarms === null) return;
+  const isWriter = person.get()?.can_write_notes === true;
+  const found = merged(own.get(), alarmsNow(), told, isWriter, endOf);
+  ({ told } = found);
+  own.dispatch(found.kept);
+}
+
+/** What has to be said for what was done here. */
+export function wordsFor(
+  before: Kept,
+  next: Kept,
+  alarms: readonly Alarm[],
+  rosOf: (at: number) => number | null,
+): readonly (() => Promise<void>)[] {
+  const found: (() => Promise<void>)[] = [];
+  for (const alarm of alarms) {
+    const subject = `alarm:${alarm.id}`;
+    const [was, is] = [before.acknowledged.get(alarm.id), next.acknowledged.get(alarm.id)];
+    if (is && is !== was) found.push(() => postNote({ kind: 'acknowledge', subject }));
+    if (was && !is) found.push(() => withdrawNote('acknowledge', subject));
+    if (alarm.cleared_at !== null) continue;
+    const [shelf, shelfNow] = [before.shelved.get(whatOf(alarm)), next.shelved.get(whatOf(alarm))];
+    if (shelfNow && shelfNow !== shelf) {
+      const until = rosOf(shelfNow.until);
+      const note = { kind: 'shelve', subject, text: shelfNow.reason } as const;
+      if (until !== null) found.push(() => postNote({ ...note, until: until.toFixed(3) }));
+    } else if (shelf && !shelfNow) {
+      found.push(() => postNote({ kind: 'shelve', subject, until: null }));
+    }
+  }
+  return found;
+}
+
+async function tell(before: Kept, next: Kept): Promise<void> {
+  const nowS = rosNow(store.get(), now());
+  const at = timeOfDay();
+  const words = wordsFor(before, next, alarmsNow(), (until) =>
+    nowS === null ? null : nowS + (until - at) / 1000,
+  );
+  pending += 1;
+  try {
+    // One behind the other, in the order of the list: of two words the later one stands.
+    for (const word of words) await word();
+  } catch (error) {
+    say(P.failed(error instanceof Error ? error.message : String(error)));
+  }
+  pending -= 1;
+  take();
+}
+
+/** Begins where somebody has signed in; returns the way to stop. */
+export function startPeople(): () => void {
+  const abort = new AbortController();
+  const stops: (() => void)[] = [];
+  let alarms: unknown = null;
+  const onStore = (): void => {
+    if (alarms === store.get().twin.alarms) return;
+    ({ alarms } = store.get().twin);
+    take();
+  };
+  fetchSession(abort.signal).then(
+    (session) => {
+      if (!session.name) return;
+      person.dispatch(session);
+      if (session.can_write_notes) acting.tell = (before, next) => void tell(before, next);
+      stops.push(store.subscribe(onStore));
+      onStore();
+    },
+    () => {
+      // Without an answer everything stays this browser's own.
+    },
+  );
+  return () => {
+    abort.abort();
+    acting.tell = null;
+    person.dispatch(null);
+    for (const stop of stops) stop();
+  };
+}

@@ -1,0 +1,193 @@
+"""The file of accounts: who may, for how long, and what is kept of a secret."""
+
+from __future__ import annotations
+
+import asyncio
+import stat
+from collections.abc import Callable, Coroutine
+from contextlib import closing
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from lupin_bridge.access import people as people_module
+from lupin_bridge.access.accounts import (
+    SESSION_S,
+    AccountError,
+    Accounts,
+    Audited,
+    Person,
+    check_password,
+    digest,
+)
+from lupin_bridge.access.people import MAX_WAITING, TRY_BURST, People, PeopleBusy
+from tests.support.people import PASSWORD, TOKEN, add, changing, remove
+
+NOW = 1_800_000_000
+
+
+@pytest.fixture
+def path(tmp_path: Path) -> Path:
+    return tmp_path / "state" / "accounts.sqlite"
+
+
+def test_the_file_is_its_owners_alone_and_holds_no_secret(path: Path) -> None:
+    add(path, anna="operator")
+    add(path, "token", scada="viewer")
+    with changing(path) as accounts:
+        cookie = accounts.begin_session("anna", "::1", NOW)
+        assert [stat.S_IMODE(file.stat().st_mode) for file in path.parent.iterdir()] == [0o600] * 3
+        raw = b"".join(file.read_bytes() for file in path.parent.iterdir())
+    for secret in (PASSWORD, TOKEN, cookie):
+        assert secret.encode() not in raw
+    assert b"$argon2id$" in raw
+
+
+def test_a_session_ends_in_its_time_and_with_its_account(path: Path) -> None:
+    add(path, anna="operator")
+    with changing(path) as accounts:
+        name = digest(accounts.begin_session("anna", "::1", NOW))
+        found = accounts.of_session(name, NOW + SESSION_S - 1)
+        assert found == Person("anna", "operator", session=name, ends_at_s=NOW + SESSION_S)
+        assert accounts.of_session(name, NOW + SESSION_S) is None
+        accounts.remove("anna", "account", by="a test", now_s=NOW)
+        assert accounts.of_session(name, NOW) is None
+        with pytest.raises(AccountError):
+            accounts.begin_session("anna", "::1", NOW)
+    add(path, anna="admin")
+    with closing(Accounts(path)) as accounts:
+        assert accounts.of_session(name, NOW) is None, "of another anna"
+
+
+def test_one_name_has_so_many_sessions(path: Path) -> None:
+    add(path, anna="operator")
+    with changing(path) as accounts:
+        names = [digest(accounts.begin_session("anna", "", NOW + n)) for n in range(25)]
+        assert [accounts.of_session(name, NOW) is not None for name in names] == [False] * 5 + [
+            True
+        ] * 20
+
+
+def test_a_name_is_one_persons_or_one_tokens(path: Path) -> None:
+    add(path, anna="operator")
+    with pytest.raises(AccountError, match="there is account 'anna' already"):
+        add(path, "token", anna="admin")
+    with pytest.raises(AccountError, match="no token 'anna'"):
+        remove(path, "anna", "token")
+    for name in ("", "-x", "a b", "a\n", "ä", "x" * 65, "<b>", "a\0b"):
+        with pytest.raises(AccountError, match="the name is"):
+            add_named(path, name)
+
+
+@pytest.mark.parametrize("length", [0, 9, 513, 10**6])
+def test_a_password_has_a_length(length: int) -> None:
+    with pytest.raises(AccountError, match=f"has {length} characters, must have 10 to 512"):
+        check_password("x" * length)
+
+
+def test_somebody_elses_file_is_left_alone(path: Path) -> None:
+    path.parent.mkdir()
+    path.write_text("no database, but something dear to somebody")
+    with pytest.raises(AccountError):
+        add(path, anna="admin")
+    assert path.read_text().startswith("no database")
+
+
+def test_a_reader_cannot_write_and_the_trail_keeps_the_newest(
+    path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("lupin_bridge.access.accounts._MAX_AUDITED", 3)
+    add(path, anna="operator")
+    with changing(path) as accounts:
+        for number in range(9):
+            accounts.note(Audited(NOW, "anna", "comment", str(number), "::1"))
+    with closing(Accounts(path)) as accounts:
+        assert [row.subject for row in accounts.audited()] == ["8", "7", "6"]
+        with pytest.raises(AccountError, match="cannot be written"):
+            accounts.note(Audited(NOW, "anna", "comment", "", ""))
+
+
+def test_the_rights_of_a_role_are_those_of_the_ones_below_it() -> None:
+    assert [Person("a", "operator").may(role) for role in ("viewer", "operator", "admin")] == [
+        True,
+        True,
+        False,
+    ]
+
+
+def add_named(path: Path, name: str) -> None:
+    with changing(path) as accounts:
+        accounts.add(name, "account", "viewer", "", by="a test", now_s=NOW)
+
+
+def with_people(path: Path, test: Callable[[People], Coroutine[Any, Any, None]]) -> None:
+    async def run() -> None:
+        await test(People(path))
+
+    asyncio.run(run())
+
+
+def test_a_wrong_name_takes_the_same_work_as_a_wrong_password(
+    path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    add(path, anna="operator")
+    add(path, secret=" ", bert="operator")
+    worked: list[str] = []
+    verify = people_module.verify
+
+    def counted(kept: str, password: str) -> bool:
+        worked.append(kept)
+        return verify(kept, password)
+
+    monkeypatch.setattr(people_module, "verify", counted)
+
+    async def test(people: People) -> None:
+        assert await people.check("anna", PASSWORD, "1") == Person("anna", "operator")
+        for name in ("anna", "nobody", "bert"):
+            assert await people.check(name, "wrong" + PASSWORD, "1") is None
+        assert await people.check("nobody", "", "1") is None
+        assert len(worked) == 5
+
+    with_people(path, test)
+
+
+def test_a_flood_of_sign_ins_waits_in_a_short_queue_and_an_address_has_few(
+    path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    add(path, anna="operator")
+    at_work: list[int] = []
+
+    def slow(kept: str, password: str) -> bool:
+        at_work.append(1)
+        assert len(at_work) == 1, "two at once"
+        at_work.pop()
+        return False
+
+    monkeypatch.setattr(people_module, "verify", slow)
+
+    async def test(people: People) -> None:
+        tries = (people.check("anna", "x", str(n)) for n in range(3 * MAX_WAITING))
+        found = await asyncio.gather(*tries, return_exceptions=True)
+        assert found.count(None) == MAX_WAITING
+        assert sum(isinstance(it, PeopleBusy) for it in found) == 2 * MAX_WAITING
+        for _ in range(TRY_BURST):
+            assert await people.check("anna", "x", "one address") is None
+        with pytest.raises(PeopleBusy, match="one address has tried"):
+            await people.check("anna", "x", "one address")
+
+    with_people(path, test)
+
+
+def test_a_file_that_has_gone_opens_nothing(path: Path) -> None:
+    async def test(people: People) -> None:
+        before = people.is_on
+        add(path, "token", scada="viewer")
+        assert (before, people.is_on) == (False, True)
+        assert people.by_token(TOKEN) == Person("scada", "viewer", by="token")
+        path.unlink()
+        assert people.is_on
+        with pytest.raises(AccountError):
+            people.by_token(TOKEN)
+
+    with_people(path, test)

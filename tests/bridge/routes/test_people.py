@@ -1,0 +1,449 @@
+"""People at a bridge: who may, what they say, who hears of it. A real server, real sockets."""
+
+from __future__ import annotations
+
+import re
+import socket
+import tempfile
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import httpx
+import pytest
+from websockets.exceptions import ConnectionClosed
+from websockets.sync.client import ClientConnection
+
+from lupin_bridge.access.accounts import digest
+from lupin_bridge.stream import people_schema
+from tests.support.messages import look
+from tests.support.people import OWN, PASSWORD, TOKEN, add, remove, sign_in, signed_in, write
+from tests.support.waiting import PATIENCE_S, wait_for
+from tests.support.web import Bridge, bridge
+from tests.support.ws_client import open_websocket
+
+BEARER = {"Authorization": f"Bearer {TOKEN}"}
+
+
+@pytest.fixture(scope="module")
+def accounts() -> Iterator[Path]:
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "accounts.sqlite"
+        add(path, anna="operator", bert="operator", vera="viewer", boss="admin")
+        add(path, "token", scada="viewer")
+        yield path
+
+
+@pytest.fixture(scope="module")
+def live(accounts: Path) -> Iterator[Bridge]:
+    """With a pest, a cold tag, and a journal that goes at the end."""
+    options = ("--accounts", str(accounts), "--ros-args", "-p", "journal:=off")
+    with bridge(*options) as running:
+        running.peer.wait_for_twin()
+        running.peer.observe(look("a", anomaly=True, bug_count=2), look("b", anomaly=True))
+        wait_for(lambda: len(alarms(running)) == 2, "the alarms")
+        yield running
+
+
+def alarms(live: Bridge) -> dict[str, dict[str, Any]]:
+    """By tag."""
+    answer = live.get("/api/alarms", BEARER)
+    assert answer.status_code == 200, answer.text
+    return {alarm["tag_id"]: alarm for alarm in answer.json()["alarms"]}
+
+
+def alarm(live: Bridge, tag_id: str = "a") -> str:
+    found: str = alarms(live)[tag_id]["id"]
+    return f"alarm:{found}"
+
+
+def notes(live: Bridge, **query: str) -> list[people_schema.Note]:
+    answer = live.get("/api/notes", BEARER, **query)
+    return people_schema.Notes.model_validate_json(answer.content).notes
+
+
+def in_s(live: Bridge, seconds: float) -> str:
+    """A moment of the twin's time."""
+    now = live.get("/api/state", BEARER).json()["header"]["stamp"]
+    return f"{now['sec'] + seconds:.0f}"
+
+
+# --- who may ------------------------------------------------------------------------------------
+
+
+def test_with_accounts_nobody_reads_without_a_name(live: Bridge) -> None:
+    for path in ("/api/state", "/api/alarms", "/api/notes", "/metrics", "/api/session"):
+        assert live.get(path).status_code == 401
+    assert live.get("/healthz").status_code == 200
+    page = live.get("/", {"Accept": "text/html"})
+    assert (page.status_code, page.headers["location"]) == (303, "signin")
+    signin = live.get("/signin").text
+    assert '<label for="name" >' in signin
+    assert "Password or token" in signin
+    assert live.get("/api/state", BEARER).status_code == 200
+
+
+def test_a_session_says_who_it_is_and_ends_at_the_sign_out(live: Bridge) -> None:
+    with signed_in(live.url, "anna") as browser:
+        told = people_schema.Session.model_validate(browser.get("/api/session").json())
+        assert (told.name, told.role, told.can_write_notes) == ("anna", "operator", True)
+        assert told.can_sign_out
+        cookie = dict(browser.cookies)
+        assert PASSWORD not in str(cookie)
+        assert browser.post("/api/signout").status_code == 204
+        assert not browser.cookies
+        assert browser.get("/api/session").status_code == 401
+        browser.cookies.update(cookie)
+        assert browser.get("/api/session").status_code == 401, "it is over"
+
+
+def test_the_cookie_is_strict_and_is_never_the_one_that_a_browser_brought(live: Bridge) -> None:
+    with httpx.Client(base_url=live.url, timeout=PATIENCE_S, trust_env=False) as browser:
+        answer = sign_in(browser, "anna")
+        name, _, rest = answer.headers["set-cookie"].partition("=")
+        fixed = rest.partition(";")[0]
+        for attribute in ("HttpOnly", "SameSite=strict", "Path=/", "Max-Age=43200"):
+            assert attribute in rest
+        assert sign_in(browser, "anna").headers["set-cookie"].partition("=")[2] != rest
+        for made_up in ("x" * 43, "", fixed[:-1], f"{fixed}x"):
+            with httpx.Client(base_url=live.url, trust_env=False, timeout=PATIENCE_S) as other:
+                other.cookies.set(name, made_up)
+                assert other.get("/api/state").status_code == 401
+
+
+@pytest.mark.parametrize(
+    ("body", "status"),
+    [
+        ({"name": "anna", "password": "wrong"}, 401),
+        ({"name": "nobody", "password": PASSWORD}, 401),
+        ({"name": "scada", "password": TOKEN}, 401),
+        ({"name": "anna' OR 1=1 --", "password": PASSWORD}, 401),
+        ({"name": "anna", "password": 7}, 400),
+        ({"name": "anna"}, 400),
+        ({"name": "anna", "password": PASSWORD, "role": "admin"}, 400),
+        ([], 400),
+    ],
+)
+def test_who_is_not_there_does_not_get_in(live: Bridge, body: Any, status: int) -> None:
+    with live_from(live, "127.0.7.1") as browser:
+        answer = browser.post("/api/signin", json=body, headers=OWN)
+    assert (answer.status_code, "set-cookie" in answer.headers) == (status, False)
+    assert PASSWORD not in answer.text
+
+
+def live_from(live: Bridge, address: str) -> httpx.Client:
+    """A client at another address of this machine: each has tries of its own."""
+    transport = httpx.HTTPTransport(local_address=address)
+    return httpx.Client(base_url=live.url, transport=transport, timeout=PATIENCE_S)
+
+
+def test_trying_is_slowed_down_for_the_address_that_tries(live: Bridge) -> None:
+    with live_from(live, "127.0.7.2") as guesser, live_from(live, "127.0.7.3") as other:
+
+        def is_slowed() -> bool:
+            answer = sign_in(guesser, "anna", "guess")
+            assert answer.status_code in {401, 429}
+            return answer.status_code == 429
+
+        wait_for(is_slowed, "an end to guessing")
+        assert sign_in(other, "anna").status_code == 204
+
+
+def test_what_a_removed_account_has_open_ends(live: Bridge, accounts: Path) -> None:
+    add(accounts, gone="operator")
+    with signed_in(live.url, "gone") as browser:
+        cookie = "; ".join(f"{name}={value}" for name, value in browser.cookies.items())
+        ws = f"{live.url.replace('http', 'ws', 1)}/ws/state"
+        with open_websocket(ws, additional_headers={"Cookie": cookie}) as socket_of_theirs:
+            assert socket_of_theirs.recv(timeout=PATIENCE_S)
+            remove(accounts, "gone")
+            assert browser.get("/api/state").status_code == 401
+            assert "the session has ended" in end_of(socket_of_theirs)
+
+
+def end_of(connection: ClientConnection) -> str:
+    """Why a WebSocket ended."""
+    try:
+        while True:
+            connection.recv(timeout=PATIENCE_S)
+    except ConnectionClosed as ended:
+        return "" if ended.rcvd is None else ended.rcvd.reason
+
+
+def test_a_revoked_token_opens_nothing_and_its_sessions_end(live: Bridge, accounts: Path) -> None:
+    secret = "another-token-of-43-characters-0123456789-ab"
+    add(accounts, "token", digest(secret), plc="operator")
+    bearer = {"Authorization": f"Bearer {secret}"}
+    with httpx.Client(base_url=live.url, timeout=PATIENCE_S, headers=OWN) as program:
+        assert program.post("/api/signin", headers=bearer).status_code == 204
+        assert program.get("/api/session").json()["name"] == "plc"
+        remove(accounts, "plc", "token")
+        assert program.get("/api/state").status_code == 401
+        assert program.get("/api/state", headers=bearer).status_code == 401
+
+
+def test_the_audit_trail_is_the_admins(live: Bridge) -> None:
+    with signed_in(live.url, "anna") as browser:
+        assert browser.get("/api/audit").status_code == 403
+    assert live.get("/api/audit", BEARER).status_code == 403
+    with signed_in(live.url, "boss") as browser:
+        found = people_schema.Audit.model_validate(browser.get("/api/audit").json()).audit
+    assert (found[0].who, found[0].what, found[0].address) == ("boss", "sign in", "127.0.0.1")
+    assert {(row.what, row.subject) for row in found} >= {("add account", "anna operator")}
+
+
+# --- what they say ------------------------------------------------------------------------------
+
+
+def test_a_word_is_shared_with_every_browser_at_once_and_can_be_taken_back(live: Bridge) -> None:
+    ws = f"{live.url.replace('http', 'ws', 1)}/ws/state"
+    with (
+        signed_in(live.url, "anna") as anna,
+        open_websocket(ws, additional_headers=BEARER) as other,
+    ):
+        answer = write(anna, kind="acknowledge", subject=alarm(live), text=" <b>on my way</b>\n")
+        assert answer.status_code == 201, answer.text
+        note = people_schema.Note.model_validate_json(answer.content)
+        assert (note.by, note.text, note.until) == ("anna", "<b>on my way</b>", None)
+        assert alarms(live)["a"]["acknowledged_by"] == "anna"
+        assert notes(live)[0] == note
+        wait_for(
+            lambda: '"acknowledged_by":"anna"' in str(other.recv(timeout=PATIENCE_S)),
+            "a frame with it",
+            meanwhile=lambda: None,
+        )
+        withdrawn = anna.delete(f"/api/notes/{note.id}").json()
+        assert withdrawn["withdrawn_by"] == "anna"
+        assert anna.delete(f"/api/notes/{note.id}").json() == withdrawn, "once is enough"
+        assert "acknowledged_by" not in alarms(live)["a"]
+        assert notes(live)[0].withdrawn_by == "anna"
+
+
+def test_of_two_words_the_later_one_stands_and_both_are_kept(live: Bridge) -> None:
+    subject = alarm(live, "b")
+    with signed_in(live.url, "anna") as anna, signed_in(live.url, "bert") as bert:
+        first = write(anna, kind="acknowledge", subject=subject).json()
+        second = write(bert, kind="acknowledge", subject=subject).json()
+        assert alarms(live)["b"]["acknowledged_by"] == "bert"
+        assert [note.by for note in notes(live, subject=subject)] == ["bert", "anna"]
+        assert bert.delete(f"/api/notes/{first['id']}").status_code == 403, "it is anna's"
+        assert bert.delete(f"/api/notes/{second['id']}").status_code == 200
+        assert alarms(live)["b"]["acknowledged_by"] == "anna"
+        with signed_in(live.url, "boss") as boss:
+            assert boss.delete(f"/api/notes/{first['id']}").json()["withdrawn_by"] == "boss"
+        assert "acknowledged_by" not in alarms(live)["b"]
+
+
+def test_a_critical_alarm_is_shelved_for_a_reason_and_an_hour_and_anybody_ends_that(
+    live: Bridge,
+) -> None:
+    subject = alarm(live)
+    assert alarms(live)["a"]["reason"]["verdict"] == "critical"
+    shelve = {"kind": "shelve", "subject": subject}
+    with signed_in(live.url, "anna") as anna, signed_in(live.url, "bert") as bert:
+        for wrong, says in (
+            ({"until": in_s(live, 600)}, "text is empty"),
+            ({"text": "seen"}, "until is missing"),
+            ({"text": "seen", "until": in_s(live, 7200)}, "at most 3600 s"),
+            ({"text": "seen", "until": in_s(live, -5)}, "at most 3600 s"),
+            ({"text": "seen", "until": "tomorrow"}, "until is 'tomorrow'"),
+        ):
+            answer = write(anna, **shelve, **wrong)
+            assert (answer.status_code, says in answer.text) == (400, True), answer.text
+        answer = write(anna, **shelve, text="sprayed", until=in_s(live, 3600))
+        assert answer.status_code == 201, answer.text
+        assert alarms(live)["a"]["shelved_by"] == "anna"
+        assert alarms(live)["a"]["shelved_until"] == answer.json()["until"]
+        assert write(bert, **shelve, until=None).status_code == 201
+        assert "shelved_by" not in alarms(live)["a"]
+
+
+@pytest.mark.parametrize(
+    ("note", "status", "says"),
+    [
+        ({"kind": "acknowledge", "subject": "alarm:nothing"}, 404, "no alarm 'nothing'"),
+        ({"kind": "comment", "subject": "tag:nowhere", "text": "x"}, 404, "no tag 'nowhere'"),
+        ({"kind": "comment", "subject": "site"}, 400, "text is empty"),
+        ({"kind": "acknowledge", "subject": "site"}, 400, "expected comment"),
+        ({"kind": "shelve", "subject": "tag:a", "until": None}, 400, "expected comment"),
+        ({"kind": "withdraw", "subject": "note:1"}, 400, "kind"),
+        ({"kind": "comment", "subject": "note:1", "text": "x"}, 400, "subject is 'note:1'"),
+        ({"kind": "comment", "subject": "site", "text": "x", "until": "5"}, 400, "until is for"),
+        ({"kind": "comment", "subject": "site", "text": "x" * 501}, 400, "at most 500"),
+        ({"kind": "comment", "subject": "site", "text": "a\0b"}, 400, "text: string should match"),
+        ({"kind": "comment", "subject": "site", "text": "a\x1b[2J"}, 400, "text: string should"),
+        ({"kind": "comment", "subject": "site", "text": ["x"]}, 400, "text"),
+        ({"kind": "comment", "subject": "site", "text": "x", "by": "boss"}, 400, "by: extra"),
+        ([1], 400, "the body"),
+    ],
+)
+def test_what_cannot_be_a_note_is_refused_in_one_line(
+    live: Bridge, note: Any, status: int, says: str
+) -> None:
+    before = notes(live)
+    with signed_in_once(live) as anna:
+        answer = anna.post("/api/notes", json=note)
+    assert (answer.status_code, says in answer.json()["detail"]) == (status, True), answer.text
+    assert len(answer.text) < 300
+    assert notes(live) == before
+
+
+_anna: list[httpx.Cookies] = []
+
+
+def signed_in_once(live: Bridge) -> httpx.Client:
+    """One session for many tests: an address has few sign-ins a minute."""
+    if not _anna:
+        with signed_in(live.url, "anna") as browser:
+            _anna.append(browser.cookies)
+    return httpx.Client(
+        base_url=live.url, cookies=_anna[0], headers=OWN, timeout=PATIENCE_S, trust_env=False
+    )
+
+
+def test_a_comment_on_a_tag_or_the_greenhouse_is_found_by_subject_and_period(live: Bridge) -> None:
+    with signed_in_once(live) as anna:
+        made = write(anna, kind="comment", subject="tag:a", text="leaf sample taken").json()
+        write(anna, kind="comment", subject="site", text="doors open")
+    assert [note.text for note in notes(live, subject="tag:a")] == ["leaf sample taken"]
+    stamp = made["made_at"]["sec"]
+    assert notes(live, to=str(stamp - 60)) == []
+    assert notes(live, **{"from": str(stamp - 60), "subject": "site"})[0].text == "doors open"
+    assert live.get("/api/notes", BEARER, tag_id="a").status_code == 400
+
+
+# --- attacks ------------------------------------------------------------------------------------
+
+
+def test_who_only_reads_writes_nothing(live: Bridge) -> None:
+    note = {"kind": "comment", "subject": "site", "text": "x"}
+    assert live.http.post("/api/notes", json=note, headers={**OWN, **BEARER}).status_code == 403
+    assert live.http.post("/api/notes", json=note, headers=OWN).status_code == 401
+    with signed_in(live.url, "vera") as vera:
+        answer = write(vera, **note)
+        assert (answer.status_code, "vera is a viewer" in answer.text) == (403, True)
+        assert vera.delete("/api/notes/1").status_code == 403
+        assert not vera.get("/api/session").json()["can_write_notes"]
+
+
+@pytest.mark.parametrize(
+    ("headers", "status"),
+    [
+        ({"X-Lupin-Twin": ""}, 201),
+        ({"Origin": "https://evil.example"}, 403),
+        ({"Origin": "null"}, 403),
+        ({"Sec-Fetch-Site": "cross-site", "Sec-Fetch-Mode": "no-cors"}, 403),
+        ({"Referer": "https://evil.example/page"}, 403),
+        ({"Host": "evil.example"}, 403),
+        ({"Content-Type": "text/plain"}, 415),
+        ({"Content-Type": "application/x-www-form-urlencoded"}, 415),
+        ({"X-HTTP-Method-Override": "DELETE"}, 201),
+    ],
+)
+def test_another_page_cannot_write_with_somebodys_cookie(
+    live: Bridge, headers: dict[str, str], status: int
+) -> None:
+    with signed_in_once(live) as anna:
+        body = b'{"kind": "comment", "subject": "site", "text": "x"}'
+        given = {"Content-Type": "application/json", **headers}
+        answer = anna.post("/api/notes", content=body, headers=given)
+        assert answer.status_code == status, answer.text
+        del anna.headers["X-Lupin-Twin"]
+        answer = anna.post("/api/notes", content=body, headers={"Content-Type": "application/json"})
+        assert (answer.status_code, "X-Lupin-Twin" in answer.text) == (403, True)
+        assert anna.get("/api/notes?_method=POST").status_code == 400
+
+
+def test_one_name_cannot_fill_the_log(live: Bridge, accounts: Path) -> None:
+    add(accounts, flood="operator")
+    with signed_in(live.url, "flood") as browser:
+
+        def is_slowed() -> bool:
+            answer = write(browser, kind="comment", subject="site", text="x")
+            assert answer.status_code in {201, 429}
+            return answer.status_code == 429
+
+        wait_for(is_slowed, "an end to writing", meanwhile=lambda: None)
+
+
+def raw(live: Bridge, request: bytes) -> bytes:
+    """What comes back for bytes on a socket, until the server ends it."""
+    host, port = live.url.removeprefix("http://").split(":")
+    with socket.create_connection((host, int(port)), timeout=PATIENCE_S) as client:
+        client.sendall(request)
+        found = b""
+        while part := client.recv(65536):
+            found += part
+        return found
+
+
+@pytest.mark.parametrize(
+    ("head", "status"),
+    [
+        (b"POST /api/notes HTTP/1.1\r\nContent-Length: 8193", b"413"),
+        (b"POST /api/notes HTTP/1.1\r\nContent-Length: 99999999999999999999", b"413"),
+        (b"POST /api/notes HTTP/1.1\r\nTransfer-Encoding: chunked", b"413"),
+        (b"POST /api/signout HTTP/1.1\r\nContent-Length: 1", b"413"),
+        (b"GET /api/notes HTTP/1.1\r\nContent-Length: 1", b"413"),
+        (b"DELETE /api/notes/1 HTTP/1.1\r\nContent-Length: 1", b"413"),
+        (b"POST /api/notes HTTP/1.1\r\nContent-Length: -1", b"400"),
+    ],
+)
+def test_a_body_that_nobody_wants_is_refused_before_it_comes(
+    live: Bridge, head: bytes, status: bytes
+) -> None:
+    answer = raw(live, head + b"\r\nHost: localhost\r\n\r\n")
+    assert answer.startswith(b"HTTP/1.1 " + status), answer
+
+
+def test_a_body_in_pieces_and_requests_behind_it_are_told_apart(live: Bridge) -> None:
+    host, port = live.url.removeprefix("http://").split(":")
+    common = f"Host: localhost\r\nX-Lupin-Twin: 1\r\nAuthorization: Bearer {TOKEN}\r\n"
+    body = '{"kind": "comment", "subject": "site", "text": "x"}'
+    post = f"POST /api/notes HTTP/1.1\r\n{common}Content-Type: application/json\r\n"
+    last = f"GET /api/session HTTP/1.1\r\n{common}Connection: close\r\n\r\n"
+    request = f"{post}Content-Length: {len(body)}\r\n\r\n{body}" * 2 + last
+    with socket.create_connection((host, int(port)), timeout=PATIENCE_S) as client:
+        client.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        for index in range(0, len(request), 7):
+            client.sendall(request[index : index + 7].encode())
+        found = b""
+        while part := client.recv(65536):
+            found += part
+    statuses = re.findall(rb"HTTP/1\.1 (\d+)", found)
+    assert statuses == [b"403", b"403", b"200"], "the token only reads"
+
+
+def test_a_body_that_does_not_come_is_not_waited_for(live: Bridge) -> None:
+    with signed_in_once(live) as anna:
+        cookie = "; ".join(f"{name}={value}" for name, value in anna.cookies.items())
+    head = (
+        "POST /api/notes HTTP/1.1\r\nHost: localhost\r\nX-Lupin-Twin: 1\r\nConnection: close\r\n"
+        f"Content-Type: application/json\r\nCookie: {cookie}\r\nContent-Length: 10\r\n\r\n1"
+    )
+    assert raw(live, head.encode()).startswith(b"HTTP/1.1 408")
+
+
+def test_no_secret_is_logged(live: Bridge) -> None:
+    with live_from(live, "127.0.7.4") as guesser:
+        assert sign_in(guesser, "anna", f"not {PASSWORD}").status_code == 401
+        assert sign_in(guesser, "anna").status_code == 204
+    assert live.get("/api/state", BEARER).status_code == 200
+    said = "a sign-in as 'anna' from 127.0.7.4 was refused"
+    wait_for(lambda: said in live.process.output, "a line of the log")
+    for secret in (PASSWORD, TOKEN):
+        assert secret not in live.process.output
+
+
+def test_without_accounts_everything_is_as_before_and_nobody_writes() -> None:
+    with bridge("--ros-args", "-p", "journal:=off") as running:
+        running.peer.wait_for_twin()
+        running.peer.observe(look("a"))
+        wait_for(lambda: running.get("/api/notes").status_code == 200, "the notes")
+        assert running.json("/api/notes") == {"notes": []}
+        answer = running.http.post(
+            "/api/notes", json={"kind": "comment", "subject": "site", "text": "x"}, headers=OWN
+        )
+        assert (answer.status_code, "sign in with an account" in answer.text) == (403, True)
+        assert sign_in(running.http, "anna").status_code == 404
+        assert running.get("/api/audit").status_code == 403

@@ -1,0 +1,83 @@
+"""Notes are where the log is: after a restart, and at `web` on the same file or on a copy."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import httpx
+import pytest
+
+from tests.support.domains import own_domain
+from tests.support.live import attached
+from tests.support.messages import look
+from tests.support.people import OWN, add, signed_in, write
+from tests.support.processes import lupin_twin
+from tests.support.ros import Peer
+from tests.support.waiting import wait_for
+from tests.support.web import Bridge, bridge
+
+
+@pytest.fixture
+def accounts(tmp_path: Path) -> Path:
+    path = tmp_path / "accounts.sqlite"
+    add(path, anna="operator", vera="viewer")
+    return path
+
+
+def told(browser: httpx.Client) -> dict[str, Any] | None:
+    """The alarm, once somebody has acknowledged it."""
+    answer = browser.get("/api/alarms")
+    found = answer.json()["alarms"] if answer.status_code == 200 else []
+    return next((alarm for alarm in found if "acknowledged_by" in alarm), None)
+
+
+def acknowledged(live: Bridge) -> dict[str, Any]:
+    """An alarm that anna has acknowledged; her note."""
+    live.peer.wait_for_twin()
+    with signed_in(live.url, "anna") as anna:
+        live.peer.observe(look("a", anomaly=True, bug_count=2))
+        (alarm,) = wait_for(lambda: anna.get("/api/alarms").json()["alarms"], "the alarm") or []
+        answer = write(anna, kind="acknowledge", subject=f"alarm:{alarm['id']}", text="seen")
+        assert answer.status_code == 201, answer.text
+        note: dict[str, Any] = answer.json()
+        return note
+
+
+def test_a_note_outlives_the_process_that_wrote_it(accounts: Path, tmp_path: Path) -> None:
+    journal = f"journal:={tmp_path / 'j.sqlite'}"
+    options = ("--accounts", str(accounts), "--ros-args", "-p", journal)
+    with bridge(*options) as live:
+        note = acknowledged(live)
+    with bridge(*options) as again, signed_in(again.url, "vera") as vera:
+        alarm = wait_for(lambda: told(vera), "the word of before")
+        assert alarm is not None
+        assert (alarm["acknowledged_by"], alarm["acknowledged_at"]) == ("anna", note["made_at"])
+        assert vera.get("/api/notes").json() == {"notes": [note]}
+
+
+@pytest.mark.parametrize("is_copy", [False, True], ids=["the same file", "a copy over ROS"])
+def test_web_shows_the_same_notes_and_says_where_to_write_them(
+    accounts: Path, tmp_path: Path, is_copy: bool
+) -> None:
+    # Another file for each process, as on another host: that of its own working folder.
+    journal = "/proc/self/cwd/j.sqlite" if is_copy else str(tmp_path / "j.sqlite")
+    options = ("--accounts", str(accounts))
+    with (
+        own_domain() as domain,
+        bridge(*options, "--ros-args", "-p", f"journal:={journal}", domain=domain) as live,
+        lupin_twin(domain, "web", *options) as process,
+        Peer(domain) as peer,
+        attached(process, peer) as web,
+    ):
+        note = acknowledged(live)
+        with signed_in(web.url, "anna") as anna:
+            alarm = wait_for(lambda: told(anna), "the note at the other bridge")
+            assert alarm is not None
+            assert alarm["acknowledged_by"] == "anna"
+            assert anna.get("/api/notes").json() == {"notes": [note]}
+            assert not anna.get("/api/session").json()["can_write_notes"]
+            for method, path in (("POST", "/api/notes"), ("DELETE", f"/api/notes/{note['id']}")):
+                answer = anna.request(method, path, headers=OWN)
+                assert (answer.status_code, answer.headers["allow"]) == (405, "GET, HEAD")
+                assert "lupin-twin serve" in answer.json()["detail"]

@@ -1,0 +1,168 @@
+"""Notes in the log: numbered as every write, followed, and what of them stands."""
+
+from __future__ import annotations
+
+from concurrent.futures import Future
+from contextlib import closing
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from lupin_twin.core.journal_condition import JournalState
+from lupin_twin.core.notes import (
+    ACKNOWLEDGE,
+    MAX_NOTES,
+    WITHDRAW,
+    Note,
+    NotesRequest,
+    NotesUnwritable,
+    PastNotes,
+    standing,
+    withdrawals,
+)
+from lupin_twin.journal import follow
+from lupin_twin.journal.notes import NoteQueue, notes, number_of
+from lupin_twin.journal.schema import open_reader
+from lupin_twin.journal.writer import Journal
+from tests.support.journal import LIMITS, NOW, opened, recording, scan, select, wait_state
+from tests.support.waiting import PATIENCE_S, wait_for
+
+
+def note(text: str = "", at_ns: int = NOW) -> Note:
+    return Note("", at_ns, "anna", ACKNOWLEDGE, "alarm:a", text)
+
+
+ALL = NotesRequest()
+
+
+def read(path: Path, request: NotesRequest = ALL) -> PastNotes:
+    with closing(open_reader(path)) as connection:
+        return notes(connection, request)
+
+
+def test_notes_and_scans_have_numbers_of_one_sequence_over_restarts(tmp_path: Path) -> None:
+    path = tmp_path / "j.sqlite"
+    for text in ("first", "second"):
+        with recording(path) as journal:
+            assert journal.take_restored(PATIENCE_S) is not None
+            written = journal.write_note(note(text)).result(PATIENCE_S)
+            assert written == replace(note(text), id=written.id)
+            journal.write(scan(text))
+            wait_for(lambda journal=journal: journal.condition.written == 1, "the scan")  # type: ignore[misc]
+    found = read(path).notes
+    assert found is not None
+    numbers = [number_of(it.id) for it in found]
+    assert [it.text for it in found] == ["first", "second"]
+    scans = [seq for (seq,) in select(path, "SELECT seq FROM scan ORDER BY seq")]
+    assert numbers + scans == [1, 3, 2, 4]
+
+
+def test_whoever_has_all_of_them_gets_none_again(tmp_path: Path) -> None:
+    path = tmp_path / "j.sqlite"
+    with opened(path) as file:
+        file.put_note(note("one"))
+        before = read(path)
+        again = NotesRequest(before.journal, before.count)
+        assert (before.count, read(path, again).notes) == (1, None)
+        file.put_note(note("two"))
+        after = read(path, again)
+        assert after.notes is not None
+        assert [it.text for it in after.notes] == ["one", "two"]
+        assert read(path, NotesRequest("another", 2)).notes == after.notes
+
+
+def test_of_too_many_the_newest_are_known(tmp_path: Path) -> None:
+    path = tmp_path / "j.sqlite"
+    with opened(path) as file:
+        for number in range(MAX_NOTES + 1):
+            file.put_note(note(str(number), NOW + number))
+    found = read(path)
+    assert found.notes is not None
+    assert (found.count, len(found.notes)) == (MAX_NOTES + 1, MAX_NOTES)
+    assert (found.notes[0].text, found.notes[-1].text) == ("1", str(MAX_NOTES))
+
+
+@pytest.mark.parametrize("most", [1, 2, 100])
+def test_a_copy_gets_each_once_and_in_its_place_among_the_scans(tmp_path: Path, most: int) -> None:
+    source, target = tmp_path / "twin.sqlite", tmp_path / "copy.sqlite"
+    with recording(source) as journal:
+        assert journal.take_restored(PATIENCE_S) is not None
+        for number in range(3):
+            journal.write_note(note(str(number))).result(PATIENCE_S)
+            journal.write(scan(str(number)))
+            wait_for(lambda n=number: journal.condition.written == n + 1, "the scan")  # type: ignore[misc]
+        journal.write_note(note("last")).result(PATIENCE_S)
+    after, is_all = 0, False
+    while not is_all:
+        with closing(open_reader(source)) as connection:
+            lot = follow.read(connection, after, most)
+        after, is_all = follow.write(target, lot, NOW, after).last, lot.is_all
+    assert read(target) == read(source)
+    assert select(target, "SELECT count(*) FROM scan") == [(3,)]
+
+
+def test_an_id_of_somebody_elses_keeps_nobody_from_writing(tmp_path: Path) -> None:
+    path = tmp_path / "j.sqlite"
+    with opened(path) as file:
+        file.put_note(note("ours"))
+        for name in ("zz", "", "f" * 24, "\u0660" * 24):
+            file._connection.execute(
+                "INSERT INTO note VALUES ('local', ?, 0, '', 'comment', 'site', '', NULL)", (name,)
+            )
+    with opened(path) as file:
+        assert number_of(file.put_note(note("again")).id) == 2
+    with closing(open_reader(path)) as connection:
+        assert follow.read(connection, 0).last == 2
+
+
+def test_a_note_is_refused_where_nothing_can_be_written_and_nobody_waits(tmp_path: Path) -> None:
+    folder = tmp_path / "not a folder"
+    folder.write_text("")
+    journal = Journal(folder / "j.sqlite", "/twin", LIMITS)
+    wait_state(journal, JournalState.FAILING)
+    with pytest.raises(NotesUnwritable, match="cannot be written"):
+        journal.write_note(note()).result(PATIENCE_S)
+    journal.close()
+    with pytest.raises(NotesUnwritable):
+        journal.write_note(note()).result(PATIENCE_S)
+
+
+def test_a_disk_that_is_full_is_said_and_the_next_note_is_written(tmp_path: Path) -> None:
+    waiting = NoteQueue()
+    first, given_up = waiting.put(note("first")), waiting.put(note("given up"))
+    assert given_up.cancel()
+
+    def full(_: Note) -> Note:
+        raise OSError("no space left on device")
+
+    with pytest.raises(OSError, match="no space"):
+        waiting.write(full)
+    with pytest.raises(NotesUnwritable, match="no space left"):
+        first.result(0)
+    second = waiting.put(note("second"))
+    waiting.write(lambda it: replace(it, id="2"))
+    assert second.result(0) == replace(note("second"), id="2")
+    assert given_up.cancelled()
+
+
+def test_no_more_wait_than_a_few(tmp_path: Path) -> None:
+    waiting = NoteQueue()
+    held: list[Future[Note]] = [waiting.put(note()) for _ in range(101)]
+    assert [it.done() for it in held].count(True) == 1
+    with pytest.raises(NotesUnwritable, match="100 notes wait"):
+        held[-1].result(0)
+
+
+def test_the_later_word_stands_until_it_is_withdrawn() -> None:
+    first, second = (Note(name, NOW, name, ACKNOWLEDGE, "alarm:a") for name in ("a1", "b2"))
+    back = Note("c3", NOW, "b2", WITHDRAW, "note:b2")
+    key = ("alarm:a", ACKNOWLEDGE)
+    assert standing([first, second], NOW) == {key: second}
+    assert standing([first, second, back], NOW) == {key: first}
+    again = Note("d4", NOW + 1, "admin", WITHDRAW, "note:b2")
+    assert withdrawals([first, second, back, again]) == {"b2": back}
+
+
+def test_what_a_clock_that_went_back_has_not_come_to_does_not_stand() -> None:
+    assert standing([Note("a1", NOW + 1, "anna", ACKNOWLEDGE, "alarm:a")], NOW) == {}

@@ -248,7 +248,7 @@ def test_check_says_what_is_damaged_and_ends_with_1(
     lines = said.out.splitlines()
     assert lines[0] == "scan 200 of tag '7' is not what was written"
     assert lines[-1] == f"{path} is damaged in 10 places"
-    assert len(lines) == 13
+    assert len(lines) == 11
     content = path.read_bytes()
     refused = Said(capsys, "vacuum", "--journal", path)
     assert (refused.code, refused.out) == (1, "")

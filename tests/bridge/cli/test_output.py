@@ -192,7 +192,7 @@ def ended(
     return (
         done.returncode,
         done.stdout,
-        done.stderr.removeprefix(b"structure\nscan\nlook\nplace\nhour\n"),
+        done.stderr.removeprefix(b"structure\nscan\nlook\nplace\n"),
     )
 
 

@@ -89,12 +89,15 @@ def test_a_log_that_was_put_into_the_file_is_short_again(
         assert file._log_bytes() < 100_000
 
 
-def test_what_was_killed_while_it_saved_begins_again(path: Path) -> None:
+@pytest.mark.parametrize("is_there", [True, False])
+def test_what_was_killed_while_it_saved_begins_again(path: Path, *, is_there: bool) -> None:
     kept(path, [scan(at_ns=NOW + n) for n in range(300)])
     aside = quarantine(path, "20261121T141500Z")
     with closing(open_writer(path)) as connection:
         set_meta(connection, "salvage", aside.name)
+    if not is_there:  # somebody has taken it away
+        aside.unlink()
     with opened(path):
         pass
-    assert select(path, "SELECT count(*) FROM scan") == [(300,)]
+    assert select(path, "SELECT count(*) FROM scan") == [(300 if is_there else 0,)]
     assert select(path, "SELECT * FROM meta WHERE key = 'salvage'") == []

@@ -61,14 +61,6 @@ def test_a_journal_that_is_not_there_gets_a_past_that_goes_on(tmp_path: Path) ->
     assert restored(path).last_seq == 5
 
 
-def test_it_is_filled_once(tmp_path: Path) -> None:
-    path = tmp_path / "j.sqlite"
-    assert filled(path)
-    assert not prefill(path, "a test", [scan("other")], NOW + SECOND)
-    assert mark(path) == (START, NOW)
-    assert select(path, "SELECT count(*) FROM scan") == [(2,)]
-
-
 def test_a_twin_that_heard_nothing_leaves_it_empty(tmp_path: Path) -> None:
     path = tmp_path / "j.sqlite"
     kept(path, [], CLOCK)

@@ -1,7 +1,6 @@
 from __future__ import annotations
 
 import os
-import sqlite3
 import time
 from collections.abc import Sequence
 from pathlib import Path
@@ -99,18 +98,6 @@ def test_a_second_twin_is_refused_by_name_and_takes_over_when_the_first_has_ende
     wait_for(lambda: second.condition.written == 1, "the second's row")
     assert wait_state(second, JournalState.RECORDING).is_well
     second.close(30.0)
-
-
-def test_a_database_of_somebody_else_is_told_and_left(path: Path) -> None:
-    path.parent.mkdir()
-    connection = sqlite3.connect(path)
-    connection.execute("CREATE TABLE theirs (x)")
-    connection.close()
-    before = path.read_bytes()
-    with recording(path) as journal:
-        journal.write(scan())
-        wait_state(journal, JournalState.FOREIGN, "not a journal of lupin-twin")
-    assert path.read_bytes() == before
 
 
 def test_a_damaged_file_is_quarantined_and_the_twin_goes_on(path: Path) -> None:

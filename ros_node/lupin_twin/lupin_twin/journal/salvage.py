@@ -152,12 +152,15 @@ def _behind_damage(lot: Callable[[int, int], object], bad: int) -> int:
 def salvage(aside: Path, connection: sqlite3.Connection) -> None:
     """Copy what can be read of a quarantined journal into a new one; rows keep their numbers.
 
-    What was copied before, by somebody who was killed amid it, is copied again.
+    What was copied before, by somebody who was killed amid it, is copied again; of a file that
+    somebody has taken away, nothing.
 
     Raises:
         sqlite3.Error, OSError: the new one cannot be written, or the old one not be opened.
 
     """
+    if not aside.exists():
+        return
     mended = aside.with_name(aside.name + ".mended")
     try:
         with closing(_opened(aside)) as old:

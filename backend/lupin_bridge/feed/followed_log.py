@@ -10,6 +10,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import logging
+import shutil
 import time
 from collections.abc import Awaitable, Callable
 from dataclasses import replace
@@ -161,7 +162,7 @@ class FollowedLog:
                 lambda: write(here, lot, twin.complete_ns, after)
             )
         except _FILE_ERRORS as error:
-            if isinstance(error, Foreign) or says_damaged(error):
+            if isinstance(error, Foreign) or says_damaged(error) or here.is_dir():
                 self._followed = None
                 await self._on_worker(lambda: _delete(here))
                 log.warning("%s cannot be used (%s): the log is copied anew", here, error)
@@ -187,6 +188,8 @@ def _written_s(path: Path) -> float:
 
 
 def _delete(path: Path) -> None:
+    if path.is_dir():
+        shutil.rmtree(path)
     for end in ("", "-wal", "-shm"):
         path.with_name(path.name + end).unlink(missing_ok=True)
 

@@ -6,7 +6,7 @@ import asyncio
 import math
 import os
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Coroutine, Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass
 from hashlib import blake2b
@@ -48,6 +48,8 @@ ResultT = TypeVar("ResultT")
 MAX_REQUESTS = 4
 
 SERVICE_LOOK_S = 0.02
+# How often who waits for an answer looks whether the twin has fallen silent.
+SILENCE_LOOK_S: Final = 0.2
 
 # ROS time beyond this, in 2001, is that of a wall's clock, and goes on while nobody tells it.
 _A_DATE_NS: Final = 10**18
@@ -249,9 +251,11 @@ class WebTwin(RosSource[WebNode, _Received]):
         try:
             async with asyncio.timeout(self.timeout_s), lane, self._slots:
                 await self._find(service)
-                return await self.thread.ask(
-                    lambda node: node.ask(service, request),
-                    lambda node, future: node.forget(service, future),
+                return await self._while_live(
+                    self.thread.ask(
+                        lambda node: node.ask(service, request),
+                        lambda node, future: node.forget(service, future),
+                    )
                 )
         except TimeoutError:
             raise TwinTimeoutError(f"the twin did not answer within {self.timeout_s:g} s") from None
@@ -264,6 +268,17 @@ class WebTwin(RosSource[WebNode, _Received]):
                 f"nothing was received on {self._names.state_topic} for {self._stale_after_s:g} s: "
                 "is the twin running?"
             )
+
+    async def _while_live(self, answer: Coroutine[Any, Any, Any]) -> Any:
+        asking = asyncio.create_task(answer)
+        try:
+            while not asking.done():
+                self._check_live()
+                await asyncio.wait((asking,), timeout=SILENCE_LOOK_S)
+            return asking.result()
+        finally:
+            asking.cancel()
+            await asyncio.wait((asking,))
 
     async def _request_field(self, epoch: int, request: FieldRequest) -> RevisedGrid:
         response = await self._request(

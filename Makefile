@@ -144,9 +144,10 @@ collect: setup
 	$(say) 'collecting the Python tests'
 	@$(TEST_ENV) $(BIN)/pytest -qq --collect-only tests >$(DONE)/collected || { cat $(DONE)/collected; exit 1; }
 
+# Twice as many workers as two cores: they wait for processes, and three of them keep 1.4 cores busy.
 unit: setup docs $(DONE)/tools ## Python tests, real ROS and real browser included
 	$(say) 'Python tests: units, ROS over DDS, browser'
-	@$(TEST_ENV) $(BIN)/pytest -q -n 3 --dist worksteal tests
+	@$(TEST_ENV) $(BIN)/pytest -q -n 4 --dist worksteal tests
 
 bench: setup $(DONE)/tools ## measure: ratios side by side, nothing asserted
 	@$(BENCH_ENV) $(BIN)/python -m tests.bench $(ARGS)

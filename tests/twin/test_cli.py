@@ -46,7 +46,7 @@ def said_beside_its_start(process: Process) -> list[str]:
 
 
 @pytest.mark.parametrize(
-    ("moment", "number"), zip(MOMENTS, 3 * (signal.SIGINT, signal.SIGTERM), strict=True)
+    ("moment", "number"), [*zip(MOMENTS, 3 * (signal.SIGINT, signal.SIGTERM), strict=True)]
 )
 def test_a_signal_during_the_start_ends_it_quietly(
     domain: int, moment: str, number: signal.Signals

@@ -49,7 +49,7 @@ from lupin_patrol.mission import (
 from lupin_patrol.perception import Sighting
 from lupin_twin.core.parameters import ParameterError
 from lupin_twin.ros.base_node import NodeUtilities, end_spinning, latched, spin_until_shutdown
-from lupin_twin.ros.convert import bloom_message, polygon_message, pose_message
+from lupin_twin.ros.convert import flower_fields, pose_message
 from lupin_twin.ros.parameters import naming, naming_own_parameters
 from lupin_twin.runtime import process
 from lupin_twin.runtime.process import remove_stale_shared_memory
@@ -224,14 +224,9 @@ def inspection(event: FlowersSeen, stamp: Time, frame_id: str) -> Observation:
     seen = message.flower
     seen.tag_id = event.tag_id
     seen.pose = PoseStamped(header=message.header, pose=message.tag_pose_in_map)
-    flower = event.flower
-    seen.species = flower.species
-    seen.confidence = float(flower.confidence)
-    seen.anomaly = flower.anomaly
-    seen.flower_count = int(flower.flower_count)
-    seen.bug_count = int(flower.bug_count)
-    seen.flowers = [bloom_message(bloom) for bloom in flower.blooms]
-    seen.box_footprint = polygon_message(flower.footprint)
+    seen.confidence = float(event.flower.confidence)
+    for name, value in flower_fields(event.flower).items():
+        setattr(seen, name, value)
     return message
 
 

@@ -381,24 +381,29 @@ def times_message(tag: TagState) -> Any:
 
 def tag_message(tag: TagState) -> Any:
     """One tag as lupin_msgs/TwinTagState, its age left for the publisher to fill in."""
-    flower = tag.flower
     return TwinTagState(
         tag_id=tag.tag_id,
         pose=pose_message(tag.pose),
         readings=[SensorReading(name=r.name, value=float(r.value)) for r in tag.readings],
         last_observed=time_msg(tag.last_observed_ns or 0),
-        species=flower.species,
-        species_confidence=float(flower.confidence),
-        anomaly=flower.anomaly,
-        flower_count=_saturated(flower.flower_count),
-        bug_count=_saturated(flower.bug_count),
-        flowers=[bloom_message(bloom) for bloom in flower.blooms],
-        box_footprint=polygon_message(flower.footprint),
+        species_confidence=float(tag.flower.confidence),
+        **flower_fields(tag.flower),
     )
 
 
-def bloom_message(bloom: Bloom) -> Any:
-    """One flower as lupin_msgs/FlowerPoint."""
+def flower_fields(flower: Flower) -> dict[str, Any]:
+    """The fields that TwinTagState and FlowerObservation share."""
+    return {
+        "species": flower.species,
+        "anomaly": flower.anomaly,
+        "flower_count": _saturated(flower.flower_count),
+        "bug_count": _saturated(flower.bug_count),
+        "flowers": [_bloom_message(bloom) for bloom in flower.blooms],
+        "box_footprint": _polygon_message(flower.footprint),
+    }
+
+
+def _bloom_message(bloom: Bloom) -> Any:
     return FlowerPoint(
         position=Point(x=float(bloom.x), y=float(bloom.y), z=float(bloom.z)),
         height_m=float(bloom.height_m),
@@ -408,8 +413,7 @@ def bloom_message(bloom: Bloom) -> Any:
     )
 
 
-def polygon_message(footprint: Iterable[tuple[float, float, float]]) -> Any:
-    """(x, y, z) points, m, as geometry_msgs/Polygon."""
+def _polygon_message(footprint: Iterable[tuple[float, float, float]]) -> Any:
     return Polygon(points=[Point32(x=float(x), y=float(y), z=float(z)) for x, y, z in footprint])
 
 

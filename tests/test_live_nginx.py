@@ -230,7 +230,10 @@ class Load:
     def run(self) -> None:
         with httpx.Client(trust_env=False, headers=BEARER, timeout=PATIENCE_S) as client:
             while not self.is_over:
-                status = client.get(self.url).status_code
+                try:
+                    status = client.get(self.url).status_code
+                except (httpx.RemoteProtocolError, httpx.ReadError):
+                    continue  # amid its answer: nginx cannot begin that anew
                 # 429: the limit for one client; 503: the good-bye of a replica that is told to end.
                 if status not in (200, 429, 503):
                     self.refused.append(status)

@@ -31,7 +31,6 @@ from tests.support.state_home import use_own
 
 REPLICAS, TAGS, MEASURED_S = 3, 30, 10.0
 COUNTS = (300, 1_500, 3_000, 6_000)
-SENSORS = ("temperature", "humidity", "co2", "light")
 
 
 def record(journal: Path, ending: threading.Event) -> None:
@@ -85,9 +84,11 @@ def main(arguments: Sequence[str] = ()) -> None:
         archive = Archive(stack.enter_context(server(fsync=True)), "gh0")
         archive.add_user("page", "lupin_page")
         journal, now_ns = folder / "gh0", time.time_ns()
-        values = dict.fromkeys(SENSORS, 20.0)
         rows: list[Row] = [pin(str(tag), now_ns - 600 * SECOND, float(tag)) for tag in range(TAGS)]
-        rows += [scan(str(tag), now_ns - SECOND, **values) for tag in range(TAGS)]  # type: ignore[arg-type]
+        rows += [
+            scan(str(tag), now_ns - SECOND, temperature=20.0, humidity=50.0, co2=410.0, light=300.0)
+            for tag in range(TAGS)
+        ]
         write(journal, rows)
         stack.enter_context(forwarder(archive, journal))
         pages = [

@@ -136,6 +136,15 @@ def test_of_one_site_alone(sites: Archive) -> None:
     )
 
 
+def test_a_month_in_which_another_site_has_rows_stays(sites: Archive) -> None:
+    sites.copy_site("gh3")
+    retain(sites, 60, "--site", "gh1")
+    assert sorted(row[2] for row in sites.rows()["scan"]) == stamps(*AGES)[2:]
+    for table, stamp in (("scan", 2), ("look", 3)):
+        assert sorted(row[stamp] for row in sites.rows("gh3")[table]) == stamps(*AGES)
+    assert exists(sites, month(stamps(*AGES)[0]))
+
+
 def test_what_was_deleted_is_not_forwarded_again(sites: Archive, tmp_path: Path) -> None:
     retain(sites, 60)
     before = sites.rows()

@@ -132,7 +132,7 @@ class Load:
                 for path in paths:
                     try:
                         status = client.get(path).status_code
-                    except httpx.RemoteProtocolError:
+                    except (httpx.RemoteProtocolError, httpx.ReadError):
                         continue  # amid its answer
                     if status not in (200, 429):
                         self.strange.append(f"{path}: {status}")

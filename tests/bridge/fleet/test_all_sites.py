@@ -42,7 +42,8 @@ def test_alarms_of_all_sites_the_worst_first(archive: Archive, tmp_path: Path) -
         tmp_path,
         {
             "gh1": scans_lately(temperature=28.0, tags=2),
-            "gh2": scans_lately(temperature=45.0, tags=1),
+            # Raised before the others.
+            "gh2": scans_lately(temperature=45.0, tags=1, scans=9),
             "well": scans_lately(temperature=22.0),
         },
     )

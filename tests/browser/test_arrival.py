@@ -38,7 +38,7 @@ def test_a_late_page_shows_every_tag_at_once_while_the_twin_is_silent(
             *(scan(i, {"temperature": 15.0 + int(i)}, at=(int(i) % 7, int(i) // 7)) for i in ids)
         )
         running.tag("28")
-        hmi = open_page(running.url)
+        hmi = open_page(running.url, "sort=tag")
         hmi.expect_rows(*ids)
         expect(hmi.cell("28", "temperature")).to_contain_text("43.0")
         hmi.expect_phase("live")

@@ -93,7 +93,7 @@ def test_a_bound_that_cannot_be_says_so_and_does_not_stay(hmi: Hmi) -> None:
     low.fill("99")
     expect(low).to_have_attribute("aria-invalid", "true")
     expect(hmi.page.locator(".bound").get_by_role("alert")).to_have_text(
-        f"Not below {high}: not in use"
+        f"Must be below {high}: not applied"
     )
     low.press("Escape")
     expect(low).to_have_value(was)

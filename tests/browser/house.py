@@ -11,7 +11,7 @@ from tests.support.waiting import wait_for
 from tests.support.web import Bridge
 
 # As the table has them: the worst first, of equals numbers in their order, then names.
-TAGS = ("10", "failed", "3", "seen", "1", "2", "9")
+TAGS = ("10", "3", "failed", "seen", "1", "2", "9")
 
 
 def observations() -> list[Any]:

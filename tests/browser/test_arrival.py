@@ -38,7 +38,7 @@ def test_a_late_page_shows_every_tag_at_once_while_the_twin_is_silent(
             *(scan(i, {"temperature": 15.0 + int(i)}, at=(int(i) % 7, int(i) // 7)) for i in ids)
         )
         running.tag("28")
-        hmi = open_page(running.url)
+        hmi = open_page(running.url, "sort=tag")
         hmi.expect_rows(*ids)
         expect(hmi.cell("28", "temperature")).to_contain_text("43.0")
         hmi.expect_phase("live")
@@ -135,7 +135,7 @@ def test_a_look_at_the_flowers_makes_no_reading_young(open_page: OpenPage) -> No
         age = card.locator("[data-sensor=temperature] .age")
         expect(age).to_have_text(re.compile(r"^2\sh 1\smin"))
         expect(card.locator("[data-sensor=co2] .age")).to_have_text(re.compile(r"^10\smin$"))
-        expect(card).to_contain_text(re.compile(r"Flowers seen\s?2\ss"))
+        expect(card).to_contain_text(re.compile(r"Flowers inspected\s?2\ss"))
         expect(card.get_by_role("region", name="Last attempts").locator("li")).to_have_count(3)
 
 

@@ -12,10 +12,10 @@ from collections.abc import Callable, Hashable, Iterator, Mapping
 from dataclasses import replace
 from typing import Final
 
-from lupin_bridge.alarms.board import AlarmBoard, Board
+from lupin_bridge.alarms.board import AlarmBoard
 from lupin_bridge.alarms.feed import AlarmFeed
 from lupin_bridge.alarms.ledger import Change
-from lupin_bridge.alarms.notes import NoteBoard, notes_of_alarms
+from lupin_bridge.alarms.notes import NoteBoard
 from lupin_bridge.feed.estimates import EstimateFollower, Reports
 from lupin_bridge.feed.shared_work import Shared
 from lupin_bridge.feed.source import TwinSource, TwinUpdate
@@ -31,14 +31,12 @@ from lupin_bridge.rate_limit import RateLimit
 from lupin_bridge.serving.admission import Admission, Answer, AnswerCache, Limits
 from lupin_bridge.serving.middleware import route_class
 from lupin_bridge.settings import Settings
-from lupin_bridge.stream.frames import FrameWriter, text_frame
-from lupin_bridge.stream.health_json import alarms_frame, alarms_in_frame
+from lupin_bridge.stream.frames import FrameWriter, alarms_message
 from lupin_bridge.stream.hub import Client, Hub
 from lupin_bridge.stream.status import Liveness, Status
 from lupin_bridge.viewers.foxglove_session import Offer
 from lupin_twin.core.diagnostics import Origin
 from lupin_twin.core.drops import LATE, LOST, Reason
-from lupin_twin.core.notes import Note
 from lupin_twin.core.state import NANOSECONDS_PER_SECOND, Snapshot
 from lupin_twin.runtime.workers import Workers
 
@@ -393,26 +391,16 @@ class Bridge:
         while True:
             await self._has_alarms.wait()
             self._has_alarms.clear()
-            write = self._alarms_writer(self.alarms.now, self.ros_time_ns, self.notes.notes or ())
+            now = self.alarms.now, self.ros_time_ns, self.notes.notes or ()
+            write = self.source.workers.submit(lambda _, now=now: alarms_message(*now), ALARMS_S)
             try:
-                wire = await asyncio.wrap_future(self.source.workers.submit(write, ALARMS_S))
+                wire = await asyncio.wrap_future(write)
                 self.hub.publish_alarms(wire, self._clock())
             except Exception:  # nobody waits for this task: the next alarms are sent
                 log.exception("the newest alarms could not be sent")
                 continue
             # Of many alarms that change all the time, no more is sent than a browser can take.
             await asyncio.sleep(max(ALARMS_REST_S, len(wire) / ALARM_BYTES_PER_S))
-
-    @staticmethod
-    def _alarms_writer(
-        now: Board, now_ns: int | None, notes: tuple[Note, ...]
-    ) -> Callable[[object], bytes]:
-        def write(_: object) -> bytes:
-            said = notes_of_alarms(now.alarms, notes, now_ns)
-            shown = alarms_in_frame(now.page, now_ns)
-            return text_frame(alarms_frame(shown, now.source, now.since_ns, said))
-
-        return write
 
     def _on_death(self) -> None:
         self.liveness.thread_dead = True

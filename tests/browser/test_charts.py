@@ -356,7 +356,7 @@ def test_the_difference_layer_is_one_field_less_the_other(
     most = float(np.nanmax(np.abs(between)))
     text = hmi.test_id("difference-high").inner_text().split("\u00a0")[0]
     assert float(text) == pytest.approx(most, abs=0.06)
-    expect(hmi.test_id("difference-legend")).to_contain_text("less")
+    expect(hmi.test_id("difference-legend")).to_contain_text("minus")
     # Right on a tag: its own two values.
     hmi.point_at(1.0, 1.0)
     values = [

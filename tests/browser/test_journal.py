@@ -92,7 +92,7 @@ def test_a_full_disk_is_told_everywhere_costs_nothing_and_heals(
             ),
             "the same in the metrics",
         )
-        words = ("Nothing is being recorded.", "make room, or see to the disk")
+        words = ("Nothing is being recorded.", "Free disk space, or check the disk")
         hmi.expect(
             lambda: is_full() and all(word in troubles.inner_text() for word in words), "the page"
         )

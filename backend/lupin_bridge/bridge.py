@@ -391,16 +391,19 @@ class Bridge:
         while True:
             await self._has_alarms.wait()
             self._has_alarms.clear()
-            now = self.alarms.now, self.ros_time_ns, self.notes.notes or ()
-            write = self.source.workers.submit(lambda _, now=now: alarms_message(*now), ALARMS_S)
+            write = self._alarms_writer()
             try:
-                wire = await asyncio.wrap_future(write)
+                wire = await asyncio.wrap_future(self.source.workers.submit(write, ALARMS_S))
                 self.hub.publish_alarms(wire, self._clock())
             except Exception:  # nobody waits for this task: the next alarms are sent
                 log.exception("the newest alarms could not be sent")
                 continue
             # Of many alarms that change all the time, no more is sent than a browser can take.
             await asyncio.sleep(max(ALARMS_REST_S, len(wire) / ALARM_BYTES_PER_S))
+
+    def _alarms_writer(self) -> Callable[[object], bytes]:
+        board, now_ns, notes = self.alarms.now, self.ros_time_ns, self.notes.notes or ()
+        return lambda _: alarms_message(board, now_ns, notes)
 
     def _on_death(self) -> None:
         self.liveness.thread_dead = True

@@ -340,3 +340,20 @@ def open_hmi(
             hmi.go(fragment, query)
         yield hmi
         hmi.check_manners()
+
+
+def slider(hmi: Hmi) -> Locator:
+    """The time bar's."""
+    return hmi.page.get_by_role("slider", name="Time shown")
+
+
+def point(hmi: Hmi, share: float) -> tuple[float, float]:
+    """The point of the page where so much of the time bar is to its left."""
+    box = slider(hmi).bounding_box()
+    assert box is not None
+    return box["x"] + share * box["width"], box["y"] + box["height"] / 2
+
+
+def press_at(hmi: Hmi, share: float) -> None:
+    """Go to the moment there."""
+    hmi.page.mouse.click(*point(hmi, share))

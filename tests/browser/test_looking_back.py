@@ -12,13 +12,13 @@ from typing import Final
 from urllib.parse import parse_qsl, urlsplit
 
 import pytest
-from playwright.sync_api import Locator, Route, expect
+from playwright.sync_api import Route, expect
 
 from lupin_twin.journal.fold import state_at
 from lupin_twin.journal.rows import Row
 from lupin_twin.journal.runs import Clock
 from lupin_twin.journal.schema import open_reader
-from tests.browser.hmi import PHONE, Hmi, OpenPage
+from tests.browser.hmi import PHONE, Hmi, OpenPage, point, press_at, slider
 from tests.browser.test_accessibility import violations
 from tests.support.journal import SECOND, kept, look, pin, scan
 from tests.support.messages import scan as observed
@@ -91,21 +91,6 @@ def page(hour: Hour, open_page: OpenPage) -> Hmi:
     hmi.expect_samples(3)
     expect(hmi.test_id("timebar")).to_have_attribute("data-state", "ready")
     return hmi
-
-
-def slider(hmi: Hmi) -> Locator:
-    return hmi.page.get_by_role("slider", name="Time shown")
-
-
-def point(hmi: Hmi, share: float) -> tuple[float, float]:
-    """The point of the page where so much of the bar is to its left."""
-    box = slider(hmi).bounding_box()
-    assert box is not None
-    return box["x"] + share * box["width"], box["y"] + box["height"] / 2
-
-
-def press_at(hmi: Hmi, share: float) -> None:
-    hmi.page.mouse.click(*point(hmi, share))
 
 
 def moment(hmi: Hmi) -> float | None:

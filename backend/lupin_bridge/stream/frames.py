@@ -11,16 +11,26 @@ from dataclasses import dataclass, field
 import orjson
 from websockets.frames import Frame, Opcode
 
+from lupin_bridge.alarms.board import Board
+from lupin_bridge.alarms.notes import notes_of_alarms
 from lupin_bridge.judge.judging import NOTHING_JUDGED, Judged
-from lupin_bridge.stream.health_json import HealthJson
+from lupin_bridge.stream.health_json import HealthJson, alarms_frame, alarms_in_frame
 from lupin_bridge.stream.state_json import StateJson, header
 from lupin_bridge.stream.status import Status
+from lupin_twin.core.notes import Note
 from lupin_twin.core.state import Snapshot, TagState
 
 
 def text_frame(payload: bytes) -> bytes:
     """UTF-8 text as one WebSocket text frame; a server does not mask (RFC 6455, section 5.1)."""
     return Frame(Opcode.TEXT, payload).serialize(mask=False)
+
+
+def alarms_message(now: Board, now_ns: int | None, notes: tuple[Note, ...]) -> bytes:
+    """The message with the alarms of now, and what people said of them."""
+    said = notes_of_alarms(now.alarms, notes, now_ns)
+    shown = alarms_in_frame(now.page, now_ns)
+    return text_frame(alarms_frame(shown, now.source, now.since_ns, said))
 
 
 def status_frame(status: Status) -> bytes:

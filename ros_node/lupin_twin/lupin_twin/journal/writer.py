@@ -1,8 +1,7 @@
 """The journal as the twin sees it: hand over, and get what was known before.
 
 One thread opens, writes, checkpoints and looks after the file; another syncs it. Whatever happens
-to the disk happens to them: nothing here raises, waits or grows without bound on the caller's
-thread.
+to the disk happens to them: nothing here raises, waits or grows without bound for the caller.
 """
 
 from __future__ import annotations
@@ -125,22 +124,19 @@ class Pending:
 # half of the 100 ms in which they are safe from a killed process. Late ones do not wait.
 _GATHER_S: Final = 0.04
 _MAX_BATCH: Final = 500
-# Ten times what is promised: a checkpoint on a slow disk is no reason yet to alarm anybody.
-_SLOW_S: Final = 1.0
+_SLOW_S: Final = 1.0  # ten times what is promised: a checkpoint on a slow disk alarms nobody yet
 _RETRY_S: Final = (0.5, 1.0, 2.0, 5.0, 10.0)
-# With nothing to write: how often the file is looked after.
-_IDLE_S: Final = 1.0
+_IDLE_S: Final = 1.0  # with nothing to write: how often the file is looked after
 # Readers have a file quarantined no oftener: were it their fault, copies would fill the disk.
 _HEAL_EVERY_S: Final = 86_400.0
-
 _WELL: Final = (JournalState.RECORDING, JournalState.OFF)
 _HEALED_IN: Final = (*_WELL, JournalState.FAILING)
 
 
 class _Era(NamedTuple):
-    """A clock that the twin has followed, and why; `scans` are restored per series at the start.
+    """A clock that the twin has followed, and why; `before_ns` is where the one before it was.
 
-    `before_ns` is where the one before it had come to, where the twin saw it go back.
+    `scans` are restored per series at the start.
     """
 
     clock: Clock
@@ -152,8 +148,7 @@ class _Era(NamedTuple):
 class Journal:
     """Records from construction to `close`. Every method is for the thread that hands over.
 
-    `origin` is where what is recorded comes from. `is_temporary`: the file's folder is its own and
-    goes at the end.
+    `is_temporary`: the file's folder is its own and goes at the end.
     """
 
     def __init__(

@@ -83,10 +83,10 @@ class Apart:
         options = (*OFTEN, "-p", f"journal:={JOURNAL}")
         return self.stack.enter_context(Process([*command, *options], ros_env(self.domain)))
 
-    def start_web(self, *, beside: bool = False) -> Bridge:
+    def start_web(self, *more: str, beside: bool = False) -> Bridge:
         program = [sys.executable, "-m", "tests.support.limited", "web", "--port", "0"]
         held = limits(answer_timeout_s=PATIENCE_S, alarm_days=3_652, answers_per_s=10_000)
-        options = [*held, "--day-hours", "00:00-00:00"]
+        options = [*held, "--day-hours", "00:00-00:00", *more]
         where = ["env", "-C", str(self.folder)] if beside else []
         env = ros_env(self.domain, XDG_STATE_HOME=str(self.state), PYTHONPATH=str(ROOT))
         process = self.stack.enter_context(Process([*where, *program, *options], env))
@@ -250,6 +250,20 @@ def test_a_followed_file_that_is_harmed_is_copied_anew(apart: Apart, harm: str) 
     assert apart.followed() == [file]
 
 
+def test_the_twins_file_may_be_named_where_it_has_another_path_here(apart: Apart) -> None:
+    file = str(apart.folder / "j.sqlite")
+    named = apart.start_web("--journal", file)
+    wait_until_ready(named)
+
+    def is_read() -> bool:
+        journal = named.get("/readyz").json()["journal"]
+        return (journal["state"], journal["path"]) == ("recording", file)
+
+    wait_for(is_read, "the named file to be read")
+    path = f"/api/state?at={T + 100}"
+    assert still(named.http.get(path)) == still(apart.beside.http.get(path))
+
+
 def test_without_its_twin_web_answers_all_the_same_and_goes_on_with_the_next(apart: Apart) -> None:
     """Last: it ends the twin."""
     before = {path: apart.beside.http.get(path) for path in QUESTIONS[:-2]}
@@ -267,6 +281,8 @@ def test_without_its_twin_web_answers_all_the_same_and_goes_on_with_the_next(apa
     # Another journal is followed into another file.
     for file in apart.folder.glob("j.sqlite*"):
         file.rename(file.with_name(f"old-{file.name}"))
+    # What is latched for the next twin is of later than that afternoon, whatever ran before.
+    apart.peer.observe(*(scan("a", {"co2": 1.0}, stamp_s=T + 9_000 + n) for n in range(50)))
     apart.twin = apart.start_twin()
     apart.peer.wait_for_twin()
     apart.peer.observe(scan("new", {"co2": 1.0}, stamp_s=T))

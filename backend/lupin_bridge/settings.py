@@ -124,6 +124,11 @@ class Settings:
         "", "webhook", "file with the secret that signs them, a line of text"
     )
     webhook_ca: str = _setting("", "webhook", "PEM file with who signs the receiver's certificate")
+    journal: str = _setting(
+        "",
+        "past",
+        "for web: the file of its twin's journal, where this machine knows it by another path",
+    )
     site: str = _setting(
         "", "archive", "the greenhouse's name in the archive, and its user's, such as gh1"
     )

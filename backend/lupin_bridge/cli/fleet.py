@@ -24,7 +24,7 @@ from lupin_bridge.settings import Secrets, SettingError, Settings, option, varia
 log = logging.getLogger("lupin_bridge")
 
 # Of the twin's own: a fleet has none.
-_NOT_HERE = ("site", "mqtt_url", "webhook_url")
+_NOT_HERE = ("site", "journal", "mqtt_url", "webhook_url")
 
 
 def run(settings: Settings, secrets: Secrets, ros_args: Sequence[str]) -> None:

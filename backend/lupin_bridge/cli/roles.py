@@ -97,6 +97,10 @@ async def _run(
     criteria = Criteria.of(settings)
     targets = Targets.of(settings, secrets)
     child.check(settings, role)
+    if settings.journal and role != "web":
+        raise SettingError(
+            f"{settings.called('journal')} is for web; a twin's own file is its parameter journal"
+        )
     listener = open_listener(settings, access)
     if not has_page():
         log.warning("the page was not built, / says so: %s", HOW_TO_BUILD)
@@ -106,7 +110,7 @@ async def _run(
     if feed is not None and feed.journal is not None:
         feed = await asyncio.to_thread(demo.with_past, feed, feed.journal, patrol_args)
     limits = Limits()
-    source = _source_of(role, ros_args, feed, limits)
+    source = _source_of(role, settings, ros_args, feed, limits)
     bridge = Bridge(source, settings, criteria=criteria, outward=Channels(targets), limits=limits)
     app = create_app(bridge, access=access, proxies=proxies)
 
@@ -128,11 +132,20 @@ async def _run(
 
 
 def _source_of(
-    role: str, ros_args: Sequence[str], feed: demo.Feed | None, limits: Limits
+    role: str,
+    settings: Settings,
+    ros_args: Sequence[str],
+    feed: demo.Feed | None,
+    limits: Limits,
 ) -> LocalTwin | WebTwin:
     timeout_s = limits.answer_timeout_s
     if role == "web":
-        return WebTwin(ros_args=ros_args, timeout_s=timeout_s, stale_after_s=STALE_AFTER_S)
+        return WebTwin(
+            ros_args=ros_args,
+            timeout_s=timeout_s,
+            stale_after_s=STALE_AFTER_S,
+            journal=Path(settings.journal).absolute() if settings.journal else None,
+        )
     # The feed's arguments are for the twin alone: its feeder has no journal.
     own_args = [] if feed is None else feed.twin_args
     world = World() if feed is None else feed.world

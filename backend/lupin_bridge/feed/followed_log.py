@@ -55,16 +55,22 @@ _ERRORS: Final = (
 class FollowedLog:
     """`condition` is that of the log which is read here; None: there is none yet.
 
-    `query(after)` gives the rows behind a number. `reported` is what the twin said last of its
-    journal. Belongs to the event loop.
+    `query(after)` gives the rows behind a number. `named` is the twin's own file as it is called
+    here, None: as the twin calls it. Belongs to the event loop.
     """
 
-    def __init__(self, query: Callable[[int], Awaitable[Lot]], workers: Workers) -> None:
+    def __init__(
+        self,
+        query: Callable[[int], Awaitable[Lot]],
+        workers: Workers,
+        named: Path | None = None,
+    ) -> None:
         self._query = query
+        self._named = named
         self._workers = workers
         self._folder: Path | None = None
         self._reported = UNKNOWN
-        self._is_own = False
+        self._own: Path | None = None
         self._followed: Followed | None = None
         self._is_known = asyncio.Event()
         self._task: asyncio.Task[None] | None = None
@@ -72,8 +78,8 @@ class FollowedLog:
     @property
     def condition(self) -> Condition | None:
         """See above."""
-        if self._is_own:
-            return self._reported
+        if self._own is not None:
+            return replace(self._reported, path=str(self._own))
         if self._followed is None:
             return None
         # A twin that cannot write its journal, or is gone, keeps nobody from reading what is here.
@@ -92,7 +98,7 @@ class FollowedLog:
 
     async def explain(self, error: NotRemembered) -> NotRemembered:
         """The same error, but of a copy: that is made anew here, and not by the twin."""
-        if self._is_own or self._followed is None:
+        if self._own is not None or self._followed is None:
             return error
         path = self._path(self._followed.journal)
         if str(path) not in str(error):
@@ -148,8 +154,10 @@ class FollowedLog:
         twin = self._reported
         if not twin.journal_id:
             return LOOK_S
-        self._is_own = await self._on_worker(lambda: _is_journal(Path(twin.path), twin.journal_id))
-        if self._is_own or self._folder is None:
+        own = self._named or Path(twin.path)
+        is_own = await self._on_worker(lambda: _is_journal(own, twin.journal_id))
+        self._own = own if is_own else None
+        if is_own or self._folder is None:
             return RETRY_S
         here = self._path(twin.journal_id)
         try:

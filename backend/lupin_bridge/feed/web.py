@@ -76,18 +76,24 @@ class _Received:
 class WebTwin(RosSource[WebNode, _Received]):
     """`TwinSource` over the ROS contracts of a twin in another process.
 
-    One that was received, and then for `stale_after_s` no more, is asked nothing.
+    One that was received, and then for `stale_after_s` no more, is asked nothing. `journal` is its
+    file as it is called here; None: as the twin calls it.
     """
 
     def __init__(
-        self, *, ros_args: Sequence[str], timeout_s: float, stale_after_s: float = math.inf
+        self,
+        *,
+        ros_args: Sequence[str],
+        timeout_s: float,
+        stale_after_s: float = math.inf,
+        journal: Path | None = None,
     ) -> None:
         super().__init__(ros_args=ros_args, timeout_s=timeout_s)
         self._stale_after_s = stale_after_s
         self._received = _Received()
         self._frame_id: str
         self._requests: Shared[RevisedGrid] = Shared()
-        self._log = FollowedLog(self._rows_behind, self.workers)
+        self._log = FollowedLog(self._rows_behind, self.workers, journal)
         self._slots = asyncio.Semaphore(MAX_REQUESTS)
         # One way is left to the small, which would wait behind the large otherwise.
         self._large_slots = asyncio.Semaphore(MAX_REQUESTS - 1)

@@ -11,7 +11,7 @@ import pytest
 
 from lupin_bridge.stream import schema
 from tests.support.domains import own_domain
-from tests.support.live import attached
+from tests.support.live import attached, wait_until_ready
 from tests.support.messages import look, scan
 from tests.support.processes import OFTEN, lupin_twin
 from tests.support.ros import Peer
@@ -103,6 +103,7 @@ def test_a_cold_day_is_a_status_and_an_alarm_live_and_as_of_a_moment_in_serve_an
         live = start("serve", *journal)
         peer.wait_for_twin()
         replica = start("web")
+        wait_until_ready(replica)
         for back in range(50, -1, -1):
             peer.observe(scan("a", {"temperature": 16.0}, stamp_s=now - back * hour))
         cold = ("temperature_24h_mean", "stressed")

@@ -202,7 +202,7 @@ BODIES = {
     "chunks": (b"GET / HTTP/1.1\r\nTransfer-Encoding: chunked\r\n", CHUNKS),
     "chunks, POST": (b"POST /api/signin HTTP/1.1\r\nTransfer-Encoding: chunked\r\n", CHUNKS),
     "a length": (b"GET / HTTP/1.1\r\nContent-Length: 16000000\r\n", bytes(60_000)),
-    "a length, POST": (b"POST /api/signin HTTP/1.1\r\nContent-Length: 1\r\n", bytes(60_000)),
+    "a length, POST": (b"POST /api/signin HTTP/1.1\r\nContent-Length: 8193\r\n", bytes(60_000)),
 }
 
 

@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 from typing import Any
 
 import httpx
 import pytest
 
-from tests.support.domains import own_domain
+from tests.support.docs import ROOT
+from tests.support.domains import own_domain, ros_env
 from tests.support.live import attached
 from tests.support.messages import look
 from tests.support.people import OWN, add, signed_in, write
-from tests.support.processes import lupin_twin
+from tests.support.processes import Process, lupin_twin
 from tests.support.ros import Peer
 from tests.support.waiting import wait_for
 from tests.support.web import Bridge, bridge
@@ -62,12 +64,15 @@ def test_web_shows_the_same_notes_and_says_where_to_write_them(
 ) -> None:
     # Another file for each process, as on another host: that of its own working folder.
     journal = "/proc/self/cwd/j.sqlite" if is_copy else str(tmp_path / "j.sqlite")
-    options = ("--accounts", str(accounts))
+    options = ["--accounts", str(accounts)]
+    serve = [sys.executable, "-m", "lupin_bridge.cli.command", "serve", "--port", "0", *options]
+    command = ["env", "-C", str(tmp_path), *serve, "--ros-args", "-p", f"journal:={journal}"]
     with (
         own_domain() as domain,
-        bridge(*options, "--ros-args", "-p", f"journal:={journal}", domain=domain) as live,
+        Process(command, ros_env(domain, PYTHONPATH=str(ROOT))) as serving,
         lupin_twin(domain, "web", *options) as process,
         Peer(domain) as peer,
+        attached(serving, peer) as live,
         attached(process, peer) as web,
     ):
         note = acknowledged(live)

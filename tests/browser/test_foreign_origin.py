@@ -245,7 +245,7 @@ def test_over_plain_http_a_page_of_the_same_host_computes_nothing_and_signs_nobo
         page = another.new_page()
         url = f"http://twin.example:{it.url.rpartition(':')[2]}"
         page.goto(f"{url}/signin")
-        page.locator("input").fill(TOKEN)
+        page.get_by_role("textbox", name="Access token").fill(TOKEN)
         page.locator("button").click()
         expect(page).to_have_url(f"{url}/")
         page.goto(origin)

@@ -326,5 +326,5 @@ def test_help_takes_the_focus_and_single_keys_work_unless_typing_or_switched_off
     hmi.page.keyboard.press("Escape")
     hmi.page.keyboard.press("1")
     hmi.page.keyboard.press("n")
-    expect(hmi.card("1")).to_be_visible()
+    expect(hmi.card("10")).to_be_visible()
     expect(hmi.test_id("legend")).to_contain_text("CO₂ ppm")

@@ -9,6 +9,7 @@ from statistics import fmean
 from typing import Any, TypeVar
 
 from lupin_bridge.feed.query import Question, Work
+from lupin_twin.core.notes import NotesRequest, PastNotes
 from lupin_twin.core.past import Event, NotRemembered, PastRow, SeriesPast, SeriesRequest
 from lupin_twin.core.state import Snapshot
 from lupin_twin.core.writes import PastWrite, RecentRequest, WritesRequest
@@ -28,6 +29,8 @@ async def look_up(question: Question[ResultT], past: Any, workers: Workers) -> R
                 need = looking.send(await past.series(need))
             elif isinstance(need, RecentRequest):
                 need = looking.send(await past.recent(need))
+            elif isinstance(need, NotesRequest):
+                need = looking.send(await past.notes(need))
             elif isinstance(need, WritesRequest):
                 raise NotRemembered("what was heard is asked of the journal", is_lasting=True)
             else:
@@ -62,6 +65,10 @@ class MadeUp:
         """Nothing: what the state has is all there is."""
         self._note(request.at_ns)
         return ()
+
+    async def notes(self, _request: NotesRequest) -> PastNotes:
+        """Nobody has said anything."""
+        return PastNotes("", 0, ())
 
     async def series(self, request: SeriesRequest) -> SeriesPast:
         """The points of a period, or as many buckets as are asked for."""

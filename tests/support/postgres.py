@@ -9,7 +9,7 @@ import signal
 import subprocess
 import tempfile
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 import psycopg
@@ -106,7 +106,8 @@ class Postgres:
         # First of all itself: then there is no other one.
         os.kill(pid, number)
         for child in Path(f"/proc/{pid}/task/{pid}/children").read_text().split():
-            os.kill(int(child), number)
+            with suppress(ProcessLookupError):  # one that has ended meanwhile
+                os.kill(int(child), number)
 
     def kill(self) -> None:
         """Kill it; its other processes end by themselves when they see that."""

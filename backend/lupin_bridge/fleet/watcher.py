@@ -32,7 +32,7 @@ from lupin_bridge.judge.verdict import Verdict
 from lupin_bridge.serving.admission import Limits
 from lupin_bridge.settings import Settings
 from lupin_bridge.stream.health_json import alarm_json
-from lupin_twin.core.diagnostics import origin_of
+from lupin_twin.core.diagnostics import Origin, origin_of
 from lupin_twin.core.state import Snapshot, TagState
 from lupin_twin.core.writes import RecentRequest, WritesRequest
 from lupin_twin.journal.fold import state_at
@@ -62,10 +62,7 @@ _FACTS: Final = (
     " coalesce(heard_at > now() - make_interval(secs => %s), false),"
     " coalesce((SELECT seq_offset + forwarded_seq FROM epoch WHERE epoch.site = site.site"
     " ORDER BY epoch DESC LIMIT 1), 0),"
-    " (SELECT value FROM meta WHERE meta.site = site.site AND key = %s),"
-    # By a clock that is simulated, no robot works.
-    " coalesce((SELECT is_simulated FROM run WHERE run.site = site.site"
-    " ORDER BY run DESC LIMIT 1) = 1, false)"
+    " (SELECT value FROM meta WHERE meta.site = site.site AND key = %s)"
     " FROM site LEFT JOIN forwarder ON forwarder.site = site.site ORDER BY site.site"
 )
 _NEWEST: Final = (
@@ -94,6 +91,13 @@ class _Judged:
     judged_s: float = field(default_factory=time.monotonic)
 
 
+def _origin(name: str, judged: _Judged | None) -> Origin:
+    """By a clock that is simulated no robot works; which clock it is, is known of a judged site."""
+    if judged is None or judged.snapshot is None:
+        return "unknown" if name == "robot" else origin_of(name, is_simulated=False)
+    return origin_of(name, is_simulated=judged.is_simulated)
+
+
 class Watcher:
     """Looks at the sites of an archive, over one connection."""
 
@@ -109,7 +113,7 @@ class Watcher:
         ((now_ns,),) = execute(_NOW).fetchall()
         before, self.sites = self.sites, {}
         for site, *facts in execute(_FACTS, (LIVE_S, ORIGIN)).fetchall():
-            name, heard_ns, is_live, last_seq, origin, is_simulated = facts
+            name, heard_ns, is_live, last_seq, origin = facts
             known = before.get(site, Site(site))
             self.sites[site] = replace(
                 known,
@@ -117,7 +121,7 @@ class Watcher:
                 heard_ns=heard_ns,
                 is_live=is_live,
                 last_seq=last_seq,
-                origin=origin_of(origin or "", is_simulated=is_simulated),
+                origin=_origin(origin or "", self._judged.get(site)),
             )
         grown = [
             name

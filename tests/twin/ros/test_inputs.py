@@ -32,6 +32,23 @@ def test_other_users_are_those_who_own_ports_of_the_domain(tmp_path: Path) -> No
     assert other_users(1, tmp_path / "none", own + 1) == []
 
 
+def test_who_has_said_nothing_for_long_begins_with_1() -> None:
+    gaps = Gaps()
+    assert gaps.see(7, lambda: 3) == 0
+    gaps.settle(3)
+    gaps.settle(3)
+    # Whose 951 is, is not told: the rest is counted as the other's number comes.
+    assert [gaps.see(number, lambda: 3) for number in (951, 8, 1, 952)] == [943, 7, 0, 0]
+    assert gaps.lost == 950
+
+
+def test_who_comes_behind_those_who_have_said_nothing_may_begin_anywhere() -> None:
+    gaps = Gaps()
+    gaps.settle(1)
+    gaps.unsettle()
+    assert gaps.see(951, lambda: 1) == 0
+
+
 def test_what_two_subscriptions_receive_is_taken_once() -> None:
     source = Input(depth=50)
     source.subscriptions = 2

@@ -82,6 +82,14 @@ class Gaps:
         self.lost += lost
         return lost
 
+    def settle(self, writers: int) -> None:
+        """Note that of so many writers those without a message by now have published none yet."""
+        self._next[:0] = [1] * (writers - len(self._next))
+
+    def unsettle(self) -> None:
+        """Note that other writers are there than before: whoever is new may begin anywhere."""
+        self._next = [expected for expected in self._next if expected != 1]
+
 
 class Input:
     """Follows the messages and publishers of a topic; belongs to its node's thread."""
@@ -115,8 +123,11 @@ class Input:
         before, self._publishers = self._publishers, frozenset(_id(one) for one in publishers)
         if before != self._publishers:
             self._since_s = now_s
+            self.gaps.unsettle()
         unlike = [one for one in publishers if _faults(one)]
         has_settled = now_s - self._since_s >= SETTLED_S
+        if has_settled and not unlike:
+            self.gaps.settle(len(publishers))
         for one in unlike:
             why, remedies = zip(*_faults(one), strict=True)
             yield (

@@ -155,6 +155,8 @@ def test_a_client_that_does_not_read_has_no_more_answers_under_way_over_all_site
     page: Page,
 ) -> None:
     dear = "api/field.json?sensor_type=temperature&resolution=0.005"
+    for name in SITES[:2]:
+        assert page.http.get(f"/sites/{name}/api/state").status_code == 200
     with deaf_client(page.url, f"/sites/gh1/{dear}"):
         wait_for(
             lambda: page.http.get(f"/sites/gh2/{HISTORY}").status_code == 429,

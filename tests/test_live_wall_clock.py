@@ -203,7 +203,10 @@ def test_who_started_a_year_ahead_and_starts_again_by_a_right_clock_knows_all_at
     with both(year, clock) as (twin, apart):
         for live in (twin, apart):
             live.tag("1")
-            assert status(live)["journal"]["state"] == "doubting"
+            twin.peer.until(
+                lambda live=live: status(live)["journal"]["state"] == "doubting",  # type: ignore[misc]
+                "the doubt",
+            )
             assert values(live.json("/api/state")["tags"]) == now
             check_year(live, year)
     assert select(year.path, "SELECT run, joins FROM run") == [(1, None)]

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import signal
 import sys
 from collections.abc import Sequence
-from threading import Event, Thread, main_thread
 from typing import NoReturn
 
 from lupin_twin.runtime import process
@@ -48,31 +46,10 @@ def command() -> NoReturn:
 
 
 def _run() -> int:
-    from rclpy.executors import SingleThreadedExecutor  # noqa: PLC0415
-
-    from lupin_twin.ros.base_node import end_spinning, spin_until_shutdown  # noqa: PLC0415
+    from lupin_twin.ros.base_node import run_until_signal  # noqa: PLC0415  # see above
     from lupin_twin.ros.node import TwinNode  # noqa: PLC0415
 
-    node = TwinNode()
-    executor = SingleThreadedExecutor()
-    executor.add_node(node)
-    ended = Event()
-
-    def spin() -> None:
-        try:
-            spin_until_shutdown(executor, node.utilities.report)
-        finally:
-            ended.set()
-            signal.pthread_kill(main_thread().ident or 0, signal.SIGTERM)  # it waits, see below
-
-    thread = Thread(target=spin, name="ros")
-    thread.start()
-    process.wait()
-    exit_code = 1 if ended.is_set() else 0
-    end_spinning(executor)
-    thread.join()
-    node.destroy_node()
-    return exit_code
+    return run_until_signal(TwinNode())
 
 
 def _refuse(reason: str) -> int:

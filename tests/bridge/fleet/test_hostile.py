@@ -157,11 +157,14 @@ def test_a_client_that_does_not_read_has_no_more_answers_under_way_over_all_site
     dear = "api/field.json?sensor_type=temperature&resolution=0.005"
     for name in SITES[:2]:
         assert page.http.get(f"/sites/{name}/api/state").status_code == 200
-    with deaf_client(page.url, f"/sites/gh1/{dear}"):
-        wait_for(
-            lambda: page.http.get(f"/sites/gh2/{HISTORY}").status_code == 429,
-            "a client that has an answer under way",
-        )
+    with ExitStack() as held:
+
+        def is_under_way() -> bool:
+            deaf = held.enter_context(deaf_client(page.url, f"/sites/gh1/{dear}"))
+            return deaf.recv(12) == b"HTTP/1.1 200"
+
+        wait_for(is_under_way, "an answer of which only the first bytes are read")
+        assert page.http.get(f"/sites/gh2/{HISTORY}").status_code == 429
         with of_address(page, OTHER) as other:
             assert other.get(f"/sites/gh2/{HISTORY}").status_code == 200
     wait_for(

@@ -7,7 +7,6 @@ import signal
 import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from threading import Event, Thread, main_thread
 from typing import TYPE_CHECKING, Any, NoReturn
 
 from lupin_twin.runtime import process
@@ -92,35 +91,15 @@ def _with_ros(ros_args: Sequence[str], role: Callable[[], int]) -> int:
 
 
 def _run(config: Config) -> int:
-    from rclpy.executors import SingleThreadedExecutor  # noqa: PLC0415
-
-    from lupin_twin.adapt.node import AdaptNode  # noqa: PLC0415
-    from lupin_twin.ros.base_node import end_spinning, spin_until_shutdown  # noqa: PLC0415
+    from lupin_twin.adapt.node import AdaptNode  # noqa: PLC0415  # see `run`
+    from lupin_twin.ros.base_node import run_until_signal  # noqa: PLC0415
 
     node = AdaptNode(config)
-    executor = SingleThreadedExecutor()
-    executor.add_node(node)
-    ended = Event()
-
-    def spin() -> None:
-        try:
-            spin_until_shutdown(executor, node.utilities.report)
-        finally:
-            ended.set()
-            signal.pthread_kill(main_thread().ident or 0, signal.SIGTERM)  # it waits, see below
-
-    thread = Thread(target=spin, name="ros")
-    thread.start()
     node.get_logger().info(
         f"adapting {len(config.sensors)} sensors for {len(config.tags)} tags; "
         "what comes and what is dropped is on /diagnostics"
     )
-    process.wait()
-    exit_code = 1 if ended.is_set() else 0
-    end_spinning(executor)
-    thread.join()
-    node.destroy_node()
-    return exit_code
+    return run_until_signal(node)
 
 
 def _check(config: Config | None, seconds: float) -> int:

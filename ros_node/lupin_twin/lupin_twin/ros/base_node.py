@@ -7,17 +7,19 @@ cannot be read is reported with its topic.
 from __future__ import annotations
 
 import math
+import signal
 import time
 import traceback
 from collections.abc import Callable
 from contextlib import suppress
+from threading import Event, Thread, main_thread
 from time import sleep
 from typing import Any, Final
 
 from rclpy.clock import Clock, ClockType
 from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.exceptions import InvalidHandle
-from rclpy.executors import ExternalShutdownException
+from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.serialization import deserialize_message
@@ -29,6 +31,7 @@ from lupin_twin.core.interfaces import SERVICE_DEPTH, Topic
 from lupin_twin.ros.inputs import Input
 from lupin_twin.ros.message_limits import MessageShape, TooManyError
 from lupin_twin.ros.parameters import naming
+from lupin_twin.runtime import process
 
 WARNING_PERIOD_S: Final = 5.0
 # So long, s, messages that wait are taken one right behind the other before others have their turn.
@@ -344,3 +347,29 @@ def end_spinning(executor: Any) -> None:
     to run where nothing waits: in the spinning thread itself.
     """
     executor.create_task(executor.shutdown)
+
+
+def run_until_signal(node: Any) -> int:
+    """Spin a node in a thread of its own until a stop signal comes; `process.block` was called.
+
+    Returns the exit code: 1 if its thread has died.
+    """
+    executor = SingleThreadedExecutor()
+    executor.add_node(node)
+    ended = Event()
+
+    def spin() -> None:
+        try:
+            spin_until_shutdown(executor, node.utilities.report)
+        finally:
+            ended.set()
+            signal.pthread_kill(main_thread().ident or 0, signal.SIGTERM)  # it waits, see below
+
+    thread = Thread(target=spin, name="ros")
+    thread.start()
+    process.wait()
+    exit_code = 1 if ended.is_set() else 0
+    end_spinning(executor)
+    thread.join()
+    node.destroy_node()
+    return exit_code

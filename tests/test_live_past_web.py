@@ -135,6 +135,7 @@ def apart(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Apart]:
         it = Apart(folder, domain, peer, stack)
         for replica in (it.beside, it.following):
             wait_until_ready(replica)
+        wait_for(lambda: len(it.followed()) == 1, "a file that follows the twin's")
         yield it
 
 

@@ -10,7 +10,7 @@ import sys
 import time
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import ExitStack, closing
+from contextlib import ExitStack, closing, contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -125,9 +125,8 @@ class Apart:
                 wait_for(same, f"the same answer to {path}")
 
 
-@pytest.fixture(scope="module")
-def apart(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Apart]:
-    folder = tmp_path_factory.mktemp("twin") / "here"
+@contextmanager
+def set_apart(folder: Path) -> Iterator[Apart]:
     folder.mkdir()
     with ExitStack() as stack:
         domain = stack.enter_context(own_domain())
@@ -136,6 +135,19 @@ def apart(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Apart]:
         for replica in (it.beside, it.following):
             wait_until_ready(replica)
         wait_for(lambda: len(it.followed()) == 1, "a file that follows the twin's")
+        yield it
+
+
+@pytest.fixture(scope="module")
+def apart(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Apart]:
+    with set_apart(tmp_path_factory.mktemp("twin") / "here") as it:
+        yield it
+
+
+@pytest.fixture
+def own(tmp_path: Path) -> Iterator[Apart]:
+    """For a test that ends the twin, or counts all that there is."""
+    with set_apart(tmp_path / "here") as it:
         yield it
 
 
@@ -184,8 +196,8 @@ def test_an_estimate_of_then_is_the_same_in_every_replica(apart: Apart) -> None:
     assert (refused.status_code, refused.json()["ok"]) == (400, False)
 
 
-def test_history_timeline_and_export_tell_the_same_past(apart: Apart) -> None:
-    first, second = apart.beside, apart.following
+def test_history_timeline_and_export_tell_the_same_past(own: Apart) -> None:
+    first, second = own.beside, own.following
     query = {"tag_id": "a", "sensor_type": "co2"}
     history = asked(first, "/api/history", **query)
     values = [400.0 + number for number in range(OBSERVED)]
@@ -262,14 +274,13 @@ def test_the_twins_file_may_be_named_where_it_has_another_path_here(
     assert list(tmp_path.rglob("*.sqlite")) == []  # nothing was followed
 
 
-def test_without_its_twin_web_answers_all_the_same_and_goes_on_with_the_next(apart: Apart) -> None:
-    """Last: it ends the twin."""
-    before = {path: apart.beside.http.get(path) for path in QUESTIONS[:-2]}
-    apart.twin.kill()
-    for replica in (apart.beside, apart.following):
+def test_without_its_twin_web_answers_all_the_same_and_goes_on_with_the_next(own: Apart) -> None:
+    before = {path: own.beside.http.get(path) for path in QUESTIONS[:-2]}
+    own.twin.kill()
+    for replica in (own.beside, own.following):
         wait_for(lambda replica=replica: replica.get("/readyz").status_code == 503, "silence")  # type: ignore[misc]
-    afresh = apart.start_web()
-    for replica in (apart.beside, apart.following, afresh):
+    afresh = own.start_web()
+    for replica in (own.beside, own.following, afresh):
         for path, told in before.items():
             if "/api/alarms" not in path:
                 answer = replica.http.get(path)
@@ -277,16 +288,16 @@ def test_without_its_twin_web_answers_all_the_same_and_goes_on_with_the_next(apa
         headers = replica.get("/api/state", at=time.time() - 1.0).headers
         assert float(headers["x-complete-to"]) < time.time() - 1.0
     # Another journal is followed into another file.
-    for file in apart.folder.glob("j.sqlite*"):
+    for file in own.folder.glob("j.sqlite*"):
         file.rename(file.with_name(f"old-{file.name}"))
     # What is latched for the next twin is of later than that afternoon, whatever ran before.
-    apart.peer.observe(*(scan("a", {"co2": 1.0}, stamp_s=T + 9_000 + n) for n in range(50)))
-    apart.twin = apart.start_twin()
-    apart.peer.wait_for_twin()
-    apart.peer.observe(scan("new", {"co2": 1.0}, stamp_s=T))
-    for replica in (apart.beside, apart.following, afresh):
+    own.peer.observe(*(scan("a", {"co2": 1.0}, stamp_s=T + 9_000 + n) for n in range(50)))
+    own.twin = own.start_twin()
+    own.peer.wait_for_twin()
+    own.peer.observe(scan("new", {"co2": 1.0}, stamp_s=T))
+    for replica in (own.beside, own.following, afresh):
         wait_for(lambda replica=replica: tags(replica) == ["new"], "the next journal")  # type: ignore[misc]
-    assert len(apart.followed()) == 2
+    assert len(own.followed()) == 2
 
 
 def tags(live: Bridge) -> list[str]:

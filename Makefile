@@ -95,6 +95,16 @@ $(DONE)/tools: .ci/tools | $(DONE)/checked
 	@.ci/tools
 	@touch $@
 
+# What a robot with TF and apriltag_ros publishes, for the tests: there are no wheels of it.
+TEST_MSGS := tests/ros_msgs/tf2_msgs tests/ros_msgs/apriltag_msgs
+$(DONE)/test_msgs/built: $(wildcard $(addsuffix /*.*,$(TEST_MSGS)) $(addsuffix /msg/*,$(TEST_MSGS))) \
+                         $(DONE)/python
+	$(say) 'building the messages of TF and apriltag_ros for the tests (about a minute)'
+	@rm -rf $(@D)
+	@env -u PYTHONPATH $(BIN)/pip wheel --quiet --no-deps --wheel-dir $(@D) $(addprefix ./,$(TEST_MSGS))
+	@env -u PYTHONPATH $(BIN)/pip install --quiet --no-deps --force-reinstall $(@D)/*.whl
+	@touch $@
+
 dist: setup docs ## what a release holds, in dist/: wheels, sdist, and the context of a container image
 	$(say) 'building into dist/'
 	@.ci/dist dist
@@ -111,7 +121,7 @@ quick: setup ## Python tests that need neither ROS nor a browser
 	$(say) 'Python tests without ROS and browser'
 	@$(TEST_ENV) $(BIN)/pytest -q -n 2 --dist worksteal --quick tests
 
-test: setup $(DONE)/tools ## every check: lint, types, guide, unit, real ROS, browser
+test: setup $(DONE)/tools $(DONE)/test_msgs/built ## every check: lint, types, guide, unit, real ROS, browser
 	@$(MAKE) --no-print-directory -j 2 --output-sync=target lint types docs hmi-test collect
 	@$(MAKE) --no-print-directory unit
 	$(say) 'all checks passed'
@@ -145,7 +155,7 @@ collect: setup
 	@$(TEST_ENV) $(BIN)/pytest -qq --collect-only tests >$(DONE)/collected || { cat $(DONE)/collected; exit 1; }
 
 # Twice as many workers as two cores: they wait for processes, and three of them keep 1.4 cores busy.
-unit: setup docs $(DONE)/tools ## Python tests, real ROS and real browser included
+unit: setup docs $(DONE)/tools $(DONE)/test_msgs/built ## Python tests, real ROS and real browser included
 	$(say) 'Python tests: units, ROS over DDS, browser'
 	@$(TEST_ENV) $(BIN)/pytest -q -n 4 --dist worksteal tests
 

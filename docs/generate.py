@@ -283,6 +283,10 @@ def topics() -> str:
         "subscriber still gets the last messages, as many as the depth.",
         "## The twin subscribes to",
         _topics(interfaces.SUBSCRIBED),
+        "## The bridge subscribes to",
+        "In `serve` and `web`, for [the robot on the map](../page/map.md#the-robot). It subscribes "
+        "as they are published, latched or not, and reads once a second. ROS remapping works.",
+        _topics(interfaces.ROBOT),
         "## The twin publishes",
         _topics(interfaces.PUBLISHED),
         "## The twin serves",
@@ -350,7 +354,7 @@ def messages() -> str:
 def policy() -> str:
     """The SROS 2 policy of twin and `web`, for the names by default."""
     published = [_root(topic.name) for topic in interfaces.PUBLISHED]
-    subscribed = [_root(topic.name) for topic in interfaces.SUBSCRIBED]
+    subscribed = [_root(it.name) for it in (*interfaces.SUBSCRIBED, *interfaces.ROBOT)]
     services = [_root(service.name) for service in interfaces.SERVICES]
     of_ros = ["/parameter_events"]
     own = [f"~/{name}" for name in interfaces.OF_EVERY_NODE]

@@ -4,7 +4,9 @@ import reactHooks from 'eslint-plugin-react-hooks';
 import tseslint from 'typescript-eslint';
 
 export default tseslint.config(
-  { ignores: ['**/openapi.gen.ts', '**/eslint.config.js', '**/prettier.config.js'] },
+  {
+    ignores: ['**/openapi.gen.ts', '**/public/**', '**/eslint.config.js', '**/prettier.config.js'],
+  },
   js.configs.recommended,
   tseslint.configs.strictTypeChecked,
   tseslint.configs.stylisticTypeChecked,

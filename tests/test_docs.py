@@ -24,7 +24,7 @@ GENERATOR = runpy.run_path(str(DOCS / "generate.py"))
 REFERENCE = {name: page() for name, page in GENERATOR["PAGES"].items()}
 EVERY_PAGE = pytest.mark.parametrize("page", pages(), ids=name_of)
 # Those of `lupin-twin fleet` beside the bridge's.
-FLEET_ROUTES = {"/api/sites", "/ws/sites", "/api/compare"}
+FLEET_ROUTES = {"/api/sites", "/api/sites/{name}/map.svg", "/ws/sites", "/api/compare"}
 # What the docs show of other programs.
 FOREIGN_OPTIONS = {
     "--find-links",
@@ -169,7 +169,7 @@ def test_every_parameter_and_variable_that_a_page_names_is_one(page: Path) -> No
 @EVERY_PAGE
 def test_every_route_topic_and_metric_that_a_page_names_is_one(page: Path) -> None:
     text = page.read_text(encoding="utf-8")
-    routes = set(re.findall(r"`(?:GET )?(/[^`\s]*)`", REFERENCE["http"])) | FLEET_ROUTES
+    routes = set(re.findall(r"`(?:GET |POST )?(/[^`\s]*)`", REFERENCE["http"])) | FLEET_ROUTES
     # A name that goes on in another route, such as `/api/tags`, is a good enough name.
     known = [re.sub(r"\\\{.*?\\\}", "[^/]+", re.escape(route)) for route in routes]
     for named in re.findall(r"(?:`|:8000|\.example)(/(?:api|ws)/[\w{}/.-]*)", text):

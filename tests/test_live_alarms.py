@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import sqlite3
 import time
-from contextlib import ExitStack
+from contextlib import ExitStack, closing
 from pathlib import Path
 from typing import Any
 
@@ -90,11 +91,12 @@ def test_a_cold_day_is_a_status_and_an_alarm_live_and_as_of_a_moment_in_serve_an
 ) -> None:
     journal = ("--ros-args", "-p", f"journal:={tmp_path / 'j.sqlite'}")
     hour, now = 60 * MINUTE, time.time() - 5.0
+    processes: list[Any] = []
     with own_domain() as domain, Peer(domain) as peer, ExitStack() as stack:
 
         def start(role: str, *options: str) -> Bridge:
-            process = stack.enter_context(lupin_twin(domain, role, *options))
-            return stack.enter_context(attached(process, peer))
+            processes.append(stack.enter_context(lupin_twin(domain, role, *options)))
+            return stack.enter_context(attached(processes[-1], peer))
 
         def reasons(live: Bridge, **query: Any) -> set[tuple[str, str]]:
             tag = live.json("/api/health", **query)["tags"].get("a", {})
@@ -122,3 +124,13 @@ def test_a_cold_day_is_a_status_and_an_alarm_live_and_as_of_a_moment_in_serve_an
         for one in (live, replica):
             assert cold not in reasons(one, at=raised - 60)
             assert cold in reasons(one, at=raised + 60)
+        before = live.get(f"/api/health?at={raised + 60}").content
+        for process in processes:
+            process.kill()
+        # As if nothing had come after that, and no alarm had ever been told.
+        with closing(sqlite3.connect(tmp_path / "j.sqlite")) as log, log:
+            log.execute("DELETE FROM scan WHERE stamp_ns > ?", ((raised + 60) * 10**9,))
+        again = start("serve", *journal)
+        peer.wait_for_twin()
+        wait_for(lambda: again.get("/api/health?at=1").status_code == 200, "the journal again")
+        assert again.get(f"/api/health?at={raised + 60}").content == before

@@ -34,7 +34,8 @@ def test_a_standby_that_is_promoted_is_gone_on_with_and_has_what_was_acknowledge
     with server() as primary:
         archive = Archive(primary)
         with server(primary=primary) as standby, ExitStack() as stack:
-            archive.hosts.append(standby.folder)
+            # The first that is asked is not the one that takes writes.
+            archive.hosts.insert(0, standby.folder)
             recording = stack.enter_context(twin(journal))
             wait_for(lambda: count(journal) > 0, "a journal")
             following = stack.enter_context(forwarder(archive, journal))

@@ -28,7 +28,7 @@ def test_serve_answers_as_the_old_build_did(name: str, tmp_path: Path) -> None:
                 continue  # what is refused is; in which words is no contract
             if path == "/api/sensors":
                 continue  # the file that was handed in: what is derived says of what, since then
-            if not same(known(plain(found), plain(right)), plain(right)):
+            if not same(known(plain(path, found), plain(path, right)), plain(path, right)):
                 different.append(path)
     assert [path for path in different if not is_another(name, path)] == []
 
@@ -53,13 +53,16 @@ def test_a_moment_is_judged_by_the_log_up_to_then_in_serve_in_web_and_after_a_re
         assert other == found[0]
 
 
-def plain(answer: list[Any]) -> list[Any]:
+def plain(path: str, answer: list[Any]) -> list[Any]:
     """An answer with its JSON read; in which order a tag's sensors came is not told."""
     status, kind, body = answer
     if kind != "application/json":
         return answer
     # What goes by this moment stands there as a bare word.
     value = json.loads(body.replace(":now", ':"now"'))
+    if path.endswith("/history"):
+        # After a restart that build told one look of each tag, however many it had told before.
+        value = value.get("sensors")
     if isinstance(value, dict):
         tags = value.get("tags", [value])
         for tag in tags if isinstance(tags, list) else [value.get("house"), *tags.values()]:

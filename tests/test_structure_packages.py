@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import configparser
 import json
 import os
 import re
@@ -215,3 +216,18 @@ def test_names_versions_and_commands_agree(package: str, set_up: Any) -> None:
         module, function = re.fullmatch(r"\w+ = ([\w.]+):(\w+)", script).groups()  # type: ignore[union-attr]
         source = Path(f"{module.replace('.', '/')}.py").read_text(encoding="utf-8")
         assert f"def {function}(" in source
+
+
+@pytest.mark.parametrize(
+    ("package", "executables"),
+    [("lupin_twin", {"twin_node", "adapt"}), ("lupin_patrol", {"patrol_node"})],
+)
+def test_every_executable_is_where_ros2_run_looks(
+    package: str, executables: set[str], set_up: Any
+) -> None:
+    scripts = set_up(package)["entry_points"]["console_scripts"]
+    assert {script.partition(" = ")[0] for script in scripts} == executables
+    told = configparser.ConfigParser()
+    told.read("setup.cfg")
+    assert told["install"]["install_scripts"] == f"$base/lib/{package}"
+    assert told["develop"]["script_dir"] == f"$base/lib/{package}"

@@ -23,21 +23,35 @@ from lupin_bridge.routes import (
     export,
     field,
     notes,
+    observations,
     pages,
     past,
+    report,
     sockets,
     state,
     status,
 )
 from lupin_bridge.routes.answers import add_refusals, error_response
 from lupin_bridge.serving.middleware import Metered, PieceByPiece
-from lupin_bridge.stream import people_schema, schema
+from lupin_bridge.stream import people_schema, robot_schema, schema
 
 STATIC_FOLDER = Path(__file__).parent / "static"
 GUIDE_FOLDER = Path(__file__).parent / "guide"
 
 # Every module whose `router` has routes.
-ROUTED = (state, sockets, field, estimate, past, export, status, notes, pages)
+ROUTED = (
+    state,
+    sockets,
+    field,
+    estimate,
+    past,
+    report,
+    export,
+    status,
+    notes,
+    observations,
+    pages,
+)
 
 
 def has_page(static_folder: Path = STATIC_FOLDER) -> bool:
@@ -92,11 +106,13 @@ def create_app(
 
 
 _DESCRIPTION = """
-Nothing here writes to ROS: every route answers GET and HEAD alone, but notes and sign-in.
+Every route answers GET and HEAD alone, but sign-in, notes and observations. Nothing here writes to
+ROS but `POST /api/observations`, which is off unless the bridge is started with it on.
 Positions are metres in the map frame, values are in the sensor's unit, what is not known is null.
-`/ws/state` is a WebSocket that sends `StateFrame`, `StatusFrame` and `AlarmsFrame` as JSON text:
-the current ones at once, then every change. A bridge with a token (`LUPIN_TOKEN`) wants it as
-`Authorization: Bearer` with every request, `/healthz` excepted; a browser signs in at `/signin`.
+`/ws/state` is a WebSocket that sends `StateFrame`, `StatusFrame`, `AlarmsFrame` and `RobotFrame` as
+JSON text: the current ones at once, then every change. A bridge with a token (`LUPIN_TOKEN`) wants
+it as `Authorization: Bearer` with every request, `/healthz` excepted; a browser signs in at
+`/signin`.
 """
 
 
@@ -115,8 +131,10 @@ FRAMES = (
     schema.DeltaFrame,
     schema.StatusFrame,
     schema.AlarmsFrame,
+    robot_schema.RobotFrame,
     schema.Alarms,
     people_schema.NoteDraft,
+    people_schema.ObservationDraft,
 )
 
 

@@ -18,8 +18,7 @@ from lupin_bridge.alarms.ledger import Change
 from lupin_bridge.alarms.notes import NoteBoard
 from lupin_bridge.feed.estimates import EstimateFollower, Reports
 from lupin_bridge.feed.shared_work import Shared
-from lupin_bridge.feed.source import TwinSource, TwinUpdate
-from lupin_bridge.judge.alarm import reasons_of_days
+from lupin_bridge.feed.source import CacheCounts, TwinSource, TwinUpdate
 from lupin_bridge.judge.judging import NOTHING_JUDGED, Judge, Judged, silenced, unjudged
 from lupin_bridge.judge.options import Criteria
 from lupin_bridge.metrics import Metrics, Sample
@@ -33,6 +32,7 @@ from lupin_bridge.serving.middleware import route_class
 from lupin_bridge.settings import Settings
 from lupin_bridge.stream.frames import FrameWriter, alarms_message
 from lupin_bridge.stream.hub import Client, Hub
+from lupin_bridge.stream.robot_follower import RobotFollower
 from lupin_bridge.stream.status import Liveness, Status
 from lupin_bridge.viewers.foxglove_session import Offer
 from lupin_twin.core.diagnostics import Origin
@@ -107,10 +107,18 @@ class Bridge:
         self.alarms = AlarmBoard()
         self.alarms.subscribe(self._on_alarms)
         self._alarm_feed = AlarmFeed(
-            source, self.criteria, self.alarms, lambda: self.ros_time_ns, limits.alarm_days
+            source,
+            self.criteria,
+            self.alarms,
+            lambda: self.ros_time_ns,
+            limits.alarm_days,
+            note_days=self._judge.note_days,
         )
+        self.robot = RobotFollower(source, self.hub, lambda: self.ros_time_ns, clock)
         self._has_alarms = asyncio.Event()
         self.notes = NoteBoard(source, self._has_alarms.set)
+        self.takes_observations = settings.http_observations == "on" and source.takes_observations
+        self.observations_pace = RateLimit(limits.observations_per_s, limits.observation_burst)
         self.outward = outward or Channels()
         self.http_answers: Counter[str] = Counter()
         self.metrics = Metrics(self._measure, self._count)
@@ -141,6 +149,7 @@ class Bridge:
         self.outward.start(self, self.criteria.sensors)
         self._alarm_feed.start()
         self._estimates.start()
+        self.robot.start()
 
     async def stop(self) -> None:
         """Stop them, and the channels; `announce_shutdown` has notified the clients."""
@@ -150,7 +159,7 @@ class Bridge:
                 with contextlib.suppress(asyncio.CancelledError):
                     await task
         await asyncio.gather(self._alarm_feed.stop(), self.notes.stop())
-        await self._estimates.stop()
+        await asyncio.gather(self._estimates.stop(), self.robot.stop())
         if self._push_timer is not None:
             self._push_timer.cancel()
         await asyncio.gather(self.outward.stop(), self.source.stop())
@@ -236,14 +245,8 @@ class Bridge:
         yield "lupin_http_answers", self.http_answers
         yield from self.outward.counts()
         known = self._estimates.known
-        yield (
-            "lupin_estimate_trusted",
-            {
-                name: trusted
-                for name, report in known.items()
-                if (trusted := report.record.is_trusted) is not None
-            },
-        )
+        trusted = {name: report.record.is_trusted for name, report in known.items()}
+        yield "lupin_estimate_trusted", {name: it for name, it in trusted.items() if it is not None}
         yield (
             "lupin_estimate_fit_failing",
             {name: bool(report.fit_problem) for name, report in known.items()},
@@ -261,7 +264,7 @@ class Bridge:
     def _measure(self) -> Iterator[Sample]:
         hub, source, status = self.hub, self.source, self.status
         tags = () if self._latest is None else self._latest.snapshot.tags
-        cache = source.cache_counts()
+        cache = CacheCounts() if self._latest is None else self._latest.cache
         journal = source.journal()
         yield "lupin_clients", len(hub)
         yield "lupin_clients_blocked", hub.blocked
@@ -272,9 +275,9 @@ class Bridge:
         yield "lupin_topics_relayed", len(source.relay)
         yield "lupin_messages_sent", self.offer.counts.sent
         yield "lupin_messages_skipped", self.offer.counts.skipped + source.relay.skipped
-        yield "lupin_ros_thread_alive", source.is_alive
-        yield "lupin_ros_calls_waiting", source.calls_waiting
-        yield "lupin_ros_callback_errors", source.callback_errors
+        yield "lupin_ros_thread_alive", source.thread.is_alive
+        yield "lupin_ros_calls_waiting", source.thread.calls_waiting
+        yield "lupin_ros_callback_errors", source.thread.callback_errors
         yield "lupin_twin_live", status.is_live
         yield "lupin_twins", status.twin_count
         yield (
@@ -383,7 +386,6 @@ class Bridge:
     def _on_alarms(self, change: Change) -> None:
         if not change.is_past:
             self.alarms_raised += sum(alarm.is_active for alarm in change.changed)
-        self._judge.note_days(reasons_of_days(self.alarms.now.active))
         self._has_alarms.set()
 
     async def _publish_alarms(self) -> None:
@@ -403,7 +405,8 @@ class Bridge:
 
     def _alarms_writer(self) -> Callable[[object], bytes]:
         board, now_ns, notes = self.alarms.now, self.ros_time_ns, self.notes.notes or ()
-        return lambda _: alarms_message(board, now_ns, notes)
+        count = self.notes.count
+        return lambda _: alarms_message(board, now_ns, notes, count)
 
     def _on_death(self) -> None:
         self.liveness.thread_dead = True

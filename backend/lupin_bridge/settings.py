@@ -51,6 +51,12 @@ class Settings:
         "file of accounts and API tokens, which `lupin-twin user` and `token` make; empty: "
         "accounts.sqlite in the folder of this user's journals",
     )
+    http_observations: Literal["off", "on"] = _setting(
+        "off",
+        "access",
+        "on: programs with a token of the role writer post readings to /api/observations, and the "
+        "bridge publishes them over ROS",
+    )
     allow_host: tuple[str, ...] = _setting(
         (),
         "access",
@@ -124,6 +130,12 @@ class Settings:
         "", "webhook", "file with the secret that signs them, a line of text"
     )
     webhook_ca: str = _setting("", "webhook", "PEM file with who signs the receiver's certificate")
+    report_at: str = _setting(
+        "",
+        "report",
+        "when the report of the last day is sent, by MQTT and webhook, such as 06:00 in the time "
+        "zone of the hours of the day; empty: never",
+    )
     journal: str = _setting(
         "",
         "past",

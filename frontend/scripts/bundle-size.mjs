@@ -10,9 +10,9 @@ import { gzipSync } from 'node:zlib';
 
 const BUDGET_BYTES = {
   first: 150_000,
-  behind: 25_000,
+  behind: 40_000,
   language: 10_000,
-  later: 50_000,
+  later: 55_000,
   fleet: 90_000,
   fleetLater: 40_000,
 };

@@ -9,16 +9,12 @@ import './styles/legend.css';
 import './styles/health.css';
 import './styles/table.css';
 import './styles/table-sizes.css';
-import './styles/alarms.css';
 import './styles/ages.css';
-import './styles/bound.css';
-import './styles/paper.css';
 import './styles/kiosk.css';
 import './styles/frozen.css';
 import './styles/troubles.css';
 import './styles/past.css';
 import './styles/forced.css';
-import './styles/print.css';
 import { startAlarmsAndTelling } from './alarms/start';
 import { startAddress } from './store/address';
 import { prefer, store } from './store/app';
@@ -65,11 +61,13 @@ if (kiosk) {
 }
 
 void loadParts().then((parts) => {
+  parts.startGestures();
   parts.startDifference();
   parts.startBadge();
   parts.startSound();
   parts.startNotify();
   parts.startPeople();
+  parts.startShell();
   if (kiosk) {
     parts.startLeaving();
   } else {

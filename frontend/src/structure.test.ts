@@ -27,15 +27,27 @@ const TABLE: Table = {
   // What goes on about alarms beside the components, which are in `ui/alarms`.
   alarms: ['strings', 'clock', 'contract', 'domain', 'store', 'map'],
   widgets: ['clock', 'npm:react'],
-  timebar: [...['strings', 'clock', 'domain', 'draw', 'store', 'widgets'], ...['npm:react']],
+  // What people say, wherever it is shown.
+  notes: [
+    ...['words', 'strings', 'contract', 'domain', 'store', 'widgets', 'styles'],
+    ...['npm:react'],
+  ],
+  timebar: [
+    ...['strings', 'clock', 'domain', 'draw', 'store', 'widgets', 'notes'],
+    ...['npm:react'],
+  ],
   export: ['strings', 'clock', 'domain', 'draw', 'store', 'map'],
   charts: [
     ...['strings', 'clock', 'contract', 'geometry', 'domain', 'store', 'widgets', 'export'],
-    ...['styles', 'npm:react', 'npm:uplot'],
+    ...['notes', 'styles', 'npm:react', 'npm:uplot'],
   ],
   estimate: [
     ...['words', 'strings', 'contract', 'geometry', 'domain', 'store', 'widgets', 'styles'],
     ...['npm:react'],
+  ],
+  robot: [
+    ...['words', 'strings', 'contract', 'geometry', 'domain', 'store', 'widgets', 'styles'],
+    ...['npm:react', 'npm:react-dom'],
   ],
   ui: [
     ...[
@@ -50,7 +62,7 @@ const TABLE: Table = {
       'map',
       'export',
     ],
-    ...['styles', 'widgets', 'alarms', 'timebar', 'charts', 'estimate'],
+    ...['styles', 'widgets', 'alarms', 'timebar', 'charts', 'estimate', 'robot', 'notes'],
     ...['npm:react', 'npm:react-dom'],
   ],
   // The page over all greenhouses, a bundle of its own.

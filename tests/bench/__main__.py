@@ -26,6 +26,7 @@ BENCHES = (
     "bench_house",
     "bench_forward",
     "bench_fleet",
+    "bench_overview",
     "bench_replicas",
 )
 

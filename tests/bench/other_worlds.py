@@ -234,6 +234,18 @@ def _uneven_variance(chance: Chance, world: World) -> World:
     return _with(world, more)
 
 
+def restless(world: World, since_s: float, seed: int) -> World:
+    """The same world until its air begins to swing, within two hours and from place to place."""
+    swings = _waves(np.random.default_rng([seed, 2]), (0.3, 0.3))
+
+    def more(xy: Floats, at_s: Floats) -> Floats:
+        swing = np.sin(2.0 * np.pi * at_s / 7_000.0) * (at_s > since_s)
+        result: Floats = 10.0 * world.uneven * swings(xy) * swing
+        return result
+
+    return _with(world, more)
+
+
 SORTS: Final[dict[str, Callable[[Chance, World], World]]] = {
     "second harmonic": _harmonic,
     "heater that switches": _heater,

@@ -20,7 +20,7 @@ from websockets.asyncio.client import connect
 
 from lupin_bridge.bridge import Bridge
 from lupin_bridge.feed.relay import Relay
-from lupin_bridge.feed.source import CacheCounts, TwinUnavailableError, TwinUpdate
+from lupin_bridge.feed.source import ThreadState, TwinUnavailableError, TwinUpdate
 from lupin_bridge.field import formats as field_formats
 from lupin_bridge.serving.admission import Limits
 from lupin_bridge.settings import Settings
@@ -46,8 +46,7 @@ class Script:
     def __init__(self) -> None:
         self.tell: Callable[[TwinUpdate], None]
         self.die: Callable[[], None]
-        self.is_alive = True
-        self.calls_waiting = self.callback_errors = 0
+        self.thread = ThreadState()
         self.workers = Workers("script")
         self.relay = Relay(lambda: cast("Any", self), cast("Any", self))  # listened to by nobody
 
@@ -57,7 +56,7 @@ class Script:
         self.tell, self.die = on_state, on_death
 
     async def stop(self) -> None:
-        self.is_alive = False
+        self.thread = ThreadState(is_alive=False)
         self.workers.close()
 
     async def ask(self, *_: object) -> tuple[PastWrite, ...]:
@@ -65,9 +64,6 @@ class Script:
 
     def journal(self) -> Condition:
         return UNKNOWN
-
-    def cache_counts(self) -> CacheCounts:
-        return CacheCounts()
 
 
 class Ear:

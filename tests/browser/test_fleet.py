@@ -55,7 +55,7 @@ def three_sites(archive: Archive, folder: Path) -> Iterator[Page]:
         page = ending.enter_context(fleet(archive))
         page.site("gh1", verdict="healthy", active_alarms=0)
         page.site("warm", verdict="critical", active_alarms=5)
-        page.site("silent", is_live=False, last_verdict="healthy")
+        page.site("silent", is_live=False, last_verdict="healthy", active_alarms=1)
         yield page
 
 
@@ -70,7 +70,14 @@ def test_the_worst_first_and_a_click_away(
             expect(cards.nth(0)).to_contain_text("Critical")
             expect(cards.nth(0)).to_contain_text("5 alarms")
             expect(cards.nth(1)).to_contain_text("Silent since")
-            expect(cards.nth(1)).to_contain_text("Last known: Healthy, No alarms")
+            expect(cards.nth(1)).to_contain_text("Last known: Healthy")
+            # That it is silent.
+            expect(cards.nth(1)).to_contain_text("1 alarm")
+            # Where the tags are: fetched, and of the size that was kept for it.
+            for card in (cards.nth(0), cards.nth(2)):
+                image = card.locator(".fleet-map img")
+                expect(image).to_have_js_property("complete", value=True)
+                assert image.evaluate("image => image.naturalWidth > 0")
             expect(cards.nth(1)).not_to_have_attribute("data-health", "healthy")
             expect(cards.nth(2)).to_contain_text("No alarms")
             # Nobody says where the rows come from; with two groups at least, there are headings.
@@ -107,15 +114,37 @@ def test_the_worst_first_and_a_click_away(
             picture(page, "kiosk")
 
 
+def test_the_way_back_from_a_greenhouse_to_all_of_them(browser: Browser, archive: Archive) -> None:
+    archive.do("INSERT INTO site VALUES ('gh1', '')")
+    with fleet(archive) as served:
+        served.site("gh1")
+        for query, words, title in (
+            ("", "All greenhouses", "Greenhouses"),
+            ("?lang=de", "Alle Gewächshäuser", "Gewächshäuser"),
+        ):
+            with opened(browser, f"{served.url}/sites/gh1/{query}") as page:
+                link = page.get_by_role("link", name=words)
+                expect(link).to_be_visible()
+                # Nothing is pushed out of sight by it.
+                assert page.evaluate("document.documentElement.scrollHeight <= innerHeight")
+                link.click()
+                expect(page.get_by_role("heading", level=1)).to_have_text(title)
+        with opened(browser, f"{served.url}/sites/gh1/?kiosk") as page:
+            expect(page.get_by_role("banner")).to_contain_text("gh1")
+            expect(page.locator(".fleet-back")).to_have_count(0)
+
+
 def test_alarms_of_all_greenhouses_are_counted_listed_and_a_click_away(
     browser: Browser, archive: Archive, tmp_path: Path
 ) -> None:
     with three_sites(archive, tmp_path) as served:
         with opened(browser, served.url) as page:
-            expect(page).to_have_title("(5) Greenhouses")
-            page.get_by_role("button", name="Alarms 5").click()
+            expect(page).to_have_title("(6) Greenhouses")
+            page.get_by_role("button", name="Alarms 6").click()
             rows = page.locator(".fleet-alarm-list li")
-            expect(rows).to_have_count(5)
+            expect(rows).to_have_count(6)
+            silence = rows.filter(has_text="silent")
+            expect(silence).to_have_attribute("data-live", "false")
             expect(rows.first).to_contain_text("warm")
             expect(rows.first).to_contain_text("Critical")
             expect(rows.first).to_contain_text("Temperature above 35")
@@ -124,16 +153,24 @@ def test_alarms_of_all_greenhouses_are_counted_listed_and_a_click_away(
             page.get_by_role("searchbox").fill("gh1")
             expect(rows).to_have_count(0)
             expect(page.get_by_role("main")).to_contain_text("No alarms")
-            expect(page).to_have_title("(5) Greenhouses")
+            expect(page).to_have_title("(6) Greenhouses")
             page.get_by_role("searchbox").fill("warm")
             expect(rows).to_have_count(5)
             # What is over leaves the cards, the count, the title and the list.
             now_ns = wall().stamp_ns
             journal = tmp_path / "warm.sqlite"
             write(journal, [scan("0", now_ns + n, temperature=22.0) for n in range(3)])
-            expect(page).to_have_title("(4) Greenhouses")
-            expect(page.get_by_role("button", name="Alarms 4")).to_be_visible()
+            expect(page).to_have_title("(5) Greenhouses")
+            expect(page.get_by_role("button", name="Alarms 5")).to_be_visible()
             expect(rows).to_have_count(4)
+            # What people say of one is beside it.
+            name = served.http.get("/api/alarms").json()["alarms"][0]["id"]
+            archive.do(
+                f"INSERT INTO note VALUES ('warm', 'n1', {now_ns}, 'Anna', 'acknowledge',"
+                f" 'alarm:{name}', '', NULL)"
+            )
+            expect(rows.first).to_contain_text("acknowledged by Anna at")
+            picture(page, "acknowledged")
             tag = rows.first.locator("span", has_text=re.compile(r"^Tag \d$")).inner_text()
             rows.first.get_by_role("link").click()
             expect(page).to_have_url(re.compile(r"/sites/warm/.*#.*at=\d+"))
@@ -143,12 +180,12 @@ def test_alarms_of_all_greenhouses_are_counted_listed_and_a_click_away(
             picture(page, "alarm-site")
         phone = {"width": 390, "height": 800}
         with opened(browser, served.url, viewport=phone) as page:
-            page.get_by_role("button", name="Alarms 4").click()
-            expect(page.locator(".fleet-alarm-list li")).to_have_count(4)
+            page.get_by_role("button", name="Alarms 5").click()
+            expect(page.locator(".fleet-alarm-list li")).to_have_count(5)
             assert page.evaluate("document.documentElement.scrollWidth") <= 390
             picture(page, "alarms-phone")
         with opened(browser, f"{served.url}?kiosk") as page:
-            expect(page.get_by_role("banner")).to_contain_text("4 alarms")
+            expect(page.get_by_role("banner")).to_contain_text("5 alarms")
 
 
 def test_one_sensor_of_several_greenhouses_the_outlier_first(

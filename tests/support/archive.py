@@ -93,6 +93,10 @@ class Archive:
                     (list(names), self.site),
                 )
 
+    def keep_live(self) -> None:
+        """Have its sites count as live for an hour, although nobody forwards them."""
+        self.do("UPDATE forwarder SET heard_at = now() + INTERVAL '1 hour'")
+
     def select(self, sql: str) -> list[tuple[Any, ...]]:
         """What its owner sees."""
         with psycopg.connect(self.owner) as connection:

@@ -56,6 +56,11 @@ class Page:
         assert answer.status_code == 200, answer.text
         return {site["site"]: site for site in answer.json()["sites"]}
 
+    def metric(self, name: str) -> float:
+        """A number of `/metrics`."""
+        lines = self.http.get("/metrics").text.splitlines()
+        return next(float(line.split()[1]) for line in lines if line.startswith(f"{name} "))
+
     def site(self, name: str = "gh1", **said: Any) -> dict[str, Any]:
         """A site's entry once it says this."""
 

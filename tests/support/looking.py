@@ -6,18 +6,17 @@ import os
 import sys
 import threading
 import time
-from collections.abc import Generator
 from dataclasses import dataclass
 from typing import Any
 
 from lupin_bridge.feed.past_child import Child
-from lupin_bridge.feed.query import Found, Need, Work
+from lupin_bridge.feed.query import Find
 from lupin_bridge.past.plans import Answered
 from lupin_bridge.serving.admission import Answer
 from lupin_twin.core.past import PastRefused
 from lupin_twin.core.state import Snapshot
 from lupin_twin.field.explored import OccupancyMap
-from lupin_twin.runtime.workers import SMALL_S, ShouldStop
+from lupin_twin.runtime.workers import ShouldStop
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,20 +25,19 @@ class Count:
 
     at_ns: int
 
-    def look(self) -> Generator[Need, Found, Work[int]]:
+    def answer(self, find: Find, should_stop: ShouldStop) -> int:
         """See `Question`."""
-        snapshot: Snapshot = yield self.at_ns
-        return Work(0.0, lambda _: len(snapshot.tags))
+        snapshot: Snapshot = find(self.at_ns)
+        return len(snapshot.tags)
 
 
 @dataclass(frozen=True, slots=True)
 class Endless:
     """Work that ends when nobody waits for it any more, and not before."""
 
-    def look(self) -> Generator[Need, Found, Work[None]]:
+    def answer(self, find: Find, should_stop: ShouldStop) -> None:
         """See `Question`."""
-        yield from ()
-        return Work(10 * SMALL_S, _until_told)
+        _until_told(should_stop)
 
 
 def _until_told(should_stop: ShouldStop) -> None:
@@ -51,10 +49,9 @@ def _until_told(should_stop: ShouldStop) -> None:
 class Running:
     """How many are at work for `Endless` in that process, and how nice it is."""
 
-    def look(self) -> Generator[Need, Found, Work[tuple[int, int]]]:
+    def answer(self, find: Find, should_stop: ShouldStop) -> tuple[int, int]:
         """See `Question`."""
-        yield from ()
-        return Work(0.0, lambda _: (_endless(), os.getpriority(os.PRIO_PROCESS, 0)))
+        return (_endless(), os.getpriority(os.PRIO_PROCESS, 0))
 
 
 def _child() -> Child:
@@ -76,10 +73,9 @@ class Body:
 
     count: int
 
-    def look(self) -> Generator[Need, Found, Work[Answered]]:
+    def answer(self, find: Find, should_stop: ShouldStop) -> Answered:
         """See `Question`."""
-        yield from ()
-        return Work(0.0, lambda _: Answered("x", Answer(b"7" * self.count, "text/plain", {})))
+        return Answered("x", Answer(b"7" * self.count, "text/plain", {}))
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,10 +84,9 @@ class MapCells:
 
     occupancy: OccupancyMap
 
-    def look(self) -> Generator[Need, Found, Work[tuple[int, int]]]:
+    def answer(self, find: Find, should_stop: ShouldStop) -> tuple[int, int]:
         """See `Question`."""
-        yield from ()
-        return Work(0.0, lambda _: (self.occupancy.cells.size, id(self.occupancy)))
+        return (self.occupancy.cells.size, id(self.occupancy))
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,12 +95,11 @@ class Failing:
 
     how: str
 
-    def look(self) -> Generator[Need, Found, Work[Any]]:
+    def answer(self, find: Find, should_stop: ShouldStop) -> Any:
         """See `Question`."""
-        yield from ()
-        return Work(0.0, self._fail)
+        return self._fail()
 
-    def _fail(self, _: ShouldStop) -> Any:
+    def _fail(self) -> Any:
         if self.how == "refused":
             raise PastRefused("x is 7, the limit is 6")
         if self.how == "fault":
@@ -133,7 +127,6 @@ def _local_error() -> Exception:
 class Dying:
     """The process that is asked this dies of it."""
 
-    def look(self) -> Generator[Need, Found, Work[None]]:
+    def answer(self, find: Find, should_stop: ShouldStop) -> None:
         """See `Question`."""
-        yield from ()
-        return Work(0.0, lambda _: os.abort())
+        os.abort()

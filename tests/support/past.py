@@ -8,36 +8,25 @@ from dataclasses import dataclass, field, replace
 from statistics import fmean
 from typing import Any, TypeVar
 
-from lupin_bridge.feed.query import Question, Work
+from lupin_bridge.feed.past_child import _found
+from lupin_bridge.feed.query import Now, Question
+from lupin_bridge.past.plans import ConditionalQuery, Query
+from lupin_twin.core.journal_condition import UNKNOWN
 from lupin_twin.core.notes import NotesRequest, PastNotes
 from lupin_twin.core.past import Event, NotRemembered, PastRow, SeriesPast, SeriesRequest
 from lupin_twin.core.state import Snapshot
-from lupin_twin.core.writes import PastWrite, RecentRequest, WritesRequest
+from lupin_twin.core.writes import PastWrite, RecentRequest, ScansRequest, WritesRequest
 from lupin_twin.runtime.workers import Workers
 
 NS = 10**9
 ResultT = TypeVar("ResultT")
 
 
-async def look_up(question: Question[ResultT], past: Any, workers: Workers) -> ResultT:
-    """Answer a question here; its work is done on a worker."""
-    looking = question.look()
-    try:
-        need = next(looking)
-        while True:
-            if isinstance(need, SeriesRequest):
-                need = looking.send(await past.series(need))
-            elif isinstance(need, RecentRequest):
-                need = looking.send(await past.recent(need))
-            elif isinstance(need, NotesRequest):
-                need = looking.send(await past.notes(need))
-            elif isinstance(need, WritesRequest):
-                raise NotRemembered("what was heard is asked of the journal", is_lasting=True)
-            else:
-                need = looking.send(await past.state_at(need))
-    except StopIteration as end:
-        work: Work[ResultT] = end.value
-    return await asyncio.wrap_future(workers.submit(work.do, work.cost_s))
+async def look_up(question: Question[ResultT], past: MadeUp, workers: Workers) -> ResultT:
+    """Answer a question on a worker here."""
+    return await asyncio.wrap_future(
+        workers.submit(lambda stop: question.answer(past.find, stop), 0.0)
+    )
 
 
 @dataclass
@@ -56,21 +45,31 @@ class MadeUp:
     lots_taken: int = 0
     is_closed: bool = False
 
-    async def state_at(self, at_ns: int) -> Snapshot:
+    def find(self, need: Any) -> Any:
+        """What is needed of the past."""
+        if isinstance(need, SeriesRequest):
+            return self.series(need)
+        if isinstance(need, RecentRequest):
+            return self.recent(need)
+        if isinstance(need, ScansRequest):
+            return ()
+        if isinstance(need, NotesRequest):
+            return PastNotes("", 0, ())  # nobody has said anything
+        if isinstance(need, WritesRequest):
+            raise NotRemembered("what was heard is asked of the journal", is_lasting=True)
+        return self.state_at(need)
+
+    def state_at(self, at_ns: int) -> Snapshot:
         """The one state, as if it were of any moment."""
         self._note(at_ns)
         return replace(self.snapshot, stamp_ns=at_ns)
 
-    async def recent(self, request: RecentRequest) -> tuple[PastWrite, ...]:
+    def recent(self, request: RecentRequest) -> tuple[PastWrite, ...]:
         """Nothing: what the state has is all there is."""
         self._note(request.at_ns)
         return ()
 
-    async def notes(self, _request: NotesRequest) -> PastNotes:
-        """Nobody has said anything."""
-        return PastNotes("", 0, ())
-
-    async def series(self, request: SeriesRequest) -> SeriesPast:
+    def series(self, request: SeriesRequest) -> SeriesPast:
         """The points of a period, or as many buckets as are asked for."""
         self._note(request)
         end_ns = request.end_ns or self.now_ns
@@ -121,3 +120,13 @@ class MadeUp:
         self.asked.append(asked)
         if self.error is not None:
             raise self.error
+
+
+def answered_by(log: Any, query: Query, now_ns: int = 2**62) -> bytes:
+    """The body of a query's answer over a log, as the process that looks back makes it."""
+    now = Now(now_ns, "map", UNKNOWN)
+    answer = (
+        ConditionalQuery(query).answer(lambda need: _found(need, now, log), lambda: False).answer
+    )
+    assert answer is not None
+    return bytes(answer.body)

@@ -49,6 +49,7 @@ class Postgres:
         self._fsync = "on" if fsync else "off"
         self._small_mb = small_mb
         self._connections = connections
+        self._listens = "-c listen_addresses=''"
         if os.geteuid() == 0:
             owner = pwd.getpwnam(_USER)
             os.chown(folder, owner.pw_uid, owner.pw_gid)
@@ -66,7 +67,7 @@ class Postgres:
     def start(self) -> None:
         """Start it; returns when it answers."""
         options = (
-            f"-k {self.folder} -c listen_addresses='' -c fsync={self._fsync}"
+            f"-k {self.folder} {self._listens} -c fsync={self._fsync}"
             f" -c max_connections={self._connections}"
         )
         log = str(self.folder / "log")
@@ -82,6 +83,22 @@ class Postgres:
         _run("unshare", "-m", "--", "sh", "-c", script, *start, as_root=True)
         with psycopg.connect(self.url, autocommit=True) as connection:
             connection.execute(f"CREATE TABLESPACE small LOCATION '{small}'")
+
+    def listen_with_tls(self, address: str, cert: Path, key: Path) -> None:
+        """Start it again, on an address of this machine's own, with a certificate."""
+        files = []
+        for given in (cert, key):
+            file = Path(shutil.copy(given, self.folder))
+            file.chmod(0o600)
+            if os.geteuid() == 0:
+                shutil.chown(file, _USER, _USER)
+            files.append(file)
+        self._listens = (
+            f"-c listen_addresses={address} -c ssl=on -c ssl_cert_file={files[0]}"
+            f" -c ssl_key_file={files[1]}"
+        )
+        self.stop()
+        self.start()
 
     def promote(self) -> None:
         """Make a primary of a standby; returns when it takes writes."""

@@ -22,9 +22,12 @@ from urllib.parse import quote
 from lupin_bridge.settings import Settings, one_of
 from lupin_twin.runtime.memory import state_folder
 
-Role = Literal["viewer", "operator", "admin"]
+Role = Literal["viewer", "operator", "admin", "writer"]
 # What each may, the ones before it may too.
 ROLES: Final[tuple[Role, ...]] = ("viewer", "operator", "admin")
+# A token of a sensor posts observations, and may nothing else: it stands in no one's row.
+WRITER: Final = "writer"
+TOKEN_ROLES: Final[tuple[Role, ...]] = (*ROLES, WRITER)
 Kind = Literal["account", "token"]
 
 # A shift: whoever takes over a control room's screen signs in by a name of their own.
@@ -70,7 +73,8 @@ class AccountError(Exception):
 class Person:
     """Who makes a request, what they may, and how that is known.
 
-    `session` is its id in the file; `ends_at_s` when it ends, s since the epoch.
+    `session` is its id in the file; `ends_at_s` when it ends, s since the epoch. `token` is the
+    digest of the one that a request came with.
     """
 
     name: str
@@ -78,10 +82,11 @@ class Person:
     by: Literal["account", "token", "proxy"] = "account"
     session: str = ""
     ends_at_s: int = 0
+    token: str = ""
 
     def may(self, role: Role) -> bool:
         """Whether that role's rights are among theirs."""
-        return ROLES.index(self.role) >= ROLES.index(role)
+        return self.role in ROLES and ROLES.index(self.role) >= ROLES.index(role)
 
 
 class Listed(NamedTuple):
@@ -215,13 +220,8 @@ class Accounts:
         connection = self._connection
         try:
             connection.execute("BEGIN IMMEDIATE")
-            try:
+            with connection:
                 yield connection
-                connection.execute("COMMIT")
-            except BaseException:
-                if connection.in_transaction:
-                    connection.execute("ROLLBACK")
-                raise
         except sqlite3.Error as error:
             raise AccountError(f"the file of accounts cannot be written: {error}") from error
 
@@ -235,8 +235,9 @@ class Accounts:
 
         """
         check_name(name)
-        if role not in ROLES:
-            raise AccountError(f"the role is {role[:64]!r}, expected {one_of(ROLES)}")
+        roles = TOKEN_ROLES if kind == "token" else ROLES
+        if role not in roles:
+            raise AccountError(f"the role is {role[:64]!r}, expected {one_of(roles)}")
         with self._writing() as connection:
             found = connection.execute("SELECT kind FROM person WHERE name = ?", (name,)).fetchone()
             if found is not None:
@@ -281,11 +282,7 @@ class Accounts:
         found = self._connection.execute(
             "SELECT name, role FROM person WHERE secret = ? AND kind = 'token'", (secret,)
         ).fetchone()
-        return None if found is None else Person(found[0], found[1], by="token")
-
-    def has_token(self, person: Person) -> bool:
-        """Whether a token of that name and role is still there."""
-        return any(it[:2] == (person.name, person.role) for it in self.listed("token"))
+        return None if found is None else Person(found[0], found[1], by="token", token=secret)
 
     def of_session(self, session: str, now_s: float) -> Person | None:
         """Whose session it is, by its id in the file; None: it has ended."""

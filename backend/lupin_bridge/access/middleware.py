@@ -19,7 +19,7 @@ from starlette.requests import HTTPConnection
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from websockets.frames import CloseCode
 
-from lupin_bridge.access.accounts import AccountError, Person, accounts_path
+from lupin_bridge.access.accounts import WRITER, AccountError, Person, accounts_path
 from lupin_bridge.access.credentials import (
     BrowserSession,
     CookieTooLong,
@@ -49,10 +49,13 @@ _READS: Final = ("GET", "HEAD")
 # of its own: for that, a script has to ask first (CORS preflight), and is not given leave.
 SIGN_IN: Final = "/api/signin"
 NOTES: Final = "/api/notes"
+# Takes no session: a token in a header is nothing that a browser sends along by itself.
+OBSERVATIONS: Final = "/api/observations"
 _METHODS: Final = {
     SIGN_IN: ("POST",),
     "/api/signout": ("POST",),
     NOTES: (*_READS, "POST"),
+    OBSERVATIONS: ("POST",),
 }
 OWN_HEADER: Final = "X-Lupin-Twin"
 
@@ -75,7 +78,7 @@ _SECURITY_HEADERS: Final = {
 
 
 class ReadOnly:
-    """ASGI middleware: reads only, but for sign-in and notes, and the headers on everything."""
+    """ASGI middleware: reads only, but for sign-in, notes and observations, and headers on all."""
 
     def __init__(self, app: ASGIApp) -> None:
         self._app = app
@@ -87,12 +90,14 @@ class ReadOnly:
             return
 
         send = with_security_headers(send)
-        method = scope["method"]
-        methods = _methods_of(path_of(scope))
+        method, path = scope["method"], path_of(scope)
+        methods = _methods_of(path)
         if method not in methods:
             detail = f"method {method[:16]} is not allowed here, use {' or '.join(methods)}"
             await _Refusal(405, detail, {"allow": ", ".join(methods)}).send(scope, receive, send)
-        elif method not in _READS and OWN_HEADER not in Headers(scope=scope):
+        elif (
+            method not in _READS and path != OBSERVATIONS and OWN_HEADER not in Headers(scope=scope)
+        ):
             detail = f"{method} without the header {OWN_HEADER}, expected any value"
             await _Refusal(403, detail).send(scope, receive, send)
         else:
@@ -217,6 +222,13 @@ class AccessControl:
             except AccountError as error:
                 log.warning("%s: nobody is let in", error)
                 checked = _Refusal(503, "the accounts cannot be read", {"retry-after": "5"})
+            if (
+                isinstance(checked, Person)
+                and checked.role == WRITER
+                and path_of(scope) != OBSERVATIONS
+            ):
+                detail = f"{checked.name} is a writer: it posts to {OBSERVATIONS}, and no more"
+                checked = _Refusal(403, detail)
             if not isinstance(checked, _Refusal):
                 await self._pass_on(checked, scope, receive, send)
                 return

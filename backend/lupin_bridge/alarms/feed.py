@@ -9,7 +9,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import logging
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import Final, TypeVar
 
@@ -17,13 +17,12 @@ from lupin_bridge.alarms.board import AlarmBoard, AlarmSource
 from lupin_bridge.alarms.ledger import Change, Page, change_between, page_of
 from lupin_bridge.alarms.state_changes import RUN, writes_between
 from lupin_bridge.feed.source import TwinSource, TwinUnavailableError, TwinUpdate
-from lupin_bridge.judge.alarm import HOUSE, Alarm, alarm_id
-from lupin_bridge.judge.alarm_fold import FORGET_EVERY_NS, Follower
+from lupin_bridge.judge.alarm import Alarm, silence
+from lupin_bridge.judge.alarm_fold import FORGET_EVERY_NS, Follower, Found
 from lupin_bridge.judge.options import Criteria
-from lupin_bridge.judge.verdict import Kind, Reason, Verdict
 from lupin_twin.core.journal_condition import JournalState
 from lupin_twin.core.past import NotRemembered, PastRefused
-from lupin_twin.core.state import NANOSECONDS_PER_SECOND, Snapshot
+from lupin_twin.core.state import NANOSECONDS_PER_SECOND, Reading, Snapshot
 from lupin_twin.core.writes import PastWrite, PastWrites, RunSpan, WritesRequest
 
 log = logging.getLogger(__name__)
@@ -58,6 +57,7 @@ class AlarmFeed:
     """Keeps `board` as it follows from what the twin observes. Belongs to the event loop.
 
     `now_ns` tells ROS time, None where it is not known; `days` is how far back the past is read.
+    `note_days` hears of the values of quantities of a day, by tag.
     """
 
     def __init__(
@@ -67,11 +67,14 @@ class AlarmFeed:
         board: AlarmBoard,
         now_ns: Callable[[], int | None],
         days: float,
+        *,
+        note_days: Callable[[Mapping[str, Sequence[Reading]]], None],
     ) -> None:
         self._source = source
         self._criteria = criteria
         self._board = board
         self._now_ns = now_ns
+        self._note_days = note_days
         self._reach_ns = int(days * DAY_NS)
         self._wake = asyncio.Event()
         self._follower: Follower | None = None
@@ -138,18 +141,10 @@ class AlarmFeed:
         if is_silent == was_silent or last_ns is None:
             return
         if open_now is None or not was_silent:
-            reason = Reason(Kind.SILENT, Verdict.UNKNOWN, since_ns=last_ns)
-            name = alarm_id(HOUSE, Kind.SILENT, "", 0, last_ns)
-            self._silences = [*self._silences, Alarm(name, reason, HOUSE, last_ns)][-_SILENCES:]
+            self._silences = [*self._silences, silence(last_ns)][-_SILENCES:]
         else:
-            over = Alarm(
-                open_now.id,
-                open_now.reason,
-                HOUSE,
-                open_now.raised_at_ns,
-                max(last_ns, open_now.raised_at_ns),
-            )
-            self._silences[-1] = over
+            over_ns = max(last_ns, open_now.raised_at_ns)
+            self._silences[-1] = replace(open_now, cleared_at_ns=over_ns)
         self._wake.set()
 
     # --- following -------------------------------------------------------------------------------
@@ -247,7 +242,13 @@ class AlarmFeed:
         def is_day(light: bool | None, at_ns: int) -> bool:
             return criteria.day(light, at_ns).is_day
 
-        return Follower(criteria.sensors, is_day, spans, criteria.recent_s)
+        return Follower(
+            criteria.sensors,
+            is_day,
+            spans,
+            criteria.recent_s,
+            day_number=criteria.day_number,
+        )
 
     async def _take(self, lot: Sequence[PastWrite]) -> None:
         follower = self._follower
@@ -274,13 +275,14 @@ class AlarmFeed:
         moment_ns, since_ns = now_ns, max(0, now_ns - self._reach_ns)
         beside = tuple(alarm for alarm in self._silences if alarm.raised_at_ns <= moment_ns)
 
-        def find(_: object) -> tuple[Page, Change, int]:
+        def find(_: object) -> tuple[Page, Change, Found]:
             found = follower.found(moment_ns, since_ns)
             self._alarms = found.alarms
-            return *self._newest(beside, since_ns), found.due_ns
+            return *self._newest(beside, since_ns), found
 
-        page, change, due_ns = await self._on_worker(find)
-        self._due_ns = due_ns
+        page, change, found = await self._on_worker(find)
+        self._due_ns = found.due_ns
+        self._note_days(found.days)
         is_past, self._is_caught_up = not self._is_caught_up, True
         begins_ns = moment_ns if self._since_ns is None else self._since_ns
         self._board.put(page, replace(change, is_past=is_past), self._origin, begins_ns)

@@ -104,6 +104,11 @@ class NoteBoard:
         """All that are known, in the order in which they were written; None: not looked yet."""
         return None if self._found is None else self._found.notes
 
+    @property
+    def count(self) -> int:
+        """How many the log has."""
+        return 0 if self._found is None else self._found.count
+
     def start(self) -> None:
         """Begin to look, once; the source knows its log by now."""
         if self._task is None:

@@ -21,7 +21,7 @@ from lupin_twin.core.past import HOUR_NS, Event
 from lupin_twin.journal.appending import LAST_SEQ, PURGED_SEQ
 from lupin_twin.journal.beside import forwarded_seq, note_forwarded
 from lupin_twin.journal.retention import RECORD
-from lupin_twin.journal.schema import LOCAL_SITE, ORIGIN, SiteLog, get_meta, open_named
+from lupin_twin.journal.schema import LOCAL_SITE, MAP, ORIGIN, SiteLog, get_meta, open_named
 
 Row = tuple[Any, ...]
 
@@ -305,7 +305,7 @@ class Source:
                 record["seq"] = record.get("seq", 0) + asked["seqs"]
                 moved = f"{key}:{asked['epoch']}"
                 found.append((asked["site"], moved, json.dumps(record)))
-            elif key == ORIGIN or key.startswith("simulated_"):
+            elif key in {ORIGIN, MAP} or key.startswith("simulated_"):
                 found.append((asked["site"], key, value))
         return found
 

@@ -24,7 +24,7 @@ from lupin_bridge.settings import Secrets, SettingError, Settings, option, varia
 log = logging.getLogger("lupin_bridge")
 
 # Of the twin's own: a fleet has none.
-_NOT_HERE = ("site", "journal", "mqtt_url", "webhook_url")
+_NOT_HERE = ("site", "journal", "mqtt_url", "webhook_url", "http_observations")
 
 
 def run(settings: Settings, secrets: Secrets, ros_args: Sequence[str]) -> None:
@@ -41,7 +41,7 @@ def run(settings: Settings, secrets: Secrets, ros_args: Sequence[str]) -> None:
     if not settings.archive_url:
         raise SettingError(f"{option('archive_url')} is missing, or {variable('archive_url')}")
     for name in _NOT_HERE:
-        if getattr(settings, name):
+        if getattr(settings, name) not in ("", "off"):
             raise SettingError(f"{settings.called(name)} is for a twin, not for lupin-twin fleet")
     try:
         check_url(settings.archive_url)

@@ -9,13 +9,15 @@ from __future__ import annotations
 import argparse
 import csv
 import math
+import sqlite3
 import time
 from collections import deque
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import closing
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import closing, suppress
 from dataclasses import dataclass, field
 from datetime import datetime
-from itertools import islice
+from itertools import groupby, islice
+from operator import itemgetter
 from pathlib import Path
 from typing import Any, Final, TextIO
 from zoneinfo import ZoneInfo
@@ -102,14 +104,15 @@ class Summary:
         """A scan that can be imported."""
         self.scans += 1
         self.tags.add(scan.tag_id)
-        self.first_ns, self.last_ns = (
-            min(self.first_ns, scan.stamp_ns),
-            max(self.last_ns, scan.stamp_ns),
-        )
+        self.first_ns = min(self.first_ns, scan.stamp_ns)
+        self.last_ns = max(self.last_ns, scan.stamp_ns)
         for reading in scan.readings:
-            found = self.sensors.setdefault(reading.name, [0, math.inf, -math.inf])
+            found = self.sensors.get(reading.name)
+            if found is None:
+                found = self.sensors[reading.name] = [0, math.inf, -math.inf]
             found[0] += 1
-            found[1], found[2] = min(found[1], reading.value), max(found[2], reading.value)
+            found[1] = min(found[1], reading.value)
+            found[2] = max(found[2], reading.value)
 
     def lines(self) -> Iterator[str]:
         """The same for a person."""
@@ -158,13 +161,13 @@ def run(options: argparse.Namespace, environ: Mapping[str, str]) -> int:
 
 def _run(options: argparse.Namespace, path: Path) -> int:
     columns = columns_of(read_yaml(options.columns))
-    summary, progress, new = Summary(), Progress(), 0
+    summary, progress, new, known = Summary(), Progress(), 0, 0
     with options.file.open(encoding="utf-8-sig", newline="") as file:
         size = options.file.stat().st_size or 1
         lines = counted(file, lambda at: progress.tell(f"reading {options.file}", at / size))
         found = scans(lines, columns, summary)
         if options.write:
-            new = _write(path, columns, found)
+            new, known = _write(path, columns, found)
         else:
             deque(found, maxlen=0)
     progress.clear()
@@ -172,7 +175,7 @@ def _run(options: argparse.Namespace, path: Path) -> int:
     if not options.write:
         say(f"nothing was written; add --write to import it into {path}")
         return 0
-    tell(f"{new} scans are new in {path}; {summary.scans - new} were there before")
+    tell(f"{new} scans are new in {path}; {known} were there before")
     if summary.scans and time.time_ns() - summary.first_ns > _KEPT_DAYS * 86_400 * _NS:
         say(
             f"a twin deletes what is older than its parameter journal_days, {_KEPT_DAYS} unless "
@@ -266,10 +269,16 @@ def scans(lines: Iterator[str], columns: Columns, summary: Summary) -> Iterator[
     """
     reader = csv.reader(lines)
     header = next((row for row in reader if row), [])
-    read = _reader(header, columns)
+    read, is_table_over = _reader(header, columns), False
     for row in reader:
-        if not row or row == header:  # InfluxDB repeats it
+        if not row:
+            is_table_over = True
             continue
+        # InfluxDB's next table has a header of its own, with other columns where its tags differ.
+        if is_table_over and columns.time in row:
+            read, is_table_over = _reader(row, columns), False
+            continue
+        is_table_over = False
         summary.rows += 1
         try:
             scan = read(row)
@@ -297,18 +306,18 @@ def _reader(header: list[str], columns: Columns) -> Callable[[list[str]], ScanRo
     value_at = at(columns.value) if columns.value else -1
     by_name = {column.name: (name, column) for name, column in columns.names.items()}
 
-    def readings_of(row: list[str]) -> tuple[Reading, ...]:
+    def readings_of(row: list[str]) -> Sequence[Reading]:
         if wide:
-            return tuple(
+            return [
                 Reading(name, _number(name, row[index], column))
                 for name, column, index in wide
-                if row[index].strip()
-            )
+                if row[index] and not row[index].isspace()
+            ]
         called = row[sensor_at]
         if by_name and called not in by_name:
             raise ValueError(f"{columns.sensor} {called[:40]!r} is not one of names")
         name, column = by_name.get(called, (called, _AS_IT_IS))
-        return (Reading(name, _number(name, row[value_at], column)),)
+        return [Reading(name, _number(name, row[value_at], column))]
 
     def read(row: list[str]) -> ScanRow | None:
         tag_id = row[tag_at].strip() if columns.tag else columns.tag_id
@@ -318,18 +327,22 @@ def _reader(header: list[str], columns: Columns) -> Callable[[list[str]], ScanRo
         if not readings:
             raise ValueError("no reading")
         stamp_ns = _moment_ns(row[time_at], columns.zone)
-        return ScanRow(tag_id, stamp_ns, stamp_ns, readings, source=SOURCE)
+        return ScanRow(tag_id, stamp_ns, stamp_ns, tuple(readings), source=SOURCE)
 
     return read
 
 
 _AS_IT_IS: Final = Column("")
+# The states of a sensor in Home Assistant that is away.
+_NOT_KNOWN: Final = ("unknown", "unavailable")
 
 
 def _number(name: str, text: str, column: Column) -> float:
     try:
         value = float(text) * column.factor + column.offset
     except ValueError:
+        if text in _NOT_KNOWN:
+            raise ValueError(f"{name} is {text}") from None
         raise ValueError(f"{name} is no number") from None
     if not column.low <= value <= column.high or math.isinf(value):
         raise ValueError(f"{name} is not from {column.low:g} to {column.high:g}")
@@ -337,12 +350,14 @@ def _number(name: str, text: str, column: Column) -> float:
 
 
 def _moment_ns(text: str, zone: ZoneInfo | None) -> int:
-    try:
-        number = float(text)
-    except ValueError:
-        pass
-    else:
-        seconds = number / 1000 if number > _MILLISECONDS else number
+    number = None
+    if text[4:5] != "-":  # most are dates: to find by an error that they are no numbers is slow
+        with suppress(ValueError):
+            number = float(text)
+    if number is not None:
+        # InfluxDB 1 has nanoseconds.
+        unit = next((size for size in (1e9, 1e6, 1e3) if number > _MILLISECONDS * size / 1e3), 1.0)
+        seconds = number / unit
         if not 0 < seconds < _MILLISECONDS:
             raise ValueError("the time is no moment since 1970")
         return int(seconds * 1e6) * 1000
@@ -360,16 +375,43 @@ def _moment_ns(text: str, zone: ZoneInfo | None) -> int:
     return int(seconds * 1e6) * 1000
 
 
-def _write(path: Path, columns: Columns, found: Iterator[ScanRow]) -> int:
-    """Write them where each belongs, batch by batch; returns how many are new."""
+def in_order(found: Iterator[ScanRow]) -> Iterator[ScanRow]:
+    """The scans by their stamps; rows of one tag and moment are one, of each sensor its first.
+
+    Exports have one sensor behind the other; there may be more than the memory holds.
+    """
+    with closing(sqlite3.connect("", isolation_level=None)) as disk:
+        disk.execute("BEGIN")
+        disk.execute("CREATE TABLE reading (stamp_ns INTEGER, tag TEXT, sensor TEXT, value REAL)")
+        disk.executemany(
+            "INSERT INTO reading VALUES (?, ?, ?, ?)",
+            (
+                (scan.stamp_ns, scan.tag_id, reading.name, reading.value)
+                for scan in found
+                for reading in scan.readings
+            ),
+        )
+        rows = disk.execute("SELECT * FROM reading ORDER BY stamp_ns, tag, rowid")
+        for (stamp_ns, tag_id), scan in groupby(rows, key=itemgetter(0, 1)):
+            values: dict[str, float] = {}
+            for _, _, sensor, value in scan:
+                values.setdefault(sensor, value)
+            readings = tuple(Reading(sensor, value) for sensor, value in values.items())
+            yield ScanRow(tag_id, stamp_ns, stamp_ns, readings, source=SOURCE)
+
+
+def _write(path: Path, columns: Columns, found: Iterator[ScanRow]) -> tuple[int, int]:
+    """Write them where each belongs, batch by batch; how many are new, and how many were known."""
     path.parent.mkdir(parents=True, exist_ok=True)
-    new = 0
+    new = count = 0
+    scans = in_order(found)
     with (
         Lock(path, "lupin-twin import"),
         closing(JournalFile(path, _NO_LIMITS, is_sound=None)) as file,
     ):
         known, placed = _known(path)
-        while batch := list(islice(found, _BATCH)):
+        while batch := list(islice(scans, _BATCH)):
+            count += len(batch)
             if not known:
                 begin = Clock(batch[0].stamp_ns, batch[0].stamp_ns, is_simulated=False)
                 known = [file.start(begin, 1, is_believed=True).run]
@@ -390,7 +432,7 @@ def _write(path: Path, columns: Columns, found: Iterator[ScanRow]) -> int:
                     if tag_id not in placed
                 ]
             )
-    return new
+    return new, count - new
 
 
 def _known(path: Path) -> tuple[list[Run], set[str]]:

@@ -17,6 +17,7 @@ from typing import Final
 
 from lupin_bridge.access.accounts import (
     ROLES,
+    TOKEN_ROLES,
     AccountError,
     Accounts,
     Kind,
@@ -60,8 +61,9 @@ def add_parsers(roles: Roles) -> None:
                     "--role",
                     dest="given_role",  # `role` is the command's
                     required=True,
-                    choices=ROLES,
-                    help="viewer reads, operator writes notes too, admin reads the audit trail too",
+                    choices=TOKEN_ROLES if role == "token" else ROLES,
+                    help="viewer reads, operator writes notes too, admin reads the audit trail too"
+                    + (", writer posts observations and does nothing else" * (role == "token")),
                 )
             if action == "add" and role == "user":
                 which = own.add_mutually_exclusive_group()

@@ -13,6 +13,7 @@ from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
 
+from lupin_bridge.access.accounts import accounts_path
 from lupin_bridge.access.middleware import Access
 from lupin_bridge.access.policy import Proxies
 from lupin_bridge.app import create_app, has_page
@@ -111,7 +112,8 @@ async def _run(
         feed = await asyncio.to_thread(demo.with_past, feed, feed.journal, patrol_args)
     limits = Limits()
     source = _source_of(role, settings, ros_args, feed, limits)
-    bridge = Bridge(source, settings, criteria=criteria, outward=Channels(targets), limits=limits)
+    outward = Channels(targets, accounts_path(settings).parent)
+    bridge = Bridge(source, settings, criteria=criteria, outward=outward, limits=limits)
     app = create_app(bridge, access=access, proxies=proxies)
 
     def announce_shutdown() -> None:
@@ -123,7 +125,7 @@ async def _run(
     feeder = None if feed is None else Feeder(feed, lambda: server.should_exit)
     forwarding = child.Forwarding(settings, lambda: source.journal().path)
     try:
-        await serve(server, listener, settings, supervisor, lambda: ailment(source))
+        await serve(server, listener, settings, supervisor, lambda: ailment(source.thread))
     finally:
         if feeder is not None:
             feeder.terminate()

@@ -15,7 +15,6 @@ from lupin_bridge.feed.revisions import RevisedEstimate, revised
 from lupin_bridge.feed.ros_source import RosSource
 from lupin_bridge.feed.shared_work import Shared
 from lupin_bridge.feed.source import CacheCounts, RevisedGrid, TwinUpdate
-from lupin_twin.core.history import TagHistory
 from lupin_twin.core.journal_condition import Condition
 from lupin_twin.core.notes import Note
 from lupin_twin.core.parameters import World
@@ -42,6 +41,7 @@ class LocalTwin(RosSource[TwinNode, TwinUpdate]):
     ) -> None:
         super().__init__(ros_args=ros_args, timeout_s=timeout_s)
         self._world = world
+        self.day_length_s = world.day_length_s
         # A restarted server must never match an ETag of its predecessor, whose counts it repeats.
         self.identity = uuid.uuid4().hex[:12]
         self.update: TwinUpdate
@@ -82,7 +82,7 @@ class LocalTwin(RosSource[TwinNode, TwinUpdate]):
                 self._rules = update.rules
             on_state(update)
 
-        await self._start_thread(make_node, on_update, on_death, lambda node: node.fields.rules)
+        await self._start_thread(make_node, on_update, on_death)
 
     def revision(self) -> str:
         """The process's identity, the observation count and the map's revision, as updated last.
@@ -98,10 +98,6 @@ class LocalTwin(RosSource[TwinNode, TwinUpdate]):
     def journal(self) -> Condition:
         """The node's journal."""
         return self.update.journal
-
-    def cache_counts(self) -> CacheCounts:
-        """The node's cache of fields, as of the last update."""
-        return self.update.cache
 
     def occupancy_map(self) -> OccupancyMap | None:
         """The latest map that the node accepted."""
@@ -123,10 +119,6 @@ class LocalTwin(RosSource[TwinNode, TwinUpdate]):
     async def estimate_report(self, request: ReportRequest) -> Report:
         """What the node knows; where another tag helps is worked out on a worker."""
         return await self._in_time(self._report(request))
-
-    async def history(self, tag_id: str) -> TagHistory | None:
-        """The last `buffer_len` scans, and as many tries, of a tag."""
-        return await self._in_time(self.thread.call(lambda node: node.history_of(tag_id)))
 
     writes_notes = True
 

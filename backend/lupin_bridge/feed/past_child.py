@@ -21,15 +21,16 @@ from concurrent.futures import Future
 from functools import partial
 from typing import IO, Any, Final
 
-from lupin_bridge.feed.query import Now, Question, Work
+from lupin_bridge.feed.query import Now, Question
+from lupin_twin.core.history import LatestRequest
 from lupin_twin.core.journal_condition import UNKNOWN
 from lupin_twin.core.notes import NotesRequest
 from lupin_twin.core.past import SeriesRequest, check_moment
-from lupin_twin.core.writes import RecentRequest, WritesRequest
-from lupin_twin.journal.fold import state_at
-from lupin_twin.journal.follow import recent, writes
+from lupin_twin.core.writes import PeriodRequest, RecentRequest, ScansRequest, WritesRequest
+from lupin_twin.journal.fold import latest, state_at
+from lupin_twin.journal.follow import observed, recent, scans, writes
 from lupin_twin.journal.notes import notes
-from lupin_twin.journal.queries import Export, series
+from lupin_twin.journal.queries import series
 from lupin_twin.runtime.journal_queries import Recall
 from lupin_twin.runtime.workers import ShouldStop
 
@@ -39,7 +40,7 @@ HEAD: Final = struct.Struct(">QIQ")
 # nice(2): beside a busy twin it gets a quarter of the core that they share.
 NICENESS: Final = 5
 
-Search = Callable[[Any, ShouldStop], Work[Any]]
+Search = Callable[[Any, ShouldStop], Any]
 
 
 class Child:
@@ -81,12 +82,20 @@ class Child:
             self._send(number, True, error)
             return
         self._condition = now.condition
-        running = self._recall.query(lambda log, stop: search(log, stop).do(stop), cost_s)
+        running = self._recall.query(search, cost_s)
         self._running[number] = running
         running.add_done_callback(partial(self._reply, number))
 
     def _search(self, question: Question[Any], now: Now) -> Search:
-        return lambda log, _: _look(question, now, log)
+        def search(log: sqlite3.Connection, should_stop: ShouldStop) -> Any:
+            def find(need: Any) -> Any:
+                if should_stop():  # as a statement ends that is interrupted
+                    raise sqlite3.OperationalError("interrupted")
+                return _found(need, now, log)
+
+            return question.answer(find, should_stop)
+
+        return search
 
     # --- in a worker's thread -------------------------------------------------------------------
 
@@ -125,33 +134,28 @@ class _Unpickler(pickle.Unpickler):
         return self._map
 
 
-def _look(question: Question[Any], now: Now, log: sqlite3.Connection) -> Work[Any]:
-    looking = question.look()
-    try:
-        need = next(looking)
-        while True:
-            need = looking.send(_found(need, now, log))
-    except StopIteration as end:
-        work: Work[Any] = end.value
-        return work
+_OF_LOG: Final[dict[Any, Callable[[sqlite3.Connection, Any], Any]]] = {
+    WritesRequest: writes,
+    PeriodRequest: observed,
+    NotesRequest: notes,
+    LatestRequest: latest,
+}
 
 
 def _found(need: Any, now: Now, log: sqlite3.Connection) -> Any:
     match need:
         case SeriesRequest():
             return series(log, need, now.stamp_ns)
-        case WritesRequest():
-            return writes(log, need)
-        case NotesRequest():
-            return notes(log, need)
-        case Export():
-            return need.step(log)
-        case RecentRequest():
+        case WritesRequest() | PeriodRequest() | NotesRequest() | LatestRequest():
+            return _OF_LOG[type(need)](log, need)
+        case RecentRequest() | ScansRequest():
             check_moment(need.at_ns, now.stamp_ns)
-            return recent(log, need)
-        case _:
+            return recent(log, need) if isinstance(need, RecentRequest) else scans(log, need)
+        case int():
             check_moment(need, now.stamp_ns)
             return state_at(log, need, now.frame_id)
+        case _:
+            return need.step(log)
 
 
 def _portable(error: BaseException) -> BaseException:

@@ -1,34 +1,54 @@
 """Questions about the past as values, so that another process may answer them.
 
-A question says one by one what it has to know of the log, and with the last of that what is left
-to do. `past_child` drives it, over a journal.
+`past_child` answers them, over a journal: it gives each what it looks up there.
 """
 
 from __future__ import annotations
 
 import pickle
-from collections.abc import Callable, Generator, Sequence
+import sqlite3
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any, Final, Generic, Protocol, TypeVar
+from typing import Any, Generic, Protocol, TypeVar
 
+from lupin_twin.core.history import LatestRequest
 from lupin_twin.core.journal_condition import Condition
 from lupin_twin.core.notes import NotesRequest
 from lupin_twin.core.past import PastRow, SeriesRequest
-from lupin_twin.core.writes import RecentRequest, WritesRequest
+from lupin_twin.core.writes import PeriodRequest, RecentRequest, ScansRequest, WritesRequest
 from lupin_twin.journal.queries import Export, lots
 from lupin_twin.runtime.workers import ShouldStop
 
 ResultT = TypeVar("ResultT")
+ResultT_co = TypeVar("ResultT_co", covariant=True)
+
+
+class Step(Protocol):
+    """What reads the log by itself, such as an export."""
+
+    def step(self, log: sqlite3.Connection) -> Any:
+        """What was found."""
+
 
 # A moment, ns of ROS time, which `Snapshot` answers; a series, which `SeriesPast` does; what was
-# recent at a moment, which a tuple of `PastWrite` does; what was received, which `PastWrites` does;
-# what people said, which `PastNotes` does; the next step of an export, which a list of `PastRow`
-# does.
-Need = int | SeriesRequest | RecentRequest | WritesRequest | NotesRequest | Export
+# recent at a moment, or scanned up to one, which a tuple of `PastWrite` does; what was received, or
+# observed in a period, which `PastWrites` does; what people said, which `PastNotes` does; a tag's
+# last scans, which a `History` does; or any other step.
+Need = (
+    int
+    | SeriesRequest
+    | RecentRequest
+    | ScansRequest
+    | WritesRequest
+    | PeriodRequest
+    | NotesRequest
+    | LatestRequest
+    | Step
+)
 # What is known as of then crosses by itself, so it is of any type.
 Found = Any
-# What writing a row of an export takes, roughly and at worst, s.
-WRITE_ROW_S: Final = 5e-6
+# Looks up what is needed of the log, as of one moment of its writing.
+Find = Callable[[Need], Found]
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,19 +60,11 @@ class Now:
     condition: Condition
 
 
-@dataclass(frozen=True, slots=True)
-class Work(Generic[ResultT]):
-    """What is left when all is known, and about how long that takes, s of one core."""
-
-    cost_s: float
-    do: Callable[[ShouldStop], ResultT]
-
-
-class Question(Protocol[ResultT]):
+class Question(Protocol[ResultT_co]):
     """A value that can be pickled, and so can its answer."""
 
-    def look(self) -> Generator[Need, Found, Work[ResultT]]:
-        """Yield each need, get what was found, return the work."""
+    def answer(self, find: Find, should_stop: ShouldStop) -> ResultT_co:
+        """The answer; it ends early where `should_stop` says that nobody waits for it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,10 +73,9 @@ class Itself:
 
     need: Need
 
-    def look(self) -> Generator[Need, Found, Work[Any]]:
-        """One need and no work."""
-        found = yield self.need
-        return Work(0.0, lambda _: found)
+    def answer(self, find: Find, should_stop: ShouldStop) -> Any:  # noqa: ARG002
+        """See `Question`."""
+        return find(self.need)
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,13 +88,14 @@ class ExportStep(Generic[ResultT]):
     export: bytes
     write: Callable[[Sequence[PastRow]], ResultT]
 
-    def look(self) -> Generator[Need, Found, Work[tuple[bytes | None, list[ResultT]]]]:
+    def answer(
+        self,
+        find: Find,
+        should_stop: ShouldStop,  # noqa: ARG002
+    ) -> tuple[bytes | None, list[ResultT]]:
         """See `Question`."""
         export: Export = pickle.loads(self.export)  # noqa: S301  # our own
-        rows: list[PastRow] | None = yield export
+        rows: list[PastRow] | None = find(export)
         if rows is None:
-            return Work(0.0, lambda _: (None, []))
-        behind = pickle.dumps(export, 5)
-        return Work(
-            len(rows) * WRITE_ROW_S, lambda _: (behind, [self.write(lot) for lot in lots(rows)])
-        )
+            return None, []
+        return pickle.dumps(export, 5), [self.write(lot) for lot in lots(rows)]

@@ -21,6 +21,7 @@ import asyncio
 import logging
 from collections import deque
 from collections.abc import Callable, Mapping
+from contextlib import ExitStack
 from dataclasses import dataclass
 from functools import partial
 from typing import Any, Final, Protocol
@@ -201,18 +202,16 @@ class Relay:
         if relayed is None:
             relayed = self._topics[topic] = _Relayed(topic)
             relayed.opening = asyncio.create_task(self._subscribe(relayed))
-            # Looked at, should all who waited have left.
-            relayed.opening.add_done_callback(lambda task: task.cancelled() or task.exception())
+            relayed.opening.add_done_callback(partial(self._opened, relayed))
         listening = Listening(on_sample, partial(self._leave, relayed))
         for sample in relayed.latched.all():
             listening.hear(sample)
         relayed.listeners.append(listening)
-        try:
+        with ExitStack() as undo:
+            undo.callback(listening.close)
             # Not ended with who asked first: others may wait for it by now.
             await asyncio.shield(relayed.opening)
-        except BaseException:
-            listening.close()
-            raise
+            undo.pop_all()
         return listening
 
     async def published(self, is_wanted: Callable[[str, str], bool]) -> Mapping[str, str]:
@@ -260,12 +259,14 @@ class Relay:
             close: Callable[[], None] = await thread.call(
                 lambda node: self._ros.subscribe(node, topic, take)
             )
-        except BaseException as error:
-            self._forget(relayed)
-            if isinstance(error, LookupError | ValueError):
-                raise NotRelayedError(f"{topic.name} cannot be relayed here: {error}") from None
-            raise
+        except (LookupError, ValueError) as error:
+            raise NotRelayedError(f"{topic.name} cannot be relayed here: {error}") from None
         return close
+
+    def _opened(self, relayed: _Relayed, task: asyncio.Task[Callable[[], None]]) -> None:
+        # Looked at here, should all who waited have left.
+        if task.cancelled() or task.exception() is not None:
+            self._forget(relayed)
 
     def _forget(self, relayed: _Relayed) -> None:
         if self._topics.get(relayed.topic) is relayed:

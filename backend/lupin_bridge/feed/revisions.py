@@ -24,14 +24,18 @@ MAX_REVISIONS: Final = 256
 
 
 class RevisionCache:
-    """The revisions of answers. An epoch is whatever changes when they may."""
+    """The revisions of answers. An epoch is whatever changes when they may.
 
-    def __init__(self) -> None:
+    One stands for `ttl_s` at most.
+    """
+
+    def __init__(self, ttl_s: float = REVISION_TTL_S) -> None:
+        self._ttl_s = ttl_s
         self._cached: OrderedDict[Hashable, _Cached] = OrderedDict()
 
     def put(self, question: Hashable, epoch: Hashable, revision: str) -> None:
         """An answer that was asked for in `epoch`, which still is."""
-        self._cached[question] = _Cached(epoch, revision, time.monotonic() + REVISION_TTL_S)
+        self._cached[question] = _Cached(epoch, revision, time.monotonic() + self._ttl_s)
         self._cached.move_to_end(question)
         if len(self._cached) > MAX_REVISIONS:
             self._cached.popitem(last=False)

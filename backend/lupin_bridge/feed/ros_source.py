@@ -6,17 +6,24 @@ import asyncio
 from collections.abc import Callable, Sequence
 from typing import Any, Generic, TypeVar
 
+from lupin_msgs.msg import Observation
 from rclpy.context import Context
 
 from lupin_bridge.feed.past_process import PastProcess
 from lupin_bridge.feed.relay import Relay
 from lupin_bridge.feed.relay_ros import RelayRos, names_of
 from lupin_bridge.feed.revisions import RevisedEstimate, RevisionCache
+from lupin_bridge.feed.robot import Robot
+from lupin_bridge.feed.robot_ros import RobotTopics
 from lupin_bridge.feed.ros_thread import BridgedNode, RosThread
 from lupin_bridge.feed.shared_work import Shared
 from lupin_bridge.feed.source import TwinSource
 from lupin_bridge.feed.topics import TwinNames
+from lupin_twin.adapt.messages import observation
+from lupin_twin.adapt.scans import MadeScan
+from lupin_twin.core import interfaces
 from lupin_twin.field.engine import FieldRules
+from lupin_twin.ros.base_node import qos_of
 from lupin_twin.runtime.workers import Workers
 
 NodeT = TypeVar("NodeT", bound=BridgedNode)
@@ -34,9 +41,13 @@ class RosSource(TwinSource, Generic[NodeT, EventT]):
         self.workers = Workers("work")
         self.past = PastProcess()
         self.relay = Relay(lambda: self.thread, RelayRos())
+        # Of the ROS thread alone.
+        self._robot_topics = RobotTopics()
         self._estimating: Shared[RevisedEstimate] = Shared()
         self._revisions = RevisionCache()
         self._rules: FieldRules
+        # Made at the first one: most bridges never publish any.
+        self._observations: Any = None
         # The same for as long as the node lives.
         self._names: TwinNames
 
@@ -45,40 +56,39 @@ class RosSource(TwinSource, Generic[NodeT, EventT]):
         make_node: Callable[[Context, Callable[[EventT], None]], NodeT],
         on_event: Callable[[EventT], None],
         on_death: Callable[[], None],
-        rules: Callable[[Any], FieldRules],
     ) -> None:
         self.thread = RosThread(
             make_node, ros_args=self._ros_args, on_event=on_event, on_death=on_death
         )
         await self.thread.start()
-        self._rules, self._names = await self.thread.call(
-            lambda node: (rules(node), names_of(node))
+        self._names, parameters = await self.thread.call(
+            lambda node: (names_of(node), node.parameters)
         )
+        self._rules, self.buffer_len = FieldRules.of(parameters), parameters.buffer_len
 
     async def stop(self) -> None:
         """Stop the ROS thread, the workers and the process that looks back."""
         self.workers.close()
         await asyncio.gather(self.past.stop(), self.thread.stop())
 
-    @property
-    def is_alive(self) -> bool:
-        """See `TwinSource`."""
-        return self.thread.is_alive
+    takes_observations = True
 
-    @property
-    def stuck_s(self) -> float:
+    async def publish_observation(self, scan: MadeScan, source: str) -> None:
         """See `TwinSource`."""
-        return self.thread.stuck_s
+        topic = self._names.observations_topic
 
-    @property
-    def calls_waiting(self) -> int:
-        """See `TwinSource`."""
-        return self.thread.calls_waiting
+        def publish(node: Any) -> None:
+            if self._observations is None:
+                self._observations = node.create_publisher(
+                    Observation, topic, qos_of(interfaces.OBSERVATIONS)
+                )
+            self._observations.publish(observation(scan, "", source))
 
-    @property
-    def callback_errors(self) -> int:
-        """See `TwinSource`."""
-        return self.thread.callback_errors
+        await self._in_time(self.thread.call(publish))
+
+    async def robot(self, now_ns: int | None) -> Robot | None:
+        """From the robot's own topics, the newest message of each."""
+        return await self.thread.call(lambda node: self._robot_topics.look(node, now_ns))
 
     def rules(self) -> FieldRules:
         """The node's parameters for fields: the twin's, as far as it was given the same."""

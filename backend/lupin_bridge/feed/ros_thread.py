@@ -20,6 +20,7 @@ from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.signals import SignalHandlerOptions
 
 from lupin_bridge.feed.source import TwinUnavailableError
+from lupin_twin.core.parameters import TwinParameters
 from lupin_twin.ros.base_node import end_spinning, spin_until_shutdown
 from lupin_twin.runtime.process import remove_stale_shared_memory
 
@@ -62,6 +63,7 @@ class BridgedNode(Protocol):
     """What the thread needs of the node it runs."""
 
     callback_errors: int
+    parameters: TwinParameters
 
     def report(self, what: str, error: Exception) -> None:
         """Count and log an error that left a callback."""

@@ -8,16 +8,17 @@ import time
 from abc import ABC, abstractmethod
 from collections.abc import AsyncGenerator, Awaitable, Callable, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Final, TypeVar
+from typing import Any, Final, TypeVar
 
 from lupin_bridge.feed.past_process import PastProcess
 from lupin_bridge.feed.query import ExportStep, Itself, Now, Question
 from lupin_bridge.feed.relay import Relay
 from lupin_bridge.feed.revisions import RevisedEstimate
+from lupin_bridge.feed.robot import Robot
 from lupin_bridge.feed.topics import TwinNames
+from lupin_twin.adapt.scans import MadeScan
 from lupin_twin.core.diagnostics import Origin
 from lupin_twin.core.drops import Counts, Recent
-from lupin_twin.core.history import TagHistory
 from lupin_twin.core.journal_condition import UNKNOWN, Condition
 from lupin_twin.core.notes import Note, NotesRequest, NotesUnwritable, PastNotes
 from lupin_twin.core.past import NotRemembered, PastRow
@@ -106,6 +107,20 @@ class RevisedGrid:
     revision: str
 
 
+@dataclass(frozen=True, slots=True)
+class ThreadState:
+    """How the ROS thread behind a source does; as it is here, where there is none.
+
+    `stuck_s` is how long it has not answered a heartbeat, s, 0 between two; `calls_waiting` are
+    calls to it, `callback_errors` those met by callbacks so far, as of the last heartbeat.
+    """
+
+    is_alive: bool = True
+    stuck_s: float = 0.0
+    calls_waiting: int = 0
+    callback_errors: int = 0
+
+
 class TwinSource(ABC):
     """A twin in this process, one elsewhere, or what an archive has of one; and its log.
 
@@ -118,8 +133,14 @@ class TwinSource(ABC):
     workers: Workers
     relay: Relay
     timeout_s: float
+    # The twin's: so many of a tag's last scans are told.
+    buffer_len: int
+    # Of what comes daily, s of ROS time; a demo's is shorter.
+    day_length_s = 86_400.0
     # Who is named where an answer takes too long.
     answerer = "the twin"
+    # A `RosThread`, or what is said where there is none.
+    thread: Any = ThreadState()
     # Tells the counts of one process from another's; empty where revisions are digests.
     identity = ""
 
@@ -132,26 +153,6 @@ class TwinSource(ABC):
     @abstractmethod
     async def stop(self) -> None:
         """Stop and release everything."""
-
-    @property
-    def is_alive(self) -> bool:
-        """Whether the thread behind this source runs, where there is one."""
-        return True
-
-    @property
-    def stuck_s(self) -> float:
-        """How long the thread has not answered a heartbeat, s; 0 between two."""
-        return 0.0
-
-    @property
-    def calls_waiting(self) -> int:
-        """Calls that wait for the ROS thread now."""
-        return 0
-
-    @property
-    def callback_errors(self) -> int:
-        """Errors met by ROS callbacks so far, as of the last heartbeat through the thread."""
-        return 0
 
     @abstractmethod
     def revision(self) -> str:
@@ -171,10 +172,6 @@ class TwinSource(ABC):
     @abstractmethod
     def names(self) -> TwinNames:
         """What the twin's topics and service are called."""
-
-    def cache_counts(self) -> CacheCounts:
-        """How the cache of fields does; all 0 where it is not in this process."""
-        return CacheCounts()
 
     @abstractmethod
     def journal(self) -> Condition:
@@ -218,9 +215,16 @@ class TwinSource(ABC):
 
         """
 
-    @abstractmethod
-    async def history(self, tag_id: str) -> TagHistory | None:
-        """The last scans and tries of a tag; None: no such tag."""
+    async def robot(self, now_ns: int | None) -> Robot | None:  # noqa: ARG002  # for who hears one
+        """What the robot has said since this was last asked; None: here it is never heard.
+
+        `now_ns` is the twin's time; None: it is not known.
+
+        Raises:
+            TwinUnavailableError: nobody there to hear it any more.
+
+        """
+        return None
 
     # --- the past; each may raise `PastRefused`, `NotRemembered` or `TwinUnavailableError` --------
 
@@ -260,6 +264,18 @@ class TwinSource(ABC):
         """
         raise NotesUnwritable(f"the note of {note.by} cannot be written: {ELSEWHERE}")
 
+    # Whether there is a node to publish by.
+    takes_observations = False
+
+    async def publish_observation(self, scan: MadeScan, source: str) -> None:
+        """Publish readings over ROS, as a robot does; whether the twin takes them is the twin's.
+
+        Raises:
+            TwinUnavailableError: there is no node.
+
+        """
+        raise TwinUnavailableError(f"readings of {source} at {scan.tag_id} have no way to ROS")
+
     async def rows(
         self,
         start_ns: int,
@@ -287,12 +303,12 @@ class TwinSource(ABC):
             ) from None
 
 
-def ailment(source: TwinSource) -> str | None:
+def ailment(thread: Any) -> str | None:
     """What is wrong with the thread behind a source so that only a restart helps; None: nothing."""
-    if not source.is_alive:
+    if not thread.is_alive:
         return "The ROS thread has ended. Restart."
-    if source.stuck_s >= STUCK_AFTER_S:
-        return f"The ROS thread has been stuck in a callback for {source.stuck_s:.0f} s. Restart."
+    if thread.stuck_s >= STUCK_AFTER_S:
+        return f"The ROS thread has been stuck in a callback for {thread.stuck_s:.0f} s. Restart."
     return None
 
 

@@ -26,7 +26,6 @@ from lupin_bridge.feed.source import (
     TwinUpdate,
 )
 from lupin_bridge.feed.web_node import Service, WebNode
-from lupin_twin.core.history import TagHistory
 from lupin_twin.core.journal_condition import UNKNOWN, Condition
 from lupin_twin.core.past import NotRemembered, lasts, may_pass
 from lupin_twin.core.state import NANOSECONDS_PER_SECOND, Snapshot
@@ -137,7 +136,7 @@ class WebTwin(RosSource[WebNode, _Received]):
                 self._log.on_update(received.update.journal)
                 on_state(received.update)
 
-        await self._start_thread(make_node, on_received, on_death, lambda node: node.rules)
+        await self._start_thread(make_node, on_received, on_death)
         self._frame_id, folder = await self.thread.call(
             lambda node: (node.parameters.frame_id, _folder(node))
         )
@@ -160,10 +159,6 @@ class WebTwin(RosSource[WebNode, _Received]):
     def occupancy_map(self) -> OccupancyMap | None:
         """The latest map."""
         return self._received.occupancy_map
-
-    async def history(self, tag_id: str) -> TagHistory | None:
-        """The last scans and tries of a tag, as far as they were seen from here."""
-        return await self.thread.call(lambda node: node.history_of(tag_id))
 
     def field_revision(self, request: FieldRequest) -> str | None:
         """That of the last answer, as long as nothing was received that could have changed it.

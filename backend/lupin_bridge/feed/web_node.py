@@ -23,7 +23,6 @@ from lupin_twin.core import ingest, interfaces
 from lupin_twin.core.clock import StampWatch
 from lupin_twin.core.diagnostics import SelfReport, self_report
 from lupin_twin.core.drops import Drop, Reason
-from lupin_twin.core.history import History, TagHistory
 from lupin_twin.core.parameters import TwinParameters
 from lupin_twin.core.state import Snapshot, TagState
 from lupin_twin.field.engine import FieldRules
@@ -149,7 +148,6 @@ class WebNode(AdjustableNode):
         self._topics: dict[str, str] = {}
         group = MutuallyExclusiveCallbackGroup()
         p = self.parameters
-        self._history = History(p.buffer_len)
         for parameter, topic, shape, callback, on_number in (
             ("state_topic", p.state_topic, message_limits.STATE, self._take_state, self.twins.add),
             ("times", interfaces.TIMES.name, message_limits.TIMES, self._take_times, None),
@@ -239,12 +237,6 @@ class WebNode(AdjustableNode):
         """Drop a request that nobody waits for any more, or it would be kept for ever."""
         self.clients_of_twin[service].remove_pending_request(future)
 
-    def history_of(self, tag_id: str) -> TagHistory | None:
-        """The last scans and tries of a tag that were seen from here; None: no such tag."""
-        if self._newest is None or all(tag.tag_id != tag_id for tag in self._newest.tags):
-            return None
-        return self._history.of(tag_id) if self._newest.has_times else TagHistory(is_known=False)
-
     # --- callbacks ----------------------------------------------------------------------------
 
     def _take_state(self, msg: Any) -> None:
@@ -287,12 +279,6 @@ class WebNode(AdjustableNode):
             reported=self.self_report.clock,
         )
         snapshot = replace(snapshot, clock=clock)
-        if snapshot.has_times:
-            known = set() if before is None else set(map(id, before.tags))
-            went_back = before is not None and snapshot.stamp_ns < before.stamp_ns
-            for tag in snapshot.tags:
-                if id(tag) not in known:
-                    self._history.follow(tag, clock_went_back=went_back)
         self._newest = snapshot
         self.digest = self._digest_of(snapshot.tags)
         if before is None or not _are_the_very_same(before.tags, snapshot.tags):
@@ -350,7 +336,6 @@ class WebNode(AdjustableNode):
 
     def _forget_all_but(self, tags: Sequence[TagState]) -> None:
         ids = {tag.tag_id for tag in tags}
-        self._history.forget_all_but(ids)
         self._digests = {tag_id: kept for tag_id, kept in self._digests.items() if tag_id in ids}
 
     def _digest_of(self, tags: Sequence[TagState]) -> str:

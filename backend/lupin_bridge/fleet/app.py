@@ -24,11 +24,13 @@ from lupin_bridge.bridge import Bridge
 from lupin_bridge.feed.past_process import PastProcess
 from lupin_bridge.feed.query import Now
 from lupin_bridge.feed.shared_work import Shared
-from lupin_bridge.field import query as field_query
+from lupin_bridge.fleet import small_map
 from lupin_bridge.fleet.compare import COMPARE_S, Compare, OfSites, answer_of, chosen, compare
 from lupin_bridge.fleet.export import respond_sites
+from lupin_bridge.fleet.link_back import SitePage
 from lupin_bridge.fleet.overview import SitesFrame, alarms_json, archive_json, etag, site_json
 from lupin_bridge.fleet.pages import Opened, SitePages, Sites
+from lupin_bridge.fleet.report import SitesReport, sites_report
 from lupin_bridge.fleet.source import SiteTwin
 from lupin_bridge.fleet.watching import Watching
 from lupin_bridge.judge.options import Criteria
@@ -40,8 +42,9 @@ from lupin_bridge.routes.answers import (
     NEVER_STORE,
     add_refusals,
     error_response,
+    has_etag,
     json_response,
-    list_header,
+    not_modified,
     respond,
 )
 from lupin_bridge.routes.sockets import has_place, next_message
@@ -70,6 +73,10 @@ _AS_EVERYWHERE: Final = frozenset(
         "/api/sensors",
     }
 )
+
+
+# Opened by itself, a picture has its own colours, and nothing else.
+_PICTURE_POLICY: Final = "default-src 'none'; style-src 'unsafe-inline'; frame-ancestors 'none'"
 
 
 class Fleet:
@@ -178,8 +185,8 @@ class Fleet:
 
     # --- several sites ------------------------------------------------------------------------
 
-    async def compare(self, query: Compare) -> Answer:
-        """The answer of `/api/compare`."""
+    async def compare(self, query: Compare | SitesReport) -> Answer:
+        """The answer of `/api/compare` or `/api/report`."""
         answer: Answer = await self.past.ask(query, Now(0, "", UNKNOWN), COMPARE_S)  # type: ignore[arg-type]  # see `reader`
         return answer
 
@@ -237,7 +244,7 @@ def create_fleet_app(
     every = (*pages.router.routes, *status.router.routes)
     app.router.routes.extend(it for it in every if getattr(it, "path", "") in _AS_EVERYWHERE)
     # The last one added is the first to be asked.
-    app.add_middleware(Sites, pages=fleet.pages)
+    app.add_middleware(Sites, pages=fleet.pages, page=SitePage(static_folder))
     app.add_middleware(PieceByPiece)
     app.add_middleware(ReadOnly)
     app.add_middleware(AccessControl, access=access)
@@ -272,9 +279,21 @@ def _add_overview(app: FastAPI, fleet: Fleet) -> None:
         """Every site of the archive, by name."""
         watching = fleet.watching
         tag = etag(watching.sites, watching.archive)
-        if field_query.matches(list_header(request, "if-none-match"), tag.removeprefix("W/")):
-            return Response(status_code=304, headers={"ETag": tag, **REVALIDATE})
+        if has_etag(request, tag.removeprefix("W/")):
+            return not_modified(tag)
         return json_response(fleet.body(), 200, {"ETag": tag, **REVALIDATE})
+
+    @app.api_route("/api/sites/{name}/map.svg", methods=["GET", "HEAD"])
+    async def site_map(request: Request, name: str) -> Response:
+        """Where the tags of a site are, and how each one is."""
+        site = fleet.watching.sites.get(name)
+        if site is None or not site.dots:
+            return error_response(f"there is no map of a site {name[:64]!r}", 404)
+        tag = f'"{small_map.version(site.dots)}"'
+        if has_etag(request, tag):
+            return not_modified(tag)
+        headers = {"ETag": tag, **REVALIDATE, "Content-Security-Policy": _PICTURE_POLICY}
+        return Response(small_map.svg(site.dots), 200, headers, "image/svg+xml")
 
     @app.websocket("/ws/sites")
     async def ws_sites(websocket: WebSocket) -> None:
@@ -329,8 +348,18 @@ def _add_answers(app: FastAPI, fleet: Fleet) -> None:
         watching = fleet.watching
         names = {site: it.name or site for site, it in watching.sites.items()}
         parameters = request.query_params.multi_items()
-        query = compare(parameters, names, watching.now_ns, fleet.criteria.sensors)
+        return await over_sites(
+            request, compare(parameters, names, watching.now_ns, fleet.criteria.sensors)
+        )
 
+    @app.api_route("/api/report", methods=["GET", "HEAD"])
+    async def reported(request: Request) -> Response:
+        """A row for each site, with its counts and the address of its report."""
+        watching = fleet.watching
+        parameters = request.query_params.multi_items()
+        return await over_sites(request, sites_report(parameters, watching.sites, watching.now_ns))
+
+    async def over_sites(request: Request, query: Compare | SitesReport) -> Response:
         async def compute() -> Answer:
             with fleet.admission.computing(client_of(request), is_large=True):
                 return await fleet.compare(query)

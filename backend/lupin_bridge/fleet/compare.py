@@ -9,7 +9,6 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from hashlib import blake2b
 from typing import Annotated, Any, Final
 
 import numpy as np
@@ -21,7 +20,7 @@ from lupin_bridge.judge.ranges import Sensors
 from lupin_bridge.past import query as past_query
 from lupin_bridge.past.query import OfPeriod, Parameters
 from lupin_bridge.query_string import Name, needed, parameter, read
-from lupin_bridge.serving.admission import REVALIDATE, Answer
+from lupin_bridge.serving.admission import Answer, json_answer
 from lupin_bridge.stream.state_json import stamp
 from lupin_twin.core.past import HOUR_NS, Grid, NotRemembered, PastRefused, grid
 from lupin_twin.core.state import NANOSECONDS_PER_SECOND
@@ -161,9 +160,7 @@ def compare(
 
 def answer_of(found: dict[str, Any]) -> Answer:
     """A JSON body whose ETag is that of its content."""
-    body = orjson.dumps(found)
-    etag = f'"{blake2b(body, digest_size=12).hexdigest()}"'
-    return Answer(body, "application/json", {"ETag": etag, **REVALIDATE})
+    return json_answer(orjson.dumps(found))
 
 
 def chosen(text: str | None, known: Mapping[str, object]) -> list[str]:

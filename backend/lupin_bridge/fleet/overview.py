@@ -10,6 +10,7 @@ from typing import Any, Final
 
 import orjson
 
+from lupin_bridge.fleet import small_map
 from lupin_bridge.judge.verdict import Verdict
 from lupin_bridge.stream.frames import text_frame
 from lupin_bridge.stream.state_json import stamp
@@ -27,7 +28,7 @@ class Site:
     `last_seq` grows with every row, `heard_ns` is when the forwarder was heard last, 0: never.
     `last_received_ns` is when the twin received its newest row, by the clock of its machine.
     `verdict` and `active_alarms` are None while they are being worked out; `alarms` are the worst
-    of the active ones, as in `/api/alarms`.
+    of the active ones, as in `/api/alarms`. `dots` draw its map, `notes` is how many people wrote.
     """
 
     site: str
@@ -40,6 +41,8 @@ class Site:
     active_alarms: int | None = None
     origin: Origin = "unknown"
     alarms: tuple[dict[str, Any], ...] = ()
+    dots: str = ""
+    notes: int = 0
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,6 +67,7 @@ def site_json(site: Site, archive: Archive, now_ns: int) -> dict[str, Any]:
         "lag_s": None if not site.heard_ns else round(max(0, now_ns - site.heard_ns) / 1e9, 1),
         "is_live": is_live,
         "origin": site.origin,
+        "map": small_map.version(site.dots),
     }
 
 
@@ -77,7 +81,7 @@ def etag(sites: Mapping[str, Site], archive: Archive) -> str:
 def _lasting(site: Site) -> tuple[object, ...]:
     return (
         *(site.site, site.name, site.last_seq, site.is_live),
-        *(site.verdict, site.active_alarms, site.last_received_ns, site.origin),
+        *(site.verdict, site.active_alarms, site.last_received_ns, site.origin, site.dots),
     )
 
 

@@ -9,12 +9,13 @@ from collections.abc import Callable, Collection, Iterator
 from dataclasses import dataclass, field
 from typing import Final
 
-from fastapi import Response, WebSocket
+from fastapi import Request, Response, WebSocket
 from starlette.requests import HTTPConnection
 from starlette.types import ASGIApp, Receive, Scope, Send
 
 from lupin_bridge.access.middleware import client_of
 from lupin_bridge.bridge import Bridge
+from lupin_bridge.fleet.link_back import SitePage
 from lupin_bridge.fleet.source import SiteTwin
 from lupin_bridge.routes.answers import error_response
 
@@ -111,9 +112,10 @@ class SitePages:
 class Sites:
     """ASGI: what is below `/sites/NAME` goes to that site's application, as if below a prefix."""
 
-    def __init__(self, app: ASGIApp, pages: SitePages) -> None:
+    def __init__(self, app: ASGIApp, pages: SitePages, page: SitePage) -> None:
         self._app = app
         self._pages = pages
+        self._page = page
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Pass a request on to its site, or to the overview."""
@@ -122,7 +124,7 @@ class Sites:
         if scope["type"] not in ("http", "websocket") or not path.startswith(_PREFIX):
             await self._app(scope, receive, send)
             return
-        name, slash, _ = path[len(_PREFIX) :].partition("/")
+        name, slash, rest = path[len(_PREFIX) :].partition("/")
         client = client_of(HTTPConnection(scope))
         found = self._pages.page_of(name, client)
         if isinstance(found, str):
@@ -138,7 +140,9 @@ class Sites:
             await asyncio.shield(found.ready)
             own = {**scope, "root_path": f"{root}{_PREFIX}{name}"}
             own.pop("app_root_path", None)
-            await found.app(own, receive, send)
+            is_page = scope["type"] == "http" and not rest
+            page = self._page.answer(Request(scope)) if is_page else None
+            await (page or found.app)(own, receive, send)
         finally:
             found.users[client] -= 1
             found.users += Counter()  # without those who read no more

@@ -6,6 +6,7 @@ path of a journal does otherwise.
 
 from __future__ import annotations
 
+import logging
 import os
 import sqlite3
 from collections.abc import Callable
@@ -16,32 +17,38 @@ from typing import Any, Final, TypeVar
 from lupin_bridge.archive.database import ArchiveError, explained
 from lupin_bridge.feed import past_child
 from lupin_bridge.feed.past_child import Child, Search
-from lupin_bridge.feed.query import Now, Question, Work
-from lupin_bridge.fleet.compare import COMPARE_S, Compare
+from lupin_bridge.feed.query import Now, Question
+from lupin_bridge.fleet.compare import Compare
+from lupin_bridge.fleet.report import SitesReport
 from lupin_bridge.fleet.site_log import SiteConnection, open_archive
 from lupin_bridge.settings import variable
 from lupin_twin.core.diagnostics import Origin, origin_of
-from lupin_twin.core.history import History, TagHistory
 from lupin_twin.core.past import NotRemembered
 from lupin_twin.core.state import Snapshot
+from lupin_twin.field.explored import OccupancyMap
 from lupin_twin.journal.appending import simulated
+from lupin_twin.journal.floor_plan import map_of
 from lupin_twin.journal.fold import state_at
 from lupin_twin.journal.retention import Stretches, kept
-from lupin_twin.journal.rows import newest_of_tag
 from lupin_twin.journal.runs import FOREVER_NS, runs, span_at
-from lupin_twin.journal.schema import ORIGIN, DamagedFile
+from lupin_twin.journal.schema import MAP, ORIGIN, DamagedFile
 from lupin_twin.runtime.journal_queries import Recall
-from lupin_twin.runtime.memory import write_of
 from lupin_twin.runtime.workers import ShouldStop
 
 AnswerT = TypeVar("AnswerT")
 
-# Scans and attempts of a tag's history, as a twin keeps them by default.
-_HISTORY: Final = 32
 _ARRIVED: Final = (
     "SELECT max(stamp_ns), max(arrival_ns) FROM (SELECT stamp_ns, arrival_ns FROM scan"
     " WHERE site = :site ORDER BY seq DESC LIMIT 1) AS last"
 )
+
+
+# What it is known by is of the text: the same in all replicas.
+_NEWER_MAP: Final = (
+    "SELECT value, hashtextextended(value, 0) FROM meta WHERE site = :site AND key = :key"
+    " AND hashtextextended(value, 0) <> :known"
+)
+logger = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,6 +56,8 @@ class Latest:
     """What a site's twin would report now, as far as its log has come here."""
 
     frame_id: str
+    # Of the map that is known already.
+    map_hash: int = 0
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,13 +73,9 @@ class Reported:
     origin: Origin
     kept_ns: Stretches
     simulated_ns: tuple[int, int] | None
-
-
-@dataclass(frozen=True, slots=True)
-class OfTag:
-    """The history of a tag."""
-
-    tag_id: str
+    # By what the newest map is known; and itself, where that is another one.
+    map_hash: int
+    occupancy_map: OccupancyMap | None
 
 
 class ArchiveChild(Child):
@@ -79,11 +84,11 @@ class ArchiveChild(Child):
     def __init__(self) -> None:
         super().__init__(ArchiveRecall)
 
-    def _search(self, question: Question[Any] | Latest | OfTag | Compare, now: Now) -> Search:
+    def _search(self, question: Question[Any] | Latest | Compare | SitesReport, now: Now) -> Search:
         site = now.condition.path
-        if isinstance(question, Latest | OfTag):
-            return lambda connection, _: _done(_of_site(SiteConnection(connection, site), question))
-        if isinstance(question, Compare):
+        if isinstance(question, Latest):
+            return lambda connection, _: _latest(SiteConnection(connection, site), question)
+        if isinstance(question, Compare | SitesReport):
             return lambda connection, _: _compared(question, connection)
         found = super()._search(question, now)
         return lambda connection, stop: found(_as_journal(connection, site), stop)
@@ -93,17 +98,9 @@ def _as_journal(connection: Any, site: str) -> sqlite3.Connection:
     return SiteConnection(connection, site)  # type: ignore[return-value]  # whose queries are of both
 
 
-def _done(found: Any) -> Work[Any]:
-    return Work(0.0, lambda _: found)
-
-
-def _compared(query: Compare, connection: Any) -> Work[Any]:
-    found = query.read(connection)
-    return Work(COMPARE_S, lambda _: query.answer(found))
-
-
-def _of_site(log: SiteConnection, asked: Latest | OfTag) -> Reported | TagHistory:
-    return _latest(log, asked) if isinstance(asked, Latest) else _history(log, asked)
+def _compared(query: Compare | SitesReport, connection: Any) -> Any:
+    found: Any = query.read(connection)
+    return query.answer(found)
 
 
 def _latest(log: SiteConnection, asked: Latest) -> Reported:
@@ -126,17 +123,18 @@ def _latest(log: SiteConnection, asked: Latest) -> Reported:
         origin_of(log.meta(ORIGIN) or "", is_simulated=not is_walls),
         kept(journal),
         None if found is None else (found.start_ns, found.end_ns),
+        *_newer_map(log, asked.map_hash),
     )
 
 
-def _history(log: SiteConnection, asked: OfTag) -> TagHistory:
-    journal: Any = log
-    span = span_at(runs(log.execute), FOREVER_NS)
-    history = History(_HISTORY)
-    if span is not None:
-        for row in newest_of_tag(journal, span.run.id, asked.tag_id, _HISTORY):
-            history.add(write_of(row))
-    return history.of(asked.tag_id)
+def _newer_map(log: SiteConnection, known: int) -> tuple[int, OccupancyMap | None]:
+    row = log.execute(_NEWER_MAP, {"key": MAP, "known": known}).fetchone()
+    text, found = row or ("", known)
+    try:
+        return found, map_of(text, found) if text else None
+    except ValueError as error:
+        logger.warning("the floor plan of %s cannot be read: %s", log.site, error)
+        return found, None
 
 
 class ArchiveRecall(Recall):

@@ -11,9 +11,9 @@ from dataclasses import replace
 from typing import Any, Final, cast
 
 from lupin_bridge.feed.past_process import PastProcess
-from lupin_bridge.feed.query import Now
+from lupin_bridge.feed.query import Itself, Now
 from lupin_bridge.feed.relay import Relay, Ros
-from lupin_bridge.feed.revisions import RevisedEstimate
+from lupin_bridge.feed.revisions import RevisedEstimate, RevisionCache, revised
 from lupin_bridge.feed.shared_work import Shared
 from lupin_bridge.feed.source import (
     RevisedGrid,
@@ -23,17 +23,18 @@ from lupin_bridge.feed.source import (
 )
 from lupin_bridge.feed.topics import TwinNames
 from lupin_bridge.fleet.overview import Site
-from lupin_bridge.fleet.reader import Latest, OfTag, Reported
+from lupin_bridge.fleet.reader import Latest, Reported
 from lupin_bridge.fleet.watching import Watching
-from lupin_twin.core.history import TagHistory
+from lupin_bridge.past.estimate import ReadingsAt
 from lupin_twin.core.journal_condition import Condition, JournalState
 from lupin_twin.core.parameters import TwinParameters
 from lupin_twin.core.past import NotRemembered
 from lupin_twin.core.state import samples_of
-from lupin_twin.estimate.engine import EstimateRequest
+from lupin_twin.estimate.engine import EstimateRequest, TagPast
+from lupin_twin.estimate.engine import cost_s as cost_s_of_estimate
 from lupin_twin.field.engine import FieldRequest, FieldRules, check_request, compute_field, cost_s
 from lupin_twin.field.explored import OccupancyMap
-from lupin_twin.runtime.estimate_rounds import Report, ReportRequest
+from lupin_twin.runtime.estimate_rounds import AS_OF, Report, ReportRequest, estimate_at
 from lupin_twin.runtime.workers import Workers
 
 log = logging.getLogger(__name__)
@@ -41,7 +42,10 @@ log = logging.getLogger(__name__)
 HEARTBEAT_S: Final = 1.0
 _RETRY_S: Final = 1.0
 _FIRST_S: Final = 5.0
-_NO_ESTIMATES: Final = "estimates are made by the twin of the greenhouse itself, not of the archive"
+# Estimates of now are of a whole minute, once so long has passed since.
+_MINUTE_NS: Final = 60_000_000_000
+_LATE_NS: Final = 10_000_000_000
+_NO_REPORT: Final = "how right estimates were is known to the twin of the greenhouse, not here"
 
 
 class SiteTwin(TwinSource):
@@ -66,7 +70,12 @@ class SiteTwin(TwinSource):
         # The parameters of a twin are not in its log: where they are others there, fields differ.
         self._parameters = TwinParameters()
         self._rules = FieldRules.of(self._parameters)
+        self.buffer_len = self._parameters.buffer_len
+        self._map: OccupancyMap | None = None
+        self._map_hash = 0
         self._computing: Shared[RevisedGrid] = Shared()
+        self._estimating: Shared[RevisedEstimate] = Shared()
+        self._revisions = RevisionCache(_MINUTE_NS / 1e9)
         self._told: TwinUpdate | None = None
         self._reported: Reported | None = None
         self._read_ns = 0
@@ -144,7 +153,11 @@ class SiteTwin(TwinSource):
     async def _read(self) -> None:
         last_seq = self._site.last_seq
         if last_seq != self._seq and self._watching.archive.is_reachable:
-            self._reported = await self._in_time(self._reading(Latest(self._parameters.frame_id)))
+            asked = Latest(self._parameters.frame_id, self._map_hash)
+            found: Reported = await self._in_time(self._reading(asked))
+            if found.map_hash != self._map_hash:
+                self._map, self._map_hash = found.occupancy_map, found.map_hash
+            self._reported = found
             self._read_ns = time.monotonic_ns()
             self._seq = last_seq
 
@@ -159,12 +172,13 @@ class SiteTwin(TwinSource):
         self._said = said
         ago_s = max(0.0, (self._watching.now_ns - site.heard_ns) / 1e9) if site.heard_ns else 0.0
         stamp_ns = self._now_ns(reported)
-        if not is_live and reported.is_walls:
+        if not is_live:
             # As of when it was last heard: who shows it adds for how long that was ago.
-            stamp_ns = site.heard_ns
+            stamp_ns = site.heard_ns if reported.is_walls else _newest_ns(reported)
         self._told = TwinUpdate(
             replace(reported.snapshot, stamp_ns=stamp_ns, tags=self._tags(reported)),
             self.revision(),
+            occupancy_map=self._map,
             journal=self._condition(reported),
             rules=self._rules,
             origin=reported.origin,
@@ -208,7 +222,7 @@ class SiteTwin(TwinSource):
 
     def revision(self) -> str:
         """Of what was read: the same in all replicas."""
-        return f"{self.site}-{self._seq}"
+        return f"{self.site}-{self._seq}-{self._map_hash}"
 
     def field_revision(self, request: FieldRequest) -> str | None:  # noqa: ARG002  # all alike
         """The revision now."""
@@ -227,8 +241,8 @@ class SiteTwin(TwinSource):
         return self._condition(self._reported)
 
     def occupancy_map(self) -> OccupancyMap | None:
-        """None: maps are not in the log."""
-        return None
+        """The newest that the twin had."""
+        return self._map
 
     async def field(self, request: FieldRequest) -> RevisedGrid:
         """The field of the newest state, computed on a worker."""
@@ -237,36 +251,52 @@ class SiteTwin(TwinSource):
         return await self._in_time(self._computing.get(key, lambda: self._compute(request)))
 
     async def _compute(self, request: FieldRequest) -> RevisedGrid:
-        revision = self.revision()
+        revision, floor = self.revision(), self._map
         tags = () if self._told is None else self._told.snapshot.tags
         samples = samples_of(tags, request.sensor_type)
         grid = await asyncio.wrap_future(
             self.workers.submit(
-                lambda stop: compute_field(request, samples, None, self._rules, stop),
+                lambda stop: compute_field(request, samples, floor, self._rules, stop),
                 cost_s(request, len(samples), self._rules),
             )
         )
         return RevisedGrid(grid, revision)
 
-    def estimate_revision(self, request: EstimateRequest) -> str | None:  # noqa: ARG002  # none
-        """None: there are no estimates."""
-        return None
+    def _minute_ns(self) -> int:
+        """The last whole minute of which everything has come."""
+        told = self._told
+        at_ns = 0 if told is None else told.snapshot.stamp_ns - _LATE_NS
+        return max(0, at_ns - at_ns % _MINUTE_NS)
 
-    async def estimate(self, request: EstimateRequest) -> RevisedEstimate:  # noqa: ARG002  # none
-        """None are made of the archive."""
-        raise NotRemembered(_NO_ESTIMATES, is_lasting=True)
+    def estimate_revision(self, request: EstimateRequest) -> str | None:
+        """That of the last answer, for a minute."""
+        return self._revisions.revision(request, self._minute_ns())
+
+    async def estimate(self, request: EstimateRequest) -> RevisedEstimate:
+        """That of the last whole minute, so that a model is not fitted for each scan."""
+        at_ns = self._minute_ns()
+        return await self._in_time(
+            self._estimating.get((at_ns, request), lambda: self._estimate(at_ns, request))
+        )
+
+    async def _estimate(self, at_ns: int, request: EstimateRequest) -> RevisedEstimate:
+        day_s, rules = self.day_length_s, self._rules
+        needed = ReadingsAt(request.box.sensor_type, at_ns, day_s)
+        pasts: list[TagPast] = await self.past.ask(Itself(needed), await self.now(), 0.0)
+        made = await asyncio.wrap_future(
+            self.workers.submit(
+                lambda stop: revised(
+                    estimate_at(replace(request, at_ns=at_ns), pasts, day_s, stop)
+                ),
+                AS_OF * cost_s_of_estimate(request, len(pasts), rules.max_grid_cells),
+            )
+        )
+        self._revisions.put(request, at_ns, made.revision)
+        return made
 
     async def estimate_report(self, request: ReportRequest) -> Report:  # noqa: ARG002  # none
-        """None are made of the archive."""
-        raise NotRemembered(_NO_ESTIMATES, is_lasting=True)
-
-    async def history(self, tag_id: str) -> TagHistory | None:
-        """The last scans and attempts of a tag."""
-        tags = () if self._told is None else self._told.snapshot.tags
-        if all(tag.tag_id != tag_id for tag in tags):
-            return None
-        found: TagHistory = await self._in_time(self._reading(OfTag(tag_id)))
-        return found
+        """None: how right estimates were is counted by the twin."""
+        raise NotRemembered(_NO_REPORT, is_lasting=True)
 
     async def now(self) -> Now:
         """What who looks back has to know of now."""
@@ -279,6 +309,11 @@ class SiteTwin(TwinSource):
     async def _reading(self, question: Any) -> Any:
         about = Now(0, self._parameters.frame_id, self._condition(None))
         return await self.past.ask(question, about, 0.0)
+
+
+def _newest_ns(reported: Reported) -> int:
+    """The last moment of a simulation that every replica knows of."""
+    return max((tag.last_observed_ns or 0 for tag in reported.snapshot.tags), default=0)
 
 
 def _no_ros() -> Any:

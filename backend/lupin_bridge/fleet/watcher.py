@@ -22,9 +22,12 @@ from typing import Any, Final
 import orjson
 
 from lupin_bridge.alarms.ledger import worst_first
+from lupin_bridge.alarms.notes import notes_of_alarms
 from lupin_bridge.archive.database import CHANNEL, ArchiveError, explained
 from lupin_bridge.fleet.overview import LIVE_S, Site
 from lupin_bridge.fleet.site_log import SiteConnection, open_archive
+from lupin_bridge.fleet.small_map import dots
+from lupin_bridge.judge.alarm import Alarm, silence
 from lupin_bridge.judge.alarm_fold import Follower
 from lupin_bridge.judge.judging import Judge
 from lupin_bridge.judge.options import Criteria
@@ -33,10 +36,12 @@ from lupin_bridge.serving.admission import Limits
 from lupin_bridge.settings import Settings
 from lupin_bridge.stream.health_json import alarm_json
 from lupin_twin.core.diagnostics import Origin, origin_of
+from lupin_twin.core.notes import Note, NotesRequest
 from lupin_twin.core.state import Snapshot, TagState
 from lupin_twin.core.writes import RecentRequest, WritesRequest
 from lupin_twin.journal.fold import state_at
 from lupin_twin.journal.follow import recent, writes
+from lupin_twin.journal.notes import notes
 from lupin_twin.journal.runs import FOREVER_NS, runs, span_at
 from lupin_twin.journal.schema import ORIGIN
 
@@ -62,7 +67,8 @@ _FACTS: Final = (
     " coalesce(heard_at > now() - make_interval(secs => %s), false),"
     " coalesce((SELECT seq_offset + forwarded_seq FROM epoch WHERE epoch.site = site.site"
     " ORDER BY epoch DESC LIMIT 1), 0),"
-    " (SELECT value FROM meta WHERE meta.site = site.site AND key = %s)"
+    " (SELECT value FROM meta WHERE meta.site = site.site AND key = %s),"
+    " (SELECT count(*) FROM note WHERE note.site = site.site)"
     " FROM site LEFT JOIN forwarder ON forwarder.site = site.site ORDER BY site.site"
 )
 _NEWEST: Final = (
@@ -78,9 +84,15 @@ _NOW: Final = "SELECT CAST(extract(epoch FROM now()) * 1e9 AS BIGINT)"
 
 @dataclass(slots=True)
 class _Judged:
-    """What is kept of a site to judge it again; `seq` is up to where that was done."""
+    """What is kept of a site to judge it again; `seq` is up to where that was done.
+
+    `was_live` is whether it was so then, `notes` are all that people had written.
+    """
 
     judge: Judge
+    was_live: bool = False
+    notes: tuple[Note, ...] = ()
+    note_count: int = 0
     snapshot: Snapshot | None = None
     is_simulated: bool = False
     follower: Follower | None = None
@@ -113,7 +125,7 @@ class Watcher:
         ((now_ns,),) = execute(_NOW).fetchall()
         before, self.sites = self.sites, {}
         for site, *facts in execute(_FACTS, (LIVE_S, ORIGIN)).fetchall():
-            name, heard_ns, is_live, last_seq, origin = facts
+            name, heard_ns, is_live, last_seq, origin, note_count = facts
             known = before.get(site, Site(site))
             self.sites[site] = replace(
                 known,
@@ -122,6 +134,7 @@ class Watcher:
                 is_live=is_live,
                 last_seq=last_seq,
                 origin=_origin(origin or "", self._judged.get(site)),
+                notes=note_count,
             )
         grown = [
             name
@@ -161,7 +174,13 @@ class Watcher:
         return 0.0 if judged is None else judged.judged_s
 
     def _is_due(self, name: str, judged: _Judged) -> bool:
-        is_behind = judged.seq != self.sites[name].last_seq or not judged.is_caught_up
+        site = self.sites[name]
+        is_behind = (
+            judged.seq != site.last_seq
+            or not judged.is_caught_up
+            or judged.was_live != site.is_live
+            or judged.note_count != site.notes
+        )
         return (is_behind and not judged.is_failing) or time.monotonic() - judged.judged_s >= _AGE_S
 
     def _judge_safely(self, name: str, judged: _Judged, now_ns: int) -> None:
@@ -176,7 +195,7 @@ class Watcher:
             # Tried again from its first row on, when others are judged for their age.
             self._judged[name] = _Judged(self._judge_of(), is_failing=True)
             self.sites[name] = replace(
-                self.sites[name], verdict=None, active_alarms=None, alarms=()
+                self.sites[name], verdict=None, active_alarms=None, alarms=(), dots=""
             )
         else:
             judged.is_failing = False
@@ -190,23 +209,33 @@ class Watcher:
                 judged.seq = site.last_seq
             if not judged.is_caught_up or judged.after < site.last_seq:
                 self._follow(log, judged)
+            if judged.note_count != site.notes:
+                judged.notes = notes(log, NotesRequest()).notes or ()
+                judged.note_count = site.notes
         if judged.snapshot is None:
             return
+        newest_ns = judged.snapshot.stamp_ns
         # A simulation's time stands between two looks.
-        moment_ns = judged.snapshot.stamp_ns if judged.is_simulated else now_ns
-        judgement = judged.judge.see(replace(judged.snapshot, stamp_ns=moment_ns))
+        now_ns = newest_ns if judged.is_simulated else now_ns
+        # What was known last of a site that is silent does not grow old.
+        moment_ns = now_ns if site.is_live else min(now_ns, max(site.heard_ns, newest_ns))
         if judged.is_caught_up:
-            reach_ns = int(Limits().alarm_days * 86_400e9)
-            found = (
-                ()
-                if judged.follower is None
-                else judged.follower.found(moment_ns, max(0, moment_ns - reach_ns)).alarms
-            )
-            active = [alarm for alarm in found if alarm.is_active]
+            alarms = _alarms(site, judged, moment_ns)
+            active = [alarm for alarm in alarms if alarm.is_active]
+            said = notes_of_alarms(alarms, judged.notes, now_ns)
             worst = heapq.nsmallest(MAX_ALARMS, active, key=worst_first)
-            site = replace(site, active_alarms=len(active), alarms=tuple(map(alarm_json, worst)))
-        judged.judged_s = time.monotonic()
-        self.sites[name] = replace(site, verdict=judgement.house.verdict)
+            site = replace(
+                site,
+                active_alarms=len(active),
+                alarms=tuple(alarm_json(alarm, said.get(alarm.id)) for alarm in worst),
+            )
+        judgement = judged.judge.see(replace(judged.snapshot, stamp_ns=moment_ns))
+        judged.judged_s, judged.was_live = time.monotonic(), site.is_live
+        self.sites[name] = replace(
+            site,
+            verdict=judgement.house.verdict,
+            dots=dots(judged.snapshot.tags, judgement.tags),
+        )
 
     def _read(self, log: Any, judged: _Judged) -> None:
         span = span_at(runs(log.execute), FOREVER_NS)
@@ -235,9 +264,26 @@ class Watcher:
                 lambda light, at_ns: day(light, at_ns).is_day,
                 past.spans,
                 self._criteria.recent_s,
+                day_number=self._criteria.day_number,
             )
         judged.follower.take(past.writes)
         judged.after, judged.is_caught_up = past.last, past.is_all
+
+
+def _alarms(site: Site, judged: _Judged, moment_ns: int) -> list[Alarm]:
+    """Those of its log, and that it is silent: as on its own page, to the id.
+
+    The judge hears of the quantities of a day that they are of.
+    """
+    reach_ns = int(Limits().alarm_days * 86_400e9)
+    found: list[Alarm] = []
+    if judged.follower is not None:
+        of_log = judged.follower.found(moment_ns, max(0, moment_ns - reach_ns))
+        judged.judge.note_days(of_log.days)
+        found += of_log.alarms
+    if site.heard_ns and not site.is_live:
+        found.append(silence(moment_ns if judged.is_simulated else site.heard_ns))
+    return found
 
 
 def _same(before: TagState | None, now: TagState) -> TagState:

@@ -5,12 +5,10 @@ It is never stored: it follows from what was observed and from the ranges.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from hashlib import blake2b
 
-from lupin_bridge.judge.derived import DAILY
-from lupin_bridge.judge.verdict import Reason, Verdict
+from lupin_bridge.judge.verdict import Kind, Reason, Verdict
 
 # The `tag_id` of an alarm of the whole greenhouse.
 HOUSE = ""
@@ -43,12 +41,6 @@ class Alarm:
         """Whether it has not been cleared."""
         return self.cleared_at_ns is None
 
-    def was_active(self, at_ns: int | None) -> bool:
-        """Whether it was raised, and not cleared, at a moment; None: whether it is active now."""
-        if at_ns is None or self.cleared_at_ns is None:
-            return self.is_active and (at_ns is None or self.raised_at_ns <= at_ns)
-        return self.raised_at_ns <= at_ns < self.cleared_at_ns
-
 
 def alarm_id(tag_id: str, kind: str, sensor: str, run_ns: int, began_ns: int) -> str:
     """The same for the same episode, whoever works it out.
@@ -64,12 +56,7 @@ def alarm_id(tag_id: str, kind: str, sensor: str, run_ns: int, began_ns: int) ->
     return digest.hexdigest()
 
 
-def reasons_of_days(
-    alarms: Iterable[Alarm], at_ns: int | None = None
-) -> Mapping[str, tuple[Reason, ...]]:
-    """By tag, the reasons of alarms of quantities of a day that were active at a moment, or are."""
-    found: dict[str, tuple[Reason, ...]] = {}
-    for alarm in alarms:
-        if alarm.reason.sensor in DAILY and alarm.was_active(at_ns):
-            found[alarm.tag_id] = (*found.get(alarm.tag_id, ()), alarm.reason)
-    return found
+def silence(last_ns: int) -> Alarm:
+    """That of a twin that was received last at a moment."""
+    reason = Reason(Kind.SILENT, Verdict.UNKNOWN, since_ns=last_ns)
+    return Alarm(alarm_id(HOUSE, Kind.SILENT, "", 0, last_ns), reason, HOUSE, last_ns)

@@ -6,7 +6,7 @@ however that was divided: they follow from the log, the ranges, and the moment.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import chain
 from statistics import median
@@ -14,11 +14,13 @@ from typing import Final
 
 from lupin_bridge.judge.alarm import HOUSE, Alarm, alarm_id
 from lupin_bridge.judge.daylight import DayLine
+from lupin_bridge.judge.days import DayNumber, TagDays, of_24_hours
 from lupin_bridge.judge.episodes import TagEpisodes
 from lupin_bridge.judge.ranges import Sensors
 from lupin_bridge.judge.scan_interval import LONGEST_NS, SHORTEST_NS, Stretches
 from lupin_bridge.judge.tag_log import Gap, TagPast, is_long
 from lupin_bridge.judge.verdict import Kind, Reason, Verdict
+from lupin_twin.core.state import Reading
 from lupin_twin.core.writes import PastWrite, RunSpan
 
 # Writes that are kept, of all tags about; of a tag its share of these.
@@ -34,11 +36,13 @@ DayOf = Callable[[bool | None, int], bool]
 class Found:
     """All alarms, in no order, the very same tuple where none is another than before.
 
-    At `due_ns` they may be others by themselves.
+    At `due_ns` they may be others by themselves. `days` are, by tag, the values of quantities of a
+    day: those of the last whole one, of the newest run.
     """
 
     alarms: tuple[Alarm, ...]
     due_ns: int = _NEVER
+    days: Mapping[str, Sequence[Reading]] = field(default_factory=dict)
 
 
 @dataclass(slots=True)
@@ -63,7 +67,8 @@ class _Run:
 class Follower:
     """Belongs to one thread at a time.
 
-    `recent_s` fixes how long readings hold, None: it is learnt. `day_of` says whether it was day.
+    `recent_s` fixes how long readings hold, None: it is learnt. `day_of` says whether it was day,
+    `day_number` which day it was.
     `spans` are the runs of the clock; of other ones another follower has to be made. `kept` is how
     many writes are kept, about.
 
@@ -77,6 +82,7 @@ class Follower:
         spans: Sequence[RunSpan],
         recent_s: float | None = None,
         *,
+        day_number: DayNumber = of_24_hours,
         kept: int = KEPT,
     ) -> None:
         self._kept = kept
@@ -88,6 +94,8 @@ class Follower:
             self._spans_of.setdefault(span.run, []).append(span)
         self._sensors = sensors
         self._day_of = day_of
+        self._day_number = day_number
+        self._days: Mapping[str, Sequence[Reading]] = {}
         self._recent_ns = None if recent_s is None else int(recent_s * 1e9)
         self._runs: dict[int, _Run] = {}
         self._tags = 0
@@ -128,7 +136,7 @@ class Follower:
         if self._is_other:
             self._is_other = False
             self._alarms = tuple(chain.from_iterable(map(_all_of, self._runs.values())))
-        return Found(self._alarms, due_ns)
+        return Found(self._alarms, due_ns, self._days)
 
     # --- taking in -----------------------------------------------------------------------------
 
@@ -136,9 +144,8 @@ class Follower:
         tag = run.tags.get(write.tag_id)
         if tag is None:
             self._tags += 1
-            episodes = TagEpisodes(
-                write.tag_id, run.begun_ns, self._sensors, self._recent_ns, self._clock
-            )
+            days = TagDays(self._sensors, self._clock, self._day_number)
+            episodes = TagEpisodes(write.tag_id, run.begun_ns, self._sensors, days, self._recent_ns)
             tag = run.tags[write.tag_id] = TagPast(
                 episodes, self._recent_ns, _matters(run), self._is_day(run)
             )
@@ -203,14 +210,20 @@ class Follower:
         is_all = run.is_late or (run.news and not is_on)
         due = [tag_id for tag_id, due_ns in run.due.items() if due_ns <= last_ns]
         ask = dict.fromkeys(run.tags) if is_all else run.news | dict.fromkeys(due)
+        days: dict[str, Sequence[Reading]] = {}
         for tag_id in run.news:
             tag = run.tags[tag_id]
+            of_tag = tuple(tag.episodes.days.values.values())
+            if is_on and of_tag != self._days.get(tag_id, ()):
+                days[tag_id] = of_tag
             ended_ns = None if is_on else tag.last_ns
             self._put(run.alarms, tag_id, tuple(tag.episodes.alarms(ended_ns)))
         for tag_id in ask:
             self._put(run.overdue, tag_id, tuple(self._overdue(run, tag_id, last_ns, is_on=is_on)))
         run.is_late = False
         run.news = {}
+        if days:
+            self._days = {**self._days, **days}
 
     def _put(
         self, table: dict[str, tuple[Alarm, ...]], tag_id: str, alarms: tuple[Alarm, ...]

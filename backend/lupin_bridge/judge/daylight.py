@@ -50,6 +50,11 @@ class ClockDay:
             return self.begins <= wall < self.ends
         return wall >= self.begins or wall < self.ends
 
+    def number(self, now_s: float) -> int:
+        """Which day it is, counted from dawn to dawn."""
+        wall = datetime.fromtimestamp(now_s, self.zone)
+        return wall.toordinal() - (wall.time() < self.begins)
+
 
 class Light:
     """The light of all tags, by tag: the finite readings, and how many of them are of day."""

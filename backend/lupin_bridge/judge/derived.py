@@ -114,7 +114,6 @@ class Course:
     Lengths are in ns, sums in the sensor's unit times ns, each by night and by day.
     """
 
-    start_ns: int
     last_ns: int
     last: float
     is_day: bool
@@ -127,7 +126,7 @@ class Course:
     @classmethod
     def begin(cls, at_ns: int, value: float, *, is_day: bool) -> Course:
         """The course of one reading."""
-        return cls(at_ns, at_ns, value, is_day, value, value, math.inf if is_day else value)
+        return cls(at_ns, value, is_day, value, value, math.inf if is_day else value)
 
     def after(self, at_ns: int, value: float, is_day: IsDay) -> Course:
         """The course with one more reading."""
@@ -142,7 +141,6 @@ class Course:
             lengths[by_day] += to_ns - from_ns
             sums[by_day] += (self.last + (value - self.last) * middle / gap_ns) * (to_ns - from_ns)
         return Course(
-            self.start_ns,
             at_ns,
             value,
             now,
@@ -152,10 +150,6 @@ class Course:
             (lengths[0], lengths[1]),
             (sums[0], sums[1]),
         )
-
-    def ends(self, at_ns: int, *, is_day: bool) -> bool:
-        """Whether a reading is the first of another day: at dawn, or after 24 hours without one."""
-        return (is_day and not self.is_day) or at_ns - self.start_ns >= DAY_NS
 
     def mean(self, *of_day: bool) -> float:
         """The mean over time by night, by day, or both; NaN where there was none."""

@@ -8,20 +8,20 @@ not before three times the sensor's own last interval: what every tenth scan has
 the others. Received once, it has no interval yet. Too little light raises one after two hours:
 before, it may be dawn or dusk. A pest is seen or not: one inspection raises, one clears. What is
 out of its range is so until it lies within by 5 % of the range's width: a value that wobbles about
-a limit is one episode. A quantity of a day is known once a day, at the first scan of the next one:
-from dawn to dawn by the clock, or 24 hours where that has none. One value raises, one clears.
+a limit is one episode. A quantity of a day has one value a day, known at the first scan of the next
+one: that raises or clears, and has no deadband.
 """
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Final
 
 from lupin_bridge.judge.alarm import Alarm, alarm_id
 from lupin_bridge.judge.daylight import LIGHT
-from lupin_bridge.judge.derived import DAILY, DERIVED, Course, IsDay
+from lupin_bridge.judge.days import TagDays
+from lupin_bridge.judge.derived import DAILY, DERIVED, IsDay
 from lupin_bridge.judge.ranges import Sensors
 from lupin_bridge.judge.scan_interval import INTERVALS, holds_ns, interval_ns
 from lupin_bridge.judge.verdict import (
@@ -78,18 +78,15 @@ class _Finding:
 class TagEpisodes:
     """A tag's episodes in one run of the clock; `step` takes its occasions in the order of time.
 
-    `recent_ns` fixes how long readings hold; None: it is learnt. `clock` says whether it was day by
-    the clock alone: the days of a quantity of a day.
+    `recent_ns` fixes how long readings hold; None: it is learnt.
     """
 
     tag_id: str
     run_ns: int
     sensors: Sensors
+    days: TagDays
     recent_ns: int | None = None
-    clock: IsDay = lambda _: True
     _species: str = ""
-    # Since the last dawn, of each sensor of which a judged quantity of a day is made.
-    _courses: dict[str, Course] = field(default_factory=dict)
     _scans_ns: tuple[int, ...] = ()
     # Of each sensor, the last scan that had it, and how long it was from the one before.
     _received_ns: dict[str, tuple[int, int]] = field(default_factory=dict)
@@ -100,7 +97,7 @@ class TagEpisodes:
         """The same, to go on from here apart."""
         return replace(
             self,
-            _courses=dict(self._courses),
+            days=self.days.copy(),
             _received_ns=dict(self._received_ns),
             _watches=dict(self._watches),
         )
@@ -147,8 +144,10 @@ class TagEpisodes:
             if is_good:
                 day = is_day(stamp_ns) if day is None else day
                 yield from self._of_range(reading, is_day=day)
-                if name in self.sensors.judged_by_the_day:
-                    yield from self._of_days(reading, stamp_ns)
+                for of_day in self.days.step(name, reading.value, stamp_ns):
+                    # A sensor of that name goes first.
+                    if of_day.name not in self._received_ns:
+                        yield from self._of_range(of_day, is_day=True)
         if readings:
             yield from self._of_age({reading.name for reading in readings}, stamp_ns)
         for kind, status in {write.kind: write.status for write in writes}.items():
@@ -174,27 +173,10 @@ class TagEpisodes:
             is_out = value < ideal.low if side == "low" else value > ideal.high
             if not is_out and key not in self._watches:
                 continue
-            band = DEADBAND * ideal.width
+            band = 0.0 if reading.name in DAILY else DEADBAND * ideal.width
             is_near = value < ideal.low + band if side == "low" else value > ideal.high - band
             reason = judge_value(reading, ranges) if is_out else None
             yield _Finding(key, is_out, is_near, reason, min if side == "low" else max)
-
-    def _of_days(self, reading: Reading, stamp_ns: int) -> Iterator[_Finding]:
-        """What the first reading of a day says of the day before."""
-        name, value = reading.name, reading.value
-        before, by_day = self._courses.get(name), self.clock(stamp_ns)
-        if before is None:
-            self._courses[name] = Course.begin(stamp_ns, value, is_day=by_day)
-            return
-        self._courses[name] = course = before.after(stamp_ns, value, self.clock)
-        if not before.ends(stamp_ns, is_day=by_day):
-            return
-        self._courses[name] = Course.begin(stamp_ns, value, is_day=by_day)
-        for quantity in self.sensors.judged_by_the_day[name]:
-            known = DAILY[quantity].of(course)
-            # A sensor of that name goes first.
-            if quantity not in self._received_ns and math.isfinite(known):
-                yield from self._of_range(Reading(quantity, known, stamp_ns), is_day=True)
 
     def _of_age(self, present: Collection[str], stamp_ns: int) -> Iterator[_Finding]:
         """Of the sensors that were read before: those that a scan has, and those it left out."""

@@ -16,6 +16,7 @@ from types import MappingProxyType
 from typing import Final
 
 from lupin_bridge.judge.daylight import Day
+from lupin_bridge.judge.days import COUNTS_NS
 from lupin_bridge.judge.ranges import Sensors
 from lupin_bridge.judge.recent_scans import DayOf, Recent, RecentScans
 from lupin_bridge.judge.scan_interval import (
@@ -37,7 +38,7 @@ from lupin_bridge.judge.verdict import (
     judge_tag,
     stopped,
 )
-from lupin_twin.core.state import Snapshot, TagState
+from lupin_twin.core.state import Reading, Snapshot, TagState
 from lupin_twin.core.writes import PastWrite
 
 log = logging.getLogger(__name__)
@@ -84,11 +85,11 @@ def judge_once(
     day_of: DayOf,
     recent_s: float | None = None,
     *,
-    days: Mapping[str, Sequence[Reason]] = MappingProxyType({}),
+    days: Mapping[str, Sequence[Reading]] = MappingProxyType({}),
 ) -> Judged:
     """What is to be said of one snapshot, given what was recent in the log then.
 
-    `days` are the reasons of quantities of a day, by tag.
+    `days` are the values of quantities of a day, by tag.
 
     Nobody knows since when a reason holds: told is the observation that says so.
     """
@@ -165,7 +166,7 @@ class Judge:
         self._once: set[str] = set()
         self._judged = NOTHING_JUDGED
         self._changed: Mapping[str, Mapping[str, int]] = {}
-        self._days: Mapping[str, Sequence[Reason]] = {}
+        self._days: Mapping[str, Sequence[Reading]] = {}
         self.errors = 0
         self._failing: set[str] = set()
 
@@ -210,10 +211,11 @@ class Judge:
         self._waiting |= _others(self._changed, changed)
         self._changed = changed
 
-    def note_days(self, days: Mapping[str, Sequence[Reason]]) -> None:
-        """By tag, the reasons of quantities of a day; the next snapshot is judged by them."""
-        self._waiting |= _others(self._days, days)
-        self._days = days
+    def note_days(self, days: Mapping[str, Sequence[Reading]]) -> None:
+        """By tag, the values of quantities of a day; the next snapshot is judged by them."""
+        if days is not self._days:
+            self._waiting |= _others(self._days, days)
+            self._days = days
 
     def holds_ns(self) -> dict[str, int]:
         """For how long each tag's readings hold, as was last known."""
@@ -317,9 +319,13 @@ class Judge:
         kept.until_ns = min(
             (
                 reading.observed_at_ns + limit + 1
-                for reading in kept.state.readings
+                for readings, limits in (
+                    (kept.state.readings, (holds, FORGOTTEN_NS)),
+                    (self._days.get(tag_id, ()), (COUNTS_NS,)),
+                )
+                for reading in readings
                 if reading.observed_at_ns is not None
-                for limit in (holds, FORGOTTEN_NS)
+                for limit in limits
                 if reading.observed_at_ns + limit >= now_ns
             ),
             default=_NEVER,

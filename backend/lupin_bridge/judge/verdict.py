@@ -13,6 +13,7 @@ from enum import StrEnum
 from types import MappingProxyType
 from typing import Final
 
+from lupin_bridge.judge.days import COUNTS_NS
 from lupin_bridge.judge.derived import DERIVED
 from lupin_bridge.judge.ranges import Ranges, Sensor, Sensors
 from lupin_bridge.judge.recent_scans import Recent, Scanned
@@ -92,13 +93,13 @@ def judge_tag(
     *,
     holds_ns: int,
     changed: Mapping[str, int] = NOTHING_CHANGED,
-    days: Sequence[Reason] = (),
+    days: Sequence[Reading] = (),
 ) -> Health:
     """What is to be said of a tag at `now_ns`, where its readings hold for `holds_ns`.
 
     Each reading is judged by the day and the plants of its own time, which `recent` has.
     `changed` are the sensors that do not read as everything else predicts, and since when. `days`
-    are the reasons of quantities of a day; they hold until everything read of the tag is forgotten.
+    are the values of quantities of a day, observed when the day was complete.
     """
     reasons: list[Reason] = []
     was_judged = False
@@ -124,7 +125,7 @@ def judge_tag(
             reasons.append(reason)
         elif ranges.ideal is not None and age_ns is not None and age_ns <= holds_ns:
             was_judged = True
-    reasons += days if _is_remembered(tag, now_ns) else ()
+    reasons += _of_days(tag, days, now_ns, sensors, recent)
     reasons += _of_age(tag, now_ns, holds_ns)
     reasons += _of_changes(tag, changed)
     reasons += _of_attempts(tag)
@@ -264,11 +265,6 @@ def judge_site(
     return Health(worst(v for v, count in tags.items() if count) or Verdict.UNKNOWN)
 
 
-def _is_remembered(tag: TagState, now_ns: int) -> bool:
-    ages = (_age_ns(reading.observed_at_ns, now_ns) for reading in tag.readings)
-    return any(age is not None and age <= FORGOTTEN_NS for age in ages)
-
-
 def _age_ns(observed_at_ns: int | None, now_ns: int) -> int | None:
     return None if observed_at_ns is None else max(0, now_ns - observed_at_ns)
 
@@ -294,6 +290,21 @@ def _of_age(tag: TagState, now_ns: int, holds_ns: int) -> Iterable[Reason]:
 def _old(sensor: str, reading: Reading, limit_s: float) -> Reason:
     since_ns = reading.observed_at_ns
     return Reason(Kind.OLD, Verdict.UNKNOWN, sensor, limit=limit_s, since_ns=since_ns)
+
+
+def _of_days(
+    tag: TagState, days: Sequence[Reading], now_ns: int, sensors: Sensors, recent: Recent
+) -> Iterable[Reason]:
+    measured = {reading.name for reading in tag.readings}
+    for day in days:
+        complete_ns = day.observed_at_ns or 0
+        # A sensor of that name goes first.
+        if day.name in measured or now_ns - complete_ns > COUNTS_NS:
+            continue
+        species = recent.species_at(complete_ns)
+        reason = judge_value(day, sensors.named(day.name).ranges(is_day=True, species=species))
+        if reason is not None:
+            yield reason
 
 
 def _of_changes(tag: TagState, changed: Mapping[str, int]) -> Iterable[Reason]:

@@ -5,10 +5,14 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
 from typing import Protocol
 
 from lupin_bridge.alarms.board import AlarmBoard
+from lupin_bridge.feed.source import TwinSource
+from lupin_bridge.judge.options import Criteria
 from lupin_bridge.judge.ranges import Sensors
+from lupin_bridge.notify.daily import DailyReport, DailyTarget
 from lupin_bridge.notify.destinations import Targets
 from lupin_bridge.notify.messages import GreenhouseState
 from lupin_bridge.notify.mirror import Mirror
@@ -34,6 +38,8 @@ class Source(Protocol):
     """What the channels need of the bridge."""
 
     alarms: AlarmBoard
+    source: TwinSource
+    criteria: Criteria
 
     def seen(self) -> GreenhouseState:
         """The state of now."""
@@ -50,13 +56,14 @@ class Source(Protocol):
 class Channels:
     """The channels that the operator wants. They look at the state by themselves.
 
-    Belongs to the event loop.
+    `folder` is where it is noted which reports were sent. Belongs to the event loop.
     """
 
-    def __init__(self, targets: Targets | None = None) -> None:
-        self._targets = targets or Targets()
+    def __init__(self, targets: Targets | None = None, folder: Path = Path()) -> None:
+        self._targets, self._folder = targets or Targets(), folder
         self._mqtt: Mqtt | None = None
         self._webhook: Webhook | None = None
+        self._reports: list[DailyReport] = []
 
     def start(self, source: Source, sensors: Sensors) -> None:
         """Begin to notify."""
@@ -72,10 +79,15 @@ class Channels:
         if targets.webhook is not None:
             self._webhook = Webhook(targets.webhook)
             self._webhook.start(source.alarms, lambda: source.ros_time_ns, lambda: source.origin)
+        if targets.report_at is not None:
+            daily = DailyTarget(targets.report_at, source.criteria.clock.zone, self._folder)
+            self._reports = [DailyReport(daily, channel) for channel in self._running]
+        for report in self._reports:
+            report.start(source)
 
     async def stop(self) -> None:
         """Stop all at once."""
-        await asyncio.gather(*(channel.stop() for channel in self._running))
+        await asyncio.gather(*(it.stop() for it in (*self._reports, *self._running)))
 
     def status(self) -> tuple[Outward, ...]:
         """The condition of each, in a line."""

@@ -6,6 +6,7 @@ import logging
 import re
 import ssl
 from dataclasses import dataclass, field
+from datetime import time
 from typing import Final
 from urllib.parse import SplitResult, urlsplit
 
@@ -118,6 +119,7 @@ class Targets:
 
     mqtt: MqttTarget | None = None
     webhook: WebhookTarget | None = None
+    report_at: time | None = None
 
     @classmethod
     def of(cls, settings: Settings, secrets: Secrets) -> Targets:
@@ -127,7 +129,25 @@ class Targets:
             SettingError: an address, a prefix or a secret that cannot be, or one without the other.
 
         """
-        return cls(_mqtt(settings, secrets.mqtt_password), _webhook(settings, secrets))
+        mqtt, webhook = _mqtt(settings, secrets.mqtt_password), _webhook(settings, secrets)
+        return cls(mqtt, webhook, _report_at(settings, has_target=bool(mqtt or webhook)))
+
+
+_HOUR: Final = re.compile(r"(?:[01]\d|2[0-3]):[0-5]\d", re.ASCII)
+
+
+def _report_at(settings: Settings, *, has_target: bool) -> time | None:
+    called, text = settings.called("report_at"), settings.report_at
+    if not text:
+        return None
+    if not _HOUR.fullmatch(text):
+        raise SettingError(f"{called} is {text!r}, must be from 00:00 to 23:59, such as 06:00")
+    if not has_target:
+        raise SettingError(
+            f"{called} is given without {settings.called('webhook_url')} or "
+            f"{settings.called('mqtt_url')}, and has no use"
+        )
+    return time.fromisoformat(text)
 
 
 def _mqtt(settings: Settings, password: str | None) -> MqttTarget | None:

@@ -1,9 +1,9 @@
 """MQTT: the state of the greenhouse, published to a broker by `aiomqtt`, with a last will.
 
-Nothing is retained but the bridge's own `online`, which the broker itself turns into `offline`: a
-retained reading or verdict would outlive what it says. A later subscriber gets everything at Home
-Assistant's birth message, or with the next change. The bridge reads nothing else: anybody may write
-to a topic, so what is received is small, and its effects are rate-limited.
+Nothing is retained but the report of a day, and the bridge's own `online`, which the broker itself
+turns into `offline`: a retained reading or verdict would outlive what it says. A later subscriber
+gets everything at Home Assistant's birth message, or with the next change. The bridge reads nothing
+else: anybody may write to a topic, so what is received is small, and its effects are rate-limited.
 """
 
 from __future__ import annotations
@@ -14,18 +14,18 @@ import math
 import random
 import secrets
 import time
+from collections import deque
 from collections.abc import Callable
 from itertools import islice
 from typing import Final
 
+import orjson
 from aiomqtt import Client, MqttError, ProtocolVersion, Will
 from paho.mqtt.packettypes import PacketTypes
 from paho.mqtt.properties import Properties
 
 from lupin_bridge.notify.destinations import Backoff, Condition, MqttTarget
-from lupin_bridge.notify.messages import (
-    GreenhouseState,
-)
+from lupin_bridge.notify.messages import GreenhouseState
 from lupin_bridge.notify.mirror import Mirror
 
 log = logging.getLogger(__name__)
@@ -72,7 +72,8 @@ class Mqtt:
         self._answer_s = answer_s
         # Of its own: two bridges with one name would throw each other out, for ever.
         self._identifier = f"lupin-twin-{secrets.token_hex(6)}"
-        self._has_to_repeat = True
+        self._has_to_repeat: bool
+        self._reports: deque[tuple[bytes, asyncio.Future[bool]]] = deque()
         self._task: asyncio.Task[None] | None = None
         self._is_stopping = self._is_connecting = False
         self._seen_s = 0.0
@@ -87,6 +88,18 @@ class Mqtt:
         self._see()
         self._count()
         self._task = asyncio.create_task(self._run(), name="mqtt")
+
+    @property
+    def called(self) -> str:
+        """The broker and where it publishes there."""
+        return f"{self._target.called} {self._topics.prefix}"
+
+    async def deliver(self, report_id: str, report: orjson.Fragment) -> bool:
+        """See `daily.ReportChannel`."""
+        end: asyncio.Future[bool] = asyncio.get_running_loop().create_future()
+        payload = {"id": report_id, "report": report, "origin": self._look().origin}
+        self._reports.append((orjson.dumps(payload), end))
+        return await end
 
     async def stop(self) -> None:
         """Publish `offline` if the broker is connected, and end."""
@@ -169,6 +182,7 @@ class Mqtt:
                 self._has_to_repeat, repeated_s = False, time.monotonic()
                 self._mirror.forget()
             self._see()
+            await self._publish_reports(client)
             messages = self._mirror.messages()
             while batch := list(islice(messages, WINDOW)):
                 if time.monotonic() - self._seen_s >= LOOK_S:
@@ -182,6 +196,16 @@ class Mqtt:
             self._backoff.succeeded()
             self._count()
             await asyncio.sleep(LOOK_S)
+
+    async def _publish_reports(self, client: Client) -> None:
+        topic = self._topics.of(None, "report")
+        while self._reports:
+            payload, end = self._reports[0]
+            await client.publish(topic, payload, qos=AT_LEAST_ONCE, retain=True)
+            self._reports.popleft()
+            self.condition.taken()
+            if not end.done():
+                end.set_result(True)
 
     async def _announce_shutdown(self, client: Client) -> None:
         client.timeout = LAST_MESSAGE_S
@@ -219,7 +243,7 @@ class Mqtt:
         self._mirror.see(self._look())
 
     def _count(self, in_flight: int = 0) -> None:
-        self.condition.waiting = self._mirror.waiting + in_flight
+        self.condition.waiting = self._mirror.waiting + in_flight + len(self._reports)
         self.condition.dropped = self._mirror.dropped
 
     def _failed(self, why: str) -> None:

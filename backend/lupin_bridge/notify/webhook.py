@@ -138,36 +138,40 @@ MAX_KNOWN: Final = 20_000
 # Changes of so long before the start are sent again.
 RESENT_NS: Final = 24 * 3600 * 1_000_000_000
 
-What = Literal["raised", "worse", "cleared", "withdrawn"]
+What = Literal["raised", "worse", "cleared", "withdrawn", "report"]
 
 
 @dataclass(slots=True)
 class Delivery:
-    """One change of one alarm; `id` is the same however often it is sent.
+    """One change of one alarm, or a report; `id` is the same however often it is sent.
 
     `origin` is where observations came from when it was received.
     """
 
     id: str
     change: What
-    alarm: Alarm
+    alarm: Alarm | None
     origin: Origin
     refusals: int = 0
+    report: orjson.Fragment | None = None
+    # Whether it was taken, or given up.
+    end: asyncio.Future[bool] | None = None
 
     def body(self, lost: int, origin: Origin) -> bytes:
         """What is posted; `lost` changes were given up since the last one that was taken.
 
         `origin` is where observations come from now, for who did not know it then.
         """
-        return orjson.dumps(
-            {
-                "id": self.id,
-                "change": self.change,
-                "alarm": alarm_json(self.alarm),
-                "lost": lost,
-                "origin": origin if self.origin == "unknown" else self.origin,
-            }
-        )
+        alarm = self.alarm
+        of = {"report": self.report} if alarm is None else {"alarm": alarm_json(alarm)}
+        origin = origin if self.origin == "unknown" else self.origin
+        head = {"id": self.id, "change": self.change}
+        return orjson.dumps({**head, **of, "lost": lost, "origin": origin})
+
+    def ended(self, *, taken: bool) -> None:
+        """It was taken, or given up."""
+        if self.end is not None and not self.end.done():
+            self.end.set_result(taken)
 
 
 class Deliveries:
@@ -195,6 +199,7 @@ class Deliveries:
 
         Meanwhile it may have given way to newer ones, and more may have been lost.
         """
+        delivery.ended(taken=taken)
         if taken:
             self.lost -= lost
             if self.first is not delivery:
@@ -219,7 +224,7 @@ class Deliveries:
         for alarm in change.withdrawn:
             if alarm.id in self._sent:
                 del self._sent[alarm.id]
-                self._wait(Delivery(f"{alarm.id}.withdrawn", "withdrawn", alarm, origin))
+                self.wait(Delivery(f"{alarm.id}.withdrawn", "withdrawn", alarm, origin))
 
     def _put_alarm(self, alarm: Alarm, origin: Origin) -> None:
         before = self._sent.get(alarm.id)
@@ -233,22 +238,23 @@ class Deliveries:
         was_cleared_ns, was_worse = before or (None, False)
         if alarm.cleared_at_ns is not None:
             if before is None or alarm.cleared_at_ns != was_cleared_ns:
-                self._wait(
+                self.wait(
                     Delivery(f"{alarm.id}.cleared.{alarm.cleared_at_ns}", "cleared", alarm, origin)
                 )
             return
         if was_cleared_ns is not None:  # a late write shows that it went on
-            self._wait(Delivery(f"{alarm.id}.raised.{was_cleared_ns}", "raised", alarm, origin))
+            self.wait(Delivery(f"{alarm.id}.raised.{was_cleared_ns}", "raised", alarm, origin))
         elif before is None:
-            self._wait(Delivery(f"{alarm.id}.raised", "raised", alarm, origin))
+            self.wait(Delivery(f"{alarm.id}.raised", "raised", alarm, origin))
         if alarm.is_worse and not was_worse:
             verdict = alarm.reason.verdict
-            self._wait(Delivery(f"{alarm.id}.worse.{verdict}", "worse", alarm, origin))
+            self.wait(Delivery(f"{alarm.id}.worse.{verdict}", "worse", alarm, origin))
 
-    def _wait(self, delivery: Delivery) -> None:
+    def wait(self, delivery: Delivery) -> None:
+        """Have it wait for its turn."""
         self._waiting.append(delivery)
         if len(self._waiting) > self._max:
-            self._waiting.popleft()
+            self._waiting.popleft().ended(taken=False)
             self._give_up()
 
     def _give_up(self) -> None:
@@ -330,6 +336,19 @@ class Webhook:
             asyncio.create_task(self._run(), name="webhook"),
             asyncio.create_task(self._take_many(now_ns), name="webhook's changes"),
         ]
+
+    @property
+    def called(self) -> str:
+        """Its address, which may be a secret."""
+        return f"{self._target.called}{self._target.path}"
+
+    async def deliver(self, report_id: str, report: orjson.Fragment) -> bool:
+        """See `daily.ReportChannel`."""
+        end: asyncio.Future[bool] = asyncio.get_running_loop().create_future()
+        self._deliveries.wait(Delivery(report_id, "report", None, self._origin(), 0, report, end))
+        self._count()
+        self._is_news.set()
+        return await end
 
     def _take(self, change: Change, now_ns: int | None) -> None:
         self._deliveries.put(change, now_ns, self._origin())

@@ -6,11 +6,10 @@ A bucket is of such readings too: of means, no mean of what is derived can be ma
 from __future__ import annotations
 
 import math
-from collections.abc import Generator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
 from statistics import fmean
-from typing import Any
 
 from lupin_bridge.judge.derived import DAILY, DAY_NS, DERIVED, Daily, Derived, IsDay
 from lupin_twin.core.past import (
@@ -26,30 +25,32 @@ from lupin_twin.core.state import Reading, TagState
 
 # (ns of ROS time, value), oldest first.
 Readings = list[tuple[int, float]]
+# Looks a series up.
+Find = Callable[[SeriesRequest], SeriesPast]
 
 
-def series(request: SeriesRequest, is_day: IsDay) -> Generator[SeriesRequest, Any, SeriesPast]:
+def series(request: SeriesRequest, is_day: IsDay, find: Find) -> SeriesPast:
     """The series of a request; a derived one, unless a sensor has its name, of its parts.
 
     Raises:
         PastRefused: more readings of the parts than one request may have.
 
     """
-    measured: SeriesPast = yield request
+    measured = find(request)
     derived, daily = DERIVED.get(request.sensor_type), DAILY.get(request.sensor_type)
     if measured.stamps_ns:
         return measured
     if derived is not None:
-        read = partial(_readings, derived)
+        read = partial(_readings, derived, find)
     elif daily is not None:
-        read = partial(_of_days, daily, is_day)
+        read = partial(_of_days, daily, is_day, find)
     else:
         return measured
-    period, readings = yield from read(request)
+    period, readings = read(request)
     if len(readings) > request.max_points:
         wide = grid(period.start_ns, period.end_ns, request.max_points)
         request = replace(request, start_ns=wide.start_ns, end_ns=wide.end_ns)
-        _, readings = yield from read(request)
+        _, readings = read(request)
         buckets: dict[int, list[float]] = {}
         for stamp_ns, value in readings:
             buckets.setdefault((stamp_ns - wide.start_ns) // wide.bucket_ns, []).append(value)
@@ -72,8 +73,8 @@ def series(request: SeriesRequest, is_day: IsDay) -> Generator[SeriesRequest, An
 
 
 def with_daily(
-    tags: Sequence[TagState], daily: Daily, at_ns: int, is_day: IsDay
-) -> Generator[SeriesRequest, Any, list[TagState]]:
+    tags: Sequence[TagState], daily: Daily, at_ns: int, is_day: IsDay, find: Find
+) -> list[TagState]:
     """The tags as of a moment, those of which it is known with a reading of the quantity too.
 
     Raises:
@@ -88,7 +89,7 @@ def with_daily(
             continue
         start_ns = max(1, at_ns - DAY_NS)
         part_request = SeriesRequest(tag.tag_id, daily.sensor, start_ns, at_ns + 1, MAX_POINTS)
-        part: SeriesPast = yield part_request
+        part = find(part_request)
         value = daily.at(at_ns, _finite(daily.name, daily.sensor, part), is_day)
         if math.isfinite(value):
             readings = (*tag.readings, Reading(daily.name, value, at_ns))
@@ -98,14 +99,14 @@ def with_daily(
 
 
 def _of_days(
-    daily: Daily, is_day: IsDay, request: SeriesRequest
-) -> Generator[SeriesRequest, Any, tuple[SeriesPast, Readings]]:
+    daily: Daily, is_day: IsDay, find: Find, request: SeriesRequest
+) -> tuple[SeriesPast, Readings]:
     """The period, empty, and a value at the last reading of each hour in it."""
     first_ns = max(1, request.start_ns - DAY_NS) if request.start_ns else 0
     part_request = replace(
         request, sensor_type=daily.sensor, start_ns=first_ns, max_points=MAX_POINTS
     )
-    part: SeriesPast = yield part_request
+    part = find(part_request)
     start_ns = request.start_ns or part.start_ns
     every = _finite(daily.name, daily.sensor, part)
     last = {at_ns // HOUR_NS: at_ns for at_ns, _ in every if at_ns >= start_ns}
@@ -129,14 +130,12 @@ def _finite(name: str, sensor: str, part: SeriesPast) -> Readings:
     return [(at_ns, value) for at_ns, value in pairs if math.isfinite(value)]
 
 
-def _readings(
-    derived: Derived, request: SeriesRequest
-) -> Generator[SeriesRequest, Any, tuple[SeriesPast, Readings]]:
+def _readings(derived: Derived, find: Find, request: SeriesRequest) -> tuple[SeriesPast, Readings]:
     """The period, empty, and what can be derived in it: of readings of one moment, one scan."""
     part_request = replace(request, max_points=MAX_POINTS)
     parts: list[SeriesPast] = []
     for name in derived.sources:
-        part: SeriesPast = yield replace(part_request, sensor_type=name)
+        part = find(replace(part_request, sensor_type=name))
         if part.is_bucketed:
             raise PastRefused(
                 f"{derived.name} is derived of {' and '.join(derived.sources)}, reading by reading:"

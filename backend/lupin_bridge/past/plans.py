@@ -1,4 +1,4 @@
-"""Queries of the past: each yields what it needs of the log, and returns the plan of its answer.
+"""Queries of the past: each looks up what it needs of the log, and plans its answer.
 
 Queries are values: they are pickled and sent to the process that reads the log. Back come the ETag
 and the body, for clients without it. A moment that has passed does not change, and its ETag is made
@@ -8,7 +8,7 @@ of content: it is the same in every replica and after a restart, until a late wr
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Generator, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from hashlib import blake2b
@@ -17,18 +17,19 @@ from typing import Any, Final, Protocol
 
 import orjson
 
-from lupin_bridge.feed.query import Found, Need, Work
+from lupin_bridge.feed.query import Find
 from lupin_bridge.field import formats
 from lupin_bridge.field import query as field_query
 from lupin_bridge.field.formats import FieldFormat
 from lupin_bridge.field.query import FieldQuery
+from lupin_bridge.judge.days import SINCE_NS, days_of
 from lupin_bridge.judge.derived import DAILY, DERIVED
 from lupin_bridge.judge.judging import judge_once
 from lupin_bridge.judge.options import Criteria
-from lupin_bridge.judge.verdict import Reason, with_derived
+from lupin_bridge.judge.verdict import with_derived
 from lupin_bridge.past import bodies, derived
 from lupin_bridge.past.query import PeriodQuery
-from lupin_bridge.serving.admission import REVALIDATE, Answer
+from lupin_bridge.serving.admission import REVALIDATE, Answer, json_answer
 from lupin_bridge.stream.health_json import HealthJson
 from lupin_bridge.stream.state_json import StateJson
 from lupin_twin.core.journal_condition import Condition
@@ -41,7 +42,7 @@ from lupin_twin.core.past import (
     SeriesRequest,
 )
 from lupin_twin.core.state import Snapshot, samples_of
-from lupin_twin.core.writes import PastWrite, RecentRequest
+from lupin_twin.core.writes import PastWrite, RecentRequest, ScansRequest
 from lupin_twin.field.engine import (
     FieldRefused,
     FieldRequest,
@@ -61,11 +62,12 @@ JSON_TYPE: Final = "application/json"
 # A larger body is sent as a buffer of its own, and not copied.
 _LARGE_BYTES: Final = 65_536
 # Costs, s of one core, at worst: to plan an answer and to write it, for each tag; to write a cell
-# or pixel of a field; to judge a tag, and a tag of a field; to write a reading or a bucket.
+# or pixel of a field; to judge a tag with its scans of three days, and a tag of a field; to write a
+# reading or a bucket.
 PLAN_TAG_S: Final = 10e-6
 _WRITE_TAG_S: Final = 20e-6
 WRITE_CELL_S: Final = 50e-9
-_HEALTH_TAG_S: Final = 200e-6
+_HEALTH_TAG_S: Final = 1e-3
 JUDGE_TAG_S: Final = 20e-6
 _WRITE_ENTRY_S: Final = 5e-6
 # Of a field too large to estimate, or one that will be refused.
@@ -98,8 +100,8 @@ class Query(Protocol):
     def cost_s(self, tags: int) -> float:
         """The cost of the lookups and of the answer with so many tags, s of one core."""
 
-    def look(self) -> Generator[Need, Found, Plan]:
-        """Yield each need, receive what was found, return the plan of the answer."""
+    def look(self, find: Find) -> Plan:
+        """The plan of the answer, of what is found in the log."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -129,12 +131,11 @@ class ConditionalQuery:
     query: Query
     if_none_match: str = ""
 
-    def look(self) -> Generator[Need, Found, Work[Answered]]:
+    def answer(self, find: Find, should_stop: ShouldStop) -> Answered:
         """See `feed.query.Question`."""
-        plan = yield from self.query.look()
-        if field_query.matches(self.if_none_match, plan.etag):
-            return Work(0.0, lambda _: Answered(plan.etag, None))
-        return Work(plan.cost_s, lambda stop: Answered(plan.etag, plan.write(stop)))
+        plan = self.query.look(find)
+        has_it = field_query.matches(self.if_none_match, plan.etag)
+        return Answered(plan.etag, None if has_it else plan.write(should_stop))
 
 
 # --- as of a moment -------------------------------------------------------------------------------
@@ -154,9 +155,9 @@ class StateQuery:
         """The cost of writing the answer with so many tags, s of one core."""
         return tags * _WRITE_TAG_S
 
-    def look(self) -> Generator[Need, Found, Plan]:
+    def look(self, find: Find) -> Plan:
         """See `Query`."""
-        snapshot: Snapshot = yield self.at_ns or 0
+        snapshot: Snapshot = find(self.at_ns or 0)
         return self.plan(snapshot)
 
     def plan(self, snapshot: Snapshot) -> Plan:
@@ -170,7 +171,7 @@ class WholeState(StateQuery):
 
     def plan(self, snapshot: Snapshot) -> Plan:
         """See `StateQuery`."""
-        etag = _etag("state", (snapshot.stamp_ns, snapshot.frame_id, snapshot.tags))
+        etag = etag_of("state", (snapshot.stamp_ns, snapshot.frame_id, snapshot.tags))
         cost = len(snapshot.tags) * _WRITE_TAG_S
         return _plan(etag, lambda _: StateJson().state(snapshot), cost)
 
@@ -195,7 +196,7 @@ class OneTag(StateQuery):
         found = next((tag for tag in snapshot.tags if tag.tag_id == self.tag_id), None)
         if found is None:
             raise NoSuchTag(self.tag_id, len(snapshot.tags))
-        etag = _etag("tag", (snapshot.stamp_ns, found))
+        etag = etag_of("tag", (snapshot.stamp_ns, found))
         return _plan(etag, lambda _: StateJson().tag(found, snapshot.now_ns), _WRITE_TAG_S)
 
 
@@ -203,24 +204,26 @@ class OneTag(StateQuery):
 class Health(StateQuery):
     """`schema.Judgement` by these criteria, and by what was recent in the log then.
 
-    `days` as in `reasons_of_days`.
+    Quantities of a day are made of all scans of that day: they follow from the log up to then, too.
     """
 
     criteria: Criteria = field(compare=False)
-    days: tuple[tuple[str, tuple[Reason, ...]], ...] = ()
 
     def write_s(self, tags: int) -> float:
         """See `StateQuery`."""
         return tags * _HEALTH_TAG_S
 
-    def look(self) -> Generator[Need, Found, Plan]:
+    def look(self, find: Find) -> Plan:
         """See `Query`."""
-        snapshot: Snapshot = yield self.at_ns or 0
-        recent: tuple[PastWrite, ...] = yield RecentRequest(self.at_ns or 0)
-        by = self.criteria
-        judged = judge_once(snapshot, recent, by.sensors, by.day, by.recent_s, days=dict(self.days))
+        by, at_ns = self.criteria, self.at_ns or 0
+        snapshot: Snapshot = find(at_ns)
+        recent: tuple[PastWrite, ...] = find(RecentRequest(at_ns))
+        sensors = frozenset(by.sensors.judged_by_the_day)
+        scans: tuple[PastWrite, ...] = find(ScansRequest(max(0, at_ns - SINCE_NS), at_ns, sensors))
+        days = days_of(scans, by.sensors, by.is_day, by.day_number)
+        judged = judge_once(snapshot, recent, by.sensors, by.day, by.recent_s, days=days)
         body = HealthJson().whole(judged)
-        return _plan(_etag("health", (snapshot.stamp_ns, body.decode())), lambda _: body)
+        return _plan(etag_of("health", (snapshot.stamp_ns, body.decode())), lambda _: body)
 
 
 @dataclass(frozen=True, slots=True)
@@ -257,13 +260,13 @@ class Field(StateQuery):
         except FieldRefused:
             return daily_s + _LARGE_S
 
-    def look(self) -> Generator[Need, Found, Plan]:
+    def look(self, find: Find) -> Plan:
         """See `Query`."""
         at_ns = self.at_ns or 0
-        snapshot: Snapshot = yield at_ns
+        snapshot: Snapshot = find(at_ns)
         daily = DAILY.get(self.query.sensor_type)
         if daily is not None:
-            tags = yield from derived.with_daily(snapshot.tags, daily, at_ns, self.criteria.is_day)
+            tags = derived.with_daily(snapshot.tags, daily, at_ns, self.criteria.is_day, find)
             snapshot = replace(snapshot, tags=tuple(tags))
         return self.plan(snapshot)
 
@@ -274,10 +277,7 @@ class Field(StateQuery):
             lupin_twin.field.engine.FieldRefused: a bad request.
 
         """
-        places = [(tag.pose.x, tag.pose.y) for tag in snapshot.tags if tag.pose is not None]
-        box = default_box(places, self.rules.max_distance_m)
-        request = self.query.request(box, self.rules.max_grid_cells)
-        self._check(request)
+        request = self.request(snapshot)
         sensor, sensors = self.criteria.sensors.named(request.sensor_type), self.criteria.sensors
         tags = with_derived(snapshot.tags, request.sensor_type)
         samples = samples_of(tags, request.sensor_type)
@@ -293,10 +293,12 @@ class Field(StateQuery):
 
         if self.field_format is None:
             of = [tag.tag_id for tag in tags if samples_of((tag,), request.sensor_type)]
-            etag = _etag("quality", (request, samples, of, far_off, *conditions))
+            etag = etag_of("quality", (request, samples, of, far_off, *conditions))
             return _plan(etag, quality, cost + len(tags) * JUDGE_TAG_S)
         field_format, scale = self.field_format, self.query.scale
-        etag = _etag(f"field {field_format.name} {scale}", (request, samples, far_off, *conditions))
+        etag = etag_of(
+            f"field {field_format.name} {scale}", (request, samples, far_off, *conditions)
+        )
 
         def write(should_stop: ShouldStop) -> Answer:
             grid = compute_field(request, samples, self.occupancy, self.rules, should_stop)
@@ -306,6 +308,14 @@ class Field(StateQuery):
             return Answer(body, field_format.media_type, {**headers, "ETag": etag, **REVALIDATE})
 
         return Plan(etag, cost + self._writing_s(request), write)
+
+    def request(self, snapshot: Snapshot) -> FieldRequest:
+        """What is to be computed of a snapshot; see `check`."""
+        places = [(tag.pose.x, tag.pose.y) for tag in snapshot.tags if tag.pose is not None]
+        box = default_box(places, self.rules.max_distance_m)
+        request = self.query.request(box, self.rules.max_grid_cells)
+        self._check(request)
+        return request
 
     def _check(self, request: FieldRequest) -> None:
         width, height = check_request(request, self.rules.max_grid_cells)
@@ -338,11 +348,11 @@ class History:
         # Both of its parts are read, and again for buckets.
         return own_s + 4 * _series_s(request.tag_id, MAX_POINTS, tags)
 
-    def look(self) -> Generator[Need, Found, Plan]:
+    def look(self, find: Find) -> Plan:
         """See `Query`."""
-        past = yield from derived.series(self.request, self.criteria.is_day)
+        past = derived.series(self.request, self.criteria.is_day, find)
         sensors = self.criteria.sensors
-        return _of_content(
+        return of_content(
             bodies.history_body(self.request, past, self.now_ns, sensors, self.journal)
         )
 
@@ -361,33 +371,30 @@ class Timeline:
         silences_s = _series_s(self._tag_id, MAX_POINTS, tags)
         return runs_s + 2 * len(bodies.COUNTED) * counted_s + silences_s
 
-    def look(self) -> Generator[Need, Found, Plan]:
+    def look(self, find: Find) -> Plan:
         """See `Query`: the runs, every event over the one period, the silences."""
-        runs: SeriesPast = yield SeriesRequest(EVERY_TAG, Event.RUNS)
+        runs: SeriesPast = find(SeriesRequest(EVERY_TAG, Event.RUNS))
         period = bodies.timeline_period(self.query, runs)
-        counted = yield from self._counted(period.start_ns, period.end_ns)
+        counted = self._counted(find, period.start_ns, period.end_ns)
         coarsest = bodies.coarsest(period, counted.values())
         if coarsest != period:
             # The wider period also holds single events outside the first one.
             period = coarsest
-            counted = yield from self._counted(period.start_ns, period.end_ns)
+            counted = self._counted(find, period.start_ns, period.end_ns)
         # What is not written yet may be no silence.
         until_ns = bodies.complete_to(self.journal, period.end_ns)
         until_ns = max(period.start_ns, period.end_ns if until_ns is None else until_ns)
-        silences: SeriesPast = yield SeriesRequest(
-            self._tag_id, Event.SILENCES, period.start_ns, until_ns, MAX_POINTS
+        silences: SeriesPast = find(
+            SeriesRequest(self._tag_id, Event.SILENCES, period.start_ns, until_ns, MAX_POINTS)
         )
-        return _of_content(bodies.timeline_body(runs, period, counted, silences, self.journal))
+        return of_content(bodies.timeline_body(runs, period, counted, silences, self.journal))
 
-    def _counted(
-        self, start_ns: int, end_ns: int
-    ) -> Generator[Need, Found, dict[Event, SeriesPast]]:
-        counted = {}
-        for event in bodies.COUNTED.values():
-            counted[event] = yield SeriesRequest(
-                self._tag_id, event, start_ns, end_ns, self.query.points
-            )
-        return counted
+    def _counted(self, find: Find, start_ns: int, end_ns: int) -> dict[Event, SeriesPast]:
+        points = self.query.points
+        return {
+            event: find(SeriesRequest(self._tag_id, event, start_ns, end_ns, points))
+            for event in bodies.COUNTED.values()
+        }
 
     @property
     def _tag_id(self) -> str:
@@ -405,9 +412,10 @@ def _plan(etag: str, write: Callable[[ShouldStop], bytes], cost: float = 0.0) ->
     return Plan(etag, cost, lambda stop: Answer(write(stop), JSON_TYPE, headers))
 
 
-def _of_content(body: Mapping[str, Any]) -> Plan:
-    text = orjson.dumps(body)
-    return _plan(f'"{blake2b(text, digest_size=12).hexdigest()}"', lambda _: text)
+def of_content(body: Mapping[str, Any]) -> Plan:
+    """The plan of a JSON answer that is there already."""
+    answer = json_answer(orjson.dumps(body))
+    return Plan(answer.headers["ETag"], 0.0, lambda _: answer)
 
 
 @lru_cache(maxsize=1)
@@ -415,7 +423,7 @@ def _digest_of_map(occupancy: OccupancyMap) -> str:
     return blake2b(occupancy.cells.data, digest_size=12).hexdigest() + repr(occupancy.place)
 
 
-def _etag(kind: str, content: object) -> str:
+def etag_of(kind: str, content: object) -> str:
     """A strong ETag of content; NaN and infinity are the same in it, as they are in JSON."""
     digest = blake2b(kind.encode(), digest_size=12)
     digest.update(orjson.dumps(content))

@@ -145,6 +145,29 @@ class OfNotes(OfPeriod):
     """The parameters of `/api/notes`."""
 
     subject: str | None = parameter("of this alone: `alarm:ID`, `tag:ID` or `site`; default: all")
+    kind: Literal["acknowledge", "shelve", "comment"] | None = parameter(
+        "this kind alone; default: all"
+    )
+
+
+# A shift, where nobody says from when on.
+SHIFT_S: Final = 8 * 3_600
+MAX_REPORT_DAYS: Final = 31
+
+
+@dataclass(frozen=True, slots=True)
+class OfReport:
+    """The parameters of `/api/report`."""
+
+    from_: str | None = parameter(f"{MOMENT}; default: eight hours before `to`")
+    to: str | None = parameter(_TO)
+
+
+@dataclass(frozen=True, slots=True)
+class OfReportPage(OfReport):
+    """The parameters of `/api/report.html`."""
+
+    lang: Literal["en", "de", "nl", "es"] = parameter("language", "en")
 
 
 @dataclass(frozen=True, slots=True)
@@ -238,14 +261,35 @@ def period(kind: type[OfPeriod], parameters: Parameters, now_ns: int | None) -> 
     return PeriodQuery(start_ns, end_ns)
 
 
-def subject(parameters: Parameters) -> str | None:
-    """The subject of `/api/notes`.
+def report(given: OfReport, now_ns: int | None) -> tuple[int, int]:
+    """The period of a report, ns of ROS time; it ends now at the latest.
+
+    Raises:
+        PastRefused: a period without an end, or with nothing in it, or too long a one.
+
+    """
+    end_ns = now_ns if given.to is None else moment("to", given.to)
+    if end_ns is None:
+        raise PastRefused("to is missing, and what time it is now is not known here")
+    end_ns = end_ns if now_ns is None else min(end_ns, now_ns)
+    shift_ns = SHIFT_S * NANOSECONDS_PER_SECOND
+    start_ns = max(0, end_ns - shift_ns) if given.from_ is None else moment("from", given.from_)
+    if start_ns >= end_ns:
+        raise PastRefused(f"from is {seconds(start_ns)} s, must be before to, {seconds(end_ns)} s")
+    days = (end_ns - start_ns) / (_SECONDS_A_DAY * NANOSECONDS_PER_SECOND)
+    if days > MAX_REPORT_DAYS:
+        raise PastRefused(f"from and to are {days:.1f} days apart, the limit is {MAX_REPORT_DAYS}")
+    return start_ns, end_ns
+
+
+def of_notes(parameters: Parameters) -> OfNotes:
+    """What `/api/notes` is asked for.
 
     Raises:
         PastRefused: see `history`.
 
     """
-    return read(OfNotes, parameters, PastRefused).subject
+    return read(OfNotes, parameters, PastRefused)
 
 
 def _period(given: OfPeriod | OfHistory, now_ns: int | None) -> tuple[int, int]:

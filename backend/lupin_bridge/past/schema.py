@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from pydantic import Field
 
-from lupin_bridge.stream.schema import Contract, HistoryReading, Time
+from lupin_bridge.stream.people_schema import Note
+from lupin_bridge.stream.schema import Alarm, Contract, HistoryReading, Time
 
 _COMPLETE_TO = Field(
     description="all that was received before this is in the journal; null: not known"
@@ -75,5 +76,73 @@ class Timeline(Stretch):
     )
     silences: list[Stretch] = Field(description="stretches in which nothing was tried")
     runs: list[ClockRun] = Field(description="the runs of the clock that meet this period")
+    complete_to: Time | None = _COMPLETE_TO
+    kept_from: Time | None = _KEPT_FROM
+
+
+class ReportCounts(Contract):
+    """How much happened in a period."""
+
+    raised: int = Field(description="alarms that were raised in it")
+    cleared: int = Field(description="alarms that were cleared in it")
+    active: int = Field(description="alarms that were active at its end")
+    critical: int = Field(description="of those, the critical ones")
+    notes: int
+    scans: int = Field(description="attempts at sensors that succeeded")
+    failed: int = Field(description="attempts that failed, inspections too")
+    inspections: int = Field(description="inspections that saw the flowers")
+    tags: int = Field(description="tags that were known at its end")
+    tags_scanned: int = Field(description="of those, with a scan in it")
+
+
+class ReportSilence(Stretch):
+    """A stretch without an attempt; a tag's does not count while the whole greenhouse paused."""
+
+    tag_id: str = Field(description="empty: the whole greenhouse")
+
+
+class ReportExtreme(Contract):
+    """The lowest or highest reading of a sensor."""
+
+    value: float
+    tag_id: str
+    stamp: Time
+
+
+class ReportSensor(Contract):
+    """The readings of a sensor, or of a quantity that is derived of each scan."""
+
+    sensor_type: str
+    unit: str
+    n: int = Field(description="plausible readings, of which the rest is")
+    failed: int = Field(description="readings that no working sensor gives")
+    mean: float | None
+    low: ReportExtreme | None
+    high: ReportExtreme | None
+
+
+class ReportLeftOut(Contract):
+    """How many entries of each list are left out."""
+
+    alarms: int
+    notes: int
+    silences: int
+    sensors: int
+    never_scanned: int
+
+
+class ShiftReport(Stretch):
+    """What happened between two moments, as it was known at the second one."""
+
+    counts: ReportCounts
+    alarms_from: Time = Field(
+        description="from here on alarms are worked out: `from`, unless too much was scanned"
+    )
+    alarms: list[Alarm] = Field(description="active at any time of the period, the worst first")
+    notes: list[Note] = Field(description="newest first")
+    silences: list[ReportSilence] = Field(description="of the greenhouse, then of tags")
+    sensors: list[ReportSensor]
+    never_scanned: list[str] = Field(description="tags without a scan in the period")
+    left_out: ReportLeftOut
     complete_to: Time | None = _COMPLETE_TO
     kept_from: Time | None = _KEPT_FROM

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Awaitable, Callable
 from dataclasses import dataclass
 from functools import partial
-from hashlib import blake2b
 from typing import Annotated, Final, TypeVar
 
 from annotated_types import Interval
@@ -19,8 +18,8 @@ from lupin_bridge.field import formats
 from lupin_bridge.field import query as field_query
 from lupin_bridge.field.formats import PNG, FieldFormat
 from lupin_bridge.field.query import EstimateQuery
-from lupin_bridge.past import bodies
 from lupin_bridge.past import query as past_query
+from lupin_bridge.past.estimate import Estimated
 from lupin_bridge.query_string import Name, needed, parameter, parameters_of, read
 from lupin_bridge.routes.answers import (
     NO_TWIN,
@@ -30,9 +29,10 @@ from lupin_bridge.routes.answers import (
     on_worker,
     read_route,
     respond,
+    respond_as_of,
 )
 from lupin_bridge.routes.field import InFormats, checked_request, far_off, write_s
-from lupin_bridge.serving.admission import REVALIDATE, Answer
+from lupin_bridge.serving.admission import REVALIDATE, Answer, json_answer
 from lupin_bridge.stream import estimate_schema, report_json
 from lupin_twin.estimate.engine import EstimateRequest, cost_s
 from lupin_twin.field.engine import FieldRefused
@@ -48,7 +48,7 @@ ESTIMATE: Final = InFormats(
 
 That of now is made for the newest reading or the last whole minute of the day, whichever is
 later: until then its ETag holds, unless something arrives, or a model fitted anew. Of a moment
-that has passed it is made by the model of now.""",
+that has passed it is made of what the log has up to then, the model too.""",
     parameters=parameters_of(EstimateQuery),
     model=estimate_schema.GetEstimateResponse,
     refusal_json=formats.estimate_refusal_json,
@@ -60,20 +60,25 @@ async def _answer(http: Request, field_format: FieldFormat) -> Response:
     query = read(EstimateQuery, http.query_params.multi_items(), FieldRefused)
     if query.layer != "mean" and field_format != PNG:
         raise FieldRefused(f"layer is {query.layer!r}, but only a PNG has one")
-    at_ns = past_query.at_of(query.at, bridge.ros_time_ns) or 0
+    at_ns = past_query.at_of(query.at, bridge.ros_time_ns)
+    if at_ns is not None:
+        source = bridge.source
+        rules, day_length_s = source.rules(), source.day_length_s
+        estimated = Estimated(
+            at_ns, query, field_format, rules, None, bridge.criteria, day_length_s
+        )
+        estimated.check()
+        return await respond_as_of(http, estimated, at_ns)
     box, cells = checked_request(bridge, query, field_format)
-    request = EstimateRequest(box, at_ns)
+    request = EstimateRequest(box)
     revision = bridge.source.estimate_revision(request)
     key = (bridge.source.revision(), request, field_format.name, query.layer, query.scale)
-    journal = bridge.source.journal()
-    response = await respond(
+    return await respond(
         http,
         key,
         lambda: _computed(http, request, cells, query, field_format),
         revision and _etag(revision, request, query, field_format),
     )
-    response.headers.update(bodies.moment_headers(journal, at_ns) if at_ns else {})
-    return response
 
 
 async def _computed(
@@ -113,7 +118,7 @@ async def _computed(
 def _etag(
     revision: str, request: EstimateRequest, query: EstimateQuery, field_format: FieldFormat
 ) -> str:
-    kind = f"estimate {field_format.name} {query.layer} {request.at_ns}"
+    kind = f"estimate {field_format.name} {query.layer}"
     return field_query.etag(revision, request.box, kind, query.scale)
 
 
@@ -223,9 +228,7 @@ async def _report(request: Request, kind: type[QueryT], body: Body[QueryT]) -> R
 
     async def compute() -> Answer:
         with bridge.admission.computing(client_of(request), is_large=True):
-            text = await body(bridge, query)
-        etag = f'"{blake2b(text, digest_size=12).hexdigest()}"'
-        return Answer(text, "application/json", {"ETag": etag, **REVALIDATE})
+            return json_answer(await body(bridge, query))
 
     return await respond(request, query, compute)
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import logging
 import time
-from collections.abc import Mapping
 from contextlib import suppress
 from typing import Any, Final
 
@@ -36,7 +35,7 @@ from lupin_bridge.routes.answers import (
 )
 from lupin_bridge.serving.admission import AdmissionError, Answer, ClientLimitError
 from lupin_bridge.stream import people_schema, schema
-from lupin_bridge.stream.state_json import stamp
+from lupin_bridge.stream.health_json import note_json
 from lupin_twin.core.notes import (
     COMMENT,
     SHELVE,
@@ -86,7 +85,7 @@ async def notes_route(request: Request) -> Response:
     """The newest first and 2,000 at most, withdrawn ones too; the same in every replica."""
     bridge = bridge_of(request)
     asked = request.query_params.multi_items()
-    subject = past_query.subject(asked)
+    given = past_query.of_notes(asked)
     period = past_query.period(past_query.OfNotes, asked, bridge.ros_time_ns)
     notes = _known(bridge)
 
@@ -96,14 +95,15 @@ async def notes_route(request: Request) -> Response:
             note_json(note, gone)
             for note in reversed(notes)
             if note.kind != WITHDRAW
-            and subject in {None, note.subject}
-            and period.start_ns <= note.made_at_ns
-            and (not period.end_ns or note.made_at_ns < period.end_ns)
+            and given.kind in {None, note.kind}
+            and given.subject in {None, note.subject}
+            and period.start_ns <= note.about_ns
+            and (not period.end_ns or note.about_ns < period.end_ns)
         ]
         body = orjson.dumps({"notes": found[:MAX_LISTED]})
         return Answer(body, "application/json", NEVER_STORE)
 
-    return await respond(request, ("notes", bridge.notes.number, period, subject), compute)
+    return await respond(request, ("notes", bridge.notes.number, period, given), compute)
 
 
 @router.post(
@@ -126,6 +126,10 @@ async def write_note(request: Request) -> Response:
     if isinstance(person, Response):
         return person
     draft = await read_body(request, people_schema.NoteDraft)
+    # They may have taken their time with it.
+    people = request.app.state.access.people
+    if people is not None and not people.still(person):
+        return error_response("the session has ended: sign in again", 401)
     note = await _write(request, bridge, _checked(draft, person, bridge))
     return json_response(orjson.dumps(note_json(note, {})), 201)
 
@@ -153,22 +157,6 @@ async def withdraw_note(request: Request, note_id: str) -> Response:
         draft = Note("", _now_ns(bridge), person.name, WITHDRAW, f"{WITHDRAWN}{note.id}")
         gone = {note.id: await _write(request, bridge, draft)}
     return json_response(orjson.dumps(note_json(note, gone)))
-
-
-def note_json(note: Note, gone: Mapping[str, Note]) -> dict[str, Any]:
-    """`people_schema.Note`; `gone` as `withdrawals` has it."""
-    by = gone.get(note.id)
-    return {
-        "id": note.id,
-        "kind": note.kind,
-        "subject": note.subject,
-        "text": note.text,
-        "until": None if note.until_ns is None else stamp(note.until_ns),
-        "made_at": stamp(note.made_at_ns),
-        "by": note.by,
-        "withdrawn_by": None if by is None else by.by,
-        "withdrawn_at": None if by is None else stamp(by.made_at_ns),
-    }
 
 
 # --- who may, and what ------------------------------------------------------------------------
@@ -208,14 +196,12 @@ def _checked(draft: people_schema.NoteDraft, person: Person, bridge: Bridge) -> 
     """The note, if it can be one."""
     now_ns = _now_ns(bridge)
     kind, _, name = draft.subject.partition(":")
-    until_ns = None
+    is_critical = False
     if kind == "alarm":
         alarm = next((it for it in bridge.alarms.now.alarms if it.id == name), None)
         if alarm is None:
             raise BodyRefused(f"subject: there is no alarm {name[:64]!r}", 404)
-        if draft.kind == SHELVE:
-            is_critical = alarm.reason.verdict is Verdict.CRITICAL
-            until_ns = _shelf_end(draft, now_ns, is_critical=is_critical)
+        is_critical = alarm.reason.verdict is Verdict.CRITICAL
     elif kind == "tag":
         latest = bridge.latest
         if latest is None or all(tag.tag_id != name for tag in latest.snapshot.tags):
@@ -224,31 +210,36 @@ def _checked(draft: people_schema.NoteDraft, person: Person, bridge: Bridge) -> 
         raise BodyRefused(f"subject is {draft.subject[:64]!r}, expected alarm:ID, tag:ID or site")
     if draft.kind != COMMENT and kind != "alarm":
         raise BodyRefused(f"kind is {draft.kind!r}, which is for alarms: expected comment")
-    if draft.kind != SHELVE and draft.until is not None:
-        raise BodyRefused("until is for the kind shelve")
     if draft.kind == COMMENT and not draft.text:
         raise BodyRefused("text is empty, a comment has one")
+    until_ns = _until(draft, now_ns, is_critical=is_critical)
     return Note("", now_ns, person.name, draft.kind, draft.subject, draft.text, until_ns)
 
 
-def _shelf_end(draft: people_schema.NoteDraft, now_ns: int, *, is_critical: bool) -> int | None:
-    if "until" not in draft.model_fields_set:
+def _until(draft: people_schema.NoteDraft, now_ns: int, *, is_critical: bool) -> int | None:
+    """When a shelf ends, or what a comment is about; None: it ends now, or is about now."""
+    if draft.kind == SHELVE and "until" not in draft.model_fields_set:
         raise BodyRefused("until is missing: a moment, or null where it is not shelved any more")
     if draft.until is None:
         return None
+    until_ns = moment("until", draft.until)
+    left_s = (until_ns - now_ns) / NANOSECONDS_PER_SECOND
+    if draft.kind == COMMENT:
+        if left_s > _SLACK_S:
+            raise BodyRefused(f"until is in {left_s:.0f} s, a comment is about a moment until now")
+        return until_ns
+    if draft.kind != SHELVE:
+        raise BodyRefused("until is for the kinds shelve and comment")
     if is_critical and not draft.text:
         raise BodyRefused("text is empty: to shelve a critical alarm takes a reason")
-    until_ns = moment("until", draft.until)
     longest_s = CRITICAL_SHELF_S if is_critical else SHELF_S
-    last_ns = now_ns + longest_s * NANOSECONDS_PER_SECOND
-    if not now_ns < until_ns <= last_ns + _SLACK_S * NANOSECONDS_PER_SECOND:
+    if not 0.0 < left_s <= longest_s + _SLACK_S:
         what = "a critical alarm" if is_critical else "an alarm"
-        left_s = (until_ns - now_ns) / NANOSECONDS_PER_SECOND
         raise BodyRefused(
             f"until is in {left_s:.0f} s, {what} is shelved for more than 0 and at most "
             f"{longest_s} s"
         )
-    return min(until_ns, last_ns)
+    return min(until_ns, now_ns + longest_s * NANOSECONDS_PER_SECOND)
 
 
 async def _write(request: Request, bridge: Bridge, note: Note) -> Note:

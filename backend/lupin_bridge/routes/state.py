@@ -7,7 +7,6 @@ import time
 from dataclasses import dataclass
 from typing import Annotated, Final
 
-import orjson
 from annotated_types import Ge
 from fastapi import APIRouter, Request, Response, WebSocket
 
@@ -15,26 +14,27 @@ from lupin_bridge.access.middleware import client_of
 from lupin_bridge.bridge import Bridge
 from lupin_bridge.past import bodies
 from lupin_bridge.past import query as past_query
+from lupin_bridge.past.latest import LatestOfTag
 from lupin_bridge.past.plans import NoSuchTag, OneTag, WholeState
 from lupin_bridge.query_string import parameter, parameters_of, read
 from lupin_bridge.routes.answers import (
     NEVER_STORE,
     NO_TWIN,
     NOT_REMEMBERED,
-    TOO_MUCH,
     bridge_of,
     error_response,
     json_response,
-    on_worker,
     read_route,
     respond,
     respond_as_of,
+    respond_past,
 )
 from lupin_bridge.routes.sockets import has_place, next_message
 from lupin_bridge.serving.admission import Answer
 from lupin_bridge.serving.ws_protocol import CONNECTION_KEY, Connection
-from lupin_bridge.stream import schema, state_json
+from lupin_bridge.stream import schema
 from lupin_bridge.stream.hub import CLOSE_POLICY, Client
+from lupin_twin.core.state import Snapshot, TagState
 
 # Of the reason in a close frame (RFC 6455, section 5.5).
 MAX_REASON_BYTES: Final = 123
@@ -61,12 +61,7 @@ router = APIRouter()
 
 # How long the ages of an answer hold: they are shown in seconds.
 AGES_HOLD_S: Final = 0.2
-# What writing a scan of a history takes, roughly and at worst.
-_WRITE_SCAN_S: Final = 20e-6
 
-_UNAVAILABLE = {
-    503: {"model": schema.ErrorMessage, "description": "no twin was found yet, or it is busy"}
-}
 _NO_TAG = {404: {"model": schema.ErrorMessage, "description": "no such tag"}}
 
 
@@ -139,28 +134,14 @@ async def state(request: Request) -> Response:
     router,
     "/api/tags/{tag_id:path}/history",
     summary="The last scans and tries of one tag",
-    responses={200: {"model": schema.TagHistory}, **_NO_TAG, **TOO_MUCH, **_UNAVAILABLE},
+    responses={200: {"model": schema.TagHistory}, **NOT_REMEMBERED, **_NO_TAG},
 )
 async def history(request: Request, tag_id: str) -> Response:
     """The tag's last scans that brought readings, sensor by sensor, and its last tries."""
     bridge = bridge_of(request)
-    if bridge.latest is None:
-        return error_response(NO_TWIN, 503)
-    number_of_tags = len(bridge.latest.snapshot.tags)
-
-    async def compute() -> Answer:
-        with bridge.admission.computing(client_of(request)):
-            past = await bridge.source.history(tag_id)
-            if past is None:
-                raise NoSuchTag(tag_id, number_of_tags)
-            body = await on_worker(
-                bridge,
-                lambda _: orjson.dumps(state_json.history(tag_id, past)),
-                (len(past.scans) + len(past.attempts)) * _WRITE_SCAN_S,
-            )
-        return Answer(body, "application/json", NEVER_STORE)
-
-    return await respond(request, ("history", bridge.state_number, tag_id), compute)
+    newest = None if bridge.latest is None else _tag_of(bridge.latest.snapshot, tag_id)
+    query = LatestOfTag(tag_id, newest, bridge.source.buffer_len)
+    return await respond_past(request, query, "latest")
 
 
 @read_route(
@@ -176,13 +157,17 @@ async def tag(request: Request, tag_id: str) -> Response:
     at_ns = past_query.at(request.query_params.multi_items(), bridge.ros_time_ns)
     if at_ns is not None:
         return await _tag_as_of(request, tag_id, at_ns)
-    latest = bridge.latest
-    if latest is None:
+    if bridge.latest is None:
         return error_response(NO_TWIN, 503)
-    for candidate in latest.snapshot.tags:
-        if candidate.tag_id == tag_id:
-            return json_response(bridge.frames.json.tag(candidate, bridge.ros_time_ns))
-    raise NoSuchTag(tag_id, len(latest.snapshot.tags))
+    found = _tag_of(bridge.latest.snapshot, tag_id)
+    return json_response(bridge.frames.json.tag(found, bridge.ros_time_ns))
+
+
+def _tag_of(snapshot: Snapshot, tag_id: str) -> TagState:
+    for found in snapshot.tags:
+        if found.tag_id == tag_id:
+            return found
+    raise NoSuchTag(tag_id, len(snapshot.tags))
 
 
 async def _tag_as_of(request: Request, tag_id: str, at_ns: int) -> Response:

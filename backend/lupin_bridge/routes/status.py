@@ -16,7 +16,7 @@ from fastapi import APIRouter, Request, Response
 from lupin_bridge.access.middleware import client_of
 from lupin_bridge.alarms.notes import notes_of_alarms
 from lupin_bridge.feed.source import ailment
-from lupin_bridge.judge.alarm import Alarm, reasons_of_days
+from lupin_bridge.judge.alarm import Alarm
 from lupin_bridge.metrics import CONTENT_TYPE
 from lupin_bridge.past import query as past_query
 from lupin_bridge.past.plans import Health
@@ -39,8 +39,9 @@ from lupin_bridge.routes.answers import (
     respond_as_of,
 )
 from lupin_bridge.serving.admission import REVALIDATE, Answer
-from lupin_bridge.stream import schema
+from lupin_bridge.stream import robot_schema, schema
 from lupin_bridge.stream.health_json import alarms_body
+from lupin_bridge.stream.robot_json import robot_body
 from lupin_bridge.stream.state_json import header, stamp
 from lupin_twin.field.explored import OccupancyMap
 
@@ -159,6 +160,22 @@ async def _map(request: Request, kind: str) -> Response:
     )
 
 
+@read_route(
+    router,
+    "/api/robot",
+    summary="Where the robot is and has been, its plan, its battery",
+    responses={200: {"model": robot_schema.Robot}},
+)
+async def robot(request: Request) -> Response:
+    """As the robot's own topics say it, of now alone: the journal has nothing of it."""
+    known = bridge_of(request).robot.log
+
+    async def compute() -> Answer:
+        return Answer(robot_body(known), "application/json", NEVER_STORE)
+
+    return await respond(request, "robot", compute)
+
+
 MAX_ALARMS: Final = 2_000
 # What going through an alarm and writing it take, roughly and at worst.
 _WRITE_ALARM_S: Final = 10e-6
@@ -184,8 +201,7 @@ async def health(request: Request) -> Response:
     bridge = bridge_of(request)
     at_ns = past_query.at(request.query_params.multi_items(), bridge.ros_time_ns)
     if at_ns is not None:
-        days = tuple(reasons_of_days(bridge.alarms.now.alarms, at_ns).items())
-        return await respond_as_of(request, Health(at_ns, bridge.criteria, days), at_ns)
+        return await respond_as_of(request, Health(at_ns, bridge.criteria), at_ns)
     if bridge.latest is None:
         return error_response(NO_TWIN, 503)
     judged = bridge.judged
@@ -273,11 +289,11 @@ def _is_in(query: PeriodQuery) -> Callable[[Alarm], bool]:
 async def healthz(request: Request) -> Response:
     """503 when the ROS thread has ended or hangs in a callback, for whoever restarts services."""
     source = bridge_of(request).source
-    wrong = ailment(source)
+    wrong = ailment(source.thread)
     body = {
         "ok": wrong is None,
         "message": wrong or "The ROS thread runs.",
-        "callback_errors": source.callback_errors,
+        "callback_errors": source.thread.callback_errors,
     }
     return json_response(orjson.dumps(body), 200 if wrong is None else 503)
 

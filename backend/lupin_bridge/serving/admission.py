@@ -14,6 +14,7 @@ from collections import Counter, OrderedDict
 from collections.abc import Callable, Hashable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from hashlib import blake2b
 from ipaddress import IPv6Address, ip_address
 from itertools import islice
 from typing import Final, Self
@@ -32,8 +33,9 @@ class Limits:
     and behind one address there may be two such pages. `concurrency` of them may be under way for
     one client (a browser has six at once), `total_concurrency` for all of them together, of
     which large ones take three quarters. `frames_per_s` is what the state's listeners get at most,
-    on average. Alarms are worked out from `alarm_days` before the start on. The page over many
-    sites has at most `open_sites` open at once, of some megabytes each.
+    on average. One token posts at most `observations_per_s`, and `observation_burst` at once: DDS
+    keeps 50 for a twin that is busy. Alarms are worked out from `alarm_days` before the start on.
+    The page over many sites has at most `open_sites` open at once, of some megabytes each.
     """
 
     client_timeout_s: float = 30.0
@@ -42,6 +44,8 @@ class Limits:
     concurrency: int = 8
     total_concurrency: int = 32
     frames_per_s: float = 10.0
+    observations_per_s: float = 10.0
+    observation_burst: int = 30
     alarm_days: float = 7.0
     open_sites: int = 50
 
@@ -271,6 +275,12 @@ class Answer:
     body: bytes | memoryview
     media_type: str
     headers: Mapping[str, str] = field(default_factory=dict)
+
+
+def json_answer(body: bytes) -> Answer:
+    """A JSON body whose ETag is that of its content."""
+    etag = f'"{blake2b(body, digest_size=12).hexdigest()}"'
+    return Answer(body, "application/json", {"ETag": etag, **REVALIDATE})
 
 
 @dataclass(slots=True, eq=False)

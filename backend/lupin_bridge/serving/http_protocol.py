@@ -6,7 +6,7 @@ never read would fill the memory, and some thousand that never finish a request 
 The times hold for the connection, and so for whatever is sent: answers of routes, and refusals of
 access control, of the framework and of this protocol alike.
 
-The parser gets one whole head at a time, of bounded size and number of lines. Two routes want a
+The parser gets one whole head at a time, of bounded size and number of lines. Three routes want a
 body, of bounded size and of a length that is said before; a request with any other body is refused
 before any of that is read.
 """
@@ -36,8 +36,9 @@ MAX_HEADERS: Final = 128
 MAX_LINES: Final = 1 + MAX_HEADERS + 1  # the request's line, and the blank one
 # From here on the next piece has to wait. asyncio's own value, but over TLS, where it is 512 kB.
 HIGH_WATER_BYTES: Final = 64 * 1024
-# Where a body is taken, and how much of it: a note of 500 characters, each of them escaped.
-BODIES: Final = (b"/api/notes", b"/api/signin")
+# Where a body is taken, and how much of it: a note of 500 characters, each of them escaped; 64
+# readings.
+BODIES: Final = (b"/api/notes", b"/api/observations", b"/api/signin")
 MAX_BODY_BYTES: Final = 8 * 1024
 # Where a request's scope has its connection, among the state.
 CONNECTION_KEY: Final = "http_connection"

@@ -26,11 +26,11 @@ def text_frame(payload: bytes) -> bytes:
     return Frame(Opcode.TEXT, payload).serialize(mask=False)
 
 
-def alarms_message(now: Board, now_ns: int | None, notes: tuple[Note, ...]) -> bytes:
-    """The message with the alarms of now, and what people said of them."""
+def alarms_message(now: Board, now_ns: int | None, notes: tuple[Note, ...], count: int) -> bytes:
+    """The message with the alarms of now, and what people said of them: `count` notes in all."""
     said = notes_of_alarms(now.alarms, notes, now_ns)
     shown = alarms_in_frame(now.page, now_ns)
-    return text_frame(alarms_frame(shown, now.source, now.since_ns, said))
+    return text_frame(alarms_frame(shown, now.source, now.since_ns, said, count))
 
 
 def status_frame(status: Status) -> bytes:

@@ -17,6 +17,7 @@ from lupin_bridge.judge.judging import Judged
 from lupin_bridge.judge.scan_interval import Patrol
 from lupin_bridge.judge.verdict import Health, Reason
 from lupin_bridge.stream.state_json import stamp
+from lupin_twin.core.notes import Note
 from lupin_twin.core.state import NANOSECONDS_PER_SECOND
 
 
@@ -37,6 +38,22 @@ def alarm_json(alarm: Alarm, said: AlarmNotes | None = None) -> dict[str, Any]:
         found["shelved_by"] = said.shelved.by
         found["shelved_until"] = stamp(said.shelved.until_ns or 0)
     return found
+
+
+def note_json(note: Note, gone: Mapping[str, Note]) -> dict[str, Any]:
+    """`people_schema.Note`; `gone` as `withdrawals` has it."""
+    by = gone.get(note.id)
+    return {
+        "id": note.id,
+        "kind": note.kind,
+        "subject": note.subject,
+        "text": note.text,
+        "until": None if note.until_ns is None else stamp(note.until_ns),
+        "made_at": stamp(note.made_at_ns),
+        "by": note.by,
+        "withdrawn_by": None if by is None else by.by,
+        "withdrawn_at": None if by is None else stamp(by.made_at_ns),
+    }
 
 
 _NOTHING: Final[Mapping[str, AlarmNotes]] = {}
@@ -93,9 +110,11 @@ def alarms_frame(
     source: str,
     since_ns: int | None,
     said: Mapping[str, AlarmNotes] = _NOTHING,
+    notes: int = 0,
 ) -> bytes:
-    """`schema.AlarmsFrame` as JSON text."""
-    return orjson.dumps({"type": "alarms", **alarms_body(alarms, source, since_ns, said)})
+    """`schema.AlarmsFrame` as JSON text; `notes`: how many there are."""
+    body = alarms_body(alarms, source, since_ns, said)
+    return orjson.dumps({"type": "alarms", "notes": notes, **body})
 
 
 class HealthJson:

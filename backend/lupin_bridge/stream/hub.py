@@ -136,6 +136,9 @@ class Client:
     next_due_s: float = 0.0
     status_due: bool = True
     alarms_due: bool = True
+    # Whoever wants alarms gets the robot too, as often as it wants states.
+    robot_due: bool = True
+    robot_next_s: float = 0.0
     written_s: float = 0.0
     blocked_since_s: float | None = None
 
@@ -158,6 +161,7 @@ class Hub:
         self._parties: Counter[str] = Counter()
         self._frame: StateFrame | None = None
         self._alarms: bytes | None = None
+        self._robot: bytes | None = None
         self._status_at = status_at
         self._status_wire: bytes | None = None
         self._status_wire_s = 0.0
@@ -256,6 +260,13 @@ class Hub:
             client.alarms_due = True
         self.serve_all(now_s)
 
+    def publish_robot(self, wire: bytes, now_s: float) -> None:
+        """What the robot says of itself is another: give this frame to everyone who can take it."""
+        self._robot = wire
+        for client in self._clients:
+            client.robot_due = True
+        self.serve_all(now_s)
+
     def serve_all(self, now_s: float) -> None:
         """Give everyone what they lack and can take now."""
         for client in self._clients:
@@ -272,11 +283,15 @@ class Hub:
                 self._mark_blocked(client, now_s)
             return
         self._serve_state(client, now_s)
-        # Behind a state: alarms are of tags that a listener knows then.
-        if not (client.wants_alarms and client.alarms_due and client.sent_seq):
+        # Behind a state: alarms are of tags that a listener knows then, and ages count from it.
+        if not (client.wants_alarms and client.sent_seq):
             return
-        if self._alarms is not None:
+        if client.alarms_due and self._alarms is not None:
             client.alarms_due = not self._write(client, self._alarms, now_s)
+        if client.robot_due and self._robot is not None and now_s >= client.robot_next_s:
+            client.robot_due = not self._write(client, self._robot, now_s)
+            if not client.robot_due:
+                client.robot_next_s = now_s + client.min_interval_s
 
     def _serve_state(self, client: Client, now_s: float) -> None:
         frame = self._frame

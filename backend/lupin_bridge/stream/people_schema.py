@@ -7,6 +7,7 @@ from typing import Annotated, Final, Literal
 from pydantic import BaseModel, ConfigDict, Field, StringConstraints
 
 from lupin_bridge.stream.schema import Contract, Time
+from lupin_twin.core.drops import MAX_SENSORS_PER_TAG, MAX_TEXT_LENGTH
 
 # Of a note, characters; no control character but tab and newline is in it.
 MAX_TEXT: Final = 500
@@ -17,6 +18,14 @@ _Text = Annotated[
     ),
 ]
 Role = Literal["viewer", "operator", "admin"]
+
+# A text of ROS ends at its first NUL.
+_Name = Annotated[
+    str,
+    StringConstraints(
+        min_length=1, max_length=MAX_TEXT_LENGTH, pattern=r"^[^\x00-\x1f\x7f-\x9f]*$"
+    ),
+]
 
 
 class _Given(BaseModel):
@@ -41,8 +50,35 @@ class NoteDraft(_Given):
     until: str | None = Field(
         default=None,
         max_length=64,
-        description="of shelve: as `at`; null: it is not shelved any more",
+        description="as `at`. Of shelve, its end; null: not any more. Of comment, the moment that "
+        "it is about; null: now",
     )
+
+
+class ObservationDraft(_Given):
+    """The body of `POST /api/observations`: what one tag's sensors read at one moment."""
+
+    tag_id: _Name
+    readings: dict[_Name, Annotated[float, Field(allow_inf_nan=False)]] = Field(
+        min_length=1, max_length=MAX_SENSORS_PER_TAG, description="by sensor, in its own unit"
+    )
+    observed_at: str | float | None = Field(
+        default=None, description="ISO 8601 or ROS seconds, as `at`; null: now"
+    )
+    place: list[Annotated[float, Field(allow_inf_nan=False, ge=-1e6, le=1e6)]] | None = Field(
+        default=None,
+        min_length=2,
+        max_length=3,
+        description="x, y and z of the tag, m; the first place stays",
+    )
+
+
+class PublishedObservation(Contract):
+    """What was published of it."""
+
+    tag_id: str
+    observed_at: Time
+    source: str = Field(description="`http/` and the name of the token")
 
 
 class Note(Contract):
@@ -52,7 +88,10 @@ class Note(Contract):
     kind: Literal["acknowledge", "shelve", "comment"]
     subject: str
     text: str
-    until: Time | None = Field(description="of shelve; null: it is not shelved any more")
+    until: Time | None = Field(
+        description="of shelve, its end; null: not any more. Of comment, the moment that it is "
+        "about; null: `made_at`"
+    )
     made_at: Time
     by: str = Field(description="name of an account or of a token")
     withdrawn_by: str | None = Field(description="null: it stands")

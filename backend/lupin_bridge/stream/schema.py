@@ -118,9 +118,7 @@ class TwinTagState(Contract):
         description="of the last try, as in lupin_msgs/Observation: 0 OK, 1 unreachable, 2 scan "
         "failed, 3 skipped; null: as last_try",
     )
-    last_try_detail: str = Field(
-        default_factory=str, description="why the last try was not OK, for a person to read"
-    )
+    last_try_detail: str = Field(default_factory=str, description="why the last try was not OK")
 
 
 class TwinState(Contract):
@@ -236,6 +234,7 @@ class AlarmsFrame(Alarms):
     """WebSocket frame: the active alarms and those raised or cleared within 24 h, on any change."""
 
     type: Literal["alarms"]
+    notes: int = Field(description="grows with every note: `/api/notes` has more")
 
 
 class StateFrame(Contract):
@@ -420,8 +419,8 @@ class PastAttempt(Contract):
     status: int = Field(description="as in lupin_msgs/Observation: 0 is OK")
     status_detail: str = Field(description="why the status is not OK, for a person to read")
     kind: int | None = Field(
-        description="as in lupin_msgs/Observation: 0 scan, 1 look; null: a twin elsewhere does not "
-        "tell it of a try that failed"
+        description="as in lupin_msgs/Observation: 0 scan, 1 look; null: of a try that failed, and "
+        "is not in the journal yet"
     )
 
 
@@ -429,9 +428,6 @@ class TagHistory(Contract):
     """The last scans and tries of one tag (as many of each as the twin's `buffer_len`)."""
 
     tag_id: str
-    is_known: bool = Field(
-        description="false: this twin does not tell what was observed when (no /twin/times)"
-    )
     sensors: list[SensorHistory]
     tries: list[PastAttempt] = Field(description="oldest first")
 

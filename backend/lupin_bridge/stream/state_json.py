@@ -171,7 +171,6 @@ def history(tag_id: str, past: TagHistory) -> dict[str, Any]:
             )
     return {
         "tag_id": tag_id,
-        "is_known": past.is_known,
         "sensors": [{"name": name, "values": values} for name, values in sensors.items()],
         "tries": [
             {

@@ -8,6 +8,7 @@ import { rosText } from '../domain/rostime';
 import { lastUntil, pointAt, type Bucket, type Reading } from '../domain/series';
 import { shown } from '../domain/text';
 import { unitOf } from '../domain/units';
+import { CommentMarks } from '../notes/parts';
 import { act, useApp } from '../store/app';
 import { useSelected } from '../store/create';
 import { pointedBy, pointedTime } from '../store/pointed';
@@ -88,6 +89,9 @@ export function PlotView({ model, height }: { model: PlotModel; height: number }
         </ul>
         {at !== null && <span className="plot-time faint">{rosText(at)}</span>}
       </header>
+      <div className="plot-comments">
+        <CommentMarks span={model.span} tagIds={model.lines.map(({ series }) => series.tagId)} />
+      </div>
       <div
         ref={place}
         className="plot-place"

@@ -85,10 +85,10 @@ describe('the axis of the values', () => {
   });
 
   test('takes the ideal range in while the values keep their share of the height', () => {
-    // Ideal is 50 to 75, and values that spread over ten of these 25 keep 40 %.
+    // Ideal is 50 to 85, and values that spread over 14 of these 35 keep 40 %.
     const humidity = { sensor: sensorNamed('humidity') };
-    expect(valueRange(model([reading(60, 70)], humidity))[1]).toBeCloseTo(75 + 25 * 0.08);
-    expect(valueRange(model([reading(60, 69.9)], humidity))[1]).toBeLessThan(75);
+    expect(valueRange(model([reading(60, 74)], humidity))[1]).toBeCloseTo(85 + 35 * 0.08);
+    expect(valueRange(model([reading(60, 73.9)], humidity))[1]).toBeLessThan(85);
     // Far above it, the ideal range stays out.
     expect(valueRange(model([reading(40, 44)]))[0]).toBeGreaterThan(39);
   });

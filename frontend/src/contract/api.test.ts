@@ -19,9 +19,7 @@ describe('addresses', () => {
     let asked = '';
     vi.stubGlobal('fetch', (url: URL) => {
       asked = url.href;
-      return Promise.resolve(
-        Response.json({ tag_id: 'a/b?c', is_known: true, sensors: [], tries: [] }),
-      );
+      return Promise.resolve(Response.json({ tag_id: 'a/b?c', sensors: [], tries: [] }));
     });
     await fetchHistory('a/b?c', signal);
     expect(asked).toMatch(/\/api\/tags\/a%2Fb%3Fc\/history$/);
@@ -50,7 +48,6 @@ describe('an answer that is none of the contract is an error that names the fiel
       (s: AbortSignal) => fetchHistory('1', s),
       {
         tag_id: '1',
-        is_known: true,
         tries: [],
         sensors: [{ name: 'co2', values: [{ stamp: 7, value: 1 }] }],
       },

@@ -1,7 +1,6 @@
 /** What the routes answer, as far as the page reads it; nothing behind these checks again. */
 import {
   also,
-  boolean,
   count,
   list,
   number,
@@ -29,7 +28,6 @@ export const QUALITY = object({
 
 export const HISTORY = object({
   tag_id: TEXT,
-  is_known: boolean,
   tries: list(
     object({ stamp: TIME, status: number, status_detail: TEXT, kind: numberOrNull }),
     MAX_SCANS,

@@ -102,10 +102,15 @@ const FRAMES: Readonly<Record<Frame['type'], Check>> = {
   }),
 };
 
-/** "passed over": a type that this page does not know, of a later server. */
+/** A message of which nothing but the type was looked at. */
+export interface Unread {
+  readonly type: string;
+}
+
+/** "passed over": a robot's, which is read by who shows it, or a type of a later server. */
 export type Parsed =
   | { readonly kind: 'frame'; readonly frame: Frame }
-  | { readonly kind: 'passed over' }
+  | { readonly kind: 'passed over'; readonly message: Unread }
   | { readonly kind: 'bad'; readonly why: string; readonly isDelta: boolean };
 
 const bad = (why: string, isDelta = false): Parsed => ({ kind: 'bad', why, isDelta });
@@ -124,8 +129,8 @@ export function parseFrame(data: unknown): Parsed {
   }
   const fault = object({ type: TEXT })(message);
   if (fault !== null) return bad(`frame${fault}`);
-  const { type } = message as { readonly type: string };
-  if (!isKnown(type)) return { kind: 'passed over' };
+  const { type } = message as Unread;
+  if (!isKnown(type)) return { kind: 'passed over', message: message as Unread };
   const why = FRAMES[type](message);
   if (why !== null) return bad(type + why, type === 'delta');
   return { kind: 'frame', frame: filled(message as Frame) };

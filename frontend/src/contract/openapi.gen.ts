@@ -218,6 +218,31 @@ export interface components {
             readonly message: string;
             readonly count: number;
         };
+        readonly Robot: {
+            readonly position: components["schemas"]["RobotPosition"] | null;
+            readonly plan: components["schemas"]["RobotPlan"] | null;
+            readonly battery: components["schemas"]["RobotBattery"] | null;
+            readonly trail: readonly components["schemas"]["RobotPoint"][];
+        };
+        readonly RobotBattery: {
+            readonly percent: number;
+            readonly observed_at: components["schemas"]["Time"];
+        };
+        readonly RobotPlan: {
+            readonly points: readonly (readonly number[])[];
+            readonly observed_at: components["schemas"]["Time"];
+        };
+        readonly RobotPoint: {
+            readonly x: number;
+            readonly y: number;
+            readonly observed_at: components["schemas"]["Time"];
+        };
+        readonly RobotPosition: {
+            readonly x: number;
+            readonly y: number;
+            readonly observed_at: components["schemas"]["Time"];
+            readonly heading: number | null;
+        };
         readonly SensorHistory: {
             readonly name: string;
             readonly values: readonly components["schemas"]["HistoryReading"][];
@@ -265,7 +290,6 @@ export interface components {
         };
         readonly TagHistory: {
             readonly tag_id: string;
-            readonly is_known: boolean;
             readonly sensors: readonly components["schemas"]["SensorHistory"][];
             readonly tries: readonly components["schemas"]["PastAttempt"][];
         };
@@ -348,6 +372,14 @@ export interface components {
             readonly since: components["schemas"]["Time"] | null;
             /** @constant */
             readonly type: "alarms";
+            readonly notes: number;
+        };
+        readonly RobotFrame: {
+            readonly position: components["schemas"]["RobotPosition"] | null;
+            readonly plan: components["schemas"]["RobotPlan"] | null;
+            readonly battery: components["schemas"]["RobotBattery"] | null;
+            /** @constant */
+            readonly type: "robot";
         };
     };
     responses: never;

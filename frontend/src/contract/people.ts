@@ -9,7 +9,7 @@ const SESSION = object({ can_sign_out: boolean });
 const NOTES = object({ notes: list(object({ id: text(MOST), kind: text(MOST) }), MOST) });
 
 /** A header of our own: no form and no picture of another page can send one. */
-const OWN = { 'X-Lupin-Twin': '1' };
+export const OWN = { 'X-Lupin-Twin': '1' };
 
 export async function fetchSession(signal: AbortSignal): Promise<Session> {
   return read<Session>('session', SESSION, await get('api/session', signal));
@@ -24,7 +24,7 @@ export interface Draft {
   readonly kind: 'acknowledge' | 'shelve' | 'comment';
   readonly subject: string;
   readonly text?: string;
-  /** Of shelve: ROS seconds; null: it is not shelved any more. */
+  /** ROS seconds. Of shelve its end, null: not any more; of comment the moment that it is about. */
   readonly until?: string | null;
 }
 

@@ -45,9 +45,11 @@ export type Timeline = Schemas['Timeline'];
 export type Alarm = Schemas['Alarm'];
 /** Who is signed in, and what they said. */
 export type Session = Schemas['Session'];
+export type Note = Schemas['Note'];
 export type Notes = Schemas['Notes'];
 export type AlarmsFrame = Schemas['AlarmsFrame'];
-export type Alarms = Schemas['Alarms'];
+/** A frame also says how many notes the log has. */
+export type Alarms = Schemas['Alarms'] & { readonly notes?: number };
 export type HealthReason = Schemas['HealthReason'];
 export type Verdict = TagHealth['verdict'];
 /** How well the estimates have foretold, by sensor. */
@@ -59,6 +61,9 @@ export type Expected = Schemas['ExpectedReading'];
 /** Where another tag helps. */
 export type Advice = Schemas['Advice'];
 export type Place = Schemas['AdvisedPlace'];
+/** What a robot says of itself; and where it has been. */
+export type RobotNow = Omit<Schemas['RobotFrame'], 'type'>;
+export type Robot = Schemas['Robot'];
 export type WirePoint = Schemas['Point'];
 export type WireTime = Schemas['Time'];
 

@@ -17,10 +17,14 @@ test('an undeclared sensor shows its own name, is never judged, and stays the sa
   expect(sensorNamed('ph')).toBe(sensorNamed('ph'));
 });
 
-test('declared sensors first, then the others by name, each once', () => {
-  const names = CATALOGUE.with(['zinc', 'humidity', 'ph', 'zinc']).map(({ name }) => name);
-  expect(names.slice(0, 2)).toEqual(['temperature', 'humidity']);
-  expect(names.slice(-3)).toEqual(['condensation_margin', 'ph', 'zinc']);
+test('what some tag reports is offered: declared sensors first, then the others by name, each once', () => {
+  const names = CATALOGUE.with(['zinc', 'humidity', 'ph', 'zinc', 'co2']).map(({ name }) => name);
+  expect(names).toEqual(['humidity', 'co2', 'ph', 'zinc']);
+});
+
+test('what follows from two sensors is offered where both are reported', () => {
+  const names = CATALOGUE.with(['humidity', 'temperature']).map(({ name }) => name);
+  expect(names).toEqual(['temperature', 'humidity', 'vpd', 'dew_point', 'condensation_margin']);
 });
 
 test('what is of a day is offered by charts, and else only while it is in view', () => {

@@ -78,14 +78,13 @@ export class Catalogue {
     return other;
   }
 
-  /** All sensors to offer: the declared ones, then others that some tag reports, by name. */
+  /** All to offer: of the declared ones what some tag reports or allows to compute; others by name. */
   with(reported: Iterable<string>): readonly Sensor[] {
     const names = new Set(reported);
     const others = [...names].filter((name) => !this.#known.has(name)).sort();
-    return [
-      ...this.all.filter((sensor) => !isOfDay(sensor) || names.has(sensor.name)),
-      ...others.map((name) => this.named(name)),
-    ];
+    const isOffered = (sensor: Sensor): boolean =>
+      names.has(sensor.name) || (!isOfDay(sensor) && isHad(sensor, (name) => names.has(name)));
+    return [...this.all.filter(isOffered), ...others.map((name) => this.named(name))];
   }
 }
 

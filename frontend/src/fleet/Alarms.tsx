@@ -11,6 +11,7 @@ import { S } from '../strings';
 import { HealthMark } from '../ui/HealthMark';
 import type { FleetWords } from '../words/fleet';
 import { alarmCount, type Site } from './sites';
+import { ms, timeText } from './times';
 import { useAnswer } from './useAnswer';
 import { useSpeech } from './useSpeech';
 
@@ -85,7 +86,7 @@ function Row({
   const raised = secondsOf(alarm.raised_at);
   const { what, worst } = valuesOf(alarm, speech, null);
   return (
-    <li data-live={alarm.is_live}>
+    <li data-live={alarm.is_live} data-shelved={Boolean(alarm.shelved_by)}>
       <a href={linkOf(alarm, raised)}>
         <HealthMark verdict={alarm.reason.verdict} />
         <strong className="fleet-alarm-site">{alarm.name}</strong>
@@ -97,10 +98,24 @@ function Row({
         <span className="fleet-line">
           {S.alarmSince(whenText(raised, timeOfDay() / 1000), null)}
           {!alarm.is_live && ` (${words.wasLive})`}
+          {saidOf(alarm, words).map((said) => (
+            <span key={said} className="fleet-said">
+              {said}
+            </span>
+          ))}
         </span>
       </a>
     </li>
   );
+}
+
+/** What people said of it. */
+function saidOf(alarm: SiteAlarm, words: FleetWords): readonly string[] {
+  const { acknowledged_by: by, acknowledged_at: at, shelved_by: who, shelved_until: until } = alarm;
+  return [
+    ...(by && at ? [words.acknowledged(by, timeText(ms(at)))] : []),
+    ...(who && until ? [words.shelved(who, timeText(ms(until)))] : []),
+  ];
 }
 
 /** The page of its site as it was then, with the tag's card open. */

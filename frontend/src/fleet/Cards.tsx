@@ -1,5 +1,5 @@
 /** A card a greenhouse; in groups where there are some. */
-import { memo, useMemo, type JSX } from 'react';
+import { memo, useEffect, useMemo, useRef, useState, type JSX } from 'react';
 
 import { S } from '../strings';
 import { HealthMark } from '../ui/HealthMark';
@@ -14,6 +14,8 @@ import {
   type Site,
 } from './sites';
 import { ms, silentAt, timeText } from './times';
+
+const STAYS_MS = 200;
 
 interface Props {
   readonly shown: readonly Site[];
@@ -81,7 +83,7 @@ const SiteCard = memo(function SiteCard({
   site: Site;
   words: FleetWords;
 }): JSX.Element {
-  const { name, verdict, last_verdict: last, is_live: isLive } = site;
+  const { name, verdict, last_verdict: last, is_live: isLive, map } = site;
   const origin = originText(site);
   return (
     <li className="fleet-site" data-health={verdict} data-live={isLive}>
@@ -90,6 +92,7 @@ const SiteCard = memo(function SiteCard({
           <span className="fleet-name">{name}</span>
           {origin && <span className="fleet-origin">{origin}</span>}
         </h3>
+        {map && <SmallMap src={`api/sites/${encodeURIComponent(site.site)}/map.svg?v=${map}`} />}
         {isLive ? (
           <HealthMark verdict={verdict} />
         ) : (
@@ -97,15 +100,11 @@ const SiteCard = memo(function SiteCard({
         )}
         {isLive && last === null && <span className="fleet-line">{words.judging}</span>}
         {!isLive && last !== null && (
-          <span className="fleet-line">
-            {words.lastKnown(S.health[last], countText(site.active_alarms, words))}
-          </span>
+          <span className="fleet-line">{words.lastKnown(S.health[last])}</span>
         )}
-        {isLive && (
-          <span className="fleet-alarms" data-any={(site.active_alarms ?? 0) > 0}>
-            {countText(site.active_alarms, words)}
-          </span>
-        )}
+        <span className="fleet-alarms" data-any={(site.active_alarms ?? 0) > 0}>
+          {countText(site.active_alarms, words)}
+        </span>
         <span className="fleet-line">
           {site.last_received
             ? words.received(timeText(ms(site.last_received)))
@@ -115,6 +114,33 @@ const SiteCard = memo(function SiteCard({
     </li>
   );
 });
+
+/** Fetched once its card stays in sight: whoever scrolls past waits for none of them. */
+function SmallMap({ src }: { src: string }): JSX.Element {
+  const place = useRef<HTMLSpanElement>(null);
+  const [isShown, setShown] = useState(false);
+  useEffect(() => {
+    let timer: ReturnType<typeof setTimeout> | undefined;
+    const seen = new IntersectionObserver(([entry]) => {
+      clearTimeout(timer);
+      if (!entry?.isIntersecting) return;
+      timer = setTimeout(() => {
+        setShown(true);
+        seen.disconnect();
+      }, STAYS_MS);
+    });
+    if (place.current) seen.observe(place.current);
+    return () => {
+      clearTimeout(timer);
+      seen.disconnect();
+    };
+  }, []);
+  return (
+    <span ref={place} className="fleet-map">
+      {isShown && <img src={src} alt="" width={88} height={48} decoding="async" />}
+    </span>
+  );
+}
 
 /** What no robot observed, or not now; null: that is not known, or need not be said. */
 export function originText({ origin }: Site): string | null {

@@ -22,6 +22,7 @@ const site = (name: string, more: Partial<Site> = {}): Site => ({
   lag_s: 0.5,
   is_live: true,
   origin: 'robot',
+  map: null,
   ...more,
 });
 const frame = (sites: readonly Site[], more: Partial<SitesFrame> = {}): SitesFrame => ({

@@ -19,6 +19,8 @@ export interface Site {
   readonly is_live: boolean;
   /** Where what it reports comes from. */
   readonly origin: string;
+  /** Another one where its small map is another; null: it has none. */
+  readonly map: string | null;
 }
 
 export interface Archive {

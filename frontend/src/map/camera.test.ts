@@ -4,6 +4,7 @@ import { isClear } from '../geometry/clear';
 import { corners, mapPoint, toCanvas, type Camera, type View } from '../geometry/coordinates';
 import { NO_VIEWPORT, type Viewport } from '../store/viewport';
 import { MapCamera } from './camera';
+import { startGestures } from './gestures';
 
 const size = { width: 600, height: 400 };
 const bounds = { minX: 0, minY: 0, maxX: 4, maxY: 8 };
@@ -18,6 +19,7 @@ const cameraOn = (target: HTMLElement, isFixed = false): MapCamera =>
   new MapCamera(target, { viewport: () => viewport, onView, onCamera }, isFixed);
 
 beforeEach(() => {
+  startGestures();
   viewport = { ...NO_VIEWPORT, size };
   onView = vi.fn<(view: View) => void>((view) => {
     viewport = { ...viewport, view };

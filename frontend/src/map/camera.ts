@@ -1,6 +1,4 @@
-import { select } from 'd3-selection';
-import { zoom, zoomIdentity, type D3ZoomEvent, type ZoomTransform } from 'd3-zoom';
-
+/** Where the map is looked at from: the programmed moves. What a hand does is in `gestures.ts`. */
 import { fitClear, isClear, type Box } from '../geometry/clear';
 import {
   cameraOf,
@@ -15,6 +13,7 @@ import {
   type Size,
   type View,
 } from '../geometry/coordinates';
+import { createStore } from '../store/create';
 import type { Viewport } from '../store/viewport';
 import type { Content } from './content';
 
@@ -26,10 +25,27 @@ export interface CameraHandlers {
   readonly onCamera: (camera: Camera) => void;
 }
 
-const transformOf = ({ x, y, scale }: View): ZoomTransform =>
-  zoomIdentity.translate(x, y).scale(scale);
+/** A hand on the map, as the camera sees it. */
+export interface Hand {
+  /** The map was moved by something else; the hand goes on from there. */
+  readonly follow: (view: View) => void;
+  readonly stop: () => void;
+}
 
-const toView = ({ x, y, k }: ZoomTransform): View => ({ x, y, scale: k });
+/** What a hand may do, and whom it tells. */
+export interface Held {
+  readonly viewport: () => Viewport;
+  readonly leastScale: () => number;
+  readonly inSight: (view: View) => View;
+  readonly onStart: () => void;
+  readonly onMove: (view: View) => void;
+  readonly onEnd: () => void;
+}
+
+export type Gestures = (element: HTMLElement, held: Held) => Hand;
+
+/** Null until they are loaded, right behind the first view: the map is painted without. */
+export const gestures = createStore<Gestures | null, Gestures>(null, (_, next) => next);
 
 /** A view that was told as a camera and comes back differs in its last digits, and moves nothing. */
 const isSame = (a: View, b: View): boolean =>
@@ -44,16 +60,11 @@ export function fitInsets({ width }: Size): Insets {
     : { top: 30, right: 76, bottom: 52, left: 40 };
 }
 
-/**
- * Wheel, pinch and drag on one element, and the programmed moves. Where they lead is told and
- * kept in the store; d3-zoom has its own copy, on the element.
- */
+/** Fits, follows links and moves as told; where that leads is kept in the store. */
 export class MapCamera {
-  readonly #selection;
-  readonly #zoom;
-  readonly #viewport: () => Viewport;
-  /** A move of the program's own is no choice of the operator's. */
-  #programmed = false;
+  readonly #handlers: CameraHandlers;
+  #hand: Hand | null = null;
+  readonly #stop: () => void;
   /** The view that the gestures under way began with. */
   #held: View | null = null;
   /** What no move leads away from; null: not known yet. */
@@ -62,39 +73,29 @@ export class MapCamera {
 
   /** `isFixed`: the program alone moves it; no wheel, finger or mouse does. */
   constructor(element: HTMLElement, handlers: CameraHandlers, isFixed = false) {
-    this.#viewport = handlers.viewport;
-    this.#selection = select<HTMLElement, unknown>(element);
-    this.#zoom = zoom<HTMLElement, unknown>()
-      .scaleExtent([MIN_SCALE, MAX_SCALE])
-      // Without the browser's layout: the size is known from the resize observer.
-      .extent(() => [
-        [0, 0],
-        [this.#viewport().size.width, this.#viewport().size.height],
-      ])
-      .constrain((transform) => transformOf(this.#inSight(toView(transform))))
-      .clickDistance(6)
-      // At once, by the double click too: nothing here is animated (see `instantly.ts`).
-      .duration(0);
-    if (isFixed) this.#zoom.filter(() => false);
-    this.#selection.call(this.#zoom);
-    // A map that comes back into the page goes on where it was.
-    this.#zoom.transform(this.#selection, transformOf(this.#viewport().view));
-    this.#zoom
-      .on('zoom', (event: D3ZoomEvent<HTMLElement, unknown>) => {
-        handlers.onView(toView(event.transform));
-      })
-      .on('start', () => {
-        // Not anew by a hand that grabs the map before the gesture of the wheel has ended.
-        if (!this.#programmed) this.#held ??= this.#viewport().view;
-      })
-      .on('end', () => {
-        if (this.#programmed) return;
-        // A click is a gesture too, and moves nothing.
-        const { view, size } = this.#viewport();
-        const hasMoved = this.#held !== view;
-        this.#held = null;
-        if (hasMoved) handlers.onCamera(cameraOf(view, size));
+    this.#handlers = handlers;
+    const take = (): void => {
+      const start = gestures.get();
+      if (isFixed || !start || this.#hand) return;
+      this.#hand = start(element, {
+        viewport: handlers.viewport,
+        leastScale: () => this.#leastScale,
+        inSight: (view) => this.#inSight(view),
+        onStart: () => {
+          // Not anew by a hand that grabs the map before the gesture of the wheel has ended.
+          this.#held ??= handlers.viewport().view;
+        },
+        onMove: handlers.onView,
+        onEnd: () => {
+          // A click is a gesture too, and moves nothing.
+          const hasMoved = this.#held !== handlers.viewport().view;
+          this.#held = null;
+          if (hasMoved) this.#choose();
+        },
       });
+    };
+    this.#stop = gestures.subscribe(take);
+    take();
   }
 
   /**
@@ -104,25 +105,39 @@ export class MapCamera {
    */
   goTo(camera: Camera | null, content: Content | null, covered: readonly Box[] = []): void {
     if (this.#held !== null) return;
-    const { view: before, size } = this.#viewport();
+    const { view: before, size } = this.#handlers.viewport();
     if (size.width === 0 || size.height === 0) return;
     const whole = content && fitClear(content.bounds, content.pins, size, fitInsets(size), covered);
     if (whole) {
       this.#content = content;
       this.#leastScale = Math.min(MIN_SCALE, whole.scale);
-      this.#zoom.scaleExtent([this.#leastScale, MAX_SCALE]);
+      this.#hand?.follow(before);
     }
     const view = camera ? this.#inSight(viewOf(camera, size, this.#leastScale)) : whole;
-    if (!view) return;
-    if (isSame(view, before)) return;
-    this.#programmed = true;
-    this.#zoom.transform(this.#selection, transformOf(view));
-    this.#programmed = false;
+    if (view && !isSame(view, before)) this.#move(view);
   }
 
   #inSight(view: View): View {
-    const { size } = this.#viewport();
+    const { size } = this.#handlers.viewport();
     return this.#content ? inSight(view, size, this.#content.bounds) : view;
+  }
+
+  #move(view: View): void {
+    this.#handlers.onView(view);
+    this.#hand?.follow(view);
+  }
+
+  #choose(): void {
+    const { view, size } = this.#handlers.viewport();
+    this.#handlers.onCamera(cameraOf(view, size));
+  }
+
+  /** A step that the operator asked for by a key or a button. */
+  #step(view: View): void {
+    const before = this.#handlers.viewport().view;
+    const within = this.#inSight(view);
+    if (!isSame(within, before)) this.#move(within);
+    if (this.#held === null) this.#choose();
   }
 
   /** Whether the operator has hold of the map, or the wheel has not yet come to rest. */
@@ -130,33 +145,35 @@ export class MapCamera {
     return this.#held !== null;
   }
 
+  /** About the middle. */
   zoomBy(factor: number): void {
-    this.#zoom.scaleBy(this.#selection, factor);
+    const { view, size } = this.#handlers.viewport();
+    const scale = Math.min(MAX_SCALE, Math.max(this.#leastScale, view.scale * factor));
+    const about = (at: number, length: number): number =>
+      length / 2 + ((at - length / 2) * scale) / view.scale;
+    this.#step({ scale, x: about(view.x, size.width), y: about(view.y, size.height) });
   }
 
   /** Moves what is seen, by a share of the view's size. */
   panBy(x: number, y: number): void {
-    const { view, size } = this.#viewport();
-    this.#zoom.translateBy(
-      this.#selection,
-      (-x * size.width) / view.scale,
-      (-y * size.height) / view.scale,
-    );
+    const { view, size } = this.#handlers.viewport();
+    this.#step({ ...view, x: view.x - x * size.width, y: view.y - y * size.height });
   }
 
   /** Brings a point into view; one that is well inside the free part stays where it is. */
   show(point: MapPoint, coveredBelow: number, covered: readonly Box[] = []): void {
-    const { view, size } = this.#viewport();
+    const { view, size } = this.#handlers.viewport();
     const { x, y } = toCanvas(view, point);
     const { width } = size;
     const height = Math.max(0, size.height - coveredBelow);
     const margin = Math.min(40, height / 4);
     const isInside = x > margin && y > margin && x < width - margin && y < height - margin;
     if (width === 0 || (isInside && isClear(view, point, covered))) return;
-    this.#zoom.translateTo(this.#selection, point.x, -point.y, [width / 2, height / 2]);
+    this.#step({ ...view, x: view.x + width / 2 - x, y: view.y + height / 2 - y });
   }
 
   destroy(): void {
-    this.#selection.on('.zoom', null);
+    this.#stop();
+    this.#hand?.stop();
   }
 }

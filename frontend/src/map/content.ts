@@ -25,18 +25,16 @@ const places = memoOne((tags: readonly Tag[]) => {
 });
 
 /**
- * What a fit shows: everything pinned or planted, the heat map, and the known part of the map.
- * The grid of the heat map is the same for every sensor, so that a switch moves nothing; while
- * the next one is on its way, the last one's stands in for it.
+ * What a fit shows: everything pinned or planted, and the known part of the floor plan. Where there
+ * is no plan, the heat map, whose grid is the same for every sensor, so that a switch moves nothing;
+ * while the next one is on its way, the last one's stands in for it.
  */
 export function contentOf({ snapshot, map }: House, field: Field | null): Content | null {
   const { pins, corners: planted } = places(snapshot?.tags ?? NO_TAGS);
-  const bounds = boundsOf([
-    ...planted,
-    // A field whose tags are gone is one of a twin before this one.
-    ...(field && planted.length > 0 ? fieldCorners(field) : []),
-    ...(map.value?.known ?? []).filter(isPossible),
-  ]);
+  const known = (map.value?.known ?? []).filter(isPossible);
+  // A field whose tags are gone is one of a twin before this one.
+  const hasField = field && planted.length > 0 && known.length === 0;
+  const bounds = boundsOf([...planted, ...(hasField ? fieldCorners(field) : []), ...known]);
   return bounds && { bounds, pins };
 }
 

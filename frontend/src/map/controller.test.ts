@@ -8,6 +8,7 @@ import { showField, showTags } from '../testing/page';
 import { readings, stateFrame, wireTag } from '../testing/tags';
 import { commandMap } from './commands';
 import { runMap } from './controller';
+import { startGestures } from './gestures';
 import { pinUnderMouse, pointedAt } from './pointer';
 
 let element: HTMLElement;
@@ -57,6 +58,7 @@ const press = (key: string): void => {
 };
 
 beforeEach(() => {
+  startGestures();
   frames = [];
   pointedAt.dispatch(null);
   pinUnderMouse.dispatch(null);

@@ -8,7 +8,10 @@ import { selectColumns, selectHealth, selectRange, selectSensors, selectZones } 
 
 beforeEach(() => {
   showTags([
-    wireTag({ tag_id: '1', readings: readings({ temperature: 20, ph: 7 }) }),
+    wireTag({
+      tag_id: '1',
+      readings: readings({ temperature: 20, humidity: 60, ph: 7 }),
+    }),
     wireTag({ tag_id: '2', readings: readings({ temperature: 30 }) }),
   ]);
 });
@@ -66,8 +69,10 @@ test('health is worked out once a snapshot', () => {
 test('what is derived can be chosen, and has no column: no tag has readings of it', () => {
   const names = (sensors: ReturnType<typeof selectSensors>): string[] =>
     sensors.map(({ name }) => name);
-  expect(names(selectSensors(store.get()))).toEqual(expect.arrayContaining(['co2', 'ph', 'vpd']));
-  expect(names(selectColumns(store.get()))).toEqual(expect.arrayContaining(['co2', 'ph']));
+  expect(names(selectSensors(store.get()))).toEqual(
+    expect.arrayContaining(['humidity', 'ph', 'vpd']),
+  );
+  expect(names(selectColumns(store.get()))).toEqual(expect.arrayContaining(['humidity', 'ph']));
   expect(names(selectColumns(store.get()))).not.toContain('vpd');
   expect(selectColumns(store.get())).toBe(selectColumns(store.get()));
 });

@@ -95,12 +95,12 @@ test('deltas are put together; one that does not fit makes a new connection', ()
 });
 
 test('alarms are taken as they come, also before a state, and change nothing else', () => {
-  FakeSocket.last.speak({ type: 'alarms', ...alarms([alarm('a')]) });
+  FakeSocket.last.speak({ type: 'alarms', notes: 0, ...alarms([alarm('a')]) });
   expect(store.get().twin.alarms?.alarms).toEqual([alarm('a')]);
   expect(store.get().twin.phase).toBe('connecting');
   FakeSocket.last.speak(status());
   FakeSocket.last.speak(stateFrame([wireTag()], { sec: 70, revision: 'after alarms' }));
-  FakeSocket.last.speak({ type: 'alarms', ...alarms([]) });
+  FakeSocket.last.speak({ type: 'alarms', notes: 0, ...alarms([]) });
   expect(revision()).toBe('after alarms');
   expect(store.get().twin.alarms?.alarms).toEqual([]);
 });

@@ -6,6 +6,7 @@ import { connect } from '../connection/socket';
 import { stateSocketUrl } from '../contract/api';
 import type { Latest } from '../contract/types';
 import { receive } from './app';
+import { robotFrame } from './robot';
 
 /**
  * Frames come up to ten times a second; the page takes the newest four times a second at most.
@@ -66,6 +67,7 @@ export function startLive(): () => void {
     },
     onRefused: () => void signInIfAsked(),
     onBad: tellBad,
+    onOther: robotFrame.dispatch,
     onFrame: (frame, connection) => {
       const { epoch, status } = connection;
       if (frame.type === 'alarms') {

@@ -16,6 +16,7 @@ export const LAYERS = [
   'pins',
   'labels',
   'advice',
+  'robot',
 ] as const;
 export type Layer = (typeof LAYERS)[number];
 

@@ -1,4 +1,4 @@
-import type { JSX } from 'react';
+import { lazy, Suspense, type JSX } from 'react';
 
 import { PERIOD_KINDS, type Period } from '../domain/period';
 import { hasDate, rosText } from '../domain/rostime';
@@ -7,6 +7,7 @@ import { act, store, useApp } from '../store/app';
 import { useSelected } from '../store/create';
 import { rosNow } from '../store/moment';
 import { S } from '../strings';
+import type * as Parts from '../notes/parts';
 import { useNow } from '../widgets/useNow';
 import { Marks } from './Marks';
 import { newestWord } from './newest';
@@ -14,6 +15,13 @@ import { OwnPeriod } from './OwnPeriod';
 import { chooseSpeed, playback, SPEEDS, togglePlayback } from './playback';
 import { Slider } from './Slider';
 import { barSpan } from './span';
+
+// Where they do not come, the bar goes on without.
+type Shown = Pick<typeof Parts, 'CommentMarks' | 'SiteComment'>;
+const NOTHING: Shown = { CommentMarks: () => null, SiteComment: () => null };
+const parts = (): Promise<Shown> => import('../notes/parts').catch(() => NOTHING);
+const CommentMarks = lazy(async () => ({ default: (await parts()).CommentMarks }));
+const SiteComment = lazy(async () => ({ default: (await parts()).SiteComment }));
 
 /** Under the map: when what happened, and the way to another moment. */
 export function TimeBar(): JSX.Element | null {
@@ -36,8 +44,14 @@ export function TimeBar(): JSX.Element | null {
         <When />
         <PeriodChoice period={period} nowS={nowS} />
         <Marks />
+        <Suspense>
+          <SiteComment />
+        </Suspense>
       </div>
       {period.kind === 'own' && <OwnPeriod period={period} isSimulated={!hasDate(nowS)} />}
+      <Suspense>
+        <CommentMarks span={span} />
+      </Suspense>
       <Slider span={span} timeline={remembered.value} nowS={nowS} />
       {remembered.state === 'failed' && (
         <p className="timebar-note" role="status">

@@ -51,8 +51,10 @@ describe('page', () => {
   test('choosing a sensor is choosing a radio button', () => {
     render(<App kiosk={false} />);
     const sensors = screen.getByRole('group', { name: 'Sensor' });
-    fireEvent.click(within(sensors).getByRole('radio', { name: /Humidity/ }));
-    expect(store.get().view.sensor).toBe('humidity');
+    fireEvent.click(within(sensors).getByRole('radio', { name: /CO₂/ }));
+    expect(store.get().view.sensor).toBe('co2');
+    // Nobody measures it.
+    expect(within(sensors).queryByRole('radio', { name: /Humidity/ })).toBeNull();
   });
 
   test('layers go on and off', () => {

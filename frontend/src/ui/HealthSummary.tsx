@@ -12,16 +12,40 @@ import { HealthMark, HealthShape } from './HealthMark';
 import { HouseLine } from './HouseLine';
 import { useReasonText } from './Reasons';
 
+/** What makes the greenhouse what it is, in words. */
+function useDriver(health: HouseHealth): string {
+  const reason = useReasonText(health.reasons[0] ?? health.worst?.health.reasons[0] ?? null);
+  // Of now, as the list of alarms is.
+  const isNow = useApp((state) => selectShown(state).moment === null);
+  const alarms = useSelected(alarmList, ({ active, shelved }) => active.length + shelved.length);
+  return driverText(health, reason, isNow ? alarms : 0);
+}
+
+/** Above the map of a phone, where the table is a tab away: the worst, and the way to the list. */
+export function HealthStrip(): JSX.Element {
+  const health = useApp(selectHealth);
+  return (
+    <button
+      type="button"
+      className="health-strip"
+      data-testid="health-strip"
+      data-health={health.verdict}
+      onClick={() => {
+        act({ type: 'list', list: 'tags' });
+      }}
+    >
+      <HealthMark verdict={health.verdict} word={false} />
+      <span>{useDriver(health)}</span>
+    </button>
+  );
+}
+
 /** How the house is, why, and how many tags are how. */
 export function HealthSummary({ kiosk }: { kiosk: boolean }): JSX.Element {
   const health = useApp(selectHealth);
   const filter = useApp((state) => state.view.health);
   const { worst } = health;
-  const reason = useReasonText(health.reasons[0] ?? worst?.health.reasons[0] ?? null);
-  // Of now, as the list of alarms is.
-  const isNow = useApp((state) => selectShown(state).moment === null);
-  const alarms = useSelected(alarmList, ({ active, shelved }) => active.length + shelved.length);
-  const driver = driverText(health, reason, isNow ? alarms : 0);
+  const driver = useDriver(health);
   return (
     <section
       className="health"

@@ -1,21 +1,17 @@
-import { useMemo, type CSSProperties, type JSX, type ReactNode } from 'react';
+import type { CSSProperties, JSX } from 'react';
 
 import type { FieldQuality } from '../contract/types';
-import { VERDICTS } from '../domain/health';
 import { numberText, readingText, valueText } from '../domain/format';
 import { fraction, rgbText, sensorColour, type Range } from '../domain/ramp';
 import type { Sensor } from '../domain/sensors';
-import { speciesLooks, UNKNOWN_SPECIES, type BloomLook } from '../domain/species';
 import { shown } from '../domain/text';
 import { differenceToShown, unitOf, type TemperatureUnit } from '../domain/units';
-import { speciesOf } from '../draw/scene';
 import { useApp } from '../store/app';
 import { selectColouring, selectHeat, selectRange, selectSensor } from '../store/derived';
 import { selectShown, selectTags } from '../store/moment';
 import { S } from '../strings';
 import { ColouringControl } from './ColouringControl';
 import { ErrorScale, EstimateFacts } from './estimate';
-import { HealthShape } from './HealthMark';
 import { HeatControl } from './HeatControl';
 import { IdealLegend } from './IdealLegend';
 import { WithParts } from './WithParts';
@@ -50,7 +46,7 @@ export function Legend({ kiosk }: { kiosk: boolean }): JSX.Element {
   }
   return (
     <section className="legend" aria-label={S.legend} data-testid="legend">
-      <WithParts>{(parts) => <parts.DifferenceLegend />}</WithParts>
+      <WithParts>{(parts) => <parts.InLegend />}</WithParts>
       <div className="legend-scale">
         <div className="legend-title">
           <strong>{shown(sensor.label, 32)}</strong> <span>{unitOf(sensor, unit)}</span>
@@ -89,7 +85,10 @@ export function Legend({ kiosk }: { kiosk: boolean }): JSX.Element {
         )}
         {isIdealWished && !isIdeal && <span data-testid="no-ideal">{S.legendNoIdeal}</span>}
       </div>
-      <Keys />
+      <details className="legend-marks" open={kiosk}>
+        <summary>{S.timebarMarks}</summary>
+        <WithParts>{(parts) => <parts.Keys />}</WithParts>
+      </details>
       {!kiosk && (
         <div className="legend-controls">
           <HeatControl place="legend" />
@@ -181,77 +180,5 @@ function Ramp({
         <span data-testid="range-high">{range ? readingText(sensor, range.high, unit) : '–'}</span>
       </div>
     </div>
-  );
-}
-
-/** What pins and dots mean; a pin is the mark of its tag's verdict. */
-function Keys(): JSX.Element {
-  const tags = useApp(selectTags);
-  const species = useMemo(() => [...speciesLooks(speciesOf(tags))], [tags]);
-  const unknown = tags.some((tag) => tag.blooms.some((bloom) => bloom.species === ''));
-  return (
-    // May scroll on a phone, so the keyboard must be able to reach it.
-    // eslint-disable-next-line jsx-a11y/no-noninteractive-tabindex
-    <ul className="legend-keys" aria-label={S.legend} tabIndex={0}>
-      {VERDICTS.map((verdict) => (
-        <li key={verdict} data-verdict={verdict}>
-          <HealthShape verdict={verdict} />
-          {S.health[verdict]}
-        </li>
-      ))}
-      <li>
-        <KeySign>
-          <circle cx="8" cy="8" r="6.5" className="key-pin dashed" />
-        </KeySign>
-        {S.pinLacking}
-      </li>
-      <li>
-        <KeySign>
-          <circle cx="8" cy="8" r="6.5" className="key-pin" />
-          <path d="M5 11 11 5" className="key-pin" />
-        </KeySign>
-        {S.pinFailed}
-      </li>
-      <li>
-        <KeySign>
-          <circle cx="8" cy="8" r="6.2" className="key-pest" />
-          <ellipse cx="8" cy="8.6" rx="1.7" ry="2.6" className="key-bug" />
-          <path d="M5 7.2h6M5 9.8h6M8 4.8v1.5" className="key-bug" />
-        </KeySign>
-        {S.pinPest}
-      </li>
-      {species.map(([name, look]) => (
-        <li key={name}>
-          <BloomKey look={look} />
-          <bdi>{shown(name, 24)}</bdi>
-        </li>
-      ))}
-      {unknown && (
-        <li>
-          <BloomKey look={UNKNOWN_SPECIES} />
-          {S.legendUnknownSpecies}
-        </li>
-      )}
-    </ul>
-  );
-}
-
-function BloomKey({ look: { colour, shape } }: { look: BloomLook }): JSX.Element {
-  return (
-    <KeySign size={14}>
-      <g className="key-bloom" fill={rgbText(colour)}>
-        {shape === 'circle' && <circle cx="8" cy="8" r="5.5" />}
-        {shape === 'square' && <path d="M3 3h10v10H3Z" />}
-        {shape === 'triangle' && <path d="M8 1.500 14.500 13H1.500Z" />}
-      </g>
-    </KeySign>
-  );
-}
-
-function KeySign({ size = 16, children }: { size?: number; children: ReactNode }): JSX.Element {
-  return (
-    <svg viewBox="0 0 16 16" width={size} height={size} aria-hidden="true">
-      {children}
-    </svg>
   );
 }

@@ -35,11 +35,14 @@ export function MapControls(): JSX.Element {
   );
 }
 
+/** Of a robot there may be none. */
+const LISTED = LAYERS.filter((layer) => layer !== 'robot');
+
 function LayerList(): JSX.Element {
   const on = useApp((state) => state.view.layers);
   return (
     <>
-      {LAYERS.map((layer) => (
+      {LISTED.map((layer) => (
         <label key={layer} className="check">
           <input
             type="checkbox"
@@ -52,7 +55,7 @@ function LayerList(): JSX.Element {
         </label>
       ))}
       <HeatControl place="layers" />
-      <WithParts>{(parts) => <parts.CompareControl />}</WithParts>
+      <WithParts>{(parts) => <parts.InLayers />}</WithParts>
     </>
   );
 }

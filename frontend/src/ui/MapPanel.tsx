@@ -6,6 +6,7 @@ import { selectShown } from '../store/moment';
 import { S } from '../strings';
 import { PastFrame } from '../timebar/PastFrame';
 import { AdviceMarks } from './estimate';
+import { HealthStrip } from './HealthSummary';
 import { inTime } from './inTime';
 import { Legend } from './Legend';
 import { MapControls } from './MapControls';
@@ -23,6 +24,7 @@ export function MapPanel({ kiosk }: { kiosk: boolean }): JSX.Element {
   const charted = useApp((state) => state.view.chart);
   return (
     <section className="map-panel" aria-label={S.mapRegion} data-map-state={mapState}>
+      {!kiosk && <HealthStrip />}
       <SensorPicker />
       <div className="map-frame">
         <MapView kiosk={kiosk} />
@@ -34,7 +36,7 @@ export function MapPanel({ kiosk }: { kiosk: boolean }): JSX.Element {
           <ScaleBar />
           <Notices place="edge" />
         </div>
-        <WithParts>{(parts) => <parts.HoverCard />}</WithParts>
+        <WithParts>{(parts) => <parts.OnMap />}</WithParts>
         {charted && !kiosk && <ChartView charted={charted} />}
         <PastFrame />
       </div>

@@ -2,12 +2,14 @@ import type { JSX } from 'react';
 
 import { saveMap, saveTable } from '../export/actions';
 import { copyLink } from '../export/link';
+import { reportLink } from '../export/report';
 import type { TemperatureUnit } from '../domain/units';
 import { prefer, useApp } from '../store/app';
 import type { Settings } from '../store/settings';
-import { S } from '../strings';
+import { LANGUAGE, S } from '../strings';
 import { useClose } from '../widgets/Disclosure';
 import { Segmented } from '../widgets/Segmented';
+import { REPORT } from '../words/report';
 import { openHelp } from './HelpDialog';
 import { LanguageChoice } from './LanguageChoice';
 import { SignOut } from './SignOut';
@@ -72,6 +74,11 @@ export function Menu(): JSX.Element {
           >
             {S.print}
           </button>
+        </li>
+        <li>
+          <a href={reportLink()} target="_blank" rel="noopener" onClick={close}>
+            {REPORT[LANGUAGE]}
+          </a>
         </li>
         <li>
           <a href={kioskLink()}>{S.kiosk}</a>

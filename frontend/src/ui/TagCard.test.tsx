@@ -89,7 +89,6 @@ describe('card', () => {
       Promise.resolve(
         Response.json({
           tag_id: '7',
-          is_known: true,
           tries: [
             { stamp: stamp(1), status: 0, status_detail: '', kind: 0 },
             { stamp: stamp(2), status: 2, status_detail: 'blurred', kind: null },
@@ -114,13 +113,6 @@ describe('card', () => {
     expect(told).toHaveLength(2);
     expect(told[0]).toMatch(/attemptnot decoded blurred$/);
     expect(told[1]).toMatch(/scanOK$/);
-  });
-
-  test('a twin that tells no history says so', async () => {
-    const none = { tag_id: '7', is_known: false, sensors: [], tries: [] };
-    vi.stubGlobal('fetch', () => Promise.resolve(Response.json(none)));
-    render(<TagCard tagId="7" />);
-    expect(await screen.findByText('This twin provides no history.')).toBeTruthy();
   });
 
   test('each reading is as old as it is itself, and the look at the flowers apart', () => {

@@ -24,6 +24,7 @@ import { Tries } from './Tries';
 import { asOf, useHistory } from './useHistory';
 
 // Charts come after the first paint, and their library with them.
+const Comments = inTime(async () => (await import('../notes/parts')).Comments);
 const CardChart = inTime(async () => (await import('../charts/CardChart')).default);
 
 /** Everything about one tag, over the map. */
@@ -168,8 +169,8 @@ function CardBody({
           </dd>
         </div>
       </dl>
-      {history && !history.is_known && <p className="faint">{S.cardNoHistory}</p>}
       {history && <Tries tries={history.tries} />}
+      <Comments subject={`tag:${tag.id}`} name={S.card(shown(tag.id, 24))} />
     </div>
   );
 }

@@ -49,7 +49,10 @@ export const TagRow = memo(function TagRow({
   hovered,
 }: Props): JSX.Element {
   const has = (id: string): boolean => isColumnShown({ hidden }, id);
-  const why = reasonsText(catalogue, health.reasons, unit);
+  const all = reasonsText(catalogue, health.reasons, unit);
+  // A failed scan is said once, with its age.
+  const others = health.reasons.filter(({ kind }) => !tag.failedTry || kind !== 'scan_failed');
+  const why = reasonsText(catalogue, others, unit);
   return (
     <tr
       aria-rowindex={index + 2}
@@ -72,22 +75,24 @@ export const TagRow = memo(function TagRow({
         )}
       </th>
       {has('health') && (
-        <td className="cell-health" title={why}>
-          <HealthMark verdict={health.verdict} />
-          {(why !== '' || tag.failedTry) && (
-            <>
-              <span className="unseen">: </span>
-              <span className="why">
-                {tag.failedTry && (
-                  <span className="tried">
-                    <Tried failed={tag.failedTry} />
-                  </span>
-                )}
-                {tag.failedTry && why !== '' && '; '}
-                {why}
-              </span>
-            </>
-          )}
+        <td className="cell-health" title={all}>
+          <div>
+            <HealthMark verdict={health.verdict} />
+            {(why !== '' || tag.failedTry) && (
+              <>
+                <span className="unseen">: </span>
+                <span className="why">
+                  {tag.failedTry && (
+                    <span className="tried">
+                      <Tried failed={tag.failedTry} />
+                    </span>
+                  )}
+                  {tag.failedTry && why !== '' && '; '}
+                  {why}
+                </span>
+              </>
+            )}
+          </div>
         </td>
       )}
       {has('age') && (

@@ -23,7 +23,12 @@ beforeEach(() => {
       species: 'rose',
       species_confidence: 0.91,
     }),
-    wireTag({ tag_id: '10', readings: readings({ temperature: 40 }), anomaly: true, bug_count: 2 }),
+    wireTag({
+      tag_id: '10',
+      readings: readings({ temperature: 40, co2: 700 }),
+      anomaly: true,
+      bug_count: 2,
+    }),
     wireTag({ tag_id: '2', pose: noPose, stale_seconds: null }),
   ];
   showTags(tags, said);

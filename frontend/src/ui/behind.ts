@@ -5,11 +5,18 @@
 import '../styles/card.css';
 import '../styles/hover.css';
 import '../styles/timebar.css';
+import '../styles/alarms.css';
+import '../styles/attention.css';
+import '../styles/bound.css';
+import '../styles/paper.css';
+// Last, as it takes back what the others say.
+import '../styles/print.css';
 
 export { startBadge } from '../alarms/badge';
 export { startNotify } from '../alarms/notify';
 export { startSound } from '../alarms/sound';
 export { saveTable } from '../export/actions';
+export { startGestures } from '../map/gestures';
 export { startDifference } from '../store/difference';
 export { startOpening } from '../store/opening';
 export { startRemembered } from '../store/remembered';
@@ -18,10 +25,10 @@ export { AlarmPanel } from './alarms/AlarmPanel';
 export { Meanwhile } from './alarms/Meanwhile';
 export { startPeople } from './alarms/people';
 export { AttentionList } from './AttentionList';
-export { CompareControl } from './CompareControl';
-export { DifferenceLegend } from './DifferenceLegend';
 export { HelpDialog, openHelp } from './HelpDialog';
-export { HoverCard } from './HoverCard';
+export { InLayers, InLegend, OnMap } from './extras';
+export { startShell } from './install';
+export { Keys } from './Keys';
 export { KioskNote, startLeaving } from './KioskNote';
 export { Menu } from './Menu';
 export { onKey } from './shortcuts';

@@ -4,19 +4,21 @@ import { afterEach, beforeAll, beforeEach, describe, expect, test } from 'vitest
 import { onMapCommand, type MapCommand } from '../map/commands';
 import { act, prefer, store } from '../store/app';
 import { showTags } from '../testing/page';
-import { wireTag } from '../testing/tags';
+import { readings, wireTag } from '../testing/tags';
 import { playback } from '../timebar/playback';
 import { startKeys } from './keys';
 import { loadParts } from './later';
 
 beforeAll(() => loadParts());
 
+const READINGS = readings({ temperature: 20, humidity: 60, co2: 700 });
+
 let stop: () => void;
 let commands: MapCommand[];
 let unhear: () => void;
 
 beforeEach(() => {
-  showTags(['1', '2', '3'].map((tag_id) => wireTag({ tag_id })));
+  showTags(['1', '2', '3'].map((tag_id) => wireTag({ tag_id, readings: READINGS })));
   commands = [];
   unhear = onMapCommand((command) => commands.push(command));
   stop = startKeys();

@@ -18,7 +18,7 @@ const ENGLISH = {
   live: 'Live',
   silentSince: (time: string): string => `Silent since ${time}`,
   neverForwarded: 'Never forwarded',
-  lastKnown: (status: string, alarms: string): string => `Last known: ${status}, ${alarms}`,
+  lastKnown: (status: string): string => `Last known: ${status}`,
   archiveDown: (time: string): string =>
     `The archive has not answered since ${time}. What you see is what was last known.`,
   disconnected: (time: string): string =>
@@ -26,6 +26,8 @@ const ENGLISH = {
   sites: 'Greenhouses',
   alarmList: 'Alarms of all greenhouses, the worst first',
   wasLive: 'last known',
+  acknowledged: (name: string, at: string): string => `acknowledged by ${name} at ${at}`,
+  shelved: (name: string, until: string): string => `shelved by ${name} until ${until}`,
   moreAlarms: (count: number): string =>
     `${count} more: the pages of the greenhouses have all of them.`,
   group: 'Group',
@@ -63,7 +65,7 @@ const GERMAN: FleetWords = {
   live: 'Live',
   silentSince: (time) => `Still seit ${time}`,
   neverForwarded: 'Nie weitergeleitet',
-  lastKnown: (status, alarms) => `Zuletzt bekannt: ${status}, ${alarms}`,
+  lastKnown: (status) => `Zuletzt bekannt: ${status}`,
   archiveDown: (time) =>
     `Das Archiv antwortet seit ${time} nicht. Sie sehen, was zuletzt bekannt war.`,
   disconnected: (time) =>
@@ -71,6 +73,8 @@ const GERMAN: FleetWords = {
   sites: 'Gewächshäuser',
   alarmList: 'Alarme aller Gewächshäuser, die schlimmsten zuerst',
   wasLive: 'zuletzt bekannt',
+  acknowledged: (name, at) => `quittiert von ${name} um ${at}`,
+  shelved: (name, until) => `zurückgestellt von ${name} bis ${until}`,
   moreAlarms: (count) => `${count} weitere: Alle stehen auf den Seiten der Gewächshäuser.`,
   group: 'Gruppe',
   allGroups: 'Alle Gruppen',
@@ -105,7 +109,7 @@ const DUTCH: FleetWords = {
   live: 'Live',
   silentSince: (time) => `Stil sinds ${time}`,
   neverForwarded: 'Nooit doorgestuurd',
-  lastKnown: (status, alarms) => `Laatst bekend: ${status}, ${alarms}`,
+  lastKnown: (status) => `Laatst bekend: ${status}`,
   archiveDown: (time) =>
     `Het archief antwoordt sinds ${time} niet. U ziet wat het laatst bekend was.`,
   disconnected: (time) =>
@@ -113,6 +117,8 @@ const DUTCH: FleetWords = {
   sites: 'Kassen',
   alarmList: 'Alarmen van alle kassen, de ergste eerst',
   wasLive: 'laatst bekend',
+  acknowledged: (name, at) => `bevestigd door ${name} om ${at}`,
+  shelved: (name, until) => `uitgesteld door ${name} tot ${until}`,
   moreAlarms: (count) => `Nog ${count}: de pagina's van de kassen hebben ze allemaal.`,
   group: 'Groep',
   allGroups: 'Alle groepen',
@@ -147,13 +153,15 @@ const SPANISH: FleetWords = {
   live: 'En directo',
   silentSince: (time) => `Sin señal desde ${time}`,
   neverForwarded: 'Nunca reenviado',
-  lastKnown: (status, alarms) => `Último estado conocido: ${status}, ${alarms}`,
+  lastKnown: (status) => `Último estado conocido: ${status}`,
   archiveDown: (time) => `El archivo no responde desde ${time}. Se muestra lo último que se supo.`,
   disconnected: (time) =>
     `Sin conexión con el servidor desde ${time}. Se muestra lo último que se supo.`,
   sites: 'Invernaderos',
   alarmList: 'Alarmas de todos los invernaderos, las peores primero',
   wasLive: 'último dato',
+  acknowledged: (name, at) => `reconocida por ${name} a las ${at}`,
+  shelved: (name, until) => `aplazada por ${name} hasta ${until}`,
   moreAlarms: (count) => `${count} más: las páginas de los invernaderos las tienen todas.`,
   group: 'Grupo',
   allGroups: 'Todos los grupos',

@@ -7,6 +7,8 @@ export const PEOPLE = {
       `Signed in as ${name}: what you acknowledge or shelve, everybody sees.`,
     reads: (name: string): string =>
       `Signed in as ${name}, who only reads: what you acknowledge or shelve stays in this browser.`,
+    elsewhere: (name: string): string =>
+      `Signed in as ${name}: this bridge writes no notes, so what you acknowledge or shelve stays in this browser.`,
     acknowledged: (name: string, at: string): string => `acknowledged by ${name} at ${at}`,
     failed: (why: string): string => `Not saved: ${why}`,
   },
@@ -15,6 +17,8 @@ export const PEOPLE = {
       `Angemeldet als ${name}: Was Sie quittieren oder zurückstellen, sehen alle.`,
     reads: (name: string): string =>
       `Angemeldet als ${name}, nur lesend: Was Sie quittieren oder zurückstellen, bleibt in diesem Browser.`,
+    elsewhere: (name: string): string =>
+      `Angemeldet als ${name}: Diese Bridge schreibt keine Notizen. Was Sie quittieren oder zurückstellen, bleibt in diesem Browser.`,
     acknowledged: (name: string, at: string): string => `quittiert von ${name} um ${at}`,
     failed: (why: string): string => `Nicht gespeichert: ${why}`,
   },
@@ -23,6 +27,8 @@ export const PEOPLE = {
       `Aangemeld als ${name}: wat u bevestigt of uitstelt, ziet iedereen.`,
     reads: (name: string): string =>
       `Aangemeld als ${name}, die alleen leest: wat u bevestigt of uitstelt, blijft in deze browser.`,
+    elsewhere: (name: string): string =>
+      `Aangemeld als ${name}: deze bridge schrijft geen notities; wat u bevestigt of uitstelt, blijft in deze browser.`,
     acknowledged: (name: string, at: string): string => `bevestigd door ${name} om ${at}`,
     failed: (why: string): string => `Niet opgeslagen: ${why}`,
   },
@@ -31,6 +37,8 @@ export const PEOPLE = {
       `Sesión iniciada como ${name}: todos ven lo que usted reconoce o aplaza.`,
     reads: (name: string): string =>
       `Sesión iniciada como ${name}, solo lectura: lo que reconoce o aplaza queda en este navegador.`,
+    elsewhere: (name: string): string =>
+      `Sesión iniciada como ${name}: este puente no guarda notas; lo que reconoce o aplaza queda en este navegador.`,
     acknowledged: (name: string, at: string): string => `reconocida por ${name} a las ${at}`,
     failed: (why: string): string => `No se ha guardado: ${why}`,
   },

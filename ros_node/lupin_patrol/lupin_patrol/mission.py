@@ -11,7 +11,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from enum import IntEnum
 from itertools import count
-from math import cos, sin
+from math import atan2, cos, sin
 from random import Random
 from typing import Any
 
@@ -93,7 +93,27 @@ class PassCompleted:
     failed: tuple[str, ...]
 
 
-Event = MapGrown | TagsDiscovered | TagScanned | FlowersSeen | PassCompleted
+@dataclass(frozen=True, slots=True)
+class WayPlanned:
+    """The robot sets out, and means to take this way; the last point is where it will stop."""
+
+    at_s: float
+    way: tuple[Point, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class RobotMoved:
+    """Where the robot is, and how full its battery is, 0 to 1; `yaw` is rad from x towards y."""
+
+    at_s: float
+    position: Point
+    yaw: float
+    battery: float
+
+
+Event = (
+    MapGrown | TagsDiscovered | TagScanned | FlowersSeen | PassCompleted | WayPlanned | RobotMoved
+)
 
 
 DOCK: Point = (0.4, 0.4)
@@ -105,6 +125,8 @@ _MAP_PERIOD_S = 1.0
 _READ_S = 0.3
 _PICTURE_S = 0.2
 _BLOCKED_SHORT_M = 0.1
+# A full battery lasts for so long a way; the robot gets a full one at its dock.
+_BATTERY_M = 400.0
 
 _POSE_NOISE_M = 0.01
 _YAW_NOISE_RAD = 0.02
@@ -144,6 +166,8 @@ class Mission:
         self._seed = seed
         self._day_speed = day_speed
         self._position = DOCK
+        self._yaw = 0.0
+        self._battery_m = _BATTERY_M
         self._now_s = begin_s
         self._first_pass = first_pass
         self._is_observing = True
@@ -158,6 +182,7 @@ class Mission:
         for pass_index in count(self._first_pass):
             yield from self._patrol(pass_index)
             yield from self._drive(DOCK, pass_index)
+            self._battery_m = _BATTERY_M
 
     def visits(self) -> Iterator[TagScanned | FlowersSeen]:
         """The scans and looks of `events`, a tenth of the work: nobody looks around on the way."""
@@ -233,15 +258,22 @@ class Mission:
     def _drive(self, goal: Point, pass_index: int, short_m: float = 0.0) -> Iterator[Event]:
         """Drive to a goal, or stop a little before it, and look around on the way."""
         way = self._roadmap.way(self._position, goal)
+        if self._is_observing:
+            yield WayPlanned(self._now_s, tuple(way))
         step_m = _ROBOT_SPEED_M_S * _OBSERVE_PERIOD_S
         for position, driven_m in walk(way, step_m, max(0.0, length_of(way) - short_m)):
-            self._position = position
+            (x, y), self._position = self._position, position
+            if position != (x, y):
+                self._yaw = atan2(position[1] - y, position[0] - x)
             self._now_s += driven_m / _ROBOT_SPEED_M_S
+            self._battery_m -= driven_m
             yield from self._observe(pass_index)
 
     def _observe(self, pass_index: int) -> Iterator[Event]:
         if not self._is_observing:
             return
+        battery = self._battery_m / _BATTERY_M
+        yield RobotMoved(self._now_s, self._position, self._yaw, battery)
         if self._detector.observe_from(self._position, pass_index):
             yield TagsDiscovered(self._now_s, self._detector.sightings())
         self._map_is_new |= self._exploration.observe_from(self._position)

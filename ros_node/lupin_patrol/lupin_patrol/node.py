@@ -11,6 +11,7 @@ from __future__ import annotations
 from array import array
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from math import cos, sin
 from threading import Event as Flag
 from threading import Thread
 from time import monotonic
@@ -18,14 +19,14 @@ from typing import Any
 
 import rclpy
 from builtin_interfaces.msg import Time
-from geometry_msgs.msg import Point, PoseStamped
+from geometry_msgs.msg import Point, Pose, PoseStamped, PoseWithCovarianceStamped, Quaternion
 from lupin_msgs.msg import (
     DiscoveredTag,
     DiscoveredTags,
     Observation,
     SensorReading,
 )
-from nav_msgs.msg import OccupancyGrid
+from nav_msgs.msg import OccupancyGrid, Path
 from rcl_interfaces.msg import ParameterDescriptor
 from rclpy.duration import Duration
 from rclpy.exceptions import (
@@ -34,6 +35,7 @@ from rclpy.exceptions import (
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
+from sensor_msgs.msg import BatteryState
 from std_msgs.msg import Header
 
 from lupin_patrol.mission import (
@@ -41,12 +43,15 @@ from lupin_patrol.mission import (
     FlowersSeen,
     MapGrown,
     PassCompleted,
+    RobotMoved,
     ScanStatus,
     TagScanned,
     TagsDiscovered,
+    WayPlanned,
     pose_of,
 )
 from lupin_patrol.perception import Sighting
+from lupin_twin.core import interfaces
 from lupin_twin.core.parameters import ParameterError
 from lupin_twin.ros.base_node import NodeUtilities, end_spinning, latched, spin_until_shutdown
 from lupin_twin.ros.convert import flower_fields, pose_message
@@ -67,7 +72,7 @@ _POLL_S = 0.05
 
 
 class PatrolNode(Node):  # type: ignore[misc]  # rclpy is not typed
-    """Publishes observations, discovered tags and the map, all of them latched."""
+    """Publishes observations, discovered tags, the map, and the robot's own, all latched."""
 
     def __init__(self) -> None:
         with naming_own_parameters():
@@ -82,6 +87,14 @@ class PatrolNode(Node):  # type: ignore[misc]  # rclpy is not typed
             DiscoveredTags, "discovered_tags_topic", "perception/discovered_tags", 1
         )
         self._map = self._latched(OccupancyGrid, "map_topic", "map", 1)
+        self._pose, self._plan, self._battery = (
+            self.create_publisher(kind, topic.name, latched(1))
+            for kind, topic in (
+                (PoseWithCovarianceStamped, interfaces.ROBOT_POSE),
+                (Path, interfaces.ROBOT_PLAN),
+                (BatteryState, interfaces.ROBOT_BATTERY),
+            )
+        )
 
     def publish(self, event: Event) -> None:
         """Tell the world what happened, now."""
@@ -99,6 +112,11 @@ class PatrolNode(Node):  # type: ignore[misc]  # rclpy is not typed
                     )
             case FlowersSeen():
                 self.observations.publish(inspection(event, stamp, self._frame_id))
+            case WayPlanned():
+                self._plan.publish(path(event, stamp, self._frame_id))
+            case RobotMoved():
+                self._pose.publish(robot_pose(event, stamp, self._frame_id))
+                self._battery.publish(battery_state(event, stamp))
             case PassCompleted():
                 self.get_logger().info(
                     f"pass {event.pass_index + 1} completed;"
@@ -249,6 +267,37 @@ def occupancy_grid(event: MapGrown, stamp: Time, frame_id: str) -> OccupancyGrid
     message.info.origin.position = Point(x=float(grid.origin[0]), y=float(grid.origin[1]), z=0.0)
     message.data = array("b", grid.cells)
     return message
+
+
+def robot_pose(event: RobotMoved, stamp: Time, frame_id: str) -> PoseWithCovarianceStamped:
+    """Return where the robot is, as AMCL publishes it; the simulated robot knows it exactly."""
+    message = PoseWithCovarianceStamped(header=Header(stamp=stamp, frame_id=frame_id))
+    message.pose.pose = _on_floor(event.position, event.yaw)
+    return message
+
+
+def path(event: WayPlanned, stamp: Time, frame_id: str) -> Path:
+    """Return the way ahead, as Nav2's planner publishes it."""
+    header = Header(stamp=stamp, frame_id=frame_id)
+    poses = [PoseStamped(header=header, pose=_on_floor(point, 0.0)) for point in event.way]
+    return Path(header=header, poses=poses)
+
+
+def battery_state(event: RobotMoved, stamp: Time) -> BatteryState:
+    """Return the battery; what is not simulated is NaN, as the message's definition has it."""
+    message = BatteryState(header=Header(stamp=stamp), percentage=float(event.battery))
+    for name in ("voltage", "temperature", "current", "charge", "capacity", "design_capacity"):
+        setattr(message, name, float("nan"))
+    message.power_supply_status = BatteryState.POWER_SUPPLY_STATUS_DISCHARGING
+    message.present = True
+    return message
+
+
+def _on_floor(point: tuple[float, float], yaw: float) -> Pose:
+    return Pose(
+        position=Point(x=float(point[0]), y=float(point[1]), z=0.0),
+        orientation=Quaternion(x=0.0, y=0.0, z=sin(yaw / 2), w=cos(yaw / 2)),
+    )
 
 
 def _observation(event: TagScanned | FlowersSeen, stamp: Time, frame_id: str) -> Observation:

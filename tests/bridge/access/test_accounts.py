@@ -171,6 +171,11 @@ def test_a_flood_of_sign_ins_waits_in_a_short_queue_and_an_address_has_few(
         found = await asyncio.gather(*tries, return_exceptions=True)
         assert found.count(None) == MAX_WAITING
         assert sum(isinstance(it, PeopleBusy) for it in found) == 2 * MAX_WAITING
+        flood = [asyncio.ensure_future(people.check("anna", "x", f"b{n}")) for n in range(20)]
+        await asyncio.sleep(0)
+        await people.note("anna", "comment", "site", "")
+        assert (await people.audited(1))[0].what == "comment"
+        await asyncio.gather(*flood, return_exceptions=True)
         for _ in range(TRY_BURST):
             assert await people.check("anna", "x", "one address") is None
         with pytest.raises(PeopleBusy, match="one address has tried"):
@@ -184,7 +189,7 @@ def test_a_file_that_has_gone_opens_nothing(path: Path) -> None:
         before = people.is_on
         add(path, "token", scada="viewer")
         assert (before, people.is_on) == (False, True)
-        assert people.by_token(TOKEN) == Person("scada", "viewer", by="token")
+        assert people.by_token(TOKEN) == Person("scada", "viewer", by="token", token=digest(TOKEN))
         path.unlink()
         assert people.is_on
         with pytest.raises(AccountError):

@@ -64,7 +64,7 @@ def follow(test: Callable[[AlarmFeed, AlarmBoard, Journal], object]) -> None:
     async def run() -> None:
         source, board = Journal(), AlarmBoard()
         criteria = Criteria.of(Settings())
-        feed = AlarmFeed(source, criteria, board, lambda: NOW, 7.0)  # type: ignore[arg-type]
+        feed = AlarmFeed(source, criteria, board, lambda: NOW, 7.0, note_days=lambda _: None)  # type: ignore[arg-type]
         feed.start()
         try:
             await test(feed, board, source)  # type: ignore[misc]

@@ -74,7 +74,7 @@ def test_every_setting_goes_by_a_variable_and_by_a_line_of_a_file(spec: Any, con
         str: ("x", "x", "'x'"),
         tuple: (("x", "y"), "x,y", "['x', 'y']"),
     }[type(spec.default)]
-    for choice in get_args(types()[spec.name]) if spec.name.startswith("log") else ():
+    for choice in get_args(types()[spec.name]) if spec.name.startswith(("log", "http")) else ():
         value, text, in_toml = choice, choice, repr(choice)
     pair = {"tls_cert": "tls_key", "tls_key": "tls_cert"}.get(spec.name)
     options = {} if pair is None else {pair: "other"}

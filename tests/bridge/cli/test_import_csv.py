@@ -16,7 +16,7 @@ from tests.support.docs import block_named
 from tests.support.domains import ros_env
 from tests.support.journal import NOW, SECOND, kept, scan, select
 from tests.support.processes import Process, lupin_twin, url_of
-from tests.support.waiting import wait_for
+from tests.support.waiting import PATIENCE_S, wait_for
 
 WIDE = {
     "time": "at",
@@ -46,6 +46,34 @@ INFLUX = """#datatype,string,long,dateTime:RFC3339,double,string,string
 ,,1,2024-05-01T10:00:00Z,800,co2,A
 ,,1,2024-05-01T10:00:00Z,3.1,battery,A
 """.replace("\n,", "\n")
+
+
+# As InfluxDB 2 exports it: lines end with CRLF, the first column is empty, and series with other
+# tags have a header of their own.
+ANNOTATED = """#group,false,false,true,true,false,false,true,true,true
+#datatype,string,long,dateTime:RFC3339,dateTime:RFC3339,dateTime:RFC3339,double,string,string,string
+#default,last,,,,,,,,
+,result,table,_start,_stop,_time,_value,_field,_measurement,room
+,,0,2024-04-01T00:00:00Z,2024-06-01T00:00:00Z,2024-05-01T10:00:00.123456789Z,21.5,temp,climate,A
+,,0,2024-04-01T00:00:00Z,2024-06-01T00:00:00Z,2024-05-01T10:00:10Z,22.5,temp,climate,A
+
+#group,false,false,true,true,true,false,false,true,true,true
+#datatype,string,long,dateTime:RFC3339,dateTime:RFC3339,string,dateTime:RFC3339,double,string,string,string
+#default,last,,,,,,,,,
+,result,table,_start,_stop,bay,_time,_value,_field,_measurement,room
+,,1,2024-04-01T00:00:00Z,2024-06-01T00:00:00Z,7,2024-05-01T10:00:10Z,800,co2,climate,A
+,,1,2024-04-01T00:00:00Z,2024-06-01T00:00:00Z,7,2024-05-01T10:00:20Z,3.1,battery,climate,A
+
+""".replace("\n", "\r\n")
+# As the history page of Home Assistant downloads it, of several entities.
+HISTORY = """entity_id,state,last_changed
+sensor.bench_temperature,unknown,2024-05-01T09:59:00.000Z
+sensor.bench_temperature,21.5,2024-05-01T10:00:00.000Z
+sensor.bench_temperature,unavailable,2024-05-01T10:01:00.000Z
+sensor.bench_temperature,22.5,2024-05-01T10:02:00.250Z
+sensor.bench_humidity,55,2024-05-01T10:00:00.000Z
+light.bench,on,2024-05-01T10:00:00.000Z
+"""
 
 
 class Import:
@@ -117,11 +145,69 @@ def test_a_databases_export_names_the_sensor_in_a_column(
 ) -> None:
     assert importing.given(LONG, INFLUX).run("--write") == 0
     assert [row[3:5] for row in importing.rows()] == [
-        ('["co2"]', "[800.0]"),
-        ('["temperature"]', "[21.5]"),
+        ('["temperature","co2"]', "[21.5,800.0]"),
         ('["temperature"]', "[22.5]"),
     ]
     assert "refused: 1: _field 'battery' is not one of names (line 10)" in capsys.readouterr().out
+
+
+def test_influxdbs_annotated_export_has_tables_of_their_own_columns(
+    importing: Import, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert importing.given(LONG, ANNOTATED).run("--write") == 0
+    then_ns = int(datetime(2024, 5, 1, 10, tzinfo=UTC).timestamp()) * SECOND
+    assert [(row[1], row[3], row[4]) for row in importing.rows()] == [
+        (then_ns + 123_456_000, '["temperature"]', "[21.5]"),
+        (then_ns + 10 * SECOND, '["temperature","co2"]', "[22.5,800.0]"),
+    ]
+    out = capsys.readouterr().out.splitlines()
+    assert out[0] == "4 rows, 3 scans of 1 tags"
+    assert [line for line in out if "refused" in line] == [
+        "refused: 1: _field 'battery' is not one of names (line 13)"
+    ]
+
+
+def test_home_assistants_history_names_its_entities_and_says_what_is_not_known(
+    importing: Import, capsys: pytest.CaptureFixture[str]
+) -> None:
+    columns = yaml.safe_load(block_named("import-home-assistant").text)
+    assert importing.given(columns, HISTORY).run("--write") == 0
+    assert [(row[0], row[3], row[4]) for row in importing.rows()] == [
+        ("bench-1", '["temperature","humidity"]', "[21.5,55.0]"),
+        ("bench-1", '["temperature"]', "[22.5]"),
+    ]
+    out = capsys.readouterr().out.splitlines()
+    assert [line for line in out if "refused" in line] == [
+        "refused: 1: temperature is unknown (line 2)",
+        "refused: 1: temperature is unavailable (line 4)",
+        "refused: 1: entity_id 'light.bench' is not one of names (line 7)",
+    ]
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "1714558200",
+        "1714558200000",
+        "1714558200000000",
+        "1714558200000000000",
+        "2024-05-01T10:10:00Z",
+        " 2024-05-01T12:10:00+02:00",
+        "20240501T101000Z",
+    ],
+)
+def test_a_time_is_a_date_or_seconds_or_parts_of_them(importing: Import, text: str) -> None:
+    importing.given(WIDE, f"\ufeffat,bench,t,rh\n{text},A,1,\n").run("--write")
+    assert importing.rows()[0][1] == 1_714_558_200 * SECOND
+
+
+def test_of_many_refused_lines_the_first_are_named(
+    importing: Import, capsys: pytest.CaptureFixture[str]
+) -> None:
+    importing.given(WIDE, "at,bench,t,rh\n" + "never,A,1,\n" * 9).run()
+    assert "refused: 9: the time is no ISO 8601, and no seconds since 1970 (line 2, 3, 4)" in (
+        capsys.readouterr().out
+    )
 
 
 def test_what_came_before_a_twin_is_in_its_past(importing: Import) -> None:
@@ -137,6 +223,7 @@ def test_what_came_before_a_twin_is_in_its_past(importing: Import) -> None:
         ("2024-05-01T10:00:00,A,1,", "the time has no offset, and time_zone is not given"),
         ("1900-05-01T10:00:00Z,A,1,", "the time is before 1970"),
         ("-5,A,1,", "the time is no moment since 1970"),
+        ("1e30,A,1,", "the time is no moment since 1970"),
         ("1714558200,,1,", "no tag, or one of more than 256 characters"),
         ("1714558200,A,,", "no reading"),
         ("1714558200,A,warm,", "temperature is no number"),
@@ -169,6 +256,7 @@ def test_a_time_without_offset_is_in_the_zone_that_is_given(importing: Import) -
         (WIDE | {"sensor": "a", "value": "b"}, ROWS, "expected sensors, or sensor and value"),
         (WIDE | {"sensors": {"t": 5}}, ROWS, "sensors.t is 5, expected keys and values"),
         (WIDE | {"places": {"A": [1]}}, ROWS, "places.A is [1], expected [x, y] in m"),
+        (WIDE | {"places": {"A": [1, "x"]}}, ROWS, "places.A is [1, 'x'], expected [x, y] in m"),
         (WIDE, b"\xff\xfe\x00", "is no CSV in UTF-8"),
         (WIDE, 'at,bench,t,rh\n"' + "x" * 200_000, "is no CSV in UTF-8: field larger than"),
         (WIDE, "", "there is no column 'at', but none"),
@@ -223,7 +311,7 @@ def test_the_page_has_what_was_imported(domain: int, importing: Import) -> None:
         address = f"{url_of(server)}/api/history?tag_id=bench-1&sensor_type=temperature&from=0"
 
         def past() -> Any:
-            answer = httpx.get(address, trust_env=False)
+            answer = httpx.get(address, timeout=PATIENCE_S, trust_env=False)
             return answer.status_code == 200 and answer.json()
 
         found = wait_for(past, "the imported past")

@@ -20,6 +20,7 @@ from lupin_twin.core.state import Pose, Reading, Scan
 from lupin_twin.field.engine import FieldJob, FieldRefused, FieldRequest
 from lupin_twin.field.grid import FieldGrid
 from lupin_twin.ros.node import TwinNode
+from lupin_twin.runtime.estimate_rounds import ReportRequest
 from lupin_twin.runtime.workers import ShouldStop
 from tests.support.waiting import PATIENCE_S, until
 
@@ -59,7 +60,7 @@ class Stage:
         self.held |= set(requests)
         tasks = [asyncio.create_task(self.twin.field(request)) for request in requests]
         await until(lambda: len(self.computed) == len(set(requests)), "the computations")
-        await until(lambda: self.twin.calls_waiting == 0, "everybody to have asked")
+        await until(lambda: self.twin.thread.calls_waiting == 0, "everybody to have asked")
         return tasks
 
 
@@ -107,7 +108,7 @@ async def test_a_field_is_computed_once_until_something_is_recorded(
         np.testing.assert_array_equal(first.grid.values, np.full(16, 400.0, np.float32))
 
         await stage.record("1", 500.0)
-        counts = stage.twin.cache_counts()
+        counts = stage.twin.update.cache
         assert (counts.hits, counts.misses, counts.entries) == (1, 1, 1)
         assert counts.bytes == first.grid.values.nbytes
         newer = await stage.twin.field(REQUEST)
@@ -121,7 +122,6 @@ async def test_a_heavy_request_does_not_hold_up_another_one(
     async with stage_of() as stage:
         (heavy,) = await stage.waiting(REQUEST)
         assert (await stage.twin.field(OTHER)).grid.width == 8
-        assert await stage.twin.history("1") is None
         assert not heavy.done()
         stage.gate.set()
         assert (await heavy).grid.width == 4
@@ -162,7 +162,7 @@ async def test_a_computation_that_nobody_waits_for_is_taken_back(
         stage.gate.set()
         await until(lambda: workers.running == 0, "the end of both at work")
         assert len(stage.computed) == 2, "what was in the queue never began"
-        assert stage.twin.cache_counts().entries == 0, "neither was computed to its end"
+        assert stage.twin.update.cache.entries == 0, "neither was computed to its end"
 
 
 async def test_a_refusal_is_get_fields_own(domain: int, stage_of: Callable[..., Any]) -> None:
@@ -191,7 +191,7 @@ async def test_what_takes_too_long_ends_by_the_setting_that_says_so(
             held = asyncio.create_task(stage.twin.thread.call(hold))
             await until(busy.is_set, "the thread to be held")
             with pytest.raises(TwinTimeoutError):
-                await stage.twin.history("1")
+                await stage.twin.estimate_report(ReportRequest("co2"))
         with pytest.raises(TwinTimeoutError, match=r"within 0\.2 s"):
             await stage.twin.field(REQUEST)
         stage.gate.set()

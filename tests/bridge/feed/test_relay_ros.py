@@ -85,7 +85,7 @@ async def test_a_twins_topics_come_as_they_are_on_the_wire(domain: int, source_t
             each.close()
         left = before - len(listening)
         await until_answered(lambda: thread.call(count), "its leaving", lambda it: it == left)
-        assert (len(relay), stage.source.callback_errors) == (0, 0)
+        assert (len(relay), stage.source.thread.callback_errors) == (0, 0)
 
         names = stage.source.names()
         assert (names.field_layers, names.tags_layer, names.planters_layer) == (

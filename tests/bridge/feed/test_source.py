@@ -16,15 +16,18 @@ from lupin_bridge.feed.local import LocalTwin
 from lupin_bridge.feed.query import Itself
 from lupin_bridge.feed.source import (
     STUCK_AFTER_S,
+    ThreadState,
     TwinSource,
     TwinUnavailableError,
     TwinUpdate,
     ailment,
 )
 from lupin_bridge.feed.web import WebTwin
+from lupin_bridge.past.estimate import ReadingsAt
+from lupin_twin.core.history import LatestRequest
 from lupin_twin.core.past import PastRefused, SeriesRequest
 from lupin_twin.core.state import Reading
-from lupin_twin.estimate.engine import EstimateRequest
+from lupin_twin.estimate.engine import EstimateRequest, TagPast
 from lupin_twin.field.engine import FieldRefused, FieldRequest
 from lupin_twin.runtime.estimate_rounds import ReportRequest
 from tests.support.messages import discovered, occupancy_grid, pose, scan
@@ -92,7 +95,7 @@ async def test_a_source_tells_of_every_change_and_of_what_it_is_asked(
 ) -> None:
     async with stage_of(source_type, domain) as stage:
         source, peer = stage.source, stage.peer
-        assert source.is_alive
+        assert source.thread.is_alive
         assert source.occupancy_map() is None
         revisions = []
 
@@ -116,33 +119,25 @@ async def test_a_source_tells_of_every_change_and_of_what_it_is_asked(
         revisions.append(stage.told[-1].revision)
         assert len(set(revisions)) == 3
 
-        # A state's times may come behind it.
         history = await until_answered(
-            lambda: source.history("1"), "the scan", lambda it: it is not None and it.scans
+            lambda: source.ask(Itself(LatestRequest("1", source.buffer_len)), 0.0),
+            "the scan",
+            lambda it: it.of("1").scans,
         )
-        assert history is not None
-        assert [(scan.stamp_ns, scan.readings[0].value) for scan in history.scans] == [
+        assert [(scan.stamp_ns, scan.readings[0].value) for scan in history.of("1").scans] == [
             (5_000_000_000, 400.0)
         ]
-        assert await source.history("nobody") is None
         assert stage.told[-1].twin_count == 1
         assert source.names().state_topic == "/twin/state"
         assert source.rules().max_grid_cells == 1000
-        assert (source.callback_errors, source.calls_waiting) == (0, 0)
+        assert (source.thread.callback_errors, source.thread.calls_waiting) == (0, 0)
         with pytest.raises(FieldRefused, match="sensor_type is empty"):
             await source.field(FieldRequest("", 0.5, 0.0, 0.0, 1.0, 1.0))
     # A thread that has not ended in time is left behind, and ends for itself.
-    await until(lambda: not source.is_alive, "its end")
+    await until(lambda: not source.thread.is_alive, "its end")
     assert stage.deaths == []
     with pytest.raises(TwinUnavailableError):
         await source.field(REQUEST)
-
-
-class Thread:
-    """What `ailment` looks at."""
-
-    def __init__(self, is_alive: bool, stuck_s: float) -> None:
-        self.is_alive, self.stuck_s = is_alive, stuck_s
 
 
 @pytest.mark.parametrize(
@@ -158,7 +153,7 @@ class Thread:
 def test_a_thread_that_only_a_restart_helps_is_told(
     is_alive: bool, stuck_s: float, said: str | None
 ) -> None:
-    assert ailment(Thread(is_alive, stuck_s)) == said  # type: ignore[arg-type]
+    assert ailment(ThreadState(is_alive, stuck_s)) == said
 
 
 @pytest.mark.parametrize("source_type", SOURCES)
@@ -195,11 +190,8 @@ async def test_a_source_tells_of_the_past(domain: int, source_type: type) -> Non
             await source.ask(Itself(2**31 * S - 1), 0.0)
 
         box = FieldRequest("co2", 0.5, 0.0, 0.0, 3.0, 1.0)
-        result = await source.estimate(EstimateRequest(box, 55 * S))
-        assert (result.estimate.sample_count, result.estimate.reading_count) == (1, 2)
-        assert result.estimate.grid.mean.shape == (2, 6)
-        assert source.estimate_revision(EstimateRequest(box, 55 * S)) == result.revision
-        assert source.estimate_revision(EstimateRequest(box, 54 * S)) is None
+        [read] = await source.ask(Itself(ReadingsAt("co2", 55 * S, source.day_length_s)), 0.0)
+        assert read == TagPast("1", 0.5, 2.5, ((5 * S, 400.0), (50 * S, 500.0)))
         with pytest.raises(FieldRefused, match="no tag has a reading"):
             await source.estimate(EstimateRequest(box))
 

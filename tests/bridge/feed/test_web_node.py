@@ -19,7 +19,6 @@ from lupin_bridge.feed.ros_thread import forward
 from lupin_bridge.feed.web_node import WebNode
 from lupin_twin.core.diagnostics import Finding
 from lupin_twin.core.drops import Counts, Recent
-from lupin_twin.core.history import TagHistory
 from lupin_twin.core.parameters import ParameterError
 from lupin_twin.core.state import NANOSECONDS_PER_SECOND as S
 from lupin_twin.core.state import Attempt, Reading, Snapshot, TagState
@@ -167,9 +166,6 @@ def spare() -> None:
     """What has been waited for comes with the next state."""
 
 
-# --- history ------------------------------------------------------------------------------------
-
-
 def scanned(at_s: int, value: float = 1.0, tag_id: str = "1") -> TagState:
     """A tag as it is after one scan."""
     at_ns = at_s * S
@@ -177,40 +173,13 @@ def scanned(at_s: int, value: float = 1.0, tag_id: str = "1") -> TagState:
     return TagState(tag_id, None, readings, at_ns, last_try=Attempt(at_ns))
 
 
-def co2(past: TagHistory | None) -> list[tuple[float, float]]:
-    assert past is not None
-    assert past.is_known
-    return [(scan.stamp_ns / S, scan.readings[0].value) for scan in past.scans]
-
-
-def test_history_is_what_was_seen_from_here(domain: int, peer: Peer) -> None:
-    with stage_in(domain, "--ros-args", "-p", "buffer_len:=2") as stage:
-        assert stage.node.history_of("1") is None
-        for at_s, value in ((6, 1.0), (7, 2.0), (7, 2.0), (8, 3.0)):
-            stage.take_with_times(peer, scanned(at_s, value))
-        assert co2(stage.node.history_of("1")) == [(7.0, 2.0), (8.0, 3.0)]
-        stage.take_with_times(peer, scanned(1, tag_id="2"))
-        assert stage.node.history_of("1") is None
-        stage.take_with_times(peer, scanned(1, tag_id="2"), TagState("1"))
-        assert co2(stage.node.history_of("1")) == [], "a successor that knows fewer starts anew"
-
-
-def test_history_follows_a_clock_that_goes_back_as_the_twins_does(stage: Stage, peer: Peer) -> None:
-    # The third is the twin's last reading held to the new time, the fourth a new one.
-    for now_s, at_s, value in ((101, 100, 1.0), (201, 200, 2.0), (7, 7, 2.0), (10, 9, 3.0)):
-        stage.take_with_times(peer, scanned(at_s, value), at_s=now_s)
-    assert co2(stage.node.history_of("1")) == [(7.0, 1.0), (7.0, 2.0), (9.0, 3.0)]
-
-
 # --- times --------------------------------------------------------------------------------------
 
 
-def test_a_twin_that_tells_no_times_has_no_history(stage: Stage, peer: Peer) -> None:
+def test_a_twin_that_tells_no_times_is_shown_without_them(stage: Stage, peer: Peer) -> None:
     snapshot = stage.take(peer, tag("1"))
     assert not snapshot.has_times
     assert snapshot.tags[0].readings[0].observed_at_ns is None
-    assert stage.node.history_of("1") == TagHistory(is_known=False)
-    assert stage.node.history_of("2") is None
 
 
 def test_a_state_waits_for_its_times_and_for_no_others(stage: Stage, peer: Peer) -> None:

@@ -286,6 +286,7 @@ def test_a_site_that_the_database_takes_too_long_over_costs_no_other_its_status(
     write(journal, scans_lately())
     forward_once(archive, journal)
     archive.copy_site("gh2")
+    archive.keep_live()
     # As `statement_timeout` ends it.
     archive.do(
         "CREATE FUNCTION ended() RETURNS boolean LANGUAGE plpgsql AS $$ BEGIN"

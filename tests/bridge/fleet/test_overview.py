@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import time
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
+from xml.etree import ElementTree
 
 import pytest
 
 from tests.support.archive import Archive, forward_once, forwarder
 from tests.support.fleet import fleet, frames, scans_lately, wall, write
-from tests.support.journal import scan
+from tests.support.journal import kept, scan
 from tests.support.postgres import server
 from tests.support.waiting import wait_for
 
@@ -26,7 +28,7 @@ def test_a_site_that_is_forwarded_is_live_and_judged(archive: Archive, journal: 
         found = page.site(is_live=True, verdict="healthy", active_alarms=0)
     assert found.keys() == {
         "site", "name", "verdict", "last_verdict", "active_alarms", "last_received", "lag_s",
-        "is_live", "origin",
+        "is_live", "origin", "map",
     }  # fmt: skip
     assert abs(found["last_received"]["sec"] - time.time()) < 120
     assert 0 <= found["lag_s"] < 10
@@ -61,7 +63,9 @@ def test_who_is_not_forwarded_is_silent_and_what_was_known_is_the_last(
         after = page.site(is_live=False)
         assert after["verdict"] == "unknown"
         assert after["last_verdict"] == "critical"
-        assert after["active_alarms"] == before["active_alarms"]
+        # And that it is silent.
+        count = before["active_alarms"] + 1
+        page.site(is_live=False, active_alarms=count)
         assert after["lag_s"] >= 10
         status = page.http.get("/sites/gh1/readyz")
         assert status.status_code == 503
@@ -77,6 +81,35 @@ def test_who_is_not_forwarded_is_silent_and_what_was_known_is_the_last(
         found = wait_for(silence, "the alarm of a twin that is silent")
         assert found is not None
         assert found["raised_at"]["sec"] <= time.time() - 10
+        # The same of all sites.
+        every = page.http.get("/api/alarms").json()
+        assert every["total"] == count
+        (silent,) = [it for it in every["alarms"] if it["reason"]["kind"] == "silent"]
+        assert (silent["site"], silent["is_live"]) == ("gh1", False)
+        assert silent["id"] == found["id"]
+        # Who is heard again is not silent any more.
+        archive.keep_live()
+        page.site(is_live=True, active_alarms=before["active_alarms"])
+
+
+def test_what_was_known_last_of_a_silent_site_does_not_grow_old(
+    archive: Archive, journal: Path
+) -> None:
+    days_ns = 3 * 86_400 * 10**9
+    then = replace(wall(), stamp_ns=wall().stamp_ns - days_ns)
+    hot = [
+        scan(str(tag), then.stamp_ns - minute * 60 * 10**9, temperature=45.0)
+        for minute in (3, 2, 1)
+        for tag in range(3)
+    ]
+    kept(journal, hot, then)
+    forward_once(archive, journal)
+    archive.do("UPDATE forwarder SET heard_at = now() - INTERVAL '3 days'")
+    with fleet(archive) as page:
+        found = page.site(is_live=False, last_verdict="critical", active_alarms=4)
+        assert found["verdict"] == "unknown"
+        assert found["lag_s"] == pytest.approx(days_ns / 1e9, abs=60)
+        assert page.http.get("/sites/gh1/readyz").json()["twin"] != "live"
 
 
 def test_an_archive_that_is_down_is_told_and_comes_back(journal: Path) -> None:
@@ -120,7 +153,7 @@ def test_a_site_whose_rows_cannot_be_read_is_unknown_and_costs_no_other_its_stat
         forward_once(site, path)
     archive.do("UPDATE scan SET readings = '{\"no\": \"list\"}' WHERE site = 'gh1'")
     with fleet(archive) as page:
-        page.site("gh2", last_verdict="healthy", active_alarms=0)
+        page.site("gh2", last_verdict="healthy")
         assert page.site("gh1", last_verdict=None, active_alarms=None)["verdict"] == "unknown"
         said = "site gh1 cannot be judged: its status is unknown"
         wait_for(lambda: said in page.process.output, said)
@@ -132,7 +165,7 @@ def test_replicas_give_the_same_etag(archive: Archive, journal: Path) -> None:
     # Until it counts as silent it is about to change.
     with fleet(archive) as one, fleet(archive) as other:
         for page in (one, other):
-            page.site(is_live=False, last_verdict="healthy", active_alarms=0)
+            page.site(is_live=False, last_verdict="healthy", active_alarms=1)
         tags = [page.http.get("/api/sites").headers["etag"] for page in (one, other)]
         assert tags[0] == tags[1]
         found = other.http.get("/api/sites", headers={"If-None-Match": tags[0]})
@@ -149,3 +182,40 @@ def test_an_archive_without_sites_is_an_empty_overview(archive: Archive) -> None
         metrics = page.http.get("/metrics").text
         assert "lupin_fleet_archive_reachable 1" in metrics
         assert "lupin_fleet_sites 0" in metrics
+
+
+def test_a_small_map_of_each_site(archive: Archive, journal: Path) -> None:
+    write(journal, scans_lately(tags=30))
+    with forwarder(archive, journal), fleet(archive) as page:
+        found = page.site(is_live=True, verdict="healthy")
+        path = "/api/sites/gh1/map.svg"
+        picture = page.http.get(path)
+        assert picture.headers["content-type"] == "image/svg+xml"
+        assert ElementTree.fromstring(picture.text).tag.endswith("svg")
+        assert dots_of(picture.text).keys() == {"healthy"}
+        assert len(dots_of(picture.text)["healthy"]) == 30
+        # A few hundred bytes, of which the dots are sent to nobody who does not look.
+        assert len(picture.content) < 1_000
+        again = page.http.get(path, headers={"If-None-Match": picture.headers["etag"]})
+        assert again.status_code == 304
+        now_ns = wall().stamp_ns
+        write(journal, [scan("0", now_ns + n, temperature=45.0) for n in range(2)])
+        page.site(verdict="critical")
+        wait_for(lambda: page.sites()["gh1"]["map"] != found["map"], "another map")
+        assert len(dots_of(page.http.get(path).text)["critical"]) == 1
+        for nowhere in ("/api/sites/gh2/map.svg", "/api/sites/gh1/map.png"):
+            assert page.http.get(nowhere).status_code == 404
+
+
+def dots_of(picture: str) -> dict[str, list[str]]:
+    """Places by verdict."""
+    paths = [it for it in ElementTree.fromstring(picture) if it.tag.endswith("path")]
+    return {it.attrib["class"]: it.attrib["d"].split("M")[1:] for it in paths}
+
+
+def test_a_site_without_a_place_has_no_map(archive: Archive, journal: Path) -> None:
+    write(journal, [scan("0", wall().stamp_ns)])
+    forward_once(archive, journal)
+    with fleet(archive) as page:
+        assert page.site(last_verdict="healthy")["map"] is None
+        assert page.http.get("/api/sites/gh1/map.svg").status_code == 404

@@ -2,25 +2,31 @@
 
 from __future__ import annotations
 
+import io
 import time
 from contextlib import closing
+from functools import partial
 from pathlib import Path
 
 import httpx
 import psycopg
+from PIL import Image
 
 from lupin_bridge.fleet.site_log import SiteConnection
 from lupin_twin.core.past import SeriesRequest
-from lupin_twin.core.writes import RecentRequest, WritesRequest
+from lupin_twin.core.writes import RecentRequest, ScansRequest, WritesRequest
+from lupin_twin.field.explored import OccupancyMap
+from lupin_twin.journal.floor_plan import text_of
 from lupin_twin.journal.fold import state_at
-from lupin_twin.journal.follow import recent, writes
+from lupin_twin.journal.follow import recent, scans, writes
 from lupin_twin.journal.queries import series
 from lupin_twin.journal.retention import kept
 from lupin_twin.journal.rows import newest_of_tag
 from lupin_twin.journal.schema import open_reader
+from tests.support import maps
 from tests.support.archive import Archive, forward_once, forwarder
-from tests.support.fleet import fleet, scans_lately, write
-from tests.support.journal import look, scan
+from tests.support.fleet import Page, fleet, scans_lately, write
+from tests.support.journal import SECOND, look, opened, pin, scan
 from tests.support.waiting import wait_for
 
 MINUTE_NS = 60_000_000_000
@@ -43,6 +49,10 @@ def test_every_query_of_a_journal_is_answered_alike(archive: Archive, tmp_path: 
             assert one == other
             one_recent, other_recent = (recent(log, RecentRequest(at_ns)) for log in logs)
             assert one_recent == other_recent
+            between = ScansRequest(at_ns - 3 * MINUTE_NS, at_ns, frozenset({"temperature"}))
+            one_part, other_part = (scans(log, between) for log in logs)
+            assert one_part == other_part
+            assert bool(one_part) is bool(at_ns)
         assert recent(local, RecentRequest(now_ns))
         first, second = (writes(log, WritesRequest(0, 86_400.0, 1000, 100)) for log in logs)
         assert first.writes == second.writes
@@ -52,6 +62,24 @@ def test_every_query_of_a_journal_is_answered_alike(archive: Archive, tmp_path: 
             one_tag, other_tag = (newest_of_tag(log, 1, tag, 4) for log in logs)  # type: ignore[arg-type]
             assert one_tag == other_tag
         assert kept(local) == kept(logs[1])  # type: ignore[arg-type]
+
+
+def test_a_greenhouse_is_also_judged_by_its_last_day_as_on_its_own_page(
+    archive: Archive, tmp_path: Path
+) -> None:
+    journal = tmp_path / "journal.sqlite"
+    now_ns = time.time_ns()
+    cold = [scan("a", now_ns - n * 60 * MINUTE_NS, temperature=13.0) for n in range(60, 0, -1)]
+    write(journal, [*cold, scan("a", now_ns, temperature=20.0)])
+    with forwarder(archive, journal), fleet(archive) as page:
+        page.site(verdict="stressed")
+
+        def reasons(query: str = "") -> list[str]:
+            tags = page.http.get(f"/sites/gh1/api/health{query}").json()["tags"]
+            return [reason["sensor"] for reason in tags.get("a", {}).get("reasons", ())]
+
+        wait_for(lambda: reasons() == ["temperature_24h_mean"], "the same on its page")
+        assert reasons(f"?at={now_ns / 1e9 + 0.001:.3f}") == ["temperature_24h_mean"]
 
 
 def test_the_whole_page_below_its_path_live_and_past(archive: Archive, tmp_path: Path) -> None:
@@ -87,9 +115,104 @@ def test_the_whole_page_below_its_path_live_and_past(archive: Archive, tmp_path:
         assert len(get("api/tags/0/history").json()["sensors"][0]["values"]) == 6
         assert get("api/export.csv").text.count("\n") == 31
         assert get("api/timeline").status_code == 200
-        # Where a map would be there is none; estimates are the twin's own.
+        estimate = get(f"api/estimate?sensor_type=temperature&resolution=0.5&at={at}").json()
+        assert estimate["sample_count"] == 5
+        # The twin has sent no map; and how right estimates were, it has counted itself.
         assert get("api/map").status_code == 404
-        assert "estimates are made by the twin" in get("api/estimate/quality").json()["detail"]
+        assert "is known to the twin" in get("api/estimate/quality").json()["detail"]
         wait_for(lambda: get("api/alarms").json()["source"] == "journal", "its alarms")
         write(journal, [scan("new", time.time_ns(), temperature=22.0)])
         wait_for(lambda: len(get("api/state").json()["tags"]) == 6, "the tag that is new")
+
+
+def test_the_floor_plan_is_that_of_the_twin(archive: Archive, tmp_path: Path) -> None:
+    # In half of it nobody has been: tags 0 to 2 stand in the other.
+    floor = maps.map_of([[0] * 6 + [-1] * 6] * 8, resolution=0.5)
+    journal = tmp_path / "journal.sqlite"
+    write(journal, scans_lately())
+    with forwarder(archive, journal), fleet(archive) as page:
+        page.site(is_live=True, verdict="healthy")
+
+        def get(path: str) -> httpx.Response:
+            return page.http.get(f"/sites/gh1/api/{path}")
+
+        def shows(it: OccupancyMap) -> bool:
+            return bool(get("map").json().get("info", {}).get("width") == it.width)
+
+        whole = "field?sensor_type=temperature&resolution=0.5"
+        before = after = get(whole)
+        assert get("map").status_code == 404
+        for shown in (floor, maps.map_of([[0, 0]])):
+            with opened(journal) as file:
+                file.note_map(text_of(shown))
+            write(journal, [scan("0", time.time_ns(), temperature=22.0)])
+            wait_for(partial(shows, shown), "the floor plan")
+            assert get("map").json()["info"]["resolution"] == shown.resolution
+            with Image.open(io.BytesIO(get("map.png").content)) as picture:
+                assert picture.size == (shown.width, shown.height)
+            if shown is floor:
+                after = get(whole)
+        # Where nobody has been there is no field, as at the greenhouse; and it is another answer.
+        assert 0 < known(after) < known(before)
+        assert after.headers["etag"] != before.headers["etag"]
+        with opened(journal) as file:
+            file.note_map("")  # one that is too large
+        write(journal, [scan("0", time.time_ns(), temperature=22.0)])
+        wait_for(lambda: get("map").status_code == 404, "no floor plan")
+
+
+def known(field: httpx.Response) -> int:
+    return sum(value is not None for value in field.json()["values"])
+
+
+def test_a_floor_plan_that_is_none_costs_the_page_nothing(archive: Archive, tmp_path: Path) -> None:
+    journal = tmp_path / "journal.sqlite"
+    write(journal, scans_lately())
+    forward_once(archive, journal)
+    archive.do("INSERT INTO meta VALUES ('gh1', 'map', '{\"width\": 5}')")
+    with fleet(archive) as page:
+        page.site(last_verdict="healthy")
+        assert len(page.http.get("/sites/gh1/api/state").json()["tags"]) == 5
+        assert page.http.get("/sites/gh1/api/map").status_code == 404
+        assert "the floor plan of gh1 cannot be read" in page.process.output
+
+
+def test_estimates_are_made_of_the_log(archive: Archive, tmp_path: Path) -> None:
+    journal = tmp_path / "journal.sqlite"
+    now_ns = time.time_ns()
+    pins = [pin(str(tag), now_ns - 3600 * SECOND, float(tag)) for tag in range(6)]
+    scans = [
+        scan(str(tag), now_ns - minute * 60 * SECOND + tag, temperature=20.0 + tag)
+        for minute in range(50, 1, -2)
+        for tag in range(6)
+    ]
+    write(journal, [*pins, *scans])
+    forward_once(archive, journal)
+    archive.keep_live()
+    asked = {"sensor_type": "temperature", "resolution": "0.5"}
+    with fleet(archive) as one, fleet(archive) as other:
+        for page in (one, other):
+            page.site(verdict="healthy")
+
+        def estimate(page: Page, **more: str) -> httpx.Response:
+            return page.http.get("/sites/gh1/api/estimate", params={**asked, **more})
+
+        now = estimate(one)
+        assert now.status_code == 200, now.text
+        found = now.json()
+        assert found["sample_count"] == 6
+        # Warmer to the east, as the tags are.
+        means = found["mean"][: found["width"]]
+        assert means[0] < means[-1]
+
+        def is_alike() -> bool:
+            """A minute may begin between two answers."""
+            return bool(estimate(one).headers["etag"] == estimate(other).headers["etag"])
+
+        wait_for(is_alike, "one ETag in both replicas")
+        at = f"{now_ns / 1e9 - 1200:.0f}"
+        past = [estimate(page, at=at) for page in (one, other)]
+        assert past[0].status_code == 200, past[0].text
+        assert past[0].content == past[1].content
+        assert past[0].json()["reading_count"] < found["reading_count"]
+        assert estimate(one, sensor_type="nothing").status_code == 400

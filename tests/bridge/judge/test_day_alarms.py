@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
+import math
 import random
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from itertools import count
 
 import pytest
 
-from lupin_bridge.judge.alarm import Alarm, reasons_of_days
+from lupin_bridge.judge.alarm import Alarm
 from lupin_bridge.judge.alarm_fold import Follower
+from lupin_bridge.judge.days import COUNTS_NS, SINCE_NS, days_of
 from lupin_bridge.judge.derived import DAILY, DAY_NS
 from lupin_bridge.judge.options import own_sensors
 from lupin_bridge.judge.verdict import Verdict
+from lupin_twin.core.state import Reading
 from lupin_twin.core.writes import PastWrite, RunSpan
 from tests.support.ordinary_day import ordinary_days
 
@@ -45,8 +48,16 @@ def scans(
     ]
 
 
+def day_number(at_ns: int) -> int:
+    return (at_ns - DAWN * HOUR) // DAY_NS
+
+
+def new_follower() -> Follower:
+    return Follower(own_sensors(), day_of, SPANS, day_number=day_number)
+
+
 def found(heard: Iterable[PastWrite]) -> list[Alarm]:
-    follower = Follower(own_sensors(), day_of, SPANS)
+    follower = new_follower()
     follower.take(heard)
     alarms = [one for one in follower.found(40 * DAY_NS).alarms if one.reason.sensor in DAILY]
     return sorted(alarms, key=lambda one: (one.raised_at_ns, one.id))
@@ -82,9 +93,10 @@ def test_the_value_is_that_of_the_history_at_that_moment() -> None:
         assert alarm.reason.value == pytest.approx(at_dawn)
 
 
-def test_near_the_limit_of_its_range_it_is_one_episode() -> None:
-    wobbling = found(scans({"temperature": [16.9, 17.2, 16.9, 17.4, 20.0, 20.0]}))
-    assert [(one.raised_at_ns, one.cleared_at_ns) for one in wobbling] == [(dawn(1), dawn(5))]
+def test_a_quantity_of_a_day_has_no_deadband() -> None:
+    wobbling = found(scans({"temperature": [16.8, 17.2, 16.8, 17.4, 20.0]}))
+    told = [(one.raised_at_ns, one.cleared_at_ns) for one in wobbling]
+    assert told == [(dawn(1), dawn(2)), (dawn(3), dawn(4))]
 
 
 def test_of_too_little_of_a_day_nothing_is_said() -> None:
@@ -101,7 +113,7 @@ def test_what_comes_late_puts_the_day_right() -> None:
     late = [one for one in heard if dawn(0) + 4 * HOUR < one.stamp_ns < dawn(0) + 15 * HOUR]
     early = [one for one in heard if one not in late]
     assert [one.raised_at_ns for one in found(early)] == [dawn(2)]
-    follower = Follower(own_sensors(), day_of, SPANS)
+    follower = new_follower()
     follower.take(early)
     follower.found(40 * DAY_NS)
     follower.take(late)
@@ -128,26 +140,68 @@ def test_a_sensor_that_reads_the_quantity_goes_first() -> None:
     assert found(own) == []
 
 
-def test_without_a_clock_a_day_is_24_hours() -> None:
+def test_without_a_clock_a_day_is_24_hours_of_ros_time() -> None:
     follower = Follower(own_sensors(), lambda _, __: True, SPANS)
     follower.take(scans({"temperature": [14.0] * 3}, first_h=DAWN + 5))
     [cold] = [one for one in follower.found(40 * DAY_NS).alarms if one.reason.sensor in DAILY]
-    assert (cold.reason.sensor, cold.raised_at_ns) == (MEAN, dawn(1) + 5 * HOUR)
+    assert (cold.reason.sensor, cold.raised_at_ns) == (MEAN, 2 * DAY_NS)
 
 
-def test_an_alarm_is_a_reason_from_when_it_was_raised_until_it_was_cleared() -> None:
-    alarms = found(scans({"temperature": [14.0, 20.0, 20.0]}))
-    raised, cleared = dawn(1), dawn(2)
-    told = [bool(reasons_of_days(alarms, at)) for at in (raised - 1, raised, cleared - 1, cleared)]
-    assert told == [False, True, True, False]
-    assert not reasons_of_days(alarms)
-    assert reasons_of_days(found(scans({"temperature": [14.0, 14.0]})))["a"][0].sensor == MEAN
+def test_the_value_of_the_last_whole_day_is_known_until_the_next_scan_after_a_dawn() -> None:
+    heard = scans({"temperature": [14.0, 20.0, 20.0]})
+
+    def mean(at_ns: int) -> float | None:
+        follower = new_follower()
+        follower.take(one for one in heard if one.stamp_ns <= at_ns)
+        days = follower.found(at_ns).days.get("a", ())
+        return next((day.value for day in days if day.name == MEAN), None)
+
+    assert mean(dawn(1) - 1) is None
+    assert mean(dawn(1)) == mean(dawn(2) - 1) == pytest.approx(14.0, abs=0.2)
+    assert mean(dawn(2)) == pytest.approx(20.0, abs=0.2)
+
+
+def test_a_day_that_was_left_out_is_not_judged_by_the_one_before() -> None:
+    heard = scans({"temperature": [14.0, 14.0, 14.0, 14.0]})
+    late = [one for one in heard if not dawn(1) <= one.stamp_ns < dawn(2)]
+    assert [one.raised_at_ns for one in found(late)] == [dawn(3)]
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_what_a_moments_last_scans_say_of_days_is_what_all_of_the_log_up_to_then_does(
+    seed: int,
+) -> None:
+    chance = random.Random(seed)
+    # Of some days the last hours are missing, and much of the next one.
+    gaps = [(dawn(day) + 20 * HOUR, dawn(day) + 44 * HOUR) for day in range(seed % 3, 7, 3)]
+    heard = [
+        replace(one, values=(chance.choice([5.0, 14.0, 20.0, math.nan, 1e9]),))
+        for one in scans({"temperature": [0.0] * 7}, every_h=chance.choice([0.5, 1.0]))
+        if not any(start < one.stamp_ns < end for start, end in gaps)
+    ]
+    known = 0
+    for at_ns in [*(end + COUNTS_NS for _, end in gaps), *range(dawn(1), 8 * DAY_NS, 11 * HOUR)]:
+        by_then = [one for one in heard if one.stamp_ns <= at_ns]
+        last = [one for one in by_then if at_ns - SINCE_NS <= one.stamp_ns]
+        past = days_of(last, own_sensors(), is_day, day_number)
+        follower = new_follower()
+        chance.shuffle(by_then)
+        follower.take(by_then)
+        assert counting(past, at_ns) == counting(follower.found(at_ns).days, at_ns)
+        known += len(counting(past, at_ns))
+    assert known
+
+
+def counting(days: Mapping[str, Sequence[Reading]], at_ns: int) -> set[Reading]:
+    """Those that count at a moment."""
+    every = [day for of_tag in days.values() for day in of_tag]
+    return {day for day in every if at_ns - (day.observed_at_ns or 0) <= COUNTS_NS}
 
 
 @pytest.mark.parametrize("seed", [0, 1])
 def test_the_demos_ordinary_days_raise_none_where_nothing_else_is_wrong(seed: int) -> None:
     heard = ordinary_days(seed)
-    follower = Follower(own_sensors(), day_of, SPANS)
+    follower = new_follower()
     follower.take(heard)
     alarms = follower.found(heard[-1].stamp_ns).alarms
     of_days = {

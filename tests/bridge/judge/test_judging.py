@@ -361,11 +361,12 @@ def test_a_sensor_that_has_changed_is_a_reason_until_it_has_come_back() -> None:
     assert back.tags["a"] == before.tags["a"]
 
 
-def test_a_tag_is_also_judged_by_the_day_before_until_nothing_of_it_is_remembered() -> None:
-    cold = Reason(Kind.RANGE, Verdict.CRITICAL, "temperature_24h_mean", 11.0, 12.0, START)
+def test_a_tag_is_also_judged_by_the_day_before_for_thirty_hours() -> None:
+    day = Reading("temperature_24h_mean", 11.0, START)
+    cold = Reason(Kind.RANGE, Verdict.CRITICAL, day.name, 11.0, 12.0, START)
     judge = Judge(SENSORS, by_light)
 
-    def kinds(after_ns: int, **days: tuple[Reason, ...]) -> list[Kind]:
+    def kinds(after_ns: int, **days: tuple[Reading, ...]) -> list[Kind]:
         judge.note_days(days)
         now = snapshot(START + after_ns, GOOD)
         live = judge.see(now).tags["a"]
@@ -374,10 +375,13 @@ def test_a_tag_is_also_judged_by_the_day_before_until_nothing_of_it_is_remembere
         return [one.kind for one in live.reasons]
 
     assert kinds(S) == []
-    assert kinds(2 * S, a=(cold,)) == [Kind.RANGE]
-    assert kinds(3 * S) == []
-    assert kinds(24 * 60 * MINUTE, a=(cold,)) == [Kind.RANGE]
-    assert kinds(24 * 60 * MINUTE + 1, a=(cold,)) == [Kind.OLD]
+    assert kinds(2 * S, a=(day,)) == [Kind.RANGE]
+    assert kinds(3 * S, a=(replace(day, value=20.0),)) == []
+    assert kinds(4 * S) == []
+    days = {"a": (day,)}
+    assert kinds(30 * 60 * MINUTE, **days) == [Kind.RANGE, Kind.OLD]
+    # That it is over by itself is seen without any news.
+    assert kinds(30 * 60 * MINUTE + 1, **days) == [Kind.OLD]
 
 
 def test_a_first_round_that_stops_is_not_healthy_for_a_day() -> None:

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+from lupin_bridge.judge.days import TagDays
 from lupin_bridge.judge.derived import IsDay
 from lupin_bridge.judge.episodes import TagEpisodes
 from lupin_bridge.judge.options import own_sensors
@@ -10,7 +11,7 @@ S = 10**9
 
 
 def tag(recent_ns: int | None = None, is_day: IsDay = lambda _: True) -> TagPast:
-    episodes = TagEpisodes("a", 0, own_sensors())
+    episodes = TagEpisodes("a", 0, own_sensors(), TagDays(own_sensors()))
     return TagPast(episodes, recent_ns, lambda start, end, _: is_long(start, end), is_day)
 
 

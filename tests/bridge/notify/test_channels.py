@@ -5,8 +5,10 @@ from __future__ import annotations
 import asyncio
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
+from typing import Any
 
 from lupin_bridge.alarms.board import AlarmBoard
+from lupin_bridge.judge.options import Criteria
 from lupin_bridge.notify.channels import Channels
 from lupin_bridge.notify.destinations import Targets
 from lupin_bridge.notify.messages import GreenhouseState
@@ -24,6 +26,8 @@ class House:
 
     ros_time_ns = NOW_NS
     origin: Origin = "simulated"
+    criteria = Criteria.of(Settings())
+    source: Any = None  # of the past nothing is asked
 
     def __init__(self) -> None:
         board = Alarms()

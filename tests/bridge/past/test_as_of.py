@@ -131,13 +131,8 @@ def judged_at(at_s: float, *tags: TagState, before_s: Sequence[float] = ()) -> P
         PastWrite(number, 1, "a", int((1 - second) * NS), 0, 0, ("temperature",), (22.0,))
         for number, second in enumerate(before_s)
     ]
-    looking = Health(at_ns, CRITERIA).look()
-    assert next(looking) == at_ns
-    assert isinstance(looking.send(Snapshot(at_ns, "map", tags)), RecentRequest)
-    with pytest.raises(StopIteration) as end:
-        looking.send(tuple(recent))
-    plan: Plan = end.value.value
-    return plan
+    log: dict[Any, Any] = {at_ns: Snapshot(at_ns, "map", tags), RecentRequest(at_ns): tuple(recent)}
+    return Health(at_ns, CRITERIA).look(lambda need: log.get(need, ()))
 
 
 def verdict_of(plan: Plan) -> tuple[str, str]:

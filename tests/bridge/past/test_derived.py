@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from typing import Any
 
 import pytest
 
@@ -31,26 +30,21 @@ def is_day(at_ns: int) -> bool:
 
 def answer(request: SeriesRequest, known: Known) -> tuple[SeriesPast, list[SeriesRequest]]:
     """What is made of a house that has these readings, and what was asked for."""
-    looking, asked = derived.series(request, is_day), list[SeriesRequest]()
-    found: Any = None
-    try:
-        while True:
-            need = looking.send(found)
-            asked.append(need)
-            end_ns = need.end_ns or NOW_NS + len(asked)  # time goes on
-            of = known.get(need.sensor_type, {})
-            of = {at: value for at, value in of.items() if need.start_ns <= at < end_ns}
-            start_ns = need.start_ns or min(of, default=end_ns)
-            found = SeriesPast(start_ns, end_ns)
-            if len(of) > need.max_points:
-                found = replace(found, bucket_ns=end_ns)
-            else:
-                values = tuple(of.values())
-                found = SeriesPast(
-                    start_ns, end_ns, None, tuple(of), (1,) * len(of), values, values, values
-                )
-    except StopIteration as end:
-        return end.value, asked
+    asked: list[SeriesRequest] = []
+
+    def find(need: SeriesRequest) -> SeriesPast:
+        asked.append(need)
+        end_ns = need.end_ns or NOW_NS + len(asked)  # time goes on
+        of = known.get(need.sensor_type, {})
+        of = {at: value for at, value in of.items() if need.start_ns <= at < end_ns}
+        start_ns = need.start_ns or min(of, default=end_ns)
+        if len(of) > need.max_points:
+            return SeriesPast(start_ns, end_ns, end_ns)
+        values = tuple(of.values())
+        ones = (1,) * len(of)
+        return SeriesPast(start_ns, end_ns, None, tuple(of), ones, values, values, values)
+
+    return derived.series(request, is_day, find), asked
 
 
 def test_only_what_was_read_in_one_scan_and_can_be_is_paired() -> None:
@@ -132,18 +126,19 @@ def test_tags_as_of_a_moment_get_the_quantity_of_the_day_up_to_then() -> None:
     lit = TagState("a", readings=(Reading("light", 0.0, at_ns), Reading("co2", 1.0, at_ns)))
     other = TagState("b", readings=(Reading("co2", 1.0, at_ns),))
     own = TagState("c", readings=(Reading("light", 1.0, 1), Reading("daily_light_integral", 7.0)))
-    looking = derived.with_daily((lit, other, own), DAILY["daily_light_integral"], at_ns, is_day)
-    need = next(looking)
+    needs: list[SeriesRequest] = []
+    points = [it for it in COURSE["light"].items() if 36 * HOUR_NS <= it[0] <= at_ns]
+
+    def find(need: SeriesRequest) -> SeriesPast:
+        needs.append(need)
+        stamps, values = zip(*points, strict=True)
+        ones = (1,) * len(points)
+        return SeriesPast(need.start_ns, need.end_ns, None, stamps, ones, values, values, values)
+
+    daily = DAILY["daily_light_integral"]
+    found = derived.with_daily((lit, other, own), daily, at_ns, is_day, find)
+    [need] = needs
     assert (need.tag_id, need.sensor_type, need.start_ns) == ("a", "light", 36 * HOUR_NS)
-    points = [(at, value) for at, value in COURSE["light"].items() if need.start_ns <= at <= at_ns]
-    stamps, values = zip(*points, strict=True)
-    with pytest.raises(StopIteration) as end:
-        looking.send(
-            SeriesPast(
-                need.start_ns, need.end_ns, None, stamps, (1,) * len(points), values, values, values
-            )
-        )
-    found = end.value.value
     assert found[1:] == [other, own]
     reading = found[0].readings[-1]
     expected = DAILY["daily_light_integral"].at(at_ns, points, is_day)

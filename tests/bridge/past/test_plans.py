@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import json
 import pickle
 from dataclasses import replace
@@ -12,6 +11,7 @@ import pytest
 
 from lupin_bridge.field.formats import PNG
 from lupin_bridge.judge.options import Criteria
+from lupin_bridge.past.latest import LatestOfTag
 from lupin_bridge.past.plans import (
     Answered,
     ConditionalQuery,
@@ -26,9 +26,11 @@ from lupin_bridge.past.plans import (
 from lupin_bridge.past.query import PeriodQuery
 from lupin_bridge.serving.admission import Answer
 from lupin_bridge.settings import Settings
+from lupin_twin.core.history import History as TagHistory
+from lupin_twin.core.history import LatestRequest
 from lupin_twin.core.journal_condition import UNKNOWN
 from lupin_twin.core.past import Event, SeriesPast, SeriesRequest
-from lupin_twin.core.writes import RecentRequest
+from lupin_twin.core.state import Attempt, Reading, TagState
 from lupin_twin.field.idw import never
 from lupin_twin.runtime.workers import SMALL_S
 from tests.bridge.past.test_as_of import HOUSE, NS, asked
@@ -48,18 +50,13 @@ QUESTIONS: tuple[Query, ...] = (
 
 def answer(question: Query, has: str = "") -> Answered:
     """What is made of the house, and of series without an entry."""
-    looking = ConditionalQuery(question, has).look()
-    found: Any = None
-    try:
-        while True:
-            need = looking.send(found)
-            if isinstance(need, SeriesRequest):
-                found = SeriesPast(0, 9 * NS)
-            else:
-                found = () if isinstance(need, RecentRequest) else HOUSE
-    except StopIteration as end:
-        answered: Answered = end.value.do(never)
-        return answered
+    return ConditionalQuery(question, has).answer(found, never)
+
+
+def found(need: Any) -> Any:
+    if isinstance(need, SeriesRequest):
+        return SeriesPast(0, 9 * NS)
+    return HOUSE if isinstance(need, int) else ()
 
 
 @pytest.mark.parametrize("question", QUESTIONS, ids=lambda q: type(q).__name__)
@@ -75,11 +72,13 @@ def test_it_crosses_and_its_answer_is_the_same_there(question: Query) -> None:
 
 
 def test_a_timeline_asks_for_its_parts_one_by_one() -> None:
-    looking = Timeline(PeriodQuery(0, 9 * NS, 5), UNKNOWN).look()
-    needs = [next(looking)]
-    with contextlib.suppress(StopIteration):
-        while True:
-            needs.append(looking.send(SeriesPast(0, 9 * NS)))
+    needs: list[Any] = []
+
+    def find(need: Any) -> Any:
+        needs.append(need)
+        return found(need)
+
+    Timeline(PeriodQuery(0, 9 * NS, 5), UNKNOWN).look(find)
     assert {need.sensor_type for need in needs if isinstance(need, SeriesRequest)} == set(Event)
 
 
@@ -89,9 +88,9 @@ def test_a_large_body_goes_beside_the_rest() -> None:
         buffers: list[pickle.PickleBuffer] = []
         text = pickle.dumps(answered, 5, buffer_callback=buffers.append)
         assert (len(buffers), len(text) > length) == (beside, not beside)
-        found = pickle.loads(text, buffers=[buffer.raw() for buffer in buffers])
-        assert found.answer is not None
-        assert bytes(found.answer.body) == b"7" * length
+        there = pickle.loads(text, buffers=[buffer.raw() for buffer in buffers])
+        assert there.answer is not None
+        assert bytes(there.answer.body) == b"7" * length
 
 
 def test_a_tag_that_was_not_known_is_told_with_how_many_were() -> None:
@@ -113,3 +112,13 @@ def test_a_large_house_and_a_large_field_cost_more_than_small_ones() -> None:
     assert Timeline(PeriodQuery(0, 0, 1, "a"), UNKNOWN).cost_s(30) > SMALL_S
     for question in QUESTIONS[:5]:
         assert json.dumps(question.cost_s(0))
+
+
+def test_what_the_log_does_not_hold_yet_of_a_tag_is_told_from_its_state() -> None:
+    tag = TagState("a", None, (Reading("co2", 7.0, 5 * NS),), 5 * NS, last_try=Attempt(5 * NS))
+    for newest, values in ((tag, [7.0]), (None, [])):
+        log: dict[Any, Any] = {LatestRequest("a", 3): TagHistory()}
+        body = LatestOfTag("a", newest, 3).look(log.__getitem__).write(never).body
+        told = json.loads(bytes(body))
+        assert [each["value"] for sensor in told["sensors"] for each in sensor["values"]] == values
+        assert len(told["tries"]) == len(values)

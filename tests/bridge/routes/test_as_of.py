@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import threading
 from dataclasses import replace
 from typing import Any
 
@@ -16,7 +17,7 @@ from lupin_twin.field import engine
 from tests.bridge.routes.test_past import remembering
 from tests.support.inprocess import run
 from tests.support.past import NS, MadeUp
-from tests.support.waiting import until
+from tests.support.waiting import PATIENCE_S, until
 
 FIELD = "sensor_type=co2&resolution=0.5"
 PATHS = (
@@ -155,11 +156,11 @@ def test_what_was_written_is_kept(domain: int, monkeypatch: pytest.MonkeyPatch) 
 
 def test_who_asks_the_same_at_once_asks_once(domain: int) -> None:
     past = MadeUp(snapshot=house())
-    gate = asyncio.Event()
+    gate = threading.Event()
 
-    async def held(at_ns: int) -> Snapshot:
+    def held(at_ns: int) -> Snapshot:
         past.asked.append(at_ns)
-        await gate.wait()
+        gate.wait(PATIENCE_S)
         return past.snapshot
 
     async def test() -> None:
@@ -219,17 +220,16 @@ def test_what_nobody_remembers_is_told(domain: int, is_lasting: bool, status: in
 def test_a_client_that_leaves_takes_its_question_along(domain: int) -> None:
     ended = asyncio.Event()
 
-    async def for_ever(at_ns: int) -> Snapshot:
+    async def for_ever(*_: Any) -> Any:
         try:
             await asyncio.Event().wait()
         finally:
             ended.set()
-        raise AssertionError(at_ns)
 
     async def test() -> None:
         past = MadeUp()
         async with remembering(past) as it:
-            past.state_at = for_ever  # type: ignore[method-assign]
+            it.twin.ask = for_ever  # type: ignore[method-assign, assignment]
             asking = asyncio.create_task(it.http.get("/api/state?at=9"))
             await until(lambda: it.bridge.admission.being_computed == 1, "the question")
             asking.cancel()

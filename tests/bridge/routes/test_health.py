@@ -32,7 +32,7 @@ def test_a_live_bridge_is_healthy_and_ready() -> None:
 async def end_ros_thread(served: Running) -> None:
     """What no callback should do, and what must not go unseen: end the thread itself."""
     waiting = asyncio.create_task(served.in_ros_thread(lambda _: sys.exit("the end")))
-    await until(lambda: not served.twin.is_alive, "the end of the ROS thread")
+    await until(lambda: not served.twin.thread.is_alive, "the end of the ROS thread")
     waiting.cancel()
 
 
@@ -56,7 +56,9 @@ def test_when_the_ros_thread_ends_health_says_so_and_every_client_is_told(domain
             assert (answer.status_code, answer.json()["reason"]) == (503, "thread_dead")
             # What was known last is still told; what would need the thread is refused at once.
             assert (await served.http.get("/api/state")).status_code == 200
-            assert (await served.http.get("/api/tags/7/history")).status_code == 503
+            assert (
+                await served.http.get("/api/estimate/quality?sensor_type=co2")
+            ).status_code == 503
             answer = await served.http.get("/api/field?sensor_type=co2")
             assert (answer.status_code, answer.headers["retry-after"]) == (503, "3")
             async with connect(ws_url(served.url), proxy=None, open_timeout=PATIENCE_S) as late:
@@ -76,7 +78,7 @@ def test_a_callback_that_raises_is_counted_and_the_thread_lives_on(domain: int) 
             with Peer(domain) as peer:
                 store = await served.in_ros_thread(spoil)
                 peer.observe(scan("lost", {"co2": 1.0}))
-                await until(lambda: served.twin.callback_errors, "the error to be counted")
+                await until(lambda: served.twin.thread.callback_errors, "the error to be counted")
                 health = (await served.http.get("/healthz")).json()
                 assert health["ok"]
                 assert health["callback_errors"] >= 1

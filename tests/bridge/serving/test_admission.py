@@ -31,7 +31,7 @@ from tests.support.waiting import until
 
 ROUTES = ("/api/field", "/api/field.json", "/api/field.png", "/api/field.npy", "/api/field/quality")
 QUERY = "?sensor_type=co2&resolution=1&bbox_min_x=0&bbox_min_y=0&bbox_max_x=4&bbox_max_y=4"
-COMPUTED = ("/api/state", "/api/tags/1/history", "/metrics", "/docs")
+COMPUTED = ("/api/state", "/api/history?tag_id=1&sensor_type=co2", "/metrics", "/docs")
 
 
 # --- the rules ----------------------------------------------------------------------------------

@@ -22,7 +22,7 @@ def test_a_frame_is_of_the_contracts_type_to_the_last_field_and_in_its_order() -
     text = alarms_frame([COLD], "journal", NIGHT_NS)
     schema.AlarmsFrame.model_validate_json(text, strict=True)
     frame = json.loads(text)
-    assert list(frame) == ["type", "alarms", "source", "since"]
+    assert list(frame) == ["type", "notes", "alarms", "source", "since"]
     assert list(frame["alarms"][0].items()) == [
         ("id", "1f"),
         (

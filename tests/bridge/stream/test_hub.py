@@ -408,3 +408,25 @@ def test_who_does_not_want_alarms_gets_none_and_is_not_taken_for_stuck(stage: St
     socket.room = 9
     stage.hub.serve(client, 2.0)
     assert socket.got == [1, 2]
+
+
+def test_the_robot_comes_behind_a_state_once_and_no_oftener_than_states_are_wanted(
+    stage: Stage,
+) -> None:
+    usual, seldom = Socket(), Socket()
+    stage.join(usual, wants_status=False)
+    stage.join(seldom, wants_status=False, min_interval_s=10.0)
+    none = stage.join(Socket(), wants_status=False, wants_alarms=False)
+    stage.hub.publish_robot(b"robot 1", 0.0)
+    assert (usual.wires, seldom.wires) == ([], [])
+    stage.publish()
+    robots = [[it for it in each.wires if b"robot" in it] for each in (usual, seldom)]
+    assert robots == [[b"robot 1"], [b"robot 1"]]
+    stage.hub.publish_robot(b"robot 2", 1.0)
+    stage.hub.publish_robot(b"robot 3", 2.0)
+    stage.hub.serve_all(3.0)
+    robots = [[it for it in each.wires if b"robot" in it] for each in (usual, seldom)]
+    assert robots == [[b"robot 1", b"robot 2", b"robot 3"], [b"robot 1"]]
+    stage.hub.serve_all(10.0)
+    assert seldom.wires[-1] == b"robot 3"
+    assert none.robot_due

@@ -236,7 +236,6 @@ def test_a_history_is_sorted_by_sensor_and_keeps_its_order() -> None:
     written = state_json.history("7", past)
     assert written == {
         "tag_id": "7",
-        "is_known": True,
         "sensors": [
             {
                 "name": "co2",
@@ -264,11 +263,6 @@ def test_a_history_is_sorted_by_sensor_and_keeps_its_order() -> None:
         ],
     }
     schema.TagHistory.model_validate(written)
-
-
-def test_a_history_that_nobody_tells_is_not_known_rather_than_empty() -> None:
-    written = state_json.history("7", TagHistory(is_known=False))
-    assert written == {"tag_id": "7", "is_known": False, "sensors": [], "tries": []}
 
 
 @pytest.mark.parametrize("clock", ["none", "stopped"])

@@ -229,7 +229,7 @@ def test_check_ends_by_itself_and_says_what_is_wrong_by_its_code(domain: int, co
     ("change", "complaint"),
     [
         (("/temperature,", "'/1 bad',"), "topic '/1 bad'"),
-        (("sensor_msgs/msg/Temperature", "apriltag_msgs/msg/X"), "the package apriltag_msgs is"),
+        (("sensor_msgs/msg/Temperature", "radar_msgs/msg/X"), "the package radar_msgs is"),
         (("sensor_msgs/msg/Temperature", "sensor_msgs/msg/Warmth"), "has no message Warmth"),
         (("reach_m: 0.8", "reach_m: far"), "reach_m is 'far', expected a number"),
     ],

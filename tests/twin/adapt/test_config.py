@@ -68,6 +68,29 @@ def test_what_the_docs_show_is_taken() -> None:
     assert (len(config.tags), len(config.broker.patterns)) == (2, 4)
 
 
+def test_another_number_of_a_standard_message_is_in_its_own_unit() -> None:
+    content = changed("sensors.humidity.field", "variance")
+    assert config_of(content).sensors[1].factor == 1.0
+
+
+def test_a_range_has_its_ends_in_order() -> None:
+    content = changed("sensors.temperature", {"topic": "/t", "type": "std_msgs/msg/Float32"})
+    content["sensors"]["temperature"] |= {"min": 5, "max": 4}
+    with pytest.raises(ConfigError, match=r"sensors\.temperature\.min is 5, above max, 4"):
+        config_of(content)
+
+
+def test_detections_need_a_robot_and_no_tags() -> None:
+    content = changed("tags", {}) | {"detections": {"topic": "/d"}}
+    detections = config_of(content).detections
+    assert detections is not None
+    assert detections.tag_id("tag36h11", 7) == "tag36h11:7"
+    fixed = {"topic": "/t", "type": "std_msgs/msg/Float32", "tag": "A"}
+    content = {"tags": {"A": [0, 0]}, "sensors": {"co2": fixed}, "detections": {"topic": "/d"}}
+    with pytest.raises(ConfigError, match="detections: robot is not given"):
+        config_of(content)
+
+
 def changed(path: str, value: Any) -> dict[str, Any]:
     """The least configuration with another value; `...` takes the key away."""
     content: dict[str, Any] = yaml.safe_load(LEAST)
@@ -99,7 +122,14 @@ def changed(path: str, value: Any) -> dict[str, Any]:
         ("robot", ..., "sensors.temperature has no tag, so it is the robot's, but robot is not"),
         ("robot.type", "nav_msgs/msg/Path", "robot.type is 'nav_msgs/msg/Path', expected one of"),
         ("robot.max_age_s", 0, "robot.max_age_s is 0, must be from 0.1 to 86400"),
-        ("tags", {}, "tags: none is given, and cell_m is 0"),
+        ("tags", {}, "tags: none is given, no detections, and cell_m is 0"),
+        ("tags", {str(n): [0, 0] for n in range(20_001)}, "tags: 20001, the limit is"),
+        ("sensors", {f"s{n}": {} for n in range(65)}, "sensors: 65, the limit is"),
+        ("sensors.temperature.max", -1e400, "sensors.temperature.max is -inf, expected a number"),
+        ("robot.tf", "base_link", "robot.'topic' is not known, expected one of tf, max_age_s"),
+        ("robot.colour", 1, "robot.'colour' is not known, expected one of tf, topic, type"),
+        ("detections", {"topic": "/d", "name": "{family}"}, "detections.name is '{family}', exp"),
+        ("detections", {"topic": "/d", "frame": 1}, "detections.'frame' is not known, expected"),
         ("tags.A", [1], "tags.A is [1], expected [x, y] or [x, y, z] in m"),
         ("tags.A", [1, math.inf], "tags.A is [1, inf], expected [x, y]"),
         ("tags", {True: [0, 0]}, "tags: True is no text of 1 to 256 characters"),

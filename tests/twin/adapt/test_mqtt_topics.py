@@ -53,6 +53,7 @@ def test_json_is_read_by_paths_and_says_when_it_was() -> None:
         (90, 90.0),
         (1_700_000_000_000, 1.7e9),
         ("1970-01-01T02:00:00+01:00", 3600),
+        ("1970-01-01T00:01:00", 60.0),  # in UTC, wherever this runs
     ):
         assert said(configured, "house/x/climate", {"list": [0, 1], "at": at})[0].stamp_s == seconds
 
@@ -96,6 +97,41 @@ def test_home_assistants_entities_are_tag_and_sensor() -> None:
             Measured(tag, ((sensor, 5.0),))
         ]
     assert said(configured, "ha/sensor/north_bay_battery/state", b"5") == []
+
+
+def test_a_preset_gives_way_to_what_is_said_and_a_topic_says_who_is_there() -> None:
+    configured = broker(
+        {
+            "topic": "zigbee2mqtt/{tag}",
+            "preset": "zigbee2mqtt",
+            "values": {"light": "lux"},
+            "availability": "there/{tag}",
+        }
+    )
+    (found,) = said(configured, "zigbee2mqtt/A", {"lux": 5, "illuminance": 7})
+    assert found.readings == (("light", 5.0),)
+    assert said(configured, "there/A", b"offline") == [Measured("A", is_away=True)]
+
+
+def test_who_the_broker_is(tmp_path: Path) -> None:
+    (tmp_path / "secret").write_text(" hush \n")
+    content = {
+        "url": "mqtts://broker.lan",
+        "topics": [{"topic": "{tag}/{sensor}"}],
+        "user": "twin",
+        "password_file": "secret",
+        "ca": "/ca.pem",
+    }
+    found = broker_of(Table("mqtt", content), tmp_path)
+    assert (found.host, found.port, found.is_tls) == ("broker.lan", 8883, True)
+    assert (found.user, found.password, found.ca) == ("twin", "hush", "/ca.pem")
+    plain = broker({"topic": "{tag}/{sensor}"}, url="mqtt://broker.lan:1884")
+    assert (plain.port, plain.is_tls) == (1884, False)
+
+
+def test_a_number_without_bounds_is_finite() -> None:
+    with pytest.raises(PayloadError, match="the payload is inf, must be from -inf to inf"):
+        said(broker({"topic": "{tag}/t", "sensor": "t"}), "A/t", b"inf")
 
 
 @pytest.mark.parametrize(
@@ -142,6 +178,9 @@ def test_json_that_says_nothing_is_named(payload: bytes, complaint: str) -> None
     ("topic", "more", "complaint"),
     [
         ({"topic": "a/#", "tag": "A", "sensor": "t"}, {}, "mqtt.topics[0].topic is 'a/#'"),
+        ({"topic": "/a/{tag}", "sensor": "t"}, {}, "mqtt.topics[0].topic is '/a/{tag}'"),
+        ({"topic": "$SYS/{tag}", "sensor": "t"}, {}, "mqtt.topics[0].topic is '$SYS/{tag}'"),
+        ({"topic": "{tag}"}, {"topics": [{}] * 101}, "expected a list of 1 to 100"),
         ({"topic": "a"}, {}, "expected {tag} in its topic, or tag; one of them"),
         ({"topic": "{tag}", "tag": "A"}, {}, "expected {tag} in its topic, or tag"),
         ({"topic": "{tag}"}, {}, "a payload that is a number needs {sensor} in its topic"),

@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 
 from lupin_twin.adapt.config import Config, Place, Robot
 from lupin_twin.adapt.scans import MadeScan, Scans, number_of
+from lupin_twin.core.drops import MAX_TAGS
 
 S = 1_000_000_000
 ROBOT = Robot("/pose", "geometry_msgs/msg/PoseStamped", max_age_s=30.0)
@@ -125,6 +126,37 @@ def test_where_no_tag_is_in_reach_a_cell_may_be_one() -> None:
     (scan,) = move(scans, 2, 0.0)
     assert (scan.tag_id, scan.place) == ("cell 3 -1", Place(7.0, -1.0))
     assert scans.tag == "A"
+
+
+def test_a_scan_is_of_the_moment_of_its_newest_reading_whatever_came_last() -> None:
+    scans = scans_of()
+    move(scans, 0, 0.0)
+    read(scans, 3)
+    read(scans, 2)
+    (scan,) = move(scans, 4, 9.0)
+    assert scan.stamp_ns == 3 * S
+
+
+def test_tags_are_bounded_fixed_and_found_ones() -> None:
+    scans = scans_of(tags={})
+    taken = [scans.take("co2", f"T{n}", 1.0, 0, 0) for n in range(MAX_TAGS + 1)]
+    assert taken == [True] * MAX_TAGS + [False]
+    found = [scans.discover(f"T{n}", Place(0, 0), 0.1, 0.1) for n in range(MAX_TAGS + 1)]
+    assert found == [True] * MAX_TAGS + [False]
+
+
+def test_a_found_tag_is_in_reach_new_and_then_as_a_surveyed_one() -> None:
+    scans = scans_of()
+    move(scans, 0, 5.0)
+    assert not scans.discover("A", Place(5, 0), 5.0, 0.0)
+    assert not scans.discover("C", Place(6, 0), 5.0, 0.0)
+    assert scans.discover("C", Place(5.5, 0), 5.0, 0.0)
+    assert not scans.discover("C", Place(5.2, 0), 5.0, 0.0)
+    move(scans, 1, 5.0)
+    assert read(scans, 2)
+    (scan,) = scans.lose(3 * S)
+    assert (scan.tag_id, scan.place) == ("C", Place(5.5, 0))
+    assert scans.tag is None
 
 
 @given(st.lists(st.floats(-1e6, 1e6), min_size=2, max_size=50))

@@ -1,4 +1,4 @@
-"""What was observed before: in its order, once each, within its bounds, for both who keep it."""
+"""What was observed before: in its order, once each, within its bounds."""
 
 from __future__ import annotations
 
@@ -36,7 +36,6 @@ def test_scans_that_brought_readings_are_kept_and_every_try() -> None:
     history.add(failed_look("1", at_s=3.0))
     history.add(Scan("1", 4 * S, status=1, status_detail="blocked"))
     past = history.of("1")
-    assert past.is_known
     assert past.scans == (PastScan(S, (Reading("co2", 400.0),)),)
     assert past.attempts == (
         PastAttempt(Attempt(S), 0),
@@ -135,95 +134,54 @@ def test_against_the_plainest_history(writes: list[Scan | Inspection], buffer_le
     assert len(past.scans) <= buffer_len
 
 
-# --- of a twin elsewhere ------------------------------------------------------------------------
+# --- with what the log has not yet ----------------------------------------------------------------
 
-
-class Twin:
-    """A store with its history, and a history that follows its states."""
-
-    def __init__(self) -> None:
-        self.store, self.own, self.followed = TwinStore(), History(), History()
-
-    def write(self, write: Scan | Inspection) -> None:
-        assert ingest.apply(write, self.store, self.own) is None
-        self.tell()
-
-    def tell(self, *, clock_went_back: bool = False) -> None:
-        for tag in self.store.snapshot(0, "map").tags:
-            self.followed.follow(tag, clock_went_back=clock_went_back)
-
-    def hold_to(self, now_ns: int) -> None:
-        if self.store.hold_to(now_ns):
-            self.own.hold_to(now_ns)
-            self.tell(clock_went_back=True)
-
-
-def test_who_follows_a_twin_sees_what_was_really_scanned_when() -> None:
-    twin = Twin()
-    twin.write(scan("1", at_s=10.0, co2=400.0, light=1.0))
-    twin.write(look("1", at_s=3610.0))
-    twin.write(scan("1", at_s=7210.0, light=2.0))
-    twin.write(scan("1", at_s=7300.0, succeeded=False))
-    followed = twin.followed.of("1")
-    assert followed.scans == twin.own.of("1").scans
-    assert stamps_s(followed.scans) == [10.0, 7210.0]
-    assert [past.what for past in followed.attempts] == [
-        past.what for past in twin.own.of("1").attempts
-    ]
-    assert [past.kind for past in followed.attempts] == [0, 1, 0, None]
-
-
-def test_who_follows_a_twin_follows_its_clock_back() -> None:
-    twin = Twin()
-    for at_s in (40.0, 3600.0):
-        twin.write(scan("1", at_s=at_s, co2=at_s))
-    twin.hold_to(50 * S)
-    twin.write(scan("1", at_s=60.0, co2=1.0))
-    assert twin.followed.of("1").scans == twin.own.of("1").scans
-    assert stamps_s(twin.followed.of("1").scans) == [40.0, 50.0, 60.0]
-
-
-def test_a_twin_that_was_started_anew_and_knows_less_moves_nothing() -> None:
-    history, successor = History(), Twin()
-    for at_s in (1000.0, 2800.0):
-        twin = Twin()
-        twin.write(scan("1", at_s=at_s, co2=at_s))
-        history.follow(twin.store.snapshot(0, "map").tags[0])
-    successor.write(scan("1", at_s=1000.0, co2=1000.0))
-    history.follow(successor.store.snapshot(0, "map").tags[0])
-    assert values(history, "co2") == [(1000.0, 1000.0), (2800.0, 2800.0)]
-    assert stamps_s(history.of("1").attempts) == [1000.0, 2800.0]
-
-
-def test_tags_that_a_twin_does_not_know_any_more_are_forgotten(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    monkeypatch.setattr(history_module, "MAX_HISTORY_ITEMS", 4)
-    history = History()
-    for tag_id in ("1", "2"):
-        history.add(scan(tag_id, co2=1.0))
-    history.forget_all_but({"2"})
-    assert history.of("1") == TagHistory()
-    history.add(scan("3", co2=1.0))
-    assert [len(history.of(tag_id).scans) for tag_id in ("2", "3")] == [1, 1]
-
-
-IN_ORDER = st.lists(
-    st.tuples(st.integers(1, 5), st.sets(st.sampled_from(["co2", "light"])), st.booleans()),
-    max_size=12,
+WRITTEN = (
+    scan("1", at_s=10.0, co2=400.0, light=1.0),
+    look("1", at_s=3610.0),
+    scan("1", at_s=7210.0, light=2.0),
+    scan("1", at_s=7300.0, succeeded=False),
 )
 
 
-@given(IN_ORDER)
-def test_both_histories_are_the_same_where_every_state_is_seen(
+@pytest.mark.parametrize("missing", [0, 1])
+def test_what_the_newest_state_shows_is_there_once_whether_the_log_has_it_or_not(
+    missing: int,
+) -> None:
+    store, every = TwinStore(), History()
+    of_log = History()
+    for write in WRITTEN:
+        assert ingest.apply(write, store, every) is None
+    for write in WRITTEN[: len(WRITTEN) - missing]:
+        of_log.add(write)
+    of_log.complete(store.snapshot(0, "map").tags[0])
+    found, expected = of_log.of("1"), every.of("1")
+    assert found.scans == expected.scans
+    assert [past.what for past in found.attempts] == [past.what for past in expected.attempts]
+    assert [past.kind for past in found.attempts] == [0, 1, 0, None if missing else 0]
+
+
+@given(
+    st.lists(
+        st.tuples(st.integers(1, 5), st.sets(st.sampled_from(["co2", "light"])), st.booleans()),
+        max_size=12,
+    )
+)
+def test_of_a_log_that_lacks_the_last_write_nothing_is_missing(
     steps: list[tuple[int, set[str], bool]],
 ) -> None:
-    twin, at_s = Twin(), 0
-    for number, (wait_s, sensors, is_look) in enumerate(steps):
+    store, every, of_log = TwinStore(), History(), History()
+    at_s = 0
+    for number, (wait_s, sensors, is_look) in enumerate(steps, 1):
         at_s += wait_s
         readings = tuple(Reading(name, float(number)) for name in sorted(sensors))
-        twin.write(look("1", at_s) if is_look else Scan("1", at_s * S, readings))
-    assert twin.followed.of("1").scans == twin.own.of("1").scans
-    assert [past.what for past in twin.followed.of("1").attempts] == [
-        past.what for past in twin.own.of("1").attempts
+        write = look("1", at_s) if is_look else Scan("1", at_s * S, readings)
+        assert ingest.apply(write, store, every) is None
+        if number < len(steps):
+            of_log.add(write)
+    for tag in store.snapshot(0, "map").tags:
+        of_log.complete(tag)
+    assert of_log.of("1").scans == every.of("1").scans
+    assert [past.what for past in of_log.of("1").attempts] == [
+        past.what for past in every.of("1").attempts
     ]

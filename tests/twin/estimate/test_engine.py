@@ -116,8 +116,8 @@ def test_what_a_sensor_has_read_since_it_changed_does_not_count() -> None:
 
     def made_of(since_h: float) -> tuple[int, int]:
         changed = {"tag-1": int(since_h * 3600 * S), "gone": 0}
-        asked = EstimateRequest(box(), int(3.0 * 3600 * S))
-        made = EstimateJob(asked, None, DAY_S, changed).compute(tags, 0)
+        asked = EstimateRequest(box())
+        made = EstimateJob(asked, None, DAY_S, changed).compute(tags, int(3.0 * 3600 * S))
         return made.sample_count, made.reading_count
 
     assert made_of(2.5) == (3, 6)

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from lupin_twin.estimate.grading import LEAST_SCANS, Grades, Record, Tally
+from tests.bench.bench_estimate_checks import AT_S, ROUNDS, trust
+from tests.bench.other_worlds import restless, world_of
 
 HOUR_NS = 3_600 * 1_000_000_000
 
@@ -38,3 +40,16 @@ def test_a_model_is_trusted_by_its_day_and_week_and_by_few_scans_neither_way() -
     assert Record(1, few, few).is_trusted is None
     assert Record(None, Tally(), Tally()).is_trusted is None
     assert Record(1, Tally(LEAST_SCANS, LEAST_SCANS), good).is_trusted is True
+
+
+def test_an_estimate_that_covers_badly_is_not_trusted_and_one_that_covers_well_is() -> None:
+    calm = world_of("wall", 0)
+    read = calm.read(AT_S + (ROUNDS + 1) * calm.round_s, 0)
+    is_trusted, covers = trust(calm, read)
+    assert is_trusted is True
+    assert covers > 0.8
+    # What was learnt of a calm day is wrong once its air swings.
+    windy = restless(calm, AT_S, 0)
+    is_trusted, covers = trust(windy, windy.read(read.time_s[-1], 0))
+    assert is_trusted is False
+    assert covers < 0.7

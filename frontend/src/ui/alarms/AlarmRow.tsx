@@ -8,10 +8,13 @@ import { nameText, whereText } from '../../alarms/words';
 import { useApp } from '../../store/app';
 import { S } from '../../strings';
 import { HealthMark } from '../HealthMark';
+import { inTime } from '../inTime';
 import { AlarmFacts, useValues } from './AlarmFacts';
 import { Either } from './Either';
 import { once } from './once';
 import { Shelving } from './Shelving';
+
+const Comments = inTime(async () => (await import('../../notes/parts')).Comments);
 
 export type GroupName = 'active' | 'shelved' | 'resolved';
 
@@ -26,6 +29,7 @@ export const AlarmRow = memo(function AlarmRow({
 }): JSX.Element {
   const { alarm, verdict, isAcknowledged } = item;
   const values = useValues(alarm);
+  const name = useApp((state) => nameText(alarm, selectSpeech(state)));
   return (
     <li
       data-alarm={alarm.id}
@@ -53,14 +57,14 @@ export const AlarmRow = memo(function AlarmRow({
           <AlarmFacts item={item} values={values} isShelved={group === 'shelved'} />
         </span>
       </button>
-      <Tools item={item} group={group} />
+      <Tools item={item} group={group} name={name} />
+      <Comments subject={`alarm:${alarm.id}`} name={name} isOfNow />
     </li>
   );
 });
 
-function Tools({ item, group }: { item: Item; group: GroupName }): JSX.Element {
+function Tools({ item, group, name }: { item: Item; group: GroupName; name: string }): JSX.Element {
   const { alarm, isAcknowledged, shelf } = item;
-  const name = useApp((state) => nameText(alarm, selectSpeech(state)));
   const canLookBack = useApp((state) => state.twin.remembered.state !== 'off');
   return (
     <div className="alarm-tools">

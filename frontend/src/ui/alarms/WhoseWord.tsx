@@ -1,21 +1,23 @@
 import type { JSX } from 'react';
 
-import type { Alarm } from '../../contract/types';
+import type { Alarm, Session } from '../../contract/types';
 import { clockText } from '../../domain/format';
 import { secondsOf } from '../../domain/rostime';
 import { useSelected } from '../../store/create';
 import { S } from '../../strings';
-import { P, person } from './people';
+import { person } from '../../store/person';
+import { P } from './people';
 
 /** Below the list: whether what is done here is this browser's own, or everybody's. */
 export function WhoseWord(): JSX.Element {
   const who = useSelected(person, (it) => it);
-  const name = who?.name;
-  return (
-    <p className="alarms-mine faint">
-      {!name ? S.alarmsMine : who.can_write_notes ? P.shared(name) : P.reads(name)}
-    </p>
-  );
+  return <p className="alarms-mine faint">{whoseWord(who)}</p>;
+}
+
+export function whoseWord(who: Session | null): string {
+  if (!who?.name) return S.alarmsMine;
+  if (who.can_write_notes) return P.shared(who.name);
+  return (who.role === 'viewer' ? P.reads : P.elsewhere)(who.name);
 }
 
 /** Who acknowledged an alarm, and when, where a name is known. */

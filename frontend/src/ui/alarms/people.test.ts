@@ -3,7 +3,9 @@ import { afterEach, beforeEach, expect, test, vi } from 'vitest';
 import { alarm, tellAlarms } from '../../testing/alarms';
 import { NOTHING_KEPT, whatOf } from '../../alarms/kept';
 import { acknowledgeAlarms, own, undo } from '../../alarms/own';
-import { merged, person, startPeople, wordsFor } from './people';
+import { person } from '../../store/person';
+import { merged, startPeople, wordsFor } from './people';
+import { whoseWord } from './WhoseWord';
 
 const COLD = alarm('cold');
 const STAMP = { sec: 1_000, nanosec: 0 };
@@ -33,6 +35,12 @@ test('a shelf is taken over with who shelved, and goes with their word', () => {
   const near = merged(kept, [SHELVED], told, false, () => 61_000);
   expect(near.kept).toBe(kept);
   expect(merged(kept, [COLD], told, false, until).kept.shelved.size).toBe(0);
+});
+
+test('an operator at a bridge that writes no notes is not called a reader', () => {
+  const anna = { can_sign_out: true, seconds_left: null, name: 'anna', can_write_notes: false };
+  expect(whoseWord({ ...anna, role: 'viewer' })).toContain('who only reads');
+  expect(whoseWord({ ...anna, role: 'operator' })).toContain('this bridge writes no notes');
 });
 
 interface Asked {

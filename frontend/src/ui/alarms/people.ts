@@ -5,11 +5,11 @@
  */
 import { now, timeOfDay } from '../../clock';
 import { fetchSession, postNote, withdrawNote } from '../../contract/people';
-import type { Alarm, Session } from '../../contract/types';
+import type { Alarm } from '../../contract/types';
 import { secondsOf } from '../../domain/rostime';
 import { store } from '../../store/app';
-import { createStore } from '../../store/create';
 import { rosNow } from '../../store/moment';
+import { person } from '../../store/person';
 import { say } from '../toast';
 import { LANGUAGE } from '../../strings';
 import { PEOPLE } from '../../words/people';
@@ -17,9 +17,6 @@ import { whatOf, type Kept } from '../../alarms/kept';
 import { acting, own } from '../../alarms/own';
 
 export const P = PEOPLE[LANGUAGE];
-
-/** Who is signed in; null: not known yet. */
-export const person = createStore<Session | null, Session | null>(null, (_, next) => next);
 
 /** What was said here and is not there yet: until it is, the bridge's word is an older one. */
 let pending = 0;

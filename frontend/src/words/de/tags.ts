@@ -76,6 +76,5 @@ export const TAGS: In<typeof ENGLISH> = {
   cardTry: 'Letzter Versuch',
   cardTries: 'Letzte Versuche',
   cardTryKinds: { scan: 'Messung', look: 'Blütenkontrolle', any: 'Versuch' },
-  cardNoHistory: 'Dieser Zwilling liefert keinen Verlauf.',
   cardPosition: 'Position',
 };

@@ -73,6 +73,5 @@ export const TAGS = {
   cardTry: 'Last attempt',
   cardTries: 'Last attempts',
   cardTryKinds: { scan: 'scan', look: 'inspection', any: 'attempt' },
-  cardNoHistory: 'This twin provides no history.',
   cardPosition: 'Position',
 } as const;

@@ -76,6 +76,5 @@ export const TAGS: In<typeof ENGLISH> = {
   cardTry: 'Último intento',
   cardTries: 'Últimos intentos',
   cardTryKinds: { scan: 'medición', look: 'revisión de flores', any: 'intento' },
-  cardNoHistory: 'Este gemelo no ofrece historial.',
   cardPosition: 'Posición',
 };

@@ -76,6 +76,5 @@ export const TAGS: In<typeof ENGLISH> = {
   cardTry: 'Laatste poging',
   cardTries: 'Laatste pogingen',
   cardTryKinds: { scan: 'meting', look: 'bloemcontrole', any: 'poging' },
-  cardNoHistory: 'Deze tweeling levert geen historie.',
   cardPosition: 'Positie',
 };

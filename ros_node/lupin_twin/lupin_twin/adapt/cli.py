@@ -114,6 +114,8 @@ def _check(config: Config | None, seconds: float) -> int:
     executor.add_node(listener)
     listen(executor, seconds)
     if config is None:
+        for why in listener.missing.values():
+            _say(why, sys.stderr)
         if not any(heard.messages for heard in listener.heard.values()):
             return _refuse(
                 f"nothing was heard that is a reading or a pose; topics: "

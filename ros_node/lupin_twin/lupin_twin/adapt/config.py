@@ -39,6 +39,8 @@ STANDARD: Final[Mapping[str, Quantity]] = {
     "std_msgs/msg/Float32": Quantity("", "data"),
     "std_msgs/msg/Float64": Quantity("", "data"),
 }
+# What apriltag_ros calls a tag's frame, unless its parameter `tag.frames` says otherwise.
+TAG_FRAME: Final = "{family}:{id}"
 # Where the pose is in a message that has a header.
 POSES: Final[Mapping[str, str]] = {
     "geometry_msgs/msg/PoseWithCovarianceStamped": "pose.pose",
@@ -58,14 +60,27 @@ class Place:
 
 @dataclass(frozen=True, slots=True)
 class Robot:
-    """Where the robot says that it is.
+    """Where the robot says that it is: by a topic, or as the frame `tf` of TF.
 
     A pose holds for `max_age_s`: localisation may publish nothing while the robot stands still.
     """
 
-    topic: str
-    type_name: str
+    topic: str = ""
+    type_name: str = ""
     max_age_s: float = 30.0
+    tf: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Detections:
+    """The topic of apriltag_ros, whose tags are frames of TF; `name` is what a tag is called."""
+
+    topic: str
+    name: str = TAG_FRAME
+
+    def tag_id(self, family: str, number: int) -> str:
+        """The tag's id in the twin."""
+        return self.name.replace("{family}", family).replace("{id}", str(number))
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,6 +114,7 @@ class Config:
     sensors: tuple[Sensor, ...]
     robot: Robot | None = None
     tags: Mapping[str, Place] = field(default_factory=dict)
+    detections: Detections | None = None
     frame_id: str = "map"
     reach_m: float = 0.8
     window_s: float = 10.0
@@ -126,6 +142,9 @@ def config_of(content: Any, folder: Path = Path()) -> Config:
         sensors,
         robot,
         tags,
+        _detections(Table("detections", table.take("detections")))
+        if table.has("detections")
+        else None,
         frame_id=table.text("frame_id", "map"),
         reach_m=table.number("reach_m", 0.8, 0.01, 100.0),
         window_s=table.number("window_s", 10.0, 0.1, 3600.0),
@@ -145,19 +164,37 @@ def config_of(content: Any, folder: Path = Path()) -> Config:
         raise ConfigError(
             f"sensors.{moving} has no tag, so it is the robot's, but robot is not given"
         )
-    if robot is not None and not tags and not config.cell_m:
-        raise ConfigError("tags: none is given, and cell_m is 0: no reading would have a place")
+    if robot is None and config.detections is not None:
+        raise ConfigError("detections: robot is not given, so no tag would be within its reach")
+    if robot is not None and not tags and not config.cell_m and config.detections is None:
+        raise ConfigError(
+            "tags: none is given, no detections, and cell_m is 0: no reading would have a place"
+        )
     return config
 
 
 def _robot(table: Table) -> Robot:
+    has_tf = table.has("tf")
     robot = Robot(
-        topic=table.text("topic"),
-        type_name=table.one_of("type", POSES),
+        topic="" if has_tf else table.text("topic"),
+        type_name="" if has_tf else table.one_of("type", POSES),
         max_age_s=table.number("max_age_s", 30.0, 0.1, 86_400.0),
+        tf=table.text("tf") if has_tf else "",
     )
     table.end()
     return robot
+
+
+def _detections(table: Table) -> Detections:
+    detections = Detections(
+        table.text("topic"), table.text("name") if table.has("name") else TAG_FRAME
+    )
+    table.end()
+    if "{id}" not in detections.name:
+        raise ConfigError(
+            f"detections.name is {shown(detections.name)}, expected {{id}} in it, and {{family}}"
+        )
+    return detections
 
 
 def _tags(content: Any, folder: Path) -> Iterator[tuple[str, Place]]:

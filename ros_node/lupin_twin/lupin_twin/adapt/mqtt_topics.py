@@ -254,8 +254,8 @@ def _value(table: Table, path: str = "") -> Value:
 
 def _regex(topic: str, sensors: tuple[str, ...]) -> str:
     """A topic's pattern; a sensor is one of those names, where there are any."""
-    # The longest first: `soil_moisture` ends with `moisture`.
-    known = "|".join(map(re.escape, sorted(sensors, key=len, reverse=True)))
+    # A tag is as short as can be, so the longest sensor is found: `soil_moisture`, not `moisture`.
+    known = "|".join(map(re.escape, sensors))
     parts, at = [], 0
     for found in _PLACEHOLDER.finditer(topic):
         parts.append(re.escape(topic[at : found.start()]))

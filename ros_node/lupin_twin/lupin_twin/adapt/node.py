@@ -5,7 +5,6 @@ The twin's rules stay the twin's: what is made here is `lupin_msgs/Observation`,
 
 from __future__ import annotations
 
-import importlib
 import time
 from collections import Counter
 from collections.abc import Callable, Iterable
@@ -14,15 +13,25 @@ from functools import partial
 from typing import Any, Final
 
 from diagnostic_msgs.msg import DiagnosticArray
-from geometry_msgs.msg import Point, Pose, Quaternion
-from lupin_msgs.msg import DiscoveredTag, DiscoveredTags, Observation, SensorReading
+from lupin_msgs.msg import DiscoveredTag, DiscoveredTags, Observation
 from rclpy.exceptions import InvalidTopicNameException
 from rclpy.node import Node
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rclpy.serialization import deserialize_message
 from std_msgs.msg import Header
 
-from lupin_twin.adapt.config import POSES, Config, Place, Sensor
+from lupin_twin.adapt.config import POSES, TAG_FRAME, Config, Place, Sensor
+from lupin_twin.adapt.frames import FrameError, Frames, Sightings
+from lupin_twin.adapt.messages import (
+    DETECTIONS_TYPE,
+    TF,
+    TF_STATIC,
+    TF_TYPE,
+    message_type,
+    observation,
+    pose_of,
+    transform_of,
+)
 from lupin_twin.adapt.mqtt import Message, MqttClient
 from lupin_twin.adapt.mqtt_topics import Pattern, PayloadError, measured
 from lupin_twin.adapt.scans import MadeScan, Scans, number_of
@@ -34,7 +43,6 @@ from lupin_twin.core.state import NANOSECONDS_PER_SECOND
 from lupin_twin.ros import convert
 from lupin_twin.ros.base_node import NodeUtilities, latched, qos_of, waker
 
-SOURCE: Final = "adapt"
 MQTT: Final = "MQTT"
 # Matches every publisher, also those that drop messages rather than wait.
 ANY_PUBLISHER: Final = QoSProfile(depth=50, reliability=ReliabilityPolicy.BEST_EFFORT)
@@ -43,27 +51,10 @@ MAX_MESSAGE_BYTES: Final = 1_000_000
 MAX_SKEW_S: Final = 10.0
 # Odometry comes a hundred times a second: tags are looked for as often as anybody can drive.
 POSE_PERIOD_S: Final = 0.1
+# Of each of several publishers its latched message comes.
+TF_STATIC_QOS: Final = latched(100)
 # A topic that says nothing for so long is named on `/diagnostics`.
 SILENT_S: Final = 10.0
-
-
-def message_type(name: str) -> Any:
-    """The class of a message type such as `sensor_msgs/msg/Temperature`.
-
-    Raises:
-        ConfigError: its package is not installed, or has no such message.
-
-    """
-    package, _, message = name.partition("/msg/")
-    try:
-        return getattr(importlib.import_module(f"{package}.msg"), message)
-    except ImportError:
-        raise ConfigError(
-            f"type {name}: the package {package} is not installed here, "
-            f"on a robot: apt install ros-jazzy-{package.replace('_', '-')}"
-        ) from None
-    except AttributeError:
-        raise ConfigError(f"type {name}: the package {package} has no message {message}") from None
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,6 +79,10 @@ class AdaptNode(Node):  # type: ignore[misc]  # rclpy is not typed
         self.utilities = NodeUtilities(self)
         self._config = config
         self._scans = Scans(config)
+        self._frames = Frames()
+        self._sightings = Sightings()
+        # Where the robot is, m; None: not known.
+        self._at: tuple[float, float] | None = None
         # By topic, since the start.
         self.received: Counter[str] = Counter()
         self.used: Counter[str] = Counter()
@@ -116,16 +111,27 @@ class AdaptNode(Node):  # type: ignore[misc]  # rclpy is not typed
         self.utilities.every(None, 1.0, "the second", self._each_second)
 
     def _subscribe(self) -> None:
-        robot = self._config.robot
-        if robot is not None:
+        robot, detections = self._config.robot, self._config.detections
+        if robot is not None and robot.topic:
             self._listen(robot.topic, robot.type_name, self._on_pose)
+        if detections is not None or (robot is not None and robot.tf):
+            self._listen(TF, TF_TYPE, partial(self._on_tf, False))
+            self._listen(TF_STATIC, TF_TYPE, partial(self._on_tf, True), TF_STATIC_QOS)
+        if detections is not None:
+            self._listen(detections.topic, DETECTIONS_TYPE, self._on_detections)
         topics: dict[tuple[str, str], list[Sensor]] = {}
         for sensor in self._config.sensors:
             topics.setdefault((sensor.topic, sensor.type_name), []).append(sensor)
         for (topic, type_name), sensors in topics.items():
             self._listen(topic, type_name, partial(self._on_message, sensors))
 
-    def _listen(self, topic: str, type_name: str, callback: Callable[[str, Any], None]) -> None:
+    def _listen(
+        self,
+        topic: str,
+        type_name: str,
+        callback: Callable[[str, Any], None],
+        qos: QoSProfile = ANY_PUBLISHER,
+    ) -> None:
         kind = message_type(type_name)
 
         def read(data: bytes) -> None:
@@ -146,7 +152,7 @@ class AdaptNode(Node):  # type: ignore[misc]  # rclpy is not typed
         self._heard_s[topic] = -SILENT_S
         try:
             self.create_subscription(
-                kind, topic, self.utilities.guarded(topic, read), ANY_PUBLISHER, raw=True
+                kind, topic, self.utilities.guarded(topic, read), qos, raw=True
             )
         except InvalidTopicNameException as error:
             raise ConfigError(f"topic {topic!r}: {str(error).partition(chr(10))[0]}") from None
@@ -184,7 +190,66 @@ class AdaptNode(Node):  # type: ignore[misc]  # rclpy is not typed
             return
         self._moved_s = now_s
         self.used[topic] += 1
+        self._at = x, y
         self._publish(self._scans.move(x, y, self._now_ns()))
+
+    def _on_tf(self, is_static: bool, topic: str, message: Any) -> None:
+        for each in message.transforms:
+            stamp_ns = None if is_static else self._stamp_ns(topic, each)
+            if stamp_ns is None and not is_static:
+                continue
+            try:
+                self._frames.put(*transform_of(each, stamp_ns))
+            except FrameError as error:
+                self._drop(Reason.POSE, topic, str(error))
+        self.used[topic] += 1
+        now_s = time.monotonic()
+        if now_s - self._moved_s >= POSE_PERIOD_S:
+            self._moved_s = now_s
+            self._move_by_tf()
+        self._find_tags()
+
+    def _place(self, frame: str) -> tuple[float, float, float]:
+        max_age_ns = int(self._config.robot.max_age_s * NANOSECONDS_PER_SECOND)  # type: ignore[union-attr]
+        return self._frames.place(frame, self._config.frame_id, self._now_ns(), max_age_ns)
+
+    def _move_by_tf(self) -> str:
+        """Move the robot to where TF has it; returns why that is not known."""
+        robot = self._config.robot
+        if robot is None or not robot.tf:
+            return ""
+        try:
+            x, y, _ = self._place(robot.tf)
+        except FrameError as error:
+            self._at = None
+            self._publish(self._scans.lose(self._now_ns()))
+            return str(error)
+        self._at = x, y
+        self._publish(self._scans.move(x, y, self._now_ns()))
+        return ""
+
+    def _on_detections(self, topic: str, message: Any) -> None:
+        stamp_ns = self._stamp_ns(topic, message)
+        if stamp_ns is None:
+            return
+        for each in message.detections:
+            tag_id = self._config.detections.tag_id(each.family, each.id)  # type: ignore[union-attr]
+            # Corrected bits make tags of shadows, and a tag's first place stays.
+            if each.hamming == 0 and tag_id not in self._scans.places:
+                frame = TAG_FRAME.format(family=each.family, id=each.id)
+                self._sightings.see(frame, tag_id, stamp_ns, self._now_ns())
+        self.used[topic] += 1
+        self._find_tags()
+
+    def _find_tags(self) -> None:
+        for tag_id, frame in self._sightings.come(self._frames):
+            try:
+                place = Place(*self._place(frame))
+            except FrameError as error:
+                self._drop(Reason.FRAME, TF, str(error), case="tf tag")
+                continue
+            if self._at is not None and self._scans.discover(tag_id, place, *self._at):
+                self._publish_tags()
 
     def _on_message(self, sensors: list[Sensor], topic: str, message: Any) -> None:
         stamp_ns = self._stamp_ns(topic, message)
@@ -276,7 +341,12 @@ class AdaptNode(Node):  # type: ignore[misc]  # rclpy is not typed
 
     def _each_second(self) -> None:
         self._publish(self._scans.due(self._now_ns()))
-        findings = [self._finding(topic) for topic in sorted(self._heard_s)]
+        if why := self._move_by_tf():
+            self._drop(Reason.FRAME, TF, why, case="tf")
+        for frame in self._sightings.missed(self._now_ns()):
+            why = f"a tag was detected, but TF has no {frame!r}: is tag.frames set in apriltag_ros?"
+            self._drop(Reason.FRAME, TF, why, case="tf tag")
+        findings = [self._finding(topic) for topic in sorted(self._heard_s) if topic != TF_STATIC]
         if self._mqtt is not None:
             if self._mqtt.problem:
                 self.utilities.warn(("mqtt", self._mqtt.problem), f"MQTT: {self._mqtt.problem}")
@@ -328,35 +398,10 @@ class AdaptNode(Node):  # type: ignore[misc]  # rclpy is not typed
             self._observations.publish(observation(scan, self._config.frame_id))
 
     def _publish_tags(self) -> None:
-        if self._config.tags:
+        if self._scans.places:
             header = Header(stamp=self.get_clock().now().to_msg(), frame_id=self._config.frame_id)
             tags = [
-                DiscoveredTag(tag_id=tag_id, pose_in_map=_pose(place))
-                for tag_id, place in self._config.tags.items()
+                DiscoveredTag(tag_id=tag_id, pose_in_map=pose_of(place))
+                for tag_id, place in self._scans.places.items()
             ]
             self._tags.publish(DiscoveredTags(header=header, tags=tags))
-
-
-def observation(scan: MadeScan, frame_id: str) -> Observation:
-    """A scan as lupin_msgs/Observation; without readings, a failed one."""
-    stamp = convert.time_msg(scan.stamp_ns)
-    message = Observation(
-        header=Header(stamp=stamp, frame_id=frame_id),
-        source=SOURCE,
-        kind=Observation.KIND_TAG_READING,
-        status=Observation.STATUS_OK if scan.readings else Observation.STATUS_SCAN_FAILED,
-        status_detail=scan.detail[:256],
-        tag_pose_in_map=_pose(scan.place),
-    )
-    message.tag_reading.tag_id = scan.tag_id
-    message.tag_reading.stamp = stamp
-    message.tag_reading.readings = [
-        SensorReading(name=name, value=float(value)) for name, value in scan.readings
-    ]
-    return message
-
-
-def _pose(place: Place | None) -> Pose:
-    if place is None:  # `w` is 1 in ROS 2 unless it is set: a pose at the origin
-        return Pose(orientation=Quaternion(x=0.0, y=0.0, z=0.0, w=0.0))
-    return Pose(position=Point(x=float(place.x), y=float(place.y), z=float(place.z)))

@@ -7,7 +7,7 @@ leaves beyond 1.1 times the reach, or the jitter of a localisation would make ma
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Final
 
@@ -99,6 +99,27 @@ class Scans:
             yield from self._be_at(f"cell {i} {j}", now_ns, cell)
         else:
             yield from self._be_at(tag_id, now_ns)
+
+    def lose(self, now_ns: int) -> Iterator[MadeScan]:
+        """Nobody knows where the robot is; yields the scan that ends by it."""
+        yield from self.due(now_ns)
+        yield from self._be_at(None, now_ns)
+
+    def discover(self, tag_id: str, place: Place, x: float, y: float) -> bool:
+        """Whether a tag that is seen from (x, y), m, is new and in reach; if so, it is there.
+
+        The first place stays, as in the twin: from then on it is a tag as a surveyed one.
+        """
+        is_new = tag_id not in self._places and len(self._places) < MAX_TAGS
+        if is_new and _distance_m(place, x, y) <= self._config.reach_m:
+            self._places[tag_id] = place
+            return True
+        return False
+
+    @property
+    def places(self) -> Mapping[str, Place]:
+        """Where tags are."""
+        return self._places
 
     def failed(self, tag_id: str, detail: str, now_ns: int) -> MadeScan:
         """A failed attempt at a tag."""

@@ -1,8 +1,7 @@
 """What was observed at each tag before: its last scans, and its last attempts of any kind.
 
-Pure: no clock, no ROS, no lock. One class holds it for a twin, which receives every observation
-(`add`), and for `web`, which follows a twin's states and times (`follow`). Times are nanoseconds of
-ROS time.
+Pure: no clock, no ROS, no lock. A twin holds it of every tag, an answer about one tag is made of
+the log. Times are nanoseconds of ROS time.
 
 An observation is known by its kind, the stamp that its producer gave it, and its source: received
 again, it is nothing new (`journal.appending` has the same rule). Readings that come in parts, with
@@ -11,7 +10,7 @@ one stamp, are one scan.
 
 from __future__ import annotations
 
-from collections.abc import Container, Iterable
+from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 from typing import Final
 
@@ -49,14 +48,18 @@ class PastAttempt:
 
 @dataclass(frozen=True, slots=True)
 class TagHistory:
-    """What is known of one tag, oldest first; of equal stamps, in the order of arrival.
-
-    `is_known` is false where a twin publishes no times: there is no history, rather than none yet.
-    """
+    """What is known of one tag, oldest first; of equal stamps, in the order of arrival."""
 
     scans: tuple[PastScan, ...] = ()
     attempts: tuple[PastAttempt, ...] = ()
-    is_known: bool = True
+
+
+@dataclass(frozen=True, slots=True)
+class LatestRequest:
+    """A tag's last scans and attempts in the log, so many of each, which a `History` answers."""
+
+    tag_id: str
+    count: int
 
 
 # In the place of the stamp that was sent: what a clock that went back has moved, and no observation
@@ -138,8 +141,6 @@ class History:
         tag = self._tags.get(tag_id)
         return TagHistory() if tag is None else TagHistory(tag.past_scans(), tag.past_attempts())
 
-    # --- a twin's own: every observation ------------------------------------------------------
-
     def news(self, write: Scan | Inspection) -> Scan | Inspection | None:
         """What of an observation was not received before, as far as that is known; None: nothing.
 
@@ -185,37 +186,20 @@ class History:
         self._ahead.clear()
         self._items = 0
 
-    # --- of a twin elsewhere: its states, one by one -------------------------------------------
-
-    def follow(self, tag: TagState, *, clock_went_back: bool = False) -> None:
-        """Add what a tag's state, with its times, shows of what was observed when.
-
-        `clock_went_back`: since the state before, so that the twin has moved what was later than
-        now. A state that merely knows less is that of a twin that was started anew.
-        Of attempts that lie closer together than two states, all but the last may be missed.
-        """
-        known = self._tags.get(tag.tag_id)
-        if clock_went_back and known is not None and (times := _times_of(tag)):
-            for one in known.known:
-                one.hold_to(max(times), retains_key=False)
+    def complete(self, newest: TagState) -> None:
+        """Add what a tag's newest state shows, and the log that this was read of has not yet."""
+        known = self._tags.get(newest.tag_id)
         by_stamp: dict[int, list[Reading]] = {}
-        for reading in tag.readings:
+        for reading in newest.readings:
             if reading.observed_at_ns is not None and not _is_known(known, reading):
                 by_stamp.setdefault(reading.observed_at_ns, []).append(reading)
         for stamp_ns, readings in sorted(by_stamp.items()):
-            self._add(tag.tag_id, _Known((KIND_TAG_READING, stamp_ns, ""), stamp_ns), readings)
+            self._add(newest.tag_id, _Known((KIND_TAG_READING, stamp_ns, ""), stamp_ns), readings)
         before = () if known is None else {past.what for past in known.past_attempts()}
-        for past in _attempts_of(tag):
+        for past in _attempts_of(newest):
             if past.what not in before:
                 key, what = (past.kind, past.stamp_ns, ""), past.what
-                self._add(tag.tag_id, _Known(key, what.stamp_ns, what.status, what.detail), ())
-
-    def forget_all_but(self, tag_ids: Container[str]) -> None:
-        """Drop the tags that a restarted twin does not know."""
-        for tag_id in [tag_id for tag_id in self._tags if tag_id not in tag_ids]:
-            self._items -= sum(one.items for one in self._tags.pop(tag_id).known)
-
-    # --- both ----------------------------------------------------------------------------------
+                self._add(newest.tag_id, _Known(key, what.stamp_ns, what.status, what.detail), ())
 
     def _add(self, tag_id: str, new: _Known, readings: Iterable[Reading]) -> None:
         """Put it in its place, or add it to what is known by its key."""
@@ -273,15 +257,6 @@ def _is_known(tag: _Tag | None, reading: Reading) -> bool:
         if one.stamp_ns == reading.observed_at_ns
         for known in one.readings
     )
-
-
-def _times_of(tag: TagState) -> list[int]:
-    times = [r.observed_at_ns for r in tag.readings if r.observed_at_ns is not None]
-    if tag.looked_at_ns is not None:
-        times.append(tag.looked_at_ns)
-    if tag.last_try is not None:
-        times.append(tag.last_try.stamp_ns)
-    return times
 
 
 def _attempts_of(tag: TagState) -> list[PastAttempt]:

@@ -77,6 +77,16 @@ CLOCK: Final = Topic(
 )
 SUBSCRIBED: Final = (OBSERVATIONS, DISCOVERED_TAGS, MAP, CLOCK)
 
+# What a robot says of itself. The twin itself never asks for it: the bridge shows it.
+ROBOT_POSE: Final = Topic(
+    "geometry_msgs/msg/PoseWithCovarianceStamped",
+    "where the robot is; also as geometry_msgs/msg/PoseStamped or nav_msgs/msg/Odometry",
+    "amcl_pose",
+)
+ROBOT_PLAN: Final = Topic("nav_msgs/msg/Path", "where it will drive next", "plan")
+ROBOT_BATTERY: Final = Topic("sensor_msgs/msg/BatteryState", "its battery", "battery_state")
+ROBOT: Final = (ROBOT_POSE, ROBOT_PLAN, ROBOT_BATTERY)
+
 STATE: Final = Topic(
     "lupin_msgs/msg/TwinState",
     "every tag as it is now, `state_publish_rate_hz` times a second",

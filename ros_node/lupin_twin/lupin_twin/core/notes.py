@@ -27,8 +27,9 @@ class NotesUnwritable(Exception):
 
 @dataclass(frozen=True, slots=True)
 class Note:
-    """One word; `until_ns` is that of `shelve`, None: the alarm is not shelved any more.
+    """One word. `until_ns` of `shelve` is its end, None: the alarm is not shelved any more.
 
+    Of `comment` it is the moment that it is about, None: that at which it was made.
     `id` is given when it is written, and ascends in that order.
     """
 
@@ -39,6 +40,12 @@ class Note:
     subject: str
     text: str = ""
     until_ns: int | None = None
+
+    @property
+    def about_ns(self) -> int:
+        """The moment that it is about."""
+        is_of_then = self.kind == COMMENT and self.until_ns is not None
+        return self.until_ns or 0 if is_of_then else self.made_at_ns
 
 
 @dataclass(frozen=True, slots=True)

@@ -20,6 +20,8 @@ MAX_NUMBER: Final = 2**63 - 1
 # older.
 RECENT_COUNT: Final = 9
 RECENT_NS: Final = 3 * 86_400 * 1_000_000_000
+# Scans of one answer: some seconds of one core.
+MAX_SCANS: Final = 200_000
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,6 +62,30 @@ class RecentRequest:
     """
 
     at_ns: int
+
+
+@dataclass(frozen=True, slots=True)
+class ScansRequest:
+    """All scans of one of `sensors` from `since_ns` to `at_ns`, both included, ns of ROS time.
+
+    Of the run that has `at_ns`, without copies. The answer is a tuple of `PastWrite`, by stamp and
+    number; it is empty if there are more than `MAX_SCANS`.
+    """
+
+    since_ns: int
+    at_ns: int
+    sensors: frozenset[str]
+
+
+@dataclass(frozen=True, slots=True)
+class PeriodRequest:
+    """All that was observed in `start_ns <= stamp < end_ns`, by stamp and number, without copies.
+
+    The answer is `PastWrites`. Who requests it knows that it is not too much at once.
+    """
+
+    start_ns: int
+    end_ns: int
 
 
 @dataclass(frozen=True, slots=True)

@@ -161,7 +161,7 @@ def thinned(readings: Readings, at_s: float, day_length_s: float) -> Readings:
 
 @dataclass(frozen=True, slots=True)
 class EstimateJob:
-    """An estimate that is not computed yet; without a model, one is fitted for it alone.
+    """An estimate of now, not computed yet; without a model, one is fitted for it alone.
 
     `changed` are the tags whose sensor has changed: what they have read since then does not count.
     """
@@ -174,7 +174,7 @@ class EstimateJob:
     def compute(
         self, tags: Sequence[TagPast], now_ns: int, should_stop: Callable[[], bool] = never
     ) -> Estimate:
-        """The estimate of what `tags` remember, as of the moment requested.
+        """The estimate of what `tags` remember.
 
         Raises:
             FieldRefused: see `readings_of`; or there are numbers among them that nothing can be
@@ -182,7 +182,7 @@ class EstimateJob:
             Abandoned: `should_stop`, called between the steps, was true.
 
         """
-        at_ns = self.request.at_ns or moment_of(tags, now_ns, self.day_length_s)
+        at_ns = moment_of(tags, now_ns, self.day_length_s)
         readings = readings_of(unchanged(tags, self.changed), at_ns, self.day_length_s)
         box = self.request.box
         try:

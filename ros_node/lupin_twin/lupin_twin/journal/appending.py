@@ -53,16 +53,18 @@ _ADD: Final = {
     table: f"INSERT INTO {table} VALUES ('{LOCAL_SITE}'{', ?' * columns})"  # noqa: S608
     for table, columns in (("scan", 11), ("look", 16), ("place", 13))
 }
+# Named, for SQLite takes `site` for a choice among many, and would read the whole table.
 _KNOWN_SCAN: Final = (
-    "SELECT stamp_ns, own_stamp_ns FROM scan WHERE site = :site AND series = :series"
-    " AND stamp_ns = :key AND source = :source AND coalesce(own_stamp_ns, 0) = 0 UNION ALL "
-    "SELECT stamp_ns, own_stamp_ns FROM scan WHERE site = :site AND series = :series"
-    " AND own_stamp_ns = :key AND source = :source LIMIT 1"
+    "SELECT stamp_ns, own_stamp_ns FROM scan INDEXED BY scan_at WHERE site = :site"
+    " AND series = :series AND stamp_ns = :key AND source = :source"
+    " AND coalesce(own_stamp_ns, 0) = 0 UNION ALL "
+    "SELECT stamp_ns, own_stamp_ns FROM scan INDEXED BY scan_sent WHERE site = :site"
+    " AND series = :series AND own_stamp_ns = :key AND source = :source LIMIT 1"
 )
 _KNOWN_LOOK: Final = (
-    "SELECT 1 FROM look WHERE site = :site AND run = :run AND tag = :tag"
+    "SELECT 1 FROM look INDEXED BY look_at WHERE site = :site AND run = :run AND tag = :tag"
     " AND stamp_ns = :key AND source = :source AND coalesce(own_stamp_ns, 0) = 0 UNION ALL "
-    "SELECT 1 FROM look WHERE site = :site AND run = :run AND tag = :tag"
+    "SELECT 1 FROM look INDEXED BY look_sent WHERE site = :site AND run = :run AND tag = :tag"
     " AND own_stamp_ns = :key AND source = :source LIMIT 1"
 )
 

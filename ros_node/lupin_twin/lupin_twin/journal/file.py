@@ -44,6 +44,7 @@ from lupin_twin.journal.salvage import quarantine, salvage
 from lupin_twin.journal.schema import (
     FILE_ERRORS,
     LOCAL_SITE,
+    MAP,
     ORIGIN,
     get_meta,
     open_writer,
@@ -164,6 +165,11 @@ class JournalFile:
         """Have it in the file where what is recorded from now on comes from."""
         if get_meta(self._connection, ORIGIN) != origin:
             set_meta(self._connection, ORIGIN, origin)
+
+    def note_map(self, text: str) -> None:
+        """Have the newest map in the file, as `floor_plan` writes it; empty: it is too large."""
+        if (get_meta(self._connection, MAP) or "") != text:
+            set_meta(self._connection, MAP, text)
 
     # --- runs ---------------------------------------------------------------------------------
 

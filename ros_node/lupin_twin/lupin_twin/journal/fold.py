@@ -16,6 +16,7 @@ from itertools import accumulate, chain, repeat
 from typing import Any, Final, TypeVar
 
 from lupin_twin.core.drops import MAX_SENSORS_PER_TAG, MAX_TAGS
+from lupin_twin.core.history import History, LatestRequest
 from lupin_twin.core.past import MAX_POINTS, SeriesRequest
 from lupin_twin.core.state import NO_FLOWER, Attempt, Flower, Pose, Reading, Snapshot, TagState
 from lupin_twin.journal.queries import newest
@@ -28,8 +29,10 @@ from lupin_twin.journal.rows import (
     ScanRow,
     flower_of,
     listed_rows,
+    newest_of_tag,
     numbers_of,
     sensor_names,
+    write_of,
 )
 from lupin_twin.journal.runs import FOREVER_NS, Carries, Run, runs, since_seq, span_at
 from lupin_twin.journal.schema import LOCAL_SITE, DamagedFile
@@ -285,23 +288,38 @@ def _readings(rows: list[tuple[Any, ...]]) -> list[tuple[Reading, ...]]:
     return [tuple(made[end - length : end]) for end, length in zip(ends, lengths, strict=True)]
 
 
+def latest(connection: sqlite3.Connection, request: LatestRequest) -> History:
+    """The last scans and attempts of a tag in the run of now."""
+    history = History(request.count)
+    span = span_at(runs(connection.execute), FOREVER_NS)
+    if span is not None:
+        for row in newest_of_tag(connection, span.run.id, request.tag_id, request.count):
+            history.add(write_of(row))
+    return history
+
+
 # A tag's id, its place (m, map frame), and its readings: (ns of ROS time, value).
 TagLately = tuple[str, float, float, tuple[tuple[int, float], ...]]
 
 
-def recent_readings(
-    connection: sqlite3.Connection, sensor_type: str, at_ns: int, reach_ns: int, most: int
+def recent_readings(  # noqa: PLR0917
+    connection: sqlite3.Connection,
+    sensor_type: str,
+    at_ns: int,
+    reach_ns: int,
+    most: int,
+    each: int = 1,
 ) -> Iterator[TagLately]:
     """The tags that had a place and a reading at `at_ns`, with their last finite readings.
 
-    `reach_ns` is how far back, `most` how many of all tags together.
+    `reach_ns` is how far back, `most` how many of all tags together, but `each` of each.
     """
     tags = [
         (tag.tag_id, tag.pose)
         for tag in state_at(connection, at_ns, "").tags
         if tag.pose is not None and any(reading.name == sensor_type for reading in tag.readings)
     ]
-    each = max(most // max(len(tags), 1), 1)
+    each = max(most // max(len(tags), 1), each)
     start_ns = max(1, at_ns - reach_ns)
     for tag_id, pose in tags:
         query = SeriesRequest(tag_id, sensor_type, start_ns, at_ns + 1, MAX_POINTS)

@@ -20,21 +20,25 @@ from typing import Any, Final, NamedTuple
 
 from lupin_twin.core.state import sure_species
 from lupin_twin.core.writes import (
+    MAX_SCANS,
     RECENT_COUNT,
     PastWrite,
     PastWrites,
+    PeriodRequest,
     RecentRequest,
     RunSpan,
+    ScansRequest,
     WritesRequest,
     recent_of,
 )
 from lupin_twin.journal.appending import PURGED_SEQ
 from lupin_twin.journal.checking import WRITTEN
+from lupin_twin.journal.events import FROM_SCAN
 from lupin_twin.journal.hours import count_rows
 from lupin_twin.journal.notes import id_behind, number_of
 from lupin_twin.journal.retention import Stretches, kept
 from lupin_twin.journal.rows import KIND_FLOWER, STATUS_OK, numbers_of, sensor_names
-from lupin_twin.journal.runs import runs, span_at, spans
+from lupin_twin.journal.runs import Span, cut, runs, span_at, spans
 from lupin_twin.journal.schema import (
     LOCAL_SITE,
     DamagedFile,
@@ -266,6 +270,35 @@ _RECENT_LOOKS: Final = (
     f" r.anomaly, r.bug_count FROM {_FIRST_LOOK}"
     f" WHERE r.site = s.site AND r.run = s.run AND r.tag = s.tag AND {_IN_TIME}"
 )
+_SCANS_BETWEEN: Final = (
+    "SELECT seq, run, tag, stamp_ns, kind, status, sensors, readings " + FROM_SCAN.format(tag="")
+)
+_LOOKS_BETWEEN: Final = (
+    "SELECT seq, run, tag, stamp_ns, species, confidence, anomaly, bug_count FROM look"
+    " WHERE site = :site AND run = :run AND stamp_ns >= :start AND stamp_ns < :end AND is_copy = 0"
+)
+
+
+def observed(connection: Any, request: PeriodRequest, site: str = LOCAL_SITE) -> PastWrites:
+    """What was observed in a period; each moment is that of the run that holds it."""
+    log = SiteLog(connection, site)
+    with log.one_view():
+        axis = spans(runs(log.execute, log.site))
+        found: list[PastWrite] = []
+        for span in cut(axis, request.start_ns, request.end_ns):
+            query = {"run": span.run.id, "start": span.start_ns, "end": span.end_ns}
+            found += _of_scans(log.execute(_SCANS_BETWEEN, query).fetchall())
+            found += _of_inspections(log.execute(_LOOKS_BETWEEN, query).fetchall())
+        found.sort(key=lambda write: (write.stamp_ns, write.number))
+        return PastWrites(_journal_id(log), _axis(axis), tuple(found), 0, is_all=True)
+
+
+_SCANS_UP_TO: Final = (
+    "SELECT seq, run, tag, stamp_ns, kind, status, sensors, readings"
+    " FROM series AS s CROSS JOIN scan AS r WHERE s.site = :site AND run = :run AND kind = 0"
+    " AND r.site = s.site AND r.series = s.series AND stamp_ns >= :since AND stamp_ns <= :at"
+    " AND is_copy = 0 LIMIT :most"
+)
 
 
 def recent(
@@ -287,6 +320,25 @@ def recent(
         return recent_of([*_of_scans(scans), *_of_inspections(inspections)], request.at_ns)
 
 
+def scans(connection: Any, request: ScansRequest, site: str = LOCAL_SITE) -> tuple[PastWrite, ...]:
+    """The scans of a stretch of time."""
+    log = SiteLog(connection, site)
+    with log.one_view():
+        span = span_at(runs(log.execute, log.site), request.at_ns)
+        if span is None:
+            return ()
+        query = {"run": span.run.id, "since": request.since_ns, "at": request.at_ns}
+        rows = log.execute(_SCANS_UP_TO, query | {"most": MAX_SCANS + 1}).fetchall()
+        if len(rows) > MAX_SCANS:
+            return ()
+        wanted = {
+            text: not request.sensors.isdisjoint(sensor_names(text))
+            for text in {row[6] for row in rows}
+        }
+        found = _of_scans([row for row in rows if wanted[row[6]]])
+        return tuple(sorted(found, key=lambda scan: (scan.stamp_ns, scan.number)))
+
+
 def writes(connection: Any, request: WritesRequest, site: str = LOCAL_SITE) -> PastWrites:
     """The next writes, copies left out."""
     log = SiteLog(connection, site)
@@ -302,10 +354,12 @@ def writes(connection: Any, request: WritesRequest, site: str = LOCAL_SITE) -> P
         is_all = len(found) < request.max_count
         found = found[: request.max_count]
         last = max(newest, after) if is_all else found[-1].number
-        axis = tuple(
-            RunSpan(s.run.id, s.start_ns, s.end_ns) for s in spans(runs(log.execute, log.site))
-        )
+        axis = _axis(spans(runs(log.execute, log.site)))
         return PastWrites(_journal_id(log), axis, tuple(found), last, is_all)
+
+
+def _axis(found: Iterable[Span]) -> tuple[RunSpan, ...]:
+    return tuple(RunSpan(span.run.id, span.start_ns, span.end_ns) for span in found)
 
 
 def _beginning(log: SiteLog, request: WritesRequest, newest: int) -> int:

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any, Final
 
-from lupin_twin.core.state import Bloom, Flower, Pose, Reading
+from lupin_twin.core.state import Bloom, Flower, Inspection, Pose, Reading, Scan
 from lupin_twin.journal.schema import LOCAL_SITE, DamagedFile
 
 # lupin_msgs/Observation
@@ -75,6 +75,20 @@ def weight(row: Row) -> int:
     if isinstance(row, InspectionRow):
         return 1 + len(row.flower.blooms) + len(row.flower.footprint)
     return 1
+
+
+def write_of(row: ScanRow | InspectionRow) -> Scan | Inspection:
+    """What was accepted, of the row that was written of it."""
+    own = row.stamp_ns if row.own_stamp_ns is None else row.own_stamp_ns
+    if isinstance(row, InspectionRow):
+        return Inspection(row.tag_id, row.stamp_ns, row.flower, source=row.source, own_stamp_ns=own)
+    if row.kind == KIND_FLOWER:
+        return Inspection(
+            row.tag_id, row.stamp_ns, None, None, row.status, row.detail, row.source, own
+        )
+    return Scan(
+        row.tag_id, row.stamp_ns, row.readings, None, row.status, row.detail, row.source, own
+    )
 
 
 # Scans that are read at most for the histories of all tags.

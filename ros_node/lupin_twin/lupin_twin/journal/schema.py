@@ -321,6 +321,8 @@ def _own_tables() -> frozenset[bytes]:
 
 # A fact: where what is recorded comes from, see `core.diagnostics.Origin`.
 ORIGIN: Final = "origin"
+# Another: the newest map, see `floor_plan`.
+MAP: Final = "map"
 
 # --- one site's rows ------------------------------------------------------------------------------
 

@@ -24,6 +24,7 @@ from lupin_twin.core.notes import Note
 from lupin_twin.journal.appending import Stretch
 from lupin_twin.journal.beside import InUse, Lock
 from lupin_twin.journal.file import JournalFile
+from lupin_twin.journal.floor_plan import NewestMap
 from lupin_twin.journal.fold import Restored
 from lupin_twin.journal.notes import NoteQueue
 from lupin_twin.journal.rebuild import is_version3, upgrade
@@ -168,6 +169,7 @@ class Journal:
         self._is_temporary = is_temporary
         self._pending = Pending(max_weight)
         self._notes = NoteQueue()
+        self.floor_plan = NewestMap()
         self._eras: list[_Era] = []
         self._stop = threading.Event()
         self._was_tried = threading.Event()
@@ -176,13 +178,10 @@ class Journal:
         # The writer thread's own.
         self._runs: list[Run] = []
         self._lock: Lock | None = None
-        self._written = self._repeated = self._refused = 0
+        self._written = self._repeated = self._refused = self._failures = 0
         self._is_sound: bool | None = None
-        self._failures = 0
-        self._met_damage = ""
         self._heals_from_s = -math.inf
-        self._quarantined = ""
-        self._left_out = ""
+        self._met_damage = self._quarantined = self._left_out = ""
         # What was received last, as the log has it, where the clock contradicts that.
         self._doubted_ns: int | None = None
         self._simulated: Stretch | None = None
@@ -319,6 +318,7 @@ class Journal:
                 self._catch_up(file)
                 self._write(file, all_that_waits=is_last)
                 self._notes.write(file.put_note)
+                self.floor_plan.write(file)
                 has_more = not is_last and file.look_after(may_purge=bool(self._runs))
                 self._kept = file.kept()
                 self._holds_older = file.holds_older

@@ -242,13 +242,13 @@ def map_of(msg: Any, revision: int) -> OccupancyMap:
         resolution=shortest(info.resolution),
         origin_x=float(info.origin.position.x),
         origin_y=float(info.origin.position.y),
-        origin_yaw=_yaw(orientation),
+        origin_yaw=yaw(orientation),
         cells=np.frombuffer(msg.data, dtype=np.int8),
         revision=revision,
     )
 
 
-def _yaw(orientation: Any) -> float:
+def yaw(orientation: Any) -> float:
     """Rotation about z in radians (the ZYX Euler angle, REP 103); 0 for an all-zero quaternion."""
     x, y, z, w = orientation.x, orientation.y, orientation.z, orientation.w
     return math.atan2(2.0 * (w * z + x * y), w * w + x * x - y * y - z * z)

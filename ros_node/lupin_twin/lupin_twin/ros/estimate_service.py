@@ -19,8 +19,8 @@ from lupin_msgs.srv import GetEstimate, GetEstimateReport
 
 from lupin_twin.core.diagnostics import Estimates
 from lupin_twin.core.interfaces import GET_ESTIMATE, GET_ESTIMATE_REPORT
-from lupin_twin.core.state import NANOSECONDS_PER_SECOND, Reading, Scan, TwinStore
-from lupin_twin.estimate import MAX_PER_TAG, FitFailed
+from lupin_twin.core.state import Reading, Scan, TwinStore
+from lupin_twin.estimate import FitFailed
 from lupin_twin.estimate.engine import (
     MAX_TAGS,
     Estimate,
@@ -29,24 +29,26 @@ from lupin_twin.estimate.engine import (
     RecentReadings,
     TagPast,
     cost_s,
-    is_usable,
 )
 from lupin_twin.field.engine import FieldRefused
 from lupin_twin.field.explored import OccupancyMap
 from lupin_twin.field.idw import never
-from lupin_twin.journal.fold import STATE_S_PER_TAG, recent_readings
+from lupin_twin.journal.fold import STATE_S_PER_TAG
 from lupin_twin.journal.queries import SERIES_S
 from lupin_twin.ros import convert_field
 from lupin_twin.ros.base_node import SERVICE_QOS, NodeUtilities
 from lupin_twin.ros.responses import answer_later
 from lupin_twin.runtime.estimate_rounds import (
     ADVICE_S,
+    AS_OF,
     Done,
     Report,
     ReportRequest,
     Round,
     Watch,
     advice,
+    estimate_at,
+    readings_at,
 )
 from lupin_twin.runtime.journal_queries import Recall
 from lupin_twin.runtime.workers import JobQueue, Query, ShouldStop, Workers, in_turns
@@ -57,8 +59,6 @@ _ROUND_S: Final = 2.0
 REST_FACTOR: Final = 9.0
 # What gathering a tag's scans takes, roughly and at worst.
 _GATHER_TAG_S: Final = 50e-6
-# Readings that are looked up in the journal, of all tags together: of few tags all of a day.
-_MAX_READINGS: Final = 20_000
 
 Gather = Callable[[str], Sequence[TagPast]]
 
@@ -70,14 +70,9 @@ class Task:
     `look_up()`, on the node's thread, begins the search for what `make`, on any, makes it of.
     """
 
-    job: EstimateJob
-    now_ns: int
     cost_s: float
     look_up: Callable[[], Future[Sequence[TagPast]]]
-
-    def make(self, found: Sequence[TagPast], should_stop: ShouldStop = never) -> Estimate:
-        """See `EstimateJob.compute`."""
-        return self.job.compute(found, self.now_ns, should_stop)
+    make: Callable[[Sequence[TagPast], ShouldStop], Estimate]
 
 
 @dataclass(slots=True)
@@ -138,7 +133,7 @@ class EstimateService:
             self._look_back(sensor)
 
     def _look_back(self, sensor: str) -> None:
-        def remember(found: list[TagPast] | Exception) -> None:
+        def remember(found: Sequence[TagPast] | Exception) -> None:
             if isinstance(found, Exception):
                 return  # without a journal that can be read, the latest readings are all there is
             for tag in found:
@@ -245,13 +240,19 @@ class EstimateService:
         """
         now_ns = self.now_ns()
         request.check(now_ns, self.max_grid_cells)
-        sensor = request.box.sensor_type
+        sensor, day_s = request.box.sensor_type, self.day_length_s
+        cost = cost_s(request, min(MAX_TAGS, self.store.size[0]), self.max_grid_cells)
+        if request.at_ns:
+            look_up = self._from_journal(sensor, request.at_ns)
+            return Task(
+                AS_OF * cost, look_up, lambda found, stop: estimate_at(request, found, day_s, stop)
+            )
         loaded = self.watch.loaded(sensor)
         changed = {} if loaded is None else loaded.changed
-        job = EstimateJob(request, self.watch.fit(sensor).model, self.day_length_s, changed)
-        tags = min(MAX_TAGS, self.store.size[0])
-        cost = cost_s(request, tags, self.max_grid_cells)
-        return Task(job, now_ns, cost, self._look_up(request))
+        job = EstimateJob(request, self.watch.fit(sensor).model, day_s, changed)
+        return Task(
+            cost, self._from_memory(sensor), lambda found, stop: job.compute(found, now_ns, stop)
+        )
 
     def report(self, request: ReportRequest) -> Callable[[], Report]:
         """What makes the report, on a worker: working out places for other tags takes a while."""
@@ -291,7 +292,7 @@ class EstimateService:
             return Query(
                 task.look_up,
                 reply,
-                lambda found: convert_field.response_of(task.make(found)),
+                lambda found: convert_field.response_of(task.make(found, never)),
                 task.cost_s,
             )
 
@@ -309,28 +310,17 @@ class EstimateService:
 
         return answer_later(self._queue, prepare, response, self.utilities.report)
 
-    def _look_up(self, request: EstimateRequest) -> Callable[[], Future[Any]]:
-        sensor, at_ns = request.box.sensor_type, request.at_ns
+    def _from_memory(self, sensor: str) -> Callable[[], Future[Sequence[TagPast]]]:
         tags = self.store.size[0]
-        if not at_ns:
 
-            def from_memory() -> Future[Sequence[TagPast]]:
-                gather = self._gather()
-                return self._workers.submit(lambda _: gather(sensor), tags * _GATHER_TAG_S)
+        def look_up() -> Future[Sequence[TagPast]]:
+            gather = self._gather()
+            return self._workers.submit(lambda _: gather(sensor), tags * _GATHER_TAG_S)
 
-            return from_memory
-        return self._from_journal(sensor, at_ns)
+        return look_up
 
-    def _from_journal(self, sensor: str, at_ns: int) -> Callable[[], Future[list[TagPast]]]:
-        reach_ns = int(self.day_length_s * NANOSECONDS_PER_SECOND)
-        tags = self.store.size[0]
-        most = max(_MAX_READINGS, tags * MAX_PER_TAG)
+    def _from_journal(self, sensor: str, at_ns: int) -> Callable[[], Future[Sequence[TagPast]]]:
         return lambda: self.recall.query(
-            lambda connection, _: [
-                TagPast(tag_id, x, y, tuple(one for one in found if is_usable(one[1])))
-                for tag_id, x, y, found in recent_readings(
-                    connection, sensor, at_ns, reach_ns, most
-                )
-            ],
-            tags * (STATE_S_PER_TAG + SERIES_S),
+            lambda log, _: readings_at(log, sensor, at_ns, self.day_length_s),
+            self.store.size[0] * (STATE_S_PER_TAG + SERIES_S),
         )

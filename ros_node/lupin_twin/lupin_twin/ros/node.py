@@ -20,7 +20,7 @@ from lupin_twin.core import ingest, interfaces
 from lupin_twin.core.clock import LATCHED_AFTER_S, ClockWatch, Lateness
 from lupin_twin.core.diagnostics import CLOCK, ERROR, Health, Origin, findings, origin_of
 from lupin_twin.core.drops import Drop, Reason
-from lupin_twin.core.history import History, TagHistory, kind_of
+from lupin_twin.core.history import History, kind_of
 from lupin_twin.core.parameters import ParameterError, TwinParameters, World
 from lupin_twin.core.state import ClockState, Inspection, Scan, Snapshot, TwinStore
 from lupin_twin.field.engine import FieldCache, FieldEngine, FieldRules
@@ -154,10 +154,6 @@ class TwinNode(AdjustableNode):
         snapshot = self.store.snapshot(self.now_ns(), self.parameters.frame_id)
         return replace(snapshot, clock=self._clock_state)
 
-    def history_of(self, tag_id: str) -> TagHistory | None:
-        """The last scans and attempts of a tag; None: no such tag."""
-        return self.history.of(tag_id) if self.store.tag(tag_id) else None
-
     # --- set-up -----------------------------------------------------------------------------
 
     def _memory(self) -> Memory:
@@ -287,6 +283,7 @@ class TwinNode(AdjustableNode):
             return
         self.occupancy_map = new
         self._map_revision += 1
+        self.memory.note_map(new)
         self.notify_listeners()
 
     def _deliver(self) -> None:

@@ -9,6 +9,7 @@ and any thread may run it. Metres in the map frame, times ns of ROS time.
 from __future__ import annotations
 
 import math
+import sqlite3
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Final
@@ -16,12 +17,29 @@ from typing import Final
 import numpy as np
 
 from lupin_twin.core.state import NANOSECONDS_PER_SECOND, Scan
-from lupin_twin.estimate import Change, Model, Place, Posterior, Readings, fit
-from lupin_twin.estimate.engine import TagPast, is_usable, readings_of, unchanged
+from lupin_twin.estimate import (
+    MAX_PER_TAG,
+    Change,
+    FitFailed,
+    Model,
+    Place,
+    Posterior,
+    Readings,
+    fit,
+)
+from lupin_twin.estimate.engine import (
+    Estimate,
+    EstimateRequest,
+    TagPast,
+    is_usable,
+    readings_of,
+    unchanged,
+)
 from lupin_twin.estimate.grading import HALF_WIDTH_SDS, Grades, Record, Tally
 from lupin_twin.field.engine import FieldRefused, check_sensor_type
 from lupin_twin.field.explored import OccupancyMap, floor, free_of
 from lupin_twin.field.idw import never
+from lupin_twin.journal.fold import recent_readings
 from lupin_twin.runtime.workers import in_turns
 
 # With fewer readings there is little to learn: each answer is fitted by itself.
@@ -150,6 +168,48 @@ def _check(past: TagPast, change: Change, at_ns: int) -> TagCheck:
         change.offset,
         None if since_s is None else at_ns + round(since_s * NANOSECONDS_PER_SECOND),
     )
+
+
+# An estimate of a moment costs so many times as much as one of now, whose model is there.
+AS_OF: Final = 3.0
+# Readings that are looked up in the log, of all tags together: of few tags all of a day.
+_MAX_READINGS: Final = 20_000
+
+
+def readings_at(
+    log: sqlite3.Connection, sensor: str, at_ns: int, day_length_s: float
+) -> list[TagPast]:
+    """What the log has of the day up to a moment, for `estimate_at`."""
+    reach_ns = int(day_length_s * NANOSECONDS_PER_SECOND)
+    return [
+        TagPast(tag_id, x, y, tuple(one for one in found if is_usable(one[1])))
+        for tag_id, x, y, found in recent_readings(
+            log, sensor, at_ns, reach_ns, _MAX_READINGS, MAX_PER_TAG
+        )
+    ]
+
+
+def estimate_at(
+    request: EstimateRequest,
+    pasts: Sequence[TagPast],
+    day_length_s: float,
+    should_stop: Callable[[], bool] = never,
+) -> Estimate:
+    """The estimate as of a moment, of readings up to then alone: model, changed sensors and all.
+
+    Raises:
+        FieldRefused: see `readings_of`; or nothing can be made of these readings.
+        lupin_twin.field.idw.Abandoned: `should_stop`, called every few milliseconds, was true.
+
+    """
+    round_ = Round(request.box.sensor_type, day_length_s, None, {}, {})
+    try:
+        loaded = round_.run(pasts, request.at_ns, should_stop).loaded
+        posterior = loaded.model.posterior(loaded.readings, 0.0, should_stop)
+        grid = posterior.grid(**request.box.cells)
+    except (FitFailed, np.linalg.LinAlgError) as error:
+        raise FieldRefused(f"these readings cannot be computed with: {error}") from error
+    return Estimate(grid, len(np.unique(loaded.readings.tag)), len(loaded.readings))
 
 
 @dataclass(frozen=True, slots=True)

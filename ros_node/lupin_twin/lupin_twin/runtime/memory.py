@@ -28,9 +28,10 @@ from lupin_twin.core.ingest import Pin
 from lupin_twin.core.journal_condition import Condition
 from lupin_twin.core.notes import Note
 from lupin_twin.core.state import Inspection, Scan, TwinStore
+from lupin_twin.field.explored import OccupancyMap
 from lupin_twin.journal.fold import Restored
 from lupin_twin.journal.retention import Limits
-from lupin_twin.journal.rows import InspectionRow, PinRow, Row, ScanRow
+from lupin_twin.journal.rows import InspectionRow, PinRow, Row, ScanRow, write_of
 from lupin_twin.journal.runs import CORRECTION_NS, Clock, Turn, turn_of
 from lupin_twin.journal.writer import Journal
 from lupin_twin.runtime.journal_queries import Recall
@@ -201,6 +202,10 @@ class Memory:
         """Have it in the journal; see there."""
         return self._journal.write_note(note)
 
+    def note_map(self, floor: OccupancyMap) -> None:
+        """Have the newest map in the journal; see there."""
+        self._journal.floor_plan.put(floor)
+
     def heal(self, damage: str) -> None:
         """Have a journal in which somebody has met damage set aside; from any thread."""
         self._journal.heal(damage)
@@ -368,18 +373,4 @@ def _row(write: Scan | Inspection, arrival_ns: int, mission: str) -> Row:
         source=write.source,
         mission=mission,
         own_stamp_ns=own,
-    )
-
-
-def write_of(row: ScanRow | InspectionRow) -> Scan | Inspection:
-    """What was accepted, of the row that was written of it."""
-    own = row.stamp_ns if row.own_stamp_ns is None else row.own_stamp_ns
-    if isinstance(row, InspectionRow):
-        return Inspection(row.tag_id, row.stamp_ns, row.flower, source=row.source, own_stamp_ns=own)
-    if row.kind == KIND_FLOWER:
-        return Inspection(
-            row.tag_id, row.stamp_ns, None, None, row.status, row.detail, row.source, own
-        )
-    return Scan(
-        row.tag_id, row.stamp_ns, row.readings, None, row.status, row.detail, row.source, own
     )

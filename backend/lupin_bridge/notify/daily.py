@@ -1,0 +1,174 @@
+"""The report of a day, sent once a day by one channel, also after a restart.
+
+What was sent last stands in a small file. A day that was missed is sent at the next start, up to a
+week of them; a message that is not taken is tried again as those of alarms are.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import logging
+import os
+from dataclasses import dataclass
+from datetime import datetime, time, timedelta, tzinfo
+from hashlib import blake2b
+from pathlib import Path
+from typing import Final, Protocol
+
+import orjson
+
+from lupin_bridge.feed.source import TwinSource, TwinUnavailableError
+from lupin_bridge.judge.options import Criteria, unix_s
+from lupin_bridge.past.plans import ConditionalQuery
+from lupin_bridge.past.query import compact
+from lupin_bridge.past.report import REPORT_S, Report
+from lupin_twin.core.past import NotRemembered, PastRefused
+
+log = logging.getLogger(__name__)
+
+LOOK_S: Final = 2.0
+# For so long the log may lack the last moments of a day.
+LATE_NS: Final = 300 * 1_000_000_000
+MOST_DAYS: Final = 7
+
+
+@dataclass(frozen=True, slots=True)
+class DailyTarget:
+    """When a day ends for the operator, by which zone (None: this machine's), and where to note it.
+
+    `folder` keeps a file for each channel and journal.
+    """
+
+    at: time
+    zone: tzinfo | None
+    folder: Path
+
+    def ended_ns(self, now_ns: int, days: int = 0) -> int:
+        """The end of the last day that is over at a moment, or of so many days after it."""
+        now = datetime.fromtimestamp(now_ns // 1_000_000_000, self.zone)
+        passed = 0 if now.timetz().replace(tzinfo=None) >= self.at else 1
+        day = now.date() + timedelta(days=days - passed)
+        return int(datetime.combine(day, self.at, self.zone).timestamp()) * 1_000_000_000
+
+
+class ReportChannel(Protocol):
+    """Where a report can be sent."""
+
+    @property
+    def name(self) -> str:
+        """What logs call it."""
+
+    @property
+    def called(self) -> str:
+        """Its address, which may be a secret."""
+
+    async def deliver(self, report_id: str, report: orjson.Fragment) -> bool:
+        """Send it until it is taken; False: it was given up, which is logged."""
+
+
+class Reporting(Protocol):
+    """What a report is of: the bridge."""
+
+    criteria: Criteria
+
+    @property
+    def source(self) -> TwinSource:
+        """Where its log is."""
+
+    @property
+    def ros_time_ns(self) -> int | None:
+        """ROS time now; None: it is not known."""
+
+
+class DailyReport:
+    """Sends by one channel. Belongs to the event loop."""
+
+    def __init__(self, target: DailyTarget, channel: ReportChannel, look_s: float = LOOK_S) -> None:
+        self._target, self._channel, self._look_s = target, channel, look_s
+        self._why = ""
+        self._task: asyncio.Task[None] | None = None
+
+    def start(self, of: Reporting) -> None:
+        """Begin."""
+        self._task = asyncio.create_task(self._run(of), name=f"report by {self._channel.name}")
+
+    async def stop(self) -> None:
+        """End; what was not taken is sent after the next start."""
+        if self._task is not None:
+            self._task.cancel()
+            with contextlib.suppress(asyncio.CancelledError):
+                await self._task
+
+    async def _run(self, of: Reporting) -> None:
+        while True:
+            try:
+                self._say(await self._look(of))
+            except (NotRemembered, PastRefused, TwinUnavailableError, OSError) as error:
+                self._say(str(error))
+            except Exception:  # nobody waits for this task
+                log.exception("the report of the day met an error and is tried again")
+            await asyncio.sleep(self._look_s)
+
+    def _say(self, why: str) -> None:
+        if why and why != self._why:
+            log.warning("the report of the day is not sent by %s: %s", self._channel.name, why)
+        self._why = why
+
+    async def _look(self, of: Reporting) -> str:
+        """Send what is due; returns why that cannot be, empty: nothing is wrong."""
+        now_ns, journal, target = of.ros_time_ns, of.source.journal(), self._target
+        if now_ns is None or not journal.journal_id:
+            return ""
+        if unix_s(now_ns) is None:
+            return "the time is simulated, and has no hours of the day"
+        file = self._file(journal.journal_id)
+        newest_ns = target.ended_ns(now_ns)
+        last_ns = _read(file)
+        if last_ns is None or last_ns > now_ns:
+            _write(file, newest_ns)  # the first one will be the next day's
+            return ""
+        if last_ns >= newest_ns:
+            return ""
+        oldest_ns = target.ended_ns(now_ns, 1 - MOST_DAYS)
+        due_ns = target.ended_ns(last_ns, 1)
+        if due_ns < oldest_ns:
+            log.error("reports before %s are not sent: too many were missed", compact(oldest_ns))
+            due_ns = oldest_ns
+        complete_ns = journal.complete_ns or 0
+        if complete_ns < due_ns and now_ns < due_ns + LATE_NS:
+            return ""
+        start_ns = target.ended_ns(due_ns, -1)
+        report = Report(start_ns, due_ns, of.criteria, journal)
+        answered = await of.source.ask(ConditionalQuery(report), REPORT_S)
+        assert answered.answer is not None  # no ETag was given
+        body = orjson.Fragment(bytes(answered.answer.body))
+        if not await self._channel.deliver(f"report.{compact(due_ns)}", body):
+            log.error("the report up to %s was given up by %s", compact(due_ns), self._channel.name)
+        _write(file, due_ns)
+        return ""
+
+    def _file(self, journal_id: str) -> Path:
+        text = f"{self._channel.called} {journal_id}".encode()
+        return self._target.folder / f"report-{blake2b(text, digest_size=12).hexdigest()}.sent"
+
+
+def _read(file: Path) -> int | None:
+    try:
+        return int(file.read_text(encoding="ascii"))
+    except FileNotFoundError:
+        return None
+    except ValueError:
+        log.error("%s is damaged: the next report is that of tomorrow", file)  # noqa: TRY400  # one line
+        return None
+
+
+def _write(file: Path, sent_ns: int) -> None:
+    """Note it durably: what is not noted is sent again."""
+    file.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
+    new = file.with_suffix(".new")
+    with new.open("w", encoding="ascii") as out:
+        out.write(str(sent_ns))
+        out.flush()
+        os.fsync(out.fileno())
+    new.replace(file)

@@ -1,0 +1,355 @@
+"""The shift report: what happened between two moments, as the log has it up to the second one.
+
+Whoever asks when, of which process, gets the same: nothing of it depends on what came later. What
+the robot observed is read in the order of time, in lots; between two of them the work can end.
+"""
+
+from __future__ import annotations
+
+import heapq
+from array import array
+from bisect import bisect_left
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from hashlib import blake2b
+from itertools import accumulate, pairwise
+from statistics import median
+from typing import Any, Final
+
+import orjson
+
+from lupin_bridge.alarms.ledger import worst_first
+from lupin_bridge.alarms.notes import notes_of_alarms
+from lupin_bridge.feed.query import Find
+from lupin_bridge.judge.alarm import Alarm
+from lupin_bridge.judge.alarm_fold import Follower
+from lupin_bridge.judge.episodes import readings_of
+from lupin_bridge.judge.options import Criteria
+from lupin_bridge.judge.scan_interval import SHORTEST_NS, TIMES_MEDIAN
+from lupin_bridge.judge.verdict import Verdict, derive
+from lupin_bridge.past import bodies
+from lupin_bridge.past.plans import JSON_TYPE, Plan
+from lupin_bridge.serving.admission import REVALIDATE, Answer
+from lupin_bridge.stream.health_json import alarm_json, note_json
+from lupin_bridge.stream.state_json import stamp
+from lupin_twin.core.history import KIND_FLOWER
+from lupin_twin.core.journal_condition import Condition
+from lupin_twin.core.notes import WITHDRAW, Note, NotesRequest, PastNotes, withdrawals
+from lupin_twin.core.past import (
+    EVERY_TAG,
+    HOUR_NS,
+    Event,
+    PastRefused,
+    SeriesPast,
+    SeriesRequest,
+)
+from lupin_twin.core.state import STATUS_OK, Snapshot
+from lupin_twin.core.writes import PastWrite, PastWrites, PeriodRequest, RunSpan
+
+# Of a day at a scan a second there are 86,400. Each takes some 25 us to go through, and three times
+# that where alarms are worked out; an answer has ten seconds.
+MAX_WRITES: Final = 100_000
+ALARM_WRITES: Final = 40_000
+# As far as before the period alarms are worked out: what began then may go on.
+LEAD_NS: Final = 7 * 24 * HOUR_NS
+_LOT: Final = 2_000
+# Entries of each list; `left_out` counts the others.
+MAX_LISTED: Final = 500
+# What a report costs, about, s of one core.
+REPORT_S: Final = 3.0
+# A house silence is in the list of silences like a tag's.
+WHOLE_SITE: Final = ""
+
+Stretch = tuple[int, int]
+
+
+@dataclass(frozen=True, slots=True)
+class Report:
+    """The report of `start_ns <= t < end_ns`, as JSON; see `report_page.ReportPage` for paper."""
+
+    start_ns: int
+    end_ns: int
+    criteria: Criteria = field(compare=False)
+    journal: Condition = field(compare=False)
+
+    def cost_s(self, tags: int) -> float:  # noqa: ARG002
+        """See `plans.Query`."""
+        return REPORT_S
+
+    def look(self, find: Find) -> Plan:
+        """See `plans.Query`.
+
+        Raises:
+            PastRefused: more was observed in the period than one report may be of.
+
+        """
+        hours = self._per_hour(find)
+        alarms_ns = self._alarms_from(hours)
+        fold = _Fold(self, alarms_ns)
+        for stretch in _stretches(hours, min(self.start_ns, alarms_ns), self.end_ns):
+            fold.take(find(PeriodRequest(*stretch)))
+        notes: PastNotes = find(NotesRequest())
+        snapshot: Snapshot = find(self.end_ns - 1)
+        known = [tag.tag_id for tag in snapshot.tags]
+        return self.plan(fold.body(notes.notes or (), known))
+
+    def plan(self, body: dict[str, Any]) -> Plan:
+        """The plan of the answer."""
+        return planned(orjson.dumps(body), JSON_TYPE, self)
+
+    def _per_hour(self, find: Find) -> Counter[int]:
+        """How much was observed in each hour, of the lead and the period; keys are ns."""
+        first_ns = max(1, self.start_ns - LEAD_NS) // HOUR_NS * HOUR_NS
+        end_ns = -(-self.end_ns // HOUR_NS) * HOUR_NS
+        found: Counter[int] = Counter()
+        for event in (Event.SCANS, Event.FAILURES, Event.LOOKS):
+            points = max(1, (end_ns - first_ns) // HOUR_NS)
+            past: SeriesPast = find(SeriesRequest(EVERY_TAG, event, first_ns, end_ns, points))
+            for at_ns, n in zip(past.stamps_ns, past.counts, strict=True):
+                found[at_ns // HOUR_NS * HOUR_NS] += n
+        return found
+
+    def _alarms_from(self, hours: Counter[int]) -> int:
+        """From which moment on alarms are worked out: of so much before the end, not of more."""
+        period = sum(n for at_ns, n in hours.items() if at_ns + HOUR_NS > self.start_ns)
+        if period > MAX_WRITES:
+            raise PastRefused(
+                f"from and to have about {period} scans and inspections between them, the limit "
+                f"is {MAX_WRITES}: ask for a shorter period"
+            )
+        total, from_ns = 0, self.end_ns
+        for at_ns in sorted(hours, reverse=True):
+            total += hours[at_ns]
+            if total > ALARM_WRITES:
+                return from_ns
+            from_ns = min(from_ns, at_ns)
+        return max(0, self.start_ns - LEAD_NS)
+
+
+def planned(
+    body: bytes, media_type: str, of: Report, headers: Mapping[str, str] | None = None
+) -> Plan:
+    """The plan of a body, with an ETag of its content."""
+    etag = f'"{blake2b(body, digest_size=12).hexdigest()}"'
+    known = bodies.period_headers(of.journal, of.start_ns, of.end_ns)
+    answer = Answer(body, media_type, {"ETag": etag, **REVALIDATE, **known, **(headers or {})})
+    return Plan(etag, 0.0, lambda _: answer)
+
+
+def _stretches(hours: Counter[int], start_ns: int, end_ns: int) -> Iterator[Stretch]:
+    """All of a period, in stretches with about a lot in each."""
+    count, from_ns = 0, start_ns
+    for at_ns in sorted(hours):
+        if count and count + hours[at_ns] > _LOT and from_ns < at_ns < end_ns:
+            yield from_ns, at_ns
+            count, from_ns = 0, at_ns
+        count += hours[at_ns]
+    if from_ns < end_ns:
+        yield from_ns, end_ns
+
+
+@dataclass(slots=True)
+class _Extremes:
+    """The readings of one sensor; of equal ones the first counts."""
+
+    n: int = 0
+    failed: int = 0
+    mean: float = 0.0
+    low: tuple[float, str, int] | None = None
+    high: tuple[float, str, int] | None = None
+
+    def add(self, value: float, write: PastWrite) -> None:
+        self.n += 1
+        self.mean += (value - self.mean) / self.n
+        if self.low is None or value < self.low[0]:
+            self.low = value, write.tag_id, write.stamp_ns
+        if self.high is None or value > self.high[0]:
+            self.high = value, write.tag_id, write.stamp_ns
+
+
+class _Fold:
+    """What is taken in, in the order of time, and the body of the report that it leads to."""
+
+    def __init__(self, of: Report, alarms_ns: int) -> None:
+        self._of = of
+        self._alarms_ns = alarms_ns
+        self._follower: Follower | None = None
+        self._sensors: dict[str, _Extremes] = {}
+        self._counts = Counter({"scans": 0, "failed": 0, "inspections": 0})
+        self._scanned: set[str] = set()
+        # When anything was tried, and when at each tag's sensors; before the period too.
+        self._tried_ns = array("q")
+        self._tried_at_ns: dict[str, array[int]] = {}
+
+    def take(self, found: PastWrites) -> None:
+        """The next writes."""
+        for write in found.writes:
+            self._tried_ns.append(write.stamp_ns)
+            if write.kind != KIND_FLOWER:
+                mine = self._tried_at_ns.setdefault(write.tag_id, array("q"))
+                mine.append(write.stamp_ns)
+            if write.stamp_ns >= self._of.start_ns:
+                self._count(write)
+        if self._follower is None:
+            self._follower = self._new(found.spans)
+        self._follower.take(it for it in found.writes if it.stamp_ns >= self._alarms_ns)
+        if found.writes:
+            # What is found later is the same; but so it is worked out lot by lot.
+            self._follower.found(found.writes[-1].stamp_ns)
+
+    def _new(self, spans: Sequence[RunSpan]) -> Follower:
+        by, end_ns = self._of.criteria, self._of.end_ns
+        cut = [
+            replace(it, end_ns=min(it.end_ns, end_ns)) for it in spans if it.start_ns < end_ns
+        ]  # what came later did not hold then
+
+        def is_day(light: bool | None, at_ns: int) -> bool:
+            return by.day(light, at_ns).is_day
+
+        return Follower(
+            by.sensors, is_day, cut, by.recent_s, day_number=by.day_number, kept=2 * MAX_WRITES
+        )
+
+    def _count(self, write: PastWrite) -> None:
+        if write.status != STATUS_OK:
+            self._counts["failed"] += 1
+            return
+        if write.kind == KIND_FLOWER:
+            self._counts["inspections"] += 1
+            return
+        self._counts["scans"] += 1
+        self._scanned.add(write.tag_id)
+        readings = readings_of([write])
+        for reading in (*readings, *derive(readings)):
+            of = self._sensors.setdefault(reading.name, _Extremes())
+            if self._of.criteria.sensors.named(reading.name).is_plausible(reading.value):
+                of.add(reading.value, write)
+            else:
+                of.failed += 1
+
+    # --- what it leads to -------------------------------------------------------------------------
+
+    def body(self, notes: Sequence[Note], known: Sequence[str]) -> dict[str, Any]:
+        """`schema.ShiftReport`; `known` are the tags by then."""
+        start_ns, end_ns = self._of.start_ns, self._of.end_ns
+        notes = [note for note in notes if note.made_at_ns < end_ns]
+        alarms = self._alarms()
+        said = notes_of_alarms(alarms, notes, end_ns)
+        gone = withdrawals(notes)
+        spoken = [it for it in notes if it.kind != WITHDRAW and it.made_at_ns >= start_ns]
+        silences = self._silences()
+        never = sorted({*known} - self._scanned)
+        order = {name: index for index, name in enumerate(self._of.criteria.sensors.by_name)}
+        sensors = sorted(self._sensors, key=lambda name: (order.get(name, len(order)), name))
+        active = [alarm for alarm in alarms if alarm.is_active]
+        return {
+            **bodies.stretch(start_ns, end_ns),
+            "counts": {
+                "raised": sum(alarm.raised_at_ns >= start_ns for alarm in alarms),
+                "cleared": len(alarms) - len(active),
+                "active": len(active),
+                "critical": sum(alarm.reason.verdict is Verdict.CRITICAL for alarm in active),
+                "notes": len(spoken),
+                **self._counts,
+                "tags": len(known),
+                "tags_scanned": len(known) - len(never),
+            },
+            "alarms_from": stamp(min(max(self._alarms_ns, start_ns), end_ns)),
+            "alarms": [
+                alarm_json(alarm, said.get(alarm.id))
+                for alarm in heapq.nsmallest(MAX_LISTED, alarms, key=worst_first)
+            ],
+            "notes": [note_json(note, gone) for note in spoken[::-1][:MAX_LISTED]],
+            "silences": [
+                {"tag_id": tag_id, **bodies.stretch(*silence)}
+                for tag_id, silence in silences[:MAX_LISTED]
+            ],
+            "sensors": [self._of_sensor(name) for name in sensors[:MAX_LISTED]],
+            "never_scanned": never[:MAX_LISTED],
+            "left_out": {
+                name: max(0, count - MAX_LISTED)
+                for name, count in {
+                    "alarms": len(alarms),
+                    "notes": len(spoken),
+                    "silences": len(silences),
+                    "sensors": len(sensors),
+                    "never_scanned": len(never),
+                }.items()
+            },
+            **bodies.period_fields(self._of.journal, start_ns, end_ns),
+        }
+
+    def _alarms(self) -> list[Alarm]:
+        """Those that were active at any time of the period, as they were at its end."""
+        start_ns, end_ns = self._of.start_ns, self._of.end_ns
+        if self._follower is None:
+            return []
+        return [
+            alarm
+            for alarm in self._follower.found(end_ns - 1).alarms
+            if alarm.raised_at_ns < end_ns
+            and (alarm.cleared_at_ns is None or alarm.cleared_at_ns >= start_ns)
+        ]
+
+    def _of_sensor(self, name: str) -> dict[str, Any]:
+        of = self._sensors[name]
+
+        def extreme(found: tuple[float, str, int] | None) -> dict[str, Any] | None:
+            if found is None:
+                return None
+            return {"value": found[0], "tag_id": found[1], "stamp": stamp(found[2])}
+
+        return {
+            "sensor_type": name,
+            "unit": self._of.criteria.sensors.named(name).unit,
+            "n": of.n,
+            "failed": of.failed,
+            "mean": of.mean if of.n else None,
+            "low": extreme(of.low),
+            "high": extreme(of.high),
+        }
+
+    def _silences(self) -> list[tuple[str, Stretch]]:
+        """Those of the greenhouse, and then of tags by themselves, the longest first."""
+        start_ns, end_ns = self._of.start_ns, self._of.end_ns
+        whole = list(silences(self._tried_ns, end_ns))
+        found = [
+            (tag_id, silence)
+            for tag_id, tried_ns in self._tried_at_ns.items()
+            for silence in silences(tried_ns, end_ns, whole)
+        ]
+        cut = [
+            (tag_id, (max(from_ns, start_ns), to_ns))
+            for tag_id, (from_ns, to_ns) in ((*((WHOLE_SITE, it) for it in whole), *found))
+            if to_ns > start_ns
+        ]
+        return sorted(cut, key=lambda it: (it[0] != WHOLE_SITE, it[1][0] - it[1][1], *it))
+
+
+def silences(
+    tried_ns: Sequence[int], end_ns: int, but: Sequence[Stretch] = ()
+) -> Iterator[Stretch]:
+    """Stretches without an attempt, longer than three times the usual interval and ten minutes.
+
+    The time within `but`, stretches in their order, does not count. Before the first attempt there
+    is no silence.
+    """
+    if not tried_ns:
+        return
+    intervals = [later - at_ns for at_ns, later in pairwise(tried_ns)]
+    longest_ns = max(SHORTEST_NS, TIMES_MEDIAN * (median(intervals) if intervals else 0))
+    starts_ns = [from_ns for from_ns, _ in but]
+    up_to = [0, *accumulate(to_ns - from_ns for from_ns, to_ns in but)]
+
+    def within_but(until_ns: int) -> int:
+        index = bisect_left(starts_ns, until_ns)
+        late_ns = max(0, but[index - 1][1] - until_ns) if index else 0
+        return up_to[index] - late_ns
+
+    for at_ns, later_ns in pairwise((*tried_ns, end_ns)):
+        length_ns = later_ns - at_ns
+        if length_ns > longest_ns:
+            length_ns -= within_but(later_ns) - within_but(at_ns)
+            if length_ns > longest_ns:
+                yield at_ns, later_ns

@@ -1,0 +1,287 @@
+"""The shift report on paper: one page of HTML, A4, without scripts or anything from elsewhere.
+
+Its words are in `report_words.json`, by language; sensors have theirs in the file of sensors.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from datetime import datetime
+from functools import cache
+from html import escape
+from importlib.resources import files
+from typing import Any, Final
+
+import orjson
+
+from lupin_bridge.judge.options import Criteria, unix_s
+from lupin_bridge.past.plans import Plan
+from lupin_bridge.past.report import WHOLE_SITE, Report, planned
+
+HTML_TYPE: Final = "text/html; charset=utf-8"
+_POLICY: Final = (
+    "default-src 'none'; style-src 'unsafe-inline'; base-uri 'none'; form-action 'none'; "
+    "frame-ancestors 'none'"
+)
+# A browser repeats a table's head on each sheet, and leaves a row whole.
+_STYLE: Final = """
+@page { size: A4; margin: 14mm 12mm }
+body { font: 10pt/1.35 system-ui, sans-serif; color: #111; background: #fff; max-width: 186mm;
+  margin: 0 auto; padding: 4mm }
+h1 { font-size: 18pt; margin: 0 } h2 { font-size: 12pt; margin: 7mm 0 1mm; break-after: avoid }
+p { margin: 1mm 0 } .note { color: #444; font-size: 9pt }
+table { border-collapse: collapse; width: 100%; font-size: 8.5pt }
+thead { display: table-header-group } tr { break-inside: avoid }
+th, td { text-align: left; vertical-align: top; padding: 1mm;
+  border-bottom: .2mm solid #bbb; overflow-wrap: anywhere; min-width: 17mm }
+th { border-bottom: .4mm solid #444; overflow-wrap: normal }
+.number { text-align: right; font-variant-numeric: tabular-nums; white-space: nowrap; min-width: 0 }
+th.number { white-space: normal }
+dl { display: grid; grid-template-columns: repeat(4, 1fr); gap: 2mm; margin: 4mm .3mm }
+dl div { border: .2mm solid #bbb; padding: 1.5mm } dt { color: #444; font-size: 8.5pt }
+dd { margin: 0; font-size: 13pt } .critical td:first-child { font-weight: 700 }
+td:first-child { min-width: 22mm; hyphens: auto }
+@media print { body { padding: 0; max-width: none } }
+"""
+Words = Mapping[str, Any]
+# An entry of a list in the body.
+Entry = Mapping[str, Any]
+
+
+@cache
+def _words() -> Mapping[str, Words]:
+    text = files("lupin_bridge.past").joinpath("report_words.json").read_text(encoding="utf-8")
+    found: Mapping[str, Words] = orjson.loads(text)
+    return found
+
+
+@dataclass(frozen=True, slots=True)
+class ReportPage(Report):
+    """The report as a page in the language `lang`."""
+
+    lang: str = "en"
+
+    def plan(self, body: dict[str, Any]) -> Plan:
+        """See `Report`."""
+        page = _Page(self.lang, self.criteria).page(body)
+        policy = {"Content-Security-Policy": _POLICY}
+        return planned(page.encode("utf-8", "replace"), HTML_TYPE, self, policy)
+
+
+class _Page:
+    def __init__(self, lang: str, criteria: Criteria) -> None:
+        self._lang = lang
+        self._words = _words()[lang]
+        self._criteria = criteria
+        named: Mapping[str, Any] = orjson.loads(criteria.sensors.text).get("sensors", {})
+        self._labels = {name: it.get("labels", {}).get(lang) for name, it in named.items()}
+
+    def page(self, body: Entry) -> str:
+        say, at = self._say, self._at
+        period = say("period", **{"from": at(body["from"]), "to": at(body["to"])})
+        title = f"{say('title')}: {period}"
+        known = [
+            say(word, at=at(body[name]))
+            for word, name in (("complete", "complete_to"), ("kept", "kept_from"))
+            if body[name] is not None
+        ]
+        parts = [
+            f'<!doctype html><html lang="{self._lang}"><head><meta charset="utf-8">',
+            '<meta name="viewport" content="width=device-width">',
+            f"<title>{escape(title)}</title><style>{_STYLE}</style></head><body>",
+            f"<h1>{escape(say('title'))}</h1><p>{escape(period)}. ",
+            f"{escape(say('zone', zone=self._zone(body['from'], body['to'])))}</p>",
+            f'<p class="note">{escape(" ".join(known) or say("unknown"))}</p>',
+            self._counts(body["counts"]),
+            self._alarms(body),
+            self._extremes(body),
+            self._table(
+                body, "notes", "notes", ("time", "name", "said", "about"), self._note(body)
+            ),
+            self._table(
+                body, "silences", "silences", ("where", "from", "to", "length"), self._silence
+            ),
+            f"<h2>{escape(say('never'))}</h2><p>",
+            escape(", ".join(body["never_scanned"]) or say("none")),
+            f"</p>{self._more(body, 'never_scanned')}</body></html>",
+        ]
+        return "".join(parts)
+
+    def _counts(self, counts: Mapping[str, int]) -> str:
+        whole = counts["tags"]
+        part = counts["tags_scanned"]
+        share = round(100 * part / whole) if whole else 0
+        shown = {
+            **{name: str(counts[name]) for name in ("raised", "cleared", "active", "critical")},
+            **{name: str(counts[name]) for name in ("scans", "failed", "inspections")},
+            "scanned": self._say("of", part=part, whole=whole, share=share),
+        }
+        cells = (
+            f"<div><dt>{escape(self._say(name))}</dt><dd>{escape(text)}</dd></div>"
+            for name, text in shown.items()
+        )
+        return f"<dl>{''.join(cells)}</dl>"
+
+    def _alarms(self, body: Entry) -> str:
+        later = ""
+        if body["alarms_from"] != body["from"]:
+            later = f"<p>{escape(self._say('later', at=self._at(body['alarms_from'])))}</p>"
+        columns = ("alarm", "where", "when", "end", "first*", "worst*", "limit*", "who")
+        return self._table(body, "alarms", "alarms", columns, self._alarm, later)
+
+    def _alarm(self, alarm: Entry) -> Iterable[str]:
+        reason = alarm["reason"]
+        who = [
+            self._say(word, name=alarm[f"{word}_by"], at=self._at(alarm[f"{word}_{when}"]))
+            for word, when in (("acknowledged", "at"), ("shelved", "until"))
+            if f"{word}_by" in alarm
+        ]
+        cleared, numbers = alarm["cleared_at"], reason["kind"] == "range"
+        unit = self._criteria.sensors.named(reason["sensor"]).unit if numbers else ""
+        return (
+            f"{self._what(reason)} ({self._words['verdicts'][reason['verdict']]})",
+            self._where(alarm["tag_id"]),
+            self._at(alarm["raised_at"]),
+            self._say("still") if cleared is None else self._at(cleared),
+            _number(reason["value"], unit) if numbers or reason["kind"] == "pest" else "",
+            _number(alarm["worst"], unit),
+            _number(reason["limit"], unit) if numbers else "",
+            "; ".join(who),
+        )
+
+    def _extremes(self, body: Entry) -> str:
+        columns = ("sensor", "low*", "where", "mean*", "high*", "where", "count*", "bad*")
+        return self._table(body, "extremes", "sensors", columns, self._sensor)
+
+    def _sensor(self, of: Entry) -> Iterable[str]:
+        unit = of["unit"]
+
+        def extreme(found: Entry | None) -> Iterable[str]:
+            if found is None:
+                return ("", "")
+            where = f"{self._where(found['tag_id'])}, {self._at(found['stamp'])}"
+            return _number(found["value"], unit), where
+
+        return (
+            self._label(of["sensor_type"]),
+            *extreme(of["low"]),
+            _number(of["mean"], unit),
+            *extreme(of["high"]),
+            str(of["n"]),
+            str(of["failed"]),
+        )
+
+    def _note(self, body: Entry) -> Callable[[Entry], Iterable[str]]:
+        alarms = {f"alarm:{alarm['id']}": alarm for alarm in body["alarms"]}
+
+        def cells(note: Entry) -> Iterable[str]:
+            subject, gone = note["subject"], note["withdrawn_by"]
+            kind, _, name = subject.partition(":")
+            if subject in alarms:
+                alarm = alarms[subject]
+                about = f"{self._what(alarm['reason'])}, {self._where(alarm['tag_id'])}"
+            else:
+                about = self._say("alarm") if kind == "alarm" else self._where(name)
+            said = [self._words["kinds"].get(note["kind"], note["kind"]), note["text"]]
+            said += [self._say("withdrawn", name=gone)] if gone else []
+            text = "; ".join(it for it in said if it)
+            return self._at(note["made_at"]), note["by"], text, about
+
+        return cells
+
+    def _silence(self, silence: Entry) -> Iterable[str]:
+        minutes = (silence["to"]["sec"] - silence["from"]["sec"]) // 60
+        length = f"{minutes // 60}:{minutes % 60:02} h"
+        from_, to = self._at(silence["from"]), self._at(silence["to"])
+        return self._where(silence["tag_id"]), from_, to, length
+
+    def _table(  # noqa: PLR0917
+        self,
+        body: Entry,
+        title: str,
+        name: str,
+        columns: Sequence[str],
+        cells: Callable[[Entry], Iterable[str]],
+        before: str = "",
+    ) -> str:
+        """A list of the body; a column whose word ends with `*` has numbers."""
+        kinds = [' class="number"' if column.endswith("*") else "" for column in columns]
+        head = f"<h2>{escape(self._say(title))}</h2>{before}"
+        if not body[name]:
+            return f"{head}<p>{escape(self._say('none'))}</p>"
+        names = "".join(
+            f'<th scope="col"{kind}>{escape(self._say(column.removesuffix("*")))}</th>'
+            for column, kind in zip(columns, kinds, strict=True)
+        )
+        rows = "".join(
+            f"<tr{_emphasis(entry)}>"
+            + "".join(
+                f"<td{kind}>{escape(cell)}</td>"
+                for cell, kind in zip(cells(entry), kinds, strict=True)
+            )
+            + "</tr>"
+            for entry in body[name]
+        )
+        table = f"<table><thead><tr>{names}</tr></thead><tbody>{rows}</tbody></table>"
+        return f"{head}{table}{self._more(body, name)}"
+
+    def _more(self, body: Entry, name: str) -> str:
+        count = body["left_out"][name]
+        return f'<p class="note">{escape(self._say("more", count=count))}</p>' if count else ""
+
+    # --- words ------------------------------------------------------------------------------------
+
+    def _say(self, word: str, **filled: object) -> str:
+        text: str = self._words[word]
+        for name, value in filled.items():
+            text = text.replace(f"{{{name}}}", str(value))
+        return text
+
+    def _what(self, reason: Entry) -> str:
+        kind, sensor, value, limit = (reason[it] for it in ("kind", "sensor", "value", "limit"))
+        if kind == "range" and value is not None and limit is not None:
+            kind = "low" if value < limit else "high"
+        elif kind == "old" and sensor:
+            kind = "old_sensor"
+        text: str = self._words["reasons"].get(kind, kind)
+        return text.replace("{sensor}", self._label(sensor))
+
+    def _label(self, sensor: str) -> str:
+        return self._labels.get(sensor) or self._criteria.sensors.named(sensor).label
+
+    def _where(self, tag_id: str) -> str:
+        return (
+            self._say("house") if tag_id in (WHOLE_SITE, "site") else self._say("tag", name=tag_id)
+        )
+
+    def _at(self, when: Mapping[str, int]) -> str:
+        """A moment by the greenhouse's clock; of a simulation, the time since its beginning."""
+        sec = when["sec"]
+        wall_s = unix_s(sec * 1_000_000_000)
+        if wall_s is None:
+            return f"sim {sec // 3600:02}:{sec // 60 % 60:02}"
+        return f"{datetime.fromtimestamp(wall_s, self._criteria.clock.zone):%Y-%m-%d %H:%M}"
+
+    def _zone(self, *moments: Mapping[str, int]) -> str:
+        zone = self._criteria.clock.zone
+        offsets = {
+            f"UTC{datetime.fromtimestamp(wall_s, zone).astimezone(zone).isoformat()[-6:]}"
+            for when in moments
+            if (wall_s := unix_s(when["sec"] * 1_000_000_000)) is not None
+        }
+        name = self._say("this_machine") if zone is None else str(zone)
+        return f"{name} ({', '.join(sorted(offsets))})" if offsets else name
+
+
+def _emphasis(entry: Entry) -> str:
+    is_critical = entry.get("reason", {}).get("verdict") == "critical"
+    return ' class="critical"' if is_critical else ""
+
+
+def _number(value: float | None, unit: str) -> str:
+    """A number in four digits, with its unit on the same line."""
+    if value is None:
+        return ""
+    digits = f"{value:.0f}" if 1e3 <= abs(value) < 1e7 else f"{value:.4g}"
+    return f"{digits}\u00a0{unit}".strip()

@@ -1,0 +1,58 @@
+/** Wheel, pinch and drag on the map, by d3-zoom, which keeps a copy of the view on the element. */
+import { select } from 'd3-selection';
+import { zoom, zoomIdentity, type D3ZoomEvent, type ZoomTransform } from 'd3-zoom';
+
+import { MAX_SCALE, type View } from '../geometry/coordinates';
+import { gestures, type Hand, type Held } from './camera';
+
+const transformOf = ({ x, y, scale }: View): ZoomTransform =>
+  zoomIdentity.translate(x, y).scale(scale);
+
+const toView = ({ x, y, k }: ZoomTransform): View => ({ x, y, scale: k });
+
+function takeHold(element: HTMLElement, held: Held): Hand {
+  const selection = select<HTMLElement, unknown>(element);
+  /** A move of the program's own is no choice of the operator's. */
+  let isFollowing = false;
+  const behaviour = zoom<HTMLElement, unknown>()
+    // Without the browser's layout: the size is known from the resize observer.
+    .extent(() => [
+      [0, 0],
+      [held.viewport().size.width, held.viewport().size.height],
+    ])
+    .constrain((transform) => transformOf(held.inSight(toView(transform))))
+    .clickDistance(6)
+    // At once, by the double click too: nothing here is animated (see `instantly.ts`).
+    .duration(0);
+  const follow = (view: View): void => {
+    isFollowing = true;
+    behaviour.scaleExtent([held.leastScale(), MAX_SCALE]);
+    behaviour.transform(selection, transformOf(view));
+    isFollowing = false;
+  };
+  const byHand = (tell: (event: D3ZoomEvent<HTMLElement, unknown>) => void) => {
+    return (event: D3ZoomEvent<HTMLElement, unknown>): void => {
+      if (!isFollowing) tell(event);
+    };
+  };
+  selection.call(behaviour);
+  // A map that comes back into the page goes on where it was.
+  follow(held.viewport().view);
+  behaviour
+    .on('start', byHand(held.onStart))
+    .on(
+      'zoom',
+      byHand(({ transform }) => {
+        held.onMove(toView(transform));
+      }),
+    )
+    .on('end', byHand(held.onEnd));
+  return {
+    follow,
+    stop: () => selection.on('.zoom', null),
+  };
+}
+
+export const startGestures = (): void => {
+  gestures.dispatch(takeHold);
+};

@@ -1,0 +1,113 @@
+import { useRef, useState, type JSX } from 'react';
+
+import { withdrawComment } from '../contract/comments';
+import { rosText } from '../domain/rostime';
+import { shown } from '../domain/text';
+import { useApp } from '../store/app';
+import { useSelected } from '../store/create';
+import { selectShown } from '../store/moment';
+import { person } from '../store/person';
+import { comments, type Comment } from './comments';
+import { Field, LONGEST } from './Field';
+import { C } from './subject';
+import { useComments } from './useComments';
+
+/** Of one subject, the newest. */
+const MOST_SHOWN = 20;
+
+/** What was said of a subject until the moment that is shown; who may write says more. */
+export function Comments({
+  subject,
+  name,
+  isOfNow = false,
+}: {
+  subject: string;
+  /** What it is about, for a screen reader. */
+  name: string;
+  /** Whatever moment is shown. */
+  isOfNow?: boolean;
+}): JSX.Element {
+  useComments();
+  const all = useSelected(comments, (it) => it);
+  const who = useSelected(person, (it) => it);
+  const shownAt = useApp((state) => selectShown(state).moment);
+  const moment = isOfNow ? null : shownAt;
+  const [isOpen, setOpen] = useState(false);
+  const button = useRef<HTMLButtonElement>(null);
+  const found = all.filter((it) => it.subject === subject && (moment === null || it.at <= moment));
+  const mayWrite = who?.can_write_notes === true;
+  return (
+    <>
+      {mayWrite && (
+        <button
+          ref={button}
+          type="button"
+          className="say"
+          aria-label={C.commentOf(name)}
+          aria-expanded={isOpen}
+          onClick={() => {
+            setOpen(!isOpen);
+          }}
+        >
+          {C.comment}
+        </button>
+      )}
+      {(found.length > 0 || isOpen) && (
+        <div className="comments" data-testid="comments">
+          <ul aria-label={C.title}>
+            {found.slice(-MOST_SHOWN).map((comment) => (
+              <Said
+                key={comment.id}
+                comment={comment}
+                mayWithdraw={mayWrite && (comment.by === who.name || who.role === 'admin')}
+              />
+            ))}
+          </ul>
+          {isOpen && (
+            <Field
+              subject={subject}
+              moment={moment}
+              onDone={() => {
+                setOpen(false);
+                button.current?.focus();
+              }}
+            />
+          )}
+        </div>
+      )}
+    </>
+  );
+}
+
+function Said({
+  comment: { id, by, at, text },
+  mayWithdraw,
+}: {
+  comment: Comment;
+  mayWithdraw: boolean;
+}): JSX.Element {
+  const [fault, setFault] = useState('');
+  return (
+    <li data-comment={id}>
+      <strong>
+        <bdi>{by}</bdi>
+      </strong>{' '}
+      <span className="faint">{rosText(at)}</span> <bdi>{shown(text, LONGEST)}</bdi>{' '}
+      {mayWithdraw && (
+        <button
+          type="button"
+          className="text-button"
+          aria-label={C.withdrawOf(shown(text, 40))}
+          onClick={() => {
+            withdrawComment(id).catch((error: unknown) => {
+              setFault(C.failed(error instanceof Error ? error.message : String(error)));
+            });
+          }}
+        >
+          {C.withdraw}
+        </button>
+      )}
+      {fault !== '' && <span role="alert">{fault}</span>}
+    </li>
+  );
+}

@@ -1,0 +1,135 @@
+import { act as flush, fireEvent, render, screen, waitFor } from '@testing-library/react';
+import { beforeEach, expect, test, vi } from 'vitest';
+
+import type { Note } from '../contract/types';
+import { act, receive } from '../store/app';
+import { person } from '../store/person';
+import { alarm, alarms } from '../testing/alarms';
+import { showTags } from '../testing/page';
+import { clustersOf, comments, commentsIn } from './comments';
+import { CommentMarks, Comments, SiteComment } from './parts';
+
+const said = (id: string, made: number, over: Partial<Note> = {}): Note => ({
+  id,
+  kind: 'comment',
+  subject: 'tag:7',
+  text: id,
+  until: null,
+  made_at: { sec: made, nanosec: 0 },
+  by: 'anna',
+  withdrawn_by: null,
+  withdrawn_at: null,
+  ...over,
+});
+
+const ANNA = {
+  can_sign_out: true,
+  seconds_left: null,
+  name: 'anna',
+  role: 'operator',
+  can_write_notes: true,
+} as const;
+
+let asked: string[] = [];
+let notes: readonly Note[] = [];
+
+beforeEach(() => {
+  asked = [];
+  notes = [];
+  comments.dispatch([]);
+  person.dispatch(null);
+  showTags([]);
+  vi.stubGlobal('fetch', (url: URL, { method = 'GET', body }: RequestInit) => {
+    asked.push(`${method} ${url.pathname}${url.search} ${typeof body === 'string' ? body : ''}`);
+    return Promise.resolve(Response.json({ notes }));
+  });
+});
+
+/** A frame: the log has so many notes. */
+const tell = (count: number): void => {
+  flush(() => {
+    receive({ type: 'alarms', alarms: { ...alarms([alarm('cold')]), notes: count } });
+  });
+};
+
+test('a comment stands where it is about, until it is withdrawn', () => {
+  const then = said('then', 900, { until: { sec: 100, nanosec: 0 }, text: 'two\nlines' });
+  const gone = said('gone', 950, { withdrawn_by: 'anna' });
+  expect(commentsIn([gone, then, said('now', 800)])).toEqual([
+    { id: 'then', subject: 'tag:7', text: 'two lines', by: 'anna', at: 100 },
+    { id: 'now', subject: 'tag:7', text: 'now', by: 'anna', at: 800 },
+  ]);
+});
+
+test('marks that would cover each other are one, and those outside of the span none', () => {
+  const found = commentsIn([950, 510, 501, 500, 10].map((at) => said(String(at), at)));
+  const clusters = clustersOf(found, { from: 100, to: 1_100 });
+  expect(clusters.map((it) => [it.at, it.comments.length])).toEqual([
+    [500, 3],
+    [950, 1],
+  ]);
+});
+
+test('what is said is fetched when there is more of it, and shown with name and time', async () => {
+  render(<Comments subject="tag:7" name="Tag 7" />);
+  tell(0);
+  expect(asked).toEqual([]);
+  notes = [said('leaf sample', 800), said('other', 800, { subject: 'tag:8' })];
+  tell(2);
+  await screen.findByText('leaf sample');
+  expect(screen.getByTestId('comments').textContent).toContain('anna sim 00:13:20 leaf sample');
+  expect(screen.queryByText('other')).toBeNull();
+  expect(screen.queryByRole('button')).toBeNull();
+  tell(2);
+  expect(asked).toEqual(['GET /api/notes?kind=comment ']);
+});
+
+test('who may write does, and withdraws their own words alone', async () => {
+  person.dispatch(ANNA);
+  comments.dispatch(commentsIn([said('mine', 800), said('bert’s', 700, { by: 'bert' })]));
+  render(<Comments subject="tag:7" name="Tag 7" />);
+  expect(screen.getAllByRole('button', { name: /^Withdraw/ })).toHaveLength(1);
+  fireEvent.click(screen.getByRole('button', { name: 'Withdraw: mine' }));
+  fireEvent.click(screen.getByRole('button', { name: 'Comment: Tag 7' }));
+  fireEvent.change(screen.getByLabelText('Comment as of now'), { target: { value: ' dry ' } });
+  fireEvent.click(screen.getByRole('button', { name: 'Save' }));
+  await waitFor(() => {
+    expect(screen.queryByLabelText('Comment as of now')).toBeNull();
+  });
+  expect(asked).toEqual([
+    'DELETE /api/notes/mine ',
+    'POST /api/notes {"kind":"comment","subject":"tag:7","text":"dry"}',
+  ]);
+});
+
+test('who looks back says it about the moment that is shown', async () => {
+  person.dispatch(ANNA);
+  flush(() => {
+    act({ type: 'moment', moment: 500 });
+  });
+  render(<SiteComment />);
+  fireEvent.click(screen.getByRole('button', { name: 'Comment: greenhouse' }));
+  const field = screen.getByLabelText('Comment about sim 00:08:20');
+  fireEvent.change(field, { target: { value: 'doors open' } });
+  fireEvent.click(screen.getByRole('button', { name: 'Save' }));
+  await waitFor(() => {
+    expect(asked.at(-1)).toBe(
+      'POST /api/notes {"kind":"comment","subject":"site","text":"doors open","until":"500.000"}',
+    );
+  });
+});
+
+test('a mark tells on its own who said what of which tag', () => {
+  const hidden = 'a\u202ecod';
+  comments.dispatch(
+    commentsIn([said('n', 500, { text: hidden }), said('s', 90, { subject: 'site' })]),
+  );
+  render(<CommentMarks span={{ from: 0, to: 1_000 }} tagIds={['8']} />);
+  expect(screen.getAllByRole('button').map((it) => it.textContent)).toEqual([
+    'anna, sim 00:01:30, greenhouse: s',
+  ]);
+  render(<CommentMarks span={{ from: 0, to: 1_000 }} tagIds={['7']} />);
+  expect(screen.getAllByRole('button').at(-1)?.textContent).toBe(
+    'anna, sim 00:08:20, Tag 7: a\ufffdcod',
+  );
+});

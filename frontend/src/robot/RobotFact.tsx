@@ -1,0 +1,40 @@
+import type { JSX } from 'react';
+
+import type { RobotNow } from '../contract/types';
+import { ageStep } from '../domain/age';
+import { ageText, percentText, written } from '../domain/format';
+import { store } from '../store/app';
+import { S } from '../strings';
+import { useTicking } from '../widgets/useNow';
+import { ageOf, timeOf, useRobot } from './heard';
+import { R } from './words';
+
+const metres = (value: number): string => written(value.toFixed(1));
+
+/** All of it in words: for the legend, and for who does not see the map. */
+export function robotText({ position, battery }: RobotNow, time: number | null): string {
+  const ago = (age: number | null): string =>
+    age === null ? R.robotAgeUnknown : S.agoSuffix(ageText(age));
+  const parts = position
+    ? [R.robotAt(metres(position.x), metres(position.y)), ago(ageOf(position.observed_at, time))]
+    : [R.robotNowhere];
+  if (battery) {
+    const percent = percentText(battery.percent / 100);
+    const age = ageOf(battery.observed_at, time);
+    parts.push(
+      ageStep(age) === 'fresh' ? R.robotBattery(percent) : R.robotReported(percent, ago(age)),
+    );
+  }
+  return parts.join('; ');
+}
+
+export function RobotFact(): JSX.Element | null {
+  const robot = useRobot();
+  const text = useTicking((now) => robotText(robot, timeOf(store.get(), now)));
+  if (!robot.position && !robot.battery) return null;
+  return (
+    <span className="robot-fact" data-testid="robot-fact">
+      {text}
+    </span>
+  );
+}

@@ -1,0 +1,65 @@
+import { act as rendered, render, screen } from '@testing-library/react';
+import { beforeEach, expect, test, vi } from 'vitest';
+
+import type { Unread } from '../contract/frames';
+import { robotFrame } from '../store/robot';
+import { store } from '../store/app';
+import { showTags } from '../testing/page';
+import { wireTag } from '../testing/tags';
+import { RobotFact, robotText } from './RobotFact';
+import { RobotLayer } from './RobotLayer';
+
+const time = (sec: number): { sec: number; nanosec: number } => ({ sec, nanosec: 0 });
+const robot = {
+  position: { x: 2.14, y: -3.4, heading: null, observed_at: time(988) },
+  plan: null,
+  battery: { percent: 64.4, observed_at: time(980) },
+};
+
+beforeEach(() => {
+  robotFrame.dispatch(null);
+  showTags([wireTag()]);
+  vi.stubGlobal('fetch', () => new Promise(() => undefined));
+});
+
+test('all of a robot is told in words, each as old as it is', () => {
+  const said = (now: number | null): string => robotText(robot, now).replaceAll('\u00a0', ' ');
+  expect(said(1_000)).toBe('Robot: 2.1 m, −3.4 m; 12 s ago; battery 64 %');
+  expect(said(1_180)).toBe('Robot: 2.1 m, −3.4 m; 3 min ago; battery 64 %, reported 3 min ago');
+  expect(said(null)).toBe('Robot: 2.1 m, −3.4 m; age unknown; battery 64 %, reported age unknown');
+  expect(robotText({ ...robot, position: null }, 981)).toMatch(/^Robot: position unknown; battery/);
+});
+
+test('of a robot that says nothing there is no line', () => {
+  const { container } = render(<RobotFact />);
+  rendered(() => {
+    robotFrame.dispatch({ type: 'robot', position: null, plan: null, battery: null } as Unread);
+  });
+  expect(container.textContent).toBe('');
+});
+
+test.each([
+  ['a place that is no number', { ...robot, position: { ...robot.position, x: '2' } }],
+  ['a plan that is no list', { ...robot, plan: { points: 'far', observed_at: time(1) } }],
+  ['a part that is missing', { position: null, plan: null }],
+])('a frame with %s is not shown, and the page says so', (_, wrong) => {
+  document.body.innerHTML = '<div id="map-view"></div>';
+  render(<RobotLayer />);
+  rendered(() => {
+    robotFrame.dispatch({ type: 'robot', ...wrong });
+  });
+  expect(screen.queryByTestId('robot-mark')).toBeNull();
+  expect(store.get().twin.unread?.why).toMatch(/^robot\./);
+  rendered(() => {
+    robotFrame.dispatch({ type: 'robot', ...robot });
+  });
+  expect(screen.getByTestId('robot-mark')).toBeTruthy();
+  expect(store.get().twin.unread).toBeNull();
+});
+
+test('a frame of another type leaves the robot as it is', () => {
+  const last = { type: 'robot', ...robot };
+  robotFrame.dispatch(last);
+  robotFrame.dispatch({ type: 'weather' });
+  expect(robotFrame.get()).toBe(last);
+});

@@ -1,0 +1,122 @@
+import { describe, expect, test } from 'vitest';
+
+import { extended, trailLines, wayAhead, type TrailPoint } from './path';
+
+const at = (x: number, seconds: number): TrailPoint => ({ x, y: 0, at: seconds });
+const position = (x: number, sec: number): Parameters<typeof extended>[1] => ({
+  x,
+  y: 0,
+  heading: null,
+  observed_at: { sec, nanosec: 0 },
+});
+
+describe('trail', () => {
+  test('grows by what is apart in place and in time, and is the same one otherwise', () => {
+    const trail = [at(0, 100)];
+    expect(extended(trail, position(5, 100))).toBe(trail);
+    expect(extended(trail, position(0.05, 110))).toBe(trail);
+    expect(extended(trail, position(0.1, 101))).toEqual([at(0, 100), at(0.1, 101)]);
+  });
+
+  test('begins anew after a clock that went back', () => {
+    expect(extended([at(0, 1_000)], position(1, 20))).toEqual([at(1, 20)]);
+  });
+
+  test('is bounded: the oldest go', () => {
+    let trail: readonly TrailPoint[] = [];
+    for (let second = 1; second <= 2_500; second++)
+      trail = extended(trail, position(second, second));
+    expect(trail).toHaveLength(2_000);
+    expect(trail.at(-1)).toEqual(at(2_500, 2_500));
+  });
+
+  test('is drawn in steps of age that hang together, and no older than an hour', () => {
+    const points = [at(0, 399), at(1, 400), at(2, 410), at(4, 2_190), at(4.5, 2_210)];
+    expect(trailLines(points, 4_000)).toEqual([
+      {
+        points: [
+          [1, 0],
+          [2, 0],
+        ],
+        step: 5,
+      },
+      {
+        points: [
+          [4, 0],
+          [4.5, 0],
+        ],
+        step: 3,
+      },
+    ]);
+  });
+
+  test('is broken where nothing was heard for long and it is elsewhere then', () => {
+    const still = [at(0, 100), at(0.5, 200), at(1, 210)];
+    expect(trailLines(still, 210)).toHaveLength(1);
+    const gap = [at(0, 100), at(0.5, 110), at(3, 200), at(4, 201)];
+    expect(trailLines(gap, 201).map(({ points }) => points.length)).toEqual([2, 2]);
+  });
+
+  test('is all of the oldest look while the time is not known', () => {
+    expect(trailLines([at(0, 100), at(1, 110)], null)).toEqual([
+      {
+        points: [
+          [0, 0],
+          [1, 0],
+        ],
+        step: 5,
+      },
+    ]);
+  });
+});
+
+describe('way', () => {
+  const corner = [
+    [0, 0],
+    [4, 0],
+    [4, 4],
+  ];
+
+  test('is whole while nobody knows where the robot is', () => {
+    expect(wayAhead(corner, null)).toEqual(corner);
+  });
+
+  test.each([
+    [
+      'at its beginning',
+      { x: 0.1, y: 0 },
+      [
+        [0.1, 0],
+        [4, 0],
+        [4, 4],
+      ],
+    ],
+    [
+      'past the middle of a stretch',
+      { x: 3, y: 0.2 },
+      [
+        [3, 0.2],
+        [4, 0],
+        [4, 4],
+      ],
+    ],
+    [
+      'behind the corner',
+      { x: 4.1, y: 1 },
+      [
+        [4.1, 1],
+        [4, 4],
+      ],
+    ],
+  ])('goes on from the robot, %s', (_, place, left) => {
+    expect(wayAhead(corner, place)).toEqual(left);
+  });
+
+  test('of one point is a line to it, and of none is none', () => {
+    expect(wayAhead([[2, 2]], { x: 0, y: 0 })).toEqual([
+      [0, 0],
+      [2, 2],
+    ]);
+    expect(wayAhead([], { x: 1, y: 1 })).toEqual([[1, 1]]);
+  });
+});

@@ -1,0 +1,115 @@
+"""The overview of a thousand sites of 30 tags: made on the server, painted, scrolled, changed.
+
+A real page over a real archive, and a real browser; all share this machine.
+"""
+
+from __future__ import annotations
+
+import argparse
+import statistics
+import tempfile
+import time
+from collections.abc import Sequence
+from pathlib import Path
+
+from playwright.sync_api import Browser, Playwright, sync_playwright
+from playwright.sync_api import Page as BrowserPage
+
+from lupin_twin.journal.rows import Row
+from tests.browser.conftest import CHROMIUM, CHROMIUM_ARGS
+from tests.support.archive import Archive, forward_once
+from tests.support.fleet import Page, fleet, write
+from tests.support.journal import SECOND, pin, scan
+from tests.support.postgres import server
+from tests.support.waiting import wait_for
+
+TAGS, SCANS = 30, 3
+# Frames of a browser that took longer than so many ms.
+LATE_MS = 50
+_SCROLL = """async () => {
+  const gaps = []; let before = performance.now();
+  const step = (resolve) => requestAnimationFrame((now) => {
+    gaps.push(now - before); before = now; window.scrollBy(0, 200);
+    gaps.length < 150 ? step(resolve) : resolve();
+  });
+  await new Promise(step);
+  return gaps.slice(5);
+}"""
+
+
+def rows() -> list[Row]:
+    """Tags in a row, of which one is too warm."""
+    now_ns = time.time_ns()
+    pins = [pin(str(tag), now_ns - 900 * SECOND, float(tag)) for tag in range(TAGS)]
+    scans = [
+        scan(str(tag), now_ns - ago * 60 * SECOND + tag, temperature=45.0 if tag == 3 else 22.0)
+        for ago in range(SCANS, 0, -1)
+        for tag in range(TAGS)
+    ]
+    return [*pins, *scans]
+
+
+def serve(page: Page, sites: int) -> None:
+    """Print what the server takes."""
+    begun_s = time.monotonic()
+    wait_for(
+        lambda: sum(it["active_alarms"] is not None for it in page.sites().values()) == sites,
+        "all sites to be judged",
+        timeout_s=600,
+    )
+    print(f"{sites} sites judged within {time.monotonic() - begun_s:.0f} s", flush=True)
+    for path in ("/api/sites", "/api/alarms", "/api/sites/gh0/map.svg"):
+        took = []
+        for _ in range(30):
+            begun_s = time.perf_counter()
+            body = page.http.get(path).content
+            took.append((time.perf_counter() - begun_s) * 1e3)
+        print(f"{path}: median {statistics.median(took):.1f} ms, {max(took):.1f} at most", end="")
+        print(f", {len(body):,} bytes")
+
+
+def paint(page: BrowserPage, url: str, sites: int) -> None:
+    """Print what a browser takes."""
+    page.goto(url, wait_until="commit")
+    page.locator(".fleet-site").nth(sites - 1).wait_for(state="attached")
+    page.evaluate("() => new Promise((done) => requestAnimationFrame(() => setTimeout(done)))")
+    print(f"painted {page.evaluate('performance.now()'):.0f} ms after the navigation began")
+    gaps = page.evaluate(_SCROLL)
+    late = sum(gap > LATE_MS for gap in gaps)
+    print(
+        f"scrolled: a frame each {statistics.median(gaps):.0f} ms, {max(gaps):.0f} at most", end=""
+    )
+    print(f", {late} of {len(gaps)} over {LATE_MS} ms")
+    page.wait_for_selector(".fleet-map img")
+    loaded = "[...document.images].filter((it) => it.complete && it.naturalWidth).length"
+    print(f"small maps fetched: {page.evaluate(loaded)} of {sites}")
+
+
+def _chromium(playwright: Playwright) -> Browser:
+    return playwright.chromium.launch(
+        executable_path=CHROMIUM, args=list(CHROMIUM_ARGS), headless=True
+    )
+
+
+def main(arguments: Sequence[str] = ()) -> None:
+    """Print the figures."""
+    parser = argparse.ArgumentParser()
+    parser.add_argument("--quick", action="store_true", help="fifty sites")
+    sites = 50 if parser.parse_args(arguments).quick else 1_000
+    with tempfile.TemporaryDirectory() as folder, server() as postgresql:
+        archive = Archive(postgresql, "gh0")
+        archive.add_user("page", "lupin_page")
+        write(Path(folder) / "journal", rows())
+        forward_once(archive, Path(folder) / "journal")
+        archive.copy_site(*(f"gh{number}" for number in range(1, sites)))
+        archive.keep_live()
+        with fleet(archive) as served, sync_playwright() as playwright:
+            serve(served, sites)
+            with _chromium(playwright) as browser:
+                for _ in range(3):
+                    with browser.new_context() as context:
+                        paint(context.new_page(), served.url, sites)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,104 @@
+"""Shift reports of a fleet: a site's own, as its twin's bridge gives it, and counts of all."""
+
+from __future__ import annotations
+
+import time
+from datetime import UTC
+from datetime import time as dtime
+from pathlib import Path
+from typing import Any
+
+from lupin_bridge.judge.daylight import ClockDay
+from lupin_bridge.judge.options import Criteria, own_sensors
+from lupin_bridge.past.report import Report
+from lupin_twin.core.journal_condition import Condition, JournalState
+from lupin_twin.journal.rows import Row, ScanRow
+from lupin_twin.journal.schema import open_reader
+from tests.support.archive import Archive, forward_once
+from tests.support.fleet import Page, fleet, write
+from tests.support.journal import SECOND, look, scan
+from tests.support.past import answered_by
+from tests.support.waiting import wait_for
+
+HOUR_S = 3600
+# By the tests' settings it is always day.
+CLOCK_OF_TESTS = dtime(0)
+
+
+def rows_of(begun_s: int) -> list[Row]:
+    """Three hours of two tags: one too warm, with a failed attempt, a silence and a pest."""
+    found: list[Row] = []
+    for minute in range(0, 180, 5):
+        at_ns = (begun_s + 60 * minute) * SECOND
+        if not 60 <= minute < 110:
+            found.append(scan("a", at_ns, temperature=22.0 + minute / 10, humidity=60.0))
+        if minute < 90:
+            found.append(scan("b", at_ns + SECOND, temperature=21.0))
+    found.append(look("b", (begun_s + 300) * SECOND, anomaly=True))
+    failed = (begun_s + 400) * SECOND
+    found.append(ScanRow("b", failed, failed + 1000, (), 0, 2, "no", source="robot"))
+    return sorted(found, key=lambda row: row.stamp_ns)
+
+
+def test_a_sites_report_is_that_of_its_journal_and_all_are_counted(
+    archive: Archive, tmp_path: Path
+) -> None:
+    begun_s = int(time.time()) // HOUR_S * HOUR_S - 4 * HOUR_S
+    for site, rows in (("gh1", rows_of(begun_s)), ("gh2", rows_of(begun_s)[:10]), ("no", [])):
+        write(tmp_path / f"{site}.sqlite", rows)
+        forward_once(archive.of_site(site), tmp_path / f"{site}.sqlite")
+    asked = f"from={begun_s + 1800}&to={begun_s + 3 * HOUR_S}"
+    with fleet(archive, "--time-zone", "UTC") as page:
+        page.site("gh1")
+        own = wait_for(lambda: answered(page, f"/sites/gh1/api/report?{asked}"), "the report")
+        assert own is not None
+        path = tmp_path / "gh1.sqlite"
+        right = of_journal(path, begun_s + 1800, begun_s + 3 * HOUR_S)
+        assert own.content == right
+        report = own.json()
+        assert {it["reason"]["kind"] for it in report["alarms"]} >= {"range", "pest"}
+        assert {it["tag_id"] for it in report["silences"]} == {"", "a", "b"}
+        html = page.http.get(f"/sites/gh1/api/report.html?{asked}&lang=nl")
+        assert (html.status_code, "Dienstrapport" in html.text) == (200, True)
+
+        every = page.http.get(f"/api/report?from={begun_s}&to={begun_s + 3 * HOUR_S}").json()
+        whole = {it["site"]: it for it in every["sites"]}
+        assert [it["site"] for it in every["sites"]] == ["gh1", "gh2", "no"]
+        for site, row in whole.items():
+            mine = page.http.get(f"/{row['report']}")
+            counts = mine.json()["counts"]
+            for name in ("scans", "failed", "inspections", "notes"):
+                assert row[name] == counts[name], (site, name)
+        assert (whole["gh1"]["failed"], whole["no"]["scans"]) == (1, 0)
+        # In whole hours.
+        some = page.http.get(f"/api/report?{asked}&sites=gh2").json()
+        assert (some["from"]["sec"], len(some["sites"])) == (begun_s, 1)
+        check_refusals(page)
+
+
+def check_refusals(page: Page) -> None:
+    for query, status in (
+        ("sites=gh9", 404),
+        ("from=5&to=4", 400),
+        ("from=0&to=99999999", 400),
+        ("lang=de", 400),
+    ):
+        answer = page.http.get(f"/api/report?{query}")
+        assert answer.status_code == status, answer.text
+
+
+def answered(page: Page, path: str) -> Any:
+    answer = page.http.get(path)
+    return answer if answer.status_code == 200 else None
+
+
+def of_journal(path: Path, start_s: int, end_s: int) -> bytes:
+    """What `serve` says of the same log."""
+    end_ns = end_s * SECOND
+    criteria = Criteria(own_sensors(), None, ClockDay(UTC, CLOCK_OF_TESTS, CLOCK_OF_TESTS))
+    journal = Condition(JournalState.RECORDING, complete_ns=end_ns, kept_ns=((0, end_ns),))
+    connection = open_reader(path)
+    try:
+        return answered_by(connection, Report(start_s * SECOND, end_ns, criteria, journal))
+    finally:
+        connection.close()

@@ -1,0 +1,287 @@
+"""The report of a day: each day once, also after a restart, and none that was missed is hidden."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+from dataclasses import dataclass, field
+from datetime import UTC, datetime, time, timedelta, tzinfo
+from pathlib import Path
+from typing import Any
+from zoneinfo import ZoneInfo
+
+import orjson
+import pytest
+
+from lupin_bridge.judge.options import Criteria
+from lupin_bridge.notify.daily import MOST_DAYS, DailyReport, DailyTarget
+from lupin_bridge.notify.destinations import Targets
+from lupin_bridge.notify.mirror import Mirror
+from lupin_bridge.notify.mqtt import Mqtt
+from lupin_bridge.notify.webhook import MAX_REFUSALS, Webhook
+from lupin_bridge.past.plans import Answered
+from lupin_bridge.serving.admission import Answer
+from lupin_bridge.settings import Secrets, SettingError, Settings
+from lupin_twin.core.journal_condition import Condition, JournalState
+from lupin_twin.core.past import NotRemembered
+from tests.support.mosquitto import Broker, Subscriber, free_port
+from tests.support.receiver import Receiver, receiver, status
+from tests.support.seen import SENSORS, Alarms, seen, tag
+from tests.support.waiting import until
+
+SIX = time(6)
+SECRETS = Secrets(webhook_secret="s" * 16)
+
+
+def ns(text: str) -> int:
+    return int(datetime.fromisoformat(text).timestamp()) * 10**9
+
+
+@dataclass
+class House:
+    """A bridge as a report needs it: a clock, and a log that says which period it was asked of."""
+
+    ros_time_ns: int
+    criteria: Criteria = field(default_factory=lambda: Criteria.of(Settings(time_zone="UTC")))
+    lag_ns: int = 0
+    error: Exception | None = None
+    journal_id: str = "j1"
+    looks: int = 0
+
+    @property
+    def source(self) -> Any:
+        return self
+
+    def journal(self) -> Condition:
+        self.looks += 1
+        complete_ns = self.ros_time_ns - self.lag_ns
+        return Condition(
+            JournalState.RECORDING, complete_ns=complete_ns, journal_id=self.journal_id
+        )
+
+    async def ask(self, question: Any, _cost_s: float) -> Answered:
+        if self.error is not None:
+            raise self.error
+        of = question.query
+        return Answered('"x"', Answer(orjson.dumps([of.start_ns, of.end_ns]), "", {}))
+
+
+@asynccontextmanager
+async def sending(
+    house: House, folder: Path, port: int, zone: tzinfo | None = UTC
+) -> AsyncIterator[Webhook]:
+    target = Targets.of(Settings(webhook_url=f"http://127.0.0.1:{port}/"), SECRETS).webhook
+    assert target is not None
+    hook = Webhook(target, first_wait_s=0.001)
+    hook.start(Alarms(), lambda: house.ros_time_ns, lambda: "robot")
+    report = DailyReport(DailyTarget(SIX, zone, folder), hook, look_s=0.005)
+    report.start(house)
+    try:
+        yield hook
+    finally:
+        await report.stop()
+        await hook.stop()
+
+
+def periods(at: Receiver) -> list[list[int]]:
+    return [it.json["report"] for it in at.posted]
+
+
+async def noted(folder: Path) -> None:
+    await until(lambda: list(folder.glob("*.sent")), "the note of what was sent")
+
+
+async def looks(house: House, count: int = 5) -> None:
+    """It has looked again so often, and found nothing to do."""
+    before = house.looks
+    await until(lambda: house.looks >= before + count, "more looks")
+
+
+async def test_each_day_is_sent_once_from_the_first_hour_on_also_after_restarts(
+    tmp_path: Path,
+) -> None:
+    house = House(ns("2026-05-01T05:00Z"))
+    with receiver(status(200)) as at:
+        async with sending(house, tmp_path, at.port):
+            await noted(tmp_path)
+            await looks(house)
+            assert at.posted == []
+            house.ros_time_ns = ns("2026-05-01T06:00Z")
+            await until(lambda: at.posted, "the first report")
+            await looks(house)
+        async with sending(house, tmp_path, at.port):
+            await looks(house)
+            house.ros_time_ns = ns("2026-05-02T06:30Z")
+            await until(lambda: len(at.posted) == 2, "the second")
+            await looks(house)
+        first = [ns("2026-04-30T06:00Z"), ns("2026-05-01T06:00Z")]
+        assert periods(at) == [first, [first[1], ns("2026-05-02T06:00Z")]]
+        assert at.ids == ["report.20260501T060000Z", "report.20260502T060000Z"]
+        assert {it.json["change"] for it in at.posted} == {"report"}
+        assert {it.json["id"] for it in at.posted} == set(at.ids)
+
+
+async def test_missed_days_are_sent_in_their_order_and_no_more_than_a_week_of_them(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    house = House(ns("2026-05-01T07:00Z"))
+    with receiver(status(200)) as at:
+        async with sending(house, tmp_path, at.port):
+            await noted(tmp_path)
+        house.ros_time_ns = ns("2026-05-04T07:00Z")
+        async with sending(house, tmp_path, at.port):
+            await until(lambda: len(at.posted) == 3, "three days")
+            await looks(house)
+        assert [end for _, end in periods(at)] == [
+            ns(f"2026-05-0{day}T06:00Z") for day in (2, 3, 4)
+        ]
+        assert "too many were missed" not in caplog.text
+        house.ros_time_ns = ns("2026-05-31T07:00Z")
+        async with sending(house, tmp_path, at.port):
+            await until(lambda: len(at.posted) == 3 + MOST_DAYS, "a week")
+            await looks(house)
+        assert periods(at)[-1][1] == ns("2026-05-31T06:00Z")
+        assert "too many were missed" in caplog.text
+
+
+async def test_one_that_is_not_taken_is_tried_again_also_by_the_next_process(
+    tmp_path: Path,
+) -> None:
+    house = House(ns("2026-05-01T07:00Z"))
+    with receiver(status(500)) as at:
+        async with sending(house, tmp_path, at.port):
+            await noted(tmp_path)
+            house.ros_time_ns = ns("2026-05-02T07:00Z")
+            await until(lambda: len(at.posted) >= 3, "some tries")
+    with receiver(status(503), status(200), port=at.port) as again:
+        async with sending(house, tmp_path, at.port):
+            await until(lambda: len(again.posted) == 2, "the report")
+            await looks(house)
+    assert len({*at.ids, *again.ids}) == 1
+
+
+async def test_one_that_the_receiver_refuses_is_given_up_and_that_is_said(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    house = House(ns("2026-05-01T07:00Z"))
+    with receiver(*[status(413)] * MAX_REFUSALS, status(200)) as at:
+        async with sending(house, tmp_path, at.port):
+            await noted(tmp_path)
+            house.ros_time_ns = ns("2026-05-02T07:00Z")
+            await until(lambda: "was given up by webhook" in caplog.text, "that it is given up")
+            house.ros_time_ns = ns("2026-05-03T07:00Z")
+            await until(lambda: len(at.posted) == MAX_REFUSALS + 1, "the next day's")
+    assert at.posted[-1].json["lost"] == 1
+
+
+async def test_it_waits_for_the_log_and_says_why_there_is_none(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    house = House(ns("2026-05-01T07:00Z"))
+    with receiver(status(200)) as at:
+        async with sending(house, tmp_path, at.port):
+            await noted(tmp_path)
+            house.lag_ns = 10 * 10**9
+            house.ros_time_ns = ns("2026-05-02T06:00:05Z")
+            await looks(house)
+            assert at.posted == []
+            house.error = NotRemembered("the disk is gone", is_lasting=False)
+            house.ros_time_ns = ns("2026-05-02T06:00:20Z")
+            await until(lambda: "not sent by webhook: the disk is gone" in caplog.text, "why")
+            house.error = None
+            await until(lambda: at.posted, "the report")
+
+
+async def test_a_clock_that_was_ahead_ends_no_reports_and_a_simulated_one_has_none(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    house = House(ns("2036-05-01T07:00Z"))
+    with receiver(status(200)) as at:
+        async with sending(house, tmp_path, at.port):
+            await noted(tmp_path)
+            house.ros_time_ns = ns("2026-05-01T07:00Z")
+            await looks(house)
+            house.ros_time_ns = ns("2026-05-02T07:00Z")
+            await until(lambda: at.posted, "the report of the true day")
+            house.ros_time_ns = 5_000 * 10**9
+            await until(lambda: "the time is simulated" in caplog.text, "why there is none")
+
+
+async def test_two_greenhouses_with_one_receiver_have_reports_of_their_own(tmp_path: Path) -> None:
+    houses = [House(ns("2026-05-01T07:00Z"), journal_id=name) for name in ("j1", "j2")]
+    with receiver(status(200)) as at:
+        for house in houses:
+            async with sending(house, tmp_path, at.port):
+                await looks(house)
+            house.ros_time_ns = ns("2026-05-02T07:00Z")
+            async with sending(house, tmp_path, at.port):
+                await looks(house, 20)
+        assert len(at.posted) == 2
+
+
+@pytest.mark.parametrize(
+    ("now", "start", "end"),
+    [
+        # Clocks go forward on 29 March 2026, and back on 25 October.
+        ("2026-03-29T12:00Z", "2026-03-28T05:00Z", "2026-03-29T04:00Z"),
+        ("2026-10-25T12:00Z", "2026-10-24T04:00Z", "2026-10-25T05:00Z"),
+    ],
+)
+def test_a_day_is_one_of_the_greenhouses_clock(now: str, start: str, end: str) -> None:
+    target = DailyTarget(SIX, ZoneInfo("Europe/Amsterdam"), Path())
+    assert target.ended_ns(ns(now)) == ns(end)
+    assert target.ended_ns(ns(end)) == ns(end)
+    assert target.ended_ns(ns(end) - 1) == ns(start) == target.ended_ns(ns(end), -1)
+    assert target.ended_ns(ns(start), 1) == ns(end)
+
+
+def test_days_follow_each_other_without_a_gap_for_a_year() -> None:
+    for zone in (ZoneInfo("Europe/Amsterdam"), ZoneInfo("Asia/Kathmandu"), UTC):
+        for at in (time(0), time(2, 30), time(23, 59)):
+            target = DailyTarget(at, zone, Path())
+            end_ns = target.ended_ns(ns("2026-01-01T12:00Z"))
+            for _ in range(370):
+                next_ns = target.ended_ns(end_ns, 1)
+                hours = timedelta(seconds=(next_ns - end_ns) / 1e9) / timedelta(hours=1)
+                assert 22 < hours < 26
+                assert target.ended_ns(next_ns, -1) == end_ns
+                assert target.ended_ns(next_ns) == next_ns
+                end_ns = next_ns
+
+
+async def test_a_broker_gets_it_once_it_is_there_and_keeps_it(tmp_path: Path) -> None:
+    broker = Broker(tmp_path)
+    target = Targets.of(Settings(mqtt_url=broker.url, mqtt_prefix="lt"), Secrets()).mqtt
+    assert target is not None
+    house = House(ns("2026-05-01T07:00Z"))
+    channel = Mqtt(target, Mirror(target.topics, SENSORS), first_wait_s=0.001)
+    channel.start(lambda: seen(tag("a", temperature=20.0)))
+    report = DailyReport(DailyTarget(SIX, UTC, tmp_path), channel, look_s=0.005)
+    report.start(house)
+    try:
+        await noted(tmp_path)
+        house.ros_time_ns = ns("2026-05-02T07:00Z")
+        await looks(house, 1)
+        with broker.running():
+            with Subscriber(broker) as heard:
+                await until(lambda: heard.last("lt/house/report"), "the report")
+            with Subscriber(broker, "lt/house/report") as later:
+                await until(lambda: later.last("lt/house/report"), "that it is kept")
+                found = later.last("lt/house/report")
+        assert found["id"] == "report.20260502T060000Z"
+        assert found["report"] == [ns("2026-05-01T06:00Z"), ns("2026-05-02T06:00Z")]
+    finally:
+        await asyncio.gather(report.stop(), channel.stop())
+
+
+@pytest.mark.parametrize("text", ["6:00", "24:00", "06:60", "06:00:00", "six"])
+def test_an_hour_that_is_none_is_refused(text: str) -> None:
+    settings = Settings(report_at=text, webhook_url=f"http://127.0.0.1:{free_port()}/")
+    with pytest.raises(SettingError, match="must be from 00:00 to 23:59"):
+        Targets.of(settings, SECRETS)
+
+
+def test_an_hour_without_a_channel_is_refused() -> None:
+    with pytest.raises(SettingError, match="has no use"):
+        Targets.of(Settings(report_at="06:00"), Secrets())

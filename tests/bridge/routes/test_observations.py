@@ -1,0 +1,275 @@
+"""Readings that programs post: over a real socket, over DDS, into the twin's state and journal."""
+
+from __future__ import annotations
+
+import json
+import tempfile
+import time
+from collections.abc import Iterator
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+import httpx
+import pytest
+
+from lupin_bridge.access.accounts import digest
+from lupin_bridge.cli.command import main
+from lupin_bridge.serving.admission import Limits
+from lupin_bridge.serving.http_protocol import MAX_BODY_BYTES
+from tests.support import raw_http
+from tests.support.journal import select
+from tests.support.people import OWN, TOKEN, add, signed_in
+from tests.support.processes import lupin_twin, twin_node, url_of
+from tests.support.ros import Peer
+from tests.support.waiting import PATIENCE_S, wait_for
+from tests.support.web import Bridge, bridge
+
+TOKENS = {name: f"{name}-token-of-many-characters-0123456789" for name in ("esp", "flood")}
+ON = ("--http-observations", "on")
+
+
+@pytest.fixture(scope="module")
+def folder() -> Iterator[Path]:
+    with tempfile.TemporaryDirectory() as name:
+        path = Path(name)
+        file = path / "accounts.sqlite"
+        add(file, anna="operator", boss="admin")
+        add(file, "token", scada="admin")
+        add(file, "token", digest(TOKENS["esp"]), esp="writer")
+        add(file, "token", digest(TOKENS["flood"]), flood="writer")
+        yield path
+
+
+@pytest.fixture(scope="module")
+def live(folder: Path) -> Iterator[Bridge]:
+    options = ("--accounts", str(folder / "accounts.sqlite"), *ON)
+    with bridge(*options, "--ros-args", "-p", f"journal:={folder / 'j.sqlite'}") as running:
+        running.peer.wait_for_twin()
+        yield running
+
+
+def post(url: str, body: Any, token: str = TOKENS["esp"], **headers: str) -> httpx.Response:
+    content = body if isinstance(body, bytes) else json.dumps(body).encode()
+    return httpx.post(
+        f"{url}/api/observations",
+        content=content,
+        headers={
+            "Authorization": f"Bearer {token}",
+            "Content-Type": "application/json",
+            **{name.replace("_", "-"): value for name, value in headers.items()},
+        },
+        timeout=PATIENCE_S,
+        trust_env=False,
+    )
+
+
+def tag_of(live: Bridge, tag_id: str) -> Any:
+    """As soon as a reader has it."""
+
+    def look() -> Any:
+        tags = live.get("/api/state", {"Authorization": f"Bearer {TOKEN}"}).json()["tags"]
+        return next((tag for tag in tags if tag["tag_id"] == tag_id), None)
+
+    return wait_for(look, f"tag {tag_id}")
+
+
+def rows(folder: Path, tag_id: str) -> list[tuple[Any, ...]]:
+    return select(
+        folder / "j.sqlite",
+        "SELECT readings, source, stamp_ns FROM scan JOIN series USING (site, series)"
+        f" WHERE tag = '{tag_id}' ORDER BY seq",
+    )
+
+
+def test_what_is_posted_is_on_the_state_and_in_the_journal_once(live: Bridge, folder: Path) -> None:
+    now_s = time.time()
+    body = {
+        "tag_id": "bench-1",
+        "readings": {"temperature": 21.5, "humidity": 60},
+        "observed_at": now_s - 5.0,
+        "place": [1.5, 2.0],
+    }
+    answer = post(live.url, body)
+    assert answer.status_code == 202, answer.text
+    said = answer.json()
+    assert (said["tag_id"], said["source"]) == ("bench-1", "http/esp")
+    tag = tag_of(live, "bench-1")
+    assert {it["name"]: it["value"] for it in tag["readings"]} == {
+        "temperature": 21.5,
+        "humidity": 60.0,
+    }
+    assert (tag["pose"]["position"]["x"], tag["pose"]["position"]["y"]) == (1.5, 2.0)
+    # A retry is the same write: of this tag, at this moment, of this source.
+    assert post(live.url, body).status_code == 202
+    later = {"tag_id": "bench-1", "readings": {"temperature": 22}, "place": [9, 9]}
+    assert post(live.url, later).status_code == 202
+    wait_for(lambda: len(rows(folder, "bench-1")) > 1, "the later one in the journal")
+    found = rows(folder, "bench-1")
+    assert [(json.loads(row[0]), row[1]) for row in found] == [
+        ([21.5, 60.0], "http/esp"),
+        ([22.0], "http/esp"),
+    ]
+    assert found[0][2] / 1e9 == pytest.approx(now_s - 5.0, abs=1e-6)
+    assert abs(found[1][2] / 1e9 - time.time()) < PATIENCE_S
+    assert tag_of(live, "bench-1")["pose"]["position"]["x"] == 1.5  # the first place stays
+
+
+def test_times_are_iso_or_seconds(live: Bridge, folder: Path) -> None:
+    moment = datetime.fromtimestamp(time.time() - 60, UTC).replace(microsecond=250_000)
+    body = {"tag_id": "iso", "readings": {"co2": 800}, "observed_at": moment.isoformat()}
+    assert post(live.url, body).status_code == 202
+    wait_for(lambda: rows(folder, "iso"), "the row")
+    assert rows(folder, "iso")[0][2] == round(moment.timestamp() * 4) * 250_000_000
+
+
+GOOD = {"tag_id": "bad", "readings": {"t": 1.0}}
+
+
+@pytest.mark.parametrize(
+    ("body", "complaint"),
+    [
+        (b"", "the body is no JSON"),
+        (b"[" * 8_000, "the body is no JSON"),
+        (b'{"tag_id": "bad", "readings": {"t": NaN}}', "the body is no JSON"),
+        (b'{"tag_id": "bad", "readings": {"t": 1e999}}', ""),
+        ([], "the body: input should be"),
+        ({**GOOD, "readings": {}}, "readings: dictionary should have at least 1"),
+        ({**GOOD, "readings": {f"s{n}": 1 for n in range(65)}}, "readings: dictionary should hav"),
+        ({**GOOD, "readings": {"t": "21"}}, "readings.t: input should be a valid number"),
+        ({**GOOD, "readings": {"t": True}}, "readings.t: input should be a valid number"),
+        ({**GOOD, "readings": {"": 1}}, "string should have at least 1 character"),
+        ({**GOOD, "tag_id": ""}, "tag_id: string should have at least 1 character"),
+        ({**GOOD, "tag_id": "x" * 257}, "tag_id: string should have at most 256 characters"),
+        ({**GOOD, "tag_id": "a\0b"}, "tag_id: string should match pattern"),
+        ({**GOOD, "place": [1]}, "place: list should have at least 2 items"),
+        ({**GOOD, "place": [1, 2e6]}, "place.1: input should be less than or equal to 1000000"),
+        ({**GOOD, "source": "robot"}, "source: extra inputs are not permitted"),
+        ({**GOOD, "observed_at": time.time() + 3600}, "s ahead of ROS time, the limit is 10 s"),
+        ({**GOOD, "observed_at": "2037-01-01T00:00:00Z"}, "s ahead of ROS time"),
+        ({**GOOD, "observed_at": "yesterday"}, "observed_at is 'yesterday', expected"),
+        ({**GOOD, "observed_at": -5}, "observed_at is '-5.000000000'"),
+        ({**GOOD, "observed_at": 1e30}, "observed_at is"),
+        ({**GOOD, "observed_at": 0}, "observed_at is 0, which is no moment"),
+    ],
+)
+def test_what_cannot_be_is_refused_by_name_and_reaches_nobody(
+    live: Bridge, folder: Path, body: Any, complaint: str
+) -> None:
+    def refused() -> httpx.Response | None:
+        answer = post(live.url, body)
+        return None if answer.status_code == 429 else answer
+
+    answer = wait_for(refused, "a turn")
+    assert answer is not None
+    assert answer.status_code == 400, answer.text
+    assert complaint in answer.json()["detail"]
+    assert len(answer.json()["detail"]) < 300
+    assert rows(folder, "bad") == []
+
+
+def test_who_may_not_is_refused(live: Bridge) -> None:
+    body = {"tag_id": "nobodys", "readings": {"t": 1}}
+    assert post(live.url, body, TOKEN).status_code == 403  # an admin
+    assert post(live.url, body, "wrong").status_code == 401
+    plain = httpx.post(f"{live.url}/api/observations", json=body, trust_env=False)
+    assert plain.status_code == 401
+    with signed_in(live.url, "boss") as browser:
+        assert browser.post("/api/observations", json=body).status_code == 403
+    # A page of somebody else's has no token; with one, it may not post either.
+    assert post(live.url, body, Origin="http://evil.example").status_code == 403
+    assert post(live.url, body, Host="evil.example").status_code == 403
+    assert post(live.url, body, Content_Type="text/plain").status_code == 415
+
+
+def test_a_writer_posts_and_does_nothing_else(live: Bridge) -> None:
+    writer = {"Authorization": f"Bearer {TOKENS['esp']}"}
+    for path in ("/", "/api/state", "/api/session", "/api/audit", "/metrics", "/docs"):
+        answer = live.get(path, writer)
+        assert answer.status_code == 403, path
+        assert "esp is a writer: it posts to /api/observations, and no more" in answer.text
+    note = {"kind": "comment", "subject": "site", "text": "x"}
+    assert live.http.post("/api/notes", json=note, headers={**writer, **OWN}).status_code == 403
+    assert live.http.post("/api/signin", headers={**writer, **OWN}).status_code == 403
+    upgrade = {**writer, "Connection": "Upgrade", "Upgrade": "websocket"}
+    upgrade |= {"Sec-WebSocket-Version": "13", "Sec-WebSocket-Key": "dGhlIHNhbXBsZSBub25jZQ=="}
+    assert live.get("/ws/state", upgrade).status_code == 403
+    answer = live.get("/api/observations", writer)
+    assert (answer.status_code, answer.headers["allow"]) == (405, "POST")
+
+
+def test_bodies_are_bounded_and_half_of_one_is_not_waited_for(live: Bridge, folder: Path) -> None:
+    huge = {"tag_id": "huge", "readings": {f"sensor {n}": 1.0 for n in range(10_000)}}
+    assert len(json.dumps(huge)) > MAX_BODY_BYTES
+    head = (
+        f"POST /api/observations HTTP/1.1\r\nHost: 127.0.0.1\r\nContent-Type: application/json\r\n"
+        f"Authorization: Bearer {TOKENS['esp']}\r\nContent-Length: {{}}\r\n\r\n"
+    )
+    said = raw_http.answer(live.url, head.format(len(json.dumps(huge))).encode())
+    assert raw_http.status(said) == 413
+    half = head.format(100).encode() + b'{"tag_id": "half", '
+    assert raw_http.status(raw_http.answer(live.url, half)) in (0, 408)
+    assert rows(folder, "huge") == rows(folder, "half") == []
+
+
+def test_one_that_floods_is_slowed_down_alone(live: Bridge) -> None:
+    """All at once on one connection: a client that waits for answers is slow enough by itself."""
+    number = Limits().observation_burst * 8
+    body = json.dumps({"tag_id": "flood", "readings": {"t": 1}})
+    request = (
+        "POST /api/observations HTTP/1.1\r\nHost: 127.0.0.1\r\nContent-Type: application/json\r\n"
+        f"Authorization: Bearer {TOKENS['flood']}\r\nContent-Length: {len(body)}\r\n"
+    )
+    last = f"{request}Connection: close\r\n\r\n{body}"
+    said = raw_http.answer(live.url, (f"{request}\r\n{body}" * (number - 1) + last).encode())
+    taken, slowed = said.count(b"HTTP/1.1 202 "), said.count(b"HTTP/1.1 429 ")
+    assert taken + slowed == number
+    assert taken >= Limits().observation_burst
+    assert slowed
+    assert b"flood has posted more than 30 observations and 10 a second" in said
+    assert b"retry-after: 1\r\n" in said.lower()
+    other = {"tag_id": "other", "readings": {"t": 1}}
+    wait_for(lambda: post(live.url, other).status_code == 202, "another's turn")
+    tag_of(live, "flood")
+
+
+def test_web_publishes_too_and_only_while_it_hears_a_twin(domain: int, folder: Path) -> None:
+    options = ("--accounts", str(folder / "accounts.sqlite"), *ON)
+    body = {"tag_id": "far", "readings": {"temperature": 20}}
+    with lupin_twin(domain, "web", *options) as web:
+        url = url_of(web)
+        answer = post(url, body)
+        assert (answer.status_code, "the twin is silent" in answer.text) == (503, True)
+        with twin_node(domain), Peer(domain) as peer:
+            peer.listen()
+            wait_for(lambda: post(url, body).status_code == 202, "the twin to be heard")
+            assert peer.tag("far", lambda tag: tag.readings).readings[0].value == 20.0
+
+
+def test_without_the_setting_nobody_writes(domain: int, folder: Path) -> None:
+    with lupin_twin(domain, "serve", "--accounts", str(folder / "accounts.sqlite")) as serve:
+        answer = post(url_of(serve), {"tag_id": "off", "readings": {"t": 1}})
+        assert answer.status_code == 403
+        assert "start serve or web with --http-observations on" in answer.json()["detail"]
+
+
+def test_without_accounts_nobody_is_a_writer(domain: int, tmp_path: Path) -> None:
+    options = ("--accounts", str(tmp_path / "none.sqlite"), *ON)
+    with lupin_twin(domain, "serve", *options) as serve:
+        answer = post(url_of(serve), {"tag_id": "open", "readings": {"t": 1}})
+        assert answer.status_code == 403
+        assert "lupin-twin token add NAME --role writer" in answer.json()["detail"]
+
+
+def test_a_fleet_takes_none(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit):
+        main(["fleet", "--archive-url", "postgresql://x@127.0.0.1:1/x", *ON])
+    assert "--http-observations is for a twin, not for lupin-twin fleet" in capsys.readouterr().err
+
+
+def test_only_a_token_is_a_writer(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    file = ("--accounts", str(tmp_path / "accounts.sqlite"))
+    assert main(["token", "add", "esp", "--role", "writer", *file]) == 0
+    assert len(capsys.readouterr().out.strip()) == 43
+    with pytest.raises(SystemExit):
+        main(["user", "add", "esp2", "--role", "writer", "--no-password", *file])

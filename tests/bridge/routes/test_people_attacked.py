@@ -1,0 +1,195 @@
+"""What people say, and who may, as an attacker tries it. A real server, real sockets."""
+
+from __future__ import annotations
+
+import json
+import socket
+import tempfile
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import httpx
+import pytest
+from websockets.exceptions import ConnectionClosed
+from websockets.sync.client import ClientConnection
+
+from lupin_bridge.access.accounts import digest
+from lupin_bridge.routes.notes import MAX_LISTED
+from lupin_bridge.stream import people_schema
+from lupin_twin.core.notes import COMMENT, Note
+from tests.support.journal import recording
+from tests.support.messages import look
+from tests.support.people import TOKEN, add, remove, signed_in, write
+from tests.support.waiting import PATIENCE_S, wait_for
+from tests.support.web import Bridge, bridge
+from tests.support.ws_client import open_websocket
+
+BEARER = {"Authorization": f"Bearer {TOKEN}"}
+COMMENT_NOW = {"kind": "comment", "subject": "site", "text": "x"}
+
+
+@pytest.fixture(scope="module")
+def accounts() -> Iterator[Path]:
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "accounts.sqlite"
+        add(path, anna="operator")
+        add(path, "token", scada="viewer")
+        yield path
+
+
+@pytest.fixture(scope="module")
+def live(accounts: Path) -> Iterator[Bridge]:
+    with bridge("--accounts", str(accounts), "--ros-args", "-p", "journal:=off") as running:
+        running.peer.wait_for_twin()
+        running.peer.observe(look("a", anomaly=True, bug_count=2))
+        wait_for(lambda: running.get("/api/alarms", BEARER).json()["alarms"], "the alarm")
+        yield running
+
+
+@pytest.fixture(scope="module")
+def anna(live: Bridge) -> Iterator[httpx.Client]:
+    with signed_in(live.url, "anna") as browser:
+        yield browser
+
+
+def notes(live: Bridge, **query: str) -> list[people_schema.Note]:
+    answer = live.get("/api/notes", BEARER, **query)
+    return people_schema.Notes.model_validate_json(answer.content).notes
+
+
+def in_s(live: Bridge, seconds: float) -> str:
+    """A moment of the twin's time."""
+    now = live.get("/api/state", BEARER).json()["header"]["stamp"]
+    return f"{now['sec'] + seconds:.0f}"
+
+
+def test_a_comment_is_about_a_moment_of_the_past_or_now(live: Bridge, anna: httpx.Client) -> None:
+    then = in_s(live, -86_400)
+    made = write(anna, **COMMENT_NOW, until=then)
+    assert (made.status_code, made.json()["until"]["sec"]) == (201, int(then)), made.text
+    for ahead_s in (60, 100 * 365 * 86_400):
+        answer = write(anna, **COMMENT_NOW, until=in_s(live, ahead_s))
+        assert (answer.status_code, "until is" in answer.text) == (400, True), answer.text
+    [alarm] = live.get("/api/alarms", BEARER).json()["alarms"]
+    answer = write(anna, kind="acknowledge", subject=f"alarm:{alarm['id']}", until=then)
+    assert (answer.status_code, "until is for the kinds" in answer.text) == (400, True)
+    about = {"from": f"{int(then) - 1}", "to": f"{int(then) + 1}"}
+    assert [note.id for note in notes(live, kind="comment", **about)] == [made.json()["id"]]
+    assert notes(live, kind="shelve", **about) == []
+    assert "'withdraw'" in live.get("/api/notes", BEARER, kind="withdraw").text
+
+
+def end_of(connection: ClientConnection) -> str:
+    """Why it has ended; "": it has not."""
+    try:
+        connection.recv(timeout=PATIENCE_S)
+    except ConnectionClosed as ended:
+        return "" if ended.rcvd is None else ended.rcvd.reason
+    return ""
+
+
+def test_another_token_of_the_same_name_keeps_nothing_open_that_the_old_one_had(
+    live: Bridge, accounts: Path
+) -> None:
+    leaked, fresh = f"leaked-{TOKEN}", f"fresh-{TOKEN}"
+    add(accounts, "token", digest(leaked), plc="viewer")
+    ws = f"{live.url.replace('http', 'ws', 1)}/ws/state"
+    headers = {"Authorization": f"Bearer {leaked}"}
+    with open_websocket(ws, additional_headers=headers) as thief:
+        assert thief.recv(timeout=PATIENCE_S)
+        remove(accounts, "plc", "token")
+        add(accounts, "token", digest(fresh), plc="viewer")
+        wait_for(
+            lambda: "the session has ended" in end_of(thief), "its end", meanwhile=lambda: None
+        )
+    ours = {"Authorization": f"Bearer {fresh}"}
+    assert live.get("/api/session", ours).json()["name"] == "plc"
+
+
+def test_who_is_removed_while_they_write_writes_nothing(live: Bridge, accounts: Path) -> None:
+    add(accounts, gone="operator")
+    with signed_in(live.url, "gone") as browser:
+        cookie = "; ".join(f"{name}={value}" for name, value in browser.cookies.items())
+    body = json.dumps({**COMMENT_NOW, "text": "too late"})
+    head = (
+        "POST /api/notes HTTP/1.1\r\nHost: localhost\r\nX-Lupin-Twin: 1\r\nConnection: close\r\n"
+        "Expect: 100-continue\r\n"
+        f"Content-Type: application/json\r\nCookie: {cookie}\r\nContent-Length: {len(body)}\r\n\r\n"
+    )
+    host, port = live.url.removeprefix("http://").split(":")
+    with socket.create_connection((host, int(port)), timeout=PATIENCE_S) as client:
+        client.sendall(head.encode())
+        # They have been let in, and their note is waited for.
+        assert client.recv(65536).startswith(b"HTTP/1.1 100")
+        remove(accounts, "gone")
+        client.sendall(body.encode())
+        answer = b""
+        while part := client.recv(65536):
+            answer += part
+    assert answer.startswith(b"HTTP/1.1 401"), answer
+    assert all(note.text != "too late" for note in notes(live))
+
+
+@pytest.mark.parametrize(
+    "body",
+    [
+        b'{"kind": "comment", "subject": "site", "text": "\\ud800"}',
+        b'{"kind": "comment", "subject": "site", "text": "\xff"}',
+        b'{"kind": "comment", "subject": "site", "text": "\\u0085"}',
+        b'{"kind": "comment", "subject": "site", "text": NaN}',
+        b"[" * 8_000,
+        b"",
+    ],
+)
+def test_what_is_no_text_is_refused(anna: httpx.Client, body: bytes) -> None:
+    answer = anna.post("/api/notes", content=body, headers={"Content-Type": "application/json"})
+    assert answer.status_code == 400, answer.text
+    assert len(answer.text) < 300
+
+
+@pytest.mark.parametrize(
+    "text",
+    ["<script>alert(1)</script>", "a\u202ecod.exe", "'; DROP TABLE note; --", "=1+1", "\U0001f33f"],
+)
+def test_any_text_comes_back_as_it_was_said_and_as_nothing_but_json(
+    live: Bridge, anna: httpx.Client, text: str
+) -> None:
+    assert write(anna, **{**COMMENT_NOW, "text": text}).status_code == 201
+    assert notes(live)[0].text == text
+    headers = live.get("/api/notes", BEARER).headers
+    assert headers["content-type"] == "application/json"
+    assert headers["x-content-type-options"] == "nosniff"
+
+
+def test_ten_thousand_notes_hold_nobody_up(accounts: Path, tmp_path: Path) -> None:
+    path, now_ns = tmp_path / "j.sqlite", time.time_ns()
+    with recording(path) as journal:
+        assert journal.take_restored(PATIENCE_S) is not None
+        for start in range(0, 10_000, 50):
+            batch = [
+                journal.write_note(
+                    Note("", now_ns - 10_000 + start + index, "bert", COMMENT, "site", "x" * 500)
+                )
+                for index in range(50)
+            ]
+            for written in batch:
+                written.result(PATIENCE_S)
+    options = ("--accounts", str(accounts), "--ros-args", "-p", f"journal:={path}")
+    with bridge(*options) as running, signed_in(running.url, "anna") as browser:
+        running.peer.wait_for_twin()
+        running.peer.observe(look("a"))
+
+        def answer_of(note: dict[str, str]) -> httpx.Response | None:
+            answer = write(browser, **note)
+            return answer if answer.status_code == 201 else None
+
+        wait_for(lambda: answer_of(COMMENT_NOW), "a note", meanwhile=lambda: None)
+        begun_s = time.monotonic()
+        assert write(browser, **{**COMMENT_NOW, "text": "one more"}).status_code == 201
+        took_s = time.monotonic() - begun_s
+        found = browser.get("/api/notes").json()["notes"]
+        assert (len(found), found[0]["text"]) == (MAX_LISTED, "one more")
+        assert browser.delete(f"/api/notes/{found[-1]['id']}").status_code == 403
+        print(f"a note took {took_s:.2f} s")
+        assert took_s < PATIENCE_S / 4

@@ -1,0 +1,57 @@
+"""The page over https can be installed, and opens where the bridge is gone: without any data."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from playwright.sync_api import Browser, expect
+
+from tests.browser.conftest import CHROMIUM, CHROMIUM_ARGS
+from tests.support.access import served
+from tests.support.tls import certificate
+from tests.support.waiting import PATIENCE_S, wait_for
+
+CACHED = """async () => {
+  const names = await window.caches.keys();
+  const all = await Promise.all(names.map((name) => window.caches.open(name)));
+  const found = await Promise.all(all.map((cache) => cache.keys()));
+  return found.flat().map(({ url }) => new URL(url).pathname);
+}"""
+FETCHED = "(path) => fetch(path).then(({ status }) => status, () => 'nothing')"
+
+
+def test_the_shell_opens_without_the_bridge_and_no_data_is_kept(
+    browser: Browser, tmp_path: Path
+) -> None:
+    ours = certificate(tmp_path)
+    # No service worker without a certificate that the browser trusts.
+    chromium = browser.browser_type.launch(
+        executable_path=CHROMIUM, args=[*CHROMIUM_ARGS, "--ignore-certificate-errors"]
+    )
+    with chromium, chromium.new_context(ignore_https_errors=True) as context:
+        context.set_default_timeout(PATIENCE_S * 1000)
+        page = context.new_page()
+        app = page.get_by_test_id("app")
+        with served(*ours.options, trust=ours.trust) as running:
+            page.goto(running.url)
+            session = context.new_cdp_session(page)
+            found = session.send("Page.getInstallabilityErrors")["installabilityErrors"]
+            assert {it["errorId"] for it in found} <= {"in-incognito"}
+            page.evaluate("navigator.serviceWorker.ready.then(() => null)")
+            page.reload()
+            expect(app).to_have_attribute("data-connection-state", "live")
+            assert page.evaluate(FETCHED, "./api/session") == 200
+            wait_for(
+                lambda: any("behind" in path for path in page.evaluate(CACHED)),
+                "the page's files",
+                meanwhile=lambda: None,
+            )
+            cached = page.evaluate(CACHED)
+            assert "/" in cached
+            assert all(path == "/" or path.startswith("/assets/") for path in cached), cached
+        page.reload()
+        expect(app).to_be_visible()
+        expect(app).not_to_have_attribute("data-connection-state", "live")
+        expect(app).to_have_attribute("data-fresh", "false")
+        for path in ("./api/session", "./api/state", "./lupin.svg", "./signin"):
+            assert page.evaluate(FETCHED, path) == "nothing", path

@@ -1,0 +1,114 @@
+"""The shift report: opened from the menu, and on paper."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from contextlib import contextmanager
+from functools import partial
+from typing import Any
+
+import pytest
+from playwright.sync_api import Browser, Page, expect
+
+from tests.browser.hmi import OpenPage
+from tests.support.messages import look, scan
+from tests.support.waiting import PATIENCE_S, wait_for
+from tests.support.web import Bridge, bridge
+
+# Names that a robot may send.
+LONG = "a" * 200
+HOSTILE = "<script>document.title = 'owned'</script>"
+TAGS = (*(f"tag {number}" for number in range(60)), LONG, HOSTILE)
+# What A4 has between the margins of the page, and the page between, CSS pixels.
+A4_PX = round(186 / 25.4 * 96)
+
+
+@pytest.fixture(scope="module")
+def troubled(browser: Browser) -> Iterator[Bridge]:  # begun before the page
+    """A greenhouse with more alarms than a sheet of paper holds."""
+    with bridge() as running:
+        running.peer.wait_for_twin()
+        for number, tag_id in enumerate(TAGS, start=1):
+            running.peer.observe(
+                scan(tag_id, {"temperature": 21.5, "humidity": 60.0, "a" * 100: 1e300})
+            )
+            running.peer.observe(look(tag_id, anomaly=True, bug_count=3))
+            if number % 20 == 0:  # no queue has room for all
+                wait_for(partial(has_tags, running, number), "tags")
+        wait_for(lambda: counts(running)["raised"] == len(TAGS), "the alarms in the report")
+        yield running
+
+
+def has_tags(running: Bridge, count: int) -> bool:
+    return len(running.json("/api/state")["tags"]) >= count
+
+
+def counts(running: Bridge) -> dict[str, Any]:
+    answer = running.http.get("/api/report")
+    found: dict[str, Any] = answer.json()["counts"] if answer.status_code == 200 else {"raised": 0}
+    return found
+
+
+@contextmanager
+def printed(browser: Browser, address: str) -> Iterator[Page]:
+    """The page as it is printed."""
+    with browser.new_context(viewport={"width": A4_PX, "height": 1000}) as context:
+        context.set_default_timeout(PATIENCE_S * 1000)
+        page = context.new_page()
+        problems: list[str] = []
+        page.on("console", lambda message: problems.append(message.text))
+        page.goto(address)
+        page.emulate_media(media="print")
+        yield page
+        assert problems == []
+
+
+def test_the_menu_opens_the_report_of_the_period_on_the_time_bar(
+    troubled: Bridge, open_page: OpenPage
+) -> None:
+    hmi = open_page(troubled.url, query="?lang=de")
+    hmi.page.get_by_role("button", name=re.compile("^Menü")).click()
+    with hmi.page.context.expect_page() as opened:
+        hmi.page.get_by_role("link", name="Schichtbericht").click()
+    page = opened.value
+    expect(page.get_by_role("heading", level=1)).to_have_text("Schichtbericht")
+    query = dict(re.findall(r"[?&]([a-z]+)=([^&]*)", page.url))
+    assert int(query["to"]) - int(query["from"]) == 8 * 3_600
+    assert page.locator("html").get_attribute("lang") == "de"
+    expect(page.get_by_role("columnheader", name="Schlimmstens")).to_be_visible()
+
+
+@pytest.mark.parametrize("lang", ["en", "de", "nl", "es"])
+def test_nothing_is_cut_on_paper_and_names_are_text(
+    troubled: Bridge, browser: Browser, lang: str
+) -> None:
+    with printed(browser, f"{troubled.url}/api/report.html?lang={lang}") as page:
+        assert "owned" not in page.title()
+        expect(page.get_by_text(HOSTILE).first).to_be_visible()
+        wide = page.evaluate(
+            "[...document.querySelectorAll('body *')].map("
+            "it => it.getBoundingClientRect().right).reduce((a, b) => Math.max(a, b))"
+        )
+        assert wide <= A4_PX + 1
+        assert page.evaluate("document.documentElement.scrollWidth") <= A4_PX
+        head = page.locator("thead").first
+        assert head.evaluate("it => getComputedStyle(it).display") == "table-header-group"
+        row = page.locator("tbody tr").first
+        assert row.evaluate("it => getComputedStyle(it).breakInside") == "avoid"
+        paper = page.pdf(prefer_css_page_size=True)
+        sheets = re.findall(rb"/MediaBox \[([^\]]*)\]", paper)
+        assert len(sheets) > 2
+        # A4, points.
+        assert {tuple(round(float(side)) for side in box.split()) for box in sheets} == {
+            (0, 0, 595, 842)
+        }
+        assert page.locator("script").count() == 0
+
+
+def test_in_the_dark_it_is_light(troubled: Bridge, browser: Browser) -> None:
+    with browser.new_context(color_scheme="dark") as context:
+        page = context.new_page()
+        page.goto(f"{troubled.url}/api/report.html")
+        colour = page.locator("body").evaluate("it => getComputedStyle(it).backgroundColor")
+        assert colour == "rgb(255, 255, 255)"

@@ -1,0 +1,170 @@
+"""The robot on the map: quiet, as old as it is, and never of another moment than now."""
+
+from __future__ import annotations
+
+import math
+import os
+import re
+from collections.abc import Iterator
+from pathlib import Path as File
+
+import pytest
+from geometry_msgs.msg import Point, Pose, PoseStamped, PoseWithCovarianceStamped, Quaternion
+from nav_msgs.msg import Path
+from playwright.sync_api import expect
+from sensor_msgs.msg import BatteryState
+
+from tests.browser.hmi import Hmi, OpenPage
+from tests.browser.test_accessibility import violations
+from tests.support.messages import scan
+from tests.support.web import Bridge, bridge
+
+
+@pytest.fixture
+def robot() -> Iterator[Bridge]:
+    with bridge("--ros-args", "-p", "state_publish_rate_hz:=10.0") as running:
+        for tag_id, at in (("a", (0.0, 0.0)), ("b", (4.0, 0.0)), ("c", (4.0, 3.0))):
+            running.peer.observe(scan(tag_id, {"temperature": 21.0}, at))
+            running.tag(tag_id)
+        yield running
+
+
+def pose(x: float, y: float, yaw: float) -> Pose:
+    turned = Quaternion(z=math.sin(yaw / 2), w=math.cos(yaw / 2))
+    return Pose(position=Point(x=x, y=y), orientation=turned)
+
+
+def stamp(live: Bridge, message: object, ago_s: float) -> None:
+    header = message.header  # type: ignore[attr-defined]
+    header.frame_id = "map"
+    now_ns = live.peer.node.get_clock().now().nanoseconds - round(ago_s * 1e9)
+    header.stamp.sec, header.stamp.nanosec = divmod(now_ns, 10**9)
+
+
+def place(live: Bridge, x: float, y: float, yaw: float = 0.0, ago_s: float = 0.0) -> None:
+    """Have the robot say where it is, and wait until the bridge knows."""
+    message = PoseWithCovarianceStamped()
+    message.pose.pose = pose(x, y, yaw)
+    stamp(live, message, ago_s)
+    live.peer.publish("/amcl_pose", message, depth=1)
+
+    def is_there() -> bool:
+        position = live.json("/api/robot")["position"]
+        return position is not None and (position["x"], position["y"]) == (x, y)
+
+    live.peer.until(is_there, f"the robot at {x}, {y} m")
+
+
+def charge(live: Bridge, share: float, ago_s: float = 0.0) -> None:
+    battery = BatteryState(percentage=share)
+    stamp(live, battery, ago_s)
+    live.peer.publish("/battery_state", battery, depth=1)
+
+
+def plan(live: Bridge, *points: tuple[float, float]) -> None:
+    way = Path(poses=[PoseStamped(pose=pose(x, y, 0.0)) for x, y in points])
+    stamp(live, way, 0.0)
+    live.peer.publish("/plan", way, depth=1)
+
+
+def mark(hmi: Hmi) -> tuple[float, float]:
+    """Where the middle of the robot's mark is, m."""
+    box = hmi.test_id("robot-mark").locator(".robot-body").bounding_box()
+    around, view = hmi.map.bounding_box(), hmi.view()
+    assert box is not None
+    assert around is not None
+    x, y = box["x"] + box["width"] / 2 - around["x"], box["y"] + box["height"] / 2 - around["y"]
+    return (x - view.x) / view.scale, (view.y - y) / view.scale
+
+
+def test_without_a_robot_there_is_no_layer_and_nothing_of_it_is_loaded(
+    robot: Bridge, open_page: OpenPage
+) -> None:
+    hmi = open_page(robot.url)
+    hmi.expect_parts()
+    hmi.page.get_by_role("button", name="Layers").click()
+    expect(hmi.page.get_by_label("Labels")).to_be_visible()
+    expect(hmi.page.get_by_label("Robot", exact=True)).to_have_count(0)
+    expect(hmi.test_id("robot")).to_have_count(0)
+    assert not [it for it in hmi.requests if "api/robot" in it]
+
+
+def test_the_robot_its_trail_its_way_and_its_battery_are_shown_and_told(
+    robot: Bridge, open_page: OpenPage
+) -> None:
+    for x, ago_s in ((0.5, 3_000.0), (1.5, 2_990.0), (2.8, 30.0), (3.0, 20.0)):
+        place(robot, x, 1.0, ago_s=ago_s)
+    charge(robot, 0.64)
+    plan(robot, (3.2, 1.0), (3.2, 3.0))
+    place(robot, 3.2, 1.5, math.pi / 2)
+    hmi = open_page(robot.url)
+    fact = hmi.test_id("robot-fact")
+    expect(fact).to_have_text(re.compile(r"Robot: 3\.2 m, 1\.5 m; \d+\ss ago; battery 64\s%"))
+    layer = hmi.test_id("robot")
+    place(robot, 3.2, 1.6, math.pi / 2)
+    expect(layer).to_have_attribute("data-looks", "live")
+    hmi.expect(lambda: mark(hmi) == pytest.approx((3.2, 1.6), abs=0.05), "the mark where it is")
+    arrow = hmi.test_id("robot-mark").locator("path")
+    assert float(re.findall(r"-?[\d.]+", arrow.get_attribute("transform") or "")[0]) == (
+        pytest.approx(-90.0, abs=0.1)
+    )
+    # Two drives, half an hour apart: nobody knows how it went from one to the other.
+    trail = layer.locator(".robot-trail")
+    expect(trail.first).to_have_attribute("data-step", re.compile("[45]"))
+    expect(trail.last).to_have_attribute("data-step", "0")
+    assert (trail.last.get_attribute("points") or "").startswith("2.8,")
+    way = layer.locator(".robot-plan").get_attribute("points") or ""
+    assert way == "3.2,1.6 3.2,3"
+    if folder := os.environ.get("ROBOT_PICTURES"):
+        hmi.page.screenshot(path=File(folder) / "robot-live.png")
+    assert violations(hmi) == []
+
+    # It can be switched off, for who opens the link too.
+    hmi.page.get_by_role("button", name="Layers").click()
+    hmi.page.get_by_label("Robot", exact=True).uncheck()
+    expect(layer).to_have_count(0)
+    expect(fact).to_have_count(0)
+    hmi.page.get_by_label("Robot", exact=True).check()
+    expect(layer).to_have_count(1)
+
+
+def test_an_old_position_never_looks_live_and_says_how_old_it_is(
+    robot: Bridge, open_page: OpenPage
+) -> None:
+    place(robot, 2.0, 1.0, ago_s=200.0)
+    charge(robot, 0.31, ago_s=400.0)
+    hmi = open_page(robot.url)
+    expect(hmi.test_id("robot")).to_have_attribute("data-looks", "old")
+    expect(hmi.test_id("robot-mark").locator("text")).to_have_text(re.compile(r"3\smin ago"))
+    expect(hmi.test_id("robot-fact")).to_have_text(
+        re.compile(r"Robot: .*; 3\smin ago; battery 31\s%, reported [67]\smin ago")
+    )
+    if folder := os.environ.get("ROBOT_PICTURES"):
+        hmi.page.screenshot(path=File(folder) / "robot-old.png")
+    # It moves on, and falls silent: what looked live ages before one's eyes.
+    place(robot, 2.5, 1.0)
+    expect(hmi.test_id("robot")).to_have_attribute("data-looks", "live")
+    expect(hmi.test_id("robot")).to_have_attribute("data-looks", "old")
+    expect(hmi.test_id("robot-mark").locator("text")).to_have_text(re.compile(r"1\d\ss ago"))
+
+
+def test_who_looks_back_sees_no_robot(robot: Bridge, open_page: OpenPage) -> None:
+    place(robot, 2.0, 1.0)
+    hmi = open_page(robot.url)
+    expect(hmi.test_id("robot")).to_have_count(1)
+    stamp_s = robot.json("/api/state")["header"]["stamp"]["sec"]
+    hmi.go(f"at={stamp_s}")
+    expect(hmi.app).to_have_attribute("data-moment", str(stamp_s))
+    expect(hmi.test_id("robot")).to_have_count(0)
+    expect(hmi.test_id("robot-fact")).to_have_count(0)
+
+
+def test_a_clock_that_does_not_run_gives_the_robot_no_age(open_page: OpenPage) -> None:
+    with bridge("--ros-args", "-p", "use_sim_time:=true") as running:
+        running.peer.observe(scan("a", {"temperature": 21.0}, (0.0, 0.0), stamp_s=1_000.0))
+        running.tag("a")
+        place(running, 1.0, 1.0)
+        hmi = open_page(running.url)
+        expect(hmi.test_id("robot")).to_have_attribute("data-looks", "old")
+        expect(hmi.test_id("robot-mark").locator("text")).to_have_text("not known")
+        expect(hmi.test_id("robot-fact")).to_have_text("Robot: 1.0 m, 1.0 m; age unknown")

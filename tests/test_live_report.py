@@ -1,0 +1,135 @@
+"""Shift reports of real processes: the same bytes everywhere, bounded, and for nobody's work."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+from typing import Any
+
+import httpx
+
+from lupin_bridge.past.schema import ShiftReport
+from tests.support.http_answers import HOUR, T0, bridges
+from tests.support.journal_answers import JOURNALS
+from tests.support.messages import scan
+from tests.support.receiver import receiver, status
+from tests.support.waiting import wait_for
+from tests.support.web import Bridge, bridge
+
+DAY = f"from={T0 - HOUR}&to={T0 + 15 * HOUR}"
+PATHS = (
+    f"/api/report?{DAY}",
+    f"/api/report?from={T0 + HOUR}&to={T0 + 9 * HOUR}",
+    *(f"/api/report.html?{DAY}&lang={lang}" for lang in ("en", "de", "nl", "es")),
+)
+
+
+def told(live: Bridge) -> list[tuple[Any, ...]]:
+    found = [live.http.get(path) for path in PATHS]
+    assert {answer.status_code for answer in found} == {200}
+    names = ("etag", "content-type", "x-complete-to", "x-kept-from")
+    return [(it.content, *(it.headers.get(name) for name in names)) for it in found]
+
+
+def test_serve_web_and_a_later_process_say_the_same_and_refuse_the_same(tmp_path: Path) -> None:
+    journal = Path(shutil.copy(JOURNALS / "day.sqlite", tmp_path / "j.sqlite"))
+    with bridges(journal) as both:
+        serve, web = (told(each) for each in both)
+        assert serve == web
+        check(both[0])
+        for each in both:
+            check_refusals(each)
+    with bridges(journal) as both:
+        assert [told(each) for each in both] == [serve, serve]
+
+
+def check(live: Bridge) -> None:
+    answer = live.http.get(PATHS[0])
+    report = ShiftReport.model_validate_json(answer.content)
+    found = live.json(f"/api/timeline?{DAY}")
+    for name, mine in (("scans", "scans"), ("failures", "failed"), ("looks", "inspections")):
+        counted = sum(bucket[name] for bucket in found["buckets"])
+        assert counted == getattr(report.counts, mine) > 0
+    assert report.complete_to == report.to
+    assert answer.headers["x-complete-to"] == f"{report.to.sec}.000000000"
+    # As of then; the alarms of now have gone on since.
+    then = {it["id"]: it for it in live.json(f"/api/alarms?{DAY}")["alarms"]}
+    reported = {it.id: it for it in report.alarms}
+    assert reported.keys() == then.keys()
+    for alarm_id, alarm in reported.items():
+        assert alarm.raised_at.model_dump() == then[alarm_id]["raised_at"]
+    again = live.http.get(PATHS[0], headers={"If-None-Match": answer.headers["etag"]})
+    assert (again.status_code, again.content) == (304, b"")
+    page = live.http.get(PATHS[3])
+    assert page.headers["content-security-policy"].startswith("default-src 'none'; style-src")
+    assert "<script" not in page.text
+    assert 'lang="de"' in page.text
+    assert "(UTC+00:00)" in page.text
+
+
+def check_refusals(live: Bridge) -> None:
+    for query, said in (
+        (f"from={T0}&to={T0 - 1}", "must be before to"),
+        (f"from={T0}&to={T0}", "must be before to"),
+        (f"from={T0 - 31 * 24 * HOUR - 1}&to={T0}", "31.0 days apart, the limit is 31"),
+        (f"from={T0 - 3652 * 24 * HOUR}&to={T0}", "3652.0 days apart, the limit is 31"),
+        ("from=yesterday", "from is 'yesterday'"),
+        ("from=1&from=2", "from"),
+        (f"to={T0}&lang=de", "lang"),
+    ):
+        answer = live.http.get(f"/api/report?{query}")
+        assert (answer.status_code, said in answer.text) == (400, True), answer.text
+    answer = live.http.get(f"/api/report.html?to={T0}&lang=fr")
+    assert (answer.status_code, "lang" in answer.json()["detail"]) == (400, True)
+    # What is to come is left out, and a shift is eight hours.
+    report = live.json(f"/api/report?to={2**31 - 1}")
+    assert report["to"]["sec"] - report["from"]["sec"] == 8 * HOUR
+    assert report["to"]["sec"] < 2**31 - 1
+
+
+def test_a_log_without_anything_gives_a_report_of_nothing() -> None:
+    with bridge(afresh=True) as live:
+        answer = wait_for(lambda: answered(live, "/api/report"), "a report")
+        assert answer is not None
+        report = ShiftReport.model_validate_json(answer.content)
+        assert (report.counts.tags, report.alarms, report.silences) == (0, [], [])
+        assert answered(live, f"/api/report.html?from={T0}&to={T0 + HOUR}") is not None
+
+
+def answered(live: Bridge, path: str) -> httpx.Response | None:
+    answer = live.http.get(path)
+    return answer if answer.status_code == 200 else None
+
+
+def test_the_report_of_a_day_is_posted_once_also_after_restarts(tmp_path: Path) -> None:
+    secret: Any = {"LUPIN_WEBHOOK_SECRET": "s" * 16}
+    with receiver(status(200)) as hook:
+        options = (
+            *("--report-at", "00:00", "--time-zone", "UTC"),
+            *("--webhook-url", f"http://127.0.0.1:{hook.port}/"),
+            *("--accounts", str(tmp_path / "accounts.sqlite")),
+            *("--ros-args", "-p", f"journal:={tmp_path / 'j.sqlite'}"),
+        )
+
+        def sent() -> Path | None:
+            return next(iter(tmp_path.glob("report-*.sent")), None)
+
+        with bridge(*options, **secret) as live:
+            live.peer.wait_for_twin()
+            live.peer.observe(scan("a", {"temperature": 21.5}))
+            note = wait_for(sent, "the note")
+            assert note is not None
+        midnight_ns = int(note.read_text())
+        assert midnight_ns % (86_400 * 10**9) == 0
+        assert hook.posted == []
+        note.write_text(str(midnight_ns - 86_400 * 10**9))
+        with bridge(*options, **secret) as live:
+            wait_for(lambda: hook.posted, "the report of the day that was missed")
+            wait_for(lambda: int(note.read_text()) == midnight_ns, "the note of it")
+            period = f"from={midnight_ns // 10**9 - 86_400}&to={midnight_ns // 10**9}"
+            posted = hook.posted[0].json
+            assert posted["change"] == "report"
+            assert posted["report"] == live.json(f"/api/report?{period}")
+        with bridge(*options, **secret) as live:
+            wait_for(lambda: live.json("/api/alarms")["source"] == "journal", "a start")
+        assert len(hook.posted) == 1

@@ -1,0 +1,254 @@
+"""`lupin-twin adapt` on a robot that says by TF where it is, and by apriltag_ros what it sees."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+import rclpy
+import yaml
+from diagnostic_msgs.msg import DiagnosticArray
+from geometry_msgs.msg import TransformStamped
+from lupin_msgs.msg import Observation
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.qos import QoSProfile, qos_profile_sensor_data
+from sensor_msgs.msg import Temperature
+
+from lupin_twin.adapt.check import Listener, listen, report, suggestion
+from lupin_twin.adapt.config import Config, config_of
+from tests.support.docs import block_named
+from tests.support.inprocess import ros_domain
+from tests.support.processes import twin_node
+from tests.support.ros import Peer, latched
+from tests.twin.adapt.test_adapt import adapt
+
+CONFIG = """
+robot: {tf: base_link, max_age_s: 2}
+detections: {topic: /detections}
+tags: {"tag36h11:1": [9.0, 9.0]}
+reach_m: 0.8
+window_s: 0.5
+sensors:
+  temperature: {topic: /temperature, type: sensor_msgs/msg/Temperature}
+"""
+
+
+@pytest.fixture
+def config(tmp_path: Path) -> Path:
+    path = tmp_path / "adapt.yaml"
+    path.write_text(CONFIG)
+    return path
+
+
+class Robot:
+    """Nav2's frames, apriltag_ros's detections, a thermometer."""
+
+    def __init__(self, peer: Peer) -> None:
+        from apriltag_msgs.msg import AprilTagDetectionArray
+        from tf2_msgs.msg import TFMessage
+
+        self._node = node = peer.node
+        self.reports: list[Any] = []
+        self.observations: list[Any] = []
+        self._tf = node.create_publisher(TFMessage, "/tf", QoSProfile(depth=100))
+        self._static = node.create_publisher(TFMessage, "/tf_static", latched(1))
+        self._seen = node.create_publisher(
+            AprilTagDetectionArray, "/detections", qos_profile_sensor_data
+        )
+        self._temperature = node.create_publisher(
+            Temperature, "/temperature", qos_profile_sensor_data
+        )
+        node.create_subscription(DiagnosticArray, "/diagnostics", self.reports.append, 10)
+        node.create_subscription(
+            Observation, "/floranova/observations", self.observations.append, latched(50)
+        )
+        # Once, and for ever; the camera looks along the robot's left.
+        self._static.publish(
+            TFMessage(transforms=[self._step("base_link", "camera", (0.0, 0.2, 0.5))])
+        )
+
+    def _step(self, parent: str, child: str, at: tuple[float, float, float]) -> TransformStamped:
+        step = TransformStamped(child_frame_id=child)
+        step.header.frame_id = parent
+        step.header.stamp = self._node.get_clock().now().to_msg()
+        move = step.transform.translation
+        move.x, move.y, move.z = at
+        return step
+
+    def be_at(self, x: float, *steps: TransformStamped) -> None:
+        from tf2_msgs.msg import TFMessage
+
+        self._tf.publish(TFMessage(transforms=[self._step("map", "odom", (x - 1.0, 0.0, 0.0))]))
+        own = self._step("odom", "/base_link", (1.0, 0.0, 0.0))  # as ROS 1 wrote it
+        self._tf.publish(TFMessage(transforms=[own, *steps]))
+
+    def see(
+        self, number: int, ahead_m: float, *, hamming: int = 0, frame: str = "tag36h11:{}"
+    ) -> TransformStamped:
+        """As apriltag_ros: first the detection, behind it the transform, of the same moment."""
+        from apriltag_msgs.msg import AprilTagDetection, AprilTagDetectionArray
+
+        step = self._step("camera", frame.format(number), (ahead_m, 0.0, 0.0))
+        detection = AprilTagDetection(family="tag36h11", id=number, hamming=hamming)
+        self._seen.publish(AprilTagDetectionArray(header=step.header, detections=[detection]))
+        return step
+
+    def read(self, value: float) -> None:
+        message = Temperature(temperature=value)
+        message.header.stamp = self._node.get_clock().now().to_msg()
+        self._temperature.publish(message)
+
+    def said(self, text: str) -> bool:
+        return any(text in it.message for report in self.reports for it in report.status)
+
+
+def test_a_tag_that_is_seen_is_on_the_map_and_what_is_read_there_is_its_own(
+    domain: int, config: Path
+) -> None:
+    with (
+        twin_node(domain),
+        adapt(domain, "--config", str(config)) as process,
+        Peer(domain) as peer,
+    ):
+        robot = Robot(peer)
+        peer.listen()
+
+        def at_the_tag() -> Any:
+            robot.be_at(
+                5.0,
+                robot.see(7, 0.3),
+                robot.see(8, 2.0),  # out of reach: too far to say where it is
+                robot.see(9, 0.3, hamming=1),  # a shadow
+                robot.see(1, 0.3),  # it was surveyed
+            )
+            robot.read(21.5)
+            tags = {tag.tag_id: tag for tag in peer.states[-1].tags} if peer.states else {}
+            return "tag36h11:7" in tags and tags["tag36h11:7"].readings and tags
+
+        tags = peer.until(at_the_tag, "the tag with its readings")
+        assert set(tags) == {"tag36h11:7", "tag36h11:1"}
+        at = tags["tag36h11:7"].pose.position
+        assert (at.x, at.y, at.z) == pytest.approx((5.3, 0.2, 0.5))
+        assert [(it.name, it.value) for it in tags["tag36h11:7"].readings] == [
+            ("temperature", 21.5)
+        ]
+        assert tags["tag36h11:1"].pose.position.x == 9.0
+
+        # The first place stays, and between tags nothing is read.
+        robot.observations.clear()
+
+        def elsewhere() -> bool:
+            robot.be_at(7.0, robot.see(7, 0.1), robot.see(8, 0.1))
+            return any(tag.tag_id == "tag36h11:8" for tag in peer.states[-1].tags)
+
+        peer.until(elsewhere, "the other tag")
+        tags = {tag.tag_id: tag for tag in peer.states[-1].tags}
+        assert tags["tag36h11:8"].pose.position.x == pytest.approx(7.1)
+        assert tags["tag36h11:7"].pose.position.x == pytest.approx(5.3)
+        assert process.stop() == 0
+
+
+@pytest.mark.parametrize(
+    ("do", "text"),
+    [
+        (lambda robot: None, "TF has no way from 'base_link' to 'map' (frame_id)"),
+        (
+            lambda robot: robot.be_at(0.0, robot.see(7, 0.3, frame="bench")),
+            "a tag was detected, but TF has no 'tag36h11:7': is tag.frames set in apriltag_ros?",
+        ),
+        (lambda robot: robot.be_at(float("nan")), "the transform to 'odom' has (nan, 0.0,"),
+    ],
+    ids=["no frames", "another name", "NaN"],
+)
+def test_what_is_wrong_with_tf_is_named(
+    domain: int, config: Path, do: Callable[[Robot], None], text: str
+) -> None:
+    with adapt(domain, "--config", str(config)) as process, Peer(domain) as peer:
+        robot = Robot(peer)
+
+        def said() -> bool:
+            do(robot)
+            return robot.said(text)
+
+        peer.until(said, f"{text!r} on /diagnostics")
+        assert process.exit_code is None
+
+
+def test_a_robot_whose_transforms_are_old_is_nowhere(domain: int, config: Path) -> None:
+    config.write_text(CONFIG.replace("[9.0, 9.0]", "[0.0, 0.0]"))
+    with adapt(domain, "--config", str(config)), Peer(domain) as peer:
+        robot = Robot(peer)
+
+        def at_the_tag() -> bool:
+            robot.be_at(0.0)
+            return robot.said("at tag36h11:1")
+
+        peer.until(at_the_tag, "the robot at its tag")
+        robot.reports.clear()
+        peer.until(lambda: robot.said("s old, the limit is 2 s"), "what was wrong")
+        robot.reports.clear()
+        robot.observations.clear()
+        for _ in range(20):
+            robot.read(21.5)
+            peer.spin_briefly()
+        peer.until(lambda: len(robot.reports) >= 2, "two seconds")
+        assert robot.observations == []
+
+
+def heard(domain: int, config: Config | None, is_enough: Callable[[Listener], bool]) -> Listener:
+    """What a check hears of the robot, as soon as that is enough."""
+    with Peer(domain) as peer, ros_domain(domain):
+        robot = Robot(peer)
+        rclpy.init(args=[])
+        try:
+            listener = Listener(config)
+            executor = SingleThreadedExecutor()
+            executor.add_node(listener)
+
+            def publish() -> bool:
+                robot.be_at(5.0, robot.see(7, 0.3))
+                robot.read(21.5)
+                listen(executor, 0.05)
+                return is_enough(listener)
+
+            peer.until(publish, "enough to be heard")
+            return listener
+        finally:
+            rclpy.try_shutdown()
+
+
+def test_check_says_where_tf_has_the_robot_and_which_tags_are_seen(domain: int) -> None:
+    config = config_of(yaml.safe_load(CONFIG))
+    lines: list[tuple[bool, str]] = []
+
+    def is_enough(listener: Listener) -> bool:
+        lines[:] = report(config, listener, 6.0)
+        return all(is_right for is_right, _ in lines)
+
+    heard(domain, config, is_enough)
+    robot, detections, _ = (line for _, line in lines)
+    assert robot.startswith("ok    robot: /tf: ")
+    assert robot.endswith("base_link is at (5.00, 0.00) m in map")
+    assert detections.startswith("ok    detections: /detections: ")
+    assert detections.endswith("tags in the last: tag36h11:7")
+
+
+def test_check_without_a_configuration_finds_tf_and_detections(domain: int) -> None:
+    def is_enough(listener: Listener) -> bool:
+        return "base_link" in listener.frames and len(listener.heard) >= 4
+
+    found = config_of(yaml.safe_load(suggestion(heard(domain, None, is_enough))))
+    assert found.robot is not None
+    assert (found.robot.tf, found.tags) == ("base_link", {})
+    assert found.detections is not None
+    assert found.detections.topic == "/detections"
+
+
+def test_what_the_docs_show_of_tf_is_taken() -> None:
+    config = config_of(yaml.safe_load(block_named("adapt-tf").text))
+    assert config.robot is not None
+    assert config.robot.tf == "base_link"
+    assert config.detections is not None
+    assert config.detections.tag_id("tag36h11", 7) == "7"

@@ -1,0 +1,200 @@
+"""A shift report says what the plainest reading of all rows says, on either engine."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import replace
+from datetime import UTC
+from itertools import pairwise
+from statistics import fmean, median
+from typing import Any
+
+import orjson
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from lupin_bridge.fleet.site_log import SiteConnection
+from lupin_bridge.judge.daylight import ClockDay
+from lupin_bridge.judge.options import Criteria, own_sensors
+from lupin_bridge.judge.verdict import derive
+from lupin_bridge.past.report import Report
+from lupin_twin.core.journal_condition import Condition, JournalState
+from lupin_twin.core.state import Reading
+from lupin_twin.core.writes import PastWrite, RunSpan
+from lupin_twin.journal.rows import InspectionRow, ScanRow
+from lupin_twin.journal.runs import runs, spans
+from tests.support.alarms_reference import Plain, alarms
+from tests.support.log_life import BEGUN, LATEST, MINUTE, Life, steps
+from tests.support.past import answered_by
+from tests.twin.journal.conftest import Engines, Living
+
+CRITERIA = Criteria(own_sensors(), None, ClockDay(UTC))
+END = BEGUN + (LATEST + 200) * MINUTE
+JOURNAL = Condition(JournalState.RECORDING, complete_ns=END, kept_ns=((0, END),))
+_stamps = st.integers(0, LATEST + 100).map(lambda minutes: BEGUN + minutes * MINUTE + 1)
+
+
+def report(connection: Any, site: str, start_ns: int, end_ns: int) -> dict[str, Any]:
+    log: Any = SiteConnection(connection, site) if site != "local" else connection
+    query = Report(start_ns, end_ns, CRITERIA, JOURNAL)
+    found: dict[str, Any] = orjson.loads(answered_by(log, query))
+    return found
+
+
+@given(steps, st.tuples(_stamps, _stamps).filter(lambda two: two[0] != two[1]).map(sorted))
+@settings(deadline=None, max_examples=60)
+def test_a_report_is_that_of_a_plain_list_on_either_engine(
+    living: Living, engines: Engines, lives: list[tuple[str, Any]], period: tuple[int, int]
+) -> None:
+    with living(lives) as life:
+        found = [report(*log, *period) for log in engines(life.connection)]
+        assert found[0] == found[1]
+        check(found[0], life, *period)
+
+
+def test_nothing_of_what_came_later_is_in_it(living: Living) -> None:
+    chance = st.tuples(steps, _stamps)
+
+    @given(chance, st.integers(1, LATEST))
+    @settings(deadline=None, max_examples=40)
+    def hold(told: tuple[list[tuple[str, Any]], int], minutes: int) -> None:
+        lives, end_ns = told
+        lives = [step for step in lives if step[0] != "back"]
+        start_ns = max(1, end_ns - minutes * MINUTE)
+        before = [(what, until(arg, end_ns)) for what, arg in lives if what == "rows"]
+        with living(lives) as life, living([step for step in before if step[1]]) as earlier:
+            both = [report(it.connection, "local", start_ns, end_ns) for it in (life, earlier)]
+        assert both[0] == both[1]
+
+    hold()
+
+
+def until(rows: Iterable[Any], end_ns: int) -> list[Any]:
+    return [row for row in rows if row.stamp_ns < end_ns]
+
+
+def check(found: dict[str, Any], life: Life, start_ns: int, end_ns: int) -> None:
+    known = [(n, row) for n, row in life._holds() if row.stamp_ns < end_ns]
+    told = sorted(
+        (write(number, life.rows[number][0], row) for number, row in known if not is_pin(row)),
+        key=lambda it: (it.stamp_ns, it.number),
+    )
+    within = [it for it in told if it.stamp_ns >= start_ns]
+    scans = [it for it in within if it.kind == 0 and it.status == 0]
+    counts = found["counts"]
+    assert counts["scans"] == len(scans)
+    assert counts["failed"] == sum(it.status != 0 for it in within)
+    assert counts["inspections"] == sum(it.has_seen for it in within)
+    assert not {it.tag_id for it in scans} & set(found["never_scanned"])
+    assert counts["tags"] == counts["tags_scanned"] + len(found["never_scanned"])
+    check_sensors(found["sensors"], scans)
+    check_silences(found["silences"], told, start_ns, end_ns)
+    axis = [
+        RunSpan(it.run.id, it.start_ns, min(it.end_ns, end_ns))
+        for it in spans(runs(life.connection.execute))
+        if it.start_ns < end_ns
+    ]
+
+    def day_of(light: bool | None, at_ns: int) -> bool:
+        return CRITERIA.day(light, at_ns).is_day
+
+    right = {
+        it
+        for it in alarms(told, axis, end_ns - 1, CRITERIA.sensors, day_of)
+        if it.cleared_ns is None or it.cleared_ns >= start_ns
+    }
+    assert {plain(it) for it in found["alarms"]} == {without_nan(it) for it in right}
+    assert counts["raised"] == sum(it.raised_ns >= start_ns for it in right)
+    assert counts["active"] == sum(it.cleared_ns is None for it in right)
+    assert counts["cleared"] == len(right) - counts["active"]
+
+
+def check_sensors(found: list[dict[str, Any]], scans: list[PastWrite]) -> None:
+    values: dict[str, list[tuple[float, str, int]]] = {}
+    for it in scans:
+        pairs = dict(zip(it.sensors, it.values, strict=True))
+        readings = [Reading(name, value, it.stamp_ns) for name, value in pairs.items()]
+        for reading in (*readings, *derive(readings)):
+            mine = values.setdefault(reading.name, [])
+            mine.append((reading.value, it.tag_id, it.stamp_ns))
+    assert {it["sensor_type"] for it in found} == set(values)
+    for entry in found:
+        sensor = CRITERIA.sensors.named(entry["sensor_type"])
+        every = values[sensor.name]
+        good = [one for one in every if sensor.is_plausible(one[0])]
+        assert (entry["n"], entry["failed"], entry["unit"]) == (
+            *(len(good), len(every) - len(good)),
+            sensor.unit,
+        )
+        if not good:
+            assert entry["mean"] is entry["low"] is entry["high"] is None
+            continue
+        assert entry["mean"] == pytest.approx(fmean(one[0] for one in good))
+        for name, best in (("low", min), ("high", max)):
+            value = best(one[0] for one in good)
+            first = next(one for one in good if one[0] == value)
+            assert (entry[name]["value"], entry[name]["tag_id"], ns(entry[name]["stamp"])) == first
+
+
+def check_silences(
+    found: list[dict[str, Any]], told: list[PastWrite], start_ns: int, end_ns: int
+) -> None:
+    def gaps(stamps: list[int], pauses: list[tuple[int, int]]) -> list[tuple[int, int]]:
+        usual = median(b - a for a, b in pairwise(stamps)) if len(stamps) > 1 else 0
+        longest = max(600 * 10**9, 3 * usual)
+        return [
+            (a, b)
+            for a, b in pairwise([*stamps, end_ns])
+            if b - a - sum(max(0, min(b, d) - max(a, c)) for c, d in pauses) > longest
+        ]
+
+    whole = gaps([it.stamp_ns for it in told], [])
+    right = {("", max(a, start_ns), b) for a, b in whole if b > start_ns}
+    for tag_id in {it.tag_id for it in told}:
+        mine = [it.stamp_ns for it in told if it.tag_id == tag_id and it.kind == 0]
+        right |= {
+            (tag_id, max(a, start_ns), b) for a, b in (gaps(mine, whole) if mine else [])
+            if b > start_ns
+        }  # fmt: skip
+    if not told:
+        right = set()
+    assert {(it["tag_id"], ns(it["from"]), ns(it["to"])) for it in found} == right
+
+
+def write(number: int, run: int, row: Any) -> PastWrite:
+    if isinstance(row, InspectionRow):
+        flower = row.flower
+        species = flower.species if flower.confidence >= 0.5 else ""
+        seen = (True, species, flower.anomaly, flower.bug_count)
+        return PastWrite(number, run, row.tag_id, row.stamp_ns, 1, 0, (), (), *seen)
+    assert isinstance(row, ScanRow)
+    names = tuple(reading.name for reading in row.readings)
+    values = tuple(reading.value for reading in row.readings)
+    return PastWrite(number, run, row.tag_id, row.stamp_ns, row.kind, row.status, names, values)
+
+
+def is_pin(row: Any) -> bool:
+    return not isinstance(row, InspectionRow | ScanRow)
+
+
+def plain(alarm: dict[str, Any]) -> Plain:
+    reason, cleared = alarm["reason"], alarm["cleared_at"]
+    return Plain(
+        alarm["tag_id"],
+        *(reason["kind"], reason["sensor"], reason["verdict"], reason["value"], reason["limit"]),
+        *(ns(reason["since"]), ns(alarm["raised_at"])),
+        None if cleared is None else ns(cleared),
+        alarm["worst"],
+    )
+
+
+def without_nan(it: Plain) -> Plain:
+    if it.value is not None and not math.isfinite(it.value):
+        return replace(it, value=None)
+    return it
+
+
+def ns(at: dict[str, int]) -> int:
+    return at["sec"] * 10**9 + at["nanosec"]

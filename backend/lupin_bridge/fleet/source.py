@@ -27,6 +27,7 @@ from lupin_bridge.fleet.reader import Latest, Reported
 from lupin_bridge.fleet.watching import Watching
 from lupin_bridge.past.estimate import ReadingsAt
 from lupin_twin.core.journal_condition import Condition, JournalState
+from lupin_twin.core.notes import Note, NotesUnwritable
 from lupin_twin.core.parameters import TwinParameters
 from lupin_twin.core.past import NotRemembered
 from lupin_twin.core.state import samples_of
@@ -297,6 +298,16 @@ class SiteTwin(TwinSource):
     async def estimate_report(self, request: ReportRequest) -> Report:  # noqa: ARG002  # none
         """None: how right estimates were is counted by the twin."""
         raise NotRemembered(_NO_REPORT, is_lasting=True)
+
+    writes_notes = True
+
+    async def write_note(self, note: Note) -> Note:
+        """Into the site's log in the archive, where every replica reads it."""
+        try:
+            written: Note = await self._in_time(self._reading(note))
+        except NotRemembered as error:
+            raise NotesUnwritable(f"the note of {note.by} was not written: {error}") from error
+        return written
 
     async def now(self) -> Now:
         """What who looks back has to know of now."""

@@ -19,7 +19,7 @@ from tests.support.fleet import fleet
 from tests.support.journal import select
 from tests.support.postgres import Postgres
 from tests.support.processes import Process
-from tests.support.waiting import wait_for
+from tests.support.waiting import PATIENCE_S, wait_for
 
 # Scans a second of each twin, and how many of them between two kills at most.
 RATE = 150
@@ -107,7 +107,8 @@ class Replica:
             rows = csv.DictReader(io.StringIO(answer.text))
             return answer.status_code == 200 and sum(row["sensor"] == "b" for row in rows) == count
 
-        wait_for(exported, f"{count} scans of {site} on the page")
+        # After many kills it is a large file.
+        wait_for(exported, f"{count} scans of {site} on the page", 10 * PATIENCE_S)
 
 
 def kill_and_compare(postgresql: Postgres, folder: Path, moments: int, seed: int) -> int:

@@ -7,7 +7,6 @@ path of a journal does otherwise.
 from __future__ import annotations
 
 import logging
-import os
 import sqlite3
 from collections.abc import Callable
 from contextlib import suppress
@@ -20,8 +19,7 @@ from lupin_bridge.feed.past_child import Child, Search
 from lupin_bridge.feed.query import Now, Question
 from lupin_bridge.fleet.compare import Compare
 from lupin_bridge.fleet.report import SitesReport
-from lupin_bridge.fleet.site_log import SiteConnection, open_archive, write_note
-from lupin_bridge.settings import variable
+from lupin_bridge.fleet.site_log import SiteConnection, archive_url, open_archive, write_note
 from lupin_twin.core.diagnostics import Origin, origin_of
 from lupin_twin.core.notes import Note
 from lupin_twin.core.past import NotRemembered
@@ -92,15 +90,11 @@ class ArchiveChild(Child):
         if isinstance(question, Latest):
             return lambda connection, _: _latest(SiteConnection(connection, site), question)
         if isinstance(question, Note):
-            return lambda _, stop: write_note(_url(), site, question, stop)
+            return lambda _, stop: write_note(site, question, stop)
         if isinstance(question, Compare | SitesReport):
             return lambda connection, _: _compared(question, connection)
         found = super()._search(question, now)
         return lambda connection, stop: found(_as_journal(connection, site), stop)
-
-
-def _url() -> str:
-    return os.environ[variable("archive_url")]
 
 
 def _as_journal(connection: Any, site: str) -> sqlite3.Connection:
@@ -183,7 +177,7 @@ class ArchiveRecall(Recall):
                 if connection.closed or not _is_alive(connection):
                     continue
                 return connection
-            return open_archive(_url(), "lupin-twin fleet")
+            return open_archive(archive_url(), "lupin-twin fleet")
 
     @property
     def _idle_archive(self) -> list[Any]:

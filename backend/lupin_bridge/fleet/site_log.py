@@ -6,6 +6,7 @@ journal reads a site of the archive, and gets the same answer.
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping
 from concurrent.futures import CancelledError
 from contextlib import closing
@@ -13,6 +14,7 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 from lupin_bridge.archive.database import CHANNEL, ArchiveError, check_version, connect, explained
+from lupin_bridge.settings import variable
 from lupin_twin.core.notes import Note
 from lupin_twin.journal.notes import last_number, put_note
 from lupin_twin.journal.schema import SiteLog
@@ -51,6 +53,11 @@ class SiteConnection:
         return self.connection.info
 
 
+def archive_url() -> str:
+    """Where the archive is: not on the command line of a process, which others can read."""
+    return os.environ[variable("archive_url")]
+
+
 def open_archive(url: str, name: str) -> Any:
     """A connection that cannot write, to the primary or to a standby.
 
@@ -76,7 +83,7 @@ def open_archive(url: str, name: str) -> Any:
     return connection
 
 
-def write_note(url: str, site: str, note: Note, should_stop: ShouldStop) -> Note:
+def write_note(site: str, note: Note, should_stop: ShouldStop) -> Note:
     """Write what somebody said into a site's log, at the primary; returns it with its id.
 
     Raises:
@@ -84,7 +91,10 @@ def write_note(url: str, site: str, note: Note, should_stop: ShouldStop) -> Note
         CancelledError: nobody waits for it any more, and it is not written.
 
     """
-    with closing(connect(url, "lupin-twin fleet")) as connection, connection.transaction():
+    with (
+        closing(connect(archive_url(), "lupin-twin fleet")) as connection,
+        connection.transaction(),
+    ):
         log = SiteLog(connection, site)
         (forwarded,) = log.execute(_FORWARDED).fetchone() or (0,)
         # Behind all that were forwarded, and before those that the twin has yet to write.

@@ -140,12 +140,12 @@ class SiteTwin(TwinSource):
                     self._has_read.set()
             except (NotRemembered, TwinUnavailableError) as error:
                 log.info("site %s is as it was: %s", self.site, error)
-                self._problem = f"The archive: {error}."
+                self._problem = _sentence(str(error))
                 await asyncio.sleep(_RETRY_S)
                 continue
             except Exception as error:  # nobody waits for this task, and the page depends on it
                 log.exception("site %s is as it was", self.site)
-                self._problem = f"The archive: {error}."
+                self._problem = _sentence(f"the archive cannot be read: {error}")
                 await asyncio.sleep(_RETRY_S)
                 continue
             await self._wake.wait()
@@ -166,7 +166,7 @@ class SiteTwin(TwinSource):
         site, is_live = self._site, self._is_live
         reported = self._reported
         archive = self._watching.archive
-        problem = self._problem if archive.is_reachable else f"The archive: {archive.message}."
+        problem = self._problem if archive.is_reachable else _sentence(archive.message)
         said = is_live, self._seq, problem
         if reported is None or not (is_live or said != self._said):
             return
@@ -325,6 +325,10 @@ class SiteTwin(TwinSource):
 def _newest_ns(reported: Reported) -> int:
     """The last moment of a simulation that every replica knows of."""
     return max((tag.last_observed_ns or 0 for tag in reported.snapshot.tags), default=0)
+
+
+def _sentence(message: str) -> str:
+    return f"{message[:1].upper()}{message[1:].rstrip('.')}."
 
 
 def _no_ros() -> Any:

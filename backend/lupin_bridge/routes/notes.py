@@ -165,7 +165,7 @@ async def withdraw_note(request: Request, note_id: str) -> Response:
 def _writer(request: Request, bridge: Bridge) -> Person | Response:
     """Who writes, or why they do not."""
     person = person_of(request)
-    if person is None:
+    if person is None or not person.name:
         return error_response(
             "notes are written by people: sign in with an account of the role operator "
             "(`lupin-twin user add`)",

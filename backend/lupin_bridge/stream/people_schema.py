@@ -37,6 +37,7 @@ class SignIn(_Given):
 
     name: str
     password: str
+    ends_others: bool = Field(default=False, description="sign this name out everywhere else")
 
 
 class NoteDraft(_Given):

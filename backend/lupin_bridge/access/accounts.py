@@ -67,7 +67,8 @@ _MIGRATIONS: Final = (
     ALTER TABLE person ADD COLUMN sites TEXT NOT NULL DEFAULT '';
     CREATE TABLE device (
         endpoint TEXT PRIMARY KEY, name TEXT NOT NULL REFERENCES person ON DELETE CASCADE,
-        public_key TEXT NOT NULL, secret TEXT NOT NULL, made_at_s INTEGER NOT NULL
+        public_key TEXT NOT NULL, secret TEXT NOT NULL, language TEXT NOT NULL,
+        made_at_s INTEGER NOT NULL
     ) STRICT;
     CREATE INDEX device_of ON device (name);
     """,
@@ -124,6 +125,7 @@ class Device(NamedTuple):
     endpoint: str
     public_key: str
     secret: str
+    language: str
 
 
 class Audited(NamedTuple):
@@ -414,15 +416,18 @@ class Accounts:
 
         """
         with self._writing() as connection:
-            connection.execute("DELETE FROM device WHERE endpoint = ?", (device.endpoint,))
+            known = connection.execute(
+                "DELETE FROM device WHERE endpoint = ? RETURNING name", (device.endpoint,)
+            ).fetchone()
             connection.execute(
                 "DELETE FROM device WHERE endpoint IN (SELECT endpoint FROM device WHERE name = ?"
                 " ORDER BY made_at_s DESC LIMIT -1 OFFSET ?)",
                 (name, MAX_DEVICES - 1),
             )
-            row = (device.endpoint, name, device.public_key, device.secret, now_s)
-            connection.execute("INSERT INTO device VALUES (?, ?, ?, ?, ?)", row)
-            _audit(connection, Audited(now_s, name, "add device", "", address))
+            row = (device.endpoint, name, *device[1:], now_s)
+            connection.execute("INSERT INTO device VALUES (?, ?, ?, ?, ?, ?)", row)
+            if known != (name,):
+                _audit(connection, Audited(now_s, name, "add device", "", address))
 
     def remove_device(self, endpoint: str, name: str = "") -> None:
         """Notify it no more; `name`: only if it is theirs.
@@ -439,7 +444,7 @@ class Accounts:
     def devices(self, site: str) -> list[Device]:
         """Those of everybody who may read this site."""
         found = self._connection.execute(
-            "SELECT endpoint, public_key, device.secret, sites FROM device"
+            "SELECT endpoint, public_key, device.secret, language, sites FROM device"
             " JOIN person USING (name) ORDER BY endpoint"
         )
         return [Device(*row) for *row, sites in found if not sites or site in _lines(sites)]

@@ -43,12 +43,14 @@ _READS: Final = ("GET", "HEAD")
 # of its own: for that, a script has to ask first (CORS preflight), and is not given leave.
 SIGN_IN: Final = "/api/signin"
 NOTES: Final = "/api/notes"
+PUSH: Final = "/api/push"
 # Takes no session: a token in a header is nothing that a browser sends along by itself.
 OBSERVATIONS: Final = "/api/observations"
 _METHODS: Final = {
     SIGN_IN: ("POST",),
     "/api/signout": ("POST",),
     NOTES: (*_READS, "POST"),
+    PUSH: (*_READS, "POST"),
     OBSERVATIONS: ("POST",),
 }
 OWN_HEADER: Final = "X-Lupin-Twin"

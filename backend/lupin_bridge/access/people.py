@@ -142,6 +142,17 @@ class People:
         # Another token of the same name is not the one that was revoked.
         return self._ask(lambda it: it.of_token(person.token)) == person
 
+    def has_account(self, person: Person) -> bool:
+        """Whether it is somebody with an account, however they signed in.
+
+        Raises:
+            AccountError: the file cannot be read.
+
+        """
+        if person.by not in ("account", "proxy") or not self.has_file:
+            return False
+        return self._ask(lambda it: it.of_name(person.name)) is not None
+
     async def check(self, name: str, password: str, address: str) -> Person | None:
         """Who signs in; None: there is no such account, or the password is another.
 

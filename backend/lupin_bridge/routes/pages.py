@@ -19,6 +19,7 @@ from starlette.types import Scope
 from lupin_bridge.access.credentials import SHARED
 from lupin_bridge.access.middleware import CONTENT_POLICY, Access, client_of
 from lupin_bridge.bridge import Bridge
+from lupin_bridge.feed.source import TwinSource
 from lupin_bridge.routes.answers import (
     NEVER_STORE,
     computed,
@@ -293,8 +294,9 @@ async def sign_out(request: Request) -> Response:
 async def session_route(request: Request) -> Response:
     """Who makes the request, and how long a session that it came with still lasts."""
     person = person_of(request) or SHARED
-    bridge: Bridge | None = getattr(request.app.state, "bridge", None)
-    is_writer = bridge is not None and bridge.source.writes_notes
+    # A fleet has no log of its own.
+    source: TwinSource | None = getattr(request.app.state.bridge, "source", None)
+    is_writer = source is not None and source.writes_notes
     seconds_left = max(0.0, person.ends_at_s - time.time()) if person.session else None
     body = {
         "can_sign_out": bool(person.session),

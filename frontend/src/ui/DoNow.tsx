@@ -50,7 +50,14 @@ export function useSince(tagId: string, reason: HealthReason | undefined): strin
 }
 
 /** What has to be done first: where, why, what, and since when; else how the greenhouse is. */
-export function DoNow({ most = MOST_TAGS }: { most?: number }): JSX.Element {
+export function DoNow({
+  most = MOST_TAGS,
+  id = 'health-driver',
+}: {
+  most?: number;
+  /** Of its first line, for tests. */
+  id?: string;
+}): JSX.Element {
   const health = useApp(selectHealth);
   const urgent = useUrgent();
   const isOfTags = health.reasons.length === 0 && urgent.length > 0;
@@ -67,13 +74,13 @@ export function DoNow({ most = MOST_TAGS }: { most?: number }): JSX.Element {
               }}
             >
               <HealthShape verdict={verdict} />
-              <Todo tagId={tag.id} reason={reasons[0]} isFirst={index === 0} />
+              <Todo tagId={tag.id} reason={reasons[0]} id={index === 0 ? id : undefined} />
             </button>
           </li>
         ))
       ) : (
         <li>
-          <Overall health={health} />
+          <Overall health={health} id={id} />
         </li>
       )}
     </ul>
@@ -83,17 +90,17 @@ export function DoNow({ most = MOST_TAGS }: { most?: number }): JSX.Element {
 function Todo({
   tagId,
   reason,
-  isFirst,
+  id,
 }: {
   tagId: string;
   reason: HealthReason | undefined;
-  isFirst: boolean;
+  id: string | undefined;
 }): JSX.Element {
   const why = S.healthDriver(shown(tagId, 24), useReasonText(reason ?? null));
   const since = useSince(tagId, reason);
   return (
     <>
-      <span className="do-why" title={why} data-testid={isFirst ? 'health-driver' : undefined}>
+      <span className="do-why" title={why} data-testid={id}>
         {why}
       </span>
       <span className="do-what">
@@ -104,7 +111,13 @@ function Todo({
 }
 
 /** How the greenhouse is, where no tag makes it so. */
-export function Overall({ health }: { health: HouseHealth }): JSX.Element {
+export function Overall({
+  health,
+  id = 'health-driver',
+}: {
+  health: HouseHealth;
+  id?: string;
+}): JSX.Element {
   const [own] = health.reasons;
   const reason = useReasonText(own ?? null);
   // Of now, as the list of alarms is.
@@ -112,7 +125,7 @@ export function Overall({ health }: { health: HouseHealth }): JSX.Element {
   const alarms = useSelected(alarmList, ({ active, shelved }) => active.length + shelved.length);
   const text = own ? reason : overallText(health, isNow ? alarms : 0);
   return (
-    <p className="do-why" data-testid="health-driver" title={text}>
+    <p className="do-why" data-testid={id} title={text}>
       {text}
       {own && <strong> {todoText(own)}</strong>}
     </p>
@@ -133,7 +146,7 @@ export function HealthStrip(): JSX.Element {
   return (
     <div className="health-strip" data-testid="health-strip" data-health={verdict}>
       <HealthMark verdict={verdict} word={false} />
-      <DoNow most={1} />
+      <DoNow most={1} id="health-first" />
     </div>
   );
 }

@@ -66,9 +66,9 @@ _LARGE_BYTES: Final = 65_536
 # reading or a bucket.
 PLAN_TAG_S: Final = 10e-6
 _WRITE_TAG_S: Final = 20e-6
-WRITE_CELL_S: Final = 50e-9
+_WRITE_CELL_S: Final = 50e-9
 _HEALTH_TAG_S: Final = 1e-3
-JUDGE_TAG_S: Final = 20e-6
+_JUDGE_TAG_S: Final = 20e-6
 _WRITE_ENTRY_S: Final = 5e-6
 # Of a field too large to estimate, or one that will be refused.
 _LARGE_S: Final = 1.0
@@ -304,7 +304,7 @@ class Field(StateQuery):
         if self.field_format is None:
             of = [tag.tag_id for tag in tags if samples_of((tag,), request.sensor_type)]
             etag = etag or content_etag("quality", of)
-            return _plan(etag, quality, cost + len(tags) * JUDGE_TAG_S)
+            return _plan(etag, quality, cost + len(tags) * _JUDGE_TAG_S)
         field_format, scale = self.field_format, self.query.scale
         etag = etag or content_etag(f"field {field_format.name} {scale}")
 
@@ -332,7 +332,7 @@ class Field(StateQuery):
 
     def _writing_s(self, request: FieldRequest) -> float:
         width, height = check_request(request, self.rules.max_grid_cells)
-        return width * height * self.query.scale**2 * WRITE_CELL_S
+        return width * height * self.query.scale**2 * _WRITE_CELL_S
 
 
 # --- over a period --------------------------------------------------------------------------------

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Awaitable, Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Annotated, Final, TypeVar
 
 from annotated_types import Interval
@@ -33,8 +33,6 @@ from lupin_bridge.routes.answers import (
 from lupin_bridge.routes.field import InFormats
 from lupin_bridge.serving.admission import Answer, json_answer
 from lupin_bridge.stream import estimate_schema, report_json
-from lupin_twin.core.state import NANOSECONDS_PER_SECOND
-from lupin_twin.estimate.engine import MINUTES_A_DAY
 from lupin_twin.field.engine import FieldRefused
 from lupin_twin.runtime.estimate_rounds import DEFAULT_PLACES, MAX_PLACES, ReportRequest
 
@@ -58,28 +56,19 @@ async def _answer(request: Request, field_format: FieldFormat) -> Response:
     query = read(EstimateQuery, request.query_params.multi_items(), FieldRefused)
     if query.layer != "mean" and field_format != PNG:
         raise FieldRefused(f"layer is {query.layer!r}, but only a PNG has one")
-    at_ns = past_query.at_of(query.at, bridge.ros_time_ns)
-    source = bridge.source
+    now_ns, source = bridge.ros_time_ns, bridge.source
+    at_ns = past_query.at_of(query.at, now_ns)
     estimated = Estimated(
-        at_ns, query, field_format, source.rules(), None, bridge.criteria, source.day_length_s
+        *(at_ns, query, field_format, source.rules(), None, bridge.criteria),
+        day_length_s=source.day_length_s,
+        now_ns=now_ns or 0,
     )
     estimated.check()
     if at_ns is not None:
         return await respond_as_of(request, estimated, at_ns)
-    now_ns = await _moment_of_now(bridge, query.sensor_type)
-    return await respond_past(request, replace(estimated, at_ns=now_ns), "estimate")
-
-
-async def _moment_of_now(bridge: Bridge, sensor: str) -> int:
-    """That of the newest reading, or the last whole minute of the day, whichever is later.
-
-    A minute of the day changes nothing that anybody could see; but of the same readings the same
-    estimate is made throughout it, to the last bit.
-    """
-    newest = (await _newest(bridge)).get(sensor, 0)
-    now_ns = bridge.ros_time_ns or 0
-    minute_ns = int(bridge.source.day_length_s / MINUTES_A_DAY * NANOSECONDS_PER_SECOND)
-    return max(now_ns - now_ns % minute_ns, newest if newest <= now_ns else 0)
+    if now_ns is None:
+        raise TwinUnavailableError(NO_TWIN)
+    return await respond_past(request, estimated, "estimate")
 
 
 ESTIMATE.register(router, _answer)
@@ -193,12 +182,8 @@ async def _report(request: Request, kind: type[QueryT], body: Body[QueryT]) -> R
 
 
 async def _sensors(bridge: Bridge) -> list[str]:
-    return sorted(await _newest(bridge))[:MAX_SENSORS]
-
-
-async def _newest(bridge: Bridge) -> dict[str, int]:
     if bridge.latest is None:
         raise TwinUnavailableError(NO_TWIN)
     snapshot = bridge.latest.snapshot
     cost_s = len(snapshot.tags) * NAMES_TAG_S
-    return await on_worker(bridge, lambda _: newest_of(snapshot), cost_s)
+    return sorted(await on_worker(bridge, lambda _: newest_of(snapshot), cost_s))[:MAX_SENSORS]

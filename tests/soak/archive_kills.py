@@ -25,6 +25,7 @@ def main() -> bool:
             print(f"not the same rows: {error}", flush=True)
             return False
     print(
-        f"in {time.monotonic() - begun_s:.0f} s: {rows:,} scans, the same in journals, archive and page"
+        f"in {time.monotonic() - begun_s:.0f} s: {rows:,} scans, "
+        "the same in journals, archive and page"
     )
     return True

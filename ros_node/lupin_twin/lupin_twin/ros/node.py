@@ -25,6 +25,7 @@ from lupin_twin.core.parameters import ParameterError, TwinParameters, World
 from lupin_twin.core.state import ClockState, Inspection, Scan, Snapshot, TwinStore
 from lupin_twin.field.engine import FieldCache, FieldEngine, FieldRules
 from lupin_twin.field.explored import OccupancyMap
+from lupin_twin.journal.beside import journal_path
 from lupin_twin.journal.runs import Clock as RunClock
 from lupin_twin.ros import convert, message_limits
 from lupin_twin.ros.base_node import NodeUtilities, qos_of, waker
@@ -35,7 +36,7 @@ from lupin_twin.ros.layer_service import LAYERS_PERIOD_S, LayerService
 from lupin_twin.ros.parameters import AdjustableNode, declare, naming, naming_own_parameters
 from lupin_twin.ros.responses import RETRY_S, Responses
 from lupin_twin.ros.services import FieldService, PastService
-from lupin_twin.runtime.memory import Memory, journal_path, open_journal
+from lupin_twin.runtime.memory import Memory, open_journal
 from lupin_twin.runtime.workers import LARGE_THREADS, JobQueue, Workers
 
 NODE_NAME: Final = "lupin_twin"

@@ -209,8 +209,7 @@ def test_who_floods_is_closed_with_the_reason(house: Bridge) -> None:
             for _ in range(100 * FRAMES_AT_ONCE):
                 flood.connection.send("{}")
         with pytest.raises(ConnectionClosed) as closed:
-            while True:
-                flood.next()  # refusals, up to its end
+            list(iter(flood.next, None))  # refusals, up to its end
         assert closed.value.rcvd is not None
         assert closed.value.rcvd.code == 1008
         assert closed.value.rcvd.reason == "more than 100 messages a second after 500 at once"

@@ -59,7 +59,7 @@ const scenarios = {
       refused: await call({ sensor_type: 'temperature' }),
       failed: await call({ sensor_type: 'temperature', colour: 'red' }),
       // Another field than the known one, which is kept and there at once.
-      late: await call({ sensor_type: 'temperature', resolution: 0.3, ...BOX }, 1e-9),
+      late: await call({ sensor_type: 'temperature', resolution: 0.01, ...BOX }, 1e-9),
     };
   },
 

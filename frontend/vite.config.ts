@@ -28,7 +28,7 @@ const RULES = [
   'src/contract/{check,frames,npy}.test.ts',
   'src/draw/palette.test.ts',
   'src/store/{create,fetcher,memo,permalink,twin,view}.test.ts',
-  'src/timebar/{axis,columns,ownTimes}.test.ts',
+  'src/timebar/{axis,columns}.test.ts',
   'src/ui/{fitting,later}.test.ts',
   'src/words/languages.test.ts',
 ];

@@ -151,7 +151,11 @@ def test_a_discovered_tag_has_a_pin_and_was_never_observed(
 def test_a_sensor_that_gives_no_number_is_told_apart_from_one_that_is_not_there(
     shared: Bridge, open_page: OpenPage
 ) -> None:
-    shared.peer.observe(scan("broken", {"temperature": float("nan")}, at=(4, 2)))
+    shared.peer.observe(
+        scan("broken", {"temperature": float("nan")}, at=(4, 2)),
+        # The table has a column for a sensor only once a tag reports it.
+        scan("humid", {"humidity": 60.0}, at=(4, 4)),
+    )
     hmi = open_page(shared.url)
     expect(hmi.cell("broken", "temperature")).to_have_text("failed")
     expect(hmi.cell("broken", "humidity")).to_contain_text("no such sensor")

@@ -248,7 +248,7 @@ def test_a_missing_reading_is_told_at_the_edge_of_the_map(open_at: Callable[...,
     expect(hmi.test_id("notice")).to_have_attribute("data-notice", "no-reading")
     notice, frame = places(hmi, "[data-testid=notice]", "[data-testid=map]")
     assert notice.bottom == pytest.approx(frame.bottom, abs=1)
-    assert notice.top > frame.bottom - (frame.bottom - frame.top) / 4
+    assert notice.top > frame.bottom - (frame.bottom - frame.top) / 3
 
 
 def test_all_text_grows_with_the_text_of_the_browser(open_at: Callable[..., Hmi]) -> None:

@@ -2,7 +2,7 @@ import type { JSX } from 'react';
 
 import { exportAddress } from '../contract/series';
 import type { Span } from '../domain/period';
-import { chartCsv } from '../domain/seriesTable';
+import { chartCsv } from '../domain/series';
 import { fileName, save } from '../export/save';
 import { useApp } from '../store/app';
 import { selectCatalogue } from '../store/derived';

@@ -11,7 +11,7 @@ import { unitOf } from '../domain/units';
 import { CommentMarks } from '../notes/parts';
 import { act, useApp } from '../store/app';
 import { useSelected } from '../store/create';
-import { pointedBy, pointedTime } from '../store/pointed';
+import { pointedBy, pointedTime } from '../store/signals';
 import { onThemeChange } from '../store/theme';
 import { S } from '../strings';
 import { isStroked, lookOf, markerPath } from './looks';

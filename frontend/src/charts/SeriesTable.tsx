@@ -3,7 +3,7 @@ import type { JSX } from 'react';
 import { ageText, readingText } from '../domain/format';
 import { rosText } from '../domain/rostime';
 import type { Sensor } from '../domain/sensors';
-import { rowsOfSeries, type SeriesRow } from '../domain/seriesTable';
+import { rowsOfSeries, type SeriesRow } from '../domain/series';
 import { shown } from '../domain/text';
 import type { TemperatureUnit } from '../domain/units';
 import { S } from '../strings';

@@ -5,8 +5,8 @@ import type { Unread } from '../contract/frames';
 import type { Frame } from '../contract/types';
 import { status } from '../testing/page';
 import { stateFrame } from '../testing/tags';
-import { phaseOf, SILENCE_MS, type Connection, type Phase } from './machine';
-import { connect, type Link } from './socket';
+import { type Connection, type Phase, phaseOf, SILENCE_MS } from './machine';
+import { connect, type Link, signInIfAsked } from './socket';
 
 class FakeSocket {
   static readonly made: FakeSocket[] = [];
@@ -191,4 +191,33 @@ describe('socket shell', () => {
     expect(FakeSocket.made).toHaveLength(1);
     expect(socket(0).closed).toBe(true);
   });
+});
+
+afterEach(() => {
+  vi.unstubAllGlobals();
+});
+
+const answering = (status: number): void => {
+  vi.stubGlobal('fetch', () => Promise.resolve(new Response(null, { status })));
+};
+
+test('a server that wants a token is one to sign in at', async () => {
+  const leave = vi.fn<(url: URL) => void>();
+  answering(401);
+  await signInIfAsked(leave);
+  expect(leave.mock.calls.map(([url]) => url.pathname)).toEqual(['/signin']);
+});
+
+test.each([200, 403, 503])('a server that answers %i keeps the page', async (status) => {
+  const leave = vi.fn<(url: URL) => void>();
+  answering(status);
+  await signInIfAsked(leave);
+  expect(leave).not.toHaveBeenCalled();
+});
+
+test('a server that is away keeps the page', async () => {
+  const leave = vi.fn<(url: URL) => void>();
+  vi.stubGlobal('fetch', () => Promise.reject(new TypeError('Failed to fetch')));
+  await signInIfAsked(leave);
+  expect(leave).not.toHaveBeenCalled();
 });

@@ -1,7 +1,8 @@
 import { now } from '../clock';
+import { route } from '../contract/api';
 import { parseFrame, type Unread } from '../contract/frames';
 import type { Frame } from '../contract/types';
-import { INITIAL, nextDeadline, step, type Connection, type ConnectionEvent } from './machine';
+import { type Connection, type ConnectionEvent, INITIAL, nextDeadline, step } from './machine';
 
 export interface ConnectionHandlers {
   /** The connection changed, or a deadline passed and its phase may have. */
@@ -126,4 +127,17 @@ export function connect(url: string, handlers: ConnectionHandlers): Link {
     drop();
   };
   return { retry, giveUp, lapse, stop };
+}
+
+/**
+ * Leaves for the sign-in page if the server asks for a token: a refused WebSocket does not tell a
+ * page why, so one more question does. A server that is merely away changes nothing.
+ */
+export async function signInIfAsked(leave: (url: URL) => void = goTo): Promise<void> {
+  const answer = await fetch(route('readyz'), { cache: 'no-store' }).catch(() => null);
+  if (answer?.status === 401) leave(route('signin'));
+}
+
+function goTo(url: URL): void {
+  location.assign(url);
 }

@@ -2,8 +2,10 @@ import { describe, expect, test } from 'vitest';
 
 import type { Field } from '../contract/types';
 import { mapPoint } from '../geometry/coordinates';
-import { fieldShade } from './ramp';
+import { fieldWith } from '../testing/field';
+import { sensorNamed } from '../testing/sensors';
 import {
+  edgesOf,
   fieldCorners,
   fieldPixels,
   interpolate,
@@ -11,8 +13,7 @@ import {
   smoothDetail,
   valueAt,
 } from './field';
-import { fieldWith } from '../testing/field';
-import { sensorNamed } from '../testing/sensors';
+import { fieldShade } from './ramp';
 
 const red = sensorNamed('temperature');
 
@@ -97,4 +98,26 @@ test('a smooth picture stays under two million pixels', () => {
 
 test('the grid reaches from its origin over all of its cells', () => {
   expect(fieldCorners(small)).toEqual([mapPoint(10, -2), mapPoint(11.5, -1)]);
+});
+
+const outlined = (rows: readonly (readonly number[])[]): Field =>
+  fieldWith(rows, { originX: 10, originY: 20, resolution: 0.5 });
+
+test('runs around what is known, each straight side once', () => {
+  expect(edgesOf(outlined([[NaN, 1, 1]]))).toEqual([
+    ...[10.5, 20, 11.5, 20],
+    ...[10.5, 20.5, 11.5, 20.5],
+    ...[10.5, 20, 10.5, 20.5],
+    ...[11.5, 20, 11.5, 20.5],
+  ]);
+});
+
+test('a hole has an edge too, and what is not known at all has none', () => {
+  const ring = [
+    [1, 1, 1],
+    [1, NaN, 1],
+    [1, 1, 1],
+  ];
+  expect(edgesOf(outlined(ring))).toHaveLength(4 * 8);
+  expect(edgesOf(outlined([[NaN, NaN]]))).toEqual([]);
 });

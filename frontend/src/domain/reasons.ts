@@ -5,7 +5,6 @@ import { ageText, digitsApart, readingText, shortAgeText, valueText } from './fo
 import { isOfRange, sideOf } from './health';
 import type { Catalogue } from './sensors';
 import { shown } from './text';
-import { tryKind } from './tries';
 import type { TemperatureUnit } from './units';
 
 /** Of a name that some twin made up. */
@@ -86,3 +85,11 @@ export const reasonsText = (
   reasons: readonly HealthReason[],
   unit: TemperatureUnit,
 ): string => reasons.map((reason) => reasonText(sensors, reason, unit, null)).join('; ');
+
+/** What became of a try, by the status of its observation (lupin_msgs/Observation). */
+export type TryKind = 'ok' | 'unreachable' | 'undecoded' | 'skipped' | 'failed';
+
+const KINDS: readonly TryKind[] = ['ok', 'unreachable', 'undecoded', 'skipped'];
+
+/** A status that is not known yet is a failure of some kind. */
+export const tryKind = (status: number): TryKind => KINDS[status] ?? 'failed';

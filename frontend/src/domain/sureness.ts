@@ -1,6 +1,8 @@
 /** How sure an estimate is of its cells, and how unsure nobody would call it known. Pure. */
+import type { Estimate } from '../contract/estimate';
 import type { Field, Sureness } from '../contract/types';
-import { fraction, rgbText, type Range, type Rgb, type Shade } from './ramp';
+import type { Placement } from '../geometry/image';
+import { fraction, type Range, rangeOf, type Rgb, rgbText, type Shade } from './ramp';
 
 /** Nine of ten values of a normal distribution lie within so many standard deviations. */
 export const NINE_OF_TEN = 1.645;
@@ -58,3 +60,60 @@ export const errorShade =
     data[at + 2] = blue;
     data[at + 3] = 255 * errorAlpha(fraction(range, value));
   };
+
+/** A field of an estimate as it came: what is too unsure is not known. Pure. */
+
+export function estimatedField(sensor: string, estimate: Estimate): Field {
+  const { mean, sd, sdKnown, readingCount, ...grid } = estimate;
+  const values = mean.map((value, cell) =>
+    stepOf(sd[cell] ?? NaN, sdKnown) < NOT_KNOWN_STEP ? value : NaN,
+  );
+  const known = rangeOf(values);
+  const { width, height, originX, originY, resolution, sampleCount } = grid;
+  return {
+    sensor,
+    width,
+    height,
+    originX,
+    originY,
+    resolution,
+    valueMin: known?.low ?? 0,
+    valueMax: known?.high ?? 0,
+    sampleCount,
+    values,
+    sureness: { sd, sdKnown, readingCount },
+  };
+}
+
+/** What of an estimate lies on explored ground, as the twin clips the nearest readings. Pure. */
+
+/** A map's picture: RGBA, top row first; transparent is not explored. */
+interface Explored {
+  readonly placement: Placement;
+  readonly pixels: Pick<ImageData, 'data' | 'width' | 'height'>;
+}
+
+/** An estimate tells a number for every cell, outside the house too; there it is not asked. */
+export function onExplored(field: Field, { placement, pixels }: Explored): Field {
+  const { sureness, width, originX, originY, resolution } = field;
+  if (!sureness) return field;
+  const cos = Math.cos(placement.yaw);
+  const sin = Math.sin(placement.yaw);
+  const isExplored = (cell: number): boolean => {
+    const x = originX + ((cell % width) + 0.5) * resolution - placement.originX;
+    const y = originY + (Math.floor(cell / width) + 0.5) * resolution - placement.originY;
+    const column = Math.floor((cos * x + sin * y) / placement.resolution);
+    const row = Math.floor((cos * y - sin * x) / placement.resolution);
+    if (column < 0 || column >= pixels.width || row < 0 || row >= pixels.height) return false;
+    const pixel = (pixels.height - 1 - row) * pixels.width + column;
+    return (pixels.data[pixel * 4 + 3] ?? 0) > 0;
+  };
+  const values = field.values.slice();
+  const sd = sureness.sd.slice();
+  for (let cell = 0; cell < values.length; cell++) {
+    if (isExplored(cell)) continue;
+    values[cell] = NaN;
+    sd[cell] = NaN;
+  }
+  return { ...field, values, sureness: { ...sureness, sd } };
+}

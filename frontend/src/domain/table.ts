@@ -4,9 +4,8 @@ import { S } from '../strings';
 import { ageSeconds } from './age';
 import { csv, type Cell } from './csv';
 import { severity, type HouseHealth } from './health';
-import { reasonsText } from './reasons';
+import { reasonsText, tryKind } from './reasons';
 import type { Catalogue, Sensor } from './sensors';
-import { tryKind } from './tries';
 import { compareIds, type Tag } from './twin';
 import { toShown, unitOf, type TemperatureUnit } from './units';
 

@@ -1,6 +1,8 @@
 import { expect, test, vi } from 'vitest';
 
-import { copyLink } from './link';
+import { act, receive } from '../store/app';
+import { stateFrame, wireTag } from '../testing/tags';
+import { copyLink, reported, reportLink } from './link';
 
 test('without a clipboard copying says no instead of failing', async () => {
   expect(await copyLink()).toBe(false);
@@ -8,4 +10,44 @@ test('without a clipboard copying says no instead of failing', async () => {
   vi.stubGlobal('navigator', { clipboard: { writeText } });
   expect(await copyLink()).toBe(true);
   expect(writeText).toHaveBeenCalledWith(window.location.href);
+});
+
+const HOUR = 3_600;
+const DAY = 24 * HOUR;
+const NOW = 100 * DAY + 0.75;
+
+test.each([
+  [null, { from: 100 * DAY - 8 * HOUR, to: 100 * DAY }],
+  [
+    { from: 5.5, to: 9.9 },
+    { from: 5, to: 9 },
+  ],
+  [
+    { from: 99 * DAY, to: 200 * DAY },
+    { from: 99 * DAY, to: 100 * DAY },
+  ],
+  [
+    { from: 0, to: 100 * DAY },
+    { from: 69 * DAY, to: 100 * DAY },
+  ],
+  [
+    { from: 7.2, to: 7.4 },
+    { from: 6, to: 7 },
+  ],
+])('the report of %o is one that the bridge gives', (span, right) => {
+  expect(reported(span, NOW)).toEqual(right);
+});
+
+test('is that of the last eight hours until a period is chosen on the time bar', () => {
+  const asked = (): URLSearchParams => new URL(reportLink(), document.baseURI).searchParams;
+  const length = (): number => Number(asked().get('to')) - Number(asked().get('from'));
+  expect(asked().has('from')).toBe(false);
+  const latest = stateFrame([wireTag()], { sec: 1_777_620_802 });
+  receive({ type: 'state', latest, now: performance.now() });
+  expect(length()).toBe(8 * HOUR);
+  expect(asked().get('lang')).toBe('en');
+  act({ type: 'period', period: { kind: 'hour' } });
+  expect(length()).toBe(HOUR);
+  act({ type: 'period', period: { kind: 'own', from: 1_777_000_000, to: 1_777_000_900 } });
+  expect([asked().get('from'), asked().get('to')]).toEqual(['1777000000', '1777000900']);
 });

@@ -2,7 +2,7 @@ import { beforeEach, describe, expect, test, vi, type Mock } from 'vitest';
 
 import { isClear } from '../geometry/clear';
 import { corners, mapPoint, toCanvas, type Camera, type View } from '../geometry/coordinates';
-import { NO_VIEWPORT, type Viewport } from '../store/viewport';
+import { NO_VIEWPORT, type Viewport } from '../store/app';
 import { MapCamera } from './camera';
 import { startGestures } from './gestures';
 

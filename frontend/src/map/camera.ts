@@ -14,7 +14,7 @@ import {
   type View,
 } from '../geometry/coordinates';
 import { createStore } from '../store/create';
-import type { Viewport } from '../store/viewport';
+import type { Viewport } from '../store/app';
 import type { Content } from './content';
 
 export interface CameraHandlers {

@@ -1,15 +1,13 @@
 import type { Ageing } from '../domain/age';
 import type { Field } from '../contract/types';
 import { divergingShade } from '../domain/difference';
-import { edgesOf } from '../domain/edges';
-import { fieldPixels, smoothDetail } from '../domain/field';
+import { edgesOf, fieldPixels, smoothDetail } from '../domain/field';
 import type { HouseHealth } from '../domain/health';
 import { fieldShade } from '../domain/ramp';
-import { cellsWhere, withOld } from '../domain/old';
+import { cellsWhere, idealShade, withOld } from '../domain/zones';
 import type { Sensor } from '../domain/sensors';
 import type { Tag } from '../domain/twin';
 import { errorShade } from '../domain/sureness';
-import { idealShade } from '../domain/zones';
 import type { TemperatureUnit } from '../domain/units';
 import { drawCrosshair, drawMark, drawPulses, type Pulse } from '../draw/overlay';
 import type { Palette } from '../draw/palette';

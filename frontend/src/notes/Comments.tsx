@@ -6,7 +6,7 @@ import { shown } from '../domain/text';
 import { useApp } from '../store/app';
 import { useSelected } from '../store/create';
 import { selectShown } from '../store/moment';
-import { person } from '../store/person';
+import { person } from '../store/signals';
 import { comments, type Comment } from './comments';
 import { Field, LONGEST } from './Field';
 import { C } from './subject';

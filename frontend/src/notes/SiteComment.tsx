@@ -2,7 +2,7 @@ import type { JSX } from 'react';
 
 import { useApp } from '../store/app';
 import { useSelected } from '../store/create';
-import { person } from '../store/person';
+import { person } from '../store/signals';
 import { Disclosure, useClose } from '../widgets/Disclosure';
 import { Field } from './Field';
 import { C } from './subject';

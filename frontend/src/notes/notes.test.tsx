@@ -3,7 +3,7 @@ import { beforeEach, expect, test, vi } from 'vitest';
 
 import type { Note } from '../contract/types';
 import { act, receive } from '../store/app';
-import { person } from '../store/person';
+import { person } from '../store/signals';
 import { alarm, alarms } from '../testing/alarms';
 import { showTags } from '../testing/page';
 import { clustersOf, comments, commentsIn } from './comments';

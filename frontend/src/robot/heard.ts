@@ -11,7 +11,7 @@ import { useSelected } from '../store/create';
 import { createFetcher } from '../store/fetcher';
 import { memoOne } from '../store/memo';
 import { rosNow, selectShown } from '../store/moment';
-import { robotFrame } from '../store/robot';
+import { robotFrame } from '../store/signals';
 import { extended, trailPoint, type TrailPoint } from './path';
 
 const NOTHING: RobotNow = { position: null, plan: null, battery: null };

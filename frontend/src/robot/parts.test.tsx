@@ -2,7 +2,7 @@ import { act as rendered, render, screen } from '@testing-library/react';
 import { beforeEach, expect, test, vi } from 'vitest';
 
 import type { Unread } from '../contract/frames';
-import { robotFrame } from '../store/robot';
+import { robotFrame } from '../store/signals';
 import { store } from '../store/app';
 import { showTags } from '../testing/page';
 import { wireTag } from '../testing/tags';

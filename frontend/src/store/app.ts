@@ -1,8 +1,21 @@
+import type { Size, View } from '../geometry/coordinates';
 import { createStore, useSelected } from './create';
 import { DEFAULT_SETTINGS, type Settings } from './settings';
 import { NO_TWIN, reduceTwin, type TwinAction, type TwinState } from './twin';
 import { DEFAULT_VIEW, reduceView, type ViewAction, type ViewState } from './view';
-import { NO_VIEWPORT, type Viewport } from './viewport';
+
+/** What of the map is on the screen just now; what the operator chose is the view's camera. */
+export interface Viewport {
+  /** Where the map is on its canvas. */
+  readonly view: View;
+  /** Of the canvas, CSS pixels; 0 until it is laid out. */
+  readonly size: Size;
+}
+
+export const NO_VIEWPORT: Viewport = {
+  view: { x: 0, y: 0, scale: 50 },
+  size: { width: 0, height: 0 },
+};
 
 export interface AppState {
   readonly twin: TwinState;

@@ -1,9 +1,10 @@
-import { afterEach, beforeEach, expect, test, vi } from 'vitest';
+import { afterEach, beforeEach, describe, expect, test, vi } from 'vitest';
 
-import { readings, stateFrame, wireTag } from '../testing/tags';
 import { showTags } from '../testing/page';
+import { CATALOGUE, sensorNamed } from '../testing/sensors';
+import { readings, stateFrame, tag, wireTag } from '../testing/tags';
 import { act, receive, store } from './app';
-import { nextSensor, startCycle } from './cycle';
+import { addressOfPage, cycleWish, nextSensor, sensorAfter, sensorsOf, startCycle } from './cycle';
 import { DEFAULT_VIEW } from './view';
 
 let stop: () => void;
@@ -75,4 +76,56 @@ test('one sensor stays, and without a wish nothing changes', () => {
   showTags([wireTag({ readings: readings({ temperature: 20 }) })]);
   stop = startCycle({ seconds: 5, refused: null });
   expect(nextSensor.get()).toBeNull();
+});
+
+describe('the wish', () => {
+  test.each(['5', '30', '3600'])('%s seconds are taken', (text) => {
+    expect(cycleWish(`?kiosk=1&cycle=${text}`)).toEqual({ seconds: Number(text), refused: null });
+  });
+
+  test.each(['4', '3601', '', '-30', '30.5', '3e1', 'soon', 'NaN', '99999'])(
+    '“%s” is refused, and said',
+    (text) => {
+      expect(cycleWish(`?cycle=${encodeURIComponent(text)}`)).toEqual({
+        seconds: null,
+        refused: text,
+      });
+    },
+  );
+
+  test('none is no mistake', () => {
+    expect(cycleWish('?kiosk=1')).toEqual({ seconds: null, refused: null });
+  });
+});
+
+describe('the round', () => {
+  const [first, second, third] = ['temperature', 'humidity', 'co2'].map(sensorNamed);
+  const three = [first, second, third].filter((sensor) => sensor !== undefined);
+
+  test('goes through all and begins again', () => {
+    expect(sensorAfter(three, 'temperature')).toBe(second);
+    expect(sensorAfter(three, 'co2')).toBe(first);
+  });
+
+  test('begins with the first where the one in view is not among them', () => {
+    expect(sensorAfter(three, 'light')).toBe(first);
+  });
+
+  test('one sensor, or none, is no round', () => {
+    expect(sensorAfter(three.slice(0, 1), 'temperature')).toBeNull();
+    expect(sensorAfter([], 'temperature')).toBeNull();
+  });
+
+  test('has the sensors that some tag has, in their usual order, failed ones too', () => {
+    const tags = [
+      tag({ readings: readings({ co2: null }) }),
+      tag({ tag_id: '2', readings: readings({ temperature: 20 }) }),
+    ];
+    expect(sensorsOf(tags, CATALOGUE.all).map(({ name }) => name)).toEqual(['temperature', 'co2']);
+  });
+});
+
+test('whoever leaves keeps the rest of the address', () => {
+  expect(addressOfPage('?kiosk=1&cycle=30', '#sensor=co2')).toBe('?#sensor=co2');
+  expect(addressOfPage('?lang=de&kiosk=1', '')).toBe('?lang=de');
 });

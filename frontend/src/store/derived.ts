@@ -2,12 +2,16 @@
 import { houseHealth, type HouseHealth } from '../domain/health';
 import type { Field, Judgement } from '../contract/types';
 import { symmetricRange } from '../domain/difference';
-import { onExplored } from '../domain/explored';
-import { rounded, withIdeal } from '../domain/autorange';
-import { oldCells, readSites, type ReadSite } from '../domain/old';
-import { rangeOf, type Range } from '../domain/ramp';
-import { errorField } from '../domain/sureness';
-import { zonesOf, type Site, type Zones } from '../domain/zones';
+import { errorField, onExplored } from '../domain/sureness';
+import { type Range, rangeOf, rounded, withIdeal } from '../domain/ramp';
+import {
+  oldCells,
+  type ReadSite,
+  readSites,
+  type Site,
+  type Zones,
+  zonesOf,
+} from '../domain/zones';
 import {
   isMeasured,
   NO_CATALOGUES,

@@ -1,12 +1,11 @@
 /** The page's one connection, and what its frames do to the store. */
 import { now, onLapse } from '../clock';
 import { latestAfter } from '../connection/latest';
-import { signInIfAsked } from '../connection/session';
-import { connect } from '../connection/socket';
+import { connect, signInIfAsked } from '../connection/socket';
 import { stateSocketUrl } from '../contract/api';
 import type { Latest } from '../contract/types';
 import { receive } from './app';
-import { robotFrame } from './robot';
+import { robotFrame } from './signals';
 
 /**
  * Frames come up to ten times a second; the page takes the newest four times a second at most.

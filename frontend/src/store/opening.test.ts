@@ -3,7 +3,7 @@ import { afterEach, beforeEach, expect, test } from 'vitest';
 import { timelineOf } from '../domain/timeline';
 import { wireStretch, wireTimeline } from '../testing/timeline';
 import { act, receive, store } from './app';
-import { startOpening } from './opening';
+import { startOpening } from './remembered';
 import { fromFragment, toFragment } from './permalink';
 import { NOT_ASKED } from './twin';
 import { DEFAULT_VIEW } from './view';

@@ -13,8 +13,7 @@ import type {
 import { INITIAL, phaseOf, type Connection, type Phase } from '../connection/machine';
 import { sharedJudgement } from '../domain/health';
 import type { Catalogues } from '../domain/sensors';
-import { heldRange } from '../domain/autorange';
-import type { Range } from '../domain/ramp';
+import { heldRange, type Range } from '../domain/ramp';
 import type { Timeline } from '../domain/timeline';
 import { snapshotOf, type Snapshot } from '../domain/twin';
 import type { MapPicture } from './picture';

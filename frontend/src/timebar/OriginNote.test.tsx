@@ -8,7 +8,7 @@ import { NO_HOUSE } from '../store/twin';
 import { goLive, goLost, showTags, status } from '../testing/page';
 import { wireTag } from '../testing/tags';
 import { ConnectionBadge } from '../ui/ConnectionBadge';
-import { LiveButton } from './LiveButton';
+import { LiveButton } from './PastHeader';
 import { OriginNote } from './OriginNote';
 import { PastFrame } from './PastFrame';
 

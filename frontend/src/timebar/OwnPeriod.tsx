@@ -1,9 +1,8 @@
-import { useState, type JSX } from 'react';
+import { type JSX, useState } from 'react';
 
 import type { Period } from '../domain/period';
 import { act } from '../store/app';
 import { S } from '../strings';
-import { fieldOf, momentOf } from './ownTimes';
 
 type Own = Extract<Period, { kind: 'own' }>;
 
@@ -52,4 +51,30 @@ export function OwnPeriod({
       )}
     </div>
   );
+}
+
+/** Moments as the fields of an own period have them. Pure but for the operator's time zone. */
+
+const two = (value: number): string => String(value).padStart(2, '0');
+
+/** "2026-11-14T03:12:40" on the operator's clock; of a simulation "1:02:03". */
+export function fieldOf(at: number, isSimulated: boolean): string {
+  const seconds = Math.floor(at);
+  if (isSimulated) {
+    return `${Math.floor(seconds / 3_600)}:${two(Math.floor(seconds / 60) % 60)}:${two(seconds % 60)}`;
+  }
+  const date = new Date(seconds * 1000);
+  const day = [date.getFullYear(), two(date.getMonth() + 1), two(date.getDate())].join('-');
+  return `${day}T${[date.getHours(), date.getMinutes(), date.getSeconds()].map(two).join(':')}`;
+}
+
+/** ROS seconds; null: that is no time. */
+export function momentOf(text: string, isSimulated: boolean): number | null {
+  if (isSimulated) {
+    const parts = /^(\d{1,6}):([0-5]\d)(?::([0-5]\d))?$/.exec(text.trim());
+    if (!parts) return null;
+    return Number(parts[1]) * 3_600 + Number(parts[2]) * 60 + Number(parts[3] ?? 0);
+  }
+  const epochMs = /^\d{4,6}-\d\d-\d\dT/.test(text) ? new Date(text).getTime() : NaN;
+  return Number.isFinite(epochMs) && epochMs >= 0 ? epochMs / 1000 : null;
 }

@@ -4,9 +4,10 @@ import { ageText } from '../domain/format';
 import { rosText } from '../domain/rostime';
 import { store, useApp } from '../store/app';
 import { rosNow, selectShown } from '../store/moment';
+import { selectIsRecorded } from '../store/origin';
 import { S } from '../strings';
 import { useTicking } from '../widgets/useNow';
-import { LiveButton } from './LiveButton';
+import { backToLive } from './span';
 
 /** In the header while the page shows another moment: which one, and the way back. */
 export function PastHeader(): JSX.Element | null {
@@ -31,5 +32,14 @@ export function PastHeader(): JSX.Element | null {
       )}
       <LiveButton />
     </div>
+  );
+}
+
+export function LiveButton(): JSX.Element {
+  const words = useApp(selectIsRecorded) ? S.backToRecording : S.backToLive;
+  return (
+    <button type="button" className="back-to-live" title={`${words} (L)`} onClick={backToLive}>
+      {words}
+    </button>
   );
 }

@@ -15,16 +15,15 @@ import type { Timeline } from '../domain/timeline';
 import { contextOf } from '../draw/surface';
 import { act, store, useApp } from '../store/app';
 import { useSelected } from '../store/create';
-import { pointedBy, pointedTime } from '../store/pointed';
+import { pointedBy, pointedTime } from '../store/signals';
 import { selectAwaited, selectShown } from '../store/moment';
 import { onThemeChange } from '../store/theme';
 import { S } from '../strings';
 import { chosenAt, momentAt, pixelS, stepped, xOf, type Axis } from './axis';
 import { columnAt, columnsOf, type Column } from './columns';
-import { BAR_PX, drawBar } from './draw';
-import { readBarPalette } from './palette';
+import { BAR_PX, drawBar, readBarPalette } from './draw';
 import { pause } from './playback';
-import { newestWord } from './newest';
+import { newestWord } from './span';
 
 /** Room that the text of a time needs, CSS pixels. */
 const TICK_ROOM_PX = 76;

@@ -1,9 +1,9 @@
 /** Draws the bar. Each mark has a shape and a place of its own; colour comes on top. */
-import type { Timeline } from '../domain/timeline';
 import type { Tick } from '../domain/ticks';
+import type { Timeline } from '../domain/timeline';
 import { clear, type Surface } from '../draw/surface';
-import { xOf, type Axis } from './axis';
-import { beforeMemory, runStarts, stretchesOf, type Column, type Stretch } from './columns';
+import { type Axis, xOf } from './axis';
+import { beforeMemory, type Column, runStarts, type Stretch, stretchesOf } from './columns';
 
 export interface BarPalette {
   readonly ink: string;
@@ -183,4 +183,26 @@ function line(
   context.moveTo(x, y);
   context.lineTo(toX, toY);
   context.stroke();
+}
+
+/** The bar's colours, as the style sheet has them now: light or dark, forced, or for paper. */
+
+export function readBarPalette(): BarPalette {
+  const style = getComputedStyle(document.documentElement);
+  const isForced = window.matchMedia('(forced-colors: active)').matches;
+  const read = (name: string, forced: string): string =>
+    isForced ? forced : style.getPropertyValue(`--${name}`).trim();
+  const textPx = 11 * (parseFloat(style.fontSize) / 16 || 1);
+  return {
+    ink: read('ink', 'CanvasText'),
+    muted: read('muted', 'CanvasText'),
+    line: read('line', 'GrayText'),
+    scan: read('bar-scan', 'CanvasText'),
+    failure: read('critical', 'Highlight'),
+    pest: read('critical', 'Highlight'),
+    cleared: read('healthy', 'CanvasText'),
+    silence: read('line-strong', 'GrayText'),
+    surface: read('surface', 'Canvas'),
+    font: `${textPx}px ${style.getPropertyValue('--font') || 'sans-serif'}`,
+  };
 }

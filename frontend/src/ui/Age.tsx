@@ -3,7 +3,7 @@ import type { JSX } from 'react';
 import { ageSeconds, ageStep, type When } from '../domain/age';
 import { ageText } from '../domain/format';
 import { shown } from '../domain/text';
-import { tryKind } from '../domain/tries';
+import { tryKind } from '../domain/reasons';
 import type { FailedTry } from '../domain/twin';
 import { useApp } from '../store/app';
 import { selectShown } from '../store/moment';

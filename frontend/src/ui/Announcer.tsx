@@ -1,7 +1,7 @@
 import type { JSX } from 'react';
 
 import { politeVoice, urgentVoice } from '../alarms/voices';
-import type { Announcement } from '../store/announcement';
+import type { Announcement } from '../store/signals';
 import { useSelected, type Store } from '../store/create';
 import { chosenTag } from './announce';
 

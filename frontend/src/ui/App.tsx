@@ -1,6 +1,6 @@
 import type { JSX } from 'react';
 
-import type { CycleWish } from '../domain/cycle';
+import type { CycleWish } from '../store/cycle';
 import { act, useApp } from '../store/app';
 import { useSelected } from '../store/create';
 import { selectHealth } from '../store/derived';

@@ -1,11 +1,10 @@
 import type { JSX } from 'react';
 
-import { addressOfPage, CYCLE_LIMITS, type CycleWish } from '../domain/cycle';
+import { addressOfPage, CYCLE_LIMITS, type CycleWish, nextSensor } from '../store/cycle';
 import { shortAgeText } from '../domain/format';
 import { shown } from '../domain/text';
 import { useApp } from '../store/app';
 import { useSelected } from '../store/create';
-import { nextSensor } from '../store/cycle';
 import { selectSensor } from '../store/derived';
 import { S } from '../strings';
 import { useTicking } from '../widgets/useNow';

@@ -1,8 +1,7 @@
 import type { JSX } from 'react';
 
 import { saveMap, saveTable } from '../export/actions';
-import { copyLink } from '../export/link';
-import { reportLink } from '../export/report';
+import { copyLink, reportLink } from '../export/link';
 import type { TemperatureUnit } from '../domain/units';
 import { prefer, useApp } from '../store/app';
 import type { Settings } from '../store/settings';

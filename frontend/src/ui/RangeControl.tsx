@@ -1,8 +1,7 @@
 import type { JSX } from 'react';
 
-import { rounded } from '../domain/autorange';
+import { type Range, rounded } from '../domain/ramp';
 import { readingText } from '../domain/format';
-import type { Range } from '../domain/ramp';
 import type { Sensor } from '../domain/sensors';
 import { act, useApp } from '../store/app';
 import { fixedRange } from '../store/view';

@@ -18,7 +18,7 @@ export { startSound } from '../alarms/sound';
 export { saveTable } from '../export/actions';
 export { startGestures } from '../map/gestures';
 export { startDifference } from '../store/difference';
-export { startOpening } from '../store/opening';
+export { startOpening } from '../store/remembered';
 export { startRemembered } from '../store/remembered';
 export { TimeBar } from '../timebar/TimeBar';
 export { AlarmPanel } from './alarms/AlarmPanel';

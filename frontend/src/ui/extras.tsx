@@ -5,7 +5,7 @@ import type * as RobotParts from '../robot/parts';
 import { useApp } from '../store/app';
 import { useSelected } from '../store/create';
 import { selectShown } from '../store/moment';
-import { robotFrame } from '../store/robot';
+import { robotFrame } from '../store/signals';
 import { CompareControl } from './CompareControl';
 import { DifferenceLegend } from './DifferenceLegend';
 import { HoverCard } from './HoverCard';

@@ -5,7 +5,7 @@ import { clockText } from '../../domain/format';
 import { secondsOf } from '../../domain/rostime';
 import { useSelected } from '../../store/create';
 import { S } from '../../strings';
-import { person } from '../../store/person';
+import { person } from '../../store/signals';
 import { P } from './people';
 
 /** Below the list: whether what is done here is this browser's own, or everybody's. */

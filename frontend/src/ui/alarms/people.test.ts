@@ -3,7 +3,7 @@ import { afterEach, beforeEach, expect, test, vi } from 'vitest';
 import { alarm, tellAlarms } from '../../testing/alarms';
 import { NOTHING_KEPT, whatOf } from '../../alarms/kept';
 import { acknowledgeAlarms, own, undo } from '../../alarms/own';
-import { person } from '../../store/person';
+import { person } from '../../store/signals';
 import { merged, startPeople, wordsFor } from './people';
 import { whoseWord } from './WhoseWord';
 

@@ -9,7 +9,7 @@ import type { Alarm } from '../../contract/types';
 import { secondsOf } from '../../domain/rostime';
 import { store } from '../../store/app';
 import { rosNow } from '../../store/moment';
-import { person } from '../../store/person';
+import { person } from '../../store/signals';
 import { say } from '../toast';
 import { LANGUAGE } from '../../strings';
 import { PEOPLE } from '../../words/people';

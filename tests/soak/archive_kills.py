@@ -24,5 +24,8 @@ def main() -> bool:
         except AssertionError as error:
             print(f"not the same rows: {error}", flush=True)
             return False
-    print(f"in {time.monotonic() - begun_s:.0f} s: {rows:,} scans, in journals, archive and page")
+    print(
+        f"in {time.monotonic() - begun_s:.0f} s: {rows:,} scans, "
+        "the same in journals, archive and page"
+    )
     return True

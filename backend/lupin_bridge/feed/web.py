@@ -33,11 +33,11 @@ from lupin_twin.estimate.engine import EstimateRequest
 from lupin_twin.estimate.engine import cost_s as estimate_cost_s
 from lupin_twin.field.engine import FieldRefused, FieldRequest, FieldRules, cost_s
 from lupin_twin.field.explored import OccupancyMap
+from lupin_twin.journal.beside import journal_path
 from lupin_twin.journal.follow import Lot
 from lupin_twin.ros import convert_field, convert_past
 from lupin_twin.ros.convert_past import NotAnAnswerError
 from lupin_twin.runtime.estimate_rounds import ADVICE_S, Report, ReportRequest
-from lupin_twin.runtime.memory import journal_path
 from lupin_twin.runtime.workers import SMALL_S
 
 ResultT = TypeVar("ResultT")

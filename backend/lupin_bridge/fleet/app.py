@@ -112,8 +112,9 @@ class Fleet:
                 admission=self.admission,
                 cache=AnswerCache(_CACHE_BYTES),
             )
-            # Who may read has been looked at by then.
+            # Who may read has been looked at by then; who writes is looked at there.
             app = create_app(bridge, access=Access(access.policy))
+            app.state.access = access
             ready = asyncio.create_task(bridge.start(), name=f"open {name}")
             return Opened(source, bridge, app, ready)
 
@@ -249,9 +250,9 @@ def create_fleet_app(
     every = (*pages.router.routes, *status.router.routes)
     app.router.routes.extend(it for it in every if getattr(it, "path", "") in _AS_EVERYWHERE)
     # The last one added is the first to be asked.
-    app.add_middleware(Sites, pages=fleet.pages, page=SitePage(static_folder))
     app.add_middleware(PieceByPiece)
     app.add_middleware(ReadOnly)
+    app.add_middleware(Sites, pages=fleet.pages, page=SitePage(static_folder))
     app.add_middleware(AccessControl, access=access)
     app.add_middleware(BehindProxies, proxies=proxies)
     page = static_folder / "fleet.html"

@@ -20,7 +20,7 @@ from typing import Final, Literal, NamedTuple
 from urllib.parse import quote
 
 from lupin_bridge.settings import Settings, one_of
-from lupin_twin.runtime.memory import state_folder
+from lupin_twin.journal.beside import state_folder
 
 Role = Literal["viewer", "operator", "admin", "writer"]
 # What each may, the ones before it may too.

@@ -30,13 +30,12 @@ from lupin_bridge.judge.options import own_sensors
 from lupin_bridge.past import bodies
 from lupin_bridge.past.query import MAX_SECONDS, moment
 from lupin_twin.core.past import NotRemembered, PastRefused, seconds
-from lupin_twin.journal.beside import InUse, holder_of
+from lupin_twin.journal.beside import InUse, demo_journal_path, holder_of, journal_path
 from lupin_twin.journal.checking import Overview, RunExtent, find_all_damage, overview
 from lupin_twin.journal.queries import rows
 from lupin_twin.journal.rebuild import NotPossible, hear_interrupts, vacuum
 from lupin_twin.journal.retention import NotKnown, forget
 from lupin_twin.journal.schema import FILE_ERRORS, Empty, Foreign, open_named, says_damaged
-from lupin_twin.runtime.memory import demo_journal_path, journal_path
 from lupin_twin.runtime.process import INTERRUPTED
 
 ACTIONS: Final[Mapping[str, str]] = {

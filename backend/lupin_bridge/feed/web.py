@@ -24,11 +24,11 @@ from lupin_twin.core.past import NotRemembered, lasts, may_pass
 from lupin_twin.core.state import NANOSECONDS_PER_SECOND, Snapshot
 from lupin_twin.field.engine import FieldRefused, FieldRules
 from lupin_twin.field.explored import OccupancyMap
+from lupin_twin.journal.beside import journal_path
 from lupin_twin.journal.follow import Lot
 from lupin_twin.ros import convert_field, convert_past
 from lupin_twin.ros.convert_past import NotAnAnswerError
 from lupin_twin.runtime.estimate_rounds import Report, ReportRequest
-from lupin_twin.runtime.memory import journal_path
 
 ResultT = TypeVar("ResultT")
 

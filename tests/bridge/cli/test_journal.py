@@ -12,9 +12,9 @@ import pytest
 
 from lupin_bridge.cli.command import main
 from lupin_bridge.past import bodies
+from lupin_twin.journal.beside import demo_journal_path, journal_path
 from lupin_twin.journal.runs import Clock
 from lupin_twin.journal.schema import open_writer
-from lupin_twin.runtime.memory import demo_journal_path, journal_path
 from tests.support.journal import NOW, SECOND, is_whole, kept, look, pin, recording, scan
 from tests.support.waiting import PATIENCE_S, wait_for
 

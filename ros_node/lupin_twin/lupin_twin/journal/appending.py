@@ -16,6 +16,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Final, NamedTuple
 
+from lupin_twin.core.history import KNOWN_BY_NOTHING
 from lupin_twin.core.state import Flower
 from lupin_twin.journal.beside import Lock
 from lupin_twin.journal.hours import WrittenInspection, WrittenScan, count
@@ -42,8 +43,6 @@ from lupin_twin.journal.schema import (
 PURGED_SEQ: Final = "purged_seq"
 # The numbers go on from here at least: rows that had later ones are gone.
 LAST_SEQ: Final = "last_seq"
-# In the place of the stamp that was sent: a copy that nothing received again is taken for.
-KNOWN_BY_NOTHING: Final = -1
 # Groups kept at hand; past that they are looked up in the file again.
 _MAX_AT_HAND: Final = 100_000
 # Readings, flowers and rows that wait for `flush`: a few MB.

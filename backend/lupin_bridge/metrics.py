@@ -35,7 +35,7 @@ GAUGES: Final = {
 }
 # The same, each with a label of its own.
 LABELLED_GAUGES: Final = {
-    "lupin_outward_connected": ("channel", "1 while MQTT's broker, the webhook's receiver takes"),
+    "lupin_outward_connected": ("channel", "1 while the other side takes messages"),
     "lupin_estimate_trusted": (
         "sensor",
         "1 while its estimates are about as often right as they say; absent while nobody knows",

@@ -23,6 +23,7 @@ BENCHES = (
     "bench_page",
     "bench_past_page",
     "bench_house",
+    "bench_import",
     "bench_forward",
     "bench_fleet",
     "bench_overview",

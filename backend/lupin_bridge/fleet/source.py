@@ -19,6 +19,7 @@ from lupin_bridge.fleet.overview import Site
 from lupin_bridge.fleet.reader import Latest, Reported
 from lupin_bridge.fleet.watching import Watching
 from lupin_twin.core.journal_condition import Condition, JournalState
+from lupin_twin.core.notes import Note, NotesUnwritable
 from lupin_twin.core.parameters import TwinParameters
 from lupin_twin.core.past import NotRemembered
 from lupin_twin.field.engine import FieldRules
@@ -122,12 +123,12 @@ class SiteTwin(TwinSource):
                     self._has_read.set()
             except (NotRemembered, TwinUnavailableError) as error:
                 log.info("site %s is as it was: %s", self.site, error)
-                self._problem = f"The archive: {error}."
+                self._problem = _sentence(str(error))
                 await asyncio.sleep(_RETRY_S)
                 continue
             except Exception as error:  # nobody waits for this task, and the page depends on it
                 log.exception("site %s is as it was", self.site)
-                self._problem = f"The archive: {error}."
+                self._problem = _sentence(f"the archive cannot be read: {error}")
                 await asyncio.sleep(_RETRY_S)
                 continue
             await self._wake.wait()
@@ -148,7 +149,7 @@ class SiteTwin(TwinSource):
         site, is_live = self._site, self._is_live
         reported = self._reported
         archive = self._watching.archive
-        problem = self._problem if archive.is_reachable else f"The archive: {archive.message}."
+        problem = self._problem if archive.is_reachable else _sentence(archive.message)
         said = is_live, self._seq, problem
         if reported is None or not (is_live or said != self._said):
             return
@@ -227,6 +228,16 @@ class SiteTwin(TwinSource):
         """None: how right estimates were is counted by the twin."""
         raise NotRemembered(_NO_REPORT, is_lasting=True)
 
+    writes_notes = True
+
+    async def write_note(self, note: Note) -> Note:
+        """Into the site's log in the archive, where every replica reads it."""
+        try:
+            written: Note = await self._in_time(self._reading(note))
+        except NotRemembered as error:
+            raise NotesUnwritable(f"the note of {note.by} was not written: {error}") from error
+        return written
+
     async def now(self) -> Now:
         """What who looks back has to know of now."""
         reported = self._reported
@@ -243,6 +254,10 @@ class SiteTwin(TwinSource):
 def _newest_ns(reported: Reported) -> int:
     """The last moment of a simulation that every replica knows of."""
     return max((tag.last_observed_ns or 0 for tag in reported.snapshot.tags), default=0)
+
+
+def _sentence(message: str) -> str:
+    return f"{message[:1].upper()}{message[1:].rstrip('.')}."
 
 
 def _no_ros() -> Any:

@@ -15,6 +15,7 @@ from typing import Any, Final, Protocol, TypeVar, cast
 import orjson
 from fastapi import APIRouter, FastAPI, Request, Response
 from pydantic import BaseModel, ValidationError
+from starlette.requests import HTTPConnection
 from starlette.types import Receive, Scope, Send
 
 from lupin_bridge.access.accounts import AccountError, Person
@@ -87,7 +88,7 @@ def bridge_of(request: Request) -> Bridge:
     return cast("Bridge", request.app.state.bridge)
 
 
-def person_of(request: Request) -> Person | None:
+def person_of(request: HTTPConnection) -> Person | None:
     """Who makes a request, where that is known."""
     found: Person | None = request.scope["state"].get(PERSON_KEY)
     return found

@@ -67,8 +67,8 @@ test('what the twin does not hear is told with the remedy, to its end', () => {
   goLive(status({ input_problems: [`${why}; use TRANSIENT_LOCAL`, 'nothing has come yet'] }));
   render(<Troubles />);
   expect(lines()).toEqual([
-    `The twin does not receive everything that is published for it. ${why}; use TRANSIENT_LOCAL.`,
-    'The twin does not receive everything that is published for it. Nothing has come yet.',
+    `Not all data arrives here. ${why}; use TRANSIENT_LOCAL.`,
+    'Not all data arrives here. Nothing has come yet.',
   ]);
 });
 

@@ -41,7 +41,7 @@ export const MAP: In<typeof ENGLISH> = {
     'Cuánto suele equivocarse el mapa de color entre los puntos: cada punto se estima a partir de todos los demás y se compara con lo que midió de verdad.',
   legendErrorWorst: (tag, error) => `La mayor, en el punto ${tag}: ${error}.`,
   legendTransparent: 'Color más intenso: valor más alto. Sin color: el mínimo. Rayado: sin datos',
-  legendTransparentShort: 'Sin color: el mínimo. Rayado: sin datos',
+  legendMore: 'Detalles',
   legendHatched: 'Rayado: sin datos',
   legendOld: 'Pálido y rayado: lecturas demasiado antiguas',
   readoutOld: 'lecturas demasiado antiguas',

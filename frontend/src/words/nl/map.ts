@@ -43,7 +43,7 @@ export const MAP: In<typeof ENGLISH> = {
   legendErrorWorst: (tag, error) => `Het meest bij meetpunt ${tag}: ${error}.`,
   legendTransparent:
     'Sterkere kleur: hogere waarde. Geen kleur: laagste waarde. Gearceerd: geen gegevens',
-  legendTransparentShort: 'Geen kleur: laagste waarde. Gearceerd: geen gegevens',
+  legendMore: 'Details',
   legendHatched: 'Gearceerd: geen gegevens',
   legendOld: 'Bleek en gearceerd: metingen te oud',
   readoutOld: 'metingen te oud',

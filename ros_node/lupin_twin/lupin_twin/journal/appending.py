@@ -94,7 +94,7 @@ class Appender:
         self.last_seq = max(
             int(get_meta(connection, PURGED_SEQ) or 0),
             int(get_meta(connection, LAST_SEQ) or 0),
-            last_number(connection),
+            last_number(SiteLog(connection)),
             *(connection.execute(text).fetchone()[0] for text in newest),
             *(row[0] - 1 for row in connection.execute("SELECT begun_seq FROM run")),
         )

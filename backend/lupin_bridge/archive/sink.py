@@ -161,7 +161,7 @@ class Sink:
             for _, key, value in batch.rows.get("meta", ()):
                 if key.startswith(RECORD):
                     record = json.loads(value)
-                    gone = (record["tag"], record["seq"], record["what"] == "pose")
+                    gone = (_text(record["tag"]), record["seq"], record["what"] == "pose")
                     self._connection.execute("SELECT forget_tag(%s, %s, %s)", gone)
             self._put(batch.rows)
             for (run, since_ns), rows in batch.events.items():
@@ -194,4 +194,10 @@ class Sink:
         with self._connection.cursor() as cursor:
             for table, of_table in rows.items():
                 if of_table:
-                    cursor.executemany(_INSERT[table], of_table)
+                    values = ([_text(value) for value in row] for row in of_table)
+                    cursor.executemany(_INSERT[table], values)
+
+
+def _text(value: Any) -> Any:
+    """What PostgreSQL can hold: its text has no NUL, and a batch with one would never go in."""
+    return value.replace("\0", "\ufffd") if isinstance(value, str) else value

@@ -95,6 +95,12 @@ def test_the_same_question_has_the_same_answer(archive: Archive, journal: Path) 
         assert series(there, asked, NOW + 2 * DAY, "gh1") == series(here, asked, NOW + 2 * DAY)
 
 
+def test_a_nul_in_a_name_does_not_stop_its_site(archive: Archive, journal: Path) -> None:
+    kept(journal, [scan("a\0b", NOW, a=1.0), scan("c", NOW + SECOND, a=2.0)])
+    forward_once(archive, journal)
+    assert archive.select("SELECT DISTINCT tag FROM series ORDER BY tag") == [("a\ufffdb",), ("c",)]
+
+
 def test_more_rows_than_go_at_once(archive: Archive, journal: Path) -> None:
     kept(journal, [pin("1"), *scans(0, 6_000), *(look("7", NOW + n * HOUR) for n in range(600))])
     forward_once(archive, journal)

@@ -67,8 +67,8 @@ test('what the twin does not hear is told with the remedy, to its end', () => {
   goLive(status({ input_problems: [`${why}; use TRANSIENT_LOCAL`, 'nothing has come yet'] }));
   render(<Troubles />);
   expect(lines()).toEqual([
-    `The twin does not receive everything that is published for it. ${why}; use TRANSIENT_LOCAL.`,
-    'The twin does not receive everything that is published for it. Nothing has come yet.',
+    `Some data does not reach the twin. ${why}; use TRANSIENT_LOCAL.`,
+    'Some data does not reach the twin. Nothing has come yet.',
   ]);
 });
 
@@ -99,7 +99,7 @@ test.each([
   [
     'doubting',
     'Nothing is being recorded: the clock contradicts the recording.',
-    /when the clock is right/,
+    /when the clock is correct/,
   ],
   [
     'in_use',

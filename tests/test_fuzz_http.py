@@ -57,6 +57,9 @@ def test_every_answer_is_one_that_the_document_describes(case: Any, live: Bridge
     if answer.status_code == 414:  # the door's answer, whatever the route
         assert len(answer.request.url) - len(live.url) > MAX_TARGET_BYTES
         return
+    if answer.status_code == 413 and answer.request.method != "POST":  # no body is wanted there
+        assert answer.request.body
+        return
     case.validate_response(answer, excluded_checks=[positive_data_acceptance])
 
 

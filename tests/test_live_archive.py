@@ -1,4 +1,4 @@
-"""Twin, forwarder and PostgreSQL as whole processes, killed at random moments under load."""
+"""Twin, forwarder, PostgreSQL and page as whole processes, killed at random moments under load."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ import pytest
 from lupin_twin.journal.beside import mark_of
 from tests.support.archive import Archive, forwarder, rows_of, wait_until_equal
 from tests.support.archive_killing import RATE, count, kill_and_compare, twin
+from tests.support.fleet import fleet
 from tests.support.messages import scan
 from tests.support.postgres import Postgres, server
 from tests.support.processes import OFTEN, children_of, lupin_twin, url_of
@@ -40,6 +41,11 @@ def test_a_standby_that_is_promoted_is_gone_on_with_and_has_what_was_acknowledge
             wait_for(lambda: count(journal) > 0, "a journal")
             following = stack.enter_context(forwarder(archive, journal))
             wait_for(lambda: len(archive.rows()["scan"]) > 2 * RATE, "rows in both")
+            archive.add_user("page", "lupin_page")
+            readers = archive.of_site("gh1")
+            readers.hosts = [primary.folder, standby.folder]
+            page = stack.enter_context(fleet(readers))
+            page.site(is_live=True)
             primary.kill()
             following.wait_for_output("is not forwarded: the archive cannot be reached")
             acknowledged = int(mark_of(journal).read_text().split()[1])
@@ -52,6 +58,8 @@ def test_a_standby_that_is_promoted_is_gone_on_with_and_has_what_was_acknowledge
             wait_for(
                 lambda: archive.select("SELECT max(seq) FROM scan")[0][0] > missing, "new rows"
             )
+            page.site(is_live=True)
+            assert page.http.get("/readyz").status_code == 200
             took_s = time.monotonic() - begun_s
             recording.communicate()
             wait_until_equal(archive, journal)

@@ -120,15 +120,11 @@ def test_map_and_inputs_come_as_they_were_published(house: Bridge) -> None:
 def test_what_writes_is_refused(house: Bridge) -> None:
     told = play(house.url, "write")
     assert [status["msg"].partition(":")[0] for status in told["told"]] == [
-        "advertise is refused",
-        "publish is refused",
-        "unadvertise is refused",
-        "advertise_service is refused",
-        "auth is refused",
+        f"op '{name}' is refused"
+        for name in ("advertise", "publish", "unadvertise", "advertise_service", "auth")
     ]
     assert {status["level"] for status in told["told"]} == {"error"}
     assert told["told"][1]["id"].startswith("publish:/cmd_vel:"), "roslib's own id comes back"
-    assert told["afterLevelNone"] == []
     house.peer.spin_briefly()
     assert house.peer.node.count_publishers("/cmd_vel") == 0
 

@@ -26,6 +26,7 @@ from lupin_bridge.routes import (
     observations,
     pages,
     past,
+    push,
     report,
     sockets,
     state,
@@ -49,6 +50,7 @@ ROUTED = (
     export,
     status,
     notes,
+    push,
     observations,
     pages,
 )
@@ -135,6 +137,7 @@ FRAMES = (
     schema.Alarms,
     people_schema.NoteDraft,
     people_schema.ObservationDraft,
+    people_schema.PushSubscription,
 )
 
 

@@ -18,7 +18,7 @@ from lupin_bridge.alarms.ledger import Change
 from lupin_bridge.alarms.notes import NoteBoard
 from lupin_bridge.feed.estimates import EstimateFollower, Reports
 from lupin_bridge.feed.shared_work import Shared
-from lupin_bridge.feed.source import CacheCounts, TwinSource, TwinUpdate
+from lupin_bridge.feed.source import TwinSource, TwinUpdate
 from lupin_bridge.judge.judging import NOTHING_JUDGED, Judge, Judged, silenced, unjudged
 from lupin_bridge.judge.options import Criteria
 from lupin_bridge.metrics import Metrics, Sample
@@ -264,7 +264,6 @@ class Bridge:
     def _measure(self) -> Iterator[Sample]:
         hub, source, status = self.hub, self.source, self.status
         tags = () if self._latest is None else self._latest.snapshot.tags
-        cache = CacheCounts() if self._latest is None else self._latest.cache
         journal = source.journal()
         yield "lupin_clients", len(hub)
         yield "lupin_clients_blocked", hub.blocked
@@ -294,10 +293,6 @@ class Bridge:
         yield "lupin_fields_computing", self.admission.being_computed
         yield "lupin_exports_running", self.admission.exporting
         yield "lupin_work_abandoned", source.workers.abandoned
-        yield "lupin_field_cache_hits", cache.hits
-        yield "lupin_field_cache_misses", cache.misses
-        yield "lupin_field_cache_entries", cache.entries
-        yield "lupin_field_cache_bytes", cache.bytes
         if journal.state == "unknown":  # nobody knows: no zeros
             return
         yield "lupin_journal_recording", journal.state == "recording"

@@ -5,11 +5,12 @@ A line that cannot be written ends no work and changes no exit code: the files c
 
 from __future__ import annotations
 
-import os
 import sys
 import time
 from contextlib import suppress
 from typing import Final, TextIO
+
+from lupin_twin.runtime.process import discard_output
 
 _AGAIN_AFTER_S: Final = 0.5
 
@@ -60,20 +61,6 @@ def _written(stream: TextIO | None, text: str) -> Exception | None:
         stream.flush()
     except (OSError, ValueError) as error:  # ValueError: somebody has closed it
         with suppress(OSError, ValueError):
-            _empty(stream)
+            discard_output(stream)  # or Python would try once more as it ends, and complain
         return error
     return None
-
-
-def _empty(stream: TextIO) -> None:
-    """Throw away what waits in it: Python would try once more as it ends, and complain."""
-    number = stream.fileno()
-    there = os.dup(number)
-    nowhere = os.open(os.devnull, os.O_WRONLY)
-    try:
-        os.dup2(nowhere, number)
-        stream.flush()
-    finally:
-        os.dup2(there, number)
-        os.close(there)
-        os.close(nowhere)

@@ -28,8 +28,6 @@ GAUGES: Final = {
     "lupin_alarms_active": "alarms that are active",
     "lupin_fields_computing": "field requests being computed now",
     "lupin_exports_running": "exports being sent now",
-    "lupin_field_cache_entries": "fields in the cache",
-    "lupin_field_cache_bytes": "memory of the fields in the cache",
     "lupin_journal_recording": "1 while the journal keeps what is observed, as promised",
     "lupin_journal_rows_waiting": "observations that are not in the journal yet",
     "lupin_journal_behind_seconds": "for how long the oldest of those has been waiting",
@@ -37,7 +35,7 @@ GAUGES: Final = {
 }
 # The same, each with a label of its own.
 LABELLED_GAUGES: Final = {
-    "lupin_outward_connected": ("channel", "1 while MQTT's broker, the webhook's receiver takes"),
+    "lupin_outward_connected": ("channel", "1 while the other side takes messages"),
     "lupin_estimate_trusted": (
         "sensor",
         "1 while its estimates are about as often right as they say; absent while nobody knows",
@@ -57,8 +55,6 @@ COUNTERS: Final = {
     "lupin_alarms_raised": "alarms raised since the start; those of the past are not counted",
     "lupin_ros_callback_errors": "errors met by ROS callbacks",
     "lupin_judge_errors": "errors met in judging a tag or a state, whose status is then unknown",
-    "lupin_field_cache_hits": "fields served from the cache",
-    "lupin_field_cache_misses": "fields that had to be computed",
     "lupin_work_abandoned": "computations that were ended because nobody waited any more",
     "lupin_journal_rows": "observations written to the journal",
     "lupin_journal_rows_lost": "observations given up because the journal could not be written",
@@ -80,8 +76,7 @@ HISTOGRAMS: Final = {
     "lupin_push_seconds": (
         "from a change in the ROS thread until every ready client has been written its frame"
     ),
-    "lupin_field_seconds": "until a field is there: from the cache, computed, or asked for",
-    "lupin_estimate_seconds": "until an estimate is there and written",
+    "lupin_field_seconds": "until a field is computed and written",
 }
 
 # From a millisecond to the time-out of a field.
@@ -103,7 +98,6 @@ class Metrics(Collector):
         ProcessCollector(registry=self._registry)
         self.push_seconds = self._histogram("lupin_push_seconds")
         self.field_seconds = self._histogram("lupin_field_seconds")
-        self.estimate_seconds = self._histogram("lupin_estimate_seconds")
         self.http_seconds = Histogram(
             "lupin_http_seconds",
             "from a request until its answer began",

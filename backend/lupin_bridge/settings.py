@@ -130,6 +130,15 @@ class Settings:
         "", "webhook", "file with the secret that signs them, a line of text"
     )
     webhook_ca: str = _setting("", "webhook", "PEM file with who signs the receiver's certificate")
+    push_contact: str = _setting(
+        "",
+        "push",
+        "turns on Web Push, and is whom push services write to if it goes wrong, such as "
+        "mailto:grower@example.org",
+    )
+    push_private_host: tuple[str, ...] = _setting(
+        (), "push", "a push service of your own, which may be in a private network, may be repeated"
+    )
     report_at: str = _setting(
         "",
         "report",

@@ -1,5 +1,6 @@
 // The page itself and its files, for when the bridge cannot be reached: the page then opens and says
-// so. Everything else goes past this script, so data is never kept and never old.
+// so. Everything else goes past this script, so data is never kept and never old. It also shows the
+// notifications that the bridge pushes while the page is closed.
 const SCOPE = self.registration.scope;
 const CACHE = `lupin-shell ${SCOPE}`;
 
@@ -41,4 +42,21 @@ async function file(request) {
   const response = await fetch(request);
   if (response.ok) await cache.put(request, response.clone());
   return response;
+}
+
+self.addEventListener('push', (event) => {
+  const { title, body } = event.data.json();
+  event.waitUntil(
+    self.registration.showNotification(title, { body, tag: 'lupin-twin.alarms', renotify: true }),
+  );
+});
+
+self.addEventListener('notificationclick', (event) => {
+  event.notification.close();
+  event.waitUntil(show());
+});
+
+async function show() {
+  const pages = await self.clients.matchAll({ type: 'window' });
+  await (pages.length > 0 ? pages[0].focus() : self.clients.openWindow(SCOPE));
 }

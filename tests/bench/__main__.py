@@ -10,7 +10,6 @@ from tests.support.state_home import use_own
 # In the order of the way through the system: field, truth, tick, journal, past, bridge, page.
 BENCHES = (
     "bench_field",
-    "bench_truth",
     "bench_estimate",
     "bench_estimate_checks",
     "bench_estimate_many",
@@ -24,6 +23,7 @@ BENCHES = (
     "bench_page",
     "bench_past_page",
     "bench_house",
+    "bench_import",
     "bench_forward",
     "bench_fleet",
     "bench_overview",

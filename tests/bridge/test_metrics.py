@@ -49,9 +49,6 @@ def test_every_metric_is_there_and_follows_what_happens(domain: int) -> None:
             wait_for(lambda: scrape(url)["lupin_tags"] == 2.0, "both tags")
             for suffix in ("json", "npy", "json"):
                 httpx.get(f"{url}/api/field.{suffix}", params=CO2, timeout=PATIENCE_S)
-            # Counts of the cache come with the twin's next update, a heartbeat at the latest.
-            hits = "lupin_field_cache_hits_total"
-            wait_for(lambda: scrape(url)[hits] == 1.0, "the counts of the cache")
             after = scrape(url)
             text = httpx.get(f"{url}/metrics", timeout=PATIENCE_S).text
             assert 'lupin_dropped_total{reason="frame"} 2.0' in text
@@ -64,9 +61,6 @@ def test_every_metric_is_there_and_follows_what_happens(domain: int) -> None:
         assert after["lupin_bytes_sent_total"] > 100.0
         assert after["lupin_push_seconds_count"] > before["lupin_push_seconds_count"]
         assert after["lupin_field_seconds_count"] == 2.0
-        assert after["lupin_field_cache_misses_total"] == 1.0
-        assert after["lupin_field_cache_hits_total"] == 1.0
-        assert after["lupin_field_cache_bytes"] > 0.0
         assert (after["lupin_ros_thread_alive"], after["lupin_twin_live"]) == (1.0, 1.0)
         assert after["lupin_state_age_seconds"] < 3.0
         assert after["lupin_ros_callback_errors_total"] == 0.0

@@ -19,7 +19,7 @@ DOCUMENT: dict[str, Any] = json.loads(document())
 def test_it_lists_every_route_of_the_contract_and_none_besides() -> None:
     described = {route for route, documented in ROUTES.items() if documented}
     # For people, and for programs, alone: see test_people and test_observations.
-    described |= {"/api/notes/{note_id}", "/api/audit", "/api/observations"}
+    described |= {"/api/notes/{note_id}", "/api/audit", "/api/observations", "/api/push"}
     assert set(DOCUMENT["paths"]) == described
 
 
@@ -28,6 +28,7 @@ def test_every_route_is_described_for_get_alone_but_those_that_write() -> None:
         "/api/notes": ["get", "post"],
         "/api/notes/{note_id}": ["delete"],
         "/api/observations": ["post"],
+        "/api/push": ["get", "post"],
     }
     for path, operations in DOCUMENT["paths"].items():
         assert list(operations) == written.get(path, ["get"]), path

@@ -280,13 +280,23 @@ def test_an_archive_without_greenhouses_and_one_that_is_down(browser: Browser) -
         with fleet(archive) as served, opened(browser, served.url) as page:
             expect(page.get_by_role("main")).to_contain_text("No greenhouse is forwarded")
             picture(page, "empty")
+            archive.do(
+                "INSERT INTO site VALUES ('gh1', '');"
+                "INSERT INTO forwarder VALUES ('gh1', 'm', 1, now(), now() + INTERVAL '1 hour')"
+            )
+            card = page.locator(".fleet-site")
+            expect(card).to_have_attribute("data-live", "true")
             own.stop()
             expect(page.get_by_role("alert")).to_contain_text("The archive has not answered since")
+            expect(card).to_contain_text("As of")
+            expect(card).to_have_attribute("data-live", "false")
             own.start()
             expect(page.get_by_role("alert")).to_be_hidden()
             picture(page, "down")
             served.process.freeze()
             expect(page.get_by_role("alert")).to_contain_text("No connection to the server since")
+            expect(card).to_contain_text("As of")
+            expect(card).to_have_attribute("data-live", "false")
             served.process.thaw()
             expect(page.get_by_role("alert")).to_be_hidden()
 

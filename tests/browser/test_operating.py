@@ -37,7 +37,7 @@ def test_a_sensor_has_its_colours_words_legend_and_column(hmi: Hmi) -> None:
     expect(legend).to_contain_text("Humidity %")
     expect(chosen).to_have_attribute("data-column", "humidity")
     expect(hmi.test_id("range-low")).to_have_text("40.0")
-    expect(hmi.test_id("range-high")).to_have_text("75.0\u00a0%")
+    expect(hmi.test_id("range-high")).to_have_text("85.0\u00a0%")
     hmi.expect_change(before)
     # At the tag with the most humid air: a clear blue where temperature's red was not.
     hmi.expect_pixels(lambda pixel: pixel[2] > pixel[0] + 50, (3.3, 3.3), what="a clear blue")
@@ -61,7 +61,7 @@ def test_a_range_is_fixed_within_reason_and_fahrenheit_is_kept(hmi: Hmi) -> None
     expect(hmi.test_id("range-high")).to_have_text("26.0\u00a0°C")
     # A look at another sensor and back is what it is for.
     hmi.page.keyboard.press("2")
-    expect(hmi.test_id("range-high")).to_have_text("75.0\u00a0%")
+    expect(hmi.test_id("range-high")).to_have_text("85.0\u00a0%")
     hmi.page.keyboard.press("1")
     expect(hmi.test_id("range-high")).to_have_text("26.0\u00a0°C")
     hmi.page.get_by_role("radio", name="Auto").check()

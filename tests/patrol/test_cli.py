@@ -14,16 +14,6 @@ from tests.support.processes import Process
 from tests.support.waiting import wait_for
 
 
-def test_defaults() -> None:
-    options = parse([])
-    assert (options.speed, options.day_speed, options.seed, options.once) == (1.0, 60.0, 0, False)
-
-
-def test_options_are_read() -> None:
-    options = parse(["--speed", "20", "--day-speed", "0", "--seed", "7", "--once"])
-    assert (options.speed, options.day_speed, options.seed, options.once) == (20.0, 0.0, 7, True)
-
-
 @pytest.mark.parametrize(
     ("option", "value", "limits"),
     [

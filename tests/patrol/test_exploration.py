@@ -49,12 +49,6 @@ def everywhere(greenhouse: Greenhouse) -> list[Point]:
     ]
 
 
-def test_at_first_nothing_is_known() -> None:
-    grid = Exploration(HALL).snapshot()
-    assert known_in(grid) == 0
-    assert set(np.frombuffer(grid.cells, dtype=np.int8)) == {UNKNOWN}
-
-
 def test_the_grid_covers_the_house_and_a_ring_of_wall() -> None:
     grid = Exploration(read_greenhouse(GreenhouseSimulator())).snapshot()
     assert (grid.width, grid.height, grid.resolution_m) == (82, 162, 0.05)
@@ -76,25 +70,10 @@ def test_a_complete_map_has_tables_and_walls_and_else_free_floor() -> None:
             assert cell(grid, (x, y)) == (FREE if is_floor else OCCUPIED), (x, y)
 
 
-def test_the_robot_sees_floor_table_and_wall_around_it() -> None:
-    grid = explored_from(LEFT)
-    assert cell(grid, (0.8, 1.6)) == FREE
-    assert cell(grid, (1.55, 1.5)) == OCCUPIED  # the table's near edge
-    assert cell(grid, (1.95, 1.5)) == OCCUPIED  # and its far one: it is seen from above
-    assert cell(grid, (-0.025, 1.5)) == OCCUPIED  # the wall
-
-
 def test_what_stands_behind_a_table_is_hidden() -> None:
     grid = explored_from(LEFT)
     assert cell(grid, (2.2, 1.5)) == UNKNOWN
     assert cell(grid, (2.2, 2.9)) == FREE  # past the table's end
-
-
-def test_a_table_is_hidden_by_another_one() -> None:
-    behind = Table("behind", Rect(2.5, 1.3, 2.7, 1.7))
-    greenhouse = Greenhouse(HALL.interior, (*HALL.tables, behind), ())
-    assert cell(explored_from(LEFT, greenhouse=greenhouse), (2.6, 1.5)) == UNKNOWN
-    assert cell(explored_from((2.2, 1.5), greenhouse=greenhouse), (2.6, 1.5)) == OCCUPIED
 
 
 def test_nothing_is_known_beyond_the_view_radius() -> None:
@@ -106,34 +85,6 @@ def test_nothing_is_known_beyond_the_view_radius() -> None:
         assert dist((x, y), (0.5, 1.0)) <= VIEW_RADIUS_M
     assert cell(grid, (0.5 + VIEW_RADIUS_M - 0.1, 1.0)) == FREE
     assert cell(grid, (0.5 + VIEW_RADIUS_M + 0.1, 1.0)) == UNKNOWN
-
-
-def test_the_map_only_ever_grows() -> None:
-    exploration = Exploration(HALL)
-    before = np.frombuffer(exploration.snapshot().cells, dtype=np.int8)
-    for position in everywhere(HALL):
-        exploration.observe_from(position)
-        after = np.frombuffer(exploration.snapshot().cells, dtype=np.int8)
-        assert (after[before != UNKNOWN] == before[before != UNKNOWN]).all()
-        before = after
-
-
-def test_a_look_says_whether_it_showed_anything_new() -> None:
-    exploration = Exploration(HALL)
-    assert exploration.observe_from(LEFT)
-    assert not exploration.observe_from(LEFT)
-    for position in everywhere(HALL):
-        exploration.observe_from(position)
-    assert not exploration.observe_from((2.5, 2.5))
-
-
-def test_a_snapshot_does_not_change_any_more() -> None:
-    exploration = Exploration(HALL)
-    exploration.observe_from(LEFT)
-    snapshot = exploration.snapshot()
-    known = known_in(snapshot)
-    exploration.observe_from((2.5, 1.5))
-    assert known_in(snapshot) == known < known_in(exploration.snapshot())
 
 
 @pytest.mark.parametrize("extent", [3.0, 3.01, 2.99])

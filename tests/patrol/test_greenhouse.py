@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 from greenhouse_sim.simulator import GreenhouseSimulator
 
-from lupin_patrol.greenhouse import CLEARANCE_M, Greenhouse, Rect, Table, read_greenhouse
+from lupin_patrol.greenhouse import CLEARANCE_M, Greenhouse, read_greenhouse
 
 
 @pytest.fixture(scope="module")
@@ -38,12 +38,6 @@ def made_of(tmp_path: Path, tags: dict[str, Any], tables: dict[str, Any]) -> Gre
 
 def box(x0: float, y0: float, x1: float, y1: float) -> dict[str, float]:
     return {"x0": x0, "y0": y0, "x1": x1, "y1": y1}
-
-
-def test_the_default_greenhouse(greenhouse: Greenhouse) -> None:
-    assert greenhouse.interior == Rect(0.0, 0.0, 4.0, 8.0)
-    assert len(greenhouse.tables) == 10
-    assert greenhouse.tables[0] == Table("Table1", Rect(1.5, 7.3, 2.6, 7.55))
 
 
 def test_the_tags_are_the_simulators_with_the_sensors_they_carry(
@@ -79,18 +73,6 @@ def test_the_robot_fits_where_it_stops_and_faces_the_tag(
         assert CLEARANCE_M <= round(hypot(*away), 6) <= 0.4
 
 
-def test_free_means_the_clearance_from_tables_and_walls(tmp_path: Path) -> None:
-    greenhouse = made_of(tmp_path, {}, {"one": box(1.0, 1.0, 2.0, 2.0)})
-    assert greenhouse.is_free((0.2, 0.2))
-    assert greenhouse.is_free((0.8, 1.5))
-    assert greenhouse.is_free((3.8, 3.8))
-    assert not greenhouse.is_free((0.19, 2.0))
-    assert not greenhouse.is_free((3.0, 3.81))
-    assert not greenhouse.is_free((0.81, 1.5))
-    assert not greenhouse.is_free((1.5, 1.5))
-    assert not greenhouse.is_free((9.0, 9.0))
-
-
 def test_a_tag_faces_the_side_it_is_nearest_to(tmp_path: Path) -> None:
     tags = {
         "left": {"x": 1.02, "y": 1.5, "sensors": []},
@@ -100,12 +82,6 @@ def test_a_tag_faces_the_side_it_is_nearest_to(tmp_path: Path) -> None:
     assert greenhouse.tag("left").facing == (-1.0, 0.0)
     assert greenhouse.tag("left").stop == pytest.approx((0.6, 1.5))
     assert greenhouse.tag("top").facing == (0.0, 1.0)
-
-
-def test_a_tag_at_a_corner_faces_the_side_with_more_room(tmp_path: Path) -> None:
-    tags = {"corner": {"x": 1.0, "y": 1.0, "sensors": []}}
-    tables = {"one": box(1.0, 1.0, 2.0, 2.0), "left of it": box(0.0, 0.0, 0.5, 4.0)}
-    assert made_of(tmp_path, tags, tables).tag("corner").facing == (0.0, -1.0)
 
 
 def test_in_a_narrow_aisle_the_robot_stops_closer(tmp_path: Path) -> None:

@@ -78,11 +78,6 @@ def test_another_seed_gives_other_events(first_pass: list[Event]) -> None:
     assert played(seed=1) != first_pass
 
 
-def test_time_never_goes_back(patrol: list[Event]) -> None:
-    assert all(a.at_s <= b.at_s for a, b in pairwise(patrol))
-    assert patrol[0].at_s == 0.0
-
-
 # --- the map -------------------------------------------------------------------------------------
 
 
@@ -105,30 +100,7 @@ def test_the_whole_house_is_known_after_one_pass_and_the_map_is_silent_then(
     assert last.at_s <= only(PassCompleted, patrol)[0].at_s
 
 
-def test_what_was_seen_since_the_last_map_is_published_at_the_end_of_the_pass(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    monkeypatch.setattr("lupin_patrol.mission._MAP_PERIOD_S", 1e9)
-    first, last = only(MapGrown, played())
-    assert first.at_s == 0.0
-    assert known_in(last.grid) == len(last.grid.cells)
-
-
 # --- discovery -----------------------------------------------------------------------------------
-
-
-def test_every_list_of_tags_holds_all_that_came_before(patrol: list[Event]) -> None:
-    lists = [event.sightings for event in only(TagsDiscovered, patrol)]
-    for before, after in pairwise(lists):
-        assert [s.tag for s in after[: len(before)]] == [s.tag for s in before]
-        assert all(a.sightings >= b.sightings for a, b in zip(after, before, strict=False))
-    assert len(lists[-1]) == 29
-
-
-def test_tags_are_discovered_on_the_way_and_not_all_at_once(first_pass: list[Event]) -> None:
-    counts = [len(event.sightings) for event in only(TagsDiscovered, first_pass)]
-    assert len(counts) > 10
-    assert counts[0] < 4
 
 
 def test_a_tag_is_discovered_before_it_is_tried(many_first_passes: list[list[Event]]) -> None:
@@ -295,7 +267,3 @@ def test_the_day_goes_on_at_its_own_speed_and_wraps_at_midnight() -> None:
             (START_OF_DAY_S + 1_000.0 * scan.at_s) % 86_400.0
         )
     assert any(later.time_of_day_s < earlier.time_of_day_s for earlier, later in pairwise(scans))
-
-
-def test_a_day_may_stand_still() -> None:
-    assert {s.time_of_day_s for s in only(TagScanned, played(day_speed=0.0))} == {START_OF_DAY_S}

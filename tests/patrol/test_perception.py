@@ -43,11 +43,6 @@ def test_a_tag_is_seen_from_near_and_from_its_front(position: Point, expected: b
     assert sees(position) is expected
 
 
-def test_a_table_in_between_hides_a_tag() -> None:
-    post = Table("post", Rect(0.5, 1.45, 0.6, 1.55))
-    assert not sees(in_front(0, 0.8), Greenhouse(HALL.interior, (TABLE, post), (TAG,)))
-
-
 def test_a_tag_is_new_once_and_counted_each_time() -> None:
     detector = TagDetector(HALL, Plants(HALL, 0), 0)
     assert detector.sightings() == ()

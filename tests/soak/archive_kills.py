@@ -1,4 +1,4 @@
-"""kill -9 of PostgreSQL, forwarders and twins at 50 random moments; the suite keeps six of them."""
+"""kill -9 of PostgreSQL, forwarders, twins and pages at 50 random moments; the suite keeps six."""
 
 from __future__ import annotations
 
@@ -24,5 +24,8 @@ def main() -> bool:
         except AssertionError as error:
             print(f"not the same rows: {error}", flush=True)
             return False
-    print(f"in {time.monotonic() - begun_s:.0f} s: {rows:,} scans, the same in both")
+    print(
+        f"in {time.monotonic() - begun_s:.0f} s: {rows:,} scans, "
+        "the same in journals, archive and page"
+    )
     return True

@@ -1,10 +1,12 @@
-"""PostgreSQL, forwarders and twins of two sites under load, killed one after the other at random.
+"""PostgreSQL, forwarders, twins and replicas of the page, killed one after the other at random.
 
 The suite keeps a few kills, `make soak` has fifty.
 """
 
 from __future__ import annotations
 
+import csv
+import io
 import random
 import subprocess
 import sys
@@ -13,10 +15,11 @@ from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
 from tests.support.archive import Archive, forwarder, run, wait_until_equal
+from tests.support.fleet import fleet
 from tests.support.journal import select
 from tests.support.postgres import Postgres
 from tests.support.processes import Process
-from tests.support.waiting import wait_for
+from tests.support.waiting import PATIENCE_S, wait_for
 
 # Scans a second of each twin, and how many of them between two kills at most.
 RATE = 150
@@ -82,6 +85,32 @@ class Site:
         assert self.forwarder.exit_code is None
 
 
+class Replica:
+    """A page over all sites; it ends with `stack`."""
+
+    def __init__(self, archive: Archive, stack: ExitStack) -> None:
+        archive.add_user("page", "lupin_page")
+        self._archive = archive
+        self._stack = stack
+        self._page = stack.enter_context(fleet(archive))
+
+    def kill(self) -> None:
+        """Kill it, and start another."""
+        self._page.process.kill()
+        self._page = self._stack.enter_context(fleet(self._archive))
+
+    def wait_for_scans(self, site: str, count: int) -> None:
+        """Wait until its export has so many scans of a site."""
+
+        def exported() -> bool:
+            answer = self._page.http.get("/api/export.csv", params={"sites": site})
+            rows = csv.DictReader(io.StringIO(answer.text))
+            return answer.status_code == 200 and sum(row["sensor"] == "b" for row in rows) == count
+
+        # After many kills it is a large file.
+        wait_for(exported, f"{count} scans of {site} on the page", 10 * PATIENCE_S)
+
+
 def kill_and_compare(postgresql: Postgres, folder: Path, moments: int, seed: int) -> int:
     """Kill at so many moments; returns how many scans archive and journals have, which are equal.
 
@@ -95,7 +124,8 @@ def kill_and_compare(postgresql: Postgres, folder: Path, moments: int, seed: int
         first = Archive(postgresql, "gh1")
         archives = [first, first.of_site("gh2")]
         sites = [Site(archive, folder / archive.site, stack) for archive in archives]
-        victims = ("forwarder", "postgres", "twin")
+        replicas = [Replica(first, stack) for _ in range(2)]
+        victims = ("forwarder", "postgres", "twin", "page")
         for moment in range(moments):
             site = chance.choice(sites)
             site.wait_for_more(chance.randrange(*_BETWEEN))
@@ -107,9 +137,15 @@ def kill_and_compare(postgresql: Postgres, folder: Path, moments: int, seed: int
                     postgresql.start()
                 case "twin":
                     site.kill_twin()
+                case "page":
+                    chance.choice(replicas).kill()
         for site in sites:
             site.end()
-            total += len(site.archive.rows()["scan"])
+            own = f"SELECT count(*) FROM scan WHERE site = '{site.archive.site}' AND is_copy = 0"
+            ((scans,),) = first.select(own)
+            for replica in replicas:
+                replica.wait_for_scans(site.archive.site, scans)
+            total += scans
         checked = run("archive", "check", "--archive-url", first.owner)
     assert checked.returncode == 0, checked.stdout
     return total

@@ -14,9 +14,10 @@ from typing import Any
 
 from hypothesis import strategies as st
 
+from lupin_twin.core.history import KNOWN_BY_NOTHING
 from lupin_twin.core.past import EVERY_TAG, Event, PastRow, SeriesPast, SeriesRequest
 from lupin_twin.core.state import NO_FLOWER, Pose, Reading
-from lupin_twin.journal.appending import KNOWN_BY_NOTHING, Appender
+from lupin_twin.journal.appending import Appender
 from lupin_twin.journal.retention import Limits, purge_step
 from lupin_twin.journal.rows import KIND_FLOWER, STATUS_OK, InspectionRow, PinRow, Row, ScanRow
 from lupin_twin.journal.runs import runs, spans

@@ -92,7 +92,8 @@ class Twin:
 
     def says(self, name: str = "t", tag: str = "7") -> tuple[float, float | None]:
         """A sensor's value and age, the same live and in the log."""
-        assert self.live == self.past()
+        # A clock that has just turned may not have its run in the log yet.
+        wait_for(lambda: self.live == self.past(), "the log to say what is known live")
         [reading] = [r for r in self.live[tag].readings if r.name == name]
         assert reading.observed_at_ns is not None
         return reading.value, (self.now_ns - reading.observed_at_ns) / S

@@ -1,4 +1,4 @@
-"""The file of accounts, tokens, sessions and the audit trail: SQLite, apart from every journal.
+"""The file of people: accounts, tokens, sessions, devices, the audit trail. SQLite, of mode 600.
 
 Nothing of it is exported, followed or forwarded. A password is kept as its argon2id hash (RFC 9106,
 by argon2-cffi), a token and a session's cookie as SHA-256: they are 256 random bits, so nothing
@@ -11,7 +11,7 @@ import os
 import re
 import secrets
 import sqlite3
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import closing, contextmanager
 from dataclasses import dataclass
 from hashlib import sha256
@@ -20,7 +20,7 @@ from typing import Final, Literal, NamedTuple
 from urllib.parse import quote
 
 from lupin_bridge.settings import Settings, one_of
-from lupin_twin.runtime.memory import state_folder
+from lupin_twin.journal.beside import state_folder
 
 Role = Literal["viewer", "operator", "admin", "writer"]
 # What each may, the ones before it may too.
@@ -37,7 +37,10 @@ _MAX_AUDITED: Final = 100_000
 MIN_PASSWORD: Final = 10
 MAX_PASSWORD: Final = 512
 
-_VERSION: Final = 1
+# Devices that one name may have notified.
+MAX_DEVICES: Final = 10
+
+_VERSION: Final = 2
 _APPLICATION_ID: Final = 0x4C555041  # "LUPA"
 _TABLES: Final = """
 BEGIN;
@@ -58,9 +61,21 @@ CREATE TABLE audit (
 ) STRICT;
 INSERT INTO meta VALUES ('id', lower(hex(randomblob(8))));
 """
+# From each version to the next. `sites`: the names, a line each; none: all sites.
+_MIGRATIONS: Final = (
+    """
+    ALTER TABLE person ADD COLUMN sites TEXT NOT NULL DEFAULT '';
+    CREATE TABLE device (
+        endpoint TEXT PRIMARY KEY, name TEXT NOT NULL REFERENCES person ON DELETE CASCADE,
+        public_key TEXT NOT NULL, secret TEXT NOT NULL, language TEXT NOT NULL,
+        made_at_s INTEGER NOT NULL
+    ) STRICT;
+    CREATE INDEX device_of ON device (name);
+    """,
+)
 _NAME: Final = re.compile(r"[A-Za-z0-9][A-Za-z0-9._@+-]{0,63}")
 _OF_SESSION: Final = (
-    "SELECT person.name, role, ends_at_s FROM session JOIN person USING (name)"
+    "SELECT person.name, role, sites, ends_at_s FROM session JOIN person USING (name)"
     " WHERE id = ? AND ends_at_s > ?"
 )
 
@@ -73,20 +88,26 @@ class AccountError(Exception):
 class Person:
     """Who makes a request, what they may, and how that is known.
 
-    `session` is its id in the file; `ends_at_s` when it ends, s since the epoch. `token` is the
-    digest of the one that a request came with.
+    `session` is its id; `ends_at_s` when it ends, s since the epoch. `token` is the digest of the
+    one that a request came with. `name` is empty for the shared token. `sites` are those whose data
+    they may read, empty: all.
     """
 
     name: str
     role: Role
-    by: Literal["account", "token", "proxy"] = "account"
+    by: Literal["account", "token", "proxy", "shared token"] = "account"
     session: str = ""
     ends_at_s: int = 0
     token: str = ""
+    sites: tuple[str, ...] = ()
 
     def may(self, role: Role) -> bool:
         """Whether that role's rights are among theirs."""
         return self.role in ROLES and ROLES.index(self.role) >= ROLES.index(role)
+
+    def reads(self, site: str) -> bool:
+        """Whether the data of a site are for them; "": a bridge without a name of its site."""
+        return not self.sites or site in self.sites
 
 
 class Listed(NamedTuple):
@@ -95,6 +116,16 @@ class Listed(NamedTuple):
     name: str
     role: str
     made_at_s: int
+    sites: str
+
+
+class Device(NamedTuple):
+    """A browser that wants notifications: its push service's address and its keys (RFC 8291)."""
+
+    endpoint: str
+    public_key: str
+    secret: str
+    language: str
 
 
 class Audited(NamedTuple):
@@ -136,6 +167,17 @@ def check_name(name: str) -> None:
         )
 
 
+def check_site(site: str) -> None:
+    """Refuse what can be no site's name in the archive.
+
+    Raises:
+        AccountError: it cannot.
+
+    """
+    if not site or len(site) > 64 or not site.isprintable():
+        raise AccountError(f"the site is {site[:80]!r}, must be 1 to 64 characters")
+
+
 def check_password(password: str) -> None:
     """Refuse what is too short or too long.
 
@@ -164,7 +206,7 @@ def make_file(path: Path) -> None:
             if connection.execute("PRAGMA page_count").fetchone() == (0,):
                 connection.execute("PRAGMA journal_mode = WAL")
                 connection.executescript(
-                    f"{_TABLES} PRAGMA user_version = {_VERSION};"
+                    f"{_TABLES} PRAGMA user_version = 1;"
                     f" PRAGMA application_id = {_APPLICATION_ID}; COMMIT;"
                 )
     except (OSError, sqlite3.Error) as error:
@@ -207,8 +249,20 @@ class Accounts:
         if execute("PRAGMA application_id").fetchone() != (_APPLICATION_ID,):
             raise AccountError(f"{path} is no file of accounts")
         (version,) = execute("PRAGMA user_version").fetchone()
-        if version != _VERSION:
+        if version > _VERSION:
             raise AccountError(f"{path} is of version {version}, this is {_VERSION}")
+        if version < _VERSION:
+            self._migrate()
+
+    def _migrate(self) -> None:
+        connection = self._connection
+        connection.execute("BEGIN EXCLUSIVE")
+        with connection:
+            # Another bridge may have been quicker.
+            (version,) = connection.execute("PRAGMA user_version").fetchone()
+            for statement in ";".join(_MIGRATIONS[version - 1 :]).split(";"):
+                connection.execute(statement)
+            connection.execute(f"PRAGMA user_version = {_VERSION}")
 
     def close(self) -> None:
         """Let go of it."""
@@ -227,8 +281,20 @@ class Accounts:
 
     # --- accounts and tokens ------------------------------------------------------------------
 
-    def add(self, name: str, kind: Kind, role: Role, secret: str, *, by: str, now_s: int) -> None:
+    def add(
+        self,
+        name: str,
+        kind: Kind,
+        role: Role,
+        secret: str,
+        *,
+        by: str,
+        now_s: int,
+        sites: Sequence[str] = (),
+    ) -> None:
         """Add an account (`secret`: its password's hash, "": it signs in elsewhere) or a token.
+
+        `sites` are those that they may read; none: all.
 
         Raises:
             AccountError: there is one of that name, or it cannot be written.
@@ -242,9 +308,10 @@ class Accounts:
             found = connection.execute("SELECT kind FROM person WHERE name = ?", (name,)).fetchone()
             if found is not None:
                 raise AccountError(f"there is {found[0]} {name!r} already: remove it first")
-            row = (name, kind, role, secret, now_s)
-            connection.execute("INSERT INTO person VALUES (?, ?, ?, ?, ?)", row)
-            _audit(connection, Audited(now_s, by, f"add {kind}", f"{name} {role}", ""))
+            row = (name, kind, role, secret, now_s, "\n".join(sites))
+            connection.execute("INSERT INTO person VALUES (?, ?, ?, ?, ?, ?)", row)
+            subject = " ".join((name, role, *sites))
+            _audit(connection, Audited(now_s, by, f"add {kind}", subject, ""))
 
     def remove(self, name: str, kind: Kind, *, by: str, now_s: int) -> None:
         """Remove an account or a token, and end its sessions.
@@ -264,7 +331,7 @@ class Accounts:
     def listed(self, kind: Kind) -> list[Listed]:
         """All accounts or tokens, by name."""
         found = self._connection.execute(
-            "SELECT name, role, made_at_s FROM person WHERE kind = ? ORDER BY name", (kind,)
+            "SELECT name, role, made_at_s, sites FROM person WHERE kind = ? ORDER BY name", (kind,)
         )
         return [Listed(*row) for row in found]
 
@@ -273,28 +340,39 @@ class Accounts:
     def of_name(self, name: str) -> tuple[Person, str] | None:
         """An account and its password's hash."""
         found = self._connection.execute(
-            "SELECT role, secret FROM person WHERE name = ? AND kind = 'account'", (name,)
+            "SELECT role, secret, sites FROM person WHERE name = ? AND kind = 'account'", (name,)
         ).fetchone()
-        return None if found is None else (Person(name, found[0]), found[1])
+        if found is None:
+            return None
+        role, secret, sites = found
+        return Person(name, role, sites=_lines(sites)), secret
 
     def of_token(self, secret: str) -> Person | None:
         """Whose token it is, by its digest."""
         found = self._connection.execute(
-            "SELECT name, role FROM person WHERE secret = ? AND kind = 'token'", (secret,)
+            "SELECT name, role, sites FROM person WHERE secret = ? AND kind = 'token'", (secret,)
         ).fetchone()
-        return None if found is None else Person(found[0], found[1], by="token", token=secret)
+        if found is None:
+            return None
+        name, role, sites = found
+        return Person(name, role, by="token", token=secret, sites=_lines(sites))
 
     def of_session(self, session: str, now_s: float) -> Person | None:
         """Whose session it is, by its id in the file; None: it has ended."""
         found = self._connection.execute(_OF_SESSION, (session, int(now_s))).fetchone()
         if found is None:
             return None
-        return Person(found[0], found[1], session=session, ends_at_s=found[2])
+        name, role, sites, ends_at_s = found
+        return Person(name, role, session=session, ends_at_s=ends_at_s, sites=_lines(sites))
 
-    # --- sessions, and what was done ----------------------------------------------------------
+    # --- sessions -----------------------------------------------------------------------------
 
-    def begin_session(self, name: str, address: str, now_s: int) -> str:
+    def begin_session(
+        self, name: str, address: str, now_s: int, *, ends_others: bool = False
+    ) -> str:
         """A new session of an account or token, as its cookie has it.
+
+        `ends_others`: those that the name has end.
 
         Raises:
             AccountError: it has gone meanwhile, or nothing can be written.
@@ -307,11 +385,14 @@ class Accounts:
             connection.execute(
                 "DELETE FROM session WHERE id IN (SELECT id FROM session WHERE name = ?"
                 " ORDER BY ends_at_s DESC LIMIT -1 OFFSET ?)",
-                (name, _MAX_SESSIONS - 1),
+                (name, 0 if ends_others else _MAX_SESSIONS - 1),
             )
+            if ends_others:
+                connection.execute("DELETE FROM device WHERE name = ?", (name,))
             row = (digest(cookie), name, now_s + SESSION_S)
             connection.execute("INSERT INTO session VALUES (?, ?, ?)", row)
-            _audit(connection, Audited(now_s, name, "sign in", "", address))
+            subject = "and out everywhere else" if ends_others else ""
+            _audit(connection, Audited(now_s, name, "sign in", subject, address))
         return cookie
 
     def end_session(self, person: Person, address: str, now_s: int) -> None:
@@ -324,6 +405,67 @@ class Accounts:
         with self._writing() as connection:
             connection.execute("DELETE FROM session WHERE id = ?", (person.session,))
             _audit(connection, Audited(now_s, person.name, "sign out", "", address))
+
+    # --- devices that are notified ------------------------------------------------------------
+
+    def add_device(self, name: str, device: Device, address: str, now_s: int) -> None:
+        """Have a browser notified; of too many, the oldest makes room.
+
+        Raises:
+            AccountError: the account has gone meanwhile, or it cannot be written.
+
+        """
+        with self._writing() as connection:
+            known = connection.execute(
+                "DELETE FROM device WHERE endpoint = ? RETURNING name", (device.endpoint,)
+            ).fetchone()
+            connection.execute(
+                "DELETE FROM device WHERE endpoint IN (SELECT endpoint FROM device WHERE name = ?"
+                " ORDER BY made_at_s DESC LIMIT -1 OFFSET ?)",
+                (name, MAX_DEVICES - 1),
+            )
+            row = (device.endpoint, name, *device[1:], now_s)
+            connection.execute("INSERT INTO device VALUES (?, ?, ?, ?, ?, ?)", row)
+            if known != (name,):
+                _audit(connection, Audited(now_s, name, "add device", "", address))
+
+    def remove_device(self, endpoint: str, name: str = "") -> None:
+        """Notify it no more; `name`: only if it is theirs.
+
+        Raises:
+            AccountError: it cannot be written.
+
+        """
+        with self._writing() as connection:
+            connection.execute(
+                "DELETE FROM device WHERE endpoint = ? AND ? IN ('', name)", (endpoint, name)
+            )
+
+    def devices(self, site: str) -> list[Device]:
+        """Those of everybody who may read this site."""
+        found = self._connection.execute(
+            "SELECT endpoint, public_key, device.secret, language, sites FROM device"
+            " JOIN person USING (name) ORDER BY endpoint"
+        )
+        return [Device(*row) for *row, sites in found if not sites or site in _lines(sites)]
+
+    def kept(self, key: str, make: Callable[[], str]) -> str:
+        """A value of this file, made by whoever is first.
+
+        Raises:
+            AccountError: it cannot be written.
+
+        """
+        with self._writing() as connection:
+            get = "SELECT value FROM meta WHERE key = ?"
+            found = connection.execute(get, (key,)).fetchone()
+            if found is None:
+                found = (make(),)
+                connection.execute("INSERT INTO meta VALUES (?, ?)", (key, *found))
+        value: str = found[0]
+        return value
+
+    # --- what was done ------------------------------------------------------------------------
 
     def note(self, done: Audited) -> None:
         """Have it in the audit trail.
@@ -342,6 +484,10 @@ class Accounts:
             (most,),
         )
         return [Audited(*row) for row in found]
+
+
+def _lines(text: str) -> tuple[str, ...]:
+    return tuple(text.split("\n")) if text else ()
 
 
 def digest(secret: str) -> str:

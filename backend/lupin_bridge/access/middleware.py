@@ -20,13 +20,7 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from websockets.frames import CloseCode
 
 from lupin_bridge.access.accounts import WRITER, AccountError, Person, accounts_path
-from lupin_bridge.access.credentials import (
-    BrowserSession,
-    CookieTooLong,
-    Credentials,
-    Sessions,
-    cookies_of,
-)
+from lupin_bridge.access.credentials import SHARED, CookieTooLong, Credentials
 from lupin_bridge.access.people import People
 from lupin_bridge.access.policy import (
     PROXY_USER_KEY,
@@ -49,12 +43,14 @@ _READS: Final = ("GET", "HEAD")
 # of its own: for that, a script has to ask first (CORS preflight), and is not given leave.
 SIGN_IN: Final = "/api/signin"
 NOTES: Final = "/api/notes"
+PUSH: Final = "/api/push"
 # Takes no session: a token in a header is nothing that a browser sends along by itself.
 OBSERVATIONS: Final = "/api/observations"
 _METHODS: Final = {
     SIGN_IN: ("POST",),
     "/api/signout": ("POST",),
     NOTES: (*_READS, "POST"),
+    PUSH: (*_READS, "POST"),
     OBSERVATIONS: ("POST",),
 }
 OWN_HEADER: Final = "X-Lupin-Twin"
@@ -126,11 +122,14 @@ OPEN_PATHS: Final = frozenset({"/signin", "/signin.js", "/signin.css", "/healthz
 # `?lang=`, which the sign-in page goes by too.
 _LANGUAGE: Final = re.compile(r"[A-Za-z]{2,3}(?:-[A-Za-z0-9]{1,8}){0,2}")
 
-# In a request's state: the session that it was let in by, where it was one.
-SESSION_KEY: Final = "session"
-# And who makes it, where that is known.
+# Below these, a fleet has what is of one site alone.
+_OF_SITE: Final = re.compile(r"/(?:api/)?sites/(?P<site>[^/]*)")
+# What anybody needs who is known, whatever they may read.
+_OF_NO_SITE: Final = frozenset({"/api/session", "/api/signout"})
+
+# In a request's state: who makes it, where anybody has to say so.
 PERSON_KEY: Final = "person"
-# So soon after an account or its session has ended, what it has open ends too.
+# So soon after an account or a session has ended, what it has open ends too.
 _LOOK_S: Final = 2.0
 
 # Path and query. The longest that means something has a tag's name of a few hundred; each segment
@@ -146,24 +145,34 @@ _PREFLIGHT_MAX_AGE_S: Final = "600"
 
 @dataclass(frozen=True, slots=True)
 class Access:
-    """Who may read: the hosts and origins, the token if there is one, and people if there are any.
+    """Who may read: the hosts and origins, and the people; None: they have been asked already.
 
-    `secure`: the bridge serves TLS itself, so that its cookie may demand it.
+    `secure`: the bridge serves TLS itself, so that its cookie may demand it. `site` is the site
+    whose data this bridge has; a fleet has those of all sites.
     """
 
     policy: AccessPolicy = field(default_factory=AccessPolicy)
-    credentials: Credentials | None = None
     secure: bool = False
-    sessions: Sessions = field(default_factory=Sessions)
     people: People | None = None
+    site: str = ""
+    is_fleet: bool = False
 
     @property
     def is_closed(self) -> bool:
         """Whether whoever reads needs a right to."""
-        return self.credentials is not None or (self.people is not None and self.people.is_on)
+        return self.people is not None and self.people.is_on
+
+    def site_of(self, path: str) -> str | None:
+        """The one site that an address is about; None: none, or several."""
+        if path in _OF_NO_SITE:
+            return None
+        if not self.is_fleet:
+            return self.site
+        match = _OF_SITE.match(path)
+        return None if match is None else match["site"]
 
     @classmethod
-    def of(cls, settings: Settings, token: str | None) -> Self:
+    def of(cls, settings: Settings, token: str | None, *, is_fleet: bool = False) -> Self:
         """From the settings, and the token if there is one.
 
         Raises:
@@ -179,9 +188,14 @@ class Access:
             raise SettingError(f"{settings.called('allow_origin')}: {error}") from None
         return cls(
             policy,
-            None if token is None else Credentials(token, called),
             secure=bool(settings.tls_cert),
-            people=People(accounts_path(settings), settings.proxy_user_header),
+            people=People(
+                accounts_path(settings),
+                None if token is None else Credentials(token, called),
+                is_proxied=bool(settings.proxy_user_header),
+            ),
+            site=settings.site,
+            is_fleet=is_fleet,
         )
 
 
@@ -222,50 +236,34 @@ class AccessControl:
             except AccountError as error:
                 log.warning("%s: nobody is let in", error)
                 checked = _Refusal(503, "the accounts cannot be read", {"retry-after": "5"})
-            if (
-                isinstance(checked, Person)
-                and checked.role == WRITER
-                and path_of(scope) != OBSERVATIONS
-            ):
-                detail = f"{checked.name} is a writer: it posts to {OBSERVATIONS}, and no more"
-                checked = _Refusal(403, detail)
+            if not isinstance(checked, _Refusal):
+                checked = self._check_reach(checked, path_of(scope))
             if not isinstance(checked, _Refusal):
                 await self._pass_on(checked, scope, receive, send)
                 return
             refusal = checked
         await refusal.send(scope, receive, send)
 
+    def _check_reach(self, person: Person | None, path: str) -> _Refusal | Person | None:
+        """Whether somebody who is known may be here."""
+        if person is None:
+            return None
+        if person.role == WRITER and path != OBSERVATIONS:
+            detail = f"{person.name} is a writer: it posts to {OBSERVATIONS}, and no more"
+            return _Refusal(403, detail)
+        site = self._access.site_of(path)
+        if site is not None and not person.reads(site):
+            here = f"this is the site {site[:64]!r}" if site else "this bridge has no --site"
+            return _Refusal(403, f"{person.name} is for {', '.join(person.sites)}: {here}")
+        return person
+
     async def _pass_on(
-        self, session: BrowserSession | Person | None, scope: Scope, receive: Receive, send: Send
+        self, person: Person | None, scope: Scope, receive: Receive, send: Send
     ) -> None:
         scope = _without_cookies(scope)
-        if isinstance(session, Person):
-            await self._pass_on_person(session, scope, receive, send)
-            return
-        if session is None:
-            await self._app(scope, receive, send)
-            return
-        scope["state"] = {**scope.get("state", {}), SESSION_KEY: session}
-        if scope["type"] == "http":
-            await self._app(scope, receive, send)
-            return
-        connection: Connection = scope["state"][CONNECTION_KEY]
-
-        def close() -> None:
-            connection.dismiss(CloseCode.POLICY_VIOLATION, "the session has ended: sign in again")
-
-        timer = asyncio.get_running_loop().call_later(session.ends_s - time.time(), close)
-        try:
-            with self._access.sessions.holds(session, close):
-                await self._app(scope, receive, send)
-        finally:
-            timer.cancel()
-
-    async def _pass_on_person(
-        self, person: Person, scope: Scope, receive: Receive, send: Send
-    ) -> None:
-        scope["state"] = {**scope.get("state", {}), PERSON_KEY: person}
-        if scope["type"] == "http":
+        if person is not None:
+            scope["state"] = {**scope.get("state", {}), PERSON_KEY: person}
+        if person is None or person == SHARED or scope["type"] == "http":
             await self._app(scope, receive, send)
             return
         looking = asyncio.create_task(self._end_with(person, scope["state"][CONNECTION_KEY]))
@@ -283,40 +281,27 @@ class AccessControl:
             log.warning("%s: what %s had open is closed", error, person.name)
         connection.dismiss(CloseCode.POLICY_VIOLATION, "the session has ended: sign in again")
 
-    def _check_credentials(
-        self, request: HTTPConnection
-    ) -> _Refusal | BrowserSession | Person | None:
-        """The right that the request is let in by, None: it needs none, or why it is not."""
+    def _check_credentials(self, request: HTTPConnection) -> _Refusal | Person | None:
+        """Who makes the request, None: nobody has to say so here, or why it is not let in."""
         path, people = path_of(request.scope), self._access.people
-        if path in OPEN_PATHS or not self._access.is_closed:
+        if people is None or path in OPEN_PATHS or not people.is_on:
             return None
         named = request.scope.get("state", {}).get(PROXY_USER_KEY)
         header = request.headers.get("authorization")
-        if people is not None and named is not None:
+        if named is not None:
             return people.by_proxy(named) or _unauthorized("the proxy names nobody who can be")
         if header is not None:
-            return self._check_header(header, client_of(request))
-        if path == SIGN_IN and people is not None and people.has_file:
+            return self._check_header(people, header, client_of(request))
+        if path == SIGN_IN and people.has_file:
             return None  # by name and password, which the route looks at
         # A cookie is no guess: it cannot be made without the token, however often one tries.
         try:
-            right = self._right_by_cookie(request)
+            person = people.by_cookies(request.scope["headers"])
         except CookieTooLong as error:
             return _Refusal(431, str(error))
-        return right or _sign_in_first(request)
+        return person or _sign_in_first(request)
 
-    def _right_by_cookie(self, request: HTTPConnection) -> BrowserSession | Person | None:
-        credentials, people = self._access.credentials, self._access.people
-        if credentials is not None:
-            for value in cookies_of(credentials.cookie_name, request.scope["headers"]):
-                session = credentials.session_of(value, time.time())
-                if session is not None and not self._access.sessions.has_ended(session):
-                    return session
-        if people is None or not people.has_file:
-            return None
-        return people.by_cookies(cookies_of(people.cookie_name(), request.scope["headers"]))
-
-    def _check_header(self, header: str, client: str) -> _Refusal | Person | None:
+    def _check_header(self, people: People, header: str, client: str) -> _Refusal | Person:
         now_s = time.monotonic()
         wait_s = self._guesses.wait_s(client, now_s)
         if wait_s > 0.0:
@@ -326,14 +311,10 @@ class AccessControl:
                 "a minute: no token is looked at until Retry-After",
                 {"retry-after": str(math.ceil(wait_s))},
             )
-        credentials, people = self._access.credentials, self._access.people
-        if credentials is not None and credentials.accepts_header(header):
-            return None
         scheme, _, token = header.partition(" ")
-        if people is not None and scheme.lower() == "bearer":
-            person = people.by_token(token.strip())
-            if person is not None:
-                return person
+        person = people.by_token(token.strip()) if scheme.lower() == "bearer" else None
+        if person is not None:
+            return person
         self._guesses.take(client, now_s)
         log.warning("wrong token from %s", client)
         return _unauthorized("this is not the bridge's token, expected Authorization: Bearer")

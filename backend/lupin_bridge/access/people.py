@@ -1,4 +1,4 @@
-"""Who makes a request, by the file of accounts. Belongs to the event loop.
+"""Who makes a request, by the shared token and the file of people. Belongs to the event loop.
 
 What reads the file does so at once, some 20 µs. What writes it, or reckons a password, does so on
 one thread: argon2 takes 64 MB and a tenth of a second on purpose, so one at a time, and few wait.
@@ -15,11 +15,13 @@ import time
 from collections.abc import Callable, Iterable
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import closing
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final, TypeVar
 
 from lupin_bridge.access.accounts import (
     MAX_PASSWORD,
+    SESSION_S,
     AccountError,
     Accounts,
     Audited,
@@ -27,6 +29,7 @@ from lupin_bridge.access.accounts import (
     digest,
     is_name,
 )
+from lupin_bridge.access.credentials import SHARED, SHARED_SESSION_S, Credentials, cookies_of
 from lupin_bridge.rate_limit import RateLimit
 from lupin_bridge.serving.admission import AdmissionError
 
@@ -49,14 +52,17 @@ class PeopleBusy(AdmissionError):
 
 
 class People:
-    """`path` is the file of accounts; until it is there nobody has one. Once it was, it must be.
+    """`path` is the file of people; until it is there nobody has an account, then it must stay.
 
-    `user_header` is the header in which a trusted proxy names the person ("": none does).
+    `shared` is the shared token. `is_proxied`: a trusted proxy names the person.
     """
 
-    def __init__(self, path: Path, user_header: str = "") -> None:
+    def __init__(
+        self, path: Path, shared: Credentials | None = None, *, is_proxied: bool = False
+    ) -> None:
         self._path = path
-        self.user_header = user_header
+        self.shared = shared
+        self._is_proxied = is_proxied
         self._accounts: Accounts | None = None
         self._inode = 0
         self._thread = ThreadPoolExecutor(1, thread_name_prefix="accounts")
@@ -66,30 +72,29 @@ class People:
     @property
     def is_on(self) -> bool:
         """Whether whoever reads has to say who they are."""
-        return bool(self._accounts or self.user_header or self._path.exists())
+        return bool(self.shared or self._is_proxied or self.has_file)
 
     @property
     def has_file(self) -> bool:
         """Whether anybody can sign in here."""
         return self._accounts is not None or self._path.exists()
 
-    def cookie_name(self) -> str:
-        """Browsers keep one jar for all ports of a host, so each file has a cookie of its own.
+    def by_cookies(self, headers: Iterable[tuple[bytes, bytes]]) -> Person | None:
+        """Whose session it is, by the cookies of a request.
 
         Raises:
             AccountError: the file cannot be read.
+            CookieTooLong: there are too many.
 
         """
-        return f"lupin_person_{self._file().id[:8]}"
-
-    def by_cookies(self, cookies: Iterable[str]) -> Person | None:
-        """Whose session one of the cookies is.
-
-        Raises:
-            AccountError: the file cannot be read.
-
-        """
-        names, now_s = [digest(cookie) for cookie in cookies], time.time()
+        headers, now_s = tuple(headers), time.time()
+        if self.shared is not None:
+            for cookie in cookies_of(self.shared.cookie_name, headers):
+                if (person := self.shared.session_of(cookie, now_s)) is not None:
+                    return person
+        if not self.has_file:
+            return None
+        names = [digest(cookie) for cookie in cookies_of(self._cookie_name(), headers)]
 
         def find(accounts: Accounts) -> Person | None:
             found = (accounts.of_session(name, now_s) for name in names)
@@ -104,6 +109,8 @@ class People:
             AccountError: the file cannot be read.
 
         """
+        if self.shared is not None and self.shared.accepts(token):
+            return SHARED
         return self._ask(lambda it: it.of_token(digest(token))) if self.has_file else None
 
     def by_proxy(self, name: str) -> Person | None:
@@ -116,7 +123,8 @@ class People:
         if not is_name(name):
             return None
         found = self._ask(lambda it: it.of_name(name)) if self.has_file else None
-        return Person(name, "viewer" if found is None else found[0].role, by="proxy")
+        known = Person(name, "viewer") if found is None else found[0]
+        return replace(known, by="proxy")
 
     def still(self, person: Person) -> bool:
         """Whether a session or token is what it was as its connection began.
@@ -125,12 +133,25 @@ class People:
             AccountError: the file cannot be read.
 
         """
+        if person.by == "shared token":
+            return self.shared is not None and self.shared.still(person, time.time())
         if person.by == "proxy":
             return self.by_proxy(person.name) == person
         if person.session:
             return self._ask(lambda it: it.of_session(person.session, time.time())) == person
         # Another token of the same name is not the one that was revoked.
         return self._ask(lambda it: it.of_token(person.token)) == person
+
+    def has_account(self, person: Person) -> bool:
+        """Whether it is somebody with an account, however they signed in.
+
+        Raises:
+            AccountError: the file cannot be read.
+
+        """
+        if person.by not in ("account", "proxy") or not self.has_file:
+            return False
+        return self._ask(lambda it: it.of_name(person.name)) is not None
 
     async def check(self, name: str, password: str, address: str) -> Person | None:
         """Who signs in; None: there is no such account, or the password is another.
@@ -163,23 +184,34 @@ class People:
         is_right = await self._on_thread(lambda: verify(known[1] if known else "", password))
         return known[0] if known is not None and is_right else None
 
-    async def sign_in(self, name: str, address: str) -> str:
-        """Begin a session; returns its cookie.
+    async def sign_in(
+        self, person: Person, address: str, *, ends_others: bool = False
+    ) -> tuple[str, str, int]:
+        """Begin a session; returns its cookie's name and value, and how long it lasts, s.
 
         Raises:
             PeopleBusy, AccountError: see `write`.
 
         """
-        return await self.write(lambda it, now_s: it.begin_session(name, address, now_s))
+        if self.shared is not None and person.by == "shared token":
+            return self.shared.cookie_name, self.shared.cookie(time.time()), SHARED_SESSION_S
+        cookie = await self.write(
+            lambda it, now_s: it.begin_session(person.name, address, now_s, ends_others=ends_others)
+        )
+        return self._cookie_name(), cookie, SESSION_S
 
-    async def sign_out(self, person: Person, address: str) -> None:
-        """End the session that a request came with.
+    async def sign_out(self, person: Person, address: str) -> str:
+        """End the session that a request came with; returns its cookie's name.
 
         Raises:
             PeopleBusy, AccountError: see `write`.
 
         """
+        if self.shared is not None and person.by == "shared token":
+            self.shared.sign_out(person, time.time())
+            return self.shared.cookie_name
         await self.write(lambda it, now_s: it.end_session(person, address, now_s))
+        return self._cookie_name()
 
     async def note(self, who: str, what: str, subject: str, address: str) -> None:
         """Have it in the audit trail.
@@ -228,6 +260,10 @@ class People:
         self._waiting -= 1
         if not doing.cancelled():
             doing.exception()  # of a client that has left nobody looks at it
+
+    def _cookie_name(self) -> str:
+        """Browsers keep one jar for all ports of a host, so each file has a cookie of its own."""
+        return f"lupin_person_{self._file().id[:8]}"
 
     def _ask(self, work: Callable[[Accounts], ResultT]) -> ResultT:
         try:

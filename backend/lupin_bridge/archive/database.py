@@ -35,6 +35,16 @@ META_AGAIN: Final = (
     "ON CONFLICT (site, key) DO UPDATE SET value = CASE WHEN meta.key ~ '_ns:' THEN"
     " greatest(meta.value::bigint, excluded.value::bigint)::text ELSE excluded.value END"
 )
+# What libpq adds to the reason: advice to programmers, and how it came to know.
+_NOISE: Final = tuple(
+    map(
+        re.compile,
+        (
+            r"^(connection is bad|connection failed|consuming input failed): ",
+            r"\? *Is the server running .*$| This probably means .*$| DETAIL: .*$",
+        ),
+    )
+)
 _SITE: Final = re.compile(r"[a-z][a-z0-9_-]{0,62}")
 
 
@@ -126,6 +136,8 @@ def explained(error: Exception) -> ArchiveError:
     text = " ".join(str(error).split())
     if isinstance(error, psycopg.Error) and error.diag.message_primary:
         text = error.diag.message_primary
+    for noise in _NOISE:
+        text = noise.sub("", text)
     match error:
         case psycopg.errors.UndefinedTable():
             return ArchiveError("the database has no archive: lupin-twin archive init makes it")

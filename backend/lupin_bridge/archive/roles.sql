@@ -37,10 +37,12 @@ END
 $$;
 
 -- What a journal says anew: counts of an hour that goes on, a run that has ended, who forwards.
-GRANT UPDATE ON meta, run, hour, tally, event, note, epoch, forwarder TO lupin_forwarder;
+GRANT UPDATE ON meta, run, hour, tally, event, epoch, forwarder TO lupin_forwarder;
 -- A pause that a late write has cut in two is none any more.
 GRANT DELETE ON event TO lupin_forwarder;
-GRANT INSERT, UPDATE ON note TO lupin_page;
+GRANT INSERT ON note TO lupin_page;
+-- What people said is never changed.
+REVOKE UPDATE ON note FROM lupin_forwarder, lupin_page;
 
 -- What a forwarder has done for it, as the owner of the tables.
 --

@@ -33,7 +33,6 @@ _SAID_ANEW: Final = {
     "run": ("site, run", "joins ended_stamp_ns"),
     "hour": ("site, series, hour", "n total low high"),
     "tally": ("site, run, event, hour", "n total low high first_ns last_ns"),
-    "note": ("site, id", "text until_ns"),
 }
 
 

@@ -18,10 +18,9 @@ from lupin_bridge.bags.recording import INPUTS, Recording
 from lupin_twin.core.parameters import World
 from lupin_twin.core.state import Bloom, Flower, Pose, Reading
 from lupin_twin.journal.appending import is_empty, prefill, simulated
-from lupin_twin.journal.beside import InUse
+from lupin_twin.journal.beside import InUse, demo_journal_path
 from lupin_twin.journal.rows import InspectionRow, PinRow, Row, ScanRow
 from lupin_twin.journal.schema import FILE_ERRORS, Foreign, open_reader
-from lupin_twin.runtime.memory import demo_journal_path
 
 log = logging.getLogger(__name__)
 

@@ -47,7 +47,7 @@ def run(settings: Settings, secrets: Secrets, ros_args: Sequence[str]) -> None:
         check_url(settings.archive_url)
     except UsageError as error:
         raise SettingError(str(error)) from None
-    access = Access.of(settings, secrets.token)
+    access = Access.of(settings, secrets.token, is_fleet=True)
     proxies = Proxies.of(settings)
     criteria = Criteria.of(settings)
     asyncio.run(_run(settings, access, proxies, criteria))

@@ -10,7 +10,7 @@ import getpass
 import os
 import sqlite3
 import time
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping
 from contextlib import closing
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
@@ -21,24 +21,21 @@ from lupin_bridge.cli.output import (
     FAILED,
     CannotWrite,
     Roles,
-    Write,
     add_actions,
     backup,
     standard,
-    writing,
 )
 from lupin_bridge.console import Progress, say
 from lupin_bridge.judge.options import own_sensors
 from lupin_bridge.past import bodies
 from lupin_bridge.past.query import MAX_SECONDS, moment
-from lupin_twin.core.past import NotRemembered, PastRefused, PastRow, seconds
-from lupin_twin.journal.beside import InUse, holder_of
+from lupin_twin.core.past import NotRemembered, PastRefused, seconds
+from lupin_twin.journal.beside import InUse, demo_journal_path, holder_of, journal_path
 from lupin_twin.journal.checking import Overview, RunExtent, find_all_damage, overview
 from lupin_twin.journal.queries import rows
 from lupin_twin.journal.rebuild import NotPossible, hear_interrupts, vacuum
 from lupin_twin.journal.retention import NotKnown, forget
 from lupin_twin.journal.schema import FILE_ERRORS, Empty, Foreign, open_named, says_damaged
-from lupin_twin.runtime.memory import demo_journal_path, journal_path
 from lupin_twin.runtime.process import INTERRUPTED
 
 ACTIONS: Final[Mapping[str, str]] = {
@@ -99,11 +96,6 @@ def add_parser(roles: Roles) -> None:
             own.add_argument("--to", dest="end", metavar="TIME", help=f"until before then: {when}")
             own.add_argument("--tag", metavar="ID", help="one tag alone")
             own.add_argument("--sensor", metavar="NAME", help="one sensor alone")
-            own.add_argument(
-                "--output",
-                metavar="FILE",
-                help="not to the standard output but to this file, which must not be there yet",
-            )
 
 
 def add_which(parser: argparse.ArgumentParser) -> None:
@@ -318,30 +310,18 @@ def _export(path: Path, options: argparse.Namespace) -> int:
         raise JournalError(f"--to is {seconds(end_ns)}, before --from, {seconds(start_ns)}")
     if options.recording is not None:
         return _record(path, options, start_ns, end_ns)
-    _check_output(options.output)
     with closing(_reader(path)) as connection:
         lots = rows(connection, start_ns, end_ns, options.tag, options.sensor)
-        if options.output is None:
-            _write_csv(lots, standard)
-        else:
-            with writing(options.output, path) as write:
-                _write_csv(lots, write)
+        sensors = own_sensors()
+        standard(bodies.CSV_HEADER)
+        for lot in lots:
+            standard(bodies.csv_lines(lot, sensors))
     return 0
-
-
-def _check_output(output: str | None) -> None:
-    if output == "":
-        raise JournalError("--output is '', must name a file")
-    if output is not None and output.lower().endswith(SUFFIX):
-        raise JournalError(
-            f"--output {output} would be CSV: for a recording name it without --output,"
-            f" lupin-twin journal export {output}"
-        )
 
 
 def _record(path: Path, options: argparse.Namespace, start_ns: int, end_ns: int) -> int:
     target: Path = options.recording
-    for name in ("tag", "sensor", "output"):
+    for name in ("tag", "sensor"):
         if getattr(options, name) is not None:
             raise JournalError(f"--{name} is for CSV: {target} has whole observations")
     if target.suffix != SUFFIX:
@@ -364,13 +344,6 @@ def _record(path: Path, options: argparse.Namespace, start_ns: int, end_ns: int)
         f" {target}"
     )
     return 0
-
-
-def _write_csv(lots: Iterable[Sequence[PastRow]], write: Write) -> None:
-    sensors = own_sensors()
-    write(bodies.CSV_HEADER)
-    for lot in lots:
-        write(bodies.csv_lines(lot, sensors))
 
 
 # --- backup --------------------------------------------------------------------------------------

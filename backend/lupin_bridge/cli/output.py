@@ -1,18 +1,12 @@
-"""What `lupin-twin journal`, `archive` and `forward` share: their actions, and where they write.
-
-That is the standard output, a new file, or a special one.
-"""
+"""What `lupin-twin journal`, `archive` and `forward` share: their actions, and where they write."""
 
 from __future__ import annotations
 
 import argparse
-import os
-import re
 import sqlite3
-import stat
 import sys
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import ExitStack, closing, contextmanager
+from contextlib import ExitStack, closing
 from pathlib import Path
 from typing import Final, TypeAlias
 
@@ -88,12 +82,6 @@ def backup(journal: sqlite3.Connection, target: Path, report: Callable[[float], 
 
 Write = Callable[[bytes], object]
 
-# What the shell has opened already: for its name the system would open the file behind it anew.
-_DESCRIPTOR: Final = re.compile(r"/dev/(stdout|stderr)|(?:/dev|/proc/self)/fd/([0-9]{1,6})")
-_NUMBERS: Final = {"stdout": 1, "stderr": 2}
-# What SQLite and the lock keep beside a journal, be it there now or not.
-_BESIDE: Final = ("", "-wal", "-shm", "-journal", ".lock")
-
 
 class CannotWrite(Exception):
     """The output cannot be written; the message is the one line that says why."""
@@ -115,77 +103,3 @@ def standard(data: bytes) -> None:
         if isinstance(error, BrokenPipeError):
             raise
         raise CannotWrite(f"cannot write to the standard output: {error.strerror}") from error
-
-
-@contextmanager
-def writing(target: str, journal: Path) -> Iterator[Write]:
-    """Write bytes to a file that was not there, and is not there where anything goes wrong.
-
-    A device, a FIFO and what the shell has opened (`/dev/stdout`) are written as they are.
-
-    Raises:
-        CannotWrite: there is such a file, it is one of the journal's own, or the disk is full.
-        BrokenPipeError: who read it has gone.
-
-    """
-    if os.path.realpath(target) in _own_files(journal):
-        raise CannotWrite(f"{target} is a file of the journal itself, and nothing is overwritten")
-    with _write_errors(target):
-        descriptor, is_new = _open(target)
-
-    def write(data: bytes) -> None:
-        rest = memoryview(data)
-        while rest:
-            with _write_errors(target):
-                rest = rest[os.write(descriptor, rest) :]
-
-    # Half of an export looks like all of it: whatever ends this, Ctrl-C too, removes it.
-    with ExitStack() as if_unfinished:
-        if is_new:
-            if_unfinished.callback(Path(target).unlink, missing_ok=True)
-        try:
-            yield write
-        finally:
-            with _write_errors(target):
-                os.close(descriptor)
-        if_unfinished.pop_all()
-
-
-def _open(target: str) -> tuple[int, bool]:
-    """Its descriptor, and whether the file was made here."""
-    opened = _DESCRIPTOR.fullmatch(target)
-    if opened:
-        name, number = opened.groups()
-        return os.dup(_NUMBERS[name] if name else int(number)), False
-    try:
-        new = os.open(target, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, 0o666)
-    except FileExistsError:
-        if not _is_special(target):
-            raise
-        return os.open(target, os.O_WRONLY | os.O_CLOEXEC), False
-    return new, True
-
-
-def _is_special(target: str) -> bool:
-    """Whether it is neither a regular file nor a link to nothing."""
-    try:
-        return not stat.S_ISREG(Path(target).stat().st_mode)
-    except FileNotFoundError:
-        return False
-
-
-def _own_files(journal: Path) -> set[str]:
-    names = {str(journal), os.path.realpath(journal)}
-    return {os.path.realpath(name + end) for name in names for end in _BESIDE}
-
-
-@contextmanager
-def _write_errors(target: str) -> Iterator[None]:
-    try:
-        yield
-    except BrokenPipeError:
-        raise
-    except FileExistsError as error:
-        raise CannotWrite(f"{target} is there already, and nothing is overwritten") from error
-    except OSError as error:
-        raise CannotWrite(f"cannot write {target}: {error.strerror}") from error

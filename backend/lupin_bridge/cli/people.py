@@ -24,6 +24,7 @@ from lupin_bridge.access.accounts import (
     accounts_path,
     check_name,
     check_password,
+    check_site,
     digest,
     make_file,
 )
@@ -57,6 +58,13 @@ def add_parsers(roles: Roles) -> None:
             if action != "list":
                 own.add_argument("name", metavar="NAME", help="letters, digits and ._@+-")
             if action == "add":
+                own.add_argument(
+                    "--for-site",
+                    action="append",
+                    default=[],
+                    metavar="SITE",
+                    help="a site whose data they may read, may be repeated (default: all)",
+                )
                 own.add_argument(
                     "--role",
                     dest="given_role",  # `role` is the command's
@@ -106,6 +114,8 @@ def run(options: argparse.Namespace, environ: Mapping[str, str]) -> int:
 
 def _add(path: Path, options: argparse.Namespace) -> int:
     check_name(options.name)
+    for site in options.for_site:
+        check_site(site)
     kind, token = _WHAT[options.role], ""
     if options.role == "token":
         token = secrets.token_urlsafe(32)
@@ -116,7 +126,13 @@ def _add(path: Path, options: argparse.Namespace) -> int:
     make_file(path)
     with closing(Accounts(path, is_writer=True)) as accounts:
         accounts.add(
-            options.name, kind, options.given_role, secret, by=_who(), now_s=int(time.time())
+            options.name,
+            kind,
+            options.given_role,
+            secret,
+            by=_who(),
+            now_s=int(time.time()),
+            sites=options.for_site,
         )
     if is_first:
         say(f"{path} is made: from now on, bridges with this file want everybody to sign in")
@@ -154,7 +170,12 @@ def _remove(path: Path, options: argparse.Namespace) -> int:
 def _list(path: Path, options: argparse.Namespace) -> int:
     with closing(Accounts(path)) as accounts:
         listed = accounts.listed(_WHAT[options.role])
-    tell(*(f"{it.name}  {it.role}  {_iso(it.made_at_s)}" for it in listed))
+    tell(
+        *(
+            f"{it.name}  {it.role}  {_iso(it.made_at_s)}  {it.sites.replace(chr(10), ' ')}".rstrip()
+            for it in listed
+        )
+    )
     return 0
 
 

@@ -30,6 +30,7 @@ from lupin_bridge.feed.web import WebTwin
 from lupin_bridge.judge.options import Criteria
 from lupin_bridge.notify.channels import Channels
 from lupin_bridge.notify.destinations import Targets
+from lupin_bridge.notify.push import Push
 from lupin_bridge.routes.pages import HOW_TO_BUILD
 from lupin_bridge.serving.admission import Limits
 from lupin_bridge.serving.server import BridgeServer, allow_connections
@@ -112,7 +113,10 @@ async def _run(
         feed = await asyncio.to_thread(demo.with_past, feed, feed.journal, patrol_args)
     limits = Limits()
     source = _source_of(role, settings, ros_args, feed, limits)
-    outward = Channels(targets, accounts_path(settings).parent)
+    push = None
+    if targets.push is not None and access.people is not None:
+        push = Push(targets.push, access.people, settings.site)
+    outward = Channels(targets, accounts_path(settings).parent, push)
     bridge = Bridge(source, settings, criteria=criteria, outward=outward, limits=limits)
     app = create_app(bridge, access=access, proxies=proxies)
 

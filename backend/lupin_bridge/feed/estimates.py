@@ -62,7 +62,7 @@ PERIOD_S: Final = 15.0
 # A greenhouse has a handful of sensors; of more, the first in the alphabet.
 MAX_SENSORS: Final = 32
 # What collecting the names of sensors takes for each tag, roughly and at worst.
-_NAMES_TAG_S: Final = 5e-6
+NAMES_TAG_S: Final = 5e-6
 
 # By tag and sensor: the reading since which it holds, ns of ROS time.
 Changed = Mapping[str, Mapping[str, int]]
@@ -109,7 +109,7 @@ class EstimateFollower:
             return
         newest = await asyncio.wrap_future(
             self._source.workers.submit(
-                lambda _: newest_of(snapshot), len(snapshot.tags) * _NAMES_TAG_S
+                lambda _: newest_of(snapshot), len(snapshot.tags) * NAMES_TAG_S
             )
         )
         known: dict[str, Report] = {}

@@ -6,28 +6,19 @@ import asyncio
 import time
 import uuid
 from collections.abc import Callable, Sequence
-from concurrent.futures import Future
-from contextlib import nullcontext
 from typing import Any
 
 from lupin_bridge.feed.query import Now
-from lupin_bridge.feed.revisions import RevisedEstimate, revised
 from lupin_bridge.feed.ros_source import RosSource
-from lupin_bridge.feed.shared_work import Shared
-from lupin_bridge.feed.source import CacheCounts, RevisedGrid, TwinUpdate
+from lupin_bridge.feed.source import TwinUpdate
 from lupin_twin.core.journal_condition import Condition
 from lupin_twin.core.notes import Note
 from lupin_twin.core.parameters import World
 from lupin_twin.core.past import NotRemembered
 from lupin_twin.core.state import NANOSECONDS_PER_SECOND, Snapshot
-from lupin_twin.estimate.engine import EstimateRequest, TagPast
-from lupin_twin.field.engine import FieldJob, FieldRequest
 from lupin_twin.field.explored import OccupancyMap
-from lupin_twin.field.grid import FieldGrid
-from lupin_twin.ros.estimate_service import Task
 from lupin_twin.ros.node import TwinNode
 from lupin_twin.runtime.estimate_rounds import ADVICE_S, Report, ReportRequest
-from lupin_twin.runtime.workers import SMALL_S
 
 # A third of what counts as silence (`status.STALE_AFTER_S`).
 HEARTBEAT_S = 1.0
@@ -45,9 +36,6 @@ class LocalTwin(RosSource[TwinNode, TwinUpdate]):
         # A restarted server must never match an ETag of its predecessor, whose counts it repeats.
         self.identity = uuid.uuid4().hex[:12]
         self.update: TwinUpdate
-        self._computing: Shared[FieldGrid] = Shared()
-        # One at a time: fields have the other workers, and frames the other cores.
-        self._large_estimate = asyncio.Semaphore(1)
 
     async def start(
         self, on_state: Callable[[TwinUpdate], None], on_death: Callable[[], None]
@@ -65,7 +53,6 @@ class LocalTwin(RosSource[TwinNode, TwinUpdate]):
                         node.twins.value,
                         node.occupancy_map,
                         node.utilities.counts(),
-                        cache=_cache_counts(node),
                         journal=node.memory.condition,
                         rules=node.fields.rules,
                         origin=node.origin,
@@ -91,10 +78,6 @@ class LocalTwin(RosSource[TwinNode, TwinUpdate]):
         """
         return self.update.revision
 
-    def field_revision(self, request: FieldRequest) -> str | None:  # noqa: ARG002  # all alike
-        """The revision now: here every field is made of the store as it stands."""
-        return self.update.revision
-
     def journal(self) -> Condition:
         """The node's journal."""
         return self.update.journal
@@ -102,19 +85,6 @@ class LocalTwin(RosSource[TwinNode, TwinUpdate]):
     def occupancy_map(self) -> OccupancyMap | None:
         """The latest map that the node accepted."""
         return self.update.occupancy_map
-
-    async def field(self, request: FieldRequest) -> RevisedGrid:
-        """A hit from the node's cache, or the field computed on a worker and handed back to it."""
-        return await self._in_time(self._field(request))
-
-    def estimate_revision(self, request: EstimateRequest) -> str | None:
-        """That of the last answer, as long as no update could have changed it."""
-        return self._revisions.revision(request, self.update.revision)
-
-    async def estimate(self, request: EstimateRequest) -> RevisedEstimate:
-        """The node says of what, and by which model; it is computed on a worker."""
-        key = (self.update.revision, request)
-        return await self._in_time(self._estimating.get(key, lambda: self._estimate(request)))
 
     async def estimate_report(self, request: ReportRequest) -> Report:
         """What the node knows; where another tag helps is worked out on a worker."""
@@ -143,40 +113,6 @@ class LocalTwin(RosSource[TwinNode, TwinUpdate]):
         update = self.update
         return Now(self.now_ns, update.snapshot.frame_id, update.journal)
 
-    async def _field(self, request: FieldRequest) -> RevisedGrid:
-        def look_up(node: TwinNode) -> tuple[FieldGrid | FieldJob, str]:
-            answer = node.fields.lookup(request, node.store, node.occupancy_map)
-            return answer, self._revision_of(node)
-
-        answer, revision = await self.thread.call(look_up)
-        if isinstance(answer, FieldJob):
-            job = answer
-            answer = await self._computing.get(job.key, lambda: self._compute(job))
-        return RevisedGrid(answer, revision)
-
-    async def _compute(self, job: FieldJob) -> FieldGrid:
-        grid = await asyncio.wrap_future(self.workers.submit(job.compute, job.cost_s))
-        await self.thread.call(lambda node: node.fields.keep(job, grid))
-        return grid
-
-    async def _estimate(self, request: EstimateRequest) -> RevisedEstimate:
-        def begin(node: TwinNode) -> tuple[Task, Future[Sequence[TagPast]]]:
-            task = node.estimates.prepare(request)
-            return task, task.look_up()
-
-        epoch = self.update.revision
-        task, looking_up = await self.thread.call(begin)
-        found = await asyncio.wrap_future(looking_up)
-        async with self._large_estimate if task.cost_s > SMALL_S else nullcontext():
-            result = await asyncio.wrap_future(
-                self.workers.submit(
-                    lambda should_stop: revised(task.make(found, should_stop)), task.cost_s
-                )
-            )
-        if epoch == self.update.revision:
-            self._revisions.put(request, epoch, result.revision)
-        return result
-
     async def _report(self, request: ReportRequest) -> Report:
         work = await self.thread.call(lambda node: node.estimates.report(request))
         return await asyncio.wrap_future(self.workers.submit(lambda _: work(), ADVICE_S))
@@ -189,8 +125,3 @@ class LocalTwin(RosSource[TwinNode, TwinUpdate]):
 
     def _revision_of(self, node: TwinNode) -> str:
         return "-".join((self.identity, *map(str, node.revision)))
-
-
-def _cache_counts(node: TwinNode) -> CacheCounts:
-    cache = node.fields.cache
-    return CacheCounts(cache.hits, cache.misses, len(cache), cache.bytes)

@@ -12,11 +12,9 @@ from rclpy.context import Context
 from lupin_bridge.feed.past_process import PastProcess
 from lupin_bridge.feed.relay import Relay
 from lupin_bridge.feed.relay_ros import RelayRos, names_of
-from lupin_bridge.feed.revisions import RevisedEstimate, RevisionCache
 from lupin_bridge.feed.robot import Robot
 from lupin_bridge.feed.robot_ros import RobotTopics
 from lupin_bridge.feed.ros_thread import BridgedNode, RosThread
-from lupin_bridge.feed.shared_work import Shared
 from lupin_bridge.feed.source import TwinSource
 from lupin_bridge.feed.topics import TwinNames
 from lupin_twin.adapt.messages import observation
@@ -43,8 +41,6 @@ class RosSource(TwinSource, Generic[NodeT, EventT]):
         self.relay = Relay(lambda: self.thread, RelayRos())
         # Of the ROS thread alone.
         self._robot_topics = RobotTopics()
-        self._estimating: Shared[RevisedEstimate] = Shared()
-        self._revisions = RevisionCache()
         self._rules: FieldRules
         # Made at the first one: most bridges never publish any.
         self._observations: Any = None

@@ -13,7 +13,6 @@ from typing import Any, Final, TypeVar
 from lupin_bridge.feed.past_process import PastProcess
 from lupin_bridge.feed.query import ExportStep, Itself, Now, Question
 from lupin_bridge.feed.relay import Relay
-from lupin_bridge.feed.revisions import RevisedEstimate
 from lupin_bridge.feed.robot import Robot
 from lupin_bridge.feed.topics import TwinNames
 from lupin_twin.adapt.scans import MadeScan
@@ -24,10 +23,8 @@ from lupin_twin.core.notes import Note, NotesRequest, NotesUnwritable, PastNotes
 from lupin_twin.core.past import NotRemembered, PastRow
 from lupin_twin.core.state import Snapshot
 from lupin_twin.core.writes import PastWrites, WritesRequest
-from lupin_twin.estimate.engine import EstimateRequest
-from lupin_twin.field.engine import FieldRequest, FieldRules
+from lupin_twin.field.engine import FieldRules
 from lupin_twin.field.explored import OccupancyMap
-from lupin_twin.field.grid import FieldGrid
 from lupin_twin.journal.follow import WRITES_S
 from lupin_twin.journal.notes import NOTES_S
 from lupin_twin.journal.queries import STRETCH_S, Export
@@ -55,26 +52,16 @@ class TwinTimeoutError(TwinUnavailableError):
 
 
 @dataclass(frozen=True, slots=True)
-class CacheCounts:
-    """How the cache of fields does."""
-
-    hits: int = 0
-    misses: int = 0
-    entries: int = 0
-    bytes: int = 0
-
-
-@dataclass(frozen=True, slots=True)
 class TwinUpdate:
     """All that the ROS thread tells the loop, as of one moment; immutable.
 
     `revision` is the snapshot's, `twin_count` how many nodes publish the state, `made_s` when it
     was told (monotonic clock). `counts` is what the twin dropped, lost and met; None: it does not
-    say. `own_counts` is the same of a node of ours that is not the twin; `cache` is that of a twin
-    in this process, and `rules` are its own; `journal` is the twin's, wherever it is, as far as
-    that tells, and so are `origin`, where its observations come from, and `input_problems`, why it
-    does not hear all of what is published for it. `silent_s` is for how long the twin has been
-    silent, where it was so before this was told; 0: it is live.
+    say. `own_counts` is the same of a node of ours that is not the twin; `rules` are those of a
+    twin in this process; `journal` is the twin's, wherever it is, as far as that tells. So are
+    `origin`, where its observations come from, and `input_problems`, why it does not hear all of
+    what is published for it. `silent_s` is for how long the twin has been silent, where it was so
+    before this was told; 0: it is live.
     """
 
     snapshot: Snapshot
@@ -83,7 +70,6 @@ class TwinUpdate:
     occupancy_map: OccupancyMap | None = None
     counts: Counts | None = None
     own_counts: Counts | None = None
-    cache: CacheCounts = field(default_factory=CacheCounts)
     journal: Condition = UNKNOWN
     rules: FieldRules | None = None
     origin: Origin = "unknown"
@@ -97,14 +83,6 @@ class TwinUpdate:
         theirs = () if self.counts is None else self.counts.recent
         ours = () if self.own_counts is None else self.own_counts.recent
         return theirs + tuple(replace(drop, message=f"web: {drop.message}") for drop in ours)
-
-
-@dataclass(frozen=True, slots=True)
-class RevisedGrid:
-    """A field and its revision: that of what it was computed from, or of its content."""
-
-    grid: FieldGrid
-    revision: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -159,13 +137,6 @@ class TwinSource(ABC):
         """The revision now: opaque, changes exactly when a field could."""
 
     @abstractmethod
-    def field_revision(self, request: FieldRequest) -> str | None:
-        """The revision of the field asked for now; None: only the answer will tell.
-
-        What is claimed here holds for the field: two different ones never have the same.
-        """
-
-    @abstractmethod
     def rules(self) -> FieldRules:
         """The rules by which fields are made, and their limit."""
 
@@ -180,31 +151,6 @@ class TwinSource(ABC):
     @abstractmethod
     def occupancy_map(self) -> OccupancyMap | None:
         """The latest map, if any has come."""
-
-    @abstractmethod
-    async def field(self, request: FieldRequest) -> RevisedGrid:
-        """Compute a field.
-
-        Raises:
-            lupin_twin.field.engine.FieldRefused: a bad request.
-            TwinUnavailableError: nobody there to compute it.
-
-        """
-
-    @abstractmethod
-    def estimate_revision(self, request: EstimateRequest) -> str | None:
-        """The revision of the estimate asked for now; None: only the answer will tell."""
-
-    @abstractmethod
-    async def estimate(self, request: EstimateRequest) -> RevisedEstimate:
-        """Estimate a sensor over a box.
-
-        Raises:
-            lupin_twin.field.engine.FieldRefused: a bad request, or nothing to make an estimate of.
-            lupin_twin.core.past.NotRemembered: there is no journal, or it cannot be read now.
-            TwinUnavailableError: nobody there to compute it.
-
-        """
 
     @abstractmethod
     async def estimate_report(self, request: ReportRequest) -> Report:

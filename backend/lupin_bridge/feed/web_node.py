@@ -8,16 +8,14 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from enum import Enum
 from hashlib import blake2b
-from operator import is_
 from typing import Any, Final
 
 from lupin_msgs.srv import (
-    GetEstimate,
     GetEstimateReport,
-    GetField,
     GetWrites,
 )
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
+from rclpy.validate_topic_name import validate_topic_name
 
 from lupin_twin.core import ingest, interfaces
 from lupin_twin.core.clock import StampWatch
@@ -44,15 +42,9 @@ NODE_NAME: Final = "lupin_web"
 class Service(Enum):
     """What a twin is asked for."""
 
-    FIELD = GetField
     WRITES = GetWrites
-    ESTIMATE = GetEstimate
     REPORT = GetEstimateReport
 
-
-# DDS finds a twin's publisher and its services each on its own, one at times a little later: of
-# what is lost on the way it tells again after 3 s.
-NEW_TWIN_S: Final = 5.0
 
 # How long a state waits for the times that a twin publishes right behind it. Without them it is
 # shown all the same, and when what was observed is not known.
@@ -86,10 +78,6 @@ def _digest_of_map(occupancy: OccupancyMap) -> int:
     digest = blake2b(repr(occupancy.place).encode("utf-8", "surrogatepass"), digest_size=6)
     digest.update(occupancy.cells.data)
     return int.from_bytes(digest.digest())
-
-
-def _are_the_very_same(before: Sequence[TagState], after: Sequence[TagState]) -> bool:
-    return len(before) == len(after) and all(map(is_, before, after))
 
 
 def _digest_of_publishers(publishers: Iterable[Any]) -> str:
@@ -131,10 +119,7 @@ class WebNode(AdjustableNode):
         self.occupancy_map: OccupancyMap | None = None
         self.digest = ""
         self.publishers_digest = ""
-        # Counts the changes heard of that a field may depend on.
-        self.epoch = 0
         self._changes = 0
-        self._publishers_since_s = -math.inf
         self._on_state = on_state
         self._on_map = on_map
         self._newest: Snapshot | None = None
@@ -171,18 +156,18 @@ class WebNode(AdjustableNode):
             callback=self._take_diagnostics,
             is_wanted=lambda data: self._topics["state_topic"].encode() in data,
         )
+        # Nobody calls it from here; roslib's clients are told its name.
         with naming("field_service_name", p.field_service_name):
-            self.clients_of_twin = {
-                service: self.create_client(
-                    service.value, name, qos_profile=SERVICE_QOS, callback_group=group
-                )
-                for service, name in (
-                    (Service.FIELD, p.field_service_name),
-                    (Service.WRITES, interfaces.GET_WRITES.name),
-                    (Service.ESTIMATE, interfaces.GET_ESTIMATE.name),
-                    (Service.REPORT, interfaces.GET_ESTIMATE_REPORT.name),
-                )
-            }
+            validate_topic_name(p.field_service_name, is_service=True)
+        self.clients_of_twin = {
+            service: self.create_client(
+                service.value, name, qos_profile=SERVICE_QOS, callback_group=group
+            )
+            for service, name in (
+                (Service.WRITES, interfaces.GET_WRITES.name),
+                (Service.REPORT, interfaces.GET_ESTIMATE_REPORT.name),
+            )
+        }
         self._patience = self.utilities.every(
             group, TIMES_PATIENCE_S, "the wait for times", self._show_without_times
         )
@@ -207,11 +192,6 @@ class WebNode(AdjustableNode):
         return f"{known}-{self._changes}" if self._changes else known
 
     @property
-    def has_new_twin(self) -> bool:
-        """Whether a twin has come so lately that its service may not have been found yet."""
-        return time.monotonic() - self._publishers_since_s < NEW_TWIN_S
-
-    @property
     def self_report(self) -> SelfReport:
         """What the twin that is followed said of itself lately."""
         is_recent = time.monotonic() - self._reported_s < REPORT_HOLDS_S
@@ -221,9 +201,7 @@ class WebNode(AdjustableNode):
         """What is to be said where no twin offers it; empty: one does."""
         if self.clients_of_twin[service].service_is_ready():
             return ""
-        if self.clients_of_twin[Service.FIELD].service_is_ready():
-            guess = "is it an older one?"
-        elif self.count_publishers(self._topics["state_topic"]):
+        if self.count_publishers(self._topics["state_topic"]):
             guess = "its state is heard, so ask again; or does it have another name there?"
         else:
             guess = "is it running?"
@@ -281,8 +259,6 @@ class WebNode(AdjustableNode):
         snapshot = replace(snapshot, clock=clock)
         self._newest = snapshot
         self.digest = self._digest_of(snapshot.tags)
-        if before is None or not _are_the_very_same(before.tags, snapshot.tags):
-            self.epoch += 1
         if len(self._digests) > len(snapshot.tags):
             self._forget_all_but(snapshot.tags)
         self._on_state(snapshot)
@@ -293,8 +269,6 @@ class WebNode(AdjustableNode):
         publishers_digest = _digest_of_publishers(publishers)
         if publishers_digest != self.publishers_digest:
             self.publishers_digest = publishers_digest
-            self.epoch += 1
-            self._publishers_since_s = time.monotonic()
         if self.twins.see(int(self.count_publishers(topic))):
             self.utilities.warn(
                 ("twins", 0),
@@ -315,7 +289,6 @@ class WebNode(AdjustableNode):
             return
         if self.occupancy_map is None or not new.shows_the_same_as(self.occupancy_map):
             self.occupancy_map = replace(new, revision=_digest_of_map(new))
-            self.epoch += 1
             self._on_map()
 
     def _take_diagnostics(self, msg: Any) -> None:
@@ -329,7 +302,6 @@ class WebNode(AdjustableNode):
         # A twin's own are not on the wire: they are set here as there.
         self.rules = FieldRules.of(now)
         self._changes += 1
-        self.epoch += 1
         self._on_map()
 
     # --- small parts --------------------------------------------------------------------------

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
@@ -133,19 +132,6 @@ def _weight(media_type: str, ranges: Iterable[tuple[str, float]]) -> float:
     by_specificity = {media_type: 3, f"{main_type}/*": 2, "*/*": 1}
     found = [(by_specificity[name], weight) for name, weight in ranges if name in by_specificity]
     return max(found)[1] if found else 0.0
-
-
-def etag(revision: str, request: FieldRequest, kind: str, scale: int) -> str:
-    """The strong ETag of a field: of the revision and the whole request."""
-    numbers = (
-        request.resolution,
-        request.bbox_min_x,
-        request.bbox_min_y,
-        request.bbox_max_x,
-        request.bbox_max_y,
-    )
-    text = repr((revision, request.sensor_type, numbers, kind, scale))
-    return f'"{hashlib.blake2b(text.encode("utf-8", "surrogatepass"), digest_size=12).hexdigest()}"'
 
 
 def matches(if_none_match: str | None, tag: str) -> bool:

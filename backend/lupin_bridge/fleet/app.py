@@ -6,14 +6,15 @@ import asyncio
 import logging
 import math
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from functools import partial
 from pathlib import Path
-from typing import Final
+from typing import Final, cast
 
 import orjson
 from fastapi import FastAPI, Request, Response, WebSocket
 from fastapi.responses import FileResponse
+from starlette.requests import HTTPConnection
 from starlette.staticfiles import StaticFiles
 
 from lupin_bridge import __version__
@@ -28,7 +29,7 @@ from lupin_bridge.fleet import small_map
 from lupin_bridge.fleet.compare import COMPARE_S, Compare, OfSites, answer_of, chosen, compare
 from lupin_bridge.fleet.export import respond_sites
 from lupin_bridge.fleet.link_back import SitePage
-from lupin_bridge.fleet.overview import SitesFrame, alarms_json, archive_json, etag, site_json
+from lupin_bridge.fleet.overview import Site, SitesFrame, alarms_json, archive_json, etag, site_json
 from lupin_bridge.fleet.pages import Opened, SitePages, Sites
 from lupin_bridge.fleet.report import SitesReport, sites_report
 from lupin_bridge.fleet.source import SiteTwin
@@ -45,6 +46,7 @@ from lupin_bridge.routes.answers import (
     has_etag,
     json_response,
     not_modified,
+    person_of,
     respond,
 )
 from lupin_bridge.routes.sockets import has_place, next_message
@@ -110,8 +112,9 @@ class Fleet:
                 admission=self.admission,
                 cache=AnswerCache(_CACHE_BYTES),
             )
-            # Who may read has been looked at by then.
+            # Who may read has been looked at by then; who writes is looked at there.
             app = create_app(bridge, access=Access(access.policy))
+            app.state.access = access
             ready = asyncio.create_task(bridge.start(), name=f"open {name}")
             return Opened(source, bridge, app, ready)
 
@@ -147,17 +150,20 @@ class Fleet:
 
     # --- the overview -------------------------------------------------------------------------
 
-    def body(self) -> bytes:
-        """`/api/sites`."""
+    def body(self, sites: Mapping[str, Site]) -> bytes:
+        """`/api/sites`, of these."""
         watching = self.watching
         now_ns = watching.now_ns
         return orjson.dumps(
-            {
-                "sites": [
-                    site_json(site, watching.archive, now_ns) for site in watching.sites.values()
-                ]
-            }
+            {"sites": [site_json(site, watching.archive, now_ns) for site in sites.values()]}
         )
+
+    def sites_for(self, request: HTTPConnection) -> Mapping[str, Site]:
+        """The sites that whoever makes a request may read."""
+        person, sites = person_of(request), self.watching.sites
+        if person is None or not person.sites:
+            return sites
+        return {name: site for name, site in sites.items() if person.reads(name)}
 
     def join(self, client: Client) -> None:
         """Add a browser; it has every site when this returns."""
@@ -244,9 +250,9 @@ def create_fleet_app(
     every = (*pages.router.routes, *status.router.routes)
     app.router.routes.extend(it for it in every if getattr(it, "path", "") in _AS_EVERYWHERE)
     # The last one added is the first to be asked.
-    app.add_middleware(Sites, pages=fleet.pages, page=SitePage(static_folder))
     app.add_middleware(PieceByPiece)
     app.add_middleware(ReadOnly)
+    app.add_middleware(Sites, pages=fleet.pages, page=SitePage(static_folder))
     app.add_middleware(AccessControl, access=access)
     app.add_middleware(BehindProxies, proxies=proxies)
     page = static_folder / "fleet.html"
@@ -269,19 +275,27 @@ def create_fleet_app(
     return app
 
 
+def sites_wire(client: Client, frame: SitesFrame, only: tuple[str, ...]) -> bytes:
+    """A frame for who may read `only` these sites; all, if none is named."""
+    base = frame.base
+    if base is not None and base.seq == client.sent_seq:
+        return frame.delta(only)
+    return frame.full(only)
+
+
 async def _not_found(request: Request, _error: Exception) -> Response:
     return error_response(f"there is nothing at {request.url.path[:128]!r}", 404)
 
 
 def _add_overview(app: FastAPI, fleet: Fleet) -> None:
     @app.api_route("/api/sites", methods=["GET", "HEAD"])
-    async def sites(request: Request) -> Response:
+    async def overview(request: Request) -> Response:
         """Every site of the archive, by name."""
-        watching = fleet.watching
-        tag = etag(watching.sites, watching.archive)
+        sites = fleet.sites_for(request)
+        tag = etag(sites, fleet.watching.archive)
         if has_etag(request, tag.removeprefix("W/")):
             return not_modified(tag)
-        return json_response(fleet.body(), 200, {"ETag": tag, **REVALIDATE})
+        return json_response(fleet.body(sites), 200, {"ETag": tag, **REVALIDATE})
 
     @app.api_route("/api/sites/{name}/map.svg", methods=["GET", "HEAD"])
     async def site_map(request: Request, name: str) -> Response:
@@ -302,12 +316,15 @@ def _add_overview(app: FastAPI, fleet: Fleet) -> None:
         if not await has_place(websocket, fleet.hub):
             return
         connection: Connection = getattr(websocket.state, CONNECTION_KEY)
+        person = person_of(websocket)
+        only = () if person is None else person.sites
         client = Client(
             connection,
             address=client_of(websocket),
             delta=True,
             wants_status=False,
             wants_alarms=False,
+            wire=lambda it, frame: sites_wire(it, cast("SitesFrame", frame), only),
         )
         connection.on_writable = lambda: fleet.hub.serve(client, time.monotonic())
         fleet.join(client)
@@ -330,7 +347,7 @@ def _add_answers(app: FastAPI, fleet: Fleet) -> None:
         """Active alarms of all sites, the worst first."""
         given = read(OfSites, request.query_params.multi_items(), PastRefused)
         watching = fleet.watching
-        names = chosen(given.sites, watching.sites)
+        names = chosen(given.sites, fleet.sites_for(request))
         key = ("alarms", watching.looks, watching.archive.is_reachable, *names)
 
         async def compute() -> Answer:
@@ -346,7 +363,7 @@ def _add_answers(app: FastAPI, fleet: Fleet) -> None:
     async def compared(request: Request) -> Response:
         """One sensor of several sites."""
         watching = fleet.watching
-        names = {site: it.name or site for site, it in watching.sites.items()}
+        names = {site: it.name or site for site, it in fleet.sites_for(request).items()}
         parameters = request.query_params.multi_items()
         return await over_sites(
             request, compare(parameters, names, watching.now_ns, fleet.criteria.sensors)
@@ -355,9 +372,8 @@ def _add_answers(app: FastAPI, fleet: Fleet) -> None:
     @app.api_route("/api/report", methods=["GET", "HEAD"])
     async def reported(request: Request) -> Response:
         """A row for each site, with its counts and the address of its report."""
-        watching = fleet.watching
-        parameters = request.query_params.multi_items()
-        return await over_sites(request, sites_report(parameters, watching.sites, watching.now_ns))
+        parameters, now_ns = request.query_params.multi_items(), fleet.watching.now_ns
+        return await over_sites(request, sites_report(parameters, fleet.sites_for(request), now_ns))
 
     async def over_sites(request: Request, query: Compare | SitesReport) -> Response:
         async def compute() -> Answer:

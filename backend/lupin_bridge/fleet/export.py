@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import AsyncGenerator, Awaitable, Callable, Iterable
+from collections.abc import AsyncGenerator, Awaitable, Callable, Iterable, Mapping
 from contextlib import aclosing
 from functools import partial
 from typing import Any, Protocol
 
 from fastapi import Request, Response
+from starlette.requests import HTTPConnection
 
 from lupin_bridge.feed.past_process import PastProcess
 from lupin_bridge.feed.query import ExportStep, Now
@@ -32,11 +33,14 @@ class ExportingSites(Exporting, Protocol):
     past: PastProcess
     criteria: Criteria
 
+    def sites_for(self, request: HTTPConnection) -> Mapping[str, Site]:
+        """The sites that whoever makes a request may read."""
+
 
 async def respond_sites(fleet: ExportingSites, kind: ExportFormat, request: Request) -> Response:
     """Every row of a period of the sites that are named, or of all."""
     period = past_query.period(past_query.OfSites, request.query_params.multi_items(), None)
-    known = fleet.watching.sites
+    known = fleet.sites_for(request)
     sites = [known.get(name, name) for name in (known if period.sites is None else period.sites)]
     for site in sites:
         if isinstance(site, str):

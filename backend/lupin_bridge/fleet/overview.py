@@ -136,15 +136,15 @@ class SitesFrame:
         self._sites = sites
         self._archive = archive
         self._now_ns = now_ns
-        self._wires: dict[bool, bytes] = {}
+        self._wires: dict[tuple[bool, tuple[str, ...]], bytes] = {}
         if base is not None:
             base.base = None
 
-    def full(self) -> bytes:
-        """Every site."""
-        return self._wire(self._sites.values(), (), is_whole=True)
+    def full(self, only: tuple[str, ...] = ()) -> bytes:
+        """Every site; `only`: of these, if any is named."""
+        return self._wire(self._sites.values(), (), only, is_whole=True)
 
-    def delta(self) -> bytes:
+    def delta(self, only: tuple[str, ...] = ()) -> bytes:
         """What is not as in the frame before; all of it, where the archive comes or goes."""
         assert self.base is not None  # the hub asks only then
         before = self.base
@@ -155,11 +155,17 @@ class SitesFrame:
             or is_news(before._sites.get(name), site)  # noqa: SLF001
         ]
         gone = [name for name in before._sites if name not in self._sites]  # noqa: SLF001
-        return self._wire(changed, gone, is_whole=False)
+        return self._wire(changed, gone, only, is_whole=False)
 
-    def _wire(self, sites: Any, gone: Any, *, is_whole: bool) -> bytes:
-        if is_whole not in self._wires:
+    def _wire(
+        self, sites: Iterable[Site], gone: Iterable[str], only: tuple[str, ...], *, is_whole: bool
+    ) -> bytes:
+        key = is_whole, only
+        if key not in self._wires:
             archive = self._archive
+            if only:
+                sites = (site for site in sites if site.site in only)
+                gone = (name for name in gone if name in only)
             body = {
                 "type": "sites",
                 "is_whole": is_whole,
@@ -167,8 +173,8 @@ class SitesFrame:
                 "sites": [site_json(site, archive, self._now_ns) for site in sites],
                 "gone": list(gone),
             }
-            self._wires[is_whole] = text_frame(orjson.dumps(body))
-        return self._wires[is_whole]
+            self._wires[key] = text_frame(orjson.dumps(body))
+        return self._wires[key]
 
 
 def archive_json(archive: Archive) -> dict[str, Any]:

@@ -13,7 +13,7 @@ from fastapi import Request, Response, WebSocket
 from starlette.requests import HTTPConnection
 from starlette.types import ASGIApp, Receive, Scope, Send
 
-from lupin_bridge.access.middleware import client_of
+from lupin_bridge.access.middleware import client_of, with_security_headers
 from lupin_bridge.bridge import Bridge
 from lupin_bridge.fleet.link_back import SitePage
 from lupin_bridge.fleet.source import SiteTwin
@@ -124,6 +124,8 @@ class Sites:
         if scope["type"] not in ("http", "websocket") or not path.startswith(_PREFIX):
             await self._app(scope, receive, send)
             return
+        if scope["type"] == "http":
+            send = with_security_headers(send)
         name, slash, rest = path[len(_PREFIX) :].partition("/")
         client = client_of(HTTPConnection(scope))
         found = self._pages.page_of(name, client)
@@ -140,7 +142,7 @@ class Sites:
             await asyncio.shield(found.ready)
             own = {**scope, "root_path": f"{root}{_PREFIX}{name}"}
             own.pop("app_root_path", None)
-            is_page = scope["type"] == "http" and not rest
+            is_page = not rest and scope.get("method") in ("GET", "HEAD")
             page = self._page.answer(Request(scope)) if is_page else None
             await (page or found.app)(own, receive, send)
         finally:

@@ -7,7 +7,6 @@ path of a journal does otherwise.
 from __future__ import annotations
 
 import logging
-import os
 import sqlite3
 from collections.abc import Callable
 from contextlib import suppress
@@ -20,9 +19,9 @@ from lupin_bridge.feed.past_child import Child, Search
 from lupin_bridge.feed.query import Now, Question
 from lupin_bridge.fleet.compare import Compare
 from lupin_bridge.fleet.report import SitesReport
-from lupin_bridge.fleet.site_log import SiteConnection, open_archive
-from lupin_bridge.settings import variable
+from lupin_bridge.fleet.site_log import SiteConnection, archive_url, open_archive, write_note
 from lupin_twin.core.diagnostics import Origin, origin_of
+from lupin_twin.core.notes import Note
 from lupin_twin.core.past import NotRemembered
 from lupin_twin.core.state import Snapshot
 from lupin_twin.field.explored import OccupancyMap
@@ -84,10 +83,14 @@ class ArchiveChild(Child):
     def __init__(self) -> None:
         super().__init__(ArchiveRecall)
 
-    def _search(self, question: Question[Any] | Latest | Compare | SitesReport, now: Now) -> Search:
+    def _search(
+        self, question: Question[Any] | Latest | Note | Compare | SitesReport, now: Now
+    ) -> Search:
         site = now.condition.path
         if isinstance(question, Latest):
             return lambda connection, _: _latest(SiteConnection(connection, site), question)
+        if isinstance(question, Note):
+            return lambda _, stop: write_note(site, question, stop)
         if isinstance(question, Compare | SitesReport):
             return lambda connection, _: _compared(question, connection)
         found = super()._search(question, now)
@@ -174,7 +177,7 @@ class ArchiveRecall(Recall):
                 if connection.closed or not _is_alive(connection):
                     continue
                 return connection
-            return open_archive(os.environ[variable("archive_url")], "lupin-twin fleet")
+            return open_archive(archive_url(), "lupin-twin fleet")
 
     @property
     def _idle_archive(self) -> list[Any]:

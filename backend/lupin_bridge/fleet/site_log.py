@@ -6,16 +6,26 @@ journal reads a site of the archive, and gets the same answer.
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping
+from concurrent.futures import CancelledError
+from contextlib import closing
 from dataclasses import dataclass
 from typing import Any, Final
 
-from lupin_bridge.archive.database import ArchiveError, check_version, connect, explained
+from lupin_bridge.archive.database import CHANNEL, ArchiveError, check_version, connect, explained
+from lupin_bridge.settings import variable
+from lupin_twin.core.notes import Note
+from lupin_twin.journal.notes import last_number, put_note
 from lupin_twin.journal.schema import SiteLog
+from lupin_twin.runtime.workers import ShouldStop
 
 _NOTHING: Final[Mapping[str, Any]] = {}
 # A question that takes longer is given up: nobody waits for its answer any more.
 _MAX_MS: Final = 10_000
+
+# The number up to which the site's journal has come, by which its own notes are known.
+_FORWARDED: Final = "SELECT forwarded_seq FROM epoch WHERE site = :site ORDER BY epoch DESC LIMIT 1"
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,6 +53,11 @@ class SiteConnection:
         return self.connection.info
 
 
+def archive_url() -> str:
+    """Where the archive is: not on the command line of a process, which others can read."""
+    return os.environ[variable("archive_url")]
+
+
 def open_archive(url: str, name: str) -> Any:
     """A connection that cannot write, to the primary or to a standby.
 
@@ -66,3 +81,25 @@ def open_archive(url: str, name: str) -> Any:
         connection.close()
         raise
     return connection
+
+
+def write_note(site: str, note: Note, should_stop: ShouldStop) -> Note:
+    """Write what somebody said into a site's log, at the primary; returns it with its id.
+
+    Raises:
+        ArchiveError: there is no archive that can be written; `psycopg.Error`: it refuses.
+        CancelledError: nobody waits for it any more, and it is not written.
+
+    """
+    with (
+        closing(connect(archive_url(), "lupin-twin fleet")) as connection,
+        connection.transaction(),
+    ):
+        log = SiteLog(connection, site)
+        (forwarded,) = log.execute(_FORWARDED).fetchone() or (0,)
+        # Behind all that were forwarded, and before those that the twin has yet to write.
+        written = put_note(log, max(forwarded, last_number(log)) + 1, note)
+        connection.execute("SELECT pg_notify(%s, %s)", (CHANNEL, site))
+        if should_stop():
+            raise CancelledError
+        return written

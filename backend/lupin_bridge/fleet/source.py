@@ -11,30 +11,20 @@ from dataclasses import replace
 from typing import Any, Final, cast
 
 from lupin_bridge.feed.past_process import PastProcess
-from lupin_bridge.feed.query import Itself, Now
+from lupin_bridge.feed.query import Now
 from lupin_bridge.feed.relay import Relay, Ros
-from lupin_bridge.feed.revisions import RevisedEstimate, RevisionCache, revised
-from lupin_bridge.feed.shared_work import Shared
-from lupin_bridge.feed.source import (
-    RevisedGrid,
-    TwinSource,
-    TwinUnavailableError,
-    TwinUpdate,
-)
+from lupin_bridge.feed.source import TwinSource, TwinUnavailableError, TwinUpdate
 from lupin_bridge.feed.topics import TwinNames
 from lupin_bridge.fleet.overview import Site
 from lupin_bridge.fleet.reader import Latest, Reported
 from lupin_bridge.fleet.watching import Watching
-from lupin_bridge.past.estimate import ReadingsAt
 from lupin_twin.core.journal_condition import Condition, JournalState
+from lupin_twin.core.notes import Note, NotesUnwritable
 from lupin_twin.core.parameters import TwinParameters
 from lupin_twin.core.past import NotRemembered
-from lupin_twin.core.state import samples_of
-from lupin_twin.estimate.engine import EstimateRequest, TagPast
-from lupin_twin.estimate.engine import cost_s as cost_s_of_estimate
-from lupin_twin.field.engine import FieldRequest, FieldRules, check_request, compute_field, cost_s
+from lupin_twin.field.engine import FieldRules
 from lupin_twin.field.explored import OccupancyMap
-from lupin_twin.runtime.estimate_rounds import AS_OF, Report, ReportRequest, estimate_at
+from lupin_twin.runtime.estimate_rounds import Report, ReportRequest
 from lupin_twin.runtime.workers import Workers
 
 log = logging.getLogger(__name__)
@@ -42,9 +32,6 @@ log = logging.getLogger(__name__)
 HEARTBEAT_S: Final = 1.0
 _RETRY_S: Final = 1.0
 _FIRST_S: Final = 5.0
-# Estimates of now are of a whole minute, once so long has passed since.
-_MINUTE_NS: Final = 60_000_000_000
-_LATE_NS: Final = 10_000_000_000
 _NO_REPORT: Final = "how right estimates were is known to the twin of the greenhouse, not here"
 
 
@@ -73,9 +60,6 @@ class SiteTwin(TwinSource):
         self.buffer_len = self._parameters.buffer_len
         self._map: OccupancyMap | None = None
         self._map_hash = 0
-        self._computing: Shared[RevisedGrid] = Shared()
-        self._estimating: Shared[RevisedEstimate] = Shared()
-        self._revisions = RevisionCache(_MINUTE_NS / 1e9)
         self._told: TwinUpdate | None = None
         self._reported: Reported | None = None
         self._read_ns = 0
@@ -139,12 +123,12 @@ class SiteTwin(TwinSource):
                     self._has_read.set()
             except (NotRemembered, TwinUnavailableError) as error:
                 log.info("site %s is as it was: %s", self.site, error)
-                self._problem = f"The archive: {error}."
+                self._problem = _sentence(str(error))
                 await asyncio.sleep(_RETRY_S)
                 continue
             except Exception as error:  # nobody waits for this task, and the page depends on it
                 log.exception("site %s is as it was", self.site)
-                self._problem = f"The archive: {error}."
+                self._problem = _sentence(f"the archive cannot be read: {error}")
                 await asyncio.sleep(_RETRY_S)
                 continue
             await self._wake.wait()
@@ -165,7 +149,7 @@ class SiteTwin(TwinSource):
         site, is_live = self._site, self._is_live
         reported = self._reported
         archive = self._watching.archive
-        problem = self._problem if archive.is_reachable else f"The archive: {archive.message}."
+        problem = self._problem if archive.is_reachable else _sentence(archive.message)
         said = is_live, self._seq, problem
         if reported is None or not (is_live or said != self._said):
             return
@@ -224,10 +208,6 @@ class SiteTwin(TwinSource):
         """Of what was read: the same in all replicas."""
         return f"{self.site}-{self._seq}-{self._map_hash}"
 
-    def field_revision(self, request: FieldRequest) -> str | None:  # noqa: ARG002  # all alike
-        """The revision now."""
-        return self.revision()
-
     def rules(self) -> FieldRules:
         """A twin's own, unless it was given others."""
         return self._rules
@@ -244,59 +224,19 @@ class SiteTwin(TwinSource):
         """The newest that the twin had."""
         return self._map
 
-    async def field(self, request: FieldRequest) -> RevisedGrid:
-        """The field of the newest state, computed on a worker."""
-        check_request(request, self._rules.max_grid_cells)
-        key = (self.revision(), request)
-        return await self._in_time(self._computing.get(key, lambda: self._compute(request)))
-
-    async def _compute(self, request: FieldRequest) -> RevisedGrid:
-        revision, floor = self.revision(), self._map
-        tags = () if self._told is None else self._told.snapshot.tags
-        samples = samples_of(tags, request.sensor_type)
-        grid = await asyncio.wrap_future(
-            self.workers.submit(
-                lambda stop: compute_field(request, samples, floor, self._rules, stop),
-                cost_s(request, len(samples), self._rules),
-            )
-        )
-        return RevisedGrid(grid, revision)
-
-    def _minute_ns(self) -> int:
-        """The last whole minute of which everything has come."""
-        told = self._told
-        at_ns = 0 if told is None else told.snapshot.stamp_ns - _LATE_NS
-        return max(0, at_ns - at_ns % _MINUTE_NS)
-
-    def estimate_revision(self, request: EstimateRequest) -> str | None:
-        """That of the last answer, for a minute."""
-        return self._revisions.revision(request, self._minute_ns())
-
-    async def estimate(self, request: EstimateRequest) -> RevisedEstimate:
-        """That of the last whole minute, so that a model is not fitted for each scan."""
-        at_ns = self._minute_ns()
-        return await self._in_time(
-            self._estimating.get((at_ns, request), lambda: self._estimate(at_ns, request))
-        )
-
-    async def _estimate(self, at_ns: int, request: EstimateRequest) -> RevisedEstimate:
-        day_s, rules = self.day_length_s, self._rules
-        needed = ReadingsAt(request.box.sensor_type, at_ns, day_s)
-        pasts: list[TagPast] = await self.past.ask(Itself(needed), await self.now(), 0.0)
-        made = await asyncio.wrap_future(
-            self.workers.submit(
-                lambda stop: revised(
-                    estimate_at(replace(request, at_ns=at_ns), pasts, day_s, stop)
-                ),
-                AS_OF * cost_s_of_estimate(request, len(pasts), rules.max_grid_cells),
-            )
-        )
-        self._revisions.put(request, at_ns, made.revision)
-        return made
-
     async def estimate_report(self, request: ReportRequest) -> Report:  # noqa: ARG002  # none
         """None: how right estimates were is counted by the twin."""
         raise NotRemembered(_NO_REPORT, is_lasting=True)
+
+    writes_notes = True
+
+    async def write_note(self, note: Note) -> Note:
+        """Into the site's log in the archive, where every replica reads it."""
+        try:
+            written: Note = await self._in_time(self._reading(note))
+        except NotRemembered as error:
+            raise NotesUnwritable(f"the note of {note.by} was not written: {error}") from error
+        return written
 
     async def now(self) -> Now:
         """What who looks back has to know of now."""
@@ -314,6 +254,10 @@ class SiteTwin(TwinSource):
 def _newest_ns(reported: Reported) -> int:
     """The last moment of a simulation that every replica knows of."""
     return max((tag.last_observed_ns or 0 for tag in reported.snapshot.tags), default=0)
+
+
+def _sentence(message: str) -> str:
+    return f"{message[:1].upper()}{message[1:].rstrip('.')}."
 
 
 def _no_ros() -> Any:

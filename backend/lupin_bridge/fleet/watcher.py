@@ -1,42 +1,39 @@
 """The process that watches the archive: what is new of which site, and how each one is.
 
-It writes to its standard output a JSON line a look: the sites that are not as before, or why the
-archive cannot be read. A site's verdict and its alarms are worked out where its last number has
-changed, by the judge that every bridge has, from the rows that have come since.
+It answers each look with the sites that are not as before. A site's verdict and its alarms are
+worked out where its last number has changed, by the judge that every bridge has, from the rows that
+have come since.
 """
 
 from __future__ import annotations
 
 import heapq
 import logging
-import os
-import signal
-import sys
-import threading
 import time
-from collections.abc import Iterator
-from contextlib import closing, suppress
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
-from typing import Any, Final
-
-import orjson
+from typing import Any, Final, TypeVar
 
 from lupin_bridge.alarms.ledger import worst_first
 from lupin_bridge.alarms.notes import notes_of_alarms
 from lupin_bridge.archive.database import CHANNEL, ArchiveError, explained
+from lupin_bridge.feed import past_child
+from lupin_bridge.feed.past_child import Child, Search
+from lupin_bridge.feed.query import Now
 from lupin_bridge.fleet.overview import LIVE_S, Site
-from lupin_bridge.fleet.site_log import SiteConnection, open_archive
+from lupin_bridge.fleet.site_log import SiteConnection, archive_url, open_archive
 from lupin_bridge.fleet.small_map import dots
 from lupin_bridge.judge.alarm import Alarm, silence
 from lupin_bridge.judge.alarm_fold import Follower
 from lupin_bridge.judge.judging import Judge
 from lupin_bridge.judge.options import Criteria
-from lupin_bridge.judge.verdict import Verdict
 from lupin_bridge.serving.admission import Limits
 from lupin_bridge.settings import Settings
 from lupin_bridge.stream.health_json import alarm_json
 from lupin_twin.core.diagnostics import Origin, origin_of
 from lupin_twin.core.notes import Note, NotesRequest
+from lupin_twin.core.past import NotRemembered
 from lupin_twin.core.state import Snapshot, TagState
 from lupin_twin.core.writes import RecentRequest, WritesRequest
 from lupin_twin.journal.fold import state_at
@@ -44,8 +41,12 @@ from lupin_twin.journal.follow import recent, writes
 from lupin_twin.journal.notes import notes
 from lupin_twin.journal.runs import FOREVER_NS, runs, span_at
 from lupin_twin.journal.schema import ORIGIN
+from lupin_twin.runtime.journal_queries import Recall
+from lupin_twin.runtime.workers import ShouldStop
 
 log = logging.getLogger(__name__)
+
+AnswerT = TypeVar("AnswerT")
 
 # A forwarder's word that there is something new wakes it at once; that may be lost, so it looks.
 LOOK_S: Final = 2.0
@@ -60,7 +61,6 @@ _LOT: Final = 2_000
 MAX_ALARMS: Final = 20
 # As many as a bridge reads of the past, see `alarms.feed`.
 _REACH_COUNT: Final = 300_000
-_RETRY_S: Final = 1.0
 
 _FACTS: Final = (
     "SELECT site.site, site.name, coalesce(CAST(extract(epoch FROM heard_at) * 1e9 AS BIGINT), 0),"
@@ -114,14 +114,52 @@ class Watcher:
     """Looks at the sites of an archive, over one connection."""
 
     def __init__(self, connection: Any, criteria: Criteria) -> None:
-        self._connection = connection
+        import psycopg  # noqa: PLC0415  # the extra `fleet`
+
+        self.connection = connection
         self._criteria = criteria
         self.sites: dict[str, Site] = {}
         self._judged: dict[str, _Judged] = {}
+        self._reported: Mapping[str, Site] | None = None
+        # By the archive's clock, of the last look.
+        self._now_ns = 0
+        self._is_judging = False
+        with suppress(psycopg.errors.ReadOnlySqlTransaction):
+            connection.execute(f"LISTEN {CHANNEL}")  # a standby knows no such thing
 
-    def look(self) -> int:
+    def news(self) -> News:
+        """What is not as it was; it looks and judges in turn, for who lives is reported first."""
+        if self._is_judging:
+            until_s = time.monotonic() + _JUDGING_S
+            for _ in self._judge_due(self._now_ns):
+                if time.monotonic() >= until_s:
+                    break
+        else:
+            if self._reported is not None and not self._has_more():
+                self._wait()
+            self._now_ns = self._see()
+        self._is_judging = not self._is_judging
+        before, self._reported = self._reported, dict(self.sites)
+        known = before or {}
+        return News(
+            self._now_ns,
+            before is None,
+            [site for name, site in self.sites.items() if known.get(name) != site],
+            [name for name in known if name not in self.sites],
+        )
+
+    def _wait(self) -> None:
+        """Until somebody says that there is something new, or it is time to look."""
+        is_notified = False
+        for _ in self.connection.notifies(timeout=LOOK_S, stop_after=1):
+            is_notified = True
+        if is_notified:
+            for _ in self.connection.notifies(timeout=_GATHER_S):
+                pass
+
+    def _see(self) -> int:
         """See who lives, and whose log has grown; returns the time of the archive's clock, ns."""
-        execute = self._connection.execute
+        execute = self.connection.execute
         ((now_ns,),) = execute(_NOW).fetchall()
         before, self.sites = self.sites, {}
         for site, *facts in execute(_FACTS, (LIVE_S, ORIGIN)).fetchall():
@@ -147,7 +185,7 @@ class Watcher:
         self._judged = {name: it for name, it in self._judged.items() if name in self.sites}
         return int(now_ns)
 
-    def judge(self, now_ns: int) -> Iterator[str]:
+    def _judge_due(self, now_ns: int) -> Iterator[str]:
         """Judge the sites whose turn it is, the longest ago first; gives each name when done."""
         for name in sorted(self.sites, key=self._turn):
             judged = self._judged.get(name)
@@ -162,7 +200,7 @@ class Watcher:
         criteria = self._criteria
         return Judge(criteria.sensors, criteria.day, criteria.recent_s)
 
-    def has_more(self) -> bool:
+    def _has_more(self) -> bool:
         """Whether somebody's turn has come."""
         return any(
             name not in self._judged or self._is_due(name, self._judged[name])
@@ -188,7 +226,7 @@ class Watcher:
         try:
             self._judge(name, judged, now_ns)
         except Exception:  # whatever is in its rows, or how long they take
-            if self._connection.closed:
+            if self.connection.closed:
                 raise  # of the archive, not of the site
             if not judged.is_failing:
                 log.exception("site %s cannot be judged: its status is unknown", name)
@@ -202,8 +240,8 @@ class Watcher:
 
     def _judge(self, name: str, judged: _Judged, now_ns: int) -> None:
         site = self.sites[name]
-        log: Any = SiteConnection(self._connection, name)
-        with self._connection.transaction():
+        log: Any = SiteConnection(self.connection, name)
+        with self.connection.transaction():
             if judged.seq != site.last_seq:
                 self._read(log, judged)
                 judged.seq = site.last_seq
@@ -293,81 +331,50 @@ def _same(before: TagState | None, now: TagState) -> TagState:
 # --- the process ----------------------------------------------------------------------------------
 
 
-def main() -> None:
-    """Watch until the parent is gone."""
-    logging.getLogger("psycopg").setLevel(logging.CRITICAL)
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    settings = Settings(**orjson.loads(sys.stdin.readline()))
-    threading.Thread(target=_end_with_input, name="end", daemon=True).start()
-    criteria = Criteria.of(settings)
-    while True:
+@dataclass(frozen=True, slots=True)
+class News:
+    """`sites` are those that are new or not as before, all of them if `is_whole`."""
+
+    now_ns: int
+    is_whole: bool
+    sites: Sequence[Site]
+    gone: Sequence[str]
+
+
+class WatchChild(Child):
+    """Looks whenever it gets the settings to judge by; it knows what it has answered before."""
+
+    def __init__(self) -> None:
+        super().__init__(_WithoutJournal)
+        self._watcher: Watcher | None = None
+
+    def _search(self, question: Any, now: Now) -> Search:  # noqa: ARG002  # it is of now
+        return lambda *_: self._look(question)
+
+    def _look(self, settings: Settings) -> News:
+        import psycopg  # noqa: PLC0415  # the extra `fleet`
+
         try:
-            with closing(open_archive(settings.archive_url, "lupin-twin fleet")) as connection:
-                _watch(connection, criteria)
-        except ArchiveError as error:
-            _write({"down": str(error)})
-        time.sleep(_RETRY_S)
+            if self._watcher is None:
+                connection = open_archive(archive_url(), "lupin-twin fleet")
+                self._watcher = Watcher(connection, Criteria.of(settings))
+            return self._watcher.news()
+        except (ArchiveError, psycopg.Error) as error:
+            if self._watcher is not None:
+                self._watcher.connection.close()
+                self._watcher = None
+            why = error if isinstance(error, ArchiveError) else explained(error)
+            raise NotRemembered(str(why), is_lasting=False) from error
 
 
-def _watch(connection: Any, criteria: Criteria) -> None:
-    import psycopg  # noqa: PLC0415  # the extra `fleet`
-
-    watcher = Watcher(connection, criteria)
-    try:
-        with suppress(psycopg.errors.ReadOnlySqlTransaction):
-            connection.execute(f"LISTEN {CHANNEL}")  # a standby knows no such thing
-        reported: dict[str, Site] = {}
-        is_first = True
-        while True:
-            now_ns = watcher.look()
-            reported = _report(watcher, reported, now_ns, is_first=is_first)
-            is_first = False
-            until_s = time.monotonic() + _JUDGING_S
-            for _ in watcher.judge(now_ns):
-                if time.monotonic() >= until_s:
-                    break
-            reported = _report(watcher, reported, now_ns)
-            if not watcher.has_more():
-                _wait(connection)
-    except psycopg.Error as error:
-        raise explained(error) from error
+class _WithoutJournal(Recall):
+    def _answer(
+        self, question: Callable[[Any, ShouldStop], AnswerT], is_abandoned: ShouldStop
+    ) -> AnswerT:
+        return question(None, is_abandoned)
 
 
-def _wait(connection: Any) -> None:
-    """Until somebody says that there is something new, or it is time to look."""
-    is_notified = False
-    for _ in connection.notifies(timeout=LOOK_S, stop_after=1):
-        is_notified = True
-    if is_notified:
-        for _ in connection.notifies(timeout=_GATHER_S):
-            pass
-
-
-def _report(
-    watcher: Watcher, reported: dict[str, Site], now_ns: int, *, is_first: bool = False
-) -> dict[str, Site]:
-    news = [site for name, site in watcher.sites.items() if reported.get(name) != site]
-    gone = [name for name in reported if name not in watcher.sites]
-    _write({"now_ns": now_ns, "is_whole": is_first, "sites": news, "gone": gone})
-    return dict(watcher.sites)
-
-
-def _write(line: dict[str, Any]) -> None:
-    sys.stdout.buffer.write(orjson.dumps(line) + b"\n")
-    sys.stdout.buffer.flush()
-
-
-def read_site(found: dict[str, Any]) -> Site:
-    """A site of a line."""
-    verdict = found.pop("verdict")
-    alarms = tuple(found.pop("alarms"))
-    return Site(**found, alarms=alarms, verdict=None if verdict is None else Verdict(verdict))
-
-
-def _end_with_input() -> None:
-    sys.stdin.read()
-    os._exit(0)
-
-
-if __name__ == "__main__":
-    main()
+def main() -> None:
+    """Answer the parent until it ends."""
+    logging.getLogger("psycopg").setLevel(logging.CRITICAL)
+    past_child.main(WatchChild)

@@ -14,10 +14,13 @@ from lupin_bridge.judge.ranges import Ranges, Sensor, Sensors, Span
 
 MAX_SENSORS = 64
 MAX_SPECIES = 64
+MAX_AREAS = 200
+MAX_AREA_TAGS = 10_000
 MAX_TEXT = 64
 MAX_SOURCE = 400
 
 _Name = Annotated[str, Field(max_length=MAX_TEXT)]
+_Ids = Annotated[list[_Name], Field(max_length=MAX_AREA_TAGS)]
 _Limit = Annotated[float, Field(ge=-1e9, le=1e9)]
 _Share = Annotated[float, Field(ge=0, le=100)]
 # The sensors that each computed quantity is made of.
@@ -115,6 +118,8 @@ class _File(_Part):
     ramp: _Ramp
     fallback: _Sensor
     sensors: Annotated[dict[str, _Sensor], Field(max_length=MAX_SENSORS)]
+    # For who reads the file: bays, rows or zones, with the ids of their tags (`A*`: that begin so).
+    areas: Annotated[dict[_Name, _Ids], Field(max_length=MAX_AREAS)] = {}
 
     @model_validator(mode="after")
     def _says_what_is_derived(self) -> Self:

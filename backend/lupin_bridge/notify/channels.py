@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Protocol
 
 from lupin_bridge.alarms.board import AlarmBoard
+from lupin_bridge.alarms.notes import NoteBoard
 from lupin_bridge.feed.source import TwinSource
 from lupin_bridge.judge.options import Criteria
 from lupin_bridge.judge.ranges import Sensors
@@ -17,6 +18,7 @@ from lupin_bridge.notify.destinations import Targets
 from lupin_bridge.notify.messages import GreenhouseState
 from lupin_bridge.notify.mirror import Mirror
 from lupin_bridge.notify.mqtt import Mqtt
+from lupin_bridge.notify.push import Push
 from lupin_bridge.notify.webhook import Webhook
 from lupin_bridge.stream.status import Outward
 from lupin_twin.core.diagnostics import Origin
@@ -38,6 +40,7 @@ class Source(Protocol):
     """What the channels need of the bridge."""
 
     alarms: AlarmBoard
+    notes: NoteBoard
     source: TwinSource
     criteria: Criteria
 
@@ -59,8 +62,14 @@ class Channels:
     `folder` is where it is noted which reports were sent. Belongs to the event loop.
     """
 
-    def __init__(self, targets: Targets | None = None, folder: Path = Path()) -> None:
+    def __init__(
+        self,
+        targets: Targets | None = None,
+        folder: Path = Path(),
+        push: Push | None = None,
+    ) -> None:
         self._targets, self._folder = targets or Targets(), folder
+        self.push = push
         self._mqtt: Mqtt | None = None
         self._webhook: Webhook | None = None
         self._reports: list[DailyReport] = []
@@ -68,7 +77,7 @@ class Channels:
     def start(self, source: Source, sensors: Sensors) -> None:
         """Begin to notify."""
         targets = self._targets
-        if targets.mqtt is None and targets.webhook is None:
+        if targets.mqtt is None and targets.webhook is None and self.push is None:
             return
         asyncio.get_running_loop().set_default_executor(
             DetachedThreads(thread_name_prefix="notify")
@@ -79,9 +88,11 @@ class Channels:
         if targets.webhook is not None:
             self._webhook = Webhook(targets.webhook)
             self._webhook.start(source.alarms, lambda: source.ros_time_ns, lambda: source.origin)
+        if self.push is not None:
+            self.push.start(source)
         if targets.report_at is not None:
             daily = DailyTarget(targets.report_at, source.criteria.clock.zone, self._folder)
-            self._reports = [DailyReport(daily, channel) for channel in self._running]
+            self._reports = [DailyReport(daily, it) for it in (self._mqtt, self._webhook) if it]
         for report in self._reports:
             report.start(source)
 
@@ -105,5 +116,5 @@ class Channels:
         yield "lupin_outward_dropped", {k: it.dropped for k, it in conditions.items()}
 
     @property
-    def _running(self) -> tuple[Mqtt | Webhook, ...]:
-        return tuple(it for it in (self._mqtt, self._webhook) if it is not None)
+    def _running(self) -> tuple[Mqtt | Webhook | Push, ...]:
+        return tuple(it for it in (self._mqtt, self._webhook, self.push) if it is not None)

@@ -97,15 +97,18 @@ class MqttTarget:
 
 
 @dataclass(frozen=True, slots=True)
-class WebhookTarget:
-    """The receiver of alarms; `path` holds the query too, and may be a secret."""
+class Endpoint:
+    """Where to post; `path` holds the query too, and may be a secret.
+
+    `address` is where to connect to in place of `host`, if that was looked up already.
+    """
 
     host: str
     port: int
     path: str = field(repr=False)
     authority: str
-    secret: bytes = field(repr=False)
     tls: ssl.SSLContext | None = None
+    address: str = ""
 
     @property
     def called(self) -> str:
@@ -114,11 +117,28 @@ class WebhookTarget:
 
 
 @dataclass(frozen=True, slots=True)
+class WebhookTarget(Endpoint):
+    """The receiver of alarms, and what they are signed with."""
+
+    secret: bytes = field(default=b"", repr=False)
+
+
+@dataclass(frozen=True, slots=True)
+class PushTarget:
+    """Who answers for what is pushed, and hosts that may be in a private network."""
+
+    contact: str
+    private_hosts: frozenset[str]
+    tls: ssl.SSLContext
+
+
+@dataclass(frozen=True, slots=True)
 class Targets:
     """Where the operator wants notifications; None: nowhere."""
 
     mqtt: MqttTarget | None = None
     webhook: WebhookTarget | None = None
+    push: PushTarget | None = None
     report_at: time | None = None
 
     @classmethod
@@ -130,9 +150,12 @@ class Targets:
 
         """
         mqtt, webhook = _mqtt(settings, secrets.mqtt_password), _webhook(settings, secrets)
-        return cls(mqtt, webhook, _report_at(settings, has_target=bool(mqtt or webhook)))
+        report_at = _report_at(settings, has_target=bool(mqtt or webhook))
+        return cls(mqtt, webhook, _push(settings), report_at)
 
 
+# RFC 8292, section 2.1.
+_CONTACT: Final = re.compile(r"(mailto:[!-?A-~]+@[!-~]+|https://[!-~]+)", re.ASCII)
 _HOUR: Final = re.compile(r"(?:[01]\d|2[0-3]):[0-5]\d", re.ASCII)
 
 
@@ -215,6 +238,20 @@ def _webhook(settings: Settings, secrets: Secrets) -> WebhookTarget | None:
         secret=secret.encode(),
         tls=_tls(settings, "webhook_ca", is_wanted=url.scheme == "https", url="webhook_url"),
     )
+
+
+def _push(settings: Settings) -> PushTarget | None:
+    contact = settings.push_contact
+    if not contact:
+        _needs(settings, "push_contact", "push_private_host")
+        return None
+    if not _CONTACT.fullmatch(contact):
+        raise SettingError(
+            f"{settings.called('push_contact')} is {contact[:128]!r}, must be mailto: and an "
+            "address, or https:// and a page"
+        )
+    hosts = frozenset(host.lower() for host in settings.push_private_host)
+    return PushTarget(contact, hosts, ssl.create_default_context())
 
 
 def _address(settings: Settings, name: str, ports: dict[str, int]) -> tuple[SplitResult, int]:

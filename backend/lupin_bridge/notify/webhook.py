@@ -1,9 +1,7 @@
 """The webhook: changes of alarms, one POST after the other, each until it is taken.
 
 A change has one id however often it is sent, also after a restart: changes of the day before are
-sent once more, and a receiver drops the ids that it has had. A POST has a connection of its own,
-and of its answer only the status is read. h11 is there for the server already: a client library
-would bring proxies, redirects, cookies and bodies of any size.
+sent once more, and a receiver drops the ids that it has had.
 """
 
 from __future__ import annotations
@@ -13,124 +11,24 @@ import base64
 import hashlib
 import hmac
 import logging
-import os
 import random
 import time
 from collections import OrderedDict, deque
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import Final, Literal
 
-import h11
 import orjson
 
 from lupin_bridge.alarms.board import AlarmBoard
 from lupin_bridge.alarms.ledger import Change, happened_ns
 from lupin_bridge.judge.alarm import Alarm
 from lupin_bridge.notify.destinations import Backoff, Condition, WebhookTarget
+from lupin_bridge.notify.http_post import PostAnswer, PostError, post
 from lupin_bridge.stream.health_json import alarm_json
 from lupin_twin.core.diagnostics import Origin
 
 log = logging.getLogger(__name__)
-
-CONNECT_S: Final = 5.0
-ANSWER_S: Final = 10.0
-# Of the answer's head. Its body is not read.
-MAX_HEAD_BYTES: Final = 16_384
-
-
-class PostError(RuntimeError):
-    """There was no answer; the message says why, in a few words."""
-
-
-@dataclass(frozen=True, slots=True)
-class PostAnswer:
-    """The status, and for how long the receiver wants to be left alone, s."""
-
-    status: int
-    retry_after_s: int = 0
-
-
-async def post(
-    target: WebhookTarget,
-    headers: Mapping[str, str],
-    body: bytes,
-    connect_s: float = CONNECT_S,
-    answer_s: float = ANSWER_S,
-) -> PostAnswer:
-    """Send it, and wait for the answer's head. Redirects are not followed.
-
-    Raises:
-        PostError: no connection, no valid TLS, no answer in time, or none of HTTP.
-
-    """
-    try:
-        async with asyncio.timeout(connect_s):
-            reader, writer = await asyncio.open_connection(
-                target.host, target.port, ssl=target.tls, limit=MAX_HEAD_BYTES
-            )
-    except TimeoutError:
-        raise PostError(f"no connection within {connect_s:g} s") from None
-    except OSError as error:
-        raise PostError(_words_of(error)) from None
-    except UnicodeError:  # of a label that is empty or too long
-        raise PostError("its host is no name that can be looked up") from None
-    try:
-        async with asyncio.timeout(answer_s):
-            return await _exchange(target, headers, body, reader, writer)
-    except TimeoutError:
-        raise PostError(f"no answer within {answer_s:g} s") from None
-    except OSError as error:
-        raise PostError(_words_of(error)) from None
-    except h11.RemoteProtocolError as error:
-        raise PostError(f"no answer of HTTP: {error}") from None
-    finally:
-        # At once: what more it has to say is not wanted.
-        writer.transport.abort()
-
-
-async def _exchange(
-    target: WebhookTarget,
-    headers: Mapping[str, str],
-    body: bytes,
-    reader: asyncio.StreamReader,
-    writer: asyncio.StreamWriter,
-) -> PostAnswer:
-    http = h11.Connection(h11.CLIENT, max_incomplete_event_size=MAX_HEAD_BYTES)
-    head = h11.Request(
-        method="POST",
-        target=target.path,
-        headers=[
-            ("Host", target.authority),
-            ("User-Agent", "lupin-twin"),
-            ("Content-Type", "application/json"),
-            ("Content-Length", str(len(body))),
-            ("Connection", "close"),
-            *headers.items(),
-        ],
-    )
-    for part in (head, h11.Data(data=body), h11.EndOfMessage()):
-        writer.write(http.send(part) or b"")
-    await writer.drain()
-    while True:
-        event = http.next_event()
-        if isinstance(event, h11.Response):
-            # As many digits as matter: Python reads no number of thousands.
-            given = dict(event.headers).get(b"retry-after", b"")[:9]
-            return PostAnswer(event.status_code, int(given) if given.isdigit() else 0)
-        if event is h11.NEED_DATA:
-            got = await reader.read(MAX_HEAD_BYTES)
-            if not got:
-                raise PostError("the connection was closed before an answer")
-            http.receive_data(got)
-
-
-def _words_of(error: OSError) -> str:
-    # asyncio and OpenSSL have words of their own, and errors of theirs have numbers of theirs.
-    if isinstance(error, ConnectionError) and error.errno:
-        return os.strerror(error.errno)
-    return error.strerror or str(error) or type(error).__name__
-
 
 MAX_WAITING: Final = 1_000
 # Alarms whose last change is known; far more than are active at once.
@@ -401,7 +299,7 @@ class Webhook:
         body = delivery.body(lost, self._origin())
         headers = signed(self._target.secret, delivery.id, int(time.time()), body)
         try:
-            answer = await post(self._target, headers, body, answer_s=ANSWER_S)
+            answer = await post(self._target, headers, body)
         except PostError as error:
             return self._failed(str(error))
         if 200 <= answer.status < 300:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import sqlite3
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
 
 from lupin_bridge.feed.query import Find
 from lupin_bridge.field import formats
@@ -12,8 +13,14 @@ from lupin_bridge.field.formats import JSON
 from lupin_bridge.field.query import EstimateQuery
 from lupin_bridge.past.plans import Field, Plan, etag_of
 from lupin_bridge.serving.admission import REVALIDATE, Answer
-from lupin_twin.core.state import Snapshot
-from lupin_twin.estimate.engine import EstimateRequest, TagPast, cost_s
+from lupin_twin.core.state import NANOSECONDS_PER_SECOND, Snapshot
+from lupin_twin.estimate.engine import (
+    MINUTES_A_DAY,
+    EstimateRequest,
+    TagPast,
+    cost_s,
+    moment_of,
+)
 from lupin_twin.field.grid import far_off_tags
 from lupin_twin.journal.queries import SERIES_S
 from lupin_twin.runtime.estimate_rounds import AS_OF, estimate_at, readings_at
@@ -35,10 +42,16 @@ class ReadingsAt:
 
 @dataclass(frozen=True, slots=True)
 class Estimated(Field):
-    """An estimate in a format; a day takes `day_length_s` of ROS time."""
+    """An estimate in a format; a day takes `day_length_s` of ROS time.
+
+    Without a moment it is that of now, `now_ns`. That is made for the newest reading or the last
+    whole minute of the day, whichever is later: a minute of the day changes nothing that anybody
+    could see, but of the same readings it is the same estimate throughout, to the last bit.
+    """
 
     query: EstimateQuery
     day_length_s: float
+    now_ns: int = field(default=0, compare=False)
 
     def write_s(self, tags: int) -> float:
         """See `StateQuery`."""
@@ -54,10 +67,15 @@ class Estimated(Field):
             lupin_twin.field.engine.FieldRefused: a bad request, or nothing to make an estimate of.
 
         """
-        at_ns = self.at_ns or 0
+        at_ns = self.now_ns if self.at_ns is None else self.at_ns
         snapshot: Snapshot = find(at_ns)
         box = self.request(snapshot)
-        pasts: list[TagPast] = find(ReadingsAt(box.sensor_type, at_ns, self.day_length_s))
+        # A minute more than a day: so none is missing for as long as this estimate is the same.
+        reach_s = self.day_length_s * (1.0 + 1.0 / MINUTES_A_DAY)
+        pasts: list[TagPast] = find(ReadingsAt(box.sensor_type, at_ns, reach_s))
+        if self.at_ns is None:
+            at_ns = moment_of(pasts, at_ns, self.day_length_s)
+        pasts = _since(pasts, at_ns - int(self.day_length_s * NANOSECONDS_PER_SECOND))
         request, far_off = EstimateRequest(box, at_ns), far_off_tags(snapshot.tags)
         query, sensors = self.query, self.criteria.sensors
         field_format = self.field_format or JSON
@@ -87,3 +105,11 @@ class Estimated(Field):
             return Answer(body, field_format.media_type, {**headers, "ETag": etag, **REVALIDATE})
 
         return Plan(etag, self.write_s(len(snapshot.tags)), write)
+
+
+def _since(pasts: Sequence[TagPast], since_ns: int) -> list[TagPast]:
+    recent = (
+        replace(past, readings=tuple(one for one in past.readings if one[0] >= since_ns))
+        for past in pasts
+    )
+    return [past for past in recent if past.readings]

@@ -66,9 +66,9 @@ _LARGE_BYTES: Final = 65_536
 # reading or a bucket.
 PLAN_TAG_S: Final = 10e-6
 _WRITE_TAG_S: Final = 20e-6
-WRITE_CELL_S: Final = 50e-9
+_WRITE_CELL_S: Final = 50e-9
 _HEALTH_TAG_S: Final = 1e-3
-JUDGE_TAG_S: Final = 20e-6
+_JUDGE_TAG_S: Final = 20e-6
 _WRITE_ENTRY_S: Final = 5e-6
 # Of a field too large to estimate, or one that will be refused.
 _LARGE_S: Final = 1.0
@@ -231,7 +231,8 @@ class Field(StateQuery):
     """A field in a format (None: its quality), by these rules, on the map of now.
 
     Without a box, it is that of the tags as they were pinned then. Quantities of a day are made of
-    each tag's readings of a day; whether it was day is decided by the clock.
+    each tag's readings of a day; whether it was day is decided by the clock. Live and past differ
+    in where the snapshot comes from, and in their ETags (`newest_etag`).
     """
 
     query: FieldQuery
@@ -260,6 +261,12 @@ class Field(StateQuery):
         except FieldRefused:
             return daily_s + _LARGE_S
 
+    def newest_etag(self, revision: str) -> str:
+        """Of the newest state: of its revision, and nothing has to be looked at for it."""
+        name = "quality" if self.field_format is None else self.field_format.name
+        rules, sensors = self.rules, self.criteria.sensors
+        return etag_of(f"newest {name}", (revision, self.query, rules, sensors.text))
+
     def look(self, find: Find) -> Plan:
         """See `Query`."""
         at_ns = self.at_ns or 0
@@ -270,8 +277,8 @@ class Field(StateQuery):
             snapshot = replace(snapshot, tags=tuple(tags))
         return self.plan(snapshot)
 
-    def plan(self, snapshot: Snapshot) -> Plan:
-        """See `StateQuery`.
+    def plan(self, snapshot: Snapshot, etag: str | None = None) -> Plan:
+        """See `StateQuery`; None: the ETag is made of content.
 
         Raises:
             lupin_twin.field.engine.FieldRefused: a bad request.
@@ -282,10 +289,13 @@ class Field(StateQuery):
         tags = with_derived(snapshot.tags, request.sensor_type)
         samples = samples_of(tags, request.sensor_type)
         far_off = far_off_tags(snapshot.tags)
-        # By content: the revision of a map is one process's own.
-        digest = None if self.occupancy is None else _digest_of_map(self.occupancy)
-        conditions = (self.rules, digest, sensors.text)
         cost = cost_s(request, len(samples), self.rules)
+
+        def content_etag(kind: str, *content: object) -> str:
+            # By content: the revision of a map is one process's own.
+            digest = None if self.occupancy is None else _digest_of_map(self.occupancy)
+            made_of = (request, samples, *content, far_off, self.rules, digest, sensors.text)
+            return etag_of(kind, made_of)
 
         def quality(should_stop: ShouldStop) -> bytes:
             grid = compute_field(request, samples, self.occupancy, self.rules, should_stop)
@@ -293,12 +303,10 @@ class Field(StateQuery):
 
         if self.field_format is None:
             of = [tag.tag_id for tag in tags if samples_of((tag,), request.sensor_type)]
-            etag = etag_of("quality", (request, samples, of, far_off, *conditions))
-            return _plan(etag, quality, cost + len(tags) * JUDGE_TAG_S)
+            etag = etag or content_etag("quality", of)
+            return _plan(etag, quality, cost + len(tags) * _JUDGE_TAG_S)
         field_format, scale = self.field_format, self.query.scale
-        etag = etag_of(
-            f"field {field_format.name} {scale}", (request, samples, far_off, *conditions)
-        )
+        etag = etag or content_etag(f"field {field_format.name} {scale}")
 
         def write(should_stop: ShouldStop) -> Answer:
             grid = compute_field(request, samples, self.occupancy, self.rules, should_stop)
@@ -324,7 +332,7 @@ class Field(StateQuery):
 
     def _writing_s(self, request: FieldRequest) -> float:
         width, height = check_request(request, self.rules.max_grid_cells)
-        return width * height * self.query.scale**2 * WRITE_CELL_S
+        return width * height * self.query.scale**2 * _WRITE_CELL_S
 
 
 # --- over a period --------------------------------------------------------------------------------

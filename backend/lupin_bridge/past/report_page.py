@@ -5,7 +5,7 @@ Its words are in `report_words.json`, by language; sensors have theirs in the fi
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import datetime
 from functools import cache
@@ -18,6 +18,7 @@ import orjson
 from lupin_bridge.judge.options import Criteria, unix_s
 from lupin_bridge.past.plans import Plan
 from lupin_bridge.past.report import WHOLE_SITE, Report, planned
+from lupin_twin.core.diagnostics import Origin
 
 HTML_TYPE: Final = "text/html; charset=utf-8"
 _POLICY: Final = (
@@ -44,6 +45,8 @@ dd { margin: 0; font-size: 13pt } .critical td:first-child { font-weight: 700 }
 td:first-child { min-width: 22mm; hyphens: auto }
 @media print { body { padding: 0; max-width: none } }
 """
+# Alarms in one notification.
+MAX_PUSHED: Final = 4
 Words = Mapping[str, Any]
 # An entry of a list in the body.
 Entry = Mapping[str, Any]
@@ -54,6 +57,25 @@ def _words() -> Mapping[str, Words]:
     text = files("lupin_bridge.past").joinpath("report_words.json").read_text(encoding="utf-8")
     found: Mapping[str, Words] = orjson.loads(text)
     return found
+
+
+def languages() -> Collection[str]:
+    """Those that there are words in."""
+    return _words().keys()
+
+
+def push_text(
+    alarms: Sequence[Entry], lang: str, criteria: Criteria, origin: Origin
+) -> tuple[str, str]:
+    """Title and text of a notification of alarms, each as in `/api/alarms`."""
+    page = _Page(lang, criteria)
+    title = page.say("alarm") if len(alarms) == 1 else f"{page.say('alarms')}: {len(alarms)}"
+    lines = [page.alarm(alarm) for alarm in alarms[:MAX_PUSHED]]
+    if len(alarms) > MAX_PUSHED:
+        lines.append(page.say("more", count=len(alarms) - MAX_PUSHED))
+    of = _words()[lang]["origins"].get(origin, "")
+    # A tag's name may be long, a push service takes 4 kB.
+    return f"{of}: {title}" if of else title, "\n".join(line[:200] for line in lines)
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,7 +100,7 @@ class _Page:
         self._labels = {name: it.get("labels", {}).get(lang) for name, it in named.items()}
 
     def page(self, body: Entry) -> str:
-        say, at = self._say, self._at
+        say, at = self.say, self._at
         period = say("period", **{"from": at(body["from"]), "to": at(body["to"])})
         title = f"{say('title')}: {period}"
         known = [
@@ -115,10 +137,10 @@ class _Page:
         shown = {
             **{name: str(counts[name]) for name in ("raised", "cleared", "active", "critical")},
             **{name: str(counts[name]) for name in ("scans", "failed", "inspections")},
-            "scanned": self._say("of", part=part, whole=whole, share=share),
+            "scanned": self.say("of", part=part, whole=whole, share=share),
         }
         cells = (
-            f"<div><dt>{escape(self._say(name))}</dt><dd>{escape(text)}</dd></div>"
+            f"<div><dt>{escape(self.say(name))}</dt><dd>{escape(text)}</dd></div>"
             for name, text in shown.items()
         )
         return f"<dl>{''.join(cells)}</dl>"
@@ -126,14 +148,14 @@ class _Page:
     def _alarms(self, body: Entry) -> str:
         later = ""
         if body["alarms_from"] != body["from"]:
-            later = f"<p>{escape(self._say('later', at=self._at(body['alarms_from'])))}</p>"
+            later = f"<p>{escape(self.say('later', at=self._at(body['alarms_from'])))}</p>"
         columns = ("alarm", "where", "when", "end", "first*", "worst*", "limit*", "who")
         return self._table(body, "alarms", "alarms", columns, self._alarm, later)
 
     def _alarm(self, alarm: Entry) -> Iterable[str]:
         reason = alarm["reason"]
         who = [
-            self._say(word, name=alarm[f"{word}_by"], at=self._at(alarm[f"{word}_{when}"]))
+            self.say(word, name=alarm[f"{word}_by"], at=self._at(alarm[f"{word}_{when}"]))
             for word, when in (("acknowledged", "at"), ("shelved", "until"))
             if f"{word}_by" in alarm
         ]
@@ -143,7 +165,7 @@ class _Page:
             f"{self._what(reason)} ({self._words['verdicts'][reason['verdict']]})",
             self._where(alarm["tag_id"]),
             self._at(alarm["raised_at"]),
-            self._say("still") if cleared is None else self._at(cleared),
+            self.say("still") if cleared is None else self._at(cleared),
             _number(reason["value"], unit) if numbers or reason["kind"] == "pest" else "",
             _number(alarm["worst"], unit),
             _number(reason["limit"], unit) if numbers else "",
@@ -182,9 +204,9 @@ class _Page:
                 alarm = alarms[subject]
                 about = f"{self._what(alarm['reason'])}, {self._where(alarm['tag_id'])}"
             else:
-                about = self._say("alarm") if kind == "alarm" else self._where(name)
+                about = self.say("alarm") if kind == "alarm" else self._where(name)
             said = [self._words["kinds"].get(note["kind"], note["kind"]), note["text"]]
-            said += [self._say("withdrawn", name=gone)] if gone else []
+            said += [self.say("withdrawn", name=gone)] if gone else []
             text = "; ".join(it for it in said if it)
             return self._at(note["made_at"]), note["by"], text, about
 
@@ -207,11 +229,11 @@ class _Page:
     ) -> str:
         """A list of the body; a column whose word ends with `*` has numbers."""
         kinds = [' class="number"' if column.endswith("*") else "" for column in columns]
-        head = f"<h2>{escape(self._say(title))}</h2>{before}"
+        head = f"<h2>{escape(self.say(title))}</h2>{before}"
         if not body[name]:
-            return f"{head}<p>{escape(self._say('none'))}</p>"
+            return f"{head}<p>{escape(self.say('none'))}</p>"
         names = "".join(
-            f'<th scope="col"{kind}>{escape(self._say(column.removesuffix("*")))}</th>'
+            f'<th scope="col"{kind}>{escape(self.say(column.removesuffix("*")))}</th>'
             for column, kind in zip(columns, kinds, strict=True)
         )
         rows = "".join(
@@ -228,11 +250,17 @@ class _Page:
 
     def _more(self, body: Entry, name: str) -> str:
         count = body["left_out"][name]
-        return f'<p class="note">{escape(self._say("more", count=count))}</p>' if count else ""
+        return f'<p class="note">{escape(self.say("more", count=count))}</p>' if count else ""
 
     # --- words ------------------------------------------------------------------------------------
 
-    def _say(self, word: str, **filled: object) -> str:
+    def alarm(self, alarm: Entry) -> str:
+        """An alarm in a line."""
+        reason = alarm["reason"]
+        verdict = self._words["verdicts"][reason["verdict"]]
+        return f"{self._where(alarm['tag_id'])}: {self._what(reason)} ({verdict})"
+
+    def say(self, word: str, **filled: object) -> str:
         text: str = self._words[word]
         for name, value in filled.items():
             text = text.replace(f"{{{name}}}", str(value))
@@ -251,9 +279,7 @@ class _Page:
         return self._labels.get(sensor) or self._criteria.sensors.named(sensor).label
 
     def _where(self, tag_id: str) -> str:
-        return (
-            self._say("house") if tag_id in (WHOLE_SITE, "site") else self._say("tag", name=tag_id)
-        )
+        return self.say("house") if tag_id in (WHOLE_SITE, "site") else self.say("tag", name=tag_id)
 
     def _at(self, when: Mapping[str, int]) -> str:
         """A moment by the greenhouse's clock; of a simulation, the time since its beginning."""
@@ -270,7 +296,7 @@ class _Page:
             for when in moments
             if (wall_s := unix_s(when["sec"] * 1_000_000_000)) is not None
         }
-        name = self._say("this_machine") if zone is None else str(zone)
+        name = self.say("this_machine") if zone is None else str(zone)
         return f"{name} ({', '.join(sorted(offsets))})" if offsets else name
 
 

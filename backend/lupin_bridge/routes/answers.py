@@ -15,6 +15,7 @@ from typing import Any, Final, Protocol, TypeVar, cast
 import orjson
 from fastapi import APIRouter, FastAPI, Request, Response
 from pydantic import BaseModel, ValidationError
+from starlette.requests import HTTPConnection
 from starlette.types import Receive, Scope, Send
 
 from lupin_bridge.access.accounts import AccountError, Person
@@ -27,9 +28,9 @@ from lupin_bridge.past.plans import (
     PLAN_TAG_S,
     Answered,
     ConditionalQuery,
+    Field,
     NoSuchTag,
     Query,
-    StateQuery,
 )
 from lupin_bridge.serving.admission import REVALIDATE, AdmissionError, Answer, BusyError, Limits
 from lupin_bridge.stream import schema
@@ -87,7 +88,7 @@ def bridge_of(request: Request) -> Bridge:
     return cast("Bridge", request.app.state.bridge)
 
 
-def person_of(request: Request) -> Person | None:
+def person_of(request: HTTPConnection) -> Person | None:
     """Who makes a request, where that is known."""
     found: Person | None = request.scope["state"].get(PERSON_KEY)
     return found
@@ -336,36 +337,44 @@ async def computed(
 # --- answers of the past --------------------------------------------------------------------------
 
 
-async def respond_newest(request: Request, query: StateQuery) -> Response:
-    """A query of the newest state, which is answered in this process.
+async def respond_newest(request: Request, field: Field) -> Response:
+    """A field of the newest state.
 
     Raises:
         AdmissionError: past a limit.
-        Exception: what the query raised.
+        Exception: what the field raised.
 
     """
     bridge = bridge_of(request)
+    etag = field.newest_etag(bridge.source.revision())
+    client = client_of(request)
+    return await respond(request, etag, lambda: newest_field(bridge, client, field, etag), etag)
+
+
+async def newest_field(bridge: Bridge, client: str, field: Field, etag: str) -> Answer:
+    """A field of the newest state, which is computed in this process, and cached.
+
+    Raises:
+        AdmissionError: past a limit of the client that was the first to ask.
+        TwinUnavailableError: there is no state.
+        lupin_twin.field.engine.FieldRefused: a bad request.
+
+    """
+    if bridge.latest is None:
+        raise TwinUnavailableError(NO_TWIN)
+    snapshot = bridge.latest.snapshot
 
     async def run(work: Callable[[ShouldStop], ResultT], cost_s: float) -> ResultT:
         return work(never) if cost_s <= _AT_ONCE_S else await on_worker(bridge, work, cost_s)
 
-    async def work() -> Answer | Response:
-        if bridge.latest is None:
-            raise TwinUnavailableError(NO_TWIN)
-        snapshot = bridge.latest.snapshot
-        plan = await run(lambda _: query.plan(snapshot), len(snapshot.tags) * PLAN_TAG_S)
-        if has_etag(request, plan.etag):
-            return not_modified(plan.etag)
-
-        async def write() -> Answer:
-            with bridge.admission.computing(client_of(request), is_large=plan.cost_s > SMALL_S):
-                answer = await run(plan.write, plan.cost_s)
-            bridge.cache.put(plan.etag, answer)
-            return answer
-
-        return cached(bridge, plan.etag) or await bridge.answering.get(plan.etag, write)
-
-    return await admitted(request, work)
+    plan = await run(lambda _: field.plan(snapshot, etag), len(snapshot.tags) * PLAN_TAG_S)
+    with (
+        bridge.admission.computing(client, is_large=plan.cost_s > SMALL_S),
+        bridge.metrics.field_seconds.time(),
+    ):
+        answer = await run(plan.write, plan.cost_s)
+    bridge.cache.put(etag, answer)
+    return answer
 
 
 async def respond_as_of(request: Request, query: Query, at_ns: int) -> Response:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Awaitable, Callable
 from dataclasses import dataclass
-from functools import partial
 from typing import Annotated, Final, TypeVar
 
 from annotated_types import Interval
@@ -12,10 +11,9 @@ from fastapi import APIRouter, Request, Response
 
 from lupin_bridge.access.middleware import client_of
 from lupin_bridge.bridge import Bridge
-from lupin_bridge.feed.estimates import MAX_SENSORS, newest_of
+from lupin_bridge.feed.estimates import MAX_SENSORS, NAMES_TAG_S, newest_of
 from lupin_bridge.feed.source import TwinUnavailableError
 from lupin_bridge.field import formats
-from lupin_bridge.field import query as field_query
 from lupin_bridge.field.formats import PNG, FieldFormat
 from lupin_bridge.field.query import EstimateQuery
 from lupin_bridge.past import query as past_query
@@ -30,14 +28,13 @@ from lupin_bridge.routes.answers import (
     read_route,
     respond,
     respond_as_of,
+    respond_past,
 )
-from lupin_bridge.routes.field import InFormats, checked_request, far_off, write_s
-from lupin_bridge.serving.admission import REVALIDATE, Answer, json_answer
+from lupin_bridge.routes.field import InFormats
+from lupin_bridge.serving.admission import Answer, json_answer
 from lupin_bridge.stream import estimate_schema, report_json
-from lupin_twin.estimate.engine import EstimateRequest, cost_s
 from lupin_twin.field.engine import FieldRefused
 from lupin_twin.runtime.estimate_rounds import DEFAULT_PLACES, MAX_PLACES, ReportRequest
-from lupin_twin.runtime.workers import SMALL_S
 
 router = APIRouter()
 
@@ -46,80 +43,32 @@ ESTIMATE: Final = InFormats(
     summary="The estimate of one sensor",
     description="""From all readings of a day, in space and time, with its error.
 
-That of now is made for the newest reading or the last whole minute of the day, whichever is
-later: until then its ETag holds, unless something arrives, or a model fitted anew. Of a moment
-that has passed it is made of what the log has up to then, the model too.""",
+Made of what the log has up to a moment, the model too. That of now is made for the newest reading
+or the last whole minute of the day, whichever is later: until then its ETag holds.""",
     parameters=parameters_of(EstimateQuery),
     model=estimate_schema.GetEstimateResponse,
     refusal_json=formats.estimate_refusal_json,
 )
 
 
-async def _answer(http: Request, field_format: FieldFormat) -> Response:
-    bridge = bridge_of(http)
-    query = read(EstimateQuery, http.query_params.multi_items(), FieldRefused)
+async def _answer(request: Request, field_format: FieldFormat) -> Response:
+    bridge = bridge_of(request)
+    query = read(EstimateQuery, request.query_params.multi_items(), FieldRefused)
     if query.layer != "mean" and field_format != PNG:
         raise FieldRefused(f"layer is {query.layer!r}, but only a PNG has one")
-    at_ns = past_query.at_of(query.at, bridge.ros_time_ns)
+    now_ns, source = bridge.ros_time_ns, bridge.source
+    at_ns = past_query.at_of(query.at, now_ns)
+    estimated = Estimated(
+        *(at_ns, query, field_format, source.rules(), None, bridge.criteria),
+        day_length_s=source.day_length_s,
+        now_ns=now_ns or 0,
+    )
+    estimated.check()
     if at_ns is not None:
-        source = bridge.source
-        rules, day_length_s = source.rules(), source.day_length_s
-        estimated = Estimated(
-            at_ns, query, field_format, rules, None, bridge.criteria, day_length_s
-        )
-        estimated.check()
-        return await respond_as_of(http, estimated, at_ns)
-    box, cells = checked_request(bridge, query, field_format)
-    request = EstimateRequest(box)
-    revision = bridge.source.estimate_revision(request)
-    key = (bridge.source.revision(), request, field_format.name, query.layer, query.scale)
-    return await respond(
-        http,
-        key,
-        lambda: _computed(http, request, cells, query, field_format),
-        revision and _etag(revision, request, query, field_format),
-    )
-
-
-async def _computed(
-    http: Request,
-    request: EstimateRequest,
-    cells: int,
-    query: EstimateQuery,
-    field_format: FieldFormat,
-) -> Answer:
-    """The estimate in a format, with its ETag, put into the cache."""
-    bridge = bridge_of(http)
-    max_cells = bridge.source.rules().max_grid_cells
-    tags = 0 if bridge.latest is None else len(bridge.latest.snapshot.tags)
-    writing_s = 2 * write_s(cells, query.scale)
-    is_large = cost_s(request, tags, max_cells) + writing_s > SMALL_S
-    sensor_type, sensors = query.sensor_type, bridge.criteria.sensors
-    with (
-        bridge.admission.computing(client_of(http), is_large=is_large),
-        bridge.metrics.estimate_seconds.time(),
-    ):
-        result = await bridge.source.estimate(request)
-        estimate = formats.within_ideal(result.estimate, sensors.named(sensor_type))
-        write = partial(formats.write_estimate, layer=query.layer, scale=query.scale)
-        body = await on_worker(
-            bridge, lambda _: write(estimate, field_format, sensor_type, sensors), writing_s
-        )
-    etag = _etag(result.revision, request, query, field_format)
-    metadata = formats.estimate_metadata(estimate, sensors.named(sensor_type))
-    headers = field_query.headers(
-        {**metadata, **far_off(bridge)}, f"{sensor_type}.{field_format.name}", "Estimate"
-    )
-    answer = Answer(body, field_format.media_type, {**headers, "ETag": etag, **REVALIDATE})
-    bridge.cache.put(etag, answer)
-    return answer
-
-
-def _etag(
-    revision: str, request: EstimateRequest, query: EstimateQuery, field_format: FieldFormat
-) -> str:
-    kind = f"estimate {field_format.name} {query.layer}"
-    return field_query.etag(revision, request.box, kind, query.scale)
+        return await respond_as_of(request, estimated, at_ns)
+    if now_ns is None:
+        raise TwinUnavailableError(NO_TWIN)
+    return await respond_past(request, estimated, "estimate")
 
 
 ESTIMATE.register(router, _answer)
@@ -153,8 +102,7 @@ class AdviceQuery(TagsQuery):
 
 QueryT = TypeVar("QueryT", QualityQuery, TagsQuery, AdviceQuery)
 
-# What looking through the tags for their sensors takes for each, and what writing one.
-_LOOK_TAG_S: Final = 5e-6
+# What writing a tag takes.
 _WRITE_TAG_S: Final = 10e-6
 
 
@@ -237,7 +185,5 @@ async def _sensors(bridge: Bridge) -> list[str]:
     if bridge.latest is None:
         raise TwinUnavailableError(NO_TWIN)
     snapshot = bridge.latest.snapshot
-    newest = await on_worker(
-        bridge, lambda _: newest_of(snapshot), len(snapshot.tags) * _LOOK_TAG_S
-    )
-    return sorted(newest)[:MAX_SENSORS]
+    cost_s = len(snapshot.tags) * NAMES_TAG_S
+    return sorted(await on_worker(bridge, lambda _: newest_of(snapshot), cost_s))[:MAX_SENSORS]

@@ -165,7 +165,7 @@ async def withdraw_note(request: Request, note_id: str) -> Response:
 def _writer(request: Request, bridge: Bridge) -> Person | Response:
     """Who writes, or why they do not."""
     person = person_of(request)
-    if person is None:
+    if person is None or not person.name:
         return error_response(
             "notes are written by people: sign in with an account of the role operator "
             "(`lupin-twin user add`)",
@@ -242,13 +242,23 @@ def _until(draft: people_schema.NoteDraft, now_ns: int, *, is_critical: bool) ->
     return min(until_ns, now_ns + longest_s * NANOSECONDS_PER_SECOND)
 
 
-async def _write(request: Request, bridge: Bridge, note: Note) -> Note:
-    wait_s = bridge.notes.pace.take(note.by, time.monotonic())
+def pace_note(bridge: Bridge, name: str) -> None:
+    """Refuse what comes too fast from one name.
+
+    Raises:
+        ClientLimitError: it has written too much.
+
+    """
+    wait_s = bridge.notes.pace.take(name, time.monotonic())
     if wait_s > 0.0:
         raise ClientLimitError(
-            f"{note.by} has written more than {NOTE_BURST} notes and {NOTES_PER_MINUTE} a minute",
+            f"{name} has written more than {NOTE_BURST} notes and {NOTES_PER_MINUTE} a minute",
             wait_s,
         )
+
+
+async def _write(request: Request, bridge: Bridge, note: Note) -> Note:
+    pace_note(bridge, note.by)
     access: Access = request.app.state.access
     written = await bridge.source.write_note(note)
     # It is in the log: whatever becomes of the rest, nobody is told that it is not.

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import secrets
 import time
 from collections.abc import Callable, Collection
 from functools import cache
@@ -17,11 +16,10 @@ from starlette.responses import RedirectResponse
 from starlette.staticfiles import StaticFiles
 from starlette.types import Scope
 
-from lupin_bridge.access import accounts
-from lupin_bridge.access.credentials import SESSION_S, BrowserSession
-from lupin_bridge.access.middleware import CONTENT_POLICY, SESSION_KEY, Access, client_of
-from lupin_bridge.access.people import People
+from lupin_bridge.access.credentials import SHARED
+from lupin_bridge.access.middleware import CONTENT_POLICY, Access, client_of
 from lupin_bridge.bridge import Bridge
+from lupin_bridge.feed.source import TwinSource
 from lupin_bridge.routes.answers import (
     NEVER_STORE,
     computed,
@@ -253,39 +251,37 @@ async def sign_in(request: Request) -> Response:
 
     For the page below: programs send `Authorization: Bearer` with every request instead.
     """
-    access, person = _access_of(request), person_of(request)
-    if not access.is_closed:
+    people, person = _access_of(request).people, person_of(request)
+    if people is None or not people.is_on:
         return error_response("this bridge asks for no token: there is nothing to sign in to", 404)
-    has_token = "authorization" in request.headers
-    if access.people is not None and access.people.has_file and (person or not has_token):
-        return await _sign_in_person(request, access.people, person if has_token else None)
-    if access.credentials is None or not has_token:  # a session must not renew itself
-        return error_response(
-            "send the token as Authorization: Bearer", 401, {"WWW-Authenticate": "Bearer"}
-        )
+    address, ends_others = client_of(request), False
+    if "authorization" not in request.headers:
+        if not people.has_file:  # a session must not renew itself
+            return error_response(
+                "send the token as Authorization: Bearer", 401, {"WWW-Authenticate": "Bearer"}
+            )
+        given = await read_body(request, people_schema.SignIn)
+        person = await people.check(given.name, given.password, address)
+        ends_others = given.ends_others
+    if person is None:
+        return error_response("there is no such account, or the password is another", 401)
+    name, cookie, lasts_s = await people.sign_in(person, address, ends_others=ends_others)
     response = Response(status_code=204, headers=NEVER_STORE)
-    response.set_cookie(
-        access.credentials.cookie_name,
-        access.credentials.cookie(secrets.token_hex(16), time.time()),
-        max_age=SESSION_S,
-        **_place_of(request),
-    )
+    response.set_cookie(name, cookie, max_age=lasts_s, **_place_of(request))
     return response
 
 
 @router.post("/api/signout", include_in_schema=False)
 async def sign_out(request: Request) -> Response:
     """End the session that the request comes with, and everything that it has open."""
-    access, person = _access_of(request), person_of(request)
-    if access.people is not None and person is not None:
-        return await _sign_out_person(request, access.people, person)
-    if access.credentials is None:
+    people, person = _access_of(request).people, person_of(request)
+    if people is None or person is None:
         return error_response("this bridge asks for no token: there is nothing to sign out of", 404)
-    session = _session_of(request)
-    if session is not None:
-        access.sessions.sign_out(session, time.time())
     response = Response(status_code=204, headers=NEVER_STORE)
-    response.delete_cookie(access.credentials.cookie_name, **_place_of(request))
+    if person.session:
+        response.delete_cookie(
+            await people.sign_out(person, client_of(request)), **_place_of(request)
+        )
     return response
 
 
@@ -297,48 +293,19 @@ async def sign_out(request: Request) -> Response:
 )
 async def session_route(request: Request) -> Response:
     """Who makes the request, and how long a session that it came with still lasts."""
-    session, person = _session_of(request), person_of(request)
-    ends_s = None if session is None else session.ends_s
-    if person is not None and person.session:
-        ends_s = person.ends_at_s
-    bridge: Bridge | None = getattr(request.app.state, "bridge", None)
-    is_writer = bridge is not None and bridge.source.writes_notes
+    person = person_of(request) or SHARED
+    # A fleet has no log of its own.
+    source: TwinSource | None = getattr(request.app.state.bridge, "source", None)
+    is_writer = source is not None and source.writes_notes
+    seconds_left = max(0.0, person.ends_at_s - time.time()) if person.session else None
     body = {
-        "can_sign_out": ends_s is not None,
-        "seconds_left": None if ends_s is None else max(0.0, ends_s - time.time()),
-        "name": None if person is None else person.name,
-        "role": "viewer" if person is None else person.role,
-        "can_write_notes": is_writer and person is not None and person.may("operator"),
+        "can_sign_out": bool(person.session),
+        "seconds_left": seconds_left,
+        "name": person.name or None,
+        "role": person.role,
+        "can_write_notes": is_writer and person.may("operator"),
     }
     return json_response(orjson.dumps(body))
-
-
-async def _sign_in_person(
-    request: Request, people: People, person: accounts.Person | None
-) -> Response:
-    """Begin a session: of the token that the request came with, or of an account."""
-    address = client_of(request)
-    if person is None:
-        given = await read_body(request, people_schema.SignIn)
-        found = await people.check(given.name, given.password, address)
-        if found is None:
-            return error_response("there is no such account, or the password is another", 401)
-        person = found
-    cookie = await people.sign_in(person.name, address)
-    response = Response(status_code=204, headers=NEVER_STORE)
-    response.set_cookie(
-        people.cookie_name(), cookie, max_age=accounts.SESSION_S, **_place_of(request)
-    )
-    return response
-
-
-async def _sign_out_person(request: Request, people: People, person: accounts.Person) -> Response:
-    if person.session:
-        await people.sign_out(person, client_of(request))
-    response = Response(status_code=204, headers=NEVER_STORE)
-    if people.has_file:
-        response.delete_cookie(people.cookie_name(), **_place_of(request))
-    return response
 
 
 @read_route(router, "/signin", include_in_schema=False)
@@ -383,11 +350,6 @@ def _place_of(request: Request) -> _Place:
         "httponly": True,
         "samesite": "strict",
     }
-
-
-def _session_of(request: Request) -> BrowserSession | None:
-    session: BrowserSession | None = request.scope["state"].get(SESSION_KEY)
-    return session
 
 
 def _access_of(request: Request) -> Access:

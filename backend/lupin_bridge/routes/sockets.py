@@ -29,10 +29,10 @@ from lupin_bridge.bridge import Bridge
 from lupin_bridge.feed.relay import Listening, NotRelayedError, Sample
 from lupin_bridge.feed.source import TwinUnavailableError
 from lupin_bridge.field import formats as field_formats
-from lupin_bridge.field import query as field_query
 from lupin_bridge.field.formats import JSON
-from lupin_bridge.routes.answers import error_response
-from lupin_bridge.routes.field import field_answer
+from lupin_bridge.field.query import FieldQuery
+from lupin_bridge.past.plans import Field
+from lupin_bridge.routes.answers import error_response, newest_field
 from lupin_bridge.serving.admission import AdmissionError
 from lupin_bridge.serving.ws_protocol import BINARY, CONNECTION_KEY, Connection, frame_head
 from lupin_bridge.stream.frames import text_frame
@@ -43,7 +43,7 @@ from lupin_bridge.viewers.rosbridge_protocol import service_failure, service_res
 from lupin_bridge.viewers.rosbridge_services import FieldCall
 from lupin_bridge.viewers.rosbridge_session import Feeds, Writer
 from lupin_bridge.viewers.rosbridge_session import Session as RosbridgeSession
-from lupin_twin.field.engine import FieldRefused, FieldRequest
+from lupin_twin.field.engine import FieldRefused
 
 log = logging.getLogger(__name__)
 router = APIRouter()
@@ -322,8 +322,8 @@ class _RosbridgeConversation(_Conversation):
             await self._send(service_failure(call.id, call.service, text))
             return
         limit_s = self._bridge.limits.answer_timeout_s
-        if call.timeout_s is not None:
-            limit_s = min(limit_s, call.timeout_s)
+        if call.timeout is not None and call.timeout > 0.0:
+            limit_s = min(limit_s, call.timeout)
         task = asyncio.create_task(self._answer(field_call, limit_s))
         self._calls.add(task)
         task.add_done_callback(self._calls.discard)
@@ -343,7 +343,7 @@ class _RosbridgeConversation(_Conversation):
         call = field_call.call
         try:
             async with asyncio.timeout_at(deadline_s):
-                values = await self._values(field_call.request, held)
+                values = await self._values(field_call.query, held)
             response = service_response(call.id, call.service, values, result=True)
         except TimeoutError:
             text = f"{call.service} did not answer within {limit_s:g} s"
@@ -360,18 +360,17 @@ class _RosbridgeConversation(_Conversation):
             response = service_failure(call.id, call.service, text)
         return text_frame(response)
 
-    async def _values(self, request: FieldRequest, held: ExitStack) -> bytes:
-        bridge = self._bridge
-        # Under the key of the same field over HTTP: it is the same body.
-        revision = bridge.source.field_revision(request)
-        tag = revision and field_query.etag(revision, request, JSON.name, 1)
-        if tag and (lent := bridge.cache.lend(tag)) is not None:
+    async def _values(self, query: FieldQuery, held: ExitStack) -> bytes:
+        bridge, source = self._bridge, self._bridge.source
+        field = Field(None, query, JSON, source.rules(), source.occupancy_map(), bridge.criteria)
+        field.check()
+        # Under the ETag of the same field over HTTP: it is the same body.
+        etag = field.newest_etag(source.revision())
+        if (lent := bridge.cache.lend(etag)) is not None:
             answer, give_back = lent
             give_back()  # the reply holds a copy of its own
             return bytes(answer.body)
-        held.enter_context(bridge.admission.request(self._client.address, time.monotonic()))
-        key = (bridge.source.revision(), request, JSON.name, 1)
-        answer = await bridge.answering.get(
-            key, lambda: field_answer(bridge, self._client.address, request, JSON)
-        )
+        client = self._client.address
+        held.enter_context(bridge.admission.request(client, time.monotonic()))
+        answer = await bridge.answering.get(etag, lambda: newest_field(bridge, client, field, etag))
         return bytes(answer.body)

@@ -38,7 +38,7 @@ MAX_LINES: Final = 1 + MAX_HEADERS + 1  # the request's line, and the blank one
 HIGH_WATER_BYTES: Final = 64 * 1024
 # Where a body is taken, and how much of it: a note of 500 characters, each of them escaped; 64
 # readings.
-BODIES: Final = (b"/api/notes", b"/api/observations", b"/api/signin")
+BODIES: Final = (b"/api/notes", b"/api/observations", b"/api/push", b"/api/signin")
 MAX_BODY_BYTES: Final = 8 * 1024
 # Where a request's scope has its connection, among the state.
 CONNECTION_KEY: Final = "http_connection"

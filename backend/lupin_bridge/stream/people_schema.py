@@ -37,6 +37,26 @@ class SignIn(_Given):
 
     name: str
     password: str
+    ends_others: bool = Field(default=False, description="sign this name out everywhere else")
+
+
+class _Keys(_Given):
+    p256dh: str = Field(max_length=100, description="of the browser, base64url (RFC 8291)")
+    auth: str = Field(max_length=30, description="of the browser, base64url (RFC 8291)")
+
+
+class PushSubscription(_Given):
+    """The body of `POST /api/push`: a browser's own, as its `toJSON()` gives it."""
+
+    endpoint: str = Field(max_length=1_000, description="the push service's address")
+    keys: _Keys | None = Field(default=None, description="null: notify it no more")
+    expirationTime: float | None = None  # noqa: N815  # as browsers write it
+
+
+class PushKey(Contract):
+    """`/api/push`: whether notifications can be had, and by which key."""
+
+    public_key: str | None = Field(description="base64url; null: not here, or not for them")
 
 
 class NoteDraft(_Given):

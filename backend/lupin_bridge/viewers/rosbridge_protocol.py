@@ -1,7 +1,7 @@
 """The read-only part of the rosbridge v2 protocol, as values: what came in, what goes out.
 
-Pure. Served at `/rosbridge` are `subscribe` and `unsubscribe` (the twin's topics), `call_service`
-(GetField and a little of rosapi) and `set_level`: what roslib's clients use to read, with `args` as
+Pure. Served at `/rosbridge` are `subscribe` and `unsubscribe` (the twin's topics), and
+`call_service` (GetField and a little of rosapi): what roslib's clients use to read, with `args` as
 an object. Any other operation is refused with a `status` message that names it.
 
 How the options meet our policy, which keeps the newest for a client and queues no more:
@@ -19,22 +19,19 @@ https://github.com/RobotWebTools/rosbridge_suite/blob/ros2/ROSBRIDGE_PROTOCOL.md
 
 from __future__ import annotations
 
-import math
-from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import Any, Final, Literal
+from typing import Annotated, Any, Final, Literal
 
 import orjson
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from lupin_bridge.serving.ws_protocol import members_of, shown
 
 MAX_NAME_LENGTH: Final = 256
 MAX_THROTTLE_RATE_MS: Final = 3_600_000.0
 
-Level = Literal["none", "error", "warning", "info"]
-LEVELS: Final[tuple[Level, ...]] = ("none", "error", "warning", "info")
-
-Id = str | int | None
+Level = Literal["error", "warning"]
+Name = Annotated[str, Field(max_length=MAX_NAME_LENGTH)]
+Id = Name | int | None
 
 
 class Refused(ValueError):
@@ -49,45 +46,60 @@ class Refused(ValueError):
         self.service = service
 
 
-@dataclass(frozen=True, slots=True)
-class Subscribe:
+class _Request(BaseModel):
+    """What every operation may have."""
+
+    model_config = ConfigDict(strict=True, frozen=True)
+
+    id: Id = None
+    compression: Name = "none"
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What is served in another way than it was requested."""
+        if self.compression == "none":
+            return ()
+        return (f"compression {shown(self.compression)} is not served: messages are plain JSON",)
+
+
+class Subscribe(_Request):
     """A subscription to a topic; `type` is empty where the client leaves it open."""
 
-    id: Id
-    topic: str
-    type: str
-    throttle_rate_ms: float
-    warnings: tuple[str, ...]
+    topic: Name
+    type: Name = ""
+    throttle_rate: Annotated[float, Field(ge=0, le=MAX_THROTTLE_RATE_MS)] = 0.0
+    queue_length: Annotated[float, Field(ge=0)] = 0.0
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """See `_Request`."""
+        if self.queue_length <= 1:
+            return super().warnings
+        length = f"queue_length {self.queue_length:.15g} is served as 1: the newest only"
+        return (*super().warnings, length)
 
 
-@dataclass(frozen=True, slots=True)
-class Unsubscribe:
+class Unsubscribe(_Request):
     """The end of one subscription to a topic, or of all where `id` is None."""
 
-    id: Id
-    topic: str
+    topic: Name
 
 
-@dataclass(frozen=True, slots=True)
-class CallService:
-    """A call; `args` are by name. `timeout_s` None: as long as the bridge waits."""
+class CallService(_Request):
+    """A call; `args` are by name. `timeout`, s; one that is not positive is none."""
 
-    id: Id
-    service: str
-    type: str
-    args: dict[str, Any]
-    timeout_s: float | None
-    warnings: tuple[str, ...]
+    service: Name
+    type: Name = ""
+    args: dict[str, Any] = Field(default_factory=dict)
+    timeout: float | None = None
 
 
-@dataclass(frozen=True, slots=True)
-class SetLevel:
-    """The least level of status that the client wants, for the whole connection."""
-
-    level: Level
-
-
-Request = Subscribe | Unsubscribe | CallService | SetLevel
+Request = Subscribe | Unsubscribe | CallService
+_OPERATIONS: Final[dict[str, type[Request]]] = {
+    "subscribe": Subscribe,
+    "unsubscribe": Unsubscribe,
+    "call_service": CallService,
+}
 
 
 # --- incoming ---------------------------------------------------------------------------------
@@ -101,123 +113,31 @@ def parse(message: str | bytes) -> Request:
 
     """
     try:
-        members = members_of(message)
+        given = members_of(message)
     except ValueError as error:
         raise Refused(str(error)) from None
-    message_id = _id(members)
-    try:
-        return _request(members, message_id)
-    except Refused as error:
-        raise Refused(str(error), message_id, error.service) from None
-
-
-def _id(members: Mapping[str, Any]) -> Id:
-    value = members.get("id")
-    if isinstance(value, str) and len(value) > MAX_NAME_LENGTH:
-        raise Refused(f"id has {len(value)} characters, the limit is {MAX_NAME_LENGTH}")
-    if value is None or type(value) in (str, int):
-        return value
-    raise Refused(f"id is {shown(value)}, expected a string or an integer")
-
-
-def _request(members: Mapping[str, Any], message_id: Id) -> Request:
-    op = _text(members, "op")
-    if op == "subscribe":
-        return _subscribe(members, message_id)
-    if op == "unsubscribe":
-        return Unsubscribe(message_id, _text(members, "topic"))
-    if op == "call_service":
-        return _call_service(members, message_id)
-    if op == "set_level":
-        return _set_level(members)
-    raise Refused(
-        f"{op} is refused: lupin-twin only reads, expected subscribe, unsubscribe, "
-        "call_service or set_level"
-    )
-
-
-def _subscribe(members: Mapping[str, Any], message_id: Id) -> Subscribe:
-    warnings = _transport(members)
-    queue_length = _number(members, "queue_length", 0.0)
-    if queue_length > 1:
-        warnings.append(f"queue_length {queue_length:.15g} is served as 1: the newest only")
-    throttle_rate_ms = _number(members, "throttle_rate", 0.0)
-    if throttle_rate_ms > MAX_THROTTLE_RATE_MS:
+    members = {name: value for name, value in given.items() if value is not None}
+    op, message_id, service = (members.get(name) for name in ("op", "id", "service"))
+    # Of a wrong kind, they are not repeated.
+    message_id = message_id if _is_short(message_id) or type(message_id) is int else None
+    kind = _OPERATIONS.get(op) if isinstance(op, str) else None
+    if kind is None:
+        served = ", ".join(_OPERATIONS)
         raise Refused(
-            f"throttle_rate is {members['throttle_rate']}, expected 0 to "
-            f"{MAX_THROTTLE_RATE_MS:.15g} ms"
+            f"op {shown(op)} is refused: lupin-twin only reads, expected {served}", message_id
         )
-    return Subscribe(
-        id=message_id,
-        topic=_text(members, "topic"),
-        type=_text(members, "type", default=""),
-        throttle_rate_ms=throttle_rate_ms,
-        warnings=tuple(warnings),
-    )
-
-
-def _call_service(members: Mapping[str, Any], message_id: Id) -> CallService:
-    service = _text(members, "service")
     try:
-        warnings = _transport(members)
-        timeout_s = _number(members, "timeout", 0.0, low=-math.inf)
-        return CallService(
-            id=message_id,
-            service=service,
-            type=_text(members, "type", default=""),
-            args=_args(members),
-            timeout_s=timeout_s if timeout_s > 0.0 else None,
-            warnings=tuple(warnings),
-        )
-    except Refused as error:
-        raise Refused(str(error), service=service) from None
+        return kind.model_validate(members)
+    except ValidationError as error:
+        first = error.errors(include_url=False, include_context=False)[0]
+        name, why = str(first["loc"][0]), first["msg"]
+        value = "" if first["type"] == "missing" else f" is {shown(first['input'])}"
+        called = service if kind is CallService and _is_short(service) else None
+        raise Refused(f"{name}{value}: {why[0].lower()}{why[1:]}", message_id, called) from None
 
 
-def _args(members: Mapping[str, Any]) -> dict[str, Any]:
-    args = members.get("args")
-    if args is None:
-        return {}
-    if isinstance(args, dict):
-        return args
-    raise Refused(f"args is {shown(args)}, expected an object")
-
-
-def _set_level(members: Mapping[str, Any]) -> SetLevel:
-    level = _text(members, "level")
-    if level not in LEVELS:
-        raise Refused(f"level is {shown(level)}, expected {', '.join(LEVELS)}")
-    return SetLevel(level)
-
-
-def _transport(members: Mapping[str, Any]) -> list[str]:
-    compression = _text(members, "compression", default="none")
-    if compression == "none":
-        return []
-    return [f"compression {shown(compression)} is not served: messages are plain JSON"]
-
-
-def _text(members: Mapping[str, Any], name: str, *, default: str | None = None) -> str:
-    value = members.get(name)
-    if value is None:
-        if default is None:
-            raise Refused(f"{name} is missing, expected a string")
-        return default
-    if not isinstance(value, str):
-        raise Refused(f"{name} is {shown(value)}, expected a string")
-    if len(value) > MAX_NAME_LENGTH:
-        raise Refused(f"{name} has {len(value)} characters, the limit is {MAX_NAME_LENGTH}")
-    return value
-
-
-def _number(members: Mapping[str, Any], name: str, default: float, low: float = 0.0) -> float:
-    value = members.get(name)
-    if value is None:
-        return default
-    if type(value) not in (int, float):
-        raise Refused(f"{name} is {shown(value)}, expected a number")
-    if value < low:
-        raise Refused(f"{name} is {value}, must not be less than {low:.15g}")
-    return float(value)
+def _is_short(value: object) -> bool:
+    return isinstance(value, str) and len(value) <= MAX_NAME_LENGTH
 
 
 # --- outgoing ---------------------------------------------------------------------------------

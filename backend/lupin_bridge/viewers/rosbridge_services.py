@@ -21,10 +21,9 @@ import numpy as np
 import orjson
 
 from lupin_bridge.feed.topics import TwinNames, absolute, topics_of
-from lupin_bridge.field.query import BOX_NAMES
+from lupin_bridge.field.query import BOX_NAMES, FieldQuery
 from lupin_bridge.serving.ws_protocol import shown
 from lupin_bridge.viewers.rosbridge_protocol import CallService, Refused
-from lupin_twin.field.engine import FieldRequest
 
 Converter = Callable[[Any], Any]
 
@@ -124,7 +123,7 @@ class FieldCall:
     """A checked call of GetField; the field itself may still be refused by the twin."""
 
     call: CallService
-    request: FieldRequest
+    query: FieldQuery
 
 
 def is_type(given: str, expected: str) -> bool:
@@ -160,7 +159,7 @@ def answer(call: CallService, names: TwinNames) -> FieldCall | bytes:
 def _field_call(call: CallService) -> FieldCall:
     if call.type and not is_type(call.type, FIELD_TYPE):
         raise Refused(f"type is {shown(call.type)}, expected {FIELD_TYPE}")
-    return FieldCall(call, FieldRequest(**_arguments(call.args, _FIELD_ARGS)))
+    return FieldCall(call, FieldQuery(**_arguments(call.args, _FIELD_ARGS)))
 
 
 def _arguments(args: dict[str, Any], defaults: Mapping[str, str | float]) -> dict[str, Any]:

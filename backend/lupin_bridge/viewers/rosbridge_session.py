@@ -23,12 +23,9 @@ from lupin_bridge.feed.topics import Topic, TwinNames, absolute, topics_of
 from lupin_bridge.serving.ws_protocol import shown
 from lupin_bridge.stream.frames import StateFrame, text_frame
 from lupin_bridge.viewers.rosbridge_protocol import (
-    LEVELS,
     CallService,
     Id,
-    Level,
     Refused,
-    SetLevel,
     Subscribe,
     Unsubscribe,
     parse,
@@ -72,7 +69,6 @@ class Session:
 
     def __init__(self, names: TwinNames) -> None:
         self._names = names
-        self._level: Level = "warning"
         self._topics = {topic.name: topic for topic in topics_of(names)}
         # By (topic as the client spells it, subscription's id); the last made is the last.
         self._subscriptions: dict[tuple[str, Id], Subscribe] = {}
@@ -105,7 +101,7 @@ class Session:
 
     def _interval_s(self, name: str) -> float:
         rates = [
-            one.throttle_rate_ms for (topic, _), one in self._subscriptions.items() if topic == name
+            one.throttle_rate for (topic, _), one in self._subscriptions.items() if topic == name
         ]
         return min(rates) / 1000.0
 
@@ -124,9 +120,6 @@ class Session:
                     return self._unsubscribe(request)
                 case CallService():
                     return self._call_service(request)
-                case SetLevel():
-                    self._level = request.level
-                    return Reaction()
         except Refused as refused:
             return Reaction(self._refusal(refused))
 
@@ -188,15 +181,10 @@ class Session:
     def _refusal(self, refused: Refused) -> tuple[bytes, ...]:
         if refused.service is not None:
             return (service_failure(refused.id, refused.service, str(refused)),)
-        return self._status("error", str(refused), refused.id)
+        return (status("error", str(refused), refused.id),)
 
     def _warn(self, texts: tuple[str, ...], message_id: Id) -> tuple[bytes, ...]:
-        return tuple(reply for text in texts for reply in self._status("warning", text, message_id))
-
-    def _status(self, level: Level, text: str, message_id: Id) -> tuple[bytes, ...]:
-        if LEVELS.index(level) > LEVELS.index(self._level):
-            return ()
-        return (status(level, text, message_id),)
+        return tuple(status("warning", text, message_id) for text in texts)
 
 
 def _published(topic: str, frame: StateFrame) -> bytes:

@@ -1,7 +1,8 @@
 import { expect, test } from 'vitest';
 
 import { alarm } from '../testing/alarms';
-import { CATALOGUE } from '../testing/sensors';
+import { cataloguesOf } from '../domain/sensors';
+import { CATALOGUE, FILE } from '../testing/sensors';
 import { alarmsCsv, arranged, causeFacts, filtered } from './arrange';
 import { NOTHING_KEPT, shelve } from './kept';
 import { listOf } from './list';
@@ -29,6 +30,19 @@ test('many of one cause stand together, the worst cause first; a few stand by th
   ]);
   const loose = arranged(active(...many(hot, 4), ...many(cold, 4)), 'cause', speech);
   expect(loose.map(({ cause, items }) => [cause, items.length])).toEqual([[null, 8]]);
+});
+
+test('of one cause, each area stands by itself, and is found by its name', () => {
+  const areas = { North: ['1', '2', '3', '4', '5'], South: ['6', '7', '8', '9', '1*'] };
+  const sensors = cataloguesOf({ ...FILE, areas }).day;
+  const items = active(...many(cold, 11));
+  const found = arranged(items, 'cause', { sensors, unit: 'C' });
+  expect(found.map(({ cause, items: own }) => [cause, own.length]).sort()).toEqual([
+    ['North · Temperature too low', 5],
+    ['South · Temperature too low', 6],
+  ]);
+  const list = listOf(many(cold, 11), NOTHING_KEPT, null, AT);
+  expect(filtered(list, 'south', { sensors, unit: 'C' }).active).toHaveLength(6);
 });
 
 test('of a cause the value farthest beyond, and since when one has been active', () => {

@@ -1,4 +1,4 @@
-/** The list of alarms as somebody wants to see it: filtered, sorted, grouped by cause; and as a file. Pure. */
+/** The list of alarms as somebody wants to see it: filtered, sorted, grouped by cause and area; and as a file. Pure. */
 import type { Alarm, WireTime } from '../contract/types';
 import { csv, type Cell } from '../domain/csv';
 import { isOfRange, sideOf } from '../domain/health';
@@ -51,7 +51,7 @@ export function arranged(items: readonly Item[], order: Order, speech: Speech): 
   }
   const causes = new Map<string, readonly Item[]>();
   for (const item of items) {
-    const cause = causeOf(item.alarm);
+    const cause = causeOf(item.alarm, speech);
     causes.set(cause, [...(causes.get(cause) ?? []), item]);
   }
   const blocks: Block[] = [];
@@ -69,11 +69,19 @@ export function arranged(items: readonly Item[], order: Order, speech: Speech): 
   return blocks;
 }
 
-/** What is wrong, wherever it is and by whatever limit. */
-const causeOf = ({ reason }: Alarm): string =>
-  [reason.kind, reason.sensor, isOfRange(reason) ? sideOf(reason) : ''].join('|');
+/** What is wrong in which area, by whatever limit. */
+const causeOf = ({ reason, tag_id }: Alarm, { sensors }: Speech): string =>
+  [
+    ...[reason.kind, reason.sensor, isOfRange(reason) ? sideOf(reason) : ''],
+    sensors.areaOf(tag_id),
+  ].join('|');
 
 function causeText(alarm: Alarm, speech: Speech): string {
+  const area = speech.sensors.areaOf(alarm.tag_id);
+  return [...(area === '' ? [] : [shown(area, 32)]), causeWords(alarm, speech)].join(' · ');
+}
+
+function causeWords(alarm: Alarm, speech: Speech): string {
   const { reason } = alarm;
   if (!isOfRange(reason)) return whatText(alarm, speech);
   const beyond = sideOf(reason) === 'below' ? S.tooLow(null) : S.tooHigh(null);

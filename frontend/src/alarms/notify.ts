@@ -6,6 +6,7 @@ import { S } from '../strings';
 import { showAlarm } from './follow';
 import type { Item } from './list';
 import { own, preferTold } from './own';
+import { wishPush } from './push';
 import { textNow } from './speech';
 import { onNews } from './watch';
 import { severalText } from './words';
@@ -32,7 +33,12 @@ export async function wishNotify(isWished: boolean): Promise<void> {
     await Notification.requestPermission();
     notifyState.dispatch(stateNow());
   }
-  preferTold({ notify: isWished && notifyState.get() === 'granted' });
+  const isOn = isWished && notifyState.get() === 'granted';
+  preferTold({ notify: isOn });
+  // Beside it: the page notifies by itself while it is open.
+  await wishPush(isOn).catch((error: unknown) => {
+    console.warn('no push notifications', error);
+  });
 }
 
 /** One for all that is new; a later one takes its place, in every tab of the browser. */

@@ -25,7 +25,7 @@ export interface Frame {
 const MARKER_ROOM = 9;
 const MARKER_SIZE = 6;
 
-/** Gaps, what is missing, ideal range and what buckets range over. */
+/** Gaps, what is missing, ideal range, critical limits and what buckets range over. */
 export function drawBelow(frame: Frame, model: PlotModel, palette: ChartPalette): void {
   const { context, box } = frame;
   context.save();
@@ -57,6 +57,15 @@ function drawIdeal(frame: Frame, { sensor, unit }: PlotModel, palette: ChartPale
   }
   context.stroke();
   context.setLineDash([]);
+  // Where the values come near it: a line that nothing ever crosses has no room.
+  context.strokeStyle = palette.failure;
+  context.beginPath();
+  for (const limit of sensor.critical ?? []) {
+    const edge = Math.round(y(toShown(sensor, limit, unit))) + 0.5;
+    context.moveTo(box.left, edge);
+    context.lineTo(box.left + box.width, edge);
+  }
+  context.stroke();
 }
 
 /** Hatched, so that an empty stretch is seen to be told and not forgotten. */

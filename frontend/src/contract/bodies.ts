@@ -15,6 +15,8 @@ import { MAX_SENSORS, POSE, TEXT, TIME } from './shapes';
 
 /** More scans than any twin keeps of one tag in memory. */
 const MAX_SCANS = 20_000;
+const MAX_AREAS = 200;
+const MAX_AREA_TAGS = 10_000;
 
 export const MAP = object({
   info: object({ resolution: number, width: count, height: count, origin: POSE }),
@@ -64,4 +66,5 @@ export const SENSORS = object({
   ramp: object({ saturation: number, max_alpha: number }),
   fallback: SENSOR,
   sensors: record(SENSOR, MAX_SENSORS),
+  areas: optional(record(list(TEXT, MAX_AREA_TAGS), MAX_AREAS)),
 });

@@ -97,6 +97,8 @@ export interface SensorsFile {
   readonly ramp: { readonly saturation: number; readonly max_alpha: number };
   readonly fallback: SensorEntry;
   readonly sensors: Readonly<Record<string, SensorEntry>>;
+  /** Bays, rows, zones: the ids of their tags; one that ends in * stands for all that begin so. */
+  readonly areas?: Readonly<Record<string, readonly string[]>>;
 }
 
 /** The newest state, put together from full frames and deltas. */

@@ -79,6 +79,16 @@ export function beyondText(
   );
 }
 
+/** What somebody does about it. */
+export function todoText(reason: HealthReason): string {
+  const { sensors, ...kinds } = S.todo;
+  if (isOfRange(reason) && reason.sensor in sensors) {
+    return sensors[reason.sensor as keyof typeof sensors][sideOf(reason)];
+  }
+  // Of a later server, a kind may be another.
+  return (kinds as Partial<Record<string, string>>)[reason.kind] ?? kinds.other;
+}
+
 /** All reasons in one line, the worst first. */
 export const reasonsText = (
   sensors: Catalogue,

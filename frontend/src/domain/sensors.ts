@@ -61,11 +61,18 @@ export class Catalogue {
   readonly #known: ReadonlyMap<string, Sensor>;
   readonly #others = new Map<string, Sensor>();
   readonly #other: (name: string) => Sensor;
+  /** Of the tag with that id; empty: in none. */
+  readonly areaOf: (tagId: string) => string;
 
-  constructor(all: readonly Sensor[], other: (name: string) => Sensor) {
+  constructor(
+    all: readonly Sensor[],
+    other: (name: string) => Sensor,
+    areaOf: (tagId: string) => string = () => '',
+  ) {
     this.all = all;
     this.#known = new Map(all.map((sensor) => [sensor.name, sensor]));
     this.#other = other;
+    this.areaOf = areaOf;
   }
 
   /** A sensor by its name on the wire; one that nobody declared gets the fallback's look. */
@@ -94,7 +101,22 @@ export interface Catalogues {
   readonly night: Catalogue;
 }
 
+/** Which area of a file a tag is in: the first that names it. */
+function areasOf({ areas = {} }: SensorsFile): (tagId: string) => string {
+  const byId = new Map<string, string>();
+  const begins: [prefix: string, area: string][] = [];
+  for (const [area, tags] of Object.entries(areas)) {
+    for (const tag of tags) {
+      if (tag.endsWith('*')) begins.push([tag.slice(0, -1), area]);
+      else if (!byId.has(tag)) byId.set(tag, area);
+    }
+  }
+  return (tagId) =>
+    byId.get(tagId) ?? begins.find(([prefix]) => tagId.startsWith(prefix))?.[1] ?? '';
+}
+
 export function cataloguesOf(file: SensorsFile, language: string = LANGUAGE): Catalogues {
+  const areaOf = areasOf(file);
   const by = (isDay: boolean): Catalogue => {
     const made = (name: string, entry: SensorEntry): Sensor => ({
       name,
@@ -116,7 +138,7 @@ export function cataloguesOf(file: SensorsFile, language: string = LANGUAGE): Ca
       ),
     });
     const all = Object.entries(file.sensors).map(([name, entry]) => made(name, entry));
-    return new Catalogue(all, (name) => made(name, file.fallback));
+    return new Catalogue(all, (name) => made(name, file.fallback), areaOf);
   };
   return { day: by(true), night: by(false) };
 }

@@ -102,6 +102,7 @@ function haystack(row: Row, sensors: Catalogue): string {
 function haystackOf({ tag, health }: Row, sensors: Catalogue): string {
   return [
     tag.id,
+    sensors.areaOf(tag.id),
     tag.species ? `${tag.species} ${speciesText(tag.species)}` : S.unclassified,
     S.health[health.verdict],
     tag.anomaly ? S.pest : '',

@@ -190,6 +190,9 @@ test('labels are as high as their text asks for', () => {
 test('pins and blooms shrink with the map, within limits', () => {
   expect(pinRadius(1)).toBe(6);
   expect(pinRadius(5000)).toBe(11);
+  // Where they crowd, the heat map is seen between them.
+  expect(pinRadius(5, 2)).toBe(2);
+  expect(pinRadius(20, 2)).toBe(6);
   expect(bloomRadius(1)).toBe(1.5);
   expect(bloomRadius(5000)).toBe(6);
 });

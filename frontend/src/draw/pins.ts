@@ -15,10 +15,18 @@ export const labelFont = (text: number): string =>
   `600 ${11.5 * text}px "Inter Variable", system-ui, sans-serif`;
 const LABEL_PADDING = 5;
 
-/** Half a pin's width in pixels: smaller when far away, so that pins stay apart, and never too small to be told. */
-export function pinRadius(scale: number): number {
-  return Math.round(Math.min(11, Math.max(6, scale * 0.11)));
+/**
+ * Half a pin's width in pixels: smaller when far away, and where pins crowd (`spacing`, m), so that the
+ * heat map is seen between them.
+ */
+export function pinRadius(scale: number, spacing = Infinity): number {
+  const usual = Math.round(Math.min(11, Math.max(6, scale * 0.11)));
+  return Math.min(usual, Math.max(LEAST_PX, Math.round(scale * spacing * 0.22)));
 }
+
+/** Of what is well, where pins crowd; a warning is never as small. */
+const LEAST_PX = 2;
+const LEAST_WARNING_PX = 5;
 
 export function bloomRadius(scale: number): number {
   return Math.round(Math.min(6, Math.max(1.5, scale * 0.022)) * 2) / 2;
@@ -89,10 +97,13 @@ export function drawPins(
   pins: readonly Pin[],
   sprites: Sprites,
   palette: Palette,
+  spacing = Infinity,
 ): void {
-  const radius = pinRadius(view.scale);
-  const box = (radius + WARNING_PX + 4) * 2;
+  const usual = pinRadius(view.scale, spacing);
   for (const verdict of BY_SEVERITY) {
+    const isWarning = verdict === 'critical' || verdict === 'stressed';
+    const radius = isWarning ? Math.max(usual, LEAST_WARNING_PX) : usual;
+    const box = (radius + WARNING_PX + 4) * 2;
     for (const pin of pins) {
       if (pin.verdict !== verdict) continue;
       const { x, y } = toCanvas(view, pin.at);
@@ -111,7 +122,8 @@ export function drawPins(
   for (const pin of pins) {
     if (!pin.pest) continue;
     const { x, y } = toCanvas(view, pin.at);
-    if (inside(surface, x, y, box * 2)) drawPest(surface, x, y, radius, sprites, palette);
+    const radius = Math.max(usual, LEAST_WARNING_PX);
+    if (inside(surface, x, y, radius * 8)) drawPest(surface, x, y, radius, sprites, palette);
   }
 }
 
@@ -137,15 +149,17 @@ function paintPin(
   context.lineCap = 'round';
   // The halo tells it from whatever colour lies below.
   context.strokeStyle = palette.halo;
-  context.lineWidth = isLine ? 5 : 4;
+  context.lineWidth = radius < LEAST_WARNING_PX ? 1.5 : isLine ? 5 : 4;
   context.stroke();
   context.fillStyle = isEmpty ? palette.verdicts.unknown.body : body;
   context.fill();
   context.strokeStyle = isLine ? own : palette.pinLine;
-  context.lineWidth = isLine ? 2 : 1.25;
+  context.lineWidth = isLine ? Math.min(2, radius * 0.4) : 1.25;
   if (kind === 'lacking') context.setLineDash([3, 3]);
   context.stroke();
   context.setLineDash([]);
+  // Too small for a sign: a dot.
+  if (radius < LEAST_WARNING_PX) return;
   context.strokeStyle = isEmpty ? own : ink;
   context.lineWidth = Math.max(1.5, radius * 0.24);
   for (const line of kind === 'failed' ? STRUCK : mark.sign) {

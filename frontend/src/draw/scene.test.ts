@@ -4,6 +4,7 @@ import { GROWING } from '../domain/age';
 import { houseHealth } from '../domain/health';
 import { judgement, NOBODY } from '../testing/health';
 import { readings, tag } from '../testing/tags';
+import type { TwinTagState as WireTag } from '../contract/types';
 import type { Tag } from '../domain/twin';
 import { buildScene, type Scene } from './scene';
 import { sensorNamed } from '../testing/sensors';
@@ -13,6 +14,7 @@ const scene = (
   now = 0,
   before: Scene | null = null,
   health = NOBODY,
+  listed: ReadonlySet<string> | null = null,
 ): Scene =>
   buildScene(
     {
@@ -22,9 +24,16 @@ const scene = (
       unit: 'C',
       now,
       ageing: GROWING,
+      listed,
     },
     before,
   );
+
+/** On a square of ten by ten, 1 m apart. */
+const at = (index: number): WireTag['pose'] => ({
+  position: { x: index % 10, y: Math.floor(index / 10), z: 0 },
+  orientation: { x: 0, y: 0, z: 0, w: 1 },
+});
 
 describe('pins', () => {
   test('none for a tag without a pose', () => {
@@ -52,6 +61,21 @@ describe('pins', () => {
     const after = scene(tags, 0, before, judgement({ '1': 'stressed', '2': 'healthy' }));
     expect(after.pins[0]?.verdict).toBe('stressed');
     expect(after.pins[1]).toBe(before.pins[1]);
+  });
+
+  test('what the filter leaves out is faint, and has neither label nor pest', () => {
+    const tags = [tag({ anomaly: true }), tag({ tag_id: '2' })];
+    const [out, listed] = scene(tags, 0, null, NOBODY, new Set(['2'])).pins;
+    expect(out).toMatchObject({ pest: false, texts: [] });
+    expect(out?.strength).toBeLessThan(0.2);
+    expect(listed?.texts).toEqual(['2']);
+  });
+
+  test('many close together say how close, a few do not', () => {
+    const row = (count: number): Tag[] =>
+      Array.from({ length: count }, (_, index) => tag({ tag_id: String(index), pose: at(index) }));
+    expect(scene(row(59)).spacing).toBe(Infinity);
+    expect(scene(row(100)).spacing).toBeCloseTo(0.9);
   });
 
   test('a label tells the value', () => {

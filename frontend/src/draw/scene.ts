@@ -8,12 +8,14 @@ import { speciesLooks, UNKNOWN_SPECIES, type BloomLook } from '../domain/species
 import { shown } from '../domain/text';
 import type { Tag } from '../domain/twin';
 import type { TemperatureUnit } from '../domain/units';
-import type { MapPoint } from '../geometry/coordinates';
+import { boundsOf, type MapPoint } from '../geometry/coordinates';
 
 /** Steps of fading; more cannot be told apart. */
 const FADE_STEPS = 6;
 /** A pin that needs somebody stays in sight, however old what it says. */
 const FAINTEST_WARNING = 5 / 6;
+/** What the filter leaves out stays in its place, and is not looked at. */
+const LEFT_OUT = 1 / 6;
 
 export interface Pin {
   readonly id: string;
@@ -26,7 +28,7 @@ export interface Pin {
   readonly kind: 'value' | 'failed' | 'lacking';
   /** As the bridge judged the tag. */
   readonly verdict: Verdict;
-  /** How fresh, 0.35 to 1; of a warning never faint. */
+  /** How fresh, 0.35 to 1; of a warning never faint; less where the filter leaves it out. */
   readonly strength: number;
   readonly pest: boolean;
   /** Label texts from the most to the least telling. */
@@ -43,6 +45,8 @@ export interface Scene {
   readonly pins: readonly Pin[];
   readonly blooms: readonly BloomDot[];
   readonly boxes: readonly (readonly MapPoint[])[];
+  /** How far pins are apart where they are many, m; else infinite. */
+  readonly spacing: number;
 }
 
 export interface SceneInput {
@@ -53,6 +57,8 @@ export interface SceneInput {
   /** ms on the monotonic clock. */
   readonly now: number;
   readonly ageing: Ageing;
+  /** The tags that the table's filter leaves; null: all of them. */
+  readonly listed: ReadonlySet<string> | null;
 }
 
 interface Planted {
@@ -97,7 +103,18 @@ export function buildScene(input: SceneInput, before: Scene | null = null): Scen
     before?.blooms === blooms &&
     before.pins.length === pins.length &&
     pins.every((pin, index) => pin === before.pins[index]);
-  return isSame ? before : { pins, blooms, boxes };
+  return isSame ? before : { pins, blooms, boxes, spacing: spacingOf(pins) };
+}
+
+/** Fewer pins never hide what lies below them. */
+const CROWD = 60;
+
+/** The side of the square that each would have if they were spread evenly over their bounds. */
+function spacingOf(pins: readonly Pin[]): number {
+  const bounds = pins.length < CROWD ? null : boundsOf(pins.map(({ at }) => at));
+  if (!bounds) return Infinity;
+  const { minX, minY, maxX, maxY } = bounds;
+  return Math.sqrt(((maxX - minX) * (maxY - minY)) / pins.length) || Infinity;
 }
 
 const samePin = (a: Pin, b: Pin): boolean =>
@@ -111,7 +128,9 @@ const samePin = (a: Pin, b: Pin): boolean =>
   a.texts.length === b.texts.length &&
   a.texts.every((text, index) => text === b.texts[index]);
 
-function pinOf(tag: Tag, at: MapPoint, { health, sensor, unit, now, ageing }: SceneInput): Pin {
+function pinOf(tag: Tag, at: MapPoint, input: SceneInput): Pin {
+  const { health, sensor, unit, now, ageing, listed } = input;
+  const isLeftOut = listed !== null && !listed.has(tag.id);
   const value = tag.readings.get(sensor.name);
   const fresh = freshness(ageSeconds(tag.readAt.get(sensor.name) ?? tag.scannedAt, now, ageing));
   const verdict = health.byTag.get(tag.id)?.verdict ?? 'unknown';
@@ -121,9 +140,11 @@ function pinOf(tag: Tag, at: MapPoint, { health, sensor, unit, now, ageing }: Sc
     at,
     kind: value === undefined ? 'lacking' : value === null ? 'failed' : 'value',
     verdict,
-    strength: Math.max(quantised(fresh, FADE_STEPS), isWarning ? FAINTEST_WARNING : 0),
-    pest: tag.anomaly,
-    texts: textsOf(tag, sensor, value, unit),
+    strength: isLeftOut
+      ? LEFT_OUT
+      : Math.max(quantised(fresh, FADE_STEPS), isWarning ? FAINTEST_WARNING : 0),
+    pest: tag.anomaly && !isLeftOut,
+    texts: isLeftOut ? [] : textsOf(tag, sensor, value, unit),
     priority:
       (tag.anomaly ? 4 : 0) +
       (value == null ? 0 : 2) +

@@ -16,26 +16,35 @@ import {
 import { ms, silentAt, timeText } from './times';
 
 const STAYS_MS = 200;
+/** So long after its last word a greenhouse counts as silent, and the archive as down. */
+const LIVE_MS = 20_000;
 
 interface Props {
   readonly shown: readonly Site[];
   readonly groups: readonly string[];
   readonly words: FleetWords;
+  /** When all of it was last known, ms since the epoch; null: it is as of now. */
+  readonly asOf: number | null;
 }
 
-export function Cards({ shown, groups, words }: Props): JSX.Element {
+export function Cards({ shown, groups, words, asOf }: Props): JSX.Element {
   const parts = useMemo(() => grouped(shown, groups), [shown, groups]);
-  if (groups.length === 0) return <List sites={shown} words={words} />;
+  if (groups.length === 0) return <List sites={shown} words={words} asOf={asOf} />;
   return (
     <>
       {parts.map((part) => (
-        <GroupOf key={part.name} group={part} words={words} />
+        <GroupOf key={part.name} group={part} words={words} asOf={asOf} />
       ))}
     </>
   );
 }
 
-function GroupOf({ group, words }: { group: Group; words: FleetWords }): JSX.Element {
+interface Listed {
+  readonly words: FleetWords;
+  readonly asOf: number | null;
+}
+
+function GroupOf({ group, words, asOf }: Listed & { group: Group }): JSX.Element {
   const { name, sites } = group;
   const worst = sites[0];
   return (
@@ -45,7 +54,7 @@ function GroupOf({ group, words }: { group: Group; words: FleetWords }): JSX.Ele
         {worst && <HealthMark verdict={worst.verdict} word={false} />}
         <span className="fleet-line">{groupText(sites, words)}</span>
       </summary>
-      <List sites={sites} words={words} />
+      <List sites={sites} words={words} asOf={asOf} />
     </details>
   );
 }
@@ -66,11 +75,11 @@ export function filterText(filter: Filter, words: FleetWords): string {
   return filter === 'all' || filter === 'silent' ? words[filter] : S.health[filter];
 }
 
-function List({ sites, words }: { sites: readonly Site[]; words: FleetWords }): JSX.Element {
+function List({ sites, words, asOf }: Listed & { sites: readonly Site[] }): JSX.Element {
   return (
     <ul className="fleet-sites">
       {sites.map((site) => (
-        <SiteCard key={site.site} site={site} words={words} />
+        <SiteCard key={site.site} site={site} words={words} asOf={asOf} />
       ))}
     </ul>
   );
@@ -79,11 +88,10 @@ function List({ sites, words }: { sites: readonly Site[]; words: FleetWords }): 
 const SiteCard = memo(function SiteCard({
   site,
   words,
-}: {
-  site: Site;
-  words: FleetWords;
-}): JSX.Element {
-  const { name, verdict, last_verdict: last, is_live: isLive, map } = site;
+  asOf,
+}: Listed & { site: Site }): JSX.Element {
+  const { name, verdict, last_verdict: last, map } = site;
+  const isLive = site.is_live && asOf === null;
   const origin = originText(site);
   return (
     <li className="fleet-site" data-health={verdict} data-live={isLive}>
@@ -96,7 +104,7 @@ const SiteCard = memo(function SiteCard({
         {isLive ? (
           <HealthMark verdict={verdict} />
         ) : (
-          <span className="fleet-silent">{silentText(site, words)}</span>
+          <span className="fleet-silent">{silentText(site, words, asOf)}</span>
         )}
         {isLive && last === null && <span className="fleet-line">{words.judging}</span>}
         {!isLive && last !== null && (
@@ -147,8 +155,11 @@ export function originText({ origin }: Site): string | null {
   return origin in S.origin ? S.origin[origin as keyof typeof S.origin] : null;
 }
 
-function silentText({ lag_s: lag }: Site, words: FleetWords): string {
-  return lag === null ? words.neverForwarded : words.silentSince(timeText(silentAt(lag)));
+function silentText(site: Site, words: FleetWords, asOf: number | null): string {
+  if (site.lag_s === null) return words.neverForwarded;
+  const at = silentAt(site.lag_s);
+  const wasLive = site.is_live || (asOf !== null && at > asOf - LIVE_MS);
+  return wasLive && asOf !== null ? words.asOf(timeText(asOf)) : words.silentSince(timeText(at));
 }
 
 function countText(count: number | null, words: FleetWords): string {

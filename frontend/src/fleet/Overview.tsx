@@ -144,7 +144,7 @@ export function Overview({ seen, words, isKiosk }: Props): JSX.Element {
         {shown.length === 0 ? (
           <p className="fleet-empty">{nothingText(seen, words)}</p>
         ) : view === 'sites' ? (
-          <Cards shown={shown} groups={groups} words={words} />
+          <Cards shown={shown} groups={groups} words={words} asOf={asOfWhen(seen)} />
         ) : (
           <Suspense fallback={<p className="fleet-empty">{words.connecting}</p>}>
             {view === 'alarms' ? (
@@ -157,6 +157,12 @@ export function Overview({ seen, words, isKiosk }: Props): JSX.Element {
       </main>
     </div>
   );
+}
+
+/** When all of it was last known, ms since the epoch; null: it is as of now. */
+function asOfWhen({ archive, lostAt }: Seen): number | null {
+  if (lostAt !== null || !archive || archive.is_reachable) return lostAt;
+  return archive.since && ms(archive.since);
 }
 
 function nothingText({ archive, sites }: Seen, words: FleetWords): string {

@@ -14,7 +14,7 @@ import {
 } from '../geometry/coordinates';
 import { Grid, nearest } from '../geometry/nearest';
 import { act, moveViewport, store, type AppState } from '../store/app';
-import { selectHeat, selectRange, selectSensor } from '../store/derived';
+import { selectHeat, selectListed, selectRange, selectSensor } from '../store/derived';
 import { memoOne } from '../store/memo';
 import { selectNewest, selectShown, selectTag, type Shown } from '../store/moment';
 import { isPrinting } from '../store/theme';
@@ -169,7 +169,8 @@ export function runMap(
       stillChanged ||
       house.health !== last.health ||
       house.ageing !== last.ageing ||
-      state.settings !== before.settings
+      state.settings !== before.settings ||
+      selectListed(state) !== selectListed(before)
     )
       spoil('pins', 'overlay');
     // A mark follows the mouse, and nothing below it is drawn anew.

@@ -44,7 +44,14 @@ import type { Size, View } from '../geometry/coordinates';
 import type { Box } from '../geometry/clear';
 import { placeLabels, type Room } from '../geometry/declutter';
 import type { AppState } from '../store/app';
-import { selectHealth, selectHeat, selectMapped, selectSensor, type Heat } from '../store/derived';
+import {
+  selectHealth,
+  selectHeat,
+  selectListed,
+  selectMapped,
+  selectSensor,
+  type Heat,
+} from '../store/derived';
 import { memoLast, memoOne } from '../store/memo';
 import { selectShown, selectTag, selectTags } from '../store/moment';
 import type { MapPicture } from '../store/picture';
@@ -222,7 +229,7 @@ export class Painter {
     this.#paintedScene = scene;
     if (layers.has('blooms')) drawBlooms(surface, view, scene.blooms, this.#sprites, this.#palette);
     if (!layers.has('pins')) return;
-    drawPins(surface, view, scene.pins, this.#sprites, this.#palette);
+    drawPins(surface, view, scene.pins, this.#sprites, this.#palette, scene.spacing);
     if (!layers.has('labels')) return;
     const room = this.#room?.scale === view.scale ? this.#room : null;
     const labels = this.#labels(scene, view.scale, state.view.selected, this.#widths, room);
@@ -263,6 +270,7 @@ export class Painter {
       selectHealth(state),
       selectSensor(state),
       state.settings.unit,
+      selectListed(state),
       Math.floor(now / FADE_TICK_MS),
     );
   }
@@ -274,9 +282,10 @@ export class Painter {
       health: HouseHealth,
       sensor: Sensor,
       unit: TemperatureUnit,
+      listed: ReadonlySet<string> | null,
       tick: number,
     ) => {
-      const look = { tags, ageing, health, sensor, unit };
+      const look = { tags, ageing, health, sensor, unit, listed };
       this.#lastScene = buildScene({ ...look, now: tick * FADE_TICK_MS }, this.#lastScene);
       return this.#lastScene;
     },

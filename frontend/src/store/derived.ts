@@ -255,6 +255,14 @@ const filtered = memoLast(
 
 const sorted = memoLast((rows: readonly Row[], sort: Sort): readonly Row[] => sortRows(rows, sort));
 
+const idsOf = memoOne((rows: readonly Row[]) => new Set(rows.map(({ tag }) => tag.id)));
+
+/** The tags that the table's filter leaves; null: all of them. */
+export function selectListed(state: AppState): ReadonlySet<string> | null {
+  const { filter, health } = state.view;
+  return filter.trim() === '' && health === null ? null : idsOf(selectRows(state));
+}
+
 /** The table's rows as the operator sees them: filtered and sorted. */
 export function selectRows(state: AppState): readonly Row[] {
   const { filter, health, sort } = state.view;

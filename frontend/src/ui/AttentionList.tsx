@@ -1,12 +1,12 @@
-import { useMemo, useRef, type JSX } from 'react';
+import { useRef, type JSX } from 'react';
 
-import { rowsOf, sortRows } from '../domain/table';
+import type { HealthReason } from '../contract/types';
+import { todoText } from '../domain/reasons';
 import { shown } from '../domain/text';
 import { useApp } from '../store/app';
 import { selectHealth } from '../store/derived';
-import { selectTags } from '../store/moment';
 import { S } from '../strings';
-import { Age } from './Age';
+import { useSince, useUrgent } from './DoNow';
 import { useFitting } from './fitting';
 import { Reasons } from './Reasons';
 
@@ -16,20 +16,13 @@ const MOST_REASONS = 2;
 
 /** For a wall screen: the tags that need somebody, the worst first. */
 export function AttentionList(): JSX.Element {
-  const tags = useApp(selectTags);
-  const health = useApp(selectHealth);
-  const rows = useMemo(
-    () =>
-      sortRows(rowsOf(tags, health), { column: 'health', descending: true }).filter(
-        ({ health: { verdict } }) => verdict === 'critical' || verdict === 'stressed',
-      ),
-    [tags, health],
-  );
+  const rows = useUrgent();
+  const { unknown } = useApp(selectHealth).counts;
   const list = useRef<HTMLUListElement>(null);
   const count = useFitting(list, rows.length);
   return (
     <div className="attention">
-      <h3>{rows.length > 0 ? S.attention : noneText(health.counts.unknown)}</h3>
+      <h3>{rows.length > 0 ? S.attention : noneText(unknown)}</h3>
       <ul ref={list}>
         {rows.slice(0, MOST_TAGS).map(({ tag, health: own }, index) => (
           <li key={tag.id} data-fits={index < count} data-tag-id={tag.id} data-health={own.verdict}>
@@ -38,9 +31,10 @@ export function AttentionList(): JSX.Element {
             </strong>
             <span className="attention-why">
               <Reasons health={own} most={MOST_REASONS} />
+              {own.reasons[0] && <strong>{todoText(own.reasons[0])}</strong>}
             </span>
             <span className="faint">
-              <Age when={tag.scannedAt} />
+              <Since tagId={tag.id} reason={own.reasons[0]} />
             </span>
           </li>
         ))}
@@ -51,6 +45,9 @@ export function AttentionList(): JSX.Element {
     </div>
   );
 }
+
+const Since = (it: { tagId: string; reason: HealthReason | undefined }): string | null =>
+  useSince(it.tagId, it.reason);
 
 /** Of whom nothing is known, nobody knows that he needs nothing. */
 const noneText = (unknown: number): string =>

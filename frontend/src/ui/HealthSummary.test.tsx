@@ -24,6 +24,23 @@ test('names the verdict, the tag that it comes from, and why', () => {
   expect(store.get().view.selected).toBe('5');
 });
 
+test('says what to do first, and since when', () => {
+  const cold = reason({ value: 6, limit: 10 });
+  const pest = reason({ kind: 'pest', sensor: '', value: 2, limit: null });
+  showTags(TAGS, judgement({ 1: [pest], 5: [cold, pest] }));
+  const stop = startAlarms();
+  render(<HealthSummary kiosk={false} />);
+  act(() => {
+    tellAlarms(alarm('a', { tag_id: '5', raised: 100 }));
+  });
+  const todo = screen.getByRole('list', { name: 'Do this now' });
+  expect([...todo.children].map(({ textContent }) => textContent)).toEqual([
+    expect.stringMatching(/^Tag 5: .*Heat, or close the vents since /),
+    'Tag 1: 2 pests seenInspect and treat the plants ',
+  ]);
+  stop();
+});
+
 test('counts the tags by verdict, and filters by one', () => {
   showTags(TAGS, judgement({ 1: 'healthy', 5: 'unknown' }));
   render(<HealthSummary kiosk={false} />);

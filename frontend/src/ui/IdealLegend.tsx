@@ -11,13 +11,6 @@ import { S } from '../strings';
 /** What the colours mean while they tell how values lie against their ideal. */
 export function IdealLegend({ sensor }: { sensor: Sensor }): JSX.Element {
   const unit = useApp((state) => state.settings.unit);
-  // The species of the house that have an ideal of their own, as one text: the same for the same.
-  const own = useApp((state) =>
-    [...new Set(selectTags(state).map(({ sureSpecies }) => sureSpecies.toLowerCase()))]
-      .filter((species) => sensor.species.has(species))
-      .sort()
-      .join('\u0000'),
-  );
   const { ideal } = sensor;
   const colours = idealParts(IDEAL_ALPHA);
   const part = S.idealParts[sensor.part ?? 'any'];
@@ -35,25 +28,30 @@ export function IdealLegend({ sensor }: { sensor: Sensor }): JSX.Element {
   );
   return (
     <div className="ideal-scale" data-testid="ideal-scale">
-      <div className="ideal-parts">
-        {step('low', S.tooLow(null), low && S.legendBelow(low))}
-        {step('right', part, low && high && `${low} – ${high}`)}
-        {step('high', S.tooHigh(null), high && S.legendAbove(high))}
-      </div>
-      {own !== '' && (
-        <p className="faint" data-testid="ideal-species">
-          {own
-            .split('\u0000')
-            .map((species) => {
-              const range = rangesFor(sensor, species).ideal;
-              const limits = range
-                ? `${valueText(sensor, range[0], unit)} – ${readingText(sensor, range[1], unit)}`
-                : '–';
-              return `${speciesText(species, 24)} ${limits}`;
-            })
-            .join('; ')}
-        </p>
-      )}
+      {step('low', S.tooLow(null), low && S.legendBelow(low))}
+      {step('right', part, low && high && `${low} – ${high}`)}
+      {step('high', S.tooHigh(null), high && S.legendAbove(high))}
     </div>
   );
+}
+
+/** The ideal of the species in the greenhouse that have one of their own. */
+export function IdealOfSpecies({ sensor }: { sensor: Sensor }): JSX.Element | null {
+  const unit = useApp((state) => state.settings.unit);
+  // As one text: the same for the same.
+  const own = useApp((state) =>
+    [...new Set(selectTags(state).map(({ sureSpecies }) => sureSpecies.toLowerCase()))]
+      .filter((species) => sensor.species.has(species))
+      .sort()
+      .join('\u0000'),
+  );
+  if (own === '') return null;
+  const texts = own.split('\u0000').map((species) => {
+    const range = rangesFor(sensor, species).ideal;
+    const limits = range
+      ? `${valueText(sensor, range[0], unit)} – ${readingText(sensor, range[1], unit)}`
+      : '–';
+    return `${speciesText(species, 24)} ${limits}`;
+  });
+  return <span data-testid="ideal-species">{texts.join('; ')}</span>;
 }

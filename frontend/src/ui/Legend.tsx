@@ -13,7 +13,7 @@ import { S } from '../strings';
 import { ColouringControl } from './ColouringControl';
 import { ErrorScale, EstimateFacts } from './estimate';
 import { HeatControl } from './HeatControl';
-import { IdealLegend } from './IdealLegend';
+import { IdealLegend, IdealOfSpecies } from './IdealLegend';
 import { WithParts } from './WithParts';
 
 export function Legend({ kiosk }: { kiosk: boolean }): JSX.Element {
@@ -46,11 +46,10 @@ export function Legend({ kiosk }: { kiosk: boolean }): JSX.Element {
   }
   return (
     <section className="legend" aria-label={S.legend} data-testid="legend">
-      <WithParts>{(parts) => <parts.InLegend />}</WithParts>
+      <div className="legend-title">
+        <strong>{shown(sensor.label, 32)}</strong> <span>{unitOf(sensor, unit)}</span>
+      </div>
       <div className="legend-scale">
-        <div className="legend-title">
-          <strong>{shown(sensor.label, 32)}</strong> <span>{unitOf(sensor, unit)}</span>
-        </div>
         {isError ? (
           <ErrorScale />
         ) : isIdeal ? (
@@ -59,36 +58,6 @@ export function Legend({ kiosk }: { kiosk: boolean }): JSX.Element {
           <Ramp sensor={sensor} range={range} unit={unit} />
         )}
       </div>
-      <div className="legend-facts">
-        <span data-testid="sample-count">
-          {samples > 0 ? S.legendTags(samples) : isFetching ? S.legendFetching : S.legendNoTags}
-        </span>
-        {!isEstimate && quality?.sensor_type === name && (
-          <Quality quality={quality} sensor={sensor} unit={unit} />
-        )}
-        {isEstimate && <EstimateFacts />}
-        {!isEstimate && (
-          <>
-            {/* One of the two is displayed. */}
-            <span className="legend-note">
-              <HatchedSign /> {isIdeal ? S.legendHatched : S.legendTransparent}
-            </span>
-            <span className="legend-note short">
-              <HatchedSign /> {isIdeal ? S.legendHatched : S.legendTransparentShort}
-            </span>
-          </>
-        )}
-        {isOld && (
-          <span className="legend-old" data-testid="legend-old">
-            <HatchedSign isFaint /> {S.legendOld}
-          </span>
-        )}
-        {isIdealWished && !isIdeal && <span data-testid="no-ideal">{S.legendNoIdeal}</span>}
-      </div>
-      <details className="legend-marks" open={kiosk}>
-        <summary>{S.timebarMarks}</summary>
-        <WithParts>{(parts) => <parts.Keys />}</WithParts>
-      </details>
       {!kiosk && (
         <div className="legend-controls">
           <HeatControl place="legend" />
@@ -98,6 +67,40 @@ export function Legend({ kiosk }: { kiosk: boolean }): JSX.Element {
           )}
         </div>
       )}
+      <WithParts>{(parts) => <parts.DifferenceLegend />}</WithParts>
+      {isOld && (
+        <span className="legend-old" data-testid="legend-old">
+          <HatchedSign isFaint /> {S.legendOld}
+        </span>
+      )}
+      {isIdealWished && !isIdeal && (
+        <span className="faint" data-testid="no-ideal">
+          {S.legendNoIdeal}
+        </span>
+      )}
+      {isEstimate && (
+        <div className="legend-facts">
+          <EstimateFacts />
+        </div>
+      )}
+      <details className="legend-more" open={kiosk}>
+        <summary>{S.legendMore}</summary>
+        <div className="legend-facts">
+          <span data-testid="sample-count">
+            {samples > 0 ? S.legendTags(samples) : isFetching ? S.legendFetching : S.legendNoTags}
+          </span>
+          {!isEstimate && quality?.sensor_type === name && (
+            <Quality quality={quality} sensor={sensor} unit={unit} />
+          )}
+          {isIdeal && !isError && <IdealOfSpecies sensor={sensor} />}
+          {!isEstimate && (
+            <span className="legend-note">
+              <HatchedSign /> {isIdeal ? S.legendHatched : S.legendTransparent}
+            </span>
+          )}
+          <WithParts>{(parts) => <parts.InLegend />}</WithParts>
+        </div>
+      </details>
     </section>
   );
 }

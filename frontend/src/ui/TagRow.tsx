@@ -50,6 +50,7 @@ export const TagRow = memo(function TagRow({
   hovered,
 }: Props): JSX.Element {
   const has = (id: string): boolean => isColumnShown({ hidden }, id);
+  const area = catalogue.areaOf(tag.id);
   const all = reasonsText(catalogue, health.reasons, unit);
   // A failed scan is said once, with its age.
   const others = health.reasons.filter(({ kind }) => !tag.failedTry || kind !== 'scan_failed');
@@ -68,6 +69,7 @@ export const TagRow = memo(function TagRow({
         {/* Its click is heard by the table (TagTable), as is one anywhere in the row. */}
         <button type="button" className="row-button" aria-pressed={selected}>
           <bdi>{shown(tag.id, 24)}</bdi>
+          {area !== '' && <small className="faint">{shown(area, 24)}</small>}
         </button>
         {!tag.at && (
           <span className="chip" title={tag.farOff ? farOffText(tag.farOff) : S.notOnMapLong}>

@@ -67,8 +67,8 @@ test('what the twin does not hear is told with the remedy, to its end', () => {
   goLive(status({ input_problems: [`${why}; use TRANSIENT_LOCAL`, 'nothing has come yet'] }));
   render(<Troubles />);
   expect(lines()).toEqual([
-    `Some data does not reach the twin. ${why}; use TRANSIENT_LOCAL.`,
-    'Some data does not reach the twin. Nothing has come yet.',
+    `Not all data arrives here. ${why}; use TRANSIENT_LOCAL.`,
+    'Not all data arrives here. Nothing has come yet.',
   ]);
 });
 

@@ -7,9 +7,9 @@ import { useSelected } from '../store/create';
 import { selectShown } from '../store/moment';
 import { robotFrame } from '../store/signals';
 import { CompareControl } from './CompareControl';
-import { DifferenceLegend } from './DifferenceLegend';
 import { HoverCard } from './HoverCard';
 import { inTime } from './inTime';
+import { Keys } from './Keys';
 
 const robot = (): Promise<typeof RobotParts> => import('../robot/parts');
 const RobotLayer = inTime(async () => (await robot()).RobotLayer);
@@ -35,8 +35,8 @@ export const OnMap = (): JSX.Element => (
 
 export const InLegend = (): JSX.Element => (
   <>
-    <DifferenceLegend />
     {useRobot() && <RobotFact />}
+    <Keys />
   </>
 );
 

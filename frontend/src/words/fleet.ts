@@ -17,6 +17,7 @@ const ENGLISH = {
   nothingReceived: 'Nothing received yet',
   live: 'Live',
   silentSince: (time: string): string => `Silent since ${time}`,
+  asOf: (time: string): string => `As of ${time}`,
   neverForwarded: 'Never forwarded',
   lastKnown: (status: string): string => `Last known: ${status}`,
   archiveDown: (time: string): string =>
@@ -64,6 +65,7 @@ const GERMAN: FleetWords = {
   nothingReceived: 'Noch nichts empfangen',
   live: 'Live',
   silentSince: (time) => `Still seit ${time}`,
+  asOf: (time) => `Stand ${time}`,
   neverForwarded: 'Nie weitergeleitet',
   lastKnown: (status) => `Zuletzt bekannt: ${status}`,
   archiveDown: (time) =>
@@ -108,6 +110,7 @@ const DUTCH: FleetWords = {
   nothingReceived: 'Nog niets ontvangen',
   live: 'Live',
   silentSince: (time) => `Stil sinds ${time}`,
+  asOf: (time) => `Stand van ${time}`,
   neverForwarded: 'Nooit doorgestuurd',
   lastKnown: (status) => `Laatst bekend: ${status}`,
   archiveDown: (time) =>
@@ -152,6 +155,7 @@ const SPANISH: FleetWords = {
   nothingReceived: 'Aún no se ha recibido nada',
   live: 'En directo',
   silentSince: (time) => `Sin señal desde ${time}`,
+  asOf: (time) => `A las ${time}`,
   neverForwarded: 'Nunca reenviado',
   lastKnown: (status) => `Último estado conocido: ${status}`,
   archiveDown: (time) => `El archivo no responde desde ${time}. Se muestra lo último que se supo.`,

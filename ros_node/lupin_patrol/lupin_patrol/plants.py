@@ -37,7 +37,7 @@ _IN_FLOWER = 0.75
 _POSITION_NOISE_M = 0.01
 _OVERLOOKED = 0.06
 # How likely a pest breaks out in a pass, and after how many passes at most it is gone.
-_OUTBREAK = 0.6
+_OUTBREAK = 0.2
 _LONGEST_OUTBREAK = 2
 
 

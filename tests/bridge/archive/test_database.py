@@ -75,7 +75,12 @@ def test_the_page_reads_every_site_and_writes_notes_alone(two_sites: Archive) ->
         found = connection.execute("SELECT site FROM scan ORDER BY site").fetchall()
     assert found == [("gh1",), ("gh2",)]
     assert not refused(two_sites, "page", NOTE)
-    for sql in (SCAN.format("gh1"), "DELETE FROM note", "UPDATE hour SET n = '[]'"):
+    for sql in (
+        SCAN.format("gh1"),
+        "DELETE FROM note",
+        "UPDATE note SET text = ''",
+        "UPDATE hour SET n = '[]'",
+    ):
         assert refused(two_sites, "page", sql), sql
 
 

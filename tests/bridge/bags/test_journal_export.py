@@ -183,7 +183,6 @@ def test_export_writes_a_recording_of_a_period(
         (("a.csv",), "a.csv does not end in .mcap"),
         (("a.mcap", "--tag", "7"), "--tag is for CSV"),
         (("a.mcap", "--sensor", "a"), "--sensor is for CSV"),
-        (("a.mcap", "--output", "b"), "--output is for CSV"),
         (("nowhere/a.mcap",), "nowhere/a.mcap: No such file or directory"),
         (("a.mcap", "--to", "5"), "holds nothing of that period"),
     ],

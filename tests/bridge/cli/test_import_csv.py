@@ -230,6 +230,8 @@ def test_what_came_before_a_twin_is_in_its_past(importing: Import) -> None:
         ("1714558200,A,nan,", "temperature is not from -inf to inf"),
         ("1714558200,A,1,1.01", "humidity is not from -inf to 100"),
         ("1714558200,A", "too few columns"),
+        ("1714558200,A\0B,1,", "a tag with NUL"),
+        ("05/01/2024 10:00,A,1,", "the time is no ISO 8601, and no seconds since 1970"),
     ],
 )
 def test_a_row_that_cannot_be_is_counted_and_named_and_the_others_come(
@@ -238,6 +240,23 @@ def test_a_row_that_cannot_be_is_counted_and_named_and_the_others_come(
     assert importing.given(WIDE, f"at,bench,t,rh\n{row}\n1714558200,B,20,0.5\n").run("--write") == 0
     assert f"refused: 1: {reason} (line 2)" in capsys.readouterr().out
     assert len(importing.rows()) == 1
+
+
+def test_the_hour_that_comes_twice_in_autumn_is_named(
+    importing: Import, capsys: pytest.CaptureFixture[str]
+) -> None:
+    rows = "at,bench,t,rh\n" + "2024-10-27T02:30,A,9,\n2024-10-27T02:30,A,8,\n"
+    assert importing.given(WIDE | {"time_zone": "Europe/Amsterdam"}, rows).run() == 0
+    assert "refused: 1: the sensor has another reading of that moment" in capsys.readouterr().out
+
+
+def test_more_sensors_than_a_tag_may_have_are_refused(
+    importing: Import, capsys: pytest.CaptureFixture[str]
+) -> None:
+    columns = {key: value for key, value in LONG.items() if key != "names"}
+    rows = "".join(f"1714558200,A,s{n},1\n" for n in range(70))
+    assert importing.given(columns, "_time,room,_field,_value\n" + rows).run() == 0
+    assert "refused: 6: sensors: 65, the limit is 64 (line 66, 67, 68)" in capsys.readouterr().out
 
 
 def test_a_time_without_offset_is_in_the_zone_that_is_given(importing: Import) -> None:
@@ -259,6 +278,8 @@ def test_a_time_without_offset_is_in_the_zone_that_is_given(importing: Import) -
         (WIDE | {"places": {"A": [1, "x"]}}, ROWS, "places.A is [1, 'x'], expected [x, y] in m"),
         (WIDE, b"\xff\xfe\x00", "is no CSV in UTF-8"),
         (WIDE, 'at,bench,t,rh\n"' + "x" * 200_000, "is no CSV in UTF-8: field larger than"),
+        (WIDE, "at,bench,t,rh\n" + "," * 1_000_001, "line 2 has 1,000,000 characters or more"),
+        (WIDE, "at,bench,t,rh\n1,A,1,1".encode("utf-16"), "is no CSV in UTF-8"),
         (WIDE, "", "there is no column 'at', but none"),
     ],
 )

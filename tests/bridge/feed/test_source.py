@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from dataclasses import replace
 from typing import Any
 
-import numpy as np
 import pytest
 
-from lupin_bridge.feed import web_node
 from lupin_bridge.feed.local import LocalTwin
 from lupin_bridge.feed.query import Itself
 from lupin_bridge.feed.source import (
@@ -27,17 +24,15 @@ from lupin_bridge.past.estimate import ReadingsAt
 from lupin_twin.core.history import LatestRequest
 from lupin_twin.core.past import PastRefused, SeriesRequest
 from lupin_twin.core.state import Reading
-from lupin_twin.estimate.engine import EstimateRequest, TagPast
-from lupin_twin.field.engine import FieldRefused, FieldRequest
+from lupin_twin.estimate.engine import TagPast
 from lupin_twin.runtime.estimate_rounds import ReportRequest
 from tests.support.messages import discovered, occupancy_grid, pose, scan
 from tests.support.processes import OFTEN, twin_node
 from tests.support.ros import Peer
 from tests.support.store import S
-from tests.support.waiting import PATIENCE_S, until, until_answered
+from tests.support.waiting import until, until_answered
 
 SOURCES = [LocalTwin, WebTwin]
-REQUEST = FieldRequest("co2", 0.5, 0.0, 0.0, 3.0, 1.0)
 
 
 class Stage:
@@ -67,9 +62,8 @@ class Stage:
 async def stage_of(source_type: type, domain: int, *ros_args: str) -> AsyncIterator[Stage]:
     """A started source; for `WebTwin`, with a twin in a process of its own."""
     arguments = (*OFTEN, "-p", "max_grid_cells:=1000", *ros_args)
-    with Peer(domain) as peer, pytest.MonkeyPatch.context() as patch:
+    with Peer(domain) as peer:
         if source_type is WebTwin:
-            patch.setattr(web_node, "NEW_TWIN_S", PATIENCE_S)  # a busy machine finds it late
             with twin_node(domain, *arguments):
                 async with started(WebTwin, arguments, peer) as stage:
                     yield stage
@@ -101,17 +95,9 @@ async def test_a_source_tells_of_every_change_and_of_what_it_is_asked(
 
         peer.observe(scan("1", {"co2": 400.0}, stamp_s=5.0))
         revisions.append((await stage.tag("1")).revision)
-        grid = (await source.field(REQUEST)).grid
-        assert (grid.sample_count, math.isnan(grid.values[0])) == (0, True)
 
         peer.discover(discovered({"1": pose(0.5, 0.5)}))
         revisions.append((await stage.tag("1", has_pose=True)).revision)
-        result = await source.field(REQUEST)
-        assert (result.grid.width, result.grid.height, result.grid.sample_count) == (6, 2, 1)
-        assert result.revision == source.field_revision(REQUEST)
-        known = np.array([[True, True, True, True, False, False]] * 2).ravel()
-        np.testing.assert_array_equal(np.isfinite(result.grid.values), known)
-        assert (result.grid.value_min, result.grid.value_max) == (400.0, 400.0)
 
         peer.publish_map(occupancy_grid([[0, 100]]))
         await until(lambda: source.occupancy_map() is not None, "the map")
@@ -131,13 +117,11 @@ async def test_a_source_tells_of_every_change_and_of_what_it_is_asked(
         assert source.names().state_topic == "/twin/state"
         assert source.rules().max_grid_cells == 1000
         assert (source.thread.callback_errors, source.thread.calls_waiting) == (0, 0)
-        with pytest.raises(FieldRefused, match="sensor_type is empty"):
-            await source.field(FieldRequest("", 0.5, 0.0, 0.0, 1.0, 1.0))
     # A thread that has not ended in time is left behind, and ends for itself.
     await until(lambda: not source.thread.is_alive, "its end")
     assert stage.deaths == []
     with pytest.raises(TwinUnavailableError):
-        await source.field(REQUEST)
+        await source.estimate_report(ReportRequest("co2"))
 
 
 @pytest.mark.parametrize(
@@ -189,13 +173,12 @@ async def test_a_source_tells_of_the_past(domain: int, source_type: type) -> Non
         with pytest.raises(PastRefused, match="later than now"):
             await source.ask(Itself(2**31 * S - 1), 0.0)
 
-        box = FieldRequest("co2", 0.5, 0.0, 0.0, 3.0, 1.0)
         [read] = await source.ask(Itself(ReadingsAt("co2", 55 * S, source.day_length_s)), 0.0)
         assert read == TagPast("1", 0.5, 2.5, ((5 * S, 400.0), (50 * S, 500.0)))
-        with pytest.raises(FieldRefused, match="no tag has a reading"):
-            await source.estimate(EstimateRequest(box))
 
-        report = await source.estimate_report(ReportRequest("co2"))
+        report = await until_answered(
+            lambda: source.estimate_report(ReportRequest("co2")), "the service", bool
+        )
         assert (report.fitted_at_ns, report.tags, report.record.since_ns) == (None, (), None)
 
         rows = [row async for lot in source.rows(1, 100 * S, None, None, list) for row in lot]

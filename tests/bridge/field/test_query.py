@@ -162,32 +162,6 @@ def test_any_accept_header_gives_a_format_or_none(accept: str) -> None:
 # --- ETag (RFC 9110, sections 8.8.3 and 13.1.2) ---------------------------------------------------
 
 
-def test_an_etag_is_strong_and_stands_for_all_that_a_field_depends_on() -> None:
-    tags = {
-        field_query.etag("r1", REQUEST, "json", 1),
-        field_query.etag("r2", REQUEST, "json", 1),
-        field_query.etag("r1", REQUEST, "png", 1),
-        field_query.etag("r1", REQUEST, "png", 2),
-        *(
-            field_query.etag("r1", replace(REQUEST, **{name: 9.5}), "json", 1)  # type: ignore[arg-type]
-            for name in ("resolution", *field_query.BOX_NAMES)
-        ),
-        field_query.etag("r1", replace(REQUEST, sensor_type="light"), "json", 1),
-    }
-    assert len(tags) == 10
-    assert all(re.fullmatch(r'"[\x21\x23-\x7e]+"', tag) for tag in tags)
-    assert field_query.etag("r1", REQUEST, "json", 1) == field_query.etag("r1", REQUEST, "json", 1)
-
-
-def test_numbers_that_are_the_same_float32_are_the_same_request() -> None:
-    other = replace(REQUEST, resolution=0.1 + 1e-12)
-    assert field_query.etag("r1", REQUEST, "json", 1) == field_query.etag("r1", other, "json", 1)
-
-
-def test_any_sensor_name_has_an_etag() -> None:
-    field_query.etag("r", replace(REQUEST, sensor_type="\ud800"), "json", 1)
-
-
 @pytest.mark.parametrize(
     ("if_none_match", "holds"),
     [

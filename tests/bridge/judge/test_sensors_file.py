@@ -255,3 +255,9 @@ def test_what_is_wrong_is_one_line_whatever_a_name_has_in_it() -> None:
     with pytest.raises(SensorsError) as refused:
         parse(text_with("sensors/a\n\x1b[2Jb", {}))
     assert str(refused.value) == "sensors.a\\n\\x1b[2Jb.ideal: Field required"
+
+
+def test_areas_are_lists_of_tags() -> None:
+    assert parse(text_with("areas", {"North bay": ["1", "A*"]})).by_name
+    with pytest.raises(SensorsError, match=r"areas\.North bay"):
+        parse(text_with("areas", {"North bay": "1"}))

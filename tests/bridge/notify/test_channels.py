@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from lupin_bridge.alarms.board import AlarmBoard
+from lupin_bridge.alarms.notes import NoteBoard
 from lupin_bridge.judge.options import Criteria
 from lupin_bridge.notify.channels import Channels
 from lupin_bridge.notify.destinations import Targets
@@ -33,6 +34,7 @@ class House:
         board = Alarms()
         board.show([alarm("a")])
         self.alarms: AlarmBoard = board
+        self.notes = NoteBoard(self.source, lambda: None)
 
     def seen(self) -> GreenhouseState:
         return seen(tag("a", temperature=20.0))

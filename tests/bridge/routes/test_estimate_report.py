@@ -84,12 +84,8 @@ def test_a_tag_that_has_changed_is_told_left_out_and_judged(live: Bridge) -> Non
     assert odd["offset"] == pytest.approx(9.0, abs=2.0)
     assert odd["measured"] - odd["expected"] > 6.0
     estimate = live.json("/api/estimate", **SENSOR, resolution=0.5)
-    # Of each tag its newest eight, and before those the newest of each hour; none since the change.
-    counted = sum(
-        8 + len({(now_s() - 1800 * hour + 60 * number) // 3600 for hour in range(20, 8, -1)})
-        for number in range(len(PLACES))
-    )
-    assert (estimate["sample_count"], estimate["reading_count"]) == (4, counted - 4)
+    # All twenty of each tag, but those since the change.
+    assert (estimate["sample_count"], estimate["reading_count"]) == (4, 20 * len(PLACES) - 4)
     reasons = answered(
         live, "/api/health", lambda body: "changed" in str(body["tags"]["d"]["reasons"])
     )["tags"]["d"]["reasons"]

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import re
-import secrets
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -16,7 +15,7 @@ import pytest
 from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import ClientConnection, connect
 
-from lupin_bridge.access.credentials import SESSION_S, Credentials
+from lupin_bridge.access.credentials import SHARED_SESSION_S, Credentials
 from tests.support.access import BEARER, OWN, TOKEN, Served, served
 from tests.support.waiting import PATIENCE_S
 
@@ -102,14 +101,14 @@ def test_the_token_is_traded_for_a_strict_cookie(closed: Served) -> None:
     assert cookie["httponly"]
     assert cookie["samesite"].lower() == "strict"
     assert (cookie["path"], cookie["domain"]) == ("/", "")
-    assert int(cookie["max-age"]) == SESSION_S
+    assert int(cookie["max-age"]) == SHARED_SESSION_S
     assert not cookie["secure"], "a browser would not send it back over plain http"
     assert TOKEN not in answer.headers["set-cookie"]
 
 
 def test_the_cookie_ends_on_the_bridges_clock_too(closed: Served) -> None:
     expires = int(cookie_of(closed.post("/api/signin", BEARER)).value.partition(".")[0])
-    assert abs(expires - time.time() - SESSION_S) < 600
+    assert abs(expires - time.time() - SHARED_SESSION_S) < 600
 
 
 def test_the_cookie_opens_everything(closed: Served) -> None:
@@ -167,8 +166,8 @@ def session(closed: Served) -> dict[str, str]:
 def ending_in(seconds: float) -> dict[str, str]:
     """The Cookie header of a session that lasts so much longer."""
     ours = Credentials(TOKEN)
-    name = secrets.token_hex(16)
-    return {"Cookie": f"{ours.cookie_name}={ours.cookie(name, time.time() + seconds - SESSION_S)}"}
+    begun_s = time.time() + seconds - SHARED_SESSION_S
+    return {"Cookie": f"{ours.cookie_name}={ours.cookie(begun_s)}"}
 
 
 @contextmanager
@@ -277,7 +276,7 @@ def test_a_page_is_told_whether_it_can_sign_out(closed: Served) -> None:
     told = closed.get("/api/session", session(closed)).json()
     assert (told["name"], told["role"], told["can_write_notes"]) == (None, "viewer", False)
     assert told["can_sign_out"]
-    assert SESSION_S - 600 < told["seconds_left"] <= SESSION_S
+    assert SHARED_SESSION_S - 600 < told["seconds_left"] <= SHARED_SESSION_S
     nobody = {"name": None, "role": "viewer", "can_write_notes": False}
     program = {"can_sign_out": False, "seconds_left": None, **nobody}
     assert closed.get("/api/session", BEARER).json() == program

@@ -10,6 +10,7 @@ from contextlib import ExitStack, suppress
 
 import pytest
 
+from lupin_bridge.routes import answers as answers_of
 from lupin_bridge.serving.admission import (
     ALL_EXPORTS,
     BURST_S,
@@ -299,17 +300,19 @@ async def test_with_all_places_taken_it_is_503_until_one_is_free(domain: int) ->
         assert [answer.status_code for answer in free] == [200, 200]
 
 
-async def test_a_place_is_held_until_the_twin_has_answered_and_then_given_back(domain: int) -> None:
-    """Of a twin that does not answer, no more clients wait than the limit allows."""
+async def test_a_place_is_held_until_there_is_an_answer_and_then_given_back(
+    domain: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Of work that does not end, no more clients wait than the limit allows."""
 
     time_is_up = asyncio.Event()
 
-    async def never(_work: object) -> None:
+    async def never(*_: object) -> None:
         await time_is_up.wait()
         raise TimeoutError
 
+    monkeypatch.setattr(answers_of, "newest_field", never)
     async with running(Limits(concurrency=3)) as it:
-        it.twin.thread.call = never  # type: ignore[method-assign, assignment]
         fields = [f"/api/field{QUERY.replace('co2', f'{n}')}" for n in range(8)]
         asked = [asyncio.create_task(it.http.get(field)) for field in fields]
         await until(lambda: sum(each.done() for each in asked) == 5, "the refusals")

@@ -133,7 +133,8 @@ def test_a_robot_of_standard_messages_alone_is_on_the_twins_state(
 
         tags = peer.until(fixed_at_b, "the fixed sensor's reading")
         assert [(each.name, each.value) for each in tags["B"].readings] == [("co2", 800.0)]
-        assert {each.source for each in robot.observations} == {"adapt"}
+        sources = {each.tag_reading.tag_id: each.source for each in robot.observations}
+        assert sources == {"A": "adapt", "B": "adapt/fixed"}
         assert process.stop() == 0
 
 

@@ -12,9 +12,12 @@ from typing import Any
 from paho.mqtt.client import Client
 from paho.mqtt.enums import CallbackAPIVersion
 
+from tests.support.domains import own_domain
+from tests.support.messages import scan
 from tests.support.mosquitto import Broker
 from tests.support.processes import Process, twin_node
 from tests.support.ros import Peer
+from tests.support.web import bridge
 from tests.twin.adapt.test_adapt import Robot, adapt
 
 CONFIG = """
@@ -108,6 +111,76 @@ def test_what_is_retained_counts_by_its_own_time_or_not_at_all(domain: int, tmp_
             peer.until(lambda: robot.said("it is retained and says no time"), "the complaint")
             peer.until(lambda: robot.said("must be from -inf to 2000"), "the other")
             assert readings(peer, "undated") == readings(peer, "hot") == {}
+
+
+def test_a_flood_a_megabyte_and_a_topic_for_each_message_harm_nothing(
+    domain: int, tmp_path: Path
+) -> None:
+    broker = Broker(tmp_path)
+    with (
+        broker.running(),
+        twin_node(domain),
+        adapted(domain, broker) as process,
+        Peer(domain) as peer,
+        device(broker) as client,
+    ):
+        robot = Robot(peer)
+        peer.listen()
+        peer.until(lambda: robot.said("connected"), "the broker")
+        client.publish("zigbee2mqtt/large", b"1" * 1_000_000)
+        for number in range(3_000):
+            client.publish(f"zigbee2mqtt/{number}", b"no number")
+
+        def is_known() -> bool:
+            client.publish("plain/bench/co2", "800")
+            return bool(readings(peer, "bench"))
+
+        peer.until(is_known, "a good reading behind all that")
+        peer.until(lambda: robot.said("it is no JSON"), "the complaint")
+        assert process.output.count("it is no JSON") < 10
+        assert process.exit_code is None
+
+
+def test_a_broker_that_falls_silent_is_an_alarm_of_its_tags_while_a_robot_goes_on(
+    tmp_path: Path,
+) -> None:
+    broker = Broker(tmp_path)
+    sim = ("--ros-args", "-p", "use_sim_time:=true")
+    path = tmp_path / "adapt.yaml"
+    path.write_text(CONFIG.format(url=broker.url))
+    with (
+        own_domain() as domain,
+        bridge(*sim, "-p", "state_publish_rate_hz:=10.0", domain=domain) as live,
+        adapt(domain, "--config", str(path), *sim) as process,
+    ):
+        peer, seconds = live.peer, 1_000.0
+
+        def later(step_s: float) -> None:
+            """Time goes on, and a robot scans another tag."""
+            nonlocal seconds
+            seconds += step_s
+            peer.set_clock(seconds)
+            peer.observe(scan("robot", {"co2": 500.0}, stamp_s=seconds))
+
+        def alarms() -> list[tuple[str, str]]:
+            body = live.json("/api/alarms", active=1)
+            return [(it["tag_id"], it["reason"]["kind"]) for it in body["alarms"]]
+
+        later(0.0)
+        with broker.running(), device(broker) as client:
+            for value in ("801", "802", "803"):
+
+                def is_known(value: str = value) -> bool:
+                    client.publish("plain/bench/co2", value)
+                    later(1.0)
+                    return readings(peer, "bench").get("co2") == float(value)
+
+                peer.until(is_known, f"{value} on the state")
+            assert alarms() == []
+        for _ in range(4):
+            later(200.0)
+        peer.until(lambda: alarms() == [("bench", "old")], "the alarm of the tag")
+        assert process.exit_code is None
 
 
 def test_a_broker_that_comes_late_or_goes_is_told_and_found_again(

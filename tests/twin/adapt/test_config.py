@@ -159,6 +159,13 @@ def test_what_cannot_be_is_named(path: str, value: Any, complaint: str | None) -
         ("a: " + "9" * 5000, "is no YAML"),
         ("\x00", "is no YAML"),
         ("- 1", "the file is [1], expected keys"),
+        ("reach_m: 0x" + "f" * 5000, "reach_m is a very large int, expected a number"),
+        # A thousand million entries, in ten lines.
+        (
+            "a0: &a0 [1]\n" + "".join(f"a{n + 1}: &a{n + 1} [{f'*a{n},' * 9}]\n" for n in range(9)),
+            "the alias *a0 is not taken",
+        ),
+        ("sensors: " + "[" * 99 + "]" * 99, ", expected keys and values"),
         ("x" * 4_000_001, "has more than 4000000 bytes"),
     ],
 )

@@ -37,10 +37,6 @@ def parameters(name: str, value: Any) -> TwinParameters:
     return TwinParameters(**{name: value})
 
 
-def test_names_and_defaults() -> None:
-    assert asdict(TwinParameters()) == DEFAULTS
-
-
 def test_the_shipped_file_holds_every_parameter_at_its_default() -> None:
     file = Path("ros_node/lupin_twin/config/twin.yaml")
     # For every node: a twin of another name or namespace, and `web`, read it too.
@@ -100,13 +96,6 @@ def test_the_ends_of_a_range_are_in_it_and_what_lies_beyond_is_not(name: str) ->
 )
 def test_of_a_list_empty_names_do_not_count(given: Any, names: tuple[str, ...]) -> None:
     assert parameters("layers", given).layers == names
-
-
-def test_every_parameter_is_described() -> None:
-    for spec in fields(TwinParameters):
-        told = describe(spec.name)
-        assert told.description
-        assert bool(told.range) == (type(spec.default) in (int, float))
 
 
 CHANGEABLE = {

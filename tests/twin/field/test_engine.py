@@ -90,12 +90,6 @@ def answer(engine: FieldEngine, request: FieldRequest, *args: Any) -> FieldGrid:
 # --- the request -----------------------------------------------------------------------------
 
 
-def test_request_over_ros_and_over_http_is_the_same() -> None:
-    over_ros = request_of(resolution=float(np.float32(0.1)), bbox_max_x=float(np.float32(1.1)))
-    assert over_ros == request_of(resolution=0.1, bbox_max_x=1.1)
-    assert check_request(over_ros, MAX_CELLS) == (11, 20)
-
-
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
@@ -174,17 +168,6 @@ def test_field_is_of_the_stores_samples_by_the_rules(store: TwinStore) -> None:
     # With no tag within the falloff, the nearest is taken: "a", 1 m away.
     nearest = answer(engine_of(falloff_radius_m=0.5), request_of(), store, None)
     assert nearest.values.reshape(2, 4)[1, 0] == 10.0
-
-
-def test_job_holds_the_moment_it_was_made_in(store: TwinStore) -> None:
-    engine = engine_of()
-    job = engine.lookup(request_of(), store, None)
-    assert isinstance(job, FieldJob)
-    store.record(scan("a", 0.5, 0.5, 11.0))
-    grid = job.compute()
-    assert grid.values[0] == 10.0
-    engine.keep(job, grid)
-    assert answer(engine, request_of(), store, None).values[0] == 11.0
 
 
 def test_a_job_that_nobody_waits_for_ends_between_two_parts(store: TwinStore) -> None:

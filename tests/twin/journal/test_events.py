@@ -3,7 +3,7 @@ from __future__ import annotations
 from pathlib import Path
 from sqlite3 import Connection
 
-from lupin_twin.core.past import EVERY_TAG, HOUR_NS, Event, SeriesPast, SeriesRequest
+from lupin_twin.core.past import EVERY_TAG, Event, SeriesPast, SeriesRequest
 from lupin_twin.journal.hours import SILENCE_NS
 from lupin_twin.journal.queries import series
 from tests.support.log_life import (
@@ -52,14 +52,6 @@ def test_of_looks_that_were_deleted_it_is_known_whether_there_was_a_pest(tmp_pat
         life.write([look(at_ns=BEGUN + 2 * HOUR, anomaly=True), look(at_ns=BEGUN + 3 * HOUR)])
         assert told(ask(life.connection, Event.PESTS_SEEN)) == [(BEGUN, 1.0)]
         assert told(ask(life.connection, Event.PESTS_CLEARED)) == [(BEGUN + 3 * HOUR, 0.0)]
-
-
-def test_long_buckets_of_the_site_come_from_tallies_alone(tmp_path: Path) -> None:
-    with lived(tmp_path / "j.sqlite") as life:
-        life.write(scan(at_ns=BEGUN + n * 10 * MINUTE) for n in range(180))
-        life.connection.execute("DELETE FROM scan WHERE seq > 20")
-        answer = ask(life.connection, Event.SCANS, start=BEGUN, end=BEGUN + 30 * HOUR, points=10)
-        assert (answer.bucket_ns, answer.counts) == (3 * HOUR_NS, (18,) * 10)
 
 
 def test_runs_are_told_as_spans_of_the_period(tmp_path: Path) -> None:

@@ -45,17 +45,6 @@ def test_runs_are_kept_in_a_file_that_takes_anothers_place(path: Path) -> None:
     assert known(path) == {scan()}
 
 
-def test_a_file_that_is_removed_or_replaced_is_noticed(
-    path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr("lupin_twin.journal.file._LOOK_EVERY_S", 0.0)
-    with opened(path) as file:
-        file.look_after(may_purge=True)
-        path.rename(path.with_name("moved"))
-        with pytest.raises(FileNotFoundError, match="removed or replaced"):
-            file.look_after(may_purge=True)
-
-
 def test_upkeep_purges_shrinks_and_checkpoints(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("lupin_twin.journal.file._LOG_BYTES", 10_000)
     monkeypatch.setattr("lupin_twin.journal.file._PURGE_EVERY_S", 0.0)
@@ -71,22 +60,6 @@ def test_upkeep_purges_shrinks_and_checkpoints(path: Path, monkeypatch: pytest.M
     assert 0 < left < 1000
     assert path.stat().st_size < 400_000
     assert is_whole(path)
-
-
-def test_a_log_that_was_put_into_the_file_is_short_again(
-    path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Else each commit from then on would have all of it put into the file again."""
-    monkeypatch.setattr("lupin_twin.journal.file._LOG_BYTES", 500_000)
-    with opened(path) as file:
-        run = file.start(CLOCK, 1, is_believed=False).run
-        number = 0
-        while file._log_bytes() <= 500_000:
-            number += 100
-            file.append([(run, scan(at_ns=NOW + number + n)) for n in range(100)])
-        file.look_after(may_purge=True)
-        file.append([(run, scan(at_ns=NOW + number + 100))])
-        assert file._log_bytes() < 100_000
 
 
 @pytest.mark.parametrize("is_there", [True, False])

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from lupin_twin.core.past import HOUR_NS, SeriesPast, SeriesRequest
+from lupin_twin.core.past import SeriesPast, SeriesRequest
 from lupin_twin.journal.queries import series
 from tests.support.log_life import (
     BEGUN,
@@ -41,33 +41,6 @@ def test_as_many_readings_as_points_are_told_and_one_more_are_buckets(tmp_path: 
                 tuple(map(float, range(1, 10))),
             )
         )
-
-
-def test_the_period_ends_before_its_end_and_now_is_told(tmp_path: Path) -> None:
-    with lived(tmp_path / "j.sqlite") as life:
-        life.write(scan(at_ns=BEGUN + n) for n in range(3))
-        ended = series(life.connection, temperature(BEGUN, BEGUN + 2), END)
-        assert ended.stamps_ns == (BEGUN, BEGUN + 1)
-        until_now = series(life.connection, temperature(BEGUN + 1), BEGUN + 2)
-        assert until_now.stamps_ns == (BEGUN + 1, BEGUN + 2)
-        later = series(life.connection, temperature(BEGUN + 3), BEGUN + 2)
-        assert later == SeriesPast(BEGUN + 3, BEGUN + 3)
-
-
-def test_long_buckets_come_from_hours_alone(tmp_path: Path) -> None:
-    hours = 30
-    with lived(tmp_path / "j.sqlite") as life:
-        life.write(
-            scan(at_ns=BEGUN + n * 10 * MINUTE, temperature=n + 0.1) for n in range(6 * hours)
-        )
-        # Were a row read, it would show.
-        life.connection.execute("UPDATE scan SET readings = '[0.0]'")
-        answer = series(life.connection, temperature(BEGUN + 1, BEGUN + hours * HOUR_NS, 10), END)
-    assert answer.start_ns == BEGUN
-    assert answer.bucket_ns == 3 * HOUR_NS
-    assert answer.counts == (18,) * 10
-    assert answer.minima == tuple(round(18 * n + 0.1, 9) for n in range(10))
-    assert answer.maxima == tuple(round(18 * n + 17.1, 9) for n in range(10))
 
 
 def test_too_many_scans_are_told_by_the_hour(

@@ -30,14 +30,6 @@ def path(tmp_path: Path) -> Path:
     return made
 
 
-def test_a_new_file_is_ours_and_can_be_shrunk(path: Path) -> None:
-    connection = open_writer(path)
-    for pragma, value in {"journal_mode": "wal", "auto_vacuum": 2, "mmap_size": 0}.items():
-        assert connection.execute(f"PRAGMA {pragma}").fetchone() == (value,)
-    connection.close()
-    assert find_damage(path) is None
-
-
 def test_an_index_that_an_earlier_release_did_not_make_is_made_and_no_damage(path: Path) -> None:
     indexes = "SELECT name FROM sqlite_schema WHERE type = 'index' AND sql != '' ORDER BY name"
     with closing(open_writer(path)) as connection:

@@ -5,7 +5,6 @@ from pathlib import Path
 
 import pytest
 
-from lupin_twin.journal.beside import InUse, Lock
 from lupin_twin.journal.rebuild import NotPossible, vacuum
 from lupin_twin.journal.schema import Empty, Foreign, open_reader, open_writer
 from tests.support.journal import NOW, SECOND, is_whole, kept, known, pin, scan
@@ -55,26 +54,6 @@ def test_a_file_that_is_no_journal_is_left_and_nothing_made_beside_it(
         small(theirs)
     assert theirs.read_bytes() == content
     assert list(tmp_path.iterdir()) == [theirs]
-
-
-def test_a_damaged_journal_is_left_as_it_is(path: Path) -> None:
-    with closing(open_writer(path)) as connection:
-        connection.execute("UPDATE scan SET readings = '[]' WHERE seq = 4700")
-        connection.execute("PRAGMA wal_checkpoint(TRUNCATE)")
-    content = path.read_bytes()
-    said = r"j\.sqlite is damaged and left as it is \(scan 4700 of tag '7' is not what was wri"
-    with pytest.raises(NotPossible, match=said):
-        small(path)
-    assert path.read_bytes() == content
-    # Nobody keeps it: its twin can have it.
-    Lock(path, "a twin").release()
-
-
-def test_while_a_twin_has_it_it_is_refused_by_name(path: Path) -> None:
-    whole = path.read_bytes()
-    with Lock(path, "/gh1/lupin_twin"), pytest.raises(InUse, match="in use by /gh1/lupin_twin"):
-        small(path)
-    assert path.read_bytes() == whole
 
 
 def test_while_somebody_reads_it_it_is_refused(path: Path) -> None:

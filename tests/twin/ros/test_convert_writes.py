@@ -6,17 +6,14 @@ import math
 from typing import Any
 
 import pytest
-from lupin_msgs.srv import GetWrites
 from rclpy.serialization import deserialize_message, serialize_message
 
-from lupin_twin.core.writes import DEFAULT_WRITES, PastWrite, PastWrites, RunSpan, WritesRequest
+from lupin_twin.core.writes import PastWrite, PastWrites, RunSpan
 from lupin_twin.journal.follow import Lot, NotALotError
 from lupin_twin.ros.convert_past import (
     lot_of,
     rows_request_message,
     rows_response,
-    writes_request,
-    writes_response,
 )
 
 WRITES = (
@@ -30,23 +27,6 @@ LOT = Lot("0123456789abcdef" * 2, ('["run",1,0,1,1,1,null,null]', '["meta","ä",
 
 def over_the_wire(message: Any) -> Any:
     return deserialize_message(serialize_message(message), type(message))
-
-
-def test_what_was_written_crosses_as_columns() -> None:
-    response = over_the_wire(writes_response(PAST))
-    assert (response.ok, response.journal, response.last, response.is_all) == (True, "a-1", 9, True)
-    assert list(response.numbers) == [4, 6, 7]
-    assert [response.texts[place] for place in response.tags] == ["7", "7", "ä"]
-    assert [response.texts[place] for place in response.sensors] == ["co2", "light"]
-    assert list(response.values) == [420.5, math.inf]
-    assert list(response.reading_counts) == [2, 0, 0]
-    assert (list(response.span_runs), list(response.span_starts_ns)) == ([1, 2], [0, 9])
-    assert (response.has_seen[1], response.bug_counts[1]) == (True, 3)
-
-
-def test_a_question_is_read_with_its_defaults() -> None:
-    message = over_the_wire(GetWrites.Request(after=3))
-    assert writes_request(message) == WritesRequest(after=3, max_count=DEFAULT_WRITES)
 
 
 def test_rows_survive_the_wire() -> None:

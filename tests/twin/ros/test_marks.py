@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import math
-
 import pytest
 
-from lupin_twin.core.state import Attempt, Flower, Pose, Snapshot, TagState
+from lupin_twin.core.state import Flower, Pose, Snapshot, TagState
 from lupin_twin.ros.layers import (
     FRESH_S,
     OLD_S,
@@ -43,11 +41,6 @@ def test_a_tag_looks_as_old_as_it_is(age_s: float, look: str) -> None:
     assert appearance_of(tag("a", age_s=age_s), NOW_NS) == look
 
 
-def test_a_tag_whose_last_try_failed_says_so_whatever_its_age() -> None:
-    assert appearance_of(tag("a", last_try=Attempt(NOW_NS, 2)), NOW_NS) == "failed"
-    assert appearance_of(tag("a", last_try=Attempt(NOW_NS, 0)), NOW_NS) == "fresh"
-
-
 def test_planters_are_told_once_by_the_number_of_their_first_tag() -> None:
     seen = Flower(footprint=BOX)
     others = Flower(footprint=((5.0, 0.0, 0.0), *BOX[1:]))
@@ -55,10 +48,3 @@ def test_planters_are_told_once_by_the_number_of_their_first_tag() -> None:
         house(tag("bare"), tag("a", flower=seen), tag("b", flower=others), tag("c", flower=seen))
     )
     assert marks == [PlanterMark(1, BOX), PlanterMark(2, others.footprint)]
-
-
-@pytest.mark.parametrize("corners", [BOX[:2], ((math.nan, 0.0, 0.0), *BOX[1:])])
-def test_what_makes_no_outline_is_no_planter(
-    corners: tuple[tuple[float, float, float], ...],
-) -> None:
-    assert planter_marks(house(tag("a", flower=Flower(footprint=corners)))) == []

@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from lupin_twin.core.past import NotRemembered, PastRefused, error_of, message_of
+from lupin_twin.core.past import NotRemembered, error_of, message_of
 from lupin_twin.runtime.workers import (
     LARGE_AT_ONCE,
     MAX_QUERIES,
@@ -64,32 +64,6 @@ def made() -> Iterator[Stage]:
     stage.workers.close()
 
 
-def test_what_is_found_is_made_an_answer_elsewhere_and_handed_out_here(made: Stage) -> None:
-    threads: list[str] = []
-
-    def make(number: int) -> str:
-        threads.append(threading.current_thread().name)
-        return f"made of {number}"
-
-    search = made.ask(make)
-    assert made.queue.waiting == 1
-    made.queue.deliver()
-    assert made.answers == [], "nothing is there yet"
-    search.set_result(7)  # found in this very thread, and still not made in it
-    assert made.delivered() == "made of 7"
-    assert threads[0].startswith("test_")
-    assert (made.queue.waiting, made.queue.answered) == (0, 1)
-    assert made.queue.slowest_s > 0.0
-
-
-@pytest.mark.parametrize("error", [PastRefused("at is 3 s"), OSError("no such file")])
-def test_an_error_of_the_search_is_the_answer(made: Stage, error: Exception) -> None:
-    made.ask().set_exception(error)
-    assert made.delivered() is error
-    assert made.queue.answered == 0
-    assert made.queue.waiting == 0
-
-
 def test_what_cannot_be_looked_up_is_answered_and_holds_up_nobody(made: Stage) -> None:
     error = NotRemembered("no journal", is_lasting=True)
 
@@ -116,13 +90,6 @@ def test_an_answer_that_cannot_be_sent_holds_up_nobody(made: Stage) -> None:
         made.queue.deliver()
     after.set_result(2)
     assert made.delivered() == "2"
-
-
-def test_closed_workers_end_no_query_in_silence(made: Stage) -> None:
-    search = made.ask()
-    made.workers.close()
-    search.set_result(1)
-    assert "closed" in str(made.delivered())
 
 
 def test_large_ones_are_taken_one_by_one_when_the_last_is_out_and_small_ones_do_not_wait(

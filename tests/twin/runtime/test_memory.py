@@ -16,9 +16,10 @@ from lupin_twin.core.ingest import Pin
 from lupin_twin.core.journal_condition import JournalState
 from lupin_twin.core.past import NotRemembered
 from lupin_twin.core.state import Flower, Inspection, Pose, Reading, Scan, TwinStore
+from lupin_twin.journal.beside import journal_path, state_folder
 from lupin_twin.journal.fold import state_at
 from lupin_twin.journal.runs import Clock
-from lupin_twin.runtime.memory import MAX_NEW_RUNS, Memory, journal_path, open_journal, state_folder
+from lupin_twin.runtime.memory import MAX_NEW_RUNS, Memory, open_journal
 from lupin_twin.runtime.workers import ShouldStop
 from tests.support.journal import is_whole, kept, scan, select
 from tests.support.waiting import wait_for

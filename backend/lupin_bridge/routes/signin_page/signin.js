@@ -3,6 +3,7 @@
 const form = document.querySelector('form');
 const person = document.querySelector('#name');
 const input = document.querySelector('#token');
+const others = document.querySelector('#others');
 const button = document.querySelector('button');
 const message = document.querySelector('#message');
 
@@ -23,7 +24,7 @@ const requestOf = (name, secret) =>
   name
     ? {
         headers: { 'Content-Type': 'application/json', 'X-Lupin-Twin': '1' },
-        body: JSON.stringify({ name, password: secret }),
+        body: JSON.stringify({ name, password: secret, ends_others: others.checked }),
       }
     : { headers: { Authorization: `Bearer ${secret}`, 'X-Lupin-Twin': '1' } };
 

@@ -44,7 +44,7 @@ export const MAP: In<typeof ENGLISH> = {
   legendErrorWorst: (tag, error) => `Am größten an Messpunkt ${tag}: ${error}.`,
   legendTransparent:
     'Kräftigere Farbe: höherer Wert. Ohne Farbe: kleinster Wert. Schraffiert: keine Daten',
-  legendTransparentShort: 'Ohne Farbe: kleinster Wert. Schraffiert: keine Daten',
+  legendMore: 'Details',
   legendHatched: 'Schraffiert: keine Daten',
   legendOld: 'Blass und schraffiert: Messwerte zu alt',
   readoutOld: 'Messwerte zu alt',

@@ -69,7 +69,7 @@ export const PAGE: In<typeof ENGLISH> = {
   unreadLast: (why) => `Die letzte: ${why}`,
   paused: 'Die Zeit ist angehalten.',
   pausedHint: 'Simulation oder Aufzeichnung sind angehalten; das Alter der Werte wächst nicht.',
-  inputProblem: 'Ein Teil der Daten erreicht den Zwilling nicht.',
+  inputProblem: 'Nicht alle Daten kommen hier an.',
   drops: (count) =>
     `Der Zwilling hat in den letzten Minuten ${counted(count, 'Nachricht', 'Nachrichten')} verworfen.`,
   dropsLast: (message) => `Die letzte: ${message}`,

@@ -40,7 +40,7 @@ export const MAP = {
     'Typical error between tags: each tag is estimated from all the others and compared with its own reading.',
   legendErrorWorst: (tag: string, error: string): string => `Worst at tag ${tag}: ${error}.`,
   legendTransparent: 'Stronger colour: higher value. No colour: minimum. Hatched: no data',
-  legendTransparentShort: 'No colour: minimum. Hatched: no data',
+  legendMore: 'Details',
   legendHatched: 'Hatched: no data',
   legendOld: 'Faint and hatched: readings too old',
   readoutOld: 'readings too old',

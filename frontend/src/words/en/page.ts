@@ -66,7 +66,7 @@ export const PAGE = {
   unreadLast: (why: string): string => `The last: ${why}`,
   paused: 'Time is paused.',
   pausedHint: 'The simulation or recording is paused, so ages do not increase.',
-  inputProblem: 'Some data does not reach the twin.',
+  inputProblem: 'Not all data arrives here.',
   drops: (count: number): string =>
     `The twin dropped ${counted(count, 'message', 'messages')} in the last minutes.`,
   dropsLast: (message: string): string => `The last: ${message}`,

@@ -66,7 +66,7 @@ export const PAGE: In<typeof ENGLISH> = {
   unreadLast: (why) => `El último: ${why}`,
   paused: 'El tiempo está en pausa.',
   pausedHint: 'La simulación o la grabación está en pausa; la antigüedad no aumenta.',
-  inputProblem: 'Parte de los datos no llega al gemelo.',
+  inputProblem: 'No llegan todos los datos.',
   drops: (count) =>
     `El gemelo ha descartado ${counted(count, 'mensaje', 'mensajes')} en los últimos minutos.`,
   dropsLast: (message) => `El último: ${message}`,

@@ -43,7 +43,7 @@ export const MAP: In<typeof ENGLISH> = {
   legendErrorWorst: (tag, error) => `Grootste fout bij meetpunt ${tag}: ${error}.`,
   legendTransparent:
     'Sterkere kleur: hogere waarde. Geen kleur: laagste waarde. Gearceerd: geen gegevens',
-  legendTransparentShort: 'Geen kleur: laagste waarde. Gearceerd: geen gegevens',
+  legendMore: 'Details',
   legendHatched: 'Gearceerd: geen gegevens',
   legendOld: 'Vaag en gearceerd: metingen te oud',
   readoutOld: 'metingen te oud',

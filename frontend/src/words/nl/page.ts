@@ -71,7 +71,7 @@ export const PAGE: In<typeof ENGLISH> = {
   unreadLast: (why) => `Het laatste: ${why}`,
   paused: 'De tijd staat stil.',
   pausedHint: 'De simulatie of opname is gepauzeerd; de ouderdom loopt niet op.',
-  inputProblem: 'Een deel van de gegevens bereikt de tweeling niet.',
+  inputProblem: 'Niet alle gegevens komen hier aan.',
   drops: (count) =>
     `De tweeling heeft de afgelopen minuten ${counted(count, 'bericht', 'berichten')} genegeerd.`,
   dropsLast: (message) => `Het laatste: ${message}`,

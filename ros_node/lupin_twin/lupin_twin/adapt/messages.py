@@ -15,7 +15,9 @@ from lupin_twin.adapt.scans import MadeScan
 from lupin_twin.adapt.table import ConfigError
 from lupin_twin.ros import convert
 
-SOURCE: Final = "adapt"
+# Of a robot's visit, and of a sensor that stands at its tag.
+VISIT_SOURCE: Final = "adapt"
+FIXED_SOURCE: Final = "adapt/fixed"
 # Their packages have no wheels: they are looked up when they are wanted.
 TF_TYPE: Final = "tf2_msgs/msg/TFMessage"
 DETECTIONS_TYPE: Final = "apriltag_msgs/msg/AprilTagDetectionArray"
@@ -54,12 +56,15 @@ def transform_of(message: Any, stamp_ns: int | None) -> tuple[str, Transform]:
     )
 
 
-def observation(scan: MadeScan, frame_id: str, source: str = SOURCE) -> Observation:
-    """A scan as lupin_msgs/Observation; without readings, a failed one."""
+def observation(scan: MadeScan, frame_id: str, source: str = "") -> Observation:
+    """A scan as lupin_msgs/Observation; without readings, a failed one.
+
+    Without a source, it is the adapter's own.
+    """
     stamp = convert.time_msg(scan.stamp_ns)
     message = Observation(
         header=Header(stamp=stamp, frame_id=frame_id),
-        source=source,
+        source=source or (FIXED_SOURCE if scan.is_fixed else VISIT_SOURCE),
         kind=Observation.KIND_TAG_READING,
         status=Observation.STATUS_OK if scan.readings else Observation.STATUS_SCAN_FAILED,
         status_detail=scan.detail[:256],

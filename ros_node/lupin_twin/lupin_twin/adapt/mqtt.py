@@ -9,11 +9,12 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Final
 
-from lupin_twin.adapt.mqtt_topics import Broker
+from lupin_twin.adapt.mqtt_topics import MAX_PAYLOAD_BYTES, Broker
 from lupin_twin.adapt.table import ConfigError
 
-# What waits for the node's thread; of more, the oldest is lost and counted.
-MAX_WAITING: Final = 10_000
+# Messages that wait for the node's thread; of more, the oldest is lost and counted. All of them
+# at their largest take 65 MB.
+MAX_WAITING: Final = 1_000
 RETRY_S: Final = (1, 60)
 
 
@@ -78,10 +79,7 @@ class MqttClient:
 
     def take(self) -> list[Message]:
         """What has come since the last call, in order."""
-        taken = []
-        while self._waiting:
-            taken.append(self._waiting.popleft())
-        return taken
+        return [self._waiting.popleft() for _ in range(len(self._waiting))]
 
     def _on_connect(
         self, client: Any, _data: Any, _flags: Any, code: Any, _properties: Any
@@ -103,5 +101,7 @@ class MqttClient:
     def _on_message(self, _client: Any, _data: Any, message: Any) -> None:
         if len(self._waiting) == MAX_WAITING:
             self.lost += 1
-        self._waiting.append(Message(message.topic, bytes(message.payload), bool(message.retain)))
+        # One byte more than is taken: `measured` refuses it.
+        payload = bytes(message.payload[: MAX_PAYLOAD_BYTES + 1])
+        self._waiting.append(Message(message.topic, payload, bool(message.retain)))
         self._wake()

@@ -8,11 +8,20 @@ import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
+from functools import lru_cache
 from pathlib import Path
 from typing import Any, Final
 from urllib.parse import urlsplit
 
-from lupin_twin.adapt.table import ConfigError, Table, shown
+from lupin_twin.adapt.table import (
+    AS_IT_IS,
+    ConfigError,
+    Table,
+    Value,
+    shown,
+    value_of,
+    values_of,
+)
 
 PORTS: Final = {"mqtt": 1883, "mqtts": 8883}
 MAX_TOPICS: Final = 100
@@ -20,17 +29,6 @@ MAX_PAYLOAD_BYTES: Final = 65_536
 # A number above this is milliseconds since the epoch, not seconds: as seconds, the year 5138.
 _MILLISECONDS: Final = 1e11
 _PLACEHOLDER: Final = re.compile(r"\{(tag|sensor)\}|(\+)")
-
-
-@dataclass(frozen=True, slots=True)
-class Value:
-    """Where a payload has a sensor, keys with full stops between, and how that becomes our unit."""
-
-    path: str = ""
-    factor: float = 1.0
-    offset: float = 0.0
-    low: float = -math.inf
-    high: float = math.inf
 
 
 # What Zigbee2MQTT calls it: https://www.zigbee2mqtt.io/guide/usage/exposes.html
@@ -68,7 +66,7 @@ class Pattern:
     tag: str = ""
     sensor: str = ""
     values: Mapping[str, Value] = field(default_factory=dict)
-    plain: Value = Value()
+    plain: Value = AS_IT_IS
     names: Mapping[str, str] = field(default_factory=dict)
     time: str = ""
     is_availability: bool = False
@@ -84,7 +82,7 @@ class Pattern:
 
     def match(self, topic: str) -> tuple[str, str] | None:
         """Tag and sensor of a topic, each empty where it says none; None: it is another's."""
-        found = re.fullmatch(_regex(self.topic, tuple(self.names)), topic)
+        found = _regex(self.topic, tuple(self.names)).fullmatch(topic)
         if found is None:
             return None
         named = found.groupdict()
@@ -130,7 +128,7 @@ def measured(pattern: Pattern, tag: str, sensor: str, payload: bytes) -> Measure
 
     """
     if len(payload) > MAX_PAYLOAD_BYTES:
-        raise PayloadError(f"{len(payload)} bytes, the limit is {MAX_PAYLOAD_BYTES}")
+        raise PayloadError(f"it has more than {MAX_PAYLOAD_BYTES} bytes, the limit")
     if pattern.is_availability:
         return Measured(tag, is_away=b"offline" in payload)
     if not pattern.values:
@@ -209,7 +207,7 @@ def _patterns(table: Table) -> Iterator[Pattern]:
     if bool(tag) == ("{tag}" in topic):
         raise ConfigError(f"{table.name}: expected {{tag}} in its topic, or tag; one of them")
     sensor = table.text("sensor") if table.has("sensor") else ""
-    values = _values(Table(f"{table.name}.values", table.take("values", {})))
+    values = values_of(Table(f"{table.name}.values", table.take("values", {})), "path")
     if preset == "zigbee2mqtt":
         values = {**_ZIGBEE, **values}
         yield Pattern(f"{topic}/availability", tag, is_availability=True)
@@ -224,35 +222,12 @@ def _patterns(table: Table) -> Iterator[Pattern]:
         yield Pattern(there, tag, is_availability=True)
     default = "last_seen" if preset == "zigbee2mqtt" else ""
     time = table.text("time") if table.has("time") else default
-    yield Pattern(topic, tag, sensor, values, _value(table), names, time)
+    yield Pattern(topic, tag, sensor, values, value_of(table), names, time)
     table.end()
 
 
-def _values(table: Table) -> dict[str, Value]:
-    values = {}
-    for name in tuple(table.content):
-        given = table.take(name)
-        if isinstance(given, str):
-            values[str(name)] = Value(given)
-            continue
-        each = Table(f"{table.name}.{name}", given)
-        path = each.text("path")
-        values[str(name)] = _value(each, path)
-        each.end()
-    return values
-
-
-def _value(table: Table, path: str = "") -> Value:
-    return Value(
-        path,
-        factor=table.number("factor", 1.0),
-        offset=table.number("offset", 0.0),
-        low=table.number("min", -math.inf),
-        high=table.number("max", math.inf),
-    )
-
-
-def _regex(topic: str, sensors: tuple[str, ...]) -> str:
+@lru_cache(maxsize=2 * MAX_TOPICS)
+def _regex(topic: str, sensors: tuple[str, ...]) -> re.Pattern[str]:
     """A topic's pattern; a sensor is one of those names, where there are any."""
     # A tag is as short as can be, so the longest sensor is found: `soil_moisture`, not `moisture`.
     known = "|".join(map(re.escape, sensors))
@@ -263,7 +238,7 @@ def _regex(topic: str, sensors: tuple[str, ...]) -> str:
         any_level = known if known and name == "sensor" else "[^/]+?"
         parts.append(f"(?P<{name}>{any_level})" if name else "[^/]+")
         at = found.end()
-    return "".join(parts) + re.escape(topic[at:])
+    return re.compile("".join(parts) + re.escape(topic[at:]))
 
 
 def _at(content: Any, path: str) -> Any:

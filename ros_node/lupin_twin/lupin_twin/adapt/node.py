@@ -159,7 +159,9 @@ class AdaptNode(Node):  # type: ignore[misc]  # rclpy is not typed
 
     def _drop(self, reason: Reason, topic: str, why: str, case: str = "") -> None:
         drop = Drop(reason, why, case=case)
-        self.utilities.drop(drop, topic)
+        # Of a broker's topics there may be any number: one warning a period for all of them.
+        known = topic if topic in self._heard_s else MQTT
+        self.utilities.warn((reason, (known, case)), drop.on(topic))
         key = case or reason.value
         count = self._dropped[key].count if key in self._dropped else 0
         self._dropped[key] = _Dropped(count + 1, drop.on(topic), time.monotonic())
@@ -317,7 +319,7 @@ class AdaptNode(Node):  # type: ignore[misc]  # rclpy is not typed
             self._drop(Reason.REJECTED, topic, str(error), case="payload")
             return
         if said.is_away:
-            self._publish([self._scans.failed(tag, "its sensor is offline", now_ns)])
+            self._publish([self._scans.failed(tag, "its sensor is offline", now_ns, is_fixed=True)])
             return
         if said.stamp_s is None and message.is_retained and said.readings:
             self._drop(

@@ -25,7 +25,7 @@ class MadeScan:
     """A scan of a tag: each sensor's mean, of the moment of the newest reading.
 
     Without a reading it is a failed attempt, and `detail` says why; with, it says how far the
-    readings were spread.
+    readings were spread. `is_fixed`: of a sensor that stands there, not of a robot's visit.
     """
 
     tag_id: str
@@ -33,6 +33,7 @@ class MadeScan:
     place: Place | None
     readings: tuple[tuple[str, float], ...]
     detail: str
+    is_fixed: bool = False
 
 
 @dataclass(slots=True)
@@ -121,9 +122,9 @@ class Scans:
         """Where tags are."""
         return self._places
 
-    def failed(self, tag_id: str, detail: str, now_ns: int) -> MadeScan:
+    def failed(self, tag_id: str, detail: str, now_ns: int, *, is_fixed: bool = False) -> MadeScan:
         """A failed attempt at a tag."""
-        return MadeScan(tag_id, now_ns, self._place(tag_id), (), detail)
+        return MadeScan(tag_id, now_ns, self._place(tag_id), (), detail, is_fixed)
 
     def take(self, sensor: str, tag: str, value: float, stamp_ns: int, now_ns: int) -> bool:
         """A reading, in the sensor's unit; returns whether it belongs to a tag.
@@ -150,7 +151,7 @@ class Scans:
         for tag_id, window in tuple(self._fixed.items()):
             if now_ns - window.begun_ns >= window_ns:
                 del self._fixed[tag_id]
-                yield self._scan(tag_id, window)
+                yield self._scan(tag_id, window, is_fixed=True)
         robot = self._config.robot
         if robot is not None and now_ns - self._seen_ns > robot.max_age_s * NS:
             yield from self._be_at(None, now_ns)
@@ -177,11 +178,12 @@ class Scans:
             stayed_s = (now_ns - window.begun_ns) / NS
             yield self.failed(tag_id, f"no reading in {stayed_s:.0f} s here", now_ns)
 
-    def _scan(self, tag_id: str, window: _Window) -> MadeScan:
+    def _scan(self, tag_id: str, window: _Window, *, is_fixed: bool = False) -> MadeScan:
         means = sorted(window.means.items())
         detail = ", ".join(f"{name} ±{mean.spread:.2g} of {mean.number}" for name, mean in means)
         readings = tuple((name, mean.mean) for name, mean in means)
-        return MadeScan(tag_id, window.newest_ns, self._place(tag_id), readings, detail)
+        place = self._place(tag_id)
+        return MadeScan(tag_id, window.newest_ns, place, readings, detail, is_fixed)
 
     def _place(self, tag_id: str) -> Place | None:
         return self._places.get(tag_id, self._cell if tag_id == self._tag else None)

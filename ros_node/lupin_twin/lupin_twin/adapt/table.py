@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import math
+import reprlib
 from collections.abc import Collection
-from typing import Any
+from dataclasses import dataclass
+from typing import Any, Final
 
-from lupin_twin.core.drops import MAX_TEXT_LENGTH
+from lupin_twin.core.drops import MAX_SENSORS_PER_TAG, MAX_TEXT_LENGTH
 
 
 class ConfigError(ValueError):
@@ -72,6 +74,63 @@ class Table:
         return f"{self.name}.{key}" if self.name else str(key)
 
 
+@dataclass(frozen=True, slots=True)
+class Value:
+    """Where a source has a sensor's number, and how that becomes our unit.
+
+    The number is value * factor + offset; what is then below `low` or above `high` is no reading.
+    """
+
+    path: str = ""
+    factor: float = 1.0
+    offset: float = 0.0
+    low: float = -math.inf
+    high: float = math.inf
+
+
+AS_IT_IS: Final = Value()
+
+
+def value_of(table: Table, path: str = "") -> Value:
+    """The keys `factor`, `offset`, `min` and `max` of a table.
+
+    Raises:
+        ConfigError: one of them cannot be.
+
+    """
+    value = Value(
+        path,
+        factor=table.number("factor", 1.0),
+        offset=table.number("offset", 0.0),
+        low=table.number("min", -math.inf),
+        high=table.number("max", math.inf),
+    )
+    if value.low > value.high:
+        raise ConfigError(f"{table.name}.min is {value.low:g}, above max, {value.high:g}")
+    return value
+
+
+def values_of(table: Table, key: str) -> dict[str, Value]:
+    """By sensor its path alone, or a table with the path under `key`.
+
+    Raises:
+        ConfigError: there are too many, or one of them cannot be.
+
+    """
+    if len(table.content) > MAX_SENSORS_PER_TAG:
+        raise ConfigError(f"{table.name}: more than {MAX_SENSORS_PER_TAG}, the limit")
+    values = {}
+    for name in tuple(table.content):
+        given = table.take(name)
+        if isinstance(given, str):
+            values[str(name)] = Value(given)
+            continue
+        each = Table(f"{table.name}.{name}", given)
+        values[str(name)] = value_of(each, each.text(key))
+        each.end()
+    return values
+
+
 def check_text(what: str, value: Any) -> str:
     """The value, where it is a text that is neither empty nor too long."""
     if not isinstance(value, str) or not 0 < len(value) <= MAX_TEXT_LENGTH:
@@ -92,7 +151,14 @@ def is_number(value: Any) -> bool:
         return False
 
 
+_SHORT: Final = reprlib.Repr()
+_SHORT.maxstring = 80
+
+
 def shown(value: Any) -> str:
-    """The value as a complaint repeats it."""
-    text = repr(value)
+    """The value as a complaint repeats it: its beginning, of text and of what is nested."""
+    try:
+        text = _SHORT.repr(value)
+    except ValueError:  # an integer of thousands of digits
+        text = f"a very large {type(value).__name__}"
     return text if len(text) <= 80 else f"{text[:79]}…"

@@ -192,11 +192,12 @@ class Hyper(NamedTuple):
         return self.tau**2 + JITTER
 
 
-# Log-normal: these are the medians, and the sds of the logarithms. What moves beside the day, the
+# Log-normal: these are the medians, and the sds of the logarithms. The day's swing (sp) is taken to
+# be more than readings spread by: the first hours show a part of it. What moves beside the day, the
 # greenhouse as a whole (sg) or one place (sh, sq), may be next to nothing: its sds are wide. It
 # passes in hours (lg): what lasts for half a day cannot be told from the day itself, and would make
 # outages seem worse than they are.
-PRIOR_MEDIAN: Final = Hyper(0.3, 3.0, 1.0, 1.0, 0.25, 8.0, 0.25, 2.5, 0.15, 0.15)
+PRIOR_MEDIAN: Final = Hyper(0.3, 3.0, 1.5, 1.0, 0.25, 8.0, 0.25, 2.5, 0.15, 0.15)
 PRIOR_LOG_SD: Final = Hyper(1.5, 0.6, 0.7, 0.6, 1.3, 0.5, 1.3, 0.5, 1.0, 1.0)
 
 

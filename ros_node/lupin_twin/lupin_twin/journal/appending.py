@@ -16,6 +16,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Final, NamedTuple
 
+from lupin_twin.core.history import KNOWN_BY_NOTHING
 from lupin_twin.core.state import Flower
 from lupin_twin.journal.beside import Lock
 from lupin_twin.journal.hours import WrittenInspection, WrittenScan, count
@@ -42,8 +43,6 @@ from lupin_twin.journal.schema import (
 PURGED_SEQ: Final = "purged_seq"
 # The numbers go on from here at least: rows that had later ones are gone.
 LAST_SEQ: Final = "last_seq"
-# In the place of the stamp that was sent: a copy that nothing received again is taken for.
-KNOWN_BY_NOTHING: Final = -1
 # Groups kept at hand; past that they are looked up in the file again.
 _MAX_AT_HAND: Final = 100_000
 # Readings, flowers and rows that wait for `flush`: a few MB.
@@ -95,7 +94,7 @@ class Appender:
         self.last_seq = max(
             int(get_meta(connection, PURGED_SEQ) or 0),
             int(get_meta(connection, LAST_SEQ) or 0),
-            last_number(connection),
+            last_number(SiteLog(connection)),
             *(connection.execute(text).fetchone()[0] for text in newest),
             *(row[0] - 1 for row in connection.execute("SELECT begun_seq FROM run")),
         )

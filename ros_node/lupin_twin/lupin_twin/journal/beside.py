@@ -1,14 +1,60 @@
-"""What lies beside a journal: its lock, how far it is in the archive, the log that has to last."""
+"""Where a journal is; and beside it: its lock, how far it is archived, the log that has to last."""
 
 from __future__ import annotations
 
 import fcntl
 import os
+import re
 import threading
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Final, Self
 
 from lupin_twin.journal.schema import sync_folder
+
+NO_JOURNAL: Final = "off"
+
+
+def journal_path(
+    given: str, environ: Mapping[str, str], domain: int, namespace: str
+) -> Path | None:
+    """Where the journal is, None where there is none.
+
+    By default it is a file of the user's, named by domain and namespace.
+
+    Raises:
+        RuntimeError: there is no home to keep it in.
+
+    """
+    if given == NO_JOURNAL:
+        return None
+    if given:
+        return Path(given).expanduser().absolute()
+    names = [f"domain-{domain}", *re.findall("[^/]+", namespace)]
+    return state_folder(environ) / f"{'.'.join(names)}.sqlite"
+
+
+def demo_journal_path(environ: Mapping[str, str], seed: int) -> Path:
+    """Where the journal of a demo is: apart from a real twin's, and each seed for itself.
+
+    Raises:
+        RuntimeError: there is no home to keep it in.
+
+    """
+    return state_folder(environ) / f"demo-seed-{seed}.sqlite"
+
+
+def state_folder(environ: Mapping[str, str]) -> Path:
+    """The user's folder for what outlives a process (XDG Base Directory Specification).
+
+    Raises:
+        RuntimeError: there is no home to keep it in.
+
+    """
+    given = Path(environ.get("XDG_STATE_HOME", ""))
+    # A relative path there is invalid and to be ignored.
+    home = given if given.is_absolute() else Path("~/.local/state").expanduser()
+    return home / "lupin-twin"
 
 
 class InUse(Exception):

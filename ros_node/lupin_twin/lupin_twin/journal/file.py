@@ -46,6 +46,7 @@ from lupin_twin.journal.schema import (
     LOCAL_SITE,
     MAP,
     ORIGIN,
+    SiteLog,
     get_meta,
     open_writer,
     says_damaged,
@@ -332,7 +333,7 @@ class JournalFile:
         """
         with self._transaction():
             self._appender.last_seq += 1
-            return put_note(self._connection, self._appender.last_seq, note)
+            return put_note(SiteLog(self._connection), self._appender.last_seq, note)
 
     def note_lost(self, run: Run, at_ns: int) -> None:
         """Have it in the file that some of what was received up to a moment never came here."""

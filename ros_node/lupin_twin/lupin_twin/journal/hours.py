@@ -250,8 +250,14 @@ def _tally(
         return
     entry[0] += 1
     entry[1] += value
-    entry[2], entry[3] = min(entry[2], value), max(entry[3], value)
-    entry[4], entry[5] = min(entry[4], stamp_ns), max(entry[5], stamp_ns)
+    if value < entry[2]:
+        entry[2] = value
+    elif value > entry[3]:
+        entry[3] = value
+    if stamp_ns > entry[5]:
+        entry[5] = stamp_ns
+    elif stamp_ns < entry[4]:
+        entry[4] = stamp_ns
 
 
 # --- one by one -----------------------------------------------------------------------------------
@@ -286,6 +292,8 @@ def _note_silences(log: SiteLog, run: int, stamps: list[int]) -> None:
         elif at_ns < first_ns:
             _note_silence(log, run, at_ns, first_ns)
             first_ns = at_ns
+        elif at_ns in (first_ns, last_ns):  # of many tags at one moment
+            continue
         elif (over := silence_over(log, run, at_ns)) is not None and over[1] > at_ns:
             gone = {"run": run, "event": Event.SILENCES, "at": over[0], "seq": 0}
             log.execute(_NOT_EVENT, gone)

@@ -4,15 +4,14 @@ from __future__ import annotations
 
 import re
 import secrets
-import sqlite3
 from collections import deque
 from collections.abc import Callable, Iterator
 from concurrent.futures import Future
-from dataclasses import replace
+from dataclasses import asdict, replace
 from typing import Any, Final
 
 from lupin_twin.core.notes import MAX_NOTES, Note, NotesRequest, NotesUnwritable, PastNotes
-from lupin_twin.journal.schema import LOCAL_SITE, SiteLog
+from lupin_twin.journal.schema import SiteLog
 
 # An id is the number of the write, in hexadecimal digits that sort as it does, and digits of
 # chance: an archive has the notes of several journals of one site, whose numbers are the same.
@@ -42,19 +41,19 @@ def number_of(note_id: str) -> int:
     return number if number < _MOST else 0
 
 
-def last_number(connection: sqlite3.Connection) -> int:
-    """The number of this twin's last note; 0: there is none."""
+def last_number(log: SiteLog) -> int:
+    """The number of the log's last note; 0: there is none."""
     # Downwards, past those of somebody else.
-    found = connection.execute("SELECT id FROM note WHERE site = ? ORDER BY id DESC", (LOCAL_SITE,))
+    found = log.execute("SELECT id FROM note WHERE site = :site ORDER BY id DESC")
     return next((number for (text,) in found if (number := number_of(text))), 0)
 
 
-def put_note(connection: sqlite3.Connection, number: int, note: Note) -> Note:
+def put_note(log: SiteLog, number: int, note: Note) -> Note:
     """Write a note under a number; returns it with its id."""
     note = replace(note, id=f"{number:0{_DIGITS}x}{secrets.token_hex(4)}")
-    row = (note.made_at_ns, note.by, note.kind, note.subject, note.text, note.until_ns)
-    connection.execute(
-        "INSERT INTO note VALUES (?, ?, ?, ?, ?, ?, ?, ?)", (LOCAL_SITE, note.id, *row)
+    log.execute(
+        "INSERT INTO note VALUES (:site, :id, :made_at_ns, :by, :kind, :subject, :text, :until_ns)",
+        asdict(note),
     )
     return note
 

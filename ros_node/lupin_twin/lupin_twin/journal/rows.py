@@ -14,13 +14,13 @@ from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any, Final
 
+from lupin_twin.core import history, state
 from lupin_twin.core.state import Bloom, Flower, Inspection, Pose, Reading, Scan
 from lupin_twin.journal.schema import LOCAL_SITE, DamagedFile
 
-# lupin_msgs/Observation
-KIND_READING = 0
-KIND_FLOWER = 1
-STATUS_OK = 0
+KIND_READING = history.KIND_TAG_READING
+KIND_FLOWER = history.KIND_FLOWER
+STATUS_OK = state.STATUS_OK
 
 
 @dataclass(frozen=True, slots=True)

@@ -25,18 +25,18 @@ from lupin_twin.core.parameters import ParameterError, TwinParameters, World
 from lupin_twin.core.state import ClockState, Inspection, Scan, Snapshot, TwinStore
 from lupin_twin.field.engine import FieldCache, FieldEngine, FieldRules
 from lupin_twin.field.explored import OccupancyMap
+from lupin_twin.journal.beside import journal_path
 from lupin_twin.journal.runs import Clock as RunClock
 from lupin_twin.ros import convert, message_limits
 from lupin_twin.ros.base_node import NodeUtilities, qos_of, waker
 from lupin_twin.ros.convert import diagnostics
 from lupin_twin.ros.estimate_service import EstimateService
-from lupin_twin.ros.field_service import FieldService
 from lupin_twin.ros.inputs import OtherTwins, TwinCount
 from lupin_twin.ros.layer_service import LAYERS_PERIOD_S, LayerService
 from lupin_twin.ros.parameters import AdjustableNode, declare, naming, naming_own_parameters
-from lupin_twin.ros.past_service import PastService
 from lupin_twin.ros.responses import RETRY_S, Responses
-from lupin_twin.runtime.memory import Memory, journal_path, open_journal
+from lupin_twin.ros.services import FieldService, PastService
+from lupin_twin.runtime.memory import Memory, open_journal
 from lupin_twin.runtime.workers import LARGE_THREADS, JobQueue, Workers
 
 NODE_NAME: Final = "lupin_twin"

@@ -9,11 +9,10 @@ belongs to, and takes microseconds, but for the start: that waits for what was k
 
 from __future__ import annotations
 
-import re
 import tempfile
 import time
 from collections import deque
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from concurrent.futures import Future
 from dataclasses import replace
 from datetime import UTC, datetime
@@ -36,8 +35,6 @@ from lupin_twin.journal.runs import CORRECTION_NS, Clock, Turn, turn_of
 from lupin_twin.journal.writer import Journal
 from lupin_twin.runtime.journal_queries import Recall
 
-NO_JOURNAL: Final = "off"
-
 # So long a start waits for what was known before; what comes later is taken in as it comes.
 _START_WAIT_S: Final = 10.0
 
@@ -49,48 +46,6 @@ NEW_RUNS_NS: Final = 100 * 1_000_000_000
 DOUBT_NS: Final = 600 * 1_000_000_000
 # Writes that are buffered at most while the log is read at the start.
 MAX_EARLY: Final = 20_000
-
-
-def journal_path(
-    given: str, environ: Mapping[str, str], domain: int, namespace: str
-) -> Path | None:
-    """Where the journal is, None where there is none.
-
-    By default it is a file of the user's, named by domain and namespace.
-
-    Raises:
-        RuntimeError: there is no home to keep it in.
-
-    """
-    if given == NO_JOURNAL:
-        return None
-    if given:
-        return Path(given).expanduser().absolute()
-    names = [f"domain-{domain}", *re.findall("[^/]+", namespace)]
-    return state_folder(environ) / f"{'.'.join(names)}.sqlite"
-
-
-def demo_journal_path(environ: Mapping[str, str], seed: int) -> Path:
-    """Where the journal of a demo is: apart from a real twin's, and each seed for itself.
-
-    Raises:
-        RuntimeError: there is no home to keep it in.
-
-    """
-    return state_folder(environ) / f"demo-seed-{seed}.sqlite"
-
-
-def state_folder(environ: Mapping[str, str]) -> Path:
-    """The user's folder for what outlives a process (XDG Base Directory Specification).
-
-    Raises:
-        RuntimeError: there is no home to keep it in.
-
-    """
-    given = Path(environ.get("XDG_STATE_HOME", ""))
-    # A relative path there is invalid and to be ignored.
-    home = given if given.is_absolute() else Path("~/.local/state").expanduser()
-    return home / "lupin-twin"
 
 
 class _Early(NamedTuple):

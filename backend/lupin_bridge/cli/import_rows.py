@@ -1,0 +1,313 @@
+"""Scans out of a CSV file: which column is what, what of it is refused, and why. Pure.
+
+A row is a scan of one tag. In the file of columns, either each sensor has a column of its own, or
+one column names the sensor and another has its value, as databases export it.
+"""
+
+from __future__ import annotations
+
+import csv
+import math
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, field
+from datetime import datetime
+from functools import lru_cache, partial
+from typing import Any, Final, NamedTuple, TextIO
+from zoneinfo import ZoneInfo
+
+from lupin_twin.adapt.table import AS_IT_IS, ConfigError, Table, Value, is_number, shown, values_of
+from lupin_twin.core.drops import (
+    MAX_SENSORS_PER_TAG,
+    MAX_TAGS,
+    MAX_TEXT_LENGTH,
+    check_length,
+)
+from lupin_twin.core.state import NANOSECONDS_PER_SECOND, Pose
+
+_MILLISECONDS: Final = 1e11
+_TOLD_EVERY: Final = 20_000
+# Characters of a line; a field of the csv module has 131,072 at most.
+_MAX_LINE: Final = 1_000_000
+# Lines that are named of each reason; their count is before them.
+_EXAMPLES: Final = 3
+
+
+@dataclass(frozen=True, slots=True)
+class Columns:
+    """What stands where. `tag_id` is every row's tag where there is no column `tag`.
+
+    `sensors` by sensor; or `sensor` is the column that names it, `value` the one with the number,
+    and `names` is what that calls each sensor.
+    """
+
+    time: str
+    zone: ZoneInfo | None
+    tag: str = ""
+    tag_id: str = ""
+    sensors: Mapping[str, Value] = field(default_factory=dict)
+    sensor: str = ""
+    value: str = ""
+    names: Mapping[str, Value] = field(default_factory=dict)
+    places: Mapping[str, Pose] = field(default_factory=dict)
+
+
+class Found(NamedTuple):
+    """A scan as the file has it: ROS time in ns, and a value for each name of a sensor."""
+
+    stamp_ns: int
+    tag_id: str
+    names: tuple[str, ...]
+    values: Sequence[float]
+
+
+@dataclass(slots=True)
+class Summary:
+    """What was found in the file. `refused`: of each reason how often, and in which first lines.
+
+    `sensors` has of each sensor how many readings, the least and the greatest.
+    """
+
+    rows: int = 0
+    scans: int = 0
+    repeated: int = 0
+    tags: set[str] = field(default_factory=set)
+    sensors: dict[str, list[float]] = field(default_factory=dict)
+    first_ns: int = 2**63 - 1
+    last_ns: int = -1
+    refused: dict[str, list[int]] = field(default_factory=dict)
+
+    def refuse(self, reason: str, line: int) -> None:
+        """A row, or a reading of it, that is not imported."""
+        lines = self.refused.setdefault(reason[:120], [0])
+        lines[0] += 1
+        if len(lines) <= _EXAMPLES:
+            lines.append(line)
+
+    def take(self, found: Found) -> None:
+        """A scan that can be imported.
+
+        Raises:
+            ValueError: with it there would be more tags or sensors than a twin takes.
+
+        """
+        stamp_ns, tag_id, names, values = found
+        if tag_id not in self.tags:
+            check_length("tags", len(self.tags) + 1, MAX_TAGS)
+            self.tags.add(tag_id)
+        for name, value in zip(names, values, strict=True):
+            sensor = self.sensors.get(name)
+            if sensor is None:
+                check_length("sensors", len(self.sensors) + 1, MAX_SENSORS_PER_TAG)
+                self.sensors[name] = [1, value, value]
+                continue
+            sensor[0] += 1
+            if value < sensor[1]:
+                sensor[1] = value
+            elif value > sensor[2]:
+                sensor[2] = value
+        self.scans += 1
+        self.first_ns = min(self.first_ns, stamp_ns)
+        self.last_ns = max(self.last_ns, stamp_ns)
+
+    def lines(self) -> Iterator[str]:
+        """The same for a person."""
+        yield f"{self.rows} rows, {self.scans} scans of {len(self.tags)} tags"
+        if self.scans:
+            yield f"from {_iso(self.first_ns)} to {_iso(self.last_ns)}"
+        for name, (count, low, high) in sorted(self.sensors.items()):
+            yield f"{name}: {count:.0f} readings from {low:.6g} to {high:.6g}"
+        for reason, (count, *examples) in self.refused.items():
+            yield f"refused: {count}: {reason} (line {', '.join(map(str, examples))})"
+        if self.repeated:
+            yield (
+                f"refused: {self.repeated}: the sensor has another reading of that moment; "
+                "where clocks are set back in autumn, times need an offset"
+            )
+
+
+def columns_of(content: Any) -> Columns:
+    """What stands where, as the file of columns says it.
+
+    Raises:
+        ConfigError: a key that cannot be.
+
+    """
+    table = Table("", content)
+    zone = table.text("time_zone") if table.has("time_zone") else ""
+    try:
+        place = ZoneInfo(zone) if zone else None
+    except (KeyError, ValueError, OSError):
+        raise ConfigError(
+            f"time_zone is {shown(zone)}, expected such as Europe/Amsterdam"
+        ) from None
+    columns = Columns(
+        time=table.text("time"),
+        zone=place,
+        tag=table.text("tag") if table.has("tag") else "",
+        tag_id=str(table.take("tag_id", "")),
+        sensors=values_of(Table("sensors", table.take("sensors", {})), "column"),
+        sensor=table.text("sensor") if table.has("sensor") else "",
+        value=table.text("value") if table.has("value") else "",
+        names=values_of(Table("names", table.take("names", {})), "column"),
+        places=dict(_places(Table("places", table.take("places", {})))),
+    )
+    table.end()
+    if bool(columns.tag) == bool(columns.tag_id):
+        raise ConfigError("expected tag, a column, or tag_id, every row's tag; one of them")
+    if bool(columns.sensors) == bool(columns.sensor and columns.value):
+        raise ConfigError("expected sensors, or sensor and value; one of them")
+    return columns
+
+
+def _places(table: Table) -> Iterator[tuple[str, Pose]]:
+    for tag_id in tuple(table.content):
+        at = table.take(tag_id)
+        if not isinstance(at, list) or len(at) != 2 or not all(map(is_number, at)):
+            raise ConfigError(f"places.{tag_id} is {shown(at)}, expected [x, y] in m")
+        yield str(tag_id), Pose(float(at[0]), float(at[1]), 0.0, 0.0, 0.0, 0.0, 1.0)
+
+
+def counted(file: TextIO, tell_at: Callable[[int], None]) -> Iterator[str]:
+    """The lines of a file, telling now and then how many bytes in it is.
+
+    Raises:
+        csv.Error: a line is too long.
+
+    """
+    at = 0
+    for number, line in enumerate(iter(partial(file.readline, _MAX_LINE), "")):
+        if len(line) == _MAX_LINE:
+            raise csv.Error(f"line {number + 1} has {_MAX_LINE:,} characters or more")
+        at += len(line)
+        if number % _TOLD_EVERY == 0:
+            tell_at(at)
+        # InfluxDB's annotations
+        yield "\n" if line.startswith("#") else line
+
+
+def scans(lines: Iterator[str], columns: Columns, summary: Summary) -> Iterator[Found]:
+    """The scans of a CSV file with a header; what is refused is in the summary.
+
+    Raises:
+        ConfigError: the header has not the columns.
+        csv.Error: it is no CSV.
+
+    """
+    reader = csv.reader(lines)
+    header = next((row for row in reader if row), [])
+    read, is_table_over = _reader(header, columns), False
+    for row in reader:
+        if not row:
+            is_table_over = True
+            continue
+        # InfluxDB's next table has a header of its own, with other columns where its tags differ.
+        if is_table_over and columns.time in row:
+            read, is_table_over = _reader(row, columns), False
+            continue
+        is_table_over = False
+        summary.rows += 1
+        try:
+            found = read(row)
+            summary.take(found)
+        except (ValueError, IndexError) as error:
+            reason = "too few columns" if isinstance(error, IndexError) else str(error)
+            summary.refuse(reason, reader.line_num)
+            continue
+        yield found
+
+
+def _reader(header: list[str], columns: Columns) -> Callable[[list[str]], Found]:
+    def at(name: str) -> int:
+        if name not in header:
+            raise ConfigError(
+                f"there is no column {name!r}, but {', '.join(header)[:200] or 'none'}"
+            )
+        return header.index(name)
+
+    time_at = at(columns.time)
+    tag_at = at(columns.tag) if columns.tag else -1
+    wide = [(name, column, at(column.path)) for name, column in columns.sensors.items()]
+    every = tuple(columns.sensors)
+    sensor_at = at(columns.sensor) if columns.sensor else -1
+    value_at = at(columns.value) if columns.value else -1
+    by_name = {column.path: (name, column) for name, column in columns.names.items()}
+
+    def readings_of(row: list[str]) -> tuple[tuple[str, ...], list[float]]:
+        if wide:
+            given = [entry for entry in wide if row[entry[2]] and not row[entry[2]].isspace()]
+            values = [_number(name, row[index], column) for name, column, index in given]
+            names = every if len(given) == len(every) else tuple(name for name, _, _ in given)
+            return names, values
+        called = row[sensor_at]
+        if by_name and called not in by_name:
+            raise ValueError(f"{columns.sensor} {called[:40]!r} is not one of names")
+        name, column = by_name.get(called) or (_text(columns.sensor, called), AS_IT_IS)
+        return (name,), [_number(name, row[value_at], column)]
+
+    def read(row: list[str]) -> Found:
+        tag_id = _text("tag", row[tag_at].strip()) if columns.tag else columns.tag_id
+        names, values = readings_of(row)
+        if not values:
+            raise ValueError("no reading")
+        return Found(_moment_ns(row[time_at], columns.zone), tag_id, names, values)
+
+    return read
+
+
+# The states of a sensor in Home Assistant that is away.
+_NOT_KNOWN: Final = ("unknown", "unavailable")
+
+
+def _text(what: str, text: str) -> str:
+    if not 0 < len(text) <= MAX_TEXT_LENGTH:
+        raise ValueError(f"no {what}, or one of more than {MAX_TEXT_LENGTH} characters")
+    if "\0" in text:
+        raise ValueError(f"a {what} with NUL")
+    return text
+
+
+def _number(name: str, text: str, column: Value) -> float:
+    try:
+        value = float(text) * column.factor + column.offset
+    except ValueError:
+        if text in _NOT_KNOWN:
+            raise ValueError(f"{name} is {text}") from None
+        raise ValueError(f"{name} is no number") from None
+    if not column.low <= value <= column.high or math.isinf(value):
+        raise ValueError(f"{name} is not from {column.low:g} to {column.high:g}")
+    return value
+
+
+# Rows of many tags have the same moment, one behind the other.
+@lru_cache(maxsize=256)
+def _moment_ns(text: str, zone: ZoneInfo | None) -> int:
+    number = None
+    if text[4:5] != "-":  # most are dates: to find by an error that they are no numbers is slow
+        with suppress(ValueError):
+            number = float(text)
+    if number is not None:
+        # InfluxDB 1 has nanoseconds.
+        unit = next((size for size in (1e9, 1e6, 1e3) if number > _MILLISECONDS * size / 1e3), 1.0)
+        seconds = number / unit
+        if not 0 < seconds < _MILLISECONDS:
+            raise ValueError("the time is no moment since 1970")
+        return int(seconds * 1e6) * 1000
+    try:
+        moment = datetime.fromisoformat(text.strip())
+    except ValueError:
+        raise ValueError("the time is no ISO 8601, and no seconds since 1970") from None
+    if moment.tzinfo is None:
+        if zone is None:
+            raise ValueError("the time has no offset, and time_zone is not given")
+        moment = moment.replace(tzinfo=zone)
+    seconds = moment.timestamp()
+    if seconds <= 0:
+        raise ValueError("the time is before 1970")
+    return int(seconds * 1e6) * 1000
+
+
+def _iso(stamp_ns: int) -> str:
+    return datetime.fromtimestamp(stamp_ns / NANOSECONDS_PER_SECOND, tz=ZoneInfo("UTC")).isoformat(
+        timespec="seconds"
+    )

@@ -1,0 +1,340 @@
+"""Web Push (RFC 8030): critical alarms on the phones and browsers of people who want them.
+
+The address to post to comes from a browser, so it may be anybody's: only https on port 443, at
+addresses that the whole internet may reach, without redirects, and little is read of an answer. A
+message is encrypted for its browser alone (RFC 8291, by `http_ece`) and signed with a key of this
+bridge (VAPID, RFC 8292, by `py_vapid`). `pywebpush` is these two and a client that follows
+redirects, and goes to any address.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import base64
+import logging
+import random
+import socket
+import time
+from collections import OrderedDict
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from ipaddress import ip_address
+from typing import TYPE_CHECKING, Final, Protocol
+from urllib.parse import urlsplit
+
+import orjson
+
+from lupin_bridge.access.accounts import AccountError, Device
+from lupin_bridge.access.people import People
+from lupin_bridge.alarms.board import AlarmBoard
+from lupin_bridge.alarms.ledger import Change
+from lupin_bridge.alarms.notes import NOTHING_SAID, NoteBoard, notes_of_alarms
+from lupin_bridge.judge.alarm import Alarm
+from lupin_bridge.judge.options import Criteria
+from lupin_bridge.judge.verdict import Verdict
+from lupin_bridge.notify.destinations import Backoff, Condition, Endpoint, PushTarget
+from lupin_bridge.notify.http_post import PostError, post
+from lupin_bridge.past.report_page import push_text
+from lupin_bridge.serving.admission import AdmissionError
+from lupin_bridge.stream.health_json import alarm_json
+from lupin_twin.core.diagnostics import Origin
+
+if TYPE_CHECKING:
+    from py_vapid import Vapid02
+
+log = logging.getLogger(__name__)
+
+MAX_ENDPOINT: Final = 1_000
+# Alarms that come so soon after each other are one notification, s.
+TOGETHER_S: Final = 2.0
+# A phone that is off gets it for so long; what is older is on the page, s.
+TTL_S: Final = 3_600
+# Tries of one message, and the time before the second one, s.
+TRIES: Final = 4
+FIRST_WAIT_S: Final = 2.0
+MOST_WAIT_S: Final = 60.0
+# Posts at once, to however many browsers.
+AT_ONCE: Final = 8
+# Alarms that were notified; far more than are active at once.
+MAX_KNOWN: Final = 20_000
+_GONE: Final = (404, 410)
+_AGAIN: Final = (408, 429, 500, 502, 503, 504)
+_KEY: Final = "vapid"
+
+
+class DeviceRefused(ValueError):
+    """It cannot be notified; the message names the field."""
+
+
+class Source(Protocol):
+    """What push needs of the bridge."""
+
+    alarms: AlarmBoard
+    criteria: Criteria
+
+    notes: NoteBoard
+
+    @property
+    def origin(self) -> Origin:
+        """Where observations come from."""
+
+    @property
+    def ros_time_ns(self) -> int | None:
+        """ROS time now; None: it is not known."""
+
+
+class Push:
+    """Belongs to the event loop. `people` has the devices, `site` is whose alarms these are."""
+
+    name: Final = "push"
+
+    def __init__(self, target: PushTarget, people: People, site: str) -> None:
+        self.condition = Condition(is_connected=True)
+        self.target, self._people, self._site = target, people, site
+        self._vapid: Vapid02 | None = None
+        self._known: OrderedDict[str, None] = OrderedDict()
+        self._new: list[Alarm] = []
+        self._is_news = asyncio.Event()
+        self._task: asyncio.Task[None] | None = None
+        self._unsubscribe: Callable[[], None] = lambda: None
+
+    async def public_key(self) -> str:
+        """The key that a browser subscribes with, base64url; made with the first.
+
+        Raises:
+            AccountError, PeopleBusy: the file of people cannot be written.
+
+        """
+        from cryptography.hazmat.primitives.serialization import (  # noqa: PLC0415  # few want it
+            Encoding,
+            PublicFormat,
+        )
+
+        key = (await self._key()).public_key
+        return encoded(key.public_bytes(Encoding.X962, PublicFormat.UncompressedPoint))
+
+    async def _key(self) -> Vapid02:
+        from py_vapid import Vapid02  # noqa: PLC0415  # as above
+
+        def make() -> str:
+            made = Vapid02()
+            made.generate_keys()
+            return str(made.private_pem().decode())
+
+        if self._vapid is None:
+            pem = await self._people.write(lambda it, _: it.kept(_KEY, make))
+            self._vapid = Vapid02.from_pem(pem.encode())
+        return self._vapid
+
+    def start(self, source: Source) -> None:
+        """Notify of critical alarms from now on."""
+
+        def receive(change: Change) -> None:
+            for alarm in change.changed:
+                if not alarm.is_active or alarm.reason.verdict is not Verdict.CRITICAL:
+                    continue
+                is_known = alarm.id in self._known
+                self._known[alarm.id] = None
+                if len(self._known) > MAX_KNOWN:
+                    self._known.popitem(last=False)
+                # At the start they are not new.
+                if not is_known and not change.is_past:
+                    self._new.append(alarm)
+                    self._is_news.set()
+
+        receive(Change(source.alarms.now.active, is_past=True))
+        self._unsubscribe = source.alarms.subscribe(receive)
+        self._task = asyncio.create_task(self._run(source), name="push")
+
+    async def stop(self) -> None:
+        """End at once."""
+        self._unsubscribe()
+        if self._task is not None:
+            self._task.cancel()
+            await asyncio.wait([self._task])
+
+    async def _run(self, source: Source) -> None:
+        while True:
+            await self._is_news.wait()
+            await asyncio.sleep(TOGETHER_S)
+            self._is_news.clear()
+            new, self._new = self._new, []
+            notes = source.notes.notes or ()
+            said = notes_of_alarms(source.alarms.now.alarms, notes, source.ros_time_ns)
+            new = [alarm for alarm in new if said.get(alarm.id, NOTHING_SAID).shelved is None]
+            try:
+                if new:
+                    await self._notify(new, source)
+            except (AccountError, AdmissionError) as error:
+                self._failed(str(error))
+            except Exception:  # nobody waits for this task
+                log.exception("push met an error and goes on")
+
+    async def _notify(self, alarms: Sequence[Alarm], source: Source) -> None:
+        devices = await self._people.write(lambda it, _: it.devices(self._site))
+        bodies = [alarm_json(alarm) for alarm in alarms]
+        at_once = asyncio.Semaphore(AT_ONCE)
+        self.condition.waiting = len(devices)
+
+        async def send(device: Device) -> None:
+            async with at_once:
+                title, body = push_text(bodies, device.language, source.criteria, source.origin)
+                title = f"{self._site}: {title}" if self._site else title
+                await self._send(device, orjson.dumps({"title": title, "body": body}))
+                self.condition.waiting -= 1
+
+        await asyncio.gather(*map(send, devices))
+
+    async def _send(self, device: Device, message: bytes) -> None:
+        """Until its push service takes it, has it no more, or was tried enough."""
+        backoff = Backoff(FIRST_WAIT_S, MOST_WAIT_S)
+        for tried in range(TRIES):
+            wait_s = backoff.wait_s(random.random())  # noqa: S311
+            try:
+                endpoint = await self._endpoint(device.endpoint)
+                answer = await post(
+                    endpoint,
+                    await self._headers(endpoint),
+                    encrypted(device, message),
+                )
+            except DeviceRefused as error:
+                self._failed(f"{urlsplit(device.endpoint).hostname}: {error}")
+                break
+            except PostError as error:
+                self._failed(f"{urlsplit(device.endpoint).hostname}: {error}")
+            else:
+                if 200 <= answer.status < 300:
+                    self.condition.taken()
+                    return
+                if answer.status in _GONE:
+                    await self._people.write(lambda it, _: it.remove_device(device.endpoint))
+                    return
+                self._failed(f"answered {answer.status} ({endpoint.called})")
+                if answer.status not in _AGAIN:
+                    break
+                wait_s = max(wait_s, min(answer.retry_after_s, MOST_WAIT_S))
+            if tried + 1 < TRIES:
+                await asyncio.sleep(wait_s)
+        self.condition.dropped += 1
+
+    def _failed(self, why: str) -> None:
+        self.condition.failing(why)
+        log.warning("a push notification was not taken: %s", self.condition.detail)
+
+    async def _headers(self, endpoint: Endpoint) -> dict[str, str]:
+        claims = {
+            "aud": f"https://{endpoint.authority}",
+            "sub": self.target.contact,
+            "exp": int(time.time()) + 12 * 3600,
+        }
+        signed: dict[str, str] = (await self._key()).sign(claims)
+        return {
+            **signed,
+            "Content-Type": "application/octet-stream",
+            "Content-Encoding": "aes128gcm",
+            "TTL": str(TTL_S),
+            "Urgency": "high",
+            "Topic": "lupin-twin-alarms",
+        }
+
+    async def _endpoint(self, url: str) -> Endpoint:
+        """Where to connect to: an address that was looked at, and that no later look changes."""
+        endpoint = parsed(url, self.target)
+        try:
+            found = await asyncio.get_running_loop().getaddrinfo(
+                endpoint.host, endpoint.port, type=socket.SOCK_STREAM
+            )
+        except (OSError, UnicodeError):
+            raise PostError("its host is not known") from None
+        addresses = [str(address[0]) for *_, address in found]
+        for address in addresses:
+            is_public = ip_address(address.partition("%")[0]).is_global
+            if not is_public and endpoint.host not in self.target.private_hosts:
+                raise DeviceRefused(f"{address} is no public address, see --push-private-host")
+        return replace(endpoint, address=addresses[0])
+
+
+def parsed(url: str, target: PushTarget) -> Endpoint:
+    """A push service's address as a browser gives it.
+
+    Raises:
+        DeviceRefused: it cannot be one.
+
+    """
+    if len(url) > MAX_ENDPOINT or not url.isascii() or not url.isprintable() or " " in url:
+        raise DeviceRefused(f"endpoint: expected an address of at most {MAX_ENDPOINT} characters")
+    try:
+        parts = urlsplit(url)
+        port = parts.port or 443
+    except ValueError:
+        raise DeviceRefused("endpoint: expected an address") from None
+    host = parts.hostname or ""
+    if parts.scheme != "https" or not host or "@" in parts.netloc or parts.fragment:
+        raise DeviceRefused("endpoint: expected https:// and a host, without a user or a fragment")
+    if port != 443 and host not in target.private_hosts:
+        raise DeviceRefused(f"endpoint has the port {port}, expected 443")
+    path = (parts.path or "/") + (f"?{parts.query}" if parts.query else "")
+    return Endpoint(host, port, path, parts.netloc, target.tls)
+
+
+def check_device(device: Device, target: PushTarget) -> None:
+    """Refuse what can never be notified.
+
+    Raises:
+        DeviceRefused: the address or a key cannot be one.
+
+    """
+    from cryptography.hazmat.primitives.asymmetric.ec import (  # noqa: PLC0415  # as above
+        SECP256R1,
+        EllipticCurvePublicKey,
+    )
+
+    endpoint = parsed(device.endpoint, target)
+    if endpoint.host not in target.private_hosts:
+        try:
+            is_public = ip_address(endpoint.host).is_global
+        except ValueError:  # a name; where it leads to is looked at each time
+            is_public = "." in endpoint.host
+        if not is_public:
+            raise DeviceRefused("endpoint: expected a host that is reached over the internet")
+    try:
+        EllipticCurvePublicKey.from_encoded_point(SECP256R1(), decoded(device.public_key))
+    except ValueError:
+        raise DeviceRefused("keys.p256dh: expected a point of P-256, base64url") from None
+    try:
+        length = len(decoded(device.secret))
+    except ValueError:
+        length = 0
+    if length != 16:
+        raise DeviceRefused("keys.auth: expected 16 bytes, base64url")
+
+
+def encrypted(device: Device, message: bytes) -> bytes:
+    """A message that only this browser can read."""
+    import http_ece  # noqa: PLC0415  # as above
+    from cryptography.hazmat.primitives.asymmetric import ec  # noqa: PLC0415
+
+    body: bytes = http_ece.encrypt(
+        message,
+        private_key=ec.generate_private_key(ec.SECP256R1()),
+        dh=decoded(device.public_key),
+        auth_secret=decoded(device.secret),
+        version="aes128gcm",
+    )
+    return body
+
+
+def encoded(raw: bytes) -> str:
+    """As base64url without padding."""
+    return base64.urlsafe_b64encode(raw).decode().rstrip("=")
+
+
+def decoded(text: str) -> bytes:
+    """From base64url, padded or not.
+
+    Raises:
+        ValueError: it is none.
+
+    """
+    plain = text.rstrip("=")
+    return base64.b64decode(plain + "=" * (-len(plain) % 4), b"-_", validate=True)

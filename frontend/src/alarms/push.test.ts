@@ -1,0 +1,62 @@
+import { afterEach, expect, test, vi } from 'vitest';
+
+import { wishPush } from './push';
+
+afterEach(() => vi.unstubAllGlobals());
+
+/** A browser with a service worker, and a bridge that has this key; what happened, in order. */
+function stage(key: string | null, { known = false, fails = false } = {}): unknown[] {
+  const log: unknown[] = [];
+  const subscription = {
+    endpoint: 'https://push.example/1',
+    toJSON: () => ({ endpoint: 'https://push.example/1', keys: { p256dh: 'p', auth: 'a' } }),
+    unsubscribe: () => Promise.resolve(log.push('unsubscribe')),
+  };
+  let isFailing = fails;
+  const pushManager = {
+    getSubscription: () => Promise.resolve(known ? subscription : null),
+    subscribe: (options: unknown) => {
+      log.push(options);
+      if (!isFailing) return Promise.resolve(subscription);
+      isFailing = false;
+      return Promise.reject(new Error('another key'));
+    },
+  };
+  const getRegistration = () => Promise.resolve({ pushManager });
+  vi.stubGlobal('navigator', { serviceWorker: { getRegistration } });
+  vi.stubGlobal('fetch', (path: string, init?: RequestInit) => {
+    if (init) log.push(JSON.parse(init.body as string));
+    return Promise.resolve({ ok: true, json: () => Promise.resolve({ public_key: key }) });
+  });
+  return log;
+}
+
+const options = { userVisibleOnly: true, applicationServerKey: 'KEY' };
+const subscribed = { endpoint: 'https://push.example/1', keys: { p256dh: 'p', auth: 'a' } };
+
+test('a browser subscribes with the key of its bridge, which gets the subscription', async () => {
+  const log = stage('KEY');
+  await wishPush(true);
+  expect(log).toEqual([options, subscribed]);
+});
+
+test('one of another key gives way', async () => {
+  const log = stage('KEY', { known: true, fails: true });
+  await wishPush(true);
+  expect(log).toEqual([options, 'unsubscribe', options, subscribed]);
+});
+
+test('who wants it no more is taken off the list, at both', async () => {
+  const log = stage('KEY', { known: true });
+  await wishPush(false);
+  expect(log).toEqual([{ endpoint: 'https://push.example/1' }, 'unsubscribe']);
+});
+
+test('nothing is asked of the browser where the bridge offers none', async () => {
+  const log = stage(null);
+  await wishPush(true);
+  expect(log).toEqual([]);
+  vi.stubGlobal('navigator', {});
+  await wishPush(true);
+  expect(log).toEqual([]);
+});

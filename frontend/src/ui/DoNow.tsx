@@ -1,0 +1,152 @@
+import { useMemo, type JSX } from 'react';
+
+import { whenText } from '../alarms/words';
+import { alarmList } from '../alarms/watch';
+import { now } from '../clock';
+import type { HealthReason } from '../contract/types';
+import { VERDICTS, type HouseHealth } from '../domain/health';
+import { todoText } from '../domain/reasons';
+import { secondsOf } from '../domain/rostime';
+import { rowsOf, sortRows, type Row } from '../domain/table';
+import { shown } from '../domain/text';
+import { act, store, useApp } from '../store/app';
+import { useSelected } from '../store/create';
+import { selectHealth } from '../store/derived';
+import { rosNow, selectShown, selectTags } from '../store/moment';
+import { S } from '../strings';
+import { HealthMark, HealthShape } from './HealthMark';
+import { useReasonText } from './Reasons';
+
+/** Beside the map; the table has the rest. */
+const MOST_TAGS = 2;
+
+/** Tags that need somebody, the worst first. */
+export function useUrgent(): readonly Row[] {
+  const tags = useApp(selectTags);
+  const health = useApp(selectHealth);
+  return useMemo(
+    () =>
+      sortRows(rowsOf(tags, health), { column: 'health', descending: true }).filter(
+        ({ health: { verdict } }) => verdict === 'critical' || verdict === 'stressed',
+      ),
+    [tags, health],
+  );
+}
+
+/** Since when the alarm of a reason is active; null: there is none, or another moment is shown. */
+export function useSince(tagId: string, reason: HealthReason | undefined): string | null {
+  const isNow = useApp((state) => selectShown(state).moment === null);
+  const begin = useSelected(alarmList, ({ active, shelved }) => {
+    const found = [...active, ...shelved].find(
+      ({ alarm }) =>
+        alarm.tag_id === tagId &&
+        alarm.reason.kind === reason?.kind &&
+        alarm.reason.sensor === reason.sensor,
+    );
+    return found ? secondsOf(found.alarm.raised_at) : null;
+  });
+  if (!isNow || begin === null) return null;
+  return S.alarmSince(whenText(begin, rosNow(store.get(), now())), null);
+}
+
+/** What has to be done first: where, why, what, and since when; else how the greenhouse is. */
+export function DoNow({
+  most = MOST_TAGS,
+  id = 'health-driver',
+}: {
+  most?: number;
+  /** Of its first line, for tests. */
+  id?: string;
+}): JSX.Element {
+  const health = useApp(selectHealth);
+  const urgent = useUrgent();
+  const isOfTags = health.reasons.length === 0 && urgent.length > 0;
+  return (
+    <ul className="do-now" aria-label={S.todoLabel} data-most={most}>
+      {isOfTags ? (
+        urgent.slice(0, most).map(({ tag, health: { verdict, reasons } }, index) => (
+          <li key={index}>
+            <button
+              type="button"
+              data-tag-id={tag.id}
+              onClick={() => {
+                act({ type: 'select', tagId: tag.id });
+              }}
+            >
+              <HealthShape verdict={verdict} />
+              <Todo tagId={tag.id} reason={reasons[0]} id={index === 0 ? id : undefined} />
+            </button>
+          </li>
+        ))
+      ) : (
+        <li>
+          <Overall health={health} id={id} />
+        </li>
+      )}
+    </ul>
+  );
+}
+
+function Todo({
+  tagId,
+  reason,
+  id,
+}: {
+  tagId: string;
+  reason: HealthReason | undefined;
+  id: string | undefined;
+}): JSX.Element {
+  const why = S.healthDriver(shown(tagId, 24), useReasonText(reason ?? null));
+  const since = useSince(tagId, reason);
+  return (
+    <>
+      <span className="do-why" title={why} data-testid={id}>
+        {why}
+      </span>
+      <span className="do-what">
+        {reason && <strong>{todoText(reason)}</strong>} {since && <small>{since}</small>}
+      </span>
+    </>
+  );
+}
+
+/** How the greenhouse is, where no tag makes it so. */
+export function Overall({
+  health,
+  id = 'health-driver',
+}: {
+  health: HouseHealth;
+  id?: string;
+}): JSX.Element {
+  const [own] = health.reasons;
+  const reason = useReasonText(own ?? null);
+  // Of now, as the list of alarms is.
+  const isNow = useApp((state) => selectShown(state).moment === null);
+  const alarms = useSelected(alarmList, ({ active, shelved }) => active.length + shelved.length);
+  const text = own ? reason : overallText(health, isNow ? alarms : 0);
+  return (
+    <p className="do-why" data-testid={id} title={text}>
+      {text}
+      {own && <strong> {todoText(own)}</strong>}
+    </p>
+  );
+}
+
+function overallText({ verdict, counts }: HouseHealth, alarms: number): string {
+  if (verdict === 'healthy') return alarms > 0 ? S.healthDespite(alarms) : S.healthAllWell;
+  const { unknown } = counts;
+  if (unknown === 0) return S.healthNothing;
+  const all = VERDICTS.reduce((sum, each) => sum + counts[each], 0);
+  return 2 * unknown > all ? S.healthMostUnknown : S.healthSomeUnknown(unknown);
+}
+
+/** Above the map of a phone, where the table is a tab away: the first of what has to be done. */
+export function HealthStrip(): JSX.Element {
+  const verdict = useApp((state) => selectHealth(state).verdict);
+  return (
+    <div className="health-strip" data-testid="health-strip" data-health={verdict}>
+      <HealthMark verdict={verdict} word={false} />
+      <DoNow most={1} id="health-first" />
+    </div>
+  );
+}

@@ -1,0 +1,138 @@
+"""What an operator says at the fleet's page is a row of the site's log, on every replica."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+from typing import Any
+
+import httpx
+import pytest
+
+from tests.support.archive import Archive, forward_once, rows_of
+from tests.support.fleet import Page, fleet, scans_lately, write
+from tests.support.people import OWN, add, signed_in
+from tests.support.waiting import wait_for
+
+ALARMS = "/sites/gh1/api/alarms"
+NOTES = "/sites/gh1/api/notes"
+
+
+@pytest.fixture
+def accounts(tmp_path: Path, archive: Archive) -> Path:
+    path = tmp_path / "accounts.sqlite"
+    add(path, anna="operator", vera="viewer")
+    write(tmp_path / "journal.sqlite", scans_lately(temperature=45.0, tags=1))
+    forward_once(archive, tmp_path / "journal.sqlite")
+    return path
+
+
+def alarm_of(browser: httpx.Client, **said: str) -> dict[str, Any]:
+    """The alarm of the hot tag, once this is said of it."""
+
+    def look() -> dict[str, Any] | None:
+        answer = browser.get(ALARMS)
+        every = answer.json()["alarms"] if answer.status_code == 200 else []
+        return next((it for it in every if it["tag_id"] and said.items() <= it.items()), None)
+
+    found = wait_for(look, f"an alarm with {said}")
+    assert found is not None
+    return found
+
+
+def post(browser: httpx.Client, **note: Any) -> httpx.Response:
+    return browser.post(NOTES, json=note)
+
+
+def test_an_alarm_is_acknowledged_and_every_replica_shows_it(
+    accounts: Path, archive: Archive, tmp_path: Path
+) -> None:
+    options = ("--accounts", str(accounts))
+    with (
+        fleet(archive, *options) as page,
+        fleet(archive, *options) as other,
+        signed_in(page.url, "anna") as anna,
+        signed_in(other.url, "vera") as vera,
+    ):
+        alarm = alarm_of(anna)
+        assert anna.get("/sites/gh1/api/session").json()["can_write_notes"]
+        answer = post(anna, kind="acknowledge", subject=f"alarm:{alarm['id']}", text="fan")
+        assert answer.status_code == 201, answer.text
+        note = answer.json()
+        ((*row,),) = archive.select("SELECT site, id, made_by, kind, subject, text FROM note")
+        subject = f"alarm:{alarm['id']}"
+        assert row == ["gh1", note["id"], "anna", "acknowledge", subject, "fan"]
+        shown = alarm_of(vera, acknowledged_by="anna")
+        assert shown["acknowledged_at"] == note["made_at"]
+        assert vera.get(NOTES).json() == {"notes": [note]}
+
+        def overview() -> bool:
+            every = vera.get("/api/alarms").json()["alarms"]
+            return any(it.get("acknowledged_by") == "anna" for it in every)
+
+        wait_for(overview, "the word beside the alarm of all sites")
+        # Withdrawn, it is kept.
+        assert anna.delete(f"{NOTES}/{note['id']}").status_code == 200
+        wait_for(lambda: "acknowledged_by" not in alarm_of(vera), "the alarm as before")
+        kinds = archive.select("SELECT kind FROM note ORDER BY id")
+        assert kinds == [("acknowledge",), ("withdraw",)]
+        # A later row of the journal changes none of it.
+        forward_once(archive, tmp_path / "journal.sqlite")
+        assert archive.select("SELECT kind FROM note ORDER BY id") == kinds
+        assert rows_of(tmp_path / "journal.sqlite")["note"] == []
+
+
+def test_who_may_not_is_refused(accounts: Path, archive: Archive) -> None:
+    with (
+        fleet(archive, "--accounts", str(accounts)) as page,
+        signed_in(page.url, "vera") as vera,
+        signed_in(page.url, "anna") as anna,
+    ):
+        subject = f"alarm:{alarm_of(vera)['id']}"
+        assert post(vera, kind="acknowledge", subject=subject).status_code == 403
+        assert not vera.get("/sites/gh1/api/session").json()["can_write_notes"]
+        nobody = httpx.post(
+            page.url + NOTES, json={"kind": "comment"}, headers=OWN, trust_env=False
+        )
+        assert nobody.status_code == 401
+        # As a page elsewhere would, with the browser's cookie and no header of its own.
+        forged = anna.build_request("POST", NOTES, json={"kind": "comment"})
+        del forged.headers["X-Lupin-Twin"]
+        assert anna.send(forged).status_code == 403
+        assert post(anna, kind="comment", subject="site", text="x" * 501).status_code == 400
+        assert post(anna, kind="comment", subject="site", text="\x00").status_code == 400
+        other = anna.post("/sites/other/api/notes", json={"kind": "comment"})
+        assert other.status_code == 404
+        # Notes are written of a site, and nothing else is.
+        for path in ("/api/notes", "/sites/gh1/", "/sites/gh1/api/state", "/api/sites"):
+            assert anna.post(path, json={}).status_code in {404, 405, 413}, path
+        assert archive.select("SELECT count(*) FROM note") == [(0,)]
+
+
+def test_an_archive_that_cannot_be_written_is_said(accounts: Path, archive: Archive) -> None:
+    with (
+        fleet(archive, "--accounts", str(accounts)) as page,
+        signed_in(page.url, "anna") as anna,
+    ):
+        alarm_of(anna)
+        archive.do("REVOKE INSERT ON note FROM lupin_page")
+        begun_s = time.monotonic()
+        answer = post(anna, kind="comment", subject="site", text="vents checked")
+        assert answer.status_code == 503, answer.text
+        assert "was not written" in answer.json()["detail"]
+        assert time.monotonic() - begun_s < 60
+        archive.do("GRANT INSERT ON note TO lupin_page")
+        assert post(anna, kind="comment", subject="site", text="vents checked").status_code == 201
+
+
+def test_the_page_is_as_closed_as_before(accounts: Path, archive: Archive) -> None:
+    with fleet(archive, "--accounts", str(accounts)) as page:
+        check_headers(page)
+
+
+def check_headers(page: Page) -> None:
+    with signed_in(page.url, "vera") as vera:
+        for path in ("/sites/gh1/", "/sites/gh1", "/sites/none/", "/sites/gh1/api/state"):
+            headers = vera.get(path).headers
+            assert headers["x-frame-options"] == "DENY", path
+            assert "frame-ancestors" in headers["content-security-policy"], path

@@ -1,0 +1,278 @@
+"""Web Push: a browser's subscription, and a push service of our own that reads what is posted."""
+
+from __future__ import annotations
+
+import json
+import re
+import ssl
+import stat
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import http_ece
+import httpx
+import pytest
+from cryptography.hazmat.primitives.asymmetric import ec
+from cryptography.hazmat.primitives.serialization import Encoding, PublicFormat
+from py_vapid import Vapid02
+
+from lupin_bridge.notify.push import encoded
+from tests.support.access import refused_start
+from tests.support.messages import look
+from tests.support.people import OWN, TOKEN, add, changing, remove, signed_in
+from tests.support.receiver import Answer, Posted, Receiver, receiver, status
+from tests.support.tls import certificate
+from tests.support.waiting import PATIENCE_S, wait_for
+from tests.support.web import Bridge, bridge
+
+CONTACT = "mailto:grower@example.org"
+
+
+@dataclass
+class Phone:
+    """A browser, and its keys."""
+
+    endpoint: str
+    private: ec.EllipticCurvePrivateKey = field(
+        default_factory=lambda: ec.generate_private_key(ec.SECP256R1())
+    )
+    auth: bytes = b"0123456789abcdef"
+
+    @property
+    def subscription(self) -> dict[str, Any]:
+        """As a browser gives it."""
+        public = self.private.public_key()
+        raw = public.public_bytes(Encoding.X962, PublicFormat.UncompressedPoint)
+        keys = {"p256dh": encoded(raw), "auth": encoded(self.auth)}
+        return {"endpoint": self.endpoint, "expirationTime": None, "keys": keys}
+
+    def read(self, posted: Posted) -> dict[str, str]:
+        """The message, as only this browser can."""
+        plain = http_ece.decrypt(
+            posted.body, private_key=self.private, auth_secret=self.auth, version="aes128gcm"
+        )
+        found: dict[str, str] = json.loads(plain)
+        return found
+
+
+@dataclass
+class Stage:
+    """A bridge with people, and a push service."""
+
+    live: Bridge
+    service: Receiver
+    accounts: Path
+
+    def phone(self, name: str) -> Phone:
+        return Phone(f"https://localhost:{self.service.port}/push/{name}")
+
+    def posted_to(self, phone: Phone) -> list[Posted]:
+        path = phone.endpoint.partition(str(self.service.port))[2]
+        return [it for it in self.service.posted if it.path == path]
+
+
+@contextmanager
+def stage(folder: Path, *answers: Answer, token: str = "") -> Iterator[Stage]:
+    ours = certificate(folder)
+    authority = folder / "ca.pem"
+    ours.authority.cert_pem.write_to_path(str(authority))
+    accounts = folder / "accounts.sqlite"
+    add(accounts, anna="operator", bert="viewer")
+    add(accounts, "token", scada="admin")
+    env = {"LUPIN_TOKEN": token} if token else dict[str, str]()
+    context = ssl.create_default_context(ssl.Purpose.CLIENT_AUTH)
+    context.load_cert_chain(ours.cert, ours.key)
+    options = ("--accounts", str(accounts), "--push-contact", CONTACT)
+    private = ("--push-private-host", "localhost", "--ros-args", "-p", "journal:=off")
+    with (
+        receiver(*(answers or (status(201),)), tls=context) as service,
+        bridge(*options, *private, SSL_CERT_FILE=str(authority), **env) as live,
+    ):
+        live.peer.wait_for_twin()
+        bearer = {"Authorization": f"Bearer {TOKEN}"}
+        # What is active at the start is nothing new.
+        wait_for(
+            lambda: live.get("/api/alarms", bearer).json()["source"] != "starting", "the alarms"
+        )
+        yield Stage(live, service, accounts)
+
+
+def subscribe(browser: httpx.Client, phone: Phone, language: str = "en") -> None:
+    headers = {"Accept-Language": language}
+    answer = browser.post("/api/push", json=phone.subscription, headers=headers)
+    assert answer.status_code == 204, answer.text
+
+
+def test_a_critical_alarm_reaches_those_phones_alone_that_may_have_it_and_until_they_may_not(
+    tmp_path: Path,
+) -> None:
+    with stage(tmp_path) as on:
+        annas, berts, gones = on.phone("anna"), on.phone("bert"), on.phone("gone")
+        add(on.accounts, gone="viewer")
+        with signed_in(on.live.url, "anna") as anna, signed_in(on.live.url, "bert") as bert:
+            key = anna.get("/api/push").json()["public_key"]
+            subscribe(anna, annas)
+            subscribe(bert, berts, "de-AT, en;q=0.5")
+            with signed_in(on.live.url, "gone") as gone:
+                subscribe(gone, gones)
+            remove(on.accounts, "gone")
+            on.live.peer.observe(look("7", anomaly=True, bug_count=2))
+            wait_for(lambda: on.posted_to(annas) and on.posted_to(berts), "both messages")
+            [to_anna], [to_bert] = on.posted_to(annas), on.posted_to(berts)
+            assert annas.read(to_anna) == {"title": "Alarm", "body": "Tag 7: Pests seen (critical)"}
+            assert berts.read(to_bert)["body"] == "Messpunkt 7: Schädlinge gesehen (kritisch)"
+            assert (to_anna.headers["ttl"], to_anna.headers["content-encoding"]) == (
+                *("3600", "aes128gcm"),
+            )
+            authorization = to_anna.headers["authorization"]
+            assert authorization.endswith(f"k={key}")
+            assert Vapid02.verify(authorization)
+            bert.post("/api/push", json={"endpoint": berts.endpoint})
+            on.live.peer.observe(look("8", anomaly=True, bug_count=1))
+            wait_for(lambda: len(on.posted_to(annas)) == 2, "the next one")
+            assert annas.read(on.posted_to(annas)[1])["body"].startswith("Tag 8:")
+        assert len(on.posted_to(berts)) == 1
+        assert not on.posted_to(gones), "their account has gone"
+        modes = {stat.S_IMODE(it.stat().st_mode) for it in tmp_path.glob("accounts.sqlite*")}
+        assert modes == {0o600}, "the key is in it"
+
+
+def test_a_phone_that_the_push_service_knows_no_more_is_forgotten_and_a_busy_one_is_tried_again(
+    tmp_path: Path,
+) -> None:
+    elsewhere = "Location: https://localhost/"
+    answers = (status(503), status(410), status(302, elsewhere), status(201))
+    with stage(tmp_path, *answers) as on, signed_in(on.live.url, "anna") as anna:
+        phone = on.phone("one")
+        subscribe(anna, phone)
+        on.live.peer.observe(look("7", anomaly=True, bug_count=2))
+
+        def is_forgotten() -> bool:
+            with changing(on.accounts) as accounts:
+                return not accounts.devices("")
+
+        wait_for(is_forgotten, "410")
+        assert len(on.service.posted) == 2
+        subscribe(anna, phone)
+        on.live.peer.observe(look("8", anomaly=True, bug_count=2))
+        wait_for(lambda: len(on.service.posted) == 3, "the one that is sent elsewhere")
+        on.live.peer.observe(look("9", anomaly=True, bug_count=2))
+        wait_for(lambda: len(on.service.posted) == 4, "the next alarm")
+        assert phone.read(on.service.posted[3])["body"].startswith("Tag 9:")
+
+
+@pytest.fixture(scope="module")
+def open_to(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Stage]:
+    with stage(tmp_path_factory.mktemp("push"), token=f"shared-{TOKEN}") as on:
+        yield on
+
+
+@pytest.mark.parametrize(
+    "endpoint",
+    [
+        "http://push.example/x",
+        "https://127.0.0.1/x",
+        "https://[::1]/x",
+        "https://[::ffff:10.0.0.1]/x",
+        "https://10.0.0.1/x",
+        "https://169.254.169.254/latest/meta-data",
+        "https://intranet/x",
+        "https://push.example:22/x",
+        "https://anna:secret@push.example/x",
+        "https://push.example/x#y",
+        "https://push.example/a b",
+        "https://push.example/\r\nX: y",
+        f"https://push.example/{'x' * 1_000}",
+        "https://localhost:99999/x",
+        "file:///etc/passwd",
+        "",
+    ],
+)
+def test_an_address_that_no_push_service_has_is_refused(open_to: Stage, endpoint: str) -> None:
+    with signed_in_once(open_to) as anna:
+        answer = anna.post("/api/push", json=Phone(endpoint).subscription)
+    assert (answer.status_code, "endpoint" in answer.json()["detail"]) == (400, True), answer.text
+
+
+_anna: list[httpx.Cookies] = []
+
+
+def signed_in_once(on: Stage) -> httpx.Client:
+    if not _anna:
+        with signed_in(on.live.url, "anna") as browser:
+            _anna.append(browser.cookies)
+    return httpx.Client(
+        base_url=on.live.url, cookies=_anna[0], headers=OWN, timeout=PATIENCE_S, trust_env=False
+    )
+
+
+@pytest.mark.parametrize(
+    ("name", "value"), [("p256dh", "BAAA"), ("p256dh", "*"), ("auth", "AAAA"), ("auth", "ä")]
+)
+def test_a_key_that_is_none_is_refused(open_to: Stage, name: str, value: str) -> None:
+    given = open_to.phone("x").subscription
+    given["keys"][name] = value
+    with signed_in_once(open_to) as anna:
+        answer = anna.post("/api/push", json=given)
+    assert (answer.status_code, f"keys.{name}" in answer.text) == (400, True), answer.text
+
+
+@pytest.mark.parametrize("host", ["127.1", "0x7f.0.0.1"])
+def test_a_name_that_leads_into_a_private_network_is_posted_nothing(
+    open_to: Stage, host: str
+) -> None:
+    """What it leads to is looked at before each post, and connected to."""
+    phone = Phone(f"https://{host}/x")
+    with signed_in_once(open_to) as anna:
+        before = count(anna, "dropped")
+        subscribe(anna, phone)
+        open_to.live.peer.observe(look(f"at {host}", anomaly=True, bug_count=2))
+        wait_for(lambda: count(anna, "dropped") == before + 1, "that it is given up")
+        assert "is no public address" in anna.get("/readyz").text + open_to.live.process.output
+        anna.post("/api/push", json={"endpoint": phone.endpoint})
+    assert open_to.service.posted == []
+
+
+def count(client: httpx.Client, what: str) -> int:
+    """A number of the channel's."""
+    found = re.search(
+        rf'lupin_outward_{what}(?:_total)?\{{channel="push"\}} ([0-9.]+)',
+        client.get("/metrics").text,
+    )
+    assert found is not None
+    return int(float(found[1]))
+
+
+def test_who_has_no_account_is_notified_of_nothing(open_to: Stage) -> None:
+    given = open_to.phone("x").subscription
+    for token in (TOKEN, f"shared-{TOKEN}"):
+        headers = {**OWN, "Authorization": f"Bearer {token}"}
+        assert open_to.live.http.get("/api/push", headers=headers).json() == {"public_key": None}
+        answer = open_to.live.http.post("/api/push", json=given, headers=headers)
+        assert (answer.status_code, "take an account" in answer.text) == (403, True)
+    assert open_to.live.http.post("/api/push", json=given, headers=OWN).status_code == 401
+
+
+def test_of_one_person_so_many_browsers_are_notified_and_the_trail_has_each_once(
+    open_to: Stage,
+) -> None:
+    def added() -> int:
+        with changing(open_to.accounts) as accounts:
+            return [row.what for row in accounts.audited()].count("add device")
+
+    before = added()
+    with signed_in_once(open_to) as anna:
+        for number in range(12):
+            subscribe(anna, open_to.phone(f"many{number}"))
+            subscribe(anna, open_to.phone(f"many{number}"))
+    with changing(open_to.accounts) as accounts:
+        assert len(accounts.devices("")) == 10
+    assert added() == before + 12
+
+
+def test_a_contact_is_an_address() -> None:
+    assert "must be mailto:" in refused_start("--push-contact", "grower")
+    assert "has no use" in refused_start("--push-private-host", "push.lan")

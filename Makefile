@@ -14,32 +14,32 @@ SHELL := /bin/bash
 .DELETE_ON_ERROR:
 .DEFAULT_GOAL := help
 
-# pip must neither look at a user's site-packages nor at the modules of a sourced ROS.
+# pip must see neither the user's site-packages nor the modules of a sourced ROS.
 export PYTHONNOUSERSITE := 1
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
-# A checked run: ROS serialises a field of the wrong type as garbage unless this is set. Bytecode is
-# kept, whatever the machine's habit: the tests start hundreds of processes with the same modules.
+# With ROS_PYTHON_CHECK_FIELDS, ROS raises an error for a field of the wrong type instead of writing garbage.
+# Bytecode is always written, because the tests start hundreds of processes with the same modules.
 TEST_ENV := PYTHONDONTWRITEBYTECODE= ROS_PYTHON_CHECK_FIELDS=1 \
             ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST ROS_LOG_DIR=$(CURDIR)/$(DONE)/ros_log
-# Measured as it runs in a greenhouse: without the checks.
+# Benchmarks run without these checks, as in a greenhouse.
 BENCH_ENV := ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST ROS_LOG_DIR=$(CURDIR)/$(DONE)/ros_log
 
 say = @printf '\033[1m==> %s\033[0m\n'
 
 .PHONY: help setup run run-fleet docs check quick test lint types collect unit hmi-test dist bench bench-live soak clean
 
-help: ## what there is
+help: ## this list
 	@grep -E '^[a-z-]+:.*## ' Makefile | sed -E 's/^([a-z-]+):.*## /  make \1\t/' | expand -t 20
 
-run: setup ## twin, bridge, HMI and the simulated patrol on http://127.0.0.1:8000 (PORT=…, HOST=…)
+run: setup ## the demo: twin, bridge, page and simulated robot on http://127.0.0.1:8000 (PORT=…, HOST=…)
 	$(say) 'demo on http://$(HOST):$(PORT) (Ctrl-C ends it)'
 	@exec $(BIN)/lupin-twin demo --host $(HOST) --port $(PORT) $(ARGS)
 
-run-fleet: setup $(DONE)/tools ## three simulated greenhouses, a PostgreSQL and the page over them, on the same address
+run-fleet: setup $(DONE)/tools ## three simulated greenhouses, a PostgreSQL and the page over them
 	$(say) 'three greenhouses on http://$(HOST):$(PORT) (Ctrl-C ends it)'
 	@exec $(BIN)/python -m tests.support.run_fleet --host $(HOST) --port $(PORT) $(ARGS)
 
-setup: $(DONE)/python $(DONE)/hmi ## everything that `make run` needs; nothing to do the second time
+setup: $(DONE)/python $(DONE)/hmi ## install everything that `make run` needs
 
 # --- set-up ------------------------------------------------------------------------------------
 
@@ -78,9 +78,9 @@ $(DONE)/hmi: $(HMI_SOURCES) $(DONE)/node_modules
 	@npm run --silent build
 	@touch $@
 
-docs: setup $(DONE)/docs ## the guide, which the bridge serves at /docs/guide/
+docs: setup $(DONE)/docs ## build the guide, which the bridge serves at /docs/guide/
 
-# Much of it is written from the code, so whatever changes there may change it.
+# Much of the guide is generated from the code, so it depends on the code too.
 DOCS_SOURCES := $(shell find docs backend ros_node -type f \( -name '*.py' -o -name '*.md' -o \
                 -name '*.msg' -o -name '*.srv' -o -name '*.json' -o -name '*.png' -o -path 'docs/_*' \) \
                 -not -path 'docs/reference/*' -not -path 'backend/lupin_bridge/static/*' \
@@ -95,7 +95,7 @@ $(DONE)/tools: .ci/tools | $(DONE)/checked
 	@.ci/tools
 	@touch $@
 
-# What a robot with TF and apriltag_ros publishes, for the tests: there are no wheels of it.
+# For the tests: messages of TF and apriltag_ros, which have no wheels.
 TEST_MSGS := tests/ros_msgs/tf2_msgs tests/ros_msgs/apriltag_msgs
 $(DONE)/test_msgs/built: $(wildcard $(addsuffix /*.*,$(TEST_MSGS)) $(addsuffix /msg/*,$(TEST_MSGS))) \
                          $(DONE)/python
@@ -105,15 +105,15 @@ $(DONE)/test_msgs/built: $(wildcard $(addsuffix /*.*,$(TEST_MSGS)) $(addsuffix /
 	@env -u PYTHONPATH $(BIN)/pip install --quiet --no-deps --force-reinstall $(@D)/*.whl
 	@touch $@
 
-dist: setup docs ## what a release holds, in dist/: wheels, sdist, and the context of a container image
+dist: setup docs ## build a release into dist/: wheels, sdist, and the context of a container image
 	$(say) 'building into dist/'
 	@.ci/dist dist
 	@ls dist
 
 # --- checks ------------------------------------------------------------------------------------
 
-# Two at a time, for none of them keeps two cores busy all along; the longest first.
-check: setup ## the quick checks: lint, types, and every test that needs neither ROS nor a browser
+# Two at a time, because none of them keeps two cores busy. The longest comes first.
+check: setup ## quick checks: lint, types, and every test that needs neither ROS nor a browser
 	@$(MAKE) --no-print-directory -j 2 --output-sync=target quick lint types hmi-test LINT=lint:changed
 	$(say) 'quick checks passed; `make test` is the whole'
 
@@ -121,16 +121,16 @@ quick: setup ## Python tests that need neither ROS nor a browser
 	$(say) 'Python tests without ROS and browser'
 	@$(TEST_ENV) $(BIN)/pytest -q -n 2 --dist worksteal --quick tests
 
-test: setup $(DONE)/tools $(DONE)/test_msgs/built ## every check: lint, types, guide, unit, real ROS, browser
+test: setup $(DONE)/tools $(DONE)/test_msgs/built ## all checks: lint, types, guide, unit tests, real ROS, browser
 	@$(MAKE) --no-print-directory -j 2 --output-sync=target lint types docs hmi-test collect
 	@$(MAKE) --no-print-directory unit
 	$(say) 'all checks passed'
 
-# A file that has not changed may still break a rule, by the types of another that has: rare enough
-# for `make check`, whose lint looks at changed files only; `make test` looks at all.
+# `make check` lints changed files only. An unchanged file can break a rule through the types of a changed one,
+# but rarely. `make test` lints all files.
 LINT := lint
 
-lint: setup ## ruff, who may import whom, ESLint, Prettier
+lint: setup ## ruff, import-linter, ESLint, Prettier
 	$(say) 'lint'
 	@$(BIN)/ruff check .
 	@$(BIN)/ruff format --check .
@@ -138,35 +138,35 @@ lint: setup ## ruff, who may import whom, ESLint, Prettier
 	@npm run --silent $(LINT)
 	@npm run --silent format:check
 
-types: setup ## mypy and tsc, both strict; the browser's types against the server's schema
+types: setup ## mypy and tsc, both strict; the page's types against the server's schema
 	$(say) 'types'
 	@$(BIN)/mypy
 	@npm run --silent typecheck
 	@npm run --silent types:check
 
-hmi-test: setup ## the HMI's unit tests, and whether its build is as small as it has to be
+hmi-test: setup ## the page's unit tests, and the size limits of its build
 	$(say) 'front-end unit tests, size of the build'
 	@npm run --silent test
 	@npm run --silent size >/dev/null
 
-# In a fresh checkout each of pytest's workers would rewrite the assertions of all test files.
+# In a fresh checkout, each pytest worker would otherwise rewrite the assertions of all test files.
 collect: setup
 	$(say) 'collecting the Python tests'
 	@$(TEST_ENV) $(BIN)/pytest -qq --collect-only tests >$(DONE)/collected || { cat $(DONE)/collected; exit 1; }
 
-# Twice as many workers as two cores: they wait for processes, and three of them keep 1.4 cores busy.
+# Four workers on two cores, because they mostly wait for processes.
 unit: setup docs $(DONE)/tools $(DONE)/test_msgs/built ## Python tests, real ROS and real browser included
 	$(say) 'Python tests: units, ROS over DDS, browser'
 	@$(TEST_ENV) $(BIN)/pytest -q -n 4 --dist worksteal tests
 
-bench: setup $(DONE)/tools ## measure: ratios side by side, nothing asserted
+bench: setup $(DONE)/tools ## all benchmarks but bench-live (ARGS=bench_field: one of them)
 	@$(BENCH_ENV) $(BIN)/python -m tests.bench $(ARGS)
 
-bench-live: setup ## the live bridge with up to 5,000 clients, in five minutes
+bench-live: setup ## benchmark of the live bridge with up to 5,000 clients
 	@$(BENCH_ENV) $(BIN)/python -m tests.bench.bench_live $(ARGS)
 
-soak: setup ## 50 kills under load, of the archive too, and eight hours of writing in a few minutes: what must hold for long
+soak: setup ## endurance: 50 kills under load, of the archive too, and eight hours of writing
 	@$(TEST_ENV) $(BIN)/python -m tests.soak $(ARGS)
 
-clean: ## remove everything that set-up and builds have made
+clean: ## remove everything that setup and builds have created
 	rm -rf $(VENV) $(DONE) node_modules backend/lupin_bridge/static backend/lupin_bridge/guide docs/reference dist

@@ -48,6 +48,8 @@ FOREIGN_OPTIONS = {
     "--rm",
     "--network",
     "--volume",
+    "--reverse-proxy",
+    "--set-xauthrequest",
     "--help",
     "--version",
 }

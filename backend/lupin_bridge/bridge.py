@@ -147,6 +147,8 @@ class Bridge:
         self._watch = asyncio.create_task(self._keep_watch(), name="watch")
         self._publishing_alarms = asyncio.create_task(self._publish_alarms(), name="alarm frames")
         self.outward.start(self, self.criteria.sensors)
+        if self._latest is not None:  # there may be no second state: a silent site has one
+            self.notes.start()
         self._alarm_feed.start()
         self._estimates.start()
         self.robot.start()

@@ -10,8 +10,9 @@ from typing import Any
 
 import httpx
 
-from lupin_bridge.access.accounts import Accounts, Kind, Role, digest, make_file
+from lupin_bridge.access.accounts import Accounts, digest, make_file
 from lupin_bridge.access.people import hashed
+from lupin_bridge.access.person import Kind, Role
 from tests.support.waiting import PATIENCE_S
 
 OWN = {"X-Lupin-Twin": "1"}

@@ -15,7 +15,7 @@ from typing import Final
 
 from itsdangerous import BadSignature, Signer
 
-from lupin_bridge.access.accounts import Person
+from lupin_bridge.access.person import Person
 from lupin_bridge.settings import SettingError
 
 MIN_TOKEN_LENGTH: Final = 16

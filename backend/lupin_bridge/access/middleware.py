@@ -19,9 +19,10 @@ from starlette.requests import HTTPConnection
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from websockets.frames import CloseCode
 
-from lupin_bridge.access.accounts import WRITER, AccountError, Person, accounts_path
+from lupin_bridge.access.accounts import accounts_path
 from lupin_bridge.access.credentials import SHARED, CookieTooLong, Credentials
 from lupin_bridge.access.people import People
+from lupin_bridge.access.person import WRITER, AccountError, Person
 from lupin_bridge.access.policy import (
     PROXY_USER_KEY,
     AccessPolicy,

@@ -19,17 +19,9 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final, TypeVar
 
-from lupin_bridge.access.accounts import (
-    MAX_PASSWORD,
-    SESSION_S,
-    AccountError,
-    Accounts,
-    Audited,
-    Person,
-    digest,
-    is_name,
-)
+from lupin_bridge.access.accounts import SESSION_S, Accounts, Audited, digest
 from lupin_bridge.access.credentials import SHARED, SHARED_SESSION_S, Credentials, cookies_of
+from lupin_bridge.access.person import MAX_PASSWORD, AccountError, Person, is_name
 from lupin_bridge.rate_limit import RateLimit
 from lupin_bridge.serving.admission import AdmissionError
 

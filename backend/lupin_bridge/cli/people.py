@@ -15,20 +15,17 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Final
 
-from lupin_bridge.access.accounts import (
+from lupin_bridge.access.accounts import Accounts, accounts_path, digest, make_file
+from lupin_bridge.access.people import hashed
+from lupin_bridge.access.person import (
     ROLES,
     TOKEN_ROLES,
     AccountError,
-    Accounts,
     Kind,
-    accounts_path,
     check_name,
     check_password,
     check_site,
-    digest,
-    make_file,
 )
-from lupin_bridge.access.people import hashed
 from lupin_bridge.cli.configuration import CONFIG_VARIABLE, read_text, settings_from
 from lupin_bridge.cli.output import FAILED, CannotWrite, Roles, add_actions, add_role, standard
 from lupin_bridge.console import say, tell

@@ -31,7 +31,6 @@ log = logging.getLogger(__name__)
 
 HEARTBEAT_S: Final = 1.0
 _RETRY_S: Final = 1.0
-_FIRST_S: Final = 5.0
 _NO_REPORT: Final = "how right estimates were is known to the twin of the greenhouse, not here"
 
 
@@ -79,8 +78,9 @@ class SiteTwin(TwinSource):
     ) -> None:
         """Begin to follow the site; who opens it first waits for what is known of it."""
         self._task = asyncio.create_task(self._follow(on_state), name=f"site {self.site}")
-        with contextlib.suppress(TimeoutError):
-            await asyncio.wait_for(self._has_read.wait(), _FIRST_S)
+        if self._watching.archive.is_reachable:
+            with contextlib.suppress(TimeoutError):
+                await asyncio.wait_for(self._has_read.wait(), self.timeout_s)
 
     async def stop(self) -> None:
         """End; the process that reads goes on for others."""

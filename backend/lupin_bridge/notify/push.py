@@ -24,8 +24,9 @@ from urllib.parse import urlsplit
 
 import orjson
 
-from lupin_bridge.access.accounts import AccountError, Device
+from lupin_bridge.access.accounts import Device
 from lupin_bridge.access.people import People
+from lupin_bridge.access.person import AccountError
 from lupin_bridge.alarms.board import AlarmBoard
 from lupin_bridge.alarms.ledger import Change
 from lupin_bridge.alarms.notes import NOTHING_SAID, NoteBoard, notes_of_alarms

@@ -10,8 +10,8 @@ from typing import Any, Final
 import orjson
 from fastapi import APIRouter, Request, Response
 
-from lupin_bridge.access.accounts import AccountError, Person
 from lupin_bridge.access.middleware import Access, client_of
+from lupin_bridge.access.person import AccountError, Person
 from lupin_bridge.alarms.notes import NOTE_BURST, NOTES_PER_MINUTE
 from lupin_bridge.bridge import Bridge
 from lupin_bridge.feed.source import ELSEWHERE, TwinUnavailableError

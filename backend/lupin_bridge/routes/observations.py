@@ -9,8 +9,8 @@ from typing import Final
 import orjson
 from fastapi import APIRouter, Request, Response
 
-from lupin_bridge.access.accounts import WRITER
 from lupin_bridge.access.middleware import OBSERVATIONS
+from lupin_bridge.access.person import WRITER
 from lupin_bridge.feed.source import TwinUnavailableError
 from lupin_bridge.past.query import moment
 from lupin_bridge.routes.answers import (

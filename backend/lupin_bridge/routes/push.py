@@ -5,8 +5,9 @@ from __future__ import annotations
 import orjson
 from fastapi import APIRouter, Request, Response
 
-from lupin_bridge.access.accounts import Device, Person
+from lupin_bridge.access.accounts import Device
 from lupin_bridge.access.middleware import PUSH, Access, client_of
+from lupin_bridge.access.person import Person
 from lupin_bridge.notify.push import DeviceRefused, check_device
 from lupin_bridge.past.report_page import languages
 from lupin_bridge.routes.answers import (

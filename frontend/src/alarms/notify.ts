@@ -36,8 +36,8 @@ export async function wishNotify(isWished: boolean): Promise<void> {
   const isOn = isWished && notifyState.get() === 'granted';
   preferTold({ notify: isOn });
   // Beside it: the page notifies by itself while it is open.
-  await wishPush(isOn).catch((error: unknown) => {
-    console.warn('no push notifications', error);
+  await wishPush(isOn).catch(() => {
+    // No push service, or a bridge that is gone meanwhile: the page still notifies.
   });
 }
 

@@ -7,7 +7,8 @@ interface Key {
 
 /** Subscribes this browser at the bridge, or ends that. Harmless where there is no Web Push. */
 export async function wishPush(isWished: boolean): Promise<void> {
-  const registration = await navigator.serviceWorker?.getRegistration();
+  if (!('serviceWorker' in navigator)) return;
+  const registration = await navigator.serviceWorker.getRegistration();
   if (!registration || !('pushManager' in registration)) return;
   const { pushManager } = registration;
   const known = await pushManager.getSubscription();

@@ -120,7 +120,7 @@ class PatrolNode(Node):  # type: ignore[misc]  # rclpy is not typed
             case PassCompleted():
                 self.get_logger().info(
                     f"pass {event.pass_index + 1} completed;"
-                    f" failed tags: {', '.join(event.failed) or 'none'}"
+                    f" tags without a successful scan: {', '.join(event.failed) or 'none'}"
                 )
 
     def wait_for_delivery(self, timeout_s: float) -> bool:

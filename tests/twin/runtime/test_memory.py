@@ -99,20 +99,20 @@ def test_what_is_known_again_is_told_in_one_line(tmp_path: Path) -> None:
         return said
 
     path = tmp_path / "j.sqlite"
-    nothing = f"journal {path}: nothing was known before"
+    nothing = f"journal {path}: nothing to restore"
     assert told(path, wall(5), wall(6), writes=WRITES) == [nothing, None]
     [line] = told(path, wall(9))
     oldest = f"{datetime.fromtimestamp(PART.stamp_ns / S, UTC):%Y-%m-%dT%H:%M:%SZ}"
     assert line == (
-        f"journal {path}: 3 tags are known again, of 3 places, 3 readings, 1 inspections;"
-        f" the oldest is of {oldest}"
+        f"journal {path}: restored 3 tags with 3 positions, 3 readings, 1 inspections;"
+        f" the oldest observation is from {oldest}"
     )
     path = tmp_path / "simulated.sqlite"
     told(path, sim(5, 5), writes=[at(SCAN, 4 * S)])
     waiting = Clock(0, NOW, is_simulated=True)
     before, after = told(path, waiting, sim(6, 6))
     assert before is None
-    assert str(after).endswith("; the oldest is of second 4.000")
+    assert str(after).endswith("; the oldest observation is from second 4.000")
 
 
 def at(write: Scan | Inspection, stamp_ns: int) -> Scan | Inspection:

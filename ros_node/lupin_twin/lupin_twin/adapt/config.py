@@ -274,7 +274,7 @@ def read_yaml(path: Path) -> Any:
 
         def compose_node(self, parent: Any, index: Any) -> Any:
             if self.check_event(yaml.AliasEvent):
-                alias = self.peek_event()
+                alias = self.peek_event()  # type: ignore[no-untyped-call]  # PyYAML is not
                 raise yaml.composer.ComposerError(
                     None, None, f"the alias *{alias.anchor} is not taken", alias.start_mark
                 )

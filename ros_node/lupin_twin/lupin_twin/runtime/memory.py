@@ -103,7 +103,7 @@ class Memory:
     def follow(self, now: Clock) -> str | None:
         """Keep to a clock: the first moment of it restores, one that goes back begins a new run.
 
-        Returns what of the journal is known again, in words, once it is. A moment of 0 is a
+        Returns a summary of what it restored from the journal, once it has. A moment of 0 is a
         simulated clock that has not started: nothing is known then of when anything was. One that
         goes back time and again stays in a run, as at its latest, until it may begin another
         (`MAX_NEW_RUNS`).
@@ -290,17 +290,17 @@ def _moved(early: _Early, by_ns: int) -> _Early:
 def _summary(restored: Restored, now: Clock) -> str:
     tags = restored.known.tags
     if not tags:
-        return "nothing was known before"
+        return "nothing to restore"
     counts = {
-        "places": sum(tag.pose is not None for tag in tags),
+        "positions": sum(tag.pose is not None for tag in tags),
         "readings": sum(len(tag.readings) for tag in tags),
         "inspections": sum(tag.looked_at_ns is not None for tag in tags),
     }
     what = ", ".join(f"{count:,} {name}" for name, count in counts.items())
     times = [r.observed_at_ns for tag in tags for r in tag.readings if r.observed_at_ns is not None]
     times += [tag.last_observed_ns for tag in tags if tag.last_observed_ns is not None]
-    oldest = f"; the oldest is of {_moment(min(times), now)}" if times else ""
-    return f"{len(tags):,} tags are known again, of {what}{oldest}"
+    oldest = f"; the oldest observation is from {_moment(min(times), now)}" if times else ""
+    return f"restored {len(tags):,} tags with {what}{oldest}"
 
 
 def _moment(stamp_ns: int, now: Clock) -> str:

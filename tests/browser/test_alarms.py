@@ -126,7 +126,7 @@ def test_a_row_has_the_value_of_now_with_its_trend_beside_the_worst(
         hmi.allow_noise(SERVER_GONE)
         running.process.kill()
         hmi.expect_phase("reconnecting")
-        expect(fact(row, "now")).to_contain_text("now not known, last 33.1\u00a0°C")
+        expect(fact(row, "now")).to_contain_text("now unknown, last 33.1\u00a0°C")
         expect(fact(row, "now")).to_have_attribute("data-status", "unknown")
 
 
@@ -136,7 +136,7 @@ def test_a_value_that_is_too_old_is_not_that_of_now(domain: int, open_page: Open
         hmi = open_page(running.url)
         hmi.page.keyboard.press("a")
         row = hmi.page.locator("[data-alarm]", has_text="Temperature above")
-        expect(fact(row, "now")).to_contain_text("now not known, last 43.5\u00a0°C")
+        expect(fact(row, "now")).to_contain_text("now unknown, last 43.5\u00a0°C")
 
 
 def test_no_value_reads_like_the_limit_that_it_is_beyond(domain: int, open_page: OpenPage) -> None:

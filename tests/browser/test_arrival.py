@@ -107,14 +107,14 @@ def test_a_failed_scan_is_listed_and_says_so_until_it_succeeds(
     expect(row.locator(".cell-age")).to_have_text("never")
     tried = row.locator(".tried")
     # Minutes, where a busy machine takes so long.
-    expect(tried).to_have_text(re.compile(r"^tried \d+\s(s|min) ago: not decoded$"))
+    expect(tried).to_have_text(re.compile(r"^attempt \d+\s(s|min) ago: not readable$"))
     shared.peer.observe(scan("tried", {"temperature": 21.0}, at=(2, 2)))
     expect(row).to_have_attribute("data-pinned", "true")
     expect(hmi.cell("tried", "temperature")).to_have_text("21.0")
     expect(tried).to_have_count(0)
     # A later failure leaves the reading as it is, and is told beside it.
     shared.peer.observe(scan("tried", status=failed))
-    expect(tried).to_contain_text("not decoded")
+    expect(tried).to_contain_text("not readable")
     expect(hmi.cell("tried", "temperature")).to_have_text("21.0")
 
 

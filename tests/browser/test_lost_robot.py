@@ -79,7 +79,7 @@ def expect_all_told(hmi: Hmi) -> None:
     hmi.expect(lambda: set(hmi.rows()) == {*AT_HOME, "lost", *FAR}, "every tag")
     for tag_id in ("lost", *FAR):
         chip = hmi.row(tag_id).locator(".chip")
-        expect(chip).to_have_text("Far off, not on the map")
+        expect(chip).to_have_text("Too far away, not on the map")
     for tag_id in AT_HOME:
         expect(hmi.row(tag_id).locator(".chip")).to_have_count(0)
     expect(hmi.row("lost").locator(".chip")).to_have_attribute("title", re.compile("x 5000.00 m"))

@@ -50,7 +50,7 @@ def test_a_word_is_everybodys_and_a_viewers_is_their_own(
             alarms_of(browser, running.url, "vera") as vera,
         ):
             expect(anna.locator(".alarms-mine")).to_contain_text("Signed in as anna")
-            expect(vera.locator(".alarms-mine")).to_contain_text("vera, who only reads")
+            expect(vera.locator(".alarms-mine")).to_contain_text("vera (viewer)")
             expect(row(vera)).to_have_attribute("data-acknowledged", "false")
             anna.get_by_role("button", name=re.compile("^Acknowledge: ")).click()
             for page in (anna, vera):

@@ -103,7 +103,7 @@ def test_back_closes_the_card_and_undoes_nothing_else(house: Bridge, open_page: 
 def test_a_link_to_a_tag_that_is_not_there_says_so(house: Bridge, open_page: OpenPage) -> None:
     hmi = open_page(house.url, "tag=nobody")
     hmi.expect_rows(*TAGS)
-    expect(hmi.card("nobody")).to_contain_text("does not have this tag")
+    expect(hmi.card("nobody")).to_contain_text("does not know this tag")
 
 
 def test_a_link_of_nonsense_is_the_whole_house(house: Bridge, open_page: OpenPage) -> None:

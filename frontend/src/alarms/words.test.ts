@@ -37,7 +37,7 @@ test('what and where, of a tag and of the greenhouse', () => {
   );
   expect(alarmText(cold, F, CRITICAL)).toContain('below 50.0\u00a0°F, now 43.9\u00a0°F');
   const silent = alarm('a', { tag_id: '', reason: { kind: 'silent', sensor: '', value: null } });
-  expect(alarmText(silent, C, null)).toMatch(/^Whole greenhouse: The twin is silent/);
+  expect(alarmText(silent, C, null)).toMatch(/^Whole greenhouse: No data from the twin/);
 });
 
 test('now, at worst and at first, each with its own severity', () => {
@@ -73,9 +73,9 @@ test('what is not known now says so, with what was known last', () => {
     lastAt: 'unknown',
   });
   expect(unknownText(cold, C, unknown(7.4), 0, 2_520)).toBe(
-    'now not known, last 7.4\u00a0°C 42\u00a0min ago',
+    'now unknown, last 7.4\u00a0°C 42\u00a0min ago',
   );
-  expect(unknownText(cold, C, unknown(null), 0, null)).toBe('now not known');
+  expect(unknownText(cold, C, unknown(null), 0, null)).toBe('now unknown');
   expect(alarmText(cold, C, unknown(7.4))).toBe(
     'Tag 1: Temperature below 10.0\u00a0°C, worst 2.5\u00a0°C (critical)',
   );

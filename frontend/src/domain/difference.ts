@@ -1,9 +1,9 @@
 /** A field less another of the same house at another moment: yesterday against today. Pure. */
 import type { Field } from '../contract/types';
-import { numberText } from './format';
+import { differenceNumber, withUnit } from './format';
 import { fraction, mix, rangeOf, rgbText, type Range, type Rgb, type Shade } from './ramp';
 import type { Sensor } from './sensors';
-import { differenceToShown, unitOf, type TemperatureUnit } from './units';
+import type { TemperatureUnit } from './units';
 
 /** What the moment that is shown is compared with: so many seconds before it, or one moment. */
 export type Compare =
@@ -88,7 +88,7 @@ export const divergingShade =
 
 /** A difference with its sign, without its unit; no sign where nothing is left to show. */
 export function signedText(sensor: Sensor, value: number, unit: TemperatureUnit): string {
-  const text = numberText(differenceToShown(sensor, value, unit));
+  const text = differenceNumber(sensor, value, unit);
   const isNothing = !/[1-9]/.test(text);
   if (isNothing) return text.replace('\u2212', '');
   return value > 0 ? `+${text}` : text;
@@ -96,7 +96,5 @@ export function signedText(sensor: Sensor, value: number, unit: TemperatureUnit)
 
 /** The same with its unit: "+1.3 °C". */
 export function differenceText(sensor: Sensor, value: number, unit: TemperatureUnit): string {
-  const suffix = unitOf(sensor, unit);
-  const text = signedText(sensor, value, unit);
-  return suffix ? `${text}\u00a0${suffix}` : text;
+  return withUnit(sensor, signedText(sensor, value, unit), unit);
 }

@@ -2,6 +2,8 @@ import { expect, test } from 'vitest';
 
 import {
   ageText,
+  differenceNumber,
+  digitsApart,
   metresText,
   momentText,
   numberText,
@@ -78,4 +80,39 @@ test.each([
 ])('%d of a sensor that nobody knows reads %s, and never as nothing', (value, text) => {
   expect(valueText(sensorNamed('spin'), value, 'C')).toBe(text);
   expect(valueText(sensorNamed('temperature'), value, 'C')).toMatch(/^.?\d\.\d\d?$/);
+});
+
+/** Numbers of every size, the same in each run (Park and Miller 1988). */
+function* sizes(count: number): Generator<number> {
+  let seed = 20_261_124;
+  const next = (): number => (seed = (seed * 48_271) % 2_147_483_647) / 2_147_483_647;
+  for (let each = 0; each < count; each++) {
+    yield (next() < 0.5 ? -1 : 1) * 10 ** (next() * 9 - 4);
+  }
+}
+const read = (text: string): number => Number(text.replace('\u2212', '-'));
+
+test('of a sensor that nobody knows no text is off by more than a twentieth of its value', () => {
+  const sensor = sensorNamed('spin');
+  for (const value of sizes(2_000)) {
+    const slack = Math.abs(value) * 0.05;
+    expect(Math.abs(read(valueText(sensor, value, 'C')) - value), String(value)).toBeLessThan(
+      slack,
+    );
+    expect(differenceNumber(sensor, value, 'C')).toBe(valueText(sensor, value, 'C'));
+  }
+});
+
+test('a value never reads like the limit that it has passed', () => {
+  const sensor = sensorNamed('humidity');
+  for (const size of sizes(500)) {
+    const limit = Math.min(100, Math.abs(size));
+    for (const value of [limit * 1.01, limit * 0.999, limit + 0.001]) {
+      // Closer than that two readings may read the same.
+      if (Math.abs(value - limit) < 1e-5) continue;
+      const more = digitsApart(sensor, [value], limit, 'C');
+      const texts = [value, limit].map((each) => valueText(sensor, each, 'C', more));
+      expect(texts[0], `${value} of ${limit}`).not.toBe(texts[1]);
+    }
+  }
 });

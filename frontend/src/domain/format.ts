@@ -2,7 +2,7 @@ import type { Range } from './ramp';
 import type { MapPoint } from '../geometry/coordinates';
 import { LOCALE, S } from '../strings';
 import type { Sensor } from './sensors';
-import { toShown, unitOf, type TemperatureUnit } from './units';
+import { differenceToShown, toShown, unitOf, type TemperatureUnit } from './units';
 
 /** What stands between the whole and the tenths where the reader lives. */
 const POINT =
@@ -47,8 +47,20 @@ export function digitsApart(
 
 /** A reading without its unit. */
 export function valueText(sensor: Sensor, value: number, unit: TemperatureUnit, more = 0): string {
-  const given = toShown(sensor, value, unit);
-  return numberText(given, more + (sensor.unit === '' ? digitsOfSmall(given) : 0));
+  return sized(sensor, toShown(sensor, value, unit), more);
+}
+
+/** What two readings differ by, or an error, without its unit. */
+export const differenceNumber = (sensor: Sensor, by: number, unit: TemperatureUnit): string =>
+  sized(sensor, differenceToShown(sensor, by, unit));
+
+const sized = (sensor: Sensor, given: number, more = 0): string =>
+  numberText(given, more + (sensor.unit === '' ? digitsOfSmall(given) : 0));
+
+/** A number's text and the sensor's unit, held together by a no-break space. */
+export function withUnit(sensor: Sensor, text: string, unit: TemperatureUnit): string {
+  const suffix = unitOf(sensor, unit);
+  return suffix ? `${text}\u00a0${suffix}` : text;
 }
 
 /** Of a sensor that nobody knows two digits of a small value, which would read as nothing else. */
@@ -57,17 +69,13 @@ function digitsOfSmall(value: number): number {
   return size === 0 || size >= 0.1 ? 0 : Math.min(MOST_MORE, Math.ceil(-Math.log10(size)) - 1);
 }
 
-/** A reading with its unit, held together by a no-break space. */
-export function readingText(
+/** A reading with its unit. */
+export const readingText = (
   sensor: Sensor,
   value: number,
   unit: TemperatureUnit,
   more = 0,
-): string {
-  const suffix = unitOf(sensor, unit);
-  const number = valueText(sensor, value, unit, more);
-  return suffix ? `${number}\u00a0${suffix}` : number;
-}
+): string => withUnit(sensor, valueText(sensor, value, unit, more), unit);
 
 /** A range with its unit; an en dash where there is none. */
 export function rangeText(sensor: Sensor, range: Range | null, unit: TemperatureUnit): string {

@@ -1,9 +1,9 @@
 /** How a value lies against its ideal range: too low, right, too high; in colour and in words. Pure. */
 import { S } from '../strings';
-import { numberText } from './format';
+import { differenceNumber, withUnit } from './format';
 import { mix, rgbText, type Rgb } from './ramp';
 import type { Ranges, Sensor, Span } from './sensors';
-import { differenceToShown, unitOf, type TemperatureUnit } from './units';
+import type { TemperatureUnit } from './units';
 
 /** How far beyond its ideal range a value is, in its unit: below 0 too low, 0 right; null: no ideal. */
 export function beyond({ ideal }: Ranges, value: number): number | null {
@@ -66,9 +66,8 @@ export function idealText(
   const by = beyond(ranges, value);
   if (by === null) return null;
   if (by === 0) return S.idealParts.any;
-  const text = numberText(differenceToShown(sensor, Math.abs(by), unit));
-  const suffix = unitOf(sensor, unit);
+  const text = differenceNumber(sensor, Math.abs(by), unit);
   // Of less than can be told there is nothing to tell.
-  const how = /[1-9]/.test(text) ? `${text}${suffix ? `\u00a0${suffix}` : ''}` : null;
+  const how = /[1-9]/.test(text) ? withUnit(sensor, text, unit) : null;
   return by < 0 ? S.tooLow(how) : S.tooHigh(how);
 }

@@ -45,7 +45,7 @@ describe('a reason in words', () => {
     [
       { kind: 'scan_failed', sensor: '', value: 2, limit: null } as const,
       null,
-      'Last scan failed: not decoded',
+      'Last scan failed: not readable',
     ],
     [{ kind: 'pest', sensor: '', value: 3, limit: null } as const, 5, '3 pests seen'],
     [{ kind: 'pest', sensor: '', value: 0, limit: null } as const, 5, 'Pest seen'],
@@ -59,7 +59,7 @@ describe('a reason in words', () => {
       90_000,
       `Soil moisture: no reading for 1${NBSP}d (readings are valid for 1${NBSP}d)`,
     ],
-    [{ ...old, limit: 600 }, null, `Not scanned lately (readings are valid for 10${NBSP}min)`],
+    [{ ...old, limit: 600 }, null, `Not scanned recently (readings are valid for 10${NBSP}min)`],
     [
       { ...old, limit: 5_400, since: null },
       null,
@@ -73,7 +73,7 @@ describe('a reason in words', () => {
     [
       { kind: 'silent', sensor: '', value: null, limit: null } as const,
       null,
-      'The twin is silent: its last data says nothing about now',
+      'No data from the twin: its last data may be out of date',
     ],
     [
       { kind: 'stopped', sensor: '', value: null, limit: null } as const,

@@ -1,6 +1,6 @@
 import { expect, test } from 'vitest';
 
-import { speciesLooks } from './species';
+import { speciesLooks, speciesText } from './species';
 
 test('each species has a look of its own, whatever the order of arrival', () => {
   const names = ['rose', 'tulip', 'orchid', 'gerbera', 'lupin'];
@@ -17,4 +17,12 @@ test('beyond the list looks repeat and nothing hangs', () => {
 
 test('no name, no look', () => {
   expect(speciesLooks(['', 'rose']).has('')).toBe(false);
+});
+
+test('a name that the page knows is in its language, in any case; another is shown as it came', () => {
+  expect(['Rose', 'Begonia', 'constructor'].map((name) => speciesText(name))).toEqual([
+    'rose',
+    'Begonia',
+    'constructor',
+  ]);
 });

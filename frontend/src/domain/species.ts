@@ -1,4 +1,6 @@
+import { S } from '../strings';
 import type { Rgb } from './ramp';
+import { shown } from './text';
 
 /** How a species' blooms are drawn: colour and shape, so that colour is never alone. */
 export interface BloomLook {
@@ -48,4 +50,11 @@ function hash(text: string): number {
     value = Math.imul(value ^ text.charCodeAt(i), 0x01000193);
   }
   return value >>> 0;
+}
+
+/** A species in the reader's language, fit to show; one that the page has no name for, as it came. */
+export function speciesText(name: string, longest?: number): string {
+  const names: Readonly<Record<string, string>> = S.speciesNames;
+  const known = name.toLowerCase();
+  return shown((Object.hasOwn(names, known) ? names[known] : undefined) ?? name, longest);
 }

@@ -4,6 +4,7 @@ import { S } from '../strings';
 import { ageSeconds } from './age';
 import { csv, type Cell } from './csv';
 import { severity, type HouseHealth } from './health';
+import { speciesText } from './species';
 import { reasonsText, tryKind } from './reasons';
 import type { Catalogue, Sensor } from './sensors';
 import { compareIds, type Tag } from './twin';
@@ -102,7 +103,7 @@ function haystackOf({ tag, health }: Row, sensors: Catalogue): string {
   return [
     tag.id,
     sensors.areaOf(tag.id),
-    tag.species || S.unclassified,
+    tag.species ? `${tag.species} ${speciesText(tag.species)}` : S.unclassified,
     S.health[health.verdict],
     tag.anomaly ? S.pest : '',
     tag.at ? '' : tag.farOff ? S.farOff : S.notOnMap,

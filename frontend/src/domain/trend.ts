@@ -1,9 +1,9 @@
 /** A reading against the same an hour before, as far as the bridge lets either stand. Pure. */
 import type { TagHealth } from '../contract/types';
-import { numberText, written } from './format';
+import { valueText, withUnit, written } from './format';
 import type { Sensor } from './sensors';
 import type { Tag } from './twin';
-import { differenceToShown, toShown, unitOf, type TemperatureUnit } from './units';
+import { differenceToShown, type TemperatureUnit } from './units';
 
 /** How long ago the other reading is looked for, seconds of the twin's time. */
 export const TREND_S = 3_600;
@@ -61,10 +61,9 @@ export function differenceShown(
   by: number,
   unit: TemperatureUnit,
 ): { readonly way: 'up' | 'down' | 'level'; readonly text: string } {
-  const digits = /[.,](\d+)$/.exec(numberText(toShown(sensor, value, unit)))?.[1]?.length ?? 0;
+  const digits = /[.,](\d+)$/.exec(valueText(sensor, value, unit))?.[1]?.length ?? 0;
   const shown = differenceToShown(sensor, by, unit).toFixed(digits);
   const way = Number(shown) > 0 ? 'up' : Number(shown) < 0 ? 'down' : 'level';
-  const suffix = unitOf(sensor, unit);
   const number = way === 'level' ? shown.replace('-', '') : `${way === 'up' ? '+' : ''}${shown}`;
-  return { way, text: suffix ? `${written(number)}\u00a0${suffix}` : written(number) };
+  return { way, text: withUnit(sensor, written(number), unit) };
 }

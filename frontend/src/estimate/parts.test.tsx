@@ -96,11 +96,11 @@ describe('legend', () => {
     expect((await screen.findByTestId('foretold')).textContent).toBe(
       '9 of 10 scans were within the predicted range',
     );
-    expect(text('estimate-key')).toContain(`off by more than ±1.6${NBSP}°C`);
+    expect(text('estimate-key')).toContain(`may exceed ±1.6${NBSP}°C`);
     expect(text('legend')).toContain('Last day: 412 of 458 scans, last week: 2900 of 3200 scans.');
     expect(text('legend')).toContain('90 % interval');
     expect(screen.queryByTestId('estimate-warning')).toBeNull();
-    expect(screen.getByRole('combobox', { name: 'Heat map made of' })).toHaveProperty(
+    expect(screen.getByRole('combobox', { name: 'Heat map shows' })).toHaveProperty(
       'value',
       'estimate',
     );
@@ -200,7 +200,7 @@ describe('where another tag would help', () => {
       screen.getByRole('button', { name: /^1\. x 1\.00 m, y 2\.00 m: a tag here/ }),
     ).toBeTruthy();
     expect(
-      screen.getByRole('button', { name: /^2\. .* each mark before it .* 70\u00a0%/ }),
+      screen.getByRole('button', { name: /^2\. .* all marks before it .* 70\u00a0%/ }),
     ).toBeTruthy();
     const marks = [...document.querySelectorAll<HTMLElement>('.advice li')];
     expect(marks.map(({ style }) => style.transform)).toEqual([
@@ -218,7 +218,7 @@ describe('where another tag would help', () => {
       receive({ type: 'past', past: { at: 5, house: store.get().twin.latest } });
       act({ type: 'moment', moment: 5 });
     });
-    expect(text('advice-note')).toBe('Suggestions for another tag are for now only');
+    expect(text('advice-note')).toBe('Suggestions for another tag are shown for the present only');
   });
 
   test('a twin that has no such service says so', async () => {

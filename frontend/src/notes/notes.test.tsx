@@ -91,10 +91,10 @@ test('who may write does, and withdraws their own words alone', async () => {
   expect(screen.getAllByRole('button', { name: /^Withdraw/ })).toHaveLength(1);
   fireEvent.click(screen.getByRole('button', { name: 'Withdraw: mine' }));
   fireEvent.click(screen.getByRole('button', { name: 'Comment: Tag 7' }));
-  fireEvent.change(screen.getByLabelText('Comment as of now'), { target: { value: ' dry ' } });
+  fireEvent.change(screen.getByLabelText('Comment about now'), { target: { value: ' dry ' } });
   fireEvent.click(screen.getByRole('button', { name: 'Save' }));
   await waitFor(() => {
-    expect(screen.queryByLabelText('Comment as of now')).toBeNull();
+    expect(screen.queryByLabelText('Comment about now')).toBeNull();
   });
   expect(asked).toEqual([
     'DELETE /api/notes/mine ',

@@ -94,14 +94,14 @@ test('a house that is not heard of is unknown, whatever was said last', () => {
   goLost();
   render(<HealthSummary kiosk={false} />);
   expect(house().dataset['health']).toBe('unknown');
-  expect(driver().textContent).toMatch(/^The twin is silent/);
+  expect(driver().textContent).toMatch(/^No data from the twin/);
   expect(screen.getByRole('button', { name: /^2 Healthy/ })).toBeTruthy();
 });
 
 test.each([
-  [true, 'light', 'The ranges for the day apply: by the light in the greenhouse'],
-  [false, 'clock', 'The ranges for the night apply: by the clock, as no light'],
-  [true, 'assumed', 'The ranges for the day apply: assumed'],
+  [true, 'light', 'Day ranges apply: by the light measured'],
+  [false, 'clock', 'Night ranges apply: by the clock, as no light'],
+  [true, 'assumed', 'Day ranges apply: assumed'],
 ] as const)('whose ranges hold is said: day %s, by %s', (is_day, source, told) => {
   showTags(TAGS, judgement({}, { is_day, source }));
   render(<HealthSummary kiosk={false} />);

@@ -3,6 +3,7 @@ import { useLayoutEffect, useRef, type JSX } from 'react';
 import { readingText, shortAgeText } from '../domain/format';
 import { idealText } from '../domain/ideal';
 import { rangesFor } from '../domain/sensors';
+import { speciesText } from '../domain/species';
 import { shown } from '../domain/text';
 import type { Tag } from '../domain/twin';
 import { beside } from '../geometry/beside';
@@ -92,7 +93,7 @@ function Brief({ pin, tag }: { pin: PinUnderMouse; tag: Tag }): JSX.Element {
       {hidden > 0 && <p className="faint">{S.cardMore(hidden)}</p>}
       {names.length === 0 && <p className="faint">{S.cardNoReadings}</p>}
       <p className="faint">
-        {tag.species ? <bdi>{shown(tag.species, 28)}</bdi> : S.unclassified}
+        {tag.species ? <bdi>{speciesText(tag.species, 28)}</bdi> : S.unclassified}
         {tag.species && !tag.sureSpecies && ` (${S.notSure})`}
       </p>
     </div>

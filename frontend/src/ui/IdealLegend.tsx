@@ -3,7 +3,7 @@ import type { JSX } from 'react';
 import { readingText, valueText } from '../domain/format';
 import { IDEAL_ALPHA, idealParts } from '../domain/ideal';
 import { rangesFor, type Sensor } from '../domain/sensors';
-import { shown } from '../domain/text';
+import { speciesText } from '../domain/species';
 import { useApp } from '../store/app';
 import { selectTags } from '../store/moment';
 import { S } from '../strings';
@@ -51,7 +51,7 @@ export function IdealOfSpecies({ sensor }: { sensor: Sensor }): JSX.Element | nu
     const limits = range
       ? `${valueText(sensor, range[0], unit)} – ${readingText(sensor, range[1], unit)}`
       : '–';
-    return `${shown(species, 24)} ${limits}`;
+    return `${speciesText(species, 24)} ${limits}`;
   });
   return <span data-testid="ideal-species">{texts.join('; ')}</span>;
 }

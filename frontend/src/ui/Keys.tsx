@@ -2,8 +2,7 @@ import { useMemo, type JSX, type ReactNode } from 'react';
 
 import { VERDICTS } from '../domain/health';
 import { rgbText } from '../domain/ramp';
-import { speciesLooks, UNKNOWN_SPECIES, type BloomLook } from '../domain/species';
-import { shown } from '../domain/text';
+import { speciesLooks, UNKNOWN_SPECIES, type BloomLook, speciesText } from '../domain/species';
 import { speciesOf } from '../draw/scene';
 import { useApp } from '../store/app';
 import { selectTags } from '../store/moment';
@@ -49,7 +48,7 @@ export function Keys(): JSX.Element {
       {species.map(([name, look]) => (
         <li key={name}>
           <BloomKey look={look} />
-          <bdi>{shown(name, 24)}</bdi>
+          <bdi>{speciesText(name, 24)}</bdi>
         </li>
       ))}
       {unknown && (

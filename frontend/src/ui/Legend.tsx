@@ -1,11 +1,11 @@
 import type { CSSProperties, JSX } from 'react';
 
 import type { FieldQuality } from '../contract/types';
-import { numberText, readingText, valueText } from '../domain/format';
+import { differenceNumber, readingText, valueText, withUnit } from '../domain/format';
 import { fraction, rgbText, sensorColour, type Range } from '../domain/ramp';
 import type { Sensor } from '../domain/sensors';
 import { shown } from '../domain/text';
-import { differenceToShown, unitOf, type TemperatureUnit } from '../domain/units';
+import { unitOf, type TemperatureUnit } from '../domain/units';
 import { useApp } from '../store/app';
 import { selectColouring, selectHeat, selectRange, selectSensor } from '../store/derived';
 import { selectShown, selectTags } from '../store/moment';
@@ -128,7 +128,7 @@ function Quality({
   const { rmse, worst } = quality;
   if (rmse === null) return null;
   const error = (value: number): string =>
-    `${numberText(differenceToShown(sensor, Math.abs(value), unit))}\u00a0${unitOf(sensor, unit)}`;
+    withUnit(sensor, differenceNumber(sensor, Math.abs(value), unit), unit);
   const atWorst = worst
     ? ` ${S.legendErrorWorst(shown(worst.tag_id, 24), error(worst.error))}`
     : '';

@@ -40,7 +40,7 @@ const WORDS: Readonly<Record<Verdict, string>> = {
 const SAYS: Readonly<Record<HealthReason['kind'], RegExp>> = {
   range: /, (below|above) [\d.]+( \(critical\))?$/,
   reading_failed: /: (the sensor returns no value|not a plausible value)$/,
-  scan_failed: /^Last scan failed: (not reachable|not decoded)/,
+  scan_failed: /^Last scan failed: (not reachable|not readable)/,
   pest: /^(\d+ pests?|Pest) seen$/,
   old: /(^Not scanned|^No scan|: no(t| reading) ).* \(readings are valid for 10\u00a0min\)$/,
   changed: /changed/,

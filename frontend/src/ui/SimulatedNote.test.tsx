@@ -30,7 +30,7 @@ test('a moment that a simulation made is said to be simulated, and no other', ()
   expect(note()).toBe('');
   lookBack(END - 1);
   expect(note()).toBe(
-    `Simulated. No robot observed this: the demo starts with simulated days, up to ${rosText(END)}.`,
+    `Simulated. Not measured by a robot: the demo starts with simulated days, up to ${rosText(END)}.`,
   );
   lookBack(END);
   expect(note()).toBe('');

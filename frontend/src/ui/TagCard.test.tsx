@@ -48,7 +48,7 @@ describe('card', () => {
     render(<TagCard tagId="7" />);
     expect(document.querySelector('.card-ideal')?.textContent).toContain('18.0 to 26.0');
     expect(screen.getByRole('complementary').textContent).toContain(
-      'Tulip 49\u00a0% sure (not sure)',
+      'tulip 49\u00a0% certain (uncertain)',
     );
   });
 
@@ -80,7 +80,7 @@ describe('card', () => {
 
   test('a tag that a link names and nobody knows', () => {
     render(<TagCard tagId="404" />);
-    expect(screen.getByTestId('tag-card').textContent).toContain('does not have this tag');
+    expect(screen.getByTestId('tag-card').textContent).toContain('does not know this tag');
   });
 
   test('draws the history that the server has', async () => {
@@ -111,7 +111,7 @@ describe('card', () => {
     const tries = screen.getByRole('region', { name: 'Last attempts' });
     const told = [...tries.querySelectorAll('li')].map((each) => each.textContent);
     expect(told).toHaveLength(2);
-    expect(told[0]).toMatch(/attemptnot decoded blurred$/);
+    expect(told[0]).toMatch(/attemptnot readable blurred$/);
     expect(told[1]).toMatch(/scanOK$/);
   });
 
@@ -158,7 +158,7 @@ describe('card', () => {
     });
     render(<TagCard tagId="7" />);
     const { textContent } = screen.getByTestId('tag-card');
-    expect(textContent).toContain('tried 3\u00a0min ago: not decoded');
+    expect(textContent).toContain('attempt 3\u00a0min ago: not readable');
     expect(textContent).toContain('no tag in the picture');
   });
 });

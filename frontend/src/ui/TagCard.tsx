@@ -4,6 +4,7 @@ import type { When } from '../domain/age';
 import { farOffText, metresText, percentText, readingText, valueText } from '../domain/format';
 import { rangeReason, sideOf } from '../domain/health';
 import { rangesFor } from '../domain/sensors';
+import { speciesText } from '../domain/species';
 import { shown } from '../domain/text';
 import type { Tag } from '../domain/twin';
 import { unitOf, type TemperatureUnit } from '../domain/units';
@@ -137,7 +138,7 @@ function CardBody({
         <div>
           <dt>{S.columns.species}</dt>
           <dd>
-            {tag.species ? <bdi>{shown(tag.species, 40)}</bdi> : S.unclassified}
+            {tag.species ? <bdi>{speciesText(tag.species, 40)}</bdi> : S.unclassified}
             {tag.species && tag.speciesConfidence !== null && (
               <span className="faint"> {S.confidence(percentText(tag.speciesConfidence))}</span>
             )}

@@ -6,6 +6,7 @@ import type { TagHealth } from '../contract/types';
 import { rangeReason, sideOf } from '../domain/health';
 import { reasonsText } from '../domain/reasons';
 import type { Catalogue, Sensor } from '../domain/sensors';
+import { speciesText } from '../domain/species';
 import { shown } from '../domain/text';
 import type { Tag } from '../domain/twin';
 import type { TemperatureUnit } from '../domain/units';
@@ -121,7 +122,7 @@ export const TagRow = memo(function TagRow({
         <td className="cell-species">
           {tag.species ? (
             <>
-              <bdi>{shown(tag.species, 28)}</bdi>
+              <bdi>{speciesText(tag.species, 28)}</bdi>
               {tag.speciesConfidence !== null && (
                 <span className="faint" title={S.confidence(percentText(tag.speciesConfidence))}>
                   {percentText(tag.speciesConfidence)}

@@ -148,7 +148,7 @@ describe('table', () => {
     const health = judgement({ a: [reason({ verdict: 'stressed' })], b: 'healthy', c: 'healthy' });
     showTags(tags, health);
     render(<TagTable />);
-    expect(trends()).toEqual(['– an hour ago: not known', '– an hour ago: not known']);
+    expect(trends()).toEqual(['– an hour ago: unknown', '– an hour ago: unknown']);
     const before = tag({
       tag_id: 'a',
       readings: [
@@ -175,7 +175,7 @@ describe('table', () => {
     flush(() => {
       hourAgo.dispatch({ of: at.sec - 601, tags: new Map() });
     });
-    expect(trends()[0]).toBe('– an hour ago: not known');
+    expect(trends()[0]).toBe('– an hour ago: unknown');
     hourAgo.dispatch(null);
   });
 

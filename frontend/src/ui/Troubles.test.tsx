@@ -99,7 +99,7 @@ test.each([
   [
     'doubting',
     'Nothing is being recorded: the clock contradicts the recording.',
-    /when the clock is right/,
+    /when the clock is correct/,
   ],
   [
     'in_use',

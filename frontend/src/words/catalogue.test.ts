@@ -41,10 +41,11 @@ const SAME: Readonly<Record<string, readonly string[]>> = {
     ...['phase.live', 'timebarLive', 'keys.time.3.1', 'menu', 'tried.ok', 'sensors', 'alarmCount'],
     ...['rangeAuto', 'saveCsvShort', 'fileName', 'trend', 'legendMore', 'robotLayer', 'robotAt'],
     ...['keys.global.12.0', 'keys.map.3.0', 'keys.time.1.0', 'keys.time.2.0', 'keys.time.3.0'],
+    'speciesNames.gerbera',
   ],
   es: [
     ...['robotLayer', 'robotAt', 'tried.ok', 'sensors', 'rangeAuto', 'saveCsvShort', 'fileName'],
-    ...['keys.global.12.0', 'idealParts.any', 'colourings.ideal'],
+    ...['speciesNames.gerbera', 'keys.global.12.0', 'idealParts.any', 'colourings.ideal'],
   ],
 };
 

@@ -62,7 +62,7 @@ test('each in words: what, where, now, at worst, since when; what is resolved un
   expect(active.textContent).toContain('first 6.6\u00a0°C');
   expect(fact(active, 'worst').textContent).toContain('worst 4.2\u00a0°C');
   expect(fact(active, 'worst').dataset['status']).toBe('critical');
-  expect(fact(active, 'now').textContent).toBe('now not known');
+  expect(fact(active, 'now').textContent).toBe('now unknown');
   const resolved = first('resolved');
   expect(resolved.textContent).toContain('Whole greenhouse: No tag is being scanned');
   expect(resolved.textContent).toContain('sim 00:01:40 until sim 00:02:40 (1\u00a0min)');
@@ -228,6 +228,6 @@ test('nothing makes itself heard unless it is wished, and what cannot says why',
   press('Notify me of alarms');
   const [sound, notify] = screen.getAllByRole<HTMLInputElement>('checkbox');
   expect([sound?.checked, notify?.checked, notify?.disabled]).toEqual([false, false, true]);
-  expect(screen.getByText(/https:\/\/ or with http:\/\/localhost/)).toBeTruthy();
+  expect(screen.getByText(/https:\/\/ or http:\/\/localhost/)).toBeTruthy();
   vi.unstubAllGlobals();
 });

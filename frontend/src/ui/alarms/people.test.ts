@@ -39,8 +39,8 @@ test('a shelf is taken over with who shelved, and goes with their word', () => {
 
 test('an operator at a bridge that writes no notes is not called a reader', () => {
   const anna = { can_sign_out: true, seconds_left: null, name: 'anna', can_write_notes: false };
-  expect(whoseWord({ ...anna, role: 'viewer' })).toContain('who only reads');
-  expect(whoseWord({ ...anna, role: 'operator' })).toContain('this bridge writes no notes');
+  expect(whoseWord({ ...anna, role: 'viewer' })).toContain('(viewer)');
+  expect(whoseWord({ ...anna, role: 'operator' })).toContain('this server stores no notes');
 });
 
 interface Asked {

@@ -6,16 +6,16 @@ import { counted } from './counted';
 export const ESTIMATE: In<typeof ENGLISH> = {
   about: 'Was ± bedeutet',
   aboutText:
-    'Neun von zehn geschätzten Werten sollten um höchstens das ± danebenliegen (90-%-Intervall). ' +
-    'Es hängt von Entfernung und Alter der Messwerte und von der Tageszeit ab: Je länger nicht ' +
+    'Neun von zehn geschätzten Werten sollten höchstens um das ± abweichen (90-%-Intervall). ' +
+    'Es hängt von Entfernung und Alter der Messwerte und von der Tageszeit ab. Je länger nicht ' +
     'gemessen wird, desto größer wird das ±.',
   onItsWay: 'Die Schätzung wird geladen',
-  noService: 'Dieser Zwilling schätzt nicht: Gezeigt werden die nächstgelegenen Messwerte',
-  noneNow: 'Zurzeit keine Schätzung: Gezeigt werden die nächstgelegenen Messwerte',
+  noService: 'Dieser Zwilling schätzt nicht: Angezeigt werden die nächstgelegenen Messwerte',
+  noneNow: 'Zurzeit keine Schätzung: Angezeigt werden die nächstgelegenen Messwerte',
   noModel: 'Noch keine Schätzung: Sie braucht zehn Messungen eines Sensors',
-  noSensor: 'Kein Messpunkt misst das, es gibt nichts zu schätzen',
+  noSensor: 'Kein Messpunkt misst diese Größe, daher gibt es keine Schätzung',
   unsure: (error) =>
-    `Schraffiert: kann um mehr als ±${error} danebenliegen, je dichter, desto mehr. Ohne Farbe: keine Daten`,
+    `Schraffiert: Der Fehler kann ±${error} übersteigen, je dichter, desto mehr. Ohne Farbe: keine Daten`,
   errorOf: (sensor) => `${sensor}: Unsicherheit der Schätzung`,
   foretold: (inside, scans) =>
     `${inside} von ${counted(scans, 'Messung', 'Messungen')} im vorhergesagten Bereich`,
@@ -37,8 +37,8 @@ export const ESTIMATE: In<typeof ENGLISH> = {
   advice: 'Wo ein weiterer Messpunkt helfen würde',
   advised: (place, percent, isFirst) =>
     isFirst
-      ? `${place}: Ein Messpunkt hier senkt den Fehler der ganzen Karte auf ${percent} des jetzigen`
-      : `${place}: Messpunkte hier und an allen Marken davor senken den Fehler der ganzen Karte auf ${percent} des jetzigen`,
+      ? `${place}: Ein Messpunkt hier senkt den Fehler der Karte auf ${percent} des heutigen`
+      : `${place}: Messpunkte hier und an allen Marken davor senken den Fehler der Karte auf ${percent} des heutigen`,
   adviceNone: 'Es ist keine Stelle bekannt, an der ein weiterer Messpunkt helfen würde',
   adviceFailed: (reason) => `Kein Vorschlag für einen weiteren Messpunkt: ${reason}`,
   adviceNow: 'Vorschläge für einen weiteren Messpunkt gibt es nur für jetzt',

@@ -37,7 +37,7 @@ export const HEALTH: In<typeof ENGLISH> = {
     },
     outOfRange: 'außerhalb des Bereichs',
     changed: (reading) => `${reading}: möglicher Sensorfehler`,
-    silent: 'Der Zwilling sendet nicht: Seine letzten Daten sagen nichts über jetzt',
+    silent: 'Keine Daten vom Zwilling: Die letzten Daten können veraltet sein',
     stopped:
       'Es wird kein Messpunkt mehr gemessen: Der Roboter steht, oder seine Daten kommen nicht an',
     other: (kind, sensor) => (sensor === '' ? kind : `${sensor}: ${kind}`),
@@ -69,37 +69,37 @@ export const HEALTH: In<typeof ENGLISH> = {
   healthSomeUnknown: (count) =>
     `${counted(count, 'Messpunkt lässt', 'Messpunkte lassen')} sich nicht beurteilen`,
   healthDay: (isDay, source) =>
-    `Es gelten die Bereiche für ${isDay ? 'den Tag' : 'die Nacht'}: ${source}`,
+    `Es gelten die ${isDay ? 'Tagesbereiche' : 'Nachtbereiche'}: ${source}`,
   healthDaySource: {
-    light: 'nach dem Licht im Gewächshaus',
+    light: 'nach dem im Gewächshaus gemessenen Licht',
     clock: 'nach der Uhr, da kein Licht gemessen wird',
     assumed: 'angenommen, da weder Licht noch Uhrzeit bekannt sind',
   },
-  idealParts: { any: 'ideal', day: 'ideal am Tag', night: 'ideal bei Nacht' },
+  idealParts: { any: 'ideal', day: 'ideal tagsüber', night: 'ideal nachts' },
   healthIdeal: (ideal, low, high, unit) => `${ideal} ${low} bis ${high} ${unit}`.trim(),
   healthAllWell: 'Alle beurteilten Messwerte liegen im Idealbereich',
   healthDespite: (alarms) =>
     alarms === 1
-      ? '1 Alarm steht noch an: Zwei gute Messungen beheben ihn'
-      : `${alarms} Alarme stehen noch an: Je zwei gute Messungen beheben sie`,
+      ? '1 Alarm steht noch an: Zwei gute Messungen heben ihn auf'
+      : `${alarms} Alarme stehen noch an: Je zwei gute Messungen heben sie auf`,
   healthNothing: 'Noch kein Messwert zu beurteilen',
-  healthFilter: ', nur diese Messpunkte zeigen',
-  houseRhythm: (interval) => `alle ${interval} ein Scan`,
-  houseLast: (age) => `letzter Scan vor ${age}`,
-  houseNever: 'noch kein Scan',
+  healthFilter: ', nur diese Messpunkte anzeigen',
+  houseRhythm: (interval) => `alle ${interval} eine Messung`,
+  houseLast: (age) => `letzte Messung vor ${age}`,
+  houseNever: 'noch keine Messung',
   houseOverdue: (count) =>
     count === 0
       ? 'kein Messpunkt überfällig'
       : counted(count, 'Messpunkt überfällig', 'Messpunkte überfällig'),
   tagChosen: (tag, health, row, rows) => `Messpunkt ${tag}, ${health}, ${row} von ${rows}`,
-  attention: 'Braucht Aufmerksamkeit',
-  attentionNone: 'Nichts braucht Aufmerksamkeit',
+  attention: 'Handlungsbedarf',
+  attentionNone: 'Kein Handlungsbedarf',
   attentionNoneKnown: (unknown) =>
-    `Soweit bekannt, braucht nichts Aufmerksamkeit; keine Daten für ${counted(unknown, 'Messpunkt', 'Messpunkte')}`,
+    `Soweit bekannt kein Handlungsbedarf; keine Daten von ${counted(unknown, 'Messpunkt', 'Messpunkten')}`,
   attentionMore: (count) => `+ ${count} weitere`,
 
-  tooLow: (by) => (by === null ? 'zu niedrig' : `zu niedrig um ${by}`),
-  tooHigh: (by) => (by === null ? 'zu hoch' : `zu hoch um ${by}`),
-  below: 'unter ideal',
-  above: 'über ideal',
+  tooLow: (by) => (by === null ? 'zu niedrig' : `um ${by} zu niedrig`),
+  tooHigh: (by) => (by === null ? 'zu hoch' : `um ${by} zu hoch`),
+  below: 'unter dem Ideal',
+  above: 'über dem Ideal',
 };

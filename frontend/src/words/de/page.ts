@@ -16,7 +16,7 @@ export const PAGE: In<typeof ENGLISH> = {
     `${name} konnte nicht geladen werden: Die Seite wird auf Englisch angezeigt.`,
   partsLate: 'Ein Teil der Seite ist nicht geladen.',
   partsLateHint:
-    'Karten, Listen und Zeitleiste erscheinen, sobald der Server antwortet. Die Seite versucht es weiter.',
+    'Details, Listen und Zeitleiste erscheinen, sobald der Server antwortet. Die Seite versucht es weiter.',
 
   phase: {
     connecting: 'Verbindet',
@@ -28,7 +28,7 @@ export const PAGE: In<typeof ENGLISH> = {
   phaseLabel: 'Verbindung',
   retryNow: 'Jetzt versuchen',
   nextTry: (seconds) => (seconds > 0 ? `nächster Versuch in ${seconds} s` : 'wird gerade versucht'),
-  frozenSince: (clock) => `Die Messwerte stehen still. Letzte Daten um ${clock}`,
+  frozenSince: (clock) => `Die Messwerte sind eingefroren. Letzte Daten um ${clock}`,
   agoSuffix: (age) => `vor ${age}`,
   frozenWhy: {
     stale: 'Die Verbindung besteht, aber es kommt nichts mehr an.',
@@ -55,7 +55,7 @@ export const PAGE: In<typeof ENGLISH> = {
     paused: '',
     no_clock: 'Der Zwilling läuft mit simulierter Zeit, und auf /clock kommt nichts.',
     clock_stopped: 'Der Zwilling läuft mit simulierter Zeit, und auf /clock kommt nichts mehr.',
-    clock_doubted: 'Sie zeigt eine Zeit vor der Aufzeichnung: bitte stellen.',
+    clock_doubted: 'Ihre Zeit liegt vor der Aufzeichnung. Bitte die Uhr stellen.',
     never_seen: 'Zwilling und Bridge müssen in derselben ROS-Domain laufen (ROS_DOMAIN_ID).',
     stale: 'Die Bridge läuft, aber auf /twin/state wird nichts mehr veröffentlicht.',
     thread_dead: 'Der ROS-Thread der Bridge ist beendet; warum, steht in ihrem Log.',
@@ -88,11 +88,11 @@ export const PAGE: In<typeof ENGLISH> = {
     },
     upgrading: {
       title: 'Die Aufzeichnung einer älteren Version wird umgestellt.',
-      hint: 'Neue Daten sind zu sehen und warten. Frühere Daten sind nach der Umstellung wieder da; das kann Minuten dauern.',
+      hint: 'Neue Daten werden angezeigt, aber noch nicht aufgezeichnet. Frühere Daten sind nach der Umstellung wieder da; das kann Minuten dauern.',
     },
     doubting: {
       title: 'Es wird nichts aufgezeichnet: Die Uhr widerspricht der Aufzeichnung.',
-      hint: 'Neue Daten sind zu sehen und warten. Sie werden aufgezeichnet, sobald die Uhr stimmt, spätestens nach zehn Minuten.',
+      hint: 'Neue Daten werden angezeigt, aber erst aufgezeichnet, wenn die Uhr stimmt, spätestens nach zehn Minuten.',
     },
     in_use: {
       title: 'Dieser Zwilling zeichnet nicht auf: Ein anderer nutzt seine Datei.',
@@ -122,7 +122,7 @@ export const PAGE: In<typeof ENGLISH> = {
   recordedPausedHint: 'Sie ist angehalten oder zu Ende; das Alter der Werte wächst nicht.',
   simulated: 'Simuliert.',
   simulatedHint: (until) =>
-    `Das hat kein Roboter gemessen: Die Demo beginnt mit simulierten Tagen bis ${until}.`,
+    `Nicht von einem Roboter gemessen: Die Demo beginnt mit simulierten Tagen bis ${until}.`,
   setAside: 'Eine beschädigte Aufzeichnung wurde in Quarantäne genommen.',
   setAsideHint: (name) =>
     `Lesbare Daten wurden übernommen, die Aufzeichnung läuft weiter. Die beschädigte Datei ist ${name}.`,
@@ -179,14 +179,14 @@ export const PAGE: In<typeof ENGLISH> = {
   helpGlobal: 'Überall',
   helpMap: 'Auf der Karte',
   helpTime: 'Auf der Zeitleiste',
-  helpToggle: 'Kürzel mit einer einzigen Taste',
+  helpToggle: 'Kürzel mit nur einer Taste',
   keys: {
     global: [
       ['1 – 9', 'Sensor wählen'],
       ['/', 'Tabelle filtern'],
-      ['F', 'Auf der Karte alles zeigen'],
+      ['F', 'Auf der Karte alles anzeigen'],
       ['N, P', 'Nächster und voriger Messpunkt'],
-      ['S', 'Farbkarte glätten'],
+      ['S', 'Heatmap glätten'],
       ['Y', 'Ebenen'],
       ['A', 'Alarme'],
       ['C', 'Verlauf des gewählten Messpunkts'],
@@ -204,9 +204,9 @@ export const PAGE: In<typeof ENGLISH> = {
       ['Ende', 'Live'],
     ],
     map: [
-      ['← ↑ ↓ →', 'Verschieben; mit Umschalt schneller'],
+      ['← ↑ ↓ →', 'Verschieben; schneller mit Umschalt'],
       ['+  −', 'Vergrößern, verkleinern'],
-      ['0', 'Alles zeigen'],
+      ['0', 'Alles anzeigen'],
       ['Eingabe', 'Nächstgelegenen Messpunkt öffnen'],
     ],
   },

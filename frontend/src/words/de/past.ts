@@ -7,13 +7,13 @@ export const PAST: In<typeof ENGLISH> = {
   past: 'Vergangenheit',
   pastTitle: (moment) => `${moment} (vergangen) · Lupin twin`,
   pastFetching: (moment) => `${moment} wird geladen`,
-  pastFetchingHint: 'Bis dahin wird nichts gezeigt.',
-  pastFailed: (moment) => `${moment} kann nicht gezeigt werden`,
+  pastFetchingHint: 'Bis dahin wird nichts angezeigt.',
+  pastFailed: (moment) => `${moment} kann nicht angezeigt werden`,
   pastNothing: (moment) => `Keine Daten für ${moment}`,
   pastReach: (from) => `Die Aufzeichnung beginnt ${from}.`,
   pastReachNothing: 'Noch ist nichts aufgezeichnet.',
   pastFault: (wanted) => `${wanted} konnte nicht geladen werden.`,
-  pastFaultShown: (shown, why) => `Gezeigt wird ${shown}; die Seite versucht es weiter. ${why}`,
+  pastFaultShown: (shown, why) => `Angezeigt wird ${shown}; die Seite versucht es weiter. ${why}`,
   phasePast: {
     connecting: 'Vergangen · verbindet',
     live: 'Vergangen',
@@ -28,7 +28,7 @@ export const PAST: In<typeof ENGLISH> = {
   meanwhileShow: (tag) => `Zurück zu live, zu Messpunkt ${tag}`,
 
   timebar: 'Zeitleiste',
-  timebarSlider: 'Gezeigte Zeit',
+  timebarSlider: 'Angezeigte Zeit',
   timebarLive: 'Live',
   timebarPeriod: 'Zeitraum',
   timebarPeriods: {
@@ -51,10 +51,10 @@ export const PAST: In<typeof ENGLISH> = {
   timebarMark: {
     scans: 'Balken nach oben: Messungen',
     failures: 'Balken nach unten: fehlgeschlagene Versuche',
-    pest: 'volles Dreieck: Schädling gesehen',
+    pest: 'gefülltes Dreieck: Schädling gesehen',
     cleared: 'leerer Ring: Schädling weg',
     silence: 'schraffiert: keine Messung versucht',
-    before: 'andersherum schraffiert: nicht aufgezeichnet oder nicht mehr gespeichert',
+    before: 'gegenläufig schraffiert: nicht aufgezeichnet oder nicht mehr gespeichert',
     run: 'gestrichelte Linie: Uhr neu gestartet',
   },
   timebarCounts: (scans, failures, seen, cleared) =>
@@ -65,7 +65,6 @@ export const PAST: In<typeof ENGLISH> = {
       ...(cleared > 0 ? [counted(cleared, 'Schädling weg', 'Schädlinge weg')] : []),
     ].join(', '),
   timebarOff: 'Keine Vergangenheit: Dieser Zwilling zeichnet nichts auf.',
-  timebarOffHint:
-    'Es gibt nichts zum Zurückblicken. Die Aufzeichnung wird beim Start des Zwillings eingeschaltet.',
+  timebarOffHint: 'Die Aufzeichnung wird beim Start des Zwillings eingeschaltet.',
   timebarFailed: (reason) => `Die Aufzeichnung konnte nicht gelesen werden: ${reason}`,
 };

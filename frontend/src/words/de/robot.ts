@@ -5,8 +5,8 @@ import type { In } from '../shape';
 export const ROBOT: In<typeof ENGLISH> = {
   robotLayer: 'Roboter',
   robotAt: (x, y) => `Roboter: ${x} m, ${y} m`,
-  robotNowhere: 'Roboter: Ort nicht bekannt',
-  robotAgeUnknown: 'Alter nicht bekannt',
+  robotNowhere: 'Roboter: Position unbekannt',
+  robotAgeUnknown: 'Alter unbekannt',
   robotBattery: (percent) => `Akku ${percent}`,
   robotReported: (percent, ago) => `Akku ${percent}, gemeldet ${ago}`,
 };

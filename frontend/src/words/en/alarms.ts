@@ -21,15 +21,13 @@ export const ALARMS = {
   /** Its value now, at worst, and when it was raised. */
   alarmNow: (reading: string): string => `now ${reading}`,
   alarmNowUnknown: (last: string | null, age: string | null): string =>
-    last === null
-      ? 'now not known'
-      : `now not known, last ${last}${age === null ? '' : ` ${age} ago`}`,
+    last === null ? 'now unknown' : `now unknown, last ${last}${age === null ? '' : ` ${age} ago`}`,
   /** Of a pest, in place of how many. */
   alarmPests: { none: 'none', seen: 'seen' },
   alarmWorst: (reading: string): string => `worst ${reading}`,
   alarmFirst: (reading: string): string => `first ${reading}`,
   alarmStatus: { critical: 'critical', healthy: 'in range' },
-  alarmShow: 'Show the tag as it is now',
+  alarmShow: 'Show this tag now',
   alarmStart: 'Go to start',
   alarmStartOf: (what: string): string => `Go to start: ${what}`,
   alarmAcknowledge: 'Acknowledge',
@@ -39,8 +37,8 @@ export const ALARMS = {
   alarmUnacknowledgeOf: (what: string): string => `Unacknowledge: ${what}`,
   alarmShelve: 'Shelve',
   alarmShelveOf: (what: string): string => `Shelve: ${what}`,
-  alarmShelveHint: 'You are not notified of it for a while, unless it gets worse.',
-  alarmShelveCritical: 'A critical alarm is shelved for 1 h at most, and with a reason.',
+  alarmShelveHint: 'No notification until the time is up, unless it gets worse.',
+  alarmShelveCritical: 'A critical alarm can be shelved for at most 1 h, and needs a reason.',
   alarmShelfReason: 'Reason',
   alarmShelfReasonOptional: 'Reason (optional)',
   alarmShelveMinutes: (minutes: number): string => `For ${minutes} min`,
@@ -60,7 +58,7 @@ export const ALARMS = {
   },
   /** Above a list whose order is held. */
   alarmsNew: (count: number): string => `${count} new`,
-  alarmsNewHint: 'The order is held while you are in the list. Show what is new',
+  alarmsNewHint: 'The order stays fixed while you use the list. Show new alarms',
   alarmMore: (count: number): string => `Show ${count} more`,
   alarmFilter: 'Filter alarms',
   alarmFilterHint: 'tag, cause …',
@@ -73,13 +71,12 @@ export const ALARMS = {
     `${tags.length === 1 ? 'Tag' : 'Tags'} ${tags.join(', ')}${more > 0 ? ` and ${more} more` : ''}`,
   alarmsNone: 'No alarm is active',
   alarmsNoneHint:
-    'An alarm is raised when something is wrong in two scans in a row. A pest, or a silent greenhouse, raises one at once.',
-  alarmsNotYet: 'It is not known yet whether there are alarms',
-  alarmsStarting: 'The past is still being read: more alarms may follow.',
+    'An alarm is raised after two bad scans in a row. A pest, or missing data from the greenhouse, raises one at once.',
+  alarmsNotYet: 'Waiting for the list of alarms',
+  alarmsStarting: 'Recorded data is still being read: more alarms may follow.',
   alarmsHeard: (since: string): string =>
-    `Nothing is recorded: alarms from before ${since} are not known.`,
-  alarmsLost: (clock: string): string =>
-    `As last received at ${clock}. What has happened since is not known.`,
+    `Nothing is recorded, so alarms before ${since} are unknown.`,
+  alarmsLost: (clock: string): string => `As last received at ${clock}. Later events are unknown.`,
   alarmsOfNow: (moment: string): string =>
     `These are the current alarms. The rest of the page shows ${moment}.`,
   alarmsMine: '“Acknowledged” and “shelved” apply in this browser only.',
@@ -87,15 +84,15 @@ export const ALARMS = {
   alarmTell: 'Notify me of alarms',
   alarmSound: 'Sound',
   alarmSoundHint: 'A short sound for new alarms, at most one in 10 s.',
-  alarmSoundWaits: 'The browser plays it after your first click on this page.',
-  alarmSoundNone: 'This browser cannot play it.',
+  alarmSoundWaits: 'The browser allows sound after your first click on this page.',
+  alarmSoundNone: 'This browser cannot play sound.',
   alarmNotify: 'Notification',
   alarmNotifyHint: 'The browser notifies you of new alarms while you look at something else.',
   alarmNotifyInsecure:
-    'Browsers allow it only where the page’s address begins with https:// or with http://localhost.',
+    'Browsers allow this only on addresses that begin with https:// or http://localhost.',
   alarmNotifyRefused:
-    'This browser refuses. Allow notifications for this page in the browser’s settings.',
-  alarmNotifyNone: 'This browser cannot do that.',
+    'This browser blocks notifications. Allow them for this page in its settings.',
+  alarmNotifyNone: 'This browser does not support notifications.',
   alarmNotifyTitle: (count: number): string => counted(count, 'new alarm', 'new alarms'),
 
   /** To hear, and while another moment is looked at. */

@@ -26,7 +26,7 @@ export const CHARTS = {
   chartMissingMore:
     'Start the twin without “journal:=off”, or name a file in the parameter “journal”.',
   chartMissingShort: 'No chart: this twin records nothing.',
-  chartNoTime: 'The twin has no time yet, and so no past.',
+  chartNoTime: 'The twin has no time yet, so there is no past to show.',
   chartNoSensors: 'This tag has no sensor.',
   chartTable: 'Show as table',
   chartPlots: 'Show as charts',

@@ -5,15 +5,15 @@ export const ESTIMATE = {
   about: 'What ± means',
   aboutText:
     'Nine of ten estimated values should be off by no more than the ± (a 90 % interval). It ' +
-    'depends on how far away and how old the readings are, and on the time of day: the longer ' +
-    'nothing is measured, the larger the ±.',
+    'depends on the distance and age of the readings, and on the time of day. The longer nothing ' +
+    'is measured, the larger the ±.',
   onItsWay: 'Loading the estimate',
   noService: 'This twin makes no estimate: the nearest readings are shown',
   noneNow: 'No estimate at the moment: the nearest readings are shown',
   noModel: 'No estimate yet: it needs ten scans of a sensor',
   noSensor: 'No tag measures this, so there is nothing to estimate',
   unsure: (error: string): string =>
-    `Hatched: may be off by more than ±${error}, the denser the more. No colour: no data`,
+    `Hatched: the error may exceed ±${error}; the denser, the more. No colour: no data`,
   /** Beside the colours of the error. */
   errorOf: (sensor: string): string => `${sensor}: uncertainty of the estimate`,
   foretold: (inside: number, scans: number): string =>
@@ -35,9 +35,9 @@ export const ESTIMATE = {
   advice: 'Where another tag would help',
   advised: (place: string, percent: string, isFirst: boolean): string =>
     isFirst
-      ? `${place}: a tag here reduces the error of the whole map to ${percent} of the present`
-      : `${place}: tags here and at each mark before it reduce the error of the whole map to ${percent} of the present`,
+      ? `${place}: a tag here reduces the error of the map to ${percent} of what it is now`
+      : `${place}: tags here and at all marks before it reduce the error of the map to ${percent} of what it is now`,
   adviceNone: 'No place is known where another tag would help',
   adviceFailed: (reason: string): string => `No suggestion for another tag: ${reason}`,
-  adviceNow: 'Suggestions for another tag are for now only',
+  adviceNow: 'Suggestions for another tag are shown for the present only',
 } as const;

@@ -28,7 +28,7 @@ export const HEALTH = {
           ? 'No scan with a known time'
           : 'no reading with a known time'
         : age === null
-          ? `${sensor === '' ? 'Not' : 'not'} scanned lately`
+          ? `${sensor === '' ? 'Not' : 'not'} scanned recently`
           : sensor === ''
             ? `Not scanned for ${age}`
             : `no reading for ${age}`;
@@ -36,7 +36,7 @@ export const HEALTH = {
     },
     outOfRange: 'out of range',
     changed: (reading: string): string => `${reading}: possible sensor fault`,
-    silent: 'The twin is silent: its last data says nothing about now',
+    silent: 'No data from the twin: its last data may be out of date',
     stopped: 'No tag is being scanned: the robot has stopped, or its data is lost',
     other: (kind: string, sensor: string): string => (sensor === '' ? kind : `${sensor}: ${kind}`),
   },
@@ -68,9 +68,9 @@ export const HEALTH = {
   healthSomeUnknown: (count: number): string =>
     `${counted(count, 'tag', 'tags')} cannot be assessed`,
   healthDay: (isDay: boolean, source: string): string =>
-    `The ranges for the ${isDay ? 'day' : 'night'} apply: ${source}`,
+    `${isDay ? 'Day' : 'Night'} ranges apply: ${source}`,
   healthDaySource: {
-    light: 'by the light in the greenhouse',
+    light: 'by the light measured in the greenhouse',
     clock: 'by the clock, as no light is measured',
     assumed: 'assumed, as neither light nor time is known',
   },
@@ -96,7 +96,7 @@ export const HEALTH = {
   attention: 'Needs attention',
   attentionNone: 'Nothing needs attention',
   attentionNoneKnown: (unknown: number): string =>
-    `Nothing known needs attention; no data for ${counted(unknown, 'tag', 'tags')}`,
+    `No known problem; no data for ${counted(unknown, 'tag', 'tags')}`,
   attentionMore: (count: number): string => `+ ${count} more`,
 
   tooLow: (by: string | null): string => (by === null ? 'too low' : `too low by ${by}`),

@@ -15,7 +15,7 @@ export const MAP = {
   layers: {
     map: 'Floor plan',
     field: 'Heat map',
-    unknown: 'Where there is no data',
+    unknown: 'Areas without data',
     smooth: 'Smooth heat map',
     grid: 'Metre grid',
     boxes: 'Planter boxes',
@@ -37,14 +37,14 @@ export const MAP = {
   legendNoTags: 'No tag contributes',
   legendError: (error: string): string => `Typical error ${error}`,
   legendErrorHint:
-    'How far the heat map is typically off between tags: each tag is estimated from all others and compared with its own reading.',
+    'Typical error between tags: each tag is estimated from all the others and compared with its own reading.',
   legendErrorWorst: (tag: string, error: string): string => `Worst at tag ${tag}: ${error}.`,
   legendTransparent: 'Stronger colour: higher value. No colour: minimum. Hatched: no data',
   legendMore: 'Details',
   legendHatched: 'Hatched: no data',
   legendOld: 'Faint and hatched: readings too old',
   readoutOld: 'readings too old',
-  heat: 'Heat map made of',
+  heat: 'Heat map shows',
   heats: { nearest: 'Nearest readings', estimate: 'Estimate', error: 'Uncertainty' },
   partMissing: 'This part of the page could not be loaded. Reload the page.',
   colouring: 'Colours by',
@@ -84,6 +84,6 @@ export const MAP = {
   differenceFailed: (reason: string): string => `No difference: ${reason}`,
   differenceTimes: (at: string, against: string): string => `${at} minus ${against}`,
   differenceSinceYesterday: (clock: string): string => `since yesterday ${clock}`,
-  differenceSinceWeek: (clock: string): string => `since a week ago, ${clock}`,
+  differenceSinceWeek: (clock: string): string => `since ${clock} a week ago`,
   differenceSince: (moment: string): string => `since ${moment}`,
 } as const;

@@ -52,7 +52,7 @@ export const PAGE = {
     paused: '',
     no_clock: 'The twin uses simulated time, but nothing is published on /clock.',
     clock_stopped: 'The twin uses simulated time, but /clock has stopped.',
-    clock_doubted: 'It is earlier than the recording: set the clock.',
+    clock_doubted: 'Its time is earlier than the recording. Set the clock.',
     never_seen: 'Twin and bridge must use the same ROS domain (ROS_DOMAIN_ID).',
     stale: 'The bridge is running, but nothing is published on /twin/state.',
     thread_dead: 'The bridge’s ROS thread has ended; its log says why.',
@@ -86,11 +86,11 @@ export const PAGE = {
     },
     upgrading: {
       title: 'The recording of an older version is being upgraded.',
-      hint: 'New data is shown and waits. Earlier data returns when the upgrade is done, which may take minutes.',
+      hint: 'New data is shown but not yet recorded. Earlier data returns after the upgrade, which may take minutes.',
     },
     doubting: {
       title: 'Nothing is being recorded: the clock contradicts the recording.',
-      hint: 'New data is shown and waits. It is recorded when the clock is right, or after ten minutes as it is.',
+      hint: 'New data is shown but not yet recorded. Recording resumes when the clock is correct, or after ten minutes.',
     },
     in_use: {
       title: 'This twin is not recording: another twin uses its file.',
@@ -121,7 +121,7 @@ export const PAGE = {
   recordedPausedHint: 'It is paused or has ended, so ages do not increase.',
   simulated: 'Simulated.',
   simulatedHint: (until: string): string =>
-    `No robot observed this: the demo starts with simulated days, up to ${until}.`,
+    `Not measured by a robot: the demo starts with simulated days, up to ${until}.`,
   setAside: 'A damaged recording was quarantined.',
   setAsideHint: (name: string): string =>
     `Readable data was kept, and recording continues. The damaged file is ${name}.`,
@@ -192,13 +192,13 @@ export const PAGE = {
       ['?', 'This list'],
     ],
     time: [
-      ['← →', 'A step back or on; with Shift ten'],
+      ['← →', 'One step back or forward; with Shift ten'],
       ['Page ↑ ↓', 'A tenth of the bar'],
-      ['Home', 'The beginning'],
+      ['Home', 'Start of the bar'],
       ['End', 'Live'],
     ],
     map: [
-      ['← ↑ ↓ →', 'Move; with Shift faster'],
+      ['← ↑ ↓ →', 'Move; faster with Shift'],
       ['+  −', 'Zoom'],
       ['0', 'Show everything'],
       ['Enter', 'Open the nearest tag'],

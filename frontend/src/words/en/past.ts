@@ -48,12 +48,12 @@ export const PAST = {
   timebarSpeeds: (speed: number): string => `${speed}×`,
   timebarMarks: 'What the marks mean',
   timebarMark: {
-    scans: 'bar up: scans',
-    failures: 'bar down: failed attempts',
+    scans: 'upward bar: scans',
+    failures: 'downward bar: failed attempts',
     pest: 'solid triangle: pest seen',
     cleared: 'open ring: pest gone',
     silence: 'hatched: no scan attempted',
-    before: 'hatched the other way: not recorded, or no longer stored',
+    before: 'reverse hatching: not recorded, or no longer stored',
     run: 'dashed line: clock restarted',
   },
   timebarCounts: (scans: number, failures: number, seen: number, cleared: number): string =>
@@ -64,7 +64,6 @@ export const PAST = {
       ...(cleared > 0 ? [counted(cleared, 'pest gone', 'pests gone')] : []),
     ].join(', '),
   timebarOff: 'No past: this twin records nothing.',
-  timebarOffHint:
-    'There is nothing to look back at. Recording is turned on where the twin is started.',
+  timebarOffHint: 'Recording is turned on when the twin is started.',
   timebarFailed: (reason: string): string => `The recorded past could not be loaded: ${reason}`,
 } as const;

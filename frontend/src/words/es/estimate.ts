@@ -8,14 +8,14 @@ export const ESTIMATE: In<typeof ENGLISH> = {
   aboutText:
     'Nueve de cada diez valores estimados deberían desviarse como mucho lo que dice el ± ' +
     '(intervalo del 90 %). Depende de la distancia y la antigüedad de las lecturas y de la hora ' +
-    'del día: cuanto más tiempo sin medir, mayor es el ±.',
+    'del día. Cuanto más tiempo sin medir, mayor es el ±.',
   onItsWay: 'Cargando la estimación',
   noService: 'Este gemelo no hace estimaciones: se muestran las lecturas más cercanas',
   noneNow: 'Ahora no hay estimación: se muestran las lecturas más cercanas',
   noModel: 'Aún no hay estimación: necesita diez mediciones de un sensor',
   noSensor: 'Ningún punto mide esto, así que no hay nada que estimar',
   unsure: (error) =>
-    `Rayado: puede desviarse más de ±${error}; cuanto más denso, más. Sin color: sin datos`,
+    `Rayado: el error puede superar ±${error}; cuanto más denso, mayor. Sin color: sin datos`,
   errorOf: (sensor) => `${sensor}: incertidumbre de la estimación`,
   foretold: (inside, scans) =>
     `${inside} de ${counted(scans, 'medición', 'mediciones')} dentro del rango previsto`,
@@ -35,9 +35,9 @@ export const ESTIMATE: In<typeof ENGLISH> = {
   advice: 'Dónde ayudaría otro punto',
   advised: (place, percent, isFirst) =>
     isFirst
-      ? `${place}: un punto aquí reduce el error de todo el mapa al ${percent} del actual`
-      : `${place}: puntos aquí y en cada marca anterior reducen el error de todo el mapa al ${percent} del actual`,
+      ? `${place}: un punto aquí reduce el error del mapa al ${percent} del actual`
+      : `${place}: puntos aquí y en cada marca anterior reducen el error del mapa al ${percent} del actual`,
   adviceNone: 'No se conoce ningún lugar donde ayudaría otro punto',
   adviceFailed: (reason) => `Sin propuesta para otro punto: ${reason}`,
-  adviceNow: 'Solo hay propuestas para ahora',
+  adviceNow: 'Las propuestas para otro punto se muestran solo para el presente',
 };

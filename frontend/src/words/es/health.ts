@@ -37,7 +37,7 @@ export const HEALTH: In<typeof ENGLISH> = {
     },
     outOfRange: 'fuera de su rango',
     changed: (reading) => `${reading}: posible fallo del sensor`,
-    silent: 'El gemelo no envía nada: sus últimos datos no dicen nada de ahora',
+    silent: 'Sin datos del gemelo: los últimos pueden estar desactualizados',
     stopped: 'No se mide ningún punto: el robot se ha parado o no llegan sus datos',
     other: (kind, sensor) => (sensor === '' ? kind : `${sensor}: ${kind}`),
   },
@@ -67,12 +67,12 @@ export const HEALTH: In<typeof ENGLISH> = {
   reasonsLabel: 'Por qué',
   healthHeading: 'Estado del invernadero',
   healthDriver: (tag, reason) => `Punto ${tag}: ${reason}`,
-  healthMostUnknown: 'De más de la mitad de los puntos no se sabe nada',
+  healthMostUnknown: 'Más de la mitad de los puntos es desconocida',
   healthSomeUnknown: (count) => `No se puede evaluar ${counted(count, 'punto', 'puntos')}`,
   healthDay: (isDay, source) =>
     `Se aplican los rangos ${isDay ? 'del día' : 'de la noche'}: ${source}`,
   healthDaySource: {
-    light: 'según la luz del invernadero',
+    light: 'según la luz medida en el invernadero',
     clock: 'según el reloj, pues no se mide la luz',
     assumed: 'se supone, pues no se conocen ni la luz ni la hora',
   },
@@ -96,11 +96,11 @@ export const HEALTH: In<typeof ENGLISH> = {
   attention: 'Requiere atención',
   attentionNone: 'Nada requiere atención',
   attentionNoneKnown: (unknown) =>
-    `Que se sepa, nada requiere atención; sin datos de ${counted(unknown, 'punto', 'puntos')}`,
+    `Sin problemas conocidos; sin datos de ${counted(unknown, 'punto', 'puntos')}`,
   attentionMore: (count) => `+ ${count} más`,
 
-  tooLow: (by) => (by === null ? 'demasiado bajo' : `demasiado bajo por ${by}`),
-  tooHigh: (by) => (by === null ? 'demasiado alto' : `demasiado alto por ${by}`),
+  tooLow: (by) => (by === null ? 'demasiado bajo' : `${by} por debajo del ideal`),
+  tooHigh: (by) => (by === null ? 'demasiado alto' : `${by} por encima del ideal`),
   below: 'bajo el ideal',
   above: 'sobre el ideal',
 };

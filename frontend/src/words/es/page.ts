@@ -51,7 +51,7 @@ export const PAGE: In<typeof ENGLISH> = {
     paused: '',
     no_clock: 'El gemelo funciona con tiempo simulado y no llega nada por /clock.',
     clock_stopped: 'El gemelo funciona con tiempo simulado y ya no llega nada por /clock.',
-    clock_doubted: 'Marca una hora anterior a lo registrado: póngalo en hora.',
+    clock_doubted: 'Su hora es anterior al registro. Póngalo en hora.',
     never_seen:
       'El gemelo y el puente («bridge») deben estar en el mismo dominio de ROS (ROS_DOMAIN_ID).',
     stale: 'El puente («bridge») funciona, pero ya no se publica nada en /twin/state.',
@@ -85,11 +85,11 @@ export const PAGE: In<typeof ENGLISH> = {
     },
     upgrading: {
       title: 'El registro de una versión anterior se está actualizando.',
-      hint: 'Los datos nuevos se muestran y esperan. Los anteriores vuelven al terminar; puede tardar minutos.',
+      hint: 'Los datos nuevos se muestran, pero aún no se registran. Los anteriores vuelven al terminar; puede tardar minutos.',
     },
     doubting: {
       title: 'No se registra nada: el reloj contradice al registro.',
-      hint: 'Los datos nuevos se muestran y esperan. Se registran cuando el reloj esté en hora o, como tarde, a los diez minutos.',
+      hint: 'Los datos nuevos se muestran y se registrarán cuando el reloj esté en hora o, como tarde, a los diez minutos.',
     },
     in_use: {
       title: 'Este gemelo no registra: otro usa su archivo.',
@@ -119,7 +119,7 @@ export const PAGE: In<typeof ENGLISH> = {
   recordedPausedHint: 'Está en pausa o ha terminado; la antigüedad no aumenta.',
   simulated: 'Simulado.',
   simulatedHint: (until) =>
-    `Ningún robot ha medido esto: la demostración empieza con días simulados, hasta ${until}.`,
+    `No lo ha medido un robot: la demostración empieza con días simulados, hasta ${until}.`,
   setAside: 'Se ha puesto en cuarentena un registro dañado.',
   setAsideHint: (name) =>
     `Se han conservado los datos legibles y el registro continúa. El archivo dañado es ${name}.`,
@@ -180,7 +180,7 @@ export const PAGE: In<typeof ENGLISH> = {
       ['/', 'Filtrar la tabla'],
       ['F', 'Mostrar todo en el mapa'],
       ['N, P', 'Punto siguiente y anterior'],
-      ['S', 'Suavizar el mapa de color'],
+      ['S', 'Suavizar el mapa de calor'],
       ['Y', 'Capas'],
       ['A', 'Alarmas'],
       ['C', 'Gráficas del punto elegido'],
@@ -198,7 +198,7 @@ export const PAGE: In<typeof ENGLISH> = {
       ['Fin', 'En directo'],
     ],
     map: [
-      ['← ↑ ↓ →', 'Mover; con Mayús, más deprisa'],
+      ['← ↑ ↓ →', 'Mover; más deprisa con Mayús'],
       ['+  −', 'Acercar y alejar'],
       ['0', 'Mostrar todo'],
       ['Intro', 'Abrir el punto más cercano'],

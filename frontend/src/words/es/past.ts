@@ -65,6 +65,6 @@ export const PAST: In<typeof ENGLISH> = {
       ...(cleared > 0 ? [counted(cleared, 'plaga desaparecida', 'plagas desaparecidas')] : []),
     ].join(', '),
   timebarOff: 'Sin pasado: este gemelo no registra nada.',
-  timebarOffHint: 'No hay pasado que mirar. El registro se activa donde se inicia el gemelo.',
+  timebarOffHint: 'El registro se activa al iniciar el gemelo.',
   timebarFailed: (reason) => `No se pudo cargar el registro: ${reason}`,
 };

@@ -6,16 +6,16 @@ import { counted } from './counted';
 export const ESTIMATE: In<typeof ENGLISH> = {
   about: 'Wat ± betekent',
   aboutText:
-    'Negen van de tien geschatte waarden horen er hoogstens de ± naast te zitten (een ' +
-    '90%-interval). Die hangt af van afstand en ouderdom van de metingen en van het tijdstip: hoe ' +
-    'langer er niet wordt gemeten, hoe groter de ±.',
+    'Negen van de tien geschatte waarden moeten binnen de ± liggen (een 90%-interval). Die hangt af ' +
+    'van de afstand en ouderdom van de metingen en van het tijdstip. Hoe langer er niet wordt ' +
+    'gemeten, hoe groter de ±.',
   onItsWay: 'De schatting wordt geladen',
   noService: 'Deze tweeling maakt geen schatting: getoond worden de dichtstbijzijnde waarden',
   noneNow: 'Er is nu geen schatting: getoond worden de dichtstbijzijnde waarden',
   noModel: 'Nog geen schatting: er zijn tien metingen van een sensor nodig',
-  noSensor: 'Geen meetpunt meet dit, er valt niets te schatten',
+  noSensor: 'Geen meetpunt meet dit, dus er is geen schatting',
   unsure: (error) =>
-    `Gearceerd: kan er meer dan ±${error} naast zitten, hoe dichter hoe meer. Geen kleur: geen gegevens`,
+    `Gearceerd: de fout kan groter zijn dan ±${error}; hoe dichter, hoe groter. Geen kleur: geen gegevens`,
   errorOf: (sensor) => `${sensor}: onzekerheid van de schatting`,
   foretold: (inside, scans) =>
     `${inside} van ${counted(scans, 'meting', 'metingen')} binnen het voorspelde bereik`,
@@ -26,7 +26,7 @@ export const ESTIMATE: In<typeof ENGLISH> = {
     `laatste week: ${inside} van ${counted(scans, 'meting', 'metingen')}`,
   fitProblem: (reason) => `Het model past niet goed bij deze kas: ${reason}`,
   notTrusted: (count) =>
-    `Foutmarge te smal: maar ${count} van de 10 metingen lagen erbinnen, geen 9.`,
+    `Foutmarge te smal: slechts ${count} van de 10 metingen lagen erbinnen, geen 9.`,
   near: (count) =>
     count === 0
       ? 'geen meetpunt in de buurt'
@@ -37,9 +37,9 @@ export const ESTIMATE: In<typeof ENGLISH> = {
   advice: 'Waar nog een meetpunt helpt',
   advised: (place, percent, isFirst) =>
     isFirst
-      ? `${place}: een meetpunt hier verlaagt de fout van de hele kaart tot ${percent} van nu`
-      : `${place}: meetpunten hier en bij elke markering ervoor verlagen de fout van de hele kaart tot ${percent} van nu`,
+      ? `${place}: een meetpunt hier verlaagt de fout van de kaart tot ${percent} van de huidige`
+      : `${place}: meetpunten hier en bij elke markering ervoor verlagen de fout van de kaart tot ${percent} van de huidige`,
   adviceNone: 'Er is geen plek bekend waar nog een meetpunt helpt',
   adviceFailed: (reason) => `Geen voorstel voor nog een meetpunt: ${reason}`,
-  adviceNow: 'Voorstellen voor nog een meetpunt zijn er alleen voor nu',
+  adviceNow: 'Voorstellen voor nog een meetpunt worden alleen voor het heden getoond',
 };

@@ -37,7 +37,7 @@ export const HEALTH: In<typeof ENGLISH> = {
     },
     outOfRange: 'buiten het bereik',
     changed: (reading) => `${reading}: mogelijke sensorfout`,
-    silent: 'De tweeling stuurt niets: de laatste gegevens zeggen niets over nu',
+    silent: 'Geen gegevens van de tweeling: de laatste gegevens kunnen verouderd zijn',
     stopped:
       'Er wordt geen meetpunt meer gemeten: de robot staat stil, of zijn gegevens komen niet aan',
     other: (kind, sensor) => (sensor === '' ? kind : `${sensor}: ${kind}`),
@@ -68,10 +68,11 @@ export const HEALTH: In<typeof ENGLISH> = {
   healthMostUnknown: 'Van meer dan de helft van de meetpunten is niets bekend',
   healthSomeUnknown: (count) =>
     `${counted(count, 'meetpunt is', 'meetpunten zijn')} niet te beoordelen`,
-  healthDay: (isDay, source) => `Het bereik voor ${isDay ? 'de dag' : 'de nacht'} geldt: ${source}`,
+  healthDay: (isDay, source) =>
+    `Het bereik voor ${isDay ? 'overdag' : '’s nachts'} geldt: ${source}`,
   healthDaySource: {
-    light: 'naar het licht in de kas',
-    clock: 'naar de klok, want er wordt geen licht gemeten',
+    light: 'op basis van het gemeten licht in de kas',
+    clock: 'op basis van de klok, want er wordt geen licht gemeten',
     assumed: 'aangenomen, want licht en tijd zijn onbekend',
   },
   idealParts: { any: 'ideaal', day: 'ideaal overdag', night: 'ideaal ’s nachts' },
@@ -83,9 +84,9 @@ export const HEALTH: In<typeof ENGLISH> = {
       : `${alarms} alarmen zijn nog actief: telkens twee goede metingen lossen ze op`,
   healthNothing: 'Nog geen meetwaarde om te beoordelen',
   healthFilter: ', alleen deze meetpunten tonen',
-  houseRhythm: (interval) => `elke ${interval} een scan`,
-  houseLast: (age) => `laatste scan ${age} geleden`,
-  houseNever: 'nog geen scan',
+  houseRhythm: (interval) => `elke ${interval} een meting`,
+  houseLast: (age) => `laatste meting ${age} geleden`,
+  houseNever: 'nog geen meting',
   houseOverdue: (count) =>
     count === 0
       ? 'geen meetpunt te laat'
@@ -94,11 +95,11 @@ export const HEALTH: In<typeof ENGLISH> = {
   attention: 'Vraagt aandacht',
   attentionNone: 'Niets vraagt aandacht',
   attentionNoneKnown: (unknown) =>
-    `Voor zover bekend vraagt niets aandacht; geen gegevens van ${counted(unknown, 'meetpunt', 'meetpunten')}`,
+    `Geen bekende problemen; geen gegevens van ${counted(unknown, 'meetpunt', 'meetpunten')}`,
   attentionMore: (count) => `+ nog ${count}`,
 
-  tooLow: (by) => (by === null ? 'te laag' : `te laag met ${by}`),
-  tooHigh: (by) => (by === null ? 'te hoog' : `te hoog met ${by}`),
+  tooLow: (by) => (by === null ? 'te laag' : `${by} te laag`),
+  tooHigh: (by) => (by === null ? 'te hoog' : `${by} te hoog`),
   below: 'onder ideaal',
   above: 'boven ideaal',
 };

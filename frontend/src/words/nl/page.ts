@@ -16,7 +16,7 @@ export const PAGE: In<typeof ENGLISH> = {
     `${name} kon niet worden geladen: de pagina wordt in het Engels getoond.`,
   partsLate: 'Een deel van de pagina is niet geladen.',
   partsLateHint:
-    'Kaarten, lijsten en de tijdbalk verschijnen zodra de server antwoordt. De pagina blijft het proberen.',
+    'Details, lijsten en de tijdbalk verschijnen zodra de server antwoordt. De pagina blijft het proberen.',
 
   phase: {
     connecting: 'Verbinden',
@@ -28,7 +28,7 @@ export const PAGE: In<typeof ENGLISH> = {
   phaseLabel: 'Verbinding',
   retryNow: 'Nu proberen',
   nextTry: (seconds) => (seconds > 0 ? `volgende poging over ${seconds} s` : 'wordt nu geprobeerd'),
-  frozenSince: (clock) => `De meetwaarden staan stil. Laatste gegevens om ${clock}`,
+  frozenSince: (clock) => `De meetwaarden zijn bevroren. Laatste gegevens om ${clock}`,
   agoSuffix: (age) => `${age} geleden`,
   frozenWhy: {
     stale: 'De verbinding is er, maar er komen geen gegevens binnen.',
@@ -57,7 +57,7 @@ export const PAGE: In<typeof ENGLISH> = {
     paused: '',
     no_clock: 'De tweeling draait op gesimuleerde tijd, en op /clock komt niets binnen.',
     clock_stopped: 'De tweeling draait op gesimuleerde tijd, en op /clock komt niets meer binnen.',
-    clock_doubted: 'Hij wijst een tijd van vóór de opname aan: zet hem goed.',
+    clock_doubted: 'De tijd ligt vóór de vastgelegde gegevens. Zet de klok goed.',
     never_seen: 'Tweeling en bridge moeten in hetzelfde ROS-domein draaien (ROS_DOMAIN_ID).',
     stale: 'De bridge draait, maar op /twin/state wordt niets meer gepubliceerd.',
     thread_dead: 'De ROS-thread van de bridge is gestopt; zijn log zegt waarom.',
@@ -66,14 +66,14 @@ export const PAGE: In<typeof ENGLISH> = {
 
   unread: (count) =>
     count === 1
-      ? 'Een bericht van de server was onleesbaar en is weggegooid.'
-      : `${count} berichten van de server waren onleesbaar en zijn weggegooid.`,
+      ? 'Een bericht van de server was onleesbaar en is genegeerd.'
+      : `${count} berichten van de server waren onleesbaar en zijn genegeerd.`,
   unreadLast: (why) => `Het laatste: ${why}`,
   paused: 'De tijd staat stil.',
   pausedHint: 'De simulatie of opname is gepauzeerd; de ouderdom loopt niet op.',
   inputProblem: 'Niet alle gegevens komen hier aan.',
   drops: (count) =>
-    `De tweeling heeft de afgelopen minuten ${counted(count, 'bericht', 'berichten')} weggegooid.`,
+    `De tweeling heeft de afgelopen minuten ${counted(count, 'bericht', 'berichten')} genegeerd.`,
   dropsLast: (message) => `Het laatste: ${message}`,
   journal: {
     off: {
@@ -90,11 +90,11 @@ export const PAGE: In<typeof ENGLISH> = {
     },
     upgrading: {
       title: 'De opname van een oudere versie wordt omgezet.',
-      hint: 'Nieuwe gegevens zijn te zien en wachten. Eerdere gegevens zijn er weer na het omzetten; dat kan minuten duren.',
+      hint: 'Nieuwe gegevens worden getoond, maar nog niet vastgelegd. Eerdere gegevens zijn er weer na het omzetten; dat kan minuten duren.',
     },
     doubting: {
       title: 'Er wordt niets vastgelegd: de klok spreekt de opname tegen.',
-      hint: 'Nieuwe gegevens zijn te zien en wachten. Ze worden vastgelegd zodra de klok klopt, uiterlijk na tien minuten.',
+      hint: 'Nieuwe gegevens worden getoond en vastgelegd zodra de klok klopt, uiterlijk na tien minuten.',
     },
     in_use: {
       title: 'Deze tweeling legt niets vast: een andere gebruikt zijn bestand.',
@@ -124,7 +124,7 @@ export const PAGE: In<typeof ENGLISH> = {
   recordedPausedHint: 'Ze is gepauzeerd of afgelopen; de ouderdom loopt niet op.',
   simulated: 'Gesimuleerd.',
   simulatedHint: (until) =>
-    `Geen robot heeft dit gemeten: de demo begint met gesimuleerde dagen, tot ${until}.`,
+    `Niet door een robot gemeten: de demo begint met gesimuleerde dagen, tot ${until}.`,
   setAside: 'Een beschadigde opname is in quarantaine gezet.',
   setAsideHint: (name) =>
     `Leesbare gegevens zijn bewaard en het vastleggen gaat door. Het beschadigde bestand is ${name}.`,
@@ -185,7 +185,7 @@ export const PAGE: In<typeof ENGLISH> = {
       ['/', 'De tabel filteren'],
       ['F', 'Alles tonen op de kaart'],
       ['N, P', 'Volgend en vorig meetpunt'],
-      ['S', 'Kleurenkaart vloeiend'],
+      ['S', 'Heatmap vloeiend'],
       ['Y', 'Lagen'],
       ['A', 'Alarmen'],
       ['C', 'Grafieken van het gekozen meetpunt'],
@@ -203,7 +203,7 @@ export const PAGE: In<typeof ENGLISH> = {
       ['End', 'Live'],
     ],
     map: [
-      ['← ↑ ↓ →', 'Verschuiven; met Shift sneller'],
+      ['← ↑ ↓ →', 'Verschuiven; sneller met Shift'],
       ['+  −', 'In- en uitzoomen'],
       ['0', 'Alles tonen'],
       ['Enter', 'Dichtstbijzijnd meetpunt openen'],

@@ -51,10 +51,10 @@ export const PAST: In<typeof ENGLISH> = {
   timebarMark: {
     scans: 'balk omhoog: metingen',
     failures: 'balk omlaag: mislukte pogingen',
-    pest: 'volle driehoek: plaag gezien',
+    pest: 'gevulde driehoek: plaag gezien',
     cleared: 'lege ring: plaag weg',
     silence: 'gearceerd: geen meting geprobeerd',
-    before: 'andersom gearceerd: niet vastgelegd of niet meer bewaard',
+    before: 'tegengesteld gearceerd: niet vastgelegd of niet meer bewaard',
     run: 'streepjeslijn: klok opnieuw gestart',
   },
   timebarCounts: (scans, failures, seen, cleared) =>
@@ -65,7 +65,6 @@ export const PAST: In<typeof ENGLISH> = {
       ...(cleared > 0 ? [counted(cleared, 'plaag weg', 'plagen weg')] : []),
     ].join(', '),
   timebarOff: 'Geen verleden: deze tweeling legt niets vast.',
-  timebarOffHint:
-    'Er valt niets terug te kijken. Vastleggen wordt aangezet waar de tweeling wordt gestart.',
+  timebarOffHint: 'Vastleggen wordt aangezet bij het starten van de tweeling.',
   timebarFailed: (reason) => `De vastgelegde gegevens konden niet worden geladen: ${reason}`,
 };

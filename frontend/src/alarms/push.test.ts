@@ -24,7 +24,7 @@ function stage(key: string | null, { known = false, fails = false } = {}): unkno
   };
   const getRegistration = () => Promise.resolve({ pushManager });
   vi.stubGlobal('navigator', { serviceWorker: { getRegistration } });
-  vi.stubGlobal('fetch', (path: string, init?: RequestInit) => {
+  vi.stubGlobal('fetch', (_path: string, init?: RequestInit) => {
     if (init) log.push(JSON.parse(init.body as string));
     return Promise.resolve({ ok: true, json: () => Promise.resolve({ public_key: key }) });
   });

@@ -209,9 +209,9 @@ def _route(title: str, operation: Mapping[str, Any]) -> list[str]:
 def _bodies(answer: Mapping[str, Any]) -> str:
     bodies = []
     for media_type, content in answer.get("content", {}).items():
-        made_of = content.get("schema", {})
-        is_named = "$ref" in made_of
-        bodies.append(code(media_type) + (f" {_type(made_of)}" if is_named else ""))
+        built_from = content.get("schema", {})
+        is_named = "$ref" in built_from
+        bodies.append(code(media_type) + (f" {_type(built_from)}" if is_named else ""))
     return ", ".join(bodies)
 
 

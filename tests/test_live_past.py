@@ -163,7 +163,7 @@ def test_a_namespace_has_services_and_a_past_of_its_own(peer: Peer) -> None:
     assert (response.ok, list(response.stamps)) == (True, [])
 
 
-HOUSE, OBSERVED, RATE, AT_ONCE = 300, 400, 200, 8
+SITE, OBSERVED, RATE, AT_ONCE = 300, 400, 200, 8
 
 
 def pieces(pid: int) -> Iterator[range]:
@@ -192,7 +192,7 @@ def test_a_flood_of_the_dearest_question_loses_no_observation(domain: int, tmp_p
         Peer(domain, "curious") as curious,
     ):
         robot.wait_for_twin()
-        for number in range(HOUSE):
+        for number in range(SITE):
             robot.observe(scan(f"t{number}", {"co2": 400.0, "light": 5.0}, stamp_s=T))
             if not number:
                 robot.tag("t0")  # and the journal is there
@@ -219,8 +219,8 @@ def test_a_flood_of_the_dearest_question_loses_no_observation(domain: int, tmp_p
             ask()
         last = f"SELECT 1 FROM scan WHERE stamp_ns = {stamp_ns(T + 2.0 + (OBSERVED - 1) / RATE)}"
         wait_for(lambda: select(journal, last), "the last of them in the journal", meanwhile=ask)
-        assert select(journal, "SELECT count(*) FROM scan") == [(HOUSE + OBSERVED,)]
+        assert select(journal, "SELECT count(*) FROM scan") == [(SITE + OBSERVED,)]
         assert "they came too fast" not in twin.output
         assert len(answers) > before + 2, "asked all the while"
-        assert {len(answer.state.tags) for answer in answers if answer.ok} <= {HOUSE, HOUSE + 1}
+        assert {len(answer.state.tags) for answer in answers if answer.ok} <= {SITE, SITE + 1}
         assert all(answer.ok for answer in answers)

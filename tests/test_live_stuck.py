@@ -175,14 +175,14 @@ def test_gone_after_the_timeout_is_a_request_that_comes_byte_by_byte(
             begin(slow)
             every.append(slow)
 
-        def is_gone(slow: socket.socket) -> bool:
+        def is_removed(slow: socket.socket) -> bool:
             try:
                 slow.send(b"x")
             except OSError:
                 return True
             return is_over(slow)
 
-        wait_reading(healthy, lambda: all(map(is_gone, every)), "their end")
+        wait_reading(healthy, lambda: all(map(is_removed, every)), "their end")
 
 
 def test_gone_after_the_timeout_is_who_asks_again_and_again_and_does_not_read(

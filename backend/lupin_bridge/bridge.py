@@ -418,7 +418,9 @@ class Bridge:
             return
         is_good = (status.is_live and status.twin_count <= 1) or status.reason == "shutting_down"
         first = self._published is None
-        if (first and not is_good) or (self._published and status.says_more_than(self._published)):
+        if (first and not is_good) or (
+            self._published and status.has_more_detail_than(self._published)
+        ):
             log.log(logging.INFO if is_good else logging.WARNING, "%s", status.message)
         self._published = status
         if status.reason not in ("never_seen", "shutting_down"):

@@ -33,7 +33,7 @@ class Progress:
     def __init__(self) -> None:
         self._is_seen = sys.stderr.isatty()
         self._what = ""
-        self._told_s = 0.0
+        self._reported_s = 0.0
 
     def tell(self, what: str, share: float) -> None:
         """Show what is done, and the share of it that is."""
@@ -42,8 +42,8 @@ class Progress:
             if is_new:
                 _written(sys.stderr, f"{what}\n")
             return
-        if is_new or time.monotonic() - self._told_s >= _AGAIN_AFTER_S:
-            self._told_s = time.monotonic()
+        if is_new or time.monotonic() - self._reported_s >= _AGAIN_AFTER_S:
+            self._reported_s = time.monotonic()
             _written(sys.stderr, f"\r\x1b[K{what} {share:.0%}")
 
     def clear(self) -> None:

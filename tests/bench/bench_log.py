@@ -41,7 +41,7 @@ SCANS: Final = 60_000
 # Scans that share a commit where the writer has to catch up.
 LOT: Final = 500
 TIMELINE: Final = (
-    Event.SCANS, Event.FAILURES, Event.LOOKS, Event.PESTS_SEEN, Event.PESTS_CLEARED,
+    Event.SCANS, Event.FAILURES, Event.INSPECTIONS, Event.PESTS_SEEN, Event.PESTS_CLEARED,
     Event.SILENCES, Event.RUNS,
 )  # fmt: skip
 
@@ -74,7 +74,7 @@ def write(folder: Path, scans: int) -> None:
 
         def commit(lot: Sequence[Row]) -> None:
             file.append([(run, row) for row in lot])
-            while file.look_after(may_purge=True):
+            while file.check_size(may_purge=True):
                 pass
 
         def size() -> int:

@@ -151,5 +151,5 @@ def fill(path: Path, house: House) -> Filled:
             file.append([(run, row) for row in lot])
             rows += len(lot)
             readings += sum(len(row.readings) for row in lot if isinstance(row, ScanRow))
-            file.look_after(may_purge=False)
+            file.check_size(may_purge=False)
     return Filled(path, house, readings, rows)

@@ -44,7 +44,7 @@ class Askers:
         self, port: int, questions: Mapping[str, str], fill: Callable[[str, random.Random], str]
     ) -> None:
         self.answers: Counter[tuple[str, int]] = Counter()
-        self._port, self._questions, self._fill = port, questions, fill
+        self._port, self._queries, self._fill = port, questions, fill
         self._is_over = threading.Event()
         self._threads = [
             threading.Thread(target=self._ask, args=(number, what), daemon=True)
@@ -70,7 +70,7 @@ class Askers:
                 "127.0.0.1", self._port, 60.0, source_address=(f"127.0.9.{number + 1}", 0)
             )
             try:
-                client.request("GET", self._fill(self._questions[what], chance))
+                client.request("GET", self._fill(self._queries[what], chance))
                 answer = client.getresponse()
                 while not self._is_over.is_set() and answer.read(65_536):
                     pass

@@ -78,7 +78,7 @@ def test_it_is_alive_for_as_long_as_nothing_is_wrong(manager: Manager) -> None:
     wrong: list[str] = []
 
     async def live() -> None:
-        living = asyncio.create_task(supervisor.keep_alive(lambda: wrong[0] if wrong else None))
+        living = asyncio.create_task(supervisor.send_watchdog(lambda: wrong[0] if wrong else None))
         for _ in range(3):
             assert await asyncio.to_thread(manager.next) == {"WATCHDOG": "1"}
         wrong.append("stuck")
@@ -111,7 +111,7 @@ def test_without_a_manager_there_is_nobody_to_tell(
     assert supervisor.watchdog_s == 0.0
     supervisor.ready("x")
     supervisor.stopping()
-    asyncio.run(supervisor.keep_alive(lambda: None))
+    asyncio.run(supervisor.send_watchdog(lambda: None))
     assert len(caplog.messages) == has_socket, "said once"
     supervisor.close()
 

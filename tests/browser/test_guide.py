@@ -30,11 +30,11 @@ def page(browser: Browser) -> object:
     context = browser.new_context()
     page = context.new_page()
 
-    def hear(message: ConsoleMessage) -> None:
+    def receive(message: ConsoleMessage) -> None:
         if message.type in ("error", "warning"):
             said.append(message.text)
 
-    page.on("console", hear)
+    page.on("console", receive)
     page.on("pageerror", lambda error: said.append(str(error)))
     yield page
     context.close()

@@ -24,7 +24,7 @@ def greenhouse(simulator: Any) -> Greenhouse:
     return read_greenhouse(simulator)
 
 
-def made_of(tmp_path: Path, tags: dict[str, Any], tables: dict[str, Any]) -> Greenhouse:
+def built_from(tmp_path: Path, tags: dict[str, Any], tables: dict[str, Any]) -> Greenhouse:
     """A greenhouse of 4 × 4 m with tags and tables of one's own."""
     layout = tmp_path / "tag_locations.json"
     layout.write_text(json.dumps({"tags": tags, "tables": tables}))
@@ -78,7 +78,7 @@ def test_a_tag_faces_the_side_it_is_nearest_to(tmp_path: Path) -> None:
         "left": {"x": 1.02, "y": 1.5, "sensors": []},
         "top": {"x": 1.5, "y": 2.03, "sensors": []},
     }
-    greenhouse = made_of(tmp_path, tags, {"one": box(1.0, 1.0, 2.0, 2.0)})
+    greenhouse = built_from(tmp_path, tags, {"one": box(1.0, 1.0, 2.0, 2.0)})
     assert greenhouse.tag("left").facing == (-1.0, 0.0)
     assert greenhouse.tag("left").stop == pytest.approx((0.6, 1.5))
     assert greenhouse.tag("top").facing == (0.0, 1.0)
@@ -87,10 +87,10 @@ def test_a_tag_faces_the_side_it_is_nearest_to(tmp_path: Path) -> None:
 def test_in_a_narrow_aisle_the_robot_stops_closer(tmp_path: Path) -> None:
     tags = {"a": {"x": 1.0, "y": 1.5, "sensors": []}}
     tables = {"one": box(1.0, 1.0, 2.0, 2.0), "left of it": box(0.0, 0.0, 0.5, 4.0)}
-    assert made_of(tmp_path, tags, tables).tag("a").stop == pytest.approx((0.7, 1.5))
+    assert built_from(tmp_path, tags, tables).tag("a").stop == pytest.approx((0.7, 1.5))
 
 
 def test_a_tag_that_no_robot_can_face_is_refused_by_name(tmp_path: Path) -> None:
     tags = {"7": {"x": 1.0, "y": 1.0, "sensors": []}}
     with pytest.raises(ValueError, match=r"tag 7 at \(1\.0, 1\.0\): no aisle beside one .* 0\.4 m"):
-        made_of(tmp_path, tags, {"one": box(0.1, 0.1, 3.9, 3.9)})
+        built_from(tmp_path, tags, {"one": box(0.1, 0.1, 3.9, 3.9)})

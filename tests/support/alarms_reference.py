@@ -102,8 +102,8 @@ def _light(of_run: list[PastWrite], at_ns: int) -> bool | None:
                     newest[write.tag_id] = write.stamp_ns, value
     lights = [
         value
-        for tag_id, (told_ns, value) in newest.items()
-        if math.isfinite(value) and scanned[tag_id] - told_ns <= LEFT_OUT
+        for tag_id, (reported_ns, value) in newest.items()
+        if math.isfinite(value) and scanned[tag_id] - reported_ns <= LEFT_OUT
     ]
     bright = sum(value >= 50.0 for value in lights)
     return bright >= len(lights) / 2 if lights else None

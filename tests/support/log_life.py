@@ -158,7 +158,7 @@ class Life:
         found = []
         for number, row in self._of(tag_id):
             value: float | None = None
-            if isinstance(row, InspectionRow) and event is Event.LOOKS:
+            if isinstance(row, InspectionRow) and event is Event.INSPECTIONS:
                 value = row.flower.bug_count
             elif isinstance(row, ScanRow) and row.status != STATUS_OK and event is Event.FAILURES:
                 value = row.status

@@ -26,7 +26,7 @@ class Count:
     at_ns: int
 
     def answer(self, find: Find, should_stop: ShouldStop) -> int:
-        """See `Question`."""
+        """See `PastQuery`."""
         snapshot: Snapshot = find(self.at_ns)
         return len(snapshot.tags)
 
@@ -36,7 +36,7 @@ class Endless:
     """Work that ends when nobody waits for it any more, and not before."""
 
     def answer(self, find: Find, should_stop: ShouldStop) -> None:
-        """See `Question`."""
+        """See `PastQuery`."""
         _until_told(should_stop)
 
 
@@ -50,7 +50,7 @@ class Running:
     """How many are at work for `Endless` in that process, and how nice it is."""
 
     def answer(self, find: Find, should_stop: ShouldStop) -> tuple[int, int]:
-        """See `Question`."""
+        """See `PastQuery`."""
         return (_endless(), os.getpriority(os.PRIO_PROCESS, 0))
 
 
@@ -74,7 +74,7 @@ class Body:
     count: int
 
     def answer(self, find: Find, should_stop: ShouldStop) -> Answered:
-        """See `Question`."""
+        """See `PastQuery`."""
         return Answered("x", Answer(b"7" * self.count, "text/plain", {}))
 
 
@@ -85,7 +85,7 @@ class MapCells:
     occupancy: OccupancyMap
 
     def answer(self, find: Find, should_stop: ShouldStop) -> tuple[int, int]:
-        """See `Question`."""
+        """See `PastQuery`."""
         return (self.occupancy.cells.size, id(self.occupancy))
 
 
@@ -96,7 +96,7 @@ class Failing:
     how: str
 
     def answer(self, find: Find, should_stop: ShouldStop) -> Any:
-        """See `Question`."""
+        """See `PastQuery`."""
         return self._fail()
 
     def _fail(self) -> Any:
@@ -128,5 +128,5 @@ class Dying:
     """The process that is asked this dies of it."""
 
     def answer(self, find: Find, should_stop: ShouldStop) -> None:
-        """See `Question`."""
+        """See `PastQuery`."""
         os.abort()

@@ -48,7 +48,7 @@ class Twin:
         self.memory.follow(now)
         self.memory.hold_to(now)
 
-    def hear(
+    def receive(
         self,
         stamp_s: float | None,
         *,

@@ -15,7 +15,7 @@ from lupin_twin.core.writes import PastWrite
 S: Final = 1_000_000_000
 DAY_NS: Final = 86_400 * S
 RUN: Final = 1
-_SCAN, _LOOK = 0, 1
+_SCAN, _INSPECTION = 0, 1
 
 
 def ordinary_days(seed: int = 0) -> list[PastWrite]:
@@ -31,7 +31,7 @@ def _write(number: int, event: dict[str, Any], at_ns: int) -> PastWrite:
     tag_id = event["tag_id"]
     if "species" in event:
         seen = (True, event["species"], event["anomaly"], event["bug_count"])
-        return PastWrite(number, RUN, tag_id, at_ns, _LOOK, 0, (), (), *seen)
+        return PastWrite(number, RUN, tag_id, at_ns, _INSPECTION, 0, (), (), *seen)
     names = tuple(name for name, _ in event["readings"])
     values = tuple(value for _, value in event["readings"])
     return PastWrite(number, RUN, tag_id, at_ns, _SCAN, event["status"], names, values)

@@ -9,7 +9,7 @@ from statistics import fmean
 from typing import Any, TypeVar
 
 from lupin_bridge.feed.past_child import _found
-from lupin_bridge.feed.query import Now, Question
+from lupin_bridge.feed.query import Now, PastQuery
 from lupin_bridge.past.plans import ConditionalQuery, Query
 from lupin_twin.core.journal_condition import UNKNOWN
 from lupin_twin.core.notes import NotesRequest, PastNotes
@@ -22,7 +22,7 @@ NS = 10**9
 ResultT = TypeVar("ResultT")
 
 
-async def look_up(question: Question[ResultT], past: MadeUp, workers: Workers) -> ResultT:
+async def look_up(question: PastQuery[ResultT], past: MadeUp, workers: Workers) -> ResultT:
     """Answer a question on a worker here."""
     return await asyncio.wrap_future(
         workers.submit(lambda stop: question.answer(past.find, stop), 0.0)

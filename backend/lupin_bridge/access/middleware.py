@@ -131,7 +131,7 @@ _OF_NO_SITE: Final = frozenset({"/api/session", "/api/signout"})
 # In a request's state: who makes it, where anybody has to say so.
 PERSON_KEY: Final = "person"
 # So soon after an account or a session has ended, what it has open ends too.
-_LOOK_S: Final = 2.0
+_POLL_S: Final = 2.0
 
 # Path and query. The longest that means something has a tag's name of a few hundred; each segment
 # of a path is looked for on the disk, and each parameter is taken apart.
@@ -277,7 +277,7 @@ class AccessControl:
         people = self._access.people
         try:
             while people is not None and people.still(person):
-                await asyncio.sleep(_LOOK_S)
+                await asyncio.sleep(_POLL_S)
         except AccountError as error:
             log.warning("%s: what %s had open is closed", error, person.name)
         connection.dismiss(CloseCode.POLICY_VIOLATION, "the session has ended: sign in again")

@@ -35,8 +35,8 @@ MAX_WAITING: Final = 8
 
 
 # Sign-ins that an address may try in vain at once, and a minute from then on.
-TRY_BURST: Final = 10
-TRIES_PER_MINUTE: Final = 10
+ATTEMPT_BURST: Final = 10
+ATTEMPTS_PER_MINUTE: Final = 10
 
 
 class PeopleBusy(AdmissionError):
@@ -59,7 +59,7 @@ class People:
         self._inode = 0
         self._thread = ThreadPoolExecutor(1, thread_name_prefix="accounts")
         self._waiting = 0
-        self._tries = RateLimit(TRIES_PER_MINUTE / 60.0, TRY_BURST)
+        self._attempts = RateLimit(ATTEMPTS_PER_MINUTE / 60.0, ATTEMPT_BURST)
 
     @property
     def is_on(self) -> bool:
@@ -156,16 +156,16 @@ class People:
 
         """
         # Many at once are no more than the few that wait for the thread.
-        wait_s = self._tries.wait_s(address, time.monotonic())
+        wait_s = self._attempts.wait_s(address, time.monotonic())
         if wait_s > 0.0:
             raise PeopleBusy(
-                f"{address} has tried to sign in in vain more than {TRY_BURST} times and "
-                f"{TRIES_PER_MINUTE} a minute: try again in {math.ceil(wait_s)} s",
+                f"{address} has tried to sign in in vain more than {ATTEMPT_BURST} times and "
+                f"{ATTEMPTS_PER_MINUTE} a minute: try again in {math.ceil(wait_s)} s",
                 wait_s,
             )
         person = await self._check(name, password)
         if person is None:
-            self._tries.take(address, time.monotonic())
+            self._attempts.take(address, time.monotonic())
             log.warning("a sign-in as %r from %s was refused", name[:64], address)
         return person
 

@@ -41,9 +41,9 @@ REST_S: Final = 0.85
 RETRY_S: Final = 5.0
 # A journal that has not answered for so long says nothing of now, although the twin is there.
 UNANSWERED_S: Final = 30.0
-_NOT_KEPT: Final = frozenset({JournalState.FAILING, JournalState.IN_USE, JournalState.FOREIGN})
+_NOT_RECORDED: Final = frozenset({JournalState.FAILING, JournalState.IN_USE, JournalState.FOREIGN})
 # Numbers of what is heard here: beyond those of any journal.
-_FIRST_HEARD: Final = 2**62
+_FIRST_RECEIVED: Final = 2**62
 _ALL_TIME: Final = (RunSpan(RUN, 0, 2**63 - 1),)
 _SILENCES: Final = 100
 
@@ -89,7 +89,7 @@ class AlarmFeed:
         self._origin: AlarmSource = "journal"
         self._seen: Snapshot | None = None
         self._received: list[PastWrite] = []
-        self._received_number = _FIRST_HEARD
+        self._received_number = _FIRST_RECEIVED
         self._silences: list[Alarm] = []
         self._alarms: tuple[Alarm, ...] = ()
         self._page, self._page_of = Page(), _NO_PAGE
@@ -115,7 +115,7 @@ class AlarmFeed:
         """The twin has a new state; costs nothing where that and the journal are as before."""
         before, now = self._seen, update.snapshot
         is_new = before is None or before.tags != now.tags
-        is_kept = update.journal.state not in _NOT_KEPT
+        is_kept = update.journal.state not in _NOT_RECORDED
         if is_kept == (self._origin == "heard"):
             self._begin("journal" if is_kept else "heard")
             before, is_new = None, True
@@ -295,8 +295,8 @@ class AlarmFeed:
         """
         now, beside = self._board.now, tuple(self._silences)
         page, change = await self._on_worker(lambda _: self._newest(beside, self._page_of[2]))
-        is_gone = any(alarm.is_active for alarm in beside)
-        is_old = unanswered_s >= UNANSWERED_S and not is_gone
+        is_removed = any(alarm.is_active for alarm in beside)
+        is_old = unanswered_s >= UNANSWERED_S and not is_removed
         source: AlarmSource = "starting" if is_old else now.source
         self._board.put(page, change, source, now.since_ns)
 

@@ -22,7 +22,7 @@ from lupin_twin.core.past import NotRemembered, PastRefused
 
 log = logging.getLogger(__name__)
 
-LOOK_S: Final = 1.0
+POLL_S: Final = 1.0
 OF_ALARM: Final = "alarm:"
 # Notes that one name may write at once, and a minute from then on.
 NOTE_BURST: Final = 300
@@ -147,4 +147,4 @@ class NoteBoard:
                 pass  # they are as they were; whoever asks the log for more is told why
             except Exception:  # nobody waits for this task
                 log.exception("the notes are as they were")
-            await asyncio.sleep(LOOK_S)
+            await asyncio.sleep(POLL_S)

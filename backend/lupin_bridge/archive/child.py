@@ -15,7 +15,7 @@ from lupin_bridge.settings import SettingError, Settings, option, variable
 
 log = logging.getLogger(__name__)
 
-_LOOK_S: Final = 0.2
+_POLL_S: Final = 0.2
 _WAIT_S: Final = 5.0
 
 
@@ -73,7 +73,7 @@ class Forwarding:
         if not self._env[variable("site")]:
             return
         while not (journal := self._journal()):
-            await asyncio.sleep(_LOOK_S)
+            await asyncio.sleep(_POLL_S)
         words = ("forward", "--end-with-input", "--journal", journal)
         while True:
             try:

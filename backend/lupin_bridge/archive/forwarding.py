@@ -26,8 +26,8 @@ from lupin_twin.journal.schema import FILE_ERRORS, Foreign
 FIRST_WAIT_S: Final = 0.5
 MAX_WAIT_S: Final = 5.0
 # How often is looked for what is new, and how often the archive is told that this lives.
-_LOOK_S: Final = 0.25
-_HEARD_S: Final = 2.0
+_POLL_S: Final = 0.25
+_HEARTBEAT_S: Final = 2.0
 
 
 class Forwarder:
@@ -88,7 +88,7 @@ class Forwarder:
         source.claim()
         with closing(Sink(self._url, self._site)) as sink:
             epoch = sink.begin(source, self._say)
-            is_full, is_said, heard_s = True, False, time.monotonic()
+            is_full, is_said, received_s = True, False, time.monotonic()
             while not source.is_replaced():
                 if source.has_changed() or is_full:
                     batch = source.batch(epoch)
@@ -101,8 +101,8 @@ class Forwarder:
                     self._say(f"site {self._site} is forwarded to {place_of(self._url)}")
                 if once and not is_full:
                     return
-                if time.monotonic() - heard_s >= _HEARD_S:
-                    heard_s = time.monotonic()
+                if time.monotonic() - received_s >= _HEARTBEAT_S:
+                    received_s = time.monotonic()
                     sink.heard()
                 if not is_full:
-                    time.sleep(_LOOK_S)
+                    time.sleep(_POLL_S)

@@ -27,8 +27,8 @@ Row = tuple[Any, ...]
 
 # Rows of each table in one transaction; looks are larger.
 _SCANS: Final = 5_000
-_LOOKS: Final = 500
-_APPENDED: Final = {"scan": _SCANS, "look": _LOOKS, "place": _SCANS}
+_INSPECTIONS: Final = 500
+_APPENDED: Final = {"scan": _SCANS, "look": _INSPECTIONS, "place": _SCANS}
 _WITHIN: Final = f"site = '{LOCAL_SITE}' AND seq > :after AND seq <= :upto"
 
 # Each with the archive's site and numbers: `seqs` and `runs` are what those are moved by.

@@ -62,7 +62,7 @@ _MAX_STEP_S: Final = 0.25
 _LONG_S: Final = 60.0
 # How long the twin is waited for: DDS finds who is there within 3 s, a busy machine takes longer.
 _TWIN_S: Final = 30.0
-_LOOK_S: Final = 1.0
+_POLL_S: Final = 1.0
 # Before a loop begins again, DDS delivers what was published.
 _DELIVERY_S: Final = 0.5
 
@@ -301,7 +301,7 @@ def _play(
     looked_s = -math.inf
     while not stopped():
         now_s = time.monotonic()
-        if now_s - looked_s > _LOOK_S:
+        if now_s - looked_s > _POLL_S:
             looked_s = now_s
             node.check_alone()
         player.beat(now_s)

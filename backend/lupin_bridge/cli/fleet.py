@@ -55,7 +55,7 @@ def run(settings: Settings, secrets: Secrets, ros_args: Sequence[str]) -> None:
 
 async def _run(settings: Settings, access: Access, proxies: Proxies, criteria: Criteria) -> None:
     listener = open_listener(settings, access)
-    await asyncio.to_thread(_say_what_is_wrong, settings.archive_url)
+    await asyncio.to_thread(_report_error, settings.archive_url)
     settings = replace(settings, max_clients=allow_connections(settings.max_clients))
     # For the process that reads; not on its command line, which others can read.
     os.environ[variable("archive_url")] = settings.archive_url
@@ -76,7 +76,7 @@ async def _run(settings: Settings, access: Access, proxies: Proxies, criteria: C
         await fleet.stop()
 
 
-def _say_what_is_wrong(url: str) -> None:
+def _report_error(url: str) -> None:
     """At once, in one line; it may pass, so the page is served all the same, and says so."""
     try:
         with closing(open_archive(url, "lupin-twin fleet")):

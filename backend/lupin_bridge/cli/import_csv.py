@@ -35,7 +35,7 @@ HELP: Final = (
     "readings of before, from CSV, into a journal; without --write, what would be imported"
 )
 _BATCH: Final = 20_000
-_KEPT_DAYS: Final = 90
+_RETENTION_DAYS: Final = 90
 # The journal deletes nothing while it is imported into.
 _NO_LIMITS: Final = Limits(days=36_500, max_bytes=2**62)
 
@@ -94,11 +94,11 @@ def _run(options: argparse.Namespace, path: Path) -> int:
     tell(f"{new} scans are new in {path}; {known} were there before")
     if (
         summary.scans
-        and time.time_ns() - summary.first_ns > _KEPT_DAYS * 86_400 * NANOSECONDS_PER_SECOND
+        and time.time_ns() - summary.first_ns > _RETENTION_DAYS * 86_400 * NANOSECONDS_PER_SECOND
     ):
         say(
-            f"a twin deletes what is older than its parameter journal_days, {_KEPT_DAYS} unless "
-            "it is set: set it before the twin starts"
+            "a twin deletes what is older than its parameter journal_days, "
+            f"{_RETENTION_DAYS} unless it is set: set it before the twin starts"
         )
     return 0
 

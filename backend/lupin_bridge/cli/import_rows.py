@@ -168,7 +168,7 @@ def _places(table: Table) -> Iterator[tuple[str, Pose]]:
         yield str(tag_id), Pose(float(at[0]), float(at[1]), 0.0, 0.0, 0.0, 0.0, 1.0)
 
 
-def counted(file: TextIO, tell_at: Callable[[int], None]) -> Iterator[str]:
+def counted(file: TextIO, report_every: Callable[[int], None]) -> Iterator[str]:
     """The lines of a file, telling now and then how many bytes in it is.
 
     Raises:
@@ -181,7 +181,7 @@ def counted(file: TextIO, tell_at: Callable[[int], None]) -> Iterator[str]:
             raise csv.Error(f"line {number + 1} has {_MAX_LINE:,} characters or more")
         at += len(line)
         if number % _TOLD_EVERY == 0:
-            tell_at(at)
+            report_every(at)
         # InfluxDB's annotations
         yield "\n" if line.startswith("#") else line
 

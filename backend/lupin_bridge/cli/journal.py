@@ -33,9 +33,9 @@ from lupin_twin.core.past import NotRemembered, PastRefused, seconds
 from lupin_twin.journal.beside import InUse, demo_journal_path, holder_of, journal_path
 from lupin_twin.journal.checking import Overview, RunExtent, find_all_damage, overview
 from lupin_twin.journal.queries import rows
-from lupin_twin.journal.rebuild import NotPossible, hear_interrupts, vacuum
-from lupin_twin.journal.retention import NotKnown, forget
-from lupin_twin.journal.schema import FILE_ERRORS, Empty, Foreign, open_named, says_damaged
+from lupin_twin.journal.rebuild import NotPossible, handle_interrupts, vacuum
+from lupin_twin.journal.retention import UnknownTagError, forget
+from lupin_twin.journal.schema import FILE_ERRORS, Empty, Foreign, is_damage_error, open_named
 from lupin_twin.runtime.process import INTERRUPTED
 
 ACTIONS: Final[Mapping[str, str]] = {
@@ -68,7 +68,7 @@ SHOWN: Final = (
     InUse,
     Empty,
     Foreign,
-    NotKnown,
+    UnknownTagError,
     NotPossible,
 )
 
@@ -138,7 +138,7 @@ def run(options: argparse.Namespace, environ: Mapping[str, str]) -> int:
     except (*FILE_ERRORS, OSError) as error:
         if getattr(error, "sqlite_errorcode", None) == sqlite3.SQLITE_INTERRUPT:
             return INTERRUPTED
-        wrong = "is damaged" if says_damaged(error) else "cannot be read or written"
+        wrong = "is damaged" if is_damage_error(error) else "cannot be read or written"
         return fail(f"the journal {path} {wrong}: {error}")
     return code
 
@@ -204,7 +204,7 @@ def _reader(path: Path) -> sqlite3.Connection:
         if path.with_name(path.name + "-wal").exists() or holder_of(path) is not None:
             raise
         connection = open_named(path, is_still=True)
-    hear_interrupts(connection)
+    handle_interrupts(connection)
     return connection
 
 

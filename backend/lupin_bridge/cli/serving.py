@@ -55,7 +55,7 @@ async def serve(
     url = address_of(listener, "https" if settings.tls_cert else "http")
     print(f"lupin-twin: {url}", flush=True)  # noqa: T201  # for people and scripts
     supervisor.ready(f"serving {url}")
-    tasks = [asyncio.create_task(supervisor.keep_alive(ailment), name="watchdog")]
+    tasks = [asyncio.create_task(supervisor.send_watchdog(ailment), name="watchdog")]
     if (renewal := _follow_certificates(settings, server)) is not None:
         tasks.append(renewal)
     try:

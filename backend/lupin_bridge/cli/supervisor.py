@@ -47,7 +47,7 @@ class Supervisor:
         """It is about to end."""
         self._notify("STOPPING=1")
 
-    async def keep_alive(self, ailment: Callable[[], str | None]) -> None:
+    async def send_watchdog(self, ailment: Callable[[], str | None]) -> None:
         """Notify that all is well, as long as `ailment` finds nothing."""
         while self.watchdog_s > 0.0:
             wrong = ailment()

@@ -23,7 +23,7 @@ from lupin_twin.runtime.workers import in_turns
 
 # A twin's next round comes no sooner.
 FRESH_S: Final = 2.0
-MAX_KEPT: Final = 64
+MAX_CACHED: Final = 64
 
 
 class Reports:
@@ -32,7 +32,7 @@ class Reports:
     def __init__(self, source: TwinSource) -> None:
         self._source = source
         self._asking: Shared[Report] = Shared()
-        self._kept: OrderedDict[ReportRequest, tuple[float, Report]] = OrderedDict()
+        self._cache: OrderedDict[ReportRequest, tuple[float, Report]] = OrderedDict()
 
     async def of(self, request: ReportRequest) -> Report:
         """What is known of a sensor's estimates.
@@ -41,17 +41,17 @@ class Reports:
             Exception: see `TwinSource.estimate_report`.
 
         """
-        kept = self._kept.get(request)
+        kept = self._cache.get(request)
         if kept is not None and time.monotonic() - kept[0] < FRESH_S:
             return kept[1]
         return await self._asking.get(request, lambda: self._ask(request))
 
     async def _ask(self, request: ReportRequest) -> Report:
         report = await self._source.estimate_report(request)
-        self._kept[request] = time.monotonic(), report
-        self._kept.move_to_end(request)
-        if len(self._kept) > MAX_KEPT:
-            self._kept.popitem(last=False)
+        self._cache[request] = time.monotonic(), report
+        self._cache.move_to_end(request)
+        if len(self._cache) > MAX_CACHED:
+            self._cache.popitem(last=False)
         return report
 
 

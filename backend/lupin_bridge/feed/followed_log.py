@@ -26,8 +26,8 @@ from lupin_twin.journal.schema import (
     Empty,
     Foreign,
     get_meta,
+    is_damage_error,
     open_reader,
-    says_damaged,
 )
 from lupin_twin.runtime.workers import Workers
 
@@ -36,7 +36,7 @@ log = logging.getLogger(__name__)
 ResultT = TypeVar("ResultT")
 
 # How often it is looked whether more was written; what is shown as past is as old at most.
-LOOK_S: Final = 0.3
+POLL_S: Final = 0.3
 # After an error, and where there is nothing to follow.
 RETRY_S: Final = 1.0
 # A twin that is heard says within a second where its journal is.
@@ -153,7 +153,7 @@ class FollowedLog:
         """See where the log is, or take what is new of it; returns when to look again, s."""
         twin = self._reported
         if not twin.journal_id:
-            return LOOK_S
+            return POLL_S
         own = self._named or Path(twin.path)
         is_own = await self._on_worker(lambda: _is_journal(own, twin.journal_id))
         self._own = own if is_own else None
@@ -170,12 +170,12 @@ class FollowedLog:
                 lambda: write(here, lot, twin.complete_ns, after)
             )
         except _FILE_ERRORS as error:
-            if isinstance(error, Foreign) or says_damaged(error) or here.is_dir():
+            if isinstance(error, Foreign) or is_damage_error(error) or here.is_dir():
                 self._followed = None
                 await self._on_worker(lambda: _delete(here))
                 log.warning("%s cannot be used (%s): the log is copied anew", here, error)
             raise
-        return LOOK_S if lot.is_all else 0.0
+        return POLL_S if lot.is_all else 0.0
 
     async def _on_worker(self, work: Callable[[], ResultT]) -> ResultT:
         return await asyncio.wrap_future(self._workers.submit(lambda _: work(), _WRITE_S))

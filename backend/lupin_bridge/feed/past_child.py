@@ -21,7 +21,7 @@ from concurrent.futures import Future
 from functools import partial
 from typing import IO, Any, Final
 
-from lupin_bridge.feed.query import Now, Question
+from lupin_bridge.feed.query import Now, PastQuery
 from lupin_twin.core.history import LatestRequest
 from lupin_twin.core.journal_condition import UNKNOWN
 from lupin_twin.core.notes import NotesRequest
@@ -86,7 +86,7 @@ class Child:
         self._running[number] = running
         running.add_done_callback(partial(self._reply, number))
 
-    def _search(self, question: Question[Any], now: Now) -> Search:
+    def _search(self, question: PastQuery[Any], now: Now) -> Search:
         def search(log: sqlite3.Connection, should_stop: ShouldStop) -> Any:
             def find(need: Any) -> Any:
                 if should_stop():  # as a statement ends that is interrupted

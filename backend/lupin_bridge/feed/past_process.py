@@ -21,14 +21,14 @@ from typing import Any, Final, TypeVar
 import numpy as np
 
 from lupin_bridge.feed.past_child import HEAD
-from lupin_bridge.feed.query import Now, Question
+from lupin_bridge.feed.query import Now, PastQuery
 from lupin_twin.core.past import NotRemembered
 from lupin_twin.field.explored import OccupancyMap
 
 log = logging.getLogger(__name__)
 
 # Questions under way, and bytes of questions that the process has not taken.
-MAX_ASKED: Final = 100
+MAX_PENDING: Final = 100
 MAX_UNSENT_BYTES: Final = 16_000_000
 # For so long after a death none is started.
 REST_S: Final = 2.0
@@ -53,7 +53,7 @@ class PastProcess:
         self.why_down = ""
         self._numbers = itertools.count(1)
         # Where questions go; until the process is there, they are kept for it.
-        self._questions: asyncio.StreamWriter | None = None
+        self._queries: asyncio.StreamWriter | None = None
         self._unsent: dict[int, tuple[bytes, OccupancyMap | None]] = {}
         self._sent_map: OccupancyMap | None = None
         self._life: asyncio.Task[None] | None = None
@@ -67,7 +67,7 @@ class PastProcess:
                 await self._life
         self._refuse_all()
 
-    async def ask(self, question: Question[AnswerT], now: Now, cost_s: float) -> AnswerT:
+    async def ask(self, question: PastQuery[AnswerT], now: Now, cost_s: float) -> AnswerT:
         """The answer; `cost_s` estimates all that it takes, s of one core.
 
         Raises:
@@ -77,8 +77,8 @@ class PastProcess:
         """
         if self.why_down:
             raise _passing(self.why_down)
-        if len(self.asked) >= MAX_ASKED:
-            raise _passing(f"{MAX_ASKED} questions about the past are under way, the limit")
+        if len(self.asked) >= MAX_PENDING:
+            raise _passing(f"{MAX_PENDING} questions about the past are under way, the limit")
         packer = _Packer()
         packer.dump((question, now, cost_s))
         number = next(self._numbers)
@@ -90,25 +90,25 @@ class PastProcess:
             self._send()
             return await answer  # type: ignore[no-any-return]
         except asyncio.CancelledError:
-            if self._questions is not None:
-                self._questions.write(pickle.dumps((number, None)))
+            if self._queries is not None:
+                self._queries.write(pickle.dumps((number, None)))
             raise
         finally:
             del self.asked[number]
             self._unsent.pop(number, None)
 
     def _send(self) -> None:
-        if self._questions is None:
+        if self._queries is None:
             return
         for number, (question, occupancy_map) in self._unsent.items():
-            if self._questions.transport.get_write_buffer_size() > MAX_UNSENT_BYTES:
+            if self._queries.transport.get_write_buffer_size() > MAX_UNSENT_BYTES:
                 why = "the process that looks back takes no more questions just now"
                 self.asked[number].set_exception(_passing(why))
                 continue
             if occupancy_map is not None and occupancy_map is not self._sent_map:
                 self._sent_map = occupancy_map
-                self._questions.write(pickle.dumps((0, occupancy_map), 5))
-            self._questions.write(pickle.dumps((number, question), 5))
+                self._queries.write(pickle.dumps((0, occupancy_map), 5))
+            self._queries.write(pickle.dumps((number, question), 5))
         self._unsent.clear()
 
     def _refuse_all(self) -> None:
@@ -143,7 +143,7 @@ class PastProcess:
         assert process.stdin is not None
         assert process.stdout is not None
         self.starts += 1
-        self.pid, self._questions, self._sent_map = process.pid, process.stdin, None
+        self.pid, self._queries, self._sent_map = process.pid, process.stdin, None
         try:
             self._send()
             with contextlib.suppress(asyncio.IncompleteReadError):
@@ -153,7 +153,7 @@ class PastProcess:
                     self._take(number, text, body.toreadonly())
             return _exit_text(await process.wait())
         finally:
-            self.pid = self._questions = None
+            self.pid = self._queries = None
             # Not by `process.kill`: of one that has just ended, that takes the exit code from
             # asyncio, which waits for it.
             with contextlib.suppress(ProcessLookupError):

@@ -60,7 +60,7 @@ class Now:
     condition: Condition
 
 
-class Question(Protocol[ResultT_co]):
+class PastQuery(Protocol[ResultT_co]):
     """A value that can be pickled, and so can its answer."""
 
     def answer(self, find: Find, should_stop: ShouldStop) -> ResultT_co:
@@ -74,7 +74,7 @@ class Itself:
     need: Need
 
     def answer(self, find: Find, should_stop: ShouldStop) -> Any:  # noqa: ARG002
-        """See `Question`."""
+        """See `PastQuery`."""
         return find(self.need)
 
 
@@ -93,7 +93,7 @@ class ExportStep(Generic[ResultT]):
         find: Find,
         should_stop: ShouldStop,  # noqa: ARG002
     ) -> tuple[bytes | None, list[ResultT]]:
-        """See `Question`."""
+        """See `PastQuery`."""
         export: Export = pickle.loads(self.export)  # noqa: S301  # our own
         rows: list[PastRow] | None = find(export)
         if rows is None:

@@ -141,7 +141,7 @@ class Listening:
             self._is_open = False
             self._leave(self)
 
-    def hear(self, sample: Sample) -> None:
+    def receive(self, sample: Sample) -> None:
         """Pass a sample on; an error is the listener's, and the others' ears are spared it."""
         if self._is_open:
             try:
@@ -168,7 +168,7 @@ class _Relayed:
             if self.topic.latched:
                 self.latched.put(sample)
             for listening in list(self.listeners):
-                listening.hear(sample)
+                listening.receive(sample)
 
 
 class Relay:
@@ -205,7 +205,7 @@ class Relay:
             relayed.opening.add_done_callback(partial(self._opened, relayed))
         listening = Listening(on_sample, partial(self._leave, relayed))
         for sample in relayed.latched.all():
-            listening.hear(sample)
+            listening.receive(sample)
         relayed.listeners.append(listening)
         with ExitStack() as undo:
             undo.callback(listening.close)

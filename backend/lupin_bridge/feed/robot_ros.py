@@ -53,7 +53,7 @@ _PACKAGES: Final = {
 }
 
 
-class _AskedFor(CallbackGroup):  # type: ignore[misc]  # rclpy is not typed
+class _OnDemand(CallbackGroup):  # type: ignore[misc]  # rclpy is not typed
     """Of subscriptions that nobody waits for."""
 
     def can_execute(self, _entity: Any) -> bool:
@@ -67,7 +67,7 @@ class _AskedFor(CallbackGroup):  # type: ignore[misc]  # rclpy is not typed
 
 
 @dataclass(slots=True)
-class _Heard:
+class _ReceivedTopic:
     """A topic, and how it is subscribed to: as it is published, once somebody does."""
 
     name: str
@@ -81,10 +81,12 @@ class RobotTopics:
     """The robot's topics as one node hears them; all of it on that node's thread."""
 
     def __init__(self) -> None:
-        self._group = _AskedFor()
-        self._pose = _Heard(interfaces.ROBOT_POSE.name, tuple(POSES))
-        self._plan = _Heard(interfaces.ROBOT_PLAN.name, (interfaces.ROBOT_PLAN.type_name,))
-        self._battery = _Heard(interfaces.ROBOT_BATTERY.name, (interfaces.ROBOT_BATTERY.type_name,))
+        self._group = _OnDemand()
+        self._pose = _ReceivedTopic(interfaces.ROBOT_POSE.name, tuple(POSES))
+        self._plan = _ReceivedTopic(interfaces.ROBOT_PLAN.name, (interfaces.ROBOT_PLAN.type_name,))
+        self._battery = _ReceivedTopic(
+            interfaces.ROBOT_BATTERY.name, (interfaces.ROBOT_BATTERY.type_name,)
+        )
 
     def look(self, node: Any, now_ns: int | None) -> Robot:
         """What has come since the last look; `now_ns` is the twin's time, None: not known.
@@ -100,8 +102,8 @@ class RobotTopics:
     def _read(
         self,
         node: Any,
-        topic: _Heard,
-        read: Callable[[_Heard, Any, int], ValueT | Drop | None],
+        topic: _ReceivedTopic,
+        read: Callable[[_ReceivedTopic, Any, int], ValueT | Drop | None],
         now_ns: int | None,
     ) -> ValueT | None:
         message = self._take(node, topic)
@@ -119,7 +121,7 @@ class RobotTopics:
             return None
         return value
 
-    def _take(self, node: Any, topic: _Heard) -> Any:
+    def _take(self, node: Any, topic: _ReceivedTopic) -> Any:
         self._subscribe(node, topic)
         if topic.subscription is None or topic.shape is None:
             return None
@@ -135,7 +137,7 @@ class RobotTopics:
             return None
         return message
 
-    def _subscribe(self, node: Any, topic: _Heard) -> None:
+    def _subscribe(self, node: Any, topic: _ReceivedTopic) -> None:
         """Subscribe as the topic is published; again where that has changed."""
         try:
             found = node.get_publishers_info_by_topic(topic.name)
@@ -237,7 +239,7 @@ def _stamp_ns(message: Any, now_ns: int | None) -> int | Drop:
     return min(stamp_ns, now_ns) or now_ns
 
 
-def _position(topic: _Heard, message: Any, stamp_ns: int) -> Position | Drop:
+def _position(topic: _ReceivedTopic, message: Any, stamp_ns: int) -> Position | Drop:
     at = message
     assert topic.how is not None
     for part in POSES[topic.how[0]].split("."):
@@ -250,7 +252,7 @@ def _position(topic: _Heard, message: Any, stamp_ns: int) -> Position | Drop:
     return Position(x, y, convert.yaw(turned) if has_heading else None, stamp_ns)
 
 
-def _plan(_topic: _Heard, message: Any, stamp_ns: int) -> Plan | Drop:
+def _plan(_topic: _ReceivedTopic, message: Any, stamp_ns: int) -> Plan | Drop:
     points = message.points
     for x, y in points:
         if not _is_near(x, y):
@@ -260,7 +262,7 @@ def _plan(_topic: _Heard, message: Any, stamp_ns: int) -> Plan | Drop:
     return Plan(tuple(shown), stamp_ns)
 
 
-def _battery(_topic: _Heard, message: Any, stamp_ns: int) -> Battery | Drop | None:
+def _battery(_topic: _ReceivedTopic, message: Any, stamp_ns: int) -> Battery | Drop | None:
     share = float(message.percentage)
     if math.isnan(share):  # not measured, says the message's definition
         return None

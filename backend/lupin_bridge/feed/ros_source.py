@@ -18,7 +18,7 @@ from lupin_bridge.feed.ros_thread import BridgedNode, RosThread
 from lupin_bridge.feed.source import TwinSource
 from lupin_bridge.feed.topics import TwinNames
 from lupin_twin.adapt.messages import observation
-from lupin_twin.adapt.scans import MadeScan
+from lupin_twin.adapt.scans import BuiltScan
 from lupin_twin.core import interfaces
 from lupin_twin.field.engine import FieldRules
 from lupin_twin.ros.base_node import qos_of
@@ -69,7 +69,7 @@ class RosSource(TwinSource, Generic[NodeT, EventT]):
 
     takes_observations = True
 
-    async def publish_observation(self, scan: MadeScan, source: str) -> None:
+    async def publish_observation(self, scan: BuiltScan, source: str) -> None:
         """See `TwinSource`."""
         topic = self._names.observations_topic
 

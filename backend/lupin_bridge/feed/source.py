@@ -11,11 +11,11 @@ from dataclasses import dataclass, field, replace
 from typing import Any, Final, TypeVar
 
 from lupin_bridge.feed.past_process import PastProcess
-from lupin_bridge.feed.query import ExportStep, Itself, Now, Question
+from lupin_bridge.feed.query import ExportStep, Itself, Now, PastQuery
 from lupin_bridge.feed.relay import Relay
 from lupin_bridge.feed.robot import Robot
 from lupin_bridge.feed.topics import TwinNames
-from lupin_twin.adapt.scans import MadeScan
+from lupin_twin.adapt.scans import BuiltScan
 from lupin_twin.core.diagnostics import Origin
 from lupin_twin.core.drops import Counts, Recent
 from lupin_twin.core.journal_condition import UNKNOWN, Condition
@@ -182,7 +182,7 @@ class TwinSource(ABC):
         """The error as the caller gets it."""
         return error
 
-    async def ask(self, question: Question[ResultT], cost_s: float) -> ResultT:
+    async def ask(self, question: PastQuery[ResultT], cost_s: float) -> ResultT:
         """The answer to a question; `cost_s` estimates all that it takes, s of one core."""
         now = await self.now()
         try:
@@ -213,7 +213,7 @@ class TwinSource(ABC):
     # Whether there is a node to publish by.
     takes_observations = False
 
-    async def publish_observation(self, scan: MadeScan, source: str) -> None:
+    async def publish_observation(self, scan: BuiltScan, source: str) -> None:
         """Publish readings over ROS, as a robot does; whether the twin takes them is the twin's.
 
         Raises:

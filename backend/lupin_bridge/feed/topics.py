@@ -50,13 +50,13 @@ class Topic:
 def topics_of(names: TwinNames) -> tuple[Topic, ...]:
     """A twin's state, what it listens to, and what it says of itself."""
     return (
-        _heard(names.state_topic, interfaces.STATE),
-        _heard(names.observations_topic, interfaces.OBSERVATIONS, 8_000_000),
-        _heard(names.discovered_tags_topic, interfaces.DISCOVERED_TAGS, 16_000_000),
-        _heard(names.map_topic, interfaces.MAP),
-        _heard(names.diagnostics_topic, interfaces.DIAGNOSTICS, 4_000_000),
+        _received(names.state_topic, interfaces.STATE),
+        _received(names.observations_topic, interfaces.OBSERVATIONS, 8_000_000),
+        _received(names.discovered_tags_topic, interfaces.DISCOVERED_TAGS, 16_000_000),
+        _received(names.map_topic, interfaces.MAP),
+        _received(names.diagnostics_topic, interfaces.DIAGNOSTICS, 4_000_000),
     )
 
 
-def _heard(name: str, topic: interfaces.Topic, max_bytes: int = _LARGEST) -> Topic:
+def _received(name: str, topic: interfaces.Topic, max_bytes: int = _LARGEST) -> Topic:
     return Topic(name, topic.type_name, topic.is_latched, topic.depth, max_bytes)

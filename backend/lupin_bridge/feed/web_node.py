@@ -246,7 +246,7 @@ class WebNode(AdjustableNode):
 
     def _show(self, msg: Any, times: Any) -> None:
         self._patience.cancel()
-        self._look_at_publishers()
+        self._check_publishers()
         before = self._newest
         snapshot = convert.snapshot_of(msg, before, times)
         now_s = time.monotonic()
@@ -263,7 +263,7 @@ class WebNode(AdjustableNode):
             self._forget_all_but(snapshot.tags)
         self._on_state(snapshot)
 
-    def _look_at_publishers(self) -> None:
+    def _check_publishers(self) -> None:
         topic = self._topics["state_topic"]
         publishers = self.get_publishers_info_by_topic(topic)
         publishers_digest = _digest_of_publishers(publishers)

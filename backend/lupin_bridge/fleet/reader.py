@@ -16,7 +16,7 @@ from typing import Any, Final, TypeVar
 from lupin_bridge.archive.database import ArchiveError, explained
 from lupin_bridge.feed import past_child
 from lupin_bridge.feed.past_child import Child, Search
-from lupin_bridge.feed.query import Now, Question
+from lupin_bridge.feed.query import Now, PastQuery
 from lupin_bridge.fleet.compare import Compare
 from lupin_bridge.fleet.report import SitesReport
 from lupin_bridge.fleet.site_log import SiteConnection, archive_url, open_archive, write_note
@@ -84,7 +84,7 @@ class ArchiveChild(Child):
         super().__init__(ArchiveRecall)
 
     def _search(
-        self, question: Question[Any] | Latest | Note | Compare | SitesReport, now: Now
+        self, question: PastQuery[Any] | Latest | Note | Compare | SitesReport, now: Now
     ) -> Search:
         site = now.condition.path
         if isinstance(question, Latest):

@@ -24,7 +24,7 @@ from lupin_twin.core.past import HOUR_NS, Event, PastRefused, seconds
 _COUNTED: Final = {
     Event.SCANS: "scans",
     Event.FAILURES: "failed",
-    Event.LOOKS: "inspections",
+    Event.INSPECTIONS: "inspections",
     "notes": "notes",
 }
 _COUNTS: Final = """

@@ -109,7 +109,7 @@ class SiteTwin(TwinSource):
         try:
             while True:
                 await asyncio.sleep(HEARTBEAT_S)
-                self._tell(on_state)
+                self._notify(on_state)
         finally:
             reading.cancel()
 
@@ -118,7 +118,7 @@ class SiteTwin(TwinSource):
             try:
                 await self._read()
                 self._problem = ""
-                self._tell(on_state)
+                self._notify(on_state)
                 if self._reported is not None:
                     self._has_read.set()
             except (NotRemembered, TwinUnavailableError) as error:
@@ -145,7 +145,7 @@ class SiteTwin(TwinSource):
             self._read_ns = time.monotonic_ns()
             self._seq = last_seq
 
-    def _tell(self, on_state: Callable[[TwinUpdate], None]) -> None:
+    def _notify(self, on_state: Callable[[TwinUpdate], None]) -> None:
         site, is_live = self._site, self._is_live
         reported = self._reported
         archive = self._watching.archive

@@ -49,7 +49,7 @@ log = logging.getLogger(__name__)
 AnswerT = TypeVar("AnswerT")
 
 # A forwarder's word that there is something new wakes it at once; that may be lost, so it looks.
-LOOK_S: Final = 2.0
+POLL_S: Final = 2.0
 # Of what came together, the rest goes along.
 _GATHER_S: Final = 0.05
 # So long it judges before it looks again: a site's freshness waits for no other site's verdict.
@@ -151,7 +151,7 @@ class Watcher:
     def _wait(self) -> None:
         """Until somebody says that there is something new, or it is time to look."""
         is_notified = False
-        for _ in self.connection.notifies(timeout=LOOK_S, stop_after=1):
+        for _ in self.connection.notifies(timeout=POLL_S, stop_after=1):
             is_notified = True
         if is_notified:
             for _ in self.connection.notifies(timeout=_GATHER_S):

@@ -26,7 +26,7 @@ STUCK_S: Final = 6.0
 # Before its first answer it has to be started, and to connect.
 _START_S: Final = 15.0
 _RETRY_S: Final = 1.0
-_LOOK_S: Final = 0.5
+_POLL_S: Final = 0.5
 _MAX_SITES: Final = 20_000
 
 
@@ -88,7 +88,7 @@ class Watching:
 
     async def _mind(self) -> None:
         while True:
-            await asyncio.sleep(_LOOK_S)
+            await asyncio.sleep(_POLL_S)
             patience_s = STUCK_S if self.looks else _START_S
             if time.monotonic() - self._answered_s >= patience_s:
                 self._down(f"the archive has not answered for {STUCK_S:g} s")

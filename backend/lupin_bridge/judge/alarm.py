@@ -11,14 +11,14 @@ from hashlib import blake2b
 from lupin_bridge.judge.verdict import Kind, Reason, Verdict
 
 # The `tag_id` of an alarm of the whole greenhouse.
-HOUSE = ""
+SITE = ""
 
 
 @dataclass(frozen=True, slots=True)
 class Alarm:
     """What was wrong, where, from when to when, and how bad at worst.
 
-    `reason` is as it was when the alarm was raised, `tag_id` is `HOUSE` for the greenhouse. `worst`
+    `reason` is as it was when the alarm was raised, `tag_id` is `SITE` for the greenhouse. `worst`
     is the value farthest beyond its limit, in the sensor's unit; of a pest, the most counted. The
     reason's verdict is the worst so far, `raised_as` the one with which it was raised.
     """
@@ -59,4 +59,4 @@ def alarm_id(tag_id: str, kind: str, sensor: str, run_ns: int, began_ns: int) ->
 def silence(last_ns: int) -> Alarm:
     """That of a twin that was received last at a moment."""
     reason = Reason(Kind.SILENT, Verdict.UNKNOWN, since_ns=last_ns)
-    return Alarm(alarm_id(HOUSE, Kind.SILENT, "", 0, last_ns), reason, HOUSE, last_ns)
+    return Alarm(alarm_id(SITE, Kind.SILENT, "", 0, last_ns), reason, SITE, last_ns)

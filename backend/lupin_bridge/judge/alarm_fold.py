@@ -12,7 +12,7 @@ from itertools import chain
 from statistics import median
 from typing import Final
 
-from lupin_bridge.judge.alarm import HOUSE, Alarm, alarm_id
+from lupin_bridge.judge.alarm import SITE, Alarm, alarm_id
 from lupin_bridge.judge.daylight import DayLine
 from lupin_bridge.judge.days import DayNumber, TagDays, of_24_hours
 from lupin_bridge.judge.episodes import TagEpisodes
@@ -108,7 +108,7 @@ class Follower:
             if write.stamp_ns < self._forgotten_ns:
                 self.missed += 1
                 continue
-            if not self._is_told(write):
+            if not self._is_notified(write):
                 continue
             run = self._runs.get(write.run)
             if run is None:
@@ -191,7 +191,7 @@ class Follower:
             run.days.forget(before_ns, {name: tag.trail.turns for name, tag in run.tags.items()})
             run.limits = {at: ns for at, ns in run.limits.items() if at >= known_ns}
 
-    def _is_told(self, write: PastWrite) -> bool:
+    def _is_notified(self, write: PastWrite) -> bool:
         """Whether its moment is that of its run: where two overlap, the newer one is told."""
         spans = self._spans_of.get(write.run, ())
         return any(span.start_ns <= write.stamp_ns < span.end_ns for span in spans)
@@ -324,9 +324,9 @@ def _gap_at(tag: TagPast, at_ns: int) -> Gap | None:
 
 def _stop(run: _Run, start_ns: int, end_ns: int | None, limit_ns: int) -> Alarm:
     return Alarm(
-        alarm_id(HOUSE, Kind.STOPPED, "", run.begun_ns, start_ns),
+        alarm_id(SITE, Kind.STOPPED, "", run.begun_ns, start_ns),
         Reason(Kind.STOPPED, Verdict.UNKNOWN, limit=limit_ns / 1e9, since_ns=start_ns),
-        HOUSE,
+        SITE,
         start_ns + limit_ns + 1,
         end_ns,
     )

@@ -219,9 +219,9 @@ class TagEpisodes:
                 self._done = (*self._done, done)[-MAX_EPISODES:]
                 del self._watches[finding.key]
         else:
-            self._watches[finding.key] = self._gone_on(watch, finding, stamp_ns)
+            self._watches[finding.key] = self._ongoing(watch, finding, stamp_ns)
 
-    def _gone_on(self, watch: _Watch, finding: _Finding, stamp_ns: int) -> _Watch:
+    def _ongoing(self, watch: _Watch, finding: _Finding, stamp_ns: int) -> _Watch:
         """The watch after one more occasion at which its reason held."""
         watch = replace(watch, against=0)
         now = finding.reason

@@ -193,7 +193,7 @@ class Judge:
             for tag_id, health in healths.items()
             if before.tags.get(tag_id) != health
         }
-        judged = self._tell(changed, gone, day, None if is_silent else now_ns)
+        judged = self._notify(changed, gone, day, None if is_silent else now_ns)
         self._now_ns = now_ns
         return judged
 
@@ -333,7 +333,7 @@ class Judge:
         self._remind(kept)
         return _since(self._judged.tags.get(tag_id, _UNKNOWN), health)
 
-    def _tell(
+    def _notify(
         self, changed: Mapping[str, Health], gone: Sequence[str], day: Day, now_ns: int | None
     ) -> Judged:
         before = self._judged

@@ -181,14 +181,14 @@ class RecentScans:
     def _take_all(self, scans: Sequence[TakenScan]) -> None:
         """The same where none is known: each is gone through once, in the order of time."""
         mine: dict[str, list[Scanned]] = {}
-        told_ns: dict[str, int] = {}
+        reported_ns: dict[str, int] = {}
         for at_ns, group in groupby(sorted(scans, key=_in_time), key=lambda scan: scan[0]):
             taken = list(group)
             for _, tag, values in taken:
                 if LIGHT in values:
-                    told_ns[tag.tag_id] = at_ns
+                    reported_ns[tag.tag_id] = at_ns
                     self._light.put(tag.tag_id, values[LIGHT])
-                elif at_ns - told_ns.get(tag.tag_id, at_ns) > LEFT_OUT_NS:
+                elif at_ns - reported_ns.get(tag.tag_id, at_ns) > LEFT_OUT_NS:
                     self._light.put(tag.tag_id, None)
             self._newest_ns = at_ns
             is_day = self.day(at_ns).is_day

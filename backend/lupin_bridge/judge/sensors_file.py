@@ -122,7 +122,7 @@ class _File(_Part):
     areas: Annotated[dict[_Name, _Ids], Field(max_length=MAX_AREAS)] = {}
 
     @model_validator(mode="after")
-    def _says_what_is_derived(self) -> Self:
+    def _check_derived(self) -> Self:
         for name, sensor in self.sensors.items():
             if sensor.derived != (of := _COMPUTED_OF.get(name, ())):
                 raise ValueError(

@@ -27,7 +27,7 @@ from lupin_twin.core.past import NotRemembered, PastRefused
 
 log = logging.getLogger(__name__)
 
-LOOK_S: Final = 2.0
+POLL_S: Final = 2.0
 # For so long the log may lack the last moments of a day.
 LATE_NS: Final = 300 * 1_000_000_000
 MOST_DAYS: Final = 7
@@ -84,8 +84,8 @@ class Reporting(Protocol):
 class DailyReport:
     """Sends by one channel. Belongs to the event loop."""
 
-    def __init__(self, target: DailyTarget, channel: ReportChannel, look_s: float = LOOK_S) -> None:
-        self._target, self._channel, self._look_s = target, channel, look_s
+    def __init__(self, target: DailyTarget, channel: ReportChannel, poll_s: float = POLL_S) -> None:
+        self._target, self._channel, self._poll_s = target, channel, poll_s
         self._why = ""
         self._task: asyncio.Task[None] | None = None
 
@@ -108,7 +108,7 @@ class DailyReport:
                 self._say(str(error))
             except Exception:  # nobody waits for this task
                 log.exception("the report of the day met an error and is tried again")
-            await asyncio.sleep(self._look_s)
+            await asyncio.sleep(self._poll_s)
 
     def _say(self, why: str) -> None:
         if why and why != self._why:

@@ -29,7 +29,7 @@ from lupin_twin.core.diagnostics import Origin
 from lupin_twin.core.state import Reading, Snapshot
 
 MAX_PLAIN: Final = 64
-_KEPT_OF_LONG: Final = 24
+_PREFIX_OF_LONG: Final = 24
 _UNSAFE: Final = re.compile(rb"[^A-Za-z0-9-]")
 
 
@@ -47,7 +47,7 @@ def safe(name: str) -> str:
         return plain
     digest = hashlib.blake2b(raw, digest_size=16).hexdigest()
     # Never half of an escape: the beginning is for people to read.
-    return f"{re.sub(r'_.?$', '', plain[:_KEPT_OF_LONG])}__{digest}"
+    return f"{re.sub(r'_.?$', '', plain[:_PREFIX_OF_LONG])}__{digest}"
 
 
 @dataclass(frozen=True, slots=True)

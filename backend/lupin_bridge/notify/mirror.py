@@ -11,7 +11,7 @@ from typing import Any, Final
 import orjson
 
 from lupin_bridge.alarms.ledger import MAX_WORST, worst_first
-from lupin_bridge.judge.alarm import HOUSE, Alarm
+from lupin_bridge.judge.alarm import SITE, Alarm
 from lupin_bridge.judge.ranges import Sensors
 from lupin_bridge.judge.scan_interval import SHORTEST_NS
 from lupin_bridge.judge.verdict import Health, Verdict, derive
@@ -74,7 +74,7 @@ class Mirror:
         self._knows_alarms = False
         self._published: dict[str, _Published] = {}
         # Tags in their turn, each with the state with which it came to wait; HOUSE: the greenhouse.
-        self._waiting: dict[str, TagState | None] = {HOUSE: None}
+        self._waiting: dict[str, TagState | None] = {SITE: None}
         # Before that, no published reading ceases to hold.
         self._first_until_ns = _NEVER
         self.dropped = 0
@@ -90,7 +90,7 @@ class Mirror:
             tag_id: _Published(configs=published.configs)
             for tag_id, published in self._published.items()
         }
-        self._waiting = dict.fromkeys((HOUSE, *self._tags, *self._published))
+        self._waiting = dict.fromkeys((SITE, *self._tags, *self._published))
         for tag_id in self._waiting:
             self._waiting[tag_id] = self._tags.get(tag_id)
 
@@ -120,7 +120,7 @@ class Mirror:
         for tag_id in changed:
             if tag_id in self._tags or tag_id in self._published:
                 self._wait(tag_id, self._tags.get(tag_id))
-        self._waiting.setdefault(HOUSE, None)
+        self._waiting.setdefault(SITE, None)
 
     def messages(self) -> Iterator[Message]:
         """The messages of all that wait."""
@@ -148,7 +148,7 @@ class Mirror:
     def _turn_of(self, tag_id: str) -> Iterator[Message]:
         published = self._published.setdefault(tag_id, _Published())
         tag = self._tags.get(tag_id)
-        if tag_id != HOUSE and tag is None:
+        if tag_id != SITE and tag is None:
             del self._published[tag_id]
             yield from (Message(topic, _GONE) for topic in sorted(published.configs))
             return
@@ -176,9 +176,9 @@ class Mirror:
         readings = (*tag.readings, *derive(tag.readings))
         holds_ns = seen.holds_ns.get(tag_id, SHORTEST_NS)
         sensors = [self._sensors.named(reading.name) for reading in readings]
-        made_of = tuple(sensor.name for sensor in sensors), expire_after_s(holds_ns)
+        built_from = tuple(sensor.name for sensor in sensors), expire_after_s(holds_ns)
         yield from self._announced(
-            published, made_of, lambda: tag_configs(topics, tag_id, sensors, holds_ns)
+            published, built_from, lambda: tag_configs(topics, tag_id, sensors, holds_ns)
         )
         published.until_ns = min(
             (
@@ -212,12 +212,12 @@ class Mirror:
     def _announced(
         self,
         published: _Published,
-        made_of: object,
+        built_from: object,
         make: Callable[[], Iterable[tuple[str, dict[str, Any]]]],
     ) -> Iterator[tuple[str, dict[str, Any]]]:
         """The announcements, where they are of something else than before."""
-        if not self._topics.discovery or published.announced == made_of:
+        if not self._topics.discovery or published.announced == built_from:
             return
         configs = dict(make())
-        published.announced, published.configs = made_of, frozenset(configs)
+        published.announced, published.configs = built_from, frozenset(configs)
         yield from configs.items()

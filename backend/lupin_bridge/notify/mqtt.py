@@ -36,7 +36,7 @@ MOST_WAIT_S: Final = 60.0
 ANSWER_S: Final = 10.0
 KEEPALIVE_S: Final = 15
 # How often the state is looked at, s.
-LOOK_S: Final = 1.0
+POLL_S: Final = 1.0
 # Messages without an acknowledgement, and in a second: to publish ten thousand tags for the first
 # time (18 messages each) takes some minutes, and does not block the loop.
 WINDOW: Final = 32
@@ -185,7 +185,7 @@ class Mqtt:
             await self._publish_reports(client)
             messages = self._mirror.messages()
             while batch := list(islice(messages, WINDOW)):
-                if time.monotonic() - self._seen_s >= LOOK_S:
+                if time.monotonic() - self._seen_s >= POLL_S:
                     self._see()
                 self._count(in_flight=1)
                 await asyncio.gather(
@@ -195,7 +195,7 @@ class Mqtt:
                 await asyncio.sleep(len(batch) / MAX_PER_S)
             self._backoff.succeeded()
             self._count()
-            await asyncio.sleep(LOOK_S)
+            await asyncio.sleep(POLL_S)
 
     async def _publish_reports(self, client: Client) -> None:
         topic = self._topics.of(None, "report")

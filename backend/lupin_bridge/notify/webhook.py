@@ -178,7 +178,7 @@ FIRST_WAIT_S: Final = 1.0
 MOST_WAIT_S: Final = 300.0
 # A twin elsewhere says once a second where observations come from, and one of before never does.
 ORIGIN_S: Final = 10.0
-ORIGIN_LOOK_S: Final = 0.1
+ORIGIN_POLL_S: Final = 0.1
 # What the receiver will not have, however often it comes: this message, not the receiver, is the
 # trouble. Others wait behind it, so it is given up.
 REFUSALS: Final = frozenset({400, 405, 409, 410, 413, 414, 415, 422, 431})
@@ -280,7 +280,7 @@ class Webhook:
     async def _run(self) -> None:
         while True:
             try:
-                wait_s = await self._try_next()
+                wait_s = await self._attempt_next()
             except Exception as error:
                 log.exception("the webhook met an error and goes on")
                 self.condition.failing(f"{type(error).__name__} ({self._target.called})")
@@ -288,13 +288,13 @@ class Webhook:
             self._count()
             await asyncio.sleep(wait_s)
 
-    async def _try_next(self) -> float:
+    async def _attempt_next(self) -> float:
         """Send the first that waits; returns how long to wait before the next, s."""
         while (delivery := self._deliveries.first) is None:
             self._is_news.clear()
             await self._is_news.wait()
         if delivery.origin == "unknown" and self._is_origin_to_come():
-            return ORIGIN_LOOK_S
+            return ORIGIN_POLL_S
         lost = self._deliveries.lost
         body = delivery.body(lost, self._origin())
         headers = signed(self._target.secret, delivery.id, int(time.time()), body)

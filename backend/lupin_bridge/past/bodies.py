@@ -202,7 +202,7 @@ def _mean(mean: float, low: float, high: float) -> float:
 COUNTED: Final = {
     "scans": Event.SCANS,
     "failures": Event.FAILURES,
-    "looks": Event.LOOKS,
+    "looks": Event.INSPECTIONS,
     "pests_seen": Event.PESTS_SEEN,
     "pests_cleared": Event.PESTS_CLEARED,
 }

@@ -294,8 +294,8 @@ class Field(StateQuery):
         def content_etag(kind: str, *content: object) -> str:
             # By content: the revision of a map is one process's own.
             digest = None if self.occupancy is None else _digest_of_map(self.occupancy)
-            made_of = (request, samples, *content, far_off, self.rules, digest, sensors.text)
-            return etag_of(kind, made_of)
+            built_from = (request, samples, *content, far_off, self.rules, digest, sensors.text)
+            return etag_of(kind, built_from)
 
         def quality(should_stop: ShouldStop) -> bytes:
             grid = compute_field(request, samples, self.occupancy, self.rules, should_stop)

@@ -103,7 +103,7 @@ class Report:
         first_ns = max(1, self.start_ns - LEAD_NS) // HOUR_NS * HOUR_NS
         end_ns = -(-self.end_ns // HOUR_NS) * HOUR_NS
         found: Counter[int] = Counter()
-        for event in (Event.SCANS, Event.FAILURES, Event.LOOKS):
+        for event in (Event.SCANS, Event.FAILURES, Event.INSPECTIONS):
             points = max(1, (end_ns - first_ns) // HOUR_NS)
             past: SeriesPast = find(SeriesRequest(EVERY_TAG, event, first_ns, end_ns, points))
             for at_ns, n in zip(past.stamps_ns, past.counts, strict=True):
@@ -179,15 +179,15 @@ class _Fold:
         self._counts = Counter({"scans": 0, "failed": 0, "inspections": 0})
         self._scanned: set[str] = set()
         # When anything was tried, and when at each tag's sensors; before the period too.
-        self._tried_ns = array("q")
-        self._tried_at_ns: dict[str, array[int]] = {}
+        self._attempted_ns = array("q")
+        self._attempted_at_ns: dict[str, array[int]] = {}
 
     def take(self, found: PastWrites) -> None:
         """The next writes."""
         for write in found.writes:
-            self._tried_ns.append(write.stamp_ns)
+            self._attempted_ns.append(write.stamp_ns)
             if write.kind != KIND_FLOWER:
-                mine = self._tried_at_ns.setdefault(write.tag_id, array("q"))
+                mine = self._attempted_at_ns.setdefault(write.tag_id, array("q"))
                 mine.append(write.stamp_ns)
             if write.stamp_ns >= self._of.start_ns:
                 self._count(write)
@@ -313,11 +313,11 @@ class _Fold:
     def _silences(self) -> list[tuple[str, Stretch]]:
         """Those of the greenhouse, and then of tags by themselves, the longest first."""
         start_ns, end_ns = self._of.start_ns, self._of.end_ns
-        whole = list(silences(self._tried_ns, end_ns))
+        whole = list(silences(self._attempted_ns, end_ns))
         found = [
             (tag_id, silence)
-            for tag_id, tried_ns in self._tried_at_ns.items()
-            for silence in silences(tried_ns, end_ns, whole)
+            for tag_id, attempted_ns in self._attempted_at_ns.items()
+            for silence in silences(attempted_ns, end_ns, whole)
         ]
         cut = [
             (tag_id, (max(from_ns, start_ns), to_ns))
@@ -328,16 +328,16 @@ class _Fold:
 
 
 def silences(
-    tried_ns: Sequence[int], end_ns: int, but: Sequence[Stretch] = ()
+    attempted_ns: Sequence[int], end_ns: int, but: Sequence[Stretch] = ()
 ) -> Iterator[Stretch]:
     """Stretches without an attempt, longer than three times the usual interval and ten minutes.
 
     The time within `but`, stretches in their order, does not count. Before the first attempt there
     is no silence.
     """
-    if not tried_ns:
+    if not attempted_ns:
         return
-    intervals = [later - at_ns for at_ns, later in pairwise(tried_ns)]
+    intervals = [later - at_ns for at_ns, later in pairwise(attempted_ns)]
     longest_ns = max(SHORTEST_NS, TIMES_MEDIAN * (median(intervals) if intervals else 0))
     starts_ns = [from_ns for from_ns, _ in but]
     up_to = [0, *accumulate(to_ns - from_ns for from_ns, to_ns in but)]
@@ -347,7 +347,7 @@ def silences(
         late_ns = max(0, but[index - 1][1] - until_ns) if index else 0
         return up_to[index] - late_ns
 
-    for at_ns, later_ns in pairwise((*tried_ns, end_ns)):
+    for at_ns, later_ns in pairwise((*attempted_ns, end_ns)):
         length_ns = later_ns - at_ns
         if length_ns > longest_ns:
             length_ns -= within_but(later_ns) - within_but(at_ns)

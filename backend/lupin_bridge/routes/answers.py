@@ -44,7 +44,7 @@ NO_TWIN: Final = "no twin has been heard yet"
 # For the few kB of a body.
 BODY_S: Final = 5.0
 # nginx's "client closed request"; nobody receives it.
-CLIENT_GONE: Final = 499
+CLIENT_DISCONNECTED: Final = 499
 # Shorter work is done on the loop: to hand it to a worker takes longer.
 _AT_ONCE_S: Final = 1e-3
 
@@ -248,7 +248,7 @@ async def admitted(request: Request, work: Callable[[], Awaitable[Answer | Respo
         held.enter_context(bridge.admission.request(client_of(request), time.monotonic()))
         answer = await while_client_waits(request, within_time(bridge, work()))
         if answer is None:
-            return Response(status_code=CLIENT_GONE)
+            return Response(status_code=CLIENT_DISCONNECTED)
         if isinstance(answer, Response):
             return answer
         return CachedResponse(answer, held.pop_all().close)

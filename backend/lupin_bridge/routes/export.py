@@ -20,7 +20,7 @@ from lupin_bridge.past.export import CSV, PARQUET, ExportFormat, MissingPackageE
 from lupin_bridge.past.query import MAX_SECONDS, PeriodQuery
 from lupin_bridge.query_string import parameters_of
 from lupin_bridge.routes.answers import (
-    CLIENT_GONE,
+    CLIENT_DISCONNECTED,
     NEVER_STORE,
     NOT_REMEMBERED,
     bridge_of,
@@ -165,7 +165,7 @@ async def respond_export(
             except MissingPackageError as error:
                 return error_response(str(error), 501)
         if begun is None:
-            return Response(status_code=CLIENT_GONE)
+            return Response(status_code=CLIENT_DISCONNECTED)
         return ExportResponse(
             of, export, *begun, headers=headers, kind=kind, release=held.pop_all().close
         )

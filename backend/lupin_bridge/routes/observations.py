@@ -26,7 +26,7 @@ from lupin_bridge.serving.admission import ClientLimitError
 from lupin_bridge.stream import people_schema, schema
 from lupin_bridge.stream.state_json import stamp
 from lupin_twin.adapt.config import Place
-from lupin_twin.adapt.scans import MadeScan
+from lupin_twin.adapt.scans import BuiltScan
 from lupin_twin.core.state import NANOSECONDS_PER_SECOND
 
 router = APIRouter()
@@ -90,7 +90,7 @@ async def post_observation(request: Request) -> Response:
         raise TwinUnavailableError("the twin is silent: post it again later")
     stamp_ns = _stamp_ns(draft.observed_at, now_ns)
     place = None if draft.place is None else Place(*draft.place)
-    scan = MadeScan(draft.tag_id, stamp_ns, place, tuple(draft.readings.items()), "")
+    scan = BuiltScan(draft.tag_id, stamp_ns, place, tuple(draft.readings.items()), "")
     source = f"http/{person.name}"
     await bridge.source.publish_observation(scan, source)
     body = {"tag_id": draft.tag_id, "observed_at": stamp(stamp_ns), "source": source}

@@ -255,7 +255,7 @@ class HttpConnection(H11Protocol):
         if self._deadline is not None:
             self._deadline.cancel()
         self._idle_since_s = self.loop.time()
-        self._deadline = self.loop.call_later(self.timeout_keep_alive, self._look_for_request)
+        self._deadline = self.loop.call_later(self.timeout_keep_alive, self._parse_request)
 
     def _stop_waiting(self) -> None:
         for deadline in (self._deadline, self._reader_deadline):
@@ -263,7 +263,7 @@ class HttpConnection(H11Protocol):
                 deadline.cancel()
         self._deadline = self._reader_deadline = None
 
-    def _look_for_request(self) -> None:
+    def _parse_request(self) -> None:
         if not self._is_at_work or self._is_refused:
             self.abort()
 

@@ -87,12 +87,12 @@ class AlarmLists(Protocol):
 
 # In a frame: the active ones first of all, and what else was so lately.
 MAX_IN_FRAME: Final = 1_000
-LATELY_NS: Final = 86_400 * NANOSECONDS_PER_SECOND
+RECENT_NS: Final = 86_400 * NANOSECONDS_PER_SECOND
 
 
 def alarms_in_frame(page: AlarmLists, now_ns: int | None) -> list[Alarm]:
     """What a frame tells of all alarms: those active now or within 24 h, newest first as they."""
-    since_ns = 0 if now_ns is None else now_ns - LATELY_NS
+    since_ns = 0 if now_ns is None else now_ns - RECENT_NS
     active = page.active[:MAX_IN_FRAME]
     over = islice(
         (
@@ -121,14 +121,14 @@ class HealthJson:
     """Writes what was judged; made for one stream of it."""
 
     def __init__(self) -> None:
-        self._kept: dict[str, tuple[Health, bytes]] = {}
+        self._cache: dict[str, tuple[Health, bytes]] = {}
         self._whole: tuple[Judged, bytes] | None = None
 
     def whole(self, judged: Judged) -> bytes:
         """The house and every tag."""
         if self._whole is None or self._whole[0] is not judged:
-            if len(self._kept) > 2 * len(judged.tags):
-                self._kept.clear()
+            if len(self._cache) > 2 * len(judged.tags):
+                self._cache.clear()
             self._whole = judged, self._text(judged, judged.tags)
         return self._whole[1]
 
@@ -147,9 +147,9 @@ class HealthJson:
 
     def _tag(self, tag_id: str, judged: Judged) -> bytes:
         health = judged.tags[tag_id]
-        kept = self._kept.get(tag_id)
+        kept = self._cache.get(tag_id)
         if kept is None or kept[0] is not health:
-            kept = self._kept[tag_id] = health, orjson.dumps(_health(health))
+            kept = self._cache[tag_id] = health, orjson.dumps(_health(health))
         return kept[1]
 
 

@@ -40,7 +40,7 @@ class StateJson:
     def __init__(self, *, has_times: bool = True) -> None:
         self._has_times = has_times
         # What stands before a tag's age and behind it.
-        self._kept: dict[str, tuple[TagState, bytes, bytes]] = {}
+        self._cache: dict[str, tuple[TagState, bytes, bytes]] = {}
 
     def state(self, snapshot: Snapshot, now_ns: int | None = OWN_TIME) -> bytes:
         """The snapshot as JSON of `schema.TwinState`, ages as of `now_ns`, or of its own time.
@@ -56,10 +56,10 @@ class StateJson:
 
     def tag(self, tag: TagState, now_ns: int | None) -> bytes:
         """One tag as JSON of `schema.TwinTagState`, its age as of `now_ns` (ROS time, ns)."""
-        kept = self._kept.get(tag.tag_id)
+        kept = self._cache.get(tag.tag_id)
         if kept is None or kept[0] is not tag:
             before, _, behind = orjson.dumps(self._fields(tag)).partition(_NO_AGE)
-            kept = self._kept[tag.tag_id] = tag, before, behind
+            kept = self._cache[tag.tag_id] = tag, before, behind
         if now_ns is None or tag.last_observed_ns is None:
             return kept[1] + _NO_AGE + kept[2]
         # To the millisecond: a browser shows seconds, and short numbers make short frames.
@@ -68,9 +68,9 @@ class StateJson:
 
     def keep_only(self, snapshot: Snapshot) -> None:
         """Forget the tags that are not in it: a restarted twin may know others."""
-        if len(self._kept) > len(snapshot.tags):
+        if len(self._cache) > len(snapshot.tags):
             ids = {tag.tag_id for tag in snapshot.tags}
-            self._kept = {tag_id: kept for tag_id, kept in self._kept.items() if tag_id in ids}
+            self._cache = {tag_id: kept for tag_id, kept in self._cache.items() if tag_id in ids}
 
     def _fields(self, tag: TagState) -> dict[str, Any]:
         fields = message_fields(tag)

@@ -99,7 +99,7 @@ class Status:
         """Whether clients have to be told, who were told `before`."""
         return (
             before is None
-            or self.says_more_than(before)
+            or self.has_more_detail_than(before)
             or before.has_map is not self.has_map
             or _about(before.drops) != _about(self.drops)
             or _news_of(before.journal) != _news_of(self.journal)
@@ -108,7 +108,7 @@ class Status:
             or before.input_problems != self.input_problems
         )
 
-    def says_more_than(self, before: Status) -> bool:
+    def has_more_detail_than(self, before: Status) -> bool:
         """Whether a person has to be told, who was told `before`."""
         return (before.reason, before.message) != (self.reason, self.message)
 

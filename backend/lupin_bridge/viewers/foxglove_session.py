@@ -174,7 +174,7 @@ def _errors(errors: list[str]) -> tuple[bytes, ...]:
 
 
 # How often layers are looked for, s.
-LOOK_S: Final = 2.0
+POLL_S: Final = 2.0
 # How often simulated time is sent, s: often enough to look as if it ran.
 TICK_S: Final = 0.1
 MAX_LAYERS: Final = 64
@@ -270,21 +270,21 @@ class Offer:
 
     async def _follow(self) -> None:
         loop = asyncio.get_running_loop()
-        look_s = loop.time() + LOOK_S
+        poll_s = loop.time() + POLL_S
         while True:
-            await asyncio.sleep(TICK_S if self.has_time else LOOK_S)
+            await asyncio.sleep(TICK_S if self.has_time else POLL_S)
             try:
                 if self.has_time:
-                    await self._tell_time()
-                if loop.time() >= look_s:
-                    look_s = loop.time() + LOOK_S
+                    await self._send_time()
+                if loop.time() >= poll_s:
+                    poll_s = loop.time() + POLL_S
                     await self.look()
             except TwinUnavailableError:
                 continue
             except Exception:  # nobody awaits this task: the next look comes whatever it was
                 log.exception("looking for layers met an error and goes on")
 
-    async def _tell_time(self) -> None:
+    async def _send_time(self) -> None:
         now_ns = (await self._source.relay.time()).now_ns
         if now_ns not in (0, self._sent_ns):  # 0: there is no time yet
             self._sent_ns = now_ns

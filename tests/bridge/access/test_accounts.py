@@ -13,7 +13,7 @@ import pytest
 
 from lupin_bridge.access import people as people_module
 from lupin_bridge.access.accounts import SESSION_S, Accounts, Audited, digest
-from lupin_bridge.access.people import MAX_WAITING, TRY_BURST, People, PeopleBusy
+from lupin_bridge.access.people import ATTEMPT_BURST, MAX_WAITING, People, PeopleBusy
 from lupin_bridge.access.person import AccountError, Person, check_password
 from tests.support.people import PASSWORD, TOKEN, add, changing, remove
 
@@ -169,7 +169,7 @@ def test_a_flood_of_sign_ins_waits_in_a_short_queue_and_an_address_has_few(
         await people.note("anna", "comment", "site", "")
         assert (await people.audited(1))[0].what == "comment"
         await asyncio.gather(*flood, return_exceptions=True)
-        for _ in range(TRY_BURST):
+        for _ in range(ATTEMPT_BURST):
             assert await people.check("anna", "x", "one address") is None
         with pytest.raises(PeopleBusy, match="one address has tried"):
             await people.check("anna", "x", "one address")

@@ -32,12 +32,12 @@ class Journal:
         self.workers = Workers("test")
         self.writes_now: list[PastWrite] = []
         self.name, self.asked = "a", 0
-        self.is_gone = False
+        self.is_removed = False
 
     async def writes(self, request: WritesRequest) -> PastWrites:
         """The next of them."""
         self.asked += 1
-        if self.is_gone:
+        if self.is_removed:
             raise TwinUnavailableError("no twin offers /twin/get_writes")
         found = [write for write in self.writes_now if write.number > request.after]
         part = tuple(found[: request.max_count])
@@ -191,12 +191,12 @@ def test_a_twin_that_is_gone_answers_nothing_and_is_an_alarm_beside_those_of_bef
         source.writes_now = [pest(1, 2)]
         feed.on_state(told(1))
         await changed(board)
-        source.is_gone = True
+        source.is_removed = True
         feed.on_silence(is_silent=True, last_ns=NOW - 5)
         await changed(board)
         assert [alarm.reason.kind for alarm in board.now.active] == ["silent", "pest"]
         assert board.now.source == "journal"
-        source.is_gone = False
+        source.is_removed = False
         feed.on_silence(is_silent=False, last_ns=NOW)
         await changed(board)
         assert [alarm.reason.kind for alarm in board.now.active] == ["pest"]
@@ -213,12 +213,12 @@ def test_alarms_that_a_journal_has_not_confirmed_for_long_are_not_told_as_all_th
         source.writes_now = [pest(1, 2)]
         feed.on_state(told(1))
         await changed(board)
-        source.is_gone = True
+        source.is_removed = True
         feed.on_state(told(2))
         await changed(board)
         assert [alarm.reason.kind for alarm in board.now.active] == ["pest"]
         assert (board.now.source, len(board.now.alarms)) == ("starting", 1)
-        source.is_gone = False
+        source.is_removed = False
         feed.on_state(told(3))
         await changed(board)
         assert (board.now.source, len(board.now.alarms)) == ("journal", 1)

@@ -17,7 +17,7 @@ import pytest
 
 from lupin_bridge.feed import past_process
 from lupin_bridge.feed.past_child import NICENESS
-from lupin_bridge.feed.past_process import MAX_ASKED, PastProcess
+from lupin_bridge.feed.past_process import MAX_PENDING, PastProcess
 from lupin_bridge.feed.query import ExportStep, Now
 from lupin_bridge.past.plans import Answered
 from lupin_twin.core.journal_condition import Condition, JournalState
@@ -125,13 +125,13 @@ def test_what_nobody_waits_for_any_more_ends_there(path: Path, shared: Shared) -
 
     async def test() -> None:
         asking = [
-            asyncio.create_task(past.ask(Endless(), now(path), 1.0)) for _ in range(MAX_ASKED)
+            asyncio.create_task(past.ask(Endless(), now(path), 1.0)) for _ in range(MAX_PENDING)
         ]
-        await until(lambda: len(past.asked) == MAX_ASKED, "all of them")
-        with pytest.raises(NotRemembered, match=f"{MAX_ASKED} questions .* the limit"):
+        await until(lambda: len(past.asked) == MAX_PENDING, "all of them")
+        with pytest.raises(NotRemembered, match=f"{MAX_PENDING} questions .* the limit"):
             await past.ask(Running(), now(path), 0.0)
         asking.pop().cancel()
-        await until(lambda: len(past.asked) < MAX_ASKED, "one to go")
+        await until(lambda: len(past.asked) < MAX_PENDING, "one to go")
         running, _ = await past.ask(Running(), now(path), 0.0)
         assert running <= 3, "those that no thread has taken wait"
         for asked in asking:

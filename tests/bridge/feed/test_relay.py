@@ -153,12 +153,12 @@ async def test_the_oldest_give_way_within_depth_and_bytes_and_the_too_large_neve
 async def test_what_comes_while_it_is_handed_out_is_handed_out_too(ros: Ros, relay: Relay) -> None:
     heard: list[bytes] = []
 
-    def hear(sample: Sample) -> None:
+    def receive(sample: Sample) -> None:
         heard.append(sample.data)
         if sample.data == b"1":
             ros.takes[STATE.name](Sample(b"2", 2))
 
-    await relay.listen(STATE, hear)
+    await relay.listen(STATE, receive)
     await ros.publish(b"1")
     assert (heard, ros.wake_ups) == ([b"1", b"2"], 2)
 

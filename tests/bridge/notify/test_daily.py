@@ -75,7 +75,7 @@ async def sending(
     assert target is not None
     hook = Webhook(target, first_wait_s=0.001)
     hook.start(Alarms(), lambda: house.ros_time_ns, lambda: "robot")
-    report = DailyReport(DailyTarget(SIX, zone, folder), hook, look_s=0.005)
+    report = DailyReport(DailyTarget(SIX, zone, folder), hook, poll_s=0.005)
     report.start(house)
     try:
         yield hook
@@ -257,7 +257,7 @@ async def test_a_broker_gets_it_once_it_is_there_and_keeps_it(tmp_path: Path) ->
     house = House(ns("2026-05-01T07:00Z"))
     channel = Mqtt(target, Mirror(target.topics, SENSORS), first_wait_s=0.001)
     channel.start(lambda: seen(tag("a", temperature=20.0)))
-    report = DailyReport(DailyTarget(SIX, UTC, tmp_path), channel, look_s=0.005)
+    report = DailyReport(DailyTarget(SIX, UTC, tmp_path), channel, poll_s=0.005)
     report.start(house)
     try:
         await noted(tmp_path)

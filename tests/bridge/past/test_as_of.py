@@ -36,7 +36,7 @@ def tag(tag_id: str, x: float, value: float, at_ns: int = NS) -> TagState:
     return TagState(tag_id, pose, (Reading("co2", value, at_ns),), at_ns)
 
 
-HOUSE = Snapshot(5 * NS, "map", (tag("a", 0.0, 400.0), tag("b", 1.0, 500.0)))
+SITE = Snapshot(5 * NS, "map", (tag("a", 0.0, 400.0), tag("b", 1.0, 500.0)))
 
 
 def a_map(revision: int, free: int = 0) -> OccupancyMap:
@@ -72,25 +72,25 @@ def body(plan: Plan) -> dict[str, Any]:
 
 
 def test_a_state_has_its_moment_and_the_ages_of_then() -> None:
-    found = body(WholeState(None).plan(HOUSE))
+    found = body(WholeState(None).plan(SITE))
     schema.TwinState.model_validate(found)
     assert found["header"] == {"stamp": {"sec": 5, "nanosec": 0}, "frame_id": "map"}
     assert [t["stale_seconds"] for t in found["tags"]] == [4.0, 4.0]
 
 
 def test_a_tag_is_the_one_in_the_state() -> None:
-    assert body(OneTag(None, "b").plan(HOUSE)) == body(WholeState(None).plan(HOUSE))["tags"][1]
+    assert body(OneTag(None, "b").plan(SITE)) == body(WholeState(None).plan(SITE))["tags"][1]
     with pytest.raises(NoSuchTag):
-        OneTag(None, "c").plan(HOUSE)
+        OneTag(None, "c").plan(SITE)
 
 
 def test_a_field_is_that_of_the_tags_of_then_over_the_box_of_then() -> None:
-    found = body(field_of(HOUSE, asked(), JSON))
+    found = body(field_of(SITE, asked(), JSON))
     schema.GetFieldResponse.model_validate(found)
     assert (found["origin_x"], found["origin_y"]) == (-1.5, -1.5)
     assert (found["width"], found["height"], found["sample_count"]) == (40, 30, 2)
     assert 400.0 <= found["value_min"] < found["value_max"] <= 500.0
-    found = body(field_of(HOUSE, asked()))
+    found = body(field_of(SITE, asked()))
     schema.FieldQuality.model_validate(found)
     assert (found["sample_count"], found["rmse"]) == (2, 100.0)
 
@@ -120,7 +120,7 @@ def test_before_there_was_anything_there_is_an_empty_state_and_an_empty_field() 
 
 def test_a_field_is_clipped_to_the_map_of_now() -> None:
     box = {"bbox_min_x": 0, "bbox_min_y": 0, "bbox_max_x": 1, "bbox_max_y": 0.5, "resolution": 0.5}
-    found = body(field_of(HOUSE, asked(RULES, a_map(1), **box), JSON))
+    found = body(field_of(SITE, asked(RULES, a_map(1), **box), JSON))
     assert [value is None for value in found["values"]] == [False, True]
 
 
@@ -191,14 +191,14 @@ def test_what_is_wrong_by_itself_is_refused_before_anything_is_known(
 
 def test_what_is_too_large_by_the_tags_of_then_is_refused() -> None:
     limit = replace(RULES, max_grid_cells=40 * 30)
-    field_of(HOUSE, asked(limit), JSON)
+    field_of(SITE, asked(limit), JSON)
     with pytest.raises(FieldRefused, match="the limit is 1199"):
-        field_of(HOUSE, asked(replace(RULES, max_grid_cells=1_199), resolution=0.1), JSON)
+        field_of(SITE, asked(replace(RULES, max_grid_cells=1_199), resolution=0.1), JSON)
     # Who does not say how wide the cells are gets wider ones.
-    field_of(HOUSE, asked(replace(RULES, max_grid_cells=1_199)), JSON)
-    field_of(HOUSE, asked(replace(RULES, max_grid_cells=4_800), scale=2), PNG)
+    field_of(SITE, asked(replace(RULES, max_grid_cells=1_199)), JSON)
+    field_of(SITE, asked(replace(RULES, max_grid_cells=4_800), scale=2), PNG)
     with pytest.raises(FieldRefused, match="4800 pixels, the limit is 4799"):
-        field_of(HOUSE, asked(replace(RULES, max_grid_cells=4_799), scale=2), PNG)
+        field_of(SITE, asked(replace(RULES, max_grid_cells=4_799), scale=2), PNG)
 
 
 # --- ETags ----------------------------------------------------------------------------------------
@@ -217,8 +217,8 @@ def plans(house: Snapshot, field: Field) -> list[str]:
 def test_the_same_content_has_the_same_etags_whoever_made_it() -> None:
     again = Snapshot(5 * NS, "map", (tag("a", 0.0, 400.0), tag("b", 1.0, 500.0)))
     for one, other in ((asked(), asked()), (asked(RULES, a_map(1)), asked(RULES, a_map(7)))):
-        assert plans(again, other) == plans(HOUSE, one)
-        assert len(set(plans(HOUSE, one))) == 7
+        assert plans(again, other) == plans(SITE, one)
+        assert len(set(plans(SITE, one))) == 7
 
 
 def later(house: Snapshot) -> Snapshot:
@@ -243,10 +243,10 @@ def changed(**changes: Any) -> Callable[[Snapshot], Snapshot]:
 def test_what_changes_an_answer_changes_its_etag(
     change: Callable[[Snapshot], Snapshot], field_changes: bool
 ) -> None:
-    house = change(HOUSE)
-    assert WholeState(None).plan(house).etag != WholeState(None).plan(HOUSE).etag
+    house = change(SITE)
+    assert WholeState(None).plan(house).etag != WholeState(None).plan(SITE).etag
     for field_format in FORMATS:
-        one, other = (field_of(h, asked(), field_format) for h in (HOUSE, house))
+        one, other = (field_of(h, asked(), field_format) for h in (SITE, house))
         assert (one.etag != other.etag) is field_changes
         is_same = one.write(lambda: False) == other.write(lambda: False)
         assert is_same is not field_changes
@@ -264,11 +264,11 @@ def test_what_changes_an_answer_changes_its_etag(
     ],
 )
 def test_another_field_has_another_etag(other: Field) -> None:
-    assert not set(plans(HOUSE, other)[3:]) & set(plans(HOUSE, asked())[3:])
+    assert not set(plans(SITE, other)[3:]) & set(plans(SITE, asked())[3:])
 
 
 def test_a_scaled_picture_is_another_one() -> None:
-    etags = {field_of(HOUSE, asked(scale=scale), PNG).etag for scale in (1, 2)}
+    etags = {field_of(SITE, asked(scale=scale), PNG).etag for scale in (1, 2)}
     assert len(etags) == 2
 
 
@@ -278,8 +278,8 @@ def test_a_scaled_picture_is_another_one() -> None:
 @pytest.mark.parametrize("field_format", [JSON, PNG])
 def test_what_takes_long_says_so(field_format: FieldFormat) -> None:
     large = replace(RULES, max_grid_cells=1_000_000)
-    assert field_of(HOUSE, asked(), field_format).cost_s < SMALL_S
-    assert field_of(HOUSE, asked(large, resolution=0.004), field_format).cost_s > SMALL_S
+    assert field_of(SITE, asked(), field_format).cost_s < SMALL_S
+    assert field_of(SITE, asked(large, resolution=0.004), field_format).cost_s > SMALL_S
     many = Snapshot(NS, "map", tuple(tag(str(n), n, 1.0) for n in range(2_000)))
-    assert WholeState(None).plan(many).cost_s > SMALL_S > WholeState(None).plan(HOUSE).cost_s
+    assert WholeState(None).plan(many).cost_s > SMALL_S > WholeState(None).plan(SITE).cost_s
     assert field_of(many, asked(large, resolution=1)).cost_s > SMALL_S

@@ -16,7 +16,7 @@ from lupin_twin.core.state import Reading, TagState
 S = 10**9
 NOW_NS = 1_000 * S
 Known = dict[str, dict[int, float]]
-HOUSE: Known = {
+SITE: Known = {
     "temperature": {10 * S: 20.0, 20 * S: 30.0, 30 * S: 25.0, 40 * S: 26.0},
     # Of another moment, out of what can be, failed.
     "humidity": {10 * S: 50.0, 20 * S + 1: 50.0, 30 * S: 120.0, 40 * S: math.nan, 50 * S: 9.0},
@@ -48,7 +48,7 @@ def answer(request: SeriesRequest, known: Known) -> tuple[SeriesPast, list[Serie
 
 
 def test_only_what_was_read_in_one_scan_and_can_be_is_paired() -> None:
-    past, asked = answer(ASKED, HOUSE)
+    past, asked = answer(ASKED, SITE)
     assert past.stamps_ns == (10 * S,)
     assert past.means == past.minima == past.maxima == (vpd(20.0, 50.0),)
     assert (past.counts, past.is_bucketed, past.start_ns) == ((1,), False, 10 * S)
@@ -58,9 +58,9 @@ def test_only_what_was_read_in_one_scan_and_can_be_is_paired() -> None:
 
 def test_a_sensor_of_that_name_goes_first_and_of_a_measured_one_nothing_else_is_asked() -> None:
     for name in ("vpd", "co2"):
-        past, asked = answer(replace(ASKED, sensor_type=name), {**HOUSE, name: {5 * S: 1.0}})
+        past, asked = answer(replace(ASKED, sensor_type=name), {**SITE, name: {5 * S: 1.0}})
         assert (past.means, len(asked)) == ((1.0,), 1)
-    past, asked = answer(replace(ASKED, sensor_type="co2"), HOUSE)
+    past, asked = answer(replace(ASKED, sensor_type="co2"), SITE)
     assert (past.stamps_ns, len(asked)) == ((), 1)
 
 

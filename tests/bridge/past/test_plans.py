@@ -33,7 +33,7 @@ from lupin_twin.core.past import Event, SeriesPast, SeriesRequest
 from lupin_twin.core.state import Attempt, Reading, TagState
 from lupin_twin.field.idw import never
 from lupin_twin.runtime.workers import SMALL_S
-from tests.bridge.past.test_as_of import HOUSE, NS, asked
+from tests.bridge.past.test_as_of import NS, SITE, asked
 
 CRITERIA = Criteria.of(Settings(time_zone="Europe/Amsterdam"))
 QUESTIONS: tuple[Query, ...] = (
@@ -56,7 +56,7 @@ def answer(question: Query, has: str = "") -> Answered:
 def found(need: Any) -> Any:
     if isinstance(need, SeriesRequest):
         return SeriesPast(0, 9 * NS)
-    return HOUSE if isinstance(need, int) else ()
+    return SITE if isinstance(need, int) else ()
 
 
 @pytest.mark.parametrize("question", QUESTIONS, ids=lambda q: type(q).__name__)

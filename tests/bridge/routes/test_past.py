@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from lupin_bridge.feed.query import Question
+from lupin_bridge.feed.query import PastQuery
 from lupin_bridge.feed.source import TwinTimeoutError, TwinUnavailableError
 from lupin_bridge.past import schema
 from lupin_bridge.serving.admission import Limits
@@ -35,7 +35,7 @@ async def remembering(past: MadeUp, limits: Limits | None = None) -> AsyncIterat
         twin = it.twin
         twin.rows = past.rows  # type: ignore[method-assign]
 
-        async def ask(question: Question[Any], cost_s: float) -> Any:  # all alike
+        async def ask(question: PastQuery[Any], cost_s: float) -> Any:  # all alike
             return await look_up(question, past, twin.workers)
 
         twin.ask = ask  # type: ignore[method-assign]

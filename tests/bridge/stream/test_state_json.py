@@ -221,7 +221,7 @@ def test_tags_that_are_gone_are_forgotten() -> None:
         writer.keep_only(snapshot)
         writer.state(snapshot)
     writer.keep_only(snapshot)
-    assert set(writer._kept) == {"4-0", "4-1", "4-2"}
+    assert set(writer._cache) == {"4-0", "4-1", "4-2"}
 
 
 def test_a_history_is_sorted_by_sensor_and_keeps_its_order() -> None:

@@ -65,18 +65,18 @@ def test_what_is_news_for_clients_and_what_for_people() -> None:
     assert not Status("live", 0.9).is_news_after(live), "an age alone is none"
     for more in (Status("stale", 3.0), Status("live", 0.1, twin_count=2)):
         assert more.is_news_after(live)
-        assert more.says_more_than(live)
+        assert more.has_more_detail_than(live)
     recorded = Status("live", 0.1, origin="recorded")
     assert recorded.is_news_after(live)
     assert schema.StatusFrame.model_validate(recorded.frame()).origin == "recorded"
     unheard = Status("live", 0.1, input_problems=("use UDP",))
     assert unheard.is_live
     assert unheard.is_news_after(live)
-    assert not unheard.says_more_than(live)
+    assert not unheard.has_more_detail_than(live)
     assert schema.StatusFrame.model_validate(unheard.frame()).input_problems == ["use UDP"]
     mapped = Status("live", 0.1, has_map=True)
     assert mapped.is_news_after(live)
-    assert not mapped.says_more_than(live)
+    assert not mapped.has_more_detail_than(live)
 
 
 @pytest.mark.parametrize(
@@ -105,7 +105,7 @@ def test_what_was_dropped_is_news_when_it_grows_much_and_when_it_is_long_ago() -
     assert status(4).is_news_after(status(3))
     assert not status(5).is_news_after(status(4))
     assert Status("live", 0.1).is_news_after(status(1))
-    assert not status(1).says_more_than(Status("live", 0.1))
+    assert not status(1).has_more_detail_than(Status("live", 0.1))
     [drop] = schema.StatusFrame.model_validate(status(5).frame()).drops
     assert (drop.reason, drop.message, drop.count) == ("frame", "dropped a message", 5)
 
@@ -119,7 +119,7 @@ def test_how_a_channel_does_is_told_when_that_changes() -> None:
     assert status(True, "no answer").is_news_after(failing)
     assert well.is_news_after(failing)
     assert not status(True, "refused").is_news_after(failing)
-    assert not failing.says_more_than(well), "the channel has logged it"
+    assert not failing.has_more_detail_than(well), "the channel has logged it"
     (told,) = schema.StatusFrame.model_validate(failing.frame()).outward
     assert (told.channel, told.is_failing, told.detail) == ("mqtt", True, "refused")
 
@@ -130,7 +130,7 @@ def test_how_the_journal_does_is_told_when_that_changes() -> None:
 
     failing = status(JournalState.FAILING, "no room")
     assert failing.is_news_after(Status("live", 0.1))
-    assert not failing.says_more_than(Status("live", 0.1)), "the twin has logged it"
+    assert not failing.has_more_detail_than(Status("live", 0.1)), "the twin has logged it"
     assert status(JournalState.FAILING, "read-only").is_news_after(failing)
     recording = status(JournalState.RECORDING, written=1)
     assert recording.is_news_after(failing)

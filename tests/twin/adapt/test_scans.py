@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from lupin_twin.adapt.config import Config, Place, Robot
-from lupin_twin.adapt.scans import MadeScan, Scans, number_of
+from lupin_twin.adapt.scans import BuiltScan, Scans, number_of
 from lupin_twin.core.drops import MAX_TAGS
 
 S = 1_000_000_000
@@ -27,7 +27,7 @@ def read(scans: Scans, at_s: float, value: float = 20.0) -> bool:
     return scans.take("temperature", "", value, int(at_s * S), int(at_s * S))
 
 
-def move(scans: Scans, at_s: float, x: float, y: float = 0.0) -> list[MadeScan]:
+def move(scans: Scans, at_s: float, x: float, y: float = 0.0) -> list[BuiltScan]:
     return list(scans.move(x, y, int(at_s * S)))
 
 
@@ -37,7 +37,7 @@ def test_a_stop_is_one_scan_of_the_mean_when_the_robot_leaves() -> None:
     assert read(scans, 2, 20.0)
     assert read(scans, 3, 22.0)
     (scan,) = move(scans, 4, 1.5)
-    assert scan == MadeScan(
+    assert scan == BuiltScan(
         "A", 3 * S, TAGS["A"], (("temperature", 21.0),), "temperature ±1.4 of 2"
     )
     assert scans.tag is None

@@ -115,13 +115,13 @@ SCANS = st.builds(
     ),
     TAG_IDS, STAMPS, SENSORS, POSES, STATUS,
 )  # fmt: skip
-LOOKS = st.builds(
+INSPECTIONS = st.builds(
     lambda tag_id, stamp_ns, pose, status: Inspection(
         tag_id, stamp_ns, None if status else Flower(), pose, status
     ),
     TAG_IDS, STAMPS, POSES, STATUS,
 )  # fmt: skip
-STEPS = st.lists(SCANS | LOOKS | st.integers(1, 30), max_size=25)
+STEPS = st.lists(SCANS | INSPECTIONS | st.integers(1, 30), max_size=25)
 
 
 def numbered(write: Write, number: int) -> Write:

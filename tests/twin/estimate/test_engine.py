@@ -114,15 +114,15 @@ def test_what_nobody_waits_for_ends_between_two_steps() -> None:
 def test_what_a_sensor_has_read_since_it_changed_does_not_count() -> None:
     tags = [tag_past(index, 1.0 + index / 3.0, 2.0) for index in range(3)]
 
-    def made_of(since_h: float) -> tuple[int, int]:
+    def built_from(since_h: float) -> tuple[int, int]:
         changed = {"tag-1": int(since_h * 3600 * S), "gone": 0}
         asked = EstimateRequest(box())
         made = EstimateJob(asked, None, DAY_S, changed).compute(tags, int(3.0 * 3600 * S))
         return made.sample_count, made.reading_count
 
-    assert made_of(2.5) == (3, 6)
-    assert made_of(2.0) == (3, 5)
-    assert made_of(1.0) == (2, 4)
+    assert built_from(2.5) == (3, 6)
+    assert built_from(2.0) == (3, 5)
+    assert built_from(1.0) == (2, 4)
 
 
 @pytest.mark.parametrize("at_ns", [-1, 11 * S])

@@ -29,7 +29,7 @@ from tests.support.log_life import (
 from tests.twin.journal.conftest import Engines, Living
 
 END = BEGUN + (LATEST + 200) * MINUTE
-COUNTED = (Event.SCANS, Event.FAILURES, Event.LOOKS, Event.PESTS_SEEN, Event.PESTS_CLEARED)
+COUNTED = (Event.SCANS, Event.FAILURES, Event.INSPECTIONS, Event.PESTS_SEEN, Event.PESTS_CLEARED)
 Period = tuple[int, int]
 _points = st.integers(1, 40)
 

@@ -21,7 +21,7 @@ END = BEGUN + (LATEST + 200) * MINUTE
 COUNTED = (
     Event.SCANS,
     Event.FAILURES,
-    Event.LOOKS,
+    Event.INSPECTIONS,
     Event.PESTS_SEEN,
     Event.PESTS_CLEARED,
 )

@@ -39,8 +39,8 @@ def test_runs_are_kept_in_a_file_that_takes_anothers_place(path: Path) -> None:
         run = file.start(CLOCK, 1, is_believed=False).run
     path.unlink()
     with opened(path) as file:
-        file.keep_run(run)
-        file.keep_run(run)
+        file.retain_run(run)
+        file.retain_run(run)
         assert file.append([(run, scan())]) == (1, 0)
     assert known(path) == {scan()}
 
@@ -52,7 +52,7 @@ def test_upkeep_purges_shrinks_and_checkpoints(path: Path, monkeypatch: pytest.M
         run = file.start(CLOCK, 1, is_believed=False).run
         file.append([(run, scan(at_ns=NOW + n)) for n in range(5000)])
         steps = 0
-        while file.look_after(may_purge=True):
+        while file.check_size(may_purge=True):
             steps += 1
         assert steps > 10
     ((left,),) = select(path, "SELECT count(*) FROM scan")

@@ -16,10 +16,10 @@ from lupin_twin.journal.schema import (
     DamagedFile,
     Empty,
     Foreign,
+    is_damage_error,
     open_named,
     open_reader,
     open_writer,
-    says_damaged,
 )
 
 
@@ -106,7 +106,7 @@ def test_a_file_that_is_no_database_is_damaged(tmp_path: Path) -> None:
     text.write_text("nothing of the kind\n" * 100)
     with pytest.raises(sqlite3.DatabaseError) as caught:
         open_writer(text)
-    assert says_damaged(caught.value)
+    assert is_damage_error(caught.value)
     assert find_damage(text)
 
 
@@ -123,7 +123,7 @@ def test_a_journal_with_a_damaged_header_is_damaged_and_not_somebody_elses(path:
     path.write_bytes(whole)
     with pytest.raises(DamagedFile) as caught:
         open_writer(path)
-    assert says_damaged(caught.value)
+    assert is_damage_error(caught.value)
 
 
 def test_a_flipped_letter_in_a_table_s_definition_is_damage(path: Path) -> None:
@@ -137,4 +137,4 @@ def test_a_flipped_letter_in_a_table_s_definition_is_damage(path: Path) -> None:
             assert find_damage(path), f"{letter} {bit}"
             with pytest.raises(FILE_ERRORS) as caught:
                 open_writer(path)
-            assert says_damaged(caught.value)
+            assert is_damage_error(caught.value)

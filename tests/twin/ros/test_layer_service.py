@@ -66,13 +66,13 @@ class Viewer(Peer):
         )
 
     def hear_diagnostics(self) -> None:
-        def hear(msg: Any) -> None:
+        def receive(msg: Any) -> None:
             for status in msg.status:
                 if status.name == "/gh1/lupin_twin: layers":
                     self.said = {each.key: each.value for each in status.values}
                     self.said["message"] = status.message
 
-        self.node.create_subscription(DiagnosticArray, "/diagnostics", hear, 10)
+        self.node.create_subscription(DiagnosticArray, "/diagnostics", receive, 10)
 
     def says(self, topic: str, count: int) -> None:
         """Wait until the twin says so; that it says more is found here too."""

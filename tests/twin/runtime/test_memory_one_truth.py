@@ -30,19 +30,19 @@ def count(path: Path) -> int:
 
 def test_of_one_write_that_is_received_twice_the_first_value_stays(path: Path) -> None:
     with twin(path) as life:
-        life.hear(-5, t=20.0)
-        life.hear(-5, t=25.0)
+        life.receive(-5, t=20.0)
+        life.receive(-5, t=25.0)
         assert life.says() == (20.0, 5.0)
     with twin(path) as life:
-        life.hear(-5, t=25.0)
+        life.receive(-5, t=25.0)
         assert life.says() == (20.0, 5.0)
         assert count(path) == 1
 
 
 def test_sensors_that_are_new_are_a_further_part_of_the_same_scan(path: Path) -> None:
     with twin(path) as life:
-        life.hear(-5, t=20.0)
-        life.hear(-5, t=25.0, h=60.0)
+        life.receive(-5, t=20.0)
+        life.receive(-5, t=25.0, h=60.0)
         assert life.says("t") == (20.0, 5.0)
         assert life.says("h") == (60.0, 5.0)
         assert len(life.history.of("7").scans) == 1
@@ -57,26 +57,26 @@ def test_of_two_sources_with_one_stamp_the_later_received_counts_and_repeats_fli
 ) -> None:
     with twin(path) as life:
         for _ in range(3):
-            life.hear(-5, source="a", t=20.0)
-            life.hear(-5, source="b", t=25.0)
-        life.hear(-5, source="a", t=20.0)
+            life.receive(-5, source="a", t=20.0)
+            life.receive(-5, source="b", t=25.0)
+        life.receive(-5, source="a", t=20.0)
         assert life.says() == (25.0, 5.0)
     with twin(path) as life:
         assert life.says() == (25.0, 5.0)
-        life.hear(-5, source="a", t=20.0)
+        life.receive(-5, source="a", t=20.0)
         assert life.says() == (25.0, 5.0)
     assert count(path) == 2
 
 
 def test_a_try_that_failed_makes_nothing_younger(path: Path) -> None:
     with twin(path) as life:
-        life.hear(-9, status=2)
-        life.hear(-8, status=1)
+        life.receive(-9, status=2)
+        life.receive(-8, status=1)
         assert life.live == life.past()
         assert life.live["7"].last_observed_ns == NOW - 9 * S
-        life.hear(-7)
-        life.hear(-6, status=2)
-        life.hear(-5, flower=NO_FLOWER, status=2)
+        life.receive(-7)
+        life.receive(-6, status=2)
+        life.receive(-5, flower=NO_FLOWER, status=2)
         assert life.live == life.past()
         assert life.live["7"].last_observed_ns == NOW - 7 * S
         before = life.live
@@ -89,26 +89,26 @@ def test_a_try_that_failed_makes_nothing_younger(path: Path) -> None:
 
 def test_a_stamp_from_the_future_is_held_to_when_it_was_first_received(path: Path) -> None:
     with twin(path) as life:
-        life.hear(60, t=20.0)
+        life.receive(60, t=20.0)
         life.at(30, passed_s=30)
-        life.hear(60, t=20.0)
+        life.receive(60, t=20.0)
         life.at(100, passed_s=70)
-        life.hear(60, t=20.0)
+        life.receive(60, t=20.0)
         assert life.says() == (20.0, 100.0)
     with twin(path, 130) as life:
-        life.hear(60, t=20.0)
+        life.receive(60, t=20.0)
         assert life.says() == (20.0, 130.0)
     assert select(path, "SELECT stamp_ns, own_stamp_ns FROM scan") == [(NOW, NOW + 60 * S)]
 
 
 def test_it_stays_known_however_much_else_was_tried_meanwhile(path: Path) -> None:
     with twin(path) as life:
-        life.hear(60, t=20.0)
+        life.receive(60, t=20.0)
         for second in range(1, 12):  # more than a tag's history has
             life.at(second, passed_s=1)
-            life.hear(second, h=float(second))
+            life.receive(second, h=float(second))
         life.at(100, passed_s=80)
-        life.hear(60, t=20.0)
+        life.receive(60, t=20.0)
         assert life.says("t") == (20.0, 100.0)
         assert count(path) == 12
 
@@ -125,7 +125,7 @@ def test_a_wall_clock_that_goes_on_is_one_run_however_far_it_jumps(
     path: Path, ahead_s: float
 ) -> None:
     with twin(path) as life:
-        life.hear(-5, t=20.0)
+        life.receive(-5, t=20.0)
         life.at(ahead_s, passed_s=1.0)
         assert life.says() == (20.0, ahead_s + 5)
     with twin(path, 2 * ahead_s) as life:
@@ -135,12 +135,12 @@ def test_a_wall_clock_that_goes_on_is_one_run_however_far_it_jumps(
 
 def test_after_a_step_back_what_comes_then_counts_everywhere(path: Path) -> None:
     with twin(path) as life:
-        life.hear(-5, t=1.0)
-        life.hear(-5, tag="8", t=3.0, pose=HERE)
+        life.receive(-5, t=1.0)
+        life.receive(-5, tag="8", t=3.0, pose=HERE)
         life.at(-40)
         assert life.says() == (1.0, 0.0)
         life.at(-30, passed_s=10)
-        life.hear(-31, t=2.0)
+        life.receive(-31, t=2.0)
         assert life.says() == (2.0, 1.0)
         assert life.says(tag="8") == (3.0, 10.0)
         assert life.live["8"].pose == HERE
@@ -156,11 +156,11 @@ def test_after_a_step_back_what_comes_then_counts_everywhere(path: Path) -> None
 
 def test_a_step_back_while_the_twin_is_away_is_one_too(path: Path) -> None:
     with twin(path) as life:
-        life.hear(-5, t=1.0)
+        life.receive(-5, t=1.0)
     with twin(path, -40) as life:
         assert life.says() == (1.0, 0.0)
         life.at(-30)
-        life.hear(-31, t=2.0)
+        life.receive(-31, t=2.0)
         assert life.says() == (2.0, 1.0)
     with twin(path, 30) as life:
         assert life.says() == (2.0, 61.0)
@@ -169,23 +169,23 @@ def test_a_step_back_while_the_twin_is_away_is_one_too(path: Path) -> None:
 
 def test_what_is_received_again_after_a_step_is_the_same_still(path: Path) -> None:
     with twin(path) as life:
-        life.hear(-5, t=1.0)
+        life.receive(-5, t=1.0)
         life.at(-40)
-        life.hear(-5, t=1.0)
+        life.receive(-5, t=1.0)
         life.at(60)
-        life.hear(-5, t=1.0)
+        life.receive(-5, t=1.0)
         assert life.says() == (1.0, 100.0)
     assert count(path) == 1
 
 
 def test_a_wall_clock_set_back_by_hours_begins_a_run_that_knows_all(path: Path) -> None:
     with twin(path) as life:
-        life.hear(-5, t=1.0, pose=HERE)
-        life.hear(-5, tag="8", status=2)
+        life.receive(-5, t=1.0, pose=HERE)
+        life.receive(-5, tag="8", status=2)
         life.at(-7200)
         assert life.says() == (1.0, 0.0)
         life.at(-7100)
-        life.hear(-7101, t=2.0)
+        life.receive(-7101, t=2.0)
         assert life.says() == (2.0, 1.0)
         before = life.live
         life.at(-7000)
@@ -199,11 +199,11 @@ def test_a_wall_clock_set_back_by_hours_begins_a_run_that_knows_all(path: Path) 
 def test_a_jump_ahead_joins_the_run_from_before_the_clock_went_back(path: Path) -> None:
     with twin(path, -100) as life:
         life.at(0, passed_s=100)
-        life.hear(-5, t=1.0)
+        life.receive(-5, t=1.0)
         life.at(-7200)
-        life.hear(-7200, t=2.0)
+        life.receive(-7200, t=2.0)
         life.at(10, passed_s=10)
-        life.hear(9, t=3.0)
+        life.receive(9, t=3.0)
         assert life.says() == (3.0, 1.0)
         assert life.past(-4)["7"].readings[0].value == 1.0
         assert life.past(5)["7"].readings[0].value == 1.0
@@ -216,20 +216,20 @@ def test_a_jump_ahead_joins_the_run_from_before_the_clock_went_back(path: Path) 
 def test_a_step_to_before_the_beginning_of_its_run_has_the_moment(path: Path) -> None:
     with twin(path, -9000) as life:
         life.at(0, passed_s=9000)
-        life.hear(-5, t=1.0)
+        life.receive(-5, t=1.0)
         life.at(-7200)
-        life.hear(-7200, t=2.0)
+        life.receive(-7200, t=2.0)
         life.at(-7240)
         assert life.says() == (2.0, 0.0)
 
 
 def test_a_simulation_that_goes_on_after_a_wall_clock_is_the_run_that_goes_on(path: Path) -> None:
     with twin(path, 10, is_simulated=True) as life:
-        life.hear(10, t=1.0)
+        life.receive(10, t=1.0)
         life.at(500, passed_s=490)
-        life.hear(500, t=1.5)
+        life.receive(500, t=1.5)
     with twin(path, 501) as life:
-        life.hear(501, t=9.0)
+        life.receive(501, t=9.0)
     with twin(path, 700, is_simulated=True) as life:
         assert life.says() == (1.5, 200.0)
     assert select(path, "SELECT run FROM run WHERE ended_stamp_ns IS NULL") == [(1,)]
@@ -237,12 +237,12 @@ def test_a_simulation_that_goes_on_after_a_wall_clock_is_the_run_that_goes_on(pa
 
 def test_a_simulation_that_is_played_again_says_all_of_it_anew(path: Path) -> None:
     with twin(path, 10, is_simulated=True) as life:
-        life.hear(10, t=1.0)
-        life.hear(20, t=1.5)
+        life.receive(10, t=1.0)
+        life.receive(20, t=1.5)
         life.at(3)
         assert life.says() == (1.5, 0.0)
         life.at(10)
-        life.hear(10, t=1.0)
+        life.receive(10, t=1.0)
         assert life.says() == (1.0, 0.0)
     assert runs(path) == [(1, None), (2, None)]
 
@@ -254,8 +254,8 @@ BOOT = -3e8  # a board without a clock of its own starts years ago
 
 def filled(path: Path) -> None:
     with twin(path) as life:
-        life.hear(-5, t=1.0, pose=HERE)
-        life.hear(-9, tag="8", t=4.0)
+        life.receive(-5, t=1.0, pose=HERE)
+        life.receive(-9, tag="8", t=4.0)
 
 
 def test_a_clock_that_contradicts_the_log_begins_nothing_and_is_told(path: Path) -> None:
@@ -270,7 +270,7 @@ def test_a_clock_that_contradicts_the_log_begins_nothing_and_is_told(path: Path)
         assert life.live["7"].readings[0].value == 1.0
         assert life.live["7"].pose == HERE
         life.at(BOOT + 100, passed_s=100)
-        life.hear(BOOT + 99, t=2.0)
+        life.receive(BOOT + 99, t=2.0)
         assert life.live["7"].readings[0].value == 2.0
         assert life.memory.condition.waiting == 1
     assert runs(path) == [(1, None)]
@@ -282,7 +282,7 @@ def test_once_it_agrees_the_run_goes_on_and_what_waited_is_written_as_of_then(pa
     filled(path)
     with twin(path, BOOT) as life:
         life.at(BOOT + 100, passed_s=100)
-        life.hear(BOOT + 99, t=2.0)
+        life.receive(BOOT + 99, t=2.0)
         life.at(BOOT + 110, passed_s=10)
         life.at(3600, passed_s=1)
         assert not life.doubts()
@@ -298,7 +298,7 @@ def test_once_it_agrees_the_run_goes_on_and_what_waited_is_written_as_of_then(pa
 def test_a_clock_that_does_not_agree_within_ten_minutes_is_believed(path: Path) -> None:
     filled(path)
     with twin(path, BOOT) as life:
-        life.hear(BOOT, t=2.0, tag="9")
+        life.receive(BOOT, t=2.0, tag="9")
         life.at(BOOT + 599, passed_s=599)
         assert life.doubts()
         life.at(BOOT + 600, passed_s=1)
@@ -309,7 +309,7 @@ def test_a_clock_that_does_not_agree_within_ten_minutes_is_believed(path: Path) 
         assert runs(path) == [(1, None), (2, None)]
         # And then it is set right.
         life.at(50, passed_s=10)
-        life.hear(50, t=3.0)
+        life.receive(50, t=3.0)
         assert life.says(tag="9")[0] == 2.0
         assert life.says() == (3.0, 0.0)
     assert runs(path) == [(1, None), (2, None), (3, 1)]
@@ -320,14 +320,14 @@ def test_a_clock_that_does_not_agree_within_ten_minutes_is_believed(path: Path) 
 
 def test_a_place_counts_from_the_earliest_stamp_that_came_with_one(path: Path) -> None:
     with twin(path) as life:
-        life.hear(-5, t=1.0, pose=HERE)
-        life.hear(-60, t=2.0, pose=THERE)
+        life.receive(-5, t=1.0, pose=HERE)
+        life.receive(-60, t=2.0, pose=THERE)
         assert life.live == life.past()
         assert life.past(-30)["7"].pose == HERE
         assert life.past(-61) == {}
     with twin(path) as life:
-        life.hear(-80, t=3.0, pose=THERE)
-        life.hear(-70, t=3.5, pose=THERE)
+        life.receive(-80, t=3.0, pose=THERE)
+        life.receive(-70, t=3.5, pose=THERE)
         assert life.past(-75)["7"].pose == HERE
         assert life.memory.apply(Pin("9", THERE), life.now_ns) is None
         assert life.past()["9"].pose == THERE

@@ -26,14 +26,14 @@ from lupin_twin.adapt.node import ANY_PUBLISHER, MAX_SKEW_S, TF_STATIC_QOS
 from lupin_twin.adapt.scans import number_of
 from lupin_twin.adapt.table import ConfigError
 
-LOOK_S: Final = 0.2
+POLL_S: Final = 0.2
 _KNOWN: Final = frozenset({*STANDARD, *POSES, TF_TYPE, DETECTIONS_TYPE})
 # REP 105, and what navigation often has instead.
 _BASES: Final = ("base_link", "base_footprint")
 
 
 @dataclass(slots=True)
-class Heard:
+class ReceivedTopic:
     """What came on one topic: how many, the newest of them, and its stamp's distance from now."""
 
     type_name: str
@@ -54,7 +54,7 @@ class Listener(Node):  # type: ignore[misc]  # rclpy is not typed
     def __init__(self, config: Config | None) -> None:
         super().__init__("lupin_adapt_check")
         self.topics: dict[str, str] = {}
-        self.heard: dict[str, Heard] = {}
+        self.heard: dict[str, ReceivedTopic] = {}
         # Types that were seen, and why they cannot be read here.
         self.missing: dict[str, str] = {}
         self.frames = Frames()
@@ -63,7 +63,7 @@ class Listener(Node):  # type: ignore[misc]  # rclpy is not typed
             self._wanted = {sensor.topic: sensor.type_name for sensor in config.sensors}
             if config.robot is not None and config.robot.topic:
                 self._wanted[config.robot.topic] = config.robot.type_name
-        self.create_timer(LOOK_S, self._look)
+        self.create_timer(POLL_S, self._look)
 
     def _look(self) -> None:
         for topic, types in self.get_topic_names_and_types():
@@ -79,7 +79,7 @@ class Listener(Node):  # type: ignore[misc]  # rclpy is not typed
         except ConfigError as error:
             self.missing[type_name] = str(error)
             return
-        heard = self.heard[topic] = Heard(type_name)
+        heard = self.heard[topic] = ReceivedTopic(type_name)
 
         def take(message: Any) -> None:
             heard.messages += 1
@@ -113,7 +113,7 @@ def report(config: Config, listener: Listener, seconds: float) -> Iterator[tuple
         yield _detections(config.detections, listener, seconds)
     for sensor in config.sensors:
         wrong = _why_silent(sensor.topic, sensor.type_name, listener, seconds)
-        heard = _heard(sensor.topic, listener)
+        heard = _received(sensor.topic, listener)
         said = _rate(heard, seconds)
         if not wrong:
             value, wrong = _value(sensor, heard)
@@ -125,7 +125,7 @@ def report(config: Config, listener: Listener, seconds: float) -> Iterator[tuple
 def _robot(config: Config, robot: Robot, listener: Listener, seconds: float) -> tuple[bool, str]:
     topic, type_name = (TF, TF_TYPE) if robot.tf else (robot.topic, robot.type_name)
     wrong = _why_silent(topic, type_name, listener, seconds)
-    heard = _heard(topic, listener)
+    heard = _received(topic, listener)
     said = _rate(heard, seconds)
     if wrong:
         pass
@@ -148,7 +148,7 @@ def _robot(config: Config, robot: Robot, listener: Listener, seconds: float) -> 
 
 def _detections(what: Detections, listener: Listener, seconds: float) -> tuple[bool, str]:
     wrong = _why_silent(what.topic, DETECTIONS_TYPE, listener, seconds)
-    heard = _heard(what.topic, listener)
+    heard = _received(what.topic, listener)
     tags = [] if wrong else heard.newest.detections
     for tag in tags:
         frame = TAG_FRAME.format(family=tag.family, id=tag.id)
@@ -193,8 +193,8 @@ def _line(what: str, topic: str, wrong: str, said: str) -> tuple[bool, str]:
     return not wrong, f"{'WRONG' if wrong else 'ok   '} {what}: {topic}: {wrong or said}"
 
 
-def _heard(topic: str, listener: Listener) -> Heard:
-    return listener.heard.get(listener.resolve_topic_name(topic), Heard(""))
+def _received(topic: str, listener: Listener) -> ReceivedTopic:
+    return listener.heard.get(listener.resolve_topic_name(topic), ReceivedTopic(""))
 
 
 def _why_silent(topic: str, type_name: str, listener: Listener, seconds: float) -> str:
@@ -209,7 +209,7 @@ def _why_silent(topic: str, type_name: str, listener: Listener, seconds: float) 
         return "nobody publishes it" + (f", did you mean {near[0]}?" if near else "")
     if listener.topics[name] != type_name:
         return f"its type is {listener.topics[name]}, configured is {type_name}"
-    if not _heard(topic, listener).messages:
+    if not _received(topic, listener).messages:
         return f"nothing came in {seconds:g} s"
     return ""
 
@@ -220,7 +220,7 @@ def _published(listener: Listener) -> Mapping[str, str]:
     }
 
 
-def _value(sensor: Sensor, heard: Heard) -> tuple[float, str]:
+def _value(sensor: Sensor, heard: ReceivedTopic) -> tuple[float, str]:
     try:
         value = number_of(heard.newest, sensor.field) * sensor.factor + sensor.offset
     except (AttributeError, LookupError, TypeError) as error:
@@ -230,12 +230,12 @@ def _value(sensor: Sensor, heard: Heard) -> tuple[float, str]:
     return value, ""
 
 
-def _skewed(heard: Heard) -> str:
+def _skewed(heard: ReceivedTopic) -> str:
     if heard.skew_s is None or abs(heard.skew_s) <= MAX_SKEW_S:
         return ""
     direction = "ahead of" if heard.skew_s > 0 else "behind"
     return f"its stamps are {abs(heard.skew_s):.0f} s {direction} ROS time here: is a clock wrong?"
 
 
-def _rate(heard: Heard, seconds: float) -> str:
+def _rate(heard: ReceivedTopic, seconds: float) -> str:
     return f"{heard.messages} messages in {seconds:g} s"

@@ -11,7 +11,7 @@ from std_msgs.msg import Header
 
 from lupin_twin.adapt.config import Place
 from lupin_twin.adapt.frames import Transform
-from lupin_twin.adapt.scans import MadeScan
+from lupin_twin.adapt.scans import BuiltScan
 from lupin_twin.adapt.table import ConfigError
 from lupin_twin.ros import convert
 
@@ -56,7 +56,7 @@ def transform_of(message: Any, stamp_ns: int | None) -> tuple[str, Transform]:
     )
 
 
-def observation(scan: MadeScan, frame_id: str, source: str = "") -> Observation:
+def observation(scan: BuiltScan, frame_id: str, source: str = "") -> Observation:
     """A scan as lupin_msgs/Observation; without readings, a failed one.
 
     Without a source, it is the adapter's own.

@@ -34,7 +34,7 @@ from lupin_twin.adapt.messages import (
 )
 from lupin_twin.adapt.mqtt import Message, MqttClient
 from lupin_twin.adapt.mqtt_topics import Pattern, PayloadError, measured
-from lupin_twin.adapt.scans import MadeScan, Scans, number_of
+from lupin_twin.adapt.scans import BuiltScan, Scans, number_of
 from lupin_twin.adapt.table import ConfigError
 from lupin_twin.core import interfaces
 from lupin_twin.core.diagnostics import OK, WARN, Finding
@@ -86,10 +86,10 @@ class AdaptNode(Node):  # type: ignore[misc]  # rclpy is not typed
         # By topic, since the start.
         self.received: Counter[str] = Counter()
         self.used: Counter[str] = Counter()
-        self._heard_s: dict[str, float] = {}
+        self._received_s: dict[str, float] = {}
         # By case: what was wrong with one sensor must not hide what is wrong with another.
         self._dropped: dict[str, _Dropped] = {}
-        self._made = 0
+        self._built = 0
         self._moved_s = 0.0
         self._started_s = time.monotonic()
         self._observations = self.create_publisher(
@@ -136,7 +136,7 @@ class AdaptNode(Node):  # type: ignore[misc]  # rclpy is not typed
 
         def read(data: bytes) -> None:
             self.received[topic] += 1
-            self._heard_s[topic] = time.monotonic()
+            self._received_s[topic] = time.monotonic()
             if len(data) > MAX_MESSAGE_BYTES:
                 self._drop(
                     Reason.SIZE, topic, f"{len(data)} bytes, the limit is {MAX_MESSAGE_BYTES}"
@@ -149,7 +149,7 @@ class AdaptNode(Node):  # type: ignore[misc]  # rclpy is not typed
                 return
             callback(topic, message)
 
-        self._heard_s[topic] = -SILENT_S
+        self._received_s[topic] = -SILENT_S
         try:
             self.create_subscription(
                 kind, topic, self.utilities.guarded(topic, read), qos, raw=True
@@ -160,7 +160,7 @@ class AdaptNode(Node):  # type: ignore[misc]  # rclpy is not typed
     def _drop(self, reason: Reason, topic: str, why: str, case: str = "") -> None:
         drop = Drop(reason, why, case=case)
         # Of a broker's topics there may be any number: one warning a period for all of them.
-        known = topic if topic in self._heard_s else MQTT
+        known = topic if topic in self._received_s else MQTT
         self.utilities.warn((reason, (known, case)), drop.on(topic))
         key = case or reason.value
         count = self._dropped[key].count if key in self._dropped else 0
@@ -348,7 +348,9 @@ class AdaptNode(Node):  # type: ignore[misc]  # rclpy is not typed
         for frame in self._sightings.missed(self._now_ns()):
             why = f"a tag was detected, but TF has no {frame!r}: is tag.frames set in apriltag_ros?"
             self._drop(Reason.FRAME, TF, why, case="tf tag")
-        findings = [self._finding(topic) for topic in sorted(self._heard_s) if topic != TF_STATIC]
+        findings = [
+            self._finding(topic) for topic in sorted(self._received_s) if topic != TF_STATIC
+        ]
         if self._mqtt is not None:
             if self._mqtt.problem:
                 self.utilities.warn(("mqtt", self._mqtt.problem), f"MQTT: {self._mqtt.problem}")
@@ -371,7 +373,7 @@ class AdaptNode(Node):  # type: ignore[misc]  # rclpy is not typed
         )
 
     def _finding(self, topic: str) -> Finding:
-        silent_s = time.monotonic() - max(self._heard_s[topic], self._started_s)
+        silent_s = time.monotonic() - max(self._received_s[topic], self._started_s)
         is_silent = silent_s > SILENT_S
         return Finding(
             topic,
@@ -388,15 +390,15 @@ class AdaptNode(Node):  # type: ignore[misc]  # rclpy is not typed
             WARN if recent or errors else OK,
             "; ".join(recent) or f"at {self._scans.tag or 'no tag'}",
             {
-                "made": str(self._made),
+                "made": str(self._built),
                 "errors": str(errors),
                 **{f"dropped: {case}": str(it.count) for case, it in self._dropped.items()},
             },
         )
 
-    def _publish(self, scans: Iterable[MadeScan]) -> None:
+    def _publish(self, scans: Iterable[BuiltScan]) -> None:
         for scan in scans:
-            self._made += 1
+            self._built += 1
             self._observations.publish(observation(scan, self._config.frame_id))
 
     def _publish_tags(self) -> None:

@@ -21,7 +21,7 @@ NS: Final = 1_000_000_000
 
 
 @dataclass(frozen=True, slots=True)
-class MadeScan:
+class BuiltScan:
     """A scan of a tag: each sensor's mean, of the moment of the newest reading.
 
     Without a reading it is a failed attempt, and `detail` says why; with, it says how far the
@@ -88,7 +88,7 @@ class Scans:
         """The tag that the robot is at; None: at none, or not known."""
         return self._tag
 
-    def move(self, x: float, y: float, now_ns: int) -> Iterator[MadeScan]:
+    def move(self, x: float, y: float, now_ns: int) -> Iterator[BuiltScan]:
         """The robot is here, m; yields the scan that ends by it."""
         yield from self.due(now_ns)
         self._seen_ns = now_ns
@@ -101,7 +101,7 @@ class Scans:
         else:
             yield from self._be_at(tag_id, now_ns)
 
-    def lose(self, now_ns: int) -> Iterator[MadeScan]:
+    def lose(self, now_ns: int) -> Iterator[BuiltScan]:
         """Nobody knows where the robot is; yields the scan that ends by it."""
         yield from self.due(now_ns)
         yield from self._be_at(None, now_ns)
@@ -122,9 +122,9 @@ class Scans:
         """Where tags are."""
         return self._places
 
-    def failed(self, tag_id: str, detail: str, now_ns: int, *, is_fixed: bool = False) -> MadeScan:
+    def failed(self, tag_id: str, detail: str, now_ns: int, *, is_fixed: bool = False) -> BuiltScan:
         """A failed attempt at a tag."""
-        return MadeScan(tag_id, now_ns, self._place(tag_id), (), detail, is_fixed)
+        return BuiltScan(tag_id, now_ns, self._place(tag_id), (), detail, is_fixed)
 
     def take(self, sensor: str, tag: str, value: float, stamp_ns: int, now_ns: int) -> bool:
         """A reading, in the sensor's unit; returns whether it belongs to a tag.
@@ -142,7 +142,7 @@ class Scans:
         window.add(sensor, value, stamp_ns)
         return True
 
-    def due(self, now_ns: int) -> Iterator[MadeScan]:
+    def due(self, now_ns: int) -> Iterator[BuiltScan]:
         """Scans whose time is over; to be called once a second, and before the robot is moved."""
         if now_ns < self._now_ns:  # the clock has gone back: another world
             self._tag, self._visit, self._fixed = None, None, {}
@@ -161,14 +161,14 @@ class Scans:
 
     def _be_at(
         self, tag_id: str | None, now_ns: int, cell: Place | None = None
-    ) -> Iterator[MadeScan]:
+    ) -> Iterator[BuiltScan]:
         if tag_id == self._tag:
             return
         yield from self._ended(now_ns)
         self._tag, self._cell = tag_id, cell
         self._visit = None if tag_id is None else _Window(now_ns)
 
-    def _ended(self, now_ns: int) -> Iterator[MadeScan]:
+    def _ended(self, now_ns: int) -> Iterator[BuiltScan]:
         window, tag_id = self._visit, self._tag
         if window is None or tag_id is None:
             return
@@ -178,12 +178,12 @@ class Scans:
             stayed_s = (now_ns - window.begun_ns) / NS
             yield self.failed(tag_id, f"no reading in {stayed_s:.0f} s here", now_ns)
 
-    def _scan(self, tag_id: str, window: _Window, *, is_fixed: bool = False) -> MadeScan:
+    def _scan(self, tag_id: str, window: _Window, *, is_fixed: bool = False) -> BuiltScan:
         means = sorted(window.means.items())
         detail = ", ".join(f"{name} ±{mean.spread:.2g} of {mean.number}" for name, mean in means)
         readings = tuple((name, mean.mean) for name, mean in means)
         place = self._place(tag_id)
-        return MadeScan(tag_id, window.newest_ns, place, readings, detail, is_fixed)
+        return BuiltScan(tag_id, window.newest_ns, place, readings, detail, is_fixed)
 
     def _place(self, tag_id: str) -> Place | None:
         return self._places.get(tag_id, self._cell if tag_id == self._tag else None)

@@ -221,7 +221,7 @@ class History:
 
     def _trim(self, tag: _Tag) -> None:
         """Drop the oldest, until the tag and all tags together are within bounds."""
-        is_full, has_gone = self._items > MAX_HISTORY_ITEMS, False
+        is_full, has_left = self._items > MAX_HISTORY_ITEMS, False
         for one in tag.known:
             many_scans, many_attempts = (
                 is_full or count > self._buffer_len for count in (tag.scans, tag.attempts)
@@ -235,8 +235,8 @@ class History:
                 one.status, tag.attempts = None, tag.attempts - 1
             self._items -= before - one.items
             is_full = self._items > MAX_HISTORY_ITEMS
-            has_gone |= not one.items
-        if has_gone:
+            has_left |= not one.items
+        if has_left:
             tag.known = [one for one in tag.known if one.items]
 
 

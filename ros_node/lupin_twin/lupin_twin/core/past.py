@@ -45,7 +45,7 @@ class Event(StrEnum):
 
     SCANS = "~scans"
     FAILURES = "~failures"
-    LOOKS = "~looks"
+    INSPECTIONS = "~looks"
     PESTS_SEEN = "~pests_seen"
     PESTS_CLEARED = "~pests_cleared"
     SILENCES = "~silences"

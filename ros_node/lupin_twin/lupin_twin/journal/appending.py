@@ -60,7 +60,7 @@ _KNOWN_SCAN: Final = (
     "SELECT stamp_ns, own_stamp_ns FROM scan INDEXED BY scan_sent WHERE site = :site"
     " AND series = :series AND own_stamp_ns = :key AND source = :source LIMIT 1"
 )
-_KNOWN_LOOK: Final = (
+_KNOWN_INSPECTION: Final = (
     "SELECT 1 FROM look INDEXED BY look_at WHERE site = :site AND run = :run AND tag = :tag"
     " AND stamp_ns = :key AND source = :source AND coalesce(own_stamp_ns, 0) = 0 UNION ALL "
     "SELECT 1 FROM look INDEXED BY look_sent WHERE site = :site AND run = :run AND tag = :tag"
@@ -233,7 +233,7 @@ class Appender:
             "site": LOCAL_SITE, "run": run, "tag": tag, "key": key, "source": source, "series": 0,
         }  # fmt: skip
         execute = self._connection.execute
-        if kind == KIND_FLOWER and execute(_KNOWN_LOOK, query).fetchone() is not None:
+        if kind == KIND_FLOWER and execute(_KNOWN_INSPECTION, query).fetchone() is not None:
             return 0, None, set()
         stamps: tuple[int, int | None] | None = None
         sensors: set[str] = set()
@@ -322,13 +322,13 @@ def _unicode(text: str) -> str:
     return text if text.isascii() else text.encode("utf-8", "replace").decode("utf-8")
 
 
-def _held(row: Row, begun_ns: int, *, keeps_key: bool) -> Row:
-    """A row as a copy of it at `begun_ns`: nothing is later. `keeps_key`: it is the same write."""
+def _held(row: Row, begun_ns: int, *, retains_key: bool) -> Row:
+    """A row as a copy of it at `begun_ns`, never later. `retains_key`: it is the same write."""
     if row.stamp_ns <= begun_ns:
         return row
     if isinstance(row, PinRow):
         return replace(row, stamp_ns=begun_ns)
-    own_ns = (row.own_stamp_ns or row.stamp_ns) if keeps_key else KNOWN_BY_NOTHING
+    own_ns = (row.own_stamp_ns or row.stamp_ns) if retains_key else KNOWN_BY_NOTHING
     return replace(row, stamp_ns=begun_ns, own_stamp_ns=own_ns)
 
 
@@ -340,7 +340,7 @@ def copy_known(appender: Appender, before: Run, run: Run, rows: Iterable[Row]) -
         if not (is_here and isinstance(row, PinRow)):
             # What a simulation says again is new; a wall clock comes to no moment twice.
             row = replace(row, arrival_ns=begun.arrival_ns)  # noqa: PLW2901
-            found.append(_held(row, begun.stamp_ns, keeps_key=not begun.is_simulated))
+            found.append(_held(row, begun.stamp_ns, retains_key=not begun.is_simulated))
     appender.append(run.root, found, are_copies=True)
     appender.flush()
 

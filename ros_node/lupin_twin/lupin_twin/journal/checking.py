@@ -15,7 +15,7 @@ from functools import partial
 from pathlib import Path
 from typing import Final
 
-from lupin_twin.journal.retention import KEPT_BYTES, KEPT_NS, records
+from lupin_twin.journal.retention import RETENTION_BYTES, RETENTION_NS, records
 from lupin_twin.journal.rows import sensor_names
 from lupin_twin.journal.runs import Run, runs
 from lupin_twin.journal.schema import (
@@ -24,8 +24,8 @@ from lupin_twin.journal.schema import (
     Empty,
     Foreign,
     get_meta,
+    is_damage_error,
     open_reader,
-    says_damaged,
 )
 
 # A lot is one short read of the file: a check that takes minutes must not keep the log growing.
@@ -72,7 +72,7 @@ def find_damage(path: Path) -> str | None:
         with closing(open_reader(path)) as connection:
             (found,) = connection.execute("PRAGMA integrity_check(1)").fetchone()
     except FILE_ERRORS as error:
-        return str(error) if says_damaged(error) else None
+        return str(error) if is_damage_error(error) else None
     except (Foreign, Empty):
         return None
     return None if found == "ok" else str(found)
@@ -209,8 +209,8 @@ def overview(connection: sqlite3.Connection, path: Path) -> Overview:
         failures=int(failures),
         sensors=_sensors(connection),
         runs=_extents(connection),
-        kept_ns=int(get_meta(connection, KEPT_NS) or 0),
-        kept_bytes=int(get_meta(connection, KEPT_BYTES) or 0),
+        kept_ns=int(get_meta(connection, RETENTION_NS) or 0),
+        kept_bytes=int(get_meta(connection, RETENTION_BYTES) or 0),
         quarantined=quarantined_beside(path),
         forgotten=tuple(records(connection)),
     )

@@ -41,7 +41,7 @@ FROM_SCAN: Final = (
     " AND scan.site = :site AND scan.series = series.series"
     " AND stamp_ns >= :start AND stamp_ns < :end AND is_copy = 0"
 )
-_FROM_LOOK: Final = (
+_FROM_INSPECTION: Final = (
     "FROM look WHERE site = :site AND run = :run{tag}"
     " AND stamp_ns >= :start AND stamp_ns < :end AND is_copy = 0"
 )
@@ -53,11 +53,11 @@ _FROM_EVENT: Final = (
 _ROWS: Final = {
     Event.SCANS: ("sensors", f"{FROM_SCAN} AND kind = 0 AND status = 0"),
     Event.FAILURES: ("status", f"{FROM_SCAN} AND status != 0"),
-    Event.LOOKS: ("bug_count", _FROM_LOOK),
+    Event.INSPECTIONS: ("bug_count", _FROM_INSPECTION),
     Event.PESTS_SEEN: ("value", _FROM_EVENT),
     Event.PESTS_CLEARED: ("value", _FROM_EVENT),
 }
-_STAMPS: Final = f"SELECT stamp_ns {FROM_SCAN} UNION ALL SELECT stamp_ns {_FROM_LOOK}"
+_STAMPS: Final = f"SELECT stamp_ns {FROM_SCAN} UNION ALL SELECT stamp_ns {_FROM_INSPECTION}"
 # A few steps in the index for each series.
 _IN_SERIES: Final = (
     "(SELECT {0}(stamp_ns) FROM scan WHERE site = s.site AND series = s.series"
@@ -66,7 +66,7 @@ _IN_SERIES: Final = (
 _ENDS: Final = (
     f"SELECT min({_IN_SERIES.format('min')}), max({_IN_SERIES.format('max')})"
     " FROM series AS s WHERE site = :site AND run = :run{tag}"
-    f" UNION ALL SELECT min(stamp_ns), max(stamp_ns) {_FROM_LOOK}"
+    f" UNION ALL SELECT min(stamp_ns), max(stamp_ns) {_FROM_INSPECTION}"
 )
 _FROM_TALLY: Final = (
     "FROM tally WHERE site = :site AND run = :run AND hour >= :first AND hour < :last"

@@ -48,8 +48,8 @@ from lupin_twin.journal.schema import (
     ORIGIN,
     SiteLog,
     get_meta,
+    is_damage_error,
     open_writer,
-    says_damaged,
     set_meta,
     transaction,
 )
@@ -60,14 +60,14 @@ _CHECKED_BYTES: Final = 64_000_000
 _LOG_BYTES: Final = 8_000_000
 _PURGE_EVERY_S: Final = 60.0
 _PURGE_HOURS_EVERY_S: Final = 86_400.0
-_LOOK_EVERY_S: Final = 1.0
+_POLL_EVERY_S: Final = 1.0
 _SALVAGE: Final = "salvage"
 
 _LAST_SCANS: Final = (
     "SELECT stamp_ns, arrival_ns FROM scan JOIN series ON series.site = scan.site"
     " AND series.series = scan.series WHERE scan.site = ? AND run = ? ORDER BY seq DESC LIMIT 100"
 )
-_LAST_LOOKS: Final = (
+_LAST_INSPECTIONS: Final = (
     "SELECT stamp_ns, arrival_ns FROM look WHERE site = ? AND run = ? ORDER BY seq DESC LIMIT 100"
 )
 
@@ -129,7 +129,7 @@ class JournalFile:
         try:
             self._connection = open_writer(self._path)
         except FILE_ERRORS as error:
-            if not says_damaged(error):
+            if not is_damage_error(error):
                 raise
             self._quarantine()
             self._connection = open_writer(self._path)
@@ -138,7 +138,7 @@ class JournalFile:
             self._appender = Appender(self._connection)
             self.simulated = simulated(self._connection)
             self.journal_id = get_meta(self._connection, "journal_id") or ""
-            self._purged_s = self._looked_s = 0.0
+            self._purged_s = self._polled_s = 0.0
             self._hours_purged_s = time.monotonic()
             self._purges_before_ns: int | None = None
             self._is_shrinking = False
@@ -183,7 +183,7 @@ class JournalFile:
         try:
             return self._start(now, scans_per_series, is_believed=is_believed)
         except FILE_ERRORS as error:
-            if self.quarantined or not says_damaged(error):
+            if self.quarantined or not is_damage_error(error):
                 raise
         self.close()
         self._quarantine()
@@ -256,7 +256,7 @@ class JournalFile:
                 return self.begin(now, before, Carries.ALL, joins=older.id)
         return before
 
-    def keep_run(self, run: Run) -> None:
+    def retain_run(self, run: Run) -> None:
         """Have the run in the file, as it was in another one that is gone."""
         if all(known.id != run.root for known in self._runs()):
             self._kept = None
@@ -273,7 +273,7 @@ class JournalFile:
         """The last that was received in a run."""
         last = run.begun
         # The rows of a run lie together at the end; only a latched one may be older than others.
-        for text in (_LAST_SCANS, _LAST_LOOKS):
+        for text in (_LAST_SCANS, _LAST_INSPECTIONS):
             for stamp_ns, arrival_ns in self._connection.execute(text, (LOCAL_SITE, run.id)):
                 if stamp_ns > last.stamp_ns:
                     last = Clock(stamp_ns, max(arrival_ns, last.arrival_ns), last.is_simulated)
@@ -353,7 +353,7 @@ class JournalFile:
 
     # --- upkeep -------------------------------------------------------------------------------
 
-    def look_after(self, *, may_purge: bool) -> bool:
+    def check_size(self, *, may_purge: bool) -> bool:
         """One small step of what has to be done; returns whether there is more to do at once.
 
         `may_purge`: the clock is believed.
@@ -363,8 +363,8 @@ class JournalFile:
 
         """
         now_s = time.monotonic()
-        if now_s - self._looked_s >= _LOOK_EVERY_S:
-            self._looked_s = now_s
+        if now_s - self._polled_s >= _POLL_EVERY_S:
+            self._polled_s = now_s
             if not self._path.exists() or self._path.stat().st_ino != self._inode:
                 raise FileNotFoundError(f"{self._path} was removed or replaced")
         if self._log_bytes() > _LOG_BYTES:

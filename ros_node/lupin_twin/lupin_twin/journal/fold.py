@@ -60,7 +60,7 @@ _SCANS: Final = (
     " FROM series AS s CROSS JOIN scan AS r"
     " WHERE s.site = :site AND s.run = :run {which} AND r.site = s.site AND r.seq = {newest}"
 )
-_LOOKS: Final = (
+_INSPECTIONS: Final = (
     "SELECT s.series, s.tag, r.seq, r.stamp_ns, r.species, r.confidence, r.anomaly,"
     " r.flower_count, r.bug_count, r.blooms, r.box"
     " FROM series AS s JOIN look AS r ON r.site = s.site"
@@ -170,7 +170,7 @@ def _known(connection: sqlite3.Connection, query: dict[str, Any]) -> Known:
                 observed[tag] = stamp_ns
             found.setdefault(tag, []).append((stamp_ns, seq, readings))
     flowers: dict[str, tuple[int, Flower]] = {}
-    inspections = execute(_LOOKS, query).fetchall()
+    inspections = execute(_INSPECTIONS, query).fetchall()
     for series, tag, seq, stamp_ns, *flower in inspections:
         first[tag] = min(series, first.get(tag, series))
         tried[tag] = max((stamp_ns, seq, STATUS_OK, ""), tried.get(tag, (-1, 0, 0, "")))
@@ -299,7 +299,7 @@ def latest(connection: sqlite3.Connection, request: LatestRequest) -> History:
 
 
 # A tag's id, its place (m, map frame), and its readings: (ns of ROS time, value).
-TagLately = tuple[str, float, float, tuple[tuple[int, float], ...]]
+RecentTag = tuple[str, float, float, tuple[tuple[int, float], ...]]
 
 
 def recent_readings(  # noqa: PLR0917
@@ -309,7 +309,7 @@ def recent_readings(  # noqa: PLR0917
     reach_ns: int,
     most: int,
     each: int = 1,
-) -> Iterator[TagLately]:
+) -> Iterator[RecentTag]:
     """The tags that had a place and a reading at `at_ns`, with their last finite readings.
 
     `reach_ns` is how far back, `most` how many of all tags together, but `each` of each.

@@ -241,7 +241,7 @@ _SCANS: Final = (
     " ON series.site = scan.site AND series.series = scan.series"
     " WHERE scan.site = :site AND seq > :after AND is_copy = 0 ORDER BY seq LIMIT :count"
 )
-_LOOKS: Final = (
+_INSPECTIONS: Final = (
     "SELECT seq, run, tag, stamp_ns, species, confidence, anomaly, bug_count FROM look"
     " WHERE site = :site AND seq > :after AND is_copy = 0 ORDER BY seq LIMIT :count"
 )
@@ -256,7 +256,7 @@ _FIRST_RECENT: Final = (
 _FIRST_SCAN: Final = _FIRST_RECENT.format(
     table="scan", which="series = s.series", kind="s.kind = 0 AND s.sensors != '[]'"
 )
-_FIRST_LOOK: Final = _FIRST_RECENT.format(
+_FIRST_INSPECTION: Final = _FIRST_RECENT.format(
     table="look", which="run = s.run AND tag = s.tag", kind="s.kind = 1"
 )
 _IN_TIME: Final = "r.is_copy = 0 AND r.stamp_ns <= :at AND r.stamp_ns >= s.first_ns"
@@ -265,15 +265,15 @@ _RECENT_SCANS: Final = (
     f" r.status, s.sensors, r.readings FROM {_FIRST_SCAN}"
     f" WHERE r.site = s.site AND r.series = s.series AND {_IN_TIME}"
 )
-_RECENT_LOOKS: Final = (
+_RECENT_INSPECTIONS: Final = (
     "SELECT r.seq, r.run, r.tag, r.stamp_ns, r.species, r.confidence,"
-    f" r.anomaly, r.bug_count FROM {_FIRST_LOOK}"
+    f" r.anomaly, r.bug_count FROM {_FIRST_INSPECTION}"
     f" WHERE r.site = s.site AND r.run = s.run AND r.tag = s.tag AND {_IN_TIME}"
 )
 _SCANS_BETWEEN: Final = (
     "SELECT seq, run, tag, stamp_ns, kind, status, sensors, readings " + FROM_SCAN.format(tag="")
 )
-_LOOKS_BETWEEN: Final = (
+_INSPECTIONS_BETWEEN: Final = (
     "SELECT seq, run, tag, stamp_ns, species, confidence, anomaly, bug_count FROM look"
     " WHERE site = :site AND run = :run AND stamp_ns >= :start AND stamp_ns < :end AND is_copy = 0"
 )
@@ -288,7 +288,7 @@ def observed(connection: Any, request: PeriodRequest, site: str = LOCAL_SITE) ->
         for span in cut(axis, request.start_ns, request.end_ns):
             query = {"run": span.run.id, "start": span.start_ns, "end": span.end_ns}
             found += _of_scans(log.execute(_SCANS_BETWEEN, query).fetchall())
-            found += _of_inspections(log.execute(_LOOKS_BETWEEN, query).fetchall())
+            found += _of_inspections(log.execute(_INSPECTIONS_BETWEEN, query).fetchall())
         found.sort(key=lambda write: (write.stamp_ns, write.number))
         return PastWrites(_journal_id(log), _axis(axis), tuple(found), 0, is_all=True)
 
@@ -316,7 +316,7 @@ def recent(
             "more": RECENT_COUNT - 1,
         }
         scans = log.execute(_RECENT_SCANS, query).fetchall()
-        inspections = log.execute(_RECENT_LOOKS, query).fetchall()
+        inspections = log.execute(_RECENT_INSPECTIONS, query).fetchall()
         return recent_of([*_of_scans(scans), *_of_inspections(inspections)], request.at_ns)
 
 
@@ -347,7 +347,7 @@ def writes(connection: Any, request: WritesRequest, site: str = LOCAL_SITE) -> P
         after = request.after or _beginning(log, request, newest)
         query = {"after": after, "count": request.max_count}
         scans = log.execute(_SCANS, query).fetchall()
-        inspections = log.execute(_LOOKS, query).fetchall()
+        inspections = log.execute(_INSPECTIONS, query).fetchall()
         found = sorted(
             [*_of_scans(scans), *_of_inspections(inspections)], key=lambda write: write.number
         )

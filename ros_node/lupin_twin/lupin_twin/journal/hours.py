@@ -22,7 +22,7 @@ SILENCE_NS: Final = 600 * 1_000_000_000
 # With the number of a run behind it: the last stamp of what was deleted of it.
 DELETED: Final = "purged_ns:"
 # What is counted by the hour.
-TALLIED: Final = (Event.SCANS, Event.FAILURES, Event.LOOKS)
+TALLIED: Final = (Event.SCANS, Event.FAILURES, Event.INSPECTIONS)
 # A sum of larger readings could be beyond any number, which PostgreSQL refuses.
 _LARGEST: Final = 1e290
 _NOTHING: Final[Mapping[int, int]] = {}
@@ -73,7 +73,10 @@ def count_rows(
     if any(scan.kind is None for scan in written):
         raise DamagedFile("a scan has no series")
     count(
-        log, written, [WrittenInspection(*row) for row in log.execute(_LOOKS, within)], counted_ns
+        log,
+        written,
+        [WrittenInspection(*row) for row in log.execute(_INSPECTIONS, within)],
+        counted_ns,
     )
 
 
@@ -104,7 +107,7 @@ def count(
             hours.setdefault((series, hour), []).append(values)
     for inspection in inspections:
         stamps.setdefault(inspection.run, []).append(inspection.stamp_ns)
-        key = (inspection.run, Event.LOOKS, inspection.stamp_ns // HOUR_NS)
+        key = (inspection.run, Event.INSPECTIONS, inspection.stamp_ns // HOUR_NS)
         _tally(tallies, key, inspection.bug_count, inspection.stamp_ns)
     for run, of_run in stamps.items():
         _note_silences(log, run, sorted(of_run))
@@ -148,7 +151,7 @@ _SCANS: Final = (
     " ON series.site = scan.site AND series.series = scan.series"
     " WHERE scan.site = :site AND seq > :after AND seq <= :until AND is_copy = 0"
 )
-_LOOKS: Final = (
+_INSPECTIONS: Final = (
     "SELECT run, tag, seq, stamp_ns, anomaly, bug_count FROM look"
     " WHERE site = :site AND seq > :after AND seq <= :until AND is_copy = 0"
 )
@@ -308,13 +311,13 @@ def _note_silence(log: SiteLog, run: int, start_ns: int, end_ns: int) -> None:
         log.execute(_EVENT, key | {"value": value})
 
 
-_LOOK: Final = (
+_INSPECTION: Final = (
     "SELECT stamp_ns, seq, anomaly, bug_count FROM look WHERE site = :site AND run = :run"
     " AND tag = :tag AND is_copy = 0 AND (stamp_ns, seq) {0} (:at, :seq)"
     " ORDER BY stamp_ns {1}, seq {1} LIMIT 1"
 )
-_BEFORE: Final = _LOOK.format("<", "DESC")
-_AFTER: Final = _LOOK.format(">", "ASC")
+_BEFORE: Final = _INSPECTION.format("<", "DESC")
+_AFTER: Final = _INSPECTION.format(">", "ASC")
 _LAST_CHANGE: Final = (
     "SELECT event FROM event WHERE site = :site AND run = :run AND tag = :tag"
     " AND (stamp_ns, seq) < (:at, :seq) ORDER BY stamp_ns DESC, seq DESC LIMIT 1"

@@ -23,7 +23,7 @@ from lupin_twin.journal.beside import Lock
 from lupin_twin.journal.checking import Progress, find_all_damage
 from lupin_twin.journal.fold import copies
 from lupin_twin.journal.hours import DELETED
-from lupin_twin.journal.retention import KEPT_BYTES, KEPT_NS
+from lupin_twin.journal.retention import RETENTION_BYTES, RETENTION_NS
 from lupin_twin.journal.runs import Carries, Run, put_run
 from lupin_twin.journal.schema import (
     APPLICATION_ID,
@@ -38,7 +38,7 @@ from lupin_twin.journal.schema import (
 from lupin_twin.journal.version3 import VERSION, Bucket, OldRun, Version3
 
 _ROWS: Final = 5_000
-_NUMBERS: Final = (KEPT_NS, KEPT_BYTES, "simulated_from_ns", "simulated_until_ns")
+_NUMBERS: Final = (RETENTION_NS, RETENTION_BYTES, "simulated_from_ns", "simulated_until_ns")
 
 
 def is_version3(path: Path) -> bool:
@@ -260,7 +260,7 @@ def vacuum(path: Path, holder: str, report: Progress) -> tuple[int, int]:
     with closing(open_named(path)):
         pass
     with Lock(path, holder), closing(open_writer(path)) as connection:
-        hear_interrupts(connection)
+        handle_interrupts(connection)
         before = path.stat().st_size
         with closing(find_all_damage(connection, report)) as found:
             first = next(found, None)
@@ -275,6 +275,6 @@ def vacuum(path: Path, holder: str, report: Progress) -> tuple[int, int]:
         return before, path.stat().st_size
 
 
-def hear_interrupts(connection: sqlite3.Connection) -> None:
+def handle_interrupts(connection: sqlite3.Connection) -> None:
     """Have Ctrl-C end what takes SQLite minutes: Python sees it only in Python."""
     connection.set_progress_handler(lambda: 0, _INSTRUCTIONS)

@@ -39,8 +39,8 @@ _PAGES: Final = 128
 _FREE_PAGES: Final = 256
 
 # The limits stand in the file, for who looks at it without its twin.
-KEPT_NS: Final = "kept_ns"
-KEPT_BYTES: Final = "kept_bytes"
+RETENTION_NS: Final = "kept_ns"
+RETENTION_BYTES: Final = "kept_bytes"
 # With the number of a run behind it.
 _LOST: Final = "lost_ns:"
 # Stretches that are reported at most, the last ones.
@@ -60,7 +60,10 @@ class Limits:
 
 def note_limits(connection: sqlite3.Connection, limits: Limits) -> None:
     """Have the limits in the file."""
-    for key, value in ((KEPT_NS, int(limits.days * DAY_NS)), (KEPT_BYTES, limits.max_bytes)):
+    for key, value in (
+        (RETENTION_NS, int(limits.days * DAY_NS)),
+        (RETENTION_BYTES, limits.max_bytes),
+    ):
         if get_meta(connection, key) != str(value):
             set_meta(connection, key, value)
 
@@ -137,7 +140,7 @@ def purge_step(
         last = seq
     if not last:
         return False
-    _keep_horizons(connection, last)
+    _write_horizons(connection, last)
     for table in ("scan", "look"):
         connection.execute(
             f"DELETE FROM {table} WHERE site = ? AND seq <= ?",  # noqa: S608  # constants
@@ -165,7 +168,7 @@ def _arrivals(connection: sqlite3.Connection, way: str) -> list[int]:
     ]
 
 
-def _keep_horizons(connection: sqlite3.Connection, last: int) -> None:
+def _write_horizons(connection: sqlite3.Connection, last: int) -> None:
     for run, stamp_ns in connection.execute(
         "SELECT run, max(stamp_ns) FROM (SELECT run, stamp_ns FROM scan JOIN series"
         " ON series.site = scan.site AND series.series = scan.series"
@@ -207,7 +210,7 @@ _OF_TAG: Final = "site = :site AND tag = :tag"
 _OF_SERIES: Final = f"site = :site AND series IN (SELECT series FROM series WHERE {_OF_TAG})"  # noqa: S608
 
 
-class NotKnown(Exception):
+class UnknownTagError(Exception):
     """There is nothing of the tag to be forgotten; the message says so. The file is as it was."""
 
 
@@ -245,7 +248,7 @@ def forget(path: Path, tag_id: str, *, pose_only: bool, by: str, at_ns: int) -> 
         set_meta(connection, LAST_SEQ, last_seq)
         forgotten = _delete(connection, tag_id, pose_only=pose_only)
         if pose_only and not forgotten.places:
-            raise NotKnown(f"the journal {path} knows no place of tag {tag_id!r}")
+            raise UnknownTagError(f"the journal {path} knows no place of tag {tag_id!r}")
         what = "pose" if pose_only else "all"
         record = {"tag": tag_id, "what": what, "by": by, "at": at_ns, "seq": last_seq}
         number = 1 + sum(1 for _ in records(connection))
@@ -266,13 +269,13 @@ def records(connection: sqlite3.Connection) -> Iterator[Mapping[str, object]]:
 
 def _check_known(connection: sqlite3.Connection, path: Path, tag_id: str) -> None:
     if get_meta(connection, "salvage"):
-        raise NotKnown(f"the journal {path} is being saved from damage: start its twin once")
+        raise UnknownTagError(f"the journal {path} is being saved from damage: start its twin once")
     query = {"site": LOCAL_SITE, "tag": tag_id}
     for table in ("series", "place"):
         found = connection.execute(f"SELECT 1 FROM {table} WHERE {_OF_TAG} LIMIT 1", query)  # noqa: S608
         if found.fetchone() is not None:
             return
-    raise NotKnown(f"the journal {path} knows no tag {tag_id!r}")
+    raise UnknownTagError(f"the journal {path} knows no tag {tag_id!r}")
 
 
 def _delete(connection: sqlite3.Connection, tag_id: str, *, pose_only: bool) -> Forgotten:

@@ -27,7 +27,7 @@ from lupin_twin.journal.schema import (
     PAGE_SIZE,
     SiteLog,
     empty_file,
-    says_damaged,
+    is_damage_error,
     set_meta,
     transaction,
 )
@@ -105,7 +105,7 @@ def readable(connection: sqlite3.Connection, select: str, number: str) -> Iterat
         try:
             rows = connection.execute(text, (at, size)).fetchall()
         except FILE_ERRORS as error:
-            if says_damaged(error):
+            if is_damage_error(error):
                 return None
             raise
         # A number may be damaged: none counts that is not between its neighbours. What stands at
@@ -247,7 +247,7 @@ def _both_ends(
         try:
             yield from old.execute(f"{select} ORDER BY {by} {order}", values or {})
         except FILE_ERRORS as error:
-            if not says_damaged(error):
+            if not is_damage_error(error):
                 raise
         else:
             return

@@ -142,7 +142,7 @@ class DamagedFile(Exception):
 FILE_ERRORS: Final = (sqlite3.Error, DamagedFile, UnicodeDecodeError)
 
 
-def says_damaged(error: BaseException) -> bool:
+def is_damage_error(error: BaseException) -> bool:
     """Whether an error means that the file is damaged."""
     if isinstance(error, (DamagedFile, UnicodeDecodeError)):
         return True
@@ -161,7 +161,7 @@ def open_writer(path: Path) -> sqlite3.Connection:
 
     Raises:
         Foreign: the file is somebody else's, `Older`: it is of an older version.
-        sqlite3.Error, OSError: it cannot be opened, or is damaged (`says_damaged`).
+        sqlite3.Error, OSError: it cannot be opened, or is damaged (`is_damage_error`).
 
     """
     is_new = not path.exists() or path.stat().st_size == 0

@@ -23,12 +23,12 @@ from lupin_twin.journal.hours import SILENCE_NS
 from lupin_twin.journal.rows import InspectionRow, PinRow, Row, ScanRow, sensor_names
 from lupin_twin.journal.runs import Carries, Clock
 from lupin_twin.journal.salvage import readable
-from lupin_twin.journal.schema import DamagedFile, says_damaged
+from lupin_twin.journal.schema import DamagedFile, is_damage_error
 
 VERSION: Final = 3
 
 _SCAN: Final = "id, series, stamp_ns, own_stamp_ns, lag_us, mission, detail, readings"
-_TALLIED: Final = {"scan": Event.SCANS, "failure": Event.FAILURES, "look": Event.LOOKS}
+_TALLIED: Final = {"scan": Event.SCANS, "failure": Event.FAILURES, "look": Event.INSPECTIONS}
 _NOTHING: Final = -(2**63)
 _COLUMN: Final = struct.Struct("<q")
 _SHAPE: Final = struct.Struct("<HHH")  # flowers, corners of the box, species named
@@ -176,7 +176,7 @@ class Version3:
         try:
             return self._connection.execute(sql, values).fetchall()
         except sqlite3.Error as error:
-            if not says_damaged(error):
+            if not is_damage_error(error):
                 raise
             self.damaged += 1
             return []

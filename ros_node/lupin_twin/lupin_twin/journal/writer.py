@@ -31,7 +31,7 @@ from lupin_twin.journal.rebuild import is_version3, upgrade
 from lupin_twin.journal.retention import Limits, Stretches
 from lupin_twin.journal.rows import Row, weight
 from lupin_twin.journal.runs import Carries, Clock, Run, Turn
-from lupin_twin.journal.schema import DamagedFile, Foreign, says_damaged
+from lupin_twin.journal.schema import DamagedFile, Foreign, is_damage_error
 
 # Readings, flowers and rows together: some 60 MB, twenty minutes of the largest greenhouse.
 MAX_WEIGHT: Final = 200_000
@@ -172,7 +172,7 @@ class Journal:
         self.floor_plan = NewestMap()
         self._eras: list[_Era] = []
         self._stop = threading.Event()
-        self._was_tried = threading.Event()
+        self._was_attempted = threading.Event()
         self._restored: Restored | None = None
         self._reported = Condition(JournalState.STARTING, "opening the journal", str(path))
         # The writer thread's own.
@@ -205,7 +205,7 @@ class Journal:
         Nothing is written before the first. With that, the journal restores; if what it restores
         `is_doubted`, it waits for another start, of a clock that agrees or is believed.
         """
-        self._was_tried.clear()
+        self._was_attempted.clear()
         self._eras.append(_Era(clock, turn, scans_per_series, before_ns))
         self._pending.arrived.set()
 
@@ -231,7 +231,7 @@ class Journal:
         Waits at most `wait_s`, and no longer than until the file turns out not to be usable.
         """
         if wait_s:
-            self._was_tried.wait(wait_s)
+            self._was_attempted.wait(wait_s)
         restored, self._restored = self._restored, None
         return restored
 
@@ -284,8 +284,8 @@ class Journal:
             except Exception as error:  # noqa: BLE001  # the twin goes on, whatever it is
                 self._report_failure(error)
                 self._notes.refuse(self._reported.detail)
-                self._was_tried.set()
-                if says_damaged(error):
+                self._was_attempted.set()
+                if is_damage_error(error):
                     self._is_sound = False
             if self._stop.is_set():
                 break
@@ -310,7 +310,7 @@ class Journal:
             self._simulated = file.simulated
             self._journal_id = file.journal_id
             if self._runs:
-                file.keep_run(self._runs[-1])
+                file.retain_run(self._runs[-1])
             is_last = False
             while not is_last:
                 is_last = self._stop.is_set()
@@ -319,7 +319,7 @@ class Journal:
                 self._write(file, all_that_waits=is_last)
                 self._notes.write(file.put_note)
                 self.floor_plan.write(file)
-                has_more = not is_last and file.look_after(may_purge=bool(self._runs))
+                has_more = not is_last and file.check_size(may_purge=bool(self._runs))
                 self._kept = file.kept()
                 self._holds_older = file.holds_older
                 self._report_well(file.size())
@@ -360,7 +360,7 @@ class Journal:
             else:
                 self._runs.append(restored.run)
             self._restored = restored
-            self._was_tried.set()
+            self._was_attempted.set()
 
     @staticmethod
     def _next_run(file: JournalFile, before: Run, era: _Era) -> Run:

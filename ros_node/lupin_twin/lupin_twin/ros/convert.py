@@ -284,9 +284,9 @@ def tag_state(tag: Any, times: Any) -> TagState:
     if times is not None:
         observed_at = dict(zip(times.sensors, map(_moment, times.observed_at), strict=False))
         looked_at_ns = _moment(times.looked_at)
-        tried_ns = _moment(times.last_try)
-        if tried_ns is not None:
-            last_try = Attempt(tried_ns, int(times.last_try_status), times.last_try_detail)
+        attempted_ns = _moment(times.last_try)
+        if attempted_ns is not None:
+            last_try = Attempt(attempted_ns, int(times.last_try_status), times.last_try_detail)
     return TagState(
         tag_id=tag.tag_id,
         pose=scanned_pose(pose_of(tag.pose)),

@@ -130,9 +130,9 @@ class EstimateService:
                     stamp_ns = reading.observed_at_ns
                     self._recent.add(tag.tag_id, reading.name, stamp_ns, reading.value)
         for sensor in sorted(sensors):
-            self._look_back(sensor)
+            self._as_of(sensor)
 
-    def _look_back(self, sensor: str) -> None:
+    def _as_of(self, sensor: str) -> None:
         def remember(found: Sequence[TagPast] | Exception) -> None:
             if isinstance(found, Exception):
                 return  # without a journal that can be read, the latest readings are all there is

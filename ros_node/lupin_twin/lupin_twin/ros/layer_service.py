@@ -59,7 +59,7 @@ _COST_S: Final = 1.0
 
 
 @dataclass(frozen=True, slots=True)
-class _Made:
+class _Built:
     """A message, None where it is the one before; and a field that others may ask for too."""
 
     data: bytes | None
@@ -70,7 +70,7 @@ class _Made:
 # What a topic's message is made of and by: a search that the node's thread begins, if there is
 # one, and what makes the message of its result on a worker.
 _Search = Callable[[], Future[Any]]
-_Plan = tuple[_Search | None, Callable[[Any, ShouldStop], _Made]]
+_Plan = tuple[_Search | None, Callable[[Any, ShouldStop], _Built]]
 
 
 @dataclass(slots=True)
@@ -97,13 +97,13 @@ class _Marked:
     arrays: MarkerArrays
     before: Sequence[Any] | None = None
 
-    def make(self, snapshot: Snapshot, *_: object) -> _Made:
+    def make(self, snapshot: Snapshot, *_: object) -> _Built:
         """The array, if it is another than the one before."""
         marks = self.marks(snapshot)
         if marks == self.before:
-            return _Made(None)
+            return _Built(None)
         self.before = marks
-        return _Made(self.arrays.build(marks))
+        return _Built(self.arrays.build(marks))
 
 
 @dataclass(slots=True)
@@ -191,12 +191,12 @@ class LayerService:
         topic.is_under_way = True
         search, make = plan[0] or _nothing, plan[1]
 
-        def made(found: Any) -> _Made:
+        def made(found: Any) -> _Built:
             return make(found, lambda: not topic.is_wanted)
 
         self._queue.ask(Query(search, partial(self._publish, topic), made, _COST_S))
 
-    def _publish(self, topic: _Topic, made: _Made | Exception) -> None:
+    def _publish(self, topic: _Topic, made: _Built | Exception) -> None:
         topic.is_under_way = False
         if isinstance(made, Abandoned):
             topic.key = None
@@ -240,7 +240,7 @@ class LayerService:
         if self.estimates.watch.fit(sensor).model is not None:
             task = self.estimates.prepare(EstimateRequest(request))
 
-        def make(found: Sequence[TagPast], should_stop: ShouldStop) -> _Made:
+        def make(found: Sequence[TagPast], should_stop: ShouldStop) -> _Built:
             job = answer if isinstance(answer, FieldJob) else None
             grid = answer if isinstance(answer, FieldGrid) else answer.compute(should_stop)
             estimate = None
@@ -248,7 +248,7 @@ class LayerService:
                 with suppress(FieldRefused):  # no reading of a day: nothing is known of the error
                     estimate = task.make(found, should_stop).grid
             data = cloud(points(grid, estimate), snapshot.stamp_ns, frame_id)
-            return _Made(data, job, grid)
+            return _Built(data, job, grid)
 
         return None if task is None else task.look_up, make
 

@@ -18,7 +18,7 @@ from typing import Final, TypeVar
 
 from lupin_twin.core.journal_condition import Condition, JournalState
 from lupin_twin.core.past import NotRemembered
-from lupin_twin.journal.schema import FILE_ERRORS, Foreign, open_reader, says_damaged
+from lupin_twin.journal.schema import FILE_ERRORS, Foreign, is_damage_error, open_reader
 from lupin_twin.runtime.workers import ShouldStop, Workers
 
 # Queries that wait at most; each is a few hundred bytes, and its asker's time-out ends it.
@@ -106,7 +106,7 @@ class Recall:
             answer = self._run(path, search, should_stop)
         except (*FILE_ERRORS, Foreign, OSError) as error:
             if not should_stop():
-                if says_damaged(error):
+                if is_damage_error(error):
                     self._heal(str(error))
                 raise _why_not(path, error) from error
         else:
@@ -173,7 +173,7 @@ def _why_not(path: Path, error: Exception) -> Exception:
         why = f"{error}; name another file by the parameter journal"
     elif isinstance(error, FileNotFoundError):
         why = f"the journal {path} is not there; the twin makes one as soon as it can write it"
-    elif says_damaged(error):
+    elif is_damage_error(error):
         why = (
             f"the journal {path} is damaged ({error}); the twin quarantines it and retains what"
             " can be read of it, but once a day: else restart the twin"

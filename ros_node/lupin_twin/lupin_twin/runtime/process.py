@@ -235,11 +235,11 @@ def _unfinished(domain: int, folder: Path) -> Iterator[Path]:
         try:
             about = os.fstat(file)
             is_old = time.time() - about.st_mtime > YOUNG_S
-            if stat.S_ISREG(about.st_mode) and is_old and not _is_made(os.read(file, _STATE.size)):
+            if stat.S_ISREG(about.st_mode) and is_old and not _is_built(os.read(file, _STATE.size)):
                 yield path
         finally:
             os.close(file)
 
 
-def _is_made(begin: bytes) -> bool:
+def _is_built(begin: bytes) -> bool:
     return len(begin) == _STATE.size and _STATE.unpack(begin)[0] >= _MADE

@@ -112,7 +112,7 @@ async def test_a_client_that_goes_does_not_end_the_look_of_another() -> None:
 async def test_looking_goes_on_after_an_error(
     monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
-    monkeypatch.setattr(module, "LOOK_S", 0.0)
+    monkeypatch.setattr(module, "POLL_S", 0.0)
 
     source = Source()
     source.fault = RuntimeError("a fault")
@@ -146,7 +146,7 @@ async def test_layers_are_bounded_and_without_ros_there_are_none() -> None:
 async def test_followers_are_told_of_news_alone_and_an_id_never_comes_back(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(module, "LOOK_S", 0.0)
+    monkeypatch.setattr(module, "POLL_S", 0.0)
     monkeypatch.setattr(module, "TICK_S", 0.0)
 
     source = Source({"/n/twin/field/a": POINTS})
@@ -187,7 +187,7 @@ async def test_followers_are_told_of_news_alone_and_an_id_never_comes_back(
 async def test_a_follower_that_fails_costs_the_others_nothing(
     monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
-    monkeypatch.setattr(module, "LOOK_S", 0.0)
+    monkeypatch.setattr(module, "POLL_S", 0.0)
     monkeypatch.setattr(module, "TICK_S", 0.0)
 
     def fail(_: int | None) -> None:

@@ -29,9 +29,9 @@ from lupin_twin.core.journal_condition import UNKNOWN, Condition
 from lupin_twin.core.past import NotRemembered
 from lupin_twin.core.state import Snapshot, TagState
 from lupin_twin.core.writes import PastWrite
-from lupin_twin.field.engine import FieldJob
 from lupin_twin.field.grid import FieldGrid
-from lupin_twin.runtime.workers import ShouldStop, Workers
+from lupin_twin.field.idw import compute_idw_field
+from lupin_twin.runtime.workers import Workers
 from tests.bridge.stream.test_frames import received
 from tests.support.inprocess import Running, run, running
 from tests.support.messages import scan
@@ -357,18 +357,18 @@ def test_while_a_field_is_made_states_are_answered_and_frames_keep_coming(
         reached.set()
         gate.wait(PATIENCE_S)
 
-    compute, write = FieldJob.compute, field_formats.write
+    compute, write = compute_idw_field, field_formats.write
 
-    def held_compute(job: FieldJob, should_stop: ShouldStop) -> FieldGrid:
+    def held_compute(*args: Any, **kwargs: Any) -> FieldGrid:
         hold()
-        return compute(job, should_stop)
+        return compute(*args, **kwargs)
 
     def held_write(*args: Any) -> bytes:
         hold()
         return write(*args)
 
     if stage == "compute":
-        monkeypatch.setattr(FieldJob, "compute", held_compute)
+        monkeypatch.setattr("lupin_twin.field.engine.compute_idw_field", held_compute)
     else:
         monkeypatch.setattr(field_formats, "write", held_write)
 

@@ -324,7 +324,7 @@ def test_a_twin_without_a_memory_says_so_and_how_to_have_one(
     bar = hmi.test_id("timebar")
     expect(bar).to_have_attribute("data-state", "off")
     expect(bar).to_contain_text("this twin records nothing")
-    expect(bar).to_contain_text("Recording is turned on where the twin is started")
+    expect(bar).to_contain_text("Recording is turned on when the twin is started")
     expect(bar).not_to_contain_text("journal")  # plain words
     expect(hmi.cell("a", "temperature")).to_have_text("25.5")
     hmi.go(f"at={hour.begun_s + 600}")
@@ -399,7 +399,7 @@ def test_the_estimate_says_plus_or_minus_what_now_and_then_and_in_its_link(
     hmi = open_page(hour.bridge.url, "period=hour", color_scheme="dark", bypass_csp=True)
     hmi.expect_samples(3)
     hmi.test_id("heat-legend").select_option("estimate")
-    expect(hmi.test_id("estimate-key")).to_contain_text("Hatched: may be off by more")
+    expect(hmi.test_id("estimate-key")).to_contain_text("Hatched: the error may exceed")
     expect(hmi.test_id("foretold")).to_be_visible()
     # The error alone, which is said also where a house that has just jumped is not known.
     hmi.test_id("heat-legend").select_option("error")

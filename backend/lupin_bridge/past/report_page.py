@@ -105,7 +105,7 @@ class _Page:
         title = f"{say('title')}: {period}"
         known = [
             say(word, at=at(body[name]))
-            for word, name in (("complete", "complete_to"), ("kept", "kept_from"))
+            for word, name in (("kept", "kept_from"), ("complete", "complete_to"))
             if body[name] is not None
         ]
         parts = [

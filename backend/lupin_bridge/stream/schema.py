@@ -428,6 +428,10 @@ class TagHistory(Contract):
     """The last scans and tries of one tag (as many of each as the twin's `buffer_len`)."""
 
     tag_id: str
+    source: str | None = Field(
+        description="of the newest observation that names one, as in lupin_msgs/Observation: "
+        "adapt/fixed is a fixed sensor, adapt a robot's visit, http/NAME a program; null: none does"
+    )
     sensors: list[SensorHistory]
     tries: list[PastAttempt] = Field(description="oldest first")
 

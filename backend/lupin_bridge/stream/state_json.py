@@ -171,6 +171,7 @@ def history(tag_id: str, past: TagHistory) -> dict[str, Any]:
             )
     return {
         "tag_id": tag_id,
+        "source": past.source or None,
         "sensors": [{"name": name, "values": values} for name, values in sensors.items()],
         "tries": [
             {

@@ -19,7 +19,9 @@ describe('addresses', () => {
     let asked = '';
     vi.stubGlobal('fetch', (url: URL) => {
       asked = url.href;
-      return Promise.resolve(Response.json({ tag_id: 'a/b?c', sensors: [], tries: [] }));
+      return Promise.resolve(
+        Response.json({ tag_id: 'a/b?c', source: null, sensors: [], tries: [] }),
+      );
     });
     await fetchHistory('a/b?c', signal);
     expect(asked).toMatch(/\/api\/tags\/a%2Fb%3Fc\/history$/);
@@ -48,6 +50,7 @@ describe('an answer that is none of the contract is an error that names the fiel
       (s: AbortSignal) => fetchHistory('1', s),
       {
         tag_id: '1',
+        source: null,
         tries: [],
         sensors: [{ name: 'co2', values: [{ stamp: 7, value: 1 }] }],
       },

@@ -30,6 +30,7 @@ export const QUALITY = object({
 
 export const HISTORY = object({
   tag_id: TEXT,
+  source: orNull(TEXT),
   tries: list(
     object({ stamp: TIME, status: number, status_detail: TEXT, kind: numberOrNull }),
     MAX_SCANS,

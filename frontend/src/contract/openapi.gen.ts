@@ -290,6 +290,7 @@ export interface components {
         };
         readonly TagHistory: {
             readonly tag_id: string;
+            readonly source: string | null;
             readonly sensors: readonly components["schemas"]["SensorHistory"][];
             readonly tries: readonly components["schemas"]["PastAttempt"][];
         };

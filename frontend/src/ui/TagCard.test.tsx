@@ -89,6 +89,7 @@ describe('card', () => {
       Promise.resolve(
         Response.json({
           tag_id: '7',
+          source: 'adapt/fixed',
           tries: [
             { stamp: stamp(1), status: 0, status_detail: '', kind: 0 },
             { stamp: stamp(2), status: 2, status_detail: 'blurred', kind: null },
@@ -108,6 +109,7 @@ describe('card', () => {
     render(<TagCard tagId="7" />);
     const line = await screen.findByRole('img', { name: /Last 2 readings, between 9\.0/ });
     expect(line.querySelector('polyline')).not.toBeNull();
+    expect(screen.getByText('Fixed sensor')).toBeTruthy();
     const tries = screen.getByRole('region', { name: 'Last attempts' });
     const told = [...tries.querySelectorAll('li')].map((each) => each.textContent);
     expect(told).toHaveLength(2);

@@ -124,6 +124,14 @@ function CardBody({
       <dl className="card-facts">
         <AgeFact label={S.cardScanned} when={tag.scannedAt} />
         {tag.lookedAt !== 'never' && <AgeFact label={S.cardLooked} when={tag.lookedAt} />}
+        {history?.source && (
+          <div>
+            <dt>{S.cardSource}</dt>
+            <dd>
+              <bdi>{sourceText(history.source)}</bdi>
+            </dd>
+          </div>
+        )}
         {tag.failedTry && (
           <div className="card-try">
             <dt>{S.cardTry}</dt>
@@ -174,6 +182,12 @@ function CardBody({
       <Comments subject={`tag:${tag.id}`} name={S.card(shown(tag.id, 24))} />
     </div>
   );
+}
+
+/** Fixed sensors and a robot's visits in words, any other source as it names itself. */
+function sourceText(source: string): string {
+  if (source === 'adapt/fixed') return S.cardFixed;
+  return source === 'adapt' ? S.cardVisited : shown(source, 40);
 }
 
 function CardReading({

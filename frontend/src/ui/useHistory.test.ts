@@ -6,6 +6,7 @@ import { asOf } from './useHistory';
 test('of another moment the card tells what had been tried by then', () => {
   const history = {
     tag_id: '1',
+    source: null,
     tries: [10, 20, 30].map((at) => ({
       stamp: wireTime(at),
       status: 0,

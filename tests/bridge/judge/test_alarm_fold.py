@@ -352,7 +352,7 @@ def test_ordinary_days_raise_less_than_an_alarm_in_ten_minutes_and_none_is_false
     counts = Counter((one.reason.kind.value, one.reason.sensor) for one in raised)
     # The climate's own nights and places, and noise where it is as wide as the range's margin.
     assert counts == {
-        ("pest", ""): 50,
+        ("pest", ""): 17,
         ("range", "temperature"): 22,
         ("range", "humidity"): 18,
         ("range", "soil_moisture"): 5,

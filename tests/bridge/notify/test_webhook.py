@@ -6,6 +6,7 @@ import asyncio
 from collections.abc import AsyncIterator, Callable, Iterator
 from contextlib import asynccontextmanager
 from dataclasses import replace
+from functools import partial
 from types import SimpleNamespace
 from typing import Any
 
@@ -13,6 +14,7 @@ import pytest
 
 from lupin_bridge.notify import webhook as webhook_module
 from lupin_bridge.notify.destinations import Targets
+from lupin_bridge.notify.http_post import post
 from lupin_bridge.notify.webhook import AT_ONCE, MAX_REFUSALS, ORIGIN_S, Delivery, Webhook
 from lupin_bridge.settings import Secrets, Settings
 from lupin_twin.core.diagnostics import Origin
@@ -178,7 +180,7 @@ def test_one_that_refuses_and_comes_later_gets_all_of_it() -> None:
 
 
 def test_one_that_hangs_is_tried_again(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(webhook_module, "ANSWER_S", 0.2)
+    monkeypatch.setattr(webhook_module, "post", partial(post, answer_s=0.2))
 
     async def run(server: Receiver) -> None:
         board = Alarms()

@@ -9,10 +9,10 @@ import sys
 from websockets.asyncio.client import connect
 
 from lupin_bridge.stream import schema
-from lupin_twin.core.state import TwinStore
+from lupin_twin.core.state import TwinStore, samples_of
 from lupin_twin.ros.node import TwinNode
 from tests.support.inprocess import Running, run, running
-from tests.support.messages import scan
+from tests.support.messages import look, scan
 from tests.support.ros import Peer
 from tests.support.waiting import PATIENCE_S, until
 from tests.support.web import bridge, ws_url
@@ -29,6 +29,13 @@ def test_a_live_bridge_is_healthy_and_ready() -> None:
             assert live.get(path).headers["cache-control"] == "no-store"
 
 
+def reads(served: Running, tag_id: str, sensor_type: str) -> bool:
+    """Whether the bridge knows where the tag is, and a reading of it."""
+    latest = served.bridge.latest
+    tags = () if latest is None else latest.snapshot.tags
+    return bool(samples_of([tag for tag in tags if tag.tag_id == tag_id], sensor_type))
+
+
 async def end_ros_thread(served: Running) -> None:
     """What no callback should do, and what must not go unseen: end the thread itself."""
     waiting = asyncio.create_task(served.in_ros_thread(lambda _: sys.exit("the end")))
@@ -43,6 +50,10 @@ def test_when_the_ros_thread_ends_health_says_so_and_every_client_is_told(domain
             connect(ws_url(served.url), proxy=None, open_timeout=PATIENCE_S) as listener,
         ):
             assert json.loads(await listener.recv())["reason"] == "live"
+            with Peer(domain) as peer:
+                peer.observe(look("known", at=(1.0, 2.0)))
+                peer.observe(scan("known", {"co2": 400.0}))
+                await until(lambda: reads(served, "known", "co2"), "the last reading")
             await end_ros_thread(served)
             while (frame := json.loads(await listener.recv())).get("reason") != "thread_dead":
                 pass
@@ -54,12 +65,14 @@ def test_when_the_ros_thread_ends_health_says_so_and_every_client_is_told(domain
             assert schema.Health.model_validate_json(answer.content).ok is False
             answer = await served.http.get("/readyz")
             assert (answer.status_code, answer.json()["reason"]) == (503, "thread_dead")
-            # What was known last is still told; what would need the thread is refused at once.
+            # What was known last is still told, and a field that is first asked for now is made of
+            # it; that it is not live, the status says. What would need the thread is refused at
+            # once.
             assert (await served.http.get("/api/state")).status_code == 200
-            assert (
-                await served.http.get("/api/estimate/quality?sensor_type=co2")
-            ).status_code == 503
             answer = await served.http.get("/api/field?sensor_type=co2")
+            found = answer.headers["x-field-sample-count"], answer.headers["x-field-value-max"]
+            assert (answer.status_code, found) == (200, ("1", "400.0"))
+            answer = await served.http.get("/api/estimate/quality?sensor_type=co2")
             assert (answer.status_code, answer.headers["retry-after"]) == (503, "3")
             async with connect(ws_url(served.url), proxy=None, open_timeout=PATIENCE_S) as late:
                 assert json.loads(await late.recv())["reason"] == "thread_dead"

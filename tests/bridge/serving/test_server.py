@@ -38,7 +38,9 @@ from tests.support.sabotage import sabotaged
 from tests.support.waiting import PATIENCE_S, wait_for
 from tests.support.web import Bridge, Listener, bridge, deaf_client, listener, overfill
 
-FIELD = "/api/field?sensor_type=co2&resolution=0.5"
+# What asks the twin itself, in its ROS thread or through its service.
+REPORT = "/api/estimate/quality?sensor_type=co2"
+# Too much for the event loop: it is computed and written by a worker.
 MILLION_CELLS = (
     "/api/field?sensor_type=co2&resolution=0.001"
     "&bbox_min_x=0&bbox_min_y=0&bbox_max_x=1&bbox_max_y=1"
@@ -144,7 +146,7 @@ def waiting_for(url: str, path: str) -> Iterator[Future[httpx.Response]]:
 
 
 def assert_sent_away(answer: Future[httpx.Response]) -> None:
-    """Whoever waited for a field at the good-bye knows why it does not come, and what to do."""
+    """Whoever waited for an answer at the good-bye knows why it does not come, and what to do."""
     response = answer.result(PATIENCE_S)
     assert response.status_code == 503
     assert response.json() == {"detail": "the bridge is shutting down"}
@@ -235,17 +237,17 @@ def test_clients_that_do_not_read_do_not_hold_up_the_end_nor_does_a_second_signa
         assert_quiet(running_bridge.process)
 
 
-# What of a request for a field never comes back: a worker that computes it, one that writes it,
-# the ROS thread. Each hangs for a sensor of its own.
+# What never comes back: a worker that computes a field, one that writes it, the ROS thread. Each
+# hangs for a sensor of its own, which is asked for by that path.
 HANGS = (
-    "lupin_twin.field.engine:FieldJob.compute:co2",
-    "lupin_bridge.field.formats:write:light",
-    "lupin_twin.field.engine:FieldEngine.lookup:humidity",
+    ("lupin_bridge.past.plans:compute_field:co2", MILLION_CELLS),
+    ("lupin_bridge.field.formats:write:light", MILLION_CELLS),
+    ("lupin_twin.ros.estimate_service:EstimateService.report:humidity", REPORT),
 )
 
 
 def test_fields_that_take_for_ever_do_not_hold_up_the_end(domain: int) -> None:
-    faults = [word for hang in HANGS for word in ("--hang", hang)]
+    faults = [word for hang, _ in HANGS for word in ("--hang", hang)]
     with (
         sabotaged(domain, faults, "lupin_bridge.cli.command", "serve", "--port", "0") as process,
         listener(url_of(process)) as healthy,
@@ -253,10 +255,10 @@ def test_fields_that_take_for_ever_do_not_hold_up_the_end(domain: int) -> None:
     ):
         healthy.until("state")
         answers = []
-        for hang in HANGS:
+        for hang, path in HANGS:
             _, what, sensor = hang.split(":")
-            path = FIELD.replace("co2", sensor)
-            answers.append(stack.enter_context(waiting_for(url_of(process), path)))
+            asked = waiting_for(url_of(process), path.replace("co2", sensor))
+            answers.append(stack.enter_context(asked))
             process.wait_for_output(f"{what} hangs")
         assert process.stop(signal.SIGINT) == 0
         for answer in answers:
@@ -274,9 +276,9 @@ def test_nor_does_a_twin_elsewhere_that_does_not_answer(domain: int) -> None:
         live.listen() as healthy,
     ):
         wait_until_ready(live)
-        wait_for(lambda: live.get(FIELD).status_code == 200, "the twin's service")
+        wait_for(lambda: live.get(REPORT).status_code == 200, "the twin's service")
         twin.freeze()
-        with waiting_for(live.url, FIELD.replace("co2", "light")) as answer:
+        with waiting_for(live.url, REPORT.replace("co2", "light")) as answer:
             wait_for(
                 lambda: "\nlupin_fields_computing 1.0" in live.get("/metrics").text,
                 "the request to be under way",

@@ -232,10 +232,12 @@ def test_a_history_is_sorted_by_sensor_and_keeps_its_order() -> None:
             PastScan(3_000_000_001, (Reading("light", 800.0),)),
         ),
         (PastAttempt(Attempt(S), 0), PastAttempt(Attempt(4 * S, 2, "not decoded"), None)),
+        "adapt/fixed",
     )
     written = state_json.history("7", past)
     assert written == {
         "tag_id": "7",
+        "source": "adapt/fixed",
         "sensors": [
             {
                 "name": "co2",

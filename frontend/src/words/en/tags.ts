@@ -80,6 +80,9 @@ export const TAGS = {
   cardHistory: (count: number, from: string, to: string): string =>
     `Last ${count} readings, between ${from} and ${to}`,
   cardBlooms: 'Blooms',
+  cardSource: 'Source',
+  cardFixed: 'Fixed sensor',
+  cardVisited: 'Visited by the robot',
   cardScanned: 'Last reading',
   cardLooked: 'Flowers inspected',
   cardTry: 'Last attempt',

@@ -52,6 +52,8 @@ class TagHistory:
 
     scans: tuple[PastScan, ...] = ()
     attempts: tuple[PastAttempt, ...] = ()
+    # Of its newest observation that names one; empty: none does.
+    source: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -139,7 +141,10 @@ class History:
     def of(self, tag_id: str) -> TagHistory:
         """What is known of a tag: nothing of one that was never tried."""
         tag = self._tags.get(tag_id)
-        return TagHistory() if tag is None else TagHistory(tag.past_scans(), tag.past_attempts())
+        if tag is None:
+            return TagHistory()
+        source = next((it.key[2] for it in reversed(tag.known) if it.key[2]), "")
+        return TagHistory(tag.past_scans(), tag.past_attempts(), source)
 
     def news(self, write: Scan | Inspection) -> Scan | Inspection | None:
         """What of an observation was not received before, as far as that is known; None: nothing.

@@ -156,7 +156,7 @@ def is_fitted(running: Bridge) -> bool:
 def has_changed(running: Bridge) -> bool:
     """Whether the estimate leaves the tag out, and everybody is told."""
     tags = running.json("/api/estimate/tags", sensor_type="temperature")["tags"]
-    told = running.json("/api/health")["tags"][CHANGED_TAG]["reasons"]
+    told = running.json("/api/health")["tags"][CHANGED_TAG].get("reasons", ())
     return tags[CHANGED_TAG]["left_out"] and any(each["kind"] == "changed" for each in told)
 
 

@@ -88,9 +88,12 @@ async def test_damage_that_is_met_looking_back_has_the_file_set_aside(
         with path.open("r+b") as file:
             file.seek(path.stat().st_size // 4)
             file.write(b"\xff" * (path.stat().st_size // 2))
-        with pytest.raises(NotRemembered, match="is damaged") as caught:
+        # The twin may meet the damage first by itself: then nothing is left to refuse.
+        try:
             [lot async for lot in twin.rows(0, end_ns, None, None, len)]
-        assert not caught.value.is_lasting
+        except NotRemembered as refused:
+            assert "is damaged" in str(refused)
+            assert not refused.is_lasting
         await until(lambda: twin.journal().set_aside, "the damaged file to be set aside")
         assert Path(twin.journal().set_aside).exists()
         await until(lambda: twin.journal().state is JournalState.RECORDING, "a new file")

@@ -21,11 +21,10 @@ from lupin_bridge.cli.output import FAILED, Roles
 from lupin_bridge.console import Progress, say, tell
 from lupin_twin.adapt.config import read_yaml
 from lupin_twin.adapt.table import ConfigError
-from lupin_twin.core.state import NANOSECONDS_PER_SECOND, Reading
+from lupin_twin.core.state import NANOSECONDS_PER_SECOND, Pin, Reading, Scan, Write
 from lupin_twin.journal.beside import Lock
 from lupin_twin.journal.file import JournalFile
 from lupin_twin.journal.retention import Limits
-from lupin_twin.journal.rows import PinRow, Row, ScanRow
 from lupin_twin.journal.runs import Clock, Run, runs, span_at
 from lupin_twin.journal.schema import FILE_ERRORS, open_named
 from lupin_twin.runtime.process import INTERRUPTED
@@ -103,7 +102,7 @@ def _run(options: argparse.Namespace, path: Path) -> int:
     return 0
 
 
-def in_order(found: Iterator[Found], summary: Summary) -> Iterator[ScanRow]:
+def in_order(found: Iterator[Found], summary: Summary) -> Iterator[Scan]:
     """The scans by their stamps; rows of one tag and moment are one, of each sensor its first.
 
     Exports have one sensor behind the other; there may be more than the memory holds.
@@ -128,10 +127,11 @@ def in_order(found: Iterator[Found], summary: Summary) -> Iterator[ScanRow]:
                     if values.setdefault(name, value) != value:
                         summary.repeated += 1
             readings = tuple(map(Reading, values, values.values()))
-            yield ScanRow(tag_id, stamp_ns, stamp_ns, readings, source=SOURCE)
+            sent = {"own_stamp_ns": stamp_ns, "arrival_ns": stamp_ns}
+            yield Scan(tag_id, stamp_ns, readings, source=SOURCE, **sent)
 
 
-def _write(path: Path, columns: Columns, found: Iterator[ScanRow]) -> tuple[int, int]:
+def _write(path: Path, columns: Columns, found: Iterator[Scan]) -> tuple[int, int]:
     """Write them where each belongs, batch by batch; how many are new, and how many were known."""
     path.parent.mkdir(parents=True, exist_ok=True)
     new = count = 0
@@ -145,7 +145,7 @@ def _write(path: Path, columns: Columns, found: Iterator[ScanRow]) -> tuple[int,
             if not known:
                 begin = Clock(batch[0].stamp_ns, batch[0].stamp_ns, is_simulated=False)
                 known = [file.start(begin, 1, is_believed=True).run]
-            rows: list[tuple[Run, Row]] = []
+            rows: list[tuple[Run, Write]] = []
             for scan in batch:
                 span = span_at(known, scan.stamp_ns) if len(known) > 1 else None
                 rows.append((known[0] if span is None else span.run, scan))
@@ -157,7 +157,7 @@ def _write(path: Path, columns: Columns, found: Iterator[ScanRow]) -> tuple[int,
             # A tag's place holds from before its first reading on, and the first one stays.
             file.append(
                 [
-                    (run, PinRow(tag_id, 1, run.begun.arrival_ns, pose))
+                    (run, Pin(tag_id, pose, 1, run.begun.arrival_ns))
                     for tag_id, pose in columns.places.items()
                     if tag_id not in placed
                 ]

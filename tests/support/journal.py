@@ -31,6 +31,7 @@ def scan(tag_id: str = "7", at_ns: int = NOW, *, source: str = "robot", **readin
         at_ns,
         tuple(Reading(name, value) for name, value in (readings or {"temperature": 21.5}).items()),
         source=source,
+        own_stamp_ns=at_ns,
         mission="m1",
         arrival_ns=at_ns + 1000,
     )

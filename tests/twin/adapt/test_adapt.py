@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -19,8 +21,9 @@ from rclpy.qos import QoSProfile, qos_profile_sensor_data
 from sensor_msgs.msg import RelativeHumidity, Temperature
 from std_msgs.msg import Float32
 
-from lupin_twin.adapt.check import Listener, listen, report, suggestion
-from lupin_twin.adapt.config import Config, config_of, read_config
+from lupin_twin.adapt.check import Listener, report, suggestion
+from lupin_twin.adapt.config import config_of, read_config
+from lupin_twin.adapt.node import AdaptNode
 from tests.support.domains import ros_env
 from tests.support.inprocess import ros_domain
 from tests.support.processes import Process, twin_node
@@ -167,54 +170,64 @@ def test_what_is_wrong_is_dropped_counted_and_said(
         assert process.exit_code is None
 
 
-def heard(domain: int, config: Config | None, is_enough: Callable[[Listener], bool]) -> Listener:
-    """What a check hears of a robot, as soon as that is enough."""
-    with Peer(domain) as peer, ros_domain(domain):
-        robot = Robot(peer)
+@contextmanager
+def listening(domain: int, make: Callable[[], Any]) -> Iterator[tuple[Any, Callable[[], None]]]:
+    """A node that checks, in this process, and what spins it for a moment."""
+    with ros_domain(domain):
         rclpy.init(args=[])
         try:
-            listener = Listener(config)
+            node = make()
             executor = SingleThreadedExecutor()
-            executor.add_node(listener)
-
-            def publish() -> bool:
-                robot.be_at(0.0, "odom")
-                robot.read(21.5)
-                listen(executor, 0.05)
-                return is_enough(listener)
-
-            peer.until(publish, "enough to be heard")
-            return listener
+            executor.add_node(node)
+            yield node, lambda: executor.spin_once(timeout_sec=0.05)
         finally:
             rclpy.try_shutdown()
 
 
 def test_check_says_of_each_topic_whether_it_is_right(domain: int, config: Path) -> None:
-    known = read_config(config)
-    lines: list[tuple[bool, str]] = []
+    config.write_text(CONFIG.replace("/humidity", "/humiditi"))
+    made = partial(AdaptNode, read_config(config), is_check=True)
+    with Peer(domain) as peer, listening(domain, made) as (node, spin):
+        robot = Robot(peer)
+        lines: list[str] = []
 
-    def is_enough(listener: Listener) -> bool:
-        lines[:] = report(known, listener, 6.0)
-        return sum(is_right for is_right, _ in lines) == 2 and "its frame" in lines[0][1]
+        def publish() -> bool:
+            robot.be_at(0.0, "odom")
+            robot.read(21.5)
+            spin()
+            lines[:] = [line for _, line in report(node, 0.0)]
+            return "its frame is 'odom', expected 'map'" in lines[0] and "21.5" in lines[1]
 
-    heard(domain, known, is_enough)
-    robot, temperature, humidity, co2 = (line for _, line in lines)
-    assert robot.startswith("WRONG robot: /amcl_pose: its frame is 'odom', expected 'map'")
-    assert temperature.startswith("ok    temperature: /temperature: ")
-    assert temperature.endswith(", temperature = 21.5")
-    assert humidity.endswith(", humidity = 60")
-    assert co2 == "WRONG co2 of tag B: /b/co2: nothing came in 6 s"
+        peer.until(publish, "enough to be heard")
+        # What came a moment ago is not silent; what never came is.
+        position, temperature, _, co2, made_of = (line for _, line in report(node, 60.0))
+        assert position.startswith("WRONG /amcl_pose: dropped a message on /amcl_pose: its frame")
+        assert temperature.startswith("ok    /temperature: receiving; received ")
+        assert temperature.endswith("temperature 21.5")
+        assert lines[2].startswith(
+            "WRONG /humiditi: nobody publishes it, did you mean /humidity?; received 0"
+        )
+        assert co2.startswith("ok    /b/co2: ")
+        assert made_of == "ok    observations: at no tag; made 0, errors 0"
+        assert robot.observations == robot.reports == []
 
 
 def test_check_without_a_configuration_finds_one_that_works(domain: int) -> None:
-    def is_enough(listener: Listener) -> bool:
-        return sum(each.messages > 0 for each in listener.heard.values()) == 3
+    with Peer(domain) as peer, listening(domain, Listener) as (node, spin):
+        robot = Robot(peer)
 
-    found = config_of(yaml.safe_load(suggestion(heard(domain, None, is_enough))))
+        def publish() -> bool:
+            robot.be_at(0.0, "odom")
+            robot.read(21.5)
+            spin()
+            return sum(each.messages > 0 for each in node.heard.values()) == 3
+
+        peer.until(publish, "enough to be heard")
+        found = config_of(yaml.safe_load(suggestion(node)))
     assert found.frame_id == "odom"
     assert found.robot is not None
     assert found.robot.topic == "/amcl_pose"
-    assert [(it.name, it.topic, it.factor) for it in found.sensors] == [
+    assert [(it.name, it.topic, it.value.factor) for it in found.sensors] == [
         ("humidity", "/humidity", 100.0),
         ("temperature", "/temperature", 1.0),
     ]
@@ -223,7 +236,7 @@ def test_check_without_a_configuration_finds_one_that_works(domain: int) -> None
 def test_check_ends_by_itself_and_says_what_is_wrong_by_its_code(domain: int, config: Path) -> None:
     with adapt(domain, "--config", str(config), "--check", "--seconds", "0.1") as process:
         assert process.wait() == 1
-        assert "WRONG robot: /amcl_pose: nobody publishes it" in process.output
+        assert "WRONG /amcl_pose: nobody publishes it; received 0" in process.output
 
 
 @pytest.mark.parametrize(

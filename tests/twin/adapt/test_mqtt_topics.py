@@ -8,8 +8,9 @@ from typing import Any
 
 import pytest
 
-from lupin_twin.adapt.mqtt_topics import Broker, Measured, PayloadError, broker_of, measured
+from lupin_twin.adapt.mqtt_topics import Broker, Measured, broker_of, measured
 from lupin_twin.adapt.table import ConfigError, Table
+from lupin_twin.adapt.value import ReadingError
 
 
 def broker(*topics: dict[str, Any], **more: Any) -> Broker:
@@ -130,7 +131,7 @@ def test_who_the_broker_is(tmp_path: Path) -> None:
 
 
 def test_a_number_without_bounds_is_finite() -> None:
-    with pytest.raises(PayloadError, match="the payload is inf, must be from -inf to inf"):
+    with pytest.raises(ReadingError, match="the payload is inf, must be from -inf to inf"):
         said(broker({"topic": "{tag}/t", "sensor": "t"}), "A/t", b"inf")
 
 
@@ -147,7 +148,7 @@ def test_a_number_without_bounds_is_finite() -> None:
 )
 def test_a_number_that_is_none_is_named(payload: bytes, complaint: str) -> None:
     configured = broker({"topic": "{tag}/t", "sensor": "temperature", "min": 0, "max": 50})
-    with pytest.raises(PayloadError) as refused:
+    with pytest.raises(ReadingError) as refused:
         said(configured, "A/t", payload)
     assert complaint in str(refused.value)
     assert len(str(refused.value)) < 250
@@ -168,7 +169,7 @@ def test_a_number_that_is_none_is_named(payload: bytes, complaint: str) -> None:
 )
 def test_json_that_says_nothing_is_named(payload: bytes, complaint: str) -> None:
     configured = broker({"topic": "{tag}/j", "values": {"temperature": "t"}, "time": "at"})
-    with pytest.raises(PayloadError) as refused:
+    with pytest.raises(ReadingError) as refused:
         said(configured, "A/j", payload)
     assert complaint in str(refused.value)
     assert len(str(refused.value)) < 250

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import math
 import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
@@ -13,15 +12,8 @@ from pathlib import Path
 from typing import Any, Final
 from urllib.parse import urlsplit
 
-from lupin_twin.adapt.table import (
-    AS_IT_IS,
-    ConfigError,
-    Table,
-    Value,
-    shown,
-    value_of,
-    values_of,
-)
+from lupin_twin.adapt.table import ConfigError, Table, shown
+from lupin_twin.adapt.value import AS_IT_IS, ReadingError, Value, value_of, values_of
 
 PORTS: Final = {"mqtt": 1883, "mqtts": 8883}
 MAX_TOPICS: Final = 100
@@ -103,10 +95,6 @@ class Broker:
     ca: str = ""
 
 
-class PayloadError(ValueError):
-    """A payload that says nothing; the message says why."""
-
-
 @dataclass(frozen=True, slots=True)
 class Measured:
     """What one message says: readings of a tag, or that its sensor is not there.
@@ -124,27 +112,27 @@ def measured(pattern: Pattern, tag: str, sensor: str, payload: bytes) -> Measure
     """What a payload says.
 
     Raises:
-        PayloadError: it has no number where one was expected, or one out of range.
+        ReadingError: it has no number where one was expected, or one out of range.
 
     """
     if len(payload) > MAX_PAYLOAD_BYTES:
-        raise PayloadError(f"it has more than {MAX_PAYLOAD_BYTES} bytes, the limit")
+        raise ReadingError(f"it has more than {MAX_PAYLOAD_BYTES} bytes, the limit")
     if pattern.is_availability:
         return Measured(tag, is_away=b"offline" in payload)
     if not pattern.values:
-        return Measured(tag, ((sensor, _number(payload, pattern.plain, "the payload")),))
+        return Measured(tag, ((sensor, pattern.plain.reading(payload, "the payload")),))
     try:
         content = json.loads(payload)
     except (ValueError, RecursionError):
-        raise PayloadError(f"it is no JSON: {shown(payload[:40])}") from None
+        raise ReadingError(f"it is no JSON: {shown(payload[:40])}") from None
     readings = []
     for name, value in pattern.values.items():
         found = _at(content, value.path)
         if found is not None:  # a device says what it has
-            readings.append((name, _number(found, value, value.path)))
+            readings.append((name, value.reading(found, value.path)))
     if not readings:
         paths = ", ".join(value.path for value in pattern.values.values())
-        raise PayloadError(f"it has none of {paths}")
+        raise ReadingError(f"it has none of {paths}")
     stamp = _at(content, pattern.time) if pattern.time else None
     return Measured(tag, tuple(readings), None if stamp is None else _seconds(stamp))
 
@@ -252,18 +240,6 @@ def _at(content: Any, path: str) -> Any:
     return content
 
 
-def _number(found: Any, value: Value, what: str) -> float:
-    """A number, also where it is written as text."""
-    try:
-        # true is a number to Python, and none to who reads a temperature.
-        number = float("" if isinstance(found, bool) else found) * value.factor + value.offset
-    except (TypeError, ValueError, OverflowError):
-        raise PayloadError(f"{what} is {shown(found)[:80]}, expected a number") from None
-    if not value.low <= number <= value.high or math.isinf(number):
-        raise PayloadError(f"{what} is {number:g}, must be from {value.low:g} to {value.high:g}")
-    return number
-
-
 def _seconds(stamp: Any) -> float:
     """A moment in seconds since the epoch, of such a number, one of milliseconds, or ISO 8601."""
     try:
@@ -276,4 +252,4 @@ def _seconds(stamp: Any) -> float:
                 return seconds
     except (ValueError, OverflowError):
         pass
-    raise PayloadError(f"its time is {shown(stamp)}, expected ISO 8601 or seconds since the epoch")
+    raise ReadingError(f"its time is {shown(stamp)}, expected ISO 8601 or seconds since the epoch")

@@ -207,21 +207,3 @@ class Scans:
 
 def _distance_m(place: Place | None, x: float, y: float) -> float:
     return math.inf if place is None else math.hypot(place.x - x, place.y - y)
-
-
-def number_of(message: object, path: str) -> float:
-    """The number at a field's path, such as `data` or `axes[2].value`.
-
-    Raises:
-        LookupError, AttributeError, TypeError: there is none.
-
-    """
-    value: object = message
-    for part in path.split("."):
-        name, _, index = part.partition("[")
-        value = getattr(value, name)
-        if index:
-            value = value[int(index[:-1])]  # type: ignore[index]
-    if not hasattr(value, "__float__"):
-        raise TypeError(f"{path} is a {type(value).__name__}, expected a number")
-    return float(value)

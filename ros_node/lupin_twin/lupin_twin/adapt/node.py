@@ -36,10 +36,10 @@ from lupin_twin.adapt.mqtt import Message, MqttClient
 from lupin_twin.adapt.mqtt_topics import Pattern, measured
 from lupin_twin.adapt.scans import BuiltScan, Scans
 from lupin_twin.adapt.table import ConfigError
-from lupin_twin.adapt.value import ReadingError, number_of
+from lupin_twin.adapt.value import number_of
 from lupin_twin.core import interfaces
 from lupin_twin.core.diagnostics import OK, WARN, Finding
-from lupin_twin.core.drops import RECENT_S, Drop, Reason
+from lupin_twin.core.drops import RECENT_S, Drop, Reason, Rejected
 from lupin_twin.core.state import NANOSECONDS_PER_SECOND
 from lupin_twin.ros import convert
 from lupin_twin.ros.base_node import NodeUtilities, latched, qos_of, waker
@@ -285,7 +285,7 @@ class AdaptNode(Node):  # type: ignore[misc]  # rclpy is not typed
             try:
                 raw = number_of(message, sensor.value.path)
                 value = sensor.value.reading(raw, sensor.name)
-            except ReadingError as error:
+            except Rejected as error:
                 self._drop(Reason.REJECTED, topic, str(error), case=sensor.name)
                 continue
             self._sources[topic].shown[sensor.name] = f"{value:g}"
@@ -331,7 +331,7 @@ class AdaptNode(Node):  # type: ignore[misc]  # rclpy is not typed
         topic, now_ns = f"MQTT {message.topic[:80]}", self._now_ns()
         try:
             said = measured(pattern, tag, sensor, message.payload)
-        except ReadingError as error:
+        except Rejected as error:
             self._drop(Reason.REJECTED, topic, str(error), case="payload")
             return
         if said.is_away:
@@ -356,6 +356,8 @@ class AdaptNode(Node):  # type: ignore[misc]  # rclpy is not typed
         for name, value in said.readings:
             if self._scans.take(name, said.tag, value, stamp_ns, now_ns):
                 self._sources[MQTT].used += 1
+            else:
+                self._drop(Reason.SIZE, topic, "it is of one tag or sensor too many", case="many")
 
     def _each_second(self) -> None:
         self._publish(self._scans.due(self._now_ns()))

@@ -7,11 +7,7 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 from lupin_twin.adapt.table import ConfigError, Table, shown
-from lupin_twin.core.drops import MAX_SENSORS_PER_TAG
-
-
-class ReadingError(ValueError):
-    """What a source says is no reading; the message says why."""
+from lupin_twin.core.drops import MAX_SENSORS_PER_TAG, Rejected
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,16 +27,16 @@ class Value:
         """The number in the sensor's unit, also of one that is written as text.
 
         Raises:
-            ReadingError: it is none, or out of range; `what` is its name.
+            Rejected: it is none, or out of range; `what` is its name.
 
         """
         try:
             # true is a number to Python, and none to who reads a temperature.
             number = float("" if isinstance(raw, bool) else raw) * self.factor + self.offset
         except (TypeError, ValueError, OverflowError):
-            raise ReadingError(f"{what} is {shown(raw)}, expected a number") from None
+            raise Rejected(f"{what} is {shown(raw)}, expected a number") from None
         if not self.low <= number <= self.high or math.isinf(number):  # NaN is in no range
-            raise ReadingError(f"{what} is {number:g}, must be from {self.low:g} to {self.high:g}")
+            raise Rejected(f"{what} is {number:g}, must be from {self.low:g} to {self.high:g}")
         return number
 
 
@@ -51,7 +47,7 @@ def number_of(message: object, path: str) -> float:
     """The number at a field's path of a message, such as `data` or `axes[2].value`.
 
     Raises:
-        ReadingError: there is none.
+        Rejected: there is none.
 
     """
     value: Any = message
@@ -65,7 +61,7 @@ def number_of(message: object, path: str) -> float:
             raise TypeError(f"it is {shown(value)}, expected a number")  # noqa: TRY301
         return float(value)
     except (AttributeError, LookupError, TypeError, ValueError) as error:
-        raise ReadingError(f"field {path}: {error}") from None
+        raise Rejected(f"field {path}: {error}") from None
 
 
 def value_of(table: Table, path: str = "", factor: float = 1.0) -> Value:

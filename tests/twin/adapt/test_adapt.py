@@ -95,14 +95,22 @@ class Robot:
     def fixed(self, value: float) -> None:
         self._co2.publish(Float32(data=value))
 
-    def said(self, text: str) -> bool:
-        """Whether the adapter has it on `/diagnostics`."""
-        return any(
-            text in status.message
+    def _statuses(self, text: str) -> list[Any]:
+        return [
+            status
             for report in self.reports
             for status in report.status
-            if status.hardware_id == "/lupin_adapt"
-        )
+            if status.hardware_id == "/lupin_adapt" and text in status.message
+        ]
+
+    def said(self, text: str) -> bool:
+        """Whether the adapter has it on `/diagnostics`."""
+        return bool(self._statuses(text))
+
+    def dropped(self, text: str) -> int:
+        """How many messages it has dropped of the source of which it says that."""
+        values = self._statuses(text)[-1].values
+        return sum(int(each.value) for each in values if each.key.startswith("dropped: "))
 
 
 def test_a_robot_of_standard_messages_alone_is_on_the_twins_state(
@@ -152,12 +160,19 @@ def test_a_robot_of_standard_messages_alone_is_on_the_twins_state(
             lambda robot: robot.read(20.0, stamp=Time(sec=7)),
             "behind ROS time here, the limit is 10 s: is a clock wrong",
         ),
+        (
+            lambda robot: robot.read(20.0, 6e307),
+            "humidity is inf, must be from -inf to inf",
+        ),
+        (lambda robot: robot.fixed(800.0), "field value: 'Float32' object has no attribute"),
     ],
-    ids=["frame", "pose", "unit", "NaN", "clock"],
+    ids=["frame", "pose", "unit", "NaN", "clock", "overflow", "field"],
 )
 def test_what_is_wrong_is_dropped_counted_and_said(
     domain: int, config: Path, do: Callable[[Robot], None], text: str
 ) -> None:
+    with config.open("a") as file:
+        file.write("  wrong: {topic: /b/co2, type: std_msgs/msg/Float32, field: value, tag: B}\n")
     with adapt(domain, "--config", str(config)) as process, Peer(domain) as peer:
         robot = Robot(peer)
 
@@ -166,8 +181,24 @@ def test_what_is_wrong_is_dropped_counted_and_said(
             return robot.said(text)
 
         peer.until(said, f"{text!r} on /diagnostics")
-        assert process.output.count(text.partition(",")[0]) >= 1  # a line, not one a message
+        assert robot.dropped(text) >= 1
+        wait_for(lambda: text in process.output, "a line of it")
         assert process.exit_code is None
+
+
+def test_a_name_or_a_type_that_is_wrong_is_named_and_so_is_what_would_be_right(
+    domain: int, config: Path
+) -> None:
+    text = CONFIG.replace("/temperature,", "/temprature,").replace("Float32", "Float64")
+    config.write_text(text)
+    with adapt(domain, "--config", str(config)) as process, Peer(domain) as peer:
+        robot = Robot(peer)
+        for text in (
+            "nobody publishes it, did you mean /temperature?",
+            "it is published as std_msgs/msg/Float32, configured is std_msgs/msg/Float64",
+        ):
+            peer.until(lambda text=text: robot.said(text), f"{text!r} on /diagnostics")  # type: ignore[misc]
+            wait_for(lambda text=text: text in process.output, "a line of it")  # type: ignore[misc]
 
 
 @contextmanager

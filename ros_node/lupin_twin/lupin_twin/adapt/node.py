@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import difflib
 import time
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from functools import partial
 from typing import Any, Final
@@ -39,7 +39,7 @@ from lupin_twin.adapt.table import ConfigError
 from lupin_twin.adapt.value import number_of
 from lupin_twin.core import interfaces
 from lupin_twin.core.diagnostics import OK, WARN, Finding
-from lupin_twin.core.drops import RECENT_S, Drop, Reason, Rejected
+from lupin_twin.core.drops import Drop, Reason, Rejected, Tally
 from lupin_twin.core.state import NANOSECONDS_PER_SECOND
 from lupin_twin.ros import convert
 from lupin_twin.ros.base_node import NodeUtilities, latched, qos_of, waker
@@ -58,21 +58,13 @@ TF_STATIC_QOS: Final = latched(100)
 SILENT_S: Final = 10.0
 
 
-@dataclass(frozen=True, slots=True)
-class _Dropped:
-    """How often something was wrong, and the last time in words; `last_s` by the steady clock."""
-
-    count: int
-    text: str
-    last_s: float
-
-
 @dataclass(slots=True)
 class _Source:
     """What came from a topic or the broker, what of it is in a scan, and what was dropped.
 
-    `problem` is what is wrong with it now, `shown` what it said last, `dropped` by case: what is
-    wrong with one sensor must not hide what is wrong with another. `name` is the topic's in ROS.
+    `problem` is what is wrong with it now, `shown` what it said last. `dropped` counts by case:
+    what is wrong with one sensor must not hide what is wrong with another. `name` is the topic's
+    in ROS.
     """
 
     name: str
@@ -82,7 +74,24 @@ class _Source:
     received_s: float = 0.0
     problem: str = ""
     shown: dict[str, str] = field(default_factory=dict)
-    dropped: dict[str, _Dropped] = field(default_factory=dict)
+    dropped: Tally = field(default_factory=Tally)
+
+    def finding(self, topic: str) -> Finding:
+        """The same for `/diagnostics`."""
+        counts = self.dropped.value(time.monotonic())
+        wrong = [self.problem] if self.problem else []
+        wrong += [recent.message for recent in counts.recent]
+        return Finding(
+            topic,
+            WARN if wrong else OK,
+            "; ".join(wrong) or ("connected" if topic == MQTT else "receiving"),
+            {
+                "received": str(self.received),
+                "used": str(self.used),
+                **self.shown,
+                **{f"dropped: {case}": str(count) for case, count in counts.dropped.items()},
+            },
+        )
 
 
 class AdaptNode(Node):  # type: ignore[misc]  # rclpy is not typed
@@ -181,9 +190,7 @@ class AdaptNode(Node):  # type: ignore[misc]  # rclpy is not typed
         # Of a broker's topics there may be any number: one warning a period for all of them.
         known = topic if topic in self._sources else MQTT
         self.utilities.warn((reason, (known, case)), drop.on(topic))
-        dropped, key = self._sources[known].dropped, case or reason.value
-        count = dropped[key].count if key in dropped else 0
-        dropped[key] = _Dropped(count + 1, drop.on(topic), time.monotonic())
+        self._sources[known].dropped.add(case or reason.value, drop.on(topic), time.monotonic())
 
     def _now_ns(self) -> int:
         return int(self.get_clock().now().nanoseconds)
@@ -237,6 +244,13 @@ class AdaptNode(Node):  # type: ignore[misc]  # rclpy is not typed
         max_age_ns = int(self._config.robot.max_age_s * NANOSECONDS_PER_SECOND)  # type: ignore[union-attr]
         return self._frames.place(frame, self._config.frame_id, self._now_ns(), max_age_ns)
 
+    def _why_no_place(self, frame: str) -> str:
+        try:
+            self._place(frame)
+        except FrameError as error:
+            return str(error)
+        return ""
+
     def _move_by_tf(self) -> None:
         robot = self._config.robot
         if robot is None or not robot.tf:
@@ -271,9 +285,9 @@ class AdaptNode(Node):  # type: ignore[misc]  # rclpy is not typed
         for tag_id, frame in self._sightings.come(self._frames):
             try:
                 place = Place(*self._place(frame))
-            except FrameError as error:
-                self._drop(Reason.FRAME, TF, str(error), case="tf tag")
+            except FrameError:  # of another frame in between, which may come too
                 continue
+            self._sightings.end(frame)
             if self._at is not None and self._scans.discover(tag_id, place, *self._at):
                 self._publish_tags()
 
@@ -361,16 +375,11 @@ class AdaptNode(Node):  # type: ignore[misc]  # rclpy is not typed
 
     def _each_second(self) -> None:
         self._publish(self._scans.due(self._now_ns()))
-        self._move_by_tf()
         for frame in self._sightings.missed(self._now_ns()):
-            why = f"a tag was detected, but TF has no {frame!r}: is tag.frames set in apriltag_ros?"
-            self._drop(Reason.FRAME, TF, why, case="tag")
-        if self._mqtt is not None:
-            self._sources[MQTT].problem = self._mqtt.problem
-            self._sources[MQTT].shown["lost"] = str(self._mqtt.lost)
-        for topic, source in self._sources.items():
-            if source.problem:
-                self.utilities.warn(("problem", topic), f"{topic}: {source.problem}")
+            why = f"TF has no {frame!r}: is tag.frames set in apriltag_ros?"
+            if frame in self._frames:
+                why = self._why_no_place(frame) or f"{frame!r} is of an earlier picture in TF"
+            self._drop(Reason.FRAME, TF, f"a tag was detected, but {why}", case="tag")
         self._send(
             self._diagnostics,
             convert.diagnostics(
@@ -378,32 +387,34 @@ class AdaptNode(Node):  # type: ignore[misc]  # rclpy is not typed
             ),
         )
 
-    def findings(self, silent_s: float) -> Iterator[Finding]:
-        """Of each source what came and what is wrong with it, and of the observations made."""
-        now_s, errors = time.monotonic(), self.utilities.callback_errors
+    def findings(self, silent_s: float) -> list[Finding]:
+        """Of each source what came and what is wrong with it, and of the observations made.
+
+        A topic on which nothing came for `silent_s` is silent.
+        """
+        self._move_by_tf()
         for topic, source in self._sources.items():
-            recent = [it.text for it in source.dropped.values() if now_s - it.last_s < RECENT_S]
-            if not source.problem and topic not in (MQTT, TF_STATIC):
-                quiet_s = now_s - max(source.received_s, self._started_s)
-                recent += [self._why_silent(source)] if quiet_s >= silent_s else []
-            wrong = "; ".join([source.problem] * bool(source.problem) + recent)
-            counts = {f"dropped: {case}": str(it.count) for case, it in source.dropped.items()}
-            yield Finding(
-                topic,
-                WARN if wrong else OK,
-                wrong or ("connected" if topic == MQTT else "receiving"),
-                {"received": str(source.received), "used": str(source.used)}
-                | source.shown
-                | counts,
-            )
-        yield Finding(
+            if topic not in (MQTT, TF, TF_STATIC):
+                source.problem = self._why_silent(source, silent_s)
+            elif topic == MQTT and self._mqtt is not None:
+                source.problem = self._mqtt.problem
+                source.shown["lost"] = str(self._mqtt.lost)
+            # A robot that stands, or a slow sensor, is nothing to be logged.
+            if source.problem and (source.received == 0 or topic in (MQTT, TF)):
+                self.utilities.warn(("problem", topic), f"{topic}: {source.problem}")
+        errors = self.utilities.callback_errors
+        made = Finding(
             "observations",
             WARN if errors else OK,
             f"at {self._scans.tag or 'no tag'}",
             {"made": str(self._built), "errors": str(errors)},
         )
+        return [*(source.finding(topic) for topic, source in self._sources.items()), made]
 
-    def _why_silent(self, source: _Source) -> str:
+    def _why_silent(self, source: _Source, silent_s: float) -> str:
+        quiet_s = time.monotonic() - max(source.received_s, self._started_s)
+        if quiet_s < silent_s:
+            return ""
         publishers = self.get_publishers_info_by_topic(source.name)
         if not publishers:
             published = (
@@ -414,7 +425,7 @@ class AdaptNode(Node):  # type: ignore[misc]  # rclpy is not typed
         types = {publisher.topic_type for publisher in publishers}
         if source.type_name not in types:
             return f"it is published as {', '.join(types)}, configured is {source.type_name}"
-        return f"nothing for {time.monotonic() - max(source.received_s, self._started_s):.0f} s"
+        return f"nothing for {quiet_s:.0f} s"
 
     def _send(self, publisher: Any, message: Any) -> None:
         if not self._is_check:

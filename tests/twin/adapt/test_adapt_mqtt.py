@@ -145,7 +145,9 @@ def test_the_last_will_of_a_sensor_that_dies_is_a_failed_scan(domain: int, tmp_p
         sensor.will_set("plain/bench", "offline")
         sensor.connect("127.0.0.1", broker.port)
         wait_for(lambda: sensor.loop() == 0 and sensor.is_connected(), "the sensor to be there")
-        sensor.socket().close()  # without a goodbye
+        connection = sensor.socket()
+        assert connection is not None
+        connection.close()  # without a goodbye
 
         def failed() -> Any:
             return next((it for it in robot.observations if it.status), None)

@@ -21,6 +21,7 @@ from typing import Final, NamedTuple
 from lupin_twin.core.diagnostics import Origin
 from lupin_twin.core.journal_condition import Condition, JournalState
 from lupin_twin.core.notes import Note
+from lupin_twin.core.state import Write
 from lupin_twin.journal.appending import Stretch
 from lupin_twin.journal.beside import InUse, Lock
 from lupin_twin.journal.file import JournalFile
@@ -29,7 +30,7 @@ from lupin_twin.journal.fold import Restored
 from lupin_twin.journal.notes import NoteQueue
 from lupin_twin.journal.rebuild import is_version3, upgrade
 from lupin_twin.journal.retention import Limits, Stretches
-from lupin_twin.journal.rows import Row, weight
+from lupin_twin.journal.rows import weight
 from lupin_twin.journal.runs import Carries, Clock, Run, Turn
 from lupin_twin.journal.schema import DamagedFile, Foreign, is_damage_error
 
@@ -41,7 +42,7 @@ class Entry(NamedTuple):
     """A row, the clock it was received by (1: the first), and when: steady clock, and ROS time."""
 
     era: int
-    row: Row
+    row: Write
     handed_over_s: float
     at_ns: int
 
@@ -209,7 +210,7 @@ class Journal:
         self._eras.append(_Era(clock, turn, scans_per_series, before_ns))
         self._pending.arrived.set()
 
-    def write(self, row: Row, at_ns: int | None = None) -> None:
+    def write(self, row: Write, at_ns: int | None = None) -> None:
         """Hand a row over that was received at `at_ns`, ROS time; None: as it was stamped.
 
         It is safe from a killed process within 100 ms.

@@ -31,7 +31,7 @@ from lupin_twin.ros import convert, message_limits
 from lupin_twin.ros.base_node import NodeUtilities, qos_of, waker
 from lupin_twin.ros.convert import diagnostics
 from lupin_twin.ros.estimate_service import EstimateService
-from lupin_twin.ros.inputs import OtherTwins, TwinCount
+from lupin_twin.ros.inputs import TwinCount
 from lupin_twin.ros.layer_service import LAYERS_PERIOD_S, LayerService
 from lupin_twin.ros.parameters import AdjustableNode, declare, naming, naming_own_parameters
 from lupin_twin.ros.responses import RETRY_S, Responses
@@ -199,7 +199,6 @@ class TwinNode(AdjustableNode):
         self.layers.offer(self, p.layers, p.frame_id)
         for service in self.services:  # those of its parameters too
             responses.watch(service)
-        self._others = OtherTwins(self, self.utilities, self.twins, p.state_topic, group=group)
         self._diagnostics = self.create_publisher(DiagnosticArray, own.name, qos_of(own))
         for period_s, what, callback in (
             (DIAGNOSTICS_PERIOD_S, "diagnostics", self._publish_diagnostics),
@@ -330,7 +329,13 @@ class TwinNode(AdjustableNode):
         self._state_publisher.publish(self._states.build(snapshot))
         self.utilities.drain()
         self._times_publisher.publish(self._times.build(snapshot))
-        self._others.check(self._state_publisher.topic_name)
+        topic = self._state_publisher.topic_name
+        if self.twins.see(int(self.count_publishers(topic)), time.monotonic()):
+            self.utilities.warn(
+                ("twins", 0),
+                f"{self.twins.value} nodes publish {topic}: consumers get a mixture; "
+                "stop all twins but one, or give them ROS domains of their own",
+            )
 
     @property
     def _clock_state(self) -> ClockState:

@@ -156,7 +156,7 @@ class Memory:
 
     def note_map(self, floor: OccupancyMap) -> None:
         """Have the newest map in the journal; see there."""
-        self._journal.floor_plan.put(floor)
+        self._journal.write_map(floor)
 
     def heal(self, damage: str) -> None:
         """Have a journal in which somebody has met damage set aside; from any thread."""

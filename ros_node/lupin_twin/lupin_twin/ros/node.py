@@ -20,7 +20,7 @@ from lupin_twin.core import ingest, interfaces
 from lupin_twin.core.clock import LATCHED_AFTER_S, ClockWatch, Lateness
 from lupin_twin.core.diagnostics import CLOCK, ERROR, Health, Origin, findings, origin_of
 from lupin_twin.core.drops import Drop, Reason
-from lupin_twin.core.history import History, kind_of
+from lupin_twin.core.history import kind_of
 from lupin_twin.core.parameters import ParameterError, TwinParameters, World
 from lupin_twin.core.state import ClockState, Inspection, Scan, Snapshot, TwinStore, Write
 from lupin_twin.field.engine import FieldCache, FieldEngine, FieldRules
@@ -67,7 +67,6 @@ class TwinNode(AdjustableNode):
         self.parameters = declare(self)
         self._world = world
         self.store = TwinStore()
-        self.history = History(self.parameters.buffer_len)
         self.memory = self._memory()
         self.lateness = Lateness()
         self.fields = FieldEngine(FieldRules.of(self.parameters), FieldCache())
@@ -168,7 +167,7 @@ class TwinNode(AdjustableNode):
             ) from error
         name = self.get_fully_qualified_name()
         journal = open_journal(path, name, p.journal_days, p.journal_max_mb, self._world.origin)
-        return Memory(self.store, self.history, journal, p.buffer_len)
+        return Memory(self.store, journal, p.buffer_len)
 
     def _connect(self) -> None:
         p, group = self.parameters, self._group
@@ -239,7 +238,7 @@ class TwinNode(AdjustableNode):
         if isinstance(write, Drop):
             self.utilities.drop(write, topic)
             return
-        is_news = self.history.news(write) is not None
+        is_news = self.memory.repeats.news(write) is not None
         if self._apply(write, topic):
             self._observed_s = time.monotonic()
             if is_news:

@@ -20,7 +20,7 @@ import numpy as np
 
 from lupin_twin.core.parameters import TwinParameters
 from lupin_twin.estimate import Model, Readings, fit
-from lupin_twin.estimate.engine import RecentReadings, TagPast, readings_of
+from lupin_twin.estimate.engine import TagPast, readings_of
 from lupin_twin.field.engine import FieldRules
 from lupin_twin.field.idw import compute_idw_field
 from tests.bench import plain_estimate
@@ -86,11 +86,12 @@ def case_of(world: World, phase: str, seed: int) -> Case:
 
 
 def as_received(read: Readings, at_s: float) -> Readings:
-    """What a twin that has received all of it makes an estimate of, by seconds from `at_s` on."""
-    recent = RecentReadings(24.0 * HOUR_S)
-    for row, tag in enumerate(read.tag.tolist()):
-        recent.add(str(tag), "", round(read.time_s[row] * 1e9), float(read.value[row]))
-    tags = [TagPast(str(tag), x, y, recent.of(str(tag), "")) for tag, (x, y) in enumerate(read.xy)]
+    """What a twin makes an estimate of, by seconds from `at_s` on."""
+    tags = []
+    for tag, (x, y) in enumerate(read.xy):
+        rows = np.flatnonzero(read.tag == tag)
+        own = zip((read.time_s[rows] * 1e9).round(), read.value[rows], strict=True)
+        tags.append(TagPast(str(tag), x, y, tuple((int(ns), float(value)) for ns, value in own)))
     return readings_of(tags, round(at_s * 1e9), 24.0 * HOUR_S)
 
 

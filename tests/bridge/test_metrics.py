@@ -12,7 +12,7 @@ from lupin_bridge.bridge import Bridge
 from lupin_bridge.metrics import CONTENT_TYPE, COUNTERS, GAUGES, HISTOGRAMS, Metrics
 from lupin_bridge.settings import Settings
 from lupin_twin.estimate.grading import Record, Tally
-from lupin_twin.runtime.estimate_rounds import Report
+from lupin_twin.runtime.estimates import Report
 from tests.bridge.test_bridge import Script
 from tests.support.messages import scan
 from tests.support.processes import lupin_twin, url_of

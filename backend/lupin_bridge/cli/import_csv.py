@@ -21,11 +21,10 @@ from lupin_bridge.cli.output import FAILED, Roles
 from lupin_bridge.console import Progress, say, tell
 from lupin_twin.adapt.config import read_yaml
 from lupin_twin.adapt.table import ConfigError
-from lupin_twin.core.state import NANOSECONDS_PER_SECOND, Reading
+from lupin_twin.core.state import NANOSECONDS_PER_SECOND, STATUS_OK, Pin, Reading, Scan, Write
 from lupin_twin.journal.beside import Lock
 from lupin_twin.journal.file import JournalFile
 from lupin_twin.journal.retention import Limits
-from lupin_twin.journal.rows import PinRow, Row, ScanRow
 from lupin_twin.journal.runs import Clock, Run, runs, span_at
 from lupin_twin.journal.schema import FILE_ERRORS, open_named
 from lupin_twin.runtime.process import INTERRUPTED
@@ -103,8 +102,10 @@ def _run(options: argparse.Namespace, path: Path) -> int:
     return 0
 
 
-def in_order(found: Iterator[Found], summary: Summary) -> Iterator[ScanRow]:
-    """The scans by their stamps; rows of one tag and moment are one, of each sensor its first.
+def in_order(
+    found: Iterator[Found], summary: Summary
+) -> Iterator[tuple[int, str, dict[str, float]]]:
+    """Stamp, tag and readings by their stamps; of one tag and moment, of each sensor its first.
 
     Exports have one sensor behind the other; there may be more than the memory holds.
     """
@@ -119,6 +120,10 @@ def in_order(found: Iterator[Found], summary: Summary) -> Iterator[ScanRow]:
                 for stamp_ns, tag_id, names, values in found
             ),
         )
+        ends = disk.execute(
+            "SELECT coalesce(min(stamp_ns), 0), coalesce(max(stamp_ns), 0) FROM scan"
+        )
+        summary.first_ns, summary.last_ns = ends.fetchone()
         sensors = tuple(ids)
         rows = disk.execute("SELECT * FROM scan ORDER BY stamp_ns, tag, rowid")
         for (stamp_ns, tag_id), parts in groupby(rows, key=itemgetter(0, 1)):
@@ -127,12 +132,13 @@ def in_order(found: Iterator[Found], summary: Summary) -> Iterator[ScanRow]:
                 for name, value in zip(sensors[names], memoryview(doubles).cast("d"), strict=True):
                     if values.setdefault(name, value) != value:
                         summary.repeated += 1
-            readings = tuple(map(Reading, values, values.values()))
-            yield ScanRow(tag_id, stamp_ns, stamp_ns, readings, source=SOURCE)
+            yield stamp_ns, tag_id, values
 
 
-def _write(path: Path, columns: Columns, found: Iterator[ScanRow]) -> tuple[int, int]:
-    """Write them where each belongs, batch by batch; how many are new, and how many were known."""
+def _write(
+    path: Path, columns: Columns, found: Iterator[tuple[int, str, dict[str, float]]]
+) -> tuple[int, int]:
+    """Write scans where each belongs, batch by batch; how many are new, and how many were known."""
     path.parent.mkdir(parents=True, exist_ok=True)
     new = count = 0
     with (
@@ -143,11 +149,15 @@ def _write(path: Path, columns: Columns, found: Iterator[ScanRow]) -> tuple[int,
         while batch := list(islice(found, _BATCH)):
             count += len(batch)
             if not known:
-                begin = Clock(batch[0].stamp_ns, batch[0].stamp_ns, is_simulated=False)
+                first_ns = batch[0][0]
+                begin = Clock(first_ns, first_ns, is_simulated=False)
                 known = [file.start(begin, 1, is_believed=True).run]
-            rows: list[tuple[Run, Row]] = []
-            for scan in batch:
-                span = span_at(known, scan.stamp_ns) if len(known) > 1 else None
+            rows: list[tuple[Run, Write]] = []
+            for stamp_ns, tag_id, values in batch:
+                span = span_at(known, stamp_ns) if len(known) > 1 else None
+                readings = tuple(map(Reading, values, values.values()))
+                sent = (SOURCE, stamp_ns, "", stamp_ns)
+                scan = Scan(tag_id, stamp_ns, readings, None, STATUS_OK, "", *sent)
                 rows.append((known[0] if span is None else span.run, scan))
             written, refused = file.append(rows)
             new += written
@@ -157,7 +167,7 @@ def _write(path: Path, columns: Columns, found: Iterator[ScanRow]) -> tuple[int,
             # A tag's place holds from before its first reading on, and the first one stays.
             file.append(
                 [
-                    (run, PinRow(tag_id, 1, run.begun.arrival_ns, pose))
+                    (run, Pin(tag_id, pose, 1, run.begun.arrival_ns))
                     for tag_id, pose in columns.places.items()
                     if tag_id not in placed
                 ]

@@ -8,15 +8,16 @@ from __future__ import annotations
 
 import csv
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field
 from datetime import datetime
 from functools import lru_cache, partial
-from typing import Any, Final, NamedTuple, TextIO
+from typing import Any, Final, TextIO
 from zoneinfo import ZoneInfo
 
-from lupin_twin.adapt.table import AS_IT_IS, ConfigError, Table, Value, is_number, shown, values_of
+from lupin_twin.adapt.table import ConfigError, Table, is_number, shown
+from lupin_twin.adapt.value import AS_IT_IS, Value, values_of
 from lupin_twin.core.drops import (
     MAX_SENSORS_PER_TAG,
     MAX_TAGS,
@@ -52,13 +53,8 @@ class Columns:
     places: Mapping[str, Pose] = field(default_factory=dict)
 
 
-class Found(NamedTuple):
-    """A scan as the file has it: ROS time in ns, and a value for each name of a sensor."""
-
-    stamp_ns: int
-    tag_id: str
-    names: tuple[str, ...]
-    values: Sequence[float]
+# A scan as the file has it: ROS time in ns, tag, and a value for each name of a sensor.
+Found = tuple[int, str, tuple[str, ...], list[float]]
 
 
 @dataclass(slots=True)
@@ -73,8 +69,8 @@ class Summary:
     repeated: int = 0
     tags: set[str] = field(default_factory=set)
     sensors: dict[str, list[float]] = field(default_factory=dict)
-    first_ns: int = 2**63 - 1
-    last_ns: int = -1
+    first_ns: int = 0
+    last_ns: int = 0
     refused: dict[str, list[int]] = field(default_factory=dict)
 
     def refuse(self, reason: str, line: int) -> None:
@@ -91,7 +87,7 @@ class Summary:
             ValueError: with it there would be more tags or sensors than a twin takes.
 
         """
-        stamp_ns, tag_id, names, values = found
+        _, tag_id, names, values = found
         if tag_id not in self.tags:
             check_length("tags", len(self.tags) + 1, MAX_TAGS)
             self.tags.add(tag_id)
@@ -107,8 +103,6 @@ class Summary:
             elif value > sensor[2]:
                 sensor[2] = value
         self.scans += 1
-        self.first_ns = min(self.first_ns, stamp_ns)
-        self.last_ns = max(self.last_ns, stamp_ns)
 
     def lines(self) -> Iterator[str]:
         """The same for a person."""
@@ -235,7 +229,7 @@ def _reader(header: list[str], columns: Columns) -> Callable[[list[str]], Found]
 
     def readings_of(row: list[str]) -> tuple[tuple[str, ...], list[float]]:
         if wide:
-            given = [entry for entry in wide if row[entry[2]] and not row[entry[2]].isspace()]
+            given = [entry for entry in wide if row[entry[2]].strip()]
             values = [_number(name, row[index], column) for name, column, index in given]
             names = every if len(given) == len(every) else tuple(name for name, _, _ in given)
             return names, values
@@ -250,7 +244,7 @@ def _reader(header: list[str], columns: Columns) -> Callable[[list[str]], Found]
         names, values = readings_of(row)
         if not values:
             raise ValueError("no reading")
-        return Found(_moment_ns(row[time_at], columns.zone), tag_id, names, values)
+        return _moment_ns(row[time_at], columns.zone), tag_id, names, values
 
     return read
 

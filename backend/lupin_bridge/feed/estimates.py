@@ -18,7 +18,7 @@ from lupin_bridge.feed.source import TwinSource, TwinUnavailableError
 from lupin_twin.core.past import NotRemembered
 from lupin_twin.core.state import Snapshot
 from lupin_twin.field.engine import FieldRefused
-from lupin_twin.runtime.estimate_rounds import Report, ReportRequest
+from lupin_twin.runtime.estimates import Report, ReportRequest
 from lupin_twin.runtime.workers import in_turns
 
 # A twin's next round comes no sooner.
@@ -57,7 +57,7 @@ class Reports:
 
 log = logging.getLogger(__name__)
 
-# A round of estimates comes every 30 s (`estimate_rounds.ROUND_REST_S`).
+# A round of estimates comes every 30 s (`estimate_service.REST_S`).
 PERIOD_S: Final = 15.0
 # A greenhouse has a handful of sensors; of more, the first in the alphabet.
 MAX_SENSORS: Final = 32

@@ -18,7 +18,7 @@ from lupin_twin.core.past import NotRemembered
 from lupin_twin.core.state import NANOSECONDS_PER_SECOND, Snapshot
 from lupin_twin.field.explored import OccupancyMap
 from lupin_twin.ros.node import TwinNode
-from lupin_twin.runtime.estimate_rounds import ADVICE_S, Report, ReportRequest
+from lupin_twin.runtime.estimates import Report, ReportRequest
 
 # A third of what counts as silence (`status.STALE_AFTER_S`).
 HEARTBEAT_S = 1.0
@@ -87,7 +87,7 @@ class LocalTwin(RosSource[TwinNode, TwinUpdate]):
         return self.update.occupancy_map
 
     async def estimate_report(self, request: ReportRequest) -> Report:
-        """What the node knows; where another tag helps is worked out on a worker."""
+        """What the node makes of its log."""
         return await self._in_time(self._report(request))
 
     writes_notes = True
@@ -114,8 +114,8 @@ class LocalTwin(RosSource[TwinNode, TwinUpdate]):
         return Now(self.now_ns, update.snapshot.frame_id, update.journal)
 
     async def _report(self, request: ReportRequest) -> Report:
-        work = await self.thread.call(lambda node: node.estimates.report(request))
-        return await asyncio.wrap_future(self.workers.submit(lambda _: work(), ADVICE_S))
+        reporting = await self.thread.call(lambda node: node.estimates.report(request))
+        return await asyncio.wrap_future(reporting)
 
     async def _explain(self, error: NotRemembered) -> NotRemembered:
         damage = error.damage

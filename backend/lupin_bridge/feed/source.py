@@ -28,7 +28,7 @@ from lupin_twin.field.explored import OccupancyMap
 from lupin_twin.journal.follow import WRITES_S
 from lupin_twin.journal.notes import NOTES_S
 from lupin_twin.journal.queries import STRETCH_S, Export
-from lupin_twin.runtime.estimate_rounds import Report, ReportRequest
+from lupin_twin.runtime.estimates import Report, ReportRequest
 from lupin_twin.runtime.workers import Workers
 
 ResultT = TypeVar("ResultT")

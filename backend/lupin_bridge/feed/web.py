@@ -28,7 +28,7 @@ from lupin_twin.journal.beside import journal_path
 from lupin_twin.journal.follow import Lot
 from lupin_twin.ros import convert_field, convert_past
 from lupin_twin.ros.convert_past import NotAnAnswerError
-from lupin_twin.runtime.estimate_rounds import Report, ReportRequest
+from lupin_twin.runtime.estimates import Report, ReportRequest
 
 ResultT = TypeVar("ResultT")
 

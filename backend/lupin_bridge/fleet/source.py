@@ -24,7 +24,7 @@ from lupin_twin.core.parameters import TwinParameters
 from lupin_twin.core.past import NotRemembered
 from lupin_twin.field.engine import FieldRules
 from lupin_twin.field.explored import OccupancyMap
-from lupin_twin.runtime.estimate_rounds import Report, ReportRequest
+from lupin_twin.runtime.estimates import Report, ReportRequest
 from lupin_twin.runtime.workers import Workers
 
 log = logging.getLogger(__name__)

@@ -23,7 +23,7 @@ from lupin_twin.estimate.engine import (
 )
 from lupin_twin.field.grid import far_off_tags
 from lupin_twin.journal.queries import SERIES_S
-from lupin_twin.runtime.estimate_rounds import AS_OF, estimate_at, readings_at
+from lupin_twin.runtime.estimates import AS_OF, estimate_at, readings_at
 from lupin_twin.runtime.workers import ShouldStop
 
 

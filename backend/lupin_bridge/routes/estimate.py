@@ -34,7 +34,7 @@ from lupin_bridge.routes.field import InFormats
 from lupin_bridge.serving.admission import Answer, json_answer
 from lupin_bridge.stream import estimate_schema, report_json
 from lupin_twin.field.engine import FieldRefused
-from lupin_twin.runtime.estimate_rounds import DEFAULT_PLACES, MAX_PLACES, ReportRequest
+from lupin_twin.runtime.estimates import DEFAULT_PLACES, MAX_PLACES, ReportRequest
 
 router = APIRouter()
 

@@ -9,7 +9,7 @@ import orjson
 
 from lupin_bridge.stream.state_json import stamp
 from lupin_twin.estimate.grading import Tally
-from lupin_twin.runtime.estimate_rounds import Report
+from lupin_twin.runtime.estimates import Report
 from lupin_twin.runtime.workers import in_turns
 
 

@@ -16,7 +16,7 @@ from lupin_bridge.feed.estimates import (
 from lupin_bridge.feed.source import TwinUnavailableError
 from lupin_twin.core.state import Pose, Reading, Snapshot, TagState
 from lupin_twin.estimate.grading import Record, Tally
-from lupin_twin.runtime.estimate_rounds import Report, ReportRequest, TagCheck
+from lupin_twin.runtime.estimates import Report, ReportRequest, TagCheck
 from lupin_twin.runtime.workers import Workers
 from tests.support.waiting import until
 

@@ -14,7 +14,7 @@ from lupin_bridge.feed.local import LocalTwin
 from lupin_bridge.feed.source import TwinTimeoutError, TwinUpdate
 from lupin_twin.core.parameters import ParameterError
 from lupin_twin.ros.node import TwinNode
-from lupin_twin.runtime.estimate_rounds import ReportRequest
+from lupin_twin.runtime.estimates import ReportRequest
 from tests.support.waiting import PATIENCE_S, until
 
 SILENT = ("--ros-args", "-p", "state_publish_rate_hz:=0.01")

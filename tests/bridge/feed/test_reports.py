@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from lupin_bridge.feed.estimates import FRESH_S, Reports
-from lupin_twin.runtime.estimate_rounds import ReportRequest
+from lupin_twin.runtime.estimates import ReportRequest
 
 CO2, LIGHT = ReportRequest("co2"), ReportRequest("light")
 

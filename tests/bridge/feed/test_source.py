@@ -25,7 +25,7 @@ from lupin_twin.core.history import LatestRequest
 from lupin_twin.core.past import PastRefused, SeriesRequest
 from lupin_twin.core.state import Reading
 from lupin_twin.estimate.engine import TagPast
-from lupin_twin.runtime.estimate_rounds import ReportRequest
+from lupin_twin.runtime.estimates import ReportRequest
 from tests.support.messages import discovered, occupancy_grid, pose, scan
 from tests.support.processes import OFTEN, twin_node
 from tests.support.ros import Peer

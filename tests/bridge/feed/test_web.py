@@ -14,7 +14,7 @@ from lupin_msgs.srv import GetEstimateReport
 from lupin_bridge.feed.source import TwinTimeoutError, TwinUnavailableError, TwinUpdate
 from lupin_bridge.feed.web import WebTwin
 from lupin_twin.field.engine import FieldRefused
-from lupin_twin.runtime.estimate_rounds import ReportRequest
+from lupin_twin.runtime.estimates import ReportRequest
 from tests.support.messages import occupancy_grid
 from tests.support.ros import Peer
 from tests.support.waiting import until, until_answered

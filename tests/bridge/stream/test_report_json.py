@@ -8,7 +8,7 @@ from lupin_bridge.stream import report_json
 from lupin_bridge.stream.estimate_schema import Advice, EstimateQualities, ExpectedTags
 from lupin_twin.estimate import Place
 from lupin_twin.estimate.grading import Record, Tally
-from lupin_twin.runtime.estimate_rounds import Report, TagCheck
+from lupin_twin.runtime.estimates import Report, TagCheck
 
 S = 1_000_000_000
 REPORT = Report(

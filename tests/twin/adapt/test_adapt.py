@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -19,8 +21,9 @@ from rclpy.qos import QoSProfile, qos_profile_sensor_data
 from sensor_msgs.msg import RelativeHumidity, Temperature
 from std_msgs.msg import Float32
 
-from lupin_twin.adapt.check import Listener, listen, report, suggestion
-from lupin_twin.adapt.config import Config, config_of, read_config
+from lupin_twin.adapt.check import Listener, report, suggestion
+from lupin_twin.adapt.config import config_of, read_config
+from lupin_twin.adapt.node import AdaptNode
 from tests.support.domains import ros_env
 from tests.support.inprocess import ros_domain
 from tests.support.processes import Process, twin_node
@@ -92,14 +95,22 @@ class Robot:
     def fixed(self, value: float) -> None:
         self._co2.publish(Float32(data=value))
 
-    def said(self, text: str) -> bool:
-        """Whether the adapter has it on `/diagnostics`."""
-        return any(
-            text in status.message
+    def _statuses(self, text: str) -> list[Any]:
+        return [
+            status
             for report in self.reports
             for status in report.status
-            if status.hardware_id == "/lupin_adapt"
-        )
+            if status.hardware_id == "/lupin_adapt" and text in status.message
+        ]
+
+    def said(self, text: str) -> bool:
+        """Whether the adapter has it on `/diagnostics`."""
+        return bool(self._statuses(text))
+
+    def dropped(self, text: str) -> int:
+        """How many messages it has dropped of the source of which it says that."""
+        values = self._statuses(text)[-1].values
+        return sum(int(each.value) for each in values if each.key.startswith("dropped: "))
 
 
 def test_a_robot_of_standard_messages_alone_is_on_the_twins_state(
@@ -149,12 +160,19 @@ def test_a_robot_of_standard_messages_alone_is_on_the_twins_state(
             lambda robot: robot.read(20.0, stamp=Time(sec=7)),
             "behind ROS time here, the limit is 10 s: is a clock wrong",
         ),
+        (
+            lambda robot: robot.read(20.0, 6e307),
+            "humidity is inf, must be from -inf to inf",
+        ),
+        (lambda robot: robot.fixed(800.0), "field value: 'Float32' object has no attribute"),
     ],
-    ids=["frame", "pose", "unit", "NaN", "clock"],
+    ids=["frame", "pose", "unit", "NaN", "clock", "overflow", "field"],
 )
 def test_what_is_wrong_is_dropped_counted_and_said(
     domain: int, config: Path, do: Callable[[Robot], None], text: str
 ) -> None:
+    with config.open("a") as file:
+        file.write("  wrong: {topic: /b/co2, type: std_msgs/msg/Float32, field: value, tag: B}\n")
     with adapt(domain, "--config", str(config)) as process, Peer(domain) as peer:
         robot = Robot(peer)
 
@@ -163,58 +181,84 @@ def test_what_is_wrong_is_dropped_counted_and_said(
             return robot.said(text)
 
         peer.until(said, f"{text!r} on /diagnostics")
-        assert process.output.count(text.partition(",")[0]) >= 1  # a line, not one a message
+        assert robot.dropped(text) >= 1
+        wait_for(lambda: text in process.output, "a line of it")
         assert process.exit_code is None
 
 
-def heard(domain: int, config: Config | None, is_enough: Callable[[Listener], bool]) -> Listener:
-    """What a check hears of a robot, as soon as that is enough."""
-    with Peer(domain) as peer, ros_domain(domain):
+def test_a_name_or_a_type_that_is_wrong_is_named_and_so_is_what_would_be_right(
+    domain: int, config: Path
+) -> None:
+    text = CONFIG.replace("/temperature,", "/temprature,").replace("Float32", "Float64")
+    config.write_text(text)
+    with adapt(domain, "--config", str(config)) as process, Peer(domain) as peer:
         robot = Robot(peer)
+        for text in (
+            "nobody publishes it, did you mean /temperature?",
+            "it is published as std_msgs/msg/Float32, configured is std_msgs/msg/Float64",
+        ):
+            peer.until(lambda text=text: robot.said(text), f"{text!r} on /diagnostics")  # type: ignore[misc]
+            wait_for(lambda text=text: text in process.output, "a line of it")  # type: ignore[misc]
+
+
+@contextmanager
+def listening(domain: int, make: Callable[[], Any]) -> Iterator[tuple[Any, Callable[[], None]]]:
+    """A node that checks, in this process, and what spins it for a moment."""
+    with ros_domain(domain):
         rclpy.init(args=[])
         try:
-            listener = Listener(config)
+            node = make()
             executor = SingleThreadedExecutor()
-            executor.add_node(listener)
-
-            def publish() -> bool:
-                robot.be_at(0.0, "odom")
-                robot.read(21.5)
-                listen(executor, 0.05)
-                return is_enough(listener)
-
-            peer.until(publish, "enough to be heard")
-            return listener
+            executor.add_node(node)
+            yield node, lambda: executor.spin_once(timeout_sec=0.05)
         finally:
             rclpy.try_shutdown()
 
 
 def test_check_says_of_each_topic_whether_it_is_right(domain: int, config: Path) -> None:
-    known = read_config(config)
-    lines: list[tuple[bool, str]] = []
+    config.write_text(CONFIG.replace("/humidity", "/humiditi"))
+    made = partial(AdaptNode, read_config(config), is_check=True)
+    with Peer(domain) as peer, listening(domain, made) as (node, spin):
+        robot = Robot(peer)
+        lines: list[str] = []
 
-    def is_enough(listener: Listener) -> bool:
-        lines[:] = report(known, listener, 6.0)
-        return sum(is_right for is_right, _ in lines) == 2 and "its frame" in lines[0][1]
+        def publish() -> bool:
+            robot.be_at(0.0, "odom")
+            robot.read(21.5)
+            spin()
+            lines[:] = [line for _, line in report(node, 0.0)]
+            return "its frame is 'odom', expected 'map'" in lines[0] and "21.5" in lines[1]
 
-    heard(domain, known, is_enough)
-    robot, temperature, humidity, co2 = (line for _, line in lines)
-    assert robot.startswith("WRONG robot: /amcl_pose: its frame is 'odom', expected 'map'")
-    assert temperature.startswith("ok    temperature: /temperature: ")
-    assert temperature.endswith(", temperature = 21.5")
-    assert humidity.endswith(", humidity = 60")
-    assert co2 == "WRONG co2 of tag B: /b/co2: nothing came in 6 s"
+        peer.until(publish, "enough to be heard")
+        # What came a moment ago is not silent; what never came is.
+        position, temperature, _, co2, made_of = (line for _, line in report(node, 60.0))
+        assert position.startswith("WRONG /amcl_pose: dropped a message on /amcl_pose: its frame")
+        assert temperature.startswith("ok    /temperature: receiving; received ")
+        assert temperature.endswith("temperature 21.5")
+        assert lines[2].startswith(
+            "WRONG /humiditi: nobody publishes it, did you mean /humidity?; received 0"
+        )
+        assert co2.startswith("ok    /b/co2: ")
+        assert made_of == "ok    observations: at no tag; made 0, errors 0"
+        assert robot.observations == robot.reports == []
 
 
 def test_check_without_a_configuration_finds_one_that_works(domain: int) -> None:
-    def is_enough(listener: Listener) -> bool:
-        return sum(each.messages > 0 for each in listener.heard.values()) == 3
+    with Peer(domain) as peer, listening(domain, Listener) as (node, spin):
+        robot = Robot(peer)
 
-    found = config_of(yaml.safe_load(suggestion(heard(domain, None, is_enough))))
+        def publish() -> bool:
+            robot.be_at(0.0, "odom")
+            robot.read(21.5)
+            spin()
+            return sum(bool(each.messages) for each in node.heard.values()) == 3
+
+        peer.until(publish, "enough to be heard")
+        found = config_of(yaml.safe_load(suggestion(node)))
     assert found.frame_id == "odom"
     assert found.robot is not None
     assert found.robot.topic == "/amcl_pose"
-    assert [(it.name, it.topic, it.factor) for it in found.sensors] == [
+    assert [(it.name, it.topic, it.value.factor) for it in found.sensors] == [
         ("humidity", "/humidity", 100.0),
         ("temperature", "/temperature", 1.0),
     ]
@@ -223,7 +267,7 @@ def test_check_without_a_configuration_finds_one_that_works(domain: int) -> None
 def test_check_ends_by_itself_and_says_what_is_wrong_by_its_code(domain: int, config: Path) -> None:
     with adapt(domain, "--config", str(config), "--check", "--seconds", "0.1") as process:
         assert process.wait() == 1
-        assert "WRONG robot: /amcl_pose: nobody publishes it" in process.output
+        assert "WRONG /amcl_pose: nobody publishes it; received 0" in process.output
 
 
 @pytest.mark.parametrize(

@@ -9,6 +9,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+from lupin_msgs.msg import Observation
 from paho.mqtt.client import Client
 from paho.mqtt.enums import CallbackAPIVersion
 
@@ -17,6 +18,7 @@ from tests.support.messages import scan
 from tests.support.mosquitto import Broker
 from tests.support.processes import Process, twin_node
 from tests.support.ros import Peer
+from tests.support.waiting import wait_for
 from tests.support.web import bridge
 from tests.twin.adapt.test_adapt import Robot, adapt
 
@@ -27,7 +29,8 @@ mqtt:
   url: {url}
   topics:
     - {{topic: "zigbee2mqtt/{{tag}}", preset: zigbee2mqtt}}
-    - {{topic: "plain/{{tag}}/{{sensor}}", max: 2000}}
+    - {{topic: "plain/{{tag}}/{{sensor}}", max: 2000, availability: "plain/{{tag}}"}}
+    - {{topic: "homeassistant/sensor/{{tag}}_{{sensor}}/state", preset: homeassistant}}
 """
 
 
@@ -91,6 +94,68 @@ def test_what_zigbee_sensors_say_is_on_the_state_and_so_is_that_one_is_gone(
 
         peer.until(has_failed, "the failed attempt")
         assert process.exit_code is None
+
+
+def test_home_assistants_entities_are_on_the_state_and_so_is_that_one_is_away(
+    domain: int, tmp_path: Path
+) -> None:
+    """As its statestream publishes them: each state by itself, and all of them retained."""
+    broker = Broker(tmp_path)
+    entity = "homeassistant/sensor/north_bay_{}/state"
+    with broker.running(), device(broker) as client:
+        before = {"temperature": "19.0", "soil_moisture": "unknown"}
+        for name, value in before.items():
+            client.publish(entity.format(name), value, 1, retain=True).wait_for_publish(60.0)
+        with (
+            twin_node(domain),
+            adapted(domain, broker) as process,
+            Peer(domain) as peer,
+        ):
+            robot = Robot(peer)
+            peer.listen()
+            # What was retained says nothing of when it was measured.
+            peer.until(lambda: robot.said("it is retained and says no time"), "the complaint")
+            states = {"temperature": "21.5", "humidity": "60", "carbon_dioxide": "800"}
+
+            def is_known() -> bool:
+                for name, value in {**states, "battery": "90"}.items():
+                    client.publish(entity.format(name), value, 1, retain=True)
+                return len(readings(peer, "north_bay")) == 3
+
+            peer.until(is_known, "three sensors on the state")
+            known = {"temperature": 21.5, "humidity": 60.0, "co2": 800.0}
+            assert readings(peer, "north_bay") == known
+            client.publish(entity.format("humidity"), "unavailable", 1, retain=True)
+
+            def has_failed() -> bool:
+                return any(it.status_detail == "its sensor is offline" for it in robot.observations)
+
+            peer.until(has_failed, "the failed attempt")
+            assert readings(peer, "north_bay") == known
+            assert not robot.said("unknown")
+            assert process.exit_code is None
+
+
+def test_the_last_will_of_a_sensor_that_dies_is_a_failed_scan(domain: int, tmp_path: Path) -> None:
+    broker = Broker(tmp_path)
+    with broker.running(), adapted(domain, broker), Peer(domain) as peer:
+        robot = Robot(peer)
+        peer.until(lambda: robot.said("connected"), "the broker")
+        sensor = Client(CallbackAPIVersion.VERSION2)
+        sensor.will_set("plain/bench", "offline")
+        sensor.connect("127.0.0.1", broker.port)
+        wait_for(lambda: sensor.loop() == 0 and sensor.is_connected(), "the sensor to be there")
+        connection = sensor.socket()
+        assert connection is not None
+        connection.close()  # without a goodbye
+
+        def failed() -> Any:
+            return next((it for it in robot.observations if it.status), None)
+
+        found = peer.until(failed, "the will as an observation")
+        assert found.status == Observation.STATUS_SCAN_FAILED
+        assert (found.tag_reading.tag_id, found.source) == ("bench", "adapt/fixed")
+        assert found.tag_pose_in_map.position.x == 1.0
 
 
 def test_what_is_retained_counts_by_its_own_time_or_not_at_all(domain: int, tmp_path: Path) -> None:

@@ -3,26 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import pytest
-import rclpy
 import yaml
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import TransformStamped
 from lupin_msgs.msg import Observation
-from rclpy.executors import SingleThreadedExecutor
 from rclpy.qos import QoSProfile, qos_profile_sensor_data
 from sensor_msgs.msg import Temperature
 
-from lupin_twin.adapt.check import Listener, listen, report, suggestion
-from lupin_twin.adapt.config import Config, config_of
+from lupin_twin.adapt.check import Listener, report, suggestion
+from lupin_twin.adapt.config import config_of
+from lupin_twin.adapt.node import AdaptNode
 from tests.support.docs import block_named
-from tests.support.inprocess import ros_domain
 from tests.support.processes import twin_node
 from tests.support.ros import Peer, latched
-from tests.twin.adapt.test_adapt import adapt
+from tests.twin.adapt.test_adapt import adapt, listening
 
 CONFIG = """
 robot: {tf: base_link, max_age_s: 2}
@@ -197,49 +196,38 @@ def test_a_robot_whose_transforms_are_old_is_nowhere(domain: int, config: Path) 
         assert robot.observations == []
 
 
-def heard(domain: int, config: Config | None, is_enough: Callable[[Listener], bool]) -> Listener:
-    """What a check hears of the robot, as soon as that is enough."""
-    with Peer(domain) as peer, ros_domain(domain):
-        robot = Robot(peer)
-        rclpy.init(args=[])
-        try:
-            listener = Listener(config)
-            executor = SingleThreadedExecutor()
-            executor.add_node(listener)
-
-            def publish() -> bool:
-                robot.be_at(5.0, robot.see(7, 0.3))
-                robot.read(21.5)
-                listen(executor, 0.05)
-                return is_enough(listener)
-
-            peer.until(publish, "enough to be heard")
-            return listener
-        finally:
-            rclpy.try_shutdown()
-
-
 def test_check_says_where_tf_has_the_robot_and_which_tags_are_seen(domain: int) -> None:
-    config = config_of(yaml.safe_load(CONFIG))
-    lines: list[tuple[bool, str]] = []
+    made = partial(AdaptNode, config_of(yaml.safe_load(CONFIG)), is_check=True)
+    with Peer(domain) as peer, listening(domain, made) as (node, spin):
+        robot = Robot(peer)
+        lines: list[tuple[bool, str]] = []
 
-    def is_enough(listener: Listener) -> bool:
-        lines[:] = report(config, listener, 6.0)
-        return all(is_right for is_right, _ in lines)
+        def publish() -> bool:
+            robot.be_at(5.0, robot.see(7, 0.3))
+            robot.read(21.5)
+            spin()
+            lines[:] = report(node, 60.0)
+            text = " ".join(line for _, line in lines)
+            return "robot at" in text and "tags tag36h11:7" in text and "temperature 21.5" in text
 
-    heard(domain, config, is_enough)
-    robot, detections, _ = (line for _, line in lines)
-    assert robot.startswith("ok    robot: /tf: ")
-    assert robot.endswith("base_link is at (5.00, 0.00) m in map")
-    assert detections.startswith("ok    detections: /detections: ")
-    assert detections.endswith("tags in the last: tag36h11:7")
+        peer.until(publish, "what TF and the camera say")
+        assert all(is_right for is_right, _ in lines)
+        tf = next(line for _, line in lines if line.startswith("ok    /tf: "))
+        assert tf.endswith("robot at (5.00, 0.00) m")
 
 
 def test_check_without_a_configuration_finds_tf_and_detections(domain: int) -> None:
-    def is_enough(listener: Listener) -> bool:
-        return "base_link" in listener.frames and len(listener.heard) >= 4
+    with Peer(domain) as peer, listening(domain, Listener) as (node, spin):
+        robot = Robot(peer)
 
-    found = config_of(yaml.safe_load(suggestion(heard(domain, None, is_enough))))
+        def publish() -> bool:
+            robot.be_at(5.0, robot.see(7, 0.3))
+            robot.read(21.5)
+            spin()
+            return "base_link" in node.frames and len(node.heard) >= 4
+
+        peer.until(publish, "enough to be heard")
+        found = config_of(yaml.safe_load(suggestion(node)))
     assert found.robot is not None
     assert (found.robot.tf, found.tags) == ("base_link", {})
     assert found.detections is not None

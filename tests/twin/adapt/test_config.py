@@ -11,6 +11,7 @@ import yaml
 
 from lupin_twin.adapt.config import Place, Robot, Sensor, config_of, read_config
 from lupin_twin.adapt.table import ConfigError
+from lupin_twin.adapt.value import Value
 from tests.support.docs import block_named
 
 LEAST = """
@@ -32,10 +33,10 @@ def test_the_least_that_has_to_work(tmp_path: Path) -> None:
     assert (config.frame_id, config.reach_m) == ("map", 0.8)
     temperature, humidity = config.sensors
     assert temperature == Sensor(
-        "temperature", "/temperature", "sensor_msgs/msg/Temperature", "temperature"
+        "temperature", "/temperature", "sensor_msgs/msg/Temperature", Value("temperature")
     )
     # A standard message's ratio is our percent, without being told.
-    assert (humidity.field, humidity.factor) == ("relative_humidity", 100.0)
+    assert (humidity.value.path, humidity.value.factor) == ("relative_humidity", 100.0)
 
 
 def test_tags_may_stand_in_a_file_of_their_own(tmp_path: Path) -> None:
@@ -55,8 +56,8 @@ def test_one_quantity_may_have_several_fixed_sensors() -> None:
         },
     }
     first, second = config_of(content).sensors
-    assert (first.name, first.tag, first.low, first.high) == ("co2", "A", -math.inf, 5000.0)
-    assert (second.name, second.tag, second.offset) == ("co2", "B", -20.0)
+    assert (first.name, first.tag, first.value.high) == ("co2", "A", 5000.0)
+    assert (second.name, second.tag, second.value.offset) == ("co2", "B", -20.0)
 
 
 def test_what_the_docs_show_is_taken() -> None:
@@ -70,7 +71,7 @@ def test_what_the_docs_show_is_taken() -> None:
 
 def test_another_number_of_a_standard_message_is_in_its_own_unit() -> None:
     content = changed("sensors.humidity.field", "variance")
-    assert config_of(content).sensors[1].factor == 1.0
+    assert config_of(content).sensors[1].value.factor == 1.0
 
 
 def test_a_range_has_its_ends_in_order() -> None:

@@ -136,9 +136,11 @@ def test_a_sighting_waits_for_its_transform_and_no_longer() -> None:
     sightings.see("late", "2", NOW, NOW)  # its transform is of an earlier picture
     sightings.see("never", "3", NOW, NOW)
     assert sightings.come(frames) == [("1", "early")]
+    sightings.end("early")
     assert sightings.come(frames) == []
     frames.put("late", step("map", 0, 0, 0))
     assert sightings.come(frames) == [("2", "late")]
+    sightings.end("late")
     assert sightings.missed(NOW + WAIT_NS) == []
     sightings.see("never", "3", NOW + S, NOW + S)  # being seen again begins no new wait
     assert sightings.missed(NOW + WAIT_NS + 1) == ["never"]

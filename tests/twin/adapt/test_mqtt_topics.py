@@ -8,8 +8,9 @@ from typing import Any
 
 import pytest
 
-from lupin_twin.adapt.mqtt_topics import Broker, Measured, PayloadError, broker_of, measured
+from lupin_twin.adapt.mqtt_topics import Broker, Measured, broker_of, measured
 from lupin_twin.adapt.table import ConfigError, Table
+from lupin_twin.core.drops import Rejected
 
 
 def broker(*topics: dict[str, Any], **more: Any) -> Broker:
@@ -45,17 +46,24 @@ def test_json_is_read_by_paths_and_says_when_it_was() -> None:
             "time": "at",
         }
     )
-    payload = {"air": {"t": 212}, "list": [1, 2], "at": "1970-01-01T00:01:00Z"}
+    payload = {"air": {"t": 212}, "list": [1, 2], "at": "2024-05-01T10:00:00Z"}
     (found,) = said(configured, "house/x/climate", payload)
     assert dict(found.readings) == pytest.approx({"temperature": 100.0, "co2": 2.0})
-    assert found.stamp_s == 60.0
+    assert found.stamp_s == 1_714_557_600.0
     for at, seconds in (
-        (90, 90.0),
+        (1_700_000_000.5, 1_700_000_000.5),
         (1_700_000_000_000, 1.7e9),
-        ("1970-01-01T02:00:00+01:00", 3600),
-        ("1970-01-01T00:01:00", 60.0),  # in UTC, wherever this runs
+        ("2024-05-01T12:00:00+02:00", 1_714_557_600.0),
+        ("2024-05-01T10:00:00", 1_714_557_600.0),  # in UTC, wherever this runs
     ):
         assert said(configured, "house/x/climate", {"list": [0, 1], "at": at})[0].stamp_s == seconds
+
+
+def test_a_tag_or_a_sensor_as_long_as_a_topic_may_be_is_refused() -> None:
+    configured = broker({"topic": "gh/{tag}/{sensor}"})
+    for topic in (f"gh/{'x' * 257}/co2", f"gh/A/{'x' * 257}"):
+        with pytest.raises(Rejected, match="has 257 characters, the limit is 256"):
+            said(configured, topic, b"1")
 
 
 def test_zigbee2mqtts_payloads_need_no_paths() -> None:
@@ -97,6 +105,7 @@ def test_home_assistants_entities_are_tag_and_sensor() -> None:
             Measured(tag, ((sensor, 5.0),))
         ]
     assert said(configured, "ha/sensor/north_bay_battery/state", b"5") == []
+    assert said(configured, "ha/sensor/a_humidity/state", b"unknown") == [Measured("a")]
 
 
 def test_a_preset_gives_way_to_what_is_said_and_a_topic_says_who_is_there() -> None:
@@ -110,7 +119,7 @@ def test_a_preset_gives_way_to_what_is_said_and_a_topic_says_who_is_there() -> N
     )
     (found,) = said(configured, "zigbee2mqtt/A", {"lux": 5, "illuminance": 7})
     assert found.readings == (("light", 5.0),)
-    assert said(configured, "there/A", b"offline") == [Measured("A", is_away=True)]
+    assert said(configured, "there/A", b"Offline") == [Measured("A", is_away=True)]
 
 
 def test_who_the_broker_is(tmp_path: Path) -> None:
@@ -130,7 +139,7 @@ def test_who_the_broker_is(tmp_path: Path) -> None:
 
 
 def test_a_number_without_bounds_is_finite() -> None:
-    with pytest.raises(PayloadError, match="the payload is inf, must be from -inf to inf"):
+    with pytest.raises(Rejected, match="the payload is inf, must be from -inf to inf"):
         said(broker({"topic": "{tag}/t", "sensor": "t"}), "A/t", b"inf")
 
 
@@ -147,7 +156,7 @@ def test_a_number_without_bounds_is_finite() -> None:
 )
 def test_a_number_that_is_none_is_named(payload: bytes, complaint: str) -> None:
     configured = broker({"topic": "{tag}/t", "sensor": "temperature", "min": 0, "max": 50})
-    with pytest.raises(PayloadError) as refused:
+    with pytest.raises(Rejected) as refused:
         said(configured, "A/t", payload)
     assert complaint in str(refused.value)
     assert len(str(refused.value)) < 250
@@ -164,11 +173,13 @@ def test_a_number_that_is_none_is_named(payload: bytes, complaint: str) -> None:
         (b'{"t": 1, "at": "yesterday"}', "its time is 'yesterday', expected ISO 8601"),
         (b'{"t": 1, "at": -5}', "its time is -5"),
         (b'{"t": 1, "at": 1e999}', "its time is inf"),
+        (b'{"t": 1, "at": true}', "its time is True"),
+        (b'{"t": 1, "at": "1970-01-01T00:01:00Z"}', "and after 2001"),  # a clock never set
     ],
 )
 def test_json_that_says_nothing_is_named(payload: bytes, complaint: str) -> None:
     configured = broker({"topic": "{tag}/j", "values": {"temperature": "t"}, "time": "at"})
-    with pytest.raises(PayloadError) as refused:
+    with pytest.raises(Rejected) as refused:
         said(configured, "A/j", payload)
     assert complaint in str(refused.value)
     assert len(str(refused.value)) < 250
@@ -181,8 +192,9 @@ def test_json_that_says_nothing_is_named(payload: bytes, complaint: str) -> None
         ({"topic": "/a/{tag}", "sensor": "t"}, {}, "mqtt.topics[0].topic is '/a/{tag}'"),
         ({"topic": "$SYS/{tag}", "sensor": "t"}, {}, "mqtt.topics[0].topic is '$SYS/{tag}'"),
         ({"topic": "{tag}"}, {"topics": [{}] * 101}, "expected a list of 1 to 100"),
-        ({"topic": "a"}, {}, "expected {tag} in its topic, or tag; one of them"),
-        ({"topic": "{tag}", "tag": "A"}, {}, "expected {tag} in its topic, or tag"),
+        ({"topic": "a"}, {}, "expected {tag} in 'a', or the key tag; one of them"),
+        ({"topic": "{tag}", "tag": "A"}, {}, "expected {tag} in '{tag}', or the key tag"),
+        ({"topic": "{tag}", "sensor": "t", "availability": "lwt"}, {}, "expected {tag} in 'lwt'"),
         ({"topic": "{tag}"}, {}, "a payload that is a number needs {sensor} in its topic"),
         ({"topic": "{tag}", "preset": "zwave"}, {}, "preset is 'zwave', expected one of zigbee"),
         ({"topic": "{tag}", "sensor": "t", "unit": "C"}, {}, "'unit' is not known, expected one"),

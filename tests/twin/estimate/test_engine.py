@@ -2,25 +2,18 @@
 
 from __future__ import annotations
 
-import math
-
-import numpy as np
 import pytest
 
 from lupin_twin.core.state import NANOSECONDS_PER_SECOND
 from lupin_twin.estimate import MAX_EXACT, MAX_PER_TAG, PER_TAG
 from lupin_twin.estimate.engine import (
     MAX_TAGS,
-    NEWEST,
-    EstimateJob,
     EstimateRequest,
-    RecentReadings,
     TagPast,
     moment_of,
     readings_of,
 )
 from lupin_twin.field.engine import FieldRefused, FieldRequest
-from lupin_twin.field.idw import Abandoned
 from tests.support.estimates import DAY_S
 
 S = NANOSECONDS_PER_SECOND
@@ -58,37 +51,6 @@ def test_many_tags_share_what_can_be_solved_at_once() -> None:
         readings_of([tag_past(index, 1.0) for index in range(MAX_TAGS + 1)], at_ns, DAY_S)
 
 
-def test_a_day_is_remembered_by_the_newest_of_each_hour_and_the_last_readings() -> None:
-    recent = RecentReadings(DAY_S)
-    for minute in range(30 * 60):
-        recent.add("a", "co2", minute * 60 * S, float(minute))
-    recent.add("a", "co2", 10 * 3600 * S, -1.0)  # received late, and older than another of its hour
-    for value in (math.nan, 1e39):
-        recent.add("a", "co2", 30 * 3600 * S, value)
-    found = recent.of("a", "co2")
-    last = [float(minute) for minute in range(30 * 60 - NEWEST, 30 * 60)]
-    hours = [60.0 * hour + 59.0 for hour in range(6, 29)]
-    assert [value for _, value in found] == [*hours, last[0] - 1.0, *last]
-    assert list(found) == sorted(found)
-    recent.add("a", "co2", *found[-2])
-    assert recent.of("a", "co2") == found, "received again, it is nothing new"
-    recent.hold_to(10 * 3600 * S)
-    assert [value for _, value in recent.of("a", "co2")] == [
-        60.0 * hour + 59.0 for hour in range(6, 10)
-    ]
-    assert recent.of("a", "light") == ()
-
-
-def test_an_estimate_without_a_model_is_fitted_for_itself() -> None:
-    request = EstimateRequest(box())
-    tags = [tag_past(index, 1.0 + index / 3.0, 2.0) for index in range(3)]
-    estimate = EstimateJob(request, None, DAY_S).compute(tags, int(3 * 3600 * S))
-    assert (estimate.sample_count, estimate.reading_count) == (3, 6)
-    assert (estimate.grid.width, estimate.grid.height) == (8, 16)
-    assert np.isfinite(estimate.grid.mean).all()
-    assert (estimate.grid.sd > 0.0).all()
-
-
 def test_an_estimate_of_now_is_one_of_the_last_minute_or_of_the_newest_reading() -> None:
     hour_ns = 3600 * S
     tags = [tag_past(0, 0.5, 1.0), tag_past(1, 2.0)]
@@ -97,32 +59,6 @@ def test_an_estimate_of_now_is_one_of_the_last_minute_or_of_the_newest_reading()
     late = [TagPast("late", 0.0, 0.0, ((hour_ns + 7 * S, 20.0), (2 * hour_ns, 20.0)))]
     assert moment_of(late, hour_ns + 59 * S, DAY_S) == hour_ns + 7 * S
     assert moment_of([], 25 * S, 1440.0) == 25 * S, "a minute of that day is a second"
-
-
-def test_what_nobody_waits_for_ends_between_two_steps() -> None:
-    asked: list[None] = []
-
-    def should_stop() -> bool:
-        asked.append(None)
-        return len(asked) == 3
-
-    tags = [tag_past(index, 1.0, 2.0) for index in range(3)]
-    with pytest.raises(Abandoned):
-        EstimateJob(EstimateRequest(box()), None, DAY_S).compute(tags, 3 * 3600 * S, should_stop)
-
-
-def test_what_a_sensor_has_read_since_it_changed_does_not_count() -> None:
-    tags = [tag_past(index, 1.0 + index / 3.0, 2.0) for index in range(3)]
-
-    def built_from(since_h: float) -> tuple[int, int]:
-        changed = {"tag-1": int(since_h * 3600 * S), "gone": 0}
-        asked = EstimateRequest(box())
-        made = EstimateJob(asked, None, DAY_S, changed).compute(tags, int(3.0 * 3600 * S))
-        return made.sample_count, made.reading_count
-
-    assert built_from(2.5) == (3, 6)
-    assert built_from(2.0) == (3, 5)
-    assert built_from(1.0) == (2, 4)
 
 
 @pytest.mark.parametrize("at_ns", [-1, 11 * S])

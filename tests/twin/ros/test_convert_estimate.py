@@ -16,7 +16,7 @@ from lupin_twin.estimate.grading import Record, Tally
 from lupin_twin.field.engine import FieldRefused
 from lupin_twin.ros import convert_field
 from lupin_twin.ros.convert_past import NotAnAnswerError
-from lupin_twin.runtime.estimate_rounds import DEFAULT_PLACES, Report, ReportRequest, TagCheck
+from lupin_twin.runtime.estimates import DEFAULT_PLACES, Report, ReportRequest, TagCheck
 from tests.support.estimates import an_estimate
 
 

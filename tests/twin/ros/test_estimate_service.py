@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from concurrent.futures import Future
 from functools import cache
 from pathlib import Path
 from threading import Event
@@ -16,12 +17,11 @@ from builtin_interfaces.msg import Time
 from lupin_msgs.srv import GetEstimate, GetEstimateReport
 
 from lupin_twin.core.diagnostics import Estimates
-from lupin_twin.core.state import NANOSECONDS_PER_SECOND, Reading, Scan, TwinStore
-from lupin_twin.estimate import FitFailed
+from lupin_twin.core.state import NANOSECONDS_PER_SECOND, TwinStore
 from lupin_twin.estimate.engine import TagPast, readings_of
-from lupin_twin.estimate.grading import Tally
-from lupin_twin.ros.estimate_service import REST_FACTOR, EstimateService
-from lupin_twin.runtime.estimate_rounds import FIRST_FIT, Done, Loaded, ReportRequest
+from lupin_twin.ros import estimate_service
+from lupin_twin.ros.estimate_service import EstimateService
+from lupin_twin.runtime.estimates import Report, ReportRequest
 from lupin_twin.runtime.workers import MAX_QUERIES
 from tests.support import messages
 from tests.support.domains import own_domain
@@ -41,8 +41,6 @@ BOX: dict[str, Any] = {
     "bbox_max_y": 3.0,
 }
 PLACES = {"a": (0.25, 0.25), "b": (1.75, 2.75)}
-# By the steady clock, later than any rest.
-FAR_S = 1e12
 
 
 @cache
@@ -93,9 +91,12 @@ def test_the_estimate_is_near_the_readings_at_the_tags_and_less_sure_between(pee
 
 
 def test_what_is_expected_of_each_tag_and_where_another_helps_is_reported(peer: Peer) -> None:
+    def ask_report(sensor_type: str, **more: int) -> Any:
+        return peer.ask(GetEstimateReport, REPORT_SERVICE, sensor_type=sensor_type, **more)
+
     def report(newest: list[int]) -> Any:
         def look() -> Any:
-            answer = peer.ask(GetEstimateReport, REPORT_SERVICE, sensor_type="humidity")
+            answer = ask_report("humidity")
             assert answer.ok, answer.error_message
             return answer if [one.sec for one in answer.observed_at] == newest else None
 
@@ -118,18 +119,12 @@ def test_what_is_expected_of_each_tag_and_where_another_helps_is_reported(peer: 
     assert 1 <= len(loaded.place_x) <= 5
     assert all(0.0 < ratio <= 1.0 for ratio in loaded.error_ratio)
     assert (loaded.week_scans, loaded.graded_since) == (0, Time())
-
-    # Half as many again: the next round need not be waited for.
-    for later_s in range(60, 360, 60):
-        scan("a", times()["a"][0] + later_s)
-    later = report([times()["a"][0] + 300, times()["b"][0]])
-    assert abs(later.expected[0] - 60.25) < 4.0 * later.expected_sd[0]
-    assert later.week_scans == 0, "two tags are too few to be held against each other"
-    refused = peer.ask(GetEstimateReport, REPORT_SERVICE, sensor_type="co2", max_places=21)
+    assert ask_report("humidity", max_places=1).at == loaded.at, "it serves for a while"
+    refused = ask_report("co2", max_places=21)
     assert refused == GetEstimateReport.Response(
         error_message="max_places is 21, the limits are 1 and 20"
     )
-    unknown = peer.ask(GetEstimateReport, REPORT_SERVICE, sensor_type="ph")
+    unknown = ask_report("ph")
     assert (unknown.ok, unknown.fitted_at, list(unknown.tag_ids)) == (True, Time(), [])
 
 
@@ -230,96 +225,55 @@ def test_after_a_restart_models_are_made_of_what_the_journal_holds(tmp_path: Pat
     assert (found.week_scans, found.graded_since) == (0, Time())
 
 
-def test_what_is_wrong_with_models_is_said_in_the_log_and_for_diagnostics() -> None:
-    """A fit that fails keeps the last; a share denies the model."""
+def test_a_report_serves_for_a_while_and_what_is_wrong_is_said_once(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    pasts: list[TagPast] = []
+    searches: list[str] = []
+
+    def read(_: object, sensor: str, *__: object) -> list[TagPast]:
+        searches.append(sensor)
+        return list(pasts)
+
+    def query(search: Callable[[Any, Any], Any], _: float) -> Future[Any]:
+        found: Future[Any] = Future()
+        found.set_result(search(None, None))
+        return found
+
+    monkeypatch.setattr(estimate_service, "readings_at", read)
+    recall: Any = SimpleNamespace(query=query)
+    came = Event()
     reported: list[str] = []
     utilities: Any = SimpleNamespace(is_behind=False, warn=lambda _, text: reported.append(text))
-    nothing: Any = None
-    service = EstimateService(
-        utilities,
-        nothing,
-        nothing,
-        occupancy=nothing,
-        day_length_s=1_440.0,
-        max_grid_cells=100,
-        now_ns=now_s,
-        wake=lambda: None,
-    )
-    loaded = Loaded(0, nothing, nothing, ())
-
-    def end(outcome: Done | Exception) -> None:
-        for _ in range(FIRST_FIT):
-            service.watch.add(Scan("a", 1, (Reading("co2", 400.0),)))
-        due = service.watch.due(FAR_S)
-        assert due is not None
-        service.watch.begin(due, FAR_S)
-        service._is_working = True  # nothing else is begun
-        service._ended(due, outcome)
-
-    end(Done(Tally(90, 10), loaded))
-    end(FitFailed("singular"))
-    assert service.state() == Estimates({"co2": "singular"}, ("co2",), 1)
-    assert [one.partition(":")[0] for one in reported] == [
-        "the estimate of co2 is too sure of itself",
-        "no new model of co2",
-    ]
-    assert "of 90 scans, 10 came to lie where 9 of 10 were predicted" in reported[0]
-    end(Done(Tally(1, 0), loaded))
-    assert len(reported) == 2, "once, for as long as it lasts"
-    end(Done(Tally(10_000, 9_000), loaded))
-    assert service.state() == Estimates({}, (), 1)
-    end(Done(Tally(100_000, 0), loaded))
-    assert len(reported) == 3, "and again where it was trusted in between"
-    report = service.report(ReportRequest("co2"))()
-    assert report.record.is_trusted is False
-    assert report.places == (), "who asks for no places has none worked out"
-    service.close()
-
-
-def test_behind_each_round_is_a_rest_of_nine_times_its_work() -> None:
-    """So that rounds take no more than a tenth of a core, however many scans come."""
-    work_s = 0.02
-    begun_s: list[float] = []
-    ended_s: list[float] = []
-
-    def run(*_: object) -> Any:
-        until_s = time.thread_time() + work_s
-        while time.thread_time() < until_s:
-            pass
-        return Done(Tally(), nothing)
-
-    nothing: Any = None
-    utilities: Any = SimpleNamespace(is_behind=False)
-    has_ended = Event()
     service = EstimateService(
         utilities,
         TwinStore(),
-        nothing,
-        occupancy=nothing,
-        day_length_s=1_440.0,
+        recall,
+        occupancy=lambda: None,
+        day_length_s=86_400.0,
         max_grid_cells=100,
-        now_ns=now_s,
-        wake=has_ended.set,
+        now_ns=lambda: int(now_s() * 1e9),
+        wake=came.set,
     )
-    watch: Any = SimpleNamespace(
-        due=lambda _: SimpleNamespace(sensor="co2", run=run),
-        begin=lambda *_: begun_s.append(time.monotonic()),
-        end=lambda *_: ended_s.append(time.monotonic()),
-        fit=lambda _: SimpleNamespace(model="one"),
-        record=lambda *_: SimpleNamespace(is_trusted=None),
-    )
-    service.watch = watch
 
-    def have_been() -> bool:
-        service.go_on()
-        if has_ended.wait(0.01):
-            has_ended.clear()
+    def report() -> Report:
+        answer = service.report(ReportRequest("co2"))
+
+        def is_there() -> bool:
             service.deliver()
-        return len(ended_s) == 3
+            return answer.done() or came.wait(0.1)
 
-    try:
-        wait_for(have_been, "three rounds")
-    finally:
-        service.close()
-    for ended, begun in zip(ended_s, begun_s[1:], strict=False):
-        assert begun - ended >= REST_FACTOR * work_s
+        wait_for(lambda: is_there() and answer.done(), "a report")
+        return answer.result()
+
+    assert report().fitted_at_ns is None
+    assert report().tags == ()
+    assert len(searches) == 2, "nothing was found that could serve"
+    at_ns = int(now_s() * 1e9)
+    pasts[:] = [TagPast(str(n), n / 10.0, 0.0, ((at_ns, 20.0),)) for n in range(10_001)]
+    assert report().fit_problem.startswith("10001 tags have this sensor")
+    assert report().places == (), "who asks for no places has none worked out"
+    assert len(searches) == 3, "it serves for half a minute"
+    assert service.state() == Estimates({"co2": report().fit_problem}, (), 1)
+    assert reported == [f"no new model of co2: {report().fit_problem}"]
+    service.close()

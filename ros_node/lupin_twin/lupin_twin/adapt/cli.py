@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import signal
 import sys
+import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn
@@ -59,13 +60,12 @@ def run(options: argparse.Namespace, ros_args: Sequence[str]) -> int:
     from lupin_twin.adapt.table import ConfigError  # noqa: PLC0415  # see above
 
     try:
-        config = None if options.config is None else read_config(options.config)
-        return _with_ros(
-            ros_args,
-            lambda: (
-                _check(config, options.seconds) if options.check or config is None else _run(config)
-            ),
-        )
+        if options.config is None:
+            return _with_ros(ros_args, lambda: _suggest(options.seconds))
+        config = read_config(options.config)
+        if options.check:
+            return _with_ros(ros_args, lambda: _check(config, options.seconds))
+        return _with_ros(ros_args, lambda: _run(config))
     except ConfigError as error:
         return _refuse(str(error))
 
@@ -102,32 +102,47 @@ def _run(config: Config) -> int:
     return run_until_signal(node)
 
 
-def _check(config: Config | None, seconds: float) -> int:
-    from rclpy.executors import SingleThreadedExecutor  # noqa: PLC0415
+def _check(config: Config, seconds: float) -> int:
+    from lupin_twin.adapt.check import report  # noqa: PLC0415  # see `run`
+    from lupin_twin.adapt.node import AdaptNode  # noqa: PLC0415
 
-    from lupin_twin.adapt.check import Listener, listen, report, suggestion  # noqa: PLC0415
-
-    signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT, signal.SIGTERM})
-    _say(f"listening for {seconds:g} s ...", sys.stderr)
-    listener = Listener(config)
-    executor = SingleThreadedExecutor()
-    executor.add_node(listener)
-    listen(executor, seconds)
-    if config is None:
-        for why in listener.missing.values():
-            _say(why, sys.stderr)
-        if not any(heard.messages for heard in listener.heard.values()):
-            return _refuse(
-                f"nothing was heard that is a reading or a pose; topics: "
-                f"{', '.join(sorted(listener.topics)) or 'none'}"
-            )
-        _say("# Where each tag is, [x, y] in m, is for you to fill in.", sys.stdout)
-        _say(suggestion(listener).rstrip(), sys.stdout)
-        return 0
-    lines = list(report(config, listener, seconds))
+    node = AdaptNode(config, is_check=True)
+    _listen(node, seconds)
+    lines = list(report(node, seconds))
+    node.destroy_node()
     for _, line in lines:
         _say(line, sys.stdout)
     return 0 if all(is_right for is_right, _ in lines) else WRONG
+
+
+def _suggest(seconds: float) -> int:
+    from lupin_twin.adapt.check import Listener, suggestion  # noqa: PLC0415  # see `run`
+
+    listener = Listener()
+    _listen(listener, seconds)
+    for why in listener.missing.values():
+        _say(why, sys.stderr)
+    if not any(heard.messages for heard in listener.heard.values()):
+        topics = sorted(name for name, _ in listener.get_topic_names_and_types())
+        return _refuse(
+            f"nothing was heard that is a reading or a pose; topics: {', '.join(topics) or 'none'}"
+        )
+    _say("# Where each tag is, [x, y] in m, is for you to fill in.", sys.stdout)
+    _say(suggestion(listener).rstrip(), sys.stdout)
+    return 0
+
+
+def _listen(node: Any, seconds: float) -> None:
+    """Spin for so long; a signal ends it."""
+    from rclpy.executors import SingleThreadedExecutor  # noqa: PLC0415  # see `run`
+
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT, signal.SIGTERM})
+    _say(f"listening for {seconds:g} s ...", sys.stderr)
+    executor = SingleThreadedExecutor()
+    executor.add_node(node)
+    until_s = time.monotonic() + seconds
+    while (left_s := until_s - time.monotonic()) > 0:
+        executor.spin_once(timeout_sec=left_s)
 
 
 def _say(text: str, to: Any) -> None:

@@ -5,7 +5,6 @@ Every complaint names the key as it stands in the file, its value, and what is e
 
 from __future__ import annotations
 
-import math
 import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
@@ -14,6 +13,7 @@ from typing import Any, Final, NamedTuple
 
 from lupin_twin.adapt.mqtt_topics import Broker, broker_of
 from lupin_twin.adapt.table import ConfigError, Table, check_text, is_number, shown
+from lupin_twin.adapt.value import Value, value_of
 from lupin_twin.core.drops import MAX_SENSORS_PER_TAG, MAX_TAGS
 
 MAX_FILE_BYTES: Final = 4_000_000
@@ -85,20 +85,12 @@ class Detections:
 
 @dataclass(frozen=True, slots=True)
 class Sensor:
-    """One number of one topic: `value * factor + offset`, in the sensor's unit.
-
-    What is then below `low` or above `high` is no reading. `tag`: the sensor is fixed at this tag;
-    empty: it is the robot's.
-    """
+    """One number of one topic. `tag`: it is fixed at this tag; empty: it is the robot's."""
 
     name: str
     topic: str
     type_name: str
-    field: str
-    factor: float = 1.0
-    offset: float = 0.0
-    low: float = -math.inf
-    high: float = math.inf
+    value: Value
     tag: str = ""
 
 
@@ -247,16 +239,10 @@ def _sensor(name: str, table: Table) -> Sensor:
         name,
         topic=table.text("topic"),
         type_name=type_name,
-        field=field,
-        factor=table.number("factor", factor),
-        offset=table.number("offset", 0.0),
-        low=table.number("min", -math.inf),
-        high=table.number("max", math.inf),
+        value=value_of(table, field, factor),
         tag=str(table.take("tag", "")),
     )
     table.end()
-    if sensor.low > sensor.high:
-        raise ConfigError(f"{table.name}.min is {sensor.low:g}, above max, {sensor.high:g}")
     return sensor
 
 

@@ -121,18 +121,19 @@ class Sightings:
             self._waiting[frame] = (tag_id, stamp_ns, begun_ns)
 
     def come(self, frames: Frames) -> list[tuple[str, str]]:
-        """Tag and frame of those whose transform is here; each of them once."""
-        found = [
+        """Tag and frame of those whose transform is here."""
+        return [
             (tag_id, frame)
             for frame, (tag_id, stamp_ns, _) in self._waiting.items()
             if (moment_ns := frames.stamp_ns(frame)) is not None and moment_ns >= stamp_ns
         ]
-        for _, frame in found:
-            del self._waiting[frame]
-        return found
+
+    def end(self, frame: str) -> None:
+        """It is known where that tag is."""
+        self._waiting.pop(frame, None)
 
     def missed(self, now_ns: int) -> list[str]:
-        """Frames that TF does not have, a while after their tags were detected."""
+        """Frames whose places are not known a while after their tags were detected."""
         gone = [
             frame
             for frame, (_, _, begun_ns) in self._waiting.items()

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import math
 import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
@@ -13,21 +12,17 @@ from pathlib import Path
 from typing import Any, Final
 from urllib.parse import urlsplit
 
-from lupin_twin.adapt.table import (
-    AS_IT_IS,
-    ConfigError,
-    Table,
-    Value,
-    shown,
-    value_of,
-    values_of,
-)
+from lupin_twin.adapt.table import ConfigError, Table, shown
+from lupin_twin.adapt.value import AS_IT_IS, Value, value_of, values_of
+from lupin_twin.core.drops import Rejected, check_texts
 
 PORTS: Final = {"mqtt": 1883, "mqtts": 8883}
 MAX_TOPICS: Final = 100
 MAX_PAYLOAD_BYTES: Final = 65_536
 # A number above this is milliseconds since the epoch, not seconds: as seconds, the year 5138.
 _MILLISECONDS: Final = 1e11
+# In 2001. A device whose clock was never set begins in 1970.
+_EARLIEST_S: Final = 1e9
 _PLACEHOLDER: Final = re.compile(r"\{(tag|sensor)\}|(\+)")
 
 
@@ -50,6 +45,8 @@ _HOME_ASSISTANT: Final = {
     "soil_moisture": "soil_moisture",
     "moisture": "soil_moisture",
 }
+# And how it says that the sensor is away, or has not said anything yet.
+_AWAY, _UNKNOWN = b"unavailable", b"unknown"
 PRESETS: Final = ("zigbee2mqtt", "homeassistant")
 
 
@@ -103,10 +100,6 @@ class Broker:
     ca: str = ""
 
 
-class PayloadError(ValueError):
-    """A payload that says nothing; the message says why."""
-
-
 @dataclass(frozen=True, slots=True)
 class Measured:
     """What one message says: readings of a tag, or that its sensor is not there.
@@ -124,27 +117,30 @@ def measured(pattern: Pattern, tag: str, sensor: str, payload: bytes) -> Measure
     """What a payload says.
 
     Raises:
-        PayloadError: it has no number where one was expected, or one out of range.
+        Rejected: it has no number where one was expected, or one out of range; a name is too long.
 
     """
+    check_texts(tag, sensor)
     if len(payload) > MAX_PAYLOAD_BYTES:
-        raise PayloadError(f"it has more than {MAX_PAYLOAD_BYTES} bytes, the limit")
+        raise Rejected(f"it has more than {MAX_PAYLOAD_BYTES} bytes, the limit")
     if pattern.is_availability:
-        return Measured(tag, is_away=b"offline" in payload)
+        return Measured(tag, is_away=b"offline" in payload.lower())
+    if pattern.names and payload in (_AWAY, _UNKNOWN):
+        return Measured(tag, is_away=payload == _AWAY)
     if not pattern.values:
-        return Measured(tag, ((sensor, _number(payload, pattern.plain, "the payload")),))
+        return Measured(tag, ((sensor, pattern.plain.reading(payload, "the payload")),))
     try:
         content = json.loads(payload)
     except (ValueError, RecursionError):
-        raise PayloadError(f"it is no JSON: {shown(payload[:40])}") from None
+        raise Rejected(f"it is no JSON: {shown(payload[:40])}") from None
     readings = []
     for name, value in pattern.values.items():
         found = _at(content, value.path)
         if found is not None:  # a device says what it has
-            readings.append((name, _number(found, value, value.path)))
+            readings.append((name, value.reading(found, value.path)))
     if not readings:
         paths = ", ".join(value.path for value in pattern.values.values())
-        raise PayloadError(f"it has none of {paths}")
+        raise Rejected(f"it has none of {paths}")
     stamp = _at(content, pattern.time) if pattern.time else None
     return Measured(tag, tuple(readings), None if stamp is None else _seconds(stamp))
 
@@ -204,8 +200,12 @@ def _patterns(table: Table) -> Iterator[Pattern]:
         )
     preset = table.one_of("preset", PRESETS) if table.has("preset") else ""
     tag = str(table.take("tag", ""))
-    if bool(tag) == ("{tag}" in topic):
-        raise ConfigError(f"{table.name}: expected {{tag}} in its topic, or tag; one of them")
+    there = table.text("availability") if table.has("availability") else ""
+    for each in (topic, there or topic):
+        if bool(tag) == ("{tag}" in each):
+            raise ConfigError(
+                f"{table.name}: expected {{tag}} in {shown(each)}, or the key tag; one of them"
+            )
     sensor = table.text("sensor") if table.has("sensor") else ""
     values = values_of(Table(f"{table.name}.values", table.take("values", {})), "path")
     if preset == "zigbee2mqtt":
@@ -217,8 +217,7 @@ def _patterns(table: Table) -> Iterator[Pattern]:
             f"{table.name}: a payload that is a number needs {{sensor}} in its topic, or sensor; "
             "JSON needs values, or a preset"
         )
-    if table.has("availability"):
-        there = table.text("availability")
+    if there:
         yield Pattern(there, tag, is_availability=True)
     default = "last_seen" if preset == "zigbee2mqtt" else ""
     time = table.text("time") if table.has("time") else default
@@ -252,28 +251,18 @@ def _at(content: Any, path: str) -> Any:
     return content
 
 
-def _number(found: Any, value: Value, what: str) -> float:
-    """A number, also where it is written as text."""
-    try:
-        # true is a number to Python, and none to who reads a temperature.
-        number = float("" if isinstance(found, bool) else found) * value.factor + value.offset
-    except (TypeError, ValueError, OverflowError):
-        raise PayloadError(f"{what} is {shown(found)[:80]}, expected a number") from None
-    if not value.low <= number <= value.high or math.isinf(number):
-        raise PayloadError(f"{what} is {number:g}, must be from {value.low:g} to {value.high:g}")
-    return number
-
-
 def _seconds(stamp: Any) -> float:
     """A moment in seconds since the epoch, of such a number, one of milliseconds, or ISO 8601."""
     try:
         if isinstance(stamp, str):
             moment = datetime.fromisoformat(stamp)
-            return (moment if moment.tzinfo else moment.replace(tzinfo=UTC)).timestamp()
-        if isinstance(stamp, int | float) and not isinstance(stamp, bool):
+            seconds = (moment if moment.tzinfo else moment.replace(tzinfo=UTC)).timestamp()
+        else:
             seconds = stamp / 1000 if stamp > _MILLISECONDS else float(stamp)
-            if 0 < seconds < _MILLISECONDS:
-                return seconds
-    except (ValueError, OverflowError):
-        pass
-    raise PayloadError(f"its time is {shown(stamp)}, expected ISO 8601 or seconds since the epoch")
+    except (TypeError, ValueError, OverflowError):
+        seconds = 0.0
+    if not _EARLIEST_S <= seconds < _MILLISECONDS:
+        raise Rejected(
+            f"its time is {shown(stamp)}, expected ISO 8601 or seconds since 1970, and after 2001"
+        )
+    return seconds

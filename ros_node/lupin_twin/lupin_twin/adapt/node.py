@@ -5,10 +5,10 @@ The twin's rules stay the twin's: what is made here is `lupin_msgs/Observation`,
 
 from __future__ import annotations
 
+import difflib
 import time
-from collections import Counter
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import partial
 from typing import Any, Final
 
@@ -33,12 +33,13 @@ from lupin_twin.adapt.messages import (
     transform_of,
 )
 from lupin_twin.adapt.mqtt import Message, MqttClient
-from lupin_twin.adapt.mqtt_topics import Pattern, PayloadError, measured
-from lupin_twin.adapt.scans import BuiltScan, Scans, number_of
+from lupin_twin.adapt.mqtt_topics import Pattern, measured
+from lupin_twin.adapt.scans import BuiltScan, Scans
 from lupin_twin.adapt.table import ConfigError
+from lupin_twin.adapt.value import number_of
 from lupin_twin.core import interfaces
 from lupin_twin.core.diagnostics import OK, WARN, Finding
-from lupin_twin.core.drops import RECENT_S, Drop, Reason
+from lupin_twin.core.drops import Drop, Reason, Rejected, Tally
 from lupin_twin.core.state import NANOSECONDS_PER_SECOND
 from lupin_twin.ros import convert
 from lupin_twin.ros.base_node import NodeUtilities, latched, qos_of, waker
@@ -57,25 +58,55 @@ TF_STATIC_QOS: Final = latched(100)
 SILENT_S: Final = 10.0
 
 
-@dataclass(frozen=True, slots=True)
-class _Dropped:
-    """How often something was wrong, and the last time in words; `last_s` by the steady clock."""
+@dataclass(slots=True)
+class _Source:
+    """What came from a topic or the broker, what of it is in a scan, and what was dropped.
 
-    count: int
-    text: str
-    last_s: float
+    `problem` is what is wrong with it now, `shown` what it said last. `dropped` counts by case:
+    what is wrong with one sensor must not hide what is wrong with another. `name` is the topic's
+    in ROS.
+    """
+
+    name: str
+    type_name: str = ""
+    received: int = 0
+    used: int = 0
+    received_s: float = 0.0
+    problem: str = ""
+    shown: dict[str, str] = field(default_factory=dict)
+    dropped: Tally = field(default_factory=Tally)
+
+    def finding(self, topic: str) -> Finding:
+        """The same for `/diagnostics`."""
+        counts = self.dropped.value(time.monotonic())
+        wrong = [self.problem] if self.problem else []
+        wrong += [recent.message for recent in counts.recent]
+        return Finding(
+            topic,
+            WARN if wrong else OK,
+            "; ".join(wrong) or ("connected" if topic == MQTT else "receiving"),
+            {
+                "received": str(self.received),
+                "used": str(self.used),
+                **self.shown,
+                **{f"dropped: {case}": str(count) for case, count in counts.dropped.items()},
+            },
+        )
 
 
 class AdaptNode(Node):  # type: ignore[misc]  # rclpy is not typed
     """Readings in, observations out. Belongs to the thread that spins it.
+
+    With `is_check`, nothing goes out: `findings` say what would come of it.
 
     Raises:
         ConfigError: a topic that ROS does not take, or a message type that is not installed.
 
     """
 
-    def __init__(self, config: Config) -> None:
-        super().__init__("lupin_adapt")
+    def __init__(self, config: Config, *, is_check: bool = False) -> None:
+        super().__init__("lupin_adapt_check" if is_check else "lupin_adapt")
+        self._is_check = is_check
         self.utilities = NodeUtilities(self)
         self._config = config
         self._scans = Scans(config)
@@ -83,12 +114,8 @@ class AdaptNode(Node):  # type: ignore[misc]  # rclpy is not typed
         self._sightings = Sightings()
         # Where the robot is, m; None: not known.
         self._at: tuple[float, float] | None = None
-        # By topic, since the start.
-        self.received: Counter[str] = Counter()
-        self.used: Counter[str] = Counter()
-        self._received_s: dict[str, float] = {}
-        # By case: what was wrong with one sensor must not hide what is wrong with another.
-        self._dropped: dict[str, _Dropped] = {}
+        # By topic as it is configured, or MQTT.
+        self._sources: dict[str, _Source] = {}
         self._built = 0
         self._moved_s = 0.0
         self._started_s = time.monotonic()
@@ -107,6 +134,7 @@ class AdaptNode(Node):  # type: ignore[misc]  # rclpy is not typed
         if config.broker is not None:
             arrived = self.create_guard_condition(self.utilities.guarded("MQTT", self._on_mqtt))
             self._mqtt = MqttClient(config.broker, waker(arrived))
+            self._sources[MQTT] = _Source(MQTT)
             self._mqtt.start()
         self.utilities.every(None, 1.0, "the second", self._each_second)
 
@@ -133,10 +161,11 @@ class AdaptNode(Node):  # type: ignore[misc]  # rclpy is not typed
         qos: QoSProfile = ANY_PUBLISHER,
     ) -> None:
         kind = message_type(type_name)
+        source = self._sources[topic] = _Source(topic, type_name)
 
         def read(data: bytes) -> None:
-            self.received[topic] += 1
-            self._received_s[topic] = time.monotonic()
+            source.received += 1
+            source.received_s = time.monotonic()
             if len(data) > MAX_MESSAGE_BYTES:
                 self._drop(
                     Reason.SIZE, topic, f"{len(data)} bytes, the limit is {MAX_MESSAGE_BYTES}"
@@ -149,22 +178,19 @@ class AdaptNode(Node):  # type: ignore[misc]  # rclpy is not typed
                 return
             callback(topic, message)
 
-        self._received_s[topic] = -SILENT_S
         try:
-            self.create_subscription(
+            source.name = self.create_subscription(
                 kind, topic, self.utilities.guarded(topic, read), qos, raw=True
-            )
+            ).topic_name
         except InvalidTopicNameException as error:
             raise ConfigError(f"topic {topic!r}: {str(error).partition(chr(10))[0]}") from None
 
     def _drop(self, reason: Reason, topic: str, why: str, case: str = "") -> None:
         drop = Drop(reason, why, case=case)
         # Of a broker's topics there may be any number: one warning a period for all of them.
-        known = topic if topic in self._received_s else MQTT
+        known = topic if topic in self._sources else MQTT
         self.utilities.warn((reason, (known, case)), drop.on(topic))
-        key = case or reason.value
-        count = self._dropped[key].count if key in self._dropped else 0
-        self._dropped[key] = _Dropped(count + 1, drop.on(topic), time.monotonic())
+        self._sources[known].dropped.add(case or reason.value, drop.on(topic), time.monotonic())
 
     def _now_ns(self) -> int:
         return int(self.get_clock().now().nanoseconds)
@@ -191,7 +217,11 @@ class AdaptNode(Node):  # type: ignore[misc]  # rclpy is not typed
             self._drop(Reason.POSE, topic, f"its position is ({x:g}, {y:g}) m")
             return
         self._moved_s = now_s
-        self.used[topic] += 1
+        self._move(topic, x, y)
+
+    def _move(self, topic: str, x: float, y: float) -> None:
+        self._sources[topic].used += 1
+        self._sources[topic].shown["robot at"] = f"({x:.2f}, {y:.2f}) m"
         self._at = x, y
         self._publish(self._scans.move(x, y, self._now_ns()))
 
@@ -204,7 +234,6 @@ class AdaptNode(Node):  # type: ignore[misc]  # rclpy is not typed
                 self._frames.put(*transform_of(each, stamp_ns))
             except FrameError as error:
                 self._drop(Reason.POSE, topic, str(error))
-        self.used[topic] += 1
         now_s = time.monotonic()
         if now_s - self._moved_s >= POSE_PERIOD_S:
             self._moved_s = now_s
@@ -215,41 +244,50 @@ class AdaptNode(Node):  # type: ignore[misc]  # rclpy is not typed
         max_age_ns = int(self._config.robot.max_age_s * NANOSECONDS_PER_SECOND)  # type: ignore[union-attr]
         return self._frames.place(frame, self._config.frame_id, self._now_ns(), max_age_ns)
 
-    def _move_by_tf(self) -> str:
-        """Move the robot to where TF has it; returns why that is not known."""
+    def _why_no_place(self, frame: str) -> str:
+        try:
+            self._place(frame)
+        except FrameError as error:
+            return str(error)
+        return ""
+
+    def _move_by_tf(self) -> None:
         robot = self._config.robot
         if robot is None or not robot.tf:
-            return ""
+            return
         try:
             x, y, _ = self._place(robot.tf)
         except FrameError as error:
+            self._sources[TF].problem = str(error)
             self._at = None
             self._publish(self._scans.lose(self._now_ns()))
-            return str(error)
-        self._at = x, y
-        self._publish(self._scans.move(x, y, self._now_ns()))
-        return ""
+        else:
+            self._sources[TF].problem = ""
+            self._move(TF, x, y)
 
     def _on_detections(self, topic: str, message: Any) -> None:
         stamp_ns = self._stamp_ns(topic, message)
         if stamp_ns is None:
             return
+        seen = []
         for each in message.detections:
             tag_id = self._config.detections.tag_id(each.family, each.id)  # type: ignore[union-attr]
+            seen.append(tag_id)
             # Corrected bits make tags of shadows, and a tag's first place stays.
             if each.hamming == 0 and tag_id not in self._scans.places:
                 frame = TAG_FRAME.format(family=each.family, id=each.id)
                 self._sightings.see(frame, tag_id, stamp_ns, self._now_ns())
-        self.used[topic] += 1
+        self._sources[topic].used += 1
+        self._sources[topic].shown["tags"] = ", ".join(seen[:8]) or "none"
         self._find_tags()
 
     def _find_tags(self) -> None:
         for tag_id, frame in self._sightings.come(self._frames):
             try:
                 place = Place(*self._place(frame))
-            except FrameError as error:
-                self._drop(Reason.FRAME, TF, str(error), case="tf tag")
+            except FrameError:  # of another frame in between, which may come too
                 continue
+            self._sightings.end(frame)
             if self._at is not None and self._scans.discover(tag_id, place, *self._at):
                 self._publish_tags()
 
@@ -259,22 +297,14 @@ class AdaptNode(Node):  # type: ignore[misc]  # rclpy is not typed
             return
         for sensor in sensors:
             try:
-                raw = number_of(message, sensor.field)
-            except (AttributeError, LookupError, TypeError) as error:
-                self._drop(
-                    Reason.REJECTED, topic, f"{sensor.name}: {error}", case=f"field {sensor.name}"
-                )
+                raw = number_of(message, sensor.value.path)
+                value = sensor.value.reading(raw, sensor.name)
+            except Rejected as error:
+                self._drop(Reason.REJECTED, topic, str(error), case=sensor.name)
                 continue
-            value = raw * sensor.factor + sensor.offset
-            if not sensor.low <= value <= sensor.high:  # NaN is in no range
-                self._drop(
-                    Reason.REJECTED,
-                    topic,
-                    f"{sensor.name} is {value:g}, must be from {sensor.low:g} to {sensor.high:g}",
-                    case=f"range {sensor.name}",
-                )
-            elif self._scans.take(sensor.name, sensor.tag, value, stamp_ns, self._now_ns()):
-                self.used[topic] += 1
+            self._sources[topic].shown[sensor.name] = f"{value:g}"
+            if self._scans.take(sensor.name, sensor.tag, value, stamp_ns, self._now_ns()):
+                self._sources[topic].used += 1
 
     def _stamp_ns(self, topic: str, message: Any) -> int | None:
         """When it was measured: by its header, or now; None, counted: its clock is wrong."""
@@ -305,7 +335,7 @@ class AdaptNode(Node):  # type: ignore[misc]  # rclpy is not typed
         assert self._mqtt is not None
         assert self._config.broker is not None
         for message in self._mqtt.take():
-            self.received[MQTT] += 1
+            self._sources[MQTT].received += 1
             for pattern in self._config.broker.patterns:
                 found = pattern.match(message.topic)
                 if found is not None:
@@ -315,7 +345,7 @@ class AdaptNode(Node):  # type: ignore[misc]  # rclpy is not typed
         topic, now_ns = f"MQTT {message.topic[:80]}", self._now_ns()
         try:
             said = measured(pattern, tag, sensor, message.payload)
-        except PayloadError as error:
+        except Rejected as error:
             self._drop(Reason.REJECTED, topic, str(error), case="payload")
             return
         if said.is_away:
@@ -339,67 +369,72 @@ class AdaptNode(Node):  # type: ignore[misc]  # rclpy is not typed
             stamp_ns += int(min(ahead_s, 0.0) * NANOSECONDS_PER_SECOND)
         for name, value in said.readings:
             if self._scans.take(name, said.tag, value, stamp_ns, now_ns):
-                self.used[MQTT] += 1
+                self._sources[MQTT].used += 1
+            else:
+                self._drop(Reason.SIZE, topic, "it is of one tag or sensor too many", case="many")
 
     def _each_second(self) -> None:
         self._publish(self._scans.due(self._now_ns()))
-        if why := self._move_by_tf():
-            self._drop(Reason.FRAME, TF, why, case="tf")
         for frame in self._sightings.missed(self._now_ns()):
-            why = f"a tag was detected, but TF has no {frame!r}: is tag.frames set in apriltag_ros?"
-            self._drop(Reason.FRAME, TF, why, case="tf tag")
-        findings = [
-            self._finding(topic) for topic in sorted(self._received_s) if topic != TF_STATIC
-        ]
-        if self._mqtt is not None:
-            if self._mqtt.problem:
-                self.utilities.warn(("mqtt", self._mqtt.problem), f"MQTT: {self._mqtt.problem}")
-            findings.append(
-                Finding(
-                    MQTT,
-                    WARN if self._mqtt.problem else OK,
-                    self._mqtt.problem or "connected",
-                    {
-                        "received": str(self.received[MQTT]),
-                        "used": str(self.used[MQTT]),
-                        "lost": str(self._mqtt.lost),
-                    },
-                )
-            )
-        self._diagnostics.publish(
+            why = f"TF has no {frame!r}: is tag.frames set in apriltag_ros?"
+            if frame in self._frames:
+                why = self._why_no_place(frame) or f"{frame!r} is of an earlier picture in TF"
+            self._drop(Reason.FRAME, TF, f"a tag was detected, but {why}", case="tag")
+        self._send(
+            self._diagnostics,
             convert.diagnostics(
-                [*findings, self._summary()], self.get_fully_qualified_name(), self._now_ns()
-            )
+                self.findings(SILENT_S), self.get_fully_qualified_name(), self._now_ns()
+            ),
         )
 
-    def _finding(self, topic: str) -> Finding:
-        silent_s = time.monotonic() - max(self._received_s[topic], self._started_s)
-        is_silent = silent_s > SILENT_S
-        return Finding(
-            topic,
-            WARN if is_silent else OK,
-            f"nothing for {silent_s:.0f} s" if is_silent else "receiving",
-            {"received": str(self.received[topic]), "used": str(self.used[topic])},
-        )
+    def findings(self, silent_s: float) -> list[Finding]:
+        """Of each source what came and what is wrong with it, and of the observations made.
 
-    def _summary(self) -> Finding:
-        now_s, errors = time.monotonic(), self.utilities.callback_errors
-        recent = [it.text for it in self._dropped.values() if now_s - it.last_s < RECENT_S]
-        return Finding(
+        A topic on which nothing came for `silent_s` is silent.
+        """
+        self._move_by_tf()
+        for topic, source in self._sources.items():
+            if topic not in (MQTT, TF, TF_STATIC):
+                source.problem = self._why_silent(source, silent_s)
+            elif topic == MQTT and self._mqtt is not None:
+                source.problem = self._mqtt.problem
+                source.shown["lost"] = str(self._mqtt.lost)
+            # A robot that stands, or a slow sensor, is nothing to be logged.
+            if source.problem and (source.received == 0 or topic in (MQTT, TF)):
+                self.utilities.warn(("problem", topic), f"{topic}: {source.problem}")
+        errors = self.utilities.callback_errors
+        made = Finding(
             "observations",
-            WARN if recent or errors else OK,
-            "; ".join(recent) or f"at {self._scans.tag or 'no tag'}",
-            {
-                "made": str(self._built),
-                "errors": str(errors),
-                **{f"dropped: {case}": str(it.count) for case, it in self._dropped.items()},
-            },
+            WARN if errors else OK,
+            f"at {self._scans.tag or 'no tag'}",
+            {"made": str(self._built), "errors": str(errors)},
         )
+        return [*(source.finding(topic) for topic, source in self._sources.items()), made]
+
+    def _why_silent(self, source: _Source, silent_s: float) -> str:
+        quiet_s = time.monotonic() - max(source.received_s, self._started_s)
+        if quiet_s < silent_s:
+            return ""
+        publishers = self.get_publishers_info_by_topic(source.name)
+        if not publishers:
+            published = (
+                name for name, _ in self.get_topic_names_and_types() if self.count_publishers(name)
+            )
+            near = difflib.get_close_matches(source.name, published, n=1, cutoff=0.5)
+            return "nobody publishes it" + (f", did you mean {near[0]}?" if near else "")
+        types = {publisher.topic_type for publisher in publishers}
+        if source.type_name not in types:
+            return f"it is published as {', '.join(types)}, configured is {source.type_name}"
+        return f"nothing for {quiet_s:.0f} s"
+
+    def _send(self, publisher: Any, message: Any) -> None:
+        if not self._is_check:
+            publisher.publish(message)
 
     def _publish(self, scans: Iterable[BuiltScan]) -> None:
         for scan in scans:
             self._built += 1
-            self._observations.publish(observation(scan, self._config.frame_id))
+            self._send(self._observations, observation(scan, self._config.frame_id))
 
     def _publish_tags(self) -> None:
         if self._scans.places:
@@ -408,4 +443,4 @@ class AdaptNode(Node):  # type: ignore[misc]  # rclpy is not typed
                 DiscoveredTag(tag_id=tag_id, pose_in_map=pose_of(place))
                 for tag_id, place in self._scans.places.items()
             ]
-            self._tags.publish(DiscoveredTags(header=header, tags=tags))
+            self._send(self._tags, DiscoveredTags(header=header, tags=tags))

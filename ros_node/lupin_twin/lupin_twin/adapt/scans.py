@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 from typing import Final
 
 from lupin_twin.adapt.config import Config, Place
-from lupin_twin.core.drops import MAX_TAGS
+from lupin_twin.core.drops import MAX_SENSORS_PER_TAG, MAX_TAGS
 
 LEAVES: Final = 1.1
 # Who was at a tag for so long and read nothing has failed; one that passed by has not.
@@ -64,9 +64,12 @@ class _Window:
     newest_ns: int = 0
     means: dict[str, _Mean] = field(default_factory=dict)
 
-    def add(self, sensor: str, value: float, stamp_ns: int) -> None:
+    def add(self, sensor: str, value: float, stamp_ns: int) -> bool:
+        if sensor not in self.means and len(self.means) >= MAX_SENSORS_PER_TAG:
+            return False
         self.means.setdefault(sensor, _Mean()).add(value)
         self.newest_ns = max(self.newest_ns, stamp_ns)
+        return True
 
 
 class Scans:
@@ -127,7 +130,7 @@ class Scans:
         return BuiltScan(tag_id, now_ns, self._place(tag_id), (), detail, is_fixed)
 
     def take(self, sensor: str, tag: str, value: float, stamp_ns: int, now_ns: int) -> bool:
-        """A reading, in the sensor's unit; returns whether it belongs to a tag.
+        """A reading, in the sensor's unit; returns whether it belongs to a tag, and has room there.
 
         `tag` is where the sensor is fixed; empty: it is the robot's.
         """
@@ -139,8 +142,7 @@ class Scans:
             window = self._visit
         else:
             return False
-        window.add(sensor, value, stamp_ns)
-        return True
+        return window.add(sensor, value, stamp_ns)
 
     def due(self, now_ns: int) -> Iterator[BuiltScan]:
         """Scans whose time is over; to be called once a second, and before the robot is moved."""
@@ -207,21 +209,3 @@ class Scans:
 
 def _distance_m(place: Place | None, x: float, y: float) -> float:
     return math.inf if place is None else math.hypot(place.x - x, place.y - y)
-
-
-def number_of(message: object, path: str) -> float:
-    """The number at a field's path, such as `data` or `axes[2].value`.
-
-    Raises:
-        LookupError, AttributeError, TypeError: there is none.
-
-    """
-    value: object = message
-    for part in path.split("."):
-        name, _, index = part.partition("[")
-        value = getattr(value, name)
-        if index:
-            value = value[int(index[:-1])]  # type: ignore[index]
-    if not hasattr(value, "__float__"):
-        raise TypeError(f"{path} is a {type(value).__name__}, expected a number")
-    return float(value)

@@ -5,10 +5,9 @@ from __future__ import annotations
 import math
 import reprlib
 from collections.abc import Collection
-from dataclasses import dataclass
 from typing import Any, Final
 
-from lupin_twin.core.drops import MAX_SENSORS_PER_TAG, MAX_TEXT_LENGTH
+from lupin_twin.core.drops import MAX_TEXT_LENGTH
 
 
 class ConfigError(ValueError):
@@ -72,63 +71,6 @@ class Table:
 
     def _called(self, key: object) -> str:
         return f"{self.name}.{key}" if self.name else str(key)
-
-
-@dataclass(frozen=True, slots=True)
-class Value:
-    """Where a source has a sensor's number, and how that becomes our unit.
-
-    The number is value * factor + offset; what is then below `low` or above `high` is no reading.
-    """
-
-    path: str = ""
-    factor: float = 1.0
-    offset: float = 0.0
-    low: float = -math.inf
-    high: float = math.inf
-
-
-AS_IT_IS: Final = Value()
-
-
-def value_of(table: Table, path: str = "") -> Value:
-    """The keys `factor`, `offset`, `min` and `max` of a table.
-
-    Raises:
-        ConfigError: one of them cannot be.
-
-    """
-    value = Value(
-        path,
-        factor=table.number("factor", 1.0),
-        offset=table.number("offset", 0.0),
-        low=table.number("min", -math.inf),
-        high=table.number("max", math.inf),
-    )
-    if value.low > value.high:
-        raise ConfigError(f"{table.name}.min is {value.low:g}, above max, {value.high:g}")
-    return value
-
-
-def values_of(table: Table, key: str) -> dict[str, Value]:
-    """By sensor its path alone, or a table with the path under `key`.
-
-    Raises:
-        ConfigError: there are too many, or one of them cannot be.
-
-    """
-    if len(table.content) > MAX_SENSORS_PER_TAG:
-        raise ConfigError(f"{table.name}: more than {MAX_SENSORS_PER_TAG}, the limit")
-    values = {}
-    for name in tuple(table.content):
-        given = table.take(name)
-        if isinstance(given, str):
-            values[str(name)] = Value(given)
-            continue
-        each = Table(f"{table.name}.{name}", given)
-        values[str(name)] = value_of(each, each.text(key))
-        each.end()
-    return values
 
 
 def check_text(what: str, value: Any) -> str:

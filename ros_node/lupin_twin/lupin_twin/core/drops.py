@@ -24,7 +24,7 @@ MAX_ITEMS = 1_000_000
 
 
 class Rejected(ValueError):
-    """A write that the store refuses; the message names the field, the value and the limit."""
+    """A write or a reading that is refused; the message names the value and the limit."""
 
 
 def check_texts(*texts: str) -> None:

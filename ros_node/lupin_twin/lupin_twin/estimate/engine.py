@@ -1,13 +1,12 @@
 """GetEstimate without ROS: which readings count, and what an answer is.
 
-Pure. An `EstimateJob` that was handed out is immutable, and any thread may compute it. Metres in
-the map frame, times ns of ROS time.
+Pure. Metres in the map frame, times ns of ROS time.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
@@ -18,21 +17,13 @@ from lupin_twin.estimate import (
     MAX_PER_TAG,
     PER_TAG,
     EstimateGrid,
-    FitFailed,
-    Model,
     Readings,
-    fit,
 )
 from lupin_twin.field.engine import FieldRefused, FieldRequest, check_request
-from lupin_twin.field.idw import Abandoned, never
 
 MAX_TAGS: Final = 10_000
 # An estimate of now is one of the last whole minute of a day of so many, or of the newest reading.
 MINUTES_A_DAY: Final = 1_440
-# A tag's newest readings that are retained, and of how many parts of a day the newest one each: as
-# many as count of one tag (`Readings.recent`).
-NEWEST: Final = MAX_PER_TAG // 4
-PARTS_A_DAY: Final = 24
 # What answers take, roughly and at worst, s of one core: for each pair of readings or, of many
 # tags, for each of these; and for each cell.
 _PAIR_S: Final = 0.3e-6
@@ -84,36 +75,6 @@ def is_usable(value: float) -> bool:
     return abs(value) <= FLOAT32_MAX
 
 
-class RecentReadings:
-    """Each tag's newest readings, and the newest of each part of the day before them."""
-
-    def __init__(self, day_length_s: float) -> None:
-        self._part_ns = max(int(day_length_s * NANOSECONDS_PER_SECOND) // PARTS_A_DAY, 1)
-        # Of tag and sensor: immutable, so that any thread may read them.
-        self._read: dict[tuple[str, str], tuple[tuple[int, float], ...]] = {}
-
-    def add(self, tag_id: str, sensor: str, stamp_ns: int, value: float) -> None:
-        """Add a reading, if an estimate can use it and it is not known."""
-        known = self.of(tag_id, sensor)
-        if not is_usable(value) or (stamp_ns, value) in known:
-            return
-        readings = sorted((*known, (stamp_ns, value)))
-        older, newest = readings[:-NEWEST], readings[-NEWEST:]
-        of_parts = {ns // self._part_ns: (ns, value) for ns, value in older}
-        self._read[tag_id, sensor] = (*list(of_parts.values())[-PARTS_A_DAY:], *newest)
-
-    def of(self, tag_id: str, sensor: str) -> tuple[tuple[int, float], ...]:
-        """Those of a tag and a sensor: (ns, value), in order."""
-        return self._read.get((tag_id, sensor), ())
-
-    def hold_to(self, now_ns: int) -> None:
-        """Follow a clock that has gone back: what is later is forgotten."""
-        self._read = {
-            key: tuple(one for one in known if one[0] <= now_ns)
-            for key, known in self._read.items()
-        }
-
-
 def moment_of(tags: Sequence[TagPast], now_ns: int, day_length_s: float) -> int:
     """The moment that an estimate of now is made for, not later than `now_ns`.
 
@@ -159,43 +120,6 @@ def thinned(readings: Readings, at_s: float, day_length_s: float) -> Readings:
     return readings.recent(at_s, day_length_s=day_length_s, per_tag=min(per_tag, MAX_PER_TAG))
 
 
-@dataclass(frozen=True, slots=True)
-class EstimateJob:
-    """An estimate of now, not computed yet; without a model, one is fitted for it alone.
-
-    `changed` are the tags whose sensor has changed: what they have read since then does not count.
-    """
-
-    request: EstimateRequest
-    model: Model | None
-    day_length_s: float
-    changed: Mapping[str, int] = field(default_factory=dict)
-
-    def compute(
-        self, tags: Sequence[TagPast], now_ns: int, should_stop: Callable[[], bool] = never
-    ) -> Estimate:
-        """The estimate of what `tags` remember.
-
-        Raises:
-            FieldRefused: see `readings_of`; or there are numbers among them that nothing can be
-                made of.
-            Abandoned: `should_stop`, called between the steps, was true.
-
-        """
-        at_ns = moment_of(tags, now_ns, self.day_length_s)
-        readings = readings_of(unchanged(tags, self.changed), at_ns, self.day_length_s)
-        box = self.request.box
-        try:
-            model = self.model
-            if model is None:
-                model = fit(readings, day_length_s=self.day_length_s, should_stop=should_stop)
-            _go_on_unless(should_stop)
-            grid = model.posterior(readings, 0.0, should_stop).grid(**box.cells)
-        except (FitFailed, np.linalg.LinAlgError) as error:
-            raise FieldRefused(f"these readings cannot be computed with: {error}") from error
-        return Estimate(grid, len(np.unique(readings.tag)), len(readings))
-
-
 def unchanged(tags: Sequence[TagPast], changed: Mapping[str, int]) -> list[TagPast]:
     """The same tags without what was read since their sensor has changed, ns."""
     return [
@@ -209,11 +133,6 @@ def unchanged(tags: Sequence[TagPast], changed: Mapping[str, int]) -> list[TagPa
         )
         for tag in tags
     ]
-
-
-def _go_on_unless(should_stop: Callable[[], bool]) -> None:
-    if should_stop():
-        raise Abandoned
 
 
 def cost_s(request: EstimateRequest, tags: int, max_grid_cells: int) -> float:

@@ -15,7 +15,7 @@ from lupin_twin.field.engine import NUMBERS, FieldRequest
 from lupin_twin.field.grid import FieldGrid
 from lupin_twin.ros import convert
 from lupin_twin.ros.convert_past import NotAnAnswerError
-from lupin_twin.runtime.estimate_rounds import (
+from lupin_twin.runtime.estimates import (
     DEFAULT_PLACES,
     MAX_PLACES,
     Report,

@@ -35,7 +35,7 @@ from lupin_twin.field.explored import OccupancyMap
 from lupin_twin.field.grid import FieldGrid
 from lupin_twin.field.idw import Abandoned
 from lupin_twin.ros.base_node import NodeUtilities, qos_of
-from lupin_twin.ros.estimate_service import EstimateService, Task
+from lupin_twin.ros.estimate_service import EstimateService
 from lupin_twin.ros.layers import (
     MAX_POINTS,
     MarkerArrays,
@@ -48,6 +48,7 @@ from lupin_twin.ros.layers import (
     topics_of,
 )
 from lupin_twin.ros.parameters import naming
+from lupin_twin.runtime.estimates import are_enough
 from lupin_twin.runtime.workers import JobQueue, Query, ShouldStop, Workers
 
 # How often subscriptions and changes are checked, s.
@@ -120,6 +121,8 @@ class LayerService:
     occupancy: Callable[[], OccupancyMap | None]
     snapshot: Callable[[], Snapshot]
     now_ns: Callable[[], int]
+    # How many writes the journal has, which estimates are made of.
+    written: Callable[[], int]
     day_length_s: float
     wake: Callable[[], None]
     _workers: Workers = field(
@@ -128,6 +131,8 @@ class LayerService:
     _topics: list[_Topic] = field(default_factory=list)
     _queue: JobQueue = field(init=False)
     _whole: tuple[object, FieldRequest] | None = None
+    # The sensors whose last message has an estimate.
+    _estimated: set[str] = field(default_factory=set)
 
     def __post_init__(self) -> None:
         self._queue = JobQueue(self._workers, self.wake, lambda: self.utilities.is_behind)
@@ -223,34 +228,33 @@ class LayerService:
     # --- what is made -----------------------------------------------------------------------
 
     def _key_of_layer(self, sensor: str) -> object:
-        occupancy, fit = self.occupancy(), self.estimates.watch.fit(sensor)
+        occupancy = self.occupancy()
         revision = None if occupancy is None else occupancy.revision
         key = self.store.observation_count, self.fields.rules, revision
-        if fit.model is None:
+        if sensor not in self._estimated:
             return key
         # An estimate goes on from minute to minute, with nothing received: its error grows.
         minute_ns = int(self.day_length_s / MINUTES_A_DAY * NANOSECONDS_PER_SECOND)
-        return key, fit.at_ns, self.now_ns() // minute_ns
+        return key, self.written(), self.now_ns() // minute_ns
 
     def _plan_layer(self, sensor: str, frame_id: str) -> _Plan:
         snapshot = self.snapshot()
         request = self._request(sensor, snapshot)
         answer = self.fields.lookup(request, self.store, self.occupancy())
-        task: Task | None = None
-        if self.estimates.watch.fit(sensor).model is not None:
-            task = self.estimates.prepare(EstimateRequest(request))
+        task = self.estimates.prepare(EstimateRequest(request))
 
         def make(found: Sequence[TagPast], should_stop: ShouldStop) -> _Built:
             job = answer if isinstance(answer, FieldJob) else None
             grid = answer if isinstance(answer, FieldGrid) else answer.compute(should_stop)
             estimate = None
-            if task is not None:
-                with suppress(FieldRefused):  # no reading of a day: nothing is known of the error
+            if are_enough(found):
+                with suppress(FieldRefused):  # nothing can be made of them
                     estimate = task.make(found, should_stop).grid
+            (self._estimated.discard if estimate is None else self._estimated.add)(sensor)
             data = cloud(points(grid, estimate), snapshot.stamp_ns, frame_id)
             return _Built(data, job, grid)
 
-        return None if task is None else task.look_up, make
+        return partial(_or_nothing, task.look_up), make
 
     def _request(self, sensor: str, snapshot: Snapshot) -> FieldRequest:
         """The same for all sensors: the box is that of all tags with a place."""
@@ -285,6 +289,17 @@ class LayerService:
         for topic in self._topics:
             topic.is_wanted = False
         self._workers.close()
+
+
+def _or_nothing(look_up: _Search) -> Future[Any]:
+    """What is found; without a journal that can be read no reading, and a field has no error."""
+    found: Future[Any] = Future()
+    look_up().add_done_callback(
+        lambda search: found.set_result(
+            () if search.cancelled() or search.exception() else search.result()
+        )
+    )
+    return found
 
 
 def _nothing() -> Future[Any]:

@@ -22,7 +22,7 @@ from lupin_twin.core.diagnostics import CLOCK, ERROR, Health, Origin, findings, 
 from lupin_twin.core.drops import Drop, Reason
 from lupin_twin.core.history import History, kind_of
 from lupin_twin.core.parameters import ParameterError, TwinParameters, World
-from lupin_twin.core.state import ClockState, Inspection, Scan, Snapshot, TwinStore
+from lupin_twin.core.state import ClockState, Inspection, Scan, Snapshot, TwinStore, Write
 from lupin_twin.field.engine import FieldCache, FieldEngine, FieldRules
 from lupin_twin.field.explored import OccupancyMap
 from lupin_twin.journal.beside import journal_path
@@ -43,7 +43,6 @@ NODE_NAME: Final = "lupin_twin"
 # How often ROS time is checked, s, however rarely the state is published.
 CLOCK_PERIOD_S: Final = 0.5
 DIAGNOSTICS_PERIOD_S: Final = 1.0
-ROUNDS_PERIOD_S: Final = 1.0  # how often a round of estimates may begin
 
 
 class TwinNode(AdjustableNode):
@@ -117,6 +116,7 @@ class TwinNode(AdjustableNode):
             occupancy=lambda: self.occupancy_map,
             snapshot=self.snapshot,
             now_ns=self.now_ns,
+            written=lambda: self.memory.condition.written,
             day_length_s=world.day_length_s,
             wake=wake,
         )
@@ -204,7 +204,6 @@ class TwinNode(AdjustableNode):
         for period_s, what, callback in (
             (DIAGNOSTICS_PERIOD_S, "diagnostics", self._publish_diagnostics),
             (CLOCK_PERIOD_S, "clock", self._check_clock),
-            (ROUNDS_PERIOD_S, "estimate", self.estimates.go_on),
             (LAYERS_PERIOD_S, "layers", self.layers.check),
             (RETRY_S, "responses", responses.go_on),
         ):
@@ -242,7 +241,7 @@ class TwinNode(AdjustableNode):
             self.utilities.drop(write, topic)
             return
         is_news = self.history.news(write) is not None
-        if self._apply(write, topic, msg.mission_id):
+        if self._apply(write, topic):
             self._observed_s = time.monotonic()
             if is_news:
                 self._check_lateness(write, topic)
@@ -344,15 +343,12 @@ class TwinNode(AdjustableNode):
 
     # --- small parts ------------------------------------------------------------------------
 
-    def _apply(self, write: ingest.Write | Drop, topic: str, mission: str = "") -> bool:
+    def _apply(self, write: Write | Drop, topic: str) -> bool:
         near, dropped = ingest.near(write, self.parameters.max_pose_m)
-        refused = None if near is None else self.memory.apply(near, time.time_ns(), mission)
+        refused = None if near is None else self.memory.apply(near, time.time_ns())
         for drop in filter(None, (dropped, refused)):
             self.utilities.drop(drop, topic)
-        if near is None or refused is not None:
-            return False
-        self.estimates.add(near)
-        return True
+        return near is not None and refused is None
 
     def notify_listeners(self) -> None:
         """Give all of them the state as it is."""
@@ -363,6 +359,7 @@ class TwinNode(AdjustableNode):
 
     def _check_clock(self) -> None:
         self._past_queue.go_on()
+        self.estimates.go_on()
         before = self._clock_watch.state
         self.now_ns()
         if self._clock_watch.state != before:
@@ -409,10 +406,8 @@ class TwinNode(AdjustableNode):
     def _follow(self, now: RunClock) -> None:
         if restored := self.memory.follow(now):
             self.get_logger().info(restored)
-            self.estimates.restore()
         if self.memory.hold_to(now):
             self.lateness.hold_to(now.stamp_ns)
-            self.estimates.hold_to(now.stamp_ns)
             self.utilities.warn(
                 ("clock", 0),
                 "ROS time has gone back: all observations from later than now age from here on",

@@ -1,0 +1,104 @@
+"""A number of a source, and what it has to be to be a reading. Pure."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any, Final
+
+from lupin_twin.adapt.table import ConfigError, Table, shown
+from lupin_twin.core.drops import MAX_SENSORS_PER_TAG, Rejected
+
+
+@dataclass(frozen=True, slots=True)
+class Value:
+    """Where a source has a sensor's number, and how that becomes our unit.
+
+    The number is value * factor + offset; what is then below `low` or above `high` is no reading.
+    """
+
+    path: str = ""
+    factor: float = 1.0
+    offset: float = 0.0
+    low: float = -math.inf
+    high: float = math.inf
+
+    def reading(self, raw: Any, what: str) -> float:
+        """The number in the sensor's unit, also of one that is written as text.
+
+        Raises:
+            Rejected: it is none, or out of range; `what` is its name.
+
+        """
+        try:
+            # true is a number to Python, and none to who reads a temperature.
+            number = float("" if isinstance(raw, bool) else raw) * self.factor + self.offset
+        except (TypeError, ValueError, OverflowError):
+            raise Rejected(f"{what} is {shown(raw)}, expected a number") from None
+        if not self.low <= number <= self.high or math.isinf(number):  # NaN is in no range
+            raise Rejected(f"{what} is {number:g}, must be from {self.low:g} to {self.high:g}")
+        return number
+
+
+AS_IT_IS: Final = Value()
+
+
+def number_of(message: object, path: str) -> float:
+    """The number at a field's path of a message, such as `data` or `axes[2].value`.
+
+    Raises:
+        Rejected: there is none.
+
+    """
+    value: Any = message
+    try:
+        for part in path.split("."):
+            name, _, index = part.partition("[")
+            value = getattr(value, name)
+            if index:
+                value = value[int(index[:-1])]
+        if isinstance(value, str | bytes):
+            raise TypeError(f"it is {shown(value)}, expected a number")  # noqa: TRY301
+        return float(value)
+    except (AttributeError, LookupError, TypeError, ValueError) as error:
+        raise Rejected(f"field {path}: {error}") from None
+
+
+def value_of(table: Table, path: str = "", factor: float = 1.0) -> Value:
+    """The keys `factor`, `offset`, `min` and `max` of a table.
+
+    Raises:
+        ConfigError: one of them cannot be.
+
+    """
+    value = Value(
+        path,
+        factor=table.number("factor", factor),
+        offset=table.number("offset", 0.0),
+        low=table.number("min", -math.inf),
+        high=table.number("max", math.inf),
+    )
+    if value.low > value.high:
+        raise ConfigError(f"{table.name}.min is {value.low:g}, above max, {value.high:g}")
+    return value
+
+
+def values_of(table: Table, key: str) -> dict[str, Value]:
+    """By sensor its path alone, or a table with the path under `key`.
+
+    Raises:
+        ConfigError: there are too many, or one of them cannot be.
+
+    """
+    if len(table.content) > MAX_SENSORS_PER_TAG:
+        raise ConfigError(f"{table.name}: more than {MAX_SENSORS_PER_TAG}, the limit")
+    values = {}
+    for name in tuple(table.content):
+        given = table.take(name)
+        if isinstance(given, str):
+            values[str(name)] = Value(given)
+            continue
+        each = Table(f"{table.name}.{name}", given)
+        values[str(name)] = value_of(each, each.text(key))
+        each.end()
+    return values

@@ -1,0 +1,280 @@
+"""What the log has of a sensor's day: its estimate as of a moment, and what estimates are worth.
+
+Pure, but for `readings_at`. A report compares each tag's newest reading with what all the others
+say of it, leaves out what sensors have read since they changed, and counts how many of the new
+scans lie where all but the tags nearby say. Metres in the map frame, times ns of ROS time.
+"""
+
+from __future__ import annotations
+
+import sqlite3
+from collections.abc import Callable, Mapping, Sequence
+from copy import copy
+from dataclasses import dataclass, replace
+from typing import Final
+
+import numpy as np
+
+from lupin_twin.core.state import NANOSECONDS_PER_SECOND
+from lupin_twin.estimate import (
+    MAX_PER_TAG,
+    Change,
+    FitFailed,
+    Model,
+    Place,
+    Posterior,
+    Readings,
+    fit,
+)
+from lupin_twin.estimate.engine import (
+    Estimate,
+    EstimateRequest,
+    TagPast,
+    is_usable,
+    readings_of,
+    unchanged,
+)
+from lupin_twin.estimate.grading import HALF_WIDTH_SDS, Grades, Record, Tally
+from lupin_twin.field.engine import FieldRefused, check_sensor_type
+from lupin_twin.field.explored import OccupancyMap, floor, free_of
+from lupin_twin.field.idw import never
+from lupin_twin.journal.fold import recent_readings
+from lupin_twin.runtime.workers import in_turns
+
+# With fewer readings of a day there is little to learn, and nothing to be said of estimates.
+FIRST_FIT: Final = 10
+# What making an estimate takes beside its grid: a fit, and a posterior to find changed sensors by.
+AS_OF: Final = 3.0
+# Readings that are looked up in the log, of all tags together: of few tags all of a day.
+_MAX_READINGS: Final = 20_000
+
+
+def readings_at(
+    log: sqlite3.Connection, sensor: str, at_ns: int, day_length_s: float
+) -> list[TagPast]:
+    """What the log has of the day up to a moment."""
+    reach_ns = int(day_length_s * NANOSECONDS_PER_SECOND)
+    return [
+        TagPast(tag_id, x, y, tuple(one for one in found if is_usable(one[1])))
+        for tag_id, x, y, found in recent_readings(
+            log, sensor, at_ns, reach_ns, _MAX_READINGS, MAX_PER_TAG
+        )
+    ]
+
+
+def are_enough(pasts: Sequence[TagPast]) -> bool:
+    """Whether there is something to be said of estimates that are made of these readings."""
+    return sum(len(past.readings) for past in pasts) >= FIRST_FIT
+
+
+@dataclass(frozen=True, slots=True)
+class TagCheck:
+    """A tag's newest reading beside what is expected of it; see `estimate.Change`."""
+
+    tag_id: str
+    measured: float
+    observed_at_ns: int
+    expected: float
+    expected_sd: float
+    z: float
+    offset: float
+    changed_since_ns: int | None
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Loaded:
+    """What a sensor's readings say as of `at_ns`; without what changed sensors have read.
+
+    Not their posterior: it takes megabytes a sensor, and tenths of a second to make again.
+    """
+
+    at_ns: int
+    model: Model
+    readings: Readings
+    checks: tuple[TagCheck, ...]
+
+    @property
+    def changed(self) -> Mapping[str, int]:
+        """The tags whose sensor has changed, and since when."""
+        return {
+            one.tag_id: one.changed_since_ns
+            for one in self.checks
+            if one.changed_since_ns is not None
+        }
+
+
+def load(
+    pasts: Sequence[TagPast],
+    at_ns: int,
+    day_length_s: float,
+    should_stop: Callable[[], bool] = never,
+) -> tuple[Loaded, Posterior]:
+    """What readings up to a moment say, fitted to them alone, and their posterior then.
+
+    Raises:
+        lupin_twin.field.idw.Abandoned: `should_stop`, called every few milliseconds, was true.
+        lupin_twin.estimate.FitFailed: no model can be fitted.
+        lupin_twin.field.engine.FieldRefused: see `readings_of`.
+        numpy.linalg.LinAlgError: numbers that nothing can be made of.
+
+    """
+    readings = readings_of(pasts, at_ns, day_length_s)
+    model = fit(readings, day_length_s=day_length_s, should_stop=should_stop)
+    posterior = model.posterior(readings, 0.0, should_stop)
+    checks = tuple(
+        _check(past, change, at_ns)
+        for past, change in in_turns(zip(pasts, posterior.changes(), strict=True))
+        if change is not None
+    )
+    loaded = Loaded(at_ns, model, posterior.readings, checks)
+    if loaded.changed:
+        rest = readings_of(unchanged(pasts, loaded.changed), at_ns, day_length_s)
+        posterior = model.posterior(rest, 0.0, should_stop)
+        loaded = Loaded(at_ns, model, rest, checks)
+    return loaded, posterior
+
+
+def _check(past: TagPast, change: Change, at_ns: int) -> TagCheck:
+    observed_at_ns, measured = max(one for one in past.readings if one[0] <= at_ns)
+    since_s = change.since_s
+    return TagCheck(
+        past.tag_id,
+        measured,
+        observed_at_ns,
+        change.expected,
+        change.expected_sd,
+        change.z,
+        change.offset,
+        None if since_s is None else at_ns + round(since_s * NANOSECONDS_PER_SECOND),
+    )
+
+
+def estimate_at(
+    request: EstimateRequest,
+    pasts: Sequence[TagPast],
+    day_length_s: float,
+    should_stop: Callable[[], bool] = never,
+) -> Estimate:
+    """The estimate as of a moment, of readings up to then alone: model, changed sensors and all.
+
+    Raises:
+        FieldRefused: see `readings_of`; or nothing can be made of these readings.
+        lupin_twin.field.idw.Abandoned: `should_stop`, called every few milliseconds, was true.
+
+    """
+    try:
+        loaded, posterior = load(pasts, request.at_ns, day_length_s, should_stop)
+        grid = posterior.grid(**request.box.cells)
+    except (FitFailed, np.linalg.LinAlgError) as error:
+        raise FieldRefused(f"these readings cannot be computed with: {error}") from error
+    return Estimate(grid, len(np.unique(loaded.readings.tag)), len(loaded.readings))
+
+
+DEFAULT_PLACES: Final = 5
+MAX_PLACES: Final = 20
+
+
+@dataclass(frozen=True, slots=True)
+class ReportRequest:
+    """A sensor, and how many places for other tags are wanted; None: none.
+
+    Working them out is dear. By the service there is no asking for none.
+
+    Raises:
+        FieldRefused: names the field, the value and the limit.
+
+    """
+
+    sensor_type: str
+    max_places: int | None = None
+
+    def __post_init__(self) -> None:
+        """Refuse what cannot be answered."""
+        check_sensor_type(self.sensor_type)
+        if self.max_places is not None and not 1 <= self.max_places <= MAX_PLACES:
+            raise FieldRefused(
+                f"max_places is {self.max_places}, the limits are 1 and {MAX_PLACES}"
+            )
+
+
+@dataclass(frozen=True, slots=True)
+class Report:
+    """What a sensor's estimates are worth as of `at_ns`.
+
+    `fitted_at_ns` is when the model was fitted that serves, None: none yet; `fit_problem` what is
+    wrong with fits or with the day's length, empty: nothing. `tags` are the newest readings beside
+    what is expected of them, `places` where another tag helps most, the best first.
+    """
+
+    at_ns: int
+    fitted_at_ns: int | None
+    fit_problem: str
+    record: Record
+    tags: tuple[TagCheck, ...] = ()
+    places: tuple[Place, ...] = ()
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Known:
+    """What was found last of a sensor's estimates; `failed` counts the models that could not be.
+
+    `loaded` None: too few readings.
+    """
+
+    report: Report
+    grades: Grades
+    loaded: Loaded | None = None
+    failed: int = 0
+
+
+def find(before: Known | None, pasts: Sequence[TagPast], at_ns: int, day_length_s: float) -> Known:
+    """What is to be said as of now: the scans since `before` are compared with what others say.
+
+    Where nothing can be made of the readings, what was found before stays, with the reason.
+    """
+    grades = Grades(day_length_s) if before is None else copy(before.grades)
+    nothing = Known(
+        Report(at_ns, None, "", grades.record(at_ns)), grades, failed=before.failed if before else 0
+    )
+    if not are_enough(pasts):
+        return nothing
+    try:
+        loaded, posterior = load(pasts, at_ns, day_length_s)
+    except (FitFailed, FieldRefused, np.linalg.LinAlgError) as error:
+        known = before or nothing
+        report = replace(known.report, fit_problem=str(error) or repr(error))
+        return replace(known, report=report, failed=known.failed + 1)
+    if before is not None and before.loaded is not None:
+        grades.add(_graded(loaded, posterior, pasts, before.loaded.at_ns), at_ns)
+    report = Report(at_ns, at_ns, "", grades.record(at_ns), loaded.checks)
+    return Known(report, grades, loaded, nothing.failed)
+
+
+def _graded(loaded: Loaded, posterior: Posterior, pasts: Sequence[TagPast], since_ns: int) -> Tally:
+    """How many of the newest scans since then came to lie where they were predicted.
+
+    Of a sensor that has changed nothing is counted, nor of a scan that was received late.
+    """
+    fresh = [
+        row
+        for row, past in enumerate(pasts)
+        if past.tag_id not in loaded.changed
+        and past.readings
+        and since_ns < max(past.readings)[0] <= loaded.at_ns
+    ]
+    if not fresh:
+        return Tally()
+    held = posterior.left_out(np.array(fresh))
+    inside = [abs(measured - mean) <= HALF_WIDTH_SDS * sd for measured, mean, sd in held]
+    return Tally(len(inside), sum(inside))
+
+
+def advice(loaded: Loaded, occupancy: OccupancyMap | None, count: int) -> tuple[Place, ...]:
+    """Where other tags help most, over all the free floor; nowhere, where none is free."""
+    tags = loaded.readings.xy
+    over = floor(tags, occupancy)
+    places = free_of(tags, over)
+    if not len(places):
+        return ()
+    posterior = loaded.model.posterior(loaded.readings, 0.0)
+    return tuple(posterior.advice(places, count, over=over))

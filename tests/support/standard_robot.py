@@ -1,0 +1,54 @@
+"""A robot that knows ROS's standard messages and nothing of the twin: a program by itself.
+
+It stands at one tag, then at the other, three seconds each, and again. At the second it is warmer.
+"""
+
+from __future__ import annotations
+
+import itertools
+from contextlib import suppress
+
+import rclpy
+from geometry_msgs.msg import PoseWithCovarianceStamped
+from rclpy.executors import ExternalShutdownException
+from rclpy.node import Node
+from rclpy.qos import DurabilityPolicy, QoSProfile, qos_profile_sensor_data
+from sensor_msgs.msg import RelativeHumidity, Temperature
+
+PLACES = ((0.2, 21.5), (3.1, 24.0))
+TICKS_AT_EACH = 30
+
+
+class StandardRobot(Node):  # type: ignore[misc]  # rclpy is not typed
+    """Localisation as AMCL publishes it, sensors as their drivers do."""
+
+    def __init__(self) -> None:
+        super().__init__("standard_robot")
+        amcl = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+        self._pose = self.create_publisher(PoseWithCovarianceStamped, "/amcl_pose", amcl)
+        sensor = qos_profile_sensor_data
+        self._temperature = self.create_publisher(Temperature, "/temperature", sensor)
+        self._humidity = self.create_publisher(RelativeHumidity, "/humidity", sensor)
+        self._ticks = itertools.count()
+        self.create_timer(0.1, self._tick)
+
+    def _tick(self) -> None:
+        x, celsius = PLACES[next(self._ticks) // TICKS_AT_EACH % len(PLACES)]
+        pose = PoseWithCovarianceStamped()
+        pose.header.frame_id = "map"
+        pose.pose.pose.position.x = x
+        temperature = Temperature(temperature=celsius)
+        humidity = RelativeHumidity(relative_humidity=0.6)
+        for publisher, message in (
+            (self._pose, pose),
+            (self._temperature, temperature),
+            (self._humidity, humidity),
+        ):
+            message.header.stamp = self.get_clock().now().to_msg()
+            publisher.publish(message)
+
+
+if __name__ == "__main__":
+    rclpy.init()
+    with suppress(KeyboardInterrupt, ExternalShutdownException):
+        rclpy.spin(StandardRobot())

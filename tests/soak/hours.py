@@ -14,7 +14,6 @@ import time
 from collections.abc import Iterator
 from pathlib import Path
 
-from lupin_twin.core.history import History
 from lupin_twin.core.state import Pose, Reading, Scan, TwinStore
 from lupin_twin.journal.retention import Limits
 from lupin_twin.journal.runs import Clock
@@ -71,7 +70,7 @@ def main(hours: int = HOURS) -> bool:
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "j.sqlite"
         journal = Journal(path, "/soak", LIMITS)
-        memory = Memory(TwinStore(), History(BUFFER_LEN), journal, BUFFER_LEN)
+        memory = Memory(TwinStore(), journal, BUFFER_LEN)
         memory.follow(Clock(NOW, NOW, is_simulated=False))
         for hour in range(hours):
             for scan in scans(hour, chance):

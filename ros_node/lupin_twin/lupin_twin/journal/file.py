@@ -13,9 +13,11 @@ from typing import Final
 
 from lupin_twin.core.notes import Note
 from lupin_twin.core.state import Write
+from lupin_twin.field.explored import OccupancyMap
 from lupin_twin.journal.appending import Appender, Stretch, copy_known, simulated
 from lupin_twin.journal.beside import Syncing, forwarded_seq
 from lupin_twin.journal.checking import find_damage
+from lupin_twin.journal.floor_plan import text_of
 from lupin_twin.journal.fold import Restored, copies, fold
 from lupin_twin.journal.notes import put_note
 from lupin_twin.journal.retention import (
@@ -62,6 +64,8 @@ _LOG_BYTES: Final = 8_000_000
 _PURGE_EVERY_S: Final = 60.0
 _PURGE_HOURS_EVERY_S: Final = 86_400.0
 _POLL_EVERY_S: Final = 1.0
+# A robot that explores sends a map a second: not each of them is written.
+_MAP_REST_S: Final = 10.0
 _SALVAGE: Final = "salvage"
 
 _LAST_SCANS: Final = (
@@ -100,6 +104,8 @@ class JournalFile:
         self.holds_older = False
         self._path = path
         self._limits = limits
+        self._map: OccupancyMap | None = None
+        self._map_rests_until_s = 0.0
         self.quarantined = ""
         if is_sound is False or (is_sound is None and self._is_damaged()):
             self._quarantine()
@@ -167,6 +173,13 @@ class JournalFile:
         """Have it in the file where what is recorded from now on comes from."""
         if get_meta(self._connection, ORIGIN) != origin:
             set_meta(self._connection, ORIGIN, origin)
+
+    def put_map(self, floor: OccupancyMap) -> None:
+        """Have the newest map in the file, by this call or one to come."""
+        now_s = time.monotonic()
+        if floor is not self._map and now_s >= self._map_rests_until_s:
+            self.note_map(text_of(floor))
+            self._map, self._map_rests_until_s = floor, now_s + _MAP_REST_S
 
     def note_map(self, text: str) -> None:
         """Have the newest map in the file, as `floor_plan` writes it; empty: it is too large."""

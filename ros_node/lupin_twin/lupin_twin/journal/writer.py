@@ -22,9 +22,9 @@ from lupin_twin.core.diagnostics import Origin
 from lupin_twin.core.journal_condition import Condition, JournalState
 from lupin_twin.core.notes import Note
 from lupin_twin.core.state import Write
+from lupin_twin.field.explored import OccupancyMap
 from lupin_twin.journal.beside import InUse, Lock
 from lupin_twin.journal.file import JournalFile
-from lupin_twin.journal.floor_plan import NewestMap
 from lupin_twin.journal.fold import Restored
 from lupin_twin.journal.notes import NoteQueue
 from lupin_twin.journal.rebuild import is_version3, upgrade
@@ -169,7 +169,7 @@ class Journal:
         self._is_temporary = is_temporary
         self._pending = Pending(max_weight)
         self._notes = NoteQueue()
-        self.floor_plan = NewestMap()
+        self._map: OccupancyMap | None = None
         self._eras: list[_Era] = []
         self._stop = threading.Event()
         self._was_attempted = threading.Event()
@@ -221,6 +221,10 @@ class Journal:
         if self._stop.is_set() or self._reported.state not in (*_WELL, JournalState.STARTING):
             self._notes.refuse(self._reported.detail)
         return written
+
+    def write_map(self, floor: OccupancyMap) -> None:
+        """Hand the newest map over; one that comes before it was written takes its place."""
+        self._map = floor
 
     def take_restored(self, wait_s: float = 0.0) -> Restored | None:
         """What was known before, once; None if that is not there (yet).
@@ -313,7 +317,8 @@ class Journal:
                 self._catch_up(file)
                 self._write(file, all_that_waits=is_last)
                 self._notes.write(file.put_note)
-                self.floor_plan.write(file)
+                if self._map is not None:
+                    file.put_map(self._map)
                 has_more = not is_last and file.check_size(may_purge=bool(self._runs))
                 self._holds_older = file.holds_older
                 self._report_well(file)

@@ -51,7 +51,7 @@ MAX_MESSAGE_BYTES: Final = 1_000_000
 # A reading whose stamp is farther from now was stamped by a clock that is wrong.
 MAX_SKEW_S: Final = 10.0
 # Odometry comes a hundred times a second: tags are looked for as often as anybody can drive.
-POSE_PERIOD_S: Final = 0.1
+POSE_PERIOD_S: Final = 0.05
 # Of each of several publishers its latched message comes.
 TF_STATIC_QOS: Final = latched(100)
 # A topic that says nothing for so long is named on `/diagnostics`.

@@ -13,7 +13,7 @@ from typing import Any
 import httpx
 import pytest
 
-from lupin_twin.journal.rows import Row
+from lupin_twin.core.state import Write
 from tests.support.disk import Disk, build
 from tests.support.domains import own_domain, ros_env
 from tests.support.journal import SECOND, kept, pin, select
@@ -132,7 +132,7 @@ def test_of_what_was_deleted_it_is_said_since_when_it_is_kept(tmp_path: Path) ->
     journal = tmp_path / "j.sqlite"
     last_s = int(time.time()) - 3_600
     stamps_s = [last_s - DAY_S // 4 * number for number in range(20)][::-1]
-    rows: list[Row] = [pin("a", stamps_s[0] * SECOND), row("gone", stamps_s[0] * SECOND, co2=1.0)]
+    rows: list[Write] = [pin("a", stamps_s[0] * SECOND), row("gone", stamps_s[0] * SECOND, co2=1.0)]
     rows += [row("a", at_s * SECOND, co2=float(n)) for n, at_s in enumerate(stamps_s)]
     kept(journal, rows)
     with both(journal, "-p", "journal_days:=2.0") as lives:

@@ -14,7 +14,7 @@ from typing import Any
 import pytest
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 
-from lupin_twin.journal.rows import Row
+from lupin_twin.core.state import Write
 from tests.support.domains import own_domain
 from tests.support.journal import SECOND, kept, pin, select
 from tests.support.journal import scan as row
@@ -40,7 +40,7 @@ class Year:
         self.path = path
         last_ns = (int(time.time()) - 3_600) * SECOND
         self.stamps_s = [last_ns // SECOND - DAY_S * day for day in range(DAYS)][::-1]
-        rows: list[Row] = [pin(tag, self.stamps_s[0] * SECOND, float(tag)) for tag in TAGS]
+        rows: list[Write] = [pin(tag, self.stamps_s[0] * SECOND, float(tag)) for tag in TAGS]
         rows += [
             row(tag, at_s * SECOND, co2=number + float(tag) / 10)
             for number, at_s in enumerate(self.stamps_s)

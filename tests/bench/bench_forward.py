@@ -12,7 +12,7 @@ import time
 from collections.abc import Sequence
 from pathlib import Path
 
-from lupin_twin.journal.rows import ScanRow
+from lupin_twin.core.state import Scan
 from tests.support.archive import Archive, forward_once
 from tests.support.journal import NOW, SECOND, kept, scan, select
 from tests.support.postgres import server
@@ -28,7 +28,7 @@ def main(arguments: Sequence[str] = ()) -> None:
     days = 1 if parser.parse_args(arguments).quick else 7
     with server(fsync=True) as postgresql, tempfile.TemporaryDirectory() as folder:
         journal, archive = Path(folder) / "journal.sqlite", Archive(postgresql)
-        rows: list[ScanRow] = []
+        rows: list[Scan] = []
         for n in range(days * 720 * TAGS):
             readings = {name: 20.0 + (n * k % 997) / 7 for k, name in enumerate(SENSORS, 1)}
             rows.append(scan(str(n % TAGS), NOW + n * 4 * SECOND, source="robot", **readings))

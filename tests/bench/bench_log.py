@@ -20,12 +20,11 @@ from typing import Final
 
 from lupin_twin.core.history import History
 from lupin_twin.core.past import EVERY_TAG, Event, SeriesRequest
-from lupin_twin.core.state import TwinStore
+from lupin_twin.core.state import Scan, TwinStore, Write
 from lupin_twin.journal.file import JournalFile
 from lupin_twin.journal.fold import state_at
 from lupin_twin.journal.queries import rows as exported
 from lupin_twin.journal.queries import series
-from lupin_twin.journal.rows import Row, ScanRow
 from lupin_twin.journal.runs import Clock
 from lupin_twin.journal.schema import open_reader
 from lupin_twin.journal.writer import Journal
@@ -72,7 +71,7 @@ def write(folder: Path, scans: int) -> None:
     with closing(file):
         run = file.start(Clock(BEGUN_NS, BEGUN_NS, is_simulated=False), 1, is_believed=True).run
 
-        def commit(lot: Sequence[Row]) -> None:
+        def commit(lot: Sequence[Write]) -> None:
             file.append([(run, row) for row in lot])
             while file.check_size(may_purge=True):
                 pass
@@ -81,7 +80,7 @@ def write(folder: Path, scans: int) -> None:
             file._connection.execute("PRAGMA wal_checkpoint(TRUNCATE)").fetchall()
             return path.stat().st_size
 
-        def in_lots(rows: Sequence[Row], lot: int) -> None:
+        def in_lots(rows: Sequence[Write], lot: int) -> None:
             for first in range(0, len(rows), lot):
                 commit(rows[first : first + lot])
 
@@ -100,8 +99,8 @@ def write(folder: Path, scans: int) -> None:
         report("bytes handed to the disk, each, a commit a scan", f"{each:,.0f}", "1,000")
 
 
-def readings(rows: Sequence[Row]) -> int:
-    return sum(len(row.readings) for row in rows if isinstance(row, ScanRow))
+def readings(rows: Sequence[Write]) -> int:
+    return sum(len(row.readings) for row in rows if isinstance(row, Scan))
 
 
 def handed_to_disk() -> int:

@@ -15,7 +15,7 @@ from pathlib import Path
 from playwright.sync_api import Browser, Playwright, sync_playwright
 from playwright.sync_api import Page as BrowserPage
 
-from lupin_twin.journal.rows import Row
+from lupin_twin.core.state import Write
 from tests.browser.conftest import CHROMIUM, CHROMIUM_ARGS
 from tests.support.archive import Archive, forward_once
 from tests.support.fleet import Page, fleet, write
@@ -37,7 +37,7 @@ _SCROLL = """async () => {
 }"""
 
 
-def rows() -> list[Row]:
+def rows() -> list[Write]:
     """Tags in a row, of which one is too warm."""
     now_ns = time.time_ns()
     pins = [pin(str(tag), now_ns - 900 * SECOND, float(tag)) for tag in range(TAGS)]

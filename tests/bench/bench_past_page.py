@@ -15,7 +15,7 @@ from typing import Any, Final
 
 from playwright.sync_api import Browser, Page, expect, sync_playwright
 
-from lupin_twin.journal.rows import Row
+from lupin_twin.core.state import Write
 from lupin_twin.journal.runs import Clock
 from tests.browser.conftest import CHROMIUM, CHROMIUM_ARGS
 from tests.support.journal import SECOND, kept, pin, scan
@@ -67,7 +67,7 @@ async (seconds) => {
 def journal_of_a_day(path: Path, begun_s: int, tags: int) -> None:
     """Tags of five sensors, each scanned every two minutes."""
     begun_ns = begun_s * SECOND
-    rows: list[Row] = [pin(str(tag), begun_ns, x=0.7 * tag) for tag in range(tags)]
+    rows: list[Write] = [pin(str(tag), begun_ns, x=0.7 * tag) for tag in range(tags)]
     for number in range(DAY_S // EVERY_S):
         for tag in range(tags):
             at_ns = begun_ns + (number * EVERY_S + tag) * SECOND

@@ -20,7 +20,7 @@ from contextlib import ExitStack
 from pathlib import Path
 from urllib.parse import urlsplit
 
-from lupin_twin.journal.rows import Row
+from lupin_twin.core.state import Write
 from tests.bench.live_parts import Clients, Seen
 from tests.support.archive import Archive, forwarder
 from tests.support.fleet import fleet, write
@@ -84,7 +84,9 @@ def main(arguments: Sequence[str] = ()) -> None:
         archive = Archive(stack.enter_context(server(fsync=True)), "gh0")
         archive.add_user("page", "lupin_page")
         journal, now_ns = folder / "gh0", time.time_ns()
-        rows: list[Row] = [pin(str(tag), now_ns - 600 * SECOND, float(tag)) for tag in range(TAGS)]
+        rows: list[Write] = [
+            pin(str(tag), now_ns - 600 * SECOND, float(tag)) for tag in range(TAGS)
+        ]
         rows += [
             scan(str(tag), now_ns - SECOND, temperature=20.0, humidity=50.0, co2=410.0, light=300.0)
             for tag in range(TAGS)

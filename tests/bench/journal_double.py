@@ -18,10 +18,9 @@ from itertools import islice
 from pathlib import Path
 from typing import Final
 
-from lupin_twin.core.state import Bloom, Flower, Pose, Reading
+from lupin_twin.core.state import Bloom, Flower, Inspection, Pin, Pose, Reading, Scan, Write
 from lupin_twin.journal.file import JournalFile
 from lupin_twin.journal.retention import Limits
-from lupin_twin.journal.rows import InspectionRow, PinRow, Row, ScanRow
 from lupin_twin.journal.runs import Clock
 
 SECOND: Final = 1_000_000_000
@@ -57,7 +56,7 @@ class House:
         """How often a tag is tried."""
         return int(self.days * DAY_S / self.every_s)
 
-    def rows(self) -> Iterator[Row]:
+    def rows(self) -> Iterator[Write]:
         """All that is heard, by time."""
         step_ns = int(self.every_s * SECOND / self.tags)
         sets = [SENSORS[part :: self.sets] for part in range(self.sets)]
@@ -69,10 +68,10 @@ class House:
                 at_ns = BEGUN_NS + int(turn * self.every_s) * SECOND + tag * step_ns
                 arrival_ns = at_ns + 50_000_000
                 if turn == 0:
-                    yield PinRow(tag_id, at_ns, arrival_ns, _place(tag))
+                    yield Pin(tag_id, _place(tag), at_ns, arrival_ns)
                 if self.failing and (turn * 7 + tag) % self.failing == 0:
-                    yield ScanRow(
-                        tag_id, at_ns, arrival_ns, status=2, detail="no answer", source="robot"
+                    yield Scan(
+                        tag_id, at_ns, (), None, 2, "no answer", "robot", at_ns, "", arrival_ns
                     )
                     continue
                 base = round(20.0 + 4.0 * by_day + (tag * 37 + turn) % 16 / 8.0, 1)
@@ -80,8 +79,8 @@ class House:
                     readings = tuple(
                         Reading(name, base + 10.0 * index) for index, name in enumerate(names)
                     )
-                    yield ScanRow(
-                        tag_id, at_ns, arrival_ns, readings, source="robot", mission="patrol"
+                    yield Scan(
+                        tag_id, at_ns, readings, None, 0, "", "robot", at_ns, "patrol", arrival_ns
                     )
                 if self.look_days and turn % looks_every == tag % looks_every:
                     yield _look(tag, at_ns, has_pest=(turn + tag) % 97 == 0)
@@ -99,14 +98,15 @@ def _place(tag: int) -> Pose:
     return Pose(tag % 100 * 0.5, tag // 100 * 0.5, 0.3, 0.0, 0.0, 0.0, 1.0)
 
 
-def _look(tag: int, at_ns: int, *, has_pest: bool) -> InspectionRow:
+def _look(tag: int, at_ns: int, *, has_pest: bool) -> Inspection:
     place = _place(tag)
     blooms = tuple(
         Bloom(place.x + n / 10, place.y + 0.1, 0.4, 0.25, "lupin", 0.9, anomaly=False)
         for n in range(2)
     )
     flower = Flower("lupin", 0.9, has_pest, 2, int(has_pest), blooms)
-    return InspectionRow(str(tag + 1), at_ns + 1, at_ns + 60_000_000, flower, "robot", "patrol")
+    sent = ("robot", at_ns + 1, "patrol", at_ns + 60_000_000)
+    return Inspection(str(tag + 1), at_ns + 1, flower, None, 0, "", *sent)
 
 
 @dataclass(frozen=True)
@@ -150,6 +150,6 @@ def fill(path: Path, house: House) -> Filled:
         while lot := list(islice(heard, _BATCH)):
             file.append([(run, row) for row in lot])
             rows += len(lot)
-            readings += sum(len(row.readings) for row in lot if isinstance(row, ScanRow))
+            readings += sum(len(row.readings) for row in lot if isinstance(row, Scan))
             file.check_size(may_purge=False)
     return Filled(path, house, readings, rows)

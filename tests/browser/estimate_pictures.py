@@ -25,7 +25,7 @@ from playwright.sync_api import Browser, expect
 from lupin_bridge.cli.demo import rows
 from lupin_patrol.greenhouse import read_greenhouse
 from lupin_patrol.perception import FREE, OCCUPIED, RESOLUTION_M
-from lupin_twin.journal.rows import Row, ScanRow
+from lupin_twin.core.state import Scan, Write
 from lupin_twin.journal.runs import Clock
 from tests.support.journal import SECOND, kept
 from tests.support.messages import occupancy_grid, pose, scan
@@ -65,7 +65,7 @@ def taken(browser: Browser, folder: Path) -> None:
         now_ns = time.time_ns()
         told, end_ns = past(now_ns), now_ns - GRADED_S * SECOND
         known = [row for row in told if row.stamp_ns <= end_ns]
-        robot = Robot(row for row in told if isinstance(row, ScanRow) and row.stamp_ns > end_ns)
+        robot = Robot(row for row in told if isinstance(row, Scan) and row.stamp_ns > end_ns)
         kept(journal, known, Clock(now_ns, now_ns, is_simulated=False))
         world = ("--world", f"day_length_s={DAY_S}")
         with bridge(*world, "--ros-args", "-p", f"journal:={journal}") as running:
@@ -84,7 +84,7 @@ def taken(browser: Browser, folder: Path) -> None:
 class Robot:
     """It scans what the simulated past says that it does, when its time has come."""
 
-    def __init__(self, scans: Iterable[ScanRow]) -> None:
+    def __init__(self, scans: Iterable[Scan]) -> None:
         self._scans = sorted(scans, key=lambda each: each.stamp_ns)
 
     def go_on(self, running: Bridge) -> None:
@@ -98,19 +98,19 @@ class Robot:
             running.tag(lot[-1].tag_id, partial(is_told, lot[-1]))
 
 
-def message_of(row: ScanRow) -> Any:
+def message_of(row: Scan) -> Any:
     """The observation that the robot tells."""
     readings = {each.name: each.value for each in row.readings}
     return scan(row.tag_id, readings, status=row.status, stamp_s=row.stamp_ns / SECOND)
 
 
-def is_told(row: ScanRow, tag: dict[str, Any]) -> bool:
+def is_told(row: Scan, tag: dict[str, Any]) -> bool:
     """Whether the twin knows the scan."""
     tried = filled(tag)["last_try"]
     return tried is not None and tried["sec"] >= row.stamp_ns // SECOND
 
 
-def past(now_ns: int) -> list[Row]:
+def past(now_ns: int) -> list[Write]:
     """What the twin is to remember, and what is to come until `AHEAD_S` from now."""
     made = subprocess.run(
         [sys.executable, "-m", "lupin_patrol.past"], capture_output=True, text=True, check=True

@@ -14,8 +14,8 @@ from urllib.parse import parse_qsl, urlsplit
 import pytest
 from playwright.sync_api import Route, expect
 
+from lupin_twin.core.state import Write
 from lupin_twin.journal.fold import state_at
-from lupin_twin.journal.rows import Row
 from lupin_twin.journal.runs import Clock
 from lupin_twin.journal.schema import open_reader
 from tests.browser.hmi import PHONE, Hmi, OpenPage, point, press_at, slider
@@ -66,7 +66,7 @@ def hour(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Hour]:
     journal = tmp_path_factory.mktemp("hour") / "journal.sqlite"
     begun_s = int(time.time()) - EVERY_S * SCANS
     begun_ns = begun_s * SECOND
-    rows: list[Row] = [pin(tag, begun_ns, x=PLACES[tag]) for tag in TAGS]
+    rows: list[Write] = [pin(tag, begun_ns, x=PLACES[tag]) for tag in TAGS]
     rows += [look("b", begun_ns + 600 * SECOND, anomaly=True), look("b", begun_ns + 900 * SECOND)]
     rows += [
         scan(tag, begun_ns + number * EVERY_S * SECOND, temperature=18.0 + number % 40 / 10)

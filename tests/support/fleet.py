@@ -11,7 +11,7 @@ from typing import Any
 
 import httpx
 
-from lupin_twin.journal.rows import Row
+from lupin_twin.core.state import Write
 from lupin_twin.journal.runs import Clock
 from tests.support.archive import Archive
 from tests.support.journal import SECOND, kept, pin, scan
@@ -26,10 +26,10 @@ def wall() -> Clock:
     return Clock(now_ns, now_ns, is_simulated=False)
 
 
-def scans_lately(temperature: float = 22.0, tags: int = 5, scans: int = 6) -> list[Row]:
+def scans_lately(temperature: float = 22.0, tags: int = 5, scans: int = 6) -> list[Write]:
     """Tags with their places, each scanned once a minute until now."""
     now_ns = time.time_ns()
-    pins: list[Row] = [pin(str(tag), now_ns - 600 * SECOND, float(tag)) for tag in range(tags)]
+    pins: list[Write] = [pin(str(tag), now_ns - 600 * SECOND, float(tag)) for tag in range(tags)]
     return pins + [
         scan(str(tag), now_ns - (scans - number) * 60 * SECOND + tag, temperature=temperature)
         for number in range(scans)
@@ -37,7 +37,7 @@ def scans_lately(temperature: float = 22.0, tags: int = 5, scans: int = 6) -> li
     ]
 
 
-def write(journal: Path, rows: list[Row]) -> None:
+def write(journal: Path, rows: list[Write]) -> None:
     """As a twin does that is started for it."""
     kept(journal, rows, wall())
 

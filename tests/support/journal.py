@@ -9,11 +9,10 @@ from pathlib import Path
 
 from lupin_twin.core.diagnostics import Origin
 from lupin_twin.core.journal_condition import Condition, JournalState
-from lupin_twin.core.state import Bloom, Flower, Pose, Reading
+from lupin_twin.core.state import Bloom, Flower, Inspection, Pin, Pose, Reading, Scan, Write
 from lupin_twin.journal.file import JournalFile
 from lupin_twin.journal.fold import Restored
 from lupin_twin.journal.retention import Limits
-from lupin_twin.journal.rows import InspectionRow, PinRow, Row, ScanRow
 from lupin_twin.journal.runs import Clock
 from lupin_twin.journal.schema import Empty, open_reader
 from lupin_twin.journal.writer import MAX_WEIGHT, Journal
@@ -25,21 +24,20 @@ LIMITS = Limits(days=36_500, max_bytes=4_000_000_000)
 CLOCK = Clock(NOW, NOW, is_simulated=False)
 
 
-def scan(
-    tag_id: str = "7", at_ns: int = NOW, *, source: str = "robot", **readings: float
-) -> ScanRow:
+def scan(tag_id: str = "7", at_ns: int = NOW, *, source: str = "robot", **readings: float) -> Scan:
     """A scan that worked."""
-    return ScanRow(
+    return Scan(
         tag_id,
         at_ns,
-        at_ns + 1000,
         tuple(Reading(name, value) for name, value in (readings or {"temperature": 21.5}).items()),
         source=source,
+        own_stamp_ns=at_ns,
         mission="m1",
+        arrival_ns=at_ns + 1000,
     )
 
 
-def look(tag_id: str = "7", at_ns: int = NOW, *, anomaly: bool = False) -> InspectionRow:
+def look(tag_id: str = "7", at_ns: int = NOW, *, anomaly: bool = False) -> Inspection:
     """A look at two flowers."""
     flower = Flower(
         species="lupin",
@@ -53,12 +51,12 @@ def look(tag_id: str = "7", at_ns: int = NOW, *, anomaly: bool = False) -> Inspe
         ),
         footprint=((0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (1.0, 1.0, 0.1)),
     )
-    return InspectionRow(tag_id, at_ns, at_ns + 2000, flower, source="robot", mission="m1")
+    return Inspection(tag_id, at_ns, flower, source="robot", mission="m1", arrival_ns=at_ns + 2000)
 
 
-def pin(tag_id: str = "7", at_ns: int = NOW, x: float = 1.5) -> PinRow:
+def pin(tag_id: str = "7", at_ns: int = NOW, x: float = 1.5) -> Pin:
     """A place."""
-    return PinRow(tag_id, at_ns, at_ns + 1000, Pose(x, 2.5, 0.0, 0.0, 0.0, 0.0, 1.0))
+    return Pin(tag_id, Pose(x, 2.5, 0.0, 0.0, 0.0, 0.0, 1.0), at_ns, at_ns + 1000)
 
 
 @contextmanager
@@ -77,7 +75,7 @@ def _now(file: JournalFile) -> Clock:
     return file._last(runs[-1]) if runs else CLOCK
 
 
-def kept(path: Path, rows: Iterable[Row], now: Clock | None = None) -> tuple[int, int]:
+def kept(path: Path, rows: Iterable[Write], now: Clock | None = None) -> tuple[int, int]:
     """Write rows, in one life of a twin; returns what `JournalFile.append` does."""
     with opened(path) as file:
         run = file.start(now or _now(file), 32, is_believed=True).run
@@ -90,14 +88,14 @@ def restored(path: Path, now: Clock | None = None, scans: int = 32) -> Restored:
         return file.start(now or _now(file), scans, is_believed=False)
 
 
-def known(path: Path, now: Clock | None = None) -> set[Row]:
+def known(path: Path, now: Clock | None = None) -> set[Write]:
     """That as the rows that it may be of."""
     found = restored(path, now)
-    rows: set[Row] = set(found.rows)
+    rows: set[Write] = set(found.rows)
     for tag in found.known.tags:
         if tag.pose is not None:
             stamp_ns = found.known.placed_ns[tag.tag_id]
-            rows.add(PinRow(tag.tag_id, stamp_ns, stamp_ns + 1000, tag.pose))
+            rows.add(Pin(tag.tag_id, tag.pose, stamp_ns, stamp_ns + 1000))
     return rows
 
 

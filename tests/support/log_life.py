@@ -14,12 +14,21 @@ from typing import Any
 
 from hypothesis import strategies as st
 
-from lupin_twin.core.history import KNOWN_BY_NOTHING
+from lupin_twin.core.history import KNOWN_BY_NOTHING, kind_of
 from lupin_twin.core.past import EVERY_TAG, Event, PastRow, SeriesPast, SeriesRequest
-from lupin_twin.core.state import NO_FLOWER, Pose, Reading
+from lupin_twin.core.state import (
+    NO_FLOWER,
+    STATUS_OK,
+    Flower,
+    Inspection,
+    Pin,
+    Pose,
+    Reading,
+    Scan,
+    Write,
+)
 from lupin_twin.journal.appending import Appender
 from lupin_twin.journal.retention import Limits, purge_step
-from lupin_twin.journal.rows import KIND_FLOWER, STATUS_OK, InspectionRow, PinRow, Row, ScanRow
 from lupin_twin.journal.runs import runs, spans
 from lupin_twin.journal.schema import open_writer, transaction
 
@@ -33,31 +42,39 @@ SILENCE_NS = 600 * SECOND
 Entry = tuple[int, int, float]  # stamp, number, value
 
 
-def scan(tag: str = "7", at_ns: int = BEGUN, *, source: str = "robot", **values: float) -> ScanRow:
+def scan(tag: str = "7", at_ns: int = BEGUN, *, source: str = "robot", **values: float) -> Scan:
     """A scan that worked."""
     readings = (values or {"temperature": 21.5}).items()
-    return ScanRow(
-        tag, at_ns, at_ns + 1000, tuple(Reading(name, value) for name, value in readings),
-        source=source, mission="m1",
+    return Scan(
+        tag, at_ns, tuple(Reading(name, value) for name, value in readings),
+        source=source, mission="m1", arrival_ns=at_ns + 1000,
     )  # fmt: skip
 
 
-def failure(tag: str = "7", at_ns: int = BEGUN, status: int = 2, kind: int = 0) -> ScanRow:
+def failure(
+    tag: str = "7", at_ns: int = BEGUN, status: int = 2, kind: int = 0
+) -> Scan | Inspection:
     """An attempt that failed."""
-    return ScanRow(tag, at_ns, at_ns + 1000, (), kind, status, "no", source="robot")
+    reported = (None, status, "no", "robot", 0, "", at_ns + 1000)
+    return Inspection(tag, at_ns, None, *reported) if kind else Scan(tag, at_ns, (), *reported)
 
 
-def look(tag: str = "7", at_ns: int = BEGUN, *, anomaly: bool = False) -> InspectionRow:
+def look(tag: str = "7", at_ns: int = BEGUN, *, anomaly: bool = False) -> Inspection:
     """A look at flowers."""
     flower = replace(
         NO_FLOWER, species="lupin", confidence=0.9, anomaly=anomaly, bug_count=int(anomaly)
     )
-    return InspectionRow(tag, at_ns, at_ns + 2000, flower, source="robot", mission="m1")
+    return Inspection(tag, at_ns, flower, source="robot", mission="m1", arrival_ns=at_ns + 2000)
 
 
-def pin(tag: str = "7", at_ns: int = BEGUN, x: float = 1.5) -> PinRow:
+def _seen(row: Write) -> Flower | None:
+    """What an inspection saw."""
+    return row.flower if isinstance(row, Inspection) else None
+
+
+def pin(tag: str = "7", at_ns: int = BEGUN, x: float = 1.5) -> Pin:
     """A place."""
-    return PinRow(tag, at_ns, at_ns + 1000, Pose(x, 2.5, 0.0, 0.0, 0.0, 0.0, 1.0))
+    return Pin(tag, Pose(x, 2.5, 0.0, 0.0, 0.0, 0.0, 1.0), at_ns, at_ns + 1000)
 
 
 @dataclass
@@ -65,16 +82,16 @@ class Life:
     """Writes rows into a log and remembers each that is new, with its run."""
 
     connection: sqlite3.Connection
-    rows: list[tuple[int, Row]] = field(default_factory=list)
+    rows: list[tuple[int, Write]] = field(default_factory=list)
     run: int = 0
-    batches: list[list[Row]] = field(default_factory=list)
+    batches: list[list[Write]] = field(default_factory=list)
     _known: dict[object, set[str]] = field(default_factory=dict)
-    _copied: dict[object, Row] = field(default_factory=dict)
+    _copied: dict[object, Write] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         self._appender = Appender(self.connection)
 
-    def write(self, rows: Iterable[Row]) -> None:
+    def write(self, rows: Iterable[Write]) -> None:
         """Rows that come together."""
         rows = list(rows)
         with transaction(self.connection):
@@ -84,15 +101,14 @@ class Life:
             if (new := self._new(row)) is not None:
                 self.rows.append((self.run, new))
 
-    def _new(self, row: Row) -> Row | None:
+    def _new(self, row: Write) -> Write | None:
         """What is new of it: of a write that is known already, other sensors."""
-        if isinstance(row, PinRow):
+        if isinstance(row, Pin):
             return row
-        kind = row.kind if isinstance(row, ScanRow) else KIND_FLOWER
-        key = (self.run, row.tag_id, kind, row.stamp_ns, row.source)
+        key = (self.run, row.tag_id, kind_of(row), row.stamp_ns, row.source)
         known = self._known.get(key)
         sensors = self._known.setdefault(key, set())
-        if isinstance(row, ScanRow):
+        if isinstance(row, Scan):
             row = replace(row, readings=tuple(r for r in row.readings if r.name not in sensors))
             sensors |= {reading.name for reading in row.readings}
             return row if known is None or row.readings else None
@@ -117,7 +133,7 @@ class Life:
             self._appender.append(
                 self.run,
                 [
-                    row if isinstance(row, PinRow) else replace(row, own_stamp_ns=KNOWN_BY_NOTHING)
+                    row if isinstance(row, Pin) else replace(row, own_stamp_ns=KNOWN_BY_NOTHING)
                     for row in self._copied.values()
                 ],
                 are_copies=True,
@@ -130,7 +146,7 @@ class Life:
             while purge_step(self.connection, Limits(0.0, 10**12), before_ns):
                 pass
 
-    def _holds(self) -> list[tuple[int, Row]]:
+    def _holds(self) -> list[tuple[int, Write]]:
         axis = spans(runs(self.connection.execute))
         return [
             (number, row)
@@ -138,7 +154,7 @@ class Life:
             if any(s.start_ns <= row.stamp_ns < s.end_ns and s.run.id == run for s in axis)
         ]
 
-    def _of(self, tag_id: str) -> list[tuple[int, Row]]:
+    def _of(self, tag_id: str) -> list[tuple[int, Write]]:
         return [(n, row) for n, row in self._holds() if tag_id in (EVERY_TAG, row.tag_id)]
 
     # --- what there was -----------------------------------------------------------------------
@@ -147,7 +163,7 @@ class Life:
         return sorted(
             (row.stamp_ns, number, reading.value)
             for number, row in self._of(tag_id)
-            if isinstance(row, ScanRow)
+            if isinstance(row, Scan)
             for reading in row.readings
             if reading.name == sensor
         )
@@ -158,11 +174,13 @@ class Life:
         found = []
         for number, row in self._of(tag_id):
             value: float | None = None
-            if isinstance(row, InspectionRow) and event is Event.INSPECTIONS:
-                value = row.flower.bug_count
-            elif isinstance(row, ScanRow) and row.status != STATUS_OK and event is Event.FAILURES:
+            if isinstance(row, Pin):
+                continue
+            if (flower := _seen(row)) is not None:
+                value = flower.bug_count if event is Event.INSPECTIONS else None
+            elif row.status != STATUS_OK and event is Event.FAILURES:
                 value = row.status
-            elif isinstance(row, ScanRow) and row.status == STATUS_OK and event is Event.SCANS:
+            elif isinstance(row, Scan) and row.status == STATUS_OK and event is Event.SCANS:
                 value = len(row.readings)
             if value is not None:
                 found.append((row.stamp_ns, number, float(value)))
@@ -174,17 +192,18 @@ class Life:
         had: dict[tuple[int, str], bool] = {}
         looks = [(row.stamp_ns, n, run, row) for n, (run, row) in enumerate(self.rows)]
         for stamp_ns, number, run, row in sorted(looks, key=lambda look: look[:2]):
-            if not isinstance(row, InspectionRow) or tag_id not in (EVERY_TAG, row.tag_id):
+            flower = _seen(row)
+            if flower is None or tag_id not in (EVERY_TAG, row.tag_id):
                 continue
-            has = row.flower.anomaly
+            has = flower.anomaly
             if has != had.get((run, row.tag_id), False) and has == is_seen and number in held:
-                found.append((stamp_ns, number, float(row.flower.bug_count)))
+                found.append((stamp_ns, number, float(flower.bug_count)))
             had[run, row.tag_id] = has
         return found
 
     def attempts(self, tag_id: str) -> list[int]:
         found = self._of(tag_id)
-        return sorted(row.stamp_ns for _, row in found if isinstance(row, ScanRow | InspectionRow))
+        return sorted(row.stamp_ns for _, row in found if not isinstance(row, Pin))
 
     def silences(
         self, tag_id: str, start_ns: int, end_ns: int, now_ns: int
@@ -204,14 +223,15 @@ class Life:
         # Each run carries what the one before it knew; it knows nothing of those behind it.
         places: dict[tuple[int, str], tuple[float, float]] = {}
         for since, row in self.rows:
-            if isinstance(row, PinRow):
+            if isinstance(row, Pin):
                 for run in range(since, self.run + 1):
                     places.setdefault((run, row.tag_id), (row.pose.x, row.pose.y))
         held = {number for number, _ in self._holds()}
         scans = sorted(
             (row.stamp_ns, number, run, row)
             for number, (run, row) in enumerate(self.rows)
-            if isinstance(row, ScanRow)
+            if not isinstance(row, Pin)
+            and _seen(row) is None
             and start_ns <= row.stamp_ns < end_ns
             and tag_id in (None, row.tag_id)
         )
@@ -221,7 +241,8 @@ class Life:
             if number in held:
                 found += [
                     PastRow(stamp_ns, row.tag_id, x, y, name, value, row.status, row.source)
-                    for name, value in [(r.name, r.value) for r in row.readings] or [("", math.nan)]
+                    for name, value in [(r.name, r.value) for r in getattr(row, "readings", ())]
+                    or [("", math.nan)]
                 ]
         return found
 
@@ -270,7 +291,7 @@ _values = st.one_of(
     st.floats(-1e6, 1e6), st.sampled_from([float("nan"), float("inf"), 21.5, 1e-7, 21.53])
 )
 _tags = st.sampled_from(TAGS)
-_rows: st.SearchStrategy[Row] = st.one_of(
+_rows: st.SearchStrategy[Write] = st.one_of(
     st.builds(
         lambda tag, at_ns, source, values: scan(tag, at_ns, source=source, **values),
         _tags,

@@ -11,9 +11,20 @@ from typing import TypeGuard
 
 from hypothesis import strategies as st
 
-from lupin_twin.core.state import Flower, Inspection, Pose, Reading, Scan, TagState, TwinStore
+from lupin_twin.core.history import kind_of
+from lupin_twin.core.state import (
+    Flower,
+    Inspection,
+    Pin,
+    Pose,
+    Reading,
+    Scan,
+    TagState,
+    TwinStore,
+    Write,
+)
 from lupin_twin.journal.file import JournalFile
-from lupin_twin.journal.rows import KIND_FLOWER, KIND_READING, InspectionRow, PinRow, Row, ScanRow
+from lupin_twin.journal.rows import KIND_FLOWER
 from lupin_twin.journal.runs import CORRECTION_NS, Carries, Clock, Run
 
 
@@ -21,7 +32,7 @@ from lupin_twin.journal.runs import CORRECTION_NS, Carries, Clock, Run
 class Hear:
     """A row, `late` ns old, after the clock has gone on; its stamp is filled in as it is heard."""
 
-    row: Row
+    row: Write
     advance: int
     late: int
 
@@ -60,22 +71,22 @@ _VALUES = st.sampled_from([0.1, 1.0, 2.5, float("nan")])
 
 
 @st.composite
-def _rows(draw: st.DrawFn) -> Row:
+def _rows(draw: st.DrawFn) -> Write:
     tag_id, source = draw(_TAGS), draw(st.sampled_from(["a", "b"]))
     match draw(st.sampled_from(["scan", "scan", "scan", "failed", "look", "blind", "pin"])):
         case "pin":
-            return PinRow(tag_id, 0, 0, Pose(float(draw(_SMALL)), 0.0, 0.0, 0.0, 0.0, 0.0, 1.0))
+            return Pin(tag_id, Pose(float(draw(_SMALL)), 0.0, 0.0, 0.0, 0.0, 0.0, 1.0))
         case "look":
             flower = Flower(flower_count=draw(_SMALL), anomaly=draw(st.booleans()))
-            return InspectionRow(tag_id, 0, 0, flower, source)
+            return Inspection(tag_id, 0, flower, source=source)
         case "blind":
-            return ScanRow(tag_id, 0, 0, (), KIND_FLOWER, draw(st.integers(1, 2)), "dark", source)
+            return Inspection(tag_id, 0, None, None, draw(st.integers(1, 2)), "dark", source)
         case kind:
             names = draw(st.sampled_from(_SETS))
             readings = tuple(Reading(name, draw(_VALUES)) for name in names)
             status = draw(st.integers(1, 2)) if kind == "failed" else 0
             detail = draw(st.sampled_from(["", "no"]))
-            return ScanRow(tag_id, 0, 0, readings, KIND_READING, status, detail, source)
+            return Scan(tag_id, 0, readings, None, status, detail, source)
 
 
 steps = st.lists(
@@ -98,7 +109,7 @@ class Stretch:
     """
 
     run: Run
-    rows: list[Row]
+    rows: list[Write]
 
 
 @dataclass
@@ -145,7 +156,7 @@ class Received:
             case Hear(row, advance, late):
                 self._pass(advance * UNIT)
                 now_ns = self._now.stamp_ns
-                stamp_ns = now_ns if isinstance(row, PinRow) else max(1, now_ns - late * UNIT)
+                stamp_ns = now_ns if isinstance(row, Pin) else max(1, now_ns - late * UNIT)
                 self._hear(replace(row, stamp_ns=stamp_ns, arrival_ns=self._now.arrival_ns))
             case Again(which):
                 rows = [row for row in self._stretch.rows if row.arrival_ns == HEARD_NS]
@@ -175,11 +186,11 @@ class Received:
         run = self._file.start(self._now, 1, is_believed=True).run
         if run.id not in known:
             last = max((s for life in before for s in life.stretches), key=_id, default=None)
-            rows: list[Row] = []
+            rows: list[Write] = []
             if last is not None and run.joins is not None:
                 rows = last.rows
             elif last is not None and not run.begun.is_simulated:
-                rows = [row for row in last.rows if isinstance(row, PinRow)]
+                rows = [row for row in last.rows if isinstance(row, Pin)]
             self._begin(run, rows, run.root if last is None else last.run.root)
         else:
             self._go_on_with(self.lives[run.root])
@@ -188,7 +199,7 @@ class Received:
     def _is_like(self, run: Run) -> bool:
         return run.begun.is_simulated == self._now.is_simulated
 
-    def _begin(self, run: Run, known: Sequence[Row], before: int) -> None:
+    def _begin(self, run: Run, known: Sequence[Write], before: int) -> None:
         begun_ns = run.begun.stamp_ns
         in_order = sorted(known, key=lambda row: row.stamp_ns)
         held = [
@@ -210,8 +221,8 @@ class Received:
         life.ended_ns = None
         self._life = life
 
-    def _hear(self, row: Row) -> None:
-        if isinstance(row, PinRow):
+    def _hear(self, row: Write) -> None:
+        if isinstance(row, Pin):
             first = next(
                 (pin for s in self._life.stretches for pin in s.rows if _is_pin(pin, row)), row
             )
@@ -219,18 +230,19 @@ class Received:
         self._file.append([(self._stretch.run, row)])
         if row.tag_id not in self.tag_ids[self._life.run.id]:
             self.tag_ids[self._life.run.id].append(row.tag_id)
-        key = (row.tag_id, _kind(row), getattr(row, "source", ""), row.stamp_ns)
-        if not isinstance(row, PinRow) and key in self._life.known_by:
+        kind = KIND_FLOWER if isinstance(row, Pin) else kind_of(row)
+        key = (row.tag_id, kind, getattr(row, "source", ""), row.stamp_ns)
+        if not isinstance(row, Pin) and key in self._life.known_by:
             known = self._life.known_by[key]
-            if not isinstance(row, ScanRow):
+            if not isinstance(row, Scan):
                 return
             row = replace(row, readings=tuple(r for r in row.readings if r.name not in known))
             if not row.readings:
                 return
-        names = {r.name for r in row.readings} if isinstance(row, ScanRow) else set()
+        names = {r.name for r in row.readings} if isinstance(row, Scan) else set()
         self._life.known_by.setdefault(key, set()).update(names)
         self._stretch.rows.append(replace(row, arrival_ns=HEARD_NS))
-        if not isinstance(row, PinRow):
+        if not isinstance(row, Pin):
             self._life.stamps.append(row.stamp_ns)
 
     # --- the plain replay ---------------------------------------------------------------------
@@ -284,25 +296,16 @@ def _id(stretch: Stretch) -> int:
     return stretch.run.id
 
 
-def _is_pin(row: Row, of: PinRow) -> TypeGuard[PinRow]:
-    return isinstance(row, PinRow) and row.tag_id == of.tag_id
+def _is_pin(row: Write, of: Pin) -> TypeGuard[Pin]:
+    return isinstance(row, Pin) and row.tag_id == of.tag_id
 
 
-def _kind(row: Row) -> int:
-    return row.kind if isinstance(row, ScanRow) else KIND_FLOWER
-
-
-def write(row: Row, store: TwinStore) -> None:
+def write(row: Write, store: TwinStore) -> None:
     """Give a store what a row was written for."""
     match row:
-        case PinRow():
+        case Pin():
             store.pin(row.tag_id, row.pose)
-        case InspectionRow():
-            store.record_inspection(Inspection(row.tag_id, row.stamp_ns, row.flower))
-        case ScanRow(kind=0):
-            readings = row.readings
-            store.record(Scan(row.tag_id, row.stamp_ns, readings, None, row.status, row.detail))
-        case ScanRow():
-            store.record_inspection(
-                Inspection(row.tag_id, row.stamp_ns, None, None, row.status, row.detail)
-            )
+        case Inspection():
+            store.record_inspection(row)
+        case Scan():
+            store.record(row)

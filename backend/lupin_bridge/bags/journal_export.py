@@ -38,16 +38,10 @@ from lupin_bridge.bags.recording import (
 )
 from lupin_bridge.feed.topics import Topic
 from lupin_bridge.message_schemas import ENCODING, schema_text
+from lupin_twin.core.history import kind_of
 from lupin_twin.core.parameters import TwinParameters
-from lupin_twin.core.state import Flower, Pose
-from lupin_twin.journal.rows import (
-    KIND_FLOWER,
-    InspectionRow,
-    PinRow,
-    Row,
-    ScanRow,
-    listed_rows,
-)
+from lupin_twin.core.state import Flower, Inspection, Pin, Pose, Scan, Write
+from lupin_twin.journal.rows import listed_rows
 from lupin_twin.journal.runs import Run, runs, spans_within
 from lupin_twin.journal.schema import LOCAL_SITE, SiteLog
 from lupin_twin.ros.convert import time_msg
@@ -111,7 +105,7 @@ class JournalRows:
         """Whether any of it goes by a clock that was simulated."""
         return any(run.begun.is_simulated for run in self.runs.values())
 
-    def __iter__(self) -> Iterator[tuple[Run, Row]]:
+    def __iter__(self) -> Iterator[tuple[Run, Write]]:
         """Each with the run of the clock that it belongs to."""
         after = 0
         while True:
@@ -122,15 +116,15 @@ class JournalRows:
                 return
             after = last
 
-    def _places_before(self, start_ns: int) -> list[PinRow]:
-        first: dict[str, PinRow] = {}
+    def _places_before(self, start_ns: int) -> list[Pin]:
+        first: dict[str, Pin] = {}
         for run in self.runs.values():
             for _, pin, is_copy in self._pins(run):
                 if is_copy or pin.stamp_ns < start_ns:
                     first.setdefault(pin.tag_id, pin)
         return list(first.values())
 
-    def _lot(self, after: int) -> tuple[list[tuple[Run, Row]], int | None]:
+    def _lot(self, after: int) -> tuple[list[tuple[Run, Write]], int | None]:
         """The next rows by their numbers, and the number of the last; None: that is all."""
         values: dict[str, Any] = self._period | {"after": after}
         numbers = [
@@ -149,21 +143,23 @@ class JournalRows:
         scans, looks, places = (
             [seq for seq in found if last is None or seq <= last] for found in numbers
         )
-        within: list[tuple[int, Run, Row]] = []
+        within: list[tuple[int, Run, Write]] = []
         for run in self.runs.values():
-            rows: list[tuple[int, Row]] = list(listed_rows(self._connection, run.id, scans, looks))
+            rows: list[tuple[int, Write]] = list(
+                listed_rows(self._connection, run.id, scans, looks)
+            )
             rows += [(seq, pin) for seq, pin, _ in self._pins(run) if seq in places]
             within += [(seq, run, row) for seq, row in rows if self._holds(run, row.stamp_ns)]
         within.sort(key=lambda entry: entry[0])
         return [(run, row) for _, run, row in within], last
 
-    def _pins(self, run: Run) -> Iterator[tuple[int, PinRow, bool]]:
+    def _pins(self, run: Run) -> Iterator[tuple[int, Pin, bool]]:
         for seq, tag, stamp_ns, arrival_ns, is_copy, *pose in self._connection.execute(
             "SELECT seq, tag, stamp_ns, arrival_ns, is_copy, x, y, z, qx, qy, qz, qw FROM place"
             " WHERE site = :site AND run = :run ORDER BY seq",
             self._period | {"run": run.id},
         ):
-            yield seq, PinRow(tag, stamp_ns, arrival_ns, Pose(*pose)), bool(is_copy)
+            yield seq, Pin(tag, Pose(*pose), stamp_ns, arrival_ns), bool(is_copy)
 
     def _holds(self, run: Run, stamp_ns: int) -> bool:
         return any(
@@ -175,32 +171,28 @@ class JournalRows:
 # --- their messages, serialised -------------------------------------------------------------------
 
 
-def observation(row: ScanRow | InspectionRow) -> bytes:
+def observation(row: Scan | Inspection) -> bytes:
     """lupin_msgs/Observation."""
     stamp = time_msg(row.stamp_ns)
     msg = Observation(mission_id=row.mission, source=row.source)
     msg.header.stamp = stamp
     msg.tag_pose_in_map.orientation.w = 0.0
     msg.flower.pose.pose.orientation.w = 0.0
-    if isinstance(row, ScanRow):
-        msg.kind, msg.status, msg.status_detail = row.kind, row.status, row.detail
-        if row.kind == KIND_FLOWER:
-            msg.flower.tag_id = row.tag_id
-        else:
-            msg.tag_reading.tag_id = row.tag_id
-            msg.tag_reading.stamp = stamp
-            msg.tag_reading.readings = [
-                SensorReading(name=reading.name, value=float(reading.value))
-                for reading in row.readings
-            ]
+    msg.kind, msg.status, msg.status_detail = kind_of(row), row.status, row.status_detail
+    if isinstance(row, Scan):
+        msg.tag_reading.tag_id = row.tag_id
+        msg.tag_reading.stamp = stamp
+        msg.tag_reading.readings = [
+            SensorReading(name=reading.name, value=float(reading.value)) for reading in row.readings
+        ]
     else:
-        msg.kind = KIND_FLOWER
         msg.flower.tag_id = row.tag_id
-        _fill(msg.flower, row.flower)
+        if row.flower is not None:
+            _fill(msg.flower, row.flower)
     return bytes(serialize_message(msg))
 
 
-def discovered(pins: Iterable[PinRow]) -> bytes:
+def discovered(pins: Iterable[Pin]) -> bytes:
     """lupin_msgs/DiscoveredTags."""
     pins = list(pins)
     tags = [DiscoveredTag(tag_id=pin.tag_id, pose_in_map=_pose(pin.pose)) for pin in pins]
@@ -325,7 +317,7 @@ def _write(writer: Writer, channels: Sequence[int], rows: JournalRows) -> Export
         if rows.places and not sum(counts):
             write(_TAGS, at_ns, discovered(rows.places))
             counts[_TAGS] += 1
-        if isinstance(row, PinRow):
+        if isinstance(row, Pin):
             topic, data = _TAGS, discovered([row])
         else:
             topic, data = _OBSERVATIONS, observation(row)

@@ -16,10 +16,19 @@ from typing import Any, Final
 
 from lupin_bridge.bags.recording import INPUTS, Recording
 from lupin_twin.core.parameters import World
-from lupin_twin.core.state import Bloom, Flower, Pose, Reading
+from lupin_twin.core.state import (
+    STATUS_OK,
+    Bloom,
+    Flower,
+    Inspection,
+    Pin,
+    Pose,
+    Reading,
+    Scan,
+    Write,
+)
 from lupin_twin.journal.appending import is_empty, prefill, simulated
 from lupin_twin.journal.beside import InUse, demo_journal_path
-from lupin_twin.journal.rows import InspectionRow, PinRow, Row, ScanRow
 from lupin_twin.journal.schema import FILE_ERRORS, Foreign, open_reader
 
 log = logging.getLogger(__name__)
@@ -175,7 +184,7 @@ def fill_past(path: Path, patrol_args: Sequence[str]) -> bool:
     return False
 
 
-def rows(lines: Iterable[str], now_ns: int) -> Iterator[Row]:
+def rows(lines: Iterable[str], now_ns: int) -> Iterator[Write]:
     """What a twin would have written of the patrol's past, a line an event, that ends `now_ns`."""
     pinned: set[str] = set()
     for line in lines:
@@ -184,21 +193,13 @@ def rows(lines: Iterable[str], now_ns: int) -> Iterator[Row]:
         stamp_ns = now_ns + round(event["at_s"] * 1e9)
         if event["pose"] and tag_id not in pinned:
             pinned.add(tag_id)
-            yield PinRow(tag_id, stamp_ns, stamp_ns, Pose(*event["pose"]))
-        mission = f"past-{event['pass']:04d}"
+            yield Pin(tag_id, Pose(*event["pose"]), stamp_ns, stamp_ns)
+        sent = (SOURCE, stamp_ns, f"past-{event['pass']:04d}", stamp_ns)
         if "species" in event:
-            yield InspectionRow(tag_id, stamp_ns, stamp_ns, _flower(event), SOURCE, mission)
+            yield Inspection(tag_id, stamp_ns, _flower(event), None, STATUS_OK, "", *sent)
             continue
-        yield ScanRow(
-            tag_id,
-            stamp_ns,
-            stamp_ns,
-            tuple(Reading(name, value) for name, value in event["readings"]),
-            status=event["status"],
-            detail=event["detail"],
-            source=SOURCE,
-            mission=mission,
-        )
+        readings = tuple(Reading(name, value) for name, value in event["readings"])
+        yield Scan(tag_id, stamp_ns, readings, None, event["status"], event["detail"], *sent)
 
 
 def _flower(event: Mapping[str, Any]) -> Flower:

@@ -21,11 +21,10 @@ from lupin_bridge.cli.output import FAILED, Roles
 from lupin_bridge.console import Progress, say, tell
 from lupin_twin.adapt.config import read_yaml
 from lupin_twin.adapt.table import ConfigError
-from lupin_twin.core.state import NANOSECONDS_PER_SECOND, Reading
+from lupin_twin.core.state import NANOSECONDS_PER_SECOND, STATUS_OK, Pin, Reading, Scan, Write
 from lupin_twin.journal.beside import Lock
 from lupin_twin.journal.file import JournalFile
 from lupin_twin.journal.retention import Limits
-from lupin_twin.journal.rows import PinRow, Row, ScanRow
 from lupin_twin.journal.runs import Clock, Run, runs, span_at
 from lupin_twin.journal.schema import FILE_ERRORS, open_named
 from lupin_twin.runtime.process import INTERRUPTED
@@ -153,11 +152,12 @@ def _write(
                 first_ns = batch[0][0]
                 begin = Clock(first_ns, first_ns, is_simulated=False)
                 known = [file.start(begin, 1, is_believed=True).run]
-            rows: list[tuple[Run, Row]] = []
+            rows: list[tuple[Run, Write]] = []
             for stamp_ns, tag_id, values in batch:
                 span = span_at(known, stamp_ns) if len(known) > 1 else None
                 readings = tuple(map(Reading, values, values.values()))
-                scan = ScanRow(tag_id, stamp_ns, stamp_ns, readings, source=SOURCE)
+                sent = (SOURCE, stamp_ns, "", stamp_ns)
+                scan = Scan(tag_id, stamp_ns, readings, None, STATUS_OK, "", *sent)
                 rows.append((known[0] if span is None else span.run, scan))
             written, refused = file.append(rows)
             new += written
@@ -167,7 +167,7 @@ def _write(
             # A tag's place holds from before its first reading on, and the first one stays.
             file.append(
                 [
-                    (run, PinRow(tag_id, 1, run.begun.arrival_ns, pose))
+                    (run, Pin(tag_id, pose, 1, run.begun.arrival_ns))
                     for tag_id, pose in columns.places.items()
                     if tag_id not in placed
                 ]

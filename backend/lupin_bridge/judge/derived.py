@@ -94,7 +94,7 @@ DERIVED: Final[Mapping[str, Derived]] = {
 
 DAY_NS: Final = 86_400 * 1_000_000_000
 MAX_GAP_NS: Final = 3 * 3600 * 1_000_000_000
-LEAST_COVERED: Final = 0.8
+LEAST_COVERED: Final = 0.9
 LX_PER_UMOL: Final = 54.0
 BASE_C: Final = 10.0
 

@@ -246,6 +246,20 @@ def with_derived(tags: Sequence[TagState], sensor_type: str) -> Sequence[TagStat
     return [replace(tag, readings=(*tag.readings, *derive(tag.readings))) for tag in tags]
 
 
+def plausible(tags: Sequence[TagState], sensor: Sensor) -> list[TagState]:
+    """The tags without what no sensor reads that works: that is no climate."""
+
+    def is_wrong(reading: Reading) -> bool:
+        return reading.name == sensor.name and not sensor.is_plausible(reading.value)
+
+    return [
+        replace(tag, readings=tuple(one for one in tag.readings if not is_wrong(one)))
+        if any(map(is_wrong, tag.readings))
+        else tag
+        for tag in tags
+    ]
+
+
 def judge_site(
     tags: Mapping[Verdict, int], *, is_silent: bool, stopped: Reason | None = None
 ) -> Health:

@@ -12,6 +12,7 @@ from functools import partial
 from statistics import fmean
 
 from lupin_bridge.judge.derived import DAILY, DAY_NS, DERIVED, Daily, Derived, IsDay
+from lupin_bridge.judge.ranges import Sensors
 from lupin_twin.core.past import (
     HOUR_NS,
     MAX_POINTS,
@@ -29,7 +30,7 @@ Readings = list[tuple[int, float]]
 Find = Callable[[SeriesRequest], SeriesPast]
 
 
-def series(request: SeriesRequest, is_day: IsDay, find: Find) -> SeriesPast:
+def series(request: SeriesRequest, sensors: Sensors, is_day: IsDay, find: Find) -> SeriesPast:
     """The series of a request; a derived one, unless a sensor has its name, of its parts.
 
     Raises:
@@ -43,7 +44,7 @@ def series(request: SeriesRequest, is_day: IsDay, find: Find) -> SeriesPast:
     if derived is not None:
         read = partial(_readings, derived, find)
     elif daily is not None:
-        read = partial(_of_days, daily, is_day, find)
+        read = partial(_of_days, daily, sensors, is_day, find)
     else:
         return measured
     period, readings = read(request)
@@ -73,7 +74,13 @@ def series(request: SeriesRequest, is_day: IsDay, find: Find) -> SeriesPast:
 
 
 def with_daily(
-    tags: Sequence[TagState], daily: Daily, at_ns: int, is_day: IsDay, find: Find
+    tags: Sequence[TagState],
+    daily: Daily,
+    at_ns: int,
+    *,
+    sensors: Sensors,
+    is_day: IsDay,
+    find: Find,
 ) -> list[TagState]:
     """The tags as of a moment, those of which it is known with a reading of the quantity too.
 
@@ -90,7 +97,7 @@ def with_daily(
         start_ns = max(1, at_ns - DAY_NS)
         part_request = SeriesRequest(tag.tag_id, daily.sensor, start_ns, at_ns + 1, MAX_POINTS)
         part = find(part_request)
-        value = daily.at(at_ns, _finite(daily.name, daily.sensor, part), is_day)
+        value = daily.at(at_ns, _readings_of(daily, sensors, part), is_day)
         if math.isfinite(value):
             readings = (*tag.readings, Reading(daily.name, value, at_ns))
             tag = replace(tag, readings=readings)  # noqa: PLW2901
@@ -99,7 +106,7 @@ def with_daily(
 
 
 def _of_days(
-    daily: Daily, is_day: IsDay, find: Find, request: SeriesRequest
+    daily: Daily, sensors: Sensors, is_day: IsDay, find: Find, request: SeriesRequest
 ) -> tuple[SeriesPast, Readings]:
     """The period, empty, and a value at the last reading of each hour in it."""
     first_ns = max(1, request.start_ns - DAY_NS) if request.start_ns else 0
@@ -108,7 +115,7 @@ def _of_days(
     )
     part = find(part_request)
     start_ns = request.start_ns or part.start_ns
-    every = _finite(daily.name, daily.sensor, part)
+    every = _readings_of(daily, sensors, part)
     last = {at_ns // HOUR_NS: at_ns for at_ns, _ in every if at_ns >= start_ns}
     readings = []
     for at_ns in last.values():
@@ -118,16 +125,17 @@ def _of_days(
     return SeriesPast(start_ns, part.end_ns), readings
 
 
-def _finite(name: str, sensor: str, part: SeriesPast) -> Readings:
-    """The readings of a series that came as they are."""
+def _readings_of(daily: Daily, sensors: Sensors, part: SeriesPast) -> Readings:
+    """The readings of a series that came as they are: those that count, of one stamp the last."""
     if part.is_bucketed:
         raise PastRefused(
-            f"{name} is made of {sensor}, reading by reading, and from {seconds(part.start_ns)} s"
-            f" to {seconds(part.end_ns)} s there are more than {MAX_POINTS} of them, the limit, or"
-            " hours alone: ask for a shorter period"
+            f"{daily.name} is made of {daily.sensor}, reading by reading, and from"
+            f" {seconds(part.start_ns)} s to {seconds(part.end_ns)} s there are more than"
+            f" {MAX_POINTS} of them, the limit, or hours alone: ask for a shorter period"
         )
-    pairs = zip(part.stamps_ns, part.means, strict=True)
-    return [(at_ns, value) for at_ns, value in pairs if math.isfinite(value)]
+    is_plausible = sensors.named(daily.sensor).is_plausible
+    latest = dict(zip(part.stamps_ns, part.means, strict=True))
+    return [(at_ns, value) for at_ns, value in latest.items() if is_plausible(value)]
 
 
 def _readings(derived: Derived, find: Find, request: SeriesRequest) -> tuple[SeriesPast, Readings]:
@@ -145,10 +153,12 @@ def _readings(derived: Derived, find: Find, request: SeriesRequest) -> tuple[Ser
         parts.append(part)
         part_request = replace(part_request, end_ns=part.end_ns)  # now is the same for both
     first, second = parts
+    # Of equal stamps, what was received last.
+    ones = dict(zip(first.stamps_ns, first.means, strict=True))
     others = dict(zip(second.stamps_ns, second.means, strict=True))
     readings = [
         (stamp_ns, value)
-        for stamp_ns, one in zip(first.stamps_ns, first.means, strict=True)
+        for stamp_ns, one in ones.items()
         if stamp_ns in others and math.isfinite(value := derived.formula(one, others[stamp_ns]))
     ]
     return SeriesPast(min(first.start_ns, second.start_ns), first.end_ns), readings

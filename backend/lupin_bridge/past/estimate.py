@@ -11,6 +11,7 @@ from lupin_bridge.field import formats
 from lupin_bridge.field import query as field_query
 from lupin_bridge.field.formats import JSON
 from lupin_bridge.field.query import EstimateQuery
+from lupin_bridge.judge.ranges import Sensor
 from lupin_bridge.past.plans import Field, Plan, etag_of
 from lupin_bridge.serving.admission import REVALIDATE, Answer
 from lupin_twin.core.state import NANOSECONDS_PER_SECOND, Snapshot
@@ -75,7 +76,9 @@ class Estimated(Field):
         pasts: list[TagPast] = find(ReadingsAt(box.sensor_type, at_ns, reach_s))
         if self.at_ns is None:
             at_ns = moment_of(pasts, at_ns, self.day_length_s)
-        pasts = _since(pasts, at_ns - int(self.day_length_s * NANOSECONDS_PER_SECOND))
+        sensor = self.criteria.sensors.named(box.sensor_type)
+        since_ns = at_ns - int(self.day_length_s * NANOSECONDS_PER_SECOND)
+        pasts = _that_count(pasts, since_ns, sensor)
         request, far_off = EstimateRequest(box, at_ns), far_off_tags(snapshot.tags)
         query, sensors = self.query, self.criteria.sensors
         field_format = self.field_format or JSON
@@ -86,7 +89,6 @@ class Estimated(Field):
 
         def write(should_stop: ShouldStop) -> Answer:
             made = estimate_at(request, pasts, self.day_length_s, should_stop)
-            sensor = sensors.named(box.sensor_type)
             estimate = formats.within_ideal(made, sensor)
             metadata = {
                 **formats.estimate_metadata(estimate, sensor),
@@ -107,9 +109,11 @@ class Estimated(Field):
         return Plan(etag, self.write_s(len(snapshot.tags)), write)
 
 
-def _since(pasts: Sequence[TagPast], since_ns: int) -> list[TagPast]:
-    recent = (
-        replace(past, readings=tuple(one for one in past.readings if one[0] >= since_ns))
-        for past in pasts
-    )
-    return [past for past in recent if past.readings]
+def _that_count(pasts: Sequence[TagPast], since_ns: int, sensor: Sensor) -> list[TagPast]:
+    """Without what is older, and what no sensor reads that works."""
+
+    def counts(reading: tuple[int, float]) -> bool:
+        return reading[0] >= since_ns and sensor.is_plausible(reading[1])
+
+    those = (replace(past, readings=tuple(filter(counts, past.readings))) for past in pasts)
+    return [past for past in those if past.readings]

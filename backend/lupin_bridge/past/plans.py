@@ -26,7 +26,7 @@ from lupin_bridge.judge.days import SINCE_NS, days_of
 from lupin_bridge.judge.derived import DAILY, DERIVED
 from lupin_bridge.judge.judging import judge_once
 from lupin_bridge.judge.options import Criteria
-from lupin_bridge.judge.verdict import with_derived
+from lupin_bridge.judge.verdict import plausible, with_derived
 from lupin_bridge.past import bodies, derived
 from lupin_bridge.past.query import PeriodQuery
 from lupin_bridge.serving.admission import REVALIDATE, Answer, json_answer
@@ -273,7 +273,10 @@ class Field(StateQuery):
         snapshot: Snapshot = find(at_ns)
         daily = DAILY.get(self.query.sensor_type)
         if daily is not None:
-            tags = derived.with_daily(snapshot.tags, daily, at_ns, self.criteria.is_day, find)
+            by = self.criteria
+            tags = derived.with_daily(
+                snapshot.tags, daily, at_ns, sensors=by.sensors, is_day=by.is_day, find=find
+            )
             snapshot = replace(snapshot, tags=tuple(tags))
         return self.plan(snapshot)
 
@@ -286,7 +289,7 @@ class Field(StateQuery):
         """
         request = self.request(snapshot)
         sensor, sensors = self.criteria.sensors.named(request.sensor_type), self.criteria.sensors
-        tags = with_derived(snapshot.tags, request.sensor_type)
+        tags = plausible(with_derived(snapshot.tags, request.sensor_type), sensor)
         samples = samples_of(tags, request.sensor_type)
         far_off = far_off_tags(snapshot.tags)
         cost = cost_s(request, len(samples), self.rules)
@@ -358,8 +361,8 @@ class History:
 
     def look(self, find: Find) -> Plan:
         """See `Query`."""
-        past = derived.series(self.request, self.criteria.is_day, find)
         sensors = self.criteria.sensors
+        past = derived.series(self.request, sensors, self.criteria.is_day, find)
         return of_content(
             bodies.history_body(self.request, past, self.now_ns, sensors, self.journal)
         )

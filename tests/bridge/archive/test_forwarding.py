@@ -15,12 +15,12 @@ import pytest
 from lupin_bridge.fleet.site_log import SiteConnection
 from lupin_twin.core.notes import NotesRequest
 from lupin_twin.core.past import SeriesRequest
+from lupin_twin.core.state import Write
 from lupin_twin.journal.beside import mark_of
 from lupin_twin.journal.notes import notes
 from lupin_twin.journal.queries import series
 from lupin_twin.journal.rebuild import vacuum
 from lupin_twin.journal.retention import Limits, forget
-from lupin_twin.journal.rows import Row
 from lupin_twin.journal.runs import Clock
 from lupin_twin.journal.schema import open_reader
 from tests.support.archive import (
@@ -45,7 +45,7 @@ def journal(tmp_path: Path) -> Path:
     return tmp_path / "journal.sqlite"
 
 
-def scans(start: int, count: int) -> list[Row]:
+def scans(start: int, count: int) -> list[Write]:
     """A scan a minute, round five tags."""
     return [
         scan(str(n % 5), NOW + n * 60 * SECOND, a=n / 7, b=-n / 3)

@@ -15,9 +15,8 @@ from lupin_bridge.feed.topics import Topic
 from lupin_twin.core import ingest
 from lupin_twin.core.drops import Drop
 from lupin_twin.core.history import History
-from lupin_twin.core.state import TagState, TwinStore
+from lupin_twin.core.state import TagState, TwinStore, Write
 from lupin_twin.journal.fold import state_at
-from lupin_twin.journal.rows import Row
 from lupin_twin.journal.runs import Clock
 from lupin_twin.journal.schema import open_reader
 from lupin_twin.ros import convert
@@ -26,7 +25,7 @@ from tests.bridge.cli.test_journal import Said
 from tests.support.bags import is_open, no_file_above, read
 from tests.support.journal import NOW, SECOND, kept, look, pin, scan
 
-ROWS: list[Row] = [
+ROWS: list[Write] = [
     pin("7"),
     scan("7", temperature=20.0, humidity=60.0),
     pin("8", NOW + SECOND, x=8.5),

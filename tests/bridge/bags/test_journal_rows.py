@@ -8,12 +8,12 @@ import pytest
 
 from lupin_bridge.bags import journal_export
 from lupin_bridge.bags.journal_export import JournalRows
-from lupin_twin.journal.rows import PinRow, Row
+from lupin_twin.core.state import Pin, Write
 from lupin_twin.journal.runs import Carries, Clock
 from lupin_twin.journal.schema import open_reader
 from tests.support.journal import NOW, SECOND, kept, look, opened, pin, scan
 
-ROWS: list[Row] = [
+ROWS: list[Write] = [
     pin("7"),
     scan("7", NOW),
     pin("8", NOW + SECOND, x=8.5),
@@ -26,7 +26,7 @@ ROWS: list[Row] = [
 ]
 
 
-def held(path: Path, start_ns: int = 0, end_ns: int = 2**62) -> tuple[list[Row], list[PinRow]]:
+def held(path: Path, start_ns: int = 0, end_ns: int = 2**62) -> tuple[list[Write], list[Pin]]:
     """The rows of a period, and the places before it."""
     with closing(open_reader(path)) as connection:
         rows = JournalRows(connection, start_ns, end_ns)

@@ -24,8 +24,7 @@ from lupin_bridge.cli.demo import (
 from lupin_patrol.cli import parse as patrol_options
 from lupin_patrol.plants import SECONDS_PER_DAY
 from lupin_twin.core.parameters import World
-from lupin_twin.core.state import Bloom, Pose, Reading
-from lupin_twin.journal.rows import InspectionRow, PinRow, ScanRow
+from lupin_twin.core.state import Bloom, Inspection, Pin, Pose, Reading, Scan
 from tests.support.journal import CLOCK, NOW, SECOND, is_whole, kept, scan, select
 
 ENV = {"XDG_STATE_HOME": "/state"}
@@ -141,14 +140,15 @@ def test_events_become_the_rows_that_a_twin_would_have_written() -> None:
     }
     made = list(rows([json.dumps(event) for event in (ok, look, failed)], NOW))
     at_ns = NOW - 2 * SECOND
-    assert made[0] == PinRow("7", at_ns, at_ns, Pose(*pose))
-    assert made[1] == ScanRow(
-        "7", at_ns, at_ns, (Reading("a", 1.5),), source=SOURCE, mission="past-0012"
+    assert made[0] == Pin("7", Pose(*pose), at_ns, at_ns)
+    assert made[1] == Scan(
+        "7", at_ns, (Reading("a", 1.5),), None, 0, "", SOURCE, at_ns, "past-0012", at_ns
     )
     seen = made[2]
-    assert isinstance(seen, InspectionRow)
+    assert isinstance(seen, Inspection)
+    assert seen.flower is not None
     assert (seen.stamp_ns, seen.flower.bug_count) == (NOW - 1_500_000_000, 3)
     assert seen.flower.blooms == (Bloom(1.0, 2.0, 0.5, 0.2, "lupin", 0.9, anomaly=True),)
     last = made[3]
-    assert isinstance(last, ScanRow)
-    assert (last.status, last.detail, last.readings) == (2, "no", ())
+    assert isinstance(last, Scan)
+    assert (last.status, last.status_detail, last.readings) == (2, "no", ())

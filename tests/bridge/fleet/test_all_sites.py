@@ -11,7 +11,7 @@ import pytest
 
 from lupin_bridge.fleet.overview import MAX_LISTED
 from lupin_bridge.fleet.watcher import MAX_ALARMS
-from lupin_twin.journal.rows import Row
+from lupin_twin.core.state import Write
 from tests.support.archive import Archive, forward_once
 from tests.support.fleet import Page, fleet, scans_lately, wall, write
 from tests.support.journal import SECOND, scan
@@ -20,7 +20,7 @@ from tests.support.waiting import wait_for
 HOUR_S = 3600
 
 
-def forward(archive: Archive, folder: Path, sites: Mapping[str, Iterable[Row]]) -> None:
+def forward(archive: Archive, folder: Path, sites: Mapping[str, Iterable[Write]]) -> None:
     """Each from a journal of its own."""
     for site, rows in sites.items():
         journal = folder / f"{site}.sqlite"
@@ -148,7 +148,7 @@ def test_what_people_said_of_an_alarm_is_beside_it(archive: Archive, tmp_path: P
 # --- comparing ------------------------------------------------------------------------------------
 
 
-def hours_ago(hours: int, temperature: float, tags: int = 2) -> list[Row]:
+def hours_ago(hours: int, temperature: float, tags: int = 2) -> list[Write]:
     """A scan of each tag in the middle of an hour, so many hours before this one."""
     middle_s = (int(time.time()) // HOUR_S - hours) * HOUR_S + HOUR_S // 2
     return [
@@ -157,7 +157,7 @@ def hours_ago(hours: int, temperature: float, tags: int = 2) -> list[Row]:
     ]
 
 
-def day(temperature: float) -> list[Row]:
+def day(temperature: float) -> list[Write]:
     return [row for hours in (3, 2, 1) for row in hours_ago(hours, temperature)]
 
 

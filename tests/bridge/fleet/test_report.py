@@ -12,7 +12,7 @@ from lupin_bridge.judge.daylight import ClockDay
 from lupin_bridge.judge.options import Criteria, own_sensors
 from lupin_bridge.past.report import Report
 from lupin_twin.core.journal_condition import Condition, JournalState
-from lupin_twin.journal.rows import Row, ScanRow
+from lupin_twin.core.state import Scan, Write
 from lupin_twin.journal.schema import open_reader
 from tests.support.archive import Archive, forward_once
 from tests.support.fleet import Page, fleet, write
@@ -25,9 +25,9 @@ HOUR_S = 3600
 CLOCK_OF_TESTS = dtime(0)
 
 
-def rows_of(begun_s: int) -> list[Row]:
+def rows_of(begun_s: int) -> list[Write]:
     """Three hours of two tags: one too warm, with a failed attempt, a silence and a pest."""
-    found: list[Row] = []
+    found: list[Write] = []
     for minute in range(0, 180, 5):
         at_ns = (begun_s + 60 * minute) * SECOND
         if not 60 <= minute < 110:
@@ -36,7 +36,7 @@ def rows_of(begun_s: int) -> list[Row]:
             found.append(scan("b", at_ns + SECOND, temperature=21.0))
     found.append(look("b", (begun_s + 300) * SECOND, anomaly=True))
     failed = (begun_s + 400) * SECOND
-    found.append(ScanRow("b", failed, failed + 1000, (), 0, 2, "no", source="robot"))
+    found.append(Scan("b", failed, (), None, 2, "no", "robot", arrival_ns=failed + 1000))
     return sorted(found, key=lambda row: row.stamp_ns)
 
 

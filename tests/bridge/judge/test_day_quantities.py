@@ -52,12 +52,20 @@ def test_a_dose_of_co2_is_of_the_hours_of_day() -> None:
 
 @pytest.mark.parametrize("name", DAILY)
 def test_of_too_little_of_a_day_there_is_no_value(name: str) -> None:
-    assert math.isfinite(value(name, lambda _: 20.0, hours=19.5))
-    assert math.isnan(value(name, lambda _: 20.0, hours=19.0))
+    assert math.isfinite(value(name, lambda _: 20.0, hours=22.0))
+    assert math.isnan(value(name, lambda _: 20.0, hours=21.0))
     # Between readings that are too far apart nothing is known.
     far = 2.0 * MAX_GAP_NS / HOUR
     assert math.isnan(value(name, lambda _: 20.0, step=far))
     assert math.isnan(DAILY[name].at(AT, [], is_day))
+
+
+def test_of_a_day_whose_noon_is_missing_there_is_no_value() -> None:
+    """Its light would be a half of what it was."""
+    noon = range(11, 15)
+    readings = [(AT + (h - 24) * HOUR, 20_000.0) for h in range(25) if h not in noon]
+    for daily in DAILY.values():
+        assert math.isnan(daily.at(AT, readings, is_day))
 
 
 def test_what_was_read_before_that_day_or_after_counts_for_nothing() -> None:

@@ -13,15 +13,17 @@ import numpy as np
 import pytest
 
 from lupin_bridge.field.formats import FORMATS, JSON, PNG, FieldFormat
-from lupin_bridge.field.query import FieldQuery
+from lupin_bridge.field.query import EstimateQuery, FieldQuery
 from lupin_bridge.judge.daylight import ClockDay
 from lupin_bridge.judge.derived import vapour_pressure_deficit_kpa
 from lupin_bridge.judge.options import Criteria, own_sensors
+from lupin_bridge.past.estimate import Estimated
 from lupin_bridge.past.plans import Field, Health, NoSuchTag, OneTag, Plan, WholeState
 from lupin_bridge.query_string import read
 from lupin_bridge.stream import schema
 from lupin_twin.core.state import Pose, Reading, Snapshot, TagState
 from lupin_twin.core.writes import PastWrite, RecentRequest
+from lupin_twin.estimate.engine import TagPast
 from lupin_twin.field.engine import FieldRefused, FieldRules
 from lupin_twin.field.explored import OccupancyMap
 from lupin_twin.runtime.workers import SMALL_S
@@ -93,6 +95,28 @@ def test_a_field_is_that_of_the_tags_of_then_over_the_box_of_then() -> None:
     found = body(field_of(SITE, asked()))
     schema.FieldQuality.model_validate(found)
     assert (found["sample_count"], found["rmse"]) == (2, 100.0)
+
+
+def test_a_broken_sensor_is_no_part_of_a_field() -> None:
+    broken = replace(SITE, tags=(*SITE.tags, tag("c", 0.5, -1.0)))
+    assert (
+        body(field_of(broken, asked(), JSON))["values"]
+        == (body(field_of(SITE, asked(), JSON))["values"])
+    )
+    assert body(field_of(broken, asked())) == body(field_of(SITE, asked()))
+
+
+def test_a_broken_sensor_is_no_part_of_an_estimate() -> None:
+    query = read(EstimateQuery, [("sensor_type", "co2")], FieldRefused)
+    estimated = Estimated(5 * NS, query, JSON, RULES, None, CRITERIA, 86_400.0)
+
+    def made_of(*readings: tuple[int, float]) -> str:
+        past = TagPast("a", 0.0, 0.0, readings)
+        return estimated.look(lambda need: SITE if need == 5 * NS else [past]).etag
+
+    good = (NS, 400.0), (2 * NS, 410.0)
+    assert made_of(*good, (3 * NS, -1.0)) == made_of(*good)
+    assert made_of(*good, (3 * NS, 0.0)) != made_of(*good)
 
 
 def test_what_is_derived_is_made_of_the_readings_of_one_scan() -> None:

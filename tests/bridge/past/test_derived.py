@@ -9,6 +9,7 @@ import pytest
 
 from lupin_bridge.judge.derived import DAILY, DAY_NS
 from lupin_bridge.judge.derived import vapour_pressure_deficit_kpa as vpd
+from lupin_bridge.judge.options import own_sensors
 from lupin_bridge.past import derived
 from lupin_twin.core.past import MAX_POINTS, PastRefused, SeriesPast, SeriesRequest
 from lupin_twin.core.state import Reading, TagState
@@ -44,7 +45,7 @@ def answer(request: SeriesRequest, known: Known) -> tuple[SeriesPast, list[Serie
         ones = (1,) * len(of)
         return SeriesPast(start_ns, end_ns, None, tuple(of), ones, values, values, values)
 
-    return derived.series(request, is_day, find), asked
+    return derived.series(request, own_sensors(), is_day, find), asked
 
 
 def test_only_what_was_read_in_one_scan_and_can_be_is_paired() -> None:
@@ -115,7 +116,7 @@ def test_a_quantity_of_a_day_has_a_value_an_hour_of_the_day_up_to_then() -> None
 def test_of_the_first_hours_and_of_too_much_there_is_no_quantity_of_a_day() -> None:
     request = SeriesRequest("a", "daily_light_integral", 0, 0, 500)
     past, _ = answer(replace(request, end_ns=80 * HOUR_NS), COURSE)
-    assert past.stamps_ns[0] / HOUR_NS == 20.5
+    assert past.stamps_ns[0] / HOUR_NS == 22.5
     many: Known = {"light": {n * S: 1.0 for n in range(1, MAX_POINTS + 2)}}
     with pytest.raises(PastRefused, match="daily_light_integral is made of light, reading by"):
         answer(replace(request, end_ns=10_000 * S), many)
@@ -136,10 +137,33 @@ def test_tags_as_of_a_moment_get_the_quantity_of_the_day_up_to_then() -> None:
         return SeriesPast(need.start_ns, need.end_ns, None, stamps, ones, values, values, values)
 
     daily = DAILY["daily_light_integral"]
-    found = derived.with_daily((lit, other, own), daily, at_ns, is_day, find)
+    found = derived.with_daily(
+        (lit, other, own), daily, at_ns, sensors=own_sensors(), is_day=is_day, find=find
+    )
     [need] = needs
     assert (need.tag_id, need.sensor_type, need.start_ns) == ("a", "light", 36 * HOUR_NS)
     assert found[1:] == [other, own]
     reading = found[0].readings[-1]
     expected = DAILY["daily_light_integral"].at(at_ns, points, is_day)
     assert reading == Reading("daily_light_integral", expected, at_ns)
+
+
+def test_a_broken_sensor_is_no_part_of_a_day_and_of_one_moment_the_last_reading_counts() -> None:
+    good = [(n * HOUR_NS, 20.0) for n in range(1, 26)]
+    # A DS18B20 that has lost its supply reads -127; and one moment was received twice.
+    bad = [(12 * HOUR_NS + 1, -127.0), (13 * HOUR_NS, 5.0)]
+    every = sorted((*good, *bad), key=lambda each: each[0])
+    every.remove((13 * HOUR_NS, 5.0))
+    every.insert(every.index((13 * HOUR_NS, 20.0)), (13 * HOUR_NS, 5.0))
+
+    def find(need: SeriesRequest) -> SeriesPast:
+        readings = every if need.sensor_type == "temperature" else []
+        stamps, values = [at for at, _ in readings], tuple(value for _, value in readings)
+        ones = (1,) * len(readings)
+        end_ns = 25 * HOUR_NS + 1
+        return SeriesPast(1, end_ns, None, tuple(stamps), ones, values, values, values)
+
+    for name, value in (("temperature_24h_mean", 20.0), ("temperature_night_minimum", 20.0)):
+        request = SeriesRequest("a", name, 25 * HOUR_NS, 25 * HOUR_NS + 1, 100)
+        past = derived.series(request, own_sensors(), is_day, find)
+        assert past.means == (value,)

@@ -11,8 +11,7 @@ from typing import Any
 import pytest
 
 from lupin_bridge.stream.estimate_schema import Advice, EstimateQualities, ExpectedTags
-from lupin_twin.core.state import Pose
-from lupin_twin.journal.rows import PinRow, Row
+from lupin_twin.core.state import Pin, Pose, Write
 from lupin_twin.journal.runs import Clock
 from tests.support.journal import SECOND, kept, scan
 from tests.support.processes import limits
@@ -42,8 +41,8 @@ def live(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Bridge]:
     From a journal: of what comes scan by scan, the last would wait for the next round.
     """
     journal, begun_ns = tmp_path_factory.mktemp("journal") / "j.sqlite", now_s() * SECOND
-    rows: list[Row] = [
-        PinRow(tag_id, begun_ns, begun_ns, Pose(*at, 0.0, 0.0, 0.0, 0.0, 1.0))
+    rows: list[Write] = [
+        Pin(tag_id, Pose(*at, 0.0, 0.0, 0.0, 0.0, 1.0), begun_ns, begun_ns)
         for tag_id, at in PLACES.items()
     ]
     rows += [

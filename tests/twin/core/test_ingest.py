@@ -10,8 +10,8 @@ import pytest
 from lupin_twin.core import ingest
 from lupin_twin.core.drops import MAX_TEXT_LENGTH, Drop, Reason
 from lupin_twin.core.history import History, TagHistory
-from lupin_twin.core.ingest import Pin, Received, ReceivedInspection, ReceivedReading, ReceivedTags
-from lupin_twin.core.state import Flower, Inspection, Pose, Reading, Scan, TwinStore
+from lupin_twin.core.ingest import Received, ReceivedInspection, ReceivedReading, ReceivedTags
+from lupin_twin.core.state import Flower, Inspection, Pin, Pose, Reading, Scan, TwinStore
 from lupin_twin.ros.convert import pose_message, pose_of
 from tests.support.store import S, at
 

@@ -9,11 +9,11 @@ from pathlib import Path
 
 import pytest
 
+from lupin_twin.core.state import Write
 from lupin_twin.journal import follow
 from lupin_twin.journal.follow import Followed, Lot, NotALotError
 from lupin_twin.journal.rebuild import upgrade
 from lupin_twin.journal.retention import Limits, purge_step
-from lupin_twin.journal.rows import Row
 from lupin_twin.journal.schema import open_reader, open_writer, transaction
 from tests.support.journal import NOW, SECOND, kept, look, pin, scan
 from tests.support.journal_answers import NAMES, answer, answers, old, same
@@ -50,7 +50,7 @@ def contents(path: Path) -> dict[str, list[tuple[object, ...]]]:
 @pytest.fixture
 def source(tmp_path: Path) -> Path:
     path = tmp_path / "twin.sqlite"
-    rows: list[Row] = [pin(), look()]
+    rows: list[Write] = [pin(), look()]
     rows += [scan(at_ns=NOW + n * 600 * SECOND) for n in range(30)]
     kept(path, [*rows, scan("8", NOW + 5 * SECOND, co2=400.0), look("8", anomaly=True)])
     return path

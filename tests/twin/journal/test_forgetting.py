@@ -10,7 +10,7 @@ from typing import NamedTuple
 import pytest
 
 from lupin_bridge.cli.command import main
-from lupin_twin.journal.rows import Row
+from lupin_twin.core.state import Write
 from tests.support import messages
 from tests.support.journal import NOW, kept, look, pin, restored, scan, select
 from tests.support.waiting import wait_for
@@ -35,7 +35,7 @@ Journal = Callable[..., Ended]
 def path(tmp_path: Path) -> Path:
     """The journal of a twin that has ended, with three tags at home and a lost one, the newest."""
     path = tmp_path / "j.sqlite"
-    rows: list[Row] = [scan(tag_id, co2=400.0) for tag_id in HOME]
+    rows: list[Write] = [scan(tag_id, co2=400.0) for tag_id in HOME]
     rows += [pin(tag_id, x=x) for tag_id, x in HOME.items()]
     kept(path, [*rows, look(LOST), scan(LOST, NOW + 1, co2=500.0), pin(LOST, x=900.0)])
     return path

@@ -6,8 +6,8 @@ from pathlib import Path
 import pytest
 
 from lupin_twin.core.journal_condition import JournalState
+from lupin_twin.core.state import Write
 from lupin_twin.journal.appending import Stretch, prefill, simulated
-from lupin_twin.journal.rows import Row
 from lupin_twin.journal.runs import Clock
 from lupin_twin.journal.schema import open_reader
 from tests.support.journal import (
@@ -28,7 +28,7 @@ from tests.support.journal import (
 
 DAY = 86_400 * SECOND
 START = NOW - 3 * DAY
-PAST: list[Row] = [
+PAST: list[Write] = [
     pin(at_ns=START),
     scan(at_ns=START),
     look(at_ns=NOW - DAY),
@@ -51,9 +51,9 @@ def test_a_journal_that_is_not_there_gets_a_past_that_goes_on(tmp_path: Path) ->
     assert is_whole(path)
     assert mark(path) == (START, NOW)
     assert {type(row).__name__ for row in known(path, CLOCK)} == {
-        "PinRow",
-        "ScanRow",
-        "InspectionRow",
+        "Pin",
+        "Scan",
+        "Inspection",
     }
     # Past and present are one run of the clock.
     kept(path, [scan(at_ns=NOW + SECOND)], CLOCK)
@@ -69,7 +69,7 @@ def test_a_twin_that_heard_nothing_leaves_it_empty(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("row", [scan(), look(), pin()])
-def test_into_what_anybody_has_recorded_nothing_is_written(tmp_path: Path, row: Row) -> None:
+def test_into_what_anybody_has_recorded_nothing_is_written(tmp_path: Path, row: Write) -> None:
     path = tmp_path / "j.sqlite"
     kept(path, [row], CLOCK)
     assert not filled(path)

@@ -20,10 +20,10 @@ from lupin_bridge.judge.daylight import ClockDay
 from lupin_bridge.judge.options import Criteria, own_sensors
 from lupin_bridge.judge.verdict import derive
 from lupin_bridge.past.report import Report
+from lupin_twin.core.history import kind_of
 from lupin_twin.core.journal_condition import Condition, JournalState
-from lupin_twin.core.state import Reading
+from lupin_twin.core.state import Inspection, Pin, Reading
 from lupin_twin.core.writes import PastWrite, RunSpan
-from lupin_twin.journal.rows import InspectionRow, ScanRow
 from lupin_twin.journal.runs import runs, spans
 from tests.support.alarms_reference import Plain, alarms
 from tests.support.log_life import BEGUN, LATEST, MINUTE, Life, steps
@@ -164,19 +164,19 @@ def check_silences(
 
 
 def write(number: int, run: int, row: Any) -> PastWrite:
-    if isinstance(row, InspectionRow):
+    if isinstance(row, Inspection) and row.flower is not None:
         flower = row.flower
         species = flower.species if flower.confidence >= 0.5 else ""
         seen = (True, species, flower.anomaly, flower.bug_count)
         return PastWrite(number, run, row.tag_id, row.stamp_ns, 1, 0, (), (), *seen)
-    assert isinstance(row, ScanRow)
-    names = tuple(reading.name for reading in row.readings)
-    values = tuple(reading.value for reading in row.readings)
-    return PastWrite(number, run, row.tag_id, row.stamp_ns, row.kind, row.status, names, values)
+    readings = getattr(row, "readings", ())
+    names = tuple(reading.name for reading in readings)
+    values = tuple(reading.value for reading in readings)
+    return PastWrite(number, run, row.tag_id, row.stamp_ns, kind_of(row), row.status, names, values)
 
 
 def is_pin(row: Any) -> bool:
-    return not isinstance(row, InspectionRow | ScanRow)
+    return isinstance(row, Pin)
 
 
 def plain(alarm: dict[str, Any]) -> Plain:

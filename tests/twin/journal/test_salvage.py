@@ -7,14 +7,14 @@ from pathlib import Path
 
 import pytest
 
+from lupin_twin.core.state import Write
 from lupin_twin.journal.checking import find_all_damage
-from lupin_twin.journal.rows import Row
 from lupin_twin.journal.salvage import quarantine, salvage
 from lupin_twin.journal.schema import open_reader, open_writer
 from tests.support.journal import NOW, SECOND, is_whole, kept, known, look, pin, scan, select
 
 TAGS = [str(tag) for tag in range(20)]
-ROWS: list[Row] = [
+ROWS: list[Write] = [
     *(pin(tag) for tag in TAGS),
     *(look(tag) for tag in TAGS),
     *(scan(tag, NOW + n * SECOND, temperature=n / 7) for n in range(100) for tag in TAGS),

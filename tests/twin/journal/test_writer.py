@@ -8,9 +8,9 @@ from pathlib import Path
 import pytest
 
 from lupin_twin.core.journal_condition import JournalState
+from lupin_twin.core.state import Write
 from lupin_twin.journal.file import JournalFile
 from lupin_twin.journal.retention import Limits
-from lupin_twin.journal.rows import Row
 from lupin_twin.journal.runs import Clock, Run, Turn
 from lupin_twin.journal.schema import DamagedFile
 from lupin_twin.journal.writer import Journal
@@ -41,7 +41,7 @@ def count(path: Path) -> int:
 
 
 def test_what_is_handed_over_is_written_and_known_after_a_restart(path: Path) -> None:
-    rows: set[Row] = {pin(), *(scan(str(n)) for n in range(1000))}
+    rows: set[Write] = {pin(), *(scan(str(n)) for n in range(1000))}
     with recording(path) as journal:
         assert journal.take_restored(30.0) is not None
         for row in rows:
@@ -116,7 +116,7 @@ def test_damage_that_is_met_while_it_records_has_the_file_quarantined_too(
 ) -> None:
     append = JournalFile.append
 
-    def meet_damage(file: JournalFile, rows: Sequence[tuple[Run, Row]]) -> tuple[int, int]:
+    def meet_damage(file: JournalFile, rows: Sequence[tuple[Run, Write]]) -> tuple[int, int]:
         monkeypatch.setattr(JournalFile, "append", append)
         raise DamagedFile("as SQLite finds it")
 

@@ -5,6 +5,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from lupin_twin.core.state import NO_FLOWER
 from lupin_twin.core.writes import (
     PastWrite,
     PastWrites,
@@ -119,7 +120,7 @@ def test_a_species_that_the_camera_was_not_sure_of_is_left_out(tmp_path: Path) -
     with lived(tmp_path / "j.sqlite") as life:
         for number, confidence in enumerate((0.05, 0.49, 0.5, 1.0)):
             one = look("7", BEGUN + number)
-            flower = replace(one.flower, confidence=confidence)
+            flower = replace(one.flower or NO_FLOWER, confidence=confidence)
             life.write([replace(one, flower=flower)])
         assert [write.species for write in asked(life.connection).writes] == (
             ["", "", "lupin", "lupin"]

@@ -10,12 +10,10 @@ from pathlib import Path
 
 import pytest
 
-from lupin_twin.core import ingest
 from lupin_twin.core.history import History
-from lupin_twin.core.ingest import Pin
 from lupin_twin.core.journal_condition import JournalState
 from lupin_twin.core.past import NotRemembered
-from lupin_twin.core.state import Flower, Inspection, Pose, Reading, Scan, TwinStore
+from lupin_twin.core.state import Flower, Inspection, Pin, Pose, Reading, Scan, TwinStore, Write
 from lupin_twin.journal.beside import journal_path, state_folder
 from lupin_twin.journal.fold import state_at
 from lupin_twin.journal.runs import Clock
@@ -90,7 +88,7 @@ def test_damage_that_somebody_meets_has_the_file_set_aside_while_the_twin_record
 
 
 def test_what_is_known_again_is_told_in_one_line(tmp_path: Path) -> None:
-    def told(path: Path, *clocks: Clock, writes: Sequence[ingest.Write] = ()) -> list[str | None]:
+    def told(path: Path, *clocks: Clock, writes: Sequence[Write] = ()) -> list[str | None]:
         memory = Memory(TwinStore(), History(8), open_journal(path, "/twin", 1e4, 1e4), 8)
         said = [memory.follow(clock) for clock in clocks]
         for write in writes:

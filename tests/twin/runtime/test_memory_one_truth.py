@@ -6,9 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from lupin_twin.core.ingest import Pin
 from lupin_twin.core.journal_condition import JournalState
-from lupin_twin.core.state import NO_FLOWER
+from lupin_twin.core.state import NO_FLOWER, Pin
 from tests.support.journal import select
 from tests.support.memory_life import HERE, NOW, THERE, S, twin
 from tests.support.waiting import wait_for

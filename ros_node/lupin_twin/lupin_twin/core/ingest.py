@@ -13,7 +13,17 @@ from typing import Final
 
 from lupin_twin.core.drops import MAX_TEXT_LENGTH, Drop, Reason, Rejected
 from lupin_twin.core.history import History
-from lupin_twin.core.state import STATUS_OK, Flower, Inspection, Pose, Reading, Scan, TwinStore
+from lupin_twin.core.state import (
+    STATUS_OK,
+    Flower,
+    Inspection,
+    Pin,
+    Pose,
+    Reading,
+    Scan,
+    TwinStore,
+    Write,
+)
 
 # lupin_msgs/Observation; the other kinds are in `history`.
 KIND_ANOMALY: Final = 2
@@ -56,6 +66,7 @@ class Received:
     frame_id: str
     stamp_ns: int
     part: ReceivedReading | ReceivedInspection | None
+    mission: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,17 +79,6 @@ class ReceivedTags:
     frame_id: str
     tag_ids: Sequence[str]
     pose: Callable[[int], Pose]
-
-
-@dataclass(frozen=True, slots=True)
-class Pin:
-    """A discovered tag gets its place."""
-
-    tag_id: str
-    pose: Pose
-
-
-Write = Scan | Inspection | Pin
 
 
 def observation(received: Received, frame_id: str, now_ns: int) -> Scan | Inspection | Drop:
@@ -110,6 +110,7 @@ def observation(received: Received, frame_id: str, now_ns: int) -> Scan | Inspec
         status_detail=_cut(received.status_detail),
         source=_cut(received.source),
         own_stamp_ns=own_stamp_ns,
+        mission=received.mission[:MAX_TEXT_LENGTH],
     )
 
 

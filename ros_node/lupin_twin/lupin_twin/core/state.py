@@ -103,7 +103,8 @@ class Scan:
     """One scan of a tag's sensors, or an attempt.
 
     `stamp_ns` is never later than now; `own_stamp_ns` is what the producer sent, 0 for nothing, by
-    which a message that is received again is known. An attempt that failed (`status`) has no pose.
+    which a message that is received again is known. `arrival_ns` is wall time. An attempt that
+    failed (`status`) has no pose.
     """
 
     tag_id: str
@@ -114,6 +115,8 @@ class Scan:
     status_detail: str = ""
     source: str = ""
     own_stamp_ns: int = 0
+    mission: str = ""
+    arrival_ns: int = 0
 
     @property
     def succeeded(self) -> bool:
@@ -133,6 +136,21 @@ class Inspection:
     status_detail: str = ""
     source: str = ""
     own_stamp_ns: int = 0
+    mission: str = ""
+    arrival_ns: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class Pin:
+    """A tag gets its place, by a scan, an inspection or a discovery; times as in `Scan`."""
+
+    tag_id: str
+    pose: Pose
+    stamp_ns: int = 0
+    arrival_ns: int = 0
+
+
+Write = Scan | Inspection | Pin
 
 
 @dataclass(frozen=True, slots=True)

@@ -16,17 +16,13 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Final, NamedTuple
 
-from lupin_twin.core.history import KNOWN_BY_NOTHING
-from lupin_twin.core.state import Flower
+from lupin_twin.core.history import KNOWN_BY_NOTHING, kind_of
+from lupin_twin.core.state import Flower, Inspection, Pin, Scan, Write
 from lupin_twin.journal.beside import Lock
 from lupin_twin.journal.hours import WrittenInspection, WrittenScan, count
 from lupin_twin.journal.notes import last_number
 from lupin_twin.journal.rows import (
     KIND_FLOWER,
-    InspectionRow,
-    PinRow,
-    Row,
-    ScanRow,
     sensor_names,
     weight,
 )
@@ -106,7 +102,7 @@ class Appender:
         self._scans: list[WrittenScan] = []
         self._inspections: list[WrittenInspection] = []
 
-    def append(self, run: int, rows: Iterable[Row], *, are_copies: bool = False) -> int:
+    def append(self, run: int, rows: Iterable[Write], *, are_copies: bool = False) -> int:
         """Take in what is not there yet; returns how many rows that were."""
         new = 0
         for row in rows:
@@ -130,9 +126,9 @@ class Appender:
 
     # --- the three kinds ----------------------------------------------------------------------
 
-    def _append(self, run: int, row: Row, is_copy: int) -> bool:
+    def _append(self, run: int, row: Write, is_copy: int) -> bool:
         tag = _unicode(row.tag_id)
-        if isinstance(row, PinRow):
+        if isinstance(row, Pin):
             pose = row.pose
             numbers = (pose.x, pose.y, pose.z, pose.qx, pose.qy, pose.qz, pose.qw)
             self.last_seq += 1
@@ -140,20 +136,23 @@ class Appender:
                 (self.last_seq, run, tag, row.stamp_ns, row.arrival_ns, *numbers, is_copy)
             )
             return True
-        if isinstance(row, InspectionRow):
-            return self._put_inspection(run, tag, row, is_copy)
+        if isinstance(row, Inspection) and row.flower is not None:
+            return self._put_inspection(run, tag, row, row.flower, is_copy)
         return self._put_scan(run, tag, row, is_copy)
 
-    def _put_scan(self, run: int, tag: str, scan: ScanRow, is_copy: int) -> bool:
-        group = self._group(run, tag, scan.kind)
-        readings = {_unicode(reading.name): reading.value for reading in scan.readings}
-        stamp_ns, own_ns, source = scan.stamp_ns, scan.own_stamp_ns, _unicode(scan.source)
+    def _put_scan(self, run: int, tag: str, scan: Scan | Inspection, is_copy: int) -> bool:
+        """A scan, or an attempt of either kind that failed."""
+        kind = kind_of(scan)
+        group = self._group(run, tag, kind)
+        sent = scan.readings if isinstance(scan, Scan) else ()
+        readings = {_unicode(reading.name): reading.value for reading in sent}
+        stamp_ns, own_ns, source = scan.stamp_ns, _own_ns(scan), _unicode(scan.source)
         key = own_ns or stamp_ns
         if is_copy or key > group.newest_ns:
             group.newest_ns = max(group.newest_ns, key)
         else:
             self.flush()
-            known = self._known((run, tag, scan.kind), key, source)
+            known = self._known((run, tag, kind), key, source)
             if known is not None:
                 known_ns, own_ns, sensors = known
                 stamp_ns = min(stamp_ns, known_ns)
@@ -161,7 +160,7 @@ class Appender:
                 if not readings:
                     return False
         self.last_seq += 1
-        series = self._series(group, run, tag, scan.kind, tuple(readings))
+        series = self._series(group, run, tag, kind, tuple(readings))
         values = list(readings.values())
         self._waiting["scan"].append(
             (
@@ -173,16 +172,18 @@ class Appender:
                 scan.status,
                 source,
                 _unicode(scan.mission),
-                _unicode(scan.detail),
+                _unicode(scan.status_detail),
                 is_copy,
                 _numbers(values),
             )
         )
         if not is_copy:
-            self._scans.append(WrittenScan(run, series, scan.kind, stamp_ns, scan.status, values))
+            self._scans.append(WrittenScan(run, series, kind, stamp_ns, scan.status, values))
         return True
 
-    def _put_inspection(self, run: int, tag: str, inspection: InspectionRow, is_copy: int) -> bool:
+    def _put_inspection(
+        self, run: int, tag: str, inspection: Inspection, flower: Flower, is_copy: int
+    ) -> bool:
         group = self._group(run, tag, KIND_FLOWER)
         source, key = _unicode(inspection.source), inspection.own_stamp_ns or inspection.stamp_ns
         if is_copy or key > group.newest_ns:
@@ -193,14 +194,13 @@ class Appender:
                 return False
         self.last_seq += 1
         self._series(group, run, tag, KIND_FLOWER, ())
-        flower = inspection.flower
         self._waiting["look"].append(
             (
                 self.last_seq,
                 run,
                 tag,
                 inspection.stamp_ns,
-                inspection.own_stamp_ns,
+                _own_ns(inspection),
                 inspection.arrival_ns,
                 source,
                 _unicode(inspection.mission),
@@ -292,6 +292,11 @@ class Appender:
         return series
 
 
+def _own_ns(write: Scan | Inspection) -> int | None:
+    """The stamp that it was sent with, where that is another than its own."""
+    return None if write.own_stamp_ns == write.stamp_ns else write.own_stamp_ns
+
+
 def _numbers(values: Iterable[float]) -> str:
     """A JSON list; what is not finite is null."""
     text = ",".join(map(repr, values))
@@ -322,22 +327,22 @@ def _unicode(text: str) -> str:
     return text if text.isascii() else text.encode("utf-8", "replace").decode("utf-8")
 
 
-def _held(row: Row, begun_ns: int, *, retains_key: bool) -> Row:
+def _held(row: Write, begun_ns: int, *, retains_key: bool) -> Write:
     """A row as a copy of it at `begun_ns`, never later. `retains_key`: it is the same write."""
     if row.stamp_ns <= begun_ns:
         return row
-    if isinstance(row, PinRow):
+    if isinstance(row, Pin):
         return replace(row, stamp_ns=begun_ns)
     own_ns = (row.own_stamp_ns or row.stamp_ns) if retains_key else KNOWN_BY_NOTHING
     return replace(row, stamp_ns=begun_ns, own_stamp_ns=own_ns)
 
 
-def copy_known(appender: Appender, before: Run, run: Run, rows: Iterable[Row]) -> None:
+def copy_known(appender: Appender, before: Run, run: Run, rows: Iterable[Write]) -> None:
     """Copy what was known in a run (see `copies`) into one, or a step, that begins now."""
     begun, found = run.begun, []
     for row in rows:
         is_here = before.root == run.root and row.stamp_ns <= begun.stamp_ns
-        if not (is_here and isinstance(row, PinRow)):
+        if not (is_here and isinstance(row, Pin)):
             # What a simulation says again is new; a wall clock comes to no moment twice.
             row = replace(row, arrival_ns=begun.arrival_ns)  # noqa: PLW2901
             found.append(_held(row, begun.stamp_ns, retains_key=not begun.is_simulated))
@@ -362,7 +367,7 @@ def is_empty(connection: sqlite3.Connection) -> bool:
     return not Appender(connection).last_seq
 
 
-def prefill(path: Path, holder: str, rows: Sequence[Row], until_ns: int) -> bool:
+def prefill(path: Path, holder: str, rows: Sequence[Write], until_ns: int) -> bool:
     """Write rows of wall time into a journal that is new or empty, all or none.
 
     `rows` are in the order of their stamps, all before `until_ns`. Returns whether it was done:

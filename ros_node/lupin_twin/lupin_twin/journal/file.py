@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Final
 
 from lupin_twin.core.notes import Note
+from lupin_twin.core.state import Write
 from lupin_twin.journal.appending import Appender, Stretch, copy_known, simulated
 from lupin_twin.journal.beside import Syncing, forwarded_seq
 from lupin_twin.journal.checking import find_damage
@@ -29,7 +30,7 @@ from lupin_twin.journal.retention import (
     purge_step,
     shrink_step,
 )
-from lupin_twin.journal.rows import Row, newest_rows
+from lupin_twin.journal.rows import newest_rows
 from lupin_twin.journal.runs import (
     CORRECTION_NS,
     FOREVER_NS,
@@ -293,7 +294,7 @@ class JournalFile:
 
     # --- writing ------------------------------------------------------------------------------
 
-    def append(self, rows: Sequence[tuple[Run, Row]]) -> tuple[int, int]:
+    def append(self, rows: Sequence[tuple[Run, Write]]) -> tuple[int, int]:
         """Write rows in one transaction; returns how many were new, and how many cannot be written.
 
         Raises:
@@ -313,7 +314,7 @@ class JournalFile:
                 refused += 1
         return written, refused
 
-    def _append(self, rows: Sequence[tuple[Run, Row]]) -> int:
+    def _append(self, rows: Sequence[tuple[Run, Write]]) -> int:
         with self._transaction():
             written = 0
             for root, of_run in groupby(rows, lambda entry: entry[0].root):

@@ -18,21 +18,28 @@ from typing import Any, Final, TypeVar
 from lupin_twin.core.drops import MAX_SENSORS_PER_TAG, MAX_TAGS
 from lupin_twin.core.history import History, LatestRequest
 from lupin_twin.core.past import MAX_POINTS, SeriesRequest
-from lupin_twin.core.state import NO_FLOWER, Attempt, Flower, Pose, Reading, Snapshot, TagState
+from lupin_twin.core.state import (
+    NO_FLOWER,
+    Attempt,
+    Flower,
+    Inspection,
+    Pin,
+    Pose,
+    Reading,
+    Scan,
+    Snapshot,
+    TagState,
+    Write,
+)
 from lupin_twin.journal.queries import newest
 from lupin_twin.journal.rows import (
     KIND_READING,
     STATUS_OK,
-    InspectionRow,
-    PinRow,
-    Row,
-    ScanRow,
     flower_of,
     listed_rows,
     newest_of_tag,
     numbers_of,
     sensor_names,
-    write_of,
 )
 from lupin_twin.journal.runs import FOREVER_NS, Carries, Run, runs, since_seq, span_at
 from lupin_twin.journal.schema import LOCAL_SITE, DamagedFile
@@ -90,7 +97,7 @@ class Restored:
 
     run: Run
     known: Known
-    rows: tuple[ScanRow | InspectionRow, ...]
+    rows: tuple[Scan | Inspection, ...]
     last_seq: int
     last_ns: int = 0
     is_doubted: bool = False
@@ -242,28 +249,29 @@ def _latest(scans: Sequence[tuple[int, int, tuple[Reading, ...]]]) -> tuple[Read
     return tuple(reading for *_, reading in latest.values())[:MAX_SENSORS_PER_TAG]
 
 
-def copies(connection: sqlite3.Connection, run: Run, carries: Carries) -> list[Row]:
+def copies(connection: sqlite3.Connection, run: Run, carries: Carries) -> list[Write]:
     """What is known in a run, as rows of another one, or of a step, that begins now.
 
     The rows that the fold rests on, in the order of their tags, of a tag in the order in which
     they count, with the stamps that they have there.
     """
     known = fold(connection, run.root, FOREVER_NS, run.begun_seq)
-    found: dict[str, list[tuple[int, int, ScanRow | InspectionRow]]] = {
+    found: dict[str, list[tuple[int, int, Scan | Inspection]]] = {
         tag.tag_id: [] for tag in known.tags
     }
     if carries is Carries.ALL:
         for seq, row in listed_rows(connection, run.root, known.scans, known.inspections):
             found[row.tag_id].append((row.stamp_ns, seq, row))
-    rows: list[Row] = []
+    rows: list[Write] = []
     for tag in known.tags:
         placed_ns = known.placed_ns.get(tag.tag_id)
         if carries is not Carries.NOTHING and tag.pose is not None and placed_ns is not None:
-            rows.append(PinRow(tag.tag_id, placed_ns, run.begun.arrival_ns, tag.pose))
+            rows.append(Pin(tag.tag_id, tag.pose, placed_ns, run.begun.arrival_ns))
         mine = sorted(found[tag.tag_id], key=lambda entry: entry[:2])
         if mine and tag.tag_id not in known.observed:
             # How long nothing has been observed there.
-            rows.append(replace(mine[0][2], stamp_ns=tag.last_observed_ns or 0))
+            since_ns = tag.last_observed_ns or 0
+            rows.append(replace(mine[0][2], stamp_ns=since_ns, own_stamp_ns=since_ns))
         rows += [row for *_, row in mine]
     return rows
 
@@ -294,7 +302,7 @@ def latest(connection: sqlite3.Connection, request: LatestRequest) -> History:
     span = span_at(runs(connection.execute), FOREVER_NS)
     if span is not None:
         for row in newest_of_tag(connection, span.run.id, request.tag_id, request.count):
-            history.add(write_of(row))
+            history.add(row)
     return history
 
 

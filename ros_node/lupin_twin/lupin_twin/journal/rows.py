@@ -1,8 +1,4 @@
-"""What the journal keeps, as plain values, and out of the texts of its tables.
-
-Stamps are ROS time, arrivals wall time, both in ns. The ROS thread makes rows, the writer thread
-writes them, restoring gives them back.
-"""
+"""Writes out of the journal's tables; its texts as values."""
 
 from __future__ import annotations
 
@@ -10,12 +6,11 @@ import json
 import math
 import sqlite3
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any, Final
 
 from lupin_twin.core import history, state
-from lupin_twin.core.state import Bloom, Flower, Inspection, Pose, Reading, Scan
+from lupin_twin.core.state import Bloom, Flower, Inspection, Reading, Scan, Write
 from lupin_twin.journal.schema import LOCAL_SITE, DamagedFile
 
 KIND_READING = history.KIND_TAG_READING
@@ -23,72 +18,13 @@ KIND_FLOWER = history.KIND_FLOWER
 STATUS_OK = state.STATUS_OK
 
 
-@dataclass(frozen=True, slots=True)
-class ScanRow:
-    """An attempt at a tag's sensors, or a failed inspection; `kind`, `status` as in the message.
-
-    `own_stamp_ns` is the stamp that it was sent with, None where that is `stamp_ns`, 0 for none.
-    """
-
-    tag_id: str
-    stamp_ns: int
-    arrival_ns: int
-    readings: tuple[Reading, ...] = ()
-    kind: int = KIND_READING
-    status: int = STATUS_OK
-    detail: str = ""
-    source: str = ""
-    mission: str = ""
-    own_stamp_ns: int | None = None
-
-
-@dataclass(frozen=True, slots=True)
-class InspectionRow:
-    """One inspection of a tag's flowers."""
-
-    tag_id: str
-    stamp_ns: int
-    arrival_ns: int
-    flower: Flower
-    source: str = ""
-    mission: str = ""
-    own_stamp_ns: int | None = None
-
-
-@dataclass(frozen=True, slots=True)
-class PinRow:
-    """A tag got its place, by whatever write: a scan, an inspection or a discovery."""
-
-    tag_id: str
-    stamp_ns: int
-    arrival_ns: int
-    pose: Pose
-
-
-Row = ScanRow | InspectionRow | PinRow
-
-
-def weight(row: Row) -> int:
-    """What a row costs in memory, in readings or flowers."""
-    if isinstance(row, ScanRow):
-        return 1 + len(row.readings)
-    if isinstance(row, InspectionRow):
-        return 1 + len(row.flower.blooms) + len(row.flower.footprint)
+def weight(write: Write) -> int:
+    """What a write costs in memory, in readings or flowers."""
+    if isinstance(write, Scan):
+        return 1 + len(write.readings)
+    if isinstance(write, Inspection) and write.flower is not None:
+        return 1 + len(write.flower.blooms) + len(write.flower.footprint)
     return 1
-
-
-def write_of(row: ScanRow | InspectionRow) -> Scan | Inspection:
-    """What was accepted, of the row that was written of it."""
-    own = row.stamp_ns if row.own_stamp_ns is None else row.own_stamp_ns
-    if isinstance(row, InspectionRow):
-        return Inspection(row.tag_id, row.stamp_ns, row.flower, source=row.source, own_stamp_ns=own)
-    if row.kind == KIND_FLOWER:
-        return Inspection(
-            row.tag_id, row.stamp_ns, None, None, row.status, row.detail, row.source, own
-        )
-    return Scan(
-        row.tag_id, row.stamp_ns, row.readings, None, row.status, row.detail, row.source, own
-    )
 
 
 # Scans that are read at most for the histories of all tags.
@@ -98,7 +34,7 @@ _OF_RUN: Final = "r.site = :site AND r.run = :run"
 
 def newest_rows(
     connection: sqlite3.Connection, run: int, per_series: int
-) -> list[ScanRow | InspectionRow]:
+) -> list[Scan | Inspection]:
     """The newest scans of each series, and the newest inspection of each tag of a run."""
     query: dict[str, Any] = {"site": LOCAL_SITE, "run": run}
     (count,) = connection.execute(
@@ -121,7 +57,7 @@ def newest_rows(
 
 def newest_of_tag(
     connection: sqlite3.Connection, run: int, tag_id: str, per_series: int
-) -> list[ScanRow | InspectionRow]:
+) -> list[Scan | Inspection]:
     """The same of one tag; each series by itself, which is quick on both engines."""
     asked: dict[str, Any] = {"site": LOCAL_SITE, "run": run, "tag": tag_id, "depth": per_series}
     of_tag = "s.site = :site AND s.run = :run AND s.tag = :tag"
@@ -143,7 +79,7 @@ def newest_of_tag(
 
 def listed_rows(
     connection: sqlite3.Connection, run: int, scans: Sequence[int], inspections: Sequence[int]
-) -> list[tuple[int, ScanRow | InspectionRow]]:
+) -> list[tuple[int, Scan | Inspection]]:
     """The scans and inspections of a run with these seqs, each with its own."""
     query = {"site": LOCAL_SITE, "run": run, "scans": json.dumps(scans)}
     query["looks"] = json.dumps(inspections)
@@ -159,15 +95,15 @@ def listed_rows(
 
 def _rows(
     connection: sqlite3.Connection, scans: str, inspections: str, query: dict[str, Any]
-) -> list[tuple[int, ScanRow | InspectionRow]]:
+) -> list[tuple[int, Scan | Inspection]]:
     """Scans and inspections (`r`) with their seqs, out of these joins with the series (`s`)."""
     return [*_scans(connection, scans, query), *_inspections(connection, inspections, query)]
 
 
 def _scans(
     connection: sqlite3.Connection, joined: str, query: dict[str, Any]
-) -> list[tuple[int, ScanRow | InspectionRow]]:
-    found: list[tuple[int, ScanRow | InspectionRow]] = []
+) -> list[tuple[int, Scan | Inspection]]:
+    found: list[tuple[int, Scan | Inspection]] = []
     rows = connection.execute(
         "SELECT seq, tag, kind, sensors, readings, stamp_ns, own_stamp_ns, arrival_ns, status,"  # noqa: S608
         f" source, mission, detail FROM {joined}",
@@ -176,27 +112,29 @@ def _scans(
     for row, values in zip(rows, numbers_of([row[4] for row in rows]), strict=True):
         seq, tag, kind, sensors, _, stamp_ns, own_ns, arrival_ns, *reported = row
         status, source, mission, detail = reported
-        readings = tuple(map(Reading, sensor_names(sensors), values))
-        scan = ScanRow(
-            tag, stamp_ns, arrival_ns, readings, kind, status, detail, source, mission, own_ns
-        )
-        found.append((seq, scan))
+        sent_ns = stamp_ns if own_ns is None else own_ns
+        reported = (None, status, detail, source, sent_ns, mission, arrival_ns)
+        if kind == KIND_FLOWER:
+            found.append((seq, Inspection(tag, stamp_ns, None, *reported)))
+        else:
+            readings = tuple(map(Reading, sensor_names(sensors), values))
+            found.append((seq, Scan(tag, stamp_ns, readings, *reported)))
     return found
 
 
 def _inspections(
     connection: sqlite3.Connection, joined: str, query: dict[str, Any]
-) -> list[tuple[int, ScanRow | InspectionRow]]:
-    found: list[tuple[int, ScanRow | InspectionRow]] = []
+) -> list[tuple[int, Scan | Inspection]]:
+    found: list[tuple[int, Scan | Inspection]] = []
     for seq, tag, stamp_ns, own_ns, arrival_ns, source, mission, *flower in connection.execute(
         "SELECT seq, r.tag, stamp_ns, own_stamp_ns, arrival_ns, source, mission, species,"  # noqa: S608
         f" confidence, anomaly, flower_count, bug_count, blooms, box FROM {joined}",
         query,
     ).fetchall():
-        inspection = InspectionRow(
-            tag, stamp_ns, arrival_ns, flower_of(flower), source, mission, own_ns
-        )
-        found.append((seq, inspection))
+        sent_ns = stamp_ns if own_ns is None else own_ns
+        seen = flower_of(flower)
+        reported = (None, STATUS_OK, "", source, sent_ns, mission, arrival_ns)
+        found.append((seq, Inspection(tag, stamp_ns, seen, *reported)))
     return found
 
 

@@ -18,9 +18,19 @@ from functools import lru_cache
 from typing import Any, Final, NamedTuple
 
 from lupin_twin.core.past import HOUR_NS, SLOT_NS, Event
-from lupin_twin.core.state import Bloom, Flower, Pose, Reading
+from lupin_twin.core.state import (
+    STATUS_OK,
+    Bloom,
+    Flower,
+    Inspection,
+    Pin,
+    Pose,
+    Reading,
+    Scan,
+    Write,
+)
 from lupin_twin.journal.hours import SILENCE_NS
-from lupin_twin.journal.rows import InspectionRow, PinRow, Row, ScanRow, sensor_names
+from lupin_twin.journal.rows import KIND_FLOWER, sensor_names
 from lupin_twin.journal.runs import Carries, Clock
 from lupin_twin.journal.salvage import readable
 from lupin_twin.journal.schema import DamagedFile, is_damage_error
@@ -103,7 +113,7 @@ class Version3:
         value = self._meta.get(key)
         return value if isinstance(value, int) else default
 
-    def rows(self) -> Iterator[tuple[int, int, Row]]:
+    def rows(self) -> Iterator[tuple[int, int, Write]]:
         """(number, run, row) of each write, in the order in which they were received."""
         yield from heapq.merge(
             self._scans(), self._inspections(), self._pins(), key=lambda row: row[0]
@@ -208,29 +218,25 @@ class Version3:
 
     # --- rows ---------------------------------------------------------------------------------
 
-    def _scans(self) -> Iterator[tuple[int, int, Row]]:
+    def _scans(self) -> Iterator[tuple[int, int, Write]]:
         for row in self._table("scan", _SCAN):
             number, series_number, stamp_ns, own_stamp_ns, lag_us, mission, detail, packed = row
             try:
                 series = self._series[series_number]
                 values = _numbers(_unsealed(row[1:-1], packed), len(series.sensors))
-                scan = ScanRow(
-                    series.tag_id,
-                    stamp_ns,
-                    stamp_ns + self._leads[series.run] + 1000 * lag_us,
-                    tuple(map(Reading, series.sensors, values)),
-                    series.kind,
-                    series.status,
-                    detail or "",
-                    series.source,
-                    self._names[mission],
-                    own_stamp_ns,
-                )
-                yield number, series.run, scan
+                sent_ns = stamp_ns if own_stamp_ns is None else own_stamp_ns
+                arrival_ns = stamp_ns + self._leads[series.run] + 1000 * lag_us
+                of = (sent_ns, self._names[mission], arrival_ns)
+                reported = (None, series.status, detail or "", series.source, *of)
+                if series.kind == KIND_FLOWER:
+                    yield number, series.run, Inspection(series.tag_id, stamp_ns, None, *reported)
+                else:
+                    readings = tuple(map(Reading, series.sensors, values))
+                    yield number, series.run, Scan(series.tag_id, stamp_ns, readings, *reported)
             except (_BadRow, KeyError):
                 self.damaged += 1
 
-    def _inspections(self) -> Iterator[tuple[int, int, Row]]:
+    def _inspections(self) -> Iterator[tuple[int, int, Write]]:
         what = (
             "id, series, stamp_ns, own_stamp_ns, lag_us, mission, species, anomaly, flower_count,"
             " bug_count, shape"
@@ -244,19 +250,20 @@ class Version3:
                 name = self._names[species]
                 flower = Flower(name, confidence, bool(anomaly), count, bugs, blooms, box)
                 arrival_ns = stamp_ns + self._leads[series.run] + 1000 * lag_us
-                at = (series.tag_id, stamp_ns, arrival_ns)
-                reported = (series.source, self._names[mission], own_stamp_ns)
-                yield number, series.run, InspectionRow(*at, flower, *reported)
+                sent_ns = stamp_ns if own_stamp_ns is None else own_stamp_ns
+                of = (sent_ns, self._names[mission], arrival_ns)
+                reported = (None, STATUS_OK, "", series.source, *of)
+                yield number, series.run, Inspection(series.tag_id, stamp_ns, flower, *reported)
             except (_BadRow, KeyError):
                 self.damaged += 1
 
-    def _pins(self) -> Iterator[tuple[int, int, Row]]:
+    def _pins(self) -> Iterator[tuple[int, int, Write]]:
         for row in self._table("pin", "id, run, tag, stamp_ns, lag_us, pose"):
             number, run, tag, stamp_ns, lag_us, packed = row
             try:
                 pose = Pose(*_numbers(_unsealed(row[1:-1], packed), 7))
                 arrival_ns = stamp_ns + self._leads[run] + 1000 * lag_us
-                yield number, run, PinRow(self._tags[tag], stamp_ns, arrival_ns, pose)
+                yield number, run, Pin(self._tags[tag], pose, stamp_ns, arrival_ns)
             except (_BadRow, KeyError):
                 self.damaged += 1
 

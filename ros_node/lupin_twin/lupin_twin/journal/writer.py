@@ -16,20 +16,20 @@ from concurrent.futures import Future
 from dataclasses import replace
 from itertools import islice
 from pathlib import Path
-from typing import Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
 from lupin_twin.core.diagnostics import Origin
 from lupin_twin.core.journal_condition import Condition, JournalState
 from lupin_twin.core.notes import Note
-from lupin_twin.journal.appending import Stretch
+from lupin_twin.core.state import Write
 from lupin_twin.journal.beside import InUse, Lock
 from lupin_twin.journal.file import JournalFile
 from lupin_twin.journal.floor_plan import NewestMap
 from lupin_twin.journal.fold import Restored
 from lupin_twin.journal.notes import NoteQueue
 from lupin_twin.journal.rebuild import is_version3, upgrade
-from lupin_twin.journal.retention import Limits, Stretches
-from lupin_twin.journal.rows import Row, weight
+from lupin_twin.journal.retention import Limits
+from lupin_twin.journal.rows import weight
 from lupin_twin.journal.runs import Carries, Clock, Run, Turn
 from lupin_twin.journal.schema import DamagedFile, Foreign, is_damage_error
 
@@ -41,7 +41,7 @@ class Entry(NamedTuple):
     """A row, the clock it was received by (1: the first), and when: steady clock, and ROS time."""
 
     era: int
-    row: Row
+    row: Write
     handed_over_s: float
     at_ns: int
 
@@ -178,15 +178,12 @@ class Journal:
         # The writer thread's own.
         self._runs: list[Run] = []
         self._lock: Lock | None = None
-        self._written = self._repeated = self._refused = self._failures = 0
+        self._failures = 0
         self._is_sound: bool | None = None
         self._heals_from_s = -math.inf
         self._met_damage = self._quarantined = self._left_out = ""
         # What was received last, as the log has it, where the clock contradicts that.
         self._doubted_ns: int | None = None
-        self._simulated: Stretch | None = None
-        self._kept: Stretches = ()
-        self._journal_id = ""
         self._holds_older = False
         self._thread = threading.Thread(target=self._run, name="journal", daemon=True)
         self._thread.start()
@@ -209,7 +206,7 @@ class Journal:
         self._eras.append(_Era(clock, turn, scans_per_series, before_ns))
         self._pending.arrived.set()
 
-    def write(self, row: Row, at_ns: int | None = None) -> None:
+    def write(self, row: Write, at_ns: int | None = None) -> None:
         """Hand a row over that was received at `at_ns`, ROS time; None: as it was stamped.
 
         It is safe from a killed process within 100 ms.
@@ -307,8 +304,6 @@ class Journal:
             self._is_sound = True
             self._quarantined = file.quarantined or self._quarantined
             file.note_origin(self._origin)
-            self._simulated = file.simulated
-            self._journal_id = file.journal_id
             if self._runs:
                 file.retain_run(self._runs[-1])
             is_last = False
@@ -320,9 +315,8 @@ class Journal:
                 self._notes.write(file.put_note)
                 self.floor_plan.write(file)
                 has_more = not is_last and file.check_size(may_purge=bool(self._runs))
-                self._kept = file.kept()
                 self._holds_older = file.holds_older
-                self._report_well(file.size())
+                self._report_well(file)
                 if not is_last and not self._pending.arrived.wait(0.0 if has_more else _IDLE_S):
                     continue
                 # Others may be about to come.
@@ -387,9 +381,12 @@ class Journal:
                 self._pending.put_back(entries)
                 raise
             self._failures = 0
-            self._written += written
-            self._refused += refused
-            self._repeated += len(known) - written - refused
+            self._reported = replace(
+                self._reported,
+                written=self._reported.written + written,
+                refused=self._reported.refused + refused,
+                repeated=self._reported.repeated + len(known) - written - refused,
+            )
             lost_ns = self._pending.take_lost()
             if lost_ns is not None:
                 file.note_lost(self._runs[-1], lost_ns)
@@ -412,17 +409,25 @@ class Journal:
         detail = f"the journal {self._path} is being upgraded: {share:.0%} is done"
         self._report(JournalState.UPGRADING, detail)
 
-    def _report_well(self, file_bytes: int) -> None:
-        if self._doubted_ns is None:
-            state = JournalState.OFF if self._is_temporary else JournalState.RECORDING
-            self._report(state, self._summary(), file_bytes)
-            return
-        until = time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime(self._doubted_ns // 10**9))
-        detail = (
-            f"the clock contradicts the journal {self._path}, which was written until {until}:"
-            " nothing is written before they agree, or ten minutes have passed"
+    def _report_well(self, file: JournalFile) -> None:
+        state = JournalState.OFF if self._is_temporary else JournalState.RECORDING
+        detail = self._summary()
+        if self._doubted_ns is not None:
+            state = JournalState.DOUBTING
+            until = time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime(self._doubted_ns // 10**9))
+            detail = (
+                f"the clock contradicts the journal {self._path}, which was written until {until}:"
+                " nothing is written before they agree, or ten minutes have passed"
+            )
+        self._report(
+            state,
+            detail,
+            file_bytes=file.size(),
+            set_aside=self._quarantined,
+            simulated_ns=file.simulated,
+            kept_ns=file.kept(),
+            journal_id=file.journal_id,
         )
-        self._report(JournalState.DOUBTING, detail, file_bytes)
 
     def _report_failure(self, error: Exception) -> None:
         match error:
@@ -434,17 +439,5 @@ class Journal:
                 detail = f"the journal {self._path} cannot be written: {error}"
                 self._report(JournalState.FAILING, detail)
 
-    def _report(self, state: JournalState, detail: str, file_bytes: int | None = None) -> None:
-        self._reported = Condition(
-            state=state,
-            detail=detail,
-            path=str(self._path),
-            written=self._written,
-            repeated=self._repeated,
-            refused=self._refused,
-            file_bytes=self._reported.file_bytes if file_bytes is None else file_bytes,
-            set_aside=self._quarantined,
-            simulated_ns=self._simulated,
-            kept_ns=self._kept,
-            journal_id=self._journal_id,
-        )
+    def _report(self, state: JournalState, detail: str, **known: Any) -> None:
+        self._reported = replace(self._reported, state=state, detail=detail, **known)

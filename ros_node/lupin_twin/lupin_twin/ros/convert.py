@@ -165,6 +165,7 @@ def received(msg: Any) -> Received:
         frame_id=msg.header.frame_id,
         stamp_ns=nanoseconds(msg.header.stamp),
         part=_part(msg),
+        mission=msg.mission_id,
     )
 
 

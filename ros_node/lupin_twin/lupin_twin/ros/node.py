@@ -22,7 +22,7 @@ from lupin_twin.core.diagnostics import CLOCK, ERROR, Health, Origin, findings, 
 from lupin_twin.core.drops import Drop, Reason
 from lupin_twin.core.history import History, kind_of
 from lupin_twin.core.parameters import ParameterError, TwinParameters, World
-from lupin_twin.core.state import ClockState, Inspection, Scan, Snapshot, TwinStore
+from lupin_twin.core.state import ClockState, Inspection, Scan, Snapshot, TwinStore, Write
 from lupin_twin.field.engine import FieldCache, FieldEngine, FieldRules
 from lupin_twin.field.explored import OccupancyMap
 from lupin_twin.journal.beside import journal_path
@@ -241,7 +241,7 @@ class TwinNode(AdjustableNode):
             self.utilities.drop(write, topic)
             return
         is_news = self.history.news(write) is not None
-        if self._apply(write, topic, msg.mission_id):
+        if self._apply(write, topic):
             self._observed_s = time.monotonic()
             if is_news:
                 self._check_lateness(write, topic)
@@ -343,9 +343,9 @@ class TwinNode(AdjustableNode):
 
     # --- small parts ------------------------------------------------------------------------
 
-    def _apply(self, write: ingest.Write | Drop, topic: str, mission: str = "") -> bool:
+    def _apply(self, write: Write | Drop, topic: str) -> bool:
         near, dropped = ingest.near(write, self.parameters.max_pose_m)
-        refused = None if near is None else self.memory.apply(near, time.time_ns(), mission)
+        refused = None if near is None else self.memory.apply(near, time.time_ns())
         for drop in filter(None, (dropped, refused)):
             self.utilities.drop(drop, topic)
         return near is not None and refused is None

@@ -21,16 +21,14 @@ from typing import Final, NamedTuple
 
 from lupin_twin.core import ingest
 from lupin_twin.core.diagnostics import Origin
-from lupin_twin.core.drops import MAX_TEXT_LENGTH, Drop
-from lupin_twin.core.history import KIND_FLOWER, KIND_TAG_READING, History
-from lupin_twin.core.ingest import Pin
+from lupin_twin.core.drops import Drop
+from lupin_twin.core.history import History
 from lupin_twin.core.journal_condition import Condition
 from lupin_twin.core.notes import Note
-from lupin_twin.core.state import Inspection, Scan, TwinStore
+from lupin_twin.core.state import Pin, TwinStore, Write
 from lupin_twin.field.explored import OccupancyMap
 from lupin_twin.journal.fold import Restored
 from lupin_twin.journal.retention import Limits
-from lupin_twin.journal.rows import InspectionRow, PinRow, Row, ScanRow, write_of
 from lupin_twin.journal.runs import CORRECTION_NS, Clock, Turn, turn_of
 from lupin_twin.journal.writer import Journal
 from lupin_twin.runtime.journal_queries import Recall
@@ -54,9 +52,7 @@ class _Early(NamedTuple):
     `lead_ns` is what the wall's clock was ahead of the steady one then.
     """
 
-    write: ingest.Write
-    arrival_ns: int
-    mission: str
+    write: Write
     lead_ns: int
 
 
@@ -127,14 +123,15 @@ class Memory:
                 self._hold_places(now)
         return self._take(self._journal.take_restored(), now)
 
-    def apply(self, write: ingest.Write, arrival_ns: int, mission: str = "") -> Drop | None:
+    def apply(self, write: Write, arrival_ns: int) -> Drop | None:
         """Write what is now and what was, and hand it over; returns what the store refused."""
+        write = replace(write, arrival_ns=arrival_ns)
         if self._early is not None:
             self._lost += len(self._early) == MAX_EARLY
-            self._early.append(_Early(write, arrival_ns, mission, self._lead_ns))
+            self._early.append(_Early(write, self._lead_ns))
         dropped = ingest.apply(write, self._store, self._history)
         if dropped is None and self._doubt is None:
-            self._hand_over(write, arrival_ns, mission)
+            self._hand_over(write)
         return dropped
 
     @property
@@ -177,7 +174,7 @@ class Memory:
         begun.append(arrival_ns)
         return True
 
-    def _hand_over(self, write: ingest.Write, arrival_ns: int, mission: str) -> None:
+    def _hand_over(self, write: Write) -> None:
         now_ns = 0 if self._clock is None else self._clock.stamp_ns
         if write.pose is not None:
             # A place belongs to the moment of the scan that brought it, as its readings do.
@@ -185,9 +182,10 @@ class Memory:
             tag, placed_ns = self._store.tag(write.tag_id), self._placed_ns.get(write.tag_id)
             if tag and tag.pose and (placed_ns is None or stamp_ns < placed_ns):
                 self._placed_ns[write.tag_id] = stamp_ns
-                self._journal.write(PinRow(write.tag_id, stamp_ns, arrival_ns, tag.pose), now_ns)
+                pin = Pin(write.tag_id, tag.pose, stamp_ns, write.arrival_ns)
+                self._journal.write(pin, now_ns)
         if not isinstance(write, Pin):
-            self._journal.write(_row(write, arrival_ns, mission[:MAX_TEXT_LENGTH]), now_ns)
+            self._journal.write(write, now_ns)
 
     def _hold_places(self, now: Clock) -> None:
         self._placed_ns = {
@@ -214,7 +212,7 @@ class Memory:
                 entry = _moved(entry, self._lead_ns - entry.lead_ns)  # noqa: PLW2901
             ingest.apply(entry.write, self._store, self._history)
             if doubt is not None and self._doubt is None:
-                self._hand_over(entry.write, entry.arrival_ns, entry.mission)
+                self._hand_over(entry.write)
         self.hold_to(now)
         return f"journal {self.condition.path}: {_summary(restored, now)}"
 
@@ -223,7 +221,7 @@ class Memory:
         self._store.restore(restored.known.tags, restored.known.observed)
         self._history.clear()
         for row in restored.rows:
-            self._history.add(write_of(row))
+            self._history.add(row)
         # From before what was handed over meanwhile, if it was earlier.
         placed = dict(restored.known.placed_ns)
         for tag_id, at_ns in self._placed_ns.items():
@@ -279,12 +277,12 @@ def _moved(early: _Early, by_ns: int) -> _Early:
 
     Where the producer's own clock was right, it is as old as its stamp.
     """
-    write = early.write
+    write = replace(early.write, arrival_ns=early.write.arrival_ns + by_ns)
     if not isinstance(write, Pin):
         stamp_ns, own_ns = write.stamp_ns + by_ns, write.own_stamp_ns
         was_right = write.stamp_ns < own_ns <= stamp_ns
         write = replace(write, stamp_ns=own_ns if was_right else stamp_ns)
-    return early._replace(write=write, arrival_ns=early.arrival_ns + by_ns)
+    return early._replace(write=write)
 
 
 def _summary(restored: Restored, now: Clock) -> str:
@@ -309,23 +307,3 @@ def _moment(stamp_ns: int, now: Clock) -> str:
     except (OverflowError, ValueError):
         return f"second {stamp_ns // 10**9}"
     return f"second {stamp_ns / 1e9:.3f}" if now.is_simulated else f"{moment:%Y-%m-%dT%H:%M:%SZ}"
-
-
-def _row(write: Scan | Inspection, arrival_ns: int, mission: str) -> Row:
-    own = None if write.own_stamp_ns == write.stamp_ns else write.own_stamp_ns
-    if isinstance(write, Inspection) and write.flower is not None:
-        return InspectionRow(
-            write.tag_id, write.stamp_ns, arrival_ns, write.flower, write.source, mission, own
-        )
-    return ScanRow(
-        tag_id=write.tag_id,
-        stamp_ns=write.stamp_ns,
-        arrival_ns=arrival_ns,
-        readings=write.readings if isinstance(write, Scan) else (),
-        kind=KIND_TAG_READING if isinstance(write, Scan) else KIND_FLOWER,
-        status=write.status,
-        detail=write.status_detail,
-        source=write.source,
-        mission=mission,
-        own_stamp_ns=own,
-    )

@@ -33,7 +33,6 @@ class Twin:
         self.memory = Memory(
             self.store,
             open_journal(path, "/twin", 1e4, 1e4),
-            8,
             lambda: int(self.steady_s * S),
         )
         self.at(at_s)

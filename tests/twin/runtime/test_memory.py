@@ -39,7 +39,7 @@ def sim(at_s: float, wall_s: float) -> Clock:
 def twin(path: Path | None, clock: Clock) -> Iterator[tuple[Memory, TwinStore]]:
     """A life of a twin."""
     store = TwinStore()
-    memory = Memory(store, open_journal(path, "/twin", 1e4, 1e4), 8)
+    memory = Memory(store, open_journal(path, "/twin", 1e4, 1e4))
     memory.follow(clock)
     try:
         yield memory, store
@@ -88,7 +88,7 @@ def test_damage_that_somebody_meets_has_the_file_set_aside_while_the_twin_record
 
 def test_what_is_known_again_is_told_in_one_line(tmp_path: Path) -> None:
     def told(path: Path, *clocks: Clock, writes: Sequence[Write] = ()) -> list[str | None]:
-        memory = Memory(TwinStore(), open_journal(path, "/twin", 1e4, 1e4), 8)
+        memory = Memory(TwinStore(), open_journal(path, "/twin", 1e4, 1e4))
         said = [memory.follow(clock) for clock in clocks]
         for write in writes:
             assert memory.apply(write, NOW) is None

@@ -32,7 +32,7 @@ from lupin_twin.journal.retention import (
     purge_step,
     shrink_step,
 )
-from lupin_twin.journal.rows import newest_rows
+from lupin_twin.journal.rows import last_rows
 from lupin_twin.journal.runs import (
     CORRECTION_NS,
     FOREVER_NS,
@@ -188,34 +188,34 @@ class JournalFile:
 
     # --- runs ---------------------------------------------------------------------------------
 
-    def start(self, now: Clock, scans_per_series: int, *, is_believed: bool) -> Restored:
+    def start(self, now: Clock, *, is_believed: bool) -> Restored:
         """What a twin that starts now knows, in the run that it is in: the last one, or a new one.
 
         A wall clock that is behind what the log has received is doubted, unless `is_believed`:
         nothing is begun then. Of a file that cannot be read what can be is salvaged, once.
         """
         try:
-            return self._start(now, scans_per_series, is_believed=is_believed)
+            return self._start(now, is_believed=is_believed)
         except FILE_ERRORS as error:
             if self.quarantined or not is_damage_error(error):
                 raise
         self.close()
         self._quarantine()
         self._open()
-        return self._start(now, scans_per_series, is_believed=is_believed)
+        return self._start(now, is_believed=is_believed)
 
-    def _start(self, now: Clock, scans_per_series: int, *, is_believed: bool) -> Restored:
+    def _start(self, now: Clock, *, is_believed: bool) -> Restored:
         every = self._runs()
         run = next((r for r in reversed(every) if r.begun.is_simulated == now.is_simulated), None)
         if run is None:
-            return self._restored(self.begin(now, None, Carries.NOTHING), scans_per_series)
+            return self._restored(self.begin(now, None, Carries.NOTHING))
         root = next(r for r in every if r.id == run.root)
         last = self._last(root)
         if now.is_simulated and not simulation_goes_on(root.begun, last, now):
             run = self.begin(now, run, Carries.NOTHING)
         elif not now.is_simulated and now.arrival_ns < last.arrival_ns - CORRECTION_NS:
             if not is_believed:
-                restored = self._restored(run, scans_per_series)
+                restored = self._restored(run)
                 return replace(restored, last_ns=last.arrival_ns, is_doubted=True)
             run = self.begin(now, run, Carries.PLACES)
         elif not now.is_simulated and now.stamp_ns < last.stamp_ns:
@@ -223,11 +223,12 @@ class JournalFile:
         else:
             with self._transaction():
                 self._go_on_with(root.id)
-        return self._restored(run, scans_per_series)
+        return self._restored(run)
 
-    def _restored(self, run: Run, scans_per_series: int) -> Restored:
+    def _restored(self, run: Run) -> Restored:
         known = fold(self._connection, run.root, FOREVER_NS, run.begun_seq)
-        rows = newest_rows(self._connection, run.root, scans_per_series)
+        begun = next(r for r in self._runs() if r.id == run.root)
+        rows = last_rows(self._connection, begun)
         return Restored(run, known, tuple(rows), self._appender.last_seq)
 
     def begin(

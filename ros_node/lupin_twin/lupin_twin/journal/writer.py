@@ -135,14 +135,10 @@ _HEALED_IN: Final = (*_WELL, JournalState.FAILING)
 
 
 class _Era(NamedTuple):
-    """A clock that the twin has followed, and why; `before_ns` is where the one before it was.
-
-    `scans` are restored per series at the start.
-    """
+    """A clock that the twin has followed, and why; `before_ns` is where the one before it was."""
 
     clock: Clock
     turn: Turn
-    scans: int
     before_ns: int | None
 
 
@@ -193,7 +189,6 @@ class Journal:
     def begin(
         self,
         clock: Clock,
-        scans_per_series: int = 1,
         turn: Turn = Turn.START,
         before_ns: int | None = None,
     ) -> None:
@@ -203,7 +198,7 @@ class Journal:
         `is_doubted`, it waits for another start, of a clock that agrees or is believed.
         """
         self._was_attempted.clear()
-        self._eras.append(_Era(clock, turn, scans_per_series, before_ns))
+        self._eras.append(_Era(clock, turn, before_ns))
         self._pending.arrived.set()
 
     def write(self, row: Write, at_ns: int | None = None) -> None:
@@ -351,7 +346,7 @@ class Journal:
                 self._runs.append(self._next_run(file, self._runs[-1], era))
                 continue
             believed = era.turn is Turn.BELIEVED
-            restored = file.start(era.clock, era.scans, is_believed=believed)
+            restored = file.start(era.clock, is_believed=believed)
             self._quarantined = file.quarantined or self._quarantined
             self._doubted_ns = restored.last_ns if restored.is_doubted else None
             if restored.is_doubted:

@@ -99,13 +99,13 @@ class TwinNode(AdjustableNode):
         self._past_queue = JobQueue(self._workers, wake, lambda: self.utilities.is_behind)
         self.estimates = EstimateService(
             self.utilities,
+            self._past_queue,
             self.store,
             self.memory.recall,
             occupancy=lambda: self.occupancy_map,
             day_length_s=world.day_length_s,
             max_grid_cells=self.parameters.max_grid_cells,
             now_ns=self.now_ns,
-            wake=wake,
         )
         self.layers = LayerService(
             self.utilities,
@@ -167,7 +167,7 @@ class TwinNode(AdjustableNode):
             ) from error
         name = self.get_fully_qualified_name()
         journal = open_journal(path, name, p.journal_days, p.journal_max_mb, self._world.origin)
-        return Memory(self.store, journal, p.buffer_len)
+        return Memory(self.store, journal)
 
     def _connect(self) -> None:
         p, group = self.parameters, self._group
@@ -287,13 +287,11 @@ class TwinNode(AdjustableNode):
         self.utilities.drain()
         self._field_service.queue.deliver()
         self._past_queue.deliver()
-        self.estimates.deliver()
         self.layers.deliver()
 
     def destroy_node(self) -> None:
         """End the workers and the journal too; what they compute is for nobody then."""
         self._workers.close()
-        self.estimates.close()
         self.layers.close()
         self.memory.close()
         super().destroy_node()
@@ -363,7 +361,6 @@ class TwinNode(AdjustableNode):
 
     def _check_clock(self) -> None:
         self._past_queue.go_on()
-        self.estimates.go_on()
         before = self._clock_watch.state
         self.now_ns()
         if self._clock_watch.state != before:

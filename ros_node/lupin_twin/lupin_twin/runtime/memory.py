@@ -67,20 +67,18 @@ class _Doubt(NamedTuple):
 class Memory:
     """A store, what it received, and the journal of both; `recall` queries that.
 
-    `buffer_len` scans of a series are restored at most; `steady_ns` is a clock that never jumps.
+    `steady_ns` is a clock that never jumps.
     """
 
     def __init__(
         self,
         store: TwinStore,
         journal: Journal,
-        buffer_len: int,
         steady_ns: Callable[[], int] = time.monotonic_ns,
     ) -> None:
         self._store = store
         self.repeats = Repeats()
         self._journal = journal
-        self._buffer_len = buffer_len
         self._steady_ns = steady_ns
         self._clock: Clock | None = None
         # What the wall's clock is ahead of the steady one.
@@ -109,7 +107,7 @@ class Memory:
         lead_ns = now.arrival_ns - self._steady_ns()
         if before is None:
             self._clock, self._lead_ns = now, lead_ns
-            self._journal.begin(now, self._buffer_len)
+            self._journal.begin(now)
             return self._take(self._journal.take_restored(_START_WAIT_S), now)
         if self._doubt is not None:
             self._clock, self._lead_ns = now, lead_ns
@@ -247,9 +245,9 @@ class Memory:
             return self._take(self._journal.take_restored(), now)
         self._agrees = now.is_simulated or now.arrival_ns >= doubt.last_ns - CORRECTION_NS
         if self._agrees:
-            self._journal.begin(now, self._buffer_len)
+            self._journal.begin(now)
         elif self._steady_ns() - doubt.since_ns >= DOUBT_NS:
-            self._journal.begin(doubt.clock, self._buffer_len, Turn.BELIEVED)
+            self._journal.begin(doubt.clock, Turn.BELIEVED)
         else:
             return None
         self._is_requested = True

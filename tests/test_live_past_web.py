@@ -238,6 +238,31 @@ def test_what_is_followed_answers_as_the_file_itself_does(apart: Apart) -> None:
     apart.are_same(apart.beside, apart.following)
 
 
+def test_alarms_are_the_same_where_the_copy_comes_late(own: Apart) -> None:
+    """As on a busy machine: no news of the twin comes after the copy."""
+    path = QUESTIONS[-3]
+    assert "/api/alarms" in path
+    (file,) = own.followed()
+
+    def are_same() -> bool:
+        here, there = (live.http.get(path) for live in (own.following, own.beside))
+        return here.json()["since"] is not None and here.content == there.content
+
+    wait_for(are_same, "the alarms of what was there")
+    with closing(sqlite3.connect(file, isolation_level=None)) as copy:
+        copy.execute("BEGIN IMMEDIATE")
+        before = own.following.http.get(path).content
+        own.peer.observe(
+            *(scan("a", {"temperature": 60.0}, stamp_s=T + 2_500.0 + n) for n in range(3))
+        )
+        wait_for(lambda: own.beside.http.get(path).content != before, "the alarm")
+        until_s = time.monotonic() + 4.0  # longer than alarms are looked for by themselves
+        wait_for(lambda: time.monotonic() > until_s, "the time to pass")
+        assert own.following.http.get(path).content == before
+        copy.execute("ROLLBACK")
+    wait_for(are_same, "the same alarms")
+
+
 @pytest.mark.parametrize("harm", ["damaged", "deleted", "emptied", "foreign", "folder"])
 def test_a_followed_file_that_is_harmed_is_copied_anew(apart: Apart, harm: str) -> None:
     (file,) = apart.followed()

@@ -20,7 +20,7 @@ from lupin_bridge.serving.http_protocol import MAX_BODY_BYTES
 from tests.support import raw_http
 from tests.support.journal import select
 from tests.support.people import OWN, TOKEN, add, signed_in
-from tests.support.processes import lupin_twin, twin_node, url_of
+from tests.support.processes import limits, lupin_twin, twin_node, url_of
 from tests.support.ros import Peer
 from tests.support.waiting import PATIENCE_S, wait_for
 from tests.support.web import Bridge, bridge
@@ -43,7 +43,7 @@ def folder() -> Iterator[Path]:
 
 @pytest.fixture(scope="module")
 def live(folder: Path) -> Iterator[Bridge]:
-    options = ("--accounts", str(folder / "accounts.sqlite"), *ON)
+    options = ("--accounts", str(folder / "accounts.sqlite"), *ON, *limits(client_timeout_s=3.0))
     with bridge(*options, "--ros-args", "-p", f"journal:={folder / 'j.sqlite'}") as running:
         running.peer.wait_for_twin()
         yield running

@@ -17,6 +17,8 @@ from lupin_twin.adapt.value import Value, value_of
 from lupin_twin.core.drops import MAX_SENSORS_PER_TAG, MAX_TAGS
 
 MAX_FILE_BYTES: Final = 4_000_000
+# As a place that is posted: nobody's greenhouse is farther from its map's origin.
+MAX_M: Final = 1e6
 _TYPE: Final = re.compile(r"[a-z][a-z0-9_]*/msg/[A-Za-z][A-Za-z0-9]*")
 _FIELD: Final = re.compile(r"[a-z]\w*(\[\d{1,9}\])?(\.[a-z]\w*(\[\d{1,9}\])?)*")
 
@@ -203,9 +205,11 @@ def _tags(content: Any, folder: Path) -> Iterator[tuple[str, Place]]:
         if (
             not isinstance(at, list)
             or len(at) not in (2, 3)
-            or not all(is_number(each) for each in at)
+            or not all(is_number(each) and abs(each) <= MAX_M for each in at)
         ):
-            raise ConfigError(f"tags.{name} is {shown(at)}, expected [x, y] or [x, y, z] in m")
+            raise ConfigError(
+                f"tags.{name} is {shown(at)}, expected [x, y] or [x, y, z] in m, up to {MAX_M:.0f}"
+            )
         yield name, Place(*map(float, at))
 
 

@@ -153,11 +153,11 @@ def broker_of(table: Table, folder: Path) -> Broker:
 
     """
     text = table.text("url")
-    url = urlsplit(text)
     try:
+        url = urlsplit(text)
         port = url.port
     except ValueError:
-        port = 0
+        url, port = urlsplit(""), 0
     if url.scheme not in PORTS or not url.hostname or port == 0 or url.path.strip("/"):
         raise ConfigError(f"mqtt.url is {shown(text)}, expected such as mqtt://broker.lan:1883")
     if "@" in url.netloc:
@@ -186,7 +186,8 @@ def _password(table: Table, folder: Path) -> str:
     if not file:
         return ""
     try:
-        return (folder / str(file)).read_text(encoding="utf-8").strip()
+        with (folder / str(file)).open(encoding="utf-8") as opened:
+            return opened.read(MAX_PAYLOAD_BYTES).strip()
     except (OSError, UnicodeDecodeError) as error:
         reason = getattr(error, "strerror", None) or "it is no text"
         raise ConfigError(f"mqtt.password_file {file}: {reason}") from None
@@ -202,6 +203,8 @@ def _patterns(table: Table) -> Iterator[Pattern]:
     tag = str(table.take("tag", ""))
     there = table.text("availability") if table.has("availability") else ""
     for each in (topic, there or topic):
+        if each.count("{tag}") > 1 or each.count("{sensor}") > 1:
+            raise ConfigError(f"{table.name}: {shown(each)} has one of them twice")
         if bool(tag) == ("{tag}" in each):
             raise ConfigError(
                 f"{table.name}: expected {{tag}} in {shown(each)}, or the key tag; one of them"

@@ -149,7 +149,7 @@ def _write(path: Path, columns: Columns, found: Iterator[Merged]) -> tuple[int, 
             if not known:
                 first_ns = batch[0][0]
                 begin = Clock(first_ns, first_ns, is_simulated=False)
-                known = [file.start(begin, 1, is_believed=True).run]
+                known = [file.start(begin, is_believed=True).run]
             rows: list[tuple[Run, Write]] = []
             for stamp_ns, tag_id, values in batch:
                 span = span_at(known, stamp_ns) if len(known) > 1 else None

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable, Iterator
 from typing import Any
 
@@ -20,7 +19,6 @@ from tests.support.sabotage import sabotaged
 from tests.support.waiting import wait_for
 from tests.support.web import Bridge, Frame, Listener, bridge, listener, tag_ids
 
-DDS_LEASE_S = 20.0  # how long Fast DDS keeps a dead process in the graph
 CLI = "lupin_bridge.cli.command"
 FIELD: dict[str, Any] = {"sensor_type": "co2", "resolution": 0.5}
 
@@ -189,11 +187,8 @@ def test_a_second_twin_is_said_loudly_and_its_end_too(domain: int) -> None:
         reason(client, "live")
         with twin_node(domain) as second:
             second.wait_for_output("lupin_twin in ROS domain")
-            come_s = time.monotonic()
             said = client.until("status", lambda frame: "2 twins" in frame["message"])
             first.wait_for_output("2 nodes publish /twin/state")
-            # Long before the lease of a dead one would have ended.
-            assert time.monotonic() - come_s < DDS_LEASE_S
             assert said["twin"] == "live"
             assert "mixture" in said["message"]
             assert "2 twins" in live.json("/readyz")["message"]

@@ -18,7 +18,6 @@ from itertools import islice
 from pathlib import Path
 from typing import Final
 
-from lupin_twin.core.history import History
 from lupin_twin.core.past import EVERY_TAG, Event, SeriesRequest
 from lupin_twin.core.state import Scan, TwinStore, Write
 from lupin_twin.journal.file import JournalFile
@@ -69,7 +68,7 @@ def write(folder: Path, scans: int) -> None:
     path = folder / "log.sqlite"
     file = JournalFile(path, LIMITS, is_sound=True)
     with closing(file):
-        run = file.start(Clock(BEGUN_NS, BEGUN_NS, is_simulated=False), 1, is_believed=True).run
+        run = file.start(Clock(BEGUN_NS, BEGUN_NS, is_simulated=False), is_believed=True).run
 
         def commit(lot: Sequence[Write]) -> None:
             file.append([(run, row) for row in lot])
@@ -153,7 +152,7 @@ def restart(many: Filled) -> None:
     begun_s, used_s = time.perf_counter(), time.process_time()
     journal = Journal(many.path, "/bench/lupin_twin", LIMITS)
     try:
-        memory = Memory(store, History(32), journal, 32)
+        memory = Memory(store, journal)
         memory.follow(Clock(end_ns, end_ns, is_simulated=False))
         took = time.perf_counter() - begun_s, time.process_time() - used_s
         assert len(store.snapshot(end_ns, "map").tags) == many.house.tags

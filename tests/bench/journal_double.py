@@ -145,7 +145,7 @@ def fill(path: Path, house: House) -> Filled:
     readings = rows = 0
     file = JournalFile(path, LIMITS, is_sound=True)
     with closing(file):
-        run = file.start(Clock(BEGUN_NS, BEGUN_NS, is_simulated=False), 1, is_believed=True).run
+        run = file.start(Clock(BEGUN_NS, BEGUN_NS, is_simulated=False), is_believed=True).run
         heard = house.rows()
         while lot := list(islice(heard, _BATCH)):
             file.append([(run, row) for row in lot])

@@ -45,7 +45,7 @@ def test_the_page_shows_what_a_robot_of_standard_messages_reads_and_where(
         hmi.expect_rows("A", "B")
         hmi.expect_samples(2)
         expect(hmi.test_id("robot-fact")).to_have_text(
-            re.compile(r"Robot: (0\.2|3\.1) m, 0\.0 m; \d+\ss ago")
+            re.compile(r"Robot: (0\.2|1\.6|3\.1) m, 0\.0 m; \d+\ss ago")
         )
         # A pin is where its tag is: a click there opens the tag's card.
         for tag_id, x in (("A", 0.0), ("B", 3.0)):

@@ -14,7 +14,6 @@ import time
 from collections.abc import Iterator
 from pathlib import Path
 
-from lupin_twin.core.history import History
 from lupin_twin.core.state import Pose, Reading, Scan, TwinStore
 from lupin_twin.journal.retention import Limits
 from lupin_twin.journal.runs import Clock
@@ -27,8 +26,6 @@ from tests.support.waiting import wait_for
 TAGS, EVERY_S, HOURS = 10_000, 600, 8
 SENSORS = ("temperature", "humidity", "co2", "light", "soil_moisture")
 LIMITS = Limits(days=36_500, max_bytes=10**11)
-# An hour of scans, so that the history is as large as it gets when the first hour is over.
-BUFFER_LEN = 3600 // EVERY_S
 # What waits at most: observations must not be lost to a clock that runs 500 times too fast.
 MOST_WAITING = 2_000
 
@@ -71,7 +68,7 @@ def main(hours: int = HOURS) -> bool:
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "j.sqlite"
         journal = Journal(path, "/soak", LIMITS)
-        memory = Memory(TwinStore(), History(BUFFER_LEN), journal, BUFFER_LEN)
+        memory = Memory(TwinStore(), journal)
         memory.follow(Clock(NOW, NOW, is_simulated=False))
         for hour in range(hours):
             for scan in scans(hour, chance):

@@ -78,14 +78,14 @@ def _now(file: JournalFile) -> Clock:
 def kept(path: Path, rows: Iterable[Write], now: Clock | None = None) -> tuple[int, int]:
     """Write rows, in one life of a twin; returns what `JournalFile.append` does."""
     with opened(path) as file:
-        run = file.start(now or _now(file), 32, is_believed=True).run
+        run = file.start(now or _now(file), is_believed=True).run
         return file.append([(run, row) for row in rows])
 
 
-def restored(path: Path, now: Clock | None = None, scans: int = 32) -> Restored:
+def restored(path: Path, now: Clock | None = None) -> Restored:
     """What a twin that starts now gets to know."""
     with opened(path) as file:
-        return file.start(now or _now(file), scans, is_believed=False)
+        return file.start(now or _now(file), is_believed=False)
 
 
 def known(path: Path, now: Clock | None = None) -> set[Write]:
@@ -134,7 +134,7 @@ def recording(
     """A journal at work, its clock begun."""
     journal = Journal(path, "/test/lupin_twin", limits, max_weight, origin=origin)
     try:
-        journal.begin(now, 32)
+        journal.begin(now)
         yield journal
     finally:
         journal.close(30.0)

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from lupin_twin.core import ingest
 from lupin_twin.core.drops import Drop
-from lupin_twin.core.history import KIND_FLOWER, KIND_TAG_READING, History
+from lupin_twin.core.history import KIND_FLOWER, KIND_TAG_READING
 from lupin_twin.core.ingest import Received, ReceivedInspection, ReceivedReading
 from lupin_twin.core.state import Flower, Pose, Reading, Snapshot, TagState, TwinStore
 from lupin_twin.journal.fold import state_at
@@ -27,14 +27,12 @@ class Twin:
     """A life of a twin over a file, without ROS; its clocks are set by hand."""
 
     def __init__(self, path: Path, at_s: float, *, is_simulated: bool = False) -> None:
-        self.store, self.history = TwinStore(), History(8)
+        self.store = TwinStore()
         self.steady_s = 1_000.0
         self.is_simulated = is_simulated
         self.memory = Memory(
             self.store,
-            self.history,
             open_journal(path, "/twin", 1e4, 1e4),
-            8,
             lambda: int(self.steady_s * S),
         )
         self.at(at_s)

@@ -183,7 +183,7 @@ class Received:
     def _start(self) -> None:
         before = [life for life in self.lives.values() if self._is_like(life.run)]
         known = {s.run.id for life in self.lives.values() for s in life.stretches}
-        run = self._file.start(self._now, 1, is_believed=True).run
+        run = self._file.start(self._now, is_believed=True).run
         if run.id not in known:
             last = max((s for life in before for s in life.stretches), key=_id, default=None)
             rows: list[Write] = []

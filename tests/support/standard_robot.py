@@ -1,12 +1,14 @@
 """A robot that knows ROS's standard messages and nothing of the twin: a program by itself.
 
-It stands at one tag, then at the other, three seconds each, and again. At the second it is warmer.
+It stands at one place, then at another, three seconds each, and again. At the second it is warmer.
+While it drives, for a second, it reads nothing.
 """
 
 from __future__ import annotations
 
 import itertools
 from contextlib import suppress
+from typing import Any
 
 import rclpy
 from geometry_msgs.msg import PoseWithCovarianceStamped
@@ -15,8 +17,9 @@ from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile, qos_profile_sensor_data
 from sensor_msgs.msg import RelativeHumidity, Temperature
 
-PLACES = ((0.2, 21.5), (3.1, 24.0))
-TICKS_AT_EACH = 30
+# Metres, and °C; None: it drives.
+STOPS = ((0.2, 21.5), (3.1, 24.0))
+ROUND = tuple(step for stop in STOPS for step in [stop] * 30 + [(1.6, None)] * 10)
 
 
 class StandardRobot(Node):  # type: ignore[misc]  # rclpy is not typed
@@ -29,23 +32,22 @@ class StandardRobot(Node):  # type: ignore[misc]  # rclpy is not typed
         sensor = qos_profile_sensor_data
         self._temperature = self.create_publisher(Temperature, "/temperature", sensor)
         self._humidity = self.create_publisher(RelativeHumidity, "/humidity", sensor)
-        self._ticks = itertools.count()
+        self._round = itertools.cycle(ROUND)
         self.create_timer(0.1, self._tick)
 
     def _tick(self) -> None:
-        x, celsius = PLACES[next(self._ticks) // TICKS_AT_EACH % len(PLACES)]
+        x, celsius = next(self._round)
         pose = PoseWithCovarianceStamped()
         pose.header.frame_id = "map"
         pose.pose.pose.position.x = x
-        temperature = Temperature(temperature=celsius)
-        humidity = RelativeHumidity(relative_humidity=0.6)
-        for publisher, message in (
-            (self._pose, pose),
-            (self._temperature, temperature),
-            (self._humidity, humidity),
-        ):
-            message.header.stamp = self.get_clock().now().to_msg()
-            publisher.publish(message)
+        self._send(self._pose, pose)
+        if celsius is not None:
+            self._send(self._temperature, Temperature(temperature=celsius))
+            self._send(self._humidity, RelativeHumidity(relative_humidity=0.6))
+
+    def _send(self, publisher: Any, message: Any) -> None:
+        message.header.stamp = self.get_clock().now().to_msg()
+        publisher.publish(message)
 
 
 if __name__ == "__main__":

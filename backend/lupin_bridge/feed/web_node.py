@@ -133,10 +133,10 @@ class WebNode(AdjustableNode):
         self._topics: dict[str, str] = {}
         group = MutuallyExclusiveCallbackGroup()
         p = self.parameters
-        for parameter, topic, shape, callback, on_number in (
-            ("state_topic", p.state_topic, message_limits.STATE, self._take_state, self.twins.add),
-            ("times", interfaces.TIMES.name, message_limits.TIMES, self._take_times, None),
-            ("map_topic", p.map_topic, message_limits.MAP, self._take_map, None),
+        for parameter, topic, shape, callback in (
+            ("state_topic", p.state_topic, message_limits.STATE, self._take_state),
+            ("times", interfaces.TIMES.name, message_limits.TIMES, self._take_times),
+            ("map_topic", p.map_topic, message_limits.MAP, self._take_map),
         ):
             self._topics[parameter] = self.utilities.subscribe(
                 parameter,
@@ -145,7 +145,6 @@ class WebNode(AdjustableNode):
                 depth=1,
                 group=group,
                 callback=callback,
-                on_number=on_number,
             )
         self.utilities.subscribe(
             "diagnostics",
@@ -269,7 +268,7 @@ class WebNode(AdjustableNode):
         publishers_digest = _digest_of_publishers(publishers)
         if publishers_digest != self.publishers_digest:
             self.publishers_digest = publishers_digest
-        if self.twins.see(int(self.count_publishers(topic))):
+        if self.twins.see(int(self.count_publishers(topic)), time.monotonic()):
             self.utilities.warn(
                 ("twins", 0),
                 f"{self.twins.value} nodes publish {topic}: what is shown is a mixture; "

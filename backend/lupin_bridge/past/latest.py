@@ -8,8 +8,8 @@ from typing import Final
 from lupin_bridge.feed.query import Find
 from lupin_bridge.past.plans import Plan, of_content
 from lupin_bridge.stream.state_json import history
-from lupin_twin.core.history import History, LatestRequest
-from lupin_twin.core.state import TagState
+from lupin_twin.core.history import LatestRequest, tag_history
+from lupin_twin.core.state import Inspection, Scan, TagState
 from lupin_twin.journal.queries import SERIES_S
 
 # What writing a scan takes, roughly and at worst, s of one core.
@@ -33,7 +33,5 @@ class LatestOfTag:
 
     def look(self, find: Find) -> Plan:
         """See `Query`."""
-        found: History = find(LatestRequest(self.tag_id, self.count))
-        if self.newest is not None:
-            found.complete(self.newest)
-        return of_content(history(self.tag_id, found.of(self.tag_id)))
+        found: list[Scan | Inspection] = find(LatestRequest(self.tag_id, self.count))
+        return of_content(history(self.tag_id, tag_history(found, self.newest, self.count)))

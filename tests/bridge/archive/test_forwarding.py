@@ -136,7 +136,7 @@ def test_of_what_was_deleted_before_it_is_known_what_was_counted(
 
 def purge(journal: Path) -> None:
     with opened(journal, Limits(days=0.0, max_bytes=10**9)) as file:
-        file.start(AFTER, 1, is_believed=True)
+        file.start(AFTER, is_believed=True)
         while file.check_size(may_purge=True):
             pass
 
@@ -162,7 +162,7 @@ def test_a_disk_that_is_full_is_not_kept_for_the_archive(archive: Archive, journ
     kept(journal, scans(0, 50))
     mark_of(journal).write_text("another 99\n")
     with opened(journal, Limits(days=1.0, max_bytes=0)) as file:
-        file.start(Clock(NOW, NOW, is_simulated=False), 1, is_believed=True)
+        file.start(Clock(NOW, NOW, is_simulated=False), is_believed=True)
         while file.check_size(may_purge=True):
             pass
     assert rows_of(journal)["scan"] == []

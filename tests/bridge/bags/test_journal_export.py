@@ -14,7 +14,7 @@ from lupin_bridge.bags.journal_export import LOT, Exported, export, offered_qos
 from lupin_bridge.feed.topics import Topic
 from lupin_twin.core import ingest
 from lupin_twin.core.drops import Drop
-from lupin_twin.core.history import History
+from lupin_twin.core.history import Repeats
 from lupin_twin.core.state import TagState, TwinStore, Write
 from lupin_twin.journal.fold import state_at
 from lupin_twin.journal.runs import Clock
@@ -48,18 +48,18 @@ def exported(
 
 def fed(target: Path) -> dict[str, str]:
     """The tags of a fresh twin that hears a recording."""
-    store, history = TwinStore(), History(32)
+    store, repeats = TwinStore(), Repeats()
     for topic, log_ns, _, data in read(target):
         if topic == "/floranova/observations":
             msg = deserialize_message(data, Observation)
             write = ingest.observation(convert.received(msg), "map", log_ns)
             assert not isinstance(write, Drop)
-            assert ingest.apply(write, store, history) is None
+            assert ingest.apply(write, store, repeats) is None
         elif topic == "/perception/discovered_tags":
             heard = convert.received_tags(deserialize_message(data, DiscoveredTags))
             for pinned in list(ingest.discoveries(heard, "map", store.is_pinned)):
                 assert not isinstance(pinned, Drop)
-                assert ingest.apply(pinned, store, history) is None
+                assert ingest.apply(pinned, store, repeats) is None
     return by_id(store.snapshot(NOW * 2, "map").tags)
 
 

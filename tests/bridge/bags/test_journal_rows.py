@@ -73,7 +73,7 @@ def test_of_an_earlier_run_the_places_are_known(tmp_path: Path) -> None:
     again = Clock(50 * SECOND, NOW + 60 * SECOND, is_simulated=True)
     row = replace(scan("7", 60 * SECOND), arrival_ns=NOW + 70 * SECOND)
     with opened(path) as file:
-        first = file.start(Clock(100 * SECOND, NOW, is_simulated=True), 1, is_believed=False).run
+        first = file.start(Clock(100 * SECOND, NOW, is_simulated=True), is_believed=False).run
         file.append([(first, pin("7", 100 * SECOND)), (first, scan("7", 100 * SECOND))])
         file.append([(file.begin(again, first, Carries.ALL), row)])
     with closing(open_reader(path)) as connection:

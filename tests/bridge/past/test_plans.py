@@ -26,7 +26,6 @@ from lupin_bridge.past.plans import (
 from lupin_bridge.past.query import PeriodQuery
 from lupin_bridge.serving.admission import Answer
 from lupin_bridge.settings import Settings
-from lupin_twin.core.history import History as TagHistory
 from lupin_twin.core.history import LatestRequest
 from lupin_twin.core.journal_condition import UNKNOWN
 from lupin_twin.core.past import Event, SeriesPast, SeriesRequest
@@ -117,7 +116,7 @@ def test_a_large_house_and_a_large_field_cost_more_than_small_ones() -> None:
 def test_what_the_log_does_not_hold_yet_of_a_tag_is_told_from_its_state() -> None:
     tag = TagState("a", None, (Reading("co2", 7.0, 5 * NS),), 5 * NS, last_try=Attempt(5 * NS))
     for newest, values in ((tag, [7.0]), (None, [])):
-        log: dict[Any, Any] = {LatestRequest("a", 3): TagHistory()}
+        log: dict[Any, Any] = {LatestRequest("a", 3): []}
         body = LatestOfTag("a", newest, 3).look(log.__getitem__).write(never).body
         told = json.loads(bytes(body))
         assert [each["value"] for sensor in told["sensors"] for each in sensor["values"]] == values

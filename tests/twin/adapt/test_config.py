@@ -45,6 +45,11 @@ def test_tags_may_stand_in_a_file_of_their_own(tmp_path: Path) -> None:
     assert read_config(tmp_path / "adapt.yaml").tags == {"A": Place(1.5, 2.5)}
 
 
+def test_a_tag_may_be_a_frame_of_tf() -> None:
+    config = config_of(changed("tags", {"A": [1, 2], "B": "bench_b"}))
+    assert (config.tags, config.frames) == ({"A": Place(1, 2)}, {"B": "bench_b"})
+
+
 def test_one_quantity_may_have_several_fixed_sensors() -> None:
     content = {
         "tags": {"A": [0, 0], "B": [1, 0]},
@@ -133,7 +138,10 @@ def changed(path: str, value: Any) -> dict[str, Any]:
         ("detections", {"topic": "/d", "frame": 1}, "detections.'frame' is not known, expected"),
         ("tags.A", [1], "tags.A is [1], expected [x, y] or [x, y, z] in m"),
         ("tags.A", [1, math.inf], "tags.A is [1, inf], expected [x, y]"),
-        ("tags", {True: [0, 0]}, "tags: True is no text of 1 to 256 characters"),
+        ("tags.A", [1, 1e308], "tags.A is [1, 1e+308], expected [x, y]"),
+        ("tags", {True: [0, 0]}, "tags: True is no text of 1 to 256 printable characters"),
+        ("tags", {"a\0b": [0, 0]}, "is no text of 1 to 256 printable characters"),
+        ("tags", {"a\ud800b": [0, 0]}, "is no text of 1 to 256 printable characters"),
         ("tags", "none.yaml", "none.yaml: No such file or directory"),
         ("reach_m", 0, "reach_m is 0, must be from 0.01 to 100"),
         ("window_s", True, "window_s is True, expected a number"),

@@ -170,11 +170,11 @@ def test_a_number_that_is_none_is_named(payload: bytes, complaint: str) -> None:
         (b"[1]", "it has none of t"),
         (b'{"t": true}', "t is True, expected a number"),
         (b'{"t": {}}', "t is {}, expected a number"),
-        (b'{"t": 1, "at": "yesterday"}', "its time is 'yesterday', expected ISO 8601"),
+        (b'{"t": 1, "at": "yesterday"}', "its time is 'yesterday': the time is no ISO 8601"),
         (b'{"t": 1, "at": -5}', "its time is -5"),
         (b'{"t": 1, "at": 1e999}', "its time is inf"),
         (b'{"t": 1, "at": true}', "its time is True"),
-        (b'{"t": 1, "at": "1970-01-01T00:01:00Z"}', "and after 2001"),  # a clock never set
+        (b'{"t": 1, "at": "1970-01-01T00:01:00Z"}', "before 2001: was its clock"),
     ],
 )
 def test_json_that_says_nothing_is_named(payload: bytes, complaint: str) -> None:
@@ -201,6 +201,9 @@ def test_json_that_says_nothing_is_named(payload: bytes, complaint: str) -> None
         ({"topic": "{tag}", "values": {"t": 5}}, {}, "mqtt.topics[0].values.t is 5"),
         ({"topic": "{tag}", "sensor": "t"}, {"url": "http://x"}, "mqtt.url is 'http://x'"),
         ({"topic": "{tag}", "sensor": "t"}, {"url": "mqtt://x:99999"}, "mqtt.url is"),
+        ({"topic": "{tag}", "sensor": "t"}, {"url": "mqtt://[::1"}, "mqtt.url is"),
+        ({"topic": "{tag}/{tag}", "sensor": "t"}, {}, "'{tag}/{tag}' has one of them twice"),
+        ({"topic": "a\0/{tag}", "sensor": "t"}, {}, "printable characters"),
         ({"topic": "{tag}", "sensor": "t"}, {"url": "mqtt://u:p@x"}, "has a user in it"),
         ({"topic": "{tag}", "sensor": "t"}, {"password_file": "/none"}, "No such file"),
         ({"topic": "{tag}", "sensor": "t"}, {"topics": []}, "mqtt.topics is [], expected a list"),

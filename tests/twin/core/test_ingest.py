@@ -9,7 +9,7 @@ import pytest
 
 from lupin_twin.core import ingest
 from lupin_twin.core.drops import MAX_TEXT_LENGTH, Drop, Reason
-from lupin_twin.core.history import History, TagHistory
+from lupin_twin.core.history import Repeats
 from lupin_twin.core.ingest import Received, ReceivedInspection, ReceivedReading, ReceivedTags
 from lupin_twin.core.state import Flower, Inspection, Pin, Pose, Reading, Scan, TwinStore
 from lupin_twin.ros.convert import pose_message, pose_of
@@ -173,32 +173,31 @@ def test_a_discovery_in_another_frame_is_dropped_once_whatever_it_holds() -> Non
 # --- writing ------------------------------------------------------------------------------------
 
 
-def test_what_is_written_is_in_store_and_history_and_what_is_refused_is_in_neither() -> None:
-    store, history = TwinStore(), History()
-    assert ingest.apply(Scan("1", S, READINGS), store, history) is None
-    assert ingest.apply(Inspection("1", 2 * S, Flower("rose")), store, history) is None
-    assert ingest.apply(Pin("1", at(1.0)), store, history) is None
+def test_what_is_written_is_stored_and_known_and_what_is_refused_is_neither() -> None:
+    store, repeats = TwinStore(), Repeats()
+    assert ingest.apply(Scan("1", S, READINGS), store, repeats) is None
+    assert ingest.apply(Inspection("1", 2 * S, Flower("rose")), store, repeats) is None
+    assert ingest.apply(Pin("1", at(1.0)), store, repeats) is None
     [tag] = store.snapshot(S, "map").tags
     assert ([r.value for r in tag.readings], tag.flower.species) == ([1.0], "rose")
     assert tag.pose == at(1.0)
-    assert [tried.stamp_ns for tried in history.of("1").attempts] == [S, 2 * S]
+    assert repeats.news(Scan("1", S, READINGS)) is None
     too_long = "x" * (MAX_TEXT_LENGTH + 1)
     for write in (Pin(too_long, at(1.0)), Scan(too_long, S), Inspection(too_long, S, None)):
-        drop = ingest.apply(write, store, history)
+        drop = ingest.apply(write, store, repeats)
         assert drop is not None
         assert drop.reason is Reason.REJECTED
         assert f"the limit is {MAX_TEXT_LENGTH}" in drop.why
-    assert history.of(too_long) == TagHistory()
+    assert repeats.news(Scan(too_long, S)) is not None
 
 
 def test_a_message_from_the_future_stays_as_old_as_when_it_was_heard_first() -> None:
     """Heard again, latched, it must not make what it said look fresh."""
-    store, history = TwinStore(), History()
+    store, repeats = TwinStore(), Repeats()
     for now_s in (100, 160, 220):
         heard = heard_reading(stamp_ns=10_000 * S)
         write = ingest.observation(heard, "map", now_s * S)
         assert isinstance(write, Scan)
-        ingest.apply(write, store, history)
+        ingest.apply(write, store, repeats)
     [tag] = store.snapshot(220 * S, "map").tags
     assert tag.last_observed_ns == 100 * S
-    assert [scan.stamp_ns for scan in history.of("1").scans] == [100 * S]

@@ -36,7 +36,7 @@ def test_a_row_that_cannot_be_written_costs_itself_alone(path: Path) -> None:
 
 def test_runs_are_kept_in_a_file_that_takes_anothers_place(path: Path) -> None:
     with opened(path) as file:
-        run = file.start(CLOCK, 1, is_believed=False).run
+        run = file.start(CLOCK, is_believed=False).run
     path.unlink()
     with opened(path) as file:
         file.retain_run(run)
@@ -49,7 +49,7 @@ def test_upkeep_purges_shrinks_and_checkpoints(path: Path, monkeypatch: pytest.M
     monkeypatch.setattr("lupin_twin.journal.file._LOG_BYTES", 10_000)
     monkeypatch.setattr("lupin_twin.journal.file._PURGE_EVERY_S", 0.0)
     with opened(path, Limits(days=36_500, max_bytes=60_000)) as file:
-        run = file.start(CLOCK, 1, is_believed=False).run
+        run = file.start(CLOCK, is_believed=False).run
         file.append([(run, scan(at_ns=NOW + n)) for n in range(5000)])
         steps = 0
         while file.check_size(may_purge=True):

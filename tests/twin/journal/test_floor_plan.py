@@ -74,7 +74,7 @@ def test_the_journal_has_the_newest_map(tmp_path: Path) -> None:
         journal = Journal(path, "test", LIMITS)
         try:
             journal.begin(CLOCK)
-            journal.floor_plan.put(floor)
+            journal.write_map(floor)
             wait_for(lambda it=floor: kept_map(path) == [(text_of(it),)], "the map in the file")  # type: ignore[misc]
         finally:
             journal.close()
@@ -85,14 +85,14 @@ def test_a_map_that_is_too_large_leaves_none_of_before(tmp_path: Path) -> None:
     journal = Journal(path, "test", LIMITS)
     try:
         journal.begin(CLOCK)
-        journal.floor_plan.put(FLOOR)
+        journal.write_map(FLOOR)
         wait_for(lambda: kept_map(path), "the map in the file")
     finally:
         journal.close()
     journal = Journal(path, "test", LIMITS)
     try:
         journal.begin(CLOCK)
-        journal.floor_plan.put(maps.map_of(np.zeros((4_001, 4_000), np.int8)))
+        journal.write_map(maps.map_of(np.zeros((4_001, 4_000), np.int8)))
         wait_for(lambda: kept_map(path) == [("",)], "no map in the file")
     finally:
         journal.close()

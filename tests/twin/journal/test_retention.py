@@ -96,7 +96,7 @@ def test_what_is_kept_begins_with_the_log_and_behind_what_was_deleted_or_lost(
     # Another run holds what lies before the end of the first, and has lost nothing.
     file.close()
     with opened(path) as again:
-        first = again.start(CLOCK, 1, is_believed=True).run
+        first = again.start(CLOCK, is_believed=True).run
         back = Clock(NOW - 9, NOW + DAY, is_simulated=False)
         again.begin(back, first, Carries.ALL, ended_ns=NOW + 2 * DAY)
         assert again.kept() == ((NOW - 9, FOREVER_NS),)
@@ -104,7 +104,7 @@ def test_what_is_kept_begins_with_the_log_and_behind_what_was_deleted_or_lost(
 
 def test_what_is_of_before_the_log_is_kept_from_there(path: Path) -> None:
     with opened(path) as file:
-        run = file.start(CLOCK, 1, is_believed=True).run
+        run = file.start(CLOCK, is_believed=True).run
         assert file.kept()[0][0] == NOW
         file.append([(run, scan("late", NOW - HOUR_NS))])
         assert file.kept()[0][0] == NOW - HOUR_NS

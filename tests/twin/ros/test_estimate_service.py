@@ -22,7 +22,7 @@ from lupin_twin.estimate.engine import TagPast, readings_of
 from lupin_twin.ros import estimate_service
 from lupin_twin.ros.estimate_service import EstimateService
 from lupin_twin.runtime.estimates import Report, ReportRequest
-from lupin_twin.runtime.workers import MAX_QUERIES
+from lupin_twin.runtime.workers import MAX_QUERIES, JobQueue, Workers
 from tests.support import messages
 from tests.support.domains import own_domain
 from tests.support.journal import select
@@ -245,22 +245,24 @@ def test_a_report_serves_for_a_while_and_what_is_wrong_is_said_once(
     came = Event()
     reported: list[str] = []
     utilities: Any = SimpleNamespace(is_behind=False, warn=lambda _, text: reported.append(text))
+    workers = Workers("test")
+    queue = JobQueue(workers, came.set)
     service = EstimateService(
         utilities,
+        queue,
         TwinStore(),
         recall,
         occupancy=lambda: None,
         day_length_s=86_400.0,
         max_grid_cells=100,
         now_ns=lambda: int(now_s() * 1e9),
-        wake=came.set,
     )
 
     def report() -> Report:
         answer = service.report(ReportRequest("co2"))
 
         def is_there() -> bool:
-            service.deliver()
+            queue.deliver()
             return answer.done() or came.wait(0.1)
 
         wait_for(lambda: is_there() and answer.done(), "a report")
@@ -276,4 +278,4 @@ def test_a_report_serves_for_a_while_and_what_is_wrong_is_said_once(
     assert len(searches) == 3, "it serves for half a minute"
     assert service.state() == Estimates({"co2": report().fit_problem}, (), 1)
     assert reported == [f"no new model of co2: {report().fit_problem}"]
-    service.close()
+    workers.close()

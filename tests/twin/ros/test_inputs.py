@@ -5,21 +5,17 @@ from __future__ import annotations
 import os
 from collections.abc import Iterable
 from pathlib import Path
-from types import SimpleNamespace
 
 from hypothesis import given
 from hypothesis import strategies as st
-from lupin_msgs.msg import TwinState
-from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
 
 from lupin_twin.ros.inputs import (
+    LEFT_OVER_S,
     Gaps,
     Input,
-    OtherTwins,
     TwinCount,
     other_users,
 )
-from tests.support.ros import Peer
 
 
 def test_other_users_are_those_who_own_ports_of_the_domain(tmp_path: Path) -> None:
@@ -82,56 +78,14 @@ def test_of_one_writer_every_lost_message_is_counted(skips: list[int], start: in
     assert gaps.lost == sum(skips)
 
 
-def received(*numbers: Iterable[int]) -> TwinCount:
-    """A count that has received these states, from two publishers in the graph."""
+def test_two_are_two_once_a_dead_one_would_have_left_the_graph() -> None:
     count = TwinCount()
-    for number in (number for some in numbers for number in some):
-        count.add(number)
-    count.see(2)
-    return count
-
-
-@given(st.integers(1, 50), st.integers(0, 60))
-def test_a_restarted_twin_is_not_taken_for_two(first: int, second: int) -> None:
-    """Nor when it passes the number at which the dead one has ended."""
-    assert received(range(first, 51), range(1, second)).value == 1
-
-
-@given(st.integers(1, 40), st.integers(1, 40))
-def test_two_that_speak_by_turns_are_two_after_two_states_of_each(first: int, second: int) -> None:
-    pairs = ((first + step, second + step) for step in range(2))
-    # One right behind the other looks like one publisher, for a state.
-    assert received(*pairs).value == 2 or abs(first - second) == 1
-    assert received(*((first + step, second + step) for step in range(3))).value == 2
-
-
-def test_two_are_two_until_one_has_left_the_graph() -> None:
-    count = received([5, 1, 6])
-    assert count.see(3)
-    assert count.value == 3
-    assert not count.see(1)
+    assert not count.see(2, 100.0)
+    assert not count.see(2, 100.0 + LEFT_OVER_S - 0.1)
     assert count.value == 1
-    count.add(7)
-    assert not count.see(2)
-
-
-def test_it_subscribes_only_while_there_are_several(domain: int) -> None:
-    texts: list[str] = []
-    utilities = SimpleNamespace(warn=lambda _, text: texts.append(text))
-    count = TwinCount()
-    with Peer(domain) as peer:
-        group = MutuallyExclusiveCallbackGroup()
-        others = OtherTwins(peer.node, utilities, count, "s", group=group)
-        publishers = [peer.node.create_publisher(TwinState, "/s", 1) for _ in range(2)]
-        peer.until(lambda: peer.node.count_publishers("/s") == 2, "both publishers")
-        others.check("/s")
-        assert peer.node.count_subscribers("/s") == 1
-        assert texts == []
-        for number in (1, 7, 2):
-            count.add(number)
-        others.check("/s")
-        assert texts[0].startswith("2 nodes publish /s: consumers get a mixture")
-        peer.node.destroy_publisher(publishers[0])
-        peer.until(lambda: peer.node.count_publishers("/s") == 1, "one publisher")
-        others.check("/s")
-        assert peer.node.count_subscribers("/s") == 0
+    assert count.see(2, 100.0 + LEFT_OVER_S)
+    assert count.see(3, 101.0 + LEFT_OVER_S)
+    assert count.value == 3
+    assert not count.see(1, 102.0 + LEFT_OVER_S)
+    assert not count.see(2, 103.0 + LEFT_OVER_S)
+    assert count.value == 1

@@ -10,7 +10,6 @@ from pathlib import Path
 
 import pytest
 
-from lupin_twin.core.history import History
 from lupin_twin.core.journal_condition import JournalState
 from lupin_twin.core.past import NotRemembered
 from lupin_twin.core.state import Flower, Inspection, Pin, Pose, Reading, Scan, TwinStore, Write
@@ -37,13 +36,13 @@ def sim(at_s: float, wall_s: float) -> Clock:
 
 
 @contextmanager
-def twin(path: Path | None, clock: Clock) -> Iterator[tuple[Memory, TwinStore, History]]:
+def twin(path: Path | None, clock: Clock) -> Iterator[tuple[Memory, TwinStore]]:
     """A life of a twin."""
-    store, history = TwinStore(), History(8)
-    memory = Memory(store, history, open_journal(path, "/twin", 1e4, 1e4), 8)
+    store = TwinStore()
+    memory = Memory(store, open_journal(path, "/twin", 1e4, 1e4))
     memory.follow(clock)
     try:
-        yield memory, store, history
+        yield memory, store
     finally:
         memory.close()
 
@@ -61,7 +60,7 @@ def test_damage_that_somebody_meets_has_the_file_set_aside_while_the_twin_record
 
         return memory.recall.query(ask).result(30.0)
 
-    with twin(path, wall(5)) as (memory, _, _):
+    with twin(path, wall(5)) as (memory, _):
         # What is met before is for the check at the start.
         wait_for(lambda: memory.condition.state is JournalState.RECORDING, "the journal")
         # Not through the memory: what that has read it keeps, and would not see the damage.
@@ -89,7 +88,7 @@ def test_damage_that_somebody_meets_has_the_file_set_aside_while_the_twin_record
 
 def test_what_is_known_again_is_told_in_one_line(tmp_path: Path) -> None:
     def told(path: Path, *clocks: Clock, writes: Sequence[Write] = ()) -> list[str | None]:
-        memory = Memory(TwinStore(), History(8), open_journal(path, "/twin", 1e4, 1e4), 8)
+        memory = Memory(TwinStore(), open_journal(path, "/twin", 1e4, 1e4))
         said = [memory.follow(clock) for clock in clocks]
         for write in writes:
             assert memory.apply(write, NOW) is None
@@ -127,32 +126,30 @@ WRITES = (SCAN, PART, FAILED, LOOK, BLIND, Pin("8", HERE), Pin("9", HERE))
 
 def test_a_twin_that_starts_again_knows_all_that_it_knew(tmp_path: Path) -> None:
     path = tmp_path / "j.sqlite"
-    with twin(path, wall(5)) as (memory, before, past):
+    with twin(path, wall(5)) as (memory, before):
         for write in WRITES:
             assert memory.apply(write, NOW) is None
-    with twin(path, wall(9)) as (_, after, again):
+    with twin(path, wall(9)) as (_, after):
         known = {tag.tag_id: tag for tag in after.snapshot(NOW, "map").tags}
         assert list(known) == ["7", "8", "9"]
         for tag in before.snapshot(NOW, "map").tags:
             restored = known[tag.tag_id]
             assert set(restored.readings) == set(tag.readings)
             assert replace(restored, readings=tag.readings) == tag
-            assert again.of(tag.tag_id) == past.of(tag.tag_id)
         assert after.observation_count >= before.observation_count
 
 
 def test_what_is_heard_again_changes_nothing_and_is_not_written(tmp_path: Path) -> None:
     path = tmp_path / "j.sqlite"
-    with twin(path, wall(5)) as (memory, _, _):
+    with twin(path, wall(5)) as (memory, _):
         for write in WRITES:
             memory.apply(write, NOW)
-    with twin(path, wall(9)) as (memory, store, history):
-        before, count, past = store.snapshot(NOW, "map"), store.observation_count, history.of("7")
+    with twin(path, wall(9)) as (memory, store):
+        before, count = store.snapshot(NOW, "map"), store.observation_count
         for write in WRITES:
             memory.apply(write, NOW + 9 * S)
         assert store.snapshot(NOW, "map") == before
         assert store.observation_count == count
-        assert history.of("7") == past
         wait_for(lambda: memory.condition.repeated == 5, "all that were there")
         assert memory.condition.written == 0
 
@@ -161,21 +158,21 @@ def test_a_simulation_that_starts_over_is_empty_and_one_that_goes_on_is_not(
     tmp_path: Path,
 ) -> None:
     path = tmp_path / "j.sqlite"
-    with twin(path, sim(500, 500)) as (memory, _, _):
+    with twin(path, sim(500, 500)) as (memory, _):
         memory.apply(at(SCAN, 499 * S), NOW + 499 * S)
         memory.apply(at(SCAN, 600 * S), NOW + 600 * S)
-    with twin(path, sim(605, 610)) as (_, store, _):
+    with twin(path, sim(605, 610)) as (_, store):
         assert store.tag("7")
-    with twin(path, sim(610, 86_400)) as (_, store, _):
+    with twin(path, sim(610, 86_400)) as (_, store):
         assert not store.tag("7")
 
 
 def test_nothing_is_known_before_a_simulated_clock_has_started(tmp_path: Path) -> None:
     path = tmp_path / "j.sqlite"
-    with twin(path, sim(5, 5)) as (memory, _, _):
+    with twin(path, sim(5, 5)) as (memory, _):
         memory.apply(at(SCAN, 4 * S), NOW)
         memory.apply(at(SCAN, 300 * S), NOW + 295 * S)
-    with twin(path, Clock(0, NOW, is_simulated=True)) as (memory, store, _):
+    with twin(path, Clock(0, NOW, is_simulated=True)) as (memory, store):
         memory.apply(at(LOOK, 301 * S), NOW + 296 * S)
         assert not store.tag("7")
         memory.follow(sim(305, 300))
@@ -185,7 +182,7 @@ def test_nothing_is_known_before_a_simulated_clock_has_started(tmp_path: Path) -
 
 def test_a_clock_that_goes_back_all_the_time_begins_few_runs(tmp_path: Path) -> None:
     path = tmp_path / "j.sqlite"
-    with twin(path, sim(9000, 0)) as (memory, _, _):
+    with twin(path, sim(9000, 0)) as (memory, _):
         for number in range(1000):
             memory.follow(sim(1000, number / 100))
             memory.follow(sim(9000, number / 100))
@@ -196,7 +193,7 @@ def test_off_is_a_temporary_file_that_answers_and_is_gone_at_the_end(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
-    with twin(None, wall(5)) as (memory, store, _):
+    with twin(None, wall(5)) as (memory, store):
         memory.apply(SCAN, NOW)
         assert store.tag("7")
         wait_for(lambda: memory.condition.written == 2, "the scan and its place")

@@ -111,4 +111,4 @@ def suggestion(listener: Listener) -> str:
     content["sensors"] = {
         name: entries[0] if len(entries) == 1 else entries for name, entries in sensors.items()
     }
-    return yaml.safe_dump(content, sort_keys=False)
+    return yaml.safe_dump(content, sort_keys=False, default_flow_style=None, width=200)

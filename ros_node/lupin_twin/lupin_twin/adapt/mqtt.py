@@ -6,7 +6,6 @@ import secrets
 import ssl
 from collections import deque
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Any, Final
 
 from lupin_twin.adapt.mqtt_topics import MAX_PAYLOAD_BYTES, Broker
@@ -16,15 +15,6 @@ from lupin_twin.adapt.table import ConfigError
 # at their largest take 65 MB.
 MAX_WAITING: Final = 1_000
 RETRY_S: Final = (1, 60)
-
-
-@dataclass(frozen=True, slots=True)
-class Message:
-    """One message of the broker."""
-
-    topic: str
-    payload: bytes
-    is_retained: bool
 
 
 class MqttClient:
@@ -48,7 +38,7 @@ class MqttClient:
             ) from None
         self._broker = broker
         self._wake = wake
-        self._waiting: deque[Message] = deque(maxlen=MAX_WAITING)
+        self._waiting: deque[Any] = deque(maxlen=MAX_WAITING)
         self.lost = 0
         self.problem = f"not connected to {broker.host}:{broker.port} yet"
         self._client: Any = Client(
@@ -77,8 +67,8 @@ class MqttClient:
         self._client.disconnect()
         self._client.loop_stop()
 
-    def take(self) -> list[Message]:
-        """What has come since the last call, in order."""
+    def take(self) -> list[Any]:
+        """What has come since the last call, in order: messages as paho has them."""
         return [self._waiting.popleft() for _ in range(len(self._waiting))]
 
     def _on_connect(
@@ -102,6 +92,6 @@ class MqttClient:
         if len(self._waiting) == MAX_WAITING:
             self.lost += 1
         # One byte more than is taken: `measured` refuses it.
-        payload = bytes(message.payload[: MAX_PAYLOAD_BYTES + 1])
-        self._waiting.append(Message(message.topic, payload, bool(message.retain)))
+        message.payload = bytes(message.payload[: MAX_PAYLOAD_BYTES + 1])
+        self._waiting.append(message)
         self._wake()

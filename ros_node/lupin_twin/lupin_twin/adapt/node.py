@@ -8,7 +8,7 @@ from __future__ import annotations
 import difflib
 import time
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass, field
+from contextlib import suppress
 from functools import partial
 from typing import Any, Final
 
@@ -20,7 +20,7 @@ from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rclpy.serialization import deserialize_message
 from std_msgs.msg import Header
 
-from lupin_twin.adapt.config import POSES, TAG_FRAME, Config, Place, Sensor
+from lupin_twin.adapt.config import POSES, TAG_FRAME, Config, Place, Robot, Sensor
 from lupin_twin.adapt.frames import FrameError, Frames, Sightings
 from lupin_twin.adapt.messages import (
     DETECTIONS_TYPE,
@@ -32,66 +32,32 @@ from lupin_twin.adapt.messages import (
     pose_of,
     transform_of,
 )
-from lupin_twin.adapt.mqtt import Message, MqttClient
+from lupin_twin.adapt.mqtt import MqttClient
 from lupin_twin.adapt.mqtt_topics import Pattern, measured
 from lupin_twin.adapt.scans import BuiltScan, Scans
+from lupin_twin.adapt.source import MQTT, Source
 from lupin_twin.adapt.table import ConfigError
 from lupin_twin.adapt.value import number_of
 from lupin_twin.core import interfaces
 from lupin_twin.core.diagnostics import OK, WARN, Finding
-from lupin_twin.core.drops import Drop, Reason, Rejected, Tally
+from lupin_twin.core.drops import Drop, Reason, Rejected
 from lupin_twin.core.state import NANOSECONDS_PER_SECOND
 from lupin_twin.ros import convert
 from lupin_twin.ros.base_node import NodeUtilities, latched, qos_of, waker
 
-MQTT: Final = "MQTT"
+# Patterns take as many steps as a topic has characters, or its square.
+MAX_TOPIC_LENGTH: Final = 1_000
 # Matches every publisher, also those that drop messages rather than wait.
 ANY_PUBLISHER: Final = QoSProfile(depth=50, reliability=ReliabilityPolicy.BEST_EFFORT)
 MAX_MESSAGE_BYTES: Final = 1_000_000
 # A reading whose stamp is farther from now was stamped by a clock that is wrong.
 MAX_SKEW_S: Final = 10.0
 # Odometry comes a hundred times a second: tags are looked for as often as anybody can drive.
-POSE_PERIOD_S: Final = 0.1
+POSE_PERIOD_S: Final = 0.05
 # Of each of several publishers its latched message comes.
 TF_STATIC_QOS: Final = latched(100)
 # A topic that says nothing for so long is named on `/diagnostics`.
 SILENT_S: Final = 10.0
-
-
-@dataclass(slots=True)
-class _Source:
-    """What came from a topic or the broker, what of it is in a scan, and what was dropped.
-
-    `problem` is what is wrong with it now, `shown` what it said last. `dropped` counts by case:
-    what is wrong with one sensor must not hide what is wrong with another. `name` is the topic's
-    in ROS.
-    """
-
-    name: str
-    type_name: str = ""
-    received: int = 0
-    used: int = 0
-    received_s: float = 0.0
-    problem: str = ""
-    shown: dict[str, str] = field(default_factory=dict)
-    dropped: Tally = field(default_factory=Tally)
-
-    def finding(self, topic: str) -> Finding:
-        """The same for `/diagnostics`."""
-        counts = self.dropped.value(time.monotonic())
-        wrong = [self.problem] if self.problem else []
-        wrong += [recent.message for recent in counts.recent]
-        return Finding(
-            topic,
-            WARN if wrong else OK,
-            "; ".join(wrong) or ("connected" if topic == MQTT else "receiving"),
-            {
-                "received": str(self.received),
-                "used": str(self.used),
-                **self.shown,
-                **{f"dropped: {case}": str(count) for case, count in counts.dropped.items()},
-            },
-        )
 
 
 class AdaptNode(Node):  # type: ignore[misc]  # rclpy is not typed
@@ -115,7 +81,7 @@ class AdaptNode(Node):  # type: ignore[misc]  # rclpy is not typed
         # Where the robot is, m; None: not known.
         self._at: tuple[float, float] | None = None
         # By topic as it is configured, or MQTT.
-        self._sources: dict[str, _Source] = {}
+        self._sources: dict[str, Source] = {}
         self._built = 0
         self._moved_s = 0.0
         self._started_s = time.monotonic()
@@ -134,7 +100,7 @@ class AdaptNode(Node):  # type: ignore[misc]  # rclpy is not typed
         if config.broker is not None:
             arrived = self.create_guard_condition(self.utilities.guarded("MQTT", self._on_mqtt))
             self._mqtt = MqttClient(config.broker, waker(arrived))
-            self._sources[MQTT] = _Source(MQTT)
+            self._sources[MQTT] = Source(MQTT)
             self._mqtt.start()
         self.utilities.every(None, 1.0, "the second", self._each_second)
 
@@ -142,7 +108,7 @@ class AdaptNode(Node):  # type: ignore[misc]  # rclpy is not typed
         robot, detections = self._config.robot, self._config.detections
         if robot is not None and robot.topic:
             self._listen(robot.topic, robot.type_name, self._on_pose)
-        if detections is not None or (robot is not None and robot.tf):
+        if detections is not None or self._config.frames or (robot is not None and robot.tf):
             self._listen(TF, TF_TYPE, partial(self._on_tf, False))
             self._listen(TF_STATIC, TF_TYPE, partial(self._on_tf, True), TF_STATIC_QOS)
         if detections is not None:
@@ -161,7 +127,7 @@ class AdaptNode(Node):  # type: ignore[misc]  # rclpy is not typed
         qos: QoSProfile = ANY_PUBLISHER,
     ) -> None:
         kind = message_type(type_name)
-        source = self._sources[topic] = _Source(topic, type_name)
+        source = self._sources[topic] = Source(topic, type_name)
 
         def read(data: bytes) -> None:
             source.received += 1
@@ -241,7 +207,8 @@ class AdaptNode(Node):  # type: ignore[misc]  # rclpy is not typed
         self._find_tags()
 
     def _place(self, frame: str) -> tuple[float, float, float]:
-        max_age_ns = int(self._config.robot.max_age_s * NANOSECONDS_PER_SECOND)  # type: ignore[union-attr]
+        robot = self._config.robot or Robot()
+        max_age_ns = int(robot.max_age_s * NANOSECONDS_PER_SECOND)
         return self._frames.place(frame, self._config.frame_id, self._now_ns(), max_age_ns)
 
     def _why_no_place(self, frame: str) -> str:
@@ -290,6 +257,11 @@ class AdaptNode(Node):  # type: ignore[misc]  # rclpy is not typed
             self._sightings.end(frame)
             if self._at is not None and self._scans.discover(tag_id, place, *self._at):
                 self._publish_tags()
+        for tag_id, frame in self._config.frames.items():
+            if tag_id not in self._scans.places:
+                with suppress(FrameError):
+                    self._scans.survey(tag_id, Place(*self._place(frame)))
+                    self._publish_tags()
 
     def _on_message(self, sensors: list[Sensor], topic: str, message: Any) -> None:
         stamp_ns = self._stamp_ns(topic, message)
@@ -336,12 +308,18 @@ class AdaptNode(Node):  # type: ignore[misc]  # rclpy is not typed
         assert self._config.broker is not None
         for message in self._mqtt.take():
             self._sources[MQTT].received += 1
+            if len(message.topic) > MAX_TOPIC_LENGTH:
+                why = (
+                    f"its topic has {len(message.topic)} characters, the limit: {MAX_TOPIC_LENGTH}"
+                )
+                self._drop(Reason.SIZE, f"MQTT {message.topic[:80]}", why, case="topic")
+                continue
             for pattern in self._config.broker.patterns:
                 found = pattern.match(message.topic)
                 if found is not None:
                     self._on_measured(pattern, *found, message)
 
-    def _on_measured(self, pattern: Pattern, tag: str, sensor: str, message: Message) -> None:
+    def _on_measured(self, pattern: Pattern, tag: str, sensor: str, message: Any) -> None:
         topic, now_ns = f"MQTT {message.topic[:80]}", self._now_ns()
         try:
             said = measured(pattern, tag, sensor, message.payload)
@@ -351,7 +329,7 @@ class AdaptNode(Node):  # type: ignore[misc]  # rclpy is not typed
         if said.is_away:
             self._publish([self._scans.failed(tag, "its sensor is offline", now_ns, is_fixed=True)])
             return
-        if said.stamp_s is None and message.is_retained and said.readings:
+        if said.stamp_s is None and message.retain and said.readings:
             self._drop(
                 Reason.REJECTED,
                 topic,
@@ -393,6 +371,10 @@ class AdaptNode(Node):  # type: ignore[misc]  # rclpy is not typed
         A topic on which nothing came for `silent_s` is silent.
         """
         self._move_by_tf()
+        for tag_id, frame in self._config.frames.items():
+            tf = self._sources[TF]
+            if tag_id not in self._scans.places:
+                tf.problem = tf.problem or self._why_no_place(frame)
         for topic, source in self._sources.items():
             if topic not in (MQTT, TF, TF_STATIC):
                 source.problem = self._why_silent(source, silent_s)
@@ -411,7 +393,7 @@ class AdaptNode(Node):  # type: ignore[misc]  # rclpy is not typed
         )
         return [*(source.finding(topic) for topic, source in self._sources.items()), made]
 
-    def _why_silent(self, source: _Source, silent_s: float) -> str:
+    def _why_silent(self, source: Source, silent_s: float) -> str:
         quiet_s = time.monotonic() - max(source.received_s, self._started_s)
         if quiet_s < silent_s:
             return ""

@@ -74,10 +74,14 @@ class Table:
 
 
 def check_text(what: str, value: Any) -> str:
-    """The value, where it is a text that is neither empty nor too long."""
-    if not isinstance(value, str) or not 0 < len(value) <= MAX_TEXT_LENGTH:
+    """The value, where it is a printable text that is neither empty nor too long."""
+    if (
+        not isinstance(value, str)
+        or not 0 < len(value) <= MAX_TEXT_LENGTH
+        or not value.isprintable()
+    ):
         raise ConfigError(
-            f"{what}: {shown(value)} is no text of 1 to {MAX_TEXT_LENGTH} characters; "
+            f"{what}: {shown(value)} is no text of 1 to {MAX_TEXT_LENGTH} printable characters; "
             "YAML takes yes, on and numbers for something else, unless they are in quotes"
         )
     return value

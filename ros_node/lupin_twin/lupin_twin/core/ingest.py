@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 from typing import Final
 
 from lupin_twin.core.drops import MAX_TEXT_LENGTH, Drop, Reason, Rejected
-from lupin_twin.core.history import History
+from lupin_twin.core.history import Repeats
 from lupin_twin.core.state import (
     STATUS_OK,
     Flower,
@@ -138,8 +138,8 @@ def discoveries(
             )
 
 
-def apply(write: Write, store: TwinStore, history: History) -> Drop | None:
-    """Write what is now, and what was; returns what the store refused.
+def apply(write: Write, store: TwinStore, repeats: Repeats) -> Drop | None:
+    """Write what is now; returns what the store refused.
 
     What was received before is nothing new, but for a place that its tag does not have yet.
     """
@@ -147,7 +147,7 @@ def apply(write: Write, store: TwinStore, history: History) -> Drop | None:
         if isinstance(write, Pin):
             store.pin(write.tag_id, write.pose)
             return None
-        news = history.news(write)
+        news = repeats.news(write)
         if news is None:
             if write.pose is not None:
                 store.pin(write.tag_id, write.pose)
@@ -158,7 +158,7 @@ def apply(write: Write, store: TwinStore, history: History) -> Drop | None:
             store.record_inspection(news)
     except Rejected as error:
         return Drop(Reason.REJECTED, str(error))
-    history.add(news)
+    repeats.add(news)
     return None
 
 

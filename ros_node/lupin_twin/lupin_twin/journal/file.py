@@ -13,9 +13,11 @@ from typing import Final
 
 from lupin_twin.core.notes import Note
 from lupin_twin.core.state import Write
+from lupin_twin.field.explored import OccupancyMap
 from lupin_twin.journal.appending import Appender, Stretch, copy_known, simulated
 from lupin_twin.journal.beside import Syncing, forwarded_seq
 from lupin_twin.journal.checking import find_damage
+from lupin_twin.journal.floor_plan import text_of
 from lupin_twin.journal.fold import Restored, copies, fold
 from lupin_twin.journal.notes import put_note
 from lupin_twin.journal.retention import (
@@ -30,7 +32,7 @@ from lupin_twin.journal.retention import (
     purge_step,
     shrink_step,
 )
-from lupin_twin.journal.rows import newest_rows
+from lupin_twin.journal.rows import last_rows
 from lupin_twin.journal.runs import (
     CORRECTION_NS,
     FOREVER_NS,
@@ -62,6 +64,8 @@ _LOG_BYTES: Final = 8_000_000
 _PURGE_EVERY_S: Final = 60.0
 _PURGE_HOURS_EVERY_S: Final = 86_400.0
 _POLL_EVERY_S: Final = 1.0
+# A robot that explores sends a map a second: not each of them is written.
+_MAP_REST_S: Final = 10.0
 _SALVAGE: Final = "salvage"
 
 _LAST_SCANS: Final = (
@@ -100,6 +104,8 @@ class JournalFile:
         self.holds_older = False
         self._path = path
         self._limits = limits
+        self._map: OccupancyMap | None = None
+        self._map_rests_until_s = 0.0
         self.quarantined = ""
         if is_sound is False or (is_sound is None and self._is_damaged()):
             self._quarantine()
@@ -168,6 +174,13 @@ class JournalFile:
         if get_meta(self._connection, ORIGIN) != origin:
             set_meta(self._connection, ORIGIN, origin)
 
+    def put_map(self, floor: OccupancyMap) -> None:
+        """Have the newest map in the file, by this call or one to come."""
+        now_s = time.monotonic()
+        if floor is not self._map and now_s >= self._map_rests_until_s:
+            self.note_map(text_of(floor))
+            self._map, self._map_rests_until_s = floor, now_s + _MAP_REST_S
+
     def note_map(self, text: str) -> None:
         """Have the newest map in the file, as `floor_plan` writes it; empty: it is too large."""
         if (get_meta(self._connection, MAP) or "") != text:
@@ -175,34 +188,34 @@ class JournalFile:
 
     # --- runs ---------------------------------------------------------------------------------
 
-    def start(self, now: Clock, scans_per_series: int, *, is_believed: bool) -> Restored:
+    def start(self, now: Clock, *, is_believed: bool) -> Restored:
         """What a twin that starts now knows, in the run that it is in: the last one, or a new one.
 
         A wall clock that is behind what the log has received is doubted, unless `is_believed`:
         nothing is begun then. Of a file that cannot be read what can be is salvaged, once.
         """
         try:
-            return self._start(now, scans_per_series, is_believed=is_believed)
+            return self._start(now, is_believed=is_believed)
         except FILE_ERRORS as error:
             if self.quarantined or not is_damage_error(error):
                 raise
         self.close()
         self._quarantine()
         self._open()
-        return self._start(now, scans_per_series, is_believed=is_believed)
+        return self._start(now, is_believed=is_believed)
 
-    def _start(self, now: Clock, scans_per_series: int, *, is_believed: bool) -> Restored:
+    def _start(self, now: Clock, *, is_believed: bool) -> Restored:
         every = self._runs()
         run = next((r for r in reversed(every) if r.begun.is_simulated == now.is_simulated), None)
         if run is None:
-            return self._restored(self.begin(now, None, Carries.NOTHING), scans_per_series)
+            return self._restored(self.begin(now, None, Carries.NOTHING))
         root = next(r for r in every if r.id == run.root)
         last = self._last(root)
         if now.is_simulated and not simulation_goes_on(root.begun, last, now):
             run = self.begin(now, run, Carries.NOTHING)
         elif not now.is_simulated and now.arrival_ns < last.arrival_ns - CORRECTION_NS:
             if not is_believed:
-                restored = self._restored(run, scans_per_series)
+                restored = self._restored(run)
                 return replace(restored, last_ns=last.arrival_ns, is_doubted=True)
             run = self.begin(now, run, Carries.PLACES)
         elif not now.is_simulated and now.stamp_ns < last.stamp_ns:
@@ -210,11 +223,12 @@ class JournalFile:
         else:
             with self._transaction():
                 self._go_on_with(root.id)
-        return self._restored(run, scans_per_series)
+        return self._restored(run)
 
-    def _restored(self, run: Run, scans_per_series: int) -> Restored:
+    def _restored(self, run: Run) -> Restored:
         known = fold(self._connection, run.root, FOREVER_NS, run.begun_seq)
-        rows = newest_rows(self._connection, run.root, scans_per_series)
+        begun = next(r for r in self._runs() if r.id == run.root)
+        rows = last_rows(self._connection, begun)
         return Restored(run, known, tuple(rows), self._appender.last_seq)
 
     def begin(

@@ -7,10 +7,8 @@ from __future__ import annotations
 
 import base64
 import json
-import math
-import time
 import zlib
-from typing import Final, Protocol
+from typing import Final
 
 import numpy as np
 
@@ -59,36 +57,3 @@ def map_of(text: str, revision: int) -> OccupancyMap:
         return OccupancyMap(**about, cells=np.frombuffer(cells, np.int8), revision=revision)
     except (AttributeError, KeyError, TypeError, zlib.error) as error:
         raise ValueError(f"it is no map: {error}") from None
-
-
-# A robot that explores sends a map a second: not each of them is written.
-_REST_S: Final = 10.0
-
-
-class MapFile(Protocol):
-    """Where it is written: `journal.file.JournalFile`."""
-
-    def note_map(self, text: str) -> None:
-        """See there."""
-
-
-class NewestMap:
-    """The newest map on its way from the twin's thread to the one that writes."""
-
-    def __init__(self) -> None:
-        self._newest: OccupancyMap | None = None
-        self._written: tuple[MapFile, OccupancyMap] | None = None
-        self._rests_until_s = -math.inf
-
-    def put(self, floor: OccupancyMap) -> None:
-        """Hand one over."""
-        self._newest = floor
-
-    def write(self, file: MapFile) -> None:
-        """Have it in the file, if it is another one than before, or another file."""
-        floor, written = self._newest, self._written
-        if floor is None or time.monotonic() < self._rests_until_s:
-            return
-        if written is None or written[0] is not file or written[1] is not floor:
-            file.note_map(text_of(floor))
-            self._written, self._rests_until_s = (file, floor), time.monotonic() + _REST_S

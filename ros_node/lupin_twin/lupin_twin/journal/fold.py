@@ -16,7 +16,7 @@ from itertools import accumulate, chain, repeat
 from typing import Any, Final, TypeVar
 
 from lupin_twin.core.drops import MAX_SENSORS_PER_TAG, MAX_TAGS
-from lupin_twin.core.history import History, LatestRequest
+from lupin_twin.core.history import LatestRequest
 from lupin_twin.core.past import MAX_POINTS, SeriesRequest
 from lupin_twin.core.state import (
     NO_FLOWER,
@@ -296,14 +296,12 @@ def _readings(rows: list[tuple[Any, ...]]) -> list[tuple[Reading, ...]]:
     return [tuple(made[end - length : end]) for end, length in zip(ends, lengths, strict=True)]
 
 
-def latest(connection: sqlite3.Connection, request: LatestRequest) -> History:
-    """The last scans and attempts of a tag in the run of now."""
-    history = History(request.count)
+def latest(connection: sqlite3.Connection, request: LatestRequest) -> list[Scan | Inspection]:
+    """The last scans and inspections of a tag in the run of now, in the order of receiving."""
     span = span_at(runs(connection.execute), FOREVER_NS)
-    if span is not None:
-        for row in newest_of_tag(connection, span.run.id, request.tag_id, request.count):
-            history.add(row)
-    return history
+    if span is None:
+        return []
+    return newest_of_tag(connection, span.run.id, request.tag_id, request.count)
 
 
 # A tag's id, its place (m, map frame), and its readings: (ns of ROS time, value).

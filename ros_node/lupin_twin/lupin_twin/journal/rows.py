@@ -11,6 +11,7 @@ from typing import Any, Final
 
 from lupin_twin.core import history, state
 from lupin_twin.core.state import Bloom, Flower, Inspection, Reading, Scan, Write
+from lupin_twin.journal.runs import Run
 from lupin_twin.journal.schema import LOCAL_SITE, DamagedFile
 
 KIND_READING = history.KIND_TAG_READING
@@ -27,32 +28,23 @@ def weight(write: Write) -> int:
     return 1
 
 
-# Scans that are read at most for the histories of all tags.
-_MAX_SCANS: Final = 20_000
 _OF_RUN: Final = "r.site = :site AND r.run = :run"
+# More than all publishers of a robot latch.
+_LAST: Final = 1_000
 
 
-def newest_rows(
-    connection: sqlite3.Connection, run: int, per_series: int
-) -> list[Scan | Inspection]:
-    """The newest scans of each series, and the newest inspection of each tag of a run."""
-    query: dict[str, Any] = {"site": LOCAL_SITE, "run": run}
-    (count,) = connection.execute(
-        "SELECT count(*) FROM series WHERE site = :site AND run = :run", query
-    ).fetchone()
-    query["depth"] = max(1, min(per_series, _MAX_SCANS // max(1, count)))
-    newest = (
-        "series AS s CROSS JOIN {0} AS r ON r.site = s.site AND r.seq IN (SELECT seq FROM {0}"
-        " WHERE site = s.site AND {1} ORDER BY stamp_ns DESC, seq DESC LIMIT {2})"
-        " WHERE s.site = :site AND s.run = :run"
-    )
+def last_rows(connection: sqlite3.Connection, run: Run) -> list[Scan | Inspection]:
+    """The last scans and inspections that were received in a run, in that order."""
+    query = {"site": LOCAL_SITE, "run": run.id, "since": run.begun_seq, "most": _LAST}
+    last = " AND r.seq >= :since ORDER BY r.seq DESC LIMIT :most"
     found = _rows(
         connection,
-        newest.format("scan", "series = s.series", ":depth"),
-        newest.format("look", "run = s.run AND tag = s.tag", "1") + " AND s.kind = 1",
+        "scan AS r CROSS JOIN series AS s ON s.site = r.site AND s.series = r.series"
+        f" WHERE r.site = :site AND s.run = :run{last}",
+        f"look AS r WHERE {_OF_RUN}{last}",
         query,
     )
-    return [row for _, row in sorted(found, key=lambda entry: entry[0])]
+    return [row for _, row in sorted(found, key=lambda entry: entry[0])[-_LAST:]]
 
 
 def newest_of_tag(

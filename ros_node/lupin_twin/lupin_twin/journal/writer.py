@@ -22,9 +22,9 @@ from lupin_twin.core.diagnostics import Origin
 from lupin_twin.core.journal_condition import Condition, JournalState
 from lupin_twin.core.notes import Note
 from lupin_twin.core.state import Write
+from lupin_twin.field.explored import OccupancyMap
 from lupin_twin.journal.beside import InUse, Lock
 from lupin_twin.journal.file import JournalFile
-from lupin_twin.journal.floor_plan import NewestMap
 from lupin_twin.journal.fold import Restored
 from lupin_twin.journal.notes import NoteQueue
 from lupin_twin.journal.rebuild import is_version3, upgrade
@@ -135,14 +135,10 @@ _HEALED_IN: Final = (*_WELL, JournalState.FAILING)
 
 
 class _Era(NamedTuple):
-    """A clock that the twin has followed, and why; `before_ns` is where the one before it was.
-
-    `scans` are restored per series at the start.
-    """
+    """A clock that the twin has followed, and why; `before_ns` is where the one before it was."""
 
     clock: Clock
     turn: Turn
-    scans: int
     before_ns: int | None
 
 
@@ -169,7 +165,7 @@ class Journal:
         self._is_temporary = is_temporary
         self._pending = Pending(max_weight)
         self._notes = NoteQueue()
-        self.floor_plan = NewestMap()
+        self._map: OccupancyMap | None = None
         self._eras: list[_Era] = []
         self._stop = threading.Event()
         self._was_attempted = threading.Event()
@@ -193,7 +189,6 @@ class Journal:
     def begin(
         self,
         clock: Clock,
-        scans_per_series: int = 1,
         turn: Turn = Turn.START,
         before_ns: int | None = None,
     ) -> None:
@@ -203,7 +198,7 @@ class Journal:
         `is_doubted`, it waits for another start, of a clock that agrees or is believed.
         """
         self._was_attempted.clear()
-        self._eras.append(_Era(clock, turn, scans_per_series, before_ns))
+        self._eras.append(_Era(clock, turn, before_ns))
         self._pending.arrived.set()
 
     def write(self, row: Write, at_ns: int | None = None) -> None:
@@ -221,6 +216,10 @@ class Journal:
         if self._stop.is_set() or self._reported.state not in (*_WELL, JournalState.STARTING):
             self._notes.refuse(self._reported.detail)
         return written
+
+    def write_map(self, floor: OccupancyMap) -> None:
+        """Hand the newest map over; one that comes before it was written takes its place."""
+        self._map = floor
 
     def take_restored(self, wait_s: float = 0.0) -> Restored | None:
         """What was known before, once; None if that is not there (yet).
@@ -313,7 +312,8 @@ class Journal:
                 self._catch_up(file)
                 self._write(file, all_that_waits=is_last)
                 self._notes.write(file.put_note)
-                self.floor_plan.write(file)
+                if self._map is not None:
+                    file.put_map(self._map)
                 has_more = not is_last and file.check_size(may_purge=bool(self._runs))
                 self._holds_older = file.holds_older
                 self._report_well(file)
@@ -346,7 +346,7 @@ class Journal:
                 self._runs.append(self._next_run(file, self._runs[-1], era))
                 continue
             believed = era.turn is Turn.BELIEVED
-            restored = file.start(era.clock, era.scans, is_believed=believed)
+            restored = file.start(era.clock, is_believed=believed)
             self._quarantined = file.quarantined or self._quarantined
             self._doubted_ns = restored.last_ns if restored.is_doubted else None
             if restored.is_doubted:

@@ -117,7 +117,6 @@ class NodeUtilities:
         depth: int,
         group: Any,
         callback: Callable[[Any], None],
-        on_number: Callable[[int], None] | None = None,
         is_wanted: Callable[[bytes], bool] | None = None,
     ) -> str:
         """Have `callback(message)` called, guarded, for each message on a latched topic.
@@ -129,9 +128,8 @@ class NodeUtilities:
         wanted, serialised as it is, or is lost of it, is nothing to be counted.
 
         `parameter` is what gave the name. Returns the topic as ROS has resolved and remapped it:
-        that is the name in its graph, and in warnings. `on_number` gets the number that each
-        message has from its publisher, counted from 1. What is past the limits of `shape` is
-        dropped before a single object is made of it.
+        that is the name in its graph, and in warnings. What is past
+        the limits of `shape` is dropped before a single object is made of it.
 
         Raises:
             lupin_twin.core.parameters.ParameterError: a name that ROS does not take.
@@ -145,8 +143,6 @@ class NodeUtilities:
             self._see_wait(info["received_timestamp"])
             self.published_ago_s = (info["received_timestamp"] - info["source_timestamp"]) / 1e9
             number = info["publication_sequence_number"]
-            if on_number is not None and number is not None:
-                on_number(number)
             # Of depth 1, the newest is wanted and nothing else.
             if depth > 1 and number is not None and is_wanted is None:
                 lost = source.gaps.see(number, lambda: int(self.node.count_publishers(name)))

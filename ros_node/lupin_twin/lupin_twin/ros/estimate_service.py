@@ -39,7 +39,7 @@ from lupin_twin.runtime.estimates import (
     readings_at,
 )
 from lupin_twin.runtime.journal_queries import Recall
-from lupin_twin.runtime.workers import JobQueue, Query, ShouldStop, Workers
+from lupin_twin.runtime.workers import JobQueue, Query, ShouldStop
 
 # A report, s of one core at worst.
 _REPORT_S: Final = 2.0
@@ -67,28 +67,21 @@ class EstimateService:
 
     All is made when asked, of what the journal has; of each sensor what was found last is retained.
     `occupancy()` is the latest map, where another tag could stand. `day_length_s` is s of ROS time.
-    Its threads are its own: no field waits for an estimate. `wake()` is called in one of them when
-    `deliver` has something to do.
+    Queries about the past are made in the same `queue`: no field waits for one.
     """
 
     utilities: NodeUtilities
+    queue: JobQueue
     store: TwinStore
     recall: Recall
     occupancy: Callable[[], OccupancyMap | None]
     day_length_s: float
     max_grid_cells: int
     now_ns: Callable[[], int]
-    wake: Callable[[], None]
-    _queue: JobQueue = field(init=False)
-    _workers: Workers = field(default_factory=lambda: Workers("estimate"))
     _known: dict[str, Known] = field(default_factory=dict)
     _rests_until_s: dict[str, float] = field(default_factory=dict)
     # Sensors whose estimates were reported as too narrow, and have not been better since.
     _warned: set[str] = field(default_factory=set)
-
-    def __post_init__(self) -> None:
-        """Nothing is known, and nothing asked for."""
-        self._queue = JobQueue(self._workers, self.wake, lambda: self.utilities.is_behind)
 
     def offer(self, node: Any, group: Any) -> None:
         """Have `node` offer the services, by names relative to its namespace; some answer later."""
@@ -97,10 +90,6 @@ class EstimateService:
             (GetEstimateReport, GET_ESTIMATE_REPORT.name, self._on_get_report),
         ):
             node.create_service(kind, name, callback, qos_profile=SERVICE_QOS, callback_group=group)
-
-    def go_on(self) -> None:
-        """Begin what may be begun by now; to be called now and then."""
-        self._queue.go_on()
 
     def prepare(self, request: EstimateRequest) -> Task:
         """What is to be done for an estimate.
@@ -133,7 +122,7 @@ class EstimateService:
             else:
                 answer.set_result(report)
 
-        self._queue.ask(self._query(request, reply, lambda report: report))
+        self.queue.ask(self._query(request, reply, lambda report: report))
         return answer
 
     def _query(
@@ -205,14 +194,6 @@ class EstimateService:
             sum(known.failed for known in self._known.values()),
         )
 
-    def deliver(self) -> None:
-        """Hand out what was made."""
-        self._queue.deliver()
-
-    def close(self) -> None:
-        """End the threads; what they make is for nobody then."""
-        self._workers.close()
-
     def _on_get_estimate(self, request: Any, response: Any) -> Any:
         def prepare(reply: Callable[[Any], None]) -> Query:
             task = self.prepare(convert_field.estimate_request_of(request))
@@ -223,14 +204,14 @@ class EstimateService:
                 task.cost_s,
             )
 
-        return answer_later(self._queue, prepare, response, self.utilities.report)
+        return answer_later(self.queue, prepare, response, self.utilities.report)
 
     def _on_get_report(self, request: Any, response: Any) -> Any:
         def prepare(reply: Callable[[Any], None]) -> Query:
             wanted = convert_field.report_request_of(request)
             return self._query(wanted, reply, convert_field.report_response)
 
-        return answer_later(self._queue, prepare, response, self.utilities.report)
+        return answer_later(self.queue, prepare, response, self.utilities.report)
 
     def _from_journal(self, sensor: str, at_ns: int) -> Callable[[], Future[Sequence[TagPast]]]:
         return lambda: self.recall.query(

@@ -11,12 +11,9 @@ import math
 import os
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
-from lupin_msgs.msg import TwinState
-from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 
 from lupin_twin.runtime.process import FOLDER, ports
@@ -180,77 +177,27 @@ def _name(publisher: Any) -> str:
     return f"{publisher.node_namespace.rstrip('/')}/{publisher.node_name}"
 
 
-# More publishers than this on one topic are counted as the graph shows them.
-MAX_ROWS: Final = 8
+# A twin that has died stays in DDS's graph for 20 s (the lease), and one restarted in its place is
+# none beside it.
+LEFT_OVER_S: Final = 30.0
 
 
 class TwinCount:
-    """Counts a second twin as soon as states of two have come by turns."""
+    """Counts the twins that publish one state: several, once the graph has shown so for long."""
 
     def __init__(self) -> None:
         self.value = 1
-        # The last number of each row, in the order in which the rows began.
-        self._rows: list[int] = []
-        self._by_turns = False
+        self._since_s: float | None = None
 
-    def add(self, number: int) -> None:
-        """Note the number that its publisher gave to a state, counted from 1."""
-        # The newest first: a twin that was started anew passes the number at which the last ended.
-        for index in reversed(range(len(self._rows))):
-            if self._rows[index] == number - 1:
-                self._rows[index] = number
-                self._by_turns |= index < len(self._rows) - 1
-                return
-        self._rows = [*self._rows[1 - MAX_ROWS :], number]
-
-    def see(self, publishers: int) -> bool:
+    def see(self, publishers: int, now_s: float) -> bool:
         """Note how many publishers the graph shows; returns whether there are several twins.
 
-        `value` is the count to believe in.
+        `value` is the count to believe in; `now_s` is seconds of a clock that never jumps.
         """
         if publishers <= 1:
-            self._rows = self._rows[-1:]
-            self._by_turns = False
-        is_several = publishers > 1 and self._by_turns
+            self._since_s = None
+        elif self._since_s is None:
+            self._since_s = now_s
+        is_several = self._since_s is not None and now_s - self._since_s >= LEFT_OVER_S
         self.value = publishers if is_several else 1
         return is_several
-
-
-@dataclass(slots=True)
-class OtherTwins:
-    """Counts who publishes the topic `name`, the node's own state; subscribes where it is several.
-
-    Its own states come too then; a dead twin, still in the graph, publishes nothing.
-    """
-
-    node: Node
-    utilities: Any
-    count: TwinCount
-    name: str
-    group: Any
-    _subscription: Any = None
-
-    def check(self, topic: str) -> None:
-        """Count who publishes it; `topic` is the name as ROS has resolved it."""
-        publishers = int(self.node.count_publishers(topic))
-        self._subscribe(publishers > 1)
-        if self.count.see(publishers):
-            self.utilities.warn(
-                ("twins", 0),
-                f"{self.count.value} nodes publish {topic}: consumers get a mixture; "
-                "stop all twins but one, or give them ROS domains of their own",
-            )
-
-    def _subscribe(self, wanted: bool) -> None:
-        if wanted and self._subscription is None:
-            self._subscription = self.node.create_subscription(
-                TwinState,
-                self.name,
-                lambda _, info: self.count.add(int(info["publication_sequence_number"])),
-                QoSProfile(depth=10, reliability=ReliabilityPolicy.RELIABLE),
-                callback_group=self.group,
-                raw=True,
-            )
-        elif not wanted and self._subscription is not None:
-            self.node.destroy_subscription(self._subscription)
-            self._subscription = None

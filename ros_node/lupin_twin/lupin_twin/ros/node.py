@@ -20,7 +20,7 @@ from lupin_twin.core import ingest, interfaces
 from lupin_twin.core.clock import LATCHED_AFTER_S, ClockWatch, Lateness
 from lupin_twin.core.diagnostics import CLOCK, ERROR, Health, Origin, findings, origin_of
 from lupin_twin.core.drops import Drop, Reason
-from lupin_twin.core.history import History, kind_of
+from lupin_twin.core.history import kind_of
 from lupin_twin.core.parameters import ParameterError, TwinParameters, World
 from lupin_twin.core.state import ClockState, Inspection, Scan, Snapshot, TwinStore, Write
 from lupin_twin.field.engine import FieldCache, FieldEngine, FieldRules
@@ -31,7 +31,7 @@ from lupin_twin.ros import convert, message_limits
 from lupin_twin.ros.base_node import NodeUtilities, qos_of, waker
 from lupin_twin.ros.convert import diagnostics
 from lupin_twin.ros.estimate_service import EstimateService
-from lupin_twin.ros.inputs import OtherTwins, TwinCount
+from lupin_twin.ros.inputs import TwinCount
 from lupin_twin.ros.layer_service import LAYERS_PERIOD_S, LayerService
 from lupin_twin.ros.parameters import AdjustableNode, declare, naming, naming_own_parameters
 from lupin_twin.ros.responses import RETRY_S, Responses
@@ -67,7 +67,6 @@ class TwinNode(AdjustableNode):
         self.parameters = declare(self)
         self._world = world
         self.store = TwinStore()
-        self.history = History(self.parameters.buffer_len)
         self.memory = self._memory()
         self.lateness = Lateness()
         self.fields = FieldEngine(FieldRules.of(self.parameters), FieldCache())
@@ -100,13 +99,13 @@ class TwinNode(AdjustableNode):
         self._past_queue = JobQueue(self._workers, wake, lambda: self.utilities.is_behind)
         self.estimates = EstimateService(
             self.utilities,
+            self._past_queue,
             self.store,
             self.memory.recall,
             occupancy=lambda: self.occupancy_map,
             day_length_s=world.day_length_s,
             max_grid_cells=self.parameters.max_grid_cells,
             now_ns=self.now_ns,
-            wake=wake,
         )
         self.layers = LayerService(
             self.utilities,
@@ -168,7 +167,7 @@ class TwinNode(AdjustableNode):
             ) from error
         name = self.get_fully_qualified_name()
         journal = open_journal(path, name, p.journal_days, p.journal_max_mb, self._world.origin)
-        return Memory(self.store, self.history, journal, p.buffer_len)
+        return Memory(self.store, journal)
 
     def _connect(self) -> None:
         p, group = self.parameters, self._group
@@ -199,7 +198,6 @@ class TwinNode(AdjustableNode):
         self.layers.offer(self, p.layers, p.frame_id)
         for service in self.services:  # those of its parameters too
             responses.watch(service)
-        self._others = OtherTwins(self, self.utilities, self.twins, p.state_topic, group=group)
         self._diagnostics = self.create_publisher(DiagnosticArray, own.name, qos_of(own))
         for period_s, what, callback in (
             (DIAGNOSTICS_PERIOD_S, "diagnostics", self._publish_diagnostics),
@@ -240,7 +238,7 @@ class TwinNode(AdjustableNode):
         if isinstance(write, Drop):
             self.utilities.drop(write, topic)
             return
-        is_news = self.history.news(write) is not None
+        is_news = self.memory.repeats.news(write) is not None
         if self._apply(write, topic):
             self._observed_s = time.monotonic()
             if is_news:
@@ -289,13 +287,11 @@ class TwinNode(AdjustableNode):
         self.utilities.drain()
         self._field_service.queue.deliver()
         self._past_queue.deliver()
-        self.estimates.deliver()
         self.layers.deliver()
 
     def destroy_node(self) -> None:
         """End the workers and the journal too; what they compute is for nobody then."""
         self._workers.close()
-        self.estimates.close()
         self.layers.close()
         self.memory.close()
         super().destroy_node()
@@ -330,7 +326,13 @@ class TwinNode(AdjustableNode):
         self._state_publisher.publish(self._states.build(snapshot))
         self.utilities.drain()
         self._times_publisher.publish(self._times.build(snapshot))
-        self._others.check(self._state_publisher.topic_name)
+        topic = self._state_publisher.topic_name
+        if self.twins.see(int(self.count_publishers(topic)), time.monotonic()):
+            self.utilities.warn(
+                ("twins", 0),
+                f"{self.twins.value} nodes publish {topic}: consumers get a mixture; "
+                "stop all twins but one, or give them ROS domains of their own",
+            )
 
     @property
     def _clock_state(self) -> ClockState:
@@ -359,7 +361,6 @@ class TwinNode(AdjustableNode):
 
     def _check_clock(self) -> None:
         self._past_queue.go_on()
-        self.estimates.go_on()
         before = self._clock_watch.state
         self.now_ns()
         if self._clock_watch.state != before:

@@ -22,7 +22,7 @@ from typing import Final, NamedTuple
 from lupin_twin.core import ingest
 from lupin_twin.core.diagnostics import Origin
 from lupin_twin.core.drops import Drop
-from lupin_twin.core.history import History
+from lupin_twin.core.history import Repeats
 from lupin_twin.core.journal_condition import Condition
 from lupin_twin.core.notes import Note
 from lupin_twin.core.state import Pin, TwinStore, Write
@@ -65,23 +65,20 @@ class _Doubt(NamedTuple):
 
 
 class Memory:
-    """A store, its history, and the journal of both; `recall` queries that.
+    """A store, what it received, and the journal of both; `recall` queries that.
 
-    `buffer_len` scans of a series are restored at most; `steady_ns` is a clock that never jumps.
+    `steady_ns` is a clock that never jumps.
     """
 
     def __init__(
         self,
         store: TwinStore,
-        history: History,
         journal: Journal,
-        buffer_len: int,
         steady_ns: Callable[[], int] = time.monotonic_ns,
     ) -> None:
         self._store = store
-        self._history = history
+        self.repeats = Repeats()
         self._journal = journal
-        self._buffer_len = buffer_len
         self._steady_ns = steady_ns
         self._clock: Clock | None = None
         # What the wall's clock is ahead of the steady one.
@@ -110,7 +107,7 @@ class Memory:
         lead_ns = now.arrival_ns - self._steady_ns()
         if before is None:
             self._clock, self._lead_ns = now, lead_ns
-            self._journal.begin(now, self._buffer_len)
+            self._journal.begin(now)
             return self._take(self._journal.take_restored(_START_WAIT_S), now)
         if self._doubt is not None:
             self._clock, self._lead_ns = now, lead_ns
@@ -129,7 +126,7 @@ class Memory:
         if self._early is not None:
             self._lost += len(self._early) == MAX_EARLY
             self._early.append(_Early(write, self._lead_ns))
-        dropped = ingest.apply(write, self._store, self._history)
+        dropped = ingest.apply(write, self._store, self.repeats)
         if dropped is None and self._doubt is None:
             self._hand_over(write)
         return dropped
@@ -156,7 +153,7 @@ class Memory:
 
     def note_map(self, floor: OccupancyMap) -> None:
         """Have the newest map in the journal; see there."""
-        self._journal.floor_plan.put(floor)
+        self._journal.write_map(floor)
 
     def heal(self, damage: str) -> None:
         """Have a journal in which somebody has met damage set aside; from any thread."""
@@ -210,7 +207,7 @@ class Memory:
         for entry in early:
             if doubt is not None and self._agrees:
                 entry = _moved(entry, self._lead_ns - entry.lead_ns)  # noqa: PLW2901
-            ingest.apply(entry.write, self._store, self._history)
+            ingest.apply(entry.write, self._store, self.repeats)
             if doubt is not None and self._doubt is None:
                 self._hand_over(entry.write)
         self.hold_to(now)
@@ -219,9 +216,9 @@ class Memory:
     def _restore(self, restored: Restored) -> None:
         count = self._store.observation_count
         self._store.restore(restored.known.tags, restored.known.observed)
-        self._history.clear()
+        self.repeats.clear()
         for row in restored.rows:
-            self._history.add(row)
+            self.repeats.add(row)
         # From before what was handed over meanwhile, if it was earlier.
         placed = dict(restored.known.placed_ns)
         for tag_id, at_ns in self._placed_ns.items():
@@ -239,7 +236,7 @@ class Memory:
         """
         if not self._store.hold_to(now.stamp_ns):
             return False
-        self._history.hold_to(now.stamp_ns, retains_keys=not now.is_simulated)
+        self.repeats.hold_to(now.stamp_ns, retains_keys=not now.is_simulated)
         return True
 
     def _check_doubt(self, doubt: _Doubt, now: Clock) -> str | None:
@@ -248,9 +245,9 @@ class Memory:
             return self._take(self._journal.take_restored(), now)
         self._agrees = now.is_simulated or now.arrival_ns >= doubt.last_ns - CORRECTION_NS
         if self._agrees:
-            self._journal.begin(now, self._buffer_len)
+            self._journal.begin(now)
         elif self._steady_ns() - doubt.since_ns >= DOUBT_NS:
-            self._journal.begin(doubt.clock, self._buffer_len, Turn.BELIEVED)
+            self._journal.begin(doubt.clock, Turn.BELIEVED)
         else:
             return None
         self._is_requested = True

@@ -8,12 +8,12 @@ days raise.
 
 from __future__ import annotations
 
+import os
 import statistics
 import time
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import replace
-from pathlib import Path
 from random import Random
 
 from lupin_bridge.alarms.board import AlarmBoard
@@ -27,6 +27,7 @@ from lupin_bridge.notify.mirror import Mirror
 from lupin_twin.core.state import Reading, Snapshot, TagState
 from lupin_twin.core.writes import PastWrite, RunSpan
 from tests.support.ordinary_day import DAY_NS, S, ordinary_days
+from tests.support.proc_stat import resident_mb
 from tests.support.seen import alarm, by_light
 
 DAYS = 7
@@ -58,20 +59,13 @@ def write(number: int, tag_id: str, at_ns: int, values: list[float]) -> PastWrit
     return PastWrite(number, 1, tag_id, at_ns, 0, 0, tuple(MIDDLE), tuple(values))
 
 
-def resident_mb() -> float:
-    for line in Path("/proc/self/status").read_text().splitlines():
-        if line.startswith("VmRSS:"):
-            return int(line.split()[1]) / 1e3
-    return 0.0
-
-
 def ms_since(start: float) -> float:
     return (time.thread_time() - start) * 1e3
 
 
 def alarms_of(tags: int) -> None:
     heard = list(past_of(tags))
-    before_mb = resident_mb()
+    before_mb = resident_mb(os.getpid())
     follower = Follower(own_sensors(), lambda light, _: bool(light), SPANS)
     lots = []
     for first in range(0, len(heard), LOT):
@@ -83,7 +77,8 @@ def alarms_of(tags: int) -> None:
     found = follower.found(now_ns)
     row(tags, f"start: {len(heard):,} scans", sum(lots) + ms_since(start), max(lots))
     row(tags, f"start: all {len(found.alarms):,} alarms told", ms_since(start))
-    print(f"{'':>7}  memory of that, without the scans heard: {resident_mb() - before_mb:.0f} MB")
+    took_mb = resident_mb(os.getpid()) - before_mb
+    print(f"{'':>7}  memory of that, without the scans heard: {took_mb:.0f} MB")
     took = []
     for change in range(CHANGES):
         now_ns += S

@@ -408,6 +408,11 @@ def test_every_language_has_room_on_a_phone(
     # Three letters, and the arrow beside them: no word to be broken.
     assert hmi.page.locator("thead th").first.locator("span").first.evaluate(_LINES) == 1
     assert hmi.page.evaluate("document.documentElement.scrollWidth") == PHONE["width"]
+    # On a phone and on the smallest laptops this column is narrow, and has the arrow at first.
+    for width in (PHONE["width"], 1100, 1280):
+        resize(hmi, (width, 800))
+        health = hmi.page.locator("thead [data-column=health] button > span").first
+        assert health.evaluate(_LINES) == 1, width
 
 
 def test_the_page_speaks_as_the_browser_the_address_or_the_menu_says(

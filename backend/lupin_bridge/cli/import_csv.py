@@ -33,6 +33,8 @@ SOURCE: Final = "import"
 HELP: Final = (
     "readings of before, from CSV, into a journal; without --write, what would be imported"
 )
+# Stamp, tag, and the value of each sensor.
+Merged = tuple[int, str, dict[str, float]]
 _BATCH: Final = 20_000
 _RETENTION_DAYS: Final = 90
 # The journal deletes nothing while it is imported into.
@@ -102,10 +104,8 @@ def _run(options: argparse.Namespace, path: Path) -> int:
     return 0
 
 
-def in_order(
-    found: Iterator[Found], summary: Summary
-) -> Iterator[tuple[int, str, dict[str, float]]]:
-    """Stamp, tag and readings by their stamps; of one tag and moment, of each sensor its first.
+def in_order(found: Iterator[Found], summary: Summary) -> Iterator[Merged]:
+    """The scans by their stamps; rows of one tag and moment are one, of each sensor its first.
 
     Exports have one sensor behind the other; there may be more than the memory holds.
     """
@@ -135,10 +135,8 @@ def in_order(
             yield stamp_ns, tag_id, values
 
 
-def _write(
-    path: Path, columns: Columns, found: Iterator[tuple[int, str, dict[str, float]]]
-) -> tuple[int, int]:
-    """Write scans where each belongs, batch by batch; how many are new, and how many were known."""
+def _write(path: Path, columns: Columns, found: Iterator[Merged]) -> tuple[int, int]:
+    """Write them where each belongs, batch by batch; how many are new, and how many were known."""
     path.parent.mkdir(parents=True, exist_ok=True)
     new = count = 0
     with (

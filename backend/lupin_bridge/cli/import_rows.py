@@ -1,4 +1,4 @@
-"""Scans out of a CSV file: which column is what, what of it is refused, and why. Pure.
+"""Scans out of a CSV file: which column is what, what of it is refused, and why.
 
 A row is a scan of one tag. In the file of columns, either each sensor has a column of its own, or
 one column names the sensor and another has its value, as databases export it.
@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import csv
 import math
+import time
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import suppress
 from dataclasses import dataclass, field
 from datetime import datetime
 from functools import lru_cache, partial
@@ -17,7 +17,7 @@ from typing import Any, Final, TextIO
 from zoneinfo import ZoneInfo
 
 from lupin_twin.adapt.table import ConfigError, Table, is_number, shown
-from lupin_twin.adapt.value import AS_IT_IS, Value, values_of
+from lupin_twin.adapt.value import AS_IT_IS, Value, seconds_of, values_of
 from lupin_twin.core.drops import (
     MAX_SENSORS_PER_TAG,
     MAX_TAGS,
@@ -26,7 +26,6 @@ from lupin_twin.core.drops import (
 )
 from lupin_twin.core.state import NANOSECONDS_PER_SECOND, Pose
 
-_MILLISECONDS: Final = 1e11
 _TOLD_EVERY: Final = 20_000
 # Characters of a line; a field of the csv module has 131,072 at most.
 _MAX_LINE: Final = 1_000_000
@@ -276,28 +275,9 @@ def _number(name: str, text: str, column: Value) -> float:
 # Rows of many tags have the same moment, one behind the other.
 @lru_cache(maxsize=256)
 def _moment_ns(text: str, zone: ZoneInfo | None) -> int:
-    number = None
-    if text[4:5] != "-":  # most are dates: to find by an error that they are no numbers is slow
-        with suppress(ValueError):
-            number = float(text)
-    if number is not None:
-        # InfluxDB 1 has nanoseconds.
-        unit = next((size for size in (1e9, 1e6, 1e3) if number > _MILLISECONDS * size / 1e3), 1.0)
-        seconds = number / unit
-        if not 0 < seconds < _MILLISECONDS:
-            raise ValueError("the time is no moment since 1970")
-        return int(seconds * 1e6) * 1000
-    try:
-        moment = datetime.fromisoformat(text.strip())
-    except ValueError:
-        raise ValueError("the time is no ISO 8601, and no seconds since 1970") from None
-    if moment.tzinfo is None:
-        if zone is None:
-            raise ValueError("the time has no offset, and time_zone is not given")
-        moment = moment.replace(tzinfo=zone)
-    seconds = moment.timestamp()
-    if seconds <= 0:
-        raise ValueError("the time is before 1970")
+    seconds = seconds_of(text, zone)
+    if seconds > time.time():
+        raise ValueError("the time is ahead of now")
     return int(seconds * 1e6) * 1000
 
 

@@ -222,6 +222,8 @@ def test_what_came_before_a_twin_is_in_its_past(importing: Import) -> None:
         ("yesterday,A,1,", "the time is no ISO 8601, and no seconds since 1970"),
         ("2024-05-01T10:00:00,A,1,", "the time has no offset, and time_zone is not given"),
         ("1900-05-01T10:00:00Z,A,1,", "the time is before 1970"),
+        ("9999-12-31T23:59:59Z,A,1,", "the time is ahead of now"),
+        ("9e10,A,1,", "the time is ahead of now"),
         ("-5,A,1,", "the time is no moment since 1970"),
         ("1e30,A,1,", "the time is no moment since 1970"),
         ("1714558200,,1,", "no tag, or one of more than 256 characters"),

@@ -64,11 +64,9 @@ class Robot:
             Observation, "/floranova/observations", self.observations.append, latched(50)
         )
         # Once, and for ever; the camera looks along the robot's left.
-        self._static.publish(
-            TFMessage(transforms=[self._step("base_link", "camera", (0.0, 0.2, 0.5))])
-        )
+        self.stand(self.step("base_link", "camera", (0.0, 0.2, 0.5)))
 
-    def _step(self, parent: str, child: str, at: tuple[float, float, float]) -> TransformStamped:
+    def step(self, parent: str, child: str, at: tuple[float, float, float]) -> TransformStamped:
         step = TransformStamped(child_frame_id=child)
         step.header.frame_id = parent
         step.header.stamp = self._node.get_clock().now().to_msg()
@@ -76,11 +74,16 @@ class Robot:
         move.x, move.y, move.z = at
         return step
 
+    def stand(self, *steps: TransformStamped) -> None:
+        from tf2_msgs.msg import TFMessage
+
+        self._static.publish(TFMessage(transforms=steps))
+
     def be_at(self, x: float, *steps: TransformStamped) -> None:
         from tf2_msgs.msg import TFMessage
 
-        self._tf.publish(TFMessage(transforms=[self._step("map", "odom", (x - 1.0, 0.0, 0.0))]))
-        own = self._step("odom", "/base_link", (1.0, 0.0, 0.0))  # as ROS 1 wrote it
+        self._tf.publish(TFMessage(transforms=[self.step("map", "odom", (x - 1.0, 0.0, 0.0))]))
+        own = self.step("odom", "/base_link", (1.0, 0.0, 0.0))  # as ROS 1 wrote it
         self._tf.publish(TFMessage(transforms=[own, *steps]))
 
     def see(
@@ -89,7 +92,7 @@ class Robot:
         """As apriltag_ros: first the detection, behind it the transform, of the same moment."""
         from apriltag_msgs.msg import AprilTagDetection, AprilTagDetectionArray
 
-        step = self._step("camera", frame.format(number), (ahead_m, 0.0, 0.0))
+        step = self.step("camera", frame.format(number), (ahead_m, 0.0, 0.0))
         detection = AprilTagDetection(family="tag36h11", id=number, hamming=hamming)
         self._seen.publish(AprilTagDetectionArray(header=step.header, detections=[detection]))
         return step
@@ -194,6 +197,36 @@ def test_a_robot_whose_transforms_are_old_is_nowhere(domain: int, config: Path) 
             peer.spin_briefly()
         peer.until(lambda: len(robot.reports) >= 2, "two seconds")
         assert robot.observations == []
+
+
+def test_a_fixed_sensor_is_where_its_frame_is(domain: int, config: Path) -> None:
+    config.write_text(
+        "tags: {bench: bench_sensor, lost: nowhere}\nwindow_s: 0.2\nsensors:\n  temperature: "
+        "{topic: /temperature, type: sensor_msgs/msg/Temperature, tag: bench}\n"
+    )
+    with (
+        twin_node(domain),
+        adapt(domain, "--config", str(config)) as process,
+        Peer(domain) as peer,
+    ):
+        robot = Robot(peer)
+        peer.listen()
+        frames = [
+            robot.step("map", "bench_row", (4.0, 0.0, 0.0)),
+            robot.step("bench_row", "bench_sensor", (0.0, 1.5, 0.8)),
+        ]
+
+        def is_there() -> Any:
+            robot.stand(*frames)
+            robot.read(21.5)
+            tags = {tag.tag_id: tag for tag in peer.states[-1].tags} if peer.states else {}
+            tag = tags.get("bench")
+            return tag if tag and tag.readings and tag.pose.orientation.w else None
+
+        at = peer.until(is_there, "the sensor where its frame is").pose.position
+        assert (at.x, at.y, at.z) == pytest.approx((4.0, 1.5, 0.8))
+        peer.until(lambda: robot.said("TF has no way from 'nowhere' to 'map'"), "the other one")
+        assert process.exit_code is None
 
 
 def test_check_says_where_tf_has_the_robot_and_which_tags_are_seen(domain: int) -> None:

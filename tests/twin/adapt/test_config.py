@@ -45,6 +45,11 @@ def test_tags_may_stand_in_a_file_of_their_own(tmp_path: Path) -> None:
     assert read_config(tmp_path / "adapt.yaml").tags == {"A": Place(1.5, 2.5)}
 
 
+def test_a_tag_may_be_a_frame_of_tf() -> None:
+    config = config_of(changed("tags", {"A": [1, 2], "B": "bench_b"}))
+    assert (config.tags, config.frames) == ({"A": Place(1, 2)}, {"B": "bench_b"})
+
+
 def test_one_quantity_may_have_several_fixed_sensors() -> None:
     content = {
         "tags": {"A": [0, 0], "B": [1, 0]},

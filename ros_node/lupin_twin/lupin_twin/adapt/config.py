@@ -100,6 +100,7 @@ class Sensor:
 class Config:
     """All of it. Lengths are metres in `frame_id`, times seconds.
 
+    `frames`: of the tags that are frames of TF, which.
     `reach_m`: the robot scans a tag while it is within this distance. `window_s`: readings of one
     tag are averaged for so long, or until the robot leaves. `cell_m`: where no tag is in reach, a
     cell of this size is one; 0: readings between tags are not used.
@@ -108,6 +109,7 @@ class Config:
     sensors: tuple[Sensor, ...]
     robot: Robot | None = None
     tags: Mapping[str, Place] = field(default_factory=dict)
+    frames: Mapping[str, str] = field(default_factory=dict)
     detections: Detections | None = None
     frame_id: str = "map"
     reach_m: float = 0.8
@@ -135,7 +137,8 @@ def config_of(content: Any, folder: Path = Path()) -> Config:
     config = Config(
         sensors,
         robot,
-        tags,
+        {name: at for name, at in tags.items() if isinstance(at, Place)},
+        {name: at for name, at in tags.items() if isinstance(at, str)},
         _detections(Table("detections", table.take("detections")))
         if table.has("detections")
         else None,
@@ -191,7 +194,7 @@ def _detections(table: Table) -> Detections:
     return detections
 
 
-def _tags(content: Any, folder: Path) -> Iterator[tuple[str, Place]]:
+def _tags(content: Any, folder: Path) -> Iterator[tuple[str, Place | str]]:
     if isinstance(content, str):
         content = read_yaml(folder / content)
     table = Table("tags", content)
@@ -202,13 +205,17 @@ def _tags(content: Any, folder: Path) -> Iterator[tuple[str, Place]]:
         name = str(key) if isinstance(key, int) and not isinstance(key, bool) else key
         check_text("tags", name)
         at = table.take(key)
+        if isinstance(at, str):
+            yield name, check_text(f"tags.{name}", at)
+            continue
         if (
             not isinstance(at, list)
             or len(at) not in (2, 3)
             or not all(is_number(each) and abs(each) <= MAX_M for each in at)
         ):
             raise ConfigError(
-                f"tags.{name} is {shown(at)}, expected [x, y] or [x, y, z] in m, up to {MAX_M:.0f}"
+                f"tags.{name} is {shown(at)}, expected [x, y] or [x, y, z] in m up to {MAX_M:.0f}, "
+                "or a frame of TF"
             )
         yield name, Place(*map(float, at))
 

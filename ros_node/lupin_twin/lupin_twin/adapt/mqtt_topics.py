@@ -6,21 +6,19 @@ import json
 import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
-from datetime import UTC, datetime
+from datetime import UTC
 from functools import lru_cache
 from pathlib import Path
 from typing import Any, Final
 from urllib.parse import urlsplit
 
 from lupin_twin.adapt.table import ConfigError, Table, shown
-from lupin_twin.adapt.value import AS_IT_IS, Value, value_of, values_of
+from lupin_twin.adapt.value import AS_IT_IS, Value, seconds_of, value_of, values_of
 from lupin_twin.core.drops import Rejected, check_texts
 
 PORTS: Final = {"mqtt": 1883, "mqtts": 8883}
 MAX_TOPICS: Final = 100
 MAX_PAYLOAD_BYTES: Final = 65_536
-# A number above this is milliseconds since the epoch, not seconds: as seconds, the year 5138.
-_MILLISECONDS: Final = 1e11
 # In 2001. A device whose clock was never set begins in 1970.
 _EARLIEST_S: Final = 1e9
 _PLACEHOLDER: Final = re.compile(r"\{(tag|sensor)\}|(\+)")
@@ -255,17 +253,10 @@ def _at(content: Any, path: str) -> Any:
 
 
 def _seconds(stamp: Any) -> float:
-    """A moment in seconds since the epoch, of such a number, one of milliseconds, or ISO 8601."""
     try:
-        if isinstance(stamp, str):
-            moment = datetime.fromisoformat(stamp)
-            seconds = (moment if moment.tzinfo else moment.replace(tzinfo=UTC)).timestamp()
-        else:
-            seconds = stamp / 1000 if stamp > _MILLISECONDS else float(stamp)
-    except (TypeError, ValueError, OverflowError):
-        seconds = 0.0
-    if not _EARLIEST_S <= seconds < _MILLISECONDS:
-        raise Rejected(
-            f"its time is {shown(stamp)}, expected ISO 8601 or seconds since 1970, and after 2001"
-        )
+        seconds = seconds_of(stamp, UTC)
+    except Rejected as error:
+        raise Rejected(f"its time is {shown(stamp)}: {error}") from None
+    if seconds < _EARLIEST_S:
+        raise Rejected(f"its time is {shown(stamp)}, before 2001: was its clock ever set?")
     return seconds

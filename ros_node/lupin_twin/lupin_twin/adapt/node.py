@@ -8,6 +8,7 @@ from __future__ import annotations
 import difflib
 import time
 from collections.abc import Callable, Iterable
+from contextlib import suppress
 from functools import partial
 from typing import Any, Final
 
@@ -19,7 +20,7 @@ from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rclpy.serialization import deserialize_message
 from std_msgs.msg import Header
 
-from lupin_twin.adapt.config import POSES, TAG_FRAME, Config, Place, Sensor
+from lupin_twin.adapt.config import POSES, TAG_FRAME, Config, Place, Robot, Sensor
 from lupin_twin.adapt.frames import FrameError, Frames, Sightings
 from lupin_twin.adapt.messages import (
     DETECTIONS_TYPE,
@@ -107,7 +108,7 @@ class AdaptNode(Node):  # type: ignore[misc]  # rclpy is not typed
         robot, detections = self._config.robot, self._config.detections
         if robot is not None and robot.topic:
             self._listen(robot.topic, robot.type_name, self._on_pose)
-        if detections is not None or (robot is not None and robot.tf):
+        if detections is not None or self._config.frames or (robot is not None and robot.tf):
             self._listen(TF, TF_TYPE, partial(self._on_tf, False))
             self._listen(TF_STATIC, TF_TYPE, partial(self._on_tf, True), TF_STATIC_QOS)
         if detections is not None:
@@ -206,7 +207,8 @@ class AdaptNode(Node):  # type: ignore[misc]  # rclpy is not typed
         self._find_tags()
 
     def _place(self, frame: str) -> tuple[float, float, float]:
-        max_age_ns = int(self._config.robot.max_age_s * NANOSECONDS_PER_SECOND)  # type: ignore[union-attr]
+        robot = self._config.robot or Robot()
+        max_age_ns = int(robot.max_age_s * NANOSECONDS_PER_SECOND)
         return self._frames.place(frame, self._config.frame_id, self._now_ns(), max_age_ns)
 
     def _why_no_place(self, frame: str) -> str:
@@ -255,6 +257,11 @@ class AdaptNode(Node):  # type: ignore[misc]  # rclpy is not typed
             self._sightings.end(frame)
             if self._at is not None and self._scans.discover(tag_id, place, *self._at):
                 self._publish_tags()
+        for tag_id, frame in self._config.frames.items():
+            if tag_id not in self._scans.places:
+                with suppress(FrameError):
+                    self._scans.survey(tag_id, Place(*self._place(frame)))
+                    self._publish_tags()
 
     def _on_message(self, sensors: list[Sensor], topic: str, message: Any) -> None:
         stamp_ns = self._stamp_ns(topic, message)
@@ -364,6 +371,10 @@ class AdaptNode(Node):  # type: ignore[misc]  # rclpy is not typed
         A topic on which nothing came for `silent_s` is silent.
         """
         self._move_by_tf()
+        for tag_id, frame in self._config.frames.items():
+            tf = self._sources[TF]
+            if tag_id not in self._scans.places:
+                tf.problem = tf.problem or self._why_no_place(frame)
         for topic, source in self._sources.items():
             if topic not in (MQTT, TF, TF_STATIC):
                 source.problem = self._why_silent(source, silent_s)

@@ -109,6 +109,10 @@ class Scans:
         yield from self.due(now_ns)
         yield from self._be_at(None, now_ns)
 
+    def survey(self, tag_id: str, place: Place) -> None:
+        """A tag of the configuration is there."""
+        self._places[tag_id] = place
+
     def discover(self, tag_id: str, place: Place, x: float, y: float) -> bool:
         """Whether a tag that is seen from (x, y), m, is new and in reach; if so, it is there.
 

@@ -1,9 +1,11 @@
-"""A number of a source, and what it has to be to be a reading. Pure."""
+"""A number or a moment of a source, and what it has to be to be a reading. Pure."""
 
 from __future__ import annotations
 
 import math
+from contextlib import suppress
 from dataclasses import dataclass
+from datetime import datetime, tzinfo
 from typing import Any, Final
 
 from lupin_twin.adapt.table import ConfigError, Table, shown
@@ -41,6 +43,42 @@ class Value:
 
 
 AS_IT_IS: Final = Value()
+# A number above this is milliseconds since the epoch, not seconds: as seconds, the year 5138.
+_MILLISECONDS: Final = 1e11
+
+
+def seconds_of(stamp: Any, zone: tzinfo | None) -> float:
+    """A moment in seconds since 1970: of ISO 8601, or of such a number, or of ms, µs or ns.
+
+    What has no offset is in `zone`.
+
+    Raises:
+        Rejected: it is none.
+
+    """
+    number = None
+    # Most are dates: to find by an error that they are no numbers is slow.
+    if not isinstance(stamp, bool) and not (isinstance(stamp, str) and stamp[4:5] == "-"):
+        with suppress(TypeError, ValueError, OverflowError):
+            number = float(stamp)
+    if number is not None:
+        unit = next((size for size in (1e9, 1e6, 1e3) if number > _MILLISECONDS * size / 1e3), 1.0)
+        seconds = number / unit
+        if not 0 < seconds < _MILLISECONDS:
+            raise Rejected("the time is no moment since 1970")
+        return seconds
+    try:
+        moment = datetime.fromisoformat(stamp.strip())
+    except (AttributeError, ValueError):
+        raise Rejected("the time is no ISO 8601, and no seconds since 1970") from None
+    if moment.tzinfo is None:
+        if zone is None:
+            raise Rejected("the time has no offset, and time_zone is not given")
+        moment = moment.replace(tzinfo=zone)
+    seconds = moment.timestamp()
+    if seconds <= 0:
+        raise Rejected("the time is before 1970")
+    return seconds
 
 
 def number_of(message: object, path: str) -> float:

@@ -58,7 +58,6 @@ POSE_PERIOD_S: Final = 0.05
 TF_STATIC_QOS: Final = latched(100)
 # A topic that says nothing for so long is named on `/diagnostics`.
 SILENT_S: Final = 10.0
-NOBODY: Final = "nobody publishes it"
 
 
 class AdaptNode(Node):  # type: ignore[misc]  # rclpy is not typed
@@ -403,14 +402,14 @@ class AdaptNode(Node):  # type: ignore[misc]  # rclpy is not typed
         # Static frames come once, and a robot may have none.
         if is_static and (source.received or not publishers):
             return ""
-        if not publishers and source.problem.startswith(NOBODY):
-            return source.problem  # to look for what is like it takes long, among many
         if not publishers:
             published = (
-                name for name, _ in self.get_topic_names_and_types() if self.count_publishers(name)
+                name
+                for name, types in self.get_topic_names_and_types()
+                if source.type_name in types and self.count_publishers(name)
             )
             near = difflib.get_close_matches(source.name, published, n=1, cutoff=0.5)
-            return NOBODY + (f", did you mean {near[0]}?" if near else "")
+            return "nobody publishes it" + (f", did you mean {near[0]}?" if near else "")
         types = {publisher.topic_type for publisher in publishers}
         if source.type_name not in types:
             return f"it is published as {', '.join(types)}, configured is {source.type_name}"

@@ -395,18 +395,14 @@ def _root(name: str) -> str:
 def measures() -> str:
     """What `/metrics` has."""
     rows = [
-        *((code(name), "gauge", "", prose(text)) for name, text in metrics.GAUGES.items()),
         *(
-            (code(name), "gauge", code(label), prose(text))
-            for name, (label, text) in metrics.LABELLED_GAUGES.items()
-        ),
-        *(
-            (code(f"{name}_total"), "counter", "", prose(text))
-            for name, text in metrics.COUNTERS.items()
-        ),
-        *(
-            (code(f"{name}_total"), "counter", code(label), prose(text))
-            for name, (label, text) in metrics.LABELLED.items()
+            (
+                code(f"{name}_total" if it.kind == "counter" else name),
+                it.kind,
+                code(it.label) if it.label else "",
+                prose(it.help),
+            )
+            for name, it in sorted(metrics.METRICS.items(), key=lambda it: it[1].kind, reverse=True)
         ),
         *((code(name), "histogram", "", prose(text)) for name, text in metrics.HISTOGRAMS.items()),
     ]

@@ -8,7 +8,7 @@ import logging
 import math
 import time
 from collections import Counter
-from collections.abc import Callable, Hashable, Iterator, Mapping
+from collections.abc import Callable, Hashable, Iterator
 from dataclasses import replace
 from typing import Final
 
@@ -121,7 +121,7 @@ class Bridge:
         self.observations_pace = RateLimit(limits.observations_per_s, limits.observation_burst)
         self.outward = outward or Channels()
         self.http_answers: Counter[str] = Counter()
-        self.metrics = Metrics(self._measure, self._count)
+        self.metrics = Metrics(self._measure)
         self.alarms_raised = 0
         self.cached_state: Hashable = None
         self.state_number = 0
@@ -242,30 +242,10 @@ class Bridge:
         self.http_answers[str(status)] += 1
         self.metrics.http_seconds.labels(route_class(path)).observe(seconds)
 
-    def _count(self) -> Iterator[tuple[str, Mapping[str, int]]]:
-        yield "lupin_admission_refused", self.admission.refused
-        yield "lupin_http_answers", self.http_answers
-        yield from self.outward.counts()
-        known = self._estimates.known
-        trusted = {name: report.record.is_trusted for name, report in known.items()}
-        yield "lupin_estimate_trusted", {name: it for name, it in trusted.items() if it is not None}
-        yield (
-            "lupin_estimate_fit_failing",
-            {name: bool(report.fit_problem) for name, report in known.items()},
-        )
-        if self._latest is None:
-            return
-        # A twin that does not say has no zeros: nobody knows.
-        for name, counts in (
-            ("lupin_dropped", self._latest.counts),
-            ("lupin_web_dropped", self._latest.own_counts),
-        ):
-            if counts is not None:
-                yield name, {str(why): counts.dropped.get(why, 0) for why in (*Reason, LOST, LATE)}
-
     def _measure(self) -> Iterator[Sample]:
         hub, source, status = self.hub, self.source, self.status
-        tags = () if self._latest is None else self._latest.snapshot.tags
+        latest = self._latest
+        tags = () if latest is None else latest.snapshot.tags
         journal = source.journal()
         yield "lupin_clients", len(hub)
         yield "lupin_clients_blocked", hub.blocked
@@ -295,6 +275,23 @@ class Bridge:
         yield "lupin_fields_computing", self.admission.being_computed
         yield "lupin_exports_running", self.admission.exporting
         yield "lupin_work_abandoned", source.workers.abandoned
+        yield "lupin_admission_refused", self.admission.refused
+        yield "lupin_http_answers", self.http_answers
+        yield from self.outward.counts()
+        known = self._estimates.known
+        trusted = {name: report.record.is_trusted for name, report in known.items()}
+        yield "lupin_estimate_trusted", {name: it for name, it in trusted.items() if it is not None}
+        yield (
+            "lupin_estimate_fit_failing",
+            {name: bool(report.fit_problem) for name, report in known.items()},
+        )
+        # A twin that does not say has no zeros: nobody knows.
+        for name, counts in (
+            ("lupin_dropped", None if latest is None else latest.counts),
+            ("lupin_web_dropped", None if latest is None else latest.own_counts),
+        ):
+            if counts is not None:
+                yield name, {str(why): counts.dropped.get(why, 0) for why in (*Reason, LOST, LATE)}
         if journal.state == "unknown":  # nobody knows: no zeros
             return
         yield "lupin_journal_recording", journal.state == "recording"

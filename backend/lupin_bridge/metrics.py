@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from typing import Final
+from dataclasses import dataclass
+from functools import partial
+from typing import Final, Literal
 
 from prometheus_client import CollectorRegistry, Histogram, ProcessCollector, generate_latest
 from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily, Metric
@@ -11,65 +13,86 @@ from prometheus_client.registry import Collector
 
 CONTENT_TYPE: Final = "text/plain; version=0.0.4; charset=utf-8"
 
-Sample = tuple[str, float]
+# A metric's name, and its value; by its label, where it has one.
+Sample = tuple[str, float | Mapping[str, float]]
 
-GAUGES: Final = {
-    "lupin_clients": "WebSocket clients that follow the state",
-    "lupin_clients_blocked": "clients whose socket takes nothing just now",
-    "lupin_topics_relayed": "ROS topics that are listened to for viewers",
-    "lupin_ros_thread_alive": "1 while the ROS thread runs",
-    "lupin_ros_calls_waiting": "calls that wait for the ROS thread",
-    "lupin_twin_live": "1 while the twin is live",
-    "lupin_twins": "twins that publish the state; more than 1 is a mistake",
-    "lupin_state_age_seconds": "seconds since the last state came; infinite: none has",
-    "lupin_tags": "tags that the twin knows",
-    "lupin_tags_pinned": "tags that have a pose",
-    "lupin_alarms_known": "1 once alarms of the past are known",
-    "lupin_alarms_active": "alarms that are active",
-    "lupin_fields_computing": "field requests being computed now",
-    "lupin_exports_running": "exports being sent now",
-    "lupin_journal_recording": "1 while the journal keeps what is observed, as promised",
-    "lupin_journal_rows_waiting": "observations that are not in the journal yet",
-    "lupin_journal_behind_seconds": "for how long the oldest of those has been waiting",
-    "lupin_journal_file_bytes": "size of the journal on the disk",
-}
-# The same, each with a label of its own.
-LABELLED_GAUGES: Final = {
-    "lupin_outward_connected": ("channel", "1 while the other side takes messages"),
-    "lupin_estimate_trusted": (
-        "sensor",
+
+@dataclass(frozen=True, slots=True)
+class Described:
+    """What a metric is; `label`: there is a value for each of it."""
+
+    kind: Literal["gauge", "counter"]
+    help: str
+    label: str = ""
+
+
+gauge = partial(Described, "gauge")
+counter = partial(Described, "counter")
+# By name; of a counter, `_total` is written behind it, as Prometheus wants it.
+METRICS: Final = {
+    "lupin_clients": gauge("WebSocket clients that follow the state"),
+    "lupin_clients_blocked": gauge("clients whose socket takes nothing just now"),
+    "lupin_topics_relayed": gauge("ROS topics that are listened to for viewers"),
+    "lupin_ros_thread_alive": gauge("1 while the ROS thread runs"),
+    "lupin_ros_calls_waiting": gauge("calls that wait for the ROS thread"),
+    "lupin_twin_live": gauge("1 while the twin is live"),
+    "lupin_twins": gauge("twins that publish the state; more than 1 is a mistake"),
+    "lupin_state_age_seconds": gauge("seconds since the last state came; infinite: none has"),
+    "lupin_tags": gauge("tags that the twin knows"),
+    "lupin_tags_pinned": gauge("tags that have a pose"),
+    "lupin_alarms_known": gauge("1 once alarms of the past are known"),
+    "lupin_alarms_active": gauge("alarms that are active"),
+    "lupin_fields_computing": gauge("field requests being computed now"),
+    "lupin_exports_running": gauge("exports being sent now"),
+    "lupin_journal_recording": gauge("1 while the journal keeps what is observed, as promised"),
+    "lupin_journal_rows_waiting": gauge("observations that are not in the journal yet"),
+    "lupin_journal_behind_seconds": gauge("for how long the oldest of those has been waiting"),
+    "lupin_journal_file_bytes": gauge("size of the journal on the disk"),
+    "lupin_outward_connected": gauge("1 while the other side takes messages", "channel"),
+    "lupin_estimate_trusted": gauge(
         "1 while its estimates are about as often right as they say; absent while nobody knows",
+        "sensor",
     ),
-    "lupin_estimate_fit_failing": ("sensor", "1 while its last round of learning came to nothing"),
-    "lupin_outward_waiting": ("channel", "tags, the greenhouse or changes of alarms, not sent yet"),
-}
-# Written with `_total` behind the name, as Prometheus wants it.
-COUNTERS: Final = {
-    "lupin_clients_dismissed": "clients closed because they took no frame for too long",
-    "lupin_frames_sent": "state frames written to clients",
-    "lupin_frames_skipped": "state frames that a client did not get, being slow or wanting fewer",
-    "lupin_bytes_sent": "bytes of frames written to clients",
-    "lupin_messages_sent": "ROS messages written to viewers as they are",
-    "lupin_messages_skipped": "ROS messages that a viewer did not get, being slow, or too large",
-    "lupin_alarms_missed": "observations that were received too late for the alarms they belong to",
-    "lupin_alarms_raised": "alarms raised since the start; those of the past are not counted",
-    "lupin_ros_callback_errors": "errors met by ROS callbacks",
-    "lupin_judge_errors": "errors met in judging a tag or a state, whose status is then unknown",
-    "lupin_work_abandoned": "computations that were ended because nobody waited any more",
-    "lupin_journal_rows": "observations written to the journal",
-    "lupin_journal_rows_lost": "observations given up because the journal could not be written",
-}
-# The same, each with a label of its own.
-LABELLED: Final = {
-    "lupin_admission_refused": ("reason", "computed answers refused, by the limit they met"),
-    "lupin_dropped": ("reason", "messages and entries that the twin dropped or lost"),
-    "lupin_web_dropped": ("reason", "messages that `web` itself dropped or lost"),
-    "lupin_http_answers": ("status", "HTTP answers of the routes, by status"),
-    "lupin_outward_sent": ("channel", "messages that a broker or a receiver has taken"),
-    "lupin_outward_failed": ("channel", "connections and posts that failed"),
-    "lupin_outward_dropped": (
-        "channel",
+    "lupin_estimate_fit_failing": gauge(
+        "1 while its last round of learning came to nothing", "sensor"
+    ),
+    "lupin_outward_waiting": gauge(
+        "tags, the greenhouse or changes of alarms, not sent yet", "channel"
+    ),
+    "lupin_clients_dismissed": counter("clients closed because they took no frame for too long"),
+    "lupin_frames_sent": counter("state frames written to clients"),
+    "lupin_frames_skipped": counter(
+        "state frames that a client did not get, being slow or wanting fewer"
+    ),
+    "lupin_bytes_sent": counter("bytes of frames written to clients"),
+    "lupin_messages_sent": counter("ROS messages written to viewers as they are"),
+    "lupin_messages_skipped": counter(
+        "ROS messages that a viewer did not get, being slow, or too large"
+    ),
+    "lupin_alarms_missed": counter(
+        "observations that were received too late for the alarms they belong to"
+    ),
+    "lupin_alarms_raised": counter(
+        "alarms raised since the start; those of the past are not counted"
+    ),
+    "lupin_ros_callback_errors": counter("errors met by ROS callbacks"),
+    "lupin_judge_errors": counter(
+        "errors met in judging a tag or a state, whose status is then unknown"
+    ),
+    "lupin_work_abandoned": counter("computations that were ended because nobody waited any more"),
+    "lupin_journal_rows": counter("observations written to the journal"),
+    "lupin_journal_rows_lost": counter(
+        "observations given up because the journal could not be written"
+    ),
+    "lupin_admission_refused": counter("computed answers refused, by the limit they met", "reason"),
+    "lupin_dropped": counter("messages and entries that the twin dropped or lost", "reason"),
+    "lupin_web_dropped": counter("messages that `web` itself dropped or lost", "reason"),
+    "lupin_http_answers": counter("HTTP answers of the routes, by status", "status"),
+    "lupin_outward_sent": counter("messages that a broker or a receiver has taken", "channel"),
+    "lupin_outward_failed": counter("connections and posts that failed", "channel"),
+    "lupin_outward_dropped": counter(
         "of MQTT, states of tags that gave way to newer ones; of the webhook, changes given up",
+        "channel",
     ),
 }
 HISTOGRAMS: Final = {
@@ -86,13 +109,8 @@ _SECONDS: Final = (0.001, 0.0025, 0.005, 0.01, 0.025, 0.05, 0.1, 0.25, 0.5, 1.0,
 class Metrics(Collector):
     """The bridge's metrics; `read` gives a sample of each gauge and counter at each scrape."""
 
-    def __init__(
-        self,
-        read: Callable[[], Iterable[Sample]],
-        read_labelled: Callable[[], Iterable[tuple[str, Mapping[str, int]]]] = tuple,
-    ) -> None:
+    def __init__(self, read: Callable[[], Iterable[Sample]]) -> None:
         self._read = read
-        self._read_labelled = read_labelled
         self._registry = CollectorRegistry()
         self._registry.register(self)
         ProcessCollector(registry=self._registry)
@@ -120,20 +138,14 @@ class Metrics(Collector):
     def collect(self) -> Iterator[Metric]:
         """The gauges and counters, for the registry."""
         for name, value in self._read():
-            if name in GAUGES:
-                yield GaugeMetricFamily(name, GAUGES[name], value)
-            else:
-                yield CounterMetricFamily(name, COUNTERS[name], value)
-        for name, counts in self._read_labelled():
-            family: GaugeMetricFamily | CounterMetricFamily
-            if name in LABELLED_GAUGES:
-                label, documentation = LABELLED_GAUGES[name]
-                family = GaugeMetricFamily(name, documentation, labels=[label])
-            else:
-                label, documentation = LABELLED[name]
-                family = CounterMetricFamily(name, documentation, labels=[label])
-            for name_of, count in counts.items():
-                family.add_metric([name_of], count)
+            known = METRICS[name]
+            kind = GaugeMetricFamily if known.kind == "gauge" else CounterMetricFamily
+            if not isinstance(value, Mapping):
+                yield kind(name, known.help, value)
+                continue
+            family = kind(name, known.help, labels=[known.label])
+            for of, count in value.items():
+                family.add_metric([of], count)
             yield family
 
     def text(self) -> bytes:

@@ -1,11 +1,7 @@
-"""The 1 Hz tick: the state and the times of a big greenhouse, few tags changed or all; its JSON.
-
-And how much memory the history of its tags takes, with short names and with the longest.
-"""
+"""The 1 Hz tick: the state and the times of a big greenhouse, few tags changed or all; its JSON."""
 
 from __future__ import annotations
 
-import os
 import statistics
 import time
 from collections.abc import Callable
@@ -18,13 +14,10 @@ from lupin_msgs.msg import TwinState, TwinTimes
 from rclpy.context import Context
 
 from lupin_bridge.stream.state_json import StateJson
-from lupin_twin.core.drops import MAX_TEXT_LENGTH
-from lupin_twin.core.history import History
-from lupin_twin.core.state import Attempt, Flower, Pose, Reading, Scan, Snapshot, TagState
+from lupin_twin.core.state import Attempt, Flower, Pose, Reading, Snapshot, TagState
 from lupin_twin.ros import convert
 from lupin_twin.ros.base_node import latched
 from tests.support.domains import own_domain
-from tests.support.proc_stat import resident_mb
 
 S = 1_000_000_000
 
@@ -88,19 +81,6 @@ def measure(count: int, state: Any, times: Any) -> None:
     )
 
 
-def measure_history(name_length: int) -> None:
-    """10,000 tags of five sensors, whose names come anew with each scan as they do over ROS."""
-    history, before_mb = History(), resident_mb(os.getpid())
-    for number in range(32):
-        for tag in range(10_000):
-            names = [f"{sensor}".rjust(name_length, "x") for sensor in range(5)]
-            stamp_ns = (number * 600 + 1) * S
-            readings = tuple(Reading(name, 20.0 + tag % 7) for name in names)
-            history.add(Scan(str(tag), stamp_ns, readings, own_stamp_ns=stamp_ns))
-    took_mb = resident_mb(os.getpid()) - before_mb
-    print(f"history of 10,000 tags, five names of {name_length}: {took_mb:.0f} MB")
-
-
 def main() -> None:
     print(
         f"\n{'tags':>7}{'all rebuilt':>14}{'1 % changed':>14}{'state tick':>12}"
@@ -116,8 +96,6 @@ def main() -> None:
             measure(count, state, times)
         node.destroy_node()
         rclpy.try_shutdown(context=context)
-    measure_history(12)
-    measure_history(MAX_TEXT_LENGTH)
 
 
 if __name__ == "__main__":

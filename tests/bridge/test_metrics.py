@@ -9,7 +9,7 @@ from prometheus_client.parser import text_string_to_metric_families
 from websockets.sync.client import connect
 
 from lupin_bridge.bridge import Bridge
-from lupin_bridge.metrics import CONTENT_TYPE, COUNTERS, GAUGES, HISTOGRAMS, Metrics
+from lupin_bridge.metrics import CONTENT_TYPE, HISTOGRAMS, METRICS, Metrics
 from lupin_bridge.settings import Settings
 from lupin_twin.estimate.grading import Record, Tally
 from lupin_twin.runtime.estimates import Report
@@ -37,7 +37,8 @@ def test_every_metric_is_there_and_follows_what_happens(domain: int) -> None:
     with lupin_twin(domain, "serve") as process, Peer(domain) as peer:
         url = url_of(process)
         before = scrape(url)
-        names = {*GAUGES, *(f"{name}_total" for name in COUNTERS)}
+        plain = {name: it.kind for name, it in METRICS.items() if not it.label}
+        names = {f"{name}_total" if kind == "counter" else name for name, kind in plain.items()}
         names |= {f"{name}_count" for name in HISTOGRAMS}
         assert names <= set(before)
         assert (before["lupin_clients"], before["lupin_tags"]) == (0.0, 0.0)
@@ -68,7 +69,7 @@ def test_every_metric_is_there_and_follows_what_happens(domain: int) -> None:
 
 def test_what_is_counted_by_a_name_has_it_as_a_label_gauges_too() -> None:
     labelled = [("lupin_outward_waiting", {"mqtt": 3}), ("lupin_outward_sent", {"webhook": 2})]
-    text = Metrics(tuple, lambda: labelled).text().decode()
+    text = Metrics(lambda: labelled).text().decode()
     assert '\nlupin_outward_waiting{channel="mqtt"} 3.0\n' in text
     assert "# TYPE lupin_outward_waiting gauge" in text
     assert '\nlupin_outward_sent_total{channel="webhook"} 2.0\n' in text

@@ -7,7 +7,7 @@ over what that hands out.
 from __future__ import annotations
 
 import heapq
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Final
 
@@ -32,13 +32,6 @@ class Change:
     changed: tuple[Alarm, ...]
     withdrawn: tuple[Alarm, ...] = ()
     is_past: bool = False
-
-    def parts(self, count: int) -> Iterator[Change]:
-        """The same in parts of at most so many alarms, one behind the other."""
-        for first in range(0, len(self.changed), count):
-            yield Change(self.changed[first : first + count], (), self.is_past)
-        for first in range(0, len(self.withdrawn), count):
-            yield Change((), self.withdrawn[first : first + count], self.is_past)
 
 
 @dataclass(frozen=True, slots=True)

@@ -93,35 +93,10 @@ def judge_once(
 
     Nobody knows since when a reason holds: told is the observation that says so.
     """
-    now_ns = snapshot.now_ns
-    recent = RecentScans.of(snapshot.tags, writes, day_of)
-    healths = dict.fromkeys((tag.tag_id for tag in snapshot.tags), _UNKNOWN)
-    has_failed = False
-    for tag in snapshot.tags:
-        if now_ns is None:
-            break
-        try:
-            healths[tag.tag_id] = judge_tag(
-                tag,
-                now_ns,
-                sensors,
-                recent.tag(tag.tag_id),
-                holds_ns=_holds_ns(recent.tag(tag.tag_id), recent_s),
-                days=days.get(tag.tag_id, ()),
-            )
-        except Exception:  # whatever it is: the others are judged, and this one is unknown
-            if not has_failed:
-                log.exception("%s could not be judged: its status is unknown", tag.tag_id)
-            has_failed = True
-    counts = Counter(health.verdict for health in healths.values())
-    scans = Scans()
-    scans.heard(recent.stamps_ns(), now_ns)
-    patrol = scans.patrol(sum(map(is_overdue, healths.values())))
-    once = sum(_is_once(recent.tag(tag_id), recent_s) for tag_id in healths)
-    stop = stopped(patrol.last_scan_ns, now_ns, once, len(healths))
-    house = judge_site(counts, is_silent=now_ns is None, stopped=stop)
-    day = recent.day(snapshot.stamp_ns)
-    return Judged(house, healths, frozenset(healths), day, patrol=patrol)
+    judge = Judge(sensors, day_of, recent_s, max_at_once=None)
+    judge.note_days(days)
+    judge.learn(writes, snapshot)
+    return judge.see(snapshot)
 
 
 def _holds_ns(recent: Recent, recent_s: float | None) -> int:
@@ -149,8 +124,16 @@ class Judge:
     in `errors`; the others are judged all the same.
     """
 
-    def __init__(self, sensors: Sensors, day_of: DayOf, recent_s: float | None = None) -> None:
+    def __init__(
+        self,
+        sensors: Sensors,
+        day_of: DayOf,
+        recent_s: float | None = None,
+        *,
+        max_at_once: int | None = MAX_AT_ONCE,
+    ) -> None:
         self._sensors = sensors
+        self._max_at_once = max_at_once
         self._day_of = day_of
         self._recent_s = recent_s
         self._tags: dict[str, _Tag] = {}
@@ -197,10 +180,15 @@ class Judge:
         self._now_ns = now_ns
         return judged
 
-    def learn(self, writes: Iterable[PastWrite]) -> None:
-        """What was recent before the first snapshot, as far as the log has it."""
-        tags = [kept.state for kept in self._tags.values()]
+    def learn(self, writes: Iterable[PastWrite], first: Snapshot | None = None) -> None:
+        """What was recent at the first snapshot, as far as the log has it.
+
+        `first` is that snapshot, where it has not been seen.
+        """
+        tags = [kept.state for kept in self._tags.values()] if first is None else first.tags
         self._recent = RecentScans.of(tags, writes, self._day_of)
+        if first is not None:
+            self._scans.heard(self._recent.stamps_ns(), first.now_ns)
         self._waiting |= dict.fromkeys(self._tags)
 
     def note_changed(self, changed: Mapping[str, Mapping[str, int]]) -> None:
@@ -257,7 +245,7 @@ class Judge:
         turn: list[str] = []
         seen = readings = 0
         for tag_id in self._waiting:
-            if readings >= MAX_AT_ONCE:
+            if self._max_at_once is not None and readings >= self._max_at_once:
                 break
             seen += 1
             kept = self._tags.get(tag_id)

@@ -9,7 +9,6 @@ from __future__ import annotations
 import asyncio
 import os
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Final
 
 import h11
@@ -23,15 +22,15 @@ MAX_HEAD_BYTES: Final = 16_384
 
 
 class PostError(RuntimeError):
-    """There was no answer; the message says why, in a few words."""
+    """It was not taken; the message says why, in a few words.
 
+    `status` is the answer's, 0: there was none. `retry_after_s` is for how long the receiver wants
+    to be left alone, s.
+    """
 
-@dataclass(frozen=True, slots=True)
-class PostAnswer:
-    """The status, and for how long the receiver wants to be left alone, s."""
-
-    status: int
-    retry_after_s: int = 0
+    def __init__(self, why: str, status: int = 0, retry_after_s: int = 0) -> None:
+        super().__init__(why)
+        self.status, self.retry_after_s = status, retry_after_s
 
 
 async def post(
@@ -40,11 +39,11 @@ async def post(
     body: bytes,
     connect_s: float = CONNECT_S,
     answer_s: float = ANSWER_S,
-) -> PostAnswer:
+) -> None:
     """Send it, and wait for the answer's head. Redirects are not followed.
 
     Raises:
-        PostError: no connection, no valid TLS, no answer in time, or none of HTTP.
+        PostError: no connection, no valid TLS, no answer in time, none of HTTP, or no success.
 
     """
     try:
@@ -65,7 +64,7 @@ async def post(
     try:
         async with asyncio.timeout(answer_s):
             all_headers = {"Content-Type": "application/json", **headers}
-            return await _exchange(target, all_headers, body, reader, writer)
+            answer = await _exchange(target, all_headers, body, reader, writer)
     except TimeoutError:
         raise PostError(f"no answer within {answer_s:g} s") from None
     except OSError as error:
@@ -75,6 +74,12 @@ async def post(
     finally:
         # At once: what more it has to say is not wanted.
         writer.transport.abort()
+    if not 200 <= answer.status_code < 300:
+        is_elsewhere = 300 <= answer.status_code < 400
+        why = f"answered {answer.status_code}{', which is not followed' if is_elsewhere else ''}"
+        # As many digits as matter: Python reads no number of thousands.
+        given = dict(answer.headers).get(b"retry-after", b"")[:9]
+        raise PostError(why, answer.status_code, int(given) if given.isdigit() else 0)
 
 
 async def _exchange(
@@ -83,7 +88,7 @@ async def _exchange(
     body: bytes,
     reader: asyncio.StreamReader,
     writer: asyncio.StreamWriter,
-) -> PostAnswer:
+) -> h11.Response:
     http = h11.Connection(h11.CLIENT, max_incomplete_event_size=MAX_HEAD_BYTES)
     head = h11.Request(
         method="POST",
@@ -102,9 +107,7 @@ async def _exchange(
     while True:
         event = http.next_event()
         if isinstance(event, h11.Response):
-            # As many digits as matter: Python reads no number of thousands.
-            given = dict(event.headers).get(b"retry-after", b"")[:9]
-            return PostAnswer(event.status_code, int(given) if given.isdigit() else 0)
+            return event
         if event is h11.NEED_DATA:
             got = await reader.read(MAX_HEAD_BYTES)
             if not got:

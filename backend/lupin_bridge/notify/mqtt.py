@@ -11,7 +11,6 @@ from __future__ import annotations
 import asyncio
 import logging
 import math
-import random
 import secrets
 import time
 from collections import deque
@@ -24,9 +23,10 @@ from aiomqtt import Client, MqttError, ProtocolVersion, Will
 from paho.mqtt.packettypes import PacketTypes
 from paho.mqtt.properties import Properties
 
-from lupin_bridge.notify.destinations import Backoff, Condition, MqttTarget
+from lupin_bridge.notify.destinations import MqttTarget
 from lupin_bridge.notify.messages import GreenhouseState
 from lupin_bridge.notify.mirror import Mirror
+from lupin_bridge.notify.retry import Backoff, Condition
 
 log = logging.getLogger(__name__)
 
@@ -124,7 +124,7 @@ class Mqtt:
             self._is_connecting = False
             if self._is_stopping:
                 return
-            await asyncio.sleep(self._backoff.wait_s(random.random()))  # noqa: S311
+            await asyncio.sleep(self._backoff.wait_s())
 
     async def _one_connection(self) -> None:
         """Connect, and publish until the connection ends.

@@ -12,7 +12,6 @@ from __future__ import annotations
 import asyncio
 import base64
 import logging
-import random
 import socket
 import time
 from collections import OrderedDict
@@ -33,8 +32,9 @@ from lupin_bridge.alarms.notes import NOTHING_SAID, NoteBoard, notes_of_alarms
 from lupin_bridge.judge.alarm import Alarm
 from lupin_bridge.judge.options import Criteria
 from lupin_bridge.judge.verdict import Verdict
-from lupin_bridge.notify.destinations import Backoff, Condition, Endpoint, PushTarget
+from lupin_bridge.notify.destinations import Endpoint, PushTarget
 from lupin_bridge.notify.http_post import PostError, post
+from lupin_bridge.notify.retry import Backoff, Condition, until_taken
 from lupin_bridge.past.report_page import push_text
 from lupin_bridge.serving.admission import AdmissionError
 from lupin_bridge.stream.health_json import alarm_json
@@ -59,12 +59,15 @@ AT_ONCE: Final = 8
 # Alarms that were notified; far more than are active at once.
 MAX_KNOWN: Final = 20_000
 _GONE: Final = (404, 410)
-_AGAIN: Final = (408, 429, 500, 502, 503, 504)
 _KEY: Final = "vapid"
 
 
 class DeviceRefused(ValueError):
     """It cannot be notified; the message names the field."""
+
+
+class DeviceGone(Exception):
+    """Its push service has it no more."""
 
 
 class Source(Protocol):
@@ -188,35 +191,26 @@ class Push:
 
     async def _send(self, device: Device, message: bytes) -> None:
         """Until its push service takes it, has it no more, or was tried enough."""
-        backoff = Backoff(FIRST_WAIT_S, MOST_WAIT_S)
-        for tried in range(TRIES):
-            wait_s = backoff.wait_s(random.random())  # noqa: S311
+        host = urlsplit(device.endpoint).hostname
+
+        async def attempt() -> None:
             try:
                 endpoint = await self._endpoint(device.endpoint)
-                answer = await post(
-                    endpoint,
-                    await self._headers(endpoint),
-                    encrypted(device, message),
-                )
-            except DeviceRefused as error:
-                self._failed(f"{urlsplit(device.endpoint).hostname}: {error}")
-                break
+                await post(endpoint, await self._headers(endpoint), encrypted(device, message))
             except PostError as error:
-                self._failed(f"{urlsplit(device.endpoint).hostname}: {error}")
-            else:
-                if 200 <= answer.status < 300:
-                    self.condition.taken()
-                    return
-                if answer.status in _GONE:
-                    await self._people.write(lambda it, _: it.remove_device(device.endpoint))
-                    return
-                self._failed(f"answered {answer.status} ({endpoint.called})")
-                if answer.status not in _AGAIN:
-                    break
-                wait_s = max(wait_s, min(answer.retry_after_s, MOST_WAIT_S))
-            if tried + 1 < TRIES:
-                await asyncio.sleep(wait_s)
-        self.condition.dropped += 1
+                if error.status in _GONE:
+                    raise DeviceGone from None
+                error.args = (f"{host}: {error}",)
+                raise
+
+        backoff = Backoff(FIRST_WAIT_S, MOST_WAIT_S)
+        try:
+            await until_taken(attempt, self.condition, backoff, "a push notification", TRIES)
+        except DeviceGone:
+            await self._people.write(lambda it, _: it.remove_device(device.endpoint))
+        except DeviceRefused as error:
+            self._failed(f"{host}: {error}")
+            self.condition.dropped += 1
 
     def _failed(self, why: str) -> None:
         self.condition.failing(why)

@@ -83,14 +83,3 @@ def test_the_worst_come_first() -> None:
         for number in range(MAX_WORST + 1)
     ]
     assert page_of(many).worst == tuple(reversed(many))[:MAX_WORST]
-
-
-def test_a_change_in_parts_is_the_same() -> None:
-    alarms = tuple(alarm(str(number)) for number in range(5))
-    parts = [*Change(alarms[:3], alarms[3:], is_past=True).parts(2)]
-    assert [(len(it.changed), len(it.withdrawn), it.is_past) for it in parts] == [
-        (2, 0, True),
-        (1, 0, True),
-        (0, 2, True),
-    ]
-    assert sum((it.changed for it in parts), ()) == alarms[:3]

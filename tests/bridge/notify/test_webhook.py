@@ -15,7 +15,8 @@ import pytest
 from lupin_bridge.notify import webhook as webhook_module
 from lupin_bridge.notify.destinations import Targets
 from lupin_bridge.notify.http_post import post
-from lupin_bridge.notify.webhook import AT_ONCE, MAX_REFUSALS, ORIGIN_S, Delivery, Webhook
+from lupin_bridge.notify.retry import MAX_REFUSALS
+from lupin_bridge.notify.webhook import MAX_WAITING, ORIGIN_S, Delivery, Webhook
 from lupin_bridge.settings import Secrets, Settings
 from lupin_twin.core.diagnostics import Origin
 from tests.support.docs import block_named
@@ -55,21 +56,37 @@ def verified(posted: Posted, secret: str, now_s: float) -> bool:
     return bool(shown["is_genuine"](posted.headers, posted.body, secret))
 
 
-def test_a_long_past_is_taken_part_by_part_and_a_change_behind_it_waits_for_its_turn() -> None:
-    many = [alarm(str(number), raised_ns=NOW_NS - number) for number in range(2 * AT_ONCE + 1)]
+def test_past_the_limit_the_oldest_is_given_up_counted_and_told() -> None:
+    many = [alarm(str(number), raised_ns=NOW_NS + number) for number in range(MAX_WAITING + 2)]
 
     async def run(server: Receiver) -> None:
         board = Alarms()
         board.show(many)
         async with telling(server.port, board) as hook:
-            board.show([*many, B])
-            assert hook.condition.waiting == 0, "nothing of it on the way"
-            await until(lambda: hook.condition.waiting == len(many) + 1, "all of it")
-            await until(lambda: server.posted, "the oldest of it")
+            assert (hook.condition.waiting, hook.condition.dropped) == (MAX_WAITING, 2)
+            await until(lambda: hook.condition.sent >= 2, "two of them")
 
-    with receiver(silence) as server:
+    with receiver(status(200)) as server:
         asyncio.run(run(server))
-    assert server.posted[0].json["alarm"]["tag_id"] == many[-1].tag_id
+    said = [(it.json["alarm"]["tag_id"], it.json["lost"]) for it in server.posted[:2]]
+    assert said == [("2", 2), ("3", 0)]
+
+
+def test_what_was_lost_while_one_was_sent_is_told_with_the_next() -> None:
+    many = [alarm(str(number), raised_ns=NOW_NS + 1 + number) for number in range(MAX_WAITING + 1)]
+
+    async def run(server: Receiver) -> None:
+        board = Alarms()
+        board.show([A])
+        async with telling(server.port, board) as hook:
+            await until(lambda: server.posted, "the first on its way")
+            board.show([A, *many])
+            await until(lambda: hook.condition.sent >= 2, "the next")
+
+    with receiver(status(500), status(500), status(200)) as server:
+        asyncio.run(run(server))
+    said = {it.json["alarm"]["tag_id"]: it.json["lost"] for it in server.posted[:4]}
+    assert said == {"a": 0, "1": 1}
 
 
 def test_changes_are_posted_in_order_and_signed() -> None:
@@ -218,7 +235,7 @@ def test_words_of_any_length_are_said_once_and_cut(caplog: pytest.LogCaptureFixt
 
     with receiver(lambda _: iter([b"x" * 3_000 + b"\r\n\r\n"])) as server:
         asyncio.run(run(server))
-    (said,) = [r.getMessage() for r in caplog.records if "takes no alarms" in r.getMessage()]
+    (said,) = [r.getMessage() for r in caplog.records if "was not taken" in r.getMessage()]
     assert len(said) < 300
 
 

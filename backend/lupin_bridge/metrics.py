@@ -54,7 +54,7 @@ METRICS: Final = {
         "sensor",
     ),
     "lupin_estimate_fit_failing": gauge(
-        "1 while its last round of learning came to nothing", "sensor"
+        "1 while its last model could not be fitted", "sensor"
     ),
     "lupin_outward_waiting": gauge(
         "tags, the greenhouse or changes of alarms, not sent yet", "channel"

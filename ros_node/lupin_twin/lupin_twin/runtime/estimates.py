@@ -52,10 +52,10 @@ _MAX_READINGS: Final = 20_000
 def readings_at(
     log: sqlite3.Connection, sensor: str, at_ns: int, day_length_s: float
 ) -> list[TagPast]:
-    """What the log has of the day up to a moment."""
+    """What the log has of the day up to a moment; of equal stamps, what was received last."""
     reach_ns = int(day_length_s * NANOSECONDS_PER_SECOND)
     return [
-        TagPast(tag_id, x, y, tuple(one for one in found if is_usable(one[1])))
+        TagPast(tag_id, x, y, tuple(one for one in dict(found).items() if is_usable(one[1])))
         for tag_id, x, y, found in recent_readings(
             log, sensor, at_ns, reach_ns, _MAX_READINGS, MAX_PER_TAG
         )
@@ -129,6 +129,8 @@ def load(
     loaded = Loaded(at_ns, model, posterior.readings, checks)
     if loaded.changed:
         rest = readings_of(unchanged(pasts, loaded.changed), at_ns, day_length_s)
+        # What they have read since says as little of how readings hang together.
+        model = fit(rest, day_length_s=day_length_s, should_stop=should_stop)
         posterior = model.posterior(rest, 0.0, should_stop)
         loaded = Loaded(at_ns, model, rest, checks)
     return loaded, posterior

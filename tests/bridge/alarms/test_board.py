@@ -17,11 +17,6 @@ def listening(board: AlarmBoard) -> list[Change]:
     return heard
 
 
-def test_it_is_empty_and_says_that_nobody_has_looked_yet() -> None:
-    now = AlarmBoard().now
-    assert (now.alarms, now.source, now.since_ns) == ((), "starting", None)
-
-
 def test_listeners_hear_of_a_change_and_find_it_made() -> None:
     board = Alarms()
     board.show([A], is_past=True)

@@ -4,8 +4,7 @@ from dataclasses import replace
 
 import pytest
 
-from lupin_bridge.alarms.board import AlarmBoard
-from lupin_bridge.alarms.ledger import Change
+from lupin_bridge.alarms.board import AlarmBoard, Change
 from tests.support.seen import Alarms, alarm
 
 A, B = alarm("a"), alarm("b", raised_ns=2)

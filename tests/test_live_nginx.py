@@ -115,7 +115,7 @@ def test_limits_and_logs_go_by_the_client_and_not_by_nginx(house: House) -> None
         wait_for(
             lambda: stranger.get("/gh1/api/state", headers=wrong).status_code == 429,
             "ten wrong tokens at a replica",
-            meanwhile=lambda: None,
+            meanwhile=lambda _: None,
         )
     said = "".join(replica.process.output for replica in house.replicas)
     assert "wrong token from 127.0.0.9" in said

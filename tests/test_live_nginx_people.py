@@ -80,7 +80,7 @@ def test_whom_the_service_knows_is_in_by_name_and_nobody_else(url: str) -> None:
         assert write(claimed).status_code == 401
         session = client.get(f"{url}/api/session", headers={**COOKIE, "Remote-User": "boss"}).json()
         assert (session["name"], session["role"]) == ("anna@example.org", "operator")
-        wait_for(lambda: write(COOKIE).status_code == 201, "a note", meanwhile=lambda: None)
+        wait_for(lambda: write(COOKIE).status_code == 201, "a note", meanwhile=lambda _: None)
         assert write({**COOKIE, "Origin": "http://evil.example"}).status_code == 403
         noted = client.get(f"{url}/api/notes", headers=COOKIE).json()["notes"]
         assert {note["by"] for note in noted} == {"anna@example.org"}

@@ -204,7 +204,7 @@ def test_a_flood_of_the_dearest_question_loses_no_observation(domain: int, tmp_p
         asked: list[Any] = []
         answers: list[Any] = []
 
-        def ask() -> None:
+        def ask(_: float = 0.0) -> None:
             answers.extend(future.result() for future in asked if future.done())
             asked[:] = [future for future in asked if not future.done()]
             while len(asked) < AT_ONCE:

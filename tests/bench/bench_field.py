@@ -18,14 +18,6 @@ import numpy as np
 ROOT = Path(__file__).resolve().parents[2]
 sys.path[:0] = [str(ROOT), str(ROOT / "ros_node" / "lupin_twin")]
 
-from lupin_twin.core.state import Pose, Reading, Scan, TwinStore  # noqa: E402
-from lupin_twin.field.engine import (  # noqa: E402
-    FieldCache,
-    FieldEngine,
-    FieldJob,
-    FieldRequest,
-    FieldRules,
-)
 from lupin_twin.field.grid import FieldGrid, cell_centres  # noqa: E402
 from lupin_twin.field.idw import FieldSample, compute_idw_field  # noqa: E402
 from tests.oracle_idw import value_at  # noqa: E402
@@ -116,65 +108,10 @@ def compare_fields() -> None:
         )
 
 
-def store_of(samples: Sequence[FieldSample]) -> TwinStore:
-    store = TwinStore()
-    for index, (x, y, value) in enumerate(samples):
-        store.record(
-            Scan(
-                tag_id=f"tag-{index}",
-                stamp_ns=0,
-                readings=(Reading("temperature", value),),
-                pose=Pose(x, y, 0.5, 0.0, 0.0, 0.0, 1.0),
-            )
-        )
-    return store
-
-
-def engine() -> FieldEngine:
-    rules = FieldRules(
-        idw_power=2.0,
-        falloff_radius_m=REACH_M,
-        max_distance_m=REACH_M,
-        max_grid_cells=1_000_000,
-    )
-    return FieldEngine(rules, FieldCache(max_bytes=64_000_000))
-
-
-def answer(fields: FieldEngine, request: FieldRequest, store: TwinStore) -> FieldGrid:
-    found = fields.lookup(request, store, None)
-    if isinstance(found, FieldJob):
-        job, found = found, found.compute()
-        fields.keep(job, found)
-    return found
-
-
-def compare_hits() -> None:
-    print("\nasking again, in process")
-    for count, side, cells in ((30, 5.0, 200), (1_000, 50.0, 1_000)):
-        samples = scattered(count, side)
-        fields, store = engine(), store_of(samples)
-        request = FieldRequest("temperature", side / cells, 0.0, 0.0, side, side)
-        answer(fields, request, store)
-        hit = best_of(lambda: answer(fields, request, store), at_most=5000)  # noqa: B023
-        made = best_of(lambda: field(samples, side, cells))  # noqa: B023
-        line(f"hit, {cells} x {cells} cells, {count} tags", hit, ("computed", made, False))
-    bomb = FieldRequest("temperature", 1e-9, 0.0, 0.0, 1000.0, 1000.0)
-
-    def refused() -> None:
-        try:
-            answer(fields, bomb, store)
-        except ValueError:
-            return
-        raise AssertionError("the bomb went off")
-
-    line("grid bomb refused", best_of(refused, at_most=5000))
-
-
 def main() -> None:
     """Print every table."""
     print(f"Python {sys.version.split()[0]}, numpy {np.__version__}")
     compare_fields()
-    compare_hits()
 
 
 if __name__ == "__main__":

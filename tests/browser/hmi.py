@@ -120,7 +120,7 @@ class Hmi:
     def expect(self, look: Callable[[], bool], what: str) -> None:
         """Wait until something holds that no locator can tell."""
         # Not asleep: Playwright hands over what happened in the page only while it is called.
-        wait_for(look, what, meanwhile=lambda: self.page.wait_for_timeout(10))
+        wait_for(look, what, meanwhile=lambda pause_s: self.page.wait_for_timeout(1000 * pause_s))
 
     def test_id(self, name: str) -> Locator:
         return self.page.get_by_test_id(name)

@@ -234,6 +234,35 @@ def test_one_sensor_of_several_greenhouses_the_outlier_first(
             picture(page, "compare-phone")
 
 
+def test_a_row_for_each_greenhouse_leads_to_its_shift_report(
+    browser: Browser, archive: Archive, tmp_path: Path
+) -> None:
+    with three_sites(archive, tmp_path) as served:
+        with opened(browser, served.url) as page:
+            page.get_by_role("button", name="Shift report").click()
+            rows = page.get_by_role("table").locator("tbody tr")
+            expect(rows.locator("th")).to_have_text(["warm", "silent", "gh1"])
+            asked = served.http.get("/api/report").json()["sites"]
+            scans = next(each["scans"] for each in asked if each["site"] == "warm")
+            assert scans > 0
+            expect(rows.first.locator("td").first).to_have_text(str(scans))
+            expect(rows.first.locator("td").nth(4)).to_have_text("5")
+            # The choice of greenhouses and of the period.
+            page.get_by_role("searchbox").fill("warm")
+            expect(rows).to_have_count(1)
+            with page.expect_response(re.compile(r"/api/report\?from=\d+&sites=warm$")):
+                page.get_by_role("button", name="Last 24 hours").click()
+            picture(page, "report")
+            rows.first.get_by_role("link").click()
+            expect(page).to_have_url(re.compile(r"/sites/warm/api/report\.html\?from=.*&lang=en$"))
+            expect(page.get_by_role("heading", level=1)).to_contain_text("report")
+        phone = {"width": 390, "height": 800}
+        with opened(browser, served.url, viewport=phone) as page:
+            page.get_by_role("button", name="Shift report").click()
+            expect(page.get_by_role("table").locator("tbody tr")).to_have_count(3)
+            assert page.evaluate("document.documentElement.scrollWidth") <= 390
+
+
 def test_groups_fold_and_can_be_chosen(browser: Browser, archive: Archive) -> None:
     archive.do(
         "INSERT INTO site VALUES ('north-1', 'Noord 1'), ('north-2', ''), ('south-1', ''),"

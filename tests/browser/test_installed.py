@@ -44,7 +44,7 @@ def test_the_shell_opens_without_the_bridge_and_no_data_is_kept(
             wait_for(
                 lambda: any("behind" in path for path in page.evaluate(CACHED)),
                 "the page's files",
-                meanwhile=lambda: None,
+                meanwhile=lambda _: None,
             )
             cached = page.evaluate(CACHED)
             assert "/" in cached

@@ -114,9 +114,9 @@ class Peer:
         """Spin until `look` gives something true, and return that."""
         return wait_for(look, what, timeout_s, meanwhile=self.spin_briefly)
 
-    def spin_briefly(self) -> None:
+    def spin_briefly(self, timeout_s: float = 0.05) -> None:
         """Handle what is there, or wait a moment for it."""
-        self._executor.spin_once(timeout_sec=0.05)
+        self._executor.spin_once(timeout_sec=timeout_s)
 
     def wait_for_twin(self) -> None:
         """Wait until a twin listens to the three topics, so that a volatile message is not lost."""

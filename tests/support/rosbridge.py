@@ -80,7 +80,7 @@ class Ros:
             message = self.next()
             return message if message["op"] == "publish" and tag_id in tags(message) else None
 
-        found = wait_for(look, f"a state with tag {tag_id}", meanwhile=lambda: None)
+        found = wait_for(look, f"a state with tag {tag_id}", meanwhile=lambda _: None)
         assert found is not None
         return found
 

@@ -11,39 +11,36 @@ T = TypeVar("T")
 
 # Discovery takes up to 3 s on an idle machine; a busy one takes far longer over everything.
 PATIENCE_S = 60.0
-# 40 looks a second: fewer than the computed answers that one address may ask a bridge for.
-_PAUSE_S = 0.025
+# What a look costs, the process that is waited for has to do without: a request that is computed, a
+# picture of a page. So who has waited for long looks less often, and is a tenth late at most.
+_SHORTEST_PAUSE_S, _LONGEST_PAUSE_S = 0.02, 0.25
 
 
 def wait_for(
     look: Callable[[], T],
     what: str,
     timeout_s: float = PATIENCE_S,
-    meanwhile: Callable[[], object] | None = None,
+    meanwhile: Callable[[float], object] = time.sleep,
 ) -> T:
     """Call `look` until it gives something true, and return that.
 
-    `meanwhile` is called between two looks (spin a node, say); without it a short pause is made.
+    `meanwhile` passes the time between two looks, as many seconds as it is given or fewer (spins a
+    node, say).
 
     Raises:
         AssertionError: nothing true within `timeout_s`; names what was waited for.
     """
-    deadline = time.monotonic() + timeout_s
+    begun_s = time.monotonic()
     while not (found := look()):
-        _hold_to(deadline, f"waited {timeout_s:g} s in vain for {what}; last: {found!r}")
-        if meanwhile is None:
-            time.sleep(_PAUSE_S)
-        else:
-            meanwhile()
+        meanwhile(_pause(begun_s, timeout_s, what, found))
     return found
 
 
 async def until(look: Callable[[], T], what: str, timeout_s: float = PATIENCE_S) -> T:
     """`wait_for` in a coroutine: the loop goes on meanwhile."""
-    deadline = time.monotonic() + timeout_s
+    begun_s = time.monotonic()
     while not (found := look()):
-        _hold_to(deadline, f"waited {timeout_s:g} s in vain for {what}; last: {found!r}")
-        await asyncio.sleep(_PAUSE_S)
+        await asyncio.sleep(_pause(begun_s, timeout_s, what, found))
     return found
 
 
@@ -54,18 +51,25 @@ async def until_answered(
     timeout_s: float = PATIENCE_S,
 ) -> T:
     """`until` where the answer has to be awaited: asked again until `is_it` says so."""
-    last: object = None
+    begun_s = time.monotonic()
+    last: T | None = None
     try:
         async with asyncio.timeout(timeout_s):
             while not is_it(found := await ask()):
                 last = found
-                await asyncio.sleep(_PAUSE_S)
+                await asyncio.sleep(_pause(begun_s, timeout_s, what, last))
             return found
     except TimeoutError as error:
-        complaint = f"waited {timeout_s:g} s in vain for {what}; last: {last!r}"
-        raise AssertionError(complaint) from error
+        raise AssertionError(_complaint(timeout_s, what, last)) from error
 
 
-def _hold_to(deadline_s: float, complaint: str) -> None:
-    if time.monotonic() > deadline_s:
-        raise AssertionError(complaint)
+def _pause(begun_s: float, timeout_s: float, what: str, last: object) -> float:
+    """How long not to look, s; raises where the time is up."""
+    waited_s = time.monotonic() - begun_s
+    if waited_s > timeout_s:
+        raise AssertionError(_complaint(timeout_s, what, last))
+    return min(max(waited_s / 10, _SHORTEST_PAUSE_S), _LONGEST_PAUSE_S)
+
+
+def _complaint(timeout_s: float, what: str, last: object) -> str:
+    return f"waited {timeout_s:g} s in vain for {what}; last: {last!r}"

@@ -93,7 +93,7 @@ class Listener:
             frame = self.next()
             return frame if frame["type"] == kind and accept(frame) else None
 
-        found = wait_for(look, f"a {kind} frame as expected", meanwhile=lambda: None)
+        found = wait_for(look, f"a {kind} frame as expected", meanwhile=lambda _: None)
         assert found is not None
         return found
 
@@ -102,7 +102,7 @@ class Listener:
         wait_for(
             lambda: text in str(self.connection.recv(timeout=PATIENCE_S)),
             f"a frame with {text}",
-            meanwhile=lambda: None,
+            meanwhile=lambda _: None,
         )
 
     def until_tag(self, tag_id: str) -> Frame:

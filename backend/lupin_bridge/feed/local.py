@@ -54,7 +54,7 @@ class LocalTwin(RosSource[TwinNode, TwinUpdate]):
                         node.occupancy_map,
                         node.utilities.counts(),
                         journal=node.memory.condition,
-                        rules=node.fields.rules,
+                        rules=node.rules,
                         origin=node.origin,
                         input_problems=node.utilities.input_problems,
                     )

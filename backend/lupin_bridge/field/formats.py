@@ -15,7 +15,7 @@ import orjson
 
 from lupin_bridge.judge.ranges import Sensor, Sensors
 from lupin_twin.core.state import TagState
-from lupin_twin.estimate import SDS_OF_IDEAL, EstimateGrid
+from lupin_twin.estimate import EstimateGrid
 from lupin_twin.estimate.engine import Estimate
 from lupin_twin.field.engine import FieldRules
 from lupin_twin.field.grid import FieldGrid, far_off_tags
@@ -243,10 +243,14 @@ def estimate_metadata(estimate: Estimate, sensor: Sensor) -> dict[str, str]:
     }
 
 
+# The ideal range is so many sds wide where a place is known: an interval of 9 in 10 is half of it.
+_SDS_OF_IDEAL: Final = 6.0
+
+
 def within_ideal(estimate: Estimate, sensor: Sensor) -> Estimate:
     """The estimate, known only where its interval for 9 of 10 is about half of the ideal range."""
     spans = [ranges.ideal for ranges in (sensor.day, sensor.night) if ranges.ideal is not None]
-    limit = min((span.high - span.low for span in spans), default=math.inf) / SDS_OF_IDEAL
+    limit = min((span.high - span.low for span in spans), default=math.inf) / _SDS_OF_IDEAL
     grid = estimate.grid
     if not limit < grid.sd_known:
         return estimate

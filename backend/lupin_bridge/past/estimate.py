@@ -23,7 +23,7 @@ from lupin_twin.estimate.engine import (
     moment_of,
 )
 from lupin_twin.field.grid import far_off_tags
-from lupin_twin.journal.queries import SERIES_S
+from lupin_twin.journal.queries import NEWEST_S_PER_TAG
 from lupin_twin.runtime.estimates import AS_OF, estimate_at, readings_at
 from lupin_twin.runtime.workers import ShouldStop
 
@@ -59,7 +59,7 @@ class Estimated(Field):
         box = (0.0, 0.0, 2.0 * self.rules.max_distance_m, 2.0 * self.rules.max_distance_m)
         max_cells = self.rules.max_grid_cells
         request = EstimateRequest(self.query.request(box, max_cells))
-        return tags * SERIES_S + AS_OF * cost_s(request, tags, max_cells)
+        return tags * NEWEST_S_PER_TAG + AS_OF * cost_s(request, tags, max_cells)
 
     def look(self, find: Find) -> Plan:
         """See `Query`.

@@ -7,9 +7,10 @@ import { boolean, count, list, object } from '../contract/check';
 import { ALARM, TEXT } from '../contract/shapes';
 import type { Alarm } from '../contract/types';
 import { secondsOf } from '../domain/rostime';
-import { S } from '../strings';
+import { LANGUAGE, S } from '../strings';
 import { HealthMark } from '../ui/HealthMark';
 import type { FleetWords } from '../words/fleet';
+import { VIEW_WORDS } from '../words/fleetViews';
 import { alarmCount, type Site } from './sites';
 import { ms, timeText } from './times';
 import { useAnswer } from './useAnswer';
@@ -20,6 +21,8 @@ interface SiteAlarm extends Alarm {
   readonly name: string;
   readonly is_live: boolean;
 }
+
+const W = VIEW_WORDS[LANGUAGE];
 
 const MOST = 200;
 /** So many names are in one address; of more, all alarms are asked for. */
@@ -58,31 +61,23 @@ export default function Alarms({ shown, words }: Props): JSX.Element {
   const isRead = shown.every((site) => site.active_alarms !== null);
   return (
     <>
-      {trouble && <p className="fleet-note">{words.notFetched(trouble)}</p>}
+      {trouble && <p className="fleet-note">{W.notFetched(trouble)}</p>}
       {all === 0 && (
         <p className="fleet-empty">{isRead ? words.noAlarms : words.alarmsBeingRead}</p>
       )}
       <ul className="fleet-alarm-list">
         {rows.map((alarm) => (
-          <Row key={`${alarm.site} ${alarm.id}`} alarm={alarm} speech={speech} words={words} />
+          <Row key={`${alarm.site} ${alarm.id}`} alarm={alarm} speech={speech} />
         ))}
       </ul>
       {value && rows.length < all && (
-        <p className="fleet-note">{words.moreAlarms(all - rows.length)}</p>
+        <p className="fleet-note">{W.moreAlarms(all - rows.length)}</p>
       )}
     </>
   );
 }
 
-function Row({
-  alarm,
-  speech,
-  words,
-}: {
-  alarm: SiteAlarm;
-  speech: Speech;
-  words: FleetWords;
-}): JSX.Element {
+function Row({ alarm, speech }: { alarm: SiteAlarm; speech: Speech }): JSX.Element {
   const raised = secondsOf(alarm.raised_at);
   const { what, worst } = valuesOf(alarm, speech, null);
   return (
@@ -97,8 +92,8 @@ function Row({
         </span>
         <span className="fleet-line">
           {S.alarmSince(whenText(raised, timeOfDay() / 1000), null)}
-          {!alarm.is_live && ` (${words.wasLive})`}
-          {saidOf(alarm, words).map((said) => (
+          {!alarm.is_live && ` (${W.wasLive})`}
+          {saidOf(alarm).map((said) => (
             <span key={said} className="fleet-said">
               {said}
             </span>
@@ -110,11 +105,11 @@ function Row({
 }
 
 /** What people said of it. */
-function saidOf(alarm: SiteAlarm, words: FleetWords): readonly string[] {
+function saidOf(alarm: SiteAlarm): readonly string[] {
   const { acknowledged_by: by, acknowledged_at: at, shelved_by: who, shelved_until: until } = alarm;
   return [
-    ...(by && at ? [words.acknowledged(by, timeText(ms(at)))] : []),
-    ...(who && until ? [words.shelved(who, timeText(ms(until)))] : []),
+    ...(by && at ? [W.acknowledged(by, timeText(ms(at)))] : []),
+    ...(who && until ? [W.shelved(who, timeText(ms(until)))] : []),
   ];
 }
 

@@ -14,8 +14,9 @@ import { spanOf as periodSpan } from '../domain/period';
 import { rosText } from '../domain/rostime';
 import { isMeasured, type Sensor } from '../domain/sensors';
 import { differenceToShown, unitOf } from '../domain/units';
-import { S } from '../strings';
+import { LANGUAGE, S } from '../strings';
 import type { FleetWords } from '../words/fleet';
+import { VIEW_WORDS } from '../words/fleetViews';
 import {
   COMPARED,
   linesOf,
@@ -30,6 +31,8 @@ import {
 import type { Site } from './sites';
 import { useAnswer } from './useAnswer';
 import { useSpeech } from './useSpeech';
+
+const W = VIEW_WORDS[LANGUAGE];
 
 const PERIODS = ['day', 'week', 'month'] as const;
 type Period = (typeof PERIODS)[number];
@@ -66,9 +69,9 @@ export default function Compare({ shown, words }: Props): JSX.Element {
     () =>
       found && {
         ...{ sensor: sensors.named(found.sensor_type), unit, span: spanOf(found), moment: null },
-        lines: linesOf(found, drawn, words.median),
+        lines: linesOf(found, drawn, W.median),
       },
-    [found, drawn, sensors, unit, words],
+    [found, drawn, sensors, unit],
   );
   const toggle = (site: string): void => {
     setPicked(drawn.includes(site) ? drawn.filter((each) => each !== site) : [...drawn, site]);
@@ -105,16 +108,16 @@ export default function Compare({ shown, words }: Props): JSX.Element {
           ))}
         </div>
         {compared.length < shown.length && (
-          <p className="fleet-note">{words.someCompared(compared.length, shown.length)}</p>
+          <p className="fleet-note">{W.someCompared(compared.length, shown.length)}</p>
         )}
       </div>
-      {trouble && <p className="fleet-note">{words.notFetched(trouble)}</p>}
+      {trouble && <p className="fleet-note">{W.notFetched(trouble)}</p>}
       {!found && !trouble && <p className="fleet-empty">{S.chartLoading}</p>}
       {found && model && (
         <>
           <Chart model={model} onPoint={setAt} />
           <p className="fleet-line">
-            <Look place={MEDIAN_LOOK} /> {words.median}
+            <Look place={MEDIAN_LOOK} /> {W.median}
           </p>
           <table className="fleet-table">
             <thead>
@@ -122,8 +125,8 @@ export default function Compare({ shown, words }: Props): JSX.Element {
                 <th scope="col" />
                 <th scope="col">{words.sites}</th>
                 <th scope="col">{at === null ? S.chartColumns.mean : rosText(at)}</th>
-                <th scope="col" title={words.deviationHint}>
-                  {words.deviation}
+                <th scope="col" title={W.deviationHint}>
+                  {W.deviation}
                 </th>
               </tr>
             </thead>
@@ -134,7 +137,7 @@ export default function Compare({ shown, words }: Props): JSX.Element {
                     <label className="fleet-draw">
                       <input
                         type="checkbox"
-                        aria-label={words.draw(site.name)}
+                        aria-label={W.draw(site.name)}
                         checked={drawn.includes(site.site)}
                         disabled={!drawn.includes(site.site) && drawn.length >= MOST_DRAWN}
                         onChange={() => {

@@ -20,8 +20,9 @@ import { ms, timeText } from './times';
 // Loaded when somebody asks for them.
 const Alarms = lazy(() => import('./Alarms'));
 const Compare = lazy(() => import('./Compare'));
+const Report = lazy(() => import('./Report'));
 
-const VIEWS = ['sites', 'alarms', 'compare'] as const;
+const VIEWS = ['sites', 'alarms', 'compare', 'report'] as const;
 type View = (typeof VIEWS)[number];
 
 const asked = new URLSearchParams(window.location.search);
@@ -147,11 +148,9 @@ export function Overview({ seen, words, isKiosk }: Props): JSX.Element {
           <Cards shown={shown} groups={groups} words={words} asOf={asOfWhen(seen)} />
         ) : (
           <Suspense fallback={<p className="fleet-empty">{words.connecting}</p>}>
-            {view === 'alarms' ? (
-              <Alarms shown={shown} words={words} />
-            ) : (
-              <Compare shown={shown} words={words} />
-            )}
+            {view === 'alarms' && <Alarms shown={shown} words={words} />}
+            {view === 'compare' && <Compare shown={shown} words={words} />}
+            {view === 'report' && <Report shown={shown} words={words} />}
           </Suspense>
         )}
       </main>

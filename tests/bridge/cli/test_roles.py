@@ -122,7 +122,7 @@ def test_the_demo_shows_the_whole_greenhouse_and_ends_with_its_patrol(domain: in
                 ids.update(tag_ids(frame["state"]))
             return len(ids) == ALL_TAGS
 
-        wait_for(look, f"all {ALL_TAGS} tags", meanwhile=lambda: None)
+        wait_for(look, f"all {ALL_TAGS} tags", meanwhile=lambda _: None)
         assert is_running(patrol)
         os.killpg(demo.pid, signal.SIGINT)  # as a terminal does at Ctrl-C
         assert demo.wait() == 0

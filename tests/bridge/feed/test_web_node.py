@@ -49,7 +49,7 @@ class Stage:
 
     def until(self, look: Callable[[], Any], what: str) -> Any:
         """Spin the node until `look` gives something true, and return that."""
-        return wait_for(look, what, meanwhile=lambda: self._executor.spin_once(timeout_sec=0.05))
+        return wait_for(look, what, meanwhile=self._executor.spin_once)
 
     def first_map(self) -> OccupancyMap:
         """The first map that comes."""
@@ -162,7 +162,7 @@ def test_a_twin_that_was_started_anew_is_another_revision_for_all_replicas(domai
         assert len(revisions) == 2
 
 
-def spare() -> None:
+def spare(_: float) -> None:
     """What has been waited for comes with the next state."""
 
 

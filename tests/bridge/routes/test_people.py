@@ -210,7 +210,7 @@ def test_a_word_is_shared_with_every_browser_at_once_and_can_be_taken_back(live:
         wait_for(
             lambda: '"acknowledged_by":"anna"' in str(other.recv(timeout=PATIENCE_S)),
             "a frame with it",
-            meanwhile=lambda: None,
+            meanwhile=lambda _: None,
         )
         withdrawn = anna.delete(f"/api/notes/{note.id}").json()
         assert withdrawn["withdrawn_by"] == "anna"
@@ -363,7 +363,7 @@ def test_one_name_cannot_fill_the_log(live: Bridge, accounts: Path) -> None:
             assert answer.status_code in {201, 429}
             return answer.status_code == 429
 
-        wait_for(is_slowed, "an end to writing", meanwhile=lambda: None)
+        wait_for(is_slowed, "an end to writing", meanwhile=lambda _: None)
 
 
 def raw(live: Bridge, request: bytes) -> bytes:

@@ -101,7 +101,7 @@ def test_another_token_of_the_same_name_keeps_nothing_open_that_the_old_one_had(
         remove(accounts, "plc", "token")
         add(accounts, "token", digest(fresh), plc="viewer")
         wait_for(
-            lambda: "the session has ended" in end_of(thief), "its end", meanwhile=lambda: None
+            lambda: "the session has ended" in end_of(thief), "its end", meanwhile=lambda _: None
         )
     ours = {"Authorization": f"Bearer {fresh}"}
     assert live.get("/api/session", ours).json()["name"] == "plc"
@@ -184,7 +184,7 @@ def test_ten_thousand_notes_hold_nobody_up(accounts: Path, tmp_path: Path) -> No
             answer = write(browser, **note)
             return answer if answer.status_code == 201 else None
 
-        wait_for(lambda: answer_of(COMMENT_NOW), "a note", meanwhile=lambda: None)
+        wait_for(lambda: answer_of(COMMENT_NOW), "a note", meanwhile=lambda _: None)
         begun_s = time.monotonic()
         assert write(browser, **{**COMMENT_NOW, "text": "one more"}).status_code == 201
         took_s = time.monotonic() - begun_s

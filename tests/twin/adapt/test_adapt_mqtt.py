@@ -6,13 +6,18 @@ import json
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 from typing import Any
 
+import yaml
 from lupin_msgs.msg import Observation
 from paho.mqtt.client import Client
 from paho.mqtt.enums import CallbackAPIVersion
 
+from lupin_twin.adapt.check import report
+from lupin_twin.adapt.config import config_of
+from lupin_twin.adapt.node import AdaptNode
 from tests.support.domains import own_domain
 from tests.support.messages import scan
 from tests.support.mosquitto import Broker
@@ -20,7 +25,7 @@ from tests.support.processes import Process, twin_node
 from tests.support.ros import Peer
 from tests.support.waiting import wait_for
 from tests.support.web import bridge
-from tests.twin.adapt.test_adapt import Robot, adapt
+from tests.twin.adapt.test_adapt import Robot, adapt, listening
 
 CONFIG = """
 tags: {{bench: [1.0, 2.0]}}
@@ -246,6 +251,25 @@ def test_a_broker_that_falls_silent_is_an_alarm_of_its_tags_while_a_robot_goes_o
             later(200.0)
         peer.until(lambda: alarms() == [("bench", "old")], "the alarm of the tag")
         assert process.exit_code is None
+
+
+def test_check_says_what_comes_from_the_broker(domain: int, tmp_path: Path) -> None:
+    broker = Broker(tmp_path)
+    config = config_of(yaml.safe_load(CONFIG.format(url=broker.url)))
+    with (
+        listening(domain, partial(AdaptNode, config, is_check=True)) as (node, spin),
+        broker.running(),
+        device(broker) as client,
+    ):
+
+        def is_right() -> bool:
+            client.publish("plain/bench/co2", "800")
+            spin()
+            line = next(line for _, line in report(node, 0.0))
+            return line.startswith("ok    MQTT: connected; received ") and "used 0" not in line
+
+        wait_for(is_right, "what the broker says")
+        node.destroy_node()
 
 
 def test_a_broker_that_comes_late_or_goes_is_told_and_found_again(

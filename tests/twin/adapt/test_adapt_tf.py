@@ -249,6 +249,22 @@ def test_check_says_where_tf_has_the_robot_and_which_tags_are_seen(domain: int) 
         assert tf.endswith("robot at (5.00, 0.00) m")
 
 
+def test_check_names_transforms_that_are_static_and_not_latched(domain: int) -> None:
+    from tf2_msgs.msg import TFMessage
+
+    made = partial(AdaptNode, config_of(yaml.safe_load(CONFIG)), is_check=True)
+    with Peer(domain) as peer, listening(domain, made) as (node, spin):
+        publisher = peer.node.create_publisher(TFMessage, "/tf_static", QoSProfile(depth=1))
+
+        def is_named() -> bool:
+            publisher.publish(TFMessage())
+            spin()
+            lines = [line for _, line in report(node, 0.0)]
+            return any("/tf_static: its QoS is VOLATILE, expected TRANSIENT" in it for it in lines)
+
+        peer.until(is_named, "the QoS")
+
+
 def test_check_without_a_configuration_finds_tf_and_detections(domain: int) -> None:
     with Peer(domain) as peer, listening(domain, Listener) as (node, spin):
         robot = Robot(peer)

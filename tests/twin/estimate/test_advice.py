@@ -31,7 +31,7 @@ def error_by_the_textbook(readings: Readings, h: Hyper, more: list[int]) -> floa
 def test_each_place_is_the_best_of_those_left_and_its_error_the_textbook_s(
     readings: Readings, h: Hyper
 ) -> None:
-    model = Model(Scale(20.0, 2.0), 2.0, DAY_S, h)
+    model = Model(Scale(20.0, 2.0), DAY_S, h)
     posterior = model.posterior(readings, float(readings.time_s.max()))
     advice = posterior.advice(CANDIDATES, 3, over=TARGETS)
     at_first = error_by_the_textbook(readings, h, [])

@@ -30,7 +30,7 @@ def by_the_textbook(readings: Readings, block: list[int], h: Hyper) -> tuple[flo
 def test_what_is_expected_is_what_the_textbook_says_without_the_last_four(
     readings: Readings, h: Hyper
 ) -> None:
-    model = Model(Scale(20.0, 2.0), 2.0, DAY_S, h)
+    model = Model(Scale(20.0, 2.0), DAY_S, h)
     found = model.posterior(readings, 2 * DAY_S).changes()
     order = np.lexsort((np.arange(len(readings)), readings.time_s))
     for tag, change in enumerate(found):
@@ -49,7 +49,7 @@ def test_a_tag_is_left_out_with_all_that_are_nearer_than_tags_are_to_gaps() -> N
     xy[8] = xy[7] + 0.05  # beside another, which must not help it
     beside = Readings(day.time_s, day.tag, day.value, xy)
     h = Hyper(1.0, 5.0, 1.0, 1.0, 0.5, 8.0, 0.4, 2.5, 0.15, 0.3)
-    posterior = Model(Scale(20.0, 2.0), 2.0, DAY_S, h).posterior(beside, DAY_S)
+    posterior = Model(Scale(20.0, 2.0), DAY_S, h).posterior(beside, DAY_S)
     [(measured, mean, sd)] = posterior.left_out(np.array([7]))
     gap = gap_of(xy)
     near = [tag for tag in range(9) if np.hypot(*(xy[tag] - xy[7])) < gap]

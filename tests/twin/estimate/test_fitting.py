@@ -18,13 +18,13 @@ START = np.zeros(len(PRIOR_MEDIAN))
 
 
 def objective_of(readings: Readings) -> Any:
-    y = scale_of(readings.value, (18.0, 26.0)).standardised(readings.value)
+    y = scale_of(readings.value).standardised(readings.value)
     return surprise(Pairs(readings, DAY_S), y)
 
 
 @given(some_readings())
 def test_the_surprise_is_minus_the_log_of_likelihood_and_prior(readings: Readings) -> None:
-    y = scale_of(readings.value, (18.0, 26.0)).standardised(readings.value)
+    y = scale_of(readings.value).standardised(readings.value)
     there = np.linspace(-0.5, 0.5, len(START))
 
     def plainly(coordinates: Any) -> float:

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lupin_twin.estimate import SDS_OF_IDEAL, FitFailed, Model, Readings, fit
+from lupin_twin.estimate import FitFailed, Model, Readings, fit
 from lupin_twin.estimate.kernel import Hyper, Scale
 from lupin_twin.estimate.posterior import INFLATION
 from tests.support import textbook_gp
@@ -18,7 +18,7 @@ PLACES = [(0.0, 0.0), (1.3, -2.0), (-4.0, 4.5)]
 
 
 def model_of(h: Hyper) -> Model:
-    return Model(Scale(20.0, 2.0), 2.0, DAY_S, h)
+    return Model(Scale(20.0, 2.0), DAY_S, h)
 
 
 @given(some_readings(), hypers, st.floats(0.0, 12.0))
@@ -42,30 +42,28 @@ def test_the_estimate_is_the_textbook_s(readings: Readings, h: Hyper, later_h: f
         [(hour / 2.0, hour % 2, 22.0) for hour in range(20)],
     ],
 )
-@pytest.mark.parametrize("ideal", [None, (18.0, 26.0)])
 def test_one_reading_duplicates_and_equal_values_make_a_model(
-    rows: list[tuple[float, int, float]], ideal: tuple[float, float] | None
+    rows: list[tuple[float, int, float]],
 ) -> None:
     readings = readings_of(rows, [(0.0, 0.0), (1.0, 1.0)])
-    posterior = fit(readings, ideal=ideal).posterior(readings, DAY_S / 2)
+    posterior = fit(readings).posterior(readings, DAY_S / 2)
     mean, sd = posterior.points(np.array(PLACES))
     assert np.isfinite(mean).all()
     assert (sd > 0.0).all()
 
 
-def test_what_is_known_has_a_limit_in_the_model_and_one_in_the_ideal_range() -> None:
+def test_what_is_known_has_a_limit_in_how_places_and_readings_differ() -> None:
     h = Hyper(1.0, 5.0, 1.0, 0.3, 0.0001, 8.0, 0.4, 2.5, 0.15, 1e-6)
     assert model_of(h).sd_known == pytest.approx(0.6 * INFLATION * 0.5 * 2.0, rel=1e-6)
     wild = h._replace(sa=100.0)
     assert model_of(wild).sd_known == 2.0
-    assert fit(a_day(), ideal=(18.0, 26.0)).limit == pytest.approx(8.0 / SDS_OF_IDEAL)
 
 
 def test_the_day_s_course_bridges_an_outage_only_where_the_day_is_as_long_as_told() -> None:
     day = a_day(passes=24)
     true = 21.0 + 4.0 * np.sin(2.0 * np.pi * 1.25) + 0.4 * day.xy[:, 1]
-    told = fit(day, ideal=(18.0, 26.0)).posterior(day, 1.25 * DAY_S).points(day.xy)
-    wrong = fit(day, ideal=(18.0, 26.0), day_length_s=60 * DAY_S)
+    told = fit(day).posterior(day, 1.25 * DAY_S).points(day.xy)
+    wrong = fit(day, day_length_s=60 * DAY_S)
     off = wrong.posterior(day, 1.25 * DAY_S).points(day.xy)
     assert np.abs(told[0] - true).mean() < 0.3
     assert np.abs(off[0] - true).mean() > 1.0

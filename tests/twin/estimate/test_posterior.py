@@ -23,7 +23,7 @@ BOX = {"bbox_min_x": 0.0, "bbox_min_y": 0.0, "bbox_max_x": 4.0, "bbox_max_y": 8.
 @pytest.mark.parametrize(("resolution", "tags"), [(0.5, 8), (0.5, 30)])
 def test_a_grid_is_its_cells_centres(resolution: float, tags: int) -> None:
     day = a_day(tags=tags, passes=4)
-    posterior = fit(day, ideal=(18.0, 26.0)).posterior(day, DAY_S)
+    posterior = fit(day).posterior(day, DAY_S)
     grid = posterior.grid(**BOX, resolution=resolution)
     assert grid.mean.shape == grid.sd.shape == grid.known.shape == (grid.height, grid.width)
     mean, sd, x, y = beside(posterior, grid)
@@ -36,7 +36,7 @@ def test_a_grid_is_its_cells_centres(resolution: float, tags: int) -> None:
 def test_a_fine_grid_is_interpolated_and_off_by_little(length: float) -> None:
     """However short the length over which the truth changes: the lattice is made for it."""
     day = a_day(tags=30, passes=6)
-    model = fit(day, ideal=(18.0, 26.0))
+    model = fit(day)
     model = replace(model, hyper=model.hyper._replace(l=length))
     posterior = model.posterior(day, DAY_S)
     grid = posterior.grid(**BOX, resolution=0.02)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 import math
 import tracemalloc
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -14,17 +15,16 @@ from lupin_twin.core.drops import MAX_TEXT_LENGTH
 from lupin_twin.core.state import Pose, Reading, Scan, TwinStore
 from lupin_twin.field import idw
 from lupin_twin.field.engine import (
-    FieldCache,
-    FieldEngine,
-    FieldJob,
     FieldRefused,
     FieldRequest,
     FieldRules,
     check_request,
+    compute_field,
     cost_s,
     default_box,
     default_request,
 )
+from lupin_twin.field.explored import OccupancyMap
 from lupin_twin.field.grid import FieldGrid
 from lupin_twin.field.idw import Abandoned
 from tests.support.maps import map_of
@@ -55,10 +55,6 @@ def rules_of(**changes: Any) -> FieldRules:
     return FieldRules(**{**given, **changes})
 
 
-def engine_of(**changes: Any) -> FieldEngine:
-    return FieldEngine(rules_of(**changes), FieldCache(max_bytes=64_000_000))
-
-
 def scan(tag_id: str, x: float, y: float, value: float) -> Scan:
     return Scan(
         tag_id=tag_id,
@@ -77,14 +73,9 @@ def store() -> TwinStore:
     return store
 
 
-def answer(engine: FieldEngine, request: FieldRequest, *args: Any) -> FieldGrid:
-    """What a client gets: the remembered field, or the job's, which is remembered."""
-    found = engine.lookup(request, *args)
-    if isinstance(found, FieldGrid):
-        return found
-    grid = found.compute()
-    engine.keep(found, grid)
-    return grid
+def answer(store: TwinStore, occupancy: OccupancyMap | None = None, **rules: float) -> FieldGrid:
+    samples = store.samples_for_sensor("temperature")
+    return compute_field(request_of(), samples, occupancy, rules_of(**rules))
 
 
 # --- the request -----------------------------------------------------------------------------
@@ -112,13 +103,9 @@ def answer(engine: FieldEngine, request: FieldRequest, *args: Any) -> FieldGrid:
         ({"resolution": 0.002}, r"0\.002 m makes 2000 x 1000 cells, the limit is 1000000 in all"),
     ],
 )
-def test_bad_request_is_refused(changes: dict[str, Any], message: str, store: TwinStore) -> None:
+def test_bad_request_is_refused(changes: dict[str, Any], message: str) -> None:
     with pytest.raises(FieldRefused, match=message):
         check_request(request_of(**changes), MAX_CELLS)
-    engine = engine_of()
-    with pytest.raises(FieldRefused, match=message):
-        engine.lookup(request_of(**changes), store, None)
-    assert (engine.cache.hits, engine.cache.misses) == (0, 0)
 
 
 @pytest.mark.parametrize(
@@ -133,40 +120,34 @@ def test_bad_request_is_refused(changes: dict[str, Any], message: str, store: Tw
         {"resolution": 1e-45, "bbox_max_x": 3.4e38, "bbox_max_y": 3.4e38},
     ],
 )
-def test_grid_bomb_is_refused_without_an_allocation(
-    changes: dict[str, Any], store: TwinStore
-) -> None:
-    engine = engine_of()
+def test_grid_bomb_is_refused_without_an_allocation(changes: dict[str, Any]) -> None:
     request = request_of(**changes)
     tracemalloc.start()
     try:
         with pytest.raises(FieldRefused, match="the limit is 1000000 in all"):
-            engine.lookup(request, store, None)
+            check_request(request, MAX_CELLS)
         _, peak = tracemalloc.get_traced_memory()
     finally:
         tracemalloc.stop()
     assert peak < 20_000
 
 
-# --- the engine ------------------------------------------------------------------------------
+# --- the field ------------------------------------------------------------------------------
 
 
 def test_field_is_of_the_stores_samples_by_the_rules(store: TwinStore) -> None:
-    grid = answer(engine_of(), request_of(), store, None)
+    grid = answer(store)
     assert (grid.width, grid.height, grid.sample_count) == (4, 2, 2)
     rows = grid.values.reshape(2, 4)
     assert (rows[0, 0], rows[1, 3]) == (10.0, 20.0)
     assert not np.isnan(rows[0, 1])
-    narrow = answer(engine_of(max_distance_m=0.5), request_of(), store, None)
+    narrow = answer(store, max_distance_m=0.5)
     assert np.isnan(narrow.values.reshape(2, 4)[0, 1])
     store.record(scan("c", 1.5, 0.5, 30.0))
-    by_power = [
-        answer(engine_of(idw_power=power), request_of(), store, None).values.reshape(2, 4)[1, 0]
-        for power in (1.0, 2.0)
-    ]
+    by_power = [answer(store, idw_power=power).values.reshape(2, 4)[1, 0] for power in (1.0, 2.0)]
     assert by_power[0] != by_power[1]
     # With no tag within the falloff, the nearest is taken: "a", 1 m away.
-    nearest = answer(engine_of(falloff_radius_m=0.5), request_of(), store, None)
+    nearest = answer(store, falloff_radius_m=0.5)
     assert nearest.values.reshape(2, 4)[1, 0] == 10.0
 
 
@@ -175,14 +156,14 @@ def test_a_job_that_nobody_waits_for_ends_between_two_parts(store: TwinStore) ->
     for number in range(100):
         store.record(scan(f"far {number}", number * 1.0, 0.0, 1.0))
     rules = {"falloff_radius_m": 200.0, "max_distance_m": 200.0}
-    job = engine_of(**rules).lookup(request_of(resolution=0.01), store, None)
-    assert isinstance(job, FieldJob)
+    samples = store.samples_for_sensor("temperature")
+    compute = partial(compute_field, request_of(resolution=0.01), samples, None, rules_of(**rules))
     asked = itertools.count(1)
-    job.compute(lambda: next(asked) == 0)
+    compute(lambda: next(asked) == 0)
     assert next(asked) > 400 * 200 * 100 / idw.MAX_PAIRS
     answers = iter([False, False, True])
     with pytest.raises(Abandoned):
-        job.compute(lambda: next(answers))
+        compute(lambda: next(answers))
     assert next(answers, None) is None, "asked three times, and not again"
 
 
@@ -209,8 +190,8 @@ def test_cost_follows_cells_and_the_windows_of_the_samples(
 
 def test_a_map_clips_to_what_it_knows(store: TwinStore) -> None:
     occupancy = map_of([[0, -1, 0, 0], [0, 0, 0, -1]])
-    unclipped = answer(engine_of(), request_of(), store, None)
-    clipped = answer(engine_of(), request_of(), store, occupancy)
+    unclipped = answer(store)
+    clipped = answer(store, occupancy)
     known = np.array([1, 0, 1, 1, 1, 1, 1, 0], dtype=np.bool_)
     np.testing.assert_array_equal(
         clipped.values, np.where(known, unclipped.values, np.float32(np.nan))
@@ -221,10 +202,9 @@ def test_a_map_clips_to_what_it_knows(store: TwinStore) -> None:
 def test_before_a_map_came_nothing_is_clipped_and_its_first_one_makes_fields_anew(
     store: TwinStore,
 ) -> None:
-    engine = engine_of()
-    grid = answer(engine, request_of(), store, None)
+    grid = answer(store)
     assert not np.isnan(grid.values).any()
-    clipped = answer(engine, request_of(), store, map_of([[-1] * 4] * 2, revision=0))
+    clipped = answer(store, map_of([[-1] * 4] * 2, revision=0))
     assert np.isnan(clipped.values).all()
     assert (clipped.sample_count, clipped.value_min, clipped.value_max) == (2, 0.0, 0.0)
 

@@ -184,7 +184,7 @@ def test_messages_that_wait_are_taken_one_right_behind_the_other(
             assert publisher.wait_for_all_acked(Duration(seconds=PATIENCE_S))
 
         publish(range(1))
-        wait_for(lambda: heard, "the first", meanwhile=lambda: executor.spin_once(0.05))
+        wait_for(lambda: heard, "the first", meanwhile=executor.spin_once)
         publish(range(1, 40))
         executor.spin_once(PATIENCE_S)
         assert heard == list(map(float, range(40)))

@@ -15,8 +15,6 @@ from lupin_msgs.msg import TwinState
 from rclpy.context import Context
 from rclpy.parameter import Parameter
 
-from lupin_twin.field.engine import FieldJob, FieldRequest
-from lupin_twin.field.grid import FieldGrid
 from lupin_twin.ros.node import TwinNode
 from tests.support.messages import occupancy_grid, scan
 from tests.support.ros import Peer
@@ -67,22 +65,12 @@ def test_a_rule_that_is_changed_takes_effect_at_once(stage: Stage) -> None:
     node = stage.node
     told: list[Any] = []
     node.add_listener(told.append, heartbeat_s=60.0)
-    before, revision = node.fields.rules, node.revision
-    request = FieldRequest("co2", 0.5, -1.0, -1.0, 1.0, 1.0)
-    job = node.fields.lookup(request, node.store, None)
-    assert isinstance(job, FieldJob)
-    node.fields.keep(job, job.compute())
+    before, revision = node.rules, node.revision
     [result] = node.set_parameters([Parameter("idw_power", value=3.5)])
     assert (result.successful, result.reason) == (True, "")
-    assert node.fields.rules == replace(before, idw_power=3.5)
+    assert node.rules == replace(before, idw_power=3.5)
     assert node.revision != revision
     assert len(told) == 2
-    other = node.fields.lookup(request, node.store, None)
-    assert isinstance(other, FieldJob)
-    assert other.rules.idw_power == 3.5
-    # What was computed by the old rules is theirs, and back with them.
-    node.set_parameters([Parameter("idw_power", value=2.0)])
-    assert isinstance(node.fields.lookup(request, node.store, None), FieldGrid)
 
 
 # --- one thread ---------------------------------------------------------------------------------

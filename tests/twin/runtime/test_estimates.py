@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 import math
+from contextlib import closing
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
-from lupin_twin.core.state import NANOSECONDS_PER_SECOND
+from lupin_twin.core.state import NANOSECONDS_PER_SECOND, Reading
 from lupin_twin.estimate.engine import EstimateRequest, TagPast
 from lupin_twin.estimate.grading import Grades, Tally
 from lupin_twin.field.engine import FieldRefused, FieldRequest
 from lupin_twin.field.idw import Abandoned
+from lupin_twin.journal.fold import state_at
+from lupin_twin.journal.schema import open_reader
 from lupin_twin.runtime.estimates import (
     FIRST_FIT,
     MAX_PLACES,
@@ -21,12 +25,17 @@ from lupin_twin.runtime.estimates import (
     advice,
     estimate_at,
     find,
+    readings_at,
 )
 from tests.support.estimates import DAY_S
+from tests.support.journal import NOW, kept, pin, scan
 from tests.support.maps import map_of
 
 S = NANOSECONDS_PER_SECOND
 HOUR_NS = 3600 * S
+
+
+PRODUCERS = (("one", 25.0), ("other", 20.0))
 
 
 def house(until_s: int, *, tags: int = 12, every_s: int = 150) -> list[TagPast]:
@@ -51,6 +60,16 @@ def found(pasts: list[TagPast], hours: float, before: Known | None = None) -> Kn
 def with_reading(pasts: list[TagPast], tag: int, at_ns: int, value: float) -> list[TagPast]:
     more = replace(pasts[tag], readings=(*pasts[tag].readings, (at_ns, value)))
     return [*pasts[:tag], more, *pasts[tag + 1 :]]
+
+
+def test_of_equal_stamps_it_is_made_of_what_the_state_shows(tmp_path: Path) -> None:
+    path = tmp_path / "twin.sqlite"
+    kept(path, [pin(), *(scan(source=name, temperature=value) for name, value in PRODUCERS)])
+    with closing(open_reader(path)) as log:
+        [past] = readings_at(log, "temperature", NOW, DAY_S)
+        [tag] = state_at(log, NOW, "map").tags
+    assert past.readings == ((NOW, 20.0),)
+    assert tag.readings == (Reading("temperature", 20.0, NOW),)
 
 
 def test_a_report_holds_each_tag_against_all_the_others() -> None:

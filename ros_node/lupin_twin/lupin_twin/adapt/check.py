@@ -91,7 +91,7 @@ def suggestion(listener: Listener) -> str:
     for topic, heard in sorted(listener.heard.items()):
         known = STANDARD.get(heard.type_name)
         if known is not None and heard.messages:
-            name = known.sensor or topic.rpartition("/")[2]
+            name = known[0] or topic.rpartition("/")[2]
             entry = {"topic": topic, "type": heard.type_name}
             sensors.setdefault(name, []).append(entry)
     content: dict[str, Any] = {}

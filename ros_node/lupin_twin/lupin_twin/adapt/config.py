@@ -9,11 +9,11 @@ import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Final, NamedTuple
+from typing import Any, Final
 
 from lupin_twin.adapt.mqtt_topics import Broker, broker_of
 from lupin_twin.adapt.table import ConfigError, Table, check_text, is_number, shown
-from lupin_twin.adapt.value import Value, value_of
+from lupin_twin.adapt.value import AS_IT_IS, Value, value_of
 from lupin_twin.core.drops import MAX_SENSORS_PER_TAG, MAX_TAGS
 
 MAX_FILE_BYTES: Final = 4_000_000
@@ -23,23 +23,14 @@ _TYPE: Final = re.compile(r"[a-z][a-z0-9_]*/msg/[A-Za-z][A-Za-z0-9]*")
 _FIELD: Final = re.compile(r"[a-z]\w*(\[\d{1,9}\])?(\.[a-z]\w*(\[\d{1,9}\])?)*")
 
 
-class Quantity(NamedTuple):
-    """What a standard message measures: its number's field, and how that becomes our unit."""
-
-    sensor: str
-    field: str
-    factor: float = 1.0
-    unit: str = ""
-
-
-# Units by the messages' own definitions; ours as in `sensors.json`.
-STANDARD: Final[Mapping[str, Quantity]] = {
-    "sensor_msgs/msg/Temperature": Quantity("temperature", "temperature", unit="°C"),
-    "sensor_msgs/msg/RelativeHumidity": Quantity("humidity", "relative_humidity", 100.0, "%"),
-    "sensor_msgs/msg/Illuminance": Quantity("light", "illuminance", unit="lx"),
-    "sensor_msgs/msg/FluidPressure": Quantity("pressure", "fluid_pressure", 0.01, "hPa"),
-    "std_msgs/msg/Float32": Quantity("", "data"),
-    "std_msgs/msg/Float64": Quantity("", "data"),
+# What a standard message measures, and how its number becomes our unit: a ratio %, Pa hPa.
+STANDARD: Final[Mapping[str, tuple[str, Value]]] = {
+    "sensor_msgs/msg/Temperature": ("temperature", Value("temperature")),
+    "sensor_msgs/msg/RelativeHumidity": ("humidity", Value("relative_humidity", 100.0)),
+    "sensor_msgs/msg/Illuminance": ("light", Value("illuminance")),
+    "sensor_msgs/msg/FluidPressure": ("pressure", Value("fluid_pressure", 0.01)),
+    "std_msgs/msg/Float32": ("", Value("data")),
+    "std_msgs/msg/Float64": ("", Value("data")),
 }
 # What apriltag_ros calls a tag's frame, unless its parameter `tag.frames` says otherwise.
 TAG_FRAME: Final = "{family}:{id}"
@@ -238,14 +229,14 @@ def _sensor(name: str, table: Table) -> Sensor:
         raise ConfigError(
             f"{table.name}.type is {shown(type_name)}, expected such as sensor_msgs/msg/Temperature"
         )
-    known = STANDARD.get(type_name)
-    field = table.text("field", None if known is None else known.field)
+    _, known = STANDARD.get(type_name, ("", AS_IT_IS))
+    field = table.text("field", known.path or None)
     if not _FIELD.fullmatch(field):
         raise ConfigError(
             f"{table.name}.field is {shown(field)}, expected a path such as data or axes[2].value"
         )
     # The factor is that of the standard field: another number of the message is in its own unit.
-    factor = known.factor if known is not None and field == known.field else 1.0
+    factor = known.factor if field == known.path else 1.0
     sensor = Sensor(
         name,
         topic=table.text("topic"),

@@ -16,7 +16,7 @@ from diagnostic_msgs.msg import DiagnosticArray
 from lupin_msgs.msg import DiscoveredTag, DiscoveredTags, Observation
 from rclpy.exceptions import InvalidTopicNameException
 from rclpy.node import Node
-from rclpy.qos import QoSProfile, ReliabilityPolicy
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.serialization import deserialize_message
 from std_msgs.msg import Header
 
@@ -376,7 +376,7 @@ class AdaptNode(Node):  # type: ignore[misc]  # rclpy is not typed
             if tag_id not in self._scans.places:
                 tf.problem = tf.problem or self._why_no_place(frame)
         for topic, source in self._sources.items():
-            if topic not in (MQTT, TF, TF_STATIC):
+            if topic not in (MQTT, TF):
                 source.problem = self._why_silent(source, silent_s)
             elif topic == MQTT and self._mqtt is not None:
                 source.problem = self._mqtt.problem
@@ -398,15 +398,26 @@ class AdaptNode(Node):  # type: ignore[misc]  # rclpy is not typed
         if quiet_s < silent_s:
             return ""
         publishers = self.get_publishers_info_by_topic(source.name)
+        is_static = source.name == TF_STATIC
+        # Static frames come once, and a robot may have none.
+        if is_static and (source.received or not publishers):
+            return ""
         if not publishers:
             published = (
-                name for name, _ in self.get_topic_names_and_types() if self.count_publishers(name)
+                name
+                for name, types in self.get_topic_names_and_types()
+                if source.type_name in types and self.count_publishers(name)
             )
             near = difflib.get_close_matches(source.name, published, n=1, cutoff=0.5)
             return "nobody publishes it" + (f", did you mean {near[0]}?" if near else "")
         types = {publisher.topic_type for publisher in publishers}
         if source.type_name not in types:
             return f"it is published as {', '.join(types)}, configured is {source.type_name}"
+        durability = DurabilityPolicy.TRANSIENT_LOCAL
+        if is_static and all(
+            publisher.qos_profile.durability != durability for publisher in publishers
+        ):
+            return "its QoS is VOLATILE, expected TRANSIENT_LOCAL"
         return f"nothing for {quiet_s:.0f} s"
 
     def _send(self, publisher: Any, message: Any) -> None:

@@ -6,14 +6,13 @@ Pure: numpy and the standard library only.
 from lupin_twin.estimate.cholesky import MAX_EXACT, PER_TAG
 from lupin_twin.estimate.cross_validation import Change, Place
 from lupin_twin.estimate.kernel import MAX_PER_TAG, Readings
-from lupin_twin.estimate.model import SDS_OF_IDEAL, FitFailed, Model, fit
+from lupin_twin.estimate.model import FitFailed, Model, fit
 from lupin_twin.estimate.posterior import EstimateGrid, Posterior
 
 __all__ = [
     "MAX_EXACT",
     "MAX_PER_TAG",
     "PER_TAG",
-    "SDS_OF_IDEAL",
     "Change",
     "EstimateGrid",
     "FitFailed",

@@ -30,9 +30,7 @@ IntArray = npt.NDArray[np.int64]
 
 # So many readings of a tag count; more say little that these do not.
 MAX_PER_TAG: Final = 32
-# Readings as old as a day are the last that count.
-MAX_AGE_DAYS: Final = 1.0
-# So many readings weigh as much as the ideal range does in saying how far values spread.
+# So many readings weigh as much as what is thought beforehand in saying how far values spread.
 _PRIOR_WEIGHT: Final = 4.0
 _MAX_WEIGHT: Final = 20.0
 
@@ -84,7 +82,7 @@ class Readings:
         many of the last hour.
         """
         age_s = at_s - self.time_s
-        chosen = np.flatnonzero((age_s >= 0.0) & (age_s <= MAX_AGE_DAYS * day_length_s))
+        chosen = np.flatnonzero((age_s >= 0.0) & (age_s <= day_length_s))
         # By tag, the newest first; of equal stamps the later in order counts as the newer.
         order = chosen[np.lexsort((-chosen, age_s[chosen], self.tag[chosen]))]
         tag = self.tag[order]
@@ -126,22 +124,20 @@ class Scale:
         return result
 
 
-def scale_of(values: FloatArray, ideal: tuple[float, float] | None) -> Scale:
+def scale_of(values: FloatArray) -> Scale:
     """The median, and a spread between what is thought beforehand and that of the readings.
 
-    Few readings spread by chance, so what is thought counts as much as four of them do: a quarter
-    of the ideal range, or without one, a tenth of the median.
+    Few readings spread by chance, so what is thought counts as much as four of them do: a tenth of
+    the median.
 
     Raises:
-        ValueError: no readings, or a range without width.
+        ValueError: no readings.
 
     """
     if not len(values):
         raise ValueError("there are no readings")
     centre = float(np.median(values))
-    if ideal is not None and not ideal[1] > ideal[0]:
-        raise ValueError(f"ideal is {ideal[0]} to {ideal[1]}, must have a width")
-    thought = abs(centre) / 10.0 if ideal is None else (ideal[1] - ideal[0]) / 4.0
+    thought = abs(centre) / 10.0
     weight = min(float(len(values)), _MAX_WEIGHT)
     # What is to be squared is taken by its largest: it may be near the end of what floats hold.
     off = values - centre

@@ -118,21 +118,16 @@ MAX_FITTED: Final = 150
 # metres the truth changes.
 _TAGS: Final = 30
 _TOGETHER: Final = 6
-# Beyond this share of how far places differ, one knows no more of a place than of any other.
+# Beyond this share of how far places differ, one knows no more of a place than of any other; nor
+# beyond how far readings spread.
 _KNOWN_SHARE: Final = 0.6
-# The ideal range is so many sds wide where a place is known: an interval of 9 in 10 is half of it.
-SDS_OF_IDEAL: Final = 6.0
 
 
 @dataclass(frozen=True, slots=True)
 class Model:
-    """How readings of one sensor hang together.
-
-    `limit` is the sd (the sensor's unit) beyond which nothing is called known.
-    """
+    """How readings of one sensor hang together."""
 
     scale: Scale
-    limit: float
     day_length_s: float
     hyper: Hyper
 
@@ -140,7 +135,7 @@ class Model:
     def sd_known(self) -> float:
         """Where the estimate's sd (the sensor's unit) is below this, it is known."""
         local = INFLATION * math.sqrt(self.hyper.local_variance)
-        return min(_KNOWN_SHARE * local * self.scale.spread, self.limit)
+        return min(_KNOWN_SHARE * local, 1.0) * self.scale.spread
 
     def posterior(
         self, readings: Readings, at_s: float, should_stop: Callable[[], bool] = never
@@ -166,15 +161,13 @@ class Model:
 def fit(
     readings: Readings,
     *,
-    ideal: tuple[float, float] | None = None,
     day_length_s: float = 86_400.0,
     should_stop: Callable[[], bool] = never,
 ) -> Model:
     """The model that the readings, and what is known beforehand, make most probable.
 
-    Of many readings 150 are fitted, of tags all over the greenhouse and of the whole day. `ideal`
-    is the sensor's ideal range in its unit, if there is one; `day_length_s` how long a day takes, s
-    of ROS time.
+    Of many readings 150 are fitted, of tags all over the greenhouse and of the whole day. A day
+    takes `day_length_s` of ROS time.
 
     Raises:
         ValueError: no readings, a day that is not longer than 0.
@@ -184,13 +177,12 @@ def fit(
     """
     if not day_length_s > 0.0:
         raise ValueError(f"day_length_s is {day_length_s}, must be greater than 0")
-    scale = scale_of(readings.value, ideal)
+    scale = scale_of(readings.value)
     some = _some(readings, day_length_s)
     pairs = Pairs(some, day_length_s)
     objective = surprise(pairs, scale.standardised(some.value), should_stop)
     best = minimise(objective, np.zeros(len(Hyper._fields)))
-    limit = scale.spread if ideal is None else (ideal[1] - ideal[0]) / SDS_OF_IDEAL
-    return Model(scale, limit, day_length_s, hyper_of(best))
+    return Model(scale, day_length_s, hyper_of(best))
 
 
 def _some(readings: Readings, day_length_s: float) -> Readings:

@@ -1,7 +1,6 @@
 """GetField without ROS: its checks, the clipping to explored ground, and the cache.
 
-Pure. `FieldEngine` belongs to the store's thread; a `FieldJob` it hands out is immutable, and any
-thread may compute it. Metres in the map frame throughout.
+Pure. Metres in the map frame throughout.
 """
 
 from __future__ import annotations
@@ -16,7 +15,6 @@ import numpy as np
 
 from lupin_twin.core.drops import MAX_TEXT_LENGTH
 from lupin_twin.core.parameters import TwinParameters
-from lupin_twin.core.state import TwinStore
 from lupin_twin.field.explored import OccupancyMap, explored_mask
 from lupin_twin.field.grid import FieldGrid, grid_dimensions, reach_of
 from lupin_twin.field.idw import compute_idw_field, never
@@ -115,8 +113,6 @@ class FieldCache:
     def __init__(self, max_bytes: int = MAX_BYTES, max_entries: int = MAX_ENTRIES) -> None:
         self.max_bytes = max_bytes
         self.max_entries = max_entries
-        self.hits = 0
-        self.misses = 0
         self.bytes = 0
         self._grids: OrderedDict[FieldKey, FieldGrid] = OrderedDict()
 
@@ -124,13 +120,10 @@ class FieldCache:
         return len(self._grids)
 
     def get(self, key: FieldKey) -> FieldGrid | None:
-        """The cached field of `key`, which becomes the most recently used; counted either way."""
+        """The cached field of `key`, which becomes the most recently used; None: there is none."""
         grid = self._grids.get(key)
-        if grid is None:
-            self.misses += 1
-            return None
-        self._grids.move_to_end(key)
-        self.hits += 1
+        if grid is not None:
+            self._grids.move_to_end(key)
         return grid
 
     def put(self, key: FieldKey, grid: FieldGrid) -> None:
@@ -232,63 +225,6 @@ def compute_field(
         explored_mask=mask,
         should_stop=should_stop,
     )
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class FieldJob:
-    """A field to be computed: all it depends on, immutable, so that any thread may do it.
-
-    `occupancy` is the map to clip to, and None before one has come.
-    """
-
-    request: FieldRequest
-    key: FieldKey
-    samples: tuple[tuple[float, float, float], ...]
-    occupancy: OccupancyMap | None
-    rules: FieldRules
-
-    @property
-    def cost_s(self) -> float:
-        """About how long `compute` takes, seconds of one core."""
-        return cost_s(self.request, len(self.samples), self.rules)
-
-    def compute(self, should_stop: Callable[[], bool] = never) -> FieldGrid:
-        """`compute_field` of all this."""
-        return compute_field(self.request, self.samples, self.occupancy, self.rules, should_stop)
-
-
-class FieldEngine:
-    """Answers a request from the cache, or with the job that computes it.
-
-    Belongs to the thread of the store. The computing does not: hand the job to any thread, bring
-    the grid back and `keep` it here.
-    """
-
-    def __init__(self, rules: FieldRules, cache: FieldCache) -> None:
-        self.rules = rules
-        self.cache = cache
-
-    def lookup(
-        self, request: FieldRequest, store: TwinStore, occupancy: OccupancyMap | None
-    ) -> FieldGrid | FieldJob:
-        """The field as it was computed before, or a job; `occupancy` is the latest map, if any."""
-        check_request(request, self.rules.max_grid_cells)
-        revision = None if occupancy is None else occupancy.revision
-        key = FieldKey(request, store.observation_count, revision, self.rules)
-        grid = self.cache.get(key)
-        if grid is not None:
-            return grid
-        return FieldJob(
-            request=request,
-            key=key,
-            samples=store.samples_for_sensor(request.sensor_type),
-            occupancy=occupancy,
-            rules=self.rules,
-        )
-
-    def keep(self, job: FieldJob, grid: FieldGrid) -> None:
-        """Remember what `job` computed."""
-        self.cache.put(job.key, grid)
 
 
 def default_box(

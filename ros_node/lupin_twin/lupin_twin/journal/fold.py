@@ -17,7 +17,6 @@ from typing import Any, Final, TypeVar
 
 from lupin_twin.core.drops import MAX_SENSORS_PER_TAG, MAX_TAGS
 from lupin_twin.core.history import LatestRequest
-from lupin_twin.core.past import MAX_POINTS, SeriesRequest
 from lupin_twin.core.state import (
     NO_FLOWER,
     Attempt,
@@ -320,14 +319,13 @@ def recent_readings(  # noqa: PLR0917
 
     `reach_ns` is how far back, `most` how many of all tags together, but `each` of each.
     """
-    tags = [
-        (tag.tag_id, tag.pose)
+    places = {
+        tag.tag_id: tag.pose
         for tag in state_at(connection, at_ns, "").tags
         if tag.pose is not None and any(reading.name == sensor_type for reading in tag.readings)
-    ]
-    each = max(most // max(len(tags), 1), each)
-    start_ns = max(1, at_ns - reach_ns)
-    for tag_id, pose in tags:
-        query = SeriesRequest(tag_id, sensor_type, start_ns, at_ns + 1, MAX_POINTS)
-        if found := newest(connection, query, each):
-            yield tag_id, pose.x, pose.y, tuple(found)
+    }
+    each = max(most // max(len(places), 1), each)
+    found = newest(connection, sensor_type, max(1, at_ns - reach_ns), at_ns + 1, each)
+    for tag_id, pose in places.items():
+        if tag_id in found:
+            yield tag_id, pose.x, pose.y, tuple(found[tag_id])

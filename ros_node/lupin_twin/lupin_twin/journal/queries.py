@@ -23,6 +23,8 @@ from lupin_twin.journal.schema import LOCAL_SITE, DamagedFile, SiteLog
 # What an answer costs, about, s; the second for events of the whole site, each tag.
 SERIES_S: Final = 0.01
 SERIES_S_PER_TAG: Final = 1e-5
+# What the newest readings of a sensor cost, each tag.
+NEWEST_S_PER_TAG: Final = 3e-4
 
 _WITHIN: Final = (
     "FROM scan WHERE site = :site AND series = :series AND stamp_ns >= :start AND stamp_ns < :end"
@@ -72,23 +74,6 @@ class _Part:
     def entries(self, limit: int) -> list[Entry]:
         rows = self.ask(f"SELECT stamp_ns, seq, readings {_WITHIN} LIMIT :limit", limit=limit)
         return self._read(rows)
-
-    def last(self, most: int) -> list[Entry]:
-        """The last finite readings, the newest first."""
-        found: list[Entry] = []
-        at = {"at": self.span.end_ns, "seq": 0}
-        while len(found) < most:
-            rows = self.ask(
-                f"SELECT stamp_ns, seq, readings {_WITHIN} AND (stamp_ns, seq) < (:at, :seq)"
-                " ORDER BY stamp_ns DESC, seq DESC LIMIT :limit",
-                limit=most,
-                **at,
-            )
-            found += [reading for reading in self._read(rows) if is_counted(reading[2])]
-            if len(rows) < most:
-                break
-            at = {"at": rows[-1][0], "seq": rows[-1][1]}
-        return found[:most]
 
     def oldest(self) -> list[int]:
         """The first stamp, or the beginning of the first hour where rows were deleted."""
@@ -151,18 +136,53 @@ def series(
         return answer(partial(_parts, log, request), start_ns, end_ns, request.max_points)
 
 
-def newest(
-    connection: Any, request: SeriesRequest, most: int, site: str = LOCAL_SITE
-) -> list[tuple[int, float]]:
-    """The last `most` finite readings of a sensor in a period: (ns of ROS time, value), in order.
+# Of each series from the stamp on of the last that counts: a search of its own, by the limit.
+_NEWEST: Final = (
+    "SELECT s.tag, r.stamp_ns, r.seq, r.readings FROM (SELECT s.*, coalesce((SELECT stamp_ns"
+    " FROM scan WHERE site = s.site AND series = s.series AND stamp_ns >= :start"
+    " AND stamp_ns < :end AND is_copy = 0 ORDER BY stamp_ns DESC LIMIT 1 OFFSET :more), :start)"
+    " AS first_ns FROM series AS s WHERE s.site = :site AND s.run = :run AND s.kind = 0"
+    " AND s.sensors = :sensors LIMIT 1000000) AS s CROSS JOIN scan AS r WHERE r.site = s.site"
+    " AND r.series = s.series AND r.stamp_ns >= s.first_ns AND r.stamp_ns < :end AND r.is_copy = 0"
+)
+_SETS: Final = "SELECT DISTINCT sensors FROM series WHERE site = :site AND run = :run AND kind = 0"
 
-    No more of the period is read than that.
+
+def newest(
+    connection: Any,
+    sensor_type: str,
+    start_ns: int,
+    end_ns: int,
+    each: int,
+    *,
+    site: str = LOCAL_SITE,
+) -> dict[str, list[tuple[int, float]]]:
+    """Of every tag the last `each` readings of a sensor in a period: (ns of ROS time, value).
+
+    In their order, and without those that are not finite.
     """
     log = SiteLog(connection, site)
+    found: dict[str, list[Entry]] = {}
     with log.one_view():
-        parts = _parts(log, request, request.start_ns, request.end_ns)
-        found = sorted(reading for part in parts for reading in part.last(most))
-        return [(stamp_ns, value) for stamp_ns, _, value in found[-most:]]
+        for span in spans_within(runs(log.execute, log.site), start_ns, end_ns):
+            within = {"run": span.run.id, "start": span.start_ns, "end": span.end_ns}
+            for (text,) in log.execute(_SETS, within).fetchall():
+                names = sensor_names(text)
+                if sensor_type not in names:
+                    continue
+                query = within | {"sensors": text, "more": each - 1}
+                rows = log.execute(_NEWEST, query).fetchall()
+                place = names.index(sensor_type)
+                values = numbers_of([row[-1] for row in rows])
+                for (tag, stamp_ns, seq, _), of_row in zip(rows, values, strict=True):
+                    if len(of_row) != len(names):
+                        raise DamagedFile(f"scan {seq} has {len(of_row)} of {len(names)} readings")
+                    if is_counted(of_row[place]):
+                        found.setdefault(tag, []).append((stamp_ns, seq, of_row[place]))
+    return {
+        tag: [(stamp_ns, value) for stamp_ns, _, value in sorted(entries)[-each:]]
+        for tag, entries in found.items()
+    }
 
 
 def _parts(log: SiteLog, request: SeriesRequest, start_ns: int, end_ns: int) -> list[_Part]:

@@ -24,7 +24,7 @@ from lupin_twin.estimate.engine import (
 from lupin_twin.field.explored import OccupancyMap
 from lupin_twin.field.idw import never
 from lupin_twin.journal.fold import STATE_S_PER_TAG
-from lupin_twin.journal.queries import SERIES_S
+from lupin_twin.journal.queries import NEWEST_S_PER_TAG
 from lupin_twin.ros import convert_field
 from lupin_twin.ros.base_node import SERVICE_QOS, NodeUtilities
 from lupin_twin.ros.responses import answer_later
@@ -220,4 +220,4 @@ class EstimateService:
 
     @property
     def _search_s(self) -> float:
-        return self.store.size[0] * (STATE_S_PER_TAG + SERIES_S)
+        return self.store.size[0] * (STATE_S_PER_TAG + NEWEST_S_PER_TAG)

@@ -24,15 +24,14 @@ from lupin_twin.core.interfaces import LAYERS, PLANTERS, TAGS
 from lupin_twin.core.state import NANOSECONDS_PER_SECOND, Snapshot, TwinStore
 from lupin_twin.estimate.engine import MINUTES_A_DAY, EstimateRequest, TagPast
 from lupin_twin.field.engine import (
-    FieldEngine,
-    FieldJob,
     FieldRefused,
     FieldRequest,
+    FieldRules,
+    compute_field,
     default_box,
     default_request,
 )
 from lupin_twin.field.explored import OccupancyMap
-from lupin_twin.field.grid import FieldGrid
 from lupin_twin.field.idw import Abandoned
 from lupin_twin.ros.base_node import NodeUtilities, qos_of
 from lupin_twin.ros.estimate_service import EstimateService
@@ -59,19 +58,10 @@ PERIOD_S: Final = 1.0
 _COST_S: Final = 1.0
 
 
-@dataclass(frozen=True, slots=True)
-class _Built:
-    """A message, None where it is the one before; and a field that others may ask for too."""
-
-    data: bytes | None
-    job: FieldJob | None = None
-    grid: FieldGrid | None = None
-
-
 # What a topic's message is made of and by: a search that the node's thread begins, if there is
-# one, and what makes the message of its result on a worker.
+# one, and what makes the message of its result on a worker; None: it is the one before.
 _Search = Callable[[], Future[Any]]
-_Plan = tuple[_Search | None, Callable[[Any, ShouldStop], _Built]]
+_Plan = tuple[_Search | None, Callable[[Any, ShouldStop], bytes | None]]
 
 
 @dataclass(slots=True)
@@ -98,13 +88,13 @@ class _Marked:
     arrays: MarkerArrays
     before: Sequence[Any] | None = None
 
-    def make(self, snapshot: Snapshot, *_: object) -> _Built:
+    def make(self, snapshot: Snapshot, *_: object) -> bytes | None:
         """The array, if it is another than the one before."""
         marks = self.marks(snapshot)
         if marks == self.before:
-            return _Built(None)
+            return None
         self.before = marks
-        return _Built(self.arrays.build(marks))
+        return self.arrays.build(marks)
 
 
 @dataclass(slots=True)
@@ -116,7 +106,7 @@ class LayerService:
 
     utilities: NodeUtilities
     store: TwinStore
-    fields: FieldEngine
+    rules: Callable[[], FieldRules]
     estimates: EstimateService
     occupancy: Callable[[], OccupancyMap | None]
     snapshot: Callable[[], Snapshot]
@@ -196,12 +186,12 @@ class LayerService:
         topic.is_under_way = True
         search, make = plan[0] or _nothing, plan[1]
 
-        def made(found: Any) -> _Built:
+        def made(found: Any) -> bytes | None:
             return make(found, lambda: not topic.is_wanted)
 
         self._queue.ask(Query(search, partial(self._publish, topic), made, _COST_S))
 
-    def _publish(self, topic: _Topic, made: _Built | Exception) -> None:
+    def _publish(self, topic: _Topic, made: bytes | Exception | None) -> None:
         topic.is_under_way = False
         if isinstance(made, Abandoned):
             topic.key = None
@@ -210,12 +200,10 @@ class LayerService:
         elif isinstance(made, Exception):
             self.utilities.report(topic.publisher.topic_name, made)
         else:
-            if made.job is not None and made.grid is not None:
-                self.fields.keep(made.job, made.grid)
             topic.problem = ""
-            if made.data is not None:
+            if made is not None:
                 self.utilities.drain()  # a large one takes this thread for a while
-                topic.publisher.publish(made.data)
+                topic.publisher.publish(made)
                 topic.published += 1
 
     def _refuse(self, topic: _Topic, error: ValueError) -> None:
@@ -230,7 +218,7 @@ class LayerService:
     def _key_of_layer(self, sensor: str) -> object:
         occupancy = self.occupancy()
         revision = None if occupancy is None else occupancy.revision
-        key = self.store.observation_count, self.fields.rules, revision
+        key = self.store.observation_count, self.rules(), revision
         if sensor not in self._estimated:
             return key
         # An estimate goes on from minute to minute, with nothing received: its error grows.
@@ -240,25 +228,24 @@ class LayerService:
     def _plan_layer(self, sensor: str, frame_id: str) -> _Plan:
         snapshot = self.snapshot()
         request = self._request(sensor, snapshot)
-        answer = self.fields.lookup(request, self.store, self.occupancy())
+        samples = self.store.samples_for_sensor(sensor)
+        compute = partial(compute_field, request, samples, self.occupancy(), self.rules())
         task = self.estimates.prepare(EstimateRequest(request))
 
-        def make(found: Sequence[TagPast], should_stop: ShouldStop) -> _Built:
-            job = answer if isinstance(answer, FieldJob) else None
-            grid = answer if isinstance(answer, FieldGrid) else answer.compute(should_stop)
+        def make(found: Sequence[TagPast], should_stop: ShouldStop) -> bytes:
+            grid = compute(should_stop)
             estimate = None
             if are_enough(found):
                 with suppress(FieldRefused):  # nothing can be made of them
                     estimate = task.make(found, should_stop).grid
             (self._estimated.discard if estimate is None else self._estimated.add)(sensor)
-            data = cloud(points(grid, estimate), snapshot.stamp_ns, frame_id)
-            return _Built(data, job, grid)
+            return cloud(points(grid, estimate), snapshot.stamp_ns, frame_id)
 
         return partial(_or_nothing, task.look_up), make
 
     def _request(self, sensor: str, snapshot: Snapshot) -> FieldRequest:
         """The same for all sensors: the box is that of all tags with a place."""
-        rules = self.fields.rules
+        rules = self.rules()
         key = self.store.observation_count, rules
         if self._whole is None or self._whole[0] != key:
             places = ((tag.pose.x, tag.pose.y) for tag in snapshot.tags if tag.pose is not None)

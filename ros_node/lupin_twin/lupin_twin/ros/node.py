@@ -23,7 +23,7 @@ from lupin_twin.core.drops import Drop, Reason
 from lupin_twin.core.history import kind_of
 from lupin_twin.core.parameters import ParameterError, TwinParameters, World
 from lupin_twin.core.state import ClockState, Inspection, Scan, Snapshot, TwinStore, Write
-from lupin_twin.field.engine import FieldCache, FieldEngine, FieldRules
+from lupin_twin.field.engine import FieldCache, FieldRules
 from lupin_twin.field.explored import OccupancyMap
 from lupin_twin.journal.beside import journal_path
 from lupin_twin.journal.runs import Clock as RunClock
@@ -69,7 +69,7 @@ class TwinNode(AdjustableNode):
         self.store = TwinStore()
         self.memory = self._memory()
         self.lateness = Lateness()
-        self.fields = FieldEngine(FieldRules.of(self.parameters), FieldCache())
+        self.rules = FieldRules.of(self.parameters)
         self.occupancy_map: OccupancyMap | None = None
         self.twins = TwinCount()
         self._clock_watch = ClockWatch()
@@ -92,7 +92,8 @@ class TwinNode(AdjustableNode):
             self.utilities,
             self._workers,
             JobQueue(self._workers, wake, large_at_once=LARGE_THREADS),
-            self.fields,
+            FieldCache(),
+            lambda: self.rules,
             self.store,
             lambda: self.occupancy_map,
         )
@@ -110,7 +111,7 @@ class TwinNode(AdjustableNode):
         self.layers = LayerService(
             self.utilities,
             self.store,
-            self.fields,
+            lambda: self.rules,
             self.estimates,
             occupancy=lambda: self.occupancy_map,
             snapshot=self.snapshot,
@@ -225,8 +226,8 @@ class TwinNode(AdjustableNode):
         if self._state_timer.timer_period_ns != int(1e9 / now.state_publish_rate_hz):
             self.destroy_timer(self._state_timer)
             self._state_timer = self._publish_at(now.state_publish_rate_hz)
-        if (rules := FieldRules.of(now)) != self.fields.rules:
-            self.fields.rules = rules
+        if (rules := FieldRules.of(now)) != self.rules:
+            self.rules = rules
             self._rules_revision += 1
             self.notify_listeners()
 

@@ -13,7 +13,14 @@ from lupin_msgs.srv import GetField, GetHistory, GetStateAt, GetWrites
 from lupin_twin.core.interfaces import GET_HISTORY, GET_STATE_AT, GET_WRITES
 from lupin_twin.core.past import EVERY_TAG, check_moment
 from lupin_twin.core.state import TwinStore
-from lupin_twin.field.engine import FieldEngine, FieldJob
+from lupin_twin.field.engine import (
+    FieldCache,
+    FieldKey,
+    FieldRules,
+    check_request,
+    compute_field,
+    cost_s,
+)
 from lupin_twin.field.explored import OccupancyMap
 from lupin_twin.journal import follow
 from lupin_twin.journal.fold import STATE_S_PER_TAG, state_at
@@ -34,7 +41,8 @@ class FieldService:
     utilities: NodeUtilities
     workers: Workers
     queue: JobQueue
-    fields: FieldEngine
+    cache: FieldCache
+    rules: Callable[[], FieldRules]
     store: TwinStore
     occupancy: Callable[[], OccupancyMap | None]
 
@@ -54,22 +62,26 @@ class FieldService:
         report = self.utilities.report
         try:
             wanted = convert_field.field_request_of(request)
-            found = self.fields.lookup(wanted, self.store, self.occupancy())
+            rules, occupancy = self.rules(), self.occupancy()
+            check_request(wanted, rules.max_grid_cells)
         except Exception as error:  # noqa: BLE001  # no client waits for ever
             return refusal(response, error, report)
-        if not isinstance(found, FieldJob):
+        revision = None if occupancy is None else occupancy.revision
+        key = FieldKey(wanted, self.store.observation_count, revision, rules)
+        if (found := self.cache.get(key)) is not None:
             return convert_field.fill_response(response, found)
-        job = found
+        samples = self.store.samples_for_sensor(wanted.sensor_type)
+        compute = partial(compute_field, wanted, samples, occupancy, rules)
+        cost = cost_s(wanted, len(samples), rules)
 
         def prepare(reply: Callable[[Any], None]) -> Query:
             def keep(grid: Any) -> None:
                 if not isinstance(grid, Exception):
-                    self.fields.keep(job, grid)
+                    self.cache.put(key, grid)
                     grid = convert_field.fill_response(response, grid)
                 reply(grid)
 
-            search = partial(self.workers.submit, job.compute, job.cost_s)
-            return Query(search, keep, cost_s=job.cost_s)
+            return Query(partial(self.workers.submit, compute, cost), keep, cost_s=cost)
 
         return answer_later(self.queue, prepare, response, report)
 

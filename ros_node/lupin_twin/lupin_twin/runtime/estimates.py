@@ -52,10 +52,10 @@ _MAX_READINGS: Final = 20_000
 def readings_at(
     log: sqlite3.Connection, sensor: str, at_ns: int, day_length_s: float
 ) -> list[TagPast]:
-    """What the log has of the day up to a moment."""
+    """What the log has of the day up to a moment; of equal stamps, what was received last."""
     reach_ns = int(day_length_s * NANOSECONDS_PER_SECOND)
     return [
-        TagPast(tag_id, x, y, tuple(one for one in found if is_usable(one[1])))
+        TagPast(tag_id, x, y, tuple(one for one in dict(found).items() if is_usable(one[1])))
         for tag_id, x, y, found in recent_readings(
             log, sensor, at_ns, reach_ns, _MAX_READINGS, MAX_PER_TAG
         )

@@ -1,0 +1,123 @@
+/** What happened at the greenhouses that are shown: a row for each, and the way to its shift report. */
+import { useState, type JSX } from 'react';
+
+import { timeOfDay } from '../clock';
+import { count, list, object, orNull } from '../contract/check';
+import { TEXT, TIME } from '../contract/shapes';
+import { LANGUAGE, S } from '../strings';
+import type { FleetWords } from '../words/fleet';
+import { VIEW_WORDS } from '../words/fleetViews';
+import type { Site, Time } from './sites';
+import { ms, timeText } from './times';
+import { useAnswer } from './useAnswer';
+
+const W = VIEW_WORDS[LANGUAGE];
+
+/** Shifts, and a day. */
+const HOURS = [12, 24] as const;
+const EVERY_MS = 60_000;
+const MOST = 100_000;
+/** So many names are in one address; of more, all greenhouses are asked for. */
+const MOST_NAMED = 50;
+
+const COUNTED = ['scans', 'failed', 'inspections', 'notes'] as const;
+
+interface SiteReport extends Readonly<Record<(typeof COUNTED)[number], number>> {
+  readonly site: string;
+  readonly name: string;
+  readonly active_alarms: number | null;
+  readonly complete_to: Time;
+  /** The address of its own report, as JSON. */
+  readonly report: string;
+}
+
+const REPORT = object({
+  sites: list(
+    object({
+      ...{ site: TEXT, name: TEXT, report: TEXT },
+      ...{ scans: count, failed: count, inspections: count, notes: count },
+      active_alarms: orNull(count),
+      complete_to: TIME,
+    }),
+    MOST,
+  ),
+});
+
+interface Props {
+  readonly shown: readonly Site[];
+  readonly words: FleetWords;
+}
+
+export default function Report({ shown, words }: Props): JSX.Element {
+  const [hours, setHours] = useState<number>(HOURS[0]);
+  // By name: where the worst one moves, the question stays.
+  const names = shown.length <= MOST_NAMED ? shown.map(({ site }) => site).sort() : [];
+  const from = (Math.floor(timeOfDay() / 3_600_000) - hours) * 3600;
+  const path = `api/report?from=${from}${names.length > 0 ? `&sites=${names.join(',')}` : ''}`;
+  const { value, trouble } = useAnswer<{ sites: readonly SiteReport[] }>(path, REPORT, EVERY_MS);
+  const found = new Map(value?.sites.map((each) => [each.site, each]));
+  return (
+    <section className="fleet-compare" aria-label={words.report}>
+      <div className="fleet-head">
+        <div className="fleet-filters" role="group" aria-label={S.timebarPeriod}>
+          {HOURS.map((each) => (
+            <button
+              key={each}
+              type="button"
+              aria-pressed={hours === each}
+              onClick={() => {
+                setHours(each);
+              }}
+            >
+              {W.hours(each)}
+            </button>
+          ))}
+        </div>
+      </div>
+      {trouble && <p className="fleet-note">{W.notFetched(trouble)}</p>}
+      {!value && !trouble && <p className="fleet-empty">{S.chartLoading}</p>}
+      {value && (
+        <div className="fleet-report">
+          <table className="fleet-table">
+            <caption className="fleet-note">{W.wholeHours}</caption>
+            <thead>
+              <tr>
+                <th scope="col">{words.sites}</th>
+                {COUNTED.map((each) => (
+                  <th key={each} scope="col">
+                    {W[each]}
+                  </th>
+                ))}
+                <th scope="col">{W.activeAlarms}</th>
+                <th scope="col">{W.completeTo}</th>
+              </tr>
+            </thead>
+            <tbody>
+              {shown.map(({ site }) => {
+                const row = found.get(site);
+                return row && <Row key={site} row={row} />;
+              })}
+            </tbody>
+          </table>
+        </div>
+      )}
+    </section>
+  );
+}
+
+function Row({ row }: { row: SiteReport }): JSX.Element {
+  return (
+    <tr>
+      <th scope="row">
+        <a href={`${row.report.replace('/api/report?', '/api/report.html?')}&lang=${LANGUAGE}`}>
+          {row.name}
+        </a>
+      </th>
+      {COUNTED.map((each) => (
+        <td key={each}>{row[each]}</td>
+      ))}
+      <td>{row.active_alarms ?? S.chartNothing}</td>
+      <td>{timeText(ms(row.complete_to))}</td>
+    </tr>
+  );
+}

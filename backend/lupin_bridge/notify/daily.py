@@ -7,7 +7,6 @@ week of them; a message that is not taken is tried again as those of alarms are.
 from __future__ import annotations
 
 import asyncio
-import contextlib
 import logging
 import os
 from dataclasses import dataclass
@@ -18,6 +17,7 @@ from typing import Final, Protocol
 
 import orjson
 
+from lupin_bridge.feed.shared_work import end
 from lupin_bridge.feed.source import TwinSource, TwinUnavailableError
 from lupin_bridge.judge.options import Criteria, unix_s
 from lupin_bridge.past.plans import ConditionalQuery
@@ -95,10 +95,7 @@ class DailyReport:
 
     async def stop(self) -> None:
         """End; what was not taken is sent after the next start."""
-        if self._task is not None:
-            self._task.cancel()
-            with contextlib.suppress(asyncio.CancelledError):
-                await self._task
+        await end(self._task)
 
     async def _run(self, of: Reporting) -> None:
         while True:

@@ -26,9 +26,9 @@ import orjson
 from lupin_bridge.access.accounts import Device
 from lupin_bridge.access.people import People
 from lupin_bridge.access.person import AccountError
-from lupin_bridge.alarms.board import AlarmBoard
-from lupin_bridge.alarms.ledger import Change
+from lupin_bridge.alarms.board import AlarmBoard, Change
 from lupin_bridge.alarms.notes import NOTHING_SAID, NoteBoard, notes_of_alarms
+from lupin_bridge.feed.shared_work import end
 from lupin_bridge.judge.alarm import Alarm
 from lupin_bridge.judge.options import Criteria
 from lupin_bridge.judge.verdict import Verdict
@@ -153,9 +153,7 @@ class Push:
     async def stop(self) -> None:
         """End at once."""
         self._unsubscribe()
-        if self._task is not None:
-            self._task.cancel()
-            await asyncio.wait([self._task])
+        await end(self._task)
 
     async def _run(self, source: Source) -> None:
         while True:

@@ -20,6 +20,8 @@ import orjson
 from lupin_bridge.feed.shared_work import end
 from lupin_bridge.feed.source import TwinSource, TwinUnavailableError
 from lupin_bridge.judge.options import Criteria, unix_s
+from lupin_bridge.notify.mqtt import Mqtt
+from lupin_bridge.notify.webhook import Webhook
 from lupin_bridge.past.plans import ConditionalQuery
 from lupin_bridge.past.query import compact
 from lupin_bridge.past.report import REPORT_S, Report
@@ -52,21 +54,6 @@ class DailyTarget:
         return int(datetime.combine(day, self.at, self.zone).timestamp()) * 1_000_000_000
 
 
-class ReportChannel(Protocol):
-    """Where a report can be sent."""
-
-    @property
-    def name(self) -> str:
-        """What logs call it."""
-
-    @property
-    def called(self) -> str:
-        """Its address, which may be a secret."""
-
-    async def deliver(self, report_id: str, report: orjson.Fragment) -> bool:
-        """Send it until it is taken; False: it was given up, which is logged."""
-
-
 class Reporting(Protocol):
     """What a report is of: the bridge."""
 
@@ -84,7 +71,9 @@ class Reporting(Protocol):
 class DailyReport:
     """Sends by one channel. Belongs to the event loop."""
 
-    def __init__(self, target: DailyTarget, channel: ReportChannel, poll_s: float = POLL_S) -> None:
+    def __init__(
+        self, target: DailyTarget, channel: Mqtt | Webhook, poll_s: float = POLL_S
+    ) -> None:
         self._target, self._channel, self._poll_s = target, channel, poll_s
         self._why = ""
         self._task: asyncio.Task[None] | None = None

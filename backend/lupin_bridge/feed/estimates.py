@@ -21,7 +21,7 @@ from lupin_twin.field.engine import FieldRefused
 from lupin_twin.runtime.estimates import Report, ReportRequest
 from lupin_twin.runtime.workers import in_turns
 
-# A twin's next round comes no sooner.
+# A twin makes no report of a sensor so soon again.
 FRESH_S: Final = 2.0
 MAX_CACHED: Final = 64
 
@@ -57,7 +57,7 @@ class Reports:
 
 log = logging.getLogger(__name__)
 
-# A round of estimates comes every 30 s (`estimate_service.REST_S`).
+# A report serves for 30 s at least (`estimate_service.REST_S`).
 PERIOD_S: Final = 15.0
 # A greenhouse has a handful of sensors; of more, the first in the alphabet.
 MAX_SENSORS: Final = 32

@@ -25,7 +25,7 @@ from lupin_bridge.feed.past_process import PastProcess
 from lupin_bridge.feed.query import Now
 from lupin_bridge.feed.shared_work import Periodic, Shared
 from lupin_bridge.fleet import small_map
-from lupin_bridge.fleet.compare import COMPARE_S, Compare, OfSites, answer_of, chosen, compare
+from lupin_bridge.fleet.compare import COMPARE_S, Compare, OfSites, chosen, compare
 from lupin_bridge.fleet.export import respond_sites
 from lupin_bridge.fleet.overview import Site, SitesFrame, alarms_json, archive_json, etag, site_json
 from lupin_bridge.fleet.pages import Opened, SitePage, SitePages, Sites
@@ -48,7 +48,14 @@ from lupin_bridge.routes.answers import (
     respond,
 )
 from lupin_bridge.routes.sockets import has_place, next_message
-from lupin_bridge.serving.admission import REVALIDATE, Admission, Answer, AnswerCache, Limits
+from lupin_bridge.serving.admission import (
+    REVALIDATE,
+    Admission,
+    Answer,
+    AnswerCache,
+    Limits,
+    json_answer,
+)
 from lupin_bridge.serving.middleware import PieceByPiece
 from lupin_bridge.serving.ws_protocol import CONNECTION_KEY, Connection
 from lupin_bridge.settings import Settings
@@ -342,7 +349,7 @@ def _add_answers(app: FastAPI, fleet: Fleet) -> None:
         async def compute() -> Answer:
             with fleet.admission.computing(client_of(request)):
                 body = alarms_json((watching.sites[name] for name in names), watching.archive)
-                answer = answer_of(body)
+                answer = json_answer(orjson.dumps(body))
             fleet.cache.put(key, answer)
             return answer
 

@@ -16,11 +16,11 @@ from pathlib import Path
 from typing import Final
 from urllib.parse import parse_qs
 
-from fastapi import Request, Response, WebSocket
+from fastapi import Request, Response
 from starlette.requests import HTTPConnection
 from starlette.types import ASGIApp, Receive, Scope, Send
 
-from lupin_bridge.access.middleware import client_of, with_security_headers
+from lupin_bridge.access.middleware import client_of, deny, with_security_headers
 from lupin_bridge.bridge import Bridge
 from lupin_bridge.fleet.source import SiteTwin
 from lupin_bridge.routes.answers import error_response, has_etag, not_modified
@@ -173,7 +173,7 @@ class Sites:
         found = self._pages.page_of(name, client)
         if isinstance(found, str):
             status = 503 if name in self._pages.sites() else 404
-            await _refuse(found, status, scope, receive, send)
+            await deny(error_response(found, status), scope, receive, send)
             return
         if not slash:
             # Relative, as all links are: below whatever prefix this is.
@@ -191,11 +191,3 @@ class Sites:
             found.users[client] -= 1
             found.users += Counter()  # without those who read no more
             found.used_s = time.monotonic()
-
-
-async def _refuse(detail: str, status: int, scope: Scope, receive: Receive, send: Send) -> None:
-    response = error_response(detail, status)
-    if scope["type"] == "websocket":
-        await WebSocket(scope, receive, send).send_denial_response(response)
-        return
-    await response(scope, receive, send)

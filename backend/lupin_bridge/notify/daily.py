@@ -13,14 +13,15 @@ from dataclasses import dataclass
 from datetime import datetime, time, timedelta, tzinfo
 from hashlib import blake2b
 from pathlib import Path
-from typing import Final, Protocol
+from typing import Final
 
 import orjson
 
 from lupin_bridge.feed.shared_work import end
-from lupin_bridge.feed.source import TwinSource, TwinUnavailableError
-from lupin_bridge.judge.options import Criteria, unix_s
+from lupin_bridge.feed.source import TwinUnavailableError
+from lupin_bridge.judge.options import unix_s
 from lupin_bridge.notify.mqtt import Mqtt
+from lupin_bridge.notify.source import Source
 from lupin_bridge.notify.webhook import Webhook
 from lupin_bridge.past.plans import ConditionalQuery
 from lupin_bridge.past.query import compact
@@ -54,20 +55,6 @@ class DailyTarget:
         return int(datetime.combine(day, self.at, self.zone).timestamp()) * 1_000_000_000
 
 
-class Reporting(Protocol):
-    """What a report is of: the bridge."""
-
-    criteria: Criteria
-
-    @property
-    def source(self) -> TwinSource:
-        """Where its log is."""
-
-    @property
-    def ros_time_ns(self) -> int | None:
-        """ROS time now; None: it is not known."""
-
-
 class DailyReport:
     """Sends by one channel. Belongs to the event loop."""
 
@@ -78,7 +65,7 @@ class DailyReport:
         self._why = ""
         self._task: asyncio.Task[None] | None = None
 
-    def start(self, of: Reporting) -> None:
+    def start(self, of: Source) -> None:
         """Begin."""
         self._task = asyncio.create_task(self._run(of), name=f"report by {self._channel.name}")
 
@@ -86,7 +73,7 @@ class DailyReport:
         """End; what was not taken is sent after the next start."""
         await end(self._task)
 
-    async def _run(self, of: Reporting) -> None:
+    async def _run(self, of: Source) -> None:
         while True:
             try:
                 self._say(await self._look(of))
@@ -101,7 +88,7 @@ class DailyReport:
             log.warning("the report of the day is not sent by %s: %s", self._channel.name, why)
         self._why = why
 
-    async def _look(self, of: Reporting) -> str:
+    async def _look(self, of: Source) -> str:
         """Send what is due; returns why that cannot be, empty: nothing is wrong."""
         now_ns, journal, target = of.ros_time_ns, of.source.journal(), self._target
         if now_ns is None or not journal.journal_id:

@@ -7,19 +7,22 @@ week of them; a message that is not taken is tried again as those of alarms are.
 from __future__ import annotations
 
 import asyncio
-import contextlib
 import logging
 import os
 from dataclasses import dataclass
 from datetime import datetime, time, timedelta, tzinfo
 from hashlib import blake2b
 from pathlib import Path
-from typing import Final, Protocol
+from typing import Final
 
 import orjson
 
-from lupin_bridge.feed.source import TwinSource, TwinUnavailableError
-from lupin_bridge.judge.options import Criteria, unix_s
+from lupin_bridge.feed.shared_work import end
+from lupin_bridge.feed.source import TwinUnavailableError
+from lupin_bridge.judge.options import unix_s
+from lupin_bridge.notify.mqtt import Mqtt
+from lupin_bridge.notify.source import Source
+from lupin_bridge.notify.webhook import Webhook
 from lupin_bridge.past.plans import ConditionalQuery
 from lupin_bridge.past.query import compact
 from lupin_bridge.past.report import REPORT_S, Report
@@ -52,55 +55,25 @@ class DailyTarget:
         return int(datetime.combine(day, self.at, self.zone).timestamp()) * 1_000_000_000
 
 
-class ReportChannel(Protocol):
-    """Where a report can be sent."""
-
-    @property
-    def name(self) -> str:
-        """What logs call it."""
-
-    @property
-    def called(self) -> str:
-        """Its address, which may be a secret."""
-
-    async def deliver(self, report_id: str, report: orjson.Fragment) -> bool:
-        """Send it until it is taken; False: it was given up, which is logged."""
-
-
-class Reporting(Protocol):
-    """What a report is of: the bridge."""
-
-    criteria: Criteria
-
-    @property
-    def source(self) -> TwinSource:
-        """Where its log is."""
-
-    @property
-    def ros_time_ns(self) -> int | None:
-        """ROS time now; None: it is not known."""
-
-
 class DailyReport:
     """Sends by one channel. Belongs to the event loop."""
 
-    def __init__(self, target: DailyTarget, channel: ReportChannel, poll_s: float = POLL_S) -> None:
+    def __init__(
+        self, target: DailyTarget, channel: Mqtt | Webhook, poll_s: float = POLL_S
+    ) -> None:
         self._target, self._channel, self._poll_s = target, channel, poll_s
         self._why = ""
         self._task: asyncio.Task[None] | None = None
 
-    def start(self, of: Reporting) -> None:
+    def start(self, of: Source) -> None:
         """Begin."""
         self._task = asyncio.create_task(self._run(of), name=f"report by {self._channel.name}")
 
     async def stop(self) -> None:
         """End; what was not taken is sent after the next start."""
-        if self._task is not None:
-            self._task.cancel()
-            with contextlib.suppress(asyncio.CancelledError):
-                await self._task
+        await end(self._task)
 
-    async def _run(self, of: Reporting) -> None:
+    async def _run(self, of: Source) -> None:
         while True:
             try:
                 self._say(await self._look(of))
@@ -115,7 +88,7 @@ class DailyReport:
             log.warning("the report of the day is not sent by %s: %s", self._channel.name, why)
         self._why = why
 
-    async def _look(self, of: Reporting) -> str:
+    async def _look(self, of: Source) -> str:
         """Send what is due; returns why that cannot be, empty: nothing is wrong."""
         now_ns, journal, target = of.ros_time_ns, of.source.journal(), self._target
         if now_ns is None or not journal.journal_id:

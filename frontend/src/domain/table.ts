@@ -22,6 +22,45 @@ export function rowsOf(tags: readonly Tag[], health: HouseHealth): Row[] {
   });
 }
 
+/** Stands above the rows of an area. */
+export interface AreaHead {
+  /** Empty: of the tags that are in none. */
+  readonly area: string;
+  readonly count: number;
+  readonly worst: Verdict;
+}
+
+/** What the table has one below the other. */
+export type Line = Row | AreaHead;
+
+export interface Area {
+  /** Empty: that of the tags that are in none; it comes last. */
+  readonly area: string;
+  readonly rows: readonly Row[];
+}
+
+/** Rows by their area, in the order in which the first of each comes. */
+export function inAreas(rows: readonly Row[], areaOf: (tagId: string) => string): readonly Area[] {
+  const areas = new Map<string, Row[]>();
+  for (const row of rows) {
+    const area = areaOf(row.tag.id);
+    const there = areas.get(area);
+    if (there) there.push(row);
+    else areas.set(area, [row]);
+  }
+  const found = [...areas].map(([area, own]) => ({ area, rows: own }));
+  return found.sort((a, b) => Number(a.area === '') - Number(b.area === ''));
+}
+
+/** The rows with a head above each area's, if there is any area. */
+export function withHeads(areas: readonly Area[]): readonly Line[] {
+  if (areas[0]?.area === '') return areas[0].rows;
+  return areas.flatMap(({ area, rows }): readonly Line[] => {
+    const worst = rows.reduce((a, b) => (severity(b.health) > severity(a.health) ? b : a));
+    return [{ area, count: rows.length, worst: worst.health.verdict }, ...rows];
+  });
+}
+
 type Key = number | string | null;
 
 /** What a column sorts by; null sorts last in both directions. */

@@ -19,7 +19,7 @@ import {
   type Catalogue,
   type Sensor,
 } from '../domain/sensors';
-import { filterRows, rowsOf, sortRows, type Row } from '../domain/table';
+import { filterRows, inAreas, rowsOf, sortRows, type Row } from '../domain/table';
 import type { Tag } from '../domain/twin';
 import type { AppState } from './app';
 import { sourceOf } from './heat';
@@ -253,7 +253,16 @@ const filtered = memoLast(
   ): readonly Row[] => filterRows(rowsOf(tags, health), filter, verdict, catalogue),
 );
 
-const sorted = memoLast((rows: readonly Row[], sort: Sort): readonly Row[] => sortRows(rows, sort));
+/** By what the table's rows are together; null: by nothing. */
+export const selectAreaOf = (state: AppState): Catalogue['areaOf'] | null =>
+  state.settings.byArea ? selectCatalogue(state).areaOf : null;
+
+const sorted = memoLast(
+  (rows: readonly Row[], sort: Sort, areaOf: Catalogue['areaOf'] | null): readonly Row[] => {
+    const found = sortRows(rows, sort);
+    return areaOf ? inAreas(found, areaOf).flatMap(({ rows: own }) => own) : found;
+  },
+);
 
 const idsOf = memoOne((rows: readonly Row[]) => new Set(rows.map(({ tag }) => tag.id)));
 
@@ -263,9 +272,10 @@ export function selectListed(state: AppState): ReadonlySet<string> | null {
   return filter.trim() === '' && health === null ? null : idsOf(selectRows(state));
 }
 
-/** The table's rows as the operator sees them: filtered and sorted. */
+/** The table's rows as the operator sees them: filtered, sorted, and together by area. */
 export function selectRows(state: AppState): readonly Row[] {
   const { filter, health, sort } = state.view;
   const catalogue = selectCatalogue(state);
-  return sorted(filtered(selectTags(state), selectHealth(state), filter, health, catalogue), sort);
+  const rows = filtered(selectTags(state), selectHealth(state), filter, health, catalogue);
+  return sorted(rows, sort, selectAreaOf(state));
 }

@@ -21,6 +21,7 @@ test('what was kept comes back', () => {
     shortcuts: false,
     hidden: ['pest', 'co2'],
     density: 'compact',
+    byArea: true,
   } as const;
   keepSettings({ setItem: (_, value) => (kept = value) }, settings);
   expect(readSettings(storage(kept))).toEqual(settings);

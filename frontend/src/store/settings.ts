@@ -9,6 +9,8 @@ export interface Settings {
   /** Columns of the table that are not wanted, by their ids; those of a sensor by its name. */
   readonly hidden: readonly string[];
   readonly density: 'usual' | 'compact';
+  /** The table's rows are together by area, where there are areas. */
+  readonly byArea: boolean;
 }
 
 export const DEFAULT_SETTINGS: Settings = {
@@ -17,6 +19,7 @@ export const DEFAULT_SETTINGS: Settings = {
   shortcuts: true,
   hidden: [],
   density: 'usual',
+  byArea: false,
 };
 
 /** More columns nobody has, and longer names nobody reads. */
@@ -53,6 +56,7 @@ export function readSettings(storage: Pick<Storage, 'getItem'>): Settings {
     shortcuts: kept.shortcuts !== false,
     hidden: idsIn(kept.hidden),
     density: kept.density === 'compact' ? 'compact' : 'usual',
+    byArea: kept.byArea === true,
   };
 }
 

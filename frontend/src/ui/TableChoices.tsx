@@ -2,7 +2,8 @@ import type { JSX } from 'react';
 
 import { shown } from '../domain/text';
 import { prefer, useApp } from '../store/app';
-import { selectColumns } from '../store/derived';
+import { selectCatalogue, selectColumns } from '../store/derived';
+import { selectTags } from '../store/moment';
 import { isColumnShown, withColumn, type Settings } from '../store/settings';
 import { S } from '../strings';
 import { Segmented } from '../widgets/Segmented';
@@ -12,6 +13,11 @@ export function TableChoices(): JSX.Element {
   const sensors = useApp(selectColumns);
   const hidden = useApp((state) => state.settings.hidden);
   const density = useApp((state) => state.settings.density);
+  const isByArea = useApp((state) => state.settings.byArea);
+  const hasAreas = useApp((state) => {
+    const { areaOf } = selectCatalogue(state);
+    return selectTags(state).some(({ id }) => areaOf(id) !== '');
+  });
   const columns = [
     ['health', S.columns.health],
     ['age', S.columns.age],
@@ -38,6 +44,18 @@ export function TableChoices(): JSX.Element {
           </label>
         ))}
       </fieldset>
+      {hasAreas && (
+        <label className="check">
+          <input
+            type="checkbox"
+            checked={isByArea}
+            onChange={(event) => {
+              prefer({ byArea: event.target.checked });
+            }}
+          />
+          <span>{S.tableByArea}</span>
+        </label>
+      )}
       <Segmented<Settings['density']>
         legend={S.density}
         value={density}

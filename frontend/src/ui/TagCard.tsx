@@ -101,6 +101,7 @@ function CardBody({
   const isEstimated = useApp((state) => state.view.heat !== 'nearest');
   const hasChanged = health?.reasons.some(({ kind }) => kind === 'changed') ?? false;
   const isCharted = useApp((state) => state.view.chart !== null);
+  const area = useApp((state) => selectCatalogue(state).areaOf(tag.id));
   return (
     <div className="card-body">
       {health && <Reasons health={health} />}
@@ -122,6 +123,14 @@ function CardBody({
       {(isEstimated || hasChanged) && <CardEstimate tag={tag} health={health} />}
       {tag.readings.size > 0 && !isCharted && <CardChart tagId={tag.id} />}
       <dl className="card-facts">
+        {area !== '' && (
+          <div>
+            <dt>{S.cardArea}</dt>
+            <dd>
+              <bdi>{shown(area, 40)}</bdi>
+            </dd>
+          </div>
+        )}
         <AgeFact label={S.cardScanned} when={tag.scannedAt} />
         {tag.lookedAt !== 'never' && <AgeFact label={S.cardLooked} when={tag.lookedAt} />}
         {history?.source && (

@@ -11,6 +11,7 @@ import {
 
 import { rgbText, sensorColour } from '../domain/ramp';
 import type { Sensor } from '../domain/sensors';
+import type { AreaHead } from '../domain/table';
 import { shown } from '../domain/text';
 import { unitOf } from '../domain/units';
 import { act, store, useApp } from '../store/app';
@@ -21,6 +22,7 @@ import { selectTags } from '../store/moment';
 import { isColumnShown } from '../store/settings';
 import { S } from '../strings';
 import { Icon } from '../widgets/Icon';
+import { HealthMark } from './HealthMark';
 import { TagRow } from './TagRow';
 import { useChosenInSight } from './chosenInSight';
 import { useHeldRows } from './useHeldRows';
@@ -37,7 +39,7 @@ export function TagTable(): JSX.Element {
   const selected = useApp((state) => state.view.selected);
   const hovered = useApp((state) => state.view.hovered);
   const unit = useApp((state) => state.settings.unit);
-  const { rows, ...hold } = useHeldRows();
+  const { lines, ...hold } = useHeldRows();
   const hasTags = useApp((state) => selectTags(state).length > 0);
   const density = useApp((state) => state.settings.density);
   const hidden = useApp((state) => state.settings.hidden);
@@ -46,24 +48,30 @@ export function TagTable(): JSX.Element {
   const has = (id: string): boolean => isColumnShown({ hidden }, id);
   const columns = ['tag', ...COLUMNS].filter(has).length + sensors.length;
   const body = useRef<HTMLTableSectionElement>(null);
-  const sight = useVisibleRows(body, rows.length);
+  const sight = useVisibleRows(body, lines.length);
   useChosenInSight(body, hasTags ? selected : null, sight.rowHeight);
   // A row that has the focus stays, or the focus would be lost with it; and the rows beside it,
-  // where the Tab key leads.
+  // where the Tab key leads, past the head of an area.
   const [focused, setFocused] = useState<string | null>(null);
-  const places = useMemo(() => new Map(rows.map(({ tag }, index) => [tag.id, index])), [rows]);
+  const places = useMemo(
+    () =>
+      new Map(
+        lines.flatMap((line, index) => ('tag' in line ? [[line.tag.id, index] as const] : [])),
+      ),
+    [lines],
+  );
   const placeOf = (id: string | null): number => (id === null ? NaN : (places.get(id) ?? NaN));
   const held = placeOf(focused);
-  const single = [placeOf(selected), held - 1, held, held + 1];
+  const single = [placeOf(selected), held - 2, held - 1, held, held + 1, held + 2];
   return (
     // Keyboard and screen reader use the button in each row; for the pointer the whole row is
     // its target. One listener here, because a layer per row makes a long table slow.
     // eslint-disable-next-line jsx-a11y/click-events-have-key-events, jsx-a11y/no-noninteractive-element-interactions
     <table
-      className={rows.length > SHORT_TABLE ? 'tags long' : 'tags'}
+      className={lines.length > SHORT_TABLE ? 'tags long' : 'tags'}
       data-density={density}
       data-testid="tag-table"
-      aria-rowcount={rows.length + 1}
+      aria-rowcount={lines.length + 1}
       onFocus={(event) => {
         setFocused(rowTag(event));
       }}
@@ -117,7 +125,7 @@ export function TagTable(): JSX.Element {
         </tr>
       </thead>
       <tbody ref={body} {...hold}>
-        {partsOf(rows.length, sight, single).map((part, place) => {
+        {partsOf(lines.length, sight, single).map((part, place) => {
           if (part.kind === 'gap') {
             const height = part.rows * sight.rowHeight;
             return (
@@ -126,7 +134,12 @@ export function TagTable(): JSX.Element {
               </tr>
             );
           }
-          const row = rows[part.index];
+          const row = lines[part.index];
+          if (row && 'area' in row) {
+            return (
+              <AreaRow key={`area ${row.area}`} head={row} index={part.index} columns={columns} />
+            );
+          }
           return (
             row && (
               <TagRow
@@ -146,7 +159,7 @@ export function TagTable(): JSX.Element {
             )
           );
         })}
-        {rows.length === 0 && hasTags && (
+        {lines.length === 0 && hasTags && (
           <tr className="no-match">
             <td colSpan={columns}>
               {S.nothingMatches}{' '}
@@ -168,7 +181,30 @@ export function TagTable(): JSX.Element {
   );
 }
 
-/** The tag whose row an event hit; null in the head. */
+/** Above the rows of an area: a heading to go to, and how the worst of them is. */
+function AreaRow({
+  head: { area, count, worst },
+  index,
+  columns,
+}: {
+  head: AreaHead;
+  index: number;
+  columns: number;
+}): JSX.Element {
+  return (
+    <tr className="area" aria-rowindex={index + 2}>
+      <td colSpan={columns}>
+        <h3>
+          <HealthMark verdict={worst} word={false} />{' '}
+          <bdi>{area === '' ? S.areaNone : shown(area, 32)}</bdi>{' '}
+          <span className="faint">{S.shownOf(count, count)}</span>
+        </h3>
+      </td>
+    </tr>
+  );
+}
+
+/** The tag whose row an event hit; null in a head. */
 function rowTag(event: SyntheticEvent): string | null {
   const row = event.target instanceof Element ? event.target.closest('tr') : null;
   return row?.dataset['tagId'] ?? null;

@@ -1,11 +1,12 @@
 import { useMemo, useState } from 'react';
 
-import type { Row } from '../domain/table';
+import { inAreas, withHeads, type Line, type Row } from '../domain/table';
 import { useApp } from '../store/app';
-import { selectRows } from '../store/derived';
+import { selectAreaOf, selectRows } from '../store/derived';
 
 interface HeldRows {
-  readonly rows: readonly Row[];
+  /** Rows, and heads of areas between them. */
+  readonly lines: readonly Line[];
   readonly onPointerEnter: () => void;
   readonly onPointerLeave: () => void;
 }
@@ -13,14 +14,17 @@ interface HeldRows {
 /** The table's rows. While a pointer or a finger is on them none moves; what is new comes last. */
 export function useHeldRows(): HeldRows {
   const rows = useApp(selectRows);
+  const areaOf = useApp(selectAreaOf);
   const [held, setHeld] = useState<ReadonlyMap<string, number> | null>(null);
-  const shown = useMemo(() => {
-    if (!held) return rows;
-    const place = ({ tag }: Row): number => held.get(tag.id) ?? Infinity;
-    return [...rows].sort((a, b) => (place(a) === place(b) ? 0 : place(a) - place(b)));
-  }, [rows, held]);
+  const lines = useMemo(() => {
+    const place = ({ tag }: Row): number => held?.get(tag.id) ?? Infinity;
+    const shown = held
+      ? [...rows].sort((a, b) => (place(a) === place(b) ? 0 : place(a) - place(b)))
+      : rows;
+    return areaOf ? withHeads(inAreas(shown, areaOf)) : shown;
+  }, [rows, held, areaOf]);
   return {
-    rows: shown,
+    lines,
     onPointerEnter: () => {
       setHeld(new Map(rows.map(({ tag }, index) => [tag.id, index])));
     },

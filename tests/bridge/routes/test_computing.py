@@ -184,7 +184,7 @@ def test_work_that_asks_no_twin_has_as_long_and_is_given_up() -> None:
         work = asyncio.create_task(asyncio.Event().wait())
         text = r"the answer was not there within 0\.1 s"
         with pytest.raises(TwinTimeoutError, match=text):
-            await within_time(bridge, work)
+            await within_time(bridge.limits, work)
         assert work.cancelled()
 
     asyncio.run(test())

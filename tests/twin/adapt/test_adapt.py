@@ -14,8 +14,9 @@ import rclpy
 import yaml
 from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticArray
-from geometry_msgs.msg import PoseWithCovarianceStamped
+from geometry_msgs.msg import PoseStamped, PoseWithCovarianceStamped
 from lupin_msgs.msg import Observation
+from nav_msgs.msg import Odometry
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.qos import QoSProfile, qos_profile_sensor_data
 from sensor_msgs.msg import RelativeHumidity, Temperature
@@ -57,14 +58,12 @@ def adapt(domain: int, *args: str) -> Process:
 class Robot:
     """What a robot that knows nothing of the twin publishes."""
 
-    def __init__(self, peer: Peer) -> None:
+    def __init__(self, peer: Peer, pose: Any = PoseWithCovarianceStamped) -> None:
         self.peer = peer
         self.reports: list[Any] = []
         self.observations: list[Any] = []
         node = peer.node
-        self._pose = node.create_publisher(
-            PoseWithCovarianceStamped, "/amcl_pose", QoSProfile(depth=1)
-        )
+        self.pose = node.create_publisher(pose, "/amcl_pose", QoSProfile(depth=1))
         sensor = qos_profile_sensor_data
         self._temperature = node.create_publisher(Temperature, "/temperature", sensor)
         self._humidity = node.create_publisher(RelativeHumidity, "/humidity", sensor)
@@ -81,7 +80,7 @@ class Robot:
         message = PoseWithCovarianceStamped()
         message.header.stamp, message.header.frame_id = self._now(), frame_id
         message.pose.pose.position.x = x
-        self._pose.publish(message)
+        self.pose.publish(message)
 
     def read(self, temperature: float, humidity: float = 0.6, stamp: Any = None) -> None:
         for publisher, message, field, value in (
@@ -149,6 +148,25 @@ def test_a_robot_of_standard_messages_alone_is_on_the_twins_state(
         assert process.stop() == 0
 
 
+@pytest.mark.parametrize("kind", [PoseStamped, Odometry])
+def test_other_poses_say_where_the_robot_is_too(domain: int, config: Path, kind: Any) -> None:
+    package = kind.__module__.partition(".")[0]
+    was = "geometry_msgs/msg/PoseWithCovarianceStamped"
+    config.write_text(CONFIG.replace(was, f"{package}/msg/{kind.__name__}"))
+    message = kind()
+    message.header.frame_id = "map"
+    pose = message.pose if kind is PoseStamped else message.pose.pose
+    pose.position.x = 3.2
+    with adapt(domain, "--config", str(config)), Peer(domain) as peer:
+        robot = Robot(peer, kind)
+
+        def is_there() -> bool:
+            robot.pose.publish(message)
+            return robot.said("at B")
+
+        peer.until(is_there, "the robot at its tag")
+
+
 @pytest.mark.parametrize(
     ("do", "text"),
     [
@@ -164,9 +182,10 @@ def test_a_robot_of_standard_messages_alone_is_on_the_twins_state(
             lambda robot: robot.read(20.0, 6e307),
             "humidity is inf, must be from -inf to inf",
         ),
+        (lambda robot: robot.be_at(0.0, "m" * 250_000), "bytes, the limit is 200000"),
         (lambda robot: robot.fixed(800.0), "field value: 'Float32' object has no attribute"),
     ],
-    ids=["frame", "pose", "unit", "NaN", "clock", "overflow", "field"],
+    ids=["frame", "pose", "unit", "NaN", "clock", "overflow", "size", "field"],
 )
 def test_what_is_wrong_is_dropped_counted_and_said(
     domain: int, config: Path, do: Callable[[Robot], None], text: str
@@ -251,7 +270,7 @@ def test_check_without_a_configuration_finds_one_that_works(domain: int) -> None
             robot.be_at(0.0, "odom")
             robot.read(21.5)
             spin()
-            return sum(bool(each.messages) for each in node.heard.values()) == 3
+            return sum(bool(each.received) for each in node.heard.values()) == 3
 
         peer.until(publish, "enough to be heard")
         found = config_of(yaml.safe_load(suggestion(node)))

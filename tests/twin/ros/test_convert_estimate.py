@@ -2,54 +2,17 @@
 
 from __future__ import annotations
 
-import math
 from array import array
-from typing import Any
 
-import numpy as np
 import pytest
 
 from lupin_twin.core.state import NANOSECONDS_PER_SECOND as S
 from lupin_twin.estimate import Place
-from lupin_twin.estimate.engine import Estimate
 from lupin_twin.estimate.grading import Record, Tally
 from lupin_twin.field.engine import FieldRefused
 from lupin_twin.ros import convert_field
 from lupin_twin.ros.convert_past import NotAnAnswerError
 from lupin_twin.runtime.estimates import DEFAULT_PLACES, Report, ReportRequest, TagCheck
-from tests.support.estimates import an_estimate
-
-
-def test_an_estimate_comes_back_as_it_was() -> None:
-    estimate = an_estimate(width=3, height=2)
-    back = convert_field.estimate_of(convert_field.response_of(estimate))
-    assert isinstance(back, Estimate)
-    assert (back.sample_count, back.reading_count) == (
-        estimate.sample_count,
-        estimate.reading_count,
-    )
-    for name in ("mean", "sd", "known"):
-        np.testing.assert_array_equal(getattr(back.grid, name), getattr(estimate.grid, name))
-    for name in ("width", "height", "origin_x", "origin_y", "resolution", "sd_known"):
-        assert getattr(back.grid, name) == getattr(estimate.grid, name), name
-
-
-@pytest.mark.parametrize(
-    ("changes", "complaint"),
-    [
-        ({"width": 2}, "6 values of mean, of 2 x 2"),
-        ({"sd": array("f", [1.0] * 5)}, "5 values of sd"),
-        ({"sd": array("f", [1.0] * 5 + [math.nan])}, "a value of sd is no number"),
-        ({"width": 0, "mean": array("f"), "sd": array("f")}, "0 values of mean"),
-    ],
-)
-def test_what_cannot_be_is_not_believed(changes: dict[str, Any], complaint: str) -> None:
-    response = convert_field.response_of(an_estimate(width=3, height=2))
-    for name, value in changes.items():
-        setattr(response, name, value)
-    with pytest.raises(NotAnAnswerError, match=complaint):
-        convert_field.estimate_of(response)
-
 
 REPORT = Report(
     5 * S,

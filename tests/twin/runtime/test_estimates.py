@@ -25,6 +25,7 @@ from lupin_twin.runtime.estimates import (
     advice,
     estimate_at,
     find,
+    load,
     readings_at,
 )
 from tests.support.estimates import DAY_S
@@ -126,6 +127,16 @@ def test_what_a_changed_sensor_reads_is_left_out_since_then_and_not_graded() -> 
     again = found(pasts, 30, known)
     assert again.loaded is not None
     assert again.loaded.changed == known.loaded.changed, "to the nanosecond"
+
+
+def test_a_changed_sensor_makes_the_estimate_of_the_others_no_less_sure() -> None:
+    pasts = house(30 * 3600)
+    odd, places = pasts[2], np.array([(2.0, 4.0), (1.0, 1.0)])
+    broken = tuple((ns, -127.0 if ns > 26 * HOUR_NS else value) for ns, value in odd.readings)
+    _, before = load(pasts, 30 * HOUR_NS, DAY_S)[1].points(places)
+    pasts[2] = replace(odd, readings=broken)
+    _, after = load(pasts, 30 * HOUR_NS, DAY_S)[1].points(places)
+    assert (after < 1.2 * before).all()
 
 
 def test_with_too_few_readings_there_is_no_model_and_grades_stay() -> None:

@@ -65,6 +65,8 @@ export const TAGS: In<typeof ENGLISH> = {
   unclassified: 'nicht bestimmt',
   tableButton: 'Spalten und Zeilen',
   tableColumns: 'Spalten',
+  tableByArea: 'Nach Bereich gruppieren',
+  areaNone: 'Kein Bereich',
   trend: 'Tendenz',
   trendTitle: (sensor) => `${sensor}: Änderung gegenüber vor einer Stunde`,
   trendNone: 'vor einer Stunde kein Messwert',
@@ -90,5 +92,6 @@ export const TAGS: In<typeof ENGLISH> = {
   cardTry: 'Letzter Versuch',
   cardTries: 'Letzte Versuche',
   cardTryKinds: { scan: 'Messung', look: 'Blütenkontrolle', any: 'Versuch' },
+  cardArea: 'Bereich',
   cardPosition: 'Position',
 };

@@ -62,6 +62,8 @@ export const TAGS = {
   unclassified: 'not classified',
   tableButton: 'Columns and rows',
   tableColumns: 'Columns',
+  tableByArea: 'Group by area',
+  areaNone: 'No area',
   trend: 'Trend',
   trendTitle: (sensor: string): string => `${sensor} compared with an hour ago`,
   trendNone: 'no reading an hour ago',
@@ -88,5 +90,6 @@ export const TAGS = {
   cardTry: 'Last attempt',
   cardTries: 'Last attempts',
   cardTryKinds: { scan: 'scan', look: 'inspection', any: 'attempt' },
+  cardArea: 'Area',
   cardPosition: 'Position',
 } as const;

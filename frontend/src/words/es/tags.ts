@@ -65,6 +65,8 @@ export const TAGS: In<typeof ENGLISH> = {
   unclassified: 'sin clasificar',
   tableButton: 'Columnas y filas',
   tableColumns: 'Columnas',
+  tableByArea: 'Agrupar por zona',
+  areaNone: 'Sin zona',
   trend: 'Tendencia',
   trendTitle: (sensor) => `${sensor} frente a hace una hora`,
   trendNone: 'sin lectura hace una hora',
@@ -90,5 +92,6 @@ export const TAGS: In<typeof ENGLISH> = {
   cardTry: 'Último intento',
   cardTries: 'Últimos intentos',
   cardTryKinds: { scan: 'medición', look: 'revisión de flores', any: 'intento' },
+  cardArea: 'Zona',
   cardPosition: 'Posición',
 };

@@ -65,6 +65,8 @@ export const TAGS: In<typeof ENGLISH> = {
   unclassified: 'niet bepaald',
   tableButton: 'Kolommen en rijen',
   tableColumns: 'Kolommen',
+  tableByArea: 'Groeperen per afdeling',
+  areaNone: 'Geen afdeling',
   trend: 'Trend',
   trendTitle: (sensor) => `${sensor} vergeleken met een uur geleden`,
   trendNone: 'een uur geleden geen meting',
@@ -90,5 +92,6 @@ export const TAGS: In<typeof ENGLISH> = {
   cardTry: 'Laatste poging',
   cardTries: 'Laatste pogingen',
   cardTryKinds: { scan: 'meting', look: 'bloemcontrole', any: 'poging' },
+  cardArea: 'Afdeling',
   cardPosition: 'Positie',
 };

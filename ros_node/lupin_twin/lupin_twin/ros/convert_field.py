@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from typing import Any, Final
 
-import numpy as np
-from lupin_msgs.srv import GetEstimate, GetEstimateReport, GetField
+from lupin_msgs.srv import GetEstimate, GetEstimateReport
 
 from lupin_twin.core.drops import MAX_TAGS
-from lupin_twin.estimate import EstimateGrid, Place
+from lupin_twin.estimate import Place
 from lupin_twin.estimate.engine import Estimate, EstimateRequest
 from lupin_twin.estimate.grading import Record, Tally
 from lupin_twin.field.engine import NUMBERS, FieldRequest
@@ -34,11 +33,6 @@ def field_request_of(msg: Any) -> FieldRequest:
     return FieldRequest(msg.sensor_type, **{name: float(getattr(msg, name)) for name in NUMBERS})
 
 
-def field_request_message(request: FieldRequest) -> Any:
-    """The other direction of `field_request_of`."""
-    return GetField.Request(sensor_type=request.sensor_type, **request.cells)
-
-
 def fill_response(response: Any, grid: FieldGrid) -> Any:
     """Fill a GetField.Response from a grid, whose values are copied."""
     response.ok = True
@@ -49,23 +43,9 @@ def fill_response(response: Any, grid: FieldGrid) -> Any:
     return response
 
 
-def grid_of(response: Any) -> FieldGrid:
-    """A GetField.Response that is `ok` as a grid: the other direction of `fill_response`."""
-    values = np.array(response.values, dtype=np.float32)
-    values.setflags(write=False)
-    shared = {name: getattr(response, name) for name in _SHARED}
-    return FieldGrid(resolution=response.resolution_used, values=values, **shared)
-
-
 def estimate_request_of(msg: Any) -> EstimateRequest:
     """GetEstimate.Request as a value."""
     return EstimateRequest(field_request_of(msg), convert.nanoseconds(msg.at))
-
-
-def estimate_request_message(request: EstimateRequest) -> Any:
-    """The other direction of `estimate_request_of`."""
-    box, at = request.box, convert.time_msg(request.at_ns)
-    return GetEstimate.Request(sensor_type=box.sensor_type, **box.cells, at=at)
 
 
 def response_of(estimate: Estimate) -> Any:
@@ -80,33 +60,6 @@ def response_of(estimate: Estimate) -> Any:
         sample_count=estimate.sample_count,
         reading_count=estimate.reading_count,
     )
-
-
-def estimate_of(response: Any) -> Estimate:
-    """A GetEstimate.Response that is `ok`: the other direction of `response_of`.
-
-    Raises:
-        NotAnAnswerError: it has not as many means or sds as cells, or some that are no numbers.
-
-    """
-    shape = int(response.height), int(response.width)
-    cells = []
-    for name in ("mean", "sd"):
-        values = np.array(getattr(response, name), dtype=np.float32)
-        if values.size != shape[0] * shape[1] or not values.size:
-            raise NotAnAnswerError(f"{values.size} values of {name}, of {shape[1]} x {shape[0]}")
-        if not np.isfinite(values).all():
-            raise NotAnAnswerError(f"a value of {name} is no number")
-        cells.append(values.reshape(shape))
-    mean, sd = cells
-    grid = EstimateGrid(
-        **{name: getattr(response, name) for name in _OF_ESTIMATES},
-        resolution=response.resolution_used,
-        mean=mean,
-        sd=sd,
-        known=sd < response.sd_known,
-    )
-    return Estimate(grid, int(response.sample_count), int(response.reading_count))
 
 
 # --- what an estimate is worth --------------------------------------------------------------

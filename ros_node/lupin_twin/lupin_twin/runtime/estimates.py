@@ -129,6 +129,8 @@ def load(
     loaded = Loaded(at_ns, model, posterior.readings, checks)
     if loaded.changed:
         rest = readings_of(unchanged(pasts, loaded.changed), at_ns, day_length_s)
+        # What they have read since says as little of how readings hang together.
+        model = fit(rest, day_length_s=day_length_s, should_stop=should_stop)
         posterior = model.posterior(rest, 0.0, should_stop)
         loaded = Loaded(at_ns, model, rest, checks)
     return loaded, posterior

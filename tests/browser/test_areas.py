@@ -1,0 +1,58 @@
+"""Bays, rows or zones of the greenhouse: the table by area, and the area of a tag."""
+
+from __future__ import annotations
+
+from playwright.sync_api import Route, expect
+
+from tests.browser.hmi import OpenPage
+from tests.browser.house import TAGS
+from tests.browser.test_accessibility import violations
+from tests.support.web import Bridge
+
+AREAS = {"North bay": ["1", "9"], "South bay": ["3", "1*"]}
+
+
+def with_areas(route: Route) -> None:
+    answer = route.fetch()
+    route.fulfill(response=answer, json={**answer.json(), "areas": AREAS})
+
+
+def test_the_table_by_area_the_worst_first(house: Bridge, open_page: OpenPage) -> None:
+    hmi = open_page(house.url, go=False, bypass_csp=True)
+    hmi.page.route("**/api/sensors", with_areas)
+    hmi.go("tag=10")
+    hmi.expect_rows(*TAGS)
+    expect(hmi.card("10").locator(".card-facts")).to_contain_text("AreaSouth bay")
+    hmi.page.get_by_role("button", name="Columns and rows").click()
+    hmi.page.get_by_role("checkbox", name="Group by area").check()
+    hmi.page.keyboard.press("Escape")
+    hmi.expect_rows("10", "3", "1", "9", "failed", "seen", "2")
+    heads = hmi.page.locator("tbody tr.area")
+    expect(heads).to_have_text(
+        ["Critical South bay 2 tags", "Healthy North bay 2 tags", "Stressed No area 3 tags"]
+    )
+    expect(hmi.page.get_by_role("table").get_by_role("heading", level=3)).to_have_count(3)
+    # Heads are rows, to be counted, and nothing to be chosen.
+    expect(hmi.page.get_by_role("table")).to_have_attribute("aria-rowcount", str(len(TAGS) + 4))
+    expect(heads.nth(1)).to_have_attribute("aria-rowindex", "5")
+    expect(hmi.row("1")).to_have_attribute("aria-rowindex", "6")
+    heads.nth(1).click()
+    expect(hmi.card("10")).to_be_visible()
+    hmi.row("3").get_by_role("button").focus()
+    hmi.page.keyboard.press("Tab")
+    expect(hmi.row("1").get_by_role("button")).to_be_focused()
+    # The keys that go from tag to tag follow the rows.
+    hmi.page.keyboard.press("n")
+    expect(hmi.row("3")).to_have_attribute("data-selected", "true")
+    assert violations(hmi) == []
+    # Kept on this device.
+    hmi.go()
+    expect(heads).to_have_count(3)
+    # Where nobody has named areas there is nothing to group by.
+    hmi.page.unroute_all()
+    hmi.page.reload()
+    hmi.expect_rows(*TAGS)
+    expect(heads).to_have_count(0)
+    hmi.page.get_by_role("button", name="Columns and rows").click()
+    expect(hmi.page.get_by_role("checkbox", name="Health")).to_be_visible()
+    expect(hmi.page.get_by_role("checkbox", name="Group by area")).to_have_count(0)

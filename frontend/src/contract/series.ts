@@ -24,6 +24,7 @@ export const SERIES = object({
     MAX_POINTS,
   ),
   gaps: list(STRETCH, MAX_POINTS + 1),
+  nights: orNull(list(STRETCH, MAX_POINTS)),
   complete_to: orNull(TIME),
   kept_from: orNull(TIME),
 });

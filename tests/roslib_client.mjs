@@ -88,7 +88,7 @@ const scenarios = {
       const again = await subscribe({ ...MAP, compression }).next();
       compressed[compression] = again.header.frame_id;
     }
-    return { map, observation, tags, compressed, warnings: statuses.map(({ msg }) => msg) };
+    return { map, observation, tags, compressed, statuses };
   },
 
   /** Tries whatever would change something. */
@@ -127,7 +127,7 @@ const scenarios = {
     other.close();
     await settled();
     return {
-      warnings: statuses.map((status) => status.msg),
+      statuses,
       heardAfterUnsubscribe: first.messages.length - heard,
       afterTheEnd: afterTheEnd.length,
     };

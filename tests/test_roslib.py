@@ -111,10 +111,7 @@ def test_map_and_inputs_come_as_they_were_published(house: Bridge) -> None:
     assert told["tags"]["tags"][0]["tag_id"] == "1"
     # Asked for in CBOR, in which they do not come: roslib reads them all the same.
     assert told["compressed"] == {"cbor": "map", "cbor-raw": "map", "png": "map"}
-    assert told["warnings"] == [
-        f"compression '{name}' is not served: messages are plain JSON"
-        for name in ("cbor", "cbor-raw", "png")
-    ]
+    assert told["statuses"] == []
 
 
 def test_what_writes_is_refused(house: Bridge) -> None:
@@ -131,7 +128,7 @@ def test_what_writes_is_refused(house: Bridge) -> None:
 
 def test_two_components_of_a_page_share_a_topic(house: Bridge) -> None:
     told = play(house.url, "two")
-    assert told["warnings"] == ["queue_length 10 is served as 1: the newest only"]
+    assert told["statuses"] == []
     assert told["heardAfterUnsubscribe"] == 0
     assert told["afterTheEnd"] == 0
 

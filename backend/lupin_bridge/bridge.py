@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import contextlib
 import logging
 import math
 import time
@@ -12,12 +11,11 @@ from collections.abc import Callable, Hashable, Iterator
 from dataclasses import replace
 from typing import Final
 
-from lupin_bridge.alarms.board import AlarmBoard
+from lupin_bridge.alarms.board import AlarmBoard, Change
 from lupin_bridge.alarms.feed import AlarmFeed
-from lupin_bridge.alarms.ledger import Change
 from lupin_bridge.alarms.notes import NoteBoard
 from lupin_bridge.feed.estimates import EstimateFollower, Reports
-from lupin_bridge.feed.shared_work import Shared
+from lupin_bridge.feed.shared_work import Periodic, Shared, end
 from lupin_bridge.feed.source import TwinSource, TwinUpdate
 from lupin_bridge.judge.judging import NOTHING_JUDGED, Judge, Judged, silenced, unjudged
 from lupin_bridge.judge.options import Criteria
@@ -32,7 +30,7 @@ from lupin_bridge.serving.middleware import route_class
 from lupin_bridge.settings import Settings
 from lupin_bridge.stream.frames import FrameWriter, alarms_message
 from lupin_bridge.stream.hub import Client, Hub
-from lupin_bridge.stream.robot_follower import RobotFollower
+from lupin_bridge.stream.robot import RobotFollower
 from lupin_bridge.stream.status import Liveness, Status
 from lupin_bridge.viewers.foxglove_session import Offer
 from lupin_twin.core.diagnostics import Origin
@@ -131,7 +129,7 @@ class Bridge:
         self._pushed_s = 0.0
         self._pace = RateLimit(limits.frames_per_s, PACE_BURST)
         self._push_timer: asyncio.TimerHandle | None = None
-        self._watch: asyncio.Task[None] | None = None
+        self._watch = Periodic(self._look_around, WATCH_PERIOD_S, "the watch")
         self._learning: asyncio.Task[None] | None = None
         self._publishing_alarms: asyncio.Task[None] | None = None
 
@@ -144,7 +142,7 @@ class Bridge:
         """
         await self.source.start(self._on_state, self._on_death)
         self._publish_status()
-        self._watch = asyncio.create_task(self._keep_watch(), name="watch")
+        self._watch.start()
         self._publishing_alarms = asyncio.create_task(self._publish_alarms(), name="alarm frames")
         self.outward.start(self, self.criteria.sensors)
         if self._latest is not None:  # there may be no second state: a silent site has one
@@ -155,11 +153,8 @@ class Bridge:
 
     async def stop(self) -> None:
         """Stop them, and the channels; `announce_shutdown` has notified the clients."""
-        for task in (self._watch, self._learning, self._publishing_alarms):
-            if task is not None:
-                task.cancel()
-                with contextlib.suppress(asyncio.CancelledError):
-                    await task
+        await end(self._learning, self._publishing_alarms)
+        await self._watch.stop()
         await asyncio.gather(self._alarm_feed.stop(), self.notes.stop())
         await asyncio.gather(self._estimates.stop(), self.robot.stop())
         if self._push_timer is not None:
@@ -356,9 +351,10 @@ class Bridge:
         self._pushed, self._pushed_s = state, now_s
         self._publish_status()
         # A source answers once it has started, which it may not have as it tells its first state.
-        if self._watch is not None:
+        has_started = self._publishing_alarms is not None
+        if has_started:
             self.notes.start()
-        if self._watch is not None and self._learning is None and state.snapshot.tags:
+        if has_started and self._learning is None and state.snapshot.tags:
             work = learn_recent(self.source, self._judge, state.snapshot)
             self._learning = asyncio.create_task(work, name="recent")
         self._judged = self._judge_state(state.snapshot)
@@ -428,18 +424,11 @@ class Bridge:
             )
         self.hub.announce(self._clock())
 
-    async def _keep_watch(self) -> None:
-        while True:
-            await asyncio.sleep(WATCH_PERIOD_S)
-            try:
-                self._publish_status()
-                now_s = self._clock()
-                if not self.status.is_live:
-                    self.hub.remind(now_s)
-                self.hub.serve_all(now_s)  # who asked for a low rate may be due by now
-                stuck = self.hub.dismiss_stuck(now_s)
-            except Exception:  # nobody waits for this task, and who takes no frame must go
-                log.exception("the watch met an error and goes on")
-                continue
-            if stuck:
-                log.warning("closed %d clients that took no frame", stuck)
+    async def _look_around(self) -> None:
+        self._publish_status()
+        now_s = self._clock()
+        if not self.status.is_live:
+            self.hub.remind(now_s)
+        self.hub.serve_all(now_s)  # who asked for a low rate may be due by now
+        if stuck := self.hub.dismiss_stuck(now_s):
+            log.warning("closed %d clients that took no frame", stuck)

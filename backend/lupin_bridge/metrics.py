@@ -53,9 +53,7 @@ METRICS: Final = {
         "1 while its estimates are about as often right as they say; absent while nobody knows",
         "sensor",
     ),
-    "lupin_estimate_fit_failing": gauge(
-        "1 while its last round of learning came to nothing", "sensor"
-    ),
+    "lupin_estimate_fit_failing": gauge("1 while its last model could not be fitted", "sensor"),
     "lupin_outward_waiting": gauge(
         "tags, the greenhouse or changes of alarms, not sent yet", "channel"
     ),

@@ -16,9 +16,8 @@ from collections.abc import Iterator
 from dataclasses import replace
 from random import Random
 
-from lupin_bridge.alarms.board import AlarmBoard
+from lupin_bridge.alarms.board import AlarmBoard, change_between, page_of
 from lupin_bridge.alarms.feed import LOT, REACH_COUNT
-from lupin_bridge.alarms.ledger import change_between, page_of
 from lupin_bridge.judge.alarm_fold import Follower
 from lupin_bridge.judge.judging import Judge
 from lupin_bridge.judge.options import own_sensors

@@ -8,6 +8,7 @@ tags in two days, four times. `--quick`: a month, and fewer scans written.
 from __future__ import annotations
 
 import argparse
+import sqlite3
 import statistics
 import sys
 import tempfile
@@ -76,7 +77,8 @@ def write(folder: Path, scans: int) -> None:
                 pass
 
         def size() -> int:
-            file._connection.execute("PRAGMA wal_checkpoint(TRUNCATE)").fetchall()
+            with closing(sqlite3.connect(path)) as beside:
+                beside.execute("PRAGMA wal_checkpoint(TRUNCATE)").fetchall()
             return path.stat().st_size
 
         def in_lots(rows: Sequence[Write], lot: int) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Sequence
 
-from lupin_bridge.alarms.ledger import Change, page_of
+from lupin_bridge.alarms.board import Change, page_of
 from lupin_bridge.bridge import ALARMS_REST_S
 from tests.bridge.test_bridge import Stage, state
 from tests.support.seen import alarm

@@ -7,7 +7,7 @@ from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
-from lupin_bridge.alarms.ledger import Page, change_between, page_of
+from lupin_bridge.alarms.board import Page, change_between, page_of
 from lupin_bridge.notify.channels import Channels
 from lupin_bridge.notify.destinations import Targets
 from lupin_bridge.settings import Secrets, Settings

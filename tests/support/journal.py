@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sqlite3
 from collections.abc import Iterable, Iterator
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from pathlib import Path
 
 from lupin_twin.core.diagnostics import Origin
@@ -69,23 +69,38 @@ def opened(path: Path, limits: Limits = LIMITS) -> Iterator[JournalFile]:
         file.close()
 
 
-def _now(file: JournalFile) -> Clock:
+_LAST_RUN = (
+    "SELECT run, is_simulated, begun_stamp_ns, begun_arrival_ns FROM run WHERE joins IS NULL"
+    " ORDER BY run DESC LIMIT 1"
+)
+_LAST = (
+    "SELECT stamp_ns, arrival_ns FROM scan JOIN series USING (site, series) WHERE run = {0}"
+    " UNION ALL SELECT stamp_ns, arrival_ns FROM look WHERE run = {0}"
+    " ORDER BY stamp_ns DESC LIMIT 1"
+)
+
+
+def _now(path: Path) -> Clock:
     """When the last was heard in the last run; `NOW` where there is none."""
-    runs = [run for run in file._runs() if run.joins is None]
-    return file._last(runs[-1]) if runs else CLOCK
+    with closing(open_reader(path)) as connection:
+        for run, is_simulated, begun_ns, arrival_ns in connection.execute(_LAST_RUN):
+            newest = connection.execute(_LAST.format(run)).fetchone() or (0, 0)
+            stamp_ns, arrival_ns = max((begun_ns, arrival_ns), newest)  # noqa: PLW2901
+            return Clock(stamp_ns, arrival_ns, bool(is_simulated))
+    return CLOCK
 
 
 def kept(path: Path, rows: Iterable[Write], now: Clock | None = None) -> tuple[int, int]:
     """Write rows, in one life of a twin; returns what `JournalFile.append` does."""
     with opened(path) as file:
-        run = file.start(now or _now(file), is_believed=True).run
+        run = file.start(now or _now(path), is_believed=True).run
         return file.append([(run, row) for row in rows])
 
 
 def restored(path: Path, now: Clock | None = None) -> Restored:
     """What a twin that starts now gets to know."""
     with opened(path) as file:
-        return file.start(now or _now(file), is_believed=False)
+        return file.start(now or _now(path), is_believed=False)
 
 
 def known(path: Path, now: Clock | None = None) -> set[Write]:

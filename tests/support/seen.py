@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
 
-from lupin_bridge.alarms.board import AlarmBoard, AlarmSource, Board
-from lupin_bridge.alarms.ledger import change_between, page_of
+from lupin_bridge.alarms.board import AlarmBoard, AlarmSource, Board, change_between, page_of
 from lupin_bridge.judge.alarm import Alarm, alarm_id
 from lupin_bridge.judge.daylight import Day, judge_day
 from lupin_bridge.judge.judging import judge_once

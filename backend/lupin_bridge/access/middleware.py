@@ -16,7 +16,9 @@ from typing import Final, Self
 import orjson
 from starlette.datastructures import Headers, MutableHeaders
 from starlette.requests import HTTPConnection
+from starlette.responses import Response
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
+from starlette.websockets import WebSocket
 from websockets.frames import CloseCode
 
 from lupin_bridge.access.accounts import accounts_path
@@ -340,23 +342,18 @@ class _Refusal:
     headers: dict[str, str] = field(default_factory=dict)
 
     async def send(self, scope: Scope, receive: Receive, send: Send) -> None:
-        prefix = ""
-        if scope["type"] == "websocket":
-            await receive()  # websocket.connect
-            prefix = "websocket."  # ASGI's "Websocket Denial Response"
         body = orjson.dumps({"detail": self.detail}) if self.detail else b""
         headers = {"cache-control": "no-store", **self.headers}
-        if body:
-            headers |= {"content-type": "application/json", "content-length": str(len(body))}
-        send = with_security_headers(send)
-        await send(
-            {
-                "type": f"{prefix}http.response.start",
-                "status": self.status,
-                "headers": [(name.encode(), value.encode()) for name, value in headers.items()],
-            }
-        )
-        await send({"type": f"{prefix}http.response.body", "body": body})
+        response = Response(body, self.status, headers, "application/json" if body else None)
+        await deny(response, scope, receive, with_security_headers(send))
+
+
+async def deny(response: Response, scope: Scope, receive: Receive, send: Send) -> None:
+    """Answer in the application's stead."""
+    if scope["type"] == "websocket":
+        await WebSocket(scope, receive, send).send_denial_response(response)
+    else:
+        await response(scope, receive, send)
 
 
 _PREFLIGHT_HEADERS: Final = {

@@ -7,15 +7,14 @@ Where none is kept, or it fails, what the states tell is taken instead, and that
 from __future__ import annotations
 
 import asyncio
-import contextlib
 import logging
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import Final, TypeVar
 
-from lupin_bridge.alarms.board import AlarmBoard, AlarmSource
-from lupin_bridge.alarms.ledger import Change, Page, change_between, page_of
+from lupin_bridge.alarms.board import AlarmBoard, AlarmSource, Change, Page, change_between, page_of
 from lupin_bridge.alarms.state_changes import RUN, writes_between
+from lupin_bridge.feed.shared_work import end
 from lupin_bridge.feed.source import TwinSource, TwinUnavailableError, TwinUpdate
 from lupin_bridge.judge.alarm import Alarm, silence
 from lupin_bridge.judge.alarm_fold import FORGET_EVERY_NS, Follower, Found
@@ -104,10 +103,7 @@ class AlarmFeed:
         """End."""
         if self._again is not None:
             self._again.cancel()
-        if self._task is not None:
-            self._task.cancel()
-            with contextlib.suppress(asyncio.CancelledError):
-                await self._task
+        await end(self._task)
 
     # --- what happens ----------------------------------------------------------------------------
 

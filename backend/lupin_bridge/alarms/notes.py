@@ -6,21 +6,18 @@ browsers and replicas are told the same, and nobody has to tell anybody.
 
 from __future__ import annotations
 
-import asyncio
 import contextlib
-import logging
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
+from lupin_bridge.feed.shared_work import Periodic
 from lupin_bridge.feed.source import TwinSource, TwinUnavailableError
 from lupin_bridge.judge.alarm import Alarm
 from lupin_bridge.judge.verdict import Verdict
 from lupin_bridge.rate_limit import RateLimit
 from lupin_twin.core.notes import ACKNOWLEDGE, SHELVE, Note, NotesRequest, PastNotes, standing
 from lupin_twin.core.past import NotRemembered, PastRefused
-
-log = logging.getLogger(__name__)
 
 POLL_S: Final = 1.0
 OF_ALARM: Final = "alarm:"
@@ -85,19 +82,19 @@ def _what(alarm: Alarm) -> tuple[object, ...]:
     return alarm.tag_id, reason.kind, reason.sensor, is_low
 
 
-class NoteBoard:
+class NoteBoard(Periodic):
     """The notes of the log; `on_change` is called when there are others. `number` counts that.
 
-    `pace` is how fast each name may write.
+    `pace` is how fast each name may write. It looks from `start` on: the source knows its log then.
     """
 
     def __init__(self, source: TwinSource, on_change: Callable[[], None]) -> None:
+        super().__init__(self._look_quietly, POLL_S, "the look for notes", 0.0)
         self._source = source
         self._on_change = on_change
         self._found: PastNotes | None = None
         self.number = 0
         self.pace = RateLimit(NOTES_PER_MINUTE / 60.0, NOTE_BURST)
-        self._task: asyncio.Task[None] | None = None
 
     @property
     def notes(self) -> tuple[Note, ...] | None:
@@ -108,18 +105,6 @@ class NoteBoard:
     def count(self) -> int:
         """How many the log has."""
         return 0 if self._found is None else self._found.count
-
-    def start(self) -> None:
-        """Begin to look, once; the source knows its log by now."""
-        if self._task is None:
-            self._task = asyncio.create_task(self._run(), name="notes")
-
-    async def stop(self) -> None:
-        """End."""
-        if self._task is not None:
-            self._task.cancel()
-            with contextlib.suppress(asyncio.CancelledError):
-                await self._task
 
     async def look(self) -> None:
         """See whether there are others.
@@ -139,12 +124,7 @@ class NoteBoard:
             self.number += 1
             self._on_change()
 
-    async def _run(self) -> None:
-        while True:
-            try:
-                await self.look()
-            except (NotRemembered, PastRefused, TwinUnavailableError):
-                pass  # they are as they were; whoever asks the log for more is told why
-            except Exception:  # nobody waits for this task
-                log.exception("the notes are as they were")
-            await asyncio.sleep(POLL_S)
+    async def _look_quietly(self) -> None:
+        # They are as they were; whoever asks the log for more is told why.
+        with contextlib.suppress(NotRemembered, PastRefused, TwinUnavailableError):
+            await self.look()

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import contextlib
 import logging
 import os
 import sys
@@ -11,6 +10,7 @@ from collections.abc import Callable
 from typing import Final
 
 from lupin_bridge.archive.database import UsageError, check_site, check_url
+from lupin_bridge.feed.shared_work import end
 from lupin_bridge.settings import SettingError, Settings, option, variable
 
 log = logging.getLogger(__name__)
@@ -62,9 +62,7 @@ class Forwarding:
 
     async def stop(self) -> None:
         """End it, at any moment: it goes on from there another time."""
-        self._task.cancel()
-        with contextlib.suppress(asyncio.CancelledError):
-            await self._task
+        await end(self._task)
         if self._process is not None and self._process.returncode is None:
             self._process.kill()
             await self._process.wait()

@@ -12,7 +12,6 @@ from contextlib import closing
 from pathlib import Path
 from typing import Any, Final
 
-from lupin_bridge.archive.checking import check, overview
 from lupin_bridge.archive.database import (
     ArchiveError,
     UsageError,
@@ -24,7 +23,7 @@ from lupin_bridge.archive.database import (
     place_of,
 )
 from lupin_bridge.archive.forwarding import Forwarder
-from lupin_bridge.archive.retention import retain
+from lupin_bridge.archive.upkeep import check, overview, retain
 from lupin_bridge.cli import journal
 from lupin_bridge.cli.output import FAILED, Roles, add_actions, add_role
 from lupin_bridge.console import say, tell

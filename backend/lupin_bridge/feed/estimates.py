@@ -13,7 +13,7 @@ from collections import OrderedDict
 from collections.abc import Callable, Mapping
 from typing import Final
 
-from lupin_bridge.feed.shared_work import Shared
+from lupin_bridge.feed.shared_work import Periodic, Shared
 from lupin_bridge.feed.source import TwinSource, TwinUnavailableError
 from lupin_twin.core.past import NotRemembered
 from lupin_twin.core.state import Snapshot
@@ -21,7 +21,7 @@ from lupin_twin.field.engine import FieldRefused
 from lupin_twin.runtime.estimates import Report, ReportRequest
 from lupin_twin.runtime.workers import in_turns
 
-# A twin's next round comes no sooner.
+# A twin makes no report of a sensor so soon again.
 FRESH_S: Final = 2.0
 MAX_CACHED: Final = 64
 
@@ -57,7 +57,7 @@ class Reports:
 
 log = logging.getLogger(__name__)
 
-# A round of estimates comes every 30 s (`estimate_service.REST_S`).
+# A report serves for 30 s at least (`estimate_service.REST_S`).
 PERIOD_S: Final = 15.0
 # A greenhouse has a handful of sensors; of more, the first in the alphabet.
 MAX_SENSORS: Final = 32
@@ -68,7 +68,7 @@ NAMES_TAG_S: Final = 5e-6
 Changed = Mapping[str, Mapping[str, int]]
 
 
-class EstimateFollower:
+class EstimateFollower(Periodic):
     """Fetches reports from `start` to `stop`. Belongs to the event loop.
 
     `snapshot` gives the newest state; `on_changed` gets the tags that have changed, each time that
@@ -83,24 +83,13 @@ class EstimateFollower:
         on_changed: Callable[[Changed], None],
         period_s: float = PERIOD_S,
     ) -> None:
+        super().__init__(self.update, period_s, "what estimates are worth")
         self.known: dict[str, Report] = {}
         self._source = source
         self._reports = reports
         self._snapshot = snapshot
         self._on_changed = on_changed
-        self._period_s = period_s
         self._changed: Changed = {}
-        self._task: asyncio.Task[None] | None = None
-
-    def start(self) -> None:
-        """Begin; the first answer comes after a period."""
-        self._task = asyncio.create_task(self._follow(), name="estimates")
-
-    async def stop(self) -> None:
-        """End."""
-        if self._task is not None:
-            self._task.cancel()
-            await asyncio.wait((self._task,))
 
     async def update(self) -> None:
         """Fetch the report of each sensor, one after the other."""
@@ -125,14 +114,6 @@ class EstimateFollower:
         if changed != self._changed:
             self._changed = changed
             self._on_changed(changed)
-
-    async def _follow(self) -> None:
-        while True:
-            await asyncio.sleep(self._period_s)
-            try:
-                await self.update()
-            except Exception:  # nobody waits for this task, and it goes on
-                log.exception("what estimates are worth is not known")
 
 
 def newest_of(snapshot: Snapshot) -> dict[str, int]:

@@ -17,6 +17,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Final, TypeVar
 
+from lupin_bridge.feed.shared_work import end
 from lupin_bridge.feed.source import TwinUnavailableError
 from lupin_twin.core.journal_condition import UNKNOWN, Condition, JournalState
 from lupin_twin.core.past import NotRemembered, PastRefused
@@ -129,10 +130,7 @@ class FollowedLog:
 
     async def stop(self) -> None:
         """End; the next one goes on where this one was."""
-        if self._task is not None:
-            self._task.cancel()
-            with contextlib.suppress(asyncio.CancelledError):
-                await self._task
+        await end(self._task)
 
     def _path(self, journal: str) -> Path:
         assert self._folder is not None
@@ -204,8 +202,8 @@ def _written_s(path: Path) -> float:
 def _delete(path: Path) -> None:
     if path.is_dir():
         shutil.rmtree(path)
-    for end in ("", "-wal", "-shm"):
-        path.with_name(path.name + end).unlink(missing_ok=True)
+    for suffix in ("", "-wal", "-shm"):
+        path.with_name(path.name + suffix).unlink(missing_ok=True)
 
 
 def _last(path: Path) -> int:

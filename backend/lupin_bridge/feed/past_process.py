@@ -22,6 +22,7 @@ import numpy as np
 
 from lupin_bridge.feed.past_child import HEAD
 from lupin_bridge.feed.query import Now, PastQuery
+from lupin_bridge.feed.shared_work import end
 from lupin_twin.core.past import NotRemembered
 from lupin_twin.field.explored import OccupancyMap
 
@@ -61,10 +62,7 @@ class PastProcess:
     async def stop(self) -> None:
         """End it; what is being asked has no answer."""
         self.why_down = "the process that looks back is ending"
-        if self._life is not None:
-            self._life.cancel()
-            with contextlib.suppress(asyncio.CancelledError):
-                await self._life
+        await end(self._life)
         self._refuse_all()
 
     async def ask(self, question: PastQuery[AnswerT], now: Now, cost_s: float) -> AnswerT:

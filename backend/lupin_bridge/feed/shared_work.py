@@ -1,16 +1,66 @@
-"""Identical work under way is done once, and ends when nobody waits for it any more."""
+"""Work on the event loop: what is shared, what is repeated, and how either ends."""
 
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable, Coroutine, Hashable
+import logging
+from collections.abc import Awaitable, Callable, Coroutine, Hashable
 from typing import Any, Generic, TypeVar
 
 ResultT = TypeVar("ResultT")
 
+log = logging.getLogger(__name__)
+
+
+async def end(*tasks: asyncio.Task[Any] | None) -> None:
+    """End tasks, and wait for that; None: it was never begun."""
+    begun = [task for task in tasks if task is not None]
+    for task in begun:
+        task.cancel()
+    await asyncio.gather(*begun, return_exceptions=True)
+
+
+class Periodic:
+    """Does `work` every so often, from `start` to `stop`; the first time after `first_s`.
+
+    Whatever it raises is logged as `what`, and it goes on: nobody waits for it.
+    """
+
+    def __init__(
+        self,
+        work: Callable[[], Awaitable[None]],
+        every_s: float,
+        what: str,
+        first_s: float | None = None,
+    ) -> None:
+        self._work, self._every_s, self._what = work, every_s, what
+        self._first_s = every_s if first_s is None else first_s
+        self._task: asyncio.Task[None] | None = None
+
+    def start(self) -> None:
+        """Begin, once."""
+        if self._task is None:
+            self._task = asyncio.create_task(self._repeat(), name=self._what)
+
+    async def stop(self) -> None:
+        """End."""
+        await end(self._task)
+
+    async def _repeat(self) -> None:
+        await asyncio.sleep(self._first_s)
+        while True:
+            try:
+                await self._work()
+            except Exception:
+                log.exception("%s met an error and goes on", self._what)
+            await asyncio.sleep(self._every_s)
+
 
 class Shared(Generic[ResultT]):
-    """The work under way, by what it makes. Belongs to the event loop."""
+    """Identical work under way is done once, and ends when nobody waits for it any more.
+
+    The work is known by what it makes. Belongs to the event loop.
+    """
 
     def __init__(self) -> None:
         self._flights: dict[Hashable, _Flight[ResultT]] = {}

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import logging
 import math
 import time
 from collections.abc import Iterator, Mapping
@@ -24,13 +23,12 @@ from lupin_bridge.app import STATIC_FOLDER, create_app
 from lupin_bridge.bridge import Bridge
 from lupin_bridge.feed.past_process import PastProcess
 from lupin_bridge.feed.query import Now
-from lupin_bridge.feed.shared_work import Shared
+from lupin_bridge.feed.shared_work import Periodic, Shared
 from lupin_bridge.fleet import small_map
-from lupin_bridge.fleet.compare import COMPARE_S, Compare, OfSites, answer_of, chosen, compare
+from lupin_bridge.fleet.compare import COMPARE_S, Compare, OfSites, chosen, compare
 from lupin_bridge.fleet.export import respond_sites
-from lupin_bridge.fleet.link_back import SitePage
 from lupin_bridge.fleet.overview import Site, SitesFrame, alarms_json, archive_json, etag, site_json
-from lupin_bridge.fleet.pages import Opened, SitePages, Sites
+from lupin_bridge.fleet.pages import Opened, SitePage, SitePages, Sites
 from lupin_bridge.fleet.report import SitesReport, sites_report
 from lupin_bridge.fleet.source import SiteTwin
 from lupin_bridge.fleet.watching import Watching
@@ -50,7 +48,14 @@ from lupin_bridge.routes.answers import (
     respond,
 )
 from lupin_bridge.routes.sockets import has_place, next_message
-from lupin_bridge.serving.admission import REVALIDATE, Admission, Answer, AnswerCache, Limits
+from lupin_bridge.serving.admission import (
+    REVALIDATE,
+    Admission,
+    Answer,
+    AnswerCache,
+    Limits,
+    json_answer,
+)
 from lupin_bridge.serving.middleware import PieceByPiece
 from lupin_bridge.serving.ws_protocol import CONNECTION_KEY, Connection
 from lupin_bridge.settings import Settings
@@ -59,8 +64,6 @@ from lupin_bridge.stream.status import Status
 from lupin_twin.core.journal_condition import UNKNOWN
 from lupin_twin.core.past import PastRefused
 from lupin_twin.runtime.workers import Workers
-
-log = logging.getLogger(__name__)
 
 _TIDY_S: Final = 5.0
 # What the cached answers of one site may take.
@@ -125,20 +128,18 @@ class Fleet:
         self._frame: SitesFrame | None = None
         self._framed_s = -math.inf
         self._push_timer: asyncio.TimerHandle | None = None
-        self._tidying: asyncio.Task[None] | None = None
+        self._tidying = Periodic(self._tidy, _TIDY_S, "tidying")
 
     async def start(self) -> None:
         """Begin to watch the archive."""
         self.watching.start()
-        self._tidying = asyncio.create_task(self._tidy(), name="tidy")
+        self._tidying.start()
 
     async def stop(self) -> None:
         """Close every page, and end."""
         if self._push_timer is not None:
             self._push_timer.cancel()
-        if self._tidying is not None:
-            self._tidying.cancel()
-            await asyncio.wait((self._tidying,))
+        await self._tidying.stop()
         await self.pages.close()
         self.workers.close()
         await asyncio.gather(self.watching.stop(), self.past.stop())
@@ -197,16 +198,11 @@ class Fleet:
         return answer
 
     async def _tidy(self) -> None:
-        while True:
-            await asyncio.sleep(_TIDY_S)
-            try:
-                now_s = time.monotonic()
-                self.pages.tidy(now_s)
-                self.hub.dismiss_stuck(now_s)
-                if now_s - self._framed_s >= _HEARTBEAT_S and self._push_timer is None:
-                    self._push()
-            except Exception:  # nobody waits for this task
-                log.exception("a page was not closed")
+        now_s = time.monotonic()
+        self.pages.tidy(now_s)
+        self.hub.dismiss_stuck(now_s)
+        if now_s - self._framed_s >= _HEARTBEAT_S and self._push_timer is None:
+            self._push()
 
     def measure(self) -> Iterator[tuple[str, str, float]]:
         """What Prometheus reads: a name, what it is, the number."""
@@ -353,7 +349,7 @@ def _add_answers(app: FastAPI, fleet: Fleet) -> None:
         async def compute() -> Answer:
             with fleet.admission.computing(client_of(request)):
                 body = alarms_json((watching.sites[name] for name in names), watching.archive)
-                answer = answer_of(body)
+                answer = json_answer(orjson.dumps(body))
             fleet.cache.put(key, answer)
             return answer
 

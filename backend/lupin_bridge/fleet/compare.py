@@ -92,7 +92,7 @@ class Compare:
 
     def answer(self, found: Sequence[tuple[str, int, int, float]]) -> Answer:
         """The answer of what was read."""
-        return answer_of(self._body(_means(self, found)))
+        return json_answer(orjson.dumps(self._body(_means(self, found))))
 
     def _body(self, means: Mapping[str, np.ndarray[Any, np.dtype[np.float64]]]) -> dict[str, Any]:
         steps = self.steps
@@ -156,11 +156,6 @@ def compare(
     steps = grid(start_ns, max(end_ns, start_ns + 1), given.points, HOUR_NS)
     sites = tuple((site, known[site]) for site in names)
     return Compare(given.sensor_type, sites, steps, sensors.named(given.sensor_type).unit)
-
-
-def answer_of(found: dict[str, Any]) -> Answer:
-    """A JSON body whose ETag is that of its content."""
-    return json_answer(orjson.dumps(found))
 
 
 def chosen(text: str | None, known: Mapping[str, object]) -> list[str]:

@@ -1,4 +1,7 @@
-"""The pages of sites: made when opened, closed when nobody reads them or others need the place."""
+"""The pages of sites: made when opened, closed when nobody reads them or others need the place.
+
+A site's page has a way back to all of them: the page itself knows of no others.
+"""
 
 from __future__ import annotations
 
@@ -7,17 +10,56 @@ import time
 from collections import Counter
 from collections.abc import Callable, Collection, Iterator
 from dataclasses import dataclass, field
+from hashlib import blake2b
+from html import escape
+from pathlib import Path
 from typing import Final
+from urllib.parse import parse_qs
 
-from fastapi import Request, Response, WebSocket
+from fastapi import Request, Response
 from starlette.requests import HTTPConnection
 from starlette.types import ASGIApp, Receive, Scope, Send
 
-from lupin_bridge.access.middleware import client_of, with_security_headers
+from lupin_bridge.access.middleware import client_of, deny, with_security_headers
 from lupin_bridge.bridge import Bridge
-from lupin_bridge.fleet.link_back import SitePage
 from lupin_bridge.fleet.source import SiteTwin
-from lupin_bridge.routes.answers import error_response
+from lupin_bridge.routes.answers import error_response, has_etag, not_modified
+from lupin_bridge.serving.admission import REVALIDATE
+
+_STYLE: Final = '<link rel="stylesheet" href="./fleet-back.css" /></head>'
+# Which of them is shown is the page's to say, see `fleet-back.css`.
+_WORDS: Final = "".join(
+    f'<span lang="{language}">{words}</span>'
+    for language, words in {
+        "en": "All greenhouses",
+        "de": "Alle Gewächshäuser",
+        "nl": "Alle kassen",
+        "es": "Todos los invernaderos",
+    }.items()
+)
+_ROOT: Final = '<div id="root">'
+
+
+class SitePage:
+    """`index.html` of the folder; there may be none."""
+
+    def __init__(self, static_folder: Path) -> None:
+        file = static_folder / "index.html"
+        self._text = file.read_text(encoding="utf-8") if file.is_file() else ""
+
+    def answer(self, request: Request) -> Response | None:
+        """The page, with its query on the way back too; None: as it is, if it is there at all."""
+        query = request.url.query
+        if not self._text or "kiosk" in parse_qs(query, keep_blank_values=True):
+            return None
+        to = escape(f"../../?{query}" if query else "../../")
+        link = f'<nav class="fleet-back"><a href="{to}">‹ {_WORDS}</a></nav>{_ROOT}'
+        body = self._text.replace("</head>", _STYLE, 1).replace(_ROOT, link, 1).encode()
+        etag = f'"{blake2b(body, digest_size=12).hexdigest()}"'
+        if has_etag(request, etag):
+            return not_modified(etag)
+        return Response(body, 200, {"ETag": etag, **REVALIDATE}, "text/html; charset=utf-8")
+
 
 # A page that nobody has asked anything of for so long, and that nobody follows, is closed.
 _IDLE_S: Final = 120.0
@@ -131,7 +173,7 @@ class Sites:
         found = self._pages.page_of(name, client)
         if isinstance(found, str):
             status = 503 if name in self._pages.sites() else 404
-            await _refuse(found, status, scope, receive, send)
+            await deny(error_response(found, status), scope, receive, send)
             return
         if not slash:
             # Relative, as all links are: below whatever prefix this is.
@@ -149,11 +191,3 @@ class Sites:
             found.users[client] -= 1
             found.users += Counter()  # without those who read no more
             found.used_s = time.monotonic()
-
-
-async def _refuse(detail: str, status: int, scope: Scope, receive: Receive, send: Send) -> None:
-    response = error_response(detail, status)
-    if scope["type"] == "websocket":
-        await WebSocket(scope, receive, send).send_denial_response(response)
-        return
-    await response(scope, receive, send)

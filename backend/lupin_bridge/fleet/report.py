@@ -11,11 +11,13 @@ from dataclasses import dataclass
 from typing import Any, Final
 from urllib.parse import quote
 
-from lupin_bridge.fleet.compare import answer_of, chosen
+import orjson
+
+from lupin_bridge.fleet.compare import chosen
 from lupin_bridge.past import query as past_query
 from lupin_bridge.past.query import OfReport, Parameters
 from lupin_bridge.query_string import parameter, read
-from lupin_bridge.serving.admission import Answer
+from lupin_bridge.serving.admission import Answer, json_answer
 from lupin_bridge.stream.state_json import stamp
 from lupin_twin.core.notes import WITHDRAW
 from lupin_twin.core.past import HOUR_NS, Event, PastRefused, seconds
@@ -79,7 +81,8 @@ class SitesReport:
             }
             for site, name, active, heard_ns in self.sites
         ]
-        return answer_of({"from": stamp(self.start_ns), "to": stamp(self.end_ns), "sites": rows})
+        body = {"from": stamp(self.start_ns), "to": stamp(self.end_ns), "sites": rows}
+        return json_answer(orjson.dumps(body))
 
 
 def sites_report(parameters: Parameters, known: Mapping[str, Any], now_ns: int) -> SitesReport:

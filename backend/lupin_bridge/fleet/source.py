@@ -13,6 +13,7 @@ from typing import Any, Final, cast
 from lupin_bridge.feed.past_process import PastProcess
 from lupin_bridge.feed.query import Now
 from lupin_bridge.feed.relay import Relay, Ros
+from lupin_bridge.feed.shared_work import end
 from lupin_bridge.feed.source import TwinSource, TwinUnavailableError, TwinUpdate
 from lupin_bridge.feed.topics import TwinNames
 from lupin_bridge.fleet.overview import Site
@@ -84,10 +85,7 @@ class SiteTwin(TwinSource):
 
     async def stop(self) -> None:
         """End; the process that reads goes on for others."""
-        if self._task is not None:
-            self._task.cancel()
-            with contextlib.suppress(asyncio.CancelledError):
-                await self._task
+        await end(self._task)
 
     def on_news(self) -> None:
         """The overview has changed: maybe this site."""

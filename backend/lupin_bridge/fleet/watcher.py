@@ -15,7 +15,7 @@ from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from typing import Any, Final, TypeVar
 
-from lupin_bridge.alarms.ledger import worst_first
+from lupin_bridge.alarms.board import worst_first
 from lupin_bridge.alarms.notes import notes_of_alarms
 from lupin_bridge.archive.database import CHANNEL, ArchiveError, explained
 from lupin_bridge.feed import past_child

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import contextlib
 import logging
 import time
 from collections.abc import Callable, Mapping
@@ -12,6 +11,7 @@ from typing import Final
 
 from lupin_bridge.feed.past_process import PastProcess
 from lupin_bridge.feed.query import Now
+from lupin_bridge.feed.shared_work import end
 from lupin_bridge.fleet.overview import Archive, Site
 from lupin_bridge.fleet.watcher import News
 from lupin_bridge.settings import Settings
@@ -63,10 +63,7 @@ class Watching:
 
     async def stop(self) -> None:
         """End."""
-        for task in self._tasks:
-            task.cancel()
-            with contextlib.suppress(asyncio.CancelledError):
-                await task
+        await end(*self._tasks)
         await self._process.stop()
 
     @property

@@ -6,22 +6,16 @@ import asyncio
 from collections.abc import Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
-from typing import Protocol
 
-from lupin_bridge.alarms.board import AlarmBoard
-from lupin_bridge.alarms.notes import NoteBoard
-from lupin_bridge.feed.source import TwinSource
-from lupin_bridge.judge.options import Criteria
 from lupin_bridge.judge.ranges import Sensors
 from lupin_bridge.notify.daily import DailyReport, DailyTarget
 from lupin_bridge.notify.destinations import Targets
-from lupin_bridge.notify.messages import GreenhouseState
 from lupin_bridge.notify.mirror import Mirror
 from lupin_bridge.notify.mqtt import Mqtt
 from lupin_bridge.notify.push import Push
+from lupin_bridge.notify.source import Source
 from lupin_bridge.notify.webhook import Webhook
 from lupin_bridge.stream.status import Outward
-from lupin_twin.core.diagnostics import Origin
 
 
 class DetachedThreads(ThreadPoolExecutor):
@@ -34,26 +28,6 @@ class DetachedThreads(ThreadPoolExecutor):
     def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:  # noqa: ARG002
         """End the idle threads, and wait for none."""
         super().shutdown(wait=False, cancel_futures=True)
-
-
-class Source(Protocol):
-    """What the channels need of the bridge."""
-
-    alarms: AlarmBoard
-    notes: NoteBoard
-    source: TwinSource
-    criteria: Criteria
-
-    def seen(self) -> GreenhouseState:
-        """The state of now."""
-
-    @property
-    def ros_time_ns(self) -> int | None:
-        """ROS time now; None: it is not known."""
-
-    @property
-    def origin(self) -> Origin:
-        """Where observations come from."""
 
 
 class Channels:

@@ -7,7 +7,6 @@ week of them; a message that is not taken is tried again as those of alarms are.
 from __future__ import annotations
 
 import asyncio
-import contextlib
 import logging
 import os
 from dataclasses import dataclass
@@ -18,8 +17,10 @@ from typing import Final, Protocol
 
 import orjson
 
-from lupin_bridge.feed.source import TwinSource, TwinUnavailableError
-from lupin_bridge.judge.options import Criteria, unix_s
+from lupin_bridge.feed.shared_work import end
+from lupin_bridge.feed.source import TwinUnavailableError
+from lupin_bridge.judge.options import unix_s
+from lupin_bridge.notify.source import Source
 from lupin_bridge.past.plans import ConditionalQuery
 from lupin_bridge.past.query import compact
 from lupin_bridge.past.report import REPORT_S, Report
@@ -67,20 +68,6 @@ class ReportChannel(Protocol):
         """Send it until it is taken; False: it was given up, which is logged."""
 
 
-class Reporting(Protocol):
-    """What a report is of: the bridge."""
-
-    criteria: Criteria
-
-    @property
-    def source(self) -> TwinSource:
-        """Where its log is."""
-
-    @property
-    def ros_time_ns(self) -> int | None:
-        """ROS time now; None: it is not known."""
-
-
 class DailyReport:
     """Sends by one channel. Belongs to the event loop."""
 
@@ -89,18 +76,15 @@ class DailyReport:
         self._why = ""
         self._task: asyncio.Task[None] | None = None
 
-    def start(self, of: Reporting) -> None:
+    def start(self, of: Source) -> None:
         """Begin."""
         self._task = asyncio.create_task(self._run(of), name=f"report by {self._channel.name}")
 
     async def stop(self) -> None:
         """End; what was not taken is sent after the next start."""
-        if self._task is not None:
-            self._task.cancel()
-            with contextlib.suppress(asyncio.CancelledError):
-                await self._task
+        await end(self._task)
 
-    async def _run(self, of: Reporting) -> None:
+    async def _run(self, of: Source) -> None:
         while True:
             try:
                 self._say(await self._look(of))
@@ -115,7 +99,7 @@ class DailyReport:
             log.warning("the report of the day is not sent by %s: %s", self._channel.name, why)
         self._why = why
 
-    async def _look(self, of: Reporting) -> str:
+    async def _look(self, of: Source) -> str:
         """Send what is due; returns why that cannot be, empty: nothing is wrong."""
         now_ns, journal, target = of.ros_time_ns, of.source.journal(), self._target
         if now_ns is None or not journal.journal_id:

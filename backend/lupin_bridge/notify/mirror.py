@@ -10,7 +10,7 @@ from typing import Any, Final
 
 import orjson
 
-from lupin_bridge.alarms.ledger import MAX_WORST, worst_first
+from lupin_bridge.alarms.board import MAX_WORST, worst_first
 from lupin_bridge.judge.alarm import SITE, Alarm
 from lupin_bridge.judge.ranges import Sensors
 from lupin_bridge.judge.scan_interval import SHORTEST_NS

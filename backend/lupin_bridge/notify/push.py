@@ -18,7 +18,7 @@ from collections import OrderedDict
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from ipaddress import ip_address
-from typing import TYPE_CHECKING, Final, Protocol
+from typing import TYPE_CHECKING, Final
 from urllib.parse import urlsplit
 
 import orjson
@@ -26,19 +26,18 @@ import orjson
 from lupin_bridge.access.accounts import Device
 from lupin_bridge.access.people import People
 from lupin_bridge.access.person import AccountError
-from lupin_bridge.alarms.board import AlarmBoard
-from lupin_bridge.alarms.ledger import Change
-from lupin_bridge.alarms.notes import NOTHING_SAID, NoteBoard, notes_of_alarms
+from lupin_bridge.alarms.board import Change
+from lupin_bridge.alarms.notes import NOTHING_SAID, notes_of_alarms
+from lupin_bridge.feed.shared_work import end
 from lupin_bridge.judge.alarm import Alarm
-from lupin_bridge.judge.options import Criteria
 from lupin_bridge.judge.verdict import Verdict
 from lupin_bridge.notify.destinations import Endpoint, PushTarget
 from lupin_bridge.notify.http_post import PostError, post
 from lupin_bridge.notify.retry import Backoff, Condition, until_taken
+from lupin_bridge.notify.source import Source
 from lupin_bridge.past.report_page import push_text
 from lupin_bridge.serving.admission import AdmissionError
 from lupin_bridge.stream.health_json import alarm_json
-from lupin_twin.core.diagnostics import Origin
 
 if TYPE_CHECKING:
     from py_vapid import Vapid02
@@ -68,23 +67,6 @@ class DeviceRefused(ValueError):
 
 class DeviceGone(Exception):
     """Its push service has it no more."""
-
-
-class Source(Protocol):
-    """What push needs of the bridge."""
-
-    alarms: AlarmBoard
-    criteria: Criteria
-
-    notes: NoteBoard
-
-    @property
-    def origin(self) -> Origin:
-        """Where observations come from."""
-
-    @property
-    def ros_time_ns(self) -> int | None:
-        """ROS time now; None: it is not known."""
 
 
 class Push:
@@ -153,9 +135,7 @@ class Push:
     async def stop(self) -> None:
         """End at once."""
         self._unsubscribe()
-        if self._task is not None:
-            self._task.cancel()
-            await asyncio.wait([self._task])
+        await end(self._task)
 
     async def _run(self, source: Source) -> None:
         while True:

@@ -19,8 +19,8 @@ from typing import Final, Literal
 
 import orjson
 
-from lupin_bridge.alarms.board import AlarmBoard
-from lupin_bridge.alarms.ledger import Change, happened_ns
+from lupin_bridge.alarms.board import AlarmBoard, Change, happened_ns
+from lupin_bridge.feed.shared_work import end
 from lupin_bridge.judge.alarm import Alarm
 from lupin_bridge.notify.destinations import WebhookTarget
 from lupin_bridge.notify.http_post import PostError, post
@@ -197,9 +197,7 @@ class Webhook:
     async def stop(self) -> None:
         """End at once; what was not taken is sent after the next start."""
         self._unsubscribe()
-        if self._task is not None:
-            self._task.cancel()
-            await asyncio.wait([self._task])
+        await end(self._task)
 
     def _wait(self, delivery: Delivery) -> None:
         if len(self._waiting) >= MAX_WAITING:

@@ -19,7 +19,7 @@ from typing import Any, Final
 
 import orjson
 
-from lupin_bridge.alarms.ledger import worst_first
+from lupin_bridge.alarms.board import worst_first
 from lupin_bridge.alarms.notes import notes_of_alarms
 from lupin_bridge.feed.query import Find
 from lupin_bridge.judge.alarm import Alarm

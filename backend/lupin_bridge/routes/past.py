@@ -1,4 +1,4 @@
-"""The past: one sensor's readings, and what happened when."""
+"""The past: one sensor's readings, what happened when, and the shift report of both."""
 
 from __future__ import annotations
 
@@ -6,13 +6,16 @@ from fastapi import APIRouter, Request, Response
 
 from lupin_bridge.past import query, schema
 from lupin_bridge.past.plans import History, Timeline
-from lupin_bridge.query_string import parameters_of
+from lupin_bridge.past.report import Report
+from lupin_bridge.past.report_page import ReportPage
+from lupin_bridge.query_string import parameters_of, read
 from lupin_bridge.routes.answers import (
     NOT_REMEMBERED,
     bridge_of,
     read_route,
     respond_past,
 )
+from lupin_twin.core.past import PastRefused
 
 router = APIRouter()
 
@@ -45,3 +48,42 @@ async def timeline_route(request: Request) -> Response:
     bridge = bridge_of(request)
     period = query.period(query.OfTimeline, request.query_params.multi_items(), bridge.ros_time_ns)
     return await respond_past(request, Timeline(period, bridge.source.journal()), "timeline")
+
+
+@read_route(
+    router,
+    "/api/report",
+    summary="What happened between two moments: alarms, notes, silences, extremes, scans",
+    responses={200: {"model": schema.ShiftReport}, **NOT_REMEMBERED},
+    openapi_extra={"parameters": parameters_of(query.OfReport)},
+)
+async def report_route(request: Request) -> Response:
+    """At most 31 days and 100,000 scans and inspections; 500 entries of each list."""
+    given = read(query.OfReport, request.query_params.multi_items(), PastRefused)
+    return await respond_past(request, _report(request, given), "report")
+
+
+@read_route(
+    router,
+    "/api/report.html",
+    summary="The same as a page for paper, A4",
+    responses={200: {"content": {"text/html": {"schema": {"type": "string"}}}}, **NOT_REMEMBERED},
+    openapi_extra={"parameters": parameters_of(query.OfReportPage)},
+)
+async def report_page_route(request: Request) -> Response:
+    """Without scripts; times are those of the setting `time_zone`."""
+    given = read(query.OfReportPage, request.query_params.multi_items(), PastRefused)
+    found = _report(request, given)
+    page = ReportPage(found.start_ns, found.end_ns, found.criteria, found.journal, given.lang)
+    return await respond_past(request, page, "report")
+
+
+def _report(request: Request, given: query.OfReport) -> Report:
+    bridge = bridge_of(request)
+    journal = bridge.source.journal()
+    now_ns = bridge.ros_time_ns
+    return Report(
+        *query.report(given, journal.complete_ns if now_ns is None else now_ns),
+        bridge.criteria,
+        journal,
+    )

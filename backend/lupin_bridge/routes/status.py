@@ -41,7 +41,7 @@ from lupin_bridge.routes.answers import (
 from lupin_bridge.serving.admission import REVALIDATE, Answer
 from lupin_bridge.stream import robot_schema, schema
 from lupin_bridge.stream.health_json import alarms_body
-from lupin_bridge.stream.robot_json import robot_body
+from lupin_bridge.stream.robot import robot_body
 from lupin_bridge.stream.state_json import header, stamp
 from lupin_twin.field.explored import OccupancyMap
 

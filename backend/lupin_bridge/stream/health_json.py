@@ -5,12 +5,13 @@ Pure. A tag's text is kept until its health is another: it stays the same for ho
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from itertools import islice
-from typing import Any, Final, Protocol
+from typing import Any, Final
 
 import orjson
 
+from lupin_bridge.alarms.board import Page
 from lupin_bridge.alarms.notes import AlarmNotes
 from lupin_bridge.judge.alarm import Alarm
 from lupin_bridge.judge.judging import Judged
@@ -73,24 +74,12 @@ def alarms_body(
     }
 
 
-class AlarmLists(Protocol):
-    """All alarms and the active ones, each newest first: `alarms.ledger.Page`."""
-
-    @property
-    def alarms(self) -> Sequence[Alarm]:
-        """All."""
-
-    @property
-    def active(self) -> Sequence[Alarm]:
-        """Those that have not been cleared."""
-
-
 # In a frame: the active ones first of all, and what else was so lately.
 MAX_IN_FRAME: Final = 1_000
 RECENT_NS: Final = 86_400 * NANOSECONDS_PER_SECOND
 
 
-def alarms_in_frame(page: AlarmLists, now_ns: int | None) -> list[Alarm]:
+def alarms_in_frame(page: Page, now_ns: int | None) -> list[Alarm]:
     """What a frame tells of all alarms: those active now or within 24 h, newest first as they."""
     since_ns = 0 if now_ns is None else now_ns - RECENT_NS
     active = page.active[:MAX_IN_FRAME]

@@ -8,10 +8,11 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import Any, Literal
 
+from lupin_bridge.stream.state_json import stamp
 from lupin_twin.core.diagnostics import Origin
 from lupin_twin.core.drops import Recent
 from lupin_twin.core.journal_condition import UNKNOWN, Condition, JournalState
-from lupin_twin.core.state import NANOSECONDS_PER_SECOND, ClockState
+from lupin_twin.core.state import ClockState
 
 # The twin publishes at least once a second (parameter state_publish_rate_hz, default 1); three
 # missed publications are no accident.
@@ -152,13 +153,8 @@ def _journal(journal: Condition) -> dict[str, Any]:
         "state": journal.state.value,
         "detail": journal.detail,
         "set_aside": journal.set_aside,
-        "simulated": simulated and {"start": _time(simulated[0]), "end": _time(simulated[1])},
+        "simulated": simulated and {"start": stamp(simulated[0]), "end": stamp(simulated[1])},
     }
-
-
-def _time(stamp_ns: int) -> dict[str, int]:
-    sec, nanosec = divmod(stamp_ns, NANOSECONDS_PER_SECOND)
-    return {"sec": sec, "nanosec": nanosec}
 
 
 @dataclass(slots=True)

@@ -8,9 +8,8 @@ How the options meet our policy, which keeps the newest for a client and queues 
 
 - `throttle_rate` (ms) is honoured; of several subscriptions the smallest counts. When it has
   passed, the newest state follows by itself (rosbridge would wait for the next message).
-- `queue_length` 0 or 1 is what every client gets: the newest, and of observations and discovered
-  tags the newest 50. A longer queue is accepted as 1, with a warning.
-- `compression` other than `none`: a warning, and plain JSON, which every client reads.
+- `queue_length` is the policy's, whatever is asked for: the newest, and of observations and
+  discovered tags the newest 50. `compression` is none: plain JSON, which every client reads.
 - `id` is a string or an integer. null counts as not given, everywhere. Members that are not named
   here are ignored, as rosbridge does.
 
@@ -52,14 +51,6 @@ class _Request(BaseModel):
     model_config = ConfigDict(strict=True, frozen=True)
 
     id: Id = None
-    compression: Name = "none"
-
-    @property
-    def warnings(self) -> tuple[str, ...]:
-        """What is served in another way than it was requested."""
-        if self.compression == "none":
-            return ()
-        return (f"compression {shown(self.compression)} is not served: messages are plain JSON",)
 
 
 class Subscribe(_Request):
@@ -68,15 +59,6 @@ class Subscribe(_Request):
     topic: Name
     type: Name = ""
     throttle_rate: Annotated[float, Field(ge=0, le=MAX_THROTTLE_RATE_MS)] = 0.0
-    queue_length: Annotated[float, Field(ge=0)] = 0.0
-
-    @property
-    def warnings(self) -> tuple[str, ...]:
-        """See `_Request`."""
-        if self.queue_length <= 1:
-            return super().warnings
-        length = f"queue_length {self.queue_length:.15g} is served as 1: the newest only"
-        return (*super().warnings, length)
 
 
 class Unsubscribe(_Request):

@@ -151,11 +151,7 @@ class Session:
             )
         self._subscriptions.pop(key, None)
         self._subscriptions[key] = request
-        return Reaction(
-            self._warn(request.warnings, request.id),
-            state_is_due=self._is_state(request.topic),
-            subscribed=request.topic,
-        )
+        return Reaction(state_is_due=self._is_state(request.topic), subscribed=request.topic)
 
     def _unsubscribe(self, request: Unsubscribe) -> Reaction:
         ended = [
@@ -168,23 +164,18 @@ class Session:
         if ended:
             return Reaction()
         text = f"there is no such subscription to topic {shown(request.topic)}"
-        return Reaction(self._warn((text,), request.id))
+        return Reaction((status("warning", text, request.id),))
 
     def _call_service(self, request: CallService) -> Reaction:
-        warnings = self._warn(request.warnings, request.id)
         reply = answer(request, self._names)
         if isinstance(reply, FieldCall):
-            return Reaction(warnings, field_call=reply)
-        response = service_response(request.id, request.service, reply, result=True)
-        return Reaction((*warnings, response))
+            return Reaction(field_call=reply)
+        return Reaction((service_response(request.id, request.service, reply, result=True),))
 
     def _refusal(self, refused: Refused) -> tuple[bytes, ...]:
         if refused.service is not None:
             return (service_failure(refused.id, refused.service, str(refused)),)
         return (status("error", str(refused), refused.id),)
-
-    def _warn(self, texts: tuple[str, ...], message_id: Id) -> tuple[bytes, ...]:
-        return tuple(status("warning", text, message_id) for text in texts)
 
 
 def _published(topic: str, frame: StateFrame) -> bytes:

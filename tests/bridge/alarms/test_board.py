@@ -4,8 +4,7 @@ from dataclasses import replace
 
 import pytest
 
-from lupin_bridge.alarms.board import AlarmBoard
-from lupin_bridge.alarms.ledger import Change
+from lupin_bridge.alarms.board import AlarmBoard, Change
 from tests.support.seen import Alarms, alarm
 
 A, B = alarm("a"), alarm("b", raised_ns=2)
@@ -15,11 +14,6 @@ def listening(board: AlarmBoard) -> list[Change]:
     heard: list[Change] = []
     board.subscribe(heard.append)
     return heard
-
-
-def test_it_is_empty_and_says_that_nobody_has_looked_yet() -> None:
-    now = AlarmBoard().now
-    assert (now.alarms, now.source, now.since_ns) == ((), "starting", None)
 
 
 def test_listeners_hear_of_a_change_and_find_it_made() -> None:

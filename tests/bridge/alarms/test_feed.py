@@ -9,9 +9,8 @@ from dataclasses import replace
 import pytest
 
 from lupin_bridge.alarms import feed as feed_module
-from lupin_bridge.alarms.board import AlarmBoard
+from lupin_bridge.alarms.board import AlarmBoard, Change
 from lupin_bridge.alarms.feed import AlarmFeed
-from lupin_bridge.alarms.ledger import Change
 from lupin_bridge.feed.source import TwinUnavailableError, TwinUpdate
 from lupin_bridge.judge import alarm_fold
 from lupin_bridge.judge.options import Criteria

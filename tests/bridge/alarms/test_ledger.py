@@ -6,7 +6,7 @@ from dataclasses import replace
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lupin_bridge.alarms.ledger import MAX_WORST, Change, Page, change_between, page_of
+from lupin_bridge.alarms.board import MAX_WORST, Change, Page, change_between, page_of
 from lupin_bridge.judge.alarm import Alarm
 from lupin_bridge.judge.episodes import MAX_EPISODES
 from lupin_bridge.judge.verdict import Verdict

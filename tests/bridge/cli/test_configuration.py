@@ -44,10 +44,6 @@ def refusal(
 # --- what comes first -----------------------------------------------------------------------------
 
 
-def test_nothing_given_is_the_defaults() -> None:
-    assert settings_from({}, {}) == Settings()
-
-
 def test_the_command_line_comes_before_the_environment_that_before_the_file(config: Any) -> None:
     path = config("port = 1\nmax_clients = 1\nreading_validity_s = 1\n")
     environment = {"LUPIN_PORT": "2", "LUPIN_MAX_CLIENTS": "2"}

@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from lupin_bridge.alarms.ledger import page_of
+from lupin_bridge.alarms.board import page_of
 from lupin_bridge.judge import alarm_fold, tag_log
 from lupin_bridge.judge.alarm import Alarm
 from lupin_bridge.judge.alarm_fold import Follower

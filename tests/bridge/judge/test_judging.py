@@ -327,14 +327,6 @@ def test_a_clock_that_goes_back_begins_anew() -> None:
     assert judge.holds_ns() == {"a": 15 * MINUTE}
 
 
-def test_of_a_tag_hardly_anything_waits() -> None:
-    judge = Judge(SENSORS, by_light)
-    for second in range(500):
-        at_ns = START + second * S
-        judge.see(snapshot(at_ns, tag("a", at_ns, temperature=22.0)))
-    assert len(judge._due) <= 2
-
-
 def test_what_is_judged_at_once_is_bounded_by_readings() -> None:
     """A tag of sixty sensors takes as long as ten of five."""
     many = {f"s{number}": 1.0 for number in range(59)}

@@ -8,7 +8,7 @@ import hmac
 import json
 from dataclasses import replace
 
-from lupin_bridge.alarms.ledger import Change
+from lupin_bridge.alarms.board import Change
 from lupin_bridge.judge.alarm import Alarm
 from lupin_bridge.judge.verdict import Verdict
 from lupin_bridge.notify.webhook import RESENT_NS, AlarmNews, signed

@@ -18,7 +18,7 @@ from lupin_bridge.judge.daylight import ClockDay
 from lupin_bridge.judge.derived import vapour_pressure_deficit_kpa
 from lupin_bridge.judge.options import Criteria, own_sensors
 from lupin_bridge.past.estimate import Estimated
-from lupin_bridge.past.plans import Field, Health, NoSuchTag, OneTag, Plan, WholeState
+from lupin_bridge.past.plans import Field, Health, OneTag, Plan, WholeState
 from lupin_bridge.query_string import read
 from lupin_bridge.stream import schema
 from lupin_twin.core.state import Pose, Reading, Snapshot, TagState
@@ -71,19 +71,6 @@ def field_of(house: Snapshot, field: Field, field_format: FieldFormat | None = N
 def body(plan: Plan) -> dict[str, Any]:
     found: dict[str, Any] = json.loads(bytes(plan.write(lambda: False).body))
     return found
-
-
-def test_a_state_has_its_moment_and_the_ages_of_then() -> None:
-    found = body(WholeState(None).plan(SITE))
-    schema.TwinState.model_validate(found)
-    assert found["header"] == {"stamp": {"sec": 5, "nanosec": 0}, "frame_id": "map"}
-    assert [t["stale_seconds"] for t in found["tags"]] == [4.0, 4.0]
-
-
-def test_a_tag_is_the_one_in_the_state() -> None:
-    assert body(OneTag(None, "b").plan(SITE)) == body(WholeState(None).plan(SITE))["tags"][1]
-    with pytest.raises(NoSuchTag):
-        OneTag(None, "c").plan(SITE)
 
 
 def test_a_field_is_that_of_the_tags_of_then_over_the_box_of_then() -> None:
@@ -197,22 +184,6 @@ def test_the_etag_of_a_judgement_is_that_of_what_is_said() -> None:
 # --- refusals -------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(
-    ("parameters", "message"),
-    [
-        ({"sensor_type": ""}, "sensor_type is ''"),
-        ({"resolution": 0}, "resolution"),
-        ({"scale": 2}, "only a PNG"),
-    ],
-)
-def test_what_is_wrong_by_itself_is_refused_before_anything_is_known(
-    parameters: dict[str, Any], message: str
-) -> None:
-    with pytest.raises(FieldRefused, match=message):
-        asked(**parameters).check()
-    asked().check()
-
-
 def test_what_is_too_large_by_the_tags_of_then_is_refused() -> None:
     limit = replace(RULES, max_grid_cells=40 * 30)
     field_of(SITE, asked(limit), JSON)
@@ -289,11 +260,6 @@ def test_what_changes_an_answer_changes_its_etag(
 )
 def test_another_field_has_another_etag(other: Field) -> None:
     assert not set(plans(SITE, other)[3:]) & set(plans(SITE, asked())[3:])
-
-
-def test_a_scaled_picture_is_another_one() -> None:
-    etags = {field_of(SITE, asked(scale=scale), PNG).etag for scale in (1, 2)}
-    assert len(etags) == 2
 
 
 # --- cost -----------------------------------------------------------------------------------------

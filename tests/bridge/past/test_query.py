@@ -11,7 +11,7 @@ import pytest
 from lupin_bridge.past import query
 from lupin_bridge.past.query import PeriodQuery
 from lupin_twin.core.drops import MAX_TEXT_LENGTH
-from lupin_twin.core.past import DEFAULT_POINTS, MAX_POINTS, PastRefused, SeriesRequest
+from lupin_twin.core.past import DEFAULT_POINTS, PastRefused, SeriesRequest
 
 NS = 10**9
 NOW_NS = 1_000 * NS
@@ -49,15 +49,6 @@ def test_what_is_given_is_what_is_asked() -> None:
     )
 
 
-@pytest.mark.parametrize("parse", ALL)
-def test_an_unknown_parameter_is_refused_and_the_known_ones_are_named(parse: Parse) -> None:
-    for name in ("fron", "FROM", "", "at " * 2_000, "resolution"):
-        with pytest.raises(PastRefused) as refused:
-            parse([(name, "1")], NOW_NS)
-        assert repr(name[:64]) in str(refused.value)
-        assert len(str(refused.value)) < 200
-
-
 # --- moments and periods --------------------------------------------------------------------------
 
 
@@ -90,19 +81,6 @@ def test_an_end_at_0_is_not_taken_for_now(parse: Parse) -> None:
 
 
 # --- the rest -------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("text", ["0", "5001", "-1", "1.5", "", "²", "٣", "1e2", "9" * 5_000, "x"])
-def test_points_out_of_their_range_are_refused(text: str) -> None:
-    for parse in (query.history, TIMELINE):
-        with pytest.raises(PastRefused, match=f"^points is '{text[:64]}': "):
-            ask(parse, points=text)
-
-
-@pytest.mark.parametrize("points", [1, MAX_POINTS])
-def test_both_ends_of_points_belong_to_them(points: int) -> None:
-    assert ask(query.history, points=str(points)).max_points == points
-    assert ask(TIMELINE, points=str(points)).points == points
 
 
 @pytest.mark.parametrize("parse", [query.history, TIMELINE, EXPORT])

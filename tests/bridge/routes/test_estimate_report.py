@@ -38,7 +38,7 @@ def temperature(tag_id: str, half_hours_ago: int) -> float:
 def live(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Bridge]:
     """A bridge whose twin remembers four tags of ten hours; one reads 9 K too much since two.
 
-    From a journal: of what comes scan by scan, the last would wait for the next round.
+    From a journal: a report of what comes scan by scan would serve before the last is there.
     """
     journal, begun_ns = tmp_path_factory.mktemp("journal") / "j.sqlite", now_s() * SECOND
     rows: list[Write] = [

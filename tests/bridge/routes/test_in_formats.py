@@ -53,22 +53,6 @@ def get(path: str, error: Exception | None = None, **headers: str) -> httpx.Resp
     return asyncio.run(asked())
 
 
-@pytest.mark.parametrize("field_format", formats.FORMATS, ids=lambda it: it.name)
-def test_each_format_has_a_path_and_a_media_type(field_format: FieldFormat) -> None:
-    named = get(f"/api/plants.{field_format.name}")
-    negotiated = get("/api/plants", accept=field_format.media_type)
-    assert named.text == negotiated.text == field_format.name
-    assert "vary" not in named.headers
-    assert negotiated.headers["vary"] == "Accept"
-
-
-def test_where_no_format_will_do_those_that_there_are_are_named() -> None:
-    answer = get("/api/plants", accept="text/html")
-    assert answer.status_code == 406
-    assert answer.headers["vary"] == "Accept"
-    assert all(known.media_type in answer.json()["detail"] for known in formats.FORMATS)
-
-
 @pytest.mark.parametrize(
     ("error", "status"),
     [

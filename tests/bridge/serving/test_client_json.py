@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from lupin_bridge.serving.ws_protocol import MAX_BRACKETS, MAX_MESSAGE_LENGTH, members_of, shown
+from lupin_bridge.serving.ws_protocol import MAX_BRACKETS, MAX_MESSAGE_LENGTH, members_of
 
 
 def refusal(message: str | bytes) -> str:
@@ -37,15 +37,3 @@ def test_deep_nesting_is_not_even_read(opening: str, closing: str) -> None:
     text = refusal(nested(MAX_BRACKETS))
     assert text == "the message opens 1001 brackets, the limit is 1000"
     assert "brackets" in refusal("[" * MAX_MESSAGE_LENGTH)
-
-
-@pytest.mark.parametrize(("length", "is_whole"), [(62, True), (63, False)])
-def test_a_value_is_quoted_whole_up_to_64_characters(length: int, is_whole: bool) -> None:
-    quoted = repr("x" * length)
-    assert shown("x" * length) == (quoted if is_whole else quoted[:63] + "…")
-
-
-def test_a_refusal_quotes_little_of_what_was_sent() -> None:
-    assert shown("x" * 1000) == "'" + "x" * 62 + "…"
-    assert shown("\n\x1b[31m") == "'\\n\\x1b[31m'"
-    assert (shown({"a": "secret"}), shown(["secret"])) == ("an object", "an array")

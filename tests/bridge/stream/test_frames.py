@@ -19,10 +19,8 @@ from lupin_bridge.stream import schema
 from lupin_bridge.stream.frames import (
     FrameWriter,
     StateFrame,
-    status_frame,
     text_frame,
 )
-from lupin_bridge.stream.status import Status
 from lupin_twin.core.state import Attempt, Pose, Reading, Snapshot, TagState
 from tests.support.seen import by_light
 
@@ -71,13 +69,6 @@ def test_a_frame_is_whole_and_unmasked() -> None:
         ):
             frame = received(wire)
             assert (frame.opcode, frame.fin, bytes(frame.data)) == (opcode, True, body)
-
-
-def test_a_status_frame_is_the_contracts() -> None:
-    frame = schema.StatusFrame.model_validate(
-        content(status_frame(Status("stale", 4.0))), strict=True
-    )
-    assert (frame.twin, frame.reason, frame.state_age_seconds) == ("offline", "stale", 4.0)
 
 
 def test_a_state_frame_is_the_contracts_and_carries_its_revision() -> None:

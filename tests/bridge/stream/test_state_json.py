@@ -213,17 +213,6 @@ def test_the_last_try_is_told_unless_it_was_the_last_observation() -> None:
         assert written["last_try_status"] == (tried and tried.status)
 
 
-def test_tags_that_are_gone_are_forgotten() -> None:
-    """A twin that is started anew with other tags, again and again, must not fill the memory."""
-    writer = StateJson()
-    for turn in range(5):
-        snapshot = Snapshot(S, "map", tuple(TagState(f"{turn}-{i}") for i in range(3)))
-        writer.keep_only(snapshot)
-        writer.state(snapshot)
-    writer.keep_only(snapshot)
-    assert set(writer._cache) == {"4-0", "4-1", "4-2"}
-
-
 def test_a_history_is_sorted_by_sensor_and_keeps_its_order() -> None:
     past = TagHistory(
         (

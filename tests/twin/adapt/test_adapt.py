@@ -182,9 +182,10 @@ def test_other_poses_say_where_the_robot_is_too(domain: int, config: Path, kind:
             lambda robot: robot.read(20.0, 6e307),
             "humidity is inf, must be from -inf to inf",
         ),
+        (lambda robot: robot.be_at(0.0, "m" * 250_000), "bytes, the limit is 200000"),
         (lambda robot: robot.fixed(800.0), "field value: 'Float32' object has no attribute"),
     ],
-    ids=["frame", "pose", "unit", "NaN", "clock", "overflow", "field"],
+    ids=["frame", "pose", "unit", "NaN", "clock", "overflow", "size", "field"],
 )
 def test_what_is_wrong_is_dropped_counted_and_said(
     domain: int, config: Path, do: Callable[[Robot], None], text: str
@@ -269,7 +270,7 @@ def test_check_without_a_configuration_finds_one_that_works(domain: int) -> None
             robot.be_at(0.0, "odom")
             robot.read(21.5)
             spin()
-            return sum(bool(each.messages) for each in node.heard.values()) == 3
+            return sum(bool(each.received) for each in node.heard.values()) == 3
 
         peer.until(publish, "enough to be heard")
         found = config_of(yaml.safe_load(suggestion(node)))

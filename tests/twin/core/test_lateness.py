@@ -93,7 +93,6 @@ def test_names_are_bounded_and_the_rest_is_counted_together() -> None:
     assert len(lateness.counts) == MAX_SOURCES + 1
     assert lateness.counts["robot 0"] == FEW + 1
     assert lateness.counts[OTHERS] == 2 * MAX_SOURCES * (FEW + 1)
-    assert len(lateness._streams) == MAX_SOURCES
 
 
 def runs(stamps_s: Iterable[int]) -> int:

@@ -23,7 +23,7 @@ from lupin_twin.core.notes import (
 )
 from lupin_twin.journal import follow
 from lupin_twin.journal.notes import NoteQueue, notes, number_of
-from lupin_twin.journal.schema import open_reader
+from lupin_twin.journal.schema import open_reader, open_writer
 from lupin_twin.journal.writer import Journal
 from tests.support.journal import LIMITS, NOW, opened, recording, scan, select, wait_state
 from tests.support.waiting import PATIENCE_S, wait_for
@@ -106,8 +106,9 @@ def test_an_id_of_somebody_elses_keeps_nobody_from_writing(tmp_path: Path) -> No
     path = tmp_path / "j.sqlite"
     with opened(path) as file:
         file.put_note(note("ours"))
+    with closing(open_writer(path)) as connection:
         for name in ("zz", "", "f" * 24, "\u0660" * 24):
-            file._connection.execute(
+            connection.execute(
                 "INSERT INTO note VALUES ('local', ?, 0, '', 'comment', 'site', '', NULL)", (name,)
             )
     with opened(path) as file:

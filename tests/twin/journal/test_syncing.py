@@ -46,8 +46,15 @@ def test_a_failed_sync_is_told_with_the_next_write(
     connection = open_writer(path)
     connection.execute("INSERT INTO site VALUES ('7', '')")
     syncing = Syncing(path, period_s=0.0)
-    syncing.has_written()
-    wait_for(lambda: not syncing._thread.is_alive(), "the end of the thread")
+
+    def write() -> str:
+        try:
+            syncing.has_written()
+        except OSError as error:
+            return str(error)
+        return ""
+
+    assert "Input/output error" in wait_for(write, "the error")
     with pytest.raises(OSError, match="Input/output"):
         syncing.has_written()
     syncing.close()

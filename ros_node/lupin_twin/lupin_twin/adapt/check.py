@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import suppress
-from dataclasses import dataclass
 from typing import Any, Final
 
 import yaml
@@ -20,6 +19,7 @@ from lupin_twin.adapt.messages import (
     transform_of,
 )
 from lupin_twin.adapt.node import ANY_PUBLISHER, TF_STATIC_QOS, AdaptNode
+from lupin_twin.adapt.source import Source
 from lupin_twin.adapt.table import ConfigError
 from lupin_twin.core.diagnostics import OK
 
@@ -38,21 +38,12 @@ def report(node: AdaptNode, seconds: float) -> Iterator[tuple[bool, str]]:
         yield is_right, f"{begin} {finding.name}: {finding.message}; {values}"
 
 
-@dataclass(slots=True)
-class ReceivedTopic:
-    """What came on one topic: how many, and the newest's frame, empty where it has none."""
-
-    type_name: str
-    messages: int = 0
-    frame_id: str = ""
-
-
 class Listener(Node):  # type: ignore[misc]  # rclpy is not typed
     """Hears every topic of a standard type."""
 
     def __init__(self) -> None:
         super().__init__("lupin_adapt_check")
-        self.heard: dict[str, ReceivedTopic] = {}
+        self.heard: dict[str, Source] = {}
         # Types that were seen, and why they cannot be read here.
         self.missing: dict[str, str] = {}
         self.frames = Frames()
@@ -69,16 +60,16 @@ class Listener(Node):  # type: ignore[misc]  # rclpy is not typed
         except ConfigError as error:
             self.missing[type_name] = str(error)
             return
-        heard = self.heard[topic] = ReceivedTopic(type_name)
+        heard = self.heard[topic] = Source(topic, type_name)
 
         def take(message: Any) -> None:
-            heard.messages += 1
+            heard.received += 1
             if type_name == TF_TYPE:
                 for each in message.transforms:
                     with suppress(FrameError):
                         self.frames.put(*transform_of(each, None))
             elif hasattr(message, "header"):
-                heard.frame_id = message.header.frame_id
+                heard.shown["frame_id"] = message.header.frame_id
 
         qos = TF_STATIC_QOS if topic == TF_STATIC else ANY_PUBLISHER
         self.create_subscription(kind, topic, take, qos)
@@ -90,15 +81,15 @@ def suggestion(listener: Listener) -> str:
     sensors: dict[str, Any] = {}
     for topic, heard in sorted(listener.heard.items()):
         known = STANDARD.get(heard.type_name)
-        if known is not None and heard.messages:
+        if known is not None and heard.received:
             name = known[0] or topic.rpartition("/")[2]
             entry = {"topic": topic, "type": heard.type_name}
             sensors.setdefault(name, []).append(entry)
     content: dict[str, Any] = {}
     if poses:
         heard = listener.heard[poses[0]]
-        if heard.frame_id:
-            content["frame_id"] = heard.frame_id
+        if frame_id := heard.shown.get("frame_id"):
+            content["frame_id"] = frame_id
         content["robot"] = {"topic": poses[0], "type": heard.type_name}
     elif base := next((name for name in _BASES if name in listener.frames), ""):
         content["robot"] = {"tf": base}

@@ -6,7 +6,8 @@ import argparse
 import signal
 import sys
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn
 
@@ -60,12 +61,11 @@ def run(options: argparse.Namespace, ros_args: Sequence[str]) -> int:
     from lupin_twin.adapt.table import ConfigError  # noqa: PLC0415  # see above
 
     try:
-        if options.config is None:
-            return _with_ros(ros_args, lambda: _suggest(options.seconds))
-        config = read_config(options.config)
-        if options.check:
-            return _with_ros(ros_args, lambda: _check(config, options.seconds))
-        return _with_ros(ros_args, lambda: _run(config))
+        config = None if options.config is None else read_config(options.config)
+        with _ros(ros_args):
+            if config is None:
+                return _suggest(options.seconds)
+            return _check(config, options.seconds) if options.check else _run(config)
     except ConfigError as error:
         return _refuse(str(error))
 
@@ -75,17 +75,20 @@ def command() -> NoReturn:
     exit_after(main)
 
 
-def _with_ros(ros_args: Sequence[str], role: Callable[[], int]) -> int:
-    import rclpy  # noqa: PLC0415  # see `main`
+@contextmanager
+def _ros(ros_args: Sequence[str]) -> Iterator[None]:
+    import rclpy  # noqa: PLC0415  # see `run`
     from rclpy.signals import SignalHandlerOptions  # noqa: PLC0415
+
+    from lupin_twin.adapt.table import ConfigError  # noqa: PLC0415
 
     try:
         rclpy.init(args=["adapt", *ros_args], signal_handler_options=SignalHandlerOptions.NO)
     except RuntimeError as error:  # the parent of all that rclpy raises for bad arguments
-        return _refuse(f"cannot start ROS: {error}")
+        raise ConfigError(f"cannot start ROS: {error}") from None
     remove_stale_shared_memory(rclpy.get_default_context().get_domain_id())
     try:
-        return role()
+        yield
     finally:
         rclpy.try_shutdown()
 
@@ -122,7 +125,7 @@ def _suggest(seconds: float) -> int:
     _listen(listener, seconds)
     for why in listener.missing.values():
         _say(why, sys.stderr)
-    if not any(heard.messages for heard in listener.heard.values()):
+    if not any(heard.received for heard in listener.heard.values()):
         topics = sorted(name for name, _ in listener.get_topic_names_and_types())
         return _refuse(
             f"nothing was heard that is a reading or a pose; topics: {', '.join(topics) or 'none'}"

@@ -49,7 +49,8 @@ from lupin_twin.ros.base_node import NodeUtilities, latched, qos_of, waker
 MAX_TOPIC_LENGTH: Final = 1_000
 # Matches every publisher, also those that drop messages rather than wait.
 ANY_PUBLISHER: Final = QoSProfile(depth=50, reliability=ReliabilityPolicy.BEST_EFFORT)
-MAX_MESSAGE_BYTES: Final = 1_000_000
+# One that claims as many elements as it has bytes takes 45 MB of memory before it is refused.
+MAX_MESSAGE_BYTES: Final = 200_000
 # A reading whose stamp is farther from now was stamped by a clock that is wrong.
 MAX_SKEW_S: Final = 10.0
 # Odometry comes a hundred times a second: tags are looked for as often as anybody can drive.

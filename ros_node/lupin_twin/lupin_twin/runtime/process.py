@@ -133,7 +133,7 @@ _LARGE_BYTES: Final = 1_000_000
 def return_large_blocks() -> None:
     """Have glibc give the memory of a large array back to the system as soon as it is freed.
 
-    By default it comes to keep those of up to 32 MB: a round of estimates left 50 MB behind.
+    By default it comes to keep those of up to 32 MB: an estimate left 50 MB behind.
     """
     with suppress(AttributeError, OSError):  # another C library
         ctypes.CDLL(None).mallopt(_M_MMAP_THRESHOLD, _LARGE_BYTES)

@@ -9,6 +9,7 @@ import time
 from collections import Counter
 from collections.abc import Callable, Hashable, Iterator
 from dataclasses import replace
+from functools import cached_property
 from typing import Final
 
 from lupin_bridge.alarms.board import AlarmBoard, Change
@@ -33,6 +34,7 @@ from lupin_bridge.stream.hub import Client, Hub
 from lupin_bridge.stream.robot import RobotFollower
 from lupin_bridge.stream.status import Liveness, Status
 from lupin_bridge.viewers.foxglove_session import Offer
+from lupin_bridge.viewers.rosbridge_session import Writer
 from lupin_twin.core.diagnostics import Origin
 from lupin_twin.core.drops import LATE, LOST, Reason
 from lupin_twin.core.state import NANOSECONDS_PER_SECOND, Snapshot
@@ -84,7 +86,7 @@ class Bridge:
         self.limits = limits
         self.liveness = Liveness()
         self.hub = Hub(settings.max_clients, limits.client_timeout_s, self.liveness.status)
-        self.admission = admission or Admission.of(limits)
+        self.admission = admission or Admission(limits)
         self.cache = AnswerCache() if cache is None else cache
         self.answering: Shared[Answer] = Shared()
         self.looking_back: Shared[Answered] = Shared()
@@ -167,6 +169,11 @@ class Bridge:
         self._publish_status()
 
     # --- for the routes -----------------------------------------------------------------------
+
+    @cached_property
+    def writer(self) -> Writer:
+        """Writes the messages of ROS topics for rosbridge's clients."""
+        return Writer(self.source.relay, self.source.workers)
 
     @property
     def workers(self) -> Workers:

@@ -77,10 +77,6 @@ HOSTILE: Final[dict[str, Callable[[Frame], Any]]] = {
     "no tags": lambda frame: {**frame, "state": {"header": frame["state"]["header"]}},
     "tags of null": lambda frame: {**frame, "state": {**frame["state"], "tags": [None]}},
     "no header": lambda frame: {**frame, "state": {"tags": frame["state"]["tags"]}},
-    "a tag twice": lambda frame: {
-        **frame,
-        "state": {**frame["state"], "tags": frame["state"]["tags"][:1] * 2},
-    },
     "an id that is a number": tag_with(tag_id=7),
     "no id": without("tag_id"),
     "no pose": without("pose"),
@@ -95,9 +91,7 @@ HOSTILE: Final[dict[str, Callable[[Frame], Any]]] = {
     "a species of numbers": tag_with(species=[1, 2]),
     "a footprint of holes": tag_with(box_footprint={"points": [None] * 5}),
     "a bloom nowhere": tag_with(flowers=[{"species": "rose"}]),
-    "sensors without end": tag_with(readings=[{**READING, "name": str(i)} for i in range(1_000)]),
     "blooms without end": tag_with(flowers=[{}] * 20_000),
-    "a species without end": tag_with(species="x" * 200_000),
     "tags without end": lambda frame: {
         **frame,
         "state": {**frame["state"], "tags": [{}] * 60_000},
@@ -177,7 +171,7 @@ def test_what_is_deep_beside_the_contract_does_no_harm(tapped: tuple[Hmi, Tap]) 
     hmi, tap = tapped
     frame = tap.state()
     frame["state"]["tags"][0]["more"] = "DEEP"
-    frame["seq"] += 0.5
+    frame["seq"] += 1_000
     before = len(tap.sockets)
     for _ in range(2):
         tap.say(json.dumps(frame).replace('"DEEP"', DEEP))

@@ -102,7 +102,7 @@ class Fleet:
         )
         self.criteria, self.limits = criteria, limits
         # One for all sites: what a client may ask for does not grow with them.
-        self.admission = Admission.of(limits)
+        self.admission = Admission(limits)
         self.workers = Workers("work")
 
         def make(name: str) -> Opened:

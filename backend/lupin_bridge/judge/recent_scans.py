@@ -57,9 +57,11 @@ class Recent:
         """Take in a scan; those that nothing is judged by any more go."""
         scans = {scan.stamp_ns: scan for scan in self.scans}
         scans[at_ns] = Scanned(at_ns, values, species=self.species_at(at_ns))
-        newest = sorted(scans)
-        kept = {*newest[-INTERVALS - 1 :], *(r.observed_at_ns for r in tag.readings)}
-        self.scans = tuple(scans[stamp_ns] for stamp_ns in newest if stamp_ns in kept)
+        if len(scans) > INTERVALS + 1:
+            newest = sorted(scans)[-INTERVALS - 1 :]
+            kept = {*newest, *(r.observed_at_ns for r in tag.readings)}
+            scans = {stamp_ns: scan for stamp_ns, scan in scans.items() if stamp_ns in kept}
+        self.scans = tuple(scans[stamp_ns] for stamp_ns in sorted(scans))
 
     def decide(self, at_ns: int, *, is_day: bool) -> bool:
         """It was day, or night, at the scan of that moment; whether that is another."""
@@ -133,7 +135,7 @@ class RecentScans:
                     scans.setdefault(key, {})[reading.name] = reading.value
             found.tag(tag.tag_id).see((*looks.get(tag.tag_id, ()), *_inspection_of(tag)))
         by_id = {tag.tag_id: tag for tag in tags}
-        found._take_all(
+        found.take(
             [(at_ns, by_id[name], it) for (at_ns, name), it in scans.items() if name in by_id]
         )
         return found
@@ -177,27 +179,6 @@ class RecentScans:
             else:
                 others |= self._decide_since(at_ns, all_of_it=self._light.is_day is not before)
         return others
-
-    def _take_all(self, scans: Sequence[TakenScan]) -> None:
-        """The same where none is known: each is gone through once, in the order of time."""
-        mine: dict[str, list[Scanned]] = {}
-        reported_ns: dict[str, int] = {}
-        for at_ns, group in groupby(sorted(scans, key=_in_time), key=lambda scan: scan[0]):
-            taken = list(group)
-            for _, tag, values in taken:
-                if LIGHT in values:
-                    reported_ns[tag.tag_id] = at_ns
-                    self._light.put(tag.tag_id, values[LIGHT])
-                elif at_ns - reported_ns.get(tag.tag_id, at_ns) > LEFT_OUT_NS:
-                    self._light.put(tag.tag_id, None)
-            self._newest_ns = at_ns
-            is_day = self.day(at_ns).is_day
-            for _, tag, values in taken:
-                species = self.tag(tag.tag_id).species_at(at_ns)
-                scan = Scanned(at_ns, values, is_day, species)
-                mine.setdefault(tag.tag_id, []).append(scan)
-        for tag_id, found in mine.items():
-            self.tag(tag_id).scans = tuple(found)
 
     def forget(self, tag_id: str) -> None:
         """Of a tag that is gone."""

@@ -13,14 +13,16 @@ from dataclasses import dataclass
 from datetime import datetime, time, timedelta, tzinfo
 from hashlib import blake2b
 from pathlib import Path
-from typing import Final, Protocol
+from typing import Final
 
 import orjson
 
 from lupin_bridge.feed.shared_work import end
 from lupin_bridge.feed.source import TwinUnavailableError
 from lupin_bridge.judge.options import unix_s
+from lupin_bridge.notify.mqtt import Mqtt
 from lupin_bridge.notify.source import Source
+from lupin_bridge.notify.webhook import Webhook
 from lupin_bridge.past.plans import ConditionalQuery
 from lupin_bridge.past.query import compact
 from lupin_bridge.past.report import REPORT_S, Report
@@ -53,25 +55,12 @@ class DailyTarget:
         return int(datetime.combine(day, self.at, self.zone).timestamp()) * 1_000_000_000
 
 
-class ReportChannel(Protocol):
-    """Where a report can be sent."""
-
-    @property
-    def name(self) -> str:
-        """What logs call it."""
-
-    @property
-    def called(self) -> str:
-        """Its address, which may be a secret."""
-
-    async def deliver(self, report_id: str, report: orjson.Fragment) -> bool:
-        """Send it until it is taken; False: it was given up, which is logged."""
-
-
 class DailyReport:
     """Sends by one channel. Belongs to the event loop."""
 
-    def __init__(self, target: DailyTarget, channel: ReportChannel, poll_s: float = POLL_S) -> None:
+    def __init__(
+        self, target: DailyTarget, channel: Mqtt | Webhook, poll_s: float = POLL_S
+    ) -> None:
         self._target, self._channel, self._poll_s = target, channel, poll_s
         self._why = ""
         self._task: asyncio.Task[None] | None = None

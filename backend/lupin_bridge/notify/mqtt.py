@@ -95,7 +95,7 @@ class Mqtt:
         return f"{self._target.called} {self._topics.prefix}"
 
     async def deliver(self, report_id: str, report: orjson.Fragment) -> bool:
-        """See `daily.ReportChannel`."""
+        """Send a report until it is taken; False: it was given up, which is logged."""
         end: asyncio.Future[bool] = asyncio.get_running_loop().create_future()
         payload = {"id": report_id, "report": report, "origin": self._look().origin}
         self._reports.append((orjson.dumps(payload), end))

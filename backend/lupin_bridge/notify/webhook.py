@@ -189,7 +189,7 @@ class Webhook:
         return f"{self._target.called}{self._target.path}"
 
     async def deliver(self, report_id: str, report: orjson.Fragment) -> bool:
-        """See `daily.ReportChannel`."""
+        """Send a report until it is taken; False: it was given up, which is logged."""
         end: asyncio.Future[bool] = asyncio.get_running_loop().create_future()
         self._wait(Delivery(report_id, "report", None, self._origin(), report, end))
         return await end

@@ -10,7 +10,7 @@ import asyncio
 import time
 from collections.abc import Awaitable, Callable, Coroutine, Hashable, Mapping
 from contextlib import ExitStack
-from typing import Any, Final, Protocol, TypeVar, cast
+from typing import Any, Final, TypeVar, cast
 
 import orjson
 from fastapi import APIRouter, FastAPI, Request, Response
@@ -64,12 +64,6 @@ NOT_REMEMBERED: Final[dict[int | str, dict[str, Any]]] = {
 ResultT = TypeVar("ResultT")
 ModelT = TypeVar("ModelT", bound=BaseModel)
 RouteT = TypeVar("RouteT", bound=Callable[..., Any])
-
-
-class Limited(Protocol):
-    """What answers within limits."""
-
-    limits: Limits
 
 
 def read_route(router: APIRouter, path: str, **documentation: Any) -> Callable[[RouteT], RouteT]:
@@ -246,7 +240,7 @@ async def admitted(request: Request, work: Callable[[], Awaitable[Answer | Respo
     bridge = bridge_of(request)
     with ExitStack() as held:
         held.enter_context(bridge.admission.request(client_of(request), time.monotonic()))
-        answer = await while_client_waits(request, within_time(bridge, work()))
+        answer = await while_client_waits(request, within_time(bridge.limits, work()))
         if answer is None:
             return Response(status_code=CLIENT_DISCONNECTED)
         if isinstance(answer, Response):
@@ -264,14 +258,14 @@ def not_modified(etag: str) -> Response:
     return Response(status_code=304, headers={"ETag": etag, **REVALIDATE})
 
 
-async def within_time(of: Limited, work: Awaitable[ResultT]) -> ResultT:
+async def within_time(limits: Limits, work: Awaitable[ResultT]) -> ResultT:
     """What `work` gives, within `Limits.answer_timeout_s`.
 
     Raises:
         TwinTimeoutError: it took longer; it is cancelled.
 
     """
-    limit_s = of.limits.answer_timeout_s
+    limit_s = limits.answer_timeout_s
     try:
         async with asyncio.timeout(limit_s):
             return await work

@@ -161,7 +161,7 @@ async def respond_export(
         with of.admission.request(client, time.monotonic()):
             export = held.enter_context(of.admission.export(client, time.monotonic(), evict))
             try:
-                begun = await while_client_waits(request, within_time(of, begin()))
+                begun = await while_client_waits(request, within_time(of.limits, begin()))
             except MissingPackageError as error:
                 return error_response(str(error), 501)
         if begun is None:
@@ -238,7 +238,7 @@ class ExportResponse(Response):
                 await send(_piece(part))
             # Also where that is nothing yet: its reader is not slow.
             self._export.take(len(part) or len(lot), time.monotonic())
-            lot = await within_time(self._of, anext(self._lots, None))
+            lot = await within_time(self._of.limits, anext(self._lots, None))
         end = await _written(self._of, self._kind, self._writer.end)
         await send({"type": "http.response.body", "body": end})
 

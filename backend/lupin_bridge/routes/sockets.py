@@ -41,7 +41,7 @@ from lupin_bridge.viewers import foxglove_protocol, foxglove_session
 from lupin_bridge.viewers.foxglove_protocol import SUBPROTOCOLS, Channel
 from lupin_bridge.viewers.rosbridge_protocol import service_failure, service_response
 from lupin_bridge.viewers.rosbridge_services import FieldCall
-from lupin_bridge.viewers.rosbridge_session import Feeds, Writer
+from lupin_bridge.viewers.rosbridge_session import Feeds
 from lupin_bridge.viewers.rosbridge_session import Session as RosbridgeSession
 from lupin_twin.field.engine import FieldRefused
 
@@ -255,14 +255,6 @@ async def rosbridge(websocket: WebSocket) -> None:
     await _RosbridgeConversation(websocket, bridge).run()
 
 
-def writer_of(state: Any, bridge: Bridge) -> Writer:
-    """The one writer of an application."""
-    if not hasattr(state, "rosbridge_writer"):
-        state.rosbridge_writer = Writer(bridge.source.relay, bridge.source.workers)
-    writer: Writer = state.rosbridge_writer
-    return writer
-
-
 class _RosbridgeConversation(_Conversation):
     """A roslib client: its session, and its calls under way."""
 
@@ -274,7 +266,7 @@ class _RosbridgeConversation(_Conversation):
             strict_interval=True,
             wire=lambda _client, frame: session.wire(frame),
         )
-        self._feeds = Feeds(writer_of(websocket.app.state, bridge), self._write_when_free)
+        self._feeds = Feeds(bridge.writer, self._write_when_free)
         self._calls: set[asyncio.Task[None]] = set()
         self._running = asyncio.Semaphore(MAX_RUNNING_CALLS)
 

@@ -17,7 +17,7 @@ from dataclasses import dataclass, field
 from hashlib import blake2b
 from ipaddress import IPv6Address, ip_address
 from itertools import islice
-from typing import Final, Self
+from typing import Final
 
 from lupin_bridge.rate_limit import RateLimit
 
@@ -126,20 +126,15 @@ class Export:
 class Admission:
     """The requests in flight. Belongs to the event loop."""
 
-    def __init__(self, rate_hz: float, concurrency: int, total_concurrency: int) -> None:
+    def __init__(self, limits: Limits) -> None:
         self.refused: Counter[str] = Counter()
-        self._rate_hz = rate_hz
-        self._concurrency = concurrency
-        self._rate = RateLimit(rate_hz, rate_hz * BURST_S)
+        self._limits = limits
+        self._rate = RateLimit(limits.answers_per_s, limits.answers_per_s * BURST_S)
         self.in_flight: Counter[str] = Counter()
         self._exports: dict[str, Export] = {}
-        self._computing = _Places(total_concurrency)
-        self._large = _Places(total_concurrency - total_concurrency // 4)
-
-    @classmethod
-    def of(cls, limits: Limits) -> Self:
-        """As these limits have it."""
-        return cls(limits.answers_per_s, limits.concurrency, limits.total_concurrency)
+        total = limits.total_concurrency
+        self._computing = _Places(total)
+        self._large = _Places(total - total // 4)
 
     @property
     def being_computed(self) -> int:
@@ -154,19 +149,19 @@ class Admission:
             ClientLimitError: one more than the client may have at once, or too soon.
 
         """
-        if self.in_flight[client] >= self._concurrency:
+        if self.in_flight[client] >= self._limits.concurrency:
             self.refused[IN_FLIGHT] += 1
             raise ClientLimitError(
-                f"{client} has {self._concurrency} requests for computed answers in flight, the "
-                "limit",
+                f"{client} has {self._limits.concurrency} requests for computed answers in "
+                "flight, the limit",
                 1.0,
             )
         wait_s = self._rate.take(client, now_s)
         if wait_s > 0.0:
             self.refused[RATE] += 1
             raise ClientLimitError(
-                f"{client} asks for more than {self._rate_hz:g} computed answers a second, the "
-                "limit",
+                f"{client} asks for more than {self._limits.answers_per_s:g} computed answers a "
+                "second, the limit",
                 wait_s,
             )
         self.in_flight[client] += 1

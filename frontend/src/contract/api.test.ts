@@ -1,6 +1,6 @@
 import { beforeEach, describe, expect, test, vi } from 'vitest';
 
-import { fetchHistory, fetchMap, fetchQuality, Refusal, route, stateSocketUrl } from './api';
+import { fetchHistory, fetchMap, Refusal, route, stateSocketUrl } from './api';
 
 const { signal } = new AbortController();
 
@@ -42,23 +42,15 @@ describe('refusals', () => {
   });
 });
 
-describe('an answer that is none of the contract is an error that names the field', () => {
-  test.each([
-    [fetchMap, { info: null }, 'map.info: an object, not null'],
-    [fetchMap, { info: { resolution: '0.05' } }, 'map.info.resolution: a number, not "0.05"'],
-    [
-      (s: AbortSignal) => fetchHistory('1', s),
-      {
-        tag_id: '1',
-        source: null,
-        tries: [],
-        sensors: [{ name: 'co2', values: [{ stamp: 7, value: 1 }] }],
-      },
-      'history.sensors[0].values[0].stamp: an object, not 7',
-    ],
-    [(s: AbortSignal) => fetchQuality('co2', s), [], 'quality: an object, not a list of 0'],
-  ])('%#', async (fetchIt, body, message) => {
-    vi.stubGlobal('fetch', () => Promise.resolve(Response.json(body)));
-    await expect(fetchIt(signal)).rejects.toThrow(message);
-  });
+test.each([
+  [Response.json(null), '/api/map: answered with null'],
+  [Response.json(7), '/api/map: answered with 7'],
+  [
+    new Response('<html>Sign in</html>', { headers: { 'Content-Type': 'text/html' } }),
+    '/api/map: answered with text/html',
+  ],
+])('an answer that is no object of JSON is an error that names it, %#', async (answer, message) => {
+  Object.defineProperty(answer, 'url', { value: 'http://localhost/api/map' });
+  vi.stubGlobal('fetch', () => Promise.resolve(answer));
+  await expect(fetchMap(signal)).rejects.toThrow(message);
 });

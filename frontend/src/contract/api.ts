@@ -1,8 +1,10 @@
 /** The bridge's routes. Addresses are relative to the page, so any path prefix works. */
-import { HISTORY, MAP, QUALITY, SENSORS } from './bodies';
-import type { Check } from './check';
+import { checkOf } from './check';
 import { parseNpy } from './npy';
+import type { components } from './openapi.gen';
 import type { Field, FieldQuality, OccupancyGrid, SensorsFile, TagHistory } from './types';
+
+type Schemas = components['schemas'];
 
 /** A refusal by the server, with its reason. */
 export class Refusal extends Error {
@@ -49,12 +51,26 @@ export async function ask(path: string, init: RequestInit): Promise<Response> {
   return response;
 }
 
-/** A body that has been checked: `T` is what the check makes of it. */
-export async function read<T>(name: string, check: Check, response: Response): Promise<T> {
-  const body: unknown = await response.json();
-  const fault = check(body);
-  if (fault !== null) throw new Error(name + fault);
+/** The body, an object of JSON; what a proxy in between answers is none. */
+export async function bodyOf<T>(response: Response): Promise<T> {
+  const type = response.headers.get('Content-Type') ?? 'no type';
+  const body: unknown = type.includes('json') ? await response.json() : type;
+  if (typeof body !== 'object' || body === null) {
+    const { pathname } = new URL(response.url, document.baseURI);
+    throw new Error(`${pathname}: answered with ${String(body)}`);
+  }
   return body as T;
+}
+
+/** The body, checked against the server's schema of that name. */
+export async function read<Name extends keyof Schemas>(
+  name: Name,
+  response: Response,
+): Promise<Schemas[Name]> {
+  const body = await bodyOf<Schemas[Name]>(response);
+  const fault = checkOf(name)(body);
+  if (fault !== null) throw new Error(name + fault);
+  return body;
 }
 
 /** Both kinds of refusal in the contract carry their reason in one field. */
@@ -138,12 +154,12 @@ export async function fetchQuality(
   const parts = new URLSearchParams({ sensor_type: sensor });
   if (at !== undefined) parts.set('at', at.toFixed(3));
   const response = await get(`api/field/quality?${parts.toString()}`, signal);
-  return read<FieldQuality>('quality', QUALITY, response);
+  return read('FieldQuality', response);
 }
 
 export async function fetchMap(signal: AbortSignal): Promise<OccupancyGrid> {
   const response = await get('api/map', signal);
-  return read<OccupancyGrid>('map', MAP, response);
+  return read('OccupancyGrid', response);
 }
 
 export async function fetchMapPicture(signal: AbortSignal): Promise<Blob> {
@@ -154,10 +170,10 @@ export async function fetchMapPicture(signal: AbortSignal): Promise<Blob> {
 /** The file of sensors that is in force. */
 export async function fetchSensors(signal: AbortSignal): Promise<SensorsFile> {
   const response = await get('api/sensors', signal);
-  return read<SensorsFile>('sensors', SENSORS, response);
+  return bodyOf(response);
 }
 
 export async function fetchHistory(tagId: string, signal: AbortSignal): Promise<TagHistory> {
   const response = await get(`api/tags/${encodeURIComponent(tagId)}/history`, signal);
-  return read<TagHistory>('history', HISTORY, response);
+  return read('TagHistory', response);
 }

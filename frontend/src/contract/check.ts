@@ -1,116 +1,117 @@
 /**
- * Strict checks of what comes from outside. A check says what is wrong with a value, as
+ * Checks a value against the server's own schema. A check says what is wrong, as
  * ".state.tags[3].pose: an object, not null"; null: nothing is. Nothing is put together unless
  * something is wrong, so that ten thousand tags cost milliseconds.
  */
+import schemas from './schemas.gen.json';
+
 export type Check = (value: unknown) => string | null;
 
-const SHOWN = 40;
-
-/** What a wrong value is, in short; it may be anything that JSON can say. */
-function named(value: unknown): string {
-  if (value === undefined) return 'missing';
-  if (Array.isArray(value)) return `a list of ${value.length}`;
-  if (typeof value === 'object' && value !== null) return 'an object';
-  const text = typeof value === 'number' ? String(value) : JSON.stringify(value);
-  return text.length > SHOWN ? `${text.slice(0, SHOWN)}…` : text;
+/** What the generated schemas use of JSON Schema. */
+interface Schema {
+  readonly $ref?: string;
+  readonly anyOf?: readonly Schema[];
+  readonly const?: string;
+  readonly enum?: readonly string[];
+  readonly type?: string;
+  readonly items?: Schema;
+  readonly properties?: Readonly<Record<string, Schema>>;
+  readonly required?: readonly string[];
+  readonly additionalProperties?: Schema;
 }
 
-const wrong = (wanted: string, value: unknown): string =>
-  value === undefined ? ': is missing' : `: ${wanted}, not ${named(value)}`;
+const SCHEMAS: Readonly<Record<string, Schema>> = schemas;
+const made = new Map<string, Check>();
 
-/** A finite number. JSON has no NaN, and "1e999" is infinite. */
-export const number: Check = (value) =>
-  typeof value === 'number' && Number.isFinite(value) ? null : wrong('a number', value);
+/** The check of a schema by its name. */
+export function checkOf(name: string): Check {
+  let check = made.get(name);
+  if (!check) {
+    const schema = SCHEMAS[name];
+    if (!schema) throw new Error(`no schema "${name}"`);
+    check = compiled(schema);
+    made.set(name, check);
+  }
+  return check;
+}
 
-/** A finite number, or null where it is not known. */
-export const numberOrNull: Check = (value) =>
-  value === null || (typeof value === 'number' && Number.isFinite(value))
-    ? null
-    : wrong('a number or null', value);
+function compiled(schema: Schema): Check {
+  const { $ref, anyOf, items, properties, additionalProperties } = schema;
+  if ($ref !== undefined) return checkOf($ref.slice($ref.lastIndexOf('/') + 1));
+  if (anyOf) {
+    const checks = anyOf.map(compiled);
+    return (value) =>
+      checks.some((check) => check(value) === null) ? null : (checks[0]?.(value) ?? null);
+  }
+  if (items) return list(compiled(items));
+  if (additionalProperties) return record(compiled(additionalProperties));
+  if (properties) return object(properties, schema.required ?? []);
+  return plain(schema);
+}
 
-/** A whole number from 0. */
-export const count: Check = (value) =>
-  Number.isSafeInteger(value) && (value as number) >= 0 ? null : wrong('a whole number', value);
+function plain({ type = '', ...schema }: Schema): Check {
+  const words = schema.const === undefined ? schema.enum : [schema.const];
+  if (words)
+    return (value) => (words.includes(value as string) ? null : wrong(words.join(), value));
+  return (value) => (isOf(type, value) ? null : wrong(`a value of type ${type}`, value));
+}
 
-export const integer: Check = (value) =>
-  Number.isSafeInteger(value) ? null : wrong('a whole number', value);
+function isOf(type: string, value: unknown): boolean {
+  if (type === 'null') return value === null;
+  // JSON has no NaN, and "1e999" is infinite.
+  if (type === 'number') return Number.isFinite(value);
+  if (type === 'integer') return Number.isSafeInteger(value);
+  return typeof value === type;
+}
 
-export const boolean: Check = (value) =>
-  typeof value === 'boolean' ? null : wrong('true or false', value);
-
-/** Text of at most so many characters. */
-export const text =
-  (most: number): Check =>
-  (value) => {
-    if (typeof value !== 'string') return wrong('text', value);
-    return value.length <= most ? null : `: ${value.length} characters, the limit is ${most}`;
-  };
-
-export const oneOf =
-  (...allowed: readonly string[]): Check =>
-  (value) =>
-    typeof value === 'string' && allowed.includes(value)
-      ? null
-      : wrong(`one of ${allowed.join(', ')}`, value);
-
-/** What may be missing. */
-export const optional =
-  (check: Check): Check =>
-  (value) =>
-    value === undefined ? null : check(value);
-
-export const orNull =
-  (check: Check): Check =>
-  (value) =>
-    value === null ? null : check(value);
-
-/** An object with these fields; it may have others, of a later server. */
-export function object(fields: Readonly<Record<string, Check>>): Check {
-  const entries = Object.entries(fields);
+function object(properties: Readonly<Record<string, Schema>>, required: readonly string[]): Check {
+  const fields = Object.entries(properties).map(
+    ([name, schema]) => [name, compiled(schema), required.includes(name)] as const,
+  );
   return (value) => {
-    if (typeof value !== 'object' || value === null || Array.isArray(value)) {
-      return wrong('an object', value);
-    }
-    for (const [name, check] of entries) {
-      const fault = check((value as Readonly<Record<string, unknown>>)[name]);
+    if (!isObject(value)) return wrong('an object', value);
+    for (const [name, check, isRequired] of fields) {
+      const field = value[name];
+      if (field === undefined && !isRequired) continue;
+      const fault = check(field);
       if (fault !== null) return `.${name}${fault}`;
     }
     return null;
   };
 }
 
-/** A list of at most so many; what it costs to show is bounded by what it may hold. */
-export const list =
-  (check: Check, most: number): Check =>
+const record =
+  (check: Check): Check =>
+  (value) => {
+    if (!isObject(value)) return wrong('an object', value);
+    for (const [name, item] of Object.entries(value)) {
+      const fault = check(item);
+      if (fault !== null) return `[${JSON.stringify(name).slice(0, SHOWN)}]${fault}`;
+    }
+    return null;
+  };
+
+const list =
+  (check: Check): Check =>
   (value) => {
     if (!Array.isArray(value)) return wrong('a list', value);
-    const items: readonly unknown[] = value;
-    if (items.length > most) return `: ${items.length} entries, the limit is ${most}`;
-    for (let index = 0; index < items.length; index++) {
-      const fault = check(items[index]);
+    for (let index = 0; index < value.length; index++) {
+      const fault = check(value[index]);
       if (fault !== null) return `[${index}]${fault}`;
     }
     return null;
   };
 
-/** An object of any names, at most so many. */
-export const record =
-  (check: Check, most: number): Check =>
-  (value) => {
-    const fault = object({})(value);
-    if (fault !== null) return fault;
-    const entries = Object.entries(value as object) as [string, unknown][];
-    if (entries.length > most) return `: ${entries.length} entries, the limit is ${most}`;
-    for (const [name, item] of entries) {
-      const why = check(item);
-      if (why !== null) return `[${JSON.stringify(name).slice(0, SHOWN)}]${why}`;
-    }
-    return null;
-  };
+export const isObject = (value: unknown): value is Readonly<Record<string, unknown>> =>
+  typeof value === 'object' && value !== null && !Array.isArray(value);
 
-/** Both; the second is asked only where the first has nothing to say. */
-export const also =
-  (first: Check, second: Check): Check =>
-  (value) =>
-    first(value) ?? second(value);
+const SHOWN = 40;
+
+/** The fault, with what the wrong value is in short. */
+function wrong(wanted: string, value: unknown): string {
+  if (value === undefined) return ': is missing';
+  if (Array.isArray(value)) return `: ${wanted}, not a list of ${value.length}`;
+  if (isObject(value)) return `: ${wanted}, not an object`;
+  const text = typeof value === 'number' ? String(value) : JSON.stringify(value);
+  return `: ${wanted}, not ${text.length > SHOWN ? `${text.slice(0, SHOWN)}…` : text}`;
+}

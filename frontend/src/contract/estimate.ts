@@ -1,24 +1,7 @@
 /** The routes of the estimate: a field with its error, and what the twin says of how good it is. */
 import { fieldParameters, get, numberIn, read, type FieldQuery } from './api';
-import {
-  boolean,
-  count,
-  list,
-  number,
-  numberOrNull,
-  object,
-  orNull,
-  record,
-  type Check,
-} from './check';
 import { npyOf } from './npy';
-import { MAX_SENSORS, TEXT, TIME } from './shapes';
-import type { Advice, Expected, ExpectedTags, Grade, Grades, Place } from './types';
-
-/** More than any twin keeps. */
-const MAX_TAGS = 100_000;
-/** What the server gives at most. */
-const MAX_PLACES = 20;
+import type { Expected, Grade, Place } from './types';
 
 /** As the server sends it; whatever a cell's error is, its mean is told. */
 export interface Estimate {
@@ -55,46 +38,22 @@ export async function fetchEstimate(query: FieldQuery, signal: AbortSignal): Pro
   };
 }
 
-const FORETOLD = object({ scans: count, inside: count });
-const GRADE = object({
-  fitted_at: orNull(TIME),
-  fit_problem: TEXT,
-  day: FORETOLD,
-  week: FORETOLD,
-  share_day: numberOrNull,
-  is_trusted: orNull(boolean),
-});
-
 /** null: no tag has this sensor. */
 export async function fetchGrade(sensor: string, signal: AbortSignal): Promise<Grade | null> {
-  const GRADES = object({ sensors: record(GRADE, MAX_SENSORS) });
-  const body = await read<Grades>(
-    'estimate/quality',
-    GRADES,
+  const body = await read(
+    'EstimateQualities',
     await asked('quality', { sensor_type: sensor }, signal),
   );
   return Object.hasOwn(body.sensors, sensor) ? (body.sensors[sensor] ?? null) : null;
 }
-
-const EXPECTED: Check = object({
-  measured: number,
-  expected: number,
-  expected_sd: number,
-  left_out: boolean,
-});
 
 export async function fetchExpected(
   sensor: string,
   signal: AbortSignal,
 ): Promise<Readonly<Record<string, Expected>>> {
   const response = await asked('tags', { sensor_type: sensor }, signal);
-  const TAGS = object({ tags: record(EXPECTED, MAX_TAGS) });
-  return (await read<ExpectedTags>('estimate/tags', TAGS, response)).tags;
+  return (await read('ExpectedTags', response)).tags;
 }
-
-const PLACES = object({
-  places: list(object({ x: number, y: number, error_ratio: number }), MAX_PLACES),
-});
 
 /** The best first. */
 export async function fetchAdvice(
@@ -104,7 +63,7 @@ export async function fetchAdvice(
 ): Promise<readonly Place[]> {
   const query = { sensor_type: sensor, places: String(places) };
   const response = await asked('advice', query, signal);
-  return (await read<Advice>('estimate/advice', PLACES, response)).places;
+  return (await read('Advice', response)).places;
 }
 
 const asked = (

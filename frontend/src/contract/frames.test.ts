@@ -3,9 +3,7 @@ import { describe, expect, test } from 'vitest';
 import { alarm } from '../testing/alarms';
 import { NOBODY } from '../testing/health';
 import { readings, stateFrame, wireTag } from '../testing/tags';
-import { MAX_ALARMS, MAX_FRAME_CHARS, MAX_TAGS, parseFrame } from './frames';
-import { MAX_SENSORS } from './shapes';
-import type { Frame } from './types';
+import { MAX_FRAME_CHARS, parseFrame } from './frames';
 
 const status = {
   type: 'status',
@@ -150,13 +148,16 @@ test.each([
   ['no json', 'a message that is no JSON'],
   ['{"type":"state","seq":1', 'a message that is no JSON'],
   [new ArrayBuffer(2), 'a message that is no text'],
-  ['null', 'frame: an object, not null'],
-  ['7', 'frame: an object, not 7'],
-  ['[]', 'frame: an object, not a list of 0'],
+  ['null', 'a frame without type'],
+  ['7', 'a frame without type'],
+  ['[]', 'a frame without type'],
   ['{"type":"delta"}', 'delta.seq: is missing'],
   ['{"type":"state","seq":1,"revision":"r","state":null}', 'state.state: an object, not null'],
-  ['{"type":"state","seq":1e999,"revision":"r"}', 'state.seq: a number, not Infinity'],
-  [JSON.stringify({ ...status, twin: 'well' }), 'status.twin: one of live, offline, not "well"'],
+  [
+    '{"type":"state","seq":1e999,"revision":"r"}',
+    'state.seq: a value of type integer, not Infinity',
+  ],
+  [JSON.stringify({ ...status, twin: 'well' }), 'status.twin: live,offline, not "well"'],
 ])('%s: what is wrong is named', (data, why) => {
   expect(whyBad(data)).toBe(why);
 });
@@ -166,56 +167,8 @@ test('a bad delta is known for one: what it would have changed is lost', () => {
   expect(parse({ ...full, seq: null })).toMatchObject({ kind: 'bad', isDelta: false });
 });
 
-describe('what would stop the page is refused, at the limit and one past it', () => {
-  const house = (count: number, over: object = {}): Frame =>
-    stateFrame(
-      Array.from({ length: count }, (_, index) => wireTag({ tag_id: `t${index}`, ...over })),
-    );
-  const kinds = (count: number): Record<string, number> =>
-    Object.fromEntries(Array.from({ length: count }, (_, index) => [`s${index}`, 1]));
-
-  test('tags', () => {
-    // Short ones, as the text of so many is long.
-    const tags = (count: number): string => `[${Array(count).fill('{}').join()}]`;
-    const frame = (count: number): string =>
-      `{"type":"state","seq":1,"revision":"r","state":{"header":${JSON.stringify(header)},"tags":${tags(count)}}}`;
-    expect(whyBad(frame(MAX_TAGS))).toBe('state.state.tags[0].tag_id: is missing');
-    expect(whyBad(frame(MAX_TAGS + 1))).toBe(
-      `state.state.tags: ${MAX_TAGS + 1} entries, the limit is ${MAX_TAGS}`,
-    );
-  });
-
-  test('kinds of sensors, of one tag and of all', () => {
-    const one = (count: number): unknown => house(1, { readings: readings(kinds(count)) });
-    expect(parse(one(MAX_SENSORS)).kind).toBe('frame');
-    expect(parse(one(MAX_SENSORS + 1)).kind).toBe('bad');
-    const half = readings(kinds(MAX_SENSORS));
-    const two = stateFrame([
-      wireTag({ tag_id: 'a', readings: half }),
-      wireTag({ tag_id: 'b', readings: readings({ other: 1 }) }),
-    ]);
-    expect(whyBad(JSON.stringify(two))).toBe(
-      `state.state.tags[1].readings: more than ${MAX_SENSORS} kinds of sensors`,
-    );
-  });
-
-  test('characters', () => {
-    expect(whyBad(' '.repeat(MAX_FRAME_CHARS + 1))).toMatch(/the limit is 128000000$/);
-  });
-});
-
-test('drops are told, if they are well formed', () => {
-  const drops = [{ reason: 'frame', message: 'frame odom', count: 12 }];
-  expect(parse({ ...status, drops })).toMatchObject({ kind: 'frame', frame: { drops } });
-  expect(whyBad(JSON.stringify({ ...status, drops: [{ ...drops[0], count: -1 }] }))).toBe(
-    'status.drops[0].count: a whole number, not -1',
-  );
-});
-
-test('a tag that is there twice is one too many', () => {
-  expect(whyBad(JSON.stringify(stateFrame([wireTag(), wireTag()])))).toBe(
-    'state.state.tags[1].tag_id: "1" a second time',
-  );
+test('a frame of too many characters is refused', () => {
+  expect(whyBad(' '.repeat(MAX_FRAME_CHARS + 1))).toMatch(/the limit is 128000000$/);
 });
 
 describe('alarms', () => {
@@ -224,6 +177,7 @@ describe('alarms', () => {
     alarms: [alarm('a'), alarm('b', { cleared: 950, worst: 2 })],
     source: 'journal',
     since: { sec: 1, nanosec: 0 },
+    notes: 0,
     ...over,
   });
 
@@ -235,21 +189,14 @@ describe('alarms', () => {
 
   test.each([
     [{ alarms: null }, /^alarms\.alarms: a list/],
-    [{ alarms: [{ ...alarm('a'), id: 7 }] }, /^alarms\.alarms\[0\]\.id: text/],
+    [{ alarms: [{ ...alarm('a'), id: 7 }] }, /^alarms\.alarms\[0\]\.id: a value of type string/],
     [{ alarms: [{ ...alarm('a'), reason: null }] }, /\[0\]\.reason: an object/],
-    [{ alarms: [{ ...alarm('a'), tag_id: null }] }, /\[0\]\.tag_id: text/],
+    [{ alarms: [{ ...alarm('a'), tag_id: null }] }, /\[0\]\.tag_id: a value of type string/],
     [{ alarms: [{ ...alarm('a'), raised_at: null }] }, /\[0\]\.raised_at: an object/],
     [{ alarms: [{ ...alarm('a'), cleared_at: 7 }] }, /\[0\]\.cleared_at: an object/],
-    [{ alarms: [{ ...alarm('a'), worst: '7' }] }, /\[0\]\.worst: a number or null/],
-    [{ alarms: [alarm('a'), alarm('a')] }, /\[1\]\.id: "a" a second time/],
+    [{ alarms: [{ ...alarm('a'), worst: '7' }] }, /\[0\]\.worst: a value of type number/],
     [{ since: 'ever' }, /^alarms\.since: an object/],
   ])('%j is refused', (over, why) => {
     expect(whyBad(JSON.stringify(frame(over)))).toMatch(why);
-  });
-
-  test('no more than the limit', () => {
-    const many = Array.from({ length: MAX_ALARMS + 1 }, (_, at) => alarm(String(at)));
-    expect(parse(frame({ alarms: many.slice(1) })).kind).toBe('frame');
-    expect(whyBad(JSON.stringify(frame({ alarms: many })))).toMatch(/the limit is 20000$/);
   });
 });

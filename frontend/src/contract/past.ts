@@ -1,40 +1,10 @@
 /** The routes of the past: how it was at a moment, and what happened when. Times are ROS seconds. */
 import { get, read } from './api';
-import { boolean, count, list, number, object, orNull } from './check';
 import { filledHealth, filledTag } from './filled';
-import { HEALTH, TAGS } from './frames';
-import { HEADER, TIME } from './shapes';
-import type { Judgement, Latest, Timeline, TwinState } from './types';
+import type { Latest, Timeline } from './types';
 
-/** What the server gives at most of each. */
-const MAX_POINTS = 5_000;
 /** Stamps are exact to the nanosecond, and a moment that is asked for to the millisecond. */
 const SAME_MOMENT_S = 0.0005;
-
-const STATE = object({ header: HEADER, tags: TAGS });
-const STRETCH = object({ from: TIME, to: TIME });
-
-export const TIMELINE = object({
-  from: TIME,
-  to: TIME,
-  bucket_s: number,
-  reach: orNull(STRETCH),
-  buckets: list(
-    object({
-      start: TIME,
-      scans: count,
-      failures: count,
-      looks: count,
-      pests_seen: count,
-      pests_cleared: count,
-    }),
-    MAX_POINTS,
-  ),
-  silences: list(STRETCH, MAX_POINTS),
-  runs: list(object({ from: TIME, to: TIME, is_simulated: boolean }), MAX_POINTS),
-  complete_to: orNull(TIME),
-  kept_from: orNull(TIME),
-});
 
 /** A moment as the routes read it: never with an exponent. */
 export const momentParameter = (at: number): string => Math.max(0, at).toFixed(3);
@@ -50,9 +20,9 @@ export async function fetchStateAt(at: number, signal: AbortSignal): Promise<Lat
   const [state, health] = await Promise.all([
     get(`api/state?${query}`, signal).then((it) => {
       isWhole = holdsAll(it, at);
-      return read<TwinState>('state', STATE, it);
+      return read('TwinState', it);
     }),
-    get(`api/health?${query}`, signal).then((it) => read<Judgement>('health', HEALTH, it)),
+    get(`api/health?${query}`, signal).then((it) => read('Judgement', it)),
   ]);
   const { sec, nanosec } = state.header.stamp;
   const told = sec + nanosec / 1e9;
@@ -95,5 +65,5 @@ export async function fetchTimeline(
   }
   if (tagId !== undefined) parts.set('tag_id', tagId);
   const response = await get(`api/timeline?${parts.toString()}`, signal);
-  return read<Timeline>('timeline', TIMELINE, response);
+  return read('Timeline', response);
 }

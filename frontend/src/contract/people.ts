@@ -1,18 +1,12 @@
 /** The bridge's routes for people: who is signed in, and what they say. */
 import { ask, get, read } from './api';
-import { boolean, list, object, text } from './check';
-import type { Notes, Session } from './types';
-
-/** More than the bridge sends, of notes and of characters. */
-const MOST = 10_000;
-const SESSION = object({ can_sign_out: boolean });
-const NOTES = object({ notes: list(object({ id: text(MOST), kind: text(MOST) }), MOST) });
+import type { Session } from './types';
 
 /** A header of our own: no form and no picture of another page can send one. */
 export const OWN = { 'X-Lupin-Twin': '1' };
 
 export async function fetchSession(signal: AbortSignal): Promise<Session> {
-  return read<Session>('session', SESSION, await get('api/session', signal));
+  return read('Session', await get('api/session', signal));
 }
 
 /** Ends the session, and with it the sockets that it has open. */
@@ -40,7 +34,7 @@ export async function postNote(note: Draft): Promise<void> {
 export async function withdrawNote(kind: Draft['kind'], subject: string): Promise<void> {
   const query = new URLSearchParams({ subject }).toString();
   const response = await get(`api/notes?${query}`, new AbortController().signal);
-  const { notes } = await read<Notes>('notes', NOTES, response);
+  const { notes } = await read('Notes', response);
   const note = notes.find((each) => each.kind === kind && each.withdrawn_by === null);
   if (note) {
     await ask(`api/notes/${encodeURIComponent(note.id)}`, { method: 'DELETE', headers: OWN });

@@ -3,8 +3,6 @@ import { useMemo, type JSX } from 'react';
 
 import { valuesOf, whenText, whereText, type Speech } from '../alarms/words';
 import { timeOfDay } from '../clock';
-import { boolean, count, list, object } from '../contract/check';
-import { ALARM, TEXT } from '../contract/shapes';
 import type { Alarm } from '../contract/types';
 import { secondsOf } from '../domain/rostime';
 import { LANGUAGE, S } from '../strings';
@@ -24,16 +22,9 @@ interface SiteAlarm extends Alarm {
 
 const W = VIEW_WORDS[LANGUAGE];
 
-const MOST = 200;
 /** So many names are in one address; of more, all alarms are asked for. */
 const MOST_NAMED = 50;
 const EVERY_MS = 10_000;
-
-const FIELDS = object({ site: TEXT, name: TEXT, is_live: boolean });
-const ALARMS = object({
-  alarms: list((value) => FIELDS(value) ?? ALARM(value), MOST),
-  total: count,
-});
 
 interface Props {
   readonly shown: readonly Site[];
@@ -47,12 +38,7 @@ export default function Alarms({ shown, words }: Props): JSX.Element {
   const path = named.length > 0 ? `api/alarms?sites=${named.join(',')}` : 'api/alarms';
   // Another count, another list.
   const news = having.map((site) => `${site.site} ${site.active_alarms ?? 0}`).join();
-  const { value, trouble } = useAnswer<{ alarms: readonly SiteAlarm[] }>(
-    path,
-    ALARMS,
-    EVERY_MS,
-    news,
-  );
+  const { value, trouble } = useAnswer<{ alarms: readonly SiteAlarm[] }>(path, EVERY_MS, news);
   const rows = useMemo(() => {
     const sites = new Set(shown.map(({ site }) => site));
     return value?.alarms.filter(({ site }) => sites.has(site)) ?? [];

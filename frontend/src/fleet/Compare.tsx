@@ -18,7 +18,6 @@ import { LANGUAGE, S } from '../strings';
 import type { FleetWords } from '../words/fleet';
 import { VIEW_WORDS } from '../words/fleetViews';
 import {
-  COMPARED,
   linesOf,
   MEDIAN_LOOK,
   MOST_DRAWN,
@@ -60,7 +59,7 @@ export default function Compare({ shown, words }: Props): JSX.Element {
   const hour = Math.floor(timeOfDay() / 3_600_000) * 3600;
   const { from } = periodSpan({ kind: period }, hour, null);
   const path = `api/compare?sensor_type=${encodeURIComponent(name)}&from=${from}&sites=${sites.join(',')}`;
-  const { value: found, trouble } = useAnswer<Compared>(path, COMPARED, EVERY_MS);
+  const { value: found, trouble } = useAnswer<Compared>(path, EVERY_MS);
   const drawn = useMemo(
     () => picked ?? found?.sites.slice(0, DRAWN).map(({ site }) => site) ?? [],
     [picked, found],

@@ -1,7 +1,5 @@
 /** What the server says of one sensor of several greenhouses, and the lines of its chart. Pure. */
 import type { Line } from '../charts/model';
-import { list, number, numberOrNull, object } from '../contract/check';
-import { TEXT, TIME } from '../contract/shapes';
 import { secondsOf } from '../domain/rostime';
 import type { Span } from '../domain/period';
 import type { Time } from './sites';
@@ -30,31 +28,8 @@ export interface Compared {
   readonly sites: readonly ComparedSite[];
 }
 
-const MOST_BUCKETS = 500;
 /** What the server compares at most. */
 export const MOST_SITES = 50;
-const VALUES = list(numberOrNull, MOST_BUCKETS);
-
-export const COMPARED = object({
-  sensor_type: TEXT,
-  from: TIME,
-  to: TIME,
-  bucket_s: number,
-  low: VALUES,
-  median: VALUES,
-  high: VALUES,
-  sites: list(
-    object({
-      site: TEXT,
-      name: TEXT,
-      mean: numberOrNull,
-      deviation: numberOrNull,
-      means: VALUES,
-    }),
-    MOST_SITES,
-  ),
-});
-
 /** So many lines can be told apart beside that of the median. */
 export const MOST_DRAWN = 6;
 /** The look that no greenhouse gets: grey, with dashes. */

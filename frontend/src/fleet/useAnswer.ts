@@ -1,8 +1,7 @@
 /** An answer of the server that is kept up to date while the page is looked at. */
 import { useEffect, useState } from 'react';
 
-import { get, read } from '../contract/api';
-import type { Check } from '../contract/check';
+import { bodyOf, get } from '../contract/api';
 
 export interface Fetched<T> {
   /** The last one that came; null: none yet. */
@@ -14,13 +13,8 @@ export interface Fetched<T> {
 /** What is asked for changes faster than anybody reads. */
 const SETTLE_MS = 300;
 
-/** Asks at once, when `path` or `news` is another, and every so many ms. `check` has to be one. */
-export function useAnswer<T>(
-  path: string,
-  check: Check,
-  everyMs: number,
-  news: unknown = null,
-): Fetched<T> {
+/** Asks at once, when `path` or `news` is another, and every so many ms. */
+export function useAnswer<T>(path: string, everyMs: number, news: unknown = null): Fetched<T> {
   const [fetched, setFetched] = useState<Fetched<T>>({ value: null, trouble: '' });
   useEffect(() => {
     const leaving = new AbortController();
@@ -29,7 +23,7 @@ export function useAnswer<T>(
       try {
         if (document.visibilityState === 'visible') {
           const response = await get(path, leaving.signal);
-          const value = await read<T>('answer', check, response);
+          const value = await bodyOf<T>(response);
           setFetched({ value, trouble: '' });
         }
       } catch (error) {
@@ -44,6 +38,6 @@ export function useAnswer<T>(
       clearTimeout(timer);
       leaving.abort();
     };
-  }, [path, check, everyMs, news]);
+  }, [path, everyMs, news]);
   return fetched;
 }

@@ -2,7 +2,6 @@
 import { useMemo } from 'react';
 
 import type { Speech } from '../alarms/words';
-import { SENSORS } from '../contract/bodies';
 import type { SensorsFile } from '../contract/types';
 import { cataloguesOf, NO_CATALOGUES } from '../domain/sensors';
 import { openStorage, readSettings } from '../store/settings';
@@ -11,7 +10,7 @@ import { useAnswer } from './useAnswer';
 const EVERY_MS = 600_000;
 
 export function useSpeech(): Speech {
-  const file = useAnswer<SensorsFile>('api/sensors', SENSORS, EVERY_MS).value;
+  const file = useAnswer<SensorsFile>('api/sensors', EVERY_MS).value;
   return useMemo(
     () => ({
       sensors: (file ? cataloguesOf(file) : NO_CATALOGUES).day,

@@ -1,7 +1,8 @@
 /** What the robot has said, checked; how old it is by the twin's time; where it has been. */
 import { useEffect, useState } from 'react';
 
-import { ROBOT_FRAME, fetchRobot } from '../contract/robot';
+import { checkOf } from '../contract/check';
+import { fetchRobot } from '../contract/robot';
 import type { Unread } from '../contract/frames';
 import type { Robot, RobotNow, WireTime } from '../contract/types';
 import { ageSeconds } from '../domain/age';
@@ -23,7 +24,7 @@ interface Checked {
 }
 
 const read = memoOne((frame: Unread): Checked => {
-  const fault = ROBOT_FRAME(frame);
+  const fault = checkOf('RobotFrame')(frame);
   return { robot: fault === null ? (frame as Unread & RobotNow) : NOTHING, fault };
 });
 const NOT_YET: Checked = { robot: NOTHING, fault: null };

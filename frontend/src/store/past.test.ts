@@ -27,7 +27,10 @@ const usual = (path: string, at: number): Response => {
   if (path.endsWith('field.npy')) return npyField([at, at]);
   if (path.endsWith('estimate.npy')) return npyEstimate([at], [0.5]);
   if (path.endsWith('quality')) {
-    return Response.json({ sensor_type: 'temperature', rmse: at, worst: null });
+    return Response.json({
+      ...{ sensor_type: 'temperature', unit: '°C', rmse: at, worst: null },
+      ...{ sample_count: 1, judged_count: 1, painted_share: 1, far_off_tags: [] },
+    });
   }
   if (path.endsWith('health')) return Response.json(judgement({ 1: [reason({ value: at })] }));
   const tag = wireTag({ readings: readings({ temperature: at }) });

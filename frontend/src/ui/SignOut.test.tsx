@@ -19,10 +19,15 @@ const server = (session: unknown, status = 204): string[] => {
   return asked;
 };
 
+const SESSION = {
+  ...{ can_sign_out: true, seconds_left: 60 },
+  ...{ name: null, role: 'viewer', can_write_notes: false },
+};
+
 const Toast = (): string => useSelected(toast, (text) => text);
 
 test('a session can be ended, and the page leaves', async () => {
-  const asked = server({ can_sign_out: true, seconds_left: 60 });
+  const asked = server(SESSION);
   const [close, leave] = [vi.fn(), vi.fn<(url: URL) => void>()];
   render(<SignOut close={close} leave={leave} />);
   fireEvent.click(await screen.findByRole('button', { name: 'Sign out' }));
@@ -34,7 +39,7 @@ test('a session can be ended, and the page leaves', async () => {
 });
 
 test('one that cannot be ended is said to go on', async () => {
-  server({ can_sign_out: true, seconds_left: 60 }, 403);
+  server(SESSION, 403);
   const leave = vi.fn();
   render(
     <>

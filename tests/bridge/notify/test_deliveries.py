@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-import base64
-import hashlib
-import hmac
-import json
 from dataclasses import replace
 
 from lupin_bridge.alarms.board import Change
 from lupin_bridge.judge.alarm import Alarm
 from lupin_bridge.judge.verdict import Verdict
-from lupin_bridge.notify.webhook import RESENT_NS, AlarmNews, signed
+from lupin_bridge.notify.webhook import RESENT_NS, AlarmNews
 from tests.support.seen import NOW_NS, S, alarm
 
 
@@ -81,31 +77,3 @@ def test_where_no_time_is_known_the_newest_alarm_says_what_day_it_is() -> None:
     old, new = alarm("old", raised_ns=1, cleared_ns=2), alarm("new", raised_ns=NOW_NS)
     found = news.of(Change((old, new), is_past=True), None, "robot")
     assert [getattr(it.alarm, "tag_id", None) for it in found] == ["new"]
-
-
-def test_a_body_is_the_alarm_as_the_web_contract_has_it() -> None:
-    (first,) = AlarmNews().of(Change((alarm("a/ä"),)), NOW_NS, "robot")
-    body = json.loads(first.body(0, "robot"))
-    assert (body["id"], body["change"], body["lost"]) == (first.id, "raised", 0)
-    assert body["alarm"]["tag_id"] == "a/ä"
-    assert body["alarm"]["reason"]["limit"] == 10.0
-    assert first.id.isascii()
-
-
-def test_the_signature_is_that_of_standard_webhooks() -> None:
-    headers = signed(b"a secret of 20 chars", "an id", 1_795_270_500, b'{"id":1}')
-    mac = hmac.new(b"a secret of 20 chars", b'an id.1795270500.{"id":1}', hashlib.sha256)
-    assert headers == {
-        "webhook-id": "an id",
-        "webhook-timestamp": "1795270500",
-        "webhook-signature": "v1," + base64.b64encode(mac.digest()).decode(),
-    }
-
-
-def test_a_change_says_where_it_came_from_when_it_was_heard_or_if_that_is_not_known_now() -> None:
-    news = AlarmNews()
-    (robot,) = news.of(Change((alarm("a"),)), NOW_NS, "robot")
-    (unknown,) = news.of(Change((alarm("b"),)), NOW_NS, "unknown")
-    said = [json.loads(it.body(0, "recorded"))["origin"] for it in (robot, unknown)]
-    assert said == ["robot", "recorded"]
-    assert json.loads(unknown.body(0, "unknown"))["origin"] == "unknown"

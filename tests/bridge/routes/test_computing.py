@@ -184,7 +184,7 @@ def test_work_that_asks_no_twin_has_as_long_and_is_given_up() -> None:
         work = asyncio.create_task(asyncio.Event().wait())
         text = r"the answer was not there within 0\.1 s"
         with pytest.raises(TwinTimeoutError, match=text):
-            await within_time(bridge, work)
+            await within_time(bridge.limits, work)
         assert work.cancelled()
 
     asyncio.run(test())
@@ -252,8 +252,6 @@ def test_the_state_is_written_a_few_times_a_second_and_never_old(
             most = states + (loop.time() - began_s) / AGES_HOLD_S + 1
             # The frames' own of each state beside the answers.
             assert len(written) <= most + states
-            entries = [key for key in it.bridge.cache._entries if "state" in str(key)]
-            assert len(entries) == 1, "the ones before have gone"
             pose = Pose(1.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0)
             new = Scan("new", 1, (), pose)
 
@@ -295,12 +293,6 @@ def test_a_hundred_readers_of_a_map_that_do_not_read_hold_one_picture_and_two_pi
             assert size > 2_000_000
             for _ in range(100):
                 stack.enter_context(deaf_client(it.url, "/api/map.png"))
-            (entry,) = [
-                entry
-                for entry in it.bridge.cache._entries.values()
-                if entry.answer.media_type == "image/png"
-            ]
-            await until(lambda: entry.readers == 100, "all of them to be answered")
             server = it.server.server_state.connections
             await until(
                 lambda: sum(c.transport.get_write_buffer_size() > 0 for c in server) == 100,

@@ -39,7 +39,7 @@ COMPUTED = ("/api/state", "/api/history?tag_id=1&sensor_type=co2", "/metrics", "
 
 
 def test_a_client_has_its_number_in_flight_and_the_next_is_refused_by_name() -> None:
-    admission = Admission(rate_hz=1000.0, concurrency=2, total_concurrency=10)
+    admission = Admission(Limits(answers_per_s=1000.0, concurrency=2, total_concurrency=10))
     with admission.request("a", 0.0):
         with admission.request("a", 0.0), admission.request("b", 0.0):
             with pytest.raises(ClientLimitError) as refused, admission.request("a", 0.0):
@@ -53,7 +53,7 @@ def test_a_client_has_its_number_in_flight_and_the_next_is_refused_by_name() -> 
 
 
 def test_a_request_that_fails_gives_its_place_back() -> None:
-    admission = Admission(rate_hz=1000.0, concurrency=1, total_concurrency=1)
+    admission = Admission(Limits(answers_per_s=1000.0, concurrency=1, total_concurrency=1))
     for _ in range(3):
         with (
             pytest.raises(ZeroDivisionError),
@@ -66,7 +66,7 @@ def test_a_request_that_fails_gives_its_place_back() -> None:
 def admitted(rate_hz: float, seconds: float) -> int:
     """How many requests of a client get in that come evenly, by the limits as they are set."""
     limits = Limits()
-    admission = Admission(limits.answers_per_s, limits.concurrency, limits.total_concurrency)
+    admission = Admission(limits)
     count = 0
     for number in range(round(rate_hz * seconds)):
         with suppress(ClientLimitError), admission.request("page", number / rate_hz):
@@ -83,7 +83,7 @@ def test_a_page_that_is_dragged_through_the_past_is_let_in_and_a_flood_is_not() 
 
 
 def test_a_client_has_one_export_at_a_time_and_all_together_have_few() -> None:
-    admission = Admission(rate_hz=1000.0, concurrency=9, total_concurrency=9)
+    admission = Admission(Limits(answers_per_s=1000.0, concurrency=9, total_concurrency=9))
     with ExitStack() as running_:
         running_.enter_context(admission.export("a", 0.0, pytest.fail))
         with pytest.raises(ClientLimitError, match="a has 1 export under way, the limit") as more:
@@ -101,7 +101,7 @@ def test_a_client_has_one_export_at_a_time_and_all_together_have_few() -> None:
 
 
 def test_the_slowest_export_makes_place_and_who_takes_enough_does_not() -> None:
-    admission = Admission(rate_hz=1000.0, concurrency=9, total_concurrency=9)
+    admission = Admission(Limits(answers_per_s=1000.0, concurrency=9, total_concurrency=9))
     ended: list[str] = []
     with ExitStack() as taken:
 
@@ -125,7 +125,7 @@ def test_the_slowest_export_makes_place_and_who_takes_enough_does_not() -> None:
 
 
 def test_a_client_has_its_rate_and_is_told_when_to_come_back() -> None:
-    admission = Admission(rate_hz=0.5, concurrency=9, total_concurrency=9)
+    admission = Admission(Limits(answers_per_s=0.5, concurrency=9, total_concurrency=9))
     with admission.request("a", 0.0):
         pass
     with pytest.raises(ClientLimitError) as refused, admission.request("a", 0.25):
@@ -138,7 +138,7 @@ def test_a_client_has_its_rate_and_is_told_when_to_come_back() -> None:
 
 
 def test_a_request_refused_for_its_number_costs_no_turn() -> None:
-    admission = Admission(rate_hz=1.0, concurrency=1, total_concurrency=9)
+    admission = Admission(Limits(answers_per_s=1.0, concurrency=1, total_concurrency=9))
     with admission.request("a", 0.0):
         for _ in range(100):
             with pytest.raises(ClientLimitError, match="in flight"), admission.request("a", 0.0):
@@ -148,7 +148,7 @@ def test_a_request_refused_for_its_number_costs_no_turn() -> None:
 
 
 def test_all_together_have_a_number_too() -> None:
-    admission = Admission(rate_hz=1.0, concurrency=1, total_concurrency=2)
+    admission = Admission(Limits(answers_per_s=1.0, concurrency=1, total_concurrency=2))
     with admission.computing("a"):
         with (
             admission.computing("b"),
@@ -165,7 +165,7 @@ def test_all_together_have_a_number_too() -> None:
 
 
 def test_large_computations_leave_a_quarter_of_the_places_to_small_ones() -> None:
-    admission = Admission(rate_hz=1.0, concurrency=1, total_concurrency=8)
+    admission = Admission(Limits(answers_per_s=1.0, concurrency=1, total_concurrency=8))
     with ExitStack() as taken:
         for client in range(6):
             taken.enter_context(admission.computing(str(client), is_large=True))
@@ -186,7 +186,7 @@ def test_large_computations_leave_a_quarter_of_the_places_to_small_ones() -> Non
 
 @pytest.mark.parametrize("total", [1, 2, 3])
 def test_few_places_are_for_large_computations_too(total: int) -> None:
-    admission = Admission(rate_hz=1.0, concurrency=1, total_concurrency=total)
+    admission = Admission(Limits(answers_per_s=1.0, concurrency=1, total_concurrency=total))
     with ExitStack() as taken:
         for client in range(total):
             taken.enter_context(admission.computing(str(client), is_large=True))
@@ -195,7 +195,7 @@ def test_few_places_are_for_large_computations_too(total: int) -> None:
 @pytest.mark.parametrize("is_large", [False, True])
 def test_of_six_clients_that_ask_for_all_they_may_each_has_a_place(is_large: bool) -> None:
     limits = Limits()
-    admission = Admission(limits.answers_per_s, limits.concurrency, limits.total_concurrency)
+    admission = Admission(limits)
     places: Counter[str] = Counter()
     with ExitStack() as taken:
         for client in "abcdef":
@@ -209,7 +209,7 @@ def test_of_six_clients_that_ask_for_all_they_may_each_has_a_place(is_large: boo
 
 
 def test_clients_that_are_gone_leave_nothing_behind() -> None:
-    admission = Admission(rate_hz=1000.0, concurrency=1, total_concurrency=1)
+    admission = Admission(Limits(answers_per_s=1000.0, concurrency=1, total_concurrency=1))
     for number in range(100):
         with admission.request(f"client {number}", 0.0):
             assert len(admission.in_flight) == 1

@@ -37,11 +37,6 @@ def test_a_message_stays_the_same_and_no_piece_is_larger_than_the_limit(more: in
         assert [frame.fin for frame in frames] == [*[False] * (len(frames) - 1), True]
 
 
-def test_a_small_message_stays_one_frame() -> None:
-    for size in (0, 125, 126, PIECE_BYTES - 10):
-        assert wire(text_frame(b"x" * size)) == text_frame(b"x" * size)
-
-
 def test_between_two_pieces_there_is_room_for_a_ping() -> None:
     row = pieces(frame_head(BINARY, 200_000) + bytes(200_000))
     first, *others = (head + bytes(payload) for head, payload in row)

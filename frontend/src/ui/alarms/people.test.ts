@@ -56,7 +56,10 @@ beforeEach(() => {
   asked = [];
   status = 201;
   own.dispatch(NOTHING_KEPT);
-  const note = { id: 'n1', kind: 'acknowledge', withdrawn_by: null };
+  const note = {
+    ...{ id: 'n1', kind: 'acknowledge', subject: 'alarm:cold', text: '', until: null },
+    ...{ made_at: { sec: 1, nanosec: 0 }, by: 'anna', withdrawn_by: null, withdrawn_at: null },
+  };
   vi.stubGlobal('fetch', (url: URL, { method = 'GET', body }: RequestInit) => {
     const path = `${url.pathname}${url.search}`;
     asked.push({ method, path, body: typeof body === 'string' ? JSON.parse(body) : null });
@@ -64,6 +67,7 @@ beforeEach(() => {
       return Promise.resolve(
         Response.json({
           can_sign_out: true,
+          seconds_left: null,
           name: 'anna',
           role: 'operator',
           can_write_notes: true,

@@ -79,12 +79,6 @@ def test_so_many_subscriptions_and_no_more(stage: Stage) -> None:
     assert stage.subscribe((199, 199)).begun
 
 
-def test_a_refusal_is_told_and_changes_nothing(stage: Stage) -> None:
-    expected = "refused: lupin-twin only reads, expected subscribe or unsubscribe"
-    assert errors(stage.say(op="advertise")) == [f"advertise is {expected}"]
-    assert errors(stage.session.receive(b"\x01")) == [f"a binary message is {expected}"]
-
-
 def test_the_newest_of_each_subscription_waits_and_each_has_its_turn(stage: Stage) -> None:
     stage.subscribe((1, 10), (2, 20))
     for key, payload in ((1, b"a"), (2, b"b"), (1, b"c"), (9, b"nobody")):
@@ -135,11 +129,6 @@ def test_channels_that_come_and_go_are_told_and_their_subscriptions_end(stage: S
     assert stage.session.has(1, now[300])
     assert not stage.session.has(1, CHANNELS[10]), "the id is another channel's now"
     assert stage.session.offer(now, WIRES) == Reaction()
-
-
-def test_a_client_is_told_of_the_channels_although_there_are_none() -> None:
-    [reply] = Session(Counts()).offer({}, {}).replies
-    assert json.loads(reply) == {"op": "advertise", "channels": []}
 
 
 def test_a_subscription_that_cannot_be_served_is_given_up(stage: Stage) -> None:

@@ -7,8 +7,6 @@ from dataclasses import replace
 from typing import Any
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 from websockets.client import ClientProtocol
 from websockets.protocol import State
 from websockets.uri import parse_uri
@@ -137,15 +135,6 @@ def test_other_topics_are_fed_as_their_last_subscription_wants_it(session: Sessi
 # --- the state on the wire --------------------------------------------------------------------
 
 
-def test_a_state_is_written_once_for_all_clients() -> None:
-    state, sessions = frame("7"), [Session(NAMES) for _ in range(3)]
-    for session in sessions:
-        subscribe(session, "a")
-        subscribe(session, "b")
-    wires = [session.wire(state) for session in sessions]
-    assert wires[0] is wires[1] is wires[2]
-
-
 def test_a_topic_is_called_what_the_client_calls_it(session: Session) -> None:
     subscribe(session, topic="twin/state")
     subscribe(session, "a", topic="twin/state")
@@ -186,31 +175,3 @@ def test_an_id_of_another_kind_is_refused_and_not_repeated(
     [reply] = replies(send(session, op="unsubscribe", topic=TOPIC, id=message_id))
     assert reply["msg"].startswith("id is ")
     assert "id" not in reply
-
-
-# --- anything at all --------------------------------------------------------------------------
-
-STEPS = st.lists(
-    st.tuples(
-        st.sampled_from(["subscribe", "unsubscribe"]),
-        st.sampled_from([None, "a", "b", 1, "1"]),
-        st.sampled_from([0, 50, 1000]),
-    ),
-    max_size=30,
-)
-
-
-@given(STEPS)
-def test_subscriptions_are_as_a_plain_account_of_them(steps: list[tuple[str, Any, int]]) -> None:
-    session, account = Session(NAMES), dict[object, int]()
-    for op, message_id, rate in steps:
-        if op == "subscribe":
-            subscribe(session, message_id, throttle_rate=rate)
-            account[message_id] = rate
-        else:
-            unsubscribe(session, message_id)
-            account = (
-                {} if message_id is None else {k: v for k, v in account.items() if k != message_id}
-            )
-        assert session.is_subscribed == bool(account)
-        assert session.min_interval_s == min(account.values(), default=0) / 1000

@@ -14,7 +14,6 @@ import base64
 import logging
 import socket
 import time
-from collections import OrderedDict
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from ipaddress import ip_address
@@ -35,6 +34,7 @@ from lupin_bridge.notify.destinations import Endpoint, PushTarget
 from lupin_bridge.notify.http_post import PostError, post
 from lupin_bridge.notify.retry import Backoff, Condition, until_taken
 from lupin_bridge.notify.source import Source
+from lupin_bridge.notify.webhook import AlarmNews
 from lupin_bridge.past.report_page import push_text
 from lupin_bridge.serving.admission import AdmissionError
 from lupin_bridge.stream.health_json import alarm_json
@@ -55,8 +55,6 @@ FIRST_WAIT_S: Final = 2.0
 MOST_WAIT_S: Final = 60.0
 # Posts at once, to however many browsers.
 AT_ONCE: Final = 8
-# Alarms that were notified; far more than are active at once.
-MAX_KNOWN: Final = 20_000
 _GONE: Final = (404, 410)
 _KEY: Final = "vapid"
 
@@ -78,8 +76,8 @@ class Push:
         self.condition = Condition(is_connected=True)
         self.target, self._people, self._site = target, people, site
         self._vapid: Vapid02 | None = None
-        self._known: OrderedDict[str, None] = OrderedDict()
-        self._new: list[Alarm] = []
+        self._news = AlarmNews()
+        self._new: dict[str, Alarm] = {}
         self._is_news = asyncio.Event()
         self._task: asyncio.Task[None] | None = None
         self._unsubscribe: Callable[[], None] = lambda: None
@@ -116,16 +114,12 @@ class Push:
         """Notify of critical alarms from now on."""
 
         def receive(change: Change) -> None:
-            for alarm in change.changed:
-                if not alarm.is_active or alarm.reason.verdict is not Verdict.CRITICAL:
-                    continue
-                is_known = alarm.id in self._known
-                self._known[alarm.id] = None
-                if len(self._known) > MAX_KNOWN:
-                    self._known.popitem(last=False)
-                # At the start they are not new.
-                if not is_known and not change.is_past:
-                    self._new.append(alarm)
+            for news in self._news.of(change, source.ros_time_ns, source.origin):
+                alarm = news.alarm
+                if alarm is None or news.change not in ("raised", "worse") or change.is_past:
+                    continue  # at the start they are not new
+                if alarm.reason.verdict is Verdict.CRITICAL:
+                    self._new[alarm.id] = alarm
                     self._is_news.set()
 
         receive(Change(source.alarms.now.active, is_past=True))
@@ -142,7 +136,7 @@ class Push:
             await self._is_news.wait()
             await asyncio.sleep(TOGETHER_S)
             self._is_news.clear()
-            new, self._new = self._new, []
+            new, self._new = list(self._new.values()), {}
             notes = source.notes.notes or ()
             said = notes_of_alarms(source.alarms.now.alarms, notes, source.ros_time_ns)
             new = [alarm for alarm in new if said.get(alarm.id, NOTHING_SAID).shelved is None]

@@ -9,9 +9,9 @@ from __future__ import annotations
 
 from bisect import bisect_right
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from datetime import datetime, time, tzinfo
+from datetime import datetime, time, timedelta, tzinfo
 from typing import Final, Literal
 
 # The sensor that tells, by its name.
@@ -49,6 +49,22 @@ class ClockDay:
         if self.begins < self.ends:
             return self.begins <= wall < self.ends
         return wall >= self.begins or wall < self.ends
+
+    def nights(self, from_s: float, to_s: float) -> Iterator[tuple[float, float]]:
+        """The nights that meet a period, from when to when, Unix time, oldest first."""
+        if self.begins == self.ends:
+            return
+        # A day that ends after midnight is followed by a dawn of the same date.
+        later = timedelta(days=self.begins < self.ends)
+        evening = datetime.fromtimestamp(from_s, self.zone).date() - timedelta(days=1)
+        while True:
+            dusk_s = datetime.combine(evening, self.ends, self.zone).timestamp()
+            dawn_s = datetime.combine(evening + later, self.begins, self.zone).timestamp()
+            if dusk_s >= to_s:
+                return
+            if dawn_s > from_s:
+                yield dusk_s, dawn_s
+            evening += timedelta(days=1)
 
     def number(self, now_s: float) -> int:
         """Which day it is, counted from dawn to dawn."""

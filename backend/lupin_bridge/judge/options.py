@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import time, tzinfo
 from importlib.resources import files
@@ -47,6 +48,14 @@ class Criteria:
     def is_day(self, stamp_ns: int) -> bool:
         """Whether it was day by the clock alone."""
         return self.day(None, stamp_ns).is_day
+
+    def nights(self, start_ns: int, end_ns: int) -> Sequence[tuple[int, int]] | None:
+        """The nights by the clock that meet a period; None: simulated, or very long."""
+        from_s, to_s = unix_s(start_ns), unix_s(end_ns)
+        if from_s is None or to_s is None or to_s - from_s > _LONGEST_S:
+            return None
+        nights = self.clock.nights(from_s, to_s)
+        return [(round(dusk_s * 1e9), round(dawn_s * 1e9)) for dusk_s, dawn_s in nights]
 
     def day_number(self, stamp_ns: int) -> int:
         """Which day it was by the clock, from dawn to dawn; a simulation's are of 24 hours."""
@@ -111,5 +120,7 @@ def unix_s(stamp_ns: int) -> float | None:
     return seconds if seconds > _OLDEST_S else None
 
 
+# Nights of a longer period are narrower than a line.
+_LONGEST_S: Final = 400 * 86_400
 # No robot drove before; simulations begin at 0.
 _OLDEST_S: Final = 1.4e9

@@ -88,7 +88,7 @@ def _completeness_headers(until_ns: int | None, since_ns: int | None) -> dict[st
 # A gap is longer than so many usual intervals between two readings.
 USUAL_INTERVALS: Final = 3
 
-Stretches = list[tuple[int, int]]
+Stretches = Sequence[tuple[int, int]]
 
 
 def history_body(
@@ -97,6 +97,8 @@ def history_body(
     now_ns: int | None,
     sensors: Sensors,
     journal: Condition = UNKNOWN,
+    *,
+    nights: Stretches | None = None,
 ) -> dict[str, Any]:
     """`schema.History`; no gap reaches past `now_ns`, or into what is not written yet."""
     known = [at_ns for at_ns in (now_ns, journal.complete_ns) if at_ns is not None]
@@ -121,6 +123,7 @@ def history_body(
         if past.is_bucketed
         else [],
         "gaps": [stretch(*gap) for gap in gaps(past, now_ns)] if request.event is None else [],
+        "nights": None if nights is None else [stretch(*night) for night in nights],
         **period_fields(journal, past.start_ns, past.end_ns),
     }
 

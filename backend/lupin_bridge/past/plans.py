@@ -363,8 +363,11 @@ class History:
         """See `Query`."""
         sensors = self.criteria.sensors
         past = derived.series(self.request, sensors, self.criteria.is_day, find)
+        nights = self.criteria.nights(past.start_ns, past.end_ns)
         return of_content(
-            bodies.history_body(self.request, past, self.now_ns, sensors, self.journal)
+            bodies.history_body(
+                self.request, past, self.now_ns, sensors, self.journal, nights=nights
+            )
         )
 
 

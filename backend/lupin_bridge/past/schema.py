@@ -45,6 +45,9 @@ class History(Stretch):
     gaps: list[Stretch] = Field(
         description="no reading for longer than three times what is usual here: draw no line"
     )
+    nights: list[Stretch] | None = Field(
+        description="nights by the clock that meet it; null: simulated time, or over 400 days"
+    )
     complete_to: Time | None = _COMPLETE_TO
     kept_from: Time | None = _KEPT_FROM
 

@@ -1,7 +1,7 @@
 import { useMemo, useRef, type JSX } from 'react';
 
 import { act, useApp } from '../store/app';
-import { selectCatalogue } from '../store/derived';
+import { selectCatalogue, selectCatalogues } from '../store/derived';
 import { S } from '../strings';
 import { Icon } from '../widgets/Icon';
 import { modelOf, pairsOf } from './charted';
@@ -20,6 +20,7 @@ export default function CardChart({ tagId }: { tagId: string }): JSX.Element | n
   const unit = useApp((state) => state.settings.unit);
   const moment = useApp((state) => state.view.moment);
   const catalogue = useApp(selectCatalogue);
+  const both = useApp(selectCatalogues);
   const sensors = useSensorsOf(tagId);
   const sensor = sensors.includes(inView) ? inView : sensors[0];
   const place = useRef<HTMLDivElement>(null);
@@ -31,8 +32,8 @@ export default function CardChart({ tagId }: { tagId: string }): JSX.Element | n
   const pairs = useMemo(() => (plan ? pairsOf([plan]) : []), [plan]);
   const { fed, span } = useFeed(pairs, pointsFor(width));
   const model = useMemo(
-    () => (plan && span ? modelOf(catalogue, plan, fed, span, unit, moment) : null),
-    [catalogue, plan, fed, span, unit, moment],
+    () => (plan && span ? modelOf(catalogue, both, plan, fed, span, unit, moment) : null),
+    [catalogue, both, plan, fed, span, unit, moment],
   );
   if (!plan) return null;
   return (

@@ -2,7 +2,7 @@ import { useMemo, useRef, useState, type JSX } from 'react';
 
 import { now } from '../clock';
 import { act, store, useApp } from '../store/app';
-import { selectCatalogue } from '../store/derived';
+import { selectCatalogue, selectCatalogues } from '../store/derived';
 import { rosNow } from '../store/moment';
 import type { Charted } from '../store/view';
 import { S } from '../strings';
@@ -31,6 +31,7 @@ export default function ChartView({ charted }: { charted: Charted }): JSX.Elemen
   const unit = useApp((state) => state.settings.unit);
   const moment = useApp((state) => state.view.moment);
   const catalogue = useApp(selectCatalogue);
+  const both = useApp(selectCatalogues);
   const isZoomed = useZoomed();
   const [isTable, setTable] = useState(false);
   const body = useRef<HTMLDivElement>(null);
@@ -42,8 +43,9 @@ export default function ChartView({ charted }: { charted: Charted }): JSX.Elemen
   const pairs = useMemo(() => pairsOf(plans), [plans]);
   const { fed, span } = useFeed(pairs, pointsFor(size.width));
   const models = useMemo(
-    () => (span ? plans.map((plan) => modelOf(catalogue, plan, fed, span, unit, moment)) : []),
-    [catalogue, plans, fed, span, unit, moment],
+    () =>
+      span ? plans.map((plan) => modelOf(catalogue, both, plan, fed, span, unit, moment)) : [],
+    [catalogue, both, plans, fed, span, unit, moment],
   );
   const withLines = models.filter(({ lines }) => lines.length > 0);
   const around = AROUND + (charted.by === 'sensor' ? LEGEND : 0);

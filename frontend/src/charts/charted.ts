@@ -1,12 +1,12 @@
 /** From what is chosen to the charts that it makes. Pure. */
 import type { Span } from '../domain/period';
-import type { Catalogue } from '../domain/sensors';
+import type { Catalogue, Catalogues } from '../domain/sensors';
 import { shown } from '../domain/text';
 import type { TemperatureUnit } from '../domain/units';
 import type { Charted } from '../store/view';
 import { S } from '../strings';
 import { marksOver, seriesOver, type Fed, type Pair } from './fed';
-import type { PlotModel } from './model';
+import { bandsOf, type PlotModel } from './model';
 
 /** One chart: a sensor, and the tags whose readings of it are its lines. */
 export interface Plan {
@@ -34,21 +34,21 @@ export const tagLabel = (tagId: string): string => S.card(shown(tagId, 24));
 /** What of a plan is here. A tag keeps its look while others come later, or have nothing. */
 export function modelOf(
   catalogue: Catalogue,
+  { day, night }: Catalogues,
   { sensor, tagIds }: Plan,
   fed: Fed,
   span: Span,
   unit: TemperatureUnit,
   moment: number | null,
 ): PlotModel {
-  return {
-    sensor: catalogue.named(sensor),
-    unit,
-    span,
-    moment,
-    lines: tagIds.flatMap((tagId, look) => {
-      const series = seriesOver(fed, { tagId, sensor }, span);
-      const marks = marksOver(fed, tagId, span);
-      return series ? [{ series, look, label: tagLabel(tagId), marks }] : [];
-    }),
-  };
+  const lines = tagIds.flatMap((tagId, look) => {
+    const series = seriesOver(fed, { tagId, sensor }, span);
+    const marks = marksOver(fed, tagId, span);
+    return series ? [{ series, look, label: tagLabel(tagId), marks }] : [];
+  });
+  const now = catalogue.named(sensor);
+  const ranges = { now, day: day.named(sensor), night: night.named(sensor) };
+  // The nights are the greenhouse's: each line has the same.
+  const bands = bandsOf(span, lines[0]?.series.nights ?? null, ranges);
+  return { sensor: now, unit, span, moment, lines, bands };
 }

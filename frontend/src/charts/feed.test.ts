@@ -40,6 +40,7 @@ function answer(url: URL): Response {
       readings: [{ stamp: time(from + 10), value: 600 }],
       buckets: [],
       gaps: [],
+      nights: null,
       complete_to: null,
       kept_from: null,
     });
@@ -115,6 +116,7 @@ test('what comes later than was asked is in no bucket, however late the period e
     readings: [],
     buckets: [{ start: time(1_000), n: 1, mean: 600, min: 600, max: 600 }],
     gaps: [],
+    nights: null,
     complete_to: null,
     kept_from: null,
   });

@@ -40,32 +40,33 @@ export function drawBelow(frame: Frame, model: PlotModel, palette: ChartPalette)
   context.restore();
 }
 
-function drawIdeal(frame: Frame, { sensor, unit }: PlotModel, palette: ChartPalette): void {
-  if (!sensor.ideal) return;
-  const { context, box, ratio, y } = frame;
-  const [low, high] = sensor.ideal.map((value) => y(toShown(sensor, value, unit)));
-  if (low === undefined || high === undefined) return;
-  context.fillStyle = palette.ideal;
-  context.fillRect(box.left, high, box.width, low - high);
-  context.strokeStyle = palette.idealLine;
+function drawIdeal(frame: Frame, { sensor, bands, unit }: PlotModel, palette: ChartPalette): void {
+  const { context, ratio, x } = frame;
+  const y = (value: number): number => frame.y(toShown(sensor, value, unit));
   context.lineWidth = ratio;
-  context.setLineDash([2 * ratio, 4 * ratio]);
-  context.beginPath();
-  for (const edge of [low, high]) {
-    context.moveTo(box.left, Math.round(edge) + 0.5);
-    context.lineTo(box.left + box.width, Math.round(edge) + 0.5);
+  for (const { from, to, ranges } of bands) {
+    const [left, right] = [x(from), x(to)];
+    const lines = (values: readonly number[]): void => {
+      context.beginPath();
+      for (const value of values) {
+        const edge = Math.round(y(value)) + 0.5;
+        context.moveTo(left, edge);
+        context.lineTo(right, edge);
+      }
+      context.stroke();
+    };
+    const { ideal, critical } = ranges;
+    if (!ideal) continue;
+    context.fillStyle = palette.ideal;
+    context.fillRect(left, y(ideal[1]), right - left, y(ideal[0]) - y(ideal[1]));
+    context.strokeStyle = palette.idealLine;
+    context.setLineDash([2 * ratio, 4 * ratio]);
+    lines(ideal);
+    context.setLineDash([]);
+    // Where the values come near it: a line that nothing ever crosses has no room.
+    context.strokeStyle = palette.failure;
+    lines(critical ?? []);
   }
-  context.stroke();
-  context.setLineDash([]);
-  // Where the values come near it: a line that nothing ever crosses has no room.
-  context.strokeStyle = palette.failure;
-  context.beginPath();
-  for (const limit of sensor.critical ?? []) {
-    const edge = Math.round(y(toShown(sensor, limit, unit))) + 0.5;
-    context.moveTo(box.left, edge);
-    context.lineTo(box.left + box.width, edge);
-  }
-  context.stroke();
 }
 
 /** Hatched, so that an empty stretch is seen to be told and not forgotten. */

@@ -1,7 +1,8 @@
 import { describe, expect, test } from 'vitest';
 
+import type { Ranges } from '../domain/sensors';
 import type { Series } from '../domain/series';
-import { aligned, pointsOf, valueRange, type PlotModel } from './model';
+import { aligned, bandsOf, pointsOf, valueRange, type PlotModel } from './model';
 import { sensorNamed } from '../testing/sensors';
 import { seriesWith } from '../testing/series';
 
@@ -10,8 +11,52 @@ const model = (all: readonly Series[], over: Partial<PlotModel> = {}): PlotModel
   unit: 'C',
   lines: all.map((each, look) => ({ series: each, look, label: each.tagId, marks: [] })),
   span: { from: 0, to: 100 },
+  bands: [{ from: 0, to: 100, ranges: over.sensor ?? sensorNamed('temperature') }],
   moment: null,
   ...over,
+});
+
+describe('the ranges of day and night', () => {
+  const ranges = {
+    now: { ideal: [18, 26], critical: null },
+    day: { ideal: [20, 28], critical: null },
+    night: { ideal: [15, 24], critical: null },
+  } as const;
+  const nameOf = (of: Ranges): string | undefined =>
+    (['now', 'day', 'night'] as const).find((name) => ranges[name] === of);
+  const bands = (from: number, to: number, nights: readonly [number, number][] | null): unknown =>
+    bandsOf(
+      { from, to },
+      nights?.map(([dusk, dawn]) => ({ from: dusk, to: dawn })) ?? null,
+      ranges,
+    ).map((band) => [band.from, band.to, nameOf(band.ranges)]);
+
+  test('follow each other over the whole span', () => {
+    expect(
+      bands(0, 100, [
+        [-10, 10],
+        [40, 60],
+        [90, 120],
+      ]),
+    ).toEqual([
+      [0, 10, 'night'],
+      [10, 40, 'day'],
+      [40, 60, 'night'],
+      [60, 90, 'day'],
+      [90, 100, 'night'],
+    ]);
+  });
+
+  test('are one where it was day, or night, all of the time', () => {
+    expect(bands(0, 100, [])).toEqual([[0, 100, 'day']]);
+    expect(bands(0, 100, [[-10, 120]])).toEqual([[0, 100, 'night']]);
+    // A span that has moved on since the nights were told.
+    expect(bands(50, 150, [[0, 40]])).toEqual([[50, 150, 'day']]);
+  });
+
+  test('are those of the moment where no clock tells', () => {
+    expect(bands(0, 100, null)).toEqual([[0, 100, 'now']]);
+  });
 });
 
 const same = (value: number): number => value;

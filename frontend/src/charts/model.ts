@@ -1,5 +1,5 @@
 /** What one chart shows: one sensor, as one or several tags read it. Pure. */
-import type { Sensor } from '../domain/sensors';
+import type { Ranges, Sensor } from '../domain/sensors';
 import type { Span } from '../domain/period';
 import { middleOf, type Mark, type Series } from '../domain/series';
 import { toShown, type TemperatureUnit } from '../domain/units';
@@ -12,8 +12,38 @@ export interface Line {
   readonly marks: readonly Mark[];
 }
 
+/** What is ideal, and what critical, for a while. */
+export interface Band extends Span {
+  readonly ranges: Ranges;
+}
+
+/** The ranges of day and night one after the other; `now`, those of the moment, where nothing tells. */
+export function bandsOf(
+  { from, to }: Span,
+  nights: readonly Span[] | null,
+  { now, day, night }: Readonly<Record<'now' | 'day' | 'night', Ranges>>,
+): readonly Band[] {
+  if (nights === null) return [{ from, to, ranges: now }];
+  const bands: Band[] = [];
+  let next = from;
+  const add = (until: number, ranges: Ranges): void => {
+    const end = Math.min(until, to);
+    if (end <= next) return;
+    bands.push({ from: next, to: end, ranges });
+    next = end;
+  };
+  for (const each of nights) {
+    add(each.from, day);
+    add(each.to, night);
+  }
+  add(to, day);
+  return bands;
+}
+
 export interface PlotModel {
   readonly sensor: Sensor;
+  /** By their time, over all of the span. */
+  readonly bands: readonly Band[];
   readonly unit: TemperatureUnit;
   readonly lines: readonly Line[];
   readonly span: Span;
@@ -68,7 +98,7 @@ const LEAST_SHARE = 0.4;
 const LEAST_OF_IDEAL = 0.1;
 
 /** The values' axis, in the unit that is shown. */
-export function valueRange({ lines, sensor, unit }: PlotModel): [low: number, high: number] {
+export function valueRange({ lines, sensor, bands, unit }: PlotModel): [low: number, high: number] {
   let low = Infinity;
   let high = -Infinity;
   const take = (value: number | null): void => {
@@ -83,7 +113,8 @@ export function valueRange({ lines, sensor, unit }: PlotModel): [low: number, hi
       take(max);
     }
   }
-  const { ideal } = sensor;
+  const bounds = bands.flatMap(({ ranges }) => ranges.ideal ?? []);
+  const ideal = bounds.length > 0 ? ([Math.min(...bounds), Math.max(...bounds)] as const) : null;
   if (low > high) [low, high] = ideal ?? [0, 1];
   const least = ideal ? LEAST_OF_IDEAL * (ideal[1] - ideal[0]) : Math.abs(low) * 0.01 || 1;
   if (high - low < least) {

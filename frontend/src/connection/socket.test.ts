@@ -1,7 +1,6 @@
 import { afterEach, beforeEach, describe, expect, test, vi } from 'vitest';
 
 import { onLapse } from '../clock';
-import type { Unread } from '../contract/frames';
 import type { Frame } from '../contract/types';
 import { status } from '../testing/page';
 import { stateFrame } from '../testing/tags';
@@ -33,7 +32,6 @@ let frames: Frame[];
 let phases: Phase[];
 let refusals: number;
 let bad: string[];
-let others: Unread[];
 const socket = (index: number): FakeSocket => {
   const made = FakeSocket.made.at(index);
   if (!made) throw new Error(`no socket ${index}`);
@@ -48,7 +46,6 @@ beforeEach(() => {
   phases = [];
   refusals = 0;
   bad = [];
-  others = [];
   link = connect('ws://test/ws/state', {
     onConnection: (connection: Connection) => {
       const phase = phaseOf(connection, performance.now());
@@ -56,7 +53,6 @@ beforeEach(() => {
     },
     onFrame: (frame) => frames.push(frame),
     onBad: (why) => bad.push(why),
-    onOther: (message) => others.push(message),
     onRefused: () => (refusals += 1),
   });
 });
@@ -143,7 +139,6 @@ describe('socket shell', () => {
     socket(0).onopen?.();
     socket(0).onmessage?.({ data: '{"type":"weather"}' });
     expect([frames, bad]).toEqual([[], []]);
-    expect(others).toEqual([{ type: 'weather' }]);
   });
 
   test('one that says nothing that can be read is no connection', () => {

@@ -1,6 +1,6 @@
 import { now } from '../clock';
 import { route } from '../contract/api';
-import { parseFrame, type Unread } from '../contract/frames';
+import { parseFrame } from '../contract/frames';
 import type { Frame } from '../contract/types';
 import { type Connection, type ConnectionEvent, INITIAL, nextDeadline, step } from './machine';
 
@@ -8,8 +8,6 @@ export interface ConnectionHandlers {
   /** The connection changed, or a deadline passed and its phase may have. */
   readonly onConnection: (connection: Connection) => void;
   readonly onFrame: (frame: Frame, connection: Connection) => void;
-  /** A message that nobody here has read. */
-  readonly onOther: (message: Unread) => void;
   /** A message came that is no frame of the contract, and why it is none; it has been dropped. */
   readonly onBad: (why: string) => void;
   /** A socket closed that never opened: the server is away, or it wants to know who is there. */
@@ -79,10 +77,7 @@ export function connect(url: string, handlers: ConnectionHandlers): Link {
       const at = look();
       if (at === null) return;
       const parsed = parseFrame(data);
-      if (parsed.kind === 'passed over') {
-        handlers.onOther(parsed.message);
-        return;
-      }
+      if (parsed.kind === 'passed over') return;
       if (parsed.kind === 'bad') {
         handlers.onBad(parsed.why);
         // What it would have changed is lost, and later deltas build on it: a new connection
@@ -91,7 +86,7 @@ export function connect(url: string, handlers: ConnectionHandlers): Link {
         return;
       }
       const { frame } = parsed;
-      if (frame.type === 'alarms') send({ type: 'heard', now: at });
+      if (frame.type === 'alarms' || frame.type === 'robot') send({ type: 'heard', now: at });
       else send({ type: 'frame', now: at, status: frame.type === 'status' ? frame : null });
       if (look() === null) return;
       handlers.onFrame(frame, connection);

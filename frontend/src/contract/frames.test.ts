@@ -74,10 +74,7 @@ test.each([[full], [status], [delta], [{ ...delta, changed: full.state.tags, rem
 test('fields and reasons of a later server do no harm', () => {
   const later = { ...status, reason: 'on_holiday', more: [[[[]]]] };
   expect(parse(later)).toEqual({ kind: 'frame', frame: later });
-  expect(parse({ type: 'weather' })).toEqual({
-    kind: 'passed over',
-    message: { type: 'weather' },
-  });
+  expect(parse({ type: 'weather' })).toEqual({ kind: 'passed over' });
   // No frame's name, though every object has it.
   expect(parse({ type: 'constructor' })).toMatchObject({ kind: 'passed over' });
 });
@@ -199,4 +196,12 @@ describe('alarms', () => {
   ])('%j is refused', (over, why) => {
     expect(whyBad(JSON.stringify(frame(over)))).toMatch(why);
   });
+});
+
+test.each([
+  [{ position: { x: '2' } }, 'robot.position.x'],
+  [{ position: null, plan: { points: 'far' } }, 'robot.plan.points'],
+  [{ plan: null }, 'robot.position: is missing'],
+])('a robot’s frame of %j is refused', (parts, why) => {
+  expect(whyBad(JSON.stringify({ type: 'robot', ...parts }))).toContain(why);
 });

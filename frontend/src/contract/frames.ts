@@ -11,17 +11,13 @@ const FRAMES: Readonly<Record<Frame['type'], string>> = {
   state: 'StateFrame',
   delta: 'DeltaFrame',
   alarms: 'AlarmsFrame',
+  robot: 'RobotFrame',
 };
 
-/** A message of which nothing but the type was looked at. */
-export interface Unread {
-  readonly type: string;
-}
-
-/** "passed over": a robot's, which is read by who shows it, or a type of a later server. */
+/** "passed over": a type of a later server. */
 export type Parsed =
   | { readonly kind: 'frame'; readonly frame: Frame }
-  | { readonly kind: 'passed over'; readonly message: Unread }
+  | { readonly kind: 'passed over' }
   | { readonly kind: 'bad'; readonly why: string; readonly isDelta: boolean };
 
 const bad = (why: string, isDelta = false): Parsed => ({ kind: 'bad', why, isDelta });
@@ -40,7 +36,7 @@ export function parseFrame(data: unknown): Parsed {
   }
   if (!isObject(message) || typeof message['type'] !== 'string') return bad('a frame without type');
   const { type } = message;
-  if (!isKnown(type)) return { kind: 'passed over', message: { ...message, type } };
+  if (!isKnown(type)) return { kind: 'passed over' };
   const why = checkOf(FRAMES[type])(message);
   if (why !== null) return bad(type + why, type === 'delta');
   return { kind: 'frame', frame: filled(message as unknown as Frame) };
@@ -58,6 +54,7 @@ function filled(frame: Frame): Frame {
     }
     case 'status':
     case 'alarms':
+    case 'robot':
       return frame;
   }
 }

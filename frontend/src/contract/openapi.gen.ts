@@ -125,6 +125,7 @@ export interface components {
             readonly readings: readonly components["schemas"]["HistoryReading"][];
             readonly buckets: readonly components["schemas"]["Bucket"][];
             readonly gaps: readonly components["schemas"]["lupin_bridge__past__schema__Stretch"][];
+            readonly nights: readonly components["schemas"]["lupin_bridge__past__schema__Stretch"][] | null;
             readonly complete_to: components["schemas"]["Time"] | null;
             readonly kept_from: components["schemas"]["Time"] | null;
         };

@@ -34,7 +34,9 @@ export type DeltaFrame = Omit<Schemas['DeltaFrame'], 'changed' | 'health'> & {
   readonly changed: readonly TwinTagState[];
   readonly health: Judgement;
 };
-export type Frame = StateFrame | DeltaFrame | StatusFrame | AlarmsFrame;
+/** What a robot says of itself. */
+export type RobotFrame = Schemas['RobotFrame'];
+export type Frame = StateFrame | DeltaFrame | StatusFrame | AlarmsFrame | RobotFrame;
 export type OccupancyGrid = Schemas['OccupancyGrid'];
 export type FieldQuality = Schemas['FieldQuality'];
 export type PastAttempt = Schemas['PastAttempt'];
@@ -62,7 +64,7 @@ export type Expected = Schemas['ExpectedReading'];
 export type Advice = Schemas['Advice'];
 export type Place = Schemas['AdvisedPlace'];
 /** What a robot says of itself; and where it has been. */
-export type RobotNow = Omit<Schemas['RobotFrame'], 'type'>;
+export type RobotNow = Omit<RobotFrame, 'type'>;
 export type Robot = Schemas['Robot'];
 export type WirePoint = Schemas['Point'];
 export type WireTime = Schemas['Time'];

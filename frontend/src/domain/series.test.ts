@@ -187,6 +187,7 @@ const series: Series = {
   ],
   buckets: [],
   gaps: [{ from: NOON + 10.5, to: NOON + 100 }],
+  nights: null,
   missing: [{ from: NOON + 150, to: NOON + 200, why: 'not_recorded' }],
 };
 const bucketed = (from: number): Series => ({

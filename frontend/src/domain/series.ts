@@ -42,6 +42,8 @@ export interface Series extends Span {
   readonly readings: readonly Reading[];
   readonly buckets: readonly Bucket[];
   readonly gaps: readonly Span[];
+  /** When it was night by the clock; null: that does not tell. */
+  readonly nights: readonly Span[] | null;
   readonly missing: readonly Missing[];
 }
 
@@ -59,6 +61,7 @@ export const seriesOf = (wire: History, nowS: number): Series => ({
   readings: wire.readings.map(({ stamp, value }) => ({ at: secondsOf(stamp), value })),
   buckets: wire.buckets.map((bucket) => ({ ...bucket, start: secondsOf(bucket.start) })),
   gaps: wire.gaps.map(spanOf),
+  nights: wire.nights?.map(spanOf) ?? null,
   missing: missingOf(wire, nowS),
 });
 

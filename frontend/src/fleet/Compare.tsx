@@ -68,6 +68,7 @@ export default function Compare({ shown, words }: Props): JSX.Element {
     () =>
       found && {
         ...{ sensor: sensors.named(found.sensor_type), unit, span: spanOf(found), moment: null },
+        bands: [{ ...spanOf(found), ranges: sensors.named(found.sensor_type) }],
         lines: linesOf(found, drawn, W.median),
       },
     [found, drawn, sensors, unit],

@@ -66,7 +66,7 @@ function lineOf(
   );
   const series = {
     ...{ from: start, to: secondsOf(to), tagId: label, sensor, bucketS },
-    ...{ readings: [], buckets, gaps, missing: [] },
+    ...{ readings: [], buckets, gaps, nights: null, missing: [] },
   };
   return { series, look, label, marks: [] };
 }

@@ -7,7 +7,7 @@ import { store, useApp } from '../store/app';
 import { isHeardNow } from '../store/moment';
 import { S } from '../strings';
 import { useTicking } from '../widgets/useNow';
-import { ageOf, timeOf, useFault, useRobot, useTrail } from './heard';
+import { ageOf, timeOf, useRobot, useTrail } from './heard';
 import { trailLines, wayAhead } from './path';
 
 /** A position that is older never looks like one of now, s. */
@@ -18,7 +18,6 @@ const FADE_S = 30;
 /** Where the robot is, has been and will be; to who does not see it, `RobotFact` says so. */
 export function RobotLayer(): ReactPortal | null {
   const { position, plan } = useRobot();
-  useFault();
   const view = useApp((state) => state.viewport.view);
   const isHeard = useApp(isHeardNow);
   const trail = useTrail();

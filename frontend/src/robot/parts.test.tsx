@@ -1,9 +1,7 @@
 import { act as rendered, render, screen } from '@testing-library/react';
 import { beforeEach, expect, test, vi } from 'vitest';
 
-import type { Unread } from '../contract/frames';
 import { robotFrame } from '../store/signals';
-import { store } from '../store/app';
 import { showTags } from '../testing/page';
 import { wireTag } from '../testing/tags';
 import { RobotFact, robotText } from './RobotFact';
@@ -33,33 +31,16 @@ test('all of a robot is told in words, each as old as it is', () => {
 test('of a robot that says nothing there is no line', () => {
   const { container } = render(<RobotFact />);
   rendered(() => {
-    robotFrame.dispatch({ type: 'robot', position: null, plan: null, battery: null } as Unread);
+    robotFrame.dispatch({ type: 'robot', position: null, plan: null, battery: null });
   });
   expect(container.textContent).toBe('');
 });
 
-test.each([
-  ['a place that is no number', { ...robot, position: { ...robot.position, x: '2' } }],
-  ['a plan that is no list', { ...robot, plan: { points: 'far', observed_at: time(1) } }],
-  ['a part that is missing', { position: null, plan: null }],
-])('a frame with %s is not shown, and the page says so', (_, wrong) => {
+test('a robot is marked on the map where it said that it is', () => {
   document.body.innerHTML = '<div id="map-view"></div>';
   render(<RobotLayer />);
-  rendered(() => {
-    robotFrame.dispatch({ type: 'robot', ...wrong });
-  });
-  expect(screen.queryByTestId('robot-mark')).toBeNull();
-  expect(store.get().twin.unread?.why).toMatch(/^robot\./);
   rendered(() => {
     robotFrame.dispatch({ type: 'robot', ...robot });
   });
   expect(screen.getByTestId('robot-mark')).toBeTruthy();
-  expect(store.get().twin.unread).toBeNull();
-});
-
-test('a frame of another type leaves the robot as it is', () => {
-  const last = { type: 'robot', ...robot };
-  robotFrame.dispatch(last);
-  robotFrame.dispatch({ type: 'weather' });
-  expect(robotFrame.get()).toBe(last);
 });

@@ -17,6 +17,7 @@ import {
   NO_CATALOGUES,
   rangesFor,
   type Catalogue,
+  type Catalogues,
   type Sensor,
 } from '../domain/sensors';
 import { filterRows, inAreas, rowsOf, sortRows, type Row } from '../domain/table';
@@ -43,9 +44,13 @@ export function selectNewestHealth(state: AppState): HouseHealth | null {
   return snapshot && healthNow(snapshot.tags, health, isHeardNow(state));
 }
 
+/** The sensors by day and by night. */
+export const selectCatalogues = (state: AppState): Catalogues =>
+  state.twin.sensors.value ?? NO_CATALOGUES;
+
 /** The sensors with the ranges that held at the moment that is shown: by day, or by night. */
 export function selectCatalogue(state: AppState): Catalogue {
-  const { day, night } = state.twin.sensors.value ?? NO_CATALOGUES;
+  const { day, night } = selectCatalogues(state);
   return (selectShown(state).health?.house.day.is_day ?? true) ? day : night;
 }
 

@@ -66,12 +66,15 @@ export function startLive(): () => void {
     },
     onRefused: () => void signInIfAsked(),
     onBad: tellBad,
-    onOther: robotFrame.dispatch,
     onFrame: (frame, connection) => {
       const { epoch, status } = connection;
       if (frame.type === 'alarms') {
         // As it is: alarms change seldom, and nobody is to wait for them.
         receive({ type: 'alarms', alarms: frame });
+        return;
+      }
+      if (frame.type === 'robot') {
+        robotFrame.dispatch(frame);
         return;
       }
       if (frame.type !== 'status') {

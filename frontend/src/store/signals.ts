@@ -1,6 +1,5 @@
 /** Small stores beside the page's state. */
-import type { Unread } from '../contract/frames';
-import type { Session } from '../contract/types';
+import type { RobotFrame, Session } from '../contract/types';
 import { createStore, type Store } from './create';
 
 /** What a screen reader is told beside what it is led to. */
@@ -39,7 +38,8 @@ export const pointedBy =
   (pointed: PointedTime | null): number | null =>
     pointed?.by === by ? pointed.at : null;
 
-/** The newest frame of a robot, as it came: what reads it is loaded once there is one. */
-export const robotFrame = createStore<Unread | null, Unread | null>(null, (last, next) =>
-  next === null || next.type === 'robot' ? next : last,
+/** The newest frame of a robot; null: none has come. */
+export const robotFrame = createStore<RobotFrame | null, RobotFrame | null>(
+  null,
+  (_, frame) => frame,
 );

@@ -11,6 +11,7 @@ export const seriesWith = (over: Partial<Series> = {}): Series => ({
   readings: [],
   buckets: [],
   gaps: [],
+  nights: null,
   missing: [],
   ...over,
 });

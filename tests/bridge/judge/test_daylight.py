@@ -74,6 +74,30 @@ def test_from_an_hour_to_the_same_it_is_always_day(hour: time) -> None:
     assert all(always.is_day(MIDNIGHT_S + minute * 60) for minute in range(24 * 60))
 
 
+@pytest.mark.parametrize(
+    ("clock", "from_h", "to_h", "nights"),
+    [
+        (CLOCK, 0, 24, [(-4, 6), (20, 30)]),
+        (CLOCK, 6, 20, []),
+        # Told as it is, and not as far as the period goes.
+        (CLOCK, 22, 23, [(20, 30)]),
+        (CLOCK, 1, 50, [(-4, 6), (20, 30), (44, 54)]),
+        (ClockDay(UTC, time(14), time(2)), 0, 48, [(2, 14), (26, 38)]),
+        (ClockDay(UTC, time(6), time(6)), 0, 48, []),
+        (ClockDay(timezone(timedelta(hours=-9))), 0, 24, [(5, 15)]),
+    ],
+)
+def test_the_nights_of_a_period(
+    clock: ClockDay, from_h: int, to_h: int, nights: list[tuple[int, int]]
+) -> None:
+    found = clock.nights(MIDNIGHT_S + from_h * 3600, MIDNIGHT_S + to_h * 3600)
+    told = [tuple((at_s - MIDNIGHT_S) / 3600 for at_s in night) for night in found]
+    assert told == nights
+    for hour in range(from_h, to_h):
+        is_night = any(dusk <= hour < dawn for dusk, dawn in nights)
+        assert clock.is_day(MIDNIGHT_S + hour * 3600) is not is_night
+
+
 def test_a_tag_has_one_say_its_last() -> None:
     light = lights(0.0, 900.0, 0.0)
     told = [light.is_day]

@@ -62,6 +62,7 @@ def test_readings_are_told_one_by_one_and_what_is_not_finite_is_null() -> None:
         ],
         "buckets": [],
         "gaps": [],
+        "nights": None,
         "complete_to": None,
         "kept_from": None,
     }

@@ -25,7 +25,6 @@ SUBPROTOCOLS: Final = ("foxglove.sdk.v1", "foxglove.websocket.v1")
 MAX_SUBSCRIPTIONS: Final = 128
 _MAX_ID: Final = 2**32 - 1
 
-INFO: Final = 0
 WARNING: Final = 1
 ERROR: Final = 2
 

@@ -33,7 +33,7 @@ def resident_mb(pid: int) -> float:
 
 
 def open_files(pid: int) -> int:
-    """How many descriptors it has open, without those to processes of its own.
+    """How many descriptors it has open, without the journal's and those to processes of its own.
 
     Those are there from the first question about the past on, or from some seconds on.
     """
@@ -41,6 +41,7 @@ def open_files(pid: int) -> int:
     files = (_target(path) for path in Path(f"/proc/{pid}/fd").iterdir())
     return sum(
         not file.startswith(("pipe:", "anon_inode:[pidfd]"))
+        and ".sqlite" not in file
         and file.removeprefix("socket:[").rstrip("]") not in own
         for file in files
     )

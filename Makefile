@@ -154,10 +154,10 @@ collect: setup
 	$(say) 'collecting the Python tests'
 	@$(TEST_ENV) $(BIN)/pytest -qq --collect-only tests >$(DONE)/collected || { cat $(DONE)/collected; exit 1; }
 
-# Five workers on two cores, because they mostly wait for processes.
+# Four workers on two cores, because they mostly wait for processes.
 unit: setup docs $(DONE)/tools $(DONE)/test_msgs/built ## Python tests, real ROS and real browser included
 	$(say) 'Python tests: units, ROS over DDS, browser'
-	@$(TEST_ENV) $(BIN)/pytest -q -n 5 --dist worksteal tests
+	@$(TEST_ENV) $(BIN)/pytest -q -n 4 --dist worksteal tests
 
 bench: setup $(DONE)/tools ## all benchmarks but bench-live (ARGS=bench_field: one of them)
 	@$(BENCH_ENV) $(BIN)/python -m tests.bench $(ARGS)

@@ -171,6 +171,7 @@ def test_a_flood_of_good_byes_and_births_is_answered_once_in_a_while(shared: Bro
     async def run(heard: Subscriber) -> None:
         async with telling(shared, House()) as channel:
             await until(lambda: channel.condition.sent > 10, "the first time")
+            await until(lambda: heard.of("lt/status")[-1:] == [b"online"], "that it has come")
             before, sent = len(heard.of("lt/status")), channel.condition.sent
             for _ in range(100):
                 heard.say("lt/status", "offline", retain=True)

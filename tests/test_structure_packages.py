@@ -225,7 +225,6 @@ def test_every_executable_is_where_ros2_run_looks_and_runs(
     package: str, executables: set[str], tmp_path: Path
 ) -> None:
     """Installed as colcon does; `ros2 run` takes it from lib/PACKAGE of the prefix in the index."""
-    pytest.importorskip("setuptools", reason="colcon brings its own")
     source, prefix = tmp_path / "source", tmp_path / "prefix"
     shutil.copytree(ROS_NODE / package, source)
     install = ("install", "--single-version-externally-managed", "--record", "record.txt")

@@ -224,6 +224,8 @@ class Webhook:
                 self.condition.failing(f"{type(error).__name__} ({self._target.called})")
                 self.condition.dropped += 1
                 is_taken = False
+                # Whatever it was may be so with the next one too.
+                await asyncio.sleep(self._backoff.wait_s())
             delivery.ended(taken=is_taken)
             self._lost += -lost if is_taken else 1
             self.condition.waiting -= 1

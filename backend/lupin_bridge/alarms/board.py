@@ -16,6 +16,8 @@ from lupin_bridge.judge.alarm import Alarm
 from lupin_bridge.judge.episodes import MAX_EPISODES
 from lupin_bridge.judge.verdict import Verdict
 
+log = logging.getLogger(__name__)
+
 # Of the active ones, so many are told to who has room for few: Home Assistant keeps no attributes
 # past 16 kB.
 MAX_WORST: Final = 20
@@ -98,8 +100,6 @@ def worst_first(alarm: Alarm) -> tuple[int, int, str]:
     """An order: by verdict, and then the newest."""
     return _ORDER[alarm.reason.verdict], -alarm.raised_at_ns, alarm.id
 
-
-log = logging.getLogger(__name__)
 
 # Where the alarms are from: nowhere yet, from a journal, or from what was heard since the start.
 AlarmSource = Literal["starting", "journal", "heard"]

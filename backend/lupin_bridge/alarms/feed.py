@@ -124,9 +124,11 @@ class AlarmFeed:
                 self._received_number += len(writes)
                 self._received += writes
             self._seen = now
-        # What comes late, or is written late, is in the journal and changes nothing that is now.
-        is_written = is_kept and update.journal.written != self._written
-        self._written = update.journal.written
+        # What comes late, or is written late, is in the journal and changes nothing that is now. It
+        # is read when the source has it: a copy of the journal may be late too.
+        written = self._source.journal().written
+        is_written = is_kept and written != self._written
+        self._written = written
         if is_new or is_written or now.stamp_ns >= self._due_ns:
             self._wake.set()
 

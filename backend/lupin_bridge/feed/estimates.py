@@ -21,6 +21,8 @@ from lupin_twin.field.engine import FieldRefused
 from lupin_twin.runtime.estimates import Report, ReportRequest
 from lupin_twin.runtime.workers import in_turns
 
+log = logging.getLogger(__name__)
+
 # A twin makes no report of a sensor so soon again.
 FRESH_S: Final = 2.0
 MAX_CACHED: Final = 64
@@ -54,8 +56,6 @@ class Reports:
             self._cache.popitem(last=False)
         return report
 
-
-log = logging.getLogger(__name__)
 
 # A report serves for 30 s at least (`estimate_service.REST_S`).
 PERIOD_S: Final = 15.0

@@ -88,20 +88,15 @@ class FollowedLog:
             self._reported,
             state=JournalState.RECORDING,
             path=str(self._path(self._followed.journal)),
+            written=self._followed.last,
             complete_ns=self._followed.complete_ns,
             kept_ns=self._followed.kept_ns,
         )
 
-    def on_update(self, journal: Condition) -> Condition:
-        """What the twin says of its journal; what it said last holds while it says nothing.
-
-        Returns the same, but `written` grows as the log that is read here does: a copy may be late.
-        """
+    def on_update(self, journal: Condition) -> None:
+        """What the twin says of its journal; what it said last holds while it says nothing."""
         if journal.state is not JournalState.UNKNOWN and journal.journal_id:
             self._reported = journal
-        if self._own is None and self._followed is not None:
-            return replace(journal, written=self._followed.last)
-        return journal
 
     async def explain(self, error: NotRemembered) -> NotRemembered:
         """The same error, but of a copy: that is made anew here, and not by the twin."""

@@ -7,7 +7,7 @@ import math
 import os
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final, TypeVar
 
@@ -109,8 +109,8 @@ class WebTwin(RosSource[WebNode, _Received]):
                 self._rules = received.rules
             # A map alone is no sign of life of the twin.
             if received.update is not None and received.update is not before:
-                journal = self._log.on_update(received.update.journal)
-                on_state(replace(received.update, journal=journal))
+                self._log.on_update(received.update.journal)
+                on_state(received.update)
 
         await self._start_thread(make_node, on_received, on_death)
         self._frame_id, folder = await self.thread.call(

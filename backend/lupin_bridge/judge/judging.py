@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import heapq
 import logging
+import math
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -93,7 +94,7 @@ def judge_once(
 
     Nobody knows since when a reason holds: told is the observation that says so.
     """
-    judge = Judge(sensors, day_of, recent_s, max_at_once=None)
+    judge = Judge(sensors, day_of, recent_s, max_at_once=math.inf)
     judge.note_days(days)
     judge.learn(writes, snapshot)
     return judge.see(snapshot)
@@ -130,7 +131,7 @@ class Judge:
         day_of: DayOf,
         recent_s: float | None = None,
         *,
-        max_at_once: int | None = MAX_AT_ONCE,
+        max_at_once: float = MAX_AT_ONCE,
     ) -> None:
         self._sensors = sensors
         self._max_at_once = max_at_once
@@ -245,7 +246,7 @@ class Judge:
         turn: list[str] = []
         seen = readings = 0
         for tag_id in self._waiting:
-            if self._max_at_once is not None and readings >= self._max_at_once:
+            if readings >= self._max_at_once:
                 break
             seen += 1
             kept = self._tags.get(tag_id)

@@ -6,10 +6,12 @@ come one by one, scan by scan.
 
 from __future__ import annotations
 
-from bisect import bisect_right
+from bisect import bisect_left, bisect_right
+from collections import defaultdict
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import groupby
+from operator import attrgetter, itemgetter
 
 from lupin_bridge.judge.daylight import LEFT_OUT_NS, LIGHT, Day, Light
 from lupin_bridge.judge.scan_interval import INTERVALS
@@ -28,6 +30,9 @@ class Scanned:
     values: Mapping[str, float]
     is_day: bool = True
     species: str = ""
+
+
+_stamp_ns = attrgetter("stamp_ns")
 
 
 @dataclass(slots=True)
@@ -55,13 +60,15 @@ class Recent:
 
     def put(self, tag: TagState, at_ns: int, values: Mapping[str, float]) -> None:
         """Take in a scan; those that nothing is judged by any more go."""
-        scans = {scan.stamp_ns: scan for scan in self.scans}
-        scans[at_ns] = Scanned(at_ns, values, species=self.species_at(at_ns))
+        scan = Scanned(at_ns, values, species=self.species_at(at_ns))
+        before = bisect_left(self.scans, at_ns, key=_stamp_ns)
+        behind = bisect_right(self.scans, at_ns, before, key=_stamp_ns)
+        scans = (*self.scans[:before], scan, *self.scans[behind:])
         if len(scans) > INTERVALS + 1:
-            newest = sorted(scans)[-INTERVALS - 1 :]
-            kept = {*newest, *(r.observed_at_ns for r in tag.readings)}
-            scans = {stamp_ns: scan for stamp_ns, scan in scans.items() if stamp_ns in kept}
-        self.scans = tuple(scans[stamp_ns] for stamp_ns in sorted(scans))
+            kept = {reading.observed_at_ns for reading in tag.readings}
+            older = (it for it in scans[: -INTERVALS - 1] if it.stamp_ns in kept)
+            scans = (*older, *scans[-INTERVALS - 1 :])
+        self.scans = scans
 
     def decide(self, at_ns: int, *, is_day: bool) -> bool:
         """It was day, or night, at the scan of that moment; whether that is another."""
@@ -74,11 +81,13 @@ class Recent:
 
     def light_at(self, at_ns: int) -> float | None:
         """What the light read at a moment; None: it was left out for long, or never told."""
-        by_then = [scan for scan in self.scans if scan.stamp_ns <= at_ns]
-        told = next((scan for scan in reversed(by_then) if LIGHT in scan.values), None)
-        if told is None or by_then[-1].stamp_ns - told.stamp_ns > LEFT_OUT_NS:
-            return None
-        return told.values[LIGHT]
+        by_then = self.scans[: bisect_right(self.scans, at_ns, key=_stamp_ns)]
+        for scan in reversed(by_then):
+            if by_then[-1].stamp_ns - scan.stamp_ns > LEFT_OUT_NS:
+                break
+            if LIGHT in scan.values:
+                return scan.values[LIGHT]
+        return None
 
     def news(self, tag: TagState) -> dict[int, dict[str, float]]:
         """The scans of a state that are not known so, by their stamps."""
@@ -109,7 +118,7 @@ class RecentScans:
 
     def __init__(self, day_of: DayOf) -> None:
         self._day_of = day_of
-        self._tags: dict[str, Recent] = {}
+        self._tags: defaultdict[str, Recent] = defaultdict(Recent)
         self._light = Light()
         self._newest_ns = -1
 
@@ -142,7 +151,7 @@ class RecentScans:
 
     def tag(self, tag_id: str) -> Recent:
         """What is recent of a tag."""
-        return self._tags.setdefault(tag_id, Recent())
+        return self._tags[tag_id]
 
     def stamps_ns(self) -> Iterator[int]:
         """When any tag was scanned."""
@@ -164,7 +173,7 @@ class RecentScans:
     def take(self, scans: Sequence[TakenScan]) -> set[str]:
         """Take scans in; the tags with one that is judged by another light than before."""
         others: set[str] = set()
-        for at_ns, group in groupby(sorted(scans, key=_in_time), key=lambda scan: scan[0]):
+        for at_ns, group in groupby(sorted(scans, key=_in_time), key=itemgetter(0)):
             taken = list(group)
             before = self._light.is_day
             for _, tag, values in taken:

@@ -82,12 +82,12 @@ class Channels:
 
     def counts(self) -> Iterator[tuple[str, Mapping[str, int]]]:
         """The same in numbers, by metric and channel."""
-        for what in ("connected", "waiting", "sent", "failed", "dropped"):
-            field = f"is_{what}" if what == "connected" else what
-            yield (
-                f"lupin_outward_{what}",
-                {it.name: int(getattr(it.condition, field)) for it in self._running},
-            )
+        conditions = {it.name: it.condition for it in self._running}
+        yield "lupin_outward_connected", {k: int(it.is_connected) for k, it in conditions.items()}
+        yield "lupin_outward_waiting", {k: it.waiting for k, it in conditions.items()}
+        yield "lupin_outward_sent", {k: it.sent for k, it in conditions.items()}
+        yield "lupin_outward_failed", {k: it.failed for k, it in conditions.items()}
+        yield "lupin_outward_dropped", {k: it.dropped for k, it in conditions.items()}
 
     @property
     def _running(self) -> tuple[Mqtt | Webhook | Push, ...]:

@@ -180,7 +180,7 @@ class Push:
 
     async def _send(self, device: Device, message: bytes) -> None:
         """Until its push service takes it, has it no more, or was tried enough."""
-        host = urlsplit(device.endpoint).hostname
+        host = urlsplit(device.endpoint).hostname or ""
 
         async def attempt() -> None:
             try:
@@ -191,16 +191,22 @@ class Push:
             except PostError as error:
                 if error.status in _GONE:
                     raise DeviceGone from None
-                error.args = (f"{host}: {error}",)
                 raise
 
         backoff = Backoff(FIRST_WAIT_S, MOST_WAIT_S)
         try:
-            await until_taken(attempt, self.condition, backoff, "a push notification", TRIES)
+            await until_taken(
+                attempt,
+                self.condition,
+                backoff,
+                "a push notification",
+                host,
+                most_tries=TRIES,
+            )
         except DeviceGone:
             await self._people.write(lambda it, _: it.remove_device(device.endpoint))
         except DeviceRefused as error:
-            self._failed(f"{host}: {error}")
+            self._failed(f"{error} ({host})")
             self.condition.dropped += 1
 
     def _failed(self, why: str) -> None:

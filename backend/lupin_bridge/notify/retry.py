@@ -78,11 +78,13 @@ async def until_taken(
     condition: Condition,
     backoff: Backoff,
     what: str,
+    where: str,
+    *,
     most_tries: float = math.inf,
 ) -> bool:
     """Try again until it is taken; False: it was given up, which is counted and logged.
 
-    `what` is what the log calls it.
+    `what` and `where` are what the log calls it and its receiver.
     """
     tries = refusals = 0
     while True:
@@ -90,7 +92,7 @@ async def until_taken(
             await post()
         except PostError as error:
             before = condition.detail
-            condition.failing(str(error))
+            condition.failing(f"{error} ({where})")
             tries += 1
             refusals += error.status in REFUSALS
             if tries >= most_tries or refusals >= MAX_REFUSALS:

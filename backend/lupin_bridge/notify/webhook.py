@@ -23,7 +23,7 @@ from lupin_bridge.alarms.board import AlarmBoard, Change, happened_ns
 from lupin_bridge.feed.shared_work import end
 from lupin_bridge.judge.alarm import Alarm
 from lupin_bridge.notify.destinations import WebhookTarget
-from lupin_bridge.notify.http_post import PostError, post
+from lupin_bridge.notify.http_post import post
 from lupin_bridge.notify.retry import Backoff, Condition, until_taken
 from lupin_bridge.stream.health_json import alarm_json
 from lupin_twin.core.diagnostics import Origin
@@ -203,9 +203,10 @@ class Webhook:
         if len(self._waiting) >= MAX_WAITING:
             self._waiting.popleft().ended(taken=False)
             self.condition.dropped += 1
+            self.condition.waiting -= 1
             self._lost += 1
         self._waiting.append(delivery)
-        self.condition.waiting = len(self._waiting)
+        self.condition.waiting += 1
         self._has_more.set()
 
     async def _run(self) -> None:
@@ -223,25 +224,21 @@ class Webhook:
                 self.condition.failing(f"{type(error).__name__} ({self._target.called})")
                 self.condition.dropped += 1
                 is_taken = False
+                # Whatever it was may be so with the next one too.
+                await asyncio.sleep(self._backoff.wait_s())
             delivery.ended(taken=is_taken)
             self._lost += -lost if is_taken else 1
-            self.condition.waiting = len(self._waiting)
+            self.condition.waiting -= 1
 
     async def _send(self, delivery: Delivery, lost: int) -> bool:
         body = delivery.body(lost, self._origin())
 
         async def attempt() -> None:
-            self.condition.waiting = len(self._waiting) + 1
             headers = signed(self._target.secret, delivery.id, int(time.time()), body)
-            try:
-                await post(self._target, headers, body)
-            except PostError as error:
-                error.args = (f"{error} ({self._target.called})",)
-                raise
+            await post(self._target, headers, body)
 
-        return await until_taken(
-            attempt, self.condition, self._backoff, f"{delivery.id} of the webhook"
-        )
+        what, where = f"{delivery.id} of the webhook", self._target.called
+        return await until_taken(attempt, self.condition, self._backoff, what, where)
 
     async def _wait_for_origin(self) -> None:
         """Until it is known; one that was not in its time is waited for no more."""

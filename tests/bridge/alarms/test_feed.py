@@ -32,6 +32,11 @@ class Journal:
         self.writes_now: list[PastWrite] = []
         self.name, self.asked = "a", 0
         self.is_removed = False
+        self.written = 0
+
+    def journal(self) -> Condition:
+        """How many it has written, of which `told` need not know."""
+        return Condition(JournalState.RECORDING, written=self.written)
 
     async def writes(self, request: WritesRequest) -> PastWrites:
         """The next of them."""
@@ -115,16 +120,14 @@ def test_it_reads_the_past_once_then_what_is_new_and_another_journal_from_its_be
 
 def test_what_is_written_is_read_also_where_the_state_stays_as_it_is() -> None:
     async def test(feed: AlarmFeed, board: AlarmBoard, source: Journal) -> None:
-        def wrote(count: int) -> TwinUpdate:
-            return told(1, journal=Condition(JournalState.RECORDING, written=count))
-
-        source.writes_now = [pest(1, 2)]
-        feed.on_state(wrote(1))
+        source.writes_now, source.written = [pest(1, 2)], 1
+        feed.on_state(told(1))
         await changed(board)
         # Once more it asks by itself, for a disk that is slow; then it has to be woken.
         feed._ask_again(asyncio.get_running_loop(), 1_000_000.0)
         source.writes_now.append(pest(2, 0))
-        feed.on_state(wrote(2))
+        source.written = 2
+        feed.on_state(told(1))
         await changed(board)
         assert board.now.active == ()
 

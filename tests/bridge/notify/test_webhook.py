@@ -35,12 +35,13 @@ async def telling(
     board: Alarms,
     origin: Callable[[], Origin] = lambda: "simulated",
     origin_s: float = ORIGIN_S,
+    first_wait_s: float = 0.001,
 ) -> AsyncIterator[Webhook]:
     """A webhook that is in a hurry."""
     settings = Settings(webhook_url=f"http://127.0.0.1:{port}/hook")
     target = Targets.of(settings, Secrets(webhook_secret=SECRET)).webhook
     assert target is not None
-    hook = Webhook(target, first_wait_s=0.001, origin_s=origin_s)
+    hook = Webhook(target, first_wait_s, origin_s)
     hook.start(board, lambda: NOW_NS, origin)
     try:
         yield hook
@@ -239,15 +240,18 @@ def test_words_of_any_length_are_said_once_and_cut(caplog: pytest.LogCaptureFixt
     assert len(said) < 300
 
 
-def test_what_cannot_even_be_sent_is_a_failure(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_what_cannot_even_be_sent_is_a_failure_and_the_next_one_waits(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     def broken(*_: object) -> bytes:
         raise TypeError("no such thing")
 
     async def run() -> None:
         board = Alarms()
-        board.show([A])
-        async with telling(free_port(), board) as hook:
-            await until(lambda: hook.condition.failed == 1, "the try")
+        board.show([A, B])
+        async with telling(free_port(), board, first_wait_s=60.0) as hook:
+            await until(lambda: hook.condition.failed, "the try")
+            assert hook.condition.failed == 1
             assert not hook.condition.is_connected
             assert hook.condition.detail.startswith("TypeError (http://")
 

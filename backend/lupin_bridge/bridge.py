@@ -9,7 +9,6 @@ import time
 from collections import Counter
 from collections.abc import Callable, Hashable, Iterator
 from dataclasses import replace
-from functools import cached_property
 from typing import Final
 
 from lupin_bridge.alarms.board import AlarmBoard, Change
@@ -92,6 +91,7 @@ class Bridge:
         self.looking_back: Shared[Answered] = Shared()
         self.frames = FrameWriter()
         self.offer = Offer(source)
+        self.rosbridge_writer = Writer(source.relay, source.workers)
         self.criteria = criteria or Criteria.of(settings)
         self._judge = Judge(self.criteria.sensors, self.criteria.day, self.criteria.recent_s)
         self._judged = NOTHING_JUDGED
@@ -169,11 +169,6 @@ class Bridge:
         self._publish_status()
 
     # --- for the routes -----------------------------------------------------------------------
-
-    @cached_property
-    def writer(self) -> Writer:
-        """Writes the messages of ROS topics for rosbridge's clients."""
-        return Writer(self.source.relay, self.source.workers)
 
     @property
     def workers(self) -> Workers:

@@ -266,7 +266,7 @@ class _RosbridgeConversation(_Conversation):
             strict_interval=True,
             wire=lambda _client, frame: session.wire(frame),
         )
-        self._feeds = Feeds(bridge.writer, self._write_when_free)
+        self._feeds = Feeds(bridge.rosbridge_writer, self._write_when_free)
         self._calls: set[asyncio.Task[None]] = set()
         self._running = asyncio.Semaphore(MAX_RUNNING_CALLS)
 

@@ -226,6 +226,14 @@ def test_a_fixed_sensor_is_where_its_frame_is(domain: int, config: Path) -> None
         at = peer.until(is_there, "the sensor where its frame is").pose.position
         assert (at.x, at.y, at.z) == pytest.approx((4.0, 1.5, 0.8))
         peer.until(lambda: robot.said("TF has no way from 'nowhere' to 'map'"), "the other one")
+        robot.stand(*frames, robot.step("map", "nowhere", (1.0, 0.0, 0.0)))
+        robot.reports.clear()
+
+        def is_right() -> bool:
+            every = (status for each in robot.reports for status in each.status)
+            return any((it.name, it.message) == ("/lupin_adapt: /tf", "receiving") for it in every)
+
+        peer.until(is_right, "nothing to be wrong any more")
         assert process.exit_code is None
 
 

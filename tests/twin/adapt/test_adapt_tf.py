@@ -281,7 +281,7 @@ def test_check_without_a_configuration_finds_tf_and_detections(domain: int) -> N
             robot.be_at(5.0, robot.see(7, 0.3))
             robot.read(21.5)
             spin()
-            return "base_link" in node.frames and len(node.heard) >= 4
+            return "base_link" in node.frames and len(node.sources) >= 4
 
         peer.until(publish, "enough to be heard")
         found = config_of(yaml.safe_load(suggestion(node)))

@@ -16,7 +16,7 @@ from tests.support.processes import Process
 from tests.support.web import bridge
 from tests.twin.adapt.test_adapt import adapt
 
-# As issue 25 has it: the least that has to work.
+# The least that has to work.
 CONFIG = """
 robot: {topic: /amcl_pose, type: geometry_msgs/msg/PoseWithCovarianceStamped}
 tags: {A: [0.0, 0.0], B: [3.0, 0.0]}        # surveyed; or a file

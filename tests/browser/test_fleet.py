@@ -237,10 +237,20 @@ def test_one_sensor_of_several_greenhouses_the_outlier_first(
 def test_a_row_for_each_greenhouse_leads_to_its_shift_report(
     browser: Browser, archive: Archive, tmp_path: Path
 ) -> None:
+    now_ns = wall().stamp_ns
     with three_sites(archive, tmp_path) as served:
+        archive.do(
+            f"INSERT INTO note VALUES ('warm', 'n1', {now_ns - 10**9}, 'Anna', 'comment', 'tag:1',"
+            f" 'vents <b>checked</b>', NULL), ('gh1', 'n1', {now_ns}, 'Ben', 'acknowledge',"
+            " 'alarm:x', '', NULL), ('gh1', 'n2', 1, 'Cem', 'withdraw', 'note:n1', '', NULL)"
+        )
         with opened(browser, served.url) as page:
             page.get_by_role("button", name="Shift report").click()
-            rows = page.get_by_role("table").locator("tbody tr")
+            rows = page.get_by_role("table").first.locator("tbody tr")
+            notes = page.get_by_role("table", name="Newest notes").locator("tbody tr")
+            expect(notes).to_have_count(2)
+            expect(notes.nth(0)).to_contain_text("Benalarm acknowledged (withdrawn by Cem)")
+            expect(notes.nth(1)).to_contain_text("warmAnnaTag 1: vents <b>checked</b>")
             expect(rows.locator("th")).to_have_text(["warm", "silent", "gh1"])
             asked = served.http.get("/api/report").json()["sites"]
             scans = next(each["scans"] for each in asked if each["site"] == "warm")
@@ -253,13 +263,14 @@ def test_a_row_for_each_greenhouse_leads_to_its_shift_report(
             with page.expect_response(re.compile(r"/api/report\?from=\d+&sites=warm$")):
                 page.get_by_role("button", name="Last 24 hours").click()
             picture(page, "report")
+            expect(notes).to_have_count(1)
             rows.first.get_by_role("link").click()
             expect(page).to_have_url(re.compile(r"/sites/warm/api/report\.html\?from=.*&lang=en$"))
             expect(page.get_by_role("heading", level=1)).to_contain_text("report")
         phone = {"width": 390, "height": 800}
         with opened(browser, served.url, viewport=phone) as page:
             page.get_by_role("button", name="Shift report").click()
-            expect(page.get_by_role("table").locator("tbody tr")).to_have_count(3)
+            expect(page.get_by_role("table").first.locator("tbody tr")).to_have_count(3)
             assert page.evaluate("document.documentElement.scrollWidth") <= 390
 
 

@@ -367,7 +367,7 @@ def _add_answers(app: FastAPI, fleet: Fleet) -> None:
 
     @app.api_route("/api/report", methods=["GET", "HEAD"])
     async def reported(request: Request) -> Response:
-        """A row for each site, with its counts and the address of its report."""
+        """A row for each site, with its counts and the address of its report; the newest notes."""
         parameters, now_ns = request.query_params.multi_items(), fleet.watching.now_ns
         return await over_sites(request, sites_report(parameters, fleet.sites_for(request), now_ns))
 

@@ -1,4 +1,4 @@
-"""What happened between two moments at every site, counted in whole hours: a row a site.
+"""What happened between two moments at every site, counted in whole hours, and its newest notes.
 
 Hours are what the log has counted already; each site's own report has the rest.
 """
@@ -14,12 +14,14 @@ from urllib.parse import quote
 import orjson
 
 from lupin_bridge.fleet.compare import chosen
+from lupin_bridge.fleet.overview import MAX_LISTED
 from lupin_bridge.past import query as past_query
 from lupin_bridge.past.query import OfReport, Parameters
 from lupin_bridge.query_string import parameter, read
 from lupin_bridge.serving.admission import Answer, json_answer
+from lupin_bridge.stream.health_json import note_json
 from lupin_bridge.stream.state_json import stamp
-from lupin_twin.core.notes import WITHDRAW
+from lupin_twin.core.notes import WITHDRAW, WITHDRAWN, Note
 from lupin_twin.core.past import HOUR_NS, Event, PastRefused, seconds
 
 # Under the names of `schema.ReportCounts`.
@@ -35,6 +37,17 @@ WHERE site = ANY(%(sites)s) AND hour >= %(first)s AND hour < %(last)s GROUP BY s
 UNION ALL SELECT site, 'notes', count(*) FROM note
 WHERE site = ANY(%(sites)s) AND kind != %(withdraw)s
     AND made_at_ns >= %(start)s AND made_at_ns < %(end)s GROUP BY site
+"""
+_NOTES: Final = """
+SELECT site, id, made_at_ns, made_by, kind, subject, text, until_ns, gone.by, gone.at_ns
+FROM note LEFT JOIN LATERAL (
+    SELECT made_by AS by, made_at_ns AS at_ns FROM note AS other
+    WHERE other.site = note.site AND kind = %(withdraw)s AND subject = %(withdrawn)s || note.id
+    ORDER BY other.id LIMIT 1
+) AS gone ON true
+WHERE site = ANY(%(sites)s) AND kind != %(withdraw)s
+    AND made_at_ns >= %(start)s AND made_at_ns < %(end)s
+ORDER BY made_at_ns DESC, site, id LIMIT %(most)s
 """
 
 
@@ -53,8 +66,8 @@ class SitesReport:
     start_ns: int
     end_ns: int
 
-    def read(self, connection: Any) -> Sequence[tuple[str, str, int]]:
-        """What was counted, by site and event."""
+    def read(self, connection: Any) -> tuple[Sequence[Any], Sequence[Any]]:
+        """What was counted, by site and event, and the newest notes."""
         query = {
             "sites": [site for site, *_ in self.sites],
             "first": self.start_ns // HOUR_NS,
@@ -62,13 +75,14 @@ class SitesReport:
             "start": self.start_ns,
             "end": self.end_ns,
             "withdraw": WITHDRAW,
+            "withdrawn": WITHDRAWN,
+            "most": MAX_LISTED,
         }
-        found: Sequence[tuple[str, str, int]] = connection.execute(_COUNTS, query).fetchall()
-        return found
+        return tuple(connection.execute(text, query).fetchall() for text in (_COUNTS, _NOTES))
 
-    def answer(self, found: Sequence[tuple[str, str, int]]) -> Answer:
+    def answer(self, found: tuple[Sequence[Any], Sequence[Any]]) -> Answer:
         """The answer of what was read."""
-        counts = Counter({(site, event): int(n) for site, event, n in found})
+        counts = Counter({(site, event): int(n) for site, event, n in found[0]})
         asked = f"from={seconds(self.start_ns)}&to={seconds(self.end_ns)}"
         rows = [
             {
@@ -81,8 +95,24 @@ class SitesReport:
             }
             for site, name, active, heard_ns in self.sites
         ]
-        body = {"from": stamp(self.start_ns), "to": stamp(self.end_ns), "sites": rows}
+        names = {site: name for site, name, *_ in self.sites}
+        notes = [
+            {"site": site, "name": names[site], **_note_json(Note(*note), by, at_ns)}
+            for site, *note, by, at_ns in found[1]
+        ]
+        body = {
+            "from": stamp(self.start_ns),
+            "to": stamp(self.end_ns),
+            "sites": rows,
+            "notes": notes,
+        }
         return json_answer(orjson.dumps(body))
+
+
+def _note_json(note: Note, gone_by: str | None, gone_ns: int) -> dict[str, Any]:
+    """`people_schema.Note`; who took it back, if anybody did, and when."""
+    gone = {} if gone_by is None else {note.id: Note("", gone_ns, gone_by, WITHDRAW, "")}
+    return note_json(note, gone)
 
 
 def sites_report(parameters: Parameters, known: Mapping[str, Any], now_ns: int) -> SitesReport:

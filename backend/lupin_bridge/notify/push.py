@@ -80,6 +80,10 @@ class Push:
         self._new: dict[str, Alarm] = {}
         self._is_news = asyncio.Event()
         self._task: asyncio.Task[None] | None = None
+        # By endpoint: what is to be sent yet, and who does it.
+        self._owed: dict[str, dict[str, Alarm]] = {}
+        self._sending: dict[str, asyncio.Task[None]] = {}
+        self._at_once = asyncio.Semaphore(AT_ONCE)
         self._unsubscribe: Callable[[], None] = lambda: None
 
     async def public_key(self) -> str:
@@ -129,7 +133,8 @@ class Push:
     async def stop(self) -> None:
         """End at once."""
         self._unsubscribe()
-        await end(self._task)
+        for task in (self._task, *self._sending.values()):
+            await end(task)
 
     async def _run(self, source: Source) -> None:
         while True:
@@ -149,19 +154,29 @@ class Push:
                 log.exception("push met an error and goes on")
 
     async def _notify(self, alarms: Sequence[Alarm], source: Source) -> None:
-        devices = await self._people.write(lambda it, _: it.devices(self._site))
-        bodies = [alarm_json(alarm) for alarm in alarms]
-        at_once = asyncio.Semaphore(AT_ONCE)
-        self.condition.waiting = len(devices)
+        for device in await self._people.write(lambda it, _: it.devices(self._site)):
+            endpoint = device.endpoint
+            self._owed.setdefault(endpoint, {}).update({alarm.id: alarm for alarm in alarms})
+            if endpoint not in self._sending:
+                self._sending[endpoint] = asyncio.create_task(self._serve(device, source))
+        self.condition.waiting = len(self._sending)
 
-        async def send(device: Device) -> None:
-            async with at_once:
+    async def _serve(self, device: Device, source: Source) -> None:
+        """Send all that is owed to a browser; no other waits for it."""
+        try:
+            while owed := self._owed.pop(device.endpoint, None):
+                bodies = [alarm_json(alarm) for alarm in owed.values()]
                 title, body = push_text(bodies, device.language, source.criteria, source.origin)
                 title = f"{self._site}: {title}" if self._site else title
                 await self._send(device, orjson.dumps({"title": title, "body": body}))
-                self.condition.waiting -= 1
-
-        await asyncio.gather(*map(send, devices))
+        except (AccountError, AdmissionError) as error:
+            self._failed(str(error))
+        except Exception:  # nobody waits for this task
+            log.exception("push met an error and goes on")
+        finally:
+            self._owed.pop(device.endpoint, None)
+            del self._sending[device.endpoint]
+            self.condition.waiting = len(self._sending)
 
     async def _send(self, device: Device, message: bytes) -> None:
         """Until its push service takes it, has it no more, or was tried enough."""
@@ -170,7 +185,9 @@ class Push:
         async def attempt() -> None:
             try:
                 endpoint = await self._endpoint(device.endpoint)
-                await post(endpoint, await self._headers(endpoint), encrypted(device, message))
+                headers, body = await self._headers(endpoint), encrypted(device, message)
+                async with self._at_once:
+                    await post(endpoint, headers, body)
             except PostError as error:
                 if error.status in _GONE:
                     raise DeviceGone from None

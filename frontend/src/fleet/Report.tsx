@@ -1,7 +1,8 @@
-/** What happened at the greenhouses that are shown: a row for each, and the way to its shift report. */
+/** What happened at the greenhouses that are shown: a row for each, and what people said of them. */
 import { useState, type JSX } from 'react';
 
 import { timeOfDay } from '../clock';
+import { shown as shownText } from '../domain/text';
 import { LANGUAGE, S } from '../strings';
 import type { FleetWords } from '../words/fleet';
 import { VIEW_WORDS } from '../words/fleetViews';
@@ -26,6 +27,24 @@ interface SiteReport extends Readonly<Record<(typeof COUNTED)[number], number>> 
   readonly report: string;
 }
 
+interface Note {
+  readonly site: string;
+  readonly name: string;
+  readonly id: string;
+  readonly made_at: Time;
+  readonly by: string;
+  readonly kind: 'acknowledge' | 'shelve' | 'comment';
+  /** `tag:` and its id, `alarm:` and its id, or `site`. */
+  readonly subject: string;
+  readonly text: string;
+  readonly withdrawn_by: string | null;
+}
+
+interface Answer {
+  readonly sites: readonly SiteReport[];
+  readonly notes: readonly Note[];
+}
+
 interface Props {
   readonly shown: readonly Site[];
   readonly words: FleetWords;
@@ -36,8 +55,10 @@ export default function Report({ shown, words }: Props): JSX.Element {
   const names = namesOf(shown);
   const from = (Math.floor(timeOfDay() / 3_600_000) - hours) * 3600;
   const path = `api/report?from=${from}${names === '' ? '' : `&sites=${names}`}`;
-  const { value, trouble } = useAnswer<{ sites: readonly SiteReport[] }>(path, EVERY_MS);
+  const { value, trouble } = useAnswer<Answer>(path, EVERY_MS);
   const found = new Map(value?.sites.map((each) => [each.site, each]));
+  const sites = new Set(shown.map(({ site }) => site));
+  const notes = value?.notes.filter(({ site }) => sites.has(site)) ?? [];
   return (
     <section className="fleet-compare" aria-label={words.report}>
       <div className="fleet-head">
@@ -81,9 +102,36 @@ export default function Report({ shown, words }: Props): JSX.Element {
               })}
             </tbody>
           </table>
+          {notes.length > 0 && (
+            <table className="fleet-table">
+              <caption className="fleet-note">{W.newestNotes}</caption>
+              <tbody>
+                {notes.map((note) => (
+                  <NoteRow key={`${note.site} ${note.id}`} note={note} />
+                ))}
+              </tbody>
+            </table>
+          )}
         </div>
       )}
     </section>
+  );
+}
+
+function NoteRow({ note }: { note: Note }): JSX.Element {
+  const { name, made_at: at, by, kind, subject, text, withdrawn_by: gone } = note;
+  const tag = subject.startsWith('tag:') ? S.card(shownText(subject.slice(4), 24)) : '';
+  const kindOf = kind === 'comment' ? '' : W.kinds[kind];
+  return (
+    <tr>
+      <td>{timeText(ms(at))}</td>
+      <th scope="row">{name}</th>
+      <td>{by}</td>
+      <td className="fleet-text">
+        {[tag, kindOf, text].filter(Boolean).join(': ')}
+        {gone !== null && ` (${W.withdrawn(gone)})`}
+      </td>
+    </tr>
   );
 }
 

@@ -57,6 +57,15 @@ export const TagRow = memo(function TagRow({
   // A failed scan is said once, with its age.
   const others = health.reasons.filter(({ kind }) => !tag.failedTry || kind !== 'scan_failed');
   const why = reasonsText(catalogue, others, unit);
+  // Both may not fit: first what the verdict beside it is about.
+  const isTriedFirst = health.reasons.some(
+    ({ kind, verdict }) => kind === 'scan_failed' && verdict === health.verdict,
+  );
+  const tried = tag.failedTry && (
+    <span className="tried">
+      <Tried failed={tag.failedTry} />
+    </span>
+  );
   return (
     <tr
       aria-rowindex={index + 2}
@@ -87,13 +96,9 @@ export const TagRow = memo(function TagRow({
               <>
                 <span className="unseen">: </span>
                 <span className="why">
-                  {tag.failedTry && (
-                    <span className="tried">
-                      <Tried failed={tag.failedTry} />
-                    </span>
-                  )}
-                  {tag.failedTry && why !== '' && '; '}
-                  {why}
+                  {isTriedFirst ? tried : why}
+                  {tried && why !== '' && '; '}
+                  {isTriedFirst ? why : tried}
                 </span>
               </>
             )}

@@ -56,6 +56,19 @@ describe('table', () => {
     expect(row('2').textContent).toContain('never');
   });
 
+  test('says first what the verdict is about, then that an attempt has failed', () => {
+    const failed = reason({ kind: 'scan_failed', verdict: 'stressed', sensor: '', value: 2 });
+    const hot = reason({ verdict: 'critical', value: 40, limit: 35 });
+    const last = { last_try: { sec: 20, nanosec: 0 }, last_try_status: 2, last_try_detail: '' };
+    const tags = ['9', '10'].map((tag_id) =>
+      wireTag({ tag_id, readings: readings({ temperature: 40 }), ...last }),
+    );
+    showTags(tags, judgement({ 9: [hot, failed], 10: [failed] }));
+    render(<TagTable />);
+    expect(row('9').querySelector('.why')?.textContent).toMatch(/^Temperature .*; attempt /);
+    expect(row('10').querySelector('.why')?.textContent).toMatch(/^attempt /);
+  });
+
   test('no row moves below a pointer, and all do once it has left', () => {
     render(<TagTable />);
     const body = row('2').parentElement ?? document.body;

@@ -23,6 +23,9 @@ const ENGLISH = {
   activeAlarms: 'Alarms now',
   completeTo: 'Complete up to',
   wholeHours: 'Counted in whole hours. Follow a name for the report of that greenhouse.',
+  newestNotes: 'Newest notes',
+  kinds: { acknowledge: 'alarm acknowledged', shelve: 'alarm shelved' },
+  withdrawn: (name: string): string => `withdrawn by ${name}`,
 };
 
 const GERMAN: In<typeof ENGLISH> = {
@@ -45,6 +48,9 @@ const GERMAN: In<typeof ENGLISH> = {
   activeAlarms: 'Alarme jetzt',
   completeTo: 'Vollständig bis',
   wholeHours: 'In vollen Stunden gezählt. Der Name führt zum Bericht des Gewächshauses.',
+  newestNotes: 'Neueste Notizen',
+  kinds: { acknowledge: 'Alarm quittiert', shelve: 'Alarm zurückgestellt' },
+  withdrawn: (name) => `zurückgezogen von ${name}`,
 };
 
 const DUTCH: In<typeof ENGLISH> = {
@@ -67,6 +73,9 @@ const DUTCH: In<typeof ENGLISH> = {
   activeAlarms: 'Alarmen nu',
   completeTo: 'Volledig tot',
   wholeHours: 'In hele uren geteld. De naam leidt naar het rapport van de kas.',
+  newestNotes: 'Nieuwste notities',
+  kinds: { acknowledge: 'alarm bevestigd', shelve: 'alarm uitgesteld' },
+  withdrawn: (name) => `ingetrokken door ${name}`,
 };
 
 const SPANISH: In<typeof ENGLISH> = {
@@ -89,6 +98,9 @@ const SPANISH: In<typeof ENGLISH> = {
   activeAlarms: 'Alarmas ahora',
   completeTo: 'Completo hasta',
   wholeHours: 'Se cuenta por horas enteras. El nombre lleva al informe de ese invernadero.',
+  newestNotes: 'Notas más recientes',
+  kinds: { acknowledge: 'alarma reconocida', shelve: 'alarma aplazada' },
+  withdrawn: (name) => `retirada por ${name}`,
 };
 
 export const VIEW_WORDS: Readonly<Record<Language, In<typeof ENGLISH>>> = {

@@ -73,7 +73,43 @@ def test_a_sites_report_is_that_of_its_journal_and_all_are_counted(
         # In whole hours.
         some = page.http.get(f"/api/report?{asked}&sites=gh2").json()
         assert (some["from"]["sec"], len(some["sites"])) == (begun_s, 1)
+        assert (every["notes"], some["notes"]) == ([], [])
         check_refusals(page)
+
+
+def test_the_newest_notes_of_all_and_who_took_one_back(archive: Archive, tmp_path: Path) -> None:
+    at_s = int(time.time()) // HOUR_S * HOUR_S - 2 * HOUR_S
+    for site in ("gh1", "gh2"):
+        write(tmp_path / f"{site}.sqlite", rows_of(at_s)[:10])
+        forward_once(archive.of_site(site), tmp_path / f"{site}.sqlite")
+    said = (
+        ("gh1", "1", at_s, "Anna", "comment", "site", "vents checked"),
+        ("gh1", "2", at_s + 60, "Anna", "acknowledge", "alarm:x", ""),
+        ("gh2", "1", at_s + 30, "Ben", "comment", "tag:a", "'; DROP TABLE note; --"),
+        ("gh1", "3", at_s + 90, "Ben", "withdraw", "note:2", ""),
+        ("gh1", "4", at_s - HOUR_S, "Anna", "comment", "site", "before"),
+    )
+    for site, name, made_s, by, kind, subject, text in said:
+        archive.do(
+            f"INSERT INTO note VALUES ('{site}', '{name}', {made_s * SECOND}, '{by}', '{kind}',"
+            f" '{subject}', $${text}$$, NULL)"
+        )
+    with fleet(archive) as page:
+        page.site("gh2")
+        found = page.http.get(f"/api/report?from={at_s}").json()
+        assert [(it["site"], it["id"], it["by"], it["text"]) for it in found["notes"]] == [
+            ("gh1", "2", "Anna", ""),
+            ("gh2", "1", "Ben", "'; DROP TABLE note; --"),
+            ("gh1", "1", "Anna", "vents checked"),
+        ]
+        assert [it["withdrawn_by"] for it in found["notes"]] == ["Ben", None, None]
+        assert found["notes"][0]["withdrawn_at"] == {"sec": at_s + 90, "nanosec": 0}
+        # As each site says them itself.
+        own = page.http.get(f"/sites/gh1/api/report?from={at_s}").json()["notes"]
+        mine = [it for it in found["notes"] if it.pop("site") == "gh1" and it.pop("name")]
+        assert mine == own
+        only = page.http.get(f"/api/report?from={at_s}&sites=gh2").json()["notes"]
+        assert [it["by"] for it in only] == ["Ben"]
 
 
 def check_refusals(page: Page) -> None:

@@ -163,6 +163,20 @@ def test_a_phone_that_the_push_service_knows_no_more_is_forgotten_and_a_busy_one
         assert phone.read(on.service.posted[3])["body"].startswith("Tag 8:")
 
 
+def test_a_push_service_that_wants_to_be_left_alone_holds_up_no_other_phone(tmp_path: Path) -> None:
+    answers = (status(503, "Retry-After: 60"), status(201))
+    with stage(tmp_path, *answers) as on, signed_in(on.live.url, "anna") as anna:
+        phones = [on.phone("one"), on.phone("two")]
+        for phone in phones:
+            subscribe(anna, phone)
+        on.live.peer.observe(look("7", anomaly=True, bug_count=2))
+        wait_for(lambda: len(on.service.posted) == 2, "a try of each")
+        on.live.peer.observe(look("8", anomaly=True, bug_count=2))
+        wait_for(lambda: len(on.service.posted) == 3, "the next alarm")
+        [both] = [phone for phone in phones if len(on.posted_to(phone)) == 2]
+        assert both.read(on.posted_to(both)[1])["body"].startswith("Tag 8:")
+
+
 @pytest.fixture(scope="module")
 def open_to(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Stage]:
     with stage(tmp_path_factory.mktemp("push")) as on:

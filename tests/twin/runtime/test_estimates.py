@@ -102,6 +102,8 @@ def test_only_what_is_new_is_graded_and_a_reading_that_is_off_is_not_inside() ->
     off = with_reading(pasts, 2, 26 * HOUR_NS + S, 60.0)
     assert found(off, 26.1, before).report.record.week == Tally(1, 0)
     assert found(off, 25.9, before).report.record.week == Tally(), "the clock has gone back"
+    known = with_reading(pasts, 2, 26 * HOUR_NS, 21.0)
+    assert found(known, 26.1, found(known, 26)).report.record.week == Tally(), "it was there"
     few = house(6 * 3600, tags=4)
     later = with_reading(few, 2, 6 * HOUR_NS + S, 20.0)
     assert found(later, 6.1, found(few, 6)).report.record.week == Tally(), "of so few tags none is"

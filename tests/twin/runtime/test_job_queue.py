@@ -136,10 +136,17 @@ def test_so_many_queries_wait_and_one_more_is_told_to_come_again(
 ) -> None:
     searches = [made.ask(cost_s=cost_s) for _ in range(MAX_QUERIES)]
     with pytest.raises(NotRemembered, match=rf"{MAX_QUERIES} requests .* the limit") as refused:
-        made.ask()
+        made.ask(cost_s=cost_s)
     told = error_of(message_of(refused.value))
     assert isinstance(told, NotRemembered)
     assert not told.is_lasting
     searches[0].set_result(0)
     made.delivered()
-    made.ask()
+    made.ask(cost_s=cost_s)
+
+
+def test_a_flood_of_large_queries_refuses_no_small_one(made: Stage) -> None:
+    for _ in range(MAX_QUERIES):
+        made.ask(cost_s=LARGE_S)
+    made.ask().set_result(7)
+    assert made.delivered() == "7"

@@ -198,7 +198,7 @@ def in_turns(
             begun_s = clock()
 
 
-# Queries that wait for their answer, and those of a sort that are dealt with at once.
+# Queries of a sort that wait for their answer, and those that are dealt with at once.
 MAX_QUERIES: Final = 32
 LARGE_AT_ONCE: Final = 1
 SMALL_AT_ONCE: Final = 4
@@ -224,10 +224,11 @@ class JobQueue:
     """Work of more than a tick for one thread, which owns the queue and gets the answers.
 
     Large queries are taken `large_at_once`, each when the one before has been delivered: what is
-    made for the largest takes some 200 MB. Small ones do not wait behind them. While `is_behind()`
-    says that messages wait for the owner's thread, queries wait too, but for one a second.
-    `wake()` is called in another thread when `deliver` has something to do; `clock` tells seconds
-    and never jumps. `answered` counts answers, `slowest_s` is the longest that one took.
+    made for the largest takes some 200 MB. Small ones do not wait behind them, nor are refused for
+    them. While `is_behind()` says that messages wait for the owner's thread, queries wait too, but
+    for one a second. `wake()` is called in another thread when `deliver` has something to do;
+    `clock` tells seconds and never jumps. `answered` counts answers, `slowest_s` is the longest
+    that one took.
     """
 
     def __init__(
@@ -250,20 +251,20 @@ class JobQueue:
     @property
     def waiting(self) -> int:
         """Queries whose answer has not been delivered yet."""
-        return sum(len(lane.waiting) + lane.under_way for lane in self._lanes)
+        return sum(lane.count for lane in self._lanes)
 
     def ask(self, query: Query) -> None:
         """Have the query answered by `deliver`.
 
         Raises:
-            NotRemembered: too many wait.
+            NotRemembered: too many of its sort wait.
 
         """
-        if self.waiting >= MAX_QUERIES:
+        lane = self._lane(query)
+        if lane.count >= MAX_QUERIES:
             raise NotRemembered(
                 f"{MAX_QUERIES} requests wait, which is the limit", is_lasting=False
             )
-        lane = self._lane(query)
         lane.waiting.append(_Waiting(query, time.monotonic()))
         self._begin(lane)
 
@@ -352,3 +353,8 @@ class _Lane:
     under_way: int = 0
     begun_s: float = -math.inf
     waiting: deque[_Waiting] = field(default_factory=deque)
+
+    @property
+    def count(self) -> int:
+        """Queries whose answer has not been delivered yet."""
+        return len(self.waiting) + self.under_way

@@ -32,6 +32,8 @@ def test_the_table_by_area_the_worst_first(house: Bridge, open_page: OpenPage) -
         ["Critical South bay 2 tags", "Healthy North bay 2 tags", "Stressed No area 3 tags"]
     )
     expect(hmi.page.get_by_role("table").get_by_role("heading", level=3)).to_have_count(3)
+    # A row does not say again what its head says.
+    expect(hmi.row("1").get_by_role("rowheader")).to_have_text("1")
     # Heads are rows, to be counted, and nothing to be chosen.
     expect(hmi.page.get_by_role("table")).to_have_attribute("aria-rowcount", str(len(TAGS) + 4))
     expect(heads.nth(1)).to_have_attribute("aria-rowindex", "5")

@@ -9,7 +9,7 @@ import { LANGUAGE, S } from '../strings';
 import { HealthMark } from '../ui/HealthMark';
 import type { FleetWords } from '../words/fleet';
 import { VIEW_WORDS } from '../words/fleetViews';
-import { alarmCount, type Site } from './sites';
+import { alarmCount, namesOf, type Site } from './sites';
 import { ms, timeText } from './times';
 import { useAnswer } from './useAnswer';
 import { useSpeech } from './useSpeech';
@@ -22,8 +22,6 @@ interface SiteAlarm extends Alarm {
 
 const W = VIEW_WORDS[LANGUAGE];
 
-/** So many names are in one address; of more, all alarms are asked for. */
-const MOST_NAMED = 50;
 const EVERY_MS = 10_000;
 
 interface Props {
@@ -34,8 +32,8 @@ interface Props {
 export default function Alarms({ shown, words }: Props): JSX.Element {
   const speech = useSpeech();
   const having = shown.filter((site) => (site.active_alarms ?? 0) > 0);
-  const named = having.length <= MOST_NAMED ? having.map(({ site }) => site) : [];
-  const path = named.length > 0 ? `api/alarms?sites=${named.join(',')}` : 'api/alarms';
+  const names = namesOf(having);
+  const path = names === '' ? 'api/alarms' : `api/alarms?sites=${names}`;
   // Another count, another list.
   const news = having.map((site) => `${site.site} ${site.active_alarms ?? 0}`).join();
   const { value, trouble } = useAnswer<{ alarms: readonly SiteAlarm[] }>(path, EVERY_MS, news);

@@ -6,7 +6,7 @@ import { shown as shownText } from '../domain/text';
 import { LANGUAGE, S } from '../strings';
 import type { FleetWords } from '../words/fleet';
 import { VIEW_WORDS } from '../words/fleetViews';
-import type { Site, Time } from './sites';
+import { namesOf, type Site, type Time } from './sites';
 import { ms, timeText } from './times';
 import { useAnswer } from './useAnswer';
 
@@ -15,8 +15,6 @@ const W = VIEW_WORDS[LANGUAGE];
 /** Shifts, and a day. */
 const HOURS = [12, 24] as const;
 const EVERY_MS = 60_000;
-/** So many names are in one address; of more, all greenhouses are asked for. */
-const MOST_NAMED = 50;
 
 const COUNTED = ['scans', 'failed', 'inspections', 'notes'] as const;
 
@@ -54,10 +52,9 @@ interface Props {
 
 export default function Report({ shown, words }: Props): JSX.Element {
   const [hours, setHours] = useState<number>(HOURS[0]);
-  // By name: where the worst one moves, the question stays.
-  const names = shown.length <= MOST_NAMED ? shown.map(({ site }) => site).sort() : [];
+  const names = namesOf(shown);
   const from = (Math.floor(timeOfDay() / 3_600_000) - hours) * 3600;
-  const path = `api/report?from=${from}${names.length > 0 ? `&sites=${names.join(',')}` : ''}`;
+  const path = `api/report?from=${from}${names === '' ? '' : `&sites=${names}`}`;
   const { value, trouble } = useAnswer<Answer>(path, EVERY_MS);
   const found = new Map(value?.sites.map((each) => [each.site, each]));
   const sites = new Set(shown.map(({ site }) => site));

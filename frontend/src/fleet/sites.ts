@@ -37,6 +37,13 @@ export interface SitesFrame {
   readonly gone: readonly string[];
 }
 
+/** So many names are in one address. */
+const MOST_NAMED = 50;
+
+/** Sites for a query; empty: too many, so that all are asked for. Where the worst one moves, it stays. */
+export const namesOf = (sites: readonly Site[]): string =>
+  sites.length > MOST_NAMED ? '' : String(sites.map(({ site }) => site).sort());
+
 export type Sites = ReadonlyMap<string, Site>;
 
 export const FILTERS = ['all', 'critical', 'stressed', 'silent', 'healthy'] as const;

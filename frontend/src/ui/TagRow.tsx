@@ -24,6 +24,8 @@ interface Props {
   readonly tag: Tag;
   readonly health: TagHealth;
   readonly catalogue: Catalogue;
+  /** Empty: in none, or its head says it. */
+  readonly area: string;
   /** Those that have a column. */
   readonly sensors: readonly Sensor[];
   readonly chosen: string;
@@ -41,6 +43,7 @@ export const TagRow = memo(function TagRow({
   tag,
   health,
   catalogue,
+  area,
   sensors,
   chosen,
   unit,
@@ -50,7 +53,6 @@ export const TagRow = memo(function TagRow({
   hovered,
 }: Props): JSX.Element {
   const has = (id: string): boolean => isColumnShown({ hidden }, id);
-  const area = catalogue.areaOf(tag.id);
   const all = reasonsText(catalogue, health.reasons, unit);
   // A failed scan is said once, with its age.
   const others = health.reasons.filter(({ kind }) => !tag.failedTry || kind !== 'scan_failed');

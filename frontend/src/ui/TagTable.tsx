@@ -41,6 +41,7 @@ export function TagTable(): JSX.Element {
   const unit = useApp((state) => state.settings.unit);
   const { lines, ...hold } = useHeldRows();
   const hasTags = useApp((state) => selectTags(state).length > 0);
+  const isByArea = useApp((state) => state.settings.byArea);
   const density = useApp((state) => state.settings.density);
   const hidden = useApp((state) => state.settings.hidden);
   const last = useSelected(hourAgo, (known) => known);
@@ -148,6 +149,7 @@ export function TagTable(): JSX.Element {
                 tag={row.tag}
                 health={row.health}
                 catalogue={catalogue}
+                area={isByArea ? '' : catalogue.areaOf(row.tag.id)}
                 sensors={sensors}
                 chosen={chosen}
                 unit={unit}

@@ -270,7 +270,7 @@ def test_check_without_a_configuration_finds_one_that_works(domain: int) -> None
             robot.be_at(0.0, "odom")
             robot.read(21.5)
             spin()
-            return sum(bool(each.received) for each in node.heard.values()) == 3
+            return sum(bool(each.received) for each in node.sources.values()) == 3
 
         peer.until(publish, "enough to be heard")
         found = config_of(yaml.safe_load(suggestion(node)))

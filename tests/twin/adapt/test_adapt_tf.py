@@ -226,6 +226,14 @@ def test_a_fixed_sensor_is_where_its_frame_is(domain: int, config: Path) -> None
         at = peer.until(is_there, "the sensor where its frame is").pose.position
         assert (at.x, at.y, at.z) == pytest.approx((4.0, 1.5, 0.8))
         peer.until(lambda: robot.said("TF has no way from 'nowhere' to 'map'"), "the other one")
+        robot.stand(*frames, robot.step("map", "nowhere", (1.0, 0.0, 0.0)))
+        robot.reports.clear()
+
+        def is_right() -> bool:
+            every = (status for each in robot.reports for status in each.status)
+            return any((it.name, it.message) == ("/lupin_adapt: /tf", "receiving") for it in every)
+
+        peer.until(is_right, "nothing to be wrong any more")
         assert process.exit_code is None
 
 
@@ -273,7 +281,7 @@ def test_check_without_a_configuration_finds_tf_and_detections(domain: int) -> N
             robot.be_at(5.0, robot.see(7, 0.3))
             robot.read(21.5)
             spin()
-            return "base_link" in node.frames and len(node.heard) >= 4
+            return "base_link" in node.frames and len(node.sources) >= 4
 
         peer.until(publish, "enough to be heard")
         found = config_of(yaml.safe_load(suggestion(node)))

@@ -39,11 +39,11 @@ def report(node: AdaptNode, seconds: float) -> Iterator[tuple[bool, str]]:
 
 
 class Listener(Node):  # type: ignore[misc]  # rclpy is not typed
-    """Hears every topic of a standard type."""
+    """Subscribes to every topic of a standard type."""
 
     def __init__(self) -> None:
         super().__init__("lupin_adapt_check")
-        self.heard: dict[str, Source] = {}
+        self.sources: dict[str, Source] = {}
         # Types that were seen, and why they cannot be read here.
         self.missing: dict[str, str] = {}
         self.frames = Frames()
@@ -51,7 +51,7 @@ class Listener(Node):  # type: ignore[misc]  # rclpy is not typed
 
     def _look(self) -> None:
         for topic, types in self.get_topic_names_and_types():
-            if topic not in self.heard and types[0] in _KNOWN:
+            if topic not in self.sources and types[0] in _KNOWN:
                 self._listen(topic, types[0])
 
     def _listen(self, topic: str, type_name: str) -> None:
@@ -60,42 +60,42 @@ class Listener(Node):  # type: ignore[misc]  # rclpy is not typed
         except ConfigError as error:
             self.missing[type_name] = str(error)
             return
-        heard = self.heard[topic] = Source(topic, type_name)
+        source = self.sources[topic] = Source(topic, type_name)
 
         def take(message: Any) -> None:
-            heard.received += 1
+            source.received += 1
             if type_name == TF_TYPE:
                 for each in message.transforms:
                     with suppress(FrameError):
                         self.frames.put(*transform_of(each, None))
             elif hasattr(message, "header"):
-                heard.shown["frame_id"] = message.header.frame_id
+                source.shown["frame_id"] = message.header.frame_id
 
         qos = TF_STATIC_QOS if topic == TF_STATIC else ANY_PUBLISHER
         self.create_subscription(kind, topic, take, qos)
 
 
 def suggestion(listener: Listener) -> str:
-    """A configuration to start from, of what was heard, as YAML."""
-    poses = [topic for topic, heard in listener.heard.items() if heard.type_name in POSES]
+    """A configuration to start from, of what was received, as YAML."""
+    poses = [topic for topic, source in listener.sources.items() if source.type_name in POSES]
     sensors: dict[str, Any] = {}
-    for topic, heard in sorted(listener.heard.items()):
-        known = STANDARD.get(heard.type_name)
-        if known is not None and heard.received:
+    for topic, source in sorted(listener.sources.items()):
+        known = STANDARD.get(source.type_name)
+        if known is not None and source.received:
             name = known[0] or topic.rpartition("/")[2]
-            entry = {"topic": topic, "type": heard.type_name}
+            entry = {"topic": topic, "type": source.type_name}
             sensors.setdefault(name, []).append(entry)
     content: dict[str, Any] = {}
     if poses:
-        heard = listener.heard[poses[0]]
-        if frame_id := heard.shown.get("frame_id"):
+        source = listener.sources[poses[0]]
+        if frame_id := source.shown.get("frame_id"):
             content["frame_id"] = frame_id
-        content["robot"] = {"topic": poses[0], "type": heard.type_name}
+        content["robot"] = {"topic": poses[0], "type": source.type_name}
     elif base := next((name for name in _BASES if name in listener.frames), ""):
         content["robot"] = {"tf": base}
     content["tags"] = {"A": [0.0, 0.0]}
-    for topic, heard in listener.heard.items():
-        if heard.type_name == DETECTIONS_TYPE:
+    for topic, source in listener.sources.items():
+        if source.type_name == DETECTIONS_TYPE:
             content["detections"] = {"topic": topic}
             content["tags"] = {}
     content["reach_m"] = 0.8

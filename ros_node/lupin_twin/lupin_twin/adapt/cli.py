@@ -125,10 +125,10 @@ def _suggest(seconds: float) -> int:
     _listen(listener, seconds)
     for why in listener.missing.values():
         _say(why, sys.stderr)
-    if not any(heard.received for heard in listener.heard.values()):
-        topics = sorted(name for name, _ in listener.get_topic_names_and_types())
+    if not any(source.received for source in listener.sources.values()):
+        topics = ", ".join(sorted(name for name, _ in listener.get_topic_names_and_types()))
         return _refuse(
-            f"nothing was heard that is a reading or a pose; topics: {', '.join(topics) or 'none'}"
+            f"nothing was received that is a reading or a pose; topics: {topics or 'none'}"
         )
     _say("# Where each tag is, [x, y] in m, is for you to fill in.", sys.stdout)
     _say(suggestion(listener).rstrip(), sys.stdout)

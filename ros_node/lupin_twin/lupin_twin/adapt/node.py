@@ -225,12 +225,10 @@ class AdaptNode(Node):  # type: ignore[misc]  # rclpy is not typed
             return
         try:
             x, y, _ = self._place(robot.tf)
-        except FrameError as error:
-            self._sources[TF].problem = str(error)
+        except FrameError:
             self._at = None
             self._publish(self._scans.lose(self._now_ns()))
         else:
-            self._sources[TF].problem = ""
             self._move(TF, x, y)
 
     def _on_detections(self, topic: str, message: Any) -> None:
@@ -250,19 +248,25 @@ class AdaptNode(Node):  # type: ignore[misc]  # rclpy is not typed
         self._find_tags()
 
     def _find_tags(self) -> None:
+        known = len(self._scans.places)
         for tag_id, frame in self._sightings.come(self._frames):
             try:
                 place = Place(*self._place(frame))
             except FrameError:  # of another frame in between, which may come too
                 continue
             self._sightings.end(frame)
-            if self._at is not None and self._scans.discover(tag_id, place, *self._at):
-                self._publish_tags()
-        for tag_id, frame in self._config.frames.items():
-            if tag_id not in self._scans.places:
-                with suppress(FrameError):
-                    self._scans.survey(tag_id, Place(*self._place(frame)))
-                    self._publish_tags()
+            if self._at is not None:
+                self._scans.discover(tag_id, place, *self._at)
+        for tag_id, frame in self._frames_to_find():
+            with suppress(FrameError):
+                self._scans.survey(tag_id, Place(*self._place(frame)))
+        if len(self._scans.places) > known:
+            self._publish_tags()
+
+    def _frames_to_find(self) -> list[tuple[str, str]]:
+        """Tag and frame of those of the configuration whose place TF did not say yet."""
+        frames, places = self._config.frames, self._scans.places
+        return [(tag_id, frame) for tag_id, frame in frames.items() if tag_id not in places]
 
     def _on_message(self, sensors: list[Sensor], topic: str, message: Any) -> None:
         stamp_ns = self._stamp_ns(topic, message)
@@ -354,6 +358,7 @@ class AdaptNode(Node):  # type: ignore[misc]  # rclpy is not typed
 
     def _each_second(self) -> None:
         self._publish(self._scans.due(self._now_ns()))
+        self._move_by_tf()
         for frame in self._sightings.missed(self._now_ns()):
             why = f"TF has no {frame!r}: is tag.frames set in apriltag_ros?"
             if frame in self._frames:
@@ -371,17 +376,14 @@ class AdaptNode(Node):  # type: ignore[misc]  # rclpy is not typed
 
         A topic on which nothing came for `silent_s` is silent.
         """
-        self._move_by_tf()
-        for tag_id, frame in self._config.frames.items():
-            tf = self._sources[TF]
-            if tag_id not in self._scans.places:
-                tf.problem = tf.problem or self._why_no_place(frame)
         for topic, source in self._sources.items():
-            if topic not in (MQTT, TF):
-                source.problem = self._why_silent(source, silent_s)
+            if topic == TF:
+                source.problem = self._why_not_in_tf()
             elif topic == MQTT and self._mqtt is not None:
                 source.problem = self._mqtt.problem
                 source.shown["lost"] = str(self._mqtt.lost)
+            else:
+                source.problem = self._why_silent(source, silent_s)
             # A robot that stands, or a slow sensor, is nothing to be logged.
             if source.problem and (source.received == 0 or topic in (MQTT, TF)):
                 self.utilities.warn(("problem", topic), f"{topic}: {source.problem}")
@@ -393,6 +395,13 @@ class AdaptNode(Node):  # type: ignore[misc]  # rclpy is not typed
             {"made": str(self._built), "errors": str(errors)},
         )
         return [*(source.finding(topic) for topic, source in self._sources.items()), made]
+
+    def _why_not_in_tf(self) -> str:
+        robot = self._config.robot
+        frames = [frame for _, frame in self._frames_to_find()]
+        if robot is not None and robot.tf:
+            frames = [robot.tf, *frames]
+        return next(filter(None, map(self._why_no_place, frames)), "")
 
     def _why_silent(self, source: Source, silent_s: float) -> str:
         quiet_s = time.monotonic() - max(source.received_s, self._started_s)

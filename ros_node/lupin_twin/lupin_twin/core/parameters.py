@@ -99,7 +99,7 @@ class TwinParameters:
         0.001,
         FARTHEST_M,
     )
-    buffer_len: int = _parameter(32, "scans kept per tag for its history", 1, 10_000, fixed=_MADE)
+    buffer_len: int = _parameter(32, "scans in the history of a tag", 1, 10_000, fixed=_MADE)
     idw_power: float = _parameter(2.0, "exponent of the distance in the weights", 0.01, 100.0)
     idw_falloff_radius_m: float = _parameter(
         1.5, "tags up to this distance are averaged, m", 0.001, 10_000.0

@@ -50,7 +50,10 @@ def last_rows(connection: sqlite3.Connection, run: Run) -> list[Scan | Inspectio
 def newest_of_tag(
     connection: sqlite3.Connection, run: int, tag_id: str, per_series: int
 ) -> list[Scan | Inspection]:
-    """The same of one tag; each series by itself, which is quick on both engines."""
+    """The newest of each series of a tag, in the order of receiving.
+
+    Each series by itself, which is quick on both engines.
+    """
     asked: dict[str, Any] = {"site": LOCAL_SITE, "run": run, "tag": tag_id, "depth": per_series}
     of_tag = "s.site = :site AND s.run = :run AND s.tag = :tag"
     newest = " ORDER BY r.stamp_ns DESC, r.seq DESC LIMIT :depth"

@@ -128,8 +128,8 @@ class NodeUtilities:
         wanted, serialised as it is, or is lost of it, is nothing to be counted.
 
         `parameter` is what gave the name. Returns the topic as ROS has resolved and remapped it:
-        that is the name in its graph, and in warnings. What is past
-        the limits of `shape` is dropped before a single object is made of it.
+        that is the name in its graph, and in warnings. What is past the limits of `shape` is
+        dropped before a single object is made of it.
 
         Raises:
             lupin_twin.core.parameters.ParameterError: a name that ROS does not take.

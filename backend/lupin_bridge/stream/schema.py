@@ -334,6 +334,9 @@ class StatusFrame(Contract):
     input_problems: list[str] = Field(
         description="why the twin does not hear all that is published for it, with the remedy"
     )
+    day_length_s: float = Field(
+        description="s of ROS time, from one hour to the same of the next day; a demo's is shorter"
+    )
     drops: list[RecentDrop] = Field(description="what the twin dropped recently, by reason")
     journal: Journal
     outward: list[Outward] = Field(description="those that the operator has set up")

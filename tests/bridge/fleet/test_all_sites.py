@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -35,9 +35,9 @@ def day(temperature: float) -> list[Write]:
     return [row for hours in (3, 2, 1) for row in hours_ago(hours, temperature)]
 
 
-def forward(archive: Archive, folder: Path, site: str, rows: list[Write]) -> None:
+def forward(archive: Archive, folder: Path, site: str, rows: Sequence[Write]) -> None:
     """From a journal of its own."""
-    write(folder / site, rows)
+    write(folder / site, list(rows))
     forward_once(archive.of_site(site), folder / site)
     archive.keep_live()
 
@@ -54,7 +54,7 @@ def every(postgresql: Postgres, tmp_path_factory: pytest.TempPathFactory) -> Ite
     """Sites that no test changes but "over" and "noted", for one test each."""
     archive, folder = Archive(postgresql), tmp_path_factory.mktemp("sites")
     archive.add_user("page", "lupin_page")
-    sites = {
+    sites: dict[str, Sequence[Write]] = {
         "gh1": scans_lately(temperature=28.0, tags=2),
         # Raised before the others.
         "gh2": scans_lately(temperature=45.0, tags=1, scans=9),

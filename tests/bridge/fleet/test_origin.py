@@ -33,7 +33,7 @@ def test_where_it_comes_from_is_in_the_log(archive: Archive, tmp_path: Path) -> 
     write(tmp_path / "gh1", scans_lately())  # which does not say it
     forward_once(archive, tmp_path / "gh1")
     with fleet(archive) as page:
-        for site, *_, said in (*SITES, ("gh1", "unknown")):
+        for site, said in [*((site, said) for site, _, _, said in SITES), ("gh1", "unknown")]:
             page.site(site, origin=said)
             assert page.http.get(f"/sites/{site}/readyz").json()["origin"] == said
         # A journal that is used for something else says that.

@@ -9,15 +9,17 @@ from pathlib import Path
 from typing import Any
 
 import httpx
+from argon2 import PasswordHasher
 
 from lupin_bridge.access.accounts import Accounts, digest, make_file
-from lupin_bridge.access.people import hashed
 from lupin_bridge.access.person import Kind, Role
 from tests.support.waiting import PATIENCE_S
 
 OWN = {"X-Lupin-Twin": "1"}
 PASSWORD = "correct horse battery staple"
 TOKEN = "a-token-of-43-characters-0123456789-abcdefg"
+# As cheap as argon2id can be: what a hash costs to verify is written in it.
+_HASH = PasswordHasher(time_cost=1, memory_cost=8, parallelism=1).hash(PASSWORD)
 
 
 @contextmanager
@@ -30,7 +32,7 @@ def changing(path: Path) -> Iterator[Accounts]:
 
 def add(path: Path, kind: Kind = "account", secret: str = "", **people: Role) -> None:
     """Accounts with `PASSWORD`, or tokens, by their names, each with its role."""
-    secret = secret or (hashed(PASSWORD) if kind == "account" else digest(TOKEN))
+    secret = secret or (_HASH if kind == "account" else digest(TOKEN))
     with changing(path) as accounts:
         for name, role in people.items():
             accounts.add(name, kind, role, secret, by="a test", now_s=int(time.time()))

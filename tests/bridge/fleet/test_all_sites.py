@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -15,137 +16,10 @@ from lupin_twin.core.state import Write
 from tests.support.archive import Archive, forward_once
 from tests.support.fleet import Page, fleet, scans_lately, wall, write
 from tests.support.journal import SECOND, scan
+from tests.support.postgres import Postgres
 from tests.support.waiting import wait_for
 
 HOUR_S = 3600
-
-
-def forward(archive: Archive, folder: Path, sites: Mapping[str, Iterable[Write]]) -> None:
-    """Each from a journal of its own."""
-    for site, rows in sites.items():
-        journal = folder / f"{site}.sqlite"
-        write(journal, list(rows))
-        forward_once(archive.of_site(site), journal)
-    archive.keep_live()
-
-
-def alarms(page: Page, sites: str = "") -> dict[str, Any]:
-    answer = page.http.get("/api/alarms", params={"sites": sites} if sites else {})
-    assert answer.status_code == 200, answer.text
-    found: dict[str, Any] = answer.json()
-    return found
-
-
-def test_alarms_of_all_sites_the_worst_first(archive: Archive, tmp_path: Path) -> None:
-    forward(
-        archive,
-        tmp_path,
-        {
-            "gh1": scans_lately(temperature=28.0, tags=2),
-            # Raised before the others.
-            "gh2": scans_lately(temperature=45.0, tags=1, scans=9),
-            "well": scans_lately(temperature=22.0),
-        },
-    )
-    with fleet(archive) as page:
-        page.site("gh1", active_alarms=2)
-        page.site("gh2", active_alarms=1)
-        page.site("well", active_alarms=0)
-        found = alarms(page)
-        said = [(it["site"], it["tag_id"], it["reason"]["verdict"]) for it in found["alarms"]]
-        assert said[0] == ("gh2", "0", "critical")
-        assert sorted(said[1:]) == [("gh1", "0", "stressed"), ("gh1", "1", "stressed")]
-        assert found["total"] == sum(site["active_alarms"] for site in page.sites().values())
-        # The newest first among equals.
-        raised = [it["raised_at"] for it in found["alarms"][1:]]
-        assert raised == sorted(raised, key=lambda at: (-at["sec"], -at["nanosec"]))
-        # As the site itself has it, with who it is of in front.
-        first = dict(found["alarms"][0])
-        assert (first.pop("site"), first.pop("name")) == ("gh2", "gh2")
-        assert first.pop("is_live") is True
-        wait_for(
-            lambda: first in page.http.get("/sites/gh2/api/alarms").json()["alarms"],
-            f"the same alarm below its site's path: {first}",
-        )
-        assert [it["site"] for it in alarms(page, "gh1,well")["alarms"]] == ["gh1", "gh1"]
-        assert alarms(page, "well") == {"alarms": [], "total": 0}
-
-
-def test_alarms_that_are_over_are_gone_and_the_etag_says_so(
-    archive: Archive, tmp_path: Path
-) -> None:
-    forward(archive, tmp_path, {"gh1": scans_lately(temperature=45.0, tags=1)})
-    with fleet(archive) as page:
-        page.site(active_alarms=1)
-        etag = page.http.get("/api/alarms").headers["etag"]
-        again = page.http.get("/api/alarms", headers={"If-None-Match": etag})
-        assert again.status_code == 304
-        now_ns = wall().stamp_ns
-        cool = [scan("0", now_ns + at, temperature=22.0) for at in range(3)]
-        forward(archive, tmp_path, {"gh1": cool})
-        page.site(active_alarms=0)
-        assert alarms(page) == {"alarms": [], "total": 0}
-
-
-def test_there_are_so_many_of_a_site_and_in_all_and_the_rest_is_counted(
-    archive: Archive, tmp_path: Path
-) -> None:
-    many = MAX_LISTED // MAX_ALARMS + 1
-    hot = {f"gh{n}": scans_lately(temperature=45.0, tags=MAX_ALARMS + 1) for n in range(many)}
-    forward(archive, tmp_path, hot)
-    with fleet(archive) as page:
-        for site in hot:
-            page.site(site, active_alarms=MAX_ALARMS + 1)
-        found = alarms(page)
-        assert len(found["alarms"]) == MAX_LISTED
-        assert found["total"] == many * (MAX_ALARMS + 1)
-        assert len(alarms(page, "gh1")["alarms"]) == MAX_ALARMS
-
-
-def test_what_people_said_of_an_alarm_is_beside_it(archive: Archive, tmp_path: Path) -> None:
-    forward(archive, tmp_path, {"gh1": scans_lately(temperature=45.0, tags=2)})
-    with fleet(archive) as page:
-        page.site(active_alarms=2)
-        etag = page.http.get("/api/alarms").headers["etag"]
-        # Nobody has said anything.
-        first, second = alarms(page)["alarms"]
-        assert not {"acknowledged_by", "shelved_by"} & {*first, *second}
-        now_ns = time.time_ns()
-        for number, (kind, alarm, until_ns) in enumerate(
-            (
-                ("acknowledge", first, "NULL"),
-                ("shelve", second, str(now_ns + HOUR_S * SECOND)),
-            )
-        ):
-            note_id = f"{number + 1:016x}beef"
-            archive.do(
-                f"INSERT INTO note VALUES ('gh1', '{note_id}', {now_ns}, 'anna', '{kind}',"
-                f" 'alarm:{alarm['id']}', 'valve', {until_ns})"
-            )
-
-        def said() -> list[tuple[str | None, str | None]]:
-            found = {it["id"]: it for it in alarms(page)["alarms"]}
-            return [
-                (found[it["id"]].get("acknowledged_by"), found[it["id"]].get("shelved_by"))
-                for it in (first, second)
-            ]
-
-        # Without a row of the log that would be new.
-        wait_for(lambda: said() == [("anna", None), (None, "anna")], "who said what")
-        assert page.http.get("/api/alarms").headers["etag"] != etag
-        shelved = next(it for it in alarms(page)["alarms"] if it["id"] == second["id"])
-        assert shelved["shelved_until"]["sec"] == now_ns // SECOND + HOUR_S
-        # The word of one greenhouse is not that of another.
-        archive.do(
-            f"INSERT INTO note VALUES ('other', 'n1', {now_ns}, 'bert', 'acknowledge',"
-            f" 'alarm:{second['id']}', '', NULL)"
-        )
-        looks = page.metric("lupin_fleet_looks")
-        wait_for(lambda: page.metric("lupin_fleet_looks") > looks + 2, "another look")
-        assert said() == [("anna", None), (None, "anna")]
-
-
-# --- comparing ------------------------------------------------------------------------------------
 
 
 def hours_ago(hours: int, temperature: float, tags: int = 2) -> list[Write]:
@@ -161,6 +35,155 @@ def day(temperature: float) -> list[Write]:
     return [row for hours in (3, 2, 1) for row in hours_ago(hours, temperature)]
 
 
+def forward(archive: Archive, folder: Path, site: str, rows: Sequence[Write]) -> None:
+    """From a journal of its own."""
+    write(folder / site, list(rows))
+    forward_once(archive.of_site(site), folder / site)
+    archive.keep_live()
+
+
+@dataclass
+class All:
+    archive: Archive
+    page: Page
+    folder: Path
+
+
+@pytest.fixture(scope="module")
+def every(postgresql: Postgres, tmp_path_factory: pytest.TempPathFactory) -> Iterator[All]:
+    """Sites that no test changes but "over" and "noted", for one test each."""
+    archive, folder = Archive(postgresql), tmp_path_factory.mktemp("sites")
+    archive.add_user("page", "lupin_page")
+    sites: dict[str, Sequence[Write]] = {
+        "gh1": scans_lately(temperature=28.0, tags=2),
+        # Raised before the others.
+        "gh2": scans_lately(temperature=45.0, tags=1, scans=9),
+        "well": scans_lately(temperature=22.0),
+        "over": scans_lately(temperature=45.0, tags=1),
+        "noted": scans_lately(temperature=45.0, tags=2),
+        "a": day(20.0),
+        "b": day(21.0),
+        "c": day(22.0),
+        "odd": day(35.0),
+        "empty": [scan("0", wall().stamp_ns - SECOND, humidity=50.0)],
+    }
+    for site, rows in sites.items():
+        forward(archive, folder, site, rows)
+    with fleet(archive) as page:
+        for site in sites:
+            page.site(site)
+        yield All(archive, page, folder)
+    archive.drop()
+
+
+def alarms(page: Page, sites: str = "") -> dict[str, Any]:
+    answer = page.http.get("/api/alarms", params={"sites": sites} if sites else {})
+    assert answer.status_code == 200, answer.text
+    found: dict[str, Any] = answer.json()
+    return found
+
+
+def test_alarms_of_all_sites_the_worst_first(every: All) -> None:
+    page = every.page
+    page.site("gh1", active_alarms=2)
+    page.site("gh2", active_alarms=1)
+    page.site("well", active_alarms=0)
+    found = alarms(page, "gh1,gh2,well")
+    said = [(it["site"], it["tag_id"], it["reason"]["verdict"]) for it in found["alarms"]]
+    assert said[0] == ("gh2", "0", "critical")
+    assert sorted(said[1:]) == [("gh1", "0", "stressed"), ("gh1", "1", "stressed")]
+    assert alarms(page)["total"] == sum(site["active_alarms"] for site in page.sites().values())
+    # The newest first among equals.
+    raised = [it["raised_at"] for it in found["alarms"][1:]]
+    assert raised == sorted(raised, key=lambda at: (-at["sec"], -at["nanosec"]))
+    # As the site itself has it, with who it is of in front.
+    first = dict(found["alarms"][0])
+    assert (first.pop("site"), first.pop("name")) == ("gh2", "gh2")
+    assert first.pop("is_live") is True
+    wait_for(
+        lambda: first in page.http.get("/sites/gh2/api/alarms").json()["alarms"],
+        f"the same alarm below its site's path: {first}",
+    )
+    assert alarms(page, "well") == {"alarms": [], "total": 0}
+
+
+def test_alarms_that_are_over_are_gone_and_the_etag_says_so(every: All) -> None:
+    page, path = every.page, "/api/alarms?sites=over"
+    page.site("over", active_alarms=1)
+    etag = page.http.get(path).headers["etag"]
+    assert page.http.get(path, headers={"If-None-Match": etag}).status_code == 304
+    now_ns = wall().stamp_ns
+    cool = [scan("0", now_ns + at, temperature=22.0) for at in range(3)]
+    forward(every.archive, every.folder, "over", cool)
+    page.site("over", active_alarms=0)
+    assert alarms(page, "over") == {"alarms": [], "total": 0}
+
+
+def test_there_are_so_many_of_a_site_and_in_all_and_the_rest_is_counted(
+    archive: Archive, tmp_path: Path
+) -> None:
+    many = MAX_LISTED // MAX_ALARMS + 1
+    forward(archive, tmp_path, "gh1", scans_lately(temperature=45.0, tags=MAX_ALARMS + 1))
+    hot = [f"gh{n}" for n in range(1, many + 1)]
+    archive.copy_site(*hot[1:])
+    archive.do("INSERT INTO site SELECT 'more' || n, '' FROM generate_series(1, 50) AS n")
+    with fleet(archive) as page:
+        for site in hot:
+            page.site(site, active_alarms=MAX_ALARMS + 1)
+        found = alarms(page)
+        assert len(found["alarms"]) == MAX_LISTED
+        assert found["total"] == many * (MAX_ALARMS + 1)
+        assert len(alarms(page, "gh1")["alarms"]) == MAX_ALARMS
+        answer = page.http.get("/api/compare?sensor_type=temperature")
+        assert answer.status_code == 400
+        assert f"sites are {50 + many}, the limit is 50" in answer.json()["detail"]
+
+
+def test_what_people_said_of_an_alarm_is_beside_it(every: All) -> None:
+    archive, page = every.archive, every.page
+    page.site("noted", active_alarms=2)
+    etag = page.http.get("/api/alarms?sites=noted").headers["etag"]
+    # Nobody has said anything.
+    first, second = alarms(page, "noted")["alarms"]
+    assert not {"acknowledged_by", "shelved_by"} & {*first, *second}
+    now_ns = time.time_ns()
+    for number, (kind, alarm, until_ns) in enumerate(
+        (
+            ("acknowledge", first, "NULL"),
+            ("shelve", second, str(now_ns + HOUR_S * SECOND)),
+        )
+    ):
+        note_id = f"{number + 1:016x}beef"
+        archive.do(
+            f"INSERT INTO note VALUES ('noted', '{note_id}', {now_ns}, 'anna', '{kind}',"
+            f" 'alarm:{alarm['id']}', 'valve', {until_ns})"
+        )
+
+    def said() -> list[tuple[str | None, str | None]]:
+        found = {it["id"]: it for it in alarms(page, "noted")["alarms"]}
+        return [
+            (found[it["id"]].get("acknowledged_by"), found[it["id"]].get("shelved_by"))
+            for it in (first, second)
+        ]
+
+    # Without a row of the log that would be new.
+    wait_for(lambda: said() == [("anna", None), (None, "anna")], "who said what")
+    assert page.http.get("/api/alarms?sites=noted").headers["etag"] != etag
+    shelved = next(it for it in alarms(page, "noted")["alarms"] if it["id"] == second["id"])
+    assert shelved["shelved_until"]["sec"] == now_ns // SECOND + HOUR_S
+    # The word of one greenhouse is not that of another.
+    archive.do(
+        f"INSERT INTO note VALUES ('gh1', 'n1', {now_ns}, 'bert', 'acknowledge',"
+        f" 'alarm:{second['id']}', '', NULL)"
+    )
+    looks = page.metric("lupin_fleet_looks")
+    wait_for(lambda: page.metric("lupin_fleet_looks") > looks + 2, "another look")
+    assert said() == [("anna", None), (None, "anna")]
+
+
+# --- comparing ------------------------------------------------------------------------------------
+
+
 def compared(page: Page, **query: str) -> dict[str, Any]:
     answer = page.http.get("/api/compare", params={"sensor_type": "temperature", **query})
     assert answer.status_code == 200, answer.text
@@ -172,105 +195,67 @@ def known(values: list[float | None]) -> list[float]:
     return [value for value in values if value is not None]
 
 
-def test_one_sensor_of_several_sites_the_outlier_first(archive: Archive, tmp_path: Path) -> None:
-    sites = {"a": day(20.0), "b": day(21.0), "c": day(22.0), "odd": day(35.0), "empty": []}
-    sites["empty"] = [scan("0", wall().stamp_ns - SECOND, humidity=50.0)]
-    forward(archive, tmp_path, sites)
-    with fleet(archive) as page:
-        for site in sites:
-            page.site(site)
-        found = compared(page)
-        assert [it["site"] for it in found["sites"]] == ["odd", "a", "b", "c", "empty"]
-        assert found["unit"] == "°C"
-        assert found["bucket_s"] == HOUR_S
-        odd, empty = found["sites"][0], found["sites"][-1]
-        # Two tags, of which one is a degree warmer.
-        assert known(odd["means"]) == [35.5, 35.5, 35.5]
-        assert odd["mean"] == 35.5
-        assert odd["deviation"] == pytest.approx(35.5 - 22.0)
-        assert (empty["mean"], empty["deviation"], known(empty["means"])) == (None, None, [])
-        # numpy's linear quantiles of 20.5, 21.5, 22.5, 35.5.
-        assert known(found["median"]) == [22.0] * 3
-        assert known(found["low"]) == pytest.approx([21.25] * 3)
-        assert known(found["high"]) == pytest.approx([25.75] * 3)
-        start_s, end_s = found["from"]["sec"], found["to"]["sec"]
-        assert len(found["median"]) == (end_s - start_s) / HOUR_S
-        places = [n for n, value in enumerate(odd["means"]) if value is not None]
-        this_hour_s = int(time.time()) // HOUR_S * HOUR_S
-        assert [this_hour_s - (start_s + n * HOUR_S) for n in places] == pytest.approx(
-            [3 * HOUR_S, 2 * HOUR_S, HOUR_S], abs=HOUR_S
-        )
+def test_one_sensor_of_several_sites_the_outlier_first(every: All) -> None:
+    found = compared(every.page, sites="a,b,c,odd,empty")
+    assert [it["site"] for it in found["sites"]] == ["odd", "a", "b", "c", "empty"]
+    assert found["unit"] == "°C"
+    assert found["bucket_s"] == HOUR_S
+    odd, empty = found["sites"][0], found["sites"][-1]
+    # Two tags, of which one is a degree warmer.
+    assert known(odd["means"]) == [35.5, 35.5, 35.5]
+    assert odd["mean"] == 35.5
+    assert odd["deviation"] == pytest.approx(35.5 - 22.0)
+    assert (empty["mean"], empty["deviation"], known(empty["means"])) == (None, None, [])
+    # numpy's linear quantiles of 20.5, 21.5, 22.5, 35.5.
+    assert known(found["median"]) == [22.0] * 3
+    assert known(found["low"]) == pytest.approx([21.25] * 3)
+    assert known(found["high"]) == pytest.approx([25.75] * 3)
+    start_s, end_s = found["from"]["sec"], found["to"]["sec"]
+    assert len(found["median"]) == (end_s - start_s) / HOUR_S
+    places = [n for n, value in enumerate(odd["means"]) if value is not None]
+    this_hour_s = int(time.time()) // HOUR_S * HOUR_S
+    assert [this_hour_s - (start_s + n * HOUR_S) for n in places] == pytest.approx(
+        [3 * HOUR_S, 2 * HOUR_S, HOUR_S], abs=HOUR_S
+    )
 
 
-def test_what_is_compared_can_be_chosen(archive: Archive, tmp_path: Path) -> None:
-    forward(archive, tmp_path, {"a": day(20.0), "b": day(30.0), "c": day(25.0)})
-    with fleet(archive) as page:
-        for site in ("a", "b", "c"):
-            page.site(site)
-        two = compared(page, sites="b,a")
-        assert [it["site"] for it in two["sites"]] == ["a", "b"]
-        assert known(two["median"]) == [25.5] * 3
-        humid = page.http.get("/api/compare", params={"sensor_type": "humidity"}).json()
-        assert {it["mean"] for it in humid["sites"]} == {60.0}
-        now_s = int(time.time())
-        # All of it in one bucket.
-        last = compared(page, **{"from": str(now_s - 4 * HOUR_S), "points": "1"})
-        assert {it["site"]: it["means"] for it in last["sites"]} == {
-            "a": [20.5],
-            "b": [30.5],
-            "c": [25.5],
-        }
-        etag = page.http.get("/api/compare?sensor_type=humidity&to=2000000000&from=1999990000")
-        again = page.http.get(str(etag.url), headers={"If-None-Match": etag.headers["etag"]})
-        assert again.status_code == 304
+def test_what_is_compared_can_be_chosen(every: All) -> None:
+    http, three = every.page.http, "sites=a,b,odd"
+    two = compared(every.page, sites="odd,a")
+    assert [it["site"] for it in two["sites"]] == ["a", "odd"]
+    assert known(two["median"]) == [28.0] * 3
+    humid = http.get(f"/api/compare?sensor_type=humidity&{three}").json()
+    assert {it["mean"] for it in humid["sites"]} == {60.0}
+    now_s = int(time.time())
+    # All of it in one bucket.
+    last = compared(every.page, sites="a,odd", **{"from": str(now_s - 4 * HOUR_S), "points": "1"})
+    assert {it["site"]: it["means"] for it in last["sites"]} == {"a": [20.5], "odd": [35.5]}
+    path = f"/api/compare?sensor_type=humidity&to=2000000000&from=1999990000&{three}"
+    etag = http.get(path).headers["etag"]
+    assert http.get(path, headers={"If-None-Match": etag}).status_code == 304
 
 
 @pytest.mark.parametrize(
-    ("route", "said"),
+    ("route", "status", "said"),
     [
-        ("alarms?site=gh1", "parameter 'site' is unknown, expected sites"),
-        ("compare", "sensor_type"),
-        ("compare?sensor_type=vpd", "sensor_type is 'vpd', which is derived"),
-        ("compare?sensor_type=a&points=501", "points is '501'"),
-        ("compare?sensor_type=a&from=0&to=2678401", "31.0 days apart, the limit is 31"),
-        ("compare?sensor_type=a&from=5&to=4", "to is 4.000000000 s, before from"),
-        ("compare?sensor_type=a&from=soon", "from is 'soon'"),
+        ("alarms?site=gh1", 400, "parameter 'site' is unknown, expected sites"),
+        ("compare", 400, "sensor_type"),
+        ("compare?sensor_type=vpd", 400, "sensor_type is 'vpd', which is derived"),
+        ("compare?sensor_type=a&points=501", 400, "points is '501'"),
+        ("compare?sensor_type=a&from=0&to=2678401", 400, "31.0 days apart, the limit is 31"),
+        ("compare?sensor_type=a&from=5&to=4", 400, "to is 4.000000000 s, before from"),
+        ("compare?sensor_type=a&from=soon", 400, "from is 'soon'"),
+        ("alarms?sites=nowhere", 404, "there is no site 'nowhere' in the archive (10 others are)"),
+        ("compare?sensor_type=a&sites=gh1,nowhere", 404, "there is no site 'nowhere'"),
     ],
 )
-def test_bad_queries_are_refused_in_a_line(
-    archive: Archive, tmp_path: Path, route: str, said: str
-) -> None:
-    forward(archive, tmp_path, {"gh1": scans_lately()})
-    with fleet(archive) as page:
-        page.site("gh1")
-        answer = page.http.get(f"/api/{route}")
-        assert answer.status_code == 400
-        assert said in answer.json()["detail"]
+def test_bad_queries_are_refused_in_a_line(every: All, route: str, status: int, said: str) -> None:
+    answer = every.page.http.get(f"/api/{route}")
+    assert answer.status_code == status
+    assert said in answer.json()["detail"]
 
 
-@pytest.mark.parametrize("route", ["alarms?sites=", "compare?sensor_type=temperature&sites=gh1,"])
-def test_a_site_that_is_not_there_is_named(archive: Archive, route: str) -> None:
-    archive.do("INSERT INTO site VALUES ('gh1', '')")
-    with fleet(archive) as page:
-        page.site("gh1")
-        answer = page.http.get(f"/api/{route}nowhere")
-        assert answer.status_code == 404
-        assert answer.json()["detail"] == "there is no site 'nowhere' in the archive (1 others are)"
-
-
-def test_more_sites_than_can_be_compared_are_refused(archive: Archive) -> None:
-    archive.do("INSERT INTO site SELECT 'gh' || n, '' FROM generate_series(1, 51) AS n")
-    with fleet(archive) as page:
-        wait_for(lambda: len(page.sites()) == 51, "51 sites")
-        answer = page.http.get("/api/compare?sensor_type=temperature")
-        assert answer.status_code == 400
-        assert "sites are 51, the limit is 50" in answer.json()["detail"]
-
-
-def test_the_sensors_in_force_are_those_of_a_bridge(archive: Archive, tmp_path: Path) -> None:
-    forward(archive, tmp_path, {"gh1": scans_lately()})
-    with fleet(archive) as page:
-        page.site("gh1")
-        sensors = page.http.get("/api/sensors")
-        assert sensors.json()["sensors"]["temperature"]["unit"] == "°C"
-        assert sensors.content == page.http.get("/sites/gh1/api/sensors").content
+def test_the_sensors_in_force_are_those_of_a_bridge(every: All) -> None:
+    sensors = every.page.http.get("/api/sensors")
+    assert sensors.json()["sensors"]["temperature"]["unit"] == "°C"
+    assert sensors.content == every.page.http.get("/sites/gh1/api/sensors").content

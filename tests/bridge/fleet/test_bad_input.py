@@ -41,14 +41,6 @@ def test_what_can_never_work_ends_it(args: tuple[str, ...], said: str) -> None:
     assert said in done.stderr
 
 
-def test_a_site_that_is_not_there(archive: Archive) -> None:
-    with fleet(archive) as page:
-        for path in ("/sites/gh9/", "/sites/gh9", "/sites/gh9/api/state", "/sites/", "/nonsense"):
-            answer = page.http.get(path)
-            assert answer.status_code == 404, path
-        assert "no site 'gh9'" in page.http.get("/sites/gh9/").json()["detail"]
-
-
 def test_what_may_pass_is_said_and_the_page_is_served(archive: Archive) -> None:
     archive.do("UPDATE archive SET version = 99")
     with fleet(archive) as page:
@@ -61,6 +53,18 @@ def test_what_may_pass_is_said_and_the_page_is_served(archive: Archive) -> None:
         assert page.sites() == {}
         archive.do("UPDATE archive SET version = 1")
         wait_for(lambda: page.http.get("/readyz").status_code == 200, "an archive that is read")
+        assert page.sites() == {}, "an archive without sites is an empty overview"
+        metrics = page.http.get("/metrics").text
+        assert "lupin_fleet_archive_reachable 1" in metrics
+        assert "lupin_fleet_sites 0" in metrics
+        for path in ("/sites/gh9/", "/sites/gh9", "/sites/gh9/api/state", "/sites/", "/nonsense"):
+            answer = page.http.get(path)
+            assert answer.status_code == 404, path
+        assert "no site 'gh9'" in page.http.get("/sites/gh9/").json()["detail"]
+        for method in ("POST", "PUT", "DELETE"):
+            assert page.http.request(method, "/api/sites").status_code == 405
+        answer = page.http.get("/api/sites", headers={"Origin": "https://evil.example"})
+        assert answer.status_code == 403
 
 
 def test_a_database_without_an_archive(archive: Archive) -> None:
@@ -69,14 +73,6 @@ def test_a_database_without_an_archive(archive: Archive) -> None:
     archive.name = "bare"
     with fleet(archive) as page:
         page.process.wait_for_output("lupin-twin archive init makes it")
-
-
-def test_nothing_is_written_and_a_forwarders_user_is_refused_other_sites(archive: Archive) -> None:
-    with fleet(archive) as page:
-        for method in ("POST", "PUT", "DELETE"):
-            assert page.http.request(method, "/api/sites").status_code == 405
-        answer = page.http.get("/api/sites", headers={"Origin": "https://evil.example"})
-        assert answer.status_code == 403
 
 
 def test_the_overviews_routes_are_those_of_the_docs() -> None:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Iterator
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -12,19 +14,32 @@ import pytest
 from tests.support.archive import Archive, forward_once, rows_of
 from tests.support.fleet import Page, fleet, scans_lately, write
 from tests.support.people import OWN, add, signed_in
+from tests.support.postgres import Postgres
 from tests.support.waiting import wait_for
 
 ALARMS = "/sites/gh1/api/alarms"
 NOTES = "/sites/gh1/api/notes"
 
 
-@pytest.fixture
-def accounts(tmp_path: Path, archive: Archive) -> Path:
-    path = tmp_path / "accounts.sqlite"
-    add(path, anna="operator", vera="viewer")
-    write(tmp_path / "journal.sqlite", scans_lately(temperature=45.0, tags=1))
-    forward_once(archive, tmp_path / "journal.sqlite")
-    return path
+@dataclass
+class Here:
+    page: Page
+    archive: Archive
+    accounts: Path
+    journal: Path
+
+
+@pytest.fixture(scope="module")
+def here(postgresql: Postgres, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Here]:
+    archive, folder = Archive(postgresql), tmp_path_factory.mktemp("notes")
+    archive.add_user("page", "lupin_page")
+    accounts, journal = folder / "accounts.sqlite", folder / "journal.sqlite"
+    add(accounts, anna="operator", vera="viewer")
+    write(journal, scans_lately(temperature=45.0, tags=1))
+    forward_once(archive, journal)
+    with fleet(archive, "--accounts", str(accounts)) as page:
+        yield Here(page, archive, accounts, journal)
+    archive.drop()
 
 
 def alarm_of(browser: httpx.Client, **said: str) -> dict[str, Any]:
@@ -44,14 +59,11 @@ def post(browser: httpx.Client, **note: Any) -> httpx.Response:
     return browser.post(NOTES, json=note)
 
 
-def test_an_alarm_is_acknowledged_and_every_replica_shows_it(
-    accounts: Path, archive: Archive, tmp_path: Path
-) -> None:
-    options = ("--accounts", str(accounts))
+def test_an_alarm_is_acknowledged_and_every_replica_shows_it(here: Here) -> None:
+    archive = here.archive
     with (
-        fleet(archive, *options) as page,
-        fleet(archive, *options) as other,
-        signed_in(page.url, "anna") as anna,
+        fleet(archive, "--accounts", str(here.accounts)) as other,
+        signed_in(here.page.url, "anna") as anna,
         signed_in(other.url, "vera") as vera,
     ):
         alarm = alarm_of(anna)
@@ -77,17 +89,14 @@ def test_an_alarm_is_acknowledged_and_every_replica_shows_it(
         kinds = archive.select("SELECT kind FROM note ORDER BY id")
         assert kinds == [("acknowledge",), ("withdraw",)]
         # A later row of the journal changes none of it.
-        forward_once(archive, tmp_path / "journal.sqlite")
+        forward_once(archive, here.journal)
         assert archive.select("SELECT kind FROM note ORDER BY id") == kinds
-        assert rows_of(tmp_path / "journal.sqlite")["note"] == []
+        assert rows_of(here.journal)["note"] == []
 
 
-def test_who_may_not_is_refused(accounts: Path, archive: Archive) -> None:
-    with (
-        fleet(archive, "--accounts", str(accounts)) as page,
-        signed_in(page.url, "vera") as vera,
-        signed_in(page.url, "anna") as anna,
-    ):
+def test_who_may_not_is_refused(here: Here) -> None:
+    page, written = here.page, here.archive.select("SELECT count(*) FROM note")
+    with signed_in(page.url, "vera") as vera, signed_in(page.url, "anna") as anna:
         subject = f"alarm:{alarm_of(vera)['id']}"
         assert post(vera, kind="acknowledge", subject=subject).status_code == 403
         assert not vera.get("/sites/gh1/api/session").json()["can_write_notes"]
@@ -106,14 +115,16 @@ def test_who_may_not_is_refused(accounts: Path, archive: Archive) -> None:
         # Notes are written of a site, and nothing else is.
         for path in ("/api/notes", "/sites/gh1/", "/sites/gh1/api/state", "/api/sites"):
             assert anna.post(path, json={}).status_code in {404, 405, 413}, path
-        assert archive.select("SELECT count(*) FROM note") == [(0,)]
+        assert here.archive.select("SELECT count(*) FROM note") == written
+        for path in ("/sites/gh1/", "/sites/gh1", "/sites/none/", "/sites/gh1/api/state"):
+            headers = vera.get(path).headers
+            assert headers["x-frame-options"] == "DENY", path
+            assert "frame-ancestors" in headers["content-security-policy"], path
 
 
-def test_an_archive_that_cannot_be_written_is_said(accounts: Path, archive: Archive) -> None:
-    with (
-        fleet(archive, "--accounts", str(accounts)) as page,
-        signed_in(page.url, "anna") as anna,
-    ):
+def test_an_archive_that_cannot_be_written_is_said(here: Here) -> None:
+    archive = here.archive
+    with signed_in(here.page.url, "anna") as anna:
         alarm_of(anna)
         archive.do("REVOKE INSERT ON note FROM lupin_page")
         begun_s = time.monotonic()
@@ -123,16 +134,3 @@ def test_an_archive_that_cannot_be_written_is_said(accounts: Path, archive: Arch
         assert time.monotonic() - begun_s < 60
         archive.do("GRANT INSERT ON note TO lupin_page")
         assert post(anna, kind="comment", subject="site", text="vents checked").status_code == 201
-
-
-def test_the_page_is_as_closed_as_before(accounts: Path, archive: Archive) -> None:
-    with fleet(archive, "--accounts", str(accounts)) as page:
-        check_headers(page)
-
-
-def check_headers(page: Page) -> None:
-    with signed_in(page.url, "vera") as vera:
-        for path in ("/sites/gh1/", "/sites/gh1", "/sites/none/", "/sites/gh1/api/state"):
-            headers = vera.get(path).headers
-            assert headers["x-frame-options"] == "DENY", path
-            assert "frame-ancestors" in headers["content-security-policy"], path

@@ -23,22 +23,18 @@ def journal(tmp_path: Path) -> Path:
     return tmp_path / "journal.sqlite"
 
 
-def test_a_site_that_is_forwarded_is_live_and_judged(archive: Archive, journal: Path) -> None:
+def test_a_site_is_live_and_judged_and_a_scan_is_there_without_being_asked_for(
+    archive: Archive, journal: Path
+) -> None:
     write(journal, scans_lately())
     with forwarder(archive, journal), fleet(archive) as page:
-        found = page.site(is_live=True, verdict="healthy", active_alarms=0)
-    assert found.keys() == {
-        "site", "name", "verdict", "last_verdict", "active_alarms", "last_received", "lag_s",
-        "is_live", "origin", "map",
-    }  # fmt: skip
-    assert abs(found["last_received"]["sec"] - time.time()) < 120
-    assert 0 <= found["lag_s"] < 10
-
-
-def test_a_scan_is_on_the_page_without_being_asked_for(archive: Archive, journal: Path) -> None:
-    write(journal, scans_lately())
-    with forwarder(archive, journal), fleet(archive) as page:
-        before = page.site(is_live=True, verdict="healthy")
+        before = page.site(is_live=True, verdict="healthy", active_alarms=0)
+        assert before.keys() == {
+            "site", "name", "verdict", "last_verdict", "active_alarms", "last_received", "lag_s",
+            "is_live", "origin", "map",
+        }  # fmt: skip
+        assert abs(before["last_received"]["sec"] - time.time()) < 120
+        assert 0 <= before["lag_s"] < 10
         with frames(page) as received:
             first = next(received)
             assert first["is_whole"]
@@ -146,49 +142,11 @@ def test_an_archive_that_is_down_is_told_and_comes_back(journal: Path) -> None:
             wait_for(lambda: page.http.get("/readyz").status_code == 200, "it to be back")
 
 
-def test_a_site_whose_rows_cannot_be_read_is_unknown_and_costs_no_other_its_status(
-    archive: Archive, journal: Path, tmp_path: Path
-) -> None:
-    archive.add_user("gh2")
-    other = tmp_path / "other.sqlite"
-    for site, path in ((archive, journal), (archive.of_site("gh2"), other)):
-        write(path, scans_lately())
-        forward_once(site, path)
-    archive.do("UPDATE scan SET readings = '{\"no\": \"list\"}' WHERE site = 'gh1'")
-    with fleet(archive) as page:
-        page.site("gh2", last_verdict="healthy")
-        assert page.site("gh1", last_verdict=None, active_alarms=None)["verdict"] == "unknown"
-        said = "site gh1 cannot be judged: its status is unknown"
-        wait_for(lambda: said in page.process.output, said)
-
-
-def test_replicas_give_the_same_etag(archive: Archive, journal: Path) -> None:
-    write(journal, scans_lately())
-    forward_once(archive, journal)
-    # Until it counts as silent it is about to change.
-    with fleet(archive) as one, fleet(archive) as other:
-        for page in (one, other):
-            page.site(is_live=False, last_verdict="healthy", active_alarms=1)
-        tags = [page.http.get("/api/sites").headers["etag"] for page in (one, other)]
-        assert tags[0] == tags[1]
-        found = other.http.get("/api/sites", headers={"If-None-Match": tags[0]})
-        assert found.status_code == 304
-        write(journal, [scan("0", wall().stamp_ns)])
-        forward_once(archive, journal)
-        wait_for(lambda: one.http.get("/api/sites").headers["etag"] != tags[0], "another tag")
-
-
-def test_an_archive_without_sites_is_an_empty_overview(archive: Archive) -> None:
-    with fleet(archive) as page:
-        wait_for(lambda: page.http.get("/readyz").status_code == 200, "an archive that is read")
-        assert page.sites() == {}
-        metrics = page.http.get("/metrics").text
-        assert "lupin_fleet_archive_reachable 1" in metrics
-        assert "lupin_fleet_sites 0" in metrics
-
-
-def test_a_small_map_of_each_site(archive: Archive, journal: Path) -> None:
+def test_a_small_map_of_each_site(archive: Archive, journal: Path, tmp_path: Path) -> None:
     write(journal, scans_lately(tags=30))
+    bare = archive.of_site("bare")
+    write(tmp_path / "bare", [scan("0", wall().stamp_ns)])  # no tag has a place
+    forward_once(bare, tmp_path / "bare")
     with forwarder(archive, journal), fleet(archive) as page:
         found = page.site(is_live=True, verdict="healthy")
         path = "/api/sites/gh1/map.svg"
@@ -206,19 +164,12 @@ def test_a_small_map_of_each_site(archive: Archive, journal: Path) -> None:
         page.site(verdict="critical")
         wait_for(lambda: page.sites()["gh1"]["map"] != found["map"], "another map")
         assert len(dots_of(page.http.get(path).text)["critical"]) == 1
-        for nowhere in ("/api/sites/gh2/map.svg", "/api/sites/gh1/map.png"):
-            assert page.http.get(nowhere).status_code == 404
+        assert page.site("bare", last_verdict="healthy")["map"] is None
+        for nowhere in ("bare/map.svg", "gh2/map.svg", "gh1/map.png"):
+            assert page.http.get(f"/api/sites/{nowhere}").status_code == 404
 
 
 def dots_of(picture: str) -> dict[str, list[str]]:
     """Places by verdict."""
     paths = [it for it in ElementTree.fromstring(picture) if it.tag.endswith("path")]
     return {it.attrib["class"]: it.attrib["d"].split("M")[1:] for it in paths}
-
-
-def test_a_site_without_a_place_has_no_map(archive: Archive, journal: Path) -> None:
-    write(journal, [scan("0", wall().stamp_ns)])
-    forward_once(archive, journal)
-    with fleet(archive) as page:
-        assert page.site(last_verdict="healthy")["map"] is None
-        assert page.http.get("/api/sites/gh1/map.svg").status_code == 404

@@ -19,6 +19,7 @@ from tests.support.docs import block_named
 from tests.support.fleet import Page, fleet, scans_lately, write
 from tests.support.journal import scan
 from tests.support.nginx import nginx
+from tests.support.postgres import Postgres
 from tests.support.waiting import PATIENCE_S, wait_for
 from tests.support.ws_client import open_websocket
 
@@ -32,19 +33,22 @@ class Replicas:
     url: str
     pages: list[Page]
     journal: Path
+    archive: Archive
 
 
-@pytest.fixture
-def replicas(archive: Archive, tmp_path: Path) -> Iterator[Replicas]:
-    journal = tmp_path / "journal"
+@pytest.fixture(scope="module")
+def replicas(postgresql: Postgres, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Replicas]:
+    archive, folder = Archive(postgresql), tmp_path_factory.mktemp("replicas")
+    archive.add_user("page", "lupin_page")
+    journal = folder / "journal"
     write(journal, scans_lately())
     forward_once(archive, journal)
     with ExitStack() as stack:
         pages = [stack.enter_context(fleet(archive, *SHOWN)) for _ in range(3)]
         ports = [int(page.url.rpartition(":")[2]) for page in pages]
         text = block_named("fleet-nginx").text
-        url = stack.enter_context(nginx(tmp_path, ports, text))
-        yield Replicas(url, pages, journal)
+        url = stack.enter_context(nginx(folder, ports, text))
+        yield Replicas(url, pages, journal, archive)
 
 
 # --- one answer -----------------------------------------------------------------------------------
@@ -56,6 +60,7 @@ ANSWERS = (
     "sites/gh1/api/state?at={at}",
     "sites/gh1/api/health?at={at}",
     "sites/gh1/api/field?sensor_type=temperature&resolution=0.5&at={at}",
+    "sites/gh1/api/estimate?sensor_type=temperature&resolution=0.5&at={at}",
 )
 
 
@@ -139,7 +144,7 @@ class Load:
                 self.answers += 1
 
 
-def test_a_replica_that_is_killed_is_missed_by_nobody(replicas: Replicas, archive: Archive) -> None:
+def test_a_replica_that_is_killed_is_missed_by_nobody(replicas: Replicas) -> None:
     for page in replicas.pages:
         page.site(last_verdict="healthy")
         assert page.http.get("/sites/gh1/api/state").status_code == 200
@@ -149,7 +154,7 @@ def test_a_replica_that_is_killed_is_missed_by_nobody(replicas: Replicas, archiv
     load = Load(replicas.url)
     runs = [*(it.run for it in browsers), load.run]
     threads = [threading.Thread(target=run) for run in runs]
-    with forwarder(archive, replicas.journal):
+    with forwarder(replicas.archive, replicas.journal):
         try:
             # One after the other, so that each replica has some of them.
             for thread, browser in zip(threads, browsers, strict=False):

@@ -83,7 +83,7 @@ class Bridge:
         self._clock = clock
         self.source = source
         self.limits = limits
-        self.liveness = Liveness()
+        self.liveness = Liveness(known=Status("never_seen", None, day_length_s=source.day_length_s))
         self.hub = Hub(settings.max_clients, limits.client_timeout_s, self.liveness.status)
         self.admission = admission or Admission(limits)
         self.cache = AnswerCache() if cache is None else cache

@@ -43,6 +43,8 @@ from tests.support.web import ws_url
 class Script:
     """A source that tells what the test makes it tell. What a real one does, others test."""
 
+    day_length_s = 86_400.0
+
     def __init__(self) -> None:
         self.tell: Callable[[TwinUpdate], None]
         self.die: Callable[[], None]

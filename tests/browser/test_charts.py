@@ -283,6 +283,40 @@ def test_a_quantity_of_the_day_is_charted_where_its_sensor_is(
     assert "daily_light_integral" not in {question["sensor_type"] for question in questions(hmi)}
 
 
+def test_the_day_before_lies_below_today_and_the_legend_compares(
+    garden: Garden, open_page: OpenPage
+) -> None:
+    running, now_s, day_s = garden.bridge, time.time(), 86_400.0
+    ago = range(3000, 0, -300)
+    running.peer.observe(
+        *(scan("6", {"co2": 500.0}, at=(5, 1), stamp_s=now_s - day_s - each) for each in ago),
+        *(scan("6", {"co2": 600.0}, at=(5, 1), stamp_s=now_s - each) for each in ago),
+    )
+    wait_for(partial(_reads, running, "6", "co2", 600.0), "today's readings")
+    from_s = round(now_s - 3600, 3)
+    hmi = open_page(running.url, f"chart.tag=6&period={from_s},{round(now_s, 3)}")
+    legend = hmi.page.get_by_role("region", name="Chart of CO₂").locator(".plot-legend")
+    expect(legend).to_have_text(re.compile("600"))
+    expect(legend).not_to_contain_text("day before")
+    inside = plot(hmi, "CO₂").locator(".u-over")
+    alone = line_rows(inside)
+    hmi.page.get_by_role("button", name="Day before").click()
+    expect(legend).to_contain_text("day before 500\u00a0ppm (+100\u00a0ppm)")
+    assert from_s - day_s in [float(question["from"]) for question in questions(hmi)]
+    # Of two levels one is new, and it lies lower.
+    hmi.expect(lambda: line_rows(inside) > alone, "a second line in the chart")
+    hmi.page.reload()
+    expect(legend).to_contain_text("day before 500")
+
+
+def line_rows(inside: Locator) -> int:
+    """How far apart the highest and the lowest row with the hue of the first line are."""
+    pixels = np.asarray(Image.open(io.BytesIO(inside.screenshot())).convert("RGB"), dtype=int)
+    is_blue = (pixels[..., 2] - pixels[..., 0] > 60).any(axis=1)
+    rows = np.flatnonzero(is_blue)
+    return int(np.ptp(rows)) if rows.size else 0
+
+
 def _reads(running: Bridge, tag_id: str, sensor: str, value: float) -> bool:
     tags = running.json("/api/state")["tags"]
     return any(

@@ -12,6 +12,9 @@ from typing import Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
+from lupin_bridge.stream.status import Reason
+from lupin_twin.core.diagnostics import Origin
+
 
 class Contract(BaseModel):
     """Base of all: frozen, and a field that the contract does not name is an error."""
@@ -307,17 +310,7 @@ class StatusFrame(Contract):
 
     type: Literal["status"]
     twin: Literal["live", "offline"]
-    reason: Literal[
-        "live",
-        "paused",
-        "no_clock",
-        "clock_stopped",
-        "clock_doubted",
-        "never_seen",
-        "stale",
-        "thread_dead",
-        "shutting_down",
-    ] = Field(
+    reason: Reason = Field(
         description="paused: simulated time stands on purpose, the twin is live; no_clock, "
         "clock_stopped: the twin's time does not run; clock_doubted: it contradicts the journal; "
         "no age is known then, and the twin counts as offline"
@@ -327,13 +320,14 @@ class StatusFrame(Contract):
         description="s since the bridge got its last state, by its own clock; null: never"
     )
     has_map: bool = Field(description="false: /api/map answers 404, no map has come yet")
-    origin: Literal["unknown", "robot", "simulated", "recorded", "sim_time"] = Field(
+    origin: Origin = Field(
         description="where what was observed comes from, as the twin says; sim_time: it goes by "
         "/clock, so from a simulation, or a recording that is played"
     )
     input_problems: list[str] = Field(
         description="why the twin does not hear all that is published for it, with the remedy"
     )
+    day_length_s: float = Field(description="s of ROS time that a day takes; fewer in a demo")
     drops: list[RecentDrop] = Field(description="what the twin dropped recently, by reason")
     journal: Journal
     outward: list[Outward] = Field(description="those that the operator has set up")

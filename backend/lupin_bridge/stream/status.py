@@ -69,6 +69,7 @@ class Status:
     `twin_count` is how many nodes publish the state topic; more than one is a mistake. `has_map`
     spares a browser requests whose 404 it would show as an error. `origin` is where what the twin
     observed comes from, as far as it says; `input_problems` is why it does not hear all.
+    `day_length_s` is how long its day takes, s of ROS time: a demo's is shorter.
     """
 
     reason: Reason
@@ -80,6 +81,7 @@ class Status:
     outward: tuple[Outward, ...] = ()
     origin: Origin = "unknown"
     input_problems: tuple[str, ...] = ()
+    day_length_s: float = 86_400.0
 
     @property
     def is_live(self) -> bool:
@@ -124,6 +126,7 @@ class Status:
             "has_map": self.has_map,
             "origin": self.origin,
             "input_problems": list(self.input_problems),
+            "day_length_s": self.day_length_s,
             "drops": [
                 {"reason": drop.reason, "message": drop.message, "count": drop.count}
                 for drop in self.drops

@@ -1,7 +1,7 @@
 import { useMemo, useRef, useState, type JSX } from 'react';
 
 import { now } from '../clock';
-import { act, store, useApp } from '../store/app';
+import { act, prefer, store, useApp } from '../store/app';
 import { selectCatalogue, selectCatalogues } from '../store/derived';
 import { rosNow } from '../store/moment';
 import type { Charted } from '../store/view';
@@ -30,6 +30,7 @@ export default function ChartView({ charted }: { charted: Charted }): JSX.Elemen
   const sensor = useApp((state) => state.view.sensor);
   const unit = useApp((state) => state.settings.unit);
   const moment = useApp((state) => state.view.moment);
+  const hasDayBefore = useApp((state) => state.settings.dayBefore);
   const catalogue = useApp(selectCatalogue);
   const both = useApp(selectCatalogues);
   const isZoomed = useZoomed();
@@ -41,7 +42,7 @@ export default function ChartView({ charted }: { charted: Charted }): JSX.Elemen
 
   const plans = useMemo(() => plansOf(charted, sensors, sensor), [charted, sensors, sensor]);
   const pairs = useMemo(() => pairsOf(plans), [plans]);
-  const { fed, span } = useFeed(pairs, pointsFor(size.width));
+  const { fed, span } = useFeed(pairs, pointsFor(size.width), hasDayBefore);
   const models = useMemo(
     () =>
       span ? plans.map((plan) => modelOf(catalogue, both, plan, fed, span, unit, moment)) : [],
@@ -75,6 +76,14 @@ export default function ChartView({ charted }: { charted: Charted }): JSX.Elemen
         />
         <SensorChoice tagId={tagId} value={sensor} />
         <div className="chart-tools">
+          <Tool
+            icon="later"
+            label={S.chartDayBefore}
+            isOn={hasDayBefore}
+            onClick={() => {
+              prefer({ dayBefore: !hasDayBefore });
+            }}
+          />
           <Tool icon="plus" label={S.chartZoomIn} onClick={zoom(0.5)} />
           <Tool icon="minus" label={S.chartZoomOut} onClick={zoom(2)} />
           {isZoomed && <Tool icon="fit" label={S.chartWhole} onClick={zoomBack} />}
@@ -126,10 +135,13 @@ export default function ChartView({ charted }: { charted: Charted }): JSX.Elemen
 function Tool({
   icon,
   label,
+  isOn,
   onClick,
 }: {
   icon: IconName;
   label: string;
+  /** Of what stays on until it is clicked again. */
+  isOn?: boolean;
   onClick: () => void;
 }): JSX.Element {
   return (
@@ -137,6 +149,7 @@ function Tool({
       type="button"
       className="icon-button"
       aria-label={label}
+      aria-pressed={isOn}
       title={label}
       onClick={onClick}
     >

@@ -3,6 +3,7 @@ import '../styles/charts.css';
 
 import { useEffect, useLayoutEffect, useRef, useState, type JSX } from 'react';
 
+import { differenceText } from '../domain/difference';
 import { rangeText, readingText } from '../domain/format';
 import { rosText } from '../domain/rostime';
 import { lastUntil, pointAt, type Bucket, type Reading } from '../domain/series';
@@ -83,6 +84,7 @@ export function PlotView({ model, height }: { model: PlotModel; height: number }
               line={line}
               model={model}
               point={pointOf(line.series, at ?? Infinity)}
+              before={beforeAt(line, at)}
               isNamed={model.lines.length > 1}
             />
           ))}
@@ -108,15 +110,18 @@ function LegendLine({
   line,
   model: { sensor, unit },
   point,
+  before,
   isNamed,
 }: {
   line: Line;
   model: PlotModel;
   point: Reading | Bucket | null;
+  before: Reading | Bucket | null;
   isNamed: boolean;
 }): JSX.Element {
   const { label } = line;
-  const value = !point ? null : 'mean' in point ? point.mean : point.value;
+  const value = valueOf(point);
+  const was = valueOf(before);
   return (
     <li>
       {isNamed && (
@@ -132,8 +137,27 @@ function LegendLine({
           {rangeText(sensor, { low: point.min, high: point.max }, unit)}
         </span>
       )}
+      {was !== null && (
+        <span className="faint">
+          {' '}
+          {S.chartBeforeWas(
+            readingText(sensor, was, unit),
+            value === null ? S.chartNothing : differenceText(sensor, value - was, unit),
+          )}
+        </span>
+      )}
     </li>
   );
+}
+
+const valueOf = (point: Reading | Bucket | null): number | null =>
+  !point ? null : 'mean' in point ? point.mean : point.value;
+
+/** The day before, at a moment or when the line's newest was read. */
+function beforeAt({ series, before }: Line, at: number | null): Reading | Bucket | null {
+  const newest = lastUntil(series, Infinity);
+  if (!before || !newest) return null;
+  return pointAt(before, at ?? ('at' in newest ? newest.at : newest.start));
 }
 
 /** A piece of the line with its marker. */

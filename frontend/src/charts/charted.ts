@@ -5,7 +5,7 @@ import { shown } from '../domain/text';
 import type { TemperatureUnit } from '../domain/units';
 import type { Charted } from '../store/view';
 import { S } from '../strings';
-import { marksOver, seriesOver, type Fed, type Pair } from './fed';
+import { marksOver, pairKey, seriesOver, type Fed, type Pair } from './fed';
 import { bandsOf, type PlotModel } from './model';
 
 /** One chart: a sensor, and the tags whose readings of it are its lines. */
@@ -44,7 +44,8 @@ export function modelOf(
   const lines = tagIds.flatMap((tagId, look) => {
     const series = seriesOver(fed, { tagId, sensor }, span);
     const marks = marksOver(fed, tagId, span);
-    return series ? [{ series, look, label: tagLabel(tagId), marks }] : [];
+    const before = fed.before.get(pairKey({ tagId, sensor })) ?? null;
+    return series ? [{ series, before, look, label: tagLabel(tagId), marks }] : [];
   });
   const now = catalogue.named(sensor);
   const ranges = { now, day: day.named(sensor), night: night.named(sensor) };

@@ -22,7 +22,12 @@ const readings = [
 ];
 const series = (over: Partial<Series> = {}): Series => seriesWith({ ...pair, readings, ...over });
 const fetched = (one: Series = series()): Fed =>
-  withFetched(NOTHING_FED, { until: 100, series: new Map([[key, one]]), marks: new Map() });
+  withFetched(NOTHING_FED, {
+    until: 100,
+    series: new Map([[key, one]]),
+    marks: new Map(),
+    before: new Map(),
+  });
 const reading = (sec: number, value: number, over = {}): ReturnType<typeof wireTag> =>
   wireTag({
     readings: [{ name: 'co2', value, observed_at: { sec, nanosec: 0 }, stale_seconds: 0 }],
@@ -85,6 +90,7 @@ describe('a state of the twin', () => {
       until: 100,
       series: new Map(),
       marks: new Map([['1', [look]]]),
+      before: new Map(),
     });
     const tag = (sec: number): ReturnType<typeof wireTag> =>
       wireTag({ looked_at: { sec, nanosec: 0 } });
@@ -102,6 +108,7 @@ describe('an answer of the server', () => {
       until: 120,
       series: new Map([[key, answer]]),
       marks: new Map(),
+      before: new Map(),
     });
     expect(next.heard.get(key)).toEqual([{ at: 120, value: 4 }]);
     expect(values(next)).toEqual([3, 4]);
@@ -117,6 +124,7 @@ describe('an answer of the server', () => {
       until: 120,
       series: new Map([[key, answer]]),
       marks: new Map(),
+      before: new Map(),
     });
     expect(next.heard.get(key)).toEqual([{ at: 130, value: 4 }]);
   });

@@ -19,6 +19,8 @@ export interface Fetched {
   readonly until: number;
   readonly series: ReadonlyMap<string, Series>;
   readonly marks: ReadonlyMap<string, readonly Mark[]>;
+  /** By `pairKey`, the day before, a day later than it was; empty: nobody asked for it. */
+  readonly before: ReadonlyMap<string, Series>;
 }
 
 export interface Fed extends Fetched {
@@ -35,6 +37,7 @@ export const NOTHING_FED: Fed = {
   until: 0,
   series: new Map(),
   marks: new Map(),
+  before: new Map(),
   state: 'waiting',
   message: '',
   heard: new Map(),
@@ -76,6 +79,7 @@ export function withOnly(fed: Fed, pairs: readonly Pair[]): Fed {
     series: only(fed.series, keys),
     heard: only(fed.heard, keys),
     marks: only(fed.marks, tags),
+    before: only(fed.before, keys),
     heardMarks: only(fed.heardMarks, tags),
     state: 'waiting',
     message: '',

@@ -12,6 +12,7 @@ const wanted = (over: Partial<Wanted> = {}): Wanted => ({
   nowS: span.to,
   period: 'hour',
   points: 300,
+  dayS: null,
   epoch: 1,
   ...over,
 });
@@ -90,6 +91,25 @@ test('a line is asked for once, with its tag’s timeline', async () => {
   expect(fed.state).toBe('ready');
   expect(fed.series.get(pairKey(pair))?.readings).toEqual([{ at: 1_010, value: 600 }]);
   expect(fed.marks.get('1')).toEqual([{ at: 1_000, widthS: 10, kind: 'failure', count: 1 }]);
+});
+
+test('the day before is asked for where it is wanted, and stands a day later than it was', async () => {
+  feed.want(wanted());
+  await settled();
+  expect(feed.get().before.size).toBe(0);
+  asked = [];
+  feed.want(wanted({ dayS: 600 }));
+  await settled();
+  expect(asked.map(({ pathname, searchParams }) => [pathname, searchParams.get('from')])).toEqual([
+    ['/api/history', '1000.000'],
+    ['/api/history', '400.000'],
+    ['/api/timeline', '1000.000'],
+  ]);
+  // At 410 it read 600, ten seconds behind the begin of that period.
+  expect(feed.get().before.get(pairKey(pair))).toMatchObject({
+    ...{ from: 1_000, to: 4_600 },
+    readings: [{ at: 1_010, value: 600 }],
+  });
 });
 
 test('what is heard is there at once, and nothing is fetched for it', async () => {

@@ -7,7 +7,7 @@ import { fetchTimeline } from '../contract/past';
 import { fetchSeries } from '../contract/series';
 import type { TwinTagState } from '../contract/types';
 import type { Span } from '../domain/period';
-import { marksOf, seriesOf } from '../domain/series';
+import { laterBy, marksOf, seriesOf, type Series } from '../domain/series';
 import { createStore } from '../store/create';
 import { createFetcher } from '../store/fetcher';
 import {
@@ -30,6 +30,8 @@ export interface Wanted {
   readonly period: string;
   /** At most so many readings or buckets a line. */
   readonly points: number;
+  /** How long a day takes, seconds, where the day before is wanted too; null: it is not. */
+  readonly dayS: number | null;
   /** Changes with each connection, and so after each gap in what was heard. */
   readonly epoch: number;
 }
@@ -79,7 +81,9 @@ export function createFeed(): Feed {
         return;
       }
       ({ pairs } = wanted);
-      const next = [wanted.period, wanted.points, ...pairs.map(pairKey)].join('\u0001');
+      const next = [wanted.period, wanted.points, wanted.dayS, ...pairs.map(pairKey)].join(
+        '\u0001',
+      );
       if (next !== group) {
         group = next;
         store.dispatch((fed) => withOnly(fed, wanted.pairs));
@@ -98,22 +102,26 @@ export function createFeed(): Feed {
 }
 
 async function fetchAll(
-  { pairs, span, nowS, points }: Wanted,
+  { pairs, span, nowS, points, dayS }: Wanted,
   signal: AbortSignal,
 ): Promise<Fetched> {
   const tagIds = [...new Set(pairs.map(({ tagId }) => tagId))];
-  const [all, timelines] = await Promise.all([
-    Promise.all(pairs.map((pair) => fetchSeries({ ...pair, ...span, points }, signal))),
+  const fetched = async ({ from, to }: Span): Promise<[string, Series][]> => {
+    const all = pairs.map((pair) => fetchSeries({ ...pair, from, to, points }, signal));
+    return (await Promise.all(all)).map((wire) => [
+      pairKey({ tagId: wire.tag_id, sensor: wire.sensor_type }),
+      seriesOf(wire, nowS),
+    ]);
+  };
+  const [series, before, timelines] = await Promise.all([
+    fetched(span),
+    dayS === null ? [] : fetched({ from: span.from - dayS, to: span.to - dayS }),
     Promise.all(tagIds.map((tagId) => fetchTimeline(span, MARK_POINTS, signal, tagId))),
   ]);
   return {
     until: Math.min(span.to, nowS),
-    series: new Map(
-      all.map((wire) => [
-        pairKey({ tagId: wire.tag_id, sensor: wire.sensor_type }),
-        seriesOf(wire, nowS),
-      ]),
-    ),
+    series: new Map(series),
+    before: new Map(before.map(([key, each]) => [key, laterBy(each, dayS ?? 0)])),
     marks: new Map(timelines.map((timeline, index) => [tagIds[index] ?? '', marksOf(timeline)])),
   };
 }

@@ -2,14 +2,20 @@ import { describe, expect, test } from 'vitest';
 
 import type { Ranges } from '../domain/sensors';
 import type { Series } from '../domain/series';
-import { aligned, bandsOf, pointsOf, valueRange, type PlotModel } from './model';
+import { aligned, bandsOf, drawnOf, pointsOf, valueRange, type PlotModel } from './model';
 import { sensorNamed } from '../testing/sensors';
 import { seriesWith } from '../testing/series';
 
 const model = (all: readonly Series[], over: Partial<PlotModel> = {}): PlotModel => ({
   sensor: sensorNamed('temperature'),
   unit: 'C',
-  lines: all.map((each, look) => ({ series: each, look, label: each.tagId, marks: [] })),
+  lines: all.map((each, look) => ({
+    series: each,
+    before: null,
+    look,
+    label: each.tagId,
+    marks: [],
+  })),
   span: { from: 0, to: 100 },
   bands: [{ from: 0, to: 100, ranges: over.sensor ?? sensorNamed('temperature') }],
   moment: null,
@@ -57,6 +63,22 @@ describe('the ranges of day and night', () => {
   test('are those of the moment where no clock tells', () => {
     expect(bands(0, 100, null)).toEqual([[0, 100, 'now']]);
   });
+});
+
+test('the day before is drawn below all lines, in the look of its own', () => {
+  const [today, before] = [20, 15].map((value) => seriesWith({ readings: [{ at: 10, value }] }));
+  const two = model([seriesWith({}), today ?? seriesWith({})]);
+  const lines = two.lines.map((line, index) =>
+    index ? { ...line, before: before ?? null } : line,
+  );
+  const all = { ...two, lines };
+  expect(drawnOf(all).map(({ look, isBefore }) => [look, isBefore])).toEqual([
+    [1, true],
+    [0, false],
+    [1, false],
+  ]);
+  expect(aligned(all)).toEqual([[10], [15], [undefined], [20]]);
+  expect(valueRange(all)[0]).toBeLessThan(15);
 });
 
 const same = (value: number): number => value;

@@ -6,6 +6,8 @@ import { toShown, type TemperatureUnit } from '../domain/units';
 
 export interface Line {
   readonly series: Series;
+  /** The day before, a day later than it was; null: it is not shown. */
+  readonly before: Series | null;
   /** Place among the looks. */
   readonly look: number;
   readonly label: string;
@@ -71,11 +73,23 @@ export function pointsOf(series: Series, shown: (value: number) => number): Poin
   return points.sort((a, b) => a.at - b.at);
 }
 
-/** Common times, and per line its values: null is a break, undefined not of this line. */
+/** What is drawn, from below: the days before, and then the lines. */
+export const drawnOf = ({
+  lines,
+}: Pick<PlotModel, 'lines'>): { series: Series; look: number; isBefore: boolean }[] => [
+  ...lines.flatMap(({ before, look }) =>
+    before ? [{ series: before, look, isBefore: true }] : [],
+  ),
+  ...lines.map(({ series, look }) => ({ series, look, isBefore: false })),
+];
+
+/** Common times, and per `drawnOf` its values: null is a break, undefined not of this line. */
 export type Aligned = [number[], ...(number | null | undefined)[][]];
 
 export function aligned({ lines, sensor, unit }: PlotModel): Aligned {
-  const all = lines.map(({ series }) => pointsOf(series, (value) => toShown(sensor, value, unit)));
+  const all = drawnOf({ lines }).map(({ series }) =>
+    pointsOf(series, (value) => toShown(sensor, value, unit)),
+  );
   const times = [...new Set(all.flatMap((points) => points.map(({ at }) => at)))].sort(
     (a, b) => a - b,
   );
@@ -106,7 +120,7 @@ export function valueRange({ lines, sensor, bands, unit }: PlotModel): [low: num
     low = Math.min(low, value);
     high = Math.max(high, value);
   };
-  for (const { series } of lines) {
+  for (const { series } of drawnOf({ lines })) {
     for (const { value } of series.readings) take(value);
     for (const { min, max } of series.buckets) {
       take(min);

@@ -6,7 +6,7 @@ import { hasDate } from '../domain/rostime';
 import { timeTicks, type Tick } from '../domain/ticks';
 import { drawAbove, drawBelow, type Frame } from './layers';
 import { lookOf } from './looks';
-import { aligned, valueRange, type PlotModel } from './model';
+import { aligned, drawnOf, valueRange, type PlotModel } from './model';
 import { readPalette } from './palette';
 
 export interface PlotHandlers {
@@ -21,6 +21,8 @@ export interface PlotSize {
   readonly height: number;
 }
 
+/** The day before: strokes and pauses, CSS pixels. */
+const DASH_BEFORE = [3, 3];
 /** A drag that is shorter is a click, CSS pixels. */
 const SHORTEST_DRAG = 6;
 /** Charts of one view have one cursor. */
@@ -77,10 +79,11 @@ export function createPlot(element: HTMLElement, handlers: PlotHandlers): Plot {
         },
         series: [
           {},
-          ...first.lines.map(({ look }) => ({
+          ...drawnOf(first).map(({ look, isBefore }) => ({
             stroke: () => palette.lines[lookOf(look).colour] ?? palette.ink,
-            width: 1.75,
-            dash: [...lookOf(look).dash],
+            width: isBefore ? 1.25 : 1.75,
+            alpha: isBefore ? 0.55 : 1,
+            dash: [...(isBefore ? DASH_BEFORE : lookOf(look).dash)],
             points: { show: false },
           })),
         ],
@@ -149,7 +152,7 @@ export function createPlot(element: HTMLElement, handlers: PlotHandlers): Plot {
   };
 
   const colourOf = (_: uPlot, series: number): string => {
-    const look = model?.lines[series - 1]?.look ?? 0;
+    const look = (model && drawnOf(model)[series - 1]?.look) ?? 0;
     return palette.lines[lookOf(look).colour] ?? palette.ink;
   };
 
@@ -157,7 +160,9 @@ export function createPlot(element: HTMLElement, handlers: PlotHandlers): Plot {
     show: (next, size) => {
       const before = model;
       model = next;
-      const nextShape = next.lines.map(({ look }) => look).join();
+      const nextShape = drawnOf(next)
+        .map(({ look, isBefore }) => `${look}${isBefore ? 'b' : ''}`)
+        .join();
       if (!chart || shape !== nextShape) {
         chart?.destroy();
         chart = build(next, size);

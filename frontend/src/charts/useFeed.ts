@@ -14,12 +14,13 @@ export interface Feeding {
 }
 
 /** What these lines have over the period of the time bar, kept up to date while it is looked at. */
-export function useFeed(pairs: readonly Pair[], points: number): Feeding {
+export function useFeed(pairs: readonly Pair[], points: number, hasDayBefore = false): Feeding {
   const [feed] = useState(createFeed);
   const fed = useSyncExternalStore(feed.subscribe, feed.get);
   const period = useApp((state) => state.view.period);
   const remembered = useApp((state) => state.twin.remembered);
   const epoch = useApp((state) => state.twin.connection.epoch);
+  const dayS = useApp((state) => state.twin.connection.status?.day_length_s ?? null);
   const isOpen = useApp((state) => state.twin.connection.socket.kind === 'open');
   const nowS = rosNow(store.get(), useNow());
   const isOff = remembered.state === 'off';
@@ -30,7 +31,11 @@ export function useFeed(pairs: readonly Pair[], points: number): Feeding {
   // With each tick: what there is nothing new of is not asked for.
   useEffect(() => {
     if (!span || nowS === null || isOff || !isOpen || points === 0) return;
-    feed.want({ pairs, span, nowS, period: JSON.stringify(period), points, epoch });
+    feed.want({
+      ...{ pairs, span, nowS, points, epoch },
+      period: JSON.stringify(period),
+      dayS: hasDayBefore ? dayS : null,
+    });
   });
 
   useEffect(() => {

@@ -23,6 +23,7 @@ const status = (twin: StatusFrame['twin']): StatusFrame => ({
   has_map: true,
   origin: 'robot',
   input_problems: [],
+  day_length_s: 86_400,
   drops: [],
   journal: { state: 'recording', detail: '', set_aside: '', simulated: null },
   outward: [],

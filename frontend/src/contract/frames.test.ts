@@ -14,6 +14,7 @@ const status = {
   has_map: false,
   origin: 'robot',
   input_problems: ['nothing has come yet from /map'],
+  day_length_s: 86_400,
   drops: [{ reason: 'frame', message: 'dropped a message', count: 3 }],
   journal: {
     state: 'failing',

@@ -274,6 +274,7 @@ export interface components {
             /** @enum {string} */
             readonly origin: "unknown" | "robot" | "simulated" | "recorded" | "sim_time";
             readonly input_problems: readonly string[];
+            readonly day_length_s: number;
             readonly drops: readonly components["schemas"]["RecentDrop"][];
             readonly journal: components["schemas"]["Journal"];
             readonly outward: readonly components["schemas"]["Outward"][];

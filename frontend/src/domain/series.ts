@@ -65,6 +65,17 @@ export const seriesOf = (wire: History, nowS: number): Series => ({
   missing: missingOf(wire, nowS),
 });
 
+/** The same so many seconds later: to stand beside what was read then. */
+export const laterBy = (series: Series, byS: number): Series => ({
+  ...series,
+  from: series.from + byS,
+  to: series.to + byS,
+  readings: series.readings.map(({ at, value }) => ({ at: at + byS, value })),
+  buckets: series.buckets.map((bucket) => ({ ...bucket, start: bucket.start + byS })),
+  gaps: series.gaps.map(({ from, to }) => ({ from: from + byS, to: to + byS })),
+  nights: null,
+});
+
 /** What a tag's timeline tells of tries and looks; scans are told by the readings themselves. */
 export const marksOf = ({ buckets, bucket_s: widthS }: Timeline): Mark[] =>
   buckets.flatMap(({ start, failures, looks }) =>

@@ -68,7 +68,7 @@ function lineOf(
     ...{ from: start, to: secondsOf(to), tagId: label, sensor, bucketS },
     ...{ readings: [], buckets, gaps, nights: null, missing: [] },
   };
-  return { series, look, label, marks: [] };
+  return { series, before: null, look, label, marks: [] };
 }
 
 export const spanOf = ({ from, to }: Compared): Span => ({

@@ -22,6 +22,7 @@ test('what was kept comes back', () => {
     hidden: ['pest', 'co2'],
     density: 'compact',
     byArea: true,
+    dayBefore: true,
   } as const;
   keepSettings({ setItem: (_, value) => (kept = value) }, settings);
   expect(readSettings(storage(kept))).toEqual(settings);

@@ -11,6 +11,8 @@ export interface Settings {
   readonly density: 'usual' | 'compact';
   /** The table's rows are together by area, where there are areas. */
   readonly byArea: boolean;
+  /** Charts show the day before, too. */
+  readonly dayBefore: boolean;
 }
 
 export const DEFAULT_SETTINGS: Settings = {
@@ -20,6 +22,7 @@ export const DEFAULT_SETTINGS: Settings = {
   hidden: [],
   density: 'usual',
   byArea: false,
+  dayBefore: false,
 };
 
 /** More columns nobody has, and longer names nobody reads. */
@@ -57,6 +60,7 @@ export function readSettings(storage: Pick<Storage, 'getItem'>): Settings {
     hidden: idsIn(kept.hidden),
     density: kept.density === 'compact' ? 'compact' : 'usual',
     byArea: kept.byArea === true,
+    dayBefore: kept.dayBefore === true,
   };
 }
 

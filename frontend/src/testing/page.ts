@@ -18,6 +18,7 @@ export const status = (over: Partial<StatusFrame> = {}): StatusFrame => ({
   has_map: true,
   origin: 'robot',
   input_problems: [],
+  day_length_s: 86_400,
   drops: [],
   journal: { state: 'recording', detail: 'recording', set_aside: '', simulated: null },
   outward: [],

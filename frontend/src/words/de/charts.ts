@@ -26,6 +26,8 @@ export const CHARTS: In<typeof ENGLISH> = {
   chartNoSensors: 'Dieser Messpunkt hat keinen Sensor.',
   chartTable: 'Als Tabelle anzeigen',
   chartPlots: 'Als Verlauf anzeigen',
+  chartDayBefore: 'Vortag',
+  chartBeforeWas: (value, by) => `Vortag ${value} (${by})`,
   chartZoomIn: 'Vergrößern',
   chartZoomOut: 'Verkleinern',
   chartWhole: 'Ganzer Zeitraum',

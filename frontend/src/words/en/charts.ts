@@ -30,6 +30,8 @@ export const CHARTS = {
   chartNoSensors: 'This tag has no sensor.',
   chartTable: 'Show as table',
   chartPlots: 'Show as charts',
+  chartDayBefore: 'Day before',
+  chartBeforeWas: (value: string, by: string): string => `day before ${value} (${by})`,
   chartZoomIn: 'Zoom in',
   chartZoomOut: 'Zoom out',
   chartWhole: 'Whole period',

@@ -26,6 +26,8 @@ export const CHARTS: In<typeof ENGLISH> = {
   chartNoSensors: 'Este punto no tiene sensores.',
   chartTable: 'Mostrar como tabla',
   chartPlots: 'Mostrar como gráfica',
+  chartDayBefore: 'Día anterior',
+  chartBeforeWas: (value, by) => `día anterior ${value} (${by})`,
   chartZoomIn: 'Acercar',
   chartZoomOut: 'Alejar',
   chartWhole: 'Todo el periodo',

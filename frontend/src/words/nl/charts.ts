@@ -26,6 +26,8 @@ export const CHARTS: In<typeof ENGLISH> = {
   chartNoSensors: 'Dit meetpunt heeft geen sensor.',
   chartTable: 'Als tabel tonen',
   chartPlots: 'Als grafiek tonen',
+  chartDayBefore: 'Dag ervoor',
+  chartBeforeWas: (value, by) => `dag ervoor ${value} (${by})`,
   chartZoomIn: 'Inzoomen',
   chartZoomOut: 'Uitzoomen',
   chartWhole: 'Hele periode',

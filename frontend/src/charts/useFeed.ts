@@ -3,6 +3,7 @@ import { useEffect, useState, useSyncExternalStore } from 'react';
 import { spanOf, type Span } from '../domain/period';
 import { store, useApp } from '../store/app';
 import { rosNow, selectNewest } from '../store/moment';
+import { selectDayS } from '../store/origin';
 import { useNow } from '../widgets/useNow';
 import { pairKey, type Fed, type Pair } from './fed';
 import { createFeed } from './feed';
@@ -20,7 +21,7 @@ export function useFeed(pairs: readonly Pair[], points: number, hasDayBefore = f
   const period = useApp((state) => state.view.period);
   const remembered = useApp((state) => state.twin.remembered);
   const epoch = useApp((state) => state.twin.connection.epoch);
-  const dayS = useApp((state) => state.twin.connection.status?.day_length_s ?? null);
+  const dayS = useApp(selectDayS);
   const isOpen = useApp((state) => state.twin.connection.socket.kind === 'open');
   const nowS = rosNow(store.get(), useNow());
   const isOff = remembered.state === 'off';

@@ -15,6 +15,10 @@ export function selectOrigin({ twin }: AppState): Origin {
   return origin === 'simulated' || origin === 'recorded' || origin === 'sim_time' ? origin : null;
 }
 
+/** How long a day of the greenhouse takes, seconds of its time: in a demo it is a short one. */
+export const selectDayS = ({ twin }: AppState): number =>
+  twin.connection.status?.day_length_s ?? 86_400;
+
 export const selectIsRecorded = (state: AppState): boolean => selectOrigin(state) === 'recorded';
 
 /** Whether the twin's time may be another than that of the clock on the wall. */

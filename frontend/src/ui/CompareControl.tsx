@@ -1,33 +1,35 @@
 import type { JSX } from 'react';
 
 import { now } from '../clock';
-import { DAY_S, WEEK_S, type Compare } from '../domain/difference';
+import type { Compare } from '../domain/difference';
 import { hasDate, rosText } from '../domain/rostime';
 import { act, store, useApp } from '../store/app';
 import { rosNow } from '../store/moment';
+import { selectDayS } from '../store/origin';
 import { S } from '../strings';
 
 const CHOICES = ['none', 'day', 'week', 'own'] as const;
 type Choice = (typeof CHOICES)[number];
 
-function choiceOf(compare: Compare | null): Choice {
+export function choiceOf(compare: Compare | null, dayS: number): Choice {
   if (compare === null) return 'none';
   if (compare.by === 'moment') return 'own';
-  return compare.seconds === DAY_S ? 'day' : compare.seconds === WEEK_S ? 'week' : 'own';
+  return compare.seconds === dayS ? 'day' : compare.seconds === 7 * dayS ? 'week' : 'own';
 }
 
 /** What the heat map is compared with: the same hour of another day, or one moment. */
 export function CompareControl(): JSX.Element {
   const compare = useApp((state) => state.view.compare);
+  const dayS = useApp(selectDayS);
   const choose = (choice: Choice): void => {
-    act({ type: 'compare', compare: compareFor(choice) });
+    act({ type: 'compare', compare: compareFor(choice, dayS) });
   };
   return (
     <div className="compare">
       <label>
         <span>{S.compare}</span>
         <select
-          value={choiceOf(compare)}
+          value={choiceOf(compare, dayS)}
           data-testid="compare"
           onChange={(event) => {
             choose(event.target.value as Choice);
@@ -46,14 +48,14 @@ export function CompareControl(): JSX.Element {
 }
 
 /** "own" begins with the moment that is shown: look back, choose it, and go back to now. */
-function compareFor(choice: Choice): Compare | null {
+function compareFor(choice: Choice, dayS: number): Compare | null {
   switch (choice) {
     case 'none':
       return null;
     case 'day':
-      return { by: 'ago', seconds: DAY_S };
+      return { by: 'ago', seconds: dayS };
     case 'week':
-      return { by: 'ago', seconds: WEEK_S };
+      return { by: 'ago', seconds: 7 * dayS };
     case 'own': {
       const at = store.get().view.moment ?? rosNow(store.get(), now());
       return at === null ? null : { by: 'moment', at };

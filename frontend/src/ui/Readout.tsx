@@ -1,6 +1,6 @@
 import type { JSX } from 'react';
 
-import { DAY_S, differenceText, WEEK_S, type Compare } from '../domain/difference';
+import { differenceText, type Compare } from '../domain/difference';
 import { cellAt, valueAt } from '../domain/field';
 import { metresText, readingText, written } from '../domain/format';
 import { idealText } from '../domain/ideal';
@@ -11,7 +11,9 @@ import { pointedAt } from '../map/pointer';
 import { useApp } from '../store/app';
 import { useSelected } from '../store/create';
 import { selectHeat, selectSensor, selectZones } from '../store/derived';
+import { selectDayS } from '../store/origin';
 import { S } from '../strings';
+import { choiceOf } from './CompareControl';
 import { EstimateReadout } from './estimate';
 
 /** The field's value at the point that mouse or crosshair is on. */
@@ -19,6 +21,7 @@ export function Readout(): JSX.Element | null {
   const point = useSelected(pointedAt, (at) => at);
   const heat = useApp(selectHeat);
   const compare = useApp((state) => state.view.compare);
+  const dayS = useApp(selectDayS);
   const sensor = useApp(selectSensor);
   const unit = useApp((state) => state.settings.unit);
   const difference = heat?.difference;
@@ -40,7 +43,7 @@ export function Readout(): JSX.Element | null {
         <strong>
           {value === null ? S.notKnown : text(sensor, value, unit)}
           {difference && value !== null && (
-            <span> {sinceText(rosText(difference.against), compare)}</span>
+            <span> {sinceText(rosText(difference.against), compare, dayS)}</span>
           )}
         </strong>
       )}
@@ -52,11 +55,11 @@ export function Readout(): JSX.Element | null {
 }
 
 /** What a difference is to; of a day or a week ago the time of day says it. */
-function sinceText(against: string, compare: Compare | null): string {
-  const seconds = compare?.by === 'ago' ? compare.seconds : null;
+function sinceText(against: string, compare: Compare | null, dayS: number): string {
+  const choice = choiceOf(compare, dayS);
   const clock = against.slice(-8, -3);
-  if (seconds === DAY_S) return S.differenceSinceYesterday(clock);
-  return seconds === WEEK_S ? S.differenceSinceWeek(clock) : S.differenceSince(against);
+  if (choice === 'day') return S.differenceSinceYesterday(clock);
+  return choice === 'week' ? S.differenceSinceWeek(clock) : S.differenceSince(against);
 }
 
 const LONGEST_BAR_PX = 110;

@@ -9,6 +9,9 @@ import type { TemperatureUnit } from './units';
 export type Compare =
   { readonly by: 'ago'; readonly seconds: number } | { readonly by: 'moment'; readonly at: number };
 
+export const DAY_S = 86_400;
+export const WEEK_S = 7 * DAY_S;
+
 /** The other moment, ROS seconds. */
 export const otherMoment = (compare: Compare, shownAt: number): number =>
   compare.by === 'moment' ? compare.at : shownAt - compare.seconds;

@@ -2,6 +2,7 @@
 import { useState, type JSX } from 'react';
 
 import { timeOfDay } from '../clock';
+import type { Note } from '../contract/types';
 import { shown as shownText } from '../domain/text';
 import { LANGUAGE, S } from '../strings';
 import type { FleetWords } from '../words/fleet';
@@ -27,22 +28,14 @@ interface SiteReport extends Readonly<Record<(typeof COUNTED)[number], number>> 
   readonly report: string;
 }
 
-interface Note {
+interface SiteNote extends Note {
   readonly site: string;
   readonly name: string;
-  readonly id: string;
-  readonly made_at: Time;
-  readonly by: string;
-  readonly kind: 'acknowledge' | 'shelve' | 'comment';
-  /** `tag:` and its id, `alarm:` and its id, or `site`. */
-  readonly subject: string;
-  readonly text: string;
-  readonly withdrawn_by: string | null;
 }
 
 interface Answer {
   readonly sites: readonly SiteReport[];
-  readonly notes: readonly Note[];
+  readonly notes: readonly SiteNote[];
 }
 
 interface Props {
@@ -118,7 +111,7 @@ export default function Report({ shown, words }: Props): JSX.Element {
   );
 }
 
-function NoteRow({ note }: { note: Note }): JSX.Element {
+function NoteRow({ note }: { note: SiteNote }): JSX.Element {
   const { name, made_at: at, by, kind, subject, text, withdrawn_by: gone } = note;
   const tag = subject.startsWith('tag:') ? S.card(shownText(subject.slice(4), 24)) : '';
   const kindOf = kind === 'comment' ? '' : W.kinds[kind];

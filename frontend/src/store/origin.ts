@@ -3,6 +3,7 @@
  * is played is, in nothing, of now.
  */
 import type { StatusFrame } from '../contract/types';
+import { DAY_S } from '../domain/difference';
 import { secondsOf } from '../domain/rostime';
 import type { AppState } from './app';
 import { isHeardNow, rosNow, selectNewest } from './moment';
@@ -17,7 +18,7 @@ export function selectOrigin({ twin }: AppState): Origin {
 
 /** How long a day of the greenhouse takes, seconds of its time: in a demo it is a short one. */
 export const selectDayS = ({ twin }: AppState): number =>
-  twin.connection.status?.day_length_s ?? 86_400;
+  twin.connection.status?.day_length_s ?? DAY_S;
 
 export const selectIsRecorded = (state: AppState): boolean => selectOrigin(state) === 'recorded';
 

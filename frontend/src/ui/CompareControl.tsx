@@ -11,7 +11,7 @@ import { S } from '../strings';
 const CHOICES = ['none', 'day', 'week', 'own'] as const;
 type Choice = (typeof CHOICES)[number];
 
-export function choiceOf(compare: Compare | null, dayS: number): Choice {
+function choiceOf(compare: Compare | null, dayS: number): Choice {
   if (compare === null) return 'none';
   if (compare.by === 'moment') return 'own';
   return compare.seconds === dayS ? 'day' : compare.seconds === 7 * dayS ? 'week' : 'own';

@@ -1,6 +1,6 @@
 import type { JSX } from 'react';
 
-import { differenceText, type Compare } from '../domain/difference';
+import { DAY_S, differenceText, WEEK_S, type Compare } from '../domain/difference';
 import { cellAt, valueAt } from '../domain/field';
 import { metresText, readingText, written } from '../domain/format';
 import { idealText } from '../domain/ideal';
@@ -11,9 +11,7 @@ import { pointedAt } from '../map/pointer';
 import { useApp } from '../store/app';
 import { useSelected } from '../store/create';
 import { selectHeat, selectSensor, selectZones } from '../store/derived';
-import { selectDayS } from '../store/origin';
 import { S } from '../strings';
-import { choiceOf } from './CompareControl';
 import { EstimateReadout } from './estimate';
 
 /** The field's value at the point that mouse or crosshair is on. */
@@ -21,7 +19,6 @@ export function Readout(): JSX.Element | null {
   const point = useSelected(pointedAt, (at) => at);
   const heat = useApp(selectHeat);
   const compare = useApp((state) => state.view.compare);
-  const dayS = useApp(selectDayS);
   const sensor = useApp(selectSensor);
   const unit = useApp((state) => state.settings.unit);
   const difference = heat?.difference;
@@ -43,7 +40,7 @@ export function Readout(): JSX.Element | null {
         <strong>
           {value === null ? S.notKnown : text(sensor, value, unit)}
           {difference && value !== null && (
-            <span> {sinceText(rosText(difference.against), compare, dayS)}</span>
+            <span> {sinceText(rosText(difference.against), compare)}</span>
           )}
         </strong>
       )}
@@ -54,12 +51,12 @@ export function Readout(): JSX.Element | null {
   );
 }
 
-/** What a difference is to; of a day or a week ago the time of day says it. */
-function sinceText(against: string, compare: Compare | null, dayS: number): string {
-  const choice = choiceOf(compare, dayS);
+/** What a difference is to; of a day or a week ago the time of day says it, if they are real ones. */
+function sinceText(against: string, compare: Compare | null): string {
+  const seconds = compare?.by === 'ago' ? compare.seconds : null;
   const clock = against.slice(-8, -3);
-  if (choice === 'day') return S.differenceSinceYesterday(clock);
-  return choice === 'week' ? S.differenceSinceWeek(clock) : S.differenceSince(against);
+  if (seconds === DAY_S) return S.differenceSinceYesterday(clock);
+  return seconds === WEEK_S ? S.differenceSinceWeek(clock) : S.differenceSince(against);
 }
 
 const LONGEST_BAR_PX = 110;

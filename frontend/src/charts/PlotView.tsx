@@ -137,13 +137,11 @@ function LegendLine({
           {rangeText(sensor, { low: point.min, high: point.max }, unit)}
         </span>
       )}
-      {was !== null && (
+      {line.before && (
         <span className="faint">
           {' '}
-          {S.chartBeforeWas(
-            readingText(sensor, was, unit),
-            value === null ? S.chartNothing : differenceText(sensor, value - was, unit),
-          )}
+          {S.chartBeforeWas(was === null ? S.chartNothing : readingText(sensor, was, unit))}
+          {was !== null && value !== null && ` (${differenceText(sensor, value - was, unit)})`}
         </span>
       )}
     </li>

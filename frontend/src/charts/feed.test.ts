@@ -112,6 +112,17 @@ test('the day before is asked for where it is wanted, and stands a day later tha
   });
 });
 
+test('before the time of a simulation began there is no day to ask for', async () => {
+  feed.want(wanted({ dayS: 4_000 }));
+  await settled();
+  expect(asked.map(({ searchParams }) => searchParams.get('from'))).toContain('0.000');
+  asked = [];
+  feed.want(wanted({ dayS: 86_400 }));
+  await settled();
+  expect(asked).toHaveLength(2);
+  expect(feed.get()).toMatchObject({ state: 'ready', before: new Map() });
+});
+
 test('what is heard is there at once, and nothing is fetched for it', async () => {
   feed.want(wanted());
   await settled();

@@ -101,11 +101,17 @@ export function createFeed(): Feed {
   };
 }
 
+/** Null: it was before the twin's time began, as in a simulation. */
+function dayBefore({ from, to }: Span, dayS: number): Span | null {
+  return to > dayS ? { from: Math.max(0, from - dayS), to: to - dayS } : null;
+}
+
 async function fetchAll(
   { pairs, span, nowS, points, dayS }: Wanted,
   signal: AbortSignal,
 ): Promise<Fetched> {
   const tagIds = [...new Set(pairs.map(({ tagId }) => tagId))];
+  const before = dayS === null ? null : dayBefore(span, dayS);
   const fetched = async ({ from, to }: Span): Promise<[string, Series][]> => {
     const all = pairs.map((pair) => fetchSeries({ ...pair, from, to, points }, signal));
     return (await Promise.all(all)).map((wire) => [
@@ -113,15 +119,15 @@ async function fetchAll(
       seriesOf(wire, nowS),
     ]);
   };
-  const [series, before, timelines] = await Promise.all([
+  const [series, earlier, timelines] = await Promise.all([
     fetched(span),
-    dayS === null ? [] : fetched({ from: span.from - dayS, to: span.to - dayS }),
+    before === null ? [] : fetched(before),
     Promise.all(tagIds.map((tagId) => fetchTimeline(span, MARK_POINTS, signal, tagId))),
   ]);
   return {
     until: Math.min(span.to, nowS),
     series: new Map(series),
-    before: new Map(before.map(([key, each]) => [key, laterBy(each, dayS ?? 0)])),
+    before: new Map(earlier.map(([key, each]) => [key, laterBy(each, dayS ?? 0)])),
     marks: new Map(timelines.map((timeline, index) => [tagIds[index] ?? '', marksOf(timeline)])),
   };
 }

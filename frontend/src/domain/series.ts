@@ -74,6 +74,7 @@ export const laterBy = (series: Series, byS: number): Series => ({
   buckets: series.buckets.map((bucket) => ({ ...bucket, start: bucket.start + byS })),
   gaps: series.gaps.map(({ from, to }) => ({ from: from + byS, to: to + byS })),
   nights: null,
+  missing: series.missing.map((each) => ({ ...each, from: each.from + byS, to: each.to + byS })),
 });
 
 /** What a tag's timeline tells of tries and looks; scans are told by the readings themselves. */

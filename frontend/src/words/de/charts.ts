@@ -27,7 +27,7 @@ export const CHARTS: In<typeof ENGLISH> = {
   chartTable: 'Als Tabelle anzeigen',
   chartPlots: 'Als Verlauf anzeigen',
   chartDayBefore: 'Vortag',
-  chartBeforeWas: (value, by) => `Vortag ${value} (${by})`,
+  chartBeforeWas: (value) => `Vortag ${value}`,
   chartZoomIn: 'Vergrößern',
   chartZoomOut: 'Verkleinern',
   chartWhole: 'Ganzer Zeitraum',

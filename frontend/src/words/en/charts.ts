@@ -31,7 +31,7 @@ export const CHARTS = {
   chartTable: 'Show as table',
   chartPlots: 'Show as charts',
   chartDayBefore: 'Day before',
-  chartBeforeWas: (value: string, by: string): string => `day before ${value} (${by})`,
+  chartBeforeWas: (value: string): string => `day before ${value}`,
   chartZoomIn: 'Zoom in',
   chartZoomOut: 'Zoom out',
   chartWhole: 'Whole period',

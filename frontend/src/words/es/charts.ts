@@ -27,7 +27,7 @@ export const CHARTS: In<typeof ENGLISH> = {
   chartTable: 'Mostrar como tabla',
   chartPlots: 'Mostrar como gráfica',
   chartDayBefore: 'Día anterior',
-  chartBeforeWas: (value, by) => `día anterior ${value} (${by})`,
+  chartBeforeWas: (value) => `día anterior ${value}`,
   chartZoomIn: 'Acercar',
   chartZoomOut: 'Alejar',
   chartWhole: 'Todo el periodo',

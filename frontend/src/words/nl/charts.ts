@@ -27,7 +27,7 @@ export const CHARTS: In<typeof ENGLISH> = {
   chartTable: 'Als tabel tonen',
   chartPlots: 'Als grafiek tonen',
   chartDayBefore: 'Dag ervoor',
-  chartBeforeWas: (value, by) => `dag ervoor ${value} (${by})`,
+  chartBeforeWas: (value) => `dag ervoor ${value}`,
   chartZoomIn: 'Inzoomen',
   chartZoomOut: 'Uitzoomen',
   chartWhole: 'Hele periode',

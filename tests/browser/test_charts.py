@@ -301,7 +301,7 @@ def test_the_day_before_lies_below_today_and_the_legend_compares(
     inside = plot(hmi, "CO₂").locator(".u-over")
     alone = line_rows(inside)
     hmi.page.get_by_role("button", name="Day before").click()
-    expect(legend).to_contain_text("day before 500\u00a0ppm (+100\u00a0ppm)")
+    expect(legend).to_contain_text("day before 500\u00a0ppm")
     assert from_s - day_s in [float(question["from"]) for question in questions(hmi)]
     # Of two levels one is new, and it lies lower.
     hmi.expect(lambda: line_rows(inside) > alone, "a second line in the chart")

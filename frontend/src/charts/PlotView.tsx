@@ -3,7 +3,6 @@ import '../styles/charts.css';
 
 import { useEffect, useLayoutEffect, useRef, useState, type JSX } from 'react';
 
-import { differenceText } from '../domain/difference';
 import { rangeText, readingText } from '../domain/format';
 import { rosText } from '../domain/rostime';
 import { lastUntil, pointAt, type Bucket, type Reading } from '../domain/series';
@@ -141,7 +140,6 @@ function LegendLine({
         <span className="faint">
           {' '}
           {S.chartBeforeWas(was === null ? S.chartNothing : readingText(sensor, was, unit))}
-          {was !== null && value !== null && ` (${differenceText(sensor, value - was, unit)})`}
         </span>
       )}
     </li>

@@ -65,6 +65,13 @@ describe('the ranges of day and night', () => {
   });
 });
 
+test('a little light does not stand in the middle between minus and plus', () => {
+  const light = sensorNamed('light');
+  const series = seriesWith({ readings: [{ at: 10, value: 800 }] });
+  const [low, high] = valueRange(model([series], { sensor: light }));
+  expect(low).toBeGreaterThan(-0.1 * high);
+});
+
 test('the day before is drawn below all lines, in the look of its own', () => {
   const [today, before] = [20, 15].map((value) => seriesWith({ readings: [{ at: 10, value }] }));
   const two = model([seriesWith({}), today ?? seriesWith({})]);

@@ -133,7 +133,9 @@ export function valueRange({ lines, sensor, bands, unit }: PlotModel): [low: num
   const least = ideal ? LEAST_OF_IDEAL * (ideal[1] - ideal[0]) : Math.abs(low) * 0.01 || 1;
   if (high - low < least) {
     const middle = (low + high) / 2;
-    [low, high] = [middle - least / 2, middle + least / 2];
+    // What is never negative has no negative half of a picture.
+    low = Math.max(middle - least / 2, Math.min(low, 0));
+    high = low + least;
   }
   if (ideal) {
     const spread = high - low;

@@ -86,15 +86,25 @@ def postgresql() -> Iterator[Postgres]:
         yield made
 
 
-@pytest.fixture
-def archive(postgresql: Postgres) -> Iterator[Archive]:
-    """A new archive, with the user of the site gh1, and one that may read all."""
+def _archive(postgresql: Postgres) -> Iterator[Archive]:
     from tests.support.archive import Archive
 
     made = Archive(postgresql)
     made.add_user("page", "lupin_page")
     yield made
     made.drop()
+
+
+@pytest.fixture
+def archive(postgresql: Postgres) -> Iterator[Archive]:
+    """A new archive, with the user of the site gh1, and one that may read all."""
+    yield from _archive(postgresql)
+
+
+@pytest.fixture(scope="module")
+def shared_archive(postgresql: Postgres) -> Iterator[Archive]:
+    """The same, for the tests of a module together."""
+    yield from _archive(postgresql)
 
 
 @pytest.fixture

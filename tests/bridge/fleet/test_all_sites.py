@@ -16,7 +16,6 @@ from lupin_twin.core.state import Write
 from tests.support.archive import Archive, forward_once
 from tests.support.fleet import Page, fleet, scans_lately, wall, write
 from tests.support.journal import SECOND, scan
-from tests.support.postgres import Postgres
 from tests.support.waiting import wait_for
 
 HOUR_S = 3600
@@ -50,10 +49,9 @@ class All:
 
 
 @pytest.fixture(scope="module")
-def every(postgresql: Postgres, tmp_path_factory: pytest.TempPathFactory) -> Iterator[All]:
+def every(shared_archive: Archive, tmp_path_factory: pytest.TempPathFactory) -> Iterator[All]:
     """Sites that no test changes but "over" and "noted", for one test each."""
-    archive, folder = Archive(postgresql), tmp_path_factory.mktemp("sites")
-    archive.add_user("page", "lupin_page")
+    archive, folder = shared_archive, tmp_path_factory.mktemp("sites")
     sites: dict[str, Sequence[Write]] = {
         "gh1": scans_lately(temperature=28.0, tags=2),
         # Raised before the others.
@@ -73,7 +71,6 @@ def every(postgresql: Postgres, tmp_path_factory: pytest.TempPathFactory) -> Ite
         for site in sites:
             page.site(site)
         yield All(archive, page, folder)
-    archive.drop()
 
 
 def alarms(page: Page, sites: str = "") -> dict[str, Any]:

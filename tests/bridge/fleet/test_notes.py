@@ -14,7 +14,6 @@ import pytest
 from tests.support.archive import Archive, forward_once, rows_of
 from tests.support.fleet import Page, fleet, scans_lately, write
 from tests.support.people import OWN, add, signed_in
-from tests.support.postgres import Postgres
 from tests.support.waiting import wait_for
 
 ALARMS = "/sites/gh1/api/alarms"
@@ -30,16 +29,14 @@ class Here:
 
 
 @pytest.fixture(scope="module")
-def here(postgresql: Postgres, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Here]:
-    archive, folder = Archive(postgresql), tmp_path_factory.mktemp("notes")
-    archive.add_user("page", "lupin_page")
+def here(shared_archive: Archive, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Here]:
+    archive, folder = shared_archive, tmp_path_factory.mktemp("notes")
     accounts, journal = folder / "accounts.sqlite", folder / "journal.sqlite"
     add(accounts, anna="operator", vera="viewer")
     write(journal, scans_lately(temperature=45.0, tags=1))
     forward_once(archive, journal)
     with fleet(archive, "--accounts", str(accounts)) as page:
         yield Here(page, archive, accounts, journal)
-    archive.drop()
 
 
 def alarm_of(browser: httpx.Client, **said: str) -> dict[str, Any]:

@@ -19,7 +19,6 @@ from tests.support.docs import block_named
 from tests.support.fleet import Page, fleet, scans_lately, write
 from tests.support.journal import scan
 from tests.support.nginx import nginx
-from tests.support.postgres import Postgres
 from tests.support.waiting import PATIENCE_S, wait_for
 from tests.support.ws_client import open_websocket
 
@@ -37,9 +36,10 @@ class Replicas:
 
 
 @pytest.fixture(scope="module")
-def replicas(postgresql: Postgres, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Replicas]:
-    archive, folder = Archive(postgresql), tmp_path_factory.mktemp("replicas")
-    archive.add_user("page", "lupin_page")
+def replicas(
+    shared_archive: Archive, tmp_path_factory: pytest.TempPathFactory
+) -> Iterator[Replicas]:
+    archive, folder = shared_archive, tmp_path_factory.mktemp("replicas")
     journal = folder / "journal"
     write(journal, scans_lately())
     forward_once(archive, journal)

@@ -85,6 +85,11 @@ class Hmi:
             self.page.goto("about:blank")  # else only the fragment changes, and nothing is loaded
         self.page.goto(f"{self.url}/{query}{'#' if fragment else ''}{fragment}")
 
+    def turn(self, fragment: str) -> None:
+        """Another permalink of the page that is there: nothing is loaded anew."""
+        self.page.goto(f"{self.url}/#{fragment}")
+        self.view()  # which is that of a frame painted since
+
     def address(self) -> str:
         """What is in the address bar now."""
         address = self.page.evaluate("location.href")

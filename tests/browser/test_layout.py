@@ -145,11 +145,11 @@ def test_a_phone_has_room_for_the_facts_a_fixed_range_and_what_is_missing(
     expect(facts.get_by_text("no data", exact=False).locator("visible=true")).to_have_count(1)
     # Over the map, which stays as high as it is.
     assert place(facts).bottom <= place(legend).top
-    hmi.go("sensor=soil_moisture&colour=value")
+    hmi.turn("sensor=soil_moisture&colour=value")
     hmi.page.get_by_role("radio", name="Fixed").check()
     title, control = place(hmi.page.locator(".legend-title")), place(hmi.page.locator(".range"))
     assert title.bottom <= control.top
-    hmi.go("sensor=radiation")
+    hmi.turn("sensor=radiation")
     expect(hmi.test_id("notice")).to_have_attribute("data-notice", "no-reading")
     notice, frame = places(hmi, "[data-testid=notice]", "[data-testid=map]")
     assert notice.bottom == pytest.approx(frame.bottom, abs=1)

@@ -229,7 +229,11 @@ function onPointerLeave(): void {
 
 /** How many letters the longest word of a label has. */
 const longestWord = (label: string): number =>
-  Math.max(...shown(label, 24).split(/[\s-]/).map((word) => word.length));
+  Math.max(
+    ...shown(label, 24)
+      .split(/[\s-]/)
+      .map((word) => word.length),
+  );
 
 const SensorHead = memo(function SensorHead({
   sensor,

@@ -1,12 +1,12 @@
 import { useRef, useState } from 'react';
 
-import { now } from '../clock';
+import { now, pause } from '../clock';
 import { endsNow, spanOf, type Span } from '../domain/period';
 import { store, useApp, type AppState } from '../store/app';
 import { rosNow, selectNewestTag } from '../store/moment';
 import { selectDayS } from '../store/origin';
 import { turnOf } from '../store/remembered';
-import type { Fetched } from '../store/twin';
+import type { Fetched } from '../store/fetcher';
 import { useFetched } from '../store/useFetched';
 import { useNow } from '../widgets/useNow';
 import { fetchLines, NO_LINES, pairKey, type Lines, type Pair } from './lines';
@@ -52,9 +52,7 @@ export function useLines(pairs: readonly Pair[], points: number, hasDayBefore = 
           group,
           paceMs: Math.max(PACE_MS, PACE_A_LINE_MS * pairs.length),
           run: async (signal) => {
-            if (answered.current === group) {
-              await new Promise((resolve) => setTimeout(resolve, WRITTEN_MS));
-            }
+            if (answered.current === group) await pause(WRITTEN_MS);
             // The twin's time has gone on since this was wished for.
             const atS = rosNow(store.get(), now()) ?? nowS;
             const asked = spanOf(period, atS, oldest);

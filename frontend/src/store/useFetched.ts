@@ -1,7 +1,6 @@
 import { useEffect, useState } from 'react';
 
-import { createFetcher, type Wish } from './fetcher';
-import { NOTHING, type Fetched } from './twin';
+import { createFetcher, type Fetched, NOTHING, type Wish } from './fetcher';
 
 /**
  * What a component wishes for just now; null: nothing more. The value before stays until the next

@@ -12,11 +12,12 @@ import { modelOf, pairsOf, plansOf, tagLabel } from './charted';
 import { ChartFiles } from './ChartFiles';
 import { ChartState } from './ChartState';
 import { ChartTables } from './ChartTables';
+import { MarksKey } from './MarksKey';
 import { PlotView } from './PlotView';
 import { SensorChoice } from './SensorChoice';
 import { TagChoice } from './TagChoice';
-import { useFeed } from './useFeed';
-import { useSensorsOf } from './useSensorsOf';
+import { useLines } from './useLines';
+import { useSensorsOf, useSpeciesOf } from './useSensorsOf';
 import { pointsFor, useSize } from './useSize';
 import { useZoomed, zoomBack, zoomBy } from './zoom';
 
@@ -42,11 +43,15 @@ export default function ChartView({ charted }: { charted: Charted }): JSX.Elemen
 
   const plans = useMemo(() => plansOf(charted, sensors, sensor), [charted, sensors, sensor]);
   const pairs = useMemo(() => pairsOf(plans), [plans]);
-  const { fed, span } = useFeed(pairs, pointsFor(size.width), hasDayBefore);
+  const asked = useLines(pairs, pointsFor(size.width), hasDayBefore);
+  const { lines, span } = asked;
+  const species = useSpeciesOf(charted.tagIds);
   const models = useMemo(
     () =>
-      span ? plans.map((plan) => modelOf(catalogue, both, plan, fed, span, unit, moment)) : [],
-    [catalogue, both, plans, fed, span, unit, moment],
+      span
+        ? plans.map((plan) => modelOf(catalogue, both, plan, species, lines, span, unit, moment))
+        : [],
+    [catalogue, both, plans, species, lines, span, unit, moment],
   );
   const withLines = models.filter(({ lines }) => lines.length > 0);
   const around = AROUND + (charted.by === 'sensor' ? LEGEND : 0);
@@ -106,8 +111,8 @@ export default function ChartView({ charted }: { charted: Charted }): JSX.Elemen
       {charted.by === 'sensor' && <TagChoice tagIds={charted.tagIds} />}
       <div className="chart-body" ref={body}>
         <ChartState
-          fed={fed}
-          isTimeKnown={span !== null}
+          asked={asked}
+          hasLines={withLines.length > 0}
           lacks={plans.length === 0 ? S.chartNoSensors : null}
         />
         {isTable && <ChartTables models={withLines} />}
@@ -120,6 +125,7 @@ export default function ChartView({ charted }: { charted: Charted }): JSX.Elemen
             />
           ))}
       </div>
+      <MarksKey marks={[...lines.marks.values()].flat()} />
       {withLines.length > 0 && span && (
         <ChartFiles
           models={withLines}

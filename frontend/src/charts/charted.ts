@@ -1,11 +1,11 @@
 /** From what is chosen to the charts that it makes. Pure. */
 import type { Span } from '../domain/period';
-import type { Catalogue, Catalogues } from '../domain/sensors';
+import { rangesFor, type Catalogue, type Catalogues, type Ranges } from '../domain/sensors';
 import { shown } from '../domain/text';
 import type { TemperatureUnit } from '../domain/units';
 import type { Charted } from '../store/view';
 import { S } from '../strings';
-import { marksOver, pairKey, seriesOver, type Fed, type Pair } from './fed';
+import { pairKey, type Lines, type Pair } from './lines';
 import { bandsOf, type PlotModel } from './model';
 
 /** One chart: a sensor, and the tags whose readings of it are its lines. */
@@ -31,25 +31,33 @@ export const pairsOf = (plans: readonly Plan[]): Pair[] =>
 
 export const tagLabel = (tagId: string): string => S.card(shown(tagId, 24));
 
-/** What of a plan is here. A tag keeps its look while others come later, or have nothing. */
+/**
+ * What of a plan is here. A tag keeps its look while others come later, or have nothing. `species` are
+ * those of the plan's tags: what is ideal is drawn where it is the same for all.
+ */
 export function modelOf(
   catalogue: Catalogue,
   { day, night }: Catalogues,
   { sensor, tagIds }: Plan,
-  fed: Fed,
+  species: readonly string[],
+  { series, before, marks }: Lines,
   span: Span,
   unit: TemperatureUnit,
   moment: number | null,
 ): PlotModel {
   const lines = tagIds.flatMap((tagId, look) => {
-    const series = seriesOver(fed, { tagId, sensor }, span);
-    const marks = marksOver(fed, tagId, span);
-    const before = fed.before.get(pairKey({ tagId, sensor })) ?? null;
-    return series ? [{ series, before, look, label: tagLabel(tagId), marks }] : [];
+    const key = pairKey({ tagId, sensor });
+    const own = series.get(key);
+    if (!own) return [];
+    const ofDayBefore = before.get(key) ?? null;
+    const label = tagLabel(tagId);
+    return [{ series: own, before: ofDayBefore, look, label, marks: marks.get(tagId) ?? [] }];
   });
   const now = catalogue.named(sensor);
-  const ranges = { now, day: day.named(sensor), night: night.named(sensor) };
+  const isMixed = new Set(tagIds.map((_, index) => rangesFor(now, species[index] ?? ''))).size > 1;
+  const own = (of: Catalogue): Ranges => rangesFor(of.named(sensor), species[0] ?? '');
+  const ranges = { now: own(catalogue), day: own(day), night: own(night) };
   // The nights are the greenhouse's: each line has the same.
-  const bands = bandsOf(span, lines[0]?.series.nights ?? null, ranges);
-  return { sensor: now, unit, span, moment, lines, bands };
+  const bands = isMixed ? [] : bandsOf(span, lines[0]?.series.nights ?? null, ranges);
+  return { sensor: now, unit, span, moment, lines, bands, isMixed };
 }

@@ -93,6 +93,7 @@ export function TagTable(): JSX.Element {
           <col
             key={sensor.name}
             className={sensor.name === chosen ? 'col-sensor' : 'col-sensor other'}
+            style={{ '--letters': longestWord(sensor.label) } as CSSProperties}
           />
         ))}
         {has('pest') && <col className="col-pest" />}
@@ -225,6 +226,14 @@ function onPointerOver(event: SyntheticEvent): void {
 function onPointerLeave(): void {
   act({ type: 'hover', tagId: null });
 }
+
+/** How many letters the longest word of a label has. */
+const longestWord = (label: string): number =>
+  Math.max(
+    ...shown(label, 24)
+      .split(/[\s-]/)
+      .map((word) => word.length),
+  );
 
 const SensorHead = memo(function SensorHead({
   sensor,

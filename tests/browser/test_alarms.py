@@ -189,7 +189,7 @@ def test_a_double_click_shelves_nothing_and_a_critical_alarm_takes_a_reason(
         times = hmi.page.locator(".shelf-times button")
         for tag, viewport in itertools.product(("b", "a"), (PHONE, WIDE)):
             hmi.page.keyboard.press("Escape")
-            hmi.page.set_viewport_size(viewport)
+            hmi.resize(**viewport)
             button = hmi.page.get_by_role("button", name=f"Shelve: Tag {tag}")
             button.dblclick()
             expect(times.first).to_be_visible()

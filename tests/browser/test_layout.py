@@ -70,22 +70,10 @@ def show(hmi: Hmi, name: str) -> None:
 HIDDEN = "table => table.scrollWidth - table.clientWidth"
 
 
-def resize(hmi: Hmi, size: Size) -> None:
-    """Give the window another size; returns when the page has laid itself out in it."""
-    hmi.page.set_viewport_size({"width": size[0], "height": size[1]})
-    hmi.page.wait_for_function(
-        "size => innerWidth === size[0] && innerHeight === size[1]", arg=size
-    )
-    # What watches sizes asks for another one in its turn.
-    hmi.page.evaluate(
-        "async () => { for (const _ of '12') await new Promise(requestAnimationFrame); }"
-    )
-
-
 def test_everything_can_be_hit(open_at: Callable[..., Hmi]) -> None:
     hmi = open_at(SIZES[0])
     for size in (*SIZES, *MIDDLING, HUGE):
-        resize(hmi, size)
+        hmi.resize(*size)
         show(hmi, "Map")
         for mode in ("Ideal", "Value", "Fixed"):
             hmi.page.get_by_role("radio", name=mode).check()
@@ -111,7 +99,7 @@ def test_an_open_card_lies_over_nothing_in_an_upright_window(open_at: Callable[.
     expect(hmi.card("1")).to_be_visible()
     parts = [".map-frame", ".timebar", ".health", ".filter-bar", ".table-scroll", ".card"]
     for width, height in UPRIGHT:
-        resize(hmi, (width, height))
+        hmi.resize(width, height)
 
         def from_top_to_foot(height: int = height) -> bool:
             boxes = places(hmi, *parts)
@@ -169,14 +157,14 @@ def test_a_longer_word_about_the_house_does_not_move_the_table(
     hmi.page.evaluate("document.fonts.ready")
     before = {}
     for size in FEW:
-        resize(hmi, size)
+        hmi.resize(*size)
         show(hmi, "Tags")
         before[size] = places(hmi, ".filter-bar")
     long = "a-tag-with-no-short-name"
     running.peer.observe(scan(long, {"temperature": 79.0}, at=(2, 1)))
     expect(driver).to_contain_text(long)
     for size in FEW:
-        resize(hmi, size)
+        hmi.resize(*size)
         hmi.expect_phase("live")
         in_place = partial(stands_at, hmi, before[size])
         hmi.expect(in_place, f"the table in its place at {size}")
@@ -235,7 +223,7 @@ def test_an_empty_house_says_what_to_do_beside_the_controls_and_in_the_table(
     hmi.expect_parts()
     tabs = hmi.page.locator(".pane-tabs")
     for size in FEW:
-        resize(hmi, size)
+        hmi.resize(*size)
         expect_in_reach(hmi, ".map-controls button")
         hmi.test_id("notice").locator("summary").click()
         expect(hmi.test_id("notice").locator("details")).to_have_attribute("open", "")
@@ -269,7 +257,7 @@ def test_all_text_grows_with_the_text_of_the_browser(open_at: Callable[..., Hmi]
       return [usual, texts()];
     }"""
     for size in ((1440, 900), (PHONE["width"], PHONE["height"])):
-        resize(hmi, size)
+        hmi.resize(*size)
         usual, grown = hmi.page.evaluate(grow)
         assert grown == pytest.approx([2 * each for each in usual])
         expect_in_reach(hmi, CONTROLS)
@@ -294,7 +282,7 @@ def test_the_row_of_sensors_fades_where_it_has_more(open_at: Callable[..., Hmi])
     expect(row).to_have_css("mask-image", re.compile("gradient"))
     hmi.choose_sensor("Condensation margin")
     expect(row).to_have_attribute("data-more", "before")
-    resize(hmi, (3840, 1440))
+    hmi.resize(3840, 1440)
     expect(row).to_have_attribute("data-more", "")
     expect(row).to_have_css("mask-image", "none")
 
@@ -328,7 +316,7 @@ def test_no_pin_lies_below_what_stands_on_the_map(domain: int, open_page: OpenPa
         )
         hmi = open_page(running.url, go=False)
         for size in FEW:
-            hmi.page.set_viewport_size({"width": size[0], "height": size[1]})
+            hmi.resize(*size)
             hmi.go()
             hmi.expect_samples(len(PINS))
             hmi.expect_parts()
@@ -394,7 +382,7 @@ LANGUAGES = {
 def test_every_language_has_room_on_a_phone(house: Bridge, open_page: OpenPage) -> None:
     hmi = open_page(house.url, go=False)
     for language, (contribute, reading) in LANGUAGES.items():
-        hmi.page.set_viewport_size(PHONE)
+        hmi.resize(**PHONE)
         hmi.go(query=f"?lang={language}")
         expect(hmi.test_id("sample-count")).to_contain_text(contribute)
         expect(hmi.page.locator("html")).to_have_attribute("lang", language)
@@ -414,7 +402,7 @@ def test_every_language_has_room_on_a_phone(house: Bridge, open_page: OpenPage) 
         assert hmi.page.evaluate("document.documentElement.scrollWidth") == PHONE["width"]
         # On a phone and on the smallest laptops this column is narrow, with the arrow at first.
         for width in (PHONE["width"], 1100, 1280):
-            resize(hmi, (width, 800))
+            hmi.resize(width, 800)
             health = hmi.page.locator("thead [data-column=health] button > span").first
             assert health.evaluate(_LINES) == 1, (language, width)
 

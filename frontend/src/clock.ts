@@ -90,3 +90,8 @@ export const onLapse = (listener: () => void): (() => void) => clock.onLapse(lis
 
 /** Time of day on the operator's own clock, ms since the epoch. */
 export const timeOfDay = (): number => Date.now();
+
+export const pause = (ms: number): Promise<void> =>
+  new Promise((resolve) => {
+    setTimeout(resolve, ms);
+  });

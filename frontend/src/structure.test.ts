@@ -68,7 +68,7 @@ const TABLE: Table = {
   // The page over all greenhouses, a bundle of its own.
   fleet: [
     ...['words', 'strings', 'clock', 'contract', 'connection', 'domain', 'store', 'alarms'],
-    ...['charts', 'ui', 'styles', 'npm:react', 'npm:react-dom', 'npm:uplot'],
+    ...['widgets', 'charts', 'ui', 'styles', 'npm:react', 'npm:react-dom', 'npm:uplot'],
   ],
   main: ['styles', 'strings', 'store', 'alarms', 'ui', 'npm:react', 'npm:react-dom'],
   // For tests alone: no part above names it.

@@ -7,7 +7,7 @@ import { Icon } from '../widgets/Icon';
 import { modelOf, pairsOf } from './charted';
 import { PlotView } from './PlotView';
 import { SensorChoice } from './SensorChoice';
-import { useFeed } from './useFeed';
+import { useLines } from './useLines';
 import { useSensorsOf } from './useSensorsOf';
 import { pointsFor, useSize } from './useSize';
 import { ChartState } from './ChartState';
@@ -30,23 +30,24 @@ export default function CardChart({ tagId }: { tagId: string }): JSX.Element | n
     [sensor, tagId],
   );
   const pairs = useMemo(() => (plan ? pairsOf([plan]) : []), [plan]);
-  const { fed, span } = useFeed(pairs, pointsFor(width));
+  const asked = useLines(pairs, pointsFor(width));
+  const { lines, state, span } = asked;
   const model = useMemo(
-    () => (plan && span ? modelOf(catalogue, both, plan, fed, span, unit, moment) : null),
-    [catalogue, both, plan, fed, span, unit, moment],
+    () => (plan && span ? modelOf(catalogue, both, plan, lines, span, unit, moment) : null),
+    [catalogue, both, plan, lines, span, unit, moment],
   );
   if (!plan) return null;
   return (
-    <div className="card-chart" ref={place} data-testid="card-chart" data-state={fed.state}>
+    <div className="card-chart" ref={place} data-testid="card-chart" data-state={state}>
       <SensorChoice tagId={tagId} value={plan.sensor} />
-      {fed.state === 'missing' ? (
+      {state === 'missing' ? (
         <p className="faint">{S.chartMissingShort}</p>
       ) : (
         <>
           {model && model.lines.length > 0 ? (
             <PlotView model={model} height={HEIGHT} />
           ) : (
-            <ChartState fed={fed} isTimeKnown={span !== null} lacks={null} />
+            <ChartState asked={asked} hasLines={false} lacks={null} />
           )}
           <button
             type="button"

@@ -3,20 +3,19 @@ import type { JSX } from 'react';
 import { shown } from '../domain/text';
 import { S } from '../strings';
 import { More } from '../widgets/More';
-import type { Fed } from './fed';
+import type { Asked } from './useLines';
 
 /** Why there is no chart (yet), in plain words. */
 export function ChartState({
-  fed,
-  isTimeKnown,
+  asked: { state, message, span },
+  hasLines,
   lacks,
 }: {
-  fed: Fed;
-  isTimeKnown: boolean;
+  asked: Asked;
+  hasLines: boolean;
   /** What there is nothing of to chart; null: there is something. */
   lacks: string | null;
 }): JSX.Element | null {
-  const { state, message, series } = fed;
   if (state === 'missing') {
     return (
       <div className="chart-state" role="status" data-state="missing">
@@ -29,11 +28,11 @@ export function ChartState({
   }
   const text =
     lacks ??
-    (!isTimeKnown
+    (span === null
       ? S.chartNoTime
       : state === 'failed'
         ? S.chartFailed(shown(message, 300))
-        : state === 'waiting' && series.size === 0
+        : state === 'waiting' && !hasLines
           ? S.chartLoading
           : null);
   if (text === null) return null;

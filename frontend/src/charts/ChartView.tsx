@@ -15,7 +15,7 @@ import { ChartTables } from './ChartTables';
 import { PlotView } from './PlotView';
 import { SensorChoice } from './SensorChoice';
 import { TagChoice } from './TagChoice';
-import { useFeed } from './useFeed';
+import { useLines } from './useLines';
 import { useSensorsOf } from './useSensorsOf';
 import { pointsFor, useSize } from './useSize';
 import { useZoomed, zoomBack, zoomBy } from './zoom';
@@ -42,11 +42,12 @@ export default function ChartView({ charted }: { charted: Charted }): JSX.Elemen
 
   const plans = useMemo(() => plansOf(charted, sensors, sensor), [charted, sensors, sensor]);
   const pairs = useMemo(() => pairsOf(plans), [plans]);
-  const { fed, span } = useFeed(pairs, pointsFor(size.width), hasDayBefore);
+  const asked = useLines(pairs, pointsFor(size.width), hasDayBefore);
+  const { lines, span } = asked;
   const models = useMemo(
     () =>
-      span ? plans.map((plan) => modelOf(catalogue, both, plan, fed, span, unit, moment)) : [],
-    [catalogue, both, plans, fed, span, unit, moment],
+      span ? plans.map((plan) => modelOf(catalogue, both, plan, lines, span, unit, moment)) : [],
+    [catalogue, both, plans, lines, span, unit, moment],
   );
   const withLines = models.filter(({ lines }) => lines.length > 0);
   const around = AROUND + (charted.by === 'sensor' ? LEGEND : 0);
@@ -106,8 +107,8 @@ export default function ChartView({ charted }: { charted: Charted }): JSX.Elemen
       {charted.by === 'sensor' && <TagChoice tagIds={charted.tagIds} />}
       <div className="chart-body" ref={body}>
         <ChartState
-          fed={fed}
-          isTimeKnown={span !== null}
+          asked={asked}
+          hasLines={withLines.length > 0}
           lacks={plans.length === 0 ? S.chartNoSensors : null}
         />
         {isTable && <ChartTables models={withLines} />}

@@ -13,7 +13,7 @@ import { spanText } from './told';
 /** The same as a line of a chart, for the keyboard and for screen readers; the newest row first. */
 export function SeriesTable({ line, model }: { line: Line; model: PlotModel }): JSX.Element {
   const { series } = line;
-  const { sensor, unit, span } = model;
+  const { sensor, unit } = model;
   const isBucketed = series.bucketS !== null;
   const { chartColumns: columns } = S;
   const rows = rowsOfSeries(series, line.marks).reverse();
@@ -23,7 +23,7 @@ export function SeriesTable({ line, model }: { line: Line; model: PlotModel }): 
     <div className="series-scroll" tabIndex={0}>
       <table className="series-table" data-testid="series-table">
         <caption>
-          {S.chartTableCaption(line.label, shown(sensor.label, 32), spanText(span))}
+          {S.chartTableCaption(line.label, shown(sensor.label, 32), spanText(series))}
         </caption>
         <thead>
           <tr>

@@ -5,7 +5,7 @@ import { shown } from '../domain/text';
 import type { TemperatureUnit } from '../domain/units';
 import type { Charted } from '../store/view';
 import { S } from '../strings';
-import { marksOver, pairKey, seriesOver, type Fed, type Pair } from './fed';
+import { pairKey, type Lines, type Pair } from './lines';
 import { bandsOf, type PlotModel } from './model';
 
 /** One chart: a sensor, and the tags whose readings of it are its lines. */
@@ -36,16 +36,18 @@ export function modelOf(
   catalogue: Catalogue,
   { day, night }: Catalogues,
   { sensor, tagIds }: Plan,
-  fed: Fed,
+  { series, before, marks }: Lines,
   span: Span,
   unit: TemperatureUnit,
   moment: number | null,
 ): PlotModel {
   const lines = tagIds.flatMap((tagId, look) => {
-    const series = seriesOver(fed, { tagId, sensor }, span);
-    const marks = marksOver(fed, tagId, span);
-    const before = fed.before.get(pairKey({ tagId, sensor })) ?? null;
-    return series ? [{ series, before, look, label: tagLabel(tagId), marks }] : [];
+    const key = pairKey({ tagId, sensor });
+    const own = series.get(key);
+    if (!own) return [];
+    const ofDayBefore = before.get(key) ?? null;
+    const label = tagLabel(tagId);
+    return [{ series: own, before: ofDayBefore, look, label, marks: marks.get(tagId) ?? [] }];
   });
   const now = catalogue.named(sensor);
   const ranges = { now, day: day.named(sensor), night: night.named(sensor) };

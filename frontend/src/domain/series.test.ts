@@ -4,13 +4,10 @@ import { CATALOGUE } from '../testing/sensors';
 import { seriesWith } from '../testing/series';
 import {
   chartCsv,
-  goneOn,
-  lastTime,
   lastUntil,
   type Mark,
   middleOf,
   pointAt,
-  quietS,
   rowsOfSeries,
   type Series,
   summaryOf,
@@ -27,101 +24,10 @@ const bucket = (start: number, n = 10, mean = 5): Series['buckets'][number] => (
   max: mean + 1,
 });
 
-describe('what is heard after the fetch', () => {
-  test('is appended once, and only what is newer than all that is there', () => {
-    const base = seriesWith({ readings: every10(5) });
-    const heard = [
-      { at: 40, value: 99 },
-      { at: 50, value: 5 },
-      { at: 50, value: 6 },
-    ];
-    expect(goneOn(base, heard, { from: 0, to: 60 }).readings).toEqual([
-      ...every10(5),
-      { at: 50, value: 5 },
-    ]);
-  });
-
-  test('of later than the period does not belong to it', () => {
-    const base = seriesWith({ readings: every10(5) });
-    const later = { at: 61, value: 5 };
-    expect(goneOn(base, [later], { from: 0, to: 60 }).readings).toHaveLength(5);
-  });
-
-  test('falls into the last bucket, or into one of its own on the same grid', () => {
-    const base = seriesWith({ bucketS: 10, buckets: [bucket(0), bucket(10, 1, 4)] });
-    const heard = [
-      { at: 19.9, value: 8 },
-      { at: 25, value: 7 },
-      { at: 26, value: null },
-    ];
-    const { buckets } = goneOn(base, heard, { from: 0, to: 30 });
-    expect(buckets).toEqual([
-      bucket(0),
-      { start: 10, n: 2, mean: 6, min: 3, max: 8 },
-      { start: 20, n: 1, mean: 7, min: 7, max: 7 },
-    ]);
-  });
-
-  test('leaves nothing from before the period', () => {
-    expect(goneOn(seriesWith({ readings: every10(5) }), [], { from: 20, to: 60 }).readings).toEqual(
-      every10(5).slice(2),
-    );
-    const bucketed = seriesWith({ bucketS: 10, buckets: [bucket(0), bucket(10)] });
-    // A bucket that ends with the beginning of the period is not in it.
-    expect(goneOn(bucketed, [], { from: 10, to: 60 }).buckets).toEqual([bucket(10)]);
-    expect(goneOn(bucketed, [], { from: 9.9, to: 60 }).buckets).toHaveLength(2);
-  });
-});
-
-describe('a gap', () => {
-  test('opens when nothing comes for more than three times the usual, and not before', () => {
-    const base = seriesWith({ readings: every10(5) });
-    expect(quietS(base)).toBe(30);
-    expect(goneOn(base, [], { from: 0, to: 70 }).gaps).toEqual([]);
-    expect(goneOn(base, [], { from: 0, to: 70.5 }).gaps).toEqual([{ from: 40, to: 70.5 }]);
-  });
-
-  test('that was open closes at the reading that ends it', () => {
-    const base = seriesWith({ readings: every10(5), gaps: [{ from: 40, to: 100 }] });
-    const period = { from: 0, to: 120 };
-    expect(goneOn(base, [{ at: 110, value: 1 }], period).gaps).toEqual([{ from: 40, to: 110 }]);
-    // It turns out that it was none: a reading of before was late.
-    expect(goneOn(base, [{ at: 60, value: 1 }], { from: 0, to: 80 }).gaps).toEqual([]);
-  });
-
-  test('leaves with the period, and is cut at its ends', () => {
-    const base = seriesWith({ readings: every10(5).slice(3), gaps: [{ from: 0, to: 30 }] });
-    expect(goneOn(base, [], { from: 20, to: 60 }).gaps).toEqual([{ from: 20, to: 30 }]);
-    expect(goneOn(base, [], { from: 30, to: 60 }).gaps).toEqual([]);
-  });
-
-  test('of a series with nothing in it is all of the period', () => {
-    const base = seriesWith({ gaps: [{ from: 0, to: 100 }] });
-    expect(goneOn(base, [], { from: 0, to: 100 }).gaps).toEqual([{ from: 0, to: 100 }]);
-    expect(goneOn(base, [{ at: 70, value: 1 }], { from: 0, to: 100 }).gaps).toEqual([
-      { from: 0, to: 70 },
-    ]);
-  });
-
-  test('between buckets is never shorter than one', () => {
-    const base = seriesWith({ bucketS: 10, buckets: [bucket(0, 100), bucket(10, 100)] });
-    expect(quietS(base)).toBe(10);
-    const heard = [{ at: 45, value: 5 }];
-    expect(goneOn(base, heard, { from: 0, to: 50 }).gaps).toEqual([{ from: 20, to: 40 }]);
-    expect(quietS(seriesWith({ bucketS: 10, buckets: [bucket(0, 1)] }))).toBe(Infinity);
-  });
-});
-
 test('a bucket stands in its middle, and never later than the period', () => {
   const bucketed = seriesWith({ bucketS: 10, buckets: [bucket(0)], to: 4 });
   expect(middleOf(bucket(0), { ...bucketed, to: 100 })).toBe(5);
   expect(middleOf(bucket(0), bucketed)).toBe(4);
-});
-
-test('the last of a series is its last reading, or the end of its last bucket', () => {
-  expect(lastTime(seriesWith())).toBeNull();
-  expect(lastTime(seriesWith({ readings: every10(3) }))).toBe(20);
-  expect(lastTime(seriesWith({ bucketS: 10, buckets: [bucket(30)] }))).toBe(40);
 });
 
 test('a summary counts readings, and takes the least and the most of buckets', () => {

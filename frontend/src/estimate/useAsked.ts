@@ -1,8 +1,7 @@
-import { useEffect, useState } from 'react';
-
 import { useApp } from '../store/app';
-import { createFetcher } from '../store/fetcher';
-import type { Fetched } from '../store/twin';
+import type { Fetched } from '../store/fetcher';
+import { useFetched } from '../store/useFetched';
+import { useTicking } from '../widgets/useNow';
 
 /** What the twin says of its estimate changes slowly. */
 const EVERY_MS = 10_000;
@@ -14,42 +13,16 @@ const EVERY_MS = 10_000;
 export function useAsked<T>(ask: (sensor: string, signal: AbortSignal) => Promise<T>): Fetched<T> {
   const sensor = useApp((state) => state.view.sensor);
   const isOpen = useApp((state) => state.twin.connection.socket.kind === 'open');
-  const [answer, setAnswer] = useState<{ readonly of: string; readonly got: Fetched<T> } | null>(
-    null,
+  const turn = useTicking((at) => String(Math.floor(at / EVERY_MS)));
+  const { value, ...rest } = useFetched<{ readonly of: string; readonly answer: T }>(
+    isOpen
+      ? {
+          key: turn,
+          group: sensor,
+          run: async (signal) => ({ of: sensor, answer: await ask(sensor, signal) }),
+        }
+      : null,
+    EVERY_MS,
   );
-  useEffect(() => {
-    if (!isOpen) return undefined;
-    let ticks = 0;
-    const fetcher = createFetcher<T>({
-      paceMs: EVERY_MS,
-      onValue: (value) => {
-        setAnswer({ of: sensor, got: { value, state: 'ready', message: '' } });
-      },
-      onError: (message) => {
-        setAnswer((last) => ({
-          of: sensor,
-          got: {
-            value: last?.of === sensor ? last.got.value : null,
-            state: 'failed',
-            message,
-          },
-        }));
-      },
-    });
-    const want = (): void => {
-      fetcher.want({
-        key: String(ticks),
-        group: sensor,
-        run: (signal) => ask(sensor, signal),
-      });
-      ticks += 1;
-    };
-    want();
-    const timer = setInterval(want, EVERY_MS);
-    return () => {
-      clearInterval(timer);
-      fetcher.want(null);
-    };
-  }, [ask, sensor, isOpen]);
-  return answer?.of === sensor ? answer.got : { value: null, state: 'waiting', message: '' };
+  return { ...rest, value: value?.of === sensor ? value.answer : null };
 }

@@ -36,7 +36,7 @@ export default function Alarms({ shown, words }: Props): JSX.Element {
   const path = names === '' ? 'api/alarms' : `api/alarms?sites=${names}`;
   // Another count, another list.
   const news = having.map((site) => `${site.site} ${site.active_alarms ?? 0}`).join();
-  const { value, trouble } = useAnswer<{ alarms: readonly SiteAlarm[] }>(path, EVERY_MS, news);
+  const { value, message } = useAnswer<{ alarms: readonly SiteAlarm[] }>(path, EVERY_MS, news);
   const rows = useMemo(() => {
     const sites = new Set(shown.map(({ site }) => site));
     return value?.alarms.filter(({ site }) => sites.has(site)) ?? [];
@@ -45,7 +45,7 @@ export default function Alarms({ shown, words }: Props): JSX.Element {
   const isRead = shown.every((site) => site.active_alarms !== null);
   return (
     <>
-      {trouble && <p className="fleet-note">{W.notFetched(trouble)}</p>}
+      {message && <p className="fleet-note">{W.notFetched(message)}</p>}
       {all === 0 && (
         <p className="fleet-empty">{isRead ? words.noAlarms : words.alarmsBeingRead}</p>
       )}

@@ -59,7 +59,7 @@ export default function Compare({ shown, words }: Props): JSX.Element {
   const hour = Math.floor(timeOfDay() / 3_600_000) * 3600;
   const { from } = periodSpan({ kind: period }, hour, null);
   const path = `api/compare?sensor_type=${encodeURIComponent(name)}&from=${from}&sites=${sites.join(',')}`;
-  const { value: found, trouble } = useAnswer<Compared>(path, EVERY_MS);
+  const { value: found, message } = useAnswer<Compared>(path, EVERY_MS);
   const drawn = useMemo(
     () => picked ?? found?.sites.slice(0, DRAWN).map(({ site }) => site) ?? [],
     [picked, found],
@@ -111,8 +111,8 @@ export default function Compare({ shown, words }: Props): JSX.Element {
           <p className="fleet-note">{W.someCompared(compared.length, shown.length)}</p>
         )}
       </div>
-      {trouble && <p className="fleet-note">{W.notFetched(trouble)}</p>}
-      {!found && !trouble && <p className="fleet-empty">{S.chartLoading}</p>}
+      {message && <p className="fleet-note">{W.notFetched(message)}</p>}
+      {!found && !message && <p className="fleet-empty">{S.chartLoading}</p>}
       {found && model && (
         <>
           <Chart model={model} onPoint={setAt} />

@@ -48,7 +48,7 @@ export default function Report({ shown, words }: Props): JSX.Element {
   const names = namesOf(shown);
   const from = (Math.floor(timeOfDay() / 3_600_000) - hours) * 3600;
   const path = `api/report?from=${from}${names === '' ? '' : `&sites=${names}`}`;
-  const { value, trouble } = useAnswer<Answer>(path, EVERY_MS);
+  const { value, message } = useAnswer<Answer>(path, EVERY_MS);
   const found = new Map(value?.sites.map((each) => [each.site, each]));
   const sites = new Set(shown.map(({ site }) => site));
   const notes = value?.notes.filter(({ site }) => sites.has(site)) ?? [];
@@ -70,8 +70,8 @@ export default function Report({ shown, words }: Props): JSX.Element {
           ))}
         </div>
       </div>
-      {trouble && <p className="fleet-note">{W.notFetched(trouble)}</p>}
-      {!value && !trouble && <p className="fleet-empty">{S.chartLoading}</p>}
+      {message && <p className="fleet-note">{W.notFetched(message)}</p>}
+      {!value && !message && <p className="fleet-empty">{S.chartLoading}</p>}
       {value && (
         <div className="fleet-report">
           <table className="fleet-table">

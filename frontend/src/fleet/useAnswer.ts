@@ -1,43 +1,29 @@
 /** An answer of the server that is kept up to date while the page is looked at. */
-import { useEffect, useState } from 'react';
-
+import { pause } from '../clock';
 import { bodyOf, get } from '../contract/api';
-
-export interface Fetched<T> {
-  /** The last one that came; null: none yet. */
-  readonly value: T | null;
-  /** Why there is no newer one; empty: there is. */
-  readonly trouble: string;
-}
+import type { Fetched } from '../store/fetcher';
+import { useFetched } from '../store/useFetched';
+import { useTicking } from '../widgets/useNow';
 
 /** What is asked for changes faster than anybody reads. */
 const SETTLE_MS = 300;
 
-/** Asks at once, when `path` or `news` is another, and every so many ms. */
-export function useAnswer<T>(path: string, everyMs: number, news: unknown = null): Fetched<T> {
-  const [fetched, setFetched] = useState<Fetched<T>>({ value: null, trouble: '' });
-  useEffect(() => {
-    const leaving = new AbortController();
-    let timer: ReturnType<typeof setTimeout> | undefined;
-    const ask = async (): Promise<void> => {
-      try {
-        if (document.visibilityState === 'visible') {
-          const response = await get(path, leaving.signal);
-          const value = await bodyOf<T>(response);
-          setFetched({ value, trouble: '' });
-        }
-      } catch (error) {
-        if (leaving.signal.aborted) return;
-        const trouble = error instanceof Error ? error.message : String(error);
-        setFetched(({ value }) => ({ value, trouble }));
-      }
-      if (!leaving.signal.aborted) timer = setTimeout(() => void ask(), everyMs);
-    };
-    timer = setTimeout(() => void ask(), SETTLE_MS);
-    return () => {
-      clearTimeout(timer);
-      leaving.abort();
-    };
-  }, [path, everyMs, news]);
-  return fetched;
+/** Asks at once, when `path` or `news` is another, and every so many ms; the last answer stays. */
+export function useAnswer<T>(path: string, everyMs: number, news = ''): Fetched<T> {
+  const turn = useTicking((at) =>
+    document.visibilityState === 'visible' ? String(Math.floor(at / everyMs)) : null,
+  );
+  return useFetched<T>(
+    turn === null
+      ? null
+      : {
+          key: `${turn}|${news}`,
+          group: path,
+          run: async (signal) => {
+            await pause(SETTLE_MS);
+            return bodyOf<T>(await get(path, signal));
+          },
+        },
+    SETTLE_MS,
+  );
 }

@@ -2,7 +2,7 @@ import { afterEach, beforeEach, describe, expect, test, vi } from 'vitest';
 
 import { canvasPoint, mapPoint, toCanvas, type View } from '../geometry/coordinates';
 import { act, receive, store } from '../store/app';
-import { NOTHING } from '../store/twin';
+import { NOTHING } from '../store/fetcher';
 import { FakeContext } from '../testing/canvas';
 import { showField, showTags } from '../testing/page';
 import { readings, stateFrame, wireTag } from '../testing/tags';

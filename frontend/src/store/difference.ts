@@ -10,8 +10,8 @@ import { receive, store, type AppState } from './app';
 import { fetchHeat, sourceOf } from './heat';
 import { ASSUMED_MARGIN_M, fieldResolution } from './loaders';
 import { rosNow, selectNewest, selectShown } from './moment';
-import { createFetcher, DRAG_PACE_MS, type Wish } from './fetcher';
-import { NOTHING, type Difference } from './twin';
+import { createFetcher, DRAG_PACE_MS, NOTHING, type Wish } from './fetcher';
+import { type Difference } from './twin';
 
 /** Live, the other moment moves on with now; this far at once, seconds. */
 const STEP_S = 10;

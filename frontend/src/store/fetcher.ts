@@ -21,6 +21,16 @@ const CALM_MS = 500;
 const RETRY_FIRST_MS = 2_000;
 const RETRY_LONGEST_MS = 30_000;
 
+/** Something fetched beside the frames. While it is fetched again, the old value stays. */
+export interface Fetched<T> {
+  readonly value: T | null;
+  readonly state: 'waiting' | 'ready' | 'failed';
+  /** Why it failed, for a person to read. */
+  readonly message: string;
+}
+
+export const NOTHING: Fetched<never> = { value: null, state: 'waiting', message: '' };
+
 /** Something to fetch. */
 export interface Wish<T> {
   /** What it depends on; a wish with the key of the one before brings nothing new. */

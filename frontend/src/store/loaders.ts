@@ -8,8 +8,7 @@ import { loadMap, type MapPicture } from './picture';
 import { receive, store, type AppState } from './app';
 import { fetchHeat, sourceOf, type Source } from './heat';
 import { selectNewest } from './moment';
-import { createFetcher, type Wish } from './fetcher';
-import { NOTHING } from './twin';
+import { createFetcher, NOTHING, type Wish } from './fetcher';
 
 const FIELD_INTERVAL_MS = 500;
 /** An estimate costs the twin more, and goes on by itself: what nobody reads becomes less sure. */

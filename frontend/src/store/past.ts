@@ -7,8 +7,8 @@ import { receive, store, type AppState } from './app';
 import { fetchHeat, sourceOf, type Source } from './heat';
 import { fieldResolution } from './loaders';
 import { selectNewest, selectPast } from './moment';
-import { createFetcher, DRAG_PACE_MS, type Wish } from './fetcher';
-import { NO_HOUSE, NOTHING, type Fetched, type Past } from './twin';
+import { createFetcher, DRAG_PACE_MS, type Fetched, NOTHING, type Wish } from './fetcher';
+import { NO_HOUSE, type Past } from './twin';
 
 /**
  * What was shown stays for so long while the first moment is on its way, with its own label: most

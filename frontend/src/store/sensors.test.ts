@@ -7,7 +7,7 @@ import { wireTag } from '../testing/tags';
 import { act, receive, store } from './app';
 import { selectCatalogue, selectHeat, selectSensor, selectSensors } from './derived';
 import { startSensors } from './sensors';
-import { NOTHING } from './twin';
+import { NOTHING } from './fetcher';
 
 const answer = vi.fn<() => Promise<Response>>();
 let stop = (): void => undefined;

@@ -13,17 +13,8 @@ import type { Catalogues } from '../domain/sensors';
 import { heldRange, type Range } from '../domain/ramp';
 import type { Timeline } from '../domain/timeline';
 import { snapshotOf, type Snapshot } from '../domain/twin';
+import { NOTHING, type Fetched } from './fetcher';
 import type { MapPicture } from './picture';
-
-/** Something fetched beside the frames. While it is fetched again, the old value stays. */
-export interface Fetched<T> {
-  readonly value: T | null;
-  readonly state: 'waiting' | 'ready' | 'failed';
-  /** Why it failed, for a person to read. */
-  readonly message: string;
-}
-
-export const NOTHING: Fetched<never> = { value: null, state: 'waiting', message: '' };
 
 /** The greenhouse as it was or is at one moment, and what is fetched about that moment. */
 export interface House {

@@ -3,7 +3,8 @@ import type { Field, Judgement, StatusFrame, TwinTagState } from '../contract/ty
 import { INITIAL, step, type ConnectionEvent } from '../connection/machine';
 import { prefer, receive, act } from '../store/app';
 import { DEFAULT_SETTINGS } from '../store/settings';
-import { NOT_ASKED, NOTHING } from '../store/twin';
+import { NOT_ASKED } from '../store/twin';
+import { NOTHING } from '../store/fetcher';
 import { DEFAULT_VIEW } from '../store/view';
 import { NOBODY } from './health';
 import { CATALOGUES } from './sensors';

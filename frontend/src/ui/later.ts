@@ -1,4 +1,5 @@
 /** Loads what the first view can do without (`behind.ts`), and keeps trying where it does not come. */
+import { pause } from '../clock';
 import { createStore } from '../store/create';
 import type * as everyPart from './behind';
 
@@ -24,7 +25,7 @@ export const loadParts = (load = (): Promise<Parts> => import('./behind')): Prom
   (coming ??= tried(load));
 
 async function tried(load: () => Promise<Parts>): Promise<Parts> {
-  for (let pause = FIRST_MS; ; pause = Math.min(2 * pause, LONGEST_MS)) {
+  for (let waitMs = FIRST_MS; ; waitMs = Math.min(2 * waitMs, LONGEST_MS)) {
     try {
       const parts = await load();
       later.dispatch({ parts, isLate: false });
@@ -32,6 +33,6 @@ async function tried(load: () => Promise<Parts>): Promise<Parts> {
     } catch {
       later.dispatch({ parts: null, isLate: true });
     }
-    await new Promise((resolve) => setTimeout(resolve, pause));
+    await pause(waitMs);
   }
 }

@@ -1,9 +1,8 @@
-import { useEffect, useState } from 'react';
-
 import { fetchHistory } from '../contract/api';
 import type { TagHistory, WireTime } from '../contract/types';
 import { secondsOf } from '../domain/rostime';
 import { memoLast } from '../store/memo';
+import { useFetched } from '../store/useFetched';
 
 /** Of the last scans and tries those that had been made by then, ROS seconds; null: now. */
 export const asOf = memoLast((history: TagHistory, moment: number | null): TagHistory => {
@@ -16,19 +15,17 @@ export const asOf = memoLast((history: TagHistory, moment: number | null): TagHi
   };
 });
 
+/** Whoever stands at a tag that is scanned over and over does not ask each time, ms. */
+const PACE_MS = 500;
+
 /** The last scans of a tag, fetched anew after each observation; null until they are here. */
 export function useHistory(tagId: string, observation: string | undefined): TagHistory | null {
-  const [history, setHistory] = useState<TagHistory | null>(null);
-  useEffect(() => {
+  const { value } = useFetched<TagHistory>(
     // A tag that a link names and the twin does not know.
-    if (observation === undefined) return undefined;
-    const abort = new AbortController();
-    fetchHistory(tagId, abort.signal).then(setHistory, () => {
-      // The card does without: history is an extra, and the next observation asks again.
-    });
-    return () => {
-      abort.abort();
-    };
-  }, [tagId, observation]);
-  return history?.tag_id === tagId ? history : null;
+    observation === undefined
+      ? null
+      : { key: observation, group: tagId, run: (signal) => fetchHistory(tagId, signal) },
+    PACE_MS,
+  );
+  return value?.tag_id === tagId ? value : null;
 }

@@ -35,7 +35,7 @@ export const ALARMS: In<typeof ENGLISH> = {
   alarmStartOf: (what) => `Zum Alarmbeginn: ${what}`,
   alarmAcknowledge: 'Quittieren',
   alarmAcknowledgeOf: (what) => `Quittieren: ${what}`,
-  alarmAcknowledgeAll: 'Alle quittieren',
+  alarmAcknowledgeAll: (count) => `Alle quittieren (${count})`,
   alarmUnacknowledge: 'Aufheben',
   alarmUnacknowledgeOf: (what) => `Quittierung aufheben: ${what}`,
   alarmShelve: 'Zurückstellen',

@@ -36,7 +36,7 @@ export const ALARMS = {
   alarmStartOf: (what: string): string => `Show when it began: ${what}`,
   alarmAcknowledge: 'Acknowledge',
   alarmAcknowledgeOf: (what: string): string => `Acknowledge: ${what}`,
-  alarmAcknowledgeAll: 'Acknowledge all',
+  alarmAcknowledgeAll: (count: number): string => `Acknowledge all (${count})`,
   alarmUnacknowledge: 'Unacknowledge',
   alarmUnacknowledgeOf: (what: string): string => `Unacknowledge: ${what}`,
   alarmShelve: 'Shelve',

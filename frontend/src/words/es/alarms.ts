@@ -35,7 +35,7 @@ export const ALARMS: In<typeof ENGLISH> = {
   alarmStartOf: (what) => `Ver cuándo empezó: ${what}`,
   alarmAcknowledge: 'Reconocer',
   alarmAcknowledgeOf: (what) => `Reconocer: ${what}`,
-  alarmAcknowledgeAll: 'Reconocer todas',
+  alarmAcknowledgeAll: (count) => `Reconocer todas (${count})`,
   alarmUnacknowledge: 'Anular',
   alarmUnacknowledgeOf: (what) => `Anular reconocimiento: ${what}`,
   alarmShelve: 'Aplazar',

@@ -35,7 +35,7 @@ export const ALARMS: In<typeof ENGLISH> = {
   alarmStartOf: (what) => `Naar begin van alarm: ${what}`,
   alarmAcknowledge: 'Bevestigen',
   alarmAcknowledgeOf: (what) => `Bevestigen: ${what}`,
-  alarmAcknowledgeAll: 'Alles bevestigen',
+  alarmAcknowledgeAll: (count) => `Alles bevestigen (${count})`,
   alarmUnacknowledge: 'Intrekken',
   alarmUnacknowledgeOf: (what) => `Bevestiging intrekken: ${what}`,
   alarmShelve: 'Uitstellen',

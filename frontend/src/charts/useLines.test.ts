@@ -1,0 +1,209 @@
+import { act as flush, renderHook } from '@testing-library/react';
+import { afterAll, beforeAll, beforeEach, describe, expect, test, vi } from 'vitest';
+
+import { act, receive } from '../store/app';
+import { goLive, goLost, showTags, status } from '../testing/page';
+import { stateFrame, wireTag } from '../testing/tags';
+import { wireTime } from '../testing/timeline';
+import { pairKey } from './lines';
+import { useLines, type Asked } from './useLines';
+
+const pair = { tagId: '1', sensor: 'co2' };
+/** The last hour is looked at anew each 15 s from here on. */
+const NOW_S = 99_990;
+
+let asked: URL[] = [];
+let refuse: Response | null = null;
+
+/** A bridge that has one reading, and one failed try at the beginning. */
+function answer(url: URL): Response {
+  if (refuse) return refuse.clone();
+  const query = url.searchParams;
+  const [from, to] = [Number(query.get('from')), Number(query.get('to'))];
+  const told = { from: wireTime(from), to: wireTime(to), complete_to: null, kept_from: null };
+  if (url.pathname.endsWith('/history')) {
+    return Response.json({
+      ...told,
+      tag_id: query.get('tag_id'),
+      sensor_type: query.get('sensor_type'),
+      unit: 'ppm',
+      is_bucketed: false,
+      bucket_s: null,
+      readings: [{ stamp: wireTime(from + 10), value: 600 }],
+      buckets: [],
+      gaps: [],
+      nights: null,
+    });
+  }
+  const bucket = { start: wireTime(from), scans: 1, failures: 1, looks: 0 };
+  return Response.json({
+    ...told,
+    bucket_s: 10,
+    reach: null,
+    buckets: [{ ...bucket, pests_seen: 0, pests_cleared: 0 }],
+    silences: [],
+    runs: [],
+  });
+}
+
+/** A state with the tag as it was visited at a moment. */
+function visit(sec: number, over: Parameters<typeof wireTag>[0] = {}): void {
+  flush(() => {
+    const latest = stateFrame([wireTag({ last_observed: wireTime(sec), ...over })], { sec });
+    receive({ type: 'state', latest, now: performance.now() });
+  });
+}
+
+const passed = (ms: number): Promise<void> =>
+  flush(async () => {
+    await vi.advanceTimersByTimeAsync(ms);
+  });
+
+const sinceOf = (path: string): number[] =>
+  asked
+    .filter(({ pathname }) => pathname === path)
+    .map(({ searchParams }) => Number(searchParams.get('from')));
+const histories = (): number[] => sinceOf('/api/history');
+
+function show(hasDayBefore = false): { readonly current: Asked } {
+  const pairs = [pair];
+  return renderHook(() => useLines(pairs, 300, hasDayBefore)).result;
+}
+
+beforeAll(() => {
+  vi.useFakeTimers();
+});
+beforeEach(() => {
+  asked = [];
+  refuse = null;
+  vi.stubGlobal('fetch', (url: URL) => {
+    asked.push(url);
+    return Promise.resolve(answer(url));
+  });
+  showTags([]);
+  act({ type: 'period', period: { kind: 'hour' } });
+  visit(NOW_S);
+});
+afterAll(() => {
+  vi.useRealTimers();
+});
+
+test('a line is asked for once, with its tag’s timeline', async () => {
+  const shown = show();
+  expect(shown.current.state).toBe('waiting');
+  await passed(100);
+  expect(asked.map(({ pathname }) => pathname)).toEqual(['/api/history', '/api/timeline']);
+  const { state, lines } = shown.current;
+  const from = NOW_S - 3_600;
+  expect(state).toBe('ready');
+  expect(lines.series.get(pairKey(pair))?.readings).toMatchObject([{ value: 600 }]);
+  expect(lines.marks.get('1')).toMatchObject([{ widthS: 10, kind: 'failure', count: 1 }]);
+  expect(histories()[0]).toBeCloseTo(from, 0);
+});
+
+describe('the day before', () => {
+  test('is asked for where it is wanted, and stands a day later than it was', async () => {
+    const shown = show(true);
+    await passed(100);
+    const [today = 0, yesterday = 0] = histories();
+    expect(today - yesterday).toBeCloseTo(86_400);
+    const { series, before } = shown.current.lines;
+    expect(before.get(pairKey(pair))?.from).toBeCloseTo(series.get(pairKey(pair))?.from ?? 0);
+    expect(before.get(pairKey(pair))?.readings).toMatchObject([{ value: 600 }]);
+  });
+
+  test('is not asked for where the time of a simulation had not begun', async () => {
+    flush(() => {
+      goLive(status({ day_length_s: NOW_S + 3_600 }));
+    });
+    const shown = show(true);
+    await passed(100);
+    expect(histories()).toHaveLength(1);
+    expect(shown.current).toMatchObject({ state: 'ready', lines: { before: new Map() } });
+  });
+});
+
+describe('the server is asked anew', () => {
+  test('after a visit, once the journal has it, and at most once in three seconds', async () => {
+    show();
+    await passed(100);
+    visit(NOW_S + 1);
+    visit(NOW_S + 2, { last_try: wireTime(NOW_S + 2) });
+    await passed(3_000);
+    expect(histories()).toHaveLength(1);
+    await passed(1_500);
+    expect(histories()).toHaveLength(2);
+    // Up to when it is asked, and not up to when the visit was.
+    expect(histories()[1]).toBeGreaterThan(NOW_S + 2 - 3_600);
+    await passed(5_000);
+    expect(histories()).toHaveLength(2);
+  });
+
+  test('now and then, as the time bar is, where nobody comes', async () => {
+    show();
+    await passed(100);
+    await passed(64_000);
+    expect(histories()).toHaveLength(1 + 4);
+  });
+
+  test('after a reconnect, and what is there stays meanwhile', async () => {
+    const shown = show();
+    await passed(100);
+    flush(goLost);
+    await passed(20_000);
+    expect(histories()).toHaveLength(1);
+    flush(goLive);
+    expect(shown.current.state).toBe('ready');
+    await passed(1_500);
+    expect(histories()).toHaveLength(2);
+  });
+
+  test('for another period at once, and what is there stays meanwhile', async () => {
+    const shown = show();
+    await passed(100);
+    flush(() => {
+      act({ type: 'period', period: { kind: 'own', from: 2_000, to: 2_100 } });
+    });
+    expect(shown.current).toMatchObject({ state: 'waiting', lines: { series: { size: 1 } } });
+    await passed(10);
+    expect(histories()[1]).toBe(2_000);
+    // It is over: nothing that comes later belongs to it.
+    visit(NOW_S + 1);
+    await passed(60_000);
+    expect(histories()).toHaveLength(2);
+  });
+
+  test('for no visit while the page shows the past', async () => {
+    show();
+    await passed(100);
+    flush(() => {
+      act({ type: 'moment', moment: NOW_S - 100 });
+    });
+    visit(NOW_S + 1);
+    await passed(5_000);
+    expect(histories()).toHaveLength(1);
+  });
+});
+
+describe('where there is nothing', () => {
+  test('a twin without a past is told from one that cannot answer now', async () => {
+    refuse = Response.json({ detail: 'too many' }, { status: 503 });
+    const shown = show();
+    await passed(100);
+    expect(shown.current).toMatchObject({ state: 'failed', message: 'too many' });
+    flush(() => {
+      const message = 'no journal is kept';
+      receive({ type: 'remembered', remembered: { value: null, state: 'off', message } });
+    });
+    expect(shown.current).toMatchObject({ state: 'missing', message: 'no journal is kept' });
+  });
+
+  test('a failure heals by itself', async () => {
+    refuse = Response.json({ detail: 'busy' }, { status: 503 });
+    const shown = show();
+    await passed(100);
+    refuse = null;
+    await passed(5_000);
+    expect(shown.current).toMatchObject({ state: 'ready', message: '' });
+  });
+});

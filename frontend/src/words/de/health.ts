@@ -58,7 +58,7 @@ export const HEALTH: In<typeof ENGLISH> = {
     range: 'Klimaregelung prüfen',
     reading_failed: 'Sensor prüfen',
     scan_failed: 'Weg und Messpunkt prüfen',
-    pest: 'Bestand kontrollieren und Schädlinge bekämpfen',
+    pest: 'Bestand prüfen, Schädlinge bekämpfen',
     old: 'Route des Roboters prüfen',
     changed: 'Mit einem zweiten Messgerät vergleichen',
     silent: 'Prüfen, ob der Zwilling läuft',

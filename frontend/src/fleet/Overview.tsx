@@ -11,6 +11,7 @@ import {
 } from 'react';
 
 import { S } from '../strings';
+import { Select } from '../widgets/Select';
 import type { FleetWords } from '../words/fleet';
 import { Cards, filterText } from './Cards';
 import type { Seen } from './follow';
@@ -106,19 +107,14 @@ export function Overview({ seen, words, isKiosk }: Props): JSX.Element {
               }}
             />
             {groups.length > 0 && (
-              <select
+              <Select
                 className="fleet-search"
                 aria-label={words.group}
                 value={groups.includes(group) ? group : ''}
-                onChange={(event) => {
-                  setGroup(event.target.value);
-                }}
-              >
-                <option value="">{words.allGroups}</option>
-                {groups.map((name) => (
-                  <option key={name}>{name}</option>
-                ))}
-              </select>
+                options={['', ...groups]}
+                text={(name) => name || words.allGroups}
+                onChange={setGroup}
+              />
             )}
             <div className="fleet-filters" role="group" aria-label={words.filter}>
               {FILTERS.map((each) => (

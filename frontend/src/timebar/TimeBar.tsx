@@ -8,6 +8,7 @@ import { useSelected } from '../store/create';
 import { rosNow } from '../store/moment';
 import { S } from '../strings';
 import { Disclosure } from '../widgets/Disclosure';
+import { Select } from '../widgets/Select';
 import { useNow } from '../widgets/useNow';
 import { OwnPeriod } from './OwnPeriod';
 import { Slider } from './Slider';
@@ -89,21 +90,14 @@ function Player(): JSX.Element {
           <path d={isPlaying ? 'M4 3h3v10H4zM9 3h3v10H9z' : 'M4 2.5v11l9-5.5z'} />
         </svg>
       </button>
-      <select
+      <Select
         aria-label={S.timebarSpeed}
         title={S.timebarSpeed}
         value={speed}
-        onChange={(event) => {
-          const chosen = SPEEDS.find((each) => String(each) === event.target.value);
-          if (chosen) chooseSpeed(chosen);
-        }}
-      >
-        {SPEEDS.map((each) => (
-          <option key={each} value={each}>
-            {S.timebarSpeeds(each)}
-          </option>
-        ))}
-      </select>
+        options={SPEEDS}
+        text={S.timebarSpeeds}
+        onChange={chooseSpeed}
+      />
     </>
   );
 }
@@ -121,25 +115,20 @@ function When(): JSX.Element {
 
 function PeriodChoice({ period, nowS }: { period: Period; nowS: number }): JSX.Element {
   return (
-    <select
+    <Select
       className="timebar-period"
       aria-label={S.timebarPeriod}
       title={S.timebarPeriod}
       value={period.kind}
-      onChange={(event) => {
-        const kind = PERIOD_KINDS.find((each) => each === event.target.value);
+      options={[...PERIOD_KINDS, 'own'] as const}
+      text={(kind) => S.timebarPeriods[kind]}
+      onChange={(kind) => {
         // An own period begins as what is in view.
         const { from, to } = barSpan(store.get(), nowS);
         const own = { kind: 'own', from: Math.floor(from), to: Math.ceil(to) } as const;
-        act({ type: 'period', period: kind ? { kind } : own });
+        act({ type: 'period', period: kind === 'own' ? own : { kind } });
       }}
-    >
-      {[...PERIOD_KINDS, 'own' as const].map((kind) => (
-        <option key={kind} value={kind}>
-          {S.timebarPeriods[kind]}
-        </option>
-      ))}
-    </select>
+    />
   );
 }
 

@@ -19,6 +19,7 @@ import { CardEstimate } from './estimate';
 import { HealthMark } from './HealthMark';
 import { inTime } from './inTime';
 import { Icon } from '../widgets/Icon';
+import { IconButton } from '../widgets/IconButton';
 import { Reasons } from './Reasons';
 import { Sparkline } from './Sparkline';
 import { Tries } from './Tries';
@@ -64,17 +65,13 @@ export function TagCard({ tagId }: { tagId: string }): JSX.Element {
           <bdi>{S.card(shown(tagId, 24))}</bdi>
         </h2>
         {health && <HealthMark verdict={health.verdict} />}
-        <button
-          type="button"
-          className="icon-button"
-          aria-label={S.cardClose}
-          title={S.cardClose}
+        <IconButton
+          icon="close"
+          label={S.cardClose}
           onClick={() => {
             act({ type: 'select', tagId: null });
           }}
-        >
-          <Icon name="close" />
-        </button>
+        />
       </header>
       {tag ? (
         <CardBody tag={tag} health={health} unit={unit} history={history} />

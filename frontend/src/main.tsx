@@ -71,6 +71,7 @@ void loadParts().then((parts) => {
   if (kiosk) {
     parts.startLeaving();
   } else {
+    parts.startComments();
     parts.startRemembered();
     parts.startOpening();
   }

@@ -28,10 +28,7 @@ const TABLE: Table = {
   alarms: ['strings', 'clock', 'contract', 'domain', 'store', 'map'],
   widgets: ['clock', 'npm:react'],
   // What people say, wherever it is shown.
-  notes: [
-    ...['words', 'strings', 'contract', 'domain', 'store', 'widgets', 'styles'],
-    ...['npm:react'],
-  ],
+  notes: [...['words', 'strings', 'contract', 'domain', 'store', 'widgets'], ...['npm:react']],
   timebar: [
     ...['strings', 'clock', 'domain', 'draw', 'store', 'widgets', 'notes'],
     ...['npm:react'],

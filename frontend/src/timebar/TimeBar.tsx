@@ -1,8 +1,10 @@
-import { type JSX, lazy, type ReactNode, Suspense } from 'react';
+import type { JSX, ReactNode } from 'react';
 
 import { type Period, PERIOD_KINDS } from '../domain/period';
 import { hasDate, rosText } from '../domain/rostime';
 import { shown } from '../domain/text';
+import { CommentMarks } from '../notes/CommentMarks';
+import { SiteComment } from '../notes/SiteComment';
 import { act, store, useApp } from '../store/app';
 import { useSelected } from '../store/create';
 import { rosNow } from '../store/moment';
@@ -14,14 +16,6 @@ import { OwnPeriod } from './OwnPeriod';
 import { Slider } from './Slider';
 import { chooseSpeed, playback, SPEEDS, togglePlayback } from './playback';
 import { barSpan, newestWord } from './span';
-import type * as Parts from '../notes/parts';
-
-// Where they do not come, the bar goes on without.
-type Shown = Pick<typeof Parts, 'CommentMarks' | 'SiteComment'>;
-const NOTHING: Shown = { CommentMarks: () => null, SiteComment: () => null };
-const parts = (): Promise<Shown> => import('../notes/parts').catch(() => NOTHING);
-const CommentMarks = lazy(async () => ({ default: (await parts()).CommentMarks }));
-const SiteComment = lazy(async () => ({ default: (await parts()).SiteComment }));
 
 /** Under the map: when what happened, and the way to another moment. */
 export function TimeBar(): JSX.Element | null {
@@ -44,14 +38,10 @@ export function TimeBar(): JSX.Element | null {
         <When />
         <PeriodChoice period={period} nowS={nowS} />
         <Marks />
-        <Suspense>
-          <SiteComment />
-        </Suspense>
+        <SiteComment />
       </div>
       {period.kind === 'own' && <OwnPeriod period={period} isSimulated={!hasDate(nowS)} />}
-      <Suspense>
-        <CommentMarks span={span} />
-      </Suspense>
+      <CommentMarks span={span} />
       <Slider span={span} timeline={remembered.value} nowS={nowS} />
       {remembered.state === 'failed' && (
         <p className="timebar-note" role="status">

@@ -10,6 +10,7 @@ import type { Tag } from '../domain/twin';
 import { unitOf, type TemperatureUnit } from '../domain/units';
 import type { TagHealth, TagHistory } from '../contract/types';
 import { commandMap } from '../map/commands';
+import { Comments } from '../notes/Comments';
 import { act, useApp } from '../store/app';
 import { selectCatalogue, selectHealth } from '../store/derived';
 import { selectNewestTag, selectShown, selectTag } from '../store/moment';
@@ -26,7 +27,6 @@ import { Tries } from './Tries';
 import { asOf, useHistory } from './useHistory';
 
 // Charts come after the first paint, and their library with them.
-const Comments = inTime(async () => (await import('../notes/parts')).Comments);
 const CardChart = inTime(async () => (await import('../charts/CardChart')).default);
 
 /** Everything about one tag, over the map. */

@@ -43,7 +43,7 @@ const TABLE: Table = {
     ...['npm:react'],
   ],
   robot: [
-    ...['words', 'strings', 'contract', 'geometry', 'domain', 'store', 'widgets', 'styles'],
+    ...['strings', 'contract', 'geometry', 'domain', 'store', 'widgets', 'styles'],
     ...['npm:react', 'npm:react-dom'],
   ],
   ui: [

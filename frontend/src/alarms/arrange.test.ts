@@ -51,6 +51,8 @@ test('of a cause the value farthest beyond, and since when one has been active',
       { ...cold(1), worst: 4.2 },
       { ...cold(2), worst: 5.5 },
       { ...cold(3), cleared_at: { sec: 120, nanosec: 0 }, worst: 3.1 },
+      // Lower still, and nearer to the limit of its plants.
+      alarm('4', { tag_id: '4', reason: { limit: 4, value: 3 }, worst: 2.9, cleared: 130 }),
     ],
     NOTHING_KEPT,
     null,

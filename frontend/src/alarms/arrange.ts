@@ -95,9 +95,10 @@ export function causeFacts(
   nowS: number | null,
 ): readonly string[] {
   const alarms = items.map(({ alarm }) => alarm);
-  const value = ({ worst, reason }: Alarm): number => worst ?? reason.value ?? NaN;
-  const isBelow = alarms.some(({ reason }) => isOfRange(reason) && sideOf(reason) === 'below');
-  const [first] = [...alarms].sort((a, b) => (isBelow ? value(a) - value(b) : value(b) - value(a)));
+  // Each against its own limit: plants differ.
+  const beyond = ({ worst, reason }: Alarm): number =>
+    Math.abs((worst ?? reason.value ?? NaN) - (reason.limit ?? 0));
+  const [first] = [...alarms].sort((a, b) => beyond(b) - beyond(a));
   const begins = alarms
     .filter((alarm) => alarm.cleared_at === null)
     .map(({ raised_at }) => secondsOf(raised_at));

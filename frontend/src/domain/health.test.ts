@@ -8,6 +8,7 @@ import {
   severity,
   sharedJudgement,
   sideOf,
+  worstReason,
   type HouseHealth,
 } from './health';
 
@@ -27,9 +28,8 @@ describe('house', () => {
   } as const;
 
   test('is what the bridge says, tag by tag and as a whole', () => {
-    const { verdict, worst, counts, byTag } = house(mixed);
+    const { verdict, counts, byTag } = house(mixed);
     expect(verdict).toBe('critical');
-    expect(worst?.tagId).toBe('3');
     expect(counts).toEqual({ critical: 2, stressed: 0, unknown: 1, healthy: 1 });
     expect(byTag.get('4')).toEqual({ verdict: 'unknown', reasons: [] });
   });
@@ -42,7 +42,7 @@ describe('house', () => {
 
   test('that is not heard of is unknown and says why; of its tags stands what was said', () => {
     const silent = house(mixed, false);
-    expect(silent).toMatchObject({ verdict: 'unknown', worst: null });
+    expect(silent).toMatchObject({ verdict: 'unknown' });
     expect(silent.reasons.map(({ kind }) => kind)).toEqual(['silent']);
     expect(silent.counts.critical).toBe(2);
   });
@@ -50,25 +50,34 @@ describe('house', () => {
   test('a tag that was not judged yet is unknown', () => {
     expect(houseHealth([tag()], NOBODY, true).byTag.get('1')?.verdict).toBe('unknown');
   });
-
-  test('of equals the first makes it what it is; of one that is well nobody does', () => {
-    expect(house({ 1: [reason()], 2: [reason()] }).worst?.tagId).toBe('1');
-    expect(house({ 1: 'healthy' }).worst).toBeNull();
-  });
 });
 
-test('the worst verdict is the most severe, and of one verdict who has most reasons for it', () => {
+test('the worst verdict is the most severe, and of one verdict who is farthest beyond a limit', () => {
+  const pest = { kind: 'pest', sensor: '', limit: null } as const;
+  const mild = { verdict: 'stressed', limit: 20 } as const;
   const order = [
-    { verdict: 'critical', reasons: Array.from({ length: 50 }, () => reason()) },
-    { verdict: 'critical', reasons: [reason(), reason()] },
-    { verdict: 'critical', reasons: [reason(), reason({ verdict: 'stressed' })] },
-    { verdict: 'stressed', reasons: [reason({ verdict: 'stressed' })] },
+    { verdict: 'critical', reasons: [reason({ value: -90, limit: 10 })] },
+    { verdict: 'critical', reasons: [reason({ ...pest, value: 7 })] },
+    { verdict: 'critical', reasons: [reason({ ...pest, value: 1 })] },
+    {
+      verdict: 'critical',
+      reasons: [reason({ value: 9, limit: 10 }), reason({ value: 6, limit: 10 })],
+    },
+    {
+      verdict: 'critical',
+      reasons: [reason({ value: 9, limit: 10 }), reason({ ...mild, value: 5 })],
+    },
+    { verdict: 'stressed', reasons: [reason({ ...mild, value: 25 })] },
+    { verdict: 'stressed', reasons: [reason({ ...mild, value: 19 })] },
+    { verdict: 'stressed', reasons: [reason({ ...mild, value: 20 })] },
     { verdict: 'unknown', reasons: [] },
     { verdict: 'healthy', reasons: [] },
   ] as const;
   const severities = order.map(severity);
   expect(severities).toEqual([...severities].sort((a, b) => b - a));
   expect(new Set(severities).size).toBe(order.length);
+  expect(worstReason(order[3])?.value).toBe(6);
+  expect(worstReason(order[4])?.value).toBe(9);
 });
 
 test('a value is out of its range where a reason says so', () => {

@@ -13,12 +13,6 @@ export const VERDICTS = [
 /** Who was not judged, or not yet. */
 const NOT_JUDGED: TagHealth = { verdict: 'unknown', reasons: [] };
 
-/** A tag and what is said of it. */
-export interface JudgedTag {
-  readonly tagId: string;
-  readonly health: TagHealth;
-}
-
 export interface HouseHealth {
   readonly verdict: Verdict;
   readonly reasons: readonly HealthReason[];
@@ -26,8 +20,6 @@ export interface HouseHealth {
   readonly day: Judgement['house']['day'] | null;
   /** What it is doing; null: nobody was asked. */
   readonly patrol: Judgement['house']['patrol'] | null;
-  /** The tag that the house has its verdict from; null: it has it from none alone. */
-  readonly worst: JudgedTag | null;
   readonly counts: Readonly<Record<Verdict, number>>;
   readonly byTag: ReadonlyMap<string, TagHealth>;
 }
@@ -63,7 +55,6 @@ export function houseHealth(
     reasons,
     day: judgement?.house.day ?? null,
     patrol: judgement?.house.patrol ?? null,
-    worst: worstOf(byTag, verdict),
     counts,
     byTag,
   };
@@ -71,21 +62,22 @@ export function houseHealth(
 
 const UNHEARD: TagHealth = { verdict: 'unknown', reasons: [SILENT] };
 
-/** Of the tags with the house's verdict, who has most reasons for it; of equals the first. */
-function worstOf(byTag: ReadonlyMap<string, TagHealth>, verdict: Verdict): JudgedTag | null {
-  if (verdict !== 'critical' && verdict !== 'stressed') return null;
-  let worst: JudgedTag | null = null;
-  for (const [tagId, health] of byTag) {
-    if (health.verdict !== verdict) continue;
-    if (!worst || severity(health) > severity(worst.health)) worst = { tagId, health };
-  }
-  return worst;
+/** More is worse: by verdict, then by how far beyond its limit the worst value is. */
+export function severity(health: TagHealth): number {
+  const reason = worstReason(health);
+  return VERDICTS.length - VERDICTS.indexOf(health.verdict) + (reason ? weight(reason) : 0);
 }
 
-/** More is worse: by verdict, then by how many reasons there are for it. */
-export function severity({ verdict, reasons }: TagHealth): number {
-  const many = reasons.filter((reason) => reason.verdict === verdict).length;
-  return VERDICTS.length - VERDICTS.indexOf(verdict) + many / (many + 1);
+/** What is to be said of a tag before all else. */
+export const worstReason = ({ verdict, reasons }: TagHealth): HealthReason | undefined =>
+  reasons.filter((reason) => reason.verdict === verdict).sort((a, b) => weight(b) - weight(a))[0];
+
+/** Pests by their number; a value by how far it is beyond its limit, as a part of the larger of both. From 0 to 1. */
+function weight(reason: HealthReason): number {
+  if (reason.kind === 'pest') return 1 - 1 / (2 + (reason.value ?? 0));
+  if (!isOfRange(reason) || reason.value === reason.limit) return 0;
+  const { value, limit } = reason;
+  return Math.min(0.99, Math.abs(value - limit) / Math.max(Math.abs(value), Math.abs(limit)));
 }
 
 /** Why a sensor's value counts as out of its range; null: it does not. */

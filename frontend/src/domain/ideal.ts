@@ -1,8 +1,10 @@
 /** How a value lies against its ideal range: too low, right, too high; in colour and in words. Pure. */
 import { S } from '../strings';
-import { differenceNumber, withUnit } from './format';
+import { differenceNumber, rangeText, withUnit } from './format';
 import { mix, rgbText, type Rgb } from './ramp';
-import type { Ranges, Sensor, Span } from './sensors';
+import { rangesFor, type Ranges, type Sensor, type Span } from './sensors';
+import { speciesText } from './species';
+import type { Tag } from './twin';
 import type { TemperatureUnit } from './units';
 
 /** How far beyond its ideal range a value is, in its unit: below 0 too low, 0 right; null: no ideal. */
@@ -28,6 +30,17 @@ export function excess(ranges: Ranges, value: number): number | null {
 function reachOf(ideal: Span, critical: Span | null, isAbove: boolean): number {
   if (!critical) return (ideal[1] - ideal[0]) / 2;
   return isAbove ? critical[1] - ideal[1] : ideal[0] - critical[0];
+}
+
+/** The ideal of each species that is there with one of its own, and of all others; empty: no species has. */
+export function idealsText(sensor: Sensor, tags: readonly Tag[], unit: TemperatureUnit): string {
+  const text = ({ ideal }: Ranges): string =>
+    rangeText(sensor, ideal && { low: ideal[0], high: ideal[1] }, unit);
+  const own = [...new Set(tags.map(({ sureSpecies }) => sureSpecies.toLowerCase()))]
+    .filter((species) => sensor.species.has(species))
+    .sort()
+    .map((species) => `${speciesText(species, 24)} ${text(rangesFor(sensor, species))}`);
+  return own.length === 0 ? '' : [...own, `${S.legendOthers} ${text(sensor)}`].join('; ');
 }
 
 /** Blue, green, orange: apart in hue and lightness for every common colour blindness. */

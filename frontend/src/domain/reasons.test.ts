@@ -23,9 +23,15 @@ describe('a reason in words', () => {
       `Humidity 49.97${NBSP}%, below 50.00`,
     ],
     [
-      { sensor: 'co2', verdict: 'stressed', value: 400.4, limit: 400 } as const,
+      { sensor: 'co2', verdict: 'stressed', value: 1500.4, limit: 1500 } as const,
       null,
-      `CO₂ 400.4${NBSP}ppm, above 400.0`,
+      `CO₂ 1500.4${NBSP}ppm, above 1500.0`,
+    ],
+    [
+      // Within the ideal range of 18 to 26, and not by enough.
+      { verdict: 'stressed', value: 18.1, limit: 18.4 } as const,
+      null,
+      `Temperature 18.1${NBSP}°C, not yet above 18.4`,
     ],
     [
       { sensor: 'vpd', value: 1.68, limit: 1.3, verdict: 'stressed' } as const,

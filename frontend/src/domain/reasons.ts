@@ -3,7 +3,7 @@ import type { HealthReason } from '../contract/types';
 import { S } from '../strings';
 import { ageText, digitsApart, readingText, shortAgeText, valueText } from './format';
 import { isOfRange, sideOf } from './health';
-import type { Catalogue } from './sensors';
+import type { Catalogue, Sensor } from './sensors';
 import { shown } from './text';
 import type { TemperatureUnit } from './units';
 
@@ -28,7 +28,7 @@ export function reasonText(
     const more = digitsApart(sensor, [reason.value], reason.limit, unit);
     return R.range(
       `${label} ${readingText(sensor, reason.value, unit, more)}`,
-      R.sides[sideOf(reason)],
+      sideText(sensor, reason),
       valueText(sensor, reason.limit, unit, more),
       reason.verdict === 'critical',
     );
@@ -64,6 +64,12 @@ export function reasonText(
   }
 }
 
+/** On which side of a limit that the file sets; of another one, the value has to pass it first. */
+const sideText = (
+  { limits }: Sensor,
+  reason: { readonly value: number; readonly limit: number },
+): string => (limits.has(reason.limit) ? S.reasons.sides : S.reasons.sidesHeld)[sideOf(reason)];
+
 /** What lies on which side of which limit, without the value: that changes. */
 export function beyondText(
   sensors: Catalogue,
@@ -74,7 +80,7 @@ export function beyondText(
   const sensor = sensors.named(reason.sensor);
   return S.reasons.beyond(
     shown(sensor.label, LONGEST_NAME),
-    S.reasons.sides[sideOf(reason)],
+    sideText(sensor, reason),
     readingText(sensor, reason.limit, unit, more),
   );
 }

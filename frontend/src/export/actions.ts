@@ -83,7 +83,6 @@ export async function saveMap(): Promise<void> {
   const sensor = selectSensor(state);
   const range = selectRange(state);
   const isIdeal = selectColouring(state) === 'ideal';
-  const { ideal } = sensor;
   const takenAt = epochOf(snapshot.takenAt);
   const { unit } = state.settings;
   const label = shown(sensor.label, 32);
@@ -106,12 +105,9 @@ export async function saveMap(): Promise<void> {
       : {
           title: isIdeal ? S.legendAgainst(label) : label,
           time: origin === null ? time : `${S.origin[origin]}, ${time}`,
-          ...(isIdeal && ideal
+          ...(isIdeal
             ? {
-                ends: [
-                  S.legendBelow(valueText(sensor, ideal[0], unit)),
-                  S.legendAbove(readingText(sensor, ideal[1], unit)),
-                ] as const,
+                ends: [S.below, S.above] as const,
                 diverging: Object.values(idealParts(IDEAL_ALPHA)).flat(),
               }
             : {

@@ -40,19 +40,19 @@ describe('another moment', () => {
       return {
         tags: selectTags(state).map(({ id }) => id),
         rows: selectRows(state).map(({ tag }) => tag.id),
-        health: selectHealth(state).worst?.tagId,
+        health: [...selectHealth(state).byTag.keys()],
         sensors: selectSensors(state).some(({ name }) => name === 'ph'),
         range: selectRange(state),
         isThere: selectTag(state, 'old') !== undefined,
       };
     };
     const now = look();
-    expect(now).toMatchObject({ tags: ['new'], rows: ['new'], health: 'new', isThere: false });
+    expect(now).toMatchObject({ tags: ['new'], rows: ['new'], health: ['new'], isThere: false });
     act({ type: 'look', view: { moment: 77 } });
     expect(look()).toEqual({
       tags: ['old'],
       rows: ['old'],
-      health: 'old',
+      health: ['old'],
       sensors: true,
       range: { low: 18, high: 40 },
       isThere: true,

@@ -1,6 +1,7 @@
 import { useRef, type JSX } from 'react';
 
 import type { HealthReason } from '../contract/types';
+import { worstReason } from '../domain/health';
 import { todoText } from '../domain/reasons';
 import { shown } from '../domain/text';
 import { useApp } from '../store/app';
@@ -31,10 +32,10 @@ export function AttentionList(): JSX.Element {
             </strong>
             <span className="attention-why">
               <Reasons health={own} most={MOST_REASONS} />
-              {own.reasons[0] && <strong>{todoText(own.reasons[0])}</strong>}
+              <Todo reason={worstReason(own)} />
             </span>
             <span className="faint">
-              <Since tagId={tag.id} reason={own.reasons[0]} />
+              <Since tagId={tag.id} reason={worstReason(own)} />
             </span>
           </li>
         ))}
@@ -45,6 +46,9 @@ export function AttentionList(): JSX.Element {
     </div>
   );
 }
+
+const Todo = ({ reason }: { reason: HealthReason | undefined }): JSX.Element | null =>
+  reason ? <strong>{todoText(reason)}</strong> : null;
 
 const Since = (it: { tagId: string; reason: HealthReason | undefined }): string | null =>
   useSince(it.tagId, it.reason);

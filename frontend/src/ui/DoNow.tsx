@@ -4,7 +4,7 @@ import { whenText } from '../alarms/words';
 import { alarmList } from '../alarms/watch';
 import { now } from '../clock';
 import type { HealthReason } from '../contract/types';
-import { VERDICTS, type HouseHealth } from '../domain/health';
+import { VERDICTS, worstReason, type HouseHealth } from '../domain/health';
 import { todoText } from '../domain/reasons';
 import { secondsOf } from '../domain/rostime';
 import { rowsOf, sortRows, type Row } from '../domain/table';
@@ -46,7 +46,7 @@ export function useSince(tagId: string, reason: HealthReason | undefined): strin
     return found ? secondsOf(found.alarm.raised_at) : null;
   });
   if (!isNow || begin === null) return null;
-  return S.alarmSince(whenText(begin, rosNow(store.get(), now())), null);
+  return S.healthSince(whenText(begin, rosNow(store.get(), now())));
 }
 
 /** What has to be done first: where, why, what, and since when; else how the greenhouse is. */
@@ -59,12 +59,13 @@ export function DoNow({
   id?: string;
 }): JSX.Element {
   const health = useApp(selectHealth);
+  const { counts } = health;
   const urgent = useUrgent();
   const isOfTags = health.reasons.length === 0 && urgent.length > 0;
   return (
     <ul className="do-now" aria-label={S.todoLabel} data-most={most}>
       {isOfTags ? (
-        urgent.slice(0, most).map(({ tag, health: { verdict, reasons } }, index) => (
+        urgent.slice(0, most).map(({ tag, health: own }, index) => (
           <li key={index}>
             <button
               type="button"
@@ -73,8 +74,13 @@ export function DoNow({
                 act({ type: 'select', tagId: tag.id });
               }}
             >
-              <HealthShape verdict={verdict} />
-              <Todo tagId={tag.id} reason={reasons[0]} id={index === 0 ? id : undefined} />
+              <HealthShape verdict={own.verdict} />
+              <Todo
+                tagId={tag.id}
+                reason={worstReason(own)}
+                id={index === 0 ? id : undefined}
+                more={index === most - 1 ? counts.critical - most : 0}
+              />
             </button>
           </li>
         ))
@@ -91,10 +97,13 @@ function Todo({
   tagId,
   reason,
   id,
+  more,
 }: {
   tagId: string;
   reason: HealthReason | undefined;
   id: string | undefined;
+  /** Critical tags that have no line here. */
+  more: number;
 }): JSX.Element {
   const why = S.healthDriver(shown(tagId, 24), useReasonText(reason ?? null));
   const since = useSince(tagId, reason);
@@ -105,6 +114,7 @@ function Todo({
       </span>
       <span className="do-what">
         {reason && <strong>{todoText(reason)}</strong>} {since && <small>{since}</small>}
+        {more > 0 && <small className="do-more">{S.healthMoreCritical(more)}</small>}
       </span>
     </>
   );
@@ -117,13 +127,14 @@ export function Overall({
 }: {
   health: HouseHealth;
   id?: string;
-}): JSX.Element {
+}): JSX.Element | null {
   const [own] = health.reasons;
   const reason = useReasonText(own ?? null);
   // Of now, as the list of alarms is.
   const isNow = useApp((state) => selectShown(state).moment === null);
   const alarms = useSelected(alarmList, ({ active, shelved }) => active.length + shelved.length);
   const text = own ? reason : overallText(health, isNow ? alarms : 0);
+  if (text === null) return null;
   return (
     <p className="do-why" data-testid={id} title={text}>
       {text}
@@ -132,7 +143,9 @@ export function Overall({
   );
 }
 
-function overallText({ verdict, counts }: HouseHealth, alarms: number): string {
+/** Null: its tags say it. */
+function overallText({ verdict, counts }: HouseHealth, alarms: number): string | null {
+  if (verdict === 'critical' || verdict === 'stressed') return null;
   if (verdict === 'healthy') return alarms > 0 ? S.healthDespite(alarms) : S.healthAllWell;
   const { unknown } = counts;
   if (unknown === 0) return S.healthNothing;

@@ -27,7 +27,8 @@ test('names the verdict, the tag that it comes from, and why', () => {
 test('says what to do first, and since when', () => {
   const cold = reason({ value: 6, limit: 10 });
   const pest = reason({ kind: 'pest', sensor: '', value: 2, limit: null });
-  showTags(TAGS, judgement({ 1: [pest], 5: [cold, pest] }));
+  const few = { ...pest, value: 0 };
+  showTags(TAGS, judgement({ 1: [few], 5: [pest, cold] }));
   const stop = startAlarms();
   render(<HealthSummary kiosk={false} />);
   act(() => {
@@ -35,10 +36,21 @@ test('says what to do first, and since when', () => {
   });
   const todo = screen.getByRole('list', { name: 'Do this now' });
   expect([...todo.children].map(({ textContent }) => textContent)).toEqual([
-    expect.stringMatching(/^Tag 5: .*Heat, or close the vents since /),
-    'Tag 1: 2 pests seenInspect and treat the plants ',
+    expect.stringMatching(/^Tag 5: 2 pests seenInspect and treat the plants /),
+    'Tag 1: Pest seenInspect and treat the plants ',
   ]);
   stop();
+});
+
+test('says how many critical tags have no line, and on the wall nothing beside them', () => {
+  const tags = ['1', '2', '3', '4'].map((tag_id) => wireTag({ tag_id }));
+  showTags(tags, judgement({ 1: [reason()], 2: [reason()], 3: [reason()], 4: 'healthy' }));
+  const { unmount } = render(<HealthSummary kiosk={false} />);
+  const { lastElementChild } = screen.getByRole('list', { name: 'Do this now' });
+  expect(lastElementChild?.textContent).toMatch(/^Tag 2: .*\+ 1 more critical$/);
+  unmount();
+  render(<HealthSummary kiosk />);
+  expect(screen.queryByTestId('health-driver')).toBeNull();
 });
 
 test('counts the tags by verdict, and filters by one', () => {

@@ -1,9 +1,8 @@
 import type { JSX } from 'react';
 
 import { readingText, valueText } from '../domain/format';
-import { IDEAL_ALPHA, idealParts } from '../domain/ideal';
-import { rangesFor, type Sensor } from '../domain/sensors';
-import { speciesText } from '../domain/species';
+import { IDEAL_ALPHA, idealParts, idealsText } from '../domain/ideal';
+import type { Sensor } from '../domain/sensors';
 import { useApp } from '../store/app';
 import { selectTags } from '../store/moment';
 import { S } from '../strings';
@@ -14,9 +13,15 @@ export function IdealLegend({ sensor }: { sensor: Sensor }): JSX.Element {
   const { ideal } = sensor;
   const colours = idealParts(IDEAL_ALPHA);
   const part = S.idealParts[sensor.part ?? 'any'];
-  const low = ideal && valueText(sensor, ideal[0], unit);
-  const high = ideal && readingText(sensor, ideal[1], unit);
-  const step = (name: keyof typeof colours, word: string, limits: string | null): JSX.Element => (
+  const species = useApp((state) => idealsText(sensor, selectTags(state), unit));
+  // Of one range alone the limits stand beside the colours: each plant is coloured by its own.
+  const low = species === '' && ideal && valueText(sensor, ideal[0], unit);
+  const high = species === '' && ideal && readingText(sensor, ideal[1], unit);
+  const step = (
+    name: keyof typeof colours,
+    word: string,
+    limits: string | false | null,
+  ): JSX.Element => (
     <div data-part={name}>
       <span
         className="ideal-bar"
@@ -27,31 +32,10 @@ export function IdealLegend({ sensor }: { sensor: Sensor }): JSX.Element {
     </div>
   );
   return (
-    <div className="ideal-scale" data-testid="ideal-scale">
-      {step('low', S.tooLow(null), low && S.legendBelow(low))}
-      {step('right', part, low && high && `${low} – ${high}`)}
-      {step('high', S.tooHigh(null), high && S.legendAbove(high))}
+    <div className="ideal-scale" data-testid="ideal-scale" title={species}>
+      {step('low', S.tooLow(null), low ? S.legendBelow(low) : S.below)}
+      {step('right', species === '' ? part : S.legendEach(part), low && high && `${low} – ${high}`)}
+      {step('high', S.tooHigh(null), high ? S.legendAbove(high) : S.above)}
     </div>
   );
-}
-
-/** The ideal of the species in the greenhouse that have one of their own. */
-export function IdealOfSpecies({ sensor }: { sensor: Sensor }): JSX.Element | null {
-  const unit = useApp((state) => state.settings.unit);
-  // As one text: the same for the same.
-  const own = useApp((state) =>
-    [...new Set(selectTags(state).map(({ sureSpecies }) => sureSpecies.toLowerCase()))]
-      .filter((species) => sensor.species.has(species))
-      .sort()
-      .join('\u0000'),
-  );
-  if (own === '') return null;
-  const texts = own.split('\u0000').map((species) => {
-    const range = rangesFor(sensor, species).ideal;
-    const limits = range
-      ? `${valueText(sensor, range[0], unit)} – ${readingText(sensor, range[1], unit)}`
-      : '–';
-    return `${speciesText(species, 24)} ${limits}`;
-  });
-  return <span data-testid="ideal-species">{texts.join('; ')}</span>;
 }

@@ -1,4 +1,4 @@
-import { fireEvent, render, screen, within } from '@testing-library/react';
+import { act as flush, fireEvent, render, screen, within } from '@testing-library/react';
 import { beforeAll, beforeEach, describe, expect, test } from 'vitest';
 
 import { act, prefer, receive, store } from '../store/app';
@@ -93,16 +93,27 @@ describe('legend', () => {
     };
     showTags([wireTag(species)], judgement({}, { is_day: false, source: 'light' }));
     render(<Legend kiosk={false} />);
-    expect(
+    const parts = (): (string | null)[] =>
       [...screen.getByTestId('ideal-scale').querySelectorAll('[data-part]')].map(
         (part) => part.textContent,
-      ),
-    ).toEqual([
+      );
+    expect(parts()).toEqual([
+      'too low below ideal',
+      'ideal by night for each species ',
+      'too high above ideal',
+    ]);
+    expect(at('ideal-species')).toBe('tulip 8.0 – 18.0\u00a0°C; others 15.0 – 24.0\u00a0°C');
+    flush(() => {
+      showTags(
+        [wireTag({ ...species, species: 'Fern' })],
+        judgement({}, { is_day: false, source: 'light' }),
+      );
+    });
+    expect(parts()).toEqual([
       'too low below 15.0',
       'ideal by night 15.0 – 24.0\u00a0°C',
       'too high above 24.0\u00a0°C',
     ]);
-    expect(at('ideal-species')).toBe('tulip 8.0 – 18.0\u00a0°C');
     fireEvent.click(screen.getByRole('radio', { name: 'Value' }));
     expect(screen.queryByTestId('ideal-scale')).toBeNull();
     expect(store.get().view.colouring).toBe('value');

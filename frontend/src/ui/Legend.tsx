@@ -2,6 +2,7 @@ import type { CSSProperties, JSX } from 'react';
 
 import type { FieldQuality } from '../contract/types';
 import { differenceNumber, readingText, valueText, withUnit } from '../domain/format';
+import { idealsText } from '../domain/ideal';
 import { fraction, rgbText, sensorColour, type Range } from '../domain/ramp';
 import type { Sensor } from '../domain/sensors';
 import { shown } from '../domain/text';
@@ -13,7 +14,7 @@ import { S } from '../strings';
 import { ColouringControl } from './ColouringControl';
 import { ErrorScale, EstimateFacts } from './estimate';
 import { HeatControl } from './HeatControl';
-import { IdealLegend, IdealOfSpecies } from './IdealLegend';
+import { IdealLegend } from './IdealLegend';
 import { WithParts } from './WithParts';
 
 export function Legend({ kiosk }: { kiosk: boolean }): JSX.Element {
@@ -33,6 +34,7 @@ export function Legend({ kiosk }: { kiosk: boolean }): JSX.Element {
   const isIdeal = useApp((state) => selectColouring(state) === 'ideal');
   const isEstimate = useApp((state) => state.view.heat !== 'nearest');
   const isError = useApp((state) => selectHeat(state)?.isError ?? false);
+  const ideals = useApp((state) => idealsText(sensor, selectTags(state), unit));
   const isOld = useApp((state) => Boolean(selectHeat(state)?.old));
   const told = useApp((state) => state.twin.sensors);
   if (!told.value) {
@@ -92,7 +94,9 @@ export function Legend({ kiosk }: { kiosk: boolean }): JSX.Element {
           {!isEstimate && quality?.sensor_type === name && (
             <Quality quality={quality} sensor={sensor} unit={unit} />
           )}
-          {isIdeal && !isError && <IdealOfSpecies sensor={sensor} />}
+          {isIdeal && !isError && ideals !== '' && (
+            <span data-testid="ideal-species">{ideals}</span>
+          )}
           {!isEstimate && (
             <span className="legend-note">
               <HatchedSign /> {isIdeal ? S.legendHatched : S.legendTransparent}

@@ -3,11 +3,12 @@ import { flushSync } from 'react-dom';
 
 import { epochOf, timeOfDay } from '../clock';
 import { rangeText } from '../domain/format';
+import { idealsText } from '../domain/ideal';
 import { dateText, rosText, secondsOf } from '../domain/rostime';
 import { shown } from '../domain/text';
 import { useApp } from '../store/app';
 import { selectColouring, selectRange, selectSensor } from '../store/derived';
-import { selectShown, selectSnapshot } from '../store/moment';
+import { selectShown, selectSnapshot, selectTags } from '../store/moment';
 import { selectHasOwnTime, selectOrigin } from '../store/origin';
 import { S } from '../strings';
 
@@ -27,6 +28,7 @@ export function PaperLine(): JSX.Element | null {
   const isIdeal = useApp((state) => selectColouring(state) === 'ideal');
   const { ideal } = sensor;
   const unit = useApp((state) => state.settings.unit);
+  const ideals = useApp((state) => idealsText(sensor, selectTags(state), unit));
   useEffect(() => {
     const onPrint = (): void => {
       // Not with the next frame: a page on its way to the printer gets none.
@@ -49,7 +51,10 @@ export function PaperLine(): JSX.Element | null {
     <p className="paper-line" data-testid="paper-line">
       <strong>{S.paper(taken, dateText(printedAt))}</strong>{' '}
       <span>
-        {S.paperRange(isIdeal ? S.legendAgainst(label) : label, rangeText(sensor, scale, unit))}
+        {S.paperRange(
+          isIdeal ? S.legendAgainst(label) : label,
+          (isIdeal && ideals) || rangeText(sensor, scale, unit),
+        )}
       </span>
     </p>
   );

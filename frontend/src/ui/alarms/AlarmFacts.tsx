@@ -119,7 +119,10 @@ function Trend({ alarm, value, by }: { alarm: Alarm; value: number; by: number }
   const title = `${S.trendTitle(sensor.label)}: ${text}`;
   return (
     <span data-trend={way} title={title}>
-      <span aria-hidden="true">{ARROWS[way]}</span> <span className="unseen">{title}</span>
+      <span aria-hidden="true">
+        {ARROWS[way]} {S.trendIn(text)}
+      </span>{' '}
+      <span className="unseen">{title}</span>
     </span>
   );
 }

@@ -14,6 +14,7 @@ import { acknowledgeAlarms } from '../../alarms/own';
 import { selectNow, selectSpeech } from '../../alarms/speech';
 import { alarmList } from '../../alarms/watch';
 import { now, timeOfDay } from '../../clock';
+import { todoText } from '../../domain/reasons';
 import { shown as shownText } from '../../domain/text';
 import { fileName, save } from '../../export/save';
 import { store, useApp } from '../../store/app';
@@ -50,7 +51,7 @@ export function AlarmPanel(): JSX.Element {
   const [order, setOrder] = useState<Order>('cause');
   const { shown, added, release, ...hold } = useHeldOrder(all);
   const seen = filtered(shown, filter, speech);
-  const waiting = unacknowledged([...seen.active, ...seen.resolved]);
+  const waiting = unacknowledged(seen.active);
   const count = seen.active.length + seen.shelved.length + seen.resolved.length;
   const hasAny = all.active.length + all.shelved.length > 0;
   return (
@@ -103,7 +104,7 @@ export function AlarmPanel(): JSX.Element {
             acknowledgeAlarms(waiting);
           })}
         >
-          <Icon name="check" size={18} /> {S.alarmAcknowledgeAll}
+          <Icon name="check" size={18} /> {S.alarmAcknowledgeAll(waiting.length)}
         </button>
         <Disclosure label={S.alarmTell} button={<Icon name="bell" />} className="tell-me">
           <TellMe />
@@ -151,6 +152,7 @@ function Rows({ block: { cause, items }, group }: { block: Block; group: GroupNa
         <CauseHeading
           cause={cause}
           items={items}
+          group={group}
           isOpen={isOpen}
           onToggle={() => {
             setOpen(!isOpen);
@@ -185,11 +187,13 @@ function Rows({ block: { cause, items }, group }: { block: Block; group: GroupNa
 function CauseHeading({
   cause,
   items,
+  group,
   isOpen,
   onToggle,
 }: {
   cause: string;
   items: readonly Item[];
+  group: GroupName;
   isOpen: boolean;
   onToggle: () => void;
 }): JSX.Element | null {
@@ -208,6 +212,7 @@ function CauseHeading({
           <span>
             <strong>{cause}</strong> · {S.alarmCount(items.length)}
           </span>
+          {group !== 'resolved' && <span className="alarm-do">{todoText(worst.alarm.reason)}</span>}
           <span className="alarm-facts">{texts.join(', ')}</span>
           <span className="alarm-facts faint">
             {S.alarmTags(named, tags.length - named.length)}
@@ -224,7 +229,7 @@ function CauseHeading({
             acknowledgeAlarms(waiting);
           })}
         >
-          {S.alarmAcknowledgeAll}
+          {S.alarmAcknowledgeAll(waiting.length)}
         </button>
       </div>
     </div>

@@ -5,6 +5,7 @@ import type { Item } from '../../alarms/list';
 import { acknowledgeAlarms, unacknowledgeAlarm, unshelveAlarm } from '../../alarms/own';
 import { selectSpeech } from '../../alarms/speech';
 import { nameText, whereText } from '../../alarms/words';
+import { todoText } from '../../domain/reasons';
 import { Comments } from '../../notes/Comments';
 import { useApp } from '../../store/app';
 import { S } from '../../strings';
@@ -27,6 +28,7 @@ export const AlarmRow = memo(function AlarmRow({
 }): JSX.Element {
   const { alarm, verdict, isAcknowledged } = item;
   const values = useValues(alarm);
+  const current = values.state?.kind === 'known' ? values.state.verdict : verdict;
   const name = useApp((state) => nameText(alarm, selectSpeech(state)));
   return (
     <li
@@ -43,7 +45,7 @@ export const AlarmRow = memo(function AlarmRow({
           showAlarm(alarm);
         }}
       >
-        <HealthMark verdict={verdict} word={false} />
+        <HealthMark verdict={current} word={false} />
         <span className="alarm-text">
           <span>
             <strong>
@@ -52,6 +54,7 @@ export const AlarmRow = memo(function AlarmRow({
             {': '}
             {values.what}
           </span>
+          {group !== 'resolved' && <span className="alarm-do">{todoText(alarm.reason)}</span>}
           <AlarmFacts item={item} values={values} isShelved={group === 'shelved'} />
         </span>
       </button>

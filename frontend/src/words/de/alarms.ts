@@ -31,7 +31,7 @@ export const ALARMS: In<typeof ENGLISH> = {
   alarmStartOf: (what) => `Zum Beginn: ${what}`,
   alarmAcknowledge: 'Quittieren',
   alarmAcknowledgeOf: (what) => `Quittieren: ${what}`,
-  alarmAcknowledgeAll: 'Alle quittieren',
+  alarmAcknowledgeAll: (count) => `Alle quittieren (${count})`,
   alarmUnacknowledge: 'Aufheben',
   alarmUnacknowledgeOf: (what) => `Quittierung aufheben: ${what}`,
   alarmShelve: 'Zurückstellen',

@@ -12,6 +12,7 @@ export const HEALTH: In<typeof ENGLISH> = {
   },
   reasons: {
     sides: { below: 'unter', above: 'über' },
+    sidesHeld: { below: 'noch nicht über', above: 'noch nicht unter' },
     range: (reading, side, limit, isCritical) =>
       `${reading}, ${side} ${limit}${isCritical ? ' (kritisch)' : ''}`,
     beyond: (sensor, side, limit) => `${sensor} ${side} ${limit}`,
@@ -82,6 +83,8 @@ export const HEALTH: In<typeof ENGLISH> = {
     alarms === 1
       ? '1 Alarm steht noch an: Zwei gute Messungen heben ihn auf'
       : `${alarms} Alarme stehen noch an: Je zwei gute Messungen heben sie auf`,
+  healthSince: (when) => `Alarm seit ${when}`,
+  healthMoreCritical: (count) => `+ ${count} weitere kritisch`,
   healthNothing: 'Noch kein Messwert zu beurteilen',
   healthFilter: ', nur diese Messpunkte anzeigen',
   houseRhythm: (interval) => `alle ${interval} eine Messung`,

@@ -58,6 +58,8 @@ export const MAP: In<typeof ENGLISH> = {
   legendAbove: (value) => `über ${value}`,
   legendAgainst: (sensor) => `${sensor} im Vergleich zum Idealbereich`,
   legendIdeal: (ideal, low, high) => `${ideal} ${low} bis ${high}`,
+  legendEach: (part) => `${part} je Art`,
+  legendOthers: 'andere',
   legendUnknownSpecies: 'Nicht bestimmt',
   pinLacking: 'Sensor nicht vorhanden',
   pinFailed: 'Sensor ausgefallen',

@@ -32,7 +32,7 @@ export const ALARMS = {
   alarmStartOf: (what: string): string => `Go to start: ${what}`,
   alarmAcknowledge: 'Acknowledge',
   alarmAcknowledgeOf: (what: string): string => `Acknowledge: ${what}`,
-  alarmAcknowledgeAll: 'Acknowledge all',
+  alarmAcknowledgeAll: (count: number): string => `Acknowledge all (${count})`,
   alarmUnacknowledge: 'Unacknowledge',
   alarmUnacknowledgeOf: (what: string): string => `Unacknowledge: ${what}`,
   alarmShelve: 'Shelve',

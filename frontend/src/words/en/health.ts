@@ -11,6 +11,8 @@ export const HEALTH = {
   /** Why a tag or the house has its verdict. */
   reasons: {
     sides: { below: 'below', above: 'above' },
+    /** What was out of its range stays so until it is well within. */
+    sidesHeld: { below: 'not yet above', above: 'not yet below' },
     range: (reading: string, side: string, limit: string, isCritical: boolean): string =>
       `${reading}, ${side} ${limit}${isCritical ? ' (critical)' : ''}`,
     /** What is wrong, whatever the value is by now. */
@@ -83,6 +85,8 @@ export const HEALTH = {
     alarms === 1
       ? '1 alarm is still active: two good scans resolve it'
       : `${alarms} alarms are still active: two good scans resolve each`,
+  healthSince: (when: string): string => `alarm since ${when}`,
+  healthMoreCritical: (count: number): string => `+ ${count} more critical`,
   healthNothing: 'No reading to assess yet',
   healthFilter: ', show only these tags',
   houseRhythm: (interval: string): string => `a scan every ${interval}`,

@@ -54,6 +54,8 @@ export const MAP = {
   legendAbove: (value: string): string => `above ${value}`,
   legendAgainst: (sensor: string): string => `${sensor} compared with its ideal range`,
   legendIdeal: (ideal: string, low: string, high: string): string => `${ideal} ${low} to ${high}`,
+  legendEach: (part: string): string => `${part} for each species`,
+  legendOthers: 'others',
   legendUnknownSpecies: 'Not classified',
   pinLacking: 'no such sensor',
   pinFailed: 'sensor failed',

@@ -31,7 +31,7 @@ export const ALARMS: In<typeof ENGLISH> = {
   alarmStartOf: (what) => `Ir al comienzo: ${what}`,
   alarmAcknowledge: 'Reconocer',
   alarmAcknowledgeOf: (what) => `Reconocer: ${what}`,
-  alarmAcknowledgeAll: 'Reconocer todas',
+  alarmAcknowledgeAll: (count) => `Reconocer todas (${count})`,
   alarmUnacknowledge: 'Anular',
   alarmUnacknowledgeOf: (what) => `Anular reconocimiento: ${what}`,
   alarmShelve: 'Aplazar',

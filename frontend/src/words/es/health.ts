@@ -12,6 +12,7 @@ export const HEALTH: In<typeof ENGLISH> = {
   },
   reasons: {
     sides: { below: 'por debajo de', above: 'por encima de' },
+    sidesHeld: { below: 'aún no por encima de', above: 'aún no por debajo de' },
     range: (reading, side, limit, isCritical) =>
       `${reading}, ${side} ${limit}${isCritical ? ' (crítico)' : ''}`,
     beyond: (sensor, side, limit) => `${sensor} ${side} ${limit}`,
@@ -83,6 +84,8 @@ export const HEALTH: In<typeof ENGLISH> = {
     alarms === 1
       ? 'Aún hay 1 alarma activa: dos mediciones buenas la resuelven'
       : `Aún hay ${alarms} alarmas activas: dos mediciones buenas resuelven cada una`,
+  healthSince: (when) => `alarma desde ${when}`,
+  healthMoreCritical: (count) => `+ ${count} más en estado crítico`,
   healthNothing: 'Aún no hay lecturas que evaluar',
   healthFilter: ', mostrar solo estos puntos',
   houseRhythm: (interval) => `una lectura cada ${interval}`,

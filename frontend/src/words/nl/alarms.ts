@@ -31,7 +31,7 @@ export const ALARMS: In<typeof ENGLISH> = {
   alarmStartOf: (what) => `Naar het begin: ${what}`,
   alarmAcknowledge: 'Bevestigen',
   alarmAcknowledgeOf: (what) => `Bevestigen: ${what}`,
-  alarmAcknowledgeAll: 'Alles bevestigen',
+  alarmAcknowledgeAll: (count) => `Alles bevestigen (${count})`,
   alarmUnacknowledge: 'Intrekken',
   alarmUnacknowledgeOf: (what) => `Bevestiging intrekken: ${what}`,
   alarmShelve: 'Uitstellen',

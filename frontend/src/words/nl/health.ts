@@ -12,6 +12,7 @@ export const HEALTH: In<typeof ENGLISH> = {
   },
   reasons: {
     sides: { below: 'onder', above: 'boven' },
+    sidesHeld: { below: 'nog niet boven', above: 'nog niet onder' },
     range: (reading, side, limit, isCritical) =>
       `${reading}, ${side} ${limit}${isCritical ? ' (kritiek)' : ''}`,
     beyond: (sensor, side, limit) => `${sensor} ${side} ${limit}`,
@@ -82,6 +83,8 @@ export const HEALTH: In<typeof ENGLISH> = {
     alarms === 1
       ? '1 alarm is nog actief: twee goede metingen lossen het op'
       : `${alarms} alarmen zijn nog actief: telkens twee goede metingen lossen ze op`,
+  healthSince: (when) => `alarm sinds ${when}`,
+  healthMoreCritical: (count) => `+ nog ${count} kritiek`,
   healthNothing: 'Nog geen meetwaarde om te beoordelen',
   healthFilter: ', alleen deze meetpunten tonen',
   houseRhythm: (interval) => `elke ${interval} een meting`,

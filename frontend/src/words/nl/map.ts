@@ -57,6 +57,8 @@ export const MAP: In<typeof ENGLISH> = {
   legendAbove: (value) => `boven ${value}`,
   legendAgainst: (sensor) => `${sensor} vergeleken met het ideale bereik`,
   legendIdeal: (ideal, low, high) => `${ideal} ${low} tot ${high}`,
+  legendEach: (part) => `${part} per soort`,
+  legendOthers: 'andere',
   legendUnknownSpecies: 'Niet bepaald',
   pinLacking: 'sensor niet aanwezig',
   pinFailed: 'sensor uitgevallen',

@@ -12,6 +12,7 @@ import pytest
 from playwright.sync_api import Locator, expect
 
 from tests.browser.hmi import PHONE, SERVER_GONE, WIDE, Hmi, OpenPage
+from tests.browser.places import place
 from tests.support.messages import scan
 from tests.support.waiting import wait_for
 from tests.support.web import Bridge, bridge
@@ -186,13 +187,18 @@ def test_a_double_click_shelves_nothing_and_a_critical_alarm_takes_a_reason(
         hmi = open_page(running.url, viewport=viewport)
         hmi.page.keyboard.press("a")
         expect(rows(hmi, "active")).to_have_count(2)
+        for row in rows(hmi, "active").all():
+            expect(row).to_be_in_viewport(ratio=1)
+            assert len({place(each).top for each in row.locator(".alarm-tools button").all()}) == 1
         times = hmi.page.locator(".shelf-times button")
+        panel = hmi.page.locator(".disclosure-panel:not([hidden])")
         for tag in ("b", "a"):
             hmi.page.keyboard.press("Escape")
             button = hmi.page.get_by_role("button", name=f"Shelve: Tag {tag}")
             button.dblclick()
             expect(times.first).to_be_visible()
-            assert apart(button, hmi.page.locator(".disclosure-panel:not([hidden])"))
+            expect(panel).to_be_in_viewport(ratio=1)
+            assert apart(button, panel)
             expect(hmi.page.get_by_role("button", name="Unshelve")).to_have_count(0)
         # Of the critical one.
         expect(times).to_have_text(["For 15 min", "For 1 h"])
@@ -251,7 +257,7 @@ def test_a_row_leads_to_its_tag_as_it_is_now_and_a_button_to_its_start(
         assert "at=" not in hmi.address()
         expect(row).to_have_attribute("data-acknowledged", "false")
 
-        hmi.tab_to(row.get_by_role("button", name="Go to start: Tag a"))
+        hmi.tab_to(row.get_by_role("button", name="Show when it began: Tag a"))
         hmi.page.keyboard.press("Enter")
         raised_s = alarm["raised_at"]["sec"] + alarm["raised_at"]["nanosec"] / 1e9
         shown = re.compile(rf"^{int(raised_s)}\.\d+$|^{int(raised_s)}$")

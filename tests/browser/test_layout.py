@@ -402,6 +402,11 @@ def test_every_language_has_room_on_a_phone(
     expect(hmi.test_id("language")).to_have_value(language)
     assert hmi.page.evaluate(_TOO_LONG) == []
     hmi.page.keyboard.press("Escape")
+    hmi.page.locator(".pane-tabs button").nth(2).click()
+    tools = hmi.page.locator("[data-group=active] .alarm-tools").first
+    expect(tools).to_be_visible()
+    assert hmi.page.evaluate(_TOO_LONG) == []
+    assert len({place(each).top for each in tools.locator("> button").all()}) == 1
     hmi.page.locator(".pane-tabs button").nth(1).click()
     expect(hmi.cell("1", "temperature")).to_contain_text(reading)
     assert hmi.page.evaluate(_TOO_LONG) == []
@@ -413,6 +418,10 @@ def test_every_language_has_room_on_a_phone(
         resize(hmi, (width, 800))
         health = hmi.page.locator("thead [data-column=health] button > span").first
         assert health.evaluate(_LINES) == 1, width
+    # Where the name of the page has no room, none of it is shown.
+    resize(hmi, (230, 740))
+    brand = place(hmi.page.locator(".brand"))
+    assert place(hmi.page.locator(".brand > span")).top >= brand.bottom
 
 
 # The heads of the table in which a word is wider than its column.

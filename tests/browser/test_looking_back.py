@@ -67,7 +67,8 @@ def hour(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Hour]:
     begun_s = int(time.time()) - EVERY_S * SCANS
     begun_ns = begun_s * SECOND
     rows: list[Write] = [pin(tag, begun_ns, x=PLACES[tag]) for tag in TAGS]
-    rows += [look("b", begun_ns + 600 * SECOND, anomaly=True), look("b", begun_ns + 900 * SECOND)]
+    rows.append(look("b", begun_ns + 600 * SECOND, anomaly=True))
+    rows += [look("b", begun_ns + second * SECOND) for second in (900, 901)]
     rows += [
         scan(tag, begun_ns + number * EVERY_S * SECOND, temperature=18.0 + number % 40 / 10)
         for number in range(SCANS)

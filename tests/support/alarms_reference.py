@@ -238,9 +238,7 @@ def _episodes(key: _Key, said: list[_Said], ended_ns: int | None) -> Iterator[Pl
             at += 1
             continue
         end = raised + 1
-        while end < len(said) and (
-            said[end].is_nearly_so or any(one.is_nearly_so for one in said[end - hold + 1 : end])
-        ):
+        while end < len(said) and (said[end].is_nearly_so or said[end - 1].is_nearly_so):
             end += 1
         over = said[at:end]
         out = [one for one in over if one.is_so]

@@ -6,10 +6,10 @@ that fail raise one only where they go on for the tag's usual interval: a second
 no more than the first. A sensor that scans leave out is old once its reading holds no longer, but
 not before three times the sensor's own last interval: what every tenth scan has is not missing from
 the others. Received once, it has no interval yet. Too little light raises one after two hours:
-before, it may be dawn or dusk. A pest is seen or not: one inspection raises, one clears. What is
-out of its range is so until it lies within by 5 % of the range's width: a value that wobbles about
-a limit is one episode. A quantity of a day has one value a day, known at the first scan of the next
-one: that raises or clears, and has no deadband.
+before, it may be dawn or dusk. A pest raises one at once: a later inspection that sees none may
+have missed it. What is out of its range is so until it lies within by 5 % of the range's width: a
+value that wobbles about a limit is one episode. A quantity of a day has one value a day, known at
+the first scan of the next one: that raises or clears, and has no deadband.
 """
 
 from __future__ import annotations
@@ -199,12 +199,12 @@ class TagEpisodes:
 
     def _note(self, finding: _Finding, stamp_ns: int) -> None:
         watch = self._watches.get(finding.key)
-        at_once = finding.key[0] is Kind.PEST or finding.key[1] in DAILY
+        is_daily = finding.key[1] in DAILY
         if watch is None:
             if finding.holds and finding.reason is not None:
                 value = finding.reason.value if finding.worse else None
                 watch = _Watch(stamp_ns, finding.reason, value, 0)
-                if at_once:
+                if is_daily or finding.key[0] is Kind.PEST:
                     verdict = finding.reason.verdict
                     watch = replace(watch, raised_at_ns=stamp_ns, raised_as=verdict)
                 self._watches[finding.key] = watch
@@ -214,7 +214,7 @@ class TagEpisodes:
         elif not finding.still_holds:
             watch = replace(watch, against=watch.against + 1)
             self._watches[finding.key] = watch
-            if watch.against == (1 if at_once else HOLD):
+            if watch.against == (1 if is_daily else HOLD):
                 done = self._alarm(finding.key, watch, stamp_ns)
                 self._done = (*self._done, done)[-MAX_EPISODES:]
                 del self._watches[finding.key]

@@ -1,4 +1,4 @@
-import { expect, test } from 'vitest';
+import { expect, test, vi } from 'vitest';
 
 import type { Alarm, Verdict } from '../contract/types';
 import { alarm } from '../testing/alarms';
@@ -55,6 +55,15 @@ test('now, at worst and at first, each with its own severity', () => {
   expect(alarmText(cold, C, known(8.7, 'critical'))).not.toContain('worst');
 });
 
+test('a worst value is named by the side of its limit that it lies on', () => {
+  const lowest = vi.spyOn(S.alarmWorst, 'below');
+  const highest = vi.spyOn(S.alarmWorst, 'above');
+  valuesOf(alarm('a', { worst: 2.5, reason: { value: 8, limit: 10 } }), C, null);
+  valuesOf(alarm('b', { worst: 31, reason: { value: 27, limit: 26 } }), C, null);
+  expect(lowest.mock.calls).toEqual([['2.5\u00a0°C']]);
+  expect(highest.mock.calls).toEqual([['31.0\u00a0°C']]);
+});
+
 test('no value reads like the limit that it differs from', () => {
   const dry = alarm('a', { worst: 44, reason: { sensor: 'humidity', value: 49.96, limit: 50 } });
   expect(valuesOf(dry, C, known(50.02, 'healthy'))).toMatchObject({
@@ -84,10 +93,12 @@ test('what is not known now says so, with what was known last', () => {
 test('of a pest how many: now, at worst and at first', () => {
   const reason = { kind: 'pest', sensor: '', value: 2, limit: null } as const;
   const pest = alarm('a', { worst: 4, reason });
-  const texts = { what: 'Pest seen', worst: 'worst 4', first: 'first 2' };
-  expect(valuesOf(pest, C, known(3, 'critical'))).toMatchObject({ ...texts, now: 'now 3' });
+  const texts = { what: 'Pest seen', worst: 'most 4', first: 'first 2' };
+  expect(valuesOf(pest, C, known(3, 'critical'))).toMatchObject({ ...texts, now: 'now 3 pests' });
   expect(valuesOf(pest, C, known(0, 'critical')).now).toBe('now seen');
   expect(valuesOf(pest, C, known(null, 'healthy')).now).toBe('now none');
+  // Seen, and not counted.
+  expect(valuesOf(alarm('a', { worst: 0, reason }), C, known(0, 'stressed')).worst).toBeNull();
 });
 
 test('since when and until when: of today the time alone', () => {

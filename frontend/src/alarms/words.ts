@@ -1,7 +1,7 @@
 /** An alarm in words: what, where, how bad now and at worst, since when, until when. Pure. */
 import type { Alarm, Verdict } from '../contract/types';
 import { ageText, clockText, digitsApart, readingText } from '../domain/format';
-import { isOfRange } from '../domain/health';
+import { isOfRange, sideOf } from '../domain/health';
 import { beyondText, reasonText } from '../domain/reasons';
 import { hasDate, rosText, secondsOf } from '../domain/rostime';
 import type { Catalogue } from '../domain/sensors';
@@ -57,20 +57,26 @@ export function valuesOf(alarm: Alarm, speech: Speech, now: Now | null): Values 
   const current = now?.kind === 'known' ? now.value : (now?.last ?? null);
   const all = [current, worst, reason.value].filter((value) => value !== null);
   const more = isOfRange(reason) ? digitsApart(sensor, all, reason.limit, unit) : 0;
+  const isPest = reason.kind === 'pest';
   const text = (value: number): string =>
-    reason.kind === 'pest'
+    isPest
       ? value > 0
         ? String(value)
         : S.alarmPests.seen
       : readingText(sensor, value, unit, more);
-  const isMeasured = isOfRange(reason) || reason.kind === 'pest' || reason.kind === 'changed';
+  const nowText = (value: number): string =>
+    isPest && value > 0 ? S.pestCount(value) : text(value);
+  const isMeasured = isOfRange(reason) || isPest || reason.kind === 'changed';
   return {
     what: whatText(alarm, speech, more),
     now:
       now?.kind === 'known'
-        ? S.alarmNow(now.value === null ? S.alarmPests.none : text(now.value))
+        ? S.alarmNow(now.value === null ? S.alarmPests.none : nowText(now.value))
         : null,
-    worst: worst === null ? null : S.alarmWorst(text(worst)),
+    worst:
+      worst === null || (isPest && worst === 0)
+        ? null
+        : S.alarmWorst[isOfRange(reason) ? sideOf(reason) : 'pest'](text(worst)),
     first: isMeasured && reason.value !== null ? S.alarmFirst(text(reason.value)) : null,
     more,
   };

@@ -5,10 +5,11 @@ import { selectCatalogue, selectCatalogues } from '../store/derived';
 import { S } from '../strings';
 import { Icon } from '../widgets/Icon';
 import { modelOf, pairsOf } from './charted';
+import { MarksKey } from './MarksKey';
 import { PlotView } from './PlotView';
 import { SensorChoice } from './SensorChoice';
 import { useLines } from './useLines';
-import { useSensorsOf } from './useSensorsOf';
+import { useSensorsOf, useSpeciesOf } from './useSensorsOf';
 import { pointsFor, useSize } from './useSize';
 import { ChartState } from './ChartState';
 
@@ -32,9 +33,11 @@ export default function CardChart({ tagId }: { tagId: string }): JSX.Element | n
   const pairs = useMemo(() => (plan ? pairsOf([plan]) : []), [plan]);
   const asked = useLines(pairs, pointsFor(width));
   const { lines, state, span } = asked;
+  const species = useSpeciesOf([tagId]);
   const model = useMemo(
-    () => (plan && span ? modelOf(catalogue, both, plan, lines, span, unit, moment) : null),
-    [catalogue, both, plan, lines, span, unit, moment],
+    () =>
+      plan && span ? modelOf(catalogue, both, plan, species, lines, span, unit, moment) : null,
+    [catalogue, both, plan, species, lines, span, unit, moment],
   );
   if (!plan) return null;
   return (
@@ -45,7 +48,10 @@ export default function CardChart({ tagId }: { tagId: string }): JSX.Element | n
       ) : (
         <>
           {model && model.lines.length > 0 ? (
-            <PlotView model={model} height={HEIGHT} />
+            <>
+              <PlotView model={model} height={HEIGHT} />
+              <MarksKey marks={[...lines.marks.values()].flat()} />
+            </>
           ) : (
             <ChartState asked={asked} hasLines={false} lacks={null} />
           )}

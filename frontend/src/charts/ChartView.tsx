@@ -12,11 +12,12 @@ import { modelOf, pairsOf, plansOf, tagLabel } from './charted';
 import { ChartFiles } from './ChartFiles';
 import { ChartState } from './ChartState';
 import { ChartTables } from './ChartTables';
+import { MarksKey } from './MarksKey';
 import { PlotView } from './PlotView';
 import { SensorChoice } from './SensorChoice';
 import { TagChoice } from './TagChoice';
 import { useLines } from './useLines';
-import { useSensorsOf } from './useSensorsOf';
+import { useSensorsOf, useSpeciesOf } from './useSensorsOf';
 import { pointsFor, useSize } from './useSize';
 import { useZoomed, zoomBack, zoomBy } from './zoom';
 
@@ -44,10 +45,13 @@ export default function ChartView({ charted }: { charted: Charted }): JSX.Elemen
   const pairs = useMemo(() => pairsOf(plans), [plans]);
   const asked = useLines(pairs, pointsFor(size.width), hasDayBefore);
   const { lines, span } = asked;
+  const species = useSpeciesOf(charted.tagIds);
   const models = useMemo(
     () =>
-      span ? plans.map((plan) => modelOf(catalogue, both, plan, lines, span, unit, moment)) : [],
-    [catalogue, both, plans, lines, span, unit, moment],
+      span
+        ? plans.map((plan) => modelOf(catalogue, both, plan, species, lines, span, unit, moment))
+        : [],
+    [catalogue, both, plans, species, lines, span, unit, moment],
   );
   const withLines = models.filter(({ lines }) => lines.length > 0);
   const around = AROUND + (charted.by === 'sensor' ? LEGEND : 0);
@@ -121,6 +125,7 @@ export default function ChartView({ charted }: { charted: Charted }): JSX.Elemen
             />
           ))}
       </div>
+      <MarksKey marks={[...lines.marks.values()].flat()} />
       {withLines.length > 0 && span && (
         <ChartFiles
           models={withLines}

@@ -88,6 +88,7 @@ export function PlotView({ model, height }: { model: PlotModel; height: number }
             />
           ))}
         </ul>
+        {model.isMixed && <span className="faint">{S.chartIdealsDiffer}</span>}
         {at !== null && <span className="plot-time faint">{rosText(at)}</span>}
       </header>
       <div className="plot-comments">

@@ -1,6 +1,6 @@
 /** From what is chosen to the charts that it makes. Pure. */
 import type { Span } from '../domain/period';
-import type { Catalogue, Catalogues } from '../domain/sensors';
+import { rangesFor, type Catalogue, type Catalogues, type Ranges } from '../domain/sensors';
 import { shown } from '../domain/text';
 import type { TemperatureUnit } from '../domain/units';
 import type { Charted } from '../store/view';
@@ -31,11 +31,15 @@ export const pairsOf = (plans: readonly Plan[]): Pair[] =>
 
 export const tagLabel = (tagId: string): string => S.card(shown(tagId, 24));
 
-/** What of a plan is here. A tag keeps its look while others come later, or have nothing. */
+/**
+ * What of a plan is here. A tag keeps its look while others come later, or have nothing. `species` are
+ * those of the plan's tags: what is ideal is drawn where it is the same for all.
+ */
 export function modelOf(
   catalogue: Catalogue,
   { day, night }: Catalogues,
   { sensor, tagIds }: Plan,
+  species: readonly string[],
   { series, before, marks }: Lines,
   span: Span,
   unit: TemperatureUnit,
@@ -50,8 +54,10 @@ export function modelOf(
     return [{ series: own, before: ofDayBefore, look, label, marks: marks.get(tagId) ?? [] }];
   });
   const now = catalogue.named(sensor);
-  const ranges = { now, day: day.named(sensor), night: night.named(sensor) };
+  const isMixed = new Set(tagIds.map((_, index) => rangesFor(now, species[index] ?? ''))).size > 1;
+  const own = (of: Catalogue): Ranges => rangesFor(of.named(sensor), species[0] ?? '');
+  const ranges = { now: own(catalogue), day: own(day), night: own(night) };
   // The nights are the greenhouse's: each line has the same.
-  const bands = bandsOf(span, lines[0]?.series.nights ?? null, ranges);
-  return { sensor: now, unit, span, moment, lines, bands };
+  const bands = isMixed ? [] : bandsOf(span, lines[0]?.series.nights ?? null, ranges);
+  return { sensor: now, unit, span, moment, lines, bands, isMixed };
 }

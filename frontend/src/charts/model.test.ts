@@ -18,6 +18,7 @@ const model = (all: readonly Series[], over: Partial<PlotModel> = {}): PlotModel
   })),
   span: { from: 0, to: 100 },
   bands: [{ from: 0, to: 100, ranges: over.sensor ?? sensorNamed('temperature') }],
+  isMixed: false,
   moment: null,
   ...over,
 });

@@ -46,6 +46,8 @@ export interface PlotModel {
   readonly sensor: Sensor;
   /** By their time, over all of the span. */
   readonly bands: readonly Band[];
+  /** The lines' plants have ranges of their own, and no band is that of all. */
+  readonly isMixed: boolean;
   readonly unit: TemperatureUnit;
   readonly lines: readonly Line[];
   readonly span: Span;

@@ -24,6 +24,14 @@ export function useSensorsOf(tagId: string): readonly string[] {
   );
 }
 
+/** The species of tags, as far as they are sure, at the moment that is shown; else empty. */
+export function useSpeciesOf(tagIds: readonly string[]): readonly string[] {
+  const species = useApp((state) =>
+    tagIds.map((id) => selectTag(state, id)?.sureSpecies ?? '').join('\u0000'),
+  );
+  return useMemo(() => species.split('\u0000'), [species]);
+}
+
 function inOrder({ all }: Catalogue, names: readonly string[]): readonly string[] {
   const place = (name: string): number => {
     const index = all.findIndex((sensor) => sensor.name === name);

@@ -69,6 +69,7 @@ export default function Compare({ shown, words }: Props): JSX.Element {
     () =>
       found && {
         ...{ sensor: sensors.named(found.sensor_type), unit, span: spanOf(found), moment: null },
+        isMixed: false,
         bands: [{ ...spanOf(found), ranges: sensors.named(found.sensor_type) }],
         lines: linesOf(found, drawn, W.median),
       },

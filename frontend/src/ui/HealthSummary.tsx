@@ -41,7 +41,8 @@ export function HealthSummary({ kiosk }: { kiosk: boolean }): JSX.Element {
               }}
             >
               <HealthShape verdict={verdict} />
-              <strong>{health.counts[verdict]}</strong> <span>{S.health[verdict]}</span>
+              <strong>{health.counts[verdict]}</strong>{' '}
+              <span>{(health.counts[verdict] === 1 ? S.health : S.healthMany)[verdict]}</span>
               {!kiosk && <span className="unseen">{S.healthFilter}</span>}
             </button>
           </li>

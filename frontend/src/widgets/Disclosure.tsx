@@ -82,7 +82,15 @@ export function Disclosure({
       >
         {button}
       </button>
-      <div id={id} className="disclosure-panel" hidden={!open} role="group" aria-label={label}>
+      {/* Takes the focus of a click beside its controls: else what scrolls behind it would. */}
+      <div
+        id={id}
+        className="disclosure-panel"
+        hidden={!open}
+        role="group"
+        aria-label={label}
+        tabIndex={-1}
+      >
         {open && <Close value={close}>{children}</Close>}
       </div>
     </div>

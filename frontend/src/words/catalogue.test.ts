@@ -121,6 +121,9 @@ describe.each([
     expect(texts.filter((text) => foreign.test(text.replaceAll(/⟦\w+⟧/g, '')))).toEqual([]);
     const leftover = /\b(the|and|with|not|readings?|shown)\b/i;
     expect(texts.filter((text) => leftover.test(text.replaceAll(/⟦\w+⟧/g, '')))).toEqual([]);
+    // Of whatever sensor: a word that agrees with one noun disagrees with another.
+    const tooMuch = [words.tooLow, words.tooHigh].map((text) => text(null));
+    expect(tooMuch.filter((text) => /(baj|alt)[oa]$/.test(text))).toEqual([]);
   });
 
   test('comes when it is asked for, and asks the page for nothing', async () => {

@@ -101,7 +101,7 @@ def test_it_reads_the_past_once_then_what_is_new_and_another_journal_from_its_be
             True,
         )
         assert len(board.now.active) == 1
-        source.writes_now.append(pest(1_200, 0))
+        source.writes_now += [pest(1_200, 0), pest(1_201, 0)]
         feed.on_state(told(2))
         await changed(board)
         assert [alarm.is_active for alarm in board.now.alarms[:1]] == [False]
@@ -125,8 +125,8 @@ def test_what_is_written_is_read_also_where_the_state_stays_as_it_is() -> None:
         await changed(board)
         # Once more it asks by itself, for a disk that is slow; then it has to be woken.
         feed._ask_again(asyncio.get_running_loop(), 1_000_000.0)
-        source.writes_now.append(pest(2, 0))
-        source.written = 2
+        source.writes_now += [pest(2, 0), pest(3, 0)]
+        source.written = 3
         feed.on_state(told(1))
         await changed(board)
         assert board.now.active == ()

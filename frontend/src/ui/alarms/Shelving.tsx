@@ -8,9 +8,6 @@ import { Disclosure, useClose } from '../../widgets/Disclosure';
 import { Either } from './Either';
 import { once } from './once';
 
-/** Between the buttons and the panel, and beyond that. */
-const GAP_PX = 20;
-
 /** Shelves an alarm for a while; a critical one for a shorter while, and with a reason. */
 export function Shelving({ item, name }: { item: Item; name: string }): JSX.Element {
   return (
@@ -30,7 +27,7 @@ function Choice({ item }: { item: Item }): JSX.Element {
   const close = useClose();
   const root = useRef<HTMLDivElement>(null);
   useLayoutEffect(() => {
-    if (root.current) openClear(root.current);
+    root.current?.scrollIntoView({ block: 'nearest' });
   }, []);
   const isNeeded = needsReason(item.verdict);
   const given = reason.trim();
@@ -67,15 +64,4 @@ function Choice({ item }: { item: Item }): JSX.Element {
       </div>
     </div>
   );
-}
-
-/** Below its button, or above it where the list ends too soon: never over it. */
-function openClear(content: HTMLElement): void {
-  const panel = content.closest<HTMLElement>('.disclosure-panel');
-  const tools = content.closest('.alarm-tools')?.getBoundingClientRect();
-  const list = content.closest('.alarms')?.getBoundingClientRect();
-  if (!panel || !tools || !list) return;
-  const below = list.bottom - tools.bottom;
-  const isAbove = below < panel.offsetHeight + GAP_PX && tools.top - list.top > below;
-  panel.dataset['above'] = String(isAbove);
 }

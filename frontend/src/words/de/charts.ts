@@ -23,6 +23,7 @@ export const CHARTS: In<typeof ENGLISH> = {
     'Den Zwilling ohne „journal:=off“ starten oder im Parameter „journal“ eine Datei nennen.',
   chartMissingShort: 'Kein Verlauf: Dieser Zwilling zeichnet nichts auf.',
   chartNoTime: 'Der Zwilling kennt noch keine Uhrzeit; es gibt noch keine Vergangenheit.',
+  chartIdealsDiffer: 'Idealbereiche je nach Art verschieden',
   chartNoSensors: 'Dieser Messpunkt hat keinen Sensor.',
   chartTable: 'Als Tabelle anzeigen',
   chartPlots: 'Als Verlauf anzeigen',

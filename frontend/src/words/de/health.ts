@@ -3,13 +3,16 @@ import type { HEALTH as ENGLISH } from '../en/health';
 import type { In } from '../shape';
 import { counted } from './counted';
 
+const ONE_OR_MANY = {
+  healthy: 'Gesund',
+  stressed: 'Gestresst',
+  critical: 'Kritisch',
+  unknown: 'Unbekannt',
+};
+
 export const HEALTH: In<typeof ENGLISH> = {
-  health: {
-    healthy: 'Gesund',
-    stressed: 'Gestresst',
-    critical: 'Kritisch',
-    unknown: 'Unbekannt',
-  },
+  health: ONE_OR_MANY,
+  healthMany: ONE_OR_MANY,
   reasons: {
     sides: { below: 'unter', above: 'über' },
     sidesHeld: { below: 'noch nicht über', above: 'noch nicht unter' },
@@ -55,7 +58,7 @@ export const HEALTH: In<typeof ENGLISH> = {
     range: 'Klimaregelung prüfen',
     reading_failed: 'Sensor prüfen',
     scan_failed: 'Weg und Messpunkt prüfen',
-    pest: 'Pflanzen untersuchen und behandeln',
+    pest: 'Bestand prüfen, Schädlinge bekämpfen',
     old: 'Route des Roboters prüfen',
     changed: 'Mit einem zweiten Messgerät vergleichen',
     silent: 'Prüfen, ob der Zwilling läuft',

@@ -27,6 +27,7 @@ export const CHARTS = {
     'Start the twin without “journal:=off”, or name a file in the parameter “journal”.',
   chartMissingShort: 'No chart: this twin records nothing.',
   chartNoTime: 'The twin has no time yet, so there is no past to show.',
+  chartIdealsDiffer: 'Ideal ranges differ by species',
   chartNoSensors: 'This tag has no sensor.',
   chartTable: 'Show as table',
   chartPlots: 'Show as charts',

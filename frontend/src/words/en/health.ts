@@ -1,13 +1,17 @@
 /** Verdicts and their reasons. */
 import { counted } from './counted';
 
+/** Of one tag, and beside a number of them. */
+const ONE_OR_MANY = {
+  healthy: 'Healthy',
+  stressed: 'Stressed',
+  critical: 'Critical',
+  unknown: 'Unknown',
+} as const;
+
 export const HEALTH = {
-  health: {
-    healthy: 'Healthy',
-    stressed: 'Stressed',
-    critical: 'Critical',
-    unknown: 'Unknown',
-  },
+  health: ONE_OR_MANY,
+  healthMany: ONE_OR_MANY,
   /** Why a tag or the house has its verdict. */
   reasons: {
     sides: { below: 'below', above: 'above' },

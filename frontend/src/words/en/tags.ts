@@ -19,7 +19,7 @@ export const TAGS = {
     age: 'Age',
   },
   pest: 'Pest',
-  pestCount: (count: number): string => counted(count, 'bug', 'bugs'),
+  pestCount: (count: number): string => counted(count, 'pest', 'pests'),
   notOnMap: 'No pin',
   notOnMapLong: 'No position known yet, so the tag has no pin on the map.',
   farOff: 'Too far away, not on the map',

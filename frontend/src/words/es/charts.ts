@@ -23,6 +23,7 @@ export const CHARTS: In<typeof ENGLISH> = {
     'Inicie el gemelo sin «journal:=off» o indique un archivo en el parámetro «journal».',
   chartMissingShort: 'Sin gráfica: este gemelo no registra nada.',
   chartNoTime: 'El gemelo aún no tiene hora; todavía no hay pasado.',
+  chartIdealsDiffer: 'El rango ideal depende de la especie',
   chartNoSensors: 'Este punto no tiene sensores.',
   chartTable: 'Mostrar como tabla',
   chartPlots: 'Mostrar como gráfica',

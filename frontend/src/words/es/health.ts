@@ -10,6 +10,12 @@ export const HEALTH: In<typeof ENGLISH> = {
     critical: 'Crítico',
     unknown: 'Desconocido',
   },
+  healthMany: {
+    healthy: 'Sanos',
+    stressed: 'Estresados',
+    critical: 'Críticos',
+    unknown: 'Desconocidos',
+  },
   reasons: {
     sides: { below: 'por debajo de', above: 'por encima de' },
     sidesHeld: { below: 'aún no por encima de', above: 'aún no por debajo de' },
@@ -20,8 +26,7 @@ export const HEALTH: In<typeof ENGLISH> = {
     implausible: (reading) => `${reading}: valor no plausible`,
     scanFailed: (outcome, age) =>
       `Última medición fallida: ${outcome}${age === null ? '' : `, hace ${age}`}`,
-    pest: (count) =>
-      count > 0 ? counted(count, 'insecto dañino visto', 'insectos dañinos vistos') : 'Plaga vista',
+    pest: (count) => (count > 0 ? counted(count, 'plaga vista', 'plagas vistas') : 'Plaga vista'),
     old: (sensor, age, holds, isDated) => {
       const since = !isDated
         ? sensor === ''
@@ -102,8 +107,8 @@ export const HEALTH: In<typeof ENGLISH> = {
     `Sin problemas conocidos; sin datos de ${counted(unknown, 'punto', 'puntos')}`,
   attentionMore: (count) => `+ ${count} más`,
 
-  tooLow: (by) => (by === null ? 'demasiado bajo' : `${by} por debajo del ideal`),
-  tooHigh: (by) => (by === null ? 'demasiado alto' : `${by} por encima del ideal`),
+  tooLow: (by) => (by === null ? 'por debajo del ideal' : `${by} por debajo del ideal`),
+  tooHigh: (by) => (by === null ? 'por encima del ideal' : `${by} por encima del ideal`),
   below: 'bajo el ideal',
   above: 'sobre el ideal',
 };

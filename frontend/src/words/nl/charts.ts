@@ -23,6 +23,7 @@ export const CHARTS: In<typeof ENGLISH> = {
     'Start de tweeling zonder “journal:=off”, of noem een bestand in de parameter “journal”.',
   chartMissingShort: 'Geen grafiek: deze tweeling legt niets vast.',
   chartNoTime: 'De tweeling heeft nog geen tijd; er is nog geen verleden.',
+  chartIdealsDiffer: 'Ideaal bereik verschilt per soort',
   chartNoSensors: 'Dit meetpunt heeft geen sensor.',
   chartTable: 'Als tabel tonen',
   chartPlots: 'Als grafiek tonen',

@@ -3,13 +3,16 @@ import type { HEALTH as ENGLISH } from '../en/health';
 import type { In } from '../shape';
 import { counted } from './counted';
 
+const ONE_OR_MANY = {
+  healthy: 'Gezond',
+  stressed: 'Gestrest',
+  critical: 'Kritiek',
+  unknown: 'Onbekend',
+};
+
 export const HEALTH: In<typeof ENGLISH> = {
-  health: {
-    healthy: 'Gezond',
-    stressed: 'Gestrest',
-    critical: 'Kritiek',
-    unknown: 'Onbekend',
-  },
+  health: ONE_OR_MANY,
+  healthMany: ONE_OR_MANY,
   reasons: {
     sides: { below: 'onder', above: 'boven' },
     sidesHeld: { below: 'nog niet boven', above: 'nog niet onder' },
@@ -21,7 +24,7 @@ export const HEALTH: In<typeof ENGLISH> = {
     scanFailed: (outcome, age) =>
       `Laatste meting mislukt: ${outcome}${age === null ? '' : `, ${age} geleden`}`,
     pest: (count) =>
-      count > 0 ? `${counted(count, 'plaaginsect', 'plaaginsecten')} gezien` : 'Plaag gezien',
+      count > 0 ? `${counted(count, 'plaagdier', 'plaagdieren')} gezien` : 'Plaag gezien',
     old: (sensor, age, holds, isDated) => {
       const since = !isDated
         ? sensor === ''
@@ -55,7 +58,7 @@ export const HEALTH: In<typeof ENGLISH> = {
     range: 'Controleer de klimaatregeling',
     reading_failed: 'Controleer de sensor',
     scan_failed: 'Controleer de weg en het meetpunt',
-    pest: 'Onderzoek en behandel de planten',
+    pest: 'Loop het gewas na en bestrijd',
     old: 'Controleer de route van de robot',
     changed: 'Vergelijk met een tweede meter',
     silent: 'Controleer of de tweeling draait',

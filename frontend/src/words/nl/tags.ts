@@ -23,7 +23,7 @@ export const TAGS: In<typeof ENGLISH> = {
     age: 'Oud',
   },
   pest: 'Plaag',
-  pestCount: (count) => counted(count, 'insect', 'insecten'),
+  pestCount: (count) => counted(count, 'plaagdier', 'plaagdieren'),
   notOnMap: 'Geen positie',
   notOnMapLong: 'De positie is nog niet bekend; het meetpunt staat niet op de kaart.',
   farOff: 'Te ver weg, niet op de kaart',

@@ -42,6 +42,7 @@ def test_it_tells_of_the_journal_and_says_so(live: Bridge) -> None:
         ros.subscribe()
         live.peer.observe(look("b"))
         live.peer.observe(look("a"))
+        live.peer.observe(look("a"))
         wait_for(lambda: not alarms(live, active=1), "it to be cleared")
         # What roslib hears is the ROS message, and no word of alarms.
         ros.send(op="call_service", service="/rosapi/topics", id="the end")

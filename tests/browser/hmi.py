@@ -85,6 +85,22 @@ class Hmi:
             self.page.goto("about:blank")  # else only the fragment changes, and nothing is loaded
         self.page.goto(f"{self.url}/{query}{'#' if fragment else ''}{fragment}")
 
+    def turn(self, fragment: str) -> None:
+        """Another permalink of the page that is there: nothing is loaded anew."""
+        self.page.goto(f"{self.url}/#{fragment}")
+        self.view()  # which is that of a frame painted since
+
+    def resize(self, width: int, height: int) -> None:
+        """Give the window another size; returns when the page has laid itself out in it."""
+        self.page.set_viewport_size({"width": width, "height": height})
+        self.page.wait_for_function(
+            "size => innerWidth === size[0] && innerHeight === size[1]", arg=[width, height]
+        )
+        # What watches sizes asks for another one in its turn.
+        self.page.evaluate(
+            "async () => { for (const _ of '12') await new Promise(requestAnimationFrame); }"
+        )
+
     def address(self) -> str:
         """What is in the address bar now."""
         address = self.page.evaluate("location.href")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import re
 import time
 from collections.abc import Iterator
@@ -168,6 +169,7 @@ def test_the_counts_agree_and_healthy_beside_an_alarm_says_why(
         expect(hmi.page).to_have_title("(2) Lupin twin")
         expect(hmi.page.locator(".list-choice [data-testid=alarm-count]")).to_have_text("2")
         expect(hmi.page.locator("[data-group=active] h3")).to_have_text("Active (2)")
+        expect(rows(hmi, "active").get_by_text("Ventilate or shade")).to_have_count(2)
         # Well again, but for too short a time to resolve anything.
         running.peer.observe(*[warm(tag, 22.0) for tag in tags])
         expect(hmi.test_id("house-health")).to_have_attribute("data-health", "healthy")
@@ -176,24 +178,26 @@ def test_the_counts_agree_and_healthy_beside_an_alarm_says_why(
         )
         for now in fact(rows(hmi, "active"), "now").all():
             expect(now).to_have_attribute("data-status", "healthy")
+        expect(rows(hmi, "active").get_by_text("Ventilate or shade")).to_have_count(0)
 
 
-@pytest.mark.parametrize("viewport", [WIDE, PHONE], ids=["wide", "phone"])
 def test_a_double_click_shelves_nothing_and_a_critical_alarm_takes_a_reason(
-    domain: int, open_page: OpenPage, viewport: dict[str, int]
+    domain: int, open_page: OpenPage
 ) -> None:
     with bridge(domain=domain) as running:
         running.peer.observe(*[warm("a", 43.5, at=(1, 1))] * 2, *[warm("b", 27.0, at=(2, 1))] * 2)
-        hmi = open_page(running.url, viewport=viewport)
+        hmi = open_page(running.url, viewport=PHONE)
         hmi.page.keyboard.press("a")
         expect(rows(hmi, "active")).to_have_count(2)
-        for row in rows(hmi, "active").all():
-            expect(row).to_be_in_viewport(ratio=1)
-            assert len({place(each).top for each in row.locator(".alarm-tools button").all()}) == 1
         times = hmi.page.locator(".shelf-times button")
         panel = hmi.page.locator(".disclosure-panel:not([hidden])")
-        for tag in ("b", "a"):
+        for tag, viewport in itertools.product(("b", "a"), (PHONE, WIDE)):
             hmi.page.keyboard.press("Escape")
+            hmi.resize(**viewport)
+            for row in rows(hmi, "active").all():
+                expect(row).to_be_in_viewport(ratio=1)
+                tools = row.locator(".alarm-tools button").all()
+                assert len({place(each).top for each in tools}) == 1
             button = hmi.page.get_by_role("button", name=f"Shelve: Tag {tag}")
             button.dblclick()
             expect(times.first).to_be_visible()

@@ -10,12 +10,11 @@ from urllib.parse import parse_qs, urlsplit
 
 import pytest
 from PIL import Image
-from playwright.sync_api import Browser, Locator, expect
+from playwright.sync_api import Locator, expect
 
-from tests.browser.hmi import PHONE, Box, Hmi, OpenPage, Pixel, open_hmi
+from tests.browser.hmi import PHONE, Box, Hmi, OpenPage, Pixel
 from tests.browser.places import expect_in_reach, place, places
 from tests.support.messages import scan
-from tests.support.processes import limits
 from tests.support.web import Bridge, bridge
 
 Size = tuple[int, int]
@@ -53,8 +52,8 @@ def open_at(house: Bridge, open_page: OpenPage) -> Callable[..., Hmi]:
 # Asked for before `open_page`, so that it ends after the pages.
 @pytest.fixture
 def running(domain: int) -> Iterator[Bridge]:
-    """A server with a house that is empty at first, for pages of many sizes at once."""
-    with bridge(*limits(concurrency=1_000), domain=domain) as empty:
+    """A server with a house that is empty at first."""
+    with bridge(domain=domain) as empty:
         yield empty
 
 
@@ -71,18 +70,10 @@ def show(hmi: Hmi, name: str) -> None:
 HIDDEN = "table => table.scrollWidth - table.clientWidth"
 
 
-def resize(hmi: Hmi, size: Size) -> None:
-    """Give the window another size; returns when the page knows it."""
-    hmi.page.set_viewport_size({"width": size[0], "height": size[1]})
-    hmi.page.wait_for_function(
-        "size => innerWidth === size[0] && innerHeight === size[1]", arg=size
-    )
-
-
 def test_everything_can_be_hit(open_at: Callable[..., Hmi]) -> None:
     hmi = open_at(SIZES[0])
     for size in (*SIZES, *MIDDLING, HUGE):
-        resize(hmi, size)
+        hmi.resize(*size)
         show(hmi, "Map")
         has_tabs = hmi.page.locator(".pane-tabs").is_visible()
         expect(hmi.test_id("health-strip")).to_be_visible(visible=has_tabs)
@@ -110,7 +101,7 @@ def test_an_open_card_lies_over_nothing_in_an_upright_window(open_at: Callable[.
     expect(hmi.card("1")).to_be_visible()
     parts = [".map-frame", ".timebar", ".health", ".filter-bar", ".table-scroll", ".card"]
     for width, height in UPRIGHT:
-        resize(hmi, (width, height))
+        hmi.resize(width, height)
 
         def from_top_to_foot(height: int = height) -> bool:
             boxes = places(hmi, *parts)
@@ -132,7 +123,7 @@ def test_each_layer_is_switched_by_touch_on_a_phone(open_at: Callable[..., Hmi])
         expect(box).to_be_checked(checked=not was_on)
 
 
-def test_a_phone_has_the_facts_and_a_fixed_range_leaves_the_title_alone(
+def test_a_phone_has_room_for_the_facts_a_fixed_range_and_what_is_missing(
     open_at: Callable[..., Hmi],
 ) -> None:
     hmi = open_at((PHONE["width"], PHONE["height"]))
@@ -144,43 +135,47 @@ def test_a_phone_has_the_facts_and_a_fixed_range_leaves_the_title_alone(
     expect(facts.get_by_text("no data", exact=False).locator("visible=true")).to_have_count(1)
     # Over the map, which stays as high as it is.
     assert place(facts).bottom <= place(legend).top
-    hmi.go("sensor=soil_moisture&colour=value")
+    hmi.turn("sensor=soil_moisture&colour=value")
     hmi.page.get_by_role("radio", name="Fixed").check()
     title, control = place(hmi.page.locator(".legend-title")), place(hmi.page.locator(".range"))
     assert title.bottom <= control.top
-
-
-def stays(hmi: Hmi, filter_bar: list[Box]) -> bool:
-    return places(hmi, ".filter-bar") == filter_bar
+    hmi.turn("sensor=radiation")
+    expect(hmi.test_id("notice")).to_have_attribute("data-notice", "no-reading")
+    notice, frame = places(hmi, "[data-testid=notice]", "[data-testid=map]")
+    assert notice.bottom == pytest.approx(frame.bottom, abs=1)
+    assert notice.top > frame.bottom - (frame.bottom - frame.top) / 3
 
 
 def test_a_longer_word_about_the_house_does_not_move_the_table(
     running: Bridge, open_page: OpenPage
 ) -> None:
     running.peer.observe(scan("1", {"temperature": 22.0}, at=(1, 1)))
+    hmi = open_page(running.url)
+    driver = hmi.test_id("health-driver")
+    expect(driver).to_have_text("All assessed readings are within their ideal ranges")
+    # Late ones take room from the table, and so does a word about a server that is late.
+    hmi.expect_parts()
+    hmi.expect_phase("live")
+    hmi.page.evaluate("document.fonts.ready")
     before = {}
-    for width, height in FEW:
-        hmi = open_page(running.url, viewport={"width": width, "height": height})
+    for size in FEW:
+        hmi.resize(*size)
         show(hmi, "Tags")
-        expect(hmi.test_id("health-driver")).to_have_text(
-            "All assessed readings are within their ideal ranges"
-        )
-        # Late ones take room from the table, and so does a word about a server that is late.
-        hmi.expect_parts()
-        hmi.expect_phase("live")
-        hmi.page.evaluate("document.fonts.ready")
-        before[width, height] = hmi, places(hmi, ".filter-bar")
+        before[size] = places(hmi, ".filter-bar")
     long = "a-tag-with-no-short-name"
     running.peer.observe(scan(long, {"temperature": 79.0}, at=(2, 1)))
-    for size, (hmi, table) in before.items():
-        driver = hmi.test_id("health-driver")
-        expect(driver).to_contain_text(long)
+    expect(driver).to_contain_text(long)
+    for size in FEW:
+        hmi.resize(*size)
         hmi.expect_phase("live")
-        hmi.expect(partial(stays, hmi, table), f"the table in its place at {size}")
-        # The rest is to be had by pointing at it, and to be heard anyway.
-        expect(driver).to_have_attribute(
-            "title", f"Tag {long}: Temperature 79.0\u00a0°C, above 35.0"
-        )
+        in_place = partial(stands_at, hmi, before[size])
+        hmi.expect(in_place, f"the table in its place at {size}")
+    # The rest is to be had by pointing at it, and to be heard anyway.
+    expect(driver).to_have_attribute("title", f"Tag {long}: Temperature 79.0\u00a0°C, above 35.0")
+
+
+def stands_at(hmi: Hmi, filter_bar: list[Box]) -> bool:
+    return places(hmi, ".filter-bar") == filter_bar
 
 
 def colours(thing: Locator) -> set[Pixel]:
@@ -223,12 +218,12 @@ def test_high_contrast_still_tells_what_is_chosen_and_what_a_colour_means(
 def test_an_empty_house_says_what_to_do_beside_the_controls_and_in_the_table(
     running: Bridge, open_page: OpenPage
 ) -> None:
-    pages = []
-    for width, height in FEW:
-        hmi = open_page(running.url, viewport={"width": width, "height": height})
-        pages.append(hmi)
-        expect(hmi.test_id("notice")).to_have_attribute("data-notice", "no-tags")
-        hmi.expect_parts()
+    hmi = open_page(running.url)
+    expect(hmi.test_id("notice")).to_have_attribute("data-notice", "no-tags")
+    hmi.expect_parts()
+    tabs = hmi.page.locator(".pane-tabs")
+    for size in FEW:
+        hmi.resize(*size)
         expect_in_reach(hmi, ".map-controls button")
         hmi.test_id("notice").locator("summary").click()
         expect(hmi.test_id("notice").locator("details")).to_have_attribute("open", "")
@@ -236,41 +231,34 @@ def test_an_empty_house_says_what_to_do_beside_the_controls_and_in_the_table(
         notice, controls, frame = places(
             hmi, "[data-testid=notice]", ".map-controls", "[data-testid=map]"
         )
-        assert notice.right <= controls.left or notice.top >= controls.bottom, width
+        assert notice.right <= controls.left or notice.top >= controls.bottom, size
         assert frame.top <= notice.top
         assert notice.bottom <= frame.bottom
-        tabs = hmi.page.locator(".pane-tabs")
         if tabs.is_visible():
             tabs.get_by_role("button", name="Tags").click()
         expect(hmi.test_id("empty-table")).to_contain_text("start its patrol")
+        if tabs.is_visible():
+            tabs.get_by_role("button", name="Map").click()
     running.peer.observe(scan("1", {"temperature": 22.0}, at=(1, 1)))
-    for hmi in pages:
-        expect(hmi.row("1")).to_be_visible()
-        expect(hmi.test_id("empty-table")).to_have_count(0)
-
-
-def test_a_missing_reading_is_told_at_the_edge_of_the_map(open_at: Callable[..., Hmi]) -> None:
-    hmi = open_at((PHONE["width"], PHONE["height"]))
-    hmi.go("sensor=radiation")
-    expect(hmi.test_id("notice")).to_have_attribute("data-notice", "no-reading")
-    notice, frame = places(hmi, "[data-testid=notice]", "[data-testid=map]")
-    assert notice.bottom == pytest.approx(frame.bottom, abs=1)
-    assert notice.top > frame.bottom - (frame.bottom - frame.top) / 3
+    expect(hmi.row("1")).to_be_attached()
+    expect(hmi.test_id("empty-table")).to_have_count(0)
 
 
 def test_all_text_grows_with_the_text_of_the_browser(open_at: Callable[..., Hmi]) -> None:
+    hmi = open_at((1440, 900))
+    # In one go, so that nothing arrives meanwhile.
+    grow = """() => {
+      const texts = () => [...document.querySelectorAll('.app *')]
+        .filter((e) => e.checkVisibility() && !e.closest('.unseen'))
+        .map((e) => parseFloat(getComputedStyle(e).fontSize));
+      document.documentElement.style.fontSize = '';
+      const usual = texts();
+      document.documentElement.style.fontSize = '200%';
+      return [usual, texts()];
+    }"""
     for size in ((1440, 900), (PHONE["width"], PHONE["height"])):
-        hmi = open_at(size)
-        texts = """const texts = () => [...document.querySelectorAll('.app *')]
-          .filter((e) => e.checkVisibility() && !e.closest('.unseen'))
-          .map((e) => parseFloat(getComputedStyle(e).fontSize))"""
-        # In one go, so that nothing arrives meanwhile.
-        usual, grown = hmi.page.evaluate(f"""() => {{
-          {texts}
-          const usual = texts();
-          document.documentElement.style.fontSize = '200%';
-          return [usual, texts()];
-        }}""")
+        hmi.resize(*size)
+        usual, grown = hmi.page.evaluate(grow)
         assert grown == pytest.approx([2 * each for each in usual])
         expect_in_reach(hmi, CONTROLS)
         show(hmi, "Tags")
@@ -288,19 +276,15 @@ def test_the_words_of_the_ideal_range_stand_below_its_bracket(open_at: Callable[
 
 
 def test_the_row_of_sensors_fades_where_it_has_more(open_at: Callable[..., Hmi]) -> None:
-    row = open_at((3840, 1440)).page.locator(".sensor-picker")
-    expect(row).to_have_attribute("data-more", "")
-    expect(row).to_have_css("mask-image", "none")
-    phone = open_at((PHONE["width"], PHONE["height"]))
-    row = phone.page.locator(".sensor-picker")
+    hmi = open_at((PHONE["width"], PHONE["height"]))
+    row = hmi.page.locator(".sensor-picker")
     expect(row).to_have_attribute("data-more", "after")
     expect(row).to_have_css("mask-image", re.compile("gradient"))
-    phone.choose_sensor("Condensation margin")
+    hmi.choose_sensor("Condensation margin")
     expect(row).to_have_attribute("data-more", "before")
-    # Where they take several rows, one stands below another.
-    resize(phone, (1440, 900))
-    lefts = [place(label).left for label in row.locator("label").all()]
-    assert 1 < len(set(lefts)) <= len(lefts) / 2
+    hmi.resize(3840, 1440)
+    expect(row).to_have_attribute("data-more", "")
+    expect(row).to_have_css("mask-image", "none")
 
 
 PINS = {f"{x}-{y}": (x, y) for x in (0, 2, 4, 6) for y in (0, 2, 4, 6)}
@@ -324,23 +308,24 @@ def hidden_pins(hmi: Hmi) -> list[str]:
     ]
 
 
-def test_no_pin_lies_below_what_stands_on_the_map(domain: int, browser: Browser) -> None:
+def test_no_pin_lies_below_what_stands_on_the_map(domain: int, open_page: OpenPage) -> None:
     """Neither as the page opens nor when the tag is chosen: it could not be seen, nor hit."""
     with bridge(domain=domain) as running:
         running.peer.observe(
             *(scan(tag_id, {"temperature": 20.0}, at=at) for tag_id, at in PINS.items())
         )
-        for width, height in FEW:
-            viewport = {"width": width, "height": height}
-            with open_hmi(browser, running.url, viewport=viewport) as hmi:
-                hmi.expect_samples(len(PINS))
-                hmi.expect_parts()
-                hmi.expect(partial(no_pin_hidden, hmi), f"all pins in sight at {viewport}")
-                drag_below_buttons(hmi, "6-6")
-                assert "6-6" in hidden_pins(hmi)
-                hmi.page.keyboard.press("p")  # the last of the table
-                expect(hmi.test_id("said-choice")).to_contain_text("Tag 6-6")
-                hmi.expect(partial(no_pin_hidden, hmi, "6-6"), f"the chosen pin at {viewport}")
+        hmi = open_page(running.url, go=False)
+        for size in FEW:
+            hmi.resize(*size)
+            hmi.go()
+            hmi.expect_samples(len(PINS))
+            hmi.expect_parts()
+            hmi.expect(partial(no_pin_hidden, hmi), f"all pins in sight at {size}")
+            drag_below_buttons(hmi, "6-6")
+            assert "6-6" in hidden_pins(hmi)
+            hmi.page.keyboard.press("p")  # the last of the table
+            expect(hmi.test_id("said-choice")).to_contain_text("Tag 6-6")
+            hmi.expect(partial(no_pin_hidden, hmi, "6-6"), f"the chosen pin at {size}")
 
 
 def no_pin_hidden(hmi: Hmi, *among: str) -> bool:
@@ -385,49 +370,50 @@ _LINES = f"(e) => {{ {_RECTS} return new Set([...range.getClientRects()].map((r)
 _WORDS_END = f"(e) => {{ {_RECTS} return range.getBoundingClientRect().right }}"
 
 
-@pytest.mark.parametrize(
-    ("language", "contribute", "reading"),
-    [
-        ("en", "tags contribute", "20.0"),
-        ("de", "Messpunkte tragen bei", "20,0"),
-        ("nl", "meetpunten dragen bij", "20,0"),
-        ("es", "puntos contribuyen", "20,0"),
-    ],
-)
-def test_every_language_has_room_on_a_phone(
-    house: Bridge, open_page: OpenPage, language: str, contribute: str, reading: str
-) -> None:
-    hmi = open_page(house.url, "", f"?lang={language}", viewport=PHONE)
-    expect(hmi.test_id("sample-count")).to_contain_text(contribute)
-    expect(hmi.page.locator("html")).to_have_attribute("lang", language)
-    assert hmi.page.evaluate(_TOO_LONG) == []
-    hmi.expect_parts()
-    word, period = hmi.test_id("timebar-when"), hmi.page.locator(".timebar-period")
-    assert word.evaluate(_WORDS_END) <= place(period).left
-    hmi.page.locator(".menu > button").click()
-    expect(hmi.test_id("language")).to_have_value(language)
-    assert hmi.page.evaluate(_TOO_LONG) == []
-    hmi.page.keyboard.press("Escape")
-    hmi.page.locator(".pane-tabs button").nth(2).click()
-    tools = hmi.page.locator("[data-group=active] .alarm-tools").first
-    expect(tools).to_be_visible()
-    assert hmi.page.evaluate(_TOO_LONG) == []
-    assert len({place(each).top for each in tools.locator("> button").all()}) == 1
-    hmi.page.locator(".pane-tabs button").nth(1).click()
-    expect(hmi.cell("1", "temperature")).to_contain_text(reading)
-    assert hmi.page.evaluate(_TOO_LONG) == []
-    # Three letters, and the arrow beside them: no word to be broken.
-    assert hmi.page.locator("thead th").first.locator("span").first.evaluate(_LINES) == 1
-    assert hmi.page.evaluate("document.documentElement.scrollWidth") == PHONE["width"]
-    # On a phone and on the smallest laptops this column is narrow, and has the arrow at first.
-    for width in (PHONE["width"], 1100, 1280):
-        resize(hmi, (width, 800))
-        health = hmi.page.locator("thead [data-column=health] button > span").first
-        assert health.evaluate(_LINES) == 1, width
-    # Where the name of the page has no room, none of it is shown.
-    resize(hmi, (230, 740))
-    brand = place(hmi.page.locator(".brand"))
-    assert place(hmi.page.locator(".brand > span")).top >= brand.bottom
+# What a phone says in each, and how it writes a number.
+LANGUAGES = {
+    "en": ("tags contribute", "20.0"),
+    "de": ("Messpunkte tragen bei", "20,0"),
+    "nl": ("meetpunten dragen bij", "20,0"),
+    "es": ("puntos contribuyen", "20,0"),
+}
+
+
+def test_every_language_has_room_on_a_phone(house: Bridge, open_page: OpenPage) -> None:
+    hmi = open_page(house.url, go=False)
+    for language, (contribute, reading) in LANGUAGES.items():
+        hmi.resize(**PHONE)
+        hmi.go(query=f"?lang={language}")
+        expect(hmi.test_id("sample-count")).to_contain_text(contribute)
+        expect(hmi.page.locator("html")).to_have_attribute("lang", language)
+        assert hmi.page.evaluate(_TOO_LONG) == []
+        hmi.expect_parts()
+        word, period = hmi.test_id("timebar-when"), hmi.page.locator(".timebar-period")
+        assert word.evaluate(_WORDS_END) <= place(period).left
+        hmi.page.locator(".menu > button").click()
+        expect(hmi.test_id("language")).to_have_value(language)
+        assert hmi.page.evaluate(_TOO_LONG) == []
+        hmi.page.keyboard.press("Escape")
+        hmi.page.locator(".pane-tabs button").nth(2).click()
+        tools = hmi.page.locator("[data-group=active] .alarm-tools").first
+        expect(tools).to_be_visible()
+        assert hmi.page.evaluate(_TOO_LONG) == []
+        assert len({place(each).top for each in tools.locator("> button").all()}) == 1
+        hmi.page.locator(".pane-tabs button").nth(1).click()
+        expect(hmi.cell("1", "temperature")).to_contain_text(reading)
+        assert hmi.page.evaluate(_TOO_LONG) == []
+        # Three letters, and the arrow beside them: no word to be broken.
+        assert hmi.page.locator("thead th").first.locator("span").first.evaluate(_LINES) == 1
+        assert hmi.page.evaluate("document.documentElement.scrollWidth") == PHONE["width"]
+        # On a phone and on the smallest laptops this column is narrow, with the arrow at first.
+        for width in (PHONE["width"], 1100, 1280):
+            hmi.resize(width, 800)
+            health = hmi.page.locator("thead [data-column=health] button > span").first
+            assert health.evaluate(_LINES) == 1, (language, width)
+        # Where the name of the page has no room, none of it is shown.
+        hmi.resize(230, 740)
+        brand = place(hmi.page.locator(".brand"))
+        assert place(hmi.page.locator(".brand > span")).top >= brand.bottom
 
 
 # The heads of the table in which a word is wider than its column.

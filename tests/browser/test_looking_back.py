@@ -181,11 +181,11 @@ def test_the_end_of_the_bar_is_now_and_before_memory_there_is_nothing(
 
 
 def test_pests_and_cards_are_those_of_the_moment(page: Hmi, hour: Hour) -> None:
-    page.go(f"tag=b&at={hour.begun_s + 700}&period=hour")
+    page.turn(f"tag=b&at={hour.begun_s + 700}&period=hour")
     expect_past(page)
     expect(page.card("b")).to_contain_text(re.compile("pests? seen", re.IGNORECASE))
     expect(page.card("b").locator("[data-sensor=temperature] strong")).to_have_text("20.3\u00a0°C")
-    page.go(f"tag=b&at={hour.begun_s + 1000}&period=hour")
+    page.turn(f"tag=b&at={hour.begun_s + 1000}&period=hour")
     expect_past(page)
     expect(page.card("b")).not_to_contain_text(re.compile("pests? seen", re.IGNORECASE))
 

@@ -215,25 +215,3 @@ def test_what_nobody_remembers_is_told(domain: int, is_lasting: bool, status: in
                 )
 
     run(domain, test())
-
-
-def test_a_client_that_leaves_takes_its_question_along(domain: int) -> None:
-    ended = asyncio.Event()
-
-    async def for_ever(*_: Any) -> Any:
-        try:
-            await asyncio.Event().wait()
-        finally:
-            ended.set()
-
-    async def test() -> None:
-        past = MadeUp()
-        async with remembering(past) as it:
-            it.twin.ask = for_ever  # type: ignore[method-assign, assignment]
-            asking = asyncio.create_task(it.http.get("/api/state?at=9"))
-            await until(lambda: it.bridge.admission.being_computed == 1, "the question")
-            asking.cancel()
-            await until(ended.is_set, "its end")
-            await until(lambda: it.bridge.admission.being_computed == 0, "its place")
-
-    run(domain, test())

@@ -346,19 +346,6 @@ def test_a_new_map_is_a_new_field() -> None:
             assert answer.json()["values"] == expected
 
 
-def test_a_restarted_bridge_never_matches_a_tag_of_its_predecessor(domain: int) -> None:
-    answers = []
-    for _ in range(2):
-        with bridge(*EAGER, domain=domain) as running:
-            running.peer.observe(scan("1", {"temperature": 20.0}, at=(1.0, 1.0)))
-            running.tag("1")
-            answers.append(running.get("/api/field.json", **QUERY))
-            old = answers[0].headers["etag"]
-            again = running.get("/api/field.json", {"If-None-Match": old}, **QUERY)
-    assert answers[0].content == answers[1].content, "the same field"
-    assert again.status_code == 200, "under another tag"
-
-
 # --- quality ------------------------------------------------------------------------------------
 
 

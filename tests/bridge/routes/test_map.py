@@ -7,6 +7,7 @@ import math
 from collections.abc import Iterator
 from itertools import count
 
+import httpx
 import numpy as np
 import numpy.typing as npt
 import pytest
@@ -49,15 +50,6 @@ def picture(running: Bridge) -> npt.NDArray[np.uint8]:
     assert (answer.status_code, answer.headers["content-type"]) == (200, "image/png")
     with Image.open(io.BytesIO(answer.content)) as image:
         return np.asarray(image.convert("RGBA"))
-
-
-def test_before_any_map_both_routes_say_so() -> None:
-    with bridge() as unmapped:
-        for path in ("/api/map", "/api/map.png"):
-            answer = unmapped.get(path)
-            assert answer.status_code == 404
-            message = schema.ErrorMessage.model_validate_json(answer.content)
-            assert message.detail == "no map has come yet on the twin's map_topic"
 
 
 def test_the_map_is_where_the_message_has_it(mapped: Bridge) -> None:
@@ -109,9 +101,24 @@ def test_a_listener_learns_of_a_new_map_by_the_revision(mapped: Bridge) -> None:
         listener.until("state", lambda frame: frame["revision"] != before)
 
 
-def test_a_restarted_bridge_never_matches_an_etag_of_its_predecessor(domain: int) -> None:
-    tags = []
+def test_a_restarted_bridge_has_no_map_at_first_and_matches_no_etag_of_its_predecessor(
+    domain: int,
+) -> None:
+    paths = ("/api/map", "/api/field.json?sensor_type=temperature")
+    first: dict[str, httpx.Response] = {}
     for _ in range(2):
         with bridge(domain=domain) as running:
-            tags.append(put_map(running, ROWS, Pose()))
-    assert tags[0] != tags[1]
+            for path in ("/api/map", "/api/map.png"):
+                answer = running.get(path)
+                message = schema.ErrorMessage.model_validate_json(answer.content)
+                assert answer.status_code == 404
+                assert message.detail == "no map has come yet on the twin's map_topic"
+            put_map(running, ROWS, Pose())
+            running.peer.observe(scan("1", {"temperature": 20.0}, at=(0.1, 0.1)))
+            running.tag("1")
+            first = first or {path: running.get(path) for path in paths}
+            has = {path: {"If-None-Match": first[path].headers["etag"]} for path in paths}
+            again = {path: running.get(path, has[path]) for path in paths}
+    for path in paths:
+        assert again[path].content == first[path].content, "the same thing"
+        assert again[path].status_code == 200, "under another tag"

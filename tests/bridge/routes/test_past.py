@@ -186,7 +186,6 @@ def test_what_cannot_be_asked_is_refused_before_anybody_is_asked(domain: int) ->
 
 
 def test_a_client_that_leaves_takes_its_question_along(domain: int) -> None:
-    past = MadeUp()
     ended = asyncio.Event()
 
     async def for_ever(*_: Any) -> Any:
@@ -196,13 +195,15 @@ def test_a_client_that_leaves_takes_its_question_along(domain: int) -> None:
             ended.set()
 
     async def test() -> None:
-        async with remembering(past) as it:
+        async with remembering(MadeUp()) as it:
             it.twin.ask = for_ever  # type: ignore[method-assign, assignment]
-            asking = asyncio.create_task(it.http.get(HISTORY))
-            await until(lambda: it.bridge.admission.being_computed == 1, "the question")
-            asking.cancel()
-            await until(ended.is_set, "its end")
-            await until(lambda: it.bridge.admission.being_computed == 0, "its place")
+            for path in (HISTORY, "/api/state?at=9"):
+                ended.clear()
+                asking = asyncio.create_task(it.http.get(path))
+                await until(lambda: it.bridge.admission.being_computed == 1, "the question")
+                asking.cancel()
+                await until(ended.is_set, "its end")
+                await until(lambda: it.bridge.admission.being_computed == 0, "its place")
 
     run(domain, test())
 

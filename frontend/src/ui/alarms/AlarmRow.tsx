@@ -56,7 +56,9 @@ export const AlarmRow = memo(function AlarmRow({
             {': '}
             {values.what}
           </span>
-          {group !== 'resolved' && <span className="alarm-do">{todoText(alarm.reason)}</span>}
+          {group !== 'resolved' && current !== 'healthy' && (
+            <span className="alarm-do">{todoText(alarm.reason)}</span>
+          )}
           <AlarmFacts item={item} values={values} isShelved={group === 'shelved'} />
         </span>
       </button>

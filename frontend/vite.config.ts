@@ -27,7 +27,7 @@ const RULES = [
   'src/connection/{backoff,latest,machine}.test.ts',
   'src/contract/{check,frames,npy}.test.ts',
   'src/draw/palette.test.ts',
-  'src/store/{create,fetcher,memo,permalink,twin,view}.test.ts',
+  'src/store/{create,fetcher,permalink,twin,view}.test.ts',
   'src/timebar/{axis,columns}.test.ts',
   'src/ui/{fitting,later}.test.ts',
   'src/words/languages.test.ts',

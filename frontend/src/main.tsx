@@ -17,7 +17,7 @@ import './styles/past.css';
 import './styles/forced.css';
 import { startAlarmsAndTelling } from './alarms/start';
 import { startAddress } from './store/address';
-import { prefer, store } from './store/app';
+import { onChange, prefer, store } from './store/app';
 import { askedCycle, startCycle } from './store/cycle';
 import { startHourAgo } from './store/hourAgo';
 import { startLive } from './store/live';
@@ -34,12 +34,12 @@ import { loadParts } from './ui/later';
 
 const storage = openStorage();
 prefer(readSettings(storage));
-let { settings } = store.get();
-store.subscribe(() => {
-  if (store.get().settings === settings) return;
-  ({ settings } = store.get());
-  keepSettings(storage, settings);
-});
+onChange(
+  ({ settings }) => [settings],
+  () => {
+    keepSettings(storage, store.get().settings);
+  },
+);
 
 const kiosk = new URLSearchParams(window.location.search).get('kiosk') === '1';
 const cycle = askedCycle();
@@ -71,6 +71,7 @@ void loadParts().then((parts) => {
   if (kiosk) {
     parts.startLeaving();
   } else {
+    parts.startComments();
     parts.startRemembered();
     parts.startOpening();
   }

@@ -28,10 +28,7 @@ const TABLE: Table = {
   alarms: ['strings', 'clock', 'contract', 'domain', 'store', 'map'],
   widgets: ['clock', 'npm:react'],
   // What people say, wherever it is shown.
-  notes: [
-    ...['words', 'strings', 'contract', 'domain', 'store', 'widgets', 'styles'],
-    ...['npm:react'],
-  ],
+  notes: [...['words', 'strings', 'contract', 'domain', 'store', 'widgets'], ...['npm:react']],
   timebar: [
     ...['strings', 'clock', 'domain', 'draw', 'store', 'widgets', 'notes'],
     ...['npm:react'],
@@ -46,7 +43,7 @@ const TABLE: Table = {
     ...['npm:react'],
   ],
   robot: [
-    ...['words', 'strings', 'contract', 'geometry', 'domain', 'store', 'widgets', 'styles'],
+    ...['strings', 'contract', 'geometry', 'domain', 'store', 'widgets', 'styles'],
     ...['npm:react', 'npm:react-dom'],
   ],
   ui: [

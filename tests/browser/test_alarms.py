@@ -169,6 +169,7 @@ def test_the_counts_agree_and_healthy_beside_an_alarm_says_why(
         expect(hmi.page).to_have_title("(2) Lupin twin")
         expect(hmi.page.locator(".list-choice [data-testid=alarm-count]")).to_have_text("2")
         expect(hmi.page.locator("[data-group=active] h3")).to_have_text("Active (2)")
+        expect(rows(hmi, "active").get_by_text("Ventilate or shade")).to_have_count(2)
         # Well again, but for too short a time to resolve anything.
         running.peer.observe(*[warm(tag, 22.0) for tag in tags])
         expect(hmi.test_id("house-health")).to_have_attribute("data-health", "healthy")
@@ -177,6 +178,7 @@ def test_the_counts_agree_and_healthy_beside_an_alarm_says_why(
         )
         for now in fact(rows(hmi, "active"), "now").all():
             expect(now).to_have_attribute("data-status", "healthy")
+        expect(rows(hmi, "active").get_by_text("Ventilate or shade")).to_have_count(0)
 
 
 def test_a_double_click_shelves_nothing_and_a_critical_alarm_takes_a_reason(

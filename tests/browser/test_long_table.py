@@ -10,6 +10,7 @@ from playwright.sync_api import expect
 
 from tests.bench.house_double import house_of
 from tests.browser.hmi import PHONE, WIDE, Hmi, OpenPage
+from tests.browser.places import place
 from tests.browser.test_accessibility import violations
 from tests.support.web import Bridge
 
@@ -46,6 +47,9 @@ def test_the_page_holds_few_rows_and_shows_any(open_house: OpenHouse) -> None:
     hmi = open_house()
     expect(hmi.page.get_by_role("table")).to_have_attribute("aria-rowcount", str(TAGS + 1))
     frame = hmi.page.locator(".table-scroll")
+    # As wide as its place, with the gaps for the rows that it does not hold.
+    table, last = hmi.page.get_by_role("table"), hmi.page.locator("thead th:visible").last
+    assert place(last).right == place(table).right
     for share, tag_id in ((1.0, str(TAGS)), (0.5, str(TAGS // 2 + 5)), (0.0, "1")):
         frame.evaluate("(e, share) => { e.scrollTop = share * e.scrollHeight; }", share)
         expect(hmi.row(tag_id)).to_be_in_viewport()

@@ -2,6 +2,7 @@
 import type { Alarm, Verdict } from '../contract/types';
 import { VERDICTS } from '../domain/health';
 import { secondsOf } from '../domain/rostime';
+import { equal } from '../domain/twin';
 import { isShelfHeld, isWorse, whatOf, type Kept, type Shelf } from './kept';
 
 /** What is resolved stays listed for so long, seconds. */
@@ -127,7 +128,10 @@ export const itemsOf = ({ active, shelved, resolved }: AlarmList): readonly Item
 export function sharedList(before: AlarmList, now: AlarmList): AlarmList {
   const known = new Map(itemsOf(before).map((item) => [item.alarm.id, item]));
   const share = (was: readonly Item[], is: readonly Item[]): readonly Item[] => {
-    const items = is.map((item) => sharedItem(known.get(item.alarm.id), item));
+    const items = is.map((item) => {
+      const before = known.get(item.alarm.id);
+      return before && equal(before, item) ? before : item;
+    });
     return items.length === was.length && items.every((item, index) => item === was[index])
       ? was
       : items;
@@ -138,13 +142,4 @@ export function sharedList(before: AlarmList, now: AlarmList): AlarmList {
   const isSame =
     active === before.active && shelved === before.shelved && resolved === before.resolved;
   return isSame ? before : { active, shelved, resolved };
-}
-
-function sharedItem(was: Item | undefined, is: Item): Item {
-  const isSame =
-    was?.verdict === is.verdict &&
-    was.isAcknowledged === is.isAcknowledged &&
-    was.shelf === is.shelf &&
-    (was.alarm === is.alarm || JSON.stringify(was.alarm) === JSON.stringify(is.alarm));
-  return isSame ? was : is;
 }

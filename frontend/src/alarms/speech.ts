@@ -3,7 +3,7 @@ import type { Alarm } from '../contract/types';
 import type { AppState } from '../store/app';
 import { selectCatalogue, selectNewestHealth } from '../store/derived';
 import { hourAgo, selectHourAgoNow, type HourAgo } from '../store/hourAgo';
-import { memoLast } from '../store/memo';
+import { memoLast } from '../domain/memo';
 import { isHeardNow, selectNewestTag } from '../store/moment';
 import { nowOf, type Now } from './now';
 import { alarmText, type Speech } from './words';

@@ -1,7 +1,7 @@
 /** Keeps the list of alarms up to date, whatever moment the page shows, and tells what is new. */
 import { now, timeOfDay } from '../clock';
 import type { Alarms } from '../contract/types';
-import { store } from '../store/app';
+import { onChange, store } from '../store/app';
 import { createStore } from '../store/create';
 import { rosNow } from '../store/moment';
 import { nextEnd, pruned } from './kept';
@@ -26,7 +26,7 @@ const SWEEP_MS = 60_000;
 export function startAlarms(): () => void {
   /** What was told of; null: nothing has come, and what comes first is no news. */
   let told: AlarmList | null = null;
-  let lookedAt: readonly unknown[] = [];
+  let looked = own.get();
   let timer: ReturnType<typeof setTimeout> | undefined;
 
   const look = (isOwnDoing: boolean): void => {
@@ -35,7 +35,7 @@ export function startAlarms(): () => void {
     const state = store.get();
     const { alarms } = state.twin;
     const kept = pruned(own.get(), idsOf(alarms), at);
-    lookedAt = [alarms, kept];
+    looked = kept;
     timer = setTimeout(look, Math.min(SWEEP_MS, (nextEnd(kept, at) ?? Infinity) - at), false);
     if (kept !== own.get()) own.dispatch(kept);
     if (!alarms) return;
@@ -48,14 +48,14 @@ export function startAlarms(): () => void {
       for (const listener of [...listeners]) listener(news);
     }
   };
-  const onStore = (): void => {
-    if (lookedAt[0] !== store.get().twin.alarms) look(false);
+  const onAlarms = (): void => {
+    look(false);
   };
   const onOwn = (): void => {
-    if (lookedAt[1] !== own.get()) look(true);
+    if (looked !== own.get()) look(true);
   };
   look(true);
-  const stops = [store.subscribe(onStore), own.subscribe(onOwn)];
+  const stops = [onChange(({ twin }) => [twin.alarms], onAlarms), own.subscribe(onOwn)];
   return () => {
     clearTimeout(timer);
     for (const stop of stops) stop();

@@ -2,6 +2,7 @@ import { useState, type JSX } from 'react';
 
 import { shown } from '../domain/text';
 import { S } from '../strings';
+import { Select } from '../widgets/Select';
 import type { PlotModel } from './model';
 import { SeriesTable } from './SeriesTable';
 
@@ -23,18 +24,12 @@ export function ChartTables({ models }: { models: readonly PlotModel[] }): JSX.E
       {lines.length > 1 && (
         <label className="chart-which">
           <span>{S.chartWhich}</span>
-          <select
+          <Select
             value={current.key}
-            onChange={(event) => {
-              setChosen(event.target.value);
-            }}
-          >
-            {lines.map(({ key, label }) => (
-              <option key={key} value={key}>
-                {label}
-              </option>
-            ))}
-          </select>
+            options={lines.map(({ key }) => key)}
+            text={(key) => lines.find((line) => line.key === key)?.label ?? ''}
+            onChange={setChosen}
+          />
         </label>
       )}
       <SeriesTable line={current.line} model={current.model} />

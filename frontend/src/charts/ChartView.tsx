@@ -6,7 +6,7 @@ import { selectCatalogue, selectCatalogues } from '../store/derived';
 import { rosNow } from '../store/moment';
 import type { Charted } from '../store/view';
 import { S } from '../strings';
-import { Icon, type IconName } from '../widgets/Icon';
+import { IconButton } from '../widgets/IconButton';
 import { Segmented } from '../widgets/Segmented';
 import { modelOf, pairsOf, plansOf, tagLabel } from './charted';
 import { ChartFiles } from './ChartFiles';
@@ -81,25 +81,25 @@ export default function ChartView({ charted }: { charted: Charted }): JSX.Elemen
         />
         <SensorChoice tagId={tagId} value={sensor} />
         <div className="chart-tools">
-          <Tool
+          <IconButton
             icon="later"
             label={S.chartDayBefore}
-            isOn={hasDayBefore}
+            aria-pressed={hasDayBefore}
             onClick={() => {
               prefer({ dayBefore: !hasDayBefore });
             }}
           />
-          <Tool icon="plus" label={S.chartZoomIn} onClick={zoom(0.5)} />
-          <Tool icon="minus" label={S.chartZoomOut} onClick={zoom(2)} />
-          {isZoomed && <Tool icon="fit" label={S.chartWhole} onClick={zoomBack} />}
-          <Tool
+          <IconButton icon="plus" label={S.chartZoomIn} onClick={zoom(0.5)} />
+          <IconButton icon="minus" label={S.chartZoomOut} onClick={zoom(2)} />
+          {isZoomed && <IconButton icon="fit" label={S.chartWhole} onClick={zoomBack} />}
+          <IconButton
             icon={isTable ? 'chart' : 'list'}
             label={isTable ? S.chartPlots : S.chartTable}
             onClick={() => {
               setTable(!isTable);
             }}
           />
-          <Tool
+          <IconButton
             icon="close"
             label={S.cardClose}
             onClick={() => {
@@ -135,31 +135,5 @@ export default function ChartView({ charted }: { charted: Charted }): JSX.Elemen
         />
       )}
     </section>
-  );
-}
-
-function Tool({
-  icon,
-  label,
-  isOn,
-  onClick,
-}: {
-  icon: IconName;
-  label: string;
-  /** Of what stays on until it is clicked again. */
-  isOn?: boolean;
-  onClick: () => void;
-}): JSX.Element {
-  return (
-    <button
-      type="button"
-      className="icon-button"
-      aria-label={label}
-      aria-pressed={isOn}
-      title={label}
-      onClick={onClick}
-    >
-      <Icon name={icon} />
-    </button>
   );
 }

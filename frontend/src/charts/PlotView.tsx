@@ -8,7 +8,7 @@ import { rosText } from '../domain/rostime';
 import { lastUntil, pointAt, type Bucket, type Reading } from '../domain/series';
 import { shown } from '../domain/text';
 import { unitOf } from '../domain/units';
-import { CommentMarks } from '../notes/parts';
+import { CommentMarks } from '../notes/CommentMarks';
 import { act, useApp } from '../store/app';
 import { useSelected } from '../store/create';
 import { pointedBy, pointedTime } from '../store/signals';

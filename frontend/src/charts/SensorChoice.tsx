@@ -5,6 +5,7 @@ import { shown } from '../domain/text';
 import { act, useApp } from '../store/app';
 import { selectCatalogue } from '../store/derived';
 import { S } from '../strings';
+import { Select } from '../widgets/Select';
 import { useSensorsOf } from './useSensorsOf';
 
 /** Which sensor of a tag is charted; what is computed of its sensors is among them. */
@@ -15,22 +16,17 @@ export function SensorChoice({ tagId, value }: { tagId: string; value: string })
     const computed = catalogue.all.filter((sensor) =>
       isHad(sensor, (name) => sensors.includes(name)),
     );
-    const names = new Set([...sensors, ...computed.map(({ name }) => name)]);
-    return [...names].map((name) => catalogue.named(name));
+    return [...new Set([...sensors, ...computed.map(({ name }) => name)])];
   }, [catalogue, sensors]);
   return (
-    <select
+    <Select
       aria-label={S.sensors}
       value={value}
-      onChange={(event) => {
-        act({ type: 'sensor', sensor: event.target.value });
+      options={choices}
+      text={(name) => shown(catalogue.named(name).label, 32)}
+      onChange={(sensor) => {
+        act({ type: 'sensor', sensor });
       }}
-    >
-      {choices.map(({ name, label }) => (
-        <option key={name} value={name}>
-          {shown(label, 32)}
-        </option>
-      ))}
-    </select>
+    />
   );
 }

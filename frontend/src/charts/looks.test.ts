@@ -1,13 +1,14 @@
 import { expect, test } from 'vitest';
 
-import { lookOf, markerPath, MOST_LINES } from './looks';
+import { MOST_CHARTED } from '../store/view';
+import { lookOf, markerPath } from './looks';
 
-const all = Array.from({ length: MOST_LINES }, (_, index) => lookOf(index));
+const all = Array.from({ length: MOST_CHARTED }, (_, index) => lookOf(index));
 
 test('each line of a chart has a colour, a dash and a marker that no other has', () => {
-  expect(new Set(all.map(({ colour }) => colour)).size).toBe(MOST_LINES);
-  expect(new Set(all.map(({ dash }) => dash.join())).size).toBe(MOST_LINES);
-  expect(new Set(all.map(({ marker }) => marker)).size).toBe(MOST_LINES);
+  expect(new Set(all.map(({ colour }) => colour)).size).toBe(MOST_CHARTED);
+  expect(new Set(all.map(({ dash }) => dash.join())).size).toBe(MOST_CHARTED);
+  expect(new Set(all.map(({ marker }) => marker)).size).toBe(MOST_CHARTED);
 });
 
 test('a marker is a path around its point', () => {

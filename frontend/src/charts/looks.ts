@@ -1,5 +1,4 @@
 /** How the lines of one chart are told apart: by colour, dash and marker, so that none has to do. */
-export const MOST_LINES = 8;
 
 export type Marker = 'circle' | 'square' | 'diamond' | 'up' | 'cross' | 'down' | 'plus' | 'ring';
 

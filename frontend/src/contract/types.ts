@@ -24,8 +24,6 @@ export type StateFrame = Omit<Schemas['StateFrame'], 'state' | 'health'> & {
   readonly health: Judgement;
 };
 export type StatusFrame = Schemas['StatusFrame'];
-/** What the twin dropped in the last minutes, and why. */
-export type Drop = Schemas['RecentDrop'];
 /** Whether what happens is kept, and what of it no robot observed. */
 export type Journal = Schemas['Journal'];
 /** How a channel does by which others are told: MQTT, the webhook. */
@@ -54,8 +52,7 @@ export type AlarmsFrame = Schemas['AlarmsFrame'];
 export type Alarms = Schemas['Alarms'] & { readonly notes?: number };
 export type HealthReason = Schemas['HealthReason'];
 export type Verdict = TagHealth['verdict'];
-/** How well the estimates have foretold, by sensor. */
-export type Grades = Schemas['EstimateQualities'];
+/** How well the estimates of a sensor have foretold. */
 export type Grade = Schemas['EstimateQuality'];
 /** What was measured at the tags against what all else foretells. */
 export type ExpectedTags = Schemas['ExpectedTags'];

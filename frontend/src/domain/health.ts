@@ -60,6 +60,9 @@ export function houseHealth(
   };
 }
 
+/** Whether nobody knows how it is now, of all its tags. */
+export const isSilent = ({ reasons }: TagHealth): boolean => reasons[0]?.kind === 'silent';
+
 const UNHEARD: TagHealth = { verdict: 'unknown', reasons: [SILENT] };
 
 /** More is worse: by verdict, then by how far beyond its limit the worst value is. */

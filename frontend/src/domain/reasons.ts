@@ -12,13 +12,15 @@ const LONGEST_NAME = 32;
 
 /**
  * A reason as a sentence without its full stop. `age` is how long ago the observation was that
- * says so, seconds; null: that is told elsewhere, or nobody knows.
+ * says so, seconds; null: that is told elsewhere, or nobody knows. `isMarked`: a sign beside it says
+ * how bad it is.
  */
 export function reasonText(
   sensors: Catalogue,
   reason: HealthReason,
   unit: TemperatureUnit,
   age: number | null,
+  isMarked = false,
 ): string {
   const { kind, sensor: name, value, limit } = reason;
   const sensor = sensors.named(name);
@@ -30,7 +32,7 @@ export function reasonText(
       `${label} ${readingText(sensor, reason.value, unit, more)}`,
       sideText(sensor, reason),
       valueText(sensor, reason.limit, unit, more),
-      reason.verdict === 'critical',
+      reason.verdict === 'critical' && !isMarked,
     );
   }
   switch (kind) {

@@ -4,6 +4,7 @@ import { S } from '../strings';
 import { ageSeconds } from './age';
 import { csv, type Cell } from './csv';
 import { severity, type HouseHealth } from './health';
+import { memoLast, memoOne } from './memo';
 import { speciesText } from './species';
 import { reasonsText, tryKind } from './reasons';
 import type { Catalogue, Sensor } from './sensors';
@@ -121,24 +122,18 @@ export function filterRows(
   const words = text.toLowerCase().split(/\s+/).filter(Boolean);
   if (words.length === 0 && health === null) return rows;
   return rows.filter(
-    (row) =>
-      (health === null || row.health.verdict === health) &&
-      words.every((word) => haystack(row, sensors).includes(word)),
+    ({ tag, health: own }) =>
+      (health === null || own.verdict === health) &&
+      words.every((word) => haystack(tag)(own, sensors).includes(word)),
   );
 }
 
 /** A tag is searched with each letter that is typed. */
-const haystacks = new WeakMap<Tag, Row & { readonly sensors: Catalogue; readonly text: string }>();
+const haystack = memoOne((tag: Tag) =>
+  memoLast((health: TagHealth, sensors: Catalogue) => haystackOf(tag, health, sensors)),
+);
 
-function haystack(row: Row, sensors: Catalogue): string {
-  const known = haystacks.get(row.tag);
-  if (known?.health === row.health && known.sensors === sensors) return known.text;
-  const text = haystackOf(row, sensors);
-  haystacks.set(row.tag, { ...row, sensors, text });
-  return text;
-}
-
-function haystackOf({ tag, health }: Row, sensors: Catalogue): string {
+function haystackOf(tag: Tag, health: TagHealth, sensors: Catalogue): string {
   return [
     tag.id,
     sensors.areaOf(tag.id),

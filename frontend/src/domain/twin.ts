@@ -189,7 +189,7 @@ function sharedTag(before: Tag | undefined, wire: TwinTagState, state: TakenStat
 }
 
 /** Deep equality of plain JSON values, but for ages. */
-function equal(a: unknown, b: unknown): boolean {
+export function equal(a: unknown, b: unknown): boolean {
   if (a === b) return true;
   if (typeof a !== 'object' || typeof b !== 'object' || a === null || b === null) return false;
   const keys = Object.keys(a);

@@ -3,10 +3,11 @@ import type { Verdict } from '../contract/types';
 import { ageSeconds, freshness, type Ageing } from '../domain/age';
 import { readingText } from '../domain/format';
 import type { HouseHealth } from '../domain/health';
+import { memoLast, memoOne } from '../domain/memo';
 import type { Sensor } from '../domain/sensors';
 import { speciesLooks, UNKNOWN_SPECIES, type BloomLook } from '../domain/species';
 import { shown } from '../domain/text';
-import type { Tag } from '../domain/twin';
+import { equal, type Tag } from '../domain/twin';
 import type { TemperatureUnit } from '../domain/units';
 import { boundsOf, type MapPoint } from '../geometry/coordinates';
 
@@ -61,17 +62,8 @@ export interface SceneInput {
   readonly listed: ReadonlySet<string> | null;
 }
 
-interface Planted {
-  readonly blooms: readonly BloomDot[];
-  readonly boxes: readonly (readonly MapPoint[])[];
-}
-
-/** What neither fades nor follows the sensor: worked out once for the same tags. */
-const plantedBy = new WeakMap<readonly Tag[], Planted>();
-
-function planted(tags: readonly Tag[]): Planted {
-  const known = plantedBy.get(tags);
-  if (known) return known;
+/** What neither fades nor follows the sensor. */
+const planted = memoOne((tags: readonly Tag[]): Pick<Scene, 'blooms' | 'boxes'> => {
   const looks = speciesLooks(speciesOf(tags));
   const boxes = new Map<string, readonly MapPoint[]>();
   const blooms: BloomDot[] = [];
@@ -83,10 +75,8 @@ function planted(tags: readonly Tag[]): Planted {
       blooms.push({ at, look: looks.get(species) ?? UNKNOWN_SPECIES });
     }
   }
-  const all = { blooms, boxes: [...boxes.values()] };
-  plantedBy.set(tags, all);
-  return all;
-}
+  return { blooms, boxes: [...boxes.values()] };
+});
 
 /** The scene; the one before if that looks the very same, and of its pins those that do. */
 export function buildScene(input: SceneInput, before: Scene | null = null): Scene {
@@ -96,7 +86,7 @@ export function buildScene(input: SceneInput, before: Scene | null = null): Scen
     if (!tag.at) continue;
     const pin = pinOf(tag, tag.at, input);
     const old = known.get(tag.id);
-    pins.push(old && samePin(old, pin) ? old : pin);
+    pins.push(old && equal(old, pin) ? old : pin);
   }
   const { blooms, boxes } = planted(input.tags);
   const isSame =
@@ -117,17 +107,6 @@ function spacingOf(pins: readonly Pin[]): number {
   return Math.sqrt(((maxX - minX) * (maxY - minY)) / pins.length) || Infinity;
 }
 
-const samePin = (a: Pin, b: Pin): boolean =>
-  a.at.x === b.at.x &&
-  a.at.y === b.at.y &&
-  a.kind === b.kind &&
-  a.verdict === b.verdict &&
-  a.strength === b.strength &&
-  a.pest === b.pest &&
-  a.priority === b.priority &&
-  a.texts.length === b.texts.length &&
-  a.texts.every((text, index) => text === b.texts[index]);
-
 function pinOf(tag: Tag, at: MapPoint, input: SceneInput): Pin {
   const { health, sensor, unit, now, ageing, listed } = input;
   const isLeftOut = listed !== null && !listed.has(tag.id);
@@ -144,7 +123,7 @@ function pinOf(tag: Tag, at: MapPoint, input: SceneInput): Pin {
       ? LEFT_OUT
       : Math.max(quantised(fresh, FADE_STEPS), isWarning ? FAINTEST_WARNING : 0),
     pest: tag.anomaly && !isLeftOut,
-    texts: isLeftOut ? [] : textsOf(tag, sensor, value, unit),
+    texts: isLeftOut ? [] : textsOf(tag)(sensor, unit),
     priority:
       (tag.anomaly ? 4 : 0) +
       (value == null ? 0 : 2) +
@@ -152,23 +131,13 @@ function pinOf(tag: Tag, at: MapPoint, input: SceneInput): Pin {
   };
 }
 
-/** A tag that is looked at again and again has the same texts as long as it is the same. */
-const textsBy = new WeakMap<Tag, { readonly of: string; readonly texts: readonly string[] }>();
-
-function textsOf(
-  tag: Tag,
-  sensor: Sensor,
-  value: number | null | undefined,
-  unit: TemperatureUnit,
-): readonly string[] {
-  const of = `${sensor.name} ${unit}`;
-  const known = textsBy.get(tag);
-  if (known?.of === of) return known.texts;
-  const id = shown(tag.id, 12);
-  const texts = value == null ? [id] : [`${id} · ${readingText(sensor, value, unit)}`, id];
-  textsBy.set(tag, { of, texts });
-  return texts;
-}
+const textsOf = memoOne((tag: Tag) =>
+  memoLast((sensor: Sensor, unit: TemperatureUnit): readonly string[] => {
+    const id = shown(tag.id, 12);
+    const value = tag.readings.get(sensor.name);
+    return value == null ? [id] : [`${id} · ${readingText(sensor, value, unit)}`, id];
+  }),
+);
 
 /** Every species of some tags: the planters' and those of single blooms. */
 export function speciesOf(tags: readonly Tag[]): Set<string> {

@@ -67,7 +67,7 @@ function groupText(sites: readonly Site[], words: FleetWords): string {
   return [
     String(sites.length),
     ...texts.map((each) => `${counts[each]} ${filterText(each, words)}`),
-    ...(alarms > 0 ? [words.alarms(alarms)] : []),
+    ...(alarms > 0 ? [S.alarmCount(alarms)] : []),
   ].join(' · ');
 }
 
@@ -164,5 +164,5 @@ function silentText(site: Site, words: FleetWords, asOf: number | null): string 
 
 function countText(count: number | null, words: FleetWords): string {
   if (count === null) return words.alarmsBeingRead;
-  return count === 0 ? words.noAlarms : words.alarms(count);
+  return count === 0 ? words.noAlarms : S.alarmCount(count);
 }

@@ -15,6 +15,7 @@ import { rosText } from '../domain/rostime';
 import { isMeasured, type Sensor } from '../domain/sensors';
 import { differenceToShown, unitOf } from '../domain/units';
 import { LANGUAGE, S } from '../strings';
+import { Select } from '../widgets/Select';
 import type { FleetWords } from '../words/fleet';
 import { VIEW_WORDS } from '../words/fleetViews';
 import {
@@ -80,20 +81,14 @@ export default function Compare({ shown, words }: Props): JSX.Element {
   return (
     <section className="fleet-compare" aria-label={words.compare}>
       <div className="fleet-head">
-        <select
+        <Select
           className="fleet-search"
           aria-label={S.sensors}
           value={name}
-          onChange={(event) => {
-            setName(event.target.value);
-          }}
-        >
-          {sensors.all.filter(isMeasured).map((each) => (
-            <option key={each.name} value={each.name}>
-              {each.label}
-            </option>
-          ))}
-        </select>
+          options={sensors.all.filter(isMeasured).map((each) => each.name)}
+          text={(each) => sensors.named(each).label}
+          onChange={setName}
+        />
         <div className="fleet-filters" role="group" aria-label={S.timebarPeriod}>
           {PERIODS.map((each) => (
             <button

@@ -11,6 +11,7 @@ import {
 } from 'react';
 
 import { S } from '../strings';
+import { Select } from '../widgets/Select';
 import type { FleetWords } from '../words/fleet';
 import { Cards, filterText } from './Cards';
 import type { Seen } from './follow';
@@ -47,7 +48,7 @@ export function Overview({ seen, words, isKiosk }: Props): JSX.Element {
   const shown = useMemo(() => chosen(sites, filter, search, group), [sites, filter, search, group]);
 
   useEffect(() => {
-    document.title = alarms === 0 ? words.title : S.alarmsTitle(alarms, words.title);
+    document.title = alarms === 0 ? words.sites : S.alarmsTitle(alarms, words.sites);
   }, [alarms, words]);
 
   useEffect(() => {
@@ -65,10 +66,10 @@ export function Overview({ seen, words, isKiosk }: Props): JSX.Element {
   return (
     <div className="fleet" data-kiosk={isKiosk}>
       <header className="fleet-head">
-        <h1>{words.title}</h1>
+        <h1>{words.sites}</h1>
         {isKiosk && (
           <span className="fleet-alarms" data-any={alarms > 0}>
-            {alarms === 0 ? words.noAlarms : words.alarms(alarms)}
+            {alarms === 0 ? words.noAlarms : S.alarmCount(alarms)}
           </span>
         )}
         {!isKiosk && (
@@ -83,7 +84,7 @@ export function Overview({ seen, words, isKiosk }: Props): JSX.Element {
                     setView(each);
                   }}
                 >
-                  {each === 'alarms' ? S.alarms : words[each]}
+                  {each === 'alarms' || each === 'report' ? S[each] : words[each]}
                   {each === 'alarms' && (
                     <>
                       {' '}
@@ -106,19 +107,14 @@ export function Overview({ seen, words, isKiosk }: Props): JSX.Element {
               }}
             />
             {groups.length > 0 && (
-              <select
+              <Select
                 className="fleet-search"
                 aria-label={words.group}
                 value={groups.includes(group) ? group : ''}
-                onChange={(event) => {
-                  setGroup(event.target.value);
-                }}
-              >
-                <option value="">{words.allGroups}</option>
-                {groups.map((name) => (
-                  <option key={name}>{name}</option>
-                ))}
-              </select>
+                options={['', ...groups]}
+                text={(name) => name || words.allGroups}
+                onChange={setGroup}
+              />
             )}
             <div className="fleet-filters" role="group" aria-label={words.filter}>
               {FILTERS.map((each) => (

@@ -53,7 +53,7 @@ export default function Report({ shown, words }: Props): JSX.Element {
   const sites = new Set(shown.map(({ site }) => site));
   const notes = value?.notes.filter(({ site }) => sites.has(site)) ?? [];
   return (
-    <section className="fleet-compare" aria-label={words.report}>
+    <section className="fleet-compare" aria-label={S.report}>
       <div className="fleet-head">
         <div className="fleet-filters" role="group" aria-label={S.timebarPeriod}>
           {HOURS.map((each) => (

@@ -19,7 +19,7 @@ const theme = (): void => {
 };
 
 document.documentElement.lang = LANGUAGE;
-document.title = words.title;
+document.title = words.sites;
 system.addEventListener('change', theme);
 theme();
 

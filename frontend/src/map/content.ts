@@ -5,7 +5,7 @@ import { holds, isPossible } from '../domain/farOff';
 import { reachOfTags, type Tag } from '../domain/twin';
 import type { Box } from '../geometry/clear';
 import { boundsOf, corners, type Bounds, type MapPoint } from '../geometry/coordinates';
-import { memoOne } from '../store/memo';
+import { memoOne } from '../domain/memo';
 import type { House } from '../store/twin';
 
 export interface Content {

@@ -15,7 +15,7 @@ import {
 import { Grid, nearest } from '../geometry/nearest';
 import { act, moveViewport, store, type AppState } from '../store/app';
 import { selectHeat, selectListed, selectRange, selectSensor } from '../store/derived';
-import { memoOne } from '../store/memo';
+import { memoOne } from '../domain/memo';
 import { selectNewest, selectShown, selectTag, type Shown } from '../store/moment';
 import { isPrinting } from '../store/theme';
 import { MapCamera } from './camera';

@@ -52,7 +52,7 @@ import {
   selectSensor,
   type Heat,
 } from '../store/derived';
-import { memoLast, memoOne } from '../store/memo';
+import { memoLast, memoOne } from '../domain/memo';
 import { selectShown, selectTag, selectTags } from '../store/moment';
 import type { MapPicture } from '../store/picture';
 

@@ -7,7 +7,6 @@ import { act, useApp } from '../store/app';
 import { useSelected } from '../store/create';
 import { clustersOf, comments } from './comments';
 import { C, subjectText, tagOf } from './subject';
-import { useComments } from './useComments';
 
 /** Comments that the text of one mark holds. */
 const MOST_TOLD = 5;
@@ -24,7 +23,6 @@ export function CommentMarks({
   /** Of these tags and of the greenhouse; none: all. */
   tagIds?: readonly string[];
 }): JSX.Element | null {
-  useComments();
   const all = useSelected(comments, (it) => it);
   const alarms = useApp((state) => state.twin.alarms?.alarms ?? NO_ALARMS);
   const { from, to } = span;

@@ -10,7 +10,6 @@ import { person } from '../store/signals';
 import { comments, type Comment } from './comments';
 import { Field, LONGEST } from './Field';
 import { C } from './subject';
-import { useComments } from './useComments';
 
 /** Of one subject, the newest. */
 const MOST_SHOWN = 20;
@@ -27,7 +26,6 @@ export function Comments({
   /** Whatever moment is shown. */
   isOfNow?: boolean;
 }): JSX.Element {
-  useComments();
   const all = useSelected(comments, (it) => it);
   const who = useSelected(person, (it) => it);
   const shownAt = useApp((state) => selectShown(state).moment);

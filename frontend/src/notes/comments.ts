@@ -31,7 +31,6 @@ export const commentsIn = (notes: readonly Note[]): Comment[] =>
 
 const PACE_MS = 500;
 
-/** Begins with the first who looks, and goes on as long as the page. */
 export function startComments(): () => void {
   const fetcher = createFetcher<readonly Note[]>({
     paceMs: PACE_MS,

@@ -6,8 +6,10 @@ import { act, receive } from '../store/app';
 import { person } from '../store/signals';
 import { alarm, alarms } from '../testing/alarms';
 import { showTags } from '../testing/page';
-import { clustersOf, comments, commentsIn } from './comments';
-import { CommentMarks, Comments, SiteComment } from './parts';
+import { CommentMarks } from './CommentMarks';
+import { Comments } from './Comments';
+import { clustersOf, comments, commentsIn, startComments } from './comments';
+import { SiteComment } from './SiteComment';
 
 const said = (id: string, made: number, over: Partial<Note> = {}): Note => ({
   id,
@@ -71,6 +73,7 @@ test('marks that would cover each other are one, and those outside of the span n
 });
 
 test('what is said is fetched when there is more of it, and shown with name and time', async () => {
+  const stop = startComments();
   render(<Comments subject="tag:7" name="Tag 7" />);
   tell(0);
   expect(asked).toEqual([]);
@@ -82,6 +85,7 @@ test('what is said is fetched when there is more of it, and shown with name and 
   expect(screen.queryByRole('button')).toBeNull();
   tell(2);
   expect(asked).toEqual(['GET /api/notes?kind=comment ']);
+  stop();
 });
 
 test('who may write does, and withdraws their own words alone', async () => {

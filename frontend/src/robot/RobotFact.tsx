@@ -7,22 +7,21 @@ import { store } from '../store/app';
 import { S } from '../strings';
 import { useTicking } from '../widgets/useNow';
 import { ageOf, timeOf, useRobot } from './heard';
-import { R } from './words';
 
 const metres = (value: number): string => written(value.toFixed(1));
 
 /** All of it in words: for the legend, and for who does not see the map. */
 export function robotText({ position, battery }: RobotNow, time: number | null): string {
   const ago = (age: number | null): string =>
-    age === null ? R.robotAgeUnknown : S.agoSuffix(ageText(age));
+    age === null ? S.robotAgeUnknown : S.agoSuffix(ageText(age));
   const parts = position
-    ? [R.robotAt(metres(position.x), metres(position.y)), ago(ageOf(position.observed_at, time))]
-    : [R.robotNowhere];
+    ? [S.robotAt(metres(position.x), metres(position.y)), ago(ageOf(position.observed_at, time))]
+    : [S.robotNowhere];
   if (battery) {
     const percent = percentText(battery.percent / 100);
     const age = ageOf(battery.observed_at, time);
     parts.push(
-      ageStep(age) === 'fresh' ? R.robotBattery(percent) : R.robotReported(percent, ago(age)),
+      ageStep(age) === 'fresh' ? S.robotBattery(percent) : S.robotReported(percent, ago(age)),
     );
   }
   return parts.join('; ');

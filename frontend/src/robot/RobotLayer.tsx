@@ -12,8 +12,8 @@ import { trailLines, wayAhead } from './path';
 
 /** A position that is older never looks like one of now, s. */
 const LIVE_S = 10;
-/** The trail fades in steps of minutes: it is looked at anew so often, s. */
-const FADE_S = 30;
+/** The trail is looked at anew so often, s. */
+const FADE_S = 10;
 
 /** Where the robot is, has been and will be; to who does not see it, `RobotFact` says so. */
 export function RobotLayer(): ReactPortal | null {

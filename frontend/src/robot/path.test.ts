@@ -30,9 +30,9 @@ describe('trail', () => {
     expect(trail.at(-1)).toEqual(at(2_500, 2_500));
   });
 
-  test('is drawn in steps of age that hang together, and no older than an hour', () => {
-    const points = [at(0, 399), at(1, 400), at(2, 410), at(4, 2_190), at(4.5, 2_210)];
-    expect(trailLines(points, 4_000)).toEqual([
+  test('is drawn in steps of age that hang together, and no older than two minutes', () => {
+    const points = [at(0, 399), at(1, 400), at(2, 402), at(4, 463), at(4.5, 465)];
+    expect(trailLines(points, 520)).toEqual([
       {
         points: [
           [1, 0],
@@ -45,14 +45,18 @@ describe('trail', () => {
           [4, 0],
           [4.5, 0],
         ],
-        step: 3,
+        step: 2,
       },
     ]);
   });
 
   test('is broken where nothing was heard for long and it is elsewhere then', () => {
     const still = [at(0, 100), at(0.5, 200), at(1, 210)];
-    expect(trailLines(still, 210)).toHaveLength(1);
+    const ends = trailLines(still, 210).map(({ points }) => points.map(([x]) => x));
+    expect(ends).toEqual([
+      [0, 0.5],
+      [0.5, 1],
+    ]);
     const gap = [at(0, 100), at(0.5, 110), at(3, 200), at(4, 201)];
     expect(trailLines(gap, 201).map(({ points }) => points.length)).toEqual([2, 2]);
   });

@@ -13,7 +13,8 @@ type Position = NonNullable<RobotNow['position']>;
 /** As the bridge keeps them: no closer in place, nor in time. */
 const STEP_M = 0.1;
 const STEP_S = 1;
-export const TRAIL_S = 3_600;
+/** Longer, and the trail of a patrol hides what it crosses. */
+const TRAIL_S = 120;
 /** More than the bridge keeps of an hour; past it the oldest go. */
 const MOST_POINTS = 2_000;
 /** Where nothing was heard for so long, and it is far away then, nobody knows how it went there. */
@@ -38,7 +39,7 @@ export function extended(trail: readonly TrailPoint[], position: Position): read
 
 export interface Line {
   readonly points: readonly (readonly [number, number])[];
-  /** 0: of now, to 5: an hour ago. */
+  /** 0: of now, to 5: two minutes ago. */
   readonly step: number;
 }
 

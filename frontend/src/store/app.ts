@@ -74,6 +74,19 @@ export const prefer = (settings: Partial<Settings>): void => {
   store.dispatch({ slice: 'settings', settings });
 };
 
+/** Calls back when one of these parts of the state is another; returns the way to stop. */
+export function onChange(
+  parts: (state: AppState) => readonly unknown[],
+  listener: () => void,
+): () => void {
+  let seen = parts(store.get());
+  return store.subscribe(() => {
+    const before = seen;
+    seen = parts(store.get());
+    if (seen.some((part, index) => part !== before[index])) listener();
+  });
+}
+
 export function useApp<Part>(select: (state: AppState) => Part): Part {
   return useSelected(store, select);
 }

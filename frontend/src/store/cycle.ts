@@ -5,7 +5,7 @@ import type { Tag } from '../domain/twin';
 import { act, type AppState, store } from './app';
 import { createStore } from './create';
 import { selectSensors } from './derived';
-import { memoLast } from './memo';
+import { memoLast } from '../domain/memo';
 import { selectTags } from './moment';
 
 /** Seconds that one sensor may be shown. */

@@ -24,7 +24,7 @@ import { filterRows, inAreas, rowsOf, sortRows, type Row } from '../domain/table
 import type { Tag } from '../domain/twin';
 import type { AppState } from './app';
 import { sourceOf } from './heat';
-import { memoLast, memoOne } from './memo';
+import { memoLast, memoOne } from '../domain/memo';
 import { isHeardNow, selectIsHeard, selectNewest, selectShown, selectTags } from './moment';
 import type { MapPicture } from './picture';
 import type { Difference } from './twin';

@@ -6,7 +6,7 @@ import { now } from '../clock';
 import { differenceOf, otherMoment, type Compare } from '../domain/difference';
 import type { Snapshot } from '../domain/twin';
 import { boundsOf, type Bounds } from '../geometry/coordinates';
-import { receive, store, type AppState } from './app';
+import { onChange, receive, store, type AppState } from './app';
 import { fetchHeat, sourceOf } from './heat';
 import { ASSUMED_MARGIN_M, fieldResolution } from './loaders';
 import { rosNow, selectNewest, selectShown } from './moment';
@@ -46,18 +46,10 @@ export function startDifference(): () => void {
     if (wish) fetcher.want(wish);
   };
   update();
-  let seen = store.get();
-  const stop = store.subscribe(() => {
-    const state = store.get();
-    const isSame =
-      seen.view.compare === state.view.compare &&
-      seen.view.sensor === state.view.sensor &&
-      sourceOf(seen.view) === sourceOf(state.view) &&
-      seen.twin.connection === state.twin.connection &&
-      selectShown(seen) === selectShown(state);
-    seen = state;
-    if (!isSame) update();
-  });
+  const stop = onChange((state) => {
+    const { view, twin } = state;
+    return [view.compare, view.sensor, sourceOf(view), twin.connection, selectShown(state)];
+  }, update);
   const timer = setInterval(update, TICK_MS);
   return () => {
     stop();

@@ -5,7 +5,7 @@ import { resolutionFor } from '../domain/field';
 import type { Snapshot } from '../domain/twin';
 import { boundsOf, type Bounds } from '../geometry/coordinates';
 import { loadMap, type MapPicture } from './picture';
-import { receive, store, type AppState } from './app';
+import { onChange, receive, store, type AppState } from './app';
 import { fetchHeat, sourceOf, type Source } from './heat';
 import { selectNewest } from './moment';
 import { createFetcher, NOTHING, type Wish } from './fetcher';
@@ -55,23 +55,15 @@ export function startLoaders(): () => void {
   });
 
   let missingSince = -1;
-  let seen: AppState | null = null;
   let ticking: ReturnType<typeof setInterval> | undefined;
   let ticks = 0;
 
   const update = (): void => {
     const state = store.get();
     const source = sourceOf(state.view);
-    const isSame =
-      seen?.twin === state.twin &&
-      seen.view.sensor === state.view.sensor &&
-      sourceOf(seen.view) === source;
-    if (isSame) return;
-    seen = state;
     if (source === 'estimate') {
       ticking ??= setInterval(() => {
         ticks += 1;
-        seen = null;
         update();
       }, ESTIMATE_TICK_MS);
     } else {
@@ -115,7 +107,7 @@ export function startLoaders(): () => void {
     );
   };
   update();
-  const stop = store.subscribe(update);
+  const stop = onChange(({ twin, view }) => [twin, view.sensor, sourceOf(view)], update);
   return () => {
     stop();
     clearInterval(ticking);

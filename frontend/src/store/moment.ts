@@ -6,7 +6,7 @@ import { AGES_UNKNOWN, GROWING, type Ageing } from '../domain/age';
 import { secondsOf } from '../domain/rostime';
 import type { Snapshot, Tag } from '../domain/twin';
 import type { AppState } from './app';
-import { memoLast, memoOne } from './memo';
+import { memoLast, memoOne } from '../domain/memo';
 import type { House, Past, TwinState } from './twin';
 
 /** The moment to show: null is now, a number a moment in the past, ROS seconds. */

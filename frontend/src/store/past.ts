@@ -3,7 +3,7 @@ import { fetchQuality, Refusal } from '../contract/api';
 import { fetchStateAt } from '../contract/past';
 import type { Field, Judgement } from '../contract/types';
 import { snapshotOf, type Snapshot } from '../domain/twin';
-import { receive, store, type AppState } from './app';
+import { onChange, receive, store, type AppState } from './app';
 import { fetchHeat, sourceOf, type Source } from './heat';
 import { fieldResolution } from './loaders';
 import { selectNewest, selectPast } from './moment';
@@ -81,11 +81,8 @@ export function startPast(): () => void {
     },
   });
 
-  let seen: AppState | null = null;
   const update = (): void => {
     const state = store.get();
-    if (seen?.view === state.view && seen.twin === state.twin) return;
-    seen = state;
     const { moment, sensor } = state.view;
     const past = selectPast(state);
     if (moment === null) {
@@ -112,7 +109,7 @@ export function startPast(): () => void {
     fetcher.want(wishFor(state, moment, heardOn));
   };
   update();
-  const stop = store.subscribe(update);
+  const stop = onChange(({ view, twin }) => [view, twin], update);
   return () => {
     stop();
     clearTimeout(patience);

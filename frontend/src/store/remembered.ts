@@ -4,7 +4,7 @@ import { Refusal } from '../contract/api';
 import { fetchTimeline } from '../contract/past';
 import { endsNow, type Period, type Span, spanOf } from '../domain/period';
 import { timelineOf } from '../domain/timeline';
-import { act, receive, store } from './app';
+import { act, onChange, receive, store } from './app';
 import { createFetcher } from './fetcher';
 import { rosNow, selectNewest } from './moment';
 import { NOT_ASKED, type Remembered } from './twin';
@@ -80,16 +80,14 @@ export function startRemembered(): () => void {
   };
   update();
   const timer = setInterval(update, INTERVAL_MS);
-  let seen = store.get();
-  const stop = store.subscribe(() => {
-    const state = store.get();
-    const isSame =
-      seen.view.period === state.view.period &&
-      seen.twin.connection.epoch === state.twin.connection.epoch &&
-      (selectNewest(seen).snapshot === null) === (selectNewest(state).snapshot === null);
-    seen = state;
-    if (!isSame) update();
-  });
+  const stop = onChange(
+    (state) => [
+      state.view.period,
+      state.twin.connection.epoch,
+      selectNewest(state).snapshot === null,
+    ],
+    update,
+  );
   return () => {
     stop();
     clearInterval(timer);

@@ -1,4 +1,4 @@
-import { store } from './app';
+import { onChange, store } from './app';
 
 const system = window.matchMedia('(prefers-color-scheme: dark)');
 let printing = false;
@@ -16,18 +16,11 @@ export function isDark(): boolean {
 
 /** Calls back whenever the theme in use may have changed; paper is always light. */
 export function onThemeChange(listener: () => void): () => void {
-  let { theme } = store.get().settings;
-  const onStore = (): void => {
-    const now = store.get().settings.theme;
-    if (now === theme) return;
-    theme = now;
-    listener();
-  };
   const onPrint = ({ type }: Event): void => {
     printing = type === 'beforeprint';
     listener();
   };
-  const stop = store.subscribe(onStore);
+  const stop = onChange(({ settings }) => [settings.theme], listener);
   system.addEventListener('change', listener);
   window.addEventListener('beforeprint', onPrint);
   window.addEventListener('afterprint', onPrint);

@@ -1,26 +1,21 @@
-import { type JSX, lazy, type ReactNode, Suspense } from 'react';
+import type { JSX, ReactNode } from 'react';
 
 import { type Period, PERIOD_KINDS } from '../domain/period';
 import { hasDate, rosText } from '../domain/rostime';
 import { shown } from '../domain/text';
+import { CommentMarks } from '../notes/CommentMarks';
+import { SiteComment } from '../notes/SiteComment';
 import { act, store, useApp } from '../store/app';
 import { useSelected } from '../store/create';
 import { rosNow } from '../store/moment';
 import { S } from '../strings';
 import { Disclosure } from '../widgets/Disclosure';
+import { Select } from '../widgets/Select';
 import { useNow } from '../widgets/useNow';
 import { OwnPeriod } from './OwnPeriod';
 import { Slider } from './Slider';
 import { chooseSpeed, playback, SPEEDS, togglePlayback } from './playback';
 import { barSpan, newestWord } from './span';
-import type * as Parts from '../notes/parts';
-
-// Where they do not come, the bar goes on without.
-type Shown = Pick<typeof Parts, 'CommentMarks' | 'SiteComment'>;
-const NOTHING: Shown = { CommentMarks: () => null, SiteComment: () => null };
-const parts = (): Promise<Shown> => import('../notes/parts').catch(() => NOTHING);
-const CommentMarks = lazy(async () => ({ default: (await parts()).CommentMarks }));
-const SiteComment = lazy(async () => ({ default: (await parts()).SiteComment }));
 
 /** Under the map: when what happened, and the way to another moment. */
 export function TimeBar(): JSX.Element | null {
@@ -43,14 +38,10 @@ export function TimeBar(): JSX.Element | null {
         <When />
         <PeriodChoice period={period} nowS={nowS} />
         <Marks />
-        <Suspense>
-          <SiteComment />
-        </Suspense>
+        <SiteComment />
       </div>
       {period.kind === 'own' && <OwnPeriod period={period} isSimulated={!hasDate(nowS)} />}
-      <Suspense>
-        <CommentMarks span={span} />
-      </Suspense>
+      <CommentMarks span={span} />
       <Slider span={span} timeline={remembered.value} nowS={nowS} />
       {remembered.state === 'failed' && (
         <p className="timebar-note" role="status">
@@ -89,21 +80,14 @@ function Player(): JSX.Element {
           <path d={isPlaying ? 'M4 3h3v10H4zM9 3h3v10H9z' : 'M4 2.5v11l9-5.5z'} />
         </svg>
       </button>
-      <select
+      <Select
         aria-label={S.timebarSpeed}
         title={S.timebarSpeed}
         value={speed}
-        onChange={(event) => {
-          const chosen = SPEEDS.find((each) => String(each) === event.target.value);
-          if (chosen) chooseSpeed(chosen);
-        }}
-      >
-        {SPEEDS.map((each) => (
-          <option key={each} value={each}>
-            {S.timebarSpeeds(each)}
-          </option>
-        ))}
-      </select>
+        options={SPEEDS}
+        text={S.timebarSpeeds}
+        onChange={chooseSpeed}
+      />
     </>
   );
 }
@@ -121,25 +105,20 @@ function When(): JSX.Element {
 
 function PeriodChoice({ period, nowS }: { period: Period; nowS: number }): JSX.Element {
   return (
-    <select
+    <Select
       className="timebar-period"
       aria-label={S.timebarPeriod}
       title={S.timebarPeriod}
       value={period.kind}
-      onChange={(event) => {
-        const kind = PERIOD_KINDS.find((each) => each === event.target.value);
+      options={[...PERIOD_KINDS, 'own'] as const}
+      text={(kind) => S.timebarPeriods[kind]}
+      onChange={(kind) => {
         // An own period begins as what is in view.
         const { from, to } = barSpan(store.get(), nowS);
         const own = { kind: 'own', from: Math.floor(from), to: Math.ceil(to) } as const;
-        act({ type: 'period', period: kind ? { kind } : own });
+        act({ type: 'period', period: kind === 'own' ? own : { kind } });
       }}
-    >
-      {[...PERIOD_KINDS, 'own' as const].map((kind) => (
-        <option key={kind} value={kind}>
-          {S.timebarPeriods[kind]}
-        </option>
-      ))}
-    </select>
+    />
   );
 }
 

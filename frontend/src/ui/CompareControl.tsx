@@ -7,6 +7,8 @@ import { act, store, useApp } from '../store/app';
 import { rosNow } from '../store/moment';
 import { selectDayS } from '../store/origin';
 import { S } from '../strings';
+import { fieldOf, momentOf } from '../timebar/OwnPeriod';
+import { Select } from '../widgets/Select';
 
 const CHOICES = ['none', 'day', 'week', 'own'] as const;
 type Choice = (typeof CHOICES)[number];
@@ -21,26 +23,19 @@ function choiceOf(compare: Compare | null, dayS: number): Choice {
 export function CompareControl(): JSX.Element {
   const compare = useApp((state) => state.view.compare);
   const dayS = useApp(selectDayS);
-  const choose = (choice: Choice): void => {
-    act({ type: 'compare', compare: compareFor(choice, dayS) });
-  };
   return (
     <div className="compare">
       <label>
         <span>{S.compare}</span>
-        <select
+        <Select
           value={choiceOf(compare, dayS)}
           data-testid="compare"
-          onChange={(event) => {
-            choose(event.target.value as Choice);
+          options={CHOICES}
+          text={(choice) => S.compareWith[choice]}
+          onChange={(choice) => {
+            act({ type: 'compare', compare: compareFor(choice, dayS) });
           }}
-        >
-          {CHOICES.map((choice) => (
-            <option key={choice} value={choice}>
-              {S.compareWith[choice]}
-            </option>
-          ))}
-        </select>
+        />
       </label>
       {compare?.by === 'moment' && <OwnMoment at={compare.at} />}
     </div>
@@ -70,18 +65,11 @@ function OwnMoment({ at }: { at: number }): JSX.Element {
       type="datetime-local"
       step={1}
       aria-label={S.compareMoment}
-      value={localText(at)}
+      value={fieldOf(at, false)}
       onChange={(event) => {
-        const chosen = new Date(event.target.value).getTime() / 1000;
-        if (chosen >= 0) act({ type: 'compare', compare: { by: 'moment', at: chosen } });
+        const chosen = momentOf(event.target.value, false);
+        if (chosen !== null) act({ type: 'compare', compare: { by: 'moment', at: chosen } });
       }}
     />
   );
-}
-
-/** As the field wants it, on the operator's own clock: 2026-11-21T14:05:00. */
-function localText(at: number): string {
-  const date = new Date(Math.floor(at) * 1000);
-  const local = new Date(date.getTime() - date.getTimezoneOffset() * 60_000);
-  return local.toISOString().slice(0, 19);
 }

@@ -14,7 +14,7 @@ import { useSelected } from '../store/create';
 import { selectHealth } from '../store/derived';
 import { rosNow, selectShown, selectTags } from '../store/moment';
 import { S } from '../strings';
-import { HealthMark, HealthShape } from './HealthMark';
+import { HealthMark } from './HealthMark';
 import { useReasonText } from './Reasons';
 
 /** Beside the map; the table has the rest. */
@@ -74,7 +74,7 @@ export function DoNow({
                 act({ type: 'select', tagId: tag.id });
               }}
             >
-              <HealthShape verdict={own.verdict} />
+              <HealthMark verdict={own.verdict} word={false} />
               <Todo
                 tagId={tag.id}
                 reason={worstReason(own)}
@@ -105,7 +105,7 @@ function Todo({
   /** Critical tags that have no line here. */
   more: number;
 }): JSX.Element {
-  const why = S.healthDriver(shown(tagId, 24), useReasonText(reason ?? null));
+  const why = S.healthDriver(shown(tagId, 24), useReasonText(reason ?? null, true));
   const since = useSince(tagId, reason);
   return (
     <>

@@ -19,15 +19,17 @@ export function HealthShape({ verdict }: { verdict: Verdict }): JSX.Element {
 export function HealthMark({
   verdict,
   word = true,
+  text = S.health[verdict],
 }: {
   verdict: Verdict;
   /** Without the word to see, it is still there to hear. */
   word?: boolean;
+  text?: string | undefined;
 }): JSX.Element {
   return (
     <span className="health-mark" data-health={verdict}>
       <VerdictMark verdict={verdict} />
-      <span className={word ? undefined : 'unseen'}>{S.health[verdict]}</span>
+      <span className={word ? undefined : 'unseen'}>{text}</span>
     </span>
   );
 }

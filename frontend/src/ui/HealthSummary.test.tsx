@@ -19,7 +19,7 @@ test('names the verdict, the tag that it comes from, and why', () => {
   render(<HealthSummary kiosk={false} />);
   expect(house().dataset['health']).toBe('critical');
   expect(screen.getByRole('heading').textContent).toBe('Greenhouse status: Critical');
-  expect(driver().textContent).toBe('Tag 5: CO₂ 4000\u00a0ppm, above 3000 (critical)');
+  expect(driver().textContent).toBe('Tag 5: CO₂ 4000\u00a0ppm, above 3000');
   fireEvent.click(driver());
   expect(store.get().view.selected).toBe('5');
 });
@@ -36,8 +36,8 @@ test('says what to do first, and since when', () => {
   });
   const todo = screen.getByRole('list', { name: 'Do this now' });
   expect([...todo.children].map(({ textContent }) => textContent)).toEqual([
-    expect.stringMatching(/^Tag 5: 2 pests seenInspect and treat the plants /),
-    'Tag 1: Pest seenInspect and treat the plants ',
+    expect.stringMatching(/^CriticalTag 5: 2 pests seenInspect and treat the plants /),
+    'CriticalTag 1: Pest seenInspect and treat the plants ',
   ]);
   stop();
 });
@@ -47,7 +47,7 @@ test('says how many critical tags have no line, and on the wall nothing beside t
   showTags(tags, judgement({ 1: [reason()], 2: [reason()], 3: [reason()], 4: 'healthy' }));
   const { unmount } = render(<HealthSummary kiosk={false} />);
   const { lastElementChild } = screen.getByRole('list', { name: 'Do this now' });
-  expect(lastElementChild?.textContent).toMatch(/^Tag 2: .*\+ 1 more critical$/);
+  expect(lastElementChild?.textContent).toMatch(/^CriticalTag 2: .*\+ 1 more critical$/);
   unmount();
   render(<HealthSummary kiosk />);
   expect(screen.queryByTestId('health-driver')).toBeNull();
@@ -106,7 +106,9 @@ test('a house that is not heard of is unknown, whatever was said last', () => {
   goLost();
   render(<HealthSummary kiosk={false} />);
   expect(house().dataset['health']).toBe('unknown');
-  expect(driver().textContent).toMatch(/^No data from the twin/);
+  expect(driver().textContent).toMatch(/^No data from the twin.* Check the twin, the server/);
+  // Its tags are not known to be unknown: that is another word.
+  expect(screen.getByRole('heading').textContent).toBe('Greenhouse status: Not current');
   expect(screen.getByRole('button', { name: /^2 Healthy/ })).toBeTruthy();
 });
 

@@ -1,6 +1,6 @@
 import type { JSX } from 'react';
 
-import { VERDICTS, type HouseHealth } from '../domain/health';
+import { isSilent, VERDICTS, type HouseHealth } from '../domain/health';
 import { act, useApp } from '../store/app';
 import { selectHealth } from '../store/derived';
 import { S } from '../strings';
@@ -22,7 +22,10 @@ export function HealthSummary({ kiosk }: { kiosk: boolean }): JSX.Element {
       <div className="health-house">
         <h2 title={dayText(health)}>
           <span className="unseen">{S.healthHeading}: </span>
-          <HealthMark verdict={health.verdict} />
+          <HealthMark
+            verdict={health.verdict}
+            text={isSilent(health) ? S.healthNotCurrent : undefined}
+          />
         </h2>
         {kiosk && <Overall health={health} />}
       </div>

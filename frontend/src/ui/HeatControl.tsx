@@ -3,6 +3,7 @@ import type { JSX } from 'react';
 import { act, useApp } from '../store/app';
 import { HEATS } from '../store/view';
 import { S } from '../strings';
+import { Select } from '../widgets/Select';
 
 /**
  * What the heat map is made of; in the link. On a narrow screen it is among the layers, elsewhere in
@@ -11,21 +12,16 @@ import { S } from '../strings';
 export function HeatControl({ place }: { place: 'legend' | 'layers' }): JSX.Element {
   const heat = useApp((state) => state.view.heat);
   return (
-    <select
+    <Select
       className="heat-choice"
       aria-label={S.heat}
       data-testid={`heat-${place}`}
       value={heat}
-      onChange={(event) => {
-        const chosen = HEATS.find((kind) => kind === event.target.value);
-        if (chosen) act({ type: 'heat', heat: chosen });
+      options={HEATS}
+      text={(kind) => S.heats[kind]}
+      onChange={(chosen) => {
+        act({ type: 'heat', heat: chosen });
       }}
-    >
-      {HEATS.map((kind) => (
-        <option key={kind} value={kind}>
-          {S.heats[kind]}
-        </option>
-      ))}
-    </select>
+    />
   );
 }

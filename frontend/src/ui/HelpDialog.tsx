@@ -2,6 +2,7 @@ import { useEffect, useRef, type JSX } from 'react';
 
 import { prefer, useApp } from '../store/app';
 import { S } from '../strings';
+import { Check } from '../widgets/Check';
 import { Icon } from '../widgets/Icon';
 
 const ID = 'help-dialog';
@@ -39,16 +40,13 @@ export function HelpDialog(): JSX.Element {
         <Keys title={S.helpGlobal} keys={S.keys.global} />
         <Keys title={S.helpTime} keys={S.keys.time} />
         <Keys title={S.helpMap} keys={S.keys.map} />
-        <label className="check">
-          <input
-            type="checkbox"
-            checked={shortcuts}
-            onChange={(event) => {
-              prefer({ shortcuts: event.target.checked });
-            }}
-          />
-          <span>{S.helpToggle}</span>
-        </label>
+        <Check
+          label={S.helpToggle}
+          isOn={shortcuts}
+          onChange={(isOn) => {
+            prefer({ shortcuts: isOn });
+          }}
+        />
       </div>
     </dialog>
   );

@@ -1,9 +1,9 @@
-import { render, screen } from '@testing-library/react';
+import { act, render, screen } from '@testing-library/react';
 import { expect, test } from 'vitest';
 
 import type { Judgement } from '../contract/types';
 import { judgement } from '../testing/health';
-import { showTags } from '../testing/page';
+import { goLost, showTags } from '../testing/page';
 import { wireTag } from '../testing/tags';
 import { HouseLine } from './HouseLine';
 
@@ -32,14 +32,18 @@ test.each([
   );
 });
 
-test('without a rhythm it has none to tell', () => {
-  expect(line({ interval_s: null, last_scan: null, overdue: 1 })).toBe(
-    'no scan yet · 1 tag overdue',
-  );
+test.each([null, 0.04])('without a rhythm it has none to tell: %s', (interval_s) => {
+  expect(line({ interval_s, last_scan: null, overdue: 1 })).toBe('no scan yet · 1 tag overdue');
 });
 
 test('nothing is told of a house without tags', () => {
   showTags([], judgement({}));
   render(<HouseLine />);
+  expect(screen.queryByTestId('house-line')).toBeNull();
+});
+
+test('nothing is told of a house that is not heard of', () => {
+  expect(line({ interval_s: 40, last_scan: null, overdue: 0 })).toBeDefined();
+  act(goLost);
   expect(screen.queryByTestId('house-line')).toBeNull();
 });

@@ -4,16 +4,16 @@ import { commandMap } from '../map/commands';
 import { act, useApp } from '../store/app';
 import { LAYERS } from '../store/view';
 import { S } from '../strings';
+import { Check } from '../widgets/Check';
 import { Disclosure } from '../widgets/Disclosure';
 import { Icon, type IconName } from '../widgets/Icon';
+import { IconButton } from '../widgets/IconButton';
 import { HeatControl } from './HeatControl';
 import { WithParts } from './WithParts';
 
 export function MapControls(): JSX.Element {
   const button = (label: string, icon: IconName, action: () => void): JSX.Element => (
-    <button type="button" className="icon-button" aria-label={label} title={label} onClick={action}>
-      <Icon name={icon} />
-    </button>
+    <IconButton label={label} icon={icon} onClick={action} />
   );
   return (
     <div className="map-controls" data-over-map>
@@ -43,16 +43,14 @@ function LayerList(): JSX.Element {
   return (
     <>
       {LISTED.map((layer) => (
-        <label key={layer} className="check">
-          <input
-            type="checkbox"
-            checked={on.has(layer)}
-            onChange={(event) => {
-              act({ type: 'layer', layer, on: event.target.checked });
-            }}
-          />
-          <span>{S.layers[layer]}</span>
-        </label>
+        <Check
+          key={layer}
+          label={S.layers[layer]}
+          isOn={on.has(layer)}
+          onChange={(isOn) => {
+            act({ type: 'layer', layer, on: isOn });
+          }}
+        />
       ))}
       <HeatControl place="layers" />
       <WithParts>{(parts) => <parts.InLayers />}</WithParts>

@@ -5,10 +5,9 @@ import { copyLink, reportLink } from '../export/link';
 import type { TemperatureUnit } from '../domain/units';
 import { prefer, useApp } from '../store/app';
 import type { Settings } from '../store/settings';
-import { LANGUAGE, S } from '../strings';
+import { S } from '../strings';
 import { useClose } from '../widgets/Disclosure';
 import { Segmented } from '../widgets/Segmented';
-import { REPORT } from '../words/report';
 import { openHelp } from './HelpDialog';
 import { LanguageChoice } from './LanguageChoice';
 import { SignOut } from './SignOut';
@@ -76,7 +75,7 @@ export function Menu(): JSX.Element {
         </li>
         <li>
           <a href={reportLink()} target="_blank" rel="noopener" onClick={close}>
-            {REPORT[LANGUAGE]}
+            {S.report}
           </a>
         </li>
         <li>

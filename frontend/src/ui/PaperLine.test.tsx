@@ -36,6 +36,12 @@ test('paper says when it was, when it was printed, and what is on it', () => {
     act({ type: 'range', range: { low: 0, high: 100 } });
   });
   expect(line()).toMatch(/Temperature 32\.0 – 212\u00a0°F$/);
+  // What comes after the print was begun is on it, and not later than it.
+  vi.advanceTimersByTime(3_000);
+  flush(() => {
+    showTags([wireTag()]);
+  });
+  expect(line()).toMatch(/^As of 1 May 2026, 14:04:30, printed 1 May 2026, 14:04:30/);
   flush(() => {
     goLive(status({ origin: 'recorded' }));
   });

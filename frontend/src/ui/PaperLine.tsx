@@ -45,11 +45,13 @@ export function PaperLine(): JSX.Element | null {
   const label = shown(sensor.label, 32);
   const scale = isIdeal && ideal ? { low: ideal[0], high: ideal[1] } : range;
   const then = moment ?? ownAt;
+  // On its way to the printer the page goes on to live.
+  const printed = then === null && printedAt < epochOf(takenAt) ? epochOf(takenAt) : printedAt;
   const time = then === null ? dateText(epochOf(takenAt)) : rosText(then);
   const taken = origin === null ? time : `${time} (${S.origin[origin]})`;
   return (
     <p className="paper-line" data-testid="paper-line">
-      <strong>{S.paper(taken, dateText(printedAt))}</strong>{' '}
+      <strong>{S.paper(taken, dateText(printed))}</strong>{' '}
       <span>
         {S.paperRange(
           isIdeal ? S.legendAgainst(label) : label,

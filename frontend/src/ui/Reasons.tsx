@@ -12,14 +12,14 @@ import { useTicking } from '../widgets/useNow';
 import { HealthShape } from './HealthMark';
 
 /** A reason in words, with its age as of the moment that is shown. */
-export function useReasonText(reason: HealthReason | null): string {
+export function useReasonText(reason: HealthReason | null, isMarked = false): string {
   const { snapshot, ageing } = useApp(selectShown);
   const unit = useApp((state) => state.settings.unit);
   const catalogue = useApp(selectCatalogue);
   return useTicking((now) => {
     if (!reason) return '';
     const when = reason.since && snapshot ? whenOf(reason.since, snapshot) : 'unknown';
-    return reasonText(catalogue, reason, unit, ageSeconds(when, now, ageing));
+    return reasonText(catalogue, reason, unit, ageSeconds(when, now, ageing), isMarked);
   });
 }
 

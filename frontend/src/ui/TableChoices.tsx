@@ -6,6 +6,7 @@ import { selectCatalogue, selectColumns } from '../store/derived';
 import { selectTags } from '../store/moment';
 import { isColumnShown, withColumn, type Settings } from '../store/settings';
 import { S } from '../strings';
+import { Check } from '../widgets/Check';
 import { Segmented } from '../widgets/Segmented';
 
 /** What can be chosen of the table: its columns, and how high its rows are. */
@@ -32,29 +33,24 @@ export function TableChoices(): JSX.Element {
       <fieldset className="columns">
         <legend>{S.tableColumns}</legend>
         {columns.map(([id, label]) => (
-          <label key={id} className="check">
-            <input
-              type="checkbox"
-              checked={isColumnShown({ hidden }, id)}
-              onChange={(event) => {
-                prefer({ hidden: withColumn(hidden, id, event.target.checked) });
-              }}
-            />
-            <span>{label}</span>
-          </label>
+          <Check
+            key={id}
+            label={label}
+            isOn={isColumnShown({ hidden }, id)}
+            onChange={(isOn) => {
+              prefer({ hidden: withColumn(hidden, id, isOn) });
+            }}
+          />
         ))}
       </fieldset>
       {hasAreas && (
-        <label className="check">
-          <input
-            type="checkbox"
-            checked={isByArea}
-            onChange={(event) => {
-              prefer({ byArea: event.target.checked });
-            }}
-          />
-          <span>{S.tableByArea}</span>
-        </label>
+        <Check
+          label={S.tableByArea}
+          isOn={isByArea}
+          onChange={(isOn) => {
+            prefer({ byArea: isOn });
+          }}
+        />
       )}
       <Segmented<Settings['density']>
         legend={S.density}

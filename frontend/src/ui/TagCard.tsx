@@ -10,6 +10,7 @@ import type { Tag } from '../domain/twin';
 import { unitOf, type TemperatureUnit } from '../domain/units';
 import type { TagHealth, TagHistory } from '../contract/types';
 import { commandMap } from '../map/commands';
+import { Comments } from '../notes/Comments';
 import { act, useApp } from '../store/app';
 import { selectCatalogue, selectHealth } from '../store/derived';
 import { selectNewestTag, selectShown, selectTag } from '../store/moment';
@@ -19,13 +20,13 @@ import { CardEstimate } from './estimate';
 import { HealthMark } from './HealthMark';
 import { inTime } from './inTime';
 import { Icon } from '../widgets/Icon';
+import { IconButton } from '../widgets/IconButton';
 import { Reasons } from './Reasons';
 import { Sparkline } from './Sparkline';
 import { Tries } from './Tries';
 import { asOf, useHistory } from './useHistory';
 
 // Charts come after the first paint, and their library with them.
-const Comments = inTime(async () => (await import('../notes/parts')).Comments);
 const CardChart = inTime(async () => (await import('../charts/CardChart')).default);
 
 /** Everything about one tag, over the map. */
@@ -64,17 +65,13 @@ export function TagCard({ tagId }: { tagId: string }): JSX.Element {
           <bdi>{S.card(shown(tagId, 24))}</bdi>
         </h2>
         {health && <HealthMark verdict={health.verdict} />}
-        <button
-          type="button"
-          className="icon-button"
-          aria-label={S.cardClose}
-          title={S.cardClose}
+        <IconButton
+          icon="close"
+          label={S.cardClose}
           onClick={() => {
             act({ type: 'select', tagId: null });
           }}
-        >
-          <Icon name="close" />
-        </button>
+        />
       </header>
       {tag ? (
         <CardBody tag={tag} health={health} unit={unit} history={history} />

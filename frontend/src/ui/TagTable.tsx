@@ -132,7 +132,7 @@ export function TagTable(): JSX.Element {
             const height = part.rows * sight.rowHeight;
             return (
               <tr key={`gap ${place}`} className="gap" aria-hidden="true" style={{ height }}>
-                <td colSpan={columns} />
+                <td />
               </tr>
             );
           }

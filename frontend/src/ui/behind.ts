@@ -7,6 +7,7 @@ import '../styles/hover.css';
 import '../styles/timebar.css';
 import '../styles/alarms.css';
 import '../styles/attention.css';
+import '../styles/comments.css';
 import '../styles/bound.css';
 import '../styles/paper.css';
 // Last, as it takes back what the others say.
@@ -17,6 +18,7 @@ export { startNotify } from '../alarms/notify';
 export { startSound } from '../alarms/sound';
 export { saveTable } from '../export/actions';
 export { startGestures } from '../map/gestures';
+export { startComments } from '../notes/comments';
 export { startDifference } from '../store/difference';
 export { startOpening } from '../store/remembered';
 export { startRemembered } from '../store/remembered';

@@ -1,7 +1,7 @@
 import { fetchHistory } from '../contract/api';
 import type { TagHistory, WireTime } from '../contract/types';
 import { secondsOf } from '../domain/rostime';
-import { memoLast } from '../store/memo';
+import { memoLast } from '../domain/memo';
 import { useFetched } from '../store/useFetched';
 
 /** Of the last scans and tries those that had been made by then, ROS seconds; null: now. */

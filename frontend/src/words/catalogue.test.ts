@@ -7,19 +7,14 @@ import { describe, expect, test } from 'vitest';
 import { parametersIn, saidBy } from '../testing/words';
 import { ENGLISH } from './en';
 import { ESTIMATE } from './en/estimate';
-import { ROBOT } from './en/robot';
 import { estimateWordsOf } from './estimate';
 import { GERMAN } from './de';
 import { ESTIMATE as GERMAN_ESTIMATE } from './de/estimate';
-import { ROBOT as GERMAN_ROBOT } from './de/robot';
 import { DUTCH } from './nl';
 import { ESTIMATE as DUTCH_ESTIMATE } from './nl/estimate';
-import { ROBOT as DUTCH_ROBOT } from './nl/robot';
 import { SPANISH } from './es';
 import { ESTIMATE as SPANISH_ESTIMATE } from './es/estimate';
-import { ROBOT as SPANISH_ROBOT } from './es/robot';
 import { wordsOf } from './load';
-import { robotWordsOf } from './robot';
 
 const sourcesIn = (folder: string): [name: string, text: string][] =>
   readdirSync(join(import.meta.dirname, folder)).map((name) => [
@@ -28,7 +23,7 @@ const sourcesIn = (folder: string): [name: string, text: string][] =>
   ]);
 
 const parameters = new Map(sourcesIn('en').flatMap(([, text]) => [...parametersIn(text)]));
-const english = saidBy({ ...ENGLISH, ...ESTIMATE, ...ROBOT }, parameters);
+const english = saidBy({ ...ENGLISH, ...ESTIMATE }, parameters);
 
 /** Texts that are the same in another language: names, signs, and words that both have. */
 const SAME: Readonly<Record<string, readonly string[]>> = {
@@ -68,11 +63,11 @@ test('English has words, and what they are made of is known', () => {
 });
 
 describe.each([
-  ['de', GERMAN, GERMAN_ESTIMATE, GERMAN_ROBOT],
-  ['nl', DUTCH, DUTCH_ESTIMATE, DUTCH_ROBOT],
-  ['es', SPANISH, SPANISH_ESTIMATE, SPANISH_ROBOT],
-] as const)('%s', (language, words, estimate, robot) => {
-  const all = { ...words, ...estimate, ...robot };
+  ['de', GERMAN, GERMAN_ESTIMATE],
+  ['nl', DUTCH, DUTCH_ESTIMATE],
+  ['es', SPANISH, SPANISH_ESTIMATE],
+] as const)('%s', (language, words, estimate) => {
+  const all = { ...words, ...estimate };
   const said = new Map(saidBy(all, parameters).map(({ at, text }) => [at, text]));
 
   test('says all that English says, and nothing else', () => {
@@ -134,7 +129,6 @@ describe.each([
   test('comes when it is asked for, and asks the page for nothing', async () => {
     expect(await wordsOf(language)).toBe(words);
     expect(await estimateWordsOf(language)).toBe(estimate);
-    expect(await robotWordsOf(language)).toBe(robot);
     // The page waits for it: an import of anything that the page has would wait for ever.
     const sources = [
       ...sourcesIn(language),
@@ -164,10 +158,10 @@ const BEHIND = /More(?:$|\.)|^offlineMore\.|More\(/;
 
 test('no word of the machines is in the first layer, in any language', () => {
   for (const words of [
-    { ...ENGLISH, ...ESTIMATE, ...ROBOT },
-    { ...GERMAN, ...GERMAN_ESTIMATE, ...GERMAN_ROBOT },
-    { ...DUTCH, ...DUTCH_ESTIMATE, ...DUTCH_ROBOT },
-    { ...SPANISH, ...SPANISH_ESTIMATE, ...SPANISH_ROBOT },
+    { ...ENGLISH, ...ESTIMATE },
+    { ...GERMAN, ...GERMAN_ESTIMATE },
+    { ...DUTCH, ...DUTCH_ESTIMATE },
+    { ...SPANISH, ...SPANISH_ESTIMATE },
   ]) {
     const first = saidBy(words, parameters)
       .map(({ at, text }) => ({ at, text: text.replaceAll(/⟦\w+⟧/g, '') }))

@@ -1,22 +1,18 @@
 /** The words of the page over all greenhouses; few enough that every language comes along. */
 import type { Language } from './languages';
-import { REPORT } from './report';
 import type { In } from './shape';
 
 const ENGLISH = {
-  title: 'Greenhouses',
   search: 'Search',
   filter: 'Filter by status',
   all: 'All',
   silent: 'Silent',
   list: 'Greenhouses, the worst first',
-  alarms: (count: number): string => (count === 1 ? '1 alarm' : `${count} alarms`),
   alarmsBeingRead: 'Alarms are being read',
   noAlarms: 'No alarms',
   judging: 'Being judged',
   received: (time: string): string => `Last received ${time}`,
   nothingReceived: 'Nothing received yet',
-  live: 'Live',
   silentSince: (time: string): string => `Silent since ${time}`,
   asOf: (time: string): string => `As of ${time}`,
   neverForwarded: 'Never forwarded',
@@ -31,7 +27,6 @@ const ENGLISH = {
   allGroups: 'All groups',
   others: 'Other greenhouses',
   compare: 'Compare',
-  report: REPORT.en,
   connecting: 'Connecting…',
   empty: 'No greenhouse is forwarded to this archive yet.',
   noMatch: 'No greenhouse matches.',
@@ -41,19 +36,16 @@ const ENGLISH = {
 export type FleetWords = In<typeof ENGLISH>;
 
 const GERMAN: FleetWords = {
-  title: 'Gewächshäuser',
   search: 'Suchen',
   filter: 'Nach Zustand filtern',
   all: 'Alle',
   silent: 'Still',
   list: 'Gewächshäuser, die schlimmsten zuerst',
-  alarms: (count) => (count === 1 ? '1 Alarm' : `${count} Alarme`),
   alarmsBeingRead: 'Alarme werden gelesen',
   noAlarms: 'Keine Alarme',
   judging: 'Wird beurteilt',
   received: (time) => `Zuletzt empfangen ${time}`,
   nothingReceived: 'Noch nichts empfangen',
-  live: 'Live',
   silentSince: (time) => `Still seit ${time}`,
   asOf: (time) => `Stand ${time}`,
   neverForwarded: 'Nie weitergeleitet',
@@ -68,7 +60,6 @@ const GERMAN: FleetWords = {
   allGroups: 'Alle Gruppen',
   others: 'Andere Gewächshäuser',
   compare: 'Vergleichen',
-  report: REPORT.de,
   connecting: 'Verbindung wird aufgebaut …',
   empty: 'In dieses Archiv wird noch kein Gewächshaus weitergeleitet.',
   noMatch: 'Kein Gewächshaus passt dazu.',
@@ -76,19 +67,16 @@ const GERMAN: FleetWords = {
 };
 
 const DUTCH: FleetWords = {
-  title: 'Kassen',
   search: 'Zoeken',
   filter: 'Filteren op toestand',
   all: 'Alle',
   silent: 'Stil',
   list: 'Kassen, de slechtste eerst',
-  alarms: (count) => (count === 1 ? '1 alarm' : `${count} alarmen`),
   alarmsBeingRead: 'Alarmen worden gelezen',
   noAlarms: 'Geen alarmen',
   judging: 'Wordt beoordeeld',
   received: (time) => `Laatst ontvangen ${time}`,
   nothingReceived: 'Nog niets ontvangen',
-  live: 'Live',
   silentSince: (time) => `Stil sinds ${time}`,
   asOf: (time) => `Stand van ${time}`,
   neverForwarded: 'Nooit doorgestuurd',
@@ -103,7 +91,6 @@ const DUTCH: FleetWords = {
   allGroups: 'Alle groepen',
   others: 'Andere kassen',
   compare: 'Vergelijken',
-  report: REPORT.nl,
   connecting: 'Verbinden…',
   empty: 'Er wordt nog geen kas naar dit archief doorgestuurd.',
   noMatch: 'Geen kas voldoet hieraan.',
@@ -111,19 +98,16 @@ const DUTCH: FleetWords = {
 };
 
 const SPANISH: FleetWords = {
-  title: 'Invernaderos',
   search: 'Buscar',
   filter: 'Filtrar por estado',
   all: 'Todos',
   silent: 'Sin señal',
   list: 'Invernaderos, los peores primero',
-  alarms: (count) => (count === 1 ? '1 alarma' : `${count} alarmas`),
   alarmsBeingRead: 'Se leen las alarmas',
   noAlarms: 'Sin alarmas',
   judging: 'Se está evaluando',
   received: (time) => `Última recepción ${time}`,
   nothingReceived: 'Aún no se ha recibido nada',
-  live: 'En directo',
   silentSince: (time) => `Sin señal desde ${time}`,
   asOf: (time) => `A las ${time}`,
   neverForwarded: 'Nunca reenviado',
@@ -137,7 +121,6 @@ const SPANISH: FleetWords = {
   allGroups: 'Todos los grupos',
   others: 'Otros invernaderos',
   compare: 'Comparar',
-  report: REPORT.es,
   connecting: 'Conectando…',
   empty: 'Todavía no se reenvía ningún invernadero a este archivo.',
   noMatch: 'Ningún invernadero coincide.',

@@ -4,6 +4,7 @@ import { epochOf } from '../../clock';
 import { clockText } from '../../domain/format';
 import { rosText, secondsOf } from '../../domain/rostime';
 import { useApp } from '../../store/app';
+import { selectNewestHealth } from '../../store/derived';
 import { selectNewest, selectShown } from '../../store/moment';
 import { S } from '../../strings';
 
@@ -17,16 +18,16 @@ export function AlarmNotes({ isEmpty }: { isEmpty: boolean }): JSX.Element {
   // Of a silent twin the bridge goes on to tell: that is an alarm itself.
   const isLost = phase !== 'live' && phase !== 'offline';
   const isKnown = alarms !== null && !isLost && !isStarting;
+  const isLast = isLost && takenAt !== null;
+  const critical = useApp((state) => selectNewestHealth(state)?.counts.critical ?? 0);
   return (
     <div className="alarm-notes">
       {moment !== null && <p data-note="now">{S.alarmsOfNow(rosText(moment))}</p>}
-      {isLost && takenAt !== null && (
-        <p data-note="lost">{S.alarmsLost(clockText(epochOf(takenAt)))}</p>
-      )}
+      {isLast && <p data-note="lost">{S.alarmsLost(clockText(epochOf(takenAt)))}</p>}
       {isStarting && <p data-note="starting">{S.alarmsStarting}</p>}
-      {isEmpty && (
+      {isEmpty && !isLast && (
         <p className="alarm-none" data-note={isKnown ? 'none' : 'unknown'}>
-          {isKnown ? S.alarmsNone : S.alarmsNotYet}
+          {!isKnown ? S.alarmsNotYet : critical > 0 ? S.alarmsWait(critical) : S.alarmsNone}
         </p>
       )}
       {isEmpty && isKnown && <p className="faint">{S.alarmsNoneHint}</p>}

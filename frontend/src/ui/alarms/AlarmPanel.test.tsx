@@ -161,12 +161,17 @@ test('without an alarm it says so; where that is not known it says that', () => 
   expect(notes()).toEqual(['none']);
   expect(screen.getByText('No alarm is active')).toBeTruthy();
   flush(() => {
+    showTags([wireTag()], judgement({ 1: [reason()] }));
+  });
+  tell();
+  expect(screen.getByText('No alarm yet: 1 critical tag waits for a second scan')).toBeTruthy();
+  flush(() => {
     receive({ type: 'alarms', alarms: alarms([], { source: 'heard' }) });
   });
   expect(notes()).toEqual(['none', 'heard']);
   tell();
   flush(goLost);
-  expect(notes()).toEqual(['lost', 'unknown']);
+  expect(notes()).toEqual(['lost']);
 });
 
 test('it is of now, and says so while another moment is shown', () => {

@@ -24,6 +24,7 @@ import { LONGEST_FILTER } from '../../store/view';
 import { S } from '../../strings';
 import { Disclosure } from '../../widgets/Disclosure';
 import { Icon } from '../../widgets/Icon';
+import { Select } from '../../widgets/Select';
 import { HealthMark } from '../HealthMark';
 import { AlarmNotes } from './AlarmNotes';
 import { AlarmRow, type GroupName } from './AlarmRow';
@@ -72,19 +73,13 @@ export function AlarmPanel(): JSX.Element {
             }}
           />
         </label>
-        <select
+        <Select
           aria-label={S.alarmOrder}
           value={order}
-          onChange={(event) => {
-            setOrder(event.target.value as Order);
-          }}
-        >
-          {ORDERS.map((each) => (
-            <option key={each} value={each}>
-              {S.alarmOrders[each]}
-            </option>
-          ))}
-        </select>
+          options={ORDERS}
+          text={(each) => S.alarmOrders[each]}
+          onChange={setOrder}
+        />
         <button
           type="button"
           className="text-button"

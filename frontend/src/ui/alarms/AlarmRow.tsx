@@ -6,16 +6,14 @@ import { acknowledgeAlarms, unacknowledgeAlarm, unshelveAlarm } from '../../alar
 import { selectSpeech } from '../../alarms/speech';
 import { nameText, whereText } from '../../alarms/words';
 import { todoText } from '../../domain/reasons';
+import { Comments } from '../../notes/Comments';
 import { useApp } from '../../store/app';
 import { S } from '../../strings';
 import { HealthMark } from '../HealthMark';
-import { inTime } from '../inTime';
 import { AlarmFacts, useValues } from './AlarmFacts';
 import { Either } from './Either';
 import { once } from './once';
 import { Shelving } from './Shelving';
-
-const Comments = inTime(async () => (await import('../../notes/parts')).Comments);
 
 export type GroupName = 'active' | 'shelved' | 'resolved';
 
@@ -56,7 +54,9 @@ export const AlarmRow = memo(function AlarmRow({
             {': '}
             {values.what}
           </span>
-          {group !== 'resolved' && <span className="alarm-do">{todoText(alarm.reason)}</span>}
+          {group !== 'resolved' && current !== 'healthy' && (
+            <span className="alarm-do">{todoText(alarm.reason)}</span>
+          )}
           <AlarmFacts item={item} values={values} isShelved={group === 'shelved'} />
         </span>
       </button>

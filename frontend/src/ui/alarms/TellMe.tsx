@@ -5,6 +5,7 @@ import { own } from '../../alarms/own';
 import { soundState, wishSound, type SoundState } from '../../alarms/sound';
 import { useSelected } from '../../store/create';
 import { S } from '../../strings';
+import { Check } from '../../widgets/Check';
 
 /** What is to be said of it; asked for anew each time, for words come in several languages. */
 const soundHint = (state: SoundState): string =>
@@ -65,16 +66,13 @@ function Way({
   const id = useId();
   return (
     <div data-way={name}>
-      <label className="check">
-        <input
-          type="checkbox"
-          checked={isOn}
-          disabled={!isPossible}
-          aria-describedby={id}
-          onChange={(event) => void onChange(event.target.checked)}
-        />
-        <span>{label}</span>
-      </label>
+      <Check
+        label={label}
+        isOn={isOn}
+        disabled={!isPossible}
+        aria-describedby={id}
+        onChange={(isWished) => void onChange(isWished)}
+      />
       <p className="faint" id={id} role="status">
         {hint}
       </p>

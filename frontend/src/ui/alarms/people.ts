@@ -7,7 +7,7 @@ import { now, timeOfDay } from '../../clock';
 import { fetchSession, postNote, withdrawNote } from '../../contract/people';
 import type { Alarm } from '../../contract/types';
 import { secondsOf } from '../../domain/rostime';
-import { store } from '../../store/app';
+import { onChange, store } from '../../store/app';
 import { rosNow } from '../../store/moment';
 import { person } from '../../store/signals';
 import { say } from '../toast';
@@ -128,19 +128,13 @@ async function tell(before: Kept, next: Kept): Promise<void> {
 export function startPeople(): () => void {
   const abort = new AbortController();
   const stops: (() => void)[] = [];
-  let alarms: unknown = null;
-  const onStore = (): void => {
-    if (alarms === store.get().twin.alarms) return;
-    ({ alarms } = store.get().twin);
-    take();
-  };
   fetchSession(abort.signal).then(
     (session) => {
       if (!session.name) return;
       person.dispatch(session);
       if (session.can_write_notes) acting.tell = (before, next) => void tell(before, next);
-      stops.push(store.subscribe(onStore));
-      onStore();
+      stops.push(onChange(({ twin }) => [twin.alarms], take));
+      take();
     },
     () => {
       // Without an answer everything stays this browser's own.

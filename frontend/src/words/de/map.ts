@@ -92,4 +92,11 @@ export const MAP: In<typeof ENGLISH> = {
   differenceSinceYesterday: (clock) => `gegenüber gestern ${clock}`,
   differenceSinceWeek: (clock) => `gegenüber vor einer Woche, ${clock}`,
   differenceSince: (moment) => `gegenüber ${moment}`,
+
+  robotLayer: 'Roboter',
+  robotAt: (x, y) => `Roboter: ${x} m, ${y} m`,
+  robotNowhere: 'Roboter: Position unbekannt',
+  robotAgeUnknown: 'Alter unbekannt',
+  robotBattery: (percent) => `Akku ${percent}`,
+  robotReported: (percent, ago) => `Akku ${percent}, gemeldet ${ago}`,
 };

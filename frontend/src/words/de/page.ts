@@ -142,6 +142,7 @@ export const PAGE: In<typeof ENGLISH> = {
   savePng: 'Karte als PNG speichern',
   saveCsv: 'Tabelle als CSV speichern',
   saveCsvShort: 'CSV',
+  report: 'Schichtbericht',
   print: 'Drucken',
   kiosk: 'Wandanzeige',
   kioskLeave: 'Verlassen',

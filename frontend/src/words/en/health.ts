@@ -62,7 +62,7 @@ export const HEALTH = {
     pest: 'Inspect and treat the plants',
     old: 'Check the route of the robot',
     changed: 'Compare with a second meter',
-    silent: 'Check that the twin is running',
+    silent: 'Check the twin, the server and the network',
     stopped: 'Check the robot',
     other: 'Look there',
   },
@@ -91,6 +91,8 @@ export const HEALTH = {
       : `${alarms} alarms are still active: two good scans resolve each`,
   healthSince: (when: string): string => `alarm since ${when}`,
   healthMoreCritical: (count: number): string => `+ ${count} more critical`,
+  /** In place of a verdict, where nobody knows how it is now. */
+  healthNotCurrent: 'Not current',
   healthNothing: 'No reading to assess yet',
   healthFilter: ', show only these tags',
   houseRhythm: (interval: string): string => `a scan every ${interval}`,

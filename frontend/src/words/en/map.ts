@@ -88,4 +88,11 @@ export const MAP = {
   differenceSinceYesterday: (clock: string): string => `since yesterday ${clock}`,
   differenceSinceWeek: (clock: string): string => `since ${clock} a week ago`,
   differenceSince: (moment: string): string => `since ${moment}`,
+
+  robotLayer: 'Robot',
+  robotAt: (x: string, y: string): string => `Robot: ${x} m, ${y} m`,
+  robotNowhere: 'Robot: position unknown',
+  robotAgeUnknown: 'age unknown',
+  robotBattery: (percent: string): string => `battery ${percent}`,
+  robotReported: (percent: string, ago: string): string => `battery ${percent}, reported ${ago}`,
 } as const;

@@ -140,6 +140,7 @@ export const PAGE = {
   savePng: 'Save map as PNG',
   saveCsv: 'Save table as CSV',
   saveCsvShort: 'CSV',
+  report: 'Shift report',
   print: 'Print',
   kiosk: 'Kiosk mode',
   kioskLeave: 'Leave',

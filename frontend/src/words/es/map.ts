@@ -89,4 +89,11 @@ export const MAP: In<typeof ENGLISH> = {
   differenceSinceYesterday: (clock) => `respecto a ayer a las ${clock}`,
   differenceSinceWeek: (clock) => `respecto a hace una semana, ${clock}`,
   differenceSince: (moment) => `respecto a ${moment}`,
+
+  robotLayer: 'Robot',
+  robotAt: (x, y) => `Robot: ${x} m, ${y} m`,
+  robotNowhere: 'Robot: no se sabe dónde está',
+  robotAgeUnknown: 'antigüedad desconocida',
+  robotBattery: (percent) => `batería ${percent}`,
+  robotReported: (percent, ago) => `batería ${percent}, comunicado ${ago}`,
 };

@@ -138,6 +138,7 @@ export const PAGE: In<typeof ENGLISH> = {
   savePng: 'Guardar el mapa como PNG',
   saveCsv: 'Guardar la tabla como CSV',
   saveCsvShort: 'CSV',
+  report: 'Informe de turno',
   print: 'Imprimir',
   kiosk: 'Pantalla mural',
   kioskLeave: 'Salir',

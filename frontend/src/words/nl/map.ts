@@ -91,4 +91,11 @@ export const MAP: In<typeof ENGLISH> = {
   differenceSinceYesterday: (clock) => `ten opzichte van gisteren ${clock}`,
   differenceSinceWeek: (clock) => `ten opzichte van vorige week, ${clock}`,
   differenceSince: (moment) => `ten opzichte van ${moment}`,
+
+  robotLayer: 'Robot',
+  robotAt: (x, y) => `Robot: ${x} m, ${y} m`,
+  robotNowhere: 'Robot: plaats niet bekend',
+  robotAgeUnknown: 'ouderdom niet bekend',
+  robotBattery: (percent) => `accu ${percent}`,
+  robotReported: (percent, ago) => `accu ${percent}, ${ago} gemeld`,
 };

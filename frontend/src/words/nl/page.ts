@@ -143,6 +143,7 @@ export const PAGE: In<typeof ENGLISH> = {
   savePng: 'Kaart opslaan als PNG',
   saveCsv: 'Tabel opslaan als CSV',
   saveCsvShort: 'CSV',
+  report: 'Dienstrapport',
   print: 'Afdrukken',
   kiosk: 'Wandscherm',
   kioskLeave: 'Verlaten',

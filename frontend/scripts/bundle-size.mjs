@@ -13,7 +13,7 @@ const BUDGET_BYTES = {
   behind: 40_000,
   language: 10_000,
   later: 55_000,
-  fleet: 90_000,
+  fleet: 92_000,
   fleetLater: 40_000,
 };
 const STATIC = new URL('../../backend/lupin_bridge/static/', import.meta.url);

@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
+import pytest
 from playwright.sync_api import Browser, expect
 from playwright.sync_api import Page as BrowserPage
 
@@ -59,59 +60,63 @@ def three_sites(archive: Archive, folder: Path) -> Iterator[Page]:
         yield page
 
 
-def test_the_worst_first_and_a_click_away(
-    browser: Browser, archive: Archive, tmp_path: Path
-) -> None:
-    with three_sites(archive, tmp_path) as served:
-        with opened(browser, served.url) as page:
-            names = page.locator(".fleet-name")
-            expect(names).to_have_text(["warm", "silent", "gh1"])
-            cards = page.locator(".fleet-site")
-            expect(cards.nth(0)).to_contain_text("Critical")
-            expect(cards.nth(0)).to_contain_text("5 alarms")
-            expect(cards.nth(1)).to_contain_text("Silent since")
-            expect(cards.nth(1)).to_contain_text("Last known: Healthy")
-            # That it is silent.
-            expect(cards.nth(1)).to_contain_text("1 alarm")
-            # Where the tags are: fetched, and of the size that was kept for it.
-            for card in (cards.nth(0), cards.nth(2)):
-                image = card.locator(".fleet-map img")
-                expect(image).to_have_js_property("complete", value=True)
-                assert image.evaluate("image => image.naturalWidth > 0")
-            expect(cards.nth(1)).not_to_have_attribute("data-health", "healthy")
-            expect(cards.nth(2)).to_contain_text("No alarms")
-            # Nobody says where the rows come from; with two groups at least, there are headings.
-            expect(page.locator(".fleet-origin")).to_have_count(0)
-            expect(page.locator(".fleet-group")).to_have_count(0)
-            picture(page, "light")
-            page.keyboard.press("/")
-            page.keyboard.type("wa")
-            expect(names).to_have_text(["warm"])
-            expect(page.get_by_role("status")).to_have_text("1 of 3 greenhouses shown")
-            page.get_by_role("searchbox").fill("")
-            page.get_by_role("button", name="Silent 1").click()
-            expect(names).to_have_text(["silent"])
-            page.get_by_role("button", name="Healthy 1").click()
-            names.first.click()
-            # The whole page of that greenhouse, below its path.
-            expect(page).to_have_url(re.compile(r"/sites/gh1/"))
-            expect(page.get_by_role("banner")).to_contain_text("gh1")
-            expect(page.locator(".tag-table, table").first).to_contain_text("4")
-            picture(page, "site")
-        with opened(browser, f"{served.url}/sites/silent/") as page:
-            expect(page.get_by_role("banner")).not_to_contain_text("Live", timeout=10_000)
-            picture(page, "silent")
-        with opened(browser, served.url, color_scheme="dark") as page:
-            expect(page.locator(".fleet-site")).to_have_count(3)
-            picture(page, "dark")
-        phone = {"width": 390, "height": 800}
-        with opened(browser, f"{served.url}?kiosk&lang=de", viewport=phone) as page:
-            expect(page.get_by_role("heading", level=1)).to_have_text("Gewächshäuser")
-            expect(page.get_by_role("searchbox")).to_have_count(0)
-            expect(page.locator(".fleet-site")).to_have_count(3)
-            width = page.evaluate("document.documentElement.scrollWidth")
-            assert width <= 390
-            picture(page, "kiosk")
+@pytest.fixture(scope="module")
+def sites(shared_archive: Archive, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Page]:
+    """Those three, for tests that change nothing that another one looks at."""
+    with three_sites(shared_archive, tmp_path_factory.mktemp("sites")) as served:
+        yield served
+
+
+def test_the_worst_first_and_a_click_away(browser: Browser, sites: Page) -> None:
+    with opened(browser, sites.url) as page:
+        names = page.locator(".fleet-name")
+        expect(names).to_have_text(["warm", "silent", "gh1"])
+        cards = page.locator(".fleet-site")
+        expect(cards.nth(0)).to_contain_text("Critical")
+        expect(cards.nth(0)).to_contain_text("5 alarms")
+        expect(cards.nth(1)).to_contain_text("Silent since")
+        expect(cards.nth(1)).to_contain_text("Last known: Healthy")
+        # That it is silent.
+        expect(cards.nth(1)).to_contain_text("1 alarm")
+        # Where the tags are: fetched, and of the size that was kept for it.
+        for card in (cards.nth(0), cards.nth(2)):
+            image = card.locator(".fleet-map img")
+            expect(image).to_have_js_property("complete", value=True)
+            assert image.evaluate("image => image.naturalWidth > 0")
+        expect(cards.nth(1)).not_to_have_attribute("data-health", "healthy")
+        expect(cards.nth(2)).to_contain_text("No alarms")
+        # Nobody says where the rows come from; with two groups at least, there are headings.
+        expect(page.locator(".fleet-origin")).to_have_count(0)
+        expect(page.locator(".fleet-group")).to_have_count(0)
+        picture(page, "light")
+        page.keyboard.press("/")
+        page.keyboard.type("wa")
+        expect(names).to_have_text(["warm"])
+        expect(page.get_by_role("status")).to_have_text("1 of 3 greenhouses shown")
+        page.get_by_role("searchbox").fill("")
+        page.get_by_role("button", name="Silent 1").click()
+        expect(names).to_have_text(["silent"])
+        page.get_by_role("button", name="Healthy 1").click()
+        names.first.click()
+        # The whole page of that greenhouse, below its path.
+        expect(page).to_have_url(re.compile(r"/sites/gh1/"))
+        expect(page.get_by_role("banner")).to_contain_text("gh1")
+        expect(page.locator(".tag-table, table").first).to_contain_text("4")
+        picture(page, "site")
+    with opened(browser, f"{sites.url}/sites/silent/") as page:
+        expect(page.get_by_role("banner")).not_to_contain_text("Live", timeout=10_000)
+        picture(page, "silent")
+    with opened(browser, sites.url, color_scheme="dark") as page:
+        expect(page.locator(".fleet-site")).to_have_count(3)
+        picture(page, "dark")
+    phone = {"width": 390, "height": 800}
+    with opened(browser, f"{sites.url}?kiosk&lang=de", viewport=phone) as page:
+        expect(page.get_by_role("heading", level=1)).to_have_text("Gewächshäuser")
+        expect(page.get_by_role("searchbox")).to_have_count(0)
+        expect(page.locator(".fleet-site")).to_have_count(3)
+        width = page.evaluate("document.documentElement.scrollWidth")
+        assert width <= 390
+        picture(page, "kiosk")
 
 
 def test_the_way_back_from_a_greenhouse_to_all_of_them(browser: Browser, archive: Archive) -> None:
@@ -235,43 +240,42 @@ def test_one_sensor_of_several_greenhouses_the_outlier_first(
 
 
 def test_a_row_for_each_greenhouse_leads_to_its_shift_report(
-    browser: Browser, archive: Archive, tmp_path: Path
+    browser: Browser, sites: Page, shared_archive: Archive
 ) -> None:
     now_ns = wall().stamp_ns
-    with three_sites(archive, tmp_path) as served:
-        archive.do(
-            f"INSERT INTO note VALUES ('warm', 'n1', {now_ns - 10**9}, 'Anna', 'comment', 'tag:1',"
-            f" 'vents <b>checked</b>', NULL), ('gh1', 'n1', {now_ns}, 'Ben', 'acknowledge',"
-            " 'alarm:x', '', NULL), ('gh1', 'n2', 1, 'Cem', 'withdraw', 'note:n1', '', NULL)"
-        )
-        with opened(browser, served.url) as page:
-            page.get_by_role("button", name="Shift report").click()
-            rows = page.get_by_role("table").first.locator("tbody tr")
-            notes = page.get_by_role("table", name="Newest notes").locator("tbody tr")
-            expect(notes).to_have_count(2)
-            expect(notes.nth(0)).to_contain_text("Benalarm acknowledged (withdrawn by Cem)")
-            expect(notes.nth(1)).to_contain_text("warmAnnaTag 1: vents <b>checked</b>")
-            expect(rows.locator("th")).to_have_text(["warm", "silent", "gh1"])
-            asked = served.http.get("/api/report").json()["sites"]
-            scans = next(each["scans"] for each in asked if each["site"] == "warm")
-            assert scans > 0
-            expect(rows.first.locator("td").first).to_have_text(str(scans))
-            expect(rows.first.locator("td").nth(4)).to_have_text("5")
-            # The choice of greenhouses and of the period.
-            page.get_by_role("searchbox").fill("warm")
-            expect(rows).to_have_count(1)
-            with page.expect_response(re.compile(r"/api/report\?from=\d+&sites=warm$")):
-                page.get_by_role("button", name="Last 24 hours").click()
-            picture(page, "report")
-            expect(notes).to_have_count(1)
-            rows.first.get_by_role("link").click()
-            expect(page).to_have_url(re.compile(r"/sites/warm/api/report\.html\?from=.*&lang=en$"))
-            expect(page.get_by_role("heading", level=1)).to_contain_text("report")
-        phone = {"width": 390, "height": 800}
-        with opened(browser, served.url, viewport=phone) as page:
-            page.get_by_role("button", name="Shift report").click()
-            expect(page.get_by_role("table").first.locator("tbody tr")).to_have_count(3)
-            assert page.evaluate("document.documentElement.scrollWidth") <= 390
+    shared_archive.do(
+        f"INSERT INTO note VALUES ('warm', 'n1', {now_ns - 10**9}, 'Anna', 'comment', 'tag:1',"
+        f" 'vents <b>checked</b>', NULL), ('gh1', 'n1', {now_ns}, 'Ben', 'acknowledge',"
+        " 'alarm:x', '', NULL), ('gh1', 'n2', 1, 'Cem', 'withdraw', 'note:n1', '', NULL)"
+    )
+    with opened(browser, sites.url) as page:
+        page.get_by_role("button", name="Shift report").click()
+        rows = page.get_by_role("table").first.locator("tbody tr")
+        notes = page.get_by_role("table", name="Newest notes").locator("tbody tr")
+        expect(notes).to_have_count(2)
+        expect(notes.nth(0)).to_contain_text("Benalarm acknowledged (withdrawn by Cem)")
+        expect(notes.nth(1)).to_contain_text("warmAnnaTag 1: vents <b>checked</b>")
+        expect(rows.locator("th")).to_have_text(["warm", "silent", "gh1"])
+        asked = sites.http.get("/api/report").json()["sites"]
+        scans = next(each["scans"] for each in asked if each["site"] == "warm")
+        assert scans > 0
+        expect(rows.first.locator("td").first).to_have_text(str(scans))
+        expect(rows.first.locator("td").nth(4)).to_have_text("5")
+        # The choice of greenhouses and of the period.
+        page.get_by_role("searchbox").fill("warm")
+        expect(rows).to_have_count(1)
+        with page.expect_response(re.compile(r"/api/report\?from=\d+&sites=warm$")):
+            page.get_by_role("button", name="Last 24 hours").click()
+        picture(page, "report")
+        expect(notes).to_have_count(1)
+        rows.first.get_by_role("link").click()
+        expect(page).to_have_url(re.compile(r"/sites/warm/api/report\.html\?from=.*&lang=en$"))
+        expect(page.get_by_role("heading", level=1)).to_contain_text("report")
+    phone = {"width": 390, "height": 800}
+    with opened(browser, sites.url, viewport=phone) as page:
+        page.get_by_role("button", name="Shift report").click()
+        expect(page.get_by_role("table").first.locator("tbody tr")).to_have_count(3)
+        assert page.evaluate("document.documentElement.scrollWidth") <= 390
 
 
 def test_groups_fold_and_can_be_chosen(browser: Browser, archive: Archive) -> None:

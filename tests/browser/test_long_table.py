@@ -100,15 +100,16 @@ def test_a_filter_and_an_order_have_their_rows_in_sight(open_house: OpenHouse) -
     expect(hmi.row(str(TAGS))).to_be_in_viewport()
 
 
-@pytest.mark.parametrize("viewport", [WIDE, PHONE])
-def test_axe_and_windows_of_any_size(open_house: OpenHouse, viewport: dict[str, int]) -> None:
-    hmi = open_house(1_000, "tag=3", viewport=viewport, bypass_csp=True)
-    tabs = hmi.page.locator(".pane-tabs")
-    if tabs.is_visible():
-        tabs.get_by_role("button", name="Tags").click()
-    expect(hmi.row("3")).to_be_in_viewport()
-    assert len(hmi.rows()) < MOST
-    assert violations(hmi) == []
+def test_axe_and_windows_of_any_size(open_house: OpenHouse) -> None:
+    hmi = open_house(1_000, "tag=3", bypass_csp=True)
+    for viewport in (WIDE, PHONE):
+        hmi.resize(**viewport)
+        tabs = hmi.page.locator(".pane-tabs")
+        if tabs.is_visible():
+            tabs.get_by_role("button", name="Tags").click()
+        expect(hmi.row("3")).to_be_in_viewport()
+        assert len(hmi.rows()) < MOST
+        assert violations(hmi) == []
 
 
 def test_forced_colours_mark_the_chosen_row(open_house: OpenHouse) -> None:

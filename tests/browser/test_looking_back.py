@@ -425,13 +425,10 @@ def test_the_estimate_says_plus_or_minus_what_now_and_then_and_in_its_link(
     expect(theirs.test_id("error-scale")).to_be_visible()
 
 
-@pytest.mark.parametrize("width", [360, 390])
 def test_a_phone_has_the_menu_and_every_count_on_its_screen(
-    hour: Hour, open_page: OpenPage, width: int
+    hour: Hour, open_page: OpenPage
 ) -> None:
-    hmi = open_page(
-        hour.bridge.url, f"at={hour.begun_s + 700}", viewport={"width": width, "height": 740}
-    )
+    hmi = open_page(hour.bridge.url, f"at={hour.begun_s + 700}", viewport=PHONE)
     expect(hmi.app).to_have_attribute("data-past", "true")
     hmi.expect_parts()
     # As wide as the words of a simulation make it.
@@ -439,9 +436,9 @@ def test_a_phone_has_the_menu_and_every_count_on_its_screen(
         """() => document.querySelector('.past-header').insertAdjacentHTML('afterend',
              '<div class="origin"><span class="origin-word">Simulated</span></div>')"""
     )
-    for each in (
-        hmi.page.get_by_role("button", name="Menu"),
-        *hmi.page.locator(".pane-tabs button").all(),
-    ):
-        expect(each).to_be_in_viewport(ratio=1)
-        assert each.evaluate("(e) => e.scrollWidth <= e.clientWidth")
+    buttons = hmi.page.get_by_role("button", name="Menu").or_(hmi.page.locator(".pane-tabs button"))
+    for width in (360, 390):
+        hmi.resize(width, 740)
+        for each in buttons.all():
+            expect(each).to_be_in_viewport(ratio=1)
+            assert each.evaluate("(e) => e.scrollWidth <= e.clientWidth"), width

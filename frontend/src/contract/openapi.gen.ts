@@ -48,6 +48,11 @@ export interface components {
             /** @enum {string} */
             readonly source: "light" | "clock" | "assumed";
         };
+        readonly EstimateQualities: {
+            readonly sensors: {
+                readonly [key: string]: components["schemas"]["EstimateQuality"];
+            };
+        };
         readonly EstimateQuality: {
             readonly fitted_at: components["schemas"]["Time"] | null;
             readonly fit_problem: string;

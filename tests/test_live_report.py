@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import shutil
 from pathlib import Path
 from typing import Any
@@ -65,6 +66,8 @@ def check(live: Bridge) -> None:
     assert "<script" not in page.text
     assert 'lang="de"' in page.text
     assert "(UTC+00:00)" in page.text
+    assert "\u00a0°C" in page.text
+    assert not re.search(r"\d\.\d\d+\u00a0°C", page.text)
 
 
 def check_refusals(live: Bridge) -> None:

@@ -101,6 +101,11 @@ def worst_first(alarm: Alarm) -> tuple[int, int, str]:
     return _ORDER[alarm.reason.verdict], -alarm.raised_at_ns, alarm.id
 
 
+def active_first(alarm: Alarm) -> tuple[bool, tuple[int, int, str]]:
+    """An order: what somebody has to act on, and then what is over, each the worst first."""
+    return not alarm.is_active, worst_first(alarm)
+
+
 # Where the alarms are from: nowhere yet, from a journal, or from what was heard since the start.
 AlarmSource = Literal["starting", "journal", "heard"]
 

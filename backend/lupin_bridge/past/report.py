@@ -19,7 +19,7 @@ from typing import Any, Final
 
 import orjson
 
-from lupin_bridge.alarms.board import worst_first
+from lupin_bridge.alarms.board import active_first
 from lupin_bridge.alarms.notes import notes_of_alarms
 from lupin_bridge.feed.query import Find
 from lupin_bridge.judge.alarm import Alarm
@@ -258,7 +258,7 @@ class _Fold:
             "alarms_from": stamp(min(max(self._alarms_ns, start_ns), end_ns)),
             "alarms": [
                 alarm_json(alarm, said.get(alarm.id))
-                for alarm in heapq.nsmallest(MAX_LISTED, alarms, key=worst_first)
+                for alarm in heapq.nsmallest(MAX_LISTED, alarms, key=active_first)
             ],
             "notes": [note_json(note, gone) for note in spoken[::-1][:MAX_LISTED]],
             "silences": [

@@ -306,8 +306,11 @@ def _emphasis(entry: Entry) -> str:
 
 
 def _number(value: float | None, unit: str) -> str:
-    """A number in four digits, with its unit on the same line."""
+    """A number as exact as the page has it, with its unit on the same line."""
     if value is None:
         return ""
-    digits = f"{value:.0f}" if 1e3 <= abs(value) < 1e7 else f"{value:.4g}"
+    size = abs(value)
+    digits = f"{value:.4g}"
+    if unit and size < 1e6:
+        digits = f"{value:.{0 if size >= 100 else 1 if size >= 1 else 2}f}"
     return f"{digits}\u00a0{unit}".strip()

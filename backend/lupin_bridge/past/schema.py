@@ -141,7 +141,9 @@ class ShiftReport(Stretch):
     alarms_from: Time = Field(
         description="from here on alarms are worked out: `from`, unless too much was scanned"
     )
-    alarms: list[Alarm] = Field(description="active at any time of the period, the worst first")
+    alarms: list[Alarm] = Field(
+        description="active at any time of the period: first those at its end; the worst first"
+    )
     notes: list[Note] = Field(description="newest first")
     silences: list[ReportSilence] = Field(description="of the greenhouse, then of tags")
     sensors: list[ReportSensor]

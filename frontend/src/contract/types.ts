@@ -53,7 +53,7 @@ export type Alarms = Schemas['Alarms'] & { readonly notes?: number };
 export type HealthReason = Schemas['HealthReason'];
 export type Verdict = TagHealth['verdict'];
 /** How well the estimates of a sensor have foretold. */
-export type Grade = Schemas['EstimateQuality'];
+export type Grade = Schemas['EstimateQualities']['sensors'][string];
 /** What was measured at the tags against what all else foretells. */
 export type ExpectedTags = Schemas['ExpectedTags'];
 export type Expected = Schemas['ExpectedReading'];

@@ -4,7 +4,8 @@ from dataclasses import replace
 
 import pytest
 
-from lupin_bridge.alarms.board import AlarmBoard, Change
+from lupin_bridge.alarms.board import AlarmBoard, Change, active_first
+from lupin_bridge.judge.verdict import Verdict
 from tests.support.seen import Alarms, alarm
 
 A, B = alarm("a"), alarm("b", raised_ns=2)
@@ -56,3 +57,9 @@ def test_who_no_longer_listens_is_not_told_and_one_that_fails_harms_nobody(
     board.show([A], "heard")
     assert (len(heard), gone) == (1, [])
     assert "no network" in caplog.text
+
+
+def test_those_that_are_active_come_before_worse_ones_that_are_over() -> None:
+    over, still = alarm(cleared_ns=9), alarm("b", Verdict.STRESSED)
+    worst = alarm("c")
+    assert sorted([over, still, worst], key=active_first) == [worst, still, over]

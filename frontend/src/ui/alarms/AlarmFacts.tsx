@@ -120,7 +120,7 @@ function Trend({ alarm, value, by }: { alarm: Alarm; value: number; by: number }
   return (
     <span data-trend={way} title={title}>
       <span aria-hidden="true">
-        {ARROWS[way]} {S.trendIn(text)}
+        {ARROWS[way]} {text} {S.trendIn}
       </span>{' '}
       <span className="unseen">{title}</span>
     </span>

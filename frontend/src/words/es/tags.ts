@@ -69,7 +69,7 @@ export const TAGS: In<typeof ENGLISH> = {
   areaNone: 'Sin zona',
   trend: 'Tendencia',
   trendTitle: (sensor) => `${sensor} frente a hace una hora`,
-  trendIn: (difference) => `${difference} en 1\u00a0h`,
+  trendIn: 'en 1\u00a0h',
   trendNone: 'sin lectura hace una hora',
   trendSame: 'sin lectura nueva desde entonces',
   trendUnknown: 'hace una hora: desconocido',

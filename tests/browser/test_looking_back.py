@@ -185,6 +185,9 @@ def test_pests_and_cards_are_those_of_the_moment(page: Hmi, hour: Hour) -> None:
     expect_past(page)
     expect(page.card("b")).to_contain_text(re.compile("pests? seen", re.IGNORECASE))
     expect(page.card("b").locator("[data-sensor=temperature] strong")).to_have_text("20.3\u00a0°C")
+    # What was wrong then is told; what was to be done is no order now.
+    expect(page.test_id("health-driver")).to_contain_text(re.compile("pests? seen", re.IGNORECASE))
+    expect(page.page.locator(".do-what strong")).to_have_count(0)
     page.turn(f"tag=b&at={hour.begun_s + 1000}&period=hour")
     expect_past(page)
     expect(page.card("b")).not_to_contain_text(re.compile("pests? seen", re.IGNORECASE))

@@ -4,6 +4,7 @@ import { whenText } from '../alarms/words';
 import { alarmList } from '../alarms/watch';
 import { now } from '../clock';
 import type { HealthReason } from '../contract/types';
+import { clockText } from '../domain/format';
 import { VERDICTS, worstReason, type HouseHealth } from '../domain/health';
 import { todoText } from '../domain/reasons';
 import { secondsOf } from '../domain/rostime';
@@ -33,20 +34,24 @@ export function useUrgent(): readonly Row[] {
   );
 }
 
-/** Since when the alarm of a reason is active; null: there is none, or another moment is shown. */
+/**
+ * Since when the alarm of a reason is active, or what somebody has said of it; null: there is none,
+ * or another moment is shown.
+ */
 export function useSince(tagId: string, reason: HealthReason | undefined): string | null {
   const isNow = useApp((state) => selectShown(state).moment === null);
-  const begin = useSelected(alarmList, ({ active, shelved }) => {
-    const found = [...active, ...shelved].find(
+  const found = useSelected(alarmList, ({ active, shelved }) =>
+    [...active, ...shelved].find(
       ({ alarm }) =>
         alarm.tag_id === tagId &&
         alarm.reason.kind === reason?.kind &&
         alarm.reason.sensor === reason.sensor,
-    );
-    return found ? secondsOf(found.alarm.raised_at) : null;
-  });
-  if (!isNow || begin === null) return null;
-  return S.healthSince(whenText(begin, rosNow(store.get(), now())));
+    ),
+  );
+  if (!isNow || !found) return null;
+  if (found.shelf) return S.alarmShelved(clockText(found.shelf.until), '');
+  if (found.isAcknowledged) return S.healthAcknowledged;
+  return S.healthSince(whenText(secondsOf(found.alarm.raised_at), rosNow(store.get(), now())));
 }
 
 /** What has to be done first: where, why, what, and since when; else how the greenhouse is. */
@@ -107,13 +112,15 @@ function Todo({
 }): JSX.Element {
   const why = S.healthDriver(shown(tagId, 24), useReasonText(reason ?? null, true));
   const since = useSince(tagId, reason);
+  // What was to be done then is no order now.
+  const isNow = useApp((state) => selectShown(state).moment === null);
   return (
     <>
       <span className="do-why" title={why} data-testid={id}>
         {why}
       </span>
       <span className="do-what">
-        {reason && <strong>{todoText(reason)}</strong>} {since && <small>{since}</small>}
+        {reason && isNow && <strong>{todoText(reason)}</strong>} {since && <small>{since}</small>}
         {more > 0 && <small className="do-more">{S.healthMoreCritical(more)}</small>}
       </span>
     </>

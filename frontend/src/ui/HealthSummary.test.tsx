@@ -1,7 +1,9 @@
 import { act, fireEvent, render, screen } from '@testing-library/react';
 import { expect, test } from 'vitest';
 
-import { startAlarms } from '../alarms/watch';
+import { calling } from '../alarms/list';
+import { acknowledgeAlarms } from '../alarms/own';
+import { alarmList, startAlarms } from '../alarms/watch';
 import { store } from '../store/app';
 import { alarm, tellAlarms } from '../testing/alarms';
 import { judgement, reason } from '../testing/health';
@@ -32,13 +34,19 @@ test('says what to do first, and since when', () => {
   const stop = startAlarms();
   render(<HealthSummary kiosk={false} />);
   act(() => {
-    tellAlarms(alarm('a', { tag_id: '5', raised: 100 }));
+    tellAlarms(alarm('a', { tag_id: '5', raised: 100, reason: pest }));
   });
   const todo = screen.getByRole('list', { name: 'Do this now' });
   expect([...todo.children].map(({ textContent }) => textContent)).toEqual([
-    expect.stringMatching(/^CriticalTag 5: 2 pests seenInspect and treat the plants /),
+    expect.stringMatching(/^CriticalTag 5: 2 pests seenInspect and treat the plants alarm since /),
     'CriticalTag 1: Pest seenInspect and treat the plants ',
   ]);
+  act(() => {
+    acknowledgeAlarms(calling(alarmList.get()));
+  });
+  expect(todo.firstElementChild?.textContent).toMatch(
+    /^CriticalTag 5: .*treat the plants acknowledged/,
+  );
   stop();
 });
 

@@ -181,7 +181,7 @@ describe('table', () => {
       });
     });
     expect(trends()).toEqual([
-      '\u2197 Temperature compared with an hour ago: +1.5\u00a0°C in 1\u00a0h',
+      '\u2197 Temperature compared with an hour ago: +1.5\u00a0°C/h',
       '– no reading an hour ago',
     ]);
     // An answer of long ago is none.

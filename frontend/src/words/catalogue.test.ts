@@ -29,7 +29,7 @@ const english = saidBy({ ...ENGLISH, ...ESTIMATE }, parameters);
 const SAME: Readonly<Record<string, readonly string[]>> = {
   de: [
     ...['phase.live', 'timebarLive', 'keys.time.3.1', 'themes.system', 'tried.ok', 'sensors'],
-    ...['cardPosition', 'rangeAuto', 'saveCsvShort', 'fileName', 'legendMore', 'trendIn'],
+    ...['cardPosition', 'rangeAuto', 'saveCsvShort', 'fileName', 'legendMore'],
     ...['keys.global.12.0', 'idealParts.any', 'colourings.ideal', 'differenceTimes'],
   ],
   nl: [

@@ -120,7 +120,7 @@ function Trend({ alarm, value, by }: { alarm: Alarm; value: number; by: number }
   return (
     <span data-trend={way} title={title}>
       <span aria-hidden="true">
-        {ARROWS[way]} {text} {S.trendIn}
+        {ARROWS[way]} {text}/h
       </span>{' '}
       <span className="unseen">{title}</span>
     </span>

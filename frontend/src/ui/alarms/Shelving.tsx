@@ -26,10 +26,13 @@ function Choice({ item }: { item: Item }): JSX.Element {
   const [reason, setReason] = useState('');
   const close = useClose();
   const root = useRef<HTMLDivElement>(null);
+  const field = useRef<HTMLInputElement>(null);
+  const isNeeded = needsReason(item.verdict);
   useLayoutEffect(() => {
     root.current?.scrollIntoView({ block: 'nearest' });
-  }, []);
-  const isNeeded = needsReason(item.verdict);
+    // What is typed at once is the reason, and no shortcut.
+    if (isNeeded) field.current?.focus({ preventScroll: true });
+  }, [isNeeded]);
   const given = reason.trim();
   return (
     <div className="shelf" ref={root}>
@@ -37,6 +40,7 @@ function Choice({ item }: { item: Item }): JSX.Element {
       <label>
         {isNeeded ? S.alarmShelfReason : S.alarmShelfReasonOptional}
         <input
+          ref={field}
           type="text"
           value={reason}
           required={isNeeded}

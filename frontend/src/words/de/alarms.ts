@@ -26,7 +26,7 @@ export const ALARMS: In<typeof ENGLISH> = {
   alarmWorst: {
     below: (reading) => `tiefster Wert ${reading}`,
     above: (reading) => `höchster Wert ${reading}`,
-    pest: (reading) => `höchstens ${reading}`,
+    pest: (reading) => `Höchstwert ${reading}`,
   },
   alarmFirst: (reading) => `anfangs ${reading}`,
   alarmStatus: { critical: 'kritisch', healthy: 'im Sollbereich' },
@@ -36,7 +36,7 @@ export const ALARMS: In<typeof ENGLISH> = {
   alarmAcknowledge: 'Quittieren',
   alarmAcknowledgeOf: (what) => `Quittieren: ${what}`,
   alarmAcknowledgeAll: (count) => `Alle quittieren (${count})`,
-  alarmUnacknowledge: 'Aufheben',
+  alarmUnacknowledge: 'Quittierung aufheben',
   alarmUnacknowledgeOf: (what) => `Quittierung aufheben: ${what}`,
   alarmShelve: 'Zurückstellen',
   alarmShelveOf: (what) => `Zurückstellen: ${what}`,

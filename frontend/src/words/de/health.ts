@@ -87,7 +87,9 @@ export const HEALTH: In<typeof ENGLISH> = {
       ? '1 Alarm steht noch an: Zwei gute Messungen heben ihn auf'
       : `${alarms} Alarme stehen noch an: Je zwei gute Messungen heben sie auf`,
   healthSince: (when) => `Alarm seit ${when}`,
-  healthMoreCritical: (count) => `+ ${count} weitere kritisch`,
+  healthAcknowledged: 'quittiert',
+  healthMoreCritical: (count) =>
+    `+ ${count} ${count === 1 ? 'weiterer kritischer' : 'weitere kritische'}`,
   healthNotCurrent: 'Nicht aktuell',
   healthNothing: 'Noch kein Messwert zu beurteilen',
   healthFilter: ', nur diese Messpunkte anzeigen',

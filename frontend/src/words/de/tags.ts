@@ -69,7 +69,6 @@ export const TAGS: In<typeof ENGLISH> = {
   areaNone: 'Kein Bereich',
   trend: 'Tendenz',
   trendTitle: (sensor) => `${sensor}: Änderung gegenüber vor einer Stunde`,
-  trendIn: 'in 1\u00a0h',
   trendNone: 'vor einer Stunde kein Messwert',
   trendSame: 'seither kein neuer Messwert',
   trendUnknown: 'vor einer Stunde: nicht bekannt',

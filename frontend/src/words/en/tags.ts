@@ -66,7 +66,6 @@ export const TAGS = {
   areaNone: 'No area',
   trend: 'Trend',
   trendTitle: (sensor: string): string => `${sensor} compared with an hour ago`,
-  trendIn: 'in 1\u00a0h',
   trendNone: 'no reading an hour ago',
   trendSame: 'no new reading since',
   trendUnknown: 'an hour ago: unknown',

@@ -90,6 +90,7 @@ export const HEALTH: In<typeof ENGLISH> = {
       ? 'Aún hay 1 alarma activa: dos mediciones buenas la resuelven'
       : `Aún hay ${alarms} alarmas activas: dos mediciones buenas resuelven cada una`,
   healthSince: (when) => `alarma desde ${when}`,
+  healthAcknowledged: 'reconocida',
   healthMoreCritical: (count) => `+ ${count} más en estado crítico`,
   healthNotCurrent: 'No actualizado',
   healthNothing: 'Aún no hay lecturas que evaluar',

@@ -69,7 +69,6 @@ export const TAGS: In<typeof ENGLISH> = {
   areaNone: 'Sin zona',
   trend: 'Tendencia',
   trendTitle: (sensor) => `${sensor} frente a hace una hora`,
-  trendIn: 'en 1\u00a0h',
   trendNone: 'sin lectura hace una hora',
   trendSame: 'sin lectura nueva desde entonces',
   trendUnknown: 'hace una hora: desconocido',

@@ -87,6 +87,7 @@ export const HEALTH: In<typeof ENGLISH> = {
       ? '1 alarm is nog actief: twee goede metingen lossen het op'
       : `${alarms} alarmen zijn nog actief: telkens twee goede metingen lossen ze op`,
   healthSince: (when) => `alarm sinds ${when}`,
+  healthAcknowledged: 'bevestigd',
   healthMoreCritical: (count) => `+ nog ${count} kritiek`,
   healthNotCurrent: 'Niet actueel',
   healthNothing: 'Nog geen meetwaarde om te beoordelen',

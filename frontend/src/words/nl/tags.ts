@@ -69,7 +69,6 @@ export const TAGS: In<typeof ENGLISH> = {
   areaNone: 'Geen afdeling',
   trend: 'Trend',
   trendTitle: (sensor) => `${sensor} vergeleken met een uur geleden`,
-  trendIn: 'in 1\u00a0u',
   trendNone: 'een uur geleden geen meting',
   trendSame: 'sindsdien geen nieuwe meting',
   trendUnknown: 'een uur geleden: niet bekend',

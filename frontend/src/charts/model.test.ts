@@ -164,8 +164,11 @@ describe('the axis of the values', () => {
     const humidity = { sensor: sensorNamed('humidity') };
     expect(valueRange(model([reading(60, 74)], humidity))[1]).toBeCloseTo(85 + 35 * 0.08);
     expect(valueRange(model([reading(60, 73.9)], humidity))[1]).toBeLessThan(85);
+    // Below it, the critical limit of 10 is taken in, though 18 is too far off.
+    expect(valueRange(model([reading(5.6, 8.2)]))[1]).toBeCloseTo(10 + 4.4 * 0.08);
+    expect(valueRange(model([reading(19, 25)]))[0]).toBeGreaterThan(10);
     // Far above it, the ideal range stays out.
-    expect(valueRange(model([reading(40, 44)]))[0]).toBeGreaterThan(39);
+    expect(valueRange(model([reading(40, 44)]))[0]).toBeGreaterThan(26);
   });
 
   test('makes no mountains of noise, and has one without any reading', () => {
@@ -178,11 +181,11 @@ describe('the axis of the values', () => {
   });
 
   test('leaves room below the values for marks', () => {
-    const plain = model([reading(10, 30)]);
+    const plain = model([reading(10, 26)]);
     const mark = { at: 5, widthS: 1, kind: 'look' as const, count: 1 };
     const marked = { ...plain, lines: plain.lines.map((line) => ({ ...line, marks: [mark] })) };
-    expect(valueRange(plain)[0]).toBeCloseTo(10 - 20 * 0.08);
-    expect(valueRange(marked)[0]).toBeCloseTo(10 - 20 * 0.3);
+    expect(valueRange(plain)[0]).toBeCloseTo(10 - 16 * 0.08);
+    expect(valueRange(marked)[0]).toBeCloseTo(10 - 16 * 0.3);
   });
 
   test('is in the unit that is shown', () => {

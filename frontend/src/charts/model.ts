@@ -129,7 +129,8 @@ export function valueRange({ lines, sensor, bands, unit }: PlotModel): [low: num
       take(max);
     }
   }
-  const bounds = bands.flatMap(({ ranges }) => ranges.ideal ?? []);
+  const all = bands.map(({ ranges }) => ranges);
+  const bounds = all.flatMap((ranges) => ranges.ideal ?? []);
   const ideal = bounds.length > 0 ? ([Math.min(...bounds), Math.max(...bounds)] as const) : null;
   if (low > high) [low, high] = ideal ?? [0, 1];
   const least = ideal ? LEAST_OF_IDEAL * (ideal[1] - ideal[0]) : Math.abs(low) * 0.01 || 1;
@@ -142,7 +143,10 @@ export function valueRange({ lines, sensor, bands, unit }: PlotModel): [low: num
   if (ideal) {
     const spread = high - low;
     // Each end on its own: one that is far off stays out, and the other still helps.
-    for (const bound of ideal) {
+    // Who is beyond what is ideal, wants to see how far it is to what is critical.
+    const critical = all.flatMap((ranges) => ranges.critical ?? []);
+    const near = critical.filter((bound) => (bound < ideal[0] ? low < ideal[0] : high > ideal[1]));
+    for (const bound of [...near, ...ideal]) {
       const [down, up] = [Math.min(low, bound), Math.max(high, bound)];
       if (spread >= LEAST_SHARE * (up - down)) [low, high] = [down, up];
     }

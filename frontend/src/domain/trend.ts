@@ -5,9 +5,6 @@ import type { Sensor } from './sensors';
 import type { Tag } from './twin';
 import { differenceToShown, type TemperatureUnit } from './units';
 
-/** How long ago the other reading is looked for, seconds of the twin's time. */
-export const TREND_S = 3_600;
-
 /** A tag, and what the bridge said of it at that moment. */
 export interface TagThen {
   readonly tag: Tag;

@@ -2,7 +2,7 @@ import { afterEach, beforeEach, expect, test, vi } from 'vitest';
 
 import { judgement } from '../testing/health';
 import { readings, stateFrame, wireTag } from '../testing/tags';
-import { showTags } from '../testing/page';
+import { goLive, showTags, status } from '../testing/page';
 import { act, prefer, receive } from './app';
 import { hourAgo, startHourAgo } from './hourAgo';
 import { NO_HOUSE } from './twin';
@@ -54,6 +54,15 @@ test('an hour before now is asked for once, and again after some minutes', async
   hear(NOW_S + 302);
   await pass(1_000);
   expect(asked).toHaveLength(2);
+});
+
+test('where a day is a short one, so is its hour', async () => {
+  goLive(status({ day_length_s: 1_440 }));
+  hear(NOW_S);
+  stop = startHourAgo();
+  await pass(10);
+  expect(Math.round(Number(asked[0]))).toBe(NOW_S - 60);
+  goLive();
 });
 
 test('of the moments that somebody drags through, few are fetched, and the last', async () => {

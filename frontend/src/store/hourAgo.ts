@@ -3,16 +3,19 @@ import { now } from '../clock';
 import { fetchStateAt } from '../contract/past';
 import type { TagHealth } from '../contract/types';
 import { secondsOf } from '../domain/rostime';
-import { TREND_S, type TagThen } from '../domain/trend';
+import type { TagThen } from '../domain/trend';
 import { snapshotOf } from '../domain/twin';
 import { store, type AppState } from './app';
 import { createStore } from './create';
 import { createFetcher } from './fetcher';
 import { rosNow, selectNewest, selectShown, selectSnapshot } from './moment';
+import { selectDayS } from './origin';
 import { isColumnShown } from './settings';
 
-/** An answer serves for so long, seconds of the twin's time: less than anybody sees in a trend. */
-const SERVES_S = 300;
+/** An hour of the greenhouse's day, seconds of the twin's time: a demo's day is a short one. */
+const selectHourS = (state: AppState): number => selectDayS(state) / 24;
+/** An answer serves for so much of an hour: less than anybody sees in a trend. */
+const SERVES = 1 / 12;
 /** Whoever drags through time does not fetch it at each step, ms. */
 const PACE_MS = 1_000;
 
@@ -33,13 +36,17 @@ export function selectHourAgo(state: AppState, last: HourAgo | null): HourAgo | 
   const base = moment ?? (snapshot && secondsOf(snapshot.at));
   // Now it may be twice as old as it serves: the next answer is on its way.
   if (!last || base === null) return null;
-  return Math.abs(base - last.of) <= (moment === null ? 2 * SERVES_S : 1) ? last : null;
+  return Math.abs(base - last.of) <= (moment === null ? 2 * SERVES * selectHourS(state) : 1)
+    ? last
+    : null;
 }
 
 /** What was known an hour before now, whatever moment is shown; null: not known. */
 export function selectHourAgoNow(state: AppState, last: HourAgo | null): HourAgo | null {
   const { snapshot } = selectNewest(state);
-  return snapshot && last && Math.abs(secondsOf(snapshot.at) - last.of) <= 2 * SERVES_S
+  return snapshot &&
+    last &&
+    Math.abs(secondsOf(snapshot.at) - last.of) <= 2 * SERVES * selectHourS(state)
     ? last
     : null;
 }
@@ -54,16 +61,17 @@ export function startHourAgo(): () => void {
   const update = (): void => {
     const state = store.get();
     const { moment } = selectShown(state);
+    const hourS = selectHourS(state);
     const base = moment ?? rosNow(state, now());
     const isSeen = isColumnShown(state.settings, 'trend') || state.view.list === 'alarms';
-    if (base === null || base < TREND_S || !isSeen) {
+    if (base === null || base < hourS || !isSeen) {
       fetcher.want(null);
       return;
     }
     fetcher.want({
-      key: moment === null ? `now ${Math.floor(base / SERVES_S)}` : `at ${moment}`,
+      key: moment === null ? `now ${Math.floor(base / (SERVES * hourS))}` : `at ${moment}`,
       run: (signal) =>
-        fetchStateAt(base - TREND_S, signal).then((latest) => {
+        fetchStateAt(base - hourS, signal).then((latest) => {
           const { tags } = snapshotOf(latest, 0, null);
           const known = tags.map((tag): [string, TagThen] => [
             tag.id,

@@ -3,7 +3,7 @@ import { memo, type JSX } from 'react';
 import type { When } from '../domain/age';
 import { farOffText, percentText, shortAgeText, valueText } from '../domain/format';
 import type { TagHealth } from '../contract/types';
-import { rangeReason, sideOf } from '../domain/health';
+import { rangeReason, sideOf, worstReason } from '../domain/health';
 import { reasonsText } from '../domain/reasons';
 import type { Catalogue, Sensor } from '../domain/sensors';
 import { speciesText } from '../domain/species';
@@ -58,9 +58,7 @@ export const TagRow = memo(function TagRow({
   const others = health.reasons.filter(({ kind }) => !tag.failedTry || kind !== 'scan_failed');
   const why = reasonsText(catalogue, others, unit);
   // Both may not fit: first what the verdict beside it is about.
-  const isTriedFirst = health.reasons.some(
-    ({ kind, verdict }) => kind === 'scan_failed' && verdict === health.verdict,
-  );
+  const isTriedFirst = worstReason(health)?.kind === 'scan_failed';
   const tried = tag.failedTry && (
     <span className="tried">
       <Tried failed={tag.failedTry} />

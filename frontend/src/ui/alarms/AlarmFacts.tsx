@@ -34,7 +34,7 @@ export function useValues(alarm: Alarm): ValuesNow {
 
 /** How bad it is now and was at worst, since when, and until when it is shelved. */
 export function AlarmFacts({
-  item: { alarm, verdict, shelf },
+  item: { alarm, verdict, shelf, isAcknowledged },
   values: { state, now: current, worst, first, more },
   isShelved,
 }: {
@@ -59,7 +59,9 @@ export function AlarmFacts({
         </span>
       )}
       <span className="alarm-facts faint">
-        {[span, first].filter((text) => text !== null).join(', ')}
+        {[span, first, isAcknowledged && !alarm.acknowledged_by ? S.healthAcknowledged : null]
+          .filter((text) => text !== null)
+          .join(', ')}
       </span>
       {isShelved && shelf && (
         <span className="alarm-facts faint">

@@ -96,6 +96,10 @@ test('acknowledged, shelved, and back', () => {
     group('active').map(({ dataset }) => dataset['acknowledged']);
   press(/^Acknowledge: Tag 5/);
   expect(acknowledged()).toEqual(['true', 'false']);
+  expect(group('active').map(({ textContent }) => textContent.includes(', acknowledged'))).toEqual([
+    true,
+    false,
+  ]);
   press('Undo');
   expect(acknowledged()).toEqual(['false', 'false']);
   press(/^Acknowledge: Tag 5/);

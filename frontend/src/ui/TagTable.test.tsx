@@ -181,7 +181,7 @@ describe('table', () => {
       });
     });
     expect(trends()).toEqual([
-      '\u2197 Temperature compared with an hour ago: +1.5\u00a0°C/h',
+      '\u2197 Temperature compared with an hour ago: +1.5\u00a0°C',
       '– no reading an hour ago',
     ]);
     // An answer of long ago is none.

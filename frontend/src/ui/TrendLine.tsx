@@ -49,7 +49,7 @@ export function TrendLine({
   return (
     <span className="trend" data-trend={way} title={`${title}: ${text}`}>
       <span aria-hidden="true">{ARROWS[way]}</span> <span className="unseen">{title}: </span>
-      {text}/h
+      {text}
     </span>
   );
 }

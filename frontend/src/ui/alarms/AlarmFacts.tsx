@@ -122,7 +122,7 @@ function Trend({ alarm, value, by }: { alarm: Alarm; value: number; by: number }
   return (
     <span data-trend={way} title={title}>
       <span aria-hidden="true">
-        {ARROWS[way]} {text}/h
+        {ARROWS[way]} {text}
       </span>{' '}
       <span className="unseen">{title}</span>
     </span>

@@ -96,7 +96,7 @@ test('of a pest how many: now, at worst and at first', () => {
   const texts = { what: 'Pest seen', worst: 'most 4', first: 'first 2' };
   expect(valuesOf(pest, C, known(3, 'critical'))).toMatchObject({ ...texts, now: 'now 3 pests' });
   expect(valuesOf(pest, C, known(0, 'critical')).now).toBe('now seen');
-  expect(valuesOf(pest, C, known(null, 'healthy')).now).toBe('now none');
+  expect(valuesOf(pest, C, known(null, 'healthy')).now).toBe('now none seen');
   // Seen, and not counted.
   expect(valuesOf(alarm('a', { worst: 0, reason }), C, known(0, 'stressed')).worst).toBeNull();
 });

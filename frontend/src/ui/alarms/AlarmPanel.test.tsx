@@ -90,6 +90,19 @@ test('the value of now follows the newest state, with its own severity', () => {
   expect(fact(first('active'), 'worst').dataset['status']).toBe('critical');
 });
 
+test('what is well again needs nothing, but pests that one inspection did not see', () => {
+  flush(() => {
+    const warm = { readings: readings({ temperature: 22 }) };
+    const tags = ['5', '6'].map((tag_id) => wireTag({ tag_id, ...warm }));
+    showTags(tags, judgement({ 5: 'healthy', 6: 'healthy' }));
+  });
+  const pest = { kind: 'pest', sensor: '', value: 2, limit: null } as const;
+  tell(alarm('a', { tag_id: '5' }), alarm('b', { tag_id: '6', reason: pest }));
+  const todo = (tag: string): string | null | undefined =>
+    document.querySelector(`[data-where='${tag}'] .alarm-do`)?.textContent;
+  expect([todo('5'), todo('6')]).toEqual([undefined, 'Inspect and treat the plants']);
+});
+
 test('acknowledged, shelved, and back', () => {
   tell(alarm('a', { tag_id: '5' }), alarm('b', { tag_id: '6', reason: { verdict: 'stressed' } }));
   const acknowledged = (): (string | undefined)[] =>

@@ -30,6 +30,9 @@ export const AlarmRow = memo(function AlarmRow({
   const values = useValues(alarm);
   const current = values.state?.kind === 'known' ? values.state.verdict : verdict;
   const name = useApp((state) => nameText(alarm, selectSpeech(state)));
+  // One inspection that sees no pests may have missed them.
+  const isPest = alarm.reason.kind === 'pest';
+  const isToDo = group !== 'resolved' && (current !== 'healthy' || isPest);
   return (
     <li
       data-alarm={alarm.id}
@@ -54,9 +57,7 @@ export const AlarmRow = memo(function AlarmRow({
             {': '}
             {values.what}
           </span>
-          {group !== 'resolved' && current !== 'healthy' && (
-            <span className="alarm-do">{todoText(alarm.reason)}</span>
-          )}
+          {isToDo && <span className="alarm-do">{todoText(alarm.reason)}</span>}
           <AlarmFacts item={item} values={values} isShelved={group === 'shelved'} />
         </span>
       </button>

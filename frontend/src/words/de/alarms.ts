@@ -22,7 +22,7 @@ export const ALARMS: In<typeof ENGLISH> = {
     last === null
       ? 'jetzt unbekannt'
       : `jetzt unbekannt, zuletzt ${last}${age === null ? '' : ` vor ${age}`}`,
-  alarmPests: { none: 'keine', seen: 'gesehen' },
+  alarmPests: { none: 'keine gesehen', seen: 'gesehen' },
   alarmWorst: {
     below: (reading) => `tiefster Wert ${reading}`,
     above: (reading) => `höchster Wert ${reading}`,

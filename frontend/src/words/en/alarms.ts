@@ -23,7 +23,7 @@ export const ALARMS = {
   alarmNowUnknown: (last: string | null, age: string | null): string =>
     last === null ? 'now unknown' : `now unknown, last ${last}${age === null ? '' : ` ${age} ago`}`,
   /** Of a pest, in place of how many. */
-  alarmPests: { none: 'none', seen: 'seen' },
+  alarmPests: { none: 'none seen', seen: 'seen' },
   alarmWorst: {
     below: (reading: string): string => `worst ${reading}`,
     above: (reading: string): string => `worst ${reading}`,

@@ -22,7 +22,7 @@ export const ALARMS: In<typeof ENGLISH> = {
     last === null
       ? 'ahora desconocido'
       : `ahora desconocido, último ${last}${age === null ? '' : ` hace ${age}`}`,
-  alarmPests: { none: 'ninguna', seen: 'vista' },
+  alarmPests: { none: 'ninguna vista', seen: 'vista' },
   alarmWorst: {
     below: (reading) => `peor valor ${reading}`,
     above: (reading) => `peor valor ${reading}`,

@@ -22,7 +22,7 @@ export const ALARMS: In<typeof ENGLISH> = {
     last === null
       ? 'nu onbekend'
       : `nu onbekend, laatst ${last}${age === null ? '' : ` ${age} geleden`}`,
-  alarmPests: { none: 'geen', seen: 'gezien' },
+  alarmPests: { none: 'geen gezien', seen: 'gezien' },
   alarmWorst: {
     below: (reading) => `laagste ${reading}`,
     above: (reading) => `hoogste ${reading}`,

@@ -32,6 +32,17 @@ test('many of one cause stand together, the worst cause first; a few stand by th
   expect(loose.map(({ cause, items }) => [cause, items.length])).toEqual([[null, 8]]);
 });
 
+test('a few of several causes: the worst first, whatever the cause', () => {
+  const worst = alarm('worst', { reason: { sensor: 'humidity', verdict: 'critical' } });
+  const mild = { verdict: 'stressed' } as const;
+  const items = active(cold(1), alarm('mild', { reason: mild }), worst, hot(1));
+  const [block] = arranged(items, 'cause', speech);
+  expect(block?.items.map(({ alarm: { id } }) => id)).toEqual(items.map((it) => it.alarm.id));
+  expect(items.map(({ verdict }) => verdict)).toEqual([
+    ...['critical', 'critical', 'stressed', 'stressed'],
+  ]);
+});
+
 test('of one cause, each area stands by itself, and is found by its name', () => {
   const areas = { North: ['1', '2', '3', '4', '5'], South: ['6', '7', '8', '9', '1*'] };
   const sensors = cataloguesOf({ ...FILE, areas }).day;

@@ -49,22 +49,23 @@ export function arranged(items: readonly Item[], order: Order, speech: Speech): 
         : (a: Item, b: Item) => compareIds(a.alarm.tag_id, b.alarm.tag_id);
     return [{ key: order, cause: null, items: [...items].sort(by) }];
   }
-  const causes = new Map<string, readonly Item[]>();
+  const causes = new Map<string, Item[]>();
   for (const item of items) {
     const cause = causeOf(item.alarm, speech);
-    causes.set(cause, [...(causes.get(cause) ?? []), item]);
+    const own = causes.get(cause);
+    if (own) own.push(item);
+    else causes.set(cause, [item]);
   }
-  const blocks: Block[] = [];
-  for (const [cause, own] of causes) {
-    const [first] = own;
+  const blocks: (Block & { readonly items: Item[] })[] = [];
+  for (const item of items) {
+    const key = causeOf(item.alarm, speech);
+    const own = causes.get(key) ?? [];
     const before = blocks.at(-1);
-    if (first && own.length > MOST_LOOSE) {
-      blocks.push({ key: cause, cause: causeText(first.alarm, speech), items: own });
-    } else if (before?.cause === null) {
-      blocks[blocks.length - 1] = { ...before, items: [...before.items, ...own] };
-    } else {
-      blocks.push({ key: `from ${cause}`, cause: null, items: own });
-    }
+    if (own.length > MOST_LOOSE) {
+      // All of them stand where the worst of them does.
+      if (own[0] === item) blocks.push({ key, cause: causeText(item.alarm, speech), items: own });
+    } else if (before?.cause === null) before.items.push(item);
+    else blocks.push({ key: `from ${item.alarm.id}`, cause: null, items: [item] });
   }
   return blocks;
 }

@@ -18,7 +18,7 @@ export interface Item {
 }
 
 export interface AlarmList {
-  /** Active and not shelved: the worst first, of equals the newest. */
+  /** Active and not shelved: the worst first, of equals what nobody has acknowledged, then the newest. */
   readonly active: readonly Item[];
   /** Active and shelved, in the same order. */
   readonly shelved: readonly Item[];
@@ -66,6 +66,7 @@ const endOf = ({ cleared_at }: Alarm): number => (cleared_at ? secondsOf(cleared
 
 const worstFirst = (a: Item, b: Item): number =>
   VERDICTS.indexOf(a.verdict) - VERDICTS.indexOf(b.verdict) ||
+  Number(a.isAcknowledged) - Number(b.isAcknowledged) ||
   beginOf(b.alarm) - beginOf(a.alarm) ||
   byName(a, b);
 

@@ -1,6 +1,7 @@
 /** What a chart has below and above its lines: drawn by functions that keep no state. */
 import type { Span } from '../domain/period';
 import { toShown } from '../domain/units';
+import { S } from '../strings';
 import { isStroked, lookOf, markerPath } from './looks';
 import { pointsOf, type Line, type PlotModel } from './model';
 import type { ChartPalette } from './palette';
@@ -131,8 +132,37 @@ export function drawAbove(frame: Frame, model: PlotModel, palette: ChartPalette)
     drawMarkers(frame, line, model, palette);
     drawMarks(frame, line, palette);
   }
+  drawNames(frame, model, palette);
   drawMoment(frame, model, palette);
   context.restore();
+}
+
+/** What band and lines are, at their beginning; CSS pixels. */
+const NAME_GAP = 4;
+
+function drawNames(frame: Frame, { sensor, bands, unit }: PlotModel, palette: ChartPalette): void {
+  const { context, box, ratio } = frame;
+  const [ranges] = bands.map((band) => band.ranges);
+  if (!ranges?.ideal) return;
+  const y = (value: number): number => frame.y(toShown(sensor, value, unit));
+  const gap = NAME_GAP * ratio;
+  const [low, high] = ranges.ideal;
+  context.font = palette.font.replace(/[\d.]+(?=px)/, (size) => String(Number(size) * ratio));
+  context.textAlign = 'left';
+  context.lineWidth = 3 * ratio;
+  context.lineJoin = 'round';
+  context.strokeStyle = palette.surface;
+  const name = (text: string, at: number, isBelow: boolean): void => {
+    context.textBaseline = isBelow ? 'top' : 'bottom';
+    const place = [box.left + gap, at + (isBelow ? gap : -gap)] as const;
+    context.strokeText(text, ...place);
+    context.fillText(text, ...place);
+  };
+  context.fillStyle = palette.text;
+  const top = Math.max(y(high), box.top);
+  if (y(low) - top > 6 * gap && top < box.top + box.height) name(S.idealParts.any, top, true);
+  context.fillStyle = palette.failure;
+  for (const bound of ranges.critical ?? []) name(S.health.critical, y(bound), bound < low);
 }
 
 /** Each reading where there is room; a point between two breaks always, or it would not be seen. */

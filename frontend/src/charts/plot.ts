@@ -58,7 +58,7 @@ export function createPlot(element: HTMLElement, handlers: PlotHandlers): Plot {
         ...size,
         class: 'plot',
         legend: { show: false },
-        padding: [8, 10, 0, 0],
+        padding: [8, 22, 0, 0],
         cursor: {
           y: false,
           points: { size: 8, width: 2, stroke: () => palette.surface, fill: colourOf },

@@ -3,7 +3,7 @@ import { useEffect, useRef, type JSX } from 'react';
 import type { When } from '../domain/age';
 import { farOffText, metresText, percentText, readingText, valueText } from '../domain/format';
 import { rangeReason, sideOf, worstReason } from '../domain/health';
-import { todoText } from '../domain/reasons';
+import { todoText, tryKind } from '../domain/reasons';
 import { rangesFor } from '../domain/sensors';
 import { speciesText } from '../domain/species';
 import { shown } from '../domain/text';
@@ -16,7 +16,7 @@ import { act, useApp } from '../store/app';
 import { selectCatalogue, selectHealth } from '../store/derived';
 import { selectNewestTag, selectShown, selectTag } from '../store/moment';
 import { S } from '../strings';
-import { Age, AgeFact, Tried, useAgeStep } from './Age';
+import { Age, AgeFact, useAgeStep } from './Age';
 import { CardEstimate } from './estimate';
 import { HealthMark } from './HealthMark';
 import { inTime } from './inTime';
@@ -147,7 +147,7 @@ function CardBody({
           <div className="card-try">
             <dt>{S.cardTry}</dt>
             <dd>
-              <Tried failed={tag.failedTry} />
+              <Age when={tag.failedTry.at} /> · {S.tried[tryKind(tag.failedTry.status)]}
               {tag.failedTry.detail && (
                 <span className="faint"> {shown(tag.failedTry.detail, 160)}</span>
               )}

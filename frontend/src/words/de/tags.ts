@@ -70,7 +70,7 @@ export const TAGS: In<typeof ENGLISH> = {
   trend: 'Tendenz',
   trendTitle: (sensor) => `${sensor}: Änderung gegenüber vor einer Stunde`,
   trendNone: 'vor einer Stunde kein Messwert',
-  trendSame: 'seither kein neuer Messwert',
+  trendSame: 'kein neuer Wert',
   trendUnknown: 'vor einer Stunde: nicht bekannt',
   density: 'Zeilen',
   densities: { usual: 'Normal', compact: 'Dicht' },

@@ -67,7 +67,7 @@ export const TAGS = {
   trend: 'Trend',
   trendTitle: (sensor: string): string => `${sensor} compared with an hour ago`,
   trendNone: 'no reading an hour ago',
-  trendSame: 'no new reading since',
+  trendSame: 'no new reading',
   trendUnknown: 'an hour ago: unknown',
   density: 'Rows',
   densities: { usual: 'Usual', compact: 'Compact' },

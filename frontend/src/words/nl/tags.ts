@@ -70,7 +70,7 @@ export const TAGS: In<typeof ENGLISH> = {
   trend: 'Trend',
   trendTitle: (sensor) => `${sensor} vergeleken met een uur geleden`,
   trendNone: 'een uur geleden geen meting',
-  trendSame: 'sindsdien geen nieuwe meting',
+  trendSame: 'geen nieuwe meting',
   trendUnknown: 'een uur geleden: niet bekend',
   density: 'Rijen',
   densities: { usual: 'Normaal', compact: 'Dicht' },

@@ -1,4 +1,4 @@
-import { act as flush, render, screen } from '@testing-library/react';
+import { act as flush, render, screen, waitFor } from '@testing-library/react';
 import { beforeEach, describe, expect, test, vi } from 'vitest';
 
 import type { Expected, Field, Grade, Place } from '../contract/types';
@@ -70,7 +70,9 @@ describe('readout', () => {
     expect(text('readout')).toContain(`22.4${NBSP}±${NBSP}1.3${NBSP}°C`);
     expect(text('readout-near')).toBe(`1 tag near, oldest reading 12${NBSP}min`);
     point(1.5);
-    expect(text('readout')).toContain('not known');
+    await waitFor(() => {
+      expect(text('readout')).toContain('not known');
+    });
     point(0.5);
     flush(() => {
       prefer({ unit: 'F' });

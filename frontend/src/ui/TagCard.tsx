@@ -221,7 +221,9 @@ function CardReading({
   const sensor = useApp((state) => selectCatalogue(state).named(name));
   const { ideal } = rangesFor(sensor, species);
   const reason = rangeReason(health, name);
-  const side = reason && sideOf(reason);
+  const isOut = ideal && value !== null && (value < ideal[0] || value > ideal[1]);
+  // What is back within its range, and not far enough, is stressed, and not "below ideal".
+  const side = isOut && reason && sideOf(reason);
   const step = useAgeStep(when);
   return (
     <li data-sensor={name} data-age={step}>
@@ -236,12 +238,11 @@ function CardReading({
         <Sparkline sensor={sensor} values={values} unit={unit} />
       </span>
       {ideal && (
-        <span className="card-ideal" data-side={side} data-health={reason?.verdict}>
+        <span className="card-ideal" data-side={side || undefined} data-health={reason?.verdict}>
           {side && (
             <>
               <Icon name={side === 'below' ? 'down' : 'up'} size={12} />
-              {S[side]}
-              {' · '}
+              <span className="unseen">{S[side]}, </span>
             </>
           )}
           {S.healthIdeal(

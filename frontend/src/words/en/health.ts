@@ -66,6 +66,7 @@ export const HEALTH = {
     stopped: 'Check the robot',
     other: 'Look there',
   },
+  todoPestAgain: 'Inspect again: a second clean inspection resolves it',
   todoLabel: 'Do this now',
   reasonsLabel: 'Why',
   healthHeading: 'Greenhouse status',

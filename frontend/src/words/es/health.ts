@@ -69,6 +69,7 @@ export const HEALTH: In<typeof ENGLISH> = {
     stopped: 'Revisar el robot',
     other: 'Ir a mirar',
   },
+  todoPestAgain: 'Inspeccione otra vez: si no hay plaga, queda resuelta',
   todoLabel: 'Hacer ahora',
   reasonsLabel: 'Por qué',
   healthHeading: 'Estado del invernadero',

@@ -71,6 +71,7 @@ export const TAGS: In<typeof ENGLISH> = {
   trendTitle: (sensor) => `${sensor} frente a hace una hora`,
   trendNone: 'sin lectura hace una hora',
   trendSame: 'sin lectura nueva',
+  trendLevel: 'estable',
   trendUnknown: 'hace una hora: desconocido',
   density: 'Filas',
   densities: { usual: 'Normales', compact: 'Compactas' },

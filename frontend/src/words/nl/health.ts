@@ -65,6 +65,7 @@ export const HEALTH: In<typeof ENGLISH> = {
     stopped: 'Kijk naar de robot',
     other: 'Ga daar kijken',
   },
+  todoPestAgain: 'Controleer nogmaals: weer niets gezien is opgelost',
   todoLabel: 'Nu doen',
   reasonsLabel: 'Waarom',
   healthHeading: 'Toestand van de kas',

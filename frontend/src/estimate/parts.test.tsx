@@ -98,7 +98,7 @@ describe('legend', () => {
     expect((await screen.findByTestId('foretold')).textContent).toBe(
       '9 of 10 scans were within the predicted range',
     );
-    expect(text('estimate-key')).toContain(`may exceed ±1.6${NBSP}°C`);
+    expect(text('estimate-key')).toContain(`less certain than ±1.6${NBSP}°C`);
     expect(text('legend')).toContain('Last day: 412 of 458 scans, last week: 2900 of 3200 scans.');
     expect(text('legend')).toContain('90 % interval');
     expect(screen.queryByTestId('estimate-warning')).toBeNull();

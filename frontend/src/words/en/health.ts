@@ -58,7 +58,7 @@ export const HEALTH = {
     },
     range: 'Check the climate settings',
     reading_failed: 'Check the sensor',
-    scan_failed: 'Check the way and the tag',
+    scan_failed: 'Check the path and the tag',
     pest: 'Inspect and treat the plants',
     old: 'Check the route of the robot',
     changed: 'Compare with a second meter',

@@ -58,7 +58,7 @@ export const HEALTH: In<typeof ENGLISH> = {
     range: 'Controleer de klimaatregeling',
     reading_failed: 'Controleer de sensor',
     scan_failed: 'Controleer de weg en het meetpunt',
-    pest: 'Loop het gewas na en bestrijd',
+    pest: 'Controleer het gewas en bestrijd de plaag',
     old: 'Controleer de route van de robot',
     changed: 'Vergelijk met een tweede meter',
     silent: 'Controleer tweeling, server en netwerk',

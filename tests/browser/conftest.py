@@ -131,5 +131,5 @@ def hmi(house: Bridge, open_page: OpenPage) -> Hmi:
     page = open_page(house.url)
     page.expect_rows(*TAGS)
     page.expect_samples(3)
-    page.settled_picture()
+    page.expect_layout()
     return page

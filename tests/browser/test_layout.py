@@ -79,6 +79,8 @@ def test_everything_can_be_hit(open_at: Callable[..., Hmi]) -> None:
         expect(hmi.test_id("health-strip")).to_be_visible(visible=has_tabs)
         for mode in ("Ideal", "Value", "Fixed"):
             hmi.page.get_by_role("radio", name=mode).check()
+            if mode == "Value":
+                continue  # all that it has, "Fixed" has too
             # Lower than this, a greenhouse of ten metres is the size of a stamp.
             least = 120 if size in LOW else 200
             tall = "([map, least]) => map.clientHeight >= least"

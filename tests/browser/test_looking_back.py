@@ -260,13 +260,6 @@ def test_a_link_shows_the_same_moment_to_somebody_else_and_back_leads_to_now(
     assert expect_past(page) == at
 
 
-def test_a_wall_screen_always_shows_now(hour: Hour, open_page: OpenPage) -> None:
-    wall = open_page(hour.bridge.url, f"at={hour.begun_s + 600}", "?kiosk=1")
-    expect(wall.app).to_have_attribute("data-moment", "now")
-    expect(wall.test_id("timebar")).to_have_count(0)
-    expect(wall.test_id("connection")).to_contain_text("Live")
-
-
 def test_a_slow_answer_never_leaves_now_under_another_moment(page: Hmi, hour: Hour) -> None:
     # By moment: who waits long for its field, or connects anew, asks for the same one again.
     asked: dict[str, list[Route]] = {}

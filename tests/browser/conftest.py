@@ -48,6 +48,8 @@ CHROMIUM_ARGS = (
     "--disable-background-networking",
     "--disable-component-update",
     "--disable-sync",
+    # Each page begins in a process that is there already, which is a tenth of what it costs.
+    "--renderer-process-limit=1",
     f"--disable-features={','.join(NOT_WANTED)}",
 )
 

@@ -115,16 +115,6 @@ def test_an_open_card_lies_over_nothing_in_an_upright_window(open_at: Callable[.
         expect_in_reach(hmi, hit)
 
 
-def test_each_layer_is_switched_by_touch_on_a_phone(open_at: Callable[..., Hmi]) -> None:
-    hmi = open_at((PHONE["width"], PHONE["height"]), has_touch=True, is_mobile=True)
-    hmi.page.get_by_role("button", name="Layers").tap()
-    expect(hmi.page.get_by_role("checkbox")).to_have_count(10)
-    for box in hmi.page.get_by_role("checkbox").all():
-        was_on = box.is_checked()
-        box.locator("..").tap()
-        expect(box).to_be_checked(checked=not was_on)
-
-
 def test_a_phone_has_room_for_the_facts_a_fixed_range_and_what_is_missing(
     open_at: Callable[..., Hmi],
 ) -> None:

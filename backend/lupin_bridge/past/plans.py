@@ -12,7 +12,6 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from hashlib import blake2b
-from pickle import PickleBuffer
 from typing import Any, Final, Protocol
 
 import orjson
@@ -59,8 +58,6 @@ from lupin_twin.journal.queries import SERIES_S, SERIES_S_PER_TAG
 from lupin_twin.runtime.workers import ShouldStop
 
 JSON_TYPE: Final = "application/json"
-# A larger body is sent as a buffer of its own, and not copied.
-_LARGE_BYTES: Final = 65_536
 # Costs, s of one core, at worst: to plan an answer and to write it, for each tag; to write a cell
 # or pixel of a field; to judge a tag with its scans of three days, and a tag of a field; to write a
 # reading or a bucket.
@@ -110,18 +107,6 @@ class Answered:
 
     etag: str
     answer: Answer | None
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        """Send a large body as a buffer of its own."""
-        if self.answer is None:
-            return Answered, (self.etag, None)
-        body, *rest = self.answer.body, self.answer.media_type, self.answer.headers
-        sent = PickleBuffer(body) if len(body) > _LARGE_BYTES else body
-        return _answered, (self.etag, sent, *rest)
-
-
-def _answered(etag: str, *answer: Any) -> Answered:
-    return Answered(etag, Answer(*answer))
 
 
 @dataclass(frozen=True, slots=True)

@@ -361,8 +361,8 @@ class _RosbridgeConversation(_Conversation):
         if (lent := bridge.cache.lend(etag)) is not None:
             answer, give_back = lent
             give_back()  # the reply holds a copy of its own
-            return bytes(answer.body)
+            return answer.body
         client = self._client.address
         held.enter_context(bridge.admission.request(client, time.monotonic()))
         answer = await bridge.answering.get(etag, lambda: newest_field(bridge, client, field, etag))
-        return bytes(answer.body)
+        return answer.body

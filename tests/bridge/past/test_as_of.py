@@ -69,7 +69,7 @@ def field_of(house: Snapshot, field: Field, field_format: FieldFormat | None = N
 
 
 def body(plan: Plan) -> dict[str, Any]:
-    found: dict[str, Any] = json.loads(bytes(plan.write(lambda: False).body))
+    found: dict[str, Any] = json.loads(plan.write(lambda: False).body)
     return found
 
 

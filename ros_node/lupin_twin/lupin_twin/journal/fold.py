@@ -117,29 +117,25 @@ class Known:
     inspections: tuple[int, ...] = ()
 
 
-def state_at(
-    connection: sqlite3.Connection, at_ns: int, frame_id: str, site: str = LOCAL_SITE
-) -> Snapshot:
+def state_at(connection: sqlite3.Connection, at_ns: int, frame_id: str) -> Snapshot:
     """Every tag as of `at_ns`, ROS time, in the order in which the log first received them.
 
     Of the run that the moment belongs to, all writes with a stamp up to then count, whenever they
     were received. Where others write meanwhile, ask within a transaction.
     """
-    every = runs(connection.execute, site)
+    every = runs(connection.execute)
     span = span_at(every, at_ns)
     if span is None:
         return Snapshot(at_ns, frame_id, ())
     since = since_seq(every, span.run.id, at_ns)
-    known = fold(connection, span.run.id, at_ns, since, site)
+    known = fold(connection, span.run.id, at_ns, since)
     return Snapshot(at_ns, frame_id, known.tags[:MAX_TAGS])
 
 
-def fold(
-    connection: sqlite3.Connection, run: int, at_ns: int, since: int, site: str = LOCAL_SITE
-) -> Known:
+def fold(connection: sqlite3.Connection, run: int, at_ns: int, since: int) -> Known:
     """What is known in a run as of a moment, of what has the seq `since` or a later one."""
     with _no_collection():
-        return _known(connection, {"site": site, "run": run, "at": at_ns, "since": since})
+        return _known(connection, {"site": LOCAL_SITE, "run": run, "at": at_ns, "since": since})
 
 
 @contextmanager

@@ -18,7 +18,7 @@ from lupin_twin.journal.events import FROM_SCAN, events
 from lupin_twin.journal.hours import deleted_ns, is_counted
 from lupin_twin.journal.rows import KIND_READING, numbers_of, sensor_names
 from lupin_twin.journal.runs import Run, Span, runs, spans_within
-from lupin_twin.journal.schema import LOCAL_SITE, DamagedFile, SiteLog
+from lupin_twin.journal.schema import DamagedFile, SiteLog
 
 # What an answer costs, about, s; the second for events of the whole site, each tag.
 SERIES_S: Final = 0.01
@@ -116,14 +116,12 @@ class _Part:
         return found
 
 
-def series(
-    connection: Any, request: SeriesRequest, now_ns: int, site: str = LOCAL_SITE
-) -> SeriesPast:
+def series(connection: Any, request: SeriesRequest, now_ns: int) -> SeriesPast:
     """What a sensor gave, or the events that are requested, see GetHistory.srv.
 
     Where rows were deleted, the answer is in buckets of whole hours.
     """
-    log = SiteLog(connection, site)
+    log = SiteLog(connection)
     with log.one_view():
         if request.event is not None:
             return events(log, request, now_ns)
@@ -149,22 +147,16 @@ _SETS: Final = "SELECT DISTINCT sensors FROM series WHERE site = :site AND run =
 
 
 def newest(
-    connection: Any,
-    sensor_type: str,
-    start_ns: int,
-    end_ns: int,
-    each: int,
-    *,
-    site: str = LOCAL_SITE,
+    connection: Any, sensor_type: str, start_ns: int, end_ns: int, each: int
 ) -> dict[str, list[tuple[int, float]]]:
     """Of every tag the last `each` readings of a sensor in a period: (ns of ROS time, value).
 
     In their order, and without those that are not finite.
     """
-    log = SiteLog(connection, site)
+    log = SiteLog(connection)
     found: dict[str, list[Entry]] = {}
     with log.one_view():
-        for span in spans_within(runs(log.execute, log.site), start_ns, end_ns):
+        for span in spans_within(runs(log.execute), start_ns, end_ns):
             within = {"run": span.run.id, "start": span.start_ns, "end": span.end_ns}
             for (text,) in log.execute(_SETS, within).fetchall():
                 names = sensor_names(text)
@@ -187,7 +179,7 @@ def newest(
 
 def _parts(log: SiteLog, request: SeriesRequest, start_ns: int, end_ns: int) -> list[_Part]:
     found = []
-    for span in spans_within(runs(log.execute, log.site), start_ns, end_ns):
+    for span in spans_within(runs(log.execute), start_ns, end_ns):
         of_run = {"run": span.run.id, "tag": request.tag_id, "kind": KIND_READING}
         for number, text in log.execute(
             "SELECT series, sensors FROM series WHERE site = :site AND run = :run AND tag = :tag"
@@ -213,16 +205,15 @@ _SCANS: Final = f"SELECT stamp_ns, seq, tag, sensors, status, source, readings {
 _NEXT: Final = f"SELECT min(stamp_ns) {FROM_SCAN}"  # constants
 
 
-def rows(  # noqa: PLR0917
+def rows(
     connection: Any,
     start_ns: int,
     end_ns: int,
     tag_id: str | None = None,
     sensor_type: str | None = None,
-    site: str = LOCAL_SITE,
 ) -> Iterator[list[PastRow]]:
     """Lots of at most `LOT` rows, see `Export`."""
-    export = Export(start_ns, end_ns, tag_id, sensor_type, site)
+    export = Export(start_ns, end_ns, tag_id, sensor_type)
     while (found := export.step(connection)) is not None:
         yield from lots(found)
 
@@ -241,17 +232,11 @@ class Export:
     """
 
     def __init__(
-        self,
-        start_ns: int,
-        end_ns: int,
-        tag_id: str | None,
-        sensor_type: str | None,
-        site: str = LOCAL_SITE,
+        self, start_ns: int, end_ns: int, tag_id: str | None, sensor_type: str | None
     ) -> None:
         self._period = (start_ns, end_ns)
         self._tag_id = tag_id
         self._sensor_type = sensor_type
-        self._site = site
         self._spans: deque[Span] | None = None
         self._at_ns = 0
         self._length_ns = _FIRST_STRETCH_NS
@@ -268,10 +253,10 @@ class Export:
             NotRemembered: behind rows that were given, some are deleted since.
 
         """
-        log = SiteLog(connection, self._site)
+        log = SiteLog(connection)
         with log.one_view():
             if self._spans is None:
-                self._spans = deque(spans_within(runs(log.execute, log.site), *self._period))
+                self._spans = deque(spans_within(runs(log.execute), *self._period))
             if not self._has_begun:
                 self._deleted_ns = {s.run.id: deleted_ns(log, s.run.id) for s in self._spans}
             while self._spans and self._spans[0].end_ns <= self._at_ns:

@@ -16,8 +16,8 @@ from lupin_bridge.alarms.board import AlarmBoard, AlarmSource, Change, Page, cha
 from lupin_bridge.alarms.state_changes import RUN, writes_between
 from lupin_bridge.feed.shared_work import end
 from lupin_bridge.feed.source import TwinSource, TwinUnavailableError, TwinUpdate
-from lupin_bridge.judge.alarm import Alarm, silence
 from lupin_bridge.judge.alarm_fold import FORGET_EVERY_NS, Follower, Found
+from lupin_bridge.judge.episodes import Alarm, silence
 from lupin_bridge.judge.options import Criteria
 from lupin_twin.core.journal_condition import JournalState
 from lupin_twin.core.past import NotRemembered, PastRefused

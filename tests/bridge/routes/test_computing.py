@@ -22,7 +22,7 @@ from lupin_bridge.routes import status
 from lupin_bridge.routes.answers import within_time
 from lupin_bridge.routes.state import AGES_HOLD_S
 from lupin_bridge.serving.admission import Limits
-from lupin_bridge.serving.middleware import PIECE_BYTES
+from lupin_bridge.serving.http_protocol import PIECE_BYTES
 from lupin_bridge.stream.state_json import StateJson
 from lupin_twin.core.state import Pose, Reading, Scan
 from lupin_twin.field.engine import FieldRequest, compute_field, cost_s

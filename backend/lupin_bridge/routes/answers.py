@@ -24,11 +24,11 @@ from lupin_bridge.bridge import Bridge
 from lupin_bridge.feed.source import TwinTimeoutError, TwinUnavailableError
 from lupin_bridge.field import query as field_query
 from lupin_bridge.past import bodies
+from lupin_bridge.past.fields import Field
 from lupin_bridge.past.plans import (
     PLAN_TAG_S,
     Answered,
     ConditionalQuery,
-    Field,
     NoSuchTag,
     Query,
 )

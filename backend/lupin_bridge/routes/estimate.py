@@ -17,7 +17,7 @@ from lupin_bridge.field import formats
 from lupin_bridge.field.formats import PNG, FieldFormat
 from lupin_bridge.field.query import EstimateQuery
 from lupin_bridge.past import query as past_query
-from lupin_bridge.past.estimate import Estimated
+from lupin_bridge.past.fields import Estimated
 from lupin_bridge.query_string import Name, needed, parameter, parameters_of, read
 from lupin_bridge.routes.answers import (
     NO_TWIN,

@@ -31,7 +31,7 @@ from lupin_bridge.feed.source import TwinUnavailableError
 from lupin_bridge.field import formats as field_formats
 from lupin_bridge.field.formats import JSON
 from lupin_bridge.field.query import FieldQuery
-from lupin_bridge.past.plans import Field
+from lupin_bridge.past.fields import Field
 from lupin_bridge.routes.answers import error_response, newest_field
 from lupin_bridge.serving.admission import AdmissionError
 from lupin_bridge.serving.ws_protocol import BINARY, CONNECTION_KEY, Connection, frame_head

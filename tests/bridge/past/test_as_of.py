@@ -17,8 +17,8 @@ from lupin_bridge.field.query import EstimateQuery, FieldQuery
 from lupin_bridge.judge.daylight import ClockDay
 from lupin_bridge.judge.derived import vapour_pressure_deficit_kpa
 from lupin_bridge.judge.options import Criteria, own_sensors
-from lupin_bridge.past.estimate import Estimated
-from lupin_bridge.past.plans import Field, Health, OneTag, Plan, WholeState
+from lupin_bridge.past.fields import Estimated, Field
+from lupin_bridge.past.plans import Health, OneTag, Plan, WholeState
 from lupin_bridge.query_string import read
 from lupin_bridge.stream import schema
 from lupin_twin.core.state import Pose, Reading, Snapshot, TagState

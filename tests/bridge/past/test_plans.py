@@ -11,12 +11,12 @@ import pytest
 
 from lupin_bridge.field.formats import PNG
 from lupin_bridge.judge.options import Criteria
-from lupin_bridge.past.latest import LatestOfTag
 from lupin_bridge.past.plans import (
     Answered,
     ConditionalQuery,
     Health,
     History,
+    LatestOfTag,
     NoSuchTag,
     OneTag,
     Query,

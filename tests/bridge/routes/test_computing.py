@@ -17,7 +17,7 @@ import pytest
 from lupin_bridge.feed.source import TwinTimeoutError
 from lupin_bridge.field.formats import PNG
 from lupin_bridge.field.query import FieldQuery
-from lupin_bridge.past import plans
+from lupin_bridge.past import fields
 from lupin_bridge.routes import status
 from lupin_bridge.routes.answers import within_time
 from lupin_bridge.routes.state import AGES_HOLD_S
@@ -90,7 +90,7 @@ class Held:
                     break
             return compute_field(request, *others)
 
-        monkeypatch.setattr(plans, "compute_field", held)
+        monkeypatch.setattr(fields, "compute_field", held)
 
 
 @pytest.fixture

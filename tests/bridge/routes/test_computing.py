@@ -145,7 +145,7 @@ def test_what_is_written_counts_for_what_is_large(
             asked = FieldRequest("co2", 4.0 / cells, 0.0, 0.0, 4.0, 4.0)
             assert cost_s(asked, 20, source.rules()) < SMALL_S, "the field alone is not"
             query = FieldQuery("co2", 4.0 / cells, 0.0, 0.0, 4.0, 4.0, scale)
-            field = plans.Field(None, query, PNG, source.rules(), None, it.bridge.criteria)
+            field = fields.Field(None, query, PNG, source.rules(), None, it.bridge.criteria)
             assert it.bridge.latest is not None
             plan = field.plan(it.bridge.latest.snapshot)
             assert (plan.cost_s > SMALL_S) is large

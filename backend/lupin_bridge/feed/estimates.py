@@ -58,13 +58,13 @@ class EstimateFollower(Periodic):
         snapshot = self._snapshot()
         if snapshot is None:
             return
-        newest = await asyncio.wrap_future(
+        sensors = await asyncio.wrap_future(
             self._source.workers.submit(
-                lambda _: newest_of(snapshot), len(snapshot.tags) * NAMES_TAG_S
+                lambda _: sensors_of(snapshot), len(snapshot.tags) * NAMES_TAG_S
             )
         )
         known: dict[str, Report] = {}
-        for sensor in sorted(newest)[:MAX_SENSORS]:
+        for sensor in sensors:
             try:
                 known[sensor] = await self._source.estimate_report(ReportRequest(sensor))
             except (FieldRefused, NotRemembered, TwinUnavailableError) as error:
@@ -78,17 +78,16 @@ class EstimateFollower(Periodic):
             self._on_changed(changed)
 
 
-def newest_of(snapshot: Snapshot) -> dict[str, int]:
-    """When each sensor was read last anywhere, ns; for a worker."""
-    newest: dict[str, int] = {}
-    for tag in in_turns(snapshot.tags):
-        if tag.pose is None:
-            continue
-        for reading in tag.readings:
-            if math.isfinite(reading.value):
-                at_ns = reading.observed_at_ns or 0
-                newest[reading.name] = max(newest.get(reading.name, 0), at_ns)
-    return newest
+def sensors_of(snapshot: Snapshot) -> list[str]:
+    """Those that estimates can be made of, at most `MAX_SENSORS`; for a worker."""
+    names = {
+        reading.name
+        for tag in in_turns(snapshot.tags)
+        if tag.pose is not None
+        for reading in tag.readings
+        if math.isfinite(reading.value)
+    }
+    return sorted(names)[:MAX_SENSORS]
 
 
 def changed_of(known: Mapping[str, Report]) -> Changed:

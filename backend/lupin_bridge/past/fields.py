@@ -85,11 +85,13 @@ class Field(StateQuery):
         side_m = 2.0 * self.rules.max_distance_m * math.sqrt(max(tags, 1))
         request = self.query.request((0.0, 0.0, side_m, side_m), self.rules.max_grid_cells)
         is_daily = self.query.sensor_type in DAILY
-        daily_s = tags * series_s("", MAX_POINTS, tags) if is_daily else 0.0
+        looked_s = tags * (_JUDGE_TAG_S + (series_s("", MAX_POINTS, tags) if is_daily else 0.0))
         try:
-            return daily_s + cost_s(request, tags, self.rules) + self._writing_s(request)
+            width, height = check_request(request, self.rules.max_grid_cells)
+            written_s = width * height * self.query.scale**2 * _WRITE_CELL_S
+            return looked_s + cost_s(request, tags, self.rules) + written_s
         except FieldRefused:
-            return daily_s + _LARGE_S
+            return looked_s + _LARGE_S
 
     def newest_etag(self, revision: str) -> str:
         """Of the newest state: of its revision, and nothing has to be looked at for it."""
@@ -122,7 +124,6 @@ class Field(StateQuery):
         tags = plausible(with_derived(snapshot.tags, request.sensor_type), sensor)
         samples = samples_of(tags, request.sensor_type)
         far_off = far_off_tags(snapshot.tags)
-        cost = cost_s(request, len(samples), self.rules)
 
         def content_etag(kind: str, *content: object) -> str:
             # By content: the revision of a map is one process's own.
@@ -137,7 +138,7 @@ class Field(StateQuery):
         if self.field_format is None:
             of = [tag.tag_id for tag in tags if samples_of((tag,), request.sensor_type)]
             etag = etag or content_etag("quality", of)
-            return plan_of(etag, quality, cost + len(tags) * _JUDGE_TAG_S)
+            return plan_of(etag, quality)
         field_format, scale = self.field_format, self.query.scale
         etag = etag or content_etag(f"field {field_format.name} {scale}")
 
@@ -148,7 +149,7 @@ class Field(StateQuery):
             body = formats.write(grid, field_format, request.sensor_type, sensors, scale)
             return Answer(body, field_format.media_type, {**headers, "ETag": etag, **REVALIDATE})
 
-        return Plan(etag, cost + self._writing_s(request), write)
+        return Plan(etag, write)
 
     def request(self, snapshot: Snapshot) -> FieldRequest:
         """What is to be computed of a snapshot; see `check`."""
@@ -162,10 +163,6 @@ class Field(StateQuery):
         width, height = check_request(request, self.rules.max_grid_cells)
         field_format = self.field_format or formats.JSON
         field_query.check_scale(self.query, field_format, width * height, self.rules.max_grid_cells)
-
-    def _writing_s(self, request: FieldRequest) -> float:
-        width, height = check_request(request, self.rules.max_grid_cells)
-        return width * height * self.query.scale**2 * _WRITE_CELL_S
 
 
 @lru_cache(maxsize=1)
@@ -254,7 +251,7 @@ class Estimated(Field):
             )
             return Answer(body, field_format.media_type, {**headers, "ETag": etag, **REVALIDATE})
 
-        return Plan(etag, self.write_s(len(snapshot.tags)), write)
+        return Plan(etag, write)
 
 
 def _that_count(pasts: Sequence[TagPast], since_ns: int, sensor: Sensor) -> list[TagPast]:

@@ -63,10 +63,9 @@ class NoSuchTag(LookupError):
 
 @dataclass(frozen=True, slots=True)
 class Plan:
-    """An answer that is not written yet: its ETag, the cost of writing it, s, and how."""
+    """An answer that is not written yet: its ETag, and how it is."""
 
     etag: str
-    cost_s: float
     write: Callable[[ShouldStop], Answer]
 
 
@@ -136,8 +135,7 @@ class WholeState(StateQuery):
     def plan(self, snapshot: Snapshot) -> Plan:
         """See `StateQuery`."""
         etag = etag_of("state", (snapshot.stamp_ns, snapshot.frame_id, snapshot.tags))
-        cost = len(snapshot.tags) * _WRITE_TAG_S
-        return plan_of(etag, lambda _: StateJson().state(snapshot), cost)
+        return plan_of(etag, lambda _: StateJson().state(snapshot))
 
 
 @dataclass(frozen=True, slots=True)
@@ -161,7 +159,7 @@ class OneTag(StateQuery):
         if found is None:
             raise NoSuchTag(self.tag_id, len(snapshot.tags))
         etag = etag_of("tag", (snapshot.stamp_ns, found))
-        return plan_of(etag, lambda _: StateJson().tag(found, snapshot.now_ns), _WRITE_TAG_S)
+        return plan_of(etag, lambda _: StateJson().tag(found, snapshot.now_ns))
 
 
 @dataclass(frozen=True, slots=True)
@@ -298,16 +296,16 @@ def series_s(tag_id: str, points: int, tags: int) -> float:
     return SERIES_S + looked_at * SERIES_S_PER_TAG + points * _WRITE_ENTRY_S
 
 
-def plan_of(etag: str, write: Callable[[ShouldStop], bytes], cost: float = 0.0) -> Plan:
+def plan_of(etag: str, write: Callable[[ShouldStop], bytes]) -> Plan:
     """The plan of a JSON answer that is written when it is wanted."""
     headers = {"ETag": etag, **REVALIDATE}
-    return Plan(etag, cost, lambda stop: Answer(write(stop), JSON_TYPE, headers))
+    return Plan(etag, lambda stop: Answer(write(stop), JSON_TYPE, headers))
 
 
 def of_content(body: Mapping[str, Any]) -> Plan:
     """The plan of a JSON answer that is there already."""
     answer = json_answer(orjson.dumps(body))
-    return Plan(answer.headers["ETag"], 0.0, lambda _: answer)
+    return Plan(answer.headers["ETag"], lambda _: answer)
 
 
 def etag_of(kind: str, content: object) -> str:

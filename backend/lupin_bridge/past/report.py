@@ -133,7 +133,7 @@ def planned(
     etag = f'"{blake2b(body, digest_size=12).hexdigest()}"'
     known = bodies.period_headers(of.journal, of.start_ns, of.end_ns)
     answer = Answer(body, media_type, {"ETag": etag, **REVALIDATE, **known, **(headers or {})})
-    return Plan(etag, 0.0, lambda _: answer)
+    return Plan(etag, lambda _: answer)
 
 
 def _stretches(hours: Counter[int], start_ns: int, end_ns: int) -> Iterator[Stretch]:

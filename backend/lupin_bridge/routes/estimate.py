@@ -11,7 +11,7 @@ from fastapi import APIRouter, Request, Response
 
 from lupin_bridge.access.middleware import client_of
 from lupin_bridge.bridge import Bridge
-from lupin_bridge.feed.estimates import MAX_SENSORS, NAMES_TAG_S, newest_of
+from lupin_bridge.feed.estimates import NAMES_TAG_S, sensors_of
 from lupin_bridge.feed.source import TwinUnavailableError
 from lupin_bridge.field import formats
 from lupin_bridge.field.formats import PNG, FieldFormat
@@ -186,4 +186,4 @@ async def _sensors(bridge: Bridge) -> list[str]:
         raise TwinUnavailableError(NO_TWIN)
     snapshot = bridge.latest.snapshot
     cost_s = len(snapshot.tags) * NAMES_TAG_S
-    return sorted(await on_worker(bridge, lambda _: newest_of(snapshot), cost_s))[:MAX_SENSORS]
+    return await on_worker(bridge, lambda _: sensors_of(snapshot), cost_s)

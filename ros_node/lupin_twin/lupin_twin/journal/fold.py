@@ -36,12 +36,11 @@ from lupin_twin.journal.rows import (
     STATUS_OK,
     flower_of,
     listed_rows,
+    named_numbers,
     newest_of_tag,
-    numbers_of,
-    sensor_names,
 )
 from lupin_twin.journal.runs import FOREVER_NS, Carries, Run, runs, since_seq, span_at
-from lupin_twin.journal.schema import LOCAL_SITE, DamagedFile
+from lupin_twin.journal.schema import LOCAL_SITE
 
 ValueT = TypeVar("ValueT")
 
@@ -273,18 +272,15 @@ def copies(connection: sqlite3.Connection, run: Run, carries: Carries) -> list[W
 
 def _readings(rows: list[tuple[Any, ...]]) -> list[tuple[Reading, ...]]:
     """The readings of rows as `_SCANS` names them."""
-    names = [sensor_names(row[3]) for row in rows]
-    values = numbers_of([row[8] for row in rows])
-    lengths = [len(row) for row in values]
-    if lengths != list(map(len, names)):
-        raise DamagedFile("a scan has another number of readings than its series has sensors")
+    every = named_numbers((row[3] for row in rows), [row[8] for row in rows])
+    lengths = [len(values) for _, values in every]
     stamps = [repeat(row[5], length) for row, length in zip(rows, lengths, strict=True)]
     # 50,000 in a large greenhouse: most of what a state takes.
     made = make_many(
         Reading,
         sum(lengths),
-        chain.from_iterable(names),
-        chain.from_iterable(values),
+        chain.from_iterable(names for names, _ in every),
+        chain.from_iterable(values for _, values in every),
         chain.from_iterable(stamps),
     )
     ends = list(accumulate(lengths))

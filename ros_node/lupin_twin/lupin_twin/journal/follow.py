@@ -37,7 +37,7 @@ from lupin_twin.journal.events import FROM_SCAN
 from lupin_twin.journal.hours import count_rows
 from lupin_twin.journal.notes import id_behind, number_of
 from lupin_twin.journal.retention import Stretches, kept
-from lupin_twin.journal.rows import KIND_FLOWER, STATUS_OK, numbers_of, sensor_names
+from lupin_twin.journal.rows import KIND_FLOWER, STATUS_OK, named_numbers, sensor_names
 from lupin_twin.journal.runs import Span, cut, runs, span_at, spans
 from lupin_twin.journal.schema import (
     LOCAL_SITE,
@@ -379,11 +379,9 @@ def _beginning(log: SiteLog, request: WritesRequest, newest: int) -> int:
 
 
 def _of_scans(rows: list[tuple[Any, ...]]) -> Iterator[PastWrite]:
-    names = {text: sensor_names(text) for text in {row[6] for row in rows}}
-    every = numbers_of([row[7] for row in rows])
-    for row, values in zip(rows, every, strict=True):
-        seq, run, tag, stamp_ns, kind, status, sensors, _ = row
-        yield PastWrite(seq, run, tag, stamp_ns, kind, status, names[sensors], tuple(values))
+    every = named_numbers((row[6] for row in rows), [row[7] for row in rows])
+    for (*of_scan, _, _), (names, values) in zip(rows, every, strict=True):
+        yield PastWrite(*of_scan, names, tuple(values))
 
 
 def _of_inspections(rows: list[tuple[Any, ...]]) -> Iterator[PastWrite]:

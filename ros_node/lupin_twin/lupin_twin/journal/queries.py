@@ -16,9 +16,9 @@ from lupin_twin.core.past import HOUR_NS, NotRemembered, PastRow, SeriesPast, Se
 from lupin_twin.journal.buckets import Buckets, Entry, answer, whole_hours
 from lupin_twin.journal.events import FROM_SCAN, events
 from lupin_twin.journal.hours import deleted_ns, is_counted
-from lupin_twin.journal.rows import KIND_READING, numbers_of, sensor_names
+from lupin_twin.journal.rows import KIND_READING, named_numbers, sensor_names
 from lupin_twin.journal.runs import Run, Span, runs, spans_within
-from lupin_twin.journal.schema import DamagedFile, SiteLog
+from lupin_twin.journal.schema import SiteLog
 
 # What an answer costs, about, s; the second for events of the whole site, each tag.
 SERIES_S: Final = 0.01
@@ -45,9 +45,9 @@ _BUCKETS: Final = (
 
 
 class _Part:
-    """A sensor's readings in a series within a span; `place` is where it stands in its list."""
+    """A sensor's readings in a series within a span; `place` is where it stands in `sensors`."""
 
-    def __init__(self, log: SiteLog, span: Span, series: int, place: int, sensors: int) -> None:
+    def __init__(self, log: SiteLog, span: Span, series: int, place: int, sensors: str) -> None:
         self.span = span
         self._log = log
         self._series = {"series": series, "place": place}
@@ -104,16 +104,11 @@ class _Part:
                     buckets.add_value(stamp_ns, value)
 
     def _read(self, rows: Sequence[tuple[int, int, str]]) -> list[Entry]:
-        found = []
-        for (stamp_ns, seq, _), values in zip(
-            rows, numbers_of([text for *_, text in rows]), strict=True
-        ):
-            if len(values) != self._sensors:
-                raise DamagedFile(
-                    f"scan {seq} has {len(values)} readings of {self._sensors} sensors"
-                )
-            found.append((stamp_ns, seq, values[self._place]))
-        return found
+        every = named_numbers([self._sensors] * len(rows), [text for *_, text in rows])
+        return [
+            (stamp_ns, seq, values[self._place])
+            for (stamp_ns, seq, _), (_, values) in zip(rows, every, strict=True)
+        ]
 
 
 def series(connection: Any, request: SeriesRequest, now_ns: int) -> SeriesPast:
@@ -165,12 +160,10 @@ def newest(
                 query = within | {"sensors": text, "more": each - 1}
                 rows = log.execute(_NEWEST, query).fetchall()
                 place = names.index(sensor_type)
-                values = numbers_of([row[-1] for row in rows])
-                for (tag, stamp_ns, seq, _), of_row in zip(rows, values, strict=True):
-                    if len(of_row) != len(names):
-                        raise DamagedFile(f"scan {seq} has {len(of_row)} of {len(names)} readings")
-                    if is_counted(of_row[place]):
-                        found.setdefault(tag, []).append((stamp_ns, seq, of_row[place]))
+                every = named_numbers([text] * len(rows), [row[-1] for row in rows])
+                for (tag, stamp_ns, seq, _), (_, values) in zip(rows, every, strict=True):
+                    if is_counted(values[place]):
+                        found.setdefault(tag, []).append((stamp_ns, seq, values[place]))
     return {
         tag: [(stamp_ns, value) for stamp_ns, _, value in sorted(entries)[-each:]]
         for tag, entries in found.items()
@@ -189,7 +182,7 @@ def _parts(log: SiteLog, request: SeriesRequest, start_ns: int, end_ns: int) -> 
             names = sensor_names(text)
             if request.sensor_type in names:
                 place = names.index(request.sensor_type)
-                found.append(_Part(log, span, number, place, len(names)))
+                found.append(_Part(log, span, number, place, text))
     return found
 
 
@@ -297,16 +290,15 @@ class Export:
 
     def _read(self, scans: list[tuple[Any, ...]]) -> list[PastRow]:
         found: list[PastRow] = []
-        names = {text: sensor_names(text) for text in {scan[3] for scan in scans}}
-        every = numbers_of([scan[-1] for scan in scans])
-        for (stamp_ns, _, tag, sensors, status, source, _), values in zip(
+        every = named_numbers((scan[3] for scan in scans), [scan[-1] for scan in scans])
+        for (stamp_ns, _, tag, _, status, source, _), (names, values) in zip(
             scans, every, strict=True
         ):
             x, y = self._places.get(tag, _NOWHERE)
-            readings = zip(names[sensors], values, strict=True)
+            readings = zip(names, values, strict=True) if values else _NO_READING
             found += [
                 PastRow(stamp_ns, tag, x, y, sensor, value, status, source)
-                for sensor, value in (readings if values else _NO_READING)
+                for sensor, value in readings
                 if self._sensor_type in (None, sensor)
             ]
         return found

@@ -8,12 +8,10 @@ from __future__ import annotations
 
 import gc
 import sqlite3
-from collections import deque
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
-from itertools import accumulate, chain, repeat
-from typing import Any, Final, TypeVar
+from typing import Any, Final
 
 from lupin_twin.core.drops import MAX_SENSORS_PER_TAG, MAX_TAGS
 from lupin_twin.core.history import LatestRequest
@@ -42,19 +40,8 @@ from lupin_twin.journal.rows import (
 from lupin_twin.journal.runs import FOREVER_NS, Carries, Run, runs, since_seq, span_at
 from lupin_twin.journal.schema import LOCAL_SITE
 
-ValueT = TypeVar("ValueT")
-
-
-def make_many(made: type[ValueT], count: int, *fields: Iterable[object]) -> list[ValueT]:
-    """`count` values of a dataclass with slots; `fields` in its order, each so long at least."""
-    values = list(map(object.__new__, repeat(made, count)))
-    for name, column in zip(made.__slots__, fields, strict=True):  # type: ignore[attr-defined]
-        deque(map(getattr(made, name).__set__, values, column), maxlen=0)
-    return values
-
-
 # What a state takes, about, seconds of one core for each tag.
-STATE_S_PER_TAG: Final = 6e-6
+STATE_S_PER_TAG: Final = 1e-5
 
 _NEWEST: Final = (
     "(SELECT seq FROM scan WHERE site = s.site AND series = s.series AND stamp_ns <= :at"
@@ -183,21 +170,21 @@ def _known(connection: sqlite3.Connection, query: dict[str, Any]) -> Known:
         for tag in tried.keys() - observed.keys()
     }
     tags = sorted(first, key=first.__getitem__)
-    attempts = [tried[tag] for tag in tags if tag in tried]
-    made = iter(_columns(Attempt, [(entry[0], *entry[2:]) for entry in attempts]))
-    states = make_many(
-        TagState,
-        len(tags),
-        tags,
-        map(poses.get, tags),
-        [_latest(found.get(tag, ())) for tag in tags],
-        [observed.get(tag, failed.get(tag)) for tag in tags],
-        [flowers[tag][1] if tag in flowers else NO_FLOWER for tag in tags],
-        [flowers[tag][0] if tag in flowers else None for tag in tags],
-        [next(made) if tag in tried else None for tag in tags],
+    attempts = {tag: Attempt(entry[0], *entry[2:]) for tag, entry in tried.items()}
+    states = tuple(
+        TagState(
+            tag,
+            poses.get(tag),
+            _latest(found.get(tag, ())),
+            observed.get(tag, failed.get(tag)),
+            flowers[tag][1] if tag in flowers else NO_FLOWER,
+            flowers[tag][0] if tag in flowers else None,
+            attempts.get(tag),
+        )
+        for tag in tags
     )
     return Known(
-        tuple(states),
+        states,
         frozenset(observed),
         placed_ns,
         tuple(dict.fromkeys(row[4] for row in scans)),
@@ -221,13 +208,7 @@ def _places(
     for seq, tag, *_ in known:
         if seq < first.get(tag, FOREVER_NS):
             first[tag] = seq
-    poses = _columns(Pose, [row[3:] for row in known])
-    return {row[1]: pose for row, pose in zip(known, poses, strict=True)}, placed_ns
-
-
-def _columns(made: type[ValueT], rows: Sequence[tuple[Any, ...]]) -> list[ValueT]:
-    """A dataclass of each row."""
-    return make_many(made, len(rows), *zip(*rows, strict=True)) if rows else []
+    return {tag: Pose(*pose) for _, tag, _, *pose in known}, placed_ns
 
 
 def _latest(scans: Sequence[tuple[int, int, tuple[Reading, ...]]]) -> tuple[Reading, ...]:
@@ -273,18 +254,10 @@ def copies(connection: sqlite3.Connection, run: Run, carries: Carries) -> list[W
 def _readings(rows: list[tuple[Any, ...]]) -> list[tuple[Reading, ...]]:
     """The readings of rows as `_SCANS` names them."""
     every = named_numbers((row[3] for row in rows), [row[8] for row in rows])
-    lengths = [len(values) for _, values in every]
-    stamps = [repeat(row[5], length) for row, length in zip(rows, lengths, strict=True)]
-    # 50,000 in a large greenhouse: most of what a state takes.
-    made = make_many(
-        Reading,
-        sum(lengths),
-        chain.from_iterable(names for names, _ in every),
-        chain.from_iterable(values for _, values in every),
-        chain.from_iterable(stamps),
-    )
-    ends = list(accumulate(lengths))
-    return [tuple(made[end - length : end]) for end, length in zip(ends, lengths, strict=True)]
+    return [
+        tuple([Reading(name, value, row[5]) for name, value in zip(*scan, strict=True)])
+        for row, scan in zip(rows, every, strict=True)
+    ]
 
 
 def latest(connection: sqlite3.Connection, request: LatestRequest) -> list[Scan | Inspection]:

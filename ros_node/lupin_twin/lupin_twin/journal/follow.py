@@ -380,8 +380,9 @@ def _beginning(log: SiteLog, request: WritesRequest, newest: int) -> int:
 
 def _of_scans(rows: list[tuple[Any, ...]]) -> Iterator[PastWrite]:
     every = named_numbers((row[6] for row in rows), [row[7] for row in rows])
-    for (*of_scan, _, _), (names, values) in zip(rows, every, strict=True):
-        yield PastWrite(*of_scan, names, tuple(values))
+    for row, (names, values) in zip(rows, every, strict=True):
+        seq, run, tag, stamp_ns, kind, status, *_ = row
+        yield PastWrite(seq, run, tag, stamp_ns, kind, status, names, tuple(values))
 
 
 def _of_inspections(rows: list[tuple[Any, ...]]) -> Iterator[PastWrite]:

@@ -229,7 +229,7 @@ class _Part:
 class _Source:
     """The attempts and events of a tag, or of the site (`tag` None), span by span.
 
-    Rows are there as far back as they are kept, what is rare for ten years; of the site the hours
+    Rows are there as far back as they are kept, what is rare for good; of the site the hours
     of all attempts too.
     """
 

@@ -27,7 +27,6 @@ from lupin_twin.journal.retention import (
     kept,
     note_limits,
     note_lost,
-    purge_hours,
     purge_step,
     shrink_step,
 )
@@ -61,7 +60,6 @@ _CHECKED_BYTES: Final = 64_000_000
 # The log is put into the file when it is this long: the longer, the fewer pages are written twice.
 _LOG_BYTES: Final = 8_000_000
 _PURGE_EVERY_S: Final = 60.0
-_PURGE_HOURS_EVERY_S: Final = 86_400.0
 _POLL_EVERY_S: Final = 1.0
 # A robot that explores sends a map a second: not each of them is written.
 _MAP_REST_S: Final = 10.0
@@ -145,7 +143,6 @@ class JournalFile:
             self.simulated = simulated(self._connection)
             self.journal_id = get_meta(self._connection, "journal_id") or ""
             self._purged_s = self._polled_s = 0.0
-            self._hours_purged_s = time.monotonic()
             self._purges_before_ns: int | None = None
             self._is_shrinking = False
             self._kept: Stretches | None = None
@@ -384,10 +381,6 @@ class JournalFile:
         return may_purge and self._purge(now_s)
 
     def _purge(self, now_s: float) -> bool:
-        if now_s - self._hours_purged_s >= _PURGE_HOURS_EVERY_S:
-            self._hours_purged_s = now_s
-            with self._transaction():
-                purge_hours(self._connection, time.time_ns())
         if self._purges_before_ns is None and not self._is_shrinking:
             if now_s - self._purged_s < _PURGE_EVERY_S:
                 return False

@@ -74,11 +74,6 @@ class Run:
         """The number of the run that rows refer to."""
         return self.id if self.joins is None else self.joins
 
-    @property
-    def lead_ns(self) -> int:
-        """What arrivals are ahead of stamps, about."""
-        return self.begun.arrival_ns - self.begun.stamp_ns if self.begun.is_simulated else 0
-
 
 @dataclass(frozen=True, slots=True)
 class Span:

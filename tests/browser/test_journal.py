@@ -111,3 +111,4 @@ def test_a_full_disk_is_told_everywhere_costs_nothing_and_heals(
         assert told["lupin_journal_rows_lost_total"] == 0
         assert told["lupin_journal_rows_total"] >= number
         live.peer.until(lambda: levels().get(TOLD) == DiagnosticStatus.OK, "no error")
+        live.process.wait_for_output("journal: well again: recording")

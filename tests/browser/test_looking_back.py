@@ -395,7 +395,7 @@ def test_the_estimate_says_plus_or_minus_what_now_and_then_and_in_its_link(
     hmi = open_page(hour.bridge.url, "period=hour", color_scheme="dark", bypass_csp=True)
     hmi.expect_samples(3)
     hmi.test_id("heat-legend").select_option("estimate")
-    expect(hmi.test_id("estimate-key")).to_contain_text("Hatched: the error may exceed")
+    expect(hmi.test_id("estimate-key")).to_contain_text("Hatched: less certain than")
     expect(hmi.test_id("foretold")).to_be_visible()
     # The error alone, which is said also where a house that has just jumped is not known.
     hmi.test_id("heat-legend").select_option("error")

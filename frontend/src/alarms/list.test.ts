@@ -62,6 +62,9 @@ describe('acknowledged and shelved', () => {
     expect(calling(list([mild.alarm]))).toHaveLength(1);
     expect(calling(list([mild.alarm], kept))).toEqual([]);
     expect(list([mild.alarm], kept).active[0]?.isAcknowledged).toBe(true);
+    // Of equals it comes after what nobody has seen yet.
+    const older = alarm('older', { raised: 1, reason: stressed });
+    expect(ids(list([mild.alarm, older], kept).active)).toEqual(['older', 'a']);
     const worse = { ...mild.alarm, reason: reason() };
     expect(calling(list([worse], kept))).toHaveLength(1);
   });

@@ -18,7 +18,7 @@ export interface Item {
 }
 
 export interface AlarmList {
-  /** Active and not shelved: the worst first, of equals the newest. */
+  /** Active and not shelved: the worst first, of equals what nobody has acknowledged, then the newest. */
   readonly active: readonly Item[];
   /** Active and shelved, in the same order. */
   readonly shelved: readonly Item[];
@@ -58,6 +58,16 @@ export function listOf(
   };
 }
 
+/** The same with what is worst now first; `verdicts` are those of now of `active`, in its order. */
+export function worstNowFirst(list: AlarmList, verdicts: readonly Verdict[]): AlarmList {
+  const ranked = list.active.map((item, index) => ({
+    item,
+    rank: VERDICTS.indexOf(verdicts[index] ?? item.verdict),
+  }));
+  const active = ranked.sort((a, b) => a.rank - b.rank).map(({ item }) => item);
+  return { ...list, active };
+}
+
 const isListed = (end: number, nowS: number | null): boolean =>
   nowS === null || nowS - end < LISTED_S;
 
@@ -66,6 +76,7 @@ const endOf = ({ cleared_at }: Alarm): number => (cleared_at ? secondsOf(cleared
 
 const worstFirst = (a: Item, b: Item): number =>
   VERDICTS.indexOf(a.verdict) - VERDICTS.indexOf(b.verdict) ||
+  Number(a.isAcknowledged) - Number(b.isAcknowledged) ||
   beginOf(b.alarm) - beginOf(a.alarm) ||
   byName(a, b);
 

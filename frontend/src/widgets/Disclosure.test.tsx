@@ -1,5 +1,5 @@
 import { fireEvent, render, screen } from '@testing-library/react';
-import { describe, expect, test } from 'vitest';
+import { describe, expect, test, vi } from 'vitest';
 
 import { Disclosure, useClose } from './Disclosure';
 
@@ -11,13 +11,18 @@ function Inside(): React.JSX.Element {
   );
 }
 
+const onElsewhere = vi.fn();
+
 const show = (): HTMLElement => {
+  onElsewhere.mockClear();
   render(
     <>
       <Disclosure label="Things" button="=" className="things">
         <Inside />
       </Disclosure>
-      <button type="button">Elsewhere</button>
+      <button type="button" onClick={onElsewhere}>
+        Elsewhere
+      </button>
     </>,
   );
   const trigger = screen.getByRole('button', { name: 'Things' });
@@ -46,6 +51,19 @@ describe('disclosure', () => {
     show();
     fireEvent.pointerDown(screen.getByRole('button', { name: 'Elsewhere' }));
     expect(isOpen()).toBe(false);
+  });
+
+  test('a finger that closes it presses nothing behind it, and one that scrolls leaves it open', () => {
+    show();
+    const elsewhere = screen.getByRole('button', { name: 'Elsewhere' });
+    fireEvent.pointerDown(elsewhere, { pointerType: 'touch' });
+    fireEvent.focusIn(elsewhere);
+    expect(isOpen()).toBe(true);
+    fireEvent.click(elsewhere);
+    expect(isOpen()).toBe(false);
+    expect(onElsewhere).not.toHaveBeenCalled();
+    fireEvent.click(elsewhere);
+    expect(onElsewhere).toHaveBeenCalledOnce();
   });
 
   test('what is inside can close it', () => {

@@ -43,8 +43,18 @@ export function Disclosure({
 
   useEffect(() => {
     if (!open) return;
+    const isOutside = ({ target }: Event): boolean => !root.current?.contains(target as Node);
+    let byFinger = false;
     const onPointerDown = (event: PointerEvent): void => {
-      if (!root.current?.contains(event.target as Node)) setOpen(false);
+      byFinger = event.pointerType === 'touch';
+      if (!byFinger && isOutside(event)) setOpen(false);
+    };
+    // A finger that closes a panel does nothing else: it cannot see what it would press behind it.
+    const onClick = (event: MouseEvent): void => {
+      if (!byFinger || !isOutside(event)) return;
+      event.preventDefault();
+      event.stopPropagation();
+      setOpen(false);
     };
     const onKeyDown = (event: KeyboardEvent): void => {
       if (event.key !== 'Escape') return;
@@ -53,13 +63,15 @@ export function Disclosure({
       trigger.current?.focus();
     };
     const onFocusIn = (event: FocusEvent): void => {
-      if (!root.current?.contains(event.target as Node)) setOpen(false);
+      if (!byFinger && isOutside(event)) setOpen(false);
     };
     document.addEventListener('pointerdown', onPointerDown);
+    document.addEventListener('click', onClick, true);
     document.addEventListener('keydown', onKeyDown, true);
     document.addEventListener('focusin', onFocusIn);
     return () => {
       document.removeEventListener('pointerdown', onPointerDown);
+      document.removeEventListener('click', onClick, true);
       document.removeEventListener('keydown', onKeyDown, true);
       document.removeEventListener('focusin', onFocusIn);
     };

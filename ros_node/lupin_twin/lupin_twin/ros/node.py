@@ -76,6 +76,7 @@ class TwinNode(AdjustableNode):
         self._observed_s: float | None = None
         self._clock_subscription: Any = None
         self._clock_reported: ClockState = "running"
+        self._was_journal_well = True
         self._map_revision = 0
         self._rules_revision = 0
         self._topics: dict[str, str] = {}
@@ -369,6 +370,9 @@ class TwinNode(AdjustableNode):
         condition = self.memory.condition
         if not condition.is_well:
             self.utilities.warn(("journal", condition.state), f"journal: {condition.detail}")
+        elif not self._was_journal_well:
+            self.get_logger().info(f"journal: well again: {condition.detail}")
+        self._was_journal_well = condition.is_well
 
     def _watch_clock(self, now_ns: int, *, is_simulated: bool) -> None:
         watch = self._clock_watch

@@ -68,7 +68,7 @@ def any_json(chance: random.Random, depth: int = 3) -> object:
 
 def anything(chance: random.Random) -> bytes:
     """A frame, or a message in pieces, as a proper client could send it."""
-    kind = chance.randrange(6)
+    kind = chance.randrange(7)
     payload = random_payload(chance, 3_000)
     if kind == 0:
         return masked(BINARY, payload)
@@ -83,7 +83,9 @@ def anything(chance: random.Random) -> bytes:
         rosbridge |= members if isinstance(members, dict) else {"topic": members}
         return masked(TEXT, json.dumps(rosbridge).encode())
     text = payload.decode("utf-8", "replace")
-    if kind == 4:
+    if kind == 6:
+        text = chance.choice(("[" * 15_000, '{"a":' * 3_000, "1e999", "null", '{"op":{}}'))
+    if kind in (4, 6):
         return masked(TEXT, text.encode())
     return masked(TEXT, text.encode(), fin=False) + masked(PING, b"") + masked(CONT, b"end")
 

@@ -12,17 +12,15 @@ import httpx
 import psycopg
 from PIL import Image
 
-from lupin_bridge.fleet.site_log import SiteConnection
 from lupin_twin.core.past import SeriesRequest
 from lupin_twin.core.writes import RecentRequest, ScansRequest, WritesRequest
-from lupin_twin.field.explored import OccupancyMap
-from lupin_twin.journal.floor_plan import text_of
+from lupin_twin.field.explored import OccupancyMap, text_of
 from lupin_twin.journal.fold import state_at
 from lupin_twin.journal.follow import recent, scans, writes
 from lupin_twin.journal.queries import series
 from lupin_twin.journal.retention import kept
 from lupin_twin.journal.rows import newest_of_tag
-from lupin_twin.journal.schema import open_reader
+from lupin_twin.journal.schema import SiteLog, open_reader
 from tests.support import maps
 from tests.support.archive import Archive, forward_once, forwarder
 from tests.support.fleet import fleet, scans_lately, write
@@ -43,7 +41,7 @@ def test_every_query_of_a_journal_is_answered_alike(archive: Archive, tmp_path: 
     write(journal, [scan("other", now_ns)])
     forward_once(archive, journal)
     with closing(open_reader(journal)) as local, psycopg.connect(archive.owner) as remote:
-        logs = local, SiteConnection(remote, "gh2")
+        logs = local, SiteLog(remote, "gh2")
         for at_ns in (now_ns, now_ns - 2 * MINUTE_NS, now_ns - 5 * MINUTE_NS, 0):
             one, other = (state_at(log, at_ns, "map") for log in logs)  # type: ignore[arg-type]
             assert one == other
@@ -144,7 +142,7 @@ def test_the_floor_plan_is_that_of_the_twin(archive: Archive, tmp_path: Path) ->
         assert get("map").status_code == 404
         for shown in (floor, maps.map_of([[0, 0]])):
             with opened(journal) as file:
-                file.note_map(text_of(shown))
+                file.put_map(shown, partial(text_of, shown))
             write(journal, [scan("0", time.time_ns(), temperature=22.0)])
             wait_for(partial(shows, shown), "the floor plan")
             assert get("map").json()["info"]["resolution"] == shown.resolution
@@ -156,7 +154,7 @@ def test_the_floor_plan_is_that_of_the_twin(archive: Archive, tmp_path: Path) ->
         assert 0 < known(after) < known(before)
         assert after.headers["etag"] != before.headers["etag"]
         with opened(journal) as file:
-            file.note_map("")  # one that is too large
+            file.put_map("", str)  # one that is too large
         write(journal, [scan("0", time.time_ns(), temperature=22.0)])
         wait_for(lambda: get("map").status_code == 404, "no floor plan")
         archive.do("UPDATE meta SET value = '{\"width\": 5}' WHERE site = 'gh1' AND key = 'map'")

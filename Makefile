@@ -119,7 +119,7 @@ check: setup ## quick checks: lint, types, and every test that needs neither ROS
 
 quick: setup ## Python tests that need neither ROS nor a browser
 	$(say) 'Python tests without ROS and browser'
-	@$(TEST_ENV) $(BIN)/pytest -q -n 2 --dist worksteal --quick tests
+	@$(TEST_ENV) $(BIN)/pytest -q -n 2 --dist worksteal -r fE --quick tests
 
 test: setup $(DONE)/tools $(DONE)/test_msgs/built ## all checks: lint, types, guide, unit tests, real ROS, browser
 	@$(MAKE) --no-print-directory -j 2 --output-sync=target lint types docs hmi-test collect

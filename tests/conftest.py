@@ -13,7 +13,7 @@ import pytest
 from hypothesis import HealthCheck, settings
 
 from tests.support.domains import own_domain
-from tests.support.needs import is_quick, let_nothing_in
+from tests.support.needs import let_nothing_in
 from tests.support.shared_memory import remove_what_the_dead_left
 from tests.support.state_home import use_own
 
@@ -46,11 +46,6 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 def pytest_configure(config: pytest.Config) -> None:
     if config.getoption("--quick"):
         let_nothing_in()
-
-
-def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool | None:
-    """Under --quick, not even imported; None: for others to decide."""
-    return True if config.getoption("--quick") and not is_quick(collection_path) else None
 
 
 def pytest_collection_finish() -> None:

@@ -51,7 +51,7 @@ schema = schemathesis.openapi.from_dict(json.loads(document()))
 
 
 @schema.parametrize()
-@settings(max_examples=30, derandomize=True, suppress_health_check=list(HealthCheck))
+@settings(max_examples=10, derandomize=True, suppress_health_check=list(HealthCheck))
 def test_every_answer_is_one_that_the_document_describes(case: Any, live: Bridge) -> None:
     answer = case.call(base_url=live.url)
     if answer.status_code == 414:  # the door's answer, whatever the route

@@ -51,7 +51,7 @@ NO_LIMITS = limits(answers_per_s=10_000)
 RATE = ("--ros-args", "-p", "state_publish_rate_hz:=10.0")
 # A topic holds 50 messages; a lot that was waited for has lost none.
 LOT = 40
-LOTS = 10
+LOTS = 5
 # All that is served is looked at after so many of them.
 FULLY = 5
 

@@ -66,15 +66,3 @@ def test_off_keeps_nothing(domain: int, tmp_path: Path) -> None:
             assert bool(client.state(lambda state: True, "a state").tags) is known
             client.observe(scan("1", {"t": 1.0}))
             client.tag("1")
-
-
-def test_a_second_twin_on_the_same_journal_says_who_has_it_and_goes_on(
-    domain: int, tmp_path: Path
-) -> None:
-    ros_args = ("-p", f"journal:={tmp_path / 'j.sqlite'}")
-    with twin_node(domain, *OFTEN, *ros_args), Peer(domain) as client:
-        client.listen()
-        client.state(lambda state: True, "a state")
-        with twin_node(domain, *OFTEN, *ros_args, "-r", "__node:=second") as second:
-            second.wait_for_output("is in use by /lupin_twin (process")
-            assert second.exit_code is None

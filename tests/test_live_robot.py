@@ -28,7 +28,7 @@ from tests.support.live import attached, wait_until_ready
 from tests.support.messages import scan
 from tests.support.processes import limits, lupin_twin
 from tests.support.waiting import PATIENCE_S
-from tests.support.web import Bridge, bridge
+from tests.support.web import Bridge, Listener, bridge
 
 QUICK = ("--ros-args", "-p", "state_publish_rate_hz:=10.0")
 # No machine is too busy for an answer.
@@ -98,6 +98,13 @@ def until_at(live: Bridge, x: float) -> Json:
     return told
 
 
+def assert_says_nothing_of_a_robot(client: Listener) -> None:
+    """With none of the next states, and not between them."""
+    kinds = [client.next()["type"] for _ in range(4)]
+    assert "state" in kinds
+    assert "robot" not in kinds
+
+
 def dropped(live: Bridge, name: str, reason: str) -> float:
     [line] = [
         line
@@ -157,10 +164,7 @@ def test_a_frame_of_the_robot_comes_behind_the_first_state_and_then_on_change_al
             robot_schema.RobotFrame.model_validate(frame)
             assert frame["position"]["x"] == 1.0
             assert "trail" not in frame
-            # Nothing is said any more: a dozen states later no frame has come.
-            for _ in range(12):
-                client.until("state")
-            assert not [it for it in client.rest() if it["type"] == "robot"]
+            assert_says_nothing_of_a_robot(client)
 
 
 def test_another_frame_and_what_is_no_place_are_dropped_named_and_counted(
@@ -201,9 +205,7 @@ def test_another_frame_and_what_is_no_place_are_dropped_named_and_counted(
 def test_before_a_robot_has_said_anything_nothing_is_known(alone: Bridge) -> None:
     assert robot(alone) == {"position": None, "plan": None, "battery": None, "trail": []}
     with alone.listen() as client:
-        for _ in range(12):
-            client.until("state")
-        assert not [it for it in client.rest() if it["type"] == "robot"]
+        assert_says_nothing_of_a_robot(client)
 
 
 def test_odometry_in_the_maps_frame_is_taken_by_its_type(alone: Bridge) -> None:

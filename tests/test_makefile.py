@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import subprocess
 
-from tests.support.needs import TESTS
+from tests.support.structure import ROOT
 
 
 def told(*target: str) -> str:
@@ -13,7 +13,7 @@ def told(*target: str) -> str:
     own = ("MAKEFLAGS", "MFLAGS", "MAKELEVEL")
     result = subprocess.run(
         ["make", "--dry-run", "--no-print-directory", *target],
-        capture_output=True, text=True, check=True, cwd=TESTS.parent,
+        capture_output=True, text=True, check=True, cwd=ROOT,
         env={name: value for name, value in os.environ.items() if name not in own},
     )  # fmt: skip
     return result.stdout

@@ -56,7 +56,9 @@ def test_a_subscriber_gets_the_state(house: Bridge) -> None:
     assert state["header"]["frame_id"] == "map"
 
 
-def test_fields_come_with_null_where_nothing_is_known(house: Bridge) -> None:
+def test_fields_come_with_null_and_a_refused_one_and_a_failed_call_are_two_things(
+    house: Bridge,
+) -> None:
     told = play(house.url, "field")
     assert told["known"]["callback"] == "done"
     known = told["known"]["values"]
@@ -71,10 +73,6 @@ def test_fields_come_with_null_where_nothing_is_known(house: Bridge) -> None:
         bbox_max_x=3,
         bbox_max_y=3,
     )
-
-
-def test_a_field_that_is_refused_and_a_call_that_fails_are_two_things(house: Bridge) -> None:
-    told = play(house.url, "field")
     assert told["refused"]["callback"] == "done"
     assert told["refused"]["values"]["ok"] is False
     assert "resolution" in told["refused"]["values"]["error_message"]

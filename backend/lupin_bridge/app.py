@@ -18,6 +18,7 @@ from lupin_bridge import __version__
 from lupin_bridge.access.middleware import Access, AccessControl, ReadOnly
 from lupin_bridge.access.policy import BehindProxies, Proxies
 from lupin_bridge.bridge import Bridge
+from lupin_bridge.metrics import Metered
 from lupin_bridge.routes import (
     estimate,
     export,
@@ -32,7 +33,7 @@ from lupin_bridge.routes import (
     status,
 )
 from lupin_bridge.routes.answers import add_refusals, error_response
-from lupin_bridge.serving.middleware import Metered, PieceByPiece
+from lupin_bridge.serving.http_protocol import PieceByPiece
 from lupin_bridge.stream import people_schema, robot_schema, schema
 
 STATIC_FOLDER = Path(__file__).parent / "static"

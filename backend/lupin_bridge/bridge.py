@@ -12,21 +12,19 @@ from dataclasses import replace
 from typing import Final
 
 from lupin_bridge.alarms.board import AlarmBoard, Change
-from lupin_bridge.alarms.feed import AlarmFeed
+from lupin_bridge.alarms.feed import AlarmFeed, learn_recent
 from lupin_bridge.alarms.notes import NoteBoard
-from lupin_bridge.feed.estimates import EstimateFollower, Reports
+from lupin_bridge.feed.estimates import EstimateFollower
 from lupin_bridge.feed.shared_work import Periodic, Shared, end
 from lupin_bridge.feed.source import TwinSource, TwinUpdate
 from lupin_bridge.judge.judging import NOTHING_JUDGED, Judge, Judged, silenced, unjudged
 from lupin_bridge.judge.options import Criteria
-from lupin_bridge.metrics import Metrics, Sample
+from lupin_bridge.metrics import Metrics, Sample, route_class
 from lupin_bridge.notify.channels import Channels
 from lupin_bridge.notify.messages import GreenhouseState
 from lupin_bridge.past.plans import Answered
-from lupin_bridge.past.recent_scans import learn_recent
 from lupin_bridge.rate_limit import RateLimit
 from lupin_bridge.serving.admission import Admission, Answer, AnswerCache, Limits
-from lupin_bridge.serving.middleware import route_class
 from lupin_bridge.settings import Settings
 from lupin_bridge.stream.frames import FrameWriter, alarms_message
 from lupin_bridge.stream.hub import Client, Hub
@@ -97,10 +95,8 @@ class Bridge:
         self._judged = NOTHING_JUDGED
         self._states_unjudged = 0
         self._is_judge_failing = False
-        self.reports = Reports(source)
         self._estimates = EstimateFollower(
             source,
-            self.reports,
             lambda: None if self._latest is None else self._latest.snapshot,
             self._judge.note_changed,
         )

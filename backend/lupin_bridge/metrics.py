@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import partial
@@ -10,6 +11,7 @@ from typing import Final, Literal
 from prometheus_client import CollectorRegistry, Histogram, ProcessCollector, generate_latest
 from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily, Metric
 from prometheus_client.registry import Collector
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 CONTENT_TYPE: Final = "text/plain; version=0.0.4; charset=utf-8"
 
@@ -152,3 +154,48 @@ class Metrics(Collector):
 
     def _histogram(self, name: str) -> Histogram:
         return Histogram(name, HISTOGRAMS[name], buckets=_SECONDS, registry=self._registry)
+
+
+# --- answers over HTTP ----------------------------------------------------------------------------
+
+# (path, status, seconds until the answer began)
+Note = Callable[[str, int, float], None]
+
+# Routes below /api with a class of their own.
+_OWN: Final = frozenset(
+    ("estimate", "export", "field", "history", "map", "signin", "state", "tags", "timeline")
+)
+
+
+def route_class(path: str) -> str:
+    """The class of a path's route, for metrics: few, however many paths there are."""
+    parts = path.strip("/").split("/")
+    if parts[0] == "api" and len(parts) > 1:
+        name = parts[1].partition(".")[0]
+        return name if name in _OWN else "other"
+    if path in ("/healthz", "/readyz", "/metrics"):
+        return "health"
+    return "docs" if path in ("/docs", "/openapi.json") else "page"
+
+
+class Metered:
+    """The outermost: notes each HTTP answer as it begins, refusals included."""
+
+    def __init__(self, app: ASGIApp, note: Note) -> None:
+        self._app = app
+        self._note = note
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Pass on, and watch for the answer."""
+        if scope["type"] != "http":
+            await self._app(scope, receive, send)
+            return
+        began_s = time.monotonic()
+        path: str = scope["path"]
+
+        async def send_and_note(message: Message) -> None:
+            if message["type"] == "http.response.start":
+                self._note(path, message["status"], time.monotonic() - began_s)
+            await send(message)
+
+        await self._app(scope, receive, send_and_note)

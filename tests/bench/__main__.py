@@ -7,21 +7,18 @@ import sys
 
 from tests.support.state_home import use_own
 
-# In the order of the way through the system: field, truth, tick, journal, past, bridge, page.
+# In the order of the way through the system: field, truth, journal, past, bridge, page.
 BENCHES = (
     "bench_field",
     "bench_estimate",
     "bench_estimate_checks",
     "bench_estimate_many",
     "bench_estimate_speed",
-    "bench_tick",
     "bench_log",
     "bench_alarms",
-    "bench_outward",
     "bench_bridge",
     "bench_past",
     "bench_page",
-    "bench_past_page",
     "bench_house",
     "bench_import",
     "bench_forward",

@@ -260,7 +260,7 @@ def test_a_status_goes_out_when_it_changes_and_only_then() -> None:
 def test_a_memory_that_is_busy_at_the_start_is_asked_again(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr("lupin_bridge.past.recent_scans.RETRY_S", 0.01)
+    monkeypatch.setattr("lupin_bridge.alarms.feed.LEARN_AGAIN_S", 0.01)
     hour_ns = 3_600 * 10**9
 
     async def test() -> None:

@@ -261,7 +261,7 @@ def test_a_row_leads_to_its_tag_as_it_is_now_and_a_button_to_its_start(
         assert "at=" not in hmi.address()
         expect(row).to_have_attribute("data-acknowledged", "false")
 
-        hmi.tab_to(row.get_by_role("button", name="Show when it began: Tag a"))
+        hmi.tab_to(row.get_by_role("button", name="Go to start: Tag a"))
         hmi.page.keyboard.press("Enter")
         raised_s = alarm["raised_at"]["sec"] + alarm["raised_at"]["nanosec"] / 1e9
         shown = re.compile(rf"^{int(raised_s)}\.\d+$|^{int(raised_s)}$")

@@ -84,9 +84,19 @@ def test_the_page_says_what_is_missing_until_it_comes(domain: int, open_page: Op
         expect(notice).to_have_count(0)
 
 
-def test_a_tag_without_a_pose_is_only_in_the_table(shared: Bridge, open_page: OpenPage) -> None:
-    shared.peer.observe(scan("lost", {"temperature": 24.0}))
+def test_what_is_not_known_of_a_tag_is_said(shared: Bridge, open_page: OpenPage) -> None:
+    shared.peer.observe(
+        scan("lost", {"temperature": 24.0}),
+        scan("broken", {"temperature": float("nan")}, at=(4, 2)),
+        # The table has a column for a sensor only once a tag reports it.
+        scan("humid", {"humidity": 60.0}, at=(4, 4)),
+    )
+    shared.peer.discover(discovered({"seen": pose(3, 3)}))
     hmi = open_page(shared.url)
+    expect(hmi.row("seen")).to_have_attribute("data-pinned", "true")
+    expect(hmi.row("seen").locator(".cell-age")).to_have_text("never")
+    expect(hmi.cell("broken", "temperature")).to_have_text("failed")
+    expect(hmi.cell("broken", "humidity")).to_contain_text("no such sensor")
     row = hmi.row("lost")
     expect(row).to_contain_text("No pin")
     expect(row).to_have_attribute("data-pinned", "false")
@@ -137,28 +147,6 @@ def test_a_look_at_the_flowers_makes_no_reading_young(open_page: OpenPage) -> No
         expect(card.locator("[data-sensor=co2] .age")).to_have_text(re.compile(r"^10\smin$"))
         expect(card).to_contain_text(re.compile(r"Flowers inspected\s?2\ss"))
         expect(card.get_by_role("region", name="Last attempts").locator("li")).to_have_count(3)
-
-
-def test_a_discovered_tag_has_a_pin_and_was_never_observed(
-    shared: Bridge, open_page: OpenPage
-) -> None:
-    shared.peer.discover(discovered({"seen": pose(3, 3)}))
-    hmi = open_page(shared.url)
-    expect(hmi.row("seen")).to_have_attribute("data-pinned", "true")
-    expect(hmi.row("seen").locator(".cell-age")).to_have_text("never")
-
-
-def test_a_sensor_that_gives_no_number_is_told_apart_from_one_that_is_not_there(
-    shared: Bridge, open_page: OpenPage
-) -> None:
-    shared.peer.observe(
-        scan("broken", {"temperature": float("nan")}, at=(4, 2)),
-        # The table has a column for a sensor only once a tag reports it.
-        scan("humid", {"humidity": 60.0}, at=(4, 4)),
-    )
-    hmi = open_page(shared.url)
-    expect(hmi.cell("broken", "temperature")).to_have_text("failed")
-    expect(hmi.cell("broken", "humidity")).to_contain_text("no such sensor")
 
 
 def test_a_pest_appears_on_map_and_table_and_a_clean_look_clears_it(

@@ -152,7 +152,9 @@ def seconds(stamp: dict[str, int]) -> float:
     return stamp["sec"] + stamp["nanosec"] / 1e9
 
 
-def test_a_gap_stays_open_and_the_rest_is_a_line(garden: Garden, open_page: OpenPage) -> None:
+def test_a_gap_stays_open_and_the_table_says_what_the_api_says(
+    garden: Garden, open_page: OpenPage
+) -> None:
     hmi = open_page(garden.bridge.url, f"chart.tag=1&{garden.period}")
     picture = plotted(hmi)
     share = picture.width / (garden.now_s - garden.from_s)
@@ -163,10 +165,6 @@ def test_a_gap_stays_open_and_the_rest_is_a_line(garden: Garden, open_page: Open
     inside = [column for column in drawn if 20 < column < left - 10]
     assert len(inside) > 0.9 * (left - 30)
 
-
-def test_the_table_says_what_the_api_says(garden: Garden, open_page: OpenPage) -> None:
-    hmi = open_page(garden.bridge.url, f"chart.tag=1&{garden.period}")
-    plotted(hmi)
     told = garden.history(**asked(hmi))
     assert not told["is_bucketed"]
     assert len(told["gaps"]) == 1

@@ -2,22 +2,21 @@
 
 from __future__ import annotations
 
-import os
 import re
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
 import pytest
-from playwright.sync_api import Browser, expect
+from playwright.sync_api import Browser, ViewportSize, expect
 from playwright.sync_api import Page as BrowserPage
 
 from tests.support.archive import Archive, forward_once, forwarder
 from tests.support.fleet import Page, fleet, scans_lately, wall, write
-from tests.support.journal import scan
+from tests.support.journal import recording, scan
 from tests.support.postgres import server
-from tests.support.processes import lupin_twin
 
+PHONE: ViewportSize = {"width": 390, "height": 800}
 HOUR_NS = 3_600_000_000_000
 
 
@@ -32,11 +31,11 @@ def opened(browser: Browser, url: str, **context: object) -> Iterator[BrowserPag
         assert not problems
 
 
-def picture(page: BrowserPage, name: str) -> None:
-    """Kept where LUPIN_PICTURES says, for people to look at."""
-    folder = os.environ.get("LUPIN_PICTURES")
-    if folder:
-        page.screenshot(path=str(Path(folder) / f"fleet-{name}.png"))
+def expect_no_wider_than_a_phone(page: BrowserPage) -> None:
+    """Nothing sticks out of a phone's screen."""
+    page.set_viewport_size(PHONE)
+    page.wait_for_function(f"innerWidth === {PHONE['width']}")
+    assert page.evaluate("document.documentElement.scrollWidth") <= PHONE["width"]
 
 
 @contextmanager
@@ -88,7 +87,6 @@ def test_the_worst_first_and_a_click_away(browser: Browser, sites: Page) -> None
         # Nobody says where the rows come from; with two groups at least, there are headings.
         expect(page.locator(".fleet-origin")).to_have_count(0)
         expect(page.locator(".fleet-group")).to_have_count(0)
-        picture(page, "light")
         page.keyboard.press("/")
         page.keyboard.type("wa")
         expect(names).to_have_text(["warm"])
@@ -102,21 +100,13 @@ def test_the_worst_first_and_a_click_away(browser: Browser, sites: Page) -> None
         expect(page).to_have_url(re.compile(r"/sites/gh1/"))
         expect(page.get_by_role("banner")).to_contain_text("gh1")
         expect(page.locator(".tag-table, table").first).to_contain_text("4")
-        picture(page, "site")
     with opened(browser, f"{sites.url}/sites/silent/") as page:
         expect(page.get_by_role("banner")).not_to_contain_text("Live", timeout=10_000)
-        picture(page, "silent")
-    with opened(browser, sites.url, color_scheme="dark") as page:
-        expect(page.locator(".fleet-site")).to_have_count(3)
-        picture(page, "dark")
-    phone = {"width": 390, "height": 800}
-    with opened(browser, f"{sites.url}?kiosk&lang=de", viewport=phone) as page:
+    with opened(browser, f"{sites.url}?kiosk&lang=de", viewport=PHONE) as page:
         expect(page.get_by_role("heading", level=1)).to_have_text("Gewächshäuser")
         expect(page.get_by_role("searchbox")).to_have_count(0)
         expect(page.locator(".fleet-site")).to_have_count(3)
-        width = page.evaluate("document.documentElement.scrollWidth")
-        assert width <= 390
-        picture(page, "kiosk")
+        expect_no_wider_than_a_phone(page)
 
 
 def test_the_way_back_from_a_greenhouse_to_all_of_them(browser: Browser, archive: Archive) -> None:
@@ -153,7 +143,6 @@ def test_alarms_of_all_greenhouses_are_counted_listed_and_a_click_away(
             expect(rows.first).to_contain_text("warm")
             expect(rows.first).to_contain_text("Critical")
             expect(rows.first).to_contain_text("Temperature above 35")
-            picture(page, "alarms")
             # The filters are those of the cards.
             page.get_by_role("searchbox").fill("gh1")
             expect(rows).to_have_count(0)
@@ -175,20 +164,13 @@ def test_alarms_of_all_greenhouses_are_counted_listed_and_a_click_away(
                 f" 'alarm:{name}', '', NULL)"
             )
             expect(rows.first).to_contain_text("acknowledged by Anna at")
-            picture(page, "acknowledged")
+            expect_no_wider_than_a_phone(page)
             tag = rows.first.locator("span", has_text=re.compile(r"^Tag \d$")).inner_text()
             rows.first.get_by_role("link").click()
             expect(page).to_have_url(re.compile(r"/sites/warm/.*#.*at=\d+"))
             # Its card, and as of then.
             expect(page.get_by_role("complementary", name=tag)).to_be_visible()
             expect(page.locator(".app")).to_have_attribute("data-past", "true")
-            picture(page, "alarm-site")
-        phone = {"width": 390, "height": 800}
-        with opened(browser, served.url, viewport=phone) as page:
-            page.get_by_role("button", name="Alarms 5").click()
-            expect(page.locator(".fleet-alarm-list li")).to_have_count(5)
-            assert page.evaluate("document.documentElement.scrollWidth") <= 390
-            picture(page, "alarms-phone")
         with opened(browser, f"{served.url}?kiosk") as page:
             expect(page.get_by_role("banner")).to_contain_text("5 alarms")
 
@@ -223,7 +205,6 @@ def test_one_sensor_of_several_greenhouses_the_outlier_first(
             expect(page.get_by_role("checkbox", name="Draw gh3")).not_to_be_checked()
             page.get_by_role("checkbox", name="Draw gh3").check()
             expect(page.get_by_role("checkbox", name="Draw gh3")).to_be_checked()
-            picture(page, "compare")
             # The same choice of greenhouses as for the cards.
             page.get_by_role("searchbox").fill("gh")
             expect(rows.locator("th")).to_have_text(["gh1", "gh3", "gh2"])
@@ -231,12 +212,7 @@ def test_one_sensor_of_several_greenhouses_the_outlier_first(
             expect(rows.locator("th")).to_have_text(["gh1", "gh3", "gh2"])
             page.get_by_label("Sensor").select_option("Humidity")
             expect(rows.locator("td").nth(1)).to_have_text("–")
-        phone = {"width": 390, "height": 800}
-        with opened(browser, served.url, viewport=phone, color_scheme="dark") as page:
-            page.get_by_role("button", name="Compare").click()
-            expect(page.locator(".fleet-table tbody tr")).to_have_count(4)
-            assert page.evaluate("document.documentElement.scrollWidth") <= 390
-            picture(page, "compare-phone")
+            expect_no_wider_than_a_phone(page)
 
 
 def test_a_row_for_each_greenhouse_leads_to_its_shift_report(
@@ -266,16 +242,13 @@ def test_a_row_for_each_greenhouse_leads_to_its_shift_report(
         expect(rows).to_have_count(1)
         with page.expect_response(re.compile(r"/api/report\?from=\d+&sites=warm$")):
             page.get_by_role("button", name="Last 24 hours").click()
-        picture(page, "report")
         expect(notes).to_have_count(1)
+        page.get_by_role("searchbox").fill("")
+        expect(rows).to_have_count(3)
+        expect_no_wider_than_a_phone(page)
         rows.first.get_by_role("link").click()
         expect(page).to_have_url(re.compile(r"/sites/warm/api/report\.html\?from=.*&lang=en$"))
         expect(page.get_by_role("heading", level=1)).to_contain_text("report")
-    phone = {"width": 390, "height": 800}
-    with opened(browser, sites.url, viewport=phone) as page:
-        page.get_by_role("button", name="Shift report").click()
-        expect(page.get_by_role("table").first.locator("tbody tr")).to_have_count(3)
-        assert page.evaluate("document.documentElement.scrollWidth") <= 390
 
 
 def test_groups_fold_and_can_be_chosen(browser: Browser, archive: Archive) -> None:
@@ -296,23 +269,20 @@ def test_groups_fold_and_can_be_chosen(browser: Browser, archive: Archive) -> No
             page.get_by_label("Group").select_option("south")
             expect(names).to_have_text(["south-1", "south-2"])
             expect(page.get_by_role("status")).to_have_text("2 of 5 greenhouses shown")
-            picture(page, "groups")
         with opened(browser, f"{served.url}?kiosk&group=north") as page:
             expect(page.locator(".fleet-name")).to_have_text(["Noord 1", "north-2"])
 
 
-def test_a_demo_says_that_it_is_simulated(
-    browser: Browser, archive: Archive, domain: int, tmp_path: Path
-) -> None:
-    words = ("--site", "gh1", "--archive-url", archive.url())
-    with (
-        lupin_twin(domain, "demo", *words, XDG_STATE_HOME=str(tmp_path)),
-        fleet(archive) as served,
-    ):
-        served.site("gh1", origin="simulated", is_live=True)
+def test_what_is_simulated_says_so(browser: Browser, archive: Archive, tmp_path: Path) -> None:
+    journal = tmp_path / "journal.sqlite"
+    with recording(journal, wall(), origin="simulated") as twin:
+        for row in scans_lately():
+            twin.write(row)
+    forward_once(archive, journal)
+    with fleet(archive) as served:
+        served.site("gh1", origin="simulated")
         with opened(browser, served.url) as page:
             expect(page.locator(".fleet-site")).to_contain_text("Simulated")
-            picture(page, "simulated")
             page.locator(".fleet-name").click()
             expect(page.get_by_test_id("origin")).to_contain_text("Simulated")
 
@@ -323,7 +293,6 @@ def test_an_archive_without_greenhouses_and_one_that_is_down(browser: Browser) -
         archive.add_user("page", "lupin_page")
         with fleet(archive) as served, opened(browser, served.url) as page:
             expect(page.get_by_role("main")).to_contain_text("No greenhouse is forwarded")
-            picture(page, "empty")
             archive.do(
                 "INSERT INTO site VALUES ('gh1', '');"
                 "INSERT INTO forwarder VALUES ('gh1', 'm', 1, now(), now() + INTERVAL '1 hour')"
@@ -336,7 +305,6 @@ def test_an_archive_without_greenhouses_and_one_that_is_down(browser: Browser) -
             expect(card).to_have_attribute("data-live", "false")
             own.start()
             expect(page.get_by_role("alert")).to_be_hidden()
-            picture(page, "down")
             served.process.freeze()
             expect(page.get_by_role("alert")).to_contain_text("No connection to the server since")
             expect(card).to_contain_text("As of")
@@ -356,6 +324,5 @@ def test_a_thousand_are_shown_without_delay(browser: Browser, archive: Archive) 
         with opened(browser, served.url) as page:
             expect(page.locator(".fleet-site")).to_have_count(1000)
             print("painted after", page.evaluate(begun), "ms")
-            picture(page, "thousand")
             page.get_by_role("searchbox").fill("-77")
             expect(page.locator(".fleet-site")).to_have_count(11)

@@ -80,7 +80,9 @@ def test_every_string_is_shown_as_text_and_none_is_run(
     assert box["height"] == 900
 
 
-def test_every_such_tag_opens_its_card(hostile: Bridge, open_page: OpenPage) -> None:
+def test_every_such_tag_opens_its_card_and_every_such_sensor_can_be_chosen(
+    hostile: Bridge, open_page: OpenPage
+) -> None:
     hmi = open_page(hostile.url)
     hmi.expect(lambda: len(hmi.rows()) == len(HOSTILE_IDS), "every tag")
     rows, card = hmi.page.locator("tbody tr[data-tag-id]"), hmi.test_id("tag-card")
@@ -94,15 +96,6 @@ def test_every_such_tag_opens_its_card(hostile: Bridge, open_page: OpenPage) -> 
         hmi.expect(partial(is_linked, hmi, tag_id), "its link")
         hmi.page.reload()
         expect(card).to_have_attribute("data-tag-id", tag_id)
-
-
-def is_linked(hmi: Hmi, tag_id: str) -> bool:
-    return parse_qs(urlsplit(hmi.address()).fragment).get("tag") == [tag_id]
-
-
-def test_every_such_sensor_can_be_looked_at(hostile: Bridge, open_page: OpenPage) -> None:
-    hmi = open_page(hostile.url)
-    hmi.expect(lambda: len(hmi.rows()) == len(HOSTILE_IDS), "every tag")
     sensors = hmi.page.locator(".sensors input")
     declared = 1  # temperature: a declared sensor that nobody measures has no button
     expect(sensors).to_have_count(declared + len(HOSTILE_SENSORS))
@@ -111,6 +104,10 @@ def test_every_such_sensor_can_be_looked_at(hostile: Bridge, open_page: OpenPage
         expect(sensors.nth(declared + index)).to_have_value(name)
         hmi.expect_samples(len(HOSTILE_IDS))
     assert nothing_sticks_out(hmi)
+
+
+def is_linked(hmi: Hmi, tag_id: str) -> bool:
+    return parse_qs(urlsplit(hmi.address()).fragment).get("tag") == [tag_id]
 
 
 def test_a_phone_and_a_wall_screen_bear_it_too(hostile: Bridge, open_page: OpenPage) -> None:

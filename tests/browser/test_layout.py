@@ -78,6 +78,8 @@ def test_everything_can_be_hit(open_at: Callable[..., Hmi]) -> None:
         expect(hmi.test_id("health-strip")).to_be_visible(visible=has_tabs)
         for mode in ("Ideal", "Value", "Fixed"):
             hmi.page.get_by_role("radio", name=mode).check()
+            if mode == "Value":
+                continue  # all that it has, "Fixed" has too
             # Lower than this, a greenhouse of ten metres is the size of a stamp.
             least = 120 if size in LOW else 200
             tall = "([map, least]) => map.clientHeight >= least"
@@ -113,16 +115,6 @@ def test_an_open_card_lies_over_nothing_in_an_upright_window(open_at: Callable[.
         hmi.expect(from_top_to_foot, f"one below the other at {width} x {height}")
         hit = ".map-controls button, .timebar :is(button, select), .health button, .card button"
         expect_in_reach(hmi, hit)
-
-
-def test_each_layer_is_switched_by_touch_on_a_phone(open_at: Callable[..., Hmi]) -> None:
-    hmi = open_at((PHONE["width"], PHONE["height"]), has_touch=True, is_mobile=True)
-    hmi.page.get_by_role("button", name="Layers").tap()
-    expect(hmi.page.get_by_role("checkbox")).to_have_count(10)
-    for box in hmi.page.get_by_role("checkbox").all():
-        was_on = box.is_checked()
-        box.locator("..").tap()
-        expect(box).to_be_checked(checked=not was_on)
 
 
 def test_a_phone_has_room_for_the_facts_a_fixed_range_and_what_is_missing(

@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import re
 import signal
-import sys
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
@@ -13,9 +12,9 @@ from typing import Any
 from playwright.sync_api import expect
 
 from tests.browser.hmi import SERVER_GONE, Hmi, OpenPage
-from tests.support.domains import ros_env
-from tests.support.processes import Process, lupin_twin, url_of
+from tests.support.processes import lupin_twin, url_of
 
+NO_JOURNAL = ("--ros-args", "-p", "journal:=off")
 WATCH_PESTS = """
 () => {
   window.pests = { seen: [], cleared: [] };
@@ -67,48 +66,31 @@ def unbidden(output: str) -> list[str]:
     ]
 
 
-def test_a_patrol_fills_the_page_and_a_pest_comes_and_goes(
+def test_a_demo_fills_the_page_a_pest_comes_and_goes_and_all_ends_with_it(
     domain: int, open_page: OpenPage
 ) -> None:
     tags = simulated_tags()
     assert len(tags) == 29
     # By this seed, a tag that is shown already has a pest in the second pass, and later none.
-    patrol = [sys.executable, "-m", "lupin_patrol", "--speed", "15", "--seed", "8"]
-    with lupin_twin(domain, "serve") as server:
-        hmi = open_page(url_of(server))
+    with lupin_twin(domain, "demo", "--speed", "15", "--seed", "8", *NO_JOURNAL) as demo:
+        hmi = open_page(url_of(demo))
         hmi.expect_phase("live")
         hmi.page.evaluate(WATCH_PESTS)
-        with Process(patrol, ros_env(domain)) as robot:
-            hmi.expect(lambda: sensors_shown(hmi) == tags, "every tag with its sensors")
-            expect(hmi.page.locator("tbody tr[data-pinned=true]")).to_have_count(29)
-            expect(hmi.page.locator("tbody .cell-species bdi")).to_have_count(29)
-            expect(hmi.test_id("notice")).to_have_count(0)
-            for label, name in (
-                ("Temperature", "temperature"),
-                ("CO₂", "co2"),
-                ("Soil moisture", "soil_moisture"),
-            ):
-                hmi.choose_sensor(label)
-                hmi.expect_samples(sum(name in sensors for sensors in tags.values()))
-            hmi.page.wait_for_function(
-                "() => window.pests.seen.some((tag) => window.pests.cleared.includes(tag))"
-            )
-            assert robot.exit_code is None
-            assert unbidden(robot.output) == []
-        hmi.expect_phase("live")
-        assert unbidden(server.output) == []
-
-
-def test_the_demo_is_one_command_that_shows_tags_and_ends_with_its_patrol(
-    domain: int, open_page: OpenPage
-) -> None:
-    with lupin_twin(domain, "demo") as demo:
-        hmi = open_page(url_of(demo))
-        # A demo that has just filled in its past is busy: questions that wait are told so.
-        hmi.allow_noise(r"503 .*/api/(state|health|timeline)\?")
-        hmi.expect(lambda: len(hmi.rows()) >= 3, "the first tags")
-        expect(hmi.page.locator("tbody tr[data-pinned=true]").first).to_be_visible()
-        expect(hmi.page.get_by_test_id("origin")).to_contain_text("Simulated")
+        hmi.expect(lambda: sensors_shown(hmi) == tags, "every tag with its sensors")
+        expect(hmi.page.locator("tbody tr[data-pinned=true]")).to_have_count(29)
+        expect(hmi.page.locator("tbody .cell-species bdi")).to_have_count(29)
+        expect(hmi.test_id("notice")).to_have_count(0)
+        expect(hmi.test_id("origin")).to_contain_text("Simulated")
+        for label, name in (
+            ("Temperature", "temperature"),
+            ("CO₂", "co2"),
+            ("Soil moisture", "soil_moisture"),
+        ):
+            hmi.choose_sensor(label)
+            hmi.expect_samples(sum(name in sensors for sensors in tags.values()))
+        hmi.page.wait_for_function(
+            "() => window.pests.seen.some((tag) => window.pests.cleared.includes(tag))"
+        )
         hmi.check_manners()
         hmi.allow_noise(SERVER_GONE)
         # What waits as it ends, the page's later parts among it: they are asked for again.

@@ -71,27 +71,6 @@ def test_a_link_shows_the_same_view_to_somebody_else(house: Bridge, open_page: O
     theirs.expect_rows("10", "1")
 
 
-def test_back_closes_the_card_and_undoes_nothing_else(house: Bridge, open_page: OpenPage) -> None:
-    hmi = open_page(house.url)
-    hmi.expect_rows(*TAGS)
-    hmi.row("2").click()
-    expect(hmi.card("2")).to_be_visible()
-    hmi.row("3").click()
-    hmi.choose_sensor("Humidity")
-    hmi.expect(lambda: "tag=3" in hmi.address(), "the other tag in the address")
-    hmi.page.go_back()
-    expect(hmi.page.get_by_test_id("tag-card")).to_have_count(0)
-    expect(hmi.test_id("legend")).to_contain_text("Humidity %")
-    hmi.expect(lambda: hmi.address().endswith("#sensor=humidity"), "an address without a tag")
-    hmi.page.go_forward()
-    expect(hmi.card("3")).to_be_visible()
-    # One that is closed by hand leaves no step behind that does nothing.
-    hmi.page.keyboard.press("Escape")
-    hmi.expect(lambda: hmi.address().endswith("#sensor=humidity"), "an address without a tag")
-    hmi.page.go_back()
-    hmi.expect(lambda: hmi.address() == "about:blank", "what was there before the page")
-
-
 def test_a_link_of_nonsense_is_the_whole_house_and_one_to_no_tag_says_so(
     house: Bridge, open_page: OpenPage
 ) -> None:
@@ -245,21 +224,6 @@ def test_copying_the_link_works_or_says_where_it_is(house: Bridge, open_page: Op
     hmi.page.get_by_role("button", name="Copy link").click()
     expect(hmi.page.locator(".toast")).to_have_text("Link copied")
     assert hmi.page.evaluate("navigator.clipboard.readText()") == f"{house.url}/#sensor=co2"
-
-
-def test_the_theme_is_kept_and_follows_the_system_by_default(
-    house: Bridge, open_page: OpenPage
-) -> None:
-    hmi = open_page(house.url, color_scheme="dark")
-    root = hmi.page.locator("html")
-    expect(root).to_have_attribute("data-theme", "dark")
-    hmi.page.emulate_media(color_scheme="light")
-    expect(root).to_have_attribute("data-theme", "light")
-    hmi.page.get_by_role("button", name="Menu").click()
-    hmi.page.get_by_role("radio", name="Dark").check()
-    expect(root).to_have_attribute("data-theme", "dark")
-    hmi.page.reload()
-    expect(root).to_have_attribute("data-theme", "dark")
 
 
 def luminance(pixel: object) -> float:

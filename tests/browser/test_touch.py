@@ -62,7 +62,7 @@ def test_a_tap_on_a_pin_opens_its_card_and_one_beside_closes_it(phone: Hmi) -> N
     expect(phone.card("10")).to_have_count(0)
 
 
-def test_one_finger_moves_the_map(phone: Hmi) -> None:
+def test_one_finger_moves_the_map_and_two_zoom_about_their_middle(phone: Hmi) -> None:
     before = phone.view()
     drag(phone, [(150 + 10 * step, 150 + 5 * step) for step in range(5)])
 
@@ -73,8 +73,6 @@ def test_one_finger_moves_the_map(phone: Hmi) -> None:
     phone.expect(moved, "a map that followed the finger")
     assert phone.view().scale == before.scale
 
-
-def test_two_fingers_zoom_about_their_middle(phone: Hmi) -> None:
     before = phone.view()
     middle = before.pixel(2, 2)
     x, y = middle
@@ -87,7 +85,7 @@ def test_two_fingers_zoom_about_their_middle(phone: Hmi) -> None:
     assert phone.page.evaluate("visualViewport.scale") == 1
 
 
-def test_a_narrow_screen_shows_one_half_at_a_time_and_nothing_sticks_out(phone: Hmi) -> None:
+def test_a_narrow_screen_shows_one_half_at_a_time_large_enough_for_a_finger(phone: Hmi) -> None:
     expect(phone.map).to_be_visible()
     expect(phone.row("1")).to_be_hidden()
     show(phone, "Tags")
@@ -95,9 +93,6 @@ def test_a_narrow_screen_shows_one_half_at_a_time_and_nothing_sticks_out(phone: 
     for pane in ("Tags", "Map"):
         show(phone, pane)
         assert phone.page.evaluate("document.documentElement.scrollWidth") == PHONE["width"]
-
-
-def test_what_a_finger_has_to_hit_is_large_enough(phone: Hmi) -> None:
     phone.colour_by_value()
     phone.page.get_by_role("radio", name="Fixed").check()
     for pane in ("Map", "Tags"):

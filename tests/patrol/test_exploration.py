@@ -5,10 +5,9 @@ from __future__ import annotations
 from math import dist
 
 import numpy as np
-import pytest
 from greenhouse_sim.simulator import GreenhouseSimulator
 
-from lupin_patrol.greenhouse import Greenhouse, Point, Rect, Table, read_greenhouse
+from lupin_patrol.greenhouse import Greenhouse, Point, Rect, read_greenhouse
 from lupin_patrol.perception import (
     FREE,
     OCCUPIED,
@@ -20,11 +19,6 @@ from lupin_patrol.perception import (
 )
 from tests.support.climate import known_in
 
-# A table in the middle of a hall, the robot left of it.
-TABLE = Rect(1.5, 1.0, 2.0, 2.0)
-HALL = Greenhouse(Rect(0.0, 0.0, 3.0, 3.0), (Table("middle", TABLE),), ())
-LEFT: Point = (1.0, 1.5)
-
 
 def cell(grid: Grid, point: Point) -> int:
     """The value at a point, by nav_msgs/OccupancyGrid's own rule."""
@@ -33,7 +27,7 @@ def cell(grid: Grid, point: Point) -> int:
     return int(np.frombuffer(grid.cells, dtype=np.int8)[row * grid.width + column])
 
 
-def explored_from(*positions: Point, greenhouse: Greenhouse = HALL) -> Grid:
+def explored_from(*positions: Point, greenhouse: Greenhouse) -> Grid:
     exploration = Exploration(greenhouse)
     for position in positions:
         exploration.observe_from(position)
@@ -47,13 +41,6 @@ def everywhere(greenhouse: Greenhouse) -> list[Point]:
         for y in np.arange(0.25, greenhouse.interior.y1, 0.5).tolist()
         if greenhouse.is_free((x, y))
     ]
-
-
-def test_the_grid_covers_the_house_and_a_ring_of_wall() -> None:
-    grid = Exploration(read_greenhouse(GreenhouseSimulator())).snapshot()
-    assert (grid.width, grid.height, grid.resolution_m) == (82, 162, 0.05)
-    assert grid.origin == (-0.05, -0.05)
-    assert len(grid.cells) == 82 * 162
 
 
 def test_a_complete_map_has_tables_and_walls_and_else_free_floor() -> None:
@@ -70,12 +57,6 @@ def test_a_complete_map_has_tables_and_walls_and_else_free_floor() -> None:
             assert cell(grid, (x, y)) == (FREE if is_floor else OCCUPIED), (x, y)
 
 
-def test_what_stands_behind_a_table_is_hidden() -> None:
-    grid = explored_from(LEFT)
-    assert cell(grid, (2.2, 1.5)) == UNKNOWN
-    assert cell(grid, (2.2, 2.9)) == FREE  # past the table's end
-
-
 def test_nothing_is_known_beyond_the_view_radius() -> None:
     far = Greenhouse(Rect(0.0, 0.0, 8.0, 2.0), (), ())
     grid = explored_from((0.5, 1.0), greenhouse=far)
@@ -85,10 +66,3 @@ def test_nothing_is_known_beyond_the_view_radius() -> None:
         assert dist((x, y), (0.5, 1.0)) <= VIEW_RADIUS_M
     assert cell(grid, (0.5 + VIEW_RADIUS_M - 0.1, 1.0)) == FREE
     assert cell(grid, (0.5 + VIEW_RADIUS_M + 0.1, 1.0)) == UNKNOWN
-
-
-@pytest.mark.parametrize("extent", [3.0, 3.01, 2.99])
-def test_a_house_that_is_no_multiple_of_the_cell_is_covered(extent: float) -> None:
-    grid = Exploration(Greenhouse(Rect(0.0, 0.0, extent, 3.0), (), ())).snapshot()
-    wall_starts = grid.origin[0] + (grid.width - 1) * RESOLUTION_M
-    assert extent - 1e-9 <= wall_starts < extent + RESOLUTION_M - 1e-9

@@ -101,7 +101,9 @@ def test_one_pass_shows_the_whole_greenhouse_and_ends(domain: int) -> None:
         reading = observation.tag_reading
         if reading.tag_id and observation.status == Observation.STATUS_OK:
             assert [r.name for r in reading.readings] == tags[reading.tag_id]["sensors"]
-            assert observation.tag_pose_in_map.position.x == tags[reading.tag_id]["x"]
+            place = observation.tag_pose_in_map.position
+            tag = tags[reading.tag_id]
+            assert (place.x, place.y) == (tag["x"], tag["y"])
             assert reading.stamp == observation.header.stamp
 
 

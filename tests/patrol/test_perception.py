@@ -9,7 +9,7 @@ from greenhouse_sim.simulator import GreenhouseSimulator
 
 from lupin_patrol.greenhouse import Greenhouse, Point, Rect, Table, Tag, read_greenhouse
 from lupin_patrol.perception import TAG_RANGE_M, TagDetector
-from lupin_patrol.plants import SPECIES, Plants
+from lupin_patrol.plants import Plants
 
 TABLE = Table("one", Rect(1.0, 1.0, 2.0, 2.0))
 TAG = Tag("7", (1.05, 1.5), ("co2",), TABLE, (1.0, 1.5), (-1.0, 0.0), (0.6, 1.5))
@@ -43,17 +43,6 @@ def test_a_tag_is_seen_from_near_and_from_its_front(position: Point, expected: b
     assert sees(position) is expected
 
 
-def test_a_tag_is_new_once_and_counted_each_time() -> None:
-    detector = TagDetector(HALL, Plants(HALL, 0), 0)
-    assert detector.sightings() == ()
-    assert detector.observe_from(in_front(0, 0.4), 0)
-    assert not detector.observe_from(in_front(10, 0.4), 0)
-    assert not detector.observe_from((3.0, 3.0), 0)
-    [sighting] = detector.sightings()
-    assert sighting.tag == TAG
-    assert sighting.sightings == 2
-
-
 def test_every_tag_of_the_greenhouse_is_seen_from_its_stop_in_the_order_of_the_looks() -> None:
     greenhouse = read_greenhouse(GreenhouseSimulator())
     plants = Plants(greenhouse, 0)
@@ -66,25 +55,6 @@ def test_every_tag_of_the_greenhouse_is_seen_from_its_stop_in_the_order_of_the_l
     detector.observe_from(greenhouse.tag("21").stop, 0)
     found = [sighting.tag.tag_id for sighting in detector.sightings()]
     assert found.index("2") < found.index("21")
-
-
-def test_the_guess_at_the_species_is_mostly_right_and_never_changes() -> None:
-    greenhouse = read_greenhouse(GreenhouseSimulator())
-    right = 0
-    for seed in range(10):
-        plants = Plants(greenhouse, seed)
-        detector = TagDetector(greenhouse, plants, seed)
-        for tag in greenhouse.tags:
-            detector.observe_from(tag.stop, 0)
-        first = {s.tag.tag_id: (s.species, s.species_confidence) for s in detector.sightings()}
-        for tag in greenhouse.tags:
-            detector.observe_from(tag.stop, 1)
-        assert first == {
-            s.tag.tag_id: (s.species, s.species_confidence) for s in detector.sightings()
-        }
-        assert all(name in SPECIES and 0.0 < sure < 1.0 for name, sure in first.values())
-        right += sum(name == plants.species(tag_id) for tag_id, (name, _) in first.items())
-    assert 0.8 < right / 290 < 1.0
 
 
 def test_a_pest_is_suspected_while_it_is_there() -> None:

@@ -32,15 +32,6 @@ def test_a_table_grows_one_species(greenhouse: Greenhouse, plants: Plants) -> No
     assert len(grown) > 1
 
 
-def test_looks_repeat_with_the_seed_and_differ_without(
-    greenhouse: Greenhouse, plants: Plants
-) -> None:
-    assert Plants(greenhouse, 0).inspect("12", 3, 0) == plants.inspect("12", 3, 0)
-    assert Plants(greenhouse, 1).inspect("12", 3, 0) != plants.inspect("12", 3, 0)
-    assert plants.inspect("12", 4, 0) != plants.inspect("12", 3, 0)
-    assert plants.inspect("12", 3, 1) != plants.inspect("12", 3, 0)
-
-
 def test_blooms_stand_inside_the_tags_own_table(greenhouse: Greenhouse, plants: Plants) -> None:
     for tag in greenhouse.tags:
         for pass_index in range(5):
@@ -54,12 +45,6 @@ def test_blooms_stand_inside_the_tags_own_table(greenhouse: Greenhouse, plants: 
                 assert bloom.z == TABLE_HEIGHT_M + bloom.height_m
                 assert 0.0 <= bloom.confidence <= 1.0
             assert 0.0 <= look.confidence <= 1.0
-
-
-def test_the_first_pass_has_a_pest_for_every_seed(greenhouse: Greenhouse) -> None:
-    for seed in range(30):
-        infested = [tag for tag in greenhouse.tags if Plants(greenhouse, seed).bugs(tag.tag_id, 0)]
-        assert len(infested) == 1
 
 
 def test_pests_come_now_and_then_and_go_after_two_passes(

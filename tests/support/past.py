@@ -129,4 +129,4 @@ def answered_by(log: Any, query: Query, now_ns: int = 2**62) -> bytes:
         ConditionalQuery(query).answer(lambda need: _found(need, now, log), lambda: False).answer
     )
     assert answer is not None
-    return bytes(answer.body)
+    return answer.body

@@ -6,8 +6,8 @@ from collections.abc import Iterable, Mapping
 from dataclasses import replace
 
 from lupin_bridge.alarms.board import AlarmBoard, AlarmSource, Board, change_between, page_of
-from lupin_bridge.judge.alarm import Alarm, alarm_id
 from lupin_bridge.judge.daylight import Day, judge_day
+from lupin_bridge.judge.episodes import Alarm, alarm_id
 from lupin_bridge.judge.judging import judge_once
 from lupin_bridge.judge.options import own_sensors
 from lupin_bridge.judge.verdict import Kind, Reason, Verdict

@@ -12,8 +12,7 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Final, Literal
 
-from lupin_bridge.judge.alarm import Alarm
-from lupin_bridge.judge.episodes import MAX_EPISODES
+from lupin_bridge.judge.episodes import MAX_EPISODES, Alarm
 from lupin_bridge.judge.verdict import Verdict
 
 log = logging.getLogger(__name__)

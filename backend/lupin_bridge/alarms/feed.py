@@ -1,4 +1,4 @@
-"""From the twin to the alarms: the past at the start, and then what has come since.
+"""From the twin's log to alarms and verdicts: the past at the start, and then what has come since.
 
 The journal is followed write by write, in lots, on workers; while nothing changes, nothing is done.
 Where none is kept, or it fails, what the states tell is taken instead, and that is said.
@@ -14,15 +14,17 @@ from typing import Final, TypeVar
 
 from lupin_bridge.alarms.board import AlarmBoard, AlarmSource, Change, Page, change_between, page_of
 from lupin_bridge.alarms.state_changes import RUN, writes_between
+from lupin_bridge.feed.query import Itself
 from lupin_bridge.feed.shared_work import end
 from lupin_bridge.feed.source import TwinSource, TwinUnavailableError, TwinUpdate
-from lupin_bridge.judge.alarm import Alarm, silence
 from lupin_bridge.judge.alarm_fold import FORGET_EVERY_NS, Follower, Found
+from lupin_bridge.judge.episodes import Alarm, silence
+from lupin_bridge.judge.judging import Judge
 from lupin_bridge.judge.options import Criteria
 from lupin_twin.core.journal_condition import JournalState
 from lupin_twin.core.past import NotRemembered, PastRefused
 from lupin_twin.core.state import NANOSECONDS_PER_SECOND, Reading, Snapshot
-from lupin_twin.core.writes import PastWrite, PastWrites, RunSpan, WritesRequest
+from lupin_twin.core.writes import PastWrite, PastWrites, RecentRequest, RunSpan, WritesRequest
 
 log = logging.getLogger(__name__)
 
@@ -313,3 +315,29 @@ class AlarmFeed:
     async def _on_worker(self, work: Callable[[object], ResultT]) -> ResultT:
         """Done where it holds up nobody; the loop only takes over what comes of it."""
         return await asyncio.wrap_future(self._source.workers.submit(work, LOT_S))
+
+
+# Between two attempts.
+LEARN_AGAIN_S: Final = 2.0
+# What is recent of a tag, looked up and judged by, takes so long, about.
+RECENT_S_PER_TAG: Final = 2e-4
+
+
+async def learn_recent(source: TwinSource, judge: Judge, first: Snapshot) -> None:
+    """Give the judge what was recent at the first state: after a start not everything is old.
+
+    It is asked again while the log cannot be read.
+    """
+    recent = Itself(RecentRequest(first.stamp_ns))
+    while True:
+        try:
+            judge.learn(await source.ask(recent, len(first.tags) * RECENT_S_PER_TAG))
+        except (NotRemembered, PastRefused, TwinUnavailableError) as error:
+            is_lasting = isinstance(error, NotRemembered) and error.is_lasting
+            if not is_lasting and not isinstance(error, PastRefused):
+                await asyncio.sleep(LEARN_AGAIN_S)
+                continue
+            log.info("what was recent before is not known: %s", error)
+        except Exception:  # nobody awaits this, and nothing else needs it
+            log.exception("what was recent before is not known")
+        return

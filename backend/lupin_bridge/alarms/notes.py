@@ -13,7 +13,7 @@ from typing import Final
 
 from lupin_bridge.feed.shared_work import Periodic
 from lupin_bridge.feed.source import TwinSource, TwinUnavailableError
-from lupin_bridge.judge.alarm import Alarm
+from lupin_bridge.judge.episodes import Alarm
 from lupin_bridge.judge.verdict import Verdict
 from lupin_bridge.rate_limit import RateLimit
 from lupin_twin.core.notes import ACKNOWLEDGE, SHELVE, Note, NotesRequest, PastNotes, standing

@@ -258,10 +258,7 @@ def _reach(extents: list[RunExtent]) -> str:
 def _retention(found: Overview) -> str:
     if not found.kept_ns:
         return "not written yet by its twin"
-    return (
-        f"{found.kept_ns / 86_400e9:g} days and {_mb(found.kept_bytes)} at most;"
-        " hours for ten years"
-    )
+    return f"{found.kept_ns / 86_400e9:g} days and {_mb(found.kept_bytes)} at most; hours for good"
 
 
 def _run_line(extent: RunExtent) -> str:

@@ -17,7 +17,7 @@ from lupin_bridge.access.accounts import accounts_path
 from lupin_bridge.access.middleware import Access
 from lupin_bridge.access.policy import Proxies
 from lupin_bridge.app import create_app, has_page
-from lupin_bridge.archive import child
+from lupin_bridge.archive import forwarding as archive
 from lupin_bridge.bags.recording import RecordingError
 from lupin_bridge.bridge import Bridge
 from lupin_bridge.cli import demo
@@ -98,7 +98,7 @@ async def _run(
     proxies = Proxies.of(settings)
     criteria = Criteria.of(settings)
     targets = Targets.of(settings, secrets)
-    child.check(settings, role)
+    archive.check(settings, role)
     if settings.journal and role != "web":
         raise SettingError(
             f"{settings.called('journal')} is for web; a twin's own file is its parameter journal"
@@ -127,7 +127,7 @@ async def _run(
     server = BridgeServer(app, settings, announce_shutdown, limits)
     await bridge.start()
     feeder = None if feed is None else Feeder(feed, lambda: server.should_exit)
-    forwarding = child.Forwarding(settings, lambda: source.journal().path)
+    forwarding = archive.Forwarding(settings, lambda: source.journal().path)
     try:
         await serve(server, listener, settings, supervisor, lambda: ailment(source.thread))
     finally:

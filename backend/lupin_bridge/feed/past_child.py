@@ -34,9 +34,8 @@ from lupin_twin.journal.queries import series
 from lupin_twin.runtime.journal_queries import Recall
 from lupin_twin.runtime.workers import ShouldStop
 
-# Before each answer: its number, how long its pickle is, and the body behind that, which is sent
-# as it is.
-HEAD: Final = struct.Struct(">QIQ")
+# Before each answer: its number, and how long its pickle is.
+HEAD: Final = struct.Struct(">QQ")
 # nice(2): beside a busy twin it gets a quarter of the core that they share.
 NICENESS: Final = 5
 
@@ -105,20 +104,13 @@ class Child:
             self._send(number, error is not None, error or done.result())
 
     def _send(self, number: int, is_error: bool, value: Any) -> None:
-        buffers: list[pickle.PickleBuffer] = []
         try:
-            text = pickle.dumps(
-                (is_error, _portable(value) if is_error else value),
-                5,
-                buffer_callback=lambda one: buffers.append(one) if not buffers else True,
-            )
+            answer = pickle.dumps((is_error, _portable(value) if is_error else value), 5)
         except Exception as unfit:  # noqa: BLE001  # an answer of any kind may not be for pickling
-            buffers = []
-            text = pickle.dumps((True, _portable(unfit)))
-        body = buffers[0].raw() if buffers else b""
+            answer = pickle.dumps((True, _portable(unfit)))
         # Whoever sends waits until the parent has taken it: so much is kept for it, and no more.
         with self._sending:
-            self._out.writelines((HEAD.pack(number, len(text), len(body)), text, body))
+            self._out.writelines((HEAD.pack(number, len(answer)), answer))
             self._out.flush()
 
 

@@ -1,8 +1,7 @@
 """The parent's end of the process that looks back (`past_child`): started, asked, ended.
 
-Belongs to the event loop, which it never keeps waiting: questions are small, and an answer is taken
-in small pieces. A process that dies is logged, its questions are answered with that, and the next
-one is started for the first question after a rest.
+Belongs to the event loop. A process that dies is logged, its questions are answered with that, and
+the next one is started for the first question after a rest.
 """
 
 from __future__ import annotations
@@ -18,8 +17,6 @@ import signal
 import sys
 from typing import Any, Final, TypeVar
 
-import numpy as np
-
 from lupin_bridge.feed.past_child import HEAD
 from lupin_bridge.feed.query import Now, PastQuery
 from lupin_bridge.feed.shared_work import end
@@ -28,9 +25,8 @@ from lupin_twin.field.explored import OccupancyMap
 
 log = logging.getLogger(__name__)
 
-# Questions under way, and bytes of questions that the process has not taken.
+# Questions under way.
 MAX_PENDING: Final = 100
-MAX_UNSENT_BYTES: Final = 16_000_000
 # For so long after a death none is started.
 REST_S: Final = 2.0
 
@@ -99,10 +95,6 @@ class PastProcess:
         if self._queries is None:
             return
         for number, (question, occupancy_map) in self._unsent.items():
-            if self._queries.transport.get_write_buffer_size() > MAX_UNSENT_BYTES:
-                why = "the process that looks back takes no more questions just now"
-                self.asked[number].set_exception(_passing(why))
-                continue
             if occupancy_map is not None and occupancy_map is not self._sent_map:
                 self._sent_map = occupancy_map
                 self._queries.write(pickle.dumps((0, occupancy_map), 5))
@@ -146,9 +138,8 @@ class PastProcess:
             self._send()
             with contextlib.suppress(asyncio.IncompleteReadError):
                 while True:
-                    number, *counts = HEAD.unpack(await process.stdout.readexactly(HEAD.size))
-                    text, body = [await _piece(process.stdout, count) for count in counts]
-                    self._take(number, text, body.toreadonly())
+                    number, length = HEAD.unpack(await process.stdout.readexactly(HEAD.size))
+                    self._take(number, await process.stdout.readexactly(length))
             return _exit_text(await process.wait())
         finally:
             self.pid = self._queries = None
@@ -159,32 +150,18 @@ class PastProcess:
                     os.kill(process.pid, signal.SIGKILL)
             await process.wait()
 
-    def _take(self, number: int, text: memoryview, body: memoryview) -> None:
+    def _take(self, number: int, text: bytes) -> None:
         answer = self.asked.get(number)
         if answer is None or answer.done():
             return  # nobody waits any more
         try:
-            is_error, value = pickle.loads(text, buffers=[body])  # noqa: S301  # our own
+            is_error, value = pickle.loads(text)  # noqa: S301  # our own
         except Exception as error:  # noqa: BLE001  # goes to the caller
             is_error, value = True, error
         if is_error:
             answer.set_exception(value)
         else:
             answer.set_result(value)
-
-
-async def _piece(answers: asyncio.StreamReader, count: int) -> memoryview:
-    """So many bytes, without a moment at which all of them would be copied at once."""
-    # Memory that nobody has touched: to clear twelve megabytes takes as long as to fill them.
-    piece = memoryview(np.empty(count, np.uint8).data)
-    rest = piece
-    while rest:
-        data = await answers.read(len(rest))
-        if not data:
-            raise asyncio.IncompleteReadError(b"", count)
-        rest[: len(data)] = data
-        rest = rest[len(data) :]
-    return piece
 
 
 class _Packer(pickle.Pickler):

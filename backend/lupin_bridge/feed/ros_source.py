@@ -1,28 +1,124 @@
-"""What both sources over ROS have in common: a node of ours in a thread, and the topics' relay."""
+"""What both sources over ROS have in common: a node in a thread, and what the relay needs."""
 
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable, Sequence
-from typing import Any, Generic, TypeVar
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, Final, Generic, TypeVar
 
-from lupin_msgs.msg import Observation
+from diagnostic_msgs.msg import DiagnosticArray
+from lupin_msgs.msg import DiscoveredTags, Observation, TwinState
+from nav_msgs.msg import OccupancyGrid
 from rclpy.context import Context
+from rclpy.exceptions import InvalidTopicNameException
+from rclpy.qos import QoSProfile
+from sensor_msgs.msg import PointCloud2
+from visualization_msgs.msg import MarkerArray
 
 from lupin_bridge.feed.past_process import PastProcess
-from lupin_bridge.feed.relay import Relay
-from lupin_bridge.feed.relay_ros import RelayRos, names_of
+from lupin_bridge.feed.relay import Relay, RosTime, Sample, Topic, TwinNames
 from lupin_bridge.feed.robot import Robot
 from lupin_bridge.feed.robot_ros import RobotTopics
 from lupin_bridge.feed.ros_thread import BridgedNode, RosThread
 from lupin_bridge.feed.source import TwinSource
-from lupin_bridge.feed.topics import TwinNames
 from lupin_twin.adapt.messages import observation
 from lupin_twin.adapt.scans import BuiltScan
 from lupin_twin.core import interfaces
+from lupin_twin.core.drops import Drop
 from lupin_twin.field.engine import FieldRules
-from lupin_twin.ros.base_node import qos_of
+from lupin_twin.ros import message_limits
+from lupin_twin.ros.base_node import latched, qos_of, read_message
 from lupin_twin.runtime.workers import Workers
+
+# A name that comes from outside imports nothing.
+_CLASSES: Final[Mapping[str, Any]] = {
+    "lupin_msgs/msg/TwinState": TwinState,
+    "lupin_msgs/msg/Observation": Observation,
+    "lupin_msgs/msg/DiscoveredTags": DiscoveredTags,
+    "nav_msgs/msg/OccupancyGrid": OccupancyGrid,
+    "diagnostic_msgs/msg/DiagnosticArray": DiagnosticArray,
+    "sensor_msgs/msg/PointCloud2": PointCloud2,
+    "visualization_msgs/msg/MarkerArray": MarkerArray,
+}
+# What is also made into messages here: the topics of `relay.topics_of`.
+_SHAPES: Final = {
+    "lupin_msgs/msg/TwinState": message_limits.STATE,
+    "lupin_msgs/msg/Observation": message_limits.OBSERVATION,
+    "lupin_msgs/msg/DiscoveredTags": message_limits.DISCOVERED_TAGS,
+    "nav_msgs/msg/OccupancyGrid": message_limits.MAP,
+    "diagnostic_msgs/msg/DiagnosticArray": message_limits.DIAGNOSTICS,
+}
+
+
+class RelayRos:
+    """`relay.Ros` over rclpy."""
+
+    def subscribe(
+        self, node: Any, topic: Topic, take: Callable[[Sample], None]
+    ) -> Callable[[], None]:
+        """Subscribe raw: nothing is made of the bytes in this thread."""
+        message_type = _CLASSES.get(topic.type_name)
+        if message_type is None:
+            raise LookupError(f"messages of {topic.type_name!r} are not relayed")
+        clock = node.get_clock()
+
+        def hand_over(data: bytes) -> None:
+            take(Sample(data, clock.now().nanoseconds))
+
+        try:
+            subscription = node.create_subscription(
+                message_type,
+                topic.name,
+                hand_over,
+                latched(topic.depth) if topic.latched else QoSProfile(depth=topic.depth),
+                raw=True,
+            )
+        except InvalidTopicNameException as error:
+            raise ValueError(" ".join(str(error).split())) from error
+        return lambda: node.destroy_subscription(subscription)
+
+    def published(self, node: Any, is_wanted: Callable[[str, str], bool]) -> Mapping[str, str]:
+        """Topics that somebody publishes as a type that is wanted, and that type.
+
+        Whoever else uses the name with another type, or only listens to it, changes nothing.
+        """
+        return {
+            name: type_name
+            for name, types in node.get_topic_names_and_types()
+            for type_name in types
+            if is_wanted(name, type_name)
+            and any(one.topic_type == type_name for one in node.get_publishers_info_by_topic(name))
+        }
+
+    def time(self, node: Any) -> RosTime:
+        """By the node's clock."""
+        clock = node.get_clock()
+        return RosTime(clock.now().nanoseconds, bool(clock.ros_time_is_active))
+
+    def read(self, topic: Topic, data: bytes) -> Any:
+        """As the nodes read it: lengths are checked before anything is made of it."""
+        message = read_message(data, _SHAPES[topic.type_name])
+        if isinstance(message, Drop):
+            raise ValueError(message.why)  # noqa: TRY004  # it is no wrong call
+        return message
+
+
+def names_of(node: Any) -> TwinNames:
+    """What a twin's topics and service are called, as a node of ours resolves them."""
+    parameters = node.parameters
+    resolve = node.resolve_topic_name
+    return TwinNames(
+        state_topic=resolve(parameters.state_topic),
+        field_service=node.resolve_service_name(parameters.field_service_name),
+        observations_topic=resolve(parameters.observations_topic),
+        discovered_tags_topic=resolve(parameters.discovered_tags_topic),
+        map_topic=resolve(parameters.map_topic),
+        diagnostics_topic=resolve(interfaces.DIAGNOSTICS.name),
+        field_layers=resolve(interfaces.LAYERS_BELOW + "x")[:-1],
+        tags_layer=resolve(interfaces.TAGS.name),
+        planters_layer=resolve(interfaces.PLANTERS.name),
+    )
+
 
 NodeT = TypeVar("NodeT", bound=BridgedNode)
 EventT = TypeVar("EventT")

@@ -12,9 +12,8 @@ from typing import Any, Final, TypeVar
 
 from lupin_bridge.feed.past_process import PastProcess
 from lupin_bridge.feed.query import ExportStep, Itself, Now, PastQuery
-from lupin_bridge.feed.relay import Relay
+from lupin_bridge.feed.relay import Relay, TwinNames
 from lupin_bridge.feed.robot import Robot
-from lupin_bridge.feed.topics import TwinNames
 from lupin_twin.adapt.scans import BuiltScan
 from lupin_twin.core.diagnostics import Origin
 from lupin_twin.core.drops import Counts, Recent

@@ -56,7 +56,7 @@ from lupin_bridge.serving.admission import (
     Limits,
     json_answer,
 )
-from lupin_bridge.serving.middleware import PieceByPiece
+from lupin_bridge.serving.http_protocol import PieceByPiece
 from lupin_bridge.serving.ws_protocol import CONNECTION_KEY, Connection
 from lupin_bridge.settings import Settings
 from lupin_bridge.stream.hub import Client, Hub

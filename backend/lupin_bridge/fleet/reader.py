@@ -24,9 +24,8 @@ from lupin_twin.core.diagnostics import Origin, origin_of
 from lupin_twin.core.notes import Note
 from lupin_twin.core.past import NotRemembered
 from lupin_twin.core.state import Snapshot
-from lupin_twin.field.explored import OccupancyMap
+from lupin_twin.field.explored import OccupancyMap, map_of
 from lupin_twin.journal.appending import simulated
-from lupin_twin.journal.floor_plan import map_of
 from lupin_twin.journal.fold import state_at
 from lupin_twin.journal.retention import Stretches, kept
 from lupin_twin.journal.runs import FOREVER_NS, runs, span_at

@@ -12,10 +12,9 @@ from typing import Any, Final, cast
 
 from lupin_bridge.feed.past_process import PastProcess
 from lupin_bridge.feed.query import Now
-from lupin_bridge.feed.relay import Relay, Ros
+from lupin_bridge.feed.relay import Relay, Ros, TwinNames
 from lupin_bridge.feed.shared_work import end
 from lupin_bridge.feed.source import TwinSource, TwinUnavailableError, TwinUpdate
-from lupin_bridge.feed.topics import TwinNames
 from lupin_bridge.fleet.overview import Site
 from lupin_bridge.fleet.reader import Latest, Reported
 from lupin_bridge.fleet.watching import Watching

@@ -24,8 +24,8 @@ from lupin_bridge.feed.query import Now
 from lupin_bridge.fleet.overview import LIVE_S, Site
 from lupin_bridge.fleet.site_log import SiteConnection, archive_url, open_archive
 from lupin_bridge.fleet.small_map import dots
-from lupin_bridge.judge.alarm import Alarm, silence
 from lupin_bridge.judge.alarm_fold import Follower
+from lupin_bridge.judge.episodes import Alarm, silence
 from lupin_bridge.judge.judging import Judge
 from lupin_bridge.judge.options import Criteria
 from lupin_bridge.serving.admission import Limits

@@ -12,10 +12,9 @@ from itertools import chain
 from statistics import median
 from typing import Final
 
-from lupin_bridge.judge.alarm import SITE, Alarm, alarm_id
 from lupin_bridge.judge.daylight import DayLine
 from lupin_bridge.judge.days import DayNumber, TagDays, of_24_hours
-from lupin_bridge.judge.episodes import TagEpisodes
+from lupin_bridge.judge.episodes import SITE, Alarm, TagEpisodes, alarm_id
 from lupin_bridge.judge.ranges import Sensors
 from lupin_bridge.judge.scan_interval import LONGEST_NS, SHORTEST_NS, Stretches
 from lupin_bridge.judge.tag_log import Gap, TagPast, is_long

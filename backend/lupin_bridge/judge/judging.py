@@ -154,7 +154,7 @@ class Judge:
         self.errors = 0
         self._failing: set[str] = set()
 
-    def see(self, snapshot: Snapshot, *, is_silent: bool = False) -> Judged:
+    def see(self, snapshot: Snapshot) -> Judged:
         """What is to be said now; the very same object where nothing has changed."""
         before, now_ns = self._judged, snapshot.now_ns
         is_back = now_ns is not None and self._now_ns is not None and now_ns < self._now_ns
@@ -177,7 +177,7 @@ class Judge:
             for tag_id, health in healths.items()
             if before.tags.get(tag_id) != health
         }
-        judged = self._notify(changed, gone, day, None if is_silent else now_ns)
+        judged = self._notify(changed, gone, day, now_ns)
         self._now_ns = now_ns
         return judged
 

@@ -115,7 +115,7 @@ class DailyReport:
         report = Report(start_ns, due_ns, of.criteria, journal)
         answered = await of.source.ask(ConditionalQuery(report), REPORT_S)
         assert answered.answer is not None  # no ETag was given
-        body = orjson.Fragment(bytes(answered.answer.body))
+        body = orjson.Fragment(answered.answer.body)
         if not await self._channel.deliver(f"report.{compact(due_ns)}", body):
             log.error("the report up to %s was given up by %s", compact(due_ns), self._channel.name)
         _write(file, due_ns)

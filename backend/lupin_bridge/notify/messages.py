@@ -18,7 +18,7 @@ from functools import lru_cache
 from typing import Any, Final
 
 from lupin_bridge.alarms.board import Board
-from lupin_bridge.judge.alarm import Alarm
+from lupin_bridge.judge.episodes import Alarm
 from lupin_bridge.judge.judging import NOTHING_JUDGED, Judged
 from lupin_bridge.judge.ranges import Sensor
 from lupin_bridge.judge.verdict import Health, Verdict

@@ -11,7 +11,7 @@ from typing import Any, Final
 import orjson
 
 from lupin_bridge.alarms.board import MAX_WORST, worst_first
-from lupin_bridge.judge.alarm import SITE, Alarm
+from lupin_bridge.judge.episodes import SITE, Alarm
 from lupin_bridge.judge.ranges import Sensors
 from lupin_bridge.judge.scan_interval import SHORTEST_NS
 from lupin_bridge.judge.verdict import Health, Verdict, derive

@@ -28,7 +28,7 @@ from lupin_bridge.access.person import AccountError
 from lupin_bridge.alarms.board import Change
 from lupin_bridge.alarms.notes import NOTHING_SAID, notes_of_alarms
 from lupin_bridge.feed.shared_work import end
-from lupin_bridge.judge.alarm import Alarm
+from lupin_bridge.judge.episodes import Alarm
 from lupin_bridge.judge.verdict import Verdict
 from lupin_bridge.notify.destinations import Endpoint, PushTarget
 from lupin_bridge.notify.http_post import PostError, post

@@ -21,7 +21,7 @@ import orjson
 
 from lupin_bridge.alarms.board import AlarmBoard, Change, happened_ns
 from lupin_bridge.feed.shared_work import end
-from lupin_bridge.judge.alarm import Alarm
+from lupin_bridge.judge.episodes import Alarm
 from lupin_bridge.notify.destinations import WebhookTarget
 from lupin_bridge.notify.http_post import post
 from lupin_bridge.notify.retry import Backoff, Condition, until_taken

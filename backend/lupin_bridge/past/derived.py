@@ -9,7 +9,6 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
-from statistics import fmean
 
 from lupin_bridge.judge.derived import DAILY, DAY_NS, DERIVED, Daily, Derived, IsDay
 from lupin_bridge.judge.ranges import Sensors
@@ -23,7 +22,10 @@ from lupin_twin.core.past import (
     seconds,
 )
 from lupin_twin.core.state import Reading, TagState
+from lupin_twin.journal.buckets import Buckets, individually
 
+# From when to when, ns.
+Period = tuple[int, int]
 # (ns of ROS time, value), oldest first.
 Readings = list[tuple[int, float]]
 # Looks a series up.
@@ -48,29 +50,14 @@ def series(request: SeriesRequest, sensors: Sensors, is_day: IsDay, find: Find) 
     else:
         return measured
     period, readings = read(request)
-    if len(readings) > request.max_points:
-        wide = grid(period.start_ns, period.end_ns, request.max_points)
-        request = replace(request, start_ns=wide.start_ns, end_ns=wide.end_ns)
-        _, readings = read(request)
-        buckets: dict[int, list[float]] = {}
-        for stamp_ns, value in readings:
-            buckets.setdefault((stamp_ns - wide.start_ns) // wide.bucket_ns, []).append(value)
-        return SeriesPast(
-            wide.start_ns,
-            wide.end_ns,
-            wide.bucket_ns,
-            tuple(wide.start_ns + number * wide.bucket_ns for number in buckets),
-            tuple(map(len, buckets.values())),
-            tuple(map(fmean, buckets.values())),
-            tuple(map(min, buckets.values())),
-            tuple(map(max, buckets.values())),
-        )
-    stamps = tuple(stamp_ns for stamp_ns, _ in readings)
-    values = tuple(value for _, value in readings)
-    ones = (1,) * len(readings)
-    return replace(
-        period, stamps_ns=stamps, counts=ones, means=values, minima=values, maxima=values
-    )
+    if len(readings) <= request.max_points:
+        return individually(readings, *period)
+    wide = grid(*period, request.max_points)
+    _, readings = read(replace(request, start_ns=wide.start_ns, end_ns=wide.end_ns))
+    buckets = Buckets(wide)
+    for stamp_ns, value in readings:
+        buckets.add_value(stamp_ns, value)
+    return buckets.past()
 
 
 def with_daily(
@@ -107,8 +94,8 @@ def with_daily(
 
 def _of_days(
     daily: Daily, sensors: Sensors, is_day: IsDay, find: Find, request: SeriesRequest
-) -> tuple[SeriesPast, Readings]:
-    """The period, empty, and a value at the last reading of each hour in it."""
+) -> tuple[Period, Readings]:
+    """The period, and a value at the last reading of each hour in it."""
     first_ns = max(1, request.start_ns - DAY_NS) if request.start_ns else 0
     part_request = replace(
         request, sensor_type=daily.sensor, start_ns=first_ns, max_points=MAX_POINTS
@@ -122,7 +109,7 @@ def _of_days(
         value = daily.at(at_ns, every, is_day)
         if math.isfinite(value):
             readings.append((at_ns, value))
-    return SeriesPast(start_ns, part.end_ns), readings
+    return (start_ns, part.end_ns), readings
 
 
 def _readings_of(daily: Daily, sensors: Sensors, part: SeriesPast) -> Readings:
@@ -138,8 +125,8 @@ def _readings_of(daily: Daily, sensors: Sensors, part: SeriesPast) -> Readings:
     return [(at_ns, value) for at_ns, value in latest.items() if is_plausible(value)]
 
 
-def _readings(derived: Derived, find: Find, request: SeriesRequest) -> tuple[SeriesPast, Readings]:
-    """The period, empty, and what can be derived in it: of readings of one moment, one scan."""
+def _readings(derived: Derived, find: Find, request: SeriesRequest) -> tuple[Period, Readings]:
+    """The period, and what can be derived in it: of readings of one moment, one scan."""
     part_request = replace(request, max_points=MAX_POINTS)
     parts: list[SeriesPast] = []
     for name in derived.sources:
@@ -161,4 +148,4 @@ def _readings(derived: Derived, find: Find, request: SeriesRequest) -> tuple[Ser
         for stamp_ns, one in ones.items()
         if stamp_ns in others and math.isfinite(value := derived.formula(one, others[stamp_ns]))
     ]
-    return SeriesPast(min(first.start_ns, second.start_ns), first.end_ns), readings
+    return (min(first.start_ns, second.start_ns), first.end_ns), readings

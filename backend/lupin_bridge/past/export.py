@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import io
 import json
-import math
 import pickle
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -57,7 +56,9 @@ class ExportFormat:
 
 
 class _Csv:
-    def __init__(self, *, has_site: bool) -> None:
+    def __init__(
+        self, _sensors: Sensors, _facts: Mapping[str, str], _sensor: str | None, has_site: bool
+    ) -> None:
         self._has_site = has_site
 
     def begin(self) -> bytes:
@@ -68,10 +69,6 @@ class _Csv:
 
     def end(self) -> bytes:
         return b""
-
-
-def _open_csv(_sensors: Sensors, _facts: Mapping[str, str], _of: str | None, site: bool) -> Writer:
-    return _Csv(has_site=site)
 
 
 # --- Parquet --------------------------------------------------------------------------------------
@@ -109,21 +106,17 @@ def _pack_columns(rows: Sequence[PastRow], sensors: Sensors, site: str | None = 
     columns: list[list[Any]] = [
         [row.stamp_ns for row in rows],
         [text(row.tag_id) for row in rows],
-        [_finite(row.x) for row in rows],
-        [_finite(row.y) for row in rows],
+        [bodies.finite(row.x) for row in rows],
+        [bodies.finite(row.y) for row in rows],
         [text(row.sensor) for row in rows],
         [units.get(row.sensor) for row in rows],
-        [_finite(row.value) for row in rows],
+        [bodies.finite(row.value) for row in rows],
         [row.status for row in rows],
         [text(row.source) for row in rows],
     ]
     if site is not None:
         columns.append([site] * len(rows))
     return pickle.dumps(columns, 5)
-
-
-def _finite(value: float) -> float | None:
-    return value if math.isfinite(value) else None
 
 
 class _Sink(io.RawIOBase):
@@ -152,7 +145,7 @@ class _Sink(io.RawIOBase):
 
 class _Parquet:
     def __init__(
-        self, sensors: Sensors, facts: Mapping[str, str], sensor: str | None, *, has_site: bool
+        self, sensors: Sensors, facts: Mapping[str, str], sensor: str | None, has_site: bool
     ) -> None:
         try:
             import pyarrow  # noqa: PLC0415  # the extra `science`, slow to import
@@ -218,13 +211,5 @@ def _described(sensors: Sensors, sensor: str | None) -> dict[str, Mapping[str, s
     return {**_COLUMNS, "value": {**_COLUMNS["value"], "units": units}}
 
 
-def _open_parquet(
-    sensors: Sensors, facts: Mapping[str, str], sensor: str | None, has_site: bool
-) -> Writer:
-    return _Parquet(sensors, facts, sensor, has_site=has_site)
-
-
-CSV: Final = ExportFormat("csv", bodies.CSV_TYPE, bodies.csv_lines, _open_csv)
-PARQUET: Final = ExportFormat(
-    "parquet", "application/vnd.apache.parquet", _pack_columns, _open_parquet
-)
+CSV: Final = ExportFormat("csv", bodies.CSV_TYPE, bodies.csv_lines, _Csv)
+PARQUET: Final = ExportFormat("parquet", "application/vnd.apache.parquet", _pack_columns, _Parquet)

@@ -7,31 +7,25 @@ of content: it is the same in every replica and after a restart, until a late wr
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
-from functools import lru_cache
+from dataclasses import dataclass, field
 from hashlib import blake2b
-from pickle import PickleBuffer
 from typing import Any, Final, Protocol
 
 import orjson
 
 from lupin_bridge.feed.query import Find
-from lupin_bridge.field import formats
 from lupin_bridge.field import query as field_query
-from lupin_bridge.field.formats import FieldFormat
-from lupin_bridge.field.query import FieldQuery
 from lupin_bridge.judge.days import SINCE_NS, days_of
 from lupin_bridge.judge.derived import DAILY, DERIVED
 from lupin_bridge.judge.judging import judge_once
 from lupin_bridge.judge.options import Criteria
-from lupin_bridge.judge.verdict import plausible, with_derived
 from lupin_bridge.past import bodies, derived
 from lupin_bridge.past.query import PeriodQuery
 from lupin_bridge.serving.admission import REVALIDATE, Answer, json_answer
 from lupin_bridge.stream.health_json import HealthJson
-from lupin_bridge.stream.state_json import StateJson
+from lupin_bridge.stream.state_json import StateJson, history
+from lupin_twin.core.history import LatestRequest, tag_history
 from lupin_twin.core.journal_condition import Condition
 from lupin_twin.core.past import (
     DEFAULT_POINTS,
@@ -41,37 +35,19 @@ from lupin_twin.core.past import (
     SeriesPast,
     SeriesRequest,
 )
-from lupin_twin.core.state import Snapshot, samples_of
+from lupin_twin.core.state import Inspection, Scan, Snapshot, TagState
 from lupin_twin.core.writes import PastWrite, RecentRequest, ScansRequest
-from lupin_twin.field.engine import (
-    FieldRefused,
-    FieldRequest,
-    FieldRules,
-    check_request,
-    compute_field,
-    cost_s,
-    default_box,
-)
-from lupin_twin.field.explored import OccupancyMap
-from lupin_twin.field.grid import far_off_tags
 from lupin_twin.journal.fold import STATE_S_PER_TAG
 from lupin_twin.journal.queries import SERIES_S, SERIES_S_PER_TAG
 from lupin_twin.runtime.workers import ShouldStop
 
 JSON_TYPE: Final = "application/json"
-# A larger body is sent as a buffer of its own, and not copied.
-_LARGE_BYTES: Final = 65_536
-# Costs, s of one core, at worst: to plan an answer and to write it, for each tag; to write a cell
-# or pixel of a field; to judge a tag with its scans of three days, and a tag of a field; to write a
-# reading or a bucket.
+# Costs, s of one core, at worst: to plan an answer and to write it, for each tag; to judge a tag
+# with its scans of three days; to write a reading or a bucket.
 PLAN_TAG_S: Final = 10e-6
 _WRITE_TAG_S: Final = 20e-6
-_WRITE_CELL_S: Final = 50e-9
 _HEALTH_TAG_S: Final = 1e-3
-_JUDGE_TAG_S: Final = 20e-6
 _WRITE_ENTRY_S: Final = 5e-6
-# Of a field too large to estimate, or one that will be refused.
-_LARGE_S: Final = 1.0
 
 
 class NoSuchTag(LookupError):
@@ -87,10 +63,9 @@ class NoSuchTag(LookupError):
 
 @dataclass(frozen=True, slots=True)
 class Plan:
-    """An answer that is not written yet: its ETag, the cost of writing it, s, and how."""
+    """An answer that is not written yet: its ETag, and how it is."""
 
     etag: str
-    cost_s: float
     write: Callable[[ShouldStop], Answer]
 
 
@@ -110,18 +85,6 @@ class Answered:
 
     etag: str
     answer: Answer | None
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        """Send a large body as a buffer of its own."""
-        if self.answer is None:
-            return Answered, (self.etag, None)
-        body, *rest = self.answer.body, self.answer.media_type, self.answer.headers
-        sent = PickleBuffer(body) if len(body) > _LARGE_BYTES else body
-        return _answered, (self.etag, sent, *rest)
-
-
-def _answered(etag: str, *answer: Any) -> Answered:
-    return Answered(etag, Answer(*answer))
 
 
 @dataclass(frozen=True, slots=True)
@@ -172,8 +135,7 @@ class WholeState(StateQuery):
     def plan(self, snapshot: Snapshot) -> Plan:
         """See `StateQuery`."""
         etag = etag_of("state", (snapshot.stamp_ns, snapshot.frame_id, snapshot.tags))
-        cost = len(snapshot.tags) * _WRITE_TAG_S
-        return _plan(etag, lambda _: StateJson().state(snapshot), cost)
+        return plan_of(etag, lambda _: StateJson().state(snapshot))
 
 
 @dataclass(frozen=True, slots=True)
@@ -197,7 +159,7 @@ class OneTag(StateQuery):
         if found is None:
             raise NoSuchTag(self.tag_id, len(snapshot.tags))
         etag = etag_of("tag", (snapshot.stamp_ns, found))
-        return _plan(etag, lambda _: StateJson().tag(found, snapshot.now_ns), _WRITE_TAG_S)
+        return plan_of(etag, lambda _: StateJson().tag(found, snapshot.now_ns))
 
 
 @dataclass(frozen=True, slots=True)
@@ -223,119 +185,7 @@ class Health(StateQuery):
         days = days_of(scans, by.sensors, by.is_day, by.day_number)
         judged = judge_once(snapshot, recent, by.sensors, by.day, by.recent_s, days=days)
         body = HealthJson().whole(judged)
-        return _plan(etag_of("health", (snapshot.stamp_ns, body.decode())), lambda _: body)
-
-
-@dataclass(frozen=True, slots=True)
-class Field(StateQuery):
-    """A field in a format (None: its quality), by these rules, on the map of now.
-
-    Without a box, it is that of the tags as they were pinned then. Quantities of a day are made of
-    each tag's readings of a day; whether it was day is decided by the clock. Live and past differ
-    in where the snapshot comes from, and in their ETags (`newest_etag`).
-    """
-
-    query: FieldQuery
-    field_format: FieldFormat | None
-    rules: FieldRules
-    occupancy: OccupancyMap | None = field(compare=False)
-    criteria: Criteria = field(compare=False)
-
-    def check(self) -> None:
-        """Refuse what can be refused without a snapshot.
-
-        Raises:
-            lupin_twin.field.engine.FieldRefused: a bad request.
-
-        """
-        self._check(self.query.request((0.0, 0.0, 0.0, 0.0), self.rules.max_grid_cells))
-
-    def write_s(self, tags: int) -> float:
-        """See `StateQuery`; without a box, as if the tags stood side by side."""
-        side_m = 2.0 * self.rules.max_distance_m * math.sqrt(max(tags, 1))
-        request = self.query.request((0.0, 0.0, side_m, side_m), self.rules.max_grid_cells)
-        is_daily = self.query.sensor_type in DAILY
-        daily_s = tags * _series_s("", MAX_POINTS, tags) if is_daily else 0.0
-        try:
-            return daily_s + cost_s(request, tags, self.rules) + self._writing_s(request)
-        except FieldRefused:
-            return daily_s + _LARGE_S
-
-    def newest_etag(self, revision: str) -> str:
-        """Of the newest state: of its revision, and nothing has to be looked at for it."""
-        name = "quality" if self.field_format is None else self.field_format.name
-        rules, sensors = self.rules, self.criteria.sensors
-        return etag_of(f"newest {name}", (revision, self.query, rules, sensors.text))
-
-    def look(self, find: Find) -> Plan:
-        """See `Query`."""
-        at_ns = self.at_ns or 0
-        snapshot: Snapshot = find(at_ns)
-        daily = DAILY.get(self.query.sensor_type)
-        if daily is not None:
-            by = self.criteria
-            tags = derived.with_daily(
-                snapshot.tags, daily, at_ns, sensors=by.sensors, is_day=by.is_day, find=find
-            )
-            snapshot = replace(snapshot, tags=tuple(tags))
-        return self.plan(snapshot)
-
-    def plan(self, snapshot: Snapshot, etag: str | None = None) -> Plan:
-        """See `StateQuery`; None: the ETag is made of content.
-
-        Raises:
-            lupin_twin.field.engine.FieldRefused: a bad request.
-
-        """
-        request = self.request(snapshot)
-        sensor, sensors = self.criteria.sensors.named(request.sensor_type), self.criteria.sensors
-        tags = plausible(with_derived(snapshot.tags, request.sensor_type), sensor)
-        samples = samples_of(tags, request.sensor_type)
-        far_off = far_off_tags(snapshot.tags)
-        cost = cost_s(request, len(samples), self.rules)
-
-        def content_etag(kind: str, *content: object) -> str:
-            # By content: the revision of a map is one process's own.
-            digest = None if self.occupancy is None else _digest_of_map(self.occupancy)
-            built_from = (request, samples, *content, far_off, self.rules, digest, sensors.text)
-            return etag_of(kind, built_from)
-
-        def quality(should_stop: ShouldStop) -> bytes:
-            grid = compute_field(request, samples, self.occupancy, self.rules, should_stop)
-            return formats.write_quality(grid, tags, sensor, self.rules, should_stop)
-
-        if self.field_format is None:
-            of = [tag.tag_id for tag in tags if samples_of((tag,), request.sensor_type)]
-            etag = etag or content_etag("quality", of)
-            return _plan(etag, quality, cost + len(tags) * _JUDGE_TAG_S)
-        field_format, scale = self.field_format, self.query.scale
-        etag = etag or content_etag(f"field {field_format.name} {scale}")
-
-        def write(should_stop: ShouldStop) -> Answer:
-            grid = compute_field(request, samples, self.occupancy, self.rules, should_stop)
-            metadata = {**formats.metadata(grid, sensor), **formats.far_off(far_off)}
-            headers = field_query.headers(metadata, f"{request.sensor_type}.{field_format.name}")
-            body = formats.write(grid, field_format, request.sensor_type, sensors, scale)
-            return Answer(body, field_format.media_type, {**headers, "ETag": etag, **REVALIDATE})
-
-        return Plan(etag, cost + self._writing_s(request), write)
-
-    def request(self, snapshot: Snapshot) -> FieldRequest:
-        """What is to be computed of a snapshot; see `check`."""
-        places = [(tag.pose.x, tag.pose.y) for tag in snapshot.tags if tag.pose is not None]
-        box = default_box(places, self.rules.max_distance_m)
-        request = self.query.request(box, self.rules.max_grid_cells)
-        self._check(request)
-        return request
-
-    def _check(self, request: FieldRequest) -> None:
-        width, height = check_request(request, self.rules.max_grid_cells)
-        field_format = self.field_format or formats.JSON
-        field_query.check_scale(self.query, field_format, width * height, self.rules.max_grid_cells)
-
-    def _writing_s(self, request: FieldRequest) -> float:
-        width, height = check_request(request, self.rules.max_grid_cells)
-        return width * height * self.query.scale**2 * _WRITE_CELL_S
+        return plan_of(etag_of("health", (snapshot.stamp_ns, body.decode())), lambda _: body)
 
 
 # --- over a period --------------------------------------------------------------------------------
@@ -353,11 +203,11 @@ class History:
     def cost_s(self, tags: int) -> float:
         """See `Query`."""
         request = self.request
-        own_s = _series_s(request.tag_id, request.max_points, tags)
+        own_s = series_s(request.tag_id, request.max_points, tags)
         if request.sensor_type not in DERIVED and request.sensor_type not in DAILY:
             return own_s
         # Both of its parts are read, and again for buckets.
-        return own_s + 4 * _series_s(request.tag_id, MAX_POINTS, tags)
+        return own_s + 4 * series_s(request.tag_id, MAX_POINTS, tags)
 
     def look(self, find: Find) -> Plan:
         """See `Query`."""
@@ -380,9 +230,9 @@ class Timeline:
 
     def cost_s(self, tags: int) -> float:
         """See `Query`: as if every event had to be counted twice."""
-        counted_s = _series_s(self._tag_id, self.query.points, tags)
-        runs_s = _series_s(EVERY_TAG, DEFAULT_POINTS, tags)
-        silences_s = _series_s(self._tag_id, MAX_POINTS, tags)
+        counted_s = series_s(self._tag_id, self.query.points, tags)
+        runs_s = series_s(EVERY_TAG, DEFAULT_POINTS, tags)
+        silences_s = series_s(self._tag_id, MAX_POINTS, tags)
         return runs_s + 2 * len(bodies.COUNTED) * counted_s + silences_s
 
     def look(self, find: Find) -> Plan:
@@ -415,26 +265,47 @@ class Timeline:
         return self.query.tag_id or EVERY_TAG
 
 
-def _series_s(tag_id: str, points: int, tags: int) -> float:
+# What writing a scan takes, roughly and at worst, s of one core.
+_WRITE_SCAN_S: Final = 20e-6
+
+
+@dataclass(frozen=True, slots=True)
+class LatestOfTag:
+    """`schema.TagHistory`: the last scans and attempts of a tag, `count` of each at most.
+
+    `newest` is its state now, where that is known: it may show what the log does not hold yet.
+    """
+
+    tag_id: str
+    newest: TagState | None
+    count: int
+
+    def cost_s(self, tags: int) -> float:  # noqa: ARG002
+        """See `Query`."""
+        return SERIES_S + self.count * _WRITE_SCAN_S
+
+    def look(self, find: Find) -> Plan:
+        """See `Query`."""
+        found: list[Scan | Inspection] = find(LatestRequest(self.tag_id, self.count))
+        return of_content(history(self.tag_id, tag_history(found, self.newest, self.count)))
+
+
+def series_s(tag_id: str, points: int, tags: int) -> float:
     """The cost of looking a series up and writing it, s of one core."""
     looked_at = tags if tag_id == EVERY_TAG else 0
     return SERIES_S + looked_at * SERIES_S_PER_TAG + points * _WRITE_ENTRY_S
 
 
-def _plan(etag: str, write: Callable[[ShouldStop], bytes], cost: float = 0.0) -> Plan:
+def plan_of(etag: str, write: Callable[[ShouldStop], bytes]) -> Plan:
+    """The plan of a JSON answer that is written when it is wanted."""
     headers = {"ETag": etag, **REVALIDATE}
-    return Plan(etag, cost, lambda stop: Answer(write(stop), JSON_TYPE, headers))
+    return Plan(etag, lambda stop: Answer(write(stop), JSON_TYPE, headers))
 
 
 def of_content(body: Mapping[str, Any]) -> Plan:
     """The plan of a JSON answer that is there already."""
     answer = json_answer(orjson.dumps(body))
-    return Plan(answer.headers["ETag"], 0.0, lambda _: answer)
-
-
-@lru_cache(maxsize=1)
-def _digest_of_map(occupancy: OccupancyMap) -> str:
-    return blake2b(occupancy.cells.data, digest_size=12).hexdigest() + repr(occupancy.place)
+    return Plan(answer.headers["ETag"], lambda _: answer)
 
 
 def etag_of(kind: str, content: object) -> str:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
-from datetime import UTC, date, datetime
+from datetime import UTC, datetime, timedelta
 from typing import Annotated, Final, Literal
 
 from annotated_types import Interval
@@ -28,11 +28,11 @@ MAX_SECONDS: Final = 2**31 - 1
 _SECONDS: Final = re.compile(r"([0-9]+)(?:\.([0-9]+))?", re.ASCII)
 # In a query string, `+01:00` reads ` 01:00`.
 _ISO: Final = re.compile(
-    r"([0-9]{4})-([0-9]{2})-([0-9]{2})[Tt]([0-9]{2}):([0-9]{2})(?::([0-9]{2})(?:\.([0-9]+))?)?"
-    r"(?:[Zz]|([+ -])([0-9]{2}):?([0-9]{2}))",
+    r"(\d{4}-\d\d-\d\d[Tt](?:[01]\d|2[0-3]):\d\d(?::\d\d(?:\.(\d+))?)?)"
+    r"([Zz]|[+ -]\d\d:?[0-5]\d)",
     re.ASCII,
 )
-_EPOCH: Final = date(1970, 1, 1).toordinal()
+_EPOCH: Final = datetime(1970, 1, 1, tzinfo=UTC)
 _SECONDS_A_DAY: Final = 86_400
 
 
@@ -49,7 +49,12 @@ def moment(name: str, text: str) -> int:
         # As text: int() takes its time for a thousand digits.
         seconds = int(whole) if len(whole.lstrip("0")) <= len(str(MAX_SECONDS)) else None
     elif iso := _ISO.fullmatch(text):
-        seconds, fraction = _unix_seconds(name, text, iso), iso.group(7)
+        shown, fraction, offset = iso.groups()
+        shown = shown.partition(".")[0] + offset.replace(" ", "+")
+        try:
+            seconds = (datetime.fromisoformat(shown.upper()) - _EPOCH) // timedelta(seconds=1)
+        except ValueError as error:
+            raise PastRefused(f"{name} is {text[:64]!r}: {error}") from None
     else:
         raise PastRefused(f"{name} is {text[:64]!r}, expected {MOMENT}")
     if seconds is None or seconds > MAX_SECONDS:
@@ -57,21 +62,6 @@ def moment(name: str, text: str) -> int:
     if seconds < 0:
         raise PastRefused(f"{name} is {text[:64]!r}, which is before 0 s of ROS time")
     return seconds * NANOSECONDS_PER_SECOND + int(f"{fraction or '':<09.9}")
-
-
-def _unix_seconds(name: str, text: str, iso: re.Match[str]) -> int:
-    year, month, day, hour, minute = (int(part) for part in iso.groups()[:5])
-    second, sign = int(iso.group(6) or 0), iso.group(8)
-    offset_hours, offset_minutes = int(iso.group(9) or 0), int(iso.group(10) or 0)
-    try:
-        days = date(year, month, day).toordinal() - _EPOCH
-    except ValueError as error:
-        raise PastRefused(f"{name} is {text[:64]!r}: {error}") from None
-    if hour > 23 or minute > 59 or second > 59 or offset_hours > 23 or offset_minutes > 59:
-        raise PastRefused(f"{name} is {text[:64]!r}, which no clock shows")
-    offset = (offset_hours * 60 + offset_minutes) * 60
-    local = days * _SECONDS_A_DAY + (hour * 60 + minute) * 60 + second
-    return local + offset if sign == "-" else local - offset
 
 
 def iso(stamp_ns: int) -> str:

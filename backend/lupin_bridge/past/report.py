@@ -22,9 +22,8 @@ import orjson
 from lupin_bridge.alarms.board import active_first
 from lupin_bridge.alarms.notes import notes_of_alarms
 from lupin_bridge.feed.query import Find
-from lupin_bridge.judge.alarm import Alarm
 from lupin_bridge.judge.alarm_fold import Follower
-from lupin_bridge.judge.episodes import readings_of
+from lupin_bridge.judge.episodes import Alarm, readings_of
 from lupin_bridge.judge.options import Criteria
 from lupin_bridge.judge.scan_interval import SHORTEST_NS, TIMES_MEDIAN
 from lupin_bridge.judge.verdict import Verdict, derive
@@ -134,7 +133,7 @@ def planned(
     etag = f'"{blake2b(body, digest_size=12).hexdigest()}"'
     known = bodies.period_headers(of.journal, of.start_ns, of.end_ns)
     answer = Answer(body, media_type, {"ETag": etag, **REVALIDATE, **known, **(headers or {})})
-    return Plan(etag, 0.0, lambda _: answer)
+    return Plan(etag, lambda _: answer)
 
 
 def _stretches(hours: Counter[int], start_ns: int, end_ns: int) -> Iterator[Stretch]:

@@ -24,11 +24,11 @@ from lupin_bridge.bridge import Bridge
 from lupin_bridge.feed.source import TwinTimeoutError, TwinUnavailableError
 from lupin_bridge.field import query as field_query
 from lupin_bridge.past import bodies
+from lupin_bridge.past.fields import Field
 from lupin_bridge.past.plans import (
     PLAN_TAG_S,
     Answered,
     ConditionalQuery,
-    Field,
     NoSuchTag,
     Query,
 )
@@ -36,7 +36,6 @@ from lupin_bridge.serving.admission import REVALIDATE, AdmissionError, Answer, B
 from lupin_bridge.stream import schema
 from lupin_twin.core.notes import NotesUnwritable
 from lupin_twin.core.past import NotRemembered, PastRefused
-from lupin_twin.field.idw import never
 from lupin_twin.runtime.workers import SMALL_S, ShouldStop
 
 NEVER_STORE: Final = {"Cache-Control": "no-store"}
@@ -45,8 +44,6 @@ NO_TWIN: Final = "no twin has been heard yet"
 BODY_S: Final = 5.0
 # nginx's "client closed request"; nobody receives it.
 CLIENT_DISCONNECTED: Final = 499
-# Shorter work is done on the loop: to hand it to a worker takes longer.
-_AT_ONCE_S: Final = 1e-3
 
 TOO_MUCH: Final[dict[int | str, dict[str, Any]]] = {
     429: {"model": schema.ErrorMessage, "description": "this client asks for too much"}
@@ -357,16 +354,14 @@ async def newest_field(bridge: Bridge, client: str, field: Field, etag: str) -> 
     if bridge.latest is None:
         raise TwinUnavailableError(NO_TWIN)
     snapshot = bridge.latest.snapshot
-
-    async def run(work: Callable[[ShouldStop], ResultT], cost_s: float) -> ResultT:
-        return work(never) if cost_s <= _AT_ONCE_S else await on_worker(bridge, work, cost_s)
-
-    plan = await run(lambda _: field.plan(snapshot, etag), len(snapshot.tags) * PLAN_TAG_S)
+    cost_s = len(snapshot.tags) * PLAN_TAG_S + field.write_s(len(snapshot.tags))
     with (
-        bridge.admission.computing(client, is_large=plan.cost_s > SMALL_S),
+        bridge.admission.computing(client, is_large=cost_s > SMALL_S),
         bridge.metrics.field_seconds.time(),
     ):
-        answer = await run(plan.write, plan.cost_s)
+        answer = await on_worker(
+            bridge, lambda stop: field.plan(snapshot, etag).write(stop), cost_s
+        )
     bridge.cache.put(etag, answer)
     return answer
 

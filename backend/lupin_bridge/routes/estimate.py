@@ -11,13 +11,13 @@ from fastapi import APIRouter, Request, Response
 
 from lupin_bridge.access.middleware import client_of
 from lupin_bridge.bridge import Bridge
-from lupin_bridge.feed.estimates import MAX_SENSORS, NAMES_TAG_S, newest_of
+from lupin_bridge.feed.estimates import NAMES_TAG_S, sensors_of
 from lupin_bridge.feed.source import TwinUnavailableError
 from lupin_bridge.field import formats
 from lupin_bridge.field.formats import PNG, FieldFormat
 from lupin_bridge.field.query import EstimateQuery
 from lupin_bridge.past import query as past_query
-from lupin_bridge.past.estimate import Estimated
+from lupin_bridge.past.fields import Estimated
 from lupin_bridge.query_string import Name, needed, parameter, parameters_of, read
 from lupin_bridge.routes.answers import (
     NO_TWIN,
@@ -122,7 +122,7 @@ async def quality(request: Request) -> Response:
 
     async def body(bridge: Bridge, query: QualityQuery) -> bytes:
         names = [query.sensor_type] if query.sensor_type else await _sensors(bridge)
-        reports = {name: await bridge.reports.of(ReportRequest(name)) for name in names}
+        reports = {name: await bridge.source.estimate_report(ReportRequest(name)) for name in names}
         return report_json.qualities(reports)
 
     return await _report(request, QualityQuery, body)
@@ -140,7 +140,7 @@ async def tags(request: Request) -> Response:
 
     async def body(bridge: Bridge, query: TagsQuery) -> bytes:
         sensor = query.sensor_type
-        report = await bridge.reports.of(ReportRequest(sensor))
+        report = await bridge.source.estimate_report(ReportRequest(sensor))
         cost_s = len(report.tags) * _WRITE_TAG_S
         return await on_worker(bridge, lambda _: report_json.tags(sensor, report), cost_s)
 
@@ -159,7 +159,7 @@ async def advice(request: Request) -> Response:
 
     async def body(bridge: Bridge, query: AdviceQuery) -> bytes:
         wanted = ReportRequest(query.sensor_type, query.places)
-        return report_json.advice(query.sensor_type, await bridge.reports.of(wanted))
+        return report_json.advice(query.sensor_type, await bridge.source.estimate_report(wanted))
 
     return await _report(request, AdviceQuery, body)
 
@@ -186,4 +186,4 @@ async def _sensors(bridge: Bridge) -> list[str]:
         raise TwinUnavailableError(NO_TWIN)
     snapshot = bridge.latest.snapshot
     cost_s = len(snapshot.tags) * NAMES_TAG_S
-    return sorted(await on_worker(bridge, lambda _: newest_of(snapshot), cost_s))[:MAX_SENSORS]
+    return await on_worker(bridge, lambda _: sensors_of(snapshot), cost_s)

@@ -15,7 +15,7 @@ from lupin_bridge.field.formats import FORMATS, JSON, FieldFormat
 from lupin_bridge.field.query import FieldQuery
 from lupin_bridge.judge.derived import DAILY
 from lupin_bridge.past import query as past_query
-from lupin_bridge.past.plans import Field
+from lupin_bridge.past.fields import Field
 from lupin_bridge.query_string import parameters_of, read
 from lupin_bridge.routes.answers import (
     NOT_REMEMBERED,

@@ -31,7 +31,7 @@ from lupin_bridge.feed.source import TwinUnavailableError
 from lupin_bridge.field import formats as field_formats
 from lupin_bridge.field.formats import JSON
 from lupin_bridge.field.query import FieldQuery
-from lupin_bridge.past.plans import Field
+from lupin_bridge.past.fields import Field
 from lupin_bridge.routes.answers import error_response, newest_field
 from lupin_bridge.serving.admission import AdmissionError
 from lupin_bridge.serving.ws_protocol import BINARY, CONNECTION_KEY, Connection, frame_head
@@ -361,8 +361,8 @@ class _RosbridgeConversation(_Conversation):
         if (lent := bridge.cache.lend(etag)) is not None:
             answer, give_back = lent
             give_back()  # the reply holds a copy of its own
-            return bytes(answer.body)
+            return answer.body
         client = self._client.address
         held.enter_context(bridge.admission.request(client, time.monotonic()))
         answer = await bridge.answering.get(etag, lambda: newest_field(bridge, client, field, etag))
-        return bytes(answer.body)
+        return answer.body

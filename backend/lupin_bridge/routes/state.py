@@ -14,8 +14,7 @@ from lupin_bridge.access.middleware import client_of
 from lupin_bridge.bridge import Bridge
 from lupin_bridge.past import bodies
 from lupin_bridge.past import query as past_query
-from lupin_bridge.past.latest import LatestOfTag
-from lupin_bridge.past.plans import NoSuchTag, OneTag, WholeState
+from lupin_bridge.past.plans import LatestOfTag, NoSuchTag, OneTag, WholeState
 from lupin_bridge.query_string import parameter, parameters_of, read
 from lupin_bridge.routes.answers import (
     NEVER_STORE,

@@ -16,7 +16,7 @@ from fastapi import APIRouter, Request, Response
 from lupin_bridge.access.middleware import client_of
 from lupin_bridge.alarms.notes import notes_of_alarms
 from lupin_bridge.feed.source import ailment
-from lupin_bridge.judge.alarm import Alarm
+from lupin_bridge.judge.episodes import Alarm
 from lupin_bridge.metrics import CONTENT_TYPE
 from lupin_bridge.past import query as past_query
 from lupin_bridge.past.plans import Health

@@ -267,7 +267,7 @@ REVALIDATE: Final = {"Cache-Control": "no-cache"}
 class Answer:
     """The body of an answer, and its headers."""
 
-    body: bytes | memoryview
+    body: bytes
     media_type: str
     headers: Mapping[str, str] = field(default_factory=dict)
 

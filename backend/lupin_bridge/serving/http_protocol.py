@@ -17,9 +17,11 @@ import asyncio
 import logging
 import re
 import sys
+from collections.abc import Iterator
 from typing import Any, Final, cast
 
 import h11
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from uvicorn.protocols.http.h11_impl import H11Protocol, RequestResponseCycle
 
 from lupin_bridge.serving.admission import client_key
@@ -271,3 +273,41 @@ class HttpConnection(H11Protocol):
         self._reader_deadline = None
         log.warning("cut off a reader that took nothing for %g s", self.timeout_keep_alive)
         self.abort()
+
+
+# --- an answer, piece by piece --------------------------------------------------------------------
+
+# Of a body, for a slow reader: the next piece follows when the socket has taken this one.
+PIECE_BYTES: Final = 64 * 1024
+
+
+def pieces_of(message: Message) -> Iterator[Message]:
+    """A message of an answer as messages with no more than `PIECE_BYTES` of body."""
+    body = message.get("body", b"")
+    if len(body) <= PIECE_BYTES:
+        yield message
+        return
+    body = memoryview(body)  # a piece is a view: of one body for a hundred readers there is one
+    for start in range(0, len(body), PIECE_BYTES):
+        yield {**message, "body": body[start : start + PIECE_BYTES], "more_body": True}
+    # uvicorn waits before it writes: the empty end waits for the last piece.
+    yield {**message, "body": b""}
+
+
+class PieceByPiece:
+    """An answer returns when its reader has taken all but the last piece."""
+
+    def __init__(self, app: ASGIApp) -> None:
+        self._app = app
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Send the application's answers in pieces."""
+        if scope["type"] != "http":
+            await self._app(scope, receive, send)
+            return
+
+        async def send_in_pieces(message: Message) -> None:
+            for piece in pieces_of(message):
+                await send(piece)
+
+        await self._app(scope, receive, send_in_pieces)

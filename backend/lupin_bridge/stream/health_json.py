@@ -13,7 +13,7 @@ import orjson
 
 from lupin_bridge.alarms.board import Page
 from lupin_bridge.alarms.notes import AlarmNotes
-from lupin_bridge.judge.alarm import Alarm
+from lupin_bridge.judge.episodes import Alarm
 from lupin_bridge.judge.judging import Judged
 from lupin_bridge.judge.scan_interval import Patrol
 from lupin_bridge.judge.verdict import Health, Reason

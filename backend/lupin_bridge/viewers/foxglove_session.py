@@ -18,9 +18,8 @@ from functools import partial
 from itertools import count
 from typing import Final
 
-from lupin_bridge.feed.relay import Sample
+from lupin_bridge.feed.relay import Sample, Topic, TwinNames, topics_of
 from lupin_bridge.feed.source import TwinSource, TwinUnavailableError
-from lupin_bridge.feed.topics import Topic, TwinNames, topics_of
 from lupin_bridge.message_schemas import schema_text
 from lupin_bridge.serving.ws_protocol import shown
 from lupin_bridge.viewers import foxglove_protocol as protocol

@@ -20,7 +20,7 @@ from typing import Any, Final
 import numpy as np
 import orjson
 
-from lupin_bridge.feed.topics import TwinNames, absolute, topics_of
+from lupin_bridge.feed.relay import TwinNames, absolute, topics_of
 from lupin_bridge.field.query import BOX_NAMES, FieldQuery
 from lupin_bridge.serving.ws_protocol import shown
 from lupin_bridge.viewers.rosbridge_protocol import CallService, Refused

@@ -16,10 +16,18 @@ from dataclasses import dataclass, replace
 from functools import partial
 from typing import Final
 
-from lupin_bridge.feed.relay import Bounded, NotRelayedError, Relay, Sample
+from lupin_bridge.feed.relay import (
+    Bounded,
+    NotRelayedError,
+    Relay,
+    Sample,
+    Topic,
+    TwinNames,
+    absolute,
+    topics_of,
+)
 from lupin_bridge.feed.shared_work import Shared
 from lupin_bridge.feed.source import TwinUnavailableError
-from lupin_bridge.feed.topics import Topic, TwinNames, absolute, topics_of
 from lupin_bridge.serving.ws_protocol import shown
 from lupin_bridge.stream.frames import StateFrame, text_frame
 from lupin_bridge.viewers.rosbridge_protocol import (

@@ -1,11 +1,13 @@
 import { expect, test } from 'vitest';
 
+import type { Alarm } from '../contract/types';
 import { alarm } from '../testing/alarms';
 import { cataloguesOf } from '../domain/sensors';
 import { CATALOGUE, FILE } from '../testing/sensors';
 import { alarmsCsv, arranged, causeFacts, filtered } from './arrange';
 import { NOTHING_KEPT, shelve } from './kept';
 import { listOf } from './list';
+import type { Now } from './now';
 
 const speech = { sensors: CATALOGUE, unit: 'C' } as const;
 const AT = 1_800_000_000_000;
@@ -62,18 +64,24 @@ test('of a cause the value farthest beyond, and since when one has been active',
       { ...cold(1), worst: 4.2 },
       { ...cold(2), worst: 5.5 },
       { ...cold(3), cleared_at: { sec: 120, nanosec: 0 }, worst: 3.1 },
-      // Lower still, and nearer to the limit of its plants.
+      // The lowest, whatever the limit of its plants.
       alarm('4', { tag_id: '4', reason: { limit: 4, value: 3 }, worst: 2.9, cleared: 130 }),
     ],
     NOTHING_KEPT,
     null,
     AT,
   );
-  expect(causeFacts([...items.active, ...items.resolved], speech, null)).toEqual([
-    'worst 3.1\u00a0°C',
-    'since sim 00:01:41',
+  const now = ({ id }: Alarm): Now | null =>
+    id === 'cold2'
+      ? { kind: 'known', value: 10.4, verdict: 'stressed', limit: 18, trend: null }
+      : id === 'cold1'
+        ? { kind: 'known', value: 10.9, verdict: 'healthy', limit: null, trend: null }
+        : null;
+  expect(causeFacts([...items.active, ...items.resolved], speech, null, now)).toEqual([
+    ...['1 Stressed', '1 Healthy'],
+    ...['now 10.4\u00a0°C (Tag 2)', 'worst 2.9\u00a0°C', 'since sim 00:01:41'],
   ]);
-  expect(causeFacts(items.resolved, speech, null)).toEqual(['worst 3.1\u00a0°C']);
+  expect(causeFacts(items.resolved, speech, null, now)).toEqual(['worst 2.9\u00a0°C']);
 });
 
 test('the newest first, or by tag: in one row', () => {

@@ -1,7 +1,7 @@
 /** The list of alarms as somebody wants to see it: filtered, sorted, grouped by cause and area; and as a file. Pure. */
 import type { Alarm, WireTime } from '../contract/types';
 import { csv, type Cell } from '../domain/csv';
-import { isOfRange, sideOf } from '../domain/health';
+import { isOfRange, sideOf, VERDICTS } from '../domain/health';
 import { secondsOf } from '../domain/rostime';
 import { shown } from '../domain/text';
 import { compareIds } from '../domain/twin';
@@ -9,7 +9,7 @@ import { toShown, unitOf } from '../domain/units';
 import { S } from '../strings';
 import type { AlarmList, Item } from './list';
 import type { Now } from './now';
-import { nameText, valuesOf, whatText, whenText, type Speech } from './words';
+import { nameText, valuesOf, whatText, whenText, whereText, type Speech } from './words';
 
 export const ORDERS = ['cause', 'newest', 'tag'] as const;
 /** By cause the worst comes first. */
@@ -89,25 +89,43 @@ function causeWords(alarm: Alarm, speech: Speech): string {
   return `${shown(speech.sensors.named(reason.sensor).label, 32)} ${beyond}`;
 }
 
-/** Of many alarms of one cause: the worst value, and since when while one is active. */
+/** Of many alarms of one cause: how bad they are now, the furthest value now and at worst, since when. */
 export function causeFacts(
   items: readonly Item[],
   speech: Speech,
   nowS: number | null,
+  nowOf: (alarm: Alarm) => Now | null,
 ): readonly string[] {
-  const alarms = items.map(({ alarm }) => alarm);
-  // Each against its own limit: plants differ.
-  const beyond = ({ worst, reason }: Alarm): number =>
-    Math.abs((worst ?? reason.value ?? NaN) - (reason.limit ?? 0));
-  const [first] = [...alarms].sort((a, b) => beyond(b) - beyond(a));
-  const begins = alarms
-    .filter((alarm) => alarm.cleared_at === null)
-    .map(({ raised_at }) => secondsOf(raised_at));
-  const worst = first ? valuesOf(first, speech, null).worst : null;
+  const all = items.map(({ alarm, verdict }) => {
+    const now = nowOf(alarm);
+    const isKnown = now?.kind === 'known';
+    return {
+      alarm,
+      verdict: isKnown ? now.verdict : verdict,
+      now: isKnown ? now.value : null,
+      worst: alarm.worst ?? alarm.reason.value,
+      values: valuesOf(alarm, speech, now),
+    };
+  });
+  type Value = (typeof all)[number];
+  // All of one cause are on the same side.
+  const sign =
+    all[0] && isOfRange(all[0].alarm.reason) && sideOf(all[0].alarm.reason) === 'below' ? -1 : 1;
+  const furthest = (of: (each: Value) => number | null): Value | undefined =>
+    all.filter((each) => of(each) !== null).sort((a, b) => sign * ((of(b) ?? 0) - (of(a) ?? 0)))[0];
+  const active = all.filter(({ alarm }) => alarm.cleared_at === null);
+  const counts = VERDICTS.map((verdict) => ({
+    verdict,
+    count: active.filter((each) => each.verdict === verdict).length,
+  }));
+  const current = furthest(({ now }) => now);
+  const begins = active.map(({ alarm }) => secondsOf(alarm.raised_at));
   return [
-    ...(worst === null ? [] : [worst]),
-    ...(begins.length === 0 ? [] : [S.alarmSince(whenText(Math.min(...begins), nowS), null)]),
-  ];
+    ...counts.filter(({ count }) => count > 0).map((it) => `${it.count} ${S.health[it.verdict]}`),
+    current?.values.now && `${current.values.now} (${whereText(current.alarm)})`,
+    furthest(({ worst }) => worst)?.values.worst,
+    begins.length > 0 ? S.alarmSince(whenText(Math.min(...begins), nowS), null) : null,
+  ].filter((text) => text != null && text !== '') as string[];
 }
 
 const iso = (at: WireTime | null): string | null =>

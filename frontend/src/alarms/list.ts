@@ -58,6 +58,16 @@ export function listOf(
   };
 }
 
+/** The same with what is worst now first; `verdicts` are those of now of `active`, in its order. */
+export function worstNowFirst(list: AlarmList, verdicts: readonly Verdict[]): AlarmList {
+  const ranked = list.active.map((item, index) => ({
+    item,
+    rank: VERDICTS.indexOf(verdicts[index] ?? item.verdict),
+  }));
+  const active = ranked.sort((a, b) => a.rank - b.rank).map(({ item }) => item);
+  return { ...list, active };
+}
+
 const isListed = (end: number, nowS: number | null): boolean =>
   nowS === null || nowS - end < LISTED_S;
 

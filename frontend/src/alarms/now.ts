@@ -10,6 +10,8 @@ export type Now =
       readonly value: number | null;
       /** How bad that is. */
       readonly verdict: Verdict;
+      /** That it is beyond now, in the sensor's unit; null: beyond none. */
+      readonly limit: number | null;
       /** What it is less what it was an hour ago; null: not known, or the same reading. */
       readonly trend: number | null;
     }
@@ -40,7 +42,8 @@ export function nowOf(
   const said = tag.health.reasons.find((each) => each.kind === kind && each.sensor === sensor);
   const verdict = said?.verdict ?? 'healthy';
   if (isPest) {
-    return { kind: 'known', value: said ? (said.value ?? 0) : null, verdict, trend: null };
+    const value = said ? (said.value ?? 0) : null;
+    return { kind: 'known', value, verdict, limit: null, trend: null };
   }
   const { readings, readAt } = tag.tag;
   // What is derived has no reading: what there is of it stands in its reason.
@@ -49,5 +52,11 @@ export function nowOf(
     return unknown(last, readAt.get(sensor) ?? 'unknown');
   }
   const trend = trendOf(sensor, tag, hourAgo);
-  return { kind: 'known', value: last, verdict, trend: trend?.kind === 'by' ? trend.by : null };
+  return {
+    kind: 'known',
+    value: last,
+    verdict,
+    limit: said?.limit ?? null,
+    trend: trend?.kind === 'by' ? trend.by : null,
+  };
 }

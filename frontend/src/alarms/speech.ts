@@ -1,5 +1,5 @@
 /** In whose words alarms are told: the sensors in force, and the operator's unit; and of what state. */
-import type { Alarm } from '../contract/types';
+import type { Alarm, Verdict } from '../contract/types';
 import type { AppState } from '../store/app';
 import { selectCatalogue, selectNewestHealth } from '../store/derived';
 import { hourAgo, selectHourAgoNow, type HourAgo } from '../store/hourAgo';
@@ -26,6 +26,12 @@ export function selectNow(
   const health = selectNewestHealth(state)?.byTag.get(alarm.tag_id);
   const before = selectHourAgoNow(state, last)?.tags.get(alarm.tag_id) ?? null;
   return nowOf(alarm, tag && health ? { tag, health } : null, before, isHeardNow(state));
+}
+
+/** How bad it is now; null: nobody knows, or it has no value. */
+export function verdictNow(state: AppState, alarm: Alarm): Verdict | null {
+  const at = selectNow(state, alarm, null);
+  return at?.kind === 'known' ? at.verdict : null;
 }
 
 /** An alarm in one line, as it is now. */

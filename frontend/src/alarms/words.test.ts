@@ -25,6 +25,7 @@ const known = (value: number | null, verdict: Verdict): Now => ({
   kind: 'known',
   value,
   verdict,
+  limit: null,
   trend: null,
 });
 const CRITICAL = known(6.6, 'critical');
@@ -53,6 +54,19 @@ test('now, at worst and at first, each with its own severity', () => {
   );
   expect(alarmText(cold, C, known(18.5, 'healthy'))).toContain('now 18.5\u00a0°C (in range)');
   expect(alarmText(cold, C, known(8.7, 'critical'))).not.toContain('worst');
+});
+
+test('its limit is that of now: what is critical, or what ends it on the way back', () => {
+  const cold = alarm('a', { tag_id: '9', worst: 8.7, reason: { value: 17.9, limit: 18 } });
+  const at = (value: number, limit: number): Now => ({
+    ...{ kind: 'known', value, verdict: 'stressed', limit, trend: null },
+  });
+  expect(valuesOf(cold, C, at(8.7, 10)).what).toBe('Temperature below 10.0\u00a0°C');
+  expect(valuesOf(cold, C, at(18.02, 18.5))).toMatchObject({
+    what: 'Temperature not yet above 18.5\u00a0°C',
+    now: 'now 18.0\u00a0°C',
+    first: 'first 17.9\u00a0°C',
+  });
 });
 
 test('a worst value is named by the side of its limit that it lies on', () => {

@@ -1,5 +1,5 @@
 /** An alarm in words: what, where, how bad now and at worst, since when, until when. Pure. */
-import type { Alarm, Verdict } from '../contract/types';
+import type { Alarm, HealthReason, Verdict } from '../contract/types';
 import { ageText, clockText, digitsApart, readingText } from '../domain/format';
 import { isOfRange, sideOf } from '../domain/health';
 import { beyondText, reasonText } from '../domain/reasons';
@@ -50,12 +50,13 @@ export interface Values {
 }
 
 export function valuesOf(alarm: Alarm, speech: Speech, now: Now | null): Values {
-  const { reason } = alarm;
+  const reason = reasonNow(alarm, now);
   const { sensors, unit } = speech;
   const sensor = sensors.named(reason.sensor);
-  const worst = alarm.worst ?? (isOfRange(reason) ? reason.value : null);
+  const worst = alarm.worst ?? (isOfRange(reason) ? alarm.reason.value : null);
   const current = now?.kind === 'known' ? now.value : (now?.last ?? null);
-  const all = [current, worst, reason.value].filter((value) => value !== null);
+  const first = alarm.reason.value;
+  const all = [current, worst, first].filter((value) => value !== null);
   const more = isOfRange(reason) ? digitsApart(sensor, all, reason.limit, unit) : 0;
   const isPest = reason.kind === 'pest';
   const text = (value: number): string =>
@@ -68,7 +69,7 @@ export function valuesOf(alarm: Alarm, speech: Speech, now: Now | null): Values 
     isPest && value > 0 ? S.pestCount(value) : text(value);
   const isMeasured = isOfRange(reason) || isPest || reason.kind === 'changed';
   return {
-    what: whatText(alarm, speech, more),
+    what: whatText({ ...alarm, reason }, speech, more),
     now:
       now?.kind === 'known'
         ? S.alarmNow(now.value === null ? S.alarmPests.none : nowText(now.value))
@@ -77,9 +78,15 @@ export function valuesOf(alarm: Alarm, speech: Speech, now: Now | null): Values 
       worst === null || (isPest && worst === 0)
         ? null
         : S.alarmWorst[isOfRange(reason) ? sideOf(reason) : 'pest'](text(worst)),
-    first: isMeasured && reason.value !== null ? S.alarmFirst(text(reason.value)) : null,
+    first: isMeasured && first !== null ? S.alarmFirst(text(first)) : null,
     more,
   };
+}
+
+/** Of a range its limit is that of now: beyond what is critical, that; on the way back, what ends it. */
+function reasonNow({ reason }: Alarm, now: Now | null): HealthReason {
+  if (!isOfRange(reason) || now?.kind !== 'known' || now.limit === null) return reason;
+  return { ...reason, value: now.value ?? reason.value, limit: now.limit };
 }
 
 /** What and where in one line, as it is now, and how bad at worst where that differs. */

@@ -13,7 +13,7 @@ import { useSensorsOf, useSpeciesOf } from './useSensorsOf';
 import { pointsFor, useSize } from './useSize';
 import { ChartState } from './ChartState';
 
-const HEIGHT = 132;
+const HEIGHT = 172;
 
 /** The sensor in view, or the tag's first, over the period of the time bar. */
 export default function CardChart({ tagId }: { tagId: string }): JSX.Element | null {

@@ -130,15 +130,16 @@ export function drawAbove(frame: Frame, model: PlotModel, palette: ChartPalette)
   context.setLineDash([]);
   for (const line of model.lines) {
     drawMarkers(frame, line, model, palette);
-    drawMarks(frame, line, palette);
   }
   drawNames(frame, model, palette);
   drawMoment(frame, model, palette);
   context.restore();
+  for (const line of model.lines) drawMarks(frame, line, palette);
 }
 
 /** What band and lines are, at their beginning; CSS pixels. */
 const NAME_GAP = 4;
+const NAME_HEIGHT = 12;
 
 function drawNames(frame: Frame, { sensor, bands, unit }: PlotModel, palette: ChartPalette): void {
   const { context, box, ratio } = frame;
@@ -152,7 +153,9 @@ function drawNames(frame: Frame, { sensor, bands, unit }: PlotModel, palette: Ch
   context.lineWidth = 3 * ratio;
   context.lineJoin = 'round';
   context.strokeStyle = palette.surface;
-  const name = (text: string, at: number, isBelow: boolean): void => {
+  const lowest = box.top + box.height - NAME_HEIGHT * ratio - gap;
+  const name = (text: string, at: number, wantsBelow: boolean): void => {
+    const isBelow = wantsBelow && at < lowest;
     context.textBaseline = isBelow ? 'top' : 'bottom';
     const place = [box.left + gap, at + (isBelow ? gap : -gap)] as const;
     context.strokeText(text, ...place);
@@ -192,8 +195,10 @@ function drawMarkers(frame: Frame, line: Line, model: PlotModel, palette: ChartP
 /** Marks of one kind closer together than this are one mark; CSS pixels. */
 const MARK_ROOM = 7;
 const MARK_SIZE = 7;
+/** Between the values and their times, marks have a lane of their own; CSS pixels. */
+export const MARKS_LANE = 24;
 
-/** A cross for what failed, a flower's ring for a look, along the lower edge. */
+/** A cross for what failed, a flower's ring for a look. */
 function drawMarks(frame: Frame, { marks }: Line, palette: ChartPalette): void {
   const { context, ratio, x, box } = frame;
   const bottom = box.top + box.height;
@@ -201,11 +206,12 @@ function drawMarks(frame: Frame, { marks }: Line, palette: ChartPalette): void {
   for (const kind of ['look', 'failure'] as const) {
     const isFailure = kind === 'failure';
     context.strokeStyle = isFailure ? palette.failure : palette.look;
-    const y = bottom - (isFailure ? 8 : 19) * ratio;
+    const y = bottom + (isFailure ? 20 : 8) * ratio;
     let last = -Infinity;
     for (const mark of marks) {
       const at = x(mark.at + mark.widthS / 2);
       if (mark.kind !== kind || at - last < MARK_ROOM * ratio) continue;
+      if (at < box.left || at > box.left + box.width) continue;
       last = at;
       const size = MARK_SIZE * ratio;
       context.stroke(new Path2D(markerPath(isFailure ? 'cross' : 'ring', at, y, size)));

@@ -180,14 +180,6 @@ describe('the axis of the values', () => {
     expect(valueRange(model([seriesWith()], unknown))).toEqual([-0.08, 1.08]);
   });
 
-  test('leaves room below the values for marks', () => {
-    const plain = model([reading(10, 26)]);
-    const mark = { at: 5, widthS: 1, kind: 'look' as const, count: 1 };
-    const marked = { ...plain, lines: plain.lines.map((line) => ({ ...line, marks: [mark] })) };
-    expect(valueRange(plain)[0]).toBeCloseTo(10 - 16 * 0.08);
-    expect(valueRange(marked)[0]).toBeCloseTo(10 - 16 * 0.3);
-  });
-
   test('is in the unit that is shown', () => {
     expect(valueRange(model([seriesWith()], { unit: 'F' }))[0]).toBeCloseTo((18 - 0.64) * 1.8 + 32);
   });

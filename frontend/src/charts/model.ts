@@ -85,6 +85,9 @@ export const drawnOf = ({
   ...lines.map(({ series, look }) => ({ series, look, isBefore: false })),
 ];
 
+export const hasMarks = ({ lines }: PlotModel): boolean =>
+  lines.some(({ marks }) => marks.length > 0);
+
 /** Common times, and per `drawnOf` its values: null is a break, undefined not of this line. */
 export type Aligned = [number[], ...(number | null | undefined)[][]];
 
@@ -106,8 +109,6 @@ export function aligned({ lines, sensor, unit }: PlotModel): Aligned {
 
 /** Room above and below the values, as a share of how far they spread. */
 const ROOM = 0.08;
-/** Marks stand below the values and not among them. */
-const ROOM_FOR_MARKS = 0.3;
 /** The ideal range comes into the picture as long as the values keep this share of the height. */
 const LEAST_SHARE = 0.4;
 /** A spread that is less than this share of the ideal range would make mountains of noise. */
@@ -152,6 +153,5 @@ export function valueRange({ lines, sensor, bands, unit }: PlotModel): [low: num
     }
   }
   const room = (high - low) * ROOM;
-  const below = lines.some(({ marks }) => marks.length > 0) ? (high - low) * ROOM_FOR_MARKS : room;
-  return [toShown(sensor, low - below, unit), toShown(sensor, high + room, unit)];
+  return [toShown(sensor, low - room, unit), toShown(sensor, high + room, unit)];
 }

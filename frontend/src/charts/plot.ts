@@ -4,9 +4,9 @@ import uPlot from 'uplot';
 import type { Span } from '../domain/period';
 import { hasDate } from '../domain/rostime';
 import { timeTicks, type Tick } from '../domain/ticks';
-import { drawAbove, drawBelow, type Frame } from './layers';
+import { drawAbove, drawBelow, MARKS_LANE, type Frame } from './layers';
 import { lookOf } from './looks';
-import { aligned, drawnOf, valueRange, type PlotModel } from './model';
+import { aligned, drawnOf, hasMarks, valueRange, type PlotModel } from './model';
 import { readPalette } from './palette';
 
 export interface PlotHandlers {
@@ -53,6 +53,7 @@ export function createPlot(element: HTMLElement, handlers: PlotHandlers): Plot {
   });
 
   const build = (first: PlotModel, size: PlotSize): uPlot => {
+    const lane = hasMarks(first) ? MARKS_LANE : 0;
     const u = new uPlot(
       {
         ...size,
@@ -94,7 +95,8 @@ export function createPlot(element: HTMLElement, handlers: PlotHandlers): Plot {
               () => palette.grid,
             ),
             font: palette.font,
-            size: 44,
+            size: 44 + lane,
+            gap: 5 + lane,
             lineGap: 1.2,
             splits: (self) => {
               ticks = ticksOf(model, self.bbox.width / uPlot.pxRatio);
@@ -162,7 +164,8 @@ export function createPlot(element: HTMLElement, handlers: PlotHandlers): Plot {
       model = next;
       const nextShape = drawnOf(next)
         .map(({ look, isBefore }) => `${look}${isBefore ? 'b' : ''}`)
-        .join();
+        .join()
+        .concat(hasMarks(next) ? ' marks' : '');
       if (!chart || shape !== nextShape) {
         chart?.destroy();
         chart = build(next, size);

@@ -67,9 +67,9 @@ describe('a trend', () => {
 test.each([
   ['temperature', 22.4, 1.26, 'C', 'up', '+1.3\u00a0°C'],
   ['temperature', 22.4, 1, 'F', 'up', '+1.8\u00a0°F'],
-  ['temperature', 22.4, -0.04, 'C', 'level', '0.0\u00a0°C'],
+  ['temperature', 22.4, -0.04, 'C', 'level', 'steady'],
   ['temperature', 22.4, -0.06, 'C', 'down', '\u22120.1\u00a0°C'],
-  ['light', 975, 0.4, 'C', 'level', '0\u00a0lx'],
+  ['light', 975, 0.4, 'C', 'level', 'steady'],
   ['light', 975, -12.2, 'C', 'down', '\u221212\u00a0lx'],
   ['ph', 6.5, 0.2, 'C', 'up', '+0.2'],
 ] as const)(

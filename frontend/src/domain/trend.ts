@@ -2,6 +2,7 @@
 import type { TagHealth } from '../contract/types';
 import { valueText, withUnit, written } from './format';
 import type { Sensor } from './sensors';
+import { S } from '../strings';
 import type { Tag } from './twin';
 import { differenceToShown, type TemperatureUnit } from './units';
 
@@ -50,7 +51,7 @@ function sameReading(sensor: string, a: Tag, b: Tag): boolean {
 
 /**
  * The difference as precise as its value is shown: what rounds to nothing is level. `text` has its
- * sign and its unit.
+ * sign and its unit, or says that there is none.
  */
 export function differenceShown(
   sensor: Sensor,
@@ -61,6 +62,6 @@ export function differenceShown(
   const digits = /[.,](\d+)$/.exec(valueText(sensor, value, unit))?.[1]?.length ?? 0;
   const shown = differenceToShown(sensor, by, unit).toFixed(digits);
   const way = Number(shown) > 0 ? 'up' : Number(shown) < 0 ? 'down' : 'level';
-  const number = way === 'level' ? shown.replace('-', '') : `${way === 'up' ? '+' : ''}${shown}`;
-  return { way, text: withUnit(sensor, written(number), unit) };
+  if (way === 'level') return { way, text: S.trendLevel };
+  return { way, text: withUnit(sensor, written(`${way === 'up' ? '+' : ''}${shown}`), unit) };
 }

@@ -257,11 +257,13 @@ export function labelRequests(
   widthOf: (text: string) => number,
 ): LabelRequest[] {
   const radius = pinRadius(scale);
+  // Beside the rings of what is selected and of pests.
+  const around = (pin: Pin): number => (pin.id === first ? 10 : pin.pest ? 6 : 0);
   return pins.map((pin) => ({
     id: pin.id,
     x: pin.at.x * scale,
     y: -pin.at.y * scale,
-    radius: pin.pest ? radius + 6 : radius,
+    radius: radius + around(pin),
     priority: pin.id === first ? 100 : pin.priority,
     texts: pin.texts.map((text) => ({ text, width: widthOf(text) + 2 * LABEL_PADDING })),
   }));

@@ -1,6 +1,7 @@
 import { useMemo, type JSX } from 'react';
 
 import { whenText } from '../alarms/words';
+import type { AlarmList, Item } from '../alarms/list';
 import { alarmList } from '../alarms/watch';
 import { now } from '../clock';
 import type { HealthReason } from '../contract/types';
@@ -21,18 +22,37 @@ import { useReasonText } from './Reasons';
 /** Beside the map; the table has the rest. */
 const MOST_TAGS = 2;
 
-/** Tags that need somebody, the worst first. */
+/** Tags that need somebody, the worst first; whose alarm is acknowledged or shelved, after the rest. */
 export function useUrgent(): readonly Row[] {
   const tags = useApp(selectTags);
   const health = useApp(selectHealth);
-  return useMemo(
-    () =>
-      sortRows(rowsOf(tags, health), { column: 'health', descending: true }).filter(
-        ({ health: { verdict } }) => verdict === 'critical' || verdict === 'stressed',
-      ),
-    [tags, health],
-  );
+  const isNow = useApp((state) => selectShown(state).moment === null);
+  const alarms = useSelected(alarmList, (it) => it);
+  return useMemo(() => {
+    const rows = sortRows(rowsOf(tags, health), { column: 'health', descending: true }).filter(
+      ({ health: { verdict } }) => verdict === 'critical' || verdict === 'stressed',
+    );
+    if (!isNow) return rows;
+    const isSeen = ({ tag, health: own }: Row): boolean => {
+      const item = alarmOf(alarms, tag.id, worstReason(own));
+      return item !== undefined && (item.isAcknowledged || item.shelf !== null);
+    };
+    return [...rows.filter((row) => !isSeen(row)), ...rows.filter(isSeen)];
+  }, [tags, health, isNow, alarms]);
 }
+
+/** The active alarm of a reason. */
+const alarmOf = (
+  { active, shelved }: AlarmList,
+  tagId: string,
+  reason: HealthReason | undefined,
+): Item | undefined =>
+  [...active, ...shelved].find(
+    ({ alarm }) =>
+      alarm.tag_id === tagId &&
+      alarm.reason.kind === reason?.kind &&
+      alarm.reason.sensor === reason.sensor,
+  );
 
 /**
  * Since when the alarm of a reason is active, or what somebody has said of it; null: there is none,
@@ -40,14 +60,7 @@ export function useUrgent(): readonly Row[] {
  */
 export function useSince(tagId: string, reason: HealthReason | undefined): string | null {
   const isNow = useApp((state) => selectShown(state).moment === null);
-  const found = useSelected(alarmList, ({ active, shelved }) =>
-    [...active, ...shelved].find(
-      ({ alarm }) =>
-        alarm.tag_id === tagId &&
-        alarm.reason.kind === reason?.kind &&
-        alarm.reason.sensor === reason.sensor,
-    ),
-  );
+  const found = useSelected(alarmList, (list) => alarmOf(list, tagId, reason));
   if (!isNow || !found) return null;
   if (found.shelf) return S.alarmShelved(clockText(found.shelf.until), '');
   if (found.isAcknowledged) return S.healthAcknowledged;

@@ -79,7 +79,7 @@ test.each(CASES)('$name', (state) => {
   expect(lines).toHaveLength(told.length);
   for (const [index, { kind, verdict, sensor, value, limit }] of told.entries()) {
     const line = lines[index];
-    expect(line?.textContent).toMatch(SAYS[kind]);
+    expect(line?.children[1]?.textContent).toMatch(SAYS[kind]);
     expect(line?.querySelector('.health-mark')?.getAttribute('data-health')).toBe(verdict);
     if (kind !== 'range' || value === null || limit === null) continue;
     expect(line?.textContent).toContain(value < limit ? 'below' : 'above');

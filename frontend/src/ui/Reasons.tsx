@@ -2,7 +2,7 @@ import type { JSX } from 'react';
 
 import type { HealthReason, TagHealth } from '../contract/types';
 import { ageSeconds } from '../domain/age';
-import { reasonText } from '../domain/reasons';
+import { reasonText, todoText } from '../domain/reasons';
 import { whenOf } from '../domain/twin';
 import { useApp } from '../store/app';
 import { selectCatalogue } from '../store/derived';
@@ -32,9 +32,12 @@ export function Reason({ reason }: { reason: HealthReason }): JSX.Element {
 export function Reasons({
   health,
   most = Infinity,
+  hasTodo = false,
 }: {
   health: TagHealth;
   most?: number;
+  /** With what to do about each. */
+  hasTodo?: boolean;
 }): JSX.Element | null {
   const { reasons } = health;
   if (reasons.length === 0) return null;
@@ -46,6 +49,7 @@ export function Reasons({
           <span>
             <Reason reason={reason} />
           </span>
+          {hasTodo && <strong>{todoText(reason)}</strong>}
         </li>
       ))}
       {reasons.length > most && <li className="faint">{S.cardMore(reasons.length - most)}</li>}

@@ -2,8 +2,8 @@ import { useEffect, useRef, type JSX } from 'react';
 
 import type { When } from '../domain/age';
 import { farOffText, metresText, percentText, readingText, valueText } from '../domain/format';
-import { rangeReason, sideOf, worstReason } from '../domain/health';
-import { todoText, tryKind } from '../domain/reasons';
+import { rangeReason, sideOf } from '../domain/health';
+import { tryKind } from '../domain/reasons';
 import { rangesFor } from '../domain/sensors';
 import { speciesText } from '../domain/species';
 import { shown } from '../domain/text';
@@ -102,11 +102,9 @@ function CardBody({
   const area = useApp((state) => selectCatalogue(state).areaOf(tag.id));
   const isNow = useApp((state) => selectShown(state).moment === null);
   const isBad = health?.verdict === 'critical' || health?.verdict === 'stressed';
-  const todo = isBad ? worstReason(health) : undefined;
   return (
     <div className="card-body">
-      {health && <Reasons health={health} />}
-      {todo && isNow && <strong className="card-do">{todoText(todo)}</strong>}
+      {health && <Reasons health={health} hasTodo={isBad && isNow} />}
       {tag.readings.size === 0 && <p className="faint">{S.cardNoReadings}</p>}
       <ul className="card-readings">
         {[...tag.readings].map(([name, value]) => (
@@ -221,7 +219,9 @@ function CardReading({
   const sensor = useApp((state) => selectCatalogue(state).named(name));
   const { ideal } = rangesFor(sensor, species);
   const reason = rangeReason(health, name);
-  const side = reason && sideOf(reason);
+  const isOut = ideal && value !== null && (value < ideal[0] || value > ideal[1]);
+  // What is back within its range, and not far enough, is stressed, and not "below ideal".
+  const side = isOut && reason && sideOf(reason);
   const step = useAgeStep(when);
   return (
     <li data-sensor={name} data-age={step}>
@@ -236,12 +236,11 @@ function CardReading({
         <Sparkline sensor={sensor} values={values} unit={unit} />
       </span>
       {ideal && (
-        <span className="card-ideal" data-side={side} data-health={reason?.verdict}>
+        <span className="card-ideal" data-side={side || undefined} data-health={reason?.verdict}>
           {side && (
             <>
               <Icon name={side === 'below' ? 'down' : 'up'} size={12} />
-              {S[side]}
-              {' · '}
+              <span className="unseen">{S[side]}, </span>
             </>
           )}
           {S.healthIdeal(

@@ -7,8 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from lupin_bridge.alarms.board import MAX_WORST, Change, Page, change_between, page_of
-from lupin_bridge.judge.alarm import Alarm
-from lupin_bridge.judge.episodes import MAX_EPISODES
+from lupin_bridge.judge.episodes import MAX_EPISODES, Alarm
 from lupin_bridge.judge.verdict import Verdict
 from tests.support.seen import alarm
 

@@ -92,7 +92,8 @@ def test_the_same_question_has_the_same_answer(archive: Archive, journal: Path) 
     asked = SeriesRequest("1", "a", NOW, NOW + 2 * DAY, 40)
     with closing(open_reader(journal)) as here, psycopg.connect(archive.owner) as there:
         there.autocommit = True
-        assert series(there, asked, NOW + 2 * DAY, "gh1") == series(here, asked, NOW + 2 * DAY)
+        gh1 = SiteConnection(there, "gh1")
+        assert series(gh1, asked, NOW + 2 * DAY) == series(here, asked, NOW + 2 * DAY)
 
 
 def test_a_nul_in_a_name_does_not_stop_its_site(archive: Archive, journal: Path) -> None:

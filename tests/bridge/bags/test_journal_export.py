@@ -11,7 +11,7 @@ from rclpy.serialization import deserialize_message
 from rosgraph_msgs.msg import Clock as ClockMessage
 
 from lupin_bridge.bags.journal_export import LOT, Exported, export, offered_qos
-from lupin_bridge.feed.topics import Topic
+from lupin_bridge.feed.relay import Topic
 from lupin_twin.core import ingest
 from lupin_twin.core.drops import Drop
 from lupin_twin.core.history import Repeats

@@ -5,7 +5,7 @@ import yaml
 from rosbags.rosbag2.metadata import parse_qos
 
 from lupin_bridge.bags.journal_export import offered_qos
-from lupin_bridge.feed.topics import Topic
+from lupin_bridge.feed.relay import Topic
 
 
 @pytest.mark.parametrize(

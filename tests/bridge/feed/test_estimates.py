@@ -11,7 +11,7 @@ from lupin_bridge.feed.estimates import (
     Changed,
     EstimateFollower,
     changed_of,
-    newest_of,
+    sensors_of,
 )
 from lupin_bridge.feed.source import TwinUnavailableError
 from lupin_twin.core.state import Pose, Reading, Snapshot, TagState
@@ -38,13 +38,13 @@ def snapshot(**newest: int) -> Snapshot:
     return Snapshot(100, "map", tuple(tags))
 
 
-def test_the_newest_are_finite_readings_of_tags_with_a_place() -> None:
+def test_estimates_are_made_of_finite_readings_of_tags_with_a_place() -> None:
     tags = (
         TagState("a", pose=HERE, readings=(Reading("co2", 1.0, 5), Reading("light", math.nan, 9))),
         TagState("b", pose=HERE, readings=(Reading("co2", 1.0, 7),)),
         TagState("c", readings=(Reading("co2", 1.0, 8),)),
     )
-    assert newest_of(Snapshot(100, "map", tags)) == {"co2": 7}
+    assert sensors_of(Snapshot(100, "map", tags)) == ["co2"]
 
 
 def test_changed_tags_are_told_by_tag_and_sensor() -> None:
@@ -62,11 +62,9 @@ class Stage:
         self.snapshot: Snapshot | None = None
         self.answers: dict[str, Report] = {}
         stage: Any = self
-        self.follower = EstimateFollower(
-            stage, stage, lambda: self.snapshot, self.told.append, period_s
-        )
+        self.follower = EstimateFollower(stage, lambda: self.snapshot, self.told.append, period_s)
 
-    async def of(self, request: ReportRequest) -> Report:
+    async def estimate_report(self, request: ReportRequest) -> Report:
         self.asked.append(request.sensor_type)
         if request.sensor_type not in self.answers:
             raise TwinUnavailableError("nobody is there")

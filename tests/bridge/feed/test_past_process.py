@@ -77,7 +77,7 @@ def is_there(pid: int) -> bool:
 Shared = tuple[asyncio.Runner, PastProcess]
 
 
-def test_it_answers_at_a_lower_priority_and_its_bodies_come_as_they_are(
+def test_it_answers_at_a_lower_priority_and_with_bodies_of_any_size(
     path: Path, shared: Shared
 ) -> None:
     runner, past = shared
@@ -85,11 +85,10 @@ def test_it_answers_at_a_lower_priority_and_its_bodies_come_as_they_are(
     async def test() -> None:
         assert await past.ask(Count(NOW_NS), now(path), 0.0) == 1
         assert await past.ask(Running(), now(path), 0.0) == (0, NICENESS)
-        for count in (0, 65_536, 65_537, 3_000_000):
+        for count in (0, 3_000_000):
             answered: Answered = await past.ask(Body(count), now(path), 0.0)
             assert answered.answer is not None
-            assert bytes(answered.answer.body) == b"7" * count
-            assert isinstance(answered.answer.body, memoryview) is (count > 65_536)
+            assert answered.answer.body == b"7" * count
         assert past.starts == 1
 
     runner.run(test())

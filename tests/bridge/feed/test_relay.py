@@ -15,9 +15,9 @@ from lupin_bridge.feed.relay import (
     Relay,
     RosTime,
     Sample,
+    Topic,
 )
 from lupin_bridge.feed.source import TwinUnavailableError
-from lupin_bridge.feed.topics import Topic
 from tests.support.waiting import until
 
 STATE = Topic("/twin/state", "lupin_msgs/msg/TwinState", depth=2, max_bytes=10)

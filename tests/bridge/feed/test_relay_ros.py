@@ -11,8 +11,7 @@ from nav_msgs.msg import OccupancyGrid
 from rclpy.serialization import deserialize_message
 from sensor_msgs.msg import PointCloud2
 
-from lupin_bridge.feed.relay import NotRelayedError, Relay, Sample
-from lupin_bridge.feed.topics import Topic, topics_of
+from lupin_bridge.feed.relay import NotRelayedError, Relay, Sample, Topic, topics_of
 from lupin_twin.ros import convert
 from tests.bridge.feed.test_source import SOURCES, stage_of
 from tests.support.messages import occupancy_grid, scan

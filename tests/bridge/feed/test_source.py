@@ -20,7 +20,7 @@ from lupin_bridge.feed.source import (
     ailment,
 )
 from lupin_bridge.feed.web import WebTwin
-from lupin_bridge.past.estimate import ReadingsAt
+from lupin_bridge.past.fields import ReadingsAt
 from lupin_twin.core.history import LatestRequest
 from lupin_twin.core.past import PastRefused, SeriesRequest
 from lupin_twin.core.state import Reading

@@ -15,8 +15,7 @@ from PIL import Image
 from lupin_bridge.fleet.site_log import SiteConnection
 from lupin_twin.core.past import SeriesRequest
 from lupin_twin.core.writes import RecentRequest, ScansRequest, WritesRequest
-from lupin_twin.field.explored import OccupancyMap
-from lupin_twin.journal.floor_plan import text_of
+from lupin_twin.field.explored import OccupancyMap, text_of
 from lupin_twin.journal.fold import state_at
 from lupin_twin.journal.follow import recent, scans, writes
 from lupin_twin.journal.queries import series
@@ -144,7 +143,7 @@ def test_the_floor_plan_is_that_of_the_twin(archive: Archive, tmp_path: Path) ->
         assert get("map").status_code == 404
         for shown in (floor, maps.map_of([[0, 0]])):
             with opened(journal) as file:
-                file.note_map(text_of(shown))
+                file.put_map(shown, partial(text_of, shown))
             write(journal, [scan("0", time.time_ns(), temperature=22.0)])
             wait_for(partial(shows, shown), "the floor plan")
             assert get("map").json()["info"]["resolution"] == shown.resolution
@@ -156,7 +155,7 @@ def test_the_floor_plan_is_that_of_the_twin(archive: Archive, tmp_path: Path) ->
         assert 0 < known(after) < known(before)
         assert after.headers["etag"] != before.headers["etag"]
         with opened(journal) as file:
-            file.note_map("")  # one that is too large
+            file.put_map("", str)  # one that is too large
         write(journal, [scan("0", time.time_ns(), temperature=22.0)])
         wait_for(lambda: get("map").status_code == 404, "no floor plan")
         archive.do("UPDATE meta SET value = '{\"width\": 5}' WHERE site = 'gh1' AND key = 'map'")

@@ -5,7 +5,7 @@ from itertools import combinations
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lupin_bridge.judge.alarm import Alarm, alarm_id
+from lupin_bridge.judge.episodes import Alarm, alarm_id
 from lupin_bridge.judge.verdict import Kind, Reason, Verdict
 
 PLACES = st.tuples(

@@ -13,8 +13,8 @@ from hypothesis import strategies as st
 
 from lupin_bridge.alarms.board import page_of
 from lupin_bridge.judge import alarm_fold, tag_log
-from lupin_bridge.judge.alarm import Alarm
 from lupin_bridge.judge.alarm_fold import Follower
+from lupin_bridge.judge.episodes import Alarm
 from lupin_bridge.judge.options import own_sensors
 from lupin_bridge.judge.verdict import Kind
 from lupin_twin.core.writes import PastWrite, RunSpan

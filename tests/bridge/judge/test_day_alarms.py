@@ -10,10 +10,10 @@ from itertools import count
 
 import pytest
 
-from lupin_bridge.judge.alarm import Alarm
 from lupin_bridge.judge.alarm_fold import Follower
 from lupin_bridge.judge.days import COUNTS_NS, SINCE_NS, days_of
 from lupin_bridge.judge.derived import DAILY, DAY_NS
+from lupin_bridge.judge.episodes import Alarm
 from lupin_bridge.judge.options import own_sensors
 from lupin_bridge.judge.verdict import Verdict
 from lupin_twin.core.state import Reading

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from lupin_bridge.judge.daylight import Day
-from lupin_bridge.judge.judging import MAX_AT_ONCE, Judge, judge_once
+from lupin_bridge.judge.judging import MAX_AT_ONCE, Judge, judge_once, silenced
 from lupin_bridge.judge.scan_interval import Patrol
 from lupin_bridge.judge.sensors_file import parse
 from lupin_bridge.judge.verdict import Health, Kind, Reason, Verdict, judge_tag
@@ -210,13 +210,12 @@ def test_a_reason_that_lasts_keeps_its_beginning() -> None:
 
 
 def test_silence_makes_the_house_unknown_and_leaves_the_tags() -> None:
-    judge = Judge(SENSORS, by_light)
-    judge.see(snapshot(START, GOOD))
-    silent = judge.see(snapshot(START, GOOD), is_silent=True)
+    judged = Judge(SENSORS, by_light).see(snapshot(START, GOOD))
+    assert judged.house.verdict is Verdict.HEALTHY
+    silent = silenced(judged)
     assert silent.house.verdict is Verdict.UNKNOWN
     assert [reason.kind for reason in silent.house.reasons] == [Kind.SILENT]
-    assert silent.changed == frozenset()
-    assert judge.see(snapshot(START, GOOD)).house.verdict is Verdict.HEALTHY
+    assert silent.tags == judged.tags
 
 
 def test_as_of_a_moment_a_tag_that_cannot_be_judged_is_unknown_and_the_others_are_judged(

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from lupin_bridge.alarms.board import Change
-from lupin_bridge.judge.alarm import Alarm
+from lupin_bridge.judge.episodes import Alarm
 from lupin_bridge.judge.verdict import Verdict
 from lupin_bridge.notify.webhook import RESENT_NS, AlarmNews
 from tests.support.seen import NOW_NS, S, alarm

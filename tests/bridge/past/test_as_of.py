@@ -17,8 +17,8 @@ from lupin_bridge.field.query import EstimateQuery, FieldQuery
 from lupin_bridge.judge.daylight import ClockDay
 from lupin_bridge.judge.derived import vapour_pressure_deficit_kpa
 from lupin_bridge.judge.options import Criteria, own_sensors
-from lupin_bridge.past.estimate import Estimated
-from lupin_bridge.past.plans import Field, Health, OneTag, Plan, WholeState
+from lupin_bridge.past.fields import Estimated, Field
+from lupin_bridge.past.plans import Health, OneTag, Plan, WholeState
 from lupin_bridge.query_string import read
 from lupin_bridge.stream import schema
 from lupin_twin.core.state import Pose, Reading, Snapshot, TagState
@@ -69,7 +69,7 @@ def field_of(house: Snapshot, field: Field, field_format: FieldFormat | None = N
 
 
 def body(plan: Plan) -> dict[str, Any]:
-    found: dict[str, Any] = json.loads(bytes(plan.write(lambda: False).body))
+    found: dict[str, Any] = json.loads(plan.write(lambda: False).body)
     return found
 
 
@@ -268,8 +268,9 @@ def test_another_field_has_another_etag(other: Field) -> None:
 @pytest.mark.parametrize("field_format", [JSON, PNG])
 def test_what_takes_long_says_so(field_format: FieldFormat) -> None:
     large = replace(RULES, max_grid_cells=1_000_000)
-    assert field_of(SITE, asked(), field_format).cost_s < SMALL_S
-    assert field_of(SITE, asked(large, resolution=0.004), field_format).cost_s > SMALL_S
-    many = Snapshot(NS, "map", tuple(tag(str(n), n, 1.0) for n in range(2_000)))
-    assert WholeState(None).plan(many).cost_s > SMALL_S > WholeState(None).plan(SITE).cost_s
-    assert field_of(many, asked(large, resolution=1)).cost_s > SMALL_S
+
+    def cost_s(tags: int, field: Field) -> float:
+        return replace(field, field_format=field_format).write_s(tags)
+
+    assert cost_s(len(SITE.tags), asked()) < SMALL_S < cost_s(2_000, asked(large, resolution=1))
+    assert cost_s(len(SITE.tags), asked(large, resolution=0.004)) > SMALL_S

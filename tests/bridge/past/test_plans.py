@@ -11,12 +11,12 @@ import pytest
 
 from lupin_bridge.field.formats import PNG
 from lupin_bridge.judge.options import Criteria
-from lupin_bridge.past.latest import LatestOfTag
 from lupin_bridge.past.plans import (
     Answered,
     ConditionalQuery,
     Health,
     History,
+    LatestOfTag,
     NoSuchTag,
     OneTag,
     Query,
@@ -24,7 +24,6 @@ from lupin_bridge.past.plans import (
     WholeState,
 )
 from lupin_bridge.past.query import PeriodQuery
-from lupin_bridge.serving.admission import Answer
 from lupin_bridge.settings import Settings
 from lupin_twin.core.history import LatestRequest
 from lupin_twin.core.journal_condition import UNKNOWN
@@ -81,17 +80,6 @@ def test_a_timeline_asks_for_its_parts_one_by_one() -> None:
     assert {need.sensor_type for need in needs if isinstance(need, SeriesRequest)} == set(Event)
 
 
-def test_a_large_body_goes_beside_the_rest() -> None:
-    for length, beside in ((65_536, 0), (65_537, 1)):
-        answered = Answered("x", Answer(b"7" * length, "text/plain", {"a": "b"}))
-        buffers: list[pickle.PickleBuffer] = []
-        text = pickle.dumps(answered, 5, buffer_callback=buffers.append)
-        assert (len(buffers), len(text) > length) == (beside, not beside)
-        there = pickle.loads(text, buffers=[buffer.raw() for buffer in buffers])
-        assert there.answer is not None
-        assert bytes(there.answer.body) == b"7" * length
-
-
 def test_a_tag_that_was_not_known_is_told_with_how_many_were() -> None:
     with pytest.raises(NoSuchTag) as caught:
         answer(OneTag(5 * NS, "c"))
@@ -118,6 +106,6 @@ def test_what_the_log_does_not_hold_yet_of_a_tag_is_told_from_its_state() -> Non
     for newest, values in ((tag, [7.0]), (None, [])):
         log: dict[Any, Any] = {LatestRequest("a", 3): []}
         body = LatestOfTag("a", newest, 3).look(log.__getitem__).write(never).body
-        told = json.loads(bytes(body))
+        told = json.loads(body)
         assert [each["value"] for sensor in told["sensors"] for each in sensor["values"]] == values
         assert len(told["tries"]) == len(values)

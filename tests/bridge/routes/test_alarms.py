@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from lupin_bridge.judge.alarm import Alarm
+from lupin_bridge.judge.episodes import Alarm
 from lupin_bridge.judge.verdict import Kind, Reason, Verdict
 from lupin_bridge.past.query import PeriodQuery
 from lupin_bridge.routes.status import _is_in

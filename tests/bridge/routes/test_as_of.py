@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from lupin_bridge.past import plans
+from lupin_bridge.past import fields, plans
 from lupin_bridge.stream import schema
 from lupin_twin.core.past import NotRemembered
 from lupin_twin.core.state import Pose, Reading, Snapshot, TagState
@@ -118,7 +118,7 @@ def test_who_has_the_answer_is_told_so_and_nothing_is_written_for_him(
                 tags[path] = answer.headers["etag"]
             it.bridge.cache.__init__()  # type: ignore[misc]
             with monkeypatch.context() as patch:
-                patch.setattr(plans, "compute_field", none)
+                patch.setattr(fields, "compute_field", none)
                 patch.setattr(plans, "StateJson", none)
                 for path, tag in tags.items():
                     has = {"If-None-Match": tag}
@@ -143,7 +143,7 @@ def test_what_was_written_is_kept(domain: int, monkeypatch: pytest.MonkeyPatch) 
         return compute(*args)
 
     async def test() -> None:
-        monkeypatch.setattr(plans, "compute_field", counted)
+        monkeypatch.setattr(fields, "compute_field", counted)
         async with remembering(MadeUp(snapshot=house())) as it:
             path = f"/api/field?{FIELD}"
             # Nothing was scanned in between: it is the same field.

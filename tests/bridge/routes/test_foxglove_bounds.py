@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from lupin_bridge.feed import relay_ros
+from lupin_bridge.feed import ros_source
 from lupin_bridge.serving.ws_protocol import PIECE_BYTES
 from tests.bridge.routes.test_foxglove import INPUT, play
 from tests.support import inprocess, messages
@@ -35,7 +35,7 @@ async def topics_are_heard_while_they_are_wanted(here: Any) -> None:
     await until(lambda: len(hub) == 1, "one more")
     got = b""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(relay_ros, "_CLASSES", {})
+        patch.setattr(ros_source, "_CLASSES", {})
         writer.write(subscribing(offer, "/map"))
         while b"cannot be served now" not in got:
             got += await reader.read(1 << 20)

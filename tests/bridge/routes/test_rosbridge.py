@@ -2,20 +2,15 @@
 
 from __future__ import annotations
 
-import json
-import random
 from collections.abc import Iterator
-from contextlib import suppress
 
 import pytest
 from lupin_msgs.msg import TwinTagState
 from websockets.exceptions import ConnectionClosed
 
-from lupin_bridge.serving.ws_protocol import FRAMES_AT_ONCE
 from tests.support import messages
-from tests.support.proc_stat import resident_mb
 from tests.support.processes import limits
-from tests.support.rosbridge import FIELD, FIELD_ARGS, TOPIC, Message, Ros, ros_at, tags
+from tests.support.rosbridge import FIELD, FIELD_ARGS, TOPIC, Ros, ros_at, tags
 from tests.support.web import Bridge, bridge
 
 
@@ -129,147 +124,13 @@ def test_a_call_gets_what_the_ros_service_answers_and_nan_as_null(house: Bridge,
     assert values == house.json("/api/field", **FIELD_ARGS)
 
 
-def test_a_refused_field_is_an_answer_of_the_service(house: Bridge, ros: Ros) -> None:
-    """As over ROS: the call succeeds, and `ok` is false."""
-    args = {"sensor_type": "temperature"}
-    response = ros.call(FIELD, args=args)
-    assert response["result"] is True
-    assert response["values"]["ok"] is False
-    assert response["values"]["error_message"] == house.peer.get_field(**args).error_message
-    assert response["values"]["values"] == []
-
-
-def test_a_call_that_cannot_be_made_fails_with_the_reason(ros: Ros) -> None:
-    response = ros.call(FIELD, args={**FIELD_ARGS, "color": "red"})
-    assert response["result"] is False
-    assert response["values"].startswith("args.color is unknown, expected sensor_type, ")
-    response = ros.call("/twin/reset")
-    assert response["result"] is False
-    assert response["values"].startswith("service '/twin/reset' is not served")
-
-
-def test_a_call_ends_when_its_own_time_is_up(ros: Ros) -> None:
-    # None that was answered before: that one would be there at once.
-    response = ros.call(FIELD, args={**FIELD_ARGS, "resolution": 0.01}, timeout=1e-9)
-    assert response["result"] is False
-    assert response["values"] == f"{FIELD} did not answer within 1e-09 s"
-
-
 # --- refusals ---------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize(
-    "message",
-    [
-        {"op": "advertise", "topic": "/cmd_vel", "type": "geometry_msgs/msg/Twist"},
-        {"op": "publish", "topic": "/cmd_vel", "msg": {"linear": {"x": 1}}},
-        {"op": "publish", "topic": TOPIC, "msg": {}},
-        {"op": "advertise_service", "service": "/s", "type": "std_srvs/srv/Trigger"},
-        {"op": "auth", "mac": "m"},
-        {"op": "drive"},
-    ],
-)
-def test_what_is_not_served_is_refused_and_changes_nothing(
-    house: Bridge, ros: Ros, message: Message
-) -> None:
-    def publishers() -> list[int]:
-        return [house.peer.node.count_publishers(topic) for topic in ("/cmd_vel", TOPIC)]
-
-    before, published = house.json("/api/state")["tags"], publishers()
-    ros.send(**message, id="w")
-    status = ros.next()
-    assert (status["op"], status["level"], status["id"]) == ("status", "error", "w")
-    assert message["op"] in status["msg"]
-    house.peer.spin_briefly()
-    assert publishers() == published
-    after = house.json("/api/state")["tags"]
-    assert [t["tag_id"] for t in after] == [t["tag_id"] for t in before]
-    assert ros.is_quiet()
 
 
 def test_a_binary_frame_is_refused_and_the_connection_stays(ros: Ros) -> None:
     ros.connection.send(b"\x00\xff")
     assert ros.next()["msg"] == "a binary frame is refused, expected JSON text"
     assert ros.is_quiet()
-
-
-def test_a_message_past_the_servers_limit_ends_the_connection_alone(house: Bridge) -> None:
-    with ros_at(house.url) as big, ros_at(house.url) as other:
-        big.connection.send('{"op":"' + "x" * 70_000 + '"}')
-        with pytest.raises(ConnectionClosed) as closed:
-            big.next()
-        assert closed.value.rcvd is not None
-        assert closed.value.rcvd.code == 1009
-        assert other.is_quiet()
-
-
-def test_who_floods_is_closed_with_the_reason(house: Bridge) -> None:
-    with ros_at(house.url) as flood, ros_at(house.url) as other:
-        with suppress(ConnectionClosed):  # it may hear the answer before it has said all
-            for _ in range(100 * FRAMES_AT_ONCE):
-                flood.connection.send("{}")
-        with pytest.raises(ConnectionClosed) as closed:
-            list(iter(flood.next, None))  # refusals, up to its end
-        assert closed.value.rcvd is not None
-        assert closed.value.rcvd.code == 1008
-        assert closed.value.rcvd.reason == "more than 100 messages a second after 500 at once"
-        assert other.is_quiet()
-
-
-def garbage(chance: random.Random) -> str | bytes:
-    """A frame that is none of the protocol's: bytes, text, JSON of the wrong kind, half an op."""
-    whole = json.dumps(
-        {
-            "op": chance.choice(["subscribe", "call_service", "unsubscribe", "publish", "x", 5]),
-            "id": chance.choice([None, {}, [], "i" * 300, True, 1.5]),
-            "topic": chance.choice(["/x", 7, None, {"a": []}]),
-            "service": chance.choice([FIELD, "/x", [], None]),
-            "args": chance.choice([{"resolution": "x"}, [[]], "x", {"x": 1}]),
-        }
-    )
-    frames: list[str | bytes] = [
-        chance.randbytes(chance.randrange(40)),
-        whole[: chance.randrange(len(whole))],
-        "[" * chance.randrange(15_000),
-        "\x00\ud7ff\u202e" * chance.randrange(9),
-        chance.choice(["null", "[]", "{}", '"x"', "1e999", "NaN", '{"op":{}}']),
-        '{"a":' * 3000,
-        whole,
-    ]
-    return chance.choice(frames)
-
-
-def test_thousands_of_malformed_frames_change_nothing(house: Bridge) -> None:
-    chance = random.Random(7)
-
-    def rubbish(connections: int) -> None:
-        for _ in range(connections):
-            some_rubbish()
-
-    def some_rubbish() -> None:
-        with ros_at(house.url) as ros:
-            for _ in range(FRAMES_AT_ONCE - 100):
-                ros.connection.send(garbage(chance))
-                # Each has its answer: a status, or the response to a call that could not be made.
-                reply = ros.next()
-                assert reply["op"] in ("status", "service_response")
-                assert reply.get("result") is not True
-            assert ros.is_quiet()
-
-    with ros_at(house.url) as other, house.listen() as listener:
-        other.subscribe()
-        other.next()
-        rubbish(2)
-        before_mb = resident_mb(house.process.pid)
-        rubbish(6)
-        assert resident_mb(house.process.pid) - before_mb < 5.0
-        house.peer.observe(messages.scan("clean", {"temperature": 20.0}))
-        house.peer.spin_briefly()
-        other.until_tag("clean")
-        listener.until_tag("clean")
-    health = house.json("/healthz")
-    assert (health["ok"], health["callback_errors"]) == (True, 0)
-    assert "Traceback" not in house.process.output
 
 
 # --- set-ups of their own ---------------------------------------------------------------------

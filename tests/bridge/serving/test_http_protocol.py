@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-from lupin_bridge.serving.middleware import PIECE_BYTES, PieceByPiece
+from lupin_bridge.serving.http_protocol import PIECE_BYTES, PieceByPiece
 from tests.support.access import Served, served
 from tests.support.processes import limits
 from tests.support.waiting import PATIENCE_S, wait_for

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from lupin_bridge.serving.middleware import route_class
+from lupin_bridge.metrics import route_class
 from tests.support.access import BEARER, TOKEN, served
 from tests.support.processes import limits
 

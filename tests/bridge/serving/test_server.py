@@ -240,7 +240,7 @@ def test_clients_that_do_not_read_do_not_hold_up_the_end_nor_does_a_second_signa
 # What never comes back: a worker that computes a field, one that writes it, the ROS thread. Each
 # hangs for a sensor of its own, which is asked for by that path.
 HANGS = (
-    ("lupin_bridge.past.plans:compute_field:co2", MILLION_CELLS),
+    ("lupin_bridge.past.fields:compute_field:co2", MILLION_CELLS),
     ("lupin_bridge.field.formats:write:light", MILLION_CELLS),
     ("lupin_twin.ros.estimate_service:EstimateService.report:humidity", REPORT),
 )

@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import json
 
-from lupin_bridge.judge.alarm import Alarm
+from lupin_bridge.judge.episodes import Alarm
 from lupin_bridge.judge.verdict import Kind, Reason, Verdict
 from lupin_bridge.stream import schema
 from lupin_bridge.stream.health_json import alarms_body, alarms_frame

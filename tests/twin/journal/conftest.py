@@ -12,13 +12,14 @@ from typing import Any
 import psycopg
 import pytest
 
+from lupin_bridge.fleet.site_log import SiteConnection
 from lupin_twin.journal.schema import POSTGRESQL_TABLES
 from tests.support.log_life import Life, lived
 from tests.support.postgres import Postgres
 
-# As the same log in SQLite, and where its rows are in PostgreSQL: a connection, and the site.
-Copied = Callable[[sqlite3.Connection], tuple[Any, str]]
-Engines = Callable[[sqlite3.Connection], list[tuple[Any, str]]]
+# As the same log in SQLite, and where its rows are in PostgreSQL.
+Copied = Callable[[sqlite3.Connection], SiteConnection]
+Engines = Callable[[sqlite3.Connection], tuple[sqlite3.Connection, SiteConnection]]
 Living = Callable[[Iterable[tuple[str, Any]]], AbstractContextManager[Life]]
 
 _TABLES = ("meta", "run", "series", "scan", "look", "place", "hour", "tally", "event")
@@ -35,7 +36,7 @@ def copied(postgresql: Postgres) -> Iterator[Copied]:
         for table in ("scan", "look"):
             archive.execute(f"CREATE TABLE {table}_any PARTITION OF {table} DEFAULT")
 
-        def copy(log: sqlite3.Connection) -> tuple[Any, str]:
+        def copy(log: sqlite3.Connection) -> SiteConnection:
             site = f"site {next(numbers)}"
             with archive.transaction(), archive.cursor() as cursor:
                 for table in _TABLES:
@@ -45,7 +46,7 @@ def copied(postgresql: Postgres) -> Iterator[Copied]:
                             f"INSERT INTO {table} VALUES ({', '.join(['%s'] * len(rows[0]))})",
                             [(site, *row[1:]) for row in rows],
                         )
-            return archive, site
+            return SiteConnection(archive, site)
 
         yield copy
 
@@ -53,7 +54,7 @@ def copied(postgresql: Postgres) -> Iterator[Copied]:
 @pytest.fixture(scope="session")
 def engines(copied: Copied) -> Engines:
     """The log in SQLite, and the same log in PostgreSQL."""
-    return lambda log: [(log, "local"), copied(log)]
+    return lambda log: (log, copied(log))
 
 
 @pytest.fixture(scope="session")

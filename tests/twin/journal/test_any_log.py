@@ -47,14 +47,12 @@ def test_its_answers_are_those_of_a_plain_list_on_either_engine(  # noqa: PLR091
 ) -> None:
     with living(lives) as life:
         local, archive = engines(life.connection)
-        for connection, site in (local, archive):
-            check_events(
-                life, connection, site, SeriesRequest(tag_id, Event.SCANS, *period, points)
-            )
+        for connection in (local, archive):
+            check_events(life, connection, SeriesRequest(tag_id, Event.SCANS, *period, points))
             for sensor in ("temperature", "co2"):
-                check_readings(life, connection, site, SeriesRequest("7", sensor, *period, points))
-            check_export(life, connection, site, period, None if tag_id == EVERY_TAG else tag_id)
-        check_counts(life, SiteLog(*archive), random)
+                check_readings(life, connection, SeriesRequest("7", sensor, *period, points))
+            check_export(life, connection, period, None if tag_id == EVERY_TAG else tag_id)
+        check_counts(life, SiteLog(archive.connection, archive.site), random)
 
 
 @given(one_run, periods, _points, st.integers(0, LATEST))
@@ -70,46 +68,46 @@ def test_of_rows_that_were_deleted_what_was_counted_stays(  # noqa: PLR0917
     with living(lives) as life:
         readings = life.readings("7", "temperature")
         life.delete(BEGUN + minute * MINUTE)
-        for connection, site in engines(life.connection):
+        for connection in engines(life.connection):
             for event in COUNTED:
                 request = SeriesRequest(EVERY_TAG, event, *period, points)
-                answer = series(connection, request, END, site)
+                answer = series(connection, request, END)
                 check(answer, request, life.events(EVERY_TAG, event), now_ns=END)
             # A reading that is no number has left no trace in an hour, and so no beginning of all.
             if period[0] or all(math.isfinite(value) for *_, value in readings):
                 request = SeriesRequest("7", "temperature", *period, points)
-                check(series(connection, request, END, site), request, readings, now_ns=END)
+                check(series(connection, request, END), request, readings, now_ns=END)
 
 
-def check_events(life: Life, connection: Any, site: str, request: SeriesRequest) -> None:
+def check_events(life: Life, connection: Any, request: SeriesRequest) -> None:
     tag_id, start_ns, end_ns = request.tag_id, request.start_ns, request.end_ns
     for event in COUNTED:
         request = replace(request, sensor_type=event)
-        answer = series(connection, request, END, site)
+        answer = series(connection, request, END)
         check(answer, request, life.events(tag_id, event), now_ns=END)
     silences = SeriesRequest(tag_id, Event.SILENCES, start_ns, end_ns)
-    answer = series(connection, silences, END, site)
+    answer = series(connection, silences, END)
     begun_ns = start_ns or min(life.attempts(tag_id), default=END)
     expected = life.silences(tag_id, begun_ns, end_ns or END + 1, END)
     assert list(zip(answer.stamps_ns, answer.means, strict=True)) == expected
 
 
-def check_readings(life: Life, connection: Any, site: str, request: SeriesRequest) -> None:
-    answer = series(connection, request, END, site)
+def check_readings(life: Life, connection: Any, request: SeriesRequest) -> None:
+    answer = series(connection, request, END)
     check(answer, request, life.readings(request.tag_id, request.sensor_type), now_ns=END)
     ended = replace(request, end_ns=request.end_ns or END, max_points=MAX_POINTS)
-    every = series(connection, ended, END, site)
+    every = series(connection, ended, END)
     readings = zip(every.stamps_ns, every.means, strict=True)
     finite = [(stamp_ns, value) for stamp_ns, value in readings if math.isfinite(value)]
     period = ended.start_ns, ended.end_ns
-    found = newest(connection, ended.sensor_type, *period, request.max_points, site=site)
+    found = newest(connection, ended.sensor_type, *period, request.max_points)
     mine = found.get(ended.tag_id, [])
     assert mine == finite[len(finite) - len(mine) :]
     if len(finite) == len(every.means):
         assert len(mine) == min(len(finite), request.max_points)
 
 
-def check_export(life: Life, connection: Any, site: str, period: Period, tag: str | None) -> None:
+def check_export(life: Life, connection: Any, period: Period, tag: str | None) -> None:
     start_ns, end_ns = period[0], period[1] or END
     expected = [
         # What is no number is null in the log.
@@ -119,7 +117,7 @@ def check_export(life: Life, connection: Any, site: str, period: Period, tag: st
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("lupin_twin.journal.queries._STRETCH", 64)
         patch.setattr("lupin_twin.journal.queries.LOT", 3)
-        lots = list(rows(connection, start_ns, end_ns, tag, site=site))
+        lots = list(rows(connection, start_ns, end_ns, tag))
     assert repr([row for lot in lots for row in lot]) == repr(expected)
     assert all(0 < len(lot) <= 3 for lot in lots)
 

@@ -15,7 +15,6 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from lupin_bridge.fleet.site_log import SiteConnection
 from lupin_bridge.judge.daylight import ClockDay
 from lupin_bridge.judge.options import Criteria, own_sensors
 from lupin_bridge.judge.verdict import derive
@@ -36,8 +35,7 @@ JOURNAL = Condition(JournalState.RECORDING, complete_ns=END, kept_ns=((0, END),)
 _stamps = st.integers(0, LATEST + 100).map(lambda minutes: BEGUN + minutes * MINUTE + 1)
 
 
-def report(connection: Any, site: str, start_ns: int, end_ns: int) -> dict[str, Any]:
-    log: Any = SiteConnection(connection, site) if site != "local" else connection
+def report(log: Any, start_ns: int, end_ns: int) -> dict[str, Any]:
     query = Report(start_ns, end_ns, CRITERIA, JOURNAL)
     found: dict[str, Any] = orjson.loads(answered_by(log, query))
     return found
@@ -49,7 +47,7 @@ def test_a_report_is_that_of_a_plain_list_on_either_engine(
     living: Living, engines: Engines, lives: list[tuple[str, Any]], period: tuple[int, int]
 ) -> None:
     with living(lives) as life:
-        found = [report(*log, *period) for log in engines(life.connection)]
+        found = [report(log, *period) for log in engines(life.connection)]
         assert found[0] == found[1]
         check(found[0], life, *period)
 
@@ -65,7 +63,7 @@ def test_nothing_of_what_came_later_is_in_it(living: Living) -> None:
         start_ns = max(1, end_ns - minutes * MINUTE)
         before = [(what, until(arg, end_ns)) for what, arg in lives if what == "rows"]
         with living(lives) as life, living([step for step in before if step[1]]) as earlier:
-            both = [report(it.connection, "local", start_ns, end_ns) for it in (life, earlier)]
+            both = [report(it.connection, start_ns, end_ns) for it in (life, earlier)]
         assert both[0] == both[1]
 
     hold()

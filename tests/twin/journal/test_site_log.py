@@ -12,7 +12,8 @@ from tests.twin.journal.conftest import Copied
 def test_a_view_of_either_engine_is_of_one_moment(tmp_path: Path, copied: Copied) -> None:
     count = "SELECT count(*) FROM scan WHERE site = :site"
     with lived(tmp_path / "j.sqlite") as life:
-        archive, site = copied(life.connection)
+        found = copied(life.connection)
+        archive, site = found.connection, found.site
         with psycopg.connect(archive.info.dsn, autocommit=True) as second:
             log, writer = SiteLog(archive, site), SiteLog(second, site)
             with log.one_view():

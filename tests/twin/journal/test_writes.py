@@ -20,8 +20,8 @@ from tests.twin.journal.conftest import Copied
 DAY = 86_400 * SECOND
 
 
-def asked(connection: Any, site: str = "local", **query: Any) -> PastWrites:
-    return writes(connection, WritesRequest(**query), site)
+def asked(connection: Any, **query: Any) -> PastWrites:
+    return writes(connection, WritesRequest(**query))
 
 
 def test_all_is_told_in_the_order_of_receiving_and_only_once(
@@ -43,7 +43,7 @@ def test_all_is_told_in_the_order_of_receiving_and_only_once(
         assert whole.writes[3].sensors == ("co2", "light")
         assert whole.writes[3].values == (400.0, 1.0)
         assert [(span.start_ns, span.end_ns) for span in whole.spans] == [(0, 2**63 - 1)]
-        assert asked(*copied(life.connection)) == whole
+        assert asked(copied(life.connection)) == whole
 
         found: list[PastWrite] = []
         part = asked(life.connection, max_count=3)
@@ -110,8 +110,7 @@ def test_what_was_recent_are_the_last_nine_scans_and_looks_of_each_tag(
             ("8", 0): [17 - 3 * DAY],
             ("8", 1): [9, 10, 11, 12, 13, 14, 15, 16, 17],
         }
-        archive, site = copied(life.connection)
-        assert recent(archive, then, site) == found
+        assert recent(copied(life.connection), then) == found
         assert recent_of(asked(life.connection).writes, then.at_ns) == found
         assert recent(life.connection, RecentRequest(BEGUN - 9 * DAY)) == ()
 

@@ -14,8 +14,8 @@ import pytest
 
 from lupin_twin.core.journal_condition import Condition, JournalState
 from lupin_twin.core.past import NotRemembered
-from lupin_twin.runtime.journal_queries import MAX_WAITING, Recall
-from lupin_twin.runtime.workers import LARGE_THREADS, SMALL_THREADS, ShouldStop
+from lupin_twin.runtime.journal_queries import Recall
+from lupin_twin.runtime.workers import ShouldStop
 from tests.support.journal import kept, recording, scan, wait_state
 from tests.support.waiting import PATIENCE_S, wait_for
 
@@ -153,19 +153,6 @@ def test_a_question_that_takes_too_long_ends(path: Path) -> None:
         future = recall.query(lambda connection, _: connection.execute(ENDLESS).fetchone())
         with pytest.raises(NotRemembered, match=r"not answer within 0\.05 s"):
             future.result(PATIENCE_S)
-
-
-def test_so_many_questions_wait_and_no_more(path: Path) -> None:
-    kept(path, [scan()])
-    with recalling(path) as recall:
-        gate = threading.Event()
-        threads = LARGE_THREADS + SMALL_THREADS
-        held = [recall.query(lambda *_: gate.wait(PATIENCE_S)) for _ in range(threads)]
-        wait_for(lambda: all(future.running() for future in held), "questions that run")
-        waiting = [recall.query(count) for _ in range(MAX_WAITING)]
-        assert f"{MAX_WAITING} queries about the past are waiting" in why_not(recall)
-        gate.set()
-        assert [future.result(PATIENCE_S) for future in waiting] == [1] * MAX_WAITING
 
 
 def test_the_end_ends_what_runs_and_leaves_nothing_open(path: Path) -> None:

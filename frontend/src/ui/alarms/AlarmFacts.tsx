@@ -86,7 +86,8 @@ function Fact({
 }): JSX.Element {
   return (
     <span data-fact={name} data-status={verdict} title={text}>
-      <HealthMark verdict={verdict} word={false} /> {text}
+      {/* That of now is the row's own mark. */}
+      {name === 'worst' && <HealthMark verdict={verdict} word={false} />} {text}
       {children && <> {children}</>}
     </span>
   );

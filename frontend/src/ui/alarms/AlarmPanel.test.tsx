@@ -83,10 +83,7 @@ test('the value of now follows the newest state, with its own severity', () => {
   expect(fact(first('active'), 'now').textContent).toContain('now 8.1\u00a0°C');
   see(12.3, reason({ value: 12.3, limit: 18, verdict: 'stressed' }));
   const now = fact(first('active'), 'now');
-  expect([now.textContent, now.dataset['status']]).toEqual([
-    'Stressed now 12.3\u00a0°C',
-    'stressed',
-  ]);
+  expect([now.textContent, now.dataset['status']]).toEqual([' now 12.3\u00a0°C', 'stressed']);
   expect(fact(first('active'), 'worst').dataset['status']).toBe('critical');
 });
 
@@ -100,7 +97,10 @@ test('what is well again needs nothing, but pests that one inspection did not se
   tell(alarm('a', { tag_id: '5' }), alarm('b', { tag_id: '6', reason: pest }));
   const todo = (tag: string): string | null | undefined =>
     document.querySelector(`[data-where='${tag}'] .alarm-do`)?.textContent;
-  expect([todo('5'), todo('6')]).toEqual([undefined, 'Inspect and treat the plants']);
+  expect([todo('5'), todo('6')]).toEqual([
+    undefined,
+    'Inspect again: a second clean inspection resolves it',
+  ]);
 });
 
 test('acknowledged, shelved, and back', () => {
@@ -143,6 +143,38 @@ test('a critical alarm takes a reason, and is shelved for no more than an hour',
   // As long as the focus is in the list, no row moves.
   fireEvent.blur(screen.getByTestId('alarms'));
   expect(first('shelved').textContent).toMatch(/shelved until [\d:]+: fan is being mended/);
+});
+
+test('what is shelved while the list is held says so where it stands, and all is without it', () => {
+  fireEvent.pointerEnter(screen.getByTestId('alarms'));
+  const mild = { verdict: 'stressed' } as const;
+  tell(alarm('a', { tag_id: '5', reason: mild }), alarm('b', { tag_id: '6', reason: mild }));
+  press(/^Shelve: Tag 5/);
+  press('For 1 h');
+  expect(group('active').map(({ textContent }) => textContent.includes('shelved until'))).toEqual([
+    true,
+    false,
+  ]);
+  press('Acknowledge all (1)');
+});
+
+test('what is worst now stands first, whatever was worse once', () => {
+  const tags = ['5', '6'].map((tag_id) =>
+    wireTag({ tag_id, readings: readings({ temperature: 12 }) }),
+  );
+  const mild = reason({ value: 12, limit: 18, verdict: 'stressed' });
+  tell(
+    alarm('was', { tag_id: '5' }),
+    alarm('is', { tag_id: '6', reason: { verdict: 'stressed' } }),
+  );
+  const judged = (five: HealthReason, six: HealthReason): (string | undefined)[] => {
+    flush(() => {
+      showTags(tags, judgement({ 5: [five], 6: [six] }));
+    });
+    return group('active').map(({ dataset }) => dataset['alarm']);
+  };
+  expect(judged(mild, reason({ value: 8 }))).toEqual(['is', 'was']);
+  expect(judged(mild, mild)).toEqual(['was', 'is']);
 });
 
 test('while the pointer is in the list no row moves, and what is new is counted above it', () => {
@@ -239,7 +271,7 @@ test('what is filtered away is not acknowledged with all', () => {
   tell(alarm('a', { tag_id: '5' }), alarm('b', { tag_id: '6' }));
   fireEvent.change(screen.getByLabelText('Filter alarms'), { target: { value: 'tag 6' } });
   expect(group('active').map(({ dataset }) => dataset['where'])).toEqual(['6']);
-  expect(screen.getByRole('heading').textContent).toBe('Active (2)');
+  expect(screen.getByRole('heading').textContent).toBe('Active (1/2)');
   press('Acknowledge all (1)');
   fireEvent.change(screen.getByLabelText('Filter alarms'), { target: { value: '' } });
   expect(group('active').map(({ dataset }) => dataset['acknowledged'])).toEqual(['false', 'true']);

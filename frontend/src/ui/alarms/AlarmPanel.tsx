@@ -1,4 +1,4 @@
-import { useState, type JSX } from 'react';
+import { useMemo, useState, type JSX } from 'react';
 
 import {
   alarmsCsv,
@@ -9,11 +9,12 @@ import {
   type Block,
   type Order,
 } from '../../alarms/arrange';
-import type { Item } from '../../alarms/list';
+import { worstNowFirst, type Item } from '../../alarms/list';
 import { acknowledgeAlarms } from '../../alarms/own';
-import { selectNow, selectSpeech } from '../../alarms/speech';
+import { selectNow, selectSpeech, verdictNow } from '../../alarms/speech';
 import { alarmList } from '../../alarms/watch';
 import { now, timeOfDay } from '../../clock';
+import type { Verdict } from '../../contract/types';
 import { todoText } from '../../domain/reasons';
 import { shown as shownText } from '../../domain/text';
 import { fileName, save } from '../../export/save';
@@ -40,12 +41,21 @@ const MOST_ROWS = 100;
 /** Tags that a cause names. */
 const MOST_TAGS = 6;
 
+/** Also while the list is held, and what was shelved meanwhile still stands where it was. */
 const unacknowledged = (items: readonly Item[]): readonly Item[] =>
-  items.filter(({ isAcknowledged }) => !isAcknowledged);
+  items.filter(({ isAcknowledged, shelf }) => !isAcknowledged && shelf === null);
 
 /** The alarms of now, beside the map: active, shelved, and resolved. */
 export function AlarmPanel(): JSX.Element {
-  const all = useSelected(alarmList, (it) => it);
+  const listed = useSelected(alarmList, (it) => it);
+  // As a text: what changes no verdict renders nothing anew.
+  const verdicts = useApp((state) =>
+    listed.active.map(({ alarm, verdict }) => verdictNow(state, alarm) ?? verdict).join(),
+  );
+  const all = useMemo(
+    () => worstNowFirst(listed, verdicts.split(',') as Verdict[]),
+    [listed, verdicts],
+  );
   const speech = useApp(selectSpeech);
   const [filter, setFilter] = useState('');
   const [order, setOrder] = useState<Order>('cause');
@@ -128,7 +138,13 @@ export function AlarmPanel(): JSX.Element {
             seen[name].length > 0 && (
               <section key={name} data-group={name}>
                 {/* As elsewhere in the page, whatever order is held. */}
-                <h3>{S.alarmGroups[name](all[name].length)}</h3>
+                <h3>
+                  {S.alarmGroups[name](
+                    filter === ''
+                      ? String(all[name].length)
+                      : `${seen[name].length}/${all[name].length}`,
+                  )}
+                </h3>
                 {arranged(seen[name], order, speech).map((block) => (
                   <Rows key={block.key} block={block} group={name} />
                 ))}
@@ -198,9 +214,12 @@ function CauseHeading({
   onToggle: () => void;
 }): JSX.Element | null {
   const speech = useApp(selectSpeech);
+  const facts = useApp((state) => {
+    const nowS = rosNow(state, now());
+    return causeFacts(items, speech, nowS, (alarm) => selectNow(state, alarm)).join(', ');
+  });
   const [worst] = items;
   if (!worst) return null;
-  const texts = causeFacts(items, speech, rosNow(store.get(), now()));
   const waiting = unacknowledged(items);
   const tags = [...new Set(items.map(({ alarm }) => alarm.tag_id))].filter(Boolean);
   const named = tags.slice(0, MOST_TAGS).map((id) => shownText(id, 16));
@@ -213,7 +232,7 @@ function CauseHeading({
             <strong>{cause}</strong> · {S.alarmCount(items.length)}
           </span>
           {group !== 'resolved' && <span className="alarm-do">{todoText(worst.alarm.reason)}</span>}
-          <span className="alarm-facts">{texts.join(', ')}</span>
+          <span className="alarm-facts">{facts}</span>
           <span className="alarm-facts faint">
             {S.alarmTags(named, tags.length - named.length)}
           </span>

@@ -50,15 +50,21 @@ export const AlarmRow = memo(function AlarmRow({
       >
         <HealthMark verdict={current} word={false} />
         <span className="alarm-text">
-          <span>
-            <strong>
-              <bdi>{whereText(alarm)}</bdi>
-            </strong>
-            {': '}
-            {values.what}
+          <span className="alarm-what">
+            <span>
+              <strong>
+                <bdi>{whereText(alarm)}</bdi>
+              </strong>
+              {': '}
+              {values.what}
+            </span>
+            {isToDo && (
+              <span className="alarm-do">
+                {current === 'healthy' ? S.todoPestAgain : todoText(alarm.reason)}
+              </span>
+            )}
           </span>
-          {isToDo && <span className="alarm-do">{todoText(alarm.reason)}</span>}
-          <AlarmFacts item={item} values={values} isShelved={group === 'shelved'} />
+          <AlarmFacts item={item} values={values} isShelved={group !== 'resolved'} />
         </span>
       </button>
       <Tools item={item} group={group} name={name} />

@@ -14,8 +14,7 @@ export const ESTIMATE: In<typeof ENGLISH> = {
   noneNow: 'Zurzeit keine Schätzung: Angezeigt werden die nächstgelegenen Messwerte',
   noModel: 'Noch keine Schätzung: Sie braucht zehn Messungen eines Sensors',
   noSensor: 'Kein Messpunkt misst diese Größe, daher gibt es keine Schätzung',
-  unsure: (error) =>
-    `Schraffiert: Der Fehler kann ±${error} übersteigen, je dichter, desto mehr. Ohne Farbe: keine Daten`,
+  unsure: (error) => `Schraffiert: ungenauer als ±${error}. Ohne Farbe: keine Daten`,
   errorOf: (sensor) => `${sensor}: Unsicherheit der Schätzung`,
   foretold: (inside, scans) =>
     `${inside} von ${counted(scans, 'Messung', 'Messungen')} im vorhergesagten Bereich`,

@@ -65,6 +65,7 @@ export const HEALTH: In<typeof ENGLISH> = {
     stopped: 'Nach dem Roboter sehen',
     other: 'Dort nachsehen',
   },
+  todoPestAgain: 'Nochmals kontrollieren: ohne Befund ist es behoben',
   todoLabel: 'Jetzt zu tun',
   reasonsLabel: 'Warum',
   healthHeading: 'Zustand des Gewächshauses',

@@ -72,6 +72,7 @@ export const TAGS: In<typeof ENGLISH> = {
   trendTitle: (sensor) => `${sensor}: Änderung gegenüber vor einer Stunde`,
   trendNone: 'vor einer Stunde kein Messwert',
   trendSame: 'kein neuer Wert',
+  trendLevel: 'gleich',
   trendUnknown: 'vor einer Stunde: nicht bekannt',
   density: 'Zeilen',
   densities: { usual: 'Normal', compact: 'Dicht' },

@@ -7,10 +7,11 @@ export const ALARMS = {
   /** Beside the word, to hear. */
   alarmsCount: (unseen: number, active: number): string =>
     active === 0 ? 'none active' : `${active} active, ${unseen} not acknowledged`,
+  /** How many, or "some/all" while the list is filtered. */
   alarmGroups: {
-    active: (count: number): string => `Active (${count})`,
-    shelved: (count: number): string => `Shelved (${count})`,
-    resolved: (count: number): string => `Resolved in the last 24 h (${count})`,
+    active: (count: string): string => `Active (${count})`,
+    shelved: (count: string): string => `Shelved (${count})`,
+    resolved: (count: string): string => `Resolved in the last 24 h (${count})`,
   },
   alarmHouse: 'Whole greenhouse',
   alarmWhat: (where: string, what: string): string => `${where}: ${what}`,
@@ -32,8 +33,8 @@ export const ALARMS = {
   alarmFirst: (reading: string): string => `first ${reading}`,
   alarmStatus: { critical: 'critical', healthy: 'in range' },
   alarmShow: 'Show this tag now',
-  alarmStart: 'Show when it began',
-  alarmStartOf: (what: string): string => `Show when it began: ${what}`,
+  alarmStart: 'Go to start',
+  alarmStartOf: (what: string): string => `Go to start: ${what}`,
   alarmAcknowledge: 'Acknowledge',
   alarmAcknowledgeOf: (what: string): string => `Acknowledge: ${what}`,
   alarmAcknowledgeAll: (count: number): string => `Acknowledge all (${count})`,

@@ -12,8 +12,7 @@ export const ESTIMATE = {
   noneNow: 'No estimate at the moment: the nearest readings are shown',
   noModel: 'No estimate yet: it needs ten scans of a sensor',
   noSensor: 'No tag measures this, so there is nothing to estimate',
-  unsure: (error: string): string =>
-    `Hatched: the error may exceed ±${error}; the denser, the more. No colour: no data`,
+  unsure: (error: string): string => `Hatched: less certain than ±${error}. No colour: no data`,
   /** Beside the colours of the error. */
   errorOf: (sensor: string): string => `${sensor}: uncertainty of the estimate`,
   foretold: (inside: number, scans: number): string =>

@@ -69,6 +69,7 @@ export const TAGS = {
   trendTitle: (sensor: string): string => `${sensor} compared with an hour ago`,
   trendNone: 'no reading an hour ago',
   trendSame: 'no new reading',
+  trendLevel: 'steady',
   trendUnknown: 'an hour ago: unknown',
   density: 'Rows',
   densities: { usual: 'Usual', compact: 'Compact' },

@@ -14,8 +14,7 @@ export const ESTIMATE: In<typeof ENGLISH> = {
   noneNow: 'Ahora no hay estimación: se muestran las lecturas más cercanas',
   noModel: 'Aún no hay estimación: necesita diez mediciones de un sensor',
   noSensor: 'Ningún punto mide esto, así que no hay nada que estimar',
-  unsure: (error) =>
-    `Rayado: el error puede superar ±${error}; cuanto más denso, mayor. Sin color: sin datos`,
+  unsure: (error) => `Rayado: menos seguro que ±${error}. Sin color: sin datos`,
   errorOf: (sensor) => `${sensor}: incertidumbre de la estimación`,
   foretold: (inside, scans) =>
     `${inside} de ${counted(scans, 'medición', 'mediciones')} dentro del rango previsto`,

@@ -26,7 +26,8 @@ export const HEALTH: In<typeof ENGLISH> = {
     implausible: (reading) => `${reading}: valor no plausible`,
     scanFailed: (outcome, age) =>
       `Última medición fallida: ${outcome}${age === null ? '' : `, hace ${age}`}`,
-    pest: (count) => (count > 0 ? counted(count, 'plaga vista', 'plagas vistas') : 'Plaga vista'),
+    pest: (count) =>
+      count > 0 ? counted(count, 'insecto visto', 'insectos vistos') : 'Plaga vista',
     old: (sensor, age, holds, isDated) => {
       const since = !isDated
         ? sensor === ''
@@ -49,13 +50,13 @@ export const HEALTH: In<typeof ENGLISH> = {
   },
   todo: {
     sensors: {
-      temperature: { below: 'Calentar o cerrar la ventilación', above: 'Ventilar o sombrear' },
+      temperature: { below: 'Calefactar o cerrar la ventilación', above: 'Ventilar o sombrear' },
       humidity: { below: 'Humidificar', above: 'Ventilar y calentar' },
       co2: {
         below: 'Dosificar CO₂ o ventilar',
         above: 'Ventilar y revisar la dosificación de CO₂',
       },
-      light: { below: 'Encender la luz de apoyo', above: 'Sombrear' },
+      light: { below: 'Encender la iluminación artificial', above: 'Sombrear' },
       soil_moisture: { below: 'Regar', above: 'Regar menos y revisar el drenaje' },
       vpd: { below: 'Ventilar y calentar', above: 'Humidificar o sombrear' },
     },
@@ -69,6 +70,7 @@ export const HEALTH: In<typeof ENGLISH> = {
     stopped: 'Revisar el robot',
     other: 'Ir a mirar',
   },
+  todoPestAgain: 'Inspeccione otra vez: si no hay plaga, queda resuelta',
   todoLabel: 'Hacer ahora',
   reasonsLabel: 'Por qué',
   healthHeading: 'Estado del invernadero',

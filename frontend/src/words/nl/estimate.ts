@@ -14,8 +14,7 @@ export const ESTIMATE: In<typeof ENGLISH> = {
   noneNow: 'Er is nu geen schatting: getoond worden de dichtstbijzijnde waarden',
   noModel: 'Nog geen schatting: er zijn tien metingen van een sensor nodig',
   noSensor: 'Geen meetpunt meet dit, dus er is geen schatting',
-  unsure: (error) =>
-    `Gearceerd: de fout kan groter zijn dan ±${error}; hoe dichter, hoe groter. Geen kleur: geen gegevens`,
+  unsure: (error) => `Gearceerd: minder zeker dan ±${error}. Geen kleur: geen gegevens`,
   errorOf: (sensor) => `${sensor}: onzekerheid van de schatting`,
   foretold: (inside, scans) =>
     `${inside} van ${counted(scans, 'meting', 'metingen')} binnen het voorspelde bereik`,

@@ -72,6 +72,7 @@ export const TAGS: In<typeof ENGLISH> = {
   trendTitle: (sensor) => `${sensor} vergeleken met een uur geleden`,
   trendNone: 'een uur geleden geen meting',
   trendSame: 'geen nieuwe meting',
+  trendLevel: 'gelijk',
   trendUnknown: 'een uur geleden: niet bekend',
   density: 'Rijen',
   densities: { usual: 'Normaal', compact: 'Dicht' },

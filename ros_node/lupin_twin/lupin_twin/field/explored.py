@@ -5,7 +5,10 @@ Pure: numpy and the standard library. Metres and radians in the map frame.
 
 from __future__ import annotations
 
+import base64
+import json
 import math
+import zlib
 from dataclasses import dataclass
 from typing import Final
 
@@ -211,3 +214,50 @@ def _thinned(places: FloatArray, tags: int) -> FloatArray:
     chosen = np.random.default_rng(len(places)).permutation(len(places))[:most]
     result: FloatArray = places[np.sort(chosen)]
     return result
+
+
+# --- as a text: one fact of the log, written again when the map is another ------------------------
+
+# A floor of 2 ha at 5 cm is some 100 kB. A larger text is no longer one row among others.
+MAX_TEXT: Final = 1_000_000
+# So many cells are packed in a tenth of a second.
+MAX_PACKED_CELLS: Final = 16_000_000
+
+
+def text_of(floor: OccupancyMap) -> str:
+    """JSON of a map, its cells deflated and in base64; empty: it is too large for a row."""
+    if floor.cells.size > MAX_PACKED_CELLS:
+        return ""
+    about = {
+        "frame_id": floor.frame_id,
+        "stamp_ns": floor.stamp_ns,
+        "width": floor.width,
+        "height": floor.height,
+        "resolution": floor.resolution,
+        "origin_x": floor.origin_x,
+        "origin_y": floor.origin_y,
+        "origin_yaw": floor.origin_yaw,
+    }
+    cells = base64.b64encode(zlib.compress(floor.cells.tobytes(), 1)).decode()
+    text = json.dumps({**about, "cells": cells})
+    return text if len(text) <= MAX_TEXT else ""
+
+
+def map_of(text: str, revision: int) -> OccupancyMap:
+    """The map of a text.
+
+    Raises:
+        ValueError: it is none.
+
+    """
+    try:
+        about = json.loads(text)
+        size = int(about["width"]) * int(about["height"])
+        if not 0 <= size <= MAX_PACKED_CELLS:
+            raise ValueError(f"it has {size} cells, the limit is {MAX_PACKED_CELLS}")
+        # Never more than it says, whatever was packed.
+        packed = base64.b64decode(about.pop("cells"), validate=True)
+        cells = zlib.decompressobj().decompress(packed, size + 1)
+        return OccupancyMap(**about, cells=np.frombuffer(cells, np.int8), revision=revision)
+    except (AttributeError, KeyError, TypeError, zlib.error) as error:
+        raise ValueError(f"it is no map: {error}") from None

@@ -81,7 +81,7 @@ _SILENCES: Final = (
 def events(log: SiteLog, request: SeriesRequest, now_ns: int) -> SeriesPast:
     """The events that are requested, see GetHistory.srv."""
     source = _Source(log, None if request.tag_id == EVERY_TAG else request.tag_id)
-    axis = spans(runs(log.execute, log.site))
+    axis = spans(runs(log.execute))
     # What is of this very moment counts as past.
     end_ns = max(request.end_ns or now_ns + 1, request.start_ns)
     start_ns = request.start_ns
@@ -229,7 +229,7 @@ class _Part:
 class _Source:
     """The attempts and events of a tag, or of the site (`tag` None), span by span.
 
-    Rows are there as far back as they are kept, what is rare for ten years; of the site the hours
+    Rows are there as far back as they are kept, what is rare for good; of the site the hours
     of all attempts too.
     """
 

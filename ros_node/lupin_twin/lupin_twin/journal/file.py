@@ -26,7 +26,6 @@ from lupin_twin.journal.retention import (
     kept,
     note_limits,
     note_lost,
-    purge_hours,
     purge_step,
     shrink_step,
 )
@@ -60,7 +59,6 @@ _CHECKED_BYTES: Final = 64_000_000
 # The log is put into the file when it is this long: the longer, the fewer pages are written twice.
 _LOG_BYTES: Final = 8_000_000
 _PURGE_EVERY_S: Final = 60.0
-_PURGE_HOURS_EVERY_S: Final = 86_400.0
 _POLL_EVERY_S: Final = 1.0
 # A robot that explores sends a map a second: not each of them is written.
 _MAP_REST_S: Final = 10.0
@@ -144,7 +142,6 @@ class JournalFile:
             self.simulated = simulated(self._connection)
             self.journal_id = get_meta(self._connection, "journal_id") or ""
             self._purged_s = self._polled_s = 0.0
-            self._hours_purged_s = time.monotonic()
             self._purges_before_ns: int | None = None
             self._is_shrinking = False
             self._kept: Stretches | None = None
@@ -173,14 +170,12 @@ class JournalFile:
             set_meta(self._connection, ORIGIN, origin)
 
     def put_map(self, floor: object, text_of: Callable[[], str]) -> None:
-        """Have the newest map in the file, by this call or one to come, as `floor_plan` has it."""
+        """Have the newest map in the file, by this call or one to come; empty: it is too large."""
         now_s = time.monotonic()
-        if floor is not self._map and now_s >= self._map_rests_until_s:
-            self.note_map(text_of())
-            self._map, self._map_rests_until_s = floor, now_s + _MAP_REST_S
-
-    def note_map(self, text: str) -> None:
-        """Have the newest map in the file, as `floor_plan` writes it; empty: it is too large."""
+        if floor is self._map or now_s < self._map_rests_until_s:
+            return
+        self._map, self._map_rests_until_s = floor, now_s + _MAP_REST_S
+        text = text_of()
         if (get_meta(self._connection, MAP) or "") != text:
             set_meta(self._connection, MAP, text)
 
@@ -385,10 +380,6 @@ class JournalFile:
         return may_purge and self._purge(now_s)
 
     def _purge(self, now_s: float) -> bool:
-        if now_s - self._hours_purged_s >= _PURGE_HOURS_EVERY_S:
-            self._hours_purged_s = now_s
-            with self._transaction():
-                purge_hours(self._connection, time.time_ns())
         if self._purges_before_ns is None and not self._is_shrinking:
             if now_s - self._purged_s < _PURGE_EVERY_S:
                 return False

@@ -8,12 +8,10 @@ from __future__ import annotations
 
 import gc
 import sqlite3
-from collections import deque
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
-from itertools import accumulate, chain, repeat
-from typing import Any, Final, TypeVar
+from typing import Any, Final
 
 from lupin_twin.core.drops import MAX_SENSORS_PER_TAG, MAX_TAGS
 from lupin_twin.core.history import LatestRequest
@@ -36,26 +34,14 @@ from lupin_twin.journal.rows import (
     STATUS_OK,
     flower_of,
     listed_rows,
+    named_numbers,
     newest_of_tag,
-    numbers_of,
-    sensor_names,
 )
 from lupin_twin.journal.runs import FOREVER_NS, Carries, Run, runs, since_seq, span_at
-from lupin_twin.journal.schema import LOCAL_SITE, DamagedFile
-
-ValueT = TypeVar("ValueT")
-
-
-def make_many(made: type[ValueT], count: int, *fields: Iterable[object]) -> list[ValueT]:
-    """`count` values of a dataclass with slots; `fields` in its order, each so long at least."""
-    values = list(map(object.__new__, repeat(made, count)))
-    for name, column in zip(made.__slots__, fields, strict=True):  # type: ignore[attr-defined]
-        deque(map(getattr(made, name).__set__, values, column), maxlen=0)
-    return values
-
+from lupin_twin.journal.schema import LOCAL_SITE
 
 # What a state takes, about, seconds of one core for each tag.
-STATE_S_PER_TAG: Final = 6e-6
+STATE_S_PER_TAG: Final = 1e-5
 
 _NEWEST: Final = (
     "(SELECT seq FROM scan WHERE site = s.site AND series = s.series AND stamp_ns <= :at"
@@ -117,29 +103,25 @@ class Known:
     inspections: tuple[int, ...] = ()
 
 
-def state_at(
-    connection: sqlite3.Connection, at_ns: int, frame_id: str, site: str = LOCAL_SITE
-) -> Snapshot:
+def state_at(connection: sqlite3.Connection, at_ns: int, frame_id: str) -> Snapshot:
     """Every tag as of `at_ns`, ROS time, in the order in which the log first received them.
 
     Of the run that the moment belongs to, all writes with a stamp up to then count, whenever they
     were received. Where others write meanwhile, ask within a transaction.
     """
-    every = runs(connection.execute, site)
+    every = runs(connection.execute)
     span = span_at(every, at_ns)
     if span is None:
         return Snapshot(at_ns, frame_id, ())
     since = since_seq(every, span.run.id, at_ns)
-    known = fold(connection, span.run.id, at_ns, since, site)
+    known = fold(connection, span.run.id, at_ns, since)
     return Snapshot(at_ns, frame_id, known.tags[:MAX_TAGS])
 
 
-def fold(
-    connection: sqlite3.Connection, run: int, at_ns: int, since: int, site: str = LOCAL_SITE
-) -> Known:
+def fold(connection: sqlite3.Connection, run: int, at_ns: int, since: int) -> Known:
     """What is known in a run as of a moment, of what has the seq `since` or a later one."""
     with _no_collection():
-        return _known(connection, {"site": site, "run": run, "at": at_ns, "since": since})
+        return _known(connection, {"site": LOCAL_SITE, "run": run, "at": at_ns, "since": since})
 
 
 @contextmanager
@@ -188,21 +170,21 @@ def _known(connection: sqlite3.Connection, query: dict[str, Any]) -> Known:
         for tag in tried.keys() - observed.keys()
     }
     tags = sorted(first, key=first.__getitem__)
-    attempts = [tried[tag] for tag in tags if tag in tried]
-    made = iter(_columns(Attempt, [(entry[0], *entry[2:]) for entry in attempts]))
-    states = make_many(
-        TagState,
-        len(tags),
-        tags,
-        map(poses.get, tags),
-        [_latest(found.get(tag, ())) for tag in tags],
-        [observed.get(tag, failed.get(tag)) for tag in tags],
-        [flowers[tag][1] if tag in flowers else NO_FLOWER for tag in tags],
-        [flowers[tag][0] if tag in flowers else None for tag in tags],
-        [next(made) if tag in tried else None for tag in tags],
+    attempts = {tag: Attempt(entry[0], *entry[2:]) for tag, entry in tried.items()}
+    states = tuple(
+        TagState(
+            tag,
+            poses.get(tag),
+            _latest(found.get(tag, ())),
+            observed.get(tag, failed.get(tag)),
+            flowers[tag][1] if tag in flowers else NO_FLOWER,
+            flowers[tag][0] if tag in flowers else None,
+            attempts.get(tag),
+        )
+        for tag in tags
     )
     return Known(
-        tuple(states),
+        states,
         frozenset(observed),
         placed_ns,
         tuple(dict.fromkeys(row[4] for row in scans)),
@@ -226,13 +208,7 @@ def _places(
     for seq, tag, *_ in known:
         if seq < first.get(tag, FOREVER_NS):
             first[tag] = seq
-    poses = _columns(Pose, [row[3:] for row in known])
-    return {row[1]: pose for row, pose in zip(known, poses, strict=True)}, placed_ns
-
-
-def _columns(made: type[ValueT], rows: Sequence[tuple[Any, ...]]) -> list[ValueT]:
-    """A dataclass of each row."""
-    return make_many(made, len(rows), *zip(*rows, strict=True)) if rows else []
+    return {tag: Pose(*pose) for _, tag, _, *pose in known}, placed_ns
 
 
 def _latest(scans: Sequence[tuple[int, int, tuple[Reading, ...]]]) -> tuple[Reading, ...]:
@@ -277,22 +253,11 @@ def copies(connection: sqlite3.Connection, run: Run, carries: Carries) -> list[W
 
 def _readings(rows: list[tuple[Any, ...]]) -> list[tuple[Reading, ...]]:
     """The readings of rows as `_SCANS` names them."""
-    names = [sensor_names(row[3]) for row in rows]
-    values = numbers_of([row[8] for row in rows])
-    lengths = [len(row) for row in values]
-    if lengths != list(map(len, names)):
-        raise DamagedFile("a scan has another number of readings than its series has sensors")
-    stamps = [repeat(row[5], length) for row, length in zip(rows, lengths, strict=True)]
-    # 50,000 in a large greenhouse: most of what a state takes.
-    made = make_many(
-        Reading,
-        sum(lengths),
-        chain.from_iterable(names),
-        chain.from_iterable(values),
-        chain.from_iterable(stamps),
-    )
-    ends = list(accumulate(lengths))
-    return [tuple(made[end - length : end]) for end, length in zip(ends, lengths, strict=True)]
+    every = named_numbers((row[3] for row in rows), [row[8] for row in rows])
+    return [
+        tuple([Reading(name, value, row[5]) for name, value in zip(*scan, strict=True)])
+        for row, scan in zip(rows, every, strict=True)
+    ]
 
 
 def latest(connection: sqlite3.Connection, request: LatestRequest) -> list[Scan | Inspection]:

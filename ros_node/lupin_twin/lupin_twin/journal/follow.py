@@ -37,7 +37,7 @@ from lupin_twin.journal.events import FROM_SCAN
 from lupin_twin.journal.hours import count_rows
 from lupin_twin.journal.notes import id_behind, number_of
 from lupin_twin.journal.retention import Stretches, kept
-from lupin_twin.journal.rows import KIND_FLOWER, STATUS_OK, numbers_of, sensor_names
+from lupin_twin.journal.rows import KIND_FLOWER, STATUS_OK, named_numbers, sensor_names
 from lupin_twin.journal.runs import Span, cut, runs, span_at, spans
 from lupin_twin.journal.schema import (
     LOCAL_SITE,
@@ -279,11 +279,11 @@ _INSPECTIONS_BETWEEN: Final = (
 )
 
 
-def observed(connection: Any, request: PeriodRequest, site: str = LOCAL_SITE) -> PastWrites:
+def observed(connection: Any, request: PeriodRequest) -> PastWrites:
     """What was observed in a period; each moment is that of the run that holds it."""
-    log = SiteLog(connection, site)
+    log = SiteLog(connection)
     with log.one_view():
-        axis = spans(runs(log.execute, log.site))
+        axis = spans(runs(log.execute))
         found: list[PastWrite] = []
         for span in cut(axis, request.start_ns, request.end_ns):
             query = {"run": span.run.id, "start": span.start_ns, "end": span.end_ns}
@@ -301,13 +301,11 @@ _SCANS_UP_TO: Final = (
 )
 
 
-def recent(
-    connection: Any, request: RecentRequest, site: str = LOCAL_SITE
-) -> tuple[PastWrite, ...]:
+def recent(connection: Any, request: RecentRequest) -> tuple[PastWrite, ...]:
     """What was recent at a moment."""
-    log = SiteLog(connection, site)
+    log = SiteLog(connection)
     with log.one_view():
-        span = span_at(runs(log.execute, log.site), request.at_ns)
+        span = span_at(runs(log.execute), request.at_ns)
         if span is None:
             return ()
         query = {
@@ -320,11 +318,11 @@ def recent(
         return recent_of([*_of_scans(scans), *_of_inspections(inspections)], request.at_ns)
 
 
-def scans(connection: Any, request: ScansRequest, site: str = LOCAL_SITE) -> tuple[PastWrite, ...]:
+def scans(connection: Any, request: ScansRequest) -> tuple[PastWrite, ...]:
     """The scans of a stretch of time."""
-    log = SiteLog(connection, site)
+    log = SiteLog(connection)
     with log.one_view():
-        span = span_at(runs(log.execute, log.site), request.at_ns)
+        span = span_at(runs(log.execute), request.at_ns)
         if span is None:
             return ()
         query = {"run": span.run.id, "since": request.since_ns, "at": request.at_ns}
@@ -339,9 +337,9 @@ def scans(connection: Any, request: ScansRequest, site: str = LOCAL_SITE) -> tup
         return tuple(sorted(found, key=lambda scan: (scan.stamp_ns, scan.number)))
 
 
-def writes(connection: Any, request: WritesRequest, site: str = LOCAL_SITE) -> PastWrites:
+def writes(connection: Any, request: WritesRequest) -> PastWrites:
     """The next writes, copies left out."""
-    log = SiteLog(connection, site)
+    log = SiteLog(connection)
     with log.one_view():
         newest = max(log.execute(_NEWEST.format(table)).fetchone()[0] or 0 for table in WRITTEN)
         after = request.after or _beginning(log, request, newest)
@@ -354,7 +352,7 @@ def writes(connection: Any, request: WritesRequest, site: str = LOCAL_SITE) -> P
         is_all = len(found) < request.max_count
         found = found[: request.max_count]
         last = max(newest, after) if is_all else found[-1].number
-        axis = _axis(spans(runs(log.execute, log.site)))
+        axis = _axis(spans(runs(log.execute)))
         return PastWrites(_journal_id(log), axis, tuple(found), last, is_all)
 
 
@@ -381,11 +379,10 @@ def _beginning(log: SiteLog, request: WritesRequest, newest: int) -> int:
 
 
 def _of_scans(rows: list[tuple[Any, ...]]) -> Iterator[PastWrite]:
-    names = {text: sensor_names(text) for text in {row[6] for row in rows}}
-    every = numbers_of([row[7] for row in rows])
-    for row, values in zip(rows, every, strict=True):
-        seq, run, tag, stamp_ns, kind, status, sensors, _ = row
-        yield PastWrite(seq, run, tag, stamp_ns, kind, status, names[sensors], tuple(values))
+    every = named_numbers((row[6] for row in rows), [row[7] for row in rows])
+    for row, (names, values) in zip(rows, every, strict=True):
+        seq, run, tag, stamp_ns, kind, status, *_ = row
+        yield PastWrite(seq, run, tag, stamp_ns, kind, status, names, tuple(values))
 
 
 def _of_inspections(rows: list[tuple[Any, ...]]) -> Iterator[PastWrite]:

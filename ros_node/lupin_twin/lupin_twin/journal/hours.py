@@ -128,19 +128,6 @@ def extent(log: SiteLog, run: int) -> tuple[int, int] | None:
     return (min(found)[0], max(last for _, last in found)) if found else None
 
 
-def delete_before(log: SiteLog, run: int, stamp_ns: int) -> None:
-    """Delete all of this that is older than a stamp of a run."""
-    for sql in (
-        (
-            "DELETE FROM hour WHERE site = :site AND hour < :hour"
-            " AND series IN (SELECT series FROM series WHERE site = :site AND run = :run)"
-        ),
-        "DELETE FROM tally WHERE site = :site AND run = :run AND hour < :hour",
-        "DELETE FROM event WHERE site = :site AND run = :run AND stamp_ns < :at",
-    ):
-        log.execute(sql, {"run": run, "at": stamp_ns, "hour": stamp_ns // HOUR_NS})
-
-
 def deleted_ns(log: SiteLog, run: int) -> int:
     """The last stamp of a run of which something was deleted; -1 if nothing was."""
     return int(log.meta(f"{DELETED}{run}") or -1)

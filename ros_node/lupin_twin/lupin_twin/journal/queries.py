@@ -16,9 +16,9 @@ from lupin_twin.core.past import HOUR_NS, NotRemembered, PastRow, SeriesPast, Se
 from lupin_twin.journal.buckets import Buckets, Entry, answer, whole_hours
 from lupin_twin.journal.events import FROM_SCAN, events
 from lupin_twin.journal.hours import deleted_ns, is_counted
-from lupin_twin.journal.rows import KIND_READING, numbers_of, sensor_names
+from lupin_twin.journal.rows import KIND_READING, named_numbers, sensor_names
 from lupin_twin.journal.runs import Run, Span, runs, spans_within
-from lupin_twin.journal.schema import LOCAL_SITE, DamagedFile, SiteLog
+from lupin_twin.journal.schema import SiteLog
 
 # What an answer costs, about, s; the second for events of the whole site, each tag.
 SERIES_S: Final = 0.01
@@ -45,9 +45,9 @@ _BUCKETS: Final = (
 
 
 class _Part:
-    """A sensor's readings in a series within a span; `place` is where it stands in its list."""
+    """A sensor's readings in a series within a span; `place` is where it stands in `sensors`."""
 
-    def __init__(self, log: SiteLog, span: Span, series: int, place: int, sensors: int) -> None:
+    def __init__(self, log: SiteLog, span: Span, series: int, place: int, sensors: str) -> None:
         self.span = span
         self._log = log
         self._series = {"series": series, "place": place}
@@ -104,26 +104,19 @@ class _Part:
                     buckets.add_value(stamp_ns, value)
 
     def _read(self, rows: Sequence[tuple[int, int, str]]) -> list[Entry]:
-        found = []
-        for (stamp_ns, seq, _), values in zip(
-            rows, numbers_of([text for *_, text in rows]), strict=True
-        ):
-            if len(values) != self._sensors:
-                raise DamagedFile(
-                    f"scan {seq} has {len(values)} readings of {self._sensors} sensors"
-                )
-            found.append((stamp_ns, seq, values[self._place]))
-        return found
+        every = named_numbers([self._sensors] * len(rows), [text for *_, text in rows])
+        return [
+            (stamp_ns, seq, values[self._place])
+            for (stamp_ns, seq, _), (_, values) in zip(rows, every, strict=True)
+        ]
 
 
-def series(
-    connection: Any, request: SeriesRequest, now_ns: int, site: str = LOCAL_SITE
-) -> SeriesPast:
+def series(connection: Any, request: SeriesRequest, now_ns: int) -> SeriesPast:
     """What a sensor gave, or the events that are requested, see GetHistory.srv.
 
     Where rows were deleted, the answer is in buckets of whole hours.
     """
-    log = SiteLog(connection, site)
+    log = SiteLog(connection)
     with log.one_view():
         if request.event is not None:
             return events(log, request, now_ns)
@@ -149,22 +142,16 @@ _SETS: Final = "SELECT DISTINCT sensors FROM series WHERE site = :site AND run =
 
 
 def newest(
-    connection: Any,
-    sensor_type: str,
-    start_ns: int,
-    end_ns: int,
-    each: int,
-    *,
-    site: str = LOCAL_SITE,
+    connection: Any, sensor_type: str, start_ns: int, end_ns: int, each: int
 ) -> dict[str, list[tuple[int, float]]]:
     """Of every tag the last `each` readings of a sensor in a period: (ns of ROS time, value).
 
     In their order, and without those that are not finite.
     """
-    log = SiteLog(connection, site)
+    log = SiteLog(connection)
     found: dict[str, list[Entry]] = {}
     with log.one_view():
-        for span in spans_within(runs(log.execute, log.site), start_ns, end_ns):
+        for span in spans_within(runs(log.execute), start_ns, end_ns):
             within = {"run": span.run.id, "start": span.start_ns, "end": span.end_ns}
             for (text,) in log.execute(_SETS, within).fetchall():
                 names = sensor_names(text)
@@ -173,12 +160,10 @@ def newest(
                 query = within | {"sensors": text, "more": each - 1}
                 rows = log.execute(_NEWEST, query).fetchall()
                 place = names.index(sensor_type)
-                values = numbers_of([row[-1] for row in rows])
-                for (tag, stamp_ns, seq, _), of_row in zip(rows, values, strict=True):
-                    if len(of_row) != len(names):
-                        raise DamagedFile(f"scan {seq} has {len(of_row)} of {len(names)} readings")
-                    if is_counted(of_row[place]):
-                        found.setdefault(tag, []).append((stamp_ns, seq, of_row[place]))
+                every = named_numbers([text] * len(rows), [row[-1] for row in rows])
+                for (tag, stamp_ns, seq, _), (_, values) in zip(rows, every, strict=True):
+                    if is_counted(values[place]):
+                        found.setdefault(tag, []).append((stamp_ns, seq, values[place]))
     return {
         tag: [(stamp_ns, value) for stamp_ns, _, value in sorted(entries)[-each:]]
         for tag, entries in found.items()
@@ -187,7 +172,7 @@ def newest(
 
 def _parts(log: SiteLog, request: SeriesRequest, start_ns: int, end_ns: int) -> list[_Part]:
     found = []
-    for span in spans_within(runs(log.execute, log.site), start_ns, end_ns):
+    for span in spans_within(runs(log.execute), start_ns, end_ns):
         of_run = {"run": span.run.id, "tag": request.tag_id, "kind": KIND_READING}
         for number, text in log.execute(
             "SELECT series, sensors FROM series WHERE site = :site AND run = :run AND tag = :tag"
@@ -197,7 +182,7 @@ def _parts(log: SiteLog, request: SeriesRequest, start_ns: int, end_ns: int) -> 
             names = sensor_names(text)
             if request.sensor_type in names:
                 place = names.index(request.sensor_type)
-                found.append(_Part(log, span, number, place, len(names)))
+                found.append(_Part(log, span, number, place, text))
     return found
 
 
@@ -213,16 +198,15 @@ _SCANS: Final = f"SELECT stamp_ns, seq, tag, sensors, status, source, readings {
 _NEXT: Final = f"SELECT min(stamp_ns) {FROM_SCAN}"  # constants
 
 
-def rows(  # noqa: PLR0917
+def rows(
     connection: Any,
     start_ns: int,
     end_ns: int,
     tag_id: str | None = None,
     sensor_type: str | None = None,
-    site: str = LOCAL_SITE,
 ) -> Iterator[list[PastRow]]:
     """Lots of at most `LOT` rows, see `Export`."""
-    export = Export(start_ns, end_ns, tag_id, sensor_type, site)
+    export = Export(start_ns, end_ns, tag_id, sensor_type)
     while (found := export.step(connection)) is not None:
         yield from lots(found)
 
@@ -241,17 +225,11 @@ class Export:
     """
 
     def __init__(
-        self,
-        start_ns: int,
-        end_ns: int,
-        tag_id: str | None,
-        sensor_type: str | None,
-        site: str = LOCAL_SITE,
+        self, start_ns: int, end_ns: int, tag_id: str | None, sensor_type: str | None
     ) -> None:
         self._period = (start_ns, end_ns)
         self._tag_id = tag_id
         self._sensor_type = sensor_type
-        self._site = site
         self._spans: deque[Span] | None = None
         self._at_ns = 0
         self._length_ns = _FIRST_STRETCH_NS
@@ -268,10 +246,10 @@ class Export:
             NotRemembered: behind rows that were given, some are deleted since.
 
         """
-        log = SiteLog(connection, self._site)
+        log = SiteLog(connection)
         with log.one_view():
             if self._spans is None:
-                self._spans = deque(spans_within(runs(log.execute, log.site), *self._period))
+                self._spans = deque(spans_within(runs(log.execute), *self._period))
             if not self._has_begun:
                 self._deleted_ns = {s.run.id: deleted_ns(log, s.run.id) for s in self._spans}
             while self._spans and self._spans[0].end_ns <= self._at_ns:
@@ -312,16 +290,15 @@ class Export:
 
     def _read(self, scans: list[tuple[Any, ...]]) -> list[PastRow]:
         found: list[PastRow] = []
-        names = {text: sensor_names(text) for text in {scan[3] for scan in scans}}
-        every = numbers_of([scan[-1] for scan in scans])
-        for (stamp_ns, _, tag, sensors, status, source, _), values in zip(
+        every = named_numbers((scan[3] for scan in scans), [scan[-1] for scan in scans])
+        for (stamp_ns, _, tag, _, status, source, _), (names, values) in zip(
             scans, every, strict=True
         ):
             x, y = self._places.get(tag, _NOWHERE)
-            readings = zip(names[sensors], values, strict=True)
+            readings = zip(names, values, strict=True) if values else _NO_READING
             found += [
                 PastRow(stamp_ns, tag, x, y, sensor, value, status, source)
-                for sensor, value in (readings if values else _NO_READING)
+                for sensor, value in readings
                 if self._sensor_type in (None, sensor)
             ]
         return found

@@ -1,7 +1,7 @@
 """What is deleted: by age and by size, a little at a time, the oldest first; a tag on request.
 
 Rows go by ranges of their numbers, which lie together in the file; the pages they leave are used
-again, and what is left over is given back to the disk. Hours stay for ten years.
+again, and what is left over is given back to the disk. Hours stay.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from typing import Final
 from lupin_twin.core.past import HOUR_NS
 from lupin_twin.journal.appending import LAST_SEQ, PURGED_SEQ, Appender
 from lupin_twin.journal.beside import InUse, Lock
-from lupin_twin.journal.hours import DELETED, delete_before, deleted_ns, extent
+from lupin_twin.journal.hours import DELETED, deleted_ns, extent
 from lupin_twin.journal.runs import runs, spans
 from lupin_twin.journal.schema import (
     LOCAL_SITE,
@@ -30,7 +30,6 @@ from lupin_twin.journal.schema import (
 )
 
 DAY_NS: Final = 24 * HOUR_NS
-_HOURS_DAYS: Final = 3652  # ten years
 
 # What one step deletes or moves: some ten milliseconds, for observations wait behind it.
 _ROWS: Final = 300
@@ -178,12 +177,6 @@ def _write_horizons(connection: sqlite3.Connection, last: int) -> None:
         {"site": LOCAL_SITE, "last": last},
     ).fetchall():
         set_meta(connection, f"{DELETED}{run}", max(stamp_ns, deleted_ns(SiteLog(connection), run)))
-
-
-def purge_hours(connection: sqlite3.Connection, now_ns: int) -> None:
-    """Delete the hours that are past ten years; what a simulation said is as old as its arrival."""
-    for run in runs(connection.execute):
-        delete_before(SiteLog(connection), run.id, now_ns - run.lead_ns - _HOURS_DAYS * DAY_NS)
 
 
 def shrink_step(connection: sqlite3.Connection) -> bool:

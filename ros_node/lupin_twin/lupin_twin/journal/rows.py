@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 import sqlite3
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from functools import lru_cache
 from typing import Any, Final
 
@@ -104,15 +104,16 @@ def _scans(
         f" source, mission, detail FROM {joined}",
         query,
     ).fetchall()
-    for row, values in zip(rows, numbers_of([row[4] for row in rows]), strict=True):
-        seq, tag, kind, sensors, _, stamp_ns, own_ns, arrival_ns, *reported = row
+    every = named_numbers((row[3] for row in rows), [row[4] for row in rows])
+    for row, (names, values) in zip(rows, every, strict=True):
+        seq, tag, kind, _, _, stamp_ns, own_ns, arrival_ns, *reported = row
         status, source, mission, detail = reported
         sent_ns = stamp_ns if own_ns is None else own_ns
         reported = (None, status, detail, source, sent_ns, mission, arrival_ns)
         if kind == KIND_FLOWER:
             found.append((seq, Inspection(tag, stamp_ns, None, *reported)))
         else:
-            readings = tuple(map(Reading, sensor_names(sensors), values))
+            readings = tuple(map(Reading, names, values))
             found.append((seq, Scan(tag, stamp_ns, readings, *reported)))
     return found
 
@@ -154,6 +155,21 @@ def numbers_of(texts: Sequence[str]) -> list[list[float]]:
     if len(every) != len(texts):
         raise DamagedFile("readings in the journal are no lists of numbers")
     return every
+
+
+def named_numbers(
+    sensors: Iterable[str], readings: Sequence[str]
+) -> list[tuple[tuple[str, ...], list[float]]]:
+    """Of many scans, the names of their sensors and what those read.
+
+    Raises:
+        DamagedFile: one of the texts is none, or there are more or fewer readings than sensors.
+
+    """
+    found = list(zip(map(sensor_names, sensors), numbers_of(readings), strict=True))
+    if any(len(names) != len(values) for names, values in found):
+        raise DamagedFile("a scan has another number of readings than its series has sensors")
+    return found
 
 
 @lru_cache(maxsize=4096)

@@ -74,11 +74,6 @@ class Run:
         """The number of the run that rows refer to."""
         return self.id if self.joins is None else self.joins
 
-    @property
-    def lead_ns(self) -> int:
-        """What arrivals are ahead of stamps, about."""
-        return self.begun.arrival_ns - self.begun.stamp_ns if self.begun.is_simulated else 0
-
 
 @dataclass(frozen=True, slots=True)
 class Span:
@@ -89,14 +84,14 @@ class Span:
     end_ns: int
 
 
-def runs(execute: Execute, site: str = LOCAL_SITE) -> list[Run]:
+def runs(execute: Execute) -> list[Run]:
     """Every run and step, in the order in which they began."""
     return [
         Run(row[0], Clock(row[2], row[3], bool(row[1])), row[4], row[5], row[6])
         for row in execute(
             "SELECT run, is_simulated, begun_stamp_ns, begun_arrival_ns, begun_seq, joins,"
             " ended_stamp_ns FROM run WHERE site = :site ORDER BY run",
-            {"site": site},
+            {"site": LOCAL_SITE},
         ).fetchall()
     ]
 

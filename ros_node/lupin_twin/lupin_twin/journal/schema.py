@@ -321,7 +321,7 @@ def _own_tables() -> frozenset[bytes]:
 
 # A fact: where what is recorded comes from, see `core.diagnostics.Origin`.
 ORIGIN: Final = "origin"
-# Another: the newest map, see `floor_plan`.
+# Another: the newest map, see `explored.text_of`.
 MAP: Final = "map"
 
 # --- one site's rows ------------------------------------------------------------------------------

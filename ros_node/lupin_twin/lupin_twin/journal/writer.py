@@ -23,10 +23,9 @@ from lupin_twin.core.diagnostics import Origin
 from lupin_twin.core.journal_condition import Condition, JournalState
 from lupin_twin.core.notes import Note
 from lupin_twin.core.state import Write
-from lupin_twin.field.explored import OccupancyMap
+from lupin_twin.field.explored import OccupancyMap, text_of
 from lupin_twin.journal.beside import InUse, Lock
 from lupin_twin.journal.file import JournalFile
-from lupin_twin.journal.floor_plan import text_of
 from lupin_twin.journal.fold import Restored
 from lupin_twin.journal.notes import NoteQueue
 from lupin_twin.journal.rebuild import is_version3, upgrade

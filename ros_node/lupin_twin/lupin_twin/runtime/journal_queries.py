@@ -21,8 +21,6 @@ from lupin_twin.core.past import NotRemembered
 from lupin_twin.journal.schema import FILE_ERRORS, Foreign, is_damage_error, open_reader
 from lupin_twin.runtime.workers import ShouldStop, Workers
 
-# Queries that wait at most; each is a few hundred bytes, and its asker's time-out ends it.
-MAX_WAITING: Final = 100
 # A query that takes longer is ended, whoever waits: while it reads, the log cannot be reused.
 MAX_S: Final = 60.0
 # So many steps of SQLite's machine lie between two checks whether to stop: about a millisecond.
@@ -45,7 +43,7 @@ class _Open:
 
 
 class Recall:
-    """Answers from construction to `close`; any thread may ask.
+    """Answers from construction to `close`; any thread may ask. Who asks bounds how many wait.
 
     `condition` gives, on any thread, the state of the journal and where it is; `heal(damage)` is
     called where damage is found, on any thread.
@@ -72,14 +70,10 @@ class Recall:
         It sees the journal as of one moment. The future may have `NotRemembered`, or what the
         search raises; cancel it when nobody waits any more.
         """
-        refused: Future[AnswerT] = Future()
-        if self._workers.waiting >= MAX_WAITING:
-            why = f"{MAX_WAITING} queries about the past are waiting, the limit; ask again"
-            refused.set_exception(NotRemembered(why, is_lasting=False))
-            return refused
         try:
             return self._workers.submit(lambda stop: self._answer(search, stop), cost_s)
         except RuntimeError:
+            refused: Future[AnswerT] = Future()
             refused.set_exception(NotRemembered("the twin is ending", is_lasting=False))
             return refused
 

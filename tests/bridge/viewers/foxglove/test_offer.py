@@ -10,9 +10,8 @@ from typing import Any
 
 import pytest
 
-from lupin_bridge.feed.relay import RosTime
+from lupin_bridge.feed.relay import RosTime, TwinNames, topics_of
 from lupin_bridge.feed.source import TwinUnavailableError
-from lupin_bridge.feed.topics import TwinNames, topics_of
 from lupin_bridge.viewers import foxglove_session as module
 from lupin_bridge.viewers.foxglove_session import MAX_LAYERS, Offer
 from tests.support.waiting import until

@@ -11,8 +11,7 @@ from typing import Any
 import orjson
 import pytest
 
-from lupin_bridge.feed.relay import NotRelayedError, Sample
-from lupin_bridge.feed.topics import Topic
+from lupin_bridge.feed.relay import NotRelayedError, Sample, Topic
 from lupin_bridge.stream.frames import text_frame
 from lupin_bridge.viewers import rosbridge_session as feeds
 from lupin_bridge.viewers.rosbridge_session import Feed, Feeds, Writer

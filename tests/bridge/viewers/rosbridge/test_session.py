@@ -11,7 +11,7 @@ from websockets.client import ClientProtocol
 from websockets.protocol import State
 from websockets.uri import parse_uri
 
-from lupin_bridge.feed.topics import TwinNames
+from lupin_bridge.feed.relay import TwinNames
 from lupin_bridge.stream.frames import FrameWriter, StateFrame
 from lupin_bridge.viewers.rosbridge_session import MAX_SUBSCRIPTIONS, Reaction, Session
 from lupin_twin.core.state import Snapshot, TagState

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from lupin_twin.journal.floor_plan import MAX_CELLS, map_of, text_of
+from lupin_twin.field.explored import MAX_PACKED_CELLS, map_of, text_of
 from lupin_twin.journal.writer import Journal
 from tests.support import maps
 from tests.support.journal import CLOCK, LIMITS, select
@@ -44,7 +44,7 @@ def test_what_is_too_large_for_a_row_is_none() -> None:
     [
         {"width": 4},
         {"width": 10_000_000, "height": 10_000_000},
-        {"width": MAX_CELLS, "height": 1},
+        {"width": MAX_PACKED_CELLS, "height": 1},
         {"width": "3"},
         {"resolution": 0.0},
         {"origin_x": None},

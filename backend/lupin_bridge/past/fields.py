@@ -1,0 +1,264 @@
+"""Fields of the newest state or as of a moment, and estimates.
+
+An estimate is of what the log has up to a moment, and of nothing else.
+"""
+
+from __future__ import annotations
+
+import math
+import sqlite3
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from functools import lru_cache
+from hashlib import blake2b
+from typing import Final
+
+from lupin_bridge.feed.query import Find
+from lupin_bridge.field import formats
+from lupin_bridge.field import query as field_query
+from lupin_bridge.field.formats import JSON, FieldFormat
+from lupin_bridge.field.query import EstimateQuery, FieldQuery
+from lupin_bridge.judge.derived import DAILY
+from lupin_bridge.judge.options import Criteria
+from lupin_bridge.judge.ranges import Sensor
+from lupin_bridge.judge.verdict import plausible, with_derived
+from lupin_bridge.past import derived
+from lupin_bridge.past.plans import Plan, StateQuery, etag_of, plan_of, series_s
+from lupin_bridge.serving.admission import REVALIDATE, Answer
+from lupin_twin.core.past import MAX_POINTS
+from lupin_twin.core.state import NANOSECONDS_PER_SECOND, Snapshot, samples_of
+from lupin_twin.estimate.engine import (
+    MINUTES_A_DAY,
+    EstimateRequest,
+    TagPast,
+    moment_of,
+)
+from lupin_twin.estimate.engine import cost_s as estimate_cost_s
+from lupin_twin.field.engine import (
+    FieldRefused,
+    FieldRequest,
+    FieldRules,
+    check_request,
+    compute_field,
+    cost_s,
+    default_box,
+)
+from lupin_twin.field.explored import OccupancyMap
+from lupin_twin.field.grid import far_off_tags
+from lupin_twin.journal.queries import NEWEST_S_PER_TAG
+from lupin_twin.runtime.estimates import AS_OF, estimate_at, readings_at
+from lupin_twin.runtime.workers import ShouldStop
+
+# Costs, s of one core, at worst: to write a cell or pixel, to judge a tag.
+_WRITE_CELL_S: Final = 50e-9
+_JUDGE_TAG_S: Final = 20e-6
+# Of a field too large to estimate, or one that will be refused.
+_LARGE_S: Final = 1.0
+
+
+@dataclass(frozen=True, slots=True)
+class Field(StateQuery):
+    """A field in a format (None: its quality), by these rules, on the map of now.
+
+    Without a box, it is that of the tags as they were pinned then. Quantities of a day are made of
+    each tag's readings of a day; whether it was day is decided by the clock. Live and past differ
+    in where the snapshot comes from, and in their ETags (`newest_etag`).
+    """
+
+    query: FieldQuery
+    field_format: FieldFormat | None
+    rules: FieldRules
+    occupancy: OccupancyMap | None = field(compare=False)
+    criteria: Criteria = field(compare=False)
+
+    def check(self) -> None:
+        """Refuse what can be refused without a snapshot.
+
+        Raises:
+            lupin_twin.field.engine.FieldRefused: a bad request.
+
+        """
+        self._check(self.query.request((0.0, 0.0, 0.0, 0.0), self.rules.max_grid_cells))
+
+    def write_s(self, tags: int) -> float:
+        """See `StateQuery`; without a box, as if the tags stood side by side."""
+        side_m = 2.0 * self.rules.max_distance_m * math.sqrt(max(tags, 1))
+        request = self.query.request((0.0, 0.0, side_m, side_m), self.rules.max_grid_cells)
+        is_daily = self.query.sensor_type in DAILY
+        looked_s = tags * (_JUDGE_TAG_S + (series_s("", MAX_POINTS, tags) if is_daily else 0.0))
+        try:
+            width, height = check_request(request, self.rules.max_grid_cells)
+            written_s = width * height * self.query.scale**2 * _WRITE_CELL_S
+            return looked_s + cost_s(request, tags, self.rules) + written_s
+        except FieldRefused:
+            return looked_s + _LARGE_S
+
+    def newest_etag(self, revision: str) -> str:
+        """Of the newest state: of its revision, and nothing has to be looked at for it."""
+        name = "quality" if self.field_format is None else self.field_format.name
+        rules, sensors = self.rules, self.criteria.sensors
+        return etag_of(f"newest {name}", (revision, self.query, rules, sensors.text))
+
+    def look(self, find: Find) -> Plan:
+        """See `Query`."""
+        at_ns = self.at_ns or 0
+        snapshot: Snapshot = find(at_ns)
+        daily = DAILY.get(self.query.sensor_type)
+        if daily is not None:
+            by = self.criteria
+            tags = derived.with_daily(
+                snapshot.tags, daily, at_ns, sensors=by.sensors, is_day=by.is_day, find=find
+            )
+            snapshot = replace(snapshot, tags=tuple(tags))
+        return self.plan(snapshot)
+
+    def plan(self, snapshot: Snapshot, etag: str | None = None) -> Plan:
+        """See `StateQuery`; None: the ETag is made of content.
+
+        Raises:
+            lupin_twin.field.engine.FieldRefused: a bad request.
+
+        """
+        request = self.request(snapshot)
+        sensor, sensors = self.criteria.sensors.named(request.sensor_type), self.criteria.sensors
+        tags = plausible(with_derived(snapshot.tags, request.sensor_type), sensor)
+        samples = samples_of(tags, request.sensor_type)
+        far_off = far_off_tags(snapshot.tags)
+
+        def content_etag(kind: str, *content: object) -> str:
+            # By content: the revision of a map is one process's own.
+            digest = None if self.occupancy is None else _digest_of_map(self.occupancy)
+            built_from = (request, samples, *content, far_off, self.rules, digest, sensors.text)
+            return etag_of(kind, built_from)
+
+        def quality(should_stop: ShouldStop) -> bytes:
+            grid = compute_field(request, samples, self.occupancy, self.rules, should_stop)
+            return formats.write_quality(grid, tags, sensor, self.rules, should_stop)
+
+        if self.field_format is None:
+            of = [tag.tag_id for tag in tags if samples_of((tag,), request.sensor_type)]
+            etag = etag or content_etag("quality", of)
+            return plan_of(etag, quality)
+        field_format, scale = self.field_format, self.query.scale
+        etag = etag or content_etag(f"field {field_format.name} {scale}")
+
+        def write(should_stop: ShouldStop) -> Answer:
+            grid = compute_field(request, samples, self.occupancy, self.rules, should_stop)
+            metadata = {**formats.metadata(grid, sensor), **formats.far_off(far_off)}
+            headers = field_query.headers(metadata, f"{request.sensor_type}.{field_format.name}")
+            body = formats.write(grid, field_format, request.sensor_type, sensors, scale)
+            return Answer(body, field_format.media_type, {**headers, "ETag": etag, **REVALIDATE})
+
+        return Plan(etag, write)
+
+    def request(self, snapshot: Snapshot) -> FieldRequest:
+        """What is to be computed of a snapshot; see `check`."""
+        places = [(tag.pose.x, tag.pose.y) for tag in snapshot.tags if tag.pose is not None]
+        box = default_box(places, self.rules.max_distance_m)
+        request = self.query.request(box, self.rules.max_grid_cells)
+        self._check(request)
+        return request
+
+    def _check(self, request: FieldRequest) -> None:
+        width, height = check_request(request, self.rules.max_grid_cells)
+        field_format = self.field_format or formats.JSON
+        field_query.check_scale(self.query, field_format, width * height, self.rules.max_grid_cells)
+
+
+@lru_cache(maxsize=1)
+def _digest_of_map(occupancy: OccupancyMap) -> str:
+    return blake2b(occupancy.cells.data, digest_size=12).hexdigest() + repr(occupancy.place)
+
+
+# --- estimates -----------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True)
+class ReadingsAt:
+    """What the log has of a sensor on the day up to a moment; a list of `TagPast`."""
+
+    sensor_type: str
+    at_ns: int
+    day_length_s: float
+
+    def step(self, log: sqlite3.Connection) -> list[TagPast]:
+        """See `Step`."""
+        return readings_at(log, self.sensor_type, self.at_ns, self.day_length_s)
+
+
+@dataclass(frozen=True, slots=True)
+class Estimated(Field):
+    """An estimate in a format; a day takes `day_length_s` of ROS time.
+
+    Without a moment it is that of now, `now_ns`. That is made for the newest reading or the last
+    whole minute of the day, whichever is later: a minute of the day changes nothing that anybody
+    could see, but of the same readings it is the same estimate throughout, to the last bit.
+    """
+
+    query: EstimateQuery
+    day_length_s: float
+    now_ns: int = field(default=0, compare=False)
+
+    def write_s(self, tags: int) -> float:
+        """See `StateQuery`."""
+        box = (0.0, 0.0, 2.0 * self.rules.max_distance_m, 2.0 * self.rules.max_distance_m)
+        max_cells = self.rules.max_grid_cells
+        request = EstimateRequest(self.query.request(box, max_cells))
+        return tags * NEWEST_S_PER_TAG + AS_OF * estimate_cost_s(request, tags, max_cells)
+
+    def look(self, find: Find) -> Plan:
+        """See `Query`.
+
+        Raises:
+            lupin_twin.field.engine.FieldRefused: a bad request, or nothing to make an estimate of.
+
+        """
+        at_ns = self.now_ns if self.at_ns is None else self.at_ns
+        snapshot: Snapshot = find(at_ns)
+        box = self.request(snapshot)
+        # A minute more than a day: so none is missing for as long as this estimate is the same.
+        reach_s = self.day_length_s * (1.0 + 1.0 / MINUTES_A_DAY)
+        pasts: list[TagPast] = find(ReadingsAt(box.sensor_type, at_ns, reach_s))
+        if self.at_ns is None:
+            at_ns = moment_of(pasts, at_ns, self.day_length_s)
+        sensor = self.criteria.sensors.named(box.sensor_type)
+        since_ns = at_ns - int(self.day_length_s * NANOSECONDS_PER_SECOND)
+        pasts = _that_count(pasts, since_ns, sensor)
+        request, far_off = EstimateRequest(box, at_ns), far_off_tags(snapshot.tags)
+        query, sensors = self.query, self.criteria.sensors
+        field_format = self.field_format or JSON
+        etag = etag_of(
+            f"estimate {field_format.name} {query.layer} {query.scale}",
+            (request, pasts, far_off, self.day_length_s, sensors.text),
+        )
+
+        def write(should_stop: ShouldStop) -> Answer:
+            made = estimate_at(request, pasts, self.day_length_s, should_stop)
+            estimate = formats.within_ideal(made, sensor)
+            metadata = {
+                **formats.estimate_metadata(estimate, sensor),
+                **formats.far_off(far_off),
+            }
+            name = f"{box.sensor_type}.{field_format.name}"
+            headers = field_query.headers(metadata, name, "Estimate")
+            body = formats.write_estimate(
+                estimate,
+                field_format,
+                box.sensor_type,
+                sensors,
+                layer=query.layer,
+                scale=query.scale,
+            )
+            return Answer(body, field_format.media_type, {**headers, "ETag": etag, **REVALIDATE})
+
+        return Plan(etag, write)
+
+
+def _that_count(pasts: Sequence[TagPast], since_ns: int, sensor: Sensor) -> list[TagPast]:
+    """Without what is older, and what no sensor reads that works."""
+
+    def counts(reading: tuple[int, float]) -> bool:
+        return reading[0] >= since_ns and sensor.is_plausible(reading[1])
+
+    those = (replace(past, readings=tuple(filter(counts, past.readings))) for past in pasts)
+    return [past for past in those if past.readings]

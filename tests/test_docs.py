@@ -6,6 +6,7 @@ import argparse
 import re
 import runpy
 from dataclasses import fields
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -21,7 +22,6 @@ from tests.support.docs import DOCS, ROOT, blocks, name_of, pages, without_block
 from tests.support.structure import PACKAGES, ROOMS
 
 GENERATOR = runpy.run_path(str(DOCS / "generate.py"))
-REFERENCE = {name: page() for name, page in GENERATOR["PAGES"].items()}
 EVERY_PAGE = pytest.mark.parametrize("page", pages(), ids=name_of)
 # Those of `lupin-twin fleet` beside the bridge's.
 FLEET_ROUTES = {"/api/sites", "/api/sites/{name}/map.svg", "/ws/sites", "/api/compare"}
@@ -55,9 +55,15 @@ FOREIGN_OPTIONS = {
 }
 
 
+@cache
+def reference() -> dict[str, str]:
+    """The generated pages. They take a second, and every worker of pytest reads this file."""
+    return {name: page() for name, page in GENERATOR["PAGES"].items()}
+
+
 def listed(page: str) -> set[str]:
     """What stands in the first cells of a generated page's tables."""
-    return set(re.findall(r"^\| `([^`]+)`", REFERENCE[page], re.MULTILINE))
+    return set(re.findall(r"^\| `([^`]+)`", reference()[page], re.MULTILINE))
 
 
 def options_of(parser: argparse.ArgumentParser) -> set[str]:
@@ -88,10 +94,10 @@ def test_every_command_is_in_the_reference_with_all_of_its_options() -> None:
     every = {f"lupin-twin {name}": it for name, it in roles.items()}
     every |= {f"lupin-twin journal {name}": it for name, it in commands(roles["journal"]).items()}
     for name, command in every.items():
-        section = REFERENCE["commands"].split(f"\n## {name}\n", 1)[1].partition("\n## ")[0]
+        section = reference()["commands"].split(f"\n## {name}\n", 1)[1].partition("\n## ")[0]
         assert options_of(command) <= set(re.findall(r"--[a-z][a-z-]*", section)), name
-    assert "\n## patrol_node\n" in REFERENCE["commands"]
-    assert "twin_node" in REFERENCE["commands"]
+    assert "\n## patrol_node\n" in reference()["commands"]
+    assert "twin_node" in reference()["commands"]
 
 
 def test_every_route_is_in_the_reference_and_none_that_is_not_there() -> None:
@@ -103,7 +109,7 @@ def test_every_route_is_in_the_reference_and_none_that_is_not_there() -> None:
         for method in (route.methods or set()) - {"HEAD"}
     }
     websockets = {route.path_format for route in routes if isinstance(route, APIWebSocketRoute)}
-    described = set(re.findall(r"^## `(\w+) (/[^`]*)`$", REFERENCE["http"], re.MULTILINE))
+    described = set(re.findall(r"^## `(\w+) (/[^`]*)`$", reference()["http"], re.MULTILINE))
     plain = {name for name in listed("http") if name.startswith("/")}
     assert described <= routed
     answered = {path for _, path in routed} | websockets | {"/"}
@@ -115,15 +121,15 @@ def test_every_member_of_a_frame_and_of_a_type_is_in_the_reference() -> None:
     schemas = create_app(None).openapi()["components"]["schemas"]
     for name, schema in schemas.items():
         page = "frames" if name in {model.__name__ for model in FRAMES} else "types"
-        section = REFERENCE[page].split(f"\n## {name}\n", 1)[1].partition("\n(type-")[0]
+        section = reference()[page].split(f"\n## {name}\n", 1)[1].partition("\n(type-")[0]
         members = re.findall(r"^\| `(\w+)`", section, re.MULTILINE)
         assert members == list(schema.get("properties", {})), name
 
 
 def test_every_message_is_in_the_reference_with_its_comments() -> None:
     for file in sorted((ROOT / "ros_node" / "lupin_msgs").glob("[ms][sr][gv]/*.[ms][sr][gv]")):
-        assert f"\n## {file.stem} (" in REFERENCE["messages"]
-        assert file.read_text(encoding="utf-8").strip() in REFERENCE["messages"]
+        assert f"\n## {file.stem} (" in reference()["messages"]
+        assert file.read_text(encoding="utf-8").strip() in reference()["messages"]
 
 
 def test_every_metric_is_in_the_reference() -> None:
@@ -150,7 +156,7 @@ def test_the_policy_beside_the_systemd_unit_is_that_of_the_table() -> None:
 
 @EVERY_PAGE
 def test_every_option_that_a_page_names_is_one(page: Path) -> None:
-    known = set(re.findall(r"--[a-z][a-z-]*", REFERENCE["commands"])) | FOREIGN_OPTIONS
+    known = set(re.findall(r"--[a-z][a-z-]*", reference()["commands"])) | FOREIGN_OPTIONS
     shown = re.findall(r"`(--[a-z][a-z-]*)", without_blocks(page))
     for block in blocks(page):
         for line in block.text.replace("\\\n", " ").splitlines():
@@ -165,13 +171,13 @@ def test_every_parameter_and_variable_that_a_page_names_is_one(page: Path) -> No
     named = set(re.findall(r"-p (\w+):=", text))
     assert named <= {spec.name for spec in fields(TwinParameters)} | {"use_sim_time"}
     variables = set(re.findall(r"`(LUPIN_[A-Z_]+)", text))
-    assert variables <= set(re.findall(r"LUPIN_[A-Z_]+", REFERENCE["settings"]))
+    assert variables <= set(re.findall(r"LUPIN_[A-Z_]+", reference()["settings"]))
 
 
 @EVERY_PAGE
 def test_every_route_topic_and_metric_that_a_page_names_is_one(page: Path) -> None:
     text = page.read_text(encoding="utf-8")
-    routes = set(re.findall(r"`(?:GET |POST )?(/[^`\s]*)`", REFERENCE["http"])) | FLEET_ROUTES
+    routes = set(re.findall(r"`(?:GET |POST )?(/[^`\s]*)`", reference()["http"])) | FLEET_ROUTES
     # A name that goes on in another route, such as `/api/tags`, is a good enough name.
     known = [re.sub(r"\\\{.*?\\\}", "[^/]+", re.escape(route)) for route in routes]
     for named in re.findall(r"(?:`|:8000|\.example)(/(?:api|ws)/[\w{}/.-]*)", text):
@@ -207,7 +213,7 @@ def test_every_file_that_a_page_names_is_there(page: Path) -> None:
         if not target.is_relative_to(DOCS / "reference"):  # those are generated
             assert target.exists(), name
         else:
-            assert target.stem in REFERENCE, name
+            assert target.stem in reference(), name
     for name in re.findall(r"`((?:backend|frontend|ros_node|tests|docs)/[^`\s:]*)`", text):
         assert list(ROOT.glob(name.rstrip("/"))), name
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import sys
 import time
 from collections.abc import Iterator
@@ -77,9 +76,8 @@ def test_with_a_full_disk_answers_say_up_to_when_they_are_complete(
     folder = tmp_path / "disk"
     folder.mkdir()
     disk = Disk(folder, library, tmp_path / "control")
-    env = {name: value for name, value in disk.env.items() if os.environ.get(name) != value}
     journal = folder / "j.sqlite"
-    with both(journal, env={"afresh": True, **env}) as lives:
+    with both(journal, env={"afresh": True, **disk.env}) as lives:
         serve, _ = lives
         serve.peer.observe(scan("a", {"co2": 400.0}, (1.0, 1.0)))
         wait_for(lambda: len(select(journal, "SELECT 1 FROM scan")) == 1, "it in the journal")

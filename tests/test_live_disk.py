@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import random
 import subprocess
 import sys
@@ -64,7 +65,7 @@ def feeding(disk: Disk, log_bytes: int = 8_000_000) -> Iterator[TwinUpdate]:
     command = [sys.executable, "-m", "tests.support.journal_child"]
     child = subprocess.Popen(
         [*command, str(disk.folder / "j.sqlite"), str(RATE), str(log_bytes)],
-        env=disk.env,
+        env={**os.environ, **disk.env},
         cwd=ROOT,
         text=True,
         stdin=subprocess.PIPE,
@@ -137,7 +138,7 @@ def test_a_journal_in_a_read_only_folder_can_be_read(disk: Disk) -> None:
                 "--journal",
                 path,
             ],
-            env=disk.env,
+            env={**os.environ, **disk.env},
             check=True,
             capture_output=True,
             text=True,

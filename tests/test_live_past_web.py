@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import json
 import sqlite3
 import sys
@@ -23,7 +21,7 @@ from tests.support.messages import look, scan
 from tests.support.processes import OFTEN, Process, limits, lupin_twin, twin_node
 from tests.support.ros import Peer
 from tests.support.waiting import PATIENCE_S, wait_for
-from tests.support.web import Bridge, filled
+from tests.support.web import Bridge
 
 ROOT = Path(__file__).parents[1]
 # How long Fast DDS keeps a dead process in the graph.
@@ -226,64 +224,6 @@ def test_a_killed_twin_is_asked_nothing(domain: int) -> None:
         assert answer.status_code == 503, answer.text
         assert int(answer.headers["retry-after"]) >= 1
         assert "nothing was received on /twin/state for 3 s" in answer.json()["detail"]
-
-
-def test_a_moment_is_as_it_was_then_and_has_one_etag_in_every_replica(apart: Apart) -> None:
-    first, second = apart.beside, apart.following
-    state = asked(first, "/api/state", at=T + 100.0)
-    assert state["header"]["stamp"] == {"sec": int(T) + 100, "nanosec": 0}
-    tags = {tag["tag_id"]: tag for tag in state["tags"]}
-    co2, *_ = filled(tags["a"])["readings"]
-    assert (co2["value"], co2["observed_at"]["sec"]) == (401.0, int(T) + 60)
-    assert (tags["a"]["bug_count"], tags["a"]["anomaly"]) == (2, True)
-    assert tags["b"]["last_try_status"] == 2
-    asked(second, "/api/state", at=T + 100.0)
-    etags = {live.get("/api/state", at=T + 100.0).headers["etag"] for live in (first, second)}
-    assert len(etags) == 1
-    response = second.get("/api/state", headers={"If-None-Match": etags.pop()}, at=T + 100.0)
-    assert response.status_code == 304
-    refused = first.get("/api/state", at=2**31 - 1)
-    assert (refused.status_code, "later than now" in refused.text) == (400, True)
-
-
-def test_an_estimate_of_then_is_the_same_in_every_replica(apart: Apart) -> None:
-    first, second = apart.beside, apart.following
-    query: dict[str, Any] = {"sensor_type": "co2", "resolution": 0.5, "at": T + 600.0}
-    one = asked(first, "/api/estimate", **query)
-    assert (one["sample_count"], one["reading_count"]) == (1, 11)
-    etags = {live.get("/api/estimate", **query).headers["etag"] for live in (first, second)}
-    assert len(etags) == 1
-    refused = first.get("/api/estimate", sensor_type="ph")
-    assert (refused.status_code, refused.json()["ok"]) == (400, False)
-
-
-def test_history_timeline_and_export_tell_the_same_past(apart: Apart) -> None:
-    first, second = apart.beside, apart.following
-    # Up to where other tests here observe more.
-    query: dict[str, Any] = {"tag_id": "a", "sensor_type": "co2", "to": T + 60.0 * OBSERVED}
-    history = asked(first, "/api/history", **query)
-    values = [400.0 + number for number in range(OBSERVED)]
-    assert [reading["value"] for reading in history["readings"]] == values
-    assert history["from"] == {"sec": int(T), "nanosec": 0}
-    buckets = asked(first, "/api/history", **query, points=10)
-    assert (buckets["bucket_s"], buckets["from"]["sec"]) == (240.0, int(T))
-    assert sum(bucket["n"] for bucket in buckets["buckets"]) == OBSERVED
-    assert buckets == asked(second, "/api/history", **query, points=10)
-
-    timeline = asked(first, "/api/timeline", to=T + 60.0 * OBSERVED)
-    counted = {
-        name: sum(bucket[name] for bucket in timeline["buckets"])
-        for name in ("scans", "failures", "looks", "pests_seen")
-    }
-    assert counted == {"scans": OBSERVED, "failures": 1, "looks": 1, "pests_seen": 1}
-    assert timeline["reach"]["from"]["sec"] == int(T)
-
-    response = first.get("/api/export.csv", to=T + 60.0 * OBSERVED)
-    rows = list(csv.DictReader(io.StringIO(response.text)))
-    assert [float(row["value"]) for row in rows if row["sensor"] == "co2"] == values
-    assert {row["source"] for row in rows} == {"test"}
-    assert {(row["x_m"], row["y_m"]) for row in rows if row["tag_id"] == "a"} == {("1.0", "2.0")}
-    assert [(row["status"], row["sensor"]) for row in rows if row["tag_id"] == "b"] == [("2", "")]
 
 
 def test_what_is_followed_answers_as_the_file_itself_does(apart: Apart) -> None:

@@ -27,11 +27,11 @@ import psycopg
 from lupin_bridge.archive.forwarding import Forwarder
 from lupin_bridge.archive.sink import Sink
 from lupin_bridge.archive.source import Batch, Epoch
-from lupin_bridge.fleet.site_log import SiteConnection
 from lupin_twin.core.past import SeriesRequest
 from lupin_twin.journal.fold import state_at
 from lupin_twin.journal.queries import series
 from lupin_twin.journal.runs import Clock
+from lupin_twin.journal.schema import SiteLog
 from tests.support.archive import Archive
 from tests.support.journal import SECOND, kept, scan
 from tests.support.postgres import server
@@ -201,7 +201,7 @@ def measure(archive: Archive, sites: int, days: int) -> None:
         ).fetchall()
         states, past = [], []
         for _ in range(40):
-            log = SiteConnection(connection, f"gh{chance.randrange(sites)}")
+            log = SiteLog(connection, f"gh{chance.randrange(sites)}")
             at_ns = BEGUN + DAY // 24 + int(chance.random() * (days * DAY - DAY // 12))
             start = time.perf_counter()
             found = state_at(log, at_ns, "map")  # type: ignore[arg-type]  # queries are of both

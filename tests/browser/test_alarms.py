@@ -132,29 +132,6 @@ def test_a_row_has_the_value_of_now_with_its_trend_beside_the_worst(
         expect(fact(row, "now")).to_have_attribute("data-status", "unknown")
 
 
-def test_a_value_that_is_too_old_is_not_that_of_now(domain: int, open_page: OpenPage) -> None:
-    with bridge("--reading-validity-s", "2", domain=domain) as running:
-        running.peer.observe(*[warm("a", value, at=(1, 1)) for value in (41.0, 43.5)])
-        hmi = open_page(running.url)
-        hmi.page.keyboard.press("a")
-        row = hmi.page.locator("[data-alarm]", has_text="Temperature above")
-        expect(fact(row, "now")).to_contain_text("now unknown, last 43.5\u00a0°C")
-
-
-def test_no_value_reads_like_the_limit_that_it_is_beyond(domain: int, open_page: OpenPage) -> None:
-    with bridge(domain=domain) as running:
-        dry = scan("a", {"humidity": 49.97, "light": 900.0}, at=(1, 1))
-        running.peer.observe(dry, dry)
-        hmi = open_page(running.url)
-        expect(hmi.test_id("health-driver")).to_have_text(
-            "Tag a: Humidity 49.97\u00a0%, below 50.00"
-        )
-        hmi.page.keyboard.press("a")
-        row = rows(hmi, "active")
-        expect(row).to_contain_text("Humidity below 50.00\u00a0%")
-        expect(fact(row, "now")).to_contain_text("now 49.97\u00a0%")
-
-
 def test_the_counts_agree_and_healthy_beside_an_alarm_says_why(
     domain: int, open_page: OpenPage
 ) -> None:

@@ -14,7 +14,7 @@ from tests.browser.places import place
 from tests.browser.test_accessibility import violations
 from tests.support.web import Bridge
 
-TAGS = 10_000
+TAGS = 2_000
 # More than the rows of any window with the spare ones; far less than all.
 MOST = 100
 

@@ -17,8 +17,7 @@ from playwright.sync_api import Download, expect
 
 from tests.browser.hmi import PHONE, Hmi, OpenPage, changed_box
 from tests.browser.house import TAGS
-from tests.support.messages import look, scan
-from tests.support.web import Bridge, bridge
+from tests.support.web import Bridge
 
 
 def test_a_link_shows_the_same_view_to_somebody_else(house: Bridge, open_page: OpenPage) -> None:
@@ -137,23 +136,6 @@ def test_the_table_as_csv_holds_every_tag_with_raw_values_or_those_that_are_show
     shown = read_csv(later.value)
     assert [row["tag"] for row in shown] == ["10", "2", "9", "1"]
     assert shown[0]["Temperature [°F]"] == "87.8"
-
-
-def test_text_that_a_spreadsheet_would_run_is_disarmed(domain: int, open_page: OpenPage) -> None:
-    hostile = '=HYPERLINK("http://x.example","a")'
-    with bridge(domain=domain) as running:
-        running.peer.observe(
-            scan(hostile, {"temperature": -5.0}, at=(-1, 1)),
-            look(hostile, "@SUM(1+1)*cmd|' /C calc'!A0,\nsecond line"),
-        )
-        hmi = open_page(running.url)
-        hmi.expect(lambda: len(hmi.rows()) == 1, "the tag")
-        expect(hmi.page.locator(".cell-species")).to_contain_text("@SUM")
-        [row] = read_csv(save(hmi, "Save table as CSV"))
-    assert row["tag"] == "'" + hostile
-    assert row["species"] == "'@SUM(1+1)*cmd|' /C calc'!A0,\nsecond line"
-    assert row["Temperature [°C]"] == "-5"
-    assert row["x [m]"] == "-1"
 
 
 FOOTER_PX = 56

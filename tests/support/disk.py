@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import struct
 import subprocess
 from dataclasses import dataclass, field
@@ -26,7 +25,7 @@ def build(folder: Path) -> Path:
 
 @dataclass
 class Disk:
-    """A folder as a child process sees it, whose `env` makes it so."""
+    """A folder as a child process sees it that has these variables (`env`) too."""
 
     folder: Path
     library: Path
@@ -36,7 +35,6 @@ class Disk:
     @property
     def env(self) -> dict[str, str]:
         return {
-            **os.environ,
             "LD_PRELOAD": str(self.library),
             "DISK_FOLDER": str(self.folder),
             "DISK_CONTROL": str(self.control),

@@ -5,10 +5,12 @@ psycopg is imported where it is needed: it is the extra `fleet`.
 
 from __future__ import annotations
 
+import os
 import re
 from importlib.resources import files
 from typing import TYPE_CHECKING, Any, Final
 
+from lupin_bridge.settings import variable
 from lupin_twin.journal.schema import POSTGRESQL_TABLES
 
 if TYPE_CHECKING:
@@ -45,6 +47,8 @@ _NOISE: Final = tuple(
         ),
     )
 )
+# A question that takes longer is given up: nobody waits for its answer any more.
+_MAX_MS: Final = 10_000
 _SITE: Final = re.compile(r"[a-z][a-z0-9_-]{0,62}")
 
 
@@ -126,6 +130,36 @@ def connect(url: str, name: str, session: str = "read-write") -> psycopg.Connect
         connection.execute(_SESSION)
     except psycopg.Error as error:
         raise explained(error) from error
+    return connection
+
+
+def archive_url() -> str:
+    """Where the archive is: not on the command line of a process, which others can read."""
+    return os.environ[variable("archive_url")]
+
+
+def open_archive(url: str, name: str) -> Any:
+    """A connection that cannot write, to the primary or to a standby.
+
+    Raises:
+        ArchiveError: there is no archive that can be read; `UsageError`: no later try helps.
+
+    """
+    import psycopg  # noqa: PLC0415  # the extra `fleet`
+
+    connection = connect(url, name, session="any")
+    try:
+        connection.read_only = True
+        # All that is read in one transaction is of one moment.
+        connection.isolation_level = psycopg.IsolationLevel.REPEATABLE_READ
+        connection.execute(f"SET statement_timeout = {_MAX_MS}")
+        check_version(connection)
+    except psycopg.Error as error:
+        connection.close()
+        raise explained(error) from error
+    except ArchiveError:
+        connection.close()
+        raise
     return connection
 
 

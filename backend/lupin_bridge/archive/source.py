@@ -21,7 +21,7 @@ from lupin_twin.core.past import HOUR_NS, Event
 from lupin_twin.journal.appending import LAST_SEQ, PURGED_SEQ
 from lupin_twin.journal.beside import forwarded_seq, note_forwarded
 from lupin_twin.journal.retention import RECORD
-from lupin_twin.journal.schema import LOCAL_SITE, MAP, ORIGIN, SiteLog, get_meta, open_named
+from lupin_twin.journal.schema import LOCAL_SITE, MAP, ORIGIN, get_meta, one_view, open_named
 
 Row = tuple[Any, ...]
 
@@ -208,7 +208,7 @@ class Source:
             ArchiveError: it is being saved from damage.
 
         """
-        with SiteLog(self._connection).one_view():
+        with one_view(self._connection):
             self._refuse_salvaged()
             upto, is_full = self._upto(epoch.forwarded_seq)
             asked = {

@@ -43,7 +43,7 @@ from lupin_twin.core.parameters import TwinParameters
 from lupin_twin.core.state import Flower, Inspection, Pin, Pose, Scan, Write
 from lupin_twin.journal.rows import listed_rows
 from lupin_twin.journal.runs import Run, runs, spans_within
-from lupin_twin.journal.schema import LOCAL_SITE, SiteLog
+from lupin_twin.journal.schema import LOCAL_SITE, one_view
 from lupin_twin.ros.convert import time_msg
 
 # What rosbag2 calls it in a channel's metadata; without it rosbag2 plays everything as volatile.
@@ -95,7 +95,7 @@ class JournalRows:
     def __init__(self, connection: sqlite3.Connection, start_ns: int, end_ns: int) -> None:
         self._connection = connection
         self._period = {"site": LOCAL_SITE, "start": start_ns, "end": end_ns, "lot": LOT}
-        with SiteLog(connection).one_view():
+        with one_view(connection):
             self._spans = spans_within(runs(connection.execute), start_ns, end_ns)
             self.runs: dict[int, Run] = {span.run.id: span.run for span in self._spans}
             self.places = self._places_before(start_ns)
@@ -109,7 +109,7 @@ class JournalRows:
         """Each with the run of the clock that it belongs to."""
         after = 0
         while True:
-            with SiteLog(self._connection).one_view():
+            with one_view(self._connection):
                 found, last = self._lot(after)
             yield from found
             if last is None:

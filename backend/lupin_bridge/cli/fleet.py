@@ -11,11 +11,10 @@ from dataclasses import replace
 
 from lupin_bridge.access.middleware import Access
 from lupin_bridge.access.policy import Proxies
-from lupin_bridge.archive.database import ArchiveError, UsageError, check_url
+from lupin_bridge.archive.database import ArchiveError, UsageError, check_url, open_archive
 from lupin_bridge.cli.serving import open_listener, serve
 from lupin_bridge.cli.supervisor import Supervisor
 from lupin_bridge.fleet.app import Fleet, create_fleet_app
-from lupin_bridge.fleet.site_log import open_archive
 from lupin_bridge.judge.options import Criteria
 from lupin_bridge.serving.admission import Limits
 from lupin_bridge.serving.server import BridgeServer, allow_connections

@@ -1,7 +1,8 @@
 """The process that reads the sites' logs: `past_child`, over the archive in place of a journal.
 
 One process answers for all sites that are open here. Which site a question is of stands where the
-path of a journal does otherwise.
+path of a journal does otherwise. Every query of the log names its site `:site` and is understood by
+both engines: a `SiteLog` stands in the place of a connection to a twin's own journal.
 """
 
 from __future__ import annotations
@@ -9,17 +10,24 @@ from __future__ import annotations
 import logging
 import sqlite3
 from collections.abc import Callable
-from contextlib import suppress
+from concurrent.futures import CancelledError
+from contextlib import closing, suppress
 from dataclasses import dataclass
 from typing import Any, Final, TypeVar
 
-from lupin_bridge.archive.database import ArchiveError, explained
+from lupin_bridge.archive.database import (
+    CHANNEL,
+    ArchiveError,
+    archive_url,
+    connect,
+    explained,
+    open_archive,
+)
 from lupin_bridge.feed import past_child
 from lupin_bridge.feed.past_child import Child, Search
 from lupin_bridge.feed.query import Now, PastQuery
 from lupin_bridge.fleet.compare import Compare
 from lupin_bridge.fleet.report import SitesReport
-from lupin_bridge.fleet.site_log import SiteConnection, archive_url, open_archive, write_note
 from lupin_twin.core.diagnostics import Origin, origin_of
 from lupin_twin.core.notes import Note
 from lupin_twin.core.past import NotRemembered
@@ -27,9 +35,10 @@ from lupin_twin.core.state import Snapshot
 from lupin_twin.field.explored import OccupancyMap, map_of
 from lupin_twin.journal.appending import simulated
 from lupin_twin.journal.fold import state_at
+from lupin_twin.journal.notes import last_number, put_note
 from lupin_twin.journal.retention import Stretches, kept
 from lupin_twin.journal.runs import FOREVER_NS, runs, span_at
-from lupin_twin.journal.schema import MAP, ORIGIN, DamagedFile
+from lupin_twin.journal.schema import MAP, ORIGIN, DamagedFile, SiteLog
 from lupin_twin.runtime.journal_queries import Recall
 from lupin_twin.runtime.workers import ShouldStop
 
@@ -46,6 +55,8 @@ _NEWER_MAP: Final = (
     "SELECT value, hashtextextended(value, 0) FROM meta WHERE site = :site AND key = :key"
     " AND hashtextextended(value, 0) <> :known"
 )
+# The number up to which the site's journal has come, by which its own notes are known.
+_FORWARDED: Final = "SELECT forwarded_seq FROM epoch WHERE site = :site ORDER BY epoch DESC LIMIT 1"
 logger = logging.getLogger(__name__)
 
 
@@ -87,9 +98,9 @@ class ArchiveChild(Child):
     ) -> Search:
         site = now.condition.path
         if isinstance(question, Latest):
-            return lambda connection, _: _latest(SiteConnection(connection, site), question)
+            return lambda connection, _: _latest(SiteLog(connection, site), question)
         if isinstance(question, Note):
-            return lambda _, stop: write_note(site, question, stop)
+            return lambda _, stop: _write_note(site, question, stop)
         if isinstance(question, Compare | SitesReport):
             return lambda connection, _: _compared(question, connection)
         found = super()._search(question, now)
@@ -97,7 +108,29 @@ class ArchiveChild(Child):
 
 
 def _as_journal(connection: Any, site: str) -> sqlite3.Connection:
-    return SiteConnection(connection, site)  # type: ignore[return-value]  # whose queries are of both
+    return SiteLog(connection, site)  # type: ignore[return-value]  # whose queries are of both
+
+
+def _write_note(site: str, note: Note, should_stop: ShouldStop) -> Note:
+    """Write what somebody said into a site's log, at the primary; returns it with its id.
+
+    Raises:
+        ArchiveError: there is no archive that can be written; `psycopg.Error`: it refuses.
+        CancelledError: nobody waits for it any more, and it is not written.
+
+    """
+    with (
+        closing(connect(archive_url(), "lupin-twin fleet")) as connection,
+        connection.transaction(),
+    ):
+        log = SiteLog(connection, site)
+        (forwarded,) = log.execute(_FORWARDED).fetchone() or (0,)
+        # Behind all that were forwarded, and before those that the twin has yet to write.
+        written = put_note(log, max(forwarded, last_number(log)) + 1, note)
+        connection.execute("SELECT pg_notify(%s, %s)", (CHANNEL, site))
+        if should_stop():
+            raise CancelledError
+        return written
 
 
 def _compared(query: Compare | SitesReport, connection: Any) -> Any:
@@ -105,7 +138,7 @@ def _compared(query: Compare | SitesReport, connection: Any) -> Any:
     return query.answer(found)
 
 
-def _latest(log: SiteConnection, asked: Latest) -> Reported:
+def _latest(log: SiteLog, asked: Latest) -> Reported:
     journal: Any = log
     every = runs(log.execute)
     span = span_at(every, FOREVER_NS)
@@ -129,7 +162,7 @@ def _latest(log: SiteConnection, asked: Latest) -> Reported:
     )
 
 
-def _newer_map(log: SiteConnection, known: int) -> tuple[int, OccupancyMap | None]:
+def _newer_map(log: SiteLog, known: int) -> tuple[int, OccupancyMap | None]:
     row = log.execute(_NEWER_MAP, {"key": MAP, "known": known}).fetchone()
     text, found = row or ("", known)
     try:

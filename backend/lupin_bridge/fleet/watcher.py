@@ -17,12 +17,17 @@ from typing import Any, Final, TypeVar
 
 from lupin_bridge.alarms.board import worst_first
 from lupin_bridge.alarms.notes import notes_of_alarms
-from lupin_bridge.archive.database import CHANNEL, ArchiveError, explained
+from lupin_bridge.archive.database import (
+    CHANNEL,
+    ArchiveError,
+    archive_url,
+    explained,
+    open_archive,
+)
 from lupin_bridge.feed import past_child
 from lupin_bridge.feed.past_child import Child, Search
 from lupin_bridge.feed.query import Now
 from lupin_bridge.fleet.overview import LIVE_S, Site
-from lupin_bridge.fleet.site_log import SiteConnection, archive_url, open_archive
 from lupin_bridge.fleet.small_map import dots
 from lupin_bridge.judge.alarm_fold import Follower
 from lupin_bridge.judge.episodes import Alarm, silence
@@ -40,7 +45,7 @@ from lupin_twin.journal.fold import state_at
 from lupin_twin.journal.follow import recent, writes
 from lupin_twin.journal.notes import notes
 from lupin_twin.journal.runs import FOREVER_NS, runs, span_at
-from lupin_twin.journal.schema import ORIGIN
+from lupin_twin.journal.schema import ORIGIN, SiteLog
 from lupin_twin.runtime.journal_queries import Recall
 from lupin_twin.runtime.workers import ShouldStop
 
@@ -240,7 +245,7 @@ class Watcher:
 
     def _judge(self, name: str, judged: _Judged, now_ns: int) -> None:
         site = self.sites[name]
-        log: Any = SiteConnection(self.connection, name)
+        log: Any = SiteLog(self.connection, name)
         with self.connection.transaction():
             if judged.seq != site.last_seq:
                 self._read(log, judged)

@@ -12,15 +12,9 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_valida
 from lupin_bridge.judge.derived import DAILY, DERIVED
 from lupin_bridge.judge.ranges import Ranges, Sensor, Sensors, Span
 
-MAX_SENSORS = 64
-MAX_SPECIES = 64
-MAX_AREAS = 200
-MAX_AREA_TAGS = 10_000
 MAX_TEXT = 64
-MAX_SOURCE = 400
 
 _Name = Annotated[str, Field(max_length=MAX_TEXT)]
-_Ids = Annotated[list[_Name], Field(max_length=MAX_AREA_TAGS)]
 _Limit = Annotated[float, Field(ge=-1e9, le=1e9)]
 _Share = Annotated[float, Field(ge=0, le=100)]
 # The sensors that each computed quantity is made of.
@@ -84,8 +78,8 @@ class _Sensor(_DayAndNight):
     derived: tuple[_Name, ...] = ()
     # What a sensor that works can read; and where all of this is from.
     plausible: tuple[_Limit, _Limit] | None = None
-    source: Annotated[str, Field(max_length=MAX_SOURCE)] = ""
-    species: Annotated[dict[str, _DayAndNight], Field(max_length=MAX_SPECIES)] = {}
+    source: str = ""
+    species: dict[str, _DayAndNight] = {}
 
     @model_validator(mode="after")
     def _names_each_species_once(self) -> Self:
@@ -117,9 +111,9 @@ class _Ramp(_Part):
 class _File(_Part):
     ramp: _Ramp
     fallback: _Sensor
-    sensors: Annotated[dict[str, _Sensor], Field(max_length=MAX_SENSORS)]
+    sensors: dict[str, _Sensor]
     # For who reads the file: bays, rows or zones, with the ids of their tags (`A*`: that begin so).
-    areas: Annotated[dict[_Name, _Ids], Field(max_length=MAX_AREAS)] = {}
+    areas: dict[_Name, list[_Name]] = {}
 
     @model_validator(mode="after")
     def _check_derived(self) -> Self:

@@ -12,7 +12,6 @@ from pathlib import Path
 import psycopg
 import pytest
 
-from lupin_bridge.fleet.site_log import SiteConnection
 from lupin_twin.core.notes import NotesRequest
 from lupin_twin.core.past import SeriesRequest
 from lupin_twin.core.state import Write
@@ -22,7 +21,7 @@ from lupin_twin.journal.queries import series
 from lupin_twin.journal.rebuild import vacuum
 from lupin_twin.journal.retention import Limits, forget
 from lupin_twin.journal.runs import Clock
-from lupin_twin.journal.schema import open_reader
+from lupin_twin.journal.schema import SiteLog, open_reader
 from tests.support.archive import (
     TABLES,
     Archive,
@@ -92,7 +91,7 @@ def test_the_same_question_has_the_same_answer(archive: Archive, journal: Path) 
     asked = SeriesRequest("1", "a", NOW, NOW + 2 * DAY, 40)
     with closing(open_reader(journal)) as here, psycopg.connect(archive.owner) as there:
         there.autocommit = True
-        gh1 = SiteConnection(there, "gh1")
+        gh1 = SiteLog(there, "gh1")
         assert series(gh1, asked, NOW + 2 * DAY) == series(here, asked, NOW + 2 * DAY)
 
 
@@ -273,9 +272,9 @@ def test_notes_are_forwarded_as_they_were_written(archive: Archive, journal: Pat
     assert len(archive.rows()["note"]) == 2
     with closing(open_reader(journal)) as here, psycopg.connect(archive.owner) as there:
         there.autocommit = True
-        found = notes(SiteConnection(there, "gh1"), NotesRequest())
+        found = notes(SiteLog(there, "gh1"), NotesRequest())
         assert found.notes == notes(here, NotesRequest()).notes
-        assert notes(SiteConnection(there, "gh2"), NotesRequest()).notes == ()
+        assert notes(SiteLog(there, "gh2"), NotesRequest()).notes == ()
 
 
 def test_what_is_received_is_in_the_archive_soon(archive: Archive, journal: Path) -> None:

@@ -17,7 +17,6 @@ from lupin_bridge.query_string import read
 from lupin_twin.field.engine import FieldRefused, FieldRequest
 
 BOX = {"bbox_min_x": "-1", "bbox_min_y": "0.5", "bbox_max_x": "2e1", "bbox_max_y": "3"}
-REQUEST = FieldRequest("co2", 0.1, -1.0, 0.5, 20.0, 3.0)
 
 
 def parse(pairs: Sequence[tuple[str, str]]) -> FieldQuery:

@@ -12,7 +12,6 @@ import httpx
 import psycopg
 from PIL import Image
 
-from lupin_bridge.fleet.site_log import SiteConnection
 from lupin_twin.core.past import SeriesRequest
 from lupin_twin.core.writes import RecentRequest, ScansRequest, WritesRequest
 from lupin_twin.field.explored import OccupancyMap, text_of
@@ -21,7 +20,7 @@ from lupin_twin.journal.follow import recent, scans, writes
 from lupin_twin.journal.queries import series
 from lupin_twin.journal.retention import kept
 from lupin_twin.journal.rows import newest_of_tag
-from lupin_twin.journal.schema import open_reader
+from lupin_twin.journal.schema import SiteLog, open_reader
 from tests.support import maps
 from tests.support.archive import Archive, forward_once, forwarder
 from tests.support.fleet import fleet, scans_lately, write
@@ -42,7 +41,7 @@ def test_every_query_of_a_journal_is_answered_alike(archive: Archive, tmp_path: 
     write(journal, [scan("other", now_ns)])
     forward_once(archive, journal)
     with closing(open_reader(journal)) as local, psycopg.connect(archive.owner) as remote:
-        logs = local, SiteConnection(remote, "gh2")
+        logs = local, SiteLog(remote, "gh2")
         for at_ns in (now_ns, now_ns - 2 * MINUTE_NS, now_ns - 5 * MINUTE_NS, 0):
             one, other = (state_at(log, at_ns, "map") for log in logs)  # type: ignore[arg-type]
             assert one == other

@@ -12,14 +12,13 @@ from typing import Any
 import psycopg
 import pytest
 
-from lupin_bridge.fleet.site_log import SiteConnection
-from lupin_twin.journal.schema import POSTGRESQL_TABLES
+from lupin_twin.journal.schema import POSTGRESQL_TABLES, SiteLog
 from tests.support.log_life import Life, lived
 from tests.support.postgres import Postgres
 
 # As the same log in SQLite, and where its rows are in PostgreSQL.
-Copied = Callable[[sqlite3.Connection], SiteConnection]
-Engines = Callable[[sqlite3.Connection], tuple[sqlite3.Connection, SiteConnection]]
+Copied = Callable[[sqlite3.Connection], SiteLog]
+Engines = Callable[[sqlite3.Connection], tuple[sqlite3.Connection, SiteLog]]
 Living = Callable[[Iterable[tuple[str, Any]]], AbstractContextManager[Life]]
 
 _TABLES = ("meta", "run", "series", "scan", "look", "place", "hour", "tally", "event")
@@ -36,7 +35,7 @@ def copied(postgresql: Postgres) -> Iterator[Copied]:
         for table in ("scan", "look"):
             archive.execute(f"CREATE TABLE {table}_any PARTITION OF {table} DEFAULT")
 
-        def copy(log: sqlite3.Connection) -> SiteConnection:
+        def copy(log: sqlite3.Connection) -> SiteLog:
             site = f"site {next(numbers)}"
             with archive.transaction(), archive.cursor() as cursor:
                 for table in _TABLES:
@@ -46,7 +45,7 @@ def copied(postgresql: Postgres) -> Iterator[Copied]:
                             f"INSERT INTO {table} VALUES ({', '.join(['%s'] * len(rows[0]))})",
                             [(site, *row[1:]) for row in rows],
                         )
-            return SiteConnection(archive, site)
+            return SiteLog(archive, site)
 
         yield copy
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import pytest
@@ -14,7 +15,7 @@ from hypothesis import strategies as st
 from lupin_twin.core.past import EVERY_TAG, MAX_POINTS, Event, SeriesRequest
 from lupin_twin.journal.appending import Appender
 from lupin_twin.journal.hours import count_rows
-from lupin_twin.journal.queries import newest, rows, series
+from lupin_twin.journal.queries import Export, lots, newest, series
 from lupin_twin.journal.schema import SiteLog
 from tests.support.log_life import (
     BEGUN,
@@ -52,7 +53,7 @@ def test_its_answers_are_those_of_a_plain_list_on_either_engine(  # noqa: PLR091
             for sensor in ("temperature", "co2"):
                 check_readings(life, connection, SeriesRequest("7", sensor, *period, points))
             check_export(life, connection, period, None if tag_id == EVERY_TAG else tag_id)
-        check_counts(life, SiteLog(archive.connection, archive.site), random)
+        check_counts(life, archive, random)
 
 
 @given(one_run, periods, _points, st.integers(0, LATEST))
@@ -117,9 +118,10 @@ def check_export(life: Life, connection: Any, period: Period, tag: str | None) -
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("lupin_twin.journal.queries._STRETCH", 64)
         patch.setattr("lupin_twin.journal.queries.LOT", 3)
-        lots = list(rows(connection, start_ns, end_ns, tag))
-    assert repr([row for lot in lots for row in lot]) == repr(expected)
-    assert all(0 < len(lot) <= 3 for lot in lots)
+        export = Export(start_ns, end_ns, tag, None)
+        found = [lot for step in iter(partial(export.step, connection), None) for lot in lots(step)]
+    assert repr([row for lot in found for row in lot]) == repr(expected)
+    assert all(0 < len(lot) <= 3 for lot in found)
 
 
 def check_counts(life: Life, archive: SiteLog, random: Any) -> None:

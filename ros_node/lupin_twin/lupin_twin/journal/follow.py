@@ -91,22 +91,21 @@ class NotALotError(ValueError):
 def read(connection: sqlite3.Connection, after: int, most: int = MAX_ROWS) -> Lot:
     """The rows behind a number, in the order of numbers, and all that is small."""
     log = SiteLog(connection)
-    with log.one_view():
-        texts = [_text("run", row) for row in _all(log, "run")]
-        texts += [_text("meta", row) for row in _all(log, "meta") if row[1].startswith(_FACTS)]
-        found = [
-            (number_of(row[1]) if table == "note" else row[1], rank, row)
-            for rank, table in enumerate(_NUMBERED)
-            for row in _behind(log, table, after, most)
-        ]
-        found.sort(key=lambda entry: entry[:2])
-        last, weight = after, 0
-        for place, (number, rank, row) in enumerate(found):
-            if (place >= most or weight > _MAX_BYTES) and number != last:
-                return Lot(_journal_id(log), tuple(texts), last, is_all=False)
-            texts.append(_text(_NUMBERED[rank], row))
-            last, weight = number, weight + len(texts[-1])
-        return Lot(_journal_id(log), tuple(texts), last, is_all=True)
+    texts = [_text("run", row) for row in _all(log, "run")]
+    texts += [_text("meta", row) for row in _all(log, "meta") if row[1].startswith(_FACTS)]
+    found = [
+        (number_of(row[1]) if table == "note" else row[1], rank, row)
+        for rank, table in enumerate(_NUMBERED)
+        for row in _behind(log, table, after, most)
+    ]
+    found.sort(key=lambda entry: entry[:2])
+    last, weight = after, 0
+    for place, (number, rank, row) in enumerate(found):
+        if (place >= most or weight > _MAX_BYTES) and number != last:
+            return Lot(_journal_id(log), tuple(texts), last, is_all=False)
+        texts.append(_text(_NUMBERED[rank], row))
+        last, weight = number, weight + len(texts[-1])
+    return Lot(_journal_id(log), tuple(texts), last, is_all=True)
 
 
 def write(path: Path, lot: Lot, complete_ns: int | None, behind: int = 0) -> Followed:
@@ -282,15 +281,14 @@ _INSPECTIONS_BETWEEN: Final = (
 def observed(connection: Any, request: PeriodRequest) -> PastWrites:
     """What was observed in a period; each moment is that of the run that holds it."""
     log = SiteLog(connection)
-    with log.one_view():
-        axis = spans(runs(log.execute))
-        found: list[PastWrite] = []
-        for span in cut(axis, request.start_ns, request.end_ns):
-            query = {"run": span.run.id, "start": span.start_ns, "end": span.end_ns}
-            found += _of_scans(log.execute(_SCANS_BETWEEN, query).fetchall())
-            found += _of_inspections(log.execute(_INSPECTIONS_BETWEEN, query).fetchall())
-        found.sort(key=lambda write: (write.stamp_ns, write.number))
-        return PastWrites(_journal_id(log), _axis(axis), tuple(found), 0, is_all=True)
+    axis = spans(runs(log.execute))
+    found: list[PastWrite] = []
+    for span in cut(axis, request.start_ns, request.end_ns):
+        query = {"run": span.run.id, "start": span.start_ns, "end": span.end_ns}
+        found += _of_scans(log.execute(_SCANS_BETWEEN, query).fetchall())
+        found += _of_inspections(log.execute(_INSPECTIONS_BETWEEN, query).fetchall())
+    found.sort(key=lambda write: (write.stamp_ns, write.number))
+    return PastWrites(_journal_id(log), _axis(axis), tuple(found), 0, is_all=True)
 
 
 _SCANS_UP_TO: Final = (
@@ -304,56 +302,53 @@ _SCANS_UP_TO: Final = (
 def recent(connection: Any, request: RecentRequest) -> tuple[PastWrite, ...]:
     """What was recent at a moment."""
     log = SiteLog(connection)
-    with log.one_view():
-        span = span_at(runs(log.execute), request.at_ns)
-        if span is None:
-            return ()
-        query = {
-            "run": span.run.id,
-            "at": request.at_ns,
-            "more": RECENT_COUNT - 1,
-        }
-        scans = log.execute(_RECENT_SCANS, query).fetchall()
-        inspections = log.execute(_RECENT_INSPECTIONS, query).fetchall()
-        return recent_of([*_of_scans(scans), *_of_inspections(inspections)], request.at_ns)
+    span = span_at(runs(log.execute), request.at_ns)
+    if span is None:
+        return ()
+    query = {
+        "run": span.run.id,
+        "at": request.at_ns,
+        "more": RECENT_COUNT - 1,
+    }
+    scans = log.execute(_RECENT_SCANS, query).fetchall()
+    inspections = log.execute(_RECENT_INSPECTIONS, query).fetchall()
+    return recent_of([*_of_scans(scans), *_of_inspections(inspections)], request.at_ns)
 
 
 def scans(connection: Any, request: ScansRequest) -> tuple[PastWrite, ...]:
     """The scans of a stretch of time."""
     log = SiteLog(connection)
-    with log.one_view():
-        span = span_at(runs(log.execute), request.at_ns)
-        if span is None:
-            return ()
-        query = {"run": span.run.id, "since": request.since_ns, "at": request.at_ns}
-        rows = log.execute(_SCANS_UP_TO, query | {"most": MAX_SCANS + 1}).fetchall()
-        if len(rows) > MAX_SCANS:
-            return ()
-        wanted = {
-            text: not request.sensors.isdisjoint(sensor_names(text))
-            for text in {row[6] for row in rows}
-        }
-        found = _of_scans([row for row in rows if wanted[row[6]]])
-        return tuple(sorted(found, key=lambda scan: (scan.stamp_ns, scan.number)))
+    span = span_at(runs(log.execute), request.at_ns)
+    if span is None:
+        return ()
+    query = {"run": span.run.id, "since": request.since_ns, "at": request.at_ns}
+    rows = log.execute(_SCANS_UP_TO, query | {"most": MAX_SCANS + 1}).fetchall()
+    if len(rows) > MAX_SCANS:
+        return ()
+    wanted = {
+        text: not request.sensors.isdisjoint(sensor_names(text))
+        for text in {row[6] for row in rows}
+    }
+    found = _of_scans([row for row in rows if wanted[row[6]]])
+    return tuple(sorted(found, key=lambda scan: (scan.stamp_ns, scan.number)))
 
 
 def writes(connection: Any, request: WritesRequest) -> PastWrites:
     """The next writes, copies left out."""
     log = SiteLog(connection)
-    with log.one_view():
-        newest = max(log.execute(_NEWEST.format(table)).fetchone()[0] or 0 for table in WRITTEN)
-        after = request.after or _beginning(log, request, newest)
-        query = {"after": after, "count": request.max_count}
-        scans = log.execute(_SCANS, query).fetchall()
-        inspections = log.execute(_INSPECTIONS, query).fetchall()
-        found = sorted(
-            [*_of_scans(scans), *_of_inspections(inspections)], key=lambda write: write.number
-        )
-        is_all = len(found) < request.max_count
-        found = found[: request.max_count]
-        last = max(newest, after) if is_all else found[-1].number
-        axis = _axis(spans(runs(log.execute)))
-        return PastWrites(_journal_id(log), axis, tuple(found), last, is_all)
+    newest = max(log.execute(_NEWEST.format(table)).fetchone()[0] or 0 for table in WRITTEN)
+    after = request.after or _beginning(log, request, newest)
+    query = {"after": after, "count": request.max_count}
+    scans = log.execute(_SCANS, query).fetchall()
+    inspections = log.execute(_INSPECTIONS, query).fetchall()
+    found = sorted(
+        [*_of_scans(scans), *_of_inspections(inspections)], key=lambda write: write.number
+    )
+    is_all = len(found) < request.max_count
+    found = found[: request.max_count]
+    last = max(newest, after) if is_all else found[-1].number
+    axis = _axis(spans(runs(log.execute)))
+    return PastWrites(_journal_id(log), axis, tuple(found), last, is_all)
 
 
 def _axis(found: Iterable[Span]) -> tuple[RunSpan, ...]:

@@ -18,7 +18,7 @@ from lupin_twin.journal.events import FROM_SCAN, events
 from lupin_twin.journal.hours import deleted_ns, is_counted
 from lupin_twin.journal.rows import KIND_READING, named_numbers, sensor_names
 from lupin_twin.journal.runs import Run, Span, runs, spans_within
-from lupin_twin.journal.schema import SiteLog
+from lupin_twin.journal.schema import SiteLog, one_view
 
 # What an answer costs, about, s; the second for events of the whole site, each tag.
 SERIES_S: Final = 0.01
@@ -117,16 +117,15 @@ def series(connection: Any, request: SeriesRequest, now_ns: int) -> SeriesPast:
     Where rows were deleted, the answer is in buckets of whole hours.
     """
     log = SiteLog(connection)
-    with log.one_view():
-        if request.event is not None:
-            return events(log, request, now_ns)
-        # A reading of this very moment counts as one of the past.
-        end_ns = max(request.end_ns or now_ns + 1, request.start_ns)
-        start_ns = request.start_ns
-        if not start_ns:
-            oldest = (at_ns for part in _parts(log, request, 0, end_ns) for at_ns in part.oldest())
-            start_ns = min(oldest, default=end_ns)
-        return answer(partial(_parts, log, request), start_ns, end_ns, request.max_points)
+    if request.event is not None:
+        return events(log, request, now_ns)
+    # A reading of this very moment counts as one of the past.
+    end_ns = max(request.end_ns or now_ns + 1, request.start_ns)
+    start_ns = request.start_ns
+    if not start_ns:
+        oldest = (at_ns for part in _parts(log, request, 0, end_ns) for at_ns in part.oldest())
+        start_ns = min(oldest, default=end_ns)
+    return answer(partial(_parts, log, request), start_ns, end_ns, request.max_points)
 
 
 # Of each series from the stamp on of the last that counts: a search of its own, by the limit.
@@ -150,20 +149,19 @@ def newest(
     """
     log = SiteLog(connection)
     found: dict[str, list[Entry]] = {}
-    with log.one_view():
-        for span in spans_within(runs(log.execute), start_ns, end_ns):
-            within = {"run": span.run.id, "start": span.start_ns, "end": span.end_ns}
-            for (text,) in log.execute(_SETS, within).fetchall():
-                names = sensor_names(text)
-                if sensor_type not in names:
-                    continue
-                query = within | {"sensors": text, "more": each - 1}
-                rows = log.execute(_NEWEST, query).fetchall()
-                place = names.index(sensor_type)
-                every = named_numbers([text] * len(rows), [row[-1] for row in rows])
-                for (tag, stamp_ns, seq, _), (_, values) in zip(rows, every, strict=True):
-                    if is_counted(values[place]):
-                        found.setdefault(tag, []).append((stamp_ns, seq, values[place]))
+    for span in spans_within(runs(log.execute), start_ns, end_ns):
+        within = {"run": span.run.id, "start": span.start_ns, "end": span.end_ns}
+        for (text,) in log.execute(_SETS, within).fetchall():
+            names = sensor_names(text)
+            if sensor_type not in names:
+                continue
+            query = within | {"sensors": text, "more": each - 1}
+            rows = log.execute(_NEWEST, query).fetchall()
+            place = names.index(sensor_type)
+            every = named_numbers([text] * len(rows), [row[-1] for row in rows])
+            for (tag, stamp_ns, seq, _), (_, values) in zip(rows, every, strict=True):
+                if is_counted(values[place]):
+                    found.setdefault(tag, []).append((stamp_ns, seq, values[place]))
     return {
         tag: [(stamp_ns, value) for stamp_ns, _, value in sorted(entries)[-each:]]
         for tag, entries in found.items()
@@ -207,7 +205,11 @@ def rows(
 ) -> Iterator[list[PastRow]]:
     """Lots of at most `LOT` rows, see `Export`."""
     export = Export(start_ns, end_ns, tag_id, sensor_type)
-    while (found := export.step(connection)) is not None:
+    while True:
+        with one_view(connection):
+            found = export.step(connection)
+        if found is None:
+            return
         yield from lots(found)
 
 
@@ -247,14 +249,13 @@ class Export:
 
         """
         log = SiteLog(connection)
-        with log.one_view():
-            if self._spans is None:
-                self._spans = deque(spans_within(runs(log.execute), *self._period))
-            if not self._has_begun:
-                self._deleted_ns = {s.run.id: deleted_ns(log, s.run.id) for s in self._spans}
-            while self._spans and self._spans[0].end_ns <= self._at_ns:
-                self._spans.popleft()
-            return self._stretch(log, self._spans[0]) if self._spans else None
+        if self._spans is None:
+            self._spans = deque(spans_within(runs(log.execute), *self._period))
+        if not self._has_begun:
+            self._deleted_ns = {s.run.id: deleted_ns(log, s.run.id) for s in self._spans}
+        while self._spans and self._spans[0].end_ns <= self._at_ns:
+            self._spans.popleft()
+        return self._stretch(log, self._spans[0]) if self._spans else None
 
     def _stretch(self, log: SiteLog, span: Span) -> list[PastRow]:
         if self._run != span.run:

@@ -221,6 +221,16 @@ def transaction(connection: sqlite3.Connection) -> Iterator[None]:
         raise
 
 
+@contextmanager
+def one_view(connection: sqlite3.Connection) -> Iterator[None]:
+    """All that is read within is of one moment; keep it short, for the log grows meanwhile."""
+    connection.execute("BEGIN")
+    try:
+        yield
+    finally:
+        connection.rollback()  # does nothing where an interrupted statement has ended it
+
+
 def sync_folder(folder: Path) -> None:
     """Make the names in a folder last."""
     descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
@@ -338,7 +348,10 @@ _NAME: Final = re.compile(r":([a-z_]+)")
 
 @dataclass(frozen=True, slots=True)
 class SiteLog:
-    """Where queries go to; each may name `:site`, and other values as `:name`."""
+    """Where queries go to; each may name `:site`, and other values as `:name`.
+
+    Who asks more than one holds a transaction: what they find is of one moment then.
+    """
 
     connection: Any
     site: str = LOCAL_SITE
@@ -356,26 +369,6 @@ class SiteLog:
         """A noted fact about the log as a whole, None where it is not noted."""
         found = self.execute(_META, {"key": key}).fetchone()
         return None if found is None else str(found[0])
-
-    @contextmanager
-    def one_view(self) -> Iterator[None]:
-        """All that is read within is of one moment; keep it short, for the log grows meanwhile."""
-        connection = self.connection
-        if isinstance(connection, sqlite3.Connection):
-            if connection.in_transaction:
-                yield
-                return
-            connection.execute("BEGIN")
-            try:
-                yield
-            finally:
-                connection.rollback()  # does nothing where an interrupted statement has ended it
-        elif connection.info.transaction_status:
-            yield
-        else:
-            with connection.transaction():
-                connection.execute("SET TRANSACTION ISOLATION LEVEL REPEATABLE READ")
-                yield
 
     def _of_engine(self, sql: str) -> str:
         return sql if isinstance(self.connection, sqlite3.Connection) else _for_psycopg(sql)

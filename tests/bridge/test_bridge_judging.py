@@ -3,22 +3,16 @@
 from __future__ import annotations
 
 import asyncio
-import json
 from typing import Any
 
 import pytest
-from websockets.asyncio.client import connect
 
 from lupin_bridge.feed.source import TwinUpdate
 from lupin_bridge.judge.verdict import Health, judge_site, judge_tag
 from lupin_bridge.stream.hub import Client
 from lupin_twin.core.state import Reading, Snapshot, TagState
 from tests.bridge.test_bridge import Ear, Stage
-from tests.support.inprocess import run, running
-from tests.support.messages import scan
-from tests.support.ros import Peer
-from tests.support.waiting import PATIENCE_S, until
-from tests.support.web import ws_url
+from tests.support.waiting import until
 
 
 def judged_state(number: int) -> TwinUpdate:
@@ -98,32 +92,3 @@ def test_a_state_that_cannot_be_judged_goes_out_and_all_is_unknown(
             assert b"lupin_judge_errors_total 2.0" in stage.bridge.metrics.text()
 
     asyncio.run(test())
-
-
-def test_of_a_real_twin_the_others_are_judged_and_the_state_is_answered(
-    domain: int, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    def judge(tag: TagState, *args: Any, **more: Any) -> Health:
-        if tag.tag_id == "bad":
-            raise ZeroDivisionError("a defect")
-        return judge_tag(tag, *args, **more)
-
-    monkeypatch.setattr("lupin_bridge.judge.judging.judge_tag", judge)
-
-    async def test() -> None:
-        async with running() as served, connect(ws_url(served.url), proxy=None) as listener:
-            with Peer(domain) as peer:
-                for tag_id in ("bad", "good"):
-                    peer.observe(scan(tag_id, {"temperature": 24.0}))
-                seen: dict[str, Any] = {}
-                while len(seen) < 2:
-                    frame = json.loads(await asyncio.wait_for(listener.recv(), PATIENCE_S))
-                    seen = frame.get("health", {}).get("tags", {})
-            assert {tag_id: tag["verdict"] for tag_id, tag in seen.items()} == {
-                "bad": "unknown",
-                "good": "healthy",
-            }
-            answer = await served.http.get("/api/health")
-            assert answer.json()["tags"]["bad"]["verdict"] == "unknown"
-
-    run(domain, test())

@@ -25,7 +25,7 @@ from lupin_patrol.cli import parse as patrol_options
 from lupin_patrol.plants import SECONDS_PER_DAY
 from lupin_twin.core.parameters import World
 from lupin_twin.core.state import Bloom, Inspection, Pin, Pose, Reading, Scan
-from tests.support.journal import CLOCK, NOW, SECOND, is_whole, kept, scan, select
+from tests.support.journal import CLOCK, NOW, SECOND, kept, scan, select
 
 ENV = {"XDG_STATE_HOME": "/state"}
 SHORT = ["--speed=50"]
@@ -62,16 +62,6 @@ def test_what_is_no_speed_is_left_for_the_patrol_to_refuse(speed: str) -> None:
 )
 def test_another_journal_or_none_or_another_clock_gets_no_past(ros_args: list[str]) -> None:
     assert journal_of(ENV, [], ["--ros-args", *ros_args]) is None
-
-
-def test_an_empty_journal_is_filled_once(tmp_path: Path) -> None:
-    path = tmp_path / "demo.sqlite"
-    assert fill_past(path, SHORT)
-    assert is_whole(path)
-    (count,) = select(path, "SELECT count(*) FROM scan")
-    assert count > (2500,)
-    assert not fill_past(path, SHORT)
-    assert select(path, "SELECT count(*) FROM scan") == [count]
 
 
 def test_started_again_it_goes_on_with_the_day(tmp_path: Path) -> None:

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from lupin_bridge.serving.server import listen
-from tests.support.journal import select
+from tests.support.journal import is_whole, select
 from tests.support.messages import scan
 from tests.support.processes import Process, children_of, lupin_twin, patrols_of, url_of
 from tests.support.recordings import OBSERVATIONS, Sent, write_bag
@@ -215,7 +215,9 @@ def test_a_patrol_that_ends_by_itself_is_told(domain: int) -> None:
 
 def test_a_demo_has_a_past_from_its_first_moment_on(domain: int, tmp_path: Path) -> None:
     """Filled in once, and told to be simulated; the patrol goes on where it ends."""
-    state = str(tmp_path)
+    state, path = str(tmp_path), tmp_path / "lupin-twin" / "demo-seed-0.sqlite"
+    filled_in = "SELECT max(stamp_ns), count(*) FROM scan WHERE source LIKE '%past)'"
+    pasts = []
     for _ in range(2):
         with (
             lupin_twin(domain, "demo", XDG_STATE_HOME=state) as demo,
@@ -223,11 +225,12 @@ def test_a_demo_has_a_past_from_its_first_moment_on(domain: int, tmp_path: Path)
         ):
             assert len(tag_ids(screen.until("state")["state"])) == ALL_TAGS
             assert demo.stop(signal.SIGINT) == 0
-    path = tmp_path / "lupin-twin" / "demo-seed-0.sqlite"
+        pasts += select(path, filled_in)
+    assert is_whole(path)
     (filled,) = select(path, "SELECT value FROM meta WHERE key = 'simulated_until_ns'")
-    past = select(path, "SELECT max(stamp_ns), count(*) FROM scan WHERE source LIKE '%past)'")
     until_ns = int(filled[0])  # type: ignore[call-overload]
-    assert past[0][0] < until_ns
-    assert past[0][1] > 2500  # type: ignore[operator]
+    assert pasts[0] == pasts[1]
+    assert pasts[0][0] < until_ns
+    assert pasts[0][1] > 2500  # type: ignore[operator]
     (after,) = select(path, "SELECT min(stamp_ns) FROM scan WHERE source = 'lupin_patrol'")
     assert after[0] is None or after[0] > until_ns

@@ -9,8 +9,7 @@ import sys
 from websockets.asyncio.client import connect
 
 from lupin_bridge.stream import schema
-from lupin_twin.core.state import TwinStore, samples_of
-from lupin_twin.ros.node import TwinNode
+from lupin_twin.core.state import samples_of
 from tests.support.inprocess import Running, run, running
 from tests.support.messages import look, scan
 from tests.support.ros import Peer
@@ -76,33 +75,5 @@ def test_when_the_ros_thread_ends_health_says_so_and_every_client_is_told(domain
             assert (answer.status_code, answer.headers["retry-after"]) == (503, "3")
             async with connect(ws_url(served.url), proxy=None, open_timeout=PATIENCE_S) as late:
                 assert json.loads(await late.recv())["reason"] == "thread_dead"
-
-    run(domain, test())
-
-
-def test_a_callback_that_raises_is_counted_and_the_thread_lives_on(domain: int) -> None:
-    async def test() -> None:
-        async with running() as served:
-
-            def spoil(node: TwinNode) -> TwinStore:
-                store, node.store = node.store, None  # type: ignore[assignment]
-                return store
-
-            with Peer(domain) as peer:
-                store = await served.in_ros_thread(spoil)
-                peer.observe(scan("lost", {"co2": 1.0}))
-                await until(lambda: served.twin.thread.callback_errors, "the error to be counted")
-                health = (await served.http.get("/healthz")).json()
-                assert health["ok"]
-                assert health["callback_errors"] >= 1
-                await served.in_ros_thread(lambda node: setattr(node, "store", store))
-                peer.observe(scan("kept", {"co2": 1.0}))
-                await until(
-                    lambda: (
-                        served.bridge.latest is not None
-                        and "kept" in [t.tag_id for t in served.bridge.latest.snapshot.tags]
-                    ),
-                    "the next observation",
-                )
 
     run(domain, test())

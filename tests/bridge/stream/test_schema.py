@@ -112,50 +112,6 @@ def live() -> Iterator[Bridge]:
         yield running
 
 
-@pytest.mark.parametrize(
-    ("path", "model"),
-    [
-        ("/api/state", schema.TwinState),
-        ("/api/tags/full", schema.TwinTagState),
-        ("/api/tags/discovered", schema.TwinTagState),
-        ("/api/tags/full/history", schema.TagHistory),
-        ("/api/tags/discovered/history", schema.TagHistory),
-        ("/api/field?sensor_type=temperature", schema.GetFieldResponse),
-        ("/api/field.json?sensor_type=nobody", schema.GetFieldResponse),
-        ("/healthz", schema.Health),
-        ("/readyz", schema.StatusFrame),
-    ],
-)
-def test_what_a_live_bridge_answers_is_of_the_contracts_type(
-    live: Bridge, path: str, model: type[BaseModel]
-) -> None:
-    answer = live.get(path)
-    assert answer.status_code == 200
-    model.model_validate_json(answer.content, strict=True)
-
-
-def test_a_live_map_is_of_the_contracts_type(live: Bridge) -> None:
-    live.peer.until(lambda: live.get("/api/map").status_code == 200, "the map")
-    schema.OccupancyGrid.model_validate_json(live.get("/api/map").content, strict=True)
-
-
-@pytest.mark.parametrize(
-    ("path", "status", "model"),
-    [
-        ("/api/field", 400, schema.GetFieldResponse),
-        ("/api/tags/nobody", 404, schema.ErrorMessage),
-        ("/api/tags/nobody/history", 404, schema.ErrorMessage),
-        ("/nowhere", 404, schema.ErrorMessage),
-    ],
-)
-def test_what_a_live_bridge_refuses_is_of_the_contracts_type(
-    live: Bridge, path: str, status: int, model: type[BaseModel]
-) -> None:
-    answer = live.get(path)
-    assert answer.status_code == status
-    model.model_validate_json(answer.content, strict=True)
-
-
 def test_live_frames_are_of_the_contracts_types(live: Bridge) -> None:
     with live.listen() as listener:
         status = listener.connection.recv()

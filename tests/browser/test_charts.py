@@ -293,7 +293,7 @@ def test_the_day_before_lies_below_today_and_the_legend_compares(
     wait_for(partial(_reads, running, "6", "co2", 600.0), "today's readings")
     from_s = round(now_s - 3600, 3)
     hmi = open_page(running.url, f"chart.tag=6&period={from_s},{round(now_s, 3)}")
-    legend = hmi.page.get_by_role("region", name="Chart of CO₂").locator(".plot-legend")
+    legend = hmi.page.get_by_role("region", name="Chart of CO₂").locator(".line-value")
     expect(legend).to_have_text(re.compile("600"))
     expect(legend).not_to_contain_text("day before")
     inside = plot(hmi, "CO₂").locator(".u-over")

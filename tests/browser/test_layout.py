@@ -6,7 +6,6 @@ import io
 import re
 from collections.abc import Callable, Iterator
 from functools import partial
-from urllib.parse import parse_qs, urlsplit
 
 import pytest
 from PIL import Image
@@ -93,9 +92,12 @@ def test_everything_can_be_hit(open_at: Callable[..., Hmi]) -> None:
         show(hmi, "Tags")
         expect_in_reach(hmi, "tbody tr, .filter-bar *:not(.unseen), .health button")
         assert hmi.page.locator(".table-scroll").evaluate(HIDDEN) == 0, size
+        # Narrower, why a tag is ill has the room.
         sure = hmi.row("1").locator(".cell-species .faint")
-        expect(sure).to_be_visible()
-        assert place(sure).right <= place(hmi.page.locator(".table-scroll")).right
+        has_room = 820 <= size[0] < 1100 or size[0] >= 1264
+        expect(sure).to_be_visible(visible=has_room)
+        if has_room:
+            assert place(sure).right <= place(hmi.page.locator(".table-scroll")).right
 
 
 def test_an_open_card_lies_over_nothing_in_an_upright_window(open_at: Callable[..., Hmi]) -> None:
@@ -362,6 +364,11 @@ _LINES = f"(e) => {{ {_RECTS} return new Set([...range.getClientRects()].map((r)
 _WORDS_END = f"(e) => {{ {_RECTS} return range.getBoundingClientRect().right }}"
 
 
+# The table's reasons that have no room in their two lines; tag 10 has the longest name of all.
+_CUT_REASONS = """() => [...document.querySelectorAll(
+    'tr:not([data-tag-id="10"], [data-health=unknown]) .cell-health > div')]
+  .filter((e) => e.scrollHeight > e.clientHeight + 1).map((e) => e.textContent)"""
+
 # What a phone says in each, and how it writes a number.
 LANGUAGES = {
     "en": ("tags contribute", "20.0"),
@@ -398,45 +405,14 @@ def test_every_language_has_room_on_a_phone(house: Bridge, open_page: OpenPage) 
         assert hmi.page.locator("thead th").first.locator("span").first.evaluate(_LINES) == 1
         assert hmi.page.evaluate("document.documentElement.scrollWidth") == PHONE["width"]
         # On a phone and on the smallest laptops this column is narrow, with the arrow at first.
-        for width in (PHONE["width"], 1100, 1280):
+        for width in (PHONE["width"], 1100, 1280, 1440):
             hmi.resize(width, 800)
+            # The smallest has no room for the longest words.
+            cut = [] if width == 1100 else hmi.page.evaluate(_CUT_REASONS)
+            assert cut == [], (language, width)
             health = hmi.page.locator("thead [data-column=health] button > span").first
             assert health.evaluate(_LINES) == 1, (language, width)
         # Where the name of the page has no room, none of it is shown.
         hmi.resize(230, 740)
         brand = place(hmi.page.locator(".brand"))
         assert place(hmi.page.locator(".brand > span")).top >= brand.bottom
-
-
-# The heads of the table in which a word is wider than its column.
-_BROKEN = """() => [...document.querySelectorAll('thead button > span:first-child')].filter((e) => {
-  e.style.overflowWrap = 'normal';
-  return e.scrollWidth > e.clientWidth;
-}).map((e) => e.textContent)"""
-
-
-def test_the_page_speaks_as_the_browser_the_address_or_the_menu_says(
-    house: Bridge, open_page: OpenPage
-) -> None:
-    hmi = open_page(house.url, "sensor=humidity&tag=1", locale="de-AT")
-    expect(hmi.test_id("legend")).to_contain_text("Luftfeuchte")
-    expect(hmi.card("1")).to_contain_text("Messpunkt 1")
-    assert hmi.page.evaluate(_BROKEN) == []
-    hmi.page.locator(".menu > button").click()
-    hmi.test_id("language").select_option(label="Nederlands")
-    expect(hmi.test_id("legend")).to_contain_text("Luchtvochtigheid")
-    expect(hmi.card("1")).to_contain_text("Meetpunt 1")
-    assert hmi.page.evaluate(_BROKEN) == []
-    kept = {"sensor": ["humidity"], "tag": ["1"]}
-    hmi.expect(
-        lambda: (
-            urlsplit(hmi.address()).query == "lang=nl"
-            and kept.items() <= parse_qs(urlsplit(hmi.address()).fragment).items()
-        ),
-        "the language in the address, beside the view",
-    )
-
-    # What is not spoken is said, in words that whoever asked may know.
-    hmi.go(query="?lang=xx")
-    expect(hmi.test_id("troubles")).to_have_text(re.compile("is not available in “xx”"))
-    expect(hmi.page.locator("html")).to_have_attribute("lang", "en")

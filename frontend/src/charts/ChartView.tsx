@@ -14,17 +14,16 @@ import { ChartState } from './ChartState';
 import { ChartTables } from './ChartTables';
 import { MarksKey } from './MarksKey';
 import { PlotView } from './PlotView';
-import { SensorChoice } from './SensorChoice';
 import { TagChoice } from './TagChoice';
 import { useLines } from './useLines';
 import { useSensorsOf, useSpeciesOf } from './useSensorsOf';
 import { pointsFor, useSize } from './useSize';
 import { useZoomed, zoomBack, zoomBy } from './zoom';
 
-const LEAST_HEIGHT = 140;
-/** Height of a chart's title and margins, and of the legend of several lines, CSS pixels. */
+/** Of one chart of a tag's, and of several tags' only one, CSS pixels. */
+const LEAST_HEIGHT = { tag: 140, sensor: 220 } as const;
+/** Height of a chart's title and margins, CSS pixels. */
 const AROUND = 42;
-const LEGEND = 24;
 
 /** The charts of a tag, or of a sensor: over the map, above the time bar whose period they have. */
 export default function ChartView({ charted }: { charted: Charted }): JSX.Element {
@@ -54,8 +53,7 @@ export default function ChartView({ charted }: { charted: Charted }): JSX.Elemen
     [catalogue, both, plans, species, lines, span, unit, moment],
   );
   const withLines = models.filter(({ lines }) => lines.length > 0);
-  const around = AROUND + (charted.by === 'sensor' ? LEGEND : 0);
-  const share = Math.floor(size.height / Math.max(1, plans.length)) - around;
+  const share = Math.floor(size.height / Math.max(1, plans.length)) - AROUND;
 
   const zoom = (factor: number) => (): void => {
     const nowS = rosNow(store.get(), now());
@@ -65,7 +63,7 @@ export default function ChartView({ charted }: { charted: Charted }): JSX.Elemen
   return (
     <section className="chart-view" aria-label={S.charts} data-testid="chart-view">
       <header>
-        <h2>
+        <h2 className={charted.by === 'tag' ? undefined : 'unseen'}>
           <bdi>{charted.by === 'tag' ? tagLabel(tagId) : S.charts}</bdi>
         </h2>
         <Segmented
@@ -79,7 +77,6 @@ export default function ChartView({ charted }: { charted: Charted }): JSX.Elemen
             act({ type: 'chart', chart: { by, tagIds: charted.tagIds } });
           }}
         />
-        <SensorChoice tagId={tagId} value={sensor} />
         <div className="chart-tools">
           <IconButton
             icon="later"
@@ -89,8 +86,8 @@ export default function ChartView({ charted }: { charted: Charted }): JSX.Elemen
               prefer({ dayBefore: !hasDayBefore });
             }}
           />
-          <IconButton icon="plus" label={S.chartZoomIn} onClick={zoom(0.5)} />
-          <IconButton icon="minus" label={S.chartZoomOut} onClick={zoom(2)} />
+          <IconButton data-zoom icon="plus" label={S.chartZoomIn} onClick={zoom(0.5)} />
+          <IconButton data-zoom icon="minus" label={S.chartZoomOut} onClick={zoom(2)} />
           {isZoomed && <IconButton icon="fit" label={S.chartWhole} onClick={zoomBack} />}
           <IconButton
             icon={isTable ? 'chart' : 'list'}
@@ -108,7 +105,7 @@ export default function ChartView({ charted }: { charted: Charted }): JSX.Elemen
           />
         </div>
       </header>
-      {charted.by === 'sensor' && <TagChoice tagIds={charted.tagIds} />}
+      {charted.by === 'sensor' && <TagChoice tagIds={charted.tagIds} model={withLines[0]} />}
       <div className="chart-body" ref={body}>
         <ChartState
           asked={asked}
@@ -121,7 +118,8 @@ export default function ChartView({ charted }: { charted: Charted }): JSX.Elemen
             <PlotView
               key={model.sensor.name}
               model={model}
-              height={Math.max(LEAST_HEIGHT, share)}
+              height={Math.max(LEAST_HEIGHT[charted.by], share)}
+              isAlone={charted.by === 'tag'}
             />
           ))}
       </div>

@@ -9,10 +9,19 @@ import { MOST_CHARTED } from '../store/view';
 import { S } from '../strings';
 import { Icon } from '../widgets/Icon';
 import { tagLabel } from './charted';
-import { LineSign } from './PlotView';
+import { LineSign, LineValue } from './LineValue';
+import type { PlotModel } from './model';
+import { SensorChoice } from './SensorChoice';
 
-/** The tags of one chart: each can go, and another be added while there is room. */
-export function TagChoice({ tagIds }: { tagIds: readonly string[] }): JSX.Element {
+/** The tags of one chart with what their lines say: each can go, and another be added. */
+export function TagChoice({
+  tagIds,
+  model,
+}: {
+  tagIds: readonly string[];
+  /** Undefined: nothing of it is here yet. */
+  model: PlotModel | undefined;
+}): JSX.Element {
   const sensor = useApp(selectSensor);
   const tags = useApp(selectTags);
   const others = tags.filter(
@@ -23,11 +32,17 @@ export function TagChoice({ tagIds }: { tagIds: readonly string[] }): JSX.Elemen
   };
   return (
     <div className="chart-tags">
+      <SensorChoice tagId={tagIds[0] ?? ''} value={sensor.name} />
       <ul>
         {tagIds.map((tagId, look) => (
           <li key={tagId}>
             <LineSign look={look} />
             <bdi>{tagLabel(tagId)}</bdi>
+            {model?.lines
+              .filter(({ series }) => series.tagId === tagId)
+              .map((line) => (
+                <LineValue key={tagId} line={line} model={model} />
+              ))}
             {tagIds.length > 1 && (
               <button
                 type="button"

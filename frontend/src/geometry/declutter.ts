@@ -36,6 +36,8 @@ export interface Room {
 }
 
 const GAP = 4;
+/** Priority of the least that needs somebody. */
+const URGENT = 3;
 const BUCKET = 64;
 
 export function placeLabels(
@@ -45,16 +47,20 @@ export function placeLabels(
 ): PlacedLabel[] {
   const taken = new Buckets();
   for (const box of room?.covered ?? []) taken.add(box);
-  for (const { x, y, radius } of requests) {
-    const r = radius * 0.8;
-    taken.add({ left: x - r, top: y - r, right: x + r, bottom: y + r });
-  }
   const ordered = requests
-    .map((request, index) => ({ request, index }))
+    .map((request, index) => {
+      const { x, y } = request;
+      const r = request.radius * 0.8;
+      const pin: Box = { left: x - r, top: y - r, right: x + r, bottom: y + r };
+      taken.add(pin);
+      return { request, index, pin };
+    })
     .sort((a, b) => b.request.priority - a.request.priority || a.index - b.index);
 
   const placed: PlacedLabel[] = [];
-  for (const { request } of ordered) {
+  for (const { request, pin } of ordered) {
+    // Among pins that overlap only those that need somebody: of more labels none would be read.
+    if (request.priority < URGENT && !taken.isFree(pin, pin)) continue;
     const spot = firstFree(request, height, taken, room?.within ?? null);
     if (!spot) continue;
     taken.add(spot.box);
@@ -111,10 +117,12 @@ class Buckets {
     }
   }
 
-  isFree(box: Box): boolean {
+  /** `own`: a box in there that does not count. */
+  isFree(box: Box, own: Box | null = null): boolean {
     for (const key of keys(box)) {
       for (const other of this.#boxes.get(key) ?? []) {
         const apart =
+          other === own ||
           box.right <= other.left ||
           other.right <= box.left ||
           box.bottom <= other.top ||

@@ -53,9 +53,9 @@ const isSame = (a: View, b: View): boolean =>
   Math.abs(a.y - b.y) < 1e-3 &&
   Math.abs(a.scale / b.scale - 1) < 1e-9;
 
-/** Space around what is fitted: less on a phone, where each pixel counts. */
-export function fitInsets({ width }: Size): Insets {
-  return width < 560
+/** Space around what is fitted: less on a phone, also on its side, where each pixel counts. */
+export function fitInsets({ width, height }: Size): Insets {
+  return width < 560 || height < 280
     ? { top: 26, right: 60, bottom: 40, left: 26 }
     : { top: 30, right: 76, bottom: 52, left: 40 };
 }

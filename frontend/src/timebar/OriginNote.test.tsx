@@ -53,6 +53,17 @@ test('a simulation is live, and told at first sight; one by /clock is not green'
   expect(screen.queryByTestId('recorded-frame')).toBeNull();
 });
 
+test('a day of the greenhouse that is a short one is told', () => {
+  const day = (day_length_s: number): boolean => {
+    flush(() => {
+      goLive(status({ origin: 'simulated', day_length_s }));
+    });
+    return screen.getByTestId('origin').textContent.includes('1 greenhouse day = 24\u00a0min');
+  };
+  expect(day(86_400)).toBe(false);
+  expect(day(1_440)).toBe(true);
+});
+
 test('a recording is never live: header, badge, frame and the way back say so, and of when', () => {
   shows('recorded');
   expect(screen.getByTestId('origin').textContent).toMatch(/^Recording.*nothing here is current/);
@@ -75,6 +86,6 @@ test('looking back in a recording, the moment is that of the past alone', () => 
     act({ type: 'moment', moment: 1 });
   });
   expect(screen.queryByTestId('recorded-frame')).toBeNull();
-  expect(screen.getByTestId('past-frame').textContent).toBe('Past: sim 00:00:01');
+  expect(screen.getByTestId('past-frame').textContent).toBe('');
   expect(screen.getByTestId('origin').querySelector('strong')).toBeNull();
 });

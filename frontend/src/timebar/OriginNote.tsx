@@ -1,9 +1,11 @@
 import type { JSX } from 'react';
 
+import { DAY_S } from '../domain/difference';
+import { intervalText } from '../domain/format';
 import { rosText } from '../domain/rostime';
 import { store, useApp } from '../store/app';
 import { selectShown } from '../store/moment';
-import { ownTime, selectOrigin } from '../store/origin';
+import { ownTime, selectDayS, selectOrigin } from '../store/origin';
 import { S } from '../strings';
 import { useTicking } from '../widgets/useNow';
 
@@ -20,10 +22,15 @@ export function OriginNote(): JSX.Element | null {
   const origin = useApp(selectOrigin);
   const isPast = useApp((state) => selectShown(state).moment !== null);
   const time = useOwnTime();
+  // In a demo a short one.
+  const dayS = useApp(selectDayS);
   if (origin === null) return null;
   return (
     <div className="origin" data-testid="origin" data-origin={origin} title={S.originHint[origin]}>
-      <span className="origin-word">{S.origin[origin]}</span>
+      <span className="origin-word">
+        {S.origin[origin]}
+        {dayS < DAY_S && <span className="origin-day"> · {S.originDay(intervalText(dayS))}</span>}
+      </span>
       <span className="unseen">{S.originHint[origin]}</span>
       {/* What counts on by itself is not read out each second. */}
       {origin === 'recorded' && time !== null && !isPast && (

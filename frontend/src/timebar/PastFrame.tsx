@@ -1,6 +1,5 @@
 import type { JSX } from 'react';
 
-import { rosText } from '../domain/rostime';
 import { useApp } from '../store/app';
 import { selectShown } from '../store/moment';
 import { selectIsRecorded } from '../store/origin';
@@ -29,12 +28,5 @@ export function PastFrame(): JSX.Element | null {
     );
   }
   if (moment === null) return null;
-  return (
-    <div className="past-frame" data-testid="past-frame" aria-hidden="true">
-      <span>
-        <span className="past-word-short">{S.past}: </span>
-        {rosText(moment)}
-      </span>
-    </div>
-  );
+  return <div className="past-frame" data-testid="past-frame" aria-hidden="true" />;
 }

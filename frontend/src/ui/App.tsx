@@ -52,8 +52,9 @@ export function App({
           {S.skipToTable}
         </a>
       )}
-      <Header kiosk={kiosk} />
-      {kiosk && <WithParts>{(parts) => <parts.KioskNote wish={cycle} />}</WithParts>}
+      <Header kiosk={kiosk}>
+        {kiosk && <WithParts>{(parts) => <parts.KioskNote wish={cycle} />}</WithParts>}
+      </Header>
       <div className="banners">
         <FrozenBanner />
         <Troubles />

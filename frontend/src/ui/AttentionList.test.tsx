@@ -25,7 +25,7 @@ test('lists who needs somebody and why, the worst first', () => {
   if (!first) throw new Error('no row');
   const why = within(first).getAllByRole('listitem');
   expect(why.map((each) => each.textContent)).toEqual([
-    'Temperature 6.6\u00a0°C, below 10.0 (critical)',
+    'Temperature 6.6\u00a0°C, below 10.0',
     '2 pests seen',
   ]);
 });

@@ -1,4 +1,4 @@
-import { useRef, type JSX } from 'react';
+import { useRef, type CSSProperties, type JSX } from 'react';
 
 import type { HealthReason } from '../contract/types';
 import { worstReason } from '../domain/health';
@@ -24,7 +24,7 @@ export function AttentionList(): JSX.Element {
   return (
     <div className="attention">
       <h3>{rows.length > 0 ? S.attention : noneText(unknown)}</h3>
-      <ul ref={list}>
+      <ul ref={list} style={{ '--rows': rows.length } as CSSProperties}>
         {rows.slice(0, MOST_TAGS).map(({ tag, health: own }, index) => (
           <li key={tag.id} data-fits={index < count} data-tag-id={tag.id} data-health={own.verdict}>
             <strong>
@@ -32,10 +32,12 @@ export function AttentionList(): JSX.Element {
             </strong>
             <span className="attention-why">
               <Reasons health={own} most={MOST_REASONS} />
-              <Todo reason={worstReason(own)} />
-            </span>
-            <span className="faint">
-              <Since tagId={tag.id} reason={worstReason(own)} />
+              <span className="attention-do">
+                <Todo reason={worstReason(own)} />{' '}
+                <small className="faint">
+                  <Since tagId={tag.id} reason={worstReason(own)} />
+                </small>
+              </span>
             </span>
           </li>
         ))}

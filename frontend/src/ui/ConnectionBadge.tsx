@@ -30,12 +30,6 @@ export function ConnectionBadge(): JSX.Element {
         {phase === 'live' && !isPast && (
           <circle cx="8" cy="8" r="6" className={isOfNow ? 'solid' : 'ring'} />
         )}
-        {phase === 'live' && isPast && (
-          <>
-            <circle cx="8" cy="8" r="6" className="ring" />
-            <path d="M8 4.500V8l2.500 1.500" className="ring" />
-          </>
-        )}
         {(phase === 'connecting' || phase === 'reconnecting') && (
           <circle cx="8" cy="8" r="6" className="ring turning" />
         )}

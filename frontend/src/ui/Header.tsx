@@ -1,4 +1,4 @@
-import type { JSX } from 'react';
+import type { JSX, ReactNode } from 'react';
 
 import { S } from '../strings';
 import { OriginNote } from '../timebar/OriginNote';
@@ -13,7 +13,7 @@ function siteName(): string | undefined {
   return /\/sites\/([^/]+)\/$/.exec(location.pathname)?.[1];
 }
 
-export function Header({ kiosk }: { kiosk: boolean }): JSX.Element {
+export function Header({ kiosk, children }: { kiosk: boolean; children?: ReactNode }): JSX.Element {
   return (
     <header className="header">
       <h1 className="brand">
@@ -23,6 +23,7 @@ export function Header({ kiosk }: { kiosk: boolean }): JSX.Element {
         </span>
       </h1>
       <PastHeader />
+      {children}
       <OriginNote />
       <ConnectionBadge />
       {!kiosk && (

@@ -12,10 +12,10 @@ afterEach(() => {
   nextSensor.dispatch(null);
 });
 
-test('names the key that leads out, and nothing else without a round', () => {
+test('names the key that leads out and says the time, and nothing else without a round', () => {
   showTags([]);
   render(<KioskNote wish={NONE} />);
-  expect(screen.getByTestId('kiosk-note').textContent).toBe('Leave Esc');
+  expect(screen.getByTestId('kiosk-note').textContent).toMatch(/^Leave Esc\d\d:\d\d$/);
   expect(screen.getByRole('button')).toBeInstanceOf(HTMLButtonElement);
 });
 

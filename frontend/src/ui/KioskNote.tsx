@@ -1,7 +1,8 @@
 import type { JSX } from 'react';
 
+import { timeOfDay } from '../clock';
 import { addressOfPage, CYCLE_LIMITS, type CycleWish, nextSensor } from '../store/cycle';
-import { shortAgeText } from '../domain/format';
+import { clockText, shortAgeText } from '../domain/format';
 import { shown } from '../domain/text';
 import { useApp } from '../store/app';
 import { useSelected } from '../store/create';
@@ -12,13 +13,14 @@ import { useTicking } from '../widgets/useNow';
 /** Longest part of a wish that is told back. */
 const LONGEST_WISH = 12;
 
-/** On a wall screen: which sensor is shown and until when, and how to leave. Quiet, told to nobody twice. */
+/** In the header of a wall screen: the time, which sensor is shown until when, and how to leave. */
 export function KioskNote({ wish }: { wish: CycleWish }): JSX.Element {
   const next = useSelected(nextSensor, (coming) => coming);
   const sensor = useApp(selectSensor);
   const left = useTicking((now) =>
     next ? shortAgeText(Math.max(0, Math.ceil((next.at - now) / 1000))) : null,
   );
+  const time = useTicking(() => clockText(timeOfDay()).slice(0, -3));
   return (
     <div className="kiosk-note" data-testid="kiosk-note">
       {wish.refused !== null && (
@@ -35,6 +37,7 @@ export function KioskNote({ wish }: { wish: CycleWish }): JSX.Element {
       <button type="button" className="text-button" onClick={leaveKiosk}>
         {S.kioskLeave} <kbd>Esc</kbd>
       </button>
+      <time className="kiosk-clock">{time}</time>
     </div>
   );
 }

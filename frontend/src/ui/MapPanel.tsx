@@ -40,8 +40,8 @@ export function MapPanel({ kiosk }: { kiosk: boolean }): JSX.Element {
         {charted && !kiosk && <ChartView charted={charted} />}
         <PastFrame />
       </div>
-      {!kiosk && <WithParts>{(parts) => <parts.TimeBar />}</WithParts>}
       <Legend kiosk={kiosk} />
+      {!kiosk && <WithParts>{(parts) => <parts.TimeBar />}</WithParts>}
     </section>
   );
 }

@@ -23,8 +23,9 @@ export function useReasonText(reason: HealthReason | null, isMarked = false): st
   });
 }
 
+/** Beside its sign. */
 export function Reason({ reason }: { reason: HealthReason }): JSX.Element {
-  return <>{useReasonText(reason)}</>;
+  return <>{useReasonText(reason, true)}</>;
 }
 
 /** Why a tag has its verdict, the worst first; nothing where there is no reason. */

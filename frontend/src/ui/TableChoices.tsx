@@ -12,6 +12,7 @@ import { Segmented } from '../widgets/Segmented';
 /** What can be chosen of the table: its columns, and how high its rows are. */
 export function TableChoices(): JSX.Element {
   const sensors = useApp(selectColumns);
+  const chosen = useApp((state) => state.view.sensor);
   const hidden = useApp((state) => state.settings.hidden);
   const density = useApp((state) => state.settings.density);
   const isByArea = useApp((state) => state.settings.byArea);
@@ -35,7 +36,14 @@ export function TableChoices(): JSX.Element {
         {columns.map(([id, label]) => (
           <Check
             key={id}
-            label={label}
+            label={
+              <>
+                {label}{' '}
+                <small className="no-room faint" data-of={id === chosen ? 'chosen' : id}>
+                  {S.columnNoRoom}
+                </small>
+              </>
+            }
             isOn={isColumnShown({ hidden }, id)}
             onChange={(isOn) => {
               prefer({ hidden: withColumn(hidden, id, isOn) });

@@ -1,10 +1,10 @@
-import { memo, type JSX } from 'react';
+import { Fragment, memo, type JSX, type ReactNode } from 'react';
 
 import type { When } from '../domain/age';
 import { farOffText, percentText, shortAgeText, valueText } from '../domain/format';
 import type { TagHealth } from '../contract/types';
 import { rangeReason, sideOf, worstReason } from '../domain/health';
-import { reasonsText } from '../domain/reasons';
+import { reasonsText, reasonText } from '../domain/reasons';
 import type { Catalogue, Sensor } from '../domain/sensors';
 import { speciesText } from '../domain/species';
 import { shown } from '../domain/text';
@@ -56,14 +56,21 @@ export const TagRow = memo(function TagRow({
   const all = reasonsText(catalogue, health.reasons, unit);
   // A failed scan is said once, with its age.
   const others = health.reasons.filter(({ kind }) => !tag.failedTry || kind !== 'scan_failed');
-  const why = reasonsText(catalogue, others, unit);
-  // Both may not fit: first what the verdict beside it is about.
-  const isTriedFirst = worstReason(health)?.kind === 'scan_failed';
-  const tried = tag.failedTry && (
-    <span className="tried">
-      <Tried failed={tag.failedTry} />
-    </span>
+  const texts = others.map((reason, place): ReactNode =>
+    // The mark of the verdict is that of the worst.
+    reasonText(catalogue, reason, unit, null, place === 0),
   );
+  if (tag.failedTry) {
+    const tried = (
+      <span className="tried">
+        <Tried failed={tag.failedTry} />
+      </span>
+    );
+    // First what the verdict beside it is about.
+    if (worstReason(health)?.kind === 'scan_failed') texts.unshift(tried);
+    else texts.push(tried);
+  }
+  const [why, ...more] = texts;
   return (
     <tr
       aria-rowindex={index + 2}
@@ -90,13 +97,21 @@ export const TagRow = memo(function TagRow({
         <td className="cell-health" title={all}>
           <div>
             <HealthMark verdict={health.verdict} />
-            {(why !== '' || tag.failedTry) && (
+            {why !== undefined && (
               <>
                 <span className="unseen">: </span>
                 <span className="why">
-                  {isTriedFirst ? tried : why}
-                  {tried && why !== '' && '; '}
-                  {isTriedFirst ? why : tried}
+                  {why}
+                  {more.length > 0 && (
+                    <>
+                      <span className="why-count" data-count={more.length} />
+                      <span className="why-more">
+                        {more.map((text, place) => (
+                          <Fragment key={place}>; {text}</Fragment>
+                        ))}
+                      </span>
+                    </>
+                  )}
                 </span>
               </>
             )}

@@ -207,13 +207,17 @@ describe('table', () => {
     expect(screen.getByRole('table').dataset['density']).toBe('compact');
   });
 
-  test('a verdict has its reasons beside it', () => {
+  test('a verdict has its first reason beside it, and how many more there are', () => {
     showTags(tags, judgement({ a: [reason()] }));
     render(<TagTable />);
-    expect(row('a').querySelector('.why')?.textContent).toBe(
-      'Temperature 6.6\u00a0°C, below 10.0 (critical)',
-    );
+    expect(row('a').querySelector('.why')?.textContent).toBe('Temperature 6.6\u00a0°C, below 10.0');
+    expect(row('a').querySelector('.why-count')).toBeNull();
     expect(row('b').querySelector('.why')).toBeNull();
+    flush(() => {
+      showTags(tags, judgement({ a: [reason(), reason({ sensor: 'humidity', value: 20 })] }));
+    });
+    expect(row('a').querySelector<HTMLElement>('.why-count')?.dataset['count']).toBe('1');
+    expect(row('a').querySelector('.why-more')?.textContent).toMatch(/^; Humidity/);
   });
 
   test('strings from the wire are text and nothing else', () => {

@@ -111,6 +111,7 @@ export const PAGE: In<typeof ENGLISH> = {
   outwardHint: 'Der Server versucht es weiter. Diese Seite ist nicht betroffen.',
   journalMore: 'Die Datei nennt der Parameter „journal“ des Zwillings; „off“ zeichnet nichts auf.',
   origin: { simulated: 'Simuliert', recorded: 'Aufzeichnung', sim_time: 'Simulierte Zeit' },
+  originDay: (length: string): string => `1 Gewächshaustag = ${length}`,
   originHint: {
     simulated: 'Kein echter Roboter: Gewächshaus, Pflanzen und Messwerte sind simuliert.',
     recorded: 'Eine Aufzeichnung wird abgespielt: Nichts davon ist live.',

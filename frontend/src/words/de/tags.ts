@@ -65,6 +65,7 @@ export const TAGS: In<typeof ENGLISH> = {
   unclassified: 'nicht bestimmt',
   tableButton: 'Spalten und Zeilen',
   tableColumns: 'Spalten',
+  columnNoRoom: 'hier kein Platz',
   tableByArea: 'Nach Bereich gruppieren',
   areaNone: 'Kein Bereich',
   trend: 'Tendenz',

@@ -111,6 +111,7 @@ export const PAGE = {
   journalMore: 'The file is named by the twin’s parameter “journal”; “off” records nothing.',
   /** What the twin observes where that is no robot's, or not of now. */
   origin: { simulated: 'Simulated', recorded: 'Recording', sim_time: 'Simulated time' },
+  originDay: (length: string): string => `1 greenhouse day = ${length}`,
   originHint: {
     simulated: 'No real robot: greenhouse, plants and readings are simulated.',
     recorded: 'A recording is playing: nothing here is current.',

@@ -62,6 +62,7 @@ export const TAGS = {
   unclassified: 'not classified',
   tableButton: 'Columns and rows',
   tableColumns: 'Columns',
+  columnNoRoom: 'no room here',
   tableByArea: 'Group by area',
   areaNone: 'No area',
   trend: 'Trend',

@@ -109,6 +109,7 @@ export const PAGE: In<typeof ENGLISH> = {
   journalMore:
     'El archivo lo indica el parámetro «journal» del gemelo; con «off» no se registra nada.',
   origin: { simulated: 'Simulado', recorded: 'Grabación', sim_time: 'Tiempo simulado' },
+  originDay: (length: string): string => `1 día de invernadero = ${length}`,
   originHint: {
     simulated: 'No hay robot real: invernadero, plantas y lecturas son simulados.',
     recorded: 'Se reproduce una grabación: nada de esto es en directo.',

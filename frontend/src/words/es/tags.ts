@@ -4,7 +4,7 @@ import type { In } from '../shape';
 import { counted } from './counted';
 
 export const TAGS: In<typeof ENGLISH> = {
-  tags: 'Puntos de medida',
+  tags: 'Puntos',
   tableCaption: 'Todos los puntos de medida con sus últimas lecturas',
   filter: 'Filtrar los puntos',
   filterHint: 'punto, especie, plaga …',
@@ -65,6 +65,7 @@ export const TAGS: In<typeof ENGLISH> = {
   unclassified: 'sin clasificar',
   tableButton: 'Columnas y filas',
   tableColumns: 'Columnas',
+  columnNoRoom: 'aquí no cabe',
   tableByArea: 'Agrupar por zona',
   areaNone: 'Sin zona',
   trend: 'Tendencia',

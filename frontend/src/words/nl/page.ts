@@ -114,6 +114,7 @@ export const PAGE: In<typeof ENGLISH> = {
   journalMore:
     'Het bestand staat in de parameter “journal” van de tweeling; “off” legt niets vast.',
   origin: { simulated: 'Gesimuleerd', recorded: 'Opname', sim_time: 'Gesimuleerde tijd' },
+  originDay: (length: string): string => `1 kasdag = ${length}`,
   originHint: {
     simulated: 'Geen echte robot: kas, planten en metingen zijn gesimuleerd.',
     recorded: 'Er wordt een opname afgespeeld: niets hiervan is live.',

@@ -65,6 +65,7 @@ export const TAGS: In<typeof ENGLISH> = {
   unclassified: 'niet bepaald',
   tableButton: 'Kolommen en rijen',
   tableColumns: 'Kolommen',
+  columnNoRoom: 'hier geen plaats',
   tableByArea: 'Groeperen per afdeling',
   areaNone: 'Geen afdeling',
   trend: 'Trend',

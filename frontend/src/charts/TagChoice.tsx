@@ -1,4 +1,4 @@
-import type { JSX } from 'react';
+import { Fragment, type JSX } from 'react';
 
 import { isHad } from '../domain/sensors';
 import { shown } from '../domain/text';
@@ -33,15 +33,18 @@ export function TagChoice({
   return (
     <div className="chart-tags">
       <SensorChoice tagId={tagIds[0] ?? ''} value={sensor.name} />
-      <ul>
+      <ul aria-label={S.tags}>
         {tagIds.map((tagId, look) => (
           <li key={tagId}>
             <LineSign look={look} />
-            <bdi>{tagLabel(tagId)}</bdi>
+            {/* As the map's labels are. */}
+            <bdi>{shown(tagId, 24)}</bdi>
             {model?.lines
               .filter(({ series }) => series.tagId === tagId)
               .map((line) => (
-                <LineValue key={tagId} line={line} model={model} />
+                <Fragment key={tagId}>
+                  · <LineValue line={line} model={model} />
+                </Fragment>
               ))}
             {tagIds.length > 1 && (
               <button

@@ -370,7 +370,7 @@ def test_what_becomes_critical_meanwhile_is_told_and_leads_to_now(page: Hmi, hou
     expect(page.page.locator("[data-group=active] li")).to_contain_text("Tag c")
     page.page.locator(".list-choice label").first.click()
     assert moment(page) is not None
-    page.page.get_by_role("button", name="Back to live, to tag c").click()
+    page.page.get_by_role("button", name="Back to live, show tag c").click()
     expect_now(page)
     expect(page.card("c")).to_contain_text("60.0")
     expect(page.test_id("meanwhile")).to_have_count(0)

@@ -17,7 +17,7 @@ const line = (patrol: Judgement['house']['patrol']): string | undefined => {
 test('tells the rhythm, the last scan and who is overdue', () => {
   // The builders' states are seconds old, whatever their stamp says.
   const told = line({ interval_s: 40, last_scan: { sec: 0, nanosec: 1 }, overdue: 2 });
-  expect(told).toMatch(/^a scan every 40\u00a0s · last scan .+ ago · 2 tags overdue$/);
+  expect(told).toMatch(/^2 tags overdue · last scan .+ ago · a scan every 40\u00a0s$/);
 });
 
 test.each([
@@ -28,12 +28,12 @@ test.each([
   [43_200, '12\u00a0h'],
 ])('of %s s between two scans', (interval_s, told) => {
   expect(line({ interval_s, last_scan: null, overdue: 0 })).toBe(
-    `a scan every ${told} · no scan yet · no tag overdue`,
+    `no tag overdue · no scan yet · a scan every ${told}`,
   );
 });
 
 test.each([null, 0.04])('without a rhythm it has none to tell: %s', (interval_s) => {
-  expect(line({ interval_s, last_scan: null, overdue: 1 })).toBe('no scan yet · 1 tag overdue');
+  expect(line({ interval_s, last_scan: null, overdue: 1 })).toBe('1 tag overdue · no scan yet');
 });
 
 test('nothing is told of a house without tags', () => {

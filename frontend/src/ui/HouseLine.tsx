@@ -25,17 +25,15 @@ export function HouseLine(): JSX.Element | null {
   });
   if (!patrol || !snapshot || snapshot.tags.length === 0 || isSilent(health)) return null;
   const { interval_s: interval, last_scan: lastScan, overdue } = patrol;
-  const parts = [
-    ...(interval === null || interval < LEAST_INTERVAL_S
-      ? []
-      : [S.houseRhythm(intervalText(interval))]),
+  const rest = [
     lastScan === null ? S.houseNever : last === null ? null : S.houseLast(last),
+    interval === null || interval < LEAST_INTERVAL_S ? null : S.houseRhythm(intervalText(interval)),
   ].filter((part) => part !== null);
   return (
     <p className="house-line" data-testid="house-line">
-      {parts.join(' · ')}
-      {parts.length > 0 && ' · '}
+      {/* First: a narrow screen cuts the end. */}
       <span data-overdue={overdue > 0}>{S.houseOverdue(overdue)}</span>
+      {rest.map((part) => ` · ${part}`)}
     </p>
   );
 }

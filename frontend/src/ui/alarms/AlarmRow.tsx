@@ -59,7 +59,7 @@ export const AlarmRow = memo(function AlarmRow({
               {values.what}
             </span>
             {isToDo && (
-              <span className="alarm-do">
+              <span className="alarm-do" data-again={current === 'healthy' || undefined}>
                 {current === 'healthy' ? S.todoPestAgain : todoText(alarm.reason)}
               </span>
             )}

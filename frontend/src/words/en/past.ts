@@ -24,7 +24,7 @@ export const PAST = {
   backToRecording: 'Back to the recording',
   frozenBehindPast: (clock: string): string => `Live data has stopped. Last data at ${clock}`,
   frozenPastStays: 'The past that is shown is not affected.',
-  meanwhileShow: (tag: string): string => `Back to live, to tag ${tag}`,
+  meanwhileShow: (tag: string): string => `Back to live, show tag ${tag}`,
 
   timebar: 'Time bar',
   timebarSlider: 'Time shown',

@@ -17,8 +17,8 @@ export const HEALTH: In<typeof ENGLISH> = {
     unknown: 'Desconocidos',
   },
   reasons: {
-    sides: { below: 'por debajo de', above: 'por encima de' },
-    sidesHeld: { below: 'aún no por encima de', above: 'aún no por debajo de' },
+    sides: { below: 'inferior a', above: 'superior a' },
+    sidesHeld: { below: 'aún no superior a', above: 'aún no inferior a' },
     range: (reading, side, limit, isCritical) =>
       `${reading}, ${side} ${limit}${isCritical ? ' (crítico)' : ''}`,
     beyond: (sensor, side, limit) => `${sensor} ${side} ${limit}`,

@@ -121,7 +121,9 @@ export function causeFacts(
   const current = furthest(({ now }) => now);
   const begins = active.map(({ alarm }) => secondsOf(alarm.raised_at));
   return [
-    ...counts.filter(({ count }) => count > 0).map((it) => `${it.count} ${S.health[it.verdict]}`),
+    ...counts
+      .filter(({ count }) => count > 0)
+      .map(({ verdict, count }) => `${count} ${(count === 1 ? S.health : S.healthMany)[verdict]}`),
     current?.values.now && `${current.values.now} (${whereText(current.alarm)})`,
     furthest(({ worst }) => worst)?.values.worst,
     begins.length > 0 ? S.alarmSince(whenText(Math.min(...begins), nowS), null) : null,

@@ -3,8 +3,10 @@ import type { Alarm, Verdict } from '../contract/types';
 import type { AppState } from '../store/app';
 import { selectCatalogue, selectNewestHealth } from '../store/derived';
 import { hourAgo, selectHourAgoNow, type HourAgo } from '../store/hourAgo';
+import { VERDICTS } from '../domain/health';
 import { memoLast } from '../domain/memo';
 import { isHeardNow, selectNewestTag } from '../store/moment';
+import type { Item } from './list';
 import { nowOf, type Now } from './now';
 import { alarmText, type Speech } from './words';
 
@@ -33,6 +35,12 @@ export function verdictNow(state: AppState, alarm: Alarm): Verdict | null {
   const at = selectNow(state, alarm, null);
   return at?.kind === 'known' ? at.verdict : null;
 }
+
+/** The worst of some alarms as they are now, or as they were said last; null: there is none. */
+export const worstNow = (state: AppState, items: readonly Item[]): Verdict | null =>
+  VERDICTS.find((each) =>
+    items.some(({ alarm, verdict }) => (verdictNow(state, alarm) ?? verdict) === each),
+  ) ?? null;
 
 /** An alarm in one line, as it is now. */
 export const textNow = (state: AppState, alarm: Alarm): string =>

@@ -107,7 +107,7 @@ test('what is not known now says so, with what was known last', () => {
 test('of a pest how many: now, at worst and at first', () => {
   const reason = { kind: 'pest', sensor: '', value: 2, limit: null } as const;
   const pest = alarm('a', { worst: 4, reason });
-  const texts = { what: 'Pest seen', worst: 'most 4', first: 'first 2' };
+  const texts = { what: 'Pest seen', worst: 'peak 4', first: 'first 2' };
   expect(valuesOf(pest, C, known(3, 'critical'))).toMatchObject({ ...texts, now: 'now 3 pests' });
   expect(valuesOf(pest, C, known(0, 'critical')).now).toBe('now seen');
   expect(valuesOf(pest, C, known(null, 'healthy')).now).toBe('now none seen');

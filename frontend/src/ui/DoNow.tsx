@@ -22,7 +22,7 @@ import { useReasonText } from './Reasons';
 /** Beside the map; the table has the rest. */
 const MOST_TAGS = 2;
 
-/** Tags that need somebody, the worst first; whose alarm is acknowledged or shelved, after the rest. */
+/** Tags that need somebody, the worst first; of equals, who is acknowledged or shelved after the rest. */
 export function useUrgent(): readonly Row[] {
   const tags = useApp(selectTags);
   const health = useApp(selectHealth);
@@ -37,7 +37,12 @@ export function useUrgent(): readonly Row[] {
       const item = alarmOf(alarms, tag.id, worstReason(own));
       return item !== undefined && (item.isAcknowledged || item.shelf !== null);
     };
-    return [...rows.filter((row) => !isSeen(row)), ...rows.filter(isSeen)];
+    const rank = (row: Row): number =>
+      2 * VERDICTS.indexOf(row.health.verdict) + Number(isSeen(row));
+    return rows
+      .map((row) => ({ row, rank: rank(row) }))
+      .sort((a, b) => a.rank - b.rank)
+      .map(({ row }) => row);
   }, [tags, health, isNow, alarms]);
 }
 

@@ -2,22 +2,26 @@ import type { JSX } from 'react';
 
 import { calling } from '../../alarms/list';
 import { alarmList } from '../../alarms/watch';
+import { worstNow } from '../../alarms/speech';
+import { useApp } from '../../store/app';
 import { useSelected } from '../../store/create';
 import { S } from '../../strings';
 import { HealthShape } from '../HealthMark';
 
-/** "Alarms" and how many are active, with the sign of the worst that nobody has acknowledged. */
+/** "Alarms" and how many are active, with the sign of the worst now; none once all are acknowledged. */
 export function AlarmsLabel(): JSX.Element {
   const list = useSelected(alarmList, (it) => it);
   const unacknowledged = calling(list);
-  const [worst] = unacknowledged;
   const { length } = list.active;
+  const worst = useApp((state) =>
+    unacknowledged.length === 0 ? null : worstNow(state, list.active),
+  );
   return (
     <>
       {S.alarms}
       {length > 0 && (
         <span className="alarm-count" data-testid="alarm-count" aria-hidden="true">
-          {worst && <HealthShape verdict={worst.verdict} />}
+          {worst && <HealthShape verdict={worst} />}
           {length}
         </span>
       )}

@@ -11,7 +11,7 @@ import {
 } from '../../alarms/arrange';
 import { worstNowFirst, type Item } from '../../alarms/list';
 import { acknowledgeAlarms } from '../../alarms/own';
-import { selectNow, selectSpeech, verdictNow } from '../../alarms/speech';
+import { selectNow, selectSpeech, verdictNow, worstNow } from '../../alarms/speech';
 import { alarmList } from '../../alarms/watch';
 import { now, timeOfDay } from '../../clock';
 import type { Verdict } from '../../contract/types';
@@ -218,20 +218,21 @@ function CauseHeading({
     const nowS = rosNow(state, now());
     return causeFacts(items, speech, nowS, (alarm) => selectNow(state, alarm)).join(', ');
   });
-  const [worst] = items;
-  if (!worst) return null;
+  const verdict = useApp((state) => worstNow(state, items));
+  const [first] = items;
+  if (!first || !verdict) return null;
   const waiting = unacknowledged(items);
   const tags = [...new Set(items.map(({ alarm }) => alarm.tag_id))].filter(Boolean);
   const named = tags.slice(0, MOST_TAGS).map((id) => shownText(id, 16));
   return (
-    <div className="alarm-cause" data-cause={cause} data-health={worst.verdict}>
+    <div className="alarm-cause" data-cause={cause} data-health={verdict}>
       <button type="button" className="alarm-go" aria-expanded={isOpen} onClick={onToggle}>
-        <HealthMark verdict={worst.verdict} word={false} />
+        <HealthMark verdict={verdict} word={false} />
         <span className="alarm-text">
           <span>
             <strong>{cause}</strong> · {S.alarmCount(items.length)}
           </span>
-          {group !== 'resolved' && <span className="alarm-do">{todoText(worst.alarm.reason)}</span>}
+          {group !== 'resolved' && <span className="alarm-do">{todoText(first.alarm.reason)}</span>}
           <span className="alarm-facts">{facts}</span>
           <span className="alarm-facts faint">
             {S.alarmTags(named, tags.length - named.length)}

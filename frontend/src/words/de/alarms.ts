@@ -26,7 +26,7 @@ export const ALARMS: In<typeof ENGLISH> = {
   alarmWorst: {
     below: (reading) => `tiefster Wert ${reading}`,
     above: (reading) => `höchster Wert ${reading}`,
-    pest: (reading) => `höchstens ${reading}`,
+    pest: (reading) => `Höchstzahl ${reading}`,
   },
   alarmFirst: (reading) => `anfangs ${reading}`,
   alarmStatus: { critical: 'kritisch', healthy: 'im Sollbereich' },
@@ -42,7 +42,7 @@ export const ALARMS: In<typeof ENGLISH> = {
   alarmShelveOf: (what) => `Zurückstellen: ${what}`,
   alarmShelveHint: 'Bis dahin keine Meldung, außer der Alarm verschlimmert sich.',
   alarmShelveCritical:
-    'Ein kritischer Alarm lässt sich höchstens 1 h zurückstellen, und nur mit Begründung.',
+    'Ein Alarm, der kritisch ist oder war, lässt sich höchstens 1 h zurückstellen, und nur mit Begründung.',
   alarmShelfReason: 'Begründung',
   alarmShelfReasonOptional: 'Begründung (optional)',
   alarmShelveMinutes: (minutes) => `Für ${minutes} min`,

@@ -52,7 +52,7 @@ export const HEALTH: In<typeof ENGLISH> = {
       humidity: { below: 'Befeuchten', above: 'Lüften und heizen' },
       co2: { below: 'CO₂ dosieren oder lüften', above: 'Lüften, CO₂-Dosierung prüfen' },
       light: { below: 'Zusatzlicht einschalten', above: 'Schattieren' },
-      soil_moisture: { below: 'Gießen', above: 'Weniger gießen, Abfluss prüfen' },
+      soil_moisture: { below: 'Bewässern', above: 'Weniger bewässern, Drainage prüfen' },
       vpd: { below: 'Lüften und heizen', above: 'Befeuchten oder schattieren' },
     },
     range: 'Klimaregelung prüfen',

@@ -28,7 +28,7 @@ export const ALARMS = {
   alarmWorst: {
     below: (reading: string): string => `worst ${reading}`,
     above: (reading: string): string => `worst ${reading}`,
-    pest: (reading: string): string => `most ${reading}`,
+    pest: (reading: string): string => `peak ${reading}`,
   },
   alarmFirst: (reading: string): string => `first ${reading}`,
   alarmStatus: { critical: 'critical', healthy: 'in range' },
@@ -43,7 +43,8 @@ export const ALARMS = {
   alarmShelve: 'Shelve',
   alarmShelveOf: (what: string): string => `Shelve: ${what}`,
   alarmShelveHint: 'No notification until the time is up, unless it gets worse.',
-  alarmShelveCritical: 'A critical alarm can be shelved for at most 1 h, and needs a reason.',
+  alarmShelveCritical:
+    'An alarm that is or was critical can be shelved for at most 1 h, and needs a reason.',
   alarmShelfReason: 'Reason',
   alarmShelfReasonOptional: 'Reason (optional)',
   alarmShelveMinutes: (minutes: number): string => `For ${minutes} min`,

@@ -36,12 +36,13 @@ export const ALARMS: In<typeof ENGLISH> = {
   alarmAcknowledge: 'Reconocer',
   alarmAcknowledgeOf: (what) => `Reconocer: ${what}`,
   alarmAcknowledgeAll: (count) => `Reconocer todas (${count})`,
-  alarmUnacknowledge: 'Anular',
+  alarmUnacknowledge: 'Anular reconocimiento',
   alarmUnacknowledgeOf: (what) => `Anular reconocimiento: ${what}`,
   alarmShelve: 'Aplazar',
   alarmShelveOf: (what) => `Aplazar: ${what}`,
   alarmShelveHint: 'Sin avisos hasta entonces, salvo que empeore.',
-  alarmShelveCritical: 'Una alarma crítica se puede aplazar 1 h como máximo y requiere un motivo.',
+  alarmShelveCritical:
+    'Una alarma que es o fue crítica se puede aplazar 1 h como máximo y requiere un motivo.',
   alarmShelfReason: 'Motivo',
   alarmShelfReasonOptional: 'Motivo (opcional)',
   alarmShelveMinutes: (minutes) => `Durante ${minutes} min`,
@@ -96,9 +97,9 @@ export const ALARMS: In<typeof ENGLISH> = {
   alarmNotifyNone: 'Este navegador no admite notificaciones.',
   alarmNotifyTitle: (count) => counted(count, 'alarma nueva', 'alarmas nuevas'),
 
-  alarmsRaised: (alarms, more) => `Nuevo: ${alarms.join('; ')}${more > 0 ? ` y ${more} más` : ''}`,
+  alarmsRaised: (alarms, more) => `Nuevas: ${alarms.join('; ')}${more > 0 ? ` y ${more} más` : ''}`,
   alarmsCleared: (alarms, more) =>
-    `Resuelto: ${alarms.join('; ')}${more > 0 ? ` y ${more} más` : ''}`,
+    `Resueltas: ${alarms.join('; ')}${more > 0 ? ` y ${more} más` : ''}`,
   alarmsMeanwhile: (alarm, more) =>
     `Alarma nueva: ${alarm}${more > 0 ? ` y ${counted(more, 'alarma más', 'alarmas más')}` : ''}`,
   alarmsTitle: (count, title) => `(${count}) ${title}`,

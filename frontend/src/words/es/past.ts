@@ -29,7 +29,7 @@ export const PAST: In<typeof ENGLISH> = {
 
   timebar: 'Barra de tiempo',
   timebarSlider: 'Momento mostrado',
-  timebarLive: 'Directo',
+  timebarLive: 'En directo',
   timebarPeriod: 'Periodo',
   timebarPeriods: {
     hour: 'Última hora',

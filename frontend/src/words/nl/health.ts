@@ -98,7 +98,7 @@ export const HEALTH: In<typeof ENGLISH> = {
   houseNever: 'nog geen meting',
   houseOverdue: (count) =>
     count === 0
-      ? 'geen meetpunt te laat'
+      ? 'alle meetpunten op tijd'
       : counted(count, 'meetpunt te laat', 'meetpunten te laat'),
   tagChosen: (tag, health, row, rows) => `Meetpunt ${tag}, ${health}, ${row} van ${rows}`,
   attention: 'Vraagt aandacht',

@@ -20,7 +20,7 @@ export const TAGS: In<typeof ENGLISH> = {
     species: 'Soort',
     flowers: 'Bloemen',
     pest: 'Plaag',
-    age: 'Oud',
+    age: 'Geleden',
   },
   pest: 'Plaag',
   pestCount: (count) => counted(count, 'plaagdier', 'plaagdieren'),

@@ -171,8 +171,8 @@ def limits(**values: float) -> tuple[str, ...]:
 
 
 def patrols_of(pid: int) -> list[int]:
-    """The patrol that a demo has started; what looks back is a process of its own too."""
-    return children_of(pid, b"lupin_patrol")
+    """The patrol that a demo has started, and not what makes its past (`lupin_patrol.past`)."""
+    return children_of(pid, b"lupin_patrol\0")
 
 
 def children_of(pid: int, word: bytes) -> list[int]:

@@ -98,36 +98,33 @@ export function causeFacts(
 ): readonly string[] {
   const all = items.map(({ alarm, verdict }) => {
     const now = nowOf(alarm);
-    const isKnown = now?.kind === 'known';
-    return {
-      alarm,
-      verdict: isKnown ? now.verdict : verdict,
-      now: isKnown ? now.value : null,
-      worst: alarm.worst ?? alarm.reason.value,
-      values: valuesOf(alarm, speech, now),
-    };
+    const known = now?.kind === 'known' ? now : null;
+    return { alarm, now, verdict: known?.verdict ?? verdict, value: known?.value ?? null };
   });
-  type Value = (typeof all)[number];
+  const [one] = items;
   // All of one cause are on the same side.
-  const sign =
-    all[0] && isOfRange(all[0].alarm.reason) && sideOf(all[0].alarm.reason) === 'below' ? -1 : 1;
-  const furthest = (of: (each: Value) => number | null): Value | undefined =>
-    all.filter((each) => of(each) !== null).sort((a, b) => sign * ((of(b) ?? 0) - (of(a) ?? 0)))[0];
+  const isBelow = one && isOfRange(one.alarm.reason) && sideOf(one.alarm.reason) === 'below';
+  const furthest = (valueOf: (each: (typeof all)[number]) => number | null) => {
+    const found = all
+      .map((each) => ({ each, value: valueOf(each) ?? NaN }))
+      .filter(({ value }) => !Number.isNaN(value))
+      .sort((a, b) => (isBelow ? a.value - b.value : b.value - a.value))[0]?.each;
+    return found && { ...valuesOf(found.alarm, speech, found.now), where: whereText(found.alarm) };
+  };
+  const current = furthest(({ value }) => value);
+  const worst = furthest(({ alarm }) => alarm.worst ?? alarm.reason.value);
   const active = all.filter(({ alarm }) => alarm.cleared_at === null);
-  const counts = VERDICTS.map((verdict) => ({
-    verdict,
-    count: active.filter((each) => each.verdict === verdict).length,
-  }));
-  const current = furthest(({ now }) => now);
+  const counts = VERDICTS.map((verdict) => {
+    const count = active.filter((each) => each.verdict === verdict).length;
+    return count > 0 ? `${count} ${(count === 1 ? S.health : S.healthMany)[verdict]}` : null;
+  });
   const begins = active.map(({ alarm }) => secondsOf(alarm.raised_at));
   return [
-    ...counts
-      .filter(({ count }) => count > 0)
-      .map(({ verdict, count }) => `${count} ${(count === 1 ? S.health : S.healthMany)[verdict]}`),
-    current?.values.now && `${current.values.now} (${whereText(current.alarm)})`,
-    furthest(({ worst }) => worst)?.values.worst,
+    ...counts,
+    current?.now ? `${current.now} (${current.where})` : null,
+    worst?.worst ?? null,
     begins.length > 0 ? S.alarmSince(whenText(Math.min(...begins), nowS), null) : null,
-  ].filter((text) => text != null && text !== '') as string[];
+  ].filter((text) => text !== null);
 }
 
 const iso = (at: WireTime | null): string | null =>

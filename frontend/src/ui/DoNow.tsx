@@ -1,7 +1,7 @@
 import { useMemo, type JSX } from 'react';
 
 import { whenText } from '../alarms/words';
-import type { AlarmList, Item } from '../alarms/list';
+import type { Item } from '../alarms/list';
 import { alarmList } from '../alarms/watch';
 import { now } from '../clock';
 import type { HealthReason } from '../contract/types';
@@ -33,26 +33,25 @@ export function useUrgent(): readonly Row[] {
       ({ health: { verdict } }) => verdict === 'critical' || verdict === 'stressed',
     );
     if (!isNow) return rows;
-    const isSeen = ({ tag, health: own }: Row): boolean => {
-      const item = alarmOf(alarms, tag.id, worstReason(own));
-      return item !== undefined && (item.isAcknowledged || item.shelf !== null);
-    };
-    const rank = (row: Row): number =>
-      2 * VERDICTS.indexOf(row.health.verdict) + Number(isSeen(row));
-    return rows
-      .map((row) => ({ row, rank: rank(row) }))
-      .sort((a, b) => a.rank - b.rank)
-      .map(({ row }) => row);
+    const seen = [...alarms.active.filter((it) => it.isAcknowledged), ...alarms.shelved];
+    const isSeen = new Set(
+      rows
+        .filter(({ tag, health: own }) => alarmOf(seen, tag.id, worstReason(own)))
+        .map(({ tag }) => tag.id),
+    );
+    const rank = ({ tag, health: own }: Row): number =>
+      2 * VERDICTS.indexOf(own.verdict) + Number(isSeen.has(tag.id));
+    return rows.sort((a, b) => rank(a) - rank(b));
   }, [tags, health, isNow, alarms]);
 }
 
-/** The active alarm of a reason. */
+/** That of a reason. */
 const alarmOf = (
-  { active, shelved }: AlarmList,
+  items: readonly Item[],
   tagId: string,
   reason: HealthReason | undefined,
 ): Item | undefined =>
-  [...active, ...shelved].find(
+  items.find(
     ({ alarm }) =>
       alarm.tag_id === tagId &&
       alarm.reason.kind === reason?.kind &&
@@ -65,7 +64,9 @@ const alarmOf = (
  */
 export function useSince(tagId: string, reason: HealthReason | undefined): string | null {
   const isNow = useApp((state) => selectShown(state).moment === null);
-  const found = useSelected(alarmList, (list) => alarmOf(list, tagId, reason));
+  const found = useSelected(alarmList, ({ active, shelved }) =>
+    alarmOf([...active, ...shelved], tagId, reason),
+  );
   if (!isNow || !found) return null;
   if (found.shelf) return S.alarmShelved(clockText(found.shelf.until), '');
   if (found.isAcknowledged) return S.healthAcknowledged;

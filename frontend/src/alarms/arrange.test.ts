@@ -34,6 +34,18 @@ test('many of one cause stand together, the worst cause first; a few stand by th
   expect(loose.map(({ cause, items }) => [cause, items.length])).toEqual([[null, 8]]);
 });
 
+test('many of one cause stand where the worst of them does', () => {
+  const mild = { verdict: 'stressed' } as const;
+  const colds = many(cold, 6).map((each, at) => ({
+    ...each,
+    reason: at === 0 ? each.reason : { ...each.reason, ...mild },
+  }));
+  const items = active(...colds, alarm('dry', { raised: 1, reason: { sensor: 'humidity' } }));
+  expect(items.map(({ alarm: { id } }) => id).slice(0, 2)).toEqual(['cold1', 'dry']);
+  const blocks = arranged(items, 'cause', speech);
+  expect(blocks.map(({ items: own }) => own.length)).toEqual([6, 1]);
+});
+
 test('a few of several causes: the worst first, whatever the cause', () => {
   const worst = alarm('worst', { reason: { sensor: 'humidity', verdict: 'critical' } });
   const mild = { verdict: 'stressed' } as const;

@@ -49,6 +49,11 @@ test('says what to do first, and since when', () => {
     expect.stringMatching(/^CriticalTag 1: /),
     expect.stringMatching(/^CriticalTag 5: .*treat the plants acknowledged/),
   ]);
+  // And never before what is worse.
+  act(() => {
+    showTags(TAGS, judgement({ 1: [{ ...cold, verdict: 'stressed' }], 5: [pest, cold] }));
+  });
+  expect(todo.firstElementChild?.textContent).toMatch(/^CriticalTag 5: /);
   stop();
 });
 

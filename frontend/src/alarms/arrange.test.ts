@@ -94,6 +94,8 @@ test('of a cause the value farthest beyond, and since when one has been active',
     ...['now 10.4\u00a0°C (Tag 2)', 'worst 2.9\u00a0°C', 'since sim 00:01:41'],
   ]);
   expect(causeFacts(items.resolved, speech, null, now)).toEqual(['worst 2.9\u00a0°C']);
+  const unknown = (): Now => ({ kind: 'unknown', last: 9, lastAt: 'unknown' });
+  expect(causeFacts(items.active, speech, null, unknown)[0]).toBe('2 Unknown');
 });
 
 test('the newest first, or by tag: in one row', () => {

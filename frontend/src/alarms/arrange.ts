@@ -99,7 +99,9 @@ export function causeFacts(
   const all = items.map(({ alarm, verdict }) => {
     const now = nowOf(alarm);
     const known = now?.kind === 'known' ? now : null;
-    return { alarm, now, verdict: known?.verdict ?? verdict, value: known?.value ?? null };
+    // What has no value is as it was said; of another, an old reading says nothing of now.
+    const current = known?.verdict ?? (now === null ? verdict : 'unknown');
+    return { alarm, now, verdict: current, value: known?.value ?? null };
   });
   const [one] = items;
   // All of one cause are on the same side.

@@ -437,3 +437,7 @@ def test_a_phone_has_the_menu_and_every_count_on_its_screen(
         for each in buttons.all():
             expect(each).to_be_in_viewport(ratio=1)
             assert each.evaluate("(e) => e.scrollWidth <= e.clientWidth"), width
+    # Beside a card, the bar is the way along the past.
+    hmi.turn(f"at={hour.begun_s + 700}&tag=a")
+    expect(hmi.card("a")).to_be_in_viewport()
+    expect(slider(hmi)).to_be_in_viewport(ratio=1)

@@ -19,10 +19,15 @@ import { S } from '../strings';
 import { HealthMark } from './HealthMark';
 import { useReasonText } from './Reasons';
 
+/** Nothing says more of such a tag. */
+const OLD: ReadonlySet<string | undefined> = new Set(['old', undefined]);
 /** Beside the map; the table has the rest. */
 const MOST_TAGS = 2;
 
-/** Tags that need somebody, the worst first; of equals, who is acknowledged or shelved after the rest. */
+/**
+ * Tags that need somebody, the worst first; of equals, who is acknowledged or shelved after the rest.
+ * What is only old needs the robot, which comes again.
+ */
 export function useUrgent(): readonly Row[] {
   const tags = useApp(selectTags);
   const health = useApp(selectHealth);
@@ -30,7 +35,7 @@ export function useUrgent(): readonly Row[] {
   const alarms = useSelected(alarmList, (it) => it);
   return useMemo(() => {
     const rows = sortRows(rowsOf(tags, health), { column: 'health', descending: true }).filter(
-      ({ health: { verdict } }) => verdict === 'critical' || verdict === 'stressed',
+      ({ health: own }) => own.verdict !== 'healthy' && !OLD.has(worstReason(own)?.kind),
     );
     if (!isNow) return rows;
     const seen = [...alarms.active.filter((it) => it.isAcknowledged), ...alarms.shelved];

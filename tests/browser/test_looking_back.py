@@ -385,6 +385,8 @@ def test_axe_has_no_objection_to_the_past(hour: Hour, open_page: OpenPage) -> No
     hmi.page.get_by_role("button", name="What the marks mean").click()
     assert violations(hmi) == []
     hmi.page.set_viewport_size({"width": PHONE["width"], "height": PHONE["height"]})
+    assert violations(hmi) == []
+    hmi.card("b").get_by_role("button", name="Close").click()
     hmi.page.get_by_label("Period", exact=True).select_option("own")
     assert violations(hmi) == []
 

@@ -9,8 +9,6 @@ really had then. For the last picture a tag is scanned whose sensor has gone wro
 from __future__ import annotations
 
 import io
-import subprocess
-import sys
 import tempfile
 import time
 from collections.abc import Iterable
@@ -22,8 +20,9 @@ from greenhouse_sim.simulator import GreenhouseSimulator
 from PIL import Image
 from playwright.sync_api import Browser, expect
 
-from lupin_bridge.cli.demo import rows
+from lupin_patrol.cli import parse
 from lupin_patrol.greenhouse import read_greenhouse
+from lupin_patrol.past import past
 from lupin_patrol.perception import FREE, OCCUPIED, RESOLUTION_M
 from lupin_twin.core.state import Scan, Write
 from lupin_twin.journal.runs import Clock
@@ -63,7 +62,7 @@ def taken(browser: Browser, folder: Path) -> None:
     with tempfile.TemporaryDirectory() as home:
         journal = Path(home) / "journal.sqlite"
         now_ns = time.time_ns()
-        told, end_ns = past(now_ns), now_ns - GRADED_S * SECOND
+        told, end_ns = remembered(now_ns), now_ns - GRADED_S * SECOND
         known = [row for row in told if row.stamp_ns <= end_ns]
         robot = Robot(row for row in told if isinstance(row, Scan) and row.stamp_ns > end_ns)
         kept(journal, known, Clock(now_ns, now_ns, is_simulated=False))
@@ -110,14 +109,11 @@ def is_told(row: Scan, tag: dict[str, Any]) -> bool:
     return tried is not None and tried["sec"] >= row.stamp_ns // SECOND
 
 
-def past(now_ns: int) -> list[Write]:
+def remembered(now_ns: int) -> list[Write]:
     """What the twin is to remember, and what is to come until `AHEAD_S` from now."""
-    made = subprocess.run(
-        [sys.executable, "-m", "lupin_patrol.past"], capture_output=True, text=True, check=True
-    )
     return [
         row
-        for row in rows(made.stdout.splitlines(), now_ns + AHEAD_S * SECOND)
+        for row in past(parse([]), now_ns + AHEAD_S * SECOND)
         if not RESUMED_S < (now_ns - row.stamp_ns) / SECOND < STOPPED_S
     ]
 

@@ -113,7 +113,7 @@ def test_a_failed_scan_is_listed_and_says_so_until_it_succeeds(
     shared.peer.observe(scan("tried", at=(2, 2), status=failed))
     row = hmi.row("tried")
     expect(row).to_have_attribute("data-pinned", "false")
-    expect(row).to_have_attribute("data-health", "stressed")
+    expect(row).to_have_attribute("data-health", "unknown")
     expect(row.locator(".cell-age")).to_have_text("never")
     tried = row.locator(".tried")
     # Minutes, where a busy machine takes so long.

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import json
+from pathlib import Path
 from statistics import fmean
-from typing import Any
 
 import pytest
 from greenhouse_sim.simulator import GreenhouseSimulator
@@ -12,66 +11,78 @@ from greenhouse_sim.simulator import GreenhouseSimulator
 from lupin_patrol.cli import parse
 from lupin_patrol.greenhouse import read_greenhouse
 from lupin_patrol.mission import START_OF_DAY_S
-from lupin_patrol.past import DAYS, main, past
+from lupin_patrol.past import DAYS, SOURCE, main, past
+from lupin_twin.core.state import Inspection, Pin, Scan, Write
 from tests.support.climate import Truth
+from tests.support.journal import NOW, kept, scan, select
 
 DAY_SPEED = 60.0
+SHORT = ["--speed=50"]
 
 
-def made(*options: str) -> list[dict[str, Any]]:
-    return list(past(parse(options)))
+def made(*options: str) -> list[Write]:
+    return list(past(parse(options), NOW))
+
+
+def at_s(row: Write) -> float:
+    """Seconds after now."""
+    return (row.stamp_ns - NOW) / 1e9
 
 
 @pytest.fixture(scope="module")
-def events() -> list[dict[str, Any]]:
+def rows() -> list[Write]:
     return made()
 
 
 @pytest.fixture(scope="module")
-def scans(events: list[dict[str, Any]]) -> list[dict[str, Any]]:
-    return [event for event in events if "status" in event]
+def scans(rows: list[Write]) -> list[Scan]:
+    return [row for row in rows if isinstance(row, Scan)]
 
 
-def test_it_is_three_days_of_the_demo_s_own_length_up_to_now(events: list[dict[str, Any]]) -> None:
-    times = [event["at_s"] for event in events]
+def test_it_is_three_days_of_the_demo_s_own_length_up_to_now(rows: list[Write]) -> None:
+    times = [at_s(row) for row in rows]
     assert times == sorted(times)
     assert -DAYS * 86_400 / DAY_SPEED <= times[0] < -DAYS * 86_400 / DAY_SPEED + 10
     assert -10 < times[-1] < 0
 
 
-def test_every_tag_is_scanned_in_every_pass_and_some_scans_fail(
-    scans: list[dict[str, Any]],
-) -> None:
+def test_every_tag_is_scanned_in_every_pass_and_some_scans_fail(scans: list[Scan]) -> None:
     tags = {tag.tag_id for tag in read_greenhouse(GreenhouseSimulator()).tags}
-    last = scans[-1]["pass"]
+    last = int(scans[-1].mission.removeprefix("past-"))
     assert last > 50
     for number in range(1, last):
-        tried = [event for event in scans if event["pass"] == number]
-        assert {event["tag_id"] for event in tried} == tags
-        failed = [event for event in tried if event["status"]]
-        assert {event["status"] for event in failed} == {1, 2}
-        assert not any(event["readings"] or event["pose"] for event in failed)
+        tried = [row for row in scans if row.mission == f"past-{number:04d}"]
+        assert {row.tag_id for row in tried} == tags
+        failed = [row for row in tried if row.status]
+        assert {row.status for row in failed} == {1, 2}
+        assert all(row.status_detail for row in failed)
+        assert not any(row.readings for row in failed)
 
 
-def test_pests_come_and_are_cleared(events: list[dict[str, Any]]) -> None:
-    seen = [(event["tag_id"], event["bug_count"] > 0) for event in events if "bug_count" in event]
-    assert all(
-        event["anomaly"] == (event["bug_count"] > 0) for event in events if "anomaly" in event
-    )
-    infested = {tag for tag, has_bugs in seen if has_bugs}
+def test_pests_come_and_are_cleared(rows: list[Write]) -> None:
+    seen = [(row.tag_id, row.flower) for row in rows if isinstance(row, Inspection) and row.flower]
+    assert all(flower.anomaly == (flower.bug_count > 0) for _, flower in seen)
+    infested = {tag for tag, flower in seen if flower.bug_count}
     assert len(infested) > 5
-    last = {tag for tag, has_bugs in dict(seen).items() if has_bugs}
+    last = {tag for tag, flower in dict(seen).items() if flower.bug_count}
     assert len(last) < len(infested)
 
 
-def test_places_are_exact_at_first(events: list[dict[str, Any]]) -> None:
+def test_each_tag_gets_its_exact_place_before_anything_else(rows: list[Write]) -> None:
     greenhouse = read_greenhouse(GreenhouseSimulator())
-    first = {event["tag_id"]: event["pose"] for event in reversed(events) if event["pose"]}
-    for tag in greenhouse.tags:
-        assert tuple(first[tag.tag_id][:2]) == tag.position
+    pins = {row.tag_id: row.pose for row in rows if isinstance(row, Pin)}
+    assert {tag: (pose.x, pose.y) for tag, pose in pins.items()} == {
+        tag.tag_id: tag.position for tag in greenhouse.tags
+    }
+    placed: set[str] = set()
+    for row in rows:
+        if isinstance(row, Pin):
+            assert row.tag_id not in placed, "it is pinned once"
+            placed.add(row.tag_id)
+        assert row.tag_id in placed or (isinstance(row, Scan) and row.status)
 
 
-def test_its_time_of_day_is_that_of_the_patrol(scans: list[dict[str, Any]]) -> None:
+def test_its_time_of_day_is_that_of_the_patrol(scans: list[Scan]) -> None:
     """Readings follow the climate's own curve, at the time of day that leads up to the start."""
     greenhouse = read_greenhouse(GreenhouseSimulator())
     truth = Truth(GreenhouseSimulator())
@@ -79,30 +90,49 @@ def test_its_time_of_day_is_that_of_the_patrol(scans: list[dict[str, Any]]) -> N
     def off_by(hours: float) -> float:
         return fmean(
             abs(
-                value
+                reading.value
                 - truth.of(
                     "temperature",
-                    greenhouse.tag(event["tag_id"]).position,
-                    START_OF_DAY_S + event["at_s"] * DAY_SPEED + hours * 3600,
+                    greenhouse.tag(row.tag_id).position,
+                    START_OF_DAY_S + at_s(row) * DAY_SPEED + hours * 3600,
                 )
             )
-            for event in scans
-            for name, value in event["readings"]
-            if name == "temperature"
+            for row in scans
+            for reading in row.readings
+            if reading.name == "temperature"
         )
 
     assert off_by(0) < min(off_by(hours) for hours in (-2, -1, 1, 2)) / 1.5
 
 
-def test_options_are_the_patrol_s(capsys: pytest.CaptureFixture[str]) -> None:
-    main(["--speed", "10", "--day-speed", "3600", "--seed", "3"])
-    lines = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
-    assert -DAYS * 86_400 / 3600 / 10 <= lines[0]["at_s"] < lines[-1]["at_s"] < 0
-    assert lines == json.loads(json.dumps(made("--speed=10", "--day-speed=3600", "--seed=3")))
-    assert lines != json.loads(json.dumps(made("--speed=10", "--day-speed=3600", "--seed=4")))
-    with pytest.raises(SystemExit):
-        main(["--speed", "0"])
+def test_options_are_the_patrol_s() -> None:
+    rows = made("--speed=10", "--day-speed=3600", "--seed=3")
+    assert -DAYS * 86_400 / 3600 / 10 <= at_s(rows[0]) < at_s(rows[-1]) < 0
+    assert rows == made("--speed=10", "--day-speed=3600", "--seed=3")
+    assert rows != made("--speed=10", "--day-speed=3600", "--seed=4")
 
 
 def test_where_the_day_stands_still_there_is_no_past() -> None:
     assert made("--day-speed=0") == []
+
+
+def test_it_fills_a_journal_that_is_new_and_leaves_somebody_s(tmp_path: Path) -> None:
+    path = tmp_path / "demo.sqlite"
+    main([str(path), *SHORT])
+    made_of = select(
+        path, "SELECT DISTINCT source, is_copy FROM scan UNION SELECT source, is_copy FROM look"
+    )
+    assert made_of == [(SOURCE, 0)]
+    assert select(path, "SELECT count(*) > 3 FROM look") == [(1,)]
+    theirs = tmp_path / "theirs.sqlite"
+    kept(theirs, [scan()])
+    main([str(theirs), *SHORT])
+    assert select(theirs, "SELECT count(*) FROM scan") == [(1,)]
+
+
+def test_what_hinders_it_ends_it(tmp_path: Path) -> None:
+    (tmp_path / "no").write_text("a file where a folder should be")
+    with pytest.raises(SystemExit, match="File exists"):
+        main([str(tmp_path / "no" / "demo.sqlite"), *SHORT])
+    with pytest.raises(SystemExit):
+        main([str(tmp_path / "demo.sqlite"), "--speed", "0"])

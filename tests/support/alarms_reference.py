@@ -205,7 +205,7 @@ def _of_tries(occasion: list[PastWrite], scans: list[int]) -> Iterator[tuple[_Ke
     at = occasion[0].stamp_ns
     for kind, status in {w.kind: w.status for w in occasion}.items():
         bad = status != 0
-        said = _Said(at, bad, bad, "stressed", float(status), scans=tuple(scans[-9:]))
+        said = _Said(at, bad, bad, "unknown", float(status), scans=tuple(scans[-9:]))
         yield ("scan_failed", "", str(kind)), said
     looks = [w for w in occasion if w.kind == FLOWER and w.has_seen]
     if looks:

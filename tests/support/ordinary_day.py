@@ -6,10 +6,11 @@ Here its times are those of the house, in which a day takes 24 hours: a round ta
 
 from __future__ import annotations
 
-from typing import Any, Final
+from typing import Final
 
 from lupin_patrol.cli import parse
 from lupin_patrol.past import DAYS, past
+from lupin_twin.core.state import NO_FLOWER, Inspection, Pin, Scan
 from lupin_twin.core.writes import PastWrite
 
 S: Final = 1_000_000_000
@@ -21,17 +22,18 @@ _SCAN, _INSPECTION = 0, 1
 def ordinary_days(seed: int = 0) -> list[PastWrite]:
     """Scans and looks of three days, from 0 ns on, as a journal tells them."""
     options = parse([f"--seed={seed}"])
+    told = (row for row in past(options, 0) if not isinstance(row, Pin))
     return [
-        _write(number, event, DAYS * DAY_NS + round(event["at_s"] * options.day_speed * S))
-        for number, event in enumerate(past(options), start=1)
+        _write(number, row, DAYS * DAY_NS + round(row.stamp_ns * options.day_speed))
+        for number, row in enumerate(told, start=1)
     ]
 
 
-def _write(number: int, event: dict[str, Any], at_ns: int) -> PastWrite:
-    tag_id = event["tag_id"]
-    if "species" in event:
-        seen = (True, event["species"], event["anomaly"], event["bug_count"])
-        return PastWrite(number, RUN, tag_id, at_ns, _INSPECTION, 0, (), (), *seen)
-    names = tuple(name for name, _ in event["readings"])
-    values = tuple(value for _, value in event["readings"])
-    return PastWrite(number, RUN, tag_id, at_ns, _SCAN, event["status"], names, values)
+def _write(number: int, row: Scan | Inspection, at_ns: int) -> PastWrite:
+    if isinstance(row, Inspection):
+        flower = row.flower or NO_FLOWER
+        seen = (True, flower.species, flower.anomaly, flower.bug_count)
+        return PastWrite(number, RUN, row.tag_id, at_ns, _INSPECTION, 0, (), (), *seen)
+    names = tuple(reading.name for reading in row.readings)
+    values = tuple(reading.value for reading in row.readings)
+    return PastWrite(number, RUN, row.tag_id, at_ns, _SCAN, row.status, names, values)

@@ -15,13 +15,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
-from geometry_msgs.msg import Point, Point32, Quaternion
-from geometry_msgs.msg import Pose as PoseMsg
 from lupin_msgs.msg import (
     DiscoveredTag,
     DiscoveredTags,
     FlowerObservation,
-    FlowerPoint,
     Observation,
     SensorReading,
 )
@@ -40,11 +37,11 @@ from lupin_bridge.feed.relay import Topic
 from lupin_bridge.message_schemas import ENCODING, schema_text
 from lupin_twin.core.history import kind_of
 from lupin_twin.core.parameters import TwinParameters
-from lupin_twin.core.state import Flower, Inspection, Pin, Pose, Scan, Write
+from lupin_twin.core.state import NO_FLOWER, Inspection, Pin, Pose, Scan, Write
 from lupin_twin.journal.rows import listed_rows
 from lupin_twin.journal.runs import Run, runs, spans_within
 from lupin_twin.journal.schema import LOCAL_SITE, one_view
-from lupin_twin.ros.convert import time_msg
+from lupin_twin.ros.convert import flower_fields, pose_message, time_msg
 
 # What rosbag2 calls it in a channel's metadata; without it rosbag2 plays everything as volatile.
 QOS_KEY: Final = "offered_qos_profiles"
@@ -174,10 +171,11 @@ class JournalRows:
 def observation(row: Scan | Inspection) -> bytes:
     """lupin_msgs/Observation."""
     stamp = time_msg(row.stamp_ns)
-    msg = Observation(mission_id=row.mission, source=row.source)
+    msg = Observation(mission_id=row.mission, source=row.source, tag_pose_in_map=pose_message(None))
     msg.header.stamp = stamp
-    msg.tag_pose_in_map.orientation.w = 0.0
-    msg.flower.pose.pose.orientation.w = 0.0
+    flower = row.flower if isinstance(row, Inspection) and row.flower else NO_FLOWER
+    msg.flower = FlowerObservation(confidence=float(flower.confidence), **flower_fields(flower))
+    msg.flower.pose.pose = pose_message(None)
     msg.kind, msg.status, msg.status_detail = kind_of(row), row.status, row.status_detail
     if isinstance(row, Scan):
         msg.tag_reading.tag_id = row.tag_id
@@ -187,15 +185,13 @@ def observation(row: Scan | Inspection) -> bytes:
         ]
     else:
         msg.flower.tag_id = row.tag_id
-        if row.flower is not None:
-            _fill(msg.flower, row.flower)
     return bytes(serialize_message(msg))
 
 
 def discovered(pins: Iterable[Pin]) -> bytes:
     """lupin_msgs/DiscoveredTags."""
     pins = list(pins)
-    tags = [DiscoveredTag(tag_id=pin.tag_id, pose_in_map=_pose(pin.pose)) for pin in pins]
+    tags = [DiscoveredTag(tag_id=pin.tag_id, pose_in_map=pose_message(pin.pose)) for pin in pins]
     msg = DiscoveredTags(tags=tags)
     msg.header.stamp = time_msg(max((pin.stamp_ns for pin in pins), default=0))
     return bytes(serialize_message(msg))
@@ -204,34 +200,6 @@ def discovered(pins: Iterable[Pin]) -> bytes:
 def clock(now_ns: int) -> bytes:
     """rosgraph_msgs/Clock."""
     return bytes(serialize_message(Clock(clock=time_msg(now_ns))))
-
-
-def _fill(msg: FlowerObservation, flower: Flower) -> None:
-    msg.species = flower.species
-    msg.confidence = float(flower.confidence)
-    msg.anomaly = flower.anomaly
-    msg.flower_count = flower.flower_count
-    msg.bug_count = flower.bug_count
-    msg.flowers = [
-        FlowerPoint(
-            position=Point(x=bloom.x, y=bloom.y, z=bloom.z),
-            height_m=float(bloom.height_m),
-            species=bloom.species,
-            confidence=float(bloom.confidence),
-            anomaly=bloom.anomaly,
-        )
-        for bloom in flower.blooms
-    ]
-    msg.box_footprint.points = [
-        Point32(x=float(x), y=float(y), z=float(z)) for x, y, z in flower.footprint
-    ]
-
-
-def _pose(pose: Pose) -> PoseMsg:
-    return PoseMsg(
-        position=Point(x=pose.x, y=pose.y, z=pose.z),
-        orientation=Quaternion(x=pose.qx, y=pose.qy, z=pose.qz, w=pose.qw),
-    )
 
 
 # --- the file -------------------------------------------------------------------------------------

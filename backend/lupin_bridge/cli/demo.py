@@ -8,32 +8,20 @@ import math
 import subprocess
 import sys
 import time
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
 from lupin_bridge.bags.recording import INPUTS, Recording
 from lupin_twin.core.parameters import World
-from lupin_twin.core.state import (
-    STATUS_OK,
-    Bloom,
-    Flower,
-    Inspection,
-    Pin,
-    Pose,
-    Reading,
-    Scan,
-    Write,
-)
-from lupin_twin.journal.appending import is_empty, prefill, simulated
-from lupin_twin.journal.beside import InUse, demo_journal_path
+from lupin_twin.journal.appending import is_empty, simulated
+from lupin_twin.journal.beside import demo_journal_path
 from lupin_twin.journal.schema import FILE_ERRORS, Foreign, open_reader
 
 log = logging.getLogger(__name__)
 
-SOURCE: Final = "lupin_patrol (simulated past)"
 # How long the patrol's day takes at its usual speed, s: the sun goes 60 times as fast.
 DAY_S: Final = 86_400.0 / 60.0
 # Mostly it takes two, and on a busy machine many more.
@@ -159,59 +147,27 @@ def since_morning_s(path: Path, patrol_args: Sequence[str], now_ns: int) -> floa
 def fill_past(path: Path, patrol_args: Sequence[str]) -> bool:
     """Fill a journal that is not there, or empty, with what the patrol would have observed.
 
-    Returns whether that was done. Whatever hinders it is logged, and the demo goes on without.
+    Returns whether it had none. Whatever hinders it is logged, and the demo goes on without.
     """
     try:
         if path.exists() and not _is_empty(path):
             return False
-        made = subprocess.run(  # noqa: S603  # the operator's own words, no shell
-            [sys.executable, "-P", "-m", "lupin_patrol.past", *patrol_args],
+        subprocess.run(  # noqa: S603  # the operator's own words, no shell
+            [sys.executable, "-P", "-m", "lupin_patrol.past", str(path), *patrol_args],
             stdin=subprocess.DEVNULL,
             capture_output=True,
             text=True,
             timeout=_TIMEOUT_S,
             check=True,
         )
-        now_ns = time.time_ns()
-        return prefill(
-            path, "lupin-twin demo", list(rows(made.stdout.splitlines(), now_ns)), now_ns
-        )
     except subprocess.CalledProcessError as error:
         why = (error.stderr.splitlines() or [str(error)])[-1]
-    except (InUse, Foreign, subprocess.TimeoutExpired, ValueError, OSError, *FILE_ERRORS) as error:
+    except (Foreign, subprocess.TimeoutExpired, OSError, *FILE_ERRORS) as error:
         why = str(error)
+    else:
+        return True
     log.warning("the demo starts without a past: %s", why)
     return False
-
-
-def rows(lines: Iterable[str], now_ns: int) -> Iterator[Write]:
-    """What a twin would have written of the patrol's past, a line an event, that ends `now_ns`."""
-    pinned: set[str] = set()
-    for line in lines:
-        event = json.loads(line)
-        tag_id = event["tag_id"]
-        stamp_ns = now_ns + round(event["at_s"] * 1e9)
-        if event["pose"] and tag_id not in pinned:
-            pinned.add(tag_id)
-            yield Pin(tag_id, Pose(*event["pose"]), stamp_ns, stamp_ns)
-        sent = (SOURCE, stamp_ns, f"past-{event['pass']:04d}", stamp_ns)
-        if "species" in event:
-            yield Inspection(tag_id, stamp_ns, _flower(event), None, STATUS_OK, "", *sent)
-            continue
-        readings = tuple(Reading(name, value) for name, value in event["readings"])
-        yield Scan(tag_id, stamp_ns, readings, None, event["status"], event["detail"], *sent)
-
-
-def _flower(event: Mapping[str, Any]) -> Flower:
-    return Flower(
-        species=event["species"],
-        confidence=event["confidence"],
-        anomaly=event["anomaly"],
-        flower_count=event["flower_count"],
-        bug_count=event["bug_count"],
-        blooms=tuple(Bloom(*bloom) for bloom in event["blooms"]),
-        footprint=tuple((x, y, z) for x, y, z in event["footprint"]),
-    )
 
 
 def _is_empty(path: Path) -> bool:

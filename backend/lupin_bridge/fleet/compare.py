@@ -167,12 +167,12 @@ def chosen(text: str | None, known: Mapping[str, object]) -> list[str]:
     """
     if text is None:
         return list(known)
-    names = text.split(",")
+    names = list(dict.fromkeys(text.split(",")))
     for name in names:
         if name not in known:
             why = f"there is no site {name[:64]!r} in the archive ({len(known)} others are)"
             raise NotRemembered(why, is_lasting=True)
-    return sorted({*names})
+    return names
 
 
 def _means(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import AsyncGenerator, Awaitable, Callable, Iterable, Mapping
 from contextlib import aclosing
+from dataclasses import dataclass
 from functools import partial
 from typing import Any, Protocol
 
@@ -13,17 +14,26 @@ from starlette.requests import HTTPConnection
 from lupin_bridge.feed.past_process import PastProcess
 from lupin_bridge.feed.query import ExportStep, Now
 from lupin_bridge.feed.source import exported
+from lupin_bridge.fleet.compare import chosen
 from lupin_bridge.fleet.overview import Site
 from lupin_bridge.fleet.watching import Watching
 from lupin_bridge.judge.options import Criteria
 from lupin_bridge.past import query as past_query
 from lupin_bridge.past.bodies import COMPLETE_TO
 from lupin_bridge.past.export import ExportFormat
-from lupin_bridge.routes.answers import error_response
+from lupin_bridge.past.query import OfExport
+from lupin_bridge.query_string import parameter, read
 from lupin_bridge.routes.export import Exporting, end_of, respond_export
 from lupin_twin.core.journal_condition import Condition, JournalState
-from lupin_twin.core.past import seconds
+from lupin_twin.core.past import PastRefused, seconds
 from lupin_twin.journal.queries import STRETCH_S, Export
+
+
+@dataclass(frozen=True, slots=True)
+class OfSitesExport(OfExport):
+    """The parameters of an export of many sites."""
+
+    sites: str | None = parameter("names of sites, with a comma between; default: all")
 
 
 class ExportingSites(Exporting, Protocol):
@@ -39,14 +49,10 @@ class ExportingSites(Exporting, Protocol):
 
 async def respond_sites(fleet: ExportingSites, kind: ExportFormat, request: Request) -> Response:
     """Every row of a period of the sites that are named, or of all."""
-    period = past_query.period(past_query.OfSites, request.query_params.multi_items(), None)
-    known = fleet.sites_for(request)
-    sites = [known.get(name, name) for name in (known if period.sites is None else period.sites)]
-    for site in sites:
-        if isinstance(site, str):
-            detail = f"there is no site {site[:64]!r} in the archive ({len(known)} others are)"
-            return error_response(detail, 404)
-    named = [site for site in sites if isinstance(site, Site)]
+    parameters, known = request.query_params.multi_items(), fleet.sites_for(request)
+    period = past_query.period(OfSitesExport, parameters, None)
+    sites = read(OfSitesExport, parameters, PastRefused).sites
+    named = [known[name] for name in chosen(sites, known)]
     end_ns = end_of(period, None)
     query = Export(period.start_ns, end_ns, period.tag_id, period.sensor_type)
     heard_ns = min((site.heard_ns for site in named), default=0)

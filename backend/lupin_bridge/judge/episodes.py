@@ -209,7 +209,7 @@ class TagEpisodes:
             fails, key = status != STATUS_OK, (Kind.SCAN_FAILED, "", str(kind))
             if fails or key in self._watches:
                 reason = Reason(
-                    Kind.SCAN_FAILED, Verdict.STRESSED, value=float(status), since_ns=stamp_ns
+                    Kind.SCAN_FAILED, Verdict.UNKNOWN, value=float(status), since_ns=stamp_ns
                 )
                 yield _Finding(key, fails, fails, reason)
         look = next((w for w in reversed(writes) if w.kind == KIND_FLOWER and w.has_seen), None)

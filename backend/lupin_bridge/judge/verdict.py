@@ -126,9 +126,10 @@ def judge_tag(
         elif ranges.ideal is not None and age_ns is not None and age_ns <= holds_ns:
             was_judged = True
     reasons += _of_days(tag, days, now_ns, sensors, recent)
-    reasons += _of_age(tag, now_ns, holds_ns)
     reasons += _of_changes(tag, changed)
+    # Before the age of its readings, which are old because of it.
     reasons += _of_attempts(tag)
+    reasons += _of_age(tag, now_ns, holds_ns)
     reasons += _of_flowers(tag)
     reasons.sort(key=lambda reason: _ORDER[reason.verdict])
     verdict = worst(reason.verdict for reason in reasons)
@@ -334,10 +335,11 @@ def _of_changes(tag: TagState, changed: Mapping[str, int]) -> Iterable[Reason]:
 
 
 def _of_attempts(tag: TagState) -> Iterable[Reason]:
+    # Nothing is wrong with the plants because of it: nobody knows.
     last = tag.last_try
     if last is not None and last.status != STATUS_OK:
         yield Reason(
-            Kind.SCAN_FAILED, Verdict.STRESSED, value=float(last.status), since_ns=last.stamp_ns
+            Kind.SCAN_FAILED, Verdict.UNKNOWN, value=float(last.status), since_ns=last.stamp_ns
         )
 
 

@@ -169,15 +169,8 @@ class OfExport(OfPeriod):
 
 
 @dataclass(frozen=True, slots=True)
-class OfSites(OfExport):
-    """The parameters of an export of many sites."""
-
-    sites: str | None = parameter("names of sites, with a comma between; default: all")
-
-
-@dataclass(frozen=True, slots=True)
 class PeriodQuery:
-    """A period; 0 ns: from the oldest, to now. None: every tag, sensor, site, active or not."""
+    """A period; 0 ns: from the oldest, to now. None: every tag, sensor, active or not."""
 
     start_ns: int
     end_ns: int
@@ -185,7 +178,6 @@ class PeriodQuery:
     tag_id: str | None = None
     sensor_type: str | None = None
     active: bool | None = None
-    sites: tuple[str, ...] | None = None
 
 
 def at(parameters: Parameters, now_ns: int | None) -> int | None:
@@ -237,14 +229,8 @@ def period(kind: type[OfPeriod], parameters: Parameters, now_ns: int | None) -> 
         case OfTimeline():
             return PeriodQuery(start_ns, end_ns, given.points, given.tag_id)
         case OfExport():
-            named = given.sites if isinstance(given, OfSites) else None
-            return PeriodQuery(
-                start_ns,
-                end_ns,
-                tag_id=given.tag_id,
-                sensor_type=given.sensor_type,
-                sites=None if named is None else tuple(dict.fromkeys(named.split(","))),
-            )
+            tag_id, sensor_type = given.tag_id, given.sensor_type
+            return PeriodQuery(start_ns, end_ns, tag_id=tag_id, sensor_type=sensor_type)
         case OfAlarms():
             active = None if given.active is None else given.active == "1"
             return PeriodQuery(start_ns, end_ns, active=active)

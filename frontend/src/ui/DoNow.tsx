@@ -19,10 +19,15 @@ import { S } from '../strings';
 import { HealthMark } from './HealthMark';
 import { useReasonText } from './Reasons';
 
+/** Nothing says more of such a tag. */
+const OLD: ReadonlySet<string | undefined> = new Set(['old', undefined]);
 /** Beside the map; the table has the rest. */
 const MOST_TAGS = 2;
 
-/** Tags that need somebody, the worst first (`severity`). */
+/**
+ * Tags that need somebody, the worst first (`severity`).
+ * What is only old needs the robot, which comes again.
+ */
 export function useUrgent(): readonly Row[] {
   const tags = useApp(selectTags);
   const health = useApp(selectHealth);
@@ -33,7 +38,7 @@ export function useUrgent(): readonly Row[] {
       ? [...alarms.active.filter((it) => it.isAcknowledged), ...alarms.shelved]
       : [];
     return rowsOf(tags, health)
-      .filter(({ health: { verdict } }) => verdict === 'critical' || verdict === 'stressed')
+      .filter(({ health: own }) => own.verdict !== 'healthy' && !OLD.has(worstReason(own)?.kind))
       .map((row) => {
         const { tag, health: own } = row;
         const isSeen = alarmOf(seen, tag.id, worstReason(own)) !== undefined;

@@ -94,6 +94,12 @@ test('all is well, hardly anything is known, and nothing is', () => {
     showTags(TAGS, judgement({ 1: 'healthy', 5: 'unknown' }));
   });
   expect(driver().textContent).toBe('1 tag cannot be assessed');
+  // A failed scan is said with its tag, whoever is old beside it.
+  const failed = reason({ kind: 'scan_failed', verdict: 'unknown', sensor: '', value: 1 });
+  act(() => {
+    showTags(TAGS, judgement({ 1: 'healthy', 5: [failed, { ...failed, kind: 'old' }] }));
+  });
+  expect(driver().textContent).toMatch(/^Tag 5: Last scan failed: not reachable/);
   act(() => {
     showTags([]);
   });

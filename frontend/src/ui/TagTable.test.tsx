@@ -57,7 +57,7 @@ describe('table', () => {
   });
 
   test('says first what the verdict is about, then that an attempt has failed', () => {
-    const failed = reason({ kind: 'scan_failed', verdict: 'stressed', sensor: '', value: 2 });
+    const failed = reason({ kind: 'scan_failed', verdict: 'unknown', sensor: '', value: 2 });
     const hot = reason({ verdict: 'critical', value: 40, limit: 35 });
     const last = { last_try: { sec: 20, nanosec: 0 }, last_try_status: 2, last_try_detail: '' };
     const tags = ['9', '10'].map((tag_id) =>

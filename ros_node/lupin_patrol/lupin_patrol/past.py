@@ -1,33 +1,37 @@
-"""What the patrol would have observed until now: three simulated days, a line of JSON each event.
+"""What the patrol would have observed until now: three simulated days, in a journal that is empty.
 
-For a demo whose memory is empty (`python -m lupin_patrol.past`, with the patrol's own options).
+For a demo without a memory: `python -m lupin_patrol.past JOURNAL`, with the patrol's own options.
 Places, plants and climate are those of the patrol with the same seed, and so is the time of day:
-where the past ends, at second 0, the patrol begins. Times are seconds before that, as they
-pass for whoever watches; a pose is x, y, z and a quaternion, as in geometry_msgs/Pose.
+where the past ends, now, the patrol begins.
 """
 
 from __future__ import annotations
 
 import argparse
-import json
 import sys
+import time
 from collections.abc import Iterator, Sequence
-from dataclasses import asdict, astuple
-from typing import Any
+from pathlib import Path
+from typing import Final
 
 from greenhouse_sim.simulator import GreenhouseSimulator
 
 from lupin_patrol.cli import parse
 from lupin_patrol.mission import Mission, TagScanned
 from lupin_patrol.plants import SECONDS_PER_DAY
+from lupin_twin.core.state import Inspection, Pin, Reading, Scan, Write
+from lupin_twin.journal.appending import prefill
+from lupin_twin.journal.beside import InUse
+from lupin_twin.journal.schema import FILE_ERRORS, Foreign
 
-DAYS = 3
+SOURCE: Final = "lupin_patrol (simulated past)"
+DAYS: Final = 3
 # So far before the patrol's own passes that none of them is alike.
-_FIRST_PASS = -1_000_000
+_FIRST_PASS: Final = -1_000_000
 
 
-def past(options: argparse.Namespace) -> Iterator[dict[str, Any]]:
-    """The events, the oldest first; none where the day stands still."""
+def past(options: argparse.Namespace, now_ns: int) -> Iterator[Write]:
+    """What a twin would have written, the oldest first; nothing where the day stands still."""
     if options.day_speed <= 0.0:
         return
     begin_s = -DAYS * SECONDS_PER_DAY / options.day_speed
@@ -38,27 +42,31 @@ def past(options: argparse.Namespace) -> Iterator[dict[str, Any]]:
         begin_s=begin_s,
         first_pass=_FIRST_PASS,
     )
+    pinned: set[str] = set()
     for event in mission.visits():
         if event.at_s >= 0.0:
             return
-        common = {
-            "tag_id": event.tag_id,
-            "at_s": event.at_s / options.speed,
-            "pass": event.pass_index - _FIRST_PASS + 1,
-            "pose": event.pose and astuple(event.pose),
-        }
+        tag_id, at_ns = event.tag_id, now_ns + round(event.at_s / options.speed * 1e9)
+        if event.pose is not None and tag_id not in pinned:
+            pinned.add(tag_id)
+            yield Pin(tag_id, event.pose, at_ns, at_ns)
+        sent = (SOURCE, at_ns, f"past-{event.pass_index - _FIRST_PASS + 1:04d}", at_ns)
         if isinstance(event, TagScanned):
-            detail, readings = event.status_detail, event.readings
-            yield common | {"status": event.status, "detail": detail, "readings": readings}
+            readings = tuple(Reading(name, value) for name, value in event.readings)
+            how = (int(event.status), event.status_detail)
+            yield Scan(tag_id, at_ns, readings, None, *how, *sent)
         else:
-            blooms = [astuple(bloom) for bloom in event.flower.blooms]
-            yield common | asdict(event.flower) | {"blooms": blooms}
+            yield Inspection(tag_id, at_ns, event.flower, None, 0, "", *sent)
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
-    """Write the past to the standard output."""
-    for event in past(parse(sys.argv[1:] if arguments is None else arguments)):
-        sys.stdout.write(json.dumps(event) + "\n")
+    """Fill a journal that is new or empty."""
+    path, *options = sys.argv[1:] if arguments is None else arguments
+    now_ns = time.time_ns()
+    try:
+        prefill(Path(path), "lupin-twin demo", list(past(parse(options), now_ns)), now_ns)
+    except (InUse, Foreign, OSError, *FILE_ERRORS) as error:
+        sys.exit(str(error))
 
 
 if __name__ == "__main__":

@@ -2,30 +2,25 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import pytest
 
 from lupin_bridge.cli.demo import (
     DAY_S,
-    SOURCE,
     Feed,
     fill_past,
     journal_of,
     own_args,
     patrolled,
-    rows,
     since_morning_s,
     with_past,
 )
 from lupin_patrol.cli import parse as patrol_options
 from lupin_patrol.plants import SECONDS_PER_DAY
 from lupin_twin.core.parameters import World
-from lupin_twin.core.state import Bloom, Inspection, Pin, Pose, Reading, Scan
-from tests.support.journal import CLOCK, NOW, SECOND, kept, scan, select
+from tests.support.journal import CLOCK, NOW, kept, scan, select
 
 ENV = {"XDG_STATE_HOME": "/state"}
 SHORT = ["--speed=50"]
@@ -110,35 +105,3 @@ def test_what_hinders_it_is_told_and_is_no_end(
     assert len(told) == 2
     assert "argument --speed" in told[0]
     assert "File exists" in told[1]
-
-
-def test_events_become_the_rows_that_a_twin_would_have_written() -> None:
-    pose = [1.0, 2.0, 0.3, 0.0, 0.0, 0.0, 1.0]
-    common: dict[str, Any] = {"tag_id": "7", "pass": 12}
-    ok = common | {"at_s": -2.0, "pose": pose, "status": 0, "detail": "", "readings": [["a", 1.5]]}
-    failed = common | {"at_s": -1.0, "pose": None, "status": 2, "detail": "no", "readings": []}
-    look = common | {
-        "at_s": -1.5,
-        "pose": pose,
-        "species": "lupin",
-        "confidence": 0.5,
-        "anomaly": True,
-        "flower_count": 1,
-        "bug_count": 3,
-        "blooms": [[1.0, 2.0, 0.5, 0.2, "lupin", 0.9, True]],
-        "footprint": [[0.0, 0.0, 0.0]],
-    }
-    made = list(rows([json.dumps(event) for event in (ok, look, failed)], NOW))
-    at_ns = NOW - 2 * SECOND
-    assert made[0] == Pin("7", Pose(*pose), at_ns, at_ns)
-    assert made[1] == Scan(
-        "7", at_ns, (Reading("a", 1.5),), None, 0, "", SOURCE, at_ns, "past-0012", at_ns
-    )
-    seen = made[2]
-    assert isinstance(seen, Inspection)
-    assert seen.flower is not None
-    assert (seen.stamp_ns, seen.flower.bug_count) == (NOW - 1_500_000_000, 3)
-    assert seen.flower.blooms == (Bloom(1.0, 2.0, 0.5, 0.2, "lupin", 0.9, anomaly=True),)
-    last = made[3]
-    assert isinstance(last, Scan)
-    assert (last.status, last.status_detail, last.readings) == (2, "no", ())

@@ -19,7 +19,6 @@ export const TAGS: In<typeof ENGLISH> = {
     tag: 'Nr.',
     species: 'Art',
     flowers: 'Blüten',
-    pest: 'Befall',
     age: 'Alter',
   },
   pest: 'Schädling',

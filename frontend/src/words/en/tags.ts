@@ -15,7 +15,6 @@ export const TAGS = {
     tag: 'Tag',
     species: 'Species',
     flowers: 'Blooms',
-    pest: 'Pest',
     age: 'Age',
   },
   pest: 'Pest',

@@ -19,7 +19,6 @@ export const TAGS: In<typeof ENGLISH> = {
     tag: 'N.º',
     species: 'Especie',
     flowers: 'Flores',
-    pest: 'Plaga',
     age: 'Hace',
   },
   pest: 'Plaga',

@@ -19,7 +19,6 @@ export const TAGS: In<typeof ENGLISH> = {
     tag: 'Nr.',
     species: 'Soort',
     flowers: 'Bloemen',
-    pest: 'Plaag',
     age: 'Geleden',
   },
   pest: 'Plaag',

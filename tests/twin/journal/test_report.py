@@ -55,8 +55,8 @@ def test_a_report_is_that_of_a_plain_list_on_either_engine(
 def test_readings_of_an_attempt_that_failed_are_in_it_as_in_charts_and_alarms(
     living: Living,
 ) -> None:
-    tried = [scan(temperature=20.0), replace(scan(at_ns=BEGUN + MINUTE, temperature=40.0), status=2)]
-    with living([("rows", tried)]) as life:
+    failed = replace(scan(at_ns=BEGUN + MINUTE, temperature=40.0), status=2)
+    with living([("rows", [scan(temperature=20.0), failed])]) as life:
         found = report(life.connection, BEGUN, END)
         check(found, life, BEGUN, END)
     (sensor,) = found["sensors"]

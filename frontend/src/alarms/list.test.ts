@@ -24,14 +24,14 @@ const ids = (items: readonly Item[]): string[] => items.map(({ alarm: { id } }) 
 const stressed = { verdict: 'stressed' } as const;
 
 describe('order', () => {
-  test('active: the worst first, of equals the newest', () => {
+  test('active: the worst first, of one verdict the farthest beyond its limit', () => {
     const shown = list([
-      alarm('mild, new', { raised: 990, reason: stressed }),
-      alarm('bad, old', { raised: 100 }),
+      alarm('mild', { reason: { ...stressed, value: -90, limit: 10 } }),
+      alarm('bad', { raised: 500, reason: { value: 9, limit: 10 } }),
       alarm('not known', { raised: 995, reason: { verdict: 'unknown' } }),
-      alarm('bad, new', { raised: 500 }),
+      alarm('bad and far', { raised: 100, reason: { value: 5, limit: 10 } }),
     ]);
-    expect(ids(shown.active)).toEqual(['bad, new', 'bad, old', 'mild, new', 'not known']);
+    expect(ids(shown.active)).toEqual(['bad and far', 'bad', 'mild', 'not known']);
   });
 
   test('resolved: what was cleared last first; no more than a day', () => {
@@ -120,7 +120,7 @@ describe('an order that is held', () => {
       alarm('a', { cleared: 990 }),
       alarm('b', { tag_id: '2' }),
     ]);
-    expect(ids(now.active)).toEqual(['new', 'b']);
+    expect(ids(now.active)).toEqual(['b', 'new']);
     const { shown, added } = heldList(before, now);
     expect(ids(shown.active)).toEqual(['a', 'b']);
     expect(shown.active[0]?.alarm.cleared_at).not.toBeNull();
@@ -144,8 +144,10 @@ test('what is the same stays the same, and the rest is not', () => {
   expect(next.resolved).toBe(before.resolved);
 });
 
-test('five hundred are put in order, the newest first, and are kept where they are the same', () => {
-  const many = Array.from({ length: 500 }, (_, at) => alarm(`a${at}`, { raised: at }));
+test('five hundred are put in order, by tag where they are equals, and are kept where they are the same', () => {
+  const many = Array.from({ length: 500 }, (_, at) =>
+    alarm(`a${at}`, { tag_id: String(500 - at) }),
+  );
   const first = list(many);
   expect(first.active.map(({ alarm: { id } }) => id)).toEqual(many.map(({ id }) => id).reverse());
   expect(sharedList(first, list(structuredClone(many)))).toBe(first);

@@ -1,8 +1,8 @@
 /** The list of alarms: what is active, shelved and resolved, in its order. Pure. */
 import type { Alarm, Verdict } from '../contract/types';
-import { VERDICTS } from '../domain/health';
+import { severity } from '../domain/health';
 import { secondsOf } from '../domain/rostime';
-import { equal } from '../domain/twin';
+import { compareIds, equal } from '../domain/twin';
 import { isShelfHeld, isWorse, whatOf, type Kept, type Shelf } from './kept';
 
 /** What is resolved stays listed for so long, seconds. */
@@ -18,7 +18,7 @@ export interface Item {
 }
 
 export interface AlarmList {
-  /** Active and not shelved: the worst first, of equals what nobody has acknowledged, then the newest. */
+  /** Active and not shelved: the worst first (`severity`). */
   readonly active: readonly Item[];
   /** Active and shelved, in the same order. */
   readonly shelved: readonly Item[];
@@ -48,7 +48,10 @@ export function listOf(
       shelf: shelf && isShelfHeld(shelf, verdict, at) ? shelf : null,
     };
   });
-  const active = items.filter(({ alarm }) => alarm.cleared_at === null).sort(worstFirst);
+  const active = inOrder(
+    items.filter(({ alarm }) => alarm.cleared_at === null),
+    severityOf,
+  );
   return {
     active: active.filter((item) => item.shelf === null),
     shelved: active.filter((item) => item.shelf !== null),
@@ -58,30 +61,27 @@ export function listOf(
   };
 }
 
-/** The same with what is worst now first; `verdicts` are those of now of `active`, in its order. */
-export function worstNowFirst(list: AlarmList, verdicts: readonly Verdict[]): AlarmList {
-  const ranked = list.active.map((item, index) => ({
-    item,
-    rank: VERDICTS.indexOf(verdicts[index] ?? item.verdict),
-  }));
-  const active = ranked.sort((a, b) => a.rank - b.rank).map(({ item }) => item);
-  return { ...list, active };
-}
-
 const isListed = (end: number, nowS: number | null): boolean =>
   nowS === null || nowS - end < LISTED_S;
 
-const beginOf = ({ raised_at }: Alarm): number => secondsOf(raised_at);
 const endOf = ({ cleared_at }: Alarm): number => (cleared_at ? secondsOf(cleared_at) : Infinity);
 
-const worstFirst = (a: Item, b: Item): number =>
-  VERDICTS.indexOf(a.verdict) - VERDICTS.indexOf(b.verdict) ||
-  Number(a.isAcknowledged) - Number(b.isAcknowledged) ||
-  beginOf(b.alarm) - beginOf(a.alarm) ||
-  byName(a, b);
+/** As bad as it was said to be. */
+const severityOf = ({ alarm: { reason }, verdict, isAcknowledged }: Item): number =>
+  severity({ verdict, reasons: [reason] }, isAcknowledged);
 
-/** Of what came at once the order is the same each time. */
-const byName = ({ alarm: a }: Item, { alarm: b }: Item): number => (a.id < b.id ? -1 : 1);
+/** In the order of `severity`; of equals it is the same each time. */
+export const inOrder = (
+  items: readonly Item[],
+  severityOf: (item: Item) => number,
+): readonly Item[] =>
+  items
+    .map((item) => ({ item, rank: severityOf(item) }))
+    .sort((a, b) => b.rank - a.rank || byName(a.item, b.item))
+    .map(({ item }) => item);
+
+const byName = ({ alarm: a }: Item, { alarm: b }: Item): number =>
+  compareIds(a.tag_id, b.tag_id) || (a.id < b.id ? -1 : 1);
 
 /** Those that call for somebody: active, not acknowledged, not shelved. */
 export const calling = ({ active }: AlarmList): readonly Item[] =>

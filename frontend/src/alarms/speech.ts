@@ -1,12 +1,12 @@
 /** In whose words alarms are told: the sensors in force, and the operator's unit; and of what state. */
-import type { Alarm, Verdict } from '../contract/types';
+import type { Alarm, HealthReason, Verdict } from '../contract/types';
 import type { AppState } from '../store/app';
 import { selectCatalogue, selectNewestHealth } from '../store/derived';
 import { hourAgo, selectHourAgoNow, type HourAgo } from '../store/hourAgo';
-import { VERDICTS } from '../domain/health';
+import { severity, VERDICTS } from '../domain/health';
 import { memoLast } from '../domain/memo';
 import { isHeardNow, selectNewestTag } from '../store/moment';
-import type { Item } from './list';
+import { inOrder, type Item } from './list';
 import { nowOf, type Now } from './now';
 import { alarmText, type Speech } from './words';
 
@@ -30,17 +30,26 @@ export function selectNow(
   return nowOf(alarm, tag && health ? { tag, health } : null, before, isHeardNow(state));
 }
 
-/** How bad it is now; null: nobody knows, or it has no value. */
-export function verdictNow(state: AppState, alarm: Alarm): Verdict | null {
+/** Why, as it is now, and how bad that is; as it was said last where nobody knows, or it has no value. */
+function reasonNow(state: AppState, alarm: Alarm): HealthReason {
   const at = selectNow(state, alarm, null);
-  return at?.kind === 'known' ? at.verdict : null;
+  if (at?.kind !== 'known') return alarm.reason;
+  const { verdict, value, limit } = at;
+  return { ...alarm.reason, verdict, value, limit };
 }
 
-/** The worst of some alarms as they are now, or as they were said last; null: there is none. */
-export const worstNow = (state: AppState, items: readonly Item[]): Verdict | null =>
-  VERDICTS.find((each) =>
-    items.some(({ alarm, verdict }) => (verdictNow(state, alarm) ?? verdict) === each),
-  ) ?? null;
+/** The worst of some alarms as they are now; null: there is none. */
+export function worstNow(state: AppState, items: readonly Item[]): Verdict | null {
+  const verdicts = items.map(({ alarm }) => reasonNow(state, alarm).verdict);
+  return VERDICTS.find((each) => verdicts.includes(each)) ?? null;
+}
+
+/** What is worst now first. */
+export const worstNowFirst = (state: AppState, items: readonly Item[]): readonly Item[] =>
+  inOrder(items, ({ alarm, isAcknowledged }) => {
+    const reason = reasonNow(state, alarm);
+    return severity({ verdict: reason.verdict, reasons: [reason] }, isAcknowledged);
+  });
 
 /** An alarm in one line, as it is now. */
 export const textNow = (state: AppState, alarm: Alarm): string =>

@@ -73,7 +73,7 @@ test('the worst verdict is the most severe, and of one verdict who is farthest b
     { verdict: 'unknown', reasons: [] },
     { verdict: 'healthy', reasons: [] },
   ] as const;
-  const severities = order.map(severity);
+  const severities = order.map((each) => severity(each));
   expect(severities).toEqual([...severities].sort((a, b) => b - a));
   expect(new Set(severities).size).toBe(order.length);
   expect(worstReason(order[3])?.value).toBe(6);

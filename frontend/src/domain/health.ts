@@ -65,10 +65,14 @@ export const isSilent = ({ reasons }: TagHealth): boolean => reasons[0]?.kind ==
 
 const UNHEARD: TagHealth = { verdict: 'unknown', reasons: [SILENT] };
 
-/** More is worse: by verdict, then by how far beyond its limit the worst value is. */
-export function severity(health: TagHealth): number {
+/**
+ * The one order of what is wrong, of tags and of alarms; more is worse. By verdict, then what nobody
+ * has seen to, then by how far beyond its limit the worst value is; of equals, by the tag.
+ */
+export function severity(health: TagHealth, isSeen = false): number {
   const reason = worstReason(health);
-  return VERDICTS.length - VERDICTS.indexOf(health.verdict) + (reason ? weight(reason) : 0);
+  const rank = VERDICTS.length - VERDICTS.indexOf(health.verdict);
+  return 2 * rank - Number(isSeen) + (reason ? weight(reason) : 0);
 }
 
 /** What is to be said of a tag before all else. */

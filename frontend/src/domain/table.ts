@@ -75,8 +75,6 @@ export function sortKey({ tag, health }: Row, column: string): Key {
       return tag.species || null;
     case 'flowers':
       return tag.observedAt === null ? null : tag.flowerCount;
-    case 'pest':
-      return tag.anomaly ? 1 + tag.bugCount : 0;
     case 'age':
       // The age itself grows with the clock; its order does not.
       return typeof tag.scannedAt === 'number' ? -tag.scannedAt : null;

@@ -6,10 +6,10 @@ import { alarmList } from '../alarms/watch';
 import { now } from '../clock';
 import type { HealthReason } from '../contract/types';
 import { clockText } from '../domain/format';
-import { VERDICTS, worstReason, type HouseHealth } from '../domain/health';
+import { severity, VERDICTS, worstReason, type HouseHealth } from '../domain/health';
 import { todoText } from '../domain/reasons';
 import { secondsOf } from '../domain/rostime';
-import { rowsOf, sortRows, type Row } from '../domain/table';
+import { rowsOf, type Row } from '../domain/table';
 import { shown } from '../domain/text';
 import { act, store, useApp } from '../store/app';
 import { useSelected } from '../store/create';
@@ -25,7 +25,7 @@ const OLD: ReadonlySet<string | undefined> = new Set(['old', undefined]);
 const MOST_TAGS = 2;
 
 /**
- * Tags that need somebody, the worst first; of equals, who is acknowledged or shelved after the rest.
+ * Tags that need somebody, the worst first (`severity`).
  * What is only old needs the robot, which comes again.
  */
 export function useUrgent(): readonly Row[] {
@@ -34,19 +34,18 @@ export function useUrgent(): readonly Row[] {
   const isNow = useApp((state) => selectShown(state).moment === null);
   const alarms = useSelected(alarmList, (it) => it);
   return useMemo(() => {
-    const rows = sortRows(rowsOf(tags, health), { column: 'health', descending: true }).filter(
-      ({ health: own }) => own.verdict !== 'healthy' && !OLD.has(worstReason(own)?.kind),
-    );
-    if (!isNow) return rows;
-    const seen = [...alarms.active.filter((it) => it.isAcknowledged), ...alarms.shelved];
-    const isSeen = new Set(
-      rows
-        .filter(({ tag, health: own }) => alarmOf(seen, tag.id, worstReason(own)))
-        .map(({ tag }) => tag.id),
-    );
-    const rank = ({ tag, health: own }: Row): number =>
-      2 * VERDICTS.indexOf(own.verdict) + Number(isSeen.has(tag.id));
-    return rows.sort((a, b) => rank(a) - rank(b));
+    const seen = isNow
+      ? [...alarms.active.filter((it) => it.isAcknowledged), ...alarms.shelved]
+      : [];
+    return rowsOf(tags, health)
+      .filter(({ health: own }) => own.verdict !== 'healthy' && !OLD.has(worstReason(own)?.kind))
+      .map((row) => {
+        const { tag, health: own } = row;
+        const isSeen = alarmOf(seen, tag.id, worstReason(own)) !== undefined;
+        return { row, rank: severity(own, isSeen) };
+      })
+      .sort((a, b) => b.rank - a.rank)
+      .map(({ row }) => row);
   }, [tags, health, isNow, alarms]);
 }
 
@@ -75,7 +74,7 @@ export function useSince(tagId: string, reason: HealthReason | undefined): strin
   if (!isNow || !found) return null;
   if (found.shelf) return S.alarmShelved(clockText(found.shelf.until), '');
   if (found.isAcknowledged) return S.healthAcknowledged;
-  return S.healthSince(whenText(secondsOf(found.alarm.raised_at), rosNow(store.get(), now())));
+  return S.alarmSince(whenText(secondsOf(found.alarm.raised_at), rosNow(store.get(), now())), null);
 }
 
 /** What has to be done first: where, why, what, and since when; else how the greenhouse is. */

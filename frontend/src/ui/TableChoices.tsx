@@ -25,7 +25,6 @@ export function TableChoices(): JSX.Element {
     ['age', S.columns.age],
     ...sensors.map(({ name, label }) => [name, shown(label, 24)] as const),
     ['trend', S.trend],
-    ['pest', S.columns.pest],
     ['species', S.columns.species],
     ['flowers', S.columns.flowers],
   ] as const;

@@ -135,9 +135,6 @@ export const TagRow = memo(function TagRow({
           )}
         </td>
       ))}
-      {has('pest') && (
-        <td className="cell-pest">{tag.anomaly && <PestMark count={tag.bugCount} />}</td>
-      )}
       {has('species') && (
         <td className="cell-species">
           {tag.species ? (
@@ -160,19 +157,6 @@ export const TagRow = memo(function TagRow({
     </tr>
   );
 });
-
-export function PestMark({ count }: { count: number }): JSX.Element {
-  return (
-    <span className="pest">
-      <svg viewBox="0 0 16 16" width="15" height="15" aria-hidden="true">
-        <path d="M8 1 15.5 14.5H.5Z" className="body" />
-        <path d="M8 5.8v4M8 12.1v.01" className="mark" />
-      </svg>
-      <span className="pest-word">{S.pest}</span>
-      {count > 0 && <span className="faint">{S.pestCount(count)}</span>}
-    </span>
-  );
-}
 
 /** A value that looks as old as it is; one that is older than its row's age says its own. */
 function TableReading({

@@ -29,7 +29,7 @@ import { useHeldRows } from './useHeldRows';
 import { partsOf, SHORT_TABLE, useVisibleRows } from './visibleRows';
 
 /** Beside the tag's own, and those of sensors. */
-const COLUMNS = ['health', 'age', 'pest', 'species', 'flowers'];
+const COLUMNS = ['health', 'age', 'species', 'flowers'];
 
 /** Every tag, also those without a pin and those whose scan failed. */
 export function TagTable(): JSX.Element {
@@ -96,7 +96,6 @@ export function TagTable(): JSX.Element {
             style={{ '--letters': longestWord(sensor.label) } as CSSProperties}
           />
         ))}
-        {has('pest') && <col className="col-pest" />}
         {has('species') && <col className="col-species" />}
         {has('flowers') && <col className="col-flowers optional" />}
       </colgroup>
@@ -117,7 +116,6 @@ export function TagTable(): JSX.Element {
               chosen={sensor.name === chosen}
             />
           ))}
-          {has('pest') && <ColumnHead id="pest">{S.columns.pest}</ColumnHead>}
           {has('species') && <ColumnHead id="species">{S.columns.species}</ColumnHead>}
           {has('flowers') && (
             <ColumnHead id="flowers" className="number optional">

@@ -9,12 +9,11 @@ import {
   type Block,
   type Order,
 } from '../../alarms/arrange';
-import { worstNowFirst, type Item } from '../../alarms/list';
+import type { Item } from '../../alarms/list';
 import { acknowledgeAlarms } from '../../alarms/own';
-import { selectNow, selectSpeech, verdictNow, worstNow } from '../../alarms/speech';
+import { selectNow, selectSpeech, worstNow, worstNowFirst } from '../../alarms/speech';
 import { alarmList } from '../../alarms/watch';
 import { now, timeOfDay } from '../../clock';
-import type { Verdict } from '../../contract/types';
 import { todoText } from '../../domain/reasons';
 import { shown as shownText } from '../../domain/text';
 import { fileName, save } from '../../export/save';
@@ -48,14 +47,16 @@ const unacknowledged = (items: readonly Item[]): readonly Item[] =>
 /** The alarms of now, beside the map: active, shelved, and resolved. */
 export function AlarmPanel(): JSX.Element {
   const listed = useSelected(alarmList, (it) => it);
-  // As a text: what changes no verdict renders nothing anew.
-  const verdicts = useApp((state) =>
-    listed.active.map(({ alarm, verdict }) => verdictNow(state, alarm) ?? verdict).join(),
+  // As a text: what does not change it renders nothing anew.
+  const ids = useApp((state) =>
+    worstNowFirst(state, listed.active)
+      .map(({ alarm }) => alarm.id)
+      .join('\n'),
   );
-  const all = useMemo(
-    () => worstNowFirst(listed, verdicts.split(',') as Verdict[]),
-    [listed, verdicts],
-  );
+  const all = useMemo(() => {
+    const items = new Map(listed.active.map((item) => [item.alarm.id, item]));
+    return { ...listed, active: ids.split('\n').flatMap((id) => items.get(id) ?? []) };
+  }, [listed, ids]);
   const speech = useApp(selectSpeech);
   const [filter, setFilter] = useState('');
   const [order, setOrder] = useState<Order>('cause');

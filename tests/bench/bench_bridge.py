@@ -6,7 +6,6 @@ request when that of an empty one (`/healthz`) on the same connection is taken o
 
 from __future__ import annotations
 
-import json
 import statistics
 import time
 from collections.abc import Callable
@@ -15,7 +14,6 @@ from typing import Any
 
 import httpx
 from lupin_msgs.srv import GetField
-from websockets.sync.client import connect
 
 from tests.support.domains import own_domain
 from tests.support.messages import scan
@@ -49,39 +47,6 @@ def row(name: str, seconds: list[float], note: str = "") -> None:
     ordered = sorted(seconds)
     p95 = ordered[min(len(ordered) - 1, round(0.95 * len(ordered)))]
     print(f"{name:<52}{statistics.median(seconds) * 1e3:>9.2f} ms{p95 * 1e3:>9.2f} ms  {note}")
-
-
-def first_state(process: Process) -> None:
-    url = url_of(process).replace("http", "ws") + "/ws/state"
-
-    def join() -> None:
-        with connect(url, compression=None) as client:
-            while json.loads(client.recv())["type"] != "state":
-                pass
-
-    row("WebSocket: from connecting to the first state", timed(join, 100), "silent publisher")
-
-
-def push_latency(process: Process, peer: Peer) -> None:
-    """From publishing an observation in one process to its frame in another; 5 a second."""
-    delays = []
-    with connect(url_of(process).replace("http", "ws") + "/ws/state", compression=None) as client:
-        for i in range(100):
-            value = 1000.0 + i
-            start = time.perf_counter()
-            peer.observe(scan("0", {"co2": value}))
-            while not _shows(client.recv(), value):
-                pass
-            delays.append(time.perf_counter() - start)
-            peer.until(lambda t=start: time.perf_counter() - t > 0.2, "the next")  # type: ignore[misc]
-    row("observation published -> WebSocket frame received", delays, "5 a second, over DDS")
-
-
-def _shows(frame: str | bytes, value: float) -> bool:
-    message: dict[str, Any] = json.loads(frame)
-    return message["type"] == "state" and any(
-        reading["value"] == value for reading in message["state"]["tags"][0]["readings"]
-    )
 
 
 def http(process: Process) -> None:
@@ -129,22 +94,6 @@ def service(peer: Peer) -> None:
     row("ROS service: 200 x 200, cached", timed(call, 100))
 
 
-def end() -> None:
-    """From Ctrl-C to the end of the process, a WebSocket client connected; to stay under 2 s."""
-    took = []
-    for _ in range(5):
-        with (
-            own_domain() as domain,
-            lupin_twin(domain, "serve") as process,
-            connect(url_of(process).replace("http", "ws") + "/ws/state") as client,
-        ):
-            client.recv()
-            start = time.perf_counter()
-            process.stop()
-            took.append(time.perf_counter() - start)
-    row("Ctrl-C, one client connected -> the process has ended", took)
-
-
 def main() -> None:
     print(f"\n{'The bridge, ' + str(TAGS) + ' tags':<52}{'median':>12}{'p95':>12}")
     # The bounds on field requests are for strangers; here they would be what is measured.
@@ -162,11 +111,8 @@ def main() -> None:
             peer.observe(scan(str(i), {"co2": 400.0 + i}, at=at))
         with httpx.Client(base_url=url_of(process)) as client:
             peer.until(lambda: len(client.get("/api/state").json()["tags"]) == TAGS, "all tags")
-        first_state(process)
-        push_latency(process, peer)
         http(process)
         service(peer)
-    end()
 
 
 if __name__ == "__main__":

@@ -25,10 +25,7 @@ from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from tests.bench.live_estimates import measure_estimates
-from tests.bench.live_outages import measure_outages
 from tests.bench.live_parts import HEAD_START_S, Clients, Seen, Server, serving
-from tests.bench.live_past import measure_past
 from tests.support.proc_stat import cpu_s, resident_mb, tcp_buffers_mb
 from tests.support.processes import limits
 from tests.support.state_home import use_own
@@ -146,15 +143,7 @@ def main() -> None:
     parser.add_argument("--quick", action="store_true", help="a minute instead of five")
     parser.add_argument("--only", type=int, metavar="N", help="row N of the table alone, from 0")
     parser.add_argument("--stuck", action="store_true", help="the stuck clients alone")
-    parser.add_argument("--past", action="store_true", help="those who ask for the past alone")
-    parser.add_argument("--estimates", action="store_true", help="those who ask for estimates")
     options = parser.parse_args()
-    if options.estimates:
-        print(measure_estimates(10.0 if options.quick else 30.0))
-        return
-    if options.past:
-        print(measure_past(10.0 if options.quick else 30.0, is_quick=options.quick))
-        return
     loads = QUICK_LOADS if options.quick else LOADS
     if options.only is not None:
         loads = loads[options.only : options.only + 1]
@@ -166,12 +155,8 @@ def main() -> None:
                 for load in same:
                     print(as_row(measure_load(server, load)), flush=True)
     if options.only is None:
-        print()
-        if options.quick:
-            parts = [measure_stuck(20, 10.0, 3.0), measure_past(10.0, is_quick=True)]
-        else:
-            parts = [measure_stuck(20, 60.0, 30.0), measure_outages(), measure_past(30.0)]
-        print(*parts, measure_estimates(10.0 if options.quick else 30.0), sep="\n\n")
+        seconds, timeout_s = (10.0, 3.0) if options.quick else (60.0, 30.0)
+        print("", measure_stuck(20, seconds, timeout_s), sep="\n")
 
 
 if __name__ == "__main__":

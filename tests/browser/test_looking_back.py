@@ -385,6 +385,8 @@ def test_axe_has_no_objection_to_the_past(hour: Hour, open_page: OpenPage) -> No
     hmi.page.get_by_role("button", name="What the marks mean").click()
     assert violations(hmi) == []
     hmi.page.set_viewport_size({"width": PHONE["width"], "height": PHONE["height"]})
+    assert violations(hmi) == []
+    hmi.card("b").get_by_role("button", name="Close").click()
     hmi.page.get_by_label("Period", exact=True).select_option("own")
     assert violations(hmi) == []
 
@@ -437,3 +439,7 @@ def test_a_phone_has_the_menu_and_every_count_on_its_screen(
         for each in buttons.all():
             expect(each).to_be_in_viewport(ratio=1)
             assert each.evaluate("(e) => e.scrollWidth <= e.clientWidth"), width
+    # Beside a card, the bar is the way along the past.
+    hmi.turn(f"at={hour.begun_s + 700}&tag=a")
+    expect(hmi.card("a")).to_be_in_viewport()
+    expect(slider(hmi)).to_be_in_viewport(ratio=1)

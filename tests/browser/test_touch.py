@@ -9,6 +9,7 @@ from playwright.sync_api import expect
 
 from tests.browser.hmi import PHONE, Hmi, OpenPage
 from tests.browser.house import TAGS
+from tests.browser.places import places
 from tests.support.web import Bridge
 
 
@@ -60,6 +61,30 @@ def test_a_tap_on_a_pin_opens_its_card_and_one_beside_closes_it(phone: Hmi) -> N
     assert box["x"] + box["width"] <= PHONE["width"]
     phone.page.get_by_role("button", name="Close").first.tap()
     expect(phone.card("10")).to_have_count(0)
+
+
+def test_most_of_the_height_is_for_what_is_looked_at(phone: Hmi) -> None:
+    """Not for bars: of each tab, and of the card."""
+    tall = 0.6 * PHONE["height"]
+
+    def heights(*selectors: str) -> list[float]:
+        return [box.bottom - box.top for box in places(phone, *selectors)]
+
+    assert sum(heights(".health-strip", ".map-frame", ".legend")) >= tall
+    for pane in ("Tags", "Alarms"):
+        phone.page.get_by_role("navigation").get_by_role("button", name=pane).tap()
+        (panel,) = heights(".tags-panel")
+        # What stays in place while the rest scrolls.
+        still = sum(heights(*("thead",) if pane == "Tags" else (".alarm-line", ".alarms h3")))
+        assert panel - still >= tall, pane
+    show(phone, "Tags")
+    phone.row("2").tap()
+    assert heights(".card")[0] >= tall
+    phone.page.get_by_role("navigation").get_by_role("button", name="Map").tap()
+    expect(phone.map).to_be_visible()
+    frame, card = heights(".map-frame", ".card")
+    assert frame >= 200
+    assert frame + card >= tall
 
 
 def test_one_finger_moves_the_map_and_two_zoom_about_their_middle(phone: Hmi) -> None:

@@ -12,7 +12,6 @@ from contextlib import ExitStack, contextmanager
 from functools import partial
 from pathlib import Path
 from typing import Any
-from urllib.parse import quote, urlencode
 
 import httpx
 
@@ -72,60 +71,3 @@ def ask(bridge: Bridge, path: str) -> list[Any]:
 def _still(path: str, response: httpx.Response) -> str:
     text = _NOW.sub("now", response.text)
     return text if "at=" in path else _AGE.sub(r'"\1":0', text)
-
-
-def questions(tags: list[str], sensors: list[str], hours: int) -> list[str]:
-    """Paths with a query over every route that looks back."""
-
-    def path(route: str, **query: Any) -> str:
-        query = {name.rstrip("_"): value for name, value in query.items()}
-        return f"{route}?{urlencode(query)}" if query else route
-
-    moments = [T0 - HOUR, T0, T0 + 0.5, *(T0 + HOUR * hours * k // 6 for k in range(1, 7))]
-    day = {"from_": T0, "to": T0 + HOUR * hours}
-    part = {"from_": T0 + HOUR, "to": T0 + 2.5 * HOUR}
-    wide = {"from_": T0 - 40 * HOUR, "to": T0 + 2000 * HOUR}
-    asked = [path("/api/state"), path("/api/sensors"), path("/api/map"), path("/api/map.png")]
-    for at in moments:
-        asked += [path("/api/state", at=at), path("/api/health", at=at)]
-        asked += [path(f"/api/tags/{quote(tag)}", at=at) for tag in tags[:2]]
-        asked.append(path("/api/field.json", sensor_type=sensors[0], resolution=0.5, at=at))
-        asked.append(path("/api/field/quality", sensor_type=sensors[0], at=at))
-    at = moments[-2]
-    for sensor in (*sensors[:2], "vpd", "dew_point"):
-        for form in ("json", "png", "npy"):
-            asked.append(path(f"/api/field.{form}", sensor_type=sensor, resolution=1, at=at))
-        for form in ("json", "npy"):
-            asked.append(path(f"/api/estimate.{form}", sensor_type=sensor, resolution=1, at=at))
-    asked.append(path("/api/estimate/tags", sensor_type=sensors[0], at=at))
-    asked.append(path("/api/estimate/advice", sensor_type=sensors[0], at=at))
-    for period in (day, part, wide):
-        for tag in tags:
-            for sensor in (*sensors[:2], "~scans", "~failures", "~pests_seen", "~silences"):
-                asked.append(path("/api/history", tag_id=tag, sensor_type=sensor, **period))
-        asked.append(
-            path("/api/history", tag_id=tags[0], sensor_type=sensors[0], points=10, **period)
-        )
-        asked.append(path("/api/history", tag_id="*", sensor_type="~looks", **period))
-        asked.append(path("/api/timeline", **period))
-        asked.append(path("/api/timeline", points=24, tag_id=tags[1], **period))
-        asked.append(path("/api/export.csv", **period))
-        asked.append(path("/api/export.csv", tag_id=tags[0], sensor_type=sensors[0], **period))
-        asked += [path("/api/alarms", **period), path("/api/alarms", active=1, **period)]
-    asked += [path(f"/api/tags/{quote(tag)}/history") for tag in tags]
-    asked += [
-        path("/api/state", at="soon"),
-        path("/api/state", at=2**31 - 1),
-        path("/api/state", at="2025-11-21T06:00:00Z"),
-        path("/api/tags/nobody", at=at),
-        path("/api/field.json", sensor_type="", at=at),
-        path("/api/field.json", sensor_type="nothing", at=at, resolution=1),
-        path("/api/history", tag_id="", sensor_type=sensors[0]),
-        path("/api/history", tag_id=tags[0], sensor_type="~moons"),
-        path("/api/history", tag_id=tags[0], sensor_type=sensors[0], from_=5, to=4),
-        path("/api/history", tag_id=tags[0], sensor_type=sensors[0], points=5001, **day),
-        path("/api/timeline", points=0, **day),
-        path("/api/export.csv", from_="yesterday"),
-        path("/api/alarms", active=2),
-    ]
-    return asked

@@ -9,7 +9,6 @@ import time
 from dataclasses import dataclass
 from typing import Any
 
-from lupin_bridge.feed.past_child import Child
 from lupin_bridge.feed.query import Find
 from lupin_bridge.past.plans import Answered
 from lupin_bridge.serving.admission import Answer
@@ -52,14 +51,6 @@ class Running:
     def answer(self, find: Find, should_stop: ShouldStop) -> tuple[int, int]:
         """See `PastQuery`."""
         return (_endless(), os.getpriority(os.PRIO_PROCESS, 0))
-
-
-def _child() -> Child:
-    frame = sys._current_frames()[threading.main_thread().ident or 0]
-    while not isinstance(child := frame.f_locals.get("self"), Child):
-        assert frame.f_back is not None
-        frame = frame.f_back
-    return child
 
 
 def _endless() -> int:

@@ -11,7 +11,6 @@ from rclpy.serialization import serialize_message
 
 OBSERVATIONS = "/floranova/observations"
 TAGS = "/perception/discovered_tags"
-STATE = "/twin/state"
 # What `ros2 bag record` (Jazzy) writes of a topic with one publisher, shortened by its durations.
 LATCHED = """\
 - history: unknown

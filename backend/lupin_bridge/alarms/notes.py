@@ -58,7 +58,7 @@ def notes_of_alarms(
 
 
 def _shelved(alarms: Sequence[Alarm], shelves: Mapping[str, Note]) -> Mapping[str, Note]:
-    """A shelf holds also for what comes back while it lasts, unless that is worse.
+    """A shelf holds also for what comes back while it lasts. It ends for what is worse by now.
 
     What comes back is an alarm of the same tag, kind, sensor and side.
     """
@@ -67,12 +67,18 @@ def _shelved(alarms: Sequence[Alarm], shelves: Mapping[str, Note]) -> Mapping[st
         note = shelves.get(alarm.id)
         known = held.get(_what(alarm))
         if note is not None and (known is None or known[0].id < note.id):
-            held[_what(alarm)] = note, _ORDER[alarm.reason.verdict]
+            held[_what(alarm)] = note, _ORDER[_verdict_at(alarm, note.made_at_ns)]
     return {
         alarm.id: shelf[0]
         for alarm in alarms
         if (shelf := held.get(_what(alarm))) and _ORDER[alarm.reason.verdict] >= shelf[1]
     }
+
+
+def _verdict_at(alarm: Alarm, at_ns: int) -> Verdict:
+    """How bad it was at a moment."""
+    was_better = alarm.worse_at_ns is not None and at_ns < alarm.worse_at_ns
+    return alarm.raised_as if was_better and alarm.raised_as else alarm.reason.verdict
 
 
 def _what(alarm: Alarm) -> tuple[object, ...]:

@@ -80,9 +80,6 @@ def backup(journal: sqlite3.Connection, target: Path, report: Callable[[float], 
     return target.stat().st_size
 
 
-Write = Callable[[bytes], object]
-
-
 class CannotWrite(Exception):
     """The output cannot be written; the message is the one line that says why."""
 

@@ -9,7 +9,7 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final, TypeVar
+from typing import Any, Final
 
 from lupin_bridge.feed.followed_log import FollowedLog
 from lupin_bridge.feed.query import Now
@@ -29,8 +29,6 @@ from lupin_twin.journal.follow import Lot
 from lupin_twin.ros import convert_field, convert_past
 from lupin_twin.ros.convert_past import NotAnAnswerError
 from lupin_twin.runtime.estimates import Report, ReportRequest
-
-ResultT = TypeVar("ResultT")
 
 # ROS time beyond this, in 2001, is that of a wall's clock, and goes on while nobody tells it.
 _A_DATE_NS: Final = 10**18

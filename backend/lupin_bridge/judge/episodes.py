@@ -52,7 +52,8 @@ class Alarm:
 
     `reason` is as it was when the alarm was raised, `tag_id` is `SITE` for the greenhouse. `worst`
     is the value farthest beyond its limit, in the sensor's unit; of a pest, the most counted. The
-    reason's verdict is the worst so far, `raised_as` the one with which it was raised.
+    reason's verdict is the worst so far, `raised_as` the one with which it was raised, and
+    `worse_at_ns` the observation that made it worse.
     """
 
     id: str
@@ -62,6 +63,7 @@ class Alarm:
     cleared_at_ns: int | None = None
     worst: float | None = None
     raised_as: Verdict | None = None
+    worse_at_ns: int | None = None
 
     @property
     def is_worse(self) -> bool:
@@ -116,6 +118,7 @@ class _Watch:
     against: int
     raised_at_ns: int | None = None
     raised_as: Verdict | None = None
+    worse_at_ns: int | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -286,7 +289,10 @@ class TagEpisodes:
             watch = replace(watch, worst=finding.worse(watch.worst, now.value))
         reason = watch.reason
         verdict = worst((reason.verdict, now.verdict)) or now.verdict
-        if watch.raised_at_ns is None and self._has_lasted(finding.key, watch, stamp_ns):
+        if watch.raised_at_ns is not None:
+            if verdict is not reason.verdict:
+                watch = replace(watch, worse_at_ns=stamp_ns)
+        elif self._has_lasted(finding.key, watch, stamp_ns):
             # It is raised now, with what is so now, and began with the first of them; what is old
             # is so since its last reading.
             is_old = now.kind is Kind.OLD
@@ -316,6 +322,7 @@ class TagEpisodes:
             cleared_at_ns=cleared_at_ns,
             worst=watch.worst,
             raised_as=watch.raised_as,
+            worse_at_ns=watch.worse_at_ns,
         )
 
 

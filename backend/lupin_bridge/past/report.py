@@ -213,12 +213,12 @@ class _Fold:
     def _count(self, write: PastWrite) -> None:
         if write.status != STATUS_OK:
             self._counts["failed"] += 1
-            return
-        if write.kind == KIND_FLOWER:
+        elif write.kind == KIND_FLOWER:
             self._counts["inspections"] += 1
-            return
-        self._counts["scans"] += 1
-        self._scanned.add(write.tag_id)
+        else:
+            self._counts["scans"] += 1
+            self._scanned.add(write.tag_id)
+        # What failed may have brought some all the same.
         readings = readings_of([write])
         for reading in (*readings, *derive(readings)):
             of = self._sensors.setdefault(reading.name, _Extremes())

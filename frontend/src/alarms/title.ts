@@ -9,7 +9,7 @@ import { alarmList } from './watch';
 export const titleOf = (count: number, moment: number | null, isRecorded = false): string => {
   const shown = moment === null ? S.product : S.pastTitle(rosText(moment));
   const title = isRecorded ? `${S.origin.recorded} · ${shown}` : shown;
-  return count === 0 ? title : S.alarmsTitle(count, title);
+  return count === 0 ? title : `(${count}) ${title}`;
 };
 
 /** Keeps it so; returns the way to stop. */

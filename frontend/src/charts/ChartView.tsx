@@ -86,8 +86,8 @@ export default function ChartView({ charted }: { charted: Charted }): JSX.Elemen
               prefer({ dayBefore: !hasDayBefore });
             }}
           />
-          <IconButton data-zoom icon="plus" label={S.chartZoomIn} onClick={zoom(0.5)} />
-          <IconButton data-zoom icon="minus" label={S.chartZoomOut} onClick={zoom(2)} />
+          <IconButton data-zoom icon="plus" label={S.zoomIn} onClick={zoom(0.5)} />
+          <IconButton data-zoom icon="minus" label={S.zoomOut} onClick={zoom(2)} />
           {isZoomed && <IconButton icon="fit" label={S.chartWhole} onClick={zoomBack} />}
           <IconButton
             icon={isTable ? 'chart' : 'list'}

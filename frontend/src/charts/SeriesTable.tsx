@@ -23,7 +23,7 @@ export function SeriesTable({ line, model }: { line: Line; model: PlotModel }): 
     <div className="series-scroll" tabIndex={0}>
       <table className="series-table" data-testid="series-table">
         <caption>
-          {S.chartTableCaption(line.label, shown(sensor.label, 32), spanText(series))}
+          {line.label}, {shown(sensor.label, 32)}, {spanText(series)}
         </caption>
         <thead>
           <tr>

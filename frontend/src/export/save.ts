@@ -1,6 +1,5 @@
 import { momentText } from '../domain/format';
 import { hasDate, rosText } from '../domain/rostime';
-import { S } from '../strings';
 
 /** Hands a file to the browser's download. */
 export function save(blob: Blob, name: string): void {
@@ -27,5 +26,5 @@ export function pastFileName(kind: string, extension: string, moment: number): s
 
 function named(kind: string, extension: string, time: string): string {
   const stamp = time.replace(' ', /^\d/.test(time) ? 'T' : '-').replaceAll(':', '-');
-  return `${S.fileName(kind, stamp)}.${extension}`;
+  return `lupin-twin-${kind}-${stamp}.${extension}`;
 }

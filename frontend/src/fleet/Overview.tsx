@@ -48,7 +48,7 @@ export function Overview({ seen, words, isKiosk }: Props): JSX.Element {
   const shown = useMemo(() => chosen(sites, filter, search, group), [sites, filter, search, group]);
 
   useEffect(() => {
-    document.title = alarms === 0 ? words.sites : S.alarmsTitle(alarms, words.sites);
+    document.title = alarms === 0 ? words.sites : `(${alarms}) ${words.sites}`;
   }, [alarms, words]);
 
   useEffect(() => {

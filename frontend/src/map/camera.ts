@@ -161,11 +161,10 @@ export class MapCamera {
   }
 
   /** Brings a point into view; one that is well inside the free part stays where it is. */
-  show(point: MapPoint, coveredBelow: number, covered: readonly Box[] = []): void {
+  show(point: MapPoint, covered: readonly Box[] = []): void {
     const { view, size } = this.#handlers.viewport();
     const { x, y } = toCanvas(view, point);
-    const { width } = size;
-    const height = Math.max(0, size.height - coveredBelow);
+    const { width, height } = size;
     const margin = Math.min(40, height / 4);
     const isInside = x > margin && y > margin && x < width - margin && y < height - margin;
     if (width === 0 || (isInside && isClear(view, point, covered))) return;

@@ -75,11 +75,3 @@ export function watchCovered(element: HTMLElement, onChange: () => void): () => 
     observer.disconnect();
   };
 }
-
-/** Height of the map's lower part that the tag's card lies over, in pixels. */
-export function coveredBelow(element: HTMLElement): number {
-  const card = document.querySelector('.card')?.getBoundingClientRect();
-  const map = element.getBoundingClientRect();
-  const overlaps = card && card.left < map.right && card.top < map.bottom && card.bottom > map.top;
-  return overlaps ? map.bottom - card.top : 0;
-}

@@ -20,14 +20,7 @@ import { selectNewest, selectShown, selectTag, type Shown } from '../store/momen
 import { isPrinting } from '../store/theme';
 import { MapCamera } from './camera';
 import { keyCommand, onMapCommand, type MapCommand } from './commands';
-import {
-  contentOf,
-  coveredBelow,
-  coveredBoxes,
-  together,
-  watchCovered,
-  type Content,
-} from './content';
+import { contentOf, coveredBoxes, together, watchCovered, type Content } from './content';
 import { Painter, type Canvases } from './painter';
 import { onPaletteChange, paletteInUse } from './palette';
 import { pinUnderMouse, pointedAt } from './pointer';
@@ -289,7 +282,7 @@ export function runMap(
         break;
       case 'show': {
         const tag = selectTag(store.get(), command.tagId);
-        if (tag?.at) camera.show(tag.at, coveredBelow(element), covered);
+        if (tag?.at) camera.show(tag.at, covered);
         break;
       }
       case 'picture':
@@ -303,9 +296,20 @@ export function runMap(
     }
   };
 
+  /** Also before the map has a size. */
+  const isChosenSeen = (): boolean => {
+    const state = store.get();
+    const { view, size } = state.viewport;
+    const at = state.view.selected === null ? null : selectTag(state, state.view.selected)?.at;
+    if (!at || size.width === 0) return true;
+    const { x, y } = toCanvas(view, at);
+    return x > 0 && y > 0 && x < size.width && y < size.height;
+  };
+
   const resize = new ResizeObserver(([entry]) => {
     if (!entry) return;
     const { width, height } = entry.contentRect;
+    const wasSeen = isChosenSeen();
     moveViewport({ size: { width, height } });
     if (width === 0 || height === 0) return;
     // Its labels grow with the page's text: on a wall screen, and as the browser is set.
@@ -313,6 +317,9 @@ export function runMap(
     painter.resize({ width, height }, window.devicePixelRatio, textScale);
     covered = coveredBoxes(element);
     goToContent();
+    // A card that opens takes room from the map.
+    const { selected } = store.get().view;
+    if (selected !== null && wasSeen) run({ type: 'show', tagId: selected });
     spoil('still', 'pins', 'overlay');
     // At once: a canvas of another size is empty, and would be seen so until the next frame.
     paint();

@@ -1,6 +1,7 @@
 import { afterEach, beforeEach, describe, expect, test, vi } from 'vitest';
 
 import { Refusal } from '../contract/api';
+import { S } from '../strings';
 import { createFetcher, DRAG_PACE_MS, type Fetcher, type Wish } from './fetcher';
 
 let told: string[];
@@ -208,7 +209,31 @@ describe('a failure', () => {
   test('is also that no answer comes', async () => {
     fetcher.want(wish('a'));
     await pass(30_000);
-    expect(errors).toEqual([{ message: 'no answer came in time', isLasting: false }]);
+    expect(errors).toEqual([{ message: S.serverBusy, isLasting: false }]);
+  });
+
+  test.each([
+    [429, 7, 7_000],
+    [503, 3, 3_000],
+    [503, 3_600, 60_000],
+  ])(
+    'for load (%i) is told in plain words, and tried again in %i s, soon at the latest',
+    async (...of) => {
+      const [status, retryAfterS, waitMs] = of;
+      fetcher.want(wish('a'));
+      await fail('a', new Refusal(status, 'client_rate', retryAfterS));
+      expect(errors).toEqual([{ message: S.serverBusy, isLasting: false }]);
+      await pass(waitMs - 1);
+      expect(started).toEqual(['a']);
+      await pass(1);
+      expect(started).toEqual(['a', 'a']);
+    },
+  );
+
+  test('is also that there is no network', async () => {
+    fetcher.want(wish('a'));
+    await fail('a', new TypeError('Failed to fetch'));
+    expect(errors).toEqual([{ message: S.serverBusy, isLasting: false }]);
   });
 });
 

@@ -4,6 +4,7 @@
  */
 import { now } from '../clock';
 import { Refusal } from '../contract/api';
+import { reasonText } from '../domain/failure';
 
 /** While somebody drags: a dozen starts a second, which a server of this kind allows. */
 export const DRAG_PACE_MS = 80;
@@ -20,6 +21,8 @@ const MOST_KEPT = 60;
 const CALM_MS = 500;
 const RETRY_FIRST_MS = 2_000;
 const RETRY_LONGEST_MS = 30_000;
+/** A server that wants to be left alone for longer is asked all the same. */
+const CALM_LONGEST_MS = 60_000;
 
 /** Something fetched beside the frames. While it is fetched again, the old value stays. */
 export interface Fetched<T> {
@@ -140,7 +143,7 @@ export function createFetcher<T>({
     running = [...running, mine];
     startedAt = now();
     const late = setTimeout(() => {
-      abort.abort(new Error('no answer came in time'));
+      abort.abort(new Refusal(504, 'no answer came in time'));
     }, TIMEOUT_MS);
     const isOver = (): boolean => {
       clearTimeout(late);
@@ -159,13 +162,13 @@ export function createFetcher<T>({
         if (isOver()) return;
         const isLasting = isDragged && isRefused(error);
         const waitMs = error instanceof Refusal ? (error.retryAfterS ?? 0) * 1_000 : 0;
-        calmUntil = now() + Math.max(CALM_MS, waitMs);
+        calmUntil = now() + Math.min(CALM_LONGEST_MS, Math.max(CALM_MS, waitMs));
         // What nobody wants any more needs no second try.
         if (wanted?.key === wish.key || !isDragged) {
           if (isLasting) done = wish.key;
           retryAt = now() + Math.min(RETRY_LONGEST_MS, RETRY_FIRST_MS * 2 ** failures);
           failures += 1;
-          onError(error instanceof Error ? error.message : String(error), isLasting, error);
+          onError(reasonText(error), isLasting, error);
         }
         pump();
       },

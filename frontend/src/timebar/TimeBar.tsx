@@ -45,7 +45,7 @@ export function TimeBar(): JSX.Element | null {
       <Slider span={span} timeline={remembered.value} nowS={nowS} />
       {remembered.state === 'failed' && (
         <p className="timebar-note" role="status">
-          {S.timebarFailed(shown(remembered.message, 160))}
+          {S.chartFailed(shown(remembered.message, 160))}
         </p>
       )}
     </section>
@@ -85,7 +85,7 @@ function Player(): JSX.Element {
         title={S.timebarSpeed}
         value={speed}
         options={SPEEDS}
-        text={S.timebarSpeeds}
+        text={(each) => `${each}×`}
         onChange={chooseSpeed}
       />
     </>

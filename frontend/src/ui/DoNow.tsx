@@ -74,7 +74,7 @@ export function useSince(tagId: string, reason: HealthReason | undefined): strin
   if (!isNow || !found) return null;
   if (found.shelf) return S.alarmShelved(clockText(found.shelf.until), '');
   if (found.isAcknowledged) return S.healthAcknowledged;
-  return S.healthSince(whenText(secondsOf(found.alarm.raised_at), rosNow(store.get(), now())));
+  return S.alarmSince(whenText(secondsOf(found.alarm.raised_at), rosNow(store.get(), now())), null);
 }
 
 /** What has to be done first: where, why, what, and since when; else how the greenhouse is. */

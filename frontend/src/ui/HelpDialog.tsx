@@ -30,7 +30,7 @@ export function HelpDialog(): JSX.Element {
     <dialog id={ID} className="help" ref={dialog} aria-labelledby="help-title">
       <div className="help-content">
         <header>
-          <h2 id="help-title">{S.helpTitle}</h2>
+          <h2 id="help-title">{S.help}</h2>
           <form method="dialog">
             <button type="submit" className="icon-button" aria-label={S.cardClose}>
               <Icon name="close" />

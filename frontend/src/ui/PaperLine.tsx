@@ -53,10 +53,8 @@ export function PaperLine(): JSX.Element | null {
     <p className="paper-line" data-testid="paper-line">
       <strong>{S.paper(taken, dateText(printed))}</strong>{' '}
       <span>
-        {S.paperRange(
-          isIdeal ? S.legendAgainst(label) : label,
-          (isIdeal && ideals) || rangeText(sensor, scale, unit),
-        )}
+        {isIdeal ? S.legendAgainst(label) : label}{' '}
+        {(isIdeal && ideals) || rangeText(sensor, scale, unit)}
       </span>
     </p>
   );

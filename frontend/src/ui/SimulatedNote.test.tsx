@@ -29,9 +29,7 @@ test('a moment that a simulation made is said to be simulated, and no other', ()
   render(<SimulatedNote />);
   expect(note()).toBe('');
   lookBack(END - 1);
-  expect(note()).toBe(
-    `Simulated. Not measured by a robot: the demo starts with simulated days, up to ${rosText(END)}.`,
-  );
+  expect(note()).toBe(`Simulated. Demo days until ${rosText(END)}, not measured.`);
   lookBack(END);
   expect(note()).toBe('');
   lookBack(START);

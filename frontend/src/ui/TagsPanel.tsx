@@ -97,7 +97,7 @@ function FilterBar(): JSX.Element {
           }}
         />
       </label>
-      <span className="count" role="status" data-testid="row-count">
+      <span className="count" role="status" data-all={count === all} data-testid="row-count">
         {S.shownOf(count, all)}
         {status && ` · ${S.health[status]}`}
       </span>

@@ -61,7 +61,7 @@ export function troublesOf(
     troubles.push({
       id: `drop ${reason}`,
       title: S.drops(count),
-      detail: S.dropsLast(shown(message, 160)),
+      detail: S.unreadLast(shown(message, 160)),
     });
   }
   return troubles;

@@ -29,17 +29,17 @@ const english = saidBy({ ...ENGLISH, ...ESTIMATE }, parameters);
 const SAME: Readonly<Record<string, readonly string[]>> = {
   de: [
     ...['phase.live', 'timebarLive', 'keys.time.3.1', 'themes.system', 'tried.ok', 'sensors'],
-    ...['cardPosition', 'rangeAuto', 'saveCsvShort', 'fileName', 'legendMore'],
+    ...['cardPosition', 'rangeAuto', 'saveCsvShort', 'legendMore'],
     ...['keys.global.12.0', 'idealParts.any', 'colourings.ideal', 'differenceTimes'],
   ],
   nl: [
     ...['phase.live', 'timebarLive', 'keys.time.3.1', 'menu', 'tried.ok', 'sensors', 'alarmCount'],
-    ...['rangeAuto', 'saveCsvShort', 'fileName', 'trend', 'legendMore', 'robotLayer', 'robotAt'],
+    ...['rangeAuto', 'saveCsvShort', 'trend', 'legendMore', 'robotLayer', 'robotAt'],
     ...['keys.global.12.0', 'keys.map.3.0', 'keys.time.1.0', 'keys.time.2.0', 'keys.time.3.0'],
     'speciesNames.gerbera',
   ],
   es: [
-    ...['robotLayer', 'robotAt', 'tried.ok', 'sensors', 'rangeAuto', 'saveCsvShort', 'fileName'],
+    ...['robotLayer', 'robotAt', 'tried.ok', 'sensors', 'rangeAuto', 'saveCsvShort'],
     ...['speciesNames.gerbera', 'keys.global.12.0', 'idealParts.any', 'colourings.ideal'],
   ],
 };

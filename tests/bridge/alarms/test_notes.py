@@ -37,6 +37,14 @@ def test_a_shelf_ends_in_its_time_by_a_later_word_and_by_withdrawal() -> None:
     assert notes_of_alarms([COLD], [SHELF, Note("2", NOW, "anna", WITHDRAW, "note:1")], NOW) == {}
 
 
+def test_a_shelf_ends_when_its_alarm_gets_worse_and_one_of_later_holds() -> None:
+    bad = replace(COLD.reason, verdict=Verdict.CRITICAL)
+    worse = replace(COLD, reason=bad, raised_as=Verdict.STRESSED, worse_at_ns=NOW + 1)
+    assert notes_of_alarms([worse], [SHELF], NOW + 1) == {}
+    again = replace(SHELF, id="2", made_at_ns=NOW + 2)
+    assert "a" in notes_of_alarms([worse], [SHELF, again], NOW + 2)
+
+
 def test_what_comes_back_is_shelved_too_unless_it_is_worse_or_another_thing() -> None:
     again = replace(COLD, id="b")
     worse = replace(again, reason=replace(COLD.reason, verdict=Verdict.CRITICAL))

@@ -14,7 +14,6 @@ from lupin_bridge.feed.robot import (
 )
 
 S = 10**9
-NOW = 10_000 * S
 
 
 def position(x: float, at_s: float, y: float = 0.0) -> Position:

@@ -220,8 +220,9 @@ def test_one_that_gets_worse_is_the_same_and_its_verdict_and_worst_are_worse() -
     assert (stressed.reason.verdict, critical.reason.verdict) == ("stressed", "critical")
     assert (critical.worst, critical.reason.limit) == (6, 18)
     assert (critical.raised_as, critical.is_worse, stressed.is_worse) == ("stressed", True, False)
+    assert (critical.worse_at_ns, stressed.worse_at_ns) == (START + 2 * MINUTE, None)
     (bad,) = told(scans([6, 6, 6]))
-    assert (bad.raised_as, bad.is_worse) == ("critical", False)
+    assert (bad.raised_as, bad.is_worse, bad.worse_at_ns) == ("critical", False, None)
 
 
 def test_whatever_a_verdict_can_be_of_becomes_an_alarm_but_what_the_estimate_says() -> None:

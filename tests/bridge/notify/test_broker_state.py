@@ -16,8 +16,6 @@ from lupin_bridge.notify.messages import GreenhouseState, Topics
 from lupin_bridge.notify.mirror import Mirror
 from tests.support.seen import HOLDS_NS, NOW_NS, SENSORS, S, alarm, seen, tag
 
-TOPICS = Topics("lt", "homeassistant")
-
 
 def mirror(discovery: str = "homeassistant") -> Mirror:
     return Mirror(Topics("lt", discovery), SENSORS)

@@ -18,7 +18,6 @@ NOW_NS = 1_000 * NS
 Parse = Callable[[list[tuple[str, str]], int | None], Any]
 TIMELINE = partial(query.period, query.OfTimeline)
 EXPORT = partial(query.period, query.OfExport)
-ALL: tuple[Parse, ...] = (query.at, query.history, TIMELINE, EXPORT)
 NEEDED: dict[Parse, dict[str, str]] = {query.history: {"tag_id": "7", "sensor_type": "co2"}}
 
 

@@ -18,13 +18,6 @@ from tests.support.log_life import (
 )
 
 END = BEGUN + (LATEST + 200) * MINUTE
-COUNTED = (
-    Event.SCANS,
-    Event.FAILURES,
-    Event.INSPECTIONS,
-    Event.PESTS_SEEN,
-    Event.PESTS_CLEARED,
-)
 
 
 def ask(

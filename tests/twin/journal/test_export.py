@@ -1,12 +1,11 @@
 from __future__ import annotations
 
-import sqlite3
 from contextlib import closing
 from pathlib import Path
 
 import pytest
 
-from lupin_twin.core.past import NotRemembered, PastRow
+from lupin_twin.core.past import NotRemembered
 from lupin_twin.journal.queries import LOT, Export, rows
 from lupin_twin.journal.schema import open_reader
 from tests.support.log_life import (
@@ -19,12 +18,6 @@ from tests.support.log_life import (
 )
 
 END = BEGUN + (LATEST + 200) * MINUTE
-
-
-def every(
-    connection: sqlite3.Connection, tag_id: str | None = None, sensor: str | None = None
-) -> list[PastRow]:
-    return [row for lot in rows(connection, 0, END, tag_id, sensor) for row in lot]
 
 
 def test_lots_come_as_they_are_taken_and_nothing_is_held_open_between(tmp_path: Path) -> None:

@@ -25,7 +25,7 @@ from lupin_twin.core.state import Inspection, Pin, Reading
 from lupin_twin.core.writes import PastWrite, RunSpan
 from lupin_twin.journal.runs import runs, spans
 from tests.support.alarms_reference import Plain, alarms
-from tests.support.log_life import BEGUN, LATEST, MINUTE, Life, steps
+from tests.support.log_life import BEGUN, LATEST, MINUTE, Life, scan, steps
 from tests.support.past import answered_by
 from tests.twin.journal.conftest import Engines, Living
 
@@ -50,6 +50,18 @@ def test_a_report_is_that_of_a_plain_list_on_either_engine(
         found = [report(log, *period) for log in engines(life.connection)]
         assert found[0] == found[1]
         check(found[0], life, *period)
+
+
+def test_readings_of_an_attempt_that_failed_are_in_it_as_in_charts_and_alarms(
+    living: Living,
+) -> None:
+    failed = replace(scan(at_ns=BEGUN + MINUTE, temperature=40.0), status=2)
+    with living([("rows", [scan(temperature=20.0), failed])]) as life:
+        found = report(life.connection, BEGUN, END)
+        check(found, life, BEGUN, END)
+    (sensor,) = found["sensors"]
+    assert (sensor["n"], sensor["high"]["value"]) == (2, 40.0)
+    assert (found["counts"]["scans"], found["counts"]["failed"]) == (1, 1)
 
 
 def test_nothing_of_what_came_later_is_in_it(living: Living) -> None:
@@ -87,7 +99,7 @@ def check(found: dict[str, Any], life: Life, start_ns: int, end_ns: int) -> None
     assert counts["inspections"] == sum(it.has_seen for it in within)
     assert not {it.tag_id for it in scans} & set(found["never_scanned"])
     assert counts["tags"] == counts["tags_scanned"] + len(found["never_scanned"])
-    check_sensors(found["sensors"], scans)
+    check_sensors(found["sensors"], [it for it in within if it.kind == 0])
     check_silences(found["silences"], told, start_ns, end_ns)
     axis = [
         RunSpan(it.run.id, it.start_ns, min(it.end_ns, end_ns))

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
 import pytest
 from rclpy.serialization import deserialize_message, serialize_message
 
-from lupin_twin.core.writes import PastWrite, PastWrites, RunSpan
 from lupin_twin.journal.follow import Lot, NotALotError
 from lupin_twin.ros.convert_past import (
     lot_of,
@@ -16,12 +14,6 @@ from lupin_twin.ros.convert_past import (
     rows_response,
 )
 
-WRITES = (
-    PastWrite(4, 1, "7", 10, 0, 0, ("co2", "light"), (420.5, math.inf)),
-    PastWrite(6, 1, "7", 11, 1, 0, has_seen=True, species="tulip", anomaly=True, bug_count=3),
-    PastWrite(7, 2, "ä", 9, 0, 2),
-)
-PAST = PastWrites("a-1", (RunSpan(1, 0, 9), RunSpan(2, 9, 2**63 - 1)), WRITES, 9, is_all=True)
 LOT = Lot("0123456789abcdef" * 2, ('["run",1,0,1,1,1,null,null]', '["meta","ä","5"]'), 9, True)
 
 

@@ -6,7 +6,6 @@ import math
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import pytest
@@ -18,13 +17,6 @@ from rclpy.parameter import Parameter
 from lupin_twin.ros.node import TwinNode
 from tests.support.messages import occupancy_grid, scan
 from tests.support.ros import Peer
-
-SOURCES = [file for folder in ("ros_node", "backend") for file in Path(folder).rglob("*.py")]
-LIMITS = {
-    "/floranova/observations": 1_000_000,
-    "/perception/discovered_tags": 8_000_000,
-    "/map": 64_000_000,
-}
 
 
 class Stage:

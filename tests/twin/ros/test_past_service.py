@@ -9,15 +9,11 @@ from builtin_interfaces.msg import Time
 from lupin_msgs.srv import GetHistory, GetStateAt
 
 from lupin_twin.core.interfaces import GET_HISTORY
-from lupin_twin.core.state import NANOSECONDS_PER_SECOND
 from tests.support import messages
 from tests.support.domains import own_domain
 from tests.support.processes import OFTEN, twin_node
 from tests.support.ros import Peer
 from tests.support.waiting import wait_for
-
-S = NANOSECONDS_PER_SECOND
-NOW_NS = 100 * S
 
 
 @pytest.fixture(scope="module")

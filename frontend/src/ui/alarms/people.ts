@@ -6,6 +6,7 @@
 import { now, timeOfDay } from '../../clock';
 import { fetchSession, postNote, withdrawNote } from '../../contract/people';
 import type { Alarm } from '../../contract/types';
+import { reasonText } from '../../domain/failure';
 import { secondsOf } from '../../domain/rostime';
 import { onChange, store } from '../../store/app';
 import { rosNow } from '../../store/moment';
@@ -118,7 +119,7 @@ async function tell(before: Kept, next: Kept): Promise<void> {
     // One behind the other, in the order of the list: of two words the later one stands.
     for (const word of words) await word();
   } catch (error) {
-    say(P.failed(error instanceof Error ? error.message : String(error)));
+    say(P.failed(reasonText(error)));
   }
   pending -= 1;
   take();

@@ -62,7 +62,7 @@ export const ALARMS: In<typeof ENGLISH> = {
   alarmsNewHint: 'Die Reihenfolge bleibt, solange Sie die Liste benutzen. Neue Alarme anzeigen',
   alarmMore: (count) => `${count} weitere anzeigen`,
   alarmFilter: 'Alarme filtern',
-  alarmFilterHint: 'Messpunkt, Ursache …',
+  alarmFilterHint: 'Filtern …',
   alarmOrder: 'Reihenfolge',
   alarmOrders: { cause: 'Nach Ursache', newest: 'Neueste zuerst', tag: 'Nach Messpunkt' },
   alarmSaveCsv: 'Alarme als CSV speichern',
@@ -102,5 +102,4 @@ export const ALARMS: In<typeof ENGLISH> = {
     `Behoben: ${alarms.join('; ')}${more > 0 ? ` und ${more} weitere` : ''}`,
   alarmsMeanwhile: (alarm, more) =>
     `Neuer Alarm: ${alarm}${more > 0 ? ` und ${counted(more, 'weiterer Alarm', 'weitere Alarme')}` : ''}`,
-  alarmsTitle: (count, title) => `(${count}) ${title}`,
 };

@@ -13,9 +13,9 @@ export const CHARTS: In<typeof ENGLISH> = {
     `${counted(count, 'Messwert', 'Messwerte')}, der letzte ${latest} um ${at}, ` +
     `zwischen ${low} und ${high}, ${gaps === 0 ? 'keine Lücke' : counted(gaps, 'Lücke', 'Lücken')}.`,
   chartEmpty: 'Kein Messwert in diesem Zeitraum.',
-  chartNothing: '–',
   chartLoading: 'Die Vergangenheit wird geladen',
-  chartFailed: (reason) => `Die Vergangenheit konnte nicht geladen werden: ${reason}`,
+  chartFailed: (reason) =>
+    `Die Vergangenheit konnte nicht geladen werden; die Seite versucht es weiter. ${reason}`,
   chartMissing: 'Dieser Zwilling zeichnet nichts auf.',
   chartMissingHint:
     'Verläufe brauchen eine Aufzeichnung. Bis dahin zeigt der Messpunkt nur seine letzten Messungen.',
@@ -29,8 +29,6 @@ export const CHARTS: In<typeof ENGLISH> = {
   chartPlots: 'Als Verlauf anzeigen',
   chartDayBefore: 'Vortag',
   chartBeforeWas: (value) => `Vortag ${value}`,
-  chartZoomIn: 'Vergrößern',
-  chartZoomOut: 'Verkleinern',
   chartWhole: 'Ganzer Zeitraum',
   chartCsvShown: 'CSV der Anzeige',
   chartCsvAll: 'CSV aller Messwerte',
@@ -38,7 +36,6 @@ export const CHARTS: In<typeof ENGLISH> = {
   chartRemoveTag: (tag) => `Messpunkt ${tag} aus dem Verlauf entfernen`,
   chartWhich: 'Tabelle von',
   chartHint: 'Ziehen zum Vergrößern; klicken, um zu dieser Zeit zu springen.',
-  chartTableCaption: (label, sensor, span) => `${label}, ${sensor}, ${span}`,
   chartColumns: {
     time: 'Zeit',
     until: 'Bis',

@@ -60,12 +60,12 @@ export const HEALTH: In<typeof ENGLISH> = {
     scan_failed: 'Weg und Messpunkt prüfen',
     pest: 'Bestand prüfen, Schädlinge bekämpfen',
     old: 'Route des Roboters prüfen',
-    changed: 'Mit einem zweiten Messgerät vergleichen',
+    changed: 'Mit zweitem Messgerät vergleichen',
     silent: 'Zwilling, Server und Netz prüfen',
     stopped: 'Nach dem Roboter sehen',
     other: 'Dort nachsehen',
   },
-  todoPestAgain: 'Nochmals kontrollieren: ohne Befund ist es behoben',
+  todoPestAgain: 'Nochmals kontrollieren: Ohne Befund ist der Alarm behoben',
   todoLabel: 'Jetzt zu tun',
   reasonsLabel: 'Warum',
   healthHeading: 'Zustand des Gewächshauses',
@@ -87,7 +87,6 @@ export const HEALTH: In<typeof ENGLISH> = {
     alarms === 1
       ? '1 Alarm steht noch an: Zwei gute Messungen heben ihn auf'
       : `${alarms} Alarme stehen noch an: Je zwei gute Messungen heben sie auf`,
-  healthSince: (when) => `Alarm seit ${when}`,
   healthAcknowledged: 'quittiert',
   healthMoreCritical: (count) =>
     `+ ${count} ${count === 1 ? 'weiterer kritischer' : 'weitere kritische'}`,

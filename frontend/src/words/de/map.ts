@@ -29,12 +29,13 @@ export const MAP: In<typeof ENGLISH> = {
     advice: 'Wo ein weiterer Messpunkt helfen würde',
   },
   scaleBar: (length) => `Maßstab: ${length}`,
-  notKnown: 'nicht bekannt',
+  notKnown: 'unbekannt',
   position: (x, y) => `x ${x} m, y ${y} m`,
 
   legend: 'Legende',
   legendWaiting: 'Namen, Einheiten und Bereiche werden geladen',
-  legendFailed: (reason) => `Namen, Einheiten und Bereiche konnten nicht geladen werden: ${reason}`,
+  legendFailed: (reason) =>
+    `Namen, Einheiten und Bereiche konnten nicht geladen werden; die Seite versucht es weiter. ${reason}`,
   legendTags: (count) => counted(count, 'Messpunkt trägt bei', 'Messpunkte tragen bei'),
   legendFetching: 'Die Heatmap wird geladen',
   legendNoTags: 'Kein Messpunkt trägt bei',
@@ -73,7 +74,8 @@ export const MAP: In<typeof ENGLISH> = {
   rangeNotBelow: (high) => `Muss unter ${high} liegen: nicht übernommen`,
   rangeNotAbove: (low) => `Muss über ${low} liegen: nicht übernommen`,
   rangeNoNumber: 'Keine Zahl: nicht übernommen',
-  fieldFailed: (reason) => `Die Heatmap konnte nicht geladen werden: ${reason}`,
+  fieldFailed: (reason) =>
+    `Die Heatmap konnte nicht geladen werden; die Seite versucht es weiter. ${reason}`,
 
   compare: 'Vergleichen mit',
   compareWith: {

@@ -55,13 +55,14 @@ export const PAGE: In<typeof ENGLISH> = {
     paused: '',
     no_clock: 'Der Zwilling läuft mit simulierter Zeit, und auf /clock kommt nichts.',
     clock_stopped: 'Der Zwilling läuft mit simulierter Zeit, und auf /clock kommt nichts mehr.',
-    clock_doubted: 'Ihre Zeit liegt vor der Aufzeichnung. Bitte die Uhr stellen.',
+    clock_doubted: 'Die Uhrzeit liegt vor der Aufzeichnung. Bitte die Uhr stellen.',
     never_seen: 'Zwilling und Bridge müssen in derselben ROS-Domain laufen (ROS_DOMAIN_ID).',
     stale: 'Die Bridge läuft, aber auf /twin/state wird nichts mehr veröffentlicht.',
     thread_dead: 'Der ROS-Thread der Bridge ist beendet; warum, steht in ihrem Log.',
     shutting_down: '',
   },
 
+  serverBusy: 'Der Server kann gerade nicht antworten.',
   unread: (count) =>
     count === 1
       ? 'Eine Nachricht vom Server war nicht lesbar und wurde verworfen.'
@@ -72,7 +73,6 @@ export const PAGE: In<typeof ENGLISH> = {
   inputProblem: 'Nicht alle Daten kommen hier an.',
   drops: (count) =>
     `Der Zwilling hat in den letzten Minuten ${counted(count, 'Nachricht', 'Nachrichten')} verworfen.`,
-  dropsLast: (message) => `Die letzte: ${message}`,
   journal: {
     off: {
       title: 'Es wird nichts aufgezeichnet.',
@@ -122,8 +122,7 @@ export const PAGE: In<typeof ENGLISH> = {
   recordedPaused: 'Die Aufzeichnung ist angehalten.',
   recordedPausedHint: 'Sie ist angehalten oder zu Ende; das Alter der Werte wächst nicht.',
   simulated: 'Simuliert.',
-  simulatedHint: (until) =>
-    `Nicht von einem Roboter gemessen: Die Demo beginnt mit simulierten Tagen bis ${until}.`,
+  simulatedHint: (until) => `Demo-Tage bis ${until}, nicht gemessen.`,
   setAside: 'Eine beschädigte Aufzeichnung wurde in Quarantäne genommen.',
   setAsideHint: (name) =>
     `Lesbare Daten wurden übernommen, die Aufzeichnung läuft weiter. Die beschädigte Datei ist ${name}.`,
@@ -177,7 +176,6 @@ export const PAGE: In<typeof ENGLISH> = {
   emptyNoMap: 'Noch kein Grundriss: Der Roboter hat seine Karte nicht geschickt.',
   emptyNoMapMore: 'Der Grundriss ist die SLAM-Karte des Roboters, die auf /map kommt.',
 
-  helpTitle: 'Tastenkürzel',
   helpGlobal: 'Überall',
   helpMap: 'Auf der Karte',
   helpTime: 'Auf der Zeitleiste',
@@ -216,7 +214,5 @@ export const PAGE: In<typeof ENGLISH> = {
   paper: (taken, printed) => `Stand ${taken}, gedruckt ${printed}`,
   paperRest: (printed, all) =>
     `Gedruckt sind die ersten ${printed} von ${all} Messpunkten. Die Tabelle als CSV enthält alle.`,
-  paperRange: (sensor, range) => `${sensor} ${range}`,
-  fileName: (kind, stamp) => `lupin-twin-${kind}-${stamp}`,
   asOf: (moment) => `Stand ${moment}`,
 };

@@ -46,7 +46,6 @@ export const PAST: In<typeof ENGLISH> = {
   timebarPlay: 'Abspielen',
   timebarPause: 'Anhalten',
   timebarSpeed: 'Geschwindigkeit',
-  timebarSpeeds: (speed) => `${speed}×`,
   timebarMarks: 'Was die Zeichen bedeuten',
   timebarMark: {
     scans: 'Balken nach oben: Messungen',
@@ -66,5 +65,4 @@ export const PAST: In<typeof ENGLISH> = {
     ].join(', '),
   timebarOff: 'Keine Vergangenheit: Dieser Zwilling zeichnet nichts auf.',
   timebarOffHint: 'Die Aufzeichnung wird beim Start des Zwillings eingeschaltet.',
-  timebarFailed: (reason) => `Die Aufzeichnung konnte nicht gelesen werden: ${reason}`,
 };

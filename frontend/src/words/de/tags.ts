@@ -7,7 +7,7 @@ export const TAGS: In<typeof ENGLISH> = {
   tags: 'Messpunkte',
   tableCaption: 'Alle Messpunkte mit ihren neuesten Messwerten',
   filter: 'Messpunkte filtern',
-  filterHint: 'Messpunkt, Art, Schädling …',
+  filterHint: 'Nr., Art, Schädling …',
   filterClear: 'Filter löschen',
   shownOf: (shown, all) =>
     shown === all
@@ -28,11 +28,11 @@ export const TAGS: In<typeof ENGLISH> = {
   farOff: 'Zu weit entfernt, nicht auf der Karte',
   farOffLong: (place) =>
     `Die Position (${place}) ist weit von allen anderen Messpunkten entfernt; der Messpunkt fehlt auf der Karte.`,
-  ageUnknown: 'nicht bekannt',
+  ageUnknown: 'unbekannt',
   ageUnknownLong: 'Das Alter ist unbekannt, bis der Zwilling wieder eine Zeit meldet.',
   neverObserved: 'nie',
   neverObservedLong: 'Noch keine Messung hat einen Wert geliefert.',
-  notKnownThen: 'nicht bekannt',
+  notKnownThen: 'unbekannt',
   notKnownThenLong: 'Das ist nicht mehr gespeichert oder war noch nicht aufgezeichnet.',
   ageUntoldLong: 'Dieser Zwilling meldet nicht, von wann seine Messwerte sind.',
   tried: {
@@ -70,9 +70,9 @@ export const TAGS: In<typeof ENGLISH> = {
   trend: 'Tendenz',
   trendTitle: (sensor) => `${sensor}: Änderung gegenüber vor einer Stunde`,
   trendNone: 'vor einer Stunde kein Messwert',
-  trendSame: 'kein neuer Wert',
+  trendSame: 'nicht neu',
   trendLevel: 'gleich',
-  trendUnknown: 'vor einer Stunde: nicht bekannt',
+  trendUnknown: 'vor einer Stunde: unbekannt',
   density: 'Zeilen',
   densities: { usual: 'Normal', compact: 'Dicht' },
 

@@ -67,7 +67,7 @@ export const ALARMS = {
   alarmsNewHint: 'The order stays fixed while you use the list. Show new alarms',
   alarmMore: (count: number): string => `Show ${count} more`,
   alarmFilter: 'Filter alarms',
-  alarmFilterHint: 'tag, cause …',
+  alarmFilterHint: 'Filter …',
   alarmOrder: 'Order',
   alarmOrders: { cause: 'By cause', newest: 'Newest first', tag: 'By tag' },
   alarmSaveCsv: 'Save alarms as CSV',
@@ -110,5 +110,4 @@ export const ALARMS = {
     `Resolved: ${alarms.join('; ')}${more > 0 ? ` and ${more} more` : ''}`,
   alarmsMeanwhile: (alarm: string, more: number): string =>
     `New alarm: ${alarm}${more > 0 ? ` and ${counted(more, 'more alarm', 'more alarms')}` : ''}`,
-  alarmsTitle: (count: number, title: string): string => `(${count}) ${title}`,
 } as const;

@@ -18,9 +18,9 @@ export const CHARTS = {
     `${counted(count, 'reading', 'readings')}, the latest ${latest} at ${at}, ` +
     `between ${low} and ${high}, ${gaps === 0 ? 'no gap' : counted(gaps, 'gap', 'gaps')}.`,
   chartEmpty: 'No reading in this period.',
-  chartNothing: '–',
   chartLoading: 'Loading the past',
-  chartFailed: (reason: string): string => `The past could not be loaded: ${reason}`,
+  chartFailed: (reason: string): string =>
+    `The past could not be loaded; the page keeps trying. ${reason}`,
   chartMissing: 'This twin records nothing.',
   chartMissingHint: 'Charts need a recording. Until then, the card shows only the last scans.',
   chartMissingMore:
@@ -33,8 +33,6 @@ export const CHARTS = {
   chartPlots: 'Show as charts',
   chartDayBefore: 'Day before',
   chartBeforeWas: (value: string): string => `day before ${value}`,
-  chartZoomIn: 'Zoom in',
-  chartZoomOut: 'Zoom out',
   chartWhole: 'Whole period',
   chartCsvShown: 'CSV of what is shown',
   chartCsvAll: 'CSV of all readings',
@@ -42,8 +40,6 @@ export const CHARTS = {
   chartRemoveTag: (tag: string): string => `Remove tag ${tag} from the chart`,
   chartWhich: 'Table of',
   chartHint: 'Drag to zoom; click to go to that time.',
-  chartTableCaption: (label: string, sensor: string, span: string): string =>
-    `${label}, ${sensor}, ${span}`,
   chartColumns: {
     time: 'Time',
     until: 'Until',

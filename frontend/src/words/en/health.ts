@@ -90,7 +90,6 @@ export const HEALTH = {
     alarms === 1
       ? '1 alarm is still active: two good scans resolve it'
       : `${alarms} alarms are still active: two good scans resolve each`,
-  healthSince: (when: string): string => `alarm since ${when}`,
   healthAcknowledged: 'acknowledged',
   healthMoreCritical: (count: number): string => `+ ${count} more critical`,
   /** In place of a verdict, where nobody knows how it is now. */

@@ -31,7 +31,7 @@ export const MAP = {
   legend: 'Legend',
   legendWaiting: 'Loading names, units and ranges',
   legendFailed: (reason: string): string =>
-    `Names, units and ranges could not be loaded: ${reason}`,
+    `Names, units and ranges could not be loaded; the page keeps trying. ${reason}`,
   legendTags: (count: number): string => counted(count, 'tag contributes', 'tags contribute'),
   legendFetching: 'Loading the heat map',
   legendNoTags: 'No tag contributes',
@@ -69,7 +69,8 @@ export const MAP = {
   rangeNotBelow: (high: string): string => `Must be below ${high}: not applied`,
   rangeNotAbove: (low: string): string => `Must be above ${low}: not applied`,
   rangeNoNumber: 'Not a number: not applied',
-  fieldFailed: (reason: string): string => `The heat map could not be loaded: ${reason}`,
+  fieldFailed: (reason: string): string =>
+    `The heat map could not be loaded; the page keeps trying. ${reason}`,
 
   compare: 'Compare with',
   compareWith: {

@@ -59,6 +59,8 @@ export const PAGE = {
     shutting_down: '',
   },
 
+  /** In place of what the server says, where it may answer soon. */
+  serverBusy: 'The server cannot answer just now.',
   unread: (count: number): string =>
     count === 1
       ? 'A message from the server could not be read and was dropped.'
@@ -69,7 +71,6 @@ export const PAGE = {
   inputProblem: 'Not all data arrives here.',
   drops: (count: number): string =>
     `The twin dropped ${counted(count, 'message', 'messages')} in the last minutes.`,
-  dropsLast: (message: string): string => `The last: ${message}`,
   /** What to tell of a journal that does not keep what happens, and what to do. */
   journal: {
     off: {
@@ -121,8 +122,7 @@ export const PAGE = {
   recordedPaused: 'The recording is paused.',
   recordedPausedHint: 'It is paused or has ended, so ages do not increase.',
   simulated: 'Simulated.',
-  simulatedHint: (until: string): string =>
-    `Not measured by a robot: the demo starts with simulated days, up to ${until}.`,
+  simulatedHint: (until: string): string => `Demo days until ${until}, not measured.`,
   setAside: 'A damaged recording was quarantined.',
   setAsideHint: (name: string): string =>
     `Readable data was kept, and recording continues. The damaged file is ${name}.`,
@@ -171,7 +171,6 @@ export const PAGE = {
   emptyNoMap: 'No floor plan yet: the robot has not sent its map.',
   emptyNoMapMore: 'The floor plan is the robot’s SLAM map, which comes on /map.',
 
-  helpTitle: 'Keyboard shortcuts',
   helpGlobal: 'Anywhere',
   helpMap: 'With the map in focus',
   helpTime: 'With the time bar in focus',
@@ -210,7 +209,5 @@ export const PAGE = {
   paper: (taken: string, printed: string): string => `As of ${taken}, printed ${printed}`,
   paperRest: (printed: number, all: number): string =>
     `The first ${printed} of ${all} tags are printed. The CSV file has all of them.`,
-  paperRange: (sensor: string, range: string): string => `${sensor} ${range}`,
-  fileName: (kind: string, stamp: string): string => `lupin-twin-${kind}-${stamp}`,
   asOf: (moment: string): string => `as of ${moment}`,
 } as const;

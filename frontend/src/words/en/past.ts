@@ -45,7 +45,6 @@ export const PAST = {
   timebarPlay: 'Play',
   timebarPause: 'Pause',
   timebarSpeed: 'Playback speed',
-  timebarSpeeds: (speed: number): string => `${speed}×`,
   timebarMarks: 'What the marks mean',
   timebarMark: {
     scans: 'upward bar: scans',
@@ -65,5 +64,4 @@ export const PAST = {
     ].join(', '),
   timebarOff: 'No past: this twin records nothing.',
   timebarOffHint: 'Recording is turned on when the twin is started.',
-  timebarFailed: (reason: string): string => `The recorded past could not be loaded: ${reason}`,
 } as const;

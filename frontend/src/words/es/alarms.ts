@@ -62,7 +62,7 @@ export const ALARMS: In<typeof ENGLISH> = {
   alarmsNewHint: 'El orden no cambia mientras usa la lista. Mostrar las alarmas nuevas',
   alarmMore: (count) => `Mostrar ${count} más`,
   alarmFilter: 'Filtrar alarmas',
-  alarmFilterHint: 'punto, causa …',
+  alarmFilterHint: 'Filtrar …',
   alarmOrder: 'Orden',
   alarmOrders: { cause: 'Por causa', newest: 'Las más recientes', tag: 'Por punto' },
   alarmSaveCsv: 'Guardar alarmas como CSV',
@@ -102,5 +102,4 @@ export const ALARMS: In<typeof ENGLISH> = {
     `Resueltas: ${alarms.join('; ')}${more > 0 ? ` y ${more} más` : ''}`,
   alarmsMeanwhile: (alarm, more) =>
     `Alarma nueva: ${alarm}${more > 0 ? ` y ${counted(more, 'alarma más', 'alarmas más')}` : ''}`,
-  alarmsTitle: (count, title) => `(${count}) ${title}`,
 };

@@ -13,9 +13,8 @@ export const CHARTS: In<typeof ENGLISH> = {
     `${counted(count, 'lectura', 'lecturas')}, la última ${latest} a las ${at}, ` +
     `entre ${low} y ${high}, ${gaps === 0 ? 'sin huecos' : counted(gaps, 'hueco', 'huecos')}.`,
   chartEmpty: 'No hay lecturas en este periodo.',
-  chartNothing: '–',
   chartLoading: 'Cargando el pasado',
-  chartFailed: (reason) => `No se pudo cargar el pasado: ${reason}`,
+  chartFailed: (reason) => `No se pudo cargar el pasado; la página lo sigue intentando. ${reason}`,
   chartMissing: 'Este gemelo no registra nada.',
   chartMissingHint:
     'Las gráficas necesitan un registro. Hasta entonces la ficha muestra solo las últimas mediciones.',
@@ -29,8 +28,6 @@ export const CHARTS: In<typeof ENGLISH> = {
   chartPlots: 'Mostrar como gráfica',
   chartDayBefore: 'Día anterior',
   chartBeforeWas: (value) => `día anterior ${value}`,
-  chartZoomIn: 'Acercar',
-  chartZoomOut: 'Alejar',
   chartWhole: 'Todo el periodo',
   chartCsvShown: 'CSV de la vista',
   chartCsvAll: 'CSV de todas las lecturas',
@@ -38,7 +35,6 @@ export const CHARTS: In<typeof ENGLISH> = {
   chartRemoveTag: (tag) => `Quitar el punto ${tag} de la gráfica`,
   chartWhich: 'Tabla de',
   chartHint: 'Arrastre para acercar; haga clic para ir a ese momento.',
-  chartTableCaption: (label, sensor, span) => `${label}, ${sensor}, ${span}`,
   chartColumns: {
     time: 'Hora',
     until: 'Hasta',

@@ -50,19 +50,19 @@ export const HEALTH: In<typeof ENGLISH> = {
   },
   todo: {
     sensors: {
-      temperature: { below: 'Calefactar o cerrar la ventilación', above: 'Ventilar o sombrear' },
+      temperature: { below: 'Calentar o cerrar ventanas', above: 'Ventilar o sombrear' },
       humidity: { below: 'Humidificar', above: 'Ventilar y calentar' },
       co2: {
         below: 'Dosificar CO₂ o ventilar',
         above: 'Ventilar y revisar la dosificación de CO₂',
       },
-      light: { below: 'Encender la iluminación artificial', above: 'Sombrear' },
+      light: { below: 'Encender las lámparas', above: 'Sombrear' },
       soil_moisture: { below: 'Regar', above: 'Regar menos y revisar el drenaje' },
       vpd: { below: 'Ventilar y calentar', above: 'Humidificar o sombrear' },
     },
     range: 'Revisar el control del clima',
     reading_failed: 'Revisar el sensor',
-    scan_failed: 'Revisar el acceso y el punto de medida',
+    scan_failed: 'Revisar el acceso y el punto',
     pest: 'Inspeccionar y tratar las plantas',
     old: 'Revisar la ruta del robot',
     changed: 'Comparar con otro medidor',
@@ -91,15 +91,14 @@ export const HEALTH: In<typeof ENGLISH> = {
     alarms === 1
       ? 'Aún hay 1 alarma activa: dos mediciones buenas la resuelven'
       : `Aún hay ${alarms} alarmas activas: dos mediciones buenas resuelven cada una`,
-  healthSince: (when) => `alarma desde ${when}`,
   healthAcknowledged: 'reconocida',
-  healthMoreCritical: (count) => `+ ${count} más en estado crítico`,
+  healthMoreCritical: (count) => `+ ${count} en estado crítico`,
   healthNotCurrent: 'No actualizado',
   healthNothing: 'Aún no hay lecturas que evaluar',
   healthFilter: ', mostrar solo estos puntos',
-  houseRhythm: (interval) => `una lectura cada ${interval}`,
-  houseLast: (age) => `última lectura hace ${age}`,
-  houseNever: 'aún sin lecturas',
+  houseRhythm: (interval) => `una medición cada ${interval}`,
+  houseLast: (age) => `última medición hace ${age}`,
+  houseNever: 'aún sin mediciones',
   houseOverdue: (count) =>
     count === 0
       ? 'ningún punto con retraso'

@@ -32,7 +32,8 @@ export const MAP: In<typeof ENGLISH> = {
 
   legend: 'Leyenda',
   legendWaiting: 'Cargando nombres, unidades y rangos',
-  legendFailed: (reason) => `No se pudieron cargar nombres, unidades y rangos: ${reason}`,
+  legendFailed: (reason) =>
+    `No se pudieron cargar nombres, unidades y rangos; la página lo sigue intentando. ${reason}`,
   legendTags: (count) => counted(count, 'punto contribuye', 'puntos contribuyen'),
   legendFetching: 'Cargando el mapa de calor',
   legendNoTags: 'Ningún punto contribuye',
@@ -70,7 +71,8 @@ export const MAP: In<typeof ENGLISH> = {
   rangeNotBelow: (high) => `Debe ser inferior a ${high}: no se aplica`,
   rangeNotAbove: (low) => `Debe ser superior a ${low}: no se aplica`,
   rangeNoNumber: 'No es un número: no se aplica',
-  fieldFailed: (reason) => `No se pudo cargar el mapa de calor: ${reason}`,
+  fieldFailed: (reason) =>
+    `No se pudo cargar el mapa de calor; la página lo sigue intentando. ${reason}`,
 
   compare: 'Comparar con',
   compareWith: {

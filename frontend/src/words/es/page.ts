@@ -59,6 +59,7 @@ export const PAGE: In<typeof ENGLISH> = {
     shutting_down: '',
   },
 
+  serverBusy: 'El servidor no puede responder ahora.',
   unread: (count) =>
     count === 1
       ? 'Un mensaje del servidor no se pudo leer y se descartó.'
@@ -69,7 +70,6 @@ export const PAGE: In<typeof ENGLISH> = {
   inputProblem: 'No llegan todos los datos.',
   drops: (count) =>
     `El gemelo ha descartado ${counted(count, 'mensaje', 'mensajes')} en los últimos minutos.`,
-  dropsLast: (message) => `El último: ${message}`,
   journal: {
     off: {
       title: 'No se guarda ningún registro.',
@@ -119,8 +119,7 @@ export const PAGE: In<typeof ENGLISH> = {
   recordedPaused: 'La grabación está en pausa.',
   recordedPausedHint: 'Está en pausa o ha terminado; la antigüedad no aumenta.',
   simulated: 'Simulado.',
-  simulatedHint: (until) =>
-    `No lo ha medido un robot: la demostración empieza con días simulados, hasta ${until}.`,
+  simulatedHint: (until) => `Días de demostración hasta ${until}, no medidos.`,
   setAside: 'Se ha puesto en cuarentena un registro dañado.',
   setAsideHint: (name) =>
     `Se han conservado los datos legibles y el registro continúa. El archivo dañado es ${name}.`,
@@ -171,7 +170,6 @@ export const PAGE: In<typeof ENGLISH> = {
   emptyNoMap: 'Aún no hay plano: el robot no ha enviado su mapa.',
   emptyNoMapMore: 'El plano es el mapa SLAM del robot, que llega por /map.',
 
-  helpTitle: 'Atajos de teclado',
   helpGlobal: 'En cualquier parte',
   helpMap: 'En el mapa',
   helpTime: 'En la barra de tiempo',
@@ -210,7 +208,5 @@ export const PAGE: In<typeof ENGLISH> = {
   paper: (taken, printed) => `Estado a ${taken}, impreso ${printed}`,
   paperRest: (printed, all) =>
     `Se imprimen los primeros ${printed} de ${all} puntos. La tabla en CSV los contiene todos.`,
-  paperRange: (sensor, range) => `${sensor} ${range}`,
-  fileName: (kind, stamp) => `lupin-twin-${kind}-${stamp}`,
   asOf: (moment) => `estado a ${moment}`,
 };

@@ -46,7 +46,6 @@ export const PAST: In<typeof ENGLISH> = {
   timebarPlay: 'Reproducir',
   timebarPause: 'Pausar',
   timebarSpeed: 'Velocidad',
-  timebarSpeeds: (speed) => `${speed}×`,
   timebarMarks: 'Qué significan las marcas',
   timebarMark: {
     scans: 'barra hacia arriba: mediciones',
@@ -66,5 +65,4 @@ export const PAST: In<typeof ENGLISH> = {
     ].join(', '),
   timebarOff: 'Sin pasado: este gemelo no registra nada.',
   timebarOffHint: 'El registro se activa al iniciar el gemelo.',
-  timebarFailed: (reason) => `No se pudo cargar el registro: ${reason}`,
 };

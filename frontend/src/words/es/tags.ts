@@ -7,7 +7,7 @@ export const TAGS: In<typeof ENGLISH> = {
   tags: 'Puntos',
   tableCaption: 'Todos los puntos de medida con sus últimas lecturas',
   filter: 'Filtrar los puntos',
-  filterHint: 'punto, especie, plaga …',
+  filterHint: 'n.º, especie, plaga …',
   filterClear: 'Borrar el filtro',
   shownOf: (shown, all) =>
     shown === all
@@ -70,7 +70,7 @@ export const TAGS: In<typeof ENGLISH> = {
   trend: 'Tendencia',
   trendTitle: (sensor) => `${sensor} frente a hace una hora`,
   trendNone: 'sin lectura hace una hora',
-  trendSame: 'sin lectura nueva',
+  trendSame: 'no nueva',
   trendLevel: 'estable',
   trendUnknown: 'hace una hora: desconocido',
   density: 'Filas',
@@ -87,7 +87,7 @@ export const TAGS: In<typeof ENGLISH> = {
   cardBlooms: 'Flores',
   cardSource: 'Origen',
   cardFixed: 'Sensor fijo',
-  cardVisited: 'Visitada por el robot',
+  cardVisited: 'Visita del robot',
   cardScanned: 'Última lectura',
   cardLooked: 'Flores revisadas',
   cardTry: 'Último intento',

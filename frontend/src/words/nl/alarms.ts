@@ -61,7 +61,7 @@ export const ALARMS: In<typeof ENGLISH> = {
   alarmsNewHint: 'De volgorde blijft zolang u de lijst gebruikt. Nieuwe alarmen tonen',
   alarmMore: (count) => `Nog ${count} tonen`,
   alarmFilter: 'Alarmen filteren',
-  alarmFilterHint: 'meetpunt, oorzaak …',
+  alarmFilterHint: 'Filteren …',
   alarmOrder: 'Volgorde',
   alarmOrders: { cause: 'Per oorzaak', newest: 'Nieuwste eerst', tag: 'Per meetpunt' },
   alarmSaveCsv: 'Alarmen opslaan als CSV',
@@ -100,5 +100,4 @@ export const ALARMS: In<typeof ENGLISH> = {
     `Opgelost: ${alarms.join('; ')}${more > 0 ? ` en nog ${more}` : ''}`,
   alarmsMeanwhile: (alarm, more) =>
     `Nieuw alarm: ${alarm}${more > 0 ? ` en nog ${counted(more, 'alarm', 'alarmen')}` : ''}`,
-  alarmsTitle: (count, title) => `(${count}) ${title}`,
 };

@@ -13,9 +13,9 @@ export const CHARTS: In<typeof ENGLISH> = {
     `${counted(count, 'meetwaarde', 'meetwaarden')}, de laatste ${latest} om ${at}, ` +
     `tussen ${low} en ${high}, ${gaps === 0 ? 'geen gat' : counted(gaps, 'gat', 'gaten')}.`,
   chartEmpty: 'Geen meetwaarde in deze periode.',
-  chartNothing: '–',
   chartLoading: 'Het verleden wordt geladen',
-  chartFailed: (reason) => `Het verleden kon niet worden geladen: ${reason}`,
+  chartFailed: (reason) =>
+    `Het verleden kon niet worden geladen; de pagina blijft het proberen. ${reason}`,
   chartMissing: 'Deze tweeling legt niets vast.',
   chartMissingHint:
     'Grafieken hebben vastgelegde gegevens nodig. Tot die er zijn, staan hier alleen de laatste metingen.',
@@ -29,8 +29,6 @@ export const CHARTS: In<typeof ENGLISH> = {
   chartPlots: 'Als grafiek tonen',
   chartDayBefore: 'Dag ervoor',
   chartBeforeWas: (value) => `dag ervoor ${value}`,
-  chartZoomIn: 'Inzoomen',
-  chartZoomOut: 'Uitzoomen',
   chartWhole: 'Hele periode',
   chartCsvShown: 'CSV van de weergave',
   chartCsvAll: 'CSV van alle meetwaarden',
@@ -38,7 +36,6 @@ export const CHARTS: In<typeof ENGLISH> = {
   chartRemoveTag: (tag) => `Meetpunt ${tag} uit de grafiek halen`,
   chartWhich: 'Tabel van',
   chartHint: 'Sleep om in te zoomen; klik om naar dat moment te gaan.',
-  chartTableCaption: (label, sensor, span) => `${label}, ${sensor}, ${span}`,
   chartColumns: {
     time: 'Tijd',
     until: 'Tot',

@@ -62,10 +62,10 @@ export const HEALTH: In<typeof ENGLISH> = {
     old: 'Controleer de route van de robot',
     changed: 'Vergelijk met een tweede meter',
     silent: 'Controleer tweeling, server en netwerk',
-    stopped: 'Kijk naar de robot',
+    stopped: 'Ga bij de robot kijken',
     other: 'Ga daar kijken',
   },
-  todoPestAgain: 'Controleer nogmaals: weer niets gezien is opgelost',
+  todoPestAgain: 'Controleer nogmaals: zonder plaag is het alarm opgelost',
   todoLabel: 'Nu doen',
   reasonsLabel: 'Waarom',
   healthHeading: 'Toestand van de kas',
@@ -87,7 +87,6 @@ export const HEALTH: In<typeof ENGLISH> = {
     alarms === 1
       ? '1 alarm is nog actief: twee goede metingen lossen het op'
       : `${alarms} alarmen zijn nog actief: telkens twee goede metingen lossen ze op`,
-  healthSince: (when) => `alarm sinds ${when}`,
   healthAcknowledged: 'bevestigd',
   healthMoreCritical: (count) => `+ nog ${count} kritiek`,
   healthNotCurrent: 'Niet actueel',

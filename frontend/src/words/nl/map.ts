@@ -28,12 +28,13 @@ export const MAP: In<typeof ENGLISH> = {
     advice: 'Waar nog een meetpunt helpt',
   },
   scaleBar: (length) => `Schaal: ${length}`,
-  notKnown: 'niet bekend',
+  notKnown: 'onbekend',
   position: (x, y) => `x ${x} m, y ${y} m`,
 
   legend: 'Legenda',
   legendWaiting: 'Namen, eenheden en bereiken worden geladen',
-  legendFailed: (reason) => `Namen, eenheden en bereiken konden niet worden geladen: ${reason}`,
+  legendFailed: (reason) =>
+    `Namen, eenheden en bereiken konden niet worden geladen; de pagina blijft het proberen. ${reason}`,
   legendTags: (count) => counted(count, 'meetpunt draagt bij', 'meetpunten dragen bij'),
   legendFetching: 'De heatmap wordt geladen',
   legendNoTags: 'Geen meetpunt draagt bij',
@@ -72,7 +73,8 @@ export const MAP: In<typeof ENGLISH> = {
   rangeNotBelow: (high) => `Moet onder ${high} liggen: niet toegepast`,
   rangeNotAbove: (low) => `Moet boven ${low} liggen: niet toegepast`,
   rangeNoNumber: 'Geen getal: niet toegepast',
-  fieldFailed: (reason) => `De heatmap kon niet worden geladen: ${reason}`,
+  fieldFailed: (reason) =>
+    `De heatmap kon niet worden geladen; de pagina blijft het proberen. ${reason}`,
 
   compare: 'Vergelijken met',
   compareWith: {
@@ -94,8 +96,8 @@ export const MAP: In<typeof ENGLISH> = {
 
   robotLayer: 'Robot',
   robotAt: (x, y) => `Robot: ${x} m, ${y} m`,
-  robotNowhere: 'Robot: plaats niet bekend',
-  robotAgeUnknown: 'ouderdom niet bekend',
+  robotNowhere: 'Robot: positie onbekend',
+  robotAgeUnknown: 'ouderdom onbekend',
   robotBattery: (percent) => `accu ${percent}`,
   robotReported: (percent, ago) => `accu ${percent}, ${ago} gemeld`,
 };

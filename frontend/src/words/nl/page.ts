@@ -10,10 +10,8 @@ export const PAGE: In<typeof ENGLISH> = {
   more: 'Meer hierover',
 
   language: 'Taal',
-  languageUnknown: (asked) =>
-    `Deze pagina is er niet in “${asked}”. Ze wordt in het Engels getoond.`,
-  languageMissing: (name) =>
-    `${name} kon niet worden geladen: de pagina wordt in het Engels getoond.`,
+  languageUnknown: (asked) => `Deze pagina is er niet in “${asked}”. U ziet de Engelse versie.`,
+  languageMissing: (name) => `${name} kon niet worden geladen: u ziet de Engelse versie.`,
   partsLate: 'Een deel van de pagina is niet geladen.',
   partsLateHint:
     'Details, lijsten en de tijdbalk verschijnen zodra de server antwoordt. De pagina blijft het proberen.',
@@ -64,6 +62,7 @@ export const PAGE: In<typeof ENGLISH> = {
     shutting_down: '',
   },
 
+  serverBusy: 'De server kan nu even niet antwoorden.',
   unread: (count) =>
     count === 1
       ? 'Een bericht van de server was onleesbaar en is genegeerd.'
@@ -74,7 +73,6 @@ export const PAGE: In<typeof ENGLISH> = {
   inputProblem: 'Niet alle gegevens komen hier aan.',
   drops: (count) =>
     `De tweeling heeft de afgelopen minuten ${counted(count, 'bericht', 'berichten')} genegeerd.`,
-  dropsLast: (message) => `Het laatste: ${message}`,
   journal: {
     off: {
       title: 'Er wordt niets vastgelegd.',
@@ -122,16 +120,15 @@ export const PAGE: In<typeof ENGLISH> = {
   },
   recordedIs: { playing: 'Speelt af', paused: 'Gepauzeerd' },
   recordedPaused: 'De opname is gepauzeerd.',
-  recordedPausedHint: 'Ze is gepauzeerd of afgelopen; de ouderdom loopt niet op.',
+  recordedPausedHint: 'Gepauzeerd of afgelopen; de ouderdom loopt niet op.',
   simulated: 'Gesimuleerd.',
-  simulatedHint: (until) =>
-    `Niet door een robot gemeten: de demo begint met gesimuleerde dagen, tot ${until}.`,
+  simulatedHint: (until) => `Demodagen tot ${until}, niet gemeten.`,
   setAside: 'Een beschadigde opname is in quarantaine gezet.',
   setAsideHint: (name) =>
     `Leesbare gegevens zijn bewaard en het vastleggen gaat door. Het beschadigde bestand is ${name}.`,
   failedTitle: 'Deze pagina is vastgelopen',
-  failedHint: 'Vertrouw niet op wat ze toont. De tweeling en de server hebben er geen last van.',
-  failedAgain: 'Ze wordt vanzelf opnieuw geladen.',
+  failedHint: 'Vertrouw niet op wat u hier ziet. De tweeling en de server hebben er geen last van.',
+  failedAgain: 'De pagina laadt vanzelf opnieuw.',
   reload: 'Opnieuw laden',
 
   menu: 'Menu',
@@ -176,7 +173,6 @@ export const PAGE: In<typeof ENGLISH> = {
   emptyNoMap: 'Nog geen plattegrond: de robot heeft zijn kaart niet gestuurd.',
   emptyNoMapMore: 'De plattegrond is de SLAM-kaart van de robot, die op /map komt.',
 
-  helpTitle: 'Sneltoetsen',
   helpGlobal: 'Overal',
   helpMap: 'Op de kaart',
   helpTime: 'Op de tijdbalk',
@@ -215,7 +211,5 @@ export const PAGE: In<typeof ENGLISH> = {
   paper: (taken, printed) => `Stand van ${taken}, afgedrukt ${printed}`,
   paperRest: (printed, all) =>
     `Afgedrukt zijn de eerste ${printed} van ${all} meetpunten. De tabel als CSV bevat ze allemaal.`,
-  paperRange: (sensor, range) => `${sensor} ${range}`,
-  fileName: (kind, stamp) => `lupin-twin-${kind}-${stamp}`,
   asOf: (moment) => `stand van ${moment}`,
 };

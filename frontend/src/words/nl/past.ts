@@ -46,7 +46,6 @@ export const PAST: In<typeof ENGLISH> = {
   timebarPlay: 'Afspelen',
   timebarPause: 'Pauzeren',
   timebarSpeed: 'Afspeelsnelheid',
-  timebarSpeeds: (speed) => `${speed}×`,
   timebarMarks: 'Wat de tekens betekenen',
   timebarMark: {
     scans: 'balk omhoog: metingen',
@@ -66,5 +65,4 @@ export const PAST: In<typeof ENGLISH> = {
     ].join(', '),
   timebarOff: 'Geen verleden: deze tweeling legt niets vast.',
   timebarOffHint: 'Vastleggen wordt aangezet bij het starten van de tweeling.',
-  timebarFailed: (reason) => `De vastgelegde gegevens konden niet worden geladen: ${reason}`,
 };

@@ -7,7 +7,7 @@ export const TAGS: In<typeof ENGLISH> = {
   tags: 'Meetpunten',
   tableCaption: 'Alle meetpunten met hun nieuwste meetwaarden',
   filter: 'Meetpunten filteren',
-  filterHint: 'meetpunt, soort, plaag …',
+  filterHint: 'nr., soort, plaag …',
   filterClear: 'Filter wissen',
   shownOf: (shown, all) =>
     shown === all
@@ -28,11 +28,11 @@ export const TAGS: In<typeof ENGLISH> = {
   farOff: 'Te ver weg, niet op de kaart',
   farOffLong: (place) =>
     `De positie (${place}) ligt ver van alle andere meetpunten; het meetpunt staat niet op de kaart.`,
-  ageUnknown: 'niet bekend',
+  ageUnknown: 'onbekend',
   ageUnknownLong: 'De ouderdom is onbekend tot de tweeling weer zijn tijd meldt.',
   neverObserved: 'nooit',
   neverObservedLong: 'Nog geen meting heeft een waarde opgeleverd.',
-  notKnownThen: 'niet bekend',
+  notKnownThen: 'onbekend',
   notKnownThenLong: 'Dit wordt niet meer bewaard of was nog niet vastgelegd.',
   ageUntoldLong: 'Deze tweeling meldt niet van wanneer zijn meetwaarden zijn.',
   tried: {
@@ -70,9 +70,9 @@ export const TAGS: In<typeof ENGLISH> = {
   trend: 'Trend',
   trendTitle: (sensor) => `${sensor} vergeleken met een uur geleden`,
   trendNone: 'een uur geleden geen meting',
-  trendSame: 'geen nieuwe meting',
+  trendSame: 'niet nieuw',
   trendLevel: 'gelijk',
-  trendUnknown: 'een uur geleden: niet bekend',
+  trendUnknown: 'een uur geleden: onbekend',
   density: 'Rijen',
   densities: { usual: 'Normaal', compact: 'Dicht' },
 

@@ -314,7 +314,11 @@ class WebNode(AdjustableNode):
         for tag in tags:
             kept = self._digests.get(tag.tag_id)
             if kept is None or kept[0] is not tag:
-                readings = [(reading.name, reading.value) for reading in tag.readings]
+                # Which are of one scan, for that is what can be derived of.
+                times = [reading.observed_at_ns for reading in tag.readings]
+                readings = [
+                    (it.name, it.value, times.index(it.observed_at_ns)) for it in tag.readings
+                ]
                 text = repr((tag.tag_id, tag.pose, readings))
                 digest = blake2b(text.encode("utf-8", "surrogatepass"), digest_size=12).digest()
                 kept = (tag, digest)

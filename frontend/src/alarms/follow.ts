@@ -10,9 +10,11 @@ import type { ViewState } from '../store/view';
 
 /** Of the bar, what lies before the moment: how it came to it is to be seen as well. */
 const LEAD = 0.1;
-const DAY_S = 86_400;
 
-/** The period that has the moment and something before it: the present one, else the shortest. */
+/**
+ * The period that has the moment and something before it: the present one, else the last hour, else
+ * one that just reaches from there to now.
+ */
 export function periodWith(
   period: Period,
   at: number,
@@ -23,9 +25,8 @@ export function periodWith(
     const { from, to } = spanOf(each, nowS, oldest);
     return at <= to && at - from >= (to - from) * LEAD;
   };
-  const kinds = ['hour', 'day', 'week', 'month'] as const;
-  const fitting = [period, ...kinds.map((kind): Period => ({ kind }))].find(has);
-  return fitting ?? { kind: 'own', from: Math.max(0, at - DAY_S / 2), to: at + DAY_S / 2 };
+  const from = Math.max(0, at - ((nowS - at) * LEAD) / (1 - LEAD));
+  return [period, { kind: 'hour' } as const].find(has) ?? { kind: 'own', from, to: nowS };
 }
 
 /** Shows the tag as it is now. */

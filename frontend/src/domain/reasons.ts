@@ -27,7 +27,7 @@ export function reasonText(
   const label = name === '' ? '' : shown(sensor.label, LONGEST_NAME);
   const R = S.reasons;
   if (isOfRange(reason)) {
-    const more = digitsApart(sensor, [reason.value], reason.limit, unit);
+    const more = digitsOf(sensor, reason, unit);
     return R.range(
       `${label} ${readingText(sensor, reason.value, unit, more)}`,
       sideText(sensor, reason),
@@ -65,6 +65,13 @@ export function reasonText(
       return R.other(shown((kind as string).replaceAll('_', ' '), LONGEST_NAME), label);
   }
 }
+
+/** How many digits more a value that is out of its range has, wherever it stands. */
+export const digitsOf = (
+  sensor: Sensor,
+  { value, limit }: { readonly value: number; readonly limit: number },
+  unit: TemperatureUnit,
+): number => digitsApart(sensor, [value], limit, unit);
 
 /** On which side of a limit that the file sets; of another one, the value has to pass it first. */
 const sideText = (

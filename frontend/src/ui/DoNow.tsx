@@ -50,7 +50,7 @@ export function useUrgent(): readonly Row[] {
 }
 
 /** That of a reason. */
-const alarmOf = (
+export const alarmOf = (
   items: readonly Item[],
   tagId: string,
   reason: HealthReason | undefined,

@@ -3,7 +3,7 @@ import { useEffect, useRef, type JSX } from 'react';
 import type { When } from '../domain/age';
 import { farOffText, metresText, percentText, readingText, valueText } from '../domain/format';
 import { rangeReason, sideOf } from '../domain/health';
-import { tryKind } from '../domain/reasons';
+import { digitsOf, tryKind } from '../domain/reasons';
 import { rangesFor } from '../domain/sensors';
 import { speciesText } from '../domain/species';
 import { shown } from '../domain/text';
@@ -219,6 +219,7 @@ function CardReading({
   const sensor = useApp((state) => selectCatalogue(state).named(name));
   const { ideal } = rangesFor(sensor, species);
   const reason = rangeReason(health, name);
+  const more = reason ? digitsOf(sensor, reason, unit) : 0;
   const isOut = ideal && value !== null && (value < ideal[0] || value > ideal[1]);
   // What is back within its range, and not far enough, is stressed, and not "below ideal".
   const side = isOut && reason && sideOf(reason);
@@ -227,7 +228,7 @@ function CardReading({
     <li data-sensor={name} data-age={step}>
       <span className="card-label">{shown(sensor.label, 32)}</span>
       <strong className="card-value">
-        {value === null ? S.sensorFailed : readingText(sensor, value, unit)}
+        {value === null ? S.sensorFailed : readingText(sensor, value, unit, more)}
       </strong>
       <span className="card-age faint">
         <Age when={when} />
@@ -245,8 +246,8 @@ function CardReading({
           )}
           {S.healthIdeal(
             S.idealParts[sensor.part ?? 'any'],
-            valueText(sensor, ideal[0], unit),
-            valueText(sensor, ideal[1], unit),
+            valueText(sensor, ideal[0], unit, more),
+            valueText(sensor, ideal[1], unit, more),
             unitOf(sensor, unit),
           )}
         </span>

@@ -4,7 +4,7 @@ import type { When } from '../domain/age';
 import { farOffText, percentText, shortAgeText, valueText } from '../domain/format';
 import type { TagHealth } from '../contract/types';
 import { rangeReason, sideOf, worstReason } from '../domain/health';
-import { reasonsText, reasonText } from '../domain/reasons';
+import { digitsOf, reasonsText, reasonText } from '../domain/reasons';
 import type { Catalogue, Sensor } from '../domain/sensors';
 import { speciesText } from '../domain/species';
 import { shown } from '../domain/text';
@@ -228,7 +228,7 @@ function Reading({
           <span className="unseen">{S[side]} </span>
         </span>
       )}
-      {valueText(sensor, value, unit)}
+      {valueText(sensor, value, unit, reason ? digitsOf(sensor, reason, unit) : 0)}
     </>
   );
 }

@@ -1,4 +1,4 @@
-/** The row of the chosen tag comes into view, and stays there as its card grows. */
+/** The row of the chosen tag, or of its alarm, comes into view, and stays there as its card grows. */
 import { useEffect, type RefObject } from 'react';
 
 /**
@@ -6,15 +6,21 @@ import { useEffect, type RefObject } from 'react';
  * be thousands above it. A chart that comes into the card later takes its room from the table.
  */
 export function useChosenInSight(
-  body: RefObject<HTMLTableSectionElement | null>,
+  body: RefObject<Element | null>,
   chosen: string | null,
-  rowHeight: number,
+  rowHeight = 0,
 ): void {
   useEffect(() => {
-    const frame = body.current?.closest('.table-scroll');
+    const frame = body.current?.closest('.table-scroll, .alarms');
     if (chosen === null || !frame) return undefined;
-    const rowOf = (): Element | null =>
-      frame.querySelector(`tr[data-tag-id="${CSS.escape(chosen)}"]`);
+    const rowOf = (): Element | null => {
+      const id = CSS.escape(chosen);
+      // Of several alarms the one that was clicked.
+      return (
+        frame.querySelector(`[data-where="${id}"]:focus-within`) ??
+        frame.querySelector(`tr[data-tag-id="${id}"], [data-where="${id}"]`)
+      );
+    };
     const show = (): void => rowOf()?.scrollIntoView({ block: 'nearest' });
     const painted = requestAnimationFrame(show);
     let height = frame.clientHeight;

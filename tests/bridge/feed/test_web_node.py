@@ -146,6 +146,21 @@ def test_the_revision_changes_with_poses_and_readings_and_with_nothing_else(
     assert stage.node.revision == revisions[-1]
 
 
+def test_readings_that_are_not_of_one_scan_any_more_are_another_revision(
+    stage: Stage, peer: Peer
+) -> None:
+    revisions = []
+    for temperature_s, humidity_s in ((1, 1), (2, 2), (3, 2)):
+        readings = (
+            Reading("temperature", 20.0, temperature_s * S),
+            Reading("humidity", 50.0, humidity_s * S),
+        )
+        tag = TagState("1", readings=readings, last_observed_ns=temperature_s * S)
+        stage.take_with_times(peer, tag)
+        revisions.append(stage.node.revision)
+    assert revisions[0] == revisions[1] != revisions[2]
+
+
 def test_a_twin_that_was_started_anew_is_another_revision_for_all_replicas(domain: int) -> None:
     with stage_in(domain) as one, stage_in(domain) as two:
         replicas, revisions = (one, two), set[str]()

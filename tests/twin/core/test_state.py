@@ -88,6 +88,14 @@ def test_a_write_that_changes_nothing_that_is_shown_does_not_count() -> None:
     assert store.observation_count == 3, "it pins the tag"
 
 
+def test_a_late_scan_with_the_same_value_counts_for_what_is_derived_may_be_gone() -> None:
+    store = TwinStore()
+    store.record(scan("1", at_s=10.0, temperature=20.0, humidity=50.0))
+    store.record_inspection(look("1", at_s=30.0, species="rose"))
+    store.record(scan("1", at_s=20.0, temperature=20.0))
+    assert store.observation_count == 3
+
+
 def test_age_is_since_the_last_observation_and_never_negative() -> None:
     store = TwinStore()
     store.record(scan("1", at_s=100.0, co2=1.0))

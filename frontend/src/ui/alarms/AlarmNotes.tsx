@@ -1,12 +1,16 @@
 import type { JSX } from 'react';
 
 import { epochOf } from '../../clock';
+import { alarmList } from '../../alarms/watch';
 import { clockText } from '../../domain/format';
+import { worstReason } from '../../domain/health';
 import { rosText, secondsOf } from '../../domain/rostime';
 import { useApp } from '../../store/app';
+import { useSelected } from '../../store/create';
 import { selectNewestHealth } from '../../store/derived';
 import { selectNewest, selectShown } from '../../store/moment';
 import { S } from '../../strings';
+import { alarmOf } from '../DoNow';
 
 /** What the list is about, and what it does not know. */
 export function AlarmNotes({ isEmpty }: { isEmpty: boolean }): JSX.Element {
@@ -19,7 +23,13 @@ export function AlarmNotes({ isEmpty }: { isEmpty: boolean }): JSX.Element {
   const isLost = phase !== 'live' && phase !== 'offline';
   const isKnown = alarms !== null && !isLost && !isStarting;
   const isLast = isLost && takenAt !== null;
-  const critical = useApp((state) => selectNewestHealth(state)?.counts.critical ?? 0);
+  const listed = useSelected(alarmList, (it) => it);
+  const waiting = useApp((state) => {
+    const all = [...listed.active, ...listed.shelved];
+    return [...(selectNewestHealth(state)?.byTag ?? [])].filter(
+      ([id, own]) => own.verdict === 'critical' && !alarmOf(all, id, worstReason(own)),
+    ).length;
+  });
   return (
     <div className="alarm-notes">
       {moment !== null && <p data-note="now">{S.alarmsOfNow(rosText(moment))}</p>}
@@ -27,9 +37,10 @@ export function AlarmNotes({ isEmpty }: { isEmpty: boolean }): JSX.Element {
       {isStarting && <p data-note="starting">{S.alarmsStarting}</p>}
       {isEmpty && !isLast && (
         <p className="alarm-none" data-note={isKnown ? 'none' : 'unknown'}>
-          {!isKnown ? S.alarmsNotYet : critical > 0 ? S.alarmsWait(critical) : S.alarmsNone}
+          {isKnown ? S.alarmsNone : S.alarmsNotYet}
         </p>
       )}
+      {isKnown && waiting > 0 && <p data-note="wait">{S.alarmsWait(waiting)}</p>}
       {isEmpty && isKnown && <p className="faint">{S.alarmsNoneHint}</p>}
       {alarms?.source === 'heard' && alarms.since && (
         <p className="faint" data-note="heard">

@@ -217,11 +217,18 @@ test('without an alarm it says so; where that is not known it says that', () => 
     showTags([wireTag()], judgement({ 1: [reason()] }));
   });
   tell();
-  expect(screen.getByText('No alarm yet: 1 critical tag waits for a second scan')).toBeTruthy();
+  const wait = '1 critical tag waits for a second scan';
+  expect(notes()).toEqual(['none', 'wait']);
+  expect(screen.getByText(wait)).toBeTruthy();
+  // Beside the alarm of another tag as well, and not beside its own.
+  tell(alarm('a', { tag_id: '5' }));
+  expect(screen.getByText(wait)).toBeTruthy();
+  tell(alarm('a', { tag_id: '1' }));
+  expect(screen.queryByText(wait)).toBeNull();
   flush(() => {
     receive({ type: 'alarms', alarms: alarms([], { source: 'heard' }) });
   });
-  expect(notes()).toEqual(['none', 'heard']);
+  expect(notes()).toEqual(['none', 'wait', 'heard']);
   tell();
   flush(goLost);
   expect(notes()).toEqual(['lost']);

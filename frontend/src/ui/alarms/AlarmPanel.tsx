@@ -1,4 +1,4 @@
-import { useMemo, useState, type JSX } from 'react';
+import { useMemo, useRef, useState, type JSX } from 'react';
 
 import {
   alarmsCsv,
@@ -25,6 +25,7 @@ import { S } from '../../strings';
 import { Disclosure } from '../../widgets/Disclosure';
 import { Icon } from '../../widgets/Icon';
 import { Select } from '../../widgets/Select';
+import { useChosenInSight } from '../chosenInSight';
 import { HealthMark } from '../HealthMark';
 import { AlarmNotes } from './AlarmNotes';
 import { AlarmRow, type GroupName } from './AlarmRow';
@@ -64,6 +65,11 @@ export function AlarmPanel(): JSX.Element {
   const seen = filtered(shown, filter, speech);
   const waiting = unacknowledged(seen.active);
   const count = seen.active.length + seen.shelved.length + seen.resolved.length;
+  const list = useRef<HTMLDivElement>(null);
+  useChosenInSight(
+    list,
+    useApp((state) => state.view.selected),
+  );
   const hasAny = all.active.length + all.shelved.length > 0;
   return (
     <>
@@ -122,6 +128,7 @@ export function AlarmPanel(): JSX.Element {
         </Disclosure>
       </DoneLine>
       <div
+        ref={list}
         className="alarms"
         id={ALARMS_ID}
         role="region"

@@ -79,7 +79,7 @@ export const ALARMS = {
   alarmsNoneHint:
     'An alarm is raised after two bad scans in a row. A pest, or missing data from the greenhouse, raises one at once.',
   alarmsWait: (tags: number): string =>
-    `No alarm yet: ${counted(tags, 'critical tag waits', 'critical tags wait')} for a second scan`,
+    `${counted(tags, 'critical tag waits', 'critical tags wait')} for a second scan`,
   alarmsNotYet: 'Waiting for the list of alarms',
   alarmsStarting: 'Recorded data is still being read: more alarms may follow.',
   alarmsHeard: (since: string): string =>

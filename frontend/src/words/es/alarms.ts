@@ -74,7 +74,7 @@ export const ALARMS: In<typeof ENGLISH> = {
   alarmsNoneHint:
     'La alarma salta tras dos mediciones anómalas seguidas. Con una plaga o si faltan datos del invernadero, salta de inmediato.',
   alarmsWait: (tags) =>
-    `Aún no hay alarma: ${counted(tags, 'punto crítico espera', 'puntos críticos esperan')} una segunda medición`,
+    `${counted(tags, 'punto crítico espera', 'puntos críticos esperan')} una segunda medición`,
   alarmsNotYet: 'Esperando la lista de alarmas',
   alarmsStarting: 'Todavía se está leyendo el registro: pueden aparecer más alarmas.',
   alarmsHeard: (since) => `No se registra nada; no se conocen las alarmas anteriores a ${since}.`,

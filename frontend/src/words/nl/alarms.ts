@@ -73,7 +73,7 @@ export const ALARMS: In<typeof ENGLISH> = {
   alarmsNoneHint:
     'Een alarm gaat af na twee afwijkende metingen achter elkaar. Bij een plaag of ontbrekende gegevens gaat het meteen af.',
   alarmsWait: (tags) =>
-    `Nog geen alarm: ${counted(tags, 'kritiek meetpunt wacht', 'kritieke meetpunten wachten')} op een tweede meting`,
+    `${counted(tags, 'kritiek meetpunt wacht', 'kritieke meetpunten wachten')} op een tweede meting`,
   alarmsNotYet: 'Wachten op de lijst met alarmen',
   alarmsStarting: 'De vastgelegde gegevens worden nog gelezen: er kunnen alarmen bijkomen.',
   alarmsHeard: (since) => `Er wordt niets vastgelegd; alarmen van vóór ${since} zijn niet bekend.`,

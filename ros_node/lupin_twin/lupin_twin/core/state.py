@@ -193,6 +193,11 @@ class TagState:
             and self.flower == other.flower
             and len(self.readings) == len(other.readings)
             and all(map(_same_value, self.readings, other.readings))
+            # What is derived is of readings of one time.
+            and all(
+                one.observed_at_ns == two.observed_at_ns
+                for one, two in zip(self.readings, other.readings, strict=True)
+            )
         )
 
     def held_to(self, now_ns: int) -> TagState:

@@ -14,7 +14,7 @@ from typing import Final
 
 from lupin_bridge.judge.daylight import DayLine
 from lupin_bridge.judge.days import DayNumber, TagDays, of_24_hours
-from lupin_bridge.judge.episodes import SITE, Alarm, TagEpisodes, alarm_id
+from lupin_bridge.judge.episodes import MAX_EPISODES, SITE, Alarm, TagEpisodes, alarm_id
 from lupin_bridge.judge.ranges import Sensors
 from lupin_bridge.judge.scan_interval import LONGEST_NS, SHORTEST_NS, Stretches
 from lupin_bridge.judge.tag_log import Gap, TagPast, is_long
@@ -69,7 +69,7 @@ class Follower:
     `recent_s` fixes how long readings hold, None: it is learnt. `day_of` says whether it was day,
     `day_number` which day it was.
     `spans` are the runs of the clock; of other ones another follower has to be made. `kept` is how
-    many writes are kept, about.
+    many writes are kept, about; `episodes` how many alarms that are over, of each tag.
 
     `missed` counts what was older than what is kept of its tag; it was not taken in.
     """
@@ -83,8 +83,10 @@ class Follower:
         *,
         day_number: DayNumber = of_24_hours,
         kept: int = KEPT,
+        episodes: int = MAX_EPISODES,
     ) -> None:
         self._kept = kept
+        self._episodes = episodes
         self.missed = 0
         self._forgotten_ns = 0
         self.spans = tuple(spans)
@@ -144,7 +146,9 @@ class Follower:
         if tag is None:
             self._tags += 1
             days = TagDays(self._sensors, self._clock, self._day_number)
-            episodes = TagEpisodes(write.tag_id, run.begun_ns, self._sensors, days, self._recent_ns)
+            episodes = TagEpisodes(
+                *(write.tag_id, run.begun_ns, self._sensors, days, self._recent_ns, self._episodes)
+            )
             tag = run.tags[write.tag_id] = TagPast(
                 episodes, self._recent_ns, _matters(run), self._is_day(run)
             )

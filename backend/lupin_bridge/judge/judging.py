@@ -188,8 +188,9 @@ class Judge:
         """
         tags = [kept.state for kept in self._tags.values()] if first is None else first.tags
         self._recent = RecentScans.of(tags, writes, self._day_of)
-        if first is not None:
-            self._scans.heard(self._recent.stamps_ns(), first.now_ns)
+        # With what is known already: of the last scan of each tag alone, no interval can be told.
+        self._scans.forget()
+        self._scans.heard(self._recent.stamps_ns(), self._now_ns if first is None else first.now_ns)
         self._waiting |= dict.fromkeys(self._tags)
 
     def note_changed(self, changed: Mapping[str, Mapping[str, int]]) -> None:

@@ -50,6 +50,8 @@ from lupin_twin.core.writes import PastWrite, PastWrites, PeriodRequest, RunSpan
 # that where alarms are worked out; an answer has ten seconds.
 MAX_WRITES: Final = 100_000
 ALARM_WRITES: Final = 40_000
+# Alarms that are over, of each tag: of a month, more than a hundred a day.
+EPISODES: Final = 5_000
 # As far as before the period alarms are worked out: what began then may go on.
 LEAD_NS: Final = 7 * 24 * HOUR_NS
 _LOT: Final = 2_000
@@ -207,7 +209,13 @@ class _Fold:
             return by.day(light, at_ns).is_day
 
         return Follower(
-            by.sensors, is_day, cut, by.recent_s, day_number=by.day_number, kept=2 * MAX_WRITES
+            by.sensors,
+            is_day,
+            cut,
+            by.recent_s,
+            day_number=by.day_number,
+            kept=2 * MAX_WRITES,
+            episodes=EPISODES,
         )
 
     def _count(self, write: PastWrite) -> None:

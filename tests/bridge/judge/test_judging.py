@@ -148,6 +148,14 @@ def test_what_was_scanned_before_makes_a_rhythm_too() -> None:
     assert judge.holds_ns() == {"a": 3 * hours}
 
 
+def test_after_a_restart_the_patrol_has_the_interval_that_it_had_before() -> None:
+    judge, now_ns = Judge(SENSORS, by_light), START + 3 * MINUTE
+    judge.see(snapshot(now_ns, tag("a", START + 2 * MINUTE, temperature=22.0)))
+    judge.learn(scan("a", START + at * MINUTE, temperature=22.0) for at in range(3))
+    patrol = judge.see(snapshot(now_ns, tag("a", START + 2 * MINUTE, temperature=22.0))).patrol
+    assert patrol == Patrol(MINUTE, START + 2 * MINUTE)
+
+
 def test_a_sensor_that_scans_leave_out_is_no_part_of_the_rhythm() -> None:
     dead = Reading("light", 900.0, START)
     scans = [START + round_ * 10 * MINUTE for round_ in range(40)]

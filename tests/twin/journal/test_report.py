@@ -64,6 +64,14 @@ def test_readings_of_an_attempt_that_failed_are_in_it_as_in_charts_and_alarms(
     assert (found["counts"]["scans"], found["counts"]["failed"]) == (1, 1)
 
 
+def test_alarms_of_a_tag_that_has_had_hundreds_are_all_counted(living: Living) -> None:
+    values = [40.0, 40.0, 21.0, 21.0] * 150
+    scans = [scan(at_ns=BEGUN + at * MINUTE, temperature=it) for at, it in enumerate(values)]
+    with living([("rows", scans)]) as life:
+        counts = report(life.connection, BEGUN, END)["counts"]
+    assert (counts["raised"], counts["cleared"]) == (150, 150)
+
+
 def test_nothing_of_what_came_later_is_in_it(living: Living) -> None:
     chance = st.tuples(steps, _stamps)
 

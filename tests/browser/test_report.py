@@ -81,7 +81,7 @@ def test_the_menu_opens_the_report_of_the_period_on_the_time_bar(
     query = dict(re.findall(r"[?&]([a-z]+)=([^&]*)", page.url))
     assert int(query["to"]) - int(query["from"]) == 8 * 3_600
     assert page.locator("html").get_attribute("lang") == "de"
-    expect(page.get_by_role("columnheader", name="Schlimmstens")).to_be_visible()
+    expect(page.get_by_role("columnheader", name="Schlimmster Wert")).to_be_visible()
 
 
 @pytest.mark.parametrize("lang", ["en", "de", "nl", "es"])

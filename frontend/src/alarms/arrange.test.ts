@@ -90,12 +90,12 @@ test('of a cause the value farthest beyond, and since when one has been active',
         ? { kind: 'known', value: 10.9, verdict: 'healthy', limit: null, trend: null }
         : null;
   expect(causeFacts([...items.active, ...items.resolved], speech, null, now)).toEqual([
-    ...['1 Stressed', '1 Healthy'],
+    ...['1 stressed', '1 healthy'],
     ...['now 10.4\u00a0°C (Tag 2)', 'worst 2.9\u00a0°C', 'since sim 00:01:41'],
   ]);
   expect(causeFacts(items.resolved, speech, null, now)).toEqual(['worst 2.9\u00a0°C']);
   const unknown = (): Now => ({ kind: 'unknown', last: 9, lastAt: 'unknown' });
-  expect(causeFacts(items.active, speech, null, unknown)[0]).toBe('2 Unknown');
+  expect(causeFacts(items.active, speech, null, unknown)[0]).toBe('2 unknown');
 });
 
 test('the newest first, or by tag: in one row', () => {

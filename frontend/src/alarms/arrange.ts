@@ -118,7 +118,9 @@ export function causeFacts(
   const active = all.filter(({ alarm }) => alarm.cleared_at === null);
   const counts = VERDICTS.map((verdict) => {
     const count = active.filter((each) => each.verdict === verdict).length;
-    return count > 0 ? `${count} ${(count === 1 ? S.health : S.healthMany)[verdict]}` : null;
+    return count > 0
+      ? `${count} ${(count === 1 ? S.health : S.healthMany)[verdict].toLowerCase()}`
+      : null;
   });
   const begins = active.map(({ alarm }) => secondsOf(alarm.raised_at));
   return [

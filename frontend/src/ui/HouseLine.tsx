@@ -33,7 +33,9 @@ export function HouseLine(): JSX.Element | null {
     <p className="house-line" data-testid="house-line">
       {/* First: a narrow screen cuts the end. */}
       <span data-overdue={overdue > 0}>{S.houseOverdue(overdue)}</span>
-      {rest.map((part) => ` · ${part}`)}
+      {rest.map((part, index) => (
+        <span key={index}> · {part}</span>
+      ))}
     </p>
   );
 }

@@ -16,6 +16,7 @@ import { act, useApp } from '../store/app';
 import { selectCatalogue, selectHealth } from '../store/derived';
 import { selectNewestTag, selectShown, selectTag } from '../store/moment';
 import { S } from '../strings';
+import { CardAlarms } from './alarms/CardAlarms';
 import { Age, AgeFact, useAgeStep } from './Age';
 import { CardEstimate } from './estimate';
 import { HealthMark } from './HealthMark';
@@ -105,6 +106,7 @@ function CardBody({
   return (
     <div className="card-body">
       {health && <Reasons health={health} hasTodo={isBad && isNow} />}
+      {isNow && <CardAlarms tagId={tag.id} />}
       {tag.readings.size === 0 && <p className="faint">{S.cardNoReadings}</p>}
       <ul className="card-readings">
         {[...tag.readings].map(([name, value]) => (

@@ -1,4 +1,4 @@
-"""The field against its definition, the oracle's double loop; and what may not change it."""
+"""The field against its definition, the oracle's double loop."""
 
 from __future__ import annotations
 
@@ -166,6 +166,3 @@ def test_field_of_many_parts_is_the_definitions(
         power=2.0,
     )
     assert_same_values(case.by_twin().values, case.by_loop(), case.samples)
-
-
-# --- what may not change it ------------------------------------------------------------------

@@ -51,6 +51,3 @@ def test_as_of_a_moment_is_what_a_plain_replay_of_all_writes_up_to_then_leaves(
             assert [shown(tag) for tag in found.tags] == [
                 shown(tag) for tag in heard.known_at(at_ns)
             ], (at_ns, steps)
-
-
-# --- by example -----------------------------------------------------------------------------------

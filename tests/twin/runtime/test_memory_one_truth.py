@@ -336,6 +336,3 @@ def test_a_place_counts_from_the_earliest_stamp_that_came_with_one(path: Path) -
         ("7", NOW - 80 * S, 1.0),
         ("9", NOW, 5.0),
     ]
-
-
-# --- 7 and 8: what many sources leave, and the end ------------------------------------------------

@@ -58,7 +58,7 @@ export const HEALTH: In<typeof ENGLISH> = {
     range: 'Klimaregelung prüfen',
     reading_failed: 'Sensor prüfen',
     scan_failed: 'Weg und Messpunkt prüfen',
-    pest: 'Bestand prüfen, Schädlinge bekämpfen',
+    pest: 'Prüfen und bekämpfen',
     old: 'Route des Roboters prüfen',
     changed: 'Mit zweitem Messgerät vergleichen',
     silent: 'Zwilling, Server und Netz prüfen',

@@ -63,7 +63,7 @@ export const HEALTH: In<typeof ENGLISH> = {
     range: 'Revisar el control del clima',
     reading_failed: 'Revisar el sensor',
     scan_failed: 'Revisar el acceso y el punto',
-    pest: 'Inspeccionar y tratar las plantas',
+    pest: 'Inspeccionar y tratar',
     old: 'Revisar la ruta del robot',
     changed: 'Comparar con otro medidor',
     silent: 'Revisar gemelo, servidor y red',

@@ -19,7 +19,7 @@ export const TAGS: In<typeof ENGLISH> = {
     tag: 'Nr.',
     species: 'Soort',
     flowers: 'Bloemen',
-    age: 'Geleden',
+    age: 'Oud',
   },
   pest: 'Plaag',
   pestCount: (count) => counted(count, 'plaagdier', 'plaagdieren'),

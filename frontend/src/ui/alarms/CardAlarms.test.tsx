@@ -1,0 +1,46 @@
+import { act as flush, fireEvent, render, screen } from '@testing-library/react';
+import { afterEach, beforeEach, expect, test } from 'vitest';
+
+import { NOTHING_KEPT } from '../../alarms/kept';
+import { own } from '../../alarms/own';
+import { alarmList, startAlarms } from '../../alarms/watch';
+import { alarm, tellAlarms } from '../../testing/alarms';
+import { showTags } from '../../testing/page';
+import { wireTag } from '../../testing/tags';
+import { CardAlarms } from './CardAlarms';
+
+let stop: () => void;
+
+beforeEach(() => {
+  own.dispatch(NOTHING_KEPT);
+  showTags([wireTag({ tag_id: '7' })]);
+  stop = startAlarms();
+  render(<CardAlarms tagId="7" />);
+});
+afterEach(() => {
+  stop();
+});
+
+test('a tag without an alarm has nothing to acknowledge', () => {
+  flush(() => {
+    tellAlarms(alarm('a', { tag_id: '8' }));
+  });
+  expect(screen.queryByTestId('card-alarms')).toBeNull();
+});
+
+test('all alarms of a tag are acknowledged where it is looked at, and no others', () => {
+  flush(() => {
+    tellAlarms(
+      alarm('a', { tag_id: '7', raised: 900 }),
+      alarm('b', { tag_id: '7', raised: 500, reason: { kind: 'pest', sensor: '' } }),
+      alarm('c', { tag_id: '8' }),
+    );
+  });
+  const line = screen.getByTestId('card-alarms');
+  expect(line.textContent).toMatch(/^2 alarms · since sim 00:08:20/);
+  fireEvent.click(screen.getByRole('button', { name: 'Acknowledge all (2)' }));
+  expect(line.textContent).toMatch(/^2 alarms acknowledged · since/);
+  expect(screen.queryByRole('button')).toBeNull();
+  const seen = alarmList.get().active.filter(({ isAcknowledged }) => isAcknowledged);
+  expect(seen.map(({ alarm: { id } }) => id).sort()).toEqual(['a', 'b']);
+});

@@ -1,0 +1,45 @@
+import type { JSX } from 'react';
+
+import { acknowledgeAlarms } from '../../alarms/own';
+import { spanText } from '../../alarms/words';
+import { alarmList } from '../../alarms/watch';
+import type { Alarm } from '../../contract/types';
+import { secondsOf } from '../../domain/rostime';
+import { store } from '../../store/app';
+import { useSelected } from '../../store/create';
+import { rosNow } from '../../store/moment';
+import { S } from '../../strings';
+import { useTicking } from '../../widgets/useNow';
+import { once } from './once';
+
+const byTime = (a: Alarm, b: Alarm): number => secondsOf(a.raised_at) - secondsOf(b.raised_at);
+
+/** Since when a tag's alarms are active, and their acknowledgement: for whoever stands at the tag. */
+export function CardAlarms({ tagId }: { tagId: string }): JSX.Element | null {
+  const active = useSelected(alarmList, (list) => list.active);
+  const items = active.filter(({ alarm }) => alarm.tag_id === tagId);
+  const waiting = items.filter(({ isAcknowledged }) => !isAcknowledged);
+  const since = useTicking((at) => {
+    const nowS = rosNow(store.get(), at);
+    const [first] = items.map(({ alarm }) => alarm).sort(byTime);
+    return first ? spanText(first, nowS) : '';
+  });
+  if (items.length === 0) return null;
+  return (
+    <div className="card-alarms alarm-tools" data-testid="card-alarms">
+      <span>
+        {(waiting.length === 0 ? S.alarmDone.acknowledge : S.alarmCount)(items.length)} · {since}
+      </span>
+      {waiting.length > 0 && (
+        <button
+          type="button"
+          onClick={once(() => {
+            acknowledgeAlarms(waiting);
+          })}
+        >
+          {waiting.length === 1 ? S.alarmAcknowledge : S.alarmAcknowledgeAll(waiting.length)}
+        </button>
+      )}
+    </div>
+  );
+}

@@ -25,8 +25,10 @@ export function periodWith(
     const { from, to } = spanOf(each, nowS, oldest);
     return at <= to && at - from >= (to - from) * LEAD;
   };
-  const from = Math.max(0, at - ((nowS - at) * LEAD) / (1 - LEAD));
-  return [period, { kind: 'hour' } as const].find(has) ?? { kind: 'own', from, to: nowS };
+  const from = Math.max(0, Math.floor(at - ((nowS - at) * LEAD) / (1 - LEAD)));
+  return (
+    [period, { kind: 'hour' } as const].find(has) ?? { kind: 'own', from, to: Math.ceil(nowS) }
+  );
 }
 
 /** Shows the tag as it is now. */

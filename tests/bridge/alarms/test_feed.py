@@ -171,7 +171,9 @@ def test_what_comes_late_finds_its_place_however_late_it_is(
 def test_what_is_older_than_what_is_kept_is_counted_and_told(
     monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
-    monkeypatch.setattr(alarm_fold.Follower.__init__, "__kwdefaults__", {"kept": 8})
+    defaults = alarm_fold.Follower.__init__.__kwdefaults__
+    assert defaults is not None
+    monkeypatch.setitem(defaults, "kept", 8)
 
     async def test(feed: AlarmFeed, board: AlarmBoard, source: Journal) -> None:
         source.writes_now = [

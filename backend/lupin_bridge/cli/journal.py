@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from lupin_bridge.bags.recording import SUFFIX
+from lupin_bridge.cli.configuration import settings_from
 from lupin_bridge.cli.output import (
     FAILED,
     CannotWrite,
@@ -26,9 +27,10 @@ from lupin_bridge.cli.output import (
     standard,
 )
 from lupin_bridge.console import Progress, say
-from lupin_bridge.judge.options import own_sensors
+from lupin_bridge.judge.options import Criteria
 from lupin_bridge.past import bodies
 from lupin_bridge.past.query import MAX_SECONDS, moment
+from lupin_bridge.settings import SettingError, variable
 from lupin_twin.core.past import NotRemembered, PastRefused, seconds
 from lupin_twin.journal.beside import InUse, demo_journal_path, holder_of, journal_path
 from lupin_twin.journal.checking import Overview, RunExtent, find_all_damage, overview
@@ -70,6 +72,7 @@ SHOWN: Final = (
     Foreign,
     UnknownTagError,
     NotPossible,
+    SettingError,
 )
 
 
@@ -96,6 +99,12 @@ def add_parser(roles: Roles) -> None:
             own.add_argument("--to", dest="end", metavar="TIME", help=f"until before then: {when}")
             own.add_argument("--tag", metavar="ID", help="one tag alone")
             own.add_argument("--sensor", metavar="NAME", help="one sensor alone")
+            own.add_argument(
+                "--sensors", metavar="FILE", help=f"units of CSV (default: {variable('sensors')})"
+            )
+            own.add_argument(
+                "--config", metavar="FILE", help=f"settings (default: {variable('config')})"
+            )
 
 
 def add_which(parser: argparse.ArgumentParser) -> None:
@@ -122,7 +131,7 @@ def run(options: argparse.Namespace, environ: Mapping[str, str]) -> int:
     try:
         path = path_of(options, environ)
         if options.action == "export":
-            code = _export(path, options)
+            code = _export(path, options, environ)
         elif options.action == "backup":
             code = _backup(path, options.target)
         elif options.action == "forget":
@@ -300,16 +309,17 @@ def _check(path: Path) -> int:
 # --- export --------------------------------------------------------------------------------------
 
 
-def _export(path: Path, options: argparse.Namespace) -> int:
+def _export(path: Path, options: argparse.Namespace, environ: Mapping[str, str]) -> int:
     start_ns = 0 if options.start is None else moment("--from", options.start)
     end_ns = _END_NS if options.end is None else moment("--to", options.end)
     if end_ns < start_ns:
         raise JournalError(f"--to is {seconds(end_ns)}, before --from, {seconds(start_ns)}")
     if options.recording is not None:
         return _record(path, options, start_ns, end_ns)
+    given = {} if options.sensors is None else {"sensors": options.sensors}
+    sensors = Criteria.of(settings_from(given, environ, options.config)).sensors
     with closing(_reader(path)) as connection:
         lots = rows(connection, start_ns, end_ns, options.tag, options.sensor)
-        sensors = own_sensors()
         standard(bodies.CSV_HEADER)
         for lot in lots:
             standard(bodies.csv_lines(lot, sensors))

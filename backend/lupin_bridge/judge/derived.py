@@ -22,8 +22,10 @@ less than `LEAST_COVERED` of 24 hours, there is no value (NaN).
 from __future__ import annotations
 
 import math
+from bisect import bisect_left, bisect_right
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from operator import itemgetter
 from typing import Final
 
 _A: Final = 17.27
@@ -172,7 +174,8 @@ class Daily:
 
     def at(self, at_ns: int, readings: Readings, is_day: IsDay) -> float:
         """Its value at a moment, of the readings of the 24 hours up to then; NaN: not known."""
-        recent = [each for each in readings if at_ns - DAY_NS <= each[0] <= at_ns]
+        first = bisect_left(readings, at_ns - DAY_NS, key=itemgetter(0))
+        recent = readings[first : bisect_right(readings, at_ns, key=itemgetter(0))]
         if not recent:
             return math.nan
         course = Course.begin(*recent[0], is_day=is_day(recent[0][0]))

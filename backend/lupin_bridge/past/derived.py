@@ -1,6 +1,7 @@
 """The past of a derived quantity, made of its parts reading by reading. Pure.
 
-A bucket is of such readings too: of means, no mean of what is derived can be made.
+A bucket is of such readings too: of means, no mean of what is derived can be made. A quantity of a
+day can be: buckets of an hour at most say enough of a sensor's course.
 """
 
 from __future__ import annotations
@@ -9,6 +10,7 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
+from typing import Final
 
 from lupin_bridge.judge.derived import DAILY, DAY_NS, DERIVED, Daily, Derived, IsDay
 from lupin_bridge.judge.ranges import Sensors
@@ -21,11 +23,13 @@ from lupin_twin.core.past import (
     grid,
     seconds,
 )
-from lupin_twin.core.state import Reading, TagState
+from lupin_twin.core.state import NANOSECONDS_PER_SECOND, Reading, TagState
 from lupin_twin.journal.buckets import Buckets, individually
 
 # From when to when, ns.
 Period = tuple[int, int]
+# Of a day there are points of a minute at least.
+_POINTS_A_DAY: Final = DAY_NS // (60 * NANOSECONDS_PER_SECOND)
 # (ns of ROS time, value), oldest first.
 Readings = list[tuple[int, float]]
 # Looks a series up.
@@ -36,7 +40,7 @@ def series(request: SeriesRequest, sensors: Sensors, is_day: IsDay, find: Find) 
     """The series of a request; a derived one, unless a sensor has its name, of its parts.
 
     Raises:
-        PastRefused: more readings of the parts than one request may have.
+        PastRefused: more readings of the parts than one request may have, or too long a period.
 
     """
     measured = find(request)
@@ -46,6 +50,8 @@ def series(request: SeriesRequest, sensors: Sensors, is_day: IsDay, find: Find) 
     if derived is not None:
         read = partial(_readings, derived, find)
     elif daily is not None:
+        # Now is the same for its parts.
+        request = replace(request, end_ns=measured.end_ns)
         read = partial(_of_days, daily, sensors, is_day, find)
     else:
         return measured
@@ -69,12 +75,7 @@ def with_daily(
     is_day: IsDay,
     find: Find,
 ) -> list[TagState]:
-    """The tags as of a moment, those of which it is known with a reading of the quantity too.
-
-    Raises:
-        PastRefused: more readings of a day than one request may have.
-
-    """
+    """The tags as of a moment, those of which it is known with a reading of the quantity too."""
     found = []
     for tag in tags:
         names = {reading.name for reading in tag.readings}
@@ -82,9 +83,9 @@ def with_daily(
             found.append(tag)
             continue
         start_ns = max(1, at_ns - DAY_NS)
-        part_request = SeriesRequest(tag.tag_id, daily.sensor, start_ns, at_ns + 1, MAX_POINTS)
+        part_request = SeriesRequest(tag.tag_id, daily.sensor, start_ns, at_ns + 1, _POINTS_A_DAY)
         part = find(part_request)
-        value = daily.at(at_ns, _readings_of(daily, sensors, part), is_day)
+        value = daily.at(at_ns, _readings_of(daily, sensors, part, at_ns), is_day)
         if math.isfinite(value):
             readings = (*tag.readings, Reading(daily.name, value, at_ns))
             tag = replace(tag, readings=readings)  # noqa: PLW2901
@@ -102,7 +103,7 @@ def _of_days(
     )
     part = find(part_request)
     start_ns = request.start_ns or part.start_ns
-    every = _readings_of(daily, sensors, part)
+    every = _readings_of(daily, sensors, part, request.end_ns)
     last = {at_ns // HOUR_NS: at_ns for at_ns, _ in every if at_ns >= start_ns}
     readings = []
     for at_ns in last.values():
@@ -112,17 +113,29 @@ def _of_days(
     return (start_ns, part.end_ns), readings
 
 
-def _readings_of(daily: Daily, sensors: Sensors, part: SeriesPast) -> Readings:
-    """The readings of a series that came as they are: those that count, of one stamp the last."""
-    if part.is_bucketed:
-        raise PastRefused(
-            f"{daily.name} is made of {daily.sensor}, reading by reading, and from"
-            f" {seconds(part.start_ns)} s to {seconds(part.end_ns)} s there are more than"
-            f" {MAX_POINTS} of them, the limit, or hours alone: ask for a shorter period"
-        )
+def _readings_of(daily: Daily, sensors: Sensors, part: SeriesPast, until_ns: int) -> Readings:
+    """The readings of a series that count, of one stamp the last.
+
+    Of a bucket that is over: its least and largest as it begins, its mean from there to its end.
+    """
     is_plausible = sensors.named(daily.sensor).is_plausible
-    latest = dict(zip(part.stamps_ns, part.means, strict=True))
-    return [(at_ns, value) for at_ns, value in latest.items() if is_plausible(value)]
+    if part.bucket_ns is None:
+        latest = dict(zip(part.stamps_ns, part.means, strict=True))
+        return [(at_ns, value) for at_ns, value in latest.items() if is_plausible(value)]
+    if part.bucket_ns > HOUR_NS:
+        raise PastRefused(
+            f"{daily.name} is made of {daily.sensor} by the hour or shorter, and from"
+            f" {seconds(part.start_ns)} s to {seconds(part.end_ns)} s there are more than"
+            f" {MAX_POINTS} hours, the limit: ask for a shorter period"
+        )
+    readings = []
+    for at_ns, low, high, mean in zip(
+        part.stamps_ns, part.minima, part.maxima, part.means, strict=True
+    ):
+        last_ns = at_ns + part.bucket_ns - 1
+        if last_ns <= until_ns and is_plausible(low) and is_plausible(high):
+            readings += [(at_ns, low), (at_ns, high), (at_ns, mean), (last_ns, mean)]
+    return readings
 
 
 def _readings(derived: Derived, find: Find, request: SeriesRequest) -> tuple[Period, Readings]:

@@ -6,6 +6,7 @@ import subprocess
 import sys
 from contextlib import closing
 from dataclasses import replace
+from importlib.resources import files
 from pathlib import Path
 
 import pytest
@@ -277,6 +278,31 @@ def test_export_writes_the_rows_of_a_period_as_the_route_does(
     two = exported("--from", "1763700003", "--to", "2025-11-21T05:40:05+01:00", "--tag", "7")
     assert [line.split(b",")[7] for line in two[1:]] == [b"1.0", b"1.3333333333333333"]
     assert exported("--sensor", "none") == every[:1]
+
+
+def test_export_has_the_units_of_the_operators_file(
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+    path: Path,
+    tmp_path: Path,
+) -> None:
+    sensors, settings = tmp_path / "own.json", tmp_path / "own.toml"
+    own = files("lupin_bridge").joinpath("sensors.json").read_text(encoding="utf-8")
+    sensors.write_text(own.replace('"temperature": {', '"a": {'), encoding="utf-8")
+    settings.write_text(f"sensors = '{sensors}'")
+
+    def unit(*words: str) -> str:
+        assert main(["journal", "export", "--journal", str(path), "--sensor", "a", *words]) == 0
+        return capsys.readouterr().out.splitlines()[1].split(",")[6]
+
+    assert (unit(), unit("--sensors", str(sensors)), unit("--config", str(settings))) == (
+        "", "°C", "°C"
+    )  # fmt: skip
+    monkeypatch.setenv("LUPIN_SENSORS", str(sensors))
+    assert unit() == "°C"
+    monkeypatch.setenv("LUPIN_SENSORS", str(tmp_path / "none"))
+    said = Said(capsys, "export", "--journal", path)
+    assert (said.code, "LUPIN_SENSORS" in said.err) == (1, True)
 
 
 @pytest.mark.parametrize(

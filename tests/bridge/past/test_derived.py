@@ -11,8 +11,9 @@ from lupin_bridge.judge.derived import DAILY, DAY_NS
 from lupin_bridge.judge.derived import vapour_pressure_deficit_kpa as vpd
 from lupin_bridge.judge.options import own_sensors
 from lupin_bridge.past import derived
-from lupin_twin.core.past import MAX_POINTS, PastRefused, SeriesPast, SeriesRequest
+from lupin_twin.core.past import MAX_POINTS, PastRefused, SeriesPast, SeriesRequest, grid
 from lupin_twin.core.state import Reading, TagState
+from lupin_twin.journal.buckets import Buckets, individually
 
 S = 10**9
 NOW_NS = 1_000 * S
@@ -29,21 +30,27 @@ def is_day(at_ns: int) -> bool:
     return at_ns % DAY_NS < DAY_NS // 2
 
 
+def found_in(need: SeriesRequest, known: Known, now_ns: int = NOW_NS) -> SeriesPast:
+    """What a house that has these readings finds."""
+    end_ns = need.end_ns or now_ns
+    of = known.get(need.sensor_type, {})
+    of = {at: value for at, value in sorted(of.items()) if need.start_ns <= at < end_ns}
+    start_ns = need.start_ns or min(of, default=end_ns)
+    if len(of) <= need.max_points:
+        return individually(list(of.items()), start_ns, end_ns)
+    buckets = Buckets(grid(start_ns, end_ns, need.max_points))
+    for at_ns, value in of.items():
+        buckets.add_value(at_ns, value)
+    return buckets.past()
+
+
 def answer(request: SeriesRequest, known: Known) -> tuple[SeriesPast, list[SeriesRequest]]:
     """What is made of a house that has these readings, and what was asked for."""
     asked: list[SeriesRequest] = []
 
     def find(need: SeriesRequest) -> SeriesPast:
         asked.append(need)
-        end_ns = need.end_ns or NOW_NS + len(asked)  # time goes on
-        of = known.get(need.sensor_type, {})
-        of = {at: value for at, value in of.items() if need.start_ns <= at < end_ns}
-        start_ns = need.start_ns or min(of, default=end_ns)
-        if len(of) > need.max_points:
-            return SeriesPast(start_ns, end_ns, end_ns)
-        values = tuple(of.values())
-        ones = (1,) * len(of)
-        return SeriesPast(start_ns, end_ns, None, tuple(of), ones, values, values, values)
+        return found_in(need, known, NOW_NS + len(asked))  # time goes on
 
     return derived.series(request, own_sensors(), is_day, find), asked
 
@@ -115,13 +122,41 @@ def test_a_quantity_of_a_day_has_a_value_an_hour_of_the_day_up_to_then() -> None
     assert (few.is_bucketed, sum(few.counts)) == (True, 30)
 
 
-def test_of_the_first_hours_and_of_too_much_there_is_no_quantity_of_a_day() -> None:
+def test_of_the_first_hours_there_is_no_quantity_of_a_day() -> None:
     request = SeriesRequest("a", "daily_light_integral", 0, 0, 500)
     past, _ = answer(replace(request, end_ns=80 * HOUR_NS), COURSE)
     assert past.stamps_ns[0] / HOUR_NS == 22.5
-    many: Known = {"light": {n * S: 1.0 for n in range(1, MAX_POINTS + 2)}}
-    with pytest.raises(PastRefused, match="daily_light_integral is made of light, reading by"):
-        answer(replace(request, end_ns=10_000 * S), many)
+
+
+def test_a_quantity_of_a_day_is_made_of_buckets_where_readings_are_many() -> None:
+    # A peak of one reading, and by night a dip: both count.
+    warm = {n * 10 * S: 20.0 + 5.0 * is_day(n * 10 * S) for n in range(1, 3 * 8_640)}
+    warm |= {40 * HOUR_NS + 10 * S: 33.0, 61 * HOUR_NS + 10 * S: 4.0}
+    until_ns = 62 * HOUR_NS + 3 * S
+    tag = TagState("a", readings=(Reading("temperature", 20.0, until_ns),))
+    for name, tolerance in (
+        ("temperature_24h_mean", 1e-2),
+        ("temperature_night_minimum", 0.0),
+        ("growing_degree_days", 0.0),
+    ):
+        daily = DAILY[name]
+        exact = daily.at(until_ns, list(warm.items()), is_day)
+        [found] = derived.with_daily(
+            [tag],
+            daily,
+            until_ns,
+            sensors=own_sensors(),
+            is_day=is_day,
+            find=lambda need: found_in(need, {"temperature": warm}),
+        )
+        assert found.readings[-1].value == pytest.approx(exact, abs=tolerance), name
+        request = SeriesRequest("a", name, until_ns - 30 * HOUR_NS, until_ns)
+        past, _ = answer(request, {"temperature": warm})
+        assert past.means[-1] == pytest.approx(exact, abs=tolerance), name
+        assert past.stamps_ns[-1] <= until_ns
+    years: Known = {"temperature": dict.fromkeys(range(S, 10**17, 10**13), 20.0)}
+    with pytest.raises(PastRefused, match="5000 hours, the limit: ask for a shorter period"):
+        answer(replace(request, start_ns=S, end_ns=10**17), years)
 
 
 def test_tags_as_of_a_moment_get_the_quantity_of_the_day_up_to_then() -> None:

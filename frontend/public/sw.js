@@ -22,7 +22,7 @@ async function page(request) {
     if (kept) return kept;
     throw error;
   }
-  if (response.ok && !response.redirected) await keep(response.clone());
+  if (response.ok && !response.redirected) await keep(response.clone()).catch(isFull);
   return response;
 }
 
@@ -40,9 +40,12 @@ async function file(request) {
   const kept = await cache.match(request);
   if (kept) return kept;
   const response = await fetch(request);
-  if (response.ok) await cache.put(request, response.clone());
+  if (response.ok) await cache.put(request, response.clone()).catch(isFull);
   return response;
 }
+
+// There is no room for a copy: the page opens as long as there is an answer.
+const isFull = () => undefined;
 
 self.addEventListener('push', (event) => {
   const { title, body } = event.data.json();

@@ -20,6 +20,28 @@ CACHED = """async () => {
 FETCHED = "(path) => fetch(path).then(({ status }) => status, () => 'nothing')"
 
 
+def test_a_browser_without_room_for_the_shell_opens_the_page_all_the_same(
+    browser: Browser, tmp_path: Path
+) -> None:
+    ours = certificate(tmp_path)
+    chromium = browser.browser_type.launch(
+        executable_path=CHROMIUM, args=[*CHROMIUM_ARGS, "--ignore-certificate-errors"]
+    )
+    with chromium, chromium.new_context(ignore_https_errors=True) as context:
+        context.set_default_timeout(PATIENCE_S * 1000)
+        page = context.new_page()
+        with served(*ours.options, trust=ours.trust) as running:
+            page.goto(running.url)
+            page.evaluate("navigator.serviceWorker.ready.then(() => null)")
+            full = {"origin": running.url, "quotaSize": 1}
+            context.new_cdp_session(page).send("Storage.overrideQuotaForOrigin", full)
+            page.reload()
+            live = page.get_by_test_id("app")
+            expect(live).to_have_attribute("data-connection-state", "live")
+            assert page.evaluate("navigator.serviceWorker.controller !== null")
+            assert page.evaluate(CACHED) == []
+
+
 def test_the_shell_opens_without_the_bridge_and_no_data_is_kept(
     browser: Browser, tmp_path: Path
 ) -> None:

@@ -2,6 +2,7 @@ import { expect, test, vi } from 'vitest';
 
 import { act, receive } from '../store/app';
 import { stateFrame, wireTag } from '../testing/tags';
+import { timelineWith } from '../testing/timeline';
 import { copyLink, reported, reportLink } from './link';
 
 test('without a clipboard copying says no instead of failing', async () => {
@@ -50,4 +51,8 @@ test('is that of the last eight hours until a period is chosen on the time bar',
   expect(length()).toBe(HOUR);
   act({ type: 'period', period: { kind: 'own', from: 1_777_000_000, to: 1_777_000_900 } });
   expect([asked().get('from'), asked().get('to')]).toEqual(['1777000000', '1777000900']);
+  const value = timelineWith({ reach: { from: 1_777_020_802, to: 1_777_620_802 } });
+  receive({ type: 'remembered', remembered: { value, state: 'ready', message: '' } });
+  act({ type: 'period', period: { kind: 'all' } });
+  expect(length()).toBe(600_000);
 });

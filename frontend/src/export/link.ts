@@ -30,7 +30,8 @@ export function reportLink(): string {
   const query = new URLSearchParams({ lang: LANGUAGE });
   if (now !== null) {
     const { period } = state.view;
-    const { from, to } = reported(isChosen(period) ? spanOf(period, now, null) : null, now);
+    const oldest = state.twin.remembered.value?.reach?.from ?? null;
+    const { from, to } = reported(isChosen(period) ? spanOf(period, now, oldest) : null, now);
     query.set('from', String(from));
     query.set('to', String(to));
   }

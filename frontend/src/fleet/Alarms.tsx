@@ -99,7 +99,8 @@ function saidOf(alarm: SiteAlarm): readonly string[] {
 
 /** The page of its site as it was then, with the tag's card open. */
 function linkOf({ site, tag_id: tag }: SiteAlarm, raised: number): string {
-  const parts = new URLSearchParams({ at: String(raised) });
+  // To the millisecond that holds the observation, and not to the one before it.
+  const parts = new URLSearchParams({ at: String(Math.ceil(raised * 1000) / 1000) });
   if (tag) parts.set('tag', tag);
   return `sites/${encodeURIComponent(site)}/${window.location.search}#${parts.toString()}`;
 }

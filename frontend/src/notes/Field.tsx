@@ -51,6 +51,12 @@ export function Field({
           onChange={(event) => {
             setText(event.target.value);
           }}
+          onKeyDown={(event) => {
+            if (event.key !== 'Escape') return;
+            // It has been of use here, and is not to close the tag's card too.
+            event.preventDefault();
+            onDone();
+          }}
         />
       </label>
       {fault !== '' && <p role="alert">{fault}</p>}

@@ -106,6 +106,17 @@ test('who may write does, and withdraws their own words alone', async () => {
   ]);
 });
 
+test('Escape leaves the field, and not what it stands in', () => {
+  person.dispatch(ANNA);
+  render(<Comments subject="tag:7" name="Tag 7" />);
+  fireEvent.click(screen.getByRole('button', { name: 'Comment: Tag 7' }));
+  expect(fireEvent.keyDown(screen.getByLabelText('Comment about now'), { key: 'Escape' })).toBe(
+    false,
+  );
+  expect(screen.queryByLabelText('Comment about now')).toBeNull();
+  expect(document.activeElement).toBe(screen.getByRole('button', { name: 'Comment: Tag 7' }));
+});
+
 test('who looks back says it about the moment that is shown', async () => {
   person.dispatch(ANNA);
   flush(() => {

@@ -6,6 +6,17 @@ import { S } from '../strings';
 
 type Own = Extract<Period, { kind: 'own' }>;
 
+interface Typed {
+  readonly from: string;
+  readonly to: string;
+}
+
+/** Null: what is typed makes no period. */
+function periodOf(typed: Typed, isSimulated: boolean): Own | null {
+  const [from, to] = [momentOf(typed.from, isSimulated), momentOf(typed.to, isSimulated)];
+  return from === null || to === null || from >= to ? null : { kind: 'own', from, to };
+}
+
 /** From when to when; what makes no period is not in use, and says so. */
 export function OwnPeriod({
   period,
@@ -14,20 +25,21 @@ export function OwnPeriod({
   period: Own;
   isSimulated: boolean;
 }): JSX.Element {
-  const [typed, setTyped] = useState({
+  const inForce = {
+    of: period,
     from: fieldOf(period.from, isSimulated),
     to: fieldOf(period.to, isSimulated),
-  });
-  const from = momentOf(typed.from, isSimulated);
-  const to = momentOf(typed.to, isSimulated);
-  const isPeriod = from !== null && to !== null && from < to;
-  const take = (next: typeof typed): void => {
-    setTyped(next);
-    const [begin, end] = [momentOf(next.from, isSimulated), momentOf(next.to, isSimulated)];
-    if (begin === null || end === null || begin >= end) return;
-    act({ type: 'period', period: { kind: 'own', from: begin, to: end } });
   };
-  const input = (name: 'from' | 'to', label: string): JSX.Element => (
+  const [last, setTyped] = useState(inForce);
+  // A chart or a link may have chosen another period since.
+  const typed = last.of === period ? last : inForce;
+  const isPeriod = periodOf(typed, isSimulated) !== null;
+  const take = (next: Typed): void => {
+    const own = periodOf(next, isSimulated);
+    setTyped({ ...next, of: own ?? period });
+    if (own) act({ type: 'period', period: own });
+  };
+  const input = (name: keyof Typed, label: string): JSX.Element => (
     <label>
       <span>{label}</span>
       <input

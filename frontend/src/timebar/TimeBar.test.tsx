@@ -166,6 +166,19 @@ describe('the period', () => {
     fireEvent.change(choice, { target: { value: 'week' } });
     expect(store.get().view.period).toEqual({ kind: 'week' });
   });
+
+  test('is in its fields the one that a chart or a link has chosen since', () => {
+    act({ type: 'period', period: { kind: 'own', from: 3_600, to: 7_200 } });
+    render(<TimeBar />);
+    const fields = (): string[] =>
+      ['From', 'To'].map((name) => screen.getByLabelText<HTMLInputElement>(name).value);
+    fireEvent.change(screen.getByLabelText('To'), { target: { value: '1:30' } });
+    expect(fields()).toEqual(['1:00:00', '1:30']);
+    flush(() => {
+      act({ type: 'period', period: { kind: 'own', from: 4_000, to: 5_000 } });
+    });
+    expect(fields()).toEqual(['1:06:40', '1:23:20']);
+  });
 });
 
 test('a twin that remembers nothing says so, and how to change it', () => {

@@ -103,6 +103,12 @@ test('what is well again needs nothing, but pests that one inspection did not se
   ]);
 });
 
+test('who acknowledged it and when, by the clock of the twin', () => {
+  const said = { acknowledged_by: 'anna', acknowledged_at: { sec: 1_000, nanosec: 0 } };
+  tell(alarm('a', { tag_id: '5', ...said }));
+  expect(fact(first('active'), 'by').textContent).toBe('acknowledged by anna at sim 00:16:40');
+});
+
 test('acknowledged, shelved, and back', () => {
   tell(alarm('a', { tag_id: '5' }), alarm('b', { tag_id: '6', reason: { verdict: 'stressed' } }));
   const acknowledged = (): (string | undefined)[] =>
@@ -272,6 +278,14 @@ test('many of one cause are one heading, which is acknowledged as one and names 
   ]);
   press('Undo');
   expect(first('active').dataset['acknowledged']).toBe('false');
+});
+
+test('Escape empties the filter first, and only then what lies over the map', () => {
+  const filter = screen.getByLabelText<HTMLInputElement>('Filter alarms');
+  fireEvent.change(filter, { target: { value: 'tag 6' } });
+  expect(fireEvent.keyDown(filter, { key: 'Escape' })).toBe(false);
+  expect(filter.value).toBe('');
+  expect(fireEvent.keyDown(filter, { key: 'Escape' })).toBe(true);
 });
 
 test('what is filtered away is not acknowledged with all', () => {

@@ -88,6 +88,12 @@ export function AlarmPanel(): JSX.Element {
             onChange={(event) => {
               setFilter(event.target.value);
             }}
+            onKeyDown={(event) => {
+              if (event.key !== 'Escape' || filter === '') return;
+              setFilter('');
+              // It has been of use here, and is not to close what lies over the map too.
+              event.preventDefault();
+            }}
           />
         </label>
         <Select

@@ -1,11 +1,14 @@
 import type { JSX } from 'react';
 
+import { whenText } from '../../alarms/words';
 import type { Alarm, Session } from '../../contract/types';
-import { clockText } from '../../domain/format';
 import { secondsOf } from '../../domain/rostime';
+import { store } from '../../store/app';
 import { useSelected } from '../../store/create';
+import { rosNow } from '../../store/moment';
 import { S } from '../../strings';
 import { person } from '../../store/signals';
+import { useTicking } from '../../widgets/useNow';
 import { P } from './people';
 
 /** Below the list: whether what is done here is this browser's own, or everybody's. */
@@ -23,10 +26,11 @@ export function whoseWord(who: Session | null): string {
 /** Who acknowledged an alarm, and when, where a name is known. */
 export function WhoAcknowledged({ alarm }: { alarm: Alarm }): JSX.Element | null {
   const { acknowledged_by: name, acknowledged_at: at } = alarm;
-  if (!name || !at) return null;
+  const when = useTicking((tick) => (at ? whenText(secondsOf(at), rosNow(store.get(), tick)) : ''));
+  if (!name || when === '') return null;
   return (
     <span className="alarm-facts faint" data-fact="by">
-      {P.acknowledged(name, clockText(secondsOf(at) * 1000))}
+      {P.acknowledged(name, when)}
     </span>
   );
 }

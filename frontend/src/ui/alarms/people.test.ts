@@ -51,10 +51,12 @@ interface Asked {
 
 let asked: Asked[] = [];
 let status = 201;
+let isAway = false;
 
 beforeEach(() => {
   asked = [];
   status = 201;
+  isAway = false;
   own.dispatch(NOTHING_KEPT);
   const note = {
     ...{ id: 'n1', kind: 'acknowledge', subject: 'alarm:cold', text: '', until: null },
@@ -64,6 +66,7 @@ beforeEach(() => {
     const path = `${url.pathname}${url.search}`;
     asked.push({ method, path, body: typeof body === 'string' ? JSON.parse(body) : null });
     if (path === '/api/session') {
+      if (isAway) return Promise.reject(new TypeError('Failed to fetch'));
       return Promise.resolve(
         Response.json({
           can_sign_out: true,
@@ -90,6 +93,17 @@ const signedIn = async (): Promise<void> => {
   });
   asked = [];
 };
+
+test('who has signed in is known also where the bridge was away at first', async () => {
+  vi.useFakeTimers();
+  isAway = true;
+  stops.push(startPeople(), () => vi.useRealTimers());
+  await vi.advanceTimersByTimeAsync(100);
+  expect(asked).toHaveLength(1);
+  isAway = false;
+  await vi.advanceTimersByTimeAsync(10_000);
+  expect(person.get()?.name).toBe('anna');
+});
 
 test('what is done here is said to the bridge, and taken back there', async () => {
   await signedIn();

@@ -5,10 +5,11 @@
  */
 import { now, timeOfDay } from '../../clock';
 import { fetchSession, postNote, withdrawNote } from '../../contract/people';
-import type { Alarm } from '../../contract/types';
+import type { Alarm, Session } from '../../contract/types';
 import { reasonText } from '../../domain/failure';
 import { secondsOf } from '../../domain/rostime';
 import { onChange, store } from '../../store/app';
+import { createFetcher } from '../../store/fetcher';
 import { rosNow } from '../../store/moment';
 import { person } from '../../store/signals';
 import { say } from '../toast';
@@ -18,6 +19,8 @@ import { whatOf, type Kept } from '../../alarms/kept';
 import { acting, own } from '../../alarms/own';
 
 export const P = PEOPLE[LANGUAGE];
+
+const PACE_MS = 500;
 
 /** What was said here and is not there yet: until it is, the bridge's word is an older one. */
 let pending = 0;
@@ -75,9 +78,9 @@ function endOf(alarm: Alarm): number | null {
 }
 
 function take(): void {
-  if (pending > 0 || store.get().twin.alarms === null) return;
-  const isWriter = person.get()?.can_write_notes === true;
-  const found = merged(own.get(), alarmsNow(), told, isWriter, endOf);
+  const who = person.get();
+  if (who === null || pending > 0 || store.get().twin.alarms === null) return;
+  const found = merged(own.get(), alarmsNow(), told, who.can_write_notes, endOf);
   ({ told } = found);
   own.dispatch(found.kept);
 }
@@ -125,26 +128,33 @@ async function tell(before: Kept, next: Kept): Promise<void> {
   take();
 }
 
-/** Begins where somebody has signed in; returns the way to stop. */
+/** Asks who has signed in, on each connection anew; returns the way to stop. */
 export function startPeople(): () => void {
-  const abort = new AbortController();
-  const stops: (() => void)[] = [];
-  fetchSession(abort.signal).then(
-    (session) => {
-      if (!session.name) return;
-      person.dispatch(session);
-      if (session.can_write_notes) acting.tell = (before, next) => void tell(before, next);
-      stops.push(onChange(({ twin }) => [twin.alarms], take));
+  const session = createFetcher<Session>({
+    paceMs: PACE_MS,
+    onValue: (found) => {
+      person.dispatch(found.name ? found : null);
+      acting.tell = found.can_write_notes ? (before, next) => void tell(before, next) : null;
       take();
     },
-    () => {
-      // Without an answer everything stays this browser's own.
+    onError: () => {
+      // It is tried again; until there is an answer everything stays as it is.
     },
-  );
+  });
+  const update = (): void => {
+    // The first connection is made while this is fetched, and to the same bridge.
+    const epoch = Math.max(1, store.get().twin.connection.epoch);
+    session.want({ key: String(epoch), group: 'session', run: fetchSession });
+  };
+  update();
+  const stops = [
+    onChange(({ twin }) => [twin.connection.epoch], update),
+    onChange(({ twin }) => [twin.alarms], take),
+  ];
   return () => {
-    abort.abort();
+    for (const stop of stops) stop();
+    session.want(null);
     acting.tell = null;
     person.dispatch(null);
-    for (const stop of stops) stop();
   };
 }

@@ -49,8 +49,9 @@ MAX_ENDPOINT: Final = 1_000
 TOGETHER_S: Final = 2.0
 # A phone that is off gets it for so long; what is older is on the page, s.
 TTL_S: Final = 3_600
-# Tries of one message, and the time before the second one, s.
-TRIES: Final = 4
+# Tries of one message, most of that hour: a greenhouse's way to the internet may fail for long. And
+# the time before the second one, s.
+TRIES: Final = 66
 FIRST_WAIT_S: Final = 2.0
 MOST_WAIT_S: Final = 60.0
 # Posts at once, to however many browsers.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import json
 import re
 import ssl
@@ -19,7 +20,9 @@ from cryptography.hazmat.primitives.asymmetric import ec
 from cryptography.hazmat.primitives.serialization import Encoding, PublicFormat
 from py_vapid import Vapid02
 
-from lupin_bridge.notify.push import encoded
+from lupin_bridge.notify.http_post import PostError
+from lupin_bridge.notify.push import FIRST_WAIT_S, MOST_WAIT_S, TRIES, encoded
+from lupin_bridge.notify.retry import Backoff, Condition, until_taken
 from tests.support.access import refused_start
 from tests.support.messages import look
 from tests.support.people import OWN, TOKEN, add, changing, remove, signed_in
@@ -175,6 +178,23 @@ def test_a_push_service_that_wants_to_be_left_alone_holds_up_no_other_phone(tmp_
         wait_for(lambda: len(on.service.posted) == 3, "the next alarm")
         [both] = [phone for phone in phones if len(on.posted_to(phone)) == 2]
         assert both.read(on.posted_to(both)[1])["body"].startswith("Tag 8:")
+
+
+def test_without_internet_for_half_an_hour_nothing_is_lost(monkeypatch: pytest.MonkeyPatch) -> None:
+    now_s = 0.0
+
+    async def sleep(for_s: float) -> None:
+        nonlocal now_s
+        now_s += for_s
+
+    async def attempt() -> None:
+        if now_s < 1800.0:
+            raise PostError("its host is not known")
+
+    monkeypatch.setattr("lupin_bridge.notify.retry.asyncio.sleep", sleep)
+    backoff, condition = Backoff(FIRST_WAIT_S, MOST_WAIT_S), Condition()
+    sent = until_taken(attempt, condition, backoff, "an alarm", "push.example", most_tries=TRIES)
+    assert asyncio.run(sent)
 
 
 @pytest.fixture(scope="module")

@@ -104,12 +104,12 @@ def kept(connection: sqlite3.Connection) -> Stretches:
 def horizon_ns(connection: sqlite3.Connection, limits: Limits, now_ns: int) -> int:
     """What was received before this, by the wall's clock, goes now.
 
-    That clock may be ahead: what was received last tells how far it has come, and no more than a
-    day of what is there goes at once.
+    That clock may be ahead: what was received last tells how far it has come, and no more than an
+    hour of what is there goes in a round, a minute: a clock that is set right soon costs little.
     """
     first = min(_arrivals(connection, "ASC"), default=now_ns)
     last = max(_arrivals(connection, "DESC"), default=now_ns)
-    return min(min(now_ns, last) - int(limits.days * DAY_NS), first + DAY_NS)
+    return min(min(now_ns, last) - int(limits.days * DAY_NS), first + HOUR_NS)
 
 
 def purge_step(

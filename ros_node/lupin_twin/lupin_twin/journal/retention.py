@@ -150,9 +150,13 @@ def purge_step(
     return True
 
 
-def holds_older(connection: sqlite3.Connection, before_ns: int) -> bool:
-    """Whether rows are there that are too old: they wait to be forwarded."""
-    return any(arrival_ns < before_ns for arrival_ns in _arrivals(connection, "ASC"))
+def undone(connection: sqlite3.Connection, limits: Limits, before_ns: int) -> str:
+    """Which limit is not kept though there is nothing more to delete, in words; empty: none."""
+    if used_bytes(connection) > limits.max_bytes:
+        return "no scans are kept: hours, which stay, are larger than journal_max_mb"
+    if any(arrival_ns < before_ns for arrival_ns in _arrivals(connection, "ASC")):
+        return "what is older than journal_days is kept until it is forwarded"
+    return ""
 
 
 def _arrivals(connection: sqlite3.Connection, way: str) -> list[int]:

@@ -7,10 +7,11 @@ from typing import Any
 
 import pytest
 
-from lupin_bridge.feed.source import TwinUpdate
+from lupin_bridge.feed.source import TwinUnavailableError, TwinUpdate
 from lupin_bridge.judge.verdict import Health, judge_site, judge_tag
 from lupin_bridge.stream.hub import Client
 from lupin_twin.core.state import Reading, Snapshot, TagState
+from lupin_twin.core.writes import PastWrite
 from tests.bridge.test_bridge import Ear, Stage
 from tests.support.waiting import until
 
@@ -53,6 +54,37 @@ def test_a_tag_that_cannot_be_judged_is_unknown_and_the_frames_go_on(
             stage.script.tell(judged_state(6))
             await until(lambda: len(stage.ear.states) == 6, "the frame")
             assert stage.ear.states[-1]["health"]["tags"]["bad"]["verdict"] == "healthy"
+
+    asyncio.run(test())
+
+
+@pytest.mark.parametrize("error", [None, TwinUnavailableError("not yet")])
+def test_a_robot_has_not_stopped_before_the_log_was_looked_at(error: Exception | None) -> None:
+    async def test() -> None:
+        asked, may_answer = asyncio.Event(), asyncio.Event()
+
+        async def ask(*_: object) -> tuple[PastWrite, ...]:
+            asked.set()
+            await may_answer.wait()
+            if error is not None:
+                raise error
+            return ()
+
+        stage = Stage(frames_per_s=1000.0)
+        stage.script.ask = ask  # type: ignore[method-assign]
+        tags = judged_state(1).snapshot.tags
+        async with stage:
+            for number in (1, 2):
+                later = TwinUpdate(Snapshot((2_000 + number) * 10**9, "map", tags), f"r{number}")
+                stage.script.tell(later)
+                await until(lambda: len(stage.ear.states) == number, "the frame")  # noqa: B023
+                house = stage.ear.states[-1]["health"]["house"]
+                if number == 1:
+                    assert house["verdict"] == "healthy"
+                    await asked.wait()
+                    may_answer.set()
+                    await until(lambda: stage.bridge._judge.knows_recent, "the log's word")
+            assert [reason["kind"] for reason in house["reasons"]] == ["stopped"]
 
     asyncio.run(test())
 

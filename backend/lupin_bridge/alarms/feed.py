@@ -326,7 +326,7 @@ RECENT_S_PER_TAG: Final = 2e-4
 async def learn_recent(source: TwinSource, judge: Judge, first: Snapshot) -> None:
     """Give the judge what was recent at the first state: after a start not everything is old.
 
-    It is asked again while the log cannot be read.
+    It is asked again while the log cannot be read; until then the judge goes by what is heard.
     """
     recent = Itself(RecentRequest(first.stamp_ns))
     while True:
@@ -335,9 +335,11 @@ async def learn_recent(source: TwinSource, judge: Judge, first: Snapshot) -> Non
         except (NotRemembered, PastRefused, TwinUnavailableError) as error:
             is_lasting = isinstance(error, NotRemembered) and error.is_lasting
             if not is_lasting and not isinstance(error, PastRefused):
+                judge.knows_recent = True
                 await asyncio.sleep(LEARN_AGAIN_S)
                 continue
             log.info("what was recent before is not known: %s", error)
         except Exception:  # nobody awaits this, and nothing else needs it
             log.exception("what was recent before is not known")
+        judge.knows_recent = True
         return

@@ -153,6 +153,8 @@ class Judge:
         self._days: Mapping[str, Sequence[Reading]] = {}
         self.errors = 0
         self._failing: set[str] = set()
+        # Before, each tag looks as if it was scanned once, and the robot as if it had stopped.
+        self.knows_recent = True
 
     def see(self, snapshot: Snapshot) -> Judged:
         """What is to be said now; the very same object where nothing has changed."""
@@ -340,7 +342,8 @@ class Judge:
             for tag_id in gone:
                 tags.pop(tag_id, None)
         patrol = self._scans.patrol(self._overdue)
-        stop = stopped(patrol.last_scan_ns, now_ns, len(self._once), len(tags))
+        once = len(self._once) if self.knows_recent else 0
+        stop = stopped(patrol.last_scan_ns, now_ns, once, len(tags))
         house = judge_site(self._counts, is_silent=now_ns is None, stopped=stop)
         is_same = (house, day, patrol) == (before.house, before.day, before.patrol)
         if tags is before.tags and is_same and before.number:

@@ -49,14 +49,16 @@ MAX_ENDPOINT: Final = 1_000
 TOGETHER_S: Final = 2.0
 # A phone that is off gets it for so long; what is older is on the page, s.
 TTL_S: Final = 3_600
-# Tries of one message, and the time before the second one, s.
-TRIES: Final = 4
+# Tries of one message, most of that hour: a greenhouse's way to the internet may fail for long. And
+# the time before the second one, s.
+TRIES: Final = 66
 FIRST_WAIT_S: Final = 2.0
 MOST_WAIT_S: Final = 60.0
 # Posts at once, to however many browsers.
 AT_ONCE: Final = 8
 _GONE: Final = (404, 410)
 _KEY: Final = "vapid"
+_NEVER: Final = 2**63 - 1
 
 
 class DeviceRefused(ValueError):
@@ -77,6 +79,7 @@ class Push:
         self.target, self._people, self._site = target, people, site
         self._vapid: Vapid02 | None = None
         self._news = AlarmNews()
+        self._has_read = False
         self._new: dict[str, Alarm] = {}
         self._is_news = asyncio.Event()
         self._task: asyncio.Task[None] | None = None
@@ -116,17 +119,27 @@ class Push:
 
     def start(self, source: Source) -> None:
         """Notify of critical alarms from now on."""
+        started_s = time.monotonic()
 
         def receive(change: Change) -> None:
-            for news in self._news.of(change, source.ros_time_ns, source.origin):
+            now_ns, since_ns = source.ros_time_ns, 0
+            if change.is_past:
+                # What is raised while the log is read at the start is new all the same.
+                since_ns = _NEVER
+                if not self._has_read and now_ns is not None:
+                    since_ns = now_ns - int((time.monotonic() - started_s) * 1e9)
+                self._has_read = True
+            for news in self._news.of(change, now_ns, source.origin):
                 alarm = news.alarm
-                if alarm is None or news.change not in ("raised", "worse") or change.is_past:
-                    continue  # at the start they are not new
-                if alarm.reason.verdict is Verdict.CRITICAL:
+                if alarm is None or news.change not in ("raised", "worse"):
+                    continue
+                at_ns = alarm.raised_at_ns if news.change == "raised" else alarm.worse_at_ns or 0
+                if at_ns >= since_ns and alarm.reason.verdict is Verdict.CRITICAL:
                     self._new[alarm.id] = alarm
                     self._is_news.set()
 
-        receive(Change(source.alarms.now.active, is_past=True))
+        if source.alarms.now.source != "starting":
+            receive(Change(source.alarms.now.active, is_past=True))
         self._unsubscribe = source.alarms.subscribe(receive)
         self._task = asyncio.create_task(self._run(source), name="push")
 

@@ -28,6 +28,8 @@ from lupin_twin.journal.buckets import Buckets, individually
 
 # From when to when, ns.
 Period = tuple[int, int]
+# Of each part, what is derived is made of so many readings at most: four weeks, one a minute.
+MAX_READINGS: Final = 8 * MAX_POINTS
 # Of a day there are points of a minute at least.
 _POINTS_A_DAY: Final = DAY_NS // (60 * NANOSECONDS_PER_SECOND)
 # (ns of ROS time, value), oldest first.
@@ -47,11 +49,11 @@ def series(request: SeriesRequest, sensors: Sensors, is_day: IsDay, find: Find) 
     derived, daily = DERIVED.get(request.sensor_type), DAILY.get(request.sensor_type)
     if measured.stamps_ns:
         return measured
+    # Now is the same for all parts.
+    request = replace(request, end_ns=measured.end_ns)
     if derived is not None:
         read = partial(_readings, derived, find)
     elif daily is not None:
-        # Now is the same for its parts.
-        request = replace(request, end_ns=measured.end_ns)
         read = partial(_of_days, daily, sensors, is_day, find)
     else:
         return measured
@@ -141,18 +143,10 @@ def _readings_of(daily: Daily, sensors: Sensors, part: SeriesPast, until_ns: int
 def _readings(derived: Derived, find: Find, request: SeriesRequest) -> tuple[Period, Readings]:
     """The period, and what can be derived in it: of readings of one moment, one scan."""
     part_request = replace(request, max_points=MAX_POINTS)
-    parts: list[SeriesPast] = []
-    for name in derived.sources:
-        part = find(replace(part_request, sensor_type=name))
-        if part.is_bucketed:
-            raise PastRefused(
-                f"{derived.name} is derived of {' and '.join(derived.sources)}, reading by reading:"
-                f" from {seconds(part.start_ns)} s to {seconds(part.end_ns)} s {name} has more than"
-                f" {MAX_POINTS} of them, the limit, or hours alone: ask for a shorter period"
-            )
-        parts.append(part)
-        part_request = replace(part_request, end_ns=part.end_ns)  # now is the same for both
-    first, second = parts
+    first, second = (
+        _each_reading(derived, find, replace(part_request, sensor_type=name))
+        for name in derived.sources
+    )
     # Of equal stamps, what was received last.
     ones = dict(zip(first.stamps_ns, first.means, strict=True))
     others = dict(zip(second.stamps_ns, second.means, strict=True))
@@ -162,3 +156,27 @@ def _readings(derived: Derived, find: Find, request: SeriesRequest) -> tuple[Per
         if stamp_ns in others and math.isfinite(value := derived.formula(one, others[stamp_ns]))
     ]
     return (min(first.start_ns, second.start_ns), first.end_ns), readings
+
+
+def _each_reading(derived: Derived, find: Find, request: SeriesRequest) -> SeriesPast:
+    """A part reading by reading: in halves, where one request has too many of them."""
+    part = find(request)
+    if not part.is_bucketed:
+        return part
+    start_ns, end_ns = request.start_ns or max(part.start_ns, 1), request.end_ns
+    middle_ns = (start_ns + end_ns) // 2
+    if not MAX_POINTS < sum(part.counts) <= MAX_READINGS or middle_ns == start_ns:
+        name, period = request.sensor_type, f"{seconds(part.start_ns)} s to {seconds(part.end_ns)}"
+        raise PastRefused(
+            f"{derived.name} is derived of {' and '.join(derived.sources)}, reading by reading:"
+            f" from {period} s {name} has more than {MAX_READINGS} of them, the limit, or hours"
+            " alone: ask for a shorter period"
+        )
+    halves = [
+        _each_reading(derived, find, replace(request, start_ns=from_ns, end_ns=to_ns))
+        for from_ns, to_ns in ((start_ns, middle_ns), (middle_ns, end_ns))
+    ]
+    stamps_ns, values = (
+        sum((getattr(half, name) for half in halves), ()) for name in ("stamps_ns", "means")
+    )
+    return individually(list(zip(stamps_ns, values, strict=True)), start_ns, end_ns)

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import asyncio
 import json
 import re
 import ssl
 import stat
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import http_ece
@@ -19,13 +21,19 @@ from cryptography.hazmat.primitives.asymmetric import ec
 from cryptography.hazmat.primitives.serialization import Encoding, PublicFormat
 from py_vapid import Vapid02
 
-from lupin_bridge.notify.push import encoded
+from lupin_bridge.alarms.board import AlarmBoard, Change, page_of
+from lupin_bridge.judge.episodes import Alarm
+from lupin_bridge.notify.destinations import PushTarget
+from lupin_bridge.notify.http_post import PostError
+from lupin_bridge.notify.push import FIRST_WAIT_S, MOST_WAIT_S, TRIES, Push, encoded
+from lupin_bridge.notify.retry import Backoff, Condition, until_taken
 from tests.support.access import refused_start
 from tests.support.messages import look
 from tests.support.people import OWN, TOKEN, add, changing, remove, signed_in
 from tests.support.receiver import Answer, Posted, Receiver, receiver, status
+from tests.support.seen import NOW_NS, S, alarm
 from tests.support.tls import certificate
-from tests.support.waiting import PATIENCE_S, wait_for
+from tests.support.waiting import PATIENCE_S, until, wait_for
 from tests.support.web import Bridge, bridge
 
 CONTACT = "mailto:grower@example.org"
@@ -175,6 +183,57 @@ def test_a_push_service_that_wants_to_be_left_alone_holds_up_no_other_phone(tmp_
         wait_for(lambda: len(on.service.posted) == 3, "the next alarm")
         [both] = [phone for phone in phones if len(on.posted_to(phone)) == 2]
         assert both.read(on.posted_to(both)[1])["body"].startswith("Tag 8:")
+
+
+def test_without_internet_for_half_an_hour_nothing_is_lost(monkeypatch: pytest.MonkeyPatch) -> None:
+    now_s = 0.0
+
+    async def sleep(for_s: float) -> None:
+        nonlocal now_s
+        now_s += for_s
+
+    async def attempt() -> None:
+        if now_s < 1800.0:
+            raise PostError("its host is not known")
+
+    monkeypatch.setattr("lupin_bridge.notify.retry.asyncio.sleep", sleep)
+    backoff, condition = Backoff(FIRST_WAIT_S, MOST_WAIT_S), Condition()
+    sent = until_taken(attempt, condition, backoff, "an alarm", "push.example", most_tries=TRIES)
+    assert asyncio.run(sent)
+
+
+def test_an_alarm_that_is_raised_while_the_log_is_read_at_the_start_is_new(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    notified: list[str] = []
+
+    async def notify(_: Push, alarms: Sequence[Alarm], __: Any) -> None:
+        notified.extend(it.tag_id for it in alarms)
+
+    async def test() -> None:
+        board = AlarmBoard()
+        source: Any = SimpleNamespace(
+            alarms=board, notes=SimpleNamespace(notes=()), origin="robot", ros_time_ns=None
+        )
+        push = Push(PushTarget(CONTACT, frozenset(), ssl.create_default_context()), None, "")  # type: ignore[arg-type]
+        push.start(source)
+        source.ros_time_ns = NOW_NS + 1
+
+        def put(change: Change) -> None:
+            board.put(page_of(change.changed), change, "journal", 0)
+
+        before, meanwhile = alarm("before", raised_ns=NOW_NS - 9 * S), alarm("meanwhile")
+        put(Change((before, meanwhile), is_past=True))
+        await until(lambda: notified == ["meanwhile"], "what is new")
+        # The log is read again, as another journal is begun.
+        put(Change((before, meanwhile, alarm("again")), is_past=True))
+        put(Change((alarm("later"),)))
+        await until(lambda: notified == ["meanwhile", "later"], "the next one")
+        await push.stop()
+
+    monkeypatch.setattr(Push, "_notify", notify)
+    monkeypatch.setattr("lupin_bridge.notify.push.TOGETHER_S", 0.0)
+    asyncio.run(test())
 
 
 @pytest.fixture(scope="module")

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from lupin_twin.core.journal_condition import JournalState
 from lupin_twin.core.state import Reading
 from lupin_twin.journal.retention import Limits
 from lupin_twin.journal.salvage import quarantine
@@ -17,8 +18,10 @@ from tests.support.journal import (
     kept,
     known,
     opened,
+    recording,
     scan,
     select,
+    wait_state,
 )
 
 
@@ -60,6 +63,16 @@ def test_upkeep_purges_shrinks_and_checkpoints(path: Path, monkeypatch: pytest.M
     assert 0 < left < 1000
     assert path.stat().st_size < 400_000
     assert is_whole(path)
+
+
+def test_it_is_said_where_hours_leave_no_room_for_scans(
+    path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("lupin_twin.journal.file._PURGE_EVERY_S", 0.0)
+    kept(path, [scan(at_ns=NOW + n) for n in range(500)])
+    with recording(path, limits=Limits(days=36_500, max_bytes=10_000)) as journal:
+        wait_state(journal, JournalState.RECORDING, "no scans are kept: hours, which stay")
+    assert select(path, "SELECT count(*) FROM scan") == [(0,)]
 
 
 @pytest.mark.parametrize("is_there", [True, False])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import shutil
 import signal
 import sqlite3
@@ -154,6 +155,29 @@ def test_a_disk_that_fills_meanwhile_leaves_the_old_file_as_it_was(tmp_path: Pat
     fail_on_a_full_disk(code, path, 50_000)
     assert path.read_bytes() == content
     assert names_in(tmp_path) == {"j.sqlite"}
+
+
+def test_where_no_links_are_and_no_room_for_a_copy_nothing_is_left_behind(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refused(*_: object) -> None:
+        raise OSError(errno.EPERM, "no links")
+
+    def half(source: Path, target: Path) -> None:
+        target.write_bytes(source.read_bytes()[:5_000])
+        raise OSError(errno.ENOSPC, "no room")
+
+    path = old("day", tmp_path)
+    content = path.read_bytes()
+    monkeypatch.setattr("os.link", refused)
+    with monkeypatch.context() as full:
+        full.setattr("shutil.copyfile", half)
+        with pytest.raises(OSError, match="no room"):
+            upgrade(path, lambda share: None)
+    assert path.read_bytes() == content
+    assert names_in(tmp_path) == {"j.sqlite"}
+    upgrade(path, lambda share: None)
+    assert names_in(tmp_path) == {"j.sqlite", "j.sqlite.v3"}
 
 
 def test_while_somebody_reads_it_waits(tmp_path: Path) -> None:

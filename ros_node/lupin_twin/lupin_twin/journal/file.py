@@ -21,13 +21,13 @@ from lupin_twin.journal.notes import put_note
 from lupin_twin.journal.retention import (
     Limits,
     Stretches,
-    holds_older,
     horizon_ns,
     kept,
     note_limits,
     note_lost,
     purge_step,
     shrink_step,
+    undone,
 )
 from lupin_twin.journal.rows import last_rows
 from lupin_twin.journal.runs import (
@@ -96,8 +96,8 @@ class JournalFile:
 
     def __init__(self, path: Path, limits: Limits, *, is_sound: bool | None) -> None:
         self.simulated: Stretch | None = None
-        # Rows past the age limit wait to be forwarded.
-        self.holds_older = False
+        # Which limit is not kept, in words.
+        self.undone = ""
         self._path = path
         self._limits = limits
         self._map: object = None
@@ -392,7 +392,7 @@ class JournalFile:
                 before_ns = self._purges_before_ns
                 forwarded = forwarded_seq(self._path, get_meta(self._connection, "journal_id"))
                 if not purge_step(self._connection, self._limits, before_ns, forwarded):
-                    self.holds_older = holds_older(self._connection, before_ns)
+                    self.undone = undone(self._connection, self._limits, before_ns)
                     self._purges_before_ns = None
                 self._kept = None
             self._is_shrinking = True

@@ -81,12 +81,12 @@ def upgrade(path: Path, report: Callable[[float], None]) -> str:
                 target.execute("PRAGMA synchronous = OFF")
                 damaged = _Upgrade(Version3(connection), target, report).run()
         _sync(new)
+        kept = _keep(path)
     except BaseException as error:
         _remove(new)
         if isinstance(error, sqlite3.OperationalError) and str(error).startswith("no such"):
             raise DamagedFile(f"the tables of {path} are not those of a journal") from error
         raise
-    kept = _keep(path)
     # Empty by now, but of the old file: who still reads that has them open, and keeps them.
     for end in ("-wal", "-shm"):
         path.with_name(path.name + end).unlink(missing_ok=True)
@@ -122,8 +122,12 @@ def _keep(path: Path) -> Path:
         os.link(path, kept)
     except OSError:  # a file system without links
         part = path.with_name(path.name + ".upgrade-copy")
-        shutil.copyfile(path, part)
-        _sync(part)
+        try:
+            shutil.copyfile(path, part)
+            _sync(part)
+        except OSError:  # the disk is full: what is there of it would keep it so
+            part.unlink(missing_ok=True)
+            raise
         part.rename(kept)
     sync_folder(path.parent)
     return kept

@@ -104,12 +104,12 @@ def kept(connection: sqlite3.Connection) -> Stretches:
 def horizon_ns(connection: sqlite3.Connection, limits: Limits, now_ns: int) -> int:
     """What was received before this, by the wall's clock, goes now.
 
-    That clock may be ahead: what was received last tells how far it has come, and no more than a
-    day of what is there goes at once.
+    That clock may be ahead: what was received last tells how far it has come, and no more than an
+    hour of what is there goes in a round, a minute: a clock that is set right soon costs little.
     """
     first = min(_arrivals(connection, "ASC"), default=now_ns)
     last = max(_arrivals(connection, "DESC"), default=now_ns)
-    return min(min(now_ns, last) - int(limits.days * DAY_NS), first + DAY_NS)
+    return min(min(now_ns, last) - int(limits.days * DAY_NS), first + HOUR_NS)
 
 
 def purge_step(
@@ -150,9 +150,13 @@ def purge_step(
     return True
 
 
-def holds_older(connection: sqlite3.Connection, before_ns: int) -> bool:
-    """Whether rows are there that are too old: they wait to be forwarded."""
-    return any(arrival_ns < before_ns for arrival_ns in _arrivals(connection, "ASC"))
+def undone(connection: sqlite3.Connection, limits: Limits, before_ns: int) -> str:
+    """Which limit is not kept though there is nothing more to delete, in words; empty: none."""
+    if used_bytes(connection) > limits.max_bytes:
+        return "no scans are kept: hours, which stay, are larger than journal_max_mb"
+    if any(arrival_ns < before_ns for arrival_ns in _arrivals(connection, "ASC")):
+        return "what is older than journal_days is kept until it is forwarded"
+    return ""
 
 
 def _arrivals(connection: sqlite3.Connection, way: str) -> list[int]:

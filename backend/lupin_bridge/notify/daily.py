@@ -111,15 +111,23 @@ class DailyReport:
         complete_ns = journal.complete_ns or 0
         if complete_ns < due_ns and now_ns < due_ns + LATE_NS:
             return ""
-        start_ns = target.ended_ns(due_ns, -1)
-        report = Report(start_ns, due_ns, of.criteria, journal)
-        answered = await of.source.ask(ConditionalQuery(report), REPORT_S)
-        assert answered.answer is not None  # no ETag was given
-        body = orjson.Fragment(answered.answer.body)
-        if not await self._channel.deliver(f"report.{compact(due_ns)}", body):
-            log.error("the report up to %s was given up by %s", compact(due_ns), self._channel.name)
+        report = Report(target.ended_ns(due_ns, -1), due_ns, of.criteria, journal)
+        try:
+            await self._send(report, of)
+        except PastRefused as error:
+            if now_ns < due_ns + LATE_NS:
+                raise
+            # It would be refused for ever, and the days behind it with it.
+            log.error("the report up to %s is left out: %s", compact(due_ns), error)  # noqa: TRY400
         _write(file, due_ns)
         return ""
+
+    async def _send(self, report: Report, of: Source) -> None:
+        answered = await of.source.ask(ConditionalQuery(report), REPORT_S)
+        assert answered.answer is not None  # no ETag was given
+        body, until = orjson.Fragment(answered.answer.body), compact(report.end_ns)
+        if not await self._channel.deliver(f"report.{until}", body):
+            log.error("the report up to %s was given up by %s", until, self._channel.name)
 
     def _file(self, journal_id: str) -> Path:
         text = f"{self._channel.called} {journal_id}".encode()

@@ -25,7 +25,7 @@ from lupin_bridge.past.plans import Answered
 from lupin_bridge.serving.admission import Answer
 from lupin_bridge.settings import Secrets, SettingError, Settings
 from lupin_twin.core.journal_condition import Condition, JournalState
-from lupin_twin.core.past import NotRemembered
+from lupin_twin.core.past import NotRemembered, PastRefused
 from tests.support.mosquitto import Broker, Subscriber, free_port
 from tests.support.receiver import Receiver, receiver, status
 from tests.support.seen import SENSORS, Alarms, seen, tag
@@ -144,6 +144,21 @@ async def test_missed_days_are_sent_in_their_order_and_no_more_than_a_week_of_th
             await looks(house)
         assert periods(at)[-1][1] == ns("2026-05-31T06:00Z")
         assert "too many were missed" in caplog.text
+
+
+async def test_a_day_with_too_much_in_it_holds_up_no_other(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    house = House(ns("2026-05-01T07:00Z"))
+    with receiver(status(200)) as at:
+        async with sending(house, tmp_path, at.port):
+            await noted(tmp_path)
+            house.error = PastRefused("about 200000 scans, the limit is 100000")
+            house.ros_time_ns = ns("2026-05-02T07:00Z")
+            await until(lambda: "20260502T060000Z is left out" in caplog.text, "the word of it")
+            house.error, house.ros_time_ns = None, ns("2026-05-03T07:00Z")
+            await until(lambda: at.posted, "the next one")
+        assert periods(at) == [[ns("2026-05-02T06:00Z"), ns("2026-05-03T06:00Z")]]
 
 
 async def test_one_that_is_not_taken_is_tried_again_also_by_the_next_process(

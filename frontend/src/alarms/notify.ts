@@ -41,7 +41,9 @@ export async function wishNotify(isWished: boolean): Promise<void> {
   });
 }
 
-/** One for all that is new; a later one takes its place, in every tab of the browser. */
+let last: Notification | null = null;
+
+/** One for all that is new, in whichever tabs of the browser; a later one takes its place. */
 function show(raised: readonly Item[]): void {
   const [first] = raised;
   if (!first) return;
@@ -53,10 +55,13 @@ function show(raised: readonly Item[]): void {
   try {
     const origin = selectOrigin(store.get());
     const title = S.alarmNotifyTitle(raised.length);
+    last?.close();
     const shown = new Notification(origin === null ? title : `${S.origin[origin]}: ${title}`, {
       body,
-      tag: 'lupin-twin.alarms',
+      // Other news has another name: under the same one a browser does so in silence.
+      tag: `lupin-twin.alarms ${first.alarm.id} ${first.verdict}`,
     });
+    last = shown;
     shown.onclick = () => {
       window.focus();
       showAlarm(first.alarm);

@@ -208,6 +208,7 @@ describe('sound', () => {
 
 describe('notification', () => {
   const shown: { title: string; body: string; onclick?: () => void; close: () => void }[] = [];
+  const tags: string[] = [];
   /** As the browser's own: jsdom has none. */
   const browser = (permission: string, answer = permission): { asked: number } => {
     const log = { asked: 0 };
@@ -222,9 +223,10 @@ describe('notification', () => {
       body: string;
       constructor(
         readonly title: string,
-        { body }: { body: string },
+        { body, tag }: { body: string; tag: string },
       ) {
         this.body = body;
+        tags.push(tag);
         shown.push(this);
       }
       close(): void {
@@ -236,7 +238,7 @@ describe('notification', () => {
     return log;
   };
   beforeEach(() => {
-    shown.length = 0;
+    shown.length = tags.length = 0;
     vi.spyOn(document, 'hasFocus').mockReturnValue(false);
   });
 
@@ -253,6 +255,17 @@ describe('notification', () => {
     shown[0]?.onclick?.();
     expect(store.get().view.selected).toBe('1');
     expect(shown).toEqual([]);
+  });
+
+  test('what comes later takes its place, and not in silence as under the same tag', async () => {
+    browser('granted');
+    start(startNotify);
+    await wishNotify(true);
+    tellAlarms();
+    tellAlarms(warm);
+    tellAlarms(warm, cold);
+    expect(shown.map(({ title }) => title)).toEqual(['1 new alarm']);
+    expect(new Set(tags).size).toBe(2);
   });
 
   test('not while somebody looks', async () => {

@@ -1,4 +1,4 @@
-import { describe, expect, test } from 'vitest';
+import { describe, expect, test, vi } from 'vitest';
 
 import { tickStep, timeTicks } from './ticks';
 
@@ -46,6 +46,14 @@ describe('ticks', () => {
       '11 May',
       '18 May',
     ]);
+  });
+
+  test('begin at midnight also behind a day that has none', () => {
+    vi.stubEnv('TZ', 'America/Santiago');
+    const span = { from: local('2026-09-05T12:00:00'), to: local('2026-09-08T12:00:00') };
+    const times = timeTicks(span, 3, false).map(({ at }) => new Date(at * 1000).getHours());
+    expect(times).toEqual([1, 0, 0]);
+    vi.unstubAllEnvs();
   });
 
   test('of months are their first days, and tell the year', () => {

@@ -63,6 +63,8 @@ function clockTimes({ from, to }: Span, step: number): number[] {
     const begin = day.getTime() / 1000;
     if (step >= 30 * DAY) day.setMonth(day.getMonth() + Math.round(step / (30 * DAY)));
     else day.setDate(day.getDate() + Math.max(1, Math.round(step / DAY)));
+    // Where summer begins at midnight, that day begins at one, and the next does not.
+    day.setHours(0, 0, 0, 0);
     if (step >= DAY) {
       if (begin >= from) times.push(begin);
       continue;

@@ -7,6 +7,7 @@ import { NO_HOUSE } from '../store/twin';
 import { FakeContext } from '../testing/canvas';
 import { showTags } from '../testing/page';
 import { readings, stateFrame, wireTag } from '../testing/tags';
+import { FOOTER_PX } from '../draw/footer';
 import { saveMap, saveTable } from './actions';
 import { fileName } from './save';
 
@@ -84,7 +85,9 @@ describe('table as a file', () => {
 test('a picture is taken of layers that are as on paper', async () => {
   const layer = document.createElement('canvas');
   layer.dataset['layer'] = 'still';
-  layer.width = layer.height = 10;
+  // As the map leaves it where the table is in front: drawn twice as fine, and of no size.
+  layer.width = layer.height = 20;
+  layer.style.width = '10px';
   document.body.append(layer);
   let result: HTMLCanvasElement | null = null;
   vi.spyOn(HTMLCanvasElement.prototype, 'toBlob').mockImplementation(function (
@@ -95,6 +98,7 @@ test('a picture is taken of layers that are as on paper', async () => {
     result = this;
     tell(new Blob(['png']));
   });
+  const height = (): number => result?.height ?? 0;
   const drawn = (): number => {
     const canvas = result;
     return canvas ? (FakeContext.recordOf(canvas)?.named('drawImage').length ?? 0) : 0;
@@ -109,6 +113,7 @@ test('a picture is taken of layers that are as on paper', async () => {
   stop();
   layer.remove();
   expect(drawn()).toBe(1);
+  expect(height()).toBe(20 + 2 * FOOTER_PX);
   expect(names).toHaveLength(2);
 });
 

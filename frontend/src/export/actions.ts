@@ -69,7 +69,8 @@ export async function saveMap(): Promise<void> {
   const state = store.get();
   const { snapshot, moment } = selectShown(state);
   if (!first || first.width === 0 || !snapshot) return;
-  const ratio = first.width / Math.max(1, first.getBoundingClientRect().width);
+  // Not as it is laid out: behind the table of a phone it has no size.
+  const ratio = first.width / (parseFloat(first.style.width) || first.width);
   const style = getComputedStyle(document.documentElement);
   const canvas = newCanvas(first.width, first.height + FOOTER_PX * ratio);
   const context = contextOf(canvas);

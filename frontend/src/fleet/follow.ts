@@ -1,6 +1,7 @@
 /** The overview as the server sends it: one socket, tried again whenever it ends. */
 import { epochOf, now, onLapse } from '../clock';
 import { backoffMs } from '../connection/backoff';
+import { signInIfAsked } from '../connection/socket';
 import { parseSites, withFrame, type Archive, type Sites } from './sites';
 
 export interface Seen {
@@ -47,9 +48,15 @@ export function follow(url: string, onSeen: (seen: Seen) => void): () => void {
   };
   const open = (): void => {
     drop();
+    let isOpened = false;
     socket = new WebSocket(url);
+    socket.onopen = () => {
+      isOpened = true;
+    };
     socket.onclose = ({ code }) => {
       lost(code);
+      // The server is away, or the session has ended.
+      if (!isOpened) void signInIfAsked();
     };
     socket.onmessage = ({ data }) => {
       const frame = parseSites(data);

@@ -1,4 +1,4 @@
-import type { JSX } from 'react';
+import { useState, type JSX } from 'react';
 
 import { now } from '../clock';
 import type { Compare } from '../domain/difference';
@@ -58,16 +58,24 @@ function compareFor(choice: Choice, dayS: number): Compare | null {
   }
 }
 
+/** While it is typed a year is none yet, and is not to be taken away for that. */
 function OwnMoment({ at }: { at: number }): JSX.Element {
+  const inForce = { of: at, text: fieldOf(at, false) };
+  const [typed, setTyped] = useState(inForce);
   if (!hasDate(at)) return <span className="faint">{rosText(at)}</span>;
   return (
     <input
       type="datetime-local"
       step={1}
       aria-label={S.compareMoment}
-      value={fieldOf(at, false)}
+      value={typed.of === at ? typed.text : inForce.text}
+      onBlur={() => {
+        setTyped(inForce);
+      }}
       onChange={(event) => {
-        const chosen = momentOf(event.target.value, false);
+        const text = event.target.value;
+        const chosen = momentOf(text, false);
+        setTyped({ of: chosen ?? at, text });
         if (chosen !== null) act({ type: 'compare', compare: { by: 'moment', at: chosen } });
       }}
     />

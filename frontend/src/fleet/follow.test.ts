@@ -1,0 +1,40 @@
+import { afterEach, expect, test, vi } from 'vitest';
+
+import { follow } from './follow';
+
+class FakeSocket {
+  static last: FakeSocket | null = null;
+  onopen: (() => void) | null = null;
+  onclose: ((event: { code: number }) => void) | null = null;
+  onmessage: ((event: { data: unknown }) => void) | null = null;
+
+  constructor() {
+    FakeSocket.last = this;
+  }
+
+  close(): void {
+    // It says nothing more.
+  }
+}
+
+afterEach(() => {
+  vi.useRealTimers();
+});
+
+test('a connection that is refused may be one of a session that has ended', () => {
+  vi.useFakeTimers();
+  vi.stubGlobal('WebSocket', FakeSocket);
+  const asked: string[] = [];
+  vi.stubGlobal('fetch', (url: URL) => {
+    asked.push(url.pathname);
+    return Promise.resolve(new Response());
+  });
+  const stop = follow('ws://test/ws/sites', () => undefined);
+  FakeSocket.last?.onopen?.();
+  FakeSocket.last?.onclose?.({ code: 1006 });
+  expect(asked).toEqual([]);
+  vi.advanceTimersByTime(60_000);
+  FakeSocket.last?.onclose?.({ code: 1006 });
+  expect(asked).toEqual(['/readyz']);
+  stop();
+});

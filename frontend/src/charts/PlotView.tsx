@@ -1,8 +1,9 @@
 import 'uplot/dist/uPlot.min.css';
 import '../styles/charts.css';
 
-import { useEffect, useLayoutEffect, useRef, useState, type JSX } from 'react';
+import { useEffect, useLayoutEffect, useRef, useState, type CSSProperties, type JSX } from 'react';
 
+import { rgbText, sensorColour } from '../domain/ramp';
 import { rosText } from '../domain/rostime';
 import { shown } from '../domain/text';
 import { unitOf } from '../domain/units';
@@ -18,7 +19,7 @@ import { createPlot, type Plot } from './plot';
 import { plotText } from './told';
 import { zoomTo } from './zoom';
 
-/** One chart. `isAlone`: its one line has no list beside it that says its value. */
+/** One chart. `isAlone`: its one line has the sensor's colour, and no list beside it that says its value. */
 export function PlotView({
   model,
   height,
@@ -71,7 +72,12 @@ export function PlotView({
   }, [model, width, height]);
 
   return (
-    <section className="plot-view" aria-label={S.chartOf(shown(model.sensor.label, 32))}>
+    <section
+      className="plot-view"
+      aria-label={S.chartOf(shown(model.sensor.label, 32))}
+      data-alone={isAlone}
+      style={{ '--sensor': rgbText(sensorColour(model.sensor)) } as CSSProperties}
+    >
       <header>
         <h3>
           {shown(model.sensor.label, 32)}{' '}

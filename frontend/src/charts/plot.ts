@@ -40,7 +40,7 @@ export interface Plot {
 }
 
 export function createPlot(element: HTMLElement, handlers: PlotHandlers): Plot {
-  let palette = readPalette();
+  let palette = readPalette(element);
   let model: PlotModel | null = null;
   let chart: uPlot | null = null;
   let shape = '';
@@ -183,7 +183,7 @@ export function createPlot(element: HTMLElement, handlers: PlotHandlers): Plot {
       chart?.setCursor({ left, top: at === null ? -10 : 0 }, false);
     },
     recolour: () => {
-      palette = readPalette();
+      palette = readPalette(element);
       chart?.batch(() => {
         chart?.redraw();
       });

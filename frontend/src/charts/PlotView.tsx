@@ -24,10 +24,12 @@ export function PlotView({
   model,
   height,
   isAlone = true,
+  hasTimes = true,
 }: {
   model: PlotModel;
   height: number;
   isAlone?: boolean;
+  hasTimes?: boolean;
 }): JSX.Element {
   const place = useRef<HTMLDivElement>(null);
   const plot = useRef<Plot | null>(null);
@@ -68,8 +70,8 @@ export function PlotView({
   }, [ofBar]);
 
   useEffect(() => {
-    if (width > 0) plot.current?.show(model, { width, height });
-  }, [model, width, height]);
+    if (width > 0) plot.current?.show(model, { width, height, hasTimes });
+  }, [model, width, height, hasTimes]);
 
   return (
     <section

@@ -149,6 +149,8 @@ test('a critical alarm takes a reason, and is shelved for no more than an hour',
   // As long as the focus is in the list, no row moves.
   fireEvent.blur(screen.getByTestId('alarms'));
   expect(first('shelved').textContent).toMatch(/shelved until [\d:]+: fan is being mended/);
+  tell(alarm('a', { tag_id: '5', shelved_by: 'anna' }));
+  expect(first('shelved').textContent).toMatch(/shelved by anna until [\d:]+: fan is being mended/);
 });
 
 test('what is shelved while the list is held says so where it stands, and all is without it', () => {

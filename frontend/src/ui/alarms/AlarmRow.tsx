@@ -30,9 +30,6 @@ export const AlarmRow = memo(function AlarmRow({
   const values = useValues(alarm);
   const current = values.state?.kind === 'known' ? values.state.verdict : verdict;
   const name = useApp((state) => nameText(alarm, selectSpeech(state)));
-  // One inspection that sees no pests may have missed them.
-  const isPest = alarm.reason.kind === 'pest';
-  const isToDo = group !== 'resolved' && (current !== 'healthy' || isPest);
   return (
     <li
       data-alarm={alarm.id}
@@ -58,9 +55,9 @@ export const AlarmRow = memo(function AlarmRow({
               {': '}
               {values.what}
             </span>
-            {isToDo && (
+            {group !== 'resolved' && (
               <span className="alarm-do" data-again={current === 'healthy' || undefined}>
-                {current === 'healthy' ? S.todoPestAgain : todoText(alarm.reason)}
+                {todoText(alarm.reason, current)}
               </span>
             )}
           </span>

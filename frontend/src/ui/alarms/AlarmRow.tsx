@@ -26,7 +26,9 @@ export const AlarmRow = memo(function AlarmRow({
   /** Where the row stands: while the order is held, not where the alarm belongs by now. */
   group: GroupName;
 }): JSX.Element {
-  const { alarm, verdict, isAcknowledged } = item;
+  const { alarm, verdict, isAcknowledged, shelf } = item;
+  const belongs = alarm.cleared_at !== null ? 'resolved' : shelf !== null ? 'shelved' : 'active';
+  const isSelected = useApp((state) => state.view.selected === alarm.tag_id);
   const values = useValues(alarm);
   const current = values.state?.kind === 'known' ? values.state.verdict : verdict;
   const name = useApp((state) => nameText(alarm, selectSpeech(state)));
@@ -36,6 +38,8 @@ export const AlarmRow = memo(function AlarmRow({
       data-where={alarm.tag_id}
       data-health={verdict}
       data-acknowledged={isAcknowledged}
+      data-elsewhere={group !== belongs}
+      data-selected={isSelected}
     >
       <button
         type="button"

@@ -163,6 +163,8 @@ test('what is shelved while the list is held says so where it stands, and all is
     true,
     false,
   ]);
+  // The heading counts it no more.
+  expect(group('active').map(({ dataset }) => dataset['elsewhere'])).toEqual(['true', 'false']);
   press('Acknowledge all (1)');
 });
 

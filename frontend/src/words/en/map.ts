@@ -25,7 +25,7 @@ export const MAP = {
     advice: 'Where another tag would help',
   },
   scaleBar: (length: string): string => `Scale: ${length}`,
-  notKnown: 'not known',
+  notKnown: 'unknown',
   position: (x: string, y: string): string => `x ${x} m, y ${y} m`,
 
   legend: 'Legend',

@@ -167,12 +167,15 @@ class Push:
                 log.exception("push met an error and goes on")
 
     async def _notify(self, alarms: Sequence[Alarm], source: Source) -> None:
-        for device in await self._people.write(lambda it, _: it.devices(self._site)):
+        for device in await self._devices():
             endpoint = device.endpoint
             self._owed.setdefault(endpoint, {}).update({alarm.id: alarm for alarm in alarms})
             if endpoint not in self._sending:
                 self._sending[endpoint] = asyncio.create_task(self._serve(device, source))
         self.condition.waiting = len(self._sending)
+
+    async def _devices(self) -> Sequence[Device]:
+        return await self._people.write(lambda it, _: it.devices(self._site))
 
     async def _serve(self, device: Device, source: Source) -> None:
         """Send all that is owed to a browser; no other waits for it."""
@@ -194,8 +197,14 @@ class Push:
     async def _send(self, device: Device, message: bytes) -> None:
         """Until its push service takes it, has it no more, or was tried enough."""
         host = urlsplit(device.endpoint).hostname or ""
+        is_again = False
 
         async def attempt() -> None:
+            nonlocal is_again
+            # Whose it is may have switched it off meanwhile, or may not have it any more.
+            if is_again and all(it.endpoint != device.endpoint for it in await self._devices()):
+                raise DeviceGone
+            is_again = True
             try:
                 endpoint = await self._endpoint(device.endpoint)
                 headers, body = await self._headers(endpoint), encrypted(device, message)

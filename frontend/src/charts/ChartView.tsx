@@ -8,6 +8,7 @@ import type { Charted } from '../store/view';
 import { S } from '../strings';
 import { IconButton } from '../widgets/IconButton';
 import { Segmented } from '../widgets/Segmented';
+import { useFocusBack } from '../widgets/useFocusBack';
 import { modelOf, pairsOf, plansOf, tagLabel } from './charted';
 import { ChartFiles } from './ChartFiles';
 import { ChartState } from './ChartState';
@@ -35,6 +36,8 @@ export default function ChartView({ charted }: { charted: Charted }): JSX.Elemen
   const both = useApp(selectCatalogues);
   const isZoomed = useZoomed();
   const [isTable, setTable] = useState(false);
+  const root = useRef<HTMLElement>(null);
+  useFocusBack(root);
   const body = useRef<HTMLDivElement>(null);
   const size = useSize(body);
   const [tagId = ''] = charted.tagIds;
@@ -61,7 +64,7 @@ export default function ChartView({ charted }: { charted: Charted }): JSX.Elemen
   };
 
   return (
-    <section className="chart-view" aria-label={S.charts} data-testid="chart-view">
+    <section ref={root} className="chart-view" aria-label={S.charts} data-testid="chart-view">
       <header>
         <h2 className={charted.by === 'tag' ? undefined : 'unseen'}>
           <bdi>{charted.by === 'tag' ? tagLabel(tagId) : S.charts}</bdi>

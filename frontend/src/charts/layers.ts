@@ -1,9 +1,10 @@
 /** What a chart has below and above its lines: drawn by functions that keep no state. */
+import { valueText } from '../domain/format';
 import type { Span } from '../domain/period';
 import { toShown } from '../domain/units';
 import { S } from '../strings';
 import { isStroked, lookOf, markerPath } from './looks';
-import { pointsOf, type Line, type PlotModel } from './model';
+import { limitsOf, pointsOf, type Line, type PlotModel } from './model';
 import type { ChartPalette } from './palette';
 
 /** Where things lie on the canvas, in its own pixels. */
@@ -131,42 +132,40 @@ export function drawAbove(frame: Frame, model: PlotModel, palette: ChartPalette)
   for (const line of model.lines) {
     drawMarkers(frame, line, model, palette);
   }
-  drawNames(frame, model, palette);
   drawMoment(frame, model, palette);
   context.restore();
+  drawNames(frame, model, palette);
   for (const line of model.lines) drawMarks(frame, line, palette);
 }
 
-/** What band and lines are, at their beginning; CSS pixels. */
-const NAME_GAP = 4;
-const NAME_HEIGHT = 12;
+/** A limit's name right of the plot needs so much of it in height; CSS pixels. */
+const NAME_HEIGHT = 13;
+const NAME_GAP = 6;
 
-function drawNames(frame: Frame, { sensor, bands, unit }: PlotModel, palette: ChartPalette): void {
-  const { context, box, ratio } = frame;
-  const [ranges] = bands.map((band) => band.ranges);
-  if (!ranges?.ideal) return;
-  const y = (value: number): number => frame.y(toShown(sensor, value, unit));
-  const gap = NAME_GAP * ratio;
-  const [low, high] = ranges.ideal;
+/** Each limit at its line, and with an arrow where its line lies above or below the picture. */
+function drawNames(
+  { context, box, ratio, y }: Frame,
+  model: PlotModel,
+  palette: ChartPalette,
+): void {
+  const height = NAME_HEIGHT * ratio;
+  const names = limitsOf(model).sort((a, b) => b.value - a.value);
   context.font = palette.font.replace(/[\d.]+(?=px)/, (size) => String(Number(size) * ratio));
   context.textAlign = 'left';
-  context.lineWidth = 3 * ratio;
-  context.lineJoin = 'round';
-  context.strokeStyle = palette.surface;
-  const lowest = box.top + box.height - NAME_HEIGHT * ratio - gap;
-  const name = (text: string, at: number, wantsBelow: boolean): void => {
-    const isBelow = wantsBelow && at < lowest;
-    context.textBaseline = isBelow ? 'top' : 'bottom';
-    const place = [box.left + gap, at + (isBelow ? gap : -gap)] as const;
-    context.strokeText(text, ...place);
-    context.fillText(text, ...place);
-  };
-  context.fillStyle = palette.text;
-  const top = Math.max(y(high), box.top);
-  if (y(low) - top > 6 * gap && top < box.top + box.height) name(S.idealParts.any, top, true);
-  context.fillStyle = palette.failure;
-  for (const bound of ranges.critical ?? []) name(S.health.critical, y(bound), bound < low);
+  context.textBaseline = 'middle';
+  let least = box.top;
+  names.forEach(({ kind, value, side }, index) => {
+    const most = box.top + box.height - (names.length - 1 - index) * height;
+    const at = Math.max(least, Math.min(y(toShown(model.sensor, value, model.unit)), most));
+    least = at + height;
+    const word = kind === 'ideal' ? S.idealParts.any : S.alarmStatus.critical;
+    const text = `${ARROWS[side]}${word} ${valueText(model.sensor, value, model.unit)}`;
+    context.fillStyle = kind === 'ideal' ? palette.text : palette.failure;
+    context.fillText(text, box.left + box.width + NAME_GAP * ratio, at);
+  });
 }
+
+const ARROWS = { below: '↓ ', inside: '', above: '↑ ' } as const;
 
 /** Each reading where there is room; a point between two breaks always, or it would not be seen. */
 function drawMarkers(frame: Frame, line: Line, model: PlotModel, palette: ChartPalette): void {

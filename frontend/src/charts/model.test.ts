@@ -2,7 +2,7 @@ import { describe, expect, test } from 'vitest';
 
 import type { Ranges } from '../domain/sensors';
 import type { Series } from '../domain/series';
-import { aligned, bandsOf, drawnOf, pointsOf, valueRange, type PlotModel } from './model';
+import { aligned, bandsOf, drawnOf, limitsOf, pointsOf, valueRange, type PlotModel } from './model';
 import { sensorNamed } from '../testing/sensors';
 import { seriesWith } from '../testing/series';
 
@@ -64,13 +64,6 @@ describe('the ranges of day and night', () => {
   test('are those of the moment where no clock tells', () => {
     expect(bands(0, 100, null)).toEqual([[0, 100, 'now']]);
   });
-});
-
-test('a little light does not stand in the middle between minus and plus', () => {
-  const light = sensorNamed('light');
-  const series = seriesWith({ readings: [{ at: 10, value: 800 }] });
-  const [low, high] = valueRange(model([series], { sensor: light }));
-  expect(low).toBeGreaterThan(-0.1 * high);
 });
 
 test('the day before is drawn below all lines, in the look of its own', () => {
@@ -171,6 +164,13 @@ describe('the axis of the values', () => {
     expect(valueRange(model([reading(40, 44)]))[0]).toBeGreaterThan(26);
   });
 
+  test('is of what was read, however far what is ideal reaches', () => {
+    const light = { sensor: sensorNamed('light') };
+    const [low, high] = valueRange(model([reading(750, 900)], light));
+    expect([low, high]).toEqual([738, 912]);
+    expect(valueRange(model([reading(0, 0)], light))[1]).toBeLessThan(2);
+  });
+
   test('makes no mountains of noise, and has one without any reading', () => {
     const [low, high] = valueRange(model([reading(22, 22)]));
     expect(high - low).toBeGreaterThan(0.8);
@@ -182,5 +182,36 @@ describe('the axis of the values', () => {
 
   test('is in the unit that is shown', () => {
     expect(valueRange(model([seriesWith()], { unit: 'F' }))[0]).toBeCloseTo((18 - 0.64) * 1.8 + 32);
+  });
+});
+
+describe('the limits that are named', () => {
+  const named = (...values: number[]): unknown[] => {
+    const readings = values.map((value, at) => ({ at, value }));
+    return limitsOf(model([seriesWith({ readings })])).map(({ kind, value, side }) => [
+      kind,
+      value,
+      side,
+    ]);
+  };
+
+  test('are those in the picture, and where what is ideal lies beyond it', () => {
+    expect(named(12, 24)).toEqual([
+      ['ideal', 18, 'inside'],
+      ['ideal', 26, 'inside'],
+      ['critical', 10, 'inside'],
+    ]);
+    expect(named(6, 10)).toEqual([
+      ['ideal', 18, 'above'],
+      ['critical', 10, 'inside'],
+    ]);
+    expect(named(40, 44)).toEqual([
+      ['ideal', 26, 'below'],
+      ['critical', 35, 'inside'],
+    ]);
+    expect(named(21, 22)).toEqual([
+      ['ideal', 18, 'below'],
+      ['ideal', 26, 'above'],
+    ]);
   });
 });

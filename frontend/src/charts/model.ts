@@ -113,6 +113,8 @@ const ROOM = 0.08;
 const LEAST_SHARE = 0.4;
 /** A spread that is less than this share of the ideal range would make mountains of noise. */
 const LEAST_OF_IDEAL = 0.1;
+/** As is this share of the values, where the ideal range reaches far beyond them. */
+const LEAST_OF_VALUE = 0.1;
 
 /** The values' axis, in the unit that is shown. */
 export function valueRange({ lines, sensor, bands, unit }: PlotModel): [low: number, high: number] {
@@ -134,7 +136,8 @@ export function valueRange({ lines, sensor, bands, unit }: PlotModel): [low: num
   const bounds = all.flatMap((ranges) => ranges.ideal ?? []);
   const ideal = bounds.length > 0 ? ([Math.min(...bounds), Math.max(...bounds)] as const) : null;
   if (low > high) [low, high] = ideal ?? [0, 1];
-  const least = ideal ? LEAST_OF_IDEAL * (ideal[1] - ideal[0]) : Math.abs(low) * 0.01 || 1;
+  const share = LEAST_OF_VALUE * Math.abs(high);
+  const least = Math.min(share || 1, ideal ? LEAST_OF_IDEAL * (ideal[1] - ideal[0]) : Infinity);
   if (high - low < least) {
     const middle = (low + high) / 2;
     // What is never negative has no negative half of a picture.
@@ -154,4 +157,30 @@ export function valueRange({ lines, sensor, bands, unit }: PlotModel): [low: num
   }
   const room = (high - low) * ROOM;
   return [toShown(sensor, low - room, unit), toShown(sensor, high + room, unit)];
+}
+
+/** A limit that is named at the picture's edge, and where its line lies. */
+export interface Limit {
+  readonly kind: 'ideal' | 'critical';
+  readonly value: number;
+  readonly side: 'below' | 'inside' | 'above';
+}
+
+/** Those of the end of the span: the ideal range's, of one out of sight the nearer, and critical ones in sight. */
+export function limitsOf(model: PlotModel): Limit[] {
+  const { ideal, critical } = model.bands.at(-1)?.ranges ?? {};
+  const [low, high] = valueRange(model);
+  const named =
+    (kind: Limit['kind']) =>
+    (value: number): Limit => {
+      const at = toShown(model.sensor, value, model.unit);
+      return { kind, value, side: at < low ? 'below' : at > high ? 'above' : 'inside' };
+    };
+  const [first, last] = (ideal ?? []).map(named('ideal'));
+  const edges = [
+    ...(first && last?.side !== 'below' ? [first] : []),
+    ...(last && first?.side !== 'above' ? [last] : []),
+  ];
+  const near = ideal ? (critical ?? []).map(named('critical')) : [];
+  return [...edges, ...near.filter(({ side }) => side === 'inside')];
 }

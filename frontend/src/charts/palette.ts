@@ -11,12 +11,15 @@ export interface ChartPalette {
   readonly failure: string;
   readonly look: string;
   readonly moment: string;
+  readonly fontPx: number;
   readonly font: string;
 }
 
 export function readPalette(): ChartPalette {
   const style = getComputedStyle(document.documentElement);
   const read = (name: string): string => style.getPropertyValue(`--chart-${name}`).trim();
+  // Larger where the page's text is.
+  const fontPx = Math.round(11.5 * (parseFloat(style.fontSize) / 16 || 1));
   return {
     lines: Array.from({ length: 8 }, (_, index) => read(String(index + 1))),
     ink: read('ink'),
@@ -29,7 +32,7 @@ export function readPalette(): ChartPalette {
     failure: read('failure'),
     look: read('look'),
     moment: read('moment'),
-    // Larger where the page's text is.
-    font: `${Math.round(11.5 * (parseFloat(style.fontSize) / 16 || 1))}px ${style.getPropertyValue('--font')}`,
+    fontPx,
+    font: `${fontPx}px ${style.getPropertyValue('--font')}`,
   };
 }

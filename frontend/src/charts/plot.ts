@@ -25,6 +25,8 @@ export interface PlotSize {
 const DASH_BEFORE = [3, 3];
 /** A drag that is shorter is a click, CSS pixels. */
 const SHORTEST_DRAG = 6;
+/** The names of limits, right of the plot; of the font's size. */
+const LIMITS_ROOM = 7.5;
 /** Charts of one view have one cursor. */
 const SYNC_KEY = 'lupin-charts';
 
@@ -59,7 +61,7 @@ export function createPlot(element: HTMLElement, handlers: PlotHandlers): Plot {
         ...size,
         class: 'plot',
         legend: { show: false },
-        padding: [8, 22, 0, 0],
+        padding: [8, LIMITS_ROOM * palette.fontPx, 0, 0],
         cursor: {
           y: false,
           points: { size: 8, width: 2, stroke: () => palette.surface, fill: colourOf },
@@ -111,7 +113,8 @@ export function createPlot(element: HTMLElement, handlers: PlotHandlers): Plot {
             ),
             font: palette.font,
             size: 48,
-            space: 34,
+            // Steps come in ones, twos and fives: in six of these there are three ticks.
+            space: (_self, _axis, _min, _max, height) => Math.min(34, height / 6),
           },
         ],
         hooks: {

@@ -10,7 +10,13 @@ test('without a clipboard copying says no instead of failing', async () => {
   const writeText = vi.fn(() => Promise.resolve());
   vi.stubGlobal('navigator', { clipboard: { writeText } });
   expect(await copyLink()).toBe(true);
-  expect(writeText).toHaveBeenCalledWith(window.location.href);
+  expect(writeText).toHaveBeenLastCalledWith(window.location.href);
+  // While the past is played, the address of the page waits.
+  act({ type: 'select', tagId: 'a/b #' });
+  act({ type: 'moment', moment: 9 });
+  await copyLink();
+  const { origin, pathname } = window.location;
+  expect(writeText).toHaveBeenLastCalledWith(`${origin}${pathname}#at=9&tag=a%2Fb+%23`);
 });
 
 const HOUR = 3_600;

@@ -2,8 +2,16 @@ import { now as pageNow } from '../clock';
 import { type Span, spanOf } from '../domain/period';
 import { store } from '../store/app';
 import { rosNow } from '../store/moment';
+import { toFragment } from '../store/permalink';
 import { isChosen } from '../store/view';
 import { LANGUAGE } from '../strings';
+
+/** Of the view as it is: that of the page comes behind, and waits while the past is played. */
+export function viewAddress(): URL {
+  const url = new URL(window.location.href);
+  url.hash = toFragment(store.get().view);
+  return url;
+}
 
 /** Copies the address of this view; true when the clipboard took it. */
 export async function copyLink(): Promise<boolean> {
@@ -11,7 +19,7 @@ export async function copyLink(): Promise<boolean> {
   // look at a property whose type claims that it is always there.
   const clipboard = navigator.clipboard as Clipboard | undefined;
   if (!clipboard) return false;
-  return clipboard.writeText(window.location.href).then(
+  return clipboard.writeText(viewAddress().href).then(
     () => true,
     () => false,
   );

@@ -27,6 +27,14 @@ test('a link that is pasted into the open page is followed too', () => {
   expect(store.get().view).toMatchObject({ sensor: 'light', selected: null });
 });
 
+test('a link that is opened while the address settles is not written over', () => {
+  act({ type: 'sensor', sensor: 'humidity' });
+  history.replaceState(null, '', '#sensor=light');
+  vi.advanceTimersByTime(500);
+  window.dispatchEvent(new HashChangeEvent('hashchange'));
+  expect(store.get().view).toMatchObject({ sensor: 'light', selected: null });
+});
+
 test('the address follows the view once it has settled, and keeps the rest', () => {
   act({ type: 'sensor', sensor: 'humidity' });
   act({ type: 'camera', camera: { x: 1, y: 2, span: 3 } });

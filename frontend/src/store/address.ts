@@ -101,6 +101,8 @@ function keepLink(): () => void {
   };
   const write = (): void => {
     clearTimeout(timer);
+    // A link has been opened just now, and is followed as soon as the browser tells of it.
+    if (!entryNow()) return;
     entry = { ...entry, ...placeOf(store.get().view) };
     mark(address());
   };

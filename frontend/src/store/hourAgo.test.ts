@@ -2,7 +2,7 @@ import { afterEach, beforeEach, expect, test, vi } from 'vitest';
 
 import { judgement } from '../testing/health';
 import { readings, stateFrame, wireTag } from '../testing/tags';
-import { goLive, showTags, status } from '../testing/page';
+import { connection, goLive, showTags, status } from '../testing/page';
 import { act, prefer, receive } from './app';
 import { hourAgo, startHourAgo } from './hourAgo';
 import { NO_HOUSE } from './twin';
@@ -62,6 +62,19 @@ test('where a day is a short one, so is its hour', async () => {
   stop = startHourAgo();
   await pass(10);
   expect(Math.round(Number(asked[0]))).toBe(NOW_S - 60);
+  goLive();
+});
+
+test('nothing is asked until the bridge has said how long an hour is', async () => {
+  connection(performance.now(), { type: 'start', now: performance.now() });
+  act({ type: 'moment', moment: 50_000 });
+  receive({ type: 'past', past: { at: 50_000, house: NO_HOUSE } });
+  stop = startHourAgo();
+  await pass(1_000);
+  expect(asked).toEqual([]);
+  goLive(status({ day_length_s: 1_440 }));
+  await pass(1_000);
+  expect(asked.map(Number)).toEqual([49_940]);
   goLive();
 });
 

@@ -64,7 +64,9 @@ export function startHourAgo(): () => void {
     const hourS = selectHourS(state);
     const base = moment ?? rosNow(state, now());
     const isSeen = isColumnShown(state.settings, 'trend') || state.view.list === 'alarms';
-    if (base === null || base < hourS || !isSeen) {
+    // The bridge's first word says how long a day is, and with it an hour.
+    const isTold = state.twin.connection.status !== null;
+    if (base === null || base < hourS || !isSeen || !isTold) {
       fetcher.want(null);
       return;
     }

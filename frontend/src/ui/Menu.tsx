@@ -1,7 +1,7 @@
 import type { JSX } from 'react';
 
 import { saveMap, saveTable } from '../export/actions';
-import { copyLink, reportLink } from '../export/link';
+import { copyLink, reportLink, viewAddress } from '../export/link';
 import { reasonText } from '../domain/failure';
 import type { TemperatureUnit } from '../domain/units';
 import { prefer, useApp } from '../store/app';
@@ -95,9 +95,9 @@ export function Menu(): JSX.Element {
 
 /** The same view in the same language, on a wall. */
 function kioskLink(): string {
-  const query = new URLSearchParams(window.location.search);
-  query.set('kiosk', '1');
-  return `?${query.toString()}${window.location.hash}`;
+  const url = viewAddress();
+  url.searchParams.set('kiosk', '1');
+  return url.href;
 }
 
 async function copyAndSay(): Promise<void> {

@@ -31,6 +31,15 @@ beforeEach(() => {
 });
 
 describe('card', () => {
+  test('gives the focus back to where it opened from', () => {
+    render(<button type="button">row</button>);
+    screen.getByText('row').focus();
+    const { unmount } = render(<TagCard tagId="7" />);
+    screen.getByRole('button', { name: 'Close' }).focus();
+    unmount();
+    expect(document.activeElement).toBe(screen.getByText('row'));
+  });
+
   test('tells everything about its tag', () => {
     render(<TagCard tagId="7" />);
     const card = screen.getByRole('complementary', { name: 'Tag 7' });

@@ -1,4 +1,4 @@
-import { useEffect, useRef, type JSX } from 'react';
+import { useRef, type JSX } from 'react';
 
 import type { When } from '../domain/age';
 import { farOffText, metresText, percentText, readingText, valueText } from '../domain/format';
@@ -23,6 +23,7 @@ import { HealthMark } from './HealthMark';
 import { inTime } from './inTime';
 import { Icon } from '../widgets/Icon';
 import { IconButton } from '../widgets/IconButton';
+import { useFocusBack } from '../widgets/useFocusBack';
 import { Reasons } from './Reasons';
 import { Sparkline } from './Sparkline';
 import { Tries } from './Tries';
@@ -42,17 +43,8 @@ export function TagCard({ tagId }: { tagId: string }): JSX.Element {
   const fetched = useHistory(tagId, newest);
   const history = fetched && asOf(fetched, moment);
   const root = useRef<HTMLElement>(null);
-  const cameFrom = useRef<Element | null>(null);
 
-  // Where the card opened from gets the focus back, if it is still somewhere in the card.
-  useEffect(() => {
-    cameFrom.current = document.activeElement;
-    const card = root.current;
-    return () => {
-      const hadFocus = card?.contains(document.activeElement);
-      if (hadFocus && cameFrom.current instanceof HTMLElement) cameFrom.current.focus();
-    };
-  }, []);
+  useFocusBack(root);
 
   return (
     <aside

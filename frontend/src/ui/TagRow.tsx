@@ -4,7 +4,7 @@ import type { When } from '../domain/age';
 import { farOffText, percentText, shortAgeText, valueText } from '../domain/format';
 import type { TagHealth } from '../contract/types';
 import { rangeReason, sideOf, worstReason } from '../domain/health';
-import { digitsOf, reasonsText, reasonText } from '../domain/reasons';
+import { beyondText, digitsOf, reasonsText, reasonText } from '../domain/reasons';
 import type { Catalogue, Sensor } from '../domain/sensors';
 import { speciesText } from '../domain/species';
 import { shown } from '../domain/text';
@@ -129,7 +129,13 @@ export const TagRow = memo(function TagRow({
           className={sensor.name === chosen ? 'number chosen' : 'number other'}
           data-sensor={sensor.name}
         >
-          <TableReading sensor={sensor} tag={tag} health={health} unit={unit} />
+          <TableReading
+            sensor={sensor}
+            tag={tag}
+            health={health}
+            catalogue={catalogue}
+            unit={unit}
+          />
           {sensor.name === chosen && has('trend') && (
             <TrendLine sensor={sensor} tag={tag} health={health} then={then} unit={unit} />
           )}
@@ -163,18 +169,26 @@ function TableReading({
   sensor,
   tag,
   health,
+  catalogue,
   unit,
 }: {
   sensor: Sensor;
   tag: Tag;
   health: TagHealth;
+  catalogue: Catalogue;
   unit: TemperatureUnit;
 }): JSX.Element {
   const when = tag.readAt.get(sensor.name) ?? 'never';
   const step = useAgeStep(when);
   return (
     <span className="reading" data-age={when === 'never' ? undefined : step}>
-      <Reading sensor={sensor} value={tag.readings.get(sensor.name)} health={health} unit={unit} />
+      <Reading
+        sensor={sensor}
+        value={tag.readings.get(sensor.name)}
+        health={health}
+        catalogue={catalogue}
+        unit={unit}
+      />
       {isOlder(when, tag.scannedAt) && (
         <span className="own-age">
           {' '}
@@ -196,11 +210,13 @@ function Reading({
   sensor,
   value,
   health,
+  catalogue,
   unit,
 }: {
   sensor: Sensor;
   value: number | null | undefined;
   health: TagHealth;
+  catalogue: Catalogue;
   unit: TemperatureUnit;
 }): JSX.Element {
   if (value === undefined) {
@@ -219,16 +235,18 @@ function Reading({
     );
   }
   const reason = rangeReason(health, sensor.name);
-  const side = reason && sideOf(reason);
+  const more = reason ? digitsOf(sensor, reason, unit) : 0;
+  // By its own limit: what is back within its range, and not far enough, is not "below ideal".
+  const beyond = reason && beyondText(catalogue, reason, unit, more);
   return (
     <>
-      {side && (
-        <span className="beyond" data-health={reason.verdict} title={S[side]}>
-          <Icon name={side === 'below' ? 'down' : 'up'} size={12} />
-          <span className="unseen">{S[side]} </span>
+      {beyond && (
+        <span className="beyond" data-health={reason.verdict} title={beyond}>
+          <Icon name={sideOf(reason) === 'below' ? 'down' : 'up'} size={12} />
+          <span className="unseen">{beyond}: </span>
         </span>
       )}
-      {valueText(sensor, value, unit, reason ? digitsOf(sensor, reason, unit) : 0)}
+      {valueText(sensor, value, unit, more)}
     </>
   );
 }

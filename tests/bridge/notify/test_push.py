@@ -171,6 +171,24 @@ def test_a_phone_that_the_push_service_knows_no_more_is_forgotten_and_a_busy_one
         assert phone.read(on.service.posted[3])["body"].startswith("Tag 8:")
 
 
+def test_a_phone_that_is_switched_off_meanwhile_is_not_tried_again(tmp_path: Path) -> None:
+    answers = (status(503, "Retry-After: 4"), status(201))
+    bearer = {"Authorization": f"Bearer {TOKEN}"}
+    with stage(tmp_path, *answers) as on, signed_in(on.live.url, "anna") as anna:
+        one, other = on.phone("one"), on.phone("other")
+        subscribe(anna, one)
+        on.live.peer.observe(look("7", anomaly=True, bug_count=2))
+        wait_for(lambda: on.service.posted, "the first try")
+        with changing(on.accounts) as accounts:
+            accounts.remove_device(one.endpoint)
+        nobody = 'lupin_outward_waiting{channel="push"} 0.0'
+        wait_for(lambda: nobody in on.live.get("/metrics", bearer).text, "the end of its tries")
+        subscribe(anna, other)
+        on.live.peer.observe(look("8", anomaly=True, bug_count=2))
+        wait_for(lambda: on.posted_to(other), "the next alarm")
+        assert len(on.posted_to(one)) == 1
+
+
 def test_a_push_service_that_wants_to_be_left_alone_holds_up_no_other_phone(tmp_path: Path) -> None:
     answers = (status(503, "Retry-After: 60"), status(201))
     with stage(tmp_path, *answers) as on, signed_in(on.live.url, "anna") as anna:

@@ -163,6 +163,7 @@ def test_a_double_click_shelves_nothing_and_a_critical_alarm_takes_a_reason(
 ) -> None:
     with bridge(domain=domain) as running:
         running.peer.observe(*[warm("a", 43.5, at=(1, 1))] * 2, *[warm("b", 27.0, at=(2, 1))] * 2)
+        running.peer.observe(*[warm("c", 27.0)] * 2, *[warm("c", 22.0)] * 2)
         hmi = open_page(running.url, viewport=PHONE)
         hmi.page.keyboard.press("a")
         expect(rows(hmi, "active")).to_have_count(2)
@@ -187,6 +188,8 @@ def test_a_double_click_shelves_nothing_and_a_critical_alarm_takes_a_reason(
             assert viewport == PHONE or tops() == before
             expect(panel).to_be_in_viewport(ratio=1)
             assert apart(button, panel)
+            # Nor does the heading of the next section lie over it.
+            panel.get_by_role("textbox").click()
             expect(hmi.page.get_by_role("button", name="Unshelve")).to_have_count(0)
         # Of the critical one.
         expect(times).to_have_text(["For 15 min", "For 1 h"])

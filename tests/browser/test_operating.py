@@ -129,7 +129,7 @@ def test_the_table_is_filtered_and_sorted_and_health_names_the_tag_that_drives_i
     driver.click()
     expect(hmi.card("10")).to_be_visible()
     hmi.page.locator(".health-counts [data-health=unknown]").first.click()
-    hmi.expect_rows("seen")
+    hmi.expect_rows("failed", "seen")
 
 
 def test_a_row_and_its_pin_find_each_other_and_the_card_tells_all(hmi: Hmi) -> None:

@@ -59,6 +59,13 @@ def test_a_word_is_everybodys_and_a_viewers_is_their_own(
             anna.reload()
             anna.keyboard.press("a")
             expect(row(anna)).to_have_attribute("data-acknowledged", "true")
+            anna.get_by_role("button", name=re.compile("^Shelve: ")).click()
+            anna.get_by_label("Reason").fill("sprayed")
+            anna.get_by_role("button", name="For 1 h").click()
+            for page in (anna, vera):
+                expect(row(page)).to_contain_text(
+                    re.compile(r"shelved by anna until [\d:]+: sprayed")
+                )
 
 
 def comment(page: Page, where: Locator, text: str) -> None:

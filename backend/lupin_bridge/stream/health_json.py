@@ -38,6 +38,7 @@ def alarm_json(alarm: Alarm, said: AlarmNotes | None = None) -> dict[str, Any]:
     if said is not None and said.shelved is not None:
         found["shelved_by"] = said.shelved.by
         found["shelved_until"] = stamp(said.shelved.until_ns or 0)
+        found["shelved_reason"] = said.shelved.text
     return found
 
 

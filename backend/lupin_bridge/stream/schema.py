@@ -219,6 +219,9 @@ class Alarm(Contract):
         default_factory=lambda: None, description="who; absent: it is not shelved"
     )
     shelved_until: Time | None = Field(default_factory=lambda: None, description="ROS time")
+    shelved_reason: str | None = Field(
+        default_factory=lambda: None, description="in the words of who shelved it; may be empty"
+    )
 
 
 class Alarms(Contract):

@@ -24,6 +24,7 @@ export interface components {
             readonly acknowledged_at?: components["schemas"]["Time"] | null;
             readonly shelved_by?: string | null;
             readonly shelved_until?: components["schemas"]["Time"] | null;
+            readonly shelved_reason?: string | null;
         };
         readonly Alarms: {
             readonly alarms: readonly components["schemas"]["Alarm"][];

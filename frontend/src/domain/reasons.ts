@@ -1,5 +1,5 @@
 /** Why a tag or the house has its verdict, in words. */
-import type { HealthReason } from '../contract/types';
+import type { HealthReason, Verdict } from '../contract/types';
 import { S } from '../strings';
 import { ageText, digitsApart, readingText, shortAgeText, valueText } from './format';
 import { isOfRange, sideOf } from './health';
@@ -94,8 +94,9 @@ export function beyondText(
   );
 }
 
-/** What somebody does about it. */
-export function todoText(reason: HealthReason): string {
+/** What somebody does about it; of what is well by now (`current`), what its alarm still waits for. */
+export function todoText(reason: HealthReason, current: Verdict = reason.verdict): string {
+  if (current === 'healthy') return reason.kind === 'pest' ? S.todoPestAgain : S.todoWell;
   const { sensors, ...kinds } = S.todo;
   if (isOfRange(reason) && reason.sensor in sensors) {
     return sensors[reason.sensor as keyof typeof sensors][sideOf(reason)];

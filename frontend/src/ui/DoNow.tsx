@@ -72,7 +72,7 @@ export function useSince(tagId: string, reason: HealthReason | undefined): strin
     alarmOf([...active, ...shelved], tagId, reason),
   );
   if (!isNow || !found) return null;
-  if (found.shelf) return S.alarmShelved(clockText(found.shelf.until), '');
+  if (found.shelf) return S.alarmShelved(clockText(found.shelf.until), '', '');
   if (found.isAcknowledged) return S.healthAcknowledged;
   return S.alarmSince(whenText(secondsOf(found.alarm.raised_at), rosNow(store.get(), now())), null);
 }

@@ -25,6 +25,7 @@ def test_who_acknowledged_and_who_shelved_until_when_is_told_and_nothing_else() 
     }
     assert found["acknowledged_at"] == {"sec": 10**9, "nanosec": 0}
     assert found["shelved_until"] == {"sec": 10**9 + 3_600, "nanosec": 0}
+    assert found["shelved_reason"] == "heater"
     assert "acknowledged_by" not in alarm_json(COLD)
     assert notes_of_alarms([COLD], said, None) == {}
 

@@ -65,7 +65,7 @@ export function AlarmFacts({
       </span>
       {isShelved && shelf && (
         <span className="alarm-facts faint">
-          {S.alarmShelved(clockText(shelf.until), shelf.reason)}
+          {S.alarmShelved(clockText(shelf.until), shelf.reason, alarm.shelved_by ?? '')}
         </span>
       )}
       <WhoAcknowledged alarm={alarm} />

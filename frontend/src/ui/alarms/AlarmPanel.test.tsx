@@ -87,7 +87,7 @@ test('the value of now follows the newest state, with its own severity', () => {
   expect(fact(first('active'), 'worst').dataset['status']).toBe('critical');
 });
 
-test('what is well again needs nothing, but pests that one inspection did not see', () => {
+test('what is well again waits for one more good scan, and pests for an inspection', () => {
   flush(() => {
     const warm = { readings: readings({ temperature: 22 }) };
     const tags = ['5', '6'].map((tag_id) => wireTag({ tag_id, ...warm }));
@@ -98,7 +98,7 @@ test('what is well again needs nothing, but pests that one inspection did not se
   const todo = (tag: string): string | null | undefined =>
     document.querySelector(`[data-where='${tag}'] .alarm-do`)?.textContent;
   expect([todo('5'), todo('6')]).toEqual([
-    undefined,
+    'Active until the next good scan',
     'Inspect again: a second clean inspection resolves it',
   ]);
 });
@@ -149,6 +149,8 @@ test('a critical alarm takes a reason, and is shelved for no more than an hour',
   // As long as the focus is in the list, no row moves.
   fireEvent.blur(screen.getByTestId('alarms'));
   expect(first('shelved').textContent).toMatch(/shelved until [\d:]+: fan is being mended/);
+  tell(alarm('a', { tag_id: '5', shelved_by: 'anna' }));
+  expect(first('shelved').textContent).toMatch(/shelved by anna until [\d:]+: fan is being mended/);
 });
 
 test('what is shelved while the list is held says so where it stands, and all is without it', () => {
@@ -161,6 +163,8 @@ test('what is shelved while the list is held says so where it stands, and all is
     true,
     false,
   ]);
+  // The heading counts it no more.
+  expect(group('active').map(({ dataset }) => dataset['elsewhere'])).toEqual(['true', 'false']);
   press('Acknowledge all (1)');
 });
 

@@ -246,7 +246,9 @@ function CauseHeading({
           <span>
             <strong>{cause}</strong> · {S.alarmCount(items.length)}
           </span>
-          {group !== 'resolved' && <span className="alarm-do">{todoText(first.alarm.reason)}</span>}
+          {group !== 'resolved' && (
+            <span className="alarm-do">{todoText(first.alarm.reason, verdict)}</span>
+          )}
           <span className="alarm-facts">{facts}</span>
           <span className="alarm-facts faint">
             {S.alarmTags(named, tags.length - named.length)}

@@ -26,19 +26,20 @@ export const AlarmRow = memo(function AlarmRow({
   /** Where the row stands: while the order is held, not where the alarm belongs by now. */
   group: GroupName;
 }): JSX.Element {
-  const { alarm, verdict, isAcknowledged } = item;
+  const { alarm, verdict, isAcknowledged, shelf } = item;
+  const belongs = alarm.cleared_at !== null ? 'resolved' : shelf !== null ? 'shelved' : 'active';
+  const isSelected = useApp((state) => state.view.selected === alarm.tag_id);
   const values = useValues(alarm);
   const current = values.state?.kind === 'known' ? values.state.verdict : verdict;
   const name = useApp((state) => nameText(alarm, selectSpeech(state)));
-  // One inspection that sees no pests may have missed them.
-  const isPest = alarm.reason.kind === 'pest';
-  const isToDo = group !== 'resolved' && (current !== 'healthy' || isPest);
   return (
     <li
       data-alarm={alarm.id}
       data-where={alarm.tag_id}
       data-health={verdict}
       data-acknowledged={isAcknowledged}
+      data-elsewhere={group !== belongs}
+      data-selected={isSelected}
     >
       <button
         type="button"
@@ -58,9 +59,9 @@ export const AlarmRow = memo(function AlarmRow({
               {': '}
               {values.what}
             </span>
-            {isToDo && (
+            {group !== 'resolved' && (
               <span className="alarm-do" data-again={current === 'healthy' || undefined}>
-                {current === 'healthy' ? S.todoPestAgain : todoText(alarm.reason)}
+                {todoText(alarm.reason, current)}
               </span>
             )}
           </span>

@@ -5,8 +5,9 @@ import { NOTHING_KEPT } from '../../alarms/kept';
 import { own } from '../../alarms/own';
 import { alarmList, startAlarms } from '../../alarms/watch';
 import { alarm, tellAlarms } from '../../testing/alarms';
+import { judgement } from '../../testing/health';
 import { showTags } from '../../testing/page';
-import { wireTag } from '../../testing/tags';
+import { readings, wireTag } from '../../testing/tags';
 import { CardAlarms } from './CardAlarms';
 
 let stop: () => void;
@@ -26,6 +27,16 @@ test('a tag without an alarm has nothing to acknowledge', () => {
     tellAlarms(alarm('a', { tag_id: '8' }));
   });
   expect(screen.queryByTestId('card-alarms')).toBeNull();
+});
+
+test('a tag that is well again says what its alarm still waits for', () => {
+  flush(() => {
+    const warm = { readings: readings({ temperature: 22 }) };
+    showTags([wireTag({ tag_id: '7', ...warm })], judgement({ 7: 'healthy' }));
+    tellAlarms(alarm('a', { tag_id: '7' }));
+  });
+  const line = screen.getByTestId('card-alarms');
+  expect(line.textContent).toContain(' · Active until the next good scan');
 });
 
 test('all alarms of a tag are acknowledged where it is looked at, and no others', () => {

@@ -1,11 +1,13 @@
 import type { JSX } from 'react';
 
 import { acknowledgeAlarms } from '../../alarms/own';
+import { worstNow } from '../../alarms/speech';
 import { spanText } from '../../alarms/words';
 import { alarmList } from '../../alarms/watch';
 import type { Alarm } from '../../contract/types';
+import { todoText } from '../../domain/reasons';
 import { secondsOf } from '../../domain/rostime';
-import { store } from '../../store/app';
+import { store, useApp } from '../../store/app';
 import { useSelected } from '../../store/create';
 import { rosNow } from '../../store/moment';
 import { S } from '../../strings';
@@ -24,11 +26,14 @@ export function CardAlarms({ tagId }: { tagId: string }): JSX.Element | null {
     const [first] = items.map(({ alarm }) => alarm).sort(byTime);
     return first ? spanText(first, nowS) : '';
   });
-  if (items.length === 0) return null;
+  const isWell = useApp((state) => worstNow(state, items) === 'healthy');
+  const [first] = items;
+  if (!first) return null;
   return (
     <div className="card-alarms alarm-tools" data-testid="card-alarms">
       <span>
         {(waiting.length === 0 ? S.alarmDone.acknowledge : S.alarmCount)(items.length)} · {since}
+        {isWell && ` · ${todoText(first.alarm.reason, 'healthy')}`}
       </span>
       {waiting.length > 0 && (
         <button

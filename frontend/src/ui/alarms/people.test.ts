@@ -10,7 +10,10 @@ import { whoseWord } from './WhoseWord';
 const COLD = alarm('cold');
 const STAMP = { sec: 1_000, nanosec: 0 };
 const SAID = { ...COLD, acknowledged_by: 'anna', acknowledged_at: STAMP };
-const SHELVED = { ...COLD, shelved_by: 'bert', shelved_until: STAMP };
+const SHELVED = {
+  ...COLD,
+  ...{ shelved_by: 'bert', shelved_until: STAMP, shelved_reason: 'pipe under repair' },
+};
 const until = (): number => 60_000;
 const never = new Set<string>();
 
@@ -29,9 +32,12 @@ test('what a viewer did stays theirs; of an operator only what the bridge knows 
   expect(merged(local, [COLD], never, true, until).kept.acknowledged.size).toBe(0);
 });
 
-test('a shelf is taken over with who shelved, and goes with their word', () => {
+test('a shelf is taken over with its reason, and goes with the word of who shelved', () => {
   const { kept, told } = merged(NOTHING_KEPT, [SHELVED], never, false, until);
-  expect(kept.shelved.get(whatOf(COLD))).toMatchObject({ until: 60_000, reason: 'bert' });
+  expect(kept.shelved.get(whatOf(COLD))).toMatchObject({
+    until: 60_000,
+    reason: 'pipe under repair',
+  });
   const near = merged(kept, [SHELVED], told, false, () => 61_000);
   expect(near.kept).toBe(kept);
   expect(merged(kept, [COLD], told, false, until).kept.shelved.size).toBe(0);

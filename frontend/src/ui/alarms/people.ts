@@ -8,6 +8,7 @@ import { fetchSession, postNote, withdrawNote } from '../../contract/people';
 import type { Alarm, Session } from '../../contract/types';
 import { reasonText } from '../../domain/failure';
 import { secondsOf } from '../../domain/rostime';
+import { shown } from '../../domain/text';
 import { onChange, store } from '../../store/app';
 import { createFetcher } from '../../store/fetcher';
 import { rosNow } from '../../store/moment';
@@ -15,7 +16,7 @@ import { person } from '../../store/signals';
 import { say } from '../toast';
 import { LANGUAGE } from '../../strings';
 import { PEOPLE } from '../../words/people';
-import { whatOf, type Kept } from '../../alarms/kept';
+import { LONGEST_REASON, whatOf, type Kept } from '../../alarms/kept';
 import { acting, own } from '../../alarms/own';
 
 export const P = PEOPLE[LANGUAGE];
@@ -60,7 +61,8 @@ export function merged(
       toldNow.add(what);
       if (shelf && Math.abs(shelf.until - until) < SAME_MS) continue;
       isSame = false;
-      shelved.set(what, { verdict, until, reason: by });
+      const why = alarm.shelved_reason;
+      shelved.set(what, { verdict, until, reason: why ? shown(why, LONGEST_REASON) : '' });
     } else if (isWriter || toldBefore.has(what)) {
       isSame &&= !shelved.delete(what);
     }

@@ -51,8 +51,8 @@ export const ALARMS: In<typeof ENGLISH> = {
   alarmShelfReasonOptional: 'Begründung (optional)',
   alarmShelveMinutes: (minutes) => `Für ${minutes} min`,
   alarmShelveHours: (hours) => `Für ${hours} h`,
-  alarmShelved: (until, reason) =>
-    `zurückgestellt bis ${until}${reason === '' ? '' : `: ${reason}`}`,
+  alarmShelved: (until, reason, by) =>
+    `zurückgestellt ${by === '' ? '' : `von ${by} `}bis ${until}${reason === '' ? '' : `: ${reason}`}`,
   alarmUnshelve: 'Wieder aktivieren',
   alarmUnshelveOf: (what) => `Wieder aktivieren: ${what}`,
   alarmUndo: 'Rückgängig',

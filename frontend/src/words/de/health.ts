@@ -66,6 +66,7 @@ export const HEALTH: In<typeof ENGLISH> = {
     other: 'Dort nachsehen',
   },
   todoPestAgain: 'Nochmals kontrollieren: Ohne Befund ist der Alarm behoben',
+  todoWell: 'Anstehend bis zur nächsten guten Messung',
   todoLabel: 'Jetzt zu tun',
   reasonsLabel: 'Warum',
   healthHeading: 'Zustand des Gewächshauses',

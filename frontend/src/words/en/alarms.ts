@@ -49,8 +49,8 @@ export const ALARMS = {
   alarmShelfReasonOptional: 'Reason (optional)',
   alarmShelveMinutes: (minutes: number): string => `For ${minutes} min`,
   alarmShelveHours: (hours: number): string => `For ${hours} h`,
-  alarmShelved: (until: string, reason: string): string =>
-    `shelved until ${until}${reason === '' ? '' : `: ${reason}`}`,
+  alarmShelved: (until: string, reason: string, by: string): string =>
+    `shelved ${by === '' ? '' : `by ${by} `}until ${until}${reason === '' ? '' : `: ${reason}`}`,
   alarmUnshelve: 'Unshelve',
   alarmUnshelveOf: (what: string): string => `Unshelve: ${what}`,
   alarmUndo: 'Undo',

@@ -67,6 +67,7 @@ export const HEALTH = {
     other: 'Look there',
   },
   todoPestAgain: 'Inspect again: a second clean inspection resolves it',
+  todoWell: 'Active until the next good scan',
   todoLabel: 'Do this now',
   reasonsLabel: 'Why',
   healthHeading: 'Greenhouse status',

@@ -47,7 +47,8 @@ export const ALARMS: In<typeof ENGLISH> = {
   alarmShelfReasonOptional: 'Motivo (opcional)',
   alarmShelveMinutes: (minutes) => `Durante ${minutes} min`,
   alarmShelveHours: (hours) => `Durante ${hours} h`,
-  alarmShelved: (until, reason) => `aplazada hasta ${until}${reason === '' ? '' : `: ${reason}`}`,
+  alarmShelved: (until, reason, by) =>
+    `aplazada ${by === '' ? '' : `por ${by} `}hasta ${until}${reason === '' ? '' : `: ${reason}`}`,
   alarmUnshelve: 'Reactivar',
   alarmUnshelveOf: (what) => `Reactivar: ${what}`,
   alarmUndo: 'Deshacer',

@@ -70,6 +70,7 @@ export const HEALTH: In<typeof ENGLISH> = {
     other: 'Ir a mirar',
   },
   todoPestAgain: 'Inspeccionar otra vez: si no hay plaga, queda resuelta',
+  todoWell: 'En espera de otra medición buena',
   todoLabel: 'Hacer ahora',
   reasonsLabel: 'Por qué',
   healthHeading: 'Estado del invernadero',

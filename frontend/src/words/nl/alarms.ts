@@ -47,7 +47,8 @@ export const ALARMS: In<typeof ENGLISH> = {
   alarmShelfReasonOptional: 'Reden (optioneel)',
   alarmShelveMinutes: (minutes) => `Voor ${minutes} min`,
   alarmShelveHours: (hours) => `Voor ${hours} uur`,
-  alarmShelved: (until, reason) => `uitgesteld tot ${until}${reason === '' ? '' : `: ${reason}`}`,
+  alarmShelved: (until, reason, by) =>
+    `uitgesteld ${by === '' ? '' : `door ${by} `}tot ${until}${reason === '' ? '' : `: ${reason}`}`,
   alarmUnshelve: 'Uitstel opheffen',
   alarmUnshelveOf: (what) => `Uitstel opheffen: ${what}`,
   alarmUndo: 'Ongedaan maken',

@@ -65,6 +65,7 @@ export const HEALTH: In<typeof ENGLISH> = {
     other: 'Ga daar kijken',
   },
   todoPestAgain: 'Controleer nogmaals: zonder plaag is het alarm opgelost',
+  todoWell: 'Actief tot de volgende goede meting',
   todoLabel: 'Nu doen',
   reasonsLabel: 'Waarom',
   healthHeading: 'Toestand van de kas',

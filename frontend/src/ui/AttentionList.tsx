@@ -51,7 +51,7 @@ export function AttentionList(): JSX.Element {
 
 /** What to do about each of them, no word twice. */
 const todoTexts = (reasons: readonly HealthReason[]): string =>
-  [...new Set(reasons.map(todoText))].join(' · ');
+  [...new Set(reasons.map((reason) => todoText(reason)))].join(' · ');
 
 const Since = (it: { tagId: string; reason: HealthReason | undefined }): string | null =>
   useSince(it.tagId, it.reason);

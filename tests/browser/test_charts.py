@@ -29,8 +29,8 @@ STEP_S: Final = 60.0
 MANY: Final = 420
 # Of the 50 that the latch holds.
 LOT: Final = 40
-# The first line's colour in the style sheet, light.
-LINE: Final = (0, 103, 177)
+# Temperature's colour as the style sheet darkens it, light.
+LINE: Final = (186, 51, 31)
 
 
 class Garden:
@@ -308,10 +308,10 @@ def test_the_day_before_lies_below_today_and_the_legend_compares(
 
 
 def line_rows(inside: Locator) -> int:
-    """How far apart the highest and the lowest row with the hue of the first line are."""
+    """How far apart the highest and the lowest row with the hue of CO₂ are."""
     pixels = np.asarray(Image.open(io.BytesIO(inside.screenshot())).convert("RGB"), dtype=int)
-    is_blue = (pixels[..., 2] - pixels[..., 0] > 60).any(axis=1)
-    rows = np.flatnonzero(is_blue)
+    is_purple = (pixels[..., 2] - pixels[..., 1] > 60).any(axis=1)
+    rows = np.flatnonzero(is_purple)
     return int(np.ptp(rows)) if rows.size else 0
 
 

@@ -49,7 +49,7 @@ export default function CardChart({ tagId }: { tagId: string }): JSX.Element | n
         <>
           {model && model.lines.length > 0 ? (
             <>
-              <PlotView model={model} height={HEIGHT} />
+              <PlotView key={plan.sensor} model={model} height={HEIGHT} />
               <MarksKey marks={[...lines.marks.values()].flat()} />
             </>
           ) : (

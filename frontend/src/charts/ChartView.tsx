@@ -14,6 +14,7 @@ import { ChartFiles } from './ChartFiles';
 import { ChartState } from './ChartState';
 import { ChartTables } from './ChartTables';
 import { MarksKey } from './MarksKey';
+import { TIMES_HEIGHT } from './plot';
 import { PlotView } from './PlotView';
 import { TagChoice } from './TagChoice';
 import { useLines } from './useLines';
@@ -21,8 +22,8 @@ import { useSensorsOf, useSpeciesOf } from './useSensorsOf';
 import { pointsFor, useSize } from './useSize';
 import { useZoomed, zoomBack, zoomBy } from './zoom';
 
-/** Of one chart of a tag's, and of several tags' only one, CSS pixels. */
-const LEAST_HEIGHT = { tag: 140, sensor: 220 } as const;
+/** Of one chart of a tag's, and of several tags' only one, without the times; CSS pixels. */
+const LEAST_HEIGHT = { tag: 96, sensor: 152 } as const;
 /** Height of a chart's title and margins, CSS pixels. */
 const AROUND = 42;
 
@@ -56,7 +57,8 @@ export default function ChartView({ charted }: { charted: Charted }): JSX.Elemen
     [catalogue, both, plans, species, lines, span, unit, moment],
   );
   const withLines = models.filter(({ lines }) => lines.length > 0);
-  const share = Math.floor(size.height / Math.max(1, plans.length)) - AROUND;
+  const room = (size.height - TIMES_HEIGHT) / Math.max(1, plans.length);
+  const height = Math.max(LEAST_HEIGHT[charted.by], Math.floor(room) - AROUND);
 
   const zoom = (factor: number) => (): void => {
     const nowS = rosNow(store.get(), now());
@@ -117,14 +119,18 @@ export default function ChartView({ charted }: { charted: Charted }): JSX.Elemen
         />
         {isTable && <ChartTables models={withLines} />}
         {!isTable &&
-          withLines.map((model) => (
-            <PlotView
-              key={model.sensor.name}
-              model={model}
-              height={Math.max(LEAST_HEIGHT[charted.by], share)}
-              isAlone={charted.by === 'tag'}
-            />
-          ))}
+          withLines.map((model, index) => {
+            const hasTimes = index === withLines.length - 1;
+            return (
+              <PlotView
+                key={model.sensor.name}
+                model={model}
+                height={height + (hasTimes ? TIMES_HEIGHT : 0)}
+                hasTimes={hasTimes}
+                isAlone={charted.by === 'tag'}
+              />
+            );
+          })}
       </div>
       <MarksKey marks={[...lines.marks.values()].flat()} />
       {withLines.length > 0 && span && (

@@ -1,8 +1,9 @@
 import 'uplot/dist/uPlot.min.css';
 import '../styles/charts.css';
 
-import { useEffect, useLayoutEffect, useRef, useState, type JSX } from 'react';
+import { useEffect, useLayoutEffect, useRef, useState, type CSSProperties, type JSX } from 'react';
 
+import { rgbText, sensorColour } from '../domain/ramp';
 import { rosText } from '../domain/rostime';
 import { shown } from '../domain/text';
 import { unitOf } from '../domain/units';
@@ -18,15 +19,17 @@ import { createPlot, type Plot } from './plot';
 import { plotText } from './told';
 import { zoomTo } from './zoom';
 
-/** One chart. `isAlone`: its one line has no list beside it that says its value. */
+/** One chart. `isAlone`: its one line has the sensor's colour, and no list beside it that says its value. */
 export function PlotView({
   model,
   height,
   isAlone = true,
+  hasTimes = true,
 }: {
   model: PlotModel;
   height: number;
   isAlone?: boolean;
+  hasTimes?: boolean;
 }): JSX.Element {
   const place = useRef<HTMLDivElement>(null);
   const plot = useRef<Plot | null>(null);
@@ -67,11 +70,16 @@ export function PlotView({
   }, [ofBar]);
 
   useEffect(() => {
-    if (width > 0) plot.current?.show(model, { width, height });
-  }, [model, width, height]);
+    if (width > 0) plot.current?.show(model, { width, height, hasTimes });
+  }, [model, width, height, hasTimes]);
 
   return (
-    <section className="plot-view" aria-label={S.chartOf(shown(model.sensor.label, 32))}>
+    <section
+      className="plot-view"
+      aria-label={S.chartOf(shown(model.sensor.label, 32))}
+      data-alone={isAlone}
+      style={{ '--sensor': rgbText(sensorColour(model.sensor)) } as CSSProperties}
+    >
       <header>
         <h3>
           {shown(model.sensor.label, 32)}{' '}

@@ -120,7 +120,7 @@ function drawRanges(frame: Frame, line: Line, model: PlotModel, palette: ChartPa
   context.globalAlpha = 1;
 }
 
-/** Markers of readings, marks of looks and failures, and the moment that is shown. */
+/** Markers of readings, the names of limits, and the moment that is shown. */
 export function drawAbove(frame: Frame, model: PlotModel, palette: ChartPalette): void {
   const { context, box } = frame;
   context.save();
@@ -135,7 +135,6 @@ export function drawAbove(frame: Frame, model: PlotModel, palette: ChartPalette)
   drawMoment(frame, model, palette);
   context.restore();
   drawNames(frame, model, palette);
-  for (const line of model.lines) drawMarks(frame, line, palette);
 }
 
 /** A limit's name right of the plot needs so much of it in height; CSS pixels. */
@@ -198,7 +197,7 @@ const MARK_SIZE = 7;
 export const MARKS_LANE = 24;
 
 /** A cross for what failed, a flower's ring for a look. */
-function drawMarks(frame: Frame, { marks }: Line, palette: ChartPalette): void {
+export function drawMarks(frame: Frame, { marks }: Line, palette: ChartPalette): void {
   const { context, ratio, x, box } = frame;
   const bottom = box.top + box.height;
   context.lineWidth = 1.75 * ratio;

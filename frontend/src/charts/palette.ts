@@ -15,11 +15,12 @@ export interface ChartPalette {
   readonly font: string;
 }
 
-export function readPalette(): ChartPalette {
-  const style = getComputedStyle(document.documentElement);
+export function readPalette(element: HTMLElement): ChartPalette {
+  const style = getComputedStyle(element);
+  const root = getComputedStyle(document.documentElement);
   const read = (name: string): string => style.getPropertyValue(`--chart-${name}`).trim();
   // Larger where the page's text is.
-  const fontPx = Math.round(11.5 * (parseFloat(style.fontSize) / 16 || 1));
+  const fontPx = Math.round(11.5 * (parseFloat(root.fontSize) / 16 || 1));
   return {
     lines: Array.from({ length: 8 }, (_, index) => read(String(index + 1))),
     ink: read('ink'),

@@ -4,7 +4,7 @@ import uPlot from 'uplot';
 import type { Span } from '../domain/period';
 import { hasDate } from '../domain/rostime';
 import { timeTicks, type Tick } from '../domain/ticks';
-import { drawAbove, drawBelow, MARKS_LANE, type Frame } from './layers';
+import { drawAbove, drawBelow, drawMarks, MARKS_LANE, type Frame } from './layers';
 import { lookOf } from './looks';
 import { aligned, drawnOf, hasMarks, valueRange, type PlotModel } from './model';
 import { readPalette } from './palette';
@@ -19,8 +19,13 @@ export interface PlotHandlers {
 export interface PlotSize {
   readonly width: number;
   readonly height: number;
+  /** Times and marks below it: of charts above each other, the last has them for all. */
+  readonly hasTimes: boolean;
 }
 
+/** Height of the times and the lane of marks, CSS pixels. */
+export const TIMES_HEIGHT = 44 + MARKS_LANE;
+const NO_TIMES_HEIGHT = 8;
 /** The day before: strokes and pauses, CSS pixels. */
 const DASH_BEFORE = [3, 3];
 /** A drag that is shorter is a click, CSS pixels. */
@@ -40,7 +45,7 @@ export interface Plot {
 }
 
 export function createPlot(element: HTMLElement, handlers: PlotHandlers): Plot {
-  let palette = readPalette();
+  let palette = readPalette(element);
   let model: PlotModel | null = null;
   let chart: uPlot | null = null;
   let shape = '';
@@ -54,7 +59,7 @@ export function createPlot(element: HTMLElement, handlers: PlotHandlers): Plot {
     y: (value) => u.valToPos(value, 'y', true),
   });
 
-  const build = (first: PlotModel, size: PlotSize): uPlot => {
+  const build = (first: PlotModel, { hasTimes, ...size }: PlotSize): uPlot => {
     const lane = hasMarks(first) ? MARKS_LANE : 0;
     const u = new uPlot(
       {
@@ -97,14 +102,14 @@ export function createPlot(element: HTMLElement, handlers: PlotHandlers): Plot {
               () => palette.grid,
             ),
             font: palette.font,
-            size: 44 + lane,
+            size: hasTimes ? TIMES_HEIGHT - MARKS_LANE + lane : NO_TIMES_HEIGHT,
             gap: 5 + lane,
             lineGap: 1.2,
             splits: (self) => {
               ticks = ticksOf(model, self.bbox.width / uPlot.pxRatio);
               return ticks.map(({ at }) => at);
             },
-            values: () => ticks.map(({ text }) => text),
+            values: () => ticks.map(({ text }) => (hasTimes ? text : '')),
           },
           {
             ...axisLook(
@@ -125,7 +130,10 @@ export function createPlot(element: HTMLElement, handlers: PlotHandlers): Plot {
           ],
           draw: [
             (self) => {
-              if (model) drawAbove(frameOf(self), model, palette);
+              if (!model) return;
+              drawAbove(frameOf(self), model, palette);
+              if (!hasTimes) return;
+              for (const line of model.lines) drawMarks(frameOf(self), line, palette);
             },
           ],
           setCursor: [
@@ -168,7 +176,7 @@ export function createPlot(element: HTMLElement, handlers: PlotHandlers): Plot {
       const nextShape = drawnOf(next)
         .map(({ look, isBefore }) => `${look}${isBefore ? 'b' : ''}`)
         .join()
-        .concat(hasMarks(next) ? ' marks' : '');
+        .concat(hasMarks(next) ? ' marks' : '', size.hasTimes ? ' times' : '');
       if (!chart || shape !== nextShape) {
         chart?.destroy();
         chart = build(next, size);
@@ -183,7 +191,7 @@ export function createPlot(element: HTMLElement, handlers: PlotHandlers): Plot {
       chart?.setCursor({ left, top: at === null ? -10 : 0 }, false);
     },
     recolour: () => {
-      palette = readPalette();
+      palette = readPalette(element);
       chart?.batch(() => {
         chart?.redraw();
       });

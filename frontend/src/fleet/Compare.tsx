@@ -215,7 +215,7 @@ function Chart({
     };
   }, [onPoint]);
   useEffect(() => {
-    if (width > 0) plot.current?.show(model, { width, height: HEIGHT });
+    if (width > 0) plot.current?.show(model, { width, height: HEIGHT, hasTimes: true });
   }, [model, width]);
   return (
     <div

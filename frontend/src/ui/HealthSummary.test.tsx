@@ -21,7 +21,7 @@ test('names the verdict, the tag that it comes from, and why', () => {
   render(<HealthSummary kiosk={false} />);
   expect(house().dataset['health']).toBe('critical');
   expect(screen.getByRole('heading').textContent).toBe('Greenhouse status: Critical');
-  expect(driver().textContent).toBe('Tag 5: CO₂ 4000\u00a0ppm, above 3000');
+  expect(driver().textContent).toBe('Tag 5: CO₂ 4,000\u00a0ppm, above 3,000');
   fireEvent.click(driver());
   expect(store.get().view.selected).toBe('5');
 });

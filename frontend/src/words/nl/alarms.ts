@@ -11,7 +11,7 @@ export const ALARMS: In<typeof ENGLISH> = {
   alarmGroups: {
     active: (count) => `Actief (${count})`,
     shelved: (count) => `Uitgesteld (${count})`,
-    resolved: (count) => `Opgelost in de laatste 24 uur (${count})`,
+    resolved: (count) => `Opgelost in de afgelopen 24 uur (${count})`,
   },
   alarmHouse: 'Hele kas',
   alarmWhat: (where, what) => `${where}: ${what}`,
@@ -28,7 +28,7 @@ export const ALARMS: In<typeof ENGLISH> = {
     above: (reading) => `hoogste ${reading}`,
     pest: (reading) => `hoogste aantal ${reading}`,
   },
-  alarmFirst: (reading) => `bij begin ${reading}`,
+  alarmFirst: (reading) => `aan het begin ${reading}`,
   alarmStatus: { critical: 'kritiek', healthy: 'binnen bereik' },
   alarmShow: 'Dit meetpunt nu tonen',
   alarmStart: 'Naar begin',

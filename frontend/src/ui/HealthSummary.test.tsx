@@ -39,7 +39,7 @@ test('says what to do first, and since when', () => {
   const todo = screen.getByRole('list', { name: 'Do this now' });
   expect([...todo.children].map(({ textContent }) => textContent)).toEqual([
     expect.stringMatching(/^CriticalTag 5: 2 pests seenInspect and treat the plants since /),
-    'CriticalTag 1: Pest seenInspect and treat the plants ',
+    'CriticalTag 1: Pest seenInspect and treat the plants no alarm yet',
   ]);
   act(() => {
     acknowledgeAlarms(calling(alarmList.get()));

@@ -78,7 +78,8 @@ export const ALARMS: In<typeof ENGLISH> = {
   alarmsNoneHint:
     'Ein Alarm wird nach zwei auffälligen Messungen nacheinander ausgelöst, bei einem Schädling oder fehlenden Daten sofort.',
   alarmsWait: (tags) =>
-    `${counted(tags, 'kritischer Messpunkt wartet', 'kritische Messpunkte warten')} auf eine zweite Messung`,
+    `${counted(tags, 'Messpunkt wartet', 'Messpunkte warten')}: kein Alarm vor einer zweiten auffälligen Messung`,
+  alarmNotYet: 'noch kein Alarm',
   alarmsNotYet: 'Warten auf die Liste der Alarme',
   alarmsStarting: 'Die Aufzeichnung wird noch gelesen: Weitere Alarme können folgen.',
   alarmsHeard: (since) => `Es wird nichts aufgezeichnet; Alarme vor ${since} sind nicht bekannt.`,

@@ -74,7 +74,8 @@ export const ALARMS: In<typeof ENGLISH> = {
   alarmsNoneHint:
     'Een alarm gaat af na twee afwijkende metingen achter elkaar. Bij een plaag of ontbrekende gegevens gaat het meteen af.',
   alarmsWait: (tags) =>
-    `${counted(tags, 'kritiek meetpunt wacht', 'kritieke meetpunten wachten')} op een tweede meting`,
+    `${counted(tags, 'meetpunt wacht', 'meetpunten wachten')}: geen alarm vóór een tweede afwijkende meting`,
+  alarmNotYet: 'nog geen alarm',
   alarmsNotYet: 'Wachten op de lijst met alarmen',
   alarmsStarting: 'De vastgelegde gegevens worden nog gelezen: er kunnen alarmen bijkomen.',
   alarmsHeard: (since) => `Er wordt niets vastgelegd; alarmen van vóór ${since} zijn niet bekend.`,

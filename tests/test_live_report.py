@@ -67,7 +67,8 @@ def check(live: Bridge) -> None:
     assert 'lang="de"' in page.text
     assert "(UTC+00:00)" in page.text
     assert "\u00a0°C" in page.text
-    assert not re.search(r"\d\.\d\d+\u00a0°C", page.text)
+    assert re.search(r"\d,\d\u00a0°C", page.text)
+    assert not re.search(r"\d[.,]\d\d+\u00a0°C|\d\.\d\u00a0°C", page.text)
 
 
 def check_refusals(live: Bridge) -> None:

@@ -174,7 +174,7 @@ def test_the_readout_says_what_is_known_and_the_map_moves_about_the_pointer(hmi:
         re.compile(r"^31\.0\s°C\s?too high by 5\.0\s°Cx 1\.0\d m, y (2|3)\.\d\d m$")
     )
     hmi.point_at(5.9, 5.9)
-    expect(hmi.test_id("readout")).to_contain_text("not known")
+    expect(hmi.test_id("readout")).to_contain_text("unknown")
 
     start = hmi.view()
     x, y = start.pixel(1, 1)

@@ -170,5 +170,5 @@ def test_a_clock_that_does_not_run_gives_the_robot_no_age(open_page: OpenPage) -
         place(running, 1.0, 1.0)
         hmi = open_page(running.url)
         expect(hmi.test_id("robot")).to_have_attribute("data-looks", "old")
-        expect(hmi.test_id("robot-mark").locator("text")).to_have_text("not known")
+        expect(hmi.test_id("robot-mark").locator("text")).to_have_text("unknown")
         expect(hmi.test_id("robot-fact")).to_have_text("Robot: 1.0 m, 1.0 m; age unknown")

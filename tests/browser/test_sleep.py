@@ -46,16 +46,16 @@ def test_after_a_sleep_no_age_and_no_live_before_a_fresh_state(
     hmi.expect_phase("reconnecting")
     # Of a tag that no scan has brought a reading of, that much is known.
     expect(ages).to_have_text(
-        ["never" if tag in ("failed", "seen") else "not known" for tag in TAGS]
+        ["never" if tag in ("failed", "seen") else "unknown" for tag in TAGS]
     )
-    expect(hmi.card("1")).to_contain_text("not known")
+    expect(hmi.card("1")).to_contain_text("unknown")
     banner = hmi.test_id("frozen")
     expect(banner).to_contain_text("Readings are frozen. Last data at")
     expect(banner).not_to_contain_text("ago")
     hmi.expect(lambda: len(held) > 0, "a new connection")
     # Open alone is not live.
     expect(hmi.app).to_have_attribute("data-fresh", "false")
-    expect(ages.first).to_have_text("not known")
+    expect(ages.first).to_have_text("unknown")
 
     is_away = False
     held[-1].close()

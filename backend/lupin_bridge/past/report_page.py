@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import datetime
-from functools import cache
+from functools import cache, partial
 from html import escape
 from importlib.resources import files
 from typing import Any, Final
@@ -22,7 +22,8 @@ from lupin_twin.core.diagnostics import Origin
 
 HTML_TYPE: Final = "text/html; charset=utf-8"
 _POLICY: Final = (
-    "default-src 'none'; style-src 'unsafe-inline'; base-uri 'none'; form-action 'none'; "
+    "default-src 'none'; style-src 'unsafe-inline'; img-src 'self'; base-uri 'none'; "
+    "form-action 'none'; "
     "frame-ancestors 'none'"
 )
 # A browser repeats a table's head on each sheet, and leaves a row whole.
@@ -30,12 +31,13 @@ _STYLE: Final = """
 @page { size: A4; margin: 14mm 12mm }
 body { font: 10pt/1.35 system-ui, sans-serif; color: #111; background: #fff; max-width: 186mm;
   margin: 0 auto; padding: 4mm }
-h1 { font-size: 18pt; margin: 0 } h2 { font-size: 12pt; margin: 7mm 0 1mm; break-after: avoid }
+h1 { font-size: 18pt; margin: 0 } h1 img { width: 8mm; height: 8mm; vertical-align: -1.5mm }
+ h2 { font-size: 12pt; margin: 7mm 0 1mm; break-after: avoid }
 p { margin: 1mm 0 } .note { color: #444; font-size: 9pt }
 table { border-collapse: collapse; width: 100%; font-size: 8.5pt }
 thead { display: table-header-group } tr { break-inside: avoid }
 th, td { text-align: left; vertical-align: top; padding: 1mm;
-  border-bottom: .2mm solid #bbb; overflow-wrap: anywhere; min-width: 17mm }
+  border-bottom: .2mm solid #bbb; overflow-wrap: anywhere; min-width: 20mm }
 th { border-bottom: .4mm solid #444; overflow-wrap: normal }
 .number { text-align: right; font-variant-numeric: tabular-nums; white-space: nowrap; min-width: 0 }
 th.number { white-space: normal }
@@ -45,6 +47,8 @@ dd { margin: 0; font-size: 13pt } .critical td:first-child { font-weight: 700 }
 td:first-child { min-width: 22mm; hyphens: auto }
 @media print { body { padding: 0; max-width: none } }
 """
+# Of all languages but English.
+_COMMA: Final = str.maketrans(".,", ",.")
 # Alarms in one notification.
 MAX_PUSHED: Final = 4
 Words = Mapping[str, Any]
@@ -96,11 +100,15 @@ class _Page:
         self._lang = lang
         self._words = _words()[lang]
         self._criteria = criteria
+        self._day = ""
         named: Mapping[str, Any] = orjson.loads(criteria.sensors.text).get("sensors", {})
         self._labels = {name: it.get("labels", {}).get(lang) for name, it in named.items()}
 
     def page(self, body: Entry) -> str:
         say, at = self.say, self._at
+        # Of a period within a day the rows leave the day out.
+        days = {at(body[name]).rpartition(" ")[0] for name in ("from", "to")}
+        self._day = f"{days.pop()} " if len(days) == 1 else ""
         period = say("period", **{"from": at(body["from"]), "to": at(body["to"])})
         title = f"{say('title')}: {period}"
         known = [
@@ -112,7 +120,8 @@ class _Page:
             f'<!doctype html><html lang="{self._lang}"><head><meta charset="utf-8">',
             '<meta name="viewport" content="width=device-width">',
             f"<title>{escape(title)}</title><style>{_STYLE}</style></head><body>",
-            f"<h1>{escape(say('title'))}</h1><p>{escape(period)}. ",
+            f'<h1><img src="../lupin.svg" alt=""> {escape(say("title"))}</h1>',
+            f"<p>{escape(period)}. ",
             f"{escape(say('zone', zone=self._zone(body['from'], body['to'])))}</p>",
             f'<p class="note">{escape(" ".join(known) or say("unknown"))}</p>',
             self._counts(body["counts"]),
@@ -149,7 +158,7 @@ class _Page:
         later = ""
         if body["alarms_from"] != body["from"]:
             later = f"<p>{escape(self.say('later', at=self._at(body['alarms_from'])))}</p>"
-        columns = ("alarm", "where", "when", "end", "first*", "worst*", "limit*", "who")
+        columns = ("alarm", "where", "when", "end", "first*", "limit*", "worst*", "who")
         return self._table(body, "alarms", "alarms", columns, self._alarm, later)
 
     def _alarm(self, alarm: Entry) -> Iterable[str]:
@@ -161,14 +170,15 @@ class _Page:
         ]
         cleared, numbers = alarm["cleared_at"], reason["kind"] == "range"
         unit = self._criteria.sensors.named(reason["sensor"]).unit if numbers else ""
+        number = partial(self._number, unit=unit, like=reason["limit"] if numbers else None)
         return (
             f"{self._what(reason)} ({self._words['verdicts'][reason['verdict']]})",
             self._where(alarm["tag_id"]),
-            self._at(alarm["raised_at"]),
-            self.say("still") if cleared is None else self._at(cleared),
-            _number(reason["value"], unit) if numbers or reason["kind"] == "pest" else "",
-            _number(alarm["worst"], unit),
-            _number(reason["limit"], unit) if numbers else "",
+            self._clock(alarm["raised_at"]),
+            self.say("still") if cleared is None else self._clock(cleared),
+            number(reason["value"]) if numbers or reason["kind"] == "pest" else "",
+            number(reason["limit"]) if numbers else "",
+            number(alarm["worst"]),
             "; ".join(who),
         )
 
@@ -177,18 +187,18 @@ class _Page:
         return self._table(body, "extremes", "sensors", columns, self._sensor)
 
     def _sensor(self, of: Entry) -> Iterable[str]:
-        unit = of["unit"]
+        number = partial(self._number, unit=of["unit"], like=of["mean"])
 
         def extreme(found: Entry | None) -> Iterable[str]:
             if found is None:
                 return ("", "")
-            where = f"{self._where(found['tag_id'])}, {self._at(found['stamp'])}"
-            return _number(found["value"], unit), where
+            where = f"{self._where(found['tag_id'])}, {self._clock(found['stamp'])}"
+            return number(found["value"]), where
 
         return (
             self._label(of["sensor_type"]),
             *extreme(of["low"]),
-            _number(of["mean"], unit),
+            number(of["mean"]),
             *extreme(of["high"]),
             str(of["n"]),
             str(of["failed"]),
@@ -208,14 +218,14 @@ class _Page:
             said = [self._words["kinds"].get(note["kind"], note["kind"]), note["text"]]
             said += [self.say("withdrawn", name=gone)] if gone else []
             text = "; ".join(it for it in said if it)
-            return self._at(note["made_at"]), note["by"], text, about
+            return self._clock(note["made_at"]), note["by"], text, about
 
         return cells
 
     def _silence(self, silence: Entry) -> Iterable[str]:
         minutes = (silence["to"]["sec"] - silence["from"]["sec"]) // 60
         length = f"{minutes // 60}:{minutes % 60:02} h"
-        from_, to = self._at(silence["from"]), self._at(silence["to"])
+        from_, to = self._clock(silence["from"]), self._clock(silence["to"])
         return self._where(silence["tag_id"]), from_, to, length
 
     def _table(  # noqa: PLR0917
@@ -289,6 +299,23 @@ class _Page:
             return f"sim {sec // 3600:02}:{sec // 60 % 60:02}"
         return f"{datetime.fromtimestamp(wall_s, self._criteria.clock.zone):%Y-%m-%d %H:%M}"
 
+    def _clock(self, when: Mapping[str, int]) -> str:
+        """A moment in a row; where all of the period is of one day, without that day."""
+        return self._at(when).removeprefix(self._day)
+
+    def _number(self, value: float | None, unit: str, like: float | None = None) -> str:
+        """A number with its unit on the same line, written as the page does; as exact as `like`."""
+        if value is None:
+            return ""
+        size = abs(value if like is None else like)
+        digits = f"{value:.4g}"
+        if unit and size < 1e6:
+            digits = f"{value:,.{0 if size >= 100 else 1 if size >= 1 else 2}f}"
+        if self._lang != "en":
+            digits = digits.translate(_COMMA)
+        digits = digits.replace("-", "\u2212")
+        return f"{digits}\u00a0{unit}".strip()
+
     def _zone(self, *moments: Mapping[str, int]) -> str:
         zone = self._criteria.clock.zone
         offsets = {
@@ -303,14 +330,3 @@ class _Page:
 def _emphasis(entry: Entry) -> str:
     is_critical = entry.get("reason", {}).get("verdict") == "critical"
     return ' class="critical"' if is_critical else ""
-
-
-def _number(value: float | None, unit: str) -> str:
-    """A number as exact as the page has it, with its unit on the same line."""
-    if value is None:
-        return ""
-    size = abs(value)
-    digits = f"{value:.4g}"
-    if unit and size < 1e6:
-        digits = f"{value:.{0 if size >= 100 else 1 if size >= 1 else 2}f}"
-    return f"{digits}\u00a0{unit}".strip()

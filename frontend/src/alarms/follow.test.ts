@@ -60,9 +60,10 @@ describe('follow', () => {
     tellAlarms(co2);
     act({ type: 'compare', compare: { by: 'ago', seconds: 60 } });
     act({ type: 'moment', moment: 9_100 });
+    act({ type: 'list', list: 'alarms' });
     showAlarm(co2);
     const { view } = store.get();
-    expect(view).toMatchObject({ moment: null, selected: '5', sensor: 'co2', pane: 'map' });
+    expect(view).toMatchObject({ moment: null, selected: '5', sensor: 'co2', pane: 'tags' });
     expect(view).toMatchObject({ chart: null, compare: null });
     expect(commands).toEqual([{ type: 'show', tagId: '5' }]);
     expect(calling(alarmList.get())).toHaveLength(1);
@@ -75,7 +76,7 @@ describe('follow', () => {
     };
     goToStart(co2);
     const { view } = store.get();
-    expect(view).toMatchObject({ moment: 9_000.002, selected: '5', sensor: 'co2' });
+    expect(view).toMatchObject({ moment: 9_000.002, selected: '5', sensor: 'co2', pane: 'map' });
     expect(view.period).toEqual({ kind: 'day' });
     expect(commands).toEqual([{ type: 'show', tagId: '5' }]);
   });

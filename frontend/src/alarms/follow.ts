@@ -31,9 +31,9 @@ export function periodWith(
   );
 }
 
-/** Shows the tag as it is now. */
+/** Shows the tag as it is now; its card lies over the list, which is there again when it closes. */
 export const showAlarm = (alarm: Alarm): void => {
-  look(alarm, { moment: null });
+  look(alarm, { moment: null, ...(alarm.tag_id === '' && { pane: 'map' }) });
 };
 
 /** Shows the moment when it began. */
@@ -44,10 +44,10 @@ export function goToStart(alarm: Alarm): void {
   // To the millisecond that holds the observation, and not to the one before it.
   const at = Math.ceil(secondsOf(alarm.raised_at) * 1000) / 1000;
   if (nowS === null || at > nowS) return;
-  look(alarm, { moment: at, period: periodWith(period, at, nowS, oldest) });
+  look(alarm, { moment: at, period: periodWith(period, at, nowS, oldest), pane: 'map' });
 }
 
-function look(alarm: Alarm, when: Partial<Pick<ViewState, 'moment' | 'period'>>): void {
+function look(alarm: Alarm, when: Partial<Pick<ViewState, 'moment' | 'period' | 'pane'>>): void {
   const { view } = store.get();
   act({
     type: 'look',
@@ -57,7 +57,6 @@ function look(alarm: Alarm, when: Partial<Pick<ViewState, 'moment' | 'period'>>)
       sensor: alarm.reason.sensor || view.sensor,
       chart: null,
       compare: null,
-      pane: 'map',
     },
   });
   if (alarm.tag_id !== '') commandMap({ type: 'show', tagId: alarm.tag_id });

@@ -54,8 +54,9 @@ test('another sensor’s age does not matter, but of what is derived', () => {
   const dry = alarm('b', { reason: vpd });
   expect(nowOf(dry, state(8, vpd), null, true)).toMatchObject({ kind: 'known', value: 1.7 });
   expect(nowOf(dry, state(8, vpd, others), null, true)).toMatchObject({ kind: 'unknown' });
-  // Of what is within its range nothing is said, so it is not known.
-  expect(nowOf(dry, state(8), null, true)).toMatchObject({ kind: 'unknown', last: null });
+  // Of what is within its range nothing is said: the tag counts as healthy, and so does this.
+  expect(nowOf(dry, state(8), null, true)).toMatchObject({ value: null, verdict: 'healthy' });
+  expect(nowOf(dry, state(8, others), null, true)).toMatchObject({ kind: 'unknown', last: null });
 });
 
 test('of a pest how many were seen last', () => {

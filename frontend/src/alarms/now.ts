@@ -6,7 +6,7 @@ import { isOldReading, trendOf, type TagThen } from '../domain/trend';
 export type Now =
   | {
       readonly kind: 'known';
-      /** In the sensor's unit; of a pest how many were counted, null: none was seen. */
+      /** In the sensor's unit; null: it is derived, and in range. Of a pest how many were counted, null: none. */
       readonly value: number | null;
       /** How bad that is. */
       readonly verdict: Verdict;
@@ -47,7 +47,12 @@ export function nowOf(
   }
   const { readings, readAt } = tag.tag;
   // What is derived has no reading: what there is of it stands in its reason.
-  const last = readings.has(sensor) ? (readings.get(sensor) ?? null) : (said?.value ?? null);
+  const isDerived = readings.size > 0 && !readings.has(sensor);
+  const last = isDerived ? (said?.value ?? null) : (readings.get(sensor) ?? null);
+  // Of what is within its range nothing is said, nor what it is.
+  if (isLive && isDerived && !said && !tag.health.reasons.some((it) => it.verdict === 'unknown')) {
+    return { kind: 'known', value: null, verdict, limit: null, trend: null };
+  }
   if (!isLive || last === null || isOldReading(sensor, tag)) {
     return unknown(last, readAt.get(sensor) ?? 'unknown');
   }

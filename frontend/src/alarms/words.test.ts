@@ -111,6 +111,9 @@ test('of a pest how many: now, at worst and at first', () => {
   expect(valuesOf(pest, C, known(3, 'critical'))).toMatchObject({ ...texts, now: 'now 3 pests' });
   expect(valuesOf(pest, C, known(0, 'critical')).now).toBe('now seen');
   expect(valuesOf(pest, C, known(null, 'healthy')).now).toBe('now none seen');
+  // What is derived, and said nothing of.
+  const dry = alarm('b', { reason: { sensor: 'vpd', value: 1.7, limit: 1.3 } });
+  expect(valuesOf(dry, C, known(null, 'healthy')).now).toBe('now in range');
   // Seen, and not counted.
   expect(valuesOf(alarm('a', { worst: 0, reason }), C, known(0, 'stressed')).worst).toBeNull();
 });

@@ -67,13 +67,12 @@ export function valuesOf(alarm: Alarm, speech: Speech, now: Now | null): Values 
       : readingText(sensor, value, unit, more);
   const nowText = (value: number): string =>
     isPest && value > 0 ? S.pestCount(value) : text(value);
+  const noneText = isPest ? S.alarmPests.none : S.alarmStatus.healthy;
   const isMeasured = isOfRange(reason) || isPest || reason.kind === 'changed';
   return {
     what: whatText({ ...alarm, reason }, speech, more),
     now:
-      now?.kind === 'known'
-        ? S.alarmNow(now.value === null ? S.alarmPests.none : nowText(now.value))
-        : null,
+      now?.kind === 'known' ? S.alarmNow(now.value === null ? noneText : nowText(now.value)) : null,
     worst:
       worst === null || (isPest && worst === 0)
         ? null
@@ -96,7 +95,8 @@ export function alarmText(alarm: Alarm, speech: Speech, now: Now | null): string
   const isWorstNow = isKnown && now.value === (alarm.worst ?? alarm.reason.value);
   const texts = [
     what,
-    isKnown && nowText !== null ? rated(nowText, now.verdict) : null,
+    // What has no value says by itself how it is.
+    isKnown && nowText !== null && now.value !== null ? rated(nowText, now.verdict) : nowText,
     worst === null || isWorstNow ? null : rated(worst, alarm.reason.verdict),
   ];
   return S.alarmWhat(whereText(alarm), texts.filter((text) => text !== null).join(', '));

@@ -23,6 +23,7 @@ test.each([
   [-3.25, '\u22123.3'],
   [99.96, '100.0'],
   [612.4, '612'],
+  [-80_000, '\u221280,000'],
   [1234567, '1.23e+6'],
 ])('%d reads %s', (value, text) => {
   expect(numberText(value)).toBe(text);
@@ -90,7 +91,7 @@ function* sizes(count: number): Generator<number> {
     yield (next() < 0.5 ? -1 : 1) * 10 ** (next() * 9 - 4);
   }
 }
-const read = (text: string): number => Number(text.replace('\u2212', '-'));
+const read = (text: string): number => Number(text.replace('\u2212', '-').replace(',', ''));
 
 test('of a sensor that nobody knows no text is off by more than a twentieth of its value', () => {
   const sensor = sensorNamed('spin');

@@ -20,7 +20,13 @@ function roundedText(value: number, more: number): string {
   return /^-0(\.0+)?$/.test(text) ? text.slice(1) : text;
 }
 
-export const numberText = (value: number, more = 0): string => written(roundedText(value, more));
+const WHOLE = new Intl.NumberFormat(LOCALE, { maximumFractionDigits: 0 });
+
+/** As a reader writes it; thousands are set apart, as on a chart's axis. */
+export const numberText = (value: number, more = 0): string =>
+  more === 0 && Math.abs(value) >= 1000 && Math.abs(value) < 1e6
+    ? WHOLE.format(value).replace('-', '\u2212')
+    : written(roundedText(value, more));
 
 /** Beyond this many digits more two numbers may read the same. */
 const MOST_MORE = 4;

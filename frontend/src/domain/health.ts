@@ -60,6 +60,10 @@ export function houseHealth(
   };
 }
 
+/** Whether something is known to be wrong with it. */
+export const isBad = ({ verdict }: TagHealth): boolean =>
+  verdict === 'critical' || verdict === 'stressed';
+
 /** Whether nobody knows how it is now, of all its tags. */
 export const isSilent = ({ reasons }: TagHealth): boolean => reasons[0]?.kind === 'silent';
 

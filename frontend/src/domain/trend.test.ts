@@ -71,6 +71,7 @@ test.each([
   ['temperature', 22.4, -0.06, 'C', 'down', '\u22120.1\u00a0°C'],
   ['light', 975, 0.4, 'C', 'level', 'steady'],
   ['light', 975, -12.2, 'C', 'down', '\u221212\u00a0lx'],
+  ['light', 9_750, -12.2, 'C', 'down', '\u221212\u00a0lx'],
   ['ph', 6.5, 0.2, 'C', 'up', '+0.2'],
 ] as const)(
   'of %s at %d a difference of %d is told in °%s: %s, %s',

@@ -59,7 +59,9 @@ export function differenceShown(
   by: number,
   unit: TemperatureUnit,
 ): { readonly way: 'up' | 'down' | 'level'; readonly text: string } {
-  const digits = /[.,](\d+)$/.exec(valueText(sensor, value, unit))?.[1]?.length ?? 0;
+  // Of thousands there are none, and the mark in them is no decimal point.
+  const decimals = Math.abs(value) < 1000 && /[.,](\d+)$/.exec(valueText(sensor, value, unit));
+  const digits = decimals ? (decimals[1]?.length ?? 0) : 0;
   const shown = differenceToShown(sensor, by, unit).toFixed(digits);
   const way = Number(shown) > 0 ? 'up' : Number(shown) < 0 ? 'down' : 'level';
   if (way === 'level') return { way, text: S.trendLevel };

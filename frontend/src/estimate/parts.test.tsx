@@ -71,7 +71,7 @@ describe('readout', () => {
     expect(text('readout-near')).toBe(`1 tag near, oldest reading 12${NBSP}min`);
     point(1.5);
     await waitFor(() => {
-      expect(text('readout')).toContain('not known');
+      expect(text('readout')).toContain('unknown');
     });
     point(0.5);
     flush(() => {

@@ -62,7 +62,7 @@ export function fitClear(
   return views.find(clear) ?? plain;
 }
 
-/** The sides that a box leaves more than half of the view to, and how deep it is from there. */
+/** The sides that a box leaves a third of the view to at least, and how deep it is from there. */
 function waysAround(box: Box, { width, height }: Size): (readonly [keyof Insets, number])[] {
   const ways: (readonly [keyof Insets, number, number])[] = [
     ['top', box.bottom + REACH_PX, height],
@@ -71,6 +71,6 @@ function waysAround(box: Box, { width, height }: Size): (readonly [keyof Insets,
     ['left', box.right + REACH_PX, width],
   ];
   return ways
-    .filter(([, depth, extent]) => depth <= extent / 2)
+    .filter(([, depth, extent]) => depth <= (extent * 2) / 3)
     .map(([side, depth]) => [side, depth] as const);
 }

@@ -88,7 +88,7 @@ describe('page', () => {
       return screen.getByTestId('readout').textContent;
     };
     expect(readout(0.5)).toContain('21.0\u00a0°C');
-    expect(readout(1.5)).toContain('not known');
+    expect(readout(1.5)).toContain('unknown');
     flush(() => {
       pointedAt.dispatch(null);
     });
@@ -108,6 +108,6 @@ describe('page', () => {
     expect(screen.queryByRole('table')).toBeNull();
     const [first] = document.querySelectorAll('.attention li');
     expect(first?.textContent).toContain('4 pests seen');
-    expect(first?.textContent).toContain('CO₂ 3200');
+    expect(first?.textContent).toContain('CO₂ 3,200');
   });
 });

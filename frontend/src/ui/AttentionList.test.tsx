@@ -28,6 +28,9 @@ test('lists who needs somebody and why, the worst first', () => {
     'Temperature 6.6\u00a0°C, below 10.0',
     '2 pests seen',
   ]);
+  expect(first.querySelector('.attention-do')?.textContent).toContain(
+    'Heat, or close the vents · Inspect and treat the plants',
+  );
 });
 
 test('ends with how many more there are', () => {

@@ -33,7 +33,7 @@ export function AttentionList(): JSX.Element {
             <span className="attention-why">
               <Reasons health={own} most={MOST_REASONS} />
               <span className="attention-do">
-                <Todo reason={worstReason(own)} />{' '}
+                <strong>{todoTexts(own.reasons.slice(0, MOST_REASONS))}</strong>{' '}
                 <small className="faint">
                   <Since tagId={tag.id} reason={worstReason(own)} />
                 </small>
@@ -49,8 +49,9 @@ export function AttentionList(): JSX.Element {
   );
 }
 
-const Todo = ({ reason }: { reason: HealthReason | undefined }): JSX.Element | null =>
-  reason ? <strong>{todoText(reason)}</strong> : null;
+/** What to do about each of them, no word twice. */
+const todoTexts = (reasons: readonly HealthReason[]): string =>
+  [...new Set(reasons.map((reason) => todoText(reason)))].join(' · ');
 
 const Since = (it: { tagId: string; reason: HealthReason | undefined }): string | null =>
   useSince(it.tagId, it.reason);

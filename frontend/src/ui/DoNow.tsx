@@ -63,15 +63,17 @@ export const alarmOf = (
   );
 
 /**
- * Since when the alarm of a reason is active, or what somebody has said of it; null: there is none,
- * or another moment is shown.
+ * Since when the alarm of a reason is active, what somebody has said of it, or that there is none
+ * yet; null: nobody knows, or another moment is shown.
  */
 export function useSince(tagId: string, reason: HealthReason | undefined): string | null {
   const isNow = useApp((state) => selectShown(state).moment === null);
   const found = useSelected(alarmList, ({ active, shelved }) =>
     alarmOf([...active, ...shelved], tagId, reason),
   );
-  if (!isNow || !found) return null;
+  const isKnown = useApp(({ twin }) => twin.alarms !== null && twin.alarms.source !== 'starting');
+  if (!isNow) return null;
+  if (!found) return isKnown ? S.alarmNotYet : null;
   if (found.shelf) return S.alarmShelved(clockText(found.shelf.until), '', '');
   if (found.isAcknowledged) return S.healthAcknowledged;
   return S.alarmSince(whenText(secondsOf(found.alarm.raised_at), rosNow(store.get(), now())), null);

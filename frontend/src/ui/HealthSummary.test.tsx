@@ -21,7 +21,7 @@ test('names the verdict, the tag that it comes from, and why', () => {
   render(<HealthSummary kiosk={false} />);
   expect(house().dataset['health']).toBe('critical');
   expect(screen.getByRole('heading').textContent).toBe('Greenhouse status: Critical');
-  expect(driver().textContent).toBe('Tag 5: CO₂ 4000\u00a0ppm, above 3000');
+  expect(driver().textContent).toBe('Tag 5: CO₂ 4,000\u00a0ppm, above 3,000');
   fireEvent.click(driver());
   expect(store.get().view.selected).toBe('5');
 });
@@ -39,7 +39,7 @@ test('says what to do first, and since when', () => {
   const todo = screen.getByRole('list', { name: 'Do this now' });
   expect([...todo.children].map(({ textContent }) => textContent)).toEqual([
     expect.stringMatching(/^CriticalTag 5: 2 pests seenInspect and treat the plants since /),
-    'CriticalTag 1: Pest seenInspect and treat the plants ',
+    'CriticalTag 1: Pest seenInspect and treat the plants no alarm yet',
   ]);
   act(() => {
     acknowledgeAlarms(calling(alarmList.get()));

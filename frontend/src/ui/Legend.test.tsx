@@ -27,7 +27,7 @@ describe('legend', () => {
     expect(at('range-low')).toBe('12.0');
     expect(at('range-high')).toBe('30.0\u00a0°C');
     expect(at('sample-count')).toBe('9 tags contribute');
-    expect(at('legend')).toMatch(/No colour: minimum. Hatched: no data/);
+    expect(at('legend')).toMatch(/No colour: minimum\.\s+Hatched: no data/);
   });
 
   test('shows the error where the server gives one, and nothing where it does not', () => {

@@ -99,7 +99,8 @@ export function Legend({ kiosk }: { kiosk: boolean }): JSX.Element {
           )}
           {!isEstimate && (
             <span className="legend-note">
-              <HatchedSign /> {isIdeal ? S.legendHatched : S.legendTransparent}
+              {!isIdeal && `${S.legendTransparent} `}
+              <HatchedSign /> {S.legendHatched}
             </span>
           )}
           <WithParts>{(parts) => <parts.InLegend />}</WithParts>

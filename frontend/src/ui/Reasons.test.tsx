@@ -38,7 +38,7 @@ const WORDS: Readonly<Record<Verdict, string>> = {
 };
 /** What has to be read in the words for each kind. */
 const SAYS: Readonly<Record<HealthReason['kind'], RegExp>> = {
-  range: /, (below|above) [\d.]+( \(critical\))?$/,
+  range: /, (below|above) [\d.,]+( \(critical\))?$/,
   reading_failed: /: (the sensor returns no value|not a plausible value)$/,
   scan_failed: /^Last scan failed: (not reachable|not readable)/,
   pest: /^(\d+ pests?|Pest) seen$/,

@@ -29,7 +29,7 @@ test('a moment that a simulation made is said to be simulated, and no other', ()
   render(<SimulatedNote />);
   expect(note()).toBe('');
   lookBack(END - 1);
-  expect(note()).toBe(`Simulated. Demo days until ${rosText(END)}, not measured.`);
+  expect(note()).toBe(`Simulated. All data until ${rosText(END)} is demo data, not measured.`);
   lookBack(END);
   expect(note()).toBe('');
   lookBack(START);

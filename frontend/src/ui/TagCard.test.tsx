@@ -147,7 +147,7 @@ describe('card', () => {
       screen.getByTestId('tag-card').querySelector(`[data-sensor=${sensor}]`);
     expect(own('temperature')?.textContent).toContain('2\u00a0h 0\u00a0min');
     expect(own('temperature')?.dataset['age']).toBe('old');
-    expect(own('co2')?.textContent).toContain('not known');
+    expect(own('co2')?.textContent).toContain('unknown');
     expect(screen.getByTestId('tag-card').textContent).toContain('Flowers inspected');
   });
 

@@ -2,7 +2,7 @@ import { useRef, type JSX } from 'react';
 
 import type { When } from '../domain/age';
 import { farOffText, metresText, percentText, readingText, valueText } from '../domain/format';
-import { rangeReason, sideOf } from '../domain/health';
+import { isBad, rangeReason, sideOf } from '../domain/health';
 import { digitsOf, tryKind } from '../domain/reasons';
 import { rangesFor } from '../domain/sensors';
 import { speciesText } from '../domain/species';
@@ -94,10 +94,9 @@ function CardBody({
   const isCharted = useApp((state) => state.view.chart !== null);
   const area = useApp((state) => selectCatalogue(state).areaOf(tag.id));
   const isNow = useApp((state) => selectShown(state).moment === null);
-  const isBad = health?.verdict === 'critical' || health?.verdict === 'stressed';
   return (
     <div className="card-body">
-      {health && <Reasons health={health} hasTodo={isBad && isNow} />}
+      {health && <Reasons health={health} hasTodo={isBad(health) && isNow} />}
       {isNow && <CardAlarms tagId={tag.id} />}
       {tag.readings.size === 0 && <p className="faint">{S.cardNoReadings}</p>}
       <ul className="card-readings">

@@ -65,7 +65,7 @@ const DUTCH: In<typeof ENGLISH> = {
   someCompared: (count, all) =>
     `${count} van ${all} kassen worden vergeleken, de slechtste eerst. Zoek, of kies een groep.`,
   notFetched: (reason) => `Dit kon niet worden opgehaald: ${reason}`,
-  hours: (count) => `Laatste ${count} uur`,
+  hours: (count) => `Afgelopen ${count} uur`,
   scans: 'Scans',
   failed: 'Mislukte pogingen',
   inspections: 'Inspecties',

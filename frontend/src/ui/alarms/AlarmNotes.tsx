@@ -3,7 +3,7 @@ import type { JSX } from 'react';
 import { epochOf } from '../../clock';
 import { alarmList } from '../../alarms/watch';
 import { clockText } from '../../domain/format';
-import { worstReason } from '../../domain/health';
+import { isBad, worstReason } from '../../domain/health';
 import { rosText, secondsOf } from '../../domain/rostime';
 import { useApp } from '../../store/app';
 import { useSelected } from '../../store/create';
@@ -27,7 +27,7 @@ export function AlarmNotes({ isEmpty }: { isEmpty: boolean }): JSX.Element {
   const waiting = useApp((state) => {
     const all = [...listed.active, ...listed.shelved];
     return [...(selectNewestHealth(state)?.byTag ?? [])].filter(
-      ([id, own]) => own.verdict === 'critical' && !alarmOf(all, id, worstReason(own)),
+      ([id, own]) => isBad(own) && !alarmOf(all, id, worstReason(own)),
     ).length;
   });
   return (

@@ -3,6 +3,10 @@ import type { ALARMS as ENGLISH } from '../en/alarms';
 import type { In } from '../shape';
 import { counted } from './counted';
 
+/** Alarme oder Messpunkte, die nicht genannt sind. */
+const furtherText = (more: number): string =>
+  more > 0 ? ` und ${counted(more, 'weiterer', 'weitere')}` : '';
+
 export const ALARMS: In<typeof ENGLISH> = {
   alarms: 'Alarme',
   listChoice: 'Neben der Karte',
@@ -60,7 +64,7 @@ export const ALARMS: In<typeof ENGLISH> = {
   },
   alarmsNew: (count) => `${count} neu`,
   alarmsNewHint: 'Die Reihenfolge bleibt, solange Sie die Liste benutzen. Neue Alarme anzeigen',
-  alarmMore: (count) => `${count} weitere anzeigen`,
+  alarmMore: (count) => `${counted(count, 'weiteren', 'weitere')} anzeigen`,
   alarmFilter: 'Alarme filtern',
   alarmFilterHint: 'Filtern …',
   alarmOrder: 'Reihenfolge',
@@ -69,12 +73,13 @@ export const ALARMS: In<typeof ENGLISH> = {
   alarmsNoMatch: 'Kein Alarm passt zum Filter.',
   alarmCount: (count) => counted(count, 'Alarm', 'Alarme'),
   alarmTags: (tags, more) =>
-    `${tags.length === 1 ? 'Messpunkt' : 'Messpunkte'} ${tags.join(', ')}${more > 0 ? ` und ${more} weitere` : ''}`,
+    `${tags.length === 1 ? 'Messpunkt' : 'Messpunkte'} ${tags.join(', ')}${furtherText(more)}`,
   alarmsNone: 'Keine anstehenden Alarme',
   alarmsNoneHint:
     'Ein Alarm wird nach zwei auffälligen Messungen nacheinander ausgelöst, bei einem Schädling oder fehlenden Daten sofort.',
   alarmsWait: (tags) =>
-    `${counted(tags, 'kritischer Messpunkt wartet', 'kritische Messpunkte warten')} auf eine zweite Messung`,
+    `${counted(tags, 'Messpunkt wartet', 'Messpunkte warten')}: kein Alarm vor einer zweiten auffälligen Messung`,
+  alarmNotYet: 'noch kein Alarm',
   alarmsNotYet: 'Warten auf die Liste der Alarme',
   alarmsStarting: 'Die Aufzeichnung wird noch gelesen: Weitere Alarme können folgen.',
   alarmsHeard: (since) => `Es wird nichts aufgezeichnet; Alarme vor ${since} sind nicht bekannt.`,
@@ -96,10 +101,8 @@ export const ALARMS: In<typeof ENGLISH> = {
   alarmNotifyNone: 'Dieser Browser unterstützt keine Benachrichtigungen.',
   alarmNotifyTitle: (count) => counted(count, 'neuer Alarm', 'neue Alarme'),
 
-  alarmsRaised: (alarms, more) =>
-    `Neu: ${alarms.join('; ')}${more > 0 ? ` und ${more} weitere` : ''}`,
-  alarmsCleared: (alarms, more) =>
-    `Behoben: ${alarms.join('; ')}${more > 0 ? ` und ${more} weitere` : ''}`,
+  alarmsRaised: (alarms, more) => `Neu: ${alarms.join('; ')}${furtherText(more)}`,
+  alarmsCleared: (alarms, more) => `Behoben: ${alarms.join('; ')}${furtherText(more)}`,
   alarmsMeanwhile: (alarm, more) =>
     `Neuer Alarm: ${alarm}${more > 0 ? ` und ${counted(more, 'weiterer Alarm', 'weitere Alarme')}` : ''}`,
 };

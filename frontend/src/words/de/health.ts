@@ -106,7 +106,7 @@ export const HEALTH: In<typeof ENGLISH> = {
   attentionNone: 'Kein Handlungsbedarf',
   attentionNoneKnown: (unknown) =>
     `Soweit bekannt kein Handlungsbedarf; keine Daten von ${counted(unknown, 'Messpunkt', 'Messpunkten')}`,
-  attentionMore: (count) => `+ ${count} weitere`,
+  attentionMore: (count) => `+ ${counted(count, 'weiterer', 'weitere')}`,
 
   tooLow: (by) => (by === null ? 'zu niedrig' : `um ${by} zu niedrig`),
   tooHigh: (by) => (by === null ? 'zu hoch' : `um ${by} zu hoch`),

@@ -43,8 +43,7 @@ export const MAP: In<typeof ENGLISH> = {
   legendErrorHint:
     'Typischer Fehler zwischen den Messpunkten: Jeder Messpunkt wird aus allen anderen geschätzt und mit seinem Messwert verglichen.',
   legendErrorWorst: (tag, error) => `Am größten an Messpunkt ${tag}: ${error}.`,
-  legendTransparent:
-    'Kräftigere Farbe: höherer Wert. Ohne Farbe: kleinster Wert. Schraffiert: keine Daten',
+  legendTransparent: 'Kräftigere Farbe: höherer Wert. Ohne Farbe: kleinster Wert.',
   legendMore: 'Details',
   legendHatched: 'Schraffiert: keine Daten',
   legendOld: 'Blass und schraffiert: Messwerte zu alt',

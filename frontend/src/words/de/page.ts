@@ -122,7 +122,7 @@ export const PAGE: In<typeof ENGLISH> = {
   recordedPaused: 'Die Aufzeichnung ist angehalten.',
   recordedPausedHint: 'Sie ist angehalten oder zu Ende; das Alter der Werte wächst nicht.',
   simulated: 'Simuliert.',
-  simulatedHint: (until) => `Demo-Tage bis ${until}, nicht gemessen.`,
+  simulatedHint: (until) => `Alle Daten bis ${until} sind Demodaten, nicht gemessen.`,
   setAside: 'Eine beschädigte Aufzeichnung wurde in Quarantäne genommen.',
   setAsideHint: (name) =>
     `Lesbare Daten wurden übernommen, die Aufzeichnung läuft weiter. Die beschädigte Datei ist ${name}.`,

@@ -25,7 +25,7 @@ export const MAP = {
     advice: 'Where another tag would help',
   },
   scaleBar: (length: string): string => `Scale: ${length}`,
-  notKnown: 'not known',
+  notKnown: 'unknown',
   position: (x: string, y: string): string => `x ${x} m, y ${y} m`,
 
   legend: 'Legend',
@@ -39,7 +39,7 @@ export const MAP = {
   legendErrorHint:
     'Typical error between tags: each tag is estimated from all the others and compared with its own reading.',
   legendErrorWorst: (tag: string, error: string): string => `Worst at tag ${tag}: ${error}.`,
-  legendTransparent: 'Stronger colour: higher value. No colour: minimum. Hatched: no data',
+  legendTransparent: 'Stronger colour: higher value. No colour: minimum.',
   legendMore: 'Details',
   legendHatched: 'Hatched: no data',
   legendOld: 'Faint and hatched: readings too old',

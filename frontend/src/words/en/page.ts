@@ -122,7 +122,7 @@ export const PAGE = {
   recordedPaused: 'The recording is paused.',
   recordedPausedHint: 'It is paused or has ended, so ages do not increase.',
   simulated: 'Simulated.',
-  simulatedHint: (until: string): string => `Demo days until ${until}, not measured.`,
+  simulatedHint: (until: string): string => `All data until ${until} is demo data, not measured.`,
   setAside: 'A damaged recording was quarantined.',
   setAsideHint: (name: string): string =>
     `Readable data was kept, and recording continues. The damaged file is ${name}.`,

@@ -24,11 +24,11 @@ export const TAGS = {
   farOff: 'Too far away, not on the map',
   farOffLong: (place: string): string =>
     `Its position (${place}) is far from all other tags, so the tag has no pin on the map.`,
-  ageUnknown: 'not known',
+  ageUnknown: 'unknown',
   ageUnknownLong: 'The age is unknown until the twin reports its time again.',
   neverObserved: 'never',
   neverObservedLong: 'No scan has returned a reading yet.',
-  notKnownThen: 'not known',
+  notKnownThen: 'unknown',
   notKnownThenLong: 'This is no longer stored, or was not recorded yet.',
   ageUntoldLong: 'This twin does not report when readings were taken.',
   tried: {
@@ -67,7 +67,7 @@ export const TAGS = {
   trend: 'Trend',
   trendTitle: (sensor: string): string => `${sensor} compared with an hour ago`,
   trendNone: 'no reading an hour ago',
-  trendSame: 'not new',
+  trendSame: 'old value',
   trendLevel: 'steady',
   trendUnknown: 'an hour ago: unknown',
   density: 'Rows',

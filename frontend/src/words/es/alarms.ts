@@ -75,7 +75,8 @@ export const ALARMS: In<typeof ENGLISH> = {
   alarmsNoneHint:
     'La alarma salta tras dos mediciones anómalas seguidas. Con una plaga o si faltan datos del invernadero, salta de inmediato.',
   alarmsWait: (tags) =>
-    `${counted(tags, 'punto crítico espera', 'puntos críticos esperan')} una segunda medición`,
+    `${counted(tags, 'punto espera', 'puntos esperan')}: no hay alarma antes de otra medición anómala`,
+  alarmNotYet: 'aún sin alarma',
   alarmsNotYet: 'Esperando la lista de alarmas',
   alarmsStarting: 'Todavía se está leyendo el registro: pueden aparecer más alarmas.',
   alarmsHeard: (since) => `No se registra nada; no se conocen las alarmas anteriores a ${since}.`,

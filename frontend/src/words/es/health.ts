@@ -26,8 +26,7 @@ export const HEALTH: In<typeof ENGLISH> = {
     implausible: (reading) => `${reading}: valor no plausible`,
     scanFailed: (outcome, age) =>
       `Última medición fallida: ${outcome}${age === null ? '' : `, hace ${age}`}`,
-    pest: (count) =>
-      count > 0 ? counted(count, 'insecto visto', 'insectos vistos') : 'Plaga vista',
+    pest: (count) => (count > 0 ? counted(count, 'plaga vista', 'plagas vistas') : 'Plaga vista'),
     old: (sensor, age, holds, isDated) => {
       const since = !isDated
         ? sensor === ''
@@ -70,7 +69,7 @@ export const HEALTH: In<typeof ENGLISH> = {
     stopped: 'Revisar el robot',
     other: 'Ir a mirar',
   },
-  todoPestAgain: 'Inspeccione otra vez: si no hay plaga, queda resuelta',
+  todoPestAgain: 'Inspeccionar otra vez: si no hay plaga, queda resuelta',
   todoWell: 'En espera de otra medición buena',
   todoLabel: 'Hacer ahora',
   reasonsLabel: 'Por qué',
@@ -111,8 +110,8 @@ export const HEALTH: In<typeof ENGLISH> = {
     `Sin problemas conocidos; sin datos de ${counted(unknown, 'punto', 'puntos')}`,
   attentionMore: (count) => `+ ${count} más`,
 
-  tooLow: (by) => (by === null ? 'por debajo del ideal' : `${by} por debajo del ideal`),
-  tooHigh: (by) => (by === null ? 'por encima del ideal' : `${by} por encima del ideal`),
+  tooLow: (by) => (by === null ? 'por debajo del rango' : `${by} por debajo del ideal`),
+  tooHigh: (by) => (by === null ? 'por encima del rango' : `${by} por encima del ideal`),
   below: 'bajo el ideal',
   above: 'sobre el ideal',
 };

@@ -41,7 +41,7 @@ export const MAP: In<typeof ENGLISH> = {
   legendErrorHint:
     'Error típico entre los puntos: cada punto se estima a partir de los demás y se compara con su propia lectura.',
   legendErrorWorst: (tag, error) => `El mayor, en el punto ${tag}: ${error}.`,
-  legendTransparent: 'Color más intenso: valor más alto. Sin color: el mínimo. Rayado: sin datos',
+  legendTransparent: 'Color más intenso: valor más alto. Sin color: el mínimo.',
   legendMore: 'Detalles',
   legendHatched: 'Rayado: sin datos',
   legendOld: 'Pálido y rayado: lecturas demasiado antiguas',

@@ -119,7 +119,7 @@ export const PAGE: In<typeof ENGLISH> = {
   recordedPaused: 'La grabación está en pausa.',
   recordedPausedHint: 'Está en pausa o ha terminado; la antigüedad no aumenta.',
   simulated: 'Simulado.',
-  simulatedHint: (until) => `Días de demostración hasta ${until}, no medidos.`,
+  simulatedHint: (until) => `Los datos hasta ${until} son de demostración, no medidos.`,
   setAside: 'Se ha puesto en cuarentena un registro dañado.',
   setAsideHint: (name) =>
     `Se han conservado los datos legibles y el registro continúa. El archivo dañado es ${name}.`,

@@ -11,7 +11,7 @@ export const ALARMS: In<typeof ENGLISH> = {
   alarmGroups: {
     active: (count) => `Actief (${count})`,
     shelved: (count) => `Uitgesteld (${count})`,
-    resolved: (count) => `Opgelost in de laatste 24 uur (${count})`,
+    resolved: (count) => `Opgelost in de afgelopen 24 uur (${count})`,
   },
   alarmHouse: 'Hele kas',
   alarmWhat: (where, what) => `${where}: ${what}`,
@@ -28,7 +28,7 @@ export const ALARMS: In<typeof ENGLISH> = {
     above: (reading) => `hoogste ${reading}`,
     pest: (reading) => `hoogste aantal ${reading}`,
   },
-  alarmFirst: (reading) => `bij begin ${reading}`,
+  alarmFirst: (reading) => `aan het begin ${reading}`,
   alarmStatus: { critical: 'kritiek', healthy: 'binnen bereik' },
   alarmShow: 'Dit meetpunt nu tonen',
   alarmStart: 'Naar begin',
@@ -74,7 +74,8 @@ export const ALARMS: In<typeof ENGLISH> = {
   alarmsNoneHint:
     'Een alarm gaat af na twee afwijkende metingen achter elkaar. Bij een plaag of ontbrekende gegevens gaat het meteen af.',
   alarmsWait: (tags) =>
-    `${counted(tags, 'kritiek meetpunt wacht', 'kritieke meetpunten wachten')} op een tweede meting`,
+    `${counted(tags, 'meetpunt wacht', 'meetpunten wachten')}: geen alarm vóór een tweede afwijkende meting`,
+  alarmNotYet: 'nog geen alarm',
   alarmsNotYet: 'Wachten op de lijst met alarmen',
   alarmsStarting: 'De vastgelegde gegevens worden nog gelezen: er kunnen alarmen bijkomen.',
   alarmsHeard: (since) => `Er wordt niets vastgelegd; alarmen van vóór ${since} zijn niet bekend.`,

@@ -20,9 +20,9 @@ export const ESTIMATE: In<typeof ENGLISH> = {
     `${inside} van ${counted(scans, 'meting', 'metingen')} binnen het voorspelde bereik`,
   foretoldNone: 'Er is nog geen meting mee vergeleken',
   foretoldDay: (inside, scans) =>
-    `Laatste dag: ${inside} van ${counted(scans, 'meting', 'metingen')}`,
+    `Afgelopen dag: ${inside} van ${counted(scans, 'meting', 'metingen')}`,
   foretoldWeek: (inside, scans) =>
-    `laatste week: ${inside} van ${counted(scans, 'meting', 'metingen')}`,
+    `afgelopen week: ${inside} van ${counted(scans, 'meting', 'metingen')}`,
   fitProblem: (reason) => `Het model past niet goed bij deze kas: ${reason}`,
   notTrusted: (count) =>
     `Foutmarge te smal: slechts ${count} van de 10 metingen lagen erbinnen, geen 9.`,

@@ -23,8 +23,7 @@ export const HEALTH: In<typeof ENGLISH> = {
     implausible: (reading) => `${reading}: geen plausibele waarde`,
     scanFailed: (outcome, age) =>
       `Laatste meting mislukt: ${outcome}${age === null ? '' : `, ${age} geleden`}`,
-    pest: (count) =>
-      count > 0 ? `${counted(count, 'plaagdier', 'plaagdieren')} gezien` : 'Plaag gezien',
+    pest: (count) => (count > 0 ? `${counted(count, 'plaag', 'plagen')} gezien` : 'Plaag gezien'),
     old: (sensor, age, holds, isDated) => {
       const since = !isDated
         ? sensor === ''

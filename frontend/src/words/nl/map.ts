@@ -42,8 +42,7 @@ export const MAP: In<typeof ENGLISH> = {
   legendErrorHint:
     'Typische fout tussen de meetpunten: elk meetpunt wordt uit alle andere geschat en vergeleken met de eigen meetwaarde.',
   legendErrorWorst: (tag, error) => `Grootste fout bij meetpunt ${tag}: ${error}.`,
-  legendTransparent:
-    'Sterkere kleur: hogere waarde. Geen kleur: laagste waarde. Gearceerd: geen gegevens',
+  legendTransparent: 'Sterkere kleur: hogere waarde. Geen kleur: laagste waarde.',
   legendMore: 'Details',
   legendHatched: 'Gearceerd: geen gegevens',
   legendOld: 'Vaag en gearceerd: metingen te oud',

@@ -122,7 +122,7 @@ export const PAGE: In<typeof ENGLISH> = {
   recordedPaused: 'De opname is gepauzeerd.',
   recordedPausedHint: 'Gepauzeerd of afgelopen; de ouderdom loopt niet op.',
   simulated: 'Gesimuleerd.',
-  simulatedHint: (until) => `Demodagen tot ${until}, niet gemeten.`,
+  simulatedHint: (until) => `Alle gegevens tot ${until} zijn demogegevens, niet gemeten.`,
   setAside: 'Een beschadigde opname is in quarantaine gezet.',
   setAsideHint: (name) =>
     `Leesbare gegevens zijn bewaard en het vastleggen gaat door. Het beschadigde bestand is ${name}.`,

@@ -123,12 +123,12 @@ function drawRanges(frame: Frame, line: Line, model: PlotModel, palette: ChartPa
 /** Markers of readings, the names of limits, and the moment that is shown. */
 export function drawAbove(frame: Frame, model: PlotModel, palette: ChartPalette): void {
   const { context, box } = frame;
+  // The last line's dashes are still in force.
+  context.setLineDash([]);
   context.save();
   context.beginPath();
   context.rect(box.left, box.top, box.width, box.height);
   context.clip();
-  // The last line's dashes are still in force.
-  context.setLineDash([]);
   for (const line of model.lines) {
     drawMarkers(frame, line, model, palette);
   }

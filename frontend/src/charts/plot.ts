@@ -31,7 +31,7 @@ const DASH_BEFORE = [3, 3];
 /** A drag that is shorter is a click, CSS pixels. */
 const SHORTEST_DRAG = 6;
 /** The names of limits, right of the plot; of the font's size. */
-const LIMITS_ROOM = 7.5;
+const LIMITS_ROOM = 8;
 /** Charts of one view have one cursor. */
 const SYNC_KEY = 'lupin-charts';
 

@@ -45,9 +45,7 @@ def test_after_a_sleep_no_age_and_no_live_before_a_fresh_state(
     hmi.page.evaluate("window.slept = 3600000")
     hmi.expect_phase("reconnecting")
     # Of a tag that no scan has brought a reading of, that much is known.
-    expect(ages).to_have_text(
-        ["never" if tag in ("failed", "seen") else "unknown" for tag in TAGS]
-    )
+    expect(ages).to_have_text(["never" if tag in ("failed", "seen") else "unknown" for tag in TAGS])
     expect(hmi.card("1")).to_contain_text("unknown")
     banner = hmi.test_id("frozen")
     expect(banner).to_contain_text("Readings are frozen. Last data at")

@@ -29,7 +29,7 @@ def test_the_table_by_area_the_worst_first(house: Bridge, open_page: OpenPage) -
     hmi.expect_rows("10", "3", "1", "9", "failed", "seen", "2")
     heads = hmi.page.locator("tbody tr.area")
     expect(heads).to_have_text(
-        ["Critical South bay 2 tags", "Healthy North bay 2 tags", "Stressed No area 3 tags"]
+        ["Critical South bay 2 tags", "Healthy North bay 2 tags", "Unknown No area 3 tags"]
     )
     expect(hmi.page.get_by_role("table").get_by_role("heading", level=3)).to_have_count(3)
     # A row does not say again what its head says.

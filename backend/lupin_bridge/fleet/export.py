@@ -22,10 +22,10 @@ from lupin_bridge.past import query as past_query
 from lupin_bridge.past.bodies import COMPLETE_TO
 from lupin_bridge.past.export import ExportFormat
 from lupin_bridge.past.query import OfExport
-from lupin_bridge.query_string import parameter, read
+from lupin_bridge.query_string import parameter
 from lupin_bridge.routes.export import Exporting, end_of, respond_export
 from lupin_twin.core.journal_condition import Condition, JournalState
-from lupin_twin.core.past import PastRefused, seconds
+from lupin_twin.core.past import seconds
 from lupin_twin.journal.queries import STRETCH_S, Export
 
 
@@ -49,10 +49,9 @@ class ExportingSites(Exporting, Protocol):
 
 async def respond_sites(fleet: ExportingSites, kind: ExportFormat, request: Request) -> Response:
     """Every row of a period of the sites that are named, or of all."""
-    parameters, known = request.query_params.multi_items(), fleet.sites_for(request)
-    period = past_query.period(OfSitesExport, parameters, None)
-    sites = read(OfSitesExport, parameters, PastRefused).sites
-    named = [known[name] for name in chosen(sites, known)]
+    period = past_query.period(OfSitesExport, request.query_params.multi_items(), None)
+    known = fleet.sites_for(request)
+    named = [known[name] for name in chosen(request.query_params.get("sites"), known)]
     end_ns = end_of(period, None)
     query = Export(period.start_ns, end_ns, period.tag_id, period.sensor_type)
     heard_ns = min((site.heard_ns for site in named), default=0)

@@ -69,7 +69,7 @@ class Follower:
     `recent_s` fixes how long readings hold, None: it is learnt. `day_of` says whether it was day,
     `day_number` which day it was.
     `spans` are the runs of the clock; of other ones another follower has to be made. `kept` is how
-    many writes are kept, about; `episodes` how many alarms that are over, of each tag.
+    many writes are kept, about; `max_episodes` how many cleared alarms are, of each tag.
 
     `missed` counts what was older than what is kept of its tag; it was not taken in.
     """
@@ -83,10 +83,10 @@ class Follower:
         *,
         day_number: DayNumber = of_24_hours,
         kept: int = KEPT,
-        episodes: int = MAX_EPISODES,
+        max_episodes: int = MAX_EPISODES,
     ) -> None:
         self._kept = kept
-        self._episodes = episodes
+        self._max_episodes = max_episodes
         self.missed = 0
         self._forgotten_ns = 0
         self.spans = tuple(spans)
@@ -147,7 +147,12 @@ class Follower:
             self._tags += 1
             days = TagDays(self._sensors, self._clock, self._day_number)
             episodes = TagEpisodes(
-                *(write.tag_id, run.begun_ns, self._sensors, days, self._recent_ns, self._episodes)
+                write.tag_id,
+                run.begun_ns,
+                self._sensors,
+                days,
+                recent_ns=self._recent_ns,
+                max_episodes=self._max_episodes,
             )
             tag = run.tags[write.tag_id] = TagPast(
                 episodes, self._recent_ns, _matters(run), self._is_day(run)

@@ -100,7 +100,7 @@ def silence(last_ns: int) -> Alarm:
 HOLD: Final = 2
 # Dawn and dusk, and a cloud, are over by then.
 TWILIGHT_NS: Final = 2 * 3600 * 1_000_000_000
-# Episodes of a tag that are kept, unless it is said otherwise: a sensor that goes wild has no more.
+# Cleared episodes of a tag that are kept by default: a sensor that goes wild has no more.
 MAX_EPISODES: Final = 100
 
 # Kind, sensor, and what tells two of those apart: the side of a range, the kind of an attempt.
@@ -136,8 +136,8 @@ class _Finding:
 class TagEpisodes:
     """A tag's episodes in one run of the clock; `step` takes its occasions in the order of time.
 
-    `recent_ns` fixes how long readings hold; None: it is learnt. Of episodes that are over, the
-    last `most` are kept.
+    `recent_ns` fixes how long readings hold; None: it is learnt. Of cleared episodes, the last
+    `max_episodes` are kept.
     """
 
     tag_id: str
@@ -145,7 +145,7 @@ class TagEpisodes:
     sensors: Sensors
     days: TagDays
     recent_ns: int | None = None
-    most: int = MAX_EPISODES
+    max_episodes: int = MAX_EPISODES
     _species: str = ""
     _scans_ns: tuple[int, ...] = ()
     # Of each sensor, the last scan that had it, and how long it was from the one before.
@@ -276,7 +276,7 @@ class TagEpisodes:
             self._watches[finding.key] = watch
             if watch.against == (1 if is_daily else HOLD):
                 done = self._alarm(finding.key, watch, stamp_ns)
-                self._done = (*self._done, done)[-self.most :]
+                self._done = (*self._done, done)[-self.max_episodes :]
                 del self._watches[finding.key]
         else:
             self._watches[finding.key] = self._ongoing(watch, finding, stamp_ns)

@@ -12,6 +12,7 @@ from __future__ import annotations
 import asyncio
 import base64
 import logging
+import math
 import socket
 import time
 from collections.abc import Callable, Sequence
@@ -49,16 +50,15 @@ MAX_ENDPOINT: Final = 1_000
 TOGETHER_S: Final = 2.0
 # A phone that is off gets it for so long; what is older is on the page, s.
 TTL_S: Final = 3_600
-# Tries of one message, most of that hour: a greenhouse's way to the internet may fail for long. And
-# the time before the second one, s.
+# Attempts of one message: they take most of that hour, for a greenhouse may be offline for long.
 TRIES: Final = 66
+# Between the first two attempts, and between later ones, s.
 FIRST_WAIT_S: Final = 2.0
 MOST_WAIT_S: Final = 60.0
 # Posts at once, to however many browsers.
 AT_ONCE: Final = 8
 _GONE: Final = (404, 410)
 _KEY: Final = "vapid"
-_NEVER: Final = 2**63 - 1
 
 
 class DeviceRefused(ValueError):
@@ -122,24 +122,23 @@ class Push:
         started_s = time.monotonic()
 
         def receive(change: Change) -> None:
-            now_ns, since_ns = source.ros_time_ns, 0
+            now_ns, since_ns = source.ros_time_ns, 0.0
             if change.is_past:
-                # What is raised while the log is read at the start is new all the same.
-                since_ns = _NEVER
-                if not self._has_read and now_ns is not None:
-                    since_ns = now_ns - int((time.monotonic() - started_s) * 1e9)
+                # Alarms of the log are not new, except those raised while it is read at the start.
+                if self._has_read or now_ns is None:
+                    since_ns = math.inf
+                else:
+                    since_ns = now_ns - (time.monotonic() - started_s) * 1e9
                 self._has_read = True
             for news in self._news.of(change, now_ns, source.origin):
                 alarm = news.alarm
                 if alarm is None or news.change not in ("raised", "worse"):
                     continue
-                at_ns = alarm.raised_at_ns if news.change == "raised" else alarm.worse_at_ns or 0
+                at_ns = alarm.worse_at_ns or alarm.raised_at_ns
                 if at_ns >= since_ns and alarm.reason.verdict is Verdict.CRITICAL:
                     self._new[alarm.id] = alarm
                     self._is_news.set()
 
-        if source.alarms.now.source != "starting":
-            receive(Change(source.alarms.now.active, is_past=True))
         self._unsubscribe = source.alarms.subscribe(receive)
         self._task = asyncio.create_task(self._run(source), name="push")
 
@@ -197,18 +196,15 @@ class Push:
     async def _send(self, device: Device, message: bytes) -> None:
         """Until its push service takes it, has it no more, or was tried enough."""
         host = urlsplit(device.endpoint).hostname or ""
-        is_again = False
 
         async def attempt() -> None:
-            nonlocal is_again
-            # Whose it is may have switched it off meanwhile, or may not have it any more.
-            if is_again and all(it.endpoint != device.endpoint for it in await self._devices()):
-                raise DeviceGone
-            is_again = True
             try:
                 endpoint = await self._endpoint(device.endpoint)
                 headers, body = await self._headers(endpoint), encrypted(device, message)
                 async with self._at_once:
+                    # Its owner may have switched it off since the last attempt.
+                    if all(it.endpoint != device.endpoint for it in await self._devices()):
+                        raise DeviceGone
                     await post(endpoint, headers, body)
             except PostError as error:
                 if error.status in _GONE:

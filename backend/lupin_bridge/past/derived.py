@@ -17,6 +17,7 @@ from lupin_bridge.judge.ranges import Sensors
 from lupin_twin.core.past import (
     HOUR_NS,
     MAX_POINTS,
+    MAX_READINGS,
     PastRefused,
     SeriesPast,
     SeriesRequest,
@@ -28,8 +29,6 @@ from lupin_twin.journal.buckets import Buckets, individually
 
 # From when to when, ns.
 Period = tuple[int, int]
-# Of each part, what is derived is made of so many readings at most: four weeks, one a minute.
-MAX_READINGS: Final = 8 * MAX_POINTS
 # Of a day there are points of a minute at least.
 _POINTS_A_DAY: Final = DAY_NS // (60 * NANOSECONDS_PER_SECOND)
 # (ns of ROS time, value), oldest first.
@@ -142,11 +141,17 @@ def _readings_of(daily: Daily, sensors: Sensors, part: SeriesPast, until_ns: int
 
 def _readings(derived: Derived, find: Find, request: SeriesRequest) -> tuple[Period, Readings]:
     """The period, and what can be derived in it: of readings of one moment, one scan."""
-    part_request = replace(request, max_points=MAX_POINTS)
-    first, second = (
-        _each_reading(derived, find, replace(part_request, sensor_type=name))
-        for name in derived.sources
-    )
+    parts: list[SeriesPast] = []
+    for name in derived.sources:
+        part = find(replace(request, sensor_type=name, max_points=MAX_READINGS))
+        if part.is_bucketed:
+            raise PastRefused(
+                f"{derived.name} is derived of {' and '.join(derived.sources)}, reading by reading:"
+                f" from {seconds(part.start_ns)} s to {seconds(part.end_ns)} s {name} has more than"
+                f" {MAX_READINGS} of them, the limit, or hours alone: ask for a shorter period"
+            )
+        parts.append(part)
+    first, second = parts
     # Of equal stamps, what was received last.
     ones = dict(zip(first.stamps_ns, first.means, strict=True))
     others = dict(zip(second.stamps_ns, second.means, strict=True))
@@ -156,27 +161,3 @@ def _readings(derived: Derived, find: Find, request: SeriesRequest) -> tuple[Per
         if stamp_ns in others and math.isfinite(value := derived.formula(one, others[stamp_ns]))
     ]
     return (min(first.start_ns, second.start_ns), first.end_ns), readings
-
-
-def _each_reading(derived: Derived, find: Find, request: SeriesRequest) -> SeriesPast:
-    """A part reading by reading: in halves, where one request has too many of them."""
-    part = find(request)
-    if not part.is_bucketed:
-        return part
-    start_ns, end_ns = request.start_ns or max(part.start_ns, 1), request.end_ns
-    middle_ns = (start_ns + end_ns) // 2
-    if not MAX_POINTS < sum(part.counts) <= MAX_READINGS or middle_ns == start_ns:
-        name, period = request.sensor_type, f"{seconds(part.start_ns)} s to {seconds(part.end_ns)}"
-        raise PastRefused(
-            f"{derived.name} is derived of {' and '.join(derived.sources)}, reading by reading:"
-            f" from {period} s {name} has more than {MAX_READINGS} of them, the limit, or hours"
-            " alone: ask for a shorter period"
-        )
-    halves = [
-        _each_reading(derived, find, replace(request, start_ns=from_ns, end_ns=to_ns))
-        for from_ns, to_ns in ((start_ns, middle_ns), (middle_ns, end_ns))
-    ]
-    stamps_ns, values = (
-        sum((getattr(half, name) for half in halves), ()) for name in ("stamps_ns", "means")
-    )
-    return individually(list(zip(stamps_ns, values, strict=True)), start_ns, end_ns)

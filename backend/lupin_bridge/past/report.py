@@ -50,8 +50,8 @@ from lupin_twin.core.writes import PastWrite, PastWrites, PeriodRequest, RunSpan
 # that where alarms are worked out; an answer has ten seconds.
 MAX_WRITES: Final = 100_000
 ALARM_WRITES: Final = 40_000
-# Alarms that are over, of each tag: of a month, more than a hundred a day.
-EPISODES: Final = 5_000
+# Cleared alarms of each tag: of a month, more than a hundred a day.
+MAX_EPISODES: Final = 5_000
 # As far as before the period alarms are worked out: what began then may go on.
 LEAD_NS: Final = 7 * 24 * HOUR_NS
 _LOT: Final = 2_000
@@ -215,7 +215,7 @@ class _Fold:
             by.recent_s,
             day_number=by.day_number,
             kept=2 * MAX_WRITES,
-            episodes=EPISODES,
+            max_episodes=MAX_EPISODES,
         )
 
     def _count(self, write: PastWrite) -> None:

@@ -11,7 +11,14 @@ from lupin_bridge.judge.derived import DAILY, DAY_NS
 from lupin_bridge.judge.derived import vapour_pressure_deficit_kpa as vpd
 from lupin_bridge.judge.options import own_sensors
 from lupin_bridge.past import derived
-from lupin_twin.core.past import MAX_POINTS, PastRefused, SeriesPast, SeriesRequest, grid
+from lupin_twin.core.past import (
+    MAX_POINTS,
+    MAX_READINGS,
+    PastRefused,
+    SeriesPast,
+    SeriesRequest,
+    grid,
+)
 from lupin_twin.core.state import Reading, TagState
 from lupin_twin.journal.buckets import Buckets, individually
 
@@ -89,7 +96,7 @@ def test_more_than_are_wanted_come_in_buckets_of_what_was_derived() -> None:
     assert past.means[0] == pytest.approx(sum(first) / 10)
 
 
-def test_more_than_one_request_may_have_are_read_in_several() -> None:
+def test_more_than_a_history_may_have_are_read_all_the_same() -> None:
     count = 3 * MAX_POINTS
     stamps = [n * S // 20 for n in range(1, count)]
     known: Known = {
@@ -104,7 +111,7 @@ def test_more_than_one_request_may_have_are_read_in_several() -> None:
 
 
 def test_too_many_to_be_read_one_by_one_are_refused_by_name_and_limit() -> None:
-    known: Known = {"temperature": dict.fromkeys(range(S, S + derived.MAX_READINGS + 1), 20.0)}
+    known: Known = {"temperature": dict.fromkeys(range(S, S + MAX_READINGS + 1), 20.0)}
     with pytest.raises(PastRefused) as refused:
         answer(ASKED, known)
     assert str(refused.value) == (

@@ -9,7 +9,7 @@ import pytest
 from lupin_twin.core.drops import MAX_TEXT_LENGTH
 from lupin_twin.core.past import (
     HOUR_NS,
-    MAX_POINTS,
+    MAX_READINGS,
     SLOT_NS,
     Grid,
     NotRemembered,
@@ -43,8 +43,8 @@ ASKED: dict[str, Any] = {"tag_id": "tag_7", "sensor_type": "temperature"}
         ({"start_ns": -1}, "start or end is -1 ns"),
         ({"end_ns": -1}, "start or end is -1 ns"),
         ({"start_ns": 5, "end_ns": 4}, "end 4 ns is before start 5 ns"),
-        ({"max_points": 0}, "max_points is 0, the limits are 1 and 5000"),
-        ({"max_points": MAX_POINTS + 1}, "max_points is 5001"),
+        ({"max_points": 0}, "max_points is 0, the limits are 1 and 40000"),
+        ({"max_points": MAX_READINGS + 1}, "max_points is 40001"),
     ],
 )
 def test_a_question_that_cannot_be_answered_is_refused(wrong: dict[str, Any], says: str) -> None:
@@ -59,7 +59,7 @@ def test_a_question_that_cannot_be_answered_is_refused(wrong: dict[str, Any], sa
         {"start_ns": 5, "end_ns": 5},
         {"start_ns": 5, "end_ns": 0},
         {"max_points": 1},
-        {"max_points": MAX_POINTS},
+        {"max_points": MAX_READINGS},
         {"tag_id": "7" * MAX_TEXT_LENGTH, "sensor_type": "t" * MAX_TEXT_LENGTH},
     ],
 )

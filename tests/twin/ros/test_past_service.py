@@ -65,3 +65,5 @@ def test_what_cannot_be_answered_is_refused_by_name_and_empty(peer: Peer) -> Non
     assert later == GetStateAt.Response(error_message=later.error_message)
     nameless = peer.ask(GetHistory, "/twin/get_history", sensor_type="co2")
     assert nameless == GetHistory.Response(error_message="tag_id is empty")
+    many = peer.ask(GetHistory, "/twin/get_history", tag_id="a", sensor_type="co2", max_points=5001)
+    assert many.error_message == "max_points is 5001, the limits are 1 and 5000"

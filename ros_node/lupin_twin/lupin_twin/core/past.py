@@ -32,6 +32,8 @@ def lasts(message: str) -> str | None:
 
 DEFAULT_POINTS: Final = 500
 MAX_POINTS: Final = 5_000
+# What is derived of a series is made of so many of its readings at most: four weeks, one a minute.
+MAX_READINGS: Final = 8 * MAX_POINTS
 # Longer buckets begin on whole ones.
 SLOT_NS: Final = 300 * 1_000_000_000
 # What is counted as it is written.
@@ -148,8 +150,10 @@ class SeriesRequest:
             raise PastRefused(f"start or end is {min(self.start_ns, self.end_ns)} ns, before 0")
         if self.end_ns and self.end_ns < self.start_ns:
             raise PastRefused(f"end {self.end_ns} ns is before start {self.start_ns} ns")
-        if not 1 <= self.max_points <= MAX_POINTS:
-            raise PastRefused(f"max_points is {self.max_points}, the limits are 1 and {MAX_POINTS}")
+        if not 1 <= self.max_points <= MAX_READINGS:
+            raise PastRefused(
+                f"max_points is {self.max_points}, the limits are 1 and {MAX_READINGS}"
+            )
 
     def _check_event(self) -> None:
         if self.sensor_type.startswith("~") and self.sensor_type not in set(Event):

@@ -14,7 +14,14 @@ from lupin_msgs.msg import TwinState, TwinTimes
 from lupin_msgs.srv import GetHistory, GetStateAt, GetWrites
 from std_msgs.msg import Header
 
-from lupin_twin.core.past import DEFAULT_POINTS, SeriesPast, SeriesRequest, error_of
+from lupin_twin.core.past import (
+    DEFAULT_POINTS,
+    MAX_POINTS,
+    PastRefused,
+    SeriesPast,
+    SeriesRequest,
+    error_of,
+)
 from lupin_twin.core.state import Snapshot
 from lupin_twin.core.writes import DEFAULT_WRITES, MAX_WRITES, PastWrites, WritesRequest
 from lupin_twin.journal.follow import Lot, NotALotError
@@ -140,13 +147,21 @@ def state_response(snapshot: Snapshot) -> Any:
 
 
 def series_request(request: Any) -> SeriesRequest:
-    """GetHistory.Request as a value."""
+    """GetHistory.Request as a value.
+
+    Raises:
+        PastRefused: it cannot be answered.
+
+    """
+    max_points = int(request.max_points) or DEFAULT_POINTS
+    if max_points > MAX_POINTS:
+        raise PastRefused(f"max_points is {max_points}, the limits are 1 and {MAX_POINTS}")
     return SeriesRequest(
         tag_id=request.tag_id,
         sensor_type=request.sensor_type,
         start_ns=convert.nanoseconds(request.start),
         end_ns=convert.nanoseconds(request.end),
-        max_points=int(request.max_points) or DEFAULT_POINTS,
+        max_points=max_points,
     )
 
 

@@ -1,5 +1,5 @@
 /** The list of alarms: what is active, shelved and resolved, in its order. Pure. */
-import type { Alarm, Verdict } from '../contract/types';
+import type { Alarm, HealthReason, Verdict } from '../contract/types';
 import { severity } from '../domain/health';
 import { secondsOf } from '../domain/rostime';
 import { compareIds, equal } from '../domain/twin';
@@ -50,7 +50,7 @@ export function listOf(
   });
   const active = inOrder(
     items.filter(({ alarm }) => alarm.cleared_at === null),
-    severityOf,
+    ({ alarm }) => alarm.reason,
   );
   return {
     active: active.filter((item) => item.shelf === null),
@@ -66,26 +66,42 @@ const isListed = (end: number, nowS: number | null): boolean =>
 
 const endOf = ({ cleared_at }: Alarm): number => (cleared_at ? secondsOf(cleared_at) : Infinity);
 
-/** As bad as it was said to be. */
-const severityOf = ({ alarm: { reason }, verdict, isAcknowledged }: Item): number =>
-  severity({ verdict, reasons: [reason] }, isAcknowledged);
-
-/** In the order of `severity`; of equals it is the same each time. */
+/** In the order of `severity`, by the reasons that are given; of equals it is the same each time. */
 export const inOrder = (
   items: readonly Item[],
-  severityOf: (item: Item) => number,
+  reasonOf: (item: Item) => HealthReason,
 ): readonly Item[] =>
   items
-    .map((item) => ({ item, rank: severityOf(item) }))
+    .map((item) => {
+      const reason = reasonOf(item);
+      const { verdict } = reason;
+      return { item, rank: severity({ verdict, reasons: [reason] }, item.isAcknowledged) };
+    })
     .sort((a, b) => b.rank - a.rank || byName(a.item, b.item))
     .map(({ item }) => item);
 
 const byName = ({ alarm: a }: Item, { alarm: b }: Item): number =>
   compareIds(a.tag_id, b.tag_id) || (a.id < b.id ? -1 : 1);
 
+/** Neither acknowledged nor shelved; in a list that is held, both still stand where they were. */
+export const unacknowledged = (items: readonly Item[]): readonly Item[] =>
+  items.filter(({ isAcknowledged, shelf }) => !isAcknowledged && shelf === null);
+
 /** Those that call for somebody: active, not acknowledged, not shelved. */
-export const calling = ({ active }: AlarmList): readonly Item[] =>
-  active.filter(({ isAcknowledged }) => !isAcknowledged);
+export const calling = ({ active }: AlarmList): readonly Item[] => unacknowledged(active);
+
+/** The alarm of why a tag is as it is. */
+export const alarmOf = (
+  items: readonly Item[],
+  tagId: string,
+  reason: HealthReason | undefined,
+): Item | undefined =>
+  items.find(
+    ({ alarm }) =>
+      alarm.tag_id === tagId &&
+      alarm.reason.kind === reason?.kind &&
+      alarm.reason.sensor === reason.sensor,
+  );
 
 /** What is new between two lists, to be told once. */
 export interface News {

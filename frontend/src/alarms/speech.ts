@@ -3,7 +3,7 @@ import type { Alarm, HealthReason, Verdict } from '../contract/types';
 import type { AppState } from '../store/app';
 import { selectCatalogue, selectNewestHealth } from '../store/derived';
 import { hourAgo, selectHourAgoNow, type HourAgo } from '../store/hourAgo';
-import { severity, VERDICTS } from '../domain/health';
+import { VERDICTS } from '../domain/health';
 import { memoLast } from '../domain/memo';
 import { isHeardNow, selectNewestTag } from '../store/moment';
 import { inOrder, type Item } from './list';
@@ -46,10 +46,7 @@ export function worstNow(state: AppState, items: readonly Item[]): Verdict | nul
 
 /** What is worst now first. */
 export const worstNowFirst = (state: AppState, items: readonly Item[]): readonly Item[] =>
-  inOrder(items, ({ alarm, isAcknowledged }) => {
-    const reason = reasonNow(state, alarm);
-    return severity({ verdict: reason.verdict, reasons: [reason] }, isAcknowledged);
-  });
+  inOrder(items, ({ alarm }) => reasonNow(state, alarm));
 
 /** An alarm in one line, as it is now. */
 export const textNow = (state: AppState, alarm: Alarm): string =>

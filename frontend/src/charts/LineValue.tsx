@@ -31,7 +31,7 @@ export function LineValue({
   const was = valueOf(beforeAt(line, at));
   return (
     <span className="line-value">
-      <strong>{value === null ? S.noSensor : readingText(sensor, value, unit)}</strong>
+      <strong>{value === null ? S.noValue : readingText(sensor, value, unit)}</strong>
       {point && 'mean' in point && point.n > 1 && (
         <span className="faint">
           {' '}
@@ -41,7 +41,7 @@ export function LineValue({
       {line.before && (
         <span className="faint">
           {' '}
-          {S.chartBeforeWas(was === null ? S.noSensor : readingText(sensor, was, unit))}
+          {S.chartBeforeWas(was === null ? S.noValue : readingText(sensor, was, unit))}
         </span>
       )}
     </span>

@@ -60,8 +60,8 @@ export function houseHealth(
   };
 }
 
-/** Whether something is known to be wrong with it. */
-export const isBad = ({ verdict }: TagHealth): boolean =>
+/** Whether something is known to be wrong. */
+export const isBad = (verdict: Verdict): boolean =>
   verdict === 'critical' || verdict === 'stressed';
 
 /** Whether nobody knows how it is now, of all its tags. */

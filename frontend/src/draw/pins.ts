@@ -1,6 +1,6 @@
 /** Pins, blooms, pest rings and labels: what the data moves. All from cached sprites. */
 import { MARKS, type Mark, type Point } from '../domain/marks';
-import { VERDICTS } from '../domain/health';
+import { isBad, VERDICTS } from '../domain/health';
 import { rgbText } from '../domain/ramp';
 import type { BloomLook } from '../domain/species';
 import { toCanvas, type View } from '../geometry/coordinates';
@@ -101,7 +101,7 @@ export function drawPins(
 ): void {
   const usual = pinRadius(view.scale, spacing);
   for (const verdict of BY_SEVERITY) {
-    const isWarning = verdict === 'critical' || verdict === 'stressed';
+    const isWarning = isBad(verdict);
     const radius = isWarning ? Math.max(usual, LEAST_WARNING_PX) : usual;
     const box = (radius + WARNING_PX + 4) * 2;
     for (const pin of pins) {
@@ -140,7 +140,7 @@ function paintPin(
 ): void {
   const mark = MARKS[verdict];
   const { body, ink, line: own } = palette.verdicts[verdict];
-  const isWarning = verdict === 'critical' || verdict === 'stressed';
+  const isWarning = isBad(verdict);
   const radius = pinSize + (isWarning ? WARNING_PX : 0);
   const isEmpty = kind !== 'value';
   const isLine = isEmpty || mark.isHollow;

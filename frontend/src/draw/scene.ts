@@ -2,7 +2,7 @@
 import type { Verdict } from '../contract/types';
 import { ageSeconds, freshness, type Ageing } from '../domain/age';
 import { readingText } from '../domain/format';
-import type { HouseHealth } from '../domain/health';
+import { isBad, type HouseHealth } from '../domain/health';
 import { memoLast, memoOne } from '../domain/memo';
 import type { Sensor } from '../domain/sensors';
 import { speciesLooks, UNKNOWN_SPECIES, type BloomLook } from '../domain/species';
@@ -113,7 +113,7 @@ function pinOf(tag: Tag, at: MapPoint, input: SceneInput): Pin {
   const value = tag.readings.get(sensor.name);
   const fresh = freshness(ageSeconds(tag.readAt.get(sensor.name) ?? tag.scannedAt, now, ageing));
   const verdict = health.byTag.get(tag.id)?.verdict ?? 'unknown';
-  const isWarning = verdict === 'critical' || verdict === 'stressed';
+  const isWarning = isBad(verdict);
   return {
     id: tag.id,
     at,

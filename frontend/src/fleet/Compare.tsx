@@ -178,10 +178,10 @@ const linkOf = ({ site }: ComparedSite, sensor: string): string =>
   `sites/${encodeURIComponent(site)}/${window.location.search}#sensor=${encodeURIComponent(sensor)}`;
 
 const readingOrNone = (sensor: Sensor, value: number | null, { unit }: Speech): string =>
-  value === null ? S.noSensor : readingText(sensor, value, unit);
+  value === null ? S.noValue : readingText(sensor, value, unit);
 
 function deviationText(sensor: Sensor, { deviation }: ComparedSite, { unit }: Speech): string {
-  if (deviation === null) return S.noSensor;
+  if (deviation === null) return S.noValue;
   return `${numberText(differenceToShown(sensor, deviation, unit))}\u00a0${unitOf(sensor, unit)}`;
 }
 

@@ -139,7 +139,7 @@ function Row({ row }: { row: SiteReport }): JSX.Element {
       {COUNTED.map((each) => (
         <td key={each}>{row[each]}</td>
       ))}
-      <td>{row.active_alarms ?? S.noSensor}</td>
+      <td>{row.active_alarms ?? S.noValue}</td>
       <td>{timeText(ms(row.complete_to))}</td>
     </tr>
   );

@@ -1,7 +1,7 @@
 import { useRef, useState, type JSX } from 'react';
 
 import { withdrawComment } from '../contract/comments';
-import { reasonText } from '../domain/failure';
+import { failureText } from '../domain/failure';
 import { rosText } from '../domain/rostime';
 import { shown } from '../domain/text';
 import { useApp } from '../store/app';
@@ -99,7 +99,7 @@ function Said({
           aria-label={C.withdrawOf(shown(text, 40))}
           onClick={() => {
             withdrawComment(id).catch((error: unknown) => {
-              setFault(C.failed(reasonText(error)));
+              setFault(C.failed(failureText(error)));
             });
           }}
         >

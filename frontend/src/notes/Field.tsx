@@ -1,7 +1,7 @@
 import { useEffect, useRef, useState, type JSX, type SyntheticEvent } from 'react';
 
 import { postNote } from '../contract/people';
-import { reasonText } from '../domain/failure';
+import { failureText } from '../domain/failure';
 import { rosText } from '../domain/rostime';
 import { C } from './subject';
 
@@ -34,7 +34,7 @@ export function Field({
       onDone,
       (error: unknown) => {
         setSending(false);
-        setFault(C.failed(reasonText(error)));
+        setFault(C.failed(failureText(error)));
       },
     );
   };

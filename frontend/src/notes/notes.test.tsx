@@ -95,10 +95,10 @@ test('who may write does, and withdraws their own words alone', async () => {
   expect(screen.getAllByRole('button', { name: /^Withdraw/ })).toHaveLength(1);
   fireEvent.click(screen.getByRole('button', { name: 'Withdraw: mine' }));
   fireEvent.click(screen.getByRole('button', { name: 'Comment: Tag 7' }));
-  fireEvent.change(screen.getByLabelText('Comment about now'), { target: { value: ' dry ' } });
+  fireEvent.change(screen.getByLabelText('Comment (now)'), { target: { value: ' dry ' } });
   fireEvent.click(screen.getByRole('button', { name: 'Save' }));
   await waitFor(() => {
-    expect(screen.queryByLabelText('Comment about now')).toBeNull();
+    expect(screen.queryByLabelText('Comment (now)')).toBeNull();
   });
   expect(asked).toEqual([
     'DELETE /api/notes/mine ',
@@ -110,10 +110,8 @@ test('Escape leaves the field, and not what it stands in', () => {
   person.dispatch(ANNA);
   render(<Comments subject="tag:7" name="Tag 7" />);
   fireEvent.click(screen.getByRole('button', { name: 'Comment: Tag 7' }));
-  expect(fireEvent.keyDown(screen.getByLabelText('Comment about now'), { key: 'Escape' })).toBe(
-    false,
-  );
-  expect(screen.queryByLabelText('Comment about now')).toBeNull();
+  expect(fireEvent.keyDown(screen.getByLabelText('Comment (now)'), { key: 'Escape' })).toBe(false);
+  expect(screen.queryByLabelText('Comment (now)')).toBeNull();
   expect(document.activeElement).toBe(screen.getByRole('button', { name: 'Comment: Tag 7' }));
 });
 
@@ -124,7 +122,7 @@ test('who looks back says it about the moment that is shown', async () => {
   });
   render(<SiteComment />);
   fireEvent.click(screen.getByRole('button', { name: 'Comment: greenhouse' }));
-  const field = screen.getByLabelText('Comment about sim 00:08:20');
+  const field = screen.getByLabelText('Comment (sim 00:08:20)');
   fireEvent.change(field, { target: { value: 'doors open' } });
   fireEvent.click(screen.getByRole('button', { name: 'Save' }));
   await waitFor(() => {

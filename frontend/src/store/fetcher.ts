@@ -4,7 +4,7 @@
  */
 import { now } from '../clock';
 import { Refusal } from '../contract/api';
-import { reasonText } from '../domain/failure';
+import { failureText } from '../domain/failure';
 
 /** While somebody drags: a dozen starts a second, which a server of this kind allows. */
 export const DRAG_PACE_MS = 80;
@@ -168,7 +168,7 @@ export function createFetcher<T>({
           if (isLasting) done = wish.key;
           retryAt = now() + Math.min(RETRY_LONGEST_MS, RETRY_FIRST_MS * 2 ** failures);
           failures += 1;
-          onError(reasonText(error), isLasting, error);
+          onError(failureText(error), isLasting, error);
         }
         pump();
       },

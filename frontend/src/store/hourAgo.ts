@@ -64,9 +64,9 @@ export function startHourAgo(): () => void {
     const hourS = selectHourS(state);
     const base = moment ?? rosNow(state, now());
     const isSeen = isColumnShown(state.settings, 'trend') || state.view.list === 'alarms';
-    // The bridge's first word says how long a day is, and with it an hour.
-    const isTold = state.twin.connection.status !== null;
-    if (base === null || base < hourS || !isSeen || !isTold) {
+    // The bridge's status says how long a day is, and with it an hour.
+    const hasStatus = state.twin.connection.status !== null;
+    if (base === null || base < hourS || !isSeen || !hasStatus) {
       fetcher.want(null);
       return;
     }

@@ -1,12 +1,12 @@
 import { useMemo, type JSX } from 'react';
 
 import { whenText } from '../alarms/words';
-import type { Item } from '../alarms/list';
+import { alarmOf } from '../alarms/list';
 import { alarmList } from '../alarms/watch';
 import { now } from '../clock';
 import type { HealthReason } from '../contract/types';
 import { clockText } from '../domain/format';
-import { severity, VERDICTS, worstReason, type HouseHealth } from '../domain/health';
+import { isBad, severity, VERDICTS, worstReason, type HouseHealth } from '../domain/health';
 import { todoText } from '../domain/reasons';
 import { secondsOf } from '../domain/rostime';
 import { rowsOf, type Row } from '../domain/table';
@@ -19,8 +19,6 @@ import { S } from '../strings';
 import { HealthMark } from './HealthMark';
 import { useReasonText } from './Reasons';
 
-/** Nothing says more of such a tag. */
-const OLD: ReadonlySet<string | undefined> = new Set(['old', undefined]);
 /** Beside the map; the table has the rest. */
 const MOST_TAGS = 2;
 
@@ -38,29 +36,16 @@ export function useUrgent(): readonly Row[] {
       ? [...alarms.active.filter((it) => it.isAcknowledged), ...alarms.shelved]
       : [];
     return rowsOf(tags, health)
-      .filter(({ health: own }) => own.verdict !== 'healthy' && !OLD.has(worstReason(own)?.kind))
-      .map((row) => {
-        const { tag, health: own } = row;
-        const isSeen = alarmOf(seen, tag.id, worstReason(own)) !== undefined;
-        return { row, rank: severity(own, isSeen) };
+      .map((row) => ({ row, reason: worstReason(row.health) }))
+      .filter(({ reason }) => reason && reason.kind !== 'old')
+      .map(({ row, reason }) => {
+        const isSeen = alarmOf(seen, row.tag.id, reason) !== undefined;
+        return { row, rank: severity(row.health, isSeen) };
       })
       .sort((a, b) => b.rank - a.rank)
       .map(({ row }) => row);
   }, [tags, health, isNow, alarms]);
 }
-
-/** That of a reason. */
-export const alarmOf = (
-  items: readonly Item[],
-  tagId: string,
-  reason: HealthReason | undefined,
-): Item | undefined =>
-  items.find(
-    ({ alarm }) =>
-      alarm.tag_id === tagId &&
-      alarm.reason.kind === reason?.kind &&
-      alarm.reason.sensor === reason.sensor,
-  );
 
 /**
  * Since when the alarm of a reason is active, what somebody has said of it, or that there is none
@@ -177,7 +162,7 @@ export function Overall({
 
 /** Null: its tags say it. */
 function overallText({ verdict, counts }: HouseHealth, alarms: number): string | null {
-  if (verdict === 'critical' || verdict === 'stressed') return null;
+  if (isBad(verdict)) return null;
   if (verdict === 'healthy') return alarms > 0 ? S.healthDespite(alarms) : S.healthAllWell;
   const { unknown } = counts;
   if (unknown === 0) return S.healthNothing;

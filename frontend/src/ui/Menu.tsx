@@ -2,7 +2,7 @@ import type { JSX } from 'react';
 
 import { saveMap, saveTable } from '../export/actions';
 import { copyLink, reportLink, viewAddress } from '../export/link';
-import { reasonText } from '../domain/failure';
+import { failureText } from '../domain/failure';
 import type { TemperatureUnit } from '../domain/units';
 import { prefer, useApp } from '../store/app';
 import type { Settings } from '../store/settings';
@@ -108,6 +108,6 @@ async function saveMapOrSay(): Promise<void> {
   try {
     await saveMap();
   } catch (error) {
-    say(S.exportFailed(reasonText(error)));
+    say(S.exportFailed(failureText(error)));
   }
 }

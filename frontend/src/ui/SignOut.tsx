@@ -3,7 +3,7 @@ import { useEffect, useState, type JSX } from 'react';
 import { route } from '../contract/api';
 import { fetchSession, signOut } from '../contract/people';
 import type { Session } from '../contract/types';
-import { reasonText } from '../domain/failure';
+import { failureText } from '../domain/failure';
 import { S } from '../strings';
 import { say } from './toast';
 
@@ -31,7 +31,7 @@ export function SignOut({
     try {
       await signOut();
     } catch (error) {
-      say(S.signOutFailed(reasonText(error)));
+      say(S.signOutFailed(failureText(error)));
       return;
     }
     leave(route('signin'));

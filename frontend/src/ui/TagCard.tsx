@@ -96,7 +96,7 @@ function CardBody({
   const isNow = useApp((state) => selectShown(state).moment === null);
   return (
     <div className="card-body">
-      {health && <Reasons health={health} hasTodo={isBad(health) && isNow} />}
+      {health && <Reasons health={health} hasTodo={isBad(health.verdict) && isNow} />}
       {isNow && <CardAlarms tagId={tag.id} />}
       {tag.readings.size === 0 && <p className="faint">{S.cardNoReadings}</p>}
       <ul className="card-readings">

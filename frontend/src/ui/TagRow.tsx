@@ -153,7 +153,7 @@ export const TagRow = memo(function TagRow({
               )}
             </>
           ) : (
-            <span className="faint">{S.noSensor}</span>
+            <span className="faint">{S.noValue}</span>
           )}
         </td>
       )}
@@ -222,7 +222,7 @@ function Reading({
   if (value === undefined) {
     return (
       <span className="faint">
-        <span aria-hidden="true">{S.noSensor}</span>
+        <span aria-hidden="true">{S.noValue}</span>
         <span className="unseen">{S.noSensorLong}</span>
       </span>
     );

@@ -1,6 +1,7 @@
-import type { JSX } from 'react';
+import { useMemo, type JSX } from 'react';
 
 import { epochOf } from '../../clock';
+import { alarmOf } from '../../alarms/list';
 import { alarmList } from '../../alarms/watch';
 import { clockText } from '../../domain/format';
 import { isBad, worstReason } from '../../domain/health';
@@ -10,7 +11,6 @@ import { useSelected } from '../../store/create';
 import { selectNewestHealth } from '../../store/derived';
 import { selectNewest, selectShown } from '../../store/moment';
 import { S } from '../../strings';
-import { alarmOf } from '../DoNow';
 
 /** What the list is about, and what it does not know. */
 export function AlarmNotes({ isEmpty }: { isEmpty: boolean }): JSX.Element {
@@ -24,12 +24,13 @@ export function AlarmNotes({ isEmpty }: { isEmpty: boolean }): JSX.Element {
   const isKnown = alarms !== null && !isLost && !isStarting;
   const isLast = isLost && takenAt !== null;
   const listed = useSelected(alarmList, (it) => it);
-  const waiting = useApp((state) => {
+  const health = useApp(selectNewestHealth);
+  const waiting = useMemo(() => {
     const all = [...listed.active, ...listed.shelved];
-    return [...(selectNewestHealth(state)?.byTag ?? [])].filter(
-      ([id, own]) => isBad(own) && !alarmOf(all, id, worstReason(own)),
+    return [...(health?.byTag ?? [])].filter(
+      ([id, own]) => isBad(own.verdict) && !alarmOf(all, id, worstReason(own)),
     ).length;
-  });
+  }, [listed, health]);
   return (
     <div className="alarm-notes">
       {moment !== null && <p data-note="now">{S.alarmsOfNow(rosText(moment))}</p>}

@@ -227,7 +227,7 @@ test('without an alarm it says so; where that is not known it says that', () => 
     showTags([wireTag()], judgement({ 1: [reason()] }));
   });
   tell();
-  const wait = '1 tag waits: no alarm before a second bad scan';
+  const wait = 'No alarm yet for 1 tag: it takes a second bad scan';
   expect(notes()).toEqual(['none', 'wait']);
   expect(screen.getByText(wait)).toBeTruthy();
   // Beside the alarm of another tag as well, and not beside its own.

@@ -9,7 +9,7 @@ import {
   type Block,
   type Order,
 } from '../../alarms/arrange';
-import type { Item } from '../../alarms/list';
+import { unacknowledged, type Item } from '../../alarms/list';
 import { acknowledgeAlarms } from '../../alarms/own';
 import { selectNow, selectSpeech, worstNow, worstNowFirst } from '../../alarms/speech';
 import { alarmList } from '../../alarms/watch';
@@ -40,10 +40,6 @@ import { WhoseWord } from './WhoseWord';
 const MOST_ROWS = 100;
 /** Tags that a cause names. */
 const MOST_TAGS = 6;
-
-/** Also while the list is held, and what was shelved meanwhile still stands where it was. */
-const unacknowledged = (items: readonly Item[]): readonly Item[] =>
-  items.filter(({ isAcknowledged, shelf }) => !isAcknowledged && shelf === null);
 
 /** The alarms of now, beside the map: active, shelved, and resolved. */
 export function AlarmPanel(): JSX.Element {

@@ -1,5 +1,6 @@
 import type { JSX } from 'react';
 
+import { unacknowledged } from '../../alarms/list';
 import { acknowledgeAlarms } from '../../alarms/own';
 import { worstNow } from '../../alarms/speech';
 import { spanText } from '../../alarms/words';
@@ -20,20 +21,17 @@ const byTime = (a: Alarm, b: Alarm): number => secondsOf(a.raised_at) - secondsO
 export function CardAlarms({ tagId }: { tagId: string }): JSX.Element | null {
   const active = useSelected(alarmList, (list) => list.active);
   const items = active.filter(({ alarm }) => alarm.tag_id === tagId);
-  const waiting = items.filter(({ isAcknowledged }) => !isAcknowledged);
-  const since = useTicking((at) => {
-    const nowS = rosNow(store.get(), at);
-    const [first] = items.map(({ alarm }) => alarm).sort(byTime);
-    return first ? spanText(first, nowS) : '';
-  });
+  const waiting = unacknowledged(items);
+  const [oldest] = items.map(({ alarm }) => alarm).sort(byTime);
+  const since = useTicking((at) => (oldest ? spanText(oldest, rosNow(store.get(), at)) : ''));
   const isWell = useApp((state) => worstNow(state, items) === 'healthy');
-  const [first] = items;
-  if (!first) return null;
+  const [worst] = items;
+  if (!worst) return null;
   return (
     <div className="card-alarms alarm-tools" data-testid="card-alarms">
       <span>
         {(waiting.length === 0 ? S.alarmDone.acknowledge : S.alarmCount)(items.length)} · {since}
-        {isWell && ` · ${todoText(first.alarm.reason, 'healthy')}`}
+        {isWell && ` · ${todoText(worst.alarm.reason, 'healthy')}`}
       </span>
       {waiting.length > 0 && (
         <button

@@ -6,7 +6,7 @@
 import { now, timeOfDay } from '../../clock';
 import { fetchSession, postNote, withdrawNote } from '../../contract/people';
 import type { Alarm, Session } from '../../contract/types';
-import { reasonText } from '../../domain/failure';
+import { failureText } from '../../domain/failure';
 import { secondsOf } from '../../domain/rostime';
 import { shown } from '../../domain/text';
 import { onChange, store } from '../../store/app';
@@ -124,7 +124,7 @@ async function tell(before: Kept, next: Kept): Promise<void> {
     // One behind the other, in the order of the list: of two words the later one stands.
     for (const word of words) await word();
   } catch (error) {
-    say(P.failed(reasonText(error)));
+    say(P.failed(failureText(error)));
   }
   pending -= 1;
   take();

@@ -44,7 +44,7 @@ export const TAGS: In<typeof ENGLISH> = {
   },
   triedAgo: (age, outcome) => `Versuch vor ${age}: ${outcome}`,
   triedSometime: (outcome) => `Versuch: ${outcome}`,
-  noSensor: '–',
+  noValue: '–',
   noSensorLong: 'Sensor nicht vorhanden',
   sensorFailed: 'ausgefallen',
   sensorFailedLong: 'Der Sensor hat keinen Wert geliefert',

@@ -79,7 +79,7 @@ export const ALARMS = {
   alarmsNoneHint:
     'An alarm is raised after two bad scans in a row. A pest, or missing data from the greenhouse, raises one at once.',
   alarmsWait: (tags: number): string =>
-    `${counted(tags, 'tag waits', 'tags wait')}: no alarm before a second bad scan`,
+    `No alarm yet for ${counted(tags, 'tag', 'tags')}: it takes a second bad scan`,
   alarmNotYet: 'no alarm yet',
   alarmsNotYet: 'Waiting for the list of alarms',
   alarmsStarting: 'Recorded data is still being read: more alarms may follow.',

@@ -60,7 +60,7 @@ export const PAGE = {
   },
 
   /** In place of what the server says, where it may answer soon. */
-  serverBusy: 'The server cannot answer just now.',
+  serverBusy: 'The server is busy or unreachable.',
   unread: (count: number): string =>
     count === 1
       ? 'A message from the server could not be read and was dropped.'

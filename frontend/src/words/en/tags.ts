@@ -40,7 +40,7 @@ export const TAGS = {
   },
   triedAgo: (age: string, outcome: string): string => `attempt ${age} ago: ${outcome}`,
   triedSometime: (outcome: string): string => `attempt: ${outcome}`,
-  noSensor: '–',
+  noValue: '–',
   noSensorLong: 'no such sensor',
   sensorFailed: 'failed',
   sensorFailedLong: 'The sensor returned no value',

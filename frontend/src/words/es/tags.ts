@@ -44,7 +44,7 @@ export const TAGS: In<typeof ENGLISH> = {
   },
   triedAgo: (age, outcome) => `intento hace ${age}: ${outcome}`,
   triedSometime: (outcome) => `intento: ${outcome}`,
-  noSensor: '–',
+  noValue: '–',
   noSensorLong: 'sensor no disponible',
   sensorFailed: 'averiado',
   sensorFailedLong: 'El sensor no dio ningún valor',

@@ -44,7 +44,7 @@ export const TAGS: In<typeof ENGLISH> = {
   },
   triedAgo: (age, outcome) => `poging ${age} geleden: ${outcome}`,
   triedSometime: (outcome) => `poging: ${outcome}`,
-  noSensor: '–',
+  noValue: '–',
   noSensorLong: 'sensor niet aanwezig',
   sensorFailed: 'uitgevallen',
   sensorFailedLong: 'De sensor gaf geen waarde',

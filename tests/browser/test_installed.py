@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
-from playwright.sync_api import Browser, expect
+from playwright.sync_api import Browser, Page, expect
 
 from tests.browser.conftest import CHROMIUM, CHROMIUM_ARGS
 from tests.support.access import served
@@ -20,43 +22,42 @@ CACHED = """async () => {
 FETCHED = "(path) => fetch(path).then(({ status }) => status, () => 'nothing')"
 
 
-def test_a_browser_without_room_for_the_shell_opens_the_page_all_the_same(
-    browser: Browser, tmp_path: Path
-) -> None:
-    ours = certificate(tmp_path)
+@contextmanager
+def page_that_trusts(browser: Browser) -> Iterator[Page]:
+    """Of a browser that trusts our certificate: without that there is no service worker."""
     chromium = browser.browser_type.launch(
         executable_path=CHROMIUM, args=[*CHROMIUM_ARGS, "--ignore-certificate-errors"]
     )
     with chromium, chromium.new_context(ignore_https_errors=True) as context:
         context.set_default_timeout(PATIENCE_S * 1000)
-        page = context.new_page()
-        with served(*ours.options, trust=ours.trust) as running:
-            page.goto(running.url)
-            page.evaluate("navigator.serviceWorker.ready.then(() => null)")
-            full = {"origin": running.url, "quotaSize": 1}
-            context.new_cdp_session(page).send("Storage.overrideQuotaForOrigin", full)
-            page.reload()
-            live = page.get_by_test_id("app")
-            expect(live).to_have_attribute("data-connection-state", "live")
-            assert page.evaluate("navigator.serviceWorker.controller !== null")
-            assert page.evaluate(CACHED) == []
+        yield context.new_page()
+
+
+def test_a_browser_without_room_for_the_shell_opens_the_page_all_the_same(
+    browser: Browser, tmp_path: Path
+) -> None:
+    ours = certificate(tmp_path)
+    with page_that_trusts(browser) as page, served(*ours.options, trust=ours.trust) as running:
+        page.goto(running.url)
+        page.evaluate("navigator.serviceWorker.ready.then(() => null)")
+        full = {"origin": running.url, "quotaSize": 1}
+        page.context.new_cdp_session(page).send("Storage.overrideQuotaForOrigin", full)
+        page.reload()
+        live = page.get_by_test_id("app")
+        expect(live).to_have_attribute("data-connection-state", "live")
+        assert page.evaluate("navigator.serviceWorker.controller !== null")
+        assert page.evaluate(CACHED) == []
 
 
 def test_the_shell_opens_without_the_bridge_and_no_data_is_kept(
     browser: Browser, tmp_path: Path
 ) -> None:
     ours = certificate(tmp_path)
-    # No service worker without a certificate that the browser trusts.
-    chromium = browser.browser_type.launch(
-        executable_path=CHROMIUM, args=[*CHROMIUM_ARGS, "--ignore-certificate-errors"]
-    )
-    with chromium, chromium.new_context(ignore_https_errors=True) as context:
-        context.set_default_timeout(PATIENCE_S * 1000)
-        page = context.new_page()
+    with page_that_trusts(browser) as page:
         app = page.get_by_test_id("app")
         with served(*ours.options, trust=ours.trust) as running:
             page.goto(running.url)
-            session = context.new_cdp_session(page)
+            session = page.context.new_cdp_session(page)
             found = session.send("Page.getInstallabilityErrors")["installabilityErrors"]
             assert {it["errorId"] for it in found} <= {"in-incognito"}
             page.evaluate("navigator.serviceWorker.ready.then(() => null)")

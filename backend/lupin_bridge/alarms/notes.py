@@ -58,7 +58,7 @@ def notes_of_alarms(
 
 
 def _shelved(alarms: Sequence[Alarm], shelves: Mapping[str, Note]) -> Mapping[str, Note]:
-    """A shelf holds also for what comes back while it lasts. It ends for what is worse by now.
+    """A shelf holds also for an alarm that returns meanwhile. It ends when the alarm gets worse.
 
     What comes back is an alarm of the same tag, kind, sensor and side.
     """

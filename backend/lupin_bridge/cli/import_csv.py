@@ -21,15 +21,12 @@ from lupin_bridge.cli.output import FAILED, Roles
 from lupin_bridge.console import Progress, say, tell
 from lupin_twin.adapt.config import read_yaml
 from lupin_twin.adapt.table import ConfigError
-from lupin_twin.core.past import HOUR_NS
-from lupin_twin.core.state import NANOSECONDS_PER_SECOND, STATUS_OK, Pin, Reading, Scan, Write
+from lupin_twin.core.state import NANOSECONDS_PER_SECOND, Pin, Reading, Scan, Write
 from lupin_twin.journal.beside import Lock
 from lupin_twin.journal.file import JournalFile
-from lupin_twin.journal.hours import deleted_ns
 from lupin_twin.journal.retention import Limits
-from lupin_twin.journal.rows import KIND_READING, sensor_names
 from lupin_twin.journal.runs import Clock, Run, runs, span_at
-from lupin_twin.journal.schema import FILE_ERRORS, LOCAL_SITE, SiteLog, open_named
+from lupin_twin.journal.schema import FILE_ERRORS, open_named
 from lupin_twin.runtime.process import INTERRUPTED
 
 SOURCE: Final = "import"
@@ -145,10 +142,8 @@ def _write(path: Path, columns: Columns, found: Iterator[Merged]) -> tuple[int, 
     with (
         Lock(path, "lupin-twin import"),
         closing(JournalFile(path, _NO_LIMITS, is_sound=None)) as file,
-        closing(open_named(path)) as connection,
     ):
         known, placed = _known(path)
-        deleted = {run.root: deleted_ns(SiteLog(connection), run.root) for run in known}
         while batch := list(islice(found, _BATCH)):
             count += len(batch)
             if not known:
@@ -158,16 +153,16 @@ def _write(path: Path, columns: Columns, found: Iterator[Merged]) -> tuple[int, 
             rows: list[tuple[Run, Write]] = []
             for stamp_ns, tag_id, values in batch:
                 span = span_at(known, stamp_ns) if len(known) > 1 else None
-                run = known[0] if span is None else span.run
-                if stamp_ns <= deleted.get(run.root, -1):
-                    for name in _deleted(connection, run.root, tag_id, stamp_ns):
-                        values.pop(name, None)
-                    if not values:
-                        continue
                 readings = tuple(map(Reading, values, values.values()))
-                sent = (SOURCE, stamp_ns, "", stamp_ns)
-                scan = Scan(tag_id, stamp_ns, readings, None, STATUS_OK, "", *sent)
-                rows.append((run, scan))
+                scan = Scan(
+                    tag_id,
+                    stamp_ns,
+                    readings,
+                    source=SOURCE,
+                    own_stamp_ns=stamp_ns,
+                    arrival_ns=stamp_ns,
+                )
+                rows.append((known[0] if span is None else span.run, scan))
             written, refused = file.append(rows)
             new += written
             if refused:
@@ -182,23 +177,6 @@ def _write(path: Path, columns: Columns, found: Iterator[Merged]) -> tuple[int, 
                 ]
             )
     return new, count - new
-
-
-# A series that is counted in the hour of a stamp, and has no row of that hour up to it.
-_DELETED: Final = (
-    "SELECT sensors FROM series JOIN hour USING (site, series) WHERE site = ? AND run = ?"
-    " AND tag = ? AND kind = ? AND hour = ? AND NOT EXISTS (SELECT 1 FROM scan"
-    " WHERE scan.site = series.site AND scan.series = series.series"
-    " AND stamp_ns BETWEEN ? AND ? AND is_copy = 0)"
-)
-
-
-def _deleted(connection: sqlite3.Connection, run: int, tag_id: str, stamp_ns: int) -> set[str]:
-    """The sensors whose readings of that moment retention has deleted: their hours count them."""
-    hour = stamp_ns // HOUR_NS
-    query = (LOCAL_SITE, run, tag_id, KIND_READING, hour, hour * HOUR_NS, stamp_ns)
-    found = connection.execute(_DELETED, query)
-    return {name for (text,) in found for name in sensor_names(text)}
 
 
 def _known(path: Path) -> tuple[list[Run], set[str]]:

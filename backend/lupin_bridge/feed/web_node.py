@@ -314,7 +314,7 @@ class WebNode(AdjustableNode):
         for tag in tags:
             kept = self._digests.get(tag.tag_id)
             if kept is None or kept[0] is not tag:
-                # Which are of one scan, for that is what can be derived of.
+                # And which of them are of one scan: only those derive a VPD.
                 times = [reading.observed_at_ns for reading in tag.readings]
                 readings = [
                     (it.name, it.value, times.index(it.observed_at_ns)) for it in tag.readings

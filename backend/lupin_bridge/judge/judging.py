@@ -123,6 +123,9 @@ class Judge:
     Where many are judged anew, it is so many at once as nobody has to wait for, and the others with
     the next snapshots. A tag that raises an error is unknown until it is judged again, and counted
     in `errors`; the others are judged all the same.
+
+    While `knows_recent` is false, the robot counts as moving: until `learn`, every tag looks as if
+    it had one scan only.
     """
 
     def __init__(
@@ -132,6 +135,7 @@ class Judge:
         recent_s: float | None = None,
         *,
         max_at_once: float = MAX_AT_ONCE,
+        knows_recent: bool = True,
     ) -> None:
         self._sensors = sensors
         self._max_at_once = max_at_once
@@ -153,8 +157,7 @@ class Judge:
         self._days: Mapping[str, Sequence[Reading]] = {}
         self.errors = 0
         self._failing: set[str] = set()
-        # Before, each tag looks as if it was scanned once, and the robot as if it had stopped.
-        self.knows_recent = True
+        self.knows_recent = knows_recent
 
     def see(self, snapshot: Snapshot) -> Judged:
         """What is to be said now; the very same object where nothing has changed."""

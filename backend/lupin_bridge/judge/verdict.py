@@ -127,7 +127,7 @@ def judge_tag(
             was_judged = True
     reasons += _of_days(tag, days, now_ns, sensors, recent)
     reasons += _of_changes(tag, changed)
-    # Before the age of its readings, which are old because of it.
+    # Before the age of the readings: they are old because the attempts failed.
     reasons += _of_attempts(tag)
     reasons += _of_age(tag, now_ns, holds_ns)
     reasons += _of_flowers(tag)
@@ -335,7 +335,7 @@ def _of_changes(tag: TagState, changed: Mapping[str, int]) -> Iterable[Reason]:
 
 
 def _of_attempts(tag: TagState) -> Iterable[Reason]:
-    # Nothing is wrong with the plants because of it: nobody knows.
+    # A failed scan says nothing about the plants.
     last = tag.last_try
     if last is not None and last.status != STATUS_OK:
         yield Reason(

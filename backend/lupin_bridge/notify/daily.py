@@ -117,7 +117,7 @@ class DailyReport:
         except PastRefused as error:
             if now_ns < due_ns + LATE_NS:
                 raise
-            # It would be refused for ever, and the days behind it with it.
+            # It would be refused for ever, and hold up the days after it.
             log.error("the report up to %s is left out: %s", compact(due_ns), error)  # noqa: TRY400
         _write(file, due_ns)
         return ""

@@ -1,7 +1,7 @@
 """The past of a derived quantity, made of its parts reading by reading. Pure.
 
-A bucket is of such readings too: of means, no mean of what is derived can be made. A quantity of a
-day can be: buckets of an hour at most say enough of a sensor's course.
+A bucket is of such readings too: a mean of what is derived does not follow from means of its parts.
+A quantity of a day is made of buckets too, of an hour at most.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ from lupin_twin.journal.buckets import Buckets, individually
 
 # From when to when, ns.
 Period = tuple[int, int]
-# Of a day there are points of a minute at least.
+# Buckets of a day are of a minute at least.
 _POINTS_A_DAY: Final = DAY_NS // (60 * NANOSECONDS_PER_SECOND)
 # (ns of ROS time, value), oldest first.
 Readings = list[tuple[int, float]]
@@ -117,7 +117,7 @@ def _of_days(
 def _readings_of(daily: Daily, sensors: Sensors, part: SeriesPast, until_ns: int) -> Readings:
     """The readings of a series that count, of one stamp the last.
 
-    Of a bucket that is over: its least and largest as it begins, its mean from there to its end.
+    A bucket that has ended counts as its minimum and maximum at its start, and its mean throughout.
     """
     is_plausible = sensors.named(daily.sensor).is_plausible
     if part.bucket_ns is None:

@@ -50,13 +50,29 @@ def past(options: argparse.Namespace, now_ns: int) -> Iterator[Write]:
         if event.pose is not None and tag_id not in pinned:
             pinned.add(tag_id)
             yield Pin(tag_id, event.pose, at_ns, at_ns)
-        sent = (SOURCE, at_ns, f"past-{event.pass_index - _FIRST_PASS + 1:04d}", at_ns)
+        mission_id = f"past-{event.pass_index - _FIRST_PASS + 1:04d}"
         if isinstance(event, TagScanned):
-            readings = tuple(Reading(name, value) for name, value in event.readings)
-            how = (int(event.status), event.status_detail)
-            yield Scan(tag_id, at_ns, readings, None, *how, *sent)
+            yield Scan(
+                tag_id,
+                at_ns,
+                tuple(Reading(name, value) for name, value in event.readings),
+                status=int(event.status),
+                status_detail=event.status_detail,
+                source=SOURCE,
+                own_stamp_ns=at_ns,
+                mission=mission_id,
+                arrival_ns=at_ns,
+            )
         else:
-            yield Inspection(tag_id, at_ns, event.flower, None, 0, "", *sent)
+            yield Inspection(
+                tag_id,
+                at_ns,
+                event.flower,
+                source=SOURCE,
+                own_stamp_ns=at_ns,
+                mission=mission_id,
+                arrival_ns=at_ns,
+            )
 
 
 def main(arguments: Sequence[str] | None = None) -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import sys
-from contextlib import closing
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
@@ -13,11 +12,9 @@ import yaml
 
 from lupin_bridge.cli.command import main
 from lupin_twin.journal.beside import Lock
-from lupin_twin.journal.retention import purge_step
-from lupin_twin.journal.schema import open_writer, transaction
 from tests.support.docs import block_named
 from tests.support.domains import ros_env
-from tests.support.journal import LIMITS, NOW, SECOND, kept, scan, select
+from tests.support.journal import NOW, SECOND, kept, scan, select
 from tests.support.processes import Process, lupin_twin, url_of
 from tests.support.waiting import PATIENCE_S, wait_for
 
@@ -141,30 +138,6 @@ def test_what_is_written_is_in_the_journal_once(
     assert "0 scans are new" in capsys.readouterr().out
     assert importing.rows() == rows
     assert select(importing.journal, "SELECT tag, x, y FROM place") == [("A", 1.5, 2.0)]
-
-
-def test_what_retention_has_deleted_meanwhile_is_counted_once(
-    importing: Import, capsys: pytest.CaptureFixture[str]
-) -> None:
-    counts = (
-        "SELECT tag, hour, n, total, low, high FROM hour JOIN series USING (site, series)"
-        " ORDER BY tag, hour, sensors"
-    )
-    tallies = "SELECT event, hour, n, first_ns, last_ns FROM tally ORDER BY event, hour"
-    importing.given(WIDE, ROWS).run("--write")
-    before = [select(importing.journal, text) for text in (counts, tallies)]
-    with closing(open_writer(importing.journal)) as connection, transaction(connection):
-        assert purge_step(connection, LIMITS, NOW)
-    assert importing.rows() == []
-    later = "2024-05-01T10:06:00Z,C,22.5,,\n2024-05-01T13:00:00Z,A,22.5,,\n"
-    assert importing.given(WIDE, ROWS).run("--write") == 0
-    assert "0 scans are new in" in capsys.readouterr().out.splitlines()[-1]
-    assert [select(importing.journal, text) for text in (counts, tallies)] == before
-    # What was never imported comes all the same.
-    assert importing.given(WIDE, ROWS + later).run("--write") == 0
-    assert [row[0] for row in importing.rows()] == ["C", "A"]
-    assert importing.run("--write") == 0
-    assert len(importing.rows()) == 2
 
 
 def test_a_databases_export_names_the_sensor_in_a_column(

@@ -295,9 +295,9 @@ def test_export_has_the_units_of_the_operators_file(
         assert main(["journal", "export", "--journal", str(path), "--sensor", "a", *words]) == 0
         return capsys.readouterr().out.splitlines()[1].split(",")[6]
 
-    assert (unit(), unit("--sensors", str(sensors)), unit("--config", str(settings))) == (
-        "", "°C", "°C"
-    )  # fmt: skip
+    assert unit() == ""
+    assert unit("--sensors", str(sensors)) == "°C"
+    assert unit("--config", str(settings)) == "°C"
     monkeypatch.setenv("LUPIN_SENSORS", str(sensors))
     assert unit() == "°C"
     monkeypatch.setenv("LUPIN_SENSORS", str(tmp_path / "none"))

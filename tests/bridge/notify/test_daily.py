@@ -27,6 +27,7 @@ from lupin_bridge.settings import Secrets, SettingError, Settings
 from lupin_twin.core.journal_condition import Condition, JournalState
 from lupin_twin.core.past import NotRemembered, PastRefused
 from tests.support.mosquitto import Broker, Subscriber, free_port
+from tests.support.receiver import Answer as Reply
 from tests.support.receiver import Receiver, receiver, status
 from tests.support.seen import SENSORS, Alarms, seen, tag
 from tests.support.waiting import until
@@ -93,6 +94,18 @@ async def noted(folder: Path) -> None:
     await until(lambda: list(folder.glob("*.sent")), "the note of what was sent")
 
 
+@asynccontextmanager
+async def begun(
+    folder: Path, *answers: Reply, now: str = "2026-05-01T07:00Z"
+) -> AsyncIterator[tuple[House, Receiver]]:
+    """A bridge that has noted the day that is over, and sends those that follow."""
+    house = House(ns(now))
+    with receiver(*answers) as at:
+        async with sending(house, folder, at.port):
+            await noted(folder)
+            yield house, at
+
+
 async def looks(house: House, count: int = 5) -> None:
     """It has looked again so often, and found nothing to do."""
     before = house.looks
@@ -149,27 +162,21 @@ async def test_missed_days_are_sent_in_their_order_and_no_more_than_a_week_of_th
 async def test_a_day_with_too_much_in_it_holds_up_no_other(
     tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
-    house = House(ns("2026-05-01T07:00Z"))
-    with receiver(status(200)) as at:
-        async with sending(house, tmp_path, at.port):
-            await noted(tmp_path)
-            house.error = PastRefused("about 200000 scans, the limit is 100000")
-            house.ros_time_ns = ns("2026-05-02T07:00Z")
-            await until(lambda: "20260502T060000Z is left out" in caplog.text, "the word of it")
-            house.error, house.ros_time_ns = None, ns("2026-05-03T07:00Z")
-            await until(lambda: at.posted, "the next one")
-        assert periods(at) == [[ns("2026-05-02T06:00Z"), ns("2026-05-03T06:00Z")]]
+    async with begun(tmp_path, status(200)) as (house, at):
+        house.error = PastRefused("about 200000 scans, the limit is 100000")
+        house.ros_time_ns = ns("2026-05-02T07:00Z")
+        await until(lambda: "20260502T060000Z is left out" in caplog.text, "the word of it")
+        house.error, house.ros_time_ns = None, ns("2026-05-03T07:00Z")
+        await until(lambda: at.posted, "the next one")
+    assert periods(at) == [[ns("2026-05-02T06:00Z"), ns("2026-05-03T06:00Z")]]
 
 
 async def test_one_that_is_not_taken_is_tried_again_also_by_the_next_process(
     tmp_path: Path,
 ) -> None:
-    house = House(ns("2026-05-01T07:00Z"))
-    with receiver(status(500)) as at:
-        async with sending(house, tmp_path, at.port):
-            await noted(tmp_path)
-            house.ros_time_ns = ns("2026-05-02T07:00Z")
-            await until(lambda: len(at.posted) >= 3, "some tries")
+    async with begun(tmp_path, status(500)) as (house, at):
+        house.ros_time_ns = ns("2026-05-02T07:00Z")
+        await until(lambda: len(at.posted) >= 3, "some tries")
     with receiver(status(503), status(200), port=at.port) as again:
         async with sending(house, tmp_path, at.port):
             await until(lambda: len(again.posted) == 2, "the report")
@@ -180,48 +187,39 @@ async def test_one_that_is_not_taken_is_tried_again_also_by_the_next_process(
 async def test_one_that_the_receiver_refuses_is_given_up_and_that_is_said(
     tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
-    house = House(ns("2026-05-01T07:00Z"))
-    with receiver(*[status(413)] * MAX_REFUSALS, status(200)) as at:
-        async with sending(house, tmp_path, at.port):
-            await noted(tmp_path)
-            house.ros_time_ns = ns("2026-05-02T07:00Z")
-            await until(lambda: "was given up by webhook" in caplog.text, "that it is given up")
-            house.ros_time_ns = ns("2026-05-03T07:00Z")
-            await until(lambda: len(at.posted) == MAX_REFUSALS + 1, "the next day's")
+    async with begun(tmp_path, *[status(413)] * MAX_REFUSALS, status(200)) as (house, at):
+        house.ros_time_ns = ns("2026-05-02T07:00Z")
+        await until(lambda: "was given up by webhook" in caplog.text, "that it is given up")
+        house.ros_time_ns = ns("2026-05-03T07:00Z")
+        await until(lambda: len(at.posted) == MAX_REFUSALS + 1, "the next day's")
     assert at.posted[-1].json["lost"] == 1
 
 
 async def test_it_waits_for_the_log_and_says_why_there_is_none(
     tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
-    house = House(ns("2026-05-01T07:00Z"))
-    with receiver(status(200)) as at:
-        async with sending(house, tmp_path, at.port):
-            await noted(tmp_path)
-            house.lag_ns = 10 * 10**9
-            house.ros_time_ns = ns("2026-05-02T06:00:05Z")
-            await looks(house)
-            assert at.posted == []
-            house.error = NotRemembered("the disk is gone", is_lasting=False)
-            house.ros_time_ns = ns("2026-05-02T06:00:20Z")
-            await until(lambda: "not sent by webhook: the disk is gone" in caplog.text, "why")
-            house.error = None
-            await until(lambda: at.posted, "the report")
+    async with begun(tmp_path, status(200)) as (house, at):
+        house.lag_ns = 10 * 10**9
+        house.ros_time_ns = ns("2026-05-02T06:00:05Z")
+        await looks(house)
+        assert at.posted == []
+        house.error = NotRemembered("the disk is gone", is_lasting=False)
+        house.ros_time_ns = ns("2026-05-02T06:00:20Z")
+        await until(lambda: "not sent by webhook: the disk is gone" in caplog.text, "why")
+        house.error = None
+        await until(lambda: at.posted, "the report")
 
 
 async def test_a_clock_that_was_ahead_ends_no_reports_and_a_simulated_one_has_none(
     tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
-    house = House(ns("2036-05-01T07:00Z"))
-    with receiver(status(200)) as at:
-        async with sending(house, tmp_path, at.port):
-            await noted(tmp_path)
-            house.ros_time_ns = ns("2026-05-01T07:00Z")
-            await looks(house)
-            house.ros_time_ns = ns("2026-05-02T07:00Z")
-            await until(lambda: at.posted, "the report of the true day")
-            house.ros_time_ns = 5_000 * 10**9
-            await until(lambda: "the time is simulated" in caplog.text, "why there is none")
+    async with begun(tmp_path, status(200), now="2036-05-01T07:00Z") as (house, at):
+        house.ros_time_ns = ns("2026-05-01T07:00Z")
+        await looks(house)
+        house.ros_time_ns = ns("2026-05-02T07:00Z")
+        await until(lambda: at.posted, "the report of the true day")
+        house.ros_time_ns = 5_000 * 10**9
+        await until(lambda: "the time is simulated" in caplog.text, "why there is none")
 
 
 async def test_two_greenhouses_with_one_receiver_have_reports_of_their_own(tmp_path: Path) -> None:

@@ -192,12 +192,7 @@ class TagState:
             and self.last_observed_ns == other.last_observed_ns
             and self.flower == other.flower
             and len(self.readings) == len(other.readings)
-            and all(map(_same_value, self.readings, other.readings))
-            # What is derived is of readings of one time.
-            and all(
-                one.observed_at_ns == two.observed_at_ns
-                for one, two in zip(self.readings, other.readings, strict=True)
-            )
+            and all(map(_is_same, self.readings, other.readings))
         )
 
     def held_to(self, now_ns: int) -> TagState:
@@ -270,8 +265,7 @@ class TwinStore:
         for reading in scan.readings:
             new = replace(reading, observed_at_ns=scan.stamp_ns)
             known = readings.setdefault(reading.name, new)
-            is_same = known.observed_at_ns == scan.stamp_ns and _same_value(known, new)
-            if not _is_later(known.observed_at_ns, scan.stamp_ns) and not is_same:
+            if not _is_later(known.observed_at_ns, scan.stamp_ns) and not _is_same(known, new):
                 readings[reading.name] = new
         check_length("readings of a tag", len(readings), MAX_SENSORS_PER_TAG)
         tag = replace(tag, readings=tuple(readings.values()), pose=tag.pose or scan.pose)
@@ -410,9 +404,10 @@ def _is_later(one_ns: int | None, other_ns: int) -> bool:
     return one_ns is not None and one_ns > other_ns
 
 
-def _same_value(one: Reading, other: Reading) -> bool:
+def _is_same(one: Reading, other: Reading) -> bool:
+    # Of one time too: readings of different scans derive no VPD.
     is_same = one.value == other.value or (math.isnan(one.value) and math.isnan(other.value))
-    return one.name == other.name and is_same
+    return is_same and (one.name, one.observed_at_ns) == (other.name, other.observed_at_ns)
 
 
 def _items_of(tag: TagState) -> int:

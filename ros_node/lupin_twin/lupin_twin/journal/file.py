@@ -27,7 +27,7 @@ from lupin_twin.journal.retention import (
     note_lost,
     purge_step,
     shrink_step,
-    undone,
+    unmet_limit,
 )
 from lupin_twin.journal.rows import last_rows
 from lupin_twin.journal.runs import (
@@ -96,8 +96,8 @@ class JournalFile:
 
     def __init__(self, path: Path, limits: Limits, *, is_sound: bool | None) -> None:
         self.simulated: Stretch | None = None
-        # Which limit is not kept, in words.
-        self.undone = ""
+        # The limit that is exceeded although nothing more can be deleted, in words.
+        self.unmet_limit = ""
         self._path = path
         self._limits = limits
         self._map: object = None
@@ -392,7 +392,7 @@ class JournalFile:
                 before_ns = self._purges_before_ns
                 forwarded = forwarded_seq(self._path, get_meta(self._connection, "journal_id"))
                 if not purge_step(self._connection, self._limits, before_ns, forwarded):
-                    self.undone = undone(self._connection, self._limits, before_ns)
+                    self.unmet_limit = unmet_limit(self._connection, self._limits, before_ns)
                     self._purges_before_ns = None
                 self._kept = None
             self._is_shrinking = True

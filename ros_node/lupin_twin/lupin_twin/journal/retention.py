@@ -104,8 +104,8 @@ def kept(connection: sqlite3.Connection) -> Stretches:
 def horizon_ns(connection: sqlite3.Connection, limits: Limits, now_ns: int) -> int:
     """What was received before this, by the wall's clock, goes now.
 
-    That clock may be ahead: what was received last tells how far it has come, and no more than an
-    hour of what is there goes in a round, a minute: a clock that is set right soon costs little.
+    That clock may be ahead. So what was received last limits it, and one round, each minute,
+    deletes an hour of data at most: a wrong clock that is soon corrected costs little.
     """
     first = min(_arrivals(connection, "ASC"), default=now_ns)
     last = max(_arrivals(connection, "DESC"), default=now_ns)
@@ -150,8 +150,8 @@ def purge_step(
     return True
 
 
-def undone(connection: sqlite3.Connection, limits: Limits, before_ns: int) -> str:
-    """Which limit is not kept though there is nothing more to delete, in words; empty: none."""
+def unmet_limit(connection: sqlite3.Connection, limits: Limits, before_ns: int) -> str:
+    """Which limit is exceeded though nothing more can be deleted, in words; empty: none."""
     if used_bytes(connection) > limits.max_bytes:
         return "no scans are kept: hours, which stay, are larger than journal_max_mb"
     if any(arrival_ns < before_ns for arrival_ns in _arrivals(connection, "ASC")):

@@ -181,7 +181,7 @@ class Journal:
         self._met_damage = self._quarantined = self._left_out = ""
         # What was received last, as the log has it, where the clock contradicts that.
         self._doubted_ns: int | None = None
-        self._undone = ""
+        self._unmet_limit = ""
         self._thread = threading.Thread(target=self._run, name="journal", daemon=True)
         self._thread.start()
 
@@ -316,7 +316,7 @@ class Journal:
                 if self._map is not None:
                     file.put_map(self._map, partial(text_of, self._map))
                 has_more = not is_last and file.check_size(may_purge=bool(self._runs))
-                self._undone = file.undone
+                self._unmet_limit = file.unmet_limit
                 self._report_well(file)
                 if not is_last and not self._pending.arrived.wait(0.0 if has_more else _IDLE_S):
                     continue
@@ -402,8 +402,8 @@ class Journal:
             return "what is observed is kept in a temporary file, which goes at the end"
         if self._quarantined:
             return f"recording; a damaged journal was quarantined as {self._quarantined}"
-        if self._undone:
-            return f"recording; {self._undone}"
+        if self._unmet_limit:
+            return f"recording; {self._unmet_limit}"
         return f"recording; {self._left_out}" if self._left_out else "recording"
 
     def _report_progress(self, share: float) -> None:

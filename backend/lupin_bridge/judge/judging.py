@@ -147,6 +147,8 @@ class Judge:
         self._seen: tuple[TagState, ...] = ()
         self._due: list[tuple[int, str]] = []
         self._now_ns: int | None = None
+        # The last time that was known: a simulation that is started anew stops its clock before.
+        self._known_ns = 0
         self._waiting: dict[str, None] = {}
         self._counts = Counter[Verdict]()
         self._scans = Scans()
@@ -162,7 +164,8 @@ class Judge:
     def see(self, snapshot: Snapshot) -> Judged:
         """What is to be said now; the very same object where nothing has changed."""
         before, now_ns = self._judged, snapshot.now_ns
-        is_back = now_ns is not None and self._now_ns is not None and now_ns < self._now_ns
+        is_back = now_ns is not None and now_ns < self._known_ns
+        self._known_ns = self._known_ns if now_ns is None else now_ns
         if is_back:
             # What was before is no part of any interval.
             self._scans.forget()

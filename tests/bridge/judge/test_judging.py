@@ -322,16 +322,20 @@ def test_judging_bit_by_bit_is_judging_all_of_it_by_the_log(
             }
 
 
-def test_a_clock_that_goes_back_begins_anew() -> None:
+@pytest.mark.parametrize("stops", [False, True])
+def test_a_clock_that_goes_back_begins_anew(stops: bool) -> None:
     judge = Judge(SENSORS, by_light)
     for minute in (0, 30, 60):
         at_ns = START + minute * MINUTE
         judge.see(snapshot(at_ns, tag("a", at_ns, temperature=22.0)))
     assert judge.holds_ns() == {"a": 90 * MINUTE}
+    if stops:  # as it does before a simulation is started anew
+        judge.see(replace(snapshot(at_ns, tag("a", at_ns, temperature=22.0)), clock="stopped"))
     for minute in (-50, -45, -40):
         at_ns = START + minute * MINUTE
-        judge.see(snapshot(at_ns, tag("a", at_ns, temperature=22.0)))
+        judged = judge.see(snapshot(at_ns, tag("a", at_ns, temperature=22.0)))
     assert judge.holds_ns() == {"a": 15 * MINUTE}
+    assert judged.patrol == Patrol(5 * MINUTE, at_ns, 0)
 
 
 def test_what_is_judged_at_once_is_bounded_by_readings() -> None:

@@ -63,6 +63,8 @@ def test_before_the_clock_begins_nothing_is_written_and_nothing_lost(path: Path)
     journal = Journal(path, "/twin", LIMITS)
     wait_state(journal, JournalState.RECORDING)
     journal.write(scan("early"))
+    wait_for(lambda: journal.condition.behind_s > 1.0, "a disk that would be slow")
+    assert journal.condition.state is JournalState.RECORDING
     assert journal.take_restored() is None
     journal.begin(CLOCK)
     wait_for(lambda: journal.condition.written == 1, "the row")

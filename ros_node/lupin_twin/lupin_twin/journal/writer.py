@@ -239,7 +239,8 @@ class Journal:
         behind_s = 0.0 if oldest_s is None else time.monotonic() - oldest_s
         last = self._reported
         state, detail = last.state, last.detail
-        if state in _WELL and behind_s > _SLOW_S:
+        # What waits for the first clock waits for no disk.
+        if self._eras and state in _WELL and behind_s > _SLOW_S:
             state = JournalState.SLOW
             detail = f"the disk is slow: the journal is {behind_s:.0f} s behind"
         if lost and state not in _WELL:

@@ -129,6 +129,16 @@ describe('the slider', () => {
     expect(slider().dataset['span']).toBe('9100,10100');
   });
 
+  test('takes the bubble beside the mouse away with the click: the header has the moment', () => {
+    render(<TimeBar />);
+    const bubble = (): Element | null => document.querySelector('.timebar-bubble');
+    fireEvent.pointerMove(slider(), at(500));
+    expect(bubble()).not.toBeNull();
+    fireEvent.pointerDown(slider(), at(500));
+    fireEvent.pointerUp(slider(), at(500));
+    expect(bubble()).toBeNull();
+  });
+
   test('is hollow while its moment is on the way, and shows what has come', () => {
     receive({ type: 'past', past: { at: 9_700, house: NO_HOUSE } });
     act({ type: 'moment', moment: 9_500 });

@@ -12,7 +12,7 @@ export const TAGS: In<typeof ENGLISH> = {
   shownOf: (shown, all) =>
     shown === all
       ? counted(all, 'Messpunkt', 'Messpunkte')
-      : `${shown} von ${counted(all, 'Messpunkt', 'Messpunkten')}`,
+      : `${shown.toLocaleString('de')} von ${counted(all, 'Messpunkt', 'Messpunkten')}`,
   nothingMatches: 'Kein Messpunkt passt zum Filter.',
   columns: {
     health: 'Zustand',

@@ -8,7 +8,9 @@ export const TAGS = {
   filterHint: 'tag, species, pest …',
   filterClear: 'Clear filter',
   shownOf: (shown: number, all: number): string =>
-    shown === all ? counted(all, 'tag', 'tags') : `${shown} of ${counted(all, 'tag', 'tags')}`,
+    shown === all
+      ? counted(all, 'tag', 'tags')
+      : `${shown.toLocaleString('en')} of ${counted(all, 'tag', 'tags')}`,
   nothingMatches: 'No tag matches the filter.',
   columns: {
     health: 'Health',

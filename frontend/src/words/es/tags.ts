@@ -12,7 +12,7 @@ export const TAGS: In<typeof ENGLISH> = {
   shownOf: (shown, all) =>
     shown === all
       ? counted(all, 'punto', 'puntos')
-      : `${shown} de ${counted(all, 'punto', 'puntos')}`,
+      : `${shown.toLocaleString('es')} de ${counted(all, 'punto', 'puntos')}`,
   nothingMatches: 'Ningún punto coincide con el filtro.',
   columns: {
     health: 'Estado',

@@ -12,7 +12,7 @@ export const TAGS: In<typeof ENGLISH> = {
   shownOf: (shown, all) =>
     shown === all
       ? counted(all, 'meetpunt', 'meetpunten')
-      : `${shown} van ${counted(all, 'meetpunt', 'meetpunten')}`,
+      : `${shown.toLocaleString('nl')} van ${counted(all, 'meetpunt', 'meetpunten')}`,
   nothingMatches: 'Geen meetpunt past bij het filter.',
   columns: {
     health: 'Toestand',

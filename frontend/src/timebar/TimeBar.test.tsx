@@ -78,6 +78,8 @@ test('the end of the bar is not live while the page is not', () => {
   expect(said()).toEqual(['Reconnecting', 'Reconnecting']);
 });
 
+const at = (clientX: number): object => ({ clientX, button: 0, pointerId: 1 });
+
 describe('the slider', () => {
   test('says where it stands, in words', () => {
     render(<TimeBar />);
@@ -113,7 +115,6 @@ describe('the slider', () => {
 
   test('follows the pointer while it is held, on a bar that stays where it is', () => {
     render(<TimeBar />);
-    const at = (clientX: number): object => ({ clientX, button: 0, pointerId: 1 });
     fireEvent.pointerMove(slider(), at(300));
     expect(moment()).toBeNull();
     fireEvent.pointerDown(slider(), at(500));

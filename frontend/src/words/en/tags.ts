@@ -1,5 +1,5 @@
 /** The tags: their table and the card of one. */
-import { counted } from './counted';
+import { counted, whole } from './counted';
 
 export const TAGS = {
   tags: 'Tags',
@@ -10,7 +10,7 @@ export const TAGS = {
   shownOf: (shown: number, all: number): string =>
     shown === all
       ? counted(all, 'tag', 'tags')
-      : `${shown.toLocaleString('en')} of ${counted(all, 'tag', 'tags')}`,
+      : `${whole(shown)} of ${counted(all, 'tag', 'tags')}`,
   nothingMatches: 'No tag matches the filter.',
   columns: {
     health: 'Health',

@@ -381,7 +381,7 @@ def test_each_of_several_tags_has_the_colour_that_its_name_has(
 ) -> None:
     hmi = open_page(garden.bridge.url, f"chart.tag=1&{garden.period}")
     plotted(hmi)
-    hmi.page.get_by_text("Several tags", exact=True).click()
+    hmi.page.get_by_role("radio", name="Several tags").check()
     inside = plot(hmi).locator(".u-over")
     signs = hmi.page.locator(".line-sign")
     expect(signs).to_have_count(1)

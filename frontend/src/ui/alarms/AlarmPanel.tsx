@@ -11,10 +11,9 @@ import {
 } from '../../alarms/arrange';
 import { unacknowledged, type Item } from '../../alarms/list';
 import { acknowledgeAlarms } from '../../alarms/own';
-import { selectNow, selectSpeech, worstNow, worstNowFirst } from '../../alarms/speech';
+import { selectNow, selectSpeech, todoNow, worstNow, worstNowFirst } from '../../alarms/speech';
 import { alarmList } from '../../alarms/watch';
 import { now, timeOfDay } from '../../clock';
-import { todoText } from '../../domain/reasons';
 import { shown as shownText } from '../../domain/text';
 import { fileName, save } from '../../export/save';
 import { store, useApp } from '../../store/app';
@@ -229,8 +228,8 @@ function CauseHeading({
     return causeFacts(items, speech, nowS, (alarm) => selectNow(state, alarm)).join(', ');
   });
   const verdict = useApp((state) => worstNow(state, items));
-  const [first] = items;
-  if (!first || !verdict) return null;
+  const todo = useApp((state) => todoNow(state, items));
+  if (!verdict) return null;
   const waiting = unacknowledged(items);
   const tags = [...new Set(items.map(({ alarm }) => alarm.tag_id))].filter(Boolean);
   const named = tags.slice(0, MOST_TAGS).map((id) => shownText(id, 16));
@@ -242,9 +241,7 @@ function CauseHeading({
           <span>
             <strong>{cause}</strong> · {S.alarmCount(items.length)}
           </span>
-          {group !== 'resolved' && (
-            <span className="alarm-do">{todoText(first.alarm.reason, verdict)}</span>
-          )}
+          {group !== 'resolved' && <span className="alarm-do">{todo}</span>}
           <span className="alarm-facts">{facts}</span>
           <span className="alarm-facts faint">
             {S.alarmTags(named, tags.length - named.length)}

@@ -5,7 +5,6 @@ import type { Item } from '../../alarms/list';
 import { acknowledgeAlarms, unacknowledgeAlarm, unshelveAlarm } from '../../alarms/own';
 import { selectSpeech } from '../../alarms/speech';
 import { nameText, whereText } from '../../alarms/words';
-import { todoText } from '../../domain/reasons';
 import { Comments } from '../../notes/Comments';
 import { useApp } from '../../store/app';
 import { S } from '../../strings';
@@ -61,7 +60,7 @@ export const AlarmRow = memo(function AlarmRow({
             </span>
             {group !== 'resolved' && (
               <span className="alarm-do" data-again={current === 'healthy' || undefined}>
-                {todoText(alarm.reason, current)}
+                {values.todo}
               </span>
             )}
           </span>

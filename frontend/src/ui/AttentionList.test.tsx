@@ -19,9 +19,18 @@ const pest = reason({ kind: 'pest', sensor: '', value: 2, limit: null });
 const warm = reason({ verdict: 'stressed', value: 30, limit: 26 });
 
 test('lists who needs somebody and why, the worst first', () => {
-  show({ well: 'healthy', warm: [warm], far: 'unknown', bug: [pest], both: [reason(), pest] });
-  expect(ids()).toEqual(['both', 'bug', 'warm']);
-  const [first] = rows();
+  const failed = reason({ kind: 'reading_failed', verdict: 'stressed', value: null, limit: null });
+  const twice = [failed, { ...failed, sensor: 'humidity' }];
+  show({
+    well: 'healthy',
+    warm: [warm],
+    far: 'unknown',
+    bug: [pest],
+    both: [reason(), pest],
+    twice,
+  });
+  expect(ids()).toEqual(['both', 'bug', 'warm', 'twice']);
+  const [first, , , last] = rows();
   if (!first) throw new Error('no row');
   const why = within(first).getAllByRole('listitem');
   expect(why.map((each) => each.textContent)).toEqual([
@@ -31,6 +40,7 @@ test('lists who needs somebody and why, the worst first', () => {
   expect(first.querySelector('.attention-do')?.textContent).toContain(
     'Inspect and treat the plants · Heat, or close the vents',
   );
+  expect(last?.querySelector('.attention-do strong')?.textContent).toBe('Check the sensor');
 });
 
 test('of many, what ails more than a few has one line, and the rest a line each', () => {

@@ -2,7 +2,7 @@ import { act as flush, fireEvent, render, screen, within } from '@testing-librar
 import { afterEach, beforeEach, expect, test, vi } from 'vitest';
 
 import { NOTHING_KEPT } from '../../alarms/kept';
-import { done, own } from '../../alarms/own';
+import { done, own, shelveAlarm } from '../../alarms/own';
 import { startAlarms } from '../../alarms/watch';
 import { notifyState } from '../../alarms/notify';
 import type { Alarm, HealthReason } from '../../contract/types';
@@ -233,7 +233,13 @@ test('without an alarm it says so; where that is not known it says that', () => 
   // Beside the alarm of another tag as well, and not beside its own.
   tell(alarm('a', { tag_id: '5' }));
   expect(screen.getByText(wait)).toBeTruthy();
-  tell(alarm('a', { tag_id: '1' }));
+  const ofTag = alarm('a', { tag_id: '1' });
+  tell(ofTag);
+  expect(screen.queryByText(wait)).toBeNull();
+  flush(() => {
+    shelveAlarm({ alarm: ofTag, verdict: 'critical' }, 15, 'fan');
+  });
+  expect(group('shelved')).toHaveLength(1);
   expect(screen.queryByText(wait)).toBeNull();
   flush(() => {
     receive({ type: 'alarms', alarms: alarms([], { source: 'heard' }) });

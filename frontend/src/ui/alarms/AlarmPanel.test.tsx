@@ -59,7 +59,7 @@ test('each in words: what, where, now, at worst, since when; what is resolved un
   const active = first('active');
   expect(active.textContent).toContain('Tag 5: Temperature below 10.0\u00a0°C');
   expect(active.textContent).toContain('since sim 00:08:20');
-  expect(active.textContent).toContain('first 6.6\u00a0°C');
+  expect(active.textContent).toContain('6.6\u00a0°C when raised');
   expect(fact(active, 'worst').textContent).toContain('worst 4.2\u00a0°C');
   expect(fact(active, 'worst').dataset['status']).toBe('critical');
   expect(fact(active, 'now').textContent).toBe('now unknown');

@@ -22,6 +22,7 @@ PATHS = (
     f"/api/report?{DAY}",
     f"/api/report?from={T0 + HOUR}&to={T0 + 9 * HOUR}",
     *(f"/api/report.html?{DAY}&lang={lang}" for lang in ("en", "de", "nl", "es")),
+    f"/api/report.html?{DAY}&time_zone=Asia/Kathmandu",
 )
 
 
@@ -85,6 +86,9 @@ def check_refusals(live: Bridge) -> None:
         assert (answer.status_code, said in answer.text) == (400, True), answer.text
     answer = live.http.get(f"/api/report.html?to={T0}&lang=fr")
     assert (answer.status_code, "lang" in answer.json()["detail"]) == (400, True)
+    for zone in ("Mars", "", "Europe", "../zone.tab", "/etc/localtime", "a" * 300, "%00"):
+        answer = live.http.get(f"/api/report.html?to={T0}&time_zone={zone}")
+        assert (answer.status_code, "time_zone is " in answer.json()["detail"]) == (400, True), zone
     # What is to come is left out, and a shift is eight hours.
     report = live.json(f"/api/report?to={2**31 - 1}")
     assert report["to"]["sec"] - report["from"]["sec"] == 8 * HOUR

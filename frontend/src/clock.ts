@@ -91,6 +91,9 @@ export const onLapse = (listener: () => void): (() => void) => clock.onLapse(lis
 /** Time of day on the operator's own clock, ms since the epoch. */
 export const timeOfDay = (): number => Date.now();
 
+/** The operator's own time zone, such as "Europe/Amsterdam". */
+export const timeZone = (): string => new Intl.DateTimeFormat().resolvedOptions().timeZone;
+
 export const pause = (ms: number): Promise<void> =>
   new Promise((resolve) => {
     setTimeout(resolve, ms);

@@ -119,7 +119,7 @@ def test_a_row_has_the_value_of_now_with_its_trend_beside_the_worst(
         hmi = open_page(running.url)
         hmi.page.keyboard.press("a")
         row = rows(hmi, "active")
-        expect(fact(row, "since")).to_have_attribute("title", re.compile("43.5"))
+        expect(fact(row, "since")).to_have_attribute("title", re.compile("43.5.* when raised"))
         robot.observe(warm("a", 47.0))
         expect(fact(row, "now")).to_contain_text("now 47.0\u00a0°C")
         robot.observe(warm("a", 33.1))

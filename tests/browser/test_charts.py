@@ -214,7 +214,7 @@ def test_many_are_buckets_and_a_drag_brings_readings(garden: Garden, open_page: 
     # What is shown, not what was asked: the answer before stays until the next has come.
     expect(plot(hmi)).to_have_attribute("aria-label", whole)
     with hmi.page.expect_download() as download:
-        hmi.page.get_by_role("button", name="CSV of what is shown").click()
+        hmi.page.get_by_role("button", name="CSV of this view").click()
     text = download.value.path().read_text(encoding="utf-8-sig")
     table = list(csv.DictReader(io.StringIO(text)))
     buckets = [row for row in table if row["kind"] == "bucket"]

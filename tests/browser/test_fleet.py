@@ -247,7 +247,8 @@ def test_a_row_for_each_greenhouse_leads_to_its_shift_report(
         expect(rows).to_have_count(3)
         expect_no_wider_than_a_phone(page)
         rows.first.get_by_role("link").click()
-        expect(page).to_have_url(re.compile(r"/sites/warm/api/report\.html\?from=.*&lang=en$"))
+        address = r"/sites/warm/api/report\.html\?from=.*&lang=en&time_zone=.+$"
+        expect(page).to_have_url(re.compile(address))
         expect(page.get_by_role("heading", level=1)).to_contain_text("report")
 
 

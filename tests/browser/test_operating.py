@@ -191,7 +191,7 @@ def test_the_readout_says_what_is_known_and_the_map_moves_about_the_pointer(hmi:
     moved = hmi.view()
     assert (moved.x - zoomed.x, moved.y - zoomed.y) == pytest.approx((60, -40), abs=1)
 
-    hmi.page.get_by_role("button", name="Show everything").click()
+    hmi.page.get_by_role("button", name="Fit to view").click()
     hmi.expect(lambda: hmi.view() == start, "the view of everything")
     hmi.page.get_by_role("button", name="Zoom in").click()
     hmi.expect(lambda: hmi.view().scale > start.scale * 1.4, "a closer view")

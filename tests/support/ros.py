@@ -43,7 +43,13 @@ class Peer:
     def __init__(self, domain: int, name: str = "peer") -> None:
         self._context = Context()
         rclpy.init(args=[], context=self._context, domain_id=domain)
-        self.node = rclpy.create_node(name, context=self._context)
+        # Neither is asked for here, and each takes endpoints that all others have to discover.
+        self.node = rclpy.create_node(
+            name,
+            context=self._context,
+            enable_rosout=False,
+            start_parameter_services=False,
+        )
         self._executor = SingleThreadedExecutor(context=self._context)
         self._executor.add_node(self.node)
         self._publishers: dict[str, Any] = {}

@@ -63,6 +63,8 @@ class DailyReport:
     ) -> None:
         self._target, self._channel, self._poll_s = target, channel, poll_s
         self._why = ""
+        # What was sent last: where that cannot be noted, it is not sent again and again.
+        self._sent: tuple[Path, int] | None = None
         self._task: asyncio.Task[None] | None = None
 
     def start(self, of: Source) -> None:
@@ -113,12 +115,14 @@ class DailyReport:
             return ""
         report = Report(target.ended_ns(due_ns, -1), due_ns, of.criteria, journal)
         try:
-            await self._send(report, of)
+            if self._sent != (file, due_ns):
+                await self._send(report, of)
         except PastRefused as error:
             if now_ns < due_ns + LATE_NS:
                 raise
             # It would be refused for ever, and hold up the days after it.
             log.error("the report up to %s is left out: %s", compact(due_ns), error)  # noqa: TRY400
+        self._sent = file, due_ns
         _write(file, due_ns)
         return ""
 

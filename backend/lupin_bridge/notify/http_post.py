@@ -17,7 +17,7 @@ from lupin_bridge.notify.destinations import Endpoint
 
 CONNECT_S: Final = 5.0
 ANSWER_S: Final = 10.0
-# Of the answer's head. Its body is not read.
+# Of the answer's head, with those of status 1xx before it. Its body is not read.
 MAX_HEAD_BYTES: Final = 16_384
 
 
@@ -89,7 +89,7 @@ async def _exchange(
     reader: asyncio.StreamReader,
     writer: asyncio.StreamWriter,
 ) -> h11.Response:
-    http = h11.Connection(h11.CLIENT, max_incomplete_event_size=MAX_HEAD_BYTES)
+    http = h11.Connection(h11.CLIENT)
     head = h11.Request(
         method="POST",
         target=target.path,
@@ -104,14 +104,18 @@ async def _exchange(
     for part in (head, h11.Data(data=body), h11.EndOfMessage()):
         writer.write(http.send(part) or b"")
     await writer.drain()
+    left = MAX_HEAD_BYTES
     while True:
         event = http.next_event()
         if isinstance(event, h11.Response):
             return event
         if event is h11.NEED_DATA:
-            got = await reader.read(MAX_HEAD_BYTES)
+            if not left:
+                raise PostError(f"its answer's head has more than {MAX_HEAD_BYTES} bytes")
+            got = await reader.read(left)
             if not got:
                 raise PostError("the connection was closed before an answer")
+            left -= len(got)
             http.receive_data(got)
 
 

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
 from typing import Annotated, Final, Literal
+from zoneinfo import ZoneInfo
 
 from annotated_types import Interval
 
@@ -158,6 +159,9 @@ class OfReportPage(OfReport):
     """The parameters of `/api/report.html`."""
 
     lang: Literal["en", "de", "nl", "es"] = parameter("language", "en")
+    time_zone: str | None = parameter(
+        "of its times, such as Europe/Amsterdam; default: that of the setting `time_zone`"
+    )
 
 
 @dataclass(frozen=True, slots=True)
@@ -256,6 +260,24 @@ def report(given: OfReport, now_ns: int | None) -> tuple[int, int]:
     if days > MAX_REPORT_DAYS:
         raise PastRefused(f"from and to are {days:.1f} days apart, the limit is {MAX_REPORT_DAYS}")
     return start_ns, end_ns
+
+
+def zone(name: str | None) -> ZoneInfo | None:
+    """The time zone of a name; None: none was given.
+
+    Raises:
+        PastRefused: one that this machine does not know.
+
+    """
+    if name is None:
+        return None
+    try:
+        return ZoneInfo(name)
+    except (KeyError, OSError, ValueError):
+        raise PastRefused(
+            f"time_zone is {name[:64]!r}, expected one that this machine knows, such as "
+            "Europe/Amsterdam"
+        ) from None
 
 
 def of_notes(parameters: Parameters) -> OfNotes:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from datetime import datetime
+from datetime import datetime, tzinfo
 from functools import cache, partial
 from html import escape
 from importlib.resources import files
@@ -29,8 +29,8 @@ _POLICY: Final = (
 # A browser repeats a table's head on each sheet, and leaves a row whole.
 _STYLE: Final = """
 @page { size: A4; margin: 14mm 12mm }
-body { font: 10pt/1.35 system-ui, sans-serif; color: #111; background: #fff; max-width: 186mm;
-  margin: 0 auto; padding: 4mm }
+body { font: 10pt/1.35 'Inter Variable', system-ui, -apple-system, 'Segoe UI', 'Liberation Sans',
+  sans-serif; color: #111; background: #fff; max-width: 186mm; margin: 0 auto; padding: 4mm }
 h1 { font-size: 18pt; margin: 0 } h1 img { width: 8mm; height: 8mm; vertical-align: -1.5mm }
  h2 { font-size: 12pt; margin: 7mm 0 1mm; break-after: avoid }
 p { margin: 1mm 0 } .note { color: #444; font-size: 9pt }
@@ -84,20 +84,22 @@ def push_text(
 
 @dataclass(frozen=True, slots=True)
 class ReportPage(Report):
-    """The report as a page in the language `lang`."""
+    """The report as a page in the language `lang`; times are of `zone`, or the greenhouse's."""
 
     lang: str = "en"
+    zone: tzinfo | None = None
 
     def plan(self, body: dict[str, Any]) -> Plan:
         """See `Report`."""
-        page = _Page(self.lang, self.criteria).page(body)
+        page = _Page(self.lang, self.criteria, self.zone).page(body)
         policy = {"Content-Security-Policy": _POLICY}
         return planned(page.encode("utf-8", "replace"), HTML_TYPE, self, policy)
 
 
 class _Page:
-    def __init__(self, lang: str, criteria: Criteria) -> None:
+    def __init__(self, lang: str, criteria: Criteria, zone: tzinfo | None = None) -> None:
         self._lang = lang
+        self._zone = zone or criteria.clock.zone
         self._words = _words()[lang]
         self._criteria = criteria
         self._day = ""
@@ -107,8 +109,8 @@ class _Page:
     def page(self, body: Entry) -> str:
         say, at = self.say, self._at
         # Of a period within a day the rows leave the day out.
-        days = {at(body[name]).rpartition(" ")[0] for name in ("from", "to")}
-        self._day = f"{days.pop()} " if len(days) == 1 else ""
+        days = {at(body[name]).rpartition(", ")[0] for name in ("from", "to")}
+        self._day = f"{days.pop()}, " if len(days) == 1 else ""
         period = say("period", **{"from": at(body["from"]), "to": at(body["to"])})
         title = f"{say('title')}: {period}"
         known = [
@@ -122,7 +124,7 @@ class _Page:
             f"<title>{escape(title)}</title><style>{_STYLE}</style></head><body>",
             f'<h1><img src="../lupin.svg" alt=""> {escape(say("title"))}</h1>',
             f"<p>{escape(period)}. ",
-            f"{escape(say('zone', zone=self._zone(body['from'], body['to'])))}</p>",
+            f"{escape(say('zone', zone=self._zone_name(body['from'], body['to'])))}</p>",
             f'<p class="note">{escape(" ".join(known) or say("unknown"))}</p>',
             self._counts(body["counts"]),
             self._alarms(body),
@@ -143,11 +145,11 @@ class _Page:
         whole = counts["tags"]
         part = counts["tags_scanned"]
         share = round(100 * part / whole) if whole else 0
-        shown = {
-            **{name: str(counts[name]) for name in ("raised", "cleared", "active", "critical")},
-            **{name: str(counts[name]) for name in ("scans", "failed", "inspections")},
-            "scanned": self.say("of", part=part, whole=whole, share=share),
-        }
+        names = ("raised", "cleared", "active", "critical", "scans", "failed", "inspections")
+        shown = {name: self._count(counts[name]) for name in names}
+        shown["scanned"] = self.say(
+            "of", part=self._count(part), whole=self._count(whole), share=share
+        )
         cells = (
             f"<div><dt>{escape(self.say(name))}</dt><dd>{escape(text)}</dd></div>"
             for name, text in shown.items()
@@ -164,7 +166,7 @@ class _Page:
     def _alarm(self, alarm: Entry) -> Iterable[str]:
         reason = alarm["reason"]
         who = [
-            self.say(word, name=alarm[f"{word}_by"], at=self._at(alarm[f"{word}_{when}"]))
+            self.say(word, name=alarm[f"{word}_by"], at=self._clock(alarm[f"{word}_{when}"]))
             for word, when in (("acknowledged", "at"), ("shelved", "until"))
             if f"{word}_by" in alarm
         ]
@@ -200,8 +202,8 @@ class _Page:
             *extreme(of["low"]),
             number(of["mean"]),
             *extreme(of["high"]),
-            str(of["n"]),
-            str(of["failed"]),
+            self._count(of["n"]),
+            self._count(of["failed"]),
         )
 
     def _note(self, body: Entry) -> Callable[[Entry], Iterable[str]]:
@@ -215,16 +217,15 @@ class _Page:
                 about = f"{self._what(alarm['reason'])}, {self._where(alarm['tag_id'])}"
             else:
                 about = self.say("alarm") if kind == "alarm" else self._where(name)
-            said = [self._words["kinds"].get(note["kind"], note["kind"]), note["text"]]
-            said += [self.say("withdrawn", name=gone)] if gone else []
-            text = "; ".join(it for it in said if it)
+            said = self._words["kinds"].get(note["kind"], note["kind"]), note["text"]
+            text = ": ".join(it for it in said if it)
+            text += f" ({self.say('withdrawn', name=gone)})" if gone else ""
             return self._clock(note["made_at"]), note["by"], text, about
 
         return cells
 
     def _silence(self, silence: Entry) -> Iterable[str]:
-        minutes = (silence["to"]["sec"] - silence["from"]["sec"]) // 60
-        length = f"{minutes // 60}:{minutes % 60:02} h"
+        length = self._length(silence["to"]["sec"] - silence["from"]["sec"])
         from_, to = self._clock(silence["from"]), self._clock(silence["to"])
         return self._where(silence["tag_id"]), from_, to, length
 
@@ -260,7 +261,8 @@ class _Page:
 
     def _more(self, body: Entry, name: str) -> str:
         count = body["left_out"][name]
-        return f'<p class="note">{escape(self.say("more", count=count))}</p>' if count else ""
+        more = self.say("more", count=self._count(count))
+        return f'<p class="note">{escape(more)}</p>' if count else ""
 
     # --- words ------------------------------------------------------------------------------------
 
@@ -292,12 +294,14 @@ class _Page:
         return self.say("house") if tag_id in (WHOLE_SITE, "site") else self.say("tag", name=tag_id)
 
     def _at(self, when: Mapping[str, int]) -> str:
-        """A moment by the greenhouse's clock; of a simulation, the time since its beginning."""
+        """A moment as the page writes it; of a simulation, the time since its beginning."""
         sec = when["sec"]
         wall_s = unix_s(sec * 1_000_000_000)
         if wall_s is None:
             return f"sim {sec // 3600:02}:{sec // 60 % 60:02}"
-        return f"{datetime.fromtimestamp(wall_s, self._criteria.clock.zone):%Y-%m-%d %H:%M}"
+        at = datetime.fromtimestamp(wall_s, self._zone)
+        month = self._words["months"][at.month - 1]
+        return self.say("date", day=at.day, month=month, year=at.year, clock=f"{at:%H:%M}")
 
     def _clock(self, when: Mapping[str, int]) -> str:
         """A moment in a row; where all of the period is of one day, without that day."""
@@ -311,13 +315,29 @@ class _Page:
         digits = f"{value:.4g}"
         if unit and size < 1e6:
             digits = f"{value:,.{0 if size >= 100 else 1 if size >= 1 else 2}f}"
+        return f"{self._written(digits)}\u00a0{unit}".strip()
+
+    def _count(self, count: int) -> str:
+        return self._written(f"{count:,}")
+
+    def _written(self, digits: str) -> str:
+        """A number's text as the page writes it in this language."""
+        if self._lang == "es" and len(digits.lstrip("-").partition(".")[0]) == len("1,000"):
+            digits = digits.replace(",", "")
         if self._lang != "en":
             digits = digits.translate(_COMMA)
-        digits = digits.replace("-", "\u2212")
-        return f"{digits}\u00a0{unit}".strip()
+        return digits.replace("-", "\u2212")
 
-    def _zone(self, *moments: Mapping[str, int]) -> str:
-        zone = self._criteria.clock.zone
+    def _length(self, seconds: int) -> str:
+        """In its two largest units, as the page writes it."""
+        days, hours, minutes = seconds // 86_400, seconds // 3600 % 24, seconds // 60 % 60
+        in_hours = f"{hours}\u00a0{self.say('hours')}"
+        if days:
+            return f"{days}\u00a0d {in_hours}"
+        return f"{in_hours if hours else ''} {minutes}\u00a0min".strip()
+
+    def _zone_name(self, *moments: Mapping[str, int]) -> str:
+        zone = self._zone
         offsets = {
             f"UTC{datetime.fromtimestamp(wall_s, zone).astimezone(zone).isoformat()[-6:]}"
             for when in moments

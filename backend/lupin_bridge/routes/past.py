@@ -71,10 +71,13 @@ async def report_route(request: Request) -> Response:
     openapi_extra={"parameters": parameters_of(query.OfReportPage)},
 )
 async def report_page_route(request: Request) -> Response:
-    """Without scripts; times are those of the setting `time_zone`."""
+    """Without scripts."""
     given = read(query.OfReportPage, request.query_params.multi_items(), PastRefused)
     found = _report(request, given)
-    page = ReportPage(found.start_ns, found.end_ns, found.criteria, found.journal, given.lang)
+    page = ReportPage(
+        *(found.start_ns, found.end_ns, found.criteria, found.journal),
+        *(given.lang, query.zone(given.time_zone)),
+    )
     return await respond_past(request, page, "report")
 
 

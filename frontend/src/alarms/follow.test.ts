@@ -74,6 +74,7 @@ describe('follow', () => {
       ...alarm('a', { tag_id: '5', reason: { sensor: 'co2' } }),
       raised_at: { sec: 9_000, nanosec: 1_200_001 },
     };
+    act({ type: 'list', list: 'alarms' });
     goToStart(co2);
     const { view } = store.get();
     expect(view).toMatchObject({ moment: 9_000.002, selected: '5', sensor: 'co2', pane: 'map' });
@@ -83,8 +84,16 @@ describe('follow', () => {
 
   test('of the greenhouse it leads to the moment alone; there is none that has not come yet', () => {
     act({ type: 'select', tagId: '1' });
-    const silent = { kind: 'silent', sensor: '' } as const;
-    goToStart(alarm('a', { tag_id: '', raised: 9_500, reason: silent }));
+    const silent = alarm('a', {
+      tag_id: '',
+      raised: 9_500,
+      reason: { kind: 'silent', sensor: '' },
+    });
+    act({ type: 'list', list: 'alarms' });
+    showAlarm(silent);
+    // No card says it.
+    expect(store.get().view).toMatchObject({ moment: null, selected: null, pane: 'map' });
+    goToStart(silent);
     expect(store.get().view).toMatchObject({
       moment: 9_500,
       selected: null,

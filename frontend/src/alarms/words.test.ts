@@ -47,7 +47,7 @@ test('now, at worst and at first, each with its own severity', () => {
     what: 'Temperature below 18.0\u00a0°C',
     now: 'now 12.6\u00a0°C',
     worst: 'worst 8.7\u00a0°C',
-    first: 'first 12.2\u00a0°C',
+    first: '12.2\u00a0°C when raised',
   });
   expect(alarmText(cold, C, known(12.6, 'stressed'))).toBe(
     'Tag 9: Temperature below 18.0\u00a0°C, now 12.6\u00a0°C, worst 8.7\u00a0°C (critical)',
@@ -65,7 +65,7 @@ test('its limit is that of now: what is critical, or what ends it on the way bac
   expect(valuesOf(cold, C, at(18.02, 18.5))).toMatchObject({
     what: 'Temperature not yet above 18.5\u00a0°C',
     now: 'now 18.0\u00a0°C',
-    first: 'first 17.9\u00a0°C',
+    first: '17.9\u00a0°C when raised',
   });
 });
 
@@ -84,7 +84,7 @@ test('no value reads like the limit that it differs from', () => {
     what: 'Humidity below 50.00\u00a0%',
     now: 'now 50.02\u00a0%',
     worst: 'worst 44.00\u00a0%',
-    first: 'first 49.96\u00a0%',
+    first: '49.96\u00a0% when raised',
   });
 });
 
@@ -107,7 +107,7 @@ test('what is not known now says so, with what was known last', () => {
 test('of a pest how many: now, at worst and at first', () => {
   const reason = { kind: 'pest', sensor: '', value: 2, limit: null } as const;
   const pest = alarm('a', { worst: 4, reason });
-  const texts = { what: 'Pest seen', worst: 'peak 4', first: 'first 2' };
+  const texts = { what: 'Pest seen', worst: 'peak 4', first: '2 when raised' };
   expect(valuesOf(pest, C, known(3, 'critical'))).toMatchObject({ ...texts, now: 'now 3 pests' });
   expect(valuesOf(pest, C, known(0, 'critical')).now).toBe('now seen');
   expect(valuesOf(pest, C, known(null, 'healthy')).now).toBe('now none seen');

@@ -1,4 +1,4 @@
-import { expect, test } from 'vitest';
+import { expect, test, vi } from 'vitest';
 
 import {
   ageText,
@@ -44,6 +44,18 @@ test.each([
   [90_061, '1\u00a0d 1\u00a0h'],
 ])('%d s is %s old', (seconds, text) => {
   expect(ageText(seconds)).toBe(text);
+});
+
+test('an age has the letters of the language', async () => {
+  vi.resetModules();
+  vi.stubGlobal('document', {});
+  vi.stubGlobal('window', { location: { search: '?lang=nl' } });
+  vi.stubGlobal('navigator', { languages: [] });
+  const dutch = await import('./format');
+  vi.unstubAllGlobals();
+  expect([4_680, 90_061].map(dutch.ageText)).toEqual(['1\u00a0u 18\u00a0min', '1\u00a0d 1\u00a0u']);
+  expect(dutch.intervalText(3_600)).toBe('1\u00a0u');
+  expect(dutch.shortAgeText(4_680)).toBe('1\u00a0u');
 });
 
 test('a short age is in one unit', () => {

@@ -96,8 +96,8 @@ export function ageText(seconds: number): string {
   const minutes = Math.floor(s / 60);
   if (minutes < 60) return `${minutes}\u00a0min`;
   const hours = Math.floor(minutes / 60);
-  if (hours < 24) return `${hours}\u00a0h ${minutes % 60}\u00a0min`;
-  return `${Math.floor(hours / 24)}\u00a0d ${hours % 24}\u00a0h`;
+  if (hours < 24) return `${hours}\u00a0${S.hours} ${minutes % 60}\u00a0min`;
+  return `${Math.floor(hours / 24)}\u00a0d ${hours % 24}\u00a0${S.hours}`;
 }
 
 /** A time between two things that come again and again: exact where it is short. */
@@ -105,7 +105,7 @@ export function intervalText(seconds: number): string {
   if (seconds < 10) return `${written(seconds.toFixed(1))}\u00a0s`;
   const s = Math.round(seconds);
   if (s >= 60 && s < 600 && s % 60 > 0) return `${Math.floor(s / 60)}\u00a0min ${s % 60}\u00a0s`;
-  return ageText(s).replace(/\u00a0(h|d) 0\u00a0\w+$/, '\u00a0$1');
+  return ageText(s).replace(/\u00a0([hud]) 0\u00a0\w+$/, '\u00a0$1');
 }
 
 /** An age in its largest unit alone, for a narrow column. */

@@ -51,7 +51,7 @@ export function reasonText(
       return R.old(
         label,
         age === null ? null : shortAgeText(age),
-        limit === null ? null : ageText(limit).replace(/\u00a0(h|d) 0\u00a0\w+$/, '\u00a0$1'),
+        limit === null ? null : ageText(limit).replace(/\u00a0([hud]) 0\u00a0\w+$/, '\u00a0$1'),
         reason.since !== null,
       );
     case 'silent':

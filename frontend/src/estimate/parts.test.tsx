@@ -197,12 +197,12 @@ describe('where another tag would help', () => {
       { x: 50, y: 1, error_ratio: 0.6 },
     ];
     render(<AdviceMarks />);
-    await screen.findByRole('list', { name: 'Where another tag would help' });
+    await screen.findByRole('list', { name: 'Suggested tag positions' });
     expect(
       screen.getByRole('button', { name: /^1\. x 1\.00 m, y 2\.00 m: a tag here/ }),
     ).toBeTruthy();
     expect(
-      screen.getByRole('button', { name: /^2\. .* all marks before it .* 70\u00a0%/ }),
+      screen.getByRole('button', { name: /^2\. .* all earlier marks .* 70\u00a0%/ }),
     ).toBeTruthy();
     const marks = [...document.querySelectorAll<HTMLElement>('.advice li')];
     expect(marks.map(({ style }) => style.transform)).toEqual([
@@ -215,7 +215,7 @@ describe('where another tag would help', () => {
 
   test('says where there is none, or none of the past', async () => {
     render(<AdviceMarks />);
-    await screen.findByText('No place is known where another tag would help');
+    await screen.findByText('No suggestion for another tag');
     flush(() => {
       receive({ type: 'past', past: { at: 5, house: store.get().twin.latest } });
       act({ type: 'moment', moment: 5 });

@@ -53,6 +53,7 @@ test('is that of the last eight hours until a period is chosen on the time bar',
   receive({ type: 'state', latest, now: performance.now() });
   expect(length()).toBe(8 * HOUR);
   expect(asked().get('lang')).toBe('en');
+  expect(asked().get('time_zone')).toBe(new Intl.DateTimeFormat().resolvedOptions().timeZone);
   act({ type: 'period', period: { kind: 'hour' } });
   expect(length()).toBe(HOUR);
   act({ type: 'period', period: { kind: 'own', from: 1_777_000_000, to: 1_777_000_900 } });

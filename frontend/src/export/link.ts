@@ -1,4 +1,4 @@
-import { now as pageNow } from '../clock';
+import { now as pageNow, timeZone } from '../clock';
 import { type Span, spanOf } from '../domain/period';
 import { store } from '../store/app';
 import { rosNow } from '../store/moment';
@@ -35,7 +35,7 @@ const LONGEST_S = 31 * 86_400;
 export function reportLink(): string {
   const state = store.get();
   const now = rosNow(state, pageNow());
-  const query = new URLSearchParams({ lang: LANGUAGE });
+  const query = new URLSearchParams({ lang: LANGUAGE, time_zone: timeZone() });
   if (now !== null) {
     const { period } = state.view;
     const oldest = state.twin.remembered.value?.reach?.from ?? null;

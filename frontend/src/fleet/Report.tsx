@@ -1,7 +1,7 @@
 /** What happened at the greenhouses that are shown: a row for each, and what people said of them. */
 import { useState, type JSX } from 'react';
 
-import { timeOfDay } from '../clock';
+import { timeOfDay, timeZone } from '../clock';
 import type { Note } from '../contract/types';
 import { shown as shownText } from '../domain/text';
 import { LANGUAGE, S } from '../strings';
@@ -128,13 +128,17 @@ function NoteRow({ note }: { note: SiteNote }): JSX.Element {
   );
 }
 
+/** Its report to read, in the reader's language and time zone. */
+const pageOf = ({ report }: SiteReport): string => {
+  const query = new URLSearchParams({ lang: LANGUAGE, time_zone: timeZone() });
+  return `${report.replace('/api/report?', '/api/report.html?')}&${query.toString()}`;
+};
+
 function Row({ row }: { row: SiteReport }): JSX.Element {
   return (
     <tr>
       <th scope="row">
-        <a href={`${row.report.replace('/api/report?', '/api/report.html?')}&lang=${LANGUAGE}`}>
-          {row.name}
-        </a>
+        <a href={pageOf(row)}>{row.name}</a>
       </th>
       {COUNTED.map((each) => (
         <td key={each}>{row[each]}</td>

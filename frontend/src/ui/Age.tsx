@@ -12,6 +12,8 @@ import { useTicking } from '../widgets/useNow';
 
 type Format = (seconds: number) => string;
 
+const agoText: Format = (seconds) => S.agoSuffix(ageText(seconds));
+
 /** An age that goes on as the moment that is shown says; null: there is none to tell. */
 function useAgeText(when: When, format: Format): string | null {
   const ageing = useApp((state) => selectShown(state).ageing);
@@ -28,7 +30,7 @@ export function useAgeStep(when: When): ReturnType<typeof ageStep> {
 }
 
 /** Seconds tick here alone, so that a table of hundreds is not rendered anew each second. */
-export function Age({ when, format = ageText }: { when: When; format?: Format }): JSX.Element {
+export function Age({ when, format = agoText }: { when: When; format?: Format }): JSX.Element {
   const text = useAgeText(when, format);
   const isWhole = useApp((state) => selectShown(state).snapshot?.isWhole ?? true);
   if (when === 'never') {

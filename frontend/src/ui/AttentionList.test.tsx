@@ -19,9 +19,18 @@ const pest = reason({ kind: 'pest', sensor: '', value: 2, limit: null });
 const warm = reason({ verdict: 'stressed', value: 30, limit: 26 });
 
 test('lists who needs somebody and why, the worst first', () => {
-  show({ well: 'healthy', warm: [warm], far: 'unknown', bug: [pest], both: [reason(), pest] });
-  expect(ids()).toEqual(['both', 'bug', 'warm']);
-  const [first] = rows();
+  const failed = reason({ kind: 'reading_failed', verdict: 'stressed', value: null, limit: null });
+  const twice = [failed, { ...failed, sensor: 'humidity' }];
+  show({
+    well: 'healthy',
+    warm: [warm],
+    far: 'unknown',
+    bug: [pest],
+    both: [reason(), pest],
+    twice,
+  });
+  expect(ids()).toEqual(['both', 'bug', 'warm', 'twice']);
+  const [first, , , last] = rows();
   if (!first) throw new Error('no row');
   const why = within(first).getAllByRole('listitem');
   expect(why.map((each) => each.textContent)).toEqual([
@@ -31,6 +40,7 @@ test('lists who needs somebody and why, the worst first', () => {
   expect(first.querySelector('.attention-do')?.textContent).toContain(
     'Heat, or close the vents · Inspect and treat the plants',
   );
+  expect(last?.querySelector('.attention-do strong')?.textContent).toBe('Check the sensor');
 });
 
 test('ends with how many more there are', () => {

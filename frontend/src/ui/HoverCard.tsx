@@ -77,7 +77,7 @@ function Brief({ pin, tag }: { pin: PinUnderMouse; tag: Tag }): JSX.Element {
               : idealText(sensor, rangesFor(sensor, tag.sureSpecies), value, unit);
           return (
             <div key={name} data-sensor={name} data-chosen={name === chosen}>
-              <dt>{shown(sensor.label, 20)}</dt>
+              <dt>{shown(sensor.label, 24)}</dt>
               <dd>
                 {value == null ? S.sensorFailed : readingText(sensor, value, unit)}{' '}
                 {how !== null && <span>{how}</span>}{' '}
@@ -88,7 +88,7 @@ function Brief({ pin, tag }: { pin: PinUnderMouse; tag: Tag }): JSX.Element {
             </div>
           );
         })}
-        {names.length === 0 && <AgeFact label={S.columns.age} when={tag.scannedAt} />}
+        {names.length === 0 && <AgeFact label={S.cardScanned} when={tag.scannedAt} />}
       </dl>
       {hidden > 0 && <p className="faint">{S.cardMore(hidden)}</p>}
       {names.length === 0 && <p className="faint">{S.cardNoReadings}</p>}

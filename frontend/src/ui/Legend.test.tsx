@@ -154,7 +154,7 @@ describe('legend', () => {
       'Stressed',
       'Unknown',
       'Healthy',
-      'no such sensor',
+      'no sensor',
       'sensor failed',
       'pest seen',
     ]);

@@ -170,7 +170,7 @@ describe('card', () => {
     });
     render(<TagCard tagId="7" />);
     const { textContent } = screen.getByTestId('tag-card');
-    expect(textContent).toContain('Last attempt3\u00a0min · not readable');
+    expect(textContent).toContain('Last attempt3\u00a0min ago · not readable');
     expect(textContent).toContain('no tag in the picture');
   });
 });

@@ -91,7 +91,7 @@ describe('table', () => {
       row(id).querySelector(`[data-sensor="${sensor}"] .reading`)?.textContent ?? '';
     expect(cell('9', 'temperature')).toBe('20.0');
     expect(cell('9', 'humidity')).toBe('failed');
-    expect(cell('9', 'co2')).toContain('no such sensor');
+    expect(cell('9', 'co2')).toContain('no sensor');
     expect(cell('10', 'temperature')).toBe('Temperature above 35.0\u00a0°C: 40.0');
     expect(row('9').textContent).toContain('rose91');
     expect(row('10').dataset['health']).toBe('critical');

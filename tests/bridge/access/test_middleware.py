@@ -216,7 +216,7 @@ def test_every_route_wants_the_token(closed: Served, path: str) -> None:
 
 
 @pytest.mark.parametrize(
-    "path", ["/nowhere", "/assets/app.js", "/lupin.svg", "/healthz/", "/SIGNIN"]
+    "path", ["/nowhere", "/assets/app.js", "/manifest.webmanifest", "/healthz/", "/SIGNIN"]
 )
 def test_what_is_there_and_what_is_not_looks_the_same_without_it(closed: Served, path: str) -> None:
     assert closed.get(path).status_code == 401

@@ -184,6 +184,23 @@ async def test_one_that_is_not_taken_is_tried_again_also_by_the_next_process(
     assert len({*at.ids, *again.ids}) == 1
 
 
+async def test_one_that_cannot_be_noted_is_not_sent_again_and_again(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    async with begun(tmp_path, status(200)) as (house, at):
+        [note] = tmp_path.glob("*.sent")
+        in_the_way, before = note.with_suffix(".new"), note.read_text()
+        in_the_way.mkdir()
+        house.ros_time_ns = ns("2026-05-02T07:00Z")
+        await until(lambda: "is not sent by webhook: [Errno" in caplog.text, "why")
+        await looks(house)
+        assert len(at.posted) == 1
+        in_the_way.rmdir()
+        await until(lambda: note.read_text() != before, "the note of it")
+        await looks(house)
+        assert len(at.posted) == 1
+
+
 async def test_one_that_the_receiver_refuses_is_given_up_and_that_is_said(
     tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:

@@ -94,13 +94,19 @@ def test_a_body_is_not_read_however_much_comes() -> None:
     assert sum(given) < 20_000_000  # what the sockets hold
 
 
-def test_a_head_is_read_up_to_a_limit() -> None:
+@pytest.mark.parametrize(
+    ("begin", "more"),
+    [(b"HTTP/1.1 200 OK\r\nX: ", b"x"), (b"", b"HTTP/1.1 102 Processing\r\n\r\n")],
+)
+def test_a_head_is_read_up_to_a_limit(begin: bytes, more: bytes) -> None:
     def long(_: Posted) -> Iterator[bytes | None]:
-        yield b"HTTP/1.1 200 OK\r\nX: " + b"x" * 2 * MAX_HEAD_BYTES
-        yield None
+        yield begin
+        while True:
+            yield more * 1000
 
     with receiver(long) as server:
-        assert refusal(f"http://127.0.0.1:{server.port}/").startswith("no answer of HTTP: ")
+        why = f"its answer's head has more than {MAX_HEAD_BYTES} bytes"
+        assert refusal(f"http://127.0.0.1:{server.port}/", 5.0) == why
 
 
 @pytest.mark.parametrize(

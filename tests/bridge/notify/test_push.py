@@ -132,7 +132,7 @@ def test_a_critical_alarm_reaches_those_phones_alone_that_may_have_it_and_until_
             wait_for(lambda: on.posted_to(annas) and on.posted_to(berts), "both messages")
             [to_anna], [to_bert] = on.posted_to(annas), on.posted_to(berts)
             assert annas.read(to_anna) == {"title": "Alarm", "body": "Tag 7: Pest seen (critical)"}
-            assert berts.read(to_bert)["body"] == "Messpunkt 7: Schädling gesehen (kritisch)"
+            assert berts.read(to_bert)["body"] == "Messpunkt 7: Schädlinge festgestellt (kritisch)"
             assert (to_anna.headers["ttl"], to_anna.headers["content-encoding"]) == (
                 *("3600", "aes128gcm"),
             )

@@ -2,7 +2,7 @@ import { act as flush, fireEvent, render, screen, within } from '@testing-librar
 import { afterEach, beforeEach, expect, test, vi } from 'vitest';
 
 import { acknowledge, NOTHING_KEPT } from '../../alarms/kept';
-import { done, own } from '../../alarms/own';
+import { done, own, shelveAlarm } from '../../alarms/own';
 import { startAlarms } from '../../alarms/watch';
 import { notifyState } from '../../alarms/notify';
 import type { Alarm, HealthReason } from '../../contract/types';
@@ -73,7 +73,7 @@ test('each in words: what, where, now, at worst, since when; what is resolved un
   const active = first('active');
   expect(active.textContent).toContain('Tag 5: Temperature below 10.0\u00a0°C');
   expect(active.textContent).toContain('since sim 00:08:20');
-  expect(fact(active, 'since').title).toContain('first 6.6\u00a0°C');
+  expect(fact(active, 'since').title).toContain('6.6\u00a0°C when raised');
   expect(fact(active, 'worst').textContent).toContain('worst 4.2\u00a0°C');
   expect(fact(active, 'worst').dataset['status']).toBe('critical');
   expect(fact(active, 'now').textContent).toBe('now unknown');
@@ -285,7 +285,13 @@ test('without an alarm it says so; where that is not known it says that', () => 
   // Beside the alarm of another tag as well, and not beside its own.
   tell(alarm('a', { tag_id: '5' }));
   expect(screen.getByText(wait)).toBeTruthy();
-  tell(alarm('a', { tag_id: '1' }));
+  const ofTag = alarm('a', { tag_id: '1' });
+  tell(ofTag);
+  expect(screen.queryByText(wait)).toBeNull();
+  flush(() => {
+    shelveAlarm({ alarm: ofTag, verdict: 'critical' }, 15, 'fan');
+  });
+  expect(group('shelved')).toHaveLength(1);
   expect(screen.queryByText(wait)).toBeNull();
   flush(() => {
     receive({ type: 'alarms', alarms: alarms([], { source: 'heard' }) });

@@ -43,8 +43,8 @@ test('a tag that is well again says what its alarm still waits for', () => {
 test('all alarms of a tag are acknowledged where it is looked at, and no others', () => {
   flush(() => {
     tellAlarms(
-      alarm('a', { tag_id: '7', raised: 900 }),
-      alarm('b', { tag_id: '7', raised: 500, reason: { kind: 'pest', sensor: '' } }),
+      alarm('a', { tag_id: '7', raised: 500 }),
+      alarm('b', { tag_id: '7', raised: 900, reason: { kind: 'pest', sensor: '' } }),
       alarm('c', { tag_id: '8' }),
     );
   });

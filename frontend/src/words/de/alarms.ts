@@ -26,11 +26,11 @@ export const ALARMS: In<typeof ENGLISH> = {
     last === null
       ? 'jetzt unbekannt'
       : `jetzt unbekannt, zuletzt ${last}${age === null ? '' : ` vor ${age}`}`,
-  alarmPests: { none: 'keine gesehen', seen: 'gesehen' },
+  alarmPests: { none: 'keine festgestellt', seen: 'festgestellt' },
   alarmWorst: {
     below: (reading) => `tiefster Wert ${reading}`,
     above: (reading) => `höchster Wert ${reading}`,
-    pest: (reading) => `Höchstzahl ${reading}`,
+    pest: (reading) => `Höchststand ${reading}`,
   },
   alarmFirst: (reading) => `anfangs ${reading}`,
   alarmStatus: { critical: 'kritisch', healthy: 'im Sollbereich' },
@@ -76,7 +76,7 @@ export const ALARMS: In<typeof ENGLISH> = {
   alarmsNoneHint:
     'Ein Alarm wird nach zwei auffälligen Messungen nacheinander ausgelöst, bei einem Schädling oder fehlenden Daten sofort.',
   alarmsWait: (tags) =>
-    `${counted(tags, 'Messpunkt wartet', 'Messpunkte warten')}: kein Alarm vor einer zweiten auffälligen Messung`,
+    `${counted(tags, 'Messpunkt', 'Messpunkte')} auffällig: Alarm erst, wenn die nächste Messung das bestätigt`,
   alarmNotYet: 'noch kein Alarm',
   alarmsNotYet: 'Warten auf die Liste der Alarme',
   alarmsStarting: 'Die Aufzeichnung wird noch gelesen: Weitere Alarme können folgen.',

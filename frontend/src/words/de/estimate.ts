@@ -33,12 +33,12 @@ export const ESTIMATE: In<typeof ENGLISH> = {
   oldest: (age) => `ältester Messwert ${age}`,
   expected: (measured, expected) => `gemessen ${measured}, erwartet ${expected}`,
   leftOut: (sensor) => `${sensor}: möglicher Sensorfehler, nicht in der Schätzung`,
-  advice: 'Wo ein weiterer Messpunkt helfen würde',
+  advice: 'Vorschläge für Messpunkte',
   advised: (place, percent, isFirst) =>
     isFirst
       ? `${place}: Ein Messpunkt hier senkt den Fehler der Karte auf ${percent} des heutigen`
       : `${place}: Messpunkte hier und an allen Marken davor senken den Fehler der Karte auf ${percent} des heutigen`,
-  adviceNone: 'Es ist keine Stelle bekannt, an der ein weiterer Messpunkt helfen würde',
+  adviceNone: 'Kein Vorschlag für einen weiteren Messpunkt',
   adviceFailed: (reason) => `Kein Vorschlag für einen weiteren Messpunkt: ${reason}`,
   adviceNow: 'Vorschläge für einen weiteren Messpunkt gibt es nur für jetzt',
 };

@@ -24,7 +24,9 @@ export const HEALTH: In<typeof ENGLISH> = {
     scanFailed: (outcome, age) =>
       `Letzte Messung fehlgeschlagen: ${outcome}${age === null ? '' : `, vor ${age}`}`,
     pest: (count) =>
-      count > 0 ? `${counted(count, 'Schädling', 'Schädlinge')} gesehen` : 'Schädling gesehen',
+      count > 0
+        ? `${counted(count, 'Schädling', 'Schädlinge')} festgestellt`
+        : 'Schädlinge festgestellt',
     old: (sensor, age, holds, isDated) => {
       const since = !isDated
         ? sensor === ''
@@ -41,7 +43,7 @@ export const HEALTH: In<typeof ENGLISH> = {
     },
     outOfRange: 'außerhalb des Bereichs',
     changed: (reading) => `${reading}: möglicher Sensorfehler`,
-    silent: 'Keine Daten vom Zwilling: Die letzten Daten können veraltet sein',
+    silent: 'Keine Daten vom digitalen Zwilling: Die letzten Daten können veraltet sein',
     stopped:
       'Es wird kein Messpunkt mehr gemessen: Der Roboter steht, oder seine Daten kommen nicht an',
     other: (kind, sensor) => (sensor === '' ? kind : `${sensor}: ${kind}`),

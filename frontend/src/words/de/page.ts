@@ -30,6 +30,7 @@ export const PAGE: In<typeof ENGLISH> = {
   nextTry: (seconds) => (seconds > 0 ? `nächster Versuch in ${seconds} s` : 'wird gerade versucht'),
   frozenSince: (clock) => `Die Messwerte sind eingefroren. Letzte Daten um ${clock}`,
   agoSuffix: (age) => `vor ${age}`,
+  hours: 'h',
   frozenWhy: {
     stale: 'Die Verbindung besteht, aber es kommt nichts mehr an.',
     reconnecting:

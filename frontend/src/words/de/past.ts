@@ -50,17 +50,17 @@ export const PAST: In<typeof ENGLISH> = {
   timebarMark: {
     scans: 'Balken nach oben: Messungen',
     failures: 'Balken nach unten: fehlgeschlagene Versuche',
-    pest: 'gefülltes Dreieck: Schädling gesehen',
-    cleared: 'leerer Ring: Schädling weg',
+    pest: 'gefülltes Dreieck: Schädlinge festgestellt',
+    cleared: 'leerer Ring: Schädlinge weg',
     silence: 'schraffiert: keine Messung versucht',
     before: 'gegenläufig schraffiert: nicht aufgezeichnet oder nicht mehr gespeichert',
-    run: 'gestrichelte Linie: Uhr neu gestartet',
+    run: 'gestrichelte Linie: Uhr zurückgesetzt',
   },
   timebarCounts: (scans, failures, seen, cleared) =>
     [
       counted(scans, 'Messung', 'Messungen'),
       ...(failures > 0 ? [`${failures} fehlgeschlagen`] : []),
-      ...(seen > 0 ? [counted(seen, 'Schädling gesehen', 'Schädlinge gesehen')] : []),
+      ...(seen > 0 ? [counted(seen, 'Schädlingsfund', 'Schädlingsfunde')] : []),
       ...(cleared > 0 ? [counted(cleared, 'Schädling weg', 'Schädlinge weg')] : []),
     ].join(', '),
   timebarOff: 'Keine Vergangenheit: Dieser Zwilling zeichnet nichts auf.',

@@ -30,7 +30,7 @@ export const ALARMS = {
     above: (reading: string): string => `worst ${reading}`,
     pest: (reading: string): string => `peak ${reading}`,
   },
-  alarmFirst: (reading: string): string => `first ${reading}`,
+  alarmFirst: (reading: string): string => `${reading} when raised`,
   alarmStatus: { critical: 'critical', healthy: 'in range' },
   alarmShow: 'Show this tag now',
   alarmStart: 'Go to start',

@@ -34,7 +34,7 @@ export const CHARTS = {
   chartDayBefore: 'Day before',
   chartBeforeWas: (value: string): string => `day before ${value}`,
   chartWhole: 'Whole period',
-  chartCsvShown: 'CSV of what is shown',
+  chartCsvShown: 'CSV of this view',
   chartCsvAll: 'CSV of all readings',
   chartAddTag: 'Add a tag',
   chartRemoveTag: (tag: string): string => `Remove tag ${tag} from the chart`,

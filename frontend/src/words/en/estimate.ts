@@ -31,12 +31,12 @@ export const ESTIMATE = {
   expected: (measured: string, expected: string): string =>
     `measured ${measured}, expected ${expected}`,
   leftOut: (sensor: string): string => `${sensor}: possible sensor fault, not used in the estimate`,
-  advice: 'Where another tag would help',
+  advice: 'Suggested tag positions',
   advised: (place: string, percent: string, isFirst: boolean): string =>
     isFirst
-      ? `${place}: a tag here reduces the error of the map to ${percent} of what it is now`
-      : `${place}: tags here and at all marks before it reduce the error of the map to ${percent} of what it is now`,
-  adviceNone: 'No place is known where another tag would help',
+      ? `${place}: a tag here reduces the map’s error to ${percent} of its current value`
+      : `${place}: tags here and at all earlier marks reduce the map’s error to ${percent} of its current value`,
+  adviceNone: 'No suggestion for another tag',
   adviceFailed: (reason: string): string => `No suggestion for another tag: ${reason}`,
   adviceNow: 'Suggestions for another tag are shown for the present only',
 } as const;

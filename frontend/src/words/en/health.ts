@@ -64,7 +64,7 @@ export const HEALTH = {
     changed: 'Compare with a second meter',
     silent: 'Check the twin, the server and the network',
     stopped: 'Check the robot',
-    other: 'Look there',
+    other: 'Check on site',
   },
   todoPestAgain: 'Inspect again: a second clean inspection resolves it',
   todoWell: 'Active until the next good scan',

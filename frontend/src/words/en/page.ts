@@ -28,6 +28,8 @@ export const PAGE = {
   nextTry: (seconds: number): string => (seconds > 0 ? `next try in ${seconds} s` : 'trying now'),
   frozenSince: (clock: string): string => `Readings are frozen. Last data at ${clock}`,
   agoSuffix: (age: string): string => `${age} ago`,
+  /** As an age has it: "1 h 18 min". */
+  hours: 'h',
   frozenWhy: {
     stale: 'The connection is open, but no data arrives.',
     reconnecting: 'Connection to the server lost. The page reconnects automatically.',
@@ -144,7 +146,7 @@ export const PAGE = {
   report: 'Shift report',
   print: 'Print',
   kiosk: 'Kiosk mode',
-  kioskLeave: 'Leave',
+  kioskLeave: 'Exit kiosk',
   cycleNext: (sensor: string, time: string): string => `next: ${sensor} in ${time}`,
   cycleRefused: (asked: string, least: number, most: number): string =>
     `cycle=${asked} is ignored: use ${least} to ${most} seconds.`,
@@ -179,7 +181,7 @@ export const PAGE = {
     global: [
       ['1 – 9', 'Choose a sensor'],
       ['/', 'Filter the table'],
-      ['F', 'Show everything on the map'],
+      ['F', 'Fit the map to view'],
       ['N, P', 'Next and previous tag'],
       ['S', 'Smooth the heat map'],
       ['Y', 'Layers'],
@@ -201,7 +203,7 @@ export const PAGE = {
     map: [
       ['← ↑ ↓ →', 'Move; faster with Shift'],
       ['+  −', 'Zoom'],
-      ['0', 'Show everything'],
+      ['0', 'Fit to view'],
       ['Enter', 'Open the nearest tag'],
     ],
   },

@@ -53,7 +53,7 @@ export const PAST = {
     cleared: 'open ring: pest gone',
     silence: 'hatched: no scan attempted',
     before: 'reverse hatching: not recorded, or no longer stored',
-    run: 'dashed line: clock restarted',
+    run: 'dashed line: clock set back',
   },
   timebarCounts: (scans: number, failures: number, seen: number, cleared: number): string =>
     [

@@ -22,7 +22,7 @@ export const ALARMS: In<typeof ENGLISH> = {
     last === null
       ? 'ahora desconocido'
       : `ahora desconocido, último ${last}${age === null ? '' : ` hace ${age}`}`,
-  alarmPests: { none: 'ninguna vista', seen: 'vista' },
+  alarmPests: { none: 'no detectada', seen: 'detectada' },
   alarmWorst: {
     below: (reading) => `peor valor ${reading}`,
     above: (reading) => `peor valor ${reading}`,
@@ -63,7 +63,7 @@ export const ALARMS: In<typeof ENGLISH> = {
   alarmFilter: 'Filtrar alarmas',
   alarmFilterHint: 'Filtrar …',
   alarmOrder: 'Orden',
-  alarmOrders: { cause: 'Por causa', newest: 'Las más recientes', tag: 'Por punto' },
+  alarmOrders: { cause: 'Por causa', newest: 'Más recientes primero', tag: 'Por punto' },
   alarmSaveCsv: 'Guardar alarmas como CSV',
   alarmsNoMatch: 'Ninguna alarma coincide con el filtro.',
   alarmCount: (count) => counted(count, 'alarma', 'alarmas'),
@@ -73,7 +73,7 @@ export const ALARMS: In<typeof ENGLISH> = {
   alarmsNoneHint:
     'La alarma salta tras dos mediciones anómalas seguidas. Con una plaga o si faltan datos del invernadero, salta de inmediato.',
   alarmsWait: (tags) =>
-    `${counted(tags, 'punto espera', 'puntos esperan')}: no hay alarma antes de otra medición anómala`,
+    `${counted(tags, 'punto pendiente', 'puntos pendientes')}: la alarma salta con otra medición anómala`,
   alarmNotYet: 'aún sin alarma',
   alarmsNotYet: 'Esperando la lista de alarmas',
   alarmsStarting: 'Todavía se está leyendo el registro: pueden aparecer más alarmas.',

@@ -31,12 +31,12 @@ export const ESTIMATE: In<typeof ENGLISH> = {
   oldest: (age) => `lectura más antigua: ${age}`,
   expected: (measured, expected) => `medido ${measured}, esperado ${expected}`,
   leftOut: (sensor) => `${sensor}: posible fallo del sensor, no se usa en la estimación`,
-  advice: 'Dónde ayudaría otro punto',
+  advice: 'Puntos propuestos',
   advised: (place, percent, isFirst) =>
     isFirst
       ? `${place}: un punto aquí reduce el error del mapa al ${percent} del actual`
       : `${place}: puntos aquí y en cada marca anterior reducen el error del mapa al ${percent} del actual`,
-  adviceNone: 'No se conoce ningún lugar donde ayudaría otro punto',
+  adviceNone: 'Sin propuesta para otro punto',
   adviceFailed: (reason) => `Sin propuesta para otro punto: ${reason}`,
   adviceNow: 'Las propuestas para otro punto se muestran solo para el presente',
 };

@@ -6,13 +6,13 @@ import { counted } from './counted';
 export const HEALTH: In<typeof ENGLISH> = {
   health: {
     healthy: 'Sano',
-    stressed: 'Estresado',
+    stressed: 'Con estrés',
     critical: 'Crítico',
     unknown: 'Desconocido',
   },
   healthMany: {
     healthy: 'Sanos',
-    stressed: 'Estresados',
+    stressed: 'Con estrés',
     critical: 'Críticos',
     unknown: 'Desconocidos',
   },
@@ -26,7 +26,8 @@ export const HEALTH: In<typeof ENGLISH> = {
     implausible: (reading) => `${reading}: valor no plausible`,
     scanFailed: (outcome, age) =>
       `Última medición fallida: ${outcome}${age === null ? '' : `, hace ${age}`}`,
-    pest: (count) => (count > 0 ? counted(count, 'plaga vista', 'plagas vistas') : 'Plaga vista'),
+    pest: (count) =>
+      count > 0 ? `Plaga detectada: ${counted(count, 'insecto', 'insectos')}` : 'Plaga detectada',
     old: (sensor, age, holds, isDated) => {
       const since = !isDated
         ? sensor === ''
@@ -112,6 +113,6 @@ export const HEALTH: In<typeof ENGLISH> = {
 
   tooLow: (by) => (by === null ? 'por debajo del rango' : `${by} por debajo del ideal`),
   tooHigh: (by) => (by === null ? 'por encima del rango' : `${by} por encima del ideal`),
-  below: 'bajo el ideal',
-  above: 'sobre el ideal',
+  below: 'por debajo del ideal',
+  above: 'por encima del ideal',
 };

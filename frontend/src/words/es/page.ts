@@ -28,6 +28,7 @@ export const PAGE: In<typeof ENGLISH> = {
   nextTry: (seconds) => (seconds > 0 ? `próximo intento en ${seconds} s` : 'intentándolo ahora'),
   frozenSince: (clock) => `Las lecturas están congeladas. Últimos datos a las ${clock}`,
   agoSuffix: (age) => `hace ${age}`,
+  hours: 'h',
   frozenWhy: {
     stale: 'La conexión está abierta, pero no llegan datos.',
     reconnecting: 'Se ha perdido la conexión con el servidor; la página se reconecta sola.',
@@ -111,7 +112,7 @@ export const PAGE: In<typeof ENGLISH> = {
   origin: { simulated: 'Simulado', recorded: 'Grabación', sim_time: 'Tiempo simulado' },
   originDay: (length: string): string => `1 día de invernadero = ${length}`,
   originHint: {
-    simulated: 'No hay robot real: invernadero, plantas y lecturas son simulados.',
+    simulated: 'No hay robot real: el invernadero, las plantas y las lecturas son simulados.',
     recorded: 'Se reproduce una grabación: nada de esto es en directo.',
     sim_time: 'No es la hora real: los datos vienen de una simulación o de una grabación.',
   },

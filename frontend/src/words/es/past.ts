@@ -50,7 +50,7 @@ export const PAST: In<typeof ENGLISH> = {
   timebarMark: {
     scans: 'barra hacia arriba: mediciones',
     failures: 'barra hacia abajo: intentos fallidos',
-    pest: 'triángulo lleno: plaga vista',
+    pest: 'triángulo lleno: plaga detectada',
     cleared: 'anillo vacío: plaga desaparecida',
     silence: 'rayado: ninguna medición intentada',
     before: 'rayado inverso: sin registro, o ya no se conserva',
@@ -60,7 +60,7 @@ export const PAST: In<typeof ENGLISH> = {
     [
       counted(scans, 'medición', 'mediciones'),
       ...(failures > 0 ? [counted(failures, 'fallida', 'fallidas')] : []),
-      ...(seen > 0 ? [counted(seen, 'plaga vista', 'plagas vistas')] : []),
+      ...(seen > 0 ? [counted(seen, 'plaga detectada', 'plagas detectadas')] : []),
       ...(cleared > 0 ? [counted(cleared, 'plaga desaparecida', 'plagas desaparecidas')] : []),
     ].join(', '),
   timebarOff: 'Sin pasado: este gemelo no registra nada.',

@@ -16,13 +16,13 @@ export const CHARTS: In<typeof ENGLISH> = {
   chartLoading: 'Het verleden wordt geladen',
   chartFailed: (reason) =>
     `Het verleden kon niet worden geladen; de pagina blijft het proberen. ${reason}`,
-  chartMissing: 'Deze tweeling legt niets vast.',
+  chartMissing: 'Deze digital twin legt niets vast.',
   chartMissingHint:
     'Grafieken hebben vastgelegde gegevens nodig. Tot die er zijn, staan hier alleen de laatste metingen.',
   chartMissingMore:
-    'Start de tweeling zonder “journal:=off”, of noem een bestand in de parameter “journal”.',
-  chartMissingShort: 'Geen grafiek: deze tweeling legt niets vast.',
-  chartNoTime: 'De tweeling heeft nog geen tijd; er is nog geen verleden.',
+    'Start de digital twin zonder “journal:=off”, of noem een bestand in de parameter “journal”.',
+  chartMissingShort: 'Geen grafiek: deze digital twin legt niets vast.',
+  chartNoTime: 'De digital twin heeft nog geen tijd; er is nog geen verleden.',
   chartIdealsDiffer: 'Ideaal bereik verschilt per soort',
   chartNoSensors: 'Dit meetpunt heeft geen sensor.',
   chartTable: 'Als tabel tonen',

@@ -10,7 +10,7 @@ export const ESTIMATE: In<typeof ENGLISH> = {
     'van de afstand en ouderdom van de metingen en van het tijdstip. Hoe langer er niet wordt ' +
     'gemeten, hoe groter de ±.',
   onItsWay: 'De schatting wordt geladen',
-  noService: 'Deze tweeling maakt geen schatting: getoond worden de dichtstbijzijnde waarden',
+  noService: 'Deze digital twin maakt geen schatting: getoond worden de dichtstbijzijnde waarden',
   noneNow: 'Er is nu geen schatting: getoond worden de dichtstbijzijnde waarden',
   noModel: 'Nog geen schatting: er zijn tien metingen van een sensor nodig',
   noSensor: 'Geen meetpunt meet dit, dus er is geen schatting',
@@ -33,12 +33,12 @@ export const ESTIMATE: In<typeof ENGLISH> = {
   oldest: (age) => `oudste meetwaarde ${age}`,
   expected: (measured, expected) => `gemeten ${measured}, verwacht ${expected}`,
   leftOut: (sensor) => `${sensor}: mogelijke sensorfout, niet in de schatting gebruikt`,
-  advice: 'Waar nog een meetpunt helpt',
+  advice: 'Voorgestelde meetpunten',
   advised: (place, percent, isFirst) =>
     isFirst
       ? `${place}: een meetpunt hier verlaagt de fout van de kaart tot ${percent} van de huidige`
       : `${place}: meetpunten hier en bij elke markering ervoor verlagen de fout van de kaart tot ${percent} van de huidige`,
-  adviceNone: 'Er is geen plek bekend waar nog een meetpunt helpt',
-  adviceFailed: (reason) => `Geen voorstel voor nog een meetpunt: ${reason}`,
-  adviceNow: 'Voorstellen voor nog een meetpunt worden alleen voor het heden getoond',
+  adviceNone: 'Geen voorstel voor een extra meetpunt',
+  adviceFailed: (reason) => `Geen voorstel voor een extra meetpunt: ${reason}`,
+  adviceNow: 'Voorstellen voor een extra meetpunt worden alleen voor het heden getoond',
 };

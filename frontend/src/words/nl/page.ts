@@ -20,7 +20,7 @@ export const PAGE: In<typeof ENGLISH> = {
     connecting: 'Verbinden',
     live: 'Live',
     stale: 'Geen signaal',
-    offline: 'Tweeling offline',
+    offline: 'Twin offline',
     reconnecting: 'Opnieuw verbinden',
   },
   phaseLabel: 'Verbinding',
@@ -28,35 +28,38 @@ export const PAGE: In<typeof ENGLISH> = {
   nextTry: (seconds) => (seconds > 0 ? `volgende poging over ${seconds} s` : 'wordt nu geprobeerd'),
   frozenSince: (clock) => `De meetwaarden zijn bevroren. Laatste gegevens om ${clock}`,
   agoSuffix: (age) => `${age} geleden`,
+  hours: 'u',
   frozenWhy: {
     stale: 'De verbinding is er, maar er komen geen gegevens binnen.',
     reconnecting:
       'De verbinding met de server is verbroken; de pagina maakt vanzelf opnieuw verbinding.',
     connecting: 'Wachten op antwoord van de server.',
     live: '',
-    offline: 'De server antwoordt, maar de tweeling niet.',
+    offline: 'De server antwoordt, maar de digital twin niet.',
   },
   offlineWhy: {
     live: '',
     paused: '',
-    no_clock: 'De tweeling heeft nog geen tijd; de ouderdom van de meetwaarden is onbekend.',
+    no_clock: 'De digital twin heeft nog geen tijd; de ouderdom van de meetwaarden is onbekend.',
     clock_stopped:
-      'De klok van de tweeling staat stil. De ouderdom van de meetwaarden is onbekend.',
+      'De klok van de digital twin staat stil. De ouderdom van de meetwaarden is onbekend.',
     clock_doubted:
-      'De klok van de tweeling loopt verkeerd. De ouderdom van de meetwaarden is onbekend.',
-    never_seen: 'De server heeft nog niets van een tweeling ontvangen. Staat de tweeling aan?',
-    stale: 'De tweeling stuurt niets meer. Controleer of hij draait.',
+      'De klok van de digital twin loopt verkeerd. De ouderdom van de meetwaarden is onbekend.',
+    never_seen:
+      'De server heeft nog niets van een digital twin ontvangen. Staat de digital twin aan?',
+    stale: 'De digital twin stuurt niets meer. Controleer of hij draait.',
     thread_dead:
-      'De server heeft het contact met de tweeling verloren en moet opnieuw worden gestart.',
+      'De server heeft het contact met de digital twin verloren en moet opnieuw worden gestart.',
     shutting_down: 'De server wordt afgesloten.',
   },
   offlineMore: {
     live: '',
     paused: '',
-    no_clock: 'De tweeling draait op gesimuleerde tijd, en op /clock komt niets binnen.',
-    clock_stopped: 'De tweeling draait op gesimuleerde tijd, en op /clock komt niets meer binnen.',
+    no_clock: 'De digital twin draait op gesimuleerde tijd, en op /clock komt niets binnen.',
+    clock_stopped:
+      'De digital twin draait op gesimuleerde tijd, en op /clock komt niets meer binnen.',
     clock_doubted: 'De tijd ligt vóór de vastgelegde gegevens. Zet de klok goed.',
-    never_seen: 'Tweeling en bridge moeten in hetzelfde ROS-domein draaien (ROS_DOMAIN_ID).',
+    never_seen: 'Digital twin en bridge moeten in hetzelfde ROS-domein draaien (ROS_DOMAIN_ID).',
     stale: 'De bridge draait, maar op /twin/state wordt niets meer gepubliceerd.',
     thread_dead: 'De ROS-thread van de bridge is gestopt; zijn log zegt waarom.',
     shutting_down: '',
@@ -72,7 +75,7 @@ export const PAGE: In<typeof ENGLISH> = {
   pausedHint: 'De simulatie of opname is gepauzeerd; de ouderdom loopt niet op.',
   inputProblem: 'Niet alle gegevens komen hier aan.',
   drops: (count) =>
-    `De tweeling heeft de afgelopen minuten ${counted(count, 'bericht', 'berichten')} genegeerd.`,
+    `De digital twin heeft de afgelopen minuten ${counted(count, 'bericht', 'berichten')} genegeerd.`,
   journal: {
     off: {
       title: 'Er wordt niets vastgelegd.',
@@ -84,7 +87,7 @@ export const PAGE: In<typeof ENGLISH> = {
     },
     failing: {
       title: 'Het vastleggen mislukt.',
-      hint: 'De tweeling draait door en blijft het proberen. Maak ruimte vrij of controleer de schijf.',
+      hint: 'De digital twin draait door en blijft het proberen. Maak ruimte vrij of controleer de schijf.',
     },
     upgrading: {
       title: 'De opname van een oudere versie wordt omgezet.',
@@ -95,12 +98,12 @@ export const PAGE: In<typeof ENGLISH> = {
       hint: 'Nieuwe gegevens worden getoond en vastgelegd zodra de klok klopt, uiterlijk na tien minuten.',
     },
     in_use: {
-      title: 'Deze tweeling legt niets vast: een andere gebruikt zijn bestand.',
+      title: 'Deze digital twin legt niets vast: een andere gebruikt zijn bestand.',
       hint: 'Stop een van beide, of geef deze een eigen bestand.',
     },
     foreign: {
-      title: 'Deze tweeling legt niets vast: zijn bestand hoort bij een ander programma.',
-      hint: 'Er is niets in veranderd. Geef de tweeling een ander bestand, of verplaats dit.',
+      title: 'Deze digital twin legt niets vast: zijn bestand hoort bij een ander programma.',
+      hint: 'Er is niets in veranderd. Geef de digital twin een ander bestand, of verplaats dit.',
     },
   },
   outward: {
@@ -110,7 +113,7 @@ export const PAGE: In<typeof ENGLISH> = {
   outwardOther: (channel) => `${channel} ontvangt geen gegevens.`,
   outwardHint: 'De server blijft het proberen. Deze pagina heeft er geen last van.',
   journalMore:
-    'Het bestand staat in de parameter “journal” van de tweeling; “off” legt niets vast.',
+    'Het bestand staat in de parameter “journal” van de digital twin; “off” legt niets vast.',
   origin: { simulated: 'Gesimuleerd', recorded: 'Opname', sim_time: 'Gesimuleerde tijd' },
   originDay: (length: string): string => `1 kasdag = ${length}`,
   originHint: {
@@ -127,7 +130,8 @@ export const PAGE: In<typeof ENGLISH> = {
   setAsideHint: (name) =>
     `Leesbare gegevens zijn bewaard en het vastleggen gaat door. Het beschadigde bestand is ${name}.`,
   failedTitle: 'Deze pagina is vastgelopen',
-  failedHint: 'Vertrouw niet op wat u hier ziet. De tweeling en de server hebben er geen last van.',
+  failedHint:
+    'Vertrouw niet op wat u hier ziet. De digital twin en de server hebben er geen last van.',
   failedAgain: 'De pagina laadt vanzelf opnieuw.',
   reload: 'Opnieuw laden',
 
@@ -159,10 +163,10 @@ export const PAGE: In<typeof ENGLISH> = {
   emptyUnreachableHint: 'Controleer of hij aanstaat. De pagina blijft het vanzelf proberen.',
   emptyUnreachableMore:
     'De server is de bridge: “lupin-twin serve” op de robot, of “make run” voor de demo.',
-  emptyNoTwin: 'Nog geen tweeling',
+  emptyNoTwin: 'Nog geen digital twin',
   emptyNoTags: 'Nog geen meetpunten',
   emptyNoTagsHint:
-    'De tweeling draait. Meetpunten verschijnen zodra de robot ze vindt of meet: ' +
+    'De digital twin draait. Meetpunten verschijnen zodra de robot ze vindt of meet: ' +
     'stuur hem op zijn ronde.',
   emptyNoTagsMore: '“lupin-twin demo” toont een gesimuleerde ronde.',
   emptyNoPins: 'Nog geen meetpunt heeft een positie',

@@ -18,7 +18,7 @@ export const PAST: In<typeof ENGLISH> = {
     connecting: 'Verleden · verbinden',
     live: 'Verleden',
     stale: 'Verleden · geen signaal',
-    offline: 'Verleden · tweeling offline',
+    offline: 'Verleden · twin offline',
     reconnecting: 'Verleden · opnieuw verbinden',
   },
   backToLive: 'Terug naar live',
@@ -54,7 +54,7 @@ export const PAST: In<typeof ENGLISH> = {
     cleared: 'lege ring: plaag weg',
     silence: 'gearceerd: geen meting geprobeerd',
     before: 'tegengesteld gearceerd: niet vastgelegd of niet meer bewaard',
-    run: 'streepjeslijn: klok opnieuw gestart',
+    run: 'streepjeslijn: klok teruggezet',
   },
   timebarCounts: (scans, failures, seen, cleared) =>
     [
@@ -63,6 +63,6 @@ export const PAST: In<typeof ENGLISH> = {
       ...(seen > 0 ? [counted(seen, 'plaag gezien', 'plagen gezien')] : []),
       ...(cleared > 0 ? [counted(cleared, 'plaag weg', 'plagen weg')] : []),
     ].join(', '),
-  timebarOff: 'Geen verleden: deze tweeling legt niets vast.',
-  timebarOffHint: 'Vastleggen wordt aangezet bij het starten van de tweeling.',
+  timebarOff: 'Geen verleden: deze digital twin legt niets vast.',
+  timebarOffHint: 'Vastleggen wordt aangezet bij het starten van de digital twin.',
 };

@@ -1,0 +1,114 @@
+"""The shift report on paper: dates, numbers and notes as the page writes them, in any zone."""
+
+from __future__ import annotations
+
+import re
+from datetime import tzinfo
+from html import unescape
+from typing import Any
+from zoneinfo import ZoneInfo
+
+import pytest
+
+from lupin_bridge.judge.options import Criteria
+from lupin_bridge.past.report_page import ReportPage
+from lupin_bridge.settings import Settings
+from lupin_twin.core.journal_condition import UNKNOWN
+from lupin_twin.field.idw import never
+
+# 27 November 2026, 05:00 UTC.
+BEGUN_S = 1_795_755_600
+HOUR_S = 3600
+GREENHOUSE = Criteria.of(Settings(time_zone="Europe/Amsterdam"))
+
+
+def at(seconds: int) -> dict[str, int]:
+    return {"sec": BEGUN_S + seconds, "nanosec": 0}
+
+
+def body(hours: int) -> dict[str, Any]:
+    """A report with a note, a silence and readings of CO₂, of so many hours."""
+    counts = dict.fromkeys(("raised", "cleared", "active", "critical", "failed", "inspections"), 0)
+    note = {
+        "id": "1",
+        "made_at": at(60),
+        "by": "Anna",
+        "kind": "comment",
+        "subject": "site",
+        "text": "Boiler 2 tripped",
+        "withdrawn_by": "Ben",
+    }
+    sensor = {
+        "sensor_type": "co2",
+        "unit": "ppm",
+        "n": 12_808,
+        "failed": 0,
+        "mean": 1500.0,
+        "low": {"value": 1234.4, "tag_id": "7", "stamp": at(120)},
+        "high": None,
+    }
+    lists = ("alarms", "notes", "silences", "sensors", "never_scanned")
+    return {
+        "from": at(0),
+        "to": at(hours * HOUR_S),
+        "counts": counts | {"scans": 2808, "tags": 1, "tags_scanned": 1},
+        "alarms_from": at(0),
+        "alarms": [],
+        "notes": [note],
+        "silences": [{"tag_id": "", "from": at(300), "to": at(300 + 78 * 60)}],
+        "sensors": [sensor],
+        "never_scanned": [],
+        "left_out": dict.fromkeys(lists, 0),
+        "complete_to": at(hours * HOUR_S),
+        "kept_from": None,
+    }
+
+
+def page_of(lang: str = "en", hours: int = 8, zone: tzinfo | None = None) -> str:
+    """The report's text, with spaces between its elements."""
+    end_s = BEGUN_S + hours * HOUR_S
+    page = ReportPage(BEGUN_S * 10**9, end_s * 10**9, GREENHOUSE, UNKNOWN, lang, zone)
+    text = page.plan(body(hours)).write(never).body.decode()
+    return re.sub(r"[ \n\u00a0]+", " ", unescape(re.sub(r"<style>.*?</style>|<[^>]*>", " ", text)))
+
+
+@pytest.mark.parametrize(
+    ("lang", "texts"),
+    [
+        (
+            "en",
+            ["27 Nov 2026, 06:00 to 27 Nov 2026, 14:00.", "Scans 2,808", " 1,234 ppm", "12,808"],
+        ),
+        ("de", ["27. Nov. 2026, 06:00 bis 27. Nov. 2026, 14:00.", "Messungen 2.808", " 1.234 ppm"]),
+        (
+            "nl",
+            [
+                "27 nov 2026, 06:00 tot 27 nov 2026, 14:00.",
+                "Metingen 2.808",
+                "06:05 07:23 1 u 18 min",
+            ],
+        ),
+        (
+            "es",
+            ["27 nov 2026, 06:00 a 27 nov 2026, 14:00.", "Mediciones 2808", " 1234 ppm", "12.808"],
+        ),
+    ],
+)
+def test_dates_and_numbers_are_written_as_on_the_page(lang: str, texts: list[str]) -> None:
+    page = page_of(lang)
+    assert [text for text in texts if text not in page] == []
+
+
+def test_times_are_of_the_greenhouse_or_of_the_zone_that_the_reader_is_in() -> None:
+    assert "Times: Europe/Amsterdam (UTC+01:00)" in page_of()
+    # Another day begins there within the period, so rows have their dates.
+    page = page_of(hours=20, zone=ZoneInfo("Asia/Kathmandu"))
+    assert "27 Nov 2026, 10:45 to 28 Nov 2026, 06:45. Times: Asia/Kathmandu (UTC+05:45)" in page
+    assert "Greenhouse 27 Nov 2026, 10:50 27 Nov 2026, 12:08 1 h 18 min" in page
+
+
+def test_a_note_reads_as_its_kind_and_its_text_and_no_heading_denies_itself() -> None:
+    page = page_of()
+    assert "06:01 Anna Comment: Boiler 2 tripped (withdrawn by Ben) Greenhouse" in page
+    assert "Gaps without scans Where" in page
+    assert "Tags not scanned None." in page

@@ -6,7 +6,8 @@ import { hourAgo, selectHourAgoNow, type HourAgo } from '../store/hourAgo';
 import { VERDICTS } from '../domain/health';
 import { memoLast } from '../domain/memo';
 import { isHeardNow, selectNewestTag } from '../store/moment';
-import { inOrder, type Item } from './list';
+import { causesFirst } from './arrange';
+import { inOrder, rankOf, type Item } from './list';
 import { nowOf, type Now } from './now';
 import { alarmText, type Speech } from './words';
 
@@ -44,9 +45,16 @@ export function worstNow(state: AppState, items: readonly Item[]): Verdict | nul
   return VERDICTS.find((each) => verdicts.includes(each)) ?? null;
 }
 
-/** What is worst now first. */
-export const worstNowFirst = (state: AppState, items: readonly Item[]): readonly Item[] =>
-  inOrder(items, ({ alarm }) => reasonNow(state, alarm));
+/** What is worst now first, many of one cause together. */
+export function worstNowFirst(state: AppState, items: readonly Item[]): readonly Item[] {
+  const reasons = new Map(items.map((item) => [item, reasonNow(state, item.alarm)]));
+  const reasonOf = (item: Item): HealthReason => reasons.get(item) ?? item.alarm.reason;
+  return causesFirst(
+    inOrder(items, reasonOf),
+    (item) => rankOf(reasonOf(item), item.isAcknowledged),
+    selectSpeech(state),
+  );
+}
 
 /** An alarm in one line, as it is now. */
 export const textNow = (state: AppState, alarm: Alarm): string =>

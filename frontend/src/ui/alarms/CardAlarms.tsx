@@ -11,6 +11,7 @@ import { secondsOf } from '../../domain/rostime';
 import { store, useApp } from '../../store/app';
 import { useSelected } from '../../store/create';
 import { rosNow } from '../../store/moment';
+import { mayAct, person } from '../../store/signals';
 import { S } from '../../strings';
 import { useTicking } from '../../widgets/useNow';
 import { once } from './once';
@@ -25,15 +26,16 @@ export function CardAlarms({ tagId }: { tagId: string }): JSX.Element | null {
   const [oldest] = items.map(({ alarm }) => alarm).sort(byTime);
   const since = useTicking((at) => (oldest ? spanText(oldest, rosNow(store.get(), at)) : ''));
   const isWell = useApp((state) => worstNow(state, items) === 'healthy');
+  const isAble = useSelected(person, mayAct);
   const [worst] = items;
   if (!worst) return null;
   return (
-    <div className="card-alarms alarm-tools" data-testid="card-alarms">
+    <div className="card-alarms" data-testid="card-alarms">
       <span>
         {(waiting.length === 0 ? S.alarmDone.acknowledge : S.alarmCount)(items.length)} · {since}
         {isWell && ` · ${todoText(worst.alarm.reason, 'healthy')}`}
       </span>
-      {waiting.length > 0 && (
+      {isAble && waiting.length > 0 && (
         <button
           type="button"
           onClick={once(() => {

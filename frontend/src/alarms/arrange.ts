@@ -3,7 +3,7 @@ import type { Alarm, WireTime } from '../contract/types';
 import { csv, type Cell } from '../domain/csv';
 import { isOfRange, sideOf, VERDICTS } from '../domain/health';
 import { secondsOf } from '../domain/rostime';
-import { shown } from '../domain/text';
+import { finder, shown } from '../domain/text';
 import { compareIds } from '../domain/twin';
 import { toShown, unitOf } from '../domain/units';
 import { S } from '../strings';
@@ -30,14 +30,20 @@ export interface Block<T extends Wrong = Item> {
   readonly items: readonly T[];
 }
 
-/** Those in whose words all of the text's occur. */
-export function filtered(list: AlarmList, text: string, speech: Speech): AlarmList {
-  const words = text.toLowerCase().split(/\s+/).filter(Boolean);
-  if (words.length === 0) return list;
-  const has = ({ alarm, verdict }: Item): boolean => {
-    const all = `${nameText(alarm, speech)} ${causeText(alarm, speech)} ${S.health[verdict]}`;
-    return words.every((word) => all.toLowerCase().includes(word));
-  };
+/** Those in whose words all of the text's occur (`finder`). */
+export function filtered(
+  list: AlarmList,
+  text: string,
+  speech: Speech,
+  isTag: (id: string) => boolean,
+): AlarmList {
+  const isFound = finder(text, isTag);
+  if (!isFound) return list;
+  const has = ({ alarm, verdict }: Item): boolean =>
+    isFound(
+      alarm.tag_id,
+      `${nameText(alarm, speech)} ${causeText(alarm, speech)} ${S.health[verdict]}`.toLowerCase(),
+    );
   return {
     active: list.active.filter(has),
     shelved: list.shelved.filter(has),
@@ -77,6 +83,34 @@ export function byCause<T extends Wrong>(items: readonly T[], speech: Speech): r
     else blocks.push({ key: `from ${item.alarm.id}`, cause: null, items: [item] });
   }
   return blocks;
+}
+
+/**
+ * In the order of their blocks: by how bad the worst alarm of a block is, then whether that is not
+ * acknowledged (both are the whole part of `severity`), then by how many they are. `items` come the worst first.
+ */
+export function causesFirst(
+  items: readonly Item[],
+  rankOf: (item: Item) => number,
+  speech: Speech,
+): readonly Item[] {
+  const causes = new Map<string, { readonly urgency: number; count: number }>();
+  const keys = new Map<Item, string>();
+  for (const item of items) {
+    const key = causeOf(item.alarm, speech);
+    keys.set(item, key);
+    const own = causes.get(key);
+    if (own) own.count += 1;
+    else causes.set(key, { urgency: Math.floor(rankOf(item)), count: 1 });
+  }
+  const blockOf = (item: Item) => {
+    const own = causes.get(keys.get(item) ?? '');
+    return own && own.count > MOST_LOOSE ? own : { urgency: Math.floor(rankOf(item)), count: 1 };
+  };
+  return items
+    .map((item) => ({ item, block: blockOf(item) }))
+    .sort((a, b) => b.block.urgency - a.block.urgency || b.block.count - a.block.count)
+    .map(({ item }) => item);
 }
 
 /** What is wrong in which area, by whatever limit. */

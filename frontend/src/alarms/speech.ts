@@ -7,7 +7,8 @@ import { VERDICTS } from '../domain/health';
 import { memoLast } from '../domain/memo';
 import { todoText } from '../domain/reasons';
 import { isHeardNow, selectNewestTag } from '../store/moment';
-import { inOrder, type Item } from './list';
+import { causesFirst } from './arrange';
+import { inOrder, rankOf, type Item } from './list';
 import { nowOf, type Now } from './now';
 import { alarmText, type Speech } from './words';
 
@@ -55,9 +56,16 @@ export function todoNow(state: AppState, items: readonly Item[]): string {
   return todos.find((text) => text !== '') ?? '';
 }
 
-/** What is worst now first. */
-export const worstNowFirst = (state: AppState, items: readonly Item[]): readonly Item[] =>
-  inOrder(items, ({ alarm }) => reasonNow(state, alarm));
+/** What is worst now first, many of one cause together. */
+export function worstNowFirst(state: AppState, items: readonly Item[]): readonly Item[] {
+  const reasons = new Map(items.map((item) => [item, reasonNow(state, item.alarm)]));
+  const reasonOf = (item: Item): HealthReason => reasons.get(item) ?? item.alarm.reason;
+  return causesFirst(
+    inOrder(items, reasonOf),
+    (item) => rankOf(reasonOf(item), item.isAcknowledged),
+    selectSpeech(state),
+  );
+}
 
 /** An alarm in one line, as it is now. */
 export const textNow = (state: AppState, alarm: Alarm): string =>

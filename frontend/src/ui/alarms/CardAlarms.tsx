@@ -10,6 +10,7 @@ import { secondsOf } from '../../domain/rostime';
 import { store, useApp } from '../../store/app';
 import { useSelected } from '../../store/create';
 import { rosNow } from '../../store/moment';
+import { mayAct, person } from '../../store/signals';
 import { S } from '../../strings';
 import { useTicking } from '../../widgets/useNow';
 import { once } from './once';
@@ -26,14 +27,15 @@ export function CardAlarms({ tagId }: { tagId: string }): JSX.Element | null {
   const well = useApp((state) =>
     worstNow(state, items) === 'healthy' ? todoNow(state, items) : '',
   );
+  const isAble = useSelected(person, mayAct);
   if (items.length === 0) return null;
   return (
-    <div className="card-alarms alarm-tools" data-testid="card-alarms">
+    <div className="card-alarms" data-testid="card-alarms">
       <span>
         {(waiting.length === 0 ? S.alarmDone.acknowledge : S.alarmCount)(items.length)} · {since}
         {well !== '' && ` · ${well}`}
       </span>
-      {waiting.length > 0 && (
+      {isAble && waiting.length > 0 && (
         <button
           type="button"
           onClick={once(() => {

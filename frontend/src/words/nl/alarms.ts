@@ -32,14 +32,12 @@ export const ALARMS: In<typeof ENGLISH> = {
   alarmStatus: { critical: 'kritiek', healthy: 'binnen bereik' },
   alarmShow: 'Dit meetpunt nu tonen',
   alarmStart: 'Naar begin',
-  alarmStartOf: (what) => `Naar begin: ${what}`,
+  alarmActionsOf: (what) => `Acties: ${what}`,
   alarmAcknowledge: 'Bevestigen',
   alarmAcknowledgeOf: (what) => `Bevestigen: ${what}`,
   alarmAcknowledgeAll: (count) => `Alles bevestigen (${count})`,
   alarmUnacknowledge: 'Bevestiging intrekken',
-  alarmUnacknowledgeOf: (what) => `Bevestiging intrekken: ${what}`,
   alarmShelve: 'Uitstellen',
-  alarmShelveOf: (what) => `Uitstellen: ${what}`,
   alarmShelveHint: 'Tot dan geen melding, tenzij het erger wordt.',
   alarmShelveCritical:
     'Een alarm dat kritiek is of was, kan hoogstens 1 uur worden uitgesteld en vraagt een reden.',
@@ -50,7 +48,7 @@ export const ALARMS: In<typeof ENGLISH> = {
   alarmShelved: (until, reason, by) =>
     `uitgesteld ${by === '' ? '' : `door ${by} `}tot ${until}${reason === '' ? '' : `: ${reason}`}`,
   alarmUnshelve: 'Uitstel opheffen',
-  alarmUnshelveOf: (what) => `Uitstel opheffen: ${what}`,
+  alarmResolved: 'opgelost',
   alarmUndo: 'Ongedaan maken',
   alarmDone: {
     acknowledge: (count) => `${counted(count, 'alarm', 'alarmen')} bevestigd`,

@@ -405,7 +405,7 @@ def test_every_language_has_room_on_a_phone(house: Bridge, open_page: OpenPage) 
         tools = hmi.page.locator("[data-group=active] .alarm-tools").first
         expect(tools).to_be_visible()
         assert hmi.page.evaluate(_TOO_LONG) == []
-        assert len({place(each).top for each in tools.locator("> button").all()}) == 1
+        assert len({place(each).top for each in tools.locator("button").all()}) == 1
         hmi.page.locator(".pane-tabs button").nth(1).click()
         expect(hmi.cell("1", "temperature")).to_contain_text(reading)
         assert hmi.page.evaluate(_TOO_LONG) == []

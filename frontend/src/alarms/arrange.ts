@@ -8,7 +8,7 @@ import { compareIds } from '../domain/twin';
 import { toShown, unitOf } from '../domain/units';
 import { S } from '../strings';
 import type { AlarmList, Item } from './list';
-import type { Now } from './now';
+import { worstOf, type Now } from './now';
 import { nameText, valuesOf, whatText, whenText, whereText, type Speech } from './words';
 
 export const ORDERS = ['cause', 'newest', 'tag'] as const;
@@ -18,11 +18,16 @@ export type Order = (typeof ORDERS)[number];
 /** More alarms than this of one cause stand below one heading. */
 const MOST_LOOSE = 4;
 
+/** What is wrong where: an alarm, or what has none yet. */
+export interface Wrong {
+  readonly alarm: Pick<Alarm, 'id' | 'tag_id' | 'reason'>;
+}
+
 /** Alarms in a row; with a cause they are many, all of that cause. */
-export interface Block {
+export interface Block<T extends Wrong = Item> {
   readonly key: string;
   readonly cause: string | null;
-  readonly items: readonly Item[];
+  readonly items: readonly T[];
 }
 
 /** Those in whose words all of the text's occur (`finder`). */
@@ -55,20 +60,24 @@ export function arranged(items: readonly Item[], order: Order, speech: Speech): 
         : (a: Item, b: Item) => compareIds(a.alarm.tag_id, b.alarm.tag_id);
     return [{ key: order, cause: null, items: [...items].sort(by) }];
   }
-  const causes = new Map<string, Item[]>();
+  return byCause(items, speech);
+}
+
+/** Many of one cause in one block, where the worst of them stands. */
+export function byCause<T extends Wrong>(items: readonly T[], speech: Speech): readonly Block<T>[] {
+  const causes = new Map<string, T[]>();
   for (const item of items) {
     const cause = causeOf(item.alarm, speech);
     const own = causes.get(cause);
     if (own) own.push(item);
     else causes.set(cause, [item]);
   }
-  const blocks: (Block & { readonly items: Item[] })[] = [];
+  const blocks: (Block<T> & { readonly items: T[] })[] = [];
   for (const item of items) {
     const key = causeOf(item.alarm, speech);
     const own = causes.get(key) ?? [];
     const before = blocks.at(-1);
     if (own.length > MOST_LOOSE) {
-      // All of them stand where the worst of them does.
       if (own[0] === item) blocks.push({ key, cause: causeText(item.alarm, speech), items: own });
     } else if (before?.cause === null) before.items.push(item);
     else blocks.push({ key: `from ${item.alarm.id}`, cause: null, items: [item] });
@@ -105,18 +114,18 @@ export function causesFirst(
 }
 
 /** What is wrong in which area, by whatever limit. */
-const causeOf = ({ reason, tag_id }: Alarm, { sensors }: Speech): string =>
+const causeOf = ({ reason, tag_id }: Wrong['alarm'], { sensors }: Speech): string =>
   [
     ...[reason.kind, reason.sensor, isOfRange(reason) ? sideOf(reason) : ''],
     sensors.areaOf(tag_id),
   ].join('|');
 
-function causeText(alarm: Alarm, speech: Speech): string {
+function causeText(alarm: Wrong['alarm'], speech: Speech): string {
   const area = speech.sensors.areaOf(alarm.tag_id);
   return [...(area === '' ? [] : [shown(area, 32)]), causeWords(alarm, speech)].join(' · ');
 }
 
-function causeWords(alarm: Alarm, speech: Speech): string {
+function causeWords(alarm: Wrong['alarm'], speech: Speech): string {
   const { reason } = alarm;
   if (!isOfRange(reason)) return whatText(alarm, speech);
   const beyond = sideOf(reason) === 'below' ? S.tooLow(null) : S.tooHigh(null);
@@ -148,7 +157,7 @@ export function causeFacts(
     return found && { ...valuesOf(found.alarm, speech, found.now), where: whereText(found.alarm) };
   };
   const current = furthest(({ value }) => value);
-  const worst = furthest(({ alarm }) => alarm.worst ?? alarm.reason.value);
+  const worst = furthest(({ alarm, now }) => worstOf(alarm, now));
   const active = all.filter(({ alarm }) => alarm.cleared_at === null);
   const counts = VERDICTS.map((verdict) => {
     const count = active.filter((each) => each.verdict === verdict).length;
@@ -181,7 +190,7 @@ export function alarmsCsv(
   ];
   const lines = (['active', 'shelved', 'resolved'] as const).flatMap((state) =>
     list[state].map(({ alarm, verdict, isAcknowledged, shelf }): Cell[] => {
-      const { reason, worst } = alarm;
+      const { reason } = alarm;
       const sensor = sensors.named(reason.sensor);
       const current = nowOf(alarm);
       const value = (given: number | null): Cell =>
@@ -193,7 +202,8 @@ export function alarmsCsv(
         ...[alarm.tag_id || null, reason.kind, reason.sensor || null],
         ...[reason.sensor === '' ? null : unitOf(sensor, unit), value(reason.limit)],
         value(current?.kind === 'known' ? current.value : null),
-        ...[value(worst), value(reason.value), iso(alarm.raised_at), iso(alarm.cleared_at)],
+        ...[value(worstOf(alarm, current)), value(reason.value)],
+        ...[iso(alarm.raised_at), iso(alarm.cleared_at)],
         isAcknowledged ? 'yes' : 'no',
         ...[shelf && new Date(shelf.until).toISOString(), shelf?.reason || null],
       ];

@@ -2,9 +2,10 @@
 import type { Alarm, HealthReason, Verdict } from '../contract/types';
 import type { AppState } from '../store/app';
 import { selectCatalogue, selectNewestHealth } from '../store/derived';
-import { hourAgo, selectHourAgoNow, type HourAgo } from '../store/hourAgo';
+import { hourAgo, selectHourAgoNow, thenOf, type HourAgo } from '../store/hourAgo';
 import { VERDICTS } from '../domain/health';
 import { memoLast } from '../domain/memo';
+import { todoText } from '../domain/reasons';
 import { isHeardNow, selectNewestTag } from '../store/moment';
 import { causesFirst } from './arrange';
 import { inOrder, rankOf, type Item } from './list';
@@ -27,7 +28,7 @@ export function selectNow(
 ): Now | null {
   const tag = selectNewestTag(state, alarm.tag_id);
   const health = selectNewestHealth(state)?.byTag.get(alarm.tag_id);
-  const before = selectHourAgoNow(state, last)?.tags.get(alarm.tag_id) ?? null;
+  const before = tag ? thenOf(selectHourAgoNow(state, last), tag) : null;
   return nowOf(alarm, tag && health ? { tag, health } : null, before, isHeardNow(state));
 }
 
@@ -43,6 +44,16 @@ function reasonNow(state: AppState, alarm: Alarm): HealthReason {
 export function worstNow(state: AppState, items: readonly Item[]): Verdict | null {
   const verdicts = items.map(({ alarm }) => reasonNow(state, alarm).verdict);
   return VERDICTS.find((each) => verdicts.includes(each)) ?? null;
+}
+
+/** What to do first about some alarms of one cause, as they are now. */
+export function todoNow(state: AppState, items: readonly Item[]): string {
+  const verdict = worstNow(state, items);
+  const todos = items
+    .map(({ alarm }) => reasonNow(state, alarm))
+    .filter((reason) => reason.verdict === verdict)
+    .map((reason) => todoText(selectCatalogue(state), reason));
+  return todos.find((text) => text !== '') ?? '';
 }
 
 /** What is worst now first, many of one cause together. */

@@ -176,6 +176,7 @@ describe('table', () => {
     flush(() => {
       hourAgo.dispatch({
         of: at.sec,
+        isNow: true,
         tags: new Map([['a', { tag: before, health: { verdict: 'healthy', reasons: [] } }]]),
       });
     });
@@ -185,7 +186,7 @@ describe('table', () => {
     ]);
     // An answer of long ago is none.
     flush(() => {
-      hourAgo.dispatch({ of: at.sec - 601, tags: new Map() });
+      hourAgo.dispatch({ of: at.sec - 601, isNow: true, tags: new Map() });
     });
     expect(trends()[0]).toBe('– an hour ago: unknown');
     hourAgo.dispatch(null);

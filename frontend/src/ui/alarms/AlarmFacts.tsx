@@ -1,5 +1,6 @@
 import type { JSX } from 'react';
 
+import { isWorse } from '../../alarms/kept';
 import type { Item } from '../../alarms/list';
 import type { Now } from '../../alarms/now';
 import { selectNow, selectSpeech } from '../../alarms/speech';
@@ -53,7 +54,15 @@ export function AlarmFacts({
           </Fact>
         )}
         {state?.kind === 'unknown' && <NotKnown alarm={alarm} state={state} more={more} />}
-        {worst !== null && <Fact name="worst" verdict={verdict} text={worst} />}
+        {worst !== null && (
+          <Fact
+            name="worst"
+            verdict={
+              state?.kind === 'known' && isWorse(state.verdict, verdict) ? state.verdict : verdict
+            }
+            text={worst}
+          />
+        )}
         <span
           className="faint"
           data-fact="since"

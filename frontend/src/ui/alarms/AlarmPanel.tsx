@@ -11,10 +11,9 @@ import {
 } from '../../alarms/arrange';
 import { calling, groupOf, unacknowledged, type AlarmList, type Item } from '../../alarms/list';
 import { acknowledgeAlarms } from '../../alarms/own';
-import { selectNow, selectSpeech, worstNow, worstNowFirst } from '../../alarms/speech';
+import { selectNow, selectSpeech, todoNow, worstNow, worstNowFirst } from '../../alarms/speech';
 import { alarmList } from '../../alarms/watch';
 import { now, timeOfDay } from '../../clock';
-import { todoText } from '../../domain/reasons';
 import { shown as shownText } from '../../domain/text';
 import { fileName, save } from '../../export/save';
 import { store, useApp } from '../../store/app';
@@ -243,9 +242,10 @@ function CauseHeading({
     const nowS = rosNow(state, now());
     return causeFacts(own, speech, nowS, (alarm) => selectNow(state, alarm)).join(', ');
   });
-  const verdict = useApp((state) => worstNow(state, own.length > 0 ? own : items));
-  const [first] = items;
-  if (!first || !verdict) return null;
+  const shown = own.length > 0 ? own : items;
+  const verdict = useApp((state) => worstNow(state, shown));
+  const todo = useApp((state) => todoNow(state, shown));
+  if (!verdict) return null;
   const waiting = unacknowledged(own);
   const tags = [...new Set(items.map(({ alarm }) => alarm.tag_id))].filter(Boolean);
   const named = tags.slice(0, MOST_TAGS).map((id) => shownText(id, 16));
@@ -258,9 +258,7 @@ function CauseHeading({
             <span>
               <strong>{cause}</strong> · {S.alarmCount(own.length)}
             </span>
-            {group !== 'resolved' && (
-              <span className="alarm-do">{todoText(first.alarm.reason, verdict)}</span>
-            )}
+            {group !== 'resolved' && <span className="alarm-do">{todo}</span>}
           </span>
           <span className="alarm-facts">{facts}</span>
           <span className="alarm-facts faint">

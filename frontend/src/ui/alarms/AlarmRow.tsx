@@ -6,7 +6,6 @@ import { acknowledgeAlarms } from '../../alarms/own';
 import { selectSpeech } from '../../alarms/speech';
 import { nameText, whereText } from '../../alarms/words';
 import { clockText } from '../../domain/format';
-import { todoText } from '../../domain/reasons';
 import { Said } from '../../notes/Comments';
 import { useApp } from '../../store/app';
 import { S } from '../../strings';
@@ -61,7 +60,7 @@ export const AlarmRow = memo(function AlarmRow({
             </span>
             {group !== 'resolved' && (
               <span className="alarm-do" data-again={current === 'healthy' || undefined}>
-                {todoText(alarm.reason, current)}
+                {values.todo}
               </span>
             )}
           </span>

@@ -2,11 +2,10 @@ import type { JSX } from 'react';
 
 import { unacknowledged } from '../../alarms/list';
 import { acknowledgeAlarms } from '../../alarms/own';
-import { worstNow } from '../../alarms/speech';
+import { todoNow, worstNow } from '../../alarms/speech';
 import { spanText } from '../../alarms/words';
 import { alarmList } from '../../alarms/watch';
 import type { Alarm } from '../../contract/types';
-import { todoText } from '../../domain/reasons';
 import { secondsOf } from '../../domain/rostime';
 import { store, useApp } from '../../store/app';
 import { useSelected } from '../../store/create';
@@ -25,15 +24,16 @@ export function CardAlarms({ tagId }: { tagId: string }): JSX.Element | null {
   const waiting = unacknowledged(items);
   const [oldest] = items.map(({ alarm }) => alarm).sort(byTime);
   const since = useTicking((at) => (oldest ? spanText(oldest, rosNow(store.get(), at)) : ''));
-  const isWell = useApp((state) => worstNow(state, items) === 'healthy');
+  const well = useApp((state) =>
+    worstNow(state, items) === 'healthy' ? todoNow(state, items) : '',
+  );
   const isAble = useSelected(person, mayAct);
-  const [worst] = items;
-  if (!worst) return null;
+  if (items.length === 0) return null;
   return (
     <div className="card-alarms" data-testid="card-alarms">
       <span>
         {(waiting.length === 0 ? S.alarmDone.acknowledge : S.alarmCount)(items.length)} · {since}
-        {isWell && ` · ${todoText(worst.alarm.reason, 'healthy')}`}
+        {well !== '' && ` · ${well}`}
       </span>
       {isAble && waiting.length > 0 && (
         <button

@@ -72,7 +72,7 @@ export const ALARMS: In<typeof ENGLISH> = {
   alarmsNoneHint:
     'Een alarm gaat af na twee afwijkende metingen achter elkaar. Bij een plaag of ontbrekende gegevens gaat het meteen af.',
   alarmsWait: (tags) =>
-    `${counted(tags, 'meetpunt wacht', 'meetpunten wachten')}: geen alarm vóór een tweede afwijkende meting`,
+    `${counted(tags, 'meetpunt', 'meetpunten')} afwijkend: pas alarm als de volgende meting het bevestigt`,
   alarmNotYet: 'nog geen alarm',
   alarmsNotYet: 'Wachten op de lijst met alarmen',
   alarmsStarting: 'De vastgelegde gegevens worden nog gelezen: er kunnen alarmen bijkomen.',

@@ -87,6 +87,8 @@ export function DoNow({
 }): JSX.Element {
   const health = useApp(selectHealth);
   const urgent = useUrgent();
+  // The alarms are those of now.
+  const all = useApp((state) => (selectShown(state).moment === null ? 'alarms' : 'tags'));
   const isOfTags = health.reasons.length === 0 && urgent.length > 0;
   return (
     <ul className="do-now" aria-label={S.todoLabel} data-most={most}>
@@ -108,7 +110,7 @@ export function DoNow({
                 type="button"
                 className="do-more"
                 onClick={() => {
-                  act({ type: 'list', list: 'alarms' });
+                  act({ type: 'list', list: all });
                 }}
               >
                 {S.attentionMore(urgent.length - most)}

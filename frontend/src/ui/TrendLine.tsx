@@ -37,10 +37,8 @@ export function TrendLine({
         {trend.kind === 'same' && then ? (
           text
         ) : (
-          // Quiet: with a young memory it stands in every row.
-          <>
-            <span aria-hidden="true">–</span> <span className="unseen">{text}</span>
-          </>
+          // Only to be heard: with a young memory it would stand in every row.
+          <span className="unseen">{text}</span>
         )}
       </span>
     );

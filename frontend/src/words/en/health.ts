@@ -112,6 +112,8 @@ export const HEALTH = {
 
   tooLow: (by: string | null): string => (by === null ? 'too low' : `too low by ${by}`),
   tooHigh: (by: string | null): string => (by === null ? 'too high' : `too high by ${by}`),
+  /** Before a value beyond its limit: short, in a narrow column. */
+  side: { below: 'low', above: 'high' },
   below: 'below ideal',
   above: 'above ideal',
 } as const;

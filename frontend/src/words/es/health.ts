@@ -115,6 +115,7 @@ export const HEALTH: In<typeof ENGLISH> = {
 
   tooLow: (by) => (by === null ? 'por debajo del rango' : `${by} por debajo del ideal`),
   tooHigh: (by) => (by === null ? 'por encima del rango' : `${by} por encima del ideal`),
+  side: { below: 'bajo', above: 'alto' },
   below: 'por debajo del ideal',
   above: 'por encima del ideal',
 };

@@ -111,6 +111,7 @@ export const HEALTH: In<typeof ENGLISH> = {
 
   tooLow: (by) => (by === null ? 'te laag' : `${by} te laag`),
   tooHigh: (by) => (by === null ? 'te hoog' : `${by} te hoog`),
+  side: { below: 'laag', above: 'hoog' },
   below: 'onder ideaal',
   above: 'boven ideaal',
 };

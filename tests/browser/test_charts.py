@@ -121,14 +121,14 @@ def plotted(hmi: Hmi) -> Image.Image:
     return Image.open(io.BytesIO(inside.screenshot())).convert("RGB")
 
 
-def columns(inside: Locator) -> list[int]:
-    return line_columns(Image.open(io.BytesIO(inside.screenshot())).convert("RGB"))
+def columns(inside: Locator, colour: Sequence[int] = LINE) -> list[int]:
+    return line_columns(Image.open(io.BytesIO(inside.screenshot())).convert("RGB"), colour)
 
 
-def line_columns(picture: Image.Image) -> list[int]:
+def line_columns(picture: Image.Image, colour: Sequence[int] = LINE) -> list[int]:
     """The columns that have something of the line's own colour."""
     pixels = np.asarray(picture, dtype=int)
-    near = np.abs(pixels - np.array(LINE)).sum(axis=2) < 90
+    near = np.abs(pixels - np.array(colour)).sum(axis=2) < 90
     return [int(column) for column in np.flatnonzero(near.any(axis=0))]
 
 
@@ -374,6 +374,21 @@ def test_what_is_observed_flows_in_and_a_gap_in_the_hearing_is_refilled(
         ),
         "what was missed",
     )
+
+
+def test_each_of_several_tags_has_the_colour_that_its_name_has(
+    garden: Garden, open_page: OpenPage
+) -> None:
+    hmi = open_page(garden.bridge.url, f"chart.tag=1&{garden.period}")
+    plotted(hmi)
+    hmi.page.get_by_role("radio", name="Several tags").check()
+    inside = plot(hmi).locator(".u-over")
+    signs = hmi.page.locator(".line-sign")
+    expect(signs).to_have_count(1)
+    drawn = signs.evaluate("sign => getComputedStyle(sign).color")
+    colour = [int(part) for part in re.findall(r"\d+", drawn)]
+    hmi.expect(lambda: bool(columns(inside, colour)), f"a line in {colour}")
+    assert not columns(inside)
 
 
 def test_the_difference_layer_is_one_field_less_the_other(

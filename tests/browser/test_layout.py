@@ -276,6 +276,17 @@ def test_the_row_of_sensors_fades_where_it_has_more(open_at: Callable[..., Hmi])
     expect(row).to_have_css("mask-image", re.compile("gradient"))
     hmi.choose_sensor("Condensation margin")
     expect(row).to_have_attribute("data-more", "before")
+    # In a window of any width it is one row, and the chosen one is in sight.
+    hmi.resize(1440, 900)
+    hmi.turn("sensor=temperature")
+    expect(row.locator(":checked")).to_have_value("temperature")
+    expect(row).to_have_attribute("data-more", "after")
+    hmi.turn("sensor=condensation_margin")
+    expect(row).to_have_attribute("data-more", "before")
+    hmi.resize(1100, 900)
+    chosen, bar = places(hmi, ".sensors label:has(:checked)", ".sensor-picker")
+    assert bar.left < chosen.left < chosen.right <= bar.right
+    assert bar.bottom - bar.top < 60
     hmi.resize(3840, 1440)
     expect(row).to_have_attribute("data-more", "")
     expect(row).to_have_css("mask-image", "none")
@@ -394,7 +405,7 @@ def test_every_language_has_room_on_a_phone(house: Bridge, open_page: OpenPage) 
         tools = hmi.page.locator("[data-group=active] .alarm-tools").first
         expect(tools).to_be_visible()
         assert hmi.page.evaluate(_TOO_LONG) == []
-        assert len({place(each).top for each in tools.locator("> button").all()}) == 1
+        assert len({place(each).top for each in tools.locator("button").all()}) == 1
         hmi.page.locator(".pane-tabs button").nth(1).click()
         expect(hmi.cell("1", "temperature")).to_contain_text(reading)
         assert hmi.page.evaluate(_TOO_LONG) == []

@@ -4,11 +4,12 @@ import type { Alarm } from '../contract/types';
 import { alarm } from '../testing/alarms';
 import { cataloguesOf } from '../domain/sensors';
 import { CATALOGUE, FILE } from '../testing/sensors';
-import { alarmsCsv, arranged, causeFacts, filtered } from './arrange';
-import { NOTHING_KEPT, shelve } from './kept';
-import { listOf } from './list';
+import { alarmsCsv, arranged, causeFacts, causesFirst, filtered } from './arrange';
+import { acknowledge, NOTHING_KEPT, shelve, type Kept } from './kept';
+import { listOf, rankOf, type Item } from './list';
 import type { Now } from './now';
 
+const isTag = (): boolean => false;
 const speech = { sensors: CATALOGUE, unit: 'C' } as const;
 const AT = 1_800_000_000_000;
 
@@ -67,7 +68,7 @@ test('of one cause, each area stands by itself, and is found by its name', () =>
     ['South · Temperature too low', 6],
   ]);
   const list = listOf(many(cold, 11), NOTHING_KEPT, null, AT);
-  expect(filtered(list, 'south', { sensors, unit: 'C' }).active).toHaveLength(6);
+  expect(filtered(list, 'south', { sensors, unit: 'C' }, isTag).active).toHaveLength(6);
 });
 
 test('of a cause the value farthest beyond, and since when one has been active', () => {
@@ -106,6 +107,36 @@ test('the newest first, or by tag: in one row', () => {
   expect(tags('tag')).toEqual([['2', '3', '10']]);
 });
 
+test('the worst cause first, then what nobody has seen to, then what most have', () => {
+  const worst = alarm('worst', { reason: { sensor: 'light', verdict: 'critical' } });
+  const dry = (tag: number) =>
+    alarm(`dry${tag}`, {
+      tag_id: String(tag),
+      reason: { sensor: 'humidity', verdict: 'stressed' },
+    });
+  const further = { value: 99, limit: 35, verdict: 'stressed' } as const;
+  const hots = many(hot, 5).map((each) => ({ ...each, reason: { ...each.reason, ...further } }));
+  const all = [...hots, ...many(dry, 7), worst];
+  const order = (kept: Kept) => {
+    const items = listOf(all, kept, null, AT).active;
+    const rank = ({ alarm: { reason }, isAcknowledged }: Item) => rankOf(reason, isAcknowledged);
+    return arranged(causesFirst(items, rank, speech), 'cause', speech).map(
+      ({ items: own }) => `${own[0]?.alarm.id.replace(/\d/, '')} ${own.length}`,
+    );
+  };
+  expect(order(NOTHING_KEPT)).toEqual(['worst 1', 'dry 7', 'hot 5']);
+  const seen = many(dry, 7).map((each) => ({ alarm: each, verdict: 'stressed' }) as const);
+  expect(order(acknowledge(NOTHING_KEPT, seen, AT))).toEqual(['worst 1', 'hot 5', 'dry 7']);
+});
+
+test('a word that is exactly the id of a tag finds that tag, and no other', () => {
+  const list = listOf([cold(7), cold(27), hot(71)], NOTHING_KEPT, null, AT);
+  const find = (text: string, ids: readonly string[]) =>
+    filtered(list, text, speech, (id) => ids.includes(id)).active.map((it) => it.alarm.id);
+  expect(find('Tag 7', ['7', '27', '71'])).toEqual(['cold7']);
+  expect(find('Tag 7', ['27', '71'])).toEqual(['cold7', 'cold27', 'hot71']);
+});
+
 test.each([
   ['tag 3 low', ['cold3']],
   ['HIGH', ['hot2']],
@@ -114,7 +145,7 @@ test.each([
   ['humidity', []],
 ])('%j finds %j', (text, ids) => {
   const list = listOf([cold(3), hot(2)], NOTHING_KEPT, null, AT);
-  expect(filtered(list, text, speech).active.map(({ alarm: it }) => it.id)).toEqual(ids);
+  expect(filtered(list, text, speech, isTag).active.map(({ alarm: it }) => it.id)).toEqual(ids);
 });
 
 test('as a file: each state, values in the unit of the page, and no formula', () => {

@@ -3,12 +3,12 @@ import type { Alarm, WireTime } from '../contract/types';
 import { csv, type Cell } from '../domain/csv';
 import { isOfRange, sideOf, VERDICTS } from '../domain/health';
 import { secondsOf } from '../domain/rostime';
-import { shown } from '../domain/text';
+import { finder, shown } from '../domain/text';
 import { compareIds } from '../domain/twin';
 import { toShown, unitOf } from '../domain/units';
 import { S } from '../strings';
 import type { AlarmList, Item } from './list';
-import type { Now } from './now';
+import { worstOf, type Now } from './now';
 import { nameText, valuesOf, whatText, whenText, whereText, type Speech } from './words';
 
 export const ORDERS = ['cause', 'newest', 'tag'] as const;
@@ -18,21 +18,32 @@ export type Order = (typeof ORDERS)[number];
 /** More alarms than this of one cause stand below one heading. */
 const MOST_LOOSE = 4;
 
-/** Alarms in a row; with a cause they are many, all of that cause. */
-export interface Block {
-  readonly key: string;
-  readonly cause: string | null;
-  readonly items: readonly Item[];
+/** What is wrong where: an alarm, or what has none yet. */
+export interface Wrong {
+  readonly alarm: Pick<Alarm, 'id' | 'tag_id' | 'reason'>;
 }
 
-/** Those in whose words all of the text's occur. */
-export function filtered(list: AlarmList, text: string, speech: Speech): AlarmList {
-  const words = text.toLowerCase().split(/\s+/).filter(Boolean);
-  if (words.length === 0) return list;
-  const has = ({ alarm, verdict }: Item): boolean => {
-    const all = `${nameText(alarm, speech)} ${causeText(alarm, speech)} ${S.health[verdict]}`;
-    return words.every((word) => all.toLowerCase().includes(word));
-  };
+/** Alarms in a row; with a cause they are many, all of that cause. */
+export interface Block<T extends Wrong = Item> {
+  readonly key: string;
+  readonly cause: string | null;
+  readonly items: readonly T[];
+}
+
+/** Those in whose words all of the text's occur (`finder`). */
+export function filtered(
+  list: AlarmList,
+  text: string,
+  speech: Speech,
+  isTag: (id: string) => boolean,
+): AlarmList {
+  const isFound = finder(text, isTag);
+  if (!isFound) return list;
+  const has = ({ alarm, verdict }: Item): boolean =>
+    isFound(
+      alarm.tag_id,
+      `${nameText(alarm, speech)} ${causeText(alarm, speech)} ${S.health[verdict]}`.toLowerCase(),
+    );
   return {
     active: list.active.filter(has),
     shelved: list.shelved.filter(has),
@@ -49,20 +60,24 @@ export function arranged(items: readonly Item[], order: Order, speech: Speech): 
         : (a: Item, b: Item) => compareIds(a.alarm.tag_id, b.alarm.tag_id);
     return [{ key: order, cause: null, items: [...items].sort(by) }];
   }
-  const causes = new Map<string, Item[]>();
+  return byCause(items, speech);
+}
+
+/** Many of one cause in one block, where the worst of them stands. */
+export function byCause<T extends Wrong>(items: readonly T[], speech: Speech): readonly Block<T>[] {
+  const causes = new Map<string, T[]>();
   for (const item of items) {
     const cause = causeOf(item.alarm, speech);
     const own = causes.get(cause);
     if (own) own.push(item);
     else causes.set(cause, [item]);
   }
-  const blocks: (Block & { readonly items: Item[] })[] = [];
+  const blocks: (Block<T> & { readonly items: T[] })[] = [];
   for (const item of items) {
     const key = causeOf(item.alarm, speech);
     const own = causes.get(key) ?? [];
     const before = blocks.at(-1);
     if (own.length > MOST_LOOSE) {
-      // All of them stand where the worst of them does.
       if (own[0] === item) blocks.push({ key, cause: causeText(item.alarm, speech), items: own });
     } else if (before?.cause === null) before.items.push(item);
     else blocks.push({ key: `from ${item.alarm.id}`, cause: null, items: [item] });
@@ -70,19 +85,47 @@ export function arranged(items: readonly Item[], order: Order, speech: Speech): 
   return blocks;
 }
 
+/**
+ * In the order of their blocks: by how bad the worst alarm of a block is, then whether that is not
+ * acknowledged (both are the whole part of `severity`), then by how many they are. `items` come the worst first.
+ */
+export function causesFirst(
+  items: readonly Item[],
+  rankOf: (item: Item) => number,
+  speech: Speech,
+): readonly Item[] {
+  const causes = new Map<string, { readonly urgency: number; count: number }>();
+  const keys = new Map<Item, string>();
+  for (const item of items) {
+    const key = causeOf(item.alarm, speech);
+    keys.set(item, key);
+    const own = causes.get(key);
+    if (own) own.count += 1;
+    else causes.set(key, { urgency: Math.floor(rankOf(item)), count: 1 });
+  }
+  const blockOf = (item: Item) => {
+    const own = causes.get(keys.get(item) ?? '');
+    return own && own.count > MOST_LOOSE ? own : { urgency: Math.floor(rankOf(item)), count: 1 };
+  };
+  return items
+    .map((item) => ({ item, block: blockOf(item) }))
+    .sort((a, b) => b.block.urgency - a.block.urgency || b.block.count - a.block.count)
+    .map(({ item }) => item);
+}
+
 /** What is wrong in which area, by whatever limit. */
-const causeOf = ({ reason, tag_id }: Alarm, { sensors }: Speech): string =>
+const causeOf = ({ reason, tag_id }: Wrong['alarm'], { sensors }: Speech): string =>
   [
     ...[reason.kind, reason.sensor, isOfRange(reason) ? sideOf(reason) : ''],
     sensors.areaOf(tag_id),
   ].join('|');
 
-function causeText(alarm: Alarm, speech: Speech): string {
+function causeText(alarm: Wrong['alarm'], speech: Speech): string {
   const area = speech.sensors.areaOf(alarm.tag_id);
   return [...(area === '' ? [] : [shown(area, 32)]), causeWords(alarm, speech)].join(' · ');
 }
 
-function causeWords(alarm: Alarm, speech: Speech): string {
+function causeWords(alarm: Wrong['alarm'], speech: Speech): string {
   const { reason } = alarm;
   if (!isOfRange(reason)) return whatText(alarm, speech);
   const beyond = sideOf(reason) === 'below' ? S.tooLow(null) : S.tooHigh(null);
@@ -114,7 +157,7 @@ export function causeFacts(
     return found && { ...valuesOf(found.alarm, speech, found.now), where: whereText(found.alarm) };
   };
   const current = furthest(({ value }) => value);
-  const worst = furthest(({ alarm }) => alarm.worst ?? alarm.reason.value);
+  const worst = furthest(({ alarm, now }) => worstOf(alarm, now));
   const active = all.filter(({ alarm }) => alarm.cleared_at === null);
   const counts = VERDICTS.map((verdict) => {
     const count = active.filter((each) => each.verdict === verdict).length;
@@ -147,7 +190,7 @@ export function alarmsCsv(
   ];
   const lines = (['active', 'shelved', 'resolved'] as const).flatMap((state) =>
     list[state].map(({ alarm, verdict, isAcknowledged, shelf }): Cell[] => {
-      const { reason, worst } = alarm;
+      const { reason } = alarm;
       const sensor = sensors.named(reason.sensor);
       const current = nowOf(alarm);
       const value = (given: number | null): Cell =>
@@ -159,7 +202,8 @@ export function alarmsCsv(
         ...[alarm.tag_id || null, reason.kind, reason.sensor || null],
         ...[reason.sensor === '' ? null : unitOf(sensor, unit), value(reason.limit)],
         value(current?.kind === 'known' ? current.value : null),
-        ...[value(worst), value(reason.value), iso(alarm.raised_at), iso(alarm.cleared_at)],
+        ...[value(worstOf(alarm, current)), value(reason.value)],
+        ...[iso(alarm.raised_at), iso(alarm.cleared_at)],
         isAcknowledged ? 'yes' : 'no',
         ...[shelf && new Date(shelf.until).toISOString(), shelf?.reason || null],
       ];

@@ -26,6 +26,10 @@ export interface AlarmList {
   readonly resolved: readonly Item[];
 }
 
+/** Where it belongs by now; in a list that is held it may still stand elsewhere. */
+export const groupOf = ({ alarm, shelf }: Item): keyof AlarmList =>
+  alarm.cleared_at !== null ? 'resolved' : shelf !== null ? 'shelved' : 'active';
+
 export const EMPTY_LIST: AlarmList = { active: [], shelved: [], resolved: [] };
 
 /**
@@ -72,13 +76,13 @@ export const inOrder = (
   reasonOf: (item: Item) => HealthReason,
 ): readonly Item[] =>
   items
-    .map((item) => {
-      const reason = reasonOf(item);
-      const { verdict } = reason;
-      return { item, rank: severity({ verdict, reasons: [reason] }, item.isAcknowledged) };
-    })
+    .map((item) => ({ item, rank: rankOf(reasonOf(item), item.isAcknowledged) }))
     .sort((a, b) => b.rank - a.rank || byName(a.item, b.item))
     .map(({ item }) => item);
+
+/** An alarm's `severity`, for that reason. */
+export const rankOf = (reason: HealthReason, isAcknowledged: boolean): number =>
+  severity({ verdict: reason.verdict, reasons: [reason] }, isAcknowledged);
 
 const byName = ({ alarm: a }: Item, { alarm: b }: Item): number =>
   compareIds(a.tag_id, b.tag_id) || (a.id < b.id ? -1 : 1);
@@ -88,7 +92,8 @@ export const unacknowledged = (items: readonly Item[]): readonly Item[] =>
   items.filter(({ isAcknowledged, shelf }) => !isAcknowledged && shelf === null);
 
 /** Those that call for somebody: active, not acknowledged, not shelved. */
-export const calling = ({ active }: AlarmList): readonly Item[] => unacknowledged(active);
+export const calling = ({ active }: AlarmList): readonly Item[] =>
+  unacknowledged(active).filter(({ alarm }) => alarm.cleared_at === null);
 
 /** The alarm of why a tag is as it is. */
 export const alarmOf = (

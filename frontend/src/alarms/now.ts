@@ -1,6 +1,7 @@
 /** What an alarm is about, as it is now: its value, how bad that is, and its trend. Pure. */
 import type { Alarm, Verdict } from '../contract/types';
 import type { When } from '../domain/age';
+import { isOfRange, sideOf } from '../domain/health';
 import { isOldReading, trendOf, type TagThen } from '../domain/trend';
 
 export type Now =
@@ -64,4 +65,13 @@ export function nowOf(
     limit: said?.limit ?? null,
     trend: trend?.kind === 'by' ? trend.by : null,
   };
+}
+
+/** Its worst value, never better than that of now, which may come first; null: there is none. */
+export function worstOf({ reason, worst }: Alarm, now: Now | null): number | null {
+  const known = worst ?? (isOfRange(reason) ? reason.value : null);
+  const current = now?.kind === 'known' ? now.value : null;
+  if (known === null || current === null) return known;
+  const isBelow = isOfRange(reason) && sideOf(reason) === 'below';
+  return isBelow ? Math.min(known, current) : Math.max(known, current);
 }

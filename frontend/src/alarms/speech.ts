@@ -2,11 +2,13 @@
 import type { Alarm, HealthReason, Verdict } from '../contract/types';
 import type { AppState } from '../store/app';
 import { selectCatalogue, selectNewestHealth } from '../store/derived';
-import { hourAgo, selectHourAgoNow, type HourAgo } from '../store/hourAgo';
+import { hourAgo, selectHourAgoNow, thenOf, type HourAgo } from '../store/hourAgo';
 import { VERDICTS } from '../domain/health';
 import { memoLast } from '../domain/memo';
+import { todoText } from '../domain/reasons';
 import { isHeardNow, selectNewestTag } from '../store/moment';
-import { inOrder, type Item } from './list';
+import { causesFirst } from './arrange';
+import { inOrder, rankOf, type Item } from './list';
 import { nowOf, type Now } from './now';
 import { alarmText, type Speech } from './words';
 
@@ -26,7 +28,7 @@ export function selectNow(
 ): Now | null {
   const tag = selectNewestTag(state, alarm.tag_id);
   const health = selectNewestHealth(state)?.byTag.get(alarm.tag_id);
-  const before = selectHourAgoNow(state, last)?.tags.get(alarm.tag_id) ?? null;
+  const before = tag ? thenOf(selectHourAgoNow(state, last), tag) : null;
   return nowOf(alarm, tag && health ? { tag, health } : null, before, isHeardNow(state));
 }
 
@@ -44,9 +46,26 @@ export function worstNow(state: AppState, items: readonly Item[]): Verdict | nul
   return VERDICTS.find((each) => verdicts.includes(each)) ?? null;
 }
 
-/** What is worst now first. */
-export const worstNowFirst = (state: AppState, items: readonly Item[]): readonly Item[] =>
-  inOrder(items, ({ alarm }) => reasonNow(state, alarm));
+/** What to do first about some alarms of one cause, as they are now. */
+export function todoNow(state: AppState, items: readonly Item[]): string {
+  const verdict = worstNow(state, items);
+  const todos = items
+    .map(({ alarm }) => reasonNow(state, alarm))
+    .filter((reason) => reason.verdict === verdict)
+    .map((reason) => todoText(selectCatalogue(state), reason));
+  return todos.find((text) => text !== '') ?? '';
+}
+
+/** What is worst now first, many of one cause together. */
+export function worstNowFirst(state: AppState, items: readonly Item[]): readonly Item[] {
+  const reasons = new Map(items.map((item) => [item, reasonNow(state, item.alarm)]));
+  const reasonOf = (item: Item): HealthReason => reasons.get(item) ?? item.alarm.reason;
+  return causesFirst(
+    inOrder(items, reasonOf),
+    (item) => rankOf(reasonOf(item), item.isAcknowledged),
+    selectSpeech(state),
+  );
+}
 
 /** An alarm in one line, as it is now. */
 export const textNow = (state: AppState, alarm: Alarm): string =>

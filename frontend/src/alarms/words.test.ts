@@ -61,12 +61,28 @@ test('its limit is that of now: what is critical, or what ends it on the way bac
   const at = (value: number, limit: number): Now => ({
     ...{ kind: 'known', value, verdict: 'stressed', limit, trend: null },
   });
-  expect(valuesOf(cold, C, at(8.7, 10)).what).toBe('Temperature below 10.0\u00a0°C');
+  expect(valuesOf(cold, C, at(8.7, 10))).toMatchObject({
+    what: 'Temperature below 10.0\u00a0°C',
+    todo: 'Heat, or close the vents',
+  });
   expect(valuesOf(cold, C, at(18.02, 18.5))).toMatchObject({
-    what: 'Temperature not yet above 18.5\u00a0°C',
+    what: 'Temperature back in range; clears above 18.5\u00a0°C',
+    todo: '',
     now: 'now 18.0\u00a0°C',
     first: '17.9\u00a0°C when raised',
   });
+});
+
+test('the worst value is never better than that of now, which may come first', () => {
+  const cold = alarm('a', { worst: 8.7, reason: { value: 9, limit: 10 } });
+  expect(valuesOf(cold, C, known(8.2, 'critical')).worst).toBe('worst 8.2\u00a0°C');
+  expect(alarmText(cold, C, known(8.2, 'critical'))).not.toContain('worst');
+  const humid = { sensor: 'humidity', value: 68, limit: 60 } as const;
+  const damp = alarm('b', { worst: 72.9, reason: humid });
+  expect(valuesOf(damp, C, known(73.7, 'stressed')).worst).toBe('worst 73.7\u00a0%');
+  expect(valuesOf(damp, C, known(59, 'healthy')).worst).toBe('worst 72.9\u00a0%');
+  const unknown = { kind: 'unknown', last: 80, lastAt: 'unknown' } as const;
+  expect(valuesOf(damp, C, unknown).worst).toBe('worst 72.9\u00a0%');
 });
 
 test('a worst value is named by the side of its limit that it lies on', () => {

@@ -2,13 +2,13 @@
 import type { Alarm, HealthReason, Verdict } from '../contract/types';
 import { ageText, clockText, digitsApart, readingText } from '../domain/format';
 import { isOfRange, sideOf } from '../domain/health';
-import { beyondText, reasonText } from '../domain/reasons';
+import { beyondText, reasonText, todoText } from '../domain/reasons';
 import { hasDate, rosText, secondsOf } from '../domain/rostime';
 import type { Catalogue } from '../domain/sensors';
 import { shown } from '../domain/text';
 import type { TemperatureUnit } from '../domain/units';
 import { S } from '../strings';
-import type { Now } from './now';
+import { worstOf, type Now } from './now';
 
 /** Of a name that some robot made up. */
 const LONGEST_NAME = 24;
@@ -25,7 +25,11 @@ export interface Speech {
 }
 
 /** What is wrong, without its value, which changes; `more` digits of a limit. */
-export function whatText({ reason }: Alarm, { sensors, unit }: Speech, more = 0): string {
+export function whatText(
+  { reason }: Pick<Alarm, 'reason'>,
+  { sensors, unit }: Speech,
+  more = 0,
+): string {
   if (isOfRange(reason)) return beyondText(sensors, reason, unit, more);
   // Of a pest how many, and of a changed sensor its reading, is told as it is now.
   const value = reason.kind === 'pest' ? 0 : reason.kind === 'changed' ? null : reason.value;
@@ -40,6 +44,8 @@ export const nameText = (alarm: Alarm, speech: Speech): string =>
 export interface Values {
   /** What is wrong; its limit has as many digits as the values. */
   readonly what: string;
+  /** What somebody does about it; empty: nothing. */
+  readonly todo: string;
   /** Null: it is not of a value, or resolved. */
   readonly now: string | null;
   /** Null: there is no such value. */
@@ -53,7 +59,7 @@ export function valuesOf(alarm: Alarm, speech: Speech, now: Now | null): Values 
   const reason = reasonNow(alarm, now);
   const { sensors, unit } = speech;
   const sensor = sensors.named(reason.sensor);
-  const worst = alarm.worst ?? (isOfRange(reason) ? alarm.reason.value : null);
+  const worst = worstOf(alarm, now);
   const current = now?.kind === 'known' ? now.value : (now?.last ?? null);
   const first = alarm.reason.value;
   const all = [current, worst, first].filter((value) => value !== null);
@@ -71,6 +77,7 @@ export function valuesOf(alarm: Alarm, speech: Speech, now: Now | null): Values 
   const isMeasured = isOfRange(reason) || isPest || reason.kind === 'changed';
   return {
     what: whatText({ ...alarm, reason }, speech, more),
+    todo: todoText(sensors, reason, now?.kind === 'known' ? now.verdict : undefined),
     now:
       now?.kind === 'known' ? S.alarmNow(now.value === null ? noneText : nowText(now.value)) : null,
     worst:
@@ -85,14 +92,15 @@ export function valuesOf(alarm: Alarm, speech: Speech, now: Now | null): Values 
 /** Of a range its limit is that of now: beyond what is critical, that; on the way back, what ends it. */
 function reasonNow({ reason }: Alarm, now: Now | null): HealthReason {
   if (!isOfRange(reason) || now?.kind !== 'known' || now.limit === null) return reason;
-  return { ...reason, value: now.value ?? reason.value, limit: now.limit };
+  const { value, limit, verdict } = now;
+  return { ...reason, value: value ?? reason.value, limit, verdict };
 }
 
 /** What and where in one line, as it is now, and how bad at worst where that differs. */
 export function alarmText(alarm: Alarm, speech: Speech, now: Now | null): string {
   const { what, now: nowText, worst } = valuesOf(alarm, speech, now);
   const isKnown = now?.kind === 'known';
-  const isWorstNow = isKnown && now.value === (alarm.worst ?? alarm.reason.value);
+  const isWorstNow = isKnown && now.value === (worstOf(alarm, now) ?? alarm.reason.value);
   const texts = [
     what,
     // What has no value says by itself how it is.

@@ -123,7 +123,8 @@ export default function ChartView({ charted }: { charted: Charted }): JSX.Elemen
             const hasTimes = index === withLines.length - 1;
             return (
               <PlotView
-                key={model.sensor.name}
+                // Alone, a line has other colours.
+                key={`${charted.by} ${model.sensor.name}`}
                 model={model}
                 height={height + (hasTimes ? TIMES_HEIGHT : 0)}
                 hasTimes={hasTimes}

@@ -31,6 +31,9 @@ export function LineValue({
   const was = valueOf(beforeAt(line, at));
   return (
     <span className="line-value">
+      {point && 'mean' in point && point.n > 1 && (
+        <span className="faint">{S.chartColumns.mean} </span>
+      )}
       <strong>{value === null ? S.noValue : readingText(sensor, value, unit)}</strong>
       {point && 'mean' in point && point.n > 1 && (
         <span className="faint">

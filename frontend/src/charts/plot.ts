@@ -69,6 +69,7 @@ export function createPlot(element: HTMLElement, handlers: PlotHandlers): Plot {
         padding: [8, LIMITS_ROOM * palette.fontPx, 0, 0],
         cursor: {
           y: false,
+          dataIdx: heldIndex,
           points: { size: 8, width: 2, stroke: () => palette.surface, fill: colourOf },
           drag: { x: true, y: false, setScale: false, dist: SHORTEST_DRAG },
           sync: {
@@ -167,6 +168,16 @@ export function createPlot(element: HTMLElement, handlers: PlotHandlers): Plot {
   const colourOf = (_: uPlot, series: number): string => {
     const look = (model && drawnOf(model)[series - 1]?.look) ?? 0;
     return palette.lines[lookOf(look).colour] ?? palette.ink;
+  };
+
+  /** The point of the reading that held then, or of the bucket: the value beside the chart is that. */
+  const heldIndex = (u: uPlot, series: number, nearest: number, at: number): number => {
+    const drawn = model && drawnOf(model)[series - 1];
+    const [times, values] = [u.data[0], u.data[series]];
+    if (!drawn || !values) return nearest;
+    // A bucket has its point in its middle.
+    const last = at + (drawn.series.bucketS ?? 0) / 2;
+    return times.findLastIndex((time, index) => time <= last && values[index] !== undefined);
   };
 
   return {

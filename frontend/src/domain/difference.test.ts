@@ -44,11 +44,21 @@ describe('a difference', () => {
 });
 
 describe('its colours', () => {
-  const range = symmetricRange(field([], { valueMin: -1, valueMax: 3 }));
+  const temperature = sensorNamed('temperature');
+  const range = symmetricRange(field([], { valueMin: -1, valueMax: 3 }), temperature);
 
   test('range as far below 0 as above', () => {
     expect(range).toEqual({ low: -3, high: 3 });
-    expect(symmetricRange(field([], { valueMin: -4, valueMax: -1 }))).toEqual({ low: -4, high: 4 });
+    const less = symmetricRange(field([], { valueMin: -4, valueMax: -1 }), temperature);
+    expect(less).toEqual({ low: -4, high: 4 });
+  });
+
+  test('are pale where hardly anything has changed, by the ideal range of 18 to 26 °C', () => {
+    const hardly = field([], { valueMin: -0.1, valueMax: 0.25 });
+    const { low, high } = symmetricRange(hardly, temperature);
+    expect([low, high]).toEqual([-high, expect.closeTo(0.4)]);
+    const none = { ideal: null, critical: null };
+    expect(symmetricRange(hardly, none)).toEqual({ low: -0.25, high: 0.25 });
   });
 
   test('are grey and to be seen at 0, blue below and orange above, the same far off', () => {

@@ -2,7 +2,7 @@
 import type { Field } from '../contract/types';
 import { differenceNumber, withUnit } from './format';
 import { fraction, mix, rangeOf, rgbText, type Range, type Rgb, type Shade } from './ramp';
-import type { Sensor } from './sensors';
+import type { Ranges, Sensor } from './sensors';
 import type { TemperatureUnit } from './units';
 
 /** What the moment that is shown is compared with: so many seconds before it, or one moment. */
@@ -43,9 +43,13 @@ export function differenceOf(shown: Field, then: Field): Field {
   };
 }
 
+/** Less than this share of the ideal range is no change worth a full colour. */
+const LEAST_OF_IDEAL = 0.05;
+
 /** As far below 0 as above it, or a small change would look like a large one of the other kind. */
-export function symmetricRange({ valueMin, valueMax }: Field): Range {
-  const most = Math.max(Math.abs(valueMin), Math.abs(valueMax));
+export function symmetricRange({ valueMin, valueMax }: Field, { ideal }: Ranges): Range {
+  const least = ideal ? LEAST_OF_IDEAL * (ideal[1] - ideal[0]) : 0;
+  const most = Math.max(Math.abs(valueMin), Math.abs(valueMax), least);
   return { low: -most, high: most };
 }
 

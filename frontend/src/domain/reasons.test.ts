@@ -31,7 +31,18 @@ describe('a reason in words', () => {
       // Within the ideal range of 18 to 26, and not by enough.
       { verdict: 'stressed', value: 18.1, limit: 18.4 } as const,
       null,
-      `Temperature 18.1${NBSP}°C, not yet above 18.4`,
+      `Temperature 18.1${NBSP}°C, back in range; clears above 18.4`,
+    ],
+    [
+      { verdict: 'stressed', value: 25.9, limit: 25.6 } as const,
+      null,
+      `Temperature 25.9${NBSP}°C, back in range; clears below 25.6`,
+    ],
+    [
+      // Within the critical range of 10, by less: of the ideal one it is far off.
+      { value: 10.1, limit: 10.4 } as const,
+      null,
+      `Temperature 10.1${NBSP}°C, below 10.4 (critical)`,
     ],
     [
       { sensor: 'vpd', value: 1.68, limit: 1.3, verdict: 'stressed' } as const,

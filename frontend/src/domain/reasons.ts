@@ -73,16 +73,19 @@ export const digitsOf = (
   unit: TemperatureUnit,
 ): number => digitsApart(sensor, [value], limit, unit);
 
-/** On which side of a limit that the file sets; of another one, the value has to pass it first. */
-const sideText = (
-  { limits }: Sensor,
-  reason: { readonly value: number; readonly limit: number },
-): string => (limits.has(reason.limit) ? S.reasons.sides : S.reasons.sidesHeld)[sideOf(reason)];
+type OfRange = HealthReason & { readonly value: number; readonly limit: number };
+
+/** Whether the value is back in its ideal range, and has yet to pass a limit that the file has not. */
+const isBack = ({ limits }: Sensor, { verdict, limit }: OfRange): boolean =>
+  verdict === 'stressed' && !limits.has(limit);
+
+const sideText = (sensor: Sensor, reason: OfRange): string =>
+  (isBack(sensor, reason) ? S.reasons.sidesBack : S.reasons.sides)[sideOf(reason)];
 
 /** What lies on which side of which limit, without the value: that changes. */
 export function beyondText(
   sensors: Catalogue,
-  reason: HealthReason & { readonly value: number; readonly limit: number },
+  reason: OfRange,
   unit: TemperatureUnit,
   more: number,
 ): string {
@@ -94,10 +97,18 @@ export function beyondText(
   );
 }
 
-/** What somebody does about it; of what is well by now (`current`), what its alarm still waits for. */
-export function todoText(reason: HealthReason, current: Verdict = reason.verdict): string {
+/**
+ * What somebody does about it; of what is well by now (`current`), what its alarm still waits for.
+ * Empty: nothing, as it is back in its range, and the reason says when that ends it.
+ */
+export function todoText(
+  catalogue: Catalogue,
+  reason: HealthReason,
+  current: Verdict = reason.verdict,
+): string {
   if (current === 'healthy') return reason.kind === 'pest' ? S.todoPestAgain : S.todoWell;
   const { sensors, ...kinds } = S.todo;
+  if (isOfRange(reason) && isBack(catalogue.named(reason.sensor), reason)) return '';
   if (isOfRange(reason) && reason.sensor in sensors) {
     return sensors[reason.sensor as keyof typeof sensors][sideOf(reason)];
   }

@@ -56,10 +56,11 @@ test('a summary counts readings, and takes the least and the most of buckets', (
   });
 });
 
-test('at a moment there is the nearest reading, or the bucket that holds it, and nothing in a gap', () => {
+test('at a moment there is the reading that held, or the bucket that holds it, and nothing in a gap', () => {
   const readings = every10(3);
   expect(pointAt(seriesWith({ readings }), 14)).toEqual({ at: 10, value: 1 });
-  expect(pointAt(seriesWith({ readings }), 16)).toEqual({ at: 20, value: 2 });
+  // Table and card say the same of that moment.
+  expect(pointAt(seriesWith({ readings }), 16)).toEqual({ at: 10, value: 1 });
   expect(pointAt(seriesWith({ readings, gaps: [{ from: 20, to: 90 }] }), 21)).toBeNull();
   expect(pointAt(seriesWith(), 21)).toBeNull();
   const bucketed = seriesWith({ bucketS: 10, buckets: [bucket(0), bucket(30)] });

@@ -92,19 +92,14 @@ export const marksOf = ({ buckets, bucket_s: widthS }: Timeline): Mark[] =>
 export const middleOf = ({ start }: Bucket, { bucketS, to }: Series): number =>
   Math.max(start, Math.min(start + (bucketS ?? 0) / 2, to));
 
-/** What a series has at a moment: the reading nearest to it, or its bucket; null: a gap. */
+/** What a series has at a moment: the reading that held then, or its bucket; null: a gap. */
 export function pointAt(series: Series, at: number): Reading | Bucket | null {
-  const { bucketS, gaps, readings, buckets } = series;
+  const { bucketS, gaps, buckets } = series;
   if (bucketS !== null) {
     return buckets.find(({ start }) => at >= start && at < start + bucketS) ?? null;
   }
   if (gaps.some(({ from, to }) => at > from && at < to)) return null;
-  let nearest: Reading | null = null;
-  for (const reading of readings) {
-    if (nearest && Math.abs(reading.at - at) > Math.abs(nearest.at - at)) break;
-    nearest = reading;
-  }
-  return nearest;
+  return lastUntil(series, at);
 }
 
 /** The last reading or bucket that had begun by then: what was known at that moment. */

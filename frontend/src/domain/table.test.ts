@@ -90,6 +90,8 @@ describe('filter', () => {
     ['humid', ['9']],
     ['critical temp', ['10']],
     ['rose pest', []],
+    // Exactly a tag's id: not 10 as well.
+    ['1', ['1']],
   ])('%j', (text, expected) => {
     expect(ids(filterRows(rows, text, null, CATALOGUE))).toEqual(expected);
   });

@@ -8,6 +8,7 @@ import { memoLast, memoOne } from './memo';
 import { speciesText } from './species';
 import { reasonsText, tryKind } from './reasons';
 import type { Catalogue, Sensor } from './sensors';
+import { finder } from './text';
 import { compareIds, type Tag } from './twin';
 import { toShown, unitOf, type TemperatureUnit } from './units';
 
@@ -110,19 +111,20 @@ function textRanks(keys: readonly Key[]): ReadonlyMap<string, number> {
   return new Map([...texts].sort(compareIds).map((text, rank) => [text, rank]));
 }
 
-/** Rows of that health, or of any, in which every word of the text occurs. */
+/** Rows of that health, or of any, in which every word of the text occurs (`finder`). */
 export function filterRows(
   rows: readonly Row[],
   text: string,
   health: Verdict | null,
   sensors: Catalogue,
 ): readonly Row[] {
-  const words = text.toLowerCase().split(/\s+/).filter(Boolean);
-  if (words.length === 0 && health === null) return rows;
+  const ids = new Set(rows.map(({ tag }) => tag.id));
+  const isFound = finder(text, (id) => ids.has(id));
+  if (!isFound && health === null) return rows;
   return rows.filter(
     ({ tag, health: own }) =>
       (health === null || own.verdict === health) &&
-      words.every((word) => haystack(tag)(own, sensors).includes(word)),
+      (!isFound || isFound(tag.id, haystack(tag)(own, sensors))),
   );
 }
 

@@ -10,6 +10,21 @@ const INVISIBLE =
 /** More than this many combining marks on one letter reach into other lines. */
 const STACKED_MARKS = /(\p{M}{3})\p{M}+/gu;
 
+/**
+ * Whether every word of a filter is in what is said of a tag, in lower case; null: there is none. A
+ * word that is exactly a tag's id finds that tag alone.
+ */
+export function finder(
+  text: string,
+  isTag: (id: string) => boolean,
+): ((tagId: string, said: string) => boolean) | null {
+  const words = text.split(/\s+/).filter(Boolean);
+  if (words.length === 0) return null;
+  const own = words.map((word) => ({ word, lower: word.toLowerCase(), isTag: isTag(word) }));
+  return (tagId, said) =>
+    own.every((each) => (each.isTag ? each.word === tagId : said.includes(each.lower)));
+}
+
 const REPLACEMENT = '\ufffd';
 const LONGEST = 80;
 /** Stands for text of which nothing can be seen: a name must have something to click on. */

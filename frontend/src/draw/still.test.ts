@@ -63,7 +63,7 @@ test('the grid’s numbers are round metres at their lines', () => {
   const context = new FakeContext();
   drawGridLabels(surface(context), view, LIGHT);
   const labels = context.named('fillText').map(({ args }) => args);
-  const two = labels.find(([text, , y]) => text === '2 m' && y === 4);
+  const two = labels.find(([text, , y]) => text === '2 m' && y === 8);
   expect(two?.[1]).toBe(50 + 2 * 40 + 4);
 });
 
@@ -72,7 +72,7 @@ test.each([1, 1.5, 2, 3])('the grid’s numbers keep apart at %d times the text'
   drawGridLabels(surface(context), view, LIGHT, textScale);
   const along = context
     .named('fillText')
-    .filter(({ args }) => args[2] === 4)
+    .filter(({ args }) => args[2] === 8)
     .map(({ args }) => args[1] as number);
   const gaps = along.slice(1).map((at, i) => at - (along[i] ?? 0));
   expect(Math.min(...gaps)).toBeGreaterThanOrEqual(56 * textScale);

@@ -106,6 +106,9 @@ export function drawGridLines(surface: Surface, view: View, palette: Palette, te
   context.stroke();
 }
 
+/** Clear of the frame that the past has, CSS pixels. */
+const EDGE_PX = 8;
+
 /** The grid's numbers, along the left and the upper edge of the view. */
 export function drawGridLabels(
   surface: Surface,
@@ -122,12 +125,12 @@ export function drawGridLabels(
   for (const x of columns) {
     const at = view.x + x * view.scale + 4;
     // The buttons are in the upper right corner, the other axis begins in the left one.
-    if (at > 30 * textScale && at < size.width - 96) context.fillText(tick(x), at, 4);
+    if (at > 30 * textScale && at < size.width - 96) context.fillText(tick(x), at, EDGE_PX);
   }
   context.textBaseline = 'bottom';
   for (const y of rows) {
     const at = view.y - y * view.scale - 2;
-    if (at > 28 * textScale) context.fillText(tick(y), 4, at);
+    if (at > 28 * textScale) context.fillText(tick(y), EDGE_PX, at);
   }
 }
 

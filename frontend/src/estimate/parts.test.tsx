@@ -99,7 +99,9 @@ describe('legend', () => {
       '9 of 10 scans were within the predicted range',
     );
     expect(text('estimate-key')).toContain(`less certain than ±1.6${NBSP}°C`);
-    expect(text('legend')).toContain('Last day: 412 of 458 scans, last week: 2900 of 3200 scans.');
+    expect(text('legend')).toContain(
+      'Last day: 412 of 458 scans, last week: 2,900 of 3,200 scans.',
+    );
     expect(text('legend')).toContain('90 % interval');
     expect(screen.queryByTestId('estimate-warning')).toBeNull();
     expect(screen.getByRole('combobox', { name: 'Heat map shows' })).toHaveProperty(

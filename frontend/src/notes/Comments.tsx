@@ -19,22 +19,15 @@ const MOST_SHOWN = 20;
 export function Comments({
   subject,
   name,
-  isOfNow = false,
 }: {
   subject: string;
   /** What it is about, for a screen reader. */
   name: string;
-  /** Whatever moment is shown. */
-  isOfNow?: boolean;
 }): JSX.Element {
-  const all = useSelected(comments, (it) => it);
-  const who = useSelected(person, (it) => it);
-  const shownAt = useApp((state) => selectShown(state).moment);
-  const moment = isOfNow ? null : shownAt;
+  const mayWrite = useSelected(person, (who) => who?.can_write_notes === true);
+  const moment = useApp((state) => selectShown(state).moment);
   const [isOpen, setOpen] = useState(false);
   const button = useRef<HTMLButtonElement>(null);
-  const found = all.filter((it) => it.subject === subject && (moment === null || it.at <= moment));
-  const mayWrite = who?.can_write_notes === true;
   return (
     <>
       {mayWrite && (
@@ -51,34 +44,47 @@ export function Comments({
           {C.comment}
         </button>
       )}
-      {(found.length > 0 || isOpen) && (
-        <div className="comments" data-testid="comments">
-          <ul aria-label={C.title}>
-            {found.slice(-MOST_SHOWN).map((comment) => (
-              <Said
-                key={comment.id}
-                comment={comment}
-                mayWithdraw={mayWrite && (comment.by === who.name || who.role === 'admin')}
-              />
-            ))}
-          </ul>
-          {isOpen && (
-            <Field
-              subject={subject}
-              moment={moment}
-              onDone={() => {
-                setOpen(false);
-                button.current?.focus();
-              }}
-            />
-          )}
-        </div>
+      <Said subject={subject} moment={moment} />
+      {isOpen && (
+        <Field
+          subject={subject}
+          moment={moment}
+          onDone={() => {
+            setOpen(false);
+            button.current?.focus();
+          }}
+        />
       )}
     </>
   );
 }
 
-function Said({
+/** What was said of a subject until a moment, ROS seconds; null: until now. */
+export function Said({
+  subject,
+  moment,
+}: {
+  subject: string;
+  moment: number | null;
+}): JSX.Element | null {
+  const all = useSelected(comments, (it) => it);
+  const who = useSelected(person, (it) => it);
+  const found = all.filter((it) => it.subject === subject && (moment === null || it.at <= moment));
+  if (found.length === 0) return null;
+  const mayWithdraw = ({ by }: Comment): boolean =>
+    who?.can_write_notes === true && (by === who.name || who.role === 'admin');
+  return (
+    <div className="comments" data-testid="comments">
+      <ul aria-label={C.title}>
+        {found.slice(-MOST_SHOWN).map((comment) => (
+          <One key={comment.id} comment={comment} mayWithdraw={mayWithdraw(comment)} />
+        ))}
+      </ul>
+    </div>
+  );
+}
+
+function One({
   comment: { id, by, at, text },
   mayWithdraw,
 }: {

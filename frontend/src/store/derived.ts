@@ -217,7 +217,9 @@ const errorOf = memoOne((field: Field): Field | null =>
 );
 const errorRange = memoOne(({ valueMax }: Field): Range => ({ low: 0, high: valueMax }));
 
-const differenceRange = memoOne(symmetricRange);
+const differenceRange = memoOne((field: Field) =>
+  memoLast((sensor: Sensor) => symmetricRange(field, sensor)),
+);
 
 /** Null: there is none, or the one that is wanted is not here, or nobody knows its colours yet. */
 export function selectHeat(state: AppState): Heat | null {
@@ -228,7 +230,7 @@ export function selectHeat(state: AppState): Heat | null {
     const field = value?.field;
     if (!field || field.sampleCount === 0) return null;
     const old = sourceOf(state.view) === 'nearest' ? selectOld(state, field) : null;
-    return heat(field, differenceRange(field), null, value, false, old);
+    return heat(field, differenceRange(field)(selectSensor(state)), null, value, false, old);
   }
   const field = selectField(state);
   const error = field && state.view.heat === 'error' ? errorOf(field) : null;

@@ -1,10 +1,10 @@
 import { afterEach, beforeEach, expect, test, vi } from 'vitest';
 
 import { judgement } from '../testing/health';
-import { readings, stateFrame, wireTag } from '../testing/tags';
+import { readings, stateFrame, tag, wireTag } from '../testing/tags';
 import { connection, goLive, showTags, status } from '../testing/page';
 import { act, prefer, receive } from './app';
-import { hourAgo, startHourAgo } from './hourAgo';
+import { hourAgo, startHourAgo, thenOf } from './hourAgo';
 import { NO_HOUSE } from './twin';
 
 const NOW_S = 100_000;
@@ -54,6 +54,26 @@ test('an hour before now is asked for once, and again after some minutes', async
   hear(NOW_S + 302);
   await pass(1_000);
   expect(asked).toHaveLength(2);
+});
+
+test('what a reading of now is compared with stays until there is a newer one', async () => {
+  stop = startHourAgo();
+  await pass(10);
+  const first = hourAgo.get()?.tags.get('1');
+  const at = (temperature: number) => tag({ readings: readings({ temperature }) });
+  expect(thenOf(hourAgo.get(), at(22))).toBe(first);
+  hear(NOW_S + 302);
+  await pass(1_000);
+  const second = hourAgo.get()?.tags.get('1');
+  expect(second).not.toBe(first);
+  expect(thenOf(hourAgo.get(), at(22))).toBe(first);
+  expect(thenOf(hourAgo.get(), at(23))).toBe(second);
+  // Of a moment in the past it is what was an hour before, however somebody came there.
+  act({ type: 'moment', moment: 50_000 });
+  receive({ type: 'past', past: { at: 50_000, house: NO_HOUSE } });
+  await pass(1_000);
+  expect(thenOf(hourAgo.get(), at(23))).not.toBe(second);
+  expect(thenOf(null, at(23))).toBeNull();
 });
 
 test('where a day is a short one, so is its hour', async () => {

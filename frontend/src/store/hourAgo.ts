@@ -4,7 +4,7 @@ import { fetchStateAt } from '../contract/past';
 import type { TagHealth } from '../contract/types';
 import { secondsOf } from '../domain/rostime';
 import type { TagThen } from '../domain/trend';
-import { snapshotOf } from '../domain/twin';
+import { snapshotOf, type Tag } from '../domain/twin';
 import { store, type AppState } from './app';
 import { createStore } from './create';
 import { createFetcher } from './fetcher';
@@ -22,6 +22,7 @@ const PACE_MS = 1_000;
 export interface HourAgo {
   /** The moment that it lies an hour before, ROS seconds. */
   readonly of: number;
+  readonly isNow: boolean;
   readonly tags: ReadonlyMap<string, TagThen>;
 }
 
@@ -49,6 +50,20 @@ export function selectHourAgoNow(state: AppState, last: HourAgo | null): HourAgo
     Math.abs(secondsOf(snapshot.at) - last.of) <= 2 * SERVES * selectHourS(state)
     ? last
     : null;
+}
+
+/** What a tag's readings of now were compared with first, by the tag. */
+const compared = new Map<string, { readonly readings: string; readonly then: TagThen }>();
+
+/** What a tag is compared with; of now it stays as long as its readings do: they change a trend, no clock. */
+export function thenOf(last: HourAgo | null, { id, wire }: Tag): TagThen | null {
+  const then = last?.tags.get(id) ?? null;
+  if (!then || !last?.isNow) return then;
+  const readings = JSON.stringify(wire.readings.map((it) => [it.value, it.observed_at]));
+  const known = compared.get(id);
+  if (known?.readings === readings) return known.then;
+  compared.set(id, { readings, then });
+  return then;
 }
 
 export function startHourAgo(): () => void {
@@ -79,7 +94,7 @@ export function startHourAgo(): () => void {
             tag.id,
             { tag, health: latest.health.tags[tag.id] ?? NOT_JUDGED },
           ]);
-          return { of: base, tags: new Map(known) };
+          return { of: base, isNow: moment === null, tags: new Map(known) };
         }),
     });
   };
@@ -89,5 +104,6 @@ export function startHourAgo(): () => void {
     stop();
     fetcher.want(null);
     hourAgo.dispatch(null);
+    compared.clear();
   };
 }

@@ -19,6 +19,9 @@ export const createVoice = (): Store<Announcement, string> =>
 /** Who is signed in; null: not known yet. */
 export const person = createStore<Session | null, Session | null>(null, (_, next) => next);
 
+/** Where people sign in, who may write notes acknowledges and shelves; else each browser for itself. */
+export const mayAct = (who: Session | null): boolean => who?.can_write_notes ?? true;
+
 /** The time that the mouse is on: in a chart, or on the time bar; each shows the other's. */
 export interface PointedTime {
   /** ROS seconds. */

@@ -4,7 +4,7 @@ import { ageText } from '../domain/format';
 import { rosText } from '../domain/rostime';
 import { store, useApp } from '../store/app';
 import { rosNow, selectShown } from '../store/moment';
-import { selectIsRecorded } from '../store/origin';
+import { selectIsRecorded, selectOrigin } from '../store/origin';
 import { S } from '../strings';
 import { useTicking } from '../widgets/useNow';
 import { backToLive } from './span';
@@ -18,11 +18,18 @@ export function PastHeader(): JSX.Element | null {
     const nowS = rosNow(store.get(), now);
     return nowS === null || moment === null ? null : ageText(Math.max(0, nowS - moment));
   });
+  const origin = useApp(selectOrigin);
   const isTimeLost = useApp((state) => state.twin.isTimeLost);
   if (moment === null || !isLooking) return null;
   return (
     <div className="past-header" data-testid="past-header">
       <span className="past-word">{S.past}</span>
+      {/* In place of the header's own mark, where a phone has no room for it. */}
+      {origin !== null && (
+        <span className="past-origin" aria-hidden="true">
+          {S.origin[origin]}
+        </span>
+      )}
       <strong>{rosText(moment)}</strong>
       {/* What counts on by itself is not read out each second. */}
       {ago !== null && !isTimeLost && (

@@ -107,6 +107,8 @@ export function Slider({
   };
   const letGo = (): void => {
     setHeld(null);
+    setPointed(null);
+    pointedTime.dispatch(null);
   };
   const onKeyDown = (event: KeyboardEvent): void => {
     if (event.altKey || event.ctrlKey || event.metaKey) return;

@@ -78,6 +78,8 @@ test('the end of the bar is not live while the page is not', () => {
   expect(said()).toEqual(['Reconnecting', 'Reconnecting']);
 });
 
+const at = (clientX: number): object => ({ clientX, button: 0, pointerId: 1 });
+
 describe('the slider', () => {
   test('says where it stands, in words', () => {
     render(<TimeBar />);
@@ -113,7 +115,6 @@ describe('the slider', () => {
 
   test('follows the pointer while it is held, on a bar that stays where it is', () => {
     render(<TimeBar />);
-    const at = (clientX: number): object => ({ clientX, button: 0, pointerId: 1 });
     fireEvent.pointerMove(slider(), at(300));
     expect(moment()).toBeNull();
     fireEvent.pointerDown(slider(), at(500));
@@ -127,6 +128,16 @@ describe('the slider', () => {
     fireEvent.pointerMove(slider(), at(800));
     expect(moment()).toBe(9_200);
     expect(slider().dataset['span']).toBe('9100,10100');
+  });
+
+  test('takes the bubble beside the mouse away with the click: the header has the moment', () => {
+    render(<TimeBar />);
+    const bubble = (): Element | null => document.querySelector('.timebar-bubble');
+    fireEvent.pointerMove(slider(), at(500));
+    expect(bubble()).not.toBeNull();
+    fireEvent.pointerDown(slider(), at(500));
+    fireEvent.pointerUp(slider(), at(500));
+    expect(bubble()).toBeNull();
   });
 
   test('is hollow while its moment is on the way, and shows what has come', () => {

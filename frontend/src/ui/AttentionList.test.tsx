@@ -34,17 +34,34 @@ test('lists who needs somebody and why, the worst first', () => {
   if (!first) throw new Error('no row');
   const why = within(first).getAllByRole('listitem');
   expect(why.map((each) => each.textContent)).toEqual([
-    'Temperature 6.6\u00a0°C, below 10.0',
     '2 pests seen',
+    'Temperature 6.6\u00a0°C, below 10.0',
   ]);
   expect(first.querySelector('.attention-do')?.textContent).toContain(
-    'Heat, or close the vents · Inspect and treat the plants',
+    'Inspect and treat the plants · Heat, or close the vents',
   );
   expect(last?.querySelector('.attention-do strong')?.textContent).toBe('Check the sensor');
 });
 
-test('ends with how many more there are', () => {
-  show(Object.fromEntries(Array.from({ length: 43 }, (_, index) => [`t${index}`, [pest]])));
+test('of many, what ails more than a few has one line, and the rest a line each', () => {
+  const many = (count: number) =>
+    Object.fromEntries(
+      Array.from({ length: count }, (_, at) => [`${at + 1}`, [reason({ value: 9 - at / 10 })]]),
+    );
+  show(many(12));
+  expect(ids()).toHaveLength(12);
+  document.body.replaceChildren();
+  show({ ...many(12), bug: [pest] });
+  expect(ids()).toEqual(['bug']);
+  const [cause] = document.querySelectorAll('li[data-cause]');
+  expect(cause?.textContent).toMatch(
+    /Temperature too low: 12 tagsHeat, or close the vents Tag 12: Temperature 7.9.*Tags 12, 11, .* and 6 more/,
+  );
+});
+
+test('ends with how many more tags there are', () => {
+  const areas = (at: number) => [reason({ sensor: `s${Math.floor(at / 3)}` })];
+  show(Object.fromEntries(Array.from({ length: 43 }, (_, at) => [`t${at}`, areas(at)])));
   expect(ids()).toHaveLength(40);
   expect(screen.getByText('+ 3 more')).toBeTruthy();
 });

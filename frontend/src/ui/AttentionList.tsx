@@ -1,60 +1,142 @@
 import { useRef, type CSSProperties, type JSX } from 'react';
 
+import { byCause } from '../alarms/arrange';
+import { selectSpeech } from '../alarms/speech';
 import type { HealthReason } from '../contract/types';
-import { worstReason } from '../domain/health';
+import { severity } from '../domain/health';
 import { todoText } from '../domain/reasons';
+import type { Catalogue } from '../domain/sensors';
 import { shown } from '../domain/text';
 import { useApp } from '../store/app';
 import { selectHealth } from '../store/derived';
 import { S } from '../strings';
-import { useSince, useUrgent } from './DoNow';
+import { useSince, useUrgent, type Urgent } from './DoNow';
 import { useFitting } from './fitting';
-import { Reasons } from './Reasons';
+import { HealthMark } from './HealthMark';
+import { Reasons, useReasonText } from './Reasons';
 
-/** Tags that a screen on the wall may have room for, and reasons of each. */
-const MOST_TAGS = 40;
+/** Lines that a screen on the wall may have room for. */
+const MOST_LINES = 40;
+/** More tags than this stand by their causes. */
+const MANY_TAGS = 12;
+/** Of each tag. */
 const MOST_REASONS = 2;
+/** That a cause names. */
+const MOST_NAMED = 6;
 
-/** For a wall screen: the tags that need somebody, the worst first. */
+interface Line {
+  readonly key: string;
+  /** Null: it is of one tag. */
+  readonly cause: string | null;
+  readonly tags: readonly [Urgent, ...Urgent[]];
+}
+
+/** For a wall screen: the tags that need somebody, in the order of `useUrgent`. */
 export function AttentionList(): JSX.Element {
-  const rows = useUrgent();
+  const urgent = useUrgent();
+  const lines = useLines(urgent);
   const { unknown } = useApp(selectHealth).counts;
   const list = useRef<HTMLUListElement>(null);
-  const count = useFitting(list, rows.length);
+  const count = useFitting(list, lines.length);
+  const rest = lines.slice(count).reduce((sum, { tags }) => sum + tags.length, 0);
   return (
     <div className="attention">
-      <h3>{rows.length > 0 ? S.attention : noneText(unknown)}</h3>
-      <ul ref={list} style={{ '--rows': rows.length } as CSSProperties}>
-        {rows.slice(0, MOST_TAGS).map(({ tag, health: own }, index) => (
-          <li key={tag.id} data-fits={index < count} data-tag-id={tag.id} data-health={own.verdict}>
-            <strong>
-              <bdi>{shown(tag.id, 16)}</bdi>
-            </strong>
-            <span className="attention-why">
-              <Reasons health={own} most={MOST_REASONS} />
-              <span className="attention-do">
-                <strong>{todoTexts(own.reasons.slice(0, MOST_REASONS))}</strong>{' '}
-                <small className="faint">
-                  <Since tagId={tag.id} reason={worstReason(own)} />
-                </small>
-              </span>
-            </span>
-          </li>
-        ))}
+      <h3>{urgent.length > 0 ? S.attention : noneText(unknown)}</h3>
+      <ul ref={list} style={{ '--rows': lines.length } as CSSProperties}>
+        {lines
+          .slice(0, MOST_LINES)
+          .map(({ key, cause, tags }, index) =>
+            cause === null ? (
+              <TagLine key={key} of={tags[0]} fits={index < count} />
+            ) : (
+              <CauseLine key={key} cause={cause} tags={tags} fits={index < count} />
+            ),
+          )}
       </ul>
-      {rows.length > count && (
-        <p className="attention-more">{S.attentionMore(rows.length - count)}</p>
-      )}
+      {rest > 0 && <p className="attention-more">{S.attentionMore(rest)}</p>}
     </div>
   );
 }
 
-/** What to do about each of them, no word twice. */
-const todoTexts = (reasons: readonly HealthReason[]): string =>
-  [...new Set(reasons.map((reason) => todoText(reason)))].join(' · ');
+/** A line for each tag; of many, one for what ails more than a few of them. */
+function useLines(urgent: readonly Urgent[]): readonly Line[] {
+  const speech = useApp(selectSpeech);
+  const ofOne = (each: Urgent): Line => ({ key: each.tagId, cause: null, tags: [each] });
+  if (urgent.length <= MANY_TAGS) return urgent.map(ofOne);
+  const wrong = urgent.map((own) => ({
+    own,
+    alarm: { id: own.tagId, tag_id: own.tagId, reason: own.reasons[0] },
+  }));
+  return byCause(wrong, speech).flatMap(({ key, cause, items }): Line[] => {
+    const [first, ...others] = items.map(({ own }) => own);
+    if (!first) return [];
+    return cause === null
+      ? [first, ...others].map(ofOne)
+      : [{ key, cause, tags: [first, ...others] }];
+  });
+}
 
-const Since = (it: { tagId: string; reason: HealthReason | undefined }): string | null =>
-  useSince(it.tagId, it.reason);
+function TagLine({ of: { tagId, reasons }, fits }: { of: Urgent; fits: boolean }): JSX.Element {
+  const { sensors } = useApp(selectSpeech);
+  const [{ verdict }] = reasons;
+  const since = useSince(tagId, reasons[0]);
+  return (
+    <li data-fits={fits} data-tag-id={tagId} data-health={verdict}>
+      <strong>
+        <bdi>{shown(tagId, 16)}</bdi>
+      </strong>
+      <span className="attention-why">
+        <Reasons health={{ verdict, reasons }} most={MOST_REASONS} />
+        <span className="attention-do">
+          <strong>{todoTexts(sensors, reasons.slice(0, MOST_REASONS))}</strong>{' '}
+          <small className="faint">{since}</small>
+        </span>
+      </span>
+    </li>
+  );
+}
+
+/** What ails many tags, what to do about it, where it is worst, and at which tags. */
+function CauseLine({
+  cause,
+  tags,
+  fits,
+}: {
+  cause: string;
+  tags: Line['tags'];
+  fits: boolean;
+}): JSX.Element {
+  const { sensors } = useApp(selectSpeech);
+  const badness = ({ reasons: [reason] }: Urgent): number =>
+    severity({ verdict: reason.verdict, reasons: [reason] });
+  const worst = tags.reduce((a, b) => (badness(b) > badness(a) ? b : a));
+  const [reason] = worst.reasons;
+  const why = S.healthDriver(shown(worst.tagId, 16), useReasonText(reason, true));
+  const named = tags.slice(0, MOST_NAMED).map(({ tagId }) => shown(tagId, 16));
+  return (
+    <li data-fits={fits} data-cause={cause} data-health={reason.verdict}>
+      <HealthMark verdict={reason.verdict} word={false} />
+      <span className="attention-why">
+        {cause}: {S.shownOf(tags.length, tags.length)}
+        <span className="attention-do">
+          <strong>
+            {todoTexts(
+              sensors,
+              tags.map(({ reasons }) => reasons[0]),
+            )}
+          </strong>{' '}
+          <small className="faint">
+            {why} · {S.alarmTags(named, tags.length - named.length)}
+          </small>
+        </span>
+      </span>
+    </li>
+  );
+}
+
+/** What to do about each of them, no word twice. */
+const todoTexts = (sensors: Catalogue, reasons: readonly HealthReason[]): string =>
+  [...new Set(reasons.map((reason) => todoText(sensors, reason)))].filter(Boolean).join(' · ');
 
 /** Of whom nothing is known, nobody knows that he needs nothing. */
 const noneText = (unknown: number): string =>

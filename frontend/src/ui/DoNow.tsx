@@ -1,19 +1,18 @@
 import { useMemo, type JSX } from 'react';
 
 import { whenText } from '../alarms/words';
-import { alarmOf } from '../alarms/list';
+import { alarmOf, type Item } from '../alarms/list';
 import { alarmList } from '../alarms/watch';
 import { now } from '../clock';
 import type { HealthReason } from '../contract/types';
-import { clockText } from '../domain/format';
-import { isBad, severity, VERDICTS, worstReason, type HouseHealth } from '../domain/health';
+import { isBad, severity, VERDICTS, type HouseHealth } from '../domain/health';
 import { todoText } from '../domain/reasons';
 import { secondsOf } from '../domain/rostime';
-import { rowsOf, type Row } from '../domain/table';
+import { rowsOf } from '../domain/table';
 import { shown } from '../domain/text';
 import { act, store, useApp } from '../store/app';
 import { useSelected } from '../store/create';
-import { selectHealth } from '../store/derived';
+import { selectCatalogue, selectHealth } from '../store/derived';
 import { rosNow, selectShown, selectTags } from '../store/moment';
 import { S } from '../strings';
 import { HealthMark } from './HealthMark';
@@ -22,44 +21,57 @@ import { useReasonText } from './Reasons';
 /** Beside the map; the table has the rest. */
 const MOST_TAGS = 2;
 
+/** More than any `severity`. */
+const UNSEEN = 100;
+
+/** A tag that needs somebody. */
+export interface Urgent {
+  readonly tagId: string;
+  /** Without what is shelved; the first is what it needs somebody for. */
+  readonly reasons: readonly [HealthReason, ...HealthReason[]];
+}
+
 /**
- * Tags that need somebody, the worst first (`severity`).
- * What is only old needs the robot, which comes again.
+ * Tags that need somebody: first those with what nobody has acknowledged, and of each the worst
+ * first (`severity`). What is only old needs the robot, which comes again.
  */
-export function useUrgent(): readonly Row[] {
+export function useUrgent(): readonly Urgent[] {
   const tags = useApp(selectTags);
   const health = useApp(selectHealth);
   const isNow = useApp((state) => selectShown(state).moment === null);
   const alarms = useSelected(alarmList, (it) => it);
   return useMemo(() => {
-    const seen = isNow
-      ? [...alarms.active.filter((it) => it.isAcknowledged), ...alarms.shelved]
-      : [];
+    const acknowledged = alarms.active.filter((it) => it.isAcknowledged);
+    const has = (items: readonly Item[], tagId: string, reason: HealthReason): boolean =>
+      isNow && alarmOf(items, tagId, reason) !== undefined;
     return rowsOf(tags, health)
-      .map((row) => ({ row, reason: worstReason(row.health) }))
-      .filter(({ reason }) => reason && reason.kind !== 'old')
-      .map(({ row, reason }) => {
-        const isSeen = alarmOf(seen, row.tag.id, reason) !== undefined;
-        return { row, rank: severity(row.health, isSeen) };
+      .flatMap(({ tag: { id }, health: { verdict, reasons } }) => {
+        const rank = (reason: HealthReason): number => {
+          const own = reason.verdict;
+          if (reason.kind === 'old' || !(isBad(own) || own === verdict)) return 0;
+          const isSeen = has(acknowledged, id, reason);
+          return severity({ verdict: own, reasons: [reason] }) + (isSeen ? 0 : UNSEEN);
+        };
+        const [first, ...rest] = reasons
+          .filter((reason) => !has(alarms.shelved, id, reason))
+          .sort((a, b) => rank(b) - rank(a));
+        if (!first || rank(first) === 0) return [];
+        return [{ tagId: id, reasons: [first, ...rest] as const, rank: rank(first) }];
       })
-      .sort((a, b) => b.rank - a.rank)
-      .map(({ row }) => row);
+      .sort((a, b) => b.rank - a.rank);
   }, [tags, health, isNow, alarms]);
 }
 
 /**
- * Since when the alarm of a reason is active, what somebody has said of it, or that there is none
+ * Since when the alarm of a reason is active, that somebody has acknowledged it, or that there is none
  * yet; null: nobody knows, or another moment is shown.
  */
-export function useSince(tagId: string, reason: HealthReason | undefined): string | null {
+export function useSince(tagId: string, reason: HealthReason): string | null {
   const isNow = useApp((state) => selectShown(state).moment === null);
-  const found = useSelected(alarmList, ({ active, shelved }) =>
-    alarmOf([...active, ...shelved], tagId, reason),
-  );
+  const found = useSelected(alarmList, ({ active }) => alarmOf(active, tagId, reason));
   const isKnown = useApp(({ twin }) => twin.alarms !== null && twin.alarms.source !== 'starting');
   if (!isNow) return null;
   if (!found) return isKnown ? S.alarmNotYet : null;
-  if (found.shelf) return S.alarmShelved(clockText(found.shelf.until), '', '');
   if (found.isAcknowledged) return S.healthAcknowledged;
   return S.alarmSince(whenText(secondsOf(found.alarm.raised_at), rosNow(store.get(), now())), null);
 }
@@ -74,29 +86,36 @@ export function DoNow({
   id?: string;
 }): JSX.Element {
   const health = useApp(selectHealth);
-  const { counts } = health;
   const urgent = useUrgent();
+  // The alarms are those of now.
+  const all = useApp((state) => (selectShown(state).moment === null ? 'alarms' : 'tags'));
   const isOfTags = health.reasons.length === 0 && urgent.length > 0;
   return (
     <ul className="do-now" aria-label={S.todoLabel} data-most={most}>
       {isOfTags ? (
-        urgent.slice(0, most).map(({ tag, health: own }, index) => (
+        urgent.slice(0, most).map(({ tagId, reasons: [reason] }, index) => (
           <li key={index}>
             <button
               type="button"
-              data-tag-id={tag.id}
+              data-tag-id={tagId}
               onClick={() => {
-                act({ type: 'select', tagId: tag.id });
+                act({ type: 'select', tagId });
               }}
             >
-              <HealthMark verdict={own.verdict} word={false} />
-              <Todo
-                tagId={tag.id}
-                reason={worstReason(own)}
-                id={index === 0 ? id : undefined}
-                more={index === most - 1 ? counts.critical - most : 0}
-              />
+              <HealthMark verdict={reason.verdict} word={false} />
+              <Todo tagId={tagId} reason={reason} id={index === 0 ? id : undefined} />
             </button>
+            {index === most - 1 && urgent.length > most && (
+              <button
+                type="button"
+                className="do-more"
+                onClick={() => {
+                  act({ type: 'list', list: all });
+                }}
+              >
+                {S.attentionMore(urgent.length - most)}
+              </button>
+            )}
           </li>
         ))
       ) : (
@@ -112,15 +131,13 @@ function Todo({
   tagId,
   reason,
   id,
-  more,
 }: {
   tagId: string;
-  reason: HealthReason | undefined;
+  reason: HealthReason;
   id: string | undefined;
-  /** Critical tags that have no line here. */
-  more: number;
 }): JSX.Element {
-  const why = S.healthDriver(shown(tagId, 24), useReasonText(reason ?? null, true));
+  const why = S.healthDriver(shown(tagId, 24), useReasonText(reason, true));
+  const catalogue = useApp(selectCatalogue);
   const since = useSince(tagId, reason);
   // What was to be done then is no order now.
   const isNow = useApp((state) => selectShown(state).moment === null);
@@ -130,8 +147,7 @@ function Todo({
         {why}
       </span>
       <span className="do-what">
-        {reason && isNow && <strong>{todoText(reason)}</strong>} {since && <small>{since}</small>}
-        {more > 0 && <small className="do-more">{S.healthMoreCritical(more)}</small>}
+        {isNow && <strong>{todoText(catalogue, reason)}</strong>} {since && <small>{since}</small>}
       </span>
     </>
   );
@@ -149,20 +165,28 @@ export function Overall({
   const reason = useReasonText(own ?? null);
   // Of now, as the list of alarms is.
   const isNow = useApp((state) => selectShown(state).moment === null);
-  const alarms = useSelected(alarmList, ({ active, shelved }) => active.length + shelved.length);
-  const text = own ? reason : overallText(health, isNow ? alarms : 0);
+  const active = useSelected(alarmList, (list) => list.active.length);
+  const shelved = useSelected(alarmList, (list) => list.shelved.length);
+  const text = own ? reason : overallText(health, isNow ? active : 0, isNow ? shelved : 0);
+  const catalogue = useApp(selectCatalogue);
   if (text === null) return null;
   return (
     <p className="do-why" data-testid={id} title={text}>
       {text}
-      {own && <strong> {todoText(own)}</strong>}
+      {own && <strong> {todoText(catalogue, own)}</strong>}
     </p>
   );
 }
 
 /** Null: its tags say it. */
-function overallText({ verdict, counts }: HouseHealth, alarms: number): string | null {
-  if (isBad(verdict)) return null;
+function overallText(
+  { verdict, counts }: HouseHealth,
+  active: number,
+  shelved: number,
+): string | null {
+  // What is shelved has no line of its own.
+  if (isBad(verdict)) return shelved > 0 ? S.alarmGroups.shelved(String(shelved)) : null;
+  const alarms = active + shelved;
   if (verdict === 'healthy') return alarms > 0 ? S.healthDespite(alarms) : S.healthAllWell;
   const { unknown } = counts;
   if (unknown === 0) return S.healthNothing;

@@ -2,7 +2,7 @@ import { act, fireEvent, render, screen } from '@testing-library/react';
 import { expect, test } from 'vitest';
 
 import { calling } from '../alarms/list';
-import { acknowledgeAlarms } from '../alarms/own';
+import { acknowledgeAlarms, shelveAlarm } from '../alarms/own';
 import { alarmList, startAlarms } from '../alarms/watch';
 import { receive, store } from '../store/app';
 import { alarm, alarms, tellAlarms } from '../testing/alarms';
@@ -30,7 +30,7 @@ test('says what to do first, and since when', () => {
   const cold = reason({ value: 6, limit: 10 });
   const pest = reason({ kind: 'pest', sensor: '', value: 2, limit: null });
   const few = { ...pest, value: 0 };
-  showTags(TAGS, judgement({ 1: [few], 5: [pest, cold] }));
+  showTags(TAGS, judgement({ 1: [few], 5: [pest] }));
   const stop = startAlarms();
   render(<HealthSummary kiosk={false} />);
   act(() => {
@@ -53,20 +53,57 @@ test('says what to do first, and since when', () => {
     expect.stringMatching(/^CriticalTag 1: /),
     expect.stringMatching(/^CriticalTag 5: .*treat the plants acknowledged/),
   ]);
-  // And never before what is worse.
+  // Of one tag too: what nobody has seen is said, however mild it is beside the rest.
   act(() => {
-    showTags(TAGS, judgement({ 1: [{ ...cold, verdict: 'stressed' }], 5: [pest, cold] }));
+    showTags(TAGS, judgement({ 5: [pest, { ...cold, verdict: 'stressed' }] }));
+    tellAlarms(alarm('a', { tag_id: '5', raised: 100, reason: pest }));
   });
-  expect(todo.firstElementChild?.textContent).toMatch(/^CriticalTag 5: /);
+  expect(todo.firstElementChild?.textContent).toMatch(/^StressedTag 5: Temperature/);
   stop();
 });
 
-test('says how many critical tags have no line, and on the wall nothing beside them', () => {
+test('nobody is called for what is shelved, and all the rest is counted', () => {
+  const tags = ['1', '2', '3', '4', '5'].map((tag_id) => wireTag({ tag_id }));
+  const mild = reason({ verdict: 'stressed' });
+  showTags(tags, judgement({ 1: [reason()], 2: [mild], 3: [mild], 4: [mild], 5: 'healthy' }));
+  const stop = startAlarms();
+  render(<HealthSummary kiosk={false} />);
+  const todo = screen.getByRole('list', { name: 'Do this now' });
+  act(() => {
+    tellAlarms(alarm('fan', { tag_id: '1' }));
+  });
+  expect(todo.textContent).toMatch(/^CriticalTag 1: .*StressedTag 2: .*\+ 2 more$/);
+  act(() => {
+    for (const item of calling(alarmList.get())) shelveAlarm(item, 15, 'fan');
+  });
+  expect(todo.textContent).toMatch(/^StressedTag 2: .*StressedTag 3: .*\+ 1 more$/);
+  fireEvent.click(screen.getByRole('button', { name: '+ 1 more' }));
+  expect(store.get().view.list).toBe('alarms');
+  // Where nothing else is wrong, that is why nothing is listed.
+  act(() => {
+    showTags(tags, judgement({ 1: [reason()] }));
+    tellAlarms(alarm('fan', { tag_id: '1' }));
+  });
+  expect(todo.textContent).toBe('Shelved (1)');
+  stop();
+});
+
+test('of what is back in its range nothing is ordered', () => {
+  const back = reason({ verdict: 'stressed', value: 18.1, limit: 18.5 });
+  showTags(TAGS, judgement({ 1: 'healthy', 5: [back] }));
+  render(<HealthSummary kiosk={false} />);
+  const todo = screen.getByRole('list', { name: 'Do this now' });
+  expect(todo.textContent.trim()).toBe(
+    'StressedTag 5: Temperature 18.1\u00a0°C, back in range; clears above 18.5',
+  );
+});
+
+test('says how many tags have no line, and on the wall nothing beside them', () => {
   const tags = ['1', '2', '3', '4'].map((tag_id) => wireTag({ tag_id }));
   showTags(tags, judgement({ 1: [reason()], 2: [reason()], 3: [reason()], 4: 'healthy' }));
   const { unmount } = render(<HealthSummary kiosk={false} />);
   const { lastElementChild } = screen.getByRole('list', { name: 'Do this now' });
-  expect(lastElementChild?.textContent).toMatch(/^CriticalTag 2: .*\+ 1 more critical$/);
+  expect(lastElementChild?.textContent).toMatch(/^CriticalTag 2: .*\+ 1 more$/);
   unmount();
   render(<HealthSummary kiosk />);
   expect(screen.queryByTestId('health-driver')).toBeNull();

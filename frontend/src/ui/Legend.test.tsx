@@ -129,6 +129,18 @@ describe('legend', () => {
     expect(screen.getByTestId('range-low')).toBeTruthy();
   });
 
+  test('tells of a difference alone while there is one, and has nothing to choose its colours by', () => {
+    act({ type: 'compare', compare: { by: 'ago', seconds: 86_400 } });
+    render(<Legend kiosk={false} />);
+    expect(screen.getByTestId('difference-legend')).toBeTruthy();
+    expect(screen.queryByTestId('range-low')).toBeNull();
+    expect(screen.queryByRole('radio')).toBeNull();
+    flush(() => {
+      act({ type: 'compare', compare: null });
+    });
+    expect(screen.getByTestId('range-low')).toBeTruthy();
+  });
+
   test('a fixed range stays while the data change, and can be typed', () => {
     render(<Legend kiosk={false} />);
     fireEvent.click(screen.getByRole('radio', { name: 'Fixed' }));

@@ -30,6 +30,7 @@ export function Legend({ kiosk }: { kiosk: boolean }): JSX.Element {
       selectShown(state).field.value?.sensor !== name &&
       selectTags(state).some((tag) => tag.at && tag.readings.get(name) != null),
   );
+  const isCompared = useApp((state) => state.view.compare !== null);
   const isIdealWished = useApp((state) => state.view.colouring === 'ideal');
   const isIdeal = useApp((state) => selectColouring(state) === 'ideal');
   const isEstimate = useApp((state) => state.view.heat !== 'nearest');
@@ -48,23 +49,27 @@ export function Legend({ kiosk }: { kiosk: boolean }): JSX.Element {
   }
   return (
     <section className="legend" aria-label={S.legend} data-testid="legend">
-      <div className="legend-title">
-        <strong>{shown(sensor.label, 32)}</strong> <span>{unitOf(sensor, unit)}</span>
-      </div>
-      <div className="legend-scale">
-        {isError ? (
-          <ErrorScale />
-        ) : isIdeal ? (
-          <IdealLegend sensor={sensor} />
-        ) : (
-          <Ramp sensor={sensor} range={range} unit={unit} />
-        )}
-      </div>
+      {!isCompared && (
+        <>
+          <div className="legend-title">
+            <strong>{shown(sensor.label, 32)}</strong> <span>{unitOf(sensor, unit)}</span>
+          </div>
+          <div className="legend-scale">
+            {isError ? (
+              <ErrorScale />
+            ) : isIdeal ? (
+              <IdealLegend sensor={sensor} />
+            ) : (
+              <Ramp sensor={sensor} range={range} unit={unit} />
+            )}
+          </div>
+        </>
+      )}
       {!kiosk && (
         <div className="legend-controls">
           <HeatControl place="legend" />
-          {!isError && <ColouringControl />}
-          {!isIdeal && !isError && (
+          {!isError && !isCompared && <ColouringControl />}
+          {!isIdeal && !isError && !isCompared && (
             <WithParts>{(parts) => <parts.RangeControl sensor={sensor} range={range} />}</WithParts>
           )}
         </div>
@@ -75,7 +80,7 @@ export function Legend({ kiosk }: { kiosk: boolean }): JSX.Element {
           <HatchedSign isFaint /> {S.legendOld}
         </span>
       )}
-      {isIdealWished && !isIdeal && (
+      {isIdealWished && !isIdeal && !isCompared && (
         <span className="faint" data-testid="no-ideal">
           {S.legendNoIdeal}
         </span>

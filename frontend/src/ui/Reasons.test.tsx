@@ -86,7 +86,11 @@ test.each(CASES)('$name', (state) => {
     // The reading that is out of range is marked where it stands, and no other one.
     const marks = [...(row?.querySelectorAll('.beyond') ?? [])];
     const cell = row?.querySelector(`[data-sensor="${sensor}"]`);
-    if (state.readings[sensor]) expect(marks.some((mark) => cell?.contains(mark))).toBe(true);
+    if (!state.readings[sensor]) continue;
+    const mark = marks.find((each) => cell?.contains(each));
+    expect(mark?.textContent).toMatch(value < limit ? /^low / : /^high /);
+    // Arrows are the trend's alone.
+    expect(cell?.querySelector('svg')).toBeNull();
   }
   const ranged = told.filter(({ kind, sensor }) => kind === 'range' && state.readings[sensor]);
   expect(row?.querySelectorAll('.beyond')).toHaveLength(ranged.length);

@@ -40,6 +40,7 @@ export function Reasons({
   hasTodo?: boolean;
 }): JSX.Element | null {
   const { reasons } = health;
+  const catalogue = useApp(selectCatalogue);
   if (reasons.length === 0) return null;
   return (
     <ul className="reasons" aria-label={S.reasonsLabel} data-testid="reasons">
@@ -49,7 +50,7 @@ export function Reasons({
           <span>
             <Reason reason={reason} />
           </span>
-          {hasTodo && <strong>{todoText(reason)}</strong>}
+          {hasTodo && <strong>{todoText(catalogue, reason)}</strong>}
         </li>
       ))}
       {reasons.length > most && <li className="faint">{S.cardMore(reasons.length - most)}</li>}

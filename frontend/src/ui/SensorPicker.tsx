@@ -1,8 +1,8 @@
 import { useEffect, useRef, type JSX } from 'react';
 
 import { rgbText, sensorColour } from '../domain/ramp';
+import type { Sensor } from '../domain/sensors';
 import { shown } from '../domain/text';
-import { unitOf } from '../domain/units';
 import { act, useApp } from '../store/app';
 import { selectSensors } from '../store/derived';
 import { S } from '../strings';
@@ -12,14 +12,14 @@ import { Segmented } from '../widgets/Segmented';
 export function SensorPicker(): JSX.Element {
   const sensors = useApp(selectSensors);
   const sensor = useApp((state) => state.view.sensor);
-  const unit = useApp((state) => state.settings.unit);
   const root = useRef<HTMLDivElement>(null);
-  // On a phone the chosen one may be out of sight: by a link, or by its key.
-  useEffect(() => {
+  // The chosen one may be out of sight: by a link, by its key, or in a narrower window.
+  const showChosen = (): void => {
     root.current
       ?.querySelector('input:checked')
       ?.parentElement?.scrollIntoView({ block: 'nearest', inline: 'nearest' });
-  }, [sensor]);
+  };
+  useEffect(showChosen, [sensor]);
   useEffect(() => {
     const row = root.current;
     if (!row) return undefined;
@@ -28,13 +28,22 @@ export function SensorPicker(): JSX.Element {
       const isMoreAfter = row.scrollLeft + row.clientWidth < row.scrollWidth - 1;
       row.dataset['more'] = `${isMoreBefore ? 'before' : ''} ${isMoreAfter ? 'after' : ''}`.trim();
     };
-    const watch = new ResizeObserver(look);
+    const watch = new ResizeObserver(() => {
+      showChosen();
+      look();
+    });
+    // A mouse wheel turns one way only, and the row goes the other.
+    const turn = ({ deltaX, deltaY }: WheelEvent): void => {
+      if (deltaX === 0) row.scrollLeft += deltaY;
+    };
     watch.observe(row);
     for (const child of row.children) watch.observe(child);
     row.addEventListener('scroll', look, { passive: true });
+    row.addEventListener('wheel', turn, { passive: true });
     return () => {
       watch.disconnect();
       row.removeEventListener('scroll', look);
+      row.removeEventListener('wheel', turn);
     };
   }, []);
   return (
@@ -48,8 +57,7 @@ export function SensorPicker(): JSX.Element {
           label: (
             <>
               <span className="swatch" style={{ background: rgbText(sensorColour(each)) }} />
-              <span className="sensor-label">{shown(each.label, 32)}</span>
-              <span className="sensor-unit">{unitOf(each, unit)}</span>
+              <Label sensor={each} />
             </>
           ),
         }))}
@@ -58,5 +66,18 @@ export function SensorPicker(): JSX.Element {
         }}
       />
     </div>
+  );
+}
+
+/** In short where the name is long: the full one to be heard, and to be had by pointing at it. */
+function Label({ sensor }: { sensor: Sensor }): JSX.Element {
+  const short = (S.sensorShort as Partial<Record<string, string>>)[sensor.name];
+  const label = shown(sensor.label, 32);
+  if (short === undefined) return <span>{label}</span>;
+  return (
+    <span title={label}>
+      <span aria-hidden="true">{short}</span>
+      <span className="unseen">{label}</span>
+    </span>
   );
 }

@@ -18,7 +18,7 @@ export function selectSimulatedUntil(state: AppState): number | null {
 export function SimulatedNote(): JSX.Element {
   const until = useApp(selectSimulatedUntil);
   return (
-    <div role="status" className="troubles" data-testid="simulated">
+    <div role="status" className="troubles simulated" data-testid="simulated">
       {until !== null && (
         <p>
           <strong>{S.simulated}</strong> <span>{S.simulatedHint(rosText(until))}</span>

@@ -21,7 +21,6 @@ import { Age, AgeFact, useAgeStep } from './Age';
 import { CardEstimate } from './estimate';
 import { HealthMark } from './HealthMark';
 import { inTime } from './inTime';
-import { Icon } from '../widgets/Icon';
 import { IconButton } from '../widgets/IconButton';
 import { useFocusBack } from '../widgets/useFocusBack';
 import { Reasons } from './Reasons';
@@ -231,12 +230,7 @@ function CardReading({
       </span>
       {ideal && (
         <span className="card-ideal" data-side={side || undefined} data-health={reason?.verdict}>
-          {side && (
-            <>
-              <Icon name={side === 'below' ? 'down' : 'up'} size={12} />
-              <span className="unseen">{S[side]}, </span>
-            </>
-          )}
+          {side && `${S.side[side]}, `}
           {S.healthIdeal(
             S.idealParts[sensor.part ?? 'any'],
             valueText(sensor, ideal[0], unit, more),

@@ -13,7 +13,6 @@ import type { TemperatureUnit } from '../domain/units';
 import { S } from '../strings';
 import { Age, Tried, useAgeStep } from './Age';
 import { HealthMark } from './HealthMark';
-import { Icon } from '../widgets/Icon';
 import type { HourAgo } from '../store/hourAgo';
 import { isColumnShown } from '../store/settings';
 import { TrendLine } from './TrendLine';
@@ -242,7 +241,7 @@ function Reading({
     <>
       {beyond && (
         <span className="beyond" data-health={reason.verdict} title={beyond}>
-          <Icon name={sideOf(reason) === 'below' ? 'down' : 'up'} size={12} />
+          <span aria-hidden="true">{S.side[sideOf(reason)]} </span>
           <span className="unseen">{beyond}: </span>
         </span>
       )}

@@ -92,7 +92,7 @@ describe('table', () => {
     expect(cell('9', 'temperature')).toBe('20.0');
     expect(cell('9', 'humidity')).toBe('failed');
     expect(cell('9', 'co2')).toContain('no sensor');
-    expect(cell('10', 'temperature')).toBe('Temperature above 35.0\u00a0°C: 40.0');
+    expect(cell('10', 'temperature')).toBe('high Temperature above 35.0\u00a0°C: 40.0');
     expect(row('9').textContent).toContain('rose91');
     expect(row('10').dataset['health']).toBe('critical');
     expect(row('2').dataset['health']).toBe('unknown');
@@ -160,7 +160,7 @@ describe('table', () => {
     const health = judgement({ a: [reason({ verdict: 'stressed' })], b: 'healthy', c: 'healthy' });
     showTags(tags, health);
     render(<TagTable />);
-    expect(trends()).toEqual(['– an hour ago: unknown', '– an hour ago: unknown']);
+    expect(trends()).toEqual(['an hour ago: unknown', 'an hour ago: unknown']);
     const before = tag({
       tag_id: 'a',
       readings: [
@@ -176,18 +176,19 @@ describe('table', () => {
     flush(() => {
       hourAgo.dispatch({
         of: at.sec,
+        isNow: true,
         tags: new Map([['a', { tag: before, health: { verdict: 'healthy', reasons: [] } }]]),
       });
     });
     expect(trends()).toEqual([
       '\u2197 Temperature compared with an hour ago: +1.5\u00a0°C',
-      '– no reading an hour ago',
+      'no reading an hour ago',
     ]);
     // An answer of long ago is none.
     flush(() => {
-      hourAgo.dispatch({ of: at.sec - 601, tags: new Map() });
+      hourAgo.dispatch({ of: at.sec - 601, isNow: true, tags: new Map() });
     });
-    expect(trends()[0]).toBe('– an hour ago: unknown');
+    expect(trends()[0]).toBe('an hour ago: unknown');
     hourAgo.dispatch(null);
   });
 

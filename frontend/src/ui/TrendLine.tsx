@@ -6,7 +6,7 @@ import { shown } from '../domain/text';
 import { differenceShown, trendOf } from '../domain/trend';
 import type { Tag } from '../domain/twin';
 import type { TemperatureUnit } from '../domain/units';
-import type { HourAgo } from '../store/hourAgo';
+import { thenOf, type HourAgo } from '../store/hourAgo';
 import { S } from '../strings';
 
 export const ARROWS = { up: '\u2197', down: '\u2198', level: '\u2192' } as const;
@@ -27,7 +27,7 @@ export function TrendLine({
   unit: TemperatureUnit;
 }): JSX.Element | null {
   const value = tag.readings.get(sensor.name);
-  const trend = trendOf(sensor.name, { tag, health }, then?.tags.get(tag.id) ?? null);
+  const trend = trendOf(sensor.name, { tag, health }, thenOf(then, tag));
   if (!trend || value == null) return null;
   const title = S.trendTitle(shown(sensor.label, 32));
   if (!then || trend.kind !== 'by') {
@@ -37,10 +37,8 @@ export function TrendLine({
         {trend.kind === 'same' && then ? (
           text
         ) : (
-          // Quiet: with a young memory it stands in every row.
-          <>
-            <span aria-hidden="true">–</span> <span className="unseen">{text}</span>
-          </>
+          // Only to be heard: with a young memory it would stand in every row.
+          <span className="unseen">{text}</span>
         )}
       </span>
     );

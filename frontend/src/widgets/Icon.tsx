@@ -3,6 +3,8 @@ import type { JSX } from 'react';
 const PATHS = {
   plus: 'M12 5v14M5 12h14',
   minus: 'M5 12h14',
+  chevron: 'm6 9 6 6 6-6',
+  dots: 'M5 12h.01M12 12h.01M19 12h.01',
   fit: 'M4 9V4h5M20 9V4h-5M4 15v5h5M20 15v5h-5',
   layers: 'M12 3 3 8l9 5 9-5-9-5ZM3 12.5l9 5 9-5M3 17l9 5 9-5',
   menu: 'M4 7h16M4 12h16M4 17h16',

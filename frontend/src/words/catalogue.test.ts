@@ -29,7 +29,7 @@ const english = saidBy({ ...ENGLISH, ...ESTIMATE }, parameters);
 const SAME: Readonly<Record<string, readonly string[]>> = {
   de: [
     ...['phase.live', 'timebarLive', 'keys.time.3.1', 'themes.system', 'tried.ok', 'sensors'],
-    ...['cardPosition', 'rangeAuto', 'saveCsvShort', 'legendMore'],
+    ...['cardPosition', 'rangeAuto', 'saveCsvShort', 'legendMore', 'sensorShort.vpd'],
     ...['keys.global.12.0', 'idealParts.any', 'colourings.ideal', 'differenceTimes'],
     'densities.usual',
   ],
@@ -37,7 +37,7 @@ const SAME: Readonly<Record<string, readonly string[]>> = {
     ...['phase.live', 'timebarLive', 'keys.time.3.1', 'menu', 'tried.ok', 'sensors', 'alarmCount'],
     ...['rangeAuto', 'saveCsvShort', 'trend', 'legendMore', 'robotLayer', 'robotAt'],
     ...['keys.global.12.0', 'keys.map.3.0', 'keys.time.1.0', 'keys.time.2.0', 'keys.time.3.0'],
-    ...['speciesNames.gerbera', 'densities.compact', 'phase.offline'],
+    ...['speciesNames.gerbera', 'densities.compact', 'phase.offline', 'sensorShort.vpd'],
   ],
   es: [
     ...['robotLayer', 'robotAt', 'tried.ok', 'sensors', 'rangeAuto', 'saveCsvShort'],

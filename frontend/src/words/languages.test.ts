@@ -1,3 +1,6 @@
+import { readFileSync } from 'node:fs';
+import { join } from 'node:path';
+
 import { expect, test } from 'vitest';
 
 import { chosenLanguage, inLanguage, LANGUAGE_NAMES, LANGUAGES } from './languages';
@@ -26,6 +29,22 @@ test('another language keeps all else of the link', () => {
   const here = { pathname: '/twin/', search: '?kiosk=1&lang=nl', hash: '#tag=12&at=5' };
   expect(inLanguage(here, 'es')).toBe('/twin/?kiosk=1&lang=es#tag=12&at=5');
   expect(inLanguage({ pathname: '/', search: '', hash: '' }, 'en')).toBe('/?lang=en');
+});
+
+test.each(LANGUAGES)('the shift report in “%s” has dates as the page writes them', (language) => {
+  const file = join(import.meta.dirname, '../../../backend/lupin_bridge/past/report_words.json');
+  const words = JSON.parse(readFileSync(file, 'utf8')) as Readonly<
+    Record<string, { readonly date: string; readonly months: readonly string[] }>
+  >;
+  const { date = '', months = [] } = words[language] ?? {};
+  const { locale } = chosenLanguage(`?lang=${language}`, []);
+  const page = new Intl.DateTimeFormat(locale, { day: 'numeric', month: 'short', year: 'numeric' });
+  const written = months.map((month) =>
+    date.replace('{day}', '7').replace('{month}', month).replace('{year}', '2026'),
+  );
+  expect(written.map((each) => each.replaceAll('\u00a0', ' '))).toEqual(
+    Array.from({ length: 12 }, (_, month) => `${page.format(new Date(2026, month, 7))}, {clock}`),
+  );
 });
 
 test('each language has its own name', () => {

@@ -6,9 +6,9 @@ export const PEOPLE = {
     shared: (name: string): string =>
       `Signed in as ${name}: everybody sees what you acknowledge or shelve.`,
     reads: (name: string): string =>
-      `Signed in as ${name} (viewer): what you acknowledge or shelve stays in this browser.`,
+      `Signed in as ${name} (viewer): you see alarms, but cannot acknowledge or shelve them.`,
     elsewhere: (name: string): string =>
-      `Signed in as ${name}: this server stores no notes, so what you acknowledge or shelve stays in this browser.`,
+      `Signed in as ${name}: this server stores no notes, so you cannot acknowledge or shelve alarms here.`,
     acknowledged: (name: string, at: string): string => `acknowledged by ${name} at ${at}`,
     failed: (why: string): string => `Not saved: ${why}`,
   },
@@ -16,9 +16,9 @@ export const PEOPLE = {
     shared: (name: string): string =>
       `Angemeldet als ${name}: Was Sie quittieren oder zurückstellen, sehen alle.`,
     reads: (name: string): string =>
-      `Angemeldet als ${name}, nur lesend: Was Sie quittieren oder zurückstellen, bleibt in diesem Browser.`,
+      `Angemeldet als ${name}, nur lesend: Sie sehen Alarme, können sie aber nicht quittieren oder zurückstellen.`,
     elsewhere: (name: string): string =>
-      `Angemeldet als ${name}: Dieser Server speichert keine Notizen. Was Sie quittieren oder zurückstellen, bleibt in diesem Browser.`,
+      `Angemeldet als ${name}: Dieser Server speichert keine Notizen. Alarme können Sie hier nicht quittieren oder zurückstellen.`,
     acknowledged: (name: string, at: string): string => `quittiert von ${name} um ${at}`,
     failed: (why: string): string => `Nicht gespeichert: ${why}`,
   },
@@ -26,9 +26,9 @@ export const PEOPLE = {
     shared: (name: string): string =>
       `Aangemeld als ${name}: wat u bevestigt of uitstelt, ziet iedereen.`,
     reads: (name: string): string =>
-      `Aangemeld als ${name} (alleen lezen): wat u bevestigt of uitstelt, blijft in deze browser.`,
+      `Aangemeld als ${name} (alleen lezen): u ziet alarmen, maar kunt ze niet bevestigen of uitstellen.`,
     elsewhere: (name: string): string =>
-      `Aangemeld als ${name}: deze server slaat geen notities op; wat u bevestigt of uitstelt, blijft in deze browser.`,
+      `Aangemeld als ${name}: deze server slaat geen notities op; u kunt hier geen alarmen bevestigen of uitstellen.`,
     acknowledged: (name: string, at: string): string => `bevestigd door ${name} om ${at}`,
     failed: (why: string): string => `Niet opgeslagen: ${why}`,
   },
@@ -36,9 +36,9 @@ export const PEOPLE = {
     shared: (name: string): string =>
       `Sesión iniciada como ${name}: todos ven lo que usted reconoce o aplaza.`,
     reads: (name: string): string =>
-      `Sesión iniciada como ${name}, solo lectura: lo que reconoce o aplaza queda en este navegador.`,
+      `Sesión iniciada como ${name}, solo lectura: ve las alarmas, pero no puede reconocerlas ni aplazarlas.`,
     elsewhere: (name: string): string =>
-      `Sesión iniciada como ${name}: este servidor no guarda notas; lo que reconoce o aplaza queda en este navegador.`,
+      `Sesión iniciada como ${name}: este servidor no guarda notas; aquí no puede reconocer ni aplazar alarmas.`,
     acknowledged: (name: string, at: string): string => `reconocida por ${name} a las ${at}`,
     failed: (why: string): string => `No se ha guardado: ${why}`,
   },

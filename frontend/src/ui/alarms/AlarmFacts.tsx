@@ -1,5 +1,6 @@
 import type { JSX } from 'react';
 
+import { isWorse } from '../../alarms/kept';
 import type { Item } from '../../alarms/list';
 import type { Now } from '../../alarms/now';
 import { selectNow, selectSpeech } from '../../alarms/speech';
@@ -16,7 +17,6 @@ import { S } from '../../strings';
 import { useTicking } from '../../widgets/useNow';
 import { HealthMark } from '../HealthMark';
 import { ARROWS } from '../TrendLine';
-import { WhoAcknowledged } from './WhoseWord';
 
 interface ValuesNow extends Values {
   readonly state: Now | null;
@@ -32,9 +32,9 @@ export function useValues(alarm: Alarm): ValuesNow {
   return { ...valuesOf(alarm, speech, state), state };
 }
 
-/** How bad it is now and was at worst, since when, and until when it is shelved. */
+/** How bad it is now and was at worst, since when, and until when it is shelved: in one line, if it has room. */
 export function AlarmFacts({
-  item: { alarm, verdict, shelf, isAcknowledged },
+  item: { alarm, verdict, shelf },
   values: { state, now: current, worst, first, more },
   isShelved,
 }: {
@@ -45,30 +45,37 @@ export function AlarmFacts({
   const span = useTicking((at) => spanText(alarm, rosNow(store.get(), at)));
   return (
     <>
-      {(state ?? worst) !== null && (
-        <span className="alarm-values">
-          {state?.kind === 'known' && current !== null && (
-            <Fact name="now" verdict={state.verdict} text={current}>
-              {state.value !== null && state.trend !== null && (
-                <Trend alarm={alarm} value={state.value} by={state.trend} />
-              )}
-            </Fact>
-          )}
-          {state?.kind === 'unknown' && <NotKnown alarm={alarm} state={state} more={more} />}
-          {worst !== null && <Fact name="worst" verdict={verdict} text={worst} />}
+      <span className="alarm-values">
+        {state?.kind === 'known' && current !== null && (
+          <Fact name="now" verdict={state.verdict} text={current}>
+            {state.value !== null && state.trend !== null && (
+              <Trend alarm={alarm} value={state.value} by={state.trend} />
+            )}
+          </Fact>
+        )}
+        {state?.kind === 'unknown' && <NotKnown alarm={alarm} state={state} more={more} />}
+        {worst !== null && (
+          <Fact
+            name="worst"
+            verdict={
+              state?.kind === 'known' && isWorse(state.verdict, verdict) ? state.verdict : verdict
+            }
+            text={worst}
+          />
+        )}
+        <span
+          className="faint"
+          data-fact="since"
+          title={[span, first].filter((text) => text !== null).join(', ')}
+        >
+          {span}
         </span>
-      )}
-      <span className="alarm-facts faint">
-        {[span, first, isAcknowledged && !alarm.acknowledged_by ? S.healthAcknowledged : null]
-          .filter((text) => text !== null)
-          .join(', ')}
       </span>
       {isShelved && shelf && (
         <span className="alarm-facts faint">
           {S.alarmShelved(clockText(shelf.until), shelf.reason, alarm.shelved_by ?? '')}
         </span>
       )}
-      <WhoAcknowledged alarm={alarm} />
     </>
   );
 }

@@ -1,12 +1,13 @@
 import { act as flush, fireEvent, render, screen, within } from '@testing-library/react';
 import { afterEach, beforeEach, expect, test, vi } from 'vitest';
 
-import { NOTHING_KEPT } from '../../alarms/kept';
+import { acknowledge, NOTHING_KEPT } from '../../alarms/kept';
 import { done, own, shelveAlarm } from '../../alarms/own';
 import { startAlarms } from '../../alarms/watch';
 import { notifyState } from '../../alarms/notify';
 import type { Alarm, HealthReason } from '../../contract/types';
-import { act, receive, store } from '../../store/app';
+import { act as dispatch, receive, store } from '../../store/app';
+import { person } from '../../store/signals';
 import { NO_HOUSE } from '../../store/twin';
 import { alarm, alarms, tellAlarms } from '../../testing/alarms';
 import { goLost, showTags } from '../../testing/page';
@@ -19,6 +20,7 @@ let stop: () => void;
 beforeEach(() => {
   own.dispatch(NOTHING_KEPT);
   done.dispatch(null);
+  person.dispatch(null);
   showTags([wireTag()]);
   stop = startAlarms();
   render(<AlarmPanel />);
@@ -33,13 +35,16 @@ const tell = (...list: readonly Alarm[]): void => {
   });
 };
 const group = (name: string): HTMLElement[] => [
-  ...document.querySelectorAll<HTMLElement>(`[data-group=${name}] li`),
+  ...document.querySelectorAll<HTMLElement>(`[data-group=${name}] [data-alarm]`),
 ];
 const first = (name: string): HTMLElement => {
   const [row] = group(name);
   if (!row) throw new Error(`no row in ${name}`);
   return row;
 };
+/** What stands in the place of a row's one button. */
+const status = (tag: string): string | null | undefined =>
+  document.querySelector(`[data-where='${tag}'] > .alarm-tools > :first-child`)?.textContent;
 const fact = (row: HTMLElement, name: string): HTMLElement => {
   const found = row.querySelector<HTMLElement>(`[data-fact=${name}]`);
   if (!found) throw new Error(`nothing of ${name}`);
@@ -50,6 +55,15 @@ const notes = (): (string | undefined)[] =>
 const press = (name: RegExp | string): void => {
   fireEvent.click(screen.getByRole('button', { name }));
 };
+/** What the menu of a tag's row offers. */
+const actions = (tag: string): (string | null)[] => {
+  press(new RegExp(`^Actions: Tag ${tag}`));
+  return [...document.querySelectorAll('.row-actions button')].map((each) => each.textContent);
+};
+const act = (tag: string, name: string): void => {
+  actions(tag);
+  press(name);
+};
 
 test('each in words: what, where, now, at worst, since when; what is resolved until when', () => {
   tell(
@@ -59,14 +73,15 @@ test('each in words: what, where, now, at worst, since when; what is resolved un
   const active = first('active');
   expect(active.textContent).toContain('Tag 5: Temperature below 10.0\u00a0°C');
   expect(active.textContent).toContain('since sim 00:08:20');
-  expect(active.textContent).toContain('6.6\u00a0°C when raised');
+  expect(fact(active, 'since').title).toContain('6.6\u00a0°C when raised');
   expect(fact(active, 'worst').textContent).toContain('worst 4.2\u00a0°C');
   expect(fact(active, 'worst').dataset['status']).toBe('critical');
   expect(fact(active, 'now').textContent).toBe('now unknown');
   const resolved = first('resolved');
   expect(resolved.textContent).toContain('Whole greenhouse: No tag is being scanned');
   expect(resolved.textContent).toContain('sim 00:01:40 until sim 00:02:40 (1\u00a0min)');
-  expect(within(resolved).queryByRole('button', { name: /^Shelve/ })).toBeNull();
+  press(/^Actions: Whole greenhouse/);
+  expect(within(resolved).queryByRole('button', { name: 'Shelve' })).toBeNull();
 });
 
 test('the value of now follows the newest state, with its own severity', () => {
@@ -85,6 +100,16 @@ test('the value of now follows the newest state, with its own severity', () => {
   const now = fact(first('active'), 'now');
   expect([now.textContent, now.dataset['status']]).toEqual([' now 12.3\u00a0°C', 'stressed']);
   expect(fact(first('active'), 'worst').dataset['status']).toBe('critical');
+});
+
+test('what is worse now than the alarm has said yet is the worst, with its severity', () => {
+  flush(() => {
+    const tag = wireTag({ readings: readings({ temperature: 8.1 }) });
+    showTags([tag], judgement({ 1: [reason({ value: 8.1 })] }));
+  });
+  tell(alarm('a', { worst: 12, reason: { value: 12, limit: 18, verdict: 'stressed' } }));
+  const worst = fact(first('active'), 'worst');
+  expect([worst.title, worst.dataset['status']]).toEqual(['worst 8.1\u00a0°C', 'critical']);
 });
 
 test('what is well again waits for one more good scan, and pests for an inspection', () => {
@@ -106,7 +131,26 @@ test('what is well again waits for one more good scan, and pests for an inspecti
 test('who acknowledged it and when, by the clock of the twin', () => {
   const said = { acknowledged_by: 'anna', acknowledged_at: { sec: 1_000, nanosec: 0 } };
   tell(alarm('a', { tag_id: '5', ...said }));
-  expect(fact(first('active'), 'by').textContent).toBe('acknowledged by anna at sim 00:16:40');
+  flush(() => {
+    own.dispatch(acknowledge(NOTHING_KEPT, [{ alarm: alarm('a'), verdict: 'critical' }], 0));
+  });
+  expect(status('5')).toBe('acknowledged by anna at sim 00:16:40');
+});
+
+test('who may not act on what is shared is offered nothing of it', () => {
+  const session = { can_sign_out: true, seconds_left: null, role: 'viewer' } as const;
+  tell(alarm('a', { tag_id: '5' }), alarm('b', { tag_id: '6' }));
+  expect(screen.getAllByRole('button', { name: /^Acknowledge/ })).toHaveLength(3);
+  flush(() => {
+    person.dispatch({ ...session, name: 'vera', can_write_notes: false });
+  });
+  expect(screen.queryAllByRole('button', { name: /acknowledge/i })).toEqual([]);
+  expect(actions('5')).toEqual(['Go to start']);
+  fireEvent.keyDown(document, { key: 'Escape' });
+  flush(() => {
+    person.dispatch({ ...session, name: 'anna', role: 'operator', can_write_notes: true });
+  });
+  expect(actions('6')).toEqual(['Go to start', 'Shelve', 'Comment']);
 });
 
 test('acknowledged, shelved, and back', () => {
@@ -115,20 +159,20 @@ test('acknowledged, shelved, and back', () => {
     group('active').map(({ dataset }) => dataset['acknowledged']);
   press(/^Acknowledge: Tag 5/);
   expect(acknowledged()).toEqual(['true', 'false']);
-  expect(group('active').map(({ textContent }) => textContent.includes(', acknowledged'))).toEqual([
-    true,
-    false,
-  ]);
+  expect([status('5'), status('6')]).toEqual(['acknowledged', 'Acknowledge']);
+  // In its place, which does nothing more.
+  press('acknowledged');
+  expect(acknowledged()).toEqual(['true', 'false']);
   press('Undo');
   expect(acknowledged()).toEqual(['false', 'false']);
   press(/^Acknowledge: Tag 5/);
-  press(/^Unacknowledge: Tag 5/);
+  act('5', 'Unacknowledge');
   expect(acknowledged()).toEqual(['false', 'false']);
-  press(/^Shelve: Tag 6/);
+  act('6', 'Shelve');
   press('For 8 h');
   expect(group('active')).toHaveLength(1);
   expect(group('shelved')[0]?.textContent).toMatch(/shelved until \d\d:\d\d:\d\d/);
-  press(/^Unshelve: Tag 6/);
+  act('6', 'Unshelve');
   expect(group('active')).toHaveLength(2);
   press('Acknowledge all (2)');
   expect(group('active').map(({ dataset }) => dataset['acknowledged'])).toEqual(['true', 'true']);
@@ -138,7 +182,7 @@ test('acknowledged, shelved, and back', () => {
 
 test('a critical alarm takes a reason, and is shelved for no more than an hour', () => {
   tell(alarm('a', { tag_id: '5' }));
-  press(/^Shelve: Tag 5/);
+  act('5', 'Shelve');
   const times = screen.getAllByRole<HTMLButtonElement>('button', { name: /^For / });
   expect(times.map(({ textContent }) => textContent)).toEqual(['For 15 min', 'For 1 h']);
   expect(times.every(({ disabled }) => disabled)).toBe(true);
@@ -157,7 +201,7 @@ test('what is shelved while the list is held says so where it stands, and all is
   fireEvent.pointerEnter(screen.getByTestId('alarms'));
   const mild = { verdict: 'stressed' } as const;
   tell(alarm('a', { tag_id: '5', reason: mild }), alarm('b', { tag_id: '6', reason: mild }));
-  press(/^Shelve: Tag 5/);
+  act('5', 'Shelve');
   press('For 1 h');
   expect(group('active').map(({ textContent }) => textContent.includes('shelved until'))).toEqual([
     true,
@@ -166,6 +210,24 @@ test('what is shelved while the list is held says so where it stands, and all is
   // The heading counts it no more.
   expect(group('active').map(({ dataset }) => dataset['elsewhere'])).toEqual(['true', 'false']);
   press('Acknowledge all (1)');
+});
+
+test('what is resolved while the list is held says so where it stands, and no count has it', () => {
+  const bad = Array.from({ length: 5 }, (_, at) => alarm(`a${at}`, { tag_id: String(at) }));
+  tell(...bad);
+  const list = screen.getByTestId('alarms');
+  fireEvent.click(screen.getByText(/5 alarms/));
+  fireEvent.pointerEnter(list);
+  tell(...bad.slice(1), alarm('a0', { tag_id: '0', cleared: 950 }));
+  expect(status('0')).toBe('resolved');
+  expect(group('active')).toHaveLength(5);
+  expect(screen.getAllByRole('heading')[0]?.textContent).toBe('Active (4)');
+  expect(screen.getByText(/4 alarms/)).toBeTruthy();
+  expect(screen.getAllByText('Acknowledge all (4)')).toHaveLength(2);
+  fireEvent.change(screen.getByLabelText('Filter alarms'), { target: { value: 'temperature' } });
+  expect(screen.getAllByRole('heading')[0]?.textContent).toBe('Active (4/4)');
+  press('Acknowledge all (4)');
+  expect(own.get().acknowledged.has('a0')).toBe(false);
 });
 
 test('what is worst now stands first, whatever was worse once', () => {
@@ -254,7 +316,7 @@ test('it is of now, and says so while another moment is shown', () => {
   tell(alarm('a'));
   expect(notes()).toEqual([]);
   flush(() => {
-    act({ type: 'moment', moment: 50 });
+    dispatch({ type: 'moment', moment: 50 });
     receive({ type: 'past', past: { at: 50, house: NO_HOUSE } });
   });
   expect(notes()).toEqual(['now']);

@@ -9,17 +9,17 @@ import {
   type Block,
   type Order,
 } from '../../alarms/arrange';
-import { unacknowledged, type Item } from '../../alarms/list';
+import { calling, groupOf, unacknowledged, type AlarmList, type Item } from '../../alarms/list';
 import { acknowledgeAlarms } from '../../alarms/own';
-import { selectNow, selectSpeech, worstNow, worstNowFirst } from '../../alarms/speech';
+import { selectNow, selectSpeech, todoNow, worstNow, worstNowFirst } from '../../alarms/speech';
 import { alarmList } from '../../alarms/watch';
 import { now, timeOfDay } from '../../clock';
-import { todoText } from '../../domain/reasons';
 import { shown as shownText } from '../../domain/text';
 import { fileName, save } from '../../export/save';
 import { store, useApp } from '../../store/app';
 import { useSelected } from '../../store/create';
-import { rosNow } from '../../store/moment';
+import { rosNow, selectNewestTag } from '../../store/moment';
+import { mayAct, person } from '../../store/signals';
 import { LONGEST_FILTER } from '../../store/view';
 import { S } from '../../strings';
 import { Disclosure } from '../../widgets/Disclosure';
@@ -27,8 +27,9 @@ import { Icon } from '../../widgets/Icon';
 import { Select } from '../../widgets/Select';
 import { useChosenInSight } from '../chosenInSight';
 import { HealthMark } from '../HealthMark';
+import { Acknowledge } from './Acknowledge';
 import { AlarmNotes } from './AlarmNotes';
-import { AlarmRow, type GroupName } from './AlarmRow';
+import { AlarmRow } from './AlarmRow';
 import { DoneLine } from './DoneLine';
 import { ALARMS_ID, ListChoice } from './ListChoice';
 import { once } from './once';
@@ -40,6 +41,8 @@ import { WhoseWord } from './WhoseWord';
 const MOST_ROWS = 100;
 /** Tags that a cause names. */
 const MOST_TAGS = 6;
+
+const isTag = (id: string): boolean => selectNewestTag(store.get(), id) !== undefined;
 
 /** The alarms of now, beside the map: active, shelved, and resolved. */
 export function AlarmPanel(): JSX.Element {
@@ -58,8 +61,11 @@ export function AlarmPanel(): JSX.Element {
   const [filter, setFilter] = useState('');
   const [order, setOrder] = useState<Order>('cause');
   const { shown, added, release, ...hold } = useHeldOrder(all);
-  const seen = filtered(shown, filter, speech);
-  const waiting = unacknowledged(seen.active);
+  const seen = filtered(shown, filter, speech, isTag);
+  // As elsewhere in the page, whatever order is held.
+  const counted = filtered(all, filter, speech, isTag);
+  const waiting = calling(seen);
+  const isAble = useSelected(person, mayAct);
   const count = seen.active.length + seen.shelved.length + seen.resolved.length;
   const list = useRef<HTMLDivElement>(null);
   useChosenInSight(
@@ -104,9 +110,8 @@ export function AlarmPanel(): JSX.Element {
           className="text-button"
           title={S.alarmSaveCsv}
           onClick={() => {
-            const text = alarmsCsv(filtered(alarmList.get(), filter, speech), speech, (alarm) =>
-              selectNow(store.get(), alarm),
-            );
+            const found = filtered(alarmList.get(), filter, speech, isTag);
+            const text = alarmsCsv(found, speech, (alarm) => selectNow(store.get(), alarm));
             const blob = new Blob([text], { type: 'text/csv;charset=utf-8' });
             save(blob, fileName('alarms', 'csv', timeOfDay()));
           }}
@@ -115,16 +120,18 @@ export function AlarmPanel(): JSX.Element {
         </button>
       </div>
       <DoneLine added={added.length} onShow={release}>
-        <button
-          type="button"
-          className="text-button all-seen"
-          disabled={waiting.length === 0}
-          onClick={once(() => {
-            acknowledgeAlarms(waiting);
-          })}
-        >
-          <Icon name="check" size={18} /> {S.alarmAcknowledgeAll(waiting.length)}
-        </button>
+        {isAble && (
+          <button
+            type="button"
+            className="text-button all-seen"
+            disabled={waiting.length === 0}
+            onClick={once(() => {
+              acknowledgeAlarms(waiting);
+            })}
+          >
+            <Icon name="check" size={18} /> {S.alarmAcknowledgeAll(waiting.length)}
+          </button>
+        )}
         <Disclosure label={S.alarmTell} button={<Icon name="bell" />} className="tell-me">
           <TellMe />
         </Disclosure>
@@ -147,12 +154,11 @@ export function AlarmPanel(): JSX.Element {
           (name) =>
             seen[name].length > 0 && (
               <section key={name} data-group={name}>
-                {/* As elsewhere in the page, whatever order is held. */}
                 <h3>
                   {S.alarmGroups[name](
                     filter === ''
                       ? String(all[name].length)
-                      : `${seen[name].length}/${all[name].length}`,
+                      : `${counted[name].length}/${all[name].length}`,
                   )}
                 </h3>
                 {arranged(seen[name], order, speech).map((block) => (
@@ -168,7 +174,13 @@ export function AlarmPanel(): JSX.Element {
 }
 
 /** Alarms in a row; many of one cause are opened by their heading. */
-function Rows({ block: { cause, items }, group }: { block: Block; group: GroupName }): JSX.Element {
+function Rows({
+  block: { cause, items },
+  group,
+}: {
+  block: Block;
+  group: keyof AlarmList;
+}): JSX.Element {
   const [most, setMost] = useState(MOST_ROWS);
   const [isOpen, setOpen] = useState(false);
   const rest = items.length - most;
@@ -219,19 +231,22 @@ function CauseHeading({
 }: {
   cause: string;
   items: readonly Item[];
-  group: GroupName;
+  group: keyof AlarmList;
   isOpen: boolean;
   onToggle: () => void;
 }): JSX.Element | null {
   const speech = useApp(selectSpeech);
+  // While the order is held, others may still stand here.
+  const own = items.filter((item) => groupOf(item) === group);
   const facts = useApp((state) => {
     const nowS = rosNow(state, now());
-    return causeFacts(items, speech, nowS, (alarm) => selectNow(state, alarm)).join(', ');
+    return causeFacts(own, speech, nowS, (alarm) => selectNow(state, alarm)).join(', ');
   });
-  const verdict = useApp((state) => worstNow(state, items));
-  const [first] = items;
-  if (!first || !verdict) return null;
-  const waiting = unacknowledged(items);
+  const shown = own.length > 0 ? own : items;
+  const verdict = useApp((state) => worstNow(state, shown));
+  const todo = useApp((state) => todoNow(state, shown));
+  if (!verdict) return null;
+  const waiting = unacknowledged(own);
   const tags = [...new Set(items.map(({ alarm }) => alarm.tag_id))].filter(Boolean);
   const named = tags.slice(0, MOST_TAGS).map((id) => shownText(id, 16));
   return (
@@ -239,31 +254,33 @@ function CauseHeading({
       <button type="button" className="alarm-go" aria-expanded={isOpen} onClick={onToggle}>
         <HealthMark verdict={verdict} word={false} />
         <span className="alarm-text">
-          <span>
-            <strong>{cause}</strong> · {S.alarmCount(items.length)}
+          <span className="alarm-what">
+            <span>
+              <strong>{cause}</strong> · {S.alarmCount(own.length)}
+            </span>
+            {group !== 'resolved' && <span className="alarm-do">{todo}</span>}
           </span>
-          {group !== 'resolved' && (
-            <span className="alarm-do">{todoText(first.alarm.reason, verdict)}</span>
-          )}
           <span className="alarm-facts">{facts}</span>
           <span className="alarm-facts faint">
             {S.alarmTags(named, tags.length - named.length)}
           </span>
         </span>
-        <Icon name={isOpen ? 'minus' : 'plus'} size={14} />
+        <Icon name="chevron" />
       </button>
-      <div className="alarm-tools">
-        <button
-          type="button"
-          disabled={waiting.length === 0}
-          aria-label={S.alarmAcknowledgeOf(cause)}
-          onClick={once(() => {
-            acknowledgeAlarms(waiting);
-          })}
-        >
-          {S.alarmAcknowledgeAll(waiting.length)}
-        </button>
-      </div>
+      {group !== 'shelved' && (
+        <div className="alarm-tools">
+          <Acknowledge
+            label={S.alarmAcknowledgeOf(cause)}
+            text={S.alarmAcknowledgeAll(waiting.length)}
+            status={
+              waiting.length > 0 ? null : own.length > 0 ? S.healthAcknowledged : S.alarmCount(0)
+            }
+            onAcknowledge={() => {
+              acknowledgeAlarms(waiting);
+            }}
+          />
+        </div>
+      )}
     </div>
   );
 }

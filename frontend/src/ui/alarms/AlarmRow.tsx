@@ -1,21 +1,20 @@
 import { memo, type JSX } from 'react';
 
-import { goToStart, showAlarm } from '../../alarms/follow';
-import type { Item } from '../../alarms/list';
-import { acknowledgeAlarms, unacknowledgeAlarm, unshelveAlarm } from '../../alarms/own';
+import { showAlarm } from '../../alarms/follow';
+import { groupOf, type AlarmList, type Item } from '../../alarms/list';
+import { acknowledgeAlarms } from '../../alarms/own';
 import { selectSpeech } from '../../alarms/speech';
 import { nameText, whereText } from '../../alarms/words';
-import { todoText } from '../../domain/reasons';
-import { Comments } from '../../notes/Comments';
+import { clockText } from '../../domain/format';
+import { Said } from '../../notes/Comments';
 import { useApp } from '../../store/app';
 import { S } from '../../strings';
 import { HealthMark } from '../HealthMark';
+import { Acknowledge } from './Acknowledge';
 import { AlarmFacts, useValues } from './AlarmFacts';
-import { Either } from './Either';
 import { once } from './once';
-import { Shelving } from './Shelving';
-
-export type GroupName = 'active' | 'shelved' | 'resolved';
+import { RowMenu } from './RowMenu';
+import { useWhoAcknowledged } from './WhoseWord';
 
 /** One alarm: what, where, how bad now and at worst, since when; it leads to its tag as it is now. */
 export const AlarmRow = memo(function AlarmRow({
@@ -24,30 +23,30 @@ export const AlarmRow = memo(function AlarmRow({
 }: {
   item: Item;
   /** Where the row stands: while the order is held, not where the alarm belongs by now. */
-  group: GroupName;
+  group: keyof AlarmList;
 }): JSX.Element {
-  const { alarm, verdict, isAcknowledged, shelf } = item;
-  const belongs = alarm.cleared_at !== null ? 'resolved' : shelf !== null ? 'shelved' : 'active';
+  const { alarm, verdict, isAcknowledged } = item;
   const isSelected = useApp((state) => state.view.selected === alarm.tag_id);
   const values = useValues(alarm);
   const current = values.state?.kind === 'known' ? values.state.verdict : verdict;
   const name = useApp((state) => nameText(alarm, selectSpeech(state)));
+  const status = useStatus(item, group);
   return (
     <li
       data-alarm={alarm.id}
       data-where={alarm.tag_id}
       data-health={verdict}
       data-acknowledged={isAcknowledged}
-      data-elsewhere={group !== belongs}
+      data-elsewhere={group !== groupOf(item)}
       data-selected={isSelected}
     >
       <button
         type="button"
         className="alarm-go"
         title={S.alarmShow}
-        onClick={() => {
+        onClick={once(() => {
           showAlarm(alarm);
-        }}
+        })}
       >
         <HealthMark verdict={current} word={false} />
         <span className="alarm-text">
@@ -61,57 +60,37 @@ export const AlarmRow = memo(function AlarmRow({
             </span>
             {group !== 'resolved' && (
               <span className="alarm-do" data-again={current === 'healthy' || undefined}>
-                {todoText(alarm.reason, current)}
+                {values.todo}
               </span>
             )}
           </span>
-          <AlarmFacts item={item} values={values} isShelved={group !== 'resolved'} />
+          <AlarmFacts item={item} values={values} isShelved={group === 'shelved'} />
         </span>
       </button>
-      <Tools item={item} group={group} name={name} />
-      <Comments subject={`alarm:${alarm.id}`} name={name} isOfNow />
+      <div className="alarm-tools">
+        <Acknowledge
+          label={S.alarmAcknowledgeOf(name)}
+          text={S.alarmAcknowledge}
+          status={status}
+          onAcknowledge={() => {
+            acknowledgeAlarms([item]);
+          }}
+        />
+        <RowMenu item={item} name={name} />
+      </div>
+      <Said subject={`alarm:${alarm.id}`} moment={null} />
     </li>
   );
 });
 
-function Tools({ item, group, name }: { item: Item; group: GroupName; name: string }): JSX.Element {
+/** What has been done about it, or that it is over where it still stands above; null: nothing. */
+function useStatus(item: Item, group: keyof AlarmList): string | null {
   const { alarm, isAcknowledged, shelf } = item;
-  const canLookBack = useApp((state) => state.twin.remembered.state !== 'off');
-  return (
-    <div className="alarm-tools">
-      <button
-        type="button"
-        aria-label={(isAcknowledged ? S.alarmUnacknowledgeOf : S.alarmAcknowledgeOf)(name)}
-        onClick={once(() => {
-          if (isAcknowledged) unacknowledgeAlarm(alarm);
-          else acknowledgeAlarms([item]);
-        })}
-      >
-        <Either texts={[S.alarmAcknowledge, S.alarmUnacknowledge]} at={isAcknowledged ? 1 : 0} />
-      </button>
-      {shelf !== null ? (
-        <button
-          type="button"
-          aria-label={S.alarmUnshelveOf(name)}
-          onClick={once(() => {
-            unshelveAlarm(alarm);
-          })}
-        >
-          <Either texts={[S.alarmShelve, S.alarmUnshelve]} at={1} />
-        </button>
-      ) : (
-        group !== 'resolved' && <Shelving item={item} name={name} />
-      )}
-      <button
-        type="button"
-        disabled={!canLookBack}
-        aria-label={S.alarmStartOf(name)}
-        onClick={() => {
-          goToStart(alarm);
-        }}
-      >
-        {S.alarmStart}
-      </button>
-    </div>
-  );
+  const who = useWhoAcknowledged(alarm);
+  const belongs = groupOf(item);
+  if (group !== belongs && belongs === 'resolved') return S.alarmResolved;
+  if (group !== belongs && shelf !== null) {
+    return S.alarmShelved(clockText(shelf.until), shelf.reason, alarm.shelved_by ?? '');
+  }
+  return isAcknowledged ? (who ?? S.healthAcknowledged) : null;
 }

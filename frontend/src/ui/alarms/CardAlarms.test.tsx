@@ -4,6 +4,7 @@ import { afterEach, beforeEach, expect, test } from 'vitest';
 import { NOTHING_KEPT } from '../../alarms/kept';
 import { own } from '../../alarms/own';
 import { alarmList, startAlarms } from '../../alarms/watch';
+import { person } from '../../store/signals';
 import { alarm, tellAlarms } from '../../testing/alarms';
 import { judgement } from '../../testing/health';
 import { showTags } from '../../testing/page';
@@ -49,6 +50,14 @@ test('all alarms of a tag are acknowledged where it is looked at, and no others'
   });
   const line = screen.getByTestId('card-alarms');
   expect(line.textContent).toMatch(/^2 alarms · since sim 00:08:20/);
+  const vera = { can_sign_out: true, seconds_left: null, name: 'vera', role: 'viewer' } as const;
+  flush(() => {
+    person.dispatch({ ...vera, can_write_notes: false });
+  });
+  expect(screen.queryByRole('button')).toBeNull();
+  flush(() => {
+    person.dispatch(null);
+  });
   fireEvent.click(screen.getByRole('button', { name: 'Acknowledge all (2)' }));
   expect(line.textContent).toMatch(/^2 alarms acknowledged · since/);
   expect(screen.queryByRole('button')).toBeNull();

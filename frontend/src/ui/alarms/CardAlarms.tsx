@@ -2,15 +2,15 @@ import type { JSX } from 'react';
 
 import { unacknowledged } from '../../alarms/list';
 import { acknowledgeAlarms } from '../../alarms/own';
-import { worstNow } from '../../alarms/speech';
+import { todoNow, worstNow } from '../../alarms/speech';
 import { spanText } from '../../alarms/words';
 import { alarmList } from '../../alarms/watch';
 import type { Alarm } from '../../contract/types';
-import { todoText } from '../../domain/reasons';
 import { secondsOf } from '../../domain/rostime';
 import { store, useApp } from '../../store/app';
 import { useSelected } from '../../store/create';
 import { rosNow } from '../../store/moment';
+import { mayAct, person } from '../../store/signals';
 import { S } from '../../strings';
 import { useTicking } from '../../widgets/useNow';
 import { once } from './once';
@@ -24,16 +24,18 @@ export function CardAlarms({ tagId }: { tagId: string }): JSX.Element | null {
   const waiting = unacknowledged(items);
   const [oldest] = items.map(({ alarm }) => alarm).sort(byTime);
   const since = useTicking((at) => (oldest ? spanText(oldest, rosNow(store.get(), at)) : ''));
-  const isWell = useApp((state) => worstNow(state, items) === 'healthy');
-  const [worst] = items;
-  if (!worst) return null;
+  const well = useApp((state) =>
+    worstNow(state, items) === 'healthy' ? todoNow(state, items) : '',
+  );
+  const isAble = useSelected(person, mayAct);
+  if (items.length === 0) return null;
   return (
-    <div className="card-alarms alarm-tools" data-testid="card-alarms">
+    <div className="card-alarms" data-testid="card-alarms">
       <span>
         {(waiting.length === 0 ? S.alarmDone.acknowledge : S.alarmCount)(items.length)} · {since}
-        {isWell && ` · ${todoText(worst.alarm.reason, 'healthy')}`}
+        {well !== '' && ` · ${well}`}
       </span>
-      {waiting.length > 0 && (
+      {isAble && waiting.length > 0 && (
         <button
           type="button"
           onClick={once(() => {

@@ -4,38 +4,23 @@ import { LONGEST_REASON, needsReason, shelfMinutes } from '../../alarms/kept';
 import type { Item } from '../../alarms/list';
 import { shelveAlarm } from '../../alarms/own';
 import { S } from '../../strings';
-import { Disclosure, useClose } from '../../widgets/Disclosure';
-import { Either } from './Either';
+import { useClose } from '../../widgets/Disclosure';
 import { once } from './once';
 
 /** Shelves an alarm for a while; a critical one for a shorter while, and with a reason. */
-export function Shelving({ item, name }: { item: Item; name: string }): JSX.Element {
-  return (
-    <Disclosure
-      label={S.alarmShelveOf(name)}
-      button={<Either texts={[S.alarmShelve, S.alarmUnshelve]} at={0} />}
-      className="shelving"
-      look="shelve"
-    >
-      <Choice item={item} />
-    </Disclosure>
-  );
-}
-
-function Choice({ item }: { item: Item }): JSX.Element {
+export function Shelving({ item }: { item: Item }): JSX.Element {
   const [reason, setReason] = useState('');
   const close = useClose();
   const root = useRef<HTMLDivElement>(null);
   const field = useRef<HTMLInputElement>(null);
   const isNeeded = needsReason(item.verdict);
   useLayoutEffect(() => {
-    root.current?.scrollIntoView({ block: 'nearest' });
     // What is typed at once is the reason, and no shortcut.
-    if (isNeeded) field.current?.focus({ preventScroll: true });
+    (isNeeded ? field : root).current?.focus({ preventScroll: true });
   }, [isNeeded]);
   const given = reason.trim();
   return (
-    <div className="shelf" ref={root}>
+    <div className="shelf" ref={root} tabIndex={-1}>
       <p className="faint">{isNeeded ? S.alarmShelveCritical : S.alarmShelveHint}</p>
       <label>
         {isNeeded ? S.alarmShelfReason : S.alarmShelfReasonOptional}

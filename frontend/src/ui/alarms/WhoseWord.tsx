@@ -6,8 +6,8 @@ import { secondsOf } from '../../domain/rostime';
 import { store } from '../../store/app';
 import { useSelected } from '../../store/create';
 import { rosNow } from '../../store/moment';
-import { S } from '../../strings';
 import { person } from '../../store/signals';
+import { S } from '../../strings';
 import { useTicking } from '../../widgets/useNow';
 import { P } from './people';
 
@@ -23,14 +23,11 @@ export function whoseWord(who: Session | null): string {
   return (who.role === 'viewer' ? P.reads : P.elsewhere)(who.name);
 }
 
-/** Who acknowledged an alarm, and when, where a name is known. */
-export function WhoAcknowledged({ alarm }: { alarm: Alarm }): JSX.Element | null {
-  const { acknowledged_by: name, acknowledged_at: at } = alarm;
+/** Who acknowledged an alarm, and when; null: no name is known. */
+export function useWhoAcknowledged({
+  acknowledged_by: name,
+  acknowledged_at: at,
+}: Alarm): string | null {
   const when = useTicking((tick) => (at ? whenText(secondsOf(at), rosNow(store.get(), tick)) : ''));
-  if (!name || when === '') return null;
-  return (
-    <span className="alarm-facts faint" data-fact="by">
-      {P.acknowledged(name, when)}
-    </span>
-  );
+  return name && when !== '' ? P.acknowledged(name, when) : null;
 }

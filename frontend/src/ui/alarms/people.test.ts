@@ -15,32 +15,22 @@ const SHELVED = {
   ...{ shelved_by: 'bert', shelved_until: STAMP, shelved_reason: 'pipe under repair' },
 };
 const until = (): number => 60_000;
-const never = new Set<string>();
 
 test('what somebody else acknowledged is acknowledged here, until it is withdrawn', () => {
-  const first = merged(NOTHING_KEPT, [SAID], never, false, until);
-  expect([...first.kept.acknowledged.keys()]).toEqual(['cold']);
-  const same = merged(first.kept, [SAID], first.told, false, until);
-  expect(same.kept).toBe(first.kept);
-  const gone = merged(first.kept, [COLD], first.told, false, until);
-  expect(gone.kept.acknowledged.size).toBe(0);
-});
-
-test('what a viewer did stays theirs; of an operator only what the bridge knows holds', () => {
-  const local = merged(NOTHING_KEPT, [SAID], never, false, until).kept;
-  expect(merged(local, [COLD], never, false, until).kept).toBe(local);
-  expect(merged(local, [COLD], never, true, until).kept.acknowledged.size).toBe(0);
+  const first = merged(NOTHING_KEPT, [SAID], until);
+  expect([...first.acknowledged.keys()]).toEqual(['cold']);
+  expect(merged(first, [SAID], until)).toBe(first);
+  expect(merged(first, [COLD], until).acknowledged.size).toBe(0);
 });
 
 test('a shelf is taken over with its reason, and goes with the word of who shelved', () => {
-  const { kept, told } = merged(NOTHING_KEPT, [SHELVED], never, false, until);
+  const kept = merged(NOTHING_KEPT, [SHELVED], until);
   expect(kept.shelved.get(whatOf(COLD))).toMatchObject({
     until: 60_000,
     reason: 'pipe under repair',
   });
-  const near = merged(kept, [SHELVED], told, false, () => 61_000);
-  expect(near.kept).toBe(kept);
-  expect(merged(kept, [COLD], told, false, until).kept.shelved.size).toBe(0);
+  expect(merged(kept, [SHELVED], () => 61_000)).toBe(kept);
+  expect(merged(kept, [COLD], until).shelved.size).toBe(0);
 });
 
 test('an operator at a bridge that writes no notes is not called a reader', () => {
@@ -58,11 +48,13 @@ interface Asked {
 let asked: Asked[] = [];
 let status = 201;
 let isAway = false;
+let role = 'operator';
 
 beforeEach(() => {
   asked = [];
   status = 201;
   isAway = false;
+  role = 'operator';
   own.dispatch(NOTHING_KEPT);
   const note = {
     ...{ id: 'n1', kind: 'acknowledge', subject: 'alarm:cold', text: '', until: null },
@@ -78,8 +70,8 @@ beforeEach(() => {
           can_sign_out: true,
           seconds_left: null,
           name: 'anna',
-          role: 'operator',
-          can_write_notes: true,
+          role,
+          can_write_notes: role === 'operator',
         }),
       );
     }
@@ -109,6 +101,16 @@ test('who has signed in is known also where the bridge was away at first', async
   isAway = false;
   await vi.advanceTimersByTimeAsync(10_000);
   expect(person.get()?.name).toBe('anna');
+});
+
+test('what a viewer had acknowledged by themselves holds no more', async () => {
+  person.dispatch(null);
+  acknowledgeAlarms([{ alarm: COLD, verdict: 'stressed' }]);
+  role = 'viewer';
+  await signedIn();
+  tellAlarms(COLD);
+  expect(own.get().acknowledged.size).toBe(0);
+  expect(asked).toEqual([]);
 });
 
 test('what is done here is said to the bridge, and taken back there', async () => {

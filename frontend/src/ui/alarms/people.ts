@@ -25,49 +25,42 @@ const PACE_MS = 500;
 
 /** What was said here and is not there yet: until it is, the bridge's word is an older one. */
 let pending = 0;
-/** Alarms that somebody acknowledged by the bridge's word, and shelves of which that tells. */
-let told: ReadonlySet<string> = new Set();
 
 /** A shelf's end is told in whole ROS seconds and kept by this browser's clock: near is the same. */
 const SAME_MS = 3_000;
 
-/** `kept`, and what the bridge says. `isWriter`: what it does not say does not hold here either. */
+/** `kept` with what the bridge says; what it does not say does not hold here either. */
 export function merged(
   kept: Kept,
   alarms: readonly Alarm[],
-  toldBefore: ReadonlySet<string>,
-  isWriter: boolean,
   untilOf: (alarm: Alarm) => number | null,
-): { kept: Kept; told: ReadonlySet<string> } {
+): Kept {
   const acknowledged = new Map(kept.acknowledged);
   const shelved = new Map(kept.shelved);
-  const toldNow = new Set<string>();
   let isSame = true;
   for (const alarm of alarms) {
     const { id, acknowledged_at: at, shelved_by: by, reason } = alarm;
     const { verdict } = reason;
     const what = whatOf(alarm);
     if (at) {
-      toldNow.add(id);
       isSame &&= acknowledged.has(id);
       if (!acknowledged.has(id)) acknowledged.set(id, { verdict, at: timeOfDay() });
-    } else if (isWriter || toldBefore.has(id)) {
+    } else {
       isSame &&= !acknowledged.delete(id);
     }
     if (alarm.cleared_at !== null) continue;
     const until = untilOf(alarm);
     const shelf = shelved.get(what);
     if (by && until !== null) {
-      toldNow.add(what);
       if (shelf && Math.abs(shelf.until - until) < SAME_MS) continue;
       isSame = false;
       const why = alarm.shelved_reason;
       shelved.set(what, { verdict, until, reason: why ? shown(why, LONGEST_REASON) : '' });
-    } else if (isWriter || toldBefore.has(what)) {
+    } else {
       isSame &&= !shelved.delete(what);
     }
   }
-  return { kept: isSame ? kept : { ...kept, acknowledged, shelved }, told: toldNow };
+  return isSame ? kept : { ...kept, acknowledged, shelved };
 }
 
 const alarmsNow = (): readonly Alarm[] => store.get().twin.alarms?.alarms ?? [];
@@ -80,11 +73,8 @@ function endOf(alarm: Alarm): number | null {
 }
 
 function take(): void {
-  const who = person.get();
-  if (who === null || pending > 0 || store.get().twin.alarms === null) return;
-  const found = merged(own.get(), alarmsNow(), told, who.can_write_notes, endOf);
-  ({ told } = found);
-  own.dispatch(found.kept);
+  if (person.get() === null || pending > 0 || store.get().twin.alarms === null) return;
+  own.dispatch(merged(own.get(), alarmsNow(), endOf));
 }
 
 /** What has to be said for what was done here. */

@@ -36,14 +36,12 @@ export const ALARMS: In<typeof ENGLISH> = {
   alarmStatus: { critical: 'kritisch', healthy: 'im Sollbereich' },
   alarmShow: 'Messpunkt jetzt anzeigen',
   alarmStart: 'Zum Beginn',
-  alarmStartOf: (what) => `Zum Beginn: ${what}`,
+  alarmActionsOf: (what) => `Aktionen: ${what}`,
   alarmAcknowledge: 'Quittieren',
   alarmAcknowledgeOf: (what) => `Quittieren: ${what}`,
   alarmAcknowledgeAll: (count) => `Alle quittieren (${count})`,
   alarmUnacknowledge: 'Quittierung aufheben',
-  alarmUnacknowledgeOf: (what) => `Quittierung aufheben: ${what}`,
   alarmShelve: 'Zurückstellen',
-  alarmShelveOf: (what) => `Zurückstellen: ${what}`,
   alarmShelveHint: 'Bis dahin keine Meldung, außer der Alarm verschlimmert sich.',
   alarmShelveCritical:
     'Ein Alarm, der kritisch ist oder war, lässt sich höchstens 1 h zurückstellen, und nur mit Begründung.',
@@ -54,7 +52,7 @@ export const ALARMS: In<typeof ENGLISH> = {
   alarmShelved: (until, reason, by) =>
     `zurückgestellt ${by === '' ? '' : `von ${by} `}bis ${until}${reason === '' ? '' : `: ${reason}`}`,
   alarmUnshelve: 'Wieder aktivieren',
-  alarmUnshelveOf: (what) => `Wieder aktivieren: ${what}`,
+  alarmResolved: 'behoben',
   alarmUndo: 'Rückgängig',
   alarmDone: {
     acknowledge: (count) => `${counted(count, 'Alarm', 'Alarme')} quittiert`,

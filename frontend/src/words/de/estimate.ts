@@ -1,7 +1,7 @@
 /** Die Schätzung: wie sicher sie ist, wie gut sie vorhersagt, wo ein weiterer Messpunkt hülfe. */
 import type { ESTIMATE as ENGLISH } from '../en/estimate';
 import type { In } from '../shape';
-import { counted } from './counted';
+import { counted, whole } from './counted';
 
 export const ESTIMATE: In<typeof ENGLISH> = {
   about: 'Was ± bedeutet',
@@ -17,12 +17,12 @@ export const ESTIMATE: In<typeof ENGLISH> = {
   unsure: (error) => `Schraffiert: ungenauer als ±${error}. Ohne Farbe: keine Daten`,
   errorOf: (sensor) => `${sensor}: Unsicherheit der Schätzung`,
   foretold: (inside, scans) =>
-    `${inside} von ${counted(scans, 'Messung', 'Messungen')} im vorhergesagten Bereich`,
+    `${whole(inside)} von ${counted(scans, 'Messung', 'Messungen')} im vorhergesagten Bereich`,
   foretoldNone: 'Noch keine Messung wurde mit ihr verglichen',
   foretoldDay: (inside, scans) =>
-    `Letzter Tag: ${inside} von ${counted(scans, 'Messung', 'Messungen')}`,
+    `Letzter Tag: ${whole(inside)} von ${counted(scans, 'Messung', 'Messungen')}`,
   foretoldWeek: (inside, scans) =>
-    `letzte Woche: ${inside} von ${counted(scans, 'Messung', 'Messungen')}`,
+    `letzte Woche: ${whole(inside)} von ${counted(scans, 'Messung', 'Messungen')}`,
   fitProblem: (reason) => `Das Modell passt nicht gut zu diesem Gewächshaus: ${reason}`,
   notTrusted: (count) =>
     `Fehlerbereich zu eng: Nur ${count} von 10 Messungen lagen darin, nicht 9.`,

@@ -15,7 +15,10 @@ export const HEALTH: In<typeof ENGLISH> = {
   healthMany: ONE_OR_MANY,
   reasons: {
     sides: { below: 'unter', above: 'über' },
-    sidesHeld: { below: 'noch nicht über', above: 'noch nicht unter' },
+    sidesBack: {
+      below: 'wieder im Bereich; endet über',
+      above: 'wieder im Bereich; endet unter',
+    },
     range: (reading, side, limit, isCritical) =>
       `${reading}, ${side} ${limit}${isCritical ? ' (kritisch)' : ''}`,
     beyond: (sensor, side, limit) => `${sensor} ${side} ${limit}`,
@@ -91,8 +94,6 @@ export const HEALTH: In<typeof ENGLISH> = {
       ? '1 Alarm steht noch an: Zwei gute Messungen heben ihn auf'
       : `${alarms} Alarme stehen noch an: Je zwei gute Messungen heben sie auf`,
   healthAcknowledged: 'quittiert',
-  healthMoreCritical: (count) =>
-    `+ ${count} ${count === 1 ? 'weiterer kritischer' : 'weitere kritische'}`,
   healthNotCurrent: 'Nicht aktuell',
   healthNothing: 'Noch kein Messwert zu beurteilen',
   healthFilter: ', nur diese Messpunkte anzeigen',
@@ -112,6 +113,7 @@ export const HEALTH: In<typeof ENGLISH> = {
 
   tooLow: (by) => (by === null ? 'zu niedrig' : `um ${by} zu niedrig`),
   tooHigh: (by) => (by === null ? 'zu hoch' : `um ${by} zu hoch`),
+  side: { below: 'tief', above: 'hoch' },
   below: 'unter dem Ideal',
   above: 'über dem Ideal',
 };

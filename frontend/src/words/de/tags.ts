@@ -1,7 +1,7 @@
 /** Die Messpunkte: ihre Tabelle und die Ansicht eines einzelnen. */
 import type { TAGS as ENGLISH } from '../en/tags';
 import type { In } from '../shape';
-import { counted } from './counted';
+import { counted, whole } from './counted';
 
 export const TAGS: In<typeof ENGLISH> = {
   tags: 'Messpunkte',
@@ -12,7 +12,7 @@ export const TAGS: In<typeof ENGLISH> = {
   shownOf: (shown, all) =>
     shown === all
       ? counted(all, 'Messpunkt', 'Messpunkte')
-      : `${shown} von ${counted(all, 'Messpunkt', 'Messpunkten')}`,
+      : `${whole(shown)} von ${counted(all, 'Messpunkt', 'Messpunkten')}`,
   nothingMatches: 'Kein Messpunkt passt zum Filter.',
   columns: {
     health: 'Zustand',

@@ -34,14 +34,12 @@ export const ALARMS = {
   alarmStatus: { critical: 'critical', healthy: 'in range' },
   alarmShow: 'Show this tag now',
   alarmStart: 'Go to start',
-  alarmStartOf: (what: string): string => `Go to start: ${what}`,
+  alarmActionsOf: (what: string): string => `Actions: ${what}`,
   alarmAcknowledge: 'Acknowledge',
   alarmAcknowledgeOf: (what: string): string => `Acknowledge: ${what}`,
   alarmAcknowledgeAll: (count: number): string => `Acknowledge all (${count})`,
   alarmUnacknowledge: 'Unacknowledge',
-  alarmUnacknowledgeOf: (what: string): string => `Unacknowledge: ${what}`,
   alarmShelve: 'Shelve',
-  alarmShelveOf: (what: string): string => `Shelve: ${what}`,
   alarmShelveHint: 'No notification until the time is up, unless it gets worse.',
   alarmShelveCritical:
     'An alarm that is or was critical can be shelved for at most 1 h, and needs a reason.',
@@ -52,7 +50,7 @@ export const ALARMS = {
   alarmShelved: (until: string, reason: string, by: string): string =>
     `shelved ${by === '' ? '' : `by ${by} `}until ${until}${reason === '' ? '' : `: ${reason}`}`,
   alarmUnshelve: 'Unshelve',
-  alarmUnshelveOf: (what: string): string => `Unshelve: ${what}`,
+  alarmResolved: 'resolved',
   alarmUndo: 'Undo',
   /** What the operator has just done. */
   alarmDone: {

@@ -1,5 +1,5 @@
 /** The estimate: how sure it is, how well it has foretold, and where another tag would help. */
-import { counted } from './counted';
+import { counted, whole } from './counted';
 
 export const ESTIMATE = {
   about: 'What ± means',
@@ -16,12 +16,12 @@ export const ESTIMATE = {
   /** Beside the colours of the error. */
   errorOf: (sensor: string): string => `${sensor}: uncertainty of the estimate`,
   foretold: (inside: number, scans: number): string =>
-    `${inside} of ${counted(scans, 'scan', 'scans')} were within the predicted range`,
+    `${whole(inside)} of ${counted(scans, 'scan', 'scans')} were within the predicted range`,
   foretoldNone: 'No scan has been compared with it yet',
   foretoldDay: (inside: number, scans: number): string =>
-    `Last day: ${inside} of ${counted(scans, 'scan', 'scans')}`,
+    `Last day: ${whole(inside)} of ${counted(scans, 'scan', 'scans')}`,
   foretoldWeek: (inside: number, scans: number): string =>
-    `last week: ${inside} of ${counted(scans, 'scan', 'scans')}`,
+    `last week: ${whole(inside)} of ${counted(scans, 'scan', 'scans')}`,
   fitProblem: (reason: string): string => `The model does not fit this greenhouse well: ${reason}`,
   notTrusted: (count: number): string =>
     `Error range is too narrow: only ${count} of 10 scans were within it, not 9.`,

@@ -15,8 +15,8 @@ export const HEALTH = {
   /** Why a tag or the house has its verdict. */
   reasons: {
     sides: { below: 'below', above: 'above' },
-    /** What was out of its range stays so until it is well within. */
-    sidesHeld: { below: 'not yet above', above: 'not yet below' },
+    /** What was out of its range counts as that until it is well within. */
+    sidesBack: { below: 'back in range; clears above', above: 'back in range; clears below' },
     range: (reading: string, side: string, limit: string, isCritical: boolean): string =>
       `${reading}, ${side} ${limit}${isCritical ? ' (critical)' : ''}`,
     /** What is wrong, whatever the value is by now. */
@@ -92,7 +92,6 @@ export const HEALTH = {
       ? '1 alarm is still active: two good scans resolve it'
       : `${alarms} alarms are still active: two good scans resolve each`,
   healthAcknowledged: 'acknowledged',
-  healthMoreCritical: (count: number): string => `+ ${count} more critical`,
   /** In place of a verdict, where nobody knows how it is now. */
   healthNotCurrent: 'Not current',
   healthNothing: 'No reading to assess yet',
@@ -113,6 +112,8 @@ export const HEALTH = {
 
   tooLow: (by: string | null): string => (by === null ? 'too low' : `too low by ${by}`),
   tooHigh: (by: string | null): string => (by === null ? 'too high' : `too high by ${by}`),
+  /** Before a value beyond its limit: short, in a narrow column. */
+  side: { below: 'low', above: 'high' },
   below: 'below ideal',
   above: 'above ideal',
 } as const;

@@ -1,5 +1,5 @@
 /** The tags: their table and the card of one. */
-import { counted } from './counted';
+import { counted, whole } from './counted';
 
 export const TAGS = {
   tags: 'Tags',
@@ -8,7 +8,9 @@ export const TAGS = {
   filterHint: 'tag, species, pest …',
   filterClear: 'Clear filter',
   shownOf: (shown: number, all: number): string =>
-    shown === all ? counted(all, 'tag', 'tags') : `${shown} of ${counted(all, 'tag', 'tags')}`,
+    shown === all
+      ? counted(all, 'tag', 'tags')
+      : `${whole(shown)} of ${counted(all, 'tag', 'tags')}`,
   nothingMatches: 'No tag matches the filter.',
   columns: {
     health: 'Health',

@@ -32,14 +32,12 @@ export const ALARMS: In<typeof ENGLISH> = {
   alarmStatus: { critical: 'crítico', healthy: 'dentro del rango' },
   alarmShow: 'Mostrar este punto ahora',
   alarmStart: 'Ir al inicio',
-  alarmStartOf: (what) => `Ir al inicio: ${what}`,
+  alarmActionsOf: (what) => `Acciones: ${what}`,
   alarmAcknowledge: 'Reconocer',
   alarmAcknowledgeOf: (what) => `Reconocer: ${what}`,
   alarmAcknowledgeAll: (count) => `Reconocer todas (${count})`,
   alarmUnacknowledge: 'Anular reconocimiento',
-  alarmUnacknowledgeOf: (what) => `Anular reconocimiento: ${what}`,
   alarmShelve: 'Aplazar',
-  alarmShelveOf: (what) => `Aplazar: ${what}`,
   alarmShelveHint: 'Sin avisos hasta entonces, salvo que empeore.',
   alarmShelveCritical:
     'Una alarma que es o fue crítica se puede aplazar 1 h como máximo y requiere un motivo.',
@@ -50,7 +48,7 @@ export const ALARMS: In<typeof ENGLISH> = {
   alarmShelved: (until, reason, by) =>
     `aplazada ${by === '' ? '' : `por ${by} `}hasta ${until}${reason === '' ? '' : `: ${reason}`}`,
   alarmUnshelve: 'Reactivar',
-  alarmUnshelveOf: (what) => `Reactivar: ${what}`,
+  alarmResolved: 'resuelta',
   alarmUndo: 'Deshacer',
   alarmDone: {
     acknowledge: (count) => counted(count, 'alarma reconocida', 'alarmas reconocidas'),

@@ -1,7 +1,7 @@
 /** La estimación: qué segura es, cómo de bien predijo y dónde ayudaría otro punto. */
 import type { ESTIMATE as ENGLISH } from '../en/estimate';
 import type { In } from '../shape';
-import { counted } from './counted';
+import { counted, whole } from './counted';
 
 export const ESTIMATE: In<typeof ENGLISH> = {
   about: 'Qué significa ±',
@@ -17,12 +17,12 @@ export const ESTIMATE: In<typeof ENGLISH> = {
   unsure: (error) => `Rayado: menos seguro que ±${error}. Sin color: sin datos`,
   errorOf: (sensor) => `${sensor}: incertidumbre de la estimación`,
   foretold: (inside, scans) =>
-    `${inside} de ${counted(scans, 'medición', 'mediciones')} dentro del rango previsto`,
+    `${whole(inside)} de ${counted(scans, 'medición', 'mediciones')} dentro del rango previsto`,
   foretoldNone: 'Aún no se ha comparado con ninguna medición',
   foretoldDay: (inside, scans) =>
-    `Último día: ${inside} de ${counted(scans, 'medición', 'mediciones')}`,
+    `Último día: ${whole(inside)} de ${counted(scans, 'medición', 'mediciones')}`,
   foretoldWeek: (inside, scans) =>
-    `última semana: ${inside} de ${counted(scans, 'medición', 'mediciones')}`,
+    `última semana: ${whole(inside)} de ${counted(scans, 'medición', 'mediciones')}`,
   fitProblem: (reason) => `El modelo no se ajusta bien a este invernadero: ${reason}`,
   notTrusted: (count) =>
     `Margen de error demasiado estrecho: solo ${count} de 10 mediciones estaban dentro, no 9.`,

@@ -18,7 +18,10 @@ export const HEALTH: In<typeof ENGLISH> = {
   },
   reasons: {
     sides: { below: 'inferior a', above: 'superior a' },
-    sidesHeld: { below: 'aún no superior a', above: 'aún no inferior a' },
+    sidesBack: {
+      below: 'de nuevo en rango; termina por encima de',
+      above: 'de nuevo en rango; termina por debajo de',
+    },
     range: (reading, side, limit, isCritical) =>
       `${reading}, ${side} ${limit}${isCritical ? ' (crítico)' : ''}`,
     beyond: (sensor, side, limit) => `${sensor} ${side} ${limit}`,
@@ -93,7 +96,6 @@ export const HEALTH: In<typeof ENGLISH> = {
       ? 'Aún hay 1 alarma activa: dos mediciones buenas la resuelven'
       : `Aún hay ${alarms} alarmas activas: dos mediciones buenas resuelven cada una`,
   healthAcknowledged: 'reconocida',
-  healthMoreCritical: (count) => `+ ${count} en estado crítico`,
   healthNotCurrent: 'No actualizado',
   healthNothing: 'Aún no hay lecturas que evaluar',
   healthFilter: ', mostrar solo estos puntos',
@@ -113,6 +115,7 @@ export const HEALTH: In<typeof ENGLISH> = {
 
   tooLow: (by) => (by === null ? 'por debajo del rango' : `${by} por debajo del ideal`),
   tooHigh: (by) => (by === null ? 'por encima del rango' : `${by} por encima del ideal`),
+  side: { below: 'bajo', above: 'alto' },
   below: 'por debajo del ideal',
   above: 'por encima del ideal',
 };

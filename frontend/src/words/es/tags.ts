@@ -1,7 +1,7 @@
 /** Los puntos de medida: su tabla y la ficha de cada uno. */
 import type { TAGS as ENGLISH } from '../en/tags';
 import type { In } from '../shape';
-import { counted } from './counted';
+import { counted, whole } from './counted';
 
 export const TAGS: In<typeof ENGLISH> = {
   tags: 'Puntos',
@@ -12,7 +12,7 @@ export const TAGS: In<typeof ENGLISH> = {
   shownOf: (shown, all) =>
     shown === all
       ? counted(all, 'punto', 'puntos')
-      : `${shown} de ${counted(all, 'punto', 'puntos')}`,
+      : `${whole(shown)} de ${counted(all, 'punto', 'puntos')}`,
   nothingMatches: 'Ningún punto coincide con el filtro.',
   columns: {
     health: 'Estado',

@@ -32,14 +32,12 @@ export const ALARMS: In<typeof ENGLISH> = {
   alarmStatus: { critical: 'kritiek', healthy: 'binnen bereik' },
   alarmShow: 'Dit meetpunt nu tonen',
   alarmStart: 'Naar begin',
-  alarmStartOf: (what) => `Naar begin: ${what}`,
+  alarmActionsOf: (what) => `Acties: ${what}`,
   alarmAcknowledge: 'Bevestigen',
   alarmAcknowledgeOf: (what) => `Bevestigen: ${what}`,
   alarmAcknowledgeAll: (count) => `Alles bevestigen (${count})`,
   alarmUnacknowledge: 'Bevestiging intrekken',
-  alarmUnacknowledgeOf: (what) => `Bevestiging intrekken: ${what}`,
   alarmShelve: 'Uitstellen',
-  alarmShelveOf: (what) => `Uitstellen: ${what}`,
   alarmShelveHint: 'Tot dan geen melding, tenzij het erger wordt.',
   alarmShelveCritical:
     'Een alarm dat kritiek is of was, kan hoogstens 1 uur worden uitgesteld en vraagt een reden.',
@@ -50,7 +48,7 @@ export const ALARMS: In<typeof ENGLISH> = {
   alarmShelved: (until, reason, by) =>
     `uitgesteld ${by === '' ? '' : `door ${by} `}tot ${until}${reason === '' ? '' : `: ${reason}`}`,
   alarmUnshelve: 'Uitstel opheffen',
-  alarmUnshelveOf: (what) => `Uitstel opheffen: ${what}`,
+  alarmResolved: 'opgelost',
   alarmUndo: 'Ongedaan maken',
   alarmDone: {
     acknowledge: (count) => `${counted(count, 'alarm', 'alarmen')} bevestigd`,
@@ -74,7 +72,7 @@ export const ALARMS: In<typeof ENGLISH> = {
   alarmsNoneHint:
     'Een alarm gaat af na twee afwijkende metingen achter elkaar. Bij een plaag of ontbrekende gegevens gaat het meteen af.',
   alarmsWait: (tags) =>
-    `${counted(tags, 'meetpunt wacht', 'meetpunten wachten')}: geen alarm vóór een tweede afwijkende meting`,
+    `${counted(tags, 'meetpunt', 'meetpunten')} afwijkend: pas alarm als de volgende meting het bevestigt`,
   alarmNotYet: 'nog geen alarm',
   alarmsNotYet: 'Wachten op de lijst met alarmen',
   alarmsStarting: 'De vastgelegde gegevens worden nog gelezen: er kunnen alarmen bijkomen.',

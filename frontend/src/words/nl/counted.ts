@@ -1,3 +1,6 @@
+/** A number of things, its thousands set apart. */
+export const whole = (count: number): string => count.toLocaleString('nl');
+
 /** A number and the word for so many. */
 export const counted = (count: number, one: string, many: string): string =>
-  `${count} ${count === 1 ? one : many}`;
+  `${whole(count)} ${count === 1 ? one : many}`;

@@ -1,7 +1,7 @@
 /** De schatting: hoe zeker ze is, hoe goed ze voorspelde, waar nog een meetpunt helpt. */
 import type { ESTIMATE as ENGLISH } from '../en/estimate';
 import type { In } from '../shape';
-import { counted } from './counted';
+import { counted, whole } from './counted';
 
 export const ESTIMATE: In<typeof ENGLISH> = {
   about: 'Wat ± betekent',
@@ -17,12 +17,12 @@ export const ESTIMATE: In<typeof ENGLISH> = {
   unsure: (error) => `Gearceerd: minder zeker dan ±${error}. Geen kleur: geen gegevens`,
   errorOf: (sensor) => `${sensor}: onzekerheid van de schatting`,
   foretold: (inside, scans) =>
-    `${inside} van ${counted(scans, 'meting', 'metingen')} binnen het voorspelde bereik`,
+    `${whole(inside)} van ${counted(scans, 'meting', 'metingen')} binnen het voorspelde bereik`,
   foretoldNone: 'Er is nog geen meting mee vergeleken',
   foretoldDay: (inside, scans) =>
-    `Afgelopen dag: ${inside} van ${counted(scans, 'meting', 'metingen')}`,
+    `Afgelopen dag: ${whole(inside)} van ${counted(scans, 'meting', 'metingen')}`,
   foretoldWeek: (inside, scans) =>
-    `afgelopen week: ${inside} van ${counted(scans, 'meting', 'metingen')}`,
+    `afgelopen week: ${whole(inside)} van ${counted(scans, 'meting', 'metingen')}`,
   fitProblem: (reason) => `Het model past niet goed bij deze kas: ${reason}`,
   notTrusted: (count) =>
     `Foutmarge te smal: slechts ${count} van de 10 metingen lagen erbinnen, geen 9.`,

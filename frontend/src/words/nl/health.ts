@@ -15,7 +15,10 @@ export const HEALTH: In<typeof ENGLISH> = {
   healthMany: ONE_OR_MANY,
   reasons: {
     sides: { below: 'onder', above: 'boven' },
-    sidesHeld: { below: 'nog niet boven', above: 'nog niet onder' },
+    sidesBack: {
+      below: 'weer binnen bereik; eindigt boven',
+      above: 'weer binnen bereik; eindigt onder',
+    },
     range: (reading, side, limit, isCritical) =>
       `${reading}, ${side} ${limit}${isCritical ? ' (kritiek)' : ''}`,
     beyond: (sensor, side, limit) => `${sensor} ${side} ${limit}`,
@@ -89,7 +92,6 @@ export const HEALTH: In<typeof ENGLISH> = {
       ? '1 alarm is nog actief: twee goede metingen lossen het op'
       : `${alarms} alarmen zijn nog actief: telkens twee goede metingen lossen ze op`,
   healthAcknowledged: 'bevestigd',
-  healthMoreCritical: (count) => `+ nog ${count} kritiek`,
   healthNotCurrent: 'Niet actueel',
   healthNothing: 'Nog geen meetwaarde om te beoordelen',
   healthFilter: ', alleen deze meetpunten tonen',
@@ -109,6 +111,7 @@ export const HEALTH: In<typeof ENGLISH> = {
 
   tooLow: (by) => (by === null ? 'te laag' : `${by} te laag`),
   tooHigh: (by) => (by === null ? 'te hoog' : `${by} te hoog`),
+  side: { below: 'laag', above: 'hoog' },
   below: 'onder ideaal',
   above: 'boven ideaal',
 };

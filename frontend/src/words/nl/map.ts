@@ -53,6 +53,7 @@ export const MAP: In<typeof ENGLISH> = {
   colouring: 'Kleuren naar',
   colourings: { ideal: 'Ideaal', value: 'Waarde' },
   legendNoIdeal: 'Nu geen ideaal bereik: gekleurd naar waarde',
+  sensorShort: { vpd: 'VPD', condensation_margin: 'Dauwmarge' },
   legendBelow: (value) => `onder ${value}`,
   legendAbove: (value) => `boven ${value}`,
   legendAgainst: (sensor) => `${sensor} vergeleken met het ideale bereik`,

@@ -1,7 +1,7 @@
 /** De meetpunten: hun tabel en de kaart van één ervan. */
 import type { TAGS as ENGLISH } from '../en/tags';
 import type { In } from '../shape';
-import { counted } from './counted';
+import { counted, whole } from './counted';
 
 export const TAGS: In<typeof ENGLISH> = {
   tags: 'Meetpunten',
@@ -12,7 +12,7 @@ export const TAGS: In<typeof ENGLISH> = {
   shownOf: (shown, all) =>
     shown === all
       ? counted(all, 'meetpunt', 'meetpunten')
-      : `${shown} van ${counted(all, 'meetpunt', 'meetpunten')}`,
+      : `${whole(shown)} van ${counted(all, 'meetpunt', 'meetpunten')}`,
   nothingMatches: 'Geen meetpunt past bij het filter.',
   columns: {
     health: 'Toestand',

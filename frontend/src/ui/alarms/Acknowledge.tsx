@@ -16,11 +16,11 @@ export function Acknowledge({
   /** What has been done; null: there is something to acknowledge. */
   status: string | null;
   onAcknowledge: () => void;
-}): JSX.Element {
+}): JSX.Element | null {
   const isAble = useSelected(person, mayAct);
   if (!isAble) {
-    return (
-      <span className="alarm-status" title={status ?? undefined}>
+    return status === null ? null : (
+      <span className="alarm-status" title={status}>
         <span>{status}</span>
       </span>
     );

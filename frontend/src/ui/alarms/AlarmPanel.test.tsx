@@ -112,26 +112,6 @@ test('what is worse now than the alarm has said yet is the worst, with its sever
   expect([worst.title, worst.dataset['status']]).toEqual(['worst 8.1\u00a0°C', 'critical']);
 });
 
-test('of many of one cause that are back in their range nothing is ordered', () => {
-  const ids = ['1', '2', '3', '4', '5'];
-  const see = (value: number, limit: number): void => {
-    flush(() => {
-      const tags = ids.map((tag_id) =>
-        wireTag({ tag_id, readings: readings({ temperature: value }) }),
-      );
-      const said = [reason({ value, limit, verdict: 'stressed' })];
-      showTags(tags, judgement(Object.fromEntries(ids.map((id) => [id, said]))));
-    });
-    tell(...ids.map((tag_id) => alarm(tag_id, { tag_id, reason: { value: 17, limit: 18 } })));
-  };
-  const todo = (): string | null | undefined =>
-    document.querySelector('.alarm-cause .alarm-do')?.textContent;
-  see(17.5, 18);
-  expect(todo()).toBe('Heat, or close the vents');
-  see(18.1, 18.5);
-  expect(todo()).toBe('');
-});
-
 test('what is well again waits for one more good scan, and pests for an inspection', () => {
   flush(() => {
     const warm = { readings: readings({ temperature: 22 }) };

@@ -1,0 +1,34 @@
+import { expect, test } from 'vitest';
+
+import { store } from '../store/app';
+import { alarm } from '../testing/alarms';
+import { judgement, reason } from '../testing/health';
+import { showTags } from '../testing/page';
+import { readings, wireTag } from '../testing/tags';
+import { NOTHING_KEPT } from './kept';
+import { listOf } from './list';
+import { todoNow } from './speech';
+
+const IDS = ['1', '2'];
+const { active } = listOf(
+  IDS.map((tag_id) => alarm(tag_id, { tag_id, reason: { value: 17, limit: 18 } })),
+  NOTHING_KEPT,
+  null,
+  0,
+);
+
+/** How each tag is now: its temperature, and the limit that it has yet to pass. */
+const todo = (...now: readonly (readonly [value: number, limit: number])[]): string => {
+  const tags = IDS.map((tag_id, at) =>
+    wireTag({ tag_id, readings: readings({ temperature: now[at]?.[0] ?? null }) }),
+  );
+  const said = now.map(([value, limit]) => [reason({ value, limit, verdict: 'stressed' })]);
+  showTags(tags, judgement(Object.fromEntries(IDS.map((id, at) => [id, said[at] ?? []]))));
+  return todoNow(store.get(), active);
+};
+
+test('nothing is ordered where all are back in their range, and something as soon as one is not', () => {
+  expect(todo([17.5, 18], [17.8, 18])).toBe('Heat, or close the vents');
+  expect(todo([18.1, 18.5], [17.8, 18])).toBe('Heat, or close the vents');
+  expect(todo([18.1, 18.5], [18.2, 18.5])).toBe('');
+});

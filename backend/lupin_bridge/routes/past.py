@@ -75,8 +75,12 @@ async def report_page_route(request: Request) -> Response:
     given = read(query.OfReportPage, request.query_params.multi_items(), PastRefused)
     found = _report(request, given)
     page = ReportPage(
-        *(found.start_ns, found.end_ns, found.criteria, found.journal),
-        *(given.lang, query.zone(given.time_zone)),
+        found.start_ns,
+        found.end_ns,
+        found.criteria,
+        found.journal,
+        lang=given.lang,
+        zone=query.zone(given.time_zone),
     )
     return await respond_past(request, page, "report")
 

@@ -82,7 +82,7 @@ def test_on_a_phone_what_is_to_be_done_comes_first_whole_and_the_page_scrolls(
     house: Bridge, open_page: OpenPage
 ) -> None:
     wall = open_page(
-        house.url, "sensor=light", "?kiosk=1", viewport=PHONE, has_touch=True, is_mobile=True
+        house.url, "sensor=humidity", "?kiosk=1", viewport=PHONE, has_touch=True, is_mobile=True
     )
     wall.expect_samples(3)
     needs = wall.page.locator("li[data-fits]")
@@ -91,7 +91,7 @@ def test_on_a_phone_what_is_to_be_done_comes_first_whole_and_the_page_scrolls(
 
     def are_in_order() -> bool:
         line, first, last, plan = places(
-            wall, ".house-line", ".attention h3", ".attention li:last-child", ".map-view"
+            wall, ".house-line", ".attention h3", ".attention > ul > li:last-child", ".map-view"
         )
         return line.bottom <= first.top and last.bottom <= plan.top
 

@@ -16,8 +16,8 @@ export const HEALTH: In<typeof ENGLISH> = {
   reasons: {
     sides: { below: 'unter', above: 'über' },
     sidesBack: {
-      below: 'wieder im Bereich; Alarm endet über',
-      above: 'wieder im Bereich; Alarm endet unter',
+      below: 'im Bereich; Alarm endet über',
+      above: 'im Bereich; Alarm endet unter',
     },
     range: (reading, side, limit, isCritical) =>
       `${reading}, ${side} ${limit}${isCritical ? ' (kritisch)' : ''}`,
@@ -113,7 +113,7 @@ export const HEALTH: In<typeof ENGLISH> = {
 
   tooLow: (by) => (by === null ? 'zu niedrig' : `um ${by} zu niedrig`),
   tooHigh: (by) => (by === null ? 'zu hoch' : `um ${by} zu hoch`),
-  side: { below: 'niedrig', above: 'hoch' },
+  side: { below: 'tief', above: 'hoch' },
   below: 'unter dem Ideal',
   above: 'über dem Ideal',
 };

@@ -66,7 +66,7 @@ export const HEALTH = {
     stopped: 'Check the robot',
     other: 'Check on site',
   },
-  todoPestAgain: 'Inspect again; a second clean inspection resolves it',
+  todoPestAgain: 'Inspect again: a second clean inspection resolves it',
   todoWell: 'Active until the next good scan',
   todoLabel: 'Do this now',
   reasonsLabel: 'Why',

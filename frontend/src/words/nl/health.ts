@@ -16,8 +16,8 @@ export const HEALTH: In<typeof ENGLISH> = {
   reasons: {
     sides: { below: 'onder', above: 'boven' },
     sidesBack: {
-      below: 'weer binnen bereik; alarm eindigt boven',
-      above: 'weer binnen bereik; alarm eindigt onder',
+      below: 'binnen bereik; alarm eindigt boven',
+      above: 'binnen bereik; alarm eindigt onder',
     },
     range: (reading, side, limit, isCritical) =>
       `${reading}, ${side} ${limit}${isCritical ? ' (kritiek)' : ''}`,

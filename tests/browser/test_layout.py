@@ -112,14 +112,14 @@ def test_below_the_layers_are_their_labelled_choices_always_in_sight(
         choice.select_option("day")
         expect(hmi.test_id("legend")).to_contain_text("difference")
         expect(choice).to_be_in_viewport(ratio=1)
-    panel = hmi.page.locator(".layers .disclosure-panel")
-    expect(panel.get_by_text("Heat map shows")).to_be_visible()
+    expect(hmi.page.locator(".layers").get_by_text("Heat map shows")).to_be_visible()
     heat = place(hmi.test_id("heat-layers"))
-    assert heat.top >= place(panel.locator(".layer-list")).bottom
+    assert heat.top >= place(hmi.page.locator(".layer-list")).bottom
 
 
-def test_the_word_for_now_is_on_one_line_of_the_time_bar(open_at: Callable[..., Hmi]) -> None:
-    now = open_at((1100, 800), query="?lang=es").test_id("timebar-when")
+def test_the_word_for_now_has_one_line_of_the_time_bar(house: Bridge, open_page: OpenPage) -> None:
+    hmi = open_page(house.url, query="?lang=es", viewport={"width": 1100, "height": 800})
+    now = hmi.test_id("timebar-when")
     expect(now).to_have_text("En directo")
     assert place(now).bottom - place(now).top < 24
 

@@ -100,6 +100,30 @@ def test_everything_can_be_hit(open_at: Callable[..., Hmi]) -> None:
             assert place(sure).right <= place(hmi.page.locator(".table-scroll")).right
 
 
+def test_below_the_layers_are_their_labelled_choices_always_in_sight(
+    open_at: Callable[..., Hmi],
+) -> None:
+    for size in ((1100, 800), (390, 844)):
+        hmi = open_at(size)
+        hmi.page.get_by_role("button", name="Layers").click()
+        expect(hmi.page.locator(".layers .check")).to_have_count(10)
+        choice = hmi.test_id("compare")
+        expect(choice).to_be_in_viewport(ratio=1)
+        choice.select_option("day")
+        expect(hmi.test_id("legend")).to_contain_text("difference")
+        expect(choice).to_be_in_viewport(ratio=1)
+    expect(hmi.page.locator(".layers").get_by_text("Heat map shows")).to_be_visible()
+    heat = place(hmi.test_id("heat-layers"))
+    assert heat.top >= place(hmi.page.locator(".layer-list")).bottom
+
+
+def test_the_word_for_now_has_one_line_of_the_time_bar(house: Bridge, open_page: OpenPage) -> None:
+    hmi = open_page(house.url, query="?lang=es", viewport={"width": 1100, "height": 800})
+    now = hmi.test_id("timebar-when")
+    expect(now).to_have_text("En directo")
+    assert place(now).bottom - place(now).top < 24
+
+
 def test_an_open_card_lies_over_nothing_in_an_upright_window(open_at: Callable[..., Hmi]) -> None:
     hmi = open_at(UPRIGHT[0], "tag=1")
     expect(hmi.card("1")).to_be_visible()

@@ -144,7 +144,7 @@ def test_a_look_at_the_flowers_makes_no_reading_young(open_page: OpenPage) -> No
         expect(hmi.cell("looked", "co2")).to_have_text("610")
         age = card.locator("[data-sensor=temperature] .age")
         expect(age).to_have_text(re.compile(r"^2\sh 1\smin"))
-        expect(card.locator("[data-sensor=co2] .age")).to_have_text(re.compile(r"^10\smin$"))
+        expect(card.locator("[data-sensor=co2] .age")).to_have_text(re.compile(r"^10\smin ago$"))
         expect(card).to_contain_text(re.compile(r"Flowers inspected\s?2\ss"))
         expect(card.get_by_role("region", name="Last attempts").locator("li")).to_have_count(3)
 

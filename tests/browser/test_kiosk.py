@@ -6,7 +6,8 @@ import re
 
 from playwright.sync_api import expect
 
-from tests.browser.hmi import OpenPage
+from tests.browser.hmi import PHONE, OpenPage
+from tests.browser.places import places
 from tests.support.web import Bridge
 
 # Of one moment: what the list holds changes with the room that it has.
@@ -75,3 +76,32 @@ def test_a_wall_screen_goes_round_and_is_left_by_the_key_that_it_names(
     expect(legend).to_contain_text("Temperature °C")
     wall.page.go_back()
     expect(note).to_be_visible()
+
+
+def test_on_a_phone_what_is_to_be_done_comes_first_whole_and_the_page_scrolls(
+    house: Bridge, open_page: OpenPage
+) -> None:
+    wall = open_page(
+        house.url, "sensor=humidity", "?kiosk=1", viewport=PHONE, has_touch=True, is_mobile=True
+    )
+    wall.expect_samples(3)
+    needs = wall.page.locator("li[data-fits]")
+    wall.expect(lambda: needs.count() > 0, "what is to be done")
+    expect(wall.page.locator("li[data-fits=false]")).to_have_count(0)
+
+    def are_in_order() -> bool:
+        line, first, last, plan = places(
+            wall, ".house-line", ".attention h3", ".attention > ul > li:last-child", ".map-view"
+        )
+        return line.bottom <= first.top and last.bottom <= plan.top
+
+    wall.expect(are_in_order, "the list above the map, nothing over it")
+    # The chosen sensor comes into its row, and leaves the page where it is.
+    assert wall.page.evaluate("scrollY") == 0
+    wall.map.scroll_into_view_if_needed()
+    assert wall.page.evaluate("scrollY") > 0
+    wall.page.evaluate("scrollTo(0, 0)")
+    leave = wall.page.get_by_role("button", name="Exit kiosk")
+    expect(leave.locator("kbd")).to_be_hidden()
+    leave.tap()
+    expect(wall.map).to_have_attribute("role", "application")

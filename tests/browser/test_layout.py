@@ -100,6 +100,30 @@ def test_everything_can_be_hit(open_at: Callable[..., Hmi]) -> None:
             assert place(sure).right <= place(hmi.page.locator(".table-scroll")).right
 
 
+def test_below_the_layers_are_their_labelled_choices_always_in_sight(
+    open_at: Callable[..., Hmi],
+) -> None:
+    for size in ((1100, 800), (390, 844)):
+        hmi = open_at(size)
+        hmi.page.get_by_role("button", name="Layers").click()
+        expect(hmi.page.locator(".layers .check")).to_have_count(10)
+        choice = hmi.test_id("compare")
+        expect(choice).to_be_in_viewport(ratio=1)
+        choice.select_option("day")
+        expect(hmi.test_id("legend")).to_contain_text("difference")
+        expect(choice).to_be_in_viewport(ratio=1)
+    expect(hmi.page.locator(".layers").get_by_text("Heat map shows")).to_be_visible()
+    heat = place(hmi.test_id("heat-layers"))
+    assert heat.top >= place(hmi.page.locator(".layer-list")).bottom
+
+
+def test_the_word_for_now_has_one_line_of_the_time_bar(house: Bridge, open_page: OpenPage) -> None:
+    hmi = open_page(house.url, query="?lang=es", viewport={"width": 1100, "height": 800})
+    now = hmi.test_id("timebar-when")
+    expect(now).to_have_text("En directo")
+    assert place(now).bottom - place(now).top < 24
+
+
 def test_an_open_card_lies_over_nothing_in_an_upright_window(open_at: Callable[..., Hmi]) -> None:
     hmi = open_at(UPRIGHT[0], "tag=1")
     expect(hmi.card("1")).to_be_visible()
@@ -276,20 +300,15 @@ def test_the_row_of_sensors_fades_where_it_has_more(open_at: Callable[..., Hmi])
     expect(row).to_have_css("mask-image", re.compile("gradient"))
     hmi.choose_sensor("Condensation margin")
     expect(row).to_have_attribute("data-more", "before")
-    # In a window of any width it is one row, and the chosen one is in sight.
-    hmi.resize(1440, 900)
-    hmi.turn("sensor=temperature")
-    expect(row.locator(":checked")).to_have_value("temperature")
-    expect(row).to_have_attribute("data-more", "after")
-    hmi.turn("sensor=condensation_margin")
-    expect(row).to_have_attribute("data-more", "before")
-    hmi.resize(1100, 900)
-    chosen, bar = places(hmi, ".sensors label:has(:checked)", ".sensor-picker")
-    assert bar.left < chosen.left < chosen.right <= bar.right
-    assert bar.bottom - bar.top < 60
-    hmi.resize(3840, 1440)
-    expect(row).to_have_attribute("data-more", "")
-    expect(row).to_have_css("mask-image", "none")
+    # In a wider window they wrap, and all of them are in sight.
+    for width in (700, 1100, 1440, 3840):
+        hmi.resize(width, 900)
+        expect(row).to_have_attribute("data-more", "")
+        expect(row).to_have_css("mask-image", "none")
+        last, bar = places(hmi, ".sensors label:last-child", ".sensor-picker")
+        assert bar.left < last.left < last.right <= bar.right
+        assert last.bottom < bar.bottom
+        assert width != 1440 or bar.bottom - bar.top < 90
 
 
 PINS = {f"{x}-{y}": (x, y) for x in (0, 2, 4, 6) for y in (0, 2, 4, 6)}

@@ -116,7 +116,8 @@ class _Page:
         known = [
             say(word, at=at(body[name]))
             for word, name in (("kept", "kept_from"), ("complete", "complete_to"))
-            if body[name] is not None
+            # Where the log begins before the period, it is `from`.
+            if body[name] is not None and (name != "kept_from" or body[name] != body["from"])
         ]
         parts = [
             f'<!doctype html><html lang="{self._lang}"><head><meta charset="utf-8">',
@@ -160,16 +161,25 @@ class _Page:
         later = ""
         if body["alarms_from"] != body["from"]:
             later = f"<p>{escape(self.say('later', at=self._at(body['alarms_from'])))}</p>"
-        columns = ("alarm", "where", "when", "end", "first*", "limit*", "worst*", "who")
-        return self._table(body, "alarms", "alarms", columns, self._alarm, later)
+        columns = ("alarm", "where", "when", "end", "first*", "limit*", "worst*")
+        if not any(self._who(alarm) for alarm in body["alarms"]):
+            return self._table(body, "alarms", "alarms", columns, self._alarm, later)
 
-    def _alarm(self, alarm: Entry) -> Iterable[str]:
-        reason = alarm["reason"]
-        who = [
+        def with_who(alarm: Entry) -> Iterable[str]:
+            return *self._alarm(alarm), self._who(alarm)
+
+        return self._table(body, "alarms", "alarms", (*columns, "who"), with_who, later)
+
+    def _who(self, alarm: Entry) -> str:
+        """Who has acknowledged or shelved an alarm."""
+        return "; ".join(
             self.say(word, name=alarm[f"{word}_by"], at=self._clock(alarm[f"{word}_{when}"]))
             for word, when in (("acknowledged", "at"), ("shelved", "until"))
             if f"{word}_by" in alarm
-        ]
+        )
+
+    def _alarm(self, alarm: Entry) -> Iterable[str]:
+        reason = alarm["reason"]
         cleared, numbers = alarm["cleared_at"], reason["kind"] == "range"
         unit = self._criteria.sensors.named(reason["sensor"]).unit if numbers else ""
         number = partial(self._number, unit=unit, like=reason["limit"] if numbers else None)
@@ -181,7 +191,6 @@ class _Page:
             number(reason["value"]) if numbers or reason["kind"] == "pest" else "",
             number(reason["limit"]) if numbers else "",
             number(alarm["worst"]),
-            "; ".join(who),
         )
 
     def _extremes(self, body: Entry) -> str:

@@ -4,7 +4,7 @@ import type { Alarm } from '../contract/types';
 import { alarm } from '../testing/alarms';
 import { cataloguesOf } from '../domain/sensors';
 import { CATALOGUE, FILE } from '../testing/sensors';
-import { alarmsCsv, arranged, causeFacts, causesFirst, filtered } from './arrange';
+import { alarmsCsv, arranged, causeFacts, causesFirst, filtered, tagsText } from './arrange';
 import { acknowledge, NOTHING_KEPT, shelve, type Kept } from './kept';
 import { listOf, rankOf, type Item } from './list';
 import type { Now } from './now';
@@ -162,4 +162,10 @@ test('as a file: each state, values in the unit of the page, and no formula', ()
       `${new Date(AT + 60_000).toISOString()},"fan, off"`,
   );
   expect(resolved).toMatch(/^resolved,,critical,1,.*1970-01-01T00:16:00.000Z,no,,$/);
+});
+
+test('the last tag left has its name too', () => {
+  const ids = Array.from({ length: 10 }, (_, at) => String(at));
+  expect(tagsText(ids.slice(0, 9))).toBe('Tags 0, 1, 2, 3, 4, 5, 6, 7, 8');
+  expect(tagsText(ids)).toBe('Tags 0, 1, 2, 3, 4, 5, 6, 7 and 2 more');
 });

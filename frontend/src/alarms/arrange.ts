@@ -18,6 +18,9 @@ export type Order = (typeof ORDERS)[number];
 /** More alarms than this of one cause stand below one heading. */
 const MOST_LOOSE = 4;
 
+/** Tags that a cause names. */
+const MOST_NAMED = 8;
+
 /** What is wrong where: an alarm, or what has none yet. */
 export interface Wrong {
   readonly alarm: Pick<Alarm, 'id' | 'tag_id' | 'reason'>;
@@ -130,6 +133,13 @@ function causeWords(alarm: Wrong['alarm'], speech: Speech): string {
   if (!isOfRange(reason)) return whatText(alarm, speech);
   const beyond = sideOf(reason) === 'below' ? S.tooLow(null) : S.tooHigh(null);
   return `${shown(speech.sensors.named(reason.sensor).label, 32)} ${beyond}`;
+}
+
+/** At which tags something is; of many, some by name. The last one left has its name too. */
+export function tagsText(ids: readonly string[]): string {
+  const count = ids.length <= MOST_NAMED + 1 ? ids.length : MOST_NAMED;
+  const named = ids.slice(0, count).map((id) => shown(id, 16));
+  return S.alarmTags(named, ids.length - count);
 }
 
 /** Of many alarms of one cause: how bad they are now, the furthest value now and at worst, since when. */

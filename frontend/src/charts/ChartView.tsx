@@ -23,7 +23,7 @@ import { pointsFor, useSize } from './useSize';
 import { useZoomed, zoomBack, zoomBy } from './zoom';
 
 /** Of one chart of a tag's, and of several tags' only one, without the times; CSS pixels. */
-const LEAST_HEIGHT = { tag: 96, sensor: 152 } as const;
+const LEAST_HEIGHT = { tag: 64, sensor: 152 } as const;
 /** Height of a chart's title and margins, CSS pixels. */
 const AROUND = 42;
 
@@ -58,7 +58,8 @@ export default function ChartView({ charted }: { charted: Charted }): JSX.Elemen
   );
   const withLines = models.filter(({ lines }) => lines.length > 0);
   const room = (size.height - TIMES_HEIGHT) / Math.max(1, plans.length);
-  const height = Math.max(LEAST_HEIGHT[charted.by], Math.floor(room) - AROUND);
+  const least = LEAST_HEIGHT[charted.by];
+  const height = Math.max(least, Math.floor(room) - AROUND);
 
   const zoom = (factor: number) => (): void => {
     const nowS = rosNow(store.get(), now());
@@ -120,7 +121,8 @@ export default function ChartView({ charted }: { charted: Charted }): JSX.Elemen
         {isTable && <ChartTables models={withLines} />}
         {!isTable &&
           withLines.map((model, index) => {
-            const hasTimes = index === withLines.length - 1;
+            // The times of them all, below the last, are out of sight where the charts scroll.
+            const hasTimes = index === withLines.length - 1 || room - AROUND < least;
             return (
               <PlotView
                 // Alone, a line has other colours.

@@ -1,6 +1,7 @@
 import { describe, expect, test } from 'vitest';
 
 import { sensorNamed } from '../testing/sensors';
+import { numberText } from './format';
 import {
   fieldAlpha,
   fraction,
@@ -12,6 +13,7 @@ import {
   rgbText,
   rounded,
   sensorColour,
+  toldApart,
   withIdeal,
 } from './ramp';
 
@@ -70,6 +72,22 @@ const run = (values: readonly (readonly [number, number])[]): Range[] => {
 test('is rounded outwards', () => {
   expect(rounded({ low: 20.34, high: 31.2 })).toEqual({ low: 20, high: 32 });
   expect(rounded({ low: 7, high: 7 })).toEqual({ low: 7, high: 7 });
+});
+
+test('of values that nobody can tell apart its ends are told apart', () => {
+  for (const [low, high] of [
+    [14.8, 14.8],
+    [14.8, 14.81],
+    [-3, -3],
+    [0, 0],
+    [0.3, 0.3],
+    [1013, 1013],
+  ] as const) {
+    const range = toldApart({ low, high });
+    expect(numberText(range.high)).not.toBe(numberText(range.low));
+    expect(Math.abs(fraction(range, low) - 0.5)).toBeLessThan(0.1);
+  }
+  expect(toldApart({ low: 20, high: 22 })).toEqual({ low: 20, high: 22 });
 });
 
 test('values that come and go at its edge do not make it flicker', () => {

@@ -118,3 +118,11 @@ export function withIdeal({ low, high }: Range, ideal: Span | null): Range {
   if (!ideal) return { low, high };
   return { low: Math.min(low, ideal[0]), high: Math.max(high, ideal[1]) };
 }
+
+/** Where both ends would read the same it is wider, on both sides: they are rounded to a tenth, or more. */
+export function toldApart({ low, high }: Range): Range {
+  const middle = (low + high) / 2;
+  const size = Math.abs(middle);
+  const least = Math.max(0.01 * size, 0.2 * Math.min(1, size)) || 0.2;
+  return high - low < least ? { low: middle - least / 2, high: middle + least / 2 } : { low, high };
+}

@@ -76,7 +76,7 @@ export const digitsOf = (
 type OfRange = HealthReason & { readonly value: number; readonly limit: number };
 
 /** Whether the value is back in its ideal range, and has yet to pass a limit that the file has not. */
-const isBack = ({ limits }: Sensor, { verdict, limit }: OfRange): boolean =>
+export const isBack = ({ limits }: Sensor, { verdict, limit }: OfRange): boolean =>
   verdict === 'stressed' && !limits.has(limit);
 
 const sideText = (sensor: Sensor, reason: OfRange): string =>

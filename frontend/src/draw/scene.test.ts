@@ -2,9 +2,10 @@ import { describe, expect, test } from 'vitest';
 
 import { GROWING } from '../domain/age';
 import { houseHealth } from '../domain/health';
+import { fieldWith } from '../testing/field';
 import { judgement, NOBODY } from '../testing/health';
 import { readings, tag } from '../testing/tags';
-import type { TwinTagState as WireTag } from '../contract/types';
+import type { Field, TwinTagState as WireTag } from '../contract/types';
 import type { Tag } from '../domain/twin';
 import { buildScene, type Scene } from './scene';
 import { sensorNamed } from '../testing/sensors';
@@ -15,12 +16,14 @@ const scene = (
   before: Scene | null = null,
   health = NOBODY,
   listed: ReadonlySet<string> | null = null,
+  field: Field | null = null,
 ): Scene =>
   buildScene(
     {
       tags,
       health: houseHealth(tags, health, true),
-      sensor: sensorNamed('temperature'),
+      sensor: sensorNamed(field?.sensor ?? 'temperature'),
+      field,
       unit: 'C',
       now,
       ageing: GROWING,
@@ -46,6 +49,16 @@ describe('pins', () => {
       (values) => scene([tag({ readings: readings(values) })]).pins[0]?.kind,
     );
     expect(kinds).toEqual(['value', 'failed', 'lacking']);
+  });
+
+  test('what is computed of two sensors is where a tag has both', () => {
+    const both = readings({ temperature: 20, humidity: 50 });
+    const tags = [tag({ readings: both }), tag({ readings: readings({ humidity: 50 }) })];
+    const known = Array.from({ length: 5 }, () => [9, 9, 9, 9, 9]);
+    const margin = fieldWith(known, { sensor: 'condensation_margin' });
+    const [has, lacks] = scene(tags, 0, null, NOBODY, null, margin).pins;
+    expect(has).toMatchObject({ kind: 'value', texts: ['1 · 9.0\u00a0K', '1'] });
+    expect(lacks?.kind).toBe('lacking');
   });
 
   test('has the verdict that was given, unknown where none was', () => {

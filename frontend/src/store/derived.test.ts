@@ -40,7 +40,7 @@ describe('range in use', () => {
     showField(fieldWith([[25]], { valueMin: 21, valueMax: 29 }));
     expect(selectRange(store.get())).toEqual({ low: 18, high: 29 });
     act({ type: 'sensor', sensor: 'ph' });
-    expect(selectRange(store.get())).toEqual({ low: 7, high: 7 });
+    expect(selectRange(store.get())).toEqual({ low: 6.9, high: 7.1 });
     act({ type: 'sensor', sensor: 'co2' });
     expect(selectRange(store.get())).toBeNull();
   });

@@ -3,7 +3,7 @@ import { houseHealth, type HouseHealth } from '../domain/health';
 import type { Field, Judgement } from '../contract/types';
 import { symmetricRange } from '../domain/difference';
 import { errorField, onExplored } from '../domain/sureness';
-import { type Range, rangeOf, rounded, withIdeal } from '../domain/ramp';
+import { type Range, rangeOf, rounded, toldApart, withIdeal } from '../domain/ramp';
 import {
   oldCells,
   type ReadSite,
@@ -104,7 +104,7 @@ export function selectRange(state: AppState): Range | null {
   const needed =
     isMapped && held?.sensor === view.sensor ? held.range : readings && rounded(readings);
   if (!needed) return null;
-  const { low, high } = withIdeal(needed, selectSensor(state).ideal);
+  const { low, high } = toldApart(withIdeal(needed, selectSensor(state).ideal));
   return range(low, high);
 }
 
@@ -134,15 +134,19 @@ export function selectZones(state: AppState, field: Field): Zones {
   return zonesBy(sites, selectSensor(state), width, height, originX, originY, resolution);
 }
 
-/** By value where that is chosen, and where no plant of the house has an ideal of the sensor. */
-export function selectColouring(state: AppState): ViewState['colouring'] {
+/** Whether some plant of the house has an ideal of the sensor. */
+export function selectHasIdeal(state: AppState): boolean {
   const sensor = selectSensor(state);
-  const hasIdeal =
+  return (
     sensor.ideal !== null ||
     (sensor.species.size > 0 &&
-      selectTags(state).some(({ sureSpecies }) => rangesFor(sensor, sureSpecies).ideal));
-  return hasIdeal ? state.view.colouring : 'value';
+      selectTags(state).some(({ sureSpecies }) => rangesFor(sensor, sureSpecies).ideal !== null))
+  );
 }
+
+/** By value where that is chosen, and where there is no ideal. */
+export const selectColouring = (state: AppState): ViewState['colouring'] =>
+  selectHasIdeal(state) ? state.view.colouring : 'value';
 
 /** What the heat map shows, and in which range of colours. */
 export interface Heat {

@@ -1,6 +1,6 @@
 import { useRef, type CSSProperties, type JSX } from 'react';
 
-import { byCause } from '../alarms/arrange';
+import { byCause, tagsText } from '../alarms/arrange';
 import { selectSpeech } from '../alarms/speech';
 import type { HealthReason } from '../contract/types';
 import { severity } from '../domain/health';
@@ -21,8 +21,6 @@ const MOST_LINES = 40;
 const MANY_TAGS = 12;
 /** Of each tag. */
 const MOST_REASONS = 2;
-/** That a cause names. */
-const MOST_NAMED = 6;
 
 interface Line {
   readonly key: string;
@@ -112,7 +110,6 @@ function CauseLine({
   const worst = tags.reduce((a, b) => (badness(b) > badness(a) ? b : a));
   const [reason] = worst.reasons;
   const why = S.healthDriver(shown(worst.tagId, 16), useReasonText(reason, true));
-  const named = tags.slice(0, MOST_NAMED).map(({ tagId }) => shown(tagId, 16));
   return (
     <li data-fits={fits} data-cause={cause} data-health={reason.verdict}>
       <HealthMark verdict={reason.verdict} word={false} />
@@ -126,7 +123,7 @@ function CauseLine({
             )}
           </strong>{' '}
           <small className="faint">
-            {why} · {S.alarmTags(named, tags.length - named.length)}
+            {why} · {tagsText(tags.map(({ tagId }) => tagId))}
           </small>
         </span>
       </span>

@@ -25,7 +25,7 @@ export function CompareControl(): JSX.Element {
   const dayS = useApp(selectDayS);
   return (
     <div className="compare">
-      <label>
+      <label className="layer-choice">
         <span>{S.compare}</span>
         <Select
           value={choiceOf(compare, dayS)}

@@ -21,9 +21,6 @@ import { useReasonText } from './Reasons';
 /** Beside the map; the table has the rest. */
 const MOST_TAGS = 2;
 
-/** More than any `severity`. */
-const UNSEEN = 100;
-
 /** A tag that needs somebody. */
 export interface Urgent {
   readonly tagId: string;
@@ -32,13 +29,14 @@ export interface Urgent {
 }
 
 /**
- * Tags that need somebody: first those with what nobody has acknowledged, and of each the worst
- * first (`severity`). What is only old needs the robot, which comes again.
+ * Tags that need somebody, and what of each, in the order of `severity`; what is back in its range
+ * comes last. What is only old needs the robot, which comes again.
  */
 export function useUrgent(): readonly Urgent[] {
   const tags = useApp(selectTags);
   const health = useApp(selectHealth);
   const isNow = useApp((state) => selectShown(state).moment === null);
+  const catalogue = useApp(selectCatalogue);
   const alarms = useSelected(alarmList, (it) => it);
   return useMemo(() => {
     const acknowledged = alarms.active.filter((it) => it.isAcknowledged);
@@ -49,8 +47,9 @@ export function useUrgent(): readonly Urgent[] {
         const rank = (reason: HealthReason): number => {
           const own = reason.verdict;
           if (reason.kind === 'old' || !(isBad(own) || own === verdict)) return 0;
-          const isSeen = has(acknowledged, id, reason);
-          return severity({ verdict: own, reasons: [reason] }) + (isSeen ? 0 : UNSEEN);
+          const isBack = todoText(catalogue, reason) === '';
+          const judged = { verdict: isBack ? 'healthy' : own, reasons: [reason] };
+          return severity(judged, has(acknowledged, id, reason));
         };
         const [first, ...rest] = reasons
           .filter((reason) => !has(alarms.shelved, id, reason))
@@ -59,7 +58,7 @@ export function useUrgent(): readonly Urgent[] {
         return [{ tagId: id, reasons: [first, ...rest] as const, rank: rank(first) }];
       })
       .sort((a, b) => b.rank - a.rank);
-  }, [tags, health, isNow, alarms]);
+  }, [tags, health, isNow, catalogue, alarms]);
 }
 
 /**
@@ -167,7 +166,7 @@ export function Overall({
   const isNow = useApp((state) => selectShown(state).moment === null);
   const active = useSelected(alarmList, (list) => list.active.length);
   const shelved = useSelected(alarmList, (list) => list.shelved.length);
-  const text = own ? reason : overallText(health, isNow ? active : 0, isNow ? shelved : 0);
+  const text = own ? reason : overallText(health, isNow ? active + shelved : 0);
   const catalogue = useApp(selectCatalogue);
   if (text === null) return null;
   return (
@@ -178,15 +177,30 @@ export function Overall({
   );
 }
 
+/** How much is shelved, where something is wrong: it has no line of its own. */
+export function ShelvedCount({ disabled = false }: { disabled?: boolean }): JSX.Element | null {
+  const isWrong = useApp((state) => isBad(selectHealth(state).verdict));
+  // Of now, as the list of alarms is.
+  const isNow = useApp((state) => selectShown(state).moment === null);
+  const count = useSelected(alarmList, (list) => list.shelved.length);
+  if (!isWrong || !isNow || count === 0) return null;
+  return (
+    <button
+      type="button"
+      className="shelved-count"
+      disabled={disabled}
+      onClick={() => {
+        act({ type: 'list', list: 'alarms' });
+      }}
+    >
+      {S.alarmGroups.shelved(String(count))}
+    </button>
+  );
+}
+
 /** Null: its tags say it. */
-function overallText(
-  { verdict, counts }: HouseHealth,
-  active: number,
-  shelved: number,
-): string | null {
-  // What is shelved has no line of its own.
-  if (isBad(verdict)) return shelved > 0 ? S.alarmGroups.shelved(String(shelved)) : null;
-  const alarms = active + shelved;
+function overallText({ verdict, counts }: HouseHealth, alarms: number): string | null {
+  if (isBad(verdict)) return null;
   if (verdict === 'healthy') return alarms > 0 ? S.healthDespite(alarms) : S.healthAllWell;
   const { unknown } = counts;
   if (unknown === 0) return S.healthNothing;
@@ -200,6 +214,7 @@ export function HealthStrip(): JSX.Element {
   return (
     <div className="health-strip" data-testid="health-strip" data-health={verdict}>
       <HealthMark verdict={verdict} word={false} />
+      <ShelvedCount />
       <DoNow most={1} id="health-first" />
     </div>
   );

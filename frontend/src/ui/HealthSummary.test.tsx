@@ -48,17 +48,26 @@ test('says what to do first, and since when', () => {
   act(() => {
     acknowledgeAlarms(calling(alarmList.get()));
   });
-  // Somebody sees to it: what nobody has seen comes first.
+  // Somebody sees to it: of what is as bad, what nobody has seen comes first.
   expect([...todo.children].map(({ textContent }) => textContent)).toEqual([
     expect.stringMatching(/^CriticalTag 1: /),
     expect.stringMatching(/^CriticalTag 5: .*treat the plants acknowledged/),
   ]);
-  // Of one tag too: what nobody has seen is said, however mild it is beside the rest.
+  // Not before what is worse, of one tag and of many; last is what is back in its range.
+  const back = reason({ verdict: 'stressed', value: 18.1, limit: 18.5 });
+  const failed = reason({ kind: 'scan_failed', verdict: 'unknown', sensor: '', value: 1 });
+  const tags = ['1', '2', '5'].map((tag_id) => wireTag({ tag_id }));
   act(() => {
-    showTags(TAGS, judgement({ 5: [pest, { ...cold, verdict: 'stressed' }] }));
+    showTags(
+      tags,
+      judgement({ 1: [back], 2: [failed], 5: [pest, { ...cold, verdict: 'stressed' }] }),
+    );
     tellAlarms(alarm('a', { tag_id: '5', raised: 100, reason: pest }));
   });
-  expect(todo.firstElementChild?.textContent).toMatch(/^StressedTag 5: Temperature/);
+  expect([...todo.children].map(({ textContent }) => textContent)).toEqual([
+    expect.stringMatching(/^CriticalTag 5: 2 pests seen.* acknowledged$/),
+    expect.stringMatching(/^UnknownTag 2: .*\+ 1 more$/),
+  ]);
   stop();
 });
 
@@ -73,18 +82,25 @@ test('nobody is called for what is shelved, and all the rest is counted', () => 
     tellAlarms(alarm('fan', { tag_id: '1' }));
   });
   expect(todo.textContent).toMatch(/^CriticalTag 1: .*StressedTag 2: .*\+ 2 more$/);
+  expect(house().textContent).not.toContain('Shelved');
   act(() => {
     for (const item of calling(alarmList.get())) shelveAlarm(item, 15, 'fan');
   });
   expect(todo.textContent).toMatch(/^StressedTag 2: .*StressedTag 3: .*\+ 1 more$/);
   fireEvent.click(screen.getByRole('button', { name: '+ 1 more' }));
   expect(store.get().view.list).toBe('alarms');
-  // Where nothing else is wrong, that is why nothing is listed.
+  // That it is left out is said, as the heading and the numbers have it.
+  act(() => {
+    store.dispatch({ slice: 'view', action: { type: 'list', list: 'tags' } });
+  });
+  fireEvent.click(screen.getByRole('button', { name: 'Shelved (1)' }));
+  expect(store.get().view.list).toBe('alarms');
   act(() => {
     showTags(tags, judgement({ 1: [reason()] }));
     tellAlarms(alarm('fan', { tag_id: '1' }));
   });
-  expect(todo.textContent).toBe('Shelved (1)');
+  expect(todo.textContent).toBe('');
+  expect(screen.getByRole('button', { name: 'Shelved (1)' })).toBeTruthy();
   stop();
 });
 

@@ -4,7 +4,7 @@ import { isSilent, VERDICTS, type HouseHealth } from '../domain/health';
 import { act, useApp } from '../store/app';
 import { selectHealth } from '../store/derived';
 import { S } from '../strings';
-import { DoNow, Overall } from './DoNow';
+import { DoNow, Overall, ShelvedCount } from './DoNow';
 import { HealthMark, HealthShape } from './HealthMark';
 import { HouseLine } from './HouseLine';
 
@@ -27,6 +27,7 @@ export function HealthSummary({ kiosk }: { kiosk: boolean }): JSX.Element {
             text={isSilent(health) ? S.healthNotCurrent : undefined}
           />
         </h2>
+        <ShelvedCount disabled={kiosk} />
         {kiosk && <Overall health={health} />}
       </div>
       {!kiosk && <DoNow />}

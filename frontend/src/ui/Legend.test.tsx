@@ -126,6 +126,7 @@ describe('legend', () => {
     act({ type: 'sensor', sensor: 'dew_point' });
     render(<Legend kiosk={false} />);
     expect(at('no-ideal')).toContain('coloured by value');
+    expect(screen.queryByRole('radio', { name: 'Ideal' })).toBeNull();
     expect(screen.getByTestId('range-low')).toBeTruthy();
   });
 

@@ -8,13 +8,20 @@ import type { Sensor } from '../domain/sensors';
 import { shown } from '../domain/text';
 import { unitOf, type TemperatureUnit } from '../domain/units';
 import { useApp } from '../store/app';
-import { selectColouring, selectHeat, selectRange, selectSensor } from '../store/derived';
+import {
+  selectColouring,
+  selectHasIdeal,
+  selectHeat,
+  selectRange,
+  selectSensor,
+} from '../store/derived';
 import { selectShown, selectTags } from '../store/moment';
 import { S } from '../strings';
 import { ColouringControl } from './ColouringControl';
 import { ErrorScale, EstimateFacts } from './estimate';
 import { HeatControl } from './HeatControl';
 import { IdealLegend } from './IdealLegend';
+import { SensorLabel } from './SensorLabel';
 import { WithParts } from './WithParts';
 
 export function Legend({ kiosk }: { kiosk: boolean }): JSX.Element {
@@ -32,6 +39,7 @@ export function Legend({ kiosk }: { kiosk: boolean }): JSX.Element {
   );
   const isCompared = useApp((state) => state.view.compare !== null);
   const isIdealWished = useApp((state) => state.view.colouring === 'ideal');
+  const hasIdeal = useApp(selectHasIdeal);
   const isIdeal = useApp((state) => selectColouring(state) === 'ideal');
   const isEstimate = useApp((state) => state.view.heat !== 'nearest');
   const isError = useApp((state) => selectHeat(state)?.isError ?? false);
@@ -52,7 +60,10 @@ export function Legend({ kiosk }: { kiosk: boolean }): JSX.Element {
       {!isCompared && (
         <>
           <div className="legend-title">
-            <strong>{shown(sensor.label, 32)}</strong> <span>{unitOf(sensor, unit)}</span>
+            <strong>
+              <SensorLabel sensor={sensor} />
+            </strong>{' '}
+            <span>{unitOf(sensor, unit)}</span>
           </div>
           <div className="legend-scale">
             {isError ? (
@@ -68,7 +79,7 @@ export function Legend({ kiosk }: { kiosk: boolean }): JSX.Element {
       {!kiosk && (
         <div className="legend-controls">
           <HeatControl place="legend" />
-          {!isError && !isCompared && <ColouringControl />}
+          {hasIdeal && !isError && !isCompared && <ColouringControl />}
           {!isIdeal && !isError && !isCompared && (
             <WithParts>{(parts) => <parts.RangeControl sensor={sensor} range={range} />}</WithParts>
           )}
@@ -80,7 +91,7 @@ export function Legend({ kiosk }: { kiosk: boolean }): JSX.Element {
           <HatchedSign isFaint /> {S.legendOld}
         </span>
       )}
-      {isIdealWished && !isIdeal && !isCompared && (
+      {isIdealWished && !hasIdeal && !isCompared && (
         <span className="faint" data-testid="no-ideal">
           {S.legendNoIdeal}
         </span>

@@ -42,18 +42,24 @@ function LayerList(): JSX.Element {
   const on = useApp((state) => state.view.layers);
   return (
     <>
-      {LISTED.map((layer) => (
-        <Check
-          key={layer}
-          label={S.layers[layer]}
-          isOn={on.has(layer)}
-          onChange={(isOn) => {
-            act({ type: 'layer', layer, on: isOn });
-          }}
-        />
-      ))}
-      <HeatControl place="layers" />
-      <WithParts>{(parts) => <parts.InLayers />}</WithParts>
+      <div className="layer-list">
+        {LISTED.map((layer) => (
+          <Check
+            key={layer}
+            label={S.layers[layer]}
+            isOn={on.has(layer)}
+            onChange={(isOn) => {
+              act({ type: 'layer', layer, on: isOn });
+            }}
+          />
+        ))}
+        <WithParts>{(parts) => <parts.InLayers />}</WithParts>
+      </div>
+      <label className="layer-choice heat-choice">
+        <span>{S.heat}</span>
+        <HeatControl place="layers" />
+      </label>
+      <WithParts>{(parts) => <parts.CompareControl />}</WithParts>
     </>
   );
 }

@@ -1,12 +1,11 @@
 import { useEffect, useRef, type JSX } from 'react';
 
 import { rgbText, sensorColour } from '../domain/ramp';
-import type { Sensor } from '../domain/sensors';
-import { shown } from '../domain/text';
 import { act, useApp } from '../store/app';
 import { selectSensors } from '../store/derived';
 import { S } from '../strings';
 import { Segmented } from '../widgets/Segmented';
+import { SensorLabel } from './SensorLabel';
 
 /** Which sensor the map shows. */
 export function SensorPicker(): JSX.Element {
@@ -57,7 +56,7 @@ export function SensorPicker(): JSX.Element {
           label: (
             <>
               <span className="swatch" style={{ background: rgbText(sensorColour(each)) }} />
-              <Label sensor={each} />
+              <SensorLabel sensor={each} />
             </>
           ),
         }))}
@@ -66,19 +65,5 @@ export function SensorPicker(): JSX.Element {
         }}
       />
     </div>
-  );
-}
-
-/** In short where the name is long: the full one to be heard, and to be had by pointing at it. */
-function Label({ sensor }: { sensor: Sensor }): JSX.Element {
-  const names: Partial<Record<string, string>> = S.sensorShort;
-  const short = Object.hasOwn(names, sensor.name) ? names[sensor.name] : undefined;
-  const label = shown(sensor.label, 32);
-  if (short === undefined) return <span>{label}</span>;
-  return (
-    <span title={label}>
-      <span aria-hidden="true">{short}</span>
-      <span className="unseen">{label}</span>
-    </span>
   );
 }

@@ -6,6 +6,7 @@ import { judgement, reason } from '../testing/health';
 import { showTags } from '../testing/page';
 import { readings, stateFrame, wireTag } from '../testing/tags';
 import { TagCard } from './TagCard';
+import { TagTable } from './TagTable';
 
 beforeEach(() => {
   vi.stubGlobal('fetch', () => Promise.reject(new Error('no server')));
@@ -80,6 +81,23 @@ describe('card', () => {
     showTags(tags, judgement({ 7: 'healthy' }, { is_day: false, source: 'light' }));
     render(<TagCard tagId="7" />);
     expect(ideals()[0]).toBe('ideal by night 8.0 to 18.0 °C');
+  });
+
+  test('what is back in its range is on no side of it, neither here nor in the table', () => {
+    const back = reason({ verdict: 'stressed', value: 17.99, limit: 18.5 });
+    const tags = [wireTag({ tag_id: '7', readings: readings({ temperature: 17.99 }) })];
+    showTags(tags, judgement({ 7: [back] }));
+    render(
+      <>
+        <TagCard tagId="7" />
+        <TagTable />
+      </>,
+    );
+    expect(screen.getAllByText(/back in range; clears above 18\.5/).length).toBeGreaterThan(0);
+    const ideal = document.querySelector<HTMLElement>('.card-ideal');
+    expect(ideal?.textContent).toMatch(/^ideal/);
+    expect(ideal?.dataset['health']).toBeUndefined();
+    expect(document.querySelector('.beyond')).toBeNull();
   });
 
   test('closes', () => {

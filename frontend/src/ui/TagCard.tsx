@@ -3,7 +3,7 @@ import { useRef, type JSX } from 'react';
 import type { When } from '../domain/age';
 import { farOffText, metresText, percentText, readingText, valueText } from '../domain/format';
 import { isBad, rangeReason, sideOf } from '../domain/health';
-import { digitsOf, tryKind } from '../domain/reasons';
+import { digitsOf, isBack, tryKind } from '../domain/reasons';
 import { rangesFor } from '../domain/sensors';
 import { speciesText } from '../domain/species';
 import { shown } from '../domain/text';
@@ -212,9 +212,8 @@ function CardReading({
   const { ideal } = rangesFor(sensor, species);
   const reason = rangeReason(health, name);
   const more = reason ? digitsOf(sensor, reason, unit) : 0;
-  const isOut = ideal && value !== null && (value < ideal[0] || value > ideal[1]);
-  // What is back within its range, and not far enough, is stressed, and not "below ideal".
-  const side = isOut && reason && sideOf(reason);
+  const out = reason && !isBack(sensor, reason) ? reason : null;
+  const side = out && sideOf(out);
   const step = useAgeStep(when);
   return (
     <li data-sensor={name} data-age={step}>
@@ -229,7 +228,7 @@ function CardReading({
         <Sparkline sensor={sensor} values={values} unit={unit} />
       </span>
       {ideal && (
-        <span className="card-ideal" data-side={side || undefined} data-health={reason?.verdict}>
+        <span className="card-ideal" data-side={side || undefined} data-health={out?.verdict}>
           {side && `${S.side[side]}, `}
           {S.healthIdeal(
             S.idealParts[sensor.part ?? 'any'],

@@ -4,7 +4,7 @@ import type { When } from '../domain/age';
 import { farOffText, percentText, shortAgeText, valueText } from '../domain/format';
 import type { TagHealth } from '../contract/types';
 import { rangeReason, sideOf, worstReason } from '../domain/health';
-import { beyondText, digitsOf, reasonsText, reasonText } from '../domain/reasons';
+import { beyondText, digitsOf, isBack, reasonsText, reasonText } from '../domain/reasons';
 import type { Catalogue, Sensor } from '../domain/sensors';
 import { speciesText } from '../domain/species';
 import { shown } from '../domain/text';
@@ -235,11 +235,11 @@ function Reading({
   }
   const reason = rangeReason(health, sensor.name);
   const more = reason ? digitsOf(sensor, reason, unit) : 0;
-  // By its own limit: what is back within its range, and not far enough, is not "below ideal".
-  const beyond = reason && beyondText(catalogue, reason, unit, more);
+  const beyond =
+    reason && !isBack(sensor, reason) ? beyondText(catalogue, reason, unit, more) : null;
   return (
     <>
-      {beyond && (
+      {reason && beyond !== null && (
         <span className="beyond" data-health={reason.verdict} title={beyond}>
           <span aria-hidden="true">{S.side[sideOf(reason)]} </span>
           <span className="unseen">{beyond}: </span>

@@ -28,6 +28,7 @@ export { AlarmPanel } from './alarms/AlarmPanel';
 export { Meanwhile } from './alarms/Meanwhile';
 export { startPeople } from './alarms/people';
 export { AttentionList } from './AttentionList';
+export { CompareControl } from './CompareControl';
 export { DifferenceLegend } from './DifferenceLegend';
 export { HelpDialog, openHelp } from './HelpDialog';
 export { InLayers, InLegend, OnMap } from './extras';

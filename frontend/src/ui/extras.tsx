@@ -6,7 +6,6 @@ import { useApp } from '../store/app';
 import { useSelected } from '../store/create';
 import { selectShown } from '../store/moment';
 import { robotFrame } from '../store/signals';
-import { CompareControl } from './CompareControl';
 import { HoverCard } from './HoverCard';
 import { inTime } from './inTime';
 import { Keys } from './Keys';
@@ -40,9 +39,4 @@ export const InLegend = (): JSX.Element => (
   </>
 );
 
-export const InLayers = (): JSX.Element => (
-  <>
-    {useHasRobot() && <RobotChoice />}
-    <CompareControl />
-  </>
-);
+export const InLayers = (): JSX.Element | null => (useHasRobot() ? <RobotChoice /> : null);

@@ -64,11 +64,17 @@ def body(hours: int) -> dict[str, Any]:
     }
 
 
-def page_of(lang: str = "en", hours: int = 8, zone: tzinfo | None = None) -> str:
+def alarm(**said: Any) -> dict[str, Any]:
+    reason = {"verdict": "critical", "kind": "pest", "sensor": "", "value": 3.0, "limit": None}
+    when = {"raised_at": at(60), "cleared_at": None}
+    return {"id": "9", "tag_id": "7", "reason": reason, "worst": 3.0, **when, **said}
+
+
+def page_of(lang: str = "en", hours: int = 8, zone: tzinfo | None = None, **fields: object) -> str:
     """The report's text, with spaces between its elements."""
     end_s = BEGUN_S + hours * HOUR_S
     page = ReportPage(BEGUN_S * 10**9, end_s * 10**9, GREENHOUSE, UNKNOWN, lang, zone)
-    text = page.plan(body(hours)).write(never).body.decode()
+    text = page.plan(body(hours) | fields).write(never).body.decode()
     return re.sub(r"[ \n\u00a0]+", " ", unescape(re.sub(r"<style>.*?</style>|<[^>]*>", " ", text)))
 
 
@@ -112,3 +118,18 @@ def test_a_note_reads_as_its_kind_and_its_text_and_no_heading_denies_itself() ->
     assert "06:01 Anna Comment: Boiler 2 tripped (withdrawn by Ben) Greenhouse" in page
     assert "Gaps without scans Where" in page
     assert "Tags not scanned None." in page
+
+
+def test_no_data_before_is_said_only_where_the_log_begins_after_the_period() -> None:
+    whole, late = (page_of(kept_from=at(seconds)) for seconds in (0, HOUR_S))
+    assert "No data before" not in whole
+    assert "Complete up to 27 Nov 2026, 14:00." in whole
+    assert "No data before 27 Nov 2026, 07:00. Complete up to 27 Nov 2026, 14:00." in late
+
+
+def test_who_acknowledged_or_shelved_has_a_column_where_somebody_did() -> None:
+    acknowledged = alarm(acknowledged_by="Anna", acknowledged_at=at(120))
+    assert "Acknowledged, shelved" not in page_of(alarms=[alarm()])
+    page = page_of(alarms=[alarm(), acknowledged])
+    assert "Acknowledged, shelved" in page
+    assert page.count("acknowledged by Anna, 06:02") == 1

@@ -45,6 +45,11 @@ export function AlarmFacts({
   const span = useTicking((at) => spanText(alarm, rosNow(store.get(), at)));
   return (
     <>
+      {isShelved && shelf && (
+        <span className="alarm-facts faint">
+          {S.alarmShelved(clockText(shelf.until), shelf.reason, alarm.shelved_by ?? '')}
+        </span>
+      )}
       <span className="alarm-values">
         {state?.kind === 'known' && current !== null && (
           <Fact name="now" verdict={state.verdict} text={current}>
@@ -71,11 +76,6 @@ export function AlarmFacts({
           {span}
         </span>
       </span>
-      {isShelved && shelf && (
-        <span className="alarm-facts faint">
-          {S.alarmShelved(clockText(shelf.until), shelf.reason, alarm.shelved_by ?? '')}
-        </span>
-      )}
     </>
   );
 }

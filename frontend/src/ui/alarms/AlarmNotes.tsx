@@ -6,23 +6,15 @@ import { alarmList } from '../../alarms/watch';
 import { clockText } from '../../domain/format';
 import { isBad, worstReason } from '../../domain/health';
 import { rosText, secondsOf } from '../../domain/rostime';
-import { useApp } from '../../store/app';
+import { useApp, type AppState } from '../../store/app';
 import { useSelected } from '../../store/create';
 import { selectNewestHealth } from '../../store/derived';
 import { selectNewest, selectShown } from '../../store/moment';
 import { S } from '../../strings';
 
-/** What the list is about, and what it does not know. */
-export function AlarmNotes({ isEmpty }: { isEmpty: boolean }): JSX.Element {
-  const alarms = useApp((state) => state.twin.alarms);
-  const moment = useApp((state) => selectShown(state).moment);
-  const phase = useApp((state) => state.twin.phase);
-  const takenAt = useApp((state) => selectNewest(state).snapshot?.takenAt ?? null);
-  const isStarting = alarms?.source === 'starting';
-  // Of a silent twin the bridge goes on to tell: that is an alarm itself.
-  const isLost = phase !== 'live' && phase !== 'offline';
-  const isKnown = alarms !== null && !isLost && !isStarting;
-  const isLast = isLost && takenAt !== null;
+/** At how many tags something is wrong that has no alarm yet; null: none, or nobody knows. */
+export function AlarmsWait(): JSX.Element | null {
+  const isKnown = useApp(selectIsKnown);
   const listed = useSelected(alarmList, (it) => it);
   const health = useApp(selectNewestHealth);
   const waiting = useMemo(() => {
@@ -31,6 +23,27 @@ export function AlarmNotes({ isEmpty }: { isEmpty: boolean }): JSX.Element {
       ([id, own]) => isBad(own.verdict) && !alarmOf(all, id, worstReason(own)),
     ).length;
   }, [listed, health]);
+  if (!isKnown || waiting === 0) return null;
+  return <p data-note="wait">{S.alarmsWait(waiting)}</p>;
+}
+
+// Of a silent twin the bridge goes on to tell: that is an alarm itself.
+const isLostOf = ({ twin: { phase } }: AppState): boolean =>
+  phase !== 'live' && phase !== 'offline';
+
+const selectIsKnown = (state: AppState): boolean => {
+  const { alarms } = state.twin;
+  return alarms !== null && alarms.source !== 'starting' && !isLostOf(state);
+};
+
+/** What the list is about, and what it does not know. */
+export function AlarmNotes({ isEmpty }: { isEmpty: boolean }): JSX.Element {
+  const alarms = useApp((state) => state.twin.alarms);
+  const moment = useApp((state) => selectShown(state).moment);
+  const takenAt = useApp((state) => selectNewest(state).snapshot?.takenAt ?? null);
+  const isStarting = alarms?.source === 'starting';
+  const isKnown = useApp(selectIsKnown);
+  const isLast = useApp(isLostOf) && takenAt !== null;
   return (
     <div className="alarm-notes">
       {moment !== null && <p data-note="now">{S.alarmsOfNow(rosText(moment))}</p>}
@@ -41,7 +54,7 @@ export function AlarmNotes({ isEmpty }: { isEmpty: boolean }): JSX.Element {
           {isKnown ? S.alarmsNone : S.alarmsNotYet}
         </p>
       )}
-      {isKnown && waiting > 0 && <p data-note="wait">{S.alarmsWait(waiting)}</p>}
+      {isEmpty && <AlarmsWait />}
       {isEmpty && isKnown && <p className="faint">{S.alarmsNoneHint}</p>}
       {alarms?.source === 'heard' && alarms.since && (
         <p className="faint" data-note="heard">

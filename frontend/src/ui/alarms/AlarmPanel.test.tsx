@@ -202,7 +202,11 @@ test('what is shelved while the list is held says so where it stands, and all is
   const mild = { verdict: 'stressed' } as const;
   tell(alarm('a', { tag_id: '5', reason: mild }), alarm('b', { tag_id: '6', reason: mild }));
   act('5', 'Shelve');
+  fireEvent.change(screen.getByLabelText(/^Reason/), { target: { value: 'fan' } });
   press('For 1 h');
+  expect(status('5')).toMatch(/^shelved until [\d:]+$/);
+  // Why, in the place of what to do.
+  expect(first('active').querySelector('.alarm-do')?.textContent).toBe('fan');
   expect(group('active').map(({ textContent }) => textContent.includes('shelved until'))).toEqual([
     true,
     false,
@@ -294,7 +298,8 @@ test('without an alarm it says so; where that is not known it says that', () => 
   expect(screen.getByText(wait)).toBeTruthy();
   // Beside the alarm of another tag as well, and not beside its own.
   tell(alarm('a', { tag_id: '5' }));
-  expect(screen.getByText(wait)).toBeTruthy();
+  // Below the rows: it comes and goes.
+  expect(screen.getByText(wait).previousElementSibling).toBe(first('active').closest('section'));
   const ofTag = alarm('a', { tag_id: '1' });
   tell(ofTag);
   expect(screen.queryByText(wait)).toBeNull();

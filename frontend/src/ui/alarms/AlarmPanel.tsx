@@ -1,4 +1,4 @@
-import { useMemo, useRef, useState, type JSX } from 'react';
+import { Fragment, useMemo, useRef, useState, type JSX } from 'react';
 
 import {
   alarmsCsv,
@@ -6,6 +6,7 @@ import {
   causeFacts,
   filtered,
   ORDERS,
+  tagsText,
   type Block,
   type Order,
 } from '../../alarms/arrange';
@@ -14,7 +15,6 @@ import { acknowledgeAlarms } from '../../alarms/own';
 import { selectNow, selectSpeech, todoNow, worstNow, worstNowFirst } from '../../alarms/speech';
 import { alarmList } from '../../alarms/watch';
 import { now, timeOfDay } from '../../clock';
-import { shown as shownText } from '../../domain/text';
 import { fileName, save } from '../../export/save';
 import { store, useApp } from '../../store/app';
 import { useSelected } from '../../store/create';
@@ -28,7 +28,7 @@ import { Select } from '../../widgets/Select';
 import { useChosenInSight } from '../chosenInSight';
 import { HealthMark } from '../HealthMark';
 import { Acknowledge } from './Acknowledge';
-import { AlarmNotes } from './AlarmNotes';
+import { AlarmNotes, AlarmsWait } from './AlarmNotes';
 import { AlarmRow } from './AlarmRow';
 import { DoneLine } from './DoneLine';
 import { ALARMS_ID, ListChoice } from './ListChoice';
@@ -39,8 +39,6 @@ import { WhoseWord } from './WhoseWord';
 
 /** Rows of one block at first, and so many more with each wish for more. */
 const MOST_ROWS = 100;
-/** Tags that a cause names. */
-const MOST_TAGS = 6;
 
 const isTag = (id: string): boolean => selectNewestTag(store.get(), id) !== undefined;
 
@@ -150,10 +148,10 @@ export function AlarmPanel(): JSX.Element {
       >
         <AlarmNotes isEmpty={!hasAny} />
         {filter !== '' && count === 0 && <p className="faint">{S.alarmsNoMatch}</p>}
-        {(['active', 'shelved', 'resolved'] as const).map(
-          (name) =>
-            seen[name].length > 0 && (
-              <section key={name} data-group={name}>
+        {(['active', 'shelved', 'resolved'] as const).map((name) => (
+          <Fragment key={name}>
+            {seen[name].length > 0 && (
+              <section data-group={name}>
                 <h3>
                   {S.alarmGroups[name](
                     filter === ''
@@ -165,8 +163,11 @@ export function AlarmPanel(): JSX.Element {
                   <Rows key={block.key} block={block} group={name} />
                 ))}
               </section>
-            ),
-        )}
+            )}
+            {/* Below the rows: it comes and goes. */}
+            {name === 'active' && hasAny && <AlarmsWait />}
+          </Fragment>
+        ))}
         {hasAny && <WhoseWord />}
       </div>
     </>
@@ -248,7 +249,6 @@ function CauseHeading({
   if (!verdict) return null;
   const waiting = unacknowledged(own);
   const tags = [...new Set(items.map(({ alarm }) => alarm.tag_id))].filter(Boolean);
-  const named = tags.slice(0, MOST_TAGS).map((id) => shownText(id, 16));
   return (
     <div className="alarm-cause" data-cause={cause} data-health={verdict}>
       <button type="button" className="alarm-go" aria-expanded={isOpen} onClick={onToggle}>
@@ -261,9 +261,7 @@ function CauseHeading({
             {group !== 'resolved' && <span className="alarm-do">{todo}</span>}
           </span>
           <span className="alarm-facts">{facts}</span>
-          <span className="alarm-facts faint">
-            {S.alarmTags(named, tags.length - named.length)}
-          </span>
+          <span className="alarm-facts faint">{tagsText(tags)}</span>
         </span>
         <Icon name="chevron" />
       </button>

@@ -31,6 +31,8 @@ export const AlarmRow = memo(function AlarmRow({
   const current = values.state?.kind === 'known' ? values.state.verdict : verdict;
   const name = useApp((state) => nameText(alarm, selectSpeech(state)));
   const status = useStatus(item, group);
+  // While the order is held, it has no line for that: nothing is to be done meanwhile.
+  const because = group === 'active' ? item.shelf?.reason : undefined;
   return (
     <li
       data-alarm={alarm.id}
@@ -59,8 +61,11 @@ export const AlarmRow = memo(function AlarmRow({
               {values.what}
             </span>
             {group !== 'resolved' && (
-              <span className="alarm-do" data-again={current === 'healthy' || undefined}>
-                {values.todo}
+              <span
+                className="alarm-do"
+                data-again={because !== undefined || current === 'healthy' || undefined}
+              >
+                {because ?? values.todo}
               </span>
             )}
           </span>
@@ -90,7 +95,7 @@ function useStatus(item: Item, group: keyof AlarmList): string | null {
   const belongs = groupOf(item);
   if (group !== belongs && belongs === 'resolved') return S.alarmResolved;
   if (group !== belongs && shelf !== null) {
-    return S.alarmShelved(clockText(shelf.until), shelf.reason, alarm.shelved_by ?? '');
+    return S.alarmShelved(clockText(shelf.until), '', alarm.shelved_by ?? '');
   }
   return isAcknowledged ? (who ?? S.healthAcknowledged) : null;
 }

@@ -16,8 +16,8 @@ export const HEALTH: In<typeof ENGLISH> = {
   reasons: {
     sides: { below: 'unter', above: 'über' },
     sidesBack: {
-      below: 'wieder im Bereich; endet über',
-      above: 'wieder im Bereich; endet unter',
+      below: 'im Bereich; Alarm endet über',
+      above: 'im Bereich; Alarm endet unter',
     },
     range: (reading, side, limit, isCritical) =>
       `${reading}, ${side} ${limit}${isCritical ? ' (kritisch)' : ''}`,
@@ -56,7 +56,7 @@ export const HEALTH: In<typeof ENGLISH> = {
       temperature: { below: 'Heizen oder Lüftung schließen', above: 'Lüften oder schattieren' },
       humidity: { below: 'Befeuchten', above: 'Lüften und heizen' },
       co2: { below: 'CO₂ dosieren oder lüften', above: 'Lüften, CO₂-Dosierung prüfen' },
-      light: { below: 'Zusatzlicht einschalten', above: 'Schattieren' },
+      light: { below: 'Assimilationslicht einschalten', above: 'Schattieren' },
       soil_moisture: { below: 'Bewässern', above: 'Weniger bewässern, Drainage prüfen' },
       vpd: { below: 'Lüften und heizen', above: 'Befeuchten oder schattieren' },
     },

@@ -19,8 +19,8 @@ export const HEALTH: In<typeof ENGLISH> = {
   reasons: {
     sides: { below: 'inferior a', above: 'superior a' },
     sidesBack: {
-      below: 'de nuevo en rango; termina por encima de',
-      above: 'de nuevo en rango; termina por debajo de',
+      below: 'en rango; se desactiva por encima de',
+      above: 'en rango; se desactiva por debajo de',
     },
     range: (reading, side, limit, isCritical) =>
       `${reading}, ${side} ${limit}${isCritical ? ' (crítico)' : ''}`,
@@ -30,7 +30,9 @@ export const HEALTH: In<typeof ENGLISH> = {
     scanFailed: (outcome, age) =>
       `Última medición fallida: ${outcome}${age === null ? '' : `, hace ${age}`}`,
     pest: (count) =>
-      count > 0 ? `Plaga detectada: ${counted(count, 'insecto', 'insectos')}` : 'Plaga detectada',
+      count > 0
+        ? `Plaga detectada: ${counted(count, 'ejemplar', 'ejemplares')}`
+        : 'Plaga detectada',
     old: (sensor, age, holds, isDated) => {
       const since = !isDated
         ? sensor === ''
@@ -71,7 +73,7 @@ export const HEALTH: In<typeof ENGLISH> = {
     changed: 'Comparar con otro medidor',
     silent: 'Revisar gemelo, servidor y red',
     stopped: 'Revisar el robot',
-    other: 'Ir a mirar',
+    other: 'Comprobar in situ',
   },
   todoPestAgain: 'Inspeccionar otra vez: si no hay plaga, queda resuelta',
   todoWell: 'En espera de otra medición buena',

@@ -16,8 +16,8 @@ export const HEALTH: In<typeof ENGLISH> = {
   reasons: {
     sides: { below: 'onder', above: 'boven' },
     sidesBack: {
-      below: 'weer binnen bereik; eindigt boven',
-      above: 'weer binnen bereik; eindigt onder',
+      below: 'binnen bereik; alarm eindigt boven',
+      above: 'binnen bereik; alarm eindigt onder',
     },
     range: (reading, side, limit, isCritical) =>
       `${reading}, ${side} ${limit}${isCritical ? ' (kritiek)' : ''}`,
@@ -55,7 +55,7 @@ export const HEALTH: In<typeof ENGLISH> = {
       humidity: { below: 'Bevochtigen', above: 'Luchten en stoken' },
       co2: { below: 'CO₂ doseren of luchten', above: 'Luchten, CO₂-dosering controleren' },
       light: { below: 'Belichting aanzetten', above: 'Schermen' },
-      soil_moisture: { below: 'Water geven', above: 'Minder water geven, afvoer controleren' },
+      soil_moisture: { below: 'Water geven', above: 'Minder water geven, drainage controleren' },
       vpd: { below: 'Luchten en stoken', above: 'Bevochtigen of schermen' },
     },
     range: 'Klimaatregeling controleren',

@@ -70,9 +70,8 @@ def test_a_word_is_everybodys_and_a_viewer_has_none(
             anna.get_by_label("Reason").fill("sprayed")
             anna.get_by_role("button", name="For 1 h").click()
             for page in (anna, vera):
-                expect(row(page)).to_contain_text(
-                    re.compile(r"shelved by anna until [\d:]+: sprayed")
-                )
+                expect(row(page)).to_contain_text(re.compile(r"shelved by anna until \d"))
+                expect(row(page)).to_contain_text("sprayed")
 
 
 def comment(page: Page, where: Locator | None, text: str) -> None:

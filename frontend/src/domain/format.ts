@@ -105,8 +105,12 @@ export function intervalText(seconds: number): string {
   if (seconds < 10) return `${written(seconds.toFixed(1))}\u00a0s`;
   const s = Math.round(seconds);
   if (s >= 60 && s < 600 && s % 60 > 0) return `${Math.floor(s / 60)}\u00a0min ${s % 60}\u00a0s`;
-  return ageText(s).replace(/\u00a0([hud]) 0\u00a0\w+$/, '\u00a0$1');
+  return durationText(s);
 }
+
+/** As an age, without a second unit of 0. */
+export const durationText = (seconds: number): string =>
+  ageText(seconds).replace(/\u00a0([hud]) 0\u00a0\w+$/, '\u00a0$1');
 
 /** An age in its largest unit alone, for a narrow column. */
 export function shortAgeText(seconds: number): string {

@@ -1,7 +1,7 @@
 /** Why a tag or the house has its verdict, in words. */
 import type { HealthReason, Verdict } from '../contract/types';
 import { S } from '../strings';
-import { ageText, digitsApart, readingText, shortAgeText, valueText } from './format';
+import { digitsApart, durationText, readingText, shortAgeText, valueText } from './format';
 import { isOfRange, sideOf } from './health';
 import type { Catalogue, Sensor } from './sensors';
 import { shown } from './text';
@@ -51,7 +51,7 @@ export function reasonText(
       return R.old(
         label,
         age === null ? null : shortAgeText(age),
-        limit === null ? null : ageText(limit).replace(/\u00a0([hud]) 0\u00a0\w+$/, '\u00a0$1'),
+        limit === null ? null : durationText(limit),
         reason.since !== null,
       );
     case 'silent':

@@ -49,6 +49,12 @@ export const isHad = (
   has: (sensor: string) => boolean,
 ): boolean => has(name) || (madeOf.length > 0 && madeOf.every(has));
 
+/** What a tag's value is of: its own reading, or the readings that it is computed of. */
+export const partsOf = (
+  { name, madeOf }: Pick<Sensor, 'name' | 'madeOf'>,
+  has: (sensor: string) => boolean,
+): readonly string[] => (madeOf.length > 0 && !has(name) ? madeOf : [name]);
+
 /** What holds for plants of a species; of one that is not known, what holds for all. */
 export const rangesFor = (sensor: Sensor, species: string): Ranges =>
   sensor.species.get(species.toLowerCase()) ?? sensor;

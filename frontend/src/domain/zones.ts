@@ -3,7 +3,7 @@ import type { Field, Judgement } from '../contract/types';
 import type { MapPoint } from '../geometry/coordinates';
 import { excess, IDEAL_ALPHA, idealColour } from './ideal';
 import type { Shade } from './ramp';
-import { type Ranges, rangesFor, type Sensor } from './sensors';
+import { partsOf, type Ranges, rangesFor, type Sensor } from './sensors';
 import type { Tag } from './twin';
 
 export interface Site {
@@ -110,10 +110,10 @@ export interface ReadSite {
 export function readSites(
   tags: readonly Tag[],
   said: Judgement['tags'],
-  { name, madeOf }: Pick<Sensor, 'name' | 'madeOf'>,
+  sensor: Pick<Sensor, 'name' | 'madeOf'>,
 ): ReadSite[] {
   return tags.flatMap(({ id, at, readings }) => {
-    const parts = madeOf.length > 0 && !readings.has(name) ? madeOf : [name];
+    const parts = partsOf(sensor, (part) => readings.has(part));
     if (!at || parts.some((part) => (readings.get(part) ?? null) === null)) return [];
     const old = said[id]?.reasons.filter(({ kind }) => kind === 'old') ?? [];
     // Without a sensor's name it is said of all that the tag has. Of what is derived no age is

@@ -2,10 +2,9 @@ import { describe, expect, test } from 'vitest';
 
 import { GROWING } from '../domain/age';
 import { houseHealth } from '../domain/health';
-import { fieldWith } from '../testing/field';
 import { judgement, NOBODY } from '../testing/health';
 import { readings, tag } from '../testing/tags';
-import type { Field, TwinTagState as WireTag } from '../contract/types';
+import type { TwinTagState as WireTag } from '../contract/types';
 import type { Tag } from '../domain/twin';
 import { buildScene, type Scene } from './scene';
 import { sensorNamed } from '../testing/sensors';
@@ -16,14 +15,13 @@ const scene = (
   before: Scene | null = null,
   health = NOBODY,
   listed: ReadonlySet<string> | null = null,
-  field: Field | null = null,
+  sensor = 'temperature',
 ): Scene =>
   buildScene(
     {
       tags,
       health: houseHealth(tags, health, true),
-      sensor: sensorNamed(field?.sensor ?? 'temperature'),
-      field,
+      sensor: sensorNamed(sensor),
       unit: 'C',
       now,
       ageing: GROWING,
@@ -51,14 +49,20 @@ describe('pins', () => {
     expect(kinds).toEqual(['value', 'failed', 'lacking']);
   });
 
-  test('what is computed of two sensors is where a tag has both', () => {
-    const both = readings({ temperature: 20, humidity: 50 });
-    const tags = [tag({ readings: both }), tag({ readings: readings({ humidity: 50 }) })];
-    const known = Array.from({ length: 5 }, () => [9, 9, 9, 9, 9]);
-    const margin = fieldWith(known, { sensor: 'condensation_margin' });
-    const [has, lacks] = scene(tags, 0, null, NOBODY, null, margin).pins;
-    expect(has).toMatchObject({ kind: 'value', texts: ['1 · 9.0\u00a0K', '1'] });
-    expect(lacks?.kind).toBe('lacking');
+  test('what is computed of two sensors is where a tag has both, and its number is no tag’s own', () => {
+    const kinds = [
+      { temperature: 20, humidity: 50 },
+      { temperature: 20, humidity: null },
+      { humidity: 50 },
+    ].map((values) => {
+      const [pin] = scene([tag({ readings: readings(values) })], 0, null, NOBODY, null, 'vpd').pins;
+      return [pin?.kind, pin?.texts];
+    });
+    expect(kinds).toEqual([
+      ['value', ['1']],
+      ['failed', ['1']],
+      ['lacking', ['1']],
+    ]);
   });
 
   test('has the verdict that was given, unknown where none was', () => {

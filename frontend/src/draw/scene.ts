@@ -1,11 +1,10 @@
 /** What to draw, from the data: one list each of pins, blooms and boxes. Pure. */
-import type { Field, Verdict } from '../contract/types';
+import type { Verdict } from '../contract/types';
 import { ageSeconds, freshness, type Ageing } from '../domain/age';
-import { valueAt } from '../domain/field';
 import { readingText } from '../domain/format';
 import { isBad, type HouseHealth } from '../domain/health';
 import { memoLast, memoOne } from '../domain/memo';
-import { isHad, type Sensor } from '../domain/sensors';
+import { partsOf, type Sensor } from '../domain/sensors';
 import { speciesLooks, UNKNOWN_SPECIES, type BloomLook } from '../domain/species';
 import { shown } from '../domain/text';
 import { equal, type Tag } from '../domain/twin';
@@ -23,7 +22,7 @@ export interface Pin {
   readonly id: string;
   readonly at: MapPoint;
   /**
-   * - value: the tag has this sensor and a reading, or what it is computed of
+   * - value: the tag has this sensor and a reading, or all that it is computed of
    * - failed: it has this sensor, whose reading is not a number
    * - lacking: it has no such sensor
    */
@@ -55,8 +54,6 @@ export interface SceneInput {
   readonly tags: readonly Tag[];
   readonly health: HouseHealth;
   readonly sensor: Sensor;
-  /** Of a sensor that is computed: there are no readings of it. Null: none is here. */
-  readonly field: Field | null;
   readonly unit: TemperatureUnit;
   /** ms on the monotonic clock. */
   readonly now: number;
@@ -113,50 +110,38 @@ function spacingOf(pins: readonly Pin[]): number {
 function pinOf(tag: Tag, at: MapPoint, input: SceneInput): Pin {
   const { health, sensor, unit, now, ageing, listed } = input;
   const isLeftOut = listed !== null && !listed.has(tag.id);
-  const value = valueOf(tag, at, input);
+  // The number of what is computed is the field's, which neighbours have a part in: it is no label.
+  const values = partsOf(sensor, (part) => tag.readings.has(part)).map((part) =>
+    tag.readings.get(part),
+  );
+  const isLacking = values.includes(undefined);
+  const isFailed = values.includes(null);
   const fresh = freshness(ageSeconds(tag.readAt.get(sensor.name) ?? tag.scannedAt, now, ageing));
   const verdict = health.byTag.get(tag.id)?.verdict ?? 'unknown';
   const isWarning = isBad(verdict);
   return {
     id: tag.id,
     at,
-    kind: value === undefined ? 'lacking' : value === null ? 'failed' : 'value',
+    kind: isLacking ? 'lacking' : isFailed ? 'failed' : 'value',
     verdict,
     strength: isLeftOut
       ? LEFT_OUT
       : Math.max(quantised(fresh, FADE_STEPS), isWarning ? FAINTEST_WARNING : 0),
     pest: tag.anomaly && !isLeftOut,
-    texts: isLeftOut ? [] : textsOf(tag)(sensor, unit, value),
+    texts: isLeftOut ? [] : textsOf(tag)(sensor, unit),
     priority:
       (tag.anomaly ? 4 : 0) +
-      (value == null ? 0 : 2) +
+      (isLacking || isFailed ? 0 : 2) +
       (verdict === 'critical' ? 4 : verdict === 'stressed' ? 3 : 0),
   };
 }
 
-/** What is computed of a tag's readings is the value of the field of nearest readings where it is. */
-function valueOf(
-  { readings }: Tag,
-  at: MapPoint,
-  { sensor, field }: SceneInput,
-): number | null | undefined {
-  const { name } = sensor;
-  if (readings.has(name)) return readings.get(name);
-  const isComputed = field?.sensor === name && !field.sureness;
-  return isComputed && isHad(sensor, (each) => readings.has(each)) ? valueAt(field, at) : undefined;
-}
-
 const textsOf = memoOne((tag: Tag) =>
-  memoLast(
-    (
-      sensor: Sensor,
-      unit: TemperatureUnit,
-      value: number | null | undefined,
-    ): readonly string[] => {
-      const id = shown(tag.id, 12);
-      return value == null ? [id] : [`${id} · ${readingText(sensor, value, unit)}`, id];
-    },
-  ),
+  memoLast((sensor: Sensor, unit: TemperatureUnit): readonly string[] => {
+    const id = shown(tag.id, 12);
+    const value = tag.readings.get(sensor.name);
+    return value == null ? [id] : [`${id} · ${readingText(sensor, value, unit)}`, id];
+  }),
 );
 
 /** Every species of some tags: the planters' and those of single blooms. */

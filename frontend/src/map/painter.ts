@@ -5,7 +5,7 @@ import { edgesOf, fieldPixels, smoothDetail } from '../domain/field';
 import type { HouseHealth } from '../domain/health';
 import { fieldShade } from '../domain/ramp';
 import { cellsWhere, idealShade, withOld } from '../domain/zones';
-import { isMeasured, type Sensor } from '../domain/sensors';
+import type { Sensor } from '../domain/sensors';
 import type { Tag } from '../domain/twin';
 import { errorShade } from '../domain/sureness';
 import type { TemperatureUnit } from '../domain/units';
@@ -269,7 +269,6 @@ export class Painter {
       selectShown(state).ageing,
       selectHealth(state),
       selectSensor(state),
-      isMeasured(selectSensor(state)) ? null : selectShown(state).field.value,
       state.settings.unit,
       selectListed(state),
       Math.floor(now / FADE_TICK_MS),
@@ -282,12 +281,11 @@ export class Painter {
       ageing: Ageing,
       health: HouseHealth,
       sensor: Sensor,
-      field: Field | null,
       unit: TemperatureUnit,
       listed: ReadonlySet<string> | null,
       tick: number,
     ) => {
-      const look = { tags, ageing, health, sensor, field, unit, listed };
+      const look = { tags, ageing, health, sensor, unit, listed };
       this.#lastScene = buildScene({ ...look, now: tick * FADE_TICK_MS }, this.#lastScene);
       return this.#lastScene;
     },

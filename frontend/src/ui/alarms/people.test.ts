@@ -132,6 +132,27 @@ test('what is done here is said to the bridge, and taken back there', async () =
   });
 });
 
+test('what the bridge has taken holds here before the frame that says so', async () => {
+  await signedIn();
+  tellAlarms(COLD);
+  let isAnswered = false;
+  const said = fetch;
+  vi.stubGlobal('fetch', async (...given: Parameters<typeof fetch>) => {
+    const answer = await said(...given);
+    isAnswered = true;
+    return answer;
+  });
+  acknowledgeAlarms([{ alarm: COLD, verdict: 'stressed' }]);
+  await vi.waitFor(() => {
+    expect(isAnswered).toBe(true);
+  });
+  // Whatever follows an answer has been done by the next turn of the loop.
+  await new Promise((resolve) => setTimeout(resolve));
+  expect(own.get().acknowledged.size).toBe(1);
+  tellAlarms(COLD);
+  expect(own.get().acknowledged.size).toBe(0);
+});
+
 test('what the bridge refuses does not hold here either', async () => {
   await signedIn();
   tellAlarms(COLD);

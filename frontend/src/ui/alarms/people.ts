@@ -109,15 +109,19 @@ async function tell(before: Kept, next: Kept): Promise<void> {
   const words = wordsFor(before, next, alarmsNow(), (until) =>
     nowS === null ? null : nowS + (until - at) / 1000,
   );
+  const { alarms } = store.get().twin;
+  let hasFailed = false;
   pending += 1;
   try {
     // One behind the other, in the order of the list: of two words the later one stands.
     for (const word of words) await word();
   } catch (error) {
+    hasFailed = true;
     say(P.failed(failureText(error)));
   }
   pending -= 1;
-  take();
+  // The frame that has them may come later than the answer: the one of before would take them back.
+  if (hasFailed || store.get().twin.alarms !== alarms) take();
 }
 
 /** Asks who has signed in, on each connection anew; returns the way to stop. */

@@ -131,6 +131,8 @@ def test_of_what_was_deleted_it_is_said_since_when_it_is_kept(tmp_path: Path) ->
     last_s = int(time.time()) - 3_600
     stamps_s = [last_s - DAY_S // 4 * number for number in range(20)][::-1]
     rows: list[Write] = [pin("a", stamps_s[0] * SECOND), row("gone", stamps_s[0] * SECOND, co2=1.0)]
+    # A round of deletion, the first at the start, takes an hour of data at most.
+    rows += [row("a", (stamps_s[0] + 60) * SECOND, co2=1.0)]
     rows += [row("a", at_s * SECOND, co2=float(n)) for n, at_s in enumerate(stamps_s)]
     kept(journal, rows)
     with both(journal, "-p", "journal_days:=2.0") as lives:

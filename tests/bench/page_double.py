@@ -66,7 +66,7 @@ window.network = { frames: 0, fetches: 0 };
     }])),
   });
   const alarms = () => ({
-    type: 'alarms', source: 'journal', since: { sec: start, nanosec: 0 },
+    type: 'alarms', source: 'journal', since: { sec: start, nanosec: 0 }, notes: 0,
     alarms: tags.filter((tag) => tag.anomaly).map((tag) => ({
       id: `${tag.tag_id} pest`, reason: reason(tag), tag_id: tag.tag_id,
       raised_at: tag.looked_at, cleared_at: null, worst: null,
@@ -82,7 +82,7 @@ window.network = { frames: 0, fetches: 0 };
         this.onopen?.();
         this.say({ type: 'status', twin: 'live', reason: 'live', message: '',
                    state_age_seconds: 0, has_map: true, origin: 'robot',
-                   drops: [], outward: [],
+                   input_problems: [], day_length_s: 86400, drops: [], outward: [],
                    journal: { state: 'recording', detail: 'recording', set_aside: '',
                               simulated: null } });
         this.say({ type: 'state', seq: ++seq, revision: revision(),

@@ -44,15 +44,18 @@ def notes_of_alarms(
     """By the id of each alarm that anybody has said something of."""
     if now_ns is None:
         return {}
+    alarms = tuple(alarms)
+    worse_ns = {alarm.id: alarm.worse_at_ns or 0 for alarm in alarms}
     found: dict[str, AlarmNotes] = {}
     shelves: dict[str, Note] = {}
     for (subject, kind), note in standing(notes, now_ns).items():
         name = subject.removeprefix(OF_ALARM)
-        if kind == ACKNOWLEDGE:
+        # Nobody has acknowledged what an alarm became later.
+        if kind == ACKNOWLEDGE and note.made_at_ns >= worse_ns.get(name, 0):
             found[name] = AlarmNotes(acknowledged=note)
         elif kind == SHELVE and (note.until_ns or 0) > now_ns:
             shelves[name] = note
-    for name, note in _shelved(tuple(alarms), shelves).items() if shelves else ():
+    for name, note in _shelved(alarms, shelves).items() if shelves else ():
         found[name] = replace(found.get(name, NOTHING_SAID), shelved=note)
     return found
 

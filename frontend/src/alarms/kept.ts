@@ -59,7 +59,7 @@ export const isWorse = (a: Verdict, b: Verdict): boolean =>
   VERDICTS.indexOf(a) < VERDICTS.indexOf(b);
 
 /** What is wrong and where, whenever it is: too cold is not too warm. */
-export const whatOf = ({ tag_id, reason }: Alarm): string =>
+export const whatOf = ({ tag_id, reason }: Pick<Alarm, 'tag_id' | 'reason'>): string =>
   JSON.stringify([tag_id, reason.kind, reason.sensor, isOfRange(reason) ? sideOf(reason) : '']);
 
 /** An alarm and how bad it is by now. */

@@ -95,17 +95,15 @@ export const unacknowledged = (items: readonly Item[]): readonly Item[] =>
 export const calling = ({ active }: AlarmList): readonly Item[] =>
   unacknowledged(active).filter(({ alarm }) => alarm.cleared_at === null);
 
-/** The alarm of why a tag is as it is. */
+/** The alarm of why a tag is as it is; that it is too cold is not that it was too warm. */
 export const alarmOf = (
   items: readonly Item[],
   tagId: string,
   reason: HealthReason | undefined,
 ): Item | undefined =>
+  reason &&
   items.find(
-    ({ alarm }) =>
-      alarm.tag_id === tagId &&
-      alarm.reason.kind === reason?.kind &&
-      alarm.reason.sensor === reason.sensor,
+    ({ alarm }) => alarm.tag_id === tagId && whatOf(alarm) === whatOf({ tag_id: tagId, reason }),
   );
 
 /** What is new between two lists, to be told once. */

@@ -28,7 +28,7 @@ export function selectNow(
 ): Now | null {
   const tag = selectNewestTag(state, alarm.tag_id);
   const health = selectNewestHealth(state)?.byTag.get(alarm.tag_id);
-  const before = tag ? thenOf(selectHourAgoNow(state, last), tag) : null;
+  const before = tag ? thenOf(selectHourAgoNow(state, last), tag, alarm.reason.sensor) : null;
   return nowOf(alarm, tag && health ? { tag, health } : null, before, isHeardNow(state));
 }
 

@@ -58,10 +58,10 @@ test('now, at worst and at first, each with its own severity', () => {
 
 test('its limit is that of now: what is critical, or what ends it on the way back', () => {
   const cold = alarm('a', { tag_id: '9', worst: 8.7, reason: { value: 17.9, limit: 18 } });
-  const at = (value: number, limit: number): Now => ({
-    ...{ kind: 'known', value, verdict: 'stressed', limit, trend: null },
+  const at = (value: number, limit: number, verdict: Verdict = 'stressed'): Now => ({
+    ...{ kind: 'known', value, verdict, limit, trend: null },
   });
-  expect(valuesOf(cold, C, at(8.7, 10))).toMatchObject({
+  expect(valuesOf(cold, C, at(8.7, 10, 'critical'))).toMatchObject({
     what: 'Temperature below 10.0\u00a0°C',
     todo: 'Heat, or close the vents',
   });

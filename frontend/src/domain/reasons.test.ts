@@ -1,7 +1,8 @@
 import { describe, expect, test } from 'vitest';
 
 import { reason } from '../testing/health';
-import { reasonsText, reasonText } from './reasons';
+import { reasonsText, reasonText, todoText } from './reasons';
+import { NO_CATALOGUES } from './sensors';
 import { CATALOGUE } from '../testing/sensors';
 
 const text = (over: Parameters<typeof reason>[0], age: number | null = null): string =>
@@ -106,6 +107,14 @@ describe('a reason in words', () => {
     expect(reasonText(CATALOGUE, reason(), 'F', null)).toBe(
       `Temperature 43.9${NBSP}°F, below 50.0 (critical)`,
     );
+  });
+
+  test('nothing is back in a range that nobody has told, or that holds no more', () => {
+    const told = reason({ verdict: 'stressed', value: 31, limit: 30 });
+    for (const sensors of [NO_CATALOGUES.day, CATALOGUE]) {
+      expect(reasonText(sensors, told, 'C', null)).toMatch(/31\.0.*, above 30\.0$/);
+      expect(todoText(sensors, told)).not.toBe('');
+    }
   });
 
   test('of a name that some twin made up stays short', () => {

@@ -75,9 +75,14 @@ export const digitsOf = (
 
 type OfRange = HealthReason & { readonly value: number; readonly limit: number };
 
-/** Whether the value is back in its ideal range, and has yet to pass a limit that the file has not. */
-export const isBack = ({ limits }: Sensor, { verdict, limit }: OfRange): boolean =>
-  verdict === 'stressed' && !limits.has(limit);
+/**
+ * Whether the value is back in an ideal range, and has yet to pass a limit that the file has not.
+ * Of a file that is not here, or has other ranges, nothing is.
+ */
+export const isBack = ({ ideals }: Sensor, { verdict, value, limit }: OfRange): boolean =>
+  verdict === 'stressed' &&
+  !ideals.flat().includes(limit) &&
+  ideals.some(([low, high]) => value >= low && value <= high);
 
 const sideText = (sensor: Sensor, reason: OfRange): string =>
   (isBack(sensor, reason) ? S.reasons.sidesBack : S.reasons.sides)[sideOf(reason)];

@@ -33,8 +33,8 @@ export interface Sensor extends Ranges {
   readonly part: 'day' | 'night' | null;
   /** Species with ranges of their own, by their name in lower case. */
   readonly species: ReadonlyMap<string, Ranges>;
-  /** All limits that the file has of it, of day, night and species. */
-  readonly limits: ReadonlySet<number>;
+  /** All ideal ranges that the file has of it, of day, night and species. */
+  readonly ideals: readonly Span[];
 }
 
 /** Whether tags can have readings of it: what is derived is told where it is a reason. */
@@ -144,11 +144,10 @@ export function cataloguesOf(file: SensorsFile, language: string = LANGUAGE): Ca
           rangesOf(ranges, isDay),
         ]),
       ),
-      limits: new Set(
-        [entry, ...Object.values(entry.species ?? {})]
-          .flatMap((ranges) => [ranges, ranges.night])
-          .flatMap((ranges) => [...(ranges?.ideal ?? []), ...(ranges?.critical ?? [])]),
-      ),
+      ideals: [entry, ...Object.values(entry.species ?? {})]
+        .flatMap((ranges) => [ranges, ranges.night])
+        .map((ranges) => spanOf(ranges?.ideal))
+        .filter((span) => span !== null),
     });
     const all = Object.entries(file.sensors).map(([name, entry]) => made(name, entry));
     return new Catalogue(all, (name) => made(name, file.fallback), areaOf);

@@ -43,7 +43,8 @@ export function isOldReading(sensor: string, { tag, health }: TagThen): boolean 
   );
 }
 
-function sameReading(sensor: string, a: Tag, b: Tag): boolean {
+/** Whether both have the very same reading of a sensor. */
+export function sameReading(sensor: string, a: Tag, b: Tag): boolean {
   const at = ({ wire }: Tag): string =>
     JSON.stringify(wire.readings.find(({ name }) => name === sensor)?.observed_at ?? null);
   return at(a) !== 'null' && at(a) === at(b);

@@ -128,6 +128,13 @@ describe('pins', () => {
     expect(scene([tag({ readings: [unknown] })]).pins[0]?.strength).toBeLessThan(0.5);
   });
 
+  test('what is computed is as old as the oldest that it is computed of', () => {
+    const old = { name: 'temperature', value: 20, observed_at: null, stale_seconds: 3_600 };
+    const fresh = { ...old, name: 'humidity', value: 50, stale_seconds: 1 };
+    const tags = [tag({ stale_seconds: 1, readings: [old, fresh] })];
+    expect(scene(tags, 0, null, NOBODY, null, 'vpd').pins[0]?.strength).toBeLessThan(0.5);
+  });
+
   test('a pest is marked and its label comes first', () => {
     const [sick] = scene([tag({ anomaly: true })]).pins;
     const [well] = scene([tag()]).pins;

@@ -111,12 +111,15 @@ function pinOf(tag: Tag, at: MapPoint, input: SceneInput): Pin {
   const { health, sensor, unit, now, ageing, listed } = input;
   const isLeftOut = listed !== null && !listed.has(tag.id);
   // The number of what is computed is the field's, which neighbours have a part in: it is no label.
-  const values = partsOf(sensor, (part) => tag.readings.has(part)).map((part) =>
-    tag.readings.get(part),
-  );
+  const parts = partsOf(sensor, (part) => tag.readings.has(part));
+  const values = parts.map((part) => tag.readings.get(part));
   const isLacking = values.includes(undefined);
   const isFailed = values.includes(null);
-  const fresh = freshness(ageSeconds(tag.readAt.get(sensor.name) ?? tag.scannedAt, now, ageing));
+  const fresh = Math.min(
+    ...parts.map((part) =>
+      freshness(ageSeconds(tag.readAt.get(part) ?? tag.scannedAt, now, ageing)),
+    ),
+  );
   const verdict = health.byTag.get(tag.id)?.verdict ?? 'unknown';
   const isWarning = isBad(verdict);
   return {

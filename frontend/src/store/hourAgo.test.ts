@@ -39,6 +39,12 @@ afterEach(() => {
   vi.useRealTimers();
 });
 
+/** Read now. */
+const at = (temperature: number) => {
+  const observed_at = { sec: NOW_S, nanosec: 0 };
+  return tag({ readings: readings({ temperature }).map((it) => ({ ...it, observed_at })) });
+};
+
 const pass = (ms: number): Promise<unknown> => vi.advanceTimersByTimeAsync(ms);
 
 test('an hour before now is asked for once, and again after some minutes', async () => {
@@ -60,20 +66,30 @@ test('what a reading of now is compared with stays until there is a newer one', 
   stop = startHourAgo();
   await pass(10);
   const first = hourAgo.get()?.tags.get('1');
-  const at = (temperature: number) => tag({ readings: readings({ temperature }) });
-  expect(thenOf(hourAgo.get(), at(22))).toBe(first);
+  expect(thenOf(hourAgo.get(), at(22), 'temperature')).toBe(first);
   hear(NOW_S + 302);
   await pass(1_000);
   const second = hourAgo.get()?.tags.get('1');
   expect(second).not.toBe(first);
-  expect(thenOf(hourAgo.get(), at(22))).toBe(first);
-  expect(thenOf(hourAgo.get(), at(23))).toBe(second);
+  expect(thenOf(hourAgo.get(), at(22), 'temperature')).toBe(first);
+  expect(thenOf(hourAgo.get(), at(23), 'temperature')).toBe(second);
   // Of a moment in the past it is what was an hour before, however somebody came there.
   act({ type: 'moment', moment: 50_000 });
   receive({ type: 'past', past: { at: 50_000, house: NO_HOUSE } });
   await pass(1_000);
-  expect(thenOf(hourAgo.get(), at(23))).not.toBe(second);
-  expect(thenOf(null, at(23))).toBeNull();
+  expect(thenOf(hourAgo.get(), at(23), 'temperature')).not.toBe(second);
+  expect(thenOf(null, at(23), 'temperature')).toBeNull();
+});
+
+test('a reading that is an hour old itself is compared with none that is older', async () => {
+  stop = startHourAgo();
+  await pass(10);
+  const known = hourAgo.get();
+  if (!known) throw new Error('nothing known');
+  expect(thenOf(known, at(22), 'temperature')).toBe(known.tags.get('1'));
+  const later = { tag: at(22), health: { verdict: 'healthy', reasons: [] } } as const;
+  const next = { ...known, tags: new Map([['1', later]]) };
+  expect(thenOf(next, at(22), 'temperature')).toBe(later);
 });
 
 test('where a day is a short one, so is its hour', async () => {

@@ -3,7 +3,7 @@ import { now } from '../clock';
 import { fetchStateAt } from '../contract/past';
 import type { TagHealth } from '../contract/types';
 import { secondsOf } from '../domain/rostime';
-import type { TagThen } from '../domain/trend';
+import { sameReading, type TagThen } from '../domain/trend';
 import { snapshotOf, type Tag } from '../domain/twin';
 import { store, type AppState } from './app';
 import { createStore } from './create';
@@ -52,17 +52,22 @@ export function selectHourAgoNow(state: AppState, last: HourAgo | null): HourAgo
     : null;
 }
 
-/** What a tag's readings of now were compared with first, by the tag. */
-const compared = new Map<string, { readonly readings: string; readonly then: TagThen }>();
+/** What a tag's reading of now was compared with first, by the tag and the sensor. */
+const compared = new Map<string, { readonly reading: string; readonly then: TagThen }>();
 
-/** What a tag is compared with; of now it stays as long as its readings do: they change a trend, no clock. */
-export function thenOf(last: HourAgo | null, { id, wire }: Tag): TagThen | null {
-  const then = last?.tags.get(id) ?? null;
-  if (!then || !last?.isNow) return then;
-  const readings = JSON.stringify(wire.readings.map((it) => [it.value, it.observed_at]));
-  const known = compared.get(id);
-  if (known?.readings === readings) return known.then;
-  compared.set(id, { readings, then });
+/**
+ * What a tag's reading is compared with; of now it stays as long as the reading does, which changes
+ * a trend, and no clock: until that is an hour old itself.
+ */
+export function thenOf(last: HourAgo | null, tag: Tag, sensor: string): TagThen | null {
+  const then = last?.tags.get(tag.id) ?? null;
+  if (!then || !last?.isNow || sameReading(sensor, tag, then.tag)) return then;
+  const { value, observed_at: at } = tag.wire.readings.find(({ name }) => name === sensor) ?? {};
+  const reading = JSON.stringify([value, at]);
+  const key = JSON.stringify([tag.id, sensor]);
+  const known = compared.get(key);
+  if (known?.reading === reading) return known.then;
+  compared.set(key, { reading, then });
   return then;
 }
 

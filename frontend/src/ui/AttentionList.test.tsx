@@ -1,6 +1,9 @@
-import { render, screen, within } from '@testing-library/react';
+import { act, render, screen, within } from '@testing-library/react';
 import { expect, test } from 'vitest';
 
+import { shelveAlarm } from '../alarms/own';
+import { startAlarms } from '../alarms/watch';
+import { alarm, tellAlarms } from '../testing/alarms';
 import { judgement, reason } from '../testing/health';
 import { showTags } from '../testing/page';
 import { wireTag } from '../testing/tags';
@@ -73,4 +76,28 @@ test('says so when nobody does, and when that is not known', () => {
   document.body.replaceChildren();
   show({ well: 'healthy', far: 'unknown' });
   expect(screen.getByRole('heading').textContent).toMatch(/no data for 1 tag$/);
+});
+
+test('where all is shelved, or the robot stands still, nobody says that nothing needs attention', () => {
+  const said = judgement({ bug: [pest] });
+  showTags([wireTag({ tag_id: 'bug' })], said);
+  const stop = startAlarms();
+  render(<AttentionList />);
+  act(() => {
+    const told = alarm('a', { tag_id: 'bug', reason: pest });
+    tellAlarms(told);
+    shelveAlarm({ alarm: told, verdict: 'critical' }, 15, 'treated');
+  });
+  expect(ids()).toEqual([]);
+  expect(screen.queryByRole('heading')).toBeNull();
+  stop();
+  document.body.replaceChildren();
+  const well = judgement({ well: 'healthy' });
+  const stopped = reason({ kind: 'stopped', verdict: 'unknown', sensor: '', value: null });
+  showTags([wireTag({ tag_id: 'well' })], {
+    ...well,
+    house: { ...well.house, verdict: 'unknown', reasons: [stopped] },
+  });
+  render(<AttentionList />);
+  expect(screen.queryByRole('heading')).toBeNull();
 });

@@ -3,7 +3,7 @@ import { useRef, type CSSProperties, type JSX } from 'react';
 import { byCause, tagsText } from '../alarms/arrange';
 import { selectSpeech } from '../alarms/speech';
 import type { HealthReason } from '../contract/types';
-import { severity } from '../domain/health';
+import { isBad, severity, type HouseHealth } from '../domain/health';
 import { todoText } from '../domain/reasons';
 import type { Catalogue } from '../domain/sensors';
 import { shown } from '../domain/text';
@@ -33,13 +33,14 @@ interface Line {
 export function AttentionList(): JSX.Element {
   const urgent = useUrgent();
   const lines = useLines(urgent);
-  const { unknown } = useApp(selectHealth).counts;
+  const health = useApp(selectHealth);
+  const heading = urgent.length > 0 ? S.attention : noneText(health);
   const list = useRef<HTMLUListElement>(null);
   const count = useFitting(list, lines.length);
   const rest = lines.slice(count).reduce((sum, { tags }) => sum + tags.length, 0);
   return (
     <div className="attention">
-      <h3>{urgent.length > 0 ? S.attention : noneText(unknown)}</h3>
+      {heading && <h3>{heading}</h3>}
       <ul ref={list} style={{ '--rows': lines.length } as CSSProperties}>
         {lines
           .slice(0, MOST_LINES)
@@ -135,6 +136,9 @@ function CauseLine({
 const todoTexts = (sensors: Catalogue, reasons: readonly HealthReason[]): string =>
   [...new Set(reasons.map((reason) => todoText(sensors, reason)))].filter(Boolean).join(' · ');
 
-/** Of whom nothing is known, nobody knows that he needs nothing. */
-const noneText = (unknown: number): string =>
-  unknown > 0 ? S.attentionNoneKnown(unknown) : S.attentionNone;
+/** Null: all of it is shelved, or the greenhouse's own reason says more. */
+function noneText({ verdict, reasons, counts: { unknown } }: HouseHealth): string | null {
+  if (isBad(verdict) || reasons.length > 0) return null;
+  // Of whom nothing is known, nobody knows that he needs nothing.
+  return unknown > 0 ? S.attentionNoneKnown(unknown) : S.attentionNone;
+}

@@ -88,11 +88,14 @@ export function DoNow({
   const urgent = useUrgent();
   // The alarms are those of now.
   const all = useApp((state) => (selectShown(state).moment === null ? 'alarms' : 'tags'));
-  const isOfTags = health.reasons.length === 0 && urgent.length > 0;
+  const hasOwn = health.reasons.length > 0;
+  // Where nobody hears of its tags they are as they were; where its robot stands still, they are so.
+  const isOfTags = urgent.length > 0 && (!hasOwn || isBad(health.verdict));
+  const count = hasOwn && most > 1 ? most - 1 : most;
   return (
     <ul className="do-now" aria-label={S.todoLabel} data-most={most}>
       {isOfTags ? (
-        urgent.slice(0, most).map(({ tagId, reasons: [reason] }, index) => (
+        urgent.slice(0, count).map(({ tagId, reasons: [reason] }, index) => (
           <li key={index}>
             <button
               type="button"
@@ -104,7 +107,7 @@ export function DoNow({
               <HealthMark verdict={reason.verdict} word={false} />
               <Todo tagId={tagId} reason={reason} id={index === 0 ? id : undefined} />
             </button>
-            {index === most - 1 && urgent.length > most && (
+            {index === count - 1 && urgent.length > count && (
               <button
                 type="button"
                 className="do-more"
@@ -112,7 +115,7 @@ export function DoNow({
                   act({ type: 'list', list: all });
                 }}
               >
-                {S.attentionMore(urgent.length - most)}
+                {S.attentionMore(urgent.length - count)}
               </button>
             )}
           </li>
@@ -120,6 +123,11 @@ export function DoNow({
       ) : (
         <li>
           <Overall health={health} id={id} />
+        </li>
+      )}
+      {isOfTags && count < most && (
+        <li>
+          <Overall health={health} id="health-own" />
         </li>
       )}
     </ul>

@@ -104,6 +104,37 @@ test('nobody is called for what is shelved, and all the rest is counted', () => 
   stop();
 });
 
+test('that it is too cold is not shelved with that it was too warm', () => {
+  const warm = reason({ verdict: 'critical', value: 40, limit: 35 });
+  showTags(TAGS, judgement({ 1: 'healthy', 5: [warm] }));
+  const stop = startAlarms();
+  render(<HealthSummary kiosk={false} />);
+  act(() => {
+    tellAlarms(alarm('warm', { tag_id: '5', reason: warm }));
+    for (const item of calling(alarmList.get())) shelveAlarm(item, 15, 'fan');
+  });
+  const todo = screen.getByRole('list', { name: 'Do this now' });
+  expect(todo.textContent).toBe('');
+  act(() => {
+    showTags(TAGS, judgement({ 1: 'healthy', 5: [reason()] }));
+    tellAlarms(alarm('warm', { tag_id: '5', reason: warm }));
+  });
+  expect(todo.textContent).toMatch(/^CriticalTag 5: Temperature 6.6.*no alarm yet$/);
+  stop();
+});
+
+test('of a robot that stands still what is critical is told first', () => {
+  const said = judgement({ 1: [reason()], 5: [reason({ value: 5 })] });
+  const stopped = reason({ kind: 'stopped', verdict: 'unknown', sensor: '', value: null });
+  showTags(TAGS, { ...said, house: { ...said.house, reasons: [stopped] } });
+  render(<HealthSummary kiosk={false} />);
+  const todo = screen.getByRole('list', { name: 'Do this now' });
+  expect([...todo.children].map(({ textContent }) => textContent)).toEqual([
+    expect.stringMatching(/^CriticalTag 5: .*\+ 1 more$/),
+    expect.stringMatching(/^No tag is being scanned.* Check the robot$/),
+  ]);
+});
+
 test('of what is back in its range nothing is ordered', () => {
   const back = reason({ verdict: 'stressed', value: 18.1, limit: 18.5 });
   showTags(TAGS, judgement({ 1: 'healthy', 5: [back] }));

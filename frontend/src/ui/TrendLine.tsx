@@ -27,7 +27,7 @@ export function TrendLine({
   unit: TemperatureUnit;
 }): JSX.Element | null {
   const value = tag.readings.get(sensor.name);
-  const trend = trendOf(sensor.name, { tag, health }, thenOf(then, tag));
+  const trend = trendOf(sensor.name, { tag, health }, thenOf(then, tag, sensor.name));
   if (!trend || value == null) return null;
   const title = S.trendTitle(shown(sensor.label, 32));
   if (!then || trend.kind !== 'by') {

@@ -46,6 +46,16 @@ def test_a_shelf_ends_when_its_alarm_gets_worse_and_one_of_later_holds() -> None
     assert "a" in notes_of_alarms([worse], [SHELF, again], NOW + 2)
 
 
+def test_nobody_has_acknowledged_what_an_alarm_became_later() -> None:
+    bad = replace(COLD.reason, verdict=Verdict.CRITICAL)
+    worse = replace(COLD, reason=bad, raised_as=Verdict.STRESSED, worse_at_ns=NOW + 1)
+    seen = Note("0", NOW, "bert", ACKNOWLEDGE, "alarm:a")
+    assert "a" in notes_of_alarms([COLD], [seen], NOW + 1)
+    assert notes_of_alarms([worse], [seen], NOW + 1) == {}
+    again = replace(seen, id="2", made_at_ns=NOW + 1)
+    assert "a" in notes_of_alarms([worse], [seen, again], NOW + 2)
+
+
 def test_what_comes_back_is_shelved_too_unless_it_is_worse_or_another_thing() -> None:
     again = replace(COLD, id="b")
     worse = replace(again, reason=replace(COLD.reason, verdict=Verdict.CRITICAL))

@@ -44,7 +44,11 @@ def test_web_knows_its_twin_again_after_a_gap_longer_than_the_lease(
 ) -> None:
     profile = tmp_path / "lease.xml"
     profile.write_text(SHORT_LEASE)
-    lease = {"FASTRTPS_DEFAULT_PROFILES_FILE": str(profile)}
+    # As between two machines: in shared memory whoever stands still may be taken for dead for ever.
+    lease = {
+        "FASTRTPS_DEFAULT_PROFILES_FILE": str(profile),
+        "FASTDDS_BUILTIN_TRANSPORTS": "UDPv4",
+    }
     with (
         Peer(domain) as peer,
         twin_node(domain, *OFTEN, afresh=True, **lease) as twin,

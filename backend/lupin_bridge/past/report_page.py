@@ -122,6 +122,7 @@ class _Page:
         parts = [
             f'<!doctype html><html lang="{self._lang}"><head><meta charset="utf-8">',
             '<meta name="viewport" content="width=device-width">',
+            '<link rel="icon" href="../lupin.svg">',
             f"<title>{escape(title)}</title><style>{_STYLE}</style></head><body>",
             f'<h1><img src="../lupin.svg" alt=""> {escape(say("title"))}</h1>',
             f"<p>{escape(period)}. ",

@@ -14,6 +14,7 @@ from lupin_bridge.feed.query import PastQuery
 from lupin_bridge.feed.source import TwinTimeoutError, TwinUnavailableError
 from lupin_bridge.past import schema
 from lupin_bridge.serving.admission import Limits
+from lupin_twin.core.diagnostics import Origin
 from lupin_twin.core.past import (
     Event,
     NotRemembered,
@@ -73,10 +74,11 @@ def test_nights_by_the_clock_are_no_simulations(domain: int) -> None:
     async def test() -> None:
         async with remembering(MadeUp()) as it:
             liveness = it.bridge.liveness
-            for origin, has_nights in (("robot", True), ("simulated", False)):
+            origins: tuple[Origin, ...] = ("robot", "simulated")
+            for origin in origins:
                 liveness.known = replace(liveness.known, origin=origin)
                 found = (await it.http.get(f"{HISTORY}&{period}")).json()
-                assert (found["nights"] is not None) == has_nights
+                assert (found["nights"] is None) == (origin == "simulated")
 
     run(domain, test())
 

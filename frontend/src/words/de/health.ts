@@ -68,7 +68,7 @@ export const HEALTH: In<typeof ENGLISH> = {
     changed: 'Mit zweitem Messgerät vergleichen',
     silent: 'Zwilling, Server und Netz prüfen',
     stopped: 'Nach dem Roboter sehen',
-    other: 'Dort nachsehen',
+    other: 'Vor Ort prüfen',
   },
   todoPestAgain: 'Nochmals kontrollieren: Ohne Befund ist der Alarm behoben',
   todoWell: 'Anstehend bis zur nächsten guten Messung',
@@ -92,7 +92,7 @@ export const HEALTH: In<typeof ENGLISH> = {
   healthDespite: (alarms) =>
     alarms === 1
       ? '1 Alarm steht noch an: Zwei gute Messungen heben ihn auf'
-      : `${alarms} Alarme stehen noch an: Je zwei gute Messungen heben sie auf`,
+      : `${alarms} Alarme stehen noch an: Jeder endet nach zwei guten Messungen`,
   healthAcknowledged: 'quittiert',
   healthNotCurrent: 'Nicht aktuell',
   healthNothing: 'Noch kein Messwert zu beurteilen',

@@ -7,7 +7,9 @@ export const ALARMS: In<typeof ENGLISH> = {
   alarms: 'Alarmas',
   listChoice: 'Junto al mapa',
   alarmsCount: (unseen, active) =>
-    active === 0 ? 'ninguna activa' : `${active} activas, ${unseen} sin reconocer`,
+    active === 0
+      ? 'ninguna activa'
+      : `${counted(active, 'activa', 'activas')}, ${unseen} sin reconocer`,
   alarmGroups: {
     active: (count) => `Activas (${count})`,
     shelved: (count) => `Aplazadas (${count})`,

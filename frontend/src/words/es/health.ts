@@ -61,7 +61,7 @@ export const HEALTH: In<typeof ENGLISH> = {
         below: 'Dosificar CO₂ o ventilar',
         above: 'Ventilar y revisar la dosificación de CO₂',
       },
-      light: { below: 'Encender las lámparas', above: 'Sombrear' },
+      light: { below: 'Encender la iluminación', above: 'Sombrear' },
       soil_moisture: { below: 'Regar', above: 'Regar menos y revisar el drenaje' },
       vpd: { below: 'Ventilar y calentar', above: 'Humidificar o sombrear' },
     },
@@ -81,8 +81,9 @@ export const HEALTH: In<typeof ENGLISH> = {
   reasonsLabel: 'Por qué',
   healthHeading: 'Estado del invernadero',
   healthDriver: (tag, reason) => `Punto ${tag}: ${reason}`,
-  healthMostUnknown: 'Más de la mitad de los puntos es desconocida',
-  healthSomeUnknown: (count) => `No se puede evaluar ${counted(count, 'punto', 'puntos')}`,
+  healthMostUnknown: 'Se desconoce el estado de más de la mitad de los puntos',
+  healthSomeUnknown: (count) =>
+    `No se ${count === 1 ? 'puede' : 'pueden'} evaluar ${counted(count, 'punto', 'puntos')}`,
   healthDay: (isDay, source) =>
     `Se aplican los rangos ${isDay ? 'del día' : 'de la noche'}: ${source}`,
   healthDaySource: {

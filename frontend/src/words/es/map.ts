@@ -98,5 +98,5 @@ export const MAP: In<typeof ENGLISH> = {
   robotNowhere: 'Robot: no se sabe dónde está',
   robotAgeUnknown: 'antigüedad desconocida',
   robotBattery: (percent) => `batería ${percent}`,
-  robotReported: (percent, ago) => `batería ${percent}, comunicado ${ago}`,
+  robotReported: (percent, ago) => `batería ${percent}, comunicada ${ago}`,
 };

@@ -32,7 +32,8 @@ async def history_route(request: Request) -> Response:
     bridge = bridge_of(request)
     now_ns = bridge.ros_time_ns
     series = query.history(request.query_params.multi_items(), now_ns)
-    history = History(series, now_ns, bridge.criteria, bridge.source.journal())
+    journal, has_nights = bridge.source.journal(), bridge.origin != "simulated"
+    history = History(series, now_ns, bridge.criteria, journal, has_nights)
     return await respond_past(request, history, "history")
 
 

@@ -199,6 +199,8 @@ class History:
     now_ns: int | None = field(compare=False)
     criteria: Criteria = field(compare=False)
     journal: Condition = field(compare=False)
+    # A simulation's days are not those of the clock.
+    has_nights: bool = True
 
     def cost_s(self, tags: int) -> float:
         """See `Query`."""
@@ -213,7 +215,7 @@ class History:
         """See `Query`."""
         sensors = self.criteria.sensors
         past = derived.series(self.request, sensors, self.criteria.is_day, find)
-        nights = self.criteria.nights(past.start_ns, past.end_ns)
+        nights = self.criteria.nights(past.start_ns, past.end_ns) if self.has_nights else None
         return of_content(
             bodies.history_body(
                 self.request, past, self.now_ns, sensors, self.journal, nights=nights

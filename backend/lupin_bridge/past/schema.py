@@ -46,7 +46,7 @@ class History(Stretch):
         description="no reading for longer than three times what is usual here: draw no line"
     )
     nights: list[Stretch] | None = Field(
-        description="nights by the clock that meet it; null: simulated time, or over 400 days"
+        description="nights by the clock that meet it; null: simulated, or over 400 days"
     )
     complete_to: Time | None = _COMPLETE_TO
     kept_from: Time | None = _KEPT_FROM

@@ -32,7 +32,8 @@ async def history_route(request: Request) -> Response:
     bridge = bridge_of(request)
     now_ns = bridge.ros_time_ns
     series = query.history(request.query_params.multi_items(), now_ns)
-    history = History(series, now_ns, bridge.criteria, bridge.source.journal())
+    journal, has_nights = bridge.source.journal(), bridge.origin != "simulated"
+    history = History(series, now_ns, bridge.criteria, journal, has_nights)
     return await respond_past(request, history, "history")
 
 
@@ -81,6 +82,8 @@ async def report_page_route(request: Request) -> Response:
         found.journal,
         lang=given.lang,
         zone=query.zone(given.time_zone),
+        origin=bridge_of(request).origin,
+        site=bridge_of(request).site,
     )
     return await respond_past(request, page, "report")
 

@@ -32,12 +32,14 @@ export default function CardChart({ tagId }: { tagId: string }): JSX.Element | n
   );
   const pairs = useMemo(() => (plan ? pairsOf([plan]) : []), [plan]);
   const asked = useLines(pairs, pointsFor(width));
-  const { lines, state, span } = asked;
+  const { lines, state, span, nowS } = asked;
   const species = useSpeciesOf([tagId]);
   const model = useMemo(
     () =>
-      plan && span ? modelOf(catalogue, both, plan, species, lines, span, unit, moment) : null,
-    [catalogue, both, plan, species, lines, span, unit, moment],
+      plan && span
+        ? modelOf(catalogue, both, plan, species, lines, span, unit, moment, nowS)
+        : null,
+    [catalogue, both, plan, species, lines, span, unit, moment, nowS],
   );
   if (!plan) return null;
   return (

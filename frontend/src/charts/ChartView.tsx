@@ -47,14 +47,16 @@ export default function ChartView({ charted }: { charted: Charted }): JSX.Elemen
   const plans = useMemo(() => plansOf(charted, sensors, sensor), [charted, sensors, sensor]);
   const pairs = useMemo(() => pairsOf(plans), [plans]);
   const asked = useLines(pairs, pointsFor(size.width), hasDayBefore);
-  const { lines, span } = asked;
+  const { lines, span, nowS } = asked;
   const species = useSpeciesOf(charted.tagIds);
   const models = useMemo(
     () =>
       span
-        ? plans.map((plan) => modelOf(catalogue, both, plan, species, lines, span, unit, moment))
+        ? plans.map((plan) =>
+            modelOf(catalogue, both, plan, species, lines, span, unit, moment, nowS),
+          )
         : [],
-    [catalogue, both, plans, species, lines, span, unit, moment],
+    [catalogue, both, plans, species, lines, span, unit, moment, nowS],
   );
   const withLines = models.filter(({ lines }) => lines.length > 0);
   const room = (size.height - TIMES_HEIGHT) / Math.max(1, plans.length);

@@ -14,7 +14,7 @@ test('the band is that of the plants, and of several kinds there is none', () =>
   const of = (...species: string[]) => {
     const lines = { series, before: new Map(), marks: new Map() };
     const span = { from: 0, to: 100 };
-    return modelOf(CATALOGUE, cataloguesOf(FILE), plan, species, lines, span, 'C', null);
+    return modelOf(CATALOGUE, cataloguesOf(FILE), plan, species, lines, span, 'C', null, null);
   };
   const ideals = (...species: string[]) => of(...species).bands.map(({ ranges }) => ranges.ideal);
   expect(ideals('', 'fern')).toEqual([[18, 26]]);

@@ -44,6 +44,7 @@ export function modelOf(
   span: Span,
   unit: TemperatureUnit,
   moment: number | null,
+  nowS: number | null,
 ): PlotModel {
   const lines = tagIds.flatMap((tagId, look) => {
     const key = pairKey({ tagId, sensor });
@@ -58,6 +59,8 @@ export function modelOf(
   const own = (of: Catalogue): Ranges => rangesFor(of.named(sensor), species[0] ?? '');
   const ranges = { now: own(catalogue), day: own(day), night: own(night) };
   // The nights are the greenhouse's: each line has the same.
-  const bands = isMixed ? [] : bandsOf(span, lines[0]?.series.nights ?? null, ranges);
+  const bands = isMixed
+    ? []
+    : bandsOf(span, lines[0]?.series.nights ?? null, ranges, moment ?? nowS);
   return { sensor: now, unit, span, moment, lines, bands, isMixed };
 }

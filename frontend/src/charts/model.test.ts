@@ -31,11 +31,17 @@ describe('the ranges of day and night', () => {
   } as const;
   const nameOf = (of: Ranges): string | undefined =>
     (['now', 'day', 'night'] as const).find((name) => ranges[name] === of);
-  const bands = (from: number, to: number, nights: readonly [number, number][] | null): unknown =>
+  const bands = (
+    from: number,
+    to: number,
+    nights: readonly [number, number][] | null,
+    at: number | null = null,
+  ): unknown =>
     bandsOf(
       { from, to },
       nights?.map(([dusk, dawn]) => ({ from: dusk, to: dawn })) ?? null,
       ranges,
+      at,
     ).map((band) => [band.from, band.to, nameOf(band.ranges)]);
 
   test('follow each other over the whole span', () => {
@@ -63,6 +69,19 @@ describe('the ranges of day and night', () => {
 
   test('are those of the moment where no clock tells', () => {
     expect(bands(0, 100, null)).toEqual([[0, 100, 'now']]);
+  });
+
+  test('are, around the moment, those that its verdicts have, whatever the clock says', () => {
+    expect(bands(0, 100, [[60, 120]], 100)).toEqual([
+      [0, 60, 'day'],
+      [60, 100, 'now'],
+    ]);
+    expect(bands(0, 100, [[60, 120]], 30)).toEqual([
+      [0, 60, 'now'],
+      [60, 100, 'night'],
+    ]);
+    // Of a period that has ended, nothing is judged now.
+    expect(bands(0, 100, [], 150)).toEqual([[0, 100, 'day']]);
   });
 });
 

@@ -19,11 +19,15 @@ export interface Band extends Span {
   readonly ranges: Ranges;
 }
 
-/** The ranges of day and night one after the other; `now`, those of the moment, where nothing tells. */
+/**
+ * The ranges of day and night one after the other; `now`, those that readings are judged by at the
+ * moment `at`, around it and where nothing tells.
+ */
 export function bandsOf(
   { from, to }: Span,
   nights: readonly Span[] | null,
   { now, day, night }: Readonly<Record<'now' | 'day' | 'night', Ranges>>,
+  at: number | null,
 ): readonly Band[] {
   if (nights === null) return [{ from, to, ranges: now }];
   const bands: Band[] = [];
@@ -31,7 +35,9 @@ export function bandsOf(
   const add = (until: number, ranges: Ranges): void => {
     const end = Math.min(until, to);
     if (end <= next) return;
-    bands.push({ from: next, to: end, ranges });
+    // Light may say other than the clock, and the chart is read beside its verdict.
+    const isJudged = at !== null && next < at && at <= end;
+    bands.push({ from: next, to: end, ranges: isJudged ? now : ranges });
     next = end;
   };
   for (const each of nights) {

@@ -25,6 +25,8 @@ export interface Asked {
   readonly message: string;
   /** The period of the time bar; null while nobody knows what time it is. */
   readonly span: Span | null;
+  /** The time of the twin, ROS seconds. */
+  readonly nowS: number | null;
 }
 
 /**
@@ -64,7 +66,7 @@ export function useLines(pairs: readonly Pair[], points: number, hasDayBefore = 
     PACE_MS,
   );
   return {
-    ...{ lines: fetched.value ?? NO_LINES, span },
+    ...{ lines: fetched.value ?? NO_LINES, span, nowS },
     ...(isOff ? { state: 'missing', message: remembered.message } : fetched),
   };
 }

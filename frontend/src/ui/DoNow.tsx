@@ -87,7 +87,9 @@ export function DoNow({
   const health = useApp(selectHealth);
   const urgent = useUrgent();
   // The alarms are those of now.
-  const all = useApp((state) => (selectShown(state).moment === null ? 'alarms' : 'tags'));
+  const isNow = useApp((state) => selectShown(state).moment === null);
+  const active = useSelected(alarmList, (list) => list.active.length);
+  const hasAlarms = isNow && active > 0;
   const hasOwn = health.reasons.length > 0;
   // Where nobody hears of its tags they are as they were; where its robot stands still, they are so.
   const isOfTags = urgent.length > 0 && (!hasOwn || isBad(health.verdict));
@@ -112,10 +114,11 @@ export function DoNow({
                 type="button"
                 className="do-more"
                 onClick={() => {
-                  act({ type: 'list', list: all });
+                  act({ type: 'list', list: hasAlarms ? 'alarms' : 'tags' });
                 }}
               >
-                {S.attentionMore(urgent.length - count)}
+                {/* Each counts what it opens: a tag may have two alarms, or none yet. */}
+                {hasAlarms ? `${S.alarms} (${active})` : S.attentionMore(urgent.length - count)}
               </button>
             )}
           </li>

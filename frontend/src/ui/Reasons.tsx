@@ -1,10 +1,13 @@
 import type { JSX } from 'react';
 
+import { alarmOf } from '../alarms/list';
+import { alarmList } from '../alarms/watch';
 import type { HealthReason, TagHealth } from '../contract/types';
 import { ageSeconds } from '../domain/age';
 import { reasonText, todoText } from '../domain/reasons';
 import { whenOf } from '../domain/twin';
 import { useApp } from '../store/app';
+import { useSelected } from '../store/create';
 import { selectCatalogue } from '../store/derived';
 import { selectShown } from '../store/moment';
 import { S } from '../strings';
@@ -32,15 +35,14 @@ export function Reason({ reason }: { reason: HealthReason }): JSX.Element {
 export function Reasons({
   health,
   most = Infinity,
-  hasTodo = false,
+  todoAt,
 }: {
   health: TagHealth;
   most?: number;
-  /** With what to do about each. */
-  hasTodo?: boolean;
+  /** Of this tag, with what to do about each. */
+  todoAt?: string | undefined;
 }): JSX.Element | null {
   const { reasons } = health;
-  const catalogue = useApp(selectCatalogue);
   if (reasons.length === 0) return null;
   return (
     <ul className="reasons" aria-label={S.reasonsLabel} data-testid="reasons">
@@ -50,10 +52,20 @@ export function Reasons({
           <span>
             <Reason reason={reason} />
           </span>
-          {hasTodo && <strong>{todoText(catalogue, reason)}</strong>}
+          {todoAt !== undefined && <Todo tagId={todoAt} reason={reason} />}
         </li>
       ))}
       {reasons.length > most && <li className="faint">{S.cardMore(reasons.length - most)}</li>}
     </ul>
   );
+}
+
+/** What to do about a reason; of what is shelved, nothing. */
+function Todo({ tagId, reason }: { tagId: string; reason: HealthReason }): JSX.Element | null {
+  const catalogue = useApp(selectCatalogue);
+  const isShelved = useSelected(
+    alarmList,
+    ({ shelved }) => alarmOf(shelved, tagId, reason) !== undefined,
+  );
+  return isShelved ? null : <strong>{todoText(catalogue, reason)}</strong>;
 }

@@ -95,7 +95,9 @@ function CardBody({
   const isNow = useApp((state) => selectShown(state).moment === null);
   return (
     <div className="card-body">
-      {health && <Reasons health={health} hasTodo={isBad(health.verdict) && isNow} />}
+      {health && (
+        <Reasons health={health} todoAt={isBad(health.verdict) && isNow ? tag.id : undefined} />
+      )}
       {isNow && <CardAlarms tagId={tag.id} />}
       {tag.readings.size === 0 && <p className="faint">{S.cardNoReadings}</p>}
       <ul className="card-readings">

@@ -9,6 +9,7 @@ from typing import Any
 
 import pytest
 
+from lupin_bridge.bridge import Bridge
 from lupin_bridge.feed.query import PastQuery
 from lupin_bridge.feed.source import TwinTimeoutError, TwinUnavailableError
 from lupin_bridge.past import schema
@@ -62,6 +63,21 @@ def test_a_history_is_readings_and_buckets_where_there_are_too_many(domain: int)
                 "min": 10.0,
                 "max": 11.0,
             }
+
+    run(domain, test())
+
+
+def test_nights_by_the_clock_are_no_simulations(
+    domain: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    period = "from=2026-11-27T00:00:00Z&to=2026-11-28T00:00:00Z"
+
+    async def test() -> None:
+        async with remembering(MadeUp()) as it:
+            for origin in ("robot", "simulated"):
+                monkeypatch.setattr(Bridge, "origin", origin)
+                found = (await it.http.get(f"{HISTORY}&{period}")).json()
+                assert (found["nights"] is None) == (origin == "simulated")
 
     run(domain, test())
 

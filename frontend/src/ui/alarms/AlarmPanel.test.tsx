@@ -183,6 +183,7 @@ test('acknowledged, shelved, and back', () => {
 test('a critical alarm takes a reason, and is shelved for no more than an hour', () => {
   tell(alarm('a', { tag_id: '5' }));
   act('5', 'Shelve');
+  expect(screen.getByText(/^Shelve: Tag 5: Temperature below 10.0.°C$/)).toBeTruthy();
   const times = screen.getAllByRole<HTMLButtonElement>('button', { name: /^For / });
   expect(times.map(({ textContent }) => textContent)).toEqual(['For 15 min', 'For 1 h']);
   expect(times.every(({ disabled }) => disabled)).toBe(true);

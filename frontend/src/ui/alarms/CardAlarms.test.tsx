@@ -2,13 +2,14 @@ import { act as flush, fireEvent, render, screen } from '@testing-library/react'
 import { afterEach, beforeEach, expect, test } from 'vitest';
 
 import { NOTHING_KEPT } from '../../alarms/kept';
-import { own } from '../../alarms/own';
+import { own, shelveAlarm } from '../../alarms/own';
 import { alarmList, startAlarms } from '../../alarms/watch';
 import { person } from '../../store/signals';
 import { alarm, tellAlarms } from '../../testing/alarms';
-import { judgement } from '../../testing/health';
+import { judgement, reason } from '../../testing/health';
 import { showTags } from '../../testing/page';
 import { readings, wireTag } from '../../testing/tags';
+import { Reasons } from '../Reasons';
 import { CardAlarms } from './CardAlarms';
 
 let stop: () => void;
@@ -63,4 +64,24 @@ test('all alarms of a tag are acknowledged where it is looked at, and no others'
   expect(screen.queryByRole('button')).toBeNull();
   const seen = alarmList.get().active.filter(({ isAcknowledged }) => isAcknowledged);
   expect(seen.map(({ alarm: { id } }) => id).sort()).toEqual(['a', 'b']);
+});
+
+test('what is shelved says until when and why, has its way back, and is no order meanwhile', () => {
+  const cold = reason();
+  render(<Reasons health={{ verdict: 'critical', reasons: [cold] }} todoAt="7" />);
+  const order = (): string | undefined =>
+    screen.getByTestId('reasons').querySelector('strong')?.textContent;
+  flush(() => {
+    tellAlarms(alarm('a', { tag_id: '7' }), alarm('b', { tag_id: '8' }));
+    for (const item of alarmList.get().active) shelveAlarm(item, 15, 'fan ordered');
+  });
+  expect(screen.queryByTestId('card-alarms')).toBeNull();
+  expect(screen.getByTestId('card-shelved').textContent).toMatch(
+    /^Temperature below 10\.0\u00a0°C: shelved until [\d:]+: fan orderedUnshelve$/,
+  );
+  expect(order()).toBeUndefined();
+  fireEvent.click(screen.getByRole('button', { name: 'Unshelve' }));
+  expect(screen.queryByTestId('card-shelved')).toBeNull();
+  expect(screen.getByTestId('card-alarms').textContent).toMatch(/^1 alarm · since/);
+  expect(order()).toBe('Heat, or close the vents');
 });

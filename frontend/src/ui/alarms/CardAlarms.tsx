@@ -1,11 +1,12 @@
 import type { JSX } from 'react';
 
 import { unacknowledged } from '../../alarms/list';
-import { acknowledgeAlarms } from '../../alarms/own';
-import { todoNow, worstNow } from '../../alarms/speech';
-import { spanText } from '../../alarms/words';
+import { acknowledgeAlarms, unshelveAlarm } from '../../alarms/own';
+import { selectSpeech, todoNow, worstNow } from '../../alarms/speech';
+import { spanText, whatText } from '../../alarms/words';
 import { alarmList } from '../../alarms/watch';
 import type { Alarm } from '../../contract/types';
+import { clockText } from '../../domain/format';
 import { secondsOf } from '../../domain/rostime';
 import { store, useApp } from '../../store/app';
 import { useSelected } from '../../store/create';
@@ -17,8 +18,17 @@ import { once } from './once';
 
 const byTime = (a: Alarm, b: Alarm): number => secondsOf(a.raised_at) - secondsOf(b.raised_at);
 
-/** Since when a tag's alarms are active, and their acknowledgement: for whoever stands at the tag. */
-export function CardAlarms({ tagId }: { tagId: string }): JSX.Element | null {
+/** A tag's alarms: since when they are active, or until when shelved; for whoever stands at the tag. */
+export function CardAlarms({ tagId }: { tagId: string }): JSX.Element {
+  return (
+    <>
+      <Active tagId={tagId} />
+      <Shelved tagId={tagId} />
+    </>
+  );
+}
+
+function Active({ tagId }: { tagId: string }): JSX.Element | null {
   const active = useSelected(alarmList, (list) => list.active);
   const items = active.filter(({ alarm }) => alarm.tag_id === tagId);
   const waiting = unacknowledged(items);
@@ -46,5 +56,40 @@ export function CardAlarms({ tagId }: { tagId: string }): JSX.Element | null {
         </button>
       )}
     </div>
+  );
+}
+
+/** What somebody has shelved: until when, why, and the way back. */
+function Shelved({ tagId }: { tagId: string }): JSX.Element {
+  const shelved = useSelected(alarmList, (list) => list.shelved);
+  const speech = useApp(selectSpeech);
+  const isAble = useSelected(person, mayAct);
+  return (
+    <>
+      {shelved.map(
+        ({ alarm, shelf }) =>
+          shelf &&
+          alarm.tag_id === tagId && (
+            <div key={alarm.id} className="card-alarms" data-testid="card-shelved">
+              <span>
+                {S.alarmWhat(
+                  whatText(alarm, speech),
+                  S.alarmShelved(clockText(shelf.until), shelf.reason, alarm.shelved_by ?? ''),
+                )}
+              </span>
+              {isAble && (
+                <button
+                  type="button"
+                  onClick={once(() => {
+                    unshelveAlarm(alarm);
+                  })}
+                >
+                  {S.alarmUnshelve}
+                </button>
+              )}
+            </div>
+          ),
+      )}
+    </>
   );
 }

@@ -18,12 +18,12 @@ import { Shelving } from './Shelving';
 export function RowMenu({ item, name }: { item: Item; name: string }): JSX.Element {
   return (
     <Disclosure label={S.alarmActionsOf(name)} button={<Icon name="dots" />} className="row-menu">
-      <Actions item={item} />
+      <Actions item={item} name={name} />
     </Disclosure>
   );
 }
 
-function Actions({ item }: { item: Item }): JSX.Element {
+function Actions({ item, name }: { item: Item; name: string }): JSX.Element {
   const { alarm, isAcknowledged, shelf } = item;
   const [form, setForm] = useState<'shelve' | 'comment' | null>(null);
   const close = useClose();
@@ -46,7 +46,7 @@ function Actions({ item }: { item: Item }): JSX.Element {
   };
   return (
     <div className="row-actions" ref={root}>
-      {form === 'shelve' && <Shelving item={item} />}
+      {form === 'shelve' && <Shelving item={item} name={name} />}
       {form === 'comment' && <Field subject={`alarm:${alarm.id}`} moment={null} onDone={close} />}
       {form === null && (
         <ul className="menu-list">

@@ -8,7 +8,7 @@ import { useClose } from '../../widgets/Disclosure';
 import { once } from './once';
 
 /** Shelves an alarm for a while; a critical one for a shorter while, and with a reason. */
-export function Shelving({ item }: { item: Item }): JSX.Element {
+export function Shelving({ item, name }: { item: Item; name: string }): JSX.Element {
   const [reason, setReason] = useState('');
   const close = useClose();
   const root = useRef<HTMLDivElement>(null);
@@ -21,6 +21,7 @@ export function Shelving({ item }: { item: Item }): JSX.Element {
   const given = reason.trim();
   return (
     <div className="shelf" ref={root} tabIndex={-1}>
+      <strong>{S.alarmWhat(S.alarmShelve, name)}</strong>
       <p className="faint">{isNeeded ? S.alarmShelveCritical : S.alarmShelveHint}</p>
       <label>
         {isNeeded ? S.alarmShelfReason : S.alarmShelfReasonOptional}

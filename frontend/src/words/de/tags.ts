@@ -70,7 +70,7 @@ export const TAGS: In<typeof ENGLISH> = {
   trend: 'Tendenz',
   trendTitle: (sensor) => `${sensor}: Änderung seit einer Stunde`,
   trendNone: 'vor einer Stunde kein Messwert',
-  trendSame: 'alter Wert',
+  trendSame: 'kein neuer Wert',
   trendLevel: 'unverändert',
   trendUnknown: 'vor einer Stunde: unbekannt',
   density: 'Zeilen',

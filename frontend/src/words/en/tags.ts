@@ -69,7 +69,7 @@ export const TAGS = {
   trend: 'Trend',
   trendTitle: (sensor: string): string => `${sensor} compared with an hour ago`,
   trendNone: 'no reading an hour ago',
-  trendSame: 'outdated',
+  trendSame: 'no new reading',
   trendLevel: 'steady',
   trendUnknown: 'an hour ago: unknown',
   density: 'Rows',

@@ -70,7 +70,7 @@ export const TAGS: In<typeof ENGLISH> = {
   trend: 'Tendencia',
   trendTitle: (sensor) => `${sensor} frente a hace una hora`,
   trendNone: 'sin lectura hace una hora',
-  trendSame: 'valor antiguo',
+  trendSame: 'sin dato nuevo',
   trendLevel: 'estable',
   trendUnknown: 'hace una hora: desconocido',
   density: 'Filas',

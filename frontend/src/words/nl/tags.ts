@@ -70,7 +70,7 @@ export const TAGS: In<typeof ENGLISH> = {
   trend: 'Trend',
   trendTitle: (sensor) => `${sensor} vergeleken met een uur geleden`,
   trendNone: 'een uur geleden geen meting',
-  trendSame: 'oude waarde',
+  trendSame: 'geen nieuwere',
   trendLevel: 'gelijk',
   trendUnknown: 'een uur geleden: onbekend',
   density: 'Rijen',

@@ -303,7 +303,7 @@ def test_the_row_of_sensors_fades_where_it_has_more(open_at: Callable[..., Hmi])
     row = hmi.page.locator(".sensor-picker")
     expect(row).to_have_attribute("data-more", "after")
     expect(row).to_have_css("mask-image", re.compile("gradient"))
-    hmi.choose_sensor("Condensation margin")
+    hmi.choose_sensor("Dew margin")
     expect(row).to_have_attribute("data-more", "before")
     # In a wider window they wrap, and all of them are in sight.
     for width in (700, 1100, 1440, 3840):

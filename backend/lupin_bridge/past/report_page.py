@@ -44,7 +44,7 @@ th.number { white-space: normal }
 dl { display: grid; grid-template-columns: repeat(4, 1fr); gap: 2mm; margin: 4mm .3mm }
 dl div { border: .2mm solid #bbb; padding: 1.5mm } dt { color: #444; font-size: 8.5pt }
 dd { margin: 0; font-size: 13pt } .critical td:first-child { font-weight: 700 }
-td:first-child { min-width: 22mm; hyphens: auto }
+td:first-child { min-width: 22mm; hyphens: auto } .alarms td:first-child { min-width: 45mm }
 @media print { body { padding: 0; max-width: none } }
 """
 # Of all languages but English.
@@ -169,7 +169,7 @@ class _Page:
         later = ""
         if body["alarms_from"] != body["from"]:
             later = f"<p>{escape(self.say('later', at=self._at(body['alarms_from'])))}</p>"
-        columns = ("alarm", "where", "when", "end", "first*", "limit*", "worst*")
+        columns = ("alarm", "point", "when", "end", "first*", "limit*", "worst*")
         if not any(self._who(alarm) for alarm in body["alarms"]):
             return self._table(body, "alarms", "alarms", columns, self._alarm, later)
 
@@ -193,7 +193,7 @@ class _Page:
         number = partial(self._number, unit=unit, like=reason["limit"] if numbers else None)
         return (
             f"{self._what(reason)} ({self._words['verdicts'][reason['verdict']]})",
-            self._where(alarm["tag_id"]),
+            alarm["tag_id"],
             self._clock(alarm["raised_at"]),
             self.say("still") if cleared is None else self._clock(cleared),
             number(reason["value"]) if numbers or reason["kind"] == "pest" else "",
@@ -273,7 +273,9 @@ class _Page:
             + "</tr>"
             for entry in body[name]
         )
-        table = f"<table><thead><tr>{names}</tr></thead><tbody>{rows}</tbody></table>"
+        table = (
+            f'<table class="{name}"><thead><tr>{names}</tr></thead><tbody>{rows}</tbody></table>'
+        )
         return f"{head}{table}{self._more(body, name)}"
 
     def _more(self, body: Entry, name: str) -> str:

@@ -6,7 +6,7 @@ import { shown } from '../domain/text';
 import { differenceShown, trendOf } from '../domain/trend';
 import type { Tag } from '../domain/twin';
 import type { TemperatureUnit } from '../domain/units';
-import { thenOf, type HourAgo } from '../store/hourAgo';
+import { shortHourText, thenOf, type HourAgo } from '../store/hourAgo';
 import { S } from '../strings';
 
 export const ARROWS = { up: '\u2197', down: '\u2198', level: '\u2192' } as const;
@@ -29,7 +29,7 @@ export function TrendLine({
   const value = tag.readings.get(sensor.name);
   const trend = trendOf(sensor.name, { tag, health }, thenOf(then, tag, sensor.name));
   if (!trend || value == null) return null;
-  const title = S.trendTitle(shown(sensor.label, 32));
+  const title = S.trendTitle(shown(sensor.label, 32), shortHourText());
   if (!then || trend.kind !== 'by') {
     if (then && trend.kind === 'same')
       return (

@@ -68,7 +68,8 @@ export const TAGS: In<typeof ENGLISH> = {
   tableByArea: 'Agrupar por zona',
   areaNone: 'Sin zona',
   trend: 'Tendencia',
-  trendTitle: (sensor) => `${sensor} frente a hace una hora`,
+  trendTitle: (sensor, hour) =>
+    `${sensor} frente a hace una hora${hour ? ` de invernadero (${hour})` : ''}`,
   trendNone: 'sin lectura hace una hora',
   trendSame: 'sin dato nuevo',
   trendLevel: 'estable',

@@ -33,7 +33,7 @@ export function TrendLine({
   if (!then || trend.kind !== 'by') {
     if (then && trend.kind === 'same')
       return (
-        <span className="trend" data-trend="same">
+        <span className="trend" data-trend="same" title={S.trendSame}>
           {S.trendSame}
         </span>
       );

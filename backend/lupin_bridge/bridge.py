@@ -80,6 +80,7 @@ class Bridge:
     ) -> None:
         self._clock = clock
         self.source = source
+        self.site = settings.site
         self.limits = limits
         self.liveness = Liveness(known=Status("never_seen", None, day_length_s=source.day_length_s))
         self.hub = Hub(settings.max_clients, limits.client_timeout_s, self.liveness.status)

@@ -6,6 +6,7 @@ import asyncio
 import math
 import time
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Final, cast
@@ -109,7 +110,7 @@ class Fleet:
             source = SiteTwin(name, self.watching, self.past, self.workers, limits.answer_timeout_s)
             bridge = Bridge(
                 source,
-                settings,
+                replace(settings, site=name),
                 criteria=criteria,
                 limits=limits,
                 admission=self.admission,

@@ -44,7 +44,7 @@ th.number { white-space: normal }
 dl { display: grid; grid-template-columns: repeat(4, 1fr); gap: 2mm; margin: 4mm .3mm }
 dl div { border: .2mm solid #bbb; padding: 1.5mm } dt { color: #444; font-size: 8.5pt }
 dd { margin: 0; font-size: 13pt } .critical td:first-child { font-weight: 700 }
-td:first-child { min-width: 22mm; hyphens: auto }
+td:first-child { min-width: 22mm; hyphens: auto } .alarms td:first-child { min-width: 45mm }
 @media print { body { padding: 0; max-width: none } }
 """
 # Of all languages but English.
@@ -84,14 +84,19 @@ def push_text(
 
 @dataclass(frozen=True, slots=True)
 class ReportPage(Report):
-    """The report as a page in the language `lang`; times are of `zone`, or the greenhouse's."""
+    """The report as a page in the language `lang`; times are of `zone`, or the greenhouse's.
+
+    `origin` is where observations come from, `site` the greenhouse's name, where it has one.
+    """
 
     lang: str = "en"
     zone: tzinfo | None = None
+    origin: Origin = "unknown"
+    site: str = ""
 
     def plan(self, body: dict[str, Any]) -> Plan:
         """See `Report`."""
-        page = _Page(self.lang, self.criteria, self.zone).page(body)
+        page = _Page(self.lang, self.criteria, self.zone).page(body, self.origin, self.site)
         policy = {"Content-Security-Policy": _POLICY}
         return planned(page.encode("utf-8", "replace"), HTML_TYPE, self, policy)
 
@@ -106,13 +111,14 @@ class _Page:
         named: Mapping[str, Any] = orjson.loads(criteria.sensors.text).get("sensors", {})
         self._labels = {name: it.get("labels", {}).get(lang) for name, it in named.items()}
 
-    def page(self, body: Entry) -> str:
+    def page(self, body: Entry, origin: Origin, site: str) -> str:
         say, at = self.say, self._at
         # Of a period within a day the rows leave the day out.
         days = {at(body[name]).rpartition(", ")[0] for name in ("from", "to")}
         self._day = f"{days.pop()}, " if len(days) == 1 else ""
         period = say("period", **{"from": at(body["from"]), "to": at(body["to"])})
-        title = f"{say('title')}: {period}"
+        heading = f"{say('title')}: {site}" if site else say("title")
+        hint = self._words["hints"].get(origin)
         known = [
             say(word, at=at(body[name]))
             for word, name in (("kept", "kept_from"), ("complete", "complete_to"))
@@ -123,8 +129,9 @@ class _Page:
             f'<!doctype html><html lang="{self._lang}"><head><meta charset="utf-8">',
             '<meta name="viewport" content="width=device-width">',
             '<link rel="icon" href="../lupin.svg">',
-            f"<title>{escape(title)}</title><style>{_STYLE}</style></head><body>",
-            f'<h1><img src="../lupin.svg" alt=""> {escape(say("title"))}</h1>',
+            f"<title>{escape(f'{heading}, {period}')}</title><style>{_STYLE}</style></head><body>",
+            f'<h1><img src="../lupin.svg" alt=""> {escape(heading)}</h1>',
+            f"<p><strong>{escape(hint)}</strong></p>" if hint else "",
             f"<p>{escape(period)}. ",
             f"{escape(say('zone', zone=self._zone_name(body['from'], body['to'])))}</p>",
             f'<p class="note">{escape(" ".join(known) or say("unknown"))}</p>',
@@ -162,7 +169,7 @@ class _Page:
         later = ""
         if body["alarms_from"] != body["from"]:
             later = f"<p>{escape(self.say('later', at=self._at(body['alarms_from'])))}</p>"
-        columns = ("alarm", "where", "when", "end", "first*", "limit*", "worst*")
+        columns = ("alarm", "point", "when", "end", "first*", "limit*", "worst*")
         if not any(self._who(alarm) for alarm in body["alarms"]):
             return self._table(body, "alarms", "alarms", columns, self._alarm, later)
 
@@ -186,7 +193,7 @@ class _Page:
         number = partial(self._number, unit=unit, like=reason["limit"] if numbers else None)
         return (
             f"{self._what(reason)} ({self._words['verdicts'][reason['verdict']]})",
-            self._where(alarm["tag_id"]),
+            alarm["tag_id"],
             self._clock(alarm["raised_at"]),
             self.say("still") if cleared is None else self._clock(cleared),
             number(reason["value"]) if numbers or reason["kind"] == "pest" else "",
@@ -266,7 +273,9 @@ class _Page:
             + "</tr>"
             for entry in body[name]
         )
-        table = f"<table><thead><tr>{names}</tr></thead><tbody>{rows}</tbody></table>"
+        table = (
+            f'<table class="{name}"><thead><tr>{names}</tr></thead><tbody>{rows}</tbody></table>'
+        )
         return f"{head}{table}{self._more(body, name)}"
 
     def _more(self, body: Entry, name: str) -> str:

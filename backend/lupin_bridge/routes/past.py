@@ -82,6 +82,8 @@ async def report_page_route(request: Request) -> Response:
         found.journal,
         lang=given.lang,
         zone=query.zone(given.time_zone),
+        origin=bridge_of(request).origin,
+        site=bridge_of(request).site,
     )
     return await respond_past(request, page, "report")
 

@@ -25,7 +25,7 @@ test('a tag’s sensors can be chosen, and what is computed of them', () => {
 test('what takes two sensors needs both', () => {
   render(<SensorChoice tagId="2" value="temperature" />);
   expect(choices()).toEqual([
-    ...['Temperature', 'Humidity', 'Vapour pressure deficit', 'Dew point', 'Condensation margin'],
+    ...['Temperature', 'Humidity', 'Vapour pressure deficit', 'Dew point', 'Dew margin'],
     ...['24-h mean temperature', 'Night minimum', 'Day-night difference (DIF)'],
     'Growing degree days',
   ]);

@@ -107,9 +107,9 @@ test('the file has every tag, values in the shown unit, and ages of its time', (
   const lines = text.split('\r\n');
   expect(lines[0]).toContain('Temperature [°F],Humidity [%]');
   expect(lines).toHaveLength(1 + tags.length + 1);
-  expect(lines[1]).toBe('2,Healthy,,68,,rose,,0,0,no,15,1970-01-01T00:01:40.250Z,1,2');
+  expect(lines[1]).toBe('2,healthy,,68,,rose,,0,0,no,15,1970-01-01T00:01:40.250Z,1,2');
   expect(lines[2]).toBe(
-    '10,Critical,"Temperature 95.0\u00a0°F, above 86.0 (critical); 3 pests seen",95,,,,0,3,yes,15,1970-01-01T00:01:40.000Z,1,2',
+    '10,critical,"Temperature 95.0\u00a0°F, above 86.0 (critical); 3 pests seen",95,,,,0,3,yes,15,1970-01-01T00:01:40.000Z,1,2',
   );
-  expect(lines[4]).toBe('1,Unknown,,,,,,0,0,no,,,,');
+  expect(lines[4]).toBe('1,unknown,,,,,,0,0,no,,,,');
 });

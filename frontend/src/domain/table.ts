@@ -181,7 +181,8 @@ export function tableCsv(
     const age = ageSeconds(tag.scannedAt, now);
     return [
       tag.id,
-      S.health[health.verdict],
+      // As on the wire, whatever the page's language.
+      health.verdict,
       reasonsText(catalogue, health.reasons, unit) || null,
       ...sensors.map((sensor): Cell => {
         const value = tag.readings.get(sensor.name);

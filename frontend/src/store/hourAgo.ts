@@ -2,6 +2,7 @@
 import { now } from '../clock';
 import { fetchStateAt } from '../contract/past';
 import type { TagHealth } from '../contract/types';
+import { intervalText } from '../domain/format';
 import { secondsOf } from '../domain/rostime';
 import { sameReading, type TagThen } from '../domain/trend';
 import { snapshotOf, type Tag } from '../domain/twin';
@@ -14,6 +15,12 @@ import { isColumnShown } from './settings';
 
 /** An hour of the greenhouse's day, seconds of the twin's time: a demo's day is a short one. */
 const selectHourS = (state: AppState): number => selectDayS(state) / 24;
+/** How long that is where it is shorter than an hour of the clock; else null. */
+export function shortHourText(): string | null {
+  const hourS = selectHourS(store.get());
+  return hourS < 3_600 ? intervalText(hourS) : null;
+}
+
 /** An answer serves for so much of an hour: less than anybody sees in a trend. */
 const SERVES = 1 / 12;
 /** Whoever drags through time does not fetch it at each step, ms. */

@@ -71,6 +71,19 @@ describe('legend', () => {
     expect(screen.queryByTestId('legend-old')).toBeNull();
   });
 
+  test.each([
+    [12, 30, '18.0 to 26.0'],
+    [18, 30, 'below 26.0'],
+    [12, 26, 'above 18.0'],
+    [18, 26, ''],
+  ])('of an ideal range from %d to %d no limit is told twice', (low, high, limits) => {
+    act({ type: 'range', range: { low, high } });
+    render(<Legend kiosk={false} />);
+    expect(at('legend')).toContain(`ideal by day${limits && ` ${limits}`}`);
+    expect(at('legend').match(/18\.0/g)).toHaveLength(1);
+    expect(at('legend').match(/26\.0/g)).toHaveLength(1);
+  });
+
   test('a field of another sensor does not count', () => {
     act({ type: 'sensor', sensor: 'humidity' });
     render(<Legend kiosk={false} />);

@@ -4,7 +4,7 @@ import type { FieldQuality } from '../contract/types';
 import { differenceNumber, readingText, valueText, withUnit } from '../domain/format';
 import { idealsText } from '../domain/ideal';
 import { fraction, rgbText, sensorColour, type Range } from '../domain/ramp';
-import type { Sensor } from '../domain/sensors';
+import type { Sensor, Span } from '../domain/sensors';
 import { shown } from '../domain/text';
 import { unitOf, type TemperatureUnit } from '../domain/units';
 import { useApp } from '../store/app';
@@ -160,6 +160,20 @@ function Quality({
   );
 }
 
+/** The ideal range in words; a limit that stands at an end of the ramp is not told again. */
+function idealNote(
+  sensor: Sensor,
+  ideal: Span,
+  ends: readonly [low: string, high: string],
+  unit: TemperatureUnit,
+): string {
+  const part = S.idealParts[sensor.part ?? 'any'];
+  const [low, high] = [valueText(sensor, ideal[0], unit), valueText(sensor, ideal[1], unit)];
+  const isHigh = ends[1] === readingText(sensor, ideal[1], unit);
+  if (ends[0] === low) return isHigh ? part : `${part} ${S.legendBelow(high)}`;
+  return isHigh ? `${part} ${S.legendAbove(low)}` : S.legendIdeal(part, low, high);
+}
+
 /** The colours of the heat map from the lowest to the highest value. */
 function Ramp({
   sensor,
@@ -174,6 +188,8 @@ function Ramp({
   const ideal = range && sensor.ideal;
   const from = ideal && fraction(range, ideal[0]);
   const to = ideal && fraction(range, ideal[1]);
+  const low = range ? valueText(sensor, range.low, unit) : '–';
+  const high = range ? readingText(sensor, range.high, unit) : '–';
   const style = {
     '--ramp-field': rgbText(colour, sensor.maxAlpha),
     '--ideal': ((from ?? 0) + (to ?? 1)) / 2,
@@ -190,18 +206,12 @@ function Ramp({
         )}
       </div>
       <div className="ramp-ends">
-        <span data-testid="range-low">{range ? valueText(sensor, range.low, unit) : '–'}</span>
+        <span data-testid="range-low">{low}</span>
         <span className="ramp-before" />
         {sensor.ideal && (
-          <span className="ramp-note">
-            {S.legendIdeal(
-              S.idealParts[sensor.part ?? 'any'],
-              valueText(sensor, sensor.ideal[0], unit),
-              valueText(sensor, sensor.ideal[1], unit),
-            )}
-          </span>
+          <span className="ramp-note">{idealNote(sensor, sensor.ideal, [low, high], unit)}</span>
         )}
-        <span data-testid="range-high">{range ? readingText(sensor, range.high, unit) : '–'}</span>
+        <span data-testid="range-high">{high}</span>
       </div>
     </div>
   );

@@ -1,6 +1,7 @@
 import { act as flush, render, screen } from '@testing-library/react';
 import { beforeEach, expect, test } from 'vitest';
 
+import type { StatusFrame } from '../contract/types';
 import { rosText } from '../domain/rostime';
 import { act, receive } from '../store/app';
 import { NO_HOUSE } from '../store/twin';
@@ -12,6 +13,10 @@ const END = 1_763_700_000;
 const time = (sec: number): { sec: number; nanosec: number } => ({ sec, nanosec: 0 });
 
 const note = (): string => screen.getByTestId('simulated').textContent;
+const filled = (): StatusFrame => {
+  const journal = { state: 'recording', detail: '', set_aside: '' } as const;
+  return status({ journal: { ...journal, simulated: { start: time(START), end: time(END) } } });
+};
 const lookBack = (at: number | null): void => {
   flush(() => {
     if (at !== null) receive({ type: 'past', past: { at, house: NO_HOUSE } });
@@ -21,8 +26,7 @@ const lookBack = (at: number | null): void => {
 
 beforeEach(() => {
   showTags([]);
-  const journal = { state: 'recording', detail: '', set_aside: '' } as const;
-  goLive(status({ journal: { ...journal, simulated: { start: time(START), end: time(END) } } }));
+  goLive(filled());
 });
 
 test('a moment that a simulation made is said to be simulated, and no other', () => {
@@ -35,6 +39,13 @@ test('a moment that a simulation made is said to be simulated, and no other', ()
   lookBack(START);
   expect(note()).not.toBe('');
   lookBack(null);
+  expect(note()).toBe('');
+});
+
+test('of a simulation no end is told, as if later data were real', () => {
+  goLive({ ...filled(), origin: 'simulated' });
+  render(<SimulatedNote />);
+  lookBack(END - 1);
   expect(note()).toBe('');
 });
 

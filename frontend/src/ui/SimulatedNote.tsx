@@ -3,13 +3,15 @@ import type { JSX } from 'react';
 import { rosText, secondsOf } from '../domain/rostime';
 import { useApp, type AppState } from '../store/app';
 import { selectShown } from '../store/moment';
+import { selectOrigin } from '../store/origin';
 import { S } from '../strings';
 
-/** Where the simulated past ends, if the moment that is shown lies in it; ROS seconds. */
+/** Where the simulated past ends, if the moment that is shown lies in it, and not all is simulated; ROS seconds. */
 export function selectSimulatedUntil(state: AppState): number | null {
   const { moment } = selectShown(state);
   const simulated = state.twin.connection.status?.journal.simulated;
-  if (moment === null || !simulated) return null;
+  // Of a simulation what comes after is no more real.
+  if (moment === null || !simulated || selectOrigin(state) === 'simulated') return null;
   const end = secondsOf(simulated.end);
   return moment < end ? end : null;
 }

@@ -4,7 +4,7 @@ import { beforeEach, describe, expect, test } from 'vitest';
 import { act, prefer, store } from '../store/app';
 import { judgement, reason } from '../testing/health';
 import { hourAgo } from '../store/hourAgo';
-import { showTags } from '../testing/page';
+import { goLive, showTags, status } from '../testing/page';
 import { readings, tag, wireTag } from '../testing/tags';
 import { TagTable } from './TagTable';
 
@@ -149,7 +149,9 @@ describe('table', () => {
   });
 
   const trends = (): (string | null)[] =>
-    [...document.querySelectorAll('.trend')].map((each) => each.textContent);
+    [...document.querySelectorAll('.chosen > :is(.trend, .unseen)')].map(
+      (each) => each.textContent,
+    );
   const tags = [
     wireTag({ tag_id: 'a', readings: readings({ temperature: 22 }) }),
     wireTag({ tag_id: 'b', readings: readings({ temperature: 20 }) }),
@@ -161,6 +163,8 @@ describe('table', () => {
     showTags(tags, health);
     render(<TagTable />);
     expect(trends()).toEqual(['an hour ago: unknown', 'an hour ago: unknown']);
+    // What is not to be seen takes no room: the value stands in the middle of its row.
+    expect(document.querySelector('.trend')).toBeNull();
     const before = tag({
       tag_id: 'a',
       readings: [
@@ -173,17 +177,25 @@ describe('table', () => {
       ],
     });
     const { at } = store.get().twin.latest.snapshot ?? { at: { sec: 0 } };
-    flush(() => {
-      hourAgo.dispatch({
-        of: at.sec,
-        isNow: true,
-        tags: new Map([['a', { tag: before, health: { verdict: 'healthy', reasons: [] } }]]),
+    const hourBefore = (): void => {
+      flush(() => {
+        hourAgo.dispatch({
+          of: at.sec,
+          isNow: true,
+          tags: new Map([['a', { tag: before, health: { verdict: 'healthy', reasons: [] } }]]),
+        });
       });
-    });
+    };
+    hourBefore();
     expect(trends()).toEqual([
       '\u2197 Temperature compared with an hour ago: +1.5\u00a0°C',
       'no reading an hour ago',
     ]);
+    // No hour of the clock, where a day is a short one.
+    goLive(status({ day_length_s: 1_440 }));
+    hourBefore();
+    expect(trends()[0]).toContain('compared with a greenhouse hour (1\u00a0min) ago: ');
+    goLive(status());
     // An answer of long ago is none.
     flush(() => {
       hourAgo.dispatch({ of: at.sec - 601, isNow: true, tags: new Map() });

@@ -6,7 +6,7 @@ import { shown } from '../domain/text';
 import { differenceShown, trendOf } from '../domain/trend';
 import type { Tag } from '../domain/twin';
 import type { TemperatureUnit } from '../domain/units';
-import { thenOf, type HourAgo } from '../store/hourAgo';
+import { shortHourText, thenOf, type HourAgo } from '../store/hourAgo';
 import { S } from '../strings';
 
 export const ARROWS = { up: '\u2197', down: '\u2198', level: '\u2192' } as const;
@@ -29,19 +29,16 @@ export function TrendLine({
   const value = tag.readings.get(sensor.name);
   const trend = trendOf(sensor.name, { tag, health }, thenOf(then, tag, sensor.name));
   if (!trend || value == null) return null;
-  const title = S.trendTitle(shown(sensor.label, 32));
+  const title = S.trendTitle(shown(sensor.label, 32), shortHourText());
   if (!then || trend.kind !== 'by') {
-    const text = !then ? S.trendUnknown : trend.kind === 'same' ? S.trendSame : S.trendNone;
-    return (
-      <span className="trend" data-trend={then ? trend.kind : 'unknown'} title={text}>
-        {trend.kind === 'same' && then ? (
-          text
-        ) : (
-          // Only to be heard: with a young memory it would stand in every row.
-          <span className="unseen">{text}</span>
-        )}
-      </span>
-    );
+    if (then && trend.kind === 'same')
+      return (
+        <span className="trend" data-trend="same" title={S.trendSame}>
+          {S.trendSame}
+        </span>
+      );
+    // Only to be heard: with a young memory it would stand in every row.
+    return <span className="unseen">{then ? S.trendNone : S.trendUnknown}</span>;
   }
   const { way, text } = differenceShown(sensor, value, trend.by, unit);
   return (

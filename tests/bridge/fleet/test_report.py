@@ -59,7 +59,7 @@ def test_a_sites_report_is_that_of_its_journal_and_all_are_counted(
         assert {it["reason"]["kind"] for it in report["alarms"]} >= {"range", "pest"}
         assert {it["tag_id"] for it in report["silences"]} == {"", "a", "b"}
         html = page.http.get(f"/sites/gh1/api/report.html?{asked}&lang=nl")
-        assert (html.status_code, "Dienstrapport" in html.text) == (200, True)
+        assert (html.status_code, "Dienstrapport: gh1</h1>" in html.text) == (200, True)
 
         every = page.http.get(f"/api/report?from={begun_s}&to={begun_s + 3 * HOUR_S}").json()
         whole = {it["site"]: it for it in every["sites"]}

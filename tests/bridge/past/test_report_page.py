@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from datetime import tzinfo
 from html import unescape
 from typing import Any
@@ -74,6 +75,10 @@ def page_of(lang: str = "en", hours: int = 8, zone: tzinfo | None = None, **fiel
     """The report's text, with spaces between its elements."""
     end_s = BEGUN_S + hours * HOUR_S
     page = ReportPage(BEGUN_S * 10**9, end_s * 10**9, GREENHOUSE, UNKNOWN, lang, zone)
+    return text_of(page, hours, **fields)
+
+
+def text_of(page: ReportPage, hours: int, **fields: object) -> str:
     text = page.plan(body(hours) | fields).write(never).body.decode()
     return re.sub(r"[ \n\u00a0]+", " ", unescape(re.sub(r"<style>.*?</style>|<[^>]*>", " ", text)))
 
@@ -127,9 +132,21 @@ def test_no_data_before_is_said_only_where_the_log_begins_after_the_period() -> 
     assert "No data before 27 Nov 2026, 07:00. Complete up to 27 Nov 2026, 14:00." in late
 
 
+def test_it_says_of_which_greenhouse_it_is_and_that_none_was_there() -> None:
+    end_ns = (BEGUN_S + HOUR_S) * 10**9
+    page = ReportPage(BEGUN_S * 10**9, end_ns, GREENHOUSE, UNKNOWN, "de")
+    assert "Simuliert" not in text_of(page, 1)
+    told = text_of(replace(page, origin="simulated", site="gh<1>"), 1)
+    assert "Schichtbericht: gh<1> Simuliert. Kein echter Roboter: Gewächshaus" in told
+
+
 def test_who_acknowledged_or_shelved_has_a_column_where_somebody_did() -> None:
     acknowledged = alarm(acknowledged_by="Anna", acknowledged_at=at(120))
     assert "Acknowledged, shelved" not in page_of(alarms=[alarm()])
     page = page_of(alarms=[alarm(), acknowledged])
     assert "Acknowledged, shelved" in page
     assert page.count("acknowledged by Anna, 06:02") == 1
+
+
+def test_a_row_of_an_alarm_has_its_tags_name_alone() -> None:
+    assert "Pest seen (critical) 7 06:01 still active" in page_of(alarms=[alarm()])

@@ -5,16 +5,15 @@ from __future__ import annotations
 import asyncio
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
-from dataclasses import replace
 from typing import Any
 
 import pytest
 
+from lupin_bridge.bridge import Bridge
 from lupin_bridge.feed.query import PastQuery
 from lupin_bridge.feed.source import TwinTimeoutError, TwinUnavailableError
 from lupin_bridge.past import schema
 from lupin_bridge.serving.admission import Limits
-from lupin_twin.core.diagnostics import Origin
 from lupin_twin.core.past import (
     Event,
     NotRemembered,
@@ -68,15 +67,15 @@ def test_a_history_is_readings_and_buckets_where_there_are_too_many(domain: int)
     run(domain, test())
 
 
-def test_nights_by_the_clock_are_no_simulations(domain: int) -> None:
+def test_nights_by_the_clock_are_no_simulations(
+    domain: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
     period = "from=2026-11-27T00:00:00Z&to=2026-11-28T00:00:00Z"
 
     async def test() -> None:
         async with remembering(MadeUp()) as it:
-            liveness = it.bridge.liveness
-            origins: tuple[Origin, ...] = ("robot", "simulated")
-            for origin in origins:
-                liveness.known = replace(liveness.known, origin=origin)
+            for origin in ("robot", "simulated"):
+                monkeypatch.setattr(Bridge, "origin", origin)
                 found = (await it.http.get(f"{HISTORY}&{period}")).json()
                 assert (found["nights"] is None) == (origin == "simulated")
 

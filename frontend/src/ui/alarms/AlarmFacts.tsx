@@ -11,7 +11,7 @@ import { clockText } from '../../domain/format';
 import { differenceShown } from '../../domain/trend';
 import { store, useApp } from '../../store/app';
 import { useSelected } from '../../store/create';
-import { hourAgo } from '../../store/hourAgo';
+import { hourAgo, shortHourText } from '../../store/hourAgo';
 import { rosNow } from '../../store/moment';
 import { S } from '../../strings';
 import { useTicking } from '../../widgets/useNow';
@@ -126,7 +126,7 @@ function Trend({ alarm, value, by }: { alarm: Alarm; value: number; by: number }
   const { sensors, unit } = useApp(selectSpeech);
   const sensor = sensors.named(alarm.reason.sensor);
   const { way, text } = differenceShown(sensor, value, by, unit);
-  const title = `${S.trendTitle(sensor.label)}: ${text}`;
+  const title = `${S.trendTitle(sensor.label, shortHourText())}: ${text}`;
   return (
     <span data-trend={way} title={title}>
       <span aria-hidden="true">

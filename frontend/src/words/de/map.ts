@@ -54,7 +54,7 @@ export const MAP: In<typeof ENGLISH> = {
   colouring: 'Farben nach',
   colourings: { ideal: 'Ideal', value: 'Wert' },
   legendNoIdeal: 'Zurzeit kein Idealbereich: Farben nach dem Wert',
-  sensorShort: { vpd: 'VPD', condensation_margin: 'Taupunktabstand' },
+  sensorShort: { vpd: 'VPD' },
   legendBelow: (value) => `unter ${value}`,
   legendAbove: (value) => `über ${value}`,
   legendAgainst: (sensor) => `${sensor} im Vergleich zum Idealbereich`,

@@ -68,7 +68,8 @@ export const TAGS: In<typeof ENGLISH> = {
   tableByArea: 'Nach Bereich gruppieren',
   areaNone: 'Kein Bereich',
   trend: 'Tendenz',
-  trendTitle: (sensor) => `${sensor}: Änderung seit einer Stunde`,
+  trendTitle: (sensor, hour) =>
+    `${sensor}: Änderung seit einer ${hour ? `Gewächshausstunde (${hour})` : 'Stunde'}`,
   trendNone: 'vor einer Stunde kein Messwert',
   trendSame: 'kein neuer Wert',
   trendLevel: 'unverändert',

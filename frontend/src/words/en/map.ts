@@ -51,7 +51,7 @@ export const MAP = {
   colourings: { ideal: 'Ideal', value: 'Value' },
   legendNoIdeal: 'No ideal range for now: coloured by value',
   /** In the bar of sensors, in place of a long name. */
-  sensorShort: { vpd: 'VPD', condensation_margin: 'Dew margin' },
+  sensorShort: { vpd: 'VPD' },
   legendBelow: (value: string): string => `below ${value}`,
   legendAbove: (value: string): string => `above ${value}`,
   legendAgainst: (sensor: string): string => `${sensor} compared with its ideal range`,

@@ -67,7 +67,9 @@ export const TAGS = {
   tableByArea: 'Group by area',
   areaNone: 'No area',
   trend: 'Trend',
-  trendTitle: (sensor: string): string => `${sensor} compared with an hour ago`,
+  /** `hour` is how long a greenhouse's hour is; null: one of the clock. */
+  trendTitle: (sensor: string, hour: string | null): string =>
+    `${sensor} compared with ${hour ? `a greenhouse hour (${hour})` : 'an hour'} ago`,
   trendNone: 'no reading an hour ago',
   trendSame: 'no new reading',
   trendLevel: 'steady',

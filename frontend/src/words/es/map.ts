@@ -52,7 +52,7 @@ export const MAP: In<typeof ENGLISH> = {
   colouring: 'Colores según',
   colourings: { ideal: 'Ideal', value: 'Valor' },
   legendNoIdeal: 'Ahora sin rango ideal: colores según el valor',
-  sensorShort: { vpd: 'DPV', condensation_margin: 'Margen de rocío' },
+  sensorShort: { vpd: 'DPV' },
   legendBelow: (value) => `menos de ${value}`,
   legendAbove: (value) => `más de ${value}`,
   legendAgainst: (sensor) => `${sensor} frente a su rango ideal`,

@@ -22,7 +22,7 @@ export const TAGS: In<typeof ENGLISH> = {
     age: 'Hace',
   },
   pest: 'Plaga',
-  pestCount: (count) => counted(count, 'ejemplar', 'ejemplares'),
+  pestCount: (count) => counted(count, 'individuo', 'individuos'),
   notOnMap: 'Sin posición',
   notOnMapLong: 'Aún no se conoce su posición, así que el punto no está en el mapa.',
   farOff: 'Demasiado lejos, fuera del mapa',
@@ -68,7 +68,8 @@ export const TAGS: In<typeof ENGLISH> = {
   tableByArea: 'Agrupar por zona',
   areaNone: 'Sin zona',
   trend: 'Tendencia',
-  trendTitle: (sensor) => `${sensor} frente a hace una hora`,
+  trendTitle: (sensor, hour) =>
+    `${sensor} frente a hace una hora${hour ? ` de invernadero (${hour})` : ''}`,
   trendNone: 'sin lectura hace una hora',
   trendSame: 'sin dato nuevo',
   trendLevel: 'estable',

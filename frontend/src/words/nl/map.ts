@@ -53,7 +53,7 @@ export const MAP: In<typeof ENGLISH> = {
   colouring: 'Kleuren naar',
   colourings: { ideal: 'Ideaal', value: 'Waarde' },
   legendNoIdeal: 'Nu geen ideaal bereik: gekleurd naar waarde',
-  sensorShort: { vpd: 'VPD', condensation_margin: 'Dauwmarge' },
+  sensorShort: { vpd: 'VPD' },
   legendBelow: (value) => `onder ${value}`,
   legendAbove: (value) => `boven ${value}`,
   legendAgainst: (sensor) => `${sensor} vergeleken met het ideale bereik`,

@@ -68,7 +68,8 @@ export const TAGS: In<typeof ENGLISH> = {
   tableByArea: 'Groeperen per afdeling',
   areaNone: 'Geen afdeling',
   trend: 'Trend',
-  trendTitle: (sensor) => `${sensor} vergeleken met een uur geleden`,
+  trendTitle: (sensor, hour) =>
+    `${sensor} vergeleken met een ${hour ? `kasuur (${hour})` : 'uur'} geleden`,
   trendNone: 'een uur geleden geen meting',
   trendSame: 'geen nieuwere',
   trendLevel: 'gelijk',

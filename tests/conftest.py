@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import gc
 import os
+import ssl
 import tempfile
 from collections.abc import Iterator
+from functools import partialmethod
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import httpx
 import pytest
 from hypothesis import HealthCheck, settings
 
@@ -31,6 +34,11 @@ os.environ["ROS_PYTHON_CHECK_FIELDS"] = "1"
 # Before numpy: threads of its own that wait for a busy core take ten times the time.
 os.environ["OPENBLAS_NUM_THREADS"] = "1"
 os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
+
+# A client reads the certificates of the whole world, 24 ms each time; on loopback nobody asks.
+_NOBODY = ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT)
+for client in (httpx.Client, httpx.AsyncClient):
+    client.__init__ = partialmethod(client.__init__, verify=_NOBODY)  # type: ignore[assignment,method-assign]
 
 # How long an example takes is the machine's business.
 settings.register_profile("here", deadline=None, suppress_health_check=[HealthCheck.too_slow])

@@ -10,6 +10,7 @@ from playwright.sync_api import expect
 
 from tests.browser.hmi import Hmi, OpenPage
 from tests.browser.house import TAGS
+from tests.browser.places import place
 from tests.support.web import Bridge
 
 # --- sensors ------------------------------------------------------------------------------------
@@ -367,3 +368,34 @@ def test_the_page_speaks_as_the_browser_the_address_or_the_menu_says(
     hmi.go(query="?lang=xx")
     expect(hmi.test_id("troubles")).to_have_text(re.compile("is not available in “xx”"))
     expect(hmi.page.locator("html")).to_have_attribute("lang", "en")
+
+
+# The words of the table's heads that go on in another line.
+_BROKEN = """() => [...document.querySelectorAll('thead button > span:first-child')]
+  .filter((head) => head.checkVisibility())
+  .flatMap((head) => [...head.childNodes].filter((node) => node.nodeType === 3))
+  .flatMap((node) => [...node.data.matchAll(/\\S+/g)].filter(({ 0: word, index }) => {
+    const range = document.createRange();
+    range.setStart(node, index);
+    range.setEnd(node, index + word.length);
+    return range.getClientRects().length > 1;
+  }).map(([word]) => word))"""
+
+
+def test_a_head_breaks_no_word_and_the_chosen_sensor_moves_no_age(
+    house: Bridge, open_page: OpenPage
+) -> None:
+    hmi = open_page(house.url, go=False)
+    for language in ("de", "nl"):
+        hmi.go(query=f"?lang={language}")
+        hmi.resize(360, 1024)
+        hmi.page.locator(".pane-tabs button").nth(1).click()
+        for width in (360, 768, 1100, 1440):
+            hmi.resize(width, 1024)
+            expect(hmi.row("1")).to_be_visible()
+            assert hmi.page.evaluate(_BROKEN) == [], (language, width)
+        age = hmi.page.locator("thead [data-column=age]")
+        before = place(age).left
+        hmi.page.keyboard.press("2")
+        expect(hmi.page.locator("thead .chosen")).to_have_attribute("data-column", "humidity")
+        assert place(age).left == pytest.approx(before, abs=0.5)

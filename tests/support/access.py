@@ -27,7 +27,7 @@ class Served:
 
     process: Process
     url: str
-    trust: ssl.SSLContext | bool = True
+    trust: ssl.SSLContext | bool = False
 
     def client(self, address: str | None = None, **options: Any) -> httpx.Client:
         """An HTTP client; `address` is the loopback address that it comes from."""
@@ -61,7 +61,7 @@ class Served:
 
 @contextmanager
 def served(
-    *options: str, trust: ssl.SSLContext | bool = True, afresh: bool = False, **env: str
+    *options: str, trust: ssl.SSLContext | bool = False, afresh: bool = False, **env: str
 ) -> Iterator[Served]:
     """`lupin-twin serve` with these options and environment, in a ROS domain of its own.
 

@@ -137,7 +137,9 @@ test('of a pest how many: now, at worst and at first', () => {
 test('since when and until when: of today the time alone', () => {
   const since = alarm('a', { raised: NOON });
   expect(spanText(since, NOON + 1_500)).toBe('since 12:00:00 (25\u00a0min)');
-  expect(spanText(since, NOON + 86_400)).toBe('since 14 Nov 2026, 12:00:00 (1\u00a0d 0\u00a0h)');
+  expect(spanText(since, NOON + 86_400)).toBe(
+    'since 14 Nov 2026, 12:00:00 (1\u00a0d\u00a00\u00a0h)',
+  );
   expect(spanText(since, null)).toBe('since 14 Nov 2026, 12:00:00');
   const over = alarm('a', { raised: NOON, cleared: NOON + 600 });
   expect(spanText(over, NOON + 1_500)).toBe('12:00:00 until 12:10:00 (10\u00a0min)');

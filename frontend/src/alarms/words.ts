@@ -131,12 +131,16 @@ export function spanText({ raised_at, cleared_at }: Alarm, nowS: number | null):
   const from = secondsOf(raised_at);
   const begin = whenText(from, nowS);
   if (cleared_at === null) {
-    return S.alarmSince(begin, nowS === null ? null : ageText(Math.max(0, nowS - from)));
+    return S.alarmSince(begin, nowS === null ? null : lengthText(nowS - from));
   }
   const until = secondsOf(cleared_at);
   const end = isSameDay(from, until) ? clockOf(until) : whenText(until, nowS);
-  return S.alarmUntil(begin, end, ageText(Math.max(0, until - from)));
+  return S.alarmUntil(begin, end, lengthText(until - from));
 }
+
+/** In one piece: a line does not break in it. */
+const lengthText = (seconds: number): string =>
+  ageText(Math.max(0, seconds)).replace(' ', '\u00a0');
 
 /** A moment: of today the time alone. */
 export const whenText = (at: number, nowS: number | null): string =>

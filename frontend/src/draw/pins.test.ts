@@ -27,6 +27,7 @@ const pin = (over: Partial<Pin> = {}): Pin => ({
 function draw(
   pins: readonly Pin[],
   palette: Palette = LIGHT,
+  spacing = Infinity,
 ): { copies: FakeContext; sprites: FakeContext[] } {
   const copies = new FakeContext();
   const sprites: FakeContext[] = [];
@@ -45,7 +46,7 @@ function draw(
       });
     }
   }
-  drawPins(surface, view, pins, new Spy(1), palette);
+  drawPins(surface, view, pins, new Spy(1), palette, spacing);
   return { copies, sprites };
 }
 
@@ -129,6 +130,13 @@ describe('pins', () => {
         .copies.named('drawImage')
         .map(({ state }) => state['globalAlpha']);
     expect(order('critical', 'healthy', 'unknown', 'stressed')).toEqual([0.9, 0.8, 0.7, 1]);
+  });
+
+  test('where pins crowd only a critical one has room for its sign', () => {
+    // Halo and outline; a cross of two strokes besides.
+    const lines = (verdict: Verdict): number | undefined =>
+      draw([pin({ verdict })], LIGHT, 0.02).sprites[0]?.named('stroke').length;
+    expect(VERDICTS.map(lines)).toEqual(VERDICTS.map((each) => (each === 'critical' ? 4 : 2)));
   });
 
   test('five hundred pins are a handful of sprites', () => {

@@ -21,12 +21,13 @@ const LABEL_PADDING = 5;
  */
 export function pinRadius(scale: number, spacing = Infinity): number {
   const usual = Math.round(Math.min(11, Math.max(6, scale * 0.11)));
-  return Math.min(usual, Math.max(LEAST_PX, Math.round(scale * spacing * 0.22)));
+  return Math.min(usual, Math.max(LEAST_PX.healthy, Math.round(scale * spacing * 0.22)));
 }
 
-/** Of what is well, where pins crowd; a warning is never as small. */
-const LEAST_PX = 2;
-const LEAST_WARNING_PX = 5;
+/** Where pins crowd; the worse, the larger. */
+const LEAST_PX = { healthy: 2, unknown: 2, stressed: 3, critical: 5 };
+/** Smaller ones have no room for a sign. */
+const LEAST_SIGN_PX = 5;
 
 export function bloomRadius(scale: number): number {
   return Math.round(Math.min(6, Math.max(1.5, scale * 0.022)) * 2) / 2;
@@ -101,8 +102,7 @@ export function drawPins(
 ): void {
   const usual = pinRadius(view.scale, spacing);
   for (const verdict of BY_SEVERITY) {
-    const isWarning = isBad(verdict);
-    const radius = isWarning ? Math.max(usual, LEAST_WARNING_PX) : usual;
+    const radius = Math.max(usual, LEAST_PX[verdict]);
     const box = (radius + WARNING_PX + 4) * 2;
     for (const pin of pins) {
       if (pin.verdict !== verdict) continue;
@@ -122,7 +122,7 @@ export function drawPins(
   for (const pin of pins) {
     if (!pin.pest) continue;
     const { x, y } = toCanvas(view, pin.at);
-    const radius = Math.max(usual, LEAST_WARNING_PX);
+    const radius = Math.max(usual, LEAST_PX.critical);
     if (inside(surface, x, y, radius * 8)) drawPest(surface, x, y, radius, sprites, palette);
   }
 }
@@ -149,7 +149,7 @@ function paintPin(
   context.lineCap = 'round';
   // The halo tells it from whatever colour lies below.
   context.strokeStyle = palette.halo;
-  context.lineWidth = radius < LEAST_WARNING_PX ? 1.5 : isLine ? 5 : 4;
+  context.lineWidth = radius < LEAST_SIGN_PX ? 1.5 : isLine ? 5 : 4;
   context.stroke();
   context.fillStyle = isEmpty ? palette.verdicts.unknown.body : body;
   context.fill();
@@ -159,7 +159,7 @@ function paintPin(
   context.stroke();
   context.setLineDash([]);
   // Too small for a sign: a dot.
-  if (radius < LEAST_WARNING_PX) return;
+  if (radius < LEAST_SIGN_PX) return;
   context.strokeStyle = isEmpty ? own : ink;
   context.lineWidth = Math.max(1.5, radius * 0.24);
   for (const line of kind === 'failed' ? STRUCK : mark.sign) {

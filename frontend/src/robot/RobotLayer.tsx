@@ -45,33 +45,39 @@ export function RobotLayer(): ReactPortal | null {
   if (!map) return null;
   // Within the map: below all that stands on it.
   return createPortal(
-    <svg className="robot-layer" aria-hidden="true" data-testid="robot" data-looks={looks}>
-      <g transform={`translate(${view.x} ${view.y}) scale(${view.scale} ${-view.scale})`}>
-        {lines.map(({ points, step }, index) => (
-          <polyline key={index} className="robot-trail" data-step={step} points={text(points)} />
-        ))}
-        {plan && <polyline className="robot-plan" points={text(wayAhead(plan.points, position))} />}
-      </g>
-      {position && at && (
-        <g transform={`translate(${at.x} ${at.y})`} data-testid="robot-mark">
-          <circle className="robot-body" r="11" />
-          {position.heading === null ? (
-            <circle className="robot-heading" r="4" />
-          ) : (
-            <path
-              className="robot-heading"
-              d="M8 0-5 5.500-2 0-5-5.500Z"
-              transform={`rotate(${(-position.heading * 180) / Math.PI})`}
-            />
-          )}
-          {looks === 'old' && (
-            <text className="robot-age" x="16" y="4">
-              {age === null ? S.ageUnknown : S.agoSuffix(age)}
-            </text>
+    <>
+      <svg className="robot-layer" aria-hidden="true" data-testid="robot" data-looks={looks}>
+        <g transform={`translate(${view.x} ${view.y}) scale(${view.scale} ${-view.scale})`}>
+          {lines.map(({ points, step }, index) => (
+            <polyline key={index} className="robot-trail" data-step={step} points={text(points)} />
+          ))}
+          {plan && (
+            <polyline className="robot-plan" points={text(wayAhead(plan.points, position))} />
           )}
         </g>
+      </svg>
+      {position && at && (
+        <svg className="robot-layer robot-now" aria-hidden="true" data-looks={looks}>
+          <g transform={`translate(${at.x} ${at.y})`} data-testid="robot-mark">
+            <circle className="robot-body" r="11" />
+            {position.heading === null ? (
+              <circle className="robot-heading" r="4" />
+            ) : (
+              <path
+                className="robot-heading"
+                d="M8 0-5 5.500-2 0-5-5.500Z"
+                transform={`rotate(${(-position.heading * 180) / Math.PI})`}
+              />
+            )}
+            {looks === 'old' && (
+              <text className="robot-age" x="16" y="4">
+                {age === null ? S.ageUnknown : S.agoSuffix(age)}
+              </text>
+            )}
+          </g>
+        </svg>
       )}
-    </svg>,
+    </>,
     map,
   );
 }

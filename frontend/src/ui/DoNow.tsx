@@ -16,7 +16,7 @@ import { selectCatalogue, selectHealth } from '../store/derived';
 import { rosNow, selectShown, selectTags } from '../store/moment';
 import { S } from '../strings';
 import { HealthMark } from './HealthMark';
-import { useReasonText } from './Reasons';
+import { selectAreAlarmsKnown, useReasonText } from './Reasons';
 
 /** Beside the map; the table has the rest. */
 const MOST_TAGS = 2;
@@ -68,7 +68,7 @@ export function useUrgent(): readonly Urgent[] {
 export function useSince(tagId: string, reason: HealthReason): string | null {
   const isNow = useApp((state) => selectShown(state).moment === null);
   const found = useSelected(alarmList, ({ active }) => alarmOf(active, tagId, reason));
-  const isKnown = useApp(({ twin }) => twin.alarms !== null && twin.alarms.source !== 'starting');
+  const isKnown = useApp(selectAreAlarmsKnown);
   if (!isNow) return null;
   if (!found) return isKnown ? S.alarmNotYet : null;
   if (found.isAcknowledged) return S.healthAcknowledged;

@@ -4,9 +4,10 @@ import { alarmOf } from '../alarms/list';
 import { alarmList } from '../alarms/watch';
 import type { HealthReason, TagHealth } from '../contract/types';
 import { ageSeconds } from '../domain/age';
+import { isBad } from '../domain/health';
 import { reasonText, todoText } from '../domain/reasons';
 import { whenOf } from '../domain/twin';
-import { useApp } from '../store/app';
+import { useApp, type AppState } from '../store/app';
 import { useSelected } from '../store/create';
 import { selectCatalogue } from '../store/derived';
 import { selectShown } from '../store/moment';
@@ -60,12 +61,21 @@ export function Reasons({
   );
 }
 
-/** What to do about a reason; of what is shelved, nothing. */
+/** What to do about a reason, and that it has no alarm yet; of what is shelved, nothing. */
 function Todo({ tagId, reason }: { tagId: string; reason: HealthReason }): JSX.Element | null {
   const catalogue = useApp(selectCatalogue);
-  const isShelved = useSelected(
-    alarmList,
-    ({ shelved }) => alarmOf(shelved, tagId, reason) !== undefined,
+  const { active, shelved } = useSelected(alarmList, (list) => list);
+  const isKnown = useApp(selectAreAlarmsKnown);
+  if (alarmOf(shelved, tagId, reason)) return null;
+  const isWaiting = isKnown && isBad(reason.verdict) && !alarmOf(active, tagId, reason);
+  return (
+    <span>
+      <strong>{todoText(catalogue, reason)}</strong>{' '}
+      {isWaiting && <small className="faint">{S.alarmNotYet}</small>}
+    </span>
   );
-  return isShelved ? null : <strong>{todoText(catalogue, reason)}</strong>;
 }
+
+/** Whether it is known which alarms there are. */
+export const selectAreAlarmsKnown = ({ twin: { alarms } }: AppState): boolean =>
+  alarms !== null && alarms.source !== 'starting';

@@ -149,7 +149,9 @@ describe('table', () => {
   });
 
   const trends = (): (string | null)[] =>
-    [...document.querySelectorAll('.trend')].map((each) => each.textContent);
+    [...document.querySelectorAll('.chosen > :is(.trend, .unseen)')].map(
+      (each) => each.textContent,
+    );
   const tags = [
     wireTag({ tag_id: 'a', readings: readings({ temperature: 22 }) }),
     wireTag({ tag_id: 'b', readings: readings({ temperature: 20 }) }),
@@ -161,6 +163,8 @@ describe('table', () => {
     showTags(tags, health);
     render(<TagTable />);
     expect(trends()).toEqual(['an hour ago: unknown', 'an hour ago: unknown']);
+    // What is not to be seen takes no room: the value stands in the middle of its row.
+    expect(document.querySelector('.trend')).toBeNull();
     const before = tag({
       tag_id: 'a',
       readings: [

@@ -31,17 +31,14 @@ export function TrendLine({
   if (!trend || value == null) return null;
   const title = S.trendTitle(shown(sensor.label, 32), shortHourText());
   if (!then || trend.kind !== 'by') {
-    const text = !then ? S.trendUnknown : trend.kind === 'same' ? S.trendSame : S.trendNone;
-    return (
-      <span className="trend" data-trend={then ? trend.kind : 'unknown'} title={text}>
-        {trend.kind === 'same' && then ? (
-          text
-        ) : (
-          // Only to be heard: with a young memory it would stand in every row.
-          <span className="unseen">{text}</span>
-        )}
-      </span>
-    );
+    if (then && trend.kind === 'same')
+      return (
+        <span className="trend" data-trend="same" title={S.trendSame}>
+          {S.trendSame}
+        </span>
+      );
+    // Only to be heard: with a young memory it would stand in every row.
+    return <span className="unseen">{then ? S.trendNone : S.trendUnknown}</span>;
   }
   const { way, text } = differenceShown(sensor, value, trend.by, unit);
   return (

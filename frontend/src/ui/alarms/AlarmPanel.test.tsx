@@ -206,8 +206,9 @@ test('what is shelved while the list is held says so where it stands, and all is
   fireEvent.change(screen.getByLabelText(/^Reason/), { target: { value: 'fan' } });
   press('For 1 h');
   expect(status('5')).toMatch(/^shelved until [\d:]+$/);
-  // Why, in the place of what to do.
-  expect(first('active').querySelector('.alarm-do')?.textContent).toBe('fan');
+  // Why, in the place of what to do, and as somebody's words.
+  expect(first('active').querySelector('.alarm-do')).toBeNull();
+  expect(first('active').querySelector('q')?.textContent).toBe('fan');
   expect(group('active').map(({ textContent }) => textContent.includes('shelved until'))).toEqual([
     true,
     false,

@@ -32,7 +32,7 @@ export const AlarmRow = memo(function AlarmRow({
   const name = useApp((state) => nameText(alarm, selectSpeech(state)));
   const status = useStatus(item, group);
   // While the order is held, it has no line for that: nothing is to be done meanwhile.
-  const because = group === 'active' ? item.shelf?.reason : undefined;
+  const shelf = group === 'active' ? item.shelf : null;
   return (
     <li
       data-alarm={alarm.id}
@@ -60,12 +60,10 @@ export const AlarmRow = memo(function AlarmRow({
               {': '}
               {values.what}
             </span>
-            {group !== 'resolved' && (
-              <span
-                className="alarm-do"
-                data-again={because !== undefined || current === 'healthy' || undefined}
-              >
-                {because ?? values.todo}
+            {shelf?.reason && <q className="faint">{shelf.reason}</q>}
+            {!shelf && group !== 'resolved' && (
+              <span className="alarm-do" data-again={current === 'healthy' || undefined}>
+                {values.todo}
               </span>
             )}
           </span>

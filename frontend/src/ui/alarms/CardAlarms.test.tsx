@@ -2,7 +2,7 @@ import { act as flush, fireEvent, render, screen } from '@testing-library/react'
 import { afterEach, beforeEach, expect, test } from 'vitest';
 
 import { NOTHING_KEPT } from '../../alarms/kept';
-import { own, shelveAlarm } from '../../alarms/own';
+import { acknowledgeAlarms, own, shelveAlarm } from '../../alarms/own';
 import { alarmList, startAlarms } from '../../alarms/watch';
 import { person } from '../../store/signals';
 import { alarm, tellAlarms } from '../../testing/alarms';
@@ -64,6 +64,32 @@ test('all alarms of a tag are acknowledged where it is looked at, and no others'
   expect(screen.queryByRole('button')).toBeNull();
   const seen = alarmList.get().active.filter(({ isAcknowledged }) => isAcknowledged);
   expect(seen.map(({ alarm: { id } }) => id).sort()).toEqual(['a', 'b']);
+});
+
+test('of one alarm it says who has acknowledged it, and when', () => {
+  flush(() => {
+    const said = { acknowledged_by: 'vera', acknowledged_at: { sec: 950, nanosec: 0 } };
+    tellAlarms(alarm('a', { tag_id: '7', ...said }));
+    acknowledgeAlarms(alarmList.get().active);
+  });
+  expect(screen.getByTestId('card-alarms').textContent).toMatch(
+    /^1 alarm: acknowledged by vera at sim 00:15:50 · since/,
+  );
+});
+
+test('of two reasons it is said which has no alarm yet', () => {
+  const pest = reason({ kind: 'pest', sensor: '', value: 2, limit: null });
+  render(<Reasons health={{ verdict: 'critical', reasons: [reason(), pest] }} todoAt="7" />);
+  const lines = (): (string | null)[] =>
+    [...screen.getByTestId('reasons').children].map(({ textContent }) => textContent);
+  expect(lines().filter((text) => text?.includes('no alarm yet'))).toEqual([]);
+  flush(() => {
+    tellAlarms(alarm('a', { tag_id: '7' }));
+  });
+  expect(lines()).toEqual([
+    expect.stringMatching(/close the vents $/),
+    expect.stringMatching(/^2 pests seenInspect and treat the plants no alarm yet$/),
+  ]);
 });
 
 test('what is shelved says until when and why, has its way back, and is no order meanwhile', () => {

@@ -1,6 +1,6 @@
 import type { JSX } from 'react';
 
-import { unacknowledged } from '../../alarms/list';
+import { unacknowledged, type Item } from '../../alarms/list';
 import { acknowledgeAlarms, unshelveAlarm } from '../../alarms/own';
 import { selectSpeech, todoNow, worstNow } from '../../alarms/speech';
 import { spanText, whatText } from '../../alarms/words';
@@ -15,6 +15,7 @@ import { mayAct, person } from '../../store/signals';
 import { S } from '../../strings';
 import { useTicking } from '../../widgets/useNow';
 import { once } from './once';
+import { useWhoAcknowledged } from './WhoseWord';
 
 const byTime = (a: Alarm, b: Alarm): number => secondsOf(a.raised_at) - secondsOf(b.raised_at);
 
@@ -42,7 +43,7 @@ function Active({ tagId }: { tagId: string }): JSX.Element | null {
   return (
     <div className="card-alarms" data-testid="card-alarms">
       <span>
-        {(waiting.length === 0 ? S.alarmDone.acknowledge : S.alarmCount)(items.length)} · {since}
+        {waiting.length > 0 ? S.alarmCount(items.length) : <Acknowledged items={items} />} · {since}
         {well !== '' && ` · ${well}`}
       </span>
       {isAble && waiting.length > 0 && (
@@ -56,6 +57,15 @@ function Active({ tagId }: { tagId: string }): JSX.Element | null {
         </button>
       )}
     </div>
+  );
+}
+
+/** How many are acknowledged; of one, by whom and when. */
+function Acknowledged({ items }: { items: readonly Item[] }): JSX.Element {
+  const [only, ...others] = items.map(({ alarm }) => alarm);
+  const who = useWhoAcknowledged(only && others.length === 0 ? only : null);
+  return (
+    <>{who === null ? S.alarmDone.acknowledge(items.length) : S.alarmWhat(S.alarmCount(1), who)}</>
   );
 }
 

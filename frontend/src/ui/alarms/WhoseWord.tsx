@@ -24,10 +24,9 @@ export function whoseWord(who: Session | null): string {
 }
 
 /** Who acknowledged an alarm, and when; null: no name is known. */
-export function useWhoAcknowledged({
-  acknowledged_by: name,
-  acknowledged_at: at,
-}: Alarm): string | null {
+export function useWhoAcknowledged(alarm: Alarm | null): string | null {
+  const name = alarm?.acknowledged_by;
+  const at = alarm?.acknowledged_at;
   const when = useTicking((tick) => (at ? whenText(secondsOf(at), rosNow(store.get(), tick)) : ''));
   return name && when !== '' ? P.acknowledged(name, when) : null;
 }

@@ -30,7 +30,7 @@ export const ALARMS: In<typeof ENGLISH> = {
   alarmWorst: {
     below: (reading) => `tiefster Wert ${reading}`,
     above: (reading) => `höchster Wert ${reading}`,
-    pest: (reading) => `Höchststand ${reading}`,
+    pest: (reading) => `höchste Anzahl ${reading}`,
   },
   alarmFirst: (reading) => `anfangs ${reading}`,
   alarmStatus: { critical: 'kritisch', healthy: 'im Sollbereich' },

@@ -31,7 +31,7 @@ export const HEALTH: In<typeof ENGLISH> = {
       `Última medición fallida: ${outcome}${age === null ? '' : `, hace ${age}`}`,
     pest: (count) =>
       count > 0
-        ? `Plaga detectada: ${counted(count, 'ejemplar', 'ejemplares')}`
+        ? `Plaga detectada: ${counted(count, 'individuo', 'individuos')}`
         : 'Plaga detectada',
     old: (sensor, age, holds, isDated) => {
       const since = !isDated

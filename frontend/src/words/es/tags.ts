@@ -22,7 +22,7 @@ export const TAGS: In<typeof ENGLISH> = {
     age: 'Hace',
   },
   pest: 'Plaga',
-  pestCount: (count) => counted(count, 'ejemplar', 'ejemplares'),
+  pestCount: (count) => counted(count, 'individuo', 'individuos'),
   notOnMap: 'Sin posición',
   notOnMapLong: 'Aún no se conoce su posición, así que el punto no está en el mapa.',
   farOff: 'Demasiado lejos, fuera del mapa',

@@ -26,7 +26,7 @@ export const ALARMS: In<typeof ENGLISH> = {
   alarmWorst: {
     below: (reading) => `laagste ${reading}`,
     above: (reading) => `hoogste ${reading}`,
-    pest: (reading) => `hoogste stand ${reading}`,
+    pest: (reading) => `hoogste aantal ${reading}`,
   },
   alarmFirst: (reading) => `bij aanvang ${reading}`,
   alarmStatus: { critical: 'kritiek', healthy: 'binnen bereik' },

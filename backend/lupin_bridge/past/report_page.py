@@ -44,7 +44,7 @@ th.number { white-space: normal }
 dl { display: grid; grid-template-columns: repeat(4, 1fr); gap: 2mm; margin: 4mm .3mm }
 dl div { border: .2mm solid #bbb; padding: 1.5mm } dt { color: #444; font-size: 8.5pt }
 dd { margin: 0; font-size: 13pt } .critical td:first-child { font-weight: 700 }
-td:first-child { hyphens: auto } 
+td:first-child { hyphens: auto }
 .alarms td:first-child { width: 45mm } .alarms :nth-child(2) { min-width: 0 }
 @media print { body { padding: 0; max-width: none } }
 """

@@ -37,14 +37,15 @@ p { margin: 1mm 0 } .note { color: #444; font-size: 9pt }
 table { border-collapse: collapse; width: 100%; font-size: 8.5pt }
 thead { display: table-header-group } tr { break-inside: avoid }
 th, td { text-align: left; vertical-align: top; padding: 1mm;
-  border-bottom: .2mm solid #bbb; overflow-wrap: anywhere; min-width: 20mm }
+  border-bottom: .2mm solid #bbb; overflow-wrap: anywhere; min-width: 22mm }
 th { border-bottom: .4mm solid #444; overflow-wrap: normal }
 .number { text-align: right; font-variant-numeric: tabular-nums; white-space: nowrap; min-width: 0 }
 th.number { white-space: normal }
 dl { display: grid; grid-template-columns: repeat(4, 1fr); gap: 2mm; margin: 4mm .3mm }
 dl div { border: .2mm solid #bbb; padding: 1.5mm } dt { color: #444; font-size: 8.5pt }
 dd { margin: 0; font-size: 13pt } .critical td:first-child { font-weight: 700 }
-td:first-child { min-width: 22mm; hyphens: auto } .alarms td:first-child { min-width: 45mm }
+td:first-child { hyphens: auto }
+.alarms td:first-child { width: 45mm } .alarms :nth-child(2) { min-width: 0 }
 @media print { body { padding: 0; max-width: none } }
 """
 # Of all languages but English.

@@ -17,6 +17,15 @@ export function rosText(at: number): string {
   return hasDate(at) ? dateText(Math.floor(at) * 1000) : simText(at);
 }
 
+/** "14 Nov": for where the year stands beside it, or goes without saying. */
+export const dayFormat = new Intl.DateTimeFormat(LOCALE, { day: 'numeric', month: 'short' });
+
+/** "14 Nov, 03:12:40", as `rosText` without the year. */
+export function shortRosText(at: number): string {
+  const epochMs = Math.floor(at) * 1000;
+  return hasDate(at) ? `${dayFormat.format(epochMs)}, ${clockText(epochMs)}` : simText(at);
+}
+
 /** "14 Nov 2026, 03:12:40" on the operator's own clock. */
 export const dateText = (epochMs: number): string =>
   `${date.format(epochMs)}, ${clockText(epochMs)}`;

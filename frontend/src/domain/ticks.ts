@@ -1,6 +1,7 @@
 /** Where a time axis is marked, and with what: round times of the operator's clock. Pure. */
 import { LOCALE } from '../strings';
 import type { Span } from './period';
+import { dayFormat } from './rostime';
 
 export interface Tick {
   /** ROS seconds. */
@@ -80,7 +81,6 @@ function clockTimes({ from, to }: Span, step: number): number[] {
 const daysOf = (day: Date): number =>
   Math.round(Date.UTC(day.getFullYear(), day.getMonth(), day.getDate()) / 1000 / DAY) + 3;
 
-const dayFormat = new Intl.DateTimeFormat(LOCALE, { day: 'numeric', month: 'short' });
 const monthFormat = new Intl.DateTimeFormat(LOCALE, { month: 'short' });
 
 const two = (value: number): string => String(value).padStart(2, '0');

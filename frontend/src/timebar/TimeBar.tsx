@@ -1,7 +1,7 @@
 import type { JSX, ReactNode } from 'react';
 
 import { type Period, PERIOD_KINDS } from '../domain/period';
-import { hasDate, rosText } from '../domain/rostime';
+import { hasDate, shortRosText } from '../domain/rostime';
 import { shown } from '../domain/text';
 import { CommentMarks } from '../notes/CommentMarks';
 import { SiteComment } from '../notes/SiteComment';
@@ -92,13 +92,13 @@ function Player(): JSX.Element {
   );
 }
 
-/** Where the bar stands: the moment that is wanted, which may still be on its way. */
+/** Where the bar stands: the moment that is wanted, which may still be on its way. The header has its year. */
 function When(): JSX.Element {
   const moment = useApp((state) => state.view.moment);
   const word = useApp(newestWord);
   return (
     <span className="timebar-when" data-testid="timebar-when">
-      {moment === null ? word : rosText(moment)}
+      {moment === null ? word : shortRosText(moment)}
     </span>
   );
 }

@@ -194,7 +194,7 @@ class _Page:
         number = partial(self._number, unit=unit, like=reason["limit"] if numbers else None)
         return (
             f"{self._what(reason)} ({self._words['verdicts'][reason['verdict']]})",
-            alarm["tag_id"],
+            alarm["tag_id"] or self.say("house"),
             self._clock(alarm["raised_at"]),
             self.say("still") if cleared is None else self._clock(cleared),
             number(reason["value"]) if numbers or reason["kind"] == "pest" else "",

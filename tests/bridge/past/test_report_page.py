@@ -148,5 +148,7 @@ def test_who_acknowledged_or_shelved_has_a_column_where_somebody_did() -> None:
     assert page.count("acknowledged by Anna, 06:02") == 1
 
 
-def test_a_row_of_an_alarm_has_its_tags_name_alone() -> None:
-    assert "Pest seen (critical) 7 06:01 still active" in page_of(alarms=[alarm()])
+def test_a_row_of_an_alarm_has_its_tags_name_alone_or_is_the_greenhouses() -> None:
+    page = page_of(alarms=[alarm(), alarm(tag_id="")])
+    assert "Pest seen (critical) 7 06:01 still active" in page
+    assert "Pest seen (critical) Greenhouse 06:01 still active" in page

@@ -41,12 +41,16 @@ window.house = {};
                    input_problems: [], day_length_s: 86400,
                    journal: { state: "recording", detail: "", set_aside: "", simulated: null },
                    outward: [] };
+  const health = { house: { verdict: 'healthy', reasons: [],
+                            day: { is_day: true, source: 'assumed' },
+                            patrol: { interval_s: null, last_scan: null, overdue: 0 } },
+                   tags: {} };
   let socket;
   const say = (frame) => socket.onmessage?.({ data: JSON.stringify(frame) });
   const delta = (changed) => {
     const base = seq++;
     say({ type: 'delta', seq, base, revision: `r${revision}`, header: header(), changed,
-          removed: [] });
+          removed: [], health });
   };
   window.house.beat = () => delta([]);
   window.house.change = (count) => {
@@ -72,11 +76,7 @@ window.house = {};
         this.onopen?.();
         say(status);
         say({ type: 'state', seq: ++seq, revision: `r${revision}`,
-              state: { header: header(), tags },
-              health: { house: { verdict: 'healthy', reasons: [],
-                                 day: { is_day: true, source: 'assumed' },
-                                 patrol: { interval_s: null, last_scan: null, overdue: 0 } },
-                        tags: {} } });
+              state: { header: header(), tags }, health });
       }, 1);
     }
     close() {}

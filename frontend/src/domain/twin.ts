@@ -217,12 +217,7 @@ export function snapshotOf(latest: Latest, arrivedAt: number, before: Snapshot |
   const state = { at: latest.state.header.stamp, takenAt };
   const known = new Map(before?.tags.map((tag) => [tag.id, tag]));
   const read = latest.state.tags.map((wire) => sharedTag(known.get(wire.tag_id), wire, state));
-  const reach = reachOfTags(read);
-  const tags = inOrder(
-    read.map((tag) => within(reach, tag)),
-    known,
-    before?.tags ?? [],
-  );
+  const tags = inOrder(read, known, before?.tags ?? []);
   return {
     tags,
     revision: latest.revision,
@@ -247,14 +242,20 @@ function within(reach: Reach, tag: Tag): Tag {
     : { ...tag, at: isFar ? null : place, farOff: isFar ? place : null };
 }
 
-/** By their ids. The very list of before if each tag is the very same: then nothing is redrawn. */
+/**
+ * By their ids, as the map shows them. The very list of before if each tag is the very same: then
+ * nothing is redrawn.
+ */
 function inOrder(
-  tags: readonly Tag[],
+  read: readonly Tag[],
   known: ReadonlyMap<string, Tag>,
   before: readonly Tag[],
 ): readonly Tag[] {
-  if (tags.length === before.length && tags.every((tag) => known.has(tag.id))) {
-    if (tags.every((tag) => known.get(tag.id) === tag)) return before;
+  const isAsBefore = read.length === before.length && read.every((tag) => known.has(tag.id));
+  if (isAsBefore && read.every((tag) => known.get(tag.id) === tag)) return before;
+  const reach = reachOfTags(read);
+  const tags = read.map((tag) => within(reach, tag));
+  if (isAsBefore) {
     const now = new Map(tags.map((tag) => [tag.id, tag]));
     if (now.size === before.length) return before.map((tag) => now.get(tag.id) ?? tag);
   }

@@ -28,7 +28,7 @@ interface Came {
 export function startPast(): () => void {
   let patience: ReturnType<typeof setTimeout> | undefined;
   let calm: ReturnType<typeof setTimeout> | undefined;
-  let judging = new AbortController();
+  let judging: AbortController | null = null;
   /** The last connection that was open. */
   let heardOn = 0;
 
@@ -50,13 +50,14 @@ export function startPast(): () => void {
 
   const forgetQuality = (): void => {
     clearTimeout(calm);
-    judging.abort();
-    judging = new AbortController();
+    judging?.abort();
+    judging = null;
   };
   const askQuality = (): void => {
     const past = selectPast(store.get());
     const field = past?.house.field.value;
     if (!past || !field || field.sureness || past.at !== store.get().view.moment) return;
+    judging = new AbortController();
     const { signal } = judging;
     fetchQuality(field.sensor, signal, past.at).then(
       (quality) => {

@@ -251,11 +251,11 @@ function inOrder(
   known: ReadonlyMap<string, Tag>,
   before: readonly Tag[],
 ): readonly Tag[] {
-  const isAsBefore = read.length === before.length && read.every((tag) => known.has(tag.id));
-  if (isAsBefore && read.every((tag) => known.get(tag.id) === tag)) return before;
+  const areIdsAsBefore = read.length === before.length && read.every((tag) => known.has(tag.id));
+  if (areIdsAsBefore && read.every((tag) => known.get(tag.id) === tag)) return before;
   const reach = reachOfTags(read);
   const tags = read.map((tag) => within(reach, tag));
-  if (isAsBefore) {
+  if (areIdsAsBefore) {
     const now = new Map(tags.map((tag) => [tag.id, tag]));
     if (now.size === before.length) return before.map((tag) => now.get(tag.id) ?? tag);
   }

@@ -15,7 +15,8 @@ import { isColumnShown } from './settings';
 
 /** An hour of the greenhouse's day, seconds of the twin's time: a demo's day is a short one. */
 const selectHourS = (state: AppState): number => selectDayS(state) / 24;
-/** How long that is where it is shorter than an hour of the clock; else null. */
+
+/** The length of the greenhouse's hour where that is shorter than one of the clock; else null. */
 export function shortHourText(): string | null {
   const hourS = selectHourS(store.get());
   return hourS < 3_600 ? intervalText(hourS) : null;

@@ -5,7 +5,6 @@ import { selectSpeech } from '../alarms/speech';
 import type { HealthReason } from '../contract/types';
 import { isBad, severity, type HouseHealth } from '../domain/health';
 import { todoText } from '../domain/reasons';
-import type { Catalogue } from '../domain/sensors';
 import { shown } from '../domain/text';
 import { useApp } from '../store/app';
 import { selectHealth } from '../store/derived';
@@ -76,7 +75,6 @@ function useLines(urgent: readonly Urgent[]): readonly Line[] {
 }
 
 function TagLine({ of: { tagId, reasons }, fits }: { of: Urgent; fits: boolean }): JSX.Element {
-  const { sensors } = useApp(selectSpeech);
   const [{ verdict }] = reasons;
   const since = useSince(tagId, reasons[0]);
   return (
@@ -87,8 +85,7 @@ function TagLine({ of: { tagId, reasons }, fits }: { of: Urgent; fits: boolean }
       <span className="attention-why">
         <Reasons health={{ verdict, reasons }} most={MOST_REASONS} />
         <span className="attention-do">
-          <strong>{todoTexts(sensors, reasons.slice(0, MOST_REASONS))}</strong>{' '}
-          <small className="faint">{since}</small>
+          <Todo reasons={reasons.slice(0, MOST_REASONS)} /> <small className="faint">{since}</small>
         </span>
       </span>
     </li>
@@ -105,7 +102,6 @@ function CauseLine({
   tags: Line['tags'];
   fits: boolean;
 }): JSX.Element {
-  const { sensors } = useApp(selectSpeech);
   const badness = ({ reasons: [reason] }: Urgent): number =>
     severity({ verdict: reason.verdict, reasons: [reason] });
   const worst = tags.reduce((a, b) => (badness(b) > badness(a) ? b : a));
@@ -117,12 +113,7 @@ function CauseLine({
       <span className="attention-why">
         {cause}: {S.shownOf(tags.length, tags.length)}
         <span className="attention-do">
-          <strong>
-            {todoTexts(
-              sensors,
-              tags.map(({ reasons }) => reasons[0]),
-            )}
-          </strong>{' '}
+          <Todo reasons={tags.map(({ reasons }) => reasons[0])} />{' '}
           <small className="faint">
             {why} · {tagsText(tags.map(({ tagId }) => tagId))}
           </small>
@@ -132,9 +123,12 @@ function CauseLine({
   );
 }
 
-/** What to do about each of them, no word twice. */
-const todoTexts = (sensors: Catalogue, reasons: readonly HealthReason[]): string =>
-  [...new Set(reasons.map((reason) => todoText(sensors, reason)))].filter(Boolean).join(' · ');
+/** What to do about each of them, no word twice; of some nothing. */
+function Todo({ reasons }: { reasons: readonly HealthReason[] }): JSX.Element | null {
+  const { sensors } = useApp(selectSpeech);
+  const texts = [...new Set(reasons.map((reason) => todoText(sensors, reason)))].filter(Boolean);
+  return texts.length > 0 ? <strong>{texts.join(' · ')}</strong> : null;
+}
 
 /** Null: all of it is shelved, or the greenhouse's own reason says more. */
 function noneText({ verdict, reasons, counts: { unknown } }: HouseHealth): string | null {

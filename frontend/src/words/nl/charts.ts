@@ -13,6 +13,10 @@ export const CHARTS: In<typeof ENGLISH> = {
     `${counted(count, 'meetwaarde', 'meetwaarden')}, de laatste ${latest} om ${at}, ` +
     `tussen ${low} en ${high}, ${gaps === 0 ? 'geen gat' : counted(gaps, 'gat', 'gaten')}.`,
   chartEmpty: 'Geen meetwaarde in deze periode.',
+  chartNeedsDay: (known) =>
+    known === null
+      ? 'Vraagt 24 u meetwaarden zonder gat van meer dan 3 u'
+      : `Vraagt 24 u meetwaarden; tot nu toe ${known}`,
   chartLoading: 'Het verleden wordt geladen',
   chartFailed: (reason) =>
     `Het verleden kon niet worden geladen; de pagina blijft het proberen. ${reason}`,

@@ -23,6 +23,7 @@ LONG = "a" * 200
 HOSTILE = "<script>document.title = 'owned'</script>"
 TAGS = (*(f"tag {number}" for number in range(60)), LONG, HOSTILE)
 # What A4 has between the margins of the page, and the page between, CSS pixels.
+FONTS = "document.fonts.ready.then((all) => [...all].map(({ status }) => status))"
 A4_PX = round(186 / 25.4 * 96)
 
 
@@ -82,6 +83,7 @@ def test_the_menu_opens_the_report_of_the_period_on_the_time_bar(
     assert int(query["to"]) - int(query["from"]) == 8 * 3_600
     assert page.locator("html").get_attribute("lang") == "de"
     expect(page.get_by_role("columnheader", name="Schlimmster Wert")).to_be_visible()
+    assert page.evaluate(FONTS) == ["loaded"]
 
 
 @pytest.mark.parametrize("lang", ["en", "de", "nl", "es"])

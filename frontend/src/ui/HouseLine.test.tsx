@@ -56,7 +56,7 @@ test.each([
     'after ten intervals and a minute',
     1.2,
     61,
-    /^No scan for 1\u00a0min \(usually every 1.2\u00a0s\) Check the robot$/,
+    /^No scan for 1\u00a0min \(usually every 1.2\u00a0s\) · Check the robot$/,
   ],
   ['not within a minute', 1.2, 59, /^no tag overdue/],
   ['not within ten intervals', 30, 299, /^no tag overdue/],

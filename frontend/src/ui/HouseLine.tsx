@@ -46,7 +46,7 @@ export function HouseLine(): JSX.Element | null {
       <p className="house-line" data-testid="house-line">
         <span data-overdue>{S.houseLate(last, intervalText(interval))}</span>
         {/* Else its own reason says so. */}
-        {health.reasons.length === 0 && <strong> {S.todo.stopped}</strong>}
+        {health.reasons.length === 0 && <strong> · {S.todo.stopped}</strong>}
       </p>
     );
   }

@@ -13,7 +13,7 @@ from typing import Any
 import pytest
 from playwright.sync_api import Browser, Page, expect
 
-from tests.browser.hmi import OpenPage
+from tests.browser.hmi import FONTS, OpenPage
 from tests.support.messages import look, scan
 from tests.support.waiting import PATIENCE_S, wait_for
 from tests.support.web import Bridge, bridge
@@ -23,7 +23,6 @@ LONG = "a" * 200
 HOSTILE = "<script>document.title = 'owned'</script>"
 TAGS = (*(f"tag {number}" for number in range(60)), LONG, HOSTILE)
 # What A4 has between the margins of the page, and the page between, CSS pixels.
-FONTS = "document.fonts.ready.then((all) => [...all].map(({ status }) => status))"
 A4_PX = round(186 / 25.4 * 96)
 
 

@@ -9,7 +9,7 @@ from urllib.parse import urlsplit
 import pytest
 from playwright.sync_api import Browser, BrowserContext, Page, expect
 
-from tests.browser.hmi import slow_down
+from tests.browser.hmi import FONTS, slow_down
 from tests.support.access import TOKEN, Served, served
 from tests.support.tls import Certificate, certificate
 from tests.support.waiting import PATIENCE_S

@@ -231,11 +231,7 @@ export function HealthStrip(): JSX.Element {
   const verdict = useApp((state) => selectHealth(state).verdict);
   const isHere = useApp(selectIsHere);
   return (
-    <div
-      className="health-strip"
-      data-testid="health-strip"
-      data-health={isHere ? verdict : undefined}
-    >
+    <div className="health-strip" data-testid="health-strip" data-health={verdict}>
       {isHere && <HealthMark verdict={verdict} word={false} />}
       <ShelvedCount />
       <DoNow most={1} id="health-first" />

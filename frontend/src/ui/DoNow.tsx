@@ -96,10 +96,9 @@ export function DoNow({
   const active = useSelected(alarmList, (list) => list.active.length);
   const hasAlarms = isNow && active > 0;
   const hasOwn = health.reasons.length > 0;
-  // Of a twin that is not heard, what had to be done stays, with its time; a banner says the rest.
-  const isLost = isSilent(health);
-  const isOfTags = urgent.length > 0 && (!hasOwn || isBad(health.verdict) || isLost);
-  const count = hasOwn && !isLost && most > 1 ? most - 1 : most;
+  // Of a twin that is not heard, what had to be done stays, with its time.
+  const isOfTags = urgent.length > 0 && (!hasOwn || isBad(health.verdict) || isSilent(health));
+  const count = hasOwn && most > 1 ? most - 1 : most;
   return (
     <ul className="do-now" aria-label={S.todoLabel} data-most={most}>
       {isOfTags ? (

@@ -15,8 +15,8 @@ export const CHARTS: In<typeof ENGLISH> = {
   chartEmpty: 'Geen meetwaarde in deze periode.',
   chartNeedsDay: (known) =>
     known === null
-      ? 'Vraagt 24 u meetwaarden zonder gat van meer dan 3 u'
-      : `Vraagt 24 u meetwaarden; tot nu toe ${known}`,
+      ? 'Heeft 24 u aan meetwaarden nodig, zonder gat van meer dan 3 u'
+      : `Heeft 24 u aan meetwaarden nodig; tot nu toe ${known}`,
   chartLoading: 'Het verleden wordt geladen',
   chartFailed: (reason) =>
     `Het verleden kon niet worden geladen; de pagina blijft het proberen. ${reason}`,

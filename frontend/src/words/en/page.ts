@@ -26,7 +26,7 @@ export const PAGE = {
   phaseLabel: 'Connection',
   retryNow: 'Try now',
   nextTry: (seconds: number): string => (seconds > 0 ? `next try in ${seconds} s` : 'trying now'),
-  frozenSince: (clock: string): string => `Readings are frozen. Last data at ${clock}`,
+  frozenSince: (clock: string): string => `No new readings. Last data at ${clock}`,
   agoSuffix: (age: string): string => `${age} ago`,
   /** As an age has it: "1 h 18 min". */
   hours: 'h',
@@ -72,7 +72,7 @@ export const PAGE = {
   pausedHint: 'The simulation or recording is paused, so ages do not increase.',
   inputProblem: 'Not all data arrives here.',
   drops: (count: number): string =>
-    `The twin dropped ${counted(count, 'message', 'messages')} in the last minutes.`,
+    `The twin dropped ${counted(count, 'message', 'messages')} in the last few minutes.`,
   /** What to tell of a journal that does not keep what happens, and what to do. */
   journal: {
     off: {
@@ -84,7 +84,7 @@ export const PAGE = {
       hint: 'Data waits in memory until the disk catches up. A power cut would lose it.',
     },
     failing: {
-      title: 'Nothing is being recorded.',
+      title: 'Recording has failed.',
       hint: 'The twin keeps running and retrying. Free disk space, or check the disk.',
     },
     upgrading: {

@@ -49,7 +49,7 @@ export const TAGS: In<typeof ENGLISH> = {
   sensorFailed: 'averiado',
   sensorFailedLong: 'El sensor no dio ningún valor',
   confidence: (percent) => `${percent} de certeza`,
-  notSure: 'incierto',
+  notSure: 'dudoso',
   speciesNames: {
     lupin: 'lupino',
     tulip: 'tulipán',

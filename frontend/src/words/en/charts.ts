@@ -22,7 +22,7 @@ export const CHARTS = {
   chartFailed: (reason: string): string =>
     `History could not be loaded; the page keeps trying. ${reason}`,
   chartMissing: 'This twin records nothing.',
-  chartMissingHint: 'Charts need a recording. Until then, the card shows only the last scans.',
+  chartMissingHint: 'Without a recording, the card shows only the last scans.',
   chartMissingMore:
     'Start the twin without “journal:=off”, or name a file in the parameter “journal”.',
   chartMissingShort: 'No chart: this twin records nothing.',

@@ -23,7 +23,7 @@ export const PAST = {
   backToLive: 'Back to live',
   backToRecording: 'Back to the recording',
   frozenBehindPast: (clock: string): string => `Live data has stopped. Last data at ${clock}`,
-  frozenPastStays: 'The past shown here is not affected.',
+  frozenPastStays: 'The past shown is not affected.',
   meanwhileShow: (tag: string): string => `Back to live, show tag ${tag}`,
 
   timebar: 'Time bar',

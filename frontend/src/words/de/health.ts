@@ -113,6 +113,6 @@ export const HEALTH: In<typeof ENGLISH> = {
   tooLow: (by) => (by === null ? 'zu niedrig' : `um ${by} zu niedrig`),
   tooHigh: (by) => (by === null ? 'zu hoch' : `um ${by} zu hoch`),
   side: { below: 'tief', above: 'hoch' },
-  below: 'unter dem Ideal',
-  above: 'über dem Ideal',
+  below: 'unter Ideal',
+  above: 'über Ideal',
 };

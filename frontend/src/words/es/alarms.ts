@@ -18,7 +18,7 @@ export const ALARMS: In<typeof ENGLISH> = {
   alarmHouse: 'Todo el invernadero',
   alarmWhat: (where, what) => `${where}: ${what}`,
   alarmSince: (when, length) => (length === null ? `desde ${when}` : `desde ${when} (${length})`),
-  alarmUntil: (from, until, length) => `${from} hasta ${until} (${length})`,
+  alarmUntil: (from, until, length) => `de ${from} a ${until} (${length})`,
   alarmNow: (reading) => `ahora ${reading}`,
   alarmNowUnknown: (last, age) =>
     last === null
@@ -26,8 +26,8 @@ export const ALARMS: In<typeof ENGLISH> = {
       : `ahora sin dato, último ${last}${age === null ? '' : ` hace ${age}`}`,
   alarmPests: { none: 'no detectada', seen: 'detectada' },
   alarmWorst: {
-    below: (reading) => `peor valor ${reading}`,
-    above: (reading) => `peor valor ${reading}`,
+    below: (reading) => `mínimo ${reading}`,
+    above: (reading) => `máximo ${reading}`,
     pest: (reading) => `máximo ${reading}`,
   },
   alarmFirst: (reading) => `al inicio ${reading}`,

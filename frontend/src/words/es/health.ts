@@ -115,8 +115,8 @@ export const HEALTH: In<typeof ENGLISH> = {
     `Sin problemas conocidos; sin datos de ${counted(unknown, 'punto', 'puntos')}`,
   attentionMore: (count) => `+ ${count} más`,
 
-  tooLow: (by) => (by === null ? 'por debajo del rango' : `${by} por debajo del ideal`),
-  tooHigh: (by) => (by === null ? 'por encima del rango' : `${by} por encima del ideal`),
+  tooLow: (by) => (by === null ? 'por debajo del límite' : `${by} por debajo del ideal`),
+  tooHigh: (by) => (by === null ? 'por encima del límite' : `${by} por encima del ideal`),
   side: { below: 'bajo', above: 'alto' },
   below: 'por debajo del ideal',
   above: 'por encima del ideal',

@@ -57,7 +57,7 @@ export const MAP: In<typeof ENGLISH> = {
   legendAbove: (value) => `más de ${value}`,
   legendAgainst: (sensor) => `${sensor} frente a su rango ideal`,
   legendIdeal: (ideal, low, high) => `${ideal} de ${low} a ${high}`,
-  legendEach: (part) => `${part} para cada especie`,
+  legendEach: (part) => `${part} por especie`,
   legendOthers: 'otras',
   legendUnknownSpecies: 'Sin clasificar',
   pinLacking: 'sin sensor',

@@ -118,7 +118,7 @@ export const PAGE = {
   originHint: {
     simulated: 'No real robot: greenhouse, plants and readings are simulated.',
     recorded: 'A recording is playing: nothing here is current.',
-    sim_time: 'This is not real time: the data comes from a simulation or a recording.',
+    sim_time: 'Not real time: the data comes from a simulation or a recording.',
   },
   recordedIs: { playing: 'Playing', paused: 'Paused' },
   recordedPaused: 'The recording is paused.',

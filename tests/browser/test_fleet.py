@@ -293,7 +293,7 @@ def test_an_archive_without_greenhouses_and_one_that_is_down(browser: Browser) -
         archive = Archive(own)
         archive.add_user("page", "lupin_page")
         with fleet(archive) as served, opened(browser, served.url) as page:
-            expect(page.get_by_role("main")).to_contain_text("No greenhouse is forwarded")
+            expect(page.get_by_role("main")).to_contain_text("No greenhouse sends data")
             archive.do(
                 "INSERT INTO site VALUES ('gh1', '');"
                 "INSERT INTO forwarder VALUES ('gh1', 'm', 1, now(), now() + INTERVAL '1 hour')"

@@ -15,7 +15,7 @@ const ENGLISH = {
   nothingReceived: 'Nothing received yet',
   silentSince: (time: string): string => `Silent since ${time}`,
   asOf: (time: string): string => `As of ${time}`,
-  neverForwarded: 'Never forwarded',
+  neverForwarded: 'Nothing sent yet',
   lastKnown: (status: string): string => `Last known: ${status}`,
   archiveDown: (time: string): string =>
     `The archive has not answered since ${time}. The last known state is shown.`,
@@ -28,7 +28,7 @@ const ENGLISH = {
   others: 'Other greenhouses',
   compare: 'Compare',
   connecting: 'Connecting…',
-  empty: 'No greenhouse is forwarded to this archive yet.',
+  empty: 'No greenhouse sends data to this archive yet.',
   noMatch: 'No greenhouse matches.',
   shown: (count: number, all: number): string => `${count} of ${all} greenhouses shown`,
 };
@@ -48,7 +48,7 @@ const GERMAN: FleetWords = {
   nothingReceived: 'Noch nichts empfangen',
   silentSince: (time) => `Kein Signal seit ${time}`,
   asOf: (time) => `Stand ${time}`,
-  neverForwarded: 'Nie weitergeleitet',
+  neverForwarded: 'Noch nie gesendet',
   lastKnown: (status) => `Zuletzt bekannt: ${status}`,
   archiveDown: (time) =>
     `Das Archiv antwortet seit ${time} nicht. Sie sehen, was zuletzt bekannt war.`,
@@ -61,7 +61,7 @@ const GERMAN: FleetWords = {
   others: 'Andere Gewächshäuser',
   compare: 'Vergleichen',
   connecting: 'Verbindung wird aufgebaut …',
-  empty: 'In dieses Archiv wird noch kein Gewächshaus weitergeleitet.',
+  empty: 'Noch kein Gewächshaus sendet Daten an dieses Archiv.',
   noMatch: 'Kein Gewächshaus passt dazu.',
   shown: (count, all) => `${count} von ${all} Gewächshäusern`,
 };
@@ -79,7 +79,7 @@ const DUTCH: FleetWords = {
   nothingReceived: 'Nog niets ontvangen',
   silentSince: (time) => `Geen signaal sinds ${time}`,
   asOf: (time) => `Stand van ${time}`,
-  neverForwarded: 'Nooit doorgestuurd',
+  neverForwarded: 'Nog niets gestuurd',
   lastKnown: (status) => `Laatst bekend: ${status}`,
   archiveDown: (time) =>
     `Het archief antwoordt niet meer sinds ${time}. U ziet wat het laatst bekend was.`,
@@ -92,7 +92,7 @@ const DUTCH: FleetWords = {
   others: 'Andere kassen',
   compare: 'Vergelijken',
   connecting: 'Verbinden…',
-  empty: 'Er wordt nog geen kas naar dit archief doorgestuurd.',
+  empty: 'Nog geen kas stuurt gegevens naar dit archief.',
   noMatch: 'Geen kas voldoet hieraan.',
   shown: (count, all) => `${count} van ${all} kassen`,
 };
@@ -123,7 +123,7 @@ const SPANISH: FleetWords = {
   others: 'Otros invernaderos',
   compare: 'Comparar',
   connecting: 'Conectando…',
-  empty: 'Todavía ningún invernadero envía datos a este archivo central.',
+  empty: 'Ningún invernadero envía aún datos a este archivo central.',
   noMatch: 'Ningún invernadero coincide.',
   shown: (count, all) => `${count} de ${all} invernaderos`,
 };

@@ -139,7 +139,7 @@ export const PAGE = {
   themes: { system: 'System', light: 'Light', dark: 'Dark' },
   copyLink: 'Copy link to this view',
   linkCopied: 'Link copied',
-  linkInBar: 'The address bar holds the link to this view',
+  linkInBar: 'The link is in the address bar',
   savePng: 'Save map as PNG',
   saveCsv: 'Save table as CSV',
   saveCsvShort: 'CSV',

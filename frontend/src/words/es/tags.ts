@@ -88,7 +88,7 @@ export const TAGS: In<typeof ENGLISH> = {
   cardBlooms: 'Flores',
   cardSource: 'Origen',
   cardFixed: 'Sensor fijo',
-  cardVisited: 'Visita del robot',
+  cardVisited: 'Medido por el robot',
   cardScanned: 'Última lectura',
   cardLooked: 'Flores revisadas',
   cardTry: 'Último intento',

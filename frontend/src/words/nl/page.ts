@@ -171,7 +171,7 @@ export const PAGE: In<typeof ENGLISH> = {
   emptyNoTagsMore: '“lupin-twin demo” toont een gesimuleerde ronde.',
   emptyNoPins: 'Nog geen meetpunt heeft een positie',
   emptyNoPinsHint:
-    'Alle meetpunten staan in de tabel; na de eerste geslaagde meting komen ze op de kaart.',
+    'Alle meetpunten staan in de tabel; na de eerste goede meting komen ze op de kaart.',
   emptyNoReading: (sensor) => `Nog geen meetwaarden op de kaart: ${sensor}`,
   emptyNoReadingHint: 'Kies een andere sensor, of wacht tot de robot meer heeft gemeten.',
   emptyNoMap: 'Geen plattegrond: de robot heeft zijn kaart nog niet gestuurd.',

@@ -19,7 +19,13 @@ test.each([
   receive({ type: 'remembered', remembered: { ...NOT_ASKED, value } });
   const line = { series: seriesWith({ sensor }), before: null, look: 0, label: '1', marks: [] };
   const model = {
-    ...{ sensor: sensorNamed(sensor), unit: 'C' as const, lines: [line], bands: [], isMixed: false },
+    ...{
+      sensor: sensorNamed(sensor),
+      unit: 'C' as const,
+      lines: [line],
+      bands: [],
+      isMixed: false,
+    },
     ...{ span: { from: 90_000, to: 100_000 }, moment: null },
   } as const;
   const { container } = render(<LineValue line={line} model={model} />);

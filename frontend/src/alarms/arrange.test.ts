@@ -86,9 +86,9 @@ test('of a cause the value farthest beyond, and since when one has been active',
   );
   const now = ({ id }: Alarm): Now | null =>
     id === 'cold2'
-      ? { kind: 'known', value: 10.4, verdict: 'stressed', limit: 18, trend: null }
+      ? { kind: 'known', value: 10.4, verdict: 'stressed', reason: null, trend: null }
       : id === 'cold1'
-        ? { kind: 'known', value: 10.9, verdict: 'healthy', limit: null, trend: null }
+        ? { kind: 'known', value: 10.9, verdict: 'healthy', reason: null, trend: null }
         : null;
   expect(causeFacts([...items.active, ...items.resolved], speech, null, now)).toEqual([
     ...['1 stressed', '1 healthy'],

@@ -2,6 +2,7 @@ import { expect, test, vi } from 'vitest';
 
 import type { Alarm, Verdict } from '../contract/types';
 import { alarm } from '../testing/alarms';
+import { held, reason } from '../testing/health';
 import { S } from '../strings';
 import { CATALOGUE } from '../testing/sensors';
 import type { Now } from './now';
@@ -25,7 +26,7 @@ const known = (value: number | null, verdict: Verdict): Now => ({
   kind: 'known',
   value,
   verdict,
-  limit: null,
+  reason: null,
   trend: null,
 });
 const CRITICAL = known(6.6, 'critical');
@@ -56,20 +57,21 @@ test('now, at worst and at first, each with its own severity', () => {
   expect(alarmText(cold, C, known(8.7, 'critical'))).not.toContain('worst');
 });
 
-test('its limit is that of now: what is critical, or what ends it on the way back', () => {
+test('its limit is that of now: what is critical; on the way back it stands beside what ends it', () => {
   const cold = alarm('a', { tag_id: '9', worst: 8.7, reason: { value: 17.9, limit: 18 } });
-  const at = (value: number, limit: number, verdict: Verdict = 'stressed'): Now => ({
-    ...{ kind: 'known', value, verdict, limit, trend: null },
+  const at = (value: number, limit: number, verdict: Verdict, release?: number): Now => ({
+    ...{ kind: 'known', value, verdict, trend: null },
+    reason: reason({ value, limit, verdict, ...held(release) }),
   });
   expect(valuesOf(cold, C, at(8.7, 10, 'critical'))).toMatchObject({
     what: 'Temperature below 10.0\u00a0°C',
     todo: 'Heat, or close the vents',
   });
-  expect(valuesOf(cold, C, at(18.02, 18.5))).toMatchObject({
-    what: 'Temperature back in range; clears above 18.5\u00a0°C',
+  expect(valuesOf(cold, C, at(18.02, 18, 'stressed', 18.5))).toMatchObject({
+    what: 'Temperature was below 18.00\u00a0°C; stays stressed until 18.50\u00a0°C',
     todo: '',
-    now: 'now 18.0\u00a0°C',
-    first: '17.9\u00a0°C when raised',
+    now: 'now 18.02\u00a0°C',
+    first: '17.90\u00a0°C when raised',
   });
 });
 

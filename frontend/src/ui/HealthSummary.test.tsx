@@ -6,7 +6,7 @@ import { acknowledgeAlarms, shelveAlarm } from '../alarms/own';
 import { alarmList, startAlarms } from '../alarms/watch';
 import { receive, store } from '../store/app';
 import { alarm, alarms, tellAlarms } from '../testing/alarms';
-import { judgement, reason } from '../testing/health';
+import { held, judgement, reason } from '../testing/health';
 import { goLost, showTags } from '../testing/page';
 import { wireTag } from '../testing/tags';
 import { HealthSummary } from './HealthSummary';
@@ -54,7 +54,7 @@ test('says what to do first, and since when', () => {
     expect.stringMatching(/^CriticalTag 5: .*treat the plants acknowledged/),
   ]);
   // Not before what is worse, of one tag and of many; last is what is back in its range.
-  const back = reason({ verdict: 'stressed', value: 18.1, limit: 18.5 });
+  const back = reason({ verdict: 'stressed', value: 18.1, limit: 18, ...held(18.5) });
   const failed = reason({ kind: 'scan_failed', verdict: 'unknown', sensor: '', value: 1 });
   const tags = ['1', '2', '5'].map((tag_id) => wireTag({ tag_id }));
   act(() => {
@@ -135,12 +135,12 @@ test('of a robot that stands still what is critical is told first', () => {
 });
 
 test('of what is back in its range nothing is ordered', () => {
-  const back = reason({ verdict: 'stressed', value: 18.1, limit: 18.5 });
+  const back = reason({ verdict: 'stressed', value: 18.1, limit: 18, ...held(18.5) });
   showTags(TAGS, judgement({ 1: 'healthy', 5: [back] }));
   render(<HealthSummary kiosk={false} />);
   const todo = screen.getByRole('list', { name: 'Do this now' });
   expect(todo.textContent.trim()).toBe(
-    'StressedTag 5: Temperature 18.1\u00a0°C, back in range; clears above 18.5',
+    'StressedTag 5: Temperature 18.1\u00a0°C, was below 18.0; stays stressed until 18.5',
   );
 });
 

@@ -63,14 +63,13 @@ export function Reasons({
 
 /** What to do about a reason, and that it has no alarm yet; of what is shelved, nothing. */
 function Todo({ tagId, reason }: { tagId: string; reason: HealthReason }): JSX.Element | null {
-  const catalogue = useApp(selectCatalogue);
   const { active, shelved } = useSelected(alarmList, (list) => list);
   const isKnown = useApp(selectAreAlarmsKnown);
   if (alarmOf(shelved, tagId, reason)) return null;
   const isWaiting = isKnown && isBad(reason.verdict) && !alarmOf(active, tagId, reason);
   return (
     <span>
-      <strong>{todoText(catalogue, reason)}</strong>{' '}
+      <strong>{todoText(reason)}</strong>{' '}
       {isWaiting && <small className="faint">{S.alarmNotYet}</small>}
     </span>
   );

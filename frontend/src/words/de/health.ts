@@ -15,13 +15,9 @@ export const HEALTH: In<typeof ENGLISH> = {
   healthMany: ONE_OR_MANY,
   reasons: {
     sides: { below: 'unter', above: 'über' },
-    sidesBack: {
-      below: 'im Bereich; Alarm endet über',
-      above: 'im Bereich; Alarm endet unter',
-    },
-    range: (reading, side, limit, isCritical) =>
-      `${reading}, ${side} ${limit}${isCritical ? ' (kritisch)' : ''}`,
-    beyond: (sensor, side, limit) => `${sensor} ${side} ${limit}`,
+    wasBeyond: (side, limit, status, until) =>
+      `war ${side} ${limit}; bleibt ${status} bis ${until}`,
+    range: (reading, limit, isCritical) => `${reading}, ${limit}${isCritical ? ' (kritisch)' : ''}`,
     readingFailed: (sensor) => `${sensor}: Der Sensor liefert keinen Wert`,
     implausible: (reading) => `${reading}: kein plausibler Wert`,
     scanFailed: (outcome, age) =>

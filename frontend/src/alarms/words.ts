@@ -3,7 +3,7 @@ import type { Alarm, Verdict } from '../contract/types';
 import { ageText, clockText, digitsApart, readingText } from '../domain/format';
 import { isOfRange, sideOf } from '../domain/health';
 import { beyondText, digitsOf, reasonText, todoText } from '../domain/reasons';
-import { hasDate, rosText, secondsOf } from '../domain/rostime';
+import { dayFormat, hasDate, rosText, secondsOf } from '../domain/rostime';
 import type { Catalogue } from '../domain/sensors';
 import { shown } from '../domain/text';
 import type { TemperatureUnit } from '../domain/units';
@@ -131,6 +131,20 @@ export function spanText({ raised_at, cleared_at }: Alarm, nowS: number | null):
   const until = secondsOf(cleared_at);
   const end = isSameDay(from, until) ? clockOf(until) : whenText(until, nowS);
   return S.alarmUntil(begin, end, lengthText(until - from));
+}
+
+/** For how long it has been so, or was; and the day that it began on, if it is another, or when it was resolved. */
+export function timesOf(
+  { raised_at, cleared_at }: Alarm,
+  nowS: number | null,
+): { readonly length: string; readonly note: string } {
+  const from = secondsOf(raised_at);
+  const until = cleared_at ? secondsOf(cleared_at) : nowS;
+  if (until === null) return { length: whenText(from, nowS), note: '' };
+  const isOfToday = !hasDate(from) || isSameDay(from, nowS ?? until);
+  const day = isOfToday ? '' : dayFormat.format(from * 1000);
+  const note = cleared_at ? `${S.alarmResolved} ${whenText(until, nowS)}` : day;
+  return { length: lengthText(until - from), note };
 }
 
 /** In one piece: a line does not break in it. */

@@ -1,7 +1,7 @@
 import { useMemo, type JSX } from 'react';
 
 import { whenText } from '../alarms/words';
-import { alarmOf, type Item } from '../alarms/list';
+import { alarmOf, isAwaited, type Item } from '../alarms/list';
 import { alarmList } from '../alarms/watch';
 import { now } from '../clock';
 import type { HealthReason } from '../contract/types';
@@ -69,7 +69,7 @@ export function useSince(tagId: string, reason: HealthReason): string | null {
   const found = useSelected(alarmList, ({ active }) => alarmOf(active, tagId, reason));
   const isKnown = useApp(selectAreAlarmsKnown);
   if (!isNow) return null;
-  if (!found) return isKnown ? S.alarmNotYet : null;
+  if (!found) return isKnown && isAwaited(reason) ? S.alarmNotYet : null;
   if (found.isAcknowledged) return S.healthAcknowledged;
   return S.alarmSince(whenText(secondsOf(found.alarm.raised_at), rosNow(store.get(), now())), null);
 }

@@ -1,10 +1,9 @@
 import type { JSX } from 'react';
 
-import { alarmOf } from '../alarms/list';
+import { alarmOf, isAwaited } from '../alarms/list';
 import { alarmList } from '../alarms/watch';
 import type { HealthReason, TagHealth } from '../contract/types';
 import { ageSeconds } from '../domain/age';
-import { isBad } from '../domain/health';
 import { reasonText, todoText } from '../domain/reasons';
 import { whenOf } from '../domain/twin';
 import { useApp, type AppState } from '../store/app';
@@ -66,7 +65,7 @@ function Todo({ tagId, reason }: { tagId: string; reason: HealthReason }): JSX.E
   const { active, shelved } = useSelected(alarmList, (list) => list);
   const isKnown = useApp(selectAreAlarmsKnown);
   if (alarmOf(shelved, tagId, reason)) return null;
-  const isWaiting = isKnown && isBad(reason.verdict) && !alarmOf(active, tagId, reason);
+  const isWaiting = isKnown && isAwaited(reason) && !alarmOf(active, tagId, reason);
   return (
     <span>
       <strong>{todoText(reason)}</strong>{' '}

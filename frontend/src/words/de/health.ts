@@ -87,8 +87,8 @@ export const HEALTH: In<typeof ENGLISH> = {
   healthAllWell: 'Alle beurteilten Messwerte liegen im Idealbereich',
   healthDespite: (alarms) =>
     alarms === 1
-      ? '1 Alarm steht noch an: Zwei gute Messungen heben ihn auf'
-      : `${alarms} Alarme stehen noch an: Jeder endet nach zwei guten Messungen`,
+      ? '1 Alarm steht noch an: nach zwei guten Messungen behoben'
+      : `${alarms} Alarme stehen noch an: nach je zwei guten Messungen behoben`,
   healthAcknowledged: 'quittiert',
   healthNotCurrent: 'Nicht aktuell',
   healthNothing: 'Noch kein Messwert zu beurteilen',

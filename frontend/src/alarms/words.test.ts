@@ -11,6 +11,7 @@ import {
   nameText,
   severalText,
   spanText,
+  timesOf,
   unknownText,
   valuesOf,
   whenText,
@@ -149,6 +150,26 @@ test('since when and until when: of today the time alone', () => {
   const night = alarm('a', { raised: NOON, cleared: NOON + 50_000 });
   expect(spanText(night, NOON + 50_001)).toMatch(/^14 Nov 2026, 12:00:00 until 01:53:20 \(13/);
   expect(whenText(100, 200)).toBe('sim 00:01:40');
+});
+
+test('for how long comes first, with the day only where it is another, and the end once it is resolved', () => {
+  const since = alarm('a', { raised: NOON });
+  expect(timesOf(since, NOON + 7_500, false)).toEqual({
+    length: '2\u00a0h\u00a05\u00a0min',
+    note: '',
+  });
+  expect(timesOf(since, NOON + 86_400, false).note).toBe('14 Nov');
+  expect(timesOf(since, null, false).length).toBe('14 Nov 2026, 12:00:00');
+  const over = alarm('a', { raised: NOON, cleared: NOON + 600 });
+  expect(timesOf(over, NOON + 1_500, true)).toEqual({
+    length: '10\u00a0min',
+    note: 'resolved 12:10:00',
+  });
+  // Of a simulation's clock there are no days.
+  expect(timesOf(alarm('a', { raised: 100 }), 160, false)).toEqual({
+    length: '1\u00a0min',
+    note: '',
+  });
 });
 
 test('of several the first are named', () => {

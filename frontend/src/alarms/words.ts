@@ -133,17 +133,18 @@ export function spanText({ raised_at, cleared_at }: Alarm, nowS: number | null):
   return S.alarmUntil(begin, end, lengthText(until - from));
 }
 
-/** For how long it has been so, or was; and the day that it began on, if it is another, or when it was resolved. */
+/** For how long it has been so, or was; and the day that it began on, if it is another; `isOver`: when it was resolved. */
 export function timesOf(
   { raised_at, cleared_at }: Alarm,
   nowS: number | null,
+  isOver: boolean,
 ): { readonly length: string; readonly note: string } {
   const from = secondsOf(raised_at);
   const until = cleared_at ? secondsOf(cleared_at) : nowS;
   if (until === null) return { length: whenText(from, nowS), note: '' };
   const isOfToday = !hasDate(from) || isSameDay(from, nowS ?? until);
   const day = isOfToday ? '' : dayFormat.format(from * 1000);
-  const note = cleared_at ? `${S.alarmResolved} ${whenText(until, nowS)}` : day;
+  const note = isOver ? `${S.alarmResolved} ${whenText(until, nowS)}` : day;
   return { length: lengthText(until - from), note };
 }
 

@@ -36,15 +36,17 @@ export function AlarmTimes({
   alarm,
   first,
   verdict,
+  isOver = false,
 }: {
   alarm: Alarm;
   first: string | null;
   verdict: Verdict;
+  isOver?: boolean;
 }): JSX.Element {
   const nowOf = (at: number): number | null => rosNow(store.get(), at);
   const span = useTicking((at) => spanText(alarm, nowOf(at)));
-  const length = useTicking((at) => timesOf(alarm, nowOf(at)).length);
-  const note = useTicking((at) => timesOf(alarm, nowOf(at)).note);
+  const length = useTicking((at) => timesOf(alarm, nowOf(at), isOver).length);
+  const note = useTicking((at) => timesOf(alarm, nowOf(at), isOver).note);
   return (
     <span
       className="alarm-times"

@@ -18,8 +18,8 @@ export function AlarmsWait(): JSX.Element | null {
   const health = useApp(selectNewestHealth);
   const waiting = useMemo(() => {
     const all = [...listed.active, ...listed.shelved];
-    return [...(health?.byTag ?? [])].filter(
-      ([id, { reasons }]) => reasons.some((each) => isAwaited(each) && !alarmOf(all, id, each)),
+    return [...(health?.byTag ?? [])].filter(([id, { reasons }]) =>
+      reasons.some((each) => isAwaited(each) && !alarmOf(all, id, each)),
     ).length;
   }, [listed, health]);
   if (!isKnown || waiting === 0) return null;

@@ -10,7 +10,14 @@ import {
   type Block,
   type Order,
 } from '../../alarms/arrange';
-import { calling, groupOf, oldestOf, unacknowledged, type AlarmList, type Item } from '../../alarms/list';
+import {
+  calling,
+  groupOf,
+  oldestOf,
+  unacknowledged,
+  type AlarmList,
+  type Item,
+} from '../../alarms/list';
 import { acknowledgeAlarms } from '../../alarms/own';
 import { selectNow, selectSpeech, todoNow, worstNow, worstNowFirst } from '../../alarms/speech';
 import { alarmList } from '../../alarms/watch';

@@ -49,7 +49,13 @@ export const AlarmRow = memo(function AlarmRow({
           showAlarm(alarm);
         })}
       >
-        <AlarmTimes alarm={alarm} first={values.first} verdict={current} />
+        <AlarmTimes
+          alarm={alarm}
+          first={values.first}
+          verdict={current}
+          // Meanwhile, a row that is held gets no line more.
+          isOver={group === 'resolved'}
+        />
         <span className="alarm-text">
           <span>
             <strong>

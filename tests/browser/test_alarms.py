@@ -109,6 +109,11 @@ def test_an_alarm_comes_is_acknowledged_shelved_and_resolved(
         robot.observe(*[warm("a", 22.0)] * 2)
         open_resolved(hmi, 1)
         expect(rows(hmi, "resolved")).to_contain_text(re.compile(r"resolved \d\d:\d\d:\d\d"))
+        # On paper as well, without what can be done to it.
+        hmi.page.emulate_media(media="print")
+        expect(rows(hmi, "resolved")).to_be_visible()
+        expect(hmi.page.get_by_role("button", name="Acknowledge")).to_have_count(0)
+        hmi.page.emulate_media(media="screen")
         expect(row).to_have_count(0)
         expect(hmi.page).to_have_title("Lupin twin")
         hmi.expect(lambda: icon(hmi) == own_icon, "its own icon")

@@ -351,6 +351,10 @@ test('of many of one cause five, then a hundred more at a time', () => {
 test('many of one cause are one heading, which is acknowledged as one and names the worst', () => {
   const bad = Array.from({ length: 5 }, (_, at) => alarm(`a${at}`, { tag_id: String(at) }));
   tell(...bad, alarm('b', { tag_id: '9', reason: { sensor: 'humidity', verdict: 'stressed' } }));
+  // Nobody opens anything on paper.
+  fireEvent(window, new Event('beforeprint'));
+  expect(group('active')).toHaveLength(6);
+  fireEvent(window, new Event('afterprint'));
   expect(group('active')).toHaveLength(1);
   const heading = screen.getByRole('button', { name: /Critical\s*Temperature too low/ });
   expect(heading.textContent).toContain('5 alarms');

@@ -33,6 +33,7 @@ import { Disclosure } from '../../widgets/Disclosure';
 import { Icon } from '../../widgets/Icon';
 import { Select } from '../../widgets/Select';
 import { useChosenInSight } from '../chosenInSight';
+import { usePaper } from '../visibleRows';
 import { HealthMark } from '../HealthMark';
 import { Acknowledge } from './Acknowledge';
 import { AlarmNotes, AlarmsWait } from './AlarmNotes';
@@ -223,8 +224,11 @@ function Rows({
   block: Block;
   group: keyof AlarmList;
 }): JSX.Element {
-  const [most, setMost] = useState(cause === null ? MOST_ROWS : MOST_OF_CAUSE);
+  const [wished, setMost] = useState(cause === null ? MOST_ROWS : MOST_OF_CAUSE);
   const [isOpen, setOpen] = useState(false);
+  // Nobody opens anything on paper.
+  const isPaper = usePaper();
+  const most = isPaper ? items.length : wished;
   const rest = items.length - most;
   return (
     <>
@@ -239,7 +243,7 @@ function Rows({
           }}
         />
       )}
-      {(isOpen || cause === null) && (
+      {(isOpen || isPaper || cause === null) && (
         <>
           <ul data-caused={cause !== null}>
             {items.slice(0, most).map((item) => (

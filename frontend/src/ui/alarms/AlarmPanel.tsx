@@ -306,7 +306,10 @@ function CauseHeading({
         )}
         <span className="alarm-text">
           <span>
-            <strong>{cause}</strong> · {S.alarmCount(own.length)} <Icon name="chevron" />
+            <strong>{cause}</strong> ·{' '}
+            <span className="alarm-many">
+              {S.alarmCount(own.length)} <Icon name="chevron" />
+            </span>
           </span>
           {group !== 'resolved' && <span className="alarm-do">{todo}</span>}
           <span className="alarm-facts">{counts}</span>

@@ -152,6 +152,8 @@ class HealthReason(Contract):
     since: Time | None = Field(
         description="ROS time of the observation that began it, of old the last one; null: none"
     )
+    was_beyond: bool = Field(default_factory=bool, description="only the deadband still holds it")
+    release: float | None = Field(default_factory=lambda: None, description="the edge that ends it")
 
 
 class TagHealth(Contract):

@@ -114,6 +114,8 @@ export interface components {
             readonly value: number | null;
             readonly limit: number | null;
             readonly since: components["schemas"]["Time"] | null;
+            readonly was_beyond?: boolean;
+            readonly release?: number | null;
         };
         readonly History: {
             readonly from: components["schemas"]["Time"];

@@ -175,6 +175,5 @@ def reason_json(reason: Reason) -> dict[str, Any]:
         "since": None if reason.since_ns is None else stamp(reason.since_ns),
     }
     if reason.release is not None:
-        found["was_beyond"] = True
         found["release"] = reason.release
     return found

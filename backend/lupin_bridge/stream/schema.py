@@ -152,8 +152,10 @@ class HealthReason(Contract):
     since: Time | None = Field(
         description="ROS time of the observation that began it, of old the last one; null: none"
     )
-    was_beyond: bool = Field(default_factory=bool, description="only the deadband still holds it")
-    release: float | None = Field(default_factory=lambda: None, description="the edge that ends it")
+    release: float | None = Field(
+        default_factory=lambda: None,
+        description="where it ends; there only while nothing but the deadband holds it",
+    )
 
 
 class TagHealth(Contract):

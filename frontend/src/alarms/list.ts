@@ -113,8 +113,8 @@ export const alarmOf = (
   );
 
 /** Whether a second scan that says the same raises the alarm of a reason. */
-export const isAwaited = ({ kind, was_beyond: wasBeyond = false }: HealthReason): boolean =>
-  kind === 'reading_failed' || (kind === 'range' && !wasBeyond);
+export const isAwaited = ({ kind, release }: HealthReason): boolean =>
+  kind === 'reading_failed' || (kind === 'range' && release === undefined);
 
 /** What is new between two lists, to be told once. */
 export interface News {

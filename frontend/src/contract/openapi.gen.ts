@@ -114,7 +114,6 @@ export interface components {
             readonly value: number | null;
             readonly limit: number | null;
             readonly since: components["schemas"]["Time"] | null;
-            readonly was_beyond?: boolean;
             readonly release?: number | null;
         };
         readonly History: {

@@ -86,7 +86,7 @@ export const worstReason = ({ verdict, reasons }: TagHealth): HealthReason | und
 /** Pests by their number; a value by how far it is beyond its limit, as a part of the larger of both. From 0 to 1. */
 function weight(reason: HealthReason): number {
   if (reason.kind === 'pest') return 1 - 1 / (2 + (reason.value ?? 0));
-  if (!isOfRange(reason) || reason.was_beyond || reason.value === reason.limit) return 0;
+  if (!isOfRange(reason) || reason.release !== undefined || reason.value === reason.limit) return 0;
   const { value, limit } = reason;
   return Math.min(0.99, Math.abs(value - limit) / Math.max(Math.abs(value), Math.abs(limit)));
 }

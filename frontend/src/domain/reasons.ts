@@ -31,7 +31,7 @@ export function reasonText(
     return R.range(
       `${label} ${readingText(sensor, reason.value, unit, more)}`,
       limitText(reason, (value) => valueText(sensor, value, unit, more)),
-      reason.verdict === 'critical' && !isMarked && !reason.was_beyond,
+      reason.verdict === 'critical' && !isMarked && reason.release === undefined,
     );
   }
   switch (kind) {
@@ -76,8 +76,8 @@ export const digitsOf = (
 type OfRange = HealthReason & { readonly value: number; readonly limit: number };
 
 /** Whether the value is back in its ideal range, and has yet to lie well within. */
-export const isBack = ({ was_beyond: wasBeyond = false, verdict }: HealthReason): boolean =>
-  wasBeyond && verdict === 'stressed';
+export const isBack = ({ release, verdict }: HealthReason): boolean =>
+  release !== undefined && verdict === 'stressed';
 
 /** On which side of which limit a value is, or was. */
 function limitText(reason: OfRange, text: (value: number) => string): string {

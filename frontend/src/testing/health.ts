@@ -17,8 +17,8 @@ export const reason = (over: Partial<HealthReason> = {}): HealthReason => ({
 });
 
 /** Of a value that is back inside its limit: what it has to pass. */
-export const held = (release?: number): Pick<HealthReason, 'was_beyond' | 'release'> =>
-  release === undefined ? {} : { was_beyond: true, release };
+export const held = (release?: number): Pick<HealthReason, 'release'> =>
+  release === undefined ? {} : { release };
 
 /** What is said of each tag: a verdict without a reason, or reasons, the worst of which decides. */
 export function judgement(

@@ -134,7 +134,7 @@ test('who acknowledged it and when, by the clock of the twin', () => {
   flush(() => {
     own.dispatch(acknowledge(NOTHING_KEPT, [{ alarm: alarm('a'), verdict: 'critical' }], 0));
   });
-  expect(status('5')).toBe('acknowledged by anna at sim 00:16:40');
+  expect(status('5')).toBe('acknowledged by anna, sim 00:16:40');
 });
 
 test('who may not act on what is shared is offered nothing of it', () => {

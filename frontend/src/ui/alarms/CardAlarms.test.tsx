@@ -73,7 +73,7 @@ test('of one alarm it says who has acknowledged it, and when', () => {
     acknowledgeAlarms(alarmList.get().active);
   });
   expect(screen.getByTestId('card-alarms').textContent).toMatch(
-    /^1 alarm: acknowledged by vera at sim 00:15:50 · since/,
+    /^1 alarm: acknowledged by vera, sim 00:15:50 · since/,
   );
 });
 

@@ -16,8 +16,8 @@ export const HEALTH: In<typeof ENGLISH> = {
   reasons: {
     sides: { below: 'unter', above: 'über' },
     sidesBack: {
-      below: 'im Bereich; Alarm endet über',
-      above: 'im Bereich; Alarm endet unter',
+      below: 'im Sollbereich; Alarm endet über',
+      above: 'im Sollbereich; Alarm endet unter',
     },
     range: (reading, side, limit, isCritical) =>
       `${reading}, ${side} ${limit}${isCritical ? ' (kritisch)' : ''}`,
@@ -37,18 +37,17 @@ export const HEALTH: In<typeof ENGLISH> = {
           : 'kein Messwert mit bekannter Zeit'
         : age === null
           ? sensor === ''
-            ? 'Länger nicht gemessen'
-            : 'länger nicht gemessen'
+            ? 'Schon länger nicht gemessen'
+            : 'schon länger nicht gemessen'
           : sensor === ''
             ? `Seit ${age} nicht gemessen`
             : `seit ${age} kein Messwert`;
       return `${sensor === '' ? '' : `${sensor}: `}${since}${holds === null ? '' : ` (Messwerte gelten ${holds} lang)`}`;
     },
-    outOfRange: 'außerhalb des Bereichs',
+    outOfRange: 'außerhalb des Sollbereichs',
     changed: (reading) => `${reading}: möglicher Sensorfehler`,
     silent: 'Keine Daten vom digitalen Zwilling: Die letzten Daten können veraltet sein',
-    stopped:
-      'Es wird kein Messpunkt mehr gemessen: Der Roboter steht, oder seine Daten kommen nicht an',
+    stopped: 'Es wird nichts mehr gemessen: Der Roboter steht, oder seine Daten kommen nicht an',
     other: (kind, sensor) => (sensor === '' ? kind : `${sensor}: ${kind}`),
   },
   todo: {
@@ -71,12 +70,12 @@ export const HEALTH: In<typeof ENGLISH> = {
     other: 'Vor Ort prüfen',
   },
   todoPestAgain: 'Nochmals kontrollieren: Ohne Befund ist der Alarm behoben',
-  todoWell: 'Anstehend bis zur nächsten guten Messung',
+  todoWell: 'Steht an bis zur nächsten guten Messung',
   todoLabel: 'Jetzt zu tun',
   reasonsLabel: 'Warum',
   healthHeading: 'Zustand des Gewächshauses',
   healthDriver: (tag, reason) => `Messpunkt ${tag}: ${reason}`,
-  healthMostUnknown: 'Mehr als die Hälfte der Messpunkte ist unbekannt',
+  healthMostUnknown: 'Von mehr als der Hälfte der Messpunkte ist nichts bekannt',
   healthSomeUnknown: (count) =>
     `${counted(count, 'Messpunkt lässt', 'Messpunkte lassen')} sich nicht beurteilen`,
   healthDay: (isDay, source) =>
@@ -91,7 +90,7 @@ export const HEALTH: In<typeof ENGLISH> = {
   healthAllWell: 'Alle beurteilten Messwerte liegen im Idealbereich',
   healthDespite: (alarms) =>
     alarms === 1
-      ? '1 Alarm steht noch an: Zwei gute Messungen heben ihn auf'
+      ? '1 Alarm steht noch an: Er endet nach zwei guten Messungen'
       : `${alarms} Alarme stehen noch an: Jeder endet nach zwei guten Messungen`,
   healthAcknowledged: 'quittiert',
   healthNotCurrent: 'Nicht aktuell',
@@ -114,6 +113,6 @@ export const HEALTH: In<typeof ENGLISH> = {
   tooLow: (by) => (by === null ? 'zu niedrig' : `um ${by} zu niedrig`),
   tooHigh: (by) => (by === null ? 'zu hoch' : `um ${by} zu hoch`),
   side: { below: 'tief', above: 'hoch' },
-  below: 'unter dem Ideal',
-  above: 'über dem Ideal',
+  below: 'unter Ideal',
+  above: 'über Ideal',
 };

@@ -57,28 +57,28 @@ def test_web_knows_its_twin_again_after_a_silence(domain: int) -> None:
         wait_for(is_known, "what the twin says of itself, after the silence")
 
 
-def test_web_joins_ros_again_once_a_silence_and_nobody_notices(domain: int) -> None:
+def test_web_joins_ros_again_in_a_silence_and_nobody_notices(domain: int) -> None:
     again = "joining ROS again"
     with (
         Peer(domain) as peer,
         twin_node(domain, *OFTEN) as twin,
-        lupin_twin(domain, "web", *limits(rejoin_after_s=3.0)) as web,
+        lupin_twin(domain, "web", *limits(rejoin_after_s=2.0)) as web,
         attached(web, peer) as live,
         live.listen() as page,
         ros_at(live.url) as viewer,
     ):
         viewer.subscribe()
-        for silence in (1, 2):
+        # The second silence is longer: the next time comes after as long again.
+        for silence, joined in ((1, 1), (2, 3)):
             peer.observe(scan(f"before {silence}", {"co2": 1.0}))
             page.until_tag(f"before {silence}")
             viewer.until_tag(f"before {silence}")
             twin.freeze()
-            wait_for(lambda count=silence: web.output.count(again) == count, "the new node")  # type: ignore[misc]
+            wait_for(lambda least=joined: web.output.count(again) >= least, "the new node")  # type: ignore[misc]
             peer.observe(scan(f"after {silence}", {"co2": 1.0}))
-            twin.stand_still()  # still: it is not joined once more
+            twin.thaw()
             page.until_tag(f"after {silence}")
             viewer.until_tag(f"after {silence}")
-            assert web.output.count(again) == silence
             (known,) = live.json(f"/api/tags/after {silence}/history")["tries"]
             assert known["status"] == 0
 

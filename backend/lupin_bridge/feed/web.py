@@ -40,6 +40,9 @@ _A_DATE_NS: Final = 10**18
 
 # How often it is looked whether the twin is lost.
 _LOOK_S: Final = 1.0
+# A node that is made while the network has no address never hears it: so it is made again, after
+# as long a silence again, and no later than this.
+_REJOIN_AGAIN_S: Final = 300.0
 
 # What reading a tag of an answer takes, roughly and at worst.
 _READ_TAG_S: Final = 20e-6
@@ -62,8 +65,8 @@ class WebTwin(RosSource[WebNode, _Received]):
     """`TwinSource` over the ROS contracts of a twin in another process.
 
     One that was received, and then for `stale_after_s` no more, is asked nothing; after
-    `rejoin_after_s`, the node is made anew, once: Fast DDS may never find a twin again that it lost
-    for longer than its lease of 20 s. `journal` is its file as it is called here; None: as the twin
+    `rejoin_after_s`, the node is made anew: Fast DDS may never find a twin again that it lost for
+    longer than its lease of 20 s. `journal` is its file as it is called here; None: as the twin
     calls it.
     """
 
@@ -82,6 +85,7 @@ class WebTwin(RosSource[WebNode, _Received]):
         self._rejoining = Periodic(self._rejoin_if_lost, _LOOK_S, "the look for a lost twin")
         self._join: Callable[[], Awaitable[None]]
         self._lost: TwinUpdate | None = None
+        self._rejoin_at_s = 0.0
         self._received = _Received()
         self._frame_id: str
         self._log = FollowedLog(self._rows_behind, self.workers, journal)
@@ -143,14 +147,17 @@ class WebTwin(RosSource[WebNode, _Received]):
 
     async def _rejoin_if_lost(self) -> None:
         update = self._received.update
-        if update is None or update is self._lost:
+        if update is None:
             return
-        if time.monotonic() - update.made_s < self.rejoin_after_s:
+        if update is not self._lost:
+            self._lost, self._rejoin_at_s = update, self.rejoin_after_s
+        silent_s = time.monotonic() - update.made_s
+        if silent_s < self._rejoin_at_s:
             return
-        log.warning("%s: joining ROS again", self._silence(self.rejoin_after_s))
+        log.warning("%s: joining ROS again", self._silence(round(silent_s)))
         await self.thread.stop()
         await self._join()
-        self._lost = update
+        self._rejoin_at_s = silent_s + min(silent_s, _REJOIN_AGAIN_S)
         self.relay.renew()
 
     def _silence(self, seconds: float) -> str:

@@ -36,7 +36,7 @@ class Limits:
     on average. One token posts at most `observations_per_s`, and `observation_burst` at once: DDS
     keeps 50 for a twin that is busy. Alarms are worked out from `alarm_days` before the start on.
     The page over many sites has at most `open_sites` open at once, of some megabytes each.
-    `rejoin_after_s`: `web` joins ROS anew where its twin has been silent for so long, once.
+    `rejoin_after_s`: `web` joins ROS anew where its twin has been silent for so long.
     """
 
     client_timeout_s: float = 30.0

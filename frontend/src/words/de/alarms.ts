@@ -62,7 +62,6 @@ export const ALARMS: In<typeof ENGLISH> = {
   },
   alarmsNew: (count) => `${count} neu`,
   alarmsNewHint: 'Die Reihenfolge bleibt, solange Sie die Liste benutzen. Neue Alarme anzeigen',
-  alarmMore: (count) => `${counted(count, 'weiteren', 'weitere')} anzeigen`,
   alarmFilter: 'Alarme filtern',
   alarmFilterHint: 'Filtern …',
   alarmOrder: 'Reihenfolge',
@@ -76,8 +75,8 @@ export const ALARMS: In<typeof ENGLISH> = {
   alarmsNoneHint:
     'Ein Alarm wird nach zwei auffälligen Messungen nacheinander ausgelöst, bei einem Schädling oder fehlenden Daten sofort.',
   alarmsWait: (tags) =>
-    `${counted(tags, 'Messpunkt', 'Messpunkte')} auffällig: Alarm erst, wenn die nächste Messung das bestätigt`,
-  alarmNotYet: 'noch kein Alarm',
+    `${counted(tags, 'Messpunkt wartet', 'Messpunkte warten')} auf eine zweite Messung: noch kein Alarm`,
+  alarmNotYet: 'wartet auf eine zweite Messung',
   alarmsNotYet: 'Warten auf die Liste der Alarme',
   alarmsStarting: 'Die Aufzeichnung wird noch gelesen: Weitere Alarme können folgen.',
   alarmsHeard: (since) => `Es wird nichts aufgezeichnet; Alarme vor ${since} sind nicht bekannt.`,

@@ -15,13 +15,9 @@ export const HEALTH: In<typeof ENGLISH> = {
   healthMany: ONE_OR_MANY,
   reasons: {
     sides: { below: 'unter', above: 'über' },
-    sidesBack: {
-      below: 'im Sollbereich; Alarm endet über',
-      above: 'im Sollbereich; Alarm endet unter',
-    },
-    range: (reading, side, limit, isCritical) =>
-      `${reading}, ${side} ${limit}${isCritical ? ' (kritisch)' : ''}`,
-    beyond: (sensor, side, limit) => `${sensor} ${side} ${limit}`,
+    wasBeyond: (side, limit, status, until) =>
+      `war ${side} ${limit}; bleibt ${status} bis ${until}`,
+    range: (reading, limit, isCritical) => `${reading}, ${limit}${isCritical ? ' (kritisch)' : ''}`,
     readingFailed: (sensor) => `${sensor}: Der Sensor liefert keinen Wert`,
     implausible: (reading) => `${reading}: kein plausibler Wert`,
     scanFailed: (outcome, age) =>
@@ -90,8 +86,8 @@ export const HEALTH: In<typeof ENGLISH> = {
   healthAllWell: 'Alle beurteilten Messwerte liegen im Idealbereich',
   healthDespite: (alarms) =>
     alarms === 1
-      ? '1 Alarm steht noch an: Er endet nach zwei guten Messungen'
-      : `${alarms} Alarme stehen noch an: Jeder endet nach zwei guten Messungen`,
+      ? '1 Alarm steht noch an: nach zwei guten Messungen behoben'
+      : `${alarms} Alarme stehen noch an: nach je zwei guten Messungen behoben`,
   healthAcknowledged: 'quittiert',
   healthNotCurrent: 'Nicht aktuell',
   healthNothing: 'Noch kein Messwert zu beurteilen',

@@ -61,7 +61,6 @@ export const ALARMS: In<typeof ENGLISH> = {
   },
   alarmsNew: (count) => counted(count, 'nueva', 'nuevas'),
   alarmsNewHint: 'El orden no cambia mientras usa la lista. Mostrar las alarmas nuevas',
-  alarmMore: (count) => `Mostrar ${count} más`,
   alarmFilter: 'Filtrar alarmas',
   alarmFilterHint: 'Filtrar …',
   alarmOrder: 'Orden',
@@ -75,8 +74,8 @@ export const ALARMS: In<typeof ENGLISH> = {
   alarmsNoneHint:
     'La alarma salta tras dos mediciones anómalas seguidas. Si hay plaga o faltan datos del invernadero, salta enseguida.',
   alarmsWait: (tags) =>
-    `${counted(tags, 'punto pendiente', 'puntos pendientes')}: la alarma salta con otra medición anómala`,
-  alarmNotYet: 'aún sin alarma',
+    `${counted(tags, 'punto', 'puntos')} a la espera de otra medición: aún sin alarma`,
+  alarmNotYet: 'a la espera de otra medición',
   alarmsNotYet: 'Esperando la lista de alarmas',
   alarmsStarting: 'Todavía se está leyendo el registro: pueden aparecer más alarmas.',
   alarmsHeard: (since) => `No se registra nada: se desconocen las alarmas anteriores a ${since}.`,

@@ -18,13 +18,9 @@ export const HEALTH: In<typeof ENGLISH> = {
   },
   reasons: {
     sides: { below: 'inferior a', above: 'superior a' },
-    sidesBack: {
-      below: 'en rango; se resuelve por encima de',
-      above: 'en rango; se resuelve por debajo de',
-    },
-    range: (reading, side, limit, isCritical) =>
-      `${reading}, ${side} ${limit}${isCritical ? ' (crítico)' : ''}`,
-    beyond: (sensor, side, limit) => `${sensor} ${side} ${limit}`,
+    wasBeyond: (side, limit, status, until) =>
+      `ha sido ${side} ${limit}; sigue ${status} hasta ${until}`,
+    range: (reading, limit, isCritical) => `${reading}, ${limit}${isCritical ? ' (crítico)' : ''}`,
     readingFailed: (sensor) => `${sensor}: el sensor no da ningún valor`,
     implausible: (reading) => `${reading}: valor inverosímil`,
     scanFailed: (outcome, age) =>

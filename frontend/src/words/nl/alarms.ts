@@ -58,7 +58,6 @@ export const ALARMS: In<typeof ENGLISH> = {
   },
   alarmsNew: (count) => `${count} nieuw`,
   alarmsNewHint: 'De volgorde blijft gelijk zolang u de lijst gebruikt. Nieuwe alarmen tonen',
-  alarmMore: (count) => `Nog ${count} tonen`,
   alarmFilter: 'Alarmen filteren',
   alarmFilterHint: 'Filteren …',
   alarmOrder: 'Volgorde',
@@ -72,8 +71,8 @@ export const ALARMS: In<typeof ENGLISH> = {
   alarmsNoneHint:
     'Een alarm gaat af na twee afwijkende metingen achter elkaar. Bij een plaag of ontbrekende gegevens gaat het meteen af.',
   alarmsWait: (tags) =>
-    `${counted(tags, 'meetpunt', 'meetpunten')} afwijkend: pas alarm als de volgende meting het bevestigt`,
-  alarmNotYet: 'nog geen alarm',
+    `${counted(tags, 'meetpunt wacht', 'meetpunten wachten')} op een tweede meting: nog geen alarm`,
+  alarmNotYet: 'wacht op een tweede meting',
   alarmsNotYet: 'Wachten op de lijst met alarmen',
   alarmsStarting: 'De vastgelegde gegevens worden nog gelezen: er kunnen alarmen bijkomen.',
   alarmsHeard: (since) => `Er wordt niets vastgelegd; alarmen van vóór ${since} zijn niet bekend.`,

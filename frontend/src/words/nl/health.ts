@@ -15,13 +15,9 @@ export const HEALTH: In<typeof ENGLISH> = {
   healthMany: ONE_OR_MANY,
   reasons: {
     sides: { below: 'onder', above: 'boven' },
-    sidesBack: {
-      below: 'weer goed; alarm eindigt boven',
-      above: 'weer goed; alarm eindigt onder',
-    },
-    range: (reading, side, limit, isCritical) =>
-      `${reading}, ${side} ${limit}${isCritical ? ' (kritiek)' : ''}`,
-    beyond: (sensor, side, limit) => `${sensor} ${side} ${limit}`,
+    wasBeyond: (side, limit, status, until) =>
+      `was ${side} ${limit}; blijft ${status} tot ${until}`,
+    range: (reading, limit, isCritical) => `${reading}, ${limit}${isCritical ? ' (kritiek)' : ''}`,
     readingFailed: (sensor) => `${sensor}: de sensor geeft geen waarde`,
     implausible: (reading) => `${reading}: onwaarschijnlijke waarde`,
     scanFailed: (outcome, age) =>

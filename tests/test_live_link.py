@@ -21,8 +21,9 @@ from lupin_twin.ros.inputs import SETTLED_S
 from tests.support.domains import ros_env
 from tests.support.live import attached, wait_until_ready
 from tests.support.messages import scan
-from tests.support.processes import OFTEN, Process, lupin_twin, twin_node
+from tests.support.processes import OFTEN, Process, limits, lupin_twin, twin_node
 from tests.support.ros import Peer
+from tests.support.rosbridge import ros_at
 from tests.support.waiting import wait_for
 from tests.support.web import Bridge, bridge
 
@@ -54,6 +55,32 @@ def test_web_knows_its_twin_again_after_a_silence(domain: int) -> None:
         assert live.get("/readyz").json()["reason"] == "stale"
         twin.thaw()
         wait_for(is_known, "what the twin says of itself, after the silence")
+
+
+def test_web_joins_ros_again_in_a_silence_and_nobody_notices(domain: int) -> None:
+    again = "joining ROS again"
+    with (
+        Peer(domain) as peer,
+        twin_node(domain, *OFTEN) as twin,
+        lupin_twin(domain, "web", *limits(rejoin_after_s=2.0)) as web,
+        attached(web, peer) as live,
+        live.listen() as page,
+        ros_at(live.url) as viewer,
+    ):
+        viewer.subscribe()
+        # The second silence is longer: the next time comes after as long again.
+        for silence, joined in ((1, 1), (2, 3)):
+            peer.observe(scan(f"before {silence}", {"co2": 1.0}))
+            page.until_tag(f"before {silence}")
+            viewer.until_tag(f"before {silence}")
+            twin.freeze()
+            wait_for(lambda least=joined: web.output.count(again) >= least, "the new node")  # type: ignore[misc]
+            peer.observe(scan(f"after {silence}", {"co2": 1.0}))
+            twin.thaw()
+            page.until_tag(f"after {silence}")
+            viewer.until_tag(f"after {silence}")
+            (known,) = live.json(f"/api/tags/after {silence}/history")["tries"]
+            assert known["status"] == 0
 
 
 # --- publishers that the contract's QoS does not match --------------------------------------------

@@ -70,8 +70,9 @@ def _leases_so_far() -> int:
 
 def ros_env(domain: int, **more: str) -> dict[str, str]:
     """The environment of a process in a ROS domain of this machine alone."""
+    ours = {name: it for name, it in os.environ.items() if name != "FASTDDS_BUILTIN_TRANSPORTS"}
     return {
-        **os.environ,
+        **ours,
         "ROS_DOMAIN_ID": str(domain),
         "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
         **more,

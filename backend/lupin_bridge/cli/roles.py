@@ -150,6 +150,7 @@ def _source_of(
             ros_args=ros_args,
             timeout_s=timeout_s,
             stale_after_s=STALE_AFTER_S,
+            rejoin_after_s=limits.rejoin_after_s,
             journal=Path(settings.journal).absolute() if settings.journal else None,
         )
     # The feed's arguments are for the twin alone: its feeder has no journal.

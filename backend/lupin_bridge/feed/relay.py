@@ -256,8 +256,7 @@ class Relay:
         relayed = self._topics.get(topic)
         if relayed is None:
             relayed = self._topics[topic] = _Relayed(topic)
-            relayed.opening = asyncio.create_task(self._subscribe(relayed))
-            relayed.opening.add_done_callback(partial(self._opened, relayed))
+            self._open(relayed)
         listening = Listening(on_sample, partial(self._leave, relayed))
         for sample in relayed.latched.all():
             listening.receive(sample)
@@ -268,6 +267,11 @@ class Relay:
             await asyncio.shield(relayed.opening)
             undo.pop_all()
         return listening
+
+    def renew(self) -> None:
+        """Subscribe to all topics again: there is another node."""
+        for relayed in self._topics.values():
+            self._open(relayed)
 
     async def published(self, is_wanted: Callable[[str, str], bool]) -> Mapping[str, str]:
         """Topics that somebody publishes now, and their types; `is_wanted(name, type)` takes them.
@@ -299,6 +303,10 @@ class Relay:
 
         """
         return self._ros.read(topic, sample.data)
+
+    def _open(self, relayed: _Relayed) -> None:
+        relayed.opening = asyncio.create_task(self._subscribe(relayed))
+        relayed.opening.add_done_callback(partial(self._opened, relayed))
 
     async def _subscribe(self, relayed: _Relayed) -> Callable[[], None]:
         topic, thread = relayed.topic, self._thread()

@@ -135,12 +135,7 @@ class RosSource(TwinSource, Generic[NodeT, EventT]):
         self.workers = Workers("work")
         self.past = PastProcess()
         self.relay = Relay(lambda: self.thread, RelayRos())
-        # Of the ROS thread alone.
-        self._robot_topics = RobotTopics()
         self._rules: FieldRules
-        # Made at the first one: most bridges never publish any.
-        self._observations: Any = None
-        # The same for as long as the node lives.
         self._names: TwinNames
 
     async def _start_thread(
@@ -149,6 +144,10 @@ class RosSource(TwinSource, Generic[NodeT, EventT]):
         on_event: Callable[[EventT], None],
         on_death: Callable[[], None],
     ) -> None:
+        # Both of the ROS thread alone; the publisher is made at the first observation: most bridges
+        # never publish any.
+        self._robot_topics = RobotTopics()
+        self._observations: Any = None
         self.thread = RosThread(
             make_node, ros_args=self._ros_args, on_event=on_event, on_death=on_death
         )

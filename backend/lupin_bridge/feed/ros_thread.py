@@ -53,6 +53,7 @@ log = logging.getLogger(__name__)
 STOP_TIMEOUT_S = 0.9
 # How long after one heartbeat came back the next one is sent.
 BEAT_PERIOD_S = 1.0
+_NOT_RUNNING: Final = "the ROS thread is not running"
 
 
 class RosStartError(RuntimeError):
@@ -105,6 +106,8 @@ class RosThread(Generic[NodeT, EventT]):
         self._node: NodeT | None = None
         self._newest: EventT | None = None
         self._calls_waiting = 0
+        # What is told when the thread is stopped: nothing else would end it.
+        self._unanswered: set[asyncio.Future[Any]] = set()
         self._callback_errors = 0
         self._beating: asyncio.Task[None] | None = None
         # When the heartbeat was sent that has not come back yet; loop's clock.
@@ -129,7 +132,7 @@ class RosThread(Generic[NodeT, EventT]):
         self._beating = asyncio.create_task(self._beat(), name="heartbeat")
 
     async def stop(self) -> None:
-        """Stop the node and join the thread."""
+        """Stop the node and join the thread; who waits for an answer gets TwinUnavailableError."""
         was_stopping, self._is_stopping = self._is_stopping, True
         if self._beating is not None:
             self._beating.cancel()
@@ -139,6 +142,8 @@ class RosThread(Generic[NodeT, EventT]):
         await asyncio.to_thread(self._thread.join, STOP_TIMEOUT_S)
         if self._thread.is_alive():
             log.warning("the ROS thread did not end within %s s: left behind", STOP_TIMEOUT_S)
+        for result in self._unanswered:
+            _settle(result, None, TwinUnavailableError(_NOT_RUNNING))
 
     @property
     def is_alive(self) -> bool:
@@ -169,7 +174,7 @@ class RosThread(Generic[NodeT, EventT]):
 
         """
         if self._executor is None or not self._thread.is_alive() or self._is_stopping:
-            raise TwinUnavailableError("the ROS thread is not running")
+            raise TwinUnavailableError(_NOT_RUNNING)
         result: asyncio.Future[ResultT] = self._loop.create_future()
 
         def run() -> None:
@@ -183,9 +188,18 @@ class RosThread(Generic[NodeT, EventT]):
         self._executor.create_task(run)
         self._calls_waiting += 1
         try:
-            return await result
+            return await self._answer(result)
         finally:
             self._calls_waiting -= 1
+
+    async def _answer(self, result: asyncio.Future[ResultT]) -> ResultT:
+        if self._is_stopping:  # since it was asked
+            raise TwinUnavailableError(_NOT_RUNNING)
+        self._unanswered.add(result)
+        try:
+            return await result
+        finally:
+            self._unanswered.discard(result)
 
     async def ask(
         self, start: Callable[[NodeT], Any], give_up: Callable[[NodeT, Any], None]
@@ -221,7 +235,7 @@ class RosThread(Generic[NodeT, EventT]):
 
         try:
             await self.call(begin)
-            return await result
+            return await self._answer(result)
         except asyncio.CancelledError:
             result.cancel()
             if self._executor is not None and not self._is_stopping:

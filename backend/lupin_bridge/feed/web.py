@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 import asyncio
+import logging
 import math
 import os
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Awaitable, Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any, Final
 
 from lupin_bridge.feed.followed_log import FollowedLog
 from lupin_bridge.feed.query import Now
 from lupin_bridge.feed.ros_source import RosSource
+from lupin_bridge.feed.shared_work import Periodic
 from lupin_bridge.feed.source import (
     TwinUnavailableError,
     TwinUpdate,
@@ -30,8 +33,16 @@ from lupin_twin.ros import convert_field, convert_past
 from lupin_twin.ros.convert_past import NotAnAnswerError
 from lupin_twin.runtime.estimates import Report, ReportRequest
 
+log = logging.getLogger(__name__)
+
 # ROS time beyond this, in 2001, is that of a wall's clock, and goes on while nobody tells it.
 _A_DATE_NS: Final = 10**18
+
+# How often it is looked whether the twin is lost.
+_LOOK_S: Final = 1.0
+# A node that is made while the network has no address never hears it: so it is made again, after
+# as long a silence again, and no later than this.
+_REJOIN_AGAIN_S: Final = 300.0
 
 # What reading a tag of an answer takes, roughly and at worst.
 _READ_TAG_S: Final = 20e-6
@@ -53,8 +64,10 @@ class _Received:
 class WebTwin(RosSource[WebNode, _Received]):
     """`TwinSource` over the ROS contracts of a twin in another process.
 
-    One that was received, and then for `stale_after_s` no more, is asked nothing. `journal` is its
-    file as it is called here; None: as the twin calls it.
+    One that was received, and then for `stale_after_s` no more, is asked nothing; after
+    `rejoin_after_s`, the node is made anew: Fast DDS may never find a twin again that it lost for
+    longer than its lease of 20 s. `journal` is its file as it is called here; None: as the twin
+    calls it.
     """
 
     def __init__(
@@ -63,10 +76,16 @@ class WebTwin(RosSource[WebNode, _Received]):
         ros_args: Sequence[str],
         timeout_s: float,
         stale_after_s: float = math.inf,
+        rejoin_after_s: float = math.inf,
         journal: Path | None = None,
     ) -> None:
         super().__init__(ros_args=ros_args, timeout_s=timeout_s)
         self._stale_after_s = stale_after_s
+        self.rejoin_after_s = rejoin_after_s
+        self._rejoining = Periodic(self._rejoin_if_lost, _LOOK_S, "the look for a lost twin")
+        self._join: Callable[[], Awaitable[None]]
+        self._lost: TwinUpdate | None = None
+        self._rejoin_at_s = 0.0
         self._received = _Received()
         self._frame_id: str
         self._log = FollowedLog(self._rows_behind, self.workers, journal)
@@ -77,7 +96,7 @@ class WebTwin(RosSource[WebNode, _Received]):
         """Start the ROS thread with its node; see `TwinSource.start`."""
 
         def make_node(context: Any, post: Callable[[_Received], None]) -> WebNode:
-            update: TwinUpdate | None = None
+            update = self._received.update
 
             def pass_on(snapshot: Snapshot) -> None:
                 nonlocal update
@@ -99,6 +118,8 @@ class WebTwin(RosSource[WebNode, _Received]):
                 post(_Received(update, node.revision, node.occupancy_map, node.rules))
 
             node = WebNode(pass_on, post_all, context=context)
+            # As `update`, it holds on in a node that is made anew.
+            node.occupancy_map = self._received.occupancy_map
             return node
 
         def on_received(received: _Received) -> None:
@@ -110,7 +131,9 @@ class WebTwin(RosSource[WebNode, _Received]):
                 self._log.on_update(received.update.journal)
                 on_state(received.update)
 
-        await self._start_thread(make_node, on_received, on_death)
+        self._join = partial(self._start_thread, make_node, on_received, on_death)
+        await self._join()
+        self._rejoining.start()
         self._frame_id, folder = await self.thread.call(
             lambda node: (node.parameters.frame_id, _folder(node))
         )
@@ -118,8 +141,27 @@ class WebTwin(RosSource[WebNode, _Received]):
 
     async def stop(self) -> None:
         """See `RosSource`."""
+        await self._rejoining.stop()
         await self._log.stop()
         await super().stop()
+
+    async def _rejoin_if_lost(self) -> None:
+        update = self._received.update
+        if update is None:
+            return
+        if update is not self._lost:
+            self._lost, self._rejoin_at_s = update, self.rejoin_after_s
+        silent_s = time.monotonic() - update.made_s
+        if silent_s < self._rejoin_at_s:
+            return
+        log.warning("%s: joining ROS again", self._silence(round(silent_s)))
+        await self.thread.stop()
+        await self._join()
+        self._rejoin_at_s = silent_s + min(silent_s, _REJOIN_AGAIN_S)
+        self.relay.renew()
+
+    def _silence(self, seconds: float) -> str:
+        return f"nothing was received on {self._names.state_topic} for {seconds:g} s"
 
     def revision(self) -> str:
         """A digest of poses and readings, and the map's revision."""
@@ -182,8 +224,7 @@ class WebTwin(RosSource[WebNode, _Received]):
         update = self._received.update
         if update is not None and time.monotonic() - update.made_s >= self._stale_after_s:
             raise TwinUnavailableError(
-                f"nothing was received on {self._names.state_topic} for {self._stale_after_s:g} s: "
-                "is the twin running?"
+                f"{self._silence(self._stale_after_s)}: is the twin running?"
             )
         if why := await self.thread.call(lambda node: node.why_not(service)):
             raise TwinUnavailableError(why)

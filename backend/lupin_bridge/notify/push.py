@@ -149,6 +149,7 @@ class Push:
             await end(task)
 
     async def _run(self, source: Source) -> None:
+        backoff = Backoff(FIRST_WAIT_S, MOST_WAIT_S)
         while True:
             await self._is_news.wait()
             await asyncio.sleep(TOGETHER_S)
@@ -160,8 +161,12 @@ class Push:
             try:
                 if new:
                     await self._notify(new, source)
+                backoff.succeeded()
             except (AccountError, AdmissionError) as error:
                 self._failed(str(error))
+                self._new = {alarm.id: alarm for alarm in new} | self._new
+                self._is_news.set()
+                await asyncio.sleep(backoff.wait_s())
             except Exception:  # nobody waits for this task
                 log.exception("push met an error and goes on")
 
@@ -210,6 +215,8 @@ class Push:
                 if error.status in _GONE:
                     raise DeviceGone from None
                 raise
+            except (AccountError, AdmissionError) as error:
+                raise PostError(str(error)) from error
 
         backoff = Backoff(FIRST_WAIT_S, MOST_WAIT_S)
         try:

@@ -246,13 +246,14 @@ def report(given: OfReport, now_ns: int | None) -> tuple[int, int]:
     """The period of a report, ns of ROS time; it ends now at the latest.
 
     Raises:
-        PastRefused: a period without an end, or with nothing in it, or too long a one.
+        PastRefused: a period with nothing in it, or too long a one; now is not known.
 
     """
-    end_ns = now_ns if given.to is None else moment("to", given.to)
-    if end_ns is None:
-        raise PastRefused("to is missing, and what time it is now is not known here")
-    end_ns = end_ns if now_ns is None else min(end_ns, now_ns)
+    to_ns = None if given.to is None else moment("to", given.to)
+    if now_ns is None:
+        to = "missing" if to_ns is None else f"{seconds(to_ns)} s"
+        raise PastRefused(f"to is {to}, and what time it is now is not known here")
+    end_ns = now_ns if to_ns is None else min(to_ns, now_ns)
     shift_ns = SHIFT_S * NANOSECONDS_PER_SECOND
     start_ns = max(0, end_ns - shift_ns) if given.from_ is None else moment("from", given.from_)
     if start_ns >= end_ns:

@@ -36,6 +36,7 @@ class Limits:
     on average. One token posts at most `observations_per_s`, and `observation_burst` at once: DDS
     keeps 50 for a twin that is busy. Alarms are worked out from `alarm_days` before the start on.
     The page over many sites has at most `open_sites` open at once, of some megabytes each.
+    `rejoin_after_s`: `web` joins ROS anew where its twin has been silent for so long.
     """
 
     client_timeout_s: float = 30.0
@@ -48,6 +49,7 @@ class Limits:
     observation_burst: int = 30
     alarm_days: float = 7.0
     open_sites: int = 50
+    rejoin_after_s: float = 30.0
 
 
 def client_key(address: str) -> str:

@@ -3,20 +3,24 @@
 from __future__ import annotations
 
 import asyncio
+import math
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from typing import Any
 
 import pytest
-from lupin_msgs.msg import SensorReading, TwinState, TwinTagState
+from geometry_msgs.msg import Point, Pose, PoseStamped
+from lupin_msgs.msg import Observation, SensorReading, TwinState, TwinTagState
 from lupin_msgs.srv import GetEstimateReport
 
+from lupin_bridge.feed.relay import Sample, topics_of
 from lupin_bridge.feed.source import TwinTimeoutError, TwinUnavailableError, TwinUpdate
 from lupin_bridge.feed.web import WebTwin
+from lupin_twin.adapt.scans import BuiltScan
 from lupin_twin.field.engine import FieldRefused
 from lupin_twin.runtime.estimates import ReportRequest
 from tests.support.messages import occupancy_grid
-from tests.support.ros import Peer
+from tests.support.ros import Peer, latched
 from tests.support.waiting import until, until_answered
 
 SAYS = {"refused": "not that one", "busy": "32 fields are being computed: ask again later"}
@@ -29,13 +33,17 @@ def state_of(value: float) -> TwinState:
 
 
 @asynccontextmanager
-async def started(timeout_s: float = 20.0) -> AsyncIterator[tuple[WebTwin, list[TwinUpdate]]]:
-    twin, told = WebTwin(ros_args=(), timeout_s=timeout_s), list[TwinUpdate]()
-    await twin.start(told.append, lambda: None)
+async def started(
+    timeout_s: float = 20.0,
+) -> AsyncIterator[tuple[WebTwin, list[TwinUpdate]]]:
+    twin = WebTwin(ros_args=(), timeout_s=timeout_s)
+    told, deaths = list[TwinUpdate](), list[None]()
+    await twin.start(told.append, lambda: deaths.append(None))
     try:
         yield twin, told
     finally:
         await twin.stop()
+    assert deaths == []
 
 
 async def test_a_map_alone_is_another_revision_and_no_sign_of_life(domain: int) -> None:
@@ -54,6 +62,63 @@ async def test_without_a_twin_its_service_is_named(domain: int) -> None:
     async with started() as (twin, _):
         with pytest.raises(TwinUnavailableError, match=f"no twin offers {NAME}: is it running"):
             await twin.estimate_report(ReportRequest("co2"))
+
+
+async def test_after_a_silence_all_goes_on_with_a_new_node(domain: int) -> None:
+    scans, samples = list[Observation](), list[Sample]()
+    with Peer(domain) as peer:
+        peer.node.create_service(GetEstimateReport, NAME, lambda _, response: response)
+        peer.node.create_subscription(
+            Observation, "/floranova/observations", scans.append, latched(50)
+        )
+        async with started() as (twin, told):
+            state_topic = topics_of(twin.names())[0]
+            await twin.relay.listen(state_topic, samples.append)
+
+            def received() -> float:
+                return told[-1].snapshot.tags[0].readings[0].value if told else 0.0
+
+            def relayed() -> float:
+                message = twin.relay.read(state_topic, samples[-1]) if samples else state_of(0.0)
+                return float(message.tags[0].readings[0].value)
+
+            async def place() -> float | None:
+                robot = await twin.robot(None)
+                return robot.position.x if robot and robot.position else None
+
+            async def is_joined() -> bool:
+                try:
+                    return bool(await twin.relay.time())
+                except TwinUnavailableError:
+                    return False
+
+            async def goes_both_ways(value: float) -> None:
+                pose = PoseStamped(pose=Pose(position=Point(x=value)))
+                pose.header.frame_id = "map"
+                peer.publish("/amcl_pose", pose, depth=1)
+                peer.publish("/twin/state", state_of(value), depth=1)
+                await until(lambda: received() == relayed() == value, "the state, raw too")
+                await until_answered(place, "the robot", lambda x: x == value)
+                scan = BuiltScan("1", 1, None, (("co2", value),), "")
+                await twin.publish_observation(scan, "program")
+                await asyncio.to_thread(
+                    peer.until,
+                    lambda: scans and scans[-1].tag_reading.readings[0].value == value,
+                    "the scan",
+                )
+
+            maps = peer.publish("/map", occupancy_grid([[0, 100]]), depth=1)
+            await goes_both_ways(1.0)
+            await until(twin.occupancy_map, "the map")
+            peer.node.destroy_publisher(maps)
+            twin.rejoin_after_s = 0.1
+            # The peer does not spin: nobody would ever answer.
+            with pytest.raises(TwinUnavailableError, match="not running"):
+                await twin.estimate_report(ReportRequest("co2"))
+            twin.rejoin_after_s = math.inf
+            await until_answered(is_joined, "the new node")
+            await goes_both_ways(2.0)
+            assert twin.occupancy_map() is not None, "and nobody publishes it any more"
 
 
 async def test_refusals_are_the_services_and_no_answer_is_waited_for_for_ever(domain: int) -> None:

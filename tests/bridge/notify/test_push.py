@@ -171,6 +171,21 @@ def test_a_phone_that_the_push_service_knows_no_more_is_forgotten_and_a_busy_one
         assert phone.read(on.service.posted[3])["body"].startswith("Tag 8:")
 
 
+def test_while_the_accounts_cannot_be_read_a_message_waits(tmp_path: Path) -> None:
+    with stage(tmp_path, status(503), status(201)) as on, signed_in(on.live.url, "anna") as anna:
+        subscribe(anna, on.phone("one"))
+        aside = on.accounts.with_name("aside")
+        on.accounts.rename(aside)
+        on.live.peer.observe(look("7", anomaly=True, bug_count=2))
+        on.live.process.wait_for_output("was not taken: the file of accounts")
+        aside.rename(on.accounts)
+        wait_for(lambda: on.service.posted, "the first attempt")
+        on.accounts.rename(aside)
+        on.live.process.wait_for_output("is tried again: the file of accounts")
+        aside.rename(on.accounts)
+        wait_for(lambda: len(on.service.posted) == 2, "the next attempt")
+
+
 def test_a_phone_that_is_switched_off_meanwhile_is_not_tried_again(tmp_path: Path) -> None:
     answers = (status(503, "Retry-After: 4"), status(201))
     bearer = {"Authorization": f"Bearer {TOKEN}"}

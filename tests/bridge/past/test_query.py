@@ -33,6 +33,12 @@ def test_what_is_left_out_is_all_that_is_kept() -> None:
     assert ask(EXPORT) == PeriodQuery(0, 0)
 
 
+@pytest.mark.parametrize(("to", "what"), [(None, "missing"), ("100", r"100\.000000000 s")])
+def test_before_the_time_is_known_the_end_of_a_report_is_refused(to: str | None, what: str) -> None:
+    with pytest.raises(PastRefused, match=f"^to is {what}, and what time it is now is not known"):
+        query.report(query.OfReport(to=to), None)
+
+
 def test_what_is_given_is_what_is_asked() -> None:
     period = {"from_": "1.5", "to": "1970-01-01T00:00:09Z"}
     start_ns, end_ns = 3 * NS // 2, 9 * NS

@@ -3,9 +3,10 @@ from __future__ import annotations
 import sqlite3
 import tempfile
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from dataclasses import replace
 from datetime import UTC, datetime
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -45,6 +46,39 @@ def twin(path: Path | None, clock: Clock) -> Iterator[tuple[Memory, TwinStore]]:
         yield memory, store
     finally:
         memory.close()
+
+
+def test_a_file_that_takes_the_place_of_the_journal_is_read_once_the_twin_has_opened_it(
+    tmp_path: Path,
+) -> None:
+    path, other = tmp_path / "j.sqlite", tmp_path / "other.sqlite"
+    refusals: list[tuple[str, bool]] = []
+
+    def how_many(connection: sqlite3.Connection, _: ShouldStop) -> int:
+        return len(connection.execute("SELECT readings FROM scan").fetchall())
+
+    def is_read(count: int) -> bool:
+        try:
+            return memory.recall.query(how_many).result(20.0) == count
+        except NotRemembered as error:
+            refusals.append((str(error), error.is_lasting))
+            return False
+
+    with twin(path, wall(0)) as (memory, _):
+        for count in (1, 2, 3):
+            kept(other, [scan(at_ns=n + 1) for n in range(count)])
+            wait_for(lambda: memory.condition.inode, "the journal to be written")
+            other.replace(path)
+            wait_for(partial(is_read, count), "the new file")
+            assert memory.condition.inode in (0, path.stat().st_ino)
+        with closing(sqlite3.connect(other)) as foreign:
+            foreign.execute("CREATE TABLE of_others (x)")
+        other.replace(path)
+        wait_for(lambda: memory.condition.state is JournalState.FOREIGN, "it to be looked at")
+        with pytest.raises(NotRemembered, match="name another file"):
+            memory.recall.query(how_many).result(20.0)
+    why = "was replaced; the twin opens the new one within seconds"
+    assert (f"the journal {path} {why}", False) in refusals
 
 
 def test_damage_that_somebody_meets_has_the_file_set_aside_while_the_twin_records(

@@ -36,7 +36,8 @@ class Condition:
 
     All that was received up to `complete_ns`, ROS time, is written; None: it is not known. Within
     `kept_ns`, stretches of ROS time in their order, all of that is still there: what lies before
-    was deleted, or nobody recorded. `journal_id` identifies the file.
+    was deleted, or nobody recorded. `journal_id` identifies the file, and `inode` which of that
+    `path` is written; 0: none, or it is not known.
     """
 
     state: JournalState
@@ -54,6 +55,7 @@ class Condition:
     complete_ns: int | None = None
     kept_ns: tuple[tuple[int, int], ...] = ()
     journal_id: str = ""
+    inode: int = 0
 
     @property
     def is_well(self) -> bool:

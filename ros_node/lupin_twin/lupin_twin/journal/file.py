@@ -149,7 +149,7 @@ class JournalFile:
         except BaseException:  # whatever it was: nobody has this object, and could close it
             self._connection.close()
             raise
-        self._inode = self._path.stat().st_ino
+        self.inode = self._path.stat().st_ino
 
     def _salvage(self) -> None:
         """Copy what can be read of what was quarantined, now or before the last end."""
@@ -373,7 +373,7 @@ class JournalFile:
         now_s = time.monotonic()
         if now_s - self._polled_s >= _POLL_EVERY_S:
             self._polled_s = now_s
-            if not self._path.exists() or self._path.stat().st_ino != self._inode:
+            if not self._path.exists() or self._path.stat().st_ino != self.inode:
                 raise FileNotFoundError(f"{self._path} was removed or replaced")
         if self._log_bytes() > _LOG_BYTES:
             self._connection.execute("PRAGMA wal_checkpoint(PASSIVE)").fetchall()

@@ -429,17 +429,16 @@ class Journal:
             simulated_ns=file.simulated,
             kept_ns=file.kept(),
             journal_id=file.journal_id,
+            inode=file.inode,
         )
 
     def _report_failure(self, error: Exception) -> None:
-        match error:
-            case InUse():
-                self._report(JournalState.IN_USE, str(error))
-            case Foreign():
-                self._report(JournalState.FOREIGN, str(error))
-            case _:
-                detail = f"the journal {self._path} cannot be written: {error}"
-                self._report(JournalState.FAILING, detail)
+        state, detail = JournalState.FAILING, f"the journal {self._path} cannot be written: {error}"
+        if isinstance(error, InUse):
+            state, detail = JournalState.IN_USE, str(error)
+        elif isinstance(error, Foreign):
+            state, detail = JournalState.FOREIGN, str(error)
+        self._report(state, detail, inode=0)
 
     def _report(self, state: JournalState, detail: str, **known: Any) -> None:
         self._reported = replace(self._reported, state=state, detail=detail, **known)

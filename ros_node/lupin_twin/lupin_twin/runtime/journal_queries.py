@@ -95,9 +95,10 @@ class Recall:
         def should_stop() -> bool:
             return is_abandoned() or time.monotonic() > until_s
 
-        path = self._path()
+        condition = self._readable()
+        path = Path(condition.path)
         try:
-            answer = self._run(path, search, should_stop)
+            answer = self._run(path, condition.inode, search, should_stop)
         except (*FILE_ERRORS, Foreign, OSError) as error:
             if not should_stop():
                 if is_damage_error(error):
@@ -112,18 +113,20 @@ class Recall:
             f"the journal did not answer within {self._max_s:g} s; ask for less", is_lasting=False
         )
 
-    def _path(self) -> Path:
+    def _readable(self) -> Condition:
         condition = self._condition()
         if condition.state is JournalState.IN_USE:
             raise NotRemembered(f"{condition.detail}: ask that twin", is_lasting=False)
-        return Path(condition.path)
+        return condition
 
-    def _run(self, path: Path, search: Search[AnswerT], should_stop: ShouldStop) -> AnswerT:
+    def _run(
+        self, path: Path, inode: int, search: Search[AnswerT], should_stop: ShouldStop
+    ) -> AnswerT:
         with self._changed:
             self._running += 1
         opened = None
         try:
-            opened = self._take(path)
+            opened = self._take(path, inode)
             connection = opened.connection
             connection.set_progress_handler(should_stop, _STEPS)
             connection.execute("BEGIN")
@@ -136,8 +139,15 @@ class Recall:
         self._put_back(opened, is_sound=True)
         return answer
 
-    def _take(self, path: Path) -> _Open:
+    def _take(self, path: Path, inode: int) -> _Open:
         status = path.stat()
+        if inode not in (0, status.st_ino):
+            # Its index is found by name, `-shm`. SQLite would begin it anew under the writer, which
+            # has it in its memory for the other file: SIGBUS.
+            raise NotRemembered(
+                f"the journal {path} was replaced; the twin opens the new one within seconds",
+                is_lasting=False,
+            )
         file = (status.st_dev, status.st_ino)
         while True:
             with self._changed:

@@ -4,8 +4,6 @@ After each lot both bridges tell what comes next, and after some of them all tha
 valid: states, fields, the map.
 """
 
-from __future__ import annotations
-
 import json
 import random
 from collections.abc import Callable, Iterator

@@ -1,7 +1,5 @@
 """Twin, forwarder, PostgreSQL and page as whole processes, killed at random moments under load."""
 
-from __future__ import annotations
-
 import signal
 import time
 from contextlib import ExitStack

@@ -1,7 +1,5 @@
 """What a disk can do to the journal: run full, turn read-only, be slow, lose power."""
 
-from __future__ import annotations
-
 import os
 import random
 import subprocess

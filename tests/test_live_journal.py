@@ -1,7 +1,5 @@
 """What a twin shows whose journal is not what it should be: where it is told, and how it heals."""
 
-from __future__ import annotations
-
 import sqlite3
 import time
 from collections.abc import Callable

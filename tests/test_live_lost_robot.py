@@ -1,7 +1,5 @@
 """A robot that is lost pins a tag kilometres away: the site stays usable, and says which tag."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from typing import Any
 

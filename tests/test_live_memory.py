@@ -1,7 +1,5 @@
 """What a twin still knows after it was killed, started again, or started twice."""
 
-from __future__ import annotations
-
 import random
 import time
 from pathlib import Path

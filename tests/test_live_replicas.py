@@ -1,7 +1,5 @@
 """Two bridges, one twin: the same answers from both, and the end of one is not the other's."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from contextlib import ExitStack
 from functools import partial

@@ -1,7 +1,5 @@
 """The robot's layer over DDS, in `serve` and `web`, from publishers of standard messages only."""
 
-from __future__ import annotations
-
 import math
 import re
 import time

@@ -5,8 +5,6 @@ are gone in the end, memory stays within a bound, and a healthy client gets ever
 if nothing were.
 """
 
-from __future__ import annotations
-
 import ctypes
 import socket
 import struct

@@ -1,7 +1,5 @@
 """What was observed when: the same from a twin's bridge and from one that follows its topics."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from typing import Any

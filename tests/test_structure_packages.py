@@ -1,7 +1,5 @@
 """What a robot's tools read: dependencies that are really used, files that are really there."""
 
-from __future__ import annotations
-
 import ast
 import json
 import os

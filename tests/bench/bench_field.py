@@ -6,8 +6,6 @@ The loop is `tests/oracle_idw.py`, the definition written down. Where it would t
 over a sample of the cells, and the table says so. Times are the best of several runs.
 """
 
-from __future__ import annotations
-
 import sys
 import time
 from collections.abc import Callable, Sequence

@@ -6,8 +6,6 @@ The export (alone with `--export`) is read to its end; its memory is the server'
 process that looks back for it.
 """
 
-from __future__ import annotations
-
 import random
 import statistics
 import sys

@@ -1,7 +1,5 @@
 """From a source to listeners: pace, status, watch; and that nothing is left behind."""
 
-from __future__ import annotations
-
 import asyncio
 import itertools
 import json

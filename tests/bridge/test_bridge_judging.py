@@ -1,7 +1,5 @@
 """A defect in judging costs a tag, or a state, its status; the frames go on."""
 
-from __future__ import annotations
-
 import asyncio
 from typing import Any
 

@@ -1,7 +1,5 @@
 """What listeners get of a twin that is silent: a sign of life, for the line is not what failed."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 from tests.bridge.test_bridge import Stage, state

@@ -1,7 +1,5 @@
 """The OpenAPI document: complete, and to be had without ROS."""
 
-from __future__ import annotations
-
 import json
 import subprocess
 import sys

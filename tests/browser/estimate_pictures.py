@@ -6,8 +6,6 @@ the pictures are taken, scan by scan, so that what was foretold is graded by rea
 really had then. For the last picture a tag is scanned whose sensor has gone wrong.
 """
 
-from __future__ import annotations
-
 import io
 import tempfile
 import time

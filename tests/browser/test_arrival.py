@@ -1,7 +1,5 @@
 """What the page shows as the greenhouse comes to be known: at once, in full, and honestly."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterator
 

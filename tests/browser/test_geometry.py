@@ -1,7 +1,5 @@
 """Where things lie, by pixel: the field upright, pins on their cells, the map turned by its yaw."""
 
-from __future__ import annotations
-
 import colorsys
 import json
 import math

@@ -1,7 +1,5 @@
 """What no server should send: it is dropped, counted and told, and nothing blanks."""
 
-from __future__ import annotations
-
 import copy
 import json
 import re

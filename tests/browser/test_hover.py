@@ -1,7 +1,5 @@
 """The mouse on a pin: a card in short, which is never in the way."""
 
-from __future__ import annotations
-
 import re
 
 from playwright.sync_api import Locator, expect

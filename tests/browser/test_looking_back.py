@@ -1,7 +1,5 @@
 """The page looks back: what it shows is what the journal has, and nobody can take it for now."""
 
-from __future__ import annotations
-
 import re
 import time
 from collections.abc import Iterator

@@ -1,7 +1,5 @@
 """Tags that a lost robot pinned far away: the page opens on the others, and lists those."""
 
-from __future__ import annotations
-
 import json
 import re
 from collections.abc import Iterator

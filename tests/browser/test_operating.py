@@ -1,7 +1,5 @@
 """The operator's hands: sensors, table, layers, range, units; by mouse and by keyboard alone."""
 
-from __future__ import annotations
-
 import re
 from urllib.parse import parse_qs, urlsplit
 

@@ -1,7 +1,5 @@
 """When something is gone: nothing looks fresh that is not, and the page heals without a reload."""
 
-from __future__ import annotations
-
 import re
 from functools import partial
 from urllib.parse import urlsplit

@@ -1,7 +1,5 @@
 """What leaves the page: links, CSV, PNG, and the settings that a browser keeps."""
 
-from __future__ import annotations
-
 import csv
 import io
 import math

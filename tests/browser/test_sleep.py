@@ -1,7 +1,5 @@
 """A machine that slept: nothing is live, and nothing has an age, before a fresh state has come."""
 
-from __future__ import annotations
-
 import re
 
 from playwright.sync_api import WebSocketRoute, expect

@@ -1,7 +1,5 @@
 """Twin, bridge and server in the test's own process and event loop, to look inside."""
 
-from __future__ import annotations
-
 import asyncio
 import gc
 import os

@@ -1,7 +1,5 @@
 """A twin over a file, without ROS: its clocks are set by hand, its observations made by hand."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The other side of the topics: a ROS node of the test's own, in the test's own process."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from types import TracebackType
 from typing import Any, Self, TypeVar

@@ -1,7 +1,5 @@
 """The doorman of a live bridge: foreign hosts and pages, tokens, and a discreet log."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Proxies and the path prefix: whose word counts, and what the application sees."""
 
-from __future__ import annotations
-
 import asyncio
 import itertools
 from collections.abc import Iterable, Iterator

@@ -1,7 +1,5 @@
 """TLS: bad files are told before anything starts, and good ones make https and wss."""
 
-from __future__ import annotations
-
 import signal
 import socket
 import ssl

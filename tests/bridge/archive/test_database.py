@@ -1,7 +1,5 @@
 """The archive's tables, and who may do what with them."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import psycopg

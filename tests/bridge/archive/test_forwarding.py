@@ -1,7 +1,5 @@
 """What a journal has is in the archive afterwards, row for row, whatever becomes of the journal."""
 
-from __future__ import annotations
-
 import json
 import shutil
 import socket

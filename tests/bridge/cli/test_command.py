@@ -1,7 +1,5 @@
 """The command: its options, ROS's arguments, and one clear line where something is wrong."""
 
-from __future__ import annotations
-
 import signal
 from collections.abc import Iterator
 from pathlib import Path

@@ -1,7 +1,5 @@
 """`lupin-twin journal`: which file it takes, what it says of it, and how it ends."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 from contextlib import closing

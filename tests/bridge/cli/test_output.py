@@ -1,7 +1,5 @@
 """Where a command writes: standard streams that are full, closed, or read by nobody."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys

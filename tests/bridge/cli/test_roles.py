@@ -1,7 +1,5 @@
 """The roles as processes: what stops them at once, what they show, and how they end."""
 
-from __future__ import annotations
-
 import os
 import signal
 import socket

@@ -1,7 +1,5 @@
 """Every sensor's report is fetched; tags that have changed are passed on when they are others."""
 
-from __future__ import annotations
-
 import asyncio
 import math
 from typing import Any

@@ -1,7 +1,5 @@
 """The twin of this process: its past, which is the journal's."""
 
-from __future__ import annotations
-
 import asyncio
 import time
 from pathlib import Path

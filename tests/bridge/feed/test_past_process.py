@@ -1,7 +1,5 @@
 """The process that looks back: asked, cancelled, killed, started again, ended with its parent."""
 
-from __future__ import annotations
-
 import asyncio
 import logging
 import os

@@ -1,7 +1,5 @@
 """The relay over a script of ROS: who hears what, how much is held, and for how long."""
 
-from __future__ import annotations
-
 import asyncio
 import weakref
 from collections.abc import Callable, Mapping

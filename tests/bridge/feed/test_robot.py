@@ -1,7 +1,5 @@
 """What is kept of a robot: the newest of each, a bounded trail, and a plan until it is done."""
 
-from __future__ import annotations
-
 import pytest
 
 from lupin_bridge.feed.robot import (

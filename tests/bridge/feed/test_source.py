@@ -1,7 +1,5 @@
 """What every source has to be: both are held to the protocol, and to what it promises."""
 
-from __future__ import annotations
-
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from dataclasses import replace

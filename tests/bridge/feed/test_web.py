@@ -1,7 +1,5 @@
 """The source of the role `web`, and a peer in place of its twin."""
 
-from __future__ import annotations
-
 import asyncio
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager

@@ -1,7 +1,5 @@
 """The ROS side of the role `web`: a real node, and a peer that plays the twin."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any

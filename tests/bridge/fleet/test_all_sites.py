@@ -1,7 +1,5 @@
 """Alarms of all sites, the worst first; one sensor of several, the outlier first."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass

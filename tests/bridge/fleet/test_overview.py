@@ -1,7 +1,5 @@
 """The page over all sites: who lives, how each one is, and what is said where nobody knows."""
 
-from __future__ import annotations
-
 import time
 from dataclasses import replace
 from itertools import chain

@@ -1,7 +1,5 @@
 """Accounts and tokens for some sites of a fleet: they read those, and learn of no other."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

@@ -1,7 +1,5 @@
 """Three replicas behind a real nginx as the guide configures it: one answer, and one is lost."""
 
-from __future__ import annotations
-
 import signal
 import threading
 import time

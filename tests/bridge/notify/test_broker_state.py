@@ -1,7 +1,5 @@
 """What a broker has to be told: what is new, once, and the newest of it."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Mapping
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """The webhook and a real receiver: refusing, hanging, slow, failing, and then taking all of it."""
 
-from __future__ import annotations
-
 import asyncio
 from collections.abc import AsyncIterator, Callable, Iterator
 from contextlib import asynccontextmanager

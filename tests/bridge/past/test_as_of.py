@@ -1,7 +1,5 @@
 """Answers as of a moment: what they say, and ETags that stand for exactly that."""
 
-from __future__ import annotations
-
 import json
 import math
 from collections.abc import Callable, Sequence

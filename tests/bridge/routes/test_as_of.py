@@ -1,7 +1,5 @@
 """State, tag, field, quality and health as of a moment, over HTTP."""
 
-from __future__ import annotations
-
 import asyncio
 import threading
 from dataclasses import replace

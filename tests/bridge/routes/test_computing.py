@@ -1,7 +1,5 @@
 """Computed answers: once for all, only while somebody waits, and the small ones never behind."""
 
-from __future__ import annotations
-
 import asyncio
 import threading
 from collections.abc import AsyncIterator, Callable

@@ -1,7 +1,5 @@
 """The export: as fast as its reader takes it, within its limits, and never whole when it is not."""
 
-from __future__ import annotations
-
 import asyncio
 import json
 import math

@@ -1,7 +1,5 @@
 """The field over HTTP, beside the same field over the ROS service of the same twin."""
 
-from __future__ import annotations
-
 import io
 import json
 import math

@@ -1,7 +1,5 @@
 """`/foxglove` in the test's own process: what a slow client costs and gets, and simulated time."""
 
-from __future__ import annotations
-
 import asyncio
 import json
 from typing import Any

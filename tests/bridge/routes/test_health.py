@@ -1,7 +1,5 @@
 """Liveness and readiness: of a live bridge, and of one whose ROS thread has ended."""
 
-from __future__ import annotations
-
 import asyncio
 import json
 import sys

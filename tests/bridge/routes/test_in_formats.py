@@ -1,7 +1,5 @@
 """One answer in every format, and what becomes of a refusal, without a twin."""
 
-from __future__ import annotations
-
 import asyncio
 from typing import Any
 

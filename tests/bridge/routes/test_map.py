@@ -1,7 +1,5 @@
 """The map: none before one has come, then where it is and how it looks, pixel by pixel."""
 
-from __future__ import annotations
-
 import io
 import math
 from collections.abc import Iterator

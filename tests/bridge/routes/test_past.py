@@ -1,7 +1,5 @@
 """History and timeline over HTTP, over a past that is made up."""
 
-from __future__ import annotations
-
 import asyncio
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager

@@ -1,7 +1,5 @@
 """People at a bridge: who may, what they say, who hears of it. A real server, real sockets."""
 
-from __future__ import annotations
-
 import re
 import socket
 import tempfile

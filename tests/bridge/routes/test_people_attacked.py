@@ -1,7 +1,5 @@
 """What people say, and who may, as an attacker tries it. A real server, real sockets."""
 
-from __future__ import annotations
-
 import json
 import socket
 import tempfile

@@ -1,7 +1,5 @@
 """`/rosbridge` of a real `lupin-twin serve`: by hand over a WebSocket, ROS on the other side."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import pytest

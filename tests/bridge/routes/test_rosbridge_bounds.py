@@ -1,7 +1,5 @@
 """`/rosbridge` in the test's own process, with a twin that can be held up: what bounds a client."""
 
-from __future__ import annotations
-
 import asyncio
 import json
 from collections.abc import Callable

@@ -1,7 +1,5 @@
 """Signing in: the page, the exchange, and the cookie's bounds."""
 
-from __future__ import annotations
-
 import json
 import re
 import time

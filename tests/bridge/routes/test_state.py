@@ -1,7 +1,5 @@
 """The state over WebSocket and HTTP, from a real twin that a real peer feeds."""
 
-from __future__ import annotations
-
 import json
 import re
 from collections.abc import Iterator

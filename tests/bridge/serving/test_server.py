@@ -1,7 +1,5 @@
 """The server: its socket, its limits, and its end, with clients connected."""
 
-from __future__ import annotations
-
 import faulthandler
 import resource
 import select

@@ -1,7 +1,5 @@
 """The connection under the fan-out: real sockets, some of which are not read."""
 
-from __future__ import annotations
-
 import asyncio
 import re
 import socket

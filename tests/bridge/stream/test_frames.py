@@ -1,7 +1,5 @@
 """Frames: numbered, made once, and of the contract's types."""
 
-from __future__ import annotations
-
 import json
 from collections import Counter
 from dataclasses import replace

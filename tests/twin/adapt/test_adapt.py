@@ -1,7 +1,5 @@
 """`lupin-twin adapt` and a twin, each in a process of its own; standard messages alone come in."""
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager

@@ -1,7 +1,5 @@
 """Fixed sensors at a real broker, on the state of a twin that has never heard of MQTT."""
 
-from __future__ import annotations
-
 import json
 import time
 from collections.abc import Iterator

@@ -1,7 +1,5 @@
 """`lupin-twin adapt` on a robot that says by TF where it is, and by apriltag_ros what it sees."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path

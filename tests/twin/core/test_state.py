@@ -1,7 +1,5 @@
 """The store, rule by rule; no ROS here."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 from collections.abc import Callable

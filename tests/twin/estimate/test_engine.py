@@ -1,7 +1,5 @@
 """Which readings count, and what an estimate is made of."""
 
-from __future__ import annotations
-
 import pytest
 
 from lupin_twin.core.state import NANOSECONDS_PER_SECOND

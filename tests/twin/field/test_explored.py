@@ -1,7 +1,5 @@
 """Which cells of a field lie on ground that the map knows."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Where another tag could stand."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """The grid's cells: how many, where their centres lie, and how float noise adds none."""
 
-from __future__ import annotations
-
 import math
 from fractions import Fraction
 from typing import Any

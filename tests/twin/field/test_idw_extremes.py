@@ -1,7 +1,5 @@
 """The field at the extremes: numbers that overflow, and what it costs in memory and time."""
 
-from __future__ import annotations
-
 import math
 import tracemalloc
 from typing import Any

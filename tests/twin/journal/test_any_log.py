@@ -1,7 +1,5 @@
 """Whatever a log has lived through, it answers as the plainest list of all its rows would."""
 
-from __future__ import annotations
-
 import json
 import math
 from dataclasses import replace

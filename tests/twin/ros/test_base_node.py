@@ -1,7 +1,5 @@
 """What every node does alike, by a node of its own in this process."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from typing import Any
 

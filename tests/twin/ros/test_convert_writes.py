@@ -1,7 +1,5 @@
 """What was written crosses as values for robots, and as rows for who copies the log."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import pytest

@@ -1,7 +1,5 @@
 """Publishers of an input: each message once, what is lost, and a second twin on the same topic."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Iterable
 from pathlib import Path

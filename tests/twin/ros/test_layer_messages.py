@@ -1,7 +1,5 @@
 """Layers and marks as messages: what a viewer reads of them again."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from hypothesis import given

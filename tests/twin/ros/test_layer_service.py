@@ -1,7 +1,5 @@
 """Layers and markers over real DDS, of a twin below a namespace, in a process of its own."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Iterator
 from pathlib import Path

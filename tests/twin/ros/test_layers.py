@@ -1,7 +1,5 @@
 """Fields as points: each known cell once, where it lies, and how far off it is."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """What is marked of tags and planters: where, once each, and how old it looks."""
 
-from __future__ import annotations
-
 import pytest
 
 from lupin_twin.core.state import Flower, Pose, Snapshot, TagState

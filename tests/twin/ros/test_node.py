@@ -1,7 +1,5 @@
 """The node over real DDS: every test talks to a twin in a process of its own."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 from typing import Any

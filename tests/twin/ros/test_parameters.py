@@ -1,7 +1,5 @@
 """Parameters as ROS hands them over; real nodes, in this process."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any

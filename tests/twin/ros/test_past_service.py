@@ -1,7 +1,5 @@
 """The services of the past, over DDS, of a twin without a journal."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import pytest

@@ -1,7 +1,5 @@
 """What estimates are worth: scans held against other tags, changed sensors, where a tag helps."""
 
-from __future__ import annotations
-
 import math
 from contextlib import closing
 from dataclasses import replace

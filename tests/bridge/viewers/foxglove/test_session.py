@@ -1,7 +1,5 @@
 """One client of Foxglove's protocol: what it may have, and what it gets where it is slow."""
 
-from __future__ import annotations
-
 import json
 from typing import Any
 

@@ -1,7 +1,5 @@
 """One rosbridge client's state: subscriptions, levels, pace; and what each message leads to."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import replace
 from typing import Any

@@ -44,11 +44,7 @@ def scattered(count: int, side: float, away: float = 0.0) -> list[FieldSample]:
     ]
 
 
-def field(
-    samples: Sequence[FieldSample],
-    side: float,
-    cells: int,
-) -> FieldGrid:
+def field(samples: Sequence[FieldSample], side: float, cells: int) -> FieldGrid:
     return compute_idw_field(
         samples,
         bbox_min_x=0.0,

@@ -17,15 +17,7 @@ from pathlib import Path
 
 import httpx
 
-from tests.bench.journal_double import (
-    MONTH,
-    QUICK_MONTH,
-    QUICK_YEAR,
-    SECOND,
-    YEAR,
-    House,
-    filled,
-)
+from tests.bench.journal_double import MONTH, QUICK_MONTH, QUICK_YEAR, SECOND, YEAR, House, filled
 from tests.support.domains import own_domain
 from tests.support.proc_stat import peak_mb, reset_peak, resident_mb
 from tests.support.processes import limits, lupin_twin, url_of

@@ -49,10 +49,7 @@ CHANGED_SCANS: Final = 5
 APART_S: Final = 2
 READY_S: Final = 120.0
 # Of each picture how long before now, s.
-PAST: Final = {
-    "estimate-early": BEGUN_S - 16,
-    "estimate-dead": RESUMED_S + 1,
-}
+PAST: Final = {"estimate-early": BEGUN_S - 16, "estimate-dead": RESUMED_S + 1}
 
 
 def taken(browser: Browser, folder: Path) -> None:

@@ -219,11 +219,7 @@ def test_a_map_with_a_yaw_lies_turned_about_its_origin(domain: int, open_page: O
         orientation=Quaternion(z=math.sin(yaw / 2), w=math.cos(yaw / 2)),
     )
     # No two turns or mirrorings of this look the same.
-    rows = [
-        [100, 0, 0, 100],
-        [0, 0, 100, -1],
-        [-1, 0, 0, 0],
-    ]
+    rows = [[100, 0, 0, 100], [0, 0, 100, -1], [-1, 0, 0, 0]]
     with bridge(domain=domain) as running:
         running.peer.publish_map(occupancy_grid(rows, resolution=0.5, origin=origin))
         running.peer.observe(scan("a", {"co2": 900.0}, at=(1, 0)))

@@ -90,10 +90,7 @@ HOSTILE: Final[dict[str, Callable[[Frame], Any]]] = {
     "a footprint of holes": tag_with(box_footprint={"points": [None] * 5}),
     "a bloom nowhere": tag_with(flowers=[{"species": "rose"}]),
     "blooms without end": tag_with(flowers=[{}] * 20_000),
-    "tags without end": lambda frame: {
-        **frame,
-        "state": {**frame["state"], "tags": [{}] * 60_000},
-    },
+    "tags without end": lambda frame: {**frame, "state": {**frame["state"], "tags": [{}] * 60_000}},
     "a status without a twin": lambda _: {"type": "status"},
     "a status of another twin": lambda _: {"type": "status", "twin": {"live": True}},
 }

@@ -6,12 +6,7 @@ from pathlib import Path
 import httpx
 import pytest
 
-from lupin_bridge.access.middleware import (
-    GUESS_BURST,
-    MAX_TARGET_BYTES,
-    OPEN_PATHS,
-    Access,
-)
+from lupin_bridge.access.middleware import GUESS_BURST, MAX_TARGET_BYTES, OPEN_PATHS, Access
 from lupin_bridge.settings import SettingError, Settings
 from lupin_bridge.stream import schema
 from tests.support.access import BEARER, OWN, TOKEN, Served, refused_start, served
@@ -41,9 +36,7 @@ def open_bridge() -> Iterator[Served]:
 
 
 @pytest.fixture(scope="module")
-def closed(
-    tmp_path_factory: pytest.TempPathFactory,
-) -> Iterator[Served]:
+def closed(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Served]:
     """With a token; at its end, its log is searched for it."""
     with served(LUPIN_TOKEN=TOKEN, ROS_LOG_DIR=str(tmp_path_factory.mktemp("log"))) as running:
         yield running

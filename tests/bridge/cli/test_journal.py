@@ -279,10 +279,7 @@ def test_export_writes_the_rows_of_a_period_as_the_route_does(
 
 
 def test_export_has_the_units_of_the_operators_file(
-    capsys: pytest.CaptureFixture[str],
-    monkeypatch: pytest.MonkeyPatch,
-    path: Path,
-    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, path: Path, tmp_path: Path
 ) -> None:
     sensors, settings = tmp_path / "own.json", tmp_path / "own.toml"
     own = files("lupin_bridge").joinpath("sensors.json").read_text(encoding="utf-8")

@@ -7,14 +7,7 @@ from typing import Any
 
 import pytest
 
-from lupin_bridge.feed.relay import (
-    Listening,
-    NotRelayedError,
-    Relay,
-    RosTime,
-    Sample,
-    Topic,
-)
+from lupin_bridge.feed.relay import Listening, NotRelayedError, Relay, RosTime, Sample, Topic
 from lupin_bridge.feed.source import TwinUnavailableError
 from tests.support.waiting import until
 

@@ -104,9 +104,7 @@ async def test_a_source_tells_of_every_change_and_of_what_it_is_asked(
         assert len(set(revisions)) == 3
 
         history = await until_answered(
-            lambda: source.ask(Itself(LatestRequest("1", source.buffer_len)), 0.0),
-            "the scan",
-            bool,
+            lambda: source.ask(Itself(LatestRequest("1", source.buffer_len)), 0.0), "the scan", bool
         )
         assert [(scan.stamp_ns, scan.readings[0].value) for scan in history] == [
             (5_000_000_000, 400.0)

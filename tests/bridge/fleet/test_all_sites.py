@@ -143,10 +143,7 @@ def test_what_people_said_of_an_alarm_is_beside_it(every: All) -> None:
     assert not {"acknowledged_by", "shelved_by"} & {*first, *second}
     now_ns = time.time_ns()
     for number, (kind, alarm, until_ns) in enumerate(
-        (
-            ("acknowledge", first, "NULL"),
-            ("shelve", second, str(now_ns + HOUR_S * SECOND)),
-        )
+        (("acknowledge", first, "NULL"), ("shelve", second, str(now_ns + HOUR_S * SECOND)))
     ):
         note_id = f"{number + 1:016x}beef"
         archive.do(

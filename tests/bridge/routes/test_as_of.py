@@ -73,9 +73,7 @@ async def test_what_is_made_of_a_days_readings_is_asked_for_like_a_sensor(domain
     state = house()
     lit = replace(state.tags[0], readings=(Reading("light", 54_000.0, 39 * hour_ns),))
     past = MadeUp(
-        points={("a/b", "light"): points},
-        snapshot=replace(state, tags=(lit,)),
-        now_ns=40 * hour_ns,
+        points={("a/b", "light"): points}, snapshot=replace(state, tags=(lit,)), now_ns=40 * hour_ns
     )
     async with remembering(past) as it:
         path = "/api/field.json?sensor_type=daily_light_integral&resolution=0.5"
@@ -183,7 +181,4 @@ async def test_what_nobody_remembers_is_told(domain: int, is_lasting: bool, stat
     async with remembering(past) as it:
         for path in PATHS:
             answer = await it.http.get(f"{path}&at=9")
-            assert (answer.status_code, answer.json()) == (
-                status,
-                {"detail": "no journal is kept"},
-            )
+            assert (answer.status_code, answer.json()) == (status, {"detail": "no journal is kept"})

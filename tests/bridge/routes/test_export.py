@@ -82,7 +82,7 @@ async def test_the_same_rows_come_as_parquet_with_units_and_coordinates(domain: 
         assert table.num_rows == sum(map(len, past.lots))
         first, last = table.slice(0, 1), table.slice(table.num_rows - 1)
         assert table.column_names == [
-            *("time", "tag_id", "x_m", "y_m", "sensor", "unit", "value", "status", "source"),
+            *("time", "tag_id", "x_m", "y_m", "sensor", "unit", "value", "status", "source")
         ]
         assert first["time"].cast("int64").to_pylist() == [NS]
         assert first.drop(["time"]).to_pylist() == [

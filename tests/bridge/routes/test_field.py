@@ -219,8 +219,7 @@ def test_a_bad_request_gets_get_fields_failure_body(
 
 
 @pytest.mark.parametrize(
-    ("resolution", "far"),
-    [(1e-9, 1_000.0), (1e-38, 1e38), (1e-45, 3.4e38), (0.001, 1_001.0)],
+    ("resolution", "far"), [(1e-9, 1_000.0), (1e-38, 1e38), (1e-45, 3.4e38), (0.001, 1_001.0)]
 )
 def test_a_grid_bomb_is_refused_over_http_as_over_ros(
     live: Bridge, resolution: float, far: float

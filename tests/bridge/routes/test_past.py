@@ -12,14 +12,7 @@ from lupin_bridge.feed.query import PastQuery
 from lupin_bridge.feed.source import TwinTimeoutError, TwinUnavailableError
 from lupin_bridge.past import schema
 from lupin_bridge.serving.admission import Limits
-from lupin_twin.core.past import (
-    Event,
-    NotRemembered,
-    PastRefused,
-    SeriesPast,
-    SeriesRequest,
-    grid,
-)
+from lupin_twin.core.past import Event, NotRemembered, PastRefused, SeriesPast, SeriesRequest, grid
 from tests.support.inprocess import Running, running
 from tests.support.past import NS, MadeUp, look_up
 from tests.support.waiting import until

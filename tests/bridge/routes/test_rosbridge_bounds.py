@@ -16,15 +16,7 @@ from lupin_bridge.stream.frames import StateFrame
 from lupin_bridge.viewers.rosbridge_session import Reaction, Session
 from tests.support import inprocess
 from tests.support.raw_ws import deaf
-from tests.support.rosbridge import (
-    FIELD,
-    FIELD_ARGS,
-    LARGE_CALL,
-    TOPIC,
-    Ros,
-    masked,
-    ros_at,
-)
+from tests.support.rosbridge import FIELD, FIELD_ARGS, LARGE_CALL, TOPIC, Ros, masked, ros_at
 from tests.support.waiting import until
 
 

@@ -91,12 +91,7 @@ def test_a_twin_that_is_well_is_ok_in_all() -> None:
         ),
         ("queues", {"counts": Counts({"lost": 5})}, OK, "nothing lost"),
         ("stamps", {"late": {"robot": 9}}, WARN, "behind their own earlier ones from robot"),
-        (
-            "journal",
-            {"journal": Condition(JournalState.FAILING, "no room")},
-            ERROR,
-            "no room",
-        ),
+        ("journal", {"journal": Condition(JournalState.FAILING, "no room")}, ERROR, "no room"),
         ("twins", {"twins": 2}, ERROR, "2 twins"),
     ],
 )

@@ -15,16 +15,7 @@ from lupin_twin.journal.appending import Appender
 from lupin_twin.journal.hours import count_rows
 from lupin_twin.journal.queries import Export, lots, newest, series
 from lupin_twin.journal.schema import SiteLog
-from tests.support.log_life import (
-    BEGUN,
-    LATEST,
-    MINUTE,
-    Life,
-    check,
-    one_run,
-    periods,
-    steps,
-)
+from tests.support.log_life import BEGUN, LATEST, MINUTE, Life, check, one_run, periods, steps
 from tests.twin.journal.conftest import Engines, Living
 
 END = BEGUN + (LATEST + 200) * MINUTE

@@ -7,12 +7,7 @@ from hypothesis import strategies as st
 from rclpy.serialization import deserialize_message, serialize_message
 from visualization_msgs.msg import Marker, MarkerArray
 
-from lupin_twin.ros.layers import (
-    COLOURS,
-    MarkerArrays,
-    TagMark,
-    tag_markers,
-)
+from lupin_twin.ros.layers import COLOURS, MarkerArrays, TagMark, tag_markers
 
 TAGS = st.builds(
     TagMark,

@@ -39,11 +39,7 @@ class Twin:
 
 
 def running_twin(*ros_args: str) -> Iterator[Twin]:
-    with (
-        own_domain() as domain,
-        twin_node(domain, *ros_args) as process,
-        Peer(domain) as peer,
-    ):
+    with own_domain() as domain, twin_node(domain, *ros_args) as process, Peer(domain) as peer:
         peer.wait_for_twin()
         yield Twin(process, peer)
 

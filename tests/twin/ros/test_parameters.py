@@ -12,12 +12,7 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 
 from lupin_twin.core.parameters import ParameterError, TwinParameters
-from lupin_twin.ros.parameters import (
-    AdjustableNode,
-    declare,
-    naming,
-    naming_own_parameters,
-)
+from lupin_twin.ros.parameters import AdjustableNode, declare, naming, naming_own_parameters
 
 
 @contextmanager

@@ -90,17 +90,6 @@ def numbers(path: Path) -> list[int]:
     return [stamp - NOW for (stamp,) in rows if isinstance(stamp, int)]
 
 
-def test_a_full_disk_is_told_and_what_waits_is_written_when_there_is_room(disk: Disk) -> None:
-    with feeding(disk) as told:
-        told.wait("recording", written=50)
-        disk.be("full")
-        told.wait("failing", "full")
-        disk.be("well")
-        told.wait("recording", written=told.last[1] + 200)
-    found = numbers(disk.folder / "j.sqlite")
-    assert found == list(range(1, len(found) + 1))
-
-
 def test_a_disk_that_is_full_from_the_start_heals_too(disk: Disk) -> None:
     disk.be("full")
     with feeding(disk) as told:

@@ -55,12 +55,3 @@ def test_latched_observations_heard_again_are_not_written_twice(
         for table in ("scan", "look", "place")
     }
     assert rows == {"scan": [(1,)], "look": [(1,)], "place": [(2,)]}
-
-
-def test_off_keeps_nothing(domain: int, tmp_path: Path) -> None:
-    for known in (False, False):
-        with twin_node(domain, *OFTEN, "-p", "journal:=off"), Peer(domain) as client:
-            client.listen()
-            assert bool(client.state(lambda state: True, "a state").tags) is known
-            client.observe(scan("1", {"t": 1.0}))
-            client.tag("1")

@@ -9,7 +9,6 @@ import pytest
 
 from lupin_bridge.past import fields, plans
 from lupin_bridge.stream import schema
-from lupin_twin.core.past import NotRemembered
 from lupin_twin.core.state import Pose, Reading, Snapshot, TagState
 from lupin_twin.field import engine
 from tests.bridge.routes.test_past import remembering
@@ -173,12 +172,3 @@ async def test_what_has_not_come_and_what_is_no_moment_is_refused_for_nothing(do
         answer = await it.http.get("/api/field?sensor_type=co2&resolution=0&at=9")
         assert "resolution" in answer.json()["error_message"]
         assert past.asked == []
-
-
-@pytest.mark.parametrize(("is_lasting", "status"), [(True, 404), (False, 503)])
-async def test_what_nobody_remembers_is_told(domain: int, is_lasting: bool, status: int) -> None:
-    past = MadeUp(error=NotRemembered("no journal is kept", is_lasting=is_lasting))
-    async with remembering(past) as it:
-        for path in PATHS:
-            answer = await it.http.get(f"{path}&at=9")
-            assert (answer.status_code, answer.json()) == (status, {"detail": "no journal is kept"})

@@ -323,26 +323,6 @@ def test_a_tag_holds_until_the_field_could_have_changed(changing: Bridge) -> Non
     assert changing.get("/api/field", {"If-None-Match": mapped}, **QUERY).status_code == 304
 
 
-def test_a_new_map_is_a_new_field() -> None:
-    with bridge(*EAGER) as clipping:
-        clipping.peer.observe(scan("1", {"temperature": 20.0}, at=(0.5, 0.5)))
-        clipping.tag("1")
-        query: dict[str, Any] = {"sensor_type": "temperature", "resolution": 1.0}
-        query |= {"bbox_min_x": 0, "bbox_min_y": 0, "bbox_max_x": 2, "bbox_max_y": 1}
-        answer = clipping.get("/api/field", **query)
-        assert answer.json()["values"] == [20.0, 20.0]
-        for cells, expected in (([[0, -1]], [20.0, None]), ([[0, 0]], [20.0, 20.0])):
-            old = answer.headers["etag"]
-            clipping.peer.publish_map(occupancy_grid(cells))
-
-            def look(old: str = old) -> Any:
-                fresh = clipping.get("/api/field", {"If-None-Match": old}, **query)
-                return fresh if fresh.status_code == 200 else None
-
-            answer = clipping.peer.until(look, "the field on the new map")
-            assert answer.json()["values"] == expected
-
-
 # --- quality ------------------------------------------------------------------------------------
 
 

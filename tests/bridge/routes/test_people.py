@@ -1,6 +1,5 @@
 """People at a bridge: who may, what they say, who hears of it. A real server, real sockets."""
 
-import re
 import socket
 import tempfile
 from collections.abc import Iterator
@@ -392,34 +391,6 @@ def test_a_body_that_nobody_wants_is_refused_before_it_comes(
 ) -> None:
     answer = raw(live, head + b"\r\nHost: localhost\r\n\r\n")
     assert answer.startswith(b"HTTP/1.1 " + status), answer
-
-
-def test_a_body_in_pieces_and_requests_behind_it_are_told_apart(live: Bridge) -> None:
-    host, port = live.url.removeprefix("http://").split(":")
-    common = f"Host: localhost\r\nX-Lupin-Twin: 1\r\nAuthorization: Bearer {TOKEN}\r\n"
-    body = '{"kind": "comment", "subject": "site", "text": "x"}'
-    post = f"POST /api/notes HTTP/1.1\r\n{common}Content-Type: application/json\r\n"
-    last = f"GET /api/session HTTP/1.1\r\n{common}Connection: close\r\n\r\n"
-    request = f"{post}Content-Length: {len(body)}\r\n\r\n{body}" * 2 + last
-    with socket.create_connection((host, int(port)), timeout=PATIENCE_S) as client:
-        client.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-        for index in range(0, len(request), 7):
-            client.sendall(request[index : index + 7].encode())
-        found = b""
-        while part := client.recv(65536):
-            found += part
-    statuses = re.findall(rb"HTTP/1\.1 (\d+)", found)
-    assert statuses == [b"403", b"403", b"200"], "the token only reads"
-
-
-def test_a_body_that_does_not_come_is_not_waited_for(live: Bridge) -> None:
-    with signed_in_once(live) as anna:
-        cookie = "; ".join(f"{name}={value}" for name, value in anna.cookies.items())
-    head = (
-        "POST /api/notes HTTP/1.1\r\nHost: localhost\r\nX-Lupin-Twin: 1\r\nConnection: close\r\n"
-        f"Content-Type: application/json\r\nCookie: {cookie}\r\nContent-Length: 10\r\n\r\n1"
-    )
-    assert raw(live, head.encode()).startswith(b"HTTP/1.1 408")
 
 
 def test_no_secret_is_logged(live: Bridge) -> None:

@@ -126,21 +126,6 @@ async def test_somebody_else_s_file_is_left_and_told_until_it_is_gone(
             await until(lambda: live.twin.journal().written == 1, "what waited")
 
 
-async def test_a_folder_that_cannot_be_written_is_told_until_it_can(
-    domain: int, tmp_path: Path
-) -> None:
-    path = tmp_path / "state" / "j.sqlite"
-    path.parent.write_text("a file where a folder should be")
-    with Peer(domain) as robot:
-        async with serve(path) as live:
-            await told(live, "failing", f"the journal {path} cannot be written")
-            robot.observe(observation("8", {"co2": 1.0}))
-            await shows(live, "8", 1.0)
-            path.parent.unlink()
-            await told(live, "recording")
-            await until(lambda: live.twin.journal().written == 1, "what waited")
-
-
 async def test_a_second_twin_says_who_has_the_file_and_takes_over(
     domain: int, tmp_path: Path
 ) -> None:

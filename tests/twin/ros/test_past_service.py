@@ -35,21 +35,6 @@ def peer() -> Iterator[Peer]:
         yield peer
 
 
-def test_the_last_scans_of_a_twin_without_a_journal_can_be_asked_for(peer: Peer) -> None:
-    response = peer.ask(GetHistory, "/twin/get_history", tag_id="a", sensor_type="co2")
-    assert response.ok, response.error_message
-    assert [(stamp.sec, stamp.nanosec) for stamp in response.stamps] == [
-        (10, 0),
-        (20, 500_000_000),
-        (30, 0),
-    ]
-    assert list(response.means) == [410.0, 420.5, 430.0]
-    assert list(response.counts) == [1, 1, 1]
-    events = peer.ask(GetHistory, "/twin/get_history", tag_id="*", sensor_type="~failures")
-    assert [stamp.sec for stamp in events.stamps] == [40]
-    assert list(events.means) == [2.0]
-
-
 def test_a_state_of_then_is_known_without_a_journal_too(peer: Peer) -> None:
     response = peer.ask(GetStateAt, "/twin/get_state_at", at=Time(sec=15))
     assert response.ok, response.error_message

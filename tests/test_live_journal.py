@@ -9,7 +9,6 @@ from typing import Any
 
 import pytest
 
-from lupin_twin.journal.beside import Lock
 from tests.support.inprocess import Running, running
 from tests.support.journal import SECOND, is_whole, kept, scan, select
 from tests.support.messages import scan as observation
@@ -124,20 +123,6 @@ async def test_somebody_else_s_file_is_left_and_told_until_it_is_gone(
             path.unlink()
             await told(live, "recording")
             await until(lambda: live.twin.journal().written == 1, "what waited")
-
-
-async def test_a_second_twin_says_who_has_the_file_and_takes_over(
-    domain: int, tmp_path: Path
-) -> None:
-    path = tmp_path / "j.sqlite"
-    with Peer(domain) as robot:
-        with Lock(path, "/gh1/lupin_twin"):
-            async with serve(path) as live:
-                await told(live, "in_use", f"the journal {path} is in use by /gh1/lupin_twin")
-        async with serve(path) as live:
-            await told(live, "recording")
-            robot.observe(observation("8", {"co2": 1.0}))
-            await shows(live, "8", 1.0)
 
 
 async def test_a_stamp_of_years_ahead_counts_as_made_on_arrival_and_is_kept_so(

@@ -328,15 +328,8 @@ def test_vacuum_says_before_and_after(capsys: pytest.CaptureFixture[str], path: 
 
 @pytest.mark.parametrize("action", ["info", "export"])
 def test_a_reader_that_goes_away_is_no_error(action: str, path: Path) -> None:
-    command = [
-        sys.executable,
-        "-m",
-        "lupin_bridge.cli.command",
-        "journal",
-        action,
-        "--journal",
-        str(path),
-    ]
+    module = [sys.executable, "-m", "lupin_bridge.cli.command"]
+    command = [*module, "journal", action, "--journal", str(path)]
     process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
     assert process.stdout is not None
     process.stdout.close()

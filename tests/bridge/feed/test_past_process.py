@@ -25,6 +25,7 @@ from lupin_twin.journal.queries import Export
 from tests.support.domains import ros_env
 from tests.support.journal import NOW, SECOND, kept, scan
 from tests.support.looking import Body, Count, Dying, Endless, Failing, MapCells, Running
+from tests.support.maps import map_of
 from tests.support.processes import Process
 from tests.support.waiting import until, wait_for
 
@@ -144,18 +145,7 @@ def test_a_map_is_sent_once(path: Path, shared: Shared) -> None:
     runner, past = shared
 
     def a_map(revision: int) -> OccupancyMap:
-        return OccupancyMap(
-            frame_id="map",
-            stamp_ns=1,
-            width=1_000,
-            height=revision,
-            resolution=0.5,
-            origin_x=0.0,
-            origin_y=0.0,
-            origin_yaw=0.0,
-            cells=np.zeros(1_000 * revision, dtype=np.int8),
-            revision=revision,
-        )
+        return map_of(np.zeros((revision, 1_000)), revision=revision)
 
     async def test() -> None:
         first, second = a_map(1), a_map(2)

@@ -29,6 +29,7 @@ from lupin_twin.field.grid import FieldGrid
 from lupin_twin.ros.node import TwinNode
 from lupin_twin.runtime.workers import LARGE_THREADS, SMALL_S, ShouldStop, Workers
 from tests.support.inprocess import Running, running
+from tests.support.maps import map_of
 from tests.support.waiting import PATIENCE_S, until
 from tests.support.web import deaf_client
 
@@ -243,19 +244,8 @@ async def test_the_state_is_written_a_few_times_a_second_and_never_old(
 def large_map() -> OccupancyMap:
     """4 million cells of noise, whose picture takes some 3 MB."""
     side = 2_000
-    cells = np.random.default_rng(1).integers(-1, 101, side * side, dtype=np.int8)
-    return OccupancyMap(
-        frame_id="map",
-        stamp_ns=0,
-        width=side,
-        height=side,
-        resolution=0.05,
-        origin_x=0.0,
-        origin_y=0.0,
-        origin_yaw=0.0,
-        cells=cells,
-        revision=1,
-    )
+    cells = np.random.default_rng(1).integers(-1, 101, (side, side), dtype=np.int8)
+    return map_of(cells, resolution=0.05)
 
 
 async def test_a_hundred_readers_of_a_map_that_do_not_read_hold_one_picture_and_two_pieces_each(

@@ -10,7 +10,7 @@ from tests.support.messages import discovered, look, pose, scan
 from tests.support.processes import OFTEN, twin_node
 from tests.support.ros import Peer
 
-ROUNDS = 4
+ROUNDS = 3
 
 
 def test_a_killed_twin_knows_all_that_was_shown_100_ms_before(domain: int, tmp_path: Path) -> None:

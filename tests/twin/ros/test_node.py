@@ -64,7 +64,7 @@ def test_a_twin_alone_publishes_an_empty_state_at_once(domain: int) -> None:
 def test_late_joiner_gets_the_latched_state_and_a_volatile_one_waits_for_the_next(
     domain: int,
 ) -> None:
-    rate = ("--ros-args", "-p", "state_publish_rate_hz:=0.2")
+    rate = ("--ros-args", "-p", "state_publish_rate_hz:=0.5")
     with twin_node(domain, *rate), Peer(domain, "first") as first:
         first.state(lambda _: True, "the first state")
         with Peer(domain, "late") as late:

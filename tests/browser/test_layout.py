@@ -405,8 +405,8 @@ _CUT_REASONS = """() => [...document.querySelectorAll(
 LANGUAGES = {
     "en": ("tags contribute", "20.0"),
     "de": ("Messpunkte tragen bei", "20,0"),
-    "nl": ("meetpunten dragen bij", "20,0"),
-    "es": ("puntos contribuyen", "20,0"),
+    "nl": ("meetpunten tellen mee", "20,0"),
+    "es": ("puntos aportan datos", "20,0"),
 }
 
 

@@ -1,5 +1,5 @@
 /** Why a tag or the house has its verdict, in words. */
-import type { HealthReason, Verdict } from '../contract/types';
+import type { HealthReason } from '../contract/types';
 import { S } from '../strings';
 import { digitsApart, durationText, readingText, shortAgeText, valueText } from './format';
 import { isOfRange, sideOf } from './health';
@@ -30,9 +30,8 @@ export function reasonText(
     const more = digitsOf(sensor, reason, unit);
     return R.range(
       `${label} ${readingText(sensor, reason.value, unit, more)}`,
-      sideText(sensor, reason),
-      valueText(sensor, reason.limit, unit, more),
-      reason.verdict === 'critical' && !isMarked,
+      limitText(reason, (value) => valueText(sensor, value, unit, more)),
+      reason.verdict === 'critical' && !isMarked && reason.release === undefined,
     );
   }
   switch (kind) {
@@ -69,23 +68,25 @@ export function reasonText(
 /** How many digits more a value that is out of its range has, wherever it stands. */
 export const digitsOf = (
   sensor: Sensor,
-  { value, limit }: { readonly value: number; readonly limit: number },
+  { value, limit, release }: OfRange,
   unit: TemperatureUnit,
-): number => digitsApart(sensor, [value], limit, unit);
+): number =>
+  Math.max(...[limit, release ?? limit].map((edge) => digitsApart(sensor, [value], edge, unit)));
 
 type OfRange = HealthReason & { readonly value: number; readonly limit: number };
 
-/**
- * Whether the value is back in an ideal range, and has yet to pass a limit that the file has not.
- * Of a file that is not here, or has other ranges, nothing is.
- */
-export const isBack = ({ ideals }: Sensor, { verdict, value, limit }: OfRange): boolean =>
-  verdict === 'stressed' &&
-  !ideals.flat().includes(limit) &&
-  ideals.some(([low, high]) => value >= low && value <= high);
+/** Whether the value is back in its ideal range, and has yet to lie well within. */
+export const isBack = ({ release, verdict }: HealthReason): boolean =>
+  release !== undefined && verdict === 'stressed';
 
-const sideText = (sensor: Sensor, reason: OfRange): string =>
-  (isBack(sensor, reason) ? S.reasons.sidesBack : S.reasons.sides)[sideOf(reason)];
+/** On which side of which limit a value is, or was. */
+function limitText(reason: OfRange, text: (value: number) => string): string {
+  const { limit, release = null, verdict } = reason;
+  const side = S.reasons.sides[sideOf(reason)];
+  return release === null
+    ? `${side} ${text(limit)}`
+    : S.reasons.wasBeyond(side, text(limit), S.health[verdict].toLowerCase(), text(release));
+}
 
 /** What lies on which side of which limit, without the value: that changes. */
 export function beyondText(
@@ -95,25 +96,18 @@ export function beyondText(
   more: number,
 ): string {
   const sensor = sensors.named(reason.sensor);
-  return S.reasons.beyond(
-    shown(sensor.label, LONGEST_NAME),
-    sideText(sensor, reason),
-    readingText(sensor, reason.limit, unit, more),
-  );
+  const limit = limitText(reason, (value) => readingText(sensor, value, unit, more));
+  return `${shown(sensor.label, LONGEST_NAME)} ${limit}`;
 }
 
 /**
- * What somebody does about it; of what is well by now (`current`), what its alarm still waits for.
+ * What somebody does about it; of what is well by now, what its alarm still waits for.
  * Empty: nothing, as it is back in its range, and the reason says when that ends it.
  */
-export function todoText(
-  catalogue: Catalogue,
-  reason: HealthReason,
-  current: Verdict = reason.verdict,
-): string {
-  if (current === 'healthy') return reason.kind === 'pest' ? S.todoPestAgain : S.todoWell;
+export function todoText(reason: HealthReason): string {
+  if (reason.verdict === 'healthy') return reason.kind === 'pest' ? S.todoPestAgain : S.todoWell;
   const { sensors, ...kinds } = S.todo;
-  if (isOfRange(reason) && isBack(catalogue.named(reason.sensor), reason)) return '';
+  if (isBack(reason)) return '';
   if (isOfRange(reason) && reason.sensor in sensors) {
     return sensors[reason.sensor as keyof typeof sensors][sideOf(reason)];
   }

@@ -214,7 +214,7 @@ function CardReading({
   const { ideal } = rangesFor(sensor, species);
   const reason = rangeReason(health, name);
   const more = reason ? digitsOf(sensor, reason, unit) : 0;
-  const out = reason && !isBack(sensor, reason) ? reason : null;
+  const out = reason && !isBack(reason) ? reason : null;
   const side = out && sideOf(out);
   const step = useAgeStep(when);
   return (

@@ -235,8 +235,7 @@ function Reading({
   }
   const reason = rangeReason(health, sensor.name);
   const more = reason ? digitsOf(sensor, reason, unit) : 0;
-  const beyond =
-    reason && !isBack(sensor, reason) ? beyondText(catalogue, reason, unit, more) : null;
+  const beyond = reason && !isBack(reason) ? beyondText(catalogue, reason, unit, more) : null;
   return (
     <>
       {reason && beyond !== null && (

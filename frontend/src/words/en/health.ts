@@ -16,11 +16,10 @@ export const HEALTH = {
   reasons: {
     sides: { below: 'below', above: 'above' },
     /** What was out of its range counts as that until it is well within. */
-    sidesBack: { below: 'back in range; clears above', above: 'back in range; clears below' },
-    range: (reading: string, side: string, limit: string, isCritical: boolean): string =>
-      `${reading}, ${side} ${limit}${isCritical ? ' (critical)' : ''}`,
-    /** What is wrong, whatever the value is by now. */
-    beyond: (sensor: string, side: string, limit: string): string => `${sensor} ${side} ${limit}`,
+    wasBeyond: (side: string, limit: string, status: string, until: string): string =>
+      `was ${side} ${limit}; stays ${status} until ${until}`,
+    range: (reading: string, limit: string, isCritical: boolean): string =>
+      `${reading}, ${limit}${isCritical ? ' (critical)' : ''}`,
     readingFailed: (sensor: string): string => `${sensor}: the sensor returns no value`,
     implausible: (reading: string): string => `${reading}: not a plausible value`,
     scanFailed: (outcome: string, age: string | null): string =>

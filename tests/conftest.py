@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import asyncio
 import gc
+import inspect
 import os
 import ssl
 import tempfile
 from collections.abc import Iterator
 from functools import partialmethod
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, cast
 
 import httpx
 import pytest
@@ -68,6 +70,22 @@ def pytest_sessionfinish(session: pytest.Session) -> None:
     """Leave the machine's memory as it was: many tests kill processes."""
     if not hasattr(session.config, "workerinput"):  # once, not by each worker
         remove_what_the_dead_left()
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_pyfunc_call(pyfuncitem: pytest.Function) -> bool | None:
+    """Run a coroutine in a loop of its own; with `domain`, its nodes are in that ROS domain."""
+    if not inspect.iscoroutinefunction(pyfuncitem.obj):
+        return None
+    names = inspect.signature(pyfuncitem.obj).parameters
+    test = pyfuncitem.obj(**{name: pyfuncitem.funcargs[name] for name in names})
+    if "domain" in pyfuncitem.funcargs:
+        from tests.support.inprocess import run  # has ROS
+
+        run(cast("int", pyfuncitem.funcargs["domain"]), test)
+    else:
+        asyncio.run(test)
+    return True
 
 
 @pytest.fixture(autouse=True)

@@ -3,8 +3,6 @@
 Nothing here is fast and nothing is shared with `lupin_twin.field.idw`.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 

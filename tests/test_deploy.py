@@ -1,7 +1,5 @@
 """The examples in `backend/deploy/`: what they promise holds, as far as it can be held here."""
 
-from __future__ import annotations
-
 import json
 import os
 import re

@@ -1,7 +1,5 @@
 """What the docs have to name, and that what they name is there."""
 
-from __future__ import annotations
-
 import argparse
 import re
 import runpy

@@ -1,7 +1,5 @@
 """The blocks of code that the docs mark with `run` do run, against a demo."""
 
-from __future__ import annotations
-
 import os
 import re
 import subprocess

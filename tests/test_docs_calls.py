@@ -1,7 +1,5 @@
 """What the docs show of service calls over ROS: each is one that the service takes."""
 
-from __future__ import annotations
-
 import re
 from typing import Any
 

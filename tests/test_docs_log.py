@@ -1,7 +1,5 @@
 """docs/log.md says what is so: its queries run, and it names every table and column."""
 
-from __future__ import annotations
-
 import re
 import shutil
 from contextlib import closing

@@ -1,7 +1,5 @@
 """How the docs are written: short sentences, the words of the glossary, pages of a size."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterator
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The programs of the tutorial about one's own robot: a real twin takes what they publish."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 from pathlib import Path

@@ -5,8 +5,6 @@ refusal; and frames that break the protocol, each of which ends its connection. 
 client gets its states, and afterwards nothing is left of the others.
 """
 
-from __future__ import annotations
-
 import json
 import random
 import struct

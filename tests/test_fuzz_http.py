@@ -4,8 +4,6 @@ One check of schemathesis is left out: that what the document allows is not refu
 which values go together, and a box may be inverted or have too many cells.
 """
 
-from __future__ import annotations
-
 import json
 import random
 import socket

@@ -4,8 +4,6 @@ After each lot both bridges tell what comes next, and after some of them all tha
 valid: states, fields, the map.
 """
 
-from __future__ import annotations
-
 import json
 import random
 from collections.abc import Callable, Iterator
@@ -16,22 +14,9 @@ import pytest
 from lupin_msgs.msg import SensorReading, TwinState
 
 from lupin_bridge.stream import schema
-from lupin_twin.core.drops import (
-    MAX_BLOOMS_PER_TAG,
-    MAX_SENSORS_PER_TAG,
-    MAX_TAGS,
-    MAX_TEXT_LENGTH,
-)
+from lupin_twin.core.drops import MAX_BLOOMS_PER_TAG, MAX_SENSORS_PER_TAG, MAX_TAGS, MAX_TEXT_LENGTH
 from tests.support.domains import own_domain
-from tests.support.hostile import (
-    ANY,
-    MEGABYTE,
-    NAN,
-    TEXTS,
-    any_state,
-    damaged,
-    long_lies,
-)
+from tests.support.hostile import ANY, MEGABYTE, NAN, TEXTS, any_state, damaged, long_lies
 from tests.support.live import attached, field_of, wait_until_ready
 from tests.support.messages import discovered, look, pose, scan
 from tests.support.proc_stat import peak_mb, reset_peak, resident_mb

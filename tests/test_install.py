@@ -1,7 +1,5 @@
 """`pip install .` from a fresh clone, with the page built and without."""
 
-from __future__ import annotations
-
 import os
 import shutil
 import subprocess

@@ -1,7 +1,5 @@
 """What `make dist` makes: a demo from its wheels alone, and the context of the container image."""
 
-from __future__ import annotations
-
 import os
 import re
 import shutil

@@ -1,7 +1,5 @@
 """Alarms over DDS: raised, cleared, the same after a kill, and in a `web` beside it."""
 
-from __future__ import annotations
-
 import sqlite3
 import time
 from contextlib import ExitStack, closing

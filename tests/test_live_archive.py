@@ -1,7 +1,5 @@
 """Twin, forwarder, PostgreSQL and page as whole processes, killed at random moments under load."""
 
-from __future__ import annotations
-
 import signal
 import time
 from contextlib import ExitStack
@@ -73,10 +71,7 @@ def test_serve_forwards_and_lives_through_the_end_of_archive_and_forwarder(
     archive, journal = Archive(postgresql), tmp_path / "journal.sqlite"
     args = ("--site", "gh1", "--archive-url", archive.url())
     ros_args = (*OFTEN, "-p", f"journal:={journal}")
-    with (
-        lupin_twin(domain, "serve", *args, *ros_args) as serve,
-        Peer(domain, "robot") as robot,
-    ):
+    with lupin_twin(domain, "serve", *args, *ros_args) as serve, Peer(domain, "robot") as robot:
         url_of(serve)
         robot.wait_for_twin()
         robot.observe(scan("7", {"temperature": 21.5}, at=(1.0, 2.0)))

@@ -3,8 +3,6 @@
 `web` knows it, and what the twin dropped, from `/diagnostics`.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterator
 

@@ -1,7 +1,5 @@
 """What the journal does not hold, yet or no more, is marked in every answer, and not denied."""
 
-from __future__ import annotations
-
 import sys
 import time
 from collections.abc import Iterator

@@ -1,7 +1,5 @@
 """Connections that never come to anything: each is answered, or ended, and none stays."""
 
-from __future__ import annotations
-
 import socket
 import ssl
 from collections.abc import Iterator

@@ -1,7 +1,5 @@
 """Faults over real processes: clients are told the truth, and everything recovers by itself."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from typing import Any
 

@@ -1,7 +1,5 @@
 """What a twin shows whose journal is not what it should be: where it is told, and how it heals."""
 
-from __future__ import annotations
-
 import sqlite3
 import time
 from collections.abc import Callable
@@ -11,8 +9,7 @@ from typing import Any
 
 import pytest
 
-from lupin_twin.journal.beside import Lock
-from tests.support.inprocess import Running, run, running
+from tests.support.inprocess import Running, running
 from tests.support.journal import SECOND, is_whole, kept, scan, select
 from tests.support.messages import scan as observation
 from tests.support.ros import Peer
@@ -85,27 +82,23 @@ async def shows(live: Running, tag_id: str, value: float) -> None:
 
 
 @pytest.mark.parametrize("damage", [truncated, flipped, no_database])
-def test_a_damaged_file_is_quarantined_read_as_far_as_it_goes_and_named(
+async def test_a_damaged_file_is_quarantined_read_as_far_as_it_goes_and_named(
     damage: Callable[[Path], None], domain: int, tmp_path: Path
 ) -> None:
     path = tmp_path / "j.sqlite"
     damage(path)
     broken = path.read_bytes()
-
-    async def test() -> None:
-        with Peer(domain) as robot:
-            async with serve(path) as live:
-                journal = await told(live, "recording", "a damaged journal was quarantined as")
-                aside = Path(journal["set_aside"])
-                assert aside.name.startswith("j.sqlite.damaged-")
-                assert aside.read_bytes() == broken
-                known = {tag.tag_id for tag in live.twin.update.snapshot.tags}
-                assert known == ({"7"} if damage is not no_database else set())
-                robot.observe(observation("8", {"co2": 1.0}))
-                await shows(live, "8", 1.0)
-        assert is_whole(path)
-
-    run(domain, test())
+    with Peer(domain) as robot:
+        async with serve(path) as live:
+            journal = await told(live, "recording", "a damaged journal was quarantined as")
+            aside = Path(journal["set_aside"])
+            assert aside.name.startswith("j.sqlite.damaged-")
+            assert aside.read_bytes() == broken
+            known = {tag.tag_id for tag in live.twin.update.snapshot.tags}
+            assert known == ({"7"} if damage is not no_database else set())
+            robot.observe(observation("8", {"co2": 1.0}))
+            await shows(live, "8", 1.0)
+    assert is_whole(path)
     kept_rows = select(
         path, "SELECT tag, count(*) FROM scan JOIN series USING (series) GROUP BY tag ORDER BY tag"
     )
@@ -115,84 +108,43 @@ def test_a_damaged_file_is_quarantined_read_as_far_as_it_goes_and_named(
         assert rows["7"] > 1000
 
 
-def test_somebody_else_s_file_is_left_and_told_until_it_is_gone(
+async def test_somebody_else_s_file_is_left_and_told_until_it_is_gone(
     domain: int, tmp_path: Path
 ) -> None:
     path = tmp_path / "j.sqlite"
     foreign(path)
     theirs = path.read_bytes()
-
-    async def test() -> None:
-        with Peer(domain) as robot:
-            async with serve(path) as live:
-                await told(live, "foreign", "is a database, but not a journal of lupin-twin")
-                robot.observe(observation("8", {"co2": 1.0}))
-                await shows(live, "8", 1.0)
-                assert path.read_bytes() == theirs
-                path.unlink()
-                await told(live, "recording")
-                await until(lambda: live.twin.journal().written == 1, "what waited")
-
-    run(domain, test())
+    with Peer(domain) as robot:
+        async with serve(path) as live:
+            await told(live, "foreign", "is a database, but not a journal of lupin-twin")
+            robot.observe(observation("8", {"co2": 1.0}))
+            await shows(live, "8", 1.0)
+            assert path.read_bytes() == theirs
+            path.unlink()
+            await told(live, "recording")
+            await until(lambda: live.twin.journal().written == 1, "what waited")
 
 
-def test_a_folder_that_cannot_be_written_is_told_until_it_can(domain: int, tmp_path: Path) -> None:
-    path = tmp_path / "state" / "j.sqlite"
-    path.parent.write_text("a file where a folder should be")
-
-    async def test() -> None:
-        with Peer(domain) as robot:
-            async with serve(path) as live:
-                await told(live, "failing", f"the journal {path} cannot be written")
-                robot.observe(observation("8", {"co2": 1.0}))
-                await shows(live, "8", 1.0)
-                path.parent.unlink()
-                await told(live, "recording")
-                await until(lambda: live.twin.journal().written == 1, "what waited")
-
-    run(domain, test())
-
-
-def test_a_second_twin_says_who_has_the_file_and_takes_over(domain: int, tmp_path: Path) -> None:
-    path = tmp_path / "j.sqlite"
-
-    async def test() -> None:
-        with Peer(domain) as robot:
-            with Lock(path, "/gh1/lupin_twin"):
-                async with serve(path) as live:
-                    await told(live, "in_use", f"the journal {path} is in use by /gh1/lupin_twin")
-            async with serve(path) as live:
-                await told(live, "recording")
-                robot.observe(observation("8", {"co2": 1.0}))
-                await shows(live, "8", 1.0)
-
-    run(domain, test())
-
-
-def test_a_stamp_of_years_ahead_counts_as_made_on_arrival_and_is_kept_so(
+async def test_a_stamp_of_years_ahead_counts_as_made_on_arrival_and_is_kept_so(
     domain: int, tmp_path: Path
 ) -> None:
     """Also when it is heard again, after a restart: it is no younger, and not written twice."""
     path = tmp_path / "j.sqlite"
     message = observation("8", {"co2": 1.0}, stamp_s=LATEST_S)
     stamps = []
-
-    async def test() -> None:
-        for _ in range(2):
-            with Peer(domain) as robot:
-                async with serve(path) as live:
-                    robot.observe(message)
-                    await shows(live, "8", 1.0)
-                    (tag,) = (await live.http.get("/api/state")).json()["tags"]
-                    stamps.append(filled(tag)["readings"][0]["observed_at"])
-                    reach = None
-                    # What was just heard is in the journal a moment later; before, the one that
-                    # ended has to leave it.
-                    while reach is None:
-                        reach = (await live.http.get("/api/timeline")).json().get("reach")
-                    assert reach["to"]["sec"] <= time.time()
-
-    run(domain, test())
+    for _ in range(2):
+        with Peer(domain) as robot:
+            async with serve(path) as live:
+                robot.observe(message)
+                await shows(live, "8", 1.0)
+                (tag,) = (await live.http.get("/api/state")).json()["tags"]
+                stamps.append(filled(tag)["readings"][0]["observed_at"])
+                reach = None
+                # What was just heard is in the journal a moment later; before, the one that
+                # ended has to leave it.
+                while reach is None:
+                    reach = (await live.http.get("/api/timeline")).json().get("reach")
+                assert reach["to"]["sec"] <= time.time()
     assert stamps[0] == stamps[1]
     assert abs(stamps[0]["sec"] - time.time()) < 60
     ((stamp_ns, own_ns),) = select(path, "SELECT stamp_ns, own_stamp_ns FROM scan")

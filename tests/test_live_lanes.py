@@ -1,7 +1,5 @@
 """Dear questions of some clients and what everybody asks for: nobody waits behind them."""
 
-from __future__ import annotations
-
 import asyncio
 from collections import Counter
 from collections.abc import Iterator

@@ -1,12 +1,9 @@
 """A robot that is lost pins a tag kilometres away: the site stays usable, and says which tag."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from typing import Any
 
 import pytest
-from diagnostic_msgs.msg import DiagnosticArray
 
 from tests.support.messages import scan
 from tests.support.web import Bridge, bridge
@@ -72,28 +69,3 @@ def test_the_default_field_of_a_house_too_large_for_fine_cells_has_wider_ones() 
         fine = running.get("/api/field", sensor_type="temperature", resolution=0.1)
         assert fine.status_code == 400
         assert "the limit is 1000" in fine.json()["error_message"]
-
-
-def test_a_pose_that_is_dropped_is_counted_where_drops_are() -> None:
-    heard: list[Any] = []
-
-    def counted() -> bool:
-        found = [
-            {pair.key: pair.value for pair in status.values}
-            for status in (heard[-1].status if heard else ())
-            if status.name == "/lupin_twin: drops"
-        ]
-        return bool(found) and found[0].get("pose") == "1" and "'lost'" in found[0]["last: pose"]
-
-    with bridge() as running:
-        peer = running.peer
-        peer.node.create_subscription(DiagnosticArray, "/diagnostics", heard.append, 10)
-        at_home(running)
-        peer.observe(scan(LOST, {"temperature": 40.0}, at=(5000.0, 1.0)))
-        tag = running.tag(LOST)
-        assert tag["pose"]["orientation"]["w"] == 0
-        assert tag["readings"][0]["value"] == 40.0
-        peer.until(counted, "the pose among the drops")
-        assert 'lupin_dropped_total{reason="pose"} 1.0' in running.get("/metrics").text
-        body = running.json("/api/field", sensor_type="temperature")
-        assert (body["width"], body["height"]) == (50, 50)

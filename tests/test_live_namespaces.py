@@ -1,7 +1,5 @@
 """Two greenhouses in one ROS domain, each below its namespace: nothing of one in the other."""
 
-from __future__ import annotations
-
 import base64
 
 import httpx

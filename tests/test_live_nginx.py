@@ -1,7 +1,5 @@
 """Behind a real nginx, with the configuration that we ship: one twin, three replicas, a prefix."""
 
-from __future__ import annotations
-
 import signal
 import threading
 import time

@@ -1,7 +1,5 @@
 """nginx that signs people in with `auth_request`, by the block that the guide shows."""
 
-from __future__ import annotations
-
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager

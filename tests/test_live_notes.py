@@ -1,7 +1,5 @@
 """Notes are where the log is: after a restart, and at `web` on the same file or on a copy."""
 
-from __future__ import annotations
-
 import sys
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """`lupin-twin serve` and a real broker: what it is told, its will, and an end in time."""
 
-from __future__ import annotations
-
 import signal
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """One parameter file for a twin and its `web`, whatever the twin is called and wherever it is."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

@@ -1,7 +1,5 @@
 """The past of a twin with a journal, over ROS: states of then, series and events, and no delay."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Iterator
 from contextlib import ExitStack

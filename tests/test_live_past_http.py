@@ -1,7 +1,5 @@
 """The past over HTTP, from a real journal: as it was, and the same after a kill and in `web`."""
 
-from __future__ import annotations
-
 import csv
 import io
 from collections.abc import Iterator

@@ -1,7 +1,5 @@
 """`web` reads its twin's file, or one that follows it: the same answers, also without a twin."""
 
-from __future__ import annotations
-
 import json
 import sqlite3
 import sys

@@ -1,13 +1,12 @@
 """Two bridges, one twin: the same answers from both, and the end of one is not the other's."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from contextlib import ExitStack
 from functools import partial
 from typing import Any
 
 import pytest
+from lupin_msgs.msg import TwinState, TwinTagState
 from websockets.exceptions import ConnectionClosed
 
 from tests.support.domains import own_domain
@@ -113,3 +112,22 @@ def test_both_serve_the_same_and_the_end_of_one_is_not_the_others(
             if frame["type"] == "state" and "after" in tag_ids(frame["state"]):
                 break
         assert second.json("/api/field", **FIELD)["sample_count"] == 3
+
+
+def test_a_twin_that_tells_no_times_has_no_history_and_no_times_of_readings(domain: int) -> None:
+    """One of another build, which publishes its state alone."""
+    message = TwinState(tags=[TwinTagState(tag_id="1")])
+    message.header.frame_id = "map"
+    message.header.stamp.sec = 100
+    with (
+        Peer(domain) as peer,
+        lupin_twin(domain, "web", "--port", "0") as process,
+        attached(process, peer) as live,
+    ):
+        peer.publish("/twin/state", message, depth=1)
+        wait_for(lambda: live.get("/api/tags/1").status_code == 200, "the state")
+        answer = live.get("/api/tags/1/history")
+        assert (answer.status_code, "journal is not known" in answer.text) == (503, True)
+        tag = live.json("/api/tags/1")
+        assert (tag["last_try"], tag["last_try_status"]) == (None, None)
+        assert "looked_at" not in tag

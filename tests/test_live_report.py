@@ -1,7 +1,5 @@
 """Shift reports of real processes: the same bytes everywhere, bounded, and for nobody's work."""
 
-from __future__ import annotations
-
 import re
 import shutil
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The robot's layer over DDS, in `serve` and `web`, from publishers of standard messages only."""
 
-from __future__ import annotations
-
 import math
 import re
 import time
@@ -10,13 +8,7 @@ from threading import Event, Thread
 from typing import Any
 
 import pytest
-from geometry_msgs.msg import (
-    Point,
-    Pose,
-    PoseStamped,
-    PoseWithCovarianceStamped,
-    Quaternion,
-)
+from geometry_msgs.msg import Point, Pose, PoseStamped, PoseWithCovarianceStamped, Quaternion
 from nav_msgs.msg import Odometry, Path
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rosgraph_msgs.msg import Clock
@@ -68,8 +60,7 @@ def stamped(message: Any, live: Bridge, frame_id: str = "map", ago_s: float = 0.
 
 def on_floor(x: float, y: float, yaw: float = 0.0) -> Pose:
     return Pose(
-        position=Point(x=x, y=y),
-        orientation=Quaternion(z=math.sin(yaw / 2), w=math.cos(yaw / 2)),
+        position=Point(x=x, y=y), orientation=Quaternion(z=math.sin(yaw / 2), w=math.cos(yaw / 2))
     )
 
 

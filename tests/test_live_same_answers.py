@@ -1,7 +1,5 @@
 """The same questions, the same answers: those of the build that wrote journals of version 3."""
 
-from __future__ import annotations
-
 import gzip
 import json
 import shutil

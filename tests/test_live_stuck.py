@@ -5,8 +5,6 @@ are gone in the end, memory stays within a bound, and a healthy client gets ever
 if nothing were.
 """
 
-from __future__ import annotations
-
 import ctypes
 import socket
 import struct
@@ -224,10 +222,7 @@ def test_a_flood_ends_its_sender_alone(server: Server, healthy: Listener, frame:
 
 
 def test_a_message_past_the_limit_is_one_in_pieces_too(server: Server, healthy: Listener) -> None:
-    with (
-        gone_in_the_end(server, healthy),
-        listener(url(server), max_rate_hz=SELDOM_HZ) as loud,
-    ):
+    with gone_in_the_end(server, healthy), listener(url(server), max_rate_hz=SELDOM_HZ) as loud:
         pieces = MAX_INBOUND_BYTES // 10_000 + 1
         with suppress(ConnectionClosed):  # it may hear the answer before it has said all
             loud.connection.send("x" * 10_000 for _ in range(pieces))

@@ -3,8 +3,6 @@
 Real processes; the clock of each is the test's (`WallClock`), and the robot stamps by it too.
 """
 
-from __future__ import annotations
-
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager

@@ -1,7 +1,5 @@
 """What the two commands of a newcomer's run, as `make` itself would tell."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 

@@ -1,7 +1,5 @@
 """The real roslib, from npm, against the real bridge: existing clients connect unchanged."""
 
-from __future__ import annotations
-
 import json
 import shutil
 from collections.abc import Iterator

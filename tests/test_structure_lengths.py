@@ -1,7 +1,5 @@
 """No file that is written by hand grows past a sitting."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 ROOT = Path(__file__).parents[1]

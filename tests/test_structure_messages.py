@@ -1,7 +1,5 @@
 """The wire format: names, types and order are shared with the robot's own packages, for good."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """What a robot's tools read: dependencies that are really used, files that are really there."""
 
-from __future__ import annotations
-
 import ast
 import json
 import os
@@ -119,10 +117,7 @@ def test_the_oldest_node_is_the_same_wherever_it_is_named() -> None:
         assert named == {floor}, name
 
 
-@pytest.mark.parametrize(
-    ("version", "is_taken"),
-    [("20.18.3", False), ("20.19.0", True)],
-)
+@pytest.mark.parametrize(("version", "is_taken"), [("20.18.3", False), ("20.19.0", True)])
 def test_set_up_begins_with_no_older_node(version: str, is_taken: bool, tmp_path: Path) -> None:
     """The preflight's own question, put to a Node of another version."""
     text = (ROOT / ".ci" / "preflight").read_text(encoding="utf-8")

@@ -1,7 +1,5 @@
 """What the dead have left is removed, and nothing of the living."""
 
-from __future__ import annotations
-
 import fcntl
 import os
 import sys

@@ -1,7 +1,5 @@
 """`make bench`: every benchmark in turn; ratios side by side, nothing asserted."""
 
-from __future__ import annotations
-
 import importlib
 import sys
 

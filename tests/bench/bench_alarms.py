@@ -6,8 +6,6 @@ Processor time, so that what else runs does not count. Beside that, what the sim
 days raise.
 """
 
-from __future__ import annotations
-
 import os
 import statistics
 import time

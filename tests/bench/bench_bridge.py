@@ -4,8 +4,6 @@ Times are what a client sees, medians and 95th percentiles; server time is what 
 request when that of an empty one (`/healthz`) on the same connection is taken off.
 """
 
-from __future__ import annotations
-
 import statistics
 import time
 from collections.abc import Callable

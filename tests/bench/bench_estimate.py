@@ -7,8 +7,6 @@ error than IDW's. Numbers were chosen on other seeds (`--choosing`) than these. 
 the method that the aim was set by (minutes more).
 """
 
-from __future__ import annotations
-
 import argparse
 import sys
 from collections import defaultdict

@@ -7,8 +7,6 @@ beside it say; what it is worth is the mean coverage of all cells in these round
 greenhouses the air becomes restless as they begin: what was learnt of a calm day is wrong then.
 """
 
-from __future__ import annotations
-
 import argparse
 import sys
 from collections import Counter

@@ -5,8 +5,6 @@ and in how their day goes, under clouds that pass. Of each field as in `bench_es
 readings that the node would choose: of a day, and of the first six hours.
 """
 
-from __future__ import annotations
-
 import os
 from collections.abc import Callable
 from typing import Any

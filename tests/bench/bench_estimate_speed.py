@@ -1,7 +1,5 @@
 """What an estimate costs beside IDW on the same grid: ms of one core, the best of several."""
 
-from __future__ import annotations
-
 import os
 import time
 from collections.abc import Callable

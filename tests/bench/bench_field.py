@@ -6,8 +6,6 @@ The loop is `tests/oracle_idw.py`, the definition written down. Where it would t
 over a sample of the cells, and the table says so. Times are the best of several runs.
 """
 
-from __future__ import annotations
-
 import sys
 import time
 from collections.abc import Callable, Sequence
@@ -46,11 +44,7 @@ def scattered(count: int, side: float, away: float = 0.0) -> list[FieldSample]:
     ]
 
 
-def field(
-    samples: Sequence[FieldSample],
-    side: float,
-    cells: int,
-) -> FieldGrid:
+def field(samples: Sequence[FieldSample], side: float, cells: int) -> FieldGrid:
     return compute_idw_field(
         samples,
         bbox_min_x=0.0,

@@ -6,8 +6,6 @@ the code of `lupin-twin forward`. Growth: rows as forwarders write them, made by
 a scan of each of 30 tags every two minutes. `--quick`: a few sites, few days.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import random

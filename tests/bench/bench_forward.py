@@ -3,8 +3,6 @@
 30 tags with five sensors, a scan of each every two minutes. `--quick`: a day.
 """
 
-from __future__ import annotations
-
 import argparse
 import sys
 import tempfile

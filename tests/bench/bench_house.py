@@ -3,8 +3,6 @@
 But for the heartbeat it is thread time of all tasks, so what else runs there does not count.
 """
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable
 

@@ -4,8 +4,6 @@ Rows a second of CPU time, the command's start included, beside what Python's ow
 for the same file. `--quick`: a fifth of the rows.
 """
 
-from __future__ import annotations
-
 import argparse
 import csv
 import random

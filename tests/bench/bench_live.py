@@ -16,8 +16,6 @@ What the columns say:
 - memory: the server's resident memory at the end, MB.
 """
 
-from __future__ import annotations
-
 import argparse
 import itertools
 import time

@@ -5,8 +5,6 @@ A greenhouse of 30 tags with five sensors is scanned for a year, every 48 minute
 tags in two days, four times. `--quick`: a month, and fewer scans written.
 """
 
-from __future__ import annotations
-
 import argparse
 import sqlite3
 import statistics

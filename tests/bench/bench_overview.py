@@ -3,8 +3,6 @@
 A real page over a real archive, and a real browser; all share this machine.
 """
 
-from __future__ import annotations
-
 import argparse
 import statistics
 import tempfile

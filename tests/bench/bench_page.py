@@ -3,8 +3,6 @@
 Chromium draws without a GPU, one pixel a CSS pixel, on this machine beside the server.
 """
 
-from __future__ import annotations
-
 import gzip
 import statistics
 from collections.abc import Iterator, Sequence

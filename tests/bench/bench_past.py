@@ -6,8 +6,6 @@ The export (alone with `--export`) is read to its end; its memory is the server'
 process that looks back for it.
 """
 
-from __future__ import annotations
-
 import random
 import statistics
 import sys
@@ -19,15 +17,7 @@ from pathlib import Path
 
 import httpx
 
-from tests.bench.journal_double import (
-    MONTH,
-    QUICK_MONTH,
-    QUICK_YEAR,
-    SECOND,
-    YEAR,
-    House,
-    filled,
-)
+from tests.bench.journal_double import MONTH, QUICK_MONTH, QUICK_YEAR, SECOND, YEAR, House, filled
 from tests.support.domains import own_domain
 from tests.support.proc_stat import peak_mb, reset_peak, resident_mb
 from tests.support.processes import limits, lupin_twin, url_of

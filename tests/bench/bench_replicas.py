@@ -6,8 +6,6 @@ third of them each replica. The delay is from before the record in the journal u
 read the frame. `--quick`: few browsers.
 """
 
-from __future__ import annotations
-
 import argparse
 import os
 import sys

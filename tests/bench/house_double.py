@@ -1,7 +1,5 @@
 """A bridge inside the page for a house of any size, whose frames are sent by hand."""
 
-from __future__ import annotations
-
 from typing import Final
 
 # So many tags in a square, a metre apart, each with two readings, species and two blooms.

@@ -4,8 +4,6 @@ Each tag is scanned in its turn, every `every_s`, so that all tags have been by 
 tag has its place.
 """
 
-from __future__ import annotations
-
 import atexit
 import math
 import shutil

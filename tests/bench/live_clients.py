@@ -15,8 +15,6 @@ It connects all clients at the monotonic time T and prints one JSON object a lin
 With `--deaf` the clients ask for frames and never read one.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import resource

@@ -1,7 +1,5 @@
 """The parts of a bench with live clients: a server with its robot, clients, and what they saw."""
 
-from __future__ import annotations
-
 import json
 import subprocess
 import sys

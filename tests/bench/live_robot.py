@@ -6,8 +6,6 @@ killed. Every change is an observation of the tag `beat`, whose reading `beat` i
 CLOCK_MONOTONIC at the moment of its publication: whoever sees it knows how long it was on its way.
 """
 
-from __future__ import annotations
-
 import argparse
 import contextlib
 import time

@@ -6,8 +6,6 @@ by waves, weather, noise); each sort then adds what a model with smooth daily co
 expect. Seeds for choosing numbers and seeds for judging them are kept apart.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from typing import Final

@@ -3,8 +3,6 @@
 A network would be the slowest part, and a queue of its frames would be counted as the page's.
 """
 
-from __future__ import annotations
-
 from typing import Final
 
 # What the page's clock runs in one go.

@@ -4,8 +4,6 @@ The same kernel without the day's second harmonic, other priors, one fit on 150 
 random, one solution of all readings (up to 1,000), and standard deviations 1.2 times as large.
 """
 
-from __future__ import annotations
-
 from typing import Final
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The application: what answers at which path, and the page."""
 
-from __future__ import annotations
-
 import asyncio
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """From a source to listeners: pace, status, watch; and that nothing is left behind."""
 
-from __future__ import annotations
-
 import asyncio
 import itertools
 import json
@@ -150,34 +148,27 @@ class Beat:
         return self.now_s - at_s
 
 
-def test_two_changes_go_out_at_once_and_the_next_by_the_rate(
+async def test_two_changes_go_out_at_once_and_the_next_by_the_rate(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    async def test() -> None:
-        beat = Beat(monkeypatch)
-        async with Stage(clock=lambda: beat.now_s, frames_per_s=20.0) as stage:
-            beat.hold(stage)
-            waits = [beat.change(at_s) for at_s in (100.0, 100.01, 100.02, 100.08, 200.0, 200.01)]
-            assert waits == pytest.approx([0.0, 0.0, 0.03, 0.02, 0.0, 0.0])
-            assert beat.change(200.02) == pytest.approx(0.03), "a pause is made up for by one"
-
-    asyncio.run(test())
+    beat = Beat(monkeypatch)
+    async with Stage(clock=lambda: beat.now_s, frames_per_s=20.0) as stage:
+        beat.hold(stage)
+        waits = [beat.change(at_s) for at_s in (100.0, 100.01, 100.02, 100.08, 200.0, 200.01)]
+        assert waits == pytest.approx([0.0, 0.0, 0.03, 0.02, 0.0, 0.0])
+        assert beat.change(200.02) == pytest.approx(0.03), "a pause is made up for by one"
 
 
-def test_of_a_producer_that_keeps_to_the_rate_no_change_waits(
+async def test_of_a_producer_that_keeps_to_the_rate_no_change_waits(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """However late single ones are, by up to an interval: the others are not held to their beat."""
-
-    async def test() -> None:
-        beat = Beat(monkeypatch)
-        late_s = [0.0, 0.09, 0.0, 0.03, 0.0, 0.099, 0.0, 0.0] * 20
-        async with Stage(clock=lambda: beat.now_s, frames_per_s=10.0) as stage:
-            beat.hold(stage)
-            waits = [beat.change(100.0 + n / 10 + late) for n, late in enumerate(late_s)]
-            assert waits == [0.0] * len(late_s)
-
-    asyncio.run(test())
+    beat = Beat(monkeypatch)
+    late_s = [0.0, 0.09, 0.0, 0.03, 0.0, 0.099, 0.0, 0.0] * 20
+    async with Stage(clock=lambda: beat.now_s, frames_per_s=10.0) as stage:
+        beat.hold(stage)
+        waits = [beat.change(100.0 + n / 10 + late) for n, late in enumerate(late_s)]
+        assert waits == [0.0] * len(late_s)
 
 
 @settings(max_examples=50, suppress_health_check=[HealthCheck.function_scoped_fixture])
@@ -201,149 +192,122 @@ def test_the_mean_rate_is_kept_whatever_the_producer_does(
     asyncio.run(test())
 
 
-def test_what_a_frame_carries_is_the_newest_of_all_that_came_since_the_last() -> None:
-    async def test() -> None:
-        async with Stage(frames_per_s=50.0) as stage:
-            for number in range(1, 101):
-                stage.script.tell(state(number))
-            await until(lambda: stage.ear.states[-1]["revision"] == "r100", "the newest")
-            assert stage.ear.states[0]["revision"] == "r1"
-            assert len(stage.ear.states) <= 4
-            assert stage.bridge.latest == state(100)
-
-    asyncio.run(test())
+async def test_what_a_frame_carries_is_the_newest_of_all_that_came_since_the_last() -> None:
+    async with Stage(frames_per_s=50.0) as stage:
+        for number in range(1, 101):
+            stage.script.tell(state(number))
+        await until(lambda: stage.ear.states[-1]["revision"] == "r100", "the newest")
+        assert stage.ear.states[0]["revision"] == "r1"
+        assert len(stage.ear.states) <= 4
+        assert stage.bridge.latest == state(100)
 
 
-def test_a_heartbeat_right_after_a_frame_tells_nobody_anything_and_is_spared() -> None:
-    async def test() -> None:
-        async with Stage(frames_per_s=100.0) as stage:
-            stage.script.tell(state(1))
-            for _ in range(3):
-                stage.script.tell(TwinUpdate(state(1).snapshot, "r1"))
-            stage.script.tell(state(2))
-            await until(lambda: len(stage.ear.states) == 2, "the change")
-            assert stage.ear.states[-1]["revision"] == "r2"
-
-    asyncio.run(test())
+async def test_a_heartbeat_right_after_a_frame_tells_nobody_anything_and_is_spared() -> None:
+    async with Stage(frames_per_s=100.0) as stage:
+        stage.script.tell(state(1))
+        for _ in range(3):
+            stage.script.tell(TwinUpdate(state(1).snapshot, "r1"))
+        stage.script.tell(state(2))
+        await until(lambda: len(stage.ear.states) == 2, "the change")
+        assert stage.ear.states[-1]["revision"] == "r2"
 
 
 # --- status -------------------------------------------------------------------------------------
 
 
-def test_a_status_goes_out_when_it_changes_and_only_then() -> None:
-    async def test() -> None:
-        now_s = 100.0
-        async with Stage(lambda: now_s) as stage:
-            stage.bridge.liveness.stale_after_s = 0.3
-            assert stage.ear.reasons == ["never_seen"]
-            stage.script.tell(state(1))
-            assert stage.ear.reasons == ["never_seen", "live"]
-            now_s += 0.5
-            await until(lambda: len(stage.ear.reasons) == 3, "the silence to be noticed")
-            stage.script.tell(state(2))
-            await until(lambda: len(stage.ear.reasons) == 4, "the twin to be back")
-            stage.script.die()
-            stage.script.die()
-            stage.bridge.announce_shutdown()
-        assert stage.ear.reasons == [
-            "never_seen",
-            "live",
-            "stale",
-            "live",
-            "thread_dead",
-            "shutting_down",
-        ]
-
-    asyncio.run(test())
+async def test_a_status_goes_out_when_it_changes_and_only_then() -> None:
+    now_s = 100.0
+    async with Stage(lambda: now_s) as stage:
+        stage.bridge.liveness.stale_after_s = 0.3
+        assert stage.ear.reasons == ["never_seen"]
+        stage.script.tell(state(1))
+        assert stage.ear.reasons == ["never_seen", "live"]
+        now_s += 0.5
+        await until(lambda: len(stage.ear.reasons) == 3, "the silence to be noticed")
+        stage.script.tell(state(2))
+        await until(lambda: len(stage.ear.reasons) == 4, "the twin to be back")
+        stage.script.die()
+        stage.script.die()
+        stage.bridge.announce_shutdown()
+    assert stage.ear.reasons == [
+        "never_seen",
+        "live",
+        "stale",
+        "live",
+        "thread_dead",
+        "shutting_down",
+    ]
 
 
-def test_a_memory_that_is_busy_at_the_start_is_asked_again(
+async def test_a_memory_that_is_busy_at_the_start_is_asked_again(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr("lupin_bridge.alarms.feed.LEARN_AGAIN_S", 0.01)
     hour_ns = 3_600 * 10**9
+    async with Stage() as stage:
+        answers = iter([NotRemembered("busy", is_lasting=False), TwinUnavailableError("gone")])
+        tag_id = f"t{4 * hour_ns}"
 
-    async def test() -> None:
-        async with Stage() as stage:
-            answers = iter([NotRemembered("busy", is_lasting=False), TwinUnavailableError("gone")])
-            tag_id = f"t{4 * hour_ns}"
-
-            async def ask(*_: object) -> tuple[PastWrite, ...]:
-                for error in answers:
-                    raise error
-                return tuple(
-                    PastWrite(n, 1, tag_id, hour_ns * n, 0, 0, ("co2",), (400.0,))
-                    for n in range(1, 5)
-                )
-
-            monkeypatch.setattr(stage.script, "ask", ask)
-            stage.script.tell(state(4 * hour_ns))
-
-            def is_learnt() -> bool:
-                stage.script.tell(state(4 * hour_ns))  # judged anew with the next frame
-                return stage.bridge.readings_hold_ns().get(tag_id) == 3 * hour_ns
-
-            await until(is_learnt, "the rhythm")
-
-    asyncio.run(test())
-
-
-def test_a_second_twin_is_told_of(caplog: pytest.LogCaptureFixture) -> None:
-    async def test() -> None:
-        async with Stage() as stage:
-            stage.script.tell(state(1))
-            stage.script.tell(replace(state(2), twin_count=2))
-            told = stage.ear.heard[-1] if stage.ear.reasons[-1] == "live" else {}
-            await until(
-                lambda: any("2 twins" in f.get("message", "") for f in stage.ear.heard), "it"
+        async def ask(*_: object) -> tuple[PastWrite, ...]:
+            for error in answers:
+                raise error
+            return tuple(
+                PastWrite(n, 1, tag_id, hour_ns * n, 0, 0, ("co2",), (400.0,)) for n in range(1, 5)
             )
-            assert told
-            assert "2 twins publish on the same topic" in caplog.text
 
-    asyncio.run(test())
+        monkeypatch.setattr(stage.script, "ask", ask)
+        stage.script.tell(state(4 * hour_ns))
+
+        def is_learnt() -> bool:
+            stage.script.tell(state(4 * hour_ns))  # judged anew with the next frame
+            return stage.bridge.readings_hold_ns().get(tag_id) == 3 * hour_ns
+
+        await until(is_learnt, "the rhythm")
+
+
+async def test_a_second_twin_is_told_of(caplog: pytest.LogCaptureFixture) -> None:
+    async with Stage() as stage:
+        stage.script.tell(state(1))
+        stage.script.tell(replace(state(2), twin_count=2))
+        told = stage.ear.heard[-1] if stage.ear.reasons[-1] == "live" else {}
+        await until(lambda: any("2 twins" in f.get("message", "") for f in stage.ear.heard), "it")
+        assert told
+        assert "2 twins publish on the same topic" in caplog.text
 
 
 # --- the watch ----------------------------------------------------------------------------------
 
 
-def test_the_watch_outlives_an_error(
+async def test_the_watch_outlives_an_error(
     monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
-    async def test() -> None:
-        async with Stage() as stage:
-            looks = 0
+    async with Stage() as stage:
+        looks = 0
 
-            def fail(_now_s: float) -> int:
-                nonlocal looks
-                looks += 1
-                raise RuntimeError("a defect")
+        def fail(_now_s: float) -> int:
+            nonlocal looks
+            looks += 1
+            raise RuntimeError("a defect")
 
-            monkeypatch.setattr(stage.bridge.hub, "dismiss_stuck", fail)
-            await until(lambda: looks >= 2, "a second look")
-            assert "the watch met an error and goes on" in caplog.text
-
-    asyncio.run(test())
+        monkeypatch.setattr(stage.bridge.hub, "dismiss_stuck", fail)
+        await until(lambda: looks >= 2, "a second look")
+        assert "the watch met an error and goes on" in caplog.text
 
 
-def test_who_asked_for_a_low_rate_gets_the_newest_although_nothing_more_happens() -> None:
+async def test_who_asked_for_a_low_rate_gets_the_newest_although_nothing_more_happens() -> None:
     now_s = 100.0
-
-    async def test() -> None:
-        nonlocal now_s
-        async with Stage(clock=lambda: now_s, frames_per_s=100.0) as stage:
-            stage.bridge.liveness.stale_after_s = math.inf  # no status takes it along
-            rare = Ear()
-            stage.bridge.join(Client(rare, min_interval_s=0.3))
-            for number in range(1, 6):
-                stage.script.tell(state(number))
-            now_s += 0.1
-            await until(lambda: stage.ear.states[-1]["revision"] == "r5", "the newest")
-            assert [frame["revision"] for frame in rare.states] == ["r1"]
-            now_s += 0.3
-            await until(lambda: rare.states[-1]["revision"] == "r5", "the newest in its time")
-            assert [frame["revision"] for frame in rare.states] == ["r1", "r5"]
-
-    asyncio.run(test())
+    async with Stage(clock=lambda: now_s, frames_per_s=100.0) as stage:
+        stage.bridge.liveness.stale_after_s = math.inf  # no status takes it along
+        rare = Ear()
+        stage.bridge.join(Client(rare, min_interval_s=0.3))
+        for number in range(1, 6):
+            stage.script.tell(state(number))
+        now_s += 0.1
+        await until(lambda: stage.ear.states[-1]["revision"] == "r5", "the newest")
+        assert [frame["revision"] for frame in rare.states] == ["r1"]
+        now_s += 0.3
+        await until(lambda: rare.states[-1]["revision"] == "r5", "the newest in its time")
+        assert [frame["revision"] for frame in rare.states] == ["r1", "r5"]
 
 
 # --- with a real twin ---------------------------------------------------------------------------

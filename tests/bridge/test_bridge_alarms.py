@@ -1,7 +1,5 @@
 """How often a bridge tells its clients of alarms."""
 
-from __future__ import annotations
-
 import asyncio
 from collections.abc import Sequence
 

@@ -1,7 +1,5 @@
 """A defect in judging costs a tag, or a state, its status; the frames go on."""
 
-from __future__ import annotations
-
 import asyncio
 from typing import Any
 
@@ -26,7 +24,7 @@ def judged_state(number: int) -> TwinUpdate:
     return TwinUpdate(Snapshot(stamp_ns, "map", tags), f"r{number}")
 
 
-def test_a_tag_that_cannot_be_judged_is_unknown_and_the_frames_go_on(
+async def test_a_tag_that_cannot_be_judged_is_unknown_and_the_frames_go_on(
     monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
     is_broken = True
@@ -37,59 +35,53 @@ def test_a_tag_that_cannot_be_judged_is_unknown_and_the_frames_go_on(
         return judge_tag(tag, *args, **more)
 
     monkeypatch.setattr("lupin_bridge.judge.judging.judge_tag", judge)
-
-    async def test() -> None:
-        nonlocal is_broken
-        async with Stage(frames_per_s=1000.0) as stage:
-            for number in range(1, 6):
-                stage.script.tell(judged_state(number))
-                await until(lambda: len(stage.ear.states) == number, "the frame")  # noqa: B023
-                health = stage.ear.states[-1]["health"]["tags"]
-                assert health["bad"] == {"verdict": "unknown"}
-                assert health["good"]["verdict"] == "healthy"
-            assert caplog.text.count("bad could not be judged") == 1
-            assert caplog.text.count("ZeroDivisionError: a defect") == 1
-            assert b"lupin_judge_errors_total 5.0" in stage.bridge.metrics.text()
-            is_broken = False
-            stage.script.tell(judged_state(6))
-            await until(lambda: len(stage.ear.states) == 6, "the frame")
-            assert stage.ear.states[-1]["health"]["tags"]["bad"]["verdict"] == "healthy"
-
-    asyncio.run(test())
+    async with Stage(frames_per_s=1000.0) as stage:
+        for number in range(1, 6):
+            stage.script.tell(judged_state(number))
+            await until(lambda: len(stage.ear.states) == number, "the frame")  # noqa: B023
+            health = stage.ear.states[-1]["health"]["tags"]
+            assert health["bad"] == {"verdict": "unknown"}
+            assert health["good"]["verdict"] == "healthy"
+        assert caplog.text.count("bad could not be judged") == 1
+        assert caplog.text.count("ZeroDivisionError: a defect") == 1
+        assert b"lupin_judge_errors_total 5.0" in stage.bridge.metrics.text()
+        is_broken = False
+        stage.script.tell(judged_state(6))
+        await until(lambda: len(stage.ear.states) == 6, "the frame")
+        assert stage.ear.states[-1]["health"]["tags"]["bad"]["verdict"] == "healthy"
 
 
 @pytest.mark.parametrize("error", [None, TwinUnavailableError("not yet")])
-def test_a_robot_has_not_stopped_before_the_log_was_looked_at(error: Exception | None) -> None:
-    async def test() -> None:
-        asked, may_answer = asyncio.Event(), asyncio.Event()
+async def test_a_robot_has_not_stopped_before_the_log_was_looked_at(
+    error: Exception | None,
+) -> None:
+    asked, may_answer = asyncio.Event(), asyncio.Event()
 
-        async def ask(*_: object) -> tuple[PastWrite, ...]:
-            asked.set()
-            await may_answer.wait()
-            if error is not None:
-                raise error
-            return ()
+    async def ask(*_: object) -> tuple[PastWrite, ...]:
+        asked.set()
+        await may_answer.wait()
+        if error is not None:
+            raise error
+        return ()
 
-        stage = Stage(frames_per_s=1000.0)
-        stage.script.ask = ask  # type: ignore[method-assign]
-        tags = judged_state(1).snapshot.tags
-        async with stage:
-            for number in (1, 2):
-                later = TwinUpdate(Snapshot((2_000 + number) * 10**9, "map", tags), f"r{number}")
-                stage.script.tell(later)
-                await until(lambda: len(stage.ear.states) == number, "the frame")  # noqa: B023
-                house = stage.ear.states[-1]["health"]["house"]
-                if number == 1:
-                    assert house["verdict"] == "healthy"
-                    await asked.wait()
-                    may_answer.set()
-                    await until(lambda: stage.bridge._judge.knows_recent, "the log's word")
-            assert [reason["kind"] for reason in house["reasons"]] == ["stopped"]
-
-    asyncio.run(test())
+    stage = Stage(frames_per_s=1000.0)
+    stage.script.ask = ask  # type: ignore[method-assign]
+    tags = judged_state(1).snapshot.tags
+    async with stage:
+        for number in (1, 2):
+            later = TwinUpdate(Snapshot((2_000 + number) * 10**9, "map", tags), f"r{number}")
+            stage.script.tell(later)
+            await until(lambda: len(stage.ear.states) == number, "the frame")  # noqa: B023
+            house = stage.ear.states[-1]["health"]["house"]
+            if number == 1:
+                assert house["verdict"] == "healthy"
+                await asked.wait()
+                may_answer.set()
+                await until(lambda: stage.bridge._judge.knows_recent, "the log's word")
+        assert [reason["kind"] for reason in house["reasons"]] == ["stopped"]
 
 
-def test_a_state_that_cannot_be_judged_goes_out_and_all_is_unknown(
+async def test_a_state_that_cannot_be_judged_goes_out_and_all_is_unknown(
     monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
     is_broken = False
@@ -105,22 +97,18 @@ def test_a_state_that_cannot_be_judged_goes_out_and_all_is_unknown(
         health = frame["health"]
         return [health["house"]["verdict"], *(tag["verdict"] for tag in health["tags"].values())]
 
-    async def test() -> None:
-        nonlocal is_broken
-        delta = Ear()
-        async with Stage(frames_per_s=1000.0) as stage:
-            stage.bridge.join(Client(delta, delta=True))
-            for number, is_broken in enumerate((False, True, True, False), start=1):
-                stage.script.tell(judged_state(number))
-                await until(lambda: len(stage.ear.states) == number, "the frame")  # noqa: B023
-                wanted = "unknown" if is_broken else "healthy"
-                assert verdicts(stage.ear.states[-1]) == [wanted] * 3
-            assert [verdicts(frame) for frame in delta.heard if frame["type"] == "delta"] == [
-                ["unknown"] * 3,
-                ["unknown"],
-                ["healthy"] * 3,
-            ]
-            assert caplog.text.count("ZeroDivisionError: a defect") == 1
-            assert b"lupin_judge_errors_total 2.0" in stage.bridge.metrics.text()
-
-    asyncio.run(test())
+    delta = Ear()
+    async with Stage(frames_per_s=1000.0) as stage:
+        stage.bridge.join(Client(delta, delta=True))
+        for number, is_broken in enumerate((False, True, True, False), start=1):
+            stage.script.tell(judged_state(number))
+            await until(lambda: len(stage.ear.states) == number, "the frame")  # noqa: B023
+            wanted = "unknown" if is_broken else "healthy"
+            assert verdicts(stage.ear.states[-1]) == [wanted] * 3
+        assert [verdicts(frame) for frame in delta.heard if frame["type"] == "delta"] == [
+            ["unknown"] * 3,
+            ["unknown"],
+            ["healthy"] * 3,
+        ]
+        assert caplog.text.count("ZeroDivisionError: a defect") == 1
+        assert b"lupin_judge_errors_total 2.0" in stage.bridge.metrics.text()

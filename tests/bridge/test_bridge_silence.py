@@ -1,45 +1,36 @@
 """What listeners get of a twin that is silent: a sign of life, for the line is not what failed."""
 
-from __future__ import annotations
-
-import asyncio
 from dataclasses import replace
 
 from tests.bridge.test_bridge import Stage, state
 from tests.support.waiting import until
 
 
-def test_while_the_twin_is_silent_its_status_comes_again_and_again() -> None:
-    async def test() -> None:
-        now_s = 100.0
+async def test_while_the_twin_is_silent_its_status_comes_again_and_again() -> None:
+    now_s = 100.0
 
-        def a_second_later(reason: str) -> bool:
-            nonlocal now_s
-            now_s += 1.0
-            return stage.ear.reasons.count(reason) >= 3
+    def a_second_later(reason: str) -> bool:
+        nonlocal now_s
+        now_s += 1.0
+        return stage.ear.reasons.count(reason) >= 3
 
-        async with Stage(lambda: now_s) as stage:
-            await until(lambda: a_second_later("never_seen"), "the status, again and again")
-            stage.script.tell(state(1))
-            await until(lambda: a_second_later("stale"), "the silence, again and again")
-            told = [frame for frame in stage.ear.heard if frame["type"] == "status"]
-            ages_s = [frame["state_age_seconds"] for frame in told if frame["reason"] == "stale"]
-            assert ages_s == sorted(set(ages_s)), "each as of then"
-
-    asyncio.run(test())
+    async with Stage(lambda: now_s) as stage:
+        await until(lambda: a_second_later("never_seen"), "the status, again and again")
+        stage.script.tell(state(1))
+        await until(lambda: a_second_later("stale"), "the silence, again and again")
+        told = [frame for frame in stage.ear.heard if frame["type"] == "status"]
+        ages_s = [frame["state_age_seconds"] for frame in told if frame["reason"] == "stale"]
+        assert ages_s == sorted(set(ages_s)), "each as of then"
 
 
-def test_a_twin_without_a_clock_has_not_been_silent_since_the_year_1970() -> None:
-    async def test() -> None:
-        async with Stage() as stage:
-            stage.bridge.liveness.stale_after_s = 0.3
-            clockless = replace(state(0).snapshot, clock="none")
-            stage.script.tell(replace(state(0), snapshot=clockless))
-            await until(lambda: "no_clock" in stage.ear.reasons, "that to be told")
-            stage.script.tell(state(7))
-            await until(lambda: stage.ear.reasons[-1] == "stale", "the silence to be noticed")
-            await until(lambda: stage.bridge.alarms.now.alarms, "its alarm")
-        (silent,) = stage.bridge.alarms.now.alarms
-        assert (silent.reason.kind, silent.raised_at_ns) == ("silent", 7)
-
-    asyncio.run(test())
+async def test_a_twin_without_a_clock_has_not_been_silent_since_the_year_1970() -> None:
+    async with Stage() as stage:
+        stage.bridge.liveness.stale_after_s = 0.3
+        clockless = replace(state(0).snapshot, clock="none")
+        stage.script.tell(replace(state(0), snapshot=clockless))
+        await until(lambda: "no_clock" in stage.ear.reasons, "that to be told")
+        stage.script.tell(state(7))
+        await until(lambda: stage.ear.reasons[-1] == "stale", "the silence to be noticed")
+        await until(lambda: stage.bridge.alarms.now.alarms, "its alarm")
+    (silent,) = stage.bridge.alarms.now.alarms
+    assert (silent.reason.kind, silent.raised_at_ns) == ("silent", 7)

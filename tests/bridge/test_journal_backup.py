@@ -1,7 +1,5 @@
 """A copy of a journal: made while its twin writes, whole, and enough for another start."""
 
-from __future__ import annotations
-
 import sqlite3
 import subprocess
 import sys

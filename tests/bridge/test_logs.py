@@ -1,7 +1,5 @@
 """The log as lines for people and as JSON for collectors."""
 
-from __future__ import annotations
-
 import json
 import logging
 import time

@@ -1,5 +1,3 @@
-from __future__ import annotations
-
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -45,22 +43,12 @@ def test_who_has_only_the_text_reads_the_message(
 def test_each_part_is_there_once_below_its_name() -> None:
     text = schema_text("lupin_msgs/msg/TwinState")
     heads = [line for line in text.splitlines() if line.startswith("MSG: ")]
-    assert sorted(heads) == [
-        f"MSG: {name}"
-        for name in (
-            "builtin_interfaces/Time",
-            "geometry_msgs/Point",
-            "geometry_msgs/Point32",
-            "geometry_msgs/Polygon",
-            "geometry_msgs/Pose",
-            "geometry_msgs/Quaternion",
-            "lupin_msgs/FlowerPoint",
-            "lupin_msgs/SensorReading",
-            "lupin_msgs/TwinTagState",
-            "std_msgs/Header",
-        )
-    ]
-    assert text.count("=" * 80) == len(heads)
+    names = (
+        "builtin_interfaces/Time geometry_msgs/Point geometry_msgs/Point32 geometry_msgs/Polygon "
+        "geometry_msgs/Pose geometry_msgs/Quaternion lupin_msgs/FlowerPoint "
+        "lupin_msgs/SensorReading lupin_msgs/TwinTagState std_msgs/Header"
+    )
+    assert sorted(heads) == [f"MSG: {name}" for name in names.split()]
 
 
 def package(prefix: Path, name: str, **messages: str) -> None:

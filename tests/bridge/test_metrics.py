@@ -1,7 +1,5 @@
 """Metrics as Prometheus reads them, from a real bridge with a real twin."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import httpx

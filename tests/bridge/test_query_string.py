@@ -1,7 +1,5 @@
 """The values of a query string, read by a dataclass; and OpenAPI is told of just these."""
 
-from __future__ import annotations
-
 import json
 from contextlib import suppress
 from dataclasses import dataclass, fields

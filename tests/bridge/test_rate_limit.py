@@ -1,7 +1,5 @@
 """Turns per client: the burst, the long run, the bounded table, and who counts as one client."""
 
-from __future__ import annotations
-
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st

@@ -1,7 +1,5 @@
 """Settings: one table, and what each may be."""
 
-from __future__ import annotations
-
 from typing import Any, get_args, get_origin
 
 import pytest

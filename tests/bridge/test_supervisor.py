@@ -1,7 +1,5 @@
 """What systemd is told, over the socket that it listens on."""
 
-from __future__ import annotations
-
 import asyncio
 import os
 import re

@@ -1,7 +1,5 @@
 """Chromium for the browser tests, and pages of the HMI in it."""
 
-from __future__ import annotations
-
 import itertools
 import os
 import threading

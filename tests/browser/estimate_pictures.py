@@ -6,8 +6,6 @@ the pictures are taken, scan by scan, so that what was foretold is graded by rea
 really had then. For the last picture a tag is scanned whose sensor has gone wrong.
 """
 
-from __future__ import annotations
-
 import io
 import tempfile
 import time
@@ -51,10 +49,7 @@ CHANGED_SCANS: Final = 5
 APART_S: Final = 2
 READY_S: Final = 120.0
 # Of each picture how long before now, s.
-PAST: Final = {
-    "estimate-early": BEGUN_S - 16,
-    "estimate-dead": RESUMED_S + 1,
-}
+PAST: Final = {"estimate-early": BEGUN_S - 16, "estimate-dead": RESUMED_S + 1}
 
 
 def taken(browser: Browser, folder: Path) -> None:

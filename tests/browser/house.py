@@ -1,7 +1,5 @@
 """A small greenhouse with one of everything, for tests that only look at it."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from lupin_msgs.msg import Observation

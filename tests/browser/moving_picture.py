@@ -3,8 +3,6 @@
 `python -m tests.browser.screenshots FOLDER --docs` makes it with the others.
 """
 
-from __future__ import annotations
-
 import io
 import re
 from collections.abc import Iterator

@@ -1,7 +1,5 @@
 """Where things are in the window, and whether somebody can hit them."""
 
-from __future__ import annotations
-
 from contextlib import suppress
 
 from playwright.sync_api import Locator, expect

@@ -5,8 +5,6 @@ blindness see it. To be looked at; with `--docs` those of the docs are made anew
 makes them.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import sys

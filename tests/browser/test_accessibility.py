@@ -3,8 +3,6 @@
 Only here the page's own policy is bypassed, to get axe into the page.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import pytest

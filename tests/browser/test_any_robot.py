@@ -1,7 +1,5 @@
 """A robot of standard messages only, `lupin-twin adapt`, a twin, and what the page then shows."""
 
-from __future__ import annotations
-
 import re
 import sys
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Bays, rows or zones of the greenhouse: the table by area, and the area of a tag."""
 
-from __future__ import annotations
-
 from playwright.sync_api import Route, expect
 
 from tests.browser.hmi import OpenPage

@@ -1,15 +1,10 @@
 """What the page shows as the greenhouse comes to be known: at once, in full, and honestly."""
 
-from __future__ import annotations
-
-import re
 from collections.abc import Iterator
 
 import pytest
-from lupin_msgs.msg import Observation
 from playwright.sync_api import expect
 
-from tests.browser.conftest import bridge_of_a_moment
 from tests.browser.hmi import OpenPage
 from tests.support.domains import own_domain
 from tests.support.messages import discovered, look, occupancy_grid, pose, scan
@@ -61,29 +56,6 @@ def test_the_table_stays_where_it_is_while_tags_arrive(domain: int, open_page: O
         expect(hmi.row("20")).to_be_in_viewport()
 
 
-def test_the_page_says_what_is_missing_until_it_comes(domain: int, open_page: OpenPage) -> None:
-    with bridge(domain=domain) as running:
-        hmi = open_page(running.url)
-        notice = hmi.test_id("notice")
-        expect(notice).to_have_attribute("data-notice", "no-tags")
-        expect(notice).to_contain_text("lupin-twin demo")
-        hmi.expect_phase("live")
-        expect(hmi.test_id("row-count")).to_have_text("0 tags")
-
-        running.peer.observe(scan("a", {"co2": 500.0}))
-        expect(notice).to_have_attribute("data-notice", "no-pins")
-
-        running.peer.discover(discovered({"a": pose(1, 1)}))
-        expect(notice).to_have_attribute("data-notice", "no-reading")
-        expect(notice).to_contain_text("Temperature")
-
-        running.peer.observe(scan("a", {"temperature": 20.0}))
-        expect(notice).to_have_attribute("data-notice", "no-map")
-
-        running.peer.publish_map(occupancy_grid([[0] * 4] * 4))
-        expect(notice).to_have_count(0)
-
-
 def test_what_is_not_known_of_a_tag_is_said(shared: Bridge, open_page: OpenPage) -> None:
     shared.peer.observe(
         scan("lost", {"temperature": 24.0}),
@@ -103,50 +75,6 @@ def test_what_is_not_known_of_a_tag_is_said(shared: Bridge, open_page: OpenPage)
     expect(hmi.cell("lost", "temperature")).to_have_text("24.0")
     row.get_by_role("button").click()
     expect(hmi.card("lost")).to_contain_text("No position known yet")
-
-
-def test_a_failed_scan_is_listed_and_says_so_until_it_succeeds(
-    shared: Bridge, open_page: OpenPage
-) -> None:
-    hmi = open_page(shared.url)
-    failed = Observation.STATUS_SCAN_FAILED
-    shared.peer.observe(scan("tried", at=(2, 2), status=failed))
-    row = hmi.row("tried")
-    expect(row).to_have_attribute("data-pinned", "false")
-    expect(row).to_have_attribute("data-health", "unknown")
-    expect(row.locator(".cell-age")).to_have_text("never")
-    tried = row.locator(".tried")
-    # Minutes, where a busy machine takes so long.
-    expect(tried).to_have_text(re.compile(r"^attempt \d+\s(s|min) ago: not readable$"))
-    shared.peer.observe(scan("tried", {"temperature": 21.0}, at=(2, 2)))
-    expect(row).to_have_attribute("data-pinned", "true")
-    expect(hmi.cell("tried", "temperature")).to_have_text("21.0")
-    expect(tried).to_have_count(0)
-    # A later failure leaves the reading as it is, and is told beside it.
-    shared.peer.observe(scan("tried", status=failed))
-    expect(tried).to_contain_text("not readable")
-    expect(hmi.cell("tried", "temperature")).to_have_text("21.0")
-
-
-def test_a_look_at_the_flowers_makes_no_reading_young(open_page: OpenPage) -> None:
-    # Ages are shown by the minute: they are the same however long this takes.
-    with bridge_of_a_moment() as (running, now_s):
-        hmi = open_page(running.url, "tag=looked")
-        running.peer.observe(
-            scan("looked", {"temperature": 20.0, "co2": 600.0}, at=(1, 4), stamp_s=now_s - 7_262),
-            scan("looked", {"co2": 610.0}, stamp_s=now_s - 602),
-            look("looked", "rose", stamp_s=now_s - 2),
-        )
-        row, card = hmi.row("looked"), hmi.card("looked")
-        expect(row.locator(".cell-age")).to_have_text(re.compile(r"^10\smin$"))
-        # Older than the row's newest reading: it says its own age.
-        expect(hmi.cell("looked", "temperature")).to_have_text(re.compile(r"^20\.0 2\sh$"))
-        expect(hmi.cell("looked", "co2")).to_have_text("610")
-        age = card.locator("[data-sensor=temperature] .age")
-        expect(age).to_have_text(re.compile(r"^2\sh 1\smin"))
-        expect(card.locator("[data-sensor=co2] .age")).to_have_text(re.compile(r"^10\smin ago$"))
-        expect(card).to_contain_text(re.compile(r"Flowers inspected\s?2\ss"))
-        expect(card.get_by_role("region", name="Last attempts").locator("li")).to_have_count(3)
 
 
 def test_a_pest_appears_on_map_and_table_and_a_clean_look_clears_it(

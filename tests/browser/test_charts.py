@@ -1,7 +1,5 @@
 """Charts and the difference layer, held against what the API says of the same past."""
 
-from __future__ import annotations
-
 import csv
 import io
 import math

@@ -1,7 +1,5 @@
 """The page over all greenhouses, in a real browser, over a real archive."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager

@@ -3,8 +3,6 @@
 The operator's browser reaches the bridge, and every page that it shows may try to use that.
 """
 
-from __future__ import annotations
-
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager

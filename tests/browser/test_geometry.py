@@ -1,14 +1,11 @@
 """Where things lie, by pixel: the field upright, pins on their cells, the map turned by its yaw."""
 
-from __future__ import annotations
-
 import colorsys
 import json
 import math
 from pathlib import Path
 from typing import Any
 
-import pytest
 from geometry_msgs.msg import Point, Pose, Quaternion
 from playwright.sync_api import expect
 
@@ -221,11 +218,7 @@ def test_a_map_with_a_yaw_lies_turned_about_its_origin(domain: int, open_page: O
         orientation=Quaternion(z=math.sin(yaw / 2), w=math.cos(yaw / 2)),
     )
     # No two turns or mirrorings of this look the same.
-    rows = [
-        [100, 0, 0, 100],
-        [0, 0, 100, -1],
-        [-1, 0, 0, 0],
-    ]
+    rows = [[100, 0, 0, 100], [0, 0, 100, -1], [-1, 0, 0, 0]]
     with bridge(domain=domain) as running:
         running.peer.publish_map(occupancy_grid(rows, resolution=0.5, origin=origin))
         running.peer.observe(scan("a", {"co2": 900.0}, at=(1, 0)))
@@ -244,67 +237,6 @@ def test_a_map_with_a_yaw_lies_turned_about_its_origin(domain: int, open_page: O
         at = {centre(i, j): cell for j, row in enumerate(rows) for i, cell in enumerate(row)}
         hmi.expect_pixels(lambda pixel: pixel == WALL, centre(0, 0), what="the map's first cell")
         assert hmi.pixels(list(at)) == [looks[cell] for cell in at.values()]
-
-
-def test_without_a_chosen_view_all_of_it_is_in_sight(domain: int, open_page: OpenPage) -> None:
-    with bridge(domain=domain) as running:
-        running.peer.publish_map(floor(6, 6))
-        running.peer.observe(
-            scan("a", {"co2": 1.0}, at=(-3, 1)), scan("b", {"co2": 2.0}, at=(9, 4))
-        )
-        running.tag("b")
-        hmi = open_page(running.url)
-        expect(hmi.row("b")).to_be_visible()
-        hmi.expect_parts()
-        box = hmi.map.bounding_box()
-        assert box is not None
-
-        def all_in_sight() -> bool:
-            view = hmi.view()
-            return all(
-                0 < x < box["width"] and 0 < y < box["height"]
-                for x, y in (view.pixel(*point) for point in [(-3, 1), (9, 4), (0, 0), (6, 6)])
-            )
-
-        hmi.expect(all_in_sight, "everything in sight")
-        # A tag that comes later, farther out, is brought into sight too.
-        running.peer.observe(scan("c", {"co2": 3.0}, at=(14, 12)))
-        expect(hmi.row("c")).to_be_visible()
-
-        def later_too() -> bool:
-            x, y = hmi.view().pixel(14, 12)
-            return all_in_sight() and 0 < x < box["width"] and 0 < y < box["height"]
-
-        hmi.expect(later_too, "the late tag in sight")
-
-
-def test_nothing_that_arrives_takes_the_map_out_of_the_operators_hand(
-    domain: int, open_page: OpenPage
-) -> None:
-    with bridge(domain=domain) as running:
-        running.peer.publish_map(floor(6, 6))
-        running.peer.observe(scan("a", {"co2": 1.0}, at=(1, 1)))
-        hmi = open_page(running.url, "sensor=co2")
-        # All that the view shows: a field that came later would widen it.
-        hmi.expect_samples(1)
-        hmi.settled_picture()
-        start = hmi.view()
-        hmi.point_at(3, 3)
-        hmi.page.mouse.down()
-        box = hmi.map.bounding_box()
-        assert box is not None
-        x, y = start.pixel(3, 3)
-        hmi.page.mouse.move(box["x"] + x + 30, box["y"] + y + 20)
-        # Without a hand on it, the view would grow to show the new tag.
-        running.peer.observe(scan("far", {"co2": 2.0}, at=(20, 20)))
-        expect(hmi.row("far")).to_be_visible()
-        held = hmi.view()
-        assert (held.x - start.x, held.y - start.y) == pytest.approx((30, 20))
-        assert held.scale == start.scale
-        hmi.page.mouse.up()
-        running.peer.observe(scan("later", {"co2": 2.0}, at=(30, 20)))
-        expect(hmi.row("later")).to_be_visible()
-        assert hmi.view() == held
 
 
 # Tells of each label what its picture's width is, and how wide its text came out in it.

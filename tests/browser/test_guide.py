@@ -1,7 +1,5 @@
 """The guide as `make docs` has built it, served by a bridge: no browser complains of it."""
 
-from __future__ import annotations
-
 import re
 
 import pytest

@@ -1,7 +1,5 @@
 """What strangers may write into strings is shown as text, and the page stays within its walls."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterator
 from functools import partial

@@ -1,9 +1,5 @@
 """The mouse on a pin: a card in short, which is never in the way."""
 
-from __future__ import annotations
-
-import re
-
 from playwright.sync_api import Locator, expect
 
 from tests.browser.hmi import PHONE, Hmi, OpenPage
@@ -15,25 +11,6 @@ PINS = {"10": (1, 3), "1": (1, 1), "2": (3, 1), "3": (3, 3), "seen": (4, 2)}
 
 def hover_card(hmi: Hmi) -> Locator:
     return hmi.test_id("hover-card")
-
-
-def test_the_mouse_on_a_pin_shows_its_card_in_short(hmi: Hmi) -> None:
-    hmi.point_at(1, 3)
-    card = hover_card(hmi)
-    expect(card).to_have_attribute("data-tag-id", "10")
-    for text in ("Tag 10", "Critical", "31.0\u00a0°C", "40.0\u00a0%", "lupin", "3 pests seen"):
-        expect(card).to_contain_text(text)
-    # Each reading has an age of its own.
-    expect(card.locator("dd .age")).to_have_text([re.compile(r"^\d+\ss$")] * 2)
-    assert card.locator("header [data-health=critical] svg").count() == 1
-    # Table and card carry the same for those who do not see it.
-    expect(card).to_have_attribute("aria-hidden", "true")
-    hmi.point_at(2, 2.4)
-    expect(card).to_have_count(0)
-    hmi.point_at(1, 3)
-    expect(card).to_be_visible()
-    hmi.page.get_by_role("searchbox").hover()
-    expect(card).to_have_count(0)
 
 
 def test_it_stands_inside_the_map_and_off_its_pin(hmi: Hmi) -> None:

@@ -1,7 +1,5 @@
 """The page over https can be installed, and opens where the bridge is gone: without any data."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path

@@ -1,7 +1,5 @@
 """A disk that runs full and has room again: told on the page and everywhere else, and healed."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

@@ -1,7 +1,5 @@
 """A wall screen, which is looked at: whoever brushes past it changes nothing."""
 
-from __future__ import annotations
-
 import re
 
 from playwright.sync_api import expect

@@ -1,7 +1,5 @@
 """Every size of window, every setting of the eye: all is there, in its place, and can be hit."""
 
-from __future__ import annotations
-
 import io
 import re
 from collections.abc import Callable, Iterator

@@ -1,7 +1,5 @@
 """The page looks back: what it shows is what the journal has, and nobody can take it for now."""
 
-from __future__ import annotations
-
 import re
 import time
 from collections.abc import Iterator
@@ -9,10 +7,9 @@ from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
-from urllib.parse import parse_qsl, urlsplit
 
 import pytest
-from playwright.sync_api import Route, expect
+from playwright.sync_api import expect
 
 from lupin_twin.core.state import Write
 from lupin_twin.journal.fold import state_at
@@ -30,7 +27,6 @@ EVERY_S: Final = 30
 SCANS: Final = 90
 # No scan of the past reads this, so that now cannot be taken for then.
 NOW_READS: Final = 25.5
-STATE: Final = re.compile(r"/api/state\?at=")
 
 # What the page says that it shows, and what it shows, whenever one of them changes.
 WATCH: Final = """
@@ -192,52 +188,6 @@ def test_the_end_of_the_bar_is_now_before_memory_is_nothing_and_between_what_was
     expect(page.card("b")).not_to_contain_text(re.compile("pests? seen", re.IGNORECASE))
 
 
-def test_with_keys_alone(page: Hmi, hour: Hour) -> None:
-    keys = page.page.keyboard
-    slider(page).focus()
-    expect(slider(page)).to_have_attribute("aria-valuetext", re.compile("^Live"))
-    keys.press("PageDown")
-    first = expect_past(page)
-    expect(slider(page)).to_have_attribute("aria-valuetext", re.compile(r"^\d+ \w+ \d{4}, "))
-    keys.press("ArrowLeft")
-    second = expect_past(page)
-    keys.press("Shift+ArrowRight")
-    third = expect_past(page)
-    assert third - second == pytest.approx(10 * (first - second), rel=0.01)
-    keys.press("End")
-    expect_now(page)
-    keys.press("Home")
-    expect_past(page)
-    keys.press("Escape")
-    expect_now(page)
-    keys.press("PageDown")
-    expect_past(page)
-    keys.press("l")
-    expect_now(page)
-    check_seen(page, hour)
-
-
-def test_playing_goes_through_the_past_and_ends_in_now(page: Hmi, hour: Hour) -> None:
-    speed, body = page.page.get_by_label("Playback speed"), page.page.locator("body")
-    play = page.page.get_by_role("button", name="Play")
-    # So slow that it goes on for half a minute, however late the answers come.
-    speed.select_option("60×")
-    press_at(page, 0.4)
-    start = expect_past(page)
-    body.press("Space")
-    expect(page.page.get_by_role("button", name="Pause")).to_have_attribute("aria-pressed", "true")
-    page.expect(lambda: len(check_seen(page, hour)) > 4, "the past to go on")
-    body.press("Space")
-    paused = expect_past(page)
-    assert paused > start
-    expect(play).to_have_attribute("aria-pressed", "false")
-    speed.select_option("3600×")
-    play.click()
-    expect_now(page)
-    expect(play).to_have_attribute("aria-pressed", "false")
-    assert {start, paused} <= check_seen(page, hour)
-
-
 def test_a_link_shows_the_same_moment_to_somebody_else_and_back_leads_to_now(
     page: Hmi, hour: Hour, open_page: OpenPage
 ) -> None:
@@ -257,54 +207,6 @@ def test_a_link_shows_the_same_moment_to_somebody_else_and_back_leads_to_now(
     expect_now(page)
     page.page.go_forward()
     assert expect_past(page) == at
-
-
-def test_a_slow_answer_never_leaves_now_under_another_moment(page: Hmi, hour: Hour) -> None:
-    # By moment: who waits long for its field, or connects anew, asks for the same one again.
-    asked: dict[str, list[Route]] = {}
-    answered: list[str] = []
-
-    def hold(route: Route) -> None:
-        at = dict(parse_qsl(urlsplit(route.request.url).query))["at"]
-        asked.setdefault(at, []).append(route)
-        if at in answered:
-            route.continue_()
-
-    page.page.route(STATE, hold)
-    press_at(page, 0.5)
-    page.expect(lambda: bool(asked), "the question")
-    notice = page.test_id("notice")
-    expect(notice).to_have_attribute("data-notice", "past-fetching")
-    assert page.rows() == []
-    answered.extend(asked)
-    for route in list(asked[answered[0]]):
-        route.continue_()
-    first = expect_past(page)
-    press_at(page, 0.6)
-    page.expect(lambda: len(asked) > 1, "the next question")
-    # What came last stays, with its own time.
-    assert moment(page) == first
-    expect(page.page.locator(".timebar-cursor")).to_have_attribute("data-awaited", "true")
-    page.page.keyboard.press("l")
-    expect_now(page)
-    page.page.unroute(STATE)
-    check_seen(page, hour)
-
-
-def test_an_answer_that_fails_is_told_and_nothing_stands_for_it(page: Hmi, hour: Hour) -> None:
-    press_at(page, 0.5)
-    first = expect_past(page)
-    page.allow_noise(r"503 .*/api/state")
-    page.page.route(STATE, lambda route: route.fulfill(status=503, json={"detail": "too busy"}))
-    press_at(page, 0.6)
-    trouble = page.test_id("troubles").locator("[data-trouble=past]")
-    expect(trouble).to_contain_text("could not be loaded")
-    expect(trouble).to_contain_text("too busy")
-    assert moment(page) == first
-    page.page.unroute(STATE)
-    expect(trouble).to_have_count(0)
-    assert expect_past(page) > first
-    check_seen(page, hour)
 
 
 def test_a_twin_without_a_memory_says_so_and_how_to_have_one(

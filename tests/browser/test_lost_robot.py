@@ -1,7 +1,5 @@
 """Tags that a lost robot pinned far away: the page opens on the others, and lists those."""
 
-from __future__ import annotations
-
 import json
 import re
 from collections.abc import Iterator
@@ -96,36 +94,6 @@ def test_the_page_opens_on_the_tags_at_home_and_lists_those_far_off(hmi: Hmi) ->
     hmi.row("orbit").get_by_role("button").click()
     expect(hmi.card("orbit")).to_contain_text("far from all other tags")
     assert hmi.view().scale > 50
-
-
-def test_no_wheel_and_no_hand_loses_the_site(hmi: Hmi) -> None:
-    hmi.go()
-    expect_all_told(hmi)
-    hmi.expect_samples()
-    box = hmi.map.bounding_box()
-    assert box is not None
-    x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
-    for dx, dy in ((300, 0), (0, 300), (-300, 0), (0, -300)):
-        hmi.page.mouse.move(x, y)
-        for _ in range(8):
-            hmi.page.mouse.down()
-            hmi.page.mouse.move(x + dx, y + dy)
-            hmi.page.mouse.up()
-            hmi.page.mouse.move(x, y)
-        assert is_home_in(hmi, hmi.view(), whole=False), (dx, dy)
-    for _ in range(40):
-        hmi.page.mouse.wheel(0, 1000)
-    hmi.expect(lambda: hmi.view().scale == 4, "the least scale")
-    assert is_home_in(hmi, hmi.view(), whole=True)
-
-
-def test_a_link_to_nowhere_opens_on_the_site(hmi: Hmi) -> None:
-    hmi.go("view=1e30,-1e308,10")
-    expect_all_told(hmi)
-    hmi.expect(lambda: is_home_in(hmi, hmi.view(), whole=False), "some of the tags at home")
-    hmi.go("view=0,0,1e300")
-    expect_all_told(hmi)
-    hmi.expect(lambda: is_home_in(hmi, hmi.view(), whole=True), "the tags at home")
 
 
 def test_a_site_of_two_tags_that_are_far_apart_is_shown_as_a_whole(open_page: OpenPage) -> None:

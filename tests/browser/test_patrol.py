@@ -1,7 +1,5 @@
 """The demo in the browser: the real patrol, faster than for people."""
 
-from __future__ import annotations
-
 import json
 import re
 import signal

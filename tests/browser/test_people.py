@@ -1,7 +1,5 @@
 """Two people at two browsers: what the one says of an alarm, the other sees."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterator
 from contextlib import contextmanager

@@ -1,7 +1,5 @@
 """The robot on the map: quiet, as old as it is, and never of another moment than now."""
 
-from __future__ import annotations
-
 import math
 import os
 import re

@@ -1,7 +1,5 @@
 """What leaves the page: links, CSV, PNG, and the settings that a browser keeps."""
 
-from __future__ import annotations
-
 import csv
 import io
 import math
@@ -68,19 +66,6 @@ def test_a_link_shows_the_same_view_to_somebody_else(house: Bridge, open_page: O
     expect(theirs.page.get_by_role("searchbox")).to_have_value("lupin")
     theirs.page.get_by_test_id("house-health").get_by_role("button", name="Healthy").click()
     theirs.expect_rows("10", "1")
-
-
-def test_a_link_of_nonsense_is_the_whole_house_and_one_to_no_tag_says_so(
-    house: Bridge, open_page: OpenPage
-) -> None:
-    hmi = open_page(house.url, "view=1,,NaN&range=9,1&layers=%00,<b>&sensor=&tag=&%E0%A4%A")
-    hmi.expect_rows(*TAGS)
-    expect(hmi.test_id("legend")).to_contain_text("Temperature °C")
-    hmi.page.get_by_role("button", name="Layers").click()
-    expect(hmi.page.get_by_role("checkbox")).to_have_count(10)
-    assert hmi.page.get_by_role("checkbox", checked=True).count() == 0  # as the link says: none
-    hmi.turn("tag=nobody")
-    expect(hmi.card("nobody")).to_contain_text("does not know this tag")
 
 
 def save(hmi: Hmi, name: str) -> Download:

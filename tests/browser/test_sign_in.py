@@ -1,7 +1,5 @@
 """Signing in as a person does it: the page, a wrong token, the right one, and coming back."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterator
 from urllib.parse import urlsplit

@@ -1,7 +1,5 @@
 """A phone in the hand: tap, drag, pinch, and the two halves of a narrow screen."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import pytest

@@ -1,7 +1,5 @@
 """The options of `patrol_node`."""
 
-from __future__ import annotations
-
 import signal
 import sys
 from pathlib import Path

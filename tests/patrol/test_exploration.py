@@ -1,7 +1,5 @@
 """The occupancy grid that grows."""
 
-from __future__ import annotations
-
 from math import dist
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Events to ROS messages, with rclpy's field checks on."""
 
-from __future__ import annotations
-
 from math import cos, pi, sin
 from typing import Any
 

@@ -1,7 +1,5 @@
 """The patrol as a whole: a repeatable sequence of events."""
 
-from __future__ import annotations
-
 import random
 from collections.abc import Iterator
 from itertools import pairwise

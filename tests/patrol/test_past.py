@@ -1,7 +1,5 @@
 """The past of a demo: what the patrol would have observed until it begins."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from statistics import fmean
 

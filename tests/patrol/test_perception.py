@@ -1,7 +1,5 @@
 """Discovery of tags."""
 
-from __future__ import annotations
-
 from math import cos, radians, sin
 
 import pytest

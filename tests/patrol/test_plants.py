@@ -1,7 +1,5 @@
 """Plants, pests and what a look at them shows."""
 
-from __future__ import annotations
-
 import pytest
 from greenhouse_sim.simulator import GreenhouseSimulator
 

@@ -1,7 +1,5 @@
 """`make soak`: what takes too long for every test run: many kills, and eight hours of writing."""
 
-from __future__ import annotations
-
 import importlib
 import sys
 

@@ -1,7 +1,5 @@
 """kill -9 of PostgreSQL, forwarders, twins and pages at 50 random moments; the suite keeps six."""
 
-from __future__ import annotations
-
 import random
 import tempfile
 import time

@@ -4,8 +4,6 @@
 store, history, journal and its upkeep. Time is the rows' own, as fast as the disk takes them.
 """
 
-from __future__ import annotations
-
 import gc
 import os
 import random

@@ -1,7 +1,5 @@
 """kill -9 at 50 random moments under 200 observations a second; the suite keeps four of them."""
 
-from __future__ import annotations
-
 import random
 import tempfile
 import time

@@ -1,7 +1,5 @@
 """A bridge alone, asked by all sorts of clients: no robot, no answer taken for granted."""
 
-from __future__ import annotations
-
 import ssl
 from collections.abc import Iterator
 from contextlib import contextmanager

@@ -1,7 +1,5 @@
 """The alarms of what was heard, in the plainest way: all of it is read again for every question."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace

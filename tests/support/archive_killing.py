@@ -3,8 +3,6 @@
 The suite keeps a few kills, `make soak` has fifty.
 """
 
-from __future__ import annotations
-
 import csv
 import io
 import random

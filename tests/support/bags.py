@@ -1,7 +1,5 @@
 """What other programs read: messages of ROS, rosbags and mcap-ros2-support, made comparable."""
 
-from __future__ import annotations
-
 import contextlib
 import resource
 from array import array

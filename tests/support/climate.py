@@ -1,7 +1,5 @@
 """What is true in the simulated greenhouse, and what is known of its floor."""
 
-from __future__ import annotations
-
 from copy import deepcopy
 from typing import Any
 

@@ -1,7 +1,5 @@
 """A disk of a test's own: full, read-only, slow, or cut off from power at any moment."""
 
-from __future__ import annotations
-
 import struct
 import subprocess
 from dataclasses import dataclass, field

@@ -3,8 +3,6 @@
 How a block is marked is told in docs/contribute/docs.md.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass

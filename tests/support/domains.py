@@ -1,7 +1,5 @@
 """One ROS domain a test, also when several test runs share the machine."""
 
-from __future__ import annotations
-
 import fcntl
 import os
 import tempfile

@@ -1,7 +1,5 @@
 """Readings for estimates, at random and by hand."""
 
-from __future__ import annotations
-
 import numpy as np
 from hypothesis import strategies as st
 

@@ -1,7 +1,5 @@
 """A real `lupin-twin fleet` over a real archive, and greenhouses that forward to it."""
 
-from __future__ import annotations
-
 import json
 import time
 from collections.abc import Iterator

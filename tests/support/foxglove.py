@@ -1,7 +1,5 @@
 """A client of Foxglove's protocol that hides nothing, and how its messages are read by others."""
 
-from __future__ import annotations
-
 import json
 import struct
 from collections.abc import Callable, Iterator, Sequence

@@ -1,7 +1,5 @@
 """ROS messages that no healthy robot sends."""
 
-from __future__ import annotations
-
 import random
 from array import array
 from collections.abc import Callable, Iterator, Mapping

@@ -3,8 +3,6 @@
 Answers that go by this moment's clock have that taken out.
 """
 
-from __future__ import annotations
-
 import base64
 import re
 from collections.abc import Iterator

@@ -1,7 +1,5 @@
 """Twin, bridge and server in the test's own process and event loop, to look inside."""
 
-from __future__ import annotations
-
 import asyncio
 import gc
 import os
@@ -73,9 +71,7 @@ class Running:
 
 @asynccontextmanager
 async def running(
-    limits: Limits | None = None,
-    ros_args: Sequence[str] = (),
-    settings: Settings | None = None,
+    limits: Limits | None = None, ros_args: Sequence[str] = (), settings: Settings | None = None
 ) -> AsyncIterator[Running]:
     """Serve on a free port, as `lupin-twin serve` does; no machine is too busy for an answer."""
     settings = settings or Settings()

@@ -3,8 +3,6 @@
 A question is a list: the name of what is asked, and its arguments.
 """
 
-from __future__ import annotations
-
 import gzip
 import json
 import math

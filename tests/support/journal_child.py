@@ -4,8 +4,6 @@ Each row's number is in its stamp, and is noted in the file `marks` beside the j
 handed over. What the journal says of itself goes to the standard output.
 """
 
-from __future__ import annotations
-
 import os
 import select
 import sys

@@ -1,7 +1,5 @@
 """A twin that is killed at a random moment under 200 observations a second, and started again."""
 
-from __future__ import annotations
-
 import random
 import signal
 import time

@@ -4,8 +4,6 @@
 as wanted, is the command `lupin-twin ROLE ...`, whose `Limits` and `World` have these values.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import sys

@@ -1,7 +1,5 @@
 """`lupin-twin web` processes, attached to twins in processes of their own."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any

@@ -1,7 +1,5 @@
 """A log that lives through something, and the plainest account of it: every row, in a list."""
 
-from __future__ import annotations
-
 import math
 import sqlite3
 from collections.abc import Iterable, Iterator

@@ -1,7 +1,5 @@
 """Questions that a test asks of the process that looks back: they cross to it by their names."""
 
-from __future__ import annotations
-
 import os
 import sys
 import threading

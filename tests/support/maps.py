@@ -1,7 +1,5 @@
 """Occupancy grids by their rows."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """A twin over a file, without ROS: its clocks are set by hand, its observations made by hand."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -31,9 +29,7 @@ class Twin:
         self.steady_s = 1_000.0
         self.is_simulated = is_simulated
         self.memory = Memory(
-            self.store,
-            open_journal(path, "/twin", 1e4, 1e4),
-            lambda: int(self.steady_s * S),
+            self.store, open_journal(path, "/twin", 1e4, 1e4), lambda: int(self.steady_s * S)
         )
         self.at(at_s)
 

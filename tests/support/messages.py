@@ -1,7 +1,5 @@
 """Messages as a robot would send them, with the least to write in a test."""
 
-from __future__ import annotations
-
 from array import array
 from collections.abc import Mapping, Sequence
 from typing import Any

@@ -1,7 +1,5 @@
 """A real mosquitto on a port of the test's own, and what it has been told."""
 
-from __future__ import annotations
-
 import json
 import os
 import socket

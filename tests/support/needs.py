@@ -3,8 +3,6 @@
 Nobody keeps a list: a file is skipped as it is collected, once it imports something of that.
 """
 
-from __future__ import annotations
-
 import importlib.abc
 import sys
 from importlib.machinery import ModuleSpec

@@ -1,7 +1,5 @@
 """A real nginx with a configuration that we ship or show, on ports of the test's own."""
 
-from __future__ import annotations
-
 import os
 import socket
 from collections.abc import Iterator, Sequence

@@ -4,8 +4,6 @@ The demo's past is made for whoever watches: a day takes 24 minutes, a round of 
 Here its times are those of the house, in which a day takes 24 hours: a round takes 48 minutes.
 """
 
-from __future__ import annotations
-
 from typing import Final
 
 from lupin_patrol.cli import parse

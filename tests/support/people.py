@@ -1,7 +1,5 @@
 """Accounts and tokens for tests, and people who have signed in."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Iterator
 from contextlib import closing, contextmanager

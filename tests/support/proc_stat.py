@@ -1,7 +1,5 @@
 """What a process costs, from /proc (proc_pid_stat(5), proc_pid_status(5))."""
 
-from __future__ import annotations
-
 import os
 from contextlib import suppress
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Real processes: started, watched, and ended without a trace."""
 
-from __future__ import annotations
-
 import contextlib
 import os
 import signal

@@ -1,7 +1,5 @@
 """Programs that no package registry of Python's or Node's has: `.ci/tools` installs them."""
 
-from __future__ import annotations
-
 import os
 import shutil
 

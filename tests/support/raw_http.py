@@ -1,7 +1,5 @@
 """An HTTP client that can say what no proper client would: bytes in, bytes out."""
 
-from __future__ import annotations
-
 import socket
 import ssl
 from contextlib import suppress

@@ -1,7 +1,5 @@
 """A WebSocket client that can say what no proper client would: bytes in, bytes out."""
 
-from __future__ import annotations
-
 import asyncio
 import random
 import socket

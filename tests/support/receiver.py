@@ -1,7 +1,5 @@
 """A real HTTP server that takes what a webhook posts, and answers as a test wants."""
 
-from __future__ import annotations
-
 import json
 import socket
 import ssl

@@ -1,7 +1,5 @@
 """Recordings as somebody else would write them."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Any, NamedTuple

@@ -3,8 +3,6 @@
 Stamps are small numbers, for moments to be equal, late and out of order often.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import TypeGuard

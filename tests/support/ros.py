@@ -1,7 +1,5 @@
 """The other side of the topics: a ROS node of the test's own, in the test's own process."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from types import TracebackType
 from typing import Any, Self, TypeVar
@@ -45,10 +43,7 @@ class Peer:
         rclpy.init(args=[], context=self._context, domain_id=domain)
         # Neither is asked for here, and each takes endpoints that all others have to discover.
         self.node = rclpy.create_node(
-            name,
-            context=self._context,
-            enable_rosout=False,
-            start_parameter_services=False,
+            name, context=self._context, enable_rosout=False, start_parameter_services=False
         )
         self._executor = SingleThreadedExecutor(context=self._context)
         self._executor.add_node(self.node)

@@ -1,7 +1,5 @@
 """A rosbridge client that hides nothing."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Iterator
 from contextlib import contextmanager

@@ -3,8 +3,6 @@
 Everything ends, and is gone, with this process.
 """
 
-from __future__ import annotations
-
 import signal
 import subprocess
 import sys

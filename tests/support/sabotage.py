@@ -6,8 +6,6 @@ often as wanted, lets a function or method fail when the marker occurs in its ar
 times (1 without it), and work otherwise; with `--hang` it says "hangs" and never comes back.
 """
 
-from __future__ import annotations
-
 import argparse
 import functools
 import runpy

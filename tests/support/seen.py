@@ -1,7 +1,5 @@
 """A house as the channels see it, made by a test."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
 

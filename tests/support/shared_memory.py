@@ -1,7 +1,5 @@
 """What killed processes leave of Fast DDS in the machine's memory, and its removal."""
 
-from __future__ import annotations
-
 import fcntl
 import time
 from contextlib import suppress

@@ -4,8 +4,6 @@ It stands at one place, then at another, three seconds each, and again. At the s
 While it drives, for a second, it reads nothing.
 """
 
-from __future__ import annotations
-
 import itertools
 from contextlib import suppress
 from typing import Any

@@ -1,7 +1,5 @@
 """A folder for what twins keep, instead of the user's: with nobody's memory in it."""
 
-from __future__ import annotations
-
 import atexit
 import os
 import shutil

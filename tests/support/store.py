@@ -1,7 +1,5 @@
 """What is written into a store, with the least to write in a test."""
 
-from __future__ import annotations
-
 from lupin_twin.core.state import (
     NANOSECONDS_PER_SECOND,
     STATUS_OK,

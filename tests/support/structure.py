@@ -1,7 +1,5 @@
 """Where the packages are. Who may import whom stands in pyproject.toml (import-linter)."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 ROOT = Path(__file__).parents[2]

@@ -4,8 +4,6 @@ Rasmussen and Williams, "Gaussian Processes for Machine Learning", 2006, 2.25 an
 is that of `lupin_twin.estimate.kernel`, written out once more, pair by pair.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from math import cos, exp, log, pi, sqrt
 from typing import NamedTuple

@@ -1,7 +1,5 @@
 """Certificates made for a test, and clients that trust them."""
 
-from __future__ import annotations
-
 import ssl
 from dataclasses import dataclass
 from pathlib import Path

@@ -4,8 +4,6 @@
 of the upgrade, that has the number; 0: nowhere. It prints how many there were.
 """
 
-from __future__ import annotations
-
 import os
 import signal
 import sys

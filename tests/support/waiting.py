@@ -1,7 +1,5 @@
 """Waiting on conditions; the only place in the tests that passes time."""
 
-from __future__ import annotations
-
 import asyncio
 import time
 from collections.abc import Awaitable, Callable

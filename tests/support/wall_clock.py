@@ -1,7 +1,5 @@
 """A wall clock of a test's own, which may be wrong, and is set right while a process runs."""
 
-from __future__ import annotations
-
 import struct
 import subprocess
 import time

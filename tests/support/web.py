@@ -1,7 +1,5 @@
 """The bridge from outside: a real `lupin-twin serve`, HTTP, WebSocket, and the robot's side."""
 
-from __future__ import annotations
-
 import json
 import socket
 from collections.abc import Callable, Iterator

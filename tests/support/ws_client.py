@@ -1,7 +1,5 @@
 """A WebSocket client as tests want it."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 

@@ -4,8 +4,6 @@ websockets' threaded client reads in one thread and writes in another, and OpenS
 threads at one connection: one request for a handshake in some hundred never left the client.
 """
 
-from __future__ import annotations
-
 import asyncio
 import json
 import ssl

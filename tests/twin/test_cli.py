@@ -1,7 +1,5 @@
 """The command `twin_node`: a clean end at every moment, and one line for impossible arguments."""
 
-from __future__ import annotations
-
 import signal
 import sys
 from collections.abc import Callable

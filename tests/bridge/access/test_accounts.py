@@ -1,7 +1,5 @@
 """The file of accounts: who may, for how long, and what is kept of a secret."""
 
-from __future__ import annotations
-
 import asyncio
 import stat
 from collections.abc import Callable, Coroutine

@@ -1,7 +1,5 @@
 """The cookie that is ours, among whatever else a browser or an attacker sends along."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import pytest

@@ -1,7 +1,5 @@
 """The shared token's rules, and the sessions that it opens."""
 
-from __future__ import annotations
-
 import pytest
 
 from lupin_bridge.access import credentials

@@ -1,20 +1,12 @@
 """The doorman of a live bridge: foreign hosts and pages, tokens, and a discreet log."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from pathlib import Path
 
 import httpx
 import pytest
 
-from lupin_bridge.access.middleware import (
-    GUESS_BURST,
-    MAX_TARGET_BYTES,
-    OPEN_PATHS,
-    Access,
-)
-from lupin_bridge.settings import SettingError, Settings
+from lupin_bridge.access.middleware import GUESS_BURST, MAX_TARGET_BYTES, OPEN_PATHS
 from lupin_bridge.stream import schema
 from tests.support.access import BEARER, OWN, TOKEN, Served, refused_start, served
 from tests.support.domains import own_domain
@@ -43,9 +35,7 @@ def open_bridge() -> Iterator[Served]:
 
 
 @pytest.fixture(scope="module")
-def closed(
-    tmp_path_factory: pytest.TempPathFactory,
-) -> Iterator[Served]:
+def closed(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Served]:
     """With a token; at its end, its log is searched for it."""
     with served(LUPIN_TOKEN=TOKEN, ROS_LOG_DIR=str(tmp_path_factory.mktemp("log"))) as running:
         yield running
@@ -59,13 +49,6 @@ def refusal_of(answer: httpx.Response) -> str:
     assert answer.headers["cross-origin-resource-policy"] == "same-origin"
     assert answer.headers["cache-control"] == "no-store"
     return schema.ErrorMessage.model_validate_json(answer.content).detail
-
-
-@pytest.mark.parametrize("origin", ["", "*", "null", "panel.example", "http://panel.example/x"])
-def test_an_allowed_origin_has_to_be_one(origin: str) -> None:
-    with pytest.raises(SettingError, match=r"--allow-origin: .* is not an origin") as refused:
-        Access.of(Settings(allow_origin=("http://good.example", origin)), None)
-    assert repr(origin) in str(refused.value)
 
 
 # --- Host ---------------------------------------------------------------------------------------
@@ -108,13 +91,6 @@ def test_a_foreign_page_gets_neither_an_answer_nor_leave_to_read_it(
 @pytest.mark.parametrize("path", ["/ws/state", "/rosbridge", "/foxglove", "/ws/nowhere"])
 def test_a_foreign_page_gets_no_websocket(open_bridge: Served, path: str) -> None:
     assert open_bridge.handshake(path, {"Origin": "http://evil.example"}) == 403
-
-
-def test_the_own_page_needs_no_leave(open_bridge: Served) -> None:
-    answer = open_bridge.get("/api/state", {"Origin": open_bridge.url})
-    assert answer.status_code == 200
-    assert "access-control-allow-origin" not in answer.headers
-    assert open_bridge.handshake(headers={"Origin": open_bridge.url}) == 101
 
 
 def test_the_pages_of_an_allowed_origin_may_read(open_bridge: Served) -> None:
@@ -165,21 +141,6 @@ def test_a_picture_in_a_foreign_page_is_not_even_computed(open_bridge: Served) -
         framed = open_bridge.get("/api/field?sensor_type=co2", {**frame, "Sec-Fetch-Dest": dest})
         assert framed.status_code == 403
     assert open_bridge.get("/", {**frame, "Sec-Fetch-Dest": "document"}).status_code == 200
-
-
-@pytest.mark.parametrize(
-    "path", ["/api/field.png?sensor_type=co2", "/api/state", "/healthz", "/x.js"]
-)
-def test_over_plain_http_it_is_told_by_the_page_it_comes_from(
-    open_bridge: Served, path: str
-) -> None:
-    """Beyond the own machine and without TLS, browsers send no Sec-Fetch headers."""
-    image = {"Accept": "image/avif,image/webp,*/*;q=0.8"}
-    answer = open_bridge.get(path, {**image, "Referer": "http://evil.example/page"})
-    assert answer.status_code == 403
-    assert "'http://evil.example'" in refusal_of(answer)
-    for referer in (f"{open_bridge.url}/", f"{PANEL}/board"):
-        assert open_bridge.get(path, {**image, "Referer": referer}).status_code != 403
 
 
 @pytest.mark.parametrize("path", ["/", "/docs", "/signin"])
@@ -242,10 +203,6 @@ def test_a_person_is_sent_to_the_sign_in_page(closed: Served, path: str, locatio
     answer = closed.get(closed.url + path, PAGE)
     assert (answer.status_code, answer.headers["location"]) == (303, location)
     assert answer.headers["cache-control"] == "no-store"
-
-
-def test_a_person_who_opens_an_api_address_is_told(closed: Served) -> None:
-    assert closed.get("/api/state", PAGE).status_code == 401
 
 
 def test_a_method_that_writes_is_not_discussed_with_strangers(closed: Served) -> None:
@@ -341,21 +298,15 @@ def test_no_log_carries_a_token_or_a_session(tmp_path: Path) -> None:
 # --- at the start -------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("token", ["", "short", "with a space in it"])
-def test_a_token_that_cannot_be_one_ends_the_start(token: str) -> None:
-    line = refused_start(LUPIN_TOKEN=token)
-    assert line.startswith("lupin-twin: LUPIN_TOKEN h")
-    assert not token or token not in line
-
-
-def test_an_origin_that_is_none_ends_the_start() -> None:
-    line = refused_start("--allow-origin", PANEL, "--allow-origin", "panel.example")
-    assert line.startswith("lupin-twin: --allow-origin: 'panel.example' is not an origin")
-
-
-def test_a_host_that_is_none_ends_the_start() -> None:
-    line = refused_start("--allow-host", "https://twin.example")
-    assert line.startswith("lupin-twin: --allow-host: 'https://twin.example' is not a host's name")
+@pytest.mark.parametrize(
+    ("option", "wrong", "is_no"),
+    [
+        ("--allow-origin", "panel.example", "an origin"),
+        ("--allow-host", "https://twin.example", "a host's name"),
+    ],
+)
+def test_what_can_never_be_allowed_ends_the_start(option: str, wrong: str, is_no: str) -> None:
+    assert f"lupin-twin: {option}: '{wrong}' is not {is_no}" in refused_start(option, wrong)
 
 
 def test_an_allowed_host_is_a_name_and_no_origin() -> None:

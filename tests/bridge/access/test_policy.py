@@ -1,7 +1,5 @@
 """Host, Origin and Sec-Fetch: which requests may pass, and what the others are told."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import pytest

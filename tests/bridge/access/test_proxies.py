@@ -1,7 +1,5 @@
 """Proxies and the path prefix: whose word counts, and what the application sees."""
 
-from __future__ import annotations
-
 import asyncio
 import itertools
 from collections.abc import Iterable, Iterator
@@ -13,7 +11,7 @@ from hypothesis import strategies as st
 
 from lupin_bridge.access.policy import BehindProxies, Proxies, path_of
 from lupin_bridge.settings import SettingError, Settings
-from tests.support.access import BEARER, OWN, TOKEN, Served, refused_start, served
+from tests.support.access import BEARER, OWN, TOKEN, Served, served
 from tests.support.processes import limits
 from tests.support.waiting import wait_for
 
@@ -134,11 +132,6 @@ def test_what_is_no_path_is_refused(prefix: str) -> None:
     ) as it:
         Proxies.of(Settings(path_prefix=prefix))
     assert repr(prefix) in str(it.value)
-
-
-def test_both_mistakes_end_the_start() -> None:
-    assert refused_start("--path-prefix", "gh1").startswith("lupin-twin: --path-prefix is 'gh1'")
-    assert refused_start("--trusted-proxy", "me").startswith("lupin-twin: --trusted-proxy is 'me'")
 
 
 # --- the bridge -----------------------------------------------------------------------------------

@@ -1,7 +1,5 @@
 """Whom a trusted proxy names, and nobody else may: real connections from several addresses."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import pytest

@@ -1,7 +1,5 @@
 """What holds for every answer of a live bridge: reads only, and the security headers."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import httpx

@@ -1,7 +1,5 @@
 """TLS: bad files are told before anything starts, and good ones make https and wss."""
 
-from __future__ import annotations
-
 import signal
 import socket
 import ssl
@@ -84,14 +82,6 @@ def test_an_encrypted_key_is_refused_without_asking_the_terminal(
         key.private_bytes(Encoding.PEM, PrivateFormat.PKCS8, BestAvailableEncryption(b"secret"))
     )
     assert "is encrypted: give a key without a passphrase" in refusal(ours.cert, encrypted)
-
-
-@pytest.mark.parametrize(
-    ("given", "missing"), [("--tls-cert", "--tls-key"), ("--tls-key", "--tls-cert")]
-)
-def test_one_without_the_other_ends_the_start(given: str, missing: str, ours: Certificate) -> None:
-    line = refused_start(given, str(ours.cert))
-    assert line == f"lupin-twin: {given} is given without {missing}, TLS needs both"
 
 
 def test_a_bad_file_ends_the_start_with_one_line(ours: Certificate) -> None:

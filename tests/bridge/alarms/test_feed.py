@@ -1,7 +1,5 @@
 """The feed by itself: with journals and replicas it is in test_live_alarms."""
 
-from __future__ import annotations
-
 import asyncio
 from collections.abc import Callable
 from dataclasses import replace

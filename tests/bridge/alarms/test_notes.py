@@ -1,7 +1,5 @@
 """What people said, joined to alarms."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 from lupin_bridge.alarms.notes import notes_of_alarms

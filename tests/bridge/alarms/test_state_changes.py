@@ -1,5 +1,3 @@
-from __future__ import annotations
-
 from dataclasses import replace
 
 from lupin_bridge.alarms.state_changes import writes_between

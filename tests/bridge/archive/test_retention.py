@@ -1,7 +1,5 @@
 """Parts of the archive by month, what it gives up by age, and a disk that is full."""
 
-from __future__ import annotations
-
 import time
 from contextlib import suppress
 from datetime import UTC, datetime

@@ -1,7 +1,5 @@
 """An archive over TLS, as libpq has it: who it is is checked, and said in one line if it is not."""
 
-from __future__ import annotations
-
 import random
 from pathlib import Path
 

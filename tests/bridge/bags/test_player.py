@@ -1,7 +1,5 @@
 """`demo --from`: what the page shows of a recording that is played, by real processes over DDS."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path

@@ -1,7 +1,5 @@
 """What of files and folders is played, and what is refused with a word on what to do."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Callable
 from pathlib import Path

@@ -1,5 +1,3 @@
-from __future__ import annotations
-
 import pytest
 import yaml
 from rosbags.rosbag2.metadata import parse_qos

@@ -1,7 +1,5 @@
 """The command: its options, ROS's arguments, and one clear line where something is wrong."""
 
-from __future__ import annotations
-
 import signal
 from collections.abc import Iterator
 from pathlib import Path
@@ -65,10 +63,7 @@ def test_no_argument_is_lost_but_for_what_ends_a_ros_part(arguments: list[str]) 
 @pytest.mark.parametrize(
     ("arguments", "named"),
     [
-        (
-            ["serve", "--port", "70000"],
-            "--port is '70000': input should be less than or equal",
-        ),
+        (["serve", "--port", "70000"], "--port is '70000': input should be less than or equal"),
         (["web", "--max-clients", "0"], "--max-clients is '0': input should be greater than or"),
         (["demo", "--reading-validity-s", "nan"], "--reading-validity-s is 'nan': input should"),
         (["serve", "--host", ""], "--host is '': string should have at least 1 char"),

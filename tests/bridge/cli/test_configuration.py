@@ -1,7 +1,5 @@
 """Settings from the command line, the environment and a file: what comes first, what is named."""
 
-from __future__ import annotations
-
 import logging
 from pathlib import Path
 from typing import Any, get_args

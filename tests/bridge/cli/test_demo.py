@@ -1,7 +1,5 @@
 """The demo's own journal and its past."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """`lupin-twin journal`: which file it takes, what it says of it, and how it ends."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 from contextlib import closing
@@ -281,10 +279,7 @@ def test_export_writes_the_rows_of_a_period_as_the_route_does(
 
 
 def test_export_has_the_units_of_the_operators_file(
-    capsys: pytest.CaptureFixture[str],
-    monkeypatch: pytest.MonkeyPatch,
-    path: Path,
-    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, path: Path, tmp_path: Path
 ) -> None:
     sensors, settings = tmp_path / "own.json", tmp_path / "own.toml"
     own = files("lupin_bridge").joinpath("sensors.json").read_text(encoding="utf-8")
@@ -333,15 +328,8 @@ def test_vacuum_says_before_and_after(capsys: pytest.CaptureFixture[str], path: 
 
 @pytest.mark.parametrize("action", ["info", "export"])
 def test_a_reader_that_goes_away_is_no_error(action: str, path: Path) -> None:
-    command = [
-        sys.executable,
-        "-m",
-        "lupin_bridge.cli.command",
-        "journal",
-        action,
-        "--journal",
-        str(path),
-    ]
+    module = [sys.executable, "-m", "lupin_bridge.cli.command"]
+    command = [*module, "journal", action, "--journal", str(path)]
     process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
     assert process.stdout is not None
     process.stdout.close()

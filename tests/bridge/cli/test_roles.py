@@ -1,7 +1,5 @@
 """The roles as processes: what stops them at once, what they show, and how they end."""
 
-from __future__ import annotations
-
 import os
 import signal
 import socket
@@ -14,9 +12,8 @@ from tests.support.journal import is_whole, select
 from tests.support.messages import scan
 from tests.support.processes import Process, children_of, lupin_twin, patrols_of, url_of
 from tests.support.recordings import OBSERVATIONS, Sent, write_bag
-from tests.support.ros import Peer
 from tests.support.waiting import wait_for
-from tests.support.web import bridge, listener, tag_ids
+from tests.support.web import listener, tag_ids
 
 ROLES = ["serve", "demo", "web"]
 ALL_TAGS = 29
@@ -66,29 +63,6 @@ def test_a_bad_ros_argument_is_named(domain: int, arguments: list[str], named: s
 # --- roles --------------------------------------------------------------------------------------
 
 
-def test_ros_arguments_reach_the_twin() -> None:
-    arguments = ("--ros-args", "-p", "idw_max_distance_m:=0.5", "-r", "/map:=/floor")
-    with bridge(*arguments, "--", "--max-clients", "5") as live:
-        live.peer.observe(scan("1", {"co2": 400.0}, at=(0, 0)))
-        live.tag("1")
-        field = live.json("/api/field", sensor_type="co2")
-        assert (field["origin_x"], field["width"]) == (-0.5, 10)
-        assert live.peer.node.count_subscribers("/map") == 0
-
-
-def test_the_role_web_shows_a_twin_elsewhere(domain: int) -> None:
-    with (
-        lupin_twin(domain, "web") as web,
-        listener(url_of(web)) as early,
-        lupin_twin(domain, "serve"),
-        Peer(domain) as peer,
-    ):
-        assert early.until("status")["reason"] == "never_seen"
-        peer.observe(scan("elsewhere", {"co2": 1.0}))
-        early.until_tag("elsewhere")
-        assert early.until("state")["revision"]
-
-
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_the_web_role_ends_at_once_and_quietly(domain: int, number: signal.Signals) -> None:
     with lupin_twin(domain, "web") as process:
@@ -104,31 +78,6 @@ def is_running(pid: int) -> bool:
     except (FileNotFoundError, ProcessLookupError):  # gone before or while it is read
         return False
     return stat.rpartition(") ")[2][0] != "Z"
-
-
-def test_the_demo_shows_the_whole_greenhouse_and_ends_with_its_patrol(domain: int) -> None:
-    with (
-        lupin_twin(
-            domain, "demo", "--speed", "10", "--seed", "3", *NO_JOURNAL, afresh=True
-        ) as demo,
-        listener(url_of(demo)) as screen,
-    ):
-        (patrol,) = wait_for(lambda: patrols_of(demo.pid), "the patrol")
-        ids: set[str] = set()
-
-        def look() -> bool:
-            frame = screen.next()
-            if frame["type"] == "state":
-                ids.update(tag_ids(frame["state"]))
-            return len(ids) == ALL_TAGS
-
-        wait_for(look, f"all {ALL_TAGS} tags", meanwhile=lambda _: None)
-        assert is_running(patrol)
-        os.killpg(demo.pid, signal.SIGINT)  # as a terminal does at Ctrl-C
-        assert demo.wait() == 0
-        assert not is_running(patrol)
-        assert "has ended" not in demo.output
-        assert "Traceback" not in demo.output
 
 
 def test_a_demo_of_a_recording_shows_its_tags_at_their_time_and_leaves_nothing(
@@ -224,7 +173,12 @@ def test_a_demo_has_a_past_from_its_first_moment_on(domain: int, tmp_path: Path)
             listener(url_of(demo)) as screen,
         ):
             assert len(tag_ids(screen.until("state")["state"])) == ALL_TAGS
-            assert demo.stop(signal.SIGINT) == 0
+            (patrol,) = patrols_of(demo.pid)
+            os.killpg(demo.pid, signal.SIGINT)  # as a terminal does at Ctrl-C
+            assert demo.wait() == 0
+            assert not is_running(patrol)
+            assert "has ended" not in demo.output
+            assert "Traceback" not in demo.output
         pasts += select(path, filled_in)
     assert is_whole(path)
     (filled,) = select(path, "SELECT value FROM meta WHERE key = 'simulated_until_ns'")

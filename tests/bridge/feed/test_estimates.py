@@ -1,7 +1,5 @@
 """Every sensor's report is fetched; tags that have changed are passed on when they are others."""
 
-from __future__ import annotations
-
 import asyncio
 import math
 from typing import Any
@@ -73,40 +71,32 @@ class Stage:
         return self.answers[request.sensor_type]
 
 
-def test_changes_are_passed_on_when_they_are_others_than_before() -> None:
+async def test_changes_are_passed_on_when_they_are_others_than_before() -> None:
     stage = Stage()
-
-    async def test() -> None:
+    await stage.follower.update()
+    assert stage.asked == [], "there is no state yet"
+    stage.snapshot = snapshot(co2=5, light=6)
+    stage.answers = {"co2": report(9, {"co2": None}), "light": report(4, {})}
+    await stage.follower.update()
+    assert stage.asked == ["co2", "light"]
+    assert stage.told == []
+    stage.answers["co2"] = report(9, {"co2": 5})
+    for _ in range(2):
         await stage.follower.update()
-        assert stage.asked == [], "there is no state yet"
-        stage.snapshot = snapshot(co2=5, light=6)
-        stage.answers = {"co2": report(9, {"co2": None}), "light": report(4, {})}
-        await stage.follower.update()
-        assert stage.asked == ["co2", "light"]
-        assert stage.told == []
-        stage.answers["co2"] = report(9, {"co2": 5})
-        for _ in range(2):
-            await stage.follower.update()
-            assert stage.told == [{"co2": {"co2": 5}}]
-        stage.snapshot = snapshot(light=6)
-        await stage.follower.update()
-        assert stage.told[1:] == [{}], "no tag has that sensor any more"
-
-    asyncio.run(test())
+        assert stage.told == [{"co2": {"co2": 5}}]
+    stage.snapshot = snapshot(light=6)
+    await stage.follower.update()
+    assert stage.told[1:] == [{}], "no tag has that sensor any more"
     stage.workers.close()
 
 
-def test_of_a_sensor_that_cannot_be_reported_just_now_the_last_report_stands() -> None:
+async def test_of_a_sensor_that_cannot_be_reported_just_now_the_last_report_stands() -> None:
     stage = Stage()
-
-    async def test() -> None:
-        stage.snapshot, stage.answers = snapshot(co2=5), {"co2": report(9, {"co2": 5})}
-        await stage.follower.update()
-        stage.answers = {}
-        await stage.follower.update()
-        assert stage.told == [{"co2": {"co2": 5}}]
-
-    asyncio.run(test())
+    stage.snapshot, stage.answers = snapshot(co2=5), {"co2": report(9, {"co2": 5})}
+    await stage.follower.update()
+    stage.answers = {}
+    await stage.follower.update()
+    assert stage.told == [{"co2": {"co2": 5}}]
     stage.workers.close()
 
 
@@ -120,16 +110,12 @@ def test_of_many_sensors_so_many_are_asked_after() -> None:
     stage.workers.close()
 
 
-def test_what_cannot_be_answered_ends_nothing() -> None:
+async def test_what_cannot_be_answered_ends_nothing() -> None:
     stage = Stage(period_s=0.0)
     stage.snapshot = snapshot(co2=1)
-
-    async def test() -> None:
-        stage.follower.start()
-        await until(lambda: len(stage.asked) > 1, "it to be asked again")
-        stage.answers = {"co2": report(9, {"co2": 1})}
-        await until(lambda: stage.told, "the answer")
-        await stage.follower.stop()
-
-    asyncio.run(test())
+    stage.follower.start()
+    await until(lambda: len(stage.asked) > 1, "it to be asked again")
+    stage.answers = {"co2": report(9, {"co2": 1})}
+    await until(lambda: stage.told, "the answer")
+    await stage.follower.stop()
     stage.workers.close()

@@ -1,7 +1,5 @@
 """Copies of journals: the newest serves at once, and those of twins long gone are deleted."""
 
-from __future__ import annotations
-
 import asyncio
 import os
 import time

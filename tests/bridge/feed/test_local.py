@@ -1,7 +1,5 @@
 """The twin of this process, in its ROS thread."""
 
-from __future__ import annotations
-
 import asyncio
 import threading
 from collections.abc import AsyncIterator

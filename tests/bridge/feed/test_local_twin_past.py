@@ -1,7 +1,5 @@
 """The twin of this process: its past, which is the journal's."""
 
-from __future__ import annotations
-
 import asyncio
 import time
 from pathlib import Path
@@ -11,9 +9,7 @@ import pytest
 from lupin_bridge.feed.query import Itself
 from lupin_bridge.feed.source import TwinTimeoutError
 from lupin_twin.core.journal_condition import JournalState
-from lupin_twin.core.past import (
-    NotRemembered,
-)
+from lupin_twin.core.past import NotRemembered
 from lupin_twin.journal.runs import Clock
 from tests.bridge.feed.test_local import started
 from tests.support.journal import SECOND, kept, scan

@@ -1,7 +1,5 @@
 """The process that looks back: asked, cancelled, killed, started again, ended with its parent."""
 
-from __future__ import annotations
-
 import asyncio
 import logging
 import os
@@ -27,6 +25,7 @@ from lupin_twin.journal.queries import Export
 from tests.support.domains import ros_env
 from tests.support.journal import NOW, SECOND, kept, scan
 from tests.support.looking import Body, Count, Dying, Endless, Failing, MapCells, Running
+from tests.support.maps import map_of
 from tests.support.processes import Process
 from tests.support.waiting import until, wait_for
 
@@ -146,18 +145,7 @@ def test_a_map_is_sent_once(path: Path, shared: Shared) -> None:
     runner, past = shared
 
     def a_map(revision: int) -> OccupancyMap:
-        return OccupancyMap(
-            frame_id="map",
-            stamp_ns=1,
-            width=1_000,
-            height=revision,
-            resolution=0.5,
-            origin_x=0.0,
-            origin_y=0.0,
-            origin_yaw=0.0,
-            cells=np.zeros(1_000 * revision, dtype=np.int8),
-            revision=revision,
-        )
+        return map_of(np.zeros((revision, 1_000)), revision=revision)
 
     async def test() -> None:
         first, second = a_map(1), a_map(2)
@@ -169,31 +157,27 @@ def test_a_map_is_sent_once(path: Path, shared: Shared) -> None:
     runner.run(test())
 
 
-def test_an_export_goes_on_where_it_was_in_another_process_too(
+async def test_an_export_goes_on_where_it_was_in_another_process_too(
     path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    async def test() -> None:
-        async with looking_back() as past:
-            export: bytes | None = pickle.dumps(Export(0, NOW_NS, None, None))
-            found: list[int] = []
-            while export is not None:
-                export, lots = await past.ask(ExportStep(export, len), now(path), 0.0)
-                found += lots
-                if past.starts == 1:
-                    assert past.pid is not None
-                    os.kill(past.pid, signal.SIGKILL)
-                    await until(lambda: past.pid is None and not past.why_down, "its end")
-            assert (found, past.starts) == ([1_000, 1_000, 500], 2)
-
     monkeypatch.setattr(past_process, "REST_S", 0.0)
-    asyncio.run(test())
+    async with looking_back() as past:
+        export: bytes | None = pickle.dumps(Export(0, NOW_NS, None, None))
+        found: list[int] = []
+        while export is not None:
+            export, lots = await past.ask(ExportStep(export, len), now(path), 0.0)
+            found += lots
+            if past.starts == 1:
+                assert past.pid is not None
+                os.kill(past.pid, signal.SIGKILL)
+                await until(lambda: past.pid is None and not past.why_down, "its end")
+        assert (found, past.starts) == ([1_000, 1_000, 500], 2)
 
 
 async def test_one_that_dies_is_told_of_and_started_again(
     path: Path, caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(past_process, "REST_S", 0.2)
-
     async with looking_back() as past:
         waiting = asyncio.create_task(past.ask(Endless(), now(path), 0.0))
         await until(lambda: past.pid is not None, "a process")
@@ -220,7 +204,6 @@ async def test_one_that_cannot_be_started_is_tried_again(
     path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(past_process, "REST_S", 0.01)
-
     async with looking_back() as past:
         with monkeypatch.context() as nowhere:
             nowhere.setattr(sys, "executable", "/nowhere/python")

@@ -1,7 +1,5 @@
 """The relay over a script of ROS: who hears what, how much is held, and for how long."""
 
-from __future__ import annotations
-
 import asyncio
 import weakref
 from collections.abc import Callable, Mapping
@@ -9,14 +7,7 @@ from typing import Any
 
 import pytest
 
-from lupin_bridge.feed.relay import (
-    Listening,
-    NotRelayedError,
-    Relay,
-    RosTime,
-    Sample,
-    Topic,
-)
+from lupin_bridge.feed.relay import Listening, NotRelayedError, Relay, RosTime, Sample, Topic
 from lupin_bridge.feed.source import TwinUnavailableError
 from tests.support.waiting import until
 

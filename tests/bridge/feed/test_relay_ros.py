@@ -1,7 +1,5 @@
 """Real topics, heard raw in both roles: the bytes are the message, and nothing is made of them."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import pytest

@@ -1,17 +1,8 @@
 """What is kept of a robot: the newest of each, a bounded trail, and a plan until it is done."""
 
-from __future__ import annotations
-
 import pytest
 
-from lupin_bridge.feed.robot import (
-    TRAIL_POINTS,
-    Battery,
-    Plan,
-    Position,
-    Robot,
-    RobotLog,
-)
+from lupin_bridge.feed.robot import TRAIL_POINTS, Battery, Plan, Position, Robot, RobotLog
 
 S = 10**9
 

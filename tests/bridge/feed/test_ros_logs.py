@@ -1,7 +1,5 @@
 """What nodes log, in the bridge's log."""
 
-from __future__ import annotations
-
 import json
 import logging
 from typing import Any

@@ -1,7 +1,5 @@
 """The ROS thread, with real nodes: what crosses, in both directions, and how it ends."""
 
-from __future__ import annotations
-
 import asyncio
 import logging
 import sys

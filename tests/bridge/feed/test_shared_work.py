@@ -1,7 +1,5 @@
 """Work that is done once for all who ask for the same, and only while somebody waits."""
 
-from __future__ import annotations
-
 import asyncio
 
 import pytest

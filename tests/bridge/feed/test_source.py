@@ -1,7 +1,5 @@
 """What every source has to be: both are held to the protocol, and to what it promises."""
 
-from __future__ import annotations
-
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from dataclasses import replace
@@ -106,9 +104,7 @@ async def test_a_source_tells_of_every_change_and_of_what_it_is_asked(
         assert len(set(revisions)) == 3
 
         history = await until_answered(
-            lambda: source.ask(Itself(LatestRequest("1", source.buffer_len)), 0.0),
-            "the scan",
-            bool,
+            lambda: source.ask(Itself(LatestRequest("1", source.buffer_len)), 0.0), "the scan", bool
         )
         assert [(scan.stamp_ns, scan.readings[0].value) for scan in history] == [
             (5_000_000_000, 400.0)
@@ -190,30 +186,3 @@ async def test_a_source_tells_of_the_past(domain: int, source_type: type) -> Non
         ]
         assert {(row.tag_id, row.x, row.y) for row in rows} == {("1", 0.5, 2.5)}
         assert {row.source for row in rows} == {"test"}
-
-
-@pytest.mark.parametrize("source_type", SOURCES)
-async def test_a_journal_that_is_off_can_be_asked_too(domain: int, source_type: type) -> None:
-    async with stage_of(source_type, domain, "-p", "journal:=off") as stage:
-        source = stage.source
-        stage.peer.observe(
-            scan("1", {"co2": 400.0}, stamp_s=5.0), scan("1", status=2, stamp_s=60.0)
-        )
-        await until(
-            lambda: any(
-                tag.last_try is not None and tag.last_try.status
-                for told in stage.told[-1:]
-                for tag in told.snapshot.tags
-            ),
-            "both",
-        )
-        past = await until_answered(
-            lambda: source.ask(Itself(SeriesRequest("1", "co2")), 0.0),
-            "it",
-            lambda it: it.stamps_ns,
-        )
-        assert (past.stamps_ns, past.means) == ((5 * S,), (400.0,))
-        scans = await source.ask(Itself(SeriesRequest("*", "~scans", 1, 100 * S)), 0.0)
-        assert scans.stamps_ns == (5 * S,)
-        [tag] = (await source.ask(Itself(5 * S), 0.0)).tags
-        assert tag.readings[0].value == 400.0

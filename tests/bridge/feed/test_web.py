@@ -1,7 +1,5 @@
 """The source of the role `web`, and a peer in place of its twin."""
 
-from __future__ import annotations
-
 import asyncio
 import math
 from collections.abc import AsyncIterator

@@ -1,7 +1,5 @@
 """The ROS side of the role `web`: a real node, and a peer that plays the twin."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any
@@ -346,9 +344,7 @@ def test_a_message_past_the_limit_is_dropped_before_it_is_read(
     for size in (limit, limit + 1):
         subscription.callback(bytes(size), INFO)
     dropped = [record.message for record in caplog.records if "dropped a message" in record.message]
-    assert dropped == [
-        f"dropped a message on {topic}: {limit + 1} bytes, the limit is {limit}",
-    ]
+    assert dropped == [f"dropped a message on {topic}: {limit + 1} bytes, the limit is {limit}"]
 
 
 @pytest.mark.parametrize(

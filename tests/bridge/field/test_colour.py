@@ -1,7 +1,5 @@
 """Colours: CSS and the bridge's pictures agree."""
 
-from __future__ import annotations
-
 import pytest
 
 from lupin_bridge.field import formats as colour

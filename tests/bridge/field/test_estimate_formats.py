@@ -1,7 +1,5 @@
 """An estimate as JSON, NPY and PNG."""
 
-from __future__ import annotations
-
 import io
 import json
 from dataclasses import replace

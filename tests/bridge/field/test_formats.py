@@ -1,7 +1,5 @@
 """The three formats of a field: decoded again and compared with the grid, cell by cell."""
 
-from __future__ import annotations
-
 import io
 import json
 import math

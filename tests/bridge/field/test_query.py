@@ -1,7 +1,5 @@
 """A field's query string, Accept, ETag and headers, without a server."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Sequence
 from urllib.parse import unquote

@@ -1,7 +1,5 @@
 """Alarms of all sites, the worst first; one sensor of several, the outlier first."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -145,10 +143,7 @@ def test_what_people_said_of_an_alarm_is_beside_it(every: All) -> None:
     assert not {"acknowledged_by", "shelved_by"} & {*first, *second}
     now_ns = time.time_ns()
     for number, (kind, alarm, until_ns) in enumerate(
-        (
-            ("acknowledge", first, "NULL"),
-            ("shelve", second, str(now_ns + HOUR_S * SECOND)),
-        )
+        (("acknowledge", first, "NULL"), ("shelve", second, str(now_ns + HOUR_S * SECOND)))
     ):
         note_id = f"{number + 1:016x}beef"
         archive.do(

@@ -1,7 +1,5 @@
 """What is wrong is said in one line."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 

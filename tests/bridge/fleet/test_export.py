@@ -1,7 +1,5 @@
 """Rows of one site or of many, as CSV and as Parquet."""
 
-from __future__ import annotations
-
 import csv
 import io
 from pathlib import Path

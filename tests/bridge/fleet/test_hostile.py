@@ -1,7 +1,5 @@
 """Whoever asks, whatever is in the archive: the fleet's page goes on, and no site costs another."""
 
-from __future__ import annotations
-
 import os
 import signal
 import time

@@ -1,7 +1,5 @@
 """What an operator says at the fleet's page is a row of the site's log, on every replica."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass

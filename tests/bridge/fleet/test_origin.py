@@ -1,7 +1,5 @@
 """What no robot observed says so, on the overview and below its site's path."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 

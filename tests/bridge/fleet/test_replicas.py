@@ -1,7 +1,5 @@
 """Three replicas behind a real nginx as the guide configures it: one answer, and one is lost."""
 
-from __future__ import annotations
-
 import signal
 import threading
 import time
@@ -43,6 +41,7 @@ def replicas(
     journal = folder / "journal"
     write(journal, scans_lately())
     forward_once(archive, journal)
+    archive.do("UPDATE forwarder SET heard_at = now() - INTERVAL '1 hour'")
     with ExitStack() as stack:
         pages = [stack.enter_context(fleet(archive, *SHOWN)) for _ in range(3)]
         ports = [int(page.url.rpartition(":")[2]) for page in pages]

@@ -1,7 +1,5 @@
 """A site's page, and every answer below it, is that of its log: as the journal itself gives it."""
 
-from __future__ import annotations
-
 import io
 import time
 from contextlib import closing

@@ -1,7 +1,5 @@
 """The small map of a site: as large at most, the worst on top, the map's own way up."""
 
-from __future__ import annotations
-
 import random
 
 from lupin_bridge.fleet.small_map import dots, svg, version

@@ -1,7 +1,5 @@
 """Alarms of quantities of a day: from dawn to dawn by the clock, one value a day and a tag."""
 
-from __future__ import annotations
-
 import math
 import random
 from collections.abc import Iterable, Mapping, Sequence

@@ -5,8 +5,6 @@ the same as a journal tells them to the alarms. The page's tests render the same
 told in `tests/README.md`.
 """
 
-from __future__ import annotations
-
 import asyncio
 import json
 import math

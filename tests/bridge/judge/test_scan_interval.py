@@ -1,5 +1,3 @@
-from __future__ import annotations
-
 from lupin_bridge.judge.scan_interval import LONGEST_NS, SHORTEST_NS, holds_ns, interval_ns
 
 MINUTE = 60_000_000_000

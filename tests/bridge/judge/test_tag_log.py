@@ -1,5 +1,3 @@
-from __future__ import annotations
-
 from lupin_bridge.judge.days import TagDays
 from lupin_bridge.judge.derived import IsDay
 from lupin_bridge.judge.episodes import TagEpisodes

@@ -1,7 +1,5 @@
 """The table of `verdicts.json`: value and age (s) of each reading, and what an expert says."""
 
-from __future__ import annotations
-
 import json
 import math
 from collections import Counter

@@ -1,7 +1,5 @@
 """What a broker has to be told: what is new, once, and the newest of it."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Mapping
 from dataclasses import replace
@@ -142,9 +140,7 @@ def test_an_announcement_is_made_anew_where_it_says_something_else() -> None:
     (config,) = announcements(news)
     assert news[config]["expire_after"] == 900
     more = told(one, seen(tag("a", NOW_NS + 2, temperature=21.0, co2=500.0), holds_ns=holds))
-    assert announcements(more) == {
-        "homeassistant/sensor/lt/tag_a_-_reading_co2/config",
-    }
+    assert announcements(more) == {"homeassistant/sensor/lt/tag_a_-_reading_co2/config"}
 
 
 def test_a_tag_that_is_gone_is_taken_back() -> None:

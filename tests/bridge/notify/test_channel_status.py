@@ -1,7 +1,5 @@
 """How long a channel waits."""
 
-from __future__ import annotations
-
 from lupin_bridge.notify.retry import Backoff
 
 

@@ -1,7 +1,5 @@
 """All channels together: started with a bridge, told of by it, stopped with it."""
 
-from __future__ import annotations
-
 import asyncio
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path

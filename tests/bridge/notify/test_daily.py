@@ -1,7 +1,5 @@
 """The report of a day: each day once, also after a restart, and none that was missed is hidden."""
 
-from __future__ import annotations
-
 import asyncio
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager

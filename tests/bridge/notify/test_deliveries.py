@@ -1,7 +1,5 @@
 """Changes of alarms: in order, each with an id, bounded, and none lost without being counted."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 from lupin_bridge.alarms.board import Change

@@ -1,7 +1,5 @@
 """Where things are sent: what cannot be is refused at the start, and no secret is in a message."""
 
-from __future__ import annotations
-
 import logging
 import ssl
 from pathlib import Path

@@ -1,7 +1,5 @@
 """What Home Assistant is told: devices, units and classes that it takes, and when to stop."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Any
 

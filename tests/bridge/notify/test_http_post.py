@@ -1,7 +1,5 @@
 """One POST to a real server: what it says, and how little is taken of what comes back."""
 
-from __future__ import annotations
-
 import asyncio
 import socket
 import ssl

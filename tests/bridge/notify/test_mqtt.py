@@ -1,7 +1,5 @@
 """MQTT and a real mosquitto: absent, refusing, hanging, killed, and then told everything."""
 
-from __future__ import annotations
-
 import asyncio
 import socket
 import threading

@@ -1,7 +1,5 @@
 """What is published: with its own time, and nothing that changes while nothing happens."""
 
-from __future__ import annotations
-
 import math
 
 import pytest

@@ -1,7 +1,5 @@
 """Any name becomes a part of a topic that is safe, and no two become the same."""
 
-from __future__ import annotations
-
 import re
 
 from hypothesis import given

@@ -1,7 +1,5 @@
 """The webhook and a real receiver: refusing, hanging, slow, failing, and then taking all of it."""
 
-from __future__ import annotations
-
 import asyncio
 from collections.abc import AsyncIterator, Callable, Iterator
 from contextlib import asynccontextmanager
@@ -124,9 +122,7 @@ def cut(_: Posted) -> Iterator[bytes | None]:
 
 
 @pytest.mark.parametrize("bad", [status(500), status(302), status(429, "Retry-After: 0"), cut])
-def test_what_is_not_taken_comes_again_with_the_same_id_and_the_rest_behind_it(
-    bad: Answer,
-) -> None:
+def test_what_is_not_taken_comes_again_with_the_same_id_and_the_rest_behind_it(bad: Answer) -> None:
     async def run(server: Receiver) -> None:
         board = Alarms()
         board.show([A, B])

@@ -1,7 +1,5 @@
 """Answers as of a moment: what they say, and ETags that stand for exactly that."""
 
-from __future__ import annotations
-
 import json
 import math
 from collections.abc import Callable, Sequence
@@ -9,7 +7,6 @@ from dataclasses import replace
 from datetime import UTC
 from typing import Any
 
-import numpy as np
 import pytest
 
 from lupin_bridge.field.formats import FORMATS, JSON, PNG, FieldFormat
@@ -27,6 +24,7 @@ from lupin_twin.estimate.engine import TagPast
 from lupin_twin.field.engine import FieldRefused, FieldRules
 from lupin_twin.field.explored import OccupancyMap
 from lupin_twin.runtime.workers import SMALL_S
+from tests.support.maps import map_of
 
 NS = 10**9
 CRITERIA = Criteria(own_sensors(), None, ClockDay(UTC))
@@ -42,18 +40,7 @@ SITE = Snapshot(5 * NS, "map", (tag("a", 0.0, 400.0), tag("b", 1.0, 500.0)))
 
 
 def a_map(revision: int, free: int = 0) -> OccupancyMap:
-    return OccupancyMap(
-        frame_id="map",
-        stamp_ns=revision,
-        width=2,
-        height=1,
-        resolution=0.5,
-        origin_x=0.0,
-        origin_y=0.0,
-        origin_yaw=0.0,
-        cells=np.array([free, -1], dtype=np.int8),
-        revision=revision,
-    )
+    return map_of([[free, -1]], stamp_ns=revision, resolution=0.5, revision=revision)
 
 
 def asked(

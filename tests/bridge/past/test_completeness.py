@@ -1,7 +1,5 @@
 """Up to when an answer is complete, and since when what it is of is kept."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import pytest

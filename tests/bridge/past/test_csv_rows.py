@@ -1,7 +1,5 @@
 """Rows as CSV: what a reader gets back, to the last digit, and nothing that a spreadsheet runs."""
 
-from __future__ import annotations
-
 import csv
 import io
 import math

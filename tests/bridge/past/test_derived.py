@@ -1,7 +1,5 @@
 """The past of what is derived: pairs of one scan, or nothing that could be taken for them."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """One sensor's past: what is sent of it, and the gaps, beside a plainer way to find them."""
 
-from __future__ import annotations
-
 import math
 from statistics import median_low
 from typing import Any

@@ -1,7 +1,5 @@
 """Moments as text: exact to the nanosecond both ways, and nothing that is guessed at."""
 
-from __future__ import annotations
-
 from contextlib import suppress
 from datetime import UTC, datetime, timedelta, timezone
 from fractions import Fraction

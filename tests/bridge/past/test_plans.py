@@ -1,7 +1,5 @@
 """What is asked of the past: it crosses, it says what it costs, who has the answer gets none."""
 
-from __future__ import annotations
-
 import json
 import pickle
 from dataclasses import replace

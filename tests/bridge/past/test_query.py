@@ -1,7 +1,5 @@
 """What a query string asks of the past: what it says, and nothing that nobody said."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import partial
 from typing import Any

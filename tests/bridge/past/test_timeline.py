@@ -1,7 +1,5 @@
 """What happened when, in buckets: the same whichever way a source tells of it."""
 
-from __future__ import annotations
-
 from collections import Counter
 from typing import Any
 

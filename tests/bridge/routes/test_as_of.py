@@ -1,7 +1,5 @@
 """State, tag, field, quality and health as of a moment, over HTTP."""
 
-from __future__ import annotations
-
 import asyncio
 import threading
 from dataclasses import replace
@@ -11,11 +9,9 @@ import pytest
 
 from lupin_bridge.past import fields, plans
 from lupin_bridge.stream import schema
-from lupin_twin.core.past import NotRemembered
 from lupin_twin.core.state import Pose, Reading, Snapshot, TagState
 from lupin_twin.field import engine
 from tests.bridge.routes.test_past import remembering
-from tests.support.inprocess import run
 from tests.support.past import NS, MadeUp
 from tests.support.waiting import PATIENCE_S, until
 
@@ -37,71 +33,61 @@ def house(value: float = 400.0) -> Snapshot:
     return Snapshot(0, "map", (TagState("a/b", pose, (Reading("co2", value, NS),), NS),))
 
 
-def test_every_route_answers_as_of_a_moment(domain: int) -> None:
+async def test_every_route_answers_as_of_a_moment(domain: int) -> None:
     past = MadeUp(snapshot=house())
-
-    async def test() -> None:
-        async with remembering(past) as it:
-            state = schema.TwinState.model_validate_json(
-                (await it.http.get("/api/state?at=1970-01-01T00:00:09.5Z")).content
+    async with remembering(past) as it:
+        state = schema.TwinState.model_validate_json(
+            (await it.http.get("/api/state?at=1970-01-01T00:00:09.5Z")).content
+        )
+        assert (state.header.stamp.sec, state.header.stamp.nanosec) == (9, 500_000_000)
+        assert [tag.stale_seconds for tag in state.tags] == [8.5]
+        tag = schema.TwinTagState.model_validate_json(
+            (await it.http.get("/api/tags/a%2Fb?at=9.5")).content
+        )
+        assert tag == state.tags[0]
+        for path in PATHS[2:4]:
+            field = schema.GetFieldResponse.model_validate_json(
+                (await it.http.get(f"{path}&at=9")).content
             )
-            assert (state.header.stamp.sec, state.header.stamp.nanosec) == (9, 500_000_000)
-            assert [tag.stale_seconds for tag in state.tags] == [8.5]
-            tag = schema.TwinTagState.model_validate_json(
-                (await it.http.get("/api/tags/a%2Fb?at=9.5")).content
-            )
-            assert tag == state.tags[0]
-            for path in PATHS[2:4]:
-                field = schema.GetFieldResponse.model_validate_json(
-                    (await it.http.get(f"{path}&at=9")).content
-                )
-                assert (field.sample_count, field.value_max) == (1, 400.0)
-                assert (field.origin_x, field.origin_y) == (-0.5, 0.5), "the box of then"
-            assert (await it.http.get(f"{PATHS[4]}&at=9")).content[:4] == b"\x89PNG"
-            assert (await it.http.get(f"{PATHS[5]}&at=9")).content[:6] == b"\x93NUMPY"
-            quality = (await it.http.get(f"{PATHS[6]}&at=9")).json()
-            assert quality["sample_count"] == 1
-            health = schema.Judgement.model_validate_json(
-                (await it.http.get("/api/health?at=9")).content
-            )
-            assert (health.house.verdict, health.tags["a/b"].verdict) == ("healthy", "healthy")
-            assert set(past.asked) == {9 * NS, 19 * NS // 2}
-            answer = await it.http.get("/api/tags/c?at=9")
-            assert answer.status_code == 404
-            # Of before the log began, nobody knows.
-            assert "no tag 'c' is known (1 others are); what was received" in answer.text
-
-    run(domain, test())
+            assert (field.sample_count, field.value_max) == (1, 400.0)
+            assert (field.origin_x, field.origin_y) == (-0.5, 0.5), "the box of then"
+        assert (await it.http.get(f"{PATHS[4]}&at=9")).content[:4] == b"\x89PNG"
+        assert (await it.http.get(f"{PATHS[5]}&at=9")).content[:6] == b"\x93NUMPY"
+        quality = (await it.http.get(f"{PATHS[6]}&at=9")).json()
+        assert quality["sample_count"] == 1
+        health = schema.Judgement.model_validate_json(
+            (await it.http.get("/api/health?at=9")).content
+        )
+        assert (health.house.verdict, health.tags["a/b"].verdict) == ("healthy", "healthy")
+        assert set(past.asked) == {9 * NS, 19 * NS // 2}
+        answer = await it.http.get("/api/tags/c?at=9")
+        assert answer.status_code == 404
+        # Of before the log began, nobody knows.
+        assert "no tag 'c' is known (1 others are); what was received" in answer.text
 
 
-def test_what_is_made_of_a_days_readings_is_asked_for_like_a_sensor(domain: int) -> None:
+async def test_what_is_made_of_a_days_readings_is_asked_for_like_a_sensor(domain: int) -> None:
     hour_ns = 3600 * NS
     points = [(n * hour_ns, 54_000.0) for n in range(1, 40)]
     state = house()
     lit = replace(state.tags[0], readings=(Reading("light", 54_000.0, 39 * hour_ns),))
     past = MadeUp(
-        points={("a/b", "light"): points},
-        snapshot=replace(state, tags=(lit,)),
-        now_ns=40 * hour_ns,
+        points={("a/b", "light"): points}, snapshot=replace(state, tags=(lit,)), now_ns=40 * hour_ns
     )
-
-    async def test() -> None:
-        async with remembering(past) as it:
-            path = "/api/field.json?sensor_type=daily_light_integral&resolution=0.5"
-            found = (await it.http.get(f"{path}&at={39 * 3600}")).json()
-            # 24 h of 1000 umol/m2/s.
-            assert (found["sample_count"], found["value_max"]) == (1, pytest.approx(86.4))
-            now = (await it.http.get(path)).json()
-            assert now["ok"]
-            asked = "tag_id=a%2Fb&sensor_type=daily_light_integral"
-            history = (await it.http.get(f"/api/history?{asked}&from=108000&to=144000")).json()
-            assert history["unit"] == "mol/m²/d"
-            assert [it["value"] for it in history["readings"]] == [pytest.approx(86.4)] * 10
-
-    run(domain, test())
+    async with remembering(past) as it:
+        path = "/api/field.json?sensor_type=daily_light_integral&resolution=0.5"
+        found = (await it.http.get(f"{path}&at={39 * 3600}")).json()
+        # 24 h of 1000 umol/m2/s.
+        assert (found["sample_count"], found["value_max"]) == (1, pytest.approx(86.4))
+        now = (await it.http.get(path)).json()
+        assert now["ok"]
+        asked = "tag_id=a%2Fb&sensor_type=daily_light_integral"
+        history = (await it.http.get(f"/api/history?{asked}&from=108000&to=144000")).json()
+        assert history["unit"] == "mol/m²/d"
+        assert [it["value"] for it in history["readings"]] == [pytest.approx(86.4)] * 10
 
 
-def test_who_has_the_answer_is_told_so_and_nothing_is_written_for_him(
+async def test_who_has_the_answer_is_told_so_and_nothing_is_written_for_him(
     domain: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     past = MadeUp(snapshot=house())
@@ -109,32 +95,29 @@ def test_who_has_the_answer_is_told_so_and_nothing_is_written_for_him(
     def none(*_: Any, **__: Any) -> Any:
         raise AssertionError("written")
 
-    async def test() -> None:
-        async with remembering(past) as it:
-            tags = {}
-            for path in PATHS:
-                answer = await it.http.get(f"{path}&at=9")
-                assert (answer.status_code, answer.headers["cache-control"]) == (200, "no-cache")
-                tags[path] = answer.headers["etag"]
-            it.bridge.cache.__init__()  # type: ignore[misc]
-            with monkeypatch.context() as patch:
-                patch.setattr(fields, "compute_field", none)
-                patch.setattr(plans, "StateJson", none)
-                for path, tag in tags.items():
-                    has = {"If-None-Match": tag}
-                    answer = await it.http.get(f"{path}&at=9", headers=has)
-                    assert (answer.status_code, answer.content) == (304, b"")
-                    assert answer.headers["etag"] == tag
-            past.snapshot = house(1600.0)  # observed before, heard late
+    async with remembering(past) as it:
+        tags = {}
+        for path in PATHS:
+            answer = await it.http.get(f"{path}&at=9")
+            assert (answer.status_code, answer.headers["cache-control"]) == (200, "no-cache")
+            tags[path] = answer.headers["etag"]
+        it.bridge.cache.__init__()  # type: ignore[misc]
+        with monkeypatch.context() as patch:
+            patch.setattr(fields, "compute_field", none)
+            patch.setattr(plans, "StateJson", none)
             for path, tag in tags.items():
-                answer = await it.http.get(f"{path}&at=9", headers={"If-None-Match": tag})
-                assert answer.status_code == 200
-                assert answer.headers["etag"] != tag
+                has = {"If-None-Match": tag}
+                answer = await it.http.get(f"{path}&at=9", headers=has)
+                assert (answer.status_code, answer.content) == (304, b"")
+                assert answer.headers["etag"] == tag
+        past.snapshot = house(1600.0)  # observed before, heard late
+        for path, tag in tags.items():
+            answer = await it.http.get(f"{path}&at=9", headers={"If-None-Match": tag})
+            assert answer.status_code == 200
+            assert answer.headers["etag"] != tag
 
-    run(domain, test())
 
-
-def test_what_was_written_is_kept(domain: int, monkeypatch: pytest.MonkeyPatch) -> None:
+async def test_what_was_written_is_kept(domain: int, monkeypatch: pytest.MonkeyPatch) -> None:
     computed = []
     compute = engine.compute_field
 
@@ -142,19 +125,16 @@ def test_what_was_written_is_kept(domain: int, monkeypatch: pytest.MonkeyPatch) 
         computed.append(args)
         return compute(*args)
 
-    async def test() -> None:
-        monkeypatch.setattr(fields, "compute_field", counted)
-        async with remembering(MadeUp(snapshot=house())) as it:
-            path = f"/api/field?{FIELD}"
-            # Nothing was scanned in between: it is the same field.
-            bodies = {(await it.http.get(f"{path}&at={at}")).content for at in (9, 9, 9.5, 10)}
-            assert (len(bodies), len(computed)) == (1, 1)
-            assert (await it.http.get(f"{path}&at=9&resolution=0.5")).status_code == 400
-
-    run(domain, test())
+    monkeypatch.setattr(fields, "compute_field", counted)
+    async with remembering(MadeUp(snapshot=house())) as it:
+        path = f"/api/field?{FIELD}"
+        # Nothing was scanned in between: it is the same field.
+        bodies = {(await it.http.get(f"{path}&at={at}")).content for at in (9, 9, 9.5, 10)}
+        assert (len(bodies), len(computed)) == (1, 1)
+        assert (await it.http.get(f"{path}&at=9&resolution=0.5")).status_code == 400
 
 
-def test_who_asks_the_same_at_once_asks_once(domain: int) -> None:
+async def test_who_asks_the_same_at_once_asks_once(domain: int) -> None:
     past = MadeUp(snapshot=house())
     gate = threading.Event()
 
@@ -163,55 +143,32 @@ def test_who_asks_the_same_at_once_asks_once(domain: int) -> None:
         gate.wait(PATIENCE_S)
         return past.snapshot
 
-    async def test() -> None:
-        async with remembering(past) as it:
-            past.state_at = held  # type: ignore[method-assign]
-            number = it.bridge.state_number
-            asking = [asyncio.create_task(it.http.get(f"{PATHS[0]}&at=9")) for _ in range(5)]
-            in_flight = it.bridge.admission.in_flight
-            await until(lambda: in_flight["127.0.0.1"] == 5, "all of them")
-            gate.set()
-            assert {(await task).status_code for task in asking} == {200}
-            # One more for each state that was told meanwhile: it may have brought something.
-            assert len(past.asked) <= 1 + it.bridge.state_number - number
-
-    run(domain, test())
+    async with remembering(past) as it:
+        past.state_at = held  # type: ignore[method-assign]
+        number = it.bridge.state_number
+        asking = [asyncio.create_task(it.http.get(f"{PATHS[0]}&at=9")) for _ in range(5)]
+        in_flight = it.bridge.admission.in_flight
+        await until(lambda: in_flight["127.0.0.1"] == 5, "all of them")
+        gate.set()
+        assert {(await task).status_code for task in asking} == {200}
+        # One more for each state that was told meanwhile: it may have brought something.
+        assert len(past.asked) <= 1 + it.bridge.state_number - number
 
 
-def test_what_has_not_come_and_what_is_no_moment_is_refused_for_nothing(domain: int) -> None:
+async def test_what_has_not_come_and_what_is_no_moment_is_refused_for_nothing(domain: int) -> None:
     past = MadeUp(snapshot=house())
-
-    async def test() -> None:
-        async with remembering(past) as it:
-            for path in PATHS:
-                for at, part in (
-                    ("2147483647", "at is 2147483647.000000000 s, later than now, "),
-                    ("yesterday", "at is 'yesterday', expected ROS seconds"),
-                    ("9&at=9", "at is given more than once"),
-                    ("9&when=9", "parameter 'when' is unknown"),
-                ):
-                    answer = await it.http.get(f"{path}&at={at}")
-                    assert answer.status_code == 400
-                    name = "error_message" if "field" in path else "detail"
-                    assert part in answer.json()[name]
-            answer = await it.http.get("/api/field?sensor_type=co2&resolution=0&at=9")
-            assert "resolution" in answer.json()["error_message"]
-            assert past.asked == []
-
-    run(domain, test())
-
-
-@pytest.mark.parametrize(("is_lasting", "status"), [(True, 404), (False, 503)])
-def test_what_nobody_remembers_is_told(domain: int, is_lasting: bool, status: int) -> None:
-    past = MadeUp(error=NotRemembered("no journal is kept", is_lasting=is_lasting))
-
-    async def test() -> None:
-        async with remembering(past) as it:
-            for path in PATHS:
-                answer = await it.http.get(f"{path}&at=9")
-                assert (answer.status_code, answer.json()) == (
-                    status,
-                    {"detail": "no journal is kept"},
-                )
-
-    run(domain, test())
+    async with remembering(past) as it:
+        for path in PATHS:
+            for at, part in (
+                ("2147483647", "at is 2147483647.000000000 s, later than now, "),
+                ("yesterday", "at is 'yesterday', expected ROS seconds"),
+                ("9&at=9", "at is given more than once"),
+                ("9&when=9", "parameter 'when' is unknown"),
+            ):
+                answer = await it.http.get(f"{path}&at={at}")
+                assert answer.status_code == 400
+                name = "error_message" if "field" in path else "detail"
+                assert part in answer.json()[name]
+        answer = await it.http.get("/api/field?sensor_type=co2&resolution=0&at=9")
+        assert "resolution" in answer.json()["error_message"]
+        assert past.asked == []

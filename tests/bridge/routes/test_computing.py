@@ -1,7 +1,5 @@
 """Computed answers: once for all, only while somebody waits, and the small ones never behind."""
 
-from __future__ import annotations
-
 import asyncio
 import threading
 from collections.abc import AsyncIterator, Callable
@@ -30,7 +28,8 @@ from lupin_twin.field.explored import OccupancyMap
 from lupin_twin.field.grid import FieldGrid
 from lupin_twin.ros.node import TwinNode
 from lupin_twin.runtime.workers import LARGE_THREADS, SMALL_S, ShouldStop, Workers
-from tests.support.inprocess import Running, run, running
+from tests.support.inprocess import Running, running
+from tests.support.maps import map_of
 from tests.support.waiting import PATIENCE_S, until
 from tests.support.web import deaf_client
 
@@ -110,115 +109,101 @@ def ask(it: Running, *paths: str) -> list[asyncio.Task[httpx.Response]]:
 # --- the small are never behind the large ---------------------------------------------------------
 
 
-def test_a_flood_of_the_dearest_fields_does_not_hold_up_a_tiny_one(domain: int, held: Held) -> None:
-    async def test() -> None:
-        async with house() as it:
-            flood = ask(it, *(field(f"co2 {n}", LARGE) for n in range(40)))
-            # A half of the 24 places for large ones: the other half is for others.
-            await until(lambda: len(held.begun) == LARGE_THREADS, "work")
-            await until(lambda: sum(task.done() for task in flood) == 28, "the refusals")
-            refused = [task for task in flood if task.done()]
-            tiny = await it.http.get(field("co2 50"))
-            assert tiny.status_code == 200
-            assert len(held.begun) == LARGE_THREADS + 1, "it passed them all"
-            assert len(refused) == 28
-            for task in refused:
-                answer = await task
-                assert (answer.status_code, answer.headers["retry-after"]) == (503, "1")
-                text = "12 large answers are being computed, 12 of them for 127.0.0.1"
-                assert text in answer.json()["detail"]
-            held.gate.set()
-            assert sorted([(await task).status_code for task in flood]) == [200] * 12 + [503] * 28
-
-    run(domain, test())
+async def test_a_flood_of_the_dearest_fields_does_not_hold_up_a_tiny_one(
+    domain: int, held: Held
+) -> None:
+    async with house() as it:
+        flood = ask(it, *(field(f"co2 {n}", LARGE) for n in range(40)))
+        # A half of the 24 places for large ones: the other half is for others.
+        await until(lambda: len(held.begun) == LARGE_THREADS, "work")
+        await until(lambda: sum(task.done() for task in flood) == 28, "the refusals")
+        refused = [task for task in flood if task.done()]
+        tiny = await it.http.get(field("co2 50"))
+        assert tiny.status_code == 200
+        assert len(held.begun) == LARGE_THREADS + 1, "it passed them all"
+        assert len(refused) == 28
+        for task in refused:
+            answer = await task
+            assert (answer.status_code, answer.headers["retry-after"]) == (503, "1")
+            text = "12 large answers are being computed, 12 of them for 127.0.0.1"
+            assert text in answer.json()["detail"]
+        held.gate.set()
+        assert sorted([(await task).status_code for task in flood]) == [200] * 12 + [503] * 28
 
 
 @pytest.mark.parametrize(
     ("cells", "scale", "large"), [(300, 1, False), (500, 1, True), (300, 3, True)]
 )
-def test_what_is_written_counts_for_what_is_large(
+async def test_what_is_written_counts_for_what_is_large(
     domain: int, cells: int, scale: int, large: bool
 ) -> None:
-    async def test() -> None:
-        async with house() as it:
-            source = it.bridge.source
-            asked = FieldRequest("co2", 4.0 / cells, 0.0, 0.0, 4.0, 4.0)
-            assert cost_s(asked, 20, source.rules()) < SMALL_S, "the field alone is not"
-            query = FieldQuery("co2", 4.0 / cells, 0.0, 0.0, 4.0, 4.0, scale)
-            field = fields.Field(None, query, PNG, source.rules(), None, it.bridge.criteria)
-            assert (field.write_s(20) > SMALL_S) is large
-
-    run(domain, test())
+    async with house() as it:
+        source = it.bridge.source
+        asked = FieldRequest("co2", 4.0 / cells, 0.0, 0.0, 4.0, 4.0)
+        assert cost_s(asked, 20, source.rules()) < SMALL_S, "the field alone is not"
+        query = FieldQuery("co2", 4.0 / cells, 0.0, 0.0, 4.0, 4.0, scale)
+        field = fields.Field(None, query, PNG, source.rules(), None, it.bridge.criteria)
+        assert (field.write_s(20) > SMALL_S) is large
 
 
 # --- only while somebody waits --------------------------------------------------------------------
 
 
-def test_a_client_that_leaves_takes_its_work_along(domain: int, held: Held) -> None:
-    async def test() -> None:
-        async with house() as it:
-            paths = [field(f"co2 {n}", LARGE) for n in range(6)]
-            leaving = ask(it, *paths)
-            workers = it.bridge.source.workers
-            await until(lambda: len(held.begun) == LARGE_THREADS, "work")
-            await until(lambda: fields_at(workers)[0] >= 6 - LARGE_THREADS, "the rest behind it")
-            at_work = list(held.begun)
-            (staying,) = ask(it, field(at_work[0], LARGE))
-            await until(lambda: it.bridge.admission.in_flight["127.0.0.1"] == 7, "who stays")
-            for task in leaving:
-                task.cancel()
-            await until(lambda: fields_at(workers) == (0, 1), "the others' end")
-            assert workers.abandoned == 5
-            held.gate.set()
-            assert (await staying).status_code == 200
-            assert held.begun == at_work, "computed once, for who stayed"
-
-    run(domain, test())
+async def test_a_client_that_leaves_takes_its_work_along(domain: int, held: Held) -> None:
+    async with house() as it:
+        paths = [field(f"co2 {n}", LARGE) for n in range(6)]
+        leaving = ask(it, *paths)
+        workers = it.bridge.source.workers
+        await until(lambda: len(held.begun) == LARGE_THREADS, "work")
+        await until(lambda: fields_at(workers)[0] >= 6 - LARGE_THREADS, "the rest behind it")
+        at_work = list(held.begun)
+        (staying,) = ask(it, field(at_work[0], LARGE))
+        await until(lambda: it.bridge.admission.in_flight["127.0.0.1"] == 7, "who stays")
+        for task in leaving:
+            task.cancel()
+        await until(lambda: fields_at(workers) == (0, 1), "the others' end")
+        assert workers.abandoned == 5
+        held.gate.set()
+        assert (await staying).status_code == 200
+        assert held.begun == at_work, "computed once, for who stayed"
 
 
-def test_work_that_asks_no_twin_has_as_long_and_is_given_up() -> None:
-    async def test() -> None:
-        bridge: Any = SimpleNamespace(limits=Limits(answer_timeout_s=0.1))
-        work = asyncio.create_task(asyncio.Event().wait())
-        text = r"the answer was not there within 0\.1 s"
-        with pytest.raises(TwinTimeoutError, match=text):
-            await within_time(bridge.limits, work)
-        assert work.cancelled()
-
-    asyncio.run(test())
+async def test_work_that_asks_no_twin_has_as_long_and_is_given_up() -> None:
+    bridge: Any = SimpleNamespace(limits=Limits(answer_timeout_s=0.1))
+    work = asyncio.create_task(asyncio.Event().wait())
+    text = r"the answer was not there within 0\.1 s"
+    with pytest.raises(TwinTimeoutError, match=text):
+        await within_time(bridge.limits, work)
+    assert work.cancelled()
 
 
-def test_a_time_out_ends_the_work_too(domain: int, held: Held) -> None:
-    async def test() -> None:
-        # Long enough for all four to be at work, or waiting for it, by then.
-        limits = Limits(answers_per_s=10_000.0, answer_timeout_s=3.0)
-        async with house(limits) as it:
-            answers = await asyncio.gather(*ask(it, *(field(f"co2 {n}", LARGE) for n in range(4))))
-            assert [answer.status_code for answer in answers] == [504] * 4
-            assert "3 s" in answers[0].json()["detail"]
-            workers = it.bridge.source.workers
-            await until(lambda: fields_at(workers) == (0, 0), "the end of it all")
-            assert workers.abandoned == 4
-            assert it.bridge.admission.being_computed == 0
-
-    run(domain, test())
+async def test_a_time_out_ends_the_work_too(domain: int, held: Held) -> None:
+    # Long enough for all four to be at work, or waiting for it, by then.
+    limits = Limits(answers_per_s=10_000.0, answer_timeout_s=3.0)
+    async with house(limits) as it:
+        answers = await asyncio.gather(*ask(it, *(field(f"co2 {n}", LARGE) for n in range(4))))
+        assert [answer.status_code for answer in answers] == [504] * 4
+        assert "3 s" in answers[0].json()["detail"]
+        workers = it.bridge.source.workers
+        await until(lambda: fields_at(workers) == (0, 0), "the end of it all")
+        assert workers.abandoned == 4
+        assert it.bridge.admission.being_computed == 0
 
 
 # --- once for all ---------------------------------------------------------------------------------
 
 
-def test_identical_requests_take_one_place_and_one_computation(domain: int, held: Held) -> None:
-    async def test() -> None:
-        async with house() as it:
-            asked = ask(it, *[field("co2", LARGE)] * 30, field("co2", LARGE, "npy"))
-            await until(lambda: it.bridge.admission.in_flight["127.0.0.1"] == 31, "all of them")
-            await until(lambda: it.bridge.admission.being_computed == 2, "a body each")
-            held.gate.set()
-            answers = await asyncio.gather(*asked)
-            assert {answer.status_code for answer in answers} == {200}
-            assert held.begun == ["co2"] * 2, "and a field each"
-
-    run(domain, test())
+async def test_identical_requests_take_one_place_and_one_computation(
+    domain: int, held: Held
+) -> None:
+    async with house() as it:
+        asked = ask(it, *[field("co2", LARGE)] * 6, field("co2", LARGE, "npy"))
+        await until(lambda: it.bridge.admission.in_flight["127.0.0.1"] == 7, "all of them")
+        await until(lambda: it.bridge.admission.being_computed == 2, "a body each")
+        held.gate.set()
+        answers = await asyncio.gather(*asked)
+        assert {answer.status_code for answer in answers} == {200}
+        assert held.begun == ["co2"] * 2, "and a field each"
 
 
 def count(monkeypatch: pytest.MonkeyPatch, where: Any, name: str) -> list[int]:
@@ -234,73 +219,54 @@ def count(monkeypatch: pytest.MonkeyPatch, where: Any, name: str) -> list[int]:
     return calls
 
 
-def test_the_state_is_written_a_few_times_a_second_and_never_old(
+async def test_the_state_is_written_a_few_times_a_second_and_never_old(
     domain: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     written = count(monkeypatch, StateJson, "state")
+    async with house() as it:
+        loop = asyncio.get_running_loop()
+        written.clear()
+        began_s, before = loop.time(), it.bridge.state_number
+        for _ in range(20):
+            await asyncio.gather(*ask(it, *["/api/state"] * 10))
+        states = it.bridge.state_number - before + 1
+        most = states + (loop.time() - began_s) / AGES_HOLD_S + 1
+        # The frames' own of each state beside the answers.
+        assert len(written) <= most + states
+        pose = Pose(1.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0)
+        new = Scan("new", 1, (), pose)
 
-    async def test() -> None:
-        async with house() as it:
-            loop = asyncio.get_running_loop()
-            written.clear()
-            began_s, before = loop.time(), it.bridge.state_number
-            for _ in range(20):
-                await asyncio.gather(*ask(it, *["/api/state"] * 10))
-            states = it.bridge.state_number - before + 1
-            most = states + (loop.time() - began_s) / AGES_HOLD_S + 1
-            # The frames' own of each state beside the answers.
-            assert len(written) <= most + states
-            pose = Pose(1.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0)
-            new = Scan("new", 1, (), pose)
-
-            await it.in_ros_thread(lambda node: node.store.record(new))
-            await until(lambda: len(it.bridge.latest.snapshot.tags) == 21, "the new tag")  # type: ignore[union-attr]
-            assert "new" in (await it.http.get("/api/state")).text
-
-    run(domain, test())
+        await it.in_ros_thread(lambda node: node.store.record(new))
+        await until(lambda: len(it.bridge.latest.snapshot.tags) == 21, "the new tag")  # type: ignore[union-attr]
+        assert "new" in (await it.http.get("/api/state")).text
 
 
 def large_map() -> OccupancyMap:
     """4 million cells of noise, whose picture takes some 3 MB."""
     side = 2_000
-    cells = np.random.default_rng(1).integers(-1, 101, side * side, dtype=np.int8)
-    return OccupancyMap(
-        frame_id="map",
-        stamp_ns=0,
-        width=side,
-        height=side,
-        resolution=0.05,
-        origin_x=0.0,
-        origin_y=0.0,
-        origin_yaw=0.0,
-        cells=cells,
-        revision=1,
-    )
+    cells = np.random.default_rng(1).integers(-1, 101, (side, side), dtype=np.int8)
+    return map_of(cells, resolution=0.05)
 
 
-def test_a_hundred_readers_of_a_map_that_do_not_read_hold_one_picture_and_two_pieces_each(
+async def test_a_hundred_readers_of_a_map_that_do_not_read_hold_one_picture_and_two_pieces_each(
     domain: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     drawn = count(monkeypatch, status, "map_png")
-
-    async def test() -> None:
-        async with house() as it:
-            stack, occupancy = ExitStack(), large_map()
-            monkeypatch.setattr(it.twin, "occupancy_map", lambda: occupancy)
-            size = len((await it.http.get("/api/map.png")).content)
-            assert size > 2_000_000
-            for _ in range(100):
-                stack.enter_context(deaf_client(it.url, "/api/map.png"))
-            server = it.server.server_state.connections
-            await until(
-                lambda: sum(c.transport.get_write_buffer_size() > 0 for c in server) == 100,
-                "sockets that are full",
-            )
-            assert len(drawn) == 1
-            unsent = [connection.transport.get_write_buffer_size() for connection in server]
-            assert max(unsent) <= 2 * PIECE_BYTES, "one at the socket, one behind it"
-            tiny = await asyncio.wait_for(it.http.get(field("co2 7")), PATIENCE_S)
-            assert tiny.status_code == 200
-            stack.close()
-
-    run(domain, test())
+    async with house() as it:
+        stack, occupancy = ExitStack(), large_map()
+        monkeypatch.setattr(it.twin, "occupancy_map", lambda: occupancy)
+        size = len((await it.http.get("/api/map.png")).content)
+        assert size > 2_000_000
+        for _ in range(100):
+            stack.enter_context(deaf_client(it.url, "/api/map.png"))
+        server = it.server.server_state.connections
+        await until(
+            lambda: sum(c.transport.get_write_buffer_size() > 0 for c in server) == 100,
+            "sockets that are full",
+        )
+        assert len(drawn) == 1
+        unsent = [connection.transport.get_write_buffer_size() for connection in server]
+        assert max(unsent) <= 2 * PIECE_BYTES, "one at the socket, one behind it"
+        tiny = await asyncio.wait_for(it.http.get(field("co2 7")), PATIENCE_S)
+        assert tiny.status_code == 200
+        stack.close()

@@ -1,7 +1,5 @@
 """The page for people: everything of the document, nothing from elsewhere, nothing unescaped."""
 
-from __future__ import annotations
-
 import json
 from html.parser import HTMLParser
 from typing import Any

@@ -1,7 +1,5 @@
 """The estimate over HTTP, beside the same over the ROS service of the same twin."""
 
-from __future__ import annotations
-
 import io
 import time
 from collections.abc import Iterator

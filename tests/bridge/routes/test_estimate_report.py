@@ -1,7 +1,5 @@
 """What estimates are worth over HTTP, and what becomes of a sensor that has changed."""
 
-from __future__ import annotations
-
 import math
 import time
 from collections.abc import Iterator

@@ -1,7 +1,5 @@
 """The export: as fast as its reader takes it, within its limits, and never whole when it is not."""
 
-from __future__ import annotations
-
 import asyncio
 import json
 import math
@@ -22,7 +20,6 @@ from lupin_bridge.serving.admission import EXPORTS, Limits
 from lupin_twin.core.past import PastRow
 from tests.bridge.routes.test_past import remembering
 from tests.support import raw_http
-from tests.support.inprocess import run
 from tests.support.past import NS, MadeUp
 from tests.support.waiting import until, until_answered
 from tests.support.web import deaf_client
@@ -39,206 +36,166 @@ def rows(count: int, stamp_s: int = 1) -> list[PastRow]:
     return [PastRow(stamp_s * NS, "7", 1.0, 2.0, "co2", math.pi, 0, "robot")] * count
 
 
-def test_all_rows_come_under_one_header(domain: int) -> None:
+async def test_all_rows_come_under_one_header(domain: int) -> None:
     past = MadeUp(lots=[rows(3), [], rows(2, 5)])
-
-    async def test() -> None:
-        async with remembering(past) as it:
-            query = "from=1&to=9&tag_id=a/b&sensor_type=co2"
-            answer = await it.http.get(f"{PATH}?{query}")
-            assert answer.content == bodies.CSV_HEADER + bodies.csv_lines(
-                [*rows(3), *rows(2, 5)], own_sensors()
-            )
-            assert answer.headers["content-type"] == bodies.CSV_TYPE
-            assert answer.headers["cache-control"] == "no-store"
-            assert answer.headers["content-disposition"] == (
-                'attachment; filename="lupin-twin_a_b_co2_'
-                'from_19700101T000001Z_to_19700101T000009Z.csv"'
-            )
-            assert past.asked == [(NS, 9 * NS, "a/b", "co2")]
-
-    run(domain, test())
+    async with remembering(past) as it:
+        query = "from=1&to=9&tag_id=a/b&sensor_type=co2"
+        answer = await it.http.get(f"{PATH}?{query}")
+        assert answer.content == bodies.CSV_HEADER + bodies.csv_lines(
+            [*rows(3), *rows(2, 5)], own_sensors()
+        )
+        assert answer.headers["content-type"] == bodies.CSV_TYPE
+        assert answer.headers["cache-control"] == "no-store"
+        assert answer.headers["content-disposition"] == (
+            'attachment; filename="lupin-twin_a_b_co2_'
+            'from_19700101T000001Z_to_19700101T000009Z.csv"'
+        )
+        assert past.asked == [(NS, 9 * NS, "a/b", "co2")]
 
 
-def test_a_period_without_rows_is_a_header(domain: int) -> None:
-    async def test() -> None:
-        async with remembering(MadeUp()) as it:
-            assert (await it.http.get(PATH)).content == bodies.CSV_HEADER
-
-    run(domain, test())
+async def test_a_period_without_rows_is_a_header(domain: int) -> None:
+    async with remembering(MadeUp()) as it:
+        assert (await it.http.get(PATH)).content == bodies.CSV_HEADER
 
 
-def test_head_asks_for_no_row(domain: int) -> None:
+async def test_head_asks_for_no_row(domain: int) -> None:
     past = MadeUp(lots=[rows(1)])
-
-    async def test() -> None:
-        async with remembering(past) as it:
-            answer = await it.http.head(f"{PATH}?to=9")
-            assert (answer.status_code, answer.content) == (200, b"")
-            assert "19700101T000009Z" in answer.headers["content-disposition"]
-            assert past.asked == []
-            assert (await it.http.head(f"{PATH}?to=now")).status_code == 400
-
-    run(domain, test())
+    async with remembering(past) as it:
+        answer = await it.http.head(f"{PATH}?to=9")
+        assert (answer.status_code, answer.content) == (200, b"")
+        assert "19700101T000009Z" in answer.headers["content-disposition"]
+        assert past.asked == []
+        assert (await it.http.head(f"{PATH}?to=now")).status_code == 400
 
 
-def test_the_same_rows_come_as_parquet_with_units_and_coordinates(domain: int) -> None:
+async def test_the_same_rows_come_as_parquet_with_units_and_coordinates(domain: int) -> None:
     failed = PastRow(7 * NS, "8", math.nan, math.nan, "", math.nan, 2, "robot")
     # More than one group of rows.
     past = MadeUp(lots=[rows(4_000)] * (GROUP_ROWS // 4_000 + 1) + [[], [failed]])
-
-    async def test() -> None:
-        async with remembering(past) as it:
-            answer = await it.http.get("/api/export.parquet?from=1&to=9&sensor_type=co2")
-            assert answer.headers["content-type"] == "application/vnd.apache.parquet"
-            assert answer.headers["content-disposition"].endswith('09Z.parquet"')
-            file = parquet.ParquetFile(pyarrow.BufferReader(answer.content))
-            assert file.num_row_groups == 2
-            table = file.read()
-            assert table.num_rows == sum(map(len, past.lots))
-            first, last = table.slice(0, 1), table.slice(table.num_rows - 1)
-            assert table.column_names == [
-                *("time", "tag_id", "x_m", "y_m", "sensor", "unit", "value", "status", "source"),
-            ]
-            assert first["time"].cast("int64").to_pylist() == [NS]
-            assert first.drop(["time"]).to_pylist() == [
-                {"tag_id": "7", "x_m": 1.0, "y_m": 2.0, "sensor": "co2", "unit": "ppm",
-                 "value": math.pi, "status": 0, "source": "robot"},
-            ]  # fmt: skip
-            assert last.drop(["time"]).to_pylist() == [
-                {"tag_id": "8", "x_m": None, "y_m": None, "sensor": None, "unit": None,
-                 "value": None, "status": 2, "source": "robot"},
-            ]  # fmt: skip
-            schema = table.schema
-            assert schema.field("value").metadata[b"units"] == b"ppm"
-            assert schema.field("x_m").metadata[b"units"] == b"m"
-            assert schema.metadata[b"to"] == b"1970-01-01T00:00:09.000000000Z"
-            assert json.loads(schema.metadata[b"units"])["co2"] == "ppm"
-
-    run(domain, test())
+    async with remembering(past) as it:
+        answer = await it.http.get("/api/export.parquet?from=1&to=9&sensor_type=co2")
+        assert answer.headers["content-type"] == "application/vnd.apache.parquet"
+        assert answer.headers["content-disposition"].endswith('09Z.parquet"')
+        file = parquet.ParquetFile(pyarrow.BufferReader(answer.content))
+        assert file.num_row_groups == 2
+        table = file.read()
+        assert table.num_rows == sum(map(len, past.lots))
+        first, last = table.slice(0, 1), table.slice(table.num_rows - 1)
+        assert table.column_names == [
+            *("time", "tag_id", "x_m", "y_m", "sensor", "unit", "value", "status", "source")
+        ]
+        assert first["time"].cast("int64").to_pylist() == [NS]
+        assert first.drop(["time"]).to_pylist() == [
+            {"tag_id": "7", "x_m": 1.0, "y_m": 2.0, "sensor": "co2", "unit": "ppm",
+             "value": math.pi, "status": 0, "source": "robot"},
+        ]  # fmt: skip
+        assert last.drop(["time"]).to_pylist() == [
+            {"tag_id": "8", "x_m": None, "y_m": None, "sensor": None, "unit": None,
+             "value": None, "status": 2, "source": "robot"},
+        ]  # fmt: skip
+        schema = table.schema
+        assert schema.field("value").metadata[b"units"] == b"ppm"
+        assert schema.field("x_m").metadata[b"units"] == b"m"
+        assert schema.metadata[b"to"] == b"1970-01-01T00:00:09.000000000Z"
+        assert json.loads(schema.metadata[b"units"])["co2"] == "ppm"
 
 
-def test_a_period_without_rows_is_a_parquet_file_of_none(domain: int) -> None:
-    async def test() -> None:
-        async with remembering(MadeUp()) as it:
-            answer = await it.http.get("/api/export.parquet")
-            assert parquet.read_table(pyarrow.BufferReader(answer.content)).num_rows == 0
-
-    run(domain, test())
+async def test_a_period_without_rows_is_a_parquet_file_of_none(domain: int) -> None:
+    async with remembering(MadeUp()) as it:
+        answer = await it.http.get("/api/export.parquet")
+        assert parquet.read_table(pyarrow.BufferReader(answer.content)).num_rows == 0
 
 
-def test_parquet_without_its_package_is_refused_with_what_to_install(
+async def test_parquet_without_its_package_is_refused_with_what_to_install(
     domain: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setitem(sys.modules, "pyarrow", None)
-
-    async def test() -> None:
-        async with remembering(MadeUp(lots=[rows(1)])) as it:
-            answer = await it.http.get("/api/export.parquet")
-            assert answer.status_code == 501
-            assert "pip install 'lupin-twin[science]'" in answer.json()["detail"]
-            # Its place is free again, and CSV needs nothing.
-            assert (await it.http.get(PATH)).status_code == 200
-
-    run(domain, test())
+    async with remembering(MadeUp(lots=[rows(1)])) as it:
+        answer = await it.http.get("/api/export.parquet")
+        assert answer.status_code == 501
+        assert "pip install 'lupin-twin[science]'" in answer.json()["detail"]
+        # Its place is free again, and CSV needs nothing.
+        assert (await it.http.get(PATH)).status_code == 200
 
 
-def test_a_reader_that_does_not_read_stops_it_and_is_cut_off(domain: int) -> None:
+async def test_a_reader_that_does_not_read_stops_it_and_is_cut_off(domain: int) -> None:
     lot = rows(1_000)
     past = MadeUp(lots=[lot] * MANY)
-
-    async def test() -> None:
-        async with remembering(past, Limits(client_timeout_s=1.0)) as it:
-            with deaf_client(it.url, PATH) as client:
-                await until(lambda: it.bridge.admission.exporting == 1, "the export")
-                server = it.server.server_state.connections
-                await until(
-                    lambda: sum(c.transport.get_write_buffer_size() > 0 for c in server) == 1,
-                    "a socket that is full",
-                )
-                await until(lambda: it.bridge.admission.exporting == 0, "its end")
-                assert (
-                    past.lots_taken * len(bodies.csv_lines(lot, own_sensors())) < MOST_TAKEN_BYTES
-                )
-                assert past.is_closed
-                with pytest.raises(ConnectionResetError):
-                    deque(iter(lambda: client.recv(65_536), b""))
-
-    run(domain, test())
+    async with remembering(past, Limits(client_timeout_s=1.0)) as it:
+        with deaf_client(it.url, PATH) as client:
+            await until(lambda: it.bridge.admission.exporting == 1, "the export")
+            server = it.server.server_state.connections
+            await until(
+                lambda: sum(c.transport.get_write_buffer_size() > 0 for c in server) == 1,
+                "a socket that is full",
+            )
+            await until(lambda: it.bridge.admission.exporting == 0, "its end")
+            assert past.lots_taken * len(bodies.csv_lines(lot, own_sensors())) < MOST_TAKEN_BYTES
+            assert past.is_closed
+            with pytest.raises(ConnectionResetError):
+                deque(iter(lambda: client.recv(65_536), b""))
 
 
-def test_a_slow_reader_gets_all_of_it_and_no_more_is_read_than_he_takes(domain: int) -> None:
+async def test_a_slow_reader_gets_all_of_it_and_no_more_is_read_than_he_takes(domain: int) -> None:
     lot = rows(1_000)
     past = MadeUp(lots=[lot] * MANY)
     size = len(bodies.csv_lines(lot, own_sensors()))
-
-    async def test() -> None:
-        async with remembering(past) as it, it.http.stream("GET", PATH) as answer:
-            taken = 0
-            async for piece in answer.aiter_raw(65_536):
-                taken += len(piece)
-                assert past.lots_taken * size - taken < MOST_TAKEN_BYTES
-            assert taken == len(bodies.CSV_HEADER) + MANY * size
-
-    run(domain, test())
+    async with remembering(past) as it, it.http.stream("GET", PATH) as answer:
+        taken = 0
+        async for piece in answer.aiter_raw(65_536):
+            taken += len(piece)
+            assert past.lots_taken * size - taken < MOST_TAKEN_BYTES
+        assert taken == len(bodies.CSV_HEADER) + MANY * size
 
 
-def test_a_client_has_one_export_and_who_leaves_frees_its_place(domain: int) -> None:
+async def test_a_client_has_one_export_and_who_leaves_frees_its_place(domain: int) -> None:
     past = MadeUp(lots=[rows(1_000)] * MANY)
-
-    async def test() -> None:
-        async with remembering(past) as it:
-            async with it.http.stream("GET", PATH) as answer:
-                assert answer.status_code == 200
-                refused = await it.http.get(PATH)
-                assert (refused.status_code, refused.headers["retry-after"]) == (429, "5")
-                assert refused.json() == {"detail": "127.0.0.1 has 1 export under way, the limit"}
-                assert (await it.http.get("/metrics")).text.count("lupin_exports_running 1.0") == 1
-                # It computes nothing while its reader takes its time.
-                assert it.bridge.admission.being_computed == 0
-            await until(lambda: it.bridge.admission.exporting == 0, "its place")
-            assert past.is_closed
-
-    run(domain, test())
+    async with remembering(past) as it:
+        async with it.http.stream("GET", PATH) as answer:
+            assert answer.status_code == 200
+            refused = await it.http.get(PATH)
+            assert (refused.status_code, refused.headers["retry-after"]) == (429, "5")
+            assert refused.json() == {"detail": "127.0.0.1 has 1 export under way, the limit"}
+            assert (await it.http.get("/metrics")).text.count("lupin_exports_running 1.0") == 1
+            # It computes nothing while its reader takes its time.
+            assert it.bridge.admission.being_computed == 0
+        await until(lambda: it.bridge.admission.exporting == 0, "its place")
+        assert past.is_closed
 
 
-def test_slow_readers_keep_nobody_waiting_for_long(
+async def test_slow_readers_keep_nobody_waiting_for_long(
     domain: int, caplog: pytest.LogCaptureFixture
 ) -> None:
     """They take a byte now and then, and so are not cut off as readers that take nothing."""
     past = MadeUp(lots=[rows(1_000)] * MANY)
+    async with remembering(past, Limits(client_timeout_s=3_600.0)) as it:
+        with ExitStack() as stack:
+            slow = [
+                stack.enter_context(raw_http.connect(it.url, f"127.0.9.{number}", room=4_096))
+                for number in range(1, EXPORTS + 1)
+            ]
+            for client in slow:
+                client.sendall(f"GET {PATH} HTTP/1.1\r\nHost: localhost\r\n\r\n".encode())
+            await until(lambda: it.bridge.admission.exporting == EXPORTS, "all places taken")
+            refused = await it.http.get(PATH)
+            assert refused.status_code == 503
+            assert refused.headers["retry-after"] == "5"
 
-    async def test() -> None:
-        async with remembering(past, Limits(client_timeout_s=3_600.0)) as it:
-            with ExitStack() as stack:
-                slow = [
-                    stack.enter_context(raw_http.connect(it.url, f"127.0.9.{number}", room=4_096))
-                    for number in range(1, EXPORTS + 1)
-                ]
+            async def is_served() -> bool:
                 for client in slow:
-                    client.sendall(f"GET {PATH} HTTP/1.1\r\nHost: localhost\r\n\r\n".encode())
-                await until(lambda: it.bridge.admission.exporting == EXPORTS, "all places taken")
-                refused = await it.http.get(PATH)
-                assert refused.status_code == 503
-                assert refused.headers["retry-after"] == "5"
+                    client.recv(1)
+                async with it.http.stream("GET", PATH) as answer:
+                    return answer.status_code == 200
 
-                async def is_served() -> bool:
-                    for client in slow:
-                        client.recv(1)
-                    async with it.http.stream("GET", PATH) as answer:
-                        return answer.status_code == 200
-
-                await until_answered(is_served, "an export")
-                with pytest.raises(ConnectionResetError):
-                    deque(iter(lambda: slow[0].recv(65_536), b""))
-            await until(lambda: it.bridge.admission.exporting == 0, "their places")
-
-    run(domain, test())
+            await until_answered(is_served, "an export")
+            with pytest.raises(ConnectionResetError):
+                deque(iter(lambda: slow[0].recv(65_536), b""))
+        await until(lambda: it.bridge.admission.exporting == 0, "their places")
     assert "the export of 127.0.9.1 is slow and makes place for another one" in caplog.text
     assert [record for record in caplog.records if record.levelname == "ERROR"] == []
 
 
-def test_who_leaves_while_a_lot_is_being_read_ends_the_reading(
+async def test_who_leaves_while_a_lot_is_being_read_ends_the_reading(
     domain: int, caplog: pytest.LogCaptureFixture
 ) -> None:
     """The lots are closed when nobody is at them any more, and not before."""
@@ -253,50 +210,37 @@ def test_who_leaves_while_a_lot_is_being_read_ends_the_reading(
             await asyncio.sleep(0)  # whoever reads has something to give back
             is_closed.set()
 
-    async def test() -> None:
-        async with remembering(MadeUp()) as it:
-            it.twin.rows = lots  # type: ignore[assignment]
-            async with it.http.stream("GET", PATH):
-                await until(is_reading.is_set, "the second lot being read")
-            await until(is_closed.is_set, "its end")
-            await until(lambda: it.bridge.admission.exporting == 0, "its place")
-
-    run(domain, test())
+    async with remembering(MadeUp()) as it:
+        it.twin.rows = lots  # type: ignore[assignment]
+        async with it.http.stream("GET", PATH):
+            await until(is_reading.is_set, "the second lot being read")
+        await until(is_closed.is_set, "its end")
+        await until(lambda: it.bridge.admission.exporting == 0, "its place")
     assert [record for record in caplog.records if record.levelname == "ERROR"] == []
 
 
-def test_a_bridge_that_ends_breaks_it_off(domain: int) -> None:
+async def test_a_bridge_that_ends_breaks_it_off(domain: int) -> None:
     past = MadeUp(lots=[rows(1_000)] * 1_000 * MANY)  # more than can be read before it is over
-
-    async def test() -> None:
-        async with remembering(past) as it, it.http.stream("GET", PATH) as answer:
-            it.server.should_exit = True
-            await until(lambda: it.bridge.liveness.shutting_down, "the good-bye")
-            with pytest.raises(httpx.TransportError):
-                async for _ in answer.aiter_raw():
-                    pass
-            await until(lambda: it.bridge.admission.exporting == 0, "its place")
-
-    run(domain, test())
+    async with remembering(past) as it, it.http.stream("GET", PATH) as answer:
+        it.server.should_exit = True
+        await until(lambda: it.bridge.liveness.shutting_down, "the good-bye")
+        with pytest.raises(httpx.TransportError):
+            async for _ in answer.aiter_raw():
+                pass
+        await until(lambda: it.bridge.admission.exporting == 0, "its place")
 
 
-def test_an_error_in_the_middle_is_never_taken_for_the_end(domain: int) -> None:
+async def test_an_error_in_the_middle_is_never_taken_for_the_end(domain: int) -> None:
     past = MadeUp(lots=[rows(3)], error=OSError("the disk is away"))
-
-    async def test() -> None:
-        async with remembering(past) as it:
-            with pytest.raises(httpx.TransportError):
-                await it.http.get(PATH)
-            await until(lambda: it.bridge.admission.exporting == 0, "its place")
-            # Nor by who knows no chunks: a connection that is reset is no end.
-            reader, writer = await asyncio.open_connection(
-                *it.url.removeprefix("http://").split(":")
-            )
-            writer.write(f"GET {PATH} HTTP/1.0\r\nHost: localhost\r\n\r\n".encode())
-            try:
-                with pytest.raises(ConnectionResetError):
-                    await reader.read()
-            finally:
-                writer.close()
-
-    run(domain, test())
+    async with remembering(past) as it:
+        with pytest.raises(httpx.TransportError):
+            await it.http.get(PATH)
+        await until(lambda: it.bridge.admission.exporting == 0, "its place")
+        # Nor by who knows no chunks: a connection that is reset is no end.
+        reader, writer = await asyncio.open_connection(*it.url.removeprefix("http://").split(":"))
+        writer.write(f"GET {PATH} HTTP/1.0\r\nHost: localhost\r\n\r\n".encode())
+        try:
+            with pytest.raises(ConnectionResetError):
+                await reader.read()
+        finally:
+            writer.close()

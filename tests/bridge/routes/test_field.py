@@ -1,7 +1,5 @@
 """The field over HTTP, beside the same field over the ROS service of the same twin."""
 
-from __future__ import annotations
-
 import io
 import json
 import math
@@ -221,8 +219,7 @@ def test_a_bad_request_gets_get_fields_failure_body(
 
 
 @pytest.mark.parametrize(
-    ("resolution", "far"),
-    [(1e-9, 1_000.0), (1e-38, 1e38), (1e-45, 3.4e38), (0.001, 1_001.0)],
+    ("resolution", "far"), [(1e-9, 1_000.0), (1e-38, 1e38), (1e-45, 3.4e38), (0.001, 1_001.0)]
 )
 def test_a_grid_bomb_is_refused_over_http_as_over_ros(
     live: Bridge, resolution: float, far: float
@@ -324,26 +321,6 @@ def test_a_tag_holds_until_the_field_could_have_changed(changing: Bridge) -> Non
         for _ in range(2):
             listener.until("state")
     assert changing.get("/api/field", {"If-None-Match": mapped}, **QUERY).status_code == 304
-
-
-def test_a_new_map_is_a_new_field() -> None:
-    with bridge(*EAGER) as clipping:
-        clipping.peer.observe(scan("1", {"temperature": 20.0}, at=(0.5, 0.5)))
-        clipping.tag("1")
-        query: dict[str, Any] = {"sensor_type": "temperature", "resolution": 1.0}
-        query |= {"bbox_min_x": 0, "bbox_min_y": 0, "bbox_max_x": 2, "bbox_max_y": 1}
-        answer = clipping.get("/api/field", **query)
-        assert answer.json()["values"] == [20.0, 20.0]
-        for cells, expected in (([[0, -1]], [20.0, None]), ([[0, 0]], [20.0, 20.0])):
-            old = answer.headers["etag"]
-            clipping.peer.publish_map(occupancy_grid(cells))
-
-            def look(old: str = old) -> Any:
-                fresh = clipping.get("/api/field", {"If-None-Match": old}, **query)
-                return fresh if fresh.status_code == 200 else None
-
-            answer = clipping.peer.until(look, "the field on the new map")
-            assert answer.json()["values"] == expected
 
 
 # --- quality ------------------------------------------------------------------------------------

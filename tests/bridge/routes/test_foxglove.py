@@ -1,7 +1,5 @@
 """`/foxglove` of a real `lupin-twin serve`: Foxglove's own client from npm, and by hand."""
 
-from __future__ import annotations
-
 import base64
 import json
 import shutil

@@ -1,7 +1,5 @@
 """`/docs/guide/`: what was built, or how to build it; styles have a rule of their own."""
 
-from __future__ import annotations
-
 import asyncio
 from pathlib import Path
 

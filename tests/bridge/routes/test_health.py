@@ -1,7 +1,5 @@
 """Liveness and readiness: of a live bridge, and of one whose ROS thread has ended."""
 
-from __future__ import annotations
-
 import asyncio
 import json
 import sys
@@ -10,7 +8,7 @@ from websockets.asyncio.client import connect
 
 from lupin_bridge.stream import schema
 from lupin_twin.core.state import samples_of
-from tests.support.inprocess import Running, run, running
+from tests.support.inprocess import Running, running
 from tests.support.messages import look, scan
 from tests.support.ros import Peer
 from tests.support.waiting import PATIENCE_S, until
@@ -42,38 +40,37 @@ async def end_ros_thread(served: Running) -> None:
     waiting.cancel()
 
 
-def test_when_the_ros_thread_ends_health_says_so_and_every_client_is_told(domain: int) -> None:
-    async def test() -> None:
-        async with (
-            running() as served,
-            connect(ws_url(served.url), proxy=None, open_timeout=PATIENCE_S) as listener,
-        ):
-            assert json.loads(await listener.recv())["reason"] == "live"
-            with Peer(domain) as peer:
-                peer.observe(look("known", at=(1.0, 2.0)))
-                peer.observe(scan("known", {"co2": 400.0}))
-                await until(lambda: reads(served, "known", "co2"), "the last reading")
-            await end_ros_thread(served)
-            while (frame := json.loads(await listener.recv())).get("reason") != "thread_dead":
-                pass
-            schema.StatusFrame.model_validate(frame)
-            assert (frame["twin"], "Restart" in frame["message"]) == ("offline", True)
+async def test_when_the_ros_thread_ends_health_says_so_and_every_client_is_told(
+    domain: int,
+) -> None:
+    async with (
+        running() as served,
+        connect(ws_url(served.url), proxy=None, open_timeout=PATIENCE_S) as listener,
+    ):
+        assert json.loads(await listener.recv())["reason"] == "live"
+        with Peer(domain) as peer:
+            peer.observe(look("known", at=(1.0, 2.0)))
+            peer.observe(scan("known", {"co2": 400.0}))
+            await until(lambda: reads(served, "known", "co2"), "the last reading")
+        await end_ros_thread(served)
+        while (frame := json.loads(await listener.recv())).get("reason") != "thread_dead":
+            pass
+        schema.StatusFrame.model_validate(frame)
+        assert (frame["twin"], "Restart" in frame["message"]) == ("offline", True)
 
-            answer = await served.http.get("/healthz")
-            assert answer.status_code == 503
-            assert schema.Health.model_validate_json(answer.content).ok is False
-            answer = await served.http.get("/readyz")
-            assert (answer.status_code, answer.json()["reason"]) == (503, "thread_dead")
-            # What was known last is still told, and a field that is first asked for now is made of
-            # it; that it is not live, the status says. What would need the thread is refused at
-            # once.
-            assert (await served.http.get("/api/state")).status_code == 200
-            answer = await served.http.get("/api/field?sensor_type=co2")
-            found = answer.headers["x-field-sample-count"], answer.headers["x-field-value-max"]
-            assert (answer.status_code, found) == (200, ("1", "400.0"))
-            answer = await served.http.get("/api/estimate/quality?sensor_type=co2")
-            assert (answer.status_code, answer.headers["retry-after"]) == (503, "3")
-            async with connect(ws_url(served.url), proxy=None, open_timeout=PATIENCE_S) as late:
-                assert json.loads(await late.recv())["reason"] == "thread_dead"
-
-    run(domain, test())
+        answer = await served.http.get("/healthz")
+        assert answer.status_code == 503
+        assert schema.Health.model_validate_json(answer.content).ok is False
+        answer = await served.http.get("/readyz")
+        assert (answer.status_code, answer.json()["reason"]) == (503, "thread_dead")
+        # What was known last is still told, and a field that is first asked for now is made of
+        # it; that it is not live, the status says. What would need the thread is refused at
+        # once.
+        assert (await served.http.get("/api/state")).status_code == 200
+        answer = await served.http.get("/api/field?sensor_type=co2")
+        found = answer.headers["x-field-sample-count"], answer.headers["x-field-value-max"]
+        assert (answer.status_code, found) == (200, ("1", "400.0"))
+        answer = await served.http.get("/api/estimate/quality?sensor_type=co2")
+        assert (answer.status_code, answer.headers["retry-after"]) == (503, "3")
+        async with connect(ws_url(served.url), proxy=None, open_timeout=PATIENCE_S) as late:
+            assert json.loads(await late.recv())["reason"] == "thread_dead"

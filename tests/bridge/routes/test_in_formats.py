@@ -1,7 +1,5 @@
 """One answer in every format, and what becomes of a refusal, without a twin."""
 
-from __future__ import annotations
-
 import asyncio
 from typing import Any
 
@@ -55,11 +53,7 @@ def get(path: str, error: Exception | None = None, **headers: str) -> httpx.Resp
 
 @pytest.mark.parametrize(
     ("error", "status"),
-    [
-        (FieldRefused("why"), 400),
-        (PastRefused("why"), 400),
-        (ClientLimitError("why", 7), 429),
-    ],
+    [(FieldRefused("why"), 400), (PastRefused("why"), 400), (ClientLimitError("why", 7), 429)],
     ids=lambda it: type(it).__name__,
 )
 def test_what_is_refused_has_the_body_of_the_service(error: Exception, status: int) -> None:

@@ -1,7 +1,5 @@
 """Verdicts over HTTP and WebSocket: the same, and by the file that the operator gave."""
 
-from __future__ import annotations
-
 import io
 import json
 import time

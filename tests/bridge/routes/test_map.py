@@ -1,18 +1,12 @@
 """The map: none before one has come, then where it is and how it looks, pixel by pixel."""
 
-from __future__ import annotations
-
-import io
 import math
 from collections.abc import Iterator
 from itertools import count
 
 import httpx
-import numpy as np
-import numpy.typing as npt
 import pytest
 from geometry_msgs.msg import Point, Pose, Quaternion
-from PIL import Image
 
 from lupin_bridge.stream import schema
 from tests.support.messages import occupancy_grid, scan
@@ -44,14 +38,6 @@ def put_map(running: Bridge, rows: list[list[int]], origin: Pose | None = None) 
     return str(running.peer.until(look, "the new map"))
 
 
-def picture(running: Bridge) -> npt.NDArray[np.uint8]:
-    """The map's picture as RGBA (height, width, 4), its first row on top."""
-    answer = running.get("/api/map.png")
-    assert (answer.status_code, answer.headers["content-type"]) == (200, "image/png")
-    with Image.open(io.BytesIO(answer.content)) as image:
-        return np.asarray(image.convert("RGBA"))
-
-
 def test_the_map_is_where_the_message_has_it(mapped: Bridge) -> None:
     turn = Quaternion(z=math.sin(0.25), w=math.cos(0.25))
     put_map(mapped, ROWS, Pose(position=Point(x=-4.0, y=1.5), orientation=turn))
@@ -62,14 +48,6 @@ def test_the_map_is_where_the_message_has_it(mapped: Bridge) -> None:
     assert (position.x, position.y) == (-4.0, 1.5)
     assert orientation.z == pytest.approx(math.sin(0.25))
     assert orientation.w == pytest.approx(math.cos(0.25))
-
-
-def test_the_pictures_top_row_is_the_maps_last(mapped: Bridge) -> None:
-    put_map(mapped, ROWS)
-    pixels = picture(mapped)
-    assert pixels[:, :, 3].tolist() == [[0, 255, 255], [255, 255, 0]]
-    top_free, bottom_free = pixels[0, 2, 0], pixels[1, 0, 0]
-    assert top_free == bottom_free > pixels[0, 1, 0] > pixels[1, 1, 0]
 
 
 def test_a_map_is_fetched_again_only_when_it_is_a_new_one(mapped: Bridge) -> None:
@@ -83,13 +61,6 @@ def test_a_map_is_fetched_again_only_when_it_is_a_new_one(mapped: Bridge) -> Non
     assert mapped.get("/api/map").headers["etag"] != mapped.get("/api/map.png").headers["etag"]
     assert put_map(mapped, ROWS) != old
     assert mapped.get("/api/map", {"If-None-Match": old}).status_code == 200
-
-
-def test_a_map_that_grows_is_a_larger_picture(mapped: Bridge) -> None:
-    put_map(mapped, [[0, 0]])
-    assert picture(mapped).shape == (1, 2, 4)
-    put_map(mapped, [[0, 0, 0]] * 5)
-    assert picture(mapped).shape == (5, 3, 4)
 
 
 def test_a_listener_learns_of_a_new_map_by_the_revision(mapped: Bridge) -> None:

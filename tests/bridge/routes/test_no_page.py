@@ -1,7 +1,5 @@
 """A bridge without its page says how to get it; with one, it does not."""
 
-from __future__ import annotations
-
 from html import escape
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Readings that programs post: over a real socket, over DDS, into the twin's state and journal."""
 
-from __future__ import annotations
-
 import json
 import tempfile
 import time

@@ -1,7 +1,5 @@
 """History and timeline over HTTP, over a past that is made up."""
 
-from __future__ import annotations
-
 import asyncio
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
@@ -14,15 +12,8 @@ from lupin_bridge.feed.query import PastQuery
 from lupin_bridge.feed.source import TwinTimeoutError, TwinUnavailableError
 from lupin_bridge.past import schema
 from lupin_bridge.serving.admission import Limits
-from lupin_twin.core.past import (
-    Event,
-    NotRemembered,
-    PastRefused,
-    SeriesPast,
-    SeriesRequest,
-    grid,
-)
-from tests.support.inprocess import Running, run, running
+from lupin_twin.core.past import Event, NotRemembered, PastRefused, SeriesPast, SeriesRequest, grid
+from tests.support.inprocess import Running, running
 from tests.support.past import NS, MadeUp, look_up
 from tests.support.waiting import until
 
@@ -44,67 +35,55 @@ async def remembering(past: MadeUp, limits: Limits | None = None) -> AsyncIterat
         yield it
 
 
-def test_a_history_is_readings_and_buckets_where_there_are_too_many(domain: int) -> None:
+async def test_a_history_is_readings_and_buckets_where_there_are_too_many(domain: int) -> None:
     points = [(number * NS, float(number)) for number in range(100)]
-
-    async def test() -> None:
-        async with remembering(MadeUp(points={("7", "co2"): points})) as it:
-            answer = await it.http.get(f"{HISTORY}&from=10&to=1970-01-01T00:00:20Z")
-            found = schema.History.model_validate_json(answer.content)
-            assert [reading.value for reading in found.readings] == list(map(float, range(10, 20)))
-            assert (found.unit, found.from_.sec, found.to.sec) == ("ppm", 10, 20)
-            answer = await it.http.get(f"{HISTORY}&from=10&to=20&points=5")
-            found = schema.History.model_validate_json(answer.content)
-            assert (found.is_bucketed, found.bucket_s, len(found.buckets)) == (True, 2.0, 5)
-            assert found.buckets[0].model_dump() == {
-                "start": {"sec": 10, "nanosec": 0},
-                "n": 2,
-                "mean": 10.5,
-                "min": 10.0,
-                "max": 11.0,
-            }
-
-    run(domain, test())
+    async with remembering(MadeUp(points={("7", "co2"): points})) as it:
+        answer = await it.http.get(f"{HISTORY}&from=10&to=1970-01-01T00:00:20Z")
+        found = schema.History.model_validate_json(answer.content)
+        assert [reading.value for reading in found.readings] == list(map(float, range(10, 20)))
+        assert (found.unit, found.from_.sec, found.to.sec) == ("ppm", 10, 20)
+        answer = await it.http.get(f"{HISTORY}&from=10&to=20&points=5")
+        found = schema.History.model_validate_json(answer.content)
+        assert (found.is_bucketed, found.bucket_s, len(found.buckets)) == (True, 2.0, 5)
+        assert found.buckets[0].model_dump() == {
+            "start": {"sec": 10, "nanosec": 0},
+            "n": 2,
+            "mean": 10.5,
+            "min": 10.0,
+            "max": 11.0,
+        }
 
 
-def test_nights_by_the_clock_are_no_simulations(
+async def test_nights_by_the_clock_are_no_simulations(
     domain: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     period = "from=2026-11-27T00:00:00Z&to=2026-11-28T00:00:00Z"
-
-    async def test() -> None:
-        async with remembering(MadeUp()) as it:
-            for origin in ("robot", "simulated"):
-                monkeypatch.setattr(Bridge, "origin", origin)
-                found = (await it.http.get(f"{HISTORY}&{period}")).json()
-                assert (found["nights"] is None) == (origin == "simulated")
-
-    run(domain, test())
+    async with remembering(MadeUp()) as it:
+        for origin in ("robot", "simulated"):
+            monkeypatch.setattr(Bridge, "origin", origin)
+            found = (await it.http.get(f"{HISTORY}&{period}")).json()
+            assert (found["nights"] is None) == (origin == "simulated")
 
 
-def test_a_timeline_asks_for_every_event_of_one_period(domain: int) -> None:
+async def test_a_timeline_asks_for_every_event_of_one_period(domain: int) -> None:
     past = MadeUp(points={("*", "~scans"): [(NS, 5.0), (2 * NS, 5.0)], ("*", "~runs"): [(0, 9.0)]})
     past.points["7", "~scans"] = [(NS, 5.0)]
-
-    async def test() -> None:
-        async with remembering(past) as it:
-            answer = await it.http.get("/api/timeline?points=10")
-            found = schema.Timeline.model_validate_json(answer.content)
-            assert [(b.start.sec, b.scans) for b in found.buckets] == [(0, 2)]
-            assert (found.bucket_s, found.reach is None, len(found.runs)) == (100.0, False, 1)
-            asked = [request for request in past.asked if isinstance(request, SeriesRequest)]
-            assert {request.sensor_type for request in asked} == set(Event)
-            assert {request.tag_id for request in asked} == {"*"}
-            # The first one says when now is; that holds for all others.
-            assert [request.end_ns for request in asked] == [0, *[past.now_ns] * 6]
-            answer = await it.http.get("/api/timeline?points=10&tag_id=7")
-            found = schema.Timeline.model_validate_json(answer.content)
-            assert [b.scans for b in found.buckets] == [1]
-
-    run(domain, test())
+    async with remembering(past) as it:
+        answer = await it.http.get("/api/timeline?points=10")
+        found = schema.Timeline.model_validate_json(answer.content)
+        assert [(b.start.sec, b.scans) for b in found.buckets] == [(0, 2)]
+        assert (found.bucket_s, found.reach is None, len(found.runs)) == (100.0, False, 1)
+        asked = [request for request in past.asked if isinstance(request, SeriesRequest)]
+        assert {request.sensor_type for request in asked} == set(Event)
+        assert {request.tag_id for request in asked} == {"*"}
+        # The first one says when now is; that holds for all others.
+        assert [request.end_ns for request in asked] == [0, *[past.now_ns] * 6]
+        answer = await it.http.get("/api/timeline?points=10&tag_id=7")
+        found = schema.Timeline.model_validate_json(answer.content)
+        assert [b.scans for b in found.buckets] == [1]
 
 
-def test_events_that_come_in_five_minutes_share_one_grid_with_those_that_come_one_by_one(
+async def test_events_that_come_in_five_minutes_share_one_grid_with_those_that_come_one_by_one(
     domain: int,
 ) -> None:
     """Scans too many to be read one by one, beside few failures, in buckets of seconds."""
@@ -122,38 +101,31 @@ def test_events_that_come_in_five_minutes_share_one_grid_with_those_that_come_on
         edges = told.start_ns, told.end_ns, told.bucket_ns
         return SeriesPast(*edges, stamps, (20_000,) * 2, found, found, found)
 
-    async def test() -> None:
-        async with remembering(past) as it:
-            past.series = series  # type: ignore[method-assign]
-            answer = await it.http.get("/api/timeline?from=400&to=700&points=100")
-            found = schema.Timeline.model_validate_json(answer.content)
-            assert (found.from_.sec, found.to.sec, found.bucket_s) == (300, 900, 300.0)
-            assert [(b.start.sec, b.scans, b.failures) for b in found.buckets] == [
-                (300, 20_000, 2),
-                (600, 20_000, 1),
-            ]
-
-    run(domain, test())
+    async with remembering(past) as it:
+        past.series = series  # type: ignore[method-assign]
+        answer = await it.http.get("/api/timeline?from=400&to=700&points=100")
+        found = schema.Timeline.model_validate_json(answer.content)
+        assert (found.from_.sec, found.to.sec, found.bucket_s) == (300, 900, 300.0)
+        assert [(b.start.sec, b.scans, b.failures) for b in found.buckets] == [
+            (300, 20_000, 2),
+            (600, 20_000, 1),
+        ]
 
 
-def test_who_has_the_answer_is_not_sent_it_again(domain: int) -> None:
+async def test_who_has_the_answer_is_not_sent_it_again(domain: int) -> None:
     past = MadeUp(points={("7", "co2"): [(NS, 1.0)]})
-
-    async def test() -> None:
-        async with remembering(past) as it:
-            for path in (f"{HISTORY}&to=9", "/api/timeline?to=9"):
-                first = await it.http.get(path)
-                assert first.headers["cache-control"] == "no-cache"
-                has = {"If-None-Match": first.headers["etag"]}
-                again = await it.http.get(path, headers=has)
-                assert (again.status_code, again.content) == (304, b"")
-                assert again.headers["etag"] == first.headers["etag"]
-            path = f"{HISTORY}&to=9"
-            has = {"If-None-Match": (await it.http.get(path)).headers["etag"]}
-            past.points["7", "co2"].append((2 * NS, 2.0))  # heard late
-            assert (await it.http.get(path, headers=has)).status_code == 200
-
-    run(domain, test())
+    async with remembering(past) as it:
+        for path in (f"{HISTORY}&to=9", "/api/timeline?to=9"):
+            first = await it.http.get(path)
+            assert first.headers["cache-control"] == "no-cache"
+            has = {"If-None-Match": first.headers["etag"]}
+            again = await it.http.get(path, headers=has)
+            assert (again.status_code, again.content) == (304, b"")
+            assert again.headers["etag"] == first.headers["etag"]
+        path = f"{HISTORY}&to=9"
+        has = {"If-None-Match": (await it.http.get(path)).headers["etag"]}
+        past.points["7", "co2"].append((2 * NS, 2.0))  # heard late
+        assert (await it.http.get(path, headers=has)).status_code == 200
 
 
 @pytest.mark.parametrize(
@@ -166,42 +138,35 @@ def test_who_has_the_answer_is_not_sent_it_again(domain: int) -> None:
         (TwinUnavailableError("nobody is there"), 503, "3"),
     ],
 )
-def test_what_the_source_cannot_answer_is_told(
+async def test_what_the_source_cannot_answer_is_told(
     domain: int, error: Exception, status: int, retry_after: str | None
 ) -> None:
-    async def test() -> None:
-        async with remembering(MadeUp(error=error)) as it:
-            for path in (HISTORY, "/api/timeline", "/api/export.csv"):
-                answer = await it.http.get(path)
-                assert (answer.status_code, answer.json()) == (status, {"detail": str(error)})
-                assert answer.headers.get("retry-after") == retry_after
-            assert it.bridge.admission.being_computed == it.bridge.admission.exporting == 0
-
-    run(domain, test())
+    async with remembering(MadeUp(error=error)) as it:
+        for path in (HISTORY, "/api/timeline", "/api/export.csv"):
+            answer = await it.http.get(path)
+            assert (answer.status_code, answer.json()) == (status, {"detail": str(error)})
+            assert answer.headers.get("retry-after") == retry_after
+        assert it.bridge.admission.being_computed == it.bridge.admission.exporting == 0
 
 
-def test_what_cannot_be_asked_is_refused_before_anybody_is_asked(domain: int) -> None:
+async def test_what_cannot_be_asked_is_refused_before_anybody_is_asked(domain: int) -> None:
     past = MadeUp()
-
-    async def test() -> None:
-        async with remembering(past) as it:
-            for path, part in (
-                ("/api/history", "tag_id: field required"),
-                (f"{HISTORY}&points=0", "points is '0'"),
-                (f"{HISTORY}&from=2000-01-01T00:00:00", "from is '2000-01-01T00:00:00', expected"),
-                (f"{HISTORY}&from=2147483647", "later than now"),
-                ("/api/timeline?at=1", "parameter 'at' is unknown"),
-                ("/api/export.csv?to=1&to=1", "to is given more than once"),
-            ):
-                answer = await it.http.get(path)
-                assert answer.status_code == 400
-                assert part in answer.json()["detail"]
-            assert past.asked == []
-
-    run(domain, test())
+    async with remembering(past) as it:
+        for path, part in (
+            ("/api/history", "tag_id: field required"),
+            (f"{HISTORY}&points=0", "points is '0'"),
+            (f"{HISTORY}&from=2000-01-01T00:00:00", "from is '2000-01-01T00:00:00', expected"),
+            (f"{HISTORY}&from=2147483647", "later than now"),
+            ("/api/timeline?at=1", "parameter 'at' is unknown"),
+            ("/api/export.csv?to=1&to=1", "to is given more than once"),
+        ):
+            answer = await it.http.get(path)
+            assert answer.status_code == 400
+            assert part in answer.json()["detail"]
+        assert past.asked == []
 
 
-def test_a_client_that_leaves_takes_its_question_along(domain: int) -> None:
+async def test_a_client_that_leaves_takes_its_question_along(domain: int) -> None:
     ended = asyncio.Event()
 
     async def for_ever(*_: Any) -> Any:
@@ -210,28 +175,22 @@ def test_a_client_that_leaves_takes_its_question_along(domain: int) -> None:
         finally:
             ended.set()
 
-    async def test() -> None:
-        async with remembering(MadeUp()) as it:
-            it.twin.ask = for_ever  # type: ignore[method-assign, assignment]
-            for path in (HISTORY, "/api/state?at=9"):
-                ended.clear()
-                asking = asyncio.create_task(it.http.get(path))
-                await until(lambda: it.bridge.admission.being_computed == 1, "the question")
-                asking.cancel()
-                await until(ended.is_set, "its end")
-                await until(lambda: it.bridge.admission.being_computed == 0, "its place")
-
-    run(domain, test())
+    async with remembering(MadeUp()) as it:
+        it.twin.ask = for_ever  # type: ignore[method-assign, assignment]
+        for path in (HISTORY, "/api/state?at=9"):
+            ended.clear()
+            asking = asyncio.create_task(it.http.get(path))
+            await until(lambda: it.bridge.admission.being_computed == 1, "the question")
+            asking.cancel()
+            await until(ended.is_set, "its end")
+            await until(lambda: it.bridge.admission.being_computed == 0, "its place")
 
 
-def test_questions_are_timed_by_their_kind(domain: int) -> None:
-    async def test() -> None:
-        async with remembering(MadeUp()) as it:
-            for path in (HISTORY, "/api/timeline", "/api/timeline?to=5"):
-                assert (await it.http.get(path)).status_code == 200
-            text = (await it.http.get("/metrics")).text
-            assert 'lupin_past_seconds_count{question="history"} 1.0' in text
-            assert 'lupin_past_seconds_count{question="timeline"} 2.0' in text
-            assert "lupin_exports_running 0.0" in text
-
-    run(domain, test())
+async def test_questions_are_timed_by_their_kind(domain: int) -> None:
+    async with remembering(MadeUp()) as it:
+        for path in (HISTORY, "/api/timeline", "/api/timeline?to=5"):
+            assert (await it.http.get(path)).status_code == 200
+        text = (await it.http.get("/metrics")).text
+        assert 'lupin_past_seconds_count{question="history"} 1.0' in text
+        assert 'lupin_past_seconds_count{question="timeline"} 2.0' in text
+        assert "lupin_exports_running 0.0" in text

@@ -1,12 +1,12 @@
 """What people say, and who may, as an attacker tries it. A real server, real sockets."""
 
-from __future__ import annotations
-
 import json
 import socket
+import sqlite3
 import tempfile
 import time
 from collections.abc import Iterator
+from contextlib import closing
 from pathlib import Path
 
 import httpx
@@ -17,8 +17,8 @@ from websockets.sync.client import ClientConnection
 from lupin_bridge.access.accounts import digest
 from lupin_bridge.routes.notes import MAX_LISTED
 from lupin_bridge.stream import people_schema
-from lupin_twin.core.notes import COMMENT, Note
-from tests.support.journal import recording
+from lupin_twin.core.notes import COMMENT
+from tests.support.journal import kept
 from tests.support.messages import look
 from tests.support.people import TOKEN, add, remove, signed_in, write
 from tests.support.waiting import PATIENCE_S, wait_for
@@ -164,17 +164,13 @@ def test_any_text_comes_back_as_it_was_said_and_as_nothing_but_json(
 
 def test_ten_thousand_notes_hold_nobody_up(accounts: Path, tmp_path: Path) -> None:
     path, now_ns = tmp_path / "j.sqlite", time.time_ns()
-    with recording(path) as journal:
-        assert journal.take_restored(PATIENCE_S) is not None
-        for start in range(0, 10_000, 50):
-            batch = [
-                journal.write_note(
-                    Note("", now_ns - 10_000 + start + index, "bert", COMMENT, "site", "x" * 500)
-                )
-                for index in range(50)
-            ]
-            for written in batch:
-                written.result(PATIENCE_S)
+    kept(path, [])
+    notes = (
+        (f"{number + 1:016x}", now_ns - 10_000 + number, "bert", COMMENT, "site", "x" * 500)
+        for number in range(10_000)
+    )
+    with closing(sqlite3.connect(path)) as log, log:
+        log.executemany("INSERT INTO note SELECT site, ?, ?, ?, ?, ?, ?, NULL FROM run", notes)
     options = ("--accounts", str(accounts), "--ros-args", "-p", f"journal:={path}")
     with bridge(*options) as running, signed_in(running.url, "anna") as browser:
         running.peer.wait_for_twin()

@@ -1,12 +1,9 @@
 """`/rosbridge` of a real `lupin-twin serve`: by hand over a WebSocket, ROS on the other side."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import pytest
 from lupin_msgs.msg import TwinTagState
-from websockets.exceptions import ConnectionClosed
 
 from tests.support import messages
 from tests.support.processes import limits
@@ -105,25 +102,6 @@ def test_no_status_of_the_bridge_comes_between(ros: Ros) -> None:
 # --- the field --------------------------------------------------------------------------------
 
 
-def test_a_call_gets_what_the_ros_service_answers_and_nan_as_null(house: Bridge, ros: Ros) -> None:
-    response = ros.call(FIELD, args=FIELD_ARGS)
-    assert (response["op"], response["id"], response["result"]) == (
-        "service_response",
-        "call",
-        True,
-    )
-    assert response["service"] == FIELD
-    over_ros = house.peer.get_field(**FIELD_ARGS)
-    values = response["values"]
-    assert values["ok"] is True
-    assert (values["width"], values["height"]) == (over_ros.width, over_ros.height) == (12, 12)
-    assert values["sample_count"] == over_ros.sample_count
-    known = [None if value != value else value for value in over_ros.values]  # noqa: PLR0124
-    assert None in values["values"]
-    assert values["values"] == pytest.approx(known)
-    assert values == house.json("/api/field", **FIELD_ARGS)
-
-
 # --- refusals ---------------------------------------------------------------------------------
 
 
@@ -149,16 +127,6 @@ def test_names_are_the_ones_that_ros_knows() -> None:
         assert ros.next()["topic"] == "/house/state"
         ros.subscribe()
         assert "expected one of /house/state, /flor" in ros.first("status")["msg"]
-
-
-def test_one_client_too_many_is_turned_away_and_told_so() -> None:
-    with bridge("--max-clients", "1") as house, ros_at(house.url) as ros:
-        assert ros.is_quiet()
-        with ros_at(house.url) as late, pytest.raises(ConnectionClosed) as closed:
-            late.next()
-        assert closed.value.rcvd is not None
-        assert closed.value.rcvd.code == 1013
-        assert closed.value.rcvd.reason == "1 clients are connected, the limit"
 
 
 def test_the_limits_of_fields_hold_here_too() -> None:

@@ -1,7 +1,5 @@
 """`/rosbridge` in the test's own process, with a twin that can be held up: what bounds a client."""
 
-from __future__ import annotations
-
 import asyncio
 import json
 from collections.abc import Callable
@@ -18,15 +16,7 @@ from lupin_bridge.stream.frames import StateFrame
 from lupin_bridge.viewers.rosbridge_session import Reaction, Session
 from tests.support import inprocess
 from tests.support.raw_ws import deaf
-from tests.support.rosbridge import (
-    FIELD,
-    FIELD_ARGS,
-    LARGE_CALL,
-    TOPIC,
-    Ros,
-    masked,
-    ros_at,
-)
+from tests.support.rosbridge import FIELD, FIELD_ARGS, LARGE_CALL, TOPIC, Ros, masked, ros_at
 from tests.support.waiting import until
 
 
@@ -53,61 +43,54 @@ async def in_thread(url: str, talk: Callable[[Ros], Any]) -> Any:
     return await asyncio.to_thread(connected)
 
 
-def test_open_calls_are_bounded_and_the_rest_is_answered(
+async def test_open_calls_are_bounded_and_the_rest_is_answered(
     domain: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     running_at_once = 0
     most_at_once = 0
+    held = asyncio.Event()
 
-    async def test() -> None:
-        held = asyncio.Event()
+    async def slow_field(*asked: Any) -> Any:
+        nonlocal running_at_once, most_at_once
+        running_at_once += 1
+        most_at_once = max(most_at_once, running_at_once)
+        await held.wait()
+        running_at_once -= 1
+        return await newest_field(*asked)
 
-        async def slow_field(*asked: Any) -> Any:
-            nonlocal running_at_once, most_at_once
-            running_at_once += 1
-            most_at_once = max(most_at_once, running_at_once)
-            await held.wait()
-            running_at_once -= 1
-            return await newest_field(*asked)
+    monkeypatch.setattr(sockets, "newest_field", slow_field)
+    async with inprocess.running() as here:
+        loop = asyncio.get_running_loop()
 
-        monkeypatch.setattr(sockets, "newest_field", slow_field)
-        async with inprocess.running() as here:
-            loop = asyncio.get_running_loop()
+        def talk(ros: Ros) -> None:
+            for call in calls(MAX_OPEN_CALLS + 3):
+                ros.connection.send(call)
+            refused = [ros.next() for _ in range(3)]
+            assert {reply["id"] for reply in refused} == {"32", "33", "34"}
+            for reply in refused:
+                assert reply["result"] is False
+                assert reply["values"] == "32 calls are under way, the limit for one client"
+            loop.call_soon_threadsafe(held.set)
+            answered = [ros.next() for _ in range(MAX_OPEN_CALLS)]
+            assert all(reply["result"] is True for reply in answered)
+            assert ros.call(FIELD, args=FIELD_ARGS)["result"] is True, "there is room again"
 
-            def talk(ros: Ros) -> None:
-                for call in calls(MAX_OPEN_CALLS + 3):
-                    ros.connection.send(call)
-                refused = [ros.next() for _ in range(3)]
-                assert {reply["id"] for reply in refused} == {"32", "33", "34"}
-                for reply in refused:
-                    assert reply["result"] is False
-                    assert reply["values"] == "32 calls are under way, the limit for one client"
-                loop.call_soon_threadsafe(held.set)
-                answered = [ros.next() for _ in range(MAX_OPEN_CALLS)]
-                assert all(reply["result"] is True for reply in answered)
-                assert ros.call(FIELD, args=FIELD_ARGS)["result"] is True, "there is room again"
-
-            await in_thread(here.url, talk)
-
-    inprocess.run(domain, test())
+        await in_thread(here.url, talk)
     assert most_at_once == 2
 
 
-def test_an_answer_that_takes_too_long_ends_a_call(
+async def test_an_answer_that_takes_too_long_ends_a_call(
     domain: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    async def test() -> None:
-        async with inprocess.running(Limits(answer_timeout_s=0.1)) as here:
+    async with inprocess.running(Limits(answer_timeout_s=0.1)) as here:
 
-            async def no_field(*_: Any) -> Any:
-                await asyncio.Event().wait()
+        async def no_field(*_: Any) -> Any:
+            await asyncio.Event().wait()
 
-            monkeypatch.setattr(sockets, "newest_field", no_field)
-            response = await in_thread(here.url, lambda ros: ros.call(FIELD, args=FIELD_ARGS))
-            assert response["result"] is False
-            assert response["values"] == f"{FIELD} did not answer within 0.1 s"
-
-    inprocess.run(domain, test())
+        monkeypatch.setattr(sockets, "newest_field", no_field)
+        response = await in_thread(here.url, lambda ros: ros.call(FIELD, args=FIELD_ARGS))
+        assert response["result"] is False
+        assert response["values"] == f"{FIELD} did not answer within 0.1 s"
 
 
 @pytest.mark.parametrize(
@@ -117,185 +100,164 @@ def test_an_answer_that_takes_too_long_ends_a_call(
         (RuntimeError("a bug"), "the bridge met an error of its own, see its log"),
     ],
 )
-def test_an_error_on_the_way_ends_the_call_and_nothing_else(
+async def test_an_error_on_the_way_ends_the_call_and_nothing_else(
     domain: int, monkeypatch: pytest.MonkeyPatch, error: Exception, text: str
 ) -> None:
-    async def test() -> None:
-        async with inprocess.running() as here:
+    async with inprocess.running() as here:
 
-            async def no_field(*_: Any) -> Any:
-                raise error
+        async def no_field(*_: Any) -> Any:
+            raise error
 
+        def talk(ros: Ros) -> None:
+            response = ros.call(FIELD, args=FIELD_ARGS)
+            assert (response["result"], response["values"]) == (False, text)
+            assert ros.is_quiet()
+
+        monkeypatch.setattr(sockets, "newest_field", no_field)
+        await in_thread(here.url, talk)
+
+
+async def test_who_has_not_subscribed_is_sent_nothing_and_counts_as_sent_nothing(
+    domain: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    async with inprocess.running() as here:
+        hub = here.bridge.hub
+        reader, writer = await deaf(here.url, "/rosbridge")
+        await until(lambda: len(hub) == 1, "the client")
+        published, plain = 0, hub.publish
+
+        def publish(frame: StateFrame, now_s: float) -> None:
+            nonlocal published
+            published += 1
+            plain(frame, now_s)
+
+        monkeypatch.setattr(hub, "publish", publish)
+        await until(lambda: published >= 2, "two states of the twin's heartbeat")
+        assert (hub.frames_sent, hub.bytes_sent) == (0, 0)
+        writer.write(masked({"op": "subscribe", "topic": TOPIC}))
+        assert b'"op":"publish"' in await reader.read(1 << 16)
+        await until(lambda: hub.frames_sent >= 1, "a state that counts")
+        writer.transport.abort()
+
+
+async def test_each_subscription_begins_with_the_state_although_it_is_no_new_one(
+    domain: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    async with inprocess.running() as here:
+
+        def talk(ros: Ros) -> None:
+            ros.subscribe("a")
+            assert ros.next()["op"] == "publish"
+            monkeypatch.setattr(here.bridge.hub, "publish", lambda _frame, _now_s: None)
+            ros.subscribe("b")
+            assert ros.call("/rosapi/topics")["op"] == "publish"
+
+        await in_thread(here.url, talk)
+
+
+async def test_many_messages_at_once_do_not_hold_up_the_others(
+    domain: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    turns, at_turn = 0, list[int]()
+    plain = Session.receive
+
+    def receive(session: Session, message: str | bytes) -> Reaction:
+        at_turn.append(turns)
+        return plain(session, message)
+
+    async def somebody_else() -> None:
+        nonlocal turns
+        while True:
+            turns += 1
+            await asyncio.sleep(0)  # until the next turn of the loop
+
+    monkeypatch.setattr(Session, "receive", receive)
+    async with inprocess.running() as here:
+        other = asyncio.create_task(somebody_else())
+        _reader, writer = await deaf(here.url, "/rosbridge")
+        writer.write(masked({"op": "x"}) * 100)
+        await until(lambda: len(at_turn) == 100, "all of them")
+        assert len(set(at_turn)) == 100, "somebody else's turn came after each"
+        writer.transport.abort()
+        other.cancel()
+
+
+async def test_a_client_that_leaves_takes_its_calls_along(
+    domain: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    began, ended = 0, 0
+    never = asyncio.Event()
+    async with inprocess.running() as here:
+
+        async def no_field(*_: Any) -> Any:
+            nonlocal began, ended
+            began += 1
+            try:
+                await never.wait()
+            finally:
+                ended += 1
+
+        monkeypatch.setattr(sockets, "newest_field", no_field)
+        gone = asyncio.Event()
+
+        async def leave() -> None:
             def talk(ros: Ros) -> None:
-                response = ros.call(FIELD, args=FIELD_ARGS)
-                assert (response["result"], response["values"]) == (False, text)
-                assert ros.is_quiet()
-
-            monkeypatch.setattr(sockets, "newest_field", no_field)
-            await in_thread(here.url, talk)
-
-    inprocess.run(domain, test())
-
-
-def test_who_has_not_subscribed_is_sent_nothing_and_counts_as_sent_nothing(
-    domain: int, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    async def test() -> None:
-        async with inprocess.running() as here:
-            hub = here.bridge.hub
-            reader, writer = await deaf(here.url, "/rosbridge")
-            await until(lambda: len(hub) == 1, "the client")
-            published, plain = 0, hub.publish
-
-            def publish(frame: StateFrame, now_s: float) -> None:
-                nonlocal published
-                published += 1
-                plain(frame, now_s)
-
-            monkeypatch.setattr(hub, "publish", publish)
-            await until(lambda: published >= 2, "two states of the twin's heartbeat")
-            assert (hub.frames_sent, hub.bytes_sent) == (0, 0)
-            writer.write(masked({"op": "subscribe", "topic": TOPIC}))
-            assert b'"op":"publish"' in await reader.read(1 << 16)
-            await until(lambda: hub.frames_sent >= 1, "a state that counts")
-            writer.transport.abort()
-
-    inprocess.run(domain, test())
-
-
-def test_each_subscription_begins_with_the_state_although_it_is_no_new_one(
-    domain: int, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    async def test() -> None:
-        async with inprocess.running() as here:
-
-            def talk(ros: Ros) -> None:
-                ros.subscribe("a")
-                assert ros.next()["op"] == "publish"
-                monkeypatch.setattr(here.bridge.hub, "publish", lambda _frame, _now_s: None)
-                ros.subscribe("b")
-                assert ros.call("/rosapi/topics")["op"] == "publish"
+                for call in calls(5):
+                    ros.connection.send(call)
+                asyncio.run_coroutine_threadsafe(
+                    until(lambda: began == 2, "two calls with the twin"), loop
+                ).result()
 
             await in_thread(here.url, talk)
+            gone.set()
 
-    inprocess.run(domain, test())
-
-
-def test_many_messages_at_once_do_not_hold_up_the_others(
-    domain: int, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    async def test() -> None:
-        turns, at_turn = 0, list[int]()
-        plain = Session.receive
-
-        def receive(session: Session, message: str | bytes) -> Reaction:
-            at_turn.append(turns)
-            return plain(session, message)
-
-        async def somebody_else() -> None:
-            nonlocal turns
-            while True:
-                turns += 1
-                await asyncio.sleep(0)  # until the next turn of the loop
-
-        monkeypatch.setattr(Session, "receive", receive)
-        async with inprocess.running() as here:
-            other = asyncio.create_task(somebody_else())
-            _reader, writer = await deaf(here.url, "/rosbridge")
-            writer.write(masked({"op": "x"}) * 100)
-            await until(lambda: len(at_turn) == 100, "all of them")
-            assert len(set(at_turn)) == 100, "somebody else's turn came after each"
-            writer.transport.abort()
-            other.cancel()
-
-    inprocess.run(domain, test())
-
-
-def test_a_client_that_leaves_takes_its_calls_along(
-    domain: int, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    async def test() -> None:
-        began, ended = 0, 0
-        never = asyncio.Event()
-        async with inprocess.running() as here:
-
-            async def no_field(*_: Any) -> Any:
-                nonlocal began, ended
-                began += 1
-                try:
-                    await never.wait()
-                finally:
-                    ended += 1
-
-            monkeypatch.setattr(sockets, "newest_field", no_field)
-            gone = asyncio.Event()
-
-            async def leave() -> None:
-                def talk(ros: Ros) -> None:
-                    for call in calls(5):
-                        ros.connection.send(call)
-                    asyncio.run_coroutine_threadsafe(
-                        until(lambda: began == 2, "two calls with the twin"), loop
-                    ).result()
-
-                await in_thread(here.url, talk)
-                gone.set()
-
-            loop = asyncio.get_running_loop()
-            await leave()
-            assert gone.is_set()
-            await until(lambda: ended == 2, "the end of both")
-            await until(lambda: len(here.bridge.hub) == 0, "a hub without clients")
-            assert began == 2, "those that waited were never begun"
-
-    inprocess.run(domain, test())
+        loop = asyncio.get_running_loop()
+        await leave()
+        assert gone.is_set()
+        await until(lambda: ended == 2, "the end of both")
+        await until(lambda: len(here.bridge.hub) == 0, "a hub without clients")
+        assert began == 2, "those that waited were never begun"
 
 
 @pytest.mark.parametrize("is_subscribed", [False, True])
-def test_a_client_that_takes_no_reply_is_closed_and_meanwhile_holds_little(
+async def test_a_client_that_takes_no_reply_is_closed_and_meanwhile_holds_little(
     domain: int, monkeypatch: pytest.MonkeyPatch, is_subscribed: bool
 ) -> None:
-    async def test() -> None:
-        async with inprocess.running(Limits(client_timeout_s=1.0)) as here:
-            # A reader that is let go of would be emptied by asyncio.
-            _reader, writer = await deaf(here.url, "/rosbridge")
-            hub = here.bridge.hub
-            await until(lambda: len(hub) == 1, "the client")
-            if is_subscribed:
-                writer.write(masked({"op": "subscribe", "topic": TOPIC}))
-                await until(lambda: hub.frames_sent >= 1, "its first state")
-                # Nor does a state show that it is stuck, where the twin is silent.
-                monkeypatch.setattr(hub, "publish", lambda _frame, _now_s: None)
-            writer.write(masked(LARGE_CALL) * 5)
-            most_bytes = 0
+    async with inprocess.running(Limits(client_timeout_s=1.0)) as here:
+        # A reader that is let go of would be emptied by asyncio.
+        _reader, writer = await deaf(here.url, "/rosbridge")
+        hub = here.bridge.hub
+        await until(lambda: len(hub) == 1, "the client")
+        if is_subscribed:
+            writer.write(masked({"op": "subscribe", "topic": TOPIC}))
+            await until(lambda: hub.frames_sent >= 1, "its first state")
+            # Nor does a state show that it is stuck, where the twin is silent.
+            monkeypatch.setattr(hub, "publish", lambda _frame, _now_s: None)
+        writer.write(masked(LARGE_CALL) * 5)
+        most_bytes = 0
 
-            def is_dismissed() -> bool:
-                nonlocal most_bytes
-                for connection in here.server.server_state.connections:
-                    waiting = connection.transport.get_write_buffer_size()
-                    most_bytes = max(most_bytes, waiting)
-                return hub.clients_dismissed == 1
+        def is_dismissed() -> bool:
+            nonlocal most_bytes
+            for connection in here.server.server_state.connections:
+                waiting = connection.transport.get_write_buffer_size()
+                most_bytes = max(most_bytes, waiting)
+            return hub.clients_dismissed == 1
 
-            await until(is_dismissed, "its dismissal")
-            await until(lambda: not here.server.server_state.connections, "its end")
-            assert 0 < most_bytes < 12_000_000, "the replies of the running calls"
-            writer.transport.abort()
-
-    inprocess.run(domain, test())
+        await until(is_dismissed, "its dismissal")
+        await until(lambda: not here.server.server_state.connections, "its end")
+        assert 0 < most_bytes < 12_000_000, "the replies of the running calls"
+        writer.transport.abort()
 
 
-def test_a_client_that_was_slow_to_take_a_reply_stays(domain: int) -> None:
-    async def test() -> None:
-        async with inprocess.running() as here:
-            reader, writer = await deaf(here.url, "/rosbridge")
-            writer.write(masked(LARGE_CALL) * 3)
-            await until(lambda: here.bridge.hub.blocked == 1, "a full socket")
-            # Each with a reply of its own, to the same question too.
-            unsent = here.bridge.hub.unsent
-            await until(lambda: unsent.bytes > 8_000_000, "two replies to count for all clients")
-            while here.bridge.hub.blocked:
-                assert await reader.read(1 << 20), "it was closed"
-            assert len(here.bridge.hub) == 1
-            writer.transport.abort()
-
-    inprocess.run(domain, test())
+async def test_a_client_that_was_slow_to_take_a_reply_stays(domain: int) -> None:
+    async with inprocess.running() as here:
+        reader, writer = await deaf(here.url, "/rosbridge")
+        writer.write(masked(LARGE_CALL) * 3)
+        await until(lambda: here.bridge.hub.blocked == 1, "a full socket")
+        # Each with a reply of its own, to the same question too.
+        unsent = here.bridge.hub.unsent
+        await until(lambda: unsent.bytes > 8_000_000, "two replies to count for all clients")
+        while here.bridge.hub.blocked:
+            assert await reader.read(1 << 20), "it was closed"
+        assert len(here.bridge.hub) == 1
+        writer.transport.abort()

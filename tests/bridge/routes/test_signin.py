@@ -1,7 +1,5 @@
 """Signing in: the page, the exchange, and the cookie's bounds."""
 
-from __future__ import annotations
-
 import json
 import re
 import time
@@ -175,11 +173,7 @@ def listening(closed: Served, headers: dict[str, str], path: str) -> Iterator[Cl
     """A WebSocket of that session."""
     url = closed.url.replace("http", "ws", 1) + path
     with connect(
-        url,
-        additional_headers=headers,
-        proxy=None,
-        ping_interval=None,
-        open_timeout=PATIENCE_S,
+        url, additional_headers=headers, proxy=None, ping_interval=None, open_timeout=PATIENCE_S
     ) as connection:
         if path == "/rosbridge":
             connection.send('{"op": "subscribe", "topic": "/twin/state"}')

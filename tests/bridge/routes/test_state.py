@@ -1,8 +1,5 @@
 """The state over WebSocket and HTTP, from a real twin that a real peer feeds."""
 
-from __future__ import annotations
-
-import json
 import re
 from collections.abc import Iterator
 from typing import Any
@@ -132,50 +129,11 @@ def test_what_cannot_be_served_is_refused_with_the_reason(live: Bridge) -> None:
 # --- /api/state ---------------------------------------------------------------------------------
 
 
-def test_the_state_is_what_the_peer_has_sent(live: Bridge) -> None:
-    live.peer.observe(
-        scan("whole", {"temperature": 21.5, "co2": 800.0}, at=(1.5, -2.5)),
-        look(
-            "whole",
-            species="rose",
-            anomaly=True,
-            flower_count=3,
-            bug_count=2,
-            blooms=[(1.0, 2.0)],
-            footprint=[(0.0, 0.0), (1.0, 0.0)],
-        ),
-    )
-    tag = live.tag("whole", lambda tag: tag["species"])
-    assert tag["pose"]["position"] == {"x": 1.5, "y": -2.5, "z": 0.0}
-    assert {r["name"]: r["value"] for r in tag["readings"]} == {"temperature": 21.5, "co2": 800.0}
-    assert (tag["species"], tag["species_confidence"], tag["anomaly"]) == ("rose", 0.9, True)
-    assert (tag["flower_count"], tag["bug_count"]) == (3, 2)
-    assert tag["flowers"] == [
-        {
-            "position": {"x": 1.0, "y": 2.0, "z": 0.0},
-            "height_m": 0.4,
-            "species": "rose",
-            "confidence": 0.8,
-            "anomaly": False,
-        }
-    ]
-    assert tag["box_footprint"]["points"][1] == {"x": 1.0, "y": 0.0, "z": 0.0}
-
-
 def test_the_state_is_kept_by_nobody(live: Bridge) -> None:
     assert live.get("/api/state").headers["cache-control"] == "no-store"
 
 
 # --- one tag ------------------------------------------------------------------------------------
-
-
-def test_one_tag_is_the_states(live: Bridge) -> None:
-    live.peer.observe(scan("single", {"co2": 1.0}, at=(1, 2)))
-    in_state = live.tag("single")
-    alone = live.json("/api/tags/single")
-    for each in (alone, in_state):
-        assert 0.0 <= each.pop("stale_seconds") < 600.0
-    assert alone == in_state
 
 
 @pytest.mark.parametrize("path", ["/api/tags/nobody", "/api/tags/nobody/history"])
@@ -296,10 +254,3 @@ def test_a_tag_that_was_never_scanned_has_an_empty_history(live: Bridge) -> None
     live.peer.discover(discovered({"unscanned": pose(1, 1)}))
     live.tag("unscanned")
     assert history(live, "unscanned") == {}
-
-
-def test_json_is_json_for_every_reader(live: Bridge) -> None:
-    live.peer.observe(scan("odd", {"co2": float("nan"), "light": float("-inf")}))
-    live.tag("odd")
-    for path in ("/api/state", "/api/tags/odd", "/api/tags/odd/history"):
-        json.loads(live.get(path).text, parse_constant=pytest.fail)

@@ -1,7 +1,5 @@
 """The door of a bridge that may open few files: whoever is stuck in it makes room for others."""
 
-from __future__ import annotations
-
 import asyncio
 import resource
 import socket

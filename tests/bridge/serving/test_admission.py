@@ -1,7 +1,5 @@
 """Answers that are computed: how many and how often, each client by itself and all together."""
 
-from __future__ import annotations
-
 import asyncio
 import math
 from collections import Counter

@@ -1,7 +1,5 @@
 """Answers that are written already: what is kept, what goes, and what readers hold."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import pytest

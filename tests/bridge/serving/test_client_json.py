@@ -1,7 +1,5 @@
 """What a WebSocket client may say as JSON, up to the limits and past them."""
 
-from __future__ import annotations
-
 import pytest
 
 from lupin_bridge.serving.ws_protocol import MAX_BRACKETS, MAX_MESSAGE_LENGTH, members_of

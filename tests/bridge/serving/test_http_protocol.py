@@ -1,7 +1,5 @@
 """Answers go out as their readers take them: in pieces, and not at all to who takes nothing."""
 
-from __future__ import annotations
-
 import asyncio
 import contextlib
 import socket

@@ -1,7 +1,5 @@
 """Every HTTP answer is counted, by its status and its kind of route."""
 
-from __future__ import annotations
-
 import pytest
 
 from lupin_bridge.metrics import route_class

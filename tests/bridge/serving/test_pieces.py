@@ -1,7 +1,5 @@
 """Large messages in pieces, by the reader of another library."""
 
-from __future__ import annotations
-
 import pytest
 from websockets.frames import Frame, Opcode
 from websockets.protocol import CLIENT, State

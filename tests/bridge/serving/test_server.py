@@ -1,7 +1,5 @@
 """The server: its socket, its limits, and its end, with clients connected."""
 
-from __future__ import annotations
-
 import faulthandler
 import resource
 import select
@@ -203,11 +201,6 @@ def test_frames_are_not_compressed(live: Bridge) -> None:
     with live.listen() as listener:
         assert listener.connection.response is not None
         assert "sec-websocket-extensions" not in listener.connection.response.headers
-
-
-def test_what_a_header_claims_of_a_proxy_is_not_believed(live: Bridge) -> None:
-    page = live.get("/docs", headers={"X-Forwarded-Proto": "https", "X-Forwarded-For": "1.2.3.4"})
-    assert f"curl '{live.url}/api/state'" in page.text
 
 
 # --- the end ------------------------------------------------------------------------------------

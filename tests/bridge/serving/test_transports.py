@@ -1,7 +1,5 @@
 """Sockets to a reader that does not read."""
 
-from __future__ import annotations
-
 import asyncio
 import fcntl
 import socket

@@ -1,7 +1,5 @@
 """The connection under the fan-out: real sockets, some of which are not read."""
 
-from __future__ import annotations
-
 import asyncio
 import re
 import socket
@@ -17,7 +15,7 @@ from lupin_bridge.serving import ws_protocol
 from lupin_bridge.serving.server import MAX_INBOUND_BYTES
 from lupin_bridge.serving.ws_protocol import Connection
 from lupin_bridge.settings import Settings
-from tests.support.inprocess import Running, run, running
+from tests.support.inprocess import Running, running
 from tests.support.messages import scan
 from tests.support.processes import limits
 from tests.support.raw_ws import BINARY, CLOSE, PING, TEXT, RawClient, frames_of, masked
@@ -116,30 +114,26 @@ async def test_a_socket_that_is_free_again_says_so_by_itself(domain: int) -> Non
             assert (taken, freed[0]) == ([False], True)
 
 
-def test_who_does_not_read_gets_no_answer_to_his_pings(domain: int) -> None:
+async def test_who_does_not_read_gets_no_answer_to_his_pings(domain: int) -> None:
     pings = 100
+    async with running(ros_args=SILENT) as served:
+        with deaf_client(served.url) as deaf:
+            connection = await joined(served)
+            heard = 0
+            handle_ping = connection.handle_ping
 
-    async def test() -> None:
-        async with running(ros_args=SILENT) as served:
-            with deaf_client(served.url) as deaf:
-                connection = await joined(served)
-                heard = 0
-                handle_ping = connection.handle_ping
+            def counted() -> None:
+                nonlocal heard
+                heard += 1
+                handle_ping()
 
-                def counted() -> None:
-                    nonlocal heard
-                    heard += 1
-                    handle_ping()
-
-                connection.handle_ping = counted  # type: ignore[method-assign]
-                while connection.can_take:
-                    connection.write(SMALL_FRAME)
-                queued = connection.transport.get_write_buffer_size()
-                deaf.sendall(masked(PING, bytes(125)) * pings)
-                await until(lambda: heard == pings, "all pings")
-                assert connection.transport.get_write_buffer_size() == queued
-
-    run(domain, test())
+            connection.handle_ping = counted  # type: ignore[method-assign]
+            while connection.can_take:
+                connection.write(SMALL_FRAME)
+            queued = connection.transport.get_write_buffer_size()
+            deaf.sendall(masked(PING, bytes(125)) * pings)
+            await until(lambda: heard == pings, "all pings")
+            assert connection.transport.get_write_buffer_size() == queued
 
 
 def drain(client: socket.socket, freed: list[bool]) -> None:
@@ -179,7 +173,6 @@ async def test_who_is_told_to_go_waits_from_then_on_and_a_client_does_not(
     domain: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(ws_protocol, "CLOSE_GRACE_S", PATIENCE_S)
-
     async with running(None, SILENT, Settings(max_clients=1)) as served:
         with deaf_client(served.url), deaf_client(served.url):
 

@@ -1,5 +1,3 @@
-from __future__ import annotations
-
 import json
 
 from lupin_bridge.judge.episodes import Alarm

@@ -1,7 +1,5 @@
 """The types of the estimate: named as the messages are."""
 
-from __future__ import annotations
-
 from lupin_msgs.srv import GetEstimate
 
 from lupin_bridge.stream.estimate_schema import GetEstimateResponse

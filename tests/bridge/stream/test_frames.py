@@ -1,7 +1,5 @@
 """Frames: numbered, made once, and of the contract's types."""
 
-from __future__ import annotations
-
 import json
 from collections import Counter
 from dataclasses import replace
@@ -16,11 +14,7 @@ from lupin_bridge.judge.judging import Judge
 from lupin_bridge.judge.options import own_sensors
 from lupin_bridge.serving.ws_protocol import BINARY, frame_head
 from lupin_bridge.stream import schema
-from lupin_bridge.stream.frames import (
-    FrameWriter,
-    StateFrame,
-    text_frame,
-)
+from lupin_bridge.stream.frames import FrameWriter, StateFrame, text_frame
 from lupin_twin.core.state import Attempt, Pose, Reading, Snapshot, TagState
 from tests.support.seen import by_light
 

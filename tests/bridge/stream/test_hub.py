@@ -1,7 +1,5 @@
 """The hub's policy, with connections whose room is the test's to give."""
 
-from __future__ import annotations
-
 import json
 from typing import Any
 

@@ -1,7 +1,5 @@
 """The map's JSON and picture, cell by cell."""
 
-from __future__ import annotations
-
 import io
 import math
 from collections.abc import Sequence

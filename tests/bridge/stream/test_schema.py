@@ -1,7 +1,5 @@
 """The contract's types: the names of the ROS messages, and what a live bridge really sends."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 from typing import Any

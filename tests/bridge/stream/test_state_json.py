@@ -1,7 +1,5 @@
 """Snapshot to JSON: held against the contract's types and against the plainest writing."""
 
-from __future__ import annotations
-
 import json
 import math
 from dataclasses import replace

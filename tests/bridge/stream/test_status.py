@@ -1,7 +1,5 @@
 """Status: live, or offline for one of four reasons."""
 
-from __future__ import annotations
-
 from typing import Any, get_args
 
 import pytest

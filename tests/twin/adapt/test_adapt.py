@@ -1,7 +1,5 @@
 """`lupin-twin adapt` and a twin, each in a process of its own; standard messages alone come in."""
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -115,11 +113,7 @@ class Robot:
 def test_a_robot_of_standard_messages_alone_is_on_the_twins_state(
     domain: int, config: Path
 ) -> None:
-    with (
-        twin_node(domain),
-        adapt(domain, "--config", str(config)) as process,
-        Peer(domain) as peer,
-    ):
+    with twin_node(domain), adapt(domain, "--config", str(config)) as process, Peer(domain) as peer:
         robot = Robot(peer)
         peer.listen()
         # Surveyed tags are known before the robot has been anywhere.
@@ -178,10 +172,7 @@ def test_other_poses_say_where_the_robot_is_too(domain: int, config: Path, kind:
             lambda robot: robot.read(20.0, stamp=Time(sec=7)),
             "behind ROS time here, the limit is 10 s: is a clock wrong",
         ),
-        (
-            lambda robot: robot.read(20.0, 6e307),
-            "humidity is inf, must be from -inf to inf",
-        ),
+        (lambda robot: robot.read(20.0, 6e307), "humidity is inf, must be from -inf to inf"),
         (lambda robot: robot.be_at(0.0, "m" * 250_000), "bytes, the limit is 200000"),
         (lambda robot: robot.fixed(800.0), "field value: 'Float32' object has no attribute"),
     ],

@@ -1,7 +1,5 @@
 """Fixed sensors at a real broker, on the state of a twin that has never heard of MQTT."""
 
-from __future__ import annotations
-
 import json
 import time
 from collections.abc import Iterator
@@ -111,11 +109,7 @@ def test_home_assistants_entities_are_on_the_state_and_so_is_that_one_is_away(
         before = {"temperature": "19.0", "soil_moisture": "unknown"}
         for name, value in before.items():
             client.publish(entity.format(name), value, 1, retain=True).wait_for_publish(60.0)
-        with (
-            twin_node(domain),
-            adapted(domain, broker) as process,
-            Peer(domain) as peer,
-        ):
+        with twin_node(domain), adapted(domain, broker) as process, Peer(domain) as peer:
             robot = Robot(peer)
             peer.listen()
             # What was retained says nothing of when it was measured.

@@ -1,7 +1,5 @@
 """`lupin-twin adapt` on a robot that says by TF where it is, and by apriltag_ros what it sees."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
@@ -109,11 +107,7 @@ class Robot:
 def test_a_tag_that_is_seen_is_on_the_map_and_what_is_read_there_is_its_own(
     domain: int, config: Path
 ) -> None:
-    with (
-        twin_node(domain),
-        adapt(domain, "--config", str(config)) as process,
-        Peer(domain) as peer,
-    ):
+    with twin_node(domain), adapt(domain, "--config", str(config)) as process, Peer(domain) as peer:
         robot = Robot(peer)
         peer.listen()
 
@@ -204,11 +198,7 @@ def test_a_fixed_sensor_is_where_its_frame_is(domain: int, config: Path) -> None
         "tags: {bench: bench_sensor, lost: nowhere}\nwindow_s: 0.2\nsensors:\n  temperature: "
         "{topic: /temperature, type: sensor_msgs/msg/Temperature, tag: bench}\n"
     )
-    with (
-        twin_node(domain),
-        adapt(domain, "--config", str(config)) as process,
-        Peer(domain) as peer,
-    ):
+    with twin_node(domain), adapt(domain, "--config", str(config)) as process, Peer(domain) as peer:
         robot = Robot(peer)
         peer.listen()
         frames = [

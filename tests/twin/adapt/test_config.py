@@ -1,7 +1,5 @@
 """What `adapt` is told: everything that can be wrong is named by its key, its value, the limit."""
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """TF: places along a chain of transforms, and everything by which such a chain is none."""
 
-from __future__ import annotations
-
 import math
 import random
 from itertools import pairwise

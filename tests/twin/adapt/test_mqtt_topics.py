@@ -1,7 +1,5 @@
 """MQTT in: topics and payloads of fixed sensors, and everything that can be wrong with them."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 from typing import Any

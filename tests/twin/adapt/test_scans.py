@@ -1,7 +1,5 @@
 """Readings become scans: the tag they belong to, and the mean of a stop."""
 
-from __future__ import annotations
-
 import statistics
 from types import SimpleNamespace
 

@@ -1,5 +1,3 @@
-from __future__ import annotations
-
 from lupin_twin.core.clock import (
     REPORT_LAG_S,
     STANDS_AFTER_S,

@@ -1,7 +1,5 @@
 """What was received before is nothing new; and what was observed at a tag, in its order."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import pytest

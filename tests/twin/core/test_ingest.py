@@ -1,7 +1,5 @@
 """The rules of ingestion, one by one: plain values in, a write or a drop out."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """The table of topics and services is what nodes have in the graph of ROS, QoS included."""
 
-from __future__ import annotations
-
 import runpy
 from collections.abc import Iterator
 from typing import Any

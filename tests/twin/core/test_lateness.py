@@ -1,7 +1,5 @@
 """A producer whose clock has gone back is found, and none whose messages come as messages do."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 
 import pytest

@@ -1,7 +1,5 @@
 """Which tags are far off. The page is held to the same cases by `domain/farOff.test.ts`."""
 
-from __future__ import annotations
-
 import json
 import math
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Parameters: the contract's names and defaults, and a clear word for each bad value."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import asdict, fields
 from pathlib import Path

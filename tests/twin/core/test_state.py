@@ -1,7 +1,5 @@
 """The store, rule by rule; no ROS here."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 from collections.abc import Callable
@@ -10,13 +8,7 @@ import pytest
 
 from lupin_twin.core import drops, state
 from lupin_twin.core.drops import Rejected
-from lupin_twin.core.state import (
-    Bloom,
-    Inspection,
-    Reading,
-    Scan,
-    TwinStore,
-)
+from lupin_twin.core.state import Bloom, Inspection, Reading, Scan, TwinStore
 from tests.support.store import S, at, look, scan
 
 
@@ -132,10 +124,7 @@ BOUNDED: dict[str, tuple[Callable[[int], Scan | Inspection], int]] = {
         drops.MAX_FOOTPRINT_POINTS,
     ),
     "the tag_id of a scan": (lambda n: Scan("t" * n, S), drops.MAX_TEXT_LENGTH),
-    "a sensor's name": (
-        lambda n: Scan("1", S, (Reading("s" * n, 0.0),)),
-        drops.MAX_TEXT_LENGTH,
-    ),
+    "a sensor's name": (lambda n: Scan("1", S, (Reading("s" * n, 0.0),)), drops.MAX_TEXT_LENGTH),
     "the tag_id of a look": (lambda n: look("t" * n), drops.MAX_TEXT_LENGTH),
     "species": (lambda n: look("1", species="r" * n), drops.MAX_TEXT_LENGTH),
     "a bloom's species": (

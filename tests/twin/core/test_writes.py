@@ -1,5 +1,3 @@
-from __future__ import annotations
-
 import pytest
 
 from lupin_twin.core.past import PastRefused

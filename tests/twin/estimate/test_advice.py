@@ -1,7 +1,5 @@
 """Where another tag helps most: the same as trying each, by the textbook."""
 
-from __future__ import annotations
-
 from math import sqrt
 
 import numpy as np

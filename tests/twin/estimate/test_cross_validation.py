@@ -1,7 +1,5 @@
 """Readings held against all others: as the textbook leaves them out; which sensor has changed."""
 
-from __future__ import annotations
-
 from math import sqrt
 
 import numpy as np

@@ -1,18 +1,10 @@
 """Which readings count, and what an estimate is made of."""
 
-from __future__ import annotations
-
 import pytest
 
 from lupin_twin.core.state import NANOSECONDS_PER_SECOND
 from lupin_twin.estimate import MAX_EXACT, MAX_PER_TAG, PER_TAG
-from lupin_twin.estimate.engine import (
-    MAX_TAGS,
-    EstimateRequest,
-    TagPast,
-    moment_of,
-    readings_of,
-)
+from lupin_twin.estimate.engine import MAX_TAGS, EstimateRequest, TagPast, moment_of, readings_of
 from lupin_twin.field.engine import FieldRefused, FieldRequest
 from tests.support.estimates import DAY_S
 

@@ -1,7 +1,5 @@
 """The most probable parameters: the density and its gradient, and what is found."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

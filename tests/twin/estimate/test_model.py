@@ -1,7 +1,5 @@
 """A model: fitted to readings, immutable, and its estimate equal to a textbook's."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given

@@ -1,7 +1,5 @@
 """The estimate as of a moment: on points and grids, of few readings and of many."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Any
 

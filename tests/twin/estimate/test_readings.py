@@ -1,7 +1,5 @@
 """What an estimate is made of: what is refused, which readings count, how they are scaled."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

@@ -1,7 +1,5 @@
 """GetField without ROS: what is refused, what is remembered, what an explored map clips."""
 
-from __future__ import annotations
-
 import itertools
 import math
 import tracemalloc

@@ -1,7 +1,5 @@
 """Which cells of a field lie on ground that the map knows."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 
@@ -75,11 +73,7 @@ def test_mask_is_the_map_cell_under_each_centre(
     """By a plain loop: each centre, turned back into the map's own frame."""
     rows = np.random.default_rng(seed).choice([-1, 0, 100], size=(9, 13))
     occupancy = map_of(
-        rows,
-        resolution=map_resolution,
-        origin_x=origin[0],
-        origin_y=origin[1],
-        origin_yaw=yaw,
+        rows, resolution=map_resolution, origin_x=origin[0], origin_y=origin[1], origin_yaw=yaw
     )
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(explored, "_CELLS_AT_ONCE", 40)

@@ -1,7 +1,5 @@
 """The memo of fields: what it keeps, what it drops, what it counts."""
 
-from __future__ import annotations
-
 from lupin_twin.field.engine import MAX_ENTRIES, FieldCache, FieldKey, FieldRequest, FieldRules
 from lupin_twin.field.grid import FieldGrid
 from lupin_twin.field.idw import compute_idw_field

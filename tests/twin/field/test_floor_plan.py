@@ -1,7 +1,5 @@
 """The newest map in the log: as it was, no larger than a row may be."""
 
-from __future__ import annotations
-
 import base64
 import json
 import zlib

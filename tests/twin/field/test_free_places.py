@@ -1,7 +1,5 @@
 """Where another tag could stand."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
@@ -28,18 +26,7 @@ def test_without_a_map_it_is_about_the_tags() -> None:
     assert ((places > low) & (places < high)).all()
     assert len(places) == 8 * 6
     assert len(floor(TAGS[:1], None)) > 1
-    empty = OccupancyMap(
-        frame_id="map",
-        stamp_ns=0,
-        width=0,
-        height=0,
-        resolution=1.0,
-        origin_x=0.0,
-        origin_y=0.0,
-        origin_yaw=0.0,
-        cells=np.array([], dtype=np.int8),
-        revision=1,
-    )
+    empty = map_of(np.zeros((0, 0)))
     np.testing.assert_array_equal(floor(TAGS, empty), places)
 
 

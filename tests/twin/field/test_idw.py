@@ -1,7 +1,5 @@
 """The field rule by rule, its grid, and what is refused; see also `test_idw_definition`."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from typing import Any

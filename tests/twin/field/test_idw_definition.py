@@ -1,7 +1,5 @@
 """The field against its definition, the oracle's double loop."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """The field at the extremes: numbers that overflow, and what it costs in memory and time."""
 
-from __future__ import annotations
-
 import math
 import tracemalloc
 from typing import Any
@@ -59,12 +57,7 @@ def test_cells_finer_than_the_coincidence_distance_share_one_sample(resolution: 
 @pytest.mark.parametrize("cells", [300, 500])
 @pytest.mark.parametrize(
     ("count", "reach", "falloff", "power"),
-    [
-        (300, 1.5, 1.5, 2.0),
-        (30, 100.0, 100.0, 2.0),
-        (30, 100.0, 0.1, 2.0),
-        (100, 3.0, 5.0, 1.5),
-    ],
+    [(300, 1.5, 1.5, 2.0), (30, 100.0, 100.0, 2.0), (30, 100.0, 0.1, 2.0), (100, 3.0, 5.0, 1.5)],
 )
 def test_memory_stays_within_ten_times_the_grid(
     cells: int, count: int, reach: float, falloff: float, power: float

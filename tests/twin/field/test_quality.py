@@ -1,7 +1,5 @@
 """How far off a field is, by leaving each tag out once, and how much of it is known."""
 
-from __future__ import annotations
-
 import math
 import tracemalloc
 from collections.abc import Iterable, Sequence

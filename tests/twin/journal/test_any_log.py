@@ -1,7 +1,5 @@
 """Whatever a log has lived through, it answers as the plainest list of all its rows would."""
 
-from __future__ import annotations
-
 import json
 import math
 from dataclasses import replace
@@ -17,16 +15,7 @@ from lupin_twin.journal.appending import Appender
 from lupin_twin.journal.hours import count_rows
 from lupin_twin.journal.queries import Export, lots, newest, series
 from lupin_twin.journal.schema import SiteLog
-from tests.support.log_life import (
-    BEGUN,
-    LATEST,
-    MINUTE,
-    Life,
-    check,
-    one_run,
-    periods,
-    steps,
-)
+from tests.support.log_life import BEGUN, LATEST, MINUTE, Life, check, one_run, periods, steps
 from tests.twin.journal.conftest import Engines, Living
 
 END = BEGUN + (LATEST + 200) * MINUTE

@@ -1,5 +1,3 @@
-from __future__ import annotations
-
 import sqlite3
 from collections.abc import Iterator
 from contextlib import closing
@@ -9,11 +7,7 @@ import pytest
 
 from lupin_twin.journal.checking import find_all_damage
 from lupin_twin.journal.fold import state_at
-from lupin_twin.journal.schema import (
-    DamagedFile,
-    open_reader,
-    open_writer,
-)
+from lupin_twin.journal.schema import DamagedFile, open_reader, open_writer
 from tests.support.journal import NOW, SECOND, kept, look, pin, scan
 
 

@@ -1,5 +1,3 @@
-from __future__ import annotations
-
 from contextlib import closing
 from pathlib import Path
 
@@ -8,14 +6,7 @@ import pytest
 from lupin_twin.core.past import NotRemembered
 from lupin_twin.journal.queries import LOT, Export, rows
 from lupin_twin.journal.schema import open_reader
-from tests.support.log_life import (
-    BEGUN,
-    LATEST,
-    MINUTE,
-    SECOND,
-    lived,
-    scan,
-)
+from tests.support.log_life import BEGUN, LATEST, MINUTE, SECOND, lived, scan
 
 END = BEGUN + (LATEST + 200) * MINUTE
 

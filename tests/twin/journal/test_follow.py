@@ -1,7 +1,5 @@
 """A log copied lot by lot: the same answers, each row once, wherever it was broken off."""
 
-from __future__ import annotations
-
 import sqlite3
 from collections.abc import Iterator
 from contextlib import closing, contextmanager

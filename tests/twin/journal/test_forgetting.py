@@ -1,7 +1,5 @@
 """Forgetting a tag, by the command line, and what a twin knows that is started after it."""
 
-from __future__ import annotations
-
 import getpass
 from collections.abc import Callable
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Notes in the log: numbered as every write, followed, and what of them stands."""
 
-from __future__ import annotations
-
 from concurrent.futures import Future
 from contextlib import closing
 from dataclasses import replace

@@ -1,5 +1,3 @@
-from __future__ import annotations
-
 from contextlib import closing
 from pathlib import Path
 
@@ -50,11 +48,7 @@ def test_a_journal_that_is_not_there_gets_a_past_that_goes_on(tmp_path: Path) ->
     assert filled(path)
     assert is_whole(path)
     assert mark(path) == (START, NOW)
-    assert {type(row).__name__ for row in known(path, CLOCK)} == {
-        "Pin",
-        "Scan",
-        "Inspection",
-    }
+    assert {type(row).__name__ for row in known(path, CLOCK)} == {"Pin", "Scan", "Inspection"}
     # Past and present are one run of the clock.
     kept(path, [scan(at_ns=NOW + SECOND)], CLOCK)
     assert select(path, "SELECT run, begun_stamp_ns FROM run") == [(1, START)]

@@ -1,19 +1,10 @@
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest
 
 from lupin_twin.core.past import SeriesPast, SeriesRequest
 from lupin_twin.journal.queries import series
-from tests.support.log_life import (
-    BEGUN,
-    LATEST,
-    MINUTE,
-    SECOND,
-    lived,
-    scan,
-)
+from tests.support.log_life import BEGUN, LATEST, MINUTE, SECOND, lived, scan
 
 END = BEGUN + (LATEST + 200) * MINUTE
 

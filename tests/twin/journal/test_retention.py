@@ -1,5 +1,3 @@
-from __future__ import annotations
-
 import sqlite3
 from collections.abc import Iterator
 from pathlib import Path
@@ -9,13 +7,7 @@ import pytest
 from lupin_twin.core.past import HOUR_NS
 from lupin_twin.journal import retention
 from lupin_twin.journal.hours import deleted_ns
-from lupin_twin.journal.retention import (
-    Limits,
-    horizon_ns,
-    note_lost,
-    purge_step,
-    used_bytes,
-)
+from lupin_twin.journal.retention import Limits, horizon_ns, note_lost, purge_step, used_bytes
 from lupin_twin.journal.runs import FOREVER_NS, Carries, Clock
 from lupin_twin.journal.schema import SiteLog, open_writer, transaction
 from tests.support.journal import CLOCK, NOW, SECOND, kept, look, opened, pin, restored, scan

@@ -1,7 +1,5 @@
 """A journal of version 3 is upgraded: what is answered is what was, whatever happens meanwhile."""
 
-from __future__ import annotations
-
 import errno
 import shutil
 import signal

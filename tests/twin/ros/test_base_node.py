@@ -1,7 +1,5 @@
 """What every node does alike, by a node of its own in this process."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from typing import Any
 
@@ -76,12 +74,7 @@ def test_a_subscription_hands_on_messages_and_tells_of_the_others(
 ) -> None:
     taken: list[Any] = []
     topic = utilities.subscribe(
-        "observations_topic",
-        "some/observations",
-        SHAPE,
-        depth=3,
-        group=None,
-        callback=taken.append,
+        "observations_topic", "some/observations", SHAPE, depth=3, group=None, callback=taken.append
     )
     assert topic == "/some/observations"
     [subscription] = [s for s in utilities.node.subscriptions if s.topic_name == topic]

@@ -1,5 +1,3 @@
-from __future__ import annotations
-
 import random
 import re
 import struct
@@ -12,12 +10,7 @@ from builtin_interfaces.msg import Time
 from geometry_msgs.msg import Polygon, PoseWithCovarianceStamped
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from lupin_msgs.msg import (
-    DiscoveredTags,
-    Observation,
-    TagReading,
-    TwinState,
-)
+from lupin_msgs.msg import DiscoveredTags, Observation, TagReading, TwinState
 from nav_msgs.msg import OccupancyGrid
 from rcl_interfaces.msg import ParameterDescriptor, ParameterEvent
 from rclpy.impl.implementation_singleton import rclpy_implementation

@@ -1,7 +1,5 @@
 """Messages to values and back; with ROS messages, without a running ROS."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from decimal import Decimal

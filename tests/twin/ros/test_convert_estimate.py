@@ -1,7 +1,5 @@
 """Estimates as messages, and back."""
 
-from __future__ import annotations
-
 from array import array
 
 import pytest

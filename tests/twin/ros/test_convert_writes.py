@@ -1,18 +1,12 @@
 """What was written crosses as values for robots, and as rows for who copies the log."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import pytest
 from rclpy.serialization import deserialize_message, serialize_message
 
 from lupin_twin.journal.follow import Lot, NotALotError
-from lupin_twin.ros.convert_past import (
-    lot_of,
-    rows_request_message,
-    rows_response,
-)
+from lupin_twin.ros.convert_past import lot_of, rows_request_message, rows_response
 
 LOT = Lot("0123456789abcdef" * 2, ('["run",1,0,1,1,1,null,null]', '["meta","ä","5"]'), 9, True)
 

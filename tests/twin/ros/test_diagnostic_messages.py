@@ -1,5 +1,3 @@
-from __future__ import annotations
-
 from lupin_twin.core.diagnostics import ERROR, OK, Finding
 from lupin_twin.ros.convert import diagnostics, findings_of
 

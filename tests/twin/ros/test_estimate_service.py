@@ -1,7 +1,5 @@
 """GetEstimate over DDS: of a twin that has heard a day, of a moment before, and what is refused."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import Future

@@ -1,7 +1,5 @@
 """Publishers of an input: each message once, what is lost, and a second twin on the same topic."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Iterable
 from pathlib import Path
@@ -9,13 +7,7 @@ from pathlib import Path
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lupin_twin.ros.inputs import (
-    LEFT_OVER_S,
-    Gaps,
-    Input,
-    TwinCount,
-    other_users,
-)
+from lupin_twin.ros.inputs import LEFT_OVER_S, Gaps, Input, TwinCount, other_users
 
 
 def test_other_users_are_those_who_own_ports_of_the_domain(tmp_path: Path) -> None:

@@ -1,7 +1,5 @@
 """What the launch file's arguments make of a twin."""
 
-from __future__ import annotations
-
 import runpy
 import sys
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Layers and marks as messages: what a viewer reads of them again."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from hypothesis import given
@@ -9,12 +7,7 @@ from hypothesis import strategies as st
 from rclpy.serialization import deserialize_message, serialize_message
 from visualization_msgs.msg import Marker, MarkerArray
 
-from lupin_twin.ros.layers import (
-    COLOURS,
-    MarkerArrays,
-    TagMark,
-    tag_markers,
-)
+from lupin_twin.ros.layers import COLOURS, MarkerArrays, TagMark, tag_markers
 
 TAGS = st.builds(
     TagMark,

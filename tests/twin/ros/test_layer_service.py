@@ -1,7 +1,5 @@
 """Layers and markers over real DDS, of a twin below a namespace, in a process of its own."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Iterator
 from pathlib import Path
@@ -170,9 +168,7 @@ def test_a_layer_is_the_field_and_is_made_only_for_who_looks(
     robot.says(CO2, 3)
 
 
-def test_the_error_is_that_of_the_value_by_the_estimate(
-    house: tuple[int, Process, Viewer],
-) -> None:
+def test_the_error_is_that_of_the_value_by_the_estimate(house: tuple[int, Process, Viewer]) -> None:
     domain, _, robot = house
     now_s = robot.node.get_clock().now().nanoseconds / 1e9
     places = [(x, 8.0) for x in range(5)]

@@ -1,7 +1,5 @@
 """Fields as points: each known cell once, where it lies, and how far off it is."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
@@ -14,12 +12,7 @@ from rclpy.validate_topic_name import validate_topic_name
 from lupin_twin.core.parameters import ParameterError
 from lupin_twin.estimate import EstimateGrid
 from lupin_twin.field.grid import FieldGrid
-from lupin_twin.ros.layers import (
-    ERROR_UNKNOWN,
-    points,
-    topic_of,
-    topics_of,
-)
+from lupin_twin.ros.layers import ERROR_UNKNOWN, points, topic_of, topics_of
 
 SIDES = st.integers(1, 6)
 CELLS = st.one_of(st.just(math.nan), st.just(math.inf), st.floats(-1e6, 1e6, width=32))

@@ -1,17 +1,9 @@
 """What is marked of tags and planters: where, once each, and how old it looks."""
 
-from __future__ import annotations
-
 import pytest
 
 from lupin_twin.core.state import Flower, Pose, Snapshot, TagState
-from lupin_twin.ros.layers import (
-    FRESH_S,
-    OLD_S,
-    PlanterMark,
-    appearance_of,
-    planter_marks,
-)
+from lupin_twin.ros.layers import FRESH_S, OLD_S, PlanterMark, appearance_of, planter_marks
 
 NOW_NS = 10_000_000_000_000
 BOX = ((0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (1.0, 0.5, 0.0))

@@ -1,7 +1,5 @@
 """What is taken of each topic: each limit, and one past it."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 

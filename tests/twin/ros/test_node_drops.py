@@ -1,7 +1,5 @@
 """What a node drops, and how loudly; over real DDS, each with a twin of its own."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 

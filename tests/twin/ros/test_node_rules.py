@@ -1,7 +1,5 @@
 """The node looked at from inside: what no message over DDS would show. In this process."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 from contextlib import contextmanager

@@ -1,7 +1,5 @@
 """The node over real DDS while somebody strains it: the state keeps its beat, nothing is lost."""
 
-from __future__ import annotations
-
 import os
 import re
 import signal

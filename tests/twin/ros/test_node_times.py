@@ -1,7 +1,5 @@
 """`/twin/times` over real DDS: what was observed when, beside the state that it belongs to."""
 
-from __future__ import annotations
-
 import time
 from typing import Any
 

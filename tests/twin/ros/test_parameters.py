@@ -1,7 +1,5 @@
 """Parameters as ROS hands them over; real nodes, in this process."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
@@ -14,12 +12,7 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 
 from lupin_twin.core.parameters import ParameterError, TwinParameters
-from lupin_twin.ros.parameters import (
-    AdjustableNode,
-    declare,
-    naming,
-    naming_own_parameters,
-)
+from lupin_twin.ros.parameters import AdjustableNode, declare, naming, naming_own_parameters
 
 
 @contextmanager

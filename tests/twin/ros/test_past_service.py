@@ -1,7 +1,5 @@
 """The services of the past, over DDS, of a twin without a journal."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import pytest
@@ -35,21 +33,6 @@ def peer() -> Iterator[Peer]:
             "the last scan in the log",
         )
         yield peer
-
-
-def test_the_last_scans_of_a_twin_without_a_journal_can_be_asked_for(peer: Peer) -> None:
-    response = peer.ask(GetHistory, "/twin/get_history", tag_id="a", sensor_type="co2")
-    assert response.ok, response.error_message
-    assert [(stamp.sec, stamp.nanosec) for stamp in response.stamps] == [
-        (10, 0),
-        (20, 500_000_000),
-        (30, 0),
-    ]
-    assert list(response.means) == [410.0, 420.5, 430.0]
-    assert list(response.counts) == [1, 1, 1]
-    events = peer.ask(GetHistory, "/twin/get_history", tag_id="*", sensor_type="~failures")
-    assert [stamp.sec for stamp in events.stamps] == [40]
-    assert list(events.means) == [2.0]
 
 
 def test_a_state_of_then_is_known_without_a_journal_too(peer: Peer) -> None:

@@ -1,7 +1,5 @@
 """Answers that DDS cannot deliver yet: over a stand-in, and of a real twin to a real client."""
 
-from __future__ import annotations
-
 import warnings
 from collections.abc import Iterator
 from types import SimpleNamespace

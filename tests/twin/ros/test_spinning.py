@@ -1,7 +1,5 @@
 """Spinning survives a callback that raises, and ends when ROS does; in this process."""
 
-from __future__ import annotations
-
 import threading
 from collections.abc import Iterator
 from typing import Any

@@ -1,7 +1,5 @@
 """What estimates are worth: scans held against other tags, changed sensors, where a tag helps."""
 
-from __future__ import annotations
-
 import math
 from contextlib import closing
 from dataclasses import replace
@@ -156,11 +154,7 @@ def test_a_fit_that_fails_keeps_what_was_found_and_says_why() -> None:
     crowd = [TagPast(str(n), n / 10.0, 0.0, ((6 * HOUR_NS, 20.0),)) for n in range(10_001)]
     known = found(crowd, 6, before)
     assert known.report.fit_problem.startswith("10001 tags have this sensor")
-    assert (known.failed, known.loaded, known.report.tags) == (
-        1,
-        before.loaded,
-        before.report.tags,
-    )
+    assert (known.failed, known.loaded, known.report.tags) == (1, before.loaded, before.report.tags)
     again = found(house(6 * 3600), 6, known)
     assert (again.report.fit_problem, again.failed) == ("", 1)
 

@@ -1,7 +1,5 @@
 """Questions to a journal: order, end, and what is said where there is no answer."""
 
-from __future__ import annotations
-
 import sqlite3
 import threading
 from collections.abc import Iterator

@@ -1,5 +1,3 @@
-from __future__ import annotations
-
 import sqlite3
 import tempfile
 from collections.abc import Iterator, Sequence
@@ -188,9 +186,7 @@ def test_what_is_heard_again_changes_nothing_and_is_not_written(tmp_path: Path) 
         assert memory.condition.written == 0
 
 
-def test_a_simulation_that_starts_over_is_empty_and_one_that_goes_on_is_not(
-    tmp_path: Path,
-) -> None:
+def test_a_simulation_that_starts_over_is_empty_and_one_that_goes_on_is_not(tmp_path: Path) -> None:
     path = tmp_path / "j.sqlite"
     with twin(path, sim(500, 500)) as (memory, _):
         memory.apply(at(SCAN, 499 * S), NOW + 499 * S)

@@ -1,7 +1,5 @@
 """What is known live, what the log says of the same moment, and what the next start knows: one."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

@@ -1,7 +1,5 @@
 """What a killed process left unfinished of Fast DDS's memory, and that nothing hangs on it."""
 
-from __future__ import annotations
-
 import logging
 import os
 import struct

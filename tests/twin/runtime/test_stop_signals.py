@@ -1,7 +1,5 @@
 """Stop signals wait until they are asked for; in a process of its own."""
 
-from __future__ import annotations
-
 import os
 import signal
 import subprocess

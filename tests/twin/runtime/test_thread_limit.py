@@ -1,7 +1,5 @@
 """numpy is told to take one core before it is imported, by all programs that import it."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys

@@ -1,7 +1,5 @@
 """Two lanes of work: the order of service, and the end of what nobody waits for."""
 
-from __future__ import annotations
-
 import gc
 import threading
 import weakref

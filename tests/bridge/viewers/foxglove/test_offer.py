@@ -1,7 +1,5 @@
 """The channels that there are, of a script of ROS: what is offered, and who is told of news."""
 
-from __future__ import annotations
-
 import asyncio
 import json
 from collections.abc import Callable, Mapping

@@ -1,7 +1,5 @@
 """One client of Foxglove's protocol: what it may have, and what it gets where it is slow."""
 
-from __future__ import annotations
-
 import json
 from typing import Any
 
@@ -9,12 +7,7 @@ import pytest
 
 from lupin_bridge.feed.relay import Sample
 from lupin_bridge.viewers.foxglove_protocol import MAX_SUBSCRIPTIONS, Channel
-from lupin_bridge.viewers.foxglove_session import (
-    MAX_MESSAGE_BYTES,
-    Counts,
-    Reaction,
-    Session,
-)
+from lupin_bridge.viewers.foxglove_session import MAX_MESSAGE_BYTES, Counts, Reaction, Session
 
 CHANNELS = {n: Channel(n, f"/topic{n}", "a/msg/B", "int32 x\n") for n in range(1, 201)}
 WIRES = {n: channel.json() for n, channel in CHANNELS.items()}

@@ -1,7 +1,5 @@
 """Feeds over a script of a relay: what is written once, what gives way, and how one ends."""
 
-from __future__ import annotations
-
 import asyncio
 from collections.abc import Callable, Iterator
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """One rosbridge client's state: subscriptions, levels, pace; and what each message leads to."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import replace
 from typing import Any
@@ -76,10 +74,7 @@ def test_to_end_what_was_never_begun_is_worth_a_warning(
             {"type": "std_msgs/String"},
             "type is 'std_msgs/String', expected lupin_msgs/msg/TwinState",
         ),
-        (
-            {"throttle_rate": -1},
-            "throttle_rate is -1: input should be greater than or equal to 0",
-        ),
+        ({"throttle_rate": -1}, "throttle_rate is -1: input should be greater than or equal to 0"),
         ({"throttle_rate": True}, "throttle_rate is True: input should be a valid number"),
         (
             {"throttle_rate": 3_600_001},

@@ -1,7 +1,5 @@
 """Messages in JSON, held against what rosbridge_suite makes of the same ones."""
 
-from __future__ import annotations
-
 import json
 import math
 from array import array

@@ -153,8 +153,7 @@ class HealthReason(Contract):
         description="ROS time of the observation that began it, of old the last one; null: none"
     )
     release: float | None = Field(
-        default_factory=lambda: None,
-        description="where it ends; there only while nothing but the deadband holds it",
+        default_factory=lambda: None, description="where it ends; only while the deadband holds it"
     )
 
 

@@ -39,8 +39,8 @@ thead { display: table-header-group } tr { break-inside: avoid }
 th, td { text-align: left; vertical-align: top; padding: 1mm;
   border-bottom: .2mm solid #bbb; overflow-wrap: anywhere; min-width: 22mm }
 th { border-bottom: .4mm solid #444; overflow-wrap: normal }
-.number { text-align: right; font-variant-numeric: tabular-nums; white-space: nowrap; min-width: 0 }
-th.number { white-space: normal }
+.number { text-align: right; font-variant-numeric: tabular-nums; overflow-wrap: normal;
+  min-width: 0 }
 dl { display: grid; grid-template-columns: repeat(4, 1fr); gap: 2mm; margin: 4mm .3mm }
 dl div { border: .2mm solid #bbb; padding: 1.5mm } dt { color: #444; font-size: 8.5pt }
 dd { margin: 0; font-size: 13pt } .critical td:first-child { font-weight: 700 }
@@ -190,8 +190,7 @@ class _Page:
     def _alarm(self, alarm: Entry) -> Iterable[str]:
         reason = alarm["reason"]
         cleared, numbers = alarm["cleared_at"], reason["kind"] == "range"
-        unit = self._criteria.sensors.named(reason["sensor"]).unit if numbers else ""
-        number = partial(self._number, unit=unit, like=reason["limit"] if numbers else None)
+        number = partial(self._number, sensor=reason["sensor"], limit=reason["limit"])
         return (
             f"{self._what(reason)} ({self._words['verdicts'][reason['verdict']]})",
             alarm["tag_id"] or self.say("house"),
@@ -207,7 +206,7 @@ class _Page:
         return self._table(body, "extremes", "sensors", columns, self._sensor)
 
     def _sensor(self, of: Entry) -> Iterable[str]:
-        number = partial(self._number, unit=of["unit"], like=of["mean"])
+        number = partial(self._number, sensor=of["sensor_type"])
 
         def extreme(found: Entry | None) -> Iterable[str]:
             if found is None:
@@ -327,15 +326,24 @@ class _Page:
         """A moment in a row; where all of the period is of one day, without that day."""
         return self._at(when).removeprefix(self._day)
 
-    def _number(self, value: float | None, unit: str, like: float | None = None) -> str:
-        """A number with its unit on the same line, written as the page does; as exact as `like`."""
+    def _number(self, value: float | None, sensor: str, limit: float | None = None) -> str:
+        """A number with its unit on the same line, written as the page does.
+
+        What reads like the limit that it is beyond says on which side it is.
+        """
         if value is None:
             return ""
-        size = abs(value if like is None else like)
-        digits = f"{value:.4g}"
-        if unit and size < 1e6:
-            digits = f"{value:,.{0 if size >= 100 else 1 if size >= 1 else 2}f}"
-        return f"{self._written(digits)}\u00a0{unit}".strip()
+        known = self._criteria.sensors
+        unit, digits, size = known.named(sensor).unit, known.digits(sensor), abs(value)
+        if digits is None and unit:
+            digits = 0 if size >= 100 else 1 if size >= 1 else 2
+        number = f"{value:.4g}"
+        if digits is not None and size < 1e6:
+            number = f"{value:,.{digits if size < 1000 else 0}f}"
+        text = f"{self._written(number)}\u00a0{unit}".strip()
+        if limit is None or value == limit or text != self._number(limit, sensor):
+            return text
+        return self.say("just_below" if value < limit else "just_above", limit=text)
 
     def _count(self, count: int) -> str:
         return self._written(f"{count:,}")

@@ -21,12 +21,22 @@ describe('a reason in words', () => {
     [
       { sensor: 'humidity', verdict: 'stressed', value: 49.97, limit: 50 } as const,
       null,
-      `Humidity 49.97${NBSP}%, below 50.00`,
+      `Humidity just below 50.0${NBSP}%`,
     ],
     [
       { sensor: 'co2', verdict: 'stressed', value: 1500.4, limit: 1500 } as const,
       null,
-      `CO₂ 1500.4${NBSP}ppm, above 1500.0`,
+      `CO₂ just above 1,500${NBSP}ppm`,
+    ],
+    [
+      { verdict: 'critical', value: 34.99, limit: 35.01 } as const,
+      null,
+      `Temperature just below 35.0${NBSP}°C (critical)`,
+    ],
+    [
+      { verdict: 'stressed', value: 18.38, limit: 18.4 } as const,
+      null,
+      `Temperature just below 18.4${NBSP}°C, back in range; clears above 18.4`,
     ],
     [
       // Within the ideal range of 18 to 26, and not by enough.
@@ -48,7 +58,7 @@ describe('a reason in words', () => {
     [
       { sensor: 'vpd', value: 1.68, limit: 1.3, verdict: 'stressed' } as const,
       null,
-      `Vapour pressure deficit 1.7${NBSP}kPa, above 1.3`,
+      `Vapour pressure deficit 1.68${NBSP}kPa, above 1.30`,
     ],
     [
       { kind: 'reading_failed', sensor: 'humidity', value: null } as const,

@@ -1,7 +1,7 @@
 /** Why a tag or the house has its verdict, in words. */
 import type { HealthReason, Verdict } from '../contract/types';
 import { S } from '../strings';
-import { digitsApart, durationText, readingText, shortAgeText, valueText } from './format';
+import { beyondLimitText, durationText, readingText, shortAgeText, valueText } from './format';
 import { isOfRange, sideOf } from './health';
 import type { Catalogue, Sensor } from './sensors';
 import { shown } from './text';
@@ -27,13 +27,12 @@ export function reasonText(
   const label = name === '' ? '' : shown(sensor.label, LONGEST_NAME);
   const R = S.reasons;
   if (isOfRange(reason)) {
-    const more = digitsOf(sensor, reason, unit);
-    return R.range(
-      `${label} ${readingText(sensor, reason.value, unit, more)}`,
-      sideText(sensor, reason),
-      valueText(sensor, reason.limit, unit, more),
-      reason.verdict === 'critical' && !isMarked,
-    );
+    const reading = beyondLimitText(sensor, reason.value, reason.limit, unit);
+    // "Just below 350" names the limit itself.
+    const isNear = reading !== readingText(sensor, reason.value, unit) && !isBack(sensor, reason);
+    const limit = `, ${sideText(sensor, reason)} ${valueText(sensor, reason.limit, unit)}`;
+    const rated = reason.verdict === 'critical' && !isMarked ? ` (${S.alarmStatus.critical})` : '';
+    return `${label} ${reading}${isNear ? '' : limit}${rated}`;
   }
   switch (kind) {
     case 'range':
@@ -66,13 +65,6 @@ export function reasonText(
   }
 }
 
-/** How many digits more a value that is out of its range has, wherever it stands. */
-export const digitsOf = (
-  sensor: Sensor,
-  { value, limit }: { readonly value: number; readonly limit: number },
-  unit: TemperatureUnit,
-): number => digitsApart(sensor, [value], limit, unit);
-
 type OfRange = HealthReason & { readonly value: number; readonly limit: number };
 
 /**
@@ -88,17 +80,12 @@ const sideText = (sensor: Sensor, reason: OfRange): string =>
   (isBack(sensor, reason) ? S.reasons.sidesBack : S.reasons.sides)[sideOf(reason)];
 
 /** What lies on which side of which limit, without the value: that changes. */
-export function beyondText(
-  sensors: Catalogue,
-  reason: OfRange,
-  unit: TemperatureUnit,
-  more: number,
-): string {
+export function beyondText(sensors: Catalogue, reason: OfRange, unit: TemperatureUnit): string {
   const sensor = sensors.named(reason.sensor);
   return S.reasons.beyond(
     shown(sensor.label, LONGEST_NAME),
     sideText(sensor, reason),
-    readingText(sensor, reason.limit, unit, more),
+    readingText(sensor, reason.limit, unit),
   );
 }
 

@@ -152,3 +152,23 @@ def test_a_row_of_an_alarm_has_its_tags_name_alone_or_is_the_greenhouses() -> No
     page = page_of(alarms=[alarm(), alarm(tag_id="")])
     assert "Pest seen (critical) 7 06:01 still active" in page
     assert "Pest seen (critical) Greenhouse 06:01 still active" in page
+
+
+@pytest.mark.parametrize(
+    ("lang", "numbers"),
+    [
+        ("en", "just below 350 ppm 350 ppm 12 ppm"),
+        ("de", "knapp unter 350 ppm 350 ppm 12 ppm"),
+        ("nl", "net onder 350 ppm 350 ppm 12 ppm"),
+        ("es", "justo por debajo de 350 ppm 350 ppm 12 ppm"),
+    ],
+)
+def test_values_of_a_sensor_have_as_many_digits_and_none_reads_like_its_limit(
+    lang: str, numbers: str
+) -> None:
+    low = {"verdict": "stressed", "kind": "range", "sensor": "co2", "value": 349.7, "limit": 350.0}
+    assert numbers in page_of(lang, alarms=[alarm(reason=low, worst=12.4)])
+    # As the page has them: `format.test.ts`.
+    sensors = GREENHOUSE.sensors
+    names = ("temperature", "vpd", "co2", "humidity", "dew_point", "co2_dose", "spin")
+    assert [sensors.digits(name) for name in names] == [1, 2, 0, 1, 1, 0, None]

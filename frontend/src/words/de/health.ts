@@ -19,8 +19,10 @@ export const HEALTH: In<typeof ENGLISH> = {
       below: 'im Bereich; Alarm endet über',
       above: 'im Bereich; Alarm endet unter',
     },
-    range: (reading, side, limit, isCritical) =>
-      `${reading}, ${side} ${limit}${isCritical ? ' (kritisch)' : ''}`,
+    just: {
+      below: (limit) => `knapp unter ${limit}`,
+      above: (limit) => `knapp über ${limit}`,
+    },
     beyond: (sensor, side, limit) => `${sensor} ${side} ${limit}`,
     readingFailed: (sensor) => `${sensor}: Der Sensor liefert keinen Wert`,
     implausible: (reading) => `${reading}: kein plausibler Wert`,

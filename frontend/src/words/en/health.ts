@@ -17,8 +17,11 @@ export const HEALTH = {
     sides: { below: 'below', above: 'above' },
     /** What was out of its range counts as that until it is well within. */
     sidesBack: { below: 'back in range; clears above', above: 'back in range; clears below' },
-    range: (reading: string, side: string, limit: string, isCritical: boolean): string =>
-      `${reading}, ${side} ${limit}${isCritical ? ' (critical)' : ''}`,
+    /** Of a value that reads like the limit that it is beyond. */
+    just: {
+      below: (limit: string): string => `just below ${limit}`,
+      above: (limit: string): string => `just above ${limit}`,
+    },
     /** What is wrong, whatever the value is by now. */
     beyond: (sensor: string, side: string, limit: string): string => `${sensor} ${side} ${limit}`,
     readingFailed: (sensor: string): string => `${sensor}: the sensor returns no value`,

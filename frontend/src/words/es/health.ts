@@ -22,8 +22,10 @@ export const HEALTH: In<typeof ENGLISH> = {
       below: 'en rango; se desactiva por encima de',
       above: 'en rango; se desactiva por debajo de',
     },
-    range: (reading, side, limit, isCritical) =>
-      `${reading}, ${side} ${limit}${isCritical ? ' (crítico)' : ''}`,
+    just: {
+      below: (limit) => `justo por debajo de ${limit}`,
+      above: (limit) => `justo por encima de ${limit}`,
+    },
     beyond: (sensor, side, limit) => `${sensor} ${side} ${limit}`,
     readingFailed: (sensor) => `${sensor}: el sensor no da ningún valor`,
     implausible: (reading) => `${reading}: valor no plausible`,

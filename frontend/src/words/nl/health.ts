@@ -19,8 +19,10 @@ export const HEALTH: In<typeof ENGLISH> = {
       below: 'binnen bereik; alarm eindigt boven',
       above: 'binnen bereik; alarm eindigt onder',
     },
-    range: (reading, side, limit, isCritical) =>
-      `${reading}, ${side} ${limit}${isCritical ? ' (kritiek)' : ''}`,
+    just: {
+      below: (limit) => `net onder ${limit}`,
+      above: (limit) => `net boven ${limit}`,
+    },
     beyond: (sensor, side, limit) => `${sensor} ${side} ${limit}`,
     readingFailed: (sensor) => `${sensor}: de sensor geeft geen waarde`,
     implausible: (reading) => `${reading}: geen plausibele waarde`,

@@ -58,7 +58,7 @@ def test_a_range_is_fixed_within_reason_and_fahrenheit_is_kept(hmi: Hmi) -> None
     high = hmi.page.get_by_label("Highest °C")
     high.fill("100")
     high.press("Enter")
-    expect(hmi.test_id("range-high")).to_have_text("100\u00a0°C")
+    expect(hmi.test_id("range-high")).to_have_text("100.0\u00a0°C")
     hmi.page.get_by_role("button", name="Use ideal range").click()
     expect(hmi.test_id("range-low")).to_have_text("18.0")
     expect(hmi.test_id("range-high")).to_have_text("26.0\u00a0°C")

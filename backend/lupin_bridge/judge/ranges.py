@@ -94,8 +94,9 @@ class Sensors:
         So many that the largest limit has about three figures: of the sensor itself, or of what it
         is computed of.
         """
-        sources = DERIVED[name].sources if name in DERIVED else ()
-        sources = (DAILY[name].sensor,) if name in DAILY else sources
+        sources: tuple[str, ...] = DERIVED[name].sources if name in DERIVED else ()
+        if name in DAILY:
+            sources = (DAILY[name].sensor,)
         for names in ((name,), sources):
             ideals = (span for each in names for span in self.named(each).ideals)
             most = max((abs(end) for span in ideals for end in (span.low, span.high)), default=0)

@@ -408,6 +408,8 @@ _LINES = f"(e) => {{ {_RECTS} return new Set([...range.getClientRects()].map((r)
 _CUT_REASONS = """() => [...document.querySelectorAll('tbody .cell-health > div')]
   .filter((e) => e.scrollHeight > e.clientHeight + 1).map((e) => e.textContent)"""
 
+_IS_CUT = "(e) => e.getBoundingClientRect().right > e.closest('th').getBoundingClientRect().right"
+
 # What a phone says in each, and how it writes a number.
 LANGUAGES = {
     "en": ("tags contribute", "20.0"),
@@ -445,6 +447,10 @@ def test_every_language_has_room_on_a_phone(house: Bridge, open_page: OpenPage) 
         for width in (PHONE["width"], 1100, 1280, 1440):
             hmi.resize(width, 800)
             assert hmi.page.evaluate(_CUT_REASONS) == [], (language, width)
+            # In one line: the longest name has a column as wide.
+            name = hmi.row("failed").locator(".row-button bdi")
+            assert name.evaluate(_LINES) == 1, width
+            assert name.evaluate(_IS_CUT) is False, width
             health = hmi.page.locator("thead [data-column=health] button > span").first
             assert health.evaluate(_LINES) == 1, (language, width)
         # Where the name of the page has no room, none of it is shown.

@@ -163,7 +163,7 @@ def test_alarms_of_all_greenhouses_are_counted_listed_and_a_click_away(
                 f"INSERT INTO note VALUES ('warm', 'n1', {now_ns}, 'Anna', 'acknowledge',"
                 f" 'alarm:{name}', '', NULL)"
             )
-            expect(rows.first).to_contain_text("acknowledged by Anna at")
+            expect(rows.first).to_contain_text("acknowledged by Anna,")
             expect_no_wider_than_a_phone(page)
             tag = rows.first.locator("span", has_text=re.compile(r"^Tag \d$")).inner_text()
             rows.first.get_by_role("link").click()
@@ -201,10 +201,10 @@ def test_one_sensor_of_several_greenhouses_the_outlier_first(
             expect(rows.first).to_contain_text("35.0\u00a0°C")
             expect(rows.first).to_contain_text("11.5\u00a0°C")
             expect(page.get_by_test_id("plot").locator("canvas")).to_be_visible()
-            expect(page.get_by_role("checkbox", name="Draw odd")).to_be_checked()
-            expect(page.get_by_role("checkbox", name="Draw gh3")).not_to_be_checked()
-            page.get_by_role("checkbox", name="Draw gh3").check()
-            expect(page.get_by_role("checkbox", name="Draw gh3")).to_be_checked()
+            expect(page.get_by_role("checkbox", name="Show odd")).to_be_checked()
+            expect(page.get_by_role("checkbox", name="Show gh3")).not_to_be_checked()
+            page.get_by_role("checkbox", name="Show gh3").check()
+            expect(page.get_by_role("checkbox", name="Show gh3")).to_be_checked()
             # The same choice of greenhouses as for the cards.
             page.get_by_role("searchbox").fill("gh")
             expect(rows.locator("th")).to_have_text(["gh1", "gh3", "gh2"])
@@ -293,7 +293,7 @@ def test_an_archive_without_greenhouses_and_one_that_is_down(browser: Browser) -
         archive = Archive(own)
         archive.add_user("page", "lupin_page")
         with fleet(archive) as served, opened(browser, served.url) as page:
-            expect(page.get_by_role("main")).to_contain_text("No greenhouse is forwarded")
+            expect(page.get_by_role("main")).to_contain_text("No greenhouse sends data")
             archive.do(
                 "INSERT INTO site VALUES ('gh1', '');"
                 "INSERT INTO forwarder VALUES ('gh1', 'm', 1, now(), now() + INTERVAL '1 hour')"

@@ -68,7 +68,7 @@ def test_a_full_disk_is_told_everywhere_costs_nothing_and_heals(
             ),
             "the same in the metrics",
         )
-        expect(troubles).to_contain_text("Nothing is being recorded.")
+        expect(troubles).to_contain_text("Recording has failed.")
         expect(troubles).to_contain_text("Free disk space, or check the disk")
         live.peer.until(lambda: levels().get(TOLD) == DiagnosticStatus.ERROR, "an error")
         # The twin goes on, and so does the page.

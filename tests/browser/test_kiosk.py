@@ -6,7 +6,7 @@ import re
 
 from playwright.sync_api import expect
 
-from tests.browser.hmi import PHONE, OpenPage
+from tests.browser.hmi import PHONE, Hmi, OpenPage
 from tests.browser.places import places
 from tests.support.web import Bridge
 
@@ -78,6 +78,14 @@ def test_a_wall_screen_goes_round_and_is_left_by_the_key_that_it_names(
     expect(note).to_be_visible()
 
 
+_HEADER = (".brand", ".origin", ".connection", ".kiosk-note")
+
+
+def _middle(wall: Hmi, part: str) -> float:
+    (box,) = places(wall, part)
+    return (box.top + box.bottom) / 2
+
+
 def test_on_a_phone_what_is_to_be_done_comes_first_whole_and_the_page_scrolls(
     house: Bridge, open_page: OpenPage
 ) -> None:
@@ -96,6 +104,10 @@ def test_on_a_phone_what_is_to_be_done_comes_first_whole_and_the_page_scrolls(
         return line.bottom <= first.top and last.bottom <= plan.top
 
     wall.expect(are_in_order, "the list above the map, nothing over it")
+    # Its header is one row on a phone of the usual width.
+    wall.resize(390, 740)
+    wall.expect(lambda: len({round(_middle(wall, part)) for part in _HEADER}) == 1, "one row")
+    wall.resize(**PHONE)
     # The chosen sensor comes into its row, and leaves the page where it is.
     assert wall.page.evaluate("scrollY") == 0
     wall.map.scroll_into_view_if_needed()

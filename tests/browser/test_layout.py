@@ -414,8 +414,8 @@ _IS_CUT = "(e) => e.getBoundingClientRect().right > e.closest('th').getBoundingC
 LANGUAGES = {
     "en": ("tags contribute", "20.0"),
     "de": ("Messpunkte tragen bei", "20,0"),
-    "nl": ("meetpunten dragen bij", "20,0"),
-    "es": ("puntos contribuyen", "20,0"),
+    "nl": ("meetpunten tellen mee", "20,0"),
+    "es": ("puntos aportan datos", "20,0"),
 }
 
 

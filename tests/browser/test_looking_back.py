@@ -345,7 +345,7 @@ def test_a_lost_connection_is_told_and_the_past_stays(page: Hmi, hour: Hour) -> 
     page.expect_phase("reconnecting")
     banner = page.test_id("frozen")
     expect(banner).to_contain_text("Live data has stopped")
-    expect(banner).to_contain_text("The past that is shown is not affected")
+    expect(banner).to_contain_text("The past shown is not affected")
     expect(page.cell("a", "temperature")).to_have_text(then)
     expect(page.page.locator("canvas[data-layer=pins]")).to_have_css("opacity", "1")
     page.page.context.set_offline(False)

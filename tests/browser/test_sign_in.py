@@ -71,7 +71,7 @@ def test_a_wrong_token_can_be_corrected_and_nothing_of_the_right_one_is_kept(
 ) -> None:
     page.goto(closed.url + "/signin")
     sign_in(page, TOKEN[::-1].strip("=") + "x")
-    expect(page.get_by_role("alert")).to_have_text("This is not the right token.")
+    expect(page.get_by_role("alert")).to_have_text("The token is not valid.")
     sign_in(page, "not a token")
     expect(page.get_by_role("alert")).to_have_text(re.compile("letters, digits"))
     assert "/signin" in page.url

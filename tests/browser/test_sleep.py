@@ -48,7 +48,7 @@ def test_after_a_sleep_no_age_and_no_live_before_a_fresh_state(
     expect(ages).to_have_text(["never" if tag in ("failed", "seen") else "unknown" for tag in TAGS])
     expect(hmi.card("1")).to_contain_text("unknown")
     banner = hmi.test_id("frozen")
-    expect(banner).to_contain_text("Readings are frozen. Last data at")
+    expect(banner).to_contain_text("No new readings. Last data at")
     expect(banner).not_to_contain_text("ago")
     hmi.expect(lambda: len(held) > 0, "a new connection")
     # Open alone is not live.

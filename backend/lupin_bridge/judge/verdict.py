@@ -66,7 +66,8 @@ class Reason:
     `since_ns` is the observation that says so; None: there was none. Of `old`, `limit` is how long
     readings hold, s, and `since_ns` the last one: its age would change all the time. Of `pest`,
     `value` is how many were counted, of `scan_failed` the attempt's status, of `reading_failed`
-    what no sensor reads that works, or None: no number.
+    what no sensor reads that works, or None: no number. `release` is what a value has to pass that
+    is back inside `limit`, and that only the deadband still holds; None: nothing like that.
     """
 
     kind: Kind
@@ -75,6 +76,7 @@ class Reason:
     value: float | None = None
     limit: float | None = None
     since_ns: int | None = None
+    release: float | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -159,7 +161,7 @@ def _still_out(reading: Reading, ranges: Ranges, sensor: Sensor, recent: Recent)
     """A value within its range by less than the deadband, of a tag that has been out of it.
 
     That is so since the last scan that was out of it, of those that are recent, unless one since
-    was further within. The limit is that of the deadband.
+    was further within.
     """
     if ranges.ideal is None:
         return None
@@ -170,11 +172,19 @@ def _still_out(reading: Reading, ranges: Ranges, sensor: Sensor, recent: Recent)
     ):
         if span is None:
             continue
-        for sign, limit in ((-1.0, span.low + band), (1.0, span.high - band)):
-            is_near = (reading.value - limit) * sign > 0.0
+        for sign, limit in ((-1.0, span.low), (1.0, span.high)):
+            release = limit - sign * band
+            is_near = (reading.value - release) * sign > 0.0
             if is_near and _was_out(reading, verdict, sign, sensor, recent):
-                since_ns = reading.observed_at_ns
-                return Reason(Kind.RANGE, verdict, reading.name, reading.value, limit, since_ns)
+                return Reason(
+                    Kind.RANGE,
+                    verdict,
+                    reading.name,
+                    reading.value,
+                    limit,
+                    reading.observed_at_ns,
+                    release,
+                )
     return None
 
 

@@ -166,7 +166,7 @@ def _health(health: Health) -> dict[str, Any]:
 
 def reason_json(reason: Reason) -> dict[str, Any]:
     """`schema.HealthReason`."""
-    return {
+    found = {
         "kind": reason.kind,
         "verdict": reason.verdict,
         "sensor": reason.sensor,
@@ -174,3 +174,6 @@ def reason_json(reason: Reason) -> dict[str, Any]:
         "limit": reason.limit,
         "since": None if reason.since_ns is None else stamp(reason.since_ns),
     }
+    if reason.release is not None:
+        found["release"] = reason.release
+    return found

@@ -152,6 +152,10 @@ class HealthReason(Contract):
     since: Time | None = Field(
         description="ROS time of the observation that began it, of old the last one; null: none"
     )
+    release: float | None = Field(
+        default_factory=lambda: None,
+        description="where it ends; there only while nothing but the deadband holds it",
+    )
 
 
 class TagHealth(Contract):

@@ -71,7 +71,7 @@ test('of one cause, each area stands by itself, and is found by its name', () =>
   expect(filtered(list, 'south', { sensors, unit: 'C' }, isTag).active).toHaveLength(6);
 });
 
-test('of a cause the value farthest beyond, and since when one has been active', () => {
+test('of a cause how many are how bad, and the value farthest beyond', () => {
   const items = listOf(
     [
       { ...cold(1), worst: 4.2 },
@@ -86,17 +86,16 @@ test('of a cause the value farthest beyond, and since when one has been active',
   );
   const now = ({ id }: Alarm): Now | null =>
     id === 'cold2'
-      ? { kind: 'known', value: 10.4, verdict: 'stressed', limit: 18, trend: null }
+      ? { kind: 'known', value: 10.4, verdict: 'stressed', reason: null, trend: null }
       : id === 'cold1'
-        ? { kind: 'known', value: 10.9, verdict: 'healthy', limit: null, trend: null }
+        ? { kind: 'known', value: 10.9, verdict: 'healthy', reason: null, trend: null }
         : null;
-  expect(causeFacts([...items.active, ...items.resolved], speech, null, now)).toEqual([
-    ...['1 stressed', '1 healthy'],
-    ...['now 10.4\u00a0°C (Tag 2)', 'worst 2.9\u00a0°C', 'since sim 00:01:41'],
+  expect(causeFacts([...items.active, ...items.resolved], speech, now)).toEqual([
+    ...['1 stressed, 1 healthy', 'now 10.4\u00a0°C (Tag 2)', 'worst 2.9\u00a0°C'],
   ]);
-  expect(causeFacts(items.resolved, speech, null, now)).toEqual(['worst 2.9\u00a0°C']);
+  expect(causeFacts(items.resolved, speech, now)).toEqual(['', '', 'worst 2.9\u00a0°C']);
   const unknown = (): Now => ({ kind: 'unknown', last: 9, lastAt: 'unknown' });
-  expect(causeFacts(items.active, speech, null, unknown)[0]).toBe('2 unknown');
+  expect(causeFacts(items.active, speech, unknown)[0]).toBe('2 unknown');
 });
 
 test('the newest first, or by tag: in one row', () => {

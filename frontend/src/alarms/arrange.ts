@@ -9,7 +9,7 @@ import { toShown, unitOf } from '../domain/units';
 import { S } from '../strings';
 import type { AlarmList, Item } from './list';
 import { worstOf, type Now } from './now';
-import { nameText, valuesOf, whatText, whenText, whereText, type Speech } from './words';
+import { nameText, valuesOf, whatText, whereText, type Speech } from './words';
 
 export const ORDERS = ['cause', 'newest', 'tag'] as const;
 /** By cause the worst comes first. */
@@ -142,13 +142,12 @@ export function tagsText(ids: readonly string[]): string {
   return S.alarmTags(named, ids.length - count);
 }
 
-/** Of many alarms of one cause: how bad they are now, the furthest value now and at worst, since when. */
+/** Of many alarms of one cause: how many are how bad now, and the furthest value now and at worst; empty: none. */
 export function causeFacts(
   items: readonly Item[],
   speech: Speech,
-  nowS: number | null,
   nowOf: (alarm: Alarm) => Now | null,
-): readonly string[] {
+): readonly [counts: string, now: string, worst: string] {
   const all = items.map(({ alarm, verdict }) => {
     const now = nowOf(alarm);
     const known = now?.kind === 'known' ? now : null;
@@ -175,13 +174,11 @@ export function causeFacts(
       ? `${count} ${(count === 1 ? S.health : S.healthMany)[verdict].toLowerCase()}`
       : null;
   });
-  const begins = active.map(({ alarm }) => secondsOf(alarm.raised_at));
   return [
-    ...counts,
-    current?.now ? `${current.now} (${current.where})` : null,
-    worst?.worst ?? null,
-    begins.length > 0 ? S.alarmSince(whenText(Math.min(...begins), nowS), null) : null,
-  ].filter((text) => text !== null);
+    counts.filter((text) => text !== null).join(', '),
+    current?.now ? `${current.now} (${current.where})` : '',
+    worst?.worst ?? '',
+  ];
 }
 
 const iso = (at: WireTime | null): string | null =>

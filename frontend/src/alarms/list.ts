@@ -87,6 +87,12 @@ export const rankOf = (reason: HealthReason, isAcknowledged: boolean): number =>
 const byName = ({ alarm: a }: Item, { alarm: b }: Item): number =>
   compareIds(a.tag_id, b.tag_id) || (a.id < b.id ? -1 : 1);
 
+/** The one that was raised first. */
+export const oldestOf = (items: readonly Item[]): Alarm | undefined =>
+  items
+    .map(({ alarm }) => alarm)
+    .sort((a, b) => secondsOf(a.raised_at) - secondsOf(b.raised_at))[0];
+
 /** Neither acknowledged nor shelved; in a list that is held, both still stand where they were. */
 export const unacknowledged = (items: readonly Item[]): readonly Item[] =>
   items.filter(({ isAcknowledged, shelf }) => !isAcknowledged && shelf === null);
@@ -105,6 +111,10 @@ export const alarmOf = (
   items.find(
     ({ alarm }) => alarm.tag_id === tagId && whatOf(alarm) === whatOf({ tag_id: tagId, reason }),
   );
+
+/** Whether a second scan that says the same raises the alarm of a reason. */
+export const isAwaited = ({ kind, release }: HealthReason): boolean =>
+  kind === 'reading_failed' || (kind === 'range' && release === undefined);
 
 /** What is new between two lists, to be told once. */
 export interface News {

@@ -1,5 +1,5 @@
 /** What an alarm is about, as it is now: its value, how bad that is, and its trend. Pure. */
-import type { Alarm, Verdict } from '../contract/types';
+import type { Alarm, HealthReason, Verdict } from '../contract/types';
 import type { When } from '../domain/age';
 import { isOfRange, sideOf } from '../domain/health';
 import { isOldReading, trendOf, type TagThen } from '../domain/trend';
@@ -11,8 +11,8 @@ export type Now =
       readonly value: number | null;
       /** How bad that is. */
       readonly verdict: Verdict;
-      /** That it is beyond now, in the sensor's unit; null: beyond none. */
-      readonly limit: number | null;
+      /** Why; null: it is in its range. */
+      readonly reason: HealthReason | null;
       /** What it is less what it was an hour ago; null: not known, or the same reading. */
       readonly trend: number | null;
     }
@@ -44,7 +44,7 @@ export function nowOf(
   const verdict = said?.verdict ?? 'healthy';
   if (isPest) {
     const value = said ? (said.value ?? 0) : null;
-    return { kind: 'known', value, verdict, limit: null, trend: null };
+    return { kind: 'known', value, verdict, reason: said ?? null, trend: null };
   }
   const { readings, readAt } = tag.tag;
   // What is derived has no reading: what there is of it stands in its reason.
@@ -52,7 +52,7 @@ export function nowOf(
   const last = isDerived ? (said?.value ?? null) : (readings.get(sensor) ?? null);
   // Of what is within its range nothing is said, nor what it is.
   if (isLive && isDerived && !said && !tag.health.reasons.some((it) => it.verdict === 'unknown')) {
-    return { kind: 'known', value: null, verdict, limit: null, trend: null };
+    return { kind: 'known', value: null, verdict, reason: null, trend: null };
   }
   if (!isLive || last === null || isOldReading(sensor, tag)) {
     return unknown(last, readAt.get(sensor) ?? 'unknown');
@@ -62,9 +62,17 @@ export function nowOf(
     kind: 'known',
     value: last,
     verdict,
-    limit: said?.limit ?? null,
+    reason: said ?? null,
     trend: trend?.kind === 'by' ? trend.by : null,
   };
+}
+
+/** Why, as it is now, and how bad that is; as it was said last where nobody knows, or it has no value. */
+export function reasonNow({ reason }: Alarm, now: Now | null): HealthReason {
+  if (now?.kind !== 'known') return reason;
+  return now.reason
+    ? { ...now.reason, value: now.value ?? reason.value }
+    : { ...reason, verdict: now.verdict };
 }
 
 /** Its worst value, never better than that of now, which may come first; null: there is none. */

@@ -2,7 +2,7 @@ import { expect, test } from 'vitest';
 
 import { store } from '../store/app';
 import { alarm } from '../testing/alarms';
-import { judgement, reason } from '../testing/health';
+import { held, judgement, reason } from '../testing/health';
 import { showTags } from '../testing/page';
 import { readings, wireTag } from '../testing/tags';
 import { NOTHING_KEPT } from './kept';
@@ -17,18 +17,20 @@ const { active } = listOf(
   0,
 );
 
-/** How each tag is now: its temperature, and the limit that it has yet to pass. */
-const todo = (...now: readonly (readonly [value: number, limit: number])[]): string => {
+/** How each tag is now: its temperature, and what it has yet to pass where it is back. */
+const todo = (...now: readonly (readonly [value: number, release?: number])[]): string => {
   const tags = IDS.map((tag_id, at) =>
     wireTag({ tag_id, readings: readings({ temperature: now[at]?.[0] ?? null }) }),
   );
-  const said = now.map(([value, limit]) => [reason({ value, limit, verdict: 'stressed' })]);
+  const said = now.map(([value, release]) => [
+    reason({ value, limit: 18, verdict: 'stressed', ...held(release) }),
+  ]);
   showTags(tags, judgement(Object.fromEntries(IDS.map((id, at) => [id, said[at] ?? []]))));
   return todoNow(store.get(), active);
 };
 
 test('nothing is ordered where all are back in their range, and something as soon as one is not', () => {
-  expect(todo([17.5, 18], [17.8, 18])).toBe('Heat, or close the vents');
-  expect(todo([18.1, 18.5], [17.8, 18])).toBe('Heat, or close the vents');
+  expect(todo([17.5], [17.8])).toBe('Heat, or close the vents');
+  expect(todo([18.1, 18.5], [17.8])).toBe('Heat, or close the vents');
   expect(todo([18.1, 18.5], [18.2, 18.5])).toBe('');
 });

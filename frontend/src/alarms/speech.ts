@@ -9,7 +9,7 @@ import { todoText } from '../domain/reasons';
 import { isHeardNow, selectNewestTag } from '../store/moment';
 import { causesFirst } from './arrange';
 import { inOrder, rankOf, type Item } from './list';
-import { nowOf, type Now } from './now';
+import { nowOf, reasonNow, type Now } from './now';
 import { alarmText, type Speech } from './words';
 
 const speech = memoLast((sensors: Speech['sensors'], unit: Speech['unit']): Speech => ({
@@ -32,17 +32,12 @@ export function selectNow(
   return nowOf(alarm, tag && health ? { tag, health } : null, before, isHeardNow(state));
 }
 
-/** Why, as it is now, and how bad that is; as it was said last where nobody knows, or it has no value. */
-function reasonNow(state: AppState, alarm: Alarm): HealthReason {
-  const at = selectNow(state, alarm, null);
-  if (at?.kind !== 'known') return alarm.reason;
-  const { verdict, value, limit } = at;
-  return { ...alarm.reason, verdict, value, limit };
-}
+const reasonIn = (state: AppState, alarm: Alarm): HealthReason =>
+  reasonNow(alarm, selectNow(state, alarm, null));
 
 /** The worst of some alarms as they are now; null: there is none. */
 export function worstNow(state: AppState, items: readonly Item[]): Verdict | null {
-  const verdicts = items.map(({ alarm }) => reasonNow(state, alarm).verdict);
+  const verdicts = items.map(({ alarm }) => reasonIn(state, alarm).verdict);
   return VERDICTS.find((each) => verdicts.includes(each)) ?? null;
 }
 
@@ -50,15 +45,15 @@ export function worstNow(state: AppState, items: readonly Item[]): Verdict | nul
 export function todoNow(state: AppState, items: readonly Item[]): string {
   const verdict = worstNow(state, items);
   const todos = items
-    .map(({ alarm }) => reasonNow(state, alarm))
+    .map(({ alarm }) => reasonIn(state, alarm))
     .filter((reason) => reason.verdict === verdict)
-    .map((reason) => todoText(selectCatalogue(state), reason));
+    .map(todoText);
   return todos.find((text) => text !== '') ?? '';
 }
 
 /** What is worst now first, many of one cause together. */
 export function worstNowFirst(state: AppState, items: readonly Item[]): readonly Item[] {
-  const reasons = new Map(items.map((item) => [item, reasonNow(state, item.alarm)]));
+  const reasons = new Map(items.map((item) => [item, reasonIn(state, item.alarm)]));
   const reasonOf = (item: Item): HealthReason => reasons.get(item) ?? item.alarm.reason;
   return causesFirst(
     inOrder(items, reasonOf),

@@ -2,6 +2,7 @@ import { expect, test, vi } from 'vitest';
 
 import type { Alarm, Verdict } from '../contract/types';
 import { alarm } from '../testing/alarms';
+import { held, reason } from '../testing/health';
 import { S } from '../strings';
 import { CATALOGUE } from '../testing/sensors';
 import type { Now } from './now';
@@ -10,6 +11,7 @@ import {
   nameText,
   severalText,
   spanText,
+  timesOf,
   unknownText,
   valuesOf,
   whenText,
@@ -25,7 +27,7 @@ const known = (value: number | null, verdict: Verdict): Now => ({
   kind: 'known',
   value,
   verdict,
-  limit: null,
+  reason: null,
   trend: null,
 });
 const CRITICAL = known(6.6, 'critical');
@@ -56,19 +58,20 @@ test('now, at worst and at first, each with its own severity', () => {
   expect(alarmText(cold, C, known(8.7, 'critical'))).not.toContain('worst');
 });
 
-test('its limit is that of now: what is critical, or what ends it on the way back', () => {
+test('its limit is that of now: what is critical; on the way back it stands beside what ends it', () => {
   const cold = alarm('a', { tag_id: '9', worst: 8.7, reason: { value: 17.9, limit: 18 } });
-  const at = (value: number, limit: number, verdict: Verdict = 'stressed'): Now => ({
-    ...{ kind: 'known', value, verdict, limit, trend: null },
+  const at = (value: number, limit: number, verdict: Verdict, release?: number): Now => ({
+    ...{ kind: 'known', value, verdict, trend: null },
+    reason: reason({ value, limit, verdict, ...held(release) }),
   });
   expect(valuesOf(cold, C, at(8.7, 10, 'critical'))).toMatchObject({
     what: 'Temperature below 10.0\u00a0°C',
     todo: 'Heat, or close the vents',
   });
-  expect(valuesOf(cold, C, at(18.02, 18.5))).toMatchObject({
-    what: 'Temperature back in range; clears above 18.5\u00a0°C',
+  expect(valuesOf(cold, C, at(18.02, 18, 'stressed', 18.5))).toMatchObject({
+    what: 'Temperature was below 18.0\u00a0°C; stays stressed until 18.5\u00a0°C',
     todo: '',
-    now: 'now 18.0\u00a0°C',
+    now: 'now just above 18.0\u00a0°C',
     first: '17.9\u00a0°C when raised',
   });
 });
@@ -147,6 +150,26 @@ test('since when and until when: of today the time alone', () => {
   const night = alarm('a', { raised: NOON, cleared: NOON + 50_000 });
   expect(spanText(night, NOON + 50_001)).toMatch(/^14 Nov 2026, 12:00:00 until 01:53:20 \(13/);
   expect(whenText(100, 200)).toBe('sim 00:01:40');
+});
+
+test('for how long comes first, with the day only where it is another, and the end once it is resolved', () => {
+  const since = alarm('a', { raised: NOON });
+  expect(timesOf(since, NOON + 7_500, false)).toEqual({
+    length: '2\u00a0h\u00a05\u00a0min',
+    note: '',
+  });
+  expect(timesOf(since, NOON + 86_400, false).note).toBe('14 Nov');
+  expect(timesOf(since, null, false).length).toBe('14 Nov 2026, 12:00:00');
+  const over = alarm('a', { raised: NOON, cleared: NOON + 600 });
+  expect(timesOf(over, NOON + 1_500, true)).toEqual({
+    length: '10\u00a0min',
+    note: 'resolved 12:10:00',
+  });
+  // Of a simulation's clock there are no days.
+  expect(timesOf(alarm('a', { raised: 100 }), 160, false)).toEqual({
+    length: '1\u00a0min',
+    note: '',
+  });
 });
 
 test('of several the first are named', () => {

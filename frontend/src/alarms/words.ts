@@ -1,14 +1,14 @@
 /** An alarm in words: what, where, how bad now and at worst, since when, until when. Pure. */
-import type { Alarm, HealthReason, Verdict } from '../contract/types';
+import type { Alarm, Verdict } from '../contract/types';
 import { ageText, beyondLimitText, clockText, readingText } from '../domain/format';
 import { isOfRange, sideOf } from '../domain/health';
 import { beyondText, reasonText, todoText } from '../domain/reasons';
-import { hasDate, rosText, secondsOf } from '../domain/rostime';
+import { dayFormat, hasDate, rosText, secondsOf } from '../domain/rostime';
 import type { Catalogue } from '../domain/sensors';
 import { shown } from '../domain/text';
 import type { TemperatureUnit } from '../domain/units';
 import { S } from '../strings';
-import { worstOf, type Now } from './now';
+import { reasonNow, worstOf, type Now } from './now';
 
 /** Of a name that some robot made up. */
 const LONGEST_NAME = 24;
@@ -69,7 +69,7 @@ export function valuesOf(alarm: Alarm, speech: Speech, now: Now | null): Values 
   const isMeasured = isOfRange(reason) || isPest || reason.kind === 'changed';
   return {
     what: whatText({ ...alarm, reason }, speech),
-    todo: todoText(sensors, reason, now?.kind === 'known' ? now.verdict : undefined),
+    todo: todoText(reason),
     now:
       now?.kind === 'known' ? S.alarmNow(now.value === null ? noneText : nowText(now.value)) : null,
     worst:
@@ -78,13 +78,6 @@ export function valuesOf(alarm: Alarm, speech: Speech, now: Now | null): Values 
         : S.alarmWorst[isOfRange(reason) ? sideOf(reason) : 'pest'](text(worst)),
     first: isMeasured && first !== null ? S.alarmFirst(text(first)) : null,
   };
-}
-
-/** Of a range its limit is that of now: beyond what is critical, that; on the way back, what ends it. */
-function reasonNow({ reason }: Alarm, now: Now | null): HealthReason {
-  if (!isOfRange(reason) || now?.kind !== 'known' || now.limit === null) return reason;
-  const { value, limit, verdict } = now;
-  return { ...reason, value: value ?? reason.value, limit, verdict };
 }
 
 /** What and where in one line, as it is now, and how bad at worst where that differs. */
@@ -126,6 +119,21 @@ export function spanText({ raised_at, cleared_at }: Alarm, nowS: number | null):
   const until = secondsOf(cleared_at);
   const end = isSameDay(from, until) ? clockOf(until) : whenText(until, nowS);
   return S.alarmUntil(begin, end, lengthText(until - from));
+}
+
+/** For how long it has been so, or was; and the day that it began on, if it is another; `isOver`: when it was resolved. */
+export function timesOf(
+  { raised_at, cleared_at }: Alarm,
+  nowS: number | null,
+  isOver: boolean,
+): { readonly length: string; readonly note: string } {
+  const from = secondsOf(raised_at);
+  const until = cleared_at ? secondsOf(cleared_at) : nowS;
+  if (until === null) return { length: whenText(from, nowS), note: '' };
+  const isOfToday = !hasDate(from) || isSameDay(from, nowS ?? until);
+  const day = isOfToday ? '' : dayFormat.format(from * 1000);
+  const note = isOver ? `${S.alarmResolved} ${whenText(until, nowS)}` : day;
+  return { length: lengthText(until - from), note };
 }
 
 /** In one piece: a line does not break in it. */

@@ -114,6 +114,7 @@ export interface components {
             readonly value: number | null;
             readonly limit: number | null;
             readonly since: components["schemas"]["Time"] | null;
+            readonly release?: number | null;
         };
         readonly History: {
             readonly from: components["schemas"]["Time"];

@@ -86,7 +86,7 @@ export const worstReason = ({ verdict, reasons }: TagHealth): HealthReason | und
 /** Pests by their number; a value by how far it is beyond its limit, as a part of the larger of both. From 0 to 1. */
 function weight(reason: HealthReason): number {
   if (reason.kind === 'pest') return 1 - 1 / (2 + (reason.value ?? 0));
-  if (!isOfRange(reason) || reason.value === reason.limit) return 0;
+  if (!isOfRange(reason) || reason.release !== undefined || reason.value === reason.limit) return 0;
   const { value, limit } = reason;
   return Math.min(0.99, Math.abs(value - limit) / Math.max(Math.abs(value), Math.abs(limit)));
 }
@@ -103,14 +103,16 @@ export const isOfRange = (
 ): reason is HealthReason & { readonly value: number; readonly limit: number } =>
   reason.kind === 'range' && reason.value !== null && reason.limit !== null;
 
-/** On which side of its range a value is that lies outside. */
+/** On which side of its range a value is that lies outside, or has yet to pass `release`. */
 export const sideOf = ({
   value,
   limit,
+  release,
 }: {
   readonly value: number;
   readonly limit: number;
-}): 'below' | 'above' => (value < limit ? 'below' : 'above');
+  readonly release?: number | null;
+}): 'below' | 'above' => (value < (release ?? limit) ? 'below' : 'above');
 
 /** The very same as before where nothing else is said: what follows from it is kept then. */
 export function sharedJudgement(before: Judgement | null, now: Judgement): Judgement {

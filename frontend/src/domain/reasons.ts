@@ -1,9 +1,9 @@
 /** Why a tag or the house has its verdict, in words. */
-import type { HealthReason, Verdict } from '../contract/types';
+import type { HealthReason } from '../contract/types';
 import { S } from '../strings';
 import { beyondLimitText, durationText, readingText, shortAgeText, valueText } from './format';
 import { isOfRange, sideOf } from './health';
-import type { Catalogue, Sensor } from './sensors';
+import type { Catalogue } from './sensors';
 import { shown } from './text';
 import type { TemperatureUnit } from './units';
 
@@ -27,12 +27,15 @@ export function reasonText(
   const label = name === '' ? '' : shown(sensor.label, LONGEST_NAME);
   const R = S.reasons;
   if (isOfRange(reason)) {
-    const reading = beyondLimitText(sensor, reason.value, reason.limit, unit);
+    const edge = reason.release ?? reason.limit;
+    const reading = beyondLimitText(sensor, reason.value, edge, unit);
+    const isHeld = reason.release !== undefined;
     // "Just below 350" names the limit itself.
-    const isNear = reading !== readingText(sensor, reason.value, unit) && !isBack(sensor, reason);
-    const limit = `, ${sideText(sensor, reason)} ${valueText(sensor, reason.limit, unit)}`;
-    const rated = reason.verdict === 'critical' && !isMarked ? ` (${S.alarmStatus.critical})` : '';
-    return `${label} ${reading}${isNear ? '' : limit}${rated}`;
+    const isNear = !isHeld && reading !== readingText(sensor, reason.value, unit);
+    const limit = limitText(reason, (each) => valueText(sensor, each, unit));
+    const isRated = reason.verdict === 'critical' && !isMarked && !isHeld;
+    const rated = isRated ? ` (${S.alarmStatus.critical})` : '';
+    return `${label} ${reading}${isNear ? '' : `, ${limit}`}${rated}`;
   }
   switch (kind) {
     case 'range':
@@ -67,40 +70,34 @@ export function reasonText(
 
 type OfRange = HealthReason & { readonly value: number; readonly limit: number };
 
-/**
- * Whether the value is back in an ideal range, and has yet to pass a limit that the file has not.
- * Of a file that is not here, or has other ranges, nothing is.
- */
-export const isBack = ({ ideals }: Sensor, { verdict, value, limit }: OfRange): boolean =>
-  verdict === 'stressed' &&
-  !ideals.flat().includes(limit) &&
-  ideals.some(([low, high]) => value >= low && value <= high);
+/** Whether the value is back in its ideal range, and has yet to lie well within. */
+export const isBack = ({ release, verdict }: HealthReason): boolean =>
+  release !== undefined && verdict === 'stressed';
 
-const sideText = (sensor: Sensor, reason: OfRange): string =>
-  (isBack(sensor, reason) ? S.reasons.sidesBack : S.reasons.sides)[sideOf(reason)];
+/** On which side of which limit a value is, or was. */
+function limitText(reason: OfRange, text: (value: number) => string): string {
+  const { limit, release = null, verdict } = reason;
+  const side = S.reasons.sides[sideOf(reason)];
+  return release === null
+    ? `${side} ${text(limit)}`
+    : S.reasons.wasBeyond(side, text(limit), S.health[verdict].toLowerCase(), text(release));
+}
 
 /** What lies on which side of which limit, without the value: that changes. */
 export function beyondText(sensors: Catalogue, reason: OfRange, unit: TemperatureUnit): string {
   const sensor = sensors.named(reason.sensor);
-  return S.reasons.beyond(
-    shown(sensor.label, LONGEST_NAME),
-    sideText(sensor, reason),
-    readingText(sensor, reason.limit, unit),
-  );
+  const limit = limitText(reason, (value) => readingText(sensor, value, unit));
+  return `${shown(sensor.label, LONGEST_NAME)} ${limit}`;
 }
 
 /**
- * What somebody does about it; of what is well by now (`current`), what its alarm still waits for.
+ * What somebody does about it; of what is well by now, what its alarm still waits for.
  * Empty: nothing, as it is back in its range, and the reason says when that ends it.
  */
-export function todoText(
-  catalogue: Catalogue,
-  reason: HealthReason,
-  current: Verdict = reason.verdict,
-): string {
-  if (current === 'healthy') return reason.kind === 'pest' ? S.todoPestAgain : S.todoWell;
+export function todoText(reason: HealthReason): string {
+  if (reason.verdict === 'healthy') return reason.kind === 'pest' ? S.todoPestAgain : S.todoWell;
   const { sensors, ...kinds } = S.todo;
-  if (isOfRange(reason) && isBack(catalogue.named(reason.sensor), reason)) return '';
+  if (isBack(reason)) return '';
   if (isOfRange(reason) && reason.sensor in sensors) {
     return sensors[reason.sensor as keyof typeof sensors][sideOf(reason)];
   }

@@ -16,6 +16,10 @@ export const reason = (over: Partial<HealthReason> = {}): HealthReason => ({
   ...over,
 });
 
+/** Of a value that is back inside its limit: what it has to pass. */
+export const held = (release?: number): Pick<HealthReason, 'release'> =>
+  release === undefined ? {} : { release };
+
 /** What is said of each tag: a verdict without a reason, or reasons, the worst of which decides. */
 export function judgement(
   said: Readonly<Record<string, Verdict | readonly HealthReason[]>>,

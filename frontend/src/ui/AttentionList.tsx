@@ -125,8 +125,7 @@ function CauseLine({
 
 /** What to do about each of them, no word twice; of some nothing. */
 function Todo({ reasons }: { reasons: readonly HealthReason[] }): JSX.Element | null {
-  const { sensors } = useApp(selectSpeech);
-  const texts = [...new Set(reasons.map((reason) => todoText(sensors, reason)))].filter(Boolean);
+  const texts = [...new Set(reasons.map(todoText))].filter(Boolean);
   return texts.length > 0 ? <strong>{texts.join(' · ')}</strong> : null;
 }
 

@@ -1,7 +1,7 @@
 import { useMemo, type JSX } from 'react';
 
 import { whenText } from '../alarms/words';
-import { alarmOf, type Item } from '../alarms/list';
+import { alarmOf, isAwaited, type Item } from '../alarms/list';
 import { alarmList } from '../alarms/watch';
 import { now } from '../clock';
 import type { HealthReason } from '../contract/types';
@@ -12,7 +12,7 @@ import { rowsOf } from '../domain/table';
 import { shown } from '../domain/text';
 import { act, store, useApp } from '../store/app';
 import { useSelected } from '../store/create';
-import { selectCatalogue, selectHealth } from '../store/derived';
+import { selectHealth } from '../store/derived';
 import { rosNow, selectShown, selectTags } from '../store/moment';
 import { S } from '../strings';
 import { HealthMark } from './HealthMark';
@@ -36,7 +36,6 @@ export function useUrgent(): readonly Urgent[] {
   const tags = useApp(selectTags);
   const health = useApp(selectHealth);
   const isNow = useApp((state) => selectShown(state).moment === null);
-  const catalogue = useApp(selectCatalogue);
   const alarms = useSelected(alarmList, (it) => it);
   return useMemo(() => {
     const acknowledged = alarms.active.filter((it) => it.isAcknowledged);
@@ -47,7 +46,7 @@ export function useUrgent(): readonly Urgent[] {
         const rank = (reason: HealthReason): number => {
           const own = reason.verdict;
           if (reason.kind === 'old' || !(isBad(own) || own === verdict)) return 0;
-          const isBack = todoText(catalogue, reason) === '';
+          const isBack = todoText(reason) === '';
           const judged = { verdict: isBack ? 'healthy' : own, reasons: [reason] };
           return severity(judged, has(acknowledged, id, reason));
         };
@@ -58,7 +57,7 @@ export function useUrgent(): readonly Urgent[] {
         return [{ tagId: id, reasons: [first, ...rest] as const, rank: rank(first) }];
       })
       .sort((a, b) => b.rank - a.rank);
-  }, [tags, health, isNow, catalogue, alarms]);
+  }, [tags, health, isNow, alarms]);
 }
 
 /**
@@ -70,7 +69,7 @@ export function useSince(tagId: string, reason: HealthReason): string | null {
   const found = useSelected(alarmList, ({ active }) => alarmOf(active, tagId, reason));
   const isKnown = useApp(selectAreAlarmsKnown);
   if (!isNow) return null;
-  if (!found) return isKnown ? S.alarmNotYet : null;
+  if (!found) return isKnown && isAwaited(reason) ? S.alarmNotYet : null;
   if (found.isAcknowledged) return S.healthAcknowledged;
   return S.alarmSince(whenText(secondsOf(found.alarm.raised_at), rosNow(store.get(), now())), null);
 }
@@ -147,7 +146,6 @@ function Todo({
   id: string | undefined;
 }): JSX.Element {
   const why = S.healthDriver(shown(tagId, 24), useReasonText(reason, true));
-  const catalogue = useApp(selectCatalogue);
   const since = useSince(tagId, reason);
   // What was to be done then is no order now.
   const isNow = useApp((state) => selectShown(state).moment === null);
@@ -157,7 +155,7 @@ function Todo({
         {why}
       </span>
       <span className="do-what">
-        {isNow && <strong>{todoText(catalogue, reason)}</strong>} {since && <small>{since}</small>}
+        {isNow && <strong>{todoText(reason)}</strong>} {since && <small>{since}</small>}
       </span>
     </>
   );
@@ -178,12 +176,11 @@ export function Overall({
   const active = useSelected(alarmList, (list) => list.active.length);
   const shelved = useSelected(alarmList, (list) => list.shelved.length);
   const text = own ? reason : overallText(health, isNow ? active + shelved : 0);
-  const catalogue = useApp(selectCatalogue);
   if (text === null) return null;
   return (
     <p className="do-why" data-testid={id} title={text}>
       {text}
-      {own && <strong> {todoText(catalogue, own)}</strong>}
+      {own && <strong> {todoText(own)}</strong>}
     </p>
   );
 }

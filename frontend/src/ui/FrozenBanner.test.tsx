@@ -80,7 +80,7 @@ test('behind a look back: live data have stopped, and what is shown stays', () =
     </>,
   );
   expect(text()).toContain('Live data has stopped.');
-  expect(text()).toContain('The past that is shown is not affected.');
+  expect(text()).toContain('The past shown is not affected.');
   expect(text()).not.toContain('frozen');
   expect(screen.getByTestId('connection').textContent).toContain('Past · reconnecting');
 });

@@ -6,7 +6,7 @@ import { acknowledgeAlarms, shelveAlarm } from '../alarms/own';
 import { alarmList, startAlarms } from '../alarms/watch';
 import { receive, store } from '../store/app';
 import { alarm, alarms, tellAlarms } from '../testing/alarms';
-import { judgement, reason } from '../testing/health';
+import { held, judgement, reason } from '../testing/health';
 import { goLost, showTags } from '../testing/page';
 import { wireTag } from '../testing/tags';
 import { HealthSummary } from './HealthSummary';
@@ -36,14 +36,15 @@ test('says what to do first, and since when', () => {
   act(() => {
     receive({ type: 'alarms', alarms: alarms([], { source: 'starting' }) });
   });
-  expect(house().textContent).not.toContain('no alarm yet');
+  expect(house().textContent).not.toContain('second scan');
   act(() => {
     tellAlarms(alarm('a', { tag_id: '5', raised: 100, reason: pest }));
   });
   const todo = screen.getByRole('list', { name: 'Do this now' });
   expect([...todo.children].map(({ textContent }) => textContent)).toEqual([
     expect.stringMatching(/^CriticalTag 5: 2 pests seenInspect and treat the plants since /),
-    'CriticalTag 1: Pest seenInspect and treat the plants no alarm yet',
+    // One inspection raises an alarm: it waits for no second one.
+    'CriticalTag 1: Pest seenInspect and treat the plants ',
   ]);
   act(() => {
     acknowledgeAlarms(calling(alarmList.get()));
@@ -54,7 +55,7 @@ test('says what to do first, and since when', () => {
     expect.stringMatching(/^CriticalTag 5: .*treat the plants acknowledged/),
   ]);
   // Not before what is worse, of one tag and of many; last is what is back in its range.
-  const back = reason({ verdict: 'stressed', value: 18.1, limit: 18.5 });
+  const back = reason({ verdict: 'stressed', value: 18.1, limit: 18, ...held(18.5) });
   const failed = reason({ kind: 'scan_failed', verdict: 'unknown', sensor: '', value: 1 });
   const tags = ['1', '2', '5'].map((tag_id) => wireTag({ tag_id }));
   act(() => {
@@ -118,7 +119,7 @@ test('that it is too cold is not shelved with that it was too warm', () => {
     showTags(TAGS, judgement({ 1: 'healthy', 5: [reason()] }));
     tellAlarms(alarm('warm', { tag_id: '5', reason: warm }));
   });
-  expect(todo.textContent).toMatch(/^CriticalTag 5: Temperature 6.6.*no alarm yet$/);
+  expect(todo.textContent).toMatch(/^CriticalTag 5: Temperature 6.6.*waiting for a second scan$/);
   stop();
 });
 
@@ -135,12 +136,12 @@ test('of a robot that stands still what is critical is told first', () => {
 });
 
 test('of what is back in its range nothing is ordered', () => {
-  const back = reason({ verdict: 'stressed', value: 18.1, limit: 18.5 });
+  const back = reason({ verdict: 'stressed', value: 18.1, limit: 18, ...held(18.5) });
   showTags(TAGS, judgement({ 1: 'healthy', 5: [back] }));
   render(<HealthSummary kiosk={false} />);
   const todo = screen.getByRole('list', { name: 'Do this now' });
   expect(todo.textContent.trim()).toBe(
-    'StressedTag 5: Temperature 18.1\u00a0°C, back in range; clears above 18.5',
+    'StressedTag 5: Temperature 18.1\u00a0°C, was below 18.0; stays stressed until 18.5',
   );
 });
 

@@ -1,10 +1,9 @@
 import type { JSX } from 'react';
 
-import { alarmOf } from '../alarms/list';
+import { alarmOf, isAwaited } from '../alarms/list';
 import { alarmList } from '../alarms/watch';
 import type { HealthReason, TagHealth } from '../contract/types';
 import { ageSeconds } from '../domain/age';
-import { isBad } from '../domain/health';
 import { reasonText, todoText } from '../domain/reasons';
 import { whenOf } from '../domain/twin';
 import { useApp, type AppState } from '../store/app';
@@ -63,14 +62,13 @@ export function Reasons({
 
 /** What to do about a reason, and that it has no alarm yet; of what is shelved, nothing. */
 function Todo({ tagId, reason }: { tagId: string; reason: HealthReason }): JSX.Element | null {
-  const catalogue = useApp(selectCatalogue);
   const { active, shelved } = useSelected(alarmList, (list) => list);
   const isKnown = useApp(selectAreAlarmsKnown);
   if (alarmOf(shelved, tagId, reason)) return null;
-  const isWaiting = isKnown && isBad(reason.verdict) && !alarmOf(active, tagId, reason);
+  const isWaiting = isKnown && isAwaited(reason) && !alarmOf(active, tagId, reason);
   return (
     <span>
-      <strong>{todoText(catalogue, reason)}</strong>{' '}
+      <strong>{todoText(reason)}</strong>{' '}
       {isWaiting && <small className="faint">{S.alarmNotYet}</small>}
     </span>
   );

@@ -2,7 +2,7 @@ import { fireEvent, render, screen } from '@testing-library/react';
 import { beforeEach, describe, expect, test, vi } from 'vitest';
 
 import { act, receive, store } from '../store/app';
-import { judgement, reason } from '../testing/health';
+import { held, judgement, reason } from '../testing/health';
 import { showTags } from '../testing/page';
 import { readings, stateFrame, wireTag } from '../testing/tags';
 import { TagCard } from './TagCard';
@@ -84,8 +84,8 @@ describe('card', () => {
   });
 
   test('what is back in its range is on no side of it, neither here nor in the table', () => {
-    const back = reason({ verdict: 'stressed', value: 17.99, limit: 18.5 });
-    const tags = [wireTag({ tag_id: '7', readings: readings({ temperature: 17.99 }) })];
+    const back = reason({ verdict: 'stressed', value: 18.1, limit: 18, ...held(18.5) });
+    const tags = [wireTag({ tag_id: '7', readings: readings({ temperature: 18.1 }) })];
     showTags(tags, judgement({ 7: [back] }));
     render(
       <>
@@ -93,7 +93,9 @@ describe('card', () => {
         <TagTable />
       </>,
     );
-    expect(screen.getAllByText(/back in range; clears above 18\.5/).length).toBeGreaterThan(0);
+    expect(
+      screen.getAllByText(/was below 18\.0; stays stressed until 18\.5/).length,
+    ).toBeGreaterThan(0);
     const ideal = document.querySelector<HTMLElement>('.card-ideal');
     expect(ideal?.textContent).toMatch(/^ideal/);
     expect(ideal?.dataset['health']).toBeUndefined();

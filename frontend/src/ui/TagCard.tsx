@@ -220,7 +220,7 @@ function CardReading({
   const sensor = useApp((state) => selectCatalogue(state).named(name));
   const { ideal } = rangesFor(sensor, species);
   const reason = rangeReason(health, name);
-  const out = reason && !isBack(sensor, reason) ? reason : null;
+  const out = reason && !isBack(reason) ? reason : null;
   const side = out && sideOf(out);
   const step = useAgeStep(when);
   return (

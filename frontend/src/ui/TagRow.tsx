@@ -234,7 +234,7 @@ function Reading({
     );
   }
   const reason = rangeReason(health, sensor.name);
-  const beyond = reason && !isBack(sensor, reason) ? beyondText(catalogue, reason, unit) : null;
+  const beyond = reason && !isBack(reason) ? beyondText(catalogue, reason, unit) : null;
   return (
     <>
       {reason && beyond !== null && (

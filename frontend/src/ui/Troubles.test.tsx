@@ -58,7 +58,7 @@ test('what the twin dropped is told with its count, and a pause as one', () => {
   render(<Troubles />);
   expect(lines()).toEqual([
     'Time is paused. The simulation or recording is paused, so ages do not increase.',
-    'The twin dropped 12 messages in the last minutes. The last: frame odom, expected map',
+    'The twin dropped 12 messages in the last few minutes. The last: frame odom, expected map',
   ]);
 });
 
@@ -93,7 +93,7 @@ const journal = (over: Partial<Journal>): void => {
 };
 
 test.each([
-  ['failing', 'Nothing is being recorded.', /Database or disk is full\. The twin keeps running/],
+  ['failing', 'Recording has failed.', /Database or disk is full\. The twin keeps running/],
   ['slow', 'Recording is behind.', /Data waits in memory/],
   ['upgrading', 'The recording of an older version is being upgraded.', /which may take minutes/],
   [

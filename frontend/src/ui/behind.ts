@@ -6,6 +6,7 @@ import '../styles/card.css';
 import '../styles/hover.css';
 import '../styles/timebar.css';
 import '../styles/alarms.css';
+import '../styles/alarm-rows.css';
 import '../styles/row-menu.css';
 import '../styles/attention.css';
 import '../styles/comments.css';

@@ -101,7 +101,7 @@ const LANGUAGES: Readonly<Record<'en' | 'de', Language>> = {
       old: /gemessen|kein Messwert|[Kk]eine Messung/,
       changed: /verändert/,
       silent: /Keine Daten vom digitalen Zwilling/,
-      stopped: /kein Messpunkt mehr gemessen/,
+      stopped: /nichts mehr gemessen/,
     },
     alarms: {
       range: /(unter|über) \d/,
@@ -109,7 +109,7 @@ const LANGUAGES: Readonly<Record<'en' | 'de', Language>> = {
     },
     tag: 'Messpunkt 1',
     house: 'Ganzes Gewächshaus',
-    most: /Mehr als die Hälfte/,
+    most: /mehr als der Hälfte/,
   },
 };
 

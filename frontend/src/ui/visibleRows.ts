@@ -66,7 +66,7 @@ export function useVisibleRows(
     ...rangeInSight(0, USUAL_HEIGHT, window.innerHeight),
     rowHeight: USUAL_HEIGHT,
   }));
-  const [isPaper, setPaper] = useState(false);
+  const isPaper = usePaper();
   const isLong = count > SHORT_TABLE;
 
   useEffect(() => {
@@ -98,6 +98,14 @@ export function useVisibleRows(
     };
   }, [body, isLong]);
 
+  if (!isLong) return { from: 0, to: count, rowHeight: 0 };
+  if (isPaper) return { from: 0, to: LONGEST_ON_PAPER, rowHeight: 0 };
+  return sight;
+}
+
+/** Whether the page is on its way to the printer. */
+export function usePaper(): boolean {
+  const [isPaper, setPaper] = useState(false);
   useEffect(() => {
     const onPrint = ({ type }: Event): void => {
       // Not with the next frame: a page on its way to the printer gets none.
@@ -112,8 +120,5 @@ export function useVisibleRows(
       window.removeEventListener('afterprint', onPrint);
     };
   }, []);
-
-  if (!isLong) return { from: 0, to: count, rowHeight: 0 };
-  if (isPaper) return { from: 0, to: LONGEST_ON_PAPER, rowHeight: 0 };
-  return sight;
+  return isPaper;
 }

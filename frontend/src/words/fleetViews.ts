@@ -4,14 +4,13 @@ import type { In } from './shape';
 
 const ENGLISH = {
   wasLive: 'last known',
-  acknowledged: (name: string, at: string): string => `acknowledged by ${name} at ${at}`,
+  acknowledged: (name: string, at: string): string => `acknowledged by ${name}, ${at}`,
   shelved: (name: string, until: string): string => `shelved by ${name} until ${until}`,
-  moreAlarms: (count: number): string =>
-    `${count} more: the pages of the greenhouses have all of them.`,
+  moreAlarms: (count: number): string => `${count} more: see the pages of the greenhouses.`,
   deviation: 'Deviation',
   deviationHint: 'How far a greenhouse is from the median of all, on average.',
   median: 'Median of all; band: the middle half',
-  draw: (site: string): string => `Draw ${site}`,
+  draw: (site: string): string => `Show ${site}`,
   someCompared: (count: number, all: number): string =>
     `${count} of ${all} greenhouses are compared, the worst first. Search, or choose a group.`,
   notFetched: (reason: string): string => `This could not be fetched: ${reason}`,
@@ -22,7 +21,7 @@ const ENGLISH = {
   notes: 'Notes',
   activeAlarms: 'Alarms now',
   completeTo: 'Complete up to',
-  wholeHours: 'Counted in whole hours. Follow a name for the report of that greenhouse.',
+  wholeHours: 'Counted in whole hours. Click a name for the report of that greenhouse.',
   newestNotes: 'Newest notes',
   kinds: { acknowledge: 'alarm acknowledged', shelve: 'alarm shelved' },
   withdrawn: (name: string): string => `withdrawn by ${name}`,
@@ -30,13 +29,13 @@ const ENGLISH = {
 
 const GERMAN: In<typeof ENGLISH> = {
   wasLive: 'zuletzt bekannt',
-  acknowledged: (name, at) => `quittiert von ${name} um ${at}`,
+  acknowledged: (name, at) => `quittiert von ${name}, ${at}`,
   shelved: (name, until) => `zurückgestellt von ${name} bis ${until}`,
-  moreAlarms: (count) => `${count} weitere: Alle stehen auf den Seiten der Gewächshäuser.`,
+  moreAlarms: (count) => `${count} weitere: siehe die Seiten der Gewächshäuser.`,
   deviation: 'Abweichung',
   deviationHint: 'Wie weit ein Gewächshaus im Mittel vom Median aller entfernt ist.',
   median: 'Median aller; Band: die mittlere Hälfte',
-  draw: (site) => `${site} zeichnen`,
+  draw: (site) => `${site} anzeigen`,
   someCompared: (count, all) =>
     `${count} von ${all} Gewächshäusern werden verglichen, die schlimmsten zuerst. Suchen Sie, oder wählen Sie eine Gruppe.`,
   notFetched: (reason) => `Das ließ sich nicht abrufen: ${reason}`,
@@ -47,7 +46,7 @@ const GERMAN: In<typeof ENGLISH> = {
   notes: 'Notizen',
   activeAlarms: 'Alarme jetzt',
   completeTo: 'Vollständig bis',
-  wholeHours: 'In vollen Stunden gezählt. Der Name führt zum Bericht des Gewächshauses.',
+  wholeHours: 'Gezählt in vollen Stunden. Der Name führt zum Bericht des Gewächshauses.',
   newestNotes: 'Neueste Notizen',
   kinds: { acknowledge: 'Alarm quittiert', shelve: 'Alarm zurückgestellt' },
   withdrawn: (name) => `zurückgenommen von ${name}`,
@@ -55,13 +54,13 @@ const GERMAN: In<typeof ENGLISH> = {
 
 const DUTCH: In<typeof ENGLISH> = {
   wasLive: 'laatst bekend',
-  acknowledged: (name, at) => `bevestigd door ${name} om ${at}`,
+  acknowledged: (name, at) => `bevestigd door ${name}, ${at}`,
   shelved: (name, until) => `uitgesteld door ${name} tot ${until}`,
-  moreAlarms: (count) => `Nog ${count}: de pagina's van de kassen hebben ze allemaal.`,
+  moreAlarms: (count) => `Nog ${count}: zie de pagina’s van de kassen.`,
   deviation: 'Afwijking',
   deviationHint: 'Hoe ver een kas gemiddeld van de mediaan van alle kassen ligt.',
   median: 'Mediaan van alle; band: de middelste helft',
-  draw: (site) => `${site} tekenen`,
+  draw: (site) => `${site} tonen`,
   someCompared: (count, all) =>
     `${count} van ${all} kassen worden vergeleken, de slechtste eerst. Zoek, of kies een groep.`,
   notFetched: (reason) => `Dit kon niet worden opgehaald: ${reason}`,
@@ -72,7 +71,7 @@ const DUTCH: In<typeof ENGLISH> = {
   notes: 'Notities',
   activeAlarms: 'Alarmen nu',
   completeTo: 'Volledig tot',
-  wholeHours: 'In hele uren geteld. De naam leidt naar het rapport van de kas.',
+  wholeHours: 'Geteld per heel uur. Klik op een naam voor het rapport van die kas.',
   newestNotes: 'Nieuwste notities',
   kinds: { acknowledge: 'alarm bevestigd', shelve: 'alarm uitgesteld' },
   withdrawn: (name) => `ingetrokken door ${name}`,
@@ -80,13 +79,13 @@ const DUTCH: In<typeof ENGLISH> = {
 
 const SPANISH: In<typeof ENGLISH> = {
   wasLive: 'último dato',
-  acknowledged: (name, at) => `reconocida por ${name} a las ${at}`,
+  acknowledged: (name, at) => `reconocida por ${name}, ${at}`,
   shelved: (name, until) => `aplazada por ${name} hasta ${until}`,
-  moreAlarms: (count) => `${count} más: las páginas de los invernaderos las tienen todas.`,
+  moreAlarms: (count) => `${count} más: vea las páginas de los invernaderos.`,
   deviation: 'Desviación',
   deviationHint: 'Cuánto se aleja un invernadero de la mediana de todos, en promedio.',
   median: 'Mediana de todos; banda: la mitad central',
-  draw: (site) => `Dibujar ${site}`,
+  draw: (site) => `Mostrar ${site}`,
   someCompared: (count, all) =>
     `Se comparan ${count} de ${all} invernaderos, los peores primero. Busque o elija un grupo.`,
   notFetched: (reason) => `No se pudo obtener: ${reason}`,
@@ -97,7 +96,7 @@ const SPANISH: In<typeof ENGLISH> = {
   notes: 'Notas',
   activeAlarms: 'Alarmas ahora',
   completeTo: 'Completo hasta',
-  wholeHours: 'Se cuenta por horas enteras. El nombre lleva al informe de ese invernadero.',
+  wholeHours: 'Recuento por horas enteras. Pulse un nombre para ver el informe de ese invernadero.',
   newestNotes: 'Notas más recientes',
   kinds: { acknowledge: 'alarma reconocida', shelve: 'alarma aplazada' },
   withdrawn: (name) => `retirada por ${name}`,

@@ -89,25 +89,28 @@ def test_scanned_once_a_tag_has_a_day_as_it_has_for_alarms() -> None:
 
 
 def test_a_value_that_wobbles_about_a_limit_flaps_at_no_scan() -> None:
-    """From 18 to 26 the deadband is 0.4: what has been out is so until it lies further within."""
+    """From 18 to 26 the deadband is 0.4: what has been out is so until it lies further within.
+
+    The limit stays the configured one; beside it stands what ends it.
+    """
     judge = Judge(SENSORS, by_light)
     found = []
     for number, value in enumerate((25.9, 26.1, 25.9, 26.1, 25.61, 25.6, 25.9, 35.1, 34.9, 34.5)):
         at_ns = START + number * MINUTE
         health = judge.see(snapshot(at_ns, tag("a", at_ns, temperature=value))).tags["a"]
-        found.append((health.verdict, *(reason.limit for reason in health.reasons)))
+        found.append((health.verdict, *((it.limit, it.release) for it in health.reasons)))
     stressed, critical = Verdict.STRESSED, Verdict.CRITICAL
     assert found == [
         (Verdict.HEALTHY,),
-        (stressed, 26.0),
-        (stressed, 25.6),
-        (stressed, 26.0),
-        (stressed, 25.6),
+        (stressed, (26.0, None)),
+        (stressed, (26.0, 25.6)),
+        (stressed, (26.0, None)),
+        (stressed, (26.0, 25.6)),
         (Verdict.HEALTHY,),
         (Verdict.HEALTHY,),
-        (critical, 35.0),
-        (critical, 34.6),
-        (stressed, 26.0),
+        (critical, (35.0, None)),
+        (critical, (35.0, 34.6)),
+        (stressed, (26.0, None)),
     ]
 
 

@@ -52,6 +52,15 @@ def test_it_is_of_the_contracts_type_to_the_last_field() -> None:
     }
 
 
+def test_what_only_the_deadband_holds_names_its_limit_and_what_ends_it() -> None:
+    """From 18 to 26 °C the deadband is 0.4."""
+    judge = Judge(SENSORS, by_light)
+    see(judge, START, [tag("a", 17.9)])
+    text = HealthJson().whole(see(judge, START + 1, [tag("a", 18.1, START + 1)]))
+    (reason,) = schema.Judgement.model_validate_json(text, strict=True).tags["a"].reasons
+    assert (reason.limit, reason.release) == (18.0, 18.4)
+
+
 def test_of_a_silent_house_it_says_so() -> None:
     judged = silenced(see(Judge(SENSORS, by_light), START, [tag("a", 22.0)]))
     body = schema.Judgement.model_validate_json(HealthJson().whole(judged), strict=True)

@@ -4,10 +4,9 @@ import { isWorse } from '../../alarms/kept';
 import type { Item } from '../../alarms/list';
 import type { Now } from '../../alarms/now';
 import { selectNow, selectSpeech } from '../../alarms/speech';
-import { spanText, unknownText, valuesOf, type Values } from '../../alarms/words';
+import { spanText, timesOf, unknownText, valuesOf, type Values } from '../../alarms/words';
 import type { Alarm, Verdict } from '../../contract/types';
 import { ageSeconds } from '../../domain/age';
-import { clockText } from '../../domain/format';
 import { differenceShown } from '../../domain/trend';
 import { store, useApp } from '../../store/app';
 import { useSelected } from '../../store/create';
@@ -32,50 +31,61 @@ export function useValues(alarm: Alarm): ValuesNow {
   return { ...valuesOf(alarm, speech, state), state };
 }
 
-/** How bad it is now and was at worst, since when, and until when it is shelved: in one line, if it has room. */
+/** For how long, and how bad it is; the day that it began on, if it is another, or when it was resolved. */
+export function AlarmTimes({
+  alarm,
+  first,
+  verdict,
+  isOver = false,
+}: {
+  alarm: Alarm;
+  first: string | null;
+  verdict: Verdict;
+  isOver?: boolean;
+}): JSX.Element {
+  const nowOf = (at: number): number | null => rosNow(store.get(), at);
+  const span = useTicking((at) => spanText(alarm, nowOf(at)));
+  const length = useTicking((at) => timesOf(alarm, nowOf(at), isOver).length);
+  const note = useTicking((at) => timesOf(alarm, nowOf(at), isOver).note);
+  return (
+    <span
+      className="alarm-times"
+      data-fact="since"
+      title={[span, first].filter((text) => text !== null).join(', ')}
+    >
+      <span>
+        {length} <small className="faint">{note}</small>
+      </span>
+      <HealthMark verdict={verdict} />
+    </span>
+  );
+}
+
+/** How it is now, and how it was at worst: a column each. */
 export function AlarmFacts({
-  item: { alarm, verdict, shelf },
-  values: { state, now: current, worst, first },
-  isShelved,
+  item: { alarm, verdict },
+  values: { state, now: current, worst },
 }: {
   item: Item;
   values: ValuesNow;
-  isShelved: boolean;
 }): JSX.Element {
-  const span = useTicking((at) => spanText(alarm, rosNow(store.get(), at)));
   return (
     <>
-      {isShelved && shelf && (
-        <span className="alarm-facts faint">
-          {S.alarmShelved(clockText(shelf.until), shelf.reason, alarm.shelved_by ?? '')}
-        </span>
+      {state?.kind === 'known' && current !== null && (
+        <Fact name="now" verdict={state.verdict} text={current}>
+          {state.value !== null && state.trend !== null && <Trend alarm={alarm} by={state.trend} />}
+        </Fact>
       )}
-      <span className="alarm-values">
-        {state?.kind === 'known' && current !== null && (
-          <Fact name="now" verdict={state.verdict} text={current}>
-            {state.value !== null && state.trend !== null && (
-              <Trend alarm={alarm} by={state.trend} />
-            )}
-          </Fact>
-        )}
-        {state?.kind === 'unknown' && <NotKnown alarm={alarm} state={state} />}
-        {worst !== null && (
-          <Fact
-            name="worst"
-            verdict={
-              state?.kind === 'known' && isWorse(state.verdict, verdict) ? state.verdict : verdict
-            }
-            text={worst}
-          />
-        )}
-        <span
-          className="faint"
-          data-fact="since"
-          title={[span, first].filter((text) => text !== null).join(', ')}
-        >
-          {span}
-        </span>
-      </span>
+      {state?.kind === 'unknown' && <NotKnown alarm={alarm} state={state} />}
+      {worst !== null && (
+        <Fact
+          name="worst"
+          verdict={
+            state?.kind === 'known' && isWorse(state.verdict, verdict) ? state.verdict : verdict
+          }
+          text={worst}
+        />
+      )}
     </>
   );
 }
@@ -93,7 +103,7 @@ function Fact({
 }): JSX.Element {
   return (
     <span data-fact={name} data-status={verdict} title={text}>
-      {/* That of now is the row's own mark. */}
+      {/* That of now is the row's own. */}
       {name === 'worst' && <HealthMark verdict={verdict} word={false} />} {text}
       {children && <> {children}</>}
     </span>

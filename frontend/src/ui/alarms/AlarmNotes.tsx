@@ -1,10 +1,9 @@
 import { useMemo, type JSX } from 'react';
 
 import { epochOf } from '../../clock';
-import { alarmOf } from '../../alarms/list';
+import { alarmOf, isAwaited } from '../../alarms/list';
 import { alarmList } from '../../alarms/watch';
 import { clockText } from '../../domain/format';
-import { isBad, worstReason } from '../../domain/health';
 import { rosText, secondsOf } from '../../domain/rostime';
 import { useApp, type AppState } from '../../store/app';
 import { useSelected } from '../../store/create';
@@ -12,15 +11,15 @@ import { selectNewestHealth } from '../../store/derived';
 import { selectNewest, selectShown } from '../../store/moment';
 import { S } from '../../strings';
 
-/** At how many tags something is wrong that has no alarm yet; null: none, or nobody knows. */
+/** At how many tags something waits for a second scan; null: none, or nobody knows. */
 export function AlarmsWait(): JSX.Element | null {
   const isKnown = useApp(selectIsKnown);
   const listed = useSelected(alarmList, (it) => it);
   const health = useApp(selectNewestHealth);
   const waiting = useMemo(() => {
     const all = [...listed.active, ...listed.shelved];
-    return [...(health?.byTag ?? [])].filter(
-      ([id, own]) => isBad(own.verdict) && !alarmOf(all, id, worstReason(own)),
+    return [...(health?.byTag ?? [])].filter(([id, { reasons }]) =>
+      reasons.some((each) => isAwaited(each) && !alarmOf(all, id, each)),
     ).length;
   }, [listed, health]);
   if (!isKnown || waiting === 0) return null;

@@ -10,15 +10,22 @@ import {
   type Block,
   type Order,
 } from '../../alarms/arrange';
-import { calling, groupOf, unacknowledged, type AlarmList, type Item } from '../../alarms/list';
+import {
+  calling,
+  groupOf,
+  oldestOf,
+  unacknowledged,
+  type AlarmList,
+  type Item,
+} from '../../alarms/list';
 import { acknowledgeAlarms } from '../../alarms/own';
 import { selectNow, selectSpeech, todoNow, worstNow, worstNowFirst } from '../../alarms/speech';
 import { alarmList } from '../../alarms/watch';
-import { now, timeOfDay } from '../../clock';
+import { timeOfDay } from '../../clock';
 import { fileName, save } from '../../export/save';
 import { store, useApp } from '../../store/app';
 import { useSelected } from '../../store/create';
-import { rosNow, selectNewestTag } from '../../store/moment';
+import { selectNewestTag } from '../../store/moment';
 import { mayAct, person } from '../../store/signals';
 import { LONGEST_FILTER } from '../../store/view';
 import { S } from '../../strings';
@@ -26,9 +33,11 @@ import { Disclosure } from '../../widgets/Disclosure';
 import { Icon } from '../../widgets/Icon';
 import { Select } from '../../widgets/Select';
 import { useChosenInSight } from '../chosenInSight';
+import { usePaper } from '../visibleRows';
 import { HealthMark } from '../HealthMark';
 import { Acknowledge } from './Acknowledge';
 import { AlarmNotes, AlarmsWait } from './AlarmNotes';
+import { AlarmTimes } from './AlarmFacts';
 import { AlarmRow } from './AlarmRow';
 import { DoneLine } from './DoneLine';
 import { ALARMS_ID, ListChoice } from './ListChoice';
@@ -37,7 +46,8 @@ import { TellMe } from './TellMe';
 import { useHeldOrder } from './useHeldOrder';
 import { WhoseWord } from './WhoseWord';
 
-/** Rows of one block at first, and so many more with each wish for more. */
+/** Rows of one cause at first; of others, and with each wish for more, as many as a page draws at once. */
+const MOST_OF_CAUSE = 5;
 const MOST_ROWS = 100;
 
 const isTag = (id: string): boolean => selectNewestTag(store.get(), id) !== undefined;
@@ -151,18 +161,15 @@ export function AlarmPanel(): JSX.Element {
         {(['active', 'shelved', 'resolved'] as const).map((name) => (
           <Fragment key={name}>
             {seen[name].length > 0 && (
-              <section data-group={name}>
-                <h3>
-                  {S.alarmGroups[name](
-                    filter === ''
-                      ? String(all[name].length)
-                      : `${counted[name].length}/${all[name].length}`,
-                  )}
-                </h3>
-                {arranged(seen[name], order, speech).map((block) => (
-                  <Rows key={block.key} block={block} group={name} />
-                ))}
-              </section>
+              <Group
+                name={name}
+                count={
+                  filter === ''
+                    ? String(all[name].length)
+                    : `${counted[name].length}/${all[name].length}`
+                }
+                blocks={arranged(seen[name], order, speech)}
+              />
             )}
             {/* Below the rows: it comes and goes. */}
             {name === 'active' && hasAny && <AlarmsWait />}
@@ -174,6 +181,41 @@ export function AlarmPanel(): JSX.Element {
   );
 }
 
+/** What is resolved is opened by its heading: nothing has to be done about it. */
+function Group({
+  name,
+  count,
+  blocks,
+}: {
+  name: keyof AlarmList;
+  count: string;
+  blocks: readonly Block[];
+}): JSX.Element {
+  const [isOpen, setOpen] = useState(name !== 'resolved');
+  const heading = S.alarmGroups[name](count);
+  return (
+    <section data-group={name}>
+      <h3>
+        {name === 'resolved' ? (
+          <button
+            type="button"
+            className="text-button"
+            aria-expanded={isOpen}
+            onClick={() => {
+              setOpen(!isOpen);
+            }}
+          >
+            {heading} <Icon name="chevron" />
+          </button>
+        ) : (
+          heading
+        )}
+      </h3>
+      {isOpen && blocks.map((block) => <Rows key={block.key} block={block} group={name} />)}
+    </section>
+  );
+}
+
 /** Alarms in a row; many of one cause are opened by their heading. */
 function Rows({
   block: { cause, items },
@@ -182,8 +224,11 @@ function Rows({
   block: Block;
   group: keyof AlarmList;
 }): JSX.Element {
-  const [most, setMost] = useState(MOST_ROWS);
+  const [wished, setMost] = useState(cause === null ? MOST_ROWS : MOST_OF_CAUSE);
   const [isOpen, setOpen] = useState(false);
+  // Nobody opens anything on paper.
+  const isPaper = usePaper();
+  const most = isPaper ? items.length : wished;
   const rest = items.length - most;
   return (
     <>
@@ -198,7 +243,7 @@ function Rows({
           }}
         />
       )}
-      {(isOpen || cause === null) && (
+      {(isOpen || isPaper || cause === null) && (
         <>
           <ul data-caused={cause !== null}>
             {items.slice(0, most).map((item) => (
@@ -208,12 +253,12 @@ function Rows({
           {rest > 0 && (
             <button
               type="button"
-              className="text-button"
+              className="text-button alarm-more"
               onClick={() => {
                 setMost(most + MOST_ROWS);
               }}
             >
-              {S.alarmMore(Math.min(rest, MOST_ROWS))}
+              {S.attentionMore(Math.min(rest, MOST_ROWS))}
             </button>
           )}
         </>
@@ -239,31 +284,39 @@ function CauseHeading({
   const speech = useApp(selectSpeech);
   // While the order is held, others may still stand here.
   const own = items.filter((item) => groupOf(item) === group);
-  const facts = useApp((state) => {
-    const nowS = rosNow(state, now());
-    return causeFacts(own, speech, nowS, (alarm) => selectNow(state, alarm)).join(', ');
-  });
+  // As a text: what does not change it renders nothing anew.
+  const facts = useApp((state) =>
+    causeFacts(own, speech, (alarm) => selectNow(state, alarm)).join('\n'),
+  );
+  const [counts, current, worst] = facts.split('\n');
   const shown = own.length > 0 ? own : items;
   const verdict = useApp((state) => worstNow(state, shown));
   const todo = useApp((state) => todoNow(state, shown));
   if (!verdict) return null;
   const waiting = unacknowledged(own);
+  const oldest = group === 'resolved' ? undefined : oldestOf(shown);
   const tags = [...new Set(items.map(({ alarm }) => alarm.tag_id))].filter(Boolean);
   return (
     <div className="alarm-cause" data-cause={cause} data-health={verdict}>
       <button type="button" className="alarm-go" aria-expanded={isOpen} onClick={onToggle}>
-        <HealthMark verdict={verdict} word={false} />
+        {oldest ? (
+          <AlarmTimes alarm={oldest} first={null} verdict={verdict} />
+        ) : (
+          <HealthMark verdict={verdict} />
+        )}
         <span className="alarm-text">
-          <span className="alarm-what">
-            <span>
-              <strong>{cause}</strong> · {S.alarmCount(own.length)}
+          <span>
+            <strong>{cause}</strong> ·{' '}
+            <span className="alarm-many">
+              {S.alarmCount(own.length)} <Icon name="chevron" />
             </span>
-            {group !== 'resolved' && <span className="alarm-do">{todo}</span>}
           </span>
-          <span className="alarm-facts">{facts}</span>
+          {group !== 'resolved' && <span className="alarm-do">{todo}</span>}
+          <span className="alarm-facts">{counts}</span>
           <span className="alarm-facts faint">{tagsText(tags)}</span>
         </span>
-        <Icon name="chevron" />
+        <span data-fact="now">{current}</span>
+        <span data-fact="worst">{worst}</span>
       </button>
       {group !== 'shelved' && (
         <div className="alarm-tools">

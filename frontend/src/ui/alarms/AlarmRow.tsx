@@ -9,14 +9,13 @@ import { clockText } from '../../domain/format';
 import { Said } from '../../notes/Comments';
 import { useApp } from '../../store/app';
 import { S } from '../../strings';
-import { HealthMark } from '../HealthMark';
 import { Acknowledge } from './Acknowledge';
-import { AlarmFacts, useValues } from './AlarmFacts';
+import { AlarmFacts, AlarmTimes, useValues } from './AlarmFacts';
 import { once } from './once';
 import { RowMenu } from './RowMenu';
 import { useWhoAcknowledged } from './WhoseWord';
 
-/** One alarm: what, where, how bad now and at worst, since when; it leads to its tag as it is now. */
+/** One alarm: for how long, what and where, now and at worst; it leads to its tag as it is now. */
 export const AlarmRow = memo(function AlarmRow({
   item,
   group,
@@ -50,25 +49,38 @@ export const AlarmRow = memo(function AlarmRow({
           showAlarm(alarm);
         })}
       >
-        <HealthMark verdict={current} word={false} />
+        <AlarmTimes
+          alarm={alarm}
+          first={values.first}
+          verdict={current}
+          // Meanwhile, a row that is held gets no line more.
+          isOver={group === 'resolved'}
+        />
         <span className="alarm-text">
-          <span className="alarm-what">
-            <span>
-              <strong>
-                <bdi>{whereText(alarm)}</bdi>
-              </strong>
-              {': '}
-              {values.what}
-            </span>
-            {shelf?.reason && <q className="faint">{shelf.reason}</q>}
-            {!shelf && group !== 'resolved' && (
-              <span className="alarm-do" data-again={current === 'healthy' || undefined}>
-                {values.todo}
-              </span>
-            )}
+          <span>
+            <strong>
+              <bdi>{whereText(alarm)}</bdi>
+            </strong>
+            {': '}
+            {values.what}
           </span>
-          <AlarmFacts item={item} values={values} isShelved={group === 'shelved'} />
+          {shelf?.reason && <q className="faint">{shelf.reason}</q>}
+          {!shelf && group !== 'resolved' && (
+            <span className="alarm-do" data-again={current === 'healthy' || undefined}>
+              {values.todo}
+            </span>
+          )}
+          {group === 'shelved' && item.shelf && (
+            <span className="alarm-facts faint">
+              {S.alarmShelved(
+                clockText(item.shelf.until),
+                item.shelf.reason,
+                alarm.shelved_by ?? '',
+              )}
+            </span>
+          )}
         </span>
+        <AlarmFacts item={item} values={values} />
       </button>
       <div className="alarm-tools">
         <Acknowledge

@@ -6,7 +6,7 @@ import { acknowledgeAlarms, own, shelveAlarm } from '../../alarms/own';
 import { alarmList, startAlarms } from '../../alarms/watch';
 import { person } from '../../store/signals';
 import { alarm, tellAlarms } from '../../testing/alarms';
-import { judgement, reason } from '../../testing/health';
+import { held, judgement, reason } from '../../testing/health';
 import { showTags } from '../../testing/page';
 import { readings, wireTag } from '../../testing/tags';
 import { Reasons } from '../Reasons';
@@ -73,22 +73,24 @@ test('of one alarm it says who has acknowledged it, and when', () => {
     acknowledgeAlarms(alarmList.get().active);
   });
   expect(screen.getByTestId('card-alarms').textContent).toMatch(
-    /^1 alarm: acknowledged by vera at sim 00:15:50 · since/,
+    /^1 alarm: acknowledged by vera, sim 00:15:50 · since/,
   );
 });
 
-test('of two reasons it is said which has no alarm yet', () => {
-  const pest = reason({ kind: 'pest', sensor: '', value: 2, limit: null });
-  render(<Reasons health={{ verdict: 'critical', reasons: [reason(), pest] }} todoAt="7" />);
+test('of two reasons it is said which waits for a second scan; what the deadband alone holds does not', () => {
+  const damp = reason({ sensor: 'humidity', value: 90, limit: 85 });
+  const back = reason({ sensor: 'co2', value: 1_450, limit: 1_500, ...held(1_400) });
+  render(<Reasons health={{ verdict: 'critical', reasons: [reason(), damp, back] }} todoAt="7" />);
   const lines = (): (string | null)[] =>
     [...screen.getByTestId('reasons').children].map(({ textContent }) => textContent);
-  expect(lines().filter((text) => text?.includes('no alarm yet'))).toEqual([]);
+  expect(lines().filter((text) => text?.includes('second scan'))).toEqual([]);
   flush(() => {
     tellAlarms(alarm('a', { tag_id: '7' }));
   });
   expect(lines()).toEqual([
     expect.stringMatching(/close the vents $/),
-    expect.stringMatching(/^2 pests seenInspect and treat the plants no alarm yet$/),
+    expect.stringMatching(/^Humidity 90.*waiting for a second scan$/),
+    expect.stringMatching(/^CO₂ 1,450.*CO₂ dosing $/),
   ]);
 });
 

@@ -1,13 +1,11 @@
 import type { JSX } from 'react';
 
-import { unacknowledged, type Item } from '../../alarms/list';
+import { oldestOf, unacknowledged, type Item } from '../../alarms/list';
 import { acknowledgeAlarms, unshelveAlarm } from '../../alarms/own';
 import { selectSpeech, todoNow, worstNow } from '../../alarms/speech';
 import { spanText, whatText } from '../../alarms/words';
 import { alarmList } from '../../alarms/watch';
-import type { Alarm } from '../../contract/types';
 import { clockText } from '../../domain/format';
-import { secondsOf } from '../../domain/rostime';
 import { store, useApp } from '../../store/app';
 import { useSelected } from '../../store/create';
 import { rosNow } from '../../store/moment';
@@ -16,8 +14,6 @@ import { S } from '../../strings';
 import { useTicking } from '../../widgets/useNow';
 import { once } from './once';
 import { useWhoAcknowledged } from './WhoseWord';
-
-const byTime = (a: Alarm, b: Alarm): number => secondsOf(a.raised_at) - secondsOf(b.raised_at);
 
 /** A tag's alarms: since when they are active, or until when shelved; for whoever stands at the tag. */
 export function CardAlarms({ tagId }: { tagId: string }): JSX.Element {
@@ -33,7 +29,7 @@ function Active({ tagId }: { tagId: string }): JSX.Element | null {
   const active = useSelected(alarmList, (list) => list.active);
   const items = active.filter(({ alarm }) => alarm.tag_id === tagId);
   const waiting = unacknowledged(items);
-  const [oldest] = items.map(({ alarm }) => alarm).sort(byTime);
+  const oldest = oldestOf(items);
   const since = useTicking((at) => (oldest ? spanText(oldest, rosNow(store.get(), at)) : ''));
   const well = useApp((state) =>
     worstNow(state, items) === 'healthy' ? todoNow(state, items) : '',

@@ -2,8 +2,10 @@ import { afterEach, beforeEach, expect, test, vi } from 'vitest';
 
 import { alarm, tellAlarms } from '../../testing/alarms';
 import { NOTHING_KEPT, whatOf } from '../../alarms/kept';
-import { acknowledgeAlarms, own, undo } from '../../alarms/own';
+import { acknowledgeAlarms, done, own, undo } from '../../alarms/own';
 import { person } from '../../store/signals';
+import { goLost } from '../../testing/page';
+import { toast } from '../toast';
 import { merged, startPeople, wordsFor } from './people';
 import { whoseWord } from './WhoseWord';
 
@@ -162,6 +164,18 @@ test('what the bridge refuses does not hold here either', async () => {
     expect(own.get().acknowledged.size).toBe(0);
   });
   expect(asked).toHaveLength(1);
+  expect([done.get(), toast.get()]).toEqual([null, expect.stringMatching(/^Not saved: /)]);
+});
+
+test('without a connection all are refused at once, as one is, and nothing looks done', async () => {
+  await signedIn();
+  const other = alarm('other', { tag_id: '2' });
+  tellAlarms(COLD, other);
+  goLost();
+  acknowledgeAlarms([COLD, other].map((each) => ({ alarm: each, verdict: 'critical' })));
+  expect([own.get().acknowledged.size, done.get()]).toEqual([0, null]);
+  expect(toast.get()).toBe('Not saved: The server is busy or unreachable.');
+  expect(asked).toEqual([]);
 });
 
 test('a shelf is said with its reason and its end by the clock of the twin', async () => {

@@ -14,10 +14,10 @@ import { createFetcher } from '../../store/fetcher';
 import { rosNow } from '../../store/moment';
 import { person } from '../../store/signals';
 import { say } from '../toast';
-import { LANGUAGE } from '../../strings';
+import { LANGUAGE, S } from '../../strings';
 import { PEOPLE } from '../../words/people';
 import { LONGEST_REASON, whatOf, type Kept } from '../../alarms/kept';
-import { acting, own } from '../../alarms/own';
+import { acting, done, own } from '../../alarms/own';
 
 export const P = PEOPLE[LANGUAGE];
 
@@ -45,8 +45,8 @@ export function merged(
     if (at) {
       isSame &&= acknowledged.has(id);
       if (!acknowledged.has(id)) acknowledged.set(id, { verdict, at: timeOfDay() });
-    } else {
-      isSame &&= !acknowledged.delete(id);
+    } else if (acknowledged.delete(id)) {
+      isSame = false;
     }
     if (alarm.cleared_at !== null) continue;
     const until = untilOf(alarm);
@@ -56,8 +56,8 @@ export function merged(
       isSame = false;
       const why = alarm.shelved_reason;
       shelved.set(what, { verdict, until, reason: why ? shown(why, LONGEST_REASON) : '' });
-    } else {
-      isSame &&= !shelved.delete(what);
+    } else if (shelved.delete(what)) {
+      isSame = false;
     }
   }
   return isSame ? kept : { ...kept, acknowledged, shelved };
@@ -109,19 +109,23 @@ async function tell(before: Kept, next: Kept): Promise<void> {
   const words = wordsFor(before, next, alarmsNow(), (until) =>
     nowS === null ? null : nowS + (until - at) / 1000,
   );
-  const { alarms } = store.get().twin;
-  let hasFailed = false;
+  const { alarms, phase } = store.get().twin;
+  // What nobody answers is not even sent: until it failed, it would look done.
+  let failure = phase === 'stale' || phase === 'reconnecting' ? S.serverBusy : null;
   pending += 1;
   try {
     // One behind the other, in the order of the list: of two words the later one stands.
-    for (const word of words) await word();
+    if (failure === null) for (const word of words) await word();
   } catch (error) {
-    hasFailed = true;
-    say(P.failed(failureText(error)));
+    failure = failureText(error);
   }
   pending -= 1;
+  if (failure !== null) {
+    say(P.failed(failure));
+    done.dispatch(null);
+  }
   // The frame that has them may come later than the answer: the one of before would take them back.
-  if (hasFailed || store.get().twin.alarms !== alarms) take();
+  if (failure !== null || store.get().twin.alarms !== alarms) take();
 }
 
 /** Asks who has signed in, on each connection anew; returns the way to stop. */

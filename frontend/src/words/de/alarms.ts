@@ -28,7 +28,7 @@ export const ALARMS: In<typeof ENGLISH> = {
       : `jetzt unbekannt, zuletzt ${last}${age === null ? '' : ` vor ${age}`}`,
   alarmPests: { none: 'keine festgestellt', seen: 'festgestellt' },
   alarmWorst: {
-    below: (reading) => `tiefster Wert ${reading}`,
+    below: (reading) => `niedrigster Wert ${reading}`,
     above: (reading) => `höchster Wert ${reading}`,
     pest: (reading) => `höchste Anzahl ${reading}`,
   },
@@ -42,7 +42,7 @@ export const ALARMS: In<typeof ENGLISH> = {
   alarmAcknowledgeAll: (count) => `Alle quittieren (${count})`,
   alarmUnacknowledge: 'Quittierung aufheben',
   alarmShelve: 'Zurückstellen',
-  alarmShelveHint: 'Bis dahin keine Meldung, außer der Alarm verschlimmert sich.',
+  alarmShelveHint: 'Bis dahin keine Meldung, außer es wird schlimmer.',
   alarmShelveCritical:
     'Ein Alarm, der kritisch ist oder war, lässt sich höchstens 1 h zurückstellen, und nur mit Begründung.',
   alarmShelfReason: 'Begründung',
@@ -62,7 +62,6 @@ export const ALARMS: In<typeof ENGLISH> = {
   },
   alarmsNew: (count) => `${count} neu`,
   alarmsNewHint: 'Die Reihenfolge bleibt, solange Sie die Liste benutzen. Neue Alarme anzeigen',
-  alarmMore: (count) => `${counted(count, 'weiteren', 'weitere')} anzeigen`,
   alarmFilter: 'Alarme filtern',
   alarmFilterHint: 'Filtern …',
   alarmOrder: 'Reihenfolge',
@@ -76,8 +75,8 @@ export const ALARMS: In<typeof ENGLISH> = {
   alarmsNoneHint:
     'Ein Alarm wird nach zwei auffälligen Messungen nacheinander ausgelöst, bei einem Schädling oder fehlenden Daten sofort.',
   alarmsWait: (tags) =>
-    `${counted(tags, 'Messpunkt', 'Messpunkte')} auffällig: Alarm erst, wenn die nächste Messung das bestätigt`,
-  alarmNotYet: 'noch kein Alarm',
+    `${counted(tags, 'Messpunkt wartet', 'Messpunkte warten')} auf eine zweite Messung: noch kein Alarm`,
+  alarmNotYet: 'wartet auf eine zweite Messung',
   alarmsNotYet: 'Warten auf die Liste der Alarme',
   alarmsStarting: 'Die Aufzeichnung wird noch gelesen: Weitere Alarme können folgen.',
   alarmsHeard: (since) => `Es wird nichts aufgezeichnet; Alarme vor ${since} sind nicht bekannt.`,
@@ -91,11 +90,11 @@ export const ALARMS: In<typeof ENGLISH> = {
   alarmSoundWaits: 'Der Browser erlaubt den Ton nach Ihrem ersten Klick auf dieser Seite.',
   alarmSoundNone: 'Dieser Browser kann keinen Ton abspielen.',
   alarmNotify: 'Benachrichtigung',
-  alarmNotifyHint: 'Der Browser meldet neue Alarme, während Sie etwas anderes ansehen.',
+  alarmNotifyHint: 'Der Browser meldet neue Alarme, auch wenn Sie gerade etwas anderes ansehen.',
   alarmNotifyInsecure:
     'Browser erlauben das nur bei Adressen, die mit https:// oder http://localhost beginnen.',
   alarmNotifyRefused:
-    'Dieser Browser blockiert Benachrichtigungen. Erlauben Sie sie für diese Seite in seinen Einstellungen.',
+    'Dieser Browser blockiert Benachrichtigungen. Bitte in seinen Einstellungen für diese Seite erlauben.',
   alarmNotifyNone: 'Dieser Browser unterstützt keine Benachrichtigungen.',
   alarmNotifyTitle: (count) => counted(count, 'neuer Alarm', 'neue Alarme'),
 

@@ -10,19 +10,18 @@ export const CHARTS: In<typeof ENGLISH> = {
   chartsByLegend: 'Was gezeigt wird',
   chartSpan: (from, to) => `${from} bis ${to}`,
   chartSummary: (count, latest, at, low, high, gaps) =>
-    `${counted(count, 'Messwert', 'Messwerte')}, der letzte ${latest} um ${at}, ` +
+    `${counted(count, 'Messwert', 'Messwerte')}, der letzte ${latest} (${at}), ` +
     `zwischen ${low} und ${high}, ${gaps === 0 ? 'keine Lücke' : counted(gaps, 'Lücke', 'Lücken')}.`,
   chartEmpty: 'Kein Messwert in diesem Zeitraum.',
-  chartLoading: 'Die Vergangenheit wird geladen',
+  chartLoading: 'Frühere Daten werden geladen',
   chartFailed: (reason) =>
-    `Die Vergangenheit konnte nicht geladen werden; die Seite versucht es weiter. ${reason}`,
+    `Frühere Daten konnten nicht geladen werden; die Seite versucht es weiter. ${reason}`,
   chartMissing: 'Dieser Zwilling zeichnet nichts auf.',
-  chartMissingHint:
-    'Verläufe brauchen eine Aufzeichnung. Bis dahin zeigt der Messpunkt nur seine letzten Messungen.',
+  chartMissingHint: 'Ohne Aufzeichnung gibt es keine Verläufe, nur die letzten Messungen.',
   chartMissingMore:
     'Den Zwilling ohne „journal:=off“ starten oder im Parameter „journal“ eine Datei nennen.',
   chartMissingShort: 'Kein Verlauf: Dieser Zwilling zeichnet nichts auf.',
-  chartNoTime: 'Der Zwilling kennt noch keine Uhrzeit; es gibt noch keine Vergangenheit.',
+  chartNoTime: 'Der Zwilling kennt noch keine Uhrzeit; es gibt noch keine früheren Daten.',
   chartIdealsDiffer: 'Idealbereiche je nach Art verschieden',
   chartNoSensors: 'Dieser Messpunkt hat keinen Sensor.',
   chartTable: 'Als Tabelle anzeigen',

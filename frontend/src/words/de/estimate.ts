@@ -7,7 +7,7 @@ export const ESTIMATE: In<typeof ENGLISH> = {
   about: 'Was ± bedeutet',
   aboutText:
     'Neun von zehn geschätzten Werten sollten höchstens um das ± abweichen (90-%-Intervall). ' +
-    'Es hängt von Entfernung und Alter der Messwerte und von der Tageszeit ab. Je länger nicht ' +
+    'Das ± hängt von Entfernung und Alter der Messwerte und von der Tageszeit ab. Je länger nicht ' +
     'gemessen wird, desto größer wird das ±.',
   onItsWay: 'Die Schätzung wird geladen',
   noService: 'Dieser Zwilling schätzt nicht: Angezeigt werden die nächstgelegenen Messwerte',
@@ -18,19 +18,18 @@ export const ESTIMATE: In<typeof ENGLISH> = {
   errorOf: (sensor) => `${sensor}: Unsicherheit der Schätzung`,
   foretold: (inside, scans) =>
     `${whole(inside)} von ${counted(scans, 'Messung', 'Messungen')} im vorhergesagten Bereich`,
-  foretoldNone: 'Noch keine Messung wurde mit ihr verglichen',
+  foretoldNone: 'Noch mit keiner Messung verglichen',
   foretoldDay: (inside, scans) =>
     `Letzter Tag: ${whole(inside)} von ${counted(scans, 'Messung', 'Messungen')}`,
   foretoldWeek: (inside, scans) =>
     `letzte Woche: ${whole(inside)} von ${counted(scans, 'Messung', 'Messungen')}`,
   fitProblem: (reason) => `Das Modell passt nicht gut zu diesem Gewächshaus: ${reason}`,
-  notTrusted: (count) =>
-    `Fehlerbereich zu eng: Nur ${count} von 10 Messungen lagen darin, nicht 9.`,
+  notTrusted: (count) => `Fehlerbereich zu eng: Nur ${count} statt 9 von 10 Messungen lagen darin.`,
   near: (count) =>
     count === 0
       ? 'kein Messpunkt in der Nähe'
       : counted(count, 'Messpunkt in der Nähe', 'Messpunkte in der Nähe'),
-  oldest: (age) => `ältester Messwert ${age}`,
+  oldest: (age) => `ältester Messwert vor ${age}`,
   expected: (measured, expected) => `gemessen ${measured}, erwartet ${expected}`,
   leftOut: (sensor) => `${sensor}: möglicher Sensorfehler, nicht in der Schätzung`,
   advice: 'Vorschläge für Messpunkte',

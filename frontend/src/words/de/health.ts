@@ -15,15 +15,12 @@ export const HEALTH: In<typeof ENGLISH> = {
   healthMany: ONE_OR_MANY,
   reasons: {
     sides: { below: 'unter', above: 'über' },
-    sidesBack: {
-      below: 'im Bereich; Alarm endet über',
-      above: 'im Bereich; Alarm endet unter',
-    },
+    wasBeyond: (side, limit, status, until) =>
+      `war ${side} ${limit}; bleibt ${status} bis ${until}`,
     just: {
       below: (limit) => `knapp unter ${limit}`,
       above: (limit) => `knapp über ${limit}`,
     },
-    beyond: (sensor, side, limit) => `${sensor} ${side} ${limit}`,
     readingFailed: (sensor) => `${sensor}: Der Sensor liefert keinen Wert`,
     implausible: (reading) => `${reading}: kein plausibler Wert`,
     scanFailed: (outcome, age) =>
@@ -39,18 +36,17 @@ export const HEALTH: In<typeof ENGLISH> = {
           : 'kein Messwert mit bekannter Zeit'
         : age === null
           ? sensor === ''
-            ? 'Länger nicht gemessen'
-            : 'länger nicht gemessen'
+            ? 'Schon länger nicht gemessen'
+            : 'schon länger nicht gemessen'
           : sensor === ''
             ? `Seit ${age} nicht gemessen`
             : `seit ${age} kein Messwert`;
       return `${sensor === '' ? '' : `${sensor}: `}${since}${holds === null ? '' : ` (Messwerte gelten ${holds} lang)`}`;
     },
-    outOfRange: 'außerhalb des Bereichs',
+    outOfRange: 'außerhalb des Sollbereichs',
     changed: (reading) => `${reading}: möglicher Sensorfehler`,
     silent: 'Keine Daten vom digitalen Zwilling: Die letzten Daten können veraltet sein',
-    stopped:
-      'Es wird kein Messpunkt mehr gemessen: Der Roboter steht, oder seine Daten kommen nicht an',
+    stopped: 'Es wird nichts mehr gemessen: Der Roboter steht, oder seine Daten kommen nicht an',
     other: (kind, sensor) => (sensor === '' ? kind : `${sensor}: ${kind}`),
   },
   todo: {
@@ -73,12 +69,12 @@ export const HEALTH: In<typeof ENGLISH> = {
     other: 'Vor Ort prüfen',
   },
   todoPestAgain: 'Nochmals kontrollieren: Ohne Befund ist der Alarm behoben',
-  todoWell: 'Anstehend bis zur nächsten guten Messung',
+  todoWell: 'Steht an bis zur nächsten guten Messung',
   todoLabel: 'Jetzt zu tun',
   reasonsLabel: 'Warum',
   healthHeading: 'Zustand des Gewächshauses',
   healthDriver: (tag, reason) => `Messpunkt ${tag}: ${reason}`,
-  healthMostUnknown: 'Mehr als die Hälfte der Messpunkte ist unbekannt',
+  healthMostUnknown: 'Von mehr als der Hälfte der Messpunkte ist nichts bekannt',
   healthSomeUnknown: (count) =>
     `${counted(count, 'Messpunkt lässt', 'Messpunkte lassen')} sich nicht beurteilen`,
   healthDay: (isDay, source) =>
@@ -93,8 +89,8 @@ export const HEALTH: In<typeof ENGLISH> = {
   healthAllWell: 'Alle beurteilten Messwerte liegen im Idealbereich',
   healthDespite: (alarms) =>
     alarms === 1
-      ? '1 Alarm steht noch an: Zwei gute Messungen heben ihn auf'
-      : `${alarms} Alarme stehen noch an: Jeder endet nach zwei guten Messungen`,
+      ? '1 Alarm steht noch an: nach zwei guten Messungen behoben'
+      : `${alarms} Alarme stehen noch an: nach je zwei guten Messungen behoben`,
   healthAcknowledged: 'quittiert',
   healthNotCurrent: 'Nicht aktuell',
   healthNothing: 'Noch kein Messwert zu beurteilen',
@@ -116,6 +112,6 @@ export const HEALTH: In<typeof ENGLISH> = {
   tooLow: (by) => (by === null ? 'zu niedrig' : `um ${by} zu niedrig`),
   tooHigh: (by) => (by === null ? 'zu hoch' : `um ${by} zu hoch`),
   side: { below: 'tief', above: 'hoch' },
-  below: 'unter dem Ideal',
-  above: 'über dem Ideal',
+  below: 'unter Ideal',
+  above: 'über Ideal',
 };

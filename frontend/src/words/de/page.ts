@@ -28,7 +28,7 @@ export const PAGE: In<typeof ENGLISH> = {
   phaseLabel: 'Verbindung',
   retryNow: 'Jetzt versuchen',
   nextTry: (seconds) => (seconds > 0 ? `nächster Versuch in ${seconds} s` : 'wird gerade versucht'),
-  frozenSince: (clock) => `Die Messwerte sind eingefroren. Letzte Daten um ${clock}`,
+  frozenSince: (clock) => `Keine neuen Messwerte. Letzte Daten um ${clock}`,
   agoSuffix: (age) => `vor ${age}`,
   hours: 'h',
   frozenWhy: {
@@ -70,7 +70,7 @@ export const PAGE: In<typeof ENGLISH> = {
       : `${count} Nachrichten vom Server waren nicht lesbar und wurden verworfen.`,
   unreadLast: (why) => `Die letzte: ${why}`,
   paused: 'Die Zeit ist angehalten.',
-  pausedHint: 'Simulation oder Aufzeichnung sind angehalten; das Alter der Werte wächst nicht.',
+  pausedHint: 'Simulation oder Aufzeichnung sind angehalten; die Messwerte altern nicht.',
   inputProblem: 'Nicht alle Daten kommen hier an.',
   drops: (count) =>
     `Der Zwilling hat in den letzten Minuten ${counted(count, 'Nachricht', 'Nachrichten')} verworfen.`,
@@ -92,7 +92,7 @@ export const PAGE: In<typeof ENGLISH> = {
       hint: 'Neue Daten werden angezeigt, aber noch nicht aufgezeichnet. Frühere Daten sind nach der Umstellung wieder da; das kann Minuten dauern.',
     },
     doubting: {
-      title: 'Es wird nichts aufgezeichnet: Die Uhr widerspricht der Aufzeichnung.',
+      title: 'Es wird nichts aufgezeichnet: Die Uhr passt nicht zur Aufzeichnung.',
       hint: 'Neue Daten werden angezeigt, aber erst aufgezeichnet, wenn die Uhr stimmt, spätestens nach zehn Minuten.',
     },
     in_use: {
@@ -121,13 +121,13 @@ export const PAGE: In<typeof ENGLISH> = {
   },
   recordedIs: { playing: 'Läuft', paused: 'Angehalten' },
   recordedPaused: 'Die Aufzeichnung ist angehalten.',
-  recordedPausedHint: 'Sie ist angehalten oder zu Ende; das Alter der Werte wächst nicht.',
+  recordedPausedHint: 'Sie ist angehalten oder zu Ende; die Messwerte altern nicht.',
   simulated: 'Simuliert.',
   simulatedHint: (until) => `Alle Daten bis ${until} sind Demodaten, nicht gemessen.`,
   setAside: 'Eine beschädigte Aufzeichnung wurde in Quarantäne genommen.',
   setAsideHint: (name) =>
     `Lesbare Daten wurden übernommen, die Aufzeichnung läuft weiter. Die beschädigte Datei ist ${name}.`,
-  failedTitle: 'Diese Seite ist ausgefallen',
+  failedTitle: 'Diese Seite ist abgestürzt',
   failedHint:
     'Verlassen Sie sich nicht auf ihre Anzeige. Zwilling und Server sind nicht betroffen.',
   failedAgain: 'Sie lädt sich von selbst neu.',
@@ -146,7 +146,7 @@ export const PAGE: In<typeof ENGLISH> = {
   report: 'Schichtbericht',
   print: 'Drucken',
   kiosk: 'Wandanzeige',
-  kioskLeave: 'Verlassen',
+  kioskLeave: 'Beenden',
   cycleNext: (sensor, time) => `danach: ${sensor} in ${time}`,
   cycleRefused: (asked, least, most) =>
     `cycle=${asked} wird ignoriert: möglich sind ${least} bis ${most} Sekunden.`,
@@ -158,8 +158,7 @@ export const PAGE: In<typeof ENGLISH> = {
   emptyConnecting: 'Verbindung zum Server wird aufgebaut',
   emptyConnectingHint: 'Das Gewächshaus erscheint, sobald er antwortet.',
   emptyUnreachable: 'Der Server antwortet nicht',
-  emptyUnreachableHint:
-    'Bitte prüfen, ob er eingeschaltet ist. Die Seite versucht es von selbst weiter.',
+  emptyUnreachableHint: 'Bitte prüfen, ob er eingeschaltet ist. Die Seite versucht es weiter.',
   emptyUnreachableMore:
     'Der Server ist die Bridge: „lupin-twin serve“ auf dem Roboter oder „make run“ für die Demo.',
   emptyNoTwin: 'Noch kein Zwilling',
@@ -170,11 +169,11 @@ export const PAGE: In<typeof ENGLISH> = {
   emptyNoTagsMore: '„lupin-twin demo“ zeigt eine simulierte Runde.',
   emptyNoPins: 'Noch kein Messpunkt hat eine Position',
   emptyNoPinsHint:
-    'Alle Messpunkte stehen in der Tabelle; mit der ersten gelungenen Messung kommen sie auf die Karte.',
-  emptyNoReading: (sensor) => `Noch kein Messpunkt auf der Karte hat einen Messwert: ${sensor}`,
+    'Alle Messpunkte stehen in der Tabelle; mit der ersten guten Messung kommen sie auf die Karte.',
+  emptyNoReading: (sensor) => `Noch keine Messwerte auf der Karte: ${sensor}`,
   emptyNoReadingHint:
     'Wählen Sie einen anderen Sensor, oder warten Sie, bis der Roboter weitere gemessen hat.',
-  emptyNoMap: 'Noch kein Grundriss: Der Roboter hat seine Karte nicht geschickt.',
+  emptyNoMap: 'Kein Grundriss: Der Roboter hat seine Karte noch nicht geschickt.',
   emptyNoMapMore: 'Der Grundriss ist die SLAM-Karte des Roboters, die auf /map kommt.',
 
   helpGlobal: 'Überall',
@@ -191,11 +190,11 @@ export const PAGE: In<typeof ENGLISH> = {
       ['Y', 'Ebenen'],
       ['A', 'Alarme'],
       ['C', 'Verlauf des gewählten Messpunkts'],
-      ['L', 'Zurück zu live'],
+      ['L', 'Zurück zu Live'],
       ['Leertaste', 'Vergangenheit abspielen oder anhalten'],
       ['U', '°C oder °F'],
       ['T', 'Hell oder dunkel'],
-      ['Esc', 'Schließen, dann zurück zu live'],
+      ['Esc', 'Schließen, dann zurück zu Live'],
       ['?', 'Diese Liste'],
     ],
     time: [
@@ -214,6 +213,6 @@ export const PAGE: In<typeof ENGLISH> = {
 
   paper: (taken, printed) => `Stand ${taken}, gedruckt ${printed}`,
   paperRest: (printed, all) =>
-    `Gedruckt sind die ersten ${printed} von ${all} Messpunkten. Die Tabelle als CSV enthält alle.`,
+    `Gedruckt sind die ersten ${printed} von ${all} Messpunkten. Die CSV-Datei enthält alle.`,
   asOf: (moment) => `Stand ${moment}`,
 };

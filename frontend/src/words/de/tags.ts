@@ -88,7 +88,7 @@ export const TAGS: In<typeof ENGLISH> = {
   cardBlooms: 'Blüten',
   cardSource: 'Quelle',
   cardFixed: 'Fester Sensor',
-  cardVisited: 'Vom Roboter angefahren',
+  cardVisited: 'Vom Roboter gemessen',
   cardScanned: 'Letzter Messwert',
   cardLooked: 'Blüten kontrolliert',
   cardTry: 'Letzter Versuch',

@@ -63,7 +63,6 @@ export const ALARMS = {
   /** Above a list whose order is held. */
   alarmsNew: (count: number): string => `${count} new`,
   alarmsNewHint: 'The order stays fixed while you use the list. Show new alarms',
-  alarmMore: (count: number): string => `Show ${count} more`,
   alarmFilter: 'Filter alarms',
   alarmFilterHint: 'Filter …',
   alarmOrder: 'Order',
@@ -77,8 +76,8 @@ export const ALARMS = {
   alarmsNoneHint:
     'An alarm is raised after two bad scans in a row. A pest, or missing data from the greenhouse, raises one at once.',
   alarmsWait: (tags: number): string =>
-    `No alarm yet for ${counted(tags, 'tag', 'tags')}: it takes a second bad scan`,
-  alarmNotYet: 'no alarm yet',
+    `${counted(tags, 'tag', 'tags')} waiting for a second scan: no alarm yet`,
+  alarmNotYet: 'waiting for a second scan',
   alarmsNotYet: 'Waiting for the list of alarms',
   alarmsStarting: 'Recorded data is still being read: more alarms may follow.',
   alarmsHeard: (since: string): string =>

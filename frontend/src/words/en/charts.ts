@@ -15,18 +15,18 @@ export const CHARTS = {
     high: string,
     gaps: number,
   ): string =>
-    `${counted(count, 'reading', 'readings')}, the latest ${latest} at ${at}, ` +
+    `${counted(count, 'reading', 'readings')}, the latest ${latest} (${at}), ` +
     `between ${low} and ${high}, ${gaps === 0 ? 'no gap' : counted(gaps, 'gap', 'gaps')}.`,
   chartEmpty: 'No reading in this period.',
-  chartLoading: 'Loading the past',
+  chartLoading: 'Loading history',
   chartFailed: (reason: string): string =>
-    `The past could not be loaded; the page keeps trying. ${reason}`,
+    `History could not be loaded; the page keeps trying. ${reason}`,
   chartMissing: 'This twin records nothing.',
-  chartMissingHint: 'Charts need a recording. Until then, the card shows only the last scans.',
+  chartMissingHint: 'Without a recording, the card shows only the last scans.',
   chartMissingMore:
     'Start the twin without “journal:=off”, or name a file in the parameter “journal”.',
   chartMissingShort: 'No chart: this twin records nothing.',
-  chartNoTime: 'The twin has no time yet, so there is no past to show.',
+  chartNoTime: 'The twin has no time yet, so there is no history.',
   chartIdealsDiffer: 'Ideal ranges differ by species',
   chartNoSensors: 'This tag has no sensor.',
   chartTable: 'Show as table',

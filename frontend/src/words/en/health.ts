@@ -16,14 +16,13 @@ export const HEALTH = {
   reasons: {
     sides: { below: 'below', above: 'above' },
     /** What was out of its range counts as that until it is well within. */
-    sidesBack: { below: 'back in range; clears above', above: 'back in range; clears below' },
+    wasBeyond: (side: string, limit: string, status: string, until: string): string =>
+      `was ${side} ${limit}; stays ${status} until ${until}`,
     /** Of a value that reads like the limit that it is beyond. */
     just: {
       below: (limit: string): string => `just below ${limit}`,
       above: (limit: string): string => `just above ${limit}`,
     },
-    /** What is wrong, whatever the value is by now. */
-    beyond: (sensor: string, side: string, limit: string): string => `${sensor} ${side} ${limit}`,
     readingFailed: (sensor: string): string => `${sensor}: the sensor returns no value`,
     implausible: (reading: string): string => `${reading}: not a plausible value`,
     scanFailed: (outcome: string, age: string | null): string =>

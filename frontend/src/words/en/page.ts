@@ -26,7 +26,7 @@ export const PAGE = {
   phaseLabel: 'Connection',
   retryNow: 'Try now',
   nextTry: (seconds: number): string => (seconds > 0 ? `next try in ${seconds} s` : 'trying now'),
-  frozenSince: (clock: string): string => `Readings are frozen. Last data at ${clock}`,
+  frozenSince: (clock: string): string => `No new readings. Last data at ${clock}`,
   agoSuffix: (age: string): string => `${age} ago`,
   /** As an age has it: "1 h 18 min". */
   hours: 'h',
@@ -72,7 +72,7 @@ export const PAGE = {
   pausedHint: 'The simulation or recording is paused, so ages do not increase.',
   inputProblem: 'Not all data arrives here.',
   drops: (count: number): string =>
-    `The twin dropped ${counted(count, 'message', 'messages')} in the last minutes.`,
+    `The twin dropped ${counted(count, 'message', 'messages')} in the last few minutes.`,
   /** What to tell of a journal that does not keep what happens, and what to do. */
   journal: {
     off: {
@@ -84,7 +84,7 @@ export const PAGE = {
       hint: 'Data waits in memory until the disk catches up. A power cut would lose it.',
     },
     failing: {
-      title: 'Nothing is being recorded.',
+      title: 'Recording has failed.',
       hint: 'The twin keeps running and retrying. Free disk space, or check the disk.',
     },
     upgrading: {
@@ -118,7 +118,7 @@ export const PAGE = {
   originHint: {
     simulated: 'No real robot: greenhouse, plants and readings are simulated.',
     recorded: 'A recording is playing: nothing here is current.',
-    sim_time: 'This is not real time: the data comes from a simulation or a recording.',
+    sim_time: 'Not real time: the data comes from a simulation or a recording.',
   },
   recordedIs: { playing: 'Playing', paused: 'Paused' },
   recordedPaused: 'The recording is paused.',
@@ -139,7 +139,7 @@ export const PAGE = {
   themes: { system: 'System', light: 'Light', dark: 'Dark' },
   copyLink: 'Copy link to this view',
   linkCopied: 'Link copied',
-  linkInBar: 'The address bar holds the link to this view',
+  linkInBar: 'The link is in the address bar',
   savePng: 'Save map as PNG',
   saveCsv: 'Save table as CSV',
   saveCsvShort: 'CSV',

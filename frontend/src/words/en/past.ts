@@ -23,7 +23,7 @@ export const PAST = {
   backToLive: 'Back to live',
   backToRecording: 'Back to the recording',
   frozenBehindPast: (clock: string): string => `Live data has stopped. Last data at ${clock}`,
-  frozenPastStays: 'The past that is shown is not affected.',
+  frozenPastStays: 'The past shown is not affected.',
   meanwhileShow: (tag: string): string => `Back to live, show tag ${tag}`,
 
   timebar: 'Time bar',
@@ -62,6 +62,6 @@ export const PAST = {
       ...(seen > 0 ? [counted(seen, 'pest seen', 'pests seen')] : []),
       ...(cleared > 0 ? [counted(cleared, 'pest gone', 'pests gone')] : []),
     ].join(', '),
-  timebarOff: 'No past: this twin records nothing.',
+  timebarOff: 'No history: this twin records nothing.',
   timebarOffHint: 'Recording is turned on when the twin is started.',
 } as const;

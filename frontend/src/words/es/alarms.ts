@@ -18,16 +18,16 @@ export const ALARMS: In<typeof ENGLISH> = {
   alarmHouse: 'Todo el invernadero',
   alarmWhat: (where, what) => `${where}: ${what}`,
   alarmSince: (when, length) => (length === null ? `desde ${when}` : `desde ${when} (${length})`),
-  alarmUntil: (from, until, length) => `${from} hasta ${until} (${length})`,
+  alarmUntil: (from, until, length) => `de ${from} a ${until} (${length})`,
   alarmNow: (reading) => `ahora ${reading}`,
   alarmNowUnknown: (last, age) =>
     last === null
-      ? 'ahora desconocido'
-      : `ahora desconocido, último ${last}${age === null ? '' : ` hace ${age}`}`,
+      ? 'ahora sin dato'
+      : `ahora sin dato, último ${last}${age === null ? '' : ` hace ${age}`}`,
   alarmPests: { none: 'no detectada', seen: 'detectada' },
   alarmWorst: {
-    below: (reading) => `peor valor ${reading}`,
-    above: (reading) => `peor valor ${reading}`,
+    below: (reading) => `mínimo ${reading}`,
+    above: (reading) => `máximo ${reading}`,
     pest: (reading) => `máximo ${reading}`,
   },
   alarmFirst: (reading) => `al inicio ${reading}`,
@@ -42,7 +42,7 @@ export const ALARMS: In<typeof ENGLISH> = {
   alarmShelve: 'Aplazar',
   alarmShelveHint: 'Sin avisos hasta entonces, salvo que empeore.',
   alarmShelveCritical:
-    'Una alarma que es o fue crítica se puede aplazar 1 h como máximo y requiere un motivo.',
+    'Si la alarma es o fue crítica, se puede aplazar 1 h como máximo, indicando el motivo.',
   alarmShelfReason: 'Motivo',
   alarmShelfReasonOptional: 'Motivo (opcional)',
   alarmShelveMinutes: (minutes) => `Durante ${minutes} min`,
@@ -55,13 +55,12 @@ export const ALARMS: In<typeof ENGLISH> = {
   alarmDone: {
     acknowledge: (count) => counted(count, 'alarma reconocida', 'alarmas reconocidas'),
     unacknowledge: (count) =>
-      counted(count, 'alarma ya no reconocida', 'alarmas ya no reconocidas'),
+      counted(count, 'alarma de nuevo sin reconocer', 'alarmas de nuevo sin reconocer'),
     shelve: (count) => counted(count, 'alarma aplazada', 'alarmas aplazadas'),
     unshelve: (count) => counted(count, 'alarma reactivada', 'alarmas reactivadas'),
   },
   alarmsNew: (count) => counted(count, 'nueva', 'nuevas'),
   alarmsNewHint: 'El orden no cambia mientras usa la lista. Mostrar las alarmas nuevas',
-  alarmMore: (count) => `Mostrar ${count} más`,
   alarmFilter: 'Filtrar alarmas',
   alarmFilterHint: 'Filtrar …',
   alarmOrder: 'Orden',
@@ -73,17 +72,17 @@ export const ALARMS: In<typeof ENGLISH> = {
     `${tags.length === 1 ? 'Punto' : 'Puntos'} ${tags.join(', ')}${more > 0 ? ` y ${more} más` : ''}`,
   alarmsNone: 'Ninguna alarma activa',
   alarmsNoneHint:
-    'La alarma salta tras dos mediciones anómalas seguidas. Con una plaga o si faltan datos del invernadero, salta de inmediato.',
+    'La alarma salta tras dos mediciones anómalas seguidas. Si hay plaga o faltan datos del invernadero, salta enseguida.',
   alarmsWait: (tags) =>
-    `${counted(tags, 'punto pendiente', 'puntos pendientes')}: la alarma salta con otra medición anómala`,
-  alarmNotYet: 'aún sin alarma',
+    `${counted(tags, 'punto', 'puntos')} a la espera de otra medición: aún sin alarma`,
+  alarmNotYet: 'a la espera de otra medición',
   alarmsNotYet: 'Esperando la lista de alarmas',
   alarmsStarting: 'Todavía se está leyendo el registro: pueden aparecer más alarmas.',
-  alarmsHeard: (since) => `No se registra nada; no se conocen las alarmas anteriores a ${since}.`,
+  alarmsHeard: (since) => `No se registra nada: se desconocen las alarmas anteriores a ${since}.`,
   alarmsLost: (clock) => `Último dato recibido a las ${clock}. Se desconoce lo ocurrido después.`,
   alarmsOfNow: (moment) =>
     `Estas son las alarmas actuales. El resto de la página muestra ${moment}.`,
-  alarmsMine: '«Reconocida» y «aplazada» valen solo en este navegador.',
+  alarmsMine: '«Reconocida» y «aplazada» solo valen en este navegador.',
 
   alarmTell: 'Avisarme de las alarmas',
   alarmSound: 'Sonido',
@@ -91,7 +90,7 @@ export const ALARMS: In<typeof ENGLISH> = {
   alarmSoundWaits: 'El navegador permite el sonido tras su primer clic en esta página.',
   alarmSoundNone: 'Este navegador no puede reproducir sonido.',
   alarmNotify: 'Notificación',
-  alarmNotifyHint: 'El navegador avisa de las alarmas nuevas mientras usted mira otra cosa.',
+  alarmNotifyHint: 'El navegador avisa de las alarmas nuevas aunque usted esté en otra ventana.',
   alarmNotifyInsecure:
     'Los navegadores solo lo permiten en direcciones que empiezan por https:// o http://localhost.',
   alarmNotifyRefused:

@@ -10,18 +10,18 @@ export const CHARTS: In<typeof ENGLISH> = {
   chartsByLegend: 'Qué se muestra',
   chartSpan: (from, to) => `${from} a ${to}`,
   chartSummary: (count, latest, at, low, high, gaps) =>
-    `${counted(count, 'lectura', 'lecturas')}, la última ${latest} a las ${at}, ` +
+    `${counted(count, 'lectura', 'lecturas')}, la última ${latest} (${at}), ` +
     `entre ${low} y ${high}, ${gaps === 0 ? 'sin huecos' : counted(gaps, 'hueco', 'huecos')}.`,
   chartEmpty: 'No hay lecturas en este periodo.',
-  chartLoading: 'Cargando el pasado',
-  chartFailed: (reason) => `No se pudo cargar el pasado; la página lo sigue intentando. ${reason}`,
+  chartLoading: 'Cargando el histórico',
+  chartFailed: (reason) =>
+    `No se pudo cargar el histórico; la página lo sigue intentando. ${reason}`,
   chartMissing: 'Este gemelo no registra nada.',
-  chartMissingHint:
-    'Las gráficas necesitan un registro. Hasta entonces la ficha muestra solo las últimas mediciones.',
+  chartMissingHint: 'Sin registro no hay gráficas: la ficha solo muestra las últimas mediciones.',
   chartMissingMore:
     'Inicie el gemelo sin «journal:=off» o indique un archivo en el parámetro «journal».',
   chartMissingShort: 'Sin gráfica: este gemelo no registra nada.',
-  chartNoTime: 'El gemelo aún no tiene hora; todavía no hay pasado.',
+  chartNoTime: 'El gemelo aún no tiene hora: todavía no hay histórico.',
   chartIdealsDiffer: 'El rango ideal depende de la especie',
   chartNoSensors: 'Este punto no tiene sensores.',
   chartTable: 'Mostrar como tabla',
@@ -34,7 +34,7 @@ export const CHARTS: In<typeof ENGLISH> = {
   chartAddTag: 'Añadir un punto',
   chartRemoveTag: (tag) => `Quitar el punto ${tag} de la gráfica`,
   chartWhich: 'Tabla de',
-  chartHint: 'Arrastre para acercar; haga clic para ir a ese momento.',
+  chartHint: 'Arrastre para ampliar; haga clic para ir a ese momento.',
   chartColumns: {
     time: 'Hora',
     until: 'Hasta',
@@ -43,7 +43,7 @@ export const CHARTS: In<typeof ENGLISH> = {
     mean: 'Media',
     min: 'Mínimo',
     max: 'Máximo',
-    event: 'Suceso',
+    event: 'Evento',
   },
   chartGap: (length) => `sin datos durante ${length}`,
   missing: { not_kept: 'ya no se conserva', not_recorded: 'sin registro' },

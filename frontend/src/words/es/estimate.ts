@@ -6,15 +6,15 @@ import { counted, whole } from './counted';
 export const ESTIMATE: In<typeof ENGLISH> = {
   about: 'Qué significa ±',
   aboutText:
-    'Nueve de cada diez valores estimados deberían desviarse como mucho lo que dice el ± ' +
-    '(intervalo del 90 %). Depende de la distancia y la antigüedad de las lecturas y de la hora ' +
-    'del día. Cuanto más tiempo sin medir, mayor es el ±.',
+    'En nueve de cada diez casos, el error no debería superar el ± (intervalo del 90 %). ' +
+    'El ± depende de la distancia y la antigüedad de las lecturas y de la hora del día. ' +
+    'Cuanto más tiempo sin medir, mayor es el ±.',
   onItsWay: 'Cargando la estimación',
   noService: 'Este gemelo no hace estimaciones: se muestran las lecturas más cercanas',
   noneNow: 'Ahora no hay estimación: se muestran las lecturas más cercanas',
-  noModel: 'Aún no hay estimación: necesita diez mediciones de un sensor',
-  noSensor: 'Ningún punto mide esto, así que no hay nada que estimar',
-  unsure: (error) => `Rayado: menos seguro que ±${error}. Sin color: sin datos`,
+  noModel: 'Aún no hay estimación: hacen falta diez mediciones de un sensor',
+  noSensor: 'Ningún punto mide esto: no hay estimación',
+  unsure: (error) => `Rayado: menos preciso que ±${error}. Sin color: sin datos`,
   errorOf: (sensor) => `${sensor}: incertidumbre de la estimación`,
   foretold: (inside, scans) =>
     `${whole(inside)} de ${counted(scans, 'medición', 'mediciones')} dentro del rango previsto`,
@@ -25,10 +25,10 @@ export const ESTIMATE: In<typeof ENGLISH> = {
     `última semana: ${whole(inside)} de ${counted(scans, 'medición', 'mediciones')}`,
   fitProblem: (reason) => `El modelo no se ajusta bien a este invernadero: ${reason}`,
   notTrusted: (count) =>
-    `Margen de error demasiado estrecho: solo ${count} de 10 mediciones estaban dentro, no 9.`,
+    `Margen de error demasiado estrecho: solo acertó en ${count} de 10 mediciones, no en 9.`,
   near: (count) =>
     count === 0 ? 'ningún punto cerca' : counted(count, 'punto cerca', 'puntos cerca'),
-  oldest: (age) => `lectura más antigua: ${age}`,
+  oldest: (age) => `lectura más antigua hace ${age}`,
   expected: (measured, expected) => `medido ${measured}, esperado ${expected}`,
   leftOut: (sensor) => `${sensor}: posible fallo del sensor, no se usa en la estimación`,
   advice: 'Puntos propuestos',
@@ -36,7 +36,7 @@ export const ESTIMATE: In<typeof ENGLISH> = {
     isFirst
       ? `${place}: un punto aquí reduce el error del mapa al ${percent} del actual`
       : `${place}: puntos aquí y en cada marca anterior reducen el error del mapa al ${percent} del actual`,
-  adviceNone: 'Sin propuesta para otro punto',
-  adviceFailed: (reason) => `Sin propuesta para otro punto: ${reason}`,
-  adviceNow: 'Las propuestas para otro punto se muestran solo para el presente',
+  adviceNone: 'No se propone ningún otro punto',
+  adviceFailed: (reason) => `No se propone ningún otro punto: ${reason}`,
+  adviceNow: 'Solo se proponen puntos para el momento actual',
 };

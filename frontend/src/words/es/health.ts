@@ -18,17 +18,14 @@ export const HEALTH: In<typeof ENGLISH> = {
   },
   reasons: {
     sides: { below: 'inferior a', above: 'superior a' },
-    sidesBack: {
-      below: 'en rango; se desactiva por encima de',
-      above: 'en rango; se desactiva por debajo de',
-    },
+    wasBeyond: (side, limit, status, until) =>
+      `ha sido ${side} ${limit}; sigue ${status} hasta ${until}`,
     just: {
       below: (limit) => `justo por debajo de ${limit}`,
       above: (limit) => `justo por encima de ${limit}`,
     },
-    beyond: (sensor, side, limit) => `${sensor} ${side} ${limit}`,
     readingFailed: (sensor) => `${sensor}: el sensor no da ningún valor`,
-    implausible: (reading) => `${reading}: valor no plausible`,
+    implausible: (reading) => `${reading}: valor inverosímil`,
     scanFailed: (outcome, age) =>
       `Última medición fallida: ${outcome}${age === null ? '' : `, hace ${age}`}`,
     pest: (count) =>
@@ -38,8 +35,8 @@ export const HEALTH: In<typeof ENGLISH> = {
     old: (sensor, age, holds, isDated) => {
       const since = !isDated
         ? sensor === ''
-          ? 'Ninguna medición de hora conocida'
-          : 'ninguna lectura de hora conocida'
+          ? 'Ninguna medición con hora conocida'
+          : 'ninguna lectura con hora conocida'
         : age === null
           ? sensor === ''
             ? 'Sin medir últimamente'
@@ -47,9 +44,9 @@ export const HEALTH: In<typeof ENGLISH> = {
           : sensor === ''
             ? `Sin medir desde hace ${age}`
             : `sin lectura desde hace ${age}`;
-      return `${sensor === '' ? '' : `${sensor}: `}${since}${holds === null ? '' : ` (las lecturas valen durante ${holds})`}`;
+      return `${sensor === '' ? '' : `${sensor}: `}${since}${holds === null ? '' : ` (las lecturas valen ${holds})`}`;
     },
-    outOfRange: 'fuera de su rango',
+    outOfRange: 'fuera de rango',
     changed: (reading) => `${reading}: posible fallo del sensor`,
     silent: 'Sin datos del gemelo: los últimos pueden estar desactualizados',
     stopped: 'No se mide ningún punto: el robot se ha parado o no llegan sus datos',
@@ -70,15 +67,15 @@ export const HEALTH: In<typeof ENGLISH> = {
     range: 'Revisar el control del clima',
     reading_failed: 'Revisar el sensor',
     scan_failed: 'Revisar el acceso y el punto',
-    pest: 'Inspeccionar y tratar',
+    pest: 'Revisar y tratar',
     old: 'Revisar la ruta del robot',
     changed: 'Comparar con otro medidor',
     silent: 'Revisar gemelo, servidor y red',
     stopped: 'Revisar el robot',
     other: 'Comprobar in situ',
   },
-  todoPestAgain: 'Inspeccionar otra vez: si no hay plaga, queda resuelta',
-  todoWell: 'En espera de otra medición buena',
+  todoPestAgain: 'Revisar otra vez: si no hay plaga, queda resuelta',
+  todoWell: 'Activa hasta la próxima medición buena',
   todoLabel: 'Hacer ahora',
   reasonsLabel: 'Por qué',
   healthHeading: 'Estado del invernadero',
@@ -86,12 +83,11 @@ export const HEALTH: In<typeof ENGLISH> = {
   healthMostUnknown: 'Se desconoce el estado de más de la mitad de los puntos',
   healthSomeUnknown: (count) =>
     `No se ${count === 1 ? 'puede' : 'pueden'} evaluar ${counted(count, 'punto', 'puntos')}`,
-  healthDay: (isDay, source) =>
-    `Se aplican los rangos ${isDay ? 'del día' : 'de la noche'}: ${source}`,
+  healthDay: (isDay, source) => `Se aplican los rangos de ${isDay ? 'día' : 'noche'}: ${source}`,
   healthDaySource: {
     light: 'según la luz medida en el invernadero',
-    clock: 'según el reloj, pues no se mide la luz',
-    assumed: 'se supone, pues no se conocen ni la luz ni la hora',
+    clock: 'según el reloj, porque no se mide la luz',
+    assumed: 'supuesto, porque no se conocen ni la luz ni la hora',
   },
   idealParts: { any: 'ideal', day: 'ideal de día', night: 'ideal de noche' },
   healthIdeal: (ideal, low, high, unit) => `${ideal} de ${low} a ${high} ${unit}`.trim(),
@@ -99,9 +95,9 @@ export const HEALTH: In<typeof ENGLISH> = {
   healthDespite: (alarms) =>
     alarms === 1
       ? 'Aún hay 1 alarma activa: dos mediciones buenas la resuelven'
-      : `Aún hay ${alarms} alarmas activas: dos mediciones buenas resuelven cada una`,
+      : `Aún hay ${alarms} alarmas activas: cada una se resuelve con dos mediciones buenas`,
   healthAcknowledged: 'reconocida',
-  healthNotCurrent: 'No actualizado',
+  healthNotCurrent: 'Desactualizado',
   healthNothing: 'Aún no hay lecturas que evaluar',
   healthFilter: ', mostrar solo estos puntos',
   houseRhythm: (interval) => `una medición cada ${interval}`,
@@ -118,8 +114,8 @@ export const HEALTH: In<typeof ENGLISH> = {
     `Sin problemas conocidos; sin datos de ${counted(unknown, 'punto', 'puntos')}`,
   attentionMore: (count) => `+ ${count} más`,
 
-  tooLow: (by) => (by === null ? 'por debajo del rango' : `${by} por debajo del ideal`),
-  tooHigh: (by) => (by === null ? 'por encima del rango' : `${by} por encima del ideal`),
+  tooLow: (by) => (by === null ? 'por debajo del límite' : `${by} por debajo del ideal`),
+  tooHigh: (by) => (by === null ? 'por encima del límite' : `${by} por encima del ideal`),
   side: { below: 'bajo', above: 'alto' },
   below: 'por debajo del ideal',
   above: 'por encima del ideal',

@@ -6,7 +6,7 @@ import { counted } from './counted';
 export const MAP: In<typeof ENGLISH> = {
   sensors: 'Sensor',
   mapRegion: 'Mapa',
-  mapPicture: 'Mapa del invernadero. La lista de al lado nombra los puntos que necesitan atención.',
+  mapPicture: 'Mapa del invernadero. La lista de al lado indica los puntos que requieren atención.',
   mapLabel:
     'Mapa del invernadero. Las flechas lo mueven, más y menos lo acercan y alejan, 0 muestra todo, ' +
     'Intro abre el punto más cercano a la cruz. La tabla contiene los mismos puntos.',
@@ -34,9 +34,9 @@ export const MAP: In<typeof ENGLISH> = {
   legendWaiting: 'Cargando nombres, unidades y rangos',
   legendFailed: (reason) =>
     `No se pudieron cargar nombres, unidades y rangos; la página lo sigue intentando. ${reason}`,
-  legendTags: (count) => counted(count, 'punto contribuye', 'puntos contribuyen'),
+  legendTags: (count) => counted(count, 'punto aporta datos', 'puntos aportan datos'),
   legendFetching: 'Cargando el mapa de calor',
-  legendNoTags: 'Ningún punto contribuye',
+  legendNoTags: 'Ningún punto aporta datos',
   legendError: (error) => `Error típico ${error}`,
   legendErrorHint:
     'Error típico entre los puntos: cada punto se estima a partir de los demás y se compara con su propia lectura.',
@@ -48,7 +48,7 @@ export const MAP: In<typeof ENGLISH> = {
   readoutOld: 'lecturas demasiado antiguas',
   heat: 'El mapa de calor muestra',
   heats: { nearest: 'Lecturas más cercanas', estimate: 'Estimación', error: 'Incertidumbre' },
-  partMissing: 'No se pudo cargar esta parte de la página. Vuelva a cargar la página.',
+  partMissing: 'No se pudo cargar esta parte de la página. Recargue la página.',
   colouring: 'Colores según',
   colourings: { ideal: 'Ideal', value: 'Valor' },
   legendNoIdeal: 'Ahora sin rango ideal: colores según el valor',
@@ -57,7 +57,7 @@ export const MAP: In<typeof ENGLISH> = {
   legendAbove: (value) => `más de ${value}`,
   legendAgainst: (sensor) => `${sensor} frente a su rango ideal`,
   legendIdeal: (ideal, low, high) => `${ideal} de ${low} a ${high}`,
-  legendEach: (part) => `${part} para cada especie`,
+  legendEach: (part) => `${part} por especie`,
   legendOthers: 'otras',
   legendUnknownSpecies: 'Sin clasificar',
   pinLacking: 'sin sensor',
@@ -95,8 +95,8 @@ export const MAP: In<typeof ENGLISH> = {
 
   robotLayer: 'Robot',
   robotAt: (x, y) => `Robot: ${x} m, ${y} m`,
-  robotNowhere: 'Robot: no se sabe dónde está',
+  robotNowhere: 'Robot: posición desconocida',
   robotAgeUnknown: 'antigüedad desconocida',
   robotBattery: (percent) => `batería ${percent}`,
-  robotReported: (percent, ago) => `batería ${percent}, comunicada ${ago}`,
+  robotReported: (percent, ago) => `batería ${percent}, dato de ${ago}`,
 };

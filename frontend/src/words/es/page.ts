@@ -24,9 +24,9 @@ export const PAGE: In<typeof ENGLISH> = {
     reconnecting: 'Reconectando',
   },
   phaseLabel: 'Conexión',
-  retryNow: 'Probar ahora',
-  nextTry: (seconds) => (seconds > 0 ? `próximo intento en ${seconds} s` : 'intentándolo ahora'),
-  frozenSince: (clock) => `Las lecturas están congeladas. Últimos datos a las ${clock}`,
+  retryNow: 'Reintentar',
+  nextTry: (seconds) => (seconds > 0 ? `próximo intento en ${seconds} s` : 'reintentando'),
+  frozenSince: (clock) => `Sin lecturas nuevas. Últimos datos a las ${clock}`,
   agoSuffix: (age) => `hace ${age}`,
   hours: 'h',
   frozenWhy: {
@@ -41,7 +41,8 @@ export const PAGE: In<typeof ENGLISH> = {
     paused: '',
     no_clock: 'El gemelo aún no tiene hora; se desconoce la antigüedad de las lecturas.',
     clock_stopped: 'El reloj del gemelo se ha parado. Se desconoce la antigüedad de las lecturas.',
-    clock_doubted: 'El reloj del gemelo no va bien. Se desconoce la antigüedad de las lecturas.',
+    clock_doubted:
+      'El reloj del gemelo no está en hora. Se desconoce la antigüedad de las lecturas.',
     never_seen: 'El servidor aún no ha recibido nada de un gemelo. ¿Está encendido el gemelo?',
     stale: 'El gemelo ha dejado de enviar. Compruebe que está en marcha.',
     thread_dead: 'El servidor ha perdido el contacto con el gemelo y hay que reiniciarlo.',
@@ -78,7 +79,7 @@ export const PAGE: In<typeof ENGLISH> = {
     },
     slow: {
       title: 'El registro va con retraso.',
-      hint: 'Los datos esperan en memoria hasta que el disco dé abasto. Un corte de luz los perdería.',
+      hint: 'Los datos esperan en memoria hasta que el disco dé abasto. Con un corte de luz se perderían.',
     },
     failing: {
       title: 'El registro está fallando.',
@@ -86,10 +87,10 @@ export const PAGE: In<typeof ENGLISH> = {
     },
     upgrading: {
       title: 'El registro de una versión anterior se está actualizando.',
-      hint: 'Los datos nuevos se muestran, pero aún no se registran. Los anteriores vuelven al terminar; puede tardar minutos.',
+      hint: 'Los datos nuevos se muestran, pero aún no se registran. Los anteriores vuelven al terminar; puede tardar unos minutos.',
     },
     doubting: {
-      title: 'No se registra nada: el reloj contradice al registro.',
+      title: 'No se registra nada: el reloj no cuadra con el registro.',
       hint: 'Los datos nuevos se muestran y se registrarán cuando el reloj esté en hora o, como tarde, a los diez minutos.',
     },
     in_use: {
@@ -98,7 +99,7 @@ export const PAGE: In<typeof ENGLISH> = {
     },
     foreign: {
       title: 'Este gemelo no registra: su archivo es de otro programa.',
-      hint: 'No se ha cambiado nada en él. Dé al gemelo otro archivo o mueva este.',
+      hint: 'Su contenido no se ha tocado. Dé al gemelo otro archivo o mueva este.',
     },
   },
   outward: {
@@ -106,7 +107,7 @@ export const PAGE: In<typeof ENGLISH> = {
     webhook: 'El webhook no recibe alarmas.',
   },
   outwardOther: (channel) => `${channel} no recibe datos.`,
-  outwardHint: 'El servidor lo sigue intentando. Esta página no está afectada.',
+  outwardHint: 'El servidor lo sigue intentando. Esta página no se ve afectada.',
   journalMore:
     'El archivo lo indica el parámetro «journal» del gemelo; con «off» no se registra nada.',
   origin: { simulated: 'Simulado', recorded: 'Grabación', sim_time: 'Tiempo simulado' },
@@ -125,9 +126,9 @@ export const PAGE: In<typeof ENGLISH> = {
   setAsideHint: (name) =>
     `Se han conservado los datos legibles y el registro continúa. El archivo dañado es ${name}.`,
   failedTitle: 'La página ha fallado',
-  failedHint: 'No se fíe de lo que muestra. Ni el gemelo ni el servidor están afectados.',
-  failedAgain: 'Se vuelve a cargar por sí sola.',
-  reload: 'Volver a cargar',
+  failedHint: 'No se fíe de lo que muestra. El gemelo y el servidor no se ven afectados.',
+  failedAgain: 'Se recarga sola.',
+  reload: 'Recargar',
 
   menu: 'Menú',
   unit: 'Temperatura',
@@ -154,7 +155,7 @@ export const PAGE: In<typeof ENGLISH> = {
   emptyConnecting: 'Conectando con el servidor',
   emptyConnectingHint: 'El invernadero aparecerá en cuanto responda.',
   emptyUnreachable: 'El servidor no responde',
-  emptyUnreachableHint: 'Compruebe que está encendido. La página lo sigue intentando por sí sola.',
+  emptyUnreachableHint: 'Compruebe que está encendido. La página lo sigue intentando.',
   emptyUnreachableMore:
     'El servidor es el puente («bridge»): «lupin-twin serve» en el robot, o «make run» para la demostración.',
   emptyNoTwin: 'Aún no hay gemelo',
@@ -165,8 +166,8 @@ export const PAGE: In<typeof ENGLISH> = {
   emptyNoTagsMore: '«lupin-twin demo» muestra una ronda simulada.',
   emptyNoPins: 'Ningún punto tiene posición todavía',
   emptyNoPinsHint:
-    'Todos los puntos están en la tabla; con la primera medición lograda aparecen en el mapa.',
-  emptyNoReading: (sensor) => `Ningún punto del mapa tiene aún una lectura: ${sensor}`,
+    'Todos los puntos están en la tabla; con la primera medición buena aparecen en el mapa.',
+  emptyNoReading: (sensor) => `Aún no hay lecturas en el mapa: ${sensor}`,
   emptyNoReadingHint: 'Elija otro sensor o espere a que el robot mida más puntos.',
   emptyNoMap: 'Aún no hay plano: el robot no ha enviado su mapa.',
   emptyNoMapMore: 'El plano es el mapa SLAM del robot, que llega por /map.',
@@ -186,7 +187,7 @@ export const PAGE: In<typeof ENGLISH> = {
       ['A', 'Alarmas'],
       ['C', 'Gráficas del punto elegido'],
       ['L', 'Volver al directo'],
-      ['Espacio', 'Reproducir el pasado o pausar'],
+      ['Espacio', 'Reproducir o pausar el pasado'],
       ['U', '°C o °F'],
       ['T', 'Claro u oscuro'],
       ['Esc', 'Cerrar; después, volver al directo'],
@@ -206,8 +207,8 @@ export const PAGE: In<typeof ENGLISH> = {
     ],
   },
 
-  paper: (taken, printed) => `Estado a ${taken}, impreso ${printed}`,
+  paper: (taken, printed) => `Datos: ${taken}. Impreso: ${printed}`,
   paperRest: (printed, all) =>
-    `Se imprimen los primeros ${printed} de ${all} puntos. La tabla en CSV los contiene todos.`,
-  asOf: (moment) => `estado a ${moment}`,
+    `Se imprimen los primeros ${printed} de ${all} puntos. El CSV los contiene todos.`,
+  asOf: (moment) => `datos: ${moment}`,
 };

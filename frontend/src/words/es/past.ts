@@ -10,7 +10,7 @@ export const PAST: In<typeof ENGLISH> = {
   pastFetchingHint: 'No se muestra nada hasta que se cargue.',
   pastFailed: (moment) => `No se puede mostrar ${moment}`,
   pastNothing: (moment) => `Sin datos de ${moment}`,
-  pastReach: (from) => `El registro empieza el ${from}.`,
+  pastReach: (from) => `Hay datos registrados desde ${from}.`,
   pastReachNothing: 'Aún no hay nada registrado.',
   pastFault: (wanted) => `No se pudo cargar ${wanted}.`,
   pastFaultShown: (shown, why) => `Se muestra ${shown} mientras la página lo reintenta. ${why}`,
@@ -24,7 +24,7 @@ export const PAST: In<typeof ENGLISH> = {
   backToLive: 'Volver al directo',
   backToRecording: 'Volver a la grabación',
   frozenBehindPast: (clock) => `Ya no llegan datos en directo. Los últimos, a las ${clock}`,
-  frozenPastStays: 'El pasado que se muestra no está afectado.',
+  frozenPastStays: 'El pasado que se muestra no se ve afectado.',
   meanwhileShow: (tag) => `Volver al directo, al punto ${tag}`,
 
   timebar: 'Barra de tiempo',
@@ -52,9 +52,9 @@ export const PAST: In<typeof ENGLISH> = {
     failures: 'barra hacia abajo: intentos fallidos',
     pest: 'triángulo lleno: plaga detectada',
     cleared: 'anillo vacío: plaga desaparecida',
-    silence: 'rayado: ninguna medición intentada',
+    silence: 'rayado: no se intentó medir',
     before: 'rayado inverso: sin registro, o ya no se conserva',
-    run: 'línea discontinua: reloj reiniciado',
+    run: 'línea discontinua: el reloj volvió atrás',
   },
   timebarCounts: (scans, failures, seen, cleared) =>
     [
@@ -63,6 +63,6 @@ export const PAST: In<typeof ENGLISH> = {
       ...(seen > 0 ? [counted(seen, 'plaga detectada', 'plagas detectadas')] : []),
       ...(cleared > 0 ? [counted(cleared, 'plaga desaparecida', 'plagas desaparecidas')] : []),
     ].join(', '),
-  timebarOff: 'Sin pasado: este gemelo no registra nada.',
+  timebarOff: 'Sin histórico: este gemelo no registra nada.',
   timebarOffHint: 'El registro se activa al iniciar el gemelo.',
 };

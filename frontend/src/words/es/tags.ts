@@ -49,7 +49,7 @@ export const TAGS: In<typeof ENGLISH> = {
   sensorFailed: 'averiado',
   sensorFailedLong: 'El sensor no dio ningún valor',
   confidence: (percent) => `${percent} de certeza`,
-  notSure: 'incierto',
+  notSure: 'dudoso',
   speciesNames: {
     lupin: 'lupino',
     tulip: 'tulipán',
@@ -88,7 +88,7 @@ export const TAGS: In<typeof ENGLISH> = {
   cardBlooms: 'Flores',
   cardSource: 'Origen',
   cardFixed: 'Sensor fijo',
-  cardVisited: 'Visita del robot',
+  cardVisited: 'Medido por el robot',
   cardScanned: 'Última lectura',
   cardLooked: 'Flores revisadas',
   cardTry: 'Último intento',

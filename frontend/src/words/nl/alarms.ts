@@ -29,7 +29,7 @@ export const ALARMS: In<typeof ENGLISH> = {
     pest: (reading) => `hoogste aantal ${reading}`,
   },
   alarmFirst: (reading) => `bij aanvang ${reading}`,
-  alarmStatus: { critical: 'kritiek', healthy: 'binnen bereik' },
+  alarmStatus: { critical: 'kritiek', healthy: 'binnen de grenzen' },
   alarmShow: 'Dit meetpunt nu tonen',
   alarmStart: 'Naar begin',
   alarmActionsOf: (what) => `Acties: ${what}`,
@@ -40,11 +40,11 @@ export const ALARMS: In<typeof ENGLISH> = {
   alarmShelve: 'Uitstellen',
   alarmShelveHint: 'Tot dan geen melding, tenzij het erger wordt.',
   alarmShelveCritical:
-    'Een alarm dat kritiek is of was, kan hoogstens 1 uur worden uitgesteld en vraagt een reden.',
+    'Een alarm dat kritiek is of was, kunt u hoogstens 1 uur uitstellen, met opgave van reden.',
   alarmShelfReason: 'Reden',
   alarmShelfReasonOptional: 'Reden (optioneel)',
-  alarmShelveMinutes: (minutes) => `${minutes} min lang`,
-  alarmShelveHours: (hours) => `${hours} uur lang`,
+  alarmShelveMinutes: (minutes) => `${minutes} min`,
+  alarmShelveHours: (hours) => `${hours} uur`,
   alarmShelved: (until, reason, by) =>
     `uitgesteld ${by === '' ? '' : `door ${by} `}tot ${until}${reason === '' ? '' : `: ${reason}`}`,
   alarmUnshelve: 'Uitstel opheffen',
@@ -57,14 +57,13 @@ export const ALARMS: In<typeof ENGLISH> = {
     unshelve: (count) => `${counted(count, 'alarm', 'alarmen')} niet meer uitgesteld`,
   },
   alarmsNew: (count) => `${count} nieuw`,
-  alarmsNewHint: 'De volgorde blijft zolang u de lijst gebruikt. Nieuwe alarmen tonen',
-  alarmMore: (count) => `Nog ${count} tonen`,
+  alarmsNewHint: 'De volgorde blijft gelijk zolang u de lijst gebruikt. Nieuwe alarmen tonen',
   alarmFilter: 'Alarmen filteren',
   alarmFilterHint: 'Filteren …',
   alarmOrder: 'Volgorde',
   alarmOrders: { cause: 'Per oorzaak', newest: 'Nieuwste eerst', tag: 'Per meetpunt' },
   alarmSaveCsv: 'Alarmen opslaan als CSV',
-  alarmsNoMatch: 'Geen alarm past bij het filter.',
+  alarmsNoMatch: 'Geen alarm voldoet aan het filter.',
   alarmCount: (count) => counted(count, 'alarm', 'alarmen'),
   alarmTags: (tags, more) =>
     `${tags.length === 1 ? 'Meetpunt' : 'Meetpunten'} ${tags.join(', ')}${more > 0 ? ` en nog ${more}` : ''}`,
@@ -72,8 +71,8 @@ export const ALARMS: In<typeof ENGLISH> = {
   alarmsNoneHint:
     'Een alarm gaat af na twee afwijkende metingen achter elkaar. Bij een plaag of ontbrekende gegevens gaat het meteen af.',
   alarmsWait: (tags) =>
-    `${counted(tags, 'meetpunt', 'meetpunten')} afwijkend: pas alarm als de volgende meting het bevestigt`,
-  alarmNotYet: 'nog geen alarm',
+    `${counted(tags, 'meetpunt wacht', 'meetpunten wachten')} op een tweede meting: nog geen alarm`,
+  alarmNotYet: 'wacht op een tweede meting',
   alarmsNotYet: 'Wachten op de lijst met alarmen',
   alarmsStarting: 'De vastgelegde gegevens worden nog gelezen: er kunnen alarmen bijkomen.',
   alarmsHeard: (since) => `Er wordt niets vastgelegd; alarmen van vóór ${since} zijn niet bekend.`,
@@ -87,7 +86,7 @@ export const ALARMS: In<typeof ENGLISH> = {
   alarmSoundWaits: 'De browser staat geluid toe na uw eerste klik op deze pagina.',
   alarmSoundNone: 'Deze browser kan geen geluid afspelen.',
   alarmNotify: 'Melding',
-  alarmNotifyHint: 'De browser meldt nieuwe alarmen terwijl u naar iets anders kijkt.',
+  alarmNotifyHint: 'De browser meldt nieuwe alarmen, ook als u in een ander venster werkt.',
   alarmNotifyInsecure:
     'Browsers staan dit alleen toe op adressen die beginnen met https:// of http://localhost.',
   alarmNotifyRefused:

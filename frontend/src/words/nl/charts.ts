@@ -10,19 +10,19 @@ export const CHARTS: In<typeof ENGLISH> = {
   chartsByLegend: 'Wat er getoond wordt',
   chartSpan: (from, to) => `${from} tot ${to}`,
   chartSummary: (count, latest, at, low, high, gaps) =>
-    `${counted(count, 'meetwaarde', 'meetwaarden')}, de laatste ${latest} om ${at}, ` +
+    `${counted(count, 'meetwaarde', 'meetwaarden')}, de laatste ${latest} (${at}), ` +
     `tussen ${low} en ${high}, ${gaps === 0 ? 'geen gat' : counted(gaps, 'gat', 'gaten')}.`,
   chartEmpty: 'Geen meetwaarde in deze periode.',
-  chartLoading: 'Het verleden wordt geladen',
+  chartLoading: 'De historie wordt geladen',
   chartFailed: (reason) =>
-    `Het verleden kon niet worden geladen; de pagina blijft het proberen. ${reason}`,
+    `De historie kon niet worden geladen; de pagina blijft het proberen. ${reason}`,
   chartMissing: 'Deze digital twin legt niets vast.',
   chartMissingHint:
-    'Grafieken hebben vastgelegde gegevens nodig. Tot die er zijn, staan hier alleen de laatste metingen.',
+    'Zonder vastgelegde gegevens zijn er geen grafieken, alleen de laatste metingen.',
   chartMissingMore:
-    'Start de digital twin zonder “journal:=off”, of noem een bestand in de parameter “journal”.',
+    'Start de digital twin zonder “journal:=off”, of geef een bestand op in de parameter “journal”.',
   chartMissingShort: 'Geen grafiek: deze digital twin legt niets vast.',
-  chartNoTime: 'De digital twin heeft nog geen tijd; er is nog geen verleden.',
+  chartNoTime: 'De digital twin heeft nog geen tijd; er is nog geen historie.',
   chartIdealsDiffer: 'Ideaal bereik verschilt per soort',
   chartNoSensors: 'Dit meetpunt heeft geen sensor.',
   chartTable: 'Als tabel tonen',
@@ -46,7 +46,7 @@ export const CHARTS: In<typeof ENGLISH> = {
     max: 'Hoogste',
     event: 'Gebeurtenis',
   },
-  chartGap: (length) => `${length} lang geen gegevens`,
+  chartGap: (length) => `${length} geen gegevens`,
   missing: { not_kept: 'niet meer bewaard', not_recorded: 'niet vastgelegd' },
   chartFailures: (count) => counted(count, 'mislukte poging', 'mislukte pogingen'),
   chartLooks: (count) => counted(count, 'bloemcontrole', 'bloemcontroles'),

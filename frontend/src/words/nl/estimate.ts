@@ -6,12 +6,12 @@ import { counted, whole } from './counted';
 export const ESTIMATE: In<typeof ENGLISH> = {
   about: 'Wat ± betekent',
   aboutText:
-    'Negen van de tien geschatte waarden moeten binnen de ± liggen (een 90%-interval). Die hangt af ' +
-    'van de afstand en ouderdom van de metingen en van het tijdstip. Hoe langer er niet wordt ' +
-    'gemeten, hoe groter de ±.',
+    'In negen van de tien gevallen is de fout naar verwachting niet groter dan de ± (90%-interval). ' +
+    'Die hangt af van hoe ver weg en hoe oud de metingen zijn, en van het tijdstip. ' +
+    'Hoe langer er niet wordt gemeten, hoe groter de ±.',
   onItsWay: 'De schatting wordt geladen',
-  noService: 'Deze digital twin maakt geen schatting: getoond worden de dichtstbijzijnde waarden',
-  noneNow: 'Er is nu geen schatting: getoond worden de dichtstbijzijnde waarden',
+  noService: 'Deze digital twin maakt geen schatting: u ziet de dichtstbijzijnde waarden',
+  noneNow: 'Er is nu geen schatting: u ziet de dichtstbijzijnde waarden',
   noModel: 'Nog geen schatting: er zijn tien metingen van een sensor nodig',
   noSensor: 'Geen meetpunt meet dit, dus er is geen schatting',
   unsure: (error) => `Gearceerd: minder zeker dan ±${error}. Geen kleur: geen gegevens`,
@@ -25,12 +25,12 @@ export const ESTIMATE: In<typeof ENGLISH> = {
     `afgelopen week: ${whole(inside)} van ${counted(scans, 'meting', 'metingen')}`,
   fitProblem: (reason) => `Het model past niet goed bij deze kas: ${reason}`,
   notTrusted: (count) =>
-    `Foutmarge te smal: slechts ${count} van de 10 metingen lagen erbinnen, geen 9.`,
+    `Foutmarge te krap: slechts ${count} van de 10 metingen vielen erbinnen, in plaats van 9.`,
   near: (count) =>
     count === 0
       ? 'geen meetpunt in de buurt'
       : counted(count, 'meetpunt in de buurt', 'meetpunten in de buurt'),
-  oldest: (age) => `oudste meetwaarde ${age}`,
+  oldest: (age) => `oudste meetwaarde ${age} geleden`,
   expected: (measured, expected) => `gemeten ${measured}, verwacht ${expected}`,
   leftOut: (sensor) => `${sensor}: mogelijke sensorfout, niet in de schatting gebruikt`,
   advice: 'Voorgestelde meetpunten',
@@ -40,5 +40,5 @@ export const ESTIMATE: In<typeof ENGLISH> = {
       : `${place}: meetpunten hier en bij elke markering ervoor verlagen de fout van de kaart tot ${percent} van de huidige`,
   adviceNone: 'Geen voorstel voor een extra meetpunt',
   adviceFailed: (reason) => `Geen voorstel voor een extra meetpunt: ${reason}`,
-  adviceNow: 'Voorstellen voor een extra meetpunt worden alleen voor het heden getoond',
+  adviceNow: 'Voorstellen voor een extra meetpunt zijn er alleen voor nu',
 };

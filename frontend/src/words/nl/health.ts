@@ -15,17 +15,14 @@ export const HEALTH: In<typeof ENGLISH> = {
   healthMany: ONE_OR_MANY,
   reasons: {
     sides: { below: 'onder', above: 'boven' },
-    sidesBack: {
-      below: 'binnen bereik; alarm eindigt boven',
-      above: 'binnen bereik; alarm eindigt onder',
-    },
+    wasBeyond: (side, limit, status, until) =>
+      `was ${side} ${limit}; blijft ${status} tot ${until}`,
     just: {
       below: (limit) => `net onder ${limit}`,
       above: (limit) => `net boven ${limit}`,
     },
-    beyond: (sensor, side, limit) => `${sensor} ${side} ${limit}`,
     readingFailed: (sensor) => `${sensor}: de sensor geeft geen waarde`,
-    implausible: (reading) => `${reading}: geen plausibele waarde`,
+    implausible: (reading) => `${reading}: onwaarschijnlijke waarde`,
     scanFailed: (outcome, age) =>
       `Laatste meting mislukt: ${outcome}${age === null ? '' : `, ${age} geleden`}`,
     pest: (count) =>
@@ -44,11 +41,10 @@ export const HEALTH: In<typeof ENGLISH> = {
             : `al ${age} geen meetwaarde`;
       return `${sensor === '' ? '' : `${sensor}: `}${since}${holds === null ? '' : ` (meetwaarden zijn ${holds} geldig)`}`;
     },
-    outOfRange: 'buiten het bereik',
+    outOfRange: 'buiten de grenzen',
     changed: (reading) => `${reading}: mogelijke sensorfout`,
     silent: 'Geen gegevens van de digital twin: de laatste gegevens kunnen verouderd zijn',
-    stopped:
-      'Er wordt geen meetpunt meer gemeten: de robot staat stil, of zijn gegevens komen niet aan',
+    stopped: 'Er wordt niets meer gemeten: de robot staat stil, of zijn gegevens komen niet aan',
     other: (kind, sensor) => (sensor === '' ? kind : `${sensor}: ${kind}`),
   },
   todo: {
@@ -79,11 +75,10 @@ export const HEALTH: In<typeof ENGLISH> = {
   healthMostUnknown: 'Van meer dan de helft van de meetpunten is niets bekend',
   healthSomeUnknown: (count) =>
     `${counted(count, 'meetpunt is', 'meetpunten zijn')} niet te beoordelen`,
-  healthDay: (isDay, source) =>
-    `Het bereik voor ${isDay ? 'overdag' : '’s nachts'} geldt: ${source}`,
+  healthDay: (isDay, source) => `De ${isDay ? 'dag' : 'nacht'}grenzen gelden: ${source}`,
   healthDaySource: {
-    light: 'op basis van het gemeten licht in de kas',
-    clock: 'op basis van de klok, want er wordt geen licht gemeten',
+    light: 'volgens het gemeten licht in de kas',
+    clock: 'volgens de klok, want er wordt geen licht gemeten',
     assumed: 'aangenomen, want licht en tijd zijn onbekend',
   },
   idealParts: { any: 'ideaal', day: 'ideaal overdag', night: 'ideaal ’s nachts' },
@@ -91,8 +86,8 @@ export const HEALTH: In<typeof ENGLISH> = {
   healthAllWell: 'Alle beoordeelde meetwaarden liggen binnen het ideale bereik',
   healthDespite: (alarms) =>
     alarms === 1
-      ? '1 alarm is nog actief: twee goede metingen lossen het op'
-      : `${alarms} alarmen zijn nog actief: telkens twee goede metingen lossen ze op`,
+      ? '1 alarm is nog actief: na twee goede metingen is het opgelost'
+      : `${alarms} alarmen zijn nog actief: elk is na twee goede metingen opgelost`,
   healthAcknowledged: 'bevestigd',
   healthNotCurrent: 'Niet actueel',
   healthNothing: 'Nog geen meetwaarde om te beoordelen',

@@ -26,7 +26,7 @@ export const PAGE: In<typeof ENGLISH> = {
   phaseLabel: 'Verbinding',
   retryNow: 'Nu proberen',
   nextTry: (seconds) => (seconds > 0 ? `volgende poging over ${seconds} s` : 'wordt nu geprobeerd'),
-  frozenSince: (clock) => `De meetwaarden zijn bevroren. Laatste gegevens om ${clock}`,
+  frozenSince: (clock) => `Geen nieuwe meetwaarden. Laatste gegevens om ${clock}`,
   agoSuffix: (age) => `${age} geleden`,
   hours: 'u',
   frozenWhy: {
@@ -40,11 +40,11 @@ export const PAGE: In<typeof ENGLISH> = {
   offlineWhy: {
     live: '',
     paused: '',
-    no_clock: 'De digital twin heeft nog geen tijd; de ouderdom van de meetwaarden is onbekend.',
+    no_clock: 'De digital twin heeft nog geen tijd; hoe oud de meetwaarden zijn, is onbekend.',
     clock_stopped:
-      'De klok van de digital twin staat stil. De ouderdom van de meetwaarden is onbekend.',
+      'De klok van de digital twin staat stil. Hoe oud de meetwaarden zijn, is onbekend.',
     clock_doubted:
-      'De klok van de digital twin loopt verkeerd. De ouderdom van de meetwaarden is onbekend.',
+      'De klok van de digital twin loopt verkeerd. Hoe oud de meetwaarden zijn, is onbekend.',
     never_seen:
       'De server heeft nog niets van een digital twin ontvangen. Staat de digital twin aan?',
     stale: 'De digital twin stuurt niets meer. Controleer of hij draait.',
@@ -72,10 +72,10 @@ export const PAGE: In<typeof ENGLISH> = {
       : `${count} berichten van de server waren onleesbaar en zijn genegeerd.`,
   unreadLast: (why) => `Het laatste: ${why}`,
   paused: 'De tijd staat stil.',
-  pausedHint: 'De simulatie of opname is gepauzeerd; de ouderdom loopt niet op.',
+  pausedHint: 'De simulatie of opname is gepauzeerd; de meetwaarden worden niet ouder.',
   inputProblem: 'Niet alle gegevens komen hier aan.',
   drops: (count) =>
-    `De digital twin heeft de afgelopen minuten ${counted(count, 'bericht', 'berichten')} genegeerd.`,
+    `De digital twin heeft de afgelopen minuten ${counted(count, 'bericht', 'berichten')} niet verwerkt.`,
   journal: {
     off: {
       title: 'Er wordt niets vastgelegd.',
@@ -83,18 +83,18 @@ export const PAGE: In<typeof ENGLISH> = {
     },
     slow: {
       title: 'Het vastleggen loopt achter.',
-      hint: 'Gegevens wachten in het geheugen tot de schijf bijblijft. Bij stroomuitval gaan ze verloren.',
+      hint: 'Gegevens wachten in het geheugen tot de schijf weer bij is. Bij stroomuitval gaan ze verloren.',
     },
     failing: {
       title: 'Het vastleggen mislukt.',
       hint: 'De digital twin draait door en blijft het proberen. Maak ruimte vrij of controleer de schijf.',
     },
     upgrading: {
-      title: 'De opname van een oudere versie wordt omgezet.',
-      hint: 'Nieuwe gegevens worden getoond, maar nog niet vastgelegd. Eerdere gegevens zijn er weer na het omzetten; dat kan minuten duren.',
+      title: 'De gegevens van een oudere versie worden omgezet.',
+      hint: 'Nieuwe gegevens worden getoond, maar nog niet vastgelegd. Eerdere gegevens zijn er weer na het omzetten; dat kan enkele minuten duren.',
     },
     doubting: {
-      title: 'Er wordt niets vastgelegd: de klok spreekt de opname tegen.',
+      title: 'Er wordt niets vastgelegd: de klok klopt niet met eerdere gegevens.',
       hint: 'Nieuwe gegevens worden getoond en vastgelegd zodra de klok klopt, uiterlijk na tien minuten.',
     },
     in_use: {
@@ -123,12 +123,12 @@ export const PAGE: In<typeof ENGLISH> = {
   },
   recordedIs: { playing: 'Speelt af', paused: 'Gepauzeerd' },
   recordedPaused: 'De opname is gepauzeerd.',
-  recordedPausedHint: 'Gepauzeerd of afgelopen; de ouderdom loopt niet op.',
+  recordedPausedHint: 'Gepauzeerd of afgelopen; de meetwaarden worden niet ouder.',
   simulated: 'Gesimuleerd.',
   simulatedHint: (until) => `Alle gegevens tot ${until} zijn demogegevens, niet gemeten.`,
-  setAside: 'Een beschadigde opname is in quarantaine gezet.',
+  setAside: 'Een beschadigd bestand is in quarantaine gezet.',
   setAsideHint: (name) =>
-    `Leesbare gegevens zijn bewaard en het vastleggen gaat door. Het beschadigde bestand is ${name}.`,
+    `Leesbare gegevens zijn bewaard en het vastleggen gaat door. Het bestand heet ${name}.`,
   failedTitle: 'Deze pagina is vastgelopen',
   failedHint:
     'Vertrouw niet op wat u hier ziet. De digital twin en de server hebben er geen last van.',
@@ -160,7 +160,7 @@ export const PAGE: In<typeof ENGLISH> = {
   emptyConnecting: 'Verbinden met de server',
   emptyConnectingHint: 'De kas verschijnt zodra hij antwoordt.',
   emptyUnreachable: 'De server antwoordt niet',
-  emptyUnreachableHint: 'Controleer of hij aanstaat. De pagina blijft het vanzelf proberen.',
+  emptyUnreachableHint: 'Controleer of hij aanstaat. De pagina blijft het proberen.',
   emptyUnreachableMore:
     'De server is de bridge: “lupin-twin serve” op de robot, of “make run” voor de demo.',
   emptyNoTwin: 'Nog geen digital twin',
@@ -171,10 +171,10 @@ export const PAGE: In<typeof ENGLISH> = {
   emptyNoTagsMore: '“lupin-twin demo” toont een gesimuleerde ronde.',
   emptyNoPins: 'Nog geen meetpunt heeft een positie',
   emptyNoPinsHint:
-    'Alle meetpunten staan in de tabel; na de eerste geslaagde meting komen ze op de kaart.',
-  emptyNoReading: (sensor) => `Nog geen meetpunt op de kaart heeft een meetwaarde: ${sensor}`,
+    'Alle meetpunten staan in de tabel; na de eerste goede meting komen ze op de kaart.',
+  emptyNoReading: (sensor) => `Nog geen meetwaarden op de kaart: ${sensor}`,
   emptyNoReadingHint: 'Kies een andere sensor, of wacht tot de robot meer heeft gemeten.',
-  emptyNoMap: 'Nog geen plattegrond: de robot heeft zijn kaart niet gestuurd.',
+  emptyNoMap: 'Geen plattegrond: de robot heeft zijn kaart nog niet gestuurd.',
   emptyNoMapMore: 'De plattegrond is de SLAM-kaart van de robot, die op /map komt.',
 
   helpGlobal: 'Overal',
@@ -187,7 +187,7 @@ export const PAGE: In<typeof ENGLISH> = {
       ['/', 'De tabel filteren'],
       ['F', 'Alles tonen op de kaart'],
       ['N, P', 'Volgend en vorig meetpunt'],
-      ['S', 'Heatmap vloeiend'],
+      ['S', 'Vloeiende heatmap'],
       ['Y', 'Lagen'],
       ['A', 'Alarmen'],
       ['C', 'Grafieken van het gekozen meetpunt'],
@@ -214,6 +214,6 @@ export const PAGE: In<typeof ENGLISH> = {
 
   paper: (taken, printed) => `Stand van ${taken}, afgedrukt ${printed}`,
   paperRest: (printed, all) =>
-    `Afgedrukt zijn de eerste ${printed} van ${all} meetpunten. De tabel als CSV bevat ze allemaal.`,
+    `De eerste ${printed} van ${all} meetpunten zijn afgedrukt. Het CSV-bestand bevat ze allemaal.`,
   asOf: (moment) => `stand van ${moment}`,
 };

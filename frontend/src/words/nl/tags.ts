@@ -13,7 +13,7 @@ export const TAGS: In<typeof ENGLISH> = {
     shown === all
       ? counted(all, 'meetpunt', 'meetpunten')
       : `${whole(shown)} van ${counted(all, 'meetpunt', 'meetpunten')}`,
-  nothingMatches: 'Geen meetpunt past bij het filter.',
+  nothingMatches: 'Geen meetpunt voldoet aan het filter.',
   columns: {
     health: 'Toestand',
     tag: 'Nr.',
@@ -29,7 +29,7 @@ export const TAGS: In<typeof ENGLISH> = {
   farOffLong: (place) =>
     `De positie (${place}) ligt ver van alle andere meetpunten; het meetpunt staat niet op de kaart.`,
   ageUnknown: 'onbekend',
-  ageUnknownLong: 'De ouderdom is onbekend tot de digital twin weer zijn tijd meldt.',
+  ageUnknownLong: 'Onbekend hoe lang geleden, tot de digital twin weer zijn tijd meldt.',
   neverObserved: 'nooit',
   neverObservedLong: 'Nog geen meting heeft een waarde opgeleverd.',
   notKnownThen: 'onbekend',
@@ -61,7 +61,7 @@ export const TAGS: In<typeof ENGLISH> = {
     cucumber: 'komkommer',
     strawberry: 'aardbei',
   },
-  unclassified: 'niet bepaald',
+  unclassified: 'niet herkend',
   tableButton: 'Kolommen en rijen',
   tableColumns: 'Kolommen',
   columnNoRoom: 'venster te smal',
@@ -71,7 +71,7 @@ export const TAGS: In<typeof ENGLISH> = {
   trendTitle: (sensor, hour) =>
     `${sensor} vergeleken met een ${hour ? `kasuur (${hour})` : 'uur'} geleden`,
   trendNone: 'een uur geleden geen meting',
-  trendSame: 'geen nieuwere',
+  trendSame: 'niets nieuws',
   trendLevel: 'gelijk',
   trendUnknown: 'een uur geleden: onbekend',
   density: 'Rijen',

@@ -23,6 +23,8 @@ from tests.support.waiting import PATIENCE_S, wait_for
 
 Pixel = tuple[int, int, int]
 
+# How each font of a page has loaded.
+FONTS = "document.fonts.ready.then((all) => [...all].map(({ status }) => status))"
 WIDE: Final = {"width": 1440, "height": 900}
 PHONE: Final = {"width": 360, "height": 740}
 # What the console says of a server that has ended, wherever it was in an answer.

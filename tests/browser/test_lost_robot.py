@@ -142,3 +142,30 @@ def test_a_site_of_two_tags_that_are_far_apart_is_shown_as_a_whole(open_page: Op
             return view.pixel(-450, 0)[0] > 0 and view.pixel(450, 0)[0] < box["width"]
 
         hmi.expect(are_both_in_sight, "both tags")
+
+
+def test_that_it_stands_still_lies_under_no_other_word(site: Bridge, open_page: OpenPage) -> None:
+    hmi = open_page(site.url, go=False, viewport={"width": 1100, "height": 800})
+    reason = {"kind": "stopped", "verdict": "unknown", "sensor": ""}
+
+    def meet(socket: WebSocketRoute) -> None:
+        def on_message(message: str | bytes) -> None:
+            frame: dict[str, Any] = json.loads(message)
+            if "health" in frame:
+                frame["health"]["house"]["reasons"] = [
+                    {**reason, "value": None, "limit": None, "since": None}
+                ]
+            socket.send(json.dumps(frame))
+
+        socket.connect_to_server().on_message(on_message)
+
+    hmi.page.route_web_socket(re.compile("/ws/state"), meet)
+    hmi.go(query="?lang=nl")
+    todo = hmi.page.get_by_test_id("house-health")
+    expect(todo.locator(".do-more")).to_be_visible()
+    order = todo.locator(".do-now p strong")
+    expect(order).to_have_text("Bij de robot gaan kijken")
+    # The space before it may stand by itself at the end of a line.
+    is_hit = """at => [...at.getClientRects()].filter(it => it.width > 9).every(
+      it => at.contains(document.elementFromPoint(it.right - 5, it.y + it.height / 2)))"""
+    assert order.evaluate(is_hit)

@@ -13,7 +13,7 @@ from typing import Any
 import pytest
 from playwright.sync_api import Browser, Page, expect
 
-from tests.browser.hmi import OpenPage
+from tests.browser.hmi import FONTS, OpenPage
 from tests.support.messages import look, scan
 from tests.support.waiting import PATIENCE_S, wait_for
 from tests.support.web import Bridge, bridge
@@ -82,6 +82,7 @@ def test_the_menu_opens_the_report_of_the_period_on_the_time_bar(
     assert int(query["to"]) - int(query["from"]) == 8 * 3_600
     assert page.locator("html").get_attribute("lang") == "de"
     expect(page.get_by_role("columnheader", name="Schlimmster Wert")).to_be_visible()
+    assert page.evaluate(FONTS) == ["loaded"]
 
 
 @pytest.mark.parametrize("lang", ["en", "de", "nl", "es"])

@@ -9,7 +9,7 @@ from urllib.parse import urlsplit
 import pytest
 from playwright.sync_api import Browser, BrowserContext, Page, expect
 
-from tests.browser.hmi import slow_down
+from tests.browser.hmi import FONTS, slow_down
 from tests.support.access import TOKEN, Served, served
 from tests.support.tls import Certificate, certificate
 from tests.support.waiting import PATIENCE_S
@@ -57,8 +57,9 @@ def test_a_person_signs_in_with_the_keyboard_alone(closed: Served, page: Page) -
     page.goto(closed.url)
     expect(page).to_have_url(closed.url + "/signin")
     expect(page.get_by_label("Access token")).to_be_focused()
-    # The page's mark comes without a token.
+    # The page's mark and font come without a token.
     expect(page.locator("h1 img")).not_to_have_js_property("naturalWidth", 0)
+    assert page.evaluate(FONTS) == ["loaded"]
     page.keyboard.type(TOKEN)
     page.keyboard.press("Enter")
     expect(page).to_have_url(re.compile(f"^{closed.url}/(#.*)?$"))

@@ -121,7 +121,9 @@ def with_security_headers(send: Send) -> Send:
 
 
 # What a browser needs to sign in, and what a supervisor needs to see that the process lives.
-OPEN_PATHS: Final = frozenset({"/signin", "/signin.js", "/signin.css", "/lupin.svg", "/healthz"})
+OPEN_PATHS: Final = frozenset(
+    {"/signin", "/signin.js", "/signin.css", "/font.woff2", "/lupin.svg", "/healthz"}
+)
 # `?lang=`, which the sign-in page goes by too.
 _LANGUAGE: Final = re.compile(r"[A-Za-z]{2,3}(?:-[A-Za-z0-9]{1,8}){0,2}")
 

@@ -76,7 +76,7 @@ _HEARTBEAT_S: Final = 5.0
 _AS_EVERYWHERE: Final = frozenset(
     {
         *("/api/signin", "/api/signout", "/api/session", "/signin", "/signin.css", "/signin.js"),
-        "/api/sensors",
+        *("/font.woff2", "/api/sensors"),
     }
 )
 

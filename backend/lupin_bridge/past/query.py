@@ -160,7 +160,8 @@ class OfReportPage(OfReport):
 
     lang: Literal["en", "de", "nl", "es"] = parameter("language", "en")
     time_zone: str | None = parameter(
-        "of its times, such as Europe/Amsterdam; default: that of the setting `time_zone`"
+        "of its times, such as Europe/Amsterdam; default: that of the setting `time_zone`; UTC in "
+        "place of one that this machine does not know"
     )
 
 
@@ -262,22 +263,12 @@ def report(given: OfReport, now_ns: int | None) -> tuple[int, int]:
     return start_ns, end_ns
 
 
-def zone(name: str | None) -> ZoneInfo | None:
-    """The time zone of a name; None: none was given.
-
-    Raises:
-        PastRefused: one that this machine does not know.
-
-    """
-    if name is None:
-        return None
+def zone(name: str) -> ZoneInfo | None:
+    """The time zone of a name; None: this machine does not know it."""
     try:
         return ZoneInfo(name)
     except (KeyError, OSError, ValueError):
-        raise PastRefused(
-            f"time_zone is {name[:64]!r}, expected one that this machine knows, such as "
-            "Europe/Amsterdam"
-        ) from None
+        return None
 
 
 def of_notes(parameters: Parameters) -> OfNotes:

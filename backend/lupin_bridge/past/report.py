@@ -43,7 +43,7 @@ from lupin_twin.core.past import (
     SeriesPast,
     SeriesRequest,
 )
-from lupin_twin.core.state import STATUS_OK, Snapshot
+from lupin_twin.core.state import STATUS_OK, Snapshot, TagState
 from lupin_twin.core.writes import PastWrite, PastWrites, PeriodRequest, RunSpan
 
 # Of a day at a scan a second there are 86,400. Each takes some 25 us to go through, and three times
@@ -93,10 +93,10 @@ class Report:
         notes: PastNotes = find(NotesRequest())
         snapshot: Snapshot = find(self.end_ns - 1)
         known = [tag.tag_id for tag in snapshot.tags]
-        return self.plan(fold.body(notes.notes or (), known))
+        return self.plan(fold.body(notes.notes or (), known), snapshot.tags)
 
-    def plan(self, body: dict[str, Any]) -> Plan:
-        """The plan of the answer."""
+    def plan(self, body: dict[str, Any], tags: Sequence[TagState]) -> Plan:  # noqa: ARG002
+        """The plan of the answer; `tags` as they were at the end."""
         return planned(orjson.dumps(body), JSON_TYPE, self)
 
     def _per_hour(self, find: Find) -> Counter[int]:

@@ -16,18 +16,23 @@ from typing import Any, Final
 import orjson
 
 from lupin_bridge.judge.options import Criteria, unix_s
+from lupin_bridge.judge.ranges import Span
+from lupin_bridge.judge.verdict import derive
 from lupin_bridge.past.plans import Plan
 from lupin_bridge.past.report import WHOLE_SITE, Report, planned
 from lupin_twin.core.diagnostics import Origin
+from lupin_twin.core.state import TagState
 
 HTML_TYPE: Final = "text/html; charset=utf-8"
 _POLICY: Final = (
-    "default-src 'none'; style-src 'unsafe-inline'; img-src 'self'; base-uri 'none'; "
-    "form-action 'none'; "
-    "frame-ancestors 'none'"
+    "default-src 'none'; style-src 'unsafe-inline'; img-src 'self'; font-src 'self'; "
+    "base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
 )
+PAGE_HEADERS: Final = {"Content-Security-Policy": _POLICY}
 # A browser repeats a table's head on each sheet, and leaves a row whole.
 _STYLE: Final = """
+@font-face { font-family: 'Inter Variable'; font-weight: 100 900;
+  src: url('../font.woff2') format('woff2') }
 @page { size: A4; margin: 14mm 12mm }
 body { font: 10pt/1.35 'Inter Variable', system-ui, -apple-system, 'Segoe UI', 'Liberation Sans',
   sans-serif; color: #111; background: #fff; max-width: 186mm; margin: 0 auto; padding: 4mm }
@@ -87,24 +92,53 @@ def push_text(
 class ReportPage(Report):
     """The report as a page in the language `lang`; times are of `zone`, or the greenhouse's.
 
-    `origin` is where observations come from, `site` the greenhouse's name, where it has one.
+    `unknown_zone` is the one that was asked for, where this machine does not know it. `origin` is
+    where observations come from, `site` the greenhouse's name, where it has one.
     """
 
     lang: str = "en"
     zone: tzinfo | None = None
+    unknown_zone: str = ""
     origin: Origin = "unknown"
     site: str = ""
 
-    def plan(self, body: dict[str, Any]) -> Plan:
+    def plan(self, body: dict[str, Any], tags: Sequence[TagState]) -> Plan:
         """See `Report`."""
-        page = _Page(self.lang, self.criteria, self.zone).page(body, self.origin, self.site)
-        policy = {"Content-Security-Policy": _POLICY}
-        return planned(page.encode("utf-8", "replace"), HTML_TYPE, self, policy)
+        words = _Page(self.lang, self.criteria, self.zone, tags)
+        page = words.page(body, self.origin, self.site, self.unknown_zone)
+        return planned(page.encode("utf-8", "replace"), HTML_TYPE, self, PAGE_HEADERS)
+
+
+def refused_page(reason: str, lang: str) -> str:
+    """Why there is no report, and the way to ask for it again."""
+    words = _words()[lang]
+    return (
+        f"{_head(lang, words['refused'])}<p>{escape(reason)}</p>"
+        f'<p><a href="">{escape(words["again"])}</a></p></body></html>'
+    )
+
+
+def _head(lang: str, title: str, period: str = "") -> str:
+    name = f"{title}, {period}" if period else title
+    return (
+        f'<!doctype html><html lang="{lang}"><head><meta charset="utf-8">'
+        '<meta name="viewport" content="width=device-width">'
+        '<link rel="icon" href="../lupin.svg">'
+        f"<title>{escape(name)}</title><style>{_STYLE}</style></head><body>"
+        f'<h1><img src="../lupin.svg" alt=""> {escape(title)}</h1>'
+    )
 
 
 class _Page:
-    def __init__(self, lang: str, criteria: Criteria, zone: tzinfo | None = None) -> None:
+    def __init__(
+        self,
+        lang: str,
+        criteria: Criteria,
+        zone: tzinfo | None = None,
+        tags: Sequence[TagState] = (),
+    ) -> None:
         self._lang = lang
+        self._tags = {tag.tag_id: tag for tag in tags}
         self._zone = zone or criteria.clock.zone
         self._words = _words()[lang]
         self._criteria = criteria
@@ -112,11 +146,11 @@ class _Page:
         named: Mapping[str, Any] = orjson.loads(criteria.sensors.text).get("sensors", {})
         self._labels = {name: it.get("labels", {}).get(lang) for name, it in named.items()}
 
-    def page(self, body: Entry, origin: Origin, site: str) -> str:
+    def page(self, body: Entry, origin: Origin, site: str, unknown_zone: str) -> str:
         say, at = self.say, self._at
-        # Of a period within a day the rows leave the day out.
-        days = {at(body[name]).rpartition(", ")[0] for name in ("from", "to")}
-        self._day = f"{days.pop()}, " if len(days) == 1 else ""
+        # Rows leave the first day out.
+        day, comma, _ = at(body["from"]).rpartition(", ")
+        self._day = f"{day}{comma}"
         period = say("period", **{"from": at(body["from"]), "to": at(body["to"])})
         heading = f"{say('title')}: {site}" if site else say("title")
         hint = self._words["hints"].get(origin)
@@ -127,14 +161,11 @@ class _Page:
             if body[name] is not None and (name != "kept_from" or body[name] != body["from"])
         ]
         parts = [
-            f'<!doctype html><html lang="{self._lang}"><head><meta charset="utf-8">',
-            '<meta name="viewport" content="width=device-width">',
-            '<link rel="icon" href="../lupin.svg">',
-            f"<title>{escape(f'{heading}, {period}')}</title><style>{_STYLE}</style></head><body>",
-            f'<h1><img src="../lupin.svg" alt=""> {escape(heading)}</h1>',
+            _head(self._lang, heading, period),
             f"<p><strong>{escape(hint)}</strong></p>" if hint else "",
             f"<p>{escape(period)}. ",
             f"{escape(say('zone', zone=self._zone_name(body['from'], body['to'])))}</p>",
+            f"<p>{escape(say('no_zone', zone=unknown_zone))}</p>" if unknown_zone else "",
             f'<p class="note">{escape(" ".join(known) or say("unknown"))}</p>',
             self._counts(body["counts"]),
             self._alarms(body),
@@ -170,14 +201,25 @@ class _Page:
         later = ""
         if body["alarms_from"] != body["from"]:
             later = f"<p>{escape(self.say('later', at=self._at(body['alarms_from'])))}</p>"
-        columns = ("alarm", "point", "when", "end", "first*", "limit*", "worst*")
-        if not any(self._who(alarm) for alarm in body["alarms"]):
-            return self._table(body, "alarms", "alarms", columns, self._alarm, later)
+        active = [alarm for alarm in body["alarms"] if alarm["cleared_at"] is None]
+        cleared = [alarm for alarm in body["alarms"] if alarm["cleared_at"] is not None]
+        return (
+            later
+            + self._of_alarms("active_alarms", active, ("when", "at_end*", "worst*", "limits*"))
+            + self._of_alarms("cleared", cleared, ("when", "end", "length", "worst*", "limits*"))
+            + self._more(body, "alarms")
+        )
 
-        def with_who(alarm: Entry) -> Iterable[str]:
-            return *self._alarm(alarm), self._who(alarm)
+    def _of_alarms(self, title: str, alarms: Sequence[Entry], columns: Sequence[str]) -> str:
+        names = ("alarm", "point", *columns)
+        if any(self._who(alarm) for alarm in alarms):
+            names = (*names, "who")
 
-        return self._table(body, "alarms", "alarms", (*columns, "who"), with_who, later)
+        def cells(alarm: Entry) -> Iterable[str]:
+            found = self._alarm(alarm)
+            return [found[name.removesuffix("*")] for name in names]
+
+        return self._list(title, "alarms", alarms, names, cells)
 
     def _who(self, alarm: Entry) -> str:
         """Who has acknowledged or shelved an alarm."""
@@ -187,19 +229,42 @@ class _Page:
             if f"{word}_by" in alarm
         )
 
-    def _alarm(self, alarm: Entry) -> Iterable[str]:
-        reason = alarm["reason"]
-        cleared, numbers = alarm["cleared_at"], reason["kind"] == "range"
-        number = partial(self._number, sensor=reason["sensor"], limit=reason["limit"])
-        return (
-            f"{self._what(reason)} ({self._words['verdicts'][reason['verdict']]})",
-            alarm["tag_id"] or self.say("house"),
-            self._clock(alarm["raised_at"]),
-            self.say("still") if cleared is None else self._clock(cleared),
-            number(reason["value"]) if numbers or reason["kind"] == "pest" else "",
-            number(reason["limit"]) if numbers else "",
-            number(alarm["worst"]),
-        )
+    def _alarm(self, alarm: Entry) -> Mapping[str, str]:
+        """The cells of an alarm, by their columns."""
+        reason, tag = alarm["reason"], self._tags.get(alarm["tag_id"])
+        raised, cleared, limit = alarm["raised_at"], alarm["cleared_at"], reason["limit"]
+        numbers = reason["kind"] == "range"
+        unit = self._criteria.sensors.named(reason["sensor"]).unit if numbers else ""
+        number, at_end = partial(self._number, sensor=reason["sensor"]), None
+        if tag is not None and numbers:
+            readings = (*tag.readings, *derive(tag.readings))
+            at_end = next((it.value for it in readings if it.name == reason["sensor"]), None)
+        elif tag is not None and reason["kind"] == "pest":
+            at_end = float(tag.flower.bug_count)
+        span = self._span(reason, tag) if numbers else None
+        low = "" if span is None else number(span.low).removesuffix(f"\u00a0{unit}") + "–"
+        return {
+            "alarm": f"{self._what(reason)} ({self._words['verdicts'][reason['verdict']]})",
+            "point": alarm["tag_id"] or self.say("house"),
+            "when": self._clock(raised),
+            "end": "" if cleared is None else self._clock(cleared),
+            "length": "" if cleared is None else self._length(cleared["sec"] - raised["sec"]),
+            "at_end": number(at_end, limit=limit),
+            "worst": number(alarm["worst"], limit=limit),
+            "limits": low + number(limit if span is None else span.high) if numbers else "",
+            "who": self._who(alarm),
+        }
+
+    def _span(self, reason: Entry, tag: TagState | None) -> Span | None:
+        """The range whose limit was passed; None: no range of today has it."""
+        sensor = self._criteria.sensors.named(reason["sensor"])
+        for species in ("" if tag is None else tag.flower.species, ""):
+            for is_day in (True, False):
+                ranges = sensor.ranges(is_day=is_day, species=species)
+                for span in (ranges.ideal, ranges.critical):
+                    if span is not None and reason["limit"] in {span.low, span.high}:
+                        return span
+        return None
 
     def _extremes(self, body: Entry) -> str:
         columns = ("sensor", "low*", "where", "mean*", "high*", "where", "count*", "bad*")
@@ -246,19 +311,29 @@ class _Page:
         from_, to = self._clock(silence["from"]), self._clock(silence["to"])
         return self._where(silence["tag_id"]), from_, to, length
 
-    def _table(  # noqa: PLR0917
+    def _table(
         self,
         body: Entry,
         title: str,
         name: str,
         columns: Sequence[str],
         cells: Callable[[Entry], Iterable[str]],
-        before: str = "",
     ) -> str:
-        """A list of the body; a column whose word ends with `*` has numbers."""
+        """A list of the body."""
+        return self._list(title, name, body[name], columns, cells) + self._more(body, name)
+
+    def _list(
+        self,
+        title: str,
+        name: str,
+        entries: Sequence[Entry],
+        columns: Sequence[str],
+        cells: Callable[[Entry], Iterable[str]],
+    ) -> str:
+        """A table; a column whose word ends with `*` has numbers."""
         kinds = [' class="number"' if column.endswith("*") else "" for column in columns]
-        head = f"<h2>{escape(self.say(title))}</h2>{before}"
-        if not body[name]:
+        head = f"<h2>{escape(self.say(title))}</h2>"
+        if not entries:
             return f"{head}<p>{escape(self.say('none'))}</p>"
         names = "".join(
             f'<th scope="col"{kind}>{escape(self.say(column.removesuffix("*")))}</th>'
@@ -271,12 +346,12 @@ class _Page:
                 for cell, kind in zip(cells(entry), kinds, strict=True)
             )
             + "</tr>"
-            for entry in body[name]
+            for entry in entries
         )
-        table = (
-            f'<table class="{name}"><thead><tr>{names}</tr></thead><tbody>{rows}</tbody></table>'
+        return (
+            f'{head}<table class="{name}"><thead><tr>{names}</tr></thead>'
+            f"<tbody>{rows}</tbody></table>"
         )
-        return f"{head}{table}{self._more(body, name)}"
 
     def _more(self, body: Entry, name: str) -> str:
         count = body["left_out"][name]
@@ -323,20 +398,15 @@ class _Page:
         return self.say("date", day=at.day, month=month, year=at.year, clock=f"{at:%H:%M}")
 
     def _clock(self, when: Mapping[str, int]) -> str:
-        """A moment in a row; where all of the period is of one day, without that day."""
+        """A moment in a row; one of the report's first day without that day."""
         return self._at(when).removeprefix(self._day)
 
     def _number(self, value: float | None, sensor: str, limit: float | None = None) -> str:
-        """A number with its unit on the same line, written as the page does.
-
-        What reads like the limit that it is beyond says on which side it is.
-        """
+        """As the page writes it; what reads like the limit that it is beyond says on which side."""
         if value is None:
             return ""
         known = self._criteria.sensors
         unit, digits, size = known.named(sensor).unit, known.digits(sensor), abs(value)
-        if digits is None and unit:
-            digits = 0 if size >= 100 else 1 if size >= 1 else 2
         number = f"{value:.4g}"
         if digits is not None and size < 1e6:
             number = f"{value:,.{digits if size < 1000 else 0}f}"

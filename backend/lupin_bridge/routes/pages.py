@@ -243,6 +243,7 @@ def _known_language(tag: str, known: Collection[str]) -> str | None:
 
 # Not in the folder of the HMI, which its build empties, and needed before the HMI may be read.
 _SIGNIN_FOLDER: Final = Path(__file__).parent / "signin_page"
+_ASSETS: Final = Path(__file__).parents[1] / "static" / "assets"
 
 
 @router.post("/api/signin", include_in_schema=False)
@@ -335,6 +336,15 @@ async def script() -> Response:
     return _file("signin.js", "text/javascript; charset=utf-8")
 
 
+@read_route(router, "/font.woff2", include_in_schema=False)
+async def font() -> Response:
+    """The HMI's font, by a name that the report and the page above know."""
+    found = _font()
+    if found is None:
+        return error_response("the page was not built, and has no font", 404)
+    return Response(found, headers={"Cache-Control": "max-age=604800"}, media_type="font/woff2")
+
+
 class _Place(TypedDict):
     path: str
     secure: bool
@@ -374,6 +384,12 @@ def _page_in(language: str, *, has_accounts: bool) -> str:
         words |= {"token": words["password"], "wrong": words["wrong_person"]}
     page = _read_file("signin.html").decode()
     return page.format(lang=language, hidden="" if has_accounts else "hidden", **words)
+
+
+@cache
+def _font() -> bytes | None:
+    path = next(_ASSETS.glob("inter-*.woff2"), None)
+    return None if path is None else path.read_bytes()
 
 
 @cache

@@ -2,19 +2,31 @@
 
 from __future__ import annotations
 
+from datetime import UTC
+
 from fastapi import APIRouter, Request, Response
 
 from lupin_bridge.past import query, schema
 from lupin_bridge.past.plans import History, Timeline
 from lupin_bridge.past.report import Report
-from lupin_bridge.past.report_page import ReportPage
+from lupin_bridge.past.report_page import (
+    HTML_TYPE,
+    PAGE_HEADERS,
+    ReportPage,
+    languages,
+    refused_page,
+)
 from lupin_bridge.query_string import parameters_of, read
 from lupin_bridge.routes.answers import (
     NOT_REMEMBERED,
+    REFUSALS,
     bridge_of,
+    list_header,
     read_route,
+    refusal,
     respond_past,
 )
+from lupin_bridge.routes.pages import language_of
 from lupin_twin.core.past import PastRefused
 
 router = APIRouter()
@@ -72,16 +84,36 @@ async def report_route(request: Request) -> Response:
     openapi_extra={"parameters": parameters_of(query.OfReportPage)},
 )
 async def report_page_route(request: Request) -> Response:
-    """Without scripts."""
+    """Without scripts. A browser gets a refusal as a page too."""
+    try:
+        return await _report_page(request)
+    except REFUSALS as error:
+        refused = refusal(error)
+        if "text/html" in list_header(request, "accept"):
+            lang = language_of(
+                request.query_params.get("lang"),
+                list_header(request, "accept-language"),
+                languages(),
+            )
+            page = refused_page(str(error), lang)
+            headers = {**refused.headers, **PAGE_HEADERS}
+            del headers["content-length"], headers["content-type"]
+            return Response(page, refused.status_code, headers, HTML_TYPE)
+        return refused
+
+
+async def _report_page(request: Request) -> Response:
     given = read(query.OfReportPage, request.query_params.multi_items(), PastRefused)
     found = _report(request, given)
+    zone = None if given.time_zone is None else query.zone(given.time_zone)
     page = ReportPage(
         found.start_ns,
         found.end_ns,
         found.criteria,
         found.journal,
         lang=given.lang,
-        zone=query.zone(given.time_zone),
+        zone=UTC if zone is None and given.time_zone is not None else zone,
+        unknown_zone="" if zone is not None else (given.time_zone or "")[:64],
         origin=bridge_of(request).origin,
         site=bridge_of(request).site,
     )

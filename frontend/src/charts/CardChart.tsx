@@ -9,13 +9,13 @@ import { MarksKey } from './MarksKey';
 import { PlotView } from './PlotView';
 import { SensorChoice } from './SensorChoice';
 import { useLines } from './useLines';
-import { useSensorsOf, useSpeciesOf } from './useSensorsOf';
+import { chosenSensor, useChosenSensor, useSensorsOf, useSpeciesOf } from './useSensorsOf';
 import { pointsFor, useSize } from './useSize';
 import { ChartState } from './ChartState';
 
 const HEIGHT = 172;
 
-/** The sensor in view, or the tag's first, over the period of the time bar. */
+/** The sensor that was chosen here, the one in view, or the tag's first, over the period of the time bar. */
 export default function CardChart({ tagId }: { tagId: string }): JSX.Element | null {
   const inView = useApp((state) => state.view.sensor);
   const unit = useApp((state) => state.settings.unit);
@@ -23,7 +23,8 @@ export default function CardChart({ tagId }: { tagId: string }): JSX.Element | n
   const catalogue = useApp(selectCatalogue);
   const both = useApp(selectCatalogues);
   const sensors = useSensorsOf(tagId);
-  const sensor = sensors.includes(inView) ? inView : sensors[0];
+  const chosen = useChosenSensor();
+  const sensor = [chosen, inView].find((name) => sensors.includes(name)) ?? sensors[0];
   const place = useRef<HTMLDivElement>(null);
   const { width } = useSize(place);
   const plan = useMemo(
@@ -44,7 +45,13 @@ export default function CardChart({ tagId }: { tagId: string }): JSX.Element | n
   if (!plan) return null;
   return (
     <div className="card-chart" ref={place} data-testid="card-chart" data-state={state}>
-      <SensorChoice tagId={tagId} value={plan.sensor} />
+      <SensorChoice
+        tagId={tagId}
+        value={plan.sensor}
+        onChange={(name) => {
+          chosenSensor.dispatch({ name, inView });
+        }}
+      />
       {state === 'missing' ? (
         <p className="faint">{S.chartMissingShort}</p>
       ) : (

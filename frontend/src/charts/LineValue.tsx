@@ -1,6 +1,7 @@
 import type { JSX } from 'react';
 
-import { rangeText, readingText } from '../domain/format';
+import { ageText, rangeText, readingText } from '../domain/format';
+import { isOfDay } from '../domain/sensors';
 import { lastUntil, pointAt, type Bucket, type Reading } from '../domain/series';
 import { useApp } from '../store/app';
 import { useSelected } from '../store/create';
@@ -8,6 +9,8 @@ import { pointedTime } from '../store/signals';
 import { S } from '../strings';
 import { isStroked, lookOf, markerPath } from './looks';
 import type { Line, PlotModel } from './model';
+
+const DAY_S = 86_400;
 
 /** The time that charts tell of: under the mouse, else the moment that the page shows; null: newest. */
 export function useTold(): { at: number | null; isPointed: boolean } {
@@ -20,7 +23,7 @@ export function useTold(): { at: number | null; isPointed: boolean } {
 /** What a line says at that time, how far it ranges there, and what it was the day before. */
 export function LineValue({
   line,
-  model: { sensor, unit },
+  model: { sensor, unit, span },
 }: {
   line: Line;
   model: PlotModel;
@@ -29,6 +32,11 @@ export function LineValue({
   const point = (isPointed ? pointAt : lastUntil)(line.series, at ?? Infinity);
   const value = valueOf(point);
   const was = valueOf(beforeAt(line, at));
+  const reach = useApp((state) => state.twin.remembered.value?.reach);
+  if (value === null && isOfDay(sensor)) {
+    const known = reach ? Math.max(0, (at ?? span.to) - reach.from) : 0;
+    return <span className="faint">{S.chartNeedsDay(known < DAY_S ? ageText(known) : null)}</span>;
+  }
   return (
     <span className="line-value">
       {point && 'mean' in point && point.n > 1 && (

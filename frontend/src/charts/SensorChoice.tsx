@@ -2,14 +2,22 @@ import { useMemo, type JSX } from 'react';
 
 import { isHad } from '../domain/sensors';
 import { shown } from '../domain/text';
-import { act, useApp } from '../store/app';
+import { useApp } from '../store/app';
 import { selectCatalogue } from '../store/derived';
 import { S } from '../strings';
 import { Select } from '../widgets/Select';
 import { useSensorsOf } from './useSensorsOf';
 
 /** Which sensor of a tag is charted; what is computed of its sensors is among them. */
-export function SensorChoice({ tagId, value }: { tagId: string; value: string }): JSX.Element {
+export function SensorChoice({
+  tagId,
+  value,
+  onChange,
+}: {
+  tagId: string;
+  value: string;
+  onChange: (sensor: string) => void;
+}): JSX.Element {
   const sensors = useSensorsOf(tagId);
   const catalogue = useApp(selectCatalogue);
   const choices = useMemo(() => {
@@ -24,9 +32,7 @@ export function SensorChoice({ tagId, value }: { tagId: string; value: string })
       value={value}
       options={choices}
       text={(name) => shown(catalogue.named(name).label, 32)}
-      onChange={(sensor) => {
-        act({ type: 'sensor', sensor });
-      }}
+      onChange={onChange}
     />
   );
 }

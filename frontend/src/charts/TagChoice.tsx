@@ -32,7 +32,13 @@ export function TagChoice({
   };
   return (
     <div className="chart-tags">
-      <SensorChoice tagId={tagIds[0] ?? ''} value={sensor.name} />
+      <SensorChoice
+        tagId={tagIds[0] ?? ''}
+        value={sensor.name}
+        onChange={(name) => {
+          act({ type: 'sensor', sensor: name });
+        }}
+      />
       <ul aria-label={S.tags}>
         {tagIds.map((tagId, look) => (
           <li key={tagId}>

@@ -2,20 +2,40 @@ import { useMemo } from 'react';
 
 import { isHad, isMeasured, type Catalogue } from '../domain/sensors';
 import { useApp } from '../store/app';
-import { selectCatalogue, selectSensor } from '../store/derived';
+import { createStore, useSelected } from '../store/create';
+import { selectCatalogue } from '../store/derived';
 import { selectTag } from '../store/moment';
 
+interface Chosen {
+  readonly name: string;
+  /** What the map showed then: with another one there, the card follows the map again. */
+  readonly inView: string;
+}
+
+/** What was chosen for the card's chart; the map keeps its own. */
+export const chosenSensor = createStore<Chosen | null, Chosen | null>(null, (_, next) => next);
+
+/** What the card's chart is to show: the sensor in view, unless another was chosen. */
+export function useChosenSensor(): string {
+  const inView = useApp((state) => state.view.sensor);
+  const chosen = useSelected(chosenSensor, (it) => it);
+  return chosen?.inView === inView ? chosen.name : inView;
+}
+
 /**
- * The sensors that a tag has at the moment that is shown, in their usual order; and what is in
- * view, where it is computed of them.
+ * The sensors that a tag has at the moment that is shown, in their usual order; and what is in view
+ * or chosen, where it is computed of them.
  */
 export function useSensorsOf(tagId: string): readonly string[] {
+  const chosen = useChosenSensor();
   const names = useApp((state) => {
     const readings = selectTag(state, tagId)?.readings;
     if (!readings) return '';
-    const inView = selectSensor(state);
-    const isComputed = !isMeasured(inView) && isHad(inView, (name) => readings.has(name));
-    return [...new Set([...readings.keys(), ...(isComputed ? [inView.name] : [])])].join('\u0000');
+    const computed = [state.view.sensor, chosen].filter((name) => {
+      const sensor = selectCatalogue(state).named(name);
+      return !isMeasured(sensor) && isHad(sensor, (each) => readings.has(each));
+    });
+    return [...new Set([...readings.keys(), ...computed])].join('\u0000');
   });
   const catalogue = useApp(selectCatalogue);
   return useMemo(

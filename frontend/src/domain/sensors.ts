@@ -43,7 +43,7 @@ export interface Sensor extends Ranges {
 export const isMeasured = ({ madeOf }: Sensor): boolean => madeOf.length === 0;
 
 /** What is computed of one sensor alone is made of its readings of a day: charts offer it. */
-const isOfDay = ({ madeOf }: Sensor): boolean => madeOf.length === 1;
+export const isOfDay = ({ madeOf }: Sensor): boolean => madeOf.length === 1;
 
 /** Whether a tag that has these sensors has it, or what it takes to compute it. */
 export const isHad = (

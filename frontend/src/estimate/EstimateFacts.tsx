@@ -2,6 +2,7 @@ import type { JSX } from 'react';
 
 import { fetchGrade } from '../contract/estimate';
 import type { Grade, NoEstimate } from '../contract/types';
+import { isMeasured } from '../domain/sensors';
 import { shown } from '../domain/text';
 import { useApp } from '../store/app';
 import { selectSensor } from '../store/derived';
@@ -22,6 +23,13 @@ export function EstimateFacts(): JSX.Element {
   const isNow = useApp((state) => selectShown(state).moment === null);
   const isError = useApp((state) => state.view.heat === 'error');
   const grade = useAsked(fetchGrade);
+  if (!isMeasured(sensor)) {
+    return (
+      <span role="status" className="estimate-missing" data-testid="estimate-missing">
+        {E.computed}
+      </span>
+    );
+  }
   const ofSensor = field?.sensor === sensor.name ? field : null;
   if (ofSensor?.noEstimate) return <Missing why={ofSensor.noEstimate} grade={grade.value} />;
   if (!ofSensor?.sureness) return <span role="status">{E.onItsWay}</span>;

@@ -151,6 +151,14 @@ describe('legend', () => {
     expect(screen.getAllByRole('status')).toHaveLength(1);
   });
 
+  test('what is computed has no estimate, and that is said', () => {
+    act({ type: 'sensor', sensor: 'vpd' });
+    render(<EstimateFacts />);
+    expect(text('estimate-missing')).toBe(
+      'A computed quantity has no estimate: the nearest readings are shown',
+    );
+  });
+
   test('the error alone has a scale of its own, from none to the most', async () => {
     showField(estimated([22.4, NaN], [0.5, 2]));
     act({ type: 'heat', heat: 'error' });

@@ -43,6 +43,8 @@ export function Overview({ seen, words, isKiosk }: Props): JSX.Element {
   const sites = useDeferredValue(seen.sites);
   const counts = useMemo(() => countsOf(sites.values()), [sites]);
   const alarms = useMemo(() => alarmCount(sites.values()), [sites]);
+  // Before, there is nothing to count.
+  const isHere = seen.archive !== null;
   const names = groupNames(sites.values()).join();
   const groups = useMemo(() => (names ? names.split(',') : []), [names]);
   const shown = useMemo(() => chosen(sites, filter, search, group), [sites, filter, search, group]);
@@ -69,7 +71,7 @@ export function Overview({ seen, words, isKiosk }: Props): JSX.Element {
         <h1>{words.sites}</h1>
         {isKiosk && (
           <span className="fleet-alarms" data-any={alarms > 0}>
-            {alarms === 0 ? words.noAlarms : S.alarmCount(alarms)}
+            {!isHere ? '' : alarms === 0 ? words.noAlarms : S.alarmCount(alarms)}
           </span>
         )}
         {!isKiosk && (
@@ -88,7 +90,7 @@ export function Overview({ seen, words, isKiosk }: Props): JSX.Element {
                   {each === 'alarms' && (
                     <>
                       {' '}
-                      <span className="fleet-count">{alarms}</span>
+                      <span className="fleet-count">{isHere && alarms}</span>
                     </>
                   )}
                 </button>
@@ -126,7 +128,8 @@ export function Overview({ seen, words, isKiosk }: Props): JSX.Element {
                     setFilter(each);
                   }}
                 >
-                  {filterText(each, words)} <span className="fleet-count">{counts[each]}</span>
+                  {filterText(each, words)}{' '}
+                  <span className="fleet-count">{isHere && counts[each]}</span>
                 </button>
               ))}
             </div>

@@ -23,7 +23,7 @@ import {
 import { filterRows, inAreas, rowsOf, sortRows, type Row } from '../domain/table';
 import type { Tag } from '../domain/twin';
 import type { AppState } from './app';
-import { sourceOf } from './heat';
+import type { Source } from './heat';
 import { memoLast, memoOne } from '../domain/memo';
 import { isHeardNow, selectIsHeard, selectNewest, selectShown, selectTags } from './moment';
 import type { MapPicture } from './picture';
@@ -57,6 +57,10 @@ export function selectCatalogue(state: AppState): Catalogue {
 /** The one in view. */
 export const selectSensor = (state: AppState): Sensor =>
   selectCatalogue(state).named(state.view.sensor);
+
+/** What is computed has no estimate: the twin estimates what tags read. */
+export const sourceOf = (state: AppState): Source =>
+  state.view.heat !== 'nearest' && isMeasured(selectSensor(state)) ? 'estimate' : 'nearest';
 
 const sensorNames = memoLast(
   // The names as one string: a new snapshot with the same sensors keeps the same list.
@@ -213,7 +217,11 @@ const onMap = memoOne((field: Field) =>
 /** The field of the moment that is shown, as far as the house is explored. */
 function selectField(state: AppState): Field | null {
   const { field, map } = selectShown(state);
-  return field.value && onMap(field.value)(map.value);
+  const { value } = field;
+  // The one of before is none of what is wanted: under its name it would be taken for it.
+  const isEstimate = Boolean(value?.sureness ?? value?.noEstimate);
+  if (!value || isEstimate !== (sourceOf(state) === 'estimate')) return null;
+  return onMap(value)(map.value);
 }
 
 const errorOf = memoOne((field: Field): Field | null =>
@@ -233,7 +241,7 @@ export function selectHeat(state: AppState): Heat | null {
     const { value } = state.twin.difference;
     const field = value?.field;
     if (!field || field.sampleCount === 0) return null;
-    const old = sourceOf(state.view) === 'nearest' ? selectOld(state, field) : null;
+    const old = sourceOf(state) === 'nearest' ? selectOld(state, field) : null;
     return heat(field, differenceRange(field)(selectSensor(state)), null, value, false, old);
   }
   const field = selectField(state);

@@ -7,7 +7,8 @@ import { differenceOf, otherMoment, type Compare } from '../domain/difference';
 import type { Snapshot } from '../domain/twin';
 import { boundsOf, type Bounds } from '../geometry/coordinates';
 import { onChange, receive, store, type AppState } from './app';
-import { fetchHeat, sourceOf } from './heat';
+import { sourceOf } from './derived';
+import { fetchHeat } from './heat';
 import { ASSUMED_MARGIN_M, fieldResolution } from './loaders';
 import { rosNow, selectNewest, selectShown } from './moment';
 import { createFetcher, DRAG_PACE_MS, NOTHING, type Wish } from './fetcher';
@@ -38,8 +39,11 @@ export function startDifference(): () => void {
       if (difference !== NOTHING) receive({ type: 'difference', difference: NOTHING });
       return;
     }
-    // Of another sensor, or to another moment, it is none of what is wanted.
-    const isOther = before?.view.compare !== compare || before.view.sensor !== sensor;
+    // Of another sensor or source, or to another moment, it is none of what is wanted.
+    const isOther =
+      before?.view.compare !== compare ||
+      before.view.sensor !== sensor ||
+      sourceOf(before) !== sourceOf(state);
     before = state;
     if (isOther && difference !== NOTHING) receive({ type: 'difference', difference: NOTHING });
     const wish = wishFor(state, compare);
@@ -48,7 +52,7 @@ export function startDifference(): () => void {
   update();
   const stop = onChange((state) => {
     const { view, twin } = state;
-    return [view.compare, view.sensor, sourceOf(view), twin.connection, selectShown(state)];
+    return [view.compare, view.sensor, sourceOf(state), twin.connection, selectShown(state)];
   }, update);
   const timer = setInterval(update, TICK_MS);
   return () => {
@@ -66,7 +70,7 @@ function wishFor(state: AppState, compare: Compare): Wish<Difference> | null {
   const box = boxOf(snapshot, resolution);
   if (!snapshot || !box || nowS === null || socket.kind !== 'open') return null;
   const { sensor } = state.view;
-  const source = sourceOf(state.view);
+  const source = sourceOf(state);
   const at = moment ?? Math.floor(nowS / STEP_S) * STEP_S;
   const against = otherMoment(compare, at);
   const { minX, minY, maxX, maxY } = box;

@@ -57,8 +57,8 @@ test('the estimate that is chosen takes the place of the nearest readings, with 
   await until(() => field().value !== null);
   expect(count('estimate')).toBe(0);
   act({ type: 'heat', heat: 'estimate' });
-  // What was there stays until it has come.
-  expect(field().value?.values).toHaveLength(2);
+  // Under the estimate's name nothing else is shown.
+  expect(selectHeat(store.get())).toBeNull();
   await until(() => field().value?.sureness !== undefined);
   expect(selectHeat(store.get())).toMatchObject({ isError: false, field: { valueMax: 22 } });
   act({ type: 'heat', heat: 'error' });
@@ -67,6 +67,15 @@ test('the estimate that is chosen takes the place of the nearest readings, with 
   const before = count('estimate.npy');
   await vi.advanceTimersByTimeAsync(1_000);
   expect(count('estimate.npy')).toBe(before);
+});
+
+test('what is computed has no estimate: the nearest readings are asked for', async () => {
+  showTags(tags);
+  act({ type: 'sensor', sensor: 'vpd' });
+  act({ type: 'heat', heat: 'estimate' });
+  await until(() => field().value !== null);
+  expect(count('estimate')).toBe(0);
+  expect(selectHeat(store.get())?.field.values).toHaveLength(2);
 });
 
 test('it goes on with the time: what nobody reads becomes less sure', async () => {

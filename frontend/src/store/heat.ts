@@ -2,13 +2,9 @@
 import { now } from '../clock';
 import { fetchField, Refusal, type FieldQuery } from '../contract/api';
 import type { Field, NoEstimate } from '../contract/types';
-import type { ViewState } from './view';
 
 /** The estimate and its error come in one. */
 export type Source = 'nearest' | 'estimate';
-
-export const sourceOf = ({ heat }: Pick<ViewState, 'heat'>): Source =>
-  heat === 'nearest' ? 'nearest' : 'estimate';
 
 /** A twin that has refused an estimate is asked again after this long, ms. */
 const CALM_MS = 10_000;

@@ -6,7 +6,8 @@ import type { Snapshot } from '../domain/twin';
 import { boundsOf, type Bounds } from '../geometry/coordinates';
 import { loadMap, type MapPicture } from './picture';
 import { onChange, receive, store, type AppState } from './app';
-import { fetchHeat, sourceOf, type Source } from './heat';
+import { sourceOf } from './derived';
+import { fetchHeat, type Source } from './heat';
 import { selectNewest } from './moment';
 import { createFetcher, NOTHING, type Wish } from './fetcher';
 
@@ -60,7 +61,7 @@ export function startLoaders(): () => void {
 
   const update = (): void => {
     const state = store.get();
-    const source = sourceOf(state.view);
+    const source = sourceOf(state);
     if (source === 'estimate') {
       ticking ??= setInterval(() => {
         ticks += 1;
@@ -107,7 +108,7 @@ export function startLoaders(): () => void {
     );
   };
   update();
-  const stop = onChange(({ twin, view }) => [twin, view.sensor, sourceOf(view)], update);
+  const stop = onChange((state) => [state.twin, state.view.sensor, sourceOf(state)], update);
   return () => {
     stop();
     clearInterval(ticking);

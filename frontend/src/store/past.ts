@@ -4,7 +4,8 @@ import { fetchStateAt } from '../contract/past';
 import type { Field, Judgement } from '../contract/types';
 import { snapshotOf, type Snapshot } from '../domain/twin';
 import { onChange, receive, store, type AppState } from './app';
-import { fetchHeat, sourceOf, type Source } from './heat';
+import { sourceOf } from './derived';
+import { fetchHeat, type Source } from './heat';
 import { fieldResolution } from './loaders';
 import { selectNewest, selectPast } from './moment';
 import { createFetcher, DRAG_PACE_MS, type Fetched, NOTHING, type Wish } from './fetcher';
@@ -126,7 +127,7 @@ const withoutField = (past: Past): Past => ({
 
 function wishFor(state: AppState, at: number, epoch: number): Wish<Came> {
   const { sensor } = state.view;
-  const source = sourceOf(state.view);
+  const source = sourceOf(state);
   const resolution = fieldResolution(selectNewest(state).snapshot);
   return {
     key: `${epoch}|${at}|${sensor}|${resolution}|${source}`,

@@ -4,7 +4,7 @@ import type { CycleWish } from '../store/cycle';
 import { act, useApp } from '../store/app';
 import { useSelected } from '../store/create';
 import { selectHealth } from '../store/derived';
-import { selectShown } from '../store/moment';
+import { selectIsHere, selectShown } from '../store/moment';
 import { selectIsRecorded } from '../store/origin';
 import { S } from '../strings';
 import { AlarmsLabel } from './alarms/AlarmCount';
@@ -92,6 +92,7 @@ function skipToTable(event: React.MouseEvent): void {
 function PaneTabs(): JSX.Element {
   const shown = useApp(({ view }) => (view.pane === 'map' ? 'map' : view.list));
   const verdict = useApp((state) => selectHealth(state).verdict);
+  const isHere = useApp(selectIsHere);
   const tab = (name: 'map' | 'tags' | 'alarms', label: JSX.Element): JSX.Element => (
     <button
       type="button"
@@ -102,7 +103,7 @@ function PaneTabs(): JSX.Element {
     >
       <Icon name={name === 'map' ? 'map' : name === 'tags' ? 'list' : 'bell'} />
       <span>{label}</span>
-      {name === 'tags' && <HealthMark verdict={verdict} word={false} />}
+      {name === 'tags' && isHere && <HealthMark verdict={verdict} word={false} />}
     </button>
   );
   return (

@@ -8,6 +8,7 @@ import { todoText } from '../domain/reasons';
 import { shown } from '../domain/text';
 import { useApp } from '../store/app';
 import { selectHealth } from '../store/derived';
+import { selectIsHere } from '../store/moment';
 import { S } from '../strings';
 import { useSince, useUrgent, type Urgent } from './DoNow';
 import { useFitting } from './fitting';
@@ -33,7 +34,8 @@ export function AttentionList(): JSX.Element {
   const urgent = useUrgent();
   const lines = useLines(urgent);
   const health = useApp(selectHealth);
-  const heading = urgent.length > 0 ? S.attention : noneText(health);
+  const isHere = useApp(selectIsHere);
+  const heading = urgent.length > 0 ? S.attention : isHere ? noneText(health) : null;
   const list = useRef<HTMLUListElement>(null);
   const count = useFitting(list, lines.length);
   const rest = lines.slice(count).reduce((sum, { tags }) => sum + tags.length, 0);

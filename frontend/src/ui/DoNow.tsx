@@ -3,9 +3,10 @@ import { useMemo, type JSX } from 'react';
 import { whenText } from '../alarms/words';
 import { alarmOf, isAwaited, type Item } from '../alarms/list';
 import { alarmList } from '../alarms/watch';
-import { now } from '../clock';
+import { epochOf, now } from '../clock';
 import type { HealthReason } from '../contract/types';
-import { isBad, severity, VERDICTS, type HouseHealth } from '../domain/health';
+import { clockText } from '../domain/format';
+import { isBad, isSilent, severity, VERDICTS, type HouseHealth } from '../domain/health';
 import { todoText } from '../domain/reasons';
 import { secondsOf } from '../domain/rostime';
 import { rowsOf } from '../domain/table';
@@ -13,7 +14,7 @@ import { shown } from '../domain/text';
 import { act, store, useApp } from '../store/app';
 import { useSelected } from '../store/create';
 import { selectHealth } from '../store/derived';
-import { rosNow, selectShown, selectTags } from '../store/moment';
+import { rosNow, selectIsHere, selectNewest, selectShown, selectTags } from '../store/moment';
 import { S } from '../strings';
 import { HealthMark } from './HealthMark';
 import { selectAreAlarmsKnown, useReasonText } from './Reasons';
@@ -62,13 +63,17 @@ export function useUrgent(): readonly Urgent[] {
 
 /**
  * Since when the alarm of a reason is active, that somebody has acknowledged it, or that there is none
- * yet; null: nobody knows, or another moment is shown.
+ * yet; of a twin that is not heard, when that was so. Null: nobody knows, or another moment is shown.
  */
 export function useSince(tagId: string, reason: HealthReason): string | null {
   const isNow = useApp((state) => selectShown(state).moment === null);
   const found = useSelected(alarmList, ({ active }) => alarmOf(active, tagId, reason));
   const isKnown = useApp(selectAreAlarmsKnown);
+  const takenAt = useApp((state) =>
+    isSilent(selectHealth(state)) ? selectNewest(state).snapshot?.takenAt : undefined,
+  );
   if (!isNow) return null;
+  if (takenAt !== undefined) return S.asOf(clockText(epochOf(takenAt)));
   if (!found) return isKnown && isAwaited(reason) ? S.alarmNotYet : null;
   if (found.isAcknowledged) return S.healthAcknowledged;
   return S.alarmSince(whenText(secondsOf(found.alarm.raised_at), rosNow(store.get(), now())), null);
@@ -90,8 +95,8 @@ export function DoNow({
   const active = useSelected(alarmList, (list) => list.active.length);
   const hasAlarms = isNow && active > 0;
   const hasOwn = health.reasons.length > 0;
-  // Where nobody hears of its tags they are as they were; where its robot stands still, they are so.
-  const isOfTags = urgent.length > 0 && (!hasOwn || isBad(health.verdict));
+  // Of a twin that is not heard, what had to be done stays, with its time.
+  const isOfTags = urgent.length > 0 && (!hasOwn || isBad(health.verdict) || isSilent(health));
   const count = hasOwn && most > 1 ? most - 1 : most;
   return (
     <ul className="do-now" aria-label={S.todoLabel} data-most={most}>
@@ -176,7 +181,8 @@ export function Overall({
   const active = useSelected(alarmList, (list) => list.active.length);
   const shelved = useSelected(alarmList, (list) => list.shelved.length);
   const text = own ? reason : overallText(health, isNow ? active + shelved : 0);
-  if (text === null) return null;
+  const isHere = useApp(selectIsHere);
+  if (text === null || !isHere) return null;
   return (
     <p className="do-why" data-testid={id} title={text}>
       {text}
@@ -219,9 +225,10 @@ function overallText({ verdict, counts }: HouseHealth, alarms: number): string |
 /** Above the map of a phone, where the table is a tab away: the first of what has to be done. */
 export function HealthStrip(): JSX.Element {
   const verdict = useApp((state) => selectHealth(state).verdict);
+  const isHere = useApp(selectIsHere);
   return (
     <div className="health-strip" data-testid="health-strip" data-health={verdict}>
-      <HealthMark verdict={verdict} word={false} />
+      {isHere && <HealthMark verdict={verdict} word={false} />}
       <ShelvedCount />
       <DoNow most={1} id="health-first" />
     </div>

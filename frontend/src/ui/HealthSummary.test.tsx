@@ -4,11 +4,14 @@ import { expect, test } from 'vitest';
 import { calling } from '../alarms/list';
 import { acknowledgeAlarms, shelveAlarm } from '../alarms/own';
 import { alarmList, startAlarms } from '../alarms/watch';
-import { receive, store } from '../store/app';
+import { act as look, receive, store } from '../store/app';
+import { NO_HOUSE } from '../store/twin';
 import { alarm, alarms, tellAlarms } from '../testing/alarms';
 import { held, judgement, reason } from '../testing/health';
 import { goLost, showTags } from '../testing/page';
 import { wireTag } from '../testing/tags';
+import { AttentionList } from './AttentionList';
+import { HealthStrip } from './DoNow';
 import { HealthSummary } from './HealthSummary';
 
 const house = (): HTMLElement => screen.getByTestId('house-health');
@@ -220,6 +223,37 @@ test('a house that is not heard of is unknown, whatever was said last', () => {
   // Its tags are not known to be unknown: that is another word.
   expect(screen.getByRole('heading').textContent).toBe('Greenhouse status: Not current');
   expect(screen.getByRole('button', { name: /^2 Healthy/ })).toBeTruthy();
+});
+
+test('what had to be done stays when the twin is not heard any more, with its time', () => {
+  showTags(TAGS, judgement({ 1: 'healthy', 5: [reason()] }));
+  render(<HealthSummary kiosk={false} />);
+  act(goLost);
+  const todo = screen.getByRole('list', { name: 'Do this now' });
+  expect([...todo.children].map(({ textContent }) => textContent)).toEqual([
+    expect.stringMatching(/^CriticalTag 5: .*Heat, or close the vents as of \d+:\d\d/),
+    expect.stringMatching(/^No data from the twin/),
+  ]);
+});
+
+test('while a moment loads nothing is said of it, and nothing is counted', () => {
+  showTags(TAGS, judgement({ 1: 'healthy', 5: [reason()] }));
+  act(() => {
+    look({ type: 'moment', moment: 500 });
+    receive({ type: 'past', past: { at: 500, house: NO_HOUSE } });
+  });
+  render(
+    <>
+      <HealthSummary kiosk={false} />
+      <HealthStrip />
+      <AttentionList />
+    </>,
+  );
+  expect(screen.getByRole('heading').textContent).toBe('Greenhouse status: ');
+  for (const each of screen.getAllByRole('list', { name: 'Do this now' })) {
+    expect(each.textContent).toBe('');
+  }
+  for (const each of screen.getAllByRole('button')) expect(each.textContent).toMatch(/^– /);
 });
 
 test.each([

@@ -3,6 +3,7 @@ import type { JSX } from 'react';
 import { isSilent, VERDICTS, type HouseHealth } from '../domain/health';
 import { act, useApp } from '../store/app';
 import { selectHealth } from '../store/derived';
+import { selectIsHere } from '../store/moment';
 import { S } from '../strings';
 import { DoNow, Overall, ShelvedCount } from './DoNow';
 import { HealthMark, HealthShape } from './HealthMark';
@@ -12,20 +13,23 @@ import { HouseLine } from './HouseLine';
 export function HealthSummary({ kiosk }: { kiosk: boolean }): JSX.Element {
   const health = useApp(selectHealth);
   const filter = useApp((state) => state.view.health);
+  const isHere = useApp(selectIsHere);
   return (
     <section
       className="health"
       aria-label={S.healthHeading}
       data-testid="house-health"
-      data-health={health.verdict}
+      data-health={isHere ? health.verdict : undefined}
     >
       <div className="health-house">
         <h2 title={dayText(health)}>
           <span className="unseen">{S.healthHeading}: </span>
-          <HealthMark
-            verdict={health.verdict}
-            text={isSilent(health) ? S.healthNotCurrent : undefined}
-          />
+          {isHere && (
+            <HealthMark
+              verdict={health.verdict}
+              text={isSilent(health) ? S.healthNotCurrent : undefined}
+            />
+          )}
         </h2>
         <ShelvedCount disabled={kiosk} />
         {kiosk && <Overall health={health} />}
@@ -45,7 +49,7 @@ export function HealthSummary({ kiosk }: { kiosk: boolean }): JSX.Element {
               }}
             >
               <HealthShape verdict={verdict} />
-              <strong>{health.counts[verdict]}</strong>{' '}
+              <strong>{isHere ? health.counts[verdict] : S.noValue}</strong>{' '}
               <span>{(health.counts[verdict] === 1 ? S.health : S.healthMany)[verdict]}</span>
               {!kiosk && <span className="unseen">{S.healthFilter}</span>}
             </button>

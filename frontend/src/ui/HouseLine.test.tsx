@@ -2,9 +2,12 @@ import { act, render, screen } from '@testing-library/react';
 import { expect, test } from 'vitest';
 
 import type { Judgement } from '../contract/types';
+import { snapshotOf } from '../domain/twin';
+import { act as view, receive } from '../store/app';
+import { NO_HOUSE } from '../store/twin';
 import { judgement } from '../testing/health';
-import { goLost, showTags } from '../testing/page';
-import { wireTag } from '../testing/tags';
+import { goLive, goLost, showTags, status } from '../testing/page';
+import { stateFrame, wireTag } from '../testing/tags';
 import { HouseLine } from './HouseLine';
 
 const line = (patrol: Judgement['house']['patrol']): string | undefined => {
@@ -46,4 +49,39 @@ test('nothing is told of a house that is not heard of', () => {
   expect(line({ interval_s: 40, last_scan: null, overdue: 0 })).toBeDefined();
   act(goLost);
   expect(screen.queryByTestId('house-line')).toBeNull();
+});
+
+test.each([
+  [
+    'after ten intervals and a minute',
+    1.2,
+    61,
+    /^No scan for 1\u00a0min \(usually every 1.2\u00a0s\) · Check the robot$/,
+  ],
+  ['not within a minute', 1.2, 59, /^no tag overdue/],
+  ['not within ten intervals', 30, 299, /^no tag overdue/],
+  ['of tags that report all at once', 0.04, 600, /^no tag overdue/],
+])('who drives no more is looked after: %s', (_, interval_s, late, told) => {
+  const health = judgement({ '1': 'healthy' }, undefined, {
+    ...{ interval_s, last_scan: { sec: 1, nanosec: 0 }, overdue: 0 },
+  });
+  const latest = stateFrame([wireTag()], { sec: 1 + late, health });
+  const show = (bridge = status()): string => {
+    act(() => {
+      receive({ type: 'state', latest, now: performance.now() });
+      goLive(bridge);
+    });
+    return screen.getByTestId('house-line').textContent;
+  };
+  showTags([wireTag()]);
+  render(<HouseLine />);
+  expect(show()).toMatch(told);
+  // The clock stands still, and nobody knows for how long.
+  expect(show(status({ reason: 'paused' }))).toMatch(/^no tag overdue/);
+  const then = { ...NO_HOUSE, snapshot: snapshotOf(latest, 0, null), health };
+  act(() => {
+    view({ type: 'moment', moment: 1 + late });
+    receive({ type: 'past', past: { at: 1 + late, house: then } });
+  });
+  expect(screen.getByTestId('house-line').textContent).toMatch(/^no tag overdue/);
 });

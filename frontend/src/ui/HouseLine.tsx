@@ -12,22 +12,47 @@ import { useTicking } from '../widgets/useNow';
 
 /** Of tags that report by themselves, all at once: no rhythm of anything. */
 const LEAST_INTERVAL_S = 0.1;
+/** No scan for longer than this, and than so many usual intervals: the robot may stand still. */
+const LATE_S = 60;
+const LATE_INTERVALS = 10;
 
 /** What the house is doing, as the bridge tells it: how often it is scanned, when last, who is overdue. */
 export function HouseLine(): JSX.Element | null {
   const health = useApp(selectHealth);
   const { patrol } = health;
   const { snapshot, ageing } = useApp(selectShown);
+  const interval = patrol?.interval_s ?? 0;
+  const hasInterval = interval >= LEAST_INTERVAL_S;
+  const ageOf = (now: number): number | null =>
+    patrol?.last_scan && snapshot
+      ? ageSeconds(whenOf(patrol.last_scan, snapshot), now, ageing)
+      : null;
   const last = useTicking((now) => {
-    if (!patrol?.last_scan || !snapshot) return null;
-    const age = ageSeconds(whenOf(patrol.last_scan, snapshot), now, ageing);
+    const age = ageOf(now);
     return age === null ? null : ageText(age);
   });
+  // A moment of the past, and a clock that is paused, have no robot that could be looked after.
+  const isLate = useTicking((now) =>
+    hasInterval &&
+    ageing.kind === 'growing' &&
+    (ageOf(now) ?? 0) > Math.max(LATE_S, LATE_INTERVALS * interval)
+      ? 'late'
+      : null,
+  );
   if (!patrol || !snapshot || snapshot.tags.length === 0 || isSilent(health)) return null;
-  const { interval_s: interval, last_scan: lastScan, overdue } = patrol;
+  const { last_scan: lastScan, overdue } = patrol;
+  if (isLate && last !== null) {
+    return (
+      <p className="house-line" data-testid="house-line">
+        <span data-overdue>{S.houseLate(last, intervalText(interval))}</span>
+        {/* Else its own reason says so. */}
+        {health.reasons.length === 0 && <strong> · {S.todo.stopped}</strong>}
+      </p>
+    );
+  }
   const rest = [
     lastScan === null ? S.houseNever : last === null ? null : S.houseLast(last),
-    interval === null || interval < LEAST_INTERVAL_S ? null : S.houseRhythm(intervalText(interval)),
+    hasInterval ? S.houseRhythm(intervalText(interval)) : null,
   ].filter((part) => part !== null);
   return (
     <p className="house-line" data-testid="house-line">

@@ -15,7 +15,7 @@ import {
   selectRange,
   selectSensor,
 } from '../store/derived';
-import { selectShown, selectTags } from '../store/moment';
+import { selectIsHere, selectShown, selectTags } from '../store/moment';
 import { S } from '../strings';
 import { ColouringControl } from './ColouringControl';
 import { ErrorScale, EstimateFacts } from './estimate';
@@ -34,8 +34,9 @@ export function Legend({ kiosk }: { kiosk: boolean }): JSX.Element {
   const samples = field?.sensor === name ? field.sampleCount : 0;
   const isFetching = useApp(
     (state) =>
-      selectShown(state).field.value?.sensor !== name &&
-      selectTags(state).some((tag) => tag.at && tag.readings.get(name) != null),
+      !selectIsHere(state) ||
+      (selectShown(state).field.value?.sensor !== name &&
+        selectTags(state).some((tag) => tag.at && tag.readings.get(name) != null)),
   );
   const isCompared = useApp((state) => state.view.compare !== null);
   const isIdealWished = useApp((state) => state.view.colouring === 'ideal');

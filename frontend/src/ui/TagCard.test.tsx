@@ -2,6 +2,7 @@ import { fireEvent, render, screen } from '@testing-library/react';
 import { beforeEach, describe, expect, test, vi } from 'vitest';
 
 import { act, receive, store } from '../store/app';
+import { NO_HOUSE } from '../store/twin';
 import { held, judgement, reason } from '../testing/health';
 import { showTags } from '../testing/page';
 import { readings, stateFrame, wireTag } from '../testing/tags';
@@ -32,6 +33,13 @@ beforeEach(() => {
 });
 
 describe('card', () => {
+  test('while a moment loads it denies no tag', () => {
+    act({ type: 'moment', moment: 500 });
+    receive({ type: 'past', past: { at: 500, house: NO_HOUSE } });
+    render(<TagCard tagId="7" />);
+    expect(screen.getByTestId('tag-card').textContent).toBe('Tag 7');
+  });
+
   test('gives the focus back to where it opened from', () => {
     render(<button type="button">row</button>);
     screen.getByText('row').focus();

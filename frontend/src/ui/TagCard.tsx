@@ -21,7 +21,7 @@ import { commandMap } from '../map/commands';
 import { Comments } from '../notes/Comments';
 import { act, useApp } from '../store/app';
 import { selectCatalogue, selectHealth } from '../store/derived';
-import { selectNewestTag, selectShown, selectTag } from '../store/moment';
+import { selectIsHere, selectNewestTag, selectShown, selectTag } from '../store/moment';
 import { S } from '../strings';
 import { CardAlarms } from './alarms/CardAlarms';
 import { Age, AgeFact, useAgeStep } from './Age';
@@ -44,6 +44,7 @@ export function TagCard({ tagId }: { tagId: string }): JSX.Element {
   const health = useApp((state) => selectHealth(state).byTag.get(tagId));
   const unit = useApp((state) => state.settings.unit);
   const moment = useApp((state) => selectShown(state).moment);
+  const isHere = useApp(selectIsHere);
   // What is newest says whether there is more to fetch, whatever moment is shown.
   const newest = useApp((state) => selectNewestTag(state, tagId)?.observation);
   const fetched = useHistory(tagId, newest);
@@ -76,7 +77,7 @@ export function TagCard({ tagId }: { tagId: string }): JSX.Element {
       {tag ? (
         <CardBody tag={tag} health={health} unit={unit} history={history} />
       ) : (
-        <p>{moment === null ? S.cardGone : S.cardGoneThen}</p>
+        isHere && <p>{moment === null ? S.cardGone : S.cardGoneThen}</p>
       )}
     </aside>
   );

@@ -2,7 +2,7 @@ import { useEffect, useRef, type JSX } from 'react';
 
 import { act, useApp } from '../store/app';
 import { selectRows } from '../store/derived';
-import { selectTags } from '../store/moment';
+import { selectIsHere, selectTags } from '../store/moment';
 import { LONGEST_FILTER } from '../store/view';
 import { S } from '../strings';
 import { ListChoice } from './alarms/ListChoice';
@@ -78,6 +78,7 @@ function FilterBar(): JSX.Element {
   const status = useApp((state) => state.view.health);
   const all = useApp((state) => selectTags(state).length);
   const count = useApp((state) => selectRows(state).length);
+  const isHere = useApp(selectIsHere);
   return (
     <div className="filter-bar">
       <ListChoice />
@@ -98,7 +99,7 @@ function FilterBar(): JSX.Element {
         />
       </label>
       <span className="count" role="status" data-all={count === all} data-testid="row-count">
-        {S.shownOf(count, all)}
+        {isHere && S.shownOf(count, all)}
         {status && ` · ${S.health[status]}`}
       </span>
       <button type="button" className="text-button" title={S.saveCsv} onClick={saveTable}>

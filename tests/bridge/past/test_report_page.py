@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from dataclasses import replace
-from datetime import tzinfo
+from datetime import UTC, tzinfo
 from html import unescape
 from typing import Any
 from zoneinfo import ZoneInfo
@@ -15,6 +16,7 @@ from lupin_bridge.judge.options import Criteria
 from lupin_bridge.past.report_page import ReportPage
 from lupin_bridge.settings import Settings
 from lupin_twin.core.journal_condition import UNKNOWN
+from lupin_twin.core.state import Flower, Reading, TagState
 from lupin_twin.field.idw import never
 
 # 27 November 2026, 05:00 UTC.
@@ -71,15 +73,21 @@ def alarm(**said: Any) -> dict[str, Any]:
     return {"id": "9", "tag_id": "7", "reason": reason, "worst": 3.0, **when, **said}
 
 
-def page_of(lang: str = "en", hours: int = 8, zone: tzinfo | None = None, **fields: object) -> str:
+def page_of(
+    lang: str = "en",
+    hours: int = 8,
+    zone: tzinfo | None = None,
+    tags: Sequence[TagState] = (),
+    **fields: object,
+) -> str:
     """The report's text, with spaces between its elements."""
     end_s = BEGUN_S + hours * HOUR_S
     page = ReportPage(BEGUN_S * 10**9, end_s * 10**9, GREENHOUSE, UNKNOWN, lang, zone)
-    return text_of(page, hours, **fields)
+    return text_of(page, hours, tags, **fields)
 
 
-def text_of(page: ReportPage, hours: int, **fields: object) -> str:
-    text = page.plan(body(hours) | fields).write(never).body.decode()
+def text_of(page: ReportPage, hours: int, tags: Sequence[TagState] = (), **fields: object) -> str:
+    text = page.plan(body(hours) | fields, tags).write(never).body.decode()
     return re.sub(r"[ \n\u00a0]+", " ", unescape(re.sub(r"<style>.*?</style>|<[^>]*>", " ", text)))
 
 
@@ -112,10 +120,24 @@ def test_dates_and_numbers_are_written_as_on_the_page(lang: str, texts: list[str
 
 def test_times_are_of_the_greenhouse_or_of_the_zone_that_the_reader_is_in() -> None:
     assert "Times: Europe/Amsterdam (UTC+01:00)" in page_of()
-    # Another day begins there within the period, so rows have their dates.
+    # Rows have their dates from the second day on.
     page = page_of(hours=20, zone=ZoneInfo("Asia/Kathmandu"))
     assert "27 Nov 2026, 10:45 to 28 Nov 2026, 06:45. Times: Asia/Kathmandu (UTC+05:45)" in page
-    assert "Greenhouse 27 Nov 2026, 10:50 27 Nov 2026, 12:08 1 h 18 min" in page
+    assert "Greenhouse 10:50 12:08 1 h 18 min" in page
+    page = page_of(
+        hours=20, alarms=[alarm(raised_at=at(19 * HOUR_S)), alarm(raised_at=at(-8 * HOUR_S))]
+    )
+    assert "7 28 Nov 2026, 01:00" in page
+    assert "7 26 Nov 2026, 22:00" in page
+
+
+def test_a_zone_that_this_machine_does_not_know_is_said() -> None:
+    end_ns = (BEGUN_S + HOUR_S) * 10**9
+    page = ReportPage(BEGUN_S * 10**9, end_ns, GREENHOUSE, UNKNOWN, "en", UTC, "Mars/<North>")
+    told = (
+        "Times: UTC (UTC+00:00) This server does not know the time zone Mars/<North>: times are in"
+    )
+    assert told in text_of(page, 1)
 
 
 def test_a_note_reads_as_its_kind_and_its_text_and_no_heading_denies_itself() -> None:
@@ -150,24 +172,56 @@ def test_who_acknowledged_or_shelved_has_a_column_where_somebody_did() -> None:
 
 def test_a_row_of_an_alarm_has_its_tags_name_alone_or_is_the_greenhouses() -> None:
     page = page_of(alarms=[alarm(), alarm(tag_id="")])
-    assert "Pest seen (critical) 7 06:01 still active" in page
-    assert "Pest seen (critical) Greenhouse 06:01 still active" in page
+    assert "Pest seen (critical) 7 06:01" in page
+    assert "Pest seen (critical) Greenhouse 06:01" in page
+
+
+def test_what_is_handed_over_comes_first_with_its_value_and_both_limits() -> None:
+    cold = {
+        "verdict": "critical",
+        "kind": "range",
+        "sensor": "temperature",
+        "value": 9.0,
+        "limit": 10.0,
+    }
+    dry = {"verdict": "stressed", "kind": "range", "sensor": "vpd", "value": 1.5, "limit": 1.3}
+    orchid = {**cold, "value": 12.0, "limit": 13.0}
+    tags = [
+        TagState("7", readings=(Reading("temperature", 9.5, 1), Reading("humidity", 30.0, 1))),
+        TagState("8", readings=(Reading("temperature", 12.5, 1),), flower=Flower("Orchid", 0.9)),
+    ]
+    alarms = [
+        alarm(tag_id="7", reason=cold, worst=8.0),
+        alarm(tag_id="8", reason=orchid, worst=11.0),
+        alarm(tag_id="7", reason=dry, worst=1.6, cleared_at=at(60 + 78 * 60)),
+        alarm(tag_id="7", reason={**cold, "limit": 3.5}, worst=2.0, cleared_at=at(120)),
+    ]
+    page = page_of(alarms=alarms, tags=tags)
+    active, _, resolved = page.partition("Alarms still active ")[2].partition(" Alarms resolved ")
+    assert active.startswith("Alarm Tag Raised At the end Worst value Limits ")
+    assert "7 06:01 9.5 °C 8.0 °C 10.0–35.0 °C" in active
+    assert "8 06:01 12.5 °C 11.0 °C 13.0–35.0 °C" in active
+    assert "7 06:01 07:19 1 h 18 min 1.60 kPa 0.20–1.30 kPa" in resolved
+    # The file of sensors has another range by now.
+    assert "7 06:01 06:02 1 min 2.0 °C 3.5 °C" in resolved
+    page = page_of(alarms=[alarm()], tags=[TagState("7", flower=Flower(bug_count=2))])
+    assert "7 06:01 2 3" in page
 
 
 @pytest.mark.parametrize(
     ("lang", "numbers"),
     [
-        ("en", "just below 350 ppm 350 ppm 12 ppm"),
-        ("de", "knapp unter 350 ppm 350 ppm 12 ppm"),
-        ("nl", "net onder 350 ppm 350 ppm 12 ppm"),
-        ("es", "justo por debajo de 350 ppm 350 ppm 12 ppm"),
+        ("en", "just below 350 ppm"),
+        ("de", "knapp unter 350 ppm"),
+        ("nl", "net onder 350 ppm"),
+        ("es", "justo por debajo de 350 ppm"),
     ],
 )
 def test_values_of_a_sensor_have_as_many_digits_and_none_reads_like_its_limit(
     lang: str, numbers: str
 ) -> None:
     low = {"verdict": "stressed", "kind": "range", "sensor": "co2", "value": 349.7, "limit": 350.0}
-    assert numbers in page_of(lang, alarms=[alarm(reason=low, worst=12.4)])
+    assert numbers in page_of(lang, alarms=[alarm(reason=low, worst=349.7)])
     # As the page has them: `format.test.ts`.
     sensors = GREENHOUSE.sensors
     names = ("temperature", "vpd", "co2", "humidity", "dew_point", "co2_dose", "spin")

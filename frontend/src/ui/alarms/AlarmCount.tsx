@@ -7,12 +7,14 @@ import { useApp } from '../../store/app';
 import { useSelected } from '../../store/create';
 import { S } from '../../strings';
 import { HealthShape } from '../HealthMark';
+import { selectAreAlarmsKnown } from '../Reasons';
 
 /** "Alarms" and how many are active, with the sign of the worst now; none once all are acknowledged. */
 export function AlarmsLabel(): JSX.Element {
   const list = useSelected(alarmList, (it) => it);
   const unacknowledged = calling(list);
   const { length } = list.active;
+  const isKnown = useApp(selectAreAlarmsKnown);
   const worst = useApp((state) =>
     unacknowledged.length === 0 ? null : worstNow(state, list.active),
   );
@@ -25,7 +27,7 @@ export function AlarmsLabel(): JSX.Element {
           {length}
         </span>
       )}
-      <span className="unseen">, {S.alarmsCount(unacknowledged.length, length)}</span>
+      {isKnown && <span className="unseen">, {S.alarmsCount(unacknowledged.length, length)}</span>}
     </>
   );
 }

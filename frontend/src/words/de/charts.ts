@@ -13,6 +13,10 @@ export const CHARTS: In<typeof ENGLISH> = {
     `${counted(count, 'Messwert', 'Messwerte')}, der letzte ${latest} (${at}), ` +
     `zwischen ${low} und ${high}, ${gaps === 0 ? 'keine Lücke' : counted(gaps, 'Lücke', 'Lücken')}.`,
   chartEmpty: 'Kein Messwert in diesem Zeitraum.',
+  chartNeedsDay: (known) =>
+    known === null
+      ? 'Braucht 24 h Messwerte ohne Lücke von über 3 h'
+      : `Braucht 24 h Messwerte; bisher ${known}`,
   chartLoading: 'Frühere Daten werden geladen',
   chartFailed: (reason) =>
     `Frühere Daten konnten nicht geladen werden; die Seite versucht es weiter. ${reason}`,

@@ -12,8 +12,9 @@ export const ESTIMATE: In<typeof ENGLISH> = {
   onItsWay: 'Die Schätzung wird geladen',
   noService: 'Dieser Zwilling schätzt nicht: Angezeigt werden die nächstgelegenen Messwerte',
   noneNow: 'Zurzeit keine Schätzung: Angezeigt werden die nächstgelegenen Messwerte',
+  computed:
+    'Eine berechnete Größe wird nicht geschätzt: Angezeigt werden die nächstgelegenen Messwerte',
   noModel: 'Noch keine Schätzung: Sie braucht zehn Messungen eines Sensors',
-  noSensor: 'Kein Messpunkt misst diese Größe, daher gibt es keine Schätzung',
   unsure: (error) => `Schraffiert: ungenauer als ±${error}. Ohne Farbe: keine Daten`,
   errorOf: (sensor) => `${sensor}: Unsicherheit der Schätzung`,
   foretold: (inside, scans) =>

@@ -98,6 +98,7 @@ export const HEALTH: In<typeof ENGLISH> = {
   houseRhythm: (interval) => `alle ${interval} eine Messung`,
   houseLast: (age) => `letzte Messung vor ${age}`,
   houseNever: 'noch keine Messung',
+  houseLate: (age, interval) => `Seit ${age} keine Messung (sonst alle ${interval})`,
   houseOverdue: (count) =>
     count === 0
       ? 'kein Messpunkt überfällig'

@@ -18,6 +18,11 @@ export const CHARTS = {
     `${counted(count, 'reading', 'readings')}, the latest ${latest} (${at}), ` +
     `between ${low} and ${high}, ${gaps === 0 ? 'no gap' : counted(gaps, 'gap', 'gaps')}.`,
   chartEmpty: 'No reading in this period.',
+  /** Of a quantity of a day. `known`: how far back anything is known; null: a day, with a gap. */
+  chartNeedsDay: (known: string | null): string =>
+    known === null
+      ? 'Needs 24 h of readings without a gap of over 3 h'
+      : `Needs 24 h of readings; ${known} so far`,
   chartLoading: 'Loading history',
   chartFailed: (reason: string): string =>
     `History could not be loaded; the page keeps trying. ${reason}`,

@@ -10,8 +10,8 @@ export const ESTIMATE = {
   onItsWay: 'Loading the estimate',
   noService: 'This twin makes no estimate: the nearest readings are shown',
   noneNow: 'No estimate at the moment: the nearest readings are shown',
+  computed: 'A computed quantity has no estimate: the nearest readings are shown',
   noModel: 'No estimate yet: it needs ten scans of a sensor',
-  noSensor: 'No tag measures this, so there is nothing to estimate',
   unsure: (error: string): string => `Hatched: less certain than ±${error}. No colour: no data`,
   /** Beside the colours of the error. */
   errorOf: (sensor: string): string => `${sensor}: uncertainty of the estimate`,

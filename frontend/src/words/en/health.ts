@@ -101,6 +101,8 @@ export const HEALTH = {
   houseRhythm: (interval: string): string => `a scan every ${interval}`,
   houseLast: (age: string): string => `last scan ${age} ago`,
   houseNever: 'no scan yet',
+  houseLate: (age: string, interval: string): string =>
+    `No scan for ${age} (usually every ${interval})`,
   houseOverdue: (count: number): string =>
     count === 0 ? 'no tag overdue' : counted(count, 'tag overdue', 'tags overdue'),
   /** Told to screen readers. */

@@ -13,6 +13,10 @@ export const CHARTS: In<typeof ENGLISH> = {
     `${counted(count, 'lectura', 'lecturas')}, la última ${latest} (${at}), ` +
     `entre ${low} y ${high}, ${gaps === 0 ? 'sin huecos' : counted(gaps, 'hueco', 'huecos')}.`,
   chartEmpty: 'No hay lecturas en este periodo.',
+  chartNeedsDay: (known) =>
+    known === null
+      ? 'Requiere 24 h de lecturas sin huecos de más de 3 h'
+      : `Requiere 24 h de lecturas; hasta ahora ${known}`,
   chartLoading: 'Cargando el histórico',
   chartFailed: (reason) =>
     `No se pudo cargar el histórico; la página lo sigue intentando. ${reason}`,

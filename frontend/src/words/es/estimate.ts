@@ -12,8 +12,8 @@ export const ESTIMATE: In<typeof ENGLISH> = {
   onItsWay: 'Cargando la estimación',
   noService: 'Este gemelo no hace estimaciones: se muestran las lecturas más cercanas',
   noneNow: 'Ahora no hay estimación: se muestran las lecturas más cercanas',
+  computed: 'Una magnitud calculada no se estima: se muestran las lecturas más cercanas',
   noModel: 'Aún no hay estimación: hacen falta diez mediciones de un sensor',
-  noSensor: 'Ningún punto mide esto: no hay estimación',
   unsure: (error) => `Rayado: menos preciso que ±${error}. Sin color: sin datos`,
   errorOf: (sensor) => `${sensor}: incertidumbre de la estimación`,
   foretold: (inside, scans) =>

@@ -103,6 +103,7 @@ export const HEALTH: In<typeof ENGLISH> = {
   houseRhythm: (interval) => `una medición cada ${interval}`,
   houseLast: (age) => `última medición hace ${age}`,
   houseNever: 'aún sin mediciones',
+  houseLate: (age, interval) => `Sin mediciones desde hace ${age} (normalmente cada ${interval})`,
   houseOverdue: (count) =>
     count === 0
       ? 'ningún punto con retraso'

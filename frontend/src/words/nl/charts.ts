@@ -13,6 +13,10 @@ export const CHARTS: In<typeof ENGLISH> = {
     `${counted(count, 'meetwaarde', 'meetwaarden')}, de laatste ${latest} (${at}), ` +
     `tussen ${low} en ${high}, ${gaps === 0 ? 'geen gat' : counted(gaps, 'gat', 'gaten')}.`,
   chartEmpty: 'Geen meetwaarde in deze periode.',
+  chartNeedsDay: (known) =>
+    known === null
+      ? 'Heeft 24 u aan meetwaarden nodig, zonder gat van meer dan 3 u'
+      : `Heeft 24 u aan meetwaarden nodig; tot nu toe ${known}`,
   chartLoading: 'De historie wordt geladen',
   chartFailed: (reason) =>
     `De historie kon niet worden geladen; de pagina blijft het proberen. ${reason}`,

@@ -12,8 +12,8 @@ export const ESTIMATE: In<typeof ENGLISH> = {
   onItsWay: 'De schatting wordt geladen',
   noService: 'Deze digital twin maakt geen schatting: u ziet de dichtstbijzijnde waarden',
   noneNow: 'Er is nu geen schatting: u ziet de dichtstbijzijnde waarden',
+  computed: 'Van een berekende waarde is er geen schatting: u ziet de dichtstbijzijnde waarden',
   noModel: 'Nog geen schatting: er zijn tien metingen van een sensor nodig',
-  noSensor: 'Geen meetpunt meet dit, dus er is geen schatting',
   unsure: (error) => `Gearceerd: minder zeker dan ±${error}. Geen kleur: geen gegevens`,
   errorOf: (sensor) => `${sensor}: onzekerheid van de schatting`,
   foretold: (inside, scans) =>

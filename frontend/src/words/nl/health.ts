@@ -95,6 +95,7 @@ export const HEALTH: In<typeof ENGLISH> = {
   houseRhythm: (interval) => `elke ${interval} een meting`,
   houseLast: (age) => `laatste meting ${age} geleden`,
   houseNever: 'nog geen meting',
+  houseLate: (age, interval) => `Al ${age} geen meting (normaal elke ${interval})`,
   houseOverdue: (count) =>
     count === 0
       ? 'alle meetpunten op tijd'

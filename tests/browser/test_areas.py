@@ -2,8 +2,9 @@
 
 from playwright.sync_api import Route, expect
 
-from tests.browser.hmi import OpenPage
+from tests.browser.hmi import WIDE, OpenPage
 from tests.browser.house import TAGS
+from tests.browser.places import place
 from tests.browser.test_accessibility import violations
 from tests.support.web import Bridge
 
@@ -22,7 +23,15 @@ def test_the_table_by_area_the_worst_first(house: Bridge, open_page: OpenPage) -
     hmi.expect_rows(*TAGS)
     expect(hmi.card("10").locator(".card-facts")).to_contain_text("AreaSouth bay")
     hmi.page.get_by_role("button", name="Columns and rows").click()
+    # Where columns give way, a head brings none of them back.
+    hmi.resize(1100, 800)
+    columns = [place(each) for each in hmi.page.locator("thead th:visible").all()]
     hmi.page.get_by_role("checkbox", name="Group by area").check()
+    expect(hmi.page.locator("tbody tr.area")).to_have_count(3)
+    assert [place(each) for each in hmi.page.locator("thead th:visible").all()] == columns
+    head = place(hmi.page.locator("tr.area h3").first)
+    assert (head.left, head.right) == (columns[0].left, columns[-1].right)
+    hmi.resize(**WIDE)
     hmi.page.keyboard.press("Escape")
     hmi.expect_rows("10", "3", "1", "9", "failed", "seen", "2")
     heads = hmi.page.locator("tbody tr.area")

@@ -326,11 +326,18 @@ def _reads(running: Bridge, tag_id: str, sensor: str, value: float) -> bool:
 def test_on_a_phone_the_card_makes_room_for_its_charts(garden: Garden, open_page: OpenPage) -> None:
     hmi = open_page(garden.bridge.url, f"tag=1&{garden.period}", viewport=PHONE)
     card = hmi.test_id("tag-card")
-    card.get_by_role("button", name="Charts", exact=True).click()
+    tab = hmi.page.locator(".pane-tabs").get_by_role("button", name="Tags")
+    tab.click()
+    charts = card.get_by_role("button", name="Charts", exact=True)
+    charts.click()
     expect(hmi.test_id("chart-view")).to_be_visible()
     expect(card).to_be_hidden()
-    hmi.page.keyboard.press("Escape")
+    hmi.test_id("chart-view").get_by_role("button", name="Close").click()
+    # To where it was opened, not to the map nor to the top of the card.
     expect(card).to_be_visible()
+    expect(tab).to_have_attribute("aria-pressed", "true")
+    expect(charts).to_be_focused()
+    expect(hmi.test_id("card-chart")).to_be_in_viewport()
 
 
 def test_what_is_observed_flows_in_and_a_gap_in_the_hearing_is_refilled(

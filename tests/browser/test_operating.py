@@ -8,10 +8,19 @@ from playwright.sync_api import expect
 
 from tests.browser.hmi import Hmi, OpenPage
 from tests.browser.house import TAGS
-from tests.browser.places import place
+from tests.browser.places import place, places
 from tests.support.web import Bridge
 
 # --- sensors ------------------------------------------------------------------------------------
+
+
+def test_a_low_window_has_one_line_of_sensors_with_the_chosen_one_in_sight(hmi: Hmi) -> None:
+    for size in ((844, 390), (1280, 600)):
+        hmi.resize(*size)
+        hmi.choose_sensor("Dew margin")
+        chosen, bar = places(hmi, ".sensors label:has(:checked)", ".sensor-picker")
+        assert bar.bottom - bar.top < 60
+        assert bar.left <= chosen.left < chosen.right <= bar.right
 
 
 def test_a_sensor_has_its_colours_words_legend_and_column(hmi: Hmi) -> None:

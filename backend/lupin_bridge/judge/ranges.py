@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
+from math import ceil, log10
 
-from lupin_bridge.judge.derived import DAILY
+from lupin_bridge.judge.derived import DAILY, DERIVED
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,10 +59,10 @@ class Sensor:
         return is_finite and (span is None or span.low <= value <= span.high)
 
     @property
-    def is_judged(self) -> bool:
-        """Whether it has a range, for any plants."""
+    def ideals(self) -> tuple[Span, ...]:
+        """All ideal ranges, of day, night and species."""
         ranges = (self.day, self.night, *(one for both in self.species.values() for one in both))
-        return any(each.ideal is not None for each in ranges)
+        return tuple(each.ideal for each in ranges if each.ideal is not None)
 
     def ranges(self, *, is_day: bool, species: str = "") -> Ranges:
         """What holds at a tag with such plants; of an unknown species, what holds for all."""
@@ -87,11 +88,27 @@ class Sensors:
         other = self.fallback
         return Sensor(name, other.label or name, other.unit, other.hue, other.lightness)
 
+    def digits(self, name: str) -> int | None:
+        """How many a value has after the point, as the page writes it; None: as its size deserves.
+
+        So many that the largest limit has about three figures: of the sensor itself, or of what it
+        is computed of.
+        """
+        sources: tuple[str, ...] = DERIVED[name].sources if name in DERIVED else ()
+        if name in DAILY:
+            sources = (DAILY[name].sensor,)
+        for names in ((name,), sources):
+            ideals = (span for each in names for span in self.named(each).ideals)
+            most = max((abs(end) for span in ideals for end in (span.low, span.high)), default=0)
+            if most > 0:
+                return max(0, min(6, 3 - ceil(log10(most))))
+        return None
+
     @cached_property
     def judged_by_the_day(self) -> Mapping[str, tuple[str, ...]]:
         """By sensor, the quantities of a day that are made of it and have a range."""
         found: dict[str, tuple[str, ...]] = {}
         for daily in DAILY.values():
-            if self.named(daily.name).is_judged:
+            if self.named(daily.name).ideals:
                 found[daily.sensor] = (*found.get(daily.sensor, ()), daily.name)
         return found

@@ -44,8 +44,8 @@ thead { display: table-header-group } tr { break-inside: avoid }
 th, td { text-align: left; vertical-align: top; padding: 1mm;
   border-bottom: .2mm solid #bbb; overflow-wrap: anywhere; min-width: 22mm }
 th { border-bottom: .4mm solid #444; overflow-wrap: normal }
-.number { text-align: right; font-variant-numeric: tabular-nums; white-space: nowrap; min-width: 0 }
-th.number { white-space: normal }
+.number { text-align: right; font-variant-numeric: tabular-nums; overflow-wrap: normal;
+  min-width: 0 }
 dl { display: grid; grid-template-columns: repeat(4, 1fr); gap: 2mm; margin: 4mm .3mm }
 dl div { border: .2mm solid #bbb; padding: 1.5mm } dt { color: #444; font-size: 8.5pt }
 dd { margin: 0; font-size: 13pt } .critical td:first-child { font-weight: 700 }
@@ -235,8 +235,7 @@ class _Page:
         raised, cleared, limit = alarm["raised_at"], alarm["cleared_at"], reason["limit"]
         numbers = reason["kind"] == "range"
         unit = self._criteria.sensors.named(reason["sensor"]).unit if numbers else ""
-        number = partial(self._number, unit=unit, like=limit if numbers else None)
-        at_end = None
+        number, at_end = partial(self._number, sensor=reason["sensor"]), None
         if tag is not None and numbers:
             readings = (*tag.readings, *derive(tag.readings))
             at_end = next((it.value for it in readings if it.name == reason["sensor"]), None)
@@ -250,8 +249,8 @@ class _Page:
             "when": self._clock(raised),
             "end": "" if cleared is None else self._clock(cleared),
             "length": "" if cleared is None else self._length(cleared["sec"] - raised["sec"]),
-            "at_end": number(at_end),
-            "worst": number(alarm["worst"]),
+            "at_end": number(at_end, limit=limit),
+            "worst": number(alarm["worst"], limit=limit),
             "limits": low + number(limit if span is None else span.high) if numbers else "",
             "who": self._who(alarm),
         }
@@ -272,7 +271,7 @@ class _Page:
         return self._table(body, "extremes", "sensors", columns, self._sensor)
 
     def _sensor(self, of: Entry) -> Iterable[str]:
-        number = partial(self._number, unit=of["unit"], like=of["mean"])
+        number = partial(self._number, sensor=of["sensor_type"])
 
         def extreme(found: Entry | None) -> Iterable[str]:
             if found is None:
@@ -402,15 +401,19 @@ class _Page:
         """A moment in a row; one of the report's first day without that day."""
         return self._at(when).removeprefix(self._day)
 
-    def _number(self, value: float | None, unit: str, like: float | None = None) -> str:
-        """A number with its unit on the same line, written as the page does; as exact as `like`."""
+    def _number(self, value: float | None, sensor: str, limit: float | None = None) -> str:
+        """As the page writes it; what reads like the limit that it is beyond says on which side."""
         if value is None:
             return ""
-        size = abs(value if like is None else like)
-        digits = f"{value:.4g}"
-        if unit and size < 1e6:
-            digits = f"{value:,.{0 if size >= 100 else 1 if size >= 1 else 2}f}"
-        return f"{self._written(digits)}\u00a0{unit}".strip()
+        known = self._criteria.sensors
+        unit, digits, size = known.named(sensor).unit, known.digits(sensor), abs(value)
+        number = f"{value:.4g}"
+        if digits is not None and size < 1e6:
+            number = f"{value:,.{digits if size < 1000 else 0}f}"
+        text = f"{self._written(number)}\u00a0{unit}".strip()
+        if limit is None or value == limit or text != self._number(limit, sensor):
+            return text
+        return self.say("just_below" if value < limit else "just_above", limit=text)
 
     def _count(self, count: int) -> str:
         return self._written(f"{count:,}")

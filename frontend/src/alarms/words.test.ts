@@ -69,10 +69,10 @@ test('its limit is that of now: what is critical; on the way back it stands besi
     todo: 'Heat, or close the vents',
   });
   expect(valuesOf(cold, C, at(18.02, 18, 'stressed', 18.5))).toMatchObject({
-    what: 'Temperature was below 18.00\u00a0°C; stays stressed until 18.50\u00a0°C',
+    what: 'Temperature was below 18.0\u00a0°C; stays stressed until 18.5\u00a0°C',
     todo: '',
-    now: 'now 18.02\u00a0°C',
-    first: '17.90\u00a0°C when raised',
+    now: 'now just above 18.0\u00a0°C',
+    first: '17.9\u00a0°C when raised',
   });
 });
 
@@ -100,10 +100,10 @@ test('a worst value is named by the side of its limit that it lies on', () => {
 test('no value reads like the limit that it differs from', () => {
   const dry = alarm('a', { worst: 44, reason: { sensor: 'humidity', value: 49.96, limit: 50 } });
   expect(valuesOf(dry, C, known(50.02, 'healthy'))).toMatchObject({
-    what: 'Humidity below 50.00\u00a0%',
-    now: 'now 50.02\u00a0%',
-    worst: 'worst 44.00\u00a0%',
-    first: '49.96\u00a0% when raised',
+    what: 'Humidity below 50.0\u00a0%',
+    now: 'now just above 50.0\u00a0%',
+    worst: 'worst 44.0\u00a0%',
+    first: 'just below 50.0\u00a0% when raised',
   });
 });
 
@@ -114,10 +114,10 @@ test('what is not known now says so, with what was known last', () => {
     last,
     lastAt: 'unknown',
   });
-  expect(unknownText(cold, C, unknown(7.4), 0, 2_520)).toBe(
+  expect(unknownText(cold, C, unknown(7.4), 2_520)).toBe(
     'now unknown, last 7.4\u00a0°C 42\u00a0min ago',
   );
-  expect(unknownText(cold, C, unknown(null), 0, null)).toBe('now unknown');
+  expect(unknownText(cold, C, unknown(null), null)).toBe('now unknown');
   expect(alarmText(cold, C, unknown(7.4))).toBe(
     'Tag 1: Temperature below 10.0\u00a0°C, worst 2.5\u00a0°C (critical)',
   );

@@ -1,8 +1,8 @@
 /** An alarm in words: what, where, how bad now and at worst, since when, until when. Pure. */
 import type { Alarm, Verdict } from '../contract/types';
-import { ageText, clockText, digitsApart, readingText } from '../domain/format';
+import { ageText, beyondLimitText, clockText, readingText } from '../domain/format';
 import { isOfRange, sideOf } from '../domain/health';
-import { beyondText, digitsOf, reasonText, todoText } from '../domain/reasons';
+import { beyondText, reasonText, todoText } from '../domain/reasons';
 import { dayFormat, hasDate, rosText, secondsOf } from '../domain/rostime';
 import type { Catalogue } from '../domain/sensors';
 import { shown } from '../domain/text';
@@ -24,13 +24,9 @@ export interface Speech {
   readonly unit: TemperatureUnit;
 }
 
-/** What is wrong, without its value, which changes; `more` digits of a limit. */
-export function whatText(
-  { reason }: Pick<Alarm, 'reason'>,
-  { sensors, unit }: Speech,
-  more = 0,
-): string {
-  if (isOfRange(reason)) return beyondText(sensors, reason, unit, more);
+/** What is wrong, without its value, which changes. */
+export function whatText({ reason }: Pick<Alarm, 'reason'>, { sensors, unit }: Speech): string {
+  if (isOfRange(reason)) return beyondText(sensors, reason, unit);
   // Of a pest how many, and of a changed sensor its reading, is told as it is now.
   const value = reason.kind === 'pest' ? 0 : reason.kind === 'changed' ? null : reason.value;
   return reasonText(sensors, { ...reason, value }, unit, null);
@@ -42,7 +38,6 @@ export const nameText = (alarm: Alarm, speech: Speech): string =>
 
 /** An alarm's values in words that do not contradict each other, nor its limit. */
 export interface Values {
-  /** What is wrong; its limit has as many digits as the values. */
   readonly what: string;
   /** What somebody does about it; empty: nothing. */
   readonly todo: string;
@@ -51,8 +46,6 @@ export interface Values {
   /** Null: there is no such value. */
   readonly worst: string | null;
   readonly first: string | null;
-  /** Digits more than usual. */
-  readonly more: number;
 }
 
 export function valuesOf(alarm: Alarm, speech: Speech, now: Now | null): Values {
@@ -60,25 +53,22 @@ export function valuesOf(alarm: Alarm, speech: Speech, now: Now | null): Values 
   const { sensors, unit } = speech;
   const sensor = sensors.named(reason.sensor);
   const worst = worstOf(alarm, now);
-  const current = now?.kind === 'known' ? now.value : (now?.last ?? null);
   const first = alarm.reason.value;
-  const all = [current, worst, first].filter((value) => value !== null);
-  const more = isOfRange(reason)
-    ? Math.max(digitsApart(sensor, all, reason.limit, unit), digitsOf(sensor, reason, unit))
-    : 0;
   const isPest = reason.kind === 'pest';
   const text = (value: number): string =>
     isPest
       ? value > 0
         ? String(value)
         : S.alarmPests.seen
-      : readingText(sensor, value, unit, more);
+      : isOfRange(reason)
+        ? beyondLimitText(sensor, value, reason.limit, unit)
+        : readingText(sensor, value, unit);
   const nowText = (value: number): string =>
     isPest && value > 0 ? S.pestCount(value) : text(value);
   const noneText = isPest ? S.alarmPests.none : S.alarmStatus.healthy;
   const isMeasured = isOfRange(reason) || isPest || reason.kind === 'changed';
   return {
-    what: whatText({ ...alarm, reason }, speech, more),
+    what: whatText({ ...alarm, reason }, speech),
     todo: todoText(reason),
     now:
       now?.kind === 'known' ? S.alarmNow(now.value === null ? noneText : nowText(now.value)) : null,
@@ -87,7 +77,6 @@ export function valuesOf(alarm: Alarm, speech: Speech, now: Now | null): Values 
         ? null
         : S.alarmWorst[isOfRange(reason) ? sideOf(reason) : 'pest'](text(worst)),
     first: isMeasured && first !== null ? S.alarmFirst(text(first)) : null,
-    more,
   };
 }
 
@@ -114,10 +103,9 @@ export function unknownText(
   { reason: { sensor: name } }: Alarm,
   { sensors, unit }: Speech,
   { last }: Extract<Now, { kind: 'unknown' }>,
-  more: number,
   age: number | null,
 ): string {
-  const reading = last === null ? null : readingText(sensors.named(name), last, unit, more);
+  const reading = last === null ? null : readingText(sensors.named(name), last, unit);
   return S.alarmNowUnknown(reading, age === null ? null : ageText(age));
 }
 

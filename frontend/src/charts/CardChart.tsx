@@ -68,8 +68,6 @@ export default function CardChart({ tagId }: { tagId: string }): JSX.Element | n
             type="button"
             className="text-button"
             onClick={() => {
-              // On a narrow screen the charts are where the map is.
-              act({ type: 'pane', pane: 'map' });
               act({ type: 'chart', chart: { by: 'tag', tagIds: [tagId] } });
             }}
           >

@@ -1,4 +1,4 @@
-import { useMemo, useRef, useState, type JSX } from 'react';
+import { useEffect, useMemo, useRef, useState, type JSX } from 'react';
 
 import { now } from '../clock';
 import { act, prefer, store, useApp } from '../store/app';
@@ -39,6 +39,18 @@ export default function ChartView({ charted }: { charted: Charted }): JSX.Elemen
   const [isTable, setTable] = useState(false);
   const root = useRef<HTMLElement>(null);
   useFocusBack(root);
+  // The card has its own chart again, with the button that led here.
+  useEffect(
+    () => () => {
+      requestAnimationFrame(() => {
+        if (document.activeElement !== document.body) return;
+        const from = document.querySelector<HTMLElement>('.card-chart > .text-button');
+        from?.focus({ preventScroll: true });
+        from?.parentElement?.scrollIntoView({ block: 'nearest' });
+      });
+    },
+    [],
+  );
   const body = useRef<HTMLDivElement>(null);
   const size = useSize(body);
   const [tagId = ''] = charted.tagIds;

@@ -90,6 +90,6 @@ test('a difference is told with its sign and unit, and has no offset of 32 °F',
   expect(differenceText(temperature, 1.3, 'C')).toBe('+1.3\u00a0°C');
   expect(differenceText(temperature, -1, 'F')).toBe('\u22121.8\u00a0°F');
   expect(differenceText(temperature, 0, 'C')).toBe('0.0\u00a0°C');
-  expect(differenceText(temperature, -0.001, 'C')).toBe('0.00\u00a0°C');
+  expect(differenceText(temperature, -0.001, 'C')).toBe('0.0\u00a0°C');
   expect(differenceText(sensorNamed('spin'), 4, 'C')).toBe('+4.0');
 });

@@ -3,7 +3,6 @@ import { expect, test, vi } from 'vitest';
 import {
   ageText,
   differenceNumber,
-  digitsApart,
   metresText,
   momentText,
   numberText,
@@ -116,16 +115,14 @@ test('of a sensor that nobody knows no text is off by more than a twentieth of i
   }
 });
 
-test('a value never reads like the limit that it has passed', () => {
-  const sensor = sensorNamed('humidity');
-  for (const size of sizes(500)) {
-    const limit = Math.min(100, Math.abs(size));
-    for (const value of [limit * 1.01, limit * 0.999, limit + 0.001]) {
-      // Closer than that two readings may read the same.
-      if (Math.abs(value - limit) < 1e-5) continue;
-      const more = digitsApart(sensor, [value], limit, 'C');
-      const texts = [value, limit].map((each) => valueText(sensor, each, 'C', more));
-      expect(texts[0], `${value} of ${limit}`).not.toBe(texts[1]);
-    }
-  }
+test('all values of a sensor have as many digits, whatever their size', () => {
+  const texts = (name: string, ...values: number[]): string[] =>
+    values.map((value) => valueText(sensorNamed(name), value, 'C'));
+  expect(texts('temperature', 0.4, 9.96, 100.4)).toEqual(['0.4', '10.0', '100.4']);
+  expect(texts('vpd', 0.04, 1.1, 12)).toEqual(['0.04', '1.10', '12.00']);
+  expect(texts('co2', 0, 99.6, 1_499.6)).toEqual(['0', '100', '1,500']);
+  expect(texts('humidity', 0.4, 100)).toEqual(['0.4', '100.0']);
+  // Without ranges of their own, as what they are computed of.
+  expect(texts('dew_point', 0.4, 12)).toEqual(['0.4', '12.0']);
+  expect(texts('co2_dose', 80.4, 800)).toEqual(['80', '800']);
 });

@@ -12,56 +12,32 @@ const POINT =
 /** A number's text as the reader writes it: their decimal point, and a true minus sign. */
 export const written = (text: string): string => text.replace('.', POINT).replace('-', '\u2212');
 
-/** A number at the precision that a climate sensor deserves, with so many digits more. */
-function roundedText(value: number, more: number): string {
+/** A number at the precision that its size deserves, or with so many digits. */
+function roundedText(value: number, digits: number | null): string {
   const size = Math.abs(value);
-  const digits = size >= 1e6 ? null : size >= 100 ? 0 : size >= 1 || value === 0 ? 1 : 2;
-  const text = digits === null ? value.toExponential(2 + more) : value.toFixed(digits + more);
+  if (size >= 1e6) return value.toExponential(2);
+  const text = value.toFixed(digits ?? (size >= 100 ? 0 : size >= 1 || value === 0 ? 1 : 2));
   return /^-0(\.0+)?$/.test(text) ? text.slice(1) : text;
 }
 
 const WHOLE = new Intl.NumberFormat(LOCALE, { maximumFractionDigits: 0 });
 
 /** As a reader writes it; thousands are set apart, as on a chart's axis. */
-export const numberText = (value: number, more = 0): string =>
-  more === 0 && Math.abs(value) >= 1000 && Math.abs(value) < 1e6
+export const numberText = (value: number, digits: number | null = null): string =>
+  Math.abs(value) >= 1000 && Math.abs(value) < 1e6
     ? WHOLE.format(value).replace('-', '\u2212')
-    : written(roundedText(value, more));
-
-/** Beyond this many digits more two numbers may read the same. */
-const MOST_MORE = 4;
-
-/**
- * How many digits more it takes for no value to read like a limit that it differs from: "50.0 %,
- * below 50.0" contradicts itself.
- */
-export function digitsApart(
-  sensor: Sensor,
-  values: readonly number[],
-  limit: number,
-  unit: TemperatureUnit,
-): number {
-  const apart = (more: number): boolean => {
-    const rounded = (value: number): number =>
-      Number(roundedText(toShown(sensor, value, unit), more));
-    return values.every((value) => value === limit || rounded(value) !== rounded(limit));
-  };
-  let more = 0;
-  while (more < MOST_MORE && !apart(more)) more += 1;
-  return more;
-}
+    : written(roundedText(value, digits));
 
 /** A reading without its unit. */
-export function valueText(sensor: Sensor, value: number, unit: TemperatureUnit, more = 0): string {
-  return sized(sensor, toShown(sensor, value, unit), more);
-}
+export const valueText = (sensor: Sensor, value: number, unit: TemperatureUnit): string =>
+  sized(sensor, toShown(sensor, value, unit));
 
 /** What two readings differ by, or an error, without its unit. */
 export const differenceNumber = (sensor: Sensor, by: number, unit: TemperatureUnit): string =>
   sized(sensor, differenceToShown(sensor, by, unit));
 
-const sized = (sensor: Sensor, given: number, more = 0): string =>
-  numberText(given, more + (sensor.unit === '' ? digitsOfSmall(given) : 0));
+const sized = ({ digits }: Sensor, given: number): string =>
+  numberText(given, digits ?? digitsOfSmall(given));
 
 /** A number's text and the sensor's unit, held together by a no-break space. */
 export function withUnit(sensor: Sensor, text: string, unit: TemperatureUnit): string {
@@ -69,19 +45,28 @@ export function withUnit(sensor: Sensor, text: string, unit: TemperatureUnit): s
   return suffix ? `${text}\u00a0${suffix}` : text;
 }
 
-/** Of a sensor that nobody knows two digits of a small value, which would read as nothing else. */
-function digitsOfSmall(value: number): number {
+/** Of a sensor without ranges two digits of a small value, which would read as nothing else. */
+function digitsOfSmall(value: number): number | null {
   const size = Math.abs(value);
-  return size === 0 || size >= 0.1 ? 0 : Math.min(MOST_MORE, Math.ceil(-Math.log10(size)) - 1);
+  return size === 0 || size >= 0.1 ? null : Math.min(6, 1 + Math.ceil(-Math.log10(size)));
 }
 
 /** A reading with its unit. */
-export const readingText = (
+export const readingText = (sensor: Sensor, value: number, unit: TemperatureUnit): string =>
+  withUnit(sensor, valueText(sensor, value, unit), unit);
+
+/** A reading with its unit; one that reads like the limit that it is beyond says on which side it is. */
+export function beyondLimitText(
   sensor: Sensor,
   value: number,
+  limit: number,
   unit: TemperatureUnit,
-  more = 0,
-): string => withUnit(sensor, valueText(sensor, value, unit, more), unit);
+): string {
+  const text = readingText(sensor, value, unit);
+  return value !== limit && text === readingText(sensor, limit, unit)
+    ? S.reasons.just[value < limit ? 'below' : 'above'](text)
+    : text;
+}
 
 /** A range with its unit; an en dash where there is none. */
 export function rangeText(sensor: Sensor, range: Range | null, unit: TemperatureUnit): string {

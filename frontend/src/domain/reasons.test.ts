@@ -20,12 +20,17 @@ describe('a reason in words', () => {
     [
       { sensor: 'humidity', verdict: 'stressed', value: 49.97, limit: 50 } as const,
       null,
-      `Humidity 49.97${NBSP}%, below 50.00`,
+      `Humidity just below 50.0${NBSP}%`,
     ],
     [
       { sensor: 'co2', verdict: 'stressed', value: 1500.4, limit: 1500 } as const,
       null,
-      `CO₂ 1500.4${NBSP}ppm, above 1500.0`,
+      `CO₂ just above 1,500${NBSP}ppm`,
+    ],
+    [
+      { verdict: 'critical', value: 34.99, limit: 35.01 } as const,
+      null,
+      `Temperature just below 35.0${NBSP}°C (critical)`,
     ],
     [
       // Within the ideal range of 18 to 26, and not by enough.
@@ -42,12 +47,12 @@ describe('a reason in words', () => {
       // Within the critical range of 10, by less: of the ideal one it is far off.
       { value: 10.39, limit: 10, ...held(10.4) } as const,
       null,
-      `Temperature 10.39${NBSP}°C, was below 10.00; stays critical until 10.40`,
+      `Temperature just below 10.4${NBSP}°C, was below 10.0; stays critical until 10.4`,
     ],
     [
       { sensor: 'vpd', value: 1.68, limit: 1.3, verdict: 'stressed' } as const,
       null,
-      `Vapour pressure deficit 1.7${NBSP}kPa, above 1.3`,
+      `Vapour pressure deficit 1.68${NBSP}kPa, above 1.30`,
     ],
     [
       { kind: 'reading_failed', sensor: 'humidity', value: null } as const,

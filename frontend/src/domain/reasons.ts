@@ -1,9 +1,9 @@
 /** Why a tag or the house has its verdict, in words. */
 import type { HealthReason } from '../contract/types';
 import { S } from '../strings';
-import { digitsApart, durationText, readingText, shortAgeText, valueText } from './format';
+import { beyondLimitText, durationText, readingText, shortAgeText, valueText } from './format';
 import { isOfRange, sideOf } from './health';
-import type { Catalogue, Sensor } from './sensors';
+import type { Catalogue } from './sensors';
 import { shown } from './text';
 import type { TemperatureUnit } from './units';
 
@@ -27,12 +27,15 @@ export function reasonText(
   const label = name === '' ? '' : shown(sensor.label, LONGEST_NAME);
   const R = S.reasons;
   if (isOfRange(reason)) {
-    const more = digitsOf(sensor, reason, unit);
-    return R.range(
-      `${label} ${readingText(sensor, reason.value, unit, more)}`,
-      limitText(reason, (value) => valueText(sensor, value, unit, more)),
-      reason.verdict === 'critical' && !isMarked && reason.release === undefined,
-    );
+    const edge = reason.release ?? reason.limit;
+    const reading = beyondLimitText(sensor, reason.value, edge, unit);
+    const isHeld = reason.release !== undefined;
+    // "Just below 350" names the limit itself.
+    const isNear = !isHeld && reading !== readingText(sensor, reason.value, unit);
+    const limit = limitText(reason, (each) => valueText(sensor, each, unit));
+    const isRated = reason.verdict === 'critical' && !isMarked && !isHeld;
+    const rated = isRated ? ` (${S.alarmStatus.critical})` : '';
+    return `${label} ${reading}${isNear ? '' : `, ${limit}`}${rated}`;
   }
   switch (kind) {
     case 'range':
@@ -65,14 +68,6 @@ export function reasonText(
   }
 }
 
-/** How many digits more a value that is out of its range has, wherever it stands. */
-export const digitsOf = (
-  sensor: Sensor,
-  { value, limit, release }: OfRange,
-  unit: TemperatureUnit,
-): number =>
-  Math.max(...[limit, release ?? limit].map((edge) => digitsApart(sensor, [value], edge, unit)));
-
 type OfRange = HealthReason & { readonly value: number; readonly limit: number };
 
 /** Whether the value is back in its ideal range, and has yet to lie well within. */
@@ -89,14 +84,9 @@ function limitText(reason: OfRange, text: (value: number) => string): string {
 }
 
 /** What lies on which side of which limit, without the value: that changes. */
-export function beyondText(
-  sensors: Catalogue,
-  reason: OfRange,
-  unit: TemperatureUnit,
-  more: number,
-): string {
+export function beyondText(sensors: Catalogue, reason: OfRange, unit: TemperatureUnit): string {
   const sensor = sensors.named(reason.sensor);
-  const limit = limitText(reason, (value) => readingText(sensor, value, unit, more));
+  const limit = limitText(reason, (value) => readingText(sensor, value, unit));
   return `${shown(sensor.label, LONGEST_NAME)} ${limit}`;
 }
 

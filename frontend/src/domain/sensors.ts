@@ -27,6 +27,8 @@ export interface Sensor extends Ranges {
   readonly saturation: number;
   readonly lightness: number;
   readonly maxAlpha: number;
+  /** After the point, wherever a value of it stands; null: as the value's size deserves. */
+  readonly digits: number | null;
   /** The sensors that it is computed of: there are fields and a past of it, and no readings. */
   readonly madeOf: readonly string[];
   /** Whose its ranges are; null: by day and by night they are the same. */
@@ -135,6 +137,7 @@ export function cataloguesOf(file: SensorsFile, language: string = LANGUAGE): Ca
       lightness: entry.lightness,
       saturation: file.ramp.saturation,
       maxAlpha: file.ramp.max_alpha,
+      digits: digitsOf([entry]) ?? digitsOf((entry.derived ?? []).map((of) => file.sensors[of])),
       madeOf: entry.derived ?? [],
       part: entry.night ? (isDay ? 'day' : 'night') : null,
       ...rangesOf(entry, isDay),
@@ -144,10 +147,7 @@ export function cataloguesOf(file: SensorsFile, language: string = LANGUAGE): Ca
           rangesOf(ranges, isDay),
         ]),
       ),
-      ideals: [entry, ...Object.values(entry.species ?? {})]
-        .flatMap((ranges) => [ranges, ranges.night])
-        .map((ranges) => spanOf(ranges?.ideal))
-        .filter((span) => span !== null),
+      ideals: idealsOf([entry]),
     });
     const all = Object.entries(file.sensors).map(([name, entry]) => made(name, entry));
     return new Catalogue(all, (name) => made(name, file.fallback), areaOf);
@@ -159,6 +159,19 @@ export function cataloguesOf(file: SensorsFile, language: string = LANGUAGE): Ca
 function rangesOf(entry: SensorRanges, isDay: boolean): Ranges {
   const { ideal, critical } = isDay ? entry : (entry.night ?? entry);
   return { ideal: spanOf(ideal), critical: spanOf(critical) };
+}
+
+/** All that entries have, of day, night and species. */
+const idealsOf = (entries: readonly (SensorEntry | undefined)[]): Span[] =>
+  entries
+    .flatMap((entry) => [entry, ...Object.values(entry?.species ?? {})])
+    .flatMap((ranges) => [spanOf(ranges?.ideal), spanOf(ranges?.night?.ideal)])
+    .filter((span) => span !== null);
+
+/** Those that tell the largest limit to about three figures: 1.30 kPa, 26.0 °C, 1500 ppm. */
+function digitsOf(entries: readonly (SensorEntry | undefined)[]): number | null {
+  const most = Math.max(0, ...idealsOf(entries).flat().map(Math.abs));
+  return most > 0 ? Math.max(0, Math.min(6, 3 - Math.ceil(Math.log10(most)))) : null;
 }
 
 function spanOf(bounds: readonly number[] | null | undefined): Span | null {

@@ -65,17 +65,14 @@ describe('a trend', () => {
 });
 
 test.each([
-  ['temperature', 22.4, 1.26, 'C', 'up', '+1.3\u00a0°C'],
-  ['temperature', 22.4, 1, 'F', 'up', '+1.8\u00a0°F'],
-  ['temperature', 22.4, -0.04, 'C', 'level', 'steady'],
-  ['temperature', 22.4, -0.06, 'C', 'down', '\u22120.1\u00a0°C'],
-  ['light', 975, 0.4, 'C', 'level', 'steady'],
-  ['light', 975, -12.2, 'C', 'down', '\u221212\u00a0lx'],
-  ['light', 9_750, -12.2, 'C', 'down', '\u221212\u00a0lx'],
-  ['ph', 6.5, 0.2, 'C', 'up', '+0.2'],
-] as const)(
-  'of %s at %d a difference of %d is told in °%s: %s, %s',
-  (name, value, by, unit, way, text) => {
-    expect(differenceShown(sensorNamed(name), value, by, unit)).toEqual({ way, text });
-  },
-);
+  ['temperature', 1.26, 'C', 'up', '+1.3\u00a0°C'],
+  ['temperature', 1, 'F', 'up', '+1.8\u00a0°F'],
+  ['temperature', -0.04, 'C', 'level', 'steady'],
+  ['temperature', -0.06, 'C', 'down', '\u22120.1\u00a0°C'],
+  ['light', 0.4, 'C', 'level', 'steady'],
+  ['light', -12.2, 'C', 'down', '\u221212\u00a0lx'],
+  ['ph', 0.2, 'C', 'up', '+0.20'],
+  ['vpd', -0.012, 'C', 'down', '\u22120.01\u00a0kPa'],
+] as const)('of %s a difference of %d is told in °%s: %s, %s', (name, by, unit, way, text) => {
+  expect(differenceShown(sensorNamed(name), by, unit)).toEqual({ way, text });
+});

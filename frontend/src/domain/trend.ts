@@ -1,10 +1,10 @@
 /** A reading against the same an hour before, as far as the bridge lets either stand. Pure. */
 import type { TagHealth } from '../contract/types';
-import { valueText, withUnit, written } from './format';
+import { differenceText } from './difference';
 import type { Sensor } from './sensors';
 import { S } from '../strings';
 import type { Tag } from './twin';
-import { differenceToShown, type TemperatureUnit } from './units';
+import type { TemperatureUnit } from './units';
 
 /** A tag, and what the bridge said of it at that moment. */
 export interface TagThen {
@@ -51,20 +51,15 @@ export function sameReading(sensor: string, a: Tag, b: Tag): boolean {
 }
 
 /**
- * The difference as precise as its value is shown: what rounds to nothing is level. `text` has its
+ * The difference as precise as the sensor's values are: what rounds to nothing is level. `text` has its
  * sign and its unit, or says that there is none.
  */
 export function differenceShown(
   sensor: Sensor,
-  value: number,
   by: number,
   unit: TemperatureUnit,
 ): { readonly way: 'up' | 'down' | 'level'; readonly text: string } {
-  // Of thousands there are none, and the mark in them is no decimal point.
-  const decimals = Math.abs(value) < 1000 && /[.,](\d+)$/.exec(valueText(sensor, value, unit));
-  const digits = decimals ? (decimals[1]?.length ?? 0) : 0;
-  const shown = differenceToShown(sensor, by, unit).toFixed(digits);
-  const way = Number(shown) > 0 ? 'up' : Number(shown) < 0 ? 'down' : 'level';
-  if (way === 'level') return { way, text: S.trendLevel };
-  return { way, text: withUnit(sensor, written(`${way === 'up' ? '+' : ''}${shown}`), unit) };
+  const text = differenceText(sensor, by, unit);
+  const way = text.startsWith('+') ? 'up' : text.startsWith('\u2212') ? 'down' : 'level';
+  return { way, text: way === 'level' ? S.trendLevel : text };
 }

@@ -9,11 +9,10 @@ import { lookOf } from '../charts/looks';
 import type { PlotModel } from '../charts/model';
 import { createPlot, type Plot } from '../charts/plot';
 import { timeOfDay } from '../clock';
-import { numberText, readingText } from '../domain/format';
+import { differenceNumber, readingText, withUnit } from '../domain/format';
 import { spanOf as periodSpan } from '../domain/period';
 import { rosText } from '../domain/rostime';
 import { isMeasured, type Sensor } from '../domain/sensors';
-import { differenceToShown, unitOf } from '../domain/units';
 import { LANGUAGE, S } from '../strings';
 import { Select } from '../widgets/Select';
 import type { FleetWords } from '../words/fleet';
@@ -182,7 +181,7 @@ const readingOrNone = (sensor: Sensor, value: number | null, { unit }: Speech): 
 
 function deviationText(sensor: Sensor, { deviation }: ComparedSite, { unit }: Speech): string {
   if (deviation === null) return S.noValue;
-  return `${numberText(differenceToShown(sensor, deviation, unit))}\u00a0${unitOf(sensor, unit)}`;
+  return withUnit(sensor, differenceNumber(sensor, deviation, unit), unit);
 }
 
 function Chart({

@@ -74,7 +74,7 @@ export function corners(bounds: Bounds): MapPoint[] {
   ];
 }
 
-/** As far out as a hand zooms, but to all there is where that is larger. */
+/** As far out as a hand zooms before it is known what there is: then to half of its fit. */
 export const MIN_SCALE = 4;
 export const MAX_SCALE = 2000;
 /** A single tag has a box of no size; a fit shows at least this much around it, in metres. */

@@ -110,7 +110,7 @@ export class MapCamera {
     const whole = content && fitClear(content.bounds, content.pins, size, fitInsets(size), covered);
     if (whole) {
       this.#content = content;
-      this.#leastScale = Math.min(MIN_SCALE, whole.scale);
+      this.#leastScale = whole.scale / 2;
       this.#hand?.follow(before);
     }
     const view = camera ? this.#inSight(viewOf(camera, size, this.#leastScale)) : whole;

@@ -57,6 +57,18 @@ test('charts of a tag follow the tag that is chosen, those of a sensor keep thei
   expect(reduceView(several, { type: 'chart', chart: { by: 'tag', tagIds: [] } }).chart).toBeNull();
 });
 
+test('charts stand where the map is, and lead back to where they were opened', () => {
+  const chart = { type: 'chart', chart: { by: 'tag', tagIds: ['5'] } } as const;
+  const close = { type: 'chart', chart: null } as const;
+  const list = reduceView(DEFAULT_VIEW, { type: 'list', list: 'tags' });
+  const open = reduceView(list, chart);
+  expect(open.pane).toBe('map');
+  expect(reduceView(reduceView(open, chart), close).pane).toBe('tags');
+  expect(reduceView(reduceView(DEFAULT_VIEW, chart), close).pane).toBe('map');
+  // Who went on to the map by hand stays there.
+  expect(reduceView(reduceView(open, { type: 'pane', pane: 'map' }), close).pane).toBe('map');
+});
+
 test('the list beside the map: a narrow screen shows it, and a filter of the table the table', () => {
   const alarms = reduceView(DEFAULT_VIEW, { type: 'list', list: 'alarms' });
   expect(alarms).toMatchObject({ list: 'alarms', pane: 'tags' });

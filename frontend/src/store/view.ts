@@ -59,6 +59,8 @@ export interface ViewState {
   readonly compare: Compare | null;
   /** What the charts show; null: they are closed. */
   readonly chart: Charted | null;
+  /** The half that the charts took the place of, and lead back to; null: none that is still wanted. */
+  readonly chartedFrom: ViewState['pane'] | null;
   /** Whether colours tell how values lie against their ideal range, or how high they are. */
   readonly colouring: 'ideal' | 'value';
   /** Fixed colour scales by sensor; one without follows its data. */
@@ -88,6 +90,7 @@ export const DEFAULT_VIEW: ViewState = {
   heat: 'nearest',
   compare: null,
   chart: null,
+  chartedFrom: null,
   colouring: 'ideal',
   ranges: new Map(),
   camera: null,
@@ -154,7 +157,7 @@ export function reduceView(view: ViewState, action: ViewAction): ViewState {
     case 'compare':
       return { ...view, compare: action.compare };
     case 'chart':
-      return { ...view, chart: chartOf(action.chart) };
+      return charted(view, chartOf(action.chart));
     case 'select': {
       const { chart } = view;
       const follows = chart?.by === 'tag' && action.tagId !== null;
@@ -197,10 +200,18 @@ export function reduceView(view: ViewState, action: ViewAction): ViewState {
       // A filter of the table shows the table.
       return { ...view, health: action.verdict, list: 'tags' };
     case 'pane':
-      return { ...view, pane: action.pane };
+      return { ...view, pane: action.pane, chartedFrom: null };
     case 'list':
-      return { ...view, list: action.list, pane: 'tags' };
+      return { ...view, list: action.list, pane: 'tags', chartedFrom: null };
   }
+}
+
+/** On a narrow screen the charts are where the map is. */
+function charted(view: ViewState, chart: Charted | null): ViewState {
+  const { pane, chartedFrom } = view;
+  return chart
+    ? { ...view, chart, pane: 'map', chartedFrom: view.chart ? chartedFrom : pane }
+    : { ...view, chart, pane: chartedFrom ?? pane, chartedFrom: null };
 }
 
 /** As many as a chart may have, none of them twice; without any there is no chart. */

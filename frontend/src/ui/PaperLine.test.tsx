@@ -35,7 +35,7 @@ test('paper says when it was, when it was printed, and what is on it', () => {
     prefer({ unit: 'F' });
     act({ type: 'range', range: { low: 0, high: 100 } });
   });
-  expect(line()).toMatch(/Temperature 32\.0 – 212\u00a0°F$/);
+  expect(line()).toMatch(/Temperature 32\.0 – 212\.0\u00a0°F$/);
   // What comes after the print was begun is on it, and not later than it.
   vi.advanceTimersByTime(3_000);
   flush(() => {

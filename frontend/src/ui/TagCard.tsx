@@ -1,9 +1,16 @@
 import { useRef, type JSX } from 'react';
 
 import type { When } from '../domain/age';
-import { farOffText, metresText, percentText, readingText, valueText } from '../domain/format';
+import {
+  beyondLimitText,
+  farOffText,
+  metresText,
+  percentText,
+  readingText,
+  valueText,
+} from '../domain/format';
 import { isBad, rangeReason, sideOf } from '../domain/health';
-import { digitsOf, isBack, tryKind } from '../domain/reasons';
+import { isBack, tryKind } from '../domain/reasons';
 import { rangesFor } from '../domain/sensors';
 import { speciesText } from '../domain/species';
 import { shown } from '../domain/text';
@@ -214,7 +221,6 @@ function CardReading({
   const sensor = useApp((state) => selectCatalogue(state).named(name));
   const { ideal } = rangesFor(sensor, species);
   const reason = rangeReason(health, name);
-  const more = reason ? digitsOf(sensor, reason, unit) : 0;
   const out = reason && !isBack(reason) ? reason : null;
   const side = out && sideOf(out);
   const step = useAgeStep(when);
@@ -222,7 +228,11 @@ function CardReading({
     <li data-sensor={name} data-age={step}>
       <span className="card-label">{shown(sensor.label, 32)}</span>
       <strong className="card-value">
-        {value === null ? S.sensorFailed : readingText(sensor, value, unit, more)}
+        {value === null
+          ? S.sensorFailed
+          : out
+            ? beyondLimitText(sensor, value, out.limit, unit)
+            : readingText(sensor, value, unit)}
       </strong>
       <span className="card-age faint">
         <Age when={when} />
@@ -235,8 +245,8 @@ function CardReading({
           {side && `${S.side[side]}, `}
           {S.healthIdeal(
             S.idealParts[sensor.part ?? 'any'],
-            valueText(sensor, ideal[0], unit, more),
-            valueText(sensor, ideal[1], unit, more),
+            valueText(sensor, ideal[0], unit),
+            valueText(sensor, ideal[1], unit),
             unitOf(sensor, unit),
           )}
         </span>

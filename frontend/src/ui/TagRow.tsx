@@ -4,7 +4,7 @@ import type { When } from '../domain/age';
 import { farOffText, percentText, shortAgeText, valueText } from '../domain/format';
 import type { TagHealth } from '../contract/types';
 import { rangeReason, sideOf, worstReason } from '../domain/health';
-import { beyondText, digitsOf, isBack, reasonsText, reasonText } from '../domain/reasons';
+import { beyondText, isBack, reasonsText, reasonText } from '../domain/reasons';
 import type { Catalogue, Sensor } from '../domain/sensors';
 import { speciesText } from '../domain/species';
 import { shown } from '../domain/text';
@@ -234,8 +234,7 @@ function Reading({
     );
   }
   const reason = rangeReason(health, sensor.name);
-  const more = reason ? digitsOf(sensor, reason, unit) : 0;
-  const beyond = reason && !isBack(reason) ? beyondText(catalogue, reason, unit, more) : null;
+  const beyond = reason && !isBack(reason) ? beyondText(catalogue, reason, unit) : null;
   return (
     <>
       {reason && beyond !== null && (
@@ -244,7 +243,7 @@ function Reading({
           <span className="unseen">{beyond}: </span>
         </span>
       )}
-      {valueText(sensor, value, unit, more)}
+      {valueText(sensor, value, unit)}
     </>
   );
 }

@@ -28,9 +28,6 @@ import { useChosenInSight } from './chosenInSight';
 import { useHeldRows } from './useHeldRows';
 import { partsOf, SHORT_TABLE, useVisibleRows } from './visibleRows';
 
-/** Beside the tag's own, and those of sensors. */
-const COLUMNS = ['health', 'age', 'species', 'flowers'];
-
 /** Every tag, also those without a pin and those whose scan failed. */
 export function TagTable(): JSX.Element {
   const catalogue = useApp(selectCatalogue);
@@ -41,13 +38,15 @@ export function TagTable(): JSX.Element {
   const unit = useApp((state) => state.settings.unit);
   const { lines, ...hold } = useHeldRows();
   const hasTags = useApp((state) => selectTags(state).length > 0);
+  const longestId = useApp((state) =>
+    selectTags(state).reduce((most, { id }) => Math.max(most, id.length), 0),
+  );
   const isByArea = useApp((state) => state.settings.byArea);
   const density = useApp((state) => state.settings.density);
   const hidden = useApp((state) => state.settings.hidden);
   const last = useSelected(hourAgo, (known) => known);
   const then = useApp((state) => selectHourAgo(state, last));
   const has = (id: string): boolean => isColumnShown({ hidden }, id);
-  const columns = ['tag', ...COLUMNS].filter(has).length + sensors.length;
   const body = useRef<HTMLTableSectionElement>(null);
   const sight = useVisibleRows(body, lines.length);
   useChosenInSight(body, hasTags ? selected : null, sight.rowHeight);
@@ -86,14 +85,14 @@ export function TagTable(): JSX.Element {
     >
       <caption className="unseen">{S.tableCaption}</caption>
       <colgroup>
-        <col className="col-tag" />
+        <col className="col-tag" style={letters(longestId)} />
         {has('health') && <col className="col-health" />}
         {has('age') && <col className="col-age" />}
         {sensors.map((sensor) => (
           <col
             key={sensor.name}
             className={sensor.name === chosen ? 'col-sensor' : 'col-sensor other'}
-            style={{ '--letters': longestWord(sensor.label) } as CSSProperties}
+            style={letters(longestWord(sensor.label))}
           />
         ))}
         {has('species') && <col className="col-species" />}
@@ -136,9 +135,7 @@ export function TagTable(): JSX.Element {
           }
           const row = lines[part.index];
           if (row && 'area' in row) {
-            return (
-              <AreaRow key={`area ${row.area}`} head={row} index={part.index} columns={columns} />
-            );
+            return <AreaRow key={`area ${row.area}`} head={row} index={part.index} />;
           }
           return (
             row && (
@@ -162,18 +159,20 @@ export function TagTable(): JSX.Element {
         })}
         {lines.length === 0 && hasTags && (
           <tr className="no-match">
-            <td colSpan={columns}>
-              {S.nothingMatches}{' '}
-              <button
-                type="button"
-                className="text-button"
-                onClick={() => {
-                  act({ type: 'filter', text: '' });
-                  act({ type: 'health', verdict: null });
-                }}
-              >
-                {S.filterClear}
-              </button>
+            <td>
+              <p>
+                {S.nothingMatches}{' '}
+                <button
+                  type="button"
+                  className="text-button"
+                  onClick={() => {
+                    act({ type: 'filter', text: '' });
+                    act({ type: 'health', verdict: null });
+                  }}
+                >
+                  {S.filterClear}
+                </button>
+              </p>
             </td>
           </tr>
         )}
@@ -186,15 +185,13 @@ export function TagTable(): JSX.Element {
 function AreaRow({
   head: { area, count, worst },
   index,
-  columns,
 }: {
   head: AreaHead;
   index: number;
-  columns: number;
 }): JSX.Element {
   return (
     <tr className="area" aria-rowindex={index + 2}>
-      <td colSpan={columns}>
+      <td>
         <h3>
           <HealthMark verdict={worst} word={false} />{' '}
           <bdi>{area === '' ? S.areaNone : shown(area, 32)}</bdi>{' '}
@@ -224,6 +221,8 @@ function onPointerOver(event: SyntheticEvent): void {
 function onPointerLeave(): void {
   act({ type: 'hover', tagId: null });
 }
+
+const letters = (count: number): CSSProperties => ({ '--letters': count }) as CSSProperties;
 
 /** How many letters the longest word of a label has. */
 const longestWord = (label: string): number =>

@@ -40,7 +40,7 @@ export function TrendLine({
     // Only to be heard: with a young memory it would stand in every row.
     return <span className="unseen">{then ? S.trendNone : S.trendUnknown}</span>;
   }
-  const { way, text } = differenceShown(sensor, value, trend.by, unit);
+  const { way, text } = differenceShown(sensor, trend.by, unit);
   return (
     <span className="trend" data-trend={way} title={`${title}: ${text}`}>
       <span aria-hidden="true">{ARROWS[way]}</span> <span className="unseen">{title}: </span>

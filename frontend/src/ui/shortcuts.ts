@@ -111,7 +111,6 @@ function runKey(key: string): boolean {
 /** Opens the charts of the chosen tag, or closes them; false: no tag is chosen. */
 function toggleCharts({ chart, selected }: ViewState): boolean {
   if (!chart && selected === null) return false;
-  act({ type: 'pane', pane: 'map' });
   act({ type: 'chart', chart: chart ? null : { by: 'tag', tagIds: [selected ?? ''] } });
   return true;
 }

@@ -201,8 +201,28 @@ def test_what_is_handed_over_comes_first_with_its_value_and_both_limits() -> Non
     assert active.startswith("Alarm Tag Raised At the end Worst value Limits ")
     assert "7 06:01 9.5 °C 8.0 °C 10.0–35.0 °C" in active
     assert "8 06:01 12.5 °C 11.0 °C 13.0–35.0 °C" in active
-    assert "7 06:01 07:19 1 h 18 min 1.6 kPa 0.2–1.3 kPa" in resolved
+    assert "7 06:01 07:19 1 h 18 min 1.60 kPa 0.20–1.30 kPa" in resolved
     # The file of sensors has another range by now.
     assert "7 06:01 06:02 1 min 2.0 °C 3.5 °C" in resolved
     page = page_of(alarms=[alarm()], tags=[TagState("7", flower=Flower(bug_count=2))])
     assert "7 06:01 2 3" in page
+
+
+@pytest.mark.parametrize(
+    ("lang", "numbers"),
+    [
+        ("en", "just below 350 ppm"),
+        ("de", "knapp unter 350 ppm"),
+        ("nl", "net onder 350 ppm"),
+        ("es", "justo por debajo de 350 ppm"),
+    ],
+)
+def test_values_of_a_sensor_have_as_many_digits_and_none_reads_like_its_limit(
+    lang: str, numbers: str
+) -> None:
+    low = {"verdict": "stressed", "kind": "range", "sensor": "co2", "value": 349.7, "limit": 350.0}
+    assert numbers in page_of(lang, alarms=[alarm(reason=low, worst=349.7)])
+    # As the page has them: `format.test.ts`.
+    sensors = GREENHOUSE.sensors
+    names = ("temperature", "vpd", "co2", "humidity", "dew_point", "co2_dose", "spin")
+    assert [sensors.digits(name) for name in names] == [1, 2, 0, 1, 1, 0, None]

@@ -64,7 +64,7 @@ export function AlarmTimes({
 /** How it is now, and how it was at worst: a column each. */
 export function AlarmFacts({
   item: { alarm, verdict },
-  values: { state, now: current, worst, more },
+  values: { state, now: current, worst },
 }: {
   item: Item;
   values: ValuesNow;
@@ -73,12 +73,10 @@ export function AlarmFacts({
     <>
       {state?.kind === 'known' && current !== null && (
         <Fact name="now" verdict={state.verdict} text={current}>
-          {state.value !== null && state.trend !== null && (
-            <Trend alarm={alarm} value={state.value} by={state.trend} />
-          )}
+          {state.value !== null && state.trend !== null && <Trend alarm={alarm} by={state.trend} />}
         </Fact>
       )}
-      {state?.kind === 'unknown' && <NotKnown alarm={alarm} state={state} more={more} />}
+      {state?.kind === 'unknown' && <NotKnown alarm={alarm} state={state} />}
       {worst !== null && (
         <Fact
           name="worst"
@@ -116,16 +114,12 @@ function Fact({
 function NotKnown({
   alarm,
   state,
-  more,
 }: {
   alarm: Alarm;
   state: Extract<Now, { kind: 'unknown' }>;
-  more: number;
 }): JSX.Element {
   const speech = useApp(selectSpeech);
-  const text = useTicking((at) =>
-    unknownText(alarm, speech, state, more, ageSeconds(state.lastAt, at)),
-  );
+  const text = useTicking((at) => unknownText(alarm, speech, state, ageSeconds(state.lastAt, at)));
   return (
     <span data-fact="now" data-status="unknown" title={text}>
       {text}
@@ -134,10 +128,10 @@ function NotKnown({
 }
 
 /** Up, down or level against an hour before. */
-function Trend({ alarm, value, by }: { alarm: Alarm; value: number; by: number }): JSX.Element {
+function Trend({ alarm, by }: { alarm: Alarm; by: number }): JSX.Element {
   const { sensors, unit } = useApp(selectSpeech);
   const sensor = sensors.named(alarm.reason.sensor);
-  const { way, text } = differenceShown(sensor, value, by, unit);
+  const { way, text } = differenceShown(sensor, by, unit);
   const title = `${S.trendTitle(sensor.label, shortHourText())}: ${text}`;
   return (
     <span data-trend={way} title={title}>

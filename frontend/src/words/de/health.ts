@@ -17,7 +17,10 @@ export const HEALTH: In<typeof ENGLISH> = {
     sides: { below: 'unter', above: 'über' },
     wasBeyond: (side, limit, status, until) =>
       `war ${side} ${limit}; bleibt ${status} bis ${until}`,
-    range: (reading, limit, isCritical) => `${reading}, ${limit}${isCritical ? ' (kritisch)' : ''}`,
+    just: {
+      below: (limit) => `knapp unter ${limit}`,
+      above: (limit) => `knapp über ${limit}`,
+    },
     readingFailed: (sensor) => `${sensor}: Der Sensor liefert keinen Wert`,
     implausible: (reading) => `${reading}: kein plausibler Wert`,
     scanFailed: (outcome, age) =>

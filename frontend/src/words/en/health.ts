@@ -18,8 +18,11 @@ export const HEALTH = {
     /** What was out of its range counts as that until it is well within. */
     wasBeyond: (side: string, limit: string, status: string, until: string): string =>
       `was ${side} ${limit}; stays ${status} until ${until}`,
-    range: (reading: string, limit: string, isCritical: boolean): string =>
-      `${reading}, ${limit}${isCritical ? ' (critical)' : ''}`,
+    /** Of a value that reads like the limit that it is beyond. */
+    just: {
+      below: (limit: string): string => `just below ${limit}`,
+      above: (limit: string): string => `just above ${limit}`,
+    },
     readingFailed: (sensor: string): string => `${sensor}: the sensor returns no value`,
     implausible: (reading: string): string => `${reading}: not a plausible value`,
     scanFailed: (outcome: string, age: string | null): string =>

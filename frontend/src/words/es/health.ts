@@ -20,7 +20,10 @@ export const HEALTH: In<typeof ENGLISH> = {
     sides: { below: 'inferior a', above: 'superior a' },
     wasBeyond: (side, limit, status, until) =>
       `ha sido ${side} ${limit}; sigue ${status} hasta ${until}`,
-    range: (reading, limit, isCritical) => `${reading}, ${limit}${isCritical ? ' (crítico)' : ''}`,
+    just: {
+      below: (limit) => `justo por debajo de ${limit}`,
+      above: (limit) => `justo por encima de ${limit}`,
+    },
     readingFailed: (sensor) => `${sensor}: el sensor no da ningún valor`,
     implausible: (reading) => `${reading}: valor inverosímil`,
     scanFailed: (outcome, age) =>

@@ -17,7 +17,10 @@ export const HEALTH: In<typeof ENGLISH> = {
     sides: { below: 'onder', above: 'boven' },
     wasBeyond: (side, limit, status, until) =>
       `was ${side} ${limit}; blijft ${status} tot ${until}`,
-    range: (reading, limit, isCritical) => `${reading}, ${limit}${isCritical ? ' (kritiek)' : ''}`,
+    just: {
+      below: (limit) => `net onder ${limit}`,
+      above: (limit) => `net boven ${limit}`,
+    },
     readingFailed: (sensor) => `${sensor}: de sensor geeft geen waarde`,
     implausible: (reading) => `${reading}: onwaarschijnlijke waarde`,
     scanFailed: (outcome, age) =>

@@ -408,8 +408,8 @@ class _Page:
         known = self._criteria.sensors
         unit, digits, size = known.named(sensor).unit, known.digits(sensor), abs(value)
         number = f"{value:.4g}"
-        if digits is not None and size < 1e6:
-            number = f"{value:,.{digits if size < 1000 else 0}f}"
+        if size < 1e6 and (digits is not None or size >= 1000):
+            number = f"{value:,.{digits if digits and size < 1000 else 0}f}"
         text = f"{self._written(number)}\u00a0{unit}".strip()
         if limit is None or value == limit or text != self._number(limit, sensor):
             return text

@@ -222,6 +222,8 @@ def test_values_of_a_sensor_have_as_many_digits_and_none_reads_like_its_limit(
 ) -> None:
     low = {"verdict": "stressed", "kind": "range", "sensor": "co2", "value": 349.7, "limit": 350.0}
     assert numbers in page_of(lang, alarms=[alarm(reason=low, worst=349.7)])
+    spun = {**low, "sensor": "spin", "value": 12345.0, "limit": 20000.0}
+    assert "e+04" not in page_of(lang, alarms=[alarm(reason=spun, worst=12345.0)])
     # As the page has them: `format.test.ts`.
     sensors = GREENHOUSE.sensors
     names = ("temperature", "vpd", "co2", "humidity", "dew_point", "co2_dose", "spin")

@@ -31,6 +31,12 @@ LOT: Final = 40
 LINE: Final = (186, 51, 31)
 
 
+# What is written into pictures.
+WATCH_TEXTS: Final = """const paint = CanvasRenderingContext2D.prototype.fillText;
+window.texts = []; CanvasRenderingContext2D.prototype.fillText = function (text, ...place) {
+  texts.push(text); return paint.call(this, text, ...place); };"""
+
+
 class Garden:
     """Two hours of tag 1 with twenty minutes of nothing; of tag 2 more than a chart has points."""
 
@@ -273,6 +279,11 @@ def test_a_quantity_of_the_day_is_charted_where_its_sensor_is(
     assert f"{len(told['readings'])} readings" in summary
     hmi.page.keyboard.press("c")
     expect(hmi.test_id("chart-view").get_by_test_id("plot")).to_have_count(2)
+    # The axis is of the page's language, whatever the browser's is.
+    dutch = open_page(running.url, go=False)
+    dutch.page.add_init_script(WATCH_TEXTS)
+    dutch.go(f"tag=5&{period}", "?lang=nl")
+    dutch.expect(lambda: "10.000" in dutch.page.evaluate("texts"), "thousands as in Dutch")
     # A tag without light has nothing to make it of: its own sensors are shown.
     hmi = open_page(running.url, f"tag=2&sensor=daily_light_integral&{garden.period}")
     expect(plot(hmi)).to_be_visible()

@@ -4,6 +4,7 @@ import uPlot from 'uplot';
 import type { Span } from '../domain/period';
 import { hasDate } from '../domain/rostime';
 import { timeTicks, type Tick } from '../domain/ticks';
+import { LOCALE } from '../strings';
 import { drawAbove, drawBelow, drawMarks, MARKS_LANE, type Frame } from './layers';
 import { lookOf } from './looks';
 import { aligned, drawnOf, hasMarks, valueRange, type PlotModel } from './model';
@@ -34,6 +35,8 @@ const SHORTEST_DRAG = 6;
 const LIMITS_ROOM = 8;
 /** Charts of one view have one cursor. */
 const SYNC_KEY = 'lupin-charts';
+/** In the page's language: uPlot goes by the browser's. */
+const AXIS_NUMBER = new Intl.NumberFormat(LOCALE);
 
 export interface Plot {
   readonly show: (model: PlotModel, size: PlotSize) => void;
@@ -121,6 +124,7 @@ export function createPlot(element: HTMLElement, handlers: PlotHandlers): Plot {
             size: 48,
             // Steps come in ones, twos and fives: in six of these there are three ticks.
             space: (_self, _axis, _min, _max, height) => Math.min(34, height / 6),
+            values: (_self, splits) => splits.map((at) => AXIS_NUMBER.format(at)),
           },
         ],
         hooks: {

@@ -157,17 +157,25 @@ def past(url: str) -> str:
 
 def of_the_docs(browser: Browser, url: str) -> None:
     """The docs' pictures of the page, and the README's moving one."""
-    for name, size, scheme, path in (
-        ("page", (1440, 900), "light", "/"),
-        ("past", (1280, 800), "dark", past(url)),
-        ("phone", (360, 740), "light", "/"),
+    for name, size, scheme, path, part in (
+        ("page", (1440, 900), "light", "/", "body"),
+        ("past", (1280, 800), "dark", past(url), "body"),
+        ("phone", (360, 740), "light", "/", "body"),
+        ("wall", (1280, 720), "dark", "/?kiosk=1", "body"),
+        ("map", (1280, 800), "light", "/", ".map-panel"),
+        ("table", (1280, 800), "light", "/", ".tags-panel"),
+        ("alarms", (1280, 800), "light", "/", ".tags-panel"),
     ):
         page = opened(browser, url, size, scheme, path)
         if "tag=" in path:
             expect(page.get_by_test_id("plot").last.locator("canvas")).to_be_visible()
+        if name == "alarms":
+            page.get_by_role("button", name="Alarms").first.click()
+            expect(page.locator("[data-alarm]").first).to_be_visible()
         # The time bar and the charts have what they asked for.
         page.wait_for_load_state("networkidle")
-        estimate_pictures.save(page.screenshot(scale="css"), IMAGES / f"{name}.png")
+        picture = page.locator(part).screenshot(scale="css")
+        estimate_pictures.save(picture, IMAGES / f"{name}.png")
         page.context.close()
     moving_picture.taken(browser, url, IMAGES / "page.webp")
 

@@ -28,8 +28,8 @@ export const ALARMS: In<typeof ENGLISH> = {
       : `jetzt unbekannt, zuletzt ${last}${age === null ? '' : ` vor ${age}`}`,
   alarmPests: { none: 'keine festgestellt', seen: 'festgestellt' },
   alarmWorst: {
-    below: (reading) => `niedrigster Wert ${reading}`,
-    above: (reading) => `höchster Wert ${reading}`,
+    below: (reading) => `Tiefstwert ${reading}`,
+    above: (reading) => `Höchstwert ${reading}`,
     pest: (reading) => `höchste Anzahl ${reading}`,
   },
   alarmFirst: (reading) => `anfangs ${reading}`,

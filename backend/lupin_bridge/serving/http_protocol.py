@@ -180,6 +180,11 @@ class HttpConnection(H11Protocol):
         else:
             self._refuse(400, msg)
 
+    def shutdown(self) -> None:
+        """End once the answer has gone; who is refused has an answer that h11 knows nothing of."""
+        if not self._is_refused:
+            super().shutdown()
+
     def abort(self) -> None:
         """Tear the connection down and forget what was still to be sent."""
         tear_down(self.transport)

@@ -9,6 +9,7 @@ from collections.abc import Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
+from urllib.parse import urlsplit
 
 import httpx
 import pytest
@@ -210,7 +211,11 @@ def test_a_signal_ends_it_and_every_client_is_told() -> None:
     with bridge() as running_bridge, running_bridge.listen() as one, running_bridge.listen() as two:
         one.until("state")
         running_bridge.get("/api/state")  # and its connection is kept alive
-        assert running_bridge.process.stop(signal.SIGINT) == 0
+        address = urlsplit(running_bridge.url)
+        with socket.create_connection((address.hostname, address.port)) as refused:
+            refused.sendall(b"GET /api/state HTTP/1.1\r\nHost: x\r\nContent-Length: 9\r\n\r\n")
+            assert refused.recv(1_024).startswith(b"HTTP/1.1 413")
+            assert running_bridge.process.stop(signal.SIGINT) == 0
         assert last_words(one) == last_words(two) == ("shutting_down", 1012)
         assert_quiet(running_bridge.process)
 

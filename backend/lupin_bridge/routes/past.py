@@ -105,15 +105,17 @@ async def report_page_route(request: Request) -> Response:
 async def _report_page(request: Request) -> Response:
     given = read(query.OfReportPage, request.query_params.multi_items(), PastRefused)
     found = _report(request, given)
-    zone = None if given.time_zone is None else query.zone(given.time_zone)
+    name = given.time_zone or ""
+    zone = query.zone(name) if name else None
+    unknown_zone = "" if zone else name[:64]
     page = ReportPage(
         found.start_ns,
         found.end_ns,
         found.criteria,
         found.journal,
         lang=given.lang,
-        zone=UTC if zone is None and given.time_zone is not None else zone,
-        unknown_zone="" if zone is not None else (given.time_zone or "")[:64],
+        zone=UTC if unknown_zone else zone,
+        unknown_zone=unknown_zone,
         origin=bridge_of(request).origin,
         site=bridge_of(request).site,
     )

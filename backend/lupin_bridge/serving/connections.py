@@ -104,7 +104,7 @@ def _close_tls_once(transport: _SSLProtocolTransport) -> None:
 
 # A second `close`, of which uvicorn has several, would have it forget its connection: nothing could
 # end that any more, as long as its other side does not answer the first.
-_SSLProtocolTransport.close = _close_tls_once  # type: ignore[method-assign]
+_SSLProtocolTransport.close = _close_tls_once  # type: ignore[assignment,method-assign]
 
 
 class Evictable(Protocol):

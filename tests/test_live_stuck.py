@@ -10,6 +10,7 @@ import socket
 import struct
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager, suppress
+from functools import partial
 from typing import Any
 
 import httpx
@@ -20,9 +21,11 @@ from lupin_bridge.serving.server import MAX_INBOUND_BYTES
 from lupin_bridge.serving.ws_protocol import FRAMES_AT_ONCE, MAX_PIECES
 from tests.bench.live_parts import Server, serving
 from tests.support import raw_http
+from tests.support.foxglove import viewer
 from tests.support.proc_stat import open_files, peak_mb, reset_peak, resident_mb
 from tests.support.processes import limits
 from tests.support.raw_ws import CLOSE, CONT, TEXT, RawClient, masked
+from tests.support.rosbridge import ros_at
 from tests.support.waiting import PATIENCE_S, wait_for
 from tests.support.web import Listener, bridge, deaf_client, listener
 
@@ -249,11 +252,13 @@ def test_one_client_too_many_is_told_so_and_may_come_when_another_has_gone() -> 
         inside = [stack.enter_context(live.listen()) for _ in range(3)]
         for client in inside:
             client.until("state")
-        with live.listen() as refused, pytest.raises(ConnectionClosed) as closed:
-            refused.next()
-        assert closed.value.rcvd is not None
-        assert closed.value.rcvd.code == 1013
-        assert closed.value.rcvd.reason == "3 clients are connected, the limit"
+        connects: Any = (live.listen, partial(ros_at, live.url), partial(viewer, live.url))
+        for connect in connects:
+            with pytest.raises(ConnectionClosed) as closed, connect() as refused:
+                refused.next()
+            assert closed.value.rcvd is not None
+            assert closed.value.rcvd.code == 1013
+            assert closed.value.rcvd.reason == "3 clients are connected, the limit"
         inside[0].connection.close()
 
         def is_let_in() -> bool:

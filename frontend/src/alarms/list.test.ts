@@ -8,6 +8,7 @@ import {
   calling,
   EMPTY_LIST,
   heldList,
+  isAwaited,
   LISTED_S,
   listOf,
   newsOf,
@@ -132,6 +133,13 @@ describe('an order that is held', () => {
   test('what the bridge takes back stays until the order is let go', () => {
     expect(ids(heldList(before, EMPTY_LIST).shown.active)).toEqual(['a', 'b']);
   });
+});
+
+test('a second scan is waited for by what a first one found: beyond a range, or no value', () => {
+  const held = { ...reason(), release: 10.4 };
+  const kinds = ['reading_failed', 'range', 'pest', 'old'] as const;
+  const awaited = [...kinds.map((kind) => reason({ kind })), held].filter(isAwaited);
+  expect(awaited.map(({ kind }) => kind)).toEqual(['reading_failed', 'range']);
 });
 
 test('what is the same stays the same, and the rest is not', () => {

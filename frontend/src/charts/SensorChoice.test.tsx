@@ -46,3 +46,9 @@ test('what the card charts is no choice of the map’s, whose next choice it fol
   });
   expect(choice).toHaveProperty('value', 'ph');
 });
+
+test('what the map shows is no choice at a tag that lacks what it is computed of', () => {
+  act({ type: 'sensor', sensor: 'vpd' });
+  render(<CardChart tagId="1" />);
+  expect(screen.getByLabelText('Sensor')).toHaveProperty('value', 'light');
+});

@@ -2,6 +2,7 @@ import { expect, test, vi } from 'vitest';
 
 import {
   ageText,
+  beyondLimitText,
   differenceNumber,
   metresText,
   momentText,
@@ -21,8 +22,10 @@ test.each([
   [21.456, '21.5'],
   [-3.25, '\u22123.3'],
   [99.96, '100.0'],
+  [100, '100'],
   [612.4, '612'],
   [-80_000, '\u221280,000'],
+  [1e6, '1.00e+6'],
   [1234567, '1.23e+6'],
 ])('%d reads %s', (value, text) => {
   expect(numberText(value)).toBe(text);
@@ -125,4 +128,8 @@ test('all values of a sensor have as many digits, whatever their size', () => {
   // Without ranges of their own, as what they are computed of.
   expect(texts('dew_point', 0.4, 12)).toEqual(['0.4', '12.0']);
   expect(texts('co2_dose', 80.4, 800)).toEqual(['80', '800']);
+});
+
+test('a value at its limit is on neither side of it', () => {
+  expect(beyondLimitText(sensorNamed('temperature'), 10, 10, 'C')).toBe('10.0\u00a0°C');
 });

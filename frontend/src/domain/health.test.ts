@@ -1,6 +1,6 @@
 import { describe, expect, test } from 'vitest';
 
-import { judgement, NOBODY, reason } from '../testing/health';
+import { held, judgement, NOBODY, reason } from '../testing/health';
 import { tag } from '../testing/tags';
 import {
   houseHealth,
@@ -78,6 +78,12 @@ test('the worst verdict is the most severe, and of one verdict who is farthest b
   expect(new Set(severities).size).toBe(order.length);
   expect(worstReason(order[3])?.value).toBe(6);
   expect(worstReason(order[4])?.value).toBe(9);
+});
+
+test('what is beyond its limit is worse than what only the deadband still holds', () => {
+  const beyond = reason({ value: 9.9, limit: 10 });
+  const back = reason({ value: 26, limit: 30, ...held(25.6) });
+  expect(worstReason({ verdict: 'critical', reasons: [back, beyond] })).toBe(beyond);
 });
 
 test('a value is out of its range where a reason says so', () => {

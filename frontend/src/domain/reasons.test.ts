@@ -2,6 +2,7 @@ import { describe, expect, test } from 'vitest';
 
 import { held, reason } from '../testing/health';
 import { reasonsText, reasonText, todoText } from './reasons';
+import { S } from '../strings';
 import { CATALOGUE } from '../testing/sensors';
 
 const text = (over: Parameters<typeof reason>[0], age: number | null = null): string =>
@@ -118,6 +119,18 @@ describe('a reason in words', () => {
       '',
     );
     expect(todoText(reason({ value: 10.1, limit: 10, ...held(10.4) }))).not.toBe('');
+  });
+
+  test('beside its mark, it does not say again how bad it is', () => {
+    expect(reasonText(CATALOGUE, reason(), 'C', null, true)).toBe(
+      `Temperature 6.6${NBSP}°C, below 10.0`,
+    );
+  });
+
+  test('what is well waits for a scan; pests, for another look at the flowers', () => {
+    const well = { verdict: 'healthy' } as const;
+    expect(todoText(reason(well))).toBe(S.todoWell);
+    expect(todoText(reason({ ...well, kind: 'pest', value: 0 }))).toBe(S.todoPestAgain);
   });
 
   test('of a name that some twin made up stays short', () => {

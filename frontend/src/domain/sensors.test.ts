@@ -106,3 +106,14 @@ describe('ranges', () => {
     expect(CATALOGUES.night.named('light').ideal).toBeNull();
   });
 });
+
+test.each([
+  ['its night', { ideal: [1, 2], night: { ideal: [1, 20] } }, 1],
+  ['its species', { ideal: [1, 2], species: { rose: { ideal: [1, 200] } } }, 0],
+  ['what lies below zero', { ideal: [-20, 2] }, 1],
+  ['no more than six', { ideal: [0, 1e-7] }, 6],
+  ['none', { ideal: null }, null],
+] as const)('the largest of all limits tells its digits: %s', (_, ranges, digits) => {
+  const sensors = { x: { label: 'x', unit: '', hue: 0, lightness: 50, ...ranges } };
+  expect(cataloguesOf({ ...FILE, sensors }).day.named('x').digits).toBe(digits);
+});

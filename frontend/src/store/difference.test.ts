@@ -90,3 +90,12 @@ test('no difference of one sensor is shown as that of another, nor after it ends
   act({ type: 'compare', compare: null });
   expect(store.get().twin.difference.value).toBeNull();
 });
+
+test('no difference of readings is shown as that of estimates', async () => {
+  act({ type: 'compare', compare: { by: 'moment', at: 500 } });
+  await settled();
+  expect(store.get().twin.difference.value).not.toBeNull();
+  act({ type: 'heat', heat: 'estimate' });
+  expect(store.get().twin.difference.value).toBeNull();
+  act({ type: 'heat', heat: 'nearest' });
+});

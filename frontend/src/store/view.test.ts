@@ -67,6 +67,9 @@ test('charts stand where the map is, and lead back to where they were opened', (
   expect(reduceView(reduceView(DEFAULT_VIEW, chart), close).pane).toBe('map');
   // Who went on to the map by hand stays there.
   expect(reduceView(reduceView(open, { type: 'pane', pane: 'map' }), close).pane).toBe('map');
+  // So does who went on to a list.
+  const alarms = reduceView(reduceView(DEFAULT_VIEW, chart), { type: 'list', list: 'alarms' });
+  expect(reduceView(alarms, close).pane).toBe('tags');
 });
 
 test('the list beside the map: a narrow screen shows it, and a filter of the table the table', () => {

@@ -57,10 +57,11 @@ export function connection(now: number, ...events: readonly ConnectionEvent[]): 
   receive({ type: 'connection', connection: last, now });
 }
 
-export function goLive(bridge: StatusFrame = status()): void {
+/** Heard of, the last time so long ago. */
+export function goLive(bridge: StatusFrame = status(), silentMs = 0): void {
   const now = performance.now();
   connection(
-    now,
+    now + silentMs,
     { type: 'start', now },
     { type: 'opened', now },
     { type: 'frame', now, status: bridge },

@@ -3,7 +3,9 @@ import { beforeAll, beforeEach, describe, expect, test, vi } from 'vitest';
 
 import { mapPoint } from '../geometry/coordinates';
 import { pointedAt } from '../map/pointer';
-import { store } from '../store/app';
+import { act, receive, store } from '../store/app';
+import { NO_HOUSE } from '../store/twin';
+import { S } from '../strings';
 import { judgement, reason } from '../testing/health';
 import { fieldWith } from '../testing/field';
 import { goLost, showField, showTags } from '../testing/page';
@@ -46,6 +48,19 @@ describe('page', () => {
     flush(goLost);
     expect(shapes()).toBe(1);
     expect(app().dataset).toMatchObject({ connectionState: 'reconnecting', fresh: 'false' });
+  });
+
+  test('while a moment loads nothing is counted or judged, and no alarm before it is known', () => {
+    render(<App kiosk={false} />);
+    flush(() => {
+      act({ type: 'moment', moment: 500 });
+      receive({ type: 'past', past: { at: 500, house: NO_HOUSE } });
+    });
+    expect(screen.getByTestId('row-count').textContent).toBe('');
+    expect(screen.getByTestId('sample-count').textContent).toBe(S.legendFetching);
+    const tabs = screen.getByRole('navigation', { name: /Map/ });
+    expect(tabs.querySelector('[data-health]')).toBeNull();
+    expect(tabs.textContent).toMatch(/Alarms$/);
   });
 
   test('choosing a sensor is choosing a radio button', () => {

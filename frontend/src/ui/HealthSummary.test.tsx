@@ -250,6 +250,7 @@ test('while a moment loads nothing is said of it, and nothing is counted', () =>
     </>,
   );
   expect(screen.getByRole('heading').textContent).toBe('Greenhouse status: ');
+  expect(screen.getByTestId('house-health').dataset).not.toHaveProperty('health');
   for (const each of screen.getAllByRole('list', { name: 'Do this now' })) {
     expect(each.textContent).toBe('');
   }

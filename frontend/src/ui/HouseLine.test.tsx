@@ -5,7 +5,7 @@ import type { Judgement } from '../contract/types';
 import { snapshotOf } from '../domain/twin';
 import { act as view, receive } from '../store/app';
 import { NO_HOUSE } from '../store/twin';
-import { judgement } from '../testing/health';
+import { judgement, reason } from '../testing/health';
 import { goLive, goLost, showTags, status } from '../testing/page';
 import { stateFrame, wireTag } from '../testing/tags';
 import { HouseLine } from './HouseLine';
@@ -24,6 +24,7 @@ test('tells the rhythm, the last scan and who is overdue', () => {
 });
 
 test.each([
+  [0.1, '0.1\u00a0s'],
   [0.52, '0.5\u00a0s'],
   [7.25, '7.3\u00a0s'],
   [95, '1\u00a0min 35\u00a0s'],
@@ -84,4 +85,17 @@ test.each([
     receive({ type: 'past', past: { at: 1 + late, house: then } });
   });
   expect(screen.getByTestId('house-line').textContent).toMatch(/^no tag overdue/);
+});
+
+test('where the house has a reason of its own, that says what to do', () => {
+  const patrol = { interval_s: 1.2, last_scan: { sec: 1, nanosec: 0 }, overdue: 0 };
+  const { house, tags } = judgement({ '1': 'healthy' }, undefined, patrol);
+  const health = { house: { ...house, reasons: [reason({ kind: 'stopped' })] }, tags };
+  const latest = stateFrame([wireTag()], { sec: 601, health });
+  showTags([wireTag()]);
+  act(() => {
+    receive({ type: 'state', latest, now: performance.now() });
+  });
+  render(<HouseLine />);
+  expect(screen.getByTestId('house-line').textContent).toMatch(/^No scan for .+\)$/);
 });

@@ -91,6 +91,14 @@ describe('card', () => {
     expect(ideals()[0]).toBe('ideal by night 8.0 to 18.0 °C');
   });
 
+  test('a value that reads like its limit says on which side of it it is', () => {
+    const low = reason({ verdict: 'stressed', value: 17.97, limit: 18 });
+    const tags = [wireTag({ tag_id: '7', readings: readings({ temperature: 17.97 }) })];
+    showTags(tags, judgement({ 7: [low] }));
+    render(<TagCard tagId="7" />);
+    expect(document.querySelector('.card-value')?.textContent).toBe('just below 18.0\u00a0°C');
+  });
+
   test('what is back in its range is on no side of it, neither here nor in the table', () => {
     const back = reason({ verdict: 'stressed', value: 18.1, limit: 18, ...held(18.5) });
     const tags = [wireTag({ tag_id: '7', readings: readings({ temperature: 18.1 }) })];

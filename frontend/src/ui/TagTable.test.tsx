@@ -131,6 +131,12 @@ describe('table', () => {
     expect(store.get().view.hovered).toBeNull();
   });
 
+  test('its first column has room for the longest name', () => {
+    render(<TagTable />);
+    const column = document.querySelector<HTMLElement>('.col-tag');
+    expect(column?.style.getPropertyValue('--letters')).toBe('2');
+  });
+
   test('a filter that finds nothing offers the way out', () => {
     act({ type: 'filter', text: 'nobody' });
     render(<TagTable />);

@@ -73,6 +73,7 @@ async def test_a_call_runs_in_the_nodes_thread_and_its_result_comes_back(domain:
         thread = await stage.ros.call(lambda _: threading.current_thread())
         assert thread is stage.ros.require_node().thread
         assert thread is not threading.current_thread()
+        assert not stage.ros._unanswered, "who has an answer is forgotten"
         results = [stage.ros.call(lambda _, n=n: n * n) for n in range(50)]  # type: ignore[misc]
         assert await asyncio.gather(*results) == [n * n for n in range(50)]
         assert stage.ros.calls_waiting == 0

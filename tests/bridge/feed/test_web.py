@@ -4,7 +4,9 @@ import asyncio
 import math
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
+from types import SimpleNamespace
 from typing import Any
+from unittest.mock import AsyncMock
 
 import pytest
 from geometry_msgs.msg import Point, Pose, PoseStamped
@@ -12,9 +14,11 @@ from lupin_msgs.msg import Observation, SensorReading, TwinState, TwinTagState
 from lupin_msgs.srv import GetEstimateReport
 from rclpy.parameter import Parameter
 
-from lupin_bridge.feed.relay import Sample, topics_of
+from lupin_bridge.feed import web
+from lupin_bridge.feed.relay import Sample, TwinNames, topics_of
 from lupin_bridge.feed.source import TwinTimeoutError, TwinUnavailableError, TwinUpdate
-from lupin_bridge.feed.web import WebTwin
+from lupin_bridge.feed.web import WebTwin, _Received
+from lupin_bridge.serving.admission import Limits
 from lupin_twin.adapt.scans import BuiltScan
 from lupin_twin.field.engine import FieldRefused
 from lupin_twin.runtime.estimates import ReportRequest
@@ -24,6 +28,7 @@ from tests.support.waiting import until, until_answered
 
 SAYS = {"refused": "not that one", "busy": "32 fields are being computed: ask again later"}
 NAME = "/twin/get_estimate_report"
+LOOK = "the look for a lost twin"
 
 
 def state_of(value: float) -> TwinState:
@@ -43,18 +48,28 @@ async def started(
     finally:
         await twin.stop()
     assert deaths == []
+    assert all(task.get_name() != LOOK for task in asyncio.all_tasks()), "it looks on"
 
 
 async def test_a_map_alone_is_another_revision_and_no_sign_of_life(domain: int) -> None:
     with Peer(domain) as peer:
         async with started() as (twin, told):
-            peer.publish("/twin/state", state_of(1.0), depth=1)
+            states = peer.publish("/twin/state", state_of(1.0), depth=1)
             await until(lambda: told and twin.revision() == told[-1].revision, "a state")
             before = len(told)
             peer.publish_map(occupancy_grid([[0, 100]]))
             await until(lambda: twin.occupancy_map() is not None, "the map")
             assert twin.revision() != told[-1].revision
             assert len(told) == before
+            # Nor does a new node forget the state for it.
+            peer.node.destroy_publisher(states)
+            await twin.thread.stop()
+            await twin._join()
+            revision = twin.revision()
+            peer.publish_map(occupancy_grid([[100, 0]]))
+            await until(lambda: twin.revision() != revision, "another map")
+            assert len(told) == before
+            assert twin._received.update is told[-1]
 
 
 async def test_without_a_twin_its_service_is_named(domain: int) -> None:
@@ -144,6 +159,28 @@ async def test_what_a_lost_twin_said_last_is_no_news_to_a_new_node(domain: int) 
             peer.publish("/twin/state", state_of(2.0), depth=1)
             await until(lambda: told[-1].snapshot.tags[0].readings[0].value == 2.0, "the next one")
             assert [it.snapshot.tags[0].readings[0].value for it in told] == [1.0, 2.0]
+
+
+async def test_a_node_is_made_again_after_as_long_a_silence_again_and_five_minutes_at_most(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    twin = WebTwin(ros_args=(), timeout_s=1.0, rejoin_after_s=Limits().rejoin_after_s)
+    now_s, joined = 0.0, list[float]()
+
+    async def join() -> None:
+        joined.append(now_s)
+
+    monkeypatch.setattr(web, "time", SimpleNamespace(monotonic=lambda: now_s))
+    twin.thread = SimpleNamespace(stop=AsyncMock())  # type: ignore[assignment]
+    twin._join, twin._names = join, TwinNames("/twin/state", NAME)
+    for made_s in (None, 1_000.0, 3_000.0):
+        if made_s is not None:
+            twin._received = _Received(SimpleNamespace(made_s=made_s))  # type: ignore[arg-type]
+        for second in range(1_000):
+            now_s = (made_s or 0.0) + second
+            await twin._rejoin_if_lost()
+    after = [30.0, 60.0, 120.0, 240.0, 480.0, 780.0]
+    assert joined == [begun + each for begun in (1_000.0, 3_000.0) for each in after]
 
 
 async def test_refusals_are_the_services_and_no_answer_is_waited_for_for_ever(domain: int) -> None:

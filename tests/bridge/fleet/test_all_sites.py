@@ -251,3 +251,8 @@ def test_the_sensors_in_force_are_those_of_a_bridge(every: All) -> None:
     sensors = every.page.http.get("/api/sensors")
     assert sensors.json()["sensors"]["temperature"]["unit"] == "°C"
     assert sensors.content == every.page.http.get("/sites/gh1/api/sensors").content
+
+
+def test_it_has_the_font_of_the_pages(every: All) -> None:
+    font = every.page.http.get("/font.woff2")
+    assert font.status_code == 200 or "the page was not built" in font.text

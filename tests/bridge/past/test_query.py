@@ -37,6 +37,10 @@ def test_before_the_time_is_known_the_end_of_a_report_is_refused(to: str | None,
         query.report(query.OfReport(to=to), None)
 
 
+def test_a_report_of_the_first_hours_begins_at_0() -> None:
+    assert query.report(query.OfReport(), NOW_NS) == (0, NOW_NS)
+
+
 def test_what_is_given_is_what_is_asked() -> None:
     period = {"from_": "1.5", "to": "1970-01-01T00:00:09Z"}
     start_ns, end_ns = 3 * NS // 2, 9 * NS

@@ -189,10 +189,16 @@ def test_what_is_handed_over_comes_first_with_its_value_and_both_limits() -> Non
     tags = [
         TagState("7", readings=(Reading("temperature", 9.5, 1), Reading("humidity", 30.0, 1))),
         TagState("8", readings=(Reading("temperature", 12.5, 1),), flower=Flower("Orchid", 0.9)),
+        TagState("9", readings=(Reading("temperature", 9.97, 1),)),
     ]
     alarms = [
         alarm(tag_id="7", reason=cold, worst=8.0),
         alarm(tag_id="8", reason=orchid, worst=11.0),
+        # Of a night, of before its species was known, and at what the twin computes.
+        alarm(tag_id="9", reason={**cold, "value": 31.0, "limit": 30.0}, worst=31.0),
+        alarm(tag_id="8", reason={**cold, "value": 27.0, "limit": 26.0}, worst=27.0),
+        alarm(tag_id="7", reason=dry, worst=1.5),
+        alarm(tag_id="9", reason=cold, worst=8.0),
         alarm(tag_id="7", reason=dry, worst=1.6, cleared_at=at(60 + 78 * 60)),
         alarm(tag_id="7", reason={**cold, "limit": 3.5}, worst=2.0, cleared_at=at(120)),
     ]
@@ -201,6 +207,10 @@ def test_what_is_handed_over_comes_first_with_its_value_and_both_limits() -> Non
     assert active.startswith("Alarm Tag Raised At the end Worst value Limits ")
     assert "7 06:01 9.5 °C 8.0 °C 10.0–35.0 °C" in active
     assert "8 06:01 12.5 °C 11.0 °C 13.0–35.0 °C" in active
+    assert "9 06:01 10.0 °C 31.0 °C 8.0–30.0 °C" in active
+    assert "8 06:01 12.5 °C 27.0 °C 18.0–26.0 °C" in active
+    assert "7 06:01 0.83 kPa 1.50 kPa 0.20–1.30 kPa" in active
+    assert "9 06:01 just below 10.0 °C 8.0 °C 10.0–35.0 °C" in active
     assert "7 06:01 07:19 1 h 18 min 1.60 kPa 0.20–1.30 kPa" in resolved
     # The file of sensors has another range by now.
     assert "7 06:01 06:02 1 min 2.0 °C 3.5 °C" in resolved
@@ -224,6 +234,10 @@ def test_values_of_a_sensor_have_as_many_digits_and_none_reads_like_its_limit(
     assert numbers in page_of(lang, alarms=[alarm(reason=low, worst=349.7)])
     spun = {**low, "sensor": "spin", "value": 12345.0, "limit": 20000.0}
     assert "e+04" not in page_of(lang, alarms=[alarm(reason=spun, worst=12345.0)])
+    assert "1e+06 20" in page_of(lang, alarms=[alarm(reason=spun, worst=1e6)])
+    assert "06:01 350 ppm 350–" in page_of(lang, alarms=[alarm(reason=low, worst=350.0)])
+    hot = {**low, "sensor": "temperature", "value": 40.0, "limit": 35.0}
+    assert re.search(r" 1[.,]?235 °C", page_of(lang, alarms=[alarm(reason=hot, worst=1234.6)]))
     # As the page has them: `format.test.ts`.
     sensors = GREENHOUSE.sensors
     names = ("temperature", "vpd", "co2", "humidity", "dew_point", "co2_dose", "spin")

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import pytest
 
+from lupin_bridge.routes import pages
 from lupin_bridge.routes.pages import HOW_TO_BUILD
 from tests.bridge.test_app import ask
 
@@ -29,3 +30,13 @@ def test_everything_else_is_where_it_is(tmp_path: Path) -> None:
 def test_with_the_page_the_root_is_the_page(tmp_path: Path) -> None:
     (tmp_path / "index.html").write_text("the page", encoding="utf-8")
     assert ask(tmp_path, "GET", "/").text == "the page"
+
+
+def test_the_font_is_the_pages(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(pages, "_font", lambda: b"wOF2")
+    answer = ask(tmp_path, "GET", "/font.woff2")
+    assert (answer.status_code, answer.content) == (200, b"wOF2")
+    assert answer.headers["content-type"] == "font/woff2"
+    assert answer.headers["cache-control"] == "max-age=604800"
+    monkeypatch.setattr(pages, "_font", lambda: None)
+    assert ask(tmp_path, "GET", "/font.woff2").status_code == 404

@@ -146,6 +146,11 @@ async def test_what_the_source_cannot_answer_is_told(
             answer = await it.http.get(path)
             assert (answer.status_code, answer.json()) == (status, {"detail": str(error)})
             assert answer.headers.get("retry-after") == retry_after
+        page = await it.http.get(
+            "/api/report.html", headers={"Accept": "text/html", "Accept-Language": "nl"}
+        )
+        assert (page.status_code, page.headers.get("retry-after")) == (status, retry_after)
+        assert '<html lang="nl">' in page.text
         assert it.bridge.admission.being_computed == it.bridge.admission.exporting == 0
 
 

@@ -46,6 +46,11 @@ def test_the_page_and_its_parts_need_no_token(closed: Served, path: str, media_t
     assert closed.get(path, method="POST").status_code == 405
 
 
+def test_its_font_needs_no_token(closed: Served) -> None:
+    font = closed.get("/font.woff2")
+    assert font.status_code == 200 or "the page was not built" in font.text
+
+
 def test_the_page_has_nothing_inline_and_nothing_from_elsewhere(closed: Served) -> None:
     page = closed.get("/signin").text
     assert not re.search(r"<script(?![^>]*\ssrc=)|<style|\sstyle=|\son\w+=", page)

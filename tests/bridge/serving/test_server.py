@@ -204,6 +204,11 @@ def test_frames_are_not_compressed(live: Bridge) -> None:
         assert "sec-websocket-extensions" not in listener.connection.response.headers
 
 
+def test_what_a_header_claims_of_a_proxy_is_not_believed(live: Bridge) -> None:
+    page = live.get("/docs", headers={"X-Forwarded-Proto": "https", "X-Forwarded-For": "1.2.3.4"})
+    assert f"curl '{live.url}/api/state'" in page.text
+
+
 # --- the end ------------------------------------------------------------------------------------
 
 

@@ -230,6 +230,7 @@ def test_off_is_a_temporary_file_that_answers_and_is_gone_at_the_end(
         answer = memory.recall.query(lambda c, _: state_at(c, NOW, "map")).result(10.0)
         assert [tag.tag_id for tag in answer.tags] == ["7"]
         assert Path(memory.condition.path).is_relative_to(tmp_path)
+        assert memory.condition.state is JournalState.OFF
     assert list(tmp_path.iterdir()) == []
 
 

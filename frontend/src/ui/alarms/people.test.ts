@@ -4,7 +4,8 @@ import { alarm, tellAlarms } from '../../testing/alarms';
 import { NOTHING_KEPT, whatOf } from '../../alarms/kept';
 import { acknowledgeAlarms, done, own, undo } from '../../alarms/own';
 import { person } from '../../store/signals';
-import { goLost } from '../../testing/page';
+import { SILENCE_MS } from '../../connection/machine';
+import { goLive, goLost, status as told } from '../../testing/page';
 import { toast } from '../toast';
 import { merged, startPeople, wordsFor } from './people';
 import { whoseWord } from './WhoseWord';
@@ -33,6 +34,9 @@ test('a shelf is taken over with its reason, and goes with the word of who shelv
   });
   expect(merged(kept, [SHELVED], () => 61_000)).toBe(kept);
   expect(merged(kept, [COLD], until).shelved.size).toBe(0);
+  // Also where something before it is another.
+  const said = { ...SAID, id: 'other', tag_id: '2' };
+  expect(merged(kept, [said, COLD], until).shelved.size).toBe(0);
 });
 
 test('an operator at a bridge that writes no notes is not called a reader', () => {
@@ -167,11 +171,19 @@ test('what the bridge refuses does not hold here either', async () => {
   expect([done.get(), toast.get()]).toEqual([null, expect.stringMatching(/^Not saved: /)]);
 });
 
-test('without a connection all are refused at once, as one is, and nothing looks done', async () => {
+test.each([
+  ['without a connection', goLost],
+  [
+    'where nothing comes any more',
+    () => {
+      goLive(told(), SILENCE_MS + 1);
+    },
+  ],
+])('%s all are refused at once, as one is, and nothing looks done', async (_, lose) => {
   await signedIn();
   const other = alarm('other', { tag_id: '2' });
   tellAlarms(COLD, other);
-  goLost();
+  lose();
   acknowledgeAlarms([COLD, other].map((each) => ({ alarm: each, verdict: 'critical' })));
   expect([own.get().acknowledged.size, done.get()]).toEqual([0, null]);
   expect(toast.get()).toBe('Not saved: The server is busy or unreachable.');

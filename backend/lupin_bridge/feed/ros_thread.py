@@ -114,6 +114,7 @@ class RosThread(Generic[NodeT, EventT]):
         self._beat_sent_s: float | None = None
         self._is_waking = False
         self._is_stopping = False
+        self._is_joining = False
 
     # --- on the event loop ------------------------------------------------------------------
 
@@ -138,8 +139,12 @@ class RosThread(Generic[NodeT, EventT]):
             self._beating.cancel()
         if not was_stopping and self._executor is not None and self._thread.is_alive():
             end_spinning(self._executor)
-        # A callback that runs now ends first: not to be waited for on the loop.
-        await asyncio.to_thread(self._thread.join, STOP_TIMEOUT_S)
+        self._is_joining = True
+        try:
+            # A callback that runs now ends first: not to be waited for on the loop.
+            await asyncio.to_thread(self._thread.join, STOP_TIMEOUT_S)
+        finally:
+            self._is_joining = False
         if self._thread.is_alive():
             log.warning("the ROS thread did not end within %s s: left behind", STOP_TIMEOUT_S)
         for result in self._unanswered:
@@ -147,8 +152,8 @@ class RosThread(Generic[NodeT, EventT]):
 
     @property
     def is_alive(self) -> bool:
-        """Whether the thread runs."""
-        return self._thread.is_alive()
+        """Whether the thread runs; one that is being stopped has not died."""
+        return self._is_joining or self._thread.is_alive()
 
     @property
     def stuck_s(self) -> float:

@@ -87,6 +87,7 @@ class WebTwin(RosSource[WebNode, _Received]):
         self._lost: TwinUpdate | None = None
         self._rejoin_at_s = 0.0
         self._received = _Received()
+        self._node: WebNode | None = None
         self._frame_id: str
         self._log = FollowedLog(self._rows_behind, self.workers, journal)
 
@@ -119,7 +120,9 @@ class WebTwin(RosSource[WebNode, _Received]):
 
             node = WebNode(pass_on, post_all, context=context)
             # As `update`, it holds on in a node that is made anew.
-            node.occupancy_map = self._received.occupancy_map
+            if self._node is not None:
+                node.take_over(self._node)
+            self._node = node
             return node
 
         def on_received(received: _Received) -> None:

@@ -123,6 +123,8 @@ class WebNode(AdjustableNode):
         self._on_state = on_state
         self._on_map = on_map
         self._newest: Snapshot | None = None
+        # When the newest state was published.
+        self._published_ns = 0
         # What came last of each: they belong together where their stamps are the same.
         self._state: Any = None
         self._times: Any = None
@@ -174,6 +176,19 @@ class WebNode(AdjustableNode):
 
     # --- for the source, on this node's thread ------------------------------------------------
 
+    def take_over(self, before: WebNode) -> None:
+        """Know what a node knew that this one takes the place of."""
+        self.occupancy_map = before.occupancy_map
+        self.digest, self.publishers_digest = before.digest, before.publishers_digest
+        self._published_ns = before._published_ns
+        differ = [
+            name
+            for name in SHARED_PARAMETERS
+            if getattr(before.parameters, name) != getattr(self.parameters, name)
+        ]
+        self.set_parameters([before.get_parameter(name) for name in differ])
+        self._changes = before._changes
+
     @property
     def callback_errors(self) -> int:
         """Errors met by callbacks so far."""
@@ -217,6 +232,11 @@ class WebNode(AdjustableNode):
     # --- callbacks ----------------------------------------------------------------------------
 
     def _take_state(self, msg: Any) -> None:
+        # DDS goes on in a twin that is stuck, and what it latched comes again to a new node: that
+        # is no sign of life.
+        if self.utilities.published_ns == self._published_ns:
+            return
+        self._published_ns = self.utilities.published_ns
         self._state = msg
         if self._show_pair():
             return

@@ -15,7 +15,7 @@ from typing import Any, Final, TypeVar, cast
 import orjson
 from fastapi import APIRouter, FastAPI, Request, Response
 from pydantic import BaseModel, ValidationError
-from starlette.requests import HTTPConnection
+from starlette.requests import ClientDisconnect, HTTPConnection
 from starlette.types import Receive, Scope, Send
 
 from lupin_bridge.access.middleware import PERSON_KEY, client_of
@@ -108,6 +108,10 @@ async def read_body(request: Request, model: type[ModelT]) -> ModelT:
             body = await request.body()
     except TimeoutError:
         raise BodyRefused(f"the body was not there within {BODY_S:g} s", 408) from None
+    except ClientDisconnect:
+        raise BodyRefused(
+            "the client left before its body was there", CLIENT_DISCONNECTED
+        ) from None
     try:
         return model.model_validate(orjson.loads(body))
     except orjson.JSONDecodeError as error:

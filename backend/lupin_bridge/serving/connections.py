@@ -19,7 +19,7 @@ import resource
 import socket
 import ssl
 import struct
-from asyncio.sslproto import SSLProtocol
+from asyncio.sslproto import SSLProtocol, _SSLProtocolTransport
 from collections import Counter, defaultdict
 from collections.abc import Callable, Collection, Iterable
 from contextlib import suppress
@@ -79,8 +79,6 @@ def tear_down(transport: asyncio.WriteTransport) -> None:
 
     Closed, its socket would go on offering what nobody reads for another four minutes.
     """
-    if _is_detached(transport):
-        return
     if transport.get_write_buffer_size() > 0:
         reset(transport)
     else:
@@ -89,20 +87,24 @@ def tear_down(transport: asyncio.WriteTransport) -> None:
 
 def reset(transport: asyncio.WriteTransport) -> None:
     """End a connection now, and so that its other side takes it for no proper end."""
-    if _is_detached(transport):
-        return
     no_lingering = struct.pack("ii", 1, 0)
-    connection: socket.socket = transport.get_extra_info("socket")
-    connection.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, no_lingering)
+    connection: socket.socket | None = transport.get_extra_info("socket")
+    if connection is not None:  # of TLS that has ended there is none
+        connection.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, no_lingering)
     transport.abort()
 
 
-def _is_detached(transport: asyncio.WriteTransport) -> bool:
-    """Whether it is one of asyncio's for TLS that was closed when its connection had ended.
+_close_tls: Final = _SSLProtocolTransport.close
 
-    Any call then, even how much is unsent, is an AttributeError.
-    """
-    return getattr(transport, "_ssl_protocol", transport) is None
+
+def _close_tls_once(transport: _SSLProtocolTransport) -> None:
+    if not transport.is_closing():
+        _close_tls(transport)
+
+
+# A second `close`, of which uvicorn has several, would have it forget its connection: nothing could
+# end that any more, as long as its other side does not answer the first.
+_SSLProtocolTransport.close = _close_tls_once  # type: ignore[assignment,method-assign]
 
 
 class Evictable(Protocol):

@@ -286,6 +286,17 @@ async def test_the_end_of_the_thread_is_told_once_and_said_aloud(
     assert "the end" in str(record.exc_info[1])
 
 
+async def test_a_thread_that_is_being_stopped_has_not_died(domain: int) -> None:
+    async with Stage() as stage:
+        thread = await stage.ros.call(lambda node: node.thread)
+        stopping = asyncio.create_task(stage.ros.stop())
+        await asyncio.sleep(0)
+        thread.join()  # on the loop, which cannot have been told yet
+        assert stage.ros.is_alive
+        await stopping
+        assert not stage.ros.is_alive
+
+
 async def test_what_the_making_of_a_node_raises_is_the_starts(domain: int) -> None:
     def make_node(context: Any, post: Callable[[int], None]) -> Probe:
         raise LookupError("no node today")

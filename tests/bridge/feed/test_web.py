@@ -12,6 +12,7 @@ import pytest
 from geometry_msgs.msg import Point, Pose, PoseStamped
 from lupin_msgs.msg import Observation, SensorReading, TwinState, TwinTagState
 from lupin_msgs.srv import GetEstimateReport
+from rclpy.parameter import Parameter
 
 from lupin_bridge.feed import web
 from lupin_bridge.feed.relay import Sample, TwinNames, topics_of
@@ -132,6 +133,32 @@ async def test_after_a_silence_all_goes_on_with_a_new_node(domain: int) -> None:
             await until_answered(is_joined, "the new node")
             await goes_both_ways(2.0)
             assert twin.occupancy_map() is not None, "and nobody publishes it any more"
+
+
+async def test_what_a_lost_twin_said_last_is_no_news_to_a_new_node(domain: int) -> None:
+    samples = list[Sample]()
+    with Peer(domain) as peer:
+        async with started() as (twin, told):
+            await twin.relay.listen(topics_of(twin.names())[0], samples.append)
+            peer.publish("/twin/state", state_of(1.0), depth=1)
+            await until(lambda: told and samples, "the state")
+            await twin.thread.call(
+                lambda node: node.set_parameters([Parameter("idw_power", value=3.0)])
+            )
+            await until(lambda: twin.rules().idw_power == 3.0, "the parameter")
+            revision = twin.revision()
+            twin.rejoin_after_s = 0.1
+            # DDS goes on in a twin that is stuck, and what it latched comes to who is new.
+            await until(lambda: len(samples) > 1, "what is latched, again")
+            twin.rejoin_after_s = math.inf
+            peer.publish_map(occupancy_grid([[0, 100]]))
+            await until(twin.occupancy_map, "the map")
+            state, _, _ = revision.rpartition("-0-")
+            assert state in twin.revision(), "the state is the same"
+            assert twin.rules().idw_power == 3.0
+            peer.publish("/twin/state", state_of(2.0), depth=1)
+            await until(lambda: told[-1].snapshot.tags[0].readings[0].value == 2.0, "the next one")
+            assert [it.snapshot.tags[0].readings[0].value for it in told] == [1.0, 2.0]
 
 
 async def test_a_node_is_made_again_after_as_long_a_silence_again_and_five_minutes_at_most(

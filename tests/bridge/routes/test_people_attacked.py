@@ -1,6 +1,7 @@
 """What people say, and who may, as an attacker tries it. A real server, real sockets."""
 
 import json
+import signal
 import socket
 import sqlite3
 import tempfile
@@ -8,6 +9,7 @@ import time
 from collections.abc import Iterator
 from contextlib import closing
 from pathlib import Path
+from urllib.parse import urlsplit
 
 import httpx
 import pytest
@@ -160,6 +162,20 @@ def test_any_text_comes_back_as_it_was_said_and_as_nothing_but_json(
     headers = live.get("/api/notes", BEARER).headers
     assert headers["content-type"] == "application/json"
     assert headers["x-content-type-options"] == "nosniff"
+
+
+def test_who_leaves_amid_a_body_is_no_error_and_nor_is_a_stop_amid_one(accounts: Path) -> None:
+    half = b"POST /api/signin HTTP/1.1\r\nHost: %s\r\nX-Lupin-Twin: 1\r\n"
+    half += b"Content-Type: application/json\r\nContent-Length: 99\r\n\r\n{"
+    with bridge("--accounts", str(accounts)) as running:
+        address = urlsplit(running.url)
+        for ends_first in ("client", "server"):
+            with socket.create_connection((address.hostname, address.port)) as client:
+                client.sendall(half % address.netloc.encode())
+                running.get("/healthz")  # and the half is read
+                if ends_first == "server":
+                    assert running.process.stop(signal.SIGINT) == 0
+        assert "ERROR" not in running.process.output
 
 
 def test_ten_thousand_notes_hold_nobody_up(accounts: Path, tmp_path: Path) -> None:

@@ -78,27 +78,41 @@ async def test_who_has_read_all_is_closed() -> None:
         assert await loop.sock_recv(theirs, 100) == b""
 
 
-async def test_over_tls_what_has_ended_bears_to_be_ended_again(tmp_path: Path) -> None:
-    ours = certificate(tmp_path)
+@asynccontextmanager
+async def tls_connection(folder: Path) -> AsyncIterator[tuple[asyncio.WriteTransport, list[str]]]:
+    """Our transport to a client that says nothing more, and whether it has ended."""
+    ours = certificate(folder)
     context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
     context.load_cert_chain(ours.cert, ours.key)
-    ended: list[asyncio.Transport] = []
+    made: list[asyncio.WriteTransport] = []
+    ended: list[str] = []
 
     class Ours(asyncio.Protocol):
         def connection_made(self, transport: asyncio.BaseTransport) -> None:
-            assert isinstance(transport, asyncio.Transport)
-            self.transport = transport
+            assert isinstance(transport, asyncio.WriteTransport)
+            made.append(transport)
 
         def connection_lost(self, _: Exception | None) -> None:
-            self.transport.close()  # as uvicorn does
-            ended.append(self.transport)
+            made[0].close()  # as uvicorn does
+            ended.append("it")
 
     server = await asyncio.get_running_loop().create_server(Ours, "127.0.0.1", 0, ssl=context)
-    host, port = server.sockets[0].getsockname()
-    _, writer = await asyncio.open_connection(host, port, ssl=ours.trust)
-    writer.close()
-    await until(lambda: ended, "the end")
-    tear_down(ended[0])
-    reset(ended[0])
+    with socket.create_connection(server.sockets[0].getsockname()) as theirs:
+        secret = await asyncio.to_thread(
+            ours.trust.wrap_socket, theirs, server_hostname="127.0.0.1"
+        )
+        with secret:
+            await until(lambda: made, "the connection")
+            yield made[0], ended
     server.close()
     await server.wait_closed()
+
+
+async def test_over_tls_what_is_being_closed_can_be_ended_and_again(tmp_path: Path) -> None:
+    async with tls_connection(tmp_path) as (transport, ended):
+        for _ in range(2):
+            transport.close()
+        tear_down(transport)
+        await until(lambda: ended, "the end")
+        tear_down(transport)
+        reset(transport)

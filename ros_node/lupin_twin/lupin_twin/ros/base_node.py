@@ -98,7 +98,9 @@ class NodeUtilities:
 
     def __init__(self, node: Node) -> None:
         self.tally = Tally()
-        # How long before it was received the message in hand was published, s, by the two clocks.
+        # When the message in hand was published, by its publisher's clock, and how long before it
+        # was received that was, s, by the two clocks.
+        self.published_ns = 0
         self.published_ago_s = 0.0
         self.node = node
         self._inputs: list[Input] = []
@@ -141,7 +143,8 @@ class NodeUtilities:
             if not (is_wanted(data) if is_wanted is not None else source.is_new(info)):
                 return
             self._see_wait(info["received_timestamp"])
-            self.published_ago_s = (info["received_timestamp"] - info["source_timestamp"]) / 1e9
+            self.published_ns = info["source_timestamp"]
+            self.published_ago_s = (info["received_timestamp"] - self.published_ns) / 1e9
             number = info["publication_sequence_number"]
             # Of depth 1, the newest is wanted and nothing else.
             if depth > 1 and number is not None and is_wanted is None:

@@ -233,8 +233,8 @@ class WebNode(AdjustableNode):
 
     def _take_state(self, msg: Any) -> None:
         # DDS goes on in a twin that is stuck, and what it latched comes again to a new node: that
-        # is no sign of life.
-        if self.utilities.published_ns == self._published_ns:
+        # is no sign of life. 0: the middleware says no times.
+        if 0 < self.utilities.published_ns == self._published_ns:
             return
         self._published_ns = self.utilities.published_ns
         self._state = msg

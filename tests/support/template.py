@@ -52,7 +52,14 @@ IMPORTED: Final = (
 )
 # Variables that are read where a program runs, by us or by rcl. Of all others some are read as
 # something is imported: with one that differs a process has to start anew.
-_READ_LATE: Final = ("LUPIN_", "PGPASSWORD", "PYTEST_", "ROS_DOMAIN_ID", "XDG_STATE_HOME")
+_READ_LATE: Final = (
+    "FASTDDS_",
+    "LUPIN_",
+    "PGPASSWORD",
+    "PYTEST_",
+    "ROS_DOMAIN_ID",
+    "XDG_STATE_HOME",
+)
 _MOST_BYTES: Final = 200_000  # what one message on a socket may hold, Linux's wmem_default
 _PR_SET_PDEATHSIG: Final = 1
 

@@ -43,7 +43,7 @@ _NOISE: Final = tuple(
         re.compile,
         (
             r"^(connection is bad|connection failed|consuming input failed): ",
-            r"\? *Is the server running .*$| This probably means .*$| DETAIL: .*$",
+            r"\?? *Is the server running .*$| This probably means .*$| DETAIL: .*$",
         ),
     )
 )
@@ -174,17 +174,23 @@ def explained(error: Exception) -> ArchiveError:
         text = noise.sub("", text)
     match error:
         case psycopg.errors.UndefinedTable():
-            return ArchiveError("the database has no archive: lupin-twin archive init makes it")
+            text = "the database has no archive: lupin-twin archive init makes it"
         case psycopg.errors.InsufficientPrivilege():
-            return ArchiveError(
-                f"the archive does not allow it: {text}; the user has to be named as the site is,"
-                " and be a member of lupin_forwarder"
+            text = (
+                f"the archive does not allow it: {text}; a forwarder needs a user in"
+                " lupin_forwarder that is named as the site is, a page one in lupin_page"
             )
         case psycopg.errors.DiskFull():
-            return ArchiveError(f"the archive is full: {text}")
+            text = f"the archive is full: {text}"
+        case psycopg.errors.QueryCanceled():
+            text = f"the archive takes too long: {text}"
+        case psycopg.DataError():
+            text = f"a value cannot be read or written: {text}"
         case psycopg.errors.UniqueViolation():
-            return ArchiveError(f"another forwarder writes the same site: {text}")
-    return ArchiveError(f"the archive cannot be reached or written: {text}")
+            text = f"another forwarder writes the same site: {text}"
+        case _:
+            text = f"the archive cannot be reached or written: {text}"
+    return ArchiveError(text)
 
 
 def check_version(connection: psycopg.Connection[Any]) -> None:

@@ -57,6 +57,7 @@ _NEWER_MAP: Final = (
 )
 # The number up to which the site's journal has come, by which its own notes are known.
 _FORWARDED: Final = "SELECT forwarded_seq FROM epoch WHERE site = :site ORDER BY epoch DESC LIMIT 1"
+_WRITE_MS: Final = 5_000
 logger = logging.getLogger(__name__)
 
 
@@ -123,6 +124,8 @@ def _write_note(site: str, note: Note, should_stop: ShouldStop) -> Note:
         closing(connect(archive_url(), "lupin-twin fleet")) as connection,
         connection.transaction(),
     ):
+        # Ended before its writer gives up: others read over these few connections, too.
+        connection.execute(f"SET LOCAL statement_timeout = {_WRITE_MS}")
         log = SiteLog(connection, site)
         (forwarded,) = log.execute(_FORWARDED).fetchone() or (0,)
         # Behind all that were forwarded, and before those that the twin has yet to write.

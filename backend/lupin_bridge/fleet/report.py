@@ -40,14 +40,16 @@ WHERE site = ANY(%(sites)s) AND kind != %(withdraw)s
 """
 _NOTES: Final = """
 SELECT site, id, made_at_ns, made_by, kind, subject, text, until_ns, gone.by, gone.at_ns
-FROM note LEFT JOIN LATERAL (
+FROM (
+    SELECT * FROM note WHERE site = ANY(%(sites)s) AND kind != %(withdraw)s
+        AND made_at_ns >= %(start)s AND made_at_ns < %(end)s
+    ORDER BY made_at_ns DESC, site, id LIMIT %(most)s
+) AS newest LEFT JOIN LATERAL (
     SELECT made_by AS by, made_at_ns AS at_ns FROM note AS other
-    WHERE other.site = note.site AND kind = %(withdraw)s AND subject = %(withdrawn)s || note.id
+    WHERE other.site = newest.site AND kind = %(withdraw)s AND subject = %(withdrawn)s || newest.id
     ORDER BY other.id LIMIT 1
 ) AS gone ON true
-WHERE site = ANY(%(sites)s) AND kind != %(withdraw)s
-    AND made_at_ns >= %(start)s AND made_at_ns < %(end)s
-ORDER BY made_at_ns DESC, site, id LIMIT %(most)s
+ORDER BY made_at_ns DESC, site, id
 """
 
 

@@ -118,14 +118,12 @@ class SiteTwin(TwinSource):
                 self._notify(on_state)
                 if self._reported is not None:
                     self._has_read.set()
-            except (NotRemembered, TwinUnavailableError) as error:
-                log.info("site %s is as it was: %s", self.site, error)
-                self._problem = _sentence(str(error))
-                await asyncio.sleep(_RETRY_S)
-                continue
             except Exception as error:  # nobody waits for this task, and the page depends on it
-                log.exception("site %s is as it was", self.site)
-                self._problem = _sentence(f"the archive cannot be read: {error}")
+                is_known = isinstance(error, (NotRemembered, TwinUnavailableError))
+                why = str(error) if is_known else f"the archive cannot be read: {error}"
+                before, self._problem = self._problem, _sentence(why)
+                if self._problem != before:
+                    log.warning("site %s is as it was: %s", self.site, why, exc_info=not is_known)
                 await asyncio.sleep(_RETRY_S)
                 continue
             await self._wake.wait()

@@ -67,11 +67,13 @@ MAX_ALARMS: Final = 20
 # As many as a bridge reads of the past, see `alarms.feed`.
 _REACH_COUNT: Final = 300_000
 
+# Whatever a site has written of itself: no value of its own may end the look at all of them.
 _FACTS: Final = (
-    "SELECT site.site, site.name, coalesce(CAST(extract(epoch FROM heard_at) * 1e9 AS BIGINT), 0),"
+    "SELECT site.site, site.name, coalesce(CAST(extract(epoch FROM"
+    " least(greatest(heard_at, 'epoch'), now())) * 1e9 AS BIGINT), 0),"
     " coalesce(heard_at > now() - make_interval(secs => %s), false),"
-    " coalesce((SELECT seq_offset + forwarded_seq FROM epoch WHERE epoch.site = site.site"
-    " ORDER BY epoch DESC LIMIT 1), 0),"
+    " (SELECT ARRAY[seq_offset, forwarded_seq] FROM epoch WHERE epoch.site = site.site"
+    " ORDER BY epoch DESC LIMIT 1),"
     " (SELECT value FROM meta WHERE meta.site = site.site AND key = %s),"
     " (SELECT count(*) FROM note WHERE note.site = site.site)"
     " FROM site LEFT JOIN forwarder ON forwarder.site = site.site ORDER BY site.site"
@@ -168,14 +170,14 @@ class Watcher:
         ((now_ns,),) = execute(_NOW).fetchall()
         before, self.sites = self.sites, {}
         for site, *facts in execute(_FACTS, (LIVE_S, ORIGIN)).fetchall():
-            name, heard_ns, is_live, last_seq, origin, note_count = facts
+            name, heard_ns, is_live, seqs, origin, note_count = facts
             known = before.get(site, Site(site))
             self.sites[site] = replace(
                 known,
                 name=name,
                 heard_ns=heard_ns,
                 is_live=is_live,
-                last_seq=last_seq,
+                last_seq=sum(seqs or ()),
                 origin=_origin(origin or "", self._judged.get(site)),
                 notes=note_count,
             )

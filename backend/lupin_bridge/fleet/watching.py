@@ -87,7 +87,9 @@ class Watching:
         while True:
             await asyncio.sleep(_POLL_S)
             patience_s = STUCK_S if self.looks else _START_S
-            if time.monotonic() - self._answered_s >= patience_s:
+            # Once it is said why, that stays: a query that is ended for its time says more.
+            is_said = self.archive.since_ns and not self.archive.is_reachable
+            if not is_said and time.monotonic() - self._answered_s >= patience_s:
                 self._down(f"the archive has not answered for {STUCK_S:g} s")
 
     def _take(self, news: News) -> None:

@@ -1,5 +1,6 @@
 """What is wrong is said in one line."""
 
+import asyncio
 import subprocess
 import sys
 
@@ -8,7 +9,9 @@ import pytest
 
 from lupin_bridge.access.middleware import Access
 from lupin_bridge.access.policy import Proxies
+from lupin_bridge.fleet import watching
 from lupin_bridge.fleet.app import Fleet, create_fleet_app
+from lupin_bridge.fleet.watching import Watching
 from lupin_bridge.judge.options import Criteria
 from lupin_bridge.settings import Settings
 from tests.support.archive import Archive, run
@@ -71,6 +74,37 @@ def test_a_database_without_an_archive(archive: Archive) -> None:
     archive.name = "bare"
     with fleet(archive) as page:
         page.process.wait_for_output("lupin-twin archive init makes it")
+
+
+def test_an_archive_that_answers_late_and_badly_is_said_once(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    said: list[str] = []
+
+    async def run_against_it() -> None:
+        made, tried = Watching(Settings(), lambda: said.append(made.archive.message)), 0
+        is_over = asyncio.Event()
+
+        async def hang_up(_: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+            nonlocal tried
+            await asyncio.sleep(1.0)  # longer than it is waited for
+            writer.close()
+            tried += 1
+            if tried == 2:
+                is_over.set()
+
+        async with await asyncio.start_server(hang_up, "127.0.0.1", 0) as server:
+            port = server.sockets[0].getsockname()[1]
+            monkeypatch.setenv("LUPIN_ARCHIVE_URL", f"postgresql://a@127.0.0.1:{port}/b")
+            made.start()
+            await is_over.wait()
+            await made.stop()
+
+    monkeypatch.setattr(watching, "_START_S", 0.5)
+    asyncio.run(run_against_it())
+    assert len(said) == 2, said
+    assert "has not answered" in said[0]
+    assert "server closed the connection" in said[1]
 
 
 def test_the_overviews_routes_are_those_of_the_docs() -> None:

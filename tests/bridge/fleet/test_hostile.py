@@ -10,6 +10,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import httpx
+import psycopg
 import pytest
 from websockets.exceptions import ConnectionClosed
 
@@ -271,6 +272,9 @@ def test_rows_that_cannot_be_read_are_said_on_their_sites_page(
             return str(running.http.get("/sites/gh1/readyz").json()["input_problems"])
 
         wait_for(lambda: "cannot be read" in problem(), "the site's page to say so")
+        looks = running.metric("lupin_fleet_looks")
+        wait_for(lambda: running.metric("lupin_fleet_looks") > looks + 1, "it to be tried again")
+        assert running.process.output.count("site gh1 is as it was: rows of the site") == 1
         # What was last known stays.
         assert len(running.http.get("/sites/gh1/api/state").json()["tags"]) == 5
         assert running.http.get("/readyz").status_code == 200
@@ -305,6 +309,31 @@ def test_a_site_that_cannot_be_read_or_takes_too_long_costs_no_other_its_status(
             running.process.wait_for_output(f"site {name} cannot be judged: its status is unknown")
         assert running.http.get("/readyz").status_code == 200
         assert measured(running, "lupin_fleet_watcher_starts") == 1
+
+
+def test_what_a_site_writes_of_itself_ends_no_look_at_the_others(
+    archive: Archive, tmp_path: Path
+) -> None:
+    write(tmp_path / "journal", scans_lately())
+    forward_once(archive, tmp_path / "journal")
+    archive.copy_site("gh2")
+    archive.keep_live()
+    archive.add_user("gh2")
+    with fleet(archive) as running:
+        running.site("gh2", is_live=True)
+        with psycopg.connect(archive.url("gh2"), autocommit=True) as site:
+            for heard in ("infinity", "0001-01-01"):
+                site.execute("UPDATE forwarder SET heard_at = %s", (heard,))
+                running.site("gh2", is_live=heard == "infinity")
+                assert running.site("gh1")["is_live"], heard
+            site.execute("UPDATE epoch SET seq_offset = 9223372036854775807")
+            site.execute("UPDATE hour SET n = '[\"some\"]'")
+            looks = running.metric("lupin_fleet_looks")
+            wait_for(lambda: running.metric("lupin_fleet_looks") > looks + 1, "two looks")
+        assert running.site("gh1")["is_live"]
+        compared = running.http.get("/api/compare?sensor_type=temperature")
+        assert compared.status_code == 503
+        assert "a value cannot be read or written: invalid input" in compared.json()["detail"]
 
 
 def test_a_sites_clock_that_is_wrong_by_a_year(archive: Archive, tmp_path: Path) -> None:

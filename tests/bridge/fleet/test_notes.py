@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import httpx
+import psycopg
 import pytest
 
 from tests.support.archive import Archive, forward_once, rows_of
@@ -129,3 +130,8 @@ def test_an_archive_that_cannot_be_written_is_said(here: Here) -> None:
         assert time.monotonic() - begun_s < 60
         archive.do("GRANT INSERT ON note TO lupin_page")
         assert post(anna, kind="comment", subject="site", text="vents checked").status_code == 201
+        with psycopg.connect(archive.owner) as holder:
+            holder.execute("LOCK note IN SHARE MODE")
+            answer = post(anna, kind="comment", subject="site", text="who waits")
+            assert (answer.status_code, "takes too long" in answer.text) == (503, True), answer.text
+        assert archive.select("SELECT 1 FROM note WHERE text = 'who waits'") == []

@@ -110,6 +110,12 @@ def test_the_newest_notes_of_all_and_who_took_one_back(archive: Archive, tmp_pat
         assert mine == own
         only = page.http.get(f"/api/report?from={at_s}&sites=gh2").json()["notes"]
         assert [it["by"] for it in only] == ["Ben"]
+        # However many people have written.
+        archive.do(
+            f"INSERT INTO note SELECT 'gh2', 'n' || n, {at_s * SECOND} - n, 'Cor', 'comment',"
+            " 'site', '', NULL FROM generate_series(1, 50000) AS n"
+        )
+        assert len(page.http.get(f"/api/report?from={at_s - HOUR_S}").json()["notes"]) == 200
 
 
 def check_refusals(page: Page) -> None:

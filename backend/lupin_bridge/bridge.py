@@ -417,7 +417,9 @@ class Bridge:
         if (first and not is_good) or (
             self._published and status.has_more_detail_than(self._published)
         ):
-            log.log(logging.INFO if is_good else logging.WARNING, "%s", status.message)
+            # Of a fleet many are open.
+            message = f"site {self.site}: {status.message}" if self.site else status.message
+            log.log(logging.INFO if is_good else logging.WARNING, "%s", message)
         self._published = status
         if status.reason not in ("never_seen", "shutting_down"):
             last = self._latest

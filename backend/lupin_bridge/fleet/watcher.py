@@ -45,7 +45,7 @@ from lupin_twin.journal.fold import state_at
 from lupin_twin.journal.follow import recent, writes
 from lupin_twin.journal.notes import notes
 from lupin_twin.journal.runs import FOREVER_NS, runs, span_at
-from lupin_twin.journal.schema import ORIGIN, SiteLog
+from lupin_twin.journal.schema import ORIGIN, DamagedFile, SiteLog
 from lupin_twin.runtime.journal_queries import Recall
 from lupin_twin.runtime.workers import ShouldStop
 
@@ -230,13 +230,17 @@ class Watcher:
 
     def _judge_safely(self, name: str, judged: _Judged, now_ns: int) -> None:
         """Judge a site; one that cannot be judged is unknown, and costs no other its status."""
+        import psycopg  # noqa: PLC0415  # the extra `fleet`
+
         try:
             self._judge(name, judged, now_ns)
-        except Exception:  # whatever is in its rows, or how long they take
+        except Exception as error:  # whatever is in its rows, or how long they take
             if self.connection.closed:
                 raise  # of the archive, not of the site
             if not judged.is_failing:
-                log.exception("site %s cannot be judged: its status is unknown", name)
+                is_known = isinstance(error, DamagedFile | psycopg.Error)
+                why = "site %s cannot be judged: its status is unknown: %s"
+                log.warning(why, name, error, exc_info=not is_known)
             # Tried again from its first row on, when others are judged for their age.
             self._judged[name] = _Judged(self._judge_of(), is_failing=True)
             self.sites[name] = replace(

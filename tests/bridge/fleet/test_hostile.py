@@ -309,6 +309,7 @@ def test_a_site_that_cannot_be_read_or_takes_too_long_costs_no_other_its_status(
             running.process.wait_for_output(f"site {name} cannot be judged: its status is unknown")
         assert running.http.get("/readyz").status_code == 200
         assert measured(running, "lupin_fleet_watcher_starts") == 1
+        assert "Traceback" not in running.process.output
 
 
 def test_what_a_site_writes_of_itself_ends_no_look_at_the_others(

@@ -67,6 +67,7 @@ def test_who_is_not_forwarded_is_silent_and_what_was_known_is_the_last(
         status = page.http.get("/sites/gh1/readyz")
         assert status.status_code == 503
         assert status.json()["state_age_seconds"] >= 10
+        page.process.wait_for_output("site gh1: The twin has fallen silent.")
         # The state is that of when it was heard last.
         stamp = page.http.get("/sites/gh1/api/state").json()["header"]["stamp"]["sec"]
         assert stamp <= time.time() - 10

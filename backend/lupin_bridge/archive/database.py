@@ -178,7 +178,8 @@ def explained(error: Exception) -> ArchiveError:
         case psycopg.errors.InsufficientPrivilege():
             text = (
                 f"the archive does not allow it: {text}; a forwarder needs a user in"
-                " lupin_forwarder that is named as the site is, a page one in lupin_page"
+                " lupin_forwarder that is named as the site is, a page one in lupin_page, and"
+                " whoever looks after it its owner"
             )
         case psycopg.errors.DiskFull():
             text = f"the archive is full: {text}"

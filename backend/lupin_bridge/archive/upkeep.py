@@ -60,9 +60,10 @@ def overview(connection: Any) -> list[str]:
             "SELECT to_timestamp(%s)::timestamptz(0)::text", (last_ns // 10**9,)
         ).fetchone()
         live = "forwarded by" if is_live else f"silent since {heard_at}, forwarded last by"
+        whose = "never forwarded" if machine is None else f"{live} {machine} (process {process})"
         lines.append(
             f"{site}: {', '.join(counts)}; the last received {last if last_ns else 'never'};"
-            f" {live} {machine} (process {process}); {epoch or 0} journals"
+            f" {whose}; {epoch or 0} journals"
         )
     return lines or ["no site is forwarded yet"]
 

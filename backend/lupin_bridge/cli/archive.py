@@ -41,6 +41,8 @@ _USAGE_ERROR: Final = 2
 # Beside a busy twin it gets a tenth of the core that they share.
 _NICENESS: Final = 10
 _URL: Final = "archive_url"
+# As of `journal_days`.
+_MAX_DAYS: Final = 36_500
 
 
 def add_parsers(roles: Roles) -> None:
@@ -127,8 +129,10 @@ def _act(options: argparse.Namespace, connection: Any, place: str) -> int:
         tell(*overview(connection))
         return 0
     if action == "retain":
-        if not options.days > 0:
-            raise UsageError(f"--days is {options.days:g}, expected more than 0")
+        if not 0 < options.days <= _MAX_DAYS:
+            raise UsageError(
+                f"--days is {options.days:g}, expected more than 0, {_MAX_DAYS} at most"
+            )
         gone = list(retain(connection, options.days, options.site))
         tell(*(f"deleted {line}" for line in gone or ["nothing"]))
         return 0

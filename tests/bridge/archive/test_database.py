@@ -77,7 +77,9 @@ def test_the_page_reads_every_site_and_writes_notes_alone(two_sites: Archive) ->
 
 
 def test_info_has_a_line_a_site(two_sites: Archive) -> None:
+    two_sites.do("INSERT INTO site VALUES ('gh3', 'Named before it is forwarded')")
     told = run("archive", "info", "--archive-url", two_sites.owner).stdout.splitlines()
+    assert told.pop().endswith("the last received never; never forwarded; 0 journals")
     assert [line.partition(", 0 looks, 0 places; ")[0] for line in told] == [
         "gh1: 1 scans",
         "gh2: 1 scans",

@@ -132,6 +132,11 @@ def test_of_one_site_alone(sites: Archive) -> None:
         1,
         "lupin-twin: the archive has no site 'gh9'\n",
     )
+    far = run("archive", "retain", "--archive-url", sites.owner, "--days", "1e9")
+    assert (far.returncode, far.stderr) == (
+        2,
+        "lupin-twin: --days is 1e+09, expected more than 0, 36500 at most\n",
+    )
 
 
 def test_a_month_in_which_another_site_has_rows_stays(sites: Archive) -> None:

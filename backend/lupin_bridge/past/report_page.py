@@ -428,6 +428,8 @@ class _Page:
 
     def _length(self, seconds: int) -> str:
         """In its two largest units, as the page writes it."""
+        if seconds < 60:
+            return f"{seconds}\u00a0s"
         days, hours, minutes = seconds // 86_400, seconds // 3600 % 24, seconds // 60 % 60
         in_hours = f"{hours}\u00a0{self.say('hours')}"
         if days:

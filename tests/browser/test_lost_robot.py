@@ -114,15 +114,17 @@ def test_a_site_of_two_tags_that_are_far_apart_is_shown_as_a_whole(open_page: Op
 
 def test_that_it_stands_still_lies_under_no_other_word(site: Bridge, open_page: OpenPage) -> None:
     hmi = open_page(site.url, go=False, viewport={"width": 1100, "height": 800})
-    reason = {"kind": "stopped", "verdict": "unknown", "sensor": ""}
+    no_value = {"sensor": "", "value": None, "limit": None, "since": None}
+    stopped = {"kind": "stopped", "verdict": "unknown", **no_value}
+    # Something else to do: a line of its own, which has no room.
+    pest = {"kind": "pest", "verdict": "stressed", **no_value}
 
     def meet(socket: WebSocketRoute) -> None:
         def on_message(message: str | bytes) -> None:
             frame: dict[str, Any] = json.loads(message)
             if "health" in frame:
-                frame["health"]["house"]["reasons"] = [
-                    {**reason, "value": None, "limit": None, "since": None}
-                ]
+                frame["health"]["house"]["reasons"] = [stopped]
+                frame["health"]["tags"]["4"] = {"verdict": "stressed", "reasons": [pest]}
             socket.send(json.dumps(frame))
 
         socket.connect_to_server().on_message(on_message)

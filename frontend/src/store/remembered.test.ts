@@ -1,10 +1,11 @@
 import { afterEach, beforeEach, describe, expect, test, vi } from 'vitest';
 
 import { goLive, goLost, showTags } from '../testing/page';
-import { wireTag } from '../testing/tags';
-import { wireTimeline } from '../testing/timeline';
+import { stateFrame, wireTag } from '../testing/tags';
+import { wireStretch, wireTimeline } from '../testing/timeline';
 import { act, receive, store } from './app';
-import { askedSpan, startRemembered, turnOf } from './remembered';
+import { fromFragment } from './permalink';
+import { askedSpan, startOpening, startRemembered, turnOf } from './remembered';
 import { NOT_ASKED } from './twin';
 
 let asked: URLSearchParams[];
@@ -70,6 +71,26 @@ test('another period is fetched at once, and nothing of the last is left', async
   await pass(0);
   expect(asked.at(-1)?.has('from')).toBe(false);
   expect(store.get().twin.remembered).toMatchObject({ state: 'failed', message: 'busy' });
+});
+
+test('a link that names no period brings back what the page opens on, at once', async () => {
+  const stopOpening = startOpening();
+  const latest = stateFrame([wireTag()], { sec: 1_000_000, revision: 'r' });
+  receive({ type: 'state', latest, now: performance.now() });
+  answer = () => Response.json(wireTimeline({ from: 0, to: 240, reach: wireStretch(0, 240) }));
+  await pass(1_100);
+  expect(store.get().view.period).toEqual({ kind: 'hour' });
+  // Also twice, sooner than anything is fetched again.
+  for (const layers of ['map', 'map,pins']) {
+    act({ type: 'look', view: fromFragment(`layers=${layers}`) });
+    await pass(100);
+  }
+  await pass(1_000);
+  expect(store.get().view.period).toEqual({ kind: 'hour' });
+  expect(store.get().twin.remembered.state).toBe('ready');
+  const spans = asked.map((query) => Number(query.get('to')) - Number(query.get('from')));
+  expect(spans.slice(1)).toEqual([3_600, 3_600, 3_600]);
+  stopOpening();
 });
 
 test('after a reconnect the gap is refilled', async () => {

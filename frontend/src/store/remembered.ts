@@ -62,7 +62,10 @@ export function startRemembered(): () => void {
     if (next !== group) {
       group = next;
       // What is known of another period is of no use; how far memory reaches stays true.
+      fetcher.want(null);
       if (value) receive({ type: 'remembered', remembered: NOT_ASKED });
+      // Which may have led back to the period before.
+      if (store.get().view.period !== period) return;
     }
     fetcher.want({
       key: `${epoch}|${group}|${turnOf(period, nowS)}`,

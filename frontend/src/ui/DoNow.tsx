@@ -21,12 +21,16 @@ import { selectAreAlarmsKnown, useReasonText } from './Reasons';
 
 /** Beside the map; the table has the rest. */
 const MOST_TAGS = 2;
+/** Of other tags that need the same, so many by name. */
+const MOST_ALSO = 3;
 
 /** A tag that needs somebody. */
 export interface Urgent {
   readonly tagId: string;
   /** Without what is shelved; the first is what it needs somebody for. */
   readonly reasons: readonly [HealthReason, ...HealthReason[]];
+  /** Somebody sees to that one. */
+  readonly isAcknowledged: boolean;
 }
 
 /**
@@ -55,7 +59,10 @@ export function useUrgent(): readonly Urgent[] {
           .filter((reason) => !has(alarms.shelved, id, reason))
           .sort((a, b) => rank(b) - rank(a));
         if (!first || rank(first) === 0) return [];
-        return [{ tagId: id, reasons: [first, ...rest] as const, rank: rank(first) }];
+        const isAcknowledged = has(acknowledged, id, first);
+        return [
+          { tagId: id, reasons: [first, ...rest] as const, isAcknowledged, rank: rank(first) },
+        ];
       })
       .sort((a, b) => b.rank - a.rank);
   }, [tags, health, isNow, alarms]);
@@ -98,10 +105,12 @@ export function DoNow({
   // Of a twin that is not heard, what had to be done stays, with its time.
   const isOfTags = urgent.length > 0 && (!hasOwn || isBad(health.verdict) || isSilent(health));
   const count = hasOwn && most > 1 ? most - 1 : most;
+  const lines = (isNow ? byTodo(urgent) : urgent.map((each) => [each] as const)).slice(0, count);
+  const rest = urgent.length - lines.flat().length;
   return (
     <ul className="do-now" aria-label={S.todoLabel} data-most={most}>
       {isOfTags ? (
-        urgent.slice(0, count).map(({ tagId, reasons: [reason] }, index) => (
+        lines.map(([{ tagId, reasons }, ...others], index) => (
           <li key={index}>
             <button
               type="button"
@@ -110,21 +119,27 @@ export function DoNow({
                 act({ type: 'select', tagId });
               }}
             >
-              <HealthMark verdict={reason.verdict} word={false} />
-              <Todo tagId={tagId} reason={reason} id={index === 0 ? id : undefined} />
+              <HealthMark verdict={reasons[0].verdict} word={false} />
+              <Todo
+                tagId={tagId}
+                reason={reasons[0]}
+                also={others.map((other) => other.tagId)}
+                id={index === 0 ? id : undefined}
+              />
             </button>
-            {index === count - 1 && urgent.length > count && (
-              <button
-                type="button"
-                className="do-more"
-                onClick={() => {
-                  act({ type: 'list', list: hasAlarms ? 'alarms' : 'tags' });
-                }}
-              >
-                {/* Each counts what it opens: a tag may have two alarms, or none yet. */}
-                {hasAlarms ? `${S.alarms} (${active})` : S.attentionMore(urgent.length - count)}
-              </button>
-            )}
+            {index === lines.length - 1 &&
+              (hasAlarms ? urgent.length > lines.length : rest > 0) && (
+                <button
+                  type="button"
+                  className="do-more"
+                  onClick={() => {
+                    act({ type: 'list', list: hasAlarms ? 'alarms' : 'tags' });
+                  }}
+                >
+                  {/* Each counts what it opens: a tag may have two alarms, or none yet. */}
+                  {hasAlarms ? `${S.alarms} (${active})` : S.attentionMore(rest)}
+                </button>
+              )}
           </li>
         ))
       ) : (
@@ -141,13 +156,35 @@ export function DoNow({
   );
 }
 
+/** Of tags that need the same the first stands for all, but not of those that somebody sees to. */
+function byTodo(urgent: readonly Urgent[]): readonly (readonly [Urgent, ...Urgent[]])[] {
+  const found = new Map<string, [Urgent, ...Urgent[]]>();
+  for (const each of urgent) {
+    const todo = todoText(each.reasons[0]);
+    const key = todo === '' ? each.tagId : `${todo}|${String(each.isAcknowledged)}`;
+    const line = found.get(key);
+    if (line) line.push(each);
+    else found.set(key, [each]);
+  }
+  return [...found.values()];
+}
+
+function alsoText(ids: readonly string[]): string {
+  const named = ids.slice(0, MOST_ALSO).map((id) => shown(id, 16));
+  const more = ids.length - named.length;
+  return named.join(', ') + (more > 0 ? ` + ${more}` : '');
+}
+
 function Todo({
   tagId,
   reason,
+  also,
   id,
 }: {
   tagId: string;
   reason: HealthReason;
+  /** Other tags that need the same. */
+  also: readonly string[];
   id: string | undefined;
 }): JSX.Element {
   const why = S.healthDriver(shown(tagId, 24), useReasonText(reason, true));
@@ -160,7 +197,9 @@ function Todo({
         {why}
       </span>
       <span className="do-what">
-        {isNow && <strong>{todoText(reason)}</strong>} {since && <small>{since}</small>}
+        {isNow && <strong>{todoText(reason)}</strong>}{' '}
+        {also.length > 0 && <span>{S.todoAlso(alsoText(also))} </span>}
+        {since && <small>{since}</small>}
       </span>
     </>
   );

@@ -45,16 +45,15 @@ test('says what to do first, and since when', () => {
   });
   const todo = screen.getByRole('list', { name: 'Do this now' });
   expect([...todo.children].map(({ textContent }) => textContent)).toEqual([
-    expect.stringMatching(/^CriticalTag 5: 2 pests seenInspect and treat the plants since /),
-    // One inspection raises an alarm: it waits for no second one.
-    'CriticalTag 1: Pest seenInspect and treat the plants ',
+    expect.stringMatching(/^CriticalTag 5: 2 pests seenInspect and treat the plants also 1 since /),
   ]);
   act(() => {
     acknowledgeAlarms(calling(alarmList.get()));
   });
   // Somebody sees to it: of what is as bad, what nobody has seen comes first.
   expect([...todo.children].map(({ textContent }) => textContent)).toEqual([
-    expect.stringMatching(/^CriticalTag 1: /),
+    // One inspection raises an alarm: it waits for no second one.
+    'CriticalTag 1: Pest seenInspect and treat the plants ',
     expect.stringMatching(/^CriticalTag 5: .*treat the plants acknowledged/),
   ]);
   // Not before what is worse, of one tag and of many; last is what is back in its range.
@@ -78,21 +77,23 @@ test('says what to do first, and since when', () => {
 test('nobody is called for what is shelved, and all the rest is counted', () => {
   const tags = ['1', '2', '3', '4', '5'].map((tag_id) => wireTag({ tag_id }));
   const mild = reason({ verdict: 'stressed' });
-  showTags(tags, judgement({ 1: [reason()], 2: [mild], 3: [mild], 4: [mild], 5: 'healthy' }));
+  const failed = reason({ kind: 'scan_failed', verdict: 'unknown', sensor: '', value: 1 });
+  const pest = reason({ kind: 'pest', verdict: 'stressed', sensor: '', value: 2, limit: null });
+  showTags(tags, judgement({ 1: [reason()], 2: [mild], 3: [mild], 4: [pest], 5: [failed] }));
   const stop = startAlarms();
   render(<HealthSummary kiosk={false} />);
   const todo = screen.getByRole('list', { name: 'Do this now' });
   act(() => {
     tellAlarms(alarm('fan', { tag_id: '1' }));
   });
-  expect(todo.textContent).toMatch(/^CriticalTag 1: .*StressedTag 2: .*Alarms \(1\)$/);
+  expect(todo.textContent).toMatch(/^CriticalTag 1: .*also 2, 3 .*StressedTag 4: .*Alarms \(1\)$/);
   fireEvent.click(screen.getByRole('button', { name: 'Alarms (1)' }));
   expect(store.get().view.list).toBe('alarms');
   expect(house().textContent).not.toContain('Shelved');
   act(() => {
     for (const item of calling(alarmList.get())) shelveAlarm(item, 15, 'fan');
   });
-  expect(todo.textContent).toMatch(/^StressedTag 2: .*StressedTag 3: .*\+ 1 more$/);
+  expect(todo.textContent).toMatch(/^StressedTag 4: .*StressedTag 2: .*also 3 .*\+ 1 more$/);
   fireEvent.click(screen.getByRole('button', { name: '+ 1 more' }));
   expect(store.get().view.list).toBe('tags');
   // That it is left out is said, as the heading and the numbers have it.
@@ -133,7 +134,7 @@ test('of a robot that stands still what is critical is told first', () => {
   render(<HealthSummary kiosk={false} />);
   const todo = screen.getByRole('list', { name: 'Do this now' });
   expect([...todo.children].map(({ textContent }) => textContent)).toEqual([
-    expect.stringMatching(/^CriticalTag 5: .*\+ 1 more$/),
+    expect.stringMatching(/^CriticalTag 5: .*also 1 /),
     expect.stringMatching(/^No tag is being scanned.* Check the robot$/),
   ]);
 });
@@ -148,12 +149,18 @@ test('of what is back in its range nothing is ordered', () => {
   );
 });
 
-test('says how many tags have no line, and on the wall nothing beside them', () => {
-  const tags = ['1', '2', '3', '4'].map((tag_id) => wireTag({ tag_id }));
-  showTags(tags, judgement({ 1: [reason()], 2: [reason()], 3: [reason()], 4: 'healthy' }));
+test('of tags that need the same done the worst stands for all, some by name', () => {
+  const ids = ['1', '2', '3', '4', '5'];
+  const all = Object.fromEntries(ids.map((id) => [id, [reason({ value: Number(id) })]]));
+  const humid = reason({ verdict: 'stressed', sensor: 'humidity', value: 90, limit: 80 });
+  const tags = [...ids, '6'].map((tag_id) => wireTag({ tag_id }));
+  showTags(tags, judgement({ ...all, 6: [humid] }));
   const { unmount } = render(<HealthSummary kiosk={false} />);
-  const { lastElementChild } = screen.getByRole('list', { name: 'Do this now' });
-  expect(lastElementChild?.textContent).toMatch(/^CriticalTag 2: .*\+ 1 more$/);
+  const todo = screen.getByRole('list', { name: 'Do this now' });
+  expect([...todo.children].map(({ textContent }) => textContent)).toEqual([
+    expect.stringMatching(/^CriticalTag 1: .*Heat, or close the vents also 2, 3, 4 \+ 1 $/),
+    expect.stringMatching(/^StressedTag 6: Humidity/),
+  ]);
   unmount();
   render(<HealthSummary kiosk />);
   expect(screen.queryByTestId('health-driver')).toBeNull();

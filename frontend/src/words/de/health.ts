@@ -70,6 +70,7 @@ export const HEALTH: In<typeof ENGLISH> = {
   },
   todoPestAgain: 'Nochmals kontrollieren: Ohne Befund ist der Alarm behoben',
   todoWell: 'Steht an bis zur nächsten guten Messung',
+  todoAlso: (tags) => `auch ${tags}`,
   todoLabel: 'Jetzt zu tun',
   reasonsLabel: 'Warum',
   healthHeading: 'Zustand des Gewächshauses',

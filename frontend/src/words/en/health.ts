@@ -70,6 +70,7 @@ export const HEALTH = {
   },
   todoPestAgain: 'Inspect again: a second clean inspection resolves it',
   todoWell: 'Active until the next good scan',
+  todoAlso: (tags: string): string => `also ${tags}`,
   todoLabel: 'Do this now',
   reasonsLabel: 'Why',
   healthHeading: 'Greenhouse status',

@@ -76,6 +76,7 @@ export const HEALTH: In<typeof ENGLISH> = {
   },
   todoPestAgain: 'Revisar otra vez: si no hay plaga, queda resuelta',
   todoWell: 'Activa hasta la próxima medición buena',
+  todoAlso: (tags) => `también ${tags}`,
   todoLabel: 'Hacer ahora',
   reasonsLabel: 'Por qué',
   healthHeading: 'Estado del invernadero',

@@ -68,6 +68,7 @@ export const HEALTH: In<typeof ENGLISH> = {
   },
   todoPestAgain: 'Nogmaals controleren: zonder plaag is het alarm opgelost',
   todoWell: 'Actief tot de volgende goede meting',
+  todoAlso: (tags) => `ook ${tags}`,
   todoLabel: 'Nu doen',
   reasonsLabel: 'Waarom',
   healthHeading: 'Toestand van de kas',

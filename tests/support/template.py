@@ -58,6 +58,9 @@ _READ_LATE: Final = (
     "PGPASSWORD",
     "PYTEST_",
     "ROS_DOMAIN_ID",
+    "ROS_LOG_DIR",
+    "SSL_CERT_FILE",
+    "TMPDIR",
     "XDG_STATE_HOME",
 )
 _MOST_BYTES: Final = 200_000  # what one message on a socket may hold, Linux's wmem_default

@@ -404,9 +404,10 @@ def _is_preflight(request: HTTPConnection) -> bool:
 
 
 def _wants_page(request: HTTPConnection) -> bool:
+    path = path_of(request.scope)
     return (
         request.scope.get("method") in ("GET", "HEAD")
-        and not path_of(request.scope).startswith("/api/")
+        and (path.endswith(".html") or not path.startswith("/api/"))
         and "text/html" in request.headers.get("accept", "")
     )
 

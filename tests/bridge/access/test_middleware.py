@@ -143,7 +143,7 @@ def test_a_picture_in_a_foreign_page_is_not_even_computed(open_bridge: Served) -
     assert open_bridge.get("/", {**frame, "Sec-Fetch-Dest": "document"}).status_code == 200
 
 
-@pytest.mark.parametrize("path", ["/", "/docs", "/signin"])
+@pytest.mark.parametrize("path", ["/", "/docs", "/signin", "/api/report.html"])
 def test_a_link_to_a_page_may_stand_anywhere(open_bridge: Served, path: str) -> None:
     linked = {**PAGE, "Referer": "http://wiki.example/greenhouse"}
     assert open_bridge.get(path, linked).status_code in (200, 303)
@@ -193,6 +193,7 @@ def test_life_shows_and_signing_in_works_without_it(closed: Served, path: str) -
     [
         ("/", "signin"),
         ("/docs", "signin"),
+        ("/api/report.html?hours=12", "../signin"),
         ("/?lang=de-AT&x=1", "signin?lang=de-AT"),
         ("/?lang=%0d%0aX:1", "signin"),
         ("/some/where/", "../../signin"),

@@ -430,9 +430,8 @@ class _Page:
         """In its two largest units, as the page writes it."""
         days, hours, minutes = seconds // 86_400, seconds // 3600 % 24, seconds // 60 % 60
         in_hours = f"{hours}\u00a0{self.say('hours')}"
-        if days:
-            return f"{days}\u00a0d {in_hours}"
-        return f"{in_hours if hours else ''} {minutes}\u00a0min".strip()
+        rest = f"{minutes}\u00a0min" if seconds >= 60 else f"{seconds}\u00a0s"
+        return f"{days}\u00a0d {in_hours}" if days else f"{in_hours} {rest}" if hours else rest
 
     def _zone_name(self, *moments: Mapping[str, int]) -> str:
         zone = self._zone

@@ -171,7 +171,7 @@ export function causeFacts(
   const counts = VERDICTS.map((verdict) => {
     const count = active.filter((each) => each.verdict === verdict).length;
     return count > 0
-      ? `${count} ${(count === 1 ? S.health : S.healthMany)[verdict].toLowerCase()}`
+      ? `${count} ${(verdict === 'healthy' ? S.alarmBack : (count === 1 ? S.health : S.healthMany)[verdict]).toLowerCase()}`
       : null;
   });
   return [

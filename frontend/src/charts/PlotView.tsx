@@ -78,6 +78,7 @@ export function PlotView({
       className="plot-view"
       aria-label={S.chartOf(shown(model.sensor.label, 32))}
       data-alone={isAlone}
+      data-told={at !== null}
       style={{ '--sensor': rgbText(sensorColour(model.sensor)) } as CSSProperties}
     >
       <header>

@@ -78,6 +78,15 @@ test('the end of the bar is not live while the page is not', () => {
   expect(said()).toEqual(['Reconnecting', 'Reconnecting']);
 });
 
+test('how fast the past is played is chosen where there is a past to play', () => {
+  render(<TimeBar />);
+  expect(screen.queryByLabelText('Playback speed')).toBeNull();
+  flush(() => {
+    act({ type: 'moment', moment: 9_004 });
+  });
+  expect(screen.getByLabelText('Playback speed')).toBeTruthy();
+});
+
 const at = (clientX: number): object => ({ clientX, button: 0, pointerId: 1 });
 
 describe('the slider', () => {

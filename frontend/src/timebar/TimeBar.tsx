@@ -65,6 +65,7 @@ function Off(): JSX.Element {
 
 function Player(): JSX.Element {
   const { isPlaying, speed } = useSelected(playback, (state) => state);
+  const isLive = useApp((state) => state.view.moment === null);
   const label = isPlaying ? S.timebarPause : S.timebarPlay;
   return (
     <>
@@ -80,14 +81,16 @@ function Player(): JSX.Element {
           <path d={isPlaying ? 'M4 3h3v10H4zM9 3h3v10H9z' : 'M4 2.5v11l9-5.5z'} />
         </svg>
       </button>
-      <Select
-        aria-label={S.timebarSpeed}
-        title={S.timebarSpeed}
-        value={speed}
-        options={SPEEDS}
-        text={(each) => `${each}×`}
-        onChange={chooseSpeed}
-      />
+      {!isLive && (
+        <Select
+          aria-label={S.timebarSpeed}
+          title={S.timebarSpeed}
+          value={speed}
+          options={SPEEDS}
+          text={(each) => `${each}×`}
+          onChange={chooseSpeed}
+        />
+      )}
     </>
   );
 }

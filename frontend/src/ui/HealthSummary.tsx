@@ -44,6 +44,7 @@ export function HealthSummary({ kiosk }: { kiosk: boolean }): JSX.Element {
               aria-pressed={filter === verdict}
               disabled={kiosk}
               data-health={verdict}
+              data-none={health.counts[verdict] === 0}
               onClick={() => {
                 act({ type: 'health', verdict: filter === verdict ? null : verdict });
               }}

@@ -200,7 +200,7 @@ def test_what_is_handed_over_comes_first_with_its_value_and_both_limits() -> Non
         alarm(tag_id="7", reason=dry, worst=1.5),
         alarm(tag_id="9", reason=cold, worst=8.0),
         alarm(tag_id="7", reason=dry, worst=1.6, cleared_at=at(60 + 78 * 60)),
-        alarm(tag_id="7", reason={**cold, "limit": 3.5}, worst=2.0, cleared_at=at(120)),
+        alarm(tag_id="7", reason={**cold, "limit": 3.5}, worst=2.0, cleared_at=at(97)),
     ]
     page = page_of(alarms=alarms, tags=tags)
     active, _, resolved = page.partition("Alarms still active ")[2].partition(" Alarms resolved ")
@@ -213,7 +213,7 @@ def test_what_is_handed_over_comes_first_with_its_value_and_both_limits() -> Non
     assert "9 06:01 just below 10.0 °C 8.0 °C 10.0–35.0 °C" in active
     assert "7 06:01 07:19 1 h 18 min 1.60 kPa 0.20–1.30 kPa" in resolved
     # The file of sensors has another range by now.
-    assert "7 06:01 06:02 1 min 2.0 °C 3.5 °C" in resolved
+    assert "7 06:01 06:01 37 s 2.0 °C 3.5 °C" in resolved
     page = page_of(alarms=[alarm()], tags=[TagState("7", flower=Flower(bug_count=2))])
     assert "7 06:01 2 3" in page
 

@@ -56,7 +56,7 @@ export function AlarmTimes({
       <span>
         {length} <small className="faint">{note}</small>
       </span>
-      <HealthMark verdict={verdict} />
+      <HealthMark verdict={verdict} text={verdict === 'healthy' ? S.alarmBack : undefined} />
     </span>
   );
 }

@@ -130,6 +130,8 @@ test('what is well again waits for one more good scan, and pests for an inspecti
     'Active until the next good scan',
     'Inspect again: a second clean inspection resolves it',
   ]);
+  // An active alarm is never called healthy.
+  expect(screen.getAllByText('Back to normal')).toHaveLength(2);
 });
 
 test('who acknowledged it and when, by the clock of the twin', () => {

@@ -34,6 +34,7 @@ export const ALARMS: In<typeof ENGLISH> = {
   },
   alarmFirst: (reading) => `anfangs ${reading}`,
   alarmStatus: { critical: 'kritisch', healthy: 'im Sollbereich' },
+  alarmBack: 'Wieder normal',
   alarmShow: 'Messpunkt jetzt anzeigen',
   alarmStart: 'Zum Beginn',
   alarmActionsOf: (what) => `Aktionen: ${what}`,

@@ -32,6 +32,8 @@ export const ALARMS = {
   },
   alarmFirst: (reading: string): string => `${reading} when raised`,
   alarmStatus: { critical: 'critical', healthy: 'in range' },
+  /** Of an alarm that is still active. */
+  alarmBack: 'Back to normal',
   alarmShow: 'Show this tag now',
   alarmStart: 'Go to start',
   alarmActionsOf: (what: string): string => `Actions: ${what}`,

@@ -7,7 +7,7 @@ export const TAGS: In<typeof ENGLISH> = {
   tags: 'Puntos',
   tableCaption: 'Todos los puntos de medida con sus últimas lecturas',
   filter: 'Filtrar los puntos',
-  filterHint: 'n.º, especie, plaga …',
+  filterHint: 'N.º, especie, plaga …',
   filterClear: 'Borrar el filtro',
   shownOf: (shown, all) =>
     shown === all

@@ -30,6 +30,7 @@ export const ALARMS: In<typeof ENGLISH> = {
   },
   alarmFirst: (reading) => `bij aanvang ${reading}`,
   alarmStatus: { critical: 'kritiek', healthy: 'binnen de grenzen' },
+  alarmBack: 'Weer normaal',
   alarmShow: 'Dit meetpunt nu tonen',
   alarmStart: 'Naar begin',
   alarmActionsOf: (what) => `Acties: ${what}`,

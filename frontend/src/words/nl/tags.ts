@@ -7,7 +7,7 @@ export const TAGS: In<typeof ENGLISH> = {
   tags: 'Meetpunten',
   tableCaption: 'Alle meetpunten met hun nieuwste meetwaarden',
   filter: 'Meetpunten filteren',
-  filterHint: 'nr., soort, plaag …',
+  filterHint: 'Nr., soort, plaag …',
   filterClear: 'Filter wissen',
   shownOf: (shown, all) =>
     shown === all

@@ -61,11 +61,6 @@ def pytest_configure(config: pytest.Config) -> None:
         let_nothing_in()
 
 
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """What waits longest begins first: at the end a worker alone with it would keep all waiting."""
-    items.sort(key=lambda item: item.get_closest_marker("slow") is None)
-
-
 def pytest_collection_finish() -> None:
     """What thousands of tests were collected into stays: no `gc.collect()` has to look at it."""
     gc.freeze()

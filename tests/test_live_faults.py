@@ -174,7 +174,6 @@ def test_a_twin_in_another_domain_is_never_seen_until_there_is_one_here(domain: 
             assert client.until("state")["state"]["tags"] == []
 
 
-@pytest.mark.slow
 def test_a_second_twin_is_said_loudly_and_its_end_too(domain: int) -> None:
     with (
         lupin_twin(domain, "web") as process,

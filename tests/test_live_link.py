@@ -57,7 +57,6 @@ def test_web_knows_its_twin_again_after_a_silence(domain: int) -> None:
         wait_for(is_known, "what the twin says of itself, after the silence")
 
 
-@pytest.mark.slow
 def test_web_joins_ros_again_in_a_silence_and_nobody_notices(domain: int) -> None:
     again = "joining ROS again"
     with (
@@ -135,7 +134,6 @@ def test_a_publisher_of_another_qos_is_heard_and_told_of(
 # --- what is lost ---------------------------------------------------------------------------------
 
 
-@pytest.mark.slow
 def test_of_a_publisher_that_had_said_nothing_each_loss_is_counted(domain: int) -> None:
     count = 1_000
     with twin_node(domain, afresh=True) as twin, Peer(domain) as peer:

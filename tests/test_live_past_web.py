@@ -165,7 +165,6 @@ def asked(live: Bridge, path: str, **query: Any) -> Any:
     return wait_for(look_for, f"{path} {query}").json()
 
 
-@pytest.mark.slow
 def test_without_its_twin_web_answers_all_the_same_and_goes_on_with_the_next(own: Apart) -> None:
     before = {path: own.beside.http.get(path) for path in QUESTIONS[:-2]}
     own.twin.kill()

@@ -286,7 +286,6 @@ def test_what_is_simulated_says_so(browser: Browser, archive: Archive, tmp_path:
             expect(page.get_by_test_id("origin")).to_contain_text("Simulated")
 
 
-@pytest.mark.slow
 def test_an_archive_without_greenhouses_and_one_that_is_down(browser: Browser) -> None:
     with server() as own:
         archive = Archive(own)

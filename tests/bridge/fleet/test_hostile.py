@@ -214,7 +214,6 @@ def test_a_process_that_is_killed_is_started_again_and_counted(page: Page) -> No
     is_started_again("reader")
 
 
-@pytest.mark.slow
 def test_an_archive_that_hangs_is_said_and_goes_on(tmp_path: Path) -> None:
     with server() as own:
         archive = made(own, tmp_path / "journal", "gh2")
@@ -248,7 +247,6 @@ def test_an_archive_that_hangs_is_said_and_goes_on(tmp_path: Path) -> None:
 # --- what is in the archive -----------------------------------------------------------------------
 
 
-@pytest.mark.slow
 def test_rows_that_cannot_be_read_are_said_on_their_sites_page(
     archive: Archive, tmp_path: Path
 ) -> None:

@@ -65,7 +65,6 @@ def answered(live: Bridge, path: str, accept: Any, **query: Any) -> Any:
     return wait_for(look, path)
 
 
-@pytest.mark.slow
 def test_a_tag_that_has_changed_is_told_left_out_and_judged(live: Bridge) -> None:
     def is_of_the_last(body: Any) -> bool:
         # What is foretold is made beside what is heard, and may be of the scan before it.

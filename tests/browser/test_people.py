@@ -2,15 +2,15 @@
 
 import re
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
-from playwright.sync_api import Browser, Locator, Page, expect
+from playwright.sync_api import Browser, Error, Locator, Page, expect
 
 from tests.browser.hmi import slow_down
 from tests.support.messages import look, scan
 from tests.support.people import PASSWORD, add
-from tests.support.waiting import PATIENCE_S
+from tests.support.waiting import PATIENCE_S, wait_for
 from tests.support.web import bridge
 
 
@@ -74,11 +74,22 @@ def test_a_word_is_everybodys_and_a_viewer_has_none(
 
 def comment(page: Page, where: Locator | None, text: str) -> None:
     """Of an alarm from the menu of its row (None), else by the button there."""
+    field = page.locator(".comment-field textarea")
     if where is None:
         act(page, "Comment")
     else:
-        where.get_by_role("button", name=re.compile("^Comment: ")).click()
-    page.locator(".comment-field textarea").fill(text)
+        button = where.get_by_role("button", name=re.compile("^Comment: "))
+
+        def opened() -> bool:
+            # A card that has only just opened is still being laid out: a click may be lost.
+            if field.count() == 0:
+                button.click()
+            with suppress(Error):  # not there yet
+                field.wait_for(timeout=2_000)
+            return field.count() > 0
+
+        wait_for(opened, "the field of a comment")
+    field.fill(text)
     page.get_by_role("button", name="Save").click()
     expect(page.locator(".comment-field")).to_have_count(0)
 

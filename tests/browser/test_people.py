@@ -2,15 +2,15 @@
 
 import re
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from pathlib import Path
 
-from playwright.sync_api import Browser, Error, Locator, Page, expect
+from playwright.sync_api import Browser, Locator, Page, expect
 
 from tests.browser.hmi import slow_down
 from tests.support.messages import look, scan
 from tests.support.people import PASSWORD, add
-from tests.support.waiting import PATIENCE_S, wait_for
+from tests.support.waiting import PATIENCE_S
 from tests.support.web import bridge
 
 
@@ -74,22 +74,11 @@ def test_a_word_is_everybodys_and_a_viewer_has_none(
 
 def comment(page: Page, where: Locator | None, text: str) -> None:
     """Of an alarm from the menu of its row (None), else by the button there."""
-    field = page.locator(".comment-field textarea")
     if where is None:
         act(page, "Comment")
     else:
-        button = where.get_by_role("button", name=re.compile("^Comment: "))
-
-        def opened() -> bool:
-            # A card that has only just opened is still being laid out: a click may be lost.
-            if field.count() == 0:
-                button.click()
-            with suppress(Error):  # not there yet
-                field.wait_for(timeout=2_000)
-            return field.count() > 0
-
-        wait_for(opened, "the field of a comment")
-    field.fill(text)
+        where.get_by_role("button", name=re.compile("^Comment: ")).click()
+    page.locator(".comment-field textarea").fill(text)
     page.get_by_role("button", name="Save").click()
     expect(page.locator(".comment-field")).to_have_count(0)
 
@@ -108,12 +97,17 @@ def test_a_comment_is_seen_by_everybody_where_and_when_it_is_about(
             alarms_of(browser, running.url, "vera") as vera,
         ):
             comment(anna, None, "aphids on <b>leaves</b>")
-            for page in (anna, vera):
+            for page in (vera, anna):
                 said = row(page).get_by_test_id("comments")
                 expect(said).to_contain_text("aphids on <b>leaves</b>")
                 expect(said).to_contain_text("anna")
                 row(page).locator(".alarm-go").click()
-            comment(anna, anna.get_by_test_id("tag-card"), "sampled")
+            # Where it is at once, it stays while the chart and all that was read comes.
+            card = anna.get_by_test_id("tag-card")
+            stood = card.locator(".say").bounding_box()
+            expect(card.locator(".plot-view")).to_be_visible()
+            assert card.locator(".say").bounding_box() == stood
+            comment(anna, card, "sampled")
             comment(anna, anna.get_by_test_id("timebar"), "vents stuck")
             expect(vera.get_by_test_id("tag-card").get_by_test_id("comments")).to_contain_text(
                 "sampled"

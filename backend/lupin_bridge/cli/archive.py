@@ -28,6 +28,7 @@ from lupin_bridge.cli import journal
 from lupin_bridge.cli.output import FAILED, Roles, add_actions, add_role
 from lupin_bridge.console import say, tell
 from lupin_bridge.settings import option, variable
+from lupin_twin.core.parameters import MAX_JOURNAL_DAYS
 from lupin_twin.runtime.process import INTERRUPTED
 
 ACTIONS: Final[Mapping[str, str]] = {
@@ -41,8 +42,6 @@ _USAGE_ERROR: Final = 2
 # Beside a busy twin it gets a tenth of the core that they share.
 _NICENESS: Final = 10
 _URL: Final = "archive_url"
-# As of `journal_days`.
-_MAX_DAYS: Final = 36_500
 
 
 def add_parsers(roles: Roles) -> None:
@@ -129,9 +128,9 @@ def _act(options: argparse.Namespace, connection: Any, place: str) -> int:
         tell(*overview(connection))
         return 0
     if action == "retain":
-        if not 0 < options.days <= _MAX_DAYS:
+        if not 0 < options.days <= MAX_JOURNAL_DAYS:
             raise UsageError(
-                f"--days is {options.days:g}, expected more than 0, {_MAX_DAYS} at most"
+                f"--days is {options.days:g}, expected more than 0, {MAX_JOURNAL_DAYS:g} at most"
             )
         gone = list(retain(connection, options.days, options.site))
         tell(*(f"deleted {line}" for line in gone or ["nothing"]))

@@ -21,6 +21,7 @@ from lupin_bridge.cli.output import FAILED, Roles
 from lupin_bridge.console import Progress, say, tell
 from lupin_twin.adapt.config import read_yaml
 from lupin_twin.adapt.table import ConfigError
+from lupin_twin.core.parameters import MAX_JOURNAL_DAYS
 from lupin_twin.core.state import NANOSECONDS_PER_SECOND, Pin, Reading, Scan, Write
 from lupin_twin.journal.beside import Lock
 from lupin_twin.journal.file import JournalFile
@@ -38,7 +39,7 @@ Merged = tuple[int, str, dict[str, float]]
 _BATCH: Final = 20_000
 _RETENTION_DAYS: Final = 90
 # The journal deletes nothing while it is imported into.
-_NO_LIMITS: Final = Limits(days=36_500, max_bytes=2**62)
+_NO_LIMITS: Final = Limits(days=MAX_JOURNAL_DAYS, max_bytes=2**62)
 
 
 def add_parser(roles: Roles) -> None:

@@ -65,7 +65,7 @@ function Off(): JSX.Element {
 
 function Player(): JSX.Element {
   const { isPlaying, speed } = useSelected(playback, (state) => state);
-  const isLive = useApp((state) => state.view.moment === null);
+  const isNow = useApp((state) => state.view.moment === null);
   const label = isPlaying ? S.timebarPause : S.timebarPlay;
   return (
     <>
@@ -81,7 +81,7 @@ function Player(): JSX.Element {
           <path d={isPlaying ? 'M4 3h3v10H4zM9 3h3v10H9z' : 'M4 2.5v11l9-5.5z'} />
         </svg>
       </button>
-      {!isLive && (
+      {!isNow && (
         <Select
           aria-label={S.timebarSpeed}
           title={S.timebarSpeed}

@@ -123,7 +123,13 @@ function CardBody({
         ))}
       </ul>
       {(isEstimated || hasChanged) && <CardEstimate tag={tag} health={health} />}
-      {tag.readings.size > 0 && !isCharted && <CardChart tagId={tag.id} />}
+      {tag.readings.size > 0 && !isCharted && (
+        <div className="card-chart-place">
+          <CardChart tagId={tag.id} />
+        </div>
+      )}
+      {/* Above what comes later: nothing moves under a finger that is about to press. */}
+      <Comments subject={`tag:${tag.id}`} name={S.card(shown(tag.id, 24))} />
       <dl className="card-facts">
         {area !== '' && (
           <div>
@@ -190,7 +196,6 @@ function CardBody({
         </div>
       </dl>
       {history && <Tries tries={history.tries} />}
-      <Comments subject={`tag:${tag.id}`} name={S.card(shown(tag.id, 24))} />
     </div>
   );
 }

@@ -13,6 +13,8 @@ from lupin_twin.core.diagnostics import Origin
 FARTHEST_M: Final = 1_000_000.0
 # Of a parameter that is a list.
 MAX_NAMES: Final = 16
+# A century.
+MAX_JOURNAL_DAYS: Final = 36_500.0
 # Characters of a value that a complaint repeats.
 MAX_SHOWN: Final = 80
 
@@ -122,7 +124,11 @@ class TwinParameters:
         fixed=_MADE,
     )
     journal_days: float = _parameter(
-        90.0, "how long the journal keeps scans and inspections, days", 0.01, 36_500.0, fixed=_MADE
+        90.0,
+        "how long the journal keeps scans and inspections, days",
+        0.01,
+        MAX_JOURNAL_DAYS,
+        fixed=_MADE,
     )
     journal_max_mb: float = _parameter(
         4000.0, "size past which the journal deletes its oldest scans, MB", 10.0, 1e7, fixed=_MADE

@@ -163,7 +163,12 @@ class People:
                 f"{ATTEMPTS_PER_MINUTE} a minute: try again in {math.ceil(wait_s)} s",
                 wait_s,
             )
-        person = await self._check(name, password)
+        try:
+            person = await self._check(name, password)
+        except asyncio.CancelledError:
+            # The thread works on it all the same: whoever leaves has tried.
+            self._attempts.take(address, time.monotonic())
+            raise
         if person is None:
             self._attempts.take(address, time.monotonic())
             log.warning("a sign-in as %r from %s was refused", name[:64], address)

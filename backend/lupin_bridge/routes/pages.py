@@ -21,6 +21,7 @@ from lupin_bridge.access.middleware import CONTENT_POLICY, Access, client_of
 from lupin_bridge.bridge import Bridge
 from lupin_bridge.feed.source import TwinSource
 from lupin_bridge.routes.answers import (
+    CLIENT_DISCONNECTED,
     NEVER_STORE,
     computed,
     error_response,
@@ -30,6 +31,7 @@ from lupin_bridge.routes.answers import (
     read_body,
     read_route,
     respond,
+    while_client_waits,
 )
 from lupin_bridge.serving.admission import REVALIDATE
 from lupin_bridge.stream import people_schema
@@ -262,11 +264,18 @@ async def sign_in(request: Request) -> Response:
                 "send the token as Authorization: Bearer", 401, {"WWW-Authenticate": "Bearer"}
             )
         given = await read_body(request, people_schema.SignIn)
-        person = await people.check(given.name, given.password, address)
+        person = await while_client_waits(
+            request, people.check(given.name, given.password, address)
+        )
         ends_others = given.ends_others
     if person is None:
         return error_response("there is no such account, or the password is another", 401)
-    name, cookie, lasts_s = await people.sign_in(person, address, ends_others=ends_others)
+    begun = await while_client_waits(
+        request, people.sign_in(person, address, ends_others=ends_others)
+    )
+    if begun is None:
+        return Response(status_code=CLIENT_DISCONNECTED)
+    name, cookie, lasts_s = begun
     response = Response(status_code=204, headers=NEVER_STORE)
     response.set_cookie(name, cookie, max_age=lasts_s, **_place_of(request))
     return response

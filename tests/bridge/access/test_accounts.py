@@ -175,6 +175,21 @@ def test_a_flood_of_sign_ins_waits_in_a_short_queue_and_an_address_has_few(
     with_people(path, test)
 
 
+def test_whoever_leaves_amid_a_sign_in_has_tried(path: Path) -> None:
+    add(path, anna="operator")
+
+    async def test(people: People) -> None:
+        for _ in range(ATTEMPT_BURST):
+            leaving = asyncio.create_task(people.check("anna", PASSWORD, "1"))
+            await asyncio.sleep(0)
+            leaving.cancel()
+            await people.audited(1)  # behind it on the thread
+        with pytest.raises(PeopleBusy, match="1 has tried"):
+            await people.check("anna", PASSWORD, "1")
+
+    with_people(path, test)
+
+
 def test_a_file_that_has_gone_opens_nothing(path: Path) -> None:
     async def test(people: People) -> None:
         before = people.is_on

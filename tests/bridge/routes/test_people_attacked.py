@@ -20,6 +20,7 @@ from lupin_bridge.access.accounts import digest
 from lupin_bridge.routes.notes import MAX_LISTED
 from lupin_bridge.stream import people_schema
 from lupin_twin.core.notes import COMMENT
+from tests.support import raw_http
 from tests.support.journal import kept
 from tests.support.messages import look
 from tests.support.people import TOKEN, add, remove, signed_in, write
@@ -175,6 +176,21 @@ def test_who_leaves_amid_a_body_is_no_error_and_nor_is_a_stop_amid_one(accounts:
                 running.get("/healthz")  # and the half is read
                 if ends_first == "server":
                     assert running.process.stop(signal.SIGINT) == 0
+        assert "ERROR" not in running.process.output
+
+
+def test_a_stop_amid_a_sign_in_is_no_error(tmp_path: Path) -> None:
+    path = tmp_path / "accounts.sqlite"
+    # What the hash says of itself decides: minutes to look at it.
+    add(path, secret=f"$argon2id$v=19$m=65536,t=2000,p=1${'A' * 22}${'A' * 43}", anna="viewer")
+    body = json.dumps({"name": "anna", "password": "x" * 12}).encode()
+    asks = b"POST /api/signin HTTP/1.1\r\nHost: 127.0.0.1\r\nX-Lupin-Twin: 1\r\n"
+    asks += b"Content-Type: application/json\r\nContent-Length: %d\r\n\r\n" % len(body) + body
+    with bridge("--accounts", str(path)) as running, raw_http.connect(running.url) as client:
+        client.sendall(asks)
+        running.get("/healthz")  # and it is read
+        assert running.process.stop(signal.SIGTERM) == 0
+        assert raw_http.status(raw_http.heard(client)) == 503
         assert "ERROR" not in running.process.output
 
 

@@ -92,9 +92,7 @@ class Bridge:
         self.offer = Offer(source)
         self.rosbridge_writer = Writer(source.relay, source.workers)
         self.criteria = criteria or Criteria.of(settings)
-        self._judge = Judge(
-            self.criteria.sensors, self.criteria.day, self.criteria.recent_s, knows_recent=False
-        )
+        self._judge = Judge(self.criteria, knows_recent=False)
         self._judged = NOTHING_JUDGED
         self._states_unjudged = 0
         self._is_judge_failing = False

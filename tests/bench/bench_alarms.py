@@ -25,7 +25,7 @@ from lupin_twin.core.state import Reading, Snapshot, TagState
 from lupin_twin.core.writes import PastWrite, RunSpan
 from tests.support.ordinary_day import DAY_NS, S, ordinary_days
 from tests.support.proc_stat import resident_mb
-from tests.support.seen import alarm, by_light
+from tests.support.seen import BY_LIGHT, alarm
 
 DAYS = 7
 SIZES = (1_000, 10_000)
@@ -63,7 +63,7 @@ def ms_since(start: float) -> float:
 def alarms_of(tags: int) -> None:
     heard = list(past_of(tags))
     before_mb = resident_mb(os.getpid())
-    follower = Follower(own_sensors(), lambda light, _: bool(light), SPANS)
+    follower = Follower(BY_LIGHT, SPANS)
     lots = []
     for first in range(0, len(heard), LOT):
         start = time.thread_time()
@@ -103,7 +103,7 @@ def verdicts_of(tags: int) -> None:
 
     now_ns = DAY_NS
     house = [tag(index, now_ns) for index in range(tags)]
-    judge = Judge(own_sensors(), by_light, recent_s=3_600.0)
+    judge = Judge(replace(BY_LIGHT, recent_s=3_600.0))
     snapshot = Snapshot(now_ns, "map", tuple(house))
     for _ in range(tags // 500 + 2):  # so many at once
         judge.see(snapshot)
@@ -149,7 +149,7 @@ def loop_of(tags: int) -> None:
     row(tags, "loop: one of them worse", statistics.median(taken), max(taken))
 
     judge, mirror = (
-        Judge(own_sensors(), by_light, recent_s=3_600.0),
+        Judge(replace(BY_LIGHT, recent_s=3_600.0)),
         Mirror(Topics("lt", ""), own_sensors()),
     )
     now_ns = DAY_NS
@@ -178,7 +178,7 @@ def row(tags: int, name: str, took_ms: float, most_ms: float | None = None) -> N
 
 def ordinary() -> None:
     heard = ordinary_days()
-    follower = Follower(own_sensors(), lambda light, _: bool(light), SPANS)
+    follower = Follower(BY_LIGHT, SPANS)
     follower.take(heard)
     raised = follower.found(heard[-1].stamp_ns).alarms
     spells = (heard[-1].stamp_ns - heard[0].stamp_ns) / (600 * S)

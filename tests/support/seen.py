@@ -4,10 +4,10 @@ from collections.abc import Iterable, Mapping
 from dataclasses import replace
 
 from lupin_bridge.alarms.board import AlarmBoard, AlarmSource, Board, change_between, page_of
-from lupin_bridge.judge.daylight import Day, judge_day
+from lupin_bridge.judge.daylight import ClockDay, Day, judge_day
 from lupin_bridge.judge.episodes import Alarm, alarm_id
 from lupin_bridge.judge.judging import judge_once
-from lupin_bridge.judge.options import own_sensors
+from lupin_bridge.judge.options import Criteria, own_sensors
 from lupin_bridge.judge.verdict import Kind, Reason, Verdict
 from lupin_bridge.notify.messages import GreenhouseState
 from lupin_twin.core.diagnostics import Origin
@@ -20,9 +20,14 @@ NOW_NS = 1_795_270_500 * S
 HOLDS_NS = 600 * S
 
 
-def by_light(light: bool | None, _: int) -> Day:
+class ByLight(Criteria):
     """Whether it is day, by the light alone."""
-    return judge_day(light, None, None)
+
+    def day(self, light: bool | None, stamp_ns: int) -> Day:
+        return judge_day(light, None, None)
+
+
+BY_LIGHT = ByLight(SENSORS, None, ClockDay(None))
 
 
 def tag(tag_id: str, at_ns: int = NOW_NS, **values: float) -> TagState:
@@ -46,7 +51,7 @@ def seen(
     holds = dict.fromkeys((it.tag_id for it in tags), HOLDS_NS) | dict(holds_ns or {})
     return GreenhouseState(
         snapshot=snapshot,
-        judged=judge_once(snapshot, (), SENSORS, lambda *_: Day(True, "assumed"), HOLDS_NS / 1e9),
+        judged=judge_once(snapshot, (), replace(BY_LIGHT, recent_s=HOLDS_NS / 1e9)),
         board=Board(page_of(alarms), "heard", NOW_NS, 1),
         holds_ns=holds,
         now_ns=now_ns,

@@ -202,7 +202,7 @@ class AlarmFeed:
     async def _take_received(self) -> None:
         lot, self._received = self._received, []
         if self._follower is None:
-            self._follower = self._new(_ALL_TIME)
+            self._follower = Follower(self._criteria, _ALL_TIME)
         for first in range(0, len(lot), LOT):
             await self._take(lot[first : first + LOT])
         await self._publish()
@@ -219,7 +219,7 @@ class AlarmFeed:
                 self._begin("journal")
                 continue
             if self._follower is None:
-                self._follower = self._new(past.spans)
+                self._follower = Follower(self._criteria, past.spans)
             self._journal, self._last = past.journal, past.last
             await self._take(past.writes)
             if generation != self._generation:
@@ -235,20 +235,6 @@ class AlarmFeed:
         is_other_axis = self._follower is not None and self._follower.spans != past.spans
         is_other = bool(self._journal) and past.journal != self._journal
         return is_other or past.last < self._last or is_other_axis
-
-    def _new(self, spans: Sequence[RunSpan]) -> Follower:
-        criteria = self._criteria
-
-        def is_day(light: bool | None, at_ns: int) -> bool:
-            return criteria.day(light, at_ns).is_day
-
-        return Follower(
-            criteria.sensors,
-            is_day,
-            spans,
-            criteria.recent_s,
-            day_number=criteria.day_number,
-        )
 
     async def _take(self, lot: Sequence[PastWrite]) -> None:
         follower = self._follower

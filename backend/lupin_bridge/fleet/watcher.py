@@ -197,15 +197,11 @@ class Watcher:
         for name in sorted(self.sites, key=self._turn):
             judged = self._judged.get(name)
             if judged is None:
-                judged = self._judged[name] = _Judged(self._judge_of())
+                judged = self._judged[name] = _Judged(Judge(self._criteria))
             elif not self._is_due(name, judged):
                 continue
             self._judge_safely(name, judged, now_ns)
             yield name
-
-    def _judge_of(self) -> Judge:
-        criteria = self._criteria
-        return Judge(criteria.sensors, criteria.day, criteria.recent_s)
 
     def _has_more(self) -> bool:
         """Whether somebody's turn has come."""
@@ -242,7 +238,7 @@ class Watcher:
                 why = "site %s cannot be judged: its status is unknown: %s"
                 log.warning(why, name, error, exc_info=not is_known)
             # Tried again from its first row on, when others are judged for their age.
-            self._judged[name] = _Judged(self._judge_of(), is_failing=True)
+            self._judged[name] = _Judged(Judge(self._criteria), is_failing=True)
             self.sites[name] = replace(
                 self.sites[name], verdict=None, active_alarms=None, alarms=(), dots=""
             )
@@ -307,14 +303,7 @@ class Watcher:
             if judged.follower is not None:
                 judged.follower, judged.after, judged.is_caught_up = None, 0, False
                 past = writes(log, replace(request, after=0))
-            day = self._criteria.day
-            judged.follower = Follower(
-                self._criteria.sensors,
-                lambda light, at_ns: day(light, at_ns).is_day,
-                past.spans,
-                self._criteria.recent_s,
-                day_number=self._criteria.day_number,
-            )
+            judged.follower = Follower(self._criteria, past.spans)
         judged.follower.take(past.writes)
         judged.after, judged.is_caught_up = past.last, past.is_all
 

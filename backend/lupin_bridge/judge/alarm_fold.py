@@ -13,9 +13,9 @@ from statistics import median
 from typing import Final
 
 from lupin_bridge.judge.daylight import DayLine
-from lupin_bridge.judge.days import DayNumber, TagDays, of_24_hours
+from lupin_bridge.judge.days import TagDays
 from lupin_bridge.judge.episodes import MAX_EPISODES, SITE, Alarm, TagEpisodes, alarm_id
-from lupin_bridge.judge.ranges import Sensors
+from lupin_bridge.judge.options import Criteria
 from lupin_bridge.judge.scan_interval import LONGEST_NS, SHORTEST_NS, Stretches
 from lupin_bridge.judge.tag_log import Gap, TagPast, is_long
 from lupin_bridge.judge.verdict import Kind, Reason, Verdict
@@ -27,8 +27,6 @@ KEPT: Final = 100_000
 # What is over and not reported any more is dropped as often as that.
 FORGET_EVERY_NS: Final = 3600 * 1_000_000_000
 _NEVER: Final = 2**63 - 1
-# What the light said, if anything, and the moment: whether it was day.
-DayOf = Callable[[bool | None, int], bool]
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,8 +64,6 @@ class _Run:
 class Follower:
     """Belongs to one thread at a time.
 
-    `recent_s` fixes how long readings hold, None: it is learnt. `day_of` says whether it was day,
-    `day_number` which day it was.
     `spans` are the runs of the clock; of other ones another follower has to be made. `kept` is how
     many writes are kept, about; `max_episodes` how many cleared alarms are, of each tag.
 
@@ -76,12 +72,9 @@ class Follower:
 
     def __init__(
         self,
-        sensors: Sensors,
-        day_of: DayOf,
+        criteria: Criteria,
         spans: Sequence[RunSpan],
-        recent_s: float | None = None,
         *,
-        day_number: DayNumber = of_24_hours,
         kept: int = KEPT,
         max_episodes: int = MAX_EPISODES,
     ) -> None:
@@ -93,11 +86,8 @@ class Follower:
         self._spans_of: dict[int, list[RunSpan]] = {}
         for span in self.spans:
             self._spans_of.setdefault(span.run, []).append(span)
-        self._sensors = sensors
-        self._day_of = day_of
-        self._day_number = day_number
+        self._criteria = criteria
         self._days: Mapping[str, Sequence[Reading]] = {}
-        self._recent_ns = None if recent_s is None else int(recent_s * 1e9)
         self._runs: dict[int, _Run] = {}
         self._tags = 0
         self._is_other = True
@@ -145,17 +135,19 @@ class Follower:
         tag = run.tags.get(write.tag_id)
         if tag is None:
             self._tags += 1
-            days = TagDays(self._sensors, self._clock, self._day_number)
+            by = self._criteria
+            recent_ns = None if by.recent_s is None else int(by.recent_s * 1e9)
+            days = TagDays(by.sensors, by.is_day, by.day_number)
             episodes = TagEpisodes(
                 write.tag_id,
                 run.begun_ns,
-                self._sensors,
+                by.sensors,
                 days,
-                recent_ns=self._recent_ns,
+                recent_ns=recent_ns,
                 max_episodes=self._max_episodes,
             )
             tag = run.tags[write.tag_id] = TagPast(
-                episodes, self._recent_ns, _matters(run), self._is_day(run)
+                episodes, recent_ns, _matters(run), self._is_day(run)
             )
         newest_ns = run.stretches.newest_ns
         if newest_ns is not None and write.stamp_ns <= newest_ns:
@@ -204,11 +196,8 @@ class Follower:
         spans = self._spans_of.get(write.run, ())
         return any(span.start_ns <= write.stamp_ns < span.end_ns for span in spans)
 
-    def _clock(self, at_ns: int) -> bool:
-        return self._day_of(None, at_ns)
-
     def _is_day(self, run: _Run) -> Callable[[int], bool]:
-        return lambda at_ns: self._day_of(run.days.is_day(at_ns), at_ns)
+        return lambda at_ns: self._criteria.day(run.days.is_day(at_ns), at_ns).is_day
 
     # --- telling -------------------------------------------------------------------------------
 

@@ -23,18 +23,13 @@ ValueT = TypeVar("ValueT")
 DayNumber = Callable[[int], int]
 
 
-def of_24_hours(at_ns: int) -> int:
-    """The days of a simulation, which has no dawn that a clock knows."""
-    return at_ns // DAY_NS
-
-
 @dataclass(slots=True)
 class TagDays:
     """A tag's days; `step` takes the readings of each sensor in the order of time."""
 
     sensors: Sensors
-    is_day: IsDay = lambda _: True
-    number: DayNumber = of_24_hours
+    is_day: IsDay
+    number: DayNumber
     # By quantity, its value of the last whole day, if that is known.
     values: dict[str, Reading] = field(default_factory=dict)
     _courses: dict[str, tuple[int, Course]] = field(default_factory=dict)

@@ -6,7 +6,6 @@ and since when each of its reasons holds.
 
 from __future__ import annotations
 
-import heapq
 import logging
 import math
 from collections import Counter
@@ -18,8 +17,8 @@ from typing import Final
 
 from lupin_bridge.judge.daylight import Day
 from lupin_bridge.judge.days import COUNTS_NS
-from lupin_bridge.judge.ranges import Sensors
-from lupin_bridge.judge.recent_scans import DayOf, Recent, RecentScans
+from lupin_bridge.judge.options import Criteria
+from lupin_bridge.judge.recent_scans import Recent, RecentScans
 from lupin_bridge.judge.scan_interval import (
     NO_PATROL,
     SHORTEST_NS,
@@ -82,9 +81,7 @@ def unjudged(snapshot: Snapshot) -> Judged:
 def judge_once(
     snapshot: Snapshot,
     writes: Iterable[PastWrite],
-    sensors: Sensors,
-    day_of: DayOf,
-    recent_s: float | None = None,
+    criteria: Criteria,
     *,
     days: Mapping[str, Sequence[Reading]] = MappingProxyType({}),
 ) -> Judged:
@@ -94,7 +91,7 @@ def judge_once(
 
     Nobody knows since when a reason holds: told is the observation that says so.
     """
-    judge = Judge(sensors, day_of, recent_s, max_at_once=math.inf)
+    judge = Judge(criteria, max_at_once=math.inf)
     judge.note_days(days)
     judge.learn(writes, snapshot)
     return judge.see(snapshot)
@@ -114,11 +111,10 @@ def _is_once(recent: Recent, recent_s: float | None) -> bool:
 class _Tag:
     state: TagState
     until_ns: int = _NEVER
-    due_ns: int = _NEVER
 
 
 class Judge:
-    """Belongs to one thread. `recent_s` fixes how long readings hold; None: it is learnt.
+    """Belongs to one thread.
 
     Where many are judged anew, it is so many at once as nobody has to wait for, and the others with
     the next snapshots. A tag that raises an error is unknown until it is judged again, and counted
@@ -130,22 +126,19 @@ class Judge:
 
     def __init__(
         self,
-        sensors: Sensors,
-        day_of: DayOf,
-        recent_s: float | None = None,
+        criteria: Criteria,
         *,
         max_at_once: float = MAX_AT_ONCE,
         knows_recent: bool = True,
     ) -> None:
-        self._sensors = sensors
+        self._criteria = criteria
         self._max_at_once = max_at_once
-        self._day_of = day_of
-        self._recent_s = recent_s
         self._tags: dict[str, _Tag] = {}
-        self._recent = RecentScans(day_of)
+        self._recent = RecentScans(criteria.day)
         self._holds: dict[str, int] = {}
         self._seen: tuple[TagState, ...] = ()
-        self._due: list[tuple[int, str]] = []
+        # Before that, what was said of each tag holds.
+        self._first_until_ns = _NEVER
         self._now_ns: int | None = None
         # The last time that was known: a simulation that is started anew stops its clock before.
         self._known_ns = 0
@@ -169,7 +162,7 @@ class Judge:
         if is_back:
             # What was before is no part of any interval.
             self._scans.forget()
-            self._recent = RecentScans(self._day_of)
+            self._recent = RecentScans(self._criteria.day)
             _, stamps_ns = self._recent.see(snapshot.tags)
             self._scans.heard(stamps_ns, now_ns)
         news, gone = self._news(snapshot)
@@ -195,7 +188,7 @@ class Judge:
         `first` is that snapshot, where it has not been seen.
         """
         tags = [kept.state for kept in self._tags.values()] if first is None else first.tags
-        self._recent = RecentScans.of(tags, writes, self._day_of)
+        self._recent = RecentScans.of(tags, writes, self._criteria.day)
         # With what is known already: of the last scan of each tag alone, no interval can be told.
         self._scans.forget()
         self._scans.heard(self._recent.stamps_ns(), self._now_ns if first is None else first.now_ns)
@@ -267,24 +260,11 @@ class Judge:
 
     def _grown_old(self, now_ns: int | None) -> dict[str, None]:
         """The tags of which something was true until now only."""
-        old: dict[str, None] = {}
-        while now_ns is not None and self._due and self._due[0][0] <= now_ns:
-            _, tag_id = heapq.heappop(self._due)
-            kept = self._tags.get(tag_id)
-            if kept is None:
-                continue
-            kept.due_ns = _NEVER
-            if kept.until_ns <= now_ns:
-                old[tag_id] = None
-            else:
-                self._remind(kept)
-        return old
-
-    def _remind(self, kept: _Tag) -> None:
-        """One entry a tag waits, never later than its time."""
-        if kept.until_ns < kept.due_ns:
-            kept.due_ns = kept.until_ns
-            heapq.heappush(self._due, (kept.due_ns, kept.state.tag_id))
+        if now_ns is None or now_ns < self._first_until_ns:
+            return {}
+        untils = [(kept.until_ns, tag_id) for tag_id, kept in self._tags.items()]
+        self._first_until_ns = min((it for it, _ in untils if it > now_ns), default=_NEVER)
+        return {tag_id: None for until_ns, tag_id in untils if until_ns <= now_ns}
 
     def _judge_safely(self, tag_id: str, now_ns: int | None) -> Health:
         try:
@@ -302,13 +282,13 @@ class Judge:
         kept = self._tags[tag_id]
         if now_ns is None:
             return _UNKNOWN
-        recent = self._recent.tag(tag_id)
-        holds = self._holds[tag_id] = _holds_ns(recent, self._recent_s)
-        (self._once.add if _is_once(recent, self._recent_s) else self._once.discard)(tag_id)
+        recent, recent_s = self._recent.tag(tag_id), self._criteria.recent_s
+        holds = self._holds[tag_id] = _holds_ns(recent, recent_s)
+        (self._once.add if _is_once(recent, recent_s) else self._once.discard)(tag_id)
         health = judge_tag(
             kept.state,
             now_ns,
-            self._sensors,
+            self._criteria.sensors,
             recent,
             holds_ns=holds,
             changed=self._changed.get(tag_id, NOTHING_CHANGED),
@@ -328,7 +308,7 @@ class Judge:
             ),
             default=_NEVER,
         )
-        self._remind(kept)
+        self._first_until_ns = min(self._first_until_ns, kept.until_ns)
         return _since(self._judged.tags.get(tag_id, _UNKNOWN), health)
 
     def _notify(

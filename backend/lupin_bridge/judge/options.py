@@ -12,7 +12,7 @@ from typing import Final
 from zoneinfo import ZoneInfo
 
 from lupin_bridge.judge.daylight import ClockDay, Day, judge_day
-from lupin_bridge.judge.days import of_24_hours
+from lupin_bridge.judge.derived import DAY_NS
 from lupin_bridge.judge.ranges import Sensors
 from lupin_bridge.settings import SettingError, Settings
 
@@ -60,7 +60,7 @@ class Criteria:
     def day_number(self, stamp_ns: int) -> int:
         """Which day it was by the clock, from dawn to dawn; a simulation's are of 24 hours."""
         now_s = unix_s(stamp_ns)
-        return of_24_hours(stamp_ns) if now_s is None else self.clock.number(now_s)
+        return stamp_ns // DAY_NS if now_s is None else self.clock.number(now_s)
 
 
 def own_sensors() -> Sensors:

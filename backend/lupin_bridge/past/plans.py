@@ -183,7 +183,7 @@ class Health(StateQuery):
         sensors = frozenset(by.sensors.judged_by_the_day)
         scans: tuple[PastWrite, ...] = find(ScansRequest(max(0, at_ns - SINCE_NS), at_ns, sensors))
         days = days_of(scans, by.sensors, by.is_day, by.day_number)
-        judged = judge_once(snapshot, recent, by.sensors, by.day, by.recent_s, days=days)
+        judged = judge_once(snapshot, recent, by, days=days)
         body = HealthJson().whole(judged)
         return plan_of(etag_of("health", (snapshot.stamp_ns, body.decode())), lambda _: body)
 

@@ -201,22 +201,9 @@ class _Fold:
 
     def _new(self, spans: Sequence[RunSpan]) -> Follower:
         by, end_ns = self._of.criteria, self._of.end_ns
-        cut = [
-            replace(it, end_ns=min(it.end_ns, end_ns)) for it in spans if it.start_ns < end_ns
-        ]  # what came later did not hold then
-
-        def is_day(light: bool | None, at_ns: int) -> bool:
-            return by.day(light, at_ns).is_day
-
-        return Follower(
-            by.sensors,
-            is_day,
-            cut,
-            by.recent_s,
-            day_number=by.day_number,
-            kept=2 * MAX_WRITES,
-            max_episodes=MAX_EPISODES,
-        )
+        # What came later did not hold then.
+        cut = [replace(it, end_ns=min(it.end_ns, end_ns)) for it in spans if it.start_ns < end_ns]
+        return Follower(by, cut, kept=2 * MAX_WRITES, max_episodes=MAX_EPISODES)
 
     def _count(self, write: PastWrite) -> None:
         if write.status != STATUS_OK:

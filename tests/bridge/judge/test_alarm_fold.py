@@ -12,8 +12,9 @@ from hypothesis import strategies as st
 from lupin_bridge.alarms.board import page_of
 from lupin_bridge.judge import alarm_fold, tag_log
 from lupin_bridge.judge.alarm_fold import Follower
+from lupin_bridge.judge.daylight import ClockDay, Day
 from lupin_bridge.judge.episodes import Alarm
-from lupin_bridge.judge.options import own_sensors
+from lupin_bridge.judge.options import Criteria, own_sensors
 from lupin_bridge.judge.verdict import Kind
 from lupin_twin.core.writes import PastWrite, RunSpan
 from tests.support.alarms_reference import Plain, S, alarms
@@ -26,8 +27,16 @@ START = 1_000 * S
 SCAN, LOOK = 0, 1
 
 
+class ShortDays(Criteria):
+    def day(self, light: bool | None, stamp_ns: int) -> Day:
+        return Day(stamp_ns % (20 * MINUTE) < 12 * MINUTE if light is None else light, "clock")
+
+
+BY = ShortDays(SENSORS, None, ClockDay(None))
+
+
 def day_of(light: bool | None, at_ns: int) -> bool:
-    return light if light is not None else at_ns % (20 * MINUTE) < 12 * MINUTE
+    return BY.day(light, at_ns).is_day
 
 
 VALUES = {
@@ -89,7 +98,7 @@ def follow(
     lots: Iterable[Sequence[PastWrite]], spans: Sequence[RunSpan], now_ns: int
 ) -> tuple[Alarm, ...]:
     """What a bridge does that is asked now and then."""
-    follower = Follower(SENSORS, day_of, spans)
+    follower = Follower(BY, spans)
     for lot in lots:
         follower.take(lot)
         follower.found(now_ns)
@@ -135,7 +144,7 @@ def test_what_is_old_is_forgotten_and_changes_nothing_of_what_is_told(seed: int)
     spans, now_ns = chance.choice(SPANS), heard[-1].stamp_ns + chance.randint(0, 300) * MINUTE
     expected = alarms(heard, spans, now_ns, SENSORS, day_of)
     # What there is no room for is kept as what it led to.
-    follower = Follower(SENSORS, day_of, spans, kept=chance.choice([3, 24, 300]))
+    follower = Follower(BY, spans, kept=chance.choice([3, 24, 300]))
     since_ns = 0
     while heard:
         # Late, but not as late as that.
@@ -155,7 +164,7 @@ def test_what_is_old_is_forgotten_and_changes_nothing_of_what_is_told(seed: int)
 
 
 def test_what_is_older_than_what_is_kept_is_not_taken_in_and_counted() -> None:
-    follower, heard = Follower(SENSORS, day_of, SPANS[0], kept=4), scans([22] * 9)
+    follower, heard = Follower(BY, SPANS[0], kept=4), scans([22] * 9)
     follower.take(heard[:5])
     follower.take(heard[5:])
     late = [replace(one, number=90 + one.number, stamp_ns=one.stamp_ns + S) for one in heard]
@@ -173,7 +182,7 @@ def test_what_is_older_than_what_is_kept_is_not_taken_in_and_counted() -> None:
 
 def test_nothing_grows_with_the_days() -> None:
     """A round a day, and a lamp that goes on and off: gaps, pauses and turns without end."""
-    follower = Follower(SENSORS, day_of, SPANS[0])
+    follower = Follower(BY, SPANS[0])
     for day in range(60):
         for at in (0, 1):
             light, number = (900.0, 0.0)[at], 2 * day + at
@@ -294,12 +303,12 @@ def test_in_a_pause_time_stands_from_its_first_moment_on(
     first = START + 40 * MINUTE
     again = replace(mine[0], number=99, stamp_ns=first)
     heard = [*mine, *other, again]
-    follower = Follower(SENSORS, day_of, SPANS[0], recent_s=holds_minutes * 60.0)
+    follower = Follower(replace(BY, recent_s=holds_minutes * 60.0), SPANS[0])
     follower.take(heard)
     found = [one for one in follower.found(first).alarms if one.tag_id == "a"]
     assert [one.reason.kind for one in found] == ["old"] * is_overdue
     # Another tag ends the pause: from then on time passes.
-    follower = Follower(SENSORS, day_of, SPANS[0], recent_s=600.0)
+    follower = Follower(replace(BY, recent_s=600.0), SPANS[0])
     follower.take([*mine, *other, *(replace(again, number=99 + n, tag_id="b", stamp_ns=first + n)
                                     for n in (0, 1))])  # fmt: skip
     (late,) = (one for one in follower.found(first + 1).alarms if one.tag_id == "a")
@@ -318,7 +327,7 @@ def test_a_tag_that_is_passed_by_is_overdue_until_it_is_scanned() -> None:
 
 
 def test_it_says_when_it_will_be_another_by_itself() -> None:
-    follower = Follower(SENSORS, day_of, SPANS[0])
+    follower = Follower(BY, SPANS[0])
     heard = scans([22, 22])
     follower.take(heard)
     last_ns = heard[-1].stamp_ns
@@ -329,7 +338,7 @@ def test_it_says_when_it_will_be_another_by_itself() -> None:
 
 
 def test_what_stays_as_it_is_is_the_very_same() -> None:
-    follower = Follower(SENSORS, day_of, SPANS[0])
+    follower = Follower(BY, SPANS[0])
     heard = scans([17, 17, 16, 22, 22])
     follower.take(heard[:2])
     now_ns = heard[-1].stamp_ns

@@ -9,10 +9,11 @@ from itertools import count
 import pytest
 
 from lupin_bridge.judge.alarm_fold import Follower
+from lupin_bridge.judge.daylight import ClockDay, Day
 from lupin_bridge.judge.days import COUNTS_NS, SINCE_NS, days_of
 from lupin_bridge.judge.derived import DAILY, DAY_NS
 from lupin_bridge.judge.episodes import Alarm
-from lupin_bridge.judge.options import own_sensors
+from lupin_bridge.judge.options import Criteria, own_sensors
 from lupin_bridge.judge.verdict import Verdict
 from lupin_twin.core.state import Reading
 from lupin_twin.core.writes import PastWrite, RunSpan
@@ -28,8 +29,12 @@ def is_day(at_ns: int) -> bool:
     return DAWN <= at_ns / HOUR % 24 < DUSK
 
 
-def day_of(light: bool | None, at_ns: int) -> bool:
-    return is_day(at_ns) if light is None else light
+class DawnToDusk(Criteria):
+    def day(self, light: bool | None, stamp_ns: int) -> Day:
+        return Day(is_day(stamp_ns) if light is None else light, "clock")
+
+    def day_number(self, stamp_ns: int) -> int:
+        return day_number(stamp_ns)
 
 
 def scans(
@@ -51,7 +56,7 @@ def day_number(at_ns: int) -> int:
 
 
 def new_follower() -> Follower:
-    return Follower(own_sensors(), day_of, SPANS, day_number=day_number)
+    return Follower(DawnToDusk(own_sensors(), None, ClockDay(None)), SPANS)
 
 
 def found(heard: Iterable[PastWrite]) -> list[Alarm]:
@@ -139,7 +144,7 @@ def test_a_sensor_that_reads_the_quantity_goes_first() -> None:
 
 
 def test_without_a_clock_a_day_is_24_hours_of_ros_time() -> None:
-    follower = Follower(own_sensors(), lambda _, __: True, SPANS)
+    follower = Follower(Criteria(own_sensors(), None, ClockDay(None)), SPANS)
     follower.take(scans({"temperature": [14.0] * 3}, first_h=DAWN + 5))
     [cold] = [one for one in follower.found(40 * DAY_NS).alarms if one.reason.sensor in DAILY]
     assert (cold.reason.sensor, cold.raised_at_ns) == (MEAN, 2 * DAY_NS)

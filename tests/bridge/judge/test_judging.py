@@ -22,7 +22,7 @@ from lupin_twin.core.state import (
     sure_species,
 )
 from lupin_twin.core.writes import PastWrite, recent_of
-from tests.support.seen import by_light
+from tests.support.seen import BY_LIGHT
 
 SENSORS = parse(files("lupin_bridge").joinpath("sensors.json").read_text(encoding="utf-8"))
 S = 1_000_000_000
@@ -51,7 +51,7 @@ COLD = tag("b", START, temperature=6.0)
 
 
 def test_nothing_that_stays_is_told_again() -> None:
-    judge = Judge(SENSORS, by_light)
+    judge = Judge(BY_LIGHT)
     first = judge.see(snapshot(START, GOOD, COLD))
     assert first.changed == {"a", "b"}
     assert first.house.verdict is Verdict.CRITICAL
@@ -59,7 +59,7 @@ def test_nothing_that_stays_is_told_again() -> None:
 
 
 def test_only_who_has_changed_is_told() -> None:
-    judge = Judge(SENSORS, by_light)
+    judge = Judge(BY_LIGHT)
     judge.see(snapshot(START, GOOD, COLD))
     warm = tag("b", START + MINUTE, temperature=20.0)
     then = judge.see(snapshot(START + MINUTE, GOOD, warm))
@@ -68,7 +68,7 @@ def test_only_who_has_changed_is_told() -> None:
 
 
 def test_time_alone_makes_readings_old() -> None:
-    judge = Judge(SENSORS, by_light)
+    judge = Judge(BY_LIGHT)
     judge.learn([scan("a", START - MINUTE, temperature=22.0)])
     judge.see(snapshot(START - MINUTE, tag("a", START - MINUTE, temperature=22.0)))
     judge.see(snapshot(START, GOOD))
@@ -80,7 +80,7 @@ def test_time_alone_makes_readings_old() -> None:
 
 
 def test_scanned_once_a_tag_has_a_day_as_it_has_for_alarms() -> None:
-    judge, day = Judge(SENSORS, by_light), 24 * 60 * MINUTE
+    judge, day = Judge(BY_LIGHT), 24 * 60 * MINUTE
     judge.see(snapshot(START, GOOD))
     assert judge.see(snapshot(START + day, GOOD)).tags["a"].verdict is Verdict.HEALTHY
     assert judge.see(snapshot(START + day + 1, GOOD)).tags["a"].verdict is Verdict.UNKNOWN
@@ -91,7 +91,7 @@ def test_a_value_that_wobbles_about_a_limit_flaps_at_no_scan() -> None:
 
     The limit stays the configured one; beside it stands what ends it.
     """
-    judge = Judge(SENSORS, by_light)
+    judge = Judge(BY_LIGHT)
     found = []
     for number, value in enumerate((25.9, 26.1, 25.9, 26.1, 25.61, 25.6, 25.9, 35.1, 34.9, 34.5)):
         at_ns = START + number * MINUTE
@@ -113,7 +113,7 @@ def test_a_value_that_wobbles_about_a_limit_flaps_at_no_scan() -> None:
 
 
 def test_what_was_out_of_its_range_nine_scans_ago_is_forgotten() -> None:
-    judge, found = Judge(SENSORS, by_light), []
+    judge, found = Judge(BY_LIGHT), []
     for number in range(10):
         at_ns, value = START + number * MINUTE, 25.9 if number else 26.1
         health = judge.see(snapshot(at_ns, tag("a", at_ns, temperature=value))).tags["a"]
@@ -122,7 +122,7 @@ def test_what_was_out_of_its_range_nine_scans_ago_is_forgotten() -> None:
 
 
 def test_the_patrols_rhythm_says_how_long_readings_hold() -> None:
-    judge = Judge(SENSORS, by_light)
+    judge = Judge(BY_LIGHT)
     for round_ in range(3):
         at_ns = START + round_ * 60 * MINUTE
         judge.see(snapshot(at_ns, tag("a", at_ns, temperature=22.0)))
@@ -138,7 +138,7 @@ def scan(tag_id: str, at_ns: int, **values: float) -> PastWrite:
 
 
 def test_what_was_scanned_before_makes_a_rhythm_too() -> None:
-    judge = Judge(SENSORS, by_light)
+    judge = Judge(BY_LIGHT)
     old = tag("a", START, temperature=22.0)
     hours = 3600 * S
     before = [scan(name, START - back * hours, temperature=9.0) for name in ("a", "gone")
@@ -150,7 +150,7 @@ def test_what_was_scanned_before_makes_a_rhythm_too() -> None:
 
 
 def test_after_a_restart_the_patrol_has_the_interval_that_it_had_before() -> None:
-    judge, now_ns = Judge(SENSORS, by_light), START + 3 * MINUTE
+    judge, now_ns = Judge(BY_LIGHT), START + 3 * MINUTE
     judge.see(snapshot(now_ns, tag("a", START + 2 * MINUTE, temperature=22.0)))
     judge.learn(scan("a", START + at * MINUTE, temperature=22.0) for at in range(3))
     patrol = judge.see(snapshot(now_ns, tag("a", START + 2 * MINUTE, temperature=22.0))).patrol
@@ -160,7 +160,7 @@ def test_after_a_restart_the_patrol_has_the_interval_that_it_had_before() -> Non
 def test_a_sensor_that_scans_leave_out_is_no_part_of_the_rhythm() -> None:
     dead = Reading("light", 900.0, START)
     scans = [START + round_ * 10 * MINUTE for round_ in range(40)]
-    judge, late = Judge(SENSORS, by_light), Judge(SENSORS, by_light)
+    judge, late = Judge(BY_LIGHT), Judge(BY_LIGHT)
     held = set()
     for at_ns in scans:
         now = replace(GOOD, readings=(dead, Reading("temperature", 22.0, at_ns)))
@@ -175,13 +175,13 @@ def test_a_sensor_that_scans_leave_out_is_no_part_of_the_rhythm() -> None:
 
 
 def test_a_fixed_limit_goes_before_the_rhythm() -> None:
-    judge = Judge(SENSORS, by_light, recent_s=30.0)
+    judge = Judge(replace(BY_LIGHT, recent_s=30.0))
     assert judge.see(snapshot(START + 30 * S, GOOD)).tags["a"].verdict == "healthy"
     assert judge.see(snapshot(START + 31 * S, GOOD)).tags["a"].verdict == "unknown"
 
 
 def test_a_reading_is_judged_by_the_day_and_the_plants_of_its_own_time() -> None:
-    judge = Judge(SENSORS, by_light)
+    judge = Judge(BY_LIGHT)
     warm, light = tag("a", START, temperature=25.0), tag("b", START, light=900.0)
     by_day = judge.see(snapshot(START, warm, light))
     assert (by_day.tags["a"].verdict, by_day.day) == (Verdict.HEALTHY, Day(True, "light"))
@@ -211,7 +211,7 @@ def told(health: Health) -> list[tuple[str, float | None, float | None]]:
 
 
 def test_a_reason_that_lasts_keeps_its_beginning() -> None:
-    judge = Judge(SENSORS, by_light)
+    judge = Judge(BY_LIGHT)
     judge.see(snapshot(START, COLD))
     still = tag("b", START + MINUTE, temperature=6.5)
     (reason,) = judge.see(snapshot(START + MINUTE, still)).tags["b"].reasons
@@ -219,7 +219,7 @@ def test_a_reason_that_lasts_keeps_its_beginning() -> None:
 
 
 def test_silence_makes_the_house_unknown_and_leaves_the_tags() -> None:
-    judged = Judge(SENSORS, by_light).see(snapshot(START, GOOD))
+    judged = Judge(BY_LIGHT).see(snapshot(START, GOOD))
     assert judged.house.verdict is Verdict.HEALTHY
     silent = silenced(judged)
     assert silent.house.verdict is Verdict.UNKNOWN
@@ -236,7 +236,7 @@ def test_as_of_a_moment_a_tag_that_cannot_be_judged_is_unknown_and_the_others_ar
         return judge_tag(state, *args, **more)
 
     monkeypatch.setattr("lupin_bridge.judge.judging.judge_tag", fail_at_b)
-    judged = judge_once(snapshot(START, GOOD, COLD), (), SENSORS, by_light)
+    judged = judge_once(snapshot(START, GOOD, COLD), (), BY_LIGHT)
     assert {tag_id: health.verdict for tag_id, health in judged.tags.items()} == {
         "a": "healthy",
         "b": "unknown",
@@ -245,7 +245,7 @@ def test_as_of_a_moment_a_tag_that_cannot_be_judged_is_unknown_and_the_others_ar
 
 
 def test_without_a_clock_nothing_is_known() -> None:
-    judge = Judge(SENSORS, by_light)
+    judge = Judge(BY_LIGHT)
     judge.see(snapshot(START, GOOD))
     stopped = judge.see(replace(snapshot(START, GOOD), clock="stopped"))
     assert (stopped.house.verdict, stopped.tags["a"].verdict) == ("unknown", "unknown")
@@ -254,12 +254,12 @@ def test_without_a_clock_nothing_is_known() -> None:
 
 
 def test_what_the_house_is_doing_is_told_beside_its_verdict() -> None:
-    judge = Judge(SENSORS, by_light, recent_s=600.0)
+    judge = Judge(replace(BY_LIGHT, recent_s=600.0))
     tags = [tag(str(i), START + i * 40 * S, temperature=22.0) for i in range(4)]
     judged = judge.see(snapshot(START + 120 * S, *tags))
     assert judged.patrol == Patrol(40 * S, START + 120 * S, 0)
     assert (
-        judge_once(snapshot(START + 120 * S, *tags), (), SENSORS, by_light, 600.0).patrol
+        judge_once(snapshot(START + 120 * S, *tags), (), replace(BY_LIGHT, recent_s=600.0)).patrol
         == judged.patrol
     )
     # Nobody is scanned any more: the last one stays, and all grow old.
@@ -275,7 +275,7 @@ def test_what_the_house_is_doing_is_told_beside_its_verdict() -> None:
 
 
 def test_a_tag_that_is_gone_is_told_as_changed_and_forgotten() -> None:
-    judge = Judge(SENSORS, by_light)
+    judge = Judge(BY_LIGHT)
     judge.see(snapshot(START, GOOD, COLD))
     gone = judge.see(snapshot(START + S, GOOD))
     assert gone.changed == {"b"}
@@ -298,7 +298,7 @@ def test_judging_bit_by_bit_is_judging_all_of_it_by_the_log(
     events: list[tuple[str, dict[str, float], Flower | None, int]],
 ) -> None:
     """Live, as of a moment, and after a restart: the same."""
-    judge, store, log = Judge(SENSORS, by_light), TwinStore(), list[PastWrite]()
+    judge, store, log = Judge(BY_LIGHT), TwinStore(), list[PastWrite]()
     now_ns = START
     for number, (tag_id, values, flower, step_s) in enumerate(events):
         now_ns += step_s * S
@@ -312,8 +312,8 @@ def test_judging_bit_by_bit_is_judging_all_of_it_by_the_log(
             log.append(replace(scan(tag_id, now_ns, **values), number=number))
         then = store.snapshot(now_ns, "map")
         live, recent = judge.see(then), recent_of(log, now_ns)
-        past = judge_once(then, recent, SENSORS, by_light)
-        started = Judge(SENSORS, by_light)
+        past = judge_once(then, recent, BY_LIGHT)
+        started = Judge(BY_LIGHT)
         started.see(then)
         started.learn(recent)
         for other in (past, started.see(then)):
@@ -325,7 +325,7 @@ def test_judging_bit_by_bit_is_judging_all_of_it_by_the_log(
 
 @pytest.mark.parametrize("stops", [False, True])
 def test_a_clock_that_goes_back_begins_anew(stops: bool) -> None:
-    judge = Judge(SENSORS, by_light)
+    judge = Judge(BY_LIGHT)
     for minute in (0, 30, 60):
         at_ns = START + minute * MINUTE
         judge.see(snapshot(at_ns, tag("a", at_ns, temperature=22.0)))
@@ -342,7 +342,7 @@ def test_a_clock_that_goes_back_begins_anew(stops: bool) -> None:
 def test_what_is_judged_at_once_is_bounded_by_readings() -> None:
     """A tag of sixty sensors takes as long as ten of five."""
     many = {f"s{number}": 1.0 for number in range(59)}
-    judge = Judge(SENSORS, by_light)
+    judge = Judge(BY_LIGHT)
     house = [tag(str(number), START, **many) for number in range(150)]
     told = judge.see(snapshot(START, *house))
     assert len(told.tags) == MAX_AT_ONCE // 60
@@ -351,7 +351,7 @@ def test_what_is_judged_at_once_is_bounded_by_readings() -> None:
 
 
 def test_a_sensor_that_has_changed_is_a_reason_until_it_has_come_back() -> None:
-    judge = Judge(SENSORS, by_light)
+    judge = Judge(BY_LIGHT)
     before = judge.see(snapshot(START, GOOD, COLD))
     judge.note_changed({"a": {"temperature": START - S, "light": 1}, "gone": {"co2": 2}})
     judged = judge.see(snapshot(START + S, GOOD, COLD))
@@ -368,13 +368,13 @@ def test_a_sensor_that_has_changed_is_a_reason_until_it_has_come_back() -> None:
 def test_a_tag_is_also_judged_by_the_day_before_for_thirty_hours() -> None:
     day = Reading("temperature_24h_mean", 11.0, START)
     cold = Reason(Kind.RANGE, Verdict.CRITICAL, day.name, 11.0, 12.0, START)
-    judge = Judge(SENSORS, by_light)
+    judge = Judge(BY_LIGHT)
 
     def kinds(after_ns: int, **days: tuple[Reading, ...]) -> list[Kind]:
         judge.note_days(days)
         now = snapshot(START + after_ns, GOOD)
         live = judge.see(now).tags["a"]
-        assert live == judge_once(now, (), SENSORS, by_light, days=days).tags["a"]
+        assert live == judge_once(now, (), BY_LIGHT, days=days).tags["a"]
         assert cold in live.reasons or Kind.RANGE not in {one.kind for one in live.reasons}
         return [one.kind for one in live.reasons]
 
@@ -389,13 +389,13 @@ def test_a_tag_is_also_judged_by_the_day_before_for_thirty_hours() -> None:
 
 
 def test_a_first_round_that_stops_is_not_healthy_for_a_day() -> None:
-    judge = Judge(SENSORS, by_light)
+    judge = Judge(BY_LIGHT)
     house = tuple(tag(name, START + n * MINUTE, temperature=22.0) for n, name in enumerate("abc"))
     last_ns = START + 2 * MINUTE
 
     def reasons(now_ns: int, *tags: TagState) -> tuple[Verdict, list[tuple[Kind, int | None]]]:
         live = judge.see(snapshot(now_ns, *tags))
-        once = judge_once(snapshot(now_ns, *tags), writes_of(*house, *tags), SENSORS, by_light)
+        once = judge_once(snapshot(now_ns, *tags), writes_of(*house, *tags), BY_LIGHT)
         assert live.house == once.house
         return live.house.verdict, [(one.kind, one.since_ns) for one in live.house.reasons]
 

@@ -110,7 +110,7 @@ def criteria() -> Criteria:
 
 
 def judged(state: dict[str, Any]) -> Judged:
-    store, judge = TwinStore(), Judge(SENSORS, criteria().day)
+    store, judge = TwinStore(), Judge(criteria())
     for at_ns, _, write in writes_of(state):
         if isinstance(write, Scan):
             store.record(write)

@@ -191,7 +191,7 @@ def test_the_widest_and_the_narrowest_ranges_are_judged_by(ideal: list[float]) -
     sensor = {**GOOD["sensors"]["temperature"], "ideal": ideal, "critical": None}
     sensors = parse(text_with("sensors/temperature", sensor))
     assert sensors.named("temperature").day.ideal == Span(*ideal)
-    episodes = TagEpisodes("a", 0, sensors, TagDays(sensors))
+    episodes = TagEpisodes("a", 0, sensors, TagDays(sensors, lambda _: True, int))
     for at, value in enumerate([-1e300, -1e300, 0.0, 1e308, 1e308, ideal[0], ideal[1], 0.0]):
         scan = PastWrite(at, 1, "a", at, 0, 0, ("temperature",), (value,))
         episodes.step([scan], lambda _: True)

@@ -1,5 +1,5 @@
 from lupin_bridge.judge.days import TagDays
-from lupin_bridge.judge.derived import IsDay
+from lupin_bridge.judge.derived import DAY_NS, IsDay
 from lupin_bridge.judge.episodes import TagEpisodes
 from lupin_bridge.judge.options import own_sensors
 from lupin_bridge.judge.tag_log import MARK, TagPast, is_long
@@ -9,7 +9,9 @@ S = 10**9
 
 
 def tag(recent_ns: int | None = None, is_day: IsDay = lambda _: True) -> TagPast:
-    episodes = TagEpisodes("a", 0, own_sensors(), TagDays(own_sensors()))
+    episodes = TagEpisodes(
+        "a", 0, own_sensors(), TagDays(own_sensors(), lambda _: True, lambda at_ns: at_ns // DAY_NS)
+    )
     return TagPast(episodes, recent_ns, lambda start, end, _: is_long(start, end), is_day)
 
 

@@ -11,12 +11,11 @@ from websockets.frames import Frame, Opcode
 from websockets.streams import StreamReader
 
 from lupin_bridge.judge.judging import Judge
-from lupin_bridge.judge.options import own_sensors
 from lupin_bridge.serving.ws_protocol import BINARY, frame_head
 from lupin_bridge.stream import schema
 from lupin_bridge.stream.frames import FrameWriter, StateFrame, text_frame
 from lupin_twin.core.state import Attempt, Pose, Reading, Snapshot, TagState
-from tests.support.seen import by_light
+from tests.support.seen import BY_LIGHT
 
 
 def received(wire: bytes) -> Frame:
@@ -191,7 +190,7 @@ def house() -> Snapshot:
 
 def test_a_frame_of_a_house_is_within_its_budget_of_bytes() -> None:
     scanned = house()
-    judged = Judge(own_sensors(), by_light, recent_s=3600.0).see(scanned)
+    judged = Judge(replace(BY_LIGHT, recent_s=3600.0)).see(scanned)
     verdicts = Counter(health.verdict for health in judged.tags.values())
     assert verdicts == {"healthy": 27, "critical": 3}
     frame = FrameWriter().state(scanned, "0123456789abcdef-1234-5", judged)

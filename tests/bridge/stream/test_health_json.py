@@ -11,7 +11,7 @@ from lupin_bridge.judge.options import own_sensors
 from lupin_bridge.stream import schema
 from lupin_bridge.stream.health_json import HealthJson
 from lupin_twin.core.state import Reading, Snapshot, TagState
-from tests.support.seen import by_light
+from tests.support.seen import BY_LIGHT
 
 SENSORS = own_sensors()
 START = 1_000_000_000_000
@@ -26,7 +26,7 @@ def tag(tag_id: str, value: float, at_ns: int = START) -> TagState:
 
 
 def test_it_is_of_the_contracts_type_to_the_last_field() -> None:
-    judged = see(Judge(SENSORS, by_light), START, [tag("a", 6.0), tag('"b"', 22.0)])
+    judged = see(Judge(BY_LIGHT), START, [tag("a", 6.0), tag('"b"', 22.0)])
     text = HealthJson().whole(judged)
     body = schema.Judgement.model_validate_json(text, strict=True)
     assert (body.house.verdict, body.house.day.source) == ("critical", "assumed")
@@ -52,7 +52,7 @@ def test_it_is_of_the_contracts_type_to_the_last_field() -> None:
 
 def test_what_only_the_deadband_holds_names_its_limit_and_what_ends_it() -> None:
     """From 18 to 26 °C the deadband is 0.4."""
-    judge = Judge(SENSORS, by_light)
+    judge = Judge(BY_LIGHT)
     see(judge, START, [tag("a", 17.9)])
     text = HealthJson().whole(see(judge, START + 1, [tag("a", 18.1, START + 1)]))
     (reason,) = schema.Judgement.model_validate_json(text, strict=True).tags["a"].reasons
@@ -60,7 +60,7 @@ def test_what_only_the_deadband_holds_names_its_limit_and_what_ends_it() -> None
 
 
 def test_of_a_silent_house_it_says_so() -> None:
-    judged = silenced(see(Judge(SENSORS, by_light), START, [tag("a", 22.0)]))
+    judged = silenced(see(Judge(BY_LIGHT), START, [tag("a", 22.0)]))
     body = schema.Judgement.model_validate_json(HealthJson().whole(judged), strict=True)
     assert (body.house.verdict, body.house.reasons[0].kind) == ("unknown", "silent")
     assert body.tags["a"].verdict == "healthy"
@@ -78,7 +78,7 @@ STEPS = st.lists(st.dictionaries(st.sampled_from("abc"), st.sampled_from([6.0, 1
 def test_whole_and_deltas_together_are_always_what_was_judged(
     steps: list[dict[str, float]], skipped: set[int]
 ) -> None:
-    writer, judge = HealthJson(), Judge(SENSORS, by_light)
+    writer, judge = HealthJson(), Judge(BY_LIGHT)
     told, shown = NOTHING_JUDGED, json.loads(writer.whole(NOTHING_JUDGED))["tags"]
     kept: dict[str, TagState] = {}
     for number, values in enumerate(steps):
@@ -100,7 +100,7 @@ def test_whole_and_deltas_together_are_always_what_was_judged(
 
 
 def test_a_delta_holds_only_what_is_another() -> None:
-    writer, judge = HealthJson(), Judge(SENSORS, by_light)
+    writer, judge = HealthJson(), Judge(BY_LIGHT)
     calm = tag("a", 22.0)
     before = see(judge, START, [calm, tag("b", 22.0)])
     now = see(judge, START + 1, [calm, tag("b", 6.0, START + 1)])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import time
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Final, Generic, TypeVar
 
@@ -20,12 +21,14 @@ from lupin_bridge.feed.relay import Relay, RosTime, Sample, Topic, TwinNames
 from lupin_bridge.feed.robot import Robot
 from lupin_bridge.feed.robot_ros import RobotTopics
 from lupin_bridge.feed.ros_thread import BridgedNode, RosThread
-from lupin_bridge.feed.source import TwinSource
+from lupin_bridge.feed.source import TwinSource, TwinUpdate
 from lupin_twin.adapt.messages import observation
 from lupin_twin.adapt.scans import BuiltScan
 from lupin_twin.core import interfaces
 from lupin_twin.core.drops import Drop
+from lupin_twin.core.state import NANOSECONDS_PER_SECOND
 from lupin_twin.field.engine import FieldRules
+from lupin_twin.field.explored import OccupancyMap
 from lupin_twin.ros import message_limits
 from lupin_twin.ros.base_node import latched, qos_of, read_message
 from lupin_twin.runtime.workers import Workers
@@ -121,13 +124,15 @@ def names_of(node: Any) -> TwinNames:
 
 
 NodeT = TypeVar("NodeT", bound=BridgedNode)
-EventT = TypeVar("EventT")
+# Hands an update over to the loop.
+Post = Callable[[TwinUpdate], None]
 
 
-class RosSource(TwinSource, Generic[NodeT, EventT]):
-    """A source with a node; who extends it says which, and what its events are."""
+class RosSource(TwinSource, Generic[NodeT]):
+    """A source with a node; who extends it says which. `update` is what that told last."""
 
-    thread: RosThread[NodeT, EventT]
+    thread: RosThread[NodeT, TwinUpdate]
+    update: TwinUpdate | None = None
 
     def __init__(self, *, ros_args: Sequence[str], timeout_s: float) -> None:
         self._ros_args = ros_args
@@ -140,16 +145,24 @@ class RosSource(TwinSource, Generic[NodeT, EventT]):
 
     async def _start_thread(
         self,
-        make_node: Callable[[Context, Callable[[EventT], None]], NodeT],
-        on_event: Callable[[EventT], None],
+        make_node: Callable[[Context, Post], NodeT],
+        on_state: Callable[[TwinUpdate], None],
         on_death: Callable[[], None],
     ) -> None:
+        def take(update: TwinUpdate) -> None:
+            before, self.update = self.update, update
+            if update.rules is not None:
+                self._rules = update.rules
+            # A map alone is no sign of life of the twin.
+            if before is None or update.made_s != before.made_s:
+                on_state(update)
+
         # Both of the ROS thread alone; the publisher is made at the first observation: most bridges
         # never publish any.
         self._robot_topics = RobotTopics()
         self._observations: Any = None
         self.thread = RosThread(
-            make_node, ros_args=self._ros_args, on_event=on_event, on_death=on_death
+            make_node, ros_args=self._ros_args, on_event=take, on_death=on_death
         )
         await self.thread.start()
         self._names, parameters = await self.thread.call(
@@ -177,6 +190,17 @@ class RosSource(TwinSource, Generic[NodeT, EventT]):
 
         await self._in_time(self.thread.call(publish))
 
+    def revision(self) -> str:
+        """As updated last; empty before anything was.
+
+        What a call brings from the ROS thread is never newer: what has changed is posted at once.
+        """
+        return "" if self.update is None else self.update.revision
+
+    def occupancy_map(self) -> OccupancyMap | None:
+        """The latest map that the node accepted."""
+        return None if self.update is None else self.update.occupancy_map
+
     async def robot(self, now_ns: int | None) -> Robot | None:
         """From the robot's own topics, the newest message of each."""
         return await self.thread.call(lambda node: self._robot_topics.look(node, now_ns))
@@ -188,3 +212,11 @@ class RosSource(TwinSource, Generic[NodeT, EventT]):
     def names(self) -> TwinNames:
         """The twin's, as ROS resolves and remaps them."""
         return self._names
+
+
+def now_ns_of(update: TwinUpdate) -> int:
+    """ROS time now: an update may be a heartbeat old."""
+    snapshot = update.snapshot
+    if snapshot.clock != "running":
+        return snapshot.stamp_ns
+    return snapshot.stamp_ns + int((time.monotonic() - update.made_s) * NANOSECONDS_PER_SECOND)

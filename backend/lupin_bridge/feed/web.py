@@ -8,25 +8,21 @@ import math
 import os
 import time
 from collections.abc import Awaitable, Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any, Final
 
 from lupin_bridge.feed.followed_log import FollowedLog
 from lupin_bridge.feed.query import Now
-from lupin_bridge.feed.ros_source import RosSource
+from lupin_bridge.feed.ros_source import Post, RosSource, now_ns_of
 from lupin_bridge.feed.shared_work import Periodic
-from lupin_bridge.feed.source import (
-    TwinUnavailableError,
-    TwinUpdate,
-)
+from lupin_bridge.feed.source import TwinUnavailableError, TwinUpdate
 from lupin_bridge.feed.web_node import Service, WebNode
 from lupin_twin.core.journal_condition import UNKNOWN, Condition
 from lupin_twin.core.past import NotRemembered, lasts, may_pass
-from lupin_twin.core.state import NANOSECONDS_PER_SECOND, Snapshot
-from lupin_twin.field.engine import FieldRefused, FieldRules
-from lupin_twin.field.explored import OccupancyMap
+from lupin_twin.core.state import Snapshot
+from lupin_twin.field.engine import FieldRefused
 from lupin_twin.journal.beside import journal_path
 from lupin_twin.journal.follow import Lot
 from lupin_twin.ros import convert_field, convert_past
@@ -48,20 +44,7 @@ _REJOIN_AGAIN_S: Final = 300.0
 _READ_TAG_S: Final = 20e-6
 
 
-@dataclass(frozen=True, slots=True)
-class _Received:
-    """All that crosses to the loop: the newest update, and what holds now.
-
-    `revision`, the map and the rules are newer than `update` where a map has come since.
-    """
-
-    update: TwinUpdate | None = None
-    revision: str = ""
-    occupancy_map: OccupancyMap | None = None
-    rules: FieldRules | None = None
-
-
-class WebTwin(RosSource[WebNode, _Received]):
+class WebTwin(RosSource[WebNode]):
     """`TwinSource` over the ROS contracts of a twin in another process.
 
     One that was received, and then for `stale_after_s` no more, is asked nothing; after
@@ -84,9 +67,9 @@ class WebTwin(RosSource[WebNode, _Received]):
         self.rejoin_after_s = rejoin_after_s
         self._rejoining = Periodic(self._rejoin_if_lost, _LOOK_S, "the look for a lost twin")
         self._join: Callable[[], Awaitable[None]]
-        self._lost: TwinUpdate | None = None
+        # When the update was made that nothing follows.
+        self._lost_s = 0.0
         self._rejoin_at_s = 0.0
-        self._received = _Received()
         self._node: WebNode | None = None
         self._frame_id: str
         self._log = FollowedLog(self._rows_behind, self.workers, journal)
@@ -96,8 +79,8 @@ class WebTwin(RosSource[WebNode, _Received]):
     ) -> None:
         """Start the ROS thread with its node; see `TwinSource.start`."""
 
-        def make_node(context: Any, post: Callable[[_Received], None]) -> WebNode:
-            update = self._received.update
+        def make_node(context: Any, post: Post) -> WebNode:
+            update = self.update
 
             def pass_on(snapshot: Snapshot) -> None:
                 nonlocal update
@@ -110,31 +93,35 @@ class WebTwin(RosSource[WebNode, _Received]):
                     report.counts,
                     node.utilities.counts(),
                     journal=report.journal,
+                    rules=node.rules,
                     origin=report.origin,
                     input_problems=report.input_problems,
                 )
-                post_all()
+                post(update)
 
-            def post_all() -> None:
-                post(_Received(update, node.revision, node.occupancy_map, node.rules))
+            def renew() -> None:
+                nonlocal update
+                if update is not None:
+                    update = replace(
+                        update,
+                        revision=node.revision,
+                        occupancy_map=node.occupancy_map,
+                        rules=node.rules,
+                    )
+                    post(update)
 
-            node = WebNode(pass_on, post_all, context=context)
+            node = WebNode(pass_on, renew, context=context)
             # As `update`, it holds on in a node that is made anew.
             if self._node is not None:
                 node.take_over(self._node)
             self._node = node
             return node
 
-        def on_received(received: _Received) -> None:
-            before, self._received = self._received.update, received
-            if received.rules is not None:
-                self._rules = received.rules
-            # A map alone is no sign of life of the twin.
-            if received.update is not None and received.update is not before:
-                self._log.on_update(received.update.journal)
-                on_state(received.update)
+        def on_update(update: TwinUpdate) -> None:
+            self._log.on_update(update.journal)
+            on_state(update)
 
-        self._join = partial(self._start_thread, make_node, on_received, on_death)
+        self._join = partial(self._start_thread, make_node, on_update, on_death)
         await self._join()
         self._rejoining.start()
         self._frame_id, folder = await self.thread.call(
@@ -149,11 +136,11 @@ class WebTwin(RosSource[WebNode, _Received]):
         await super().stop()
 
     async def _rejoin_if_lost(self) -> None:
-        update = self._received.update
+        update = self.update
         if update is None:
             return
-        if update is not self._lost:
-            self._lost, self._rejoin_at_s = update, self.rejoin_after_s
+        if update.made_s != self._lost_s:
+            self._lost_s, self._rejoin_at_s = update.made_s, self.rejoin_after_s
         silent_s = time.monotonic() - update.made_s
         if silent_s < self._rejoin_at_s:
             return
@@ -166,18 +153,9 @@ class WebTwin(RosSource[WebNode, _Received]):
     def _silence(self, seconds: float) -> str:
         return f"nothing was received on {self._names.state_topic} for {seconds:g} s"
 
-    def revision(self) -> str:
-        """A digest of poses and readings, and the map's revision."""
-        return self._received.revision
-
     def journal(self) -> Condition:
         """The twin's, as far as it is read here; before that, what is said on `/diagnostics`."""
-        update = self._received.update
-        return self._log.condition or (UNKNOWN if update is None else update.journal)
-
-    def occupancy_map(self) -> OccupancyMap | None:
-        """The latest map."""
-        return self._received.occupancy_map
+        return self._log.condition or (UNKNOWN if self.update is None else self.update.journal)
 
     async def estimate_report(self, request: ReportRequest) -> Report:
         """What the twin's service says."""
@@ -194,9 +172,9 @@ class WebTwin(RosSource[WebNode, _Received]):
 
     async def now(self) -> Now:
         """What who looks back has to know of now, and where the log is."""
-        if self._received.update is not None:
+        if self.update is not None:
             await self._log.wait()
-        condition, update = self._log.condition, self._received.update
+        condition, update = self._log.condition, self.update
         if condition is None:
             raise TwinUnavailableError("the twin's journal is not known here yet")
         if update is None:  # it has been followed before, and its twin is not there
@@ -204,10 +182,7 @@ class WebTwin(RosSource[WebNode, _Received]):
             if now_ns > _A_DATE_NS:
                 now_ns = max(now_ns, time.time_ns())
             return Now(now_ns, self._frame_id, condition)
-        snapshot, now_ns = update.snapshot, update.snapshot.stamp_ns
-        if snapshot.clock == "running":
-            now_ns += int((time.monotonic() - update.made_s) * NANOSECONDS_PER_SECOND)
-        return Now(now_ns, snapshot.frame_id, condition)
+        return Now(now_ns_of(update), update.snapshot.frame_id, condition)
 
     async def _explain(self, error: NotRemembered) -> NotRemembered:
         return await self._log.explain(error)
@@ -224,7 +199,7 @@ class WebTwin(RosSource[WebNode, _Received]):
 
         """
         # DDS offers the services of a twin that was killed for another twenty seconds.
-        update = self._received.update
+        update = self.update
         if update is not None and time.monotonic() - update.made_s >= self._stale_after_s:
             raise TwinUnavailableError(
                 f"{self._silence(self._stale_after_s)}: is the twin running?"

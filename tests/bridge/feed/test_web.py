@@ -17,7 +17,7 @@ from rclpy.parameter import Parameter
 from lupin_bridge.feed import web
 from lupin_bridge.feed.relay import Sample, TwinNames, topics_of
 from lupin_bridge.feed.source import TwinTimeoutError, TwinUnavailableError, TwinUpdate
-from lupin_bridge.feed.web import WebTwin, _Received
+from lupin_bridge.feed.web import WebTwin
 from lupin_bridge.serving.admission import Limits
 from lupin_twin.adapt.scans import BuiltScan
 from lupin_twin.field.engine import FieldRefused
@@ -69,7 +69,8 @@ async def test_a_map_alone_is_another_revision_and_no_sign_of_life(domain: int) 
             peer.publish_map(occupancy_grid([[100, 0]]))
             await until(lambda: twin.revision() != revision, "another map")
             assert len(told) == before
-            assert twin._received.update is told[-1]
+            assert twin.update is not None
+            assert twin.update.snapshot is told[-1].snapshot
 
 
 async def test_without_a_twin_its_service_is_named(domain: int) -> None:
@@ -175,7 +176,7 @@ async def test_a_node_is_made_again_after_as_long_a_silence_again_and_five_minut
     twin._join, twin._names = join, TwinNames("/twin/state", NAME)
     for made_s in (None, 1_000.0, 3_000.0):
         if made_s is not None:
-            twin._received = _Received(SimpleNamespace(made_s=made_s))  # type: ignore[arg-type]
+            twin.update = SimpleNamespace(made_s=made_s)  # type: ignore[assignment]
         for second in range(1_000):
             now_s = (made_s or 0.0) + second
             await twin._rejoin_if_lost()

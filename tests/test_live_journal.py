@@ -56,10 +56,12 @@ async def told(live: Running, state: str, part: str = "") -> dict[str, Any]:
     """What /readyz says of the journal once that is so; the twin is live."""
 
     def look() -> bool:
-        journal = live.bridge.status.journal
+        journal = live.bridge.status.update.journal
         return journal.state == state and part in journal.detail
 
-    await until(look, f"a journal that is {state} ({part}), not {live.bridge.status.journal}")
+    await until(
+        look, f"a journal that is {state} ({part}), not {live.bridge.status.update.journal}"
+    )
     # A machine that stood still for seconds makes any twin silent, until its next state.
     answer = await until_answered(
         lambda: live.http.get("/readyz"), "the twin to be live", lambda it: it.status_code == 200

@@ -8,7 +8,6 @@ import math
 import time
 from collections import Counter
 from collections.abc import Callable, Hashable, Iterator
-from dataclasses import replace
 from typing import Final
 
 from lupin_bridge.alarms.board import AlarmBoard, Change
@@ -82,7 +81,7 @@ class Bridge:
         self.source = source
         self.site = settings.site
         self.limits = limits
-        self.liveness = Liveness(known=Status("never_seen", None, day_length_s=source.day_length_s))
+        self.liveness = Liveness(day_length_s=source.day_length_s)
         self.hub = Hub(settings.max_clients, limits.client_timeout_s, self.liveness.status)
         self.admission = admission or Admission(limits)
         self.cache = AnswerCache() if cache is None else cache
@@ -100,7 +99,7 @@ class Bridge:
         self._estimates = EstimateFollower(
             source,
             self.reports,
-            lambda: None if self._latest is None else self._latest.snapshot,
+            lambda: None if self.latest is None else self.latest.snapshot,
             self._judge.note_changed,
         )
         self.alarms = AlarmBoard()
@@ -124,7 +123,6 @@ class Bridge:
         self.alarms_raised = 0
         self.cached_state: Hashable = None
         self.state_number = 0
-        self._latest: TwinUpdate | None = None
         self._published: Status | None = None
         self._pushed: TwinUpdate | None = None
         self._pushed_s = 0.0
@@ -146,7 +144,7 @@ class Bridge:
         self._watch.start()
         self._publishing_alarms = asyncio.create_task(self._publish_alarms(), name="alarm frames")
         self.outward.start(self, self.criteria.sensors)
-        if self._latest is not None:  # there may be no second state: a silent site has one
+        if self.latest is not None:  # there may be no second state: a silent site has one
             self.notes.start()
         self._alarm_feed.start()
         self._estimates.start()
@@ -177,7 +175,7 @@ class Bridge:
     @property
     def latest(self) -> TwinUpdate | None:
         """The newest state, before any pacing; None while no twin was heard."""
-        return self._latest
+        return self.liveness.update
 
     @property
     def status(self) -> Status:
@@ -187,18 +185,17 @@ class Bridge:
     @property
     def origin(self) -> Origin:
         """Where observations come from, as the twin says."""
-        return self.liveness.known.origin
+        return self.status.update.origin
 
     @property
     def ros_time_ns(self) -> int | None:
         """ROS time now: the newest state's, and the time since it came; None: it is not known."""
-        if self._latest is None or self.liveness.last_state_s is None:
+        latest, silent_s = self.latest, self.liveness.silent_s(self._clock())
+        if latest is None or silent_s is None:
             return None
-        snapshot = self._latest.snapshot
-        if snapshot.clock != "running":  # paused: it stands
-            return snapshot.now_ns
-        since_s = self._clock() - self.liveness.last_state_s + self.liveness.silent_s
-        return self._latest.snapshot.stamp_ns + int(since_s * NANOSECONDS_PER_SECOND)
+        if latest.snapshot.clock != "running":  # paused: it stands
+            return latest.snapshot.now_ns
+        return latest.snapshot.stamp_ns + int(silent_s * NANOSECONDS_PER_SECOND)
 
     @property
     def judged(self) -> Judged:
@@ -211,17 +208,12 @@ class Bridge:
 
     def seen(self) -> GreenhouseState:
         """How the house is now, for who tells others of it."""
-        latest, status = self._latest, self.status
         return GreenhouseState(
-            snapshot=None if latest is None else latest.snapshot,
-            judged=self.judged,
-            board=self.alarms.now,
+            self.status,
+            self.judged,
+            self.alarms.now,
             holds_ns=self.readings_hold_ns(),
             now_ns=self.ros_time_ns,
-            is_live=status.is_live,
-            twin=status.reason,
-            message=status.message,
-            origin=status.origin,
         )
 
     def join(self, client: Client) -> None:
@@ -240,7 +232,7 @@ class Bridge:
 
     def _measure(self) -> Iterator[Sample]:
         hub, source, status = self.hub, self.source, self.status
-        latest = self._latest
+        latest = self.latest
         tags = () if latest is None else latest.snapshot.tags
         journal = source.journal()
         yield "lupin_clients", len(hub)
@@ -256,7 +248,7 @@ class Bridge:
         yield "lupin_ros_calls_waiting", source.thread.calls_waiting
         yield "lupin_ros_callback_errors", source.thread.callback_errors
         yield "lupin_twin_live", status.is_live
-        yield "lupin_twins", status.twin_count
+        yield "lupin_twins", status.update.twin_count
         yield (
             "lupin_state_age_seconds",
             math.inf if status.state_age_s is None else status.state_age_s,
@@ -300,21 +292,9 @@ class Bridge:
     # --- from the source ----------------------------------------------------------------------
 
     def _on_state(self, state: TwinUpdate) -> None:
-        self._latest = state
         self.state_number += 1
         now_s = self._clock()
-        self.liveness.last_state_s = now_s
-        self.liveness.silent_s = state.silent_s
-        self.liveness.clock = state.snapshot.clock
-        self.liveness.known = replace(
-            self.liveness.known,
-            twin_count=state.twin_count,
-            has_map=state.occupancy_map is not None,
-            drops=state.drops,
-            journal=state.journal,
-            origin=state.origin,
-            input_problems=state.input_problems,
-        )
+        self.liveness.update, self.liveness.updated_s = state, now_s
         self._alarm_feed.on_state(state)
         if self._push_timer is not None:
             return  # it will take this state along
@@ -345,7 +325,7 @@ class Bridge:
         )
 
     def _push(self) -> None:
-        state = self._latest
+        state = self.latest
         if state is None:
             return
         now_s = self._clock()
@@ -406,11 +386,12 @@ class Bridge:
     # --- the watch ----------------------------------------------------------------------------
 
     def _publish_status(self) -> None:
-        self.liveness.known = replace(self.liveness.known, outward=self.outward.status())
+        self.liveness.outward = self.outward.status()
         status = self.status
         if not status.is_news_after(self._published):
             return
-        is_good = (status.is_live and status.twin_count <= 1) or status.reason == "shutting_down"
+        is_one = status.is_live and status.update.twin_count <= 1
+        is_good = is_one or status.reason == "shutting_down"
         first = self._published is None
         if (first and not is_good) or (
             self._published and status.has_more_detail_than(self._published)
@@ -420,7 +401,7 @@ class Bridge:
             log.log(logging.INFO if is_good else logging.WARNING, "%s", message)
         self._published = status
         if status.reason not in ("never_seen", "shutting_down"):
-            last = self._latest
+            last = self.latest
             self._alarm_feed.on_silence(
                 is_silent=not status.is_live,
                 last_ns=None if last is None else last.snapshot.now_ns,

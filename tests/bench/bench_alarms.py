@@ -16,11 +16,13 @@ from random import Random
 
 from lupin_bridge.alarms.board import AlarmBoard, change_between, page_of
 from lupin_bridge.alarms.feed import LOT, REACH_COUNT
+from lupin_bridge.feed.source import TwinUpdate
 from lupin_bridge.judge.alarm_fold import Follower
 from lupin_bridge.judge.judging import Judge
 from lupin_bridge.judge.options import own_sensors
 from lupin_bridge.notify.messages import GreenhouseState, Topics
 from lupin_bridge.notify.mirror import Mirror
+from lupin_bridge.stream.status import Status
 from lupin_twin.core.state import Reading, Snapshot, TagState
 from lupin_twin.core.writes import PastWrite, RunSpan
 from tests.support.ordinary_day import DAY_NS, S, ordinary_days
@@ -160,9 +162,8 @@ def loop_of(tags: int) -> None:
         snapshot = Snapshot(now_ns + second * S, "map", house)
         start = time.process_time()
         judged = judge.see(snapshot)
-        seen = GreenhouseState(
-            snapshot, judged, board.now, judge.holds_ns(), snapshot.stamp_ns, is_live=True
-        )
+        status = Status("live", 0.0, TwinUpdate(snapshot, "r"))
+        seen = GreenhouseState(status, judged, board.now, judge.holds_ns(), snapshot.stamp_ns)
         mirror.see(seen)
         for _ in mirror.messages():
             pass

@@ -4,12 +4,14 @@ from collections.abc import Iterable, Mapping
 from dataclasses import replace
 
 from lupin_bridge.alarms.board import AlarmBoard, AlarmSource, Board, change_between, page_of
+from lupin_bridge.feed.source import TwinUpdate
 from lupin_bridge.judge.daylight import ClockDay, Day, judge_day
 from lupin_bridge.judge.episodes import Alarm, alarm_id
 from lupin_bridge.judge.judging import judge_once
 from lupin_bridge.judge.options import Criteria, own_sensors
 from lupin_bridge.judge.verdict import Kind, Reason, Verdict
 from lupin_bridge.notify.messages import GreenhouseState
+from lupin_bridge.stream.status import Status
 from lupin_twin.core.diagnostics import Origin
 from lupin_twin.core.state import Reading, Snapshot, TagState
 
@@ -50,15 +52,11 @@ def seen(
     )
     holds = dict.fromkeys((it.tag_id for it in tags), HOLDS_NS) | dict(holds_ns or {})
     return GreenhouseState(
-        snapshot=snapshot,
+        Status("live" if is_live else "stale", 0.0, TwinUpdate(snapshot, "r", origin=origin)),
         judged=judge_once(snapshot, (), replace(BY_LIGHT, recent_s=HOLDS_NS / 1e9)),
         board=Board(page_of(alarms), "heard", NOW_NS, 1),
         holds_ns=holds,
         now_ns=now_ns,
-        is_live=is_live,
-        twin="live" if is_live else "stale",
-        message="The twin is live." if is_live else "The twin has fallen silent.",
-        origin=origin,
     )
 
 

@@ -11,7 +11,7 @@ from typing import Any, TypeVar
 from lupin_bridge.feed.query import Now
 from lupin_bridge.feed.ros_source import Post, RosSource, now_ns_of
 from lupin_bridge.feed.source import TwinUpdate
-from lupin_twin.core.journal_condition import UNKNOWN, Condition
+from lupin_twin.core.journal_condition import Condition
 from lupin_twin.core.notes import Note
 from lupin_twin.core.parameters import World
 from lupin_twin.core.past import NotRemembered
@@ -36,6 +36,8 @@ class LocalTwin(RosSource[TwinNode]):
         self.day_length_s = world.day_length_s
         # A restarted server must never match an ETag of its predecessor, whose counts it repeats.
         self.identity = uuid.uuid4().hex[:12]
+        # The first comes before the start is over.
+        self.update: TwinUpdate
 
     async def start(
         self, on_state: Callable[[TwinUpdate], None], on_death: Callable[[], None]
@@ -67,7 +69,7 @@ class LocalTwin(RosSource[TwinNode]):
 
     def journal(self) -> Condition:
         """The node's journal."""
-        return UNKNOWN if self.update is None else self.update.journal
+        return self.update.journal
 
     async def estimate_report(self, request: ReportRequest) -> Report:
         """What the node makes of its log."""
@@ -85,7 +87,6 @@ class LocalTwin(RosSource[TwinNode]):
     async def now(self) -> Now:
         """What who looks back has to know of now."""
         update = self.update
-        assert update is not None  # the first comes before the start is over
         return Now(now_ns_of(update), update.snapshot.frame_id, update.journal)
 
     async def _explain(self, error: NotRemembered) -> NotRemembered:

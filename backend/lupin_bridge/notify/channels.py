@@ -15,7 +15,6 @@ from lupin_bridge.notify.mqtt import Mqtt
 from lupin_bridge.notify.push import Push
 from lupin_bridge.notify.source import Source
 from lupin_bridge.notify.webhook import Webhook
-from lupin_bridge.stream.status import Outward
 
 
 class DetachedThreads(ThreadPoolExecutor):
@@ -74,11 +73,9 @@ class Channels:
         """Stop all at once."""
         await asyncio.gather(*(it.stop() for it in (*self._reports, *self._running)))
 
-    def status(self) -> tuple[Outward, ...]:
-        """The condition of each, in a line."""
-        return tuple(
-            Outward(it.name, bool(it.condition.detail), it.condition.detail) for it in self._running
-        )
+    def status(self) -> Mapping[str, str]:
+        """What is wrong with each, in a line; empty: nothing."""
+        return {it.name: it.condition.detail for it in self._running}
 
     def counts(self) -> Iterator[tuple[str, Mapping[str, int]]]:
         """The same in numbers, by metric and channel."""

@@ -25,8 +25,9 @@ from lupin_bridge.judge.verdict import Health, Verdict
 from lupin_bridge.past.query import iso
 from lupin_bridge.stream.health_json import alarm_json, reason_json
 from lupin_bridge.stream.state_json import moment
+from lupin_bridge.stream.status import NEVER_SEEN, Status
 from lupin_twin.core.diagnostics import Origin
-from lupin_twin.core.state import Reading, Snapshot
+from lupin_twin.core.state import Reading, TagState
 
 MAX_PLAIN: Final = 64
 _PREFIX_OF_LONG: Final = 24
@@ -95,19 +96,24 @@ class GreenhouseState:
     """The greenhouse as the bridge knows it at one moment.
 
     `now_ns` is ROS time, None where it is not known; `holds_ns` is for how long each tag's readings
-    hold. `twin` is why the twin is live or not (`stream.status.Reason`), `message` says so.
-    `origin` is where what was observed comes from.
+    hold.
     """
 
-    snapshot: Snapshot | None = None
+    status: Status = NEVER_SEEN
     judged: Judged = NOTHING_JUDGED
     board: Board = field(default_factory=Board)
     holds_ns: Mapping[str, int] = field(default_factory=dict)
     now_ns: int | None = None
-    is_live: bool = False
-    twin: str = ""
-    message: str = ""
-    origin: Origin = "unknown"
+
+    @property
+    def tags(self) -> tuple[TagState, ...]:
+        """All of them; none, while no twin was heard."""
+        return self.status.update.snapshot.tags
+
+    @property
+    def origin(self) -> Origin:
+        """Where what was observed comes from."""
+        return self.status.update.origin
 
 
 def holds(reading: Reading, holds_ns: int, now_ns: int | None) -> bool:
@@ -148,10 +154,10 @@ def greenhouse_payload(judged: Judged) -> dict[str, Any]:
     return {**health_payload(judged.house), "day": day}
 
 
-def twin_payload(seen: GreenhouseState) -> dict[str, Any]:
+def twin_payload(status: Status) -> dict[str, Any]:
     """Whether the twin is live, and why not."""
-    state = "ON" if seen.is_live else "OFF"
-    return {"state": state, "reason": seen.twin, "message": seen.message}
+    state = "ON" if status.is_live else "OFF"
+    return {"state": state, "reason": status.reason, "message": status.message}
 
 
 def alarms_payload(count: int, worst: Iterable[Alarm], *, is_known: bool) -> dict[str, Any]:

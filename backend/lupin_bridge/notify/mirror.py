@@ -98,9 +98,8 @@ class Mirror:
         """Take the state of now; tags that have changed wait for their turn."""
         before, self._seen = self._seen, seen
         changed: dict[str, None] = {}
-        tags = () if seen.snapshot is None else seen.snapshot.tags
-        if before.snapshot is None or tags != before.snapshot.tags:
-            known, self._tags = self._tags, {tag.tag_id: tag for tag in tags}
+        if seen.tags != before.tags:
+            known, self._tags = self._tags, {tag.tag_id: tag for tag in seen.tags}
             changed |= dict.fromkeys(t for t, tag in self._tags.items() if known.get(t) is not tag)
             changed |= dict.fromkeys(known.keys() - self._tags.keys())
         old, new = before.judged.tags, seen.judged.tags
@@ -163,7 +162,7 @@ class Mirror:
     def _of_greenhouse(self, published: _Published) -> Iterator[tuple[str, dict[str, Any]]]:
         yield from self._announced(published, "house", lambda: greenhouse_configs(self._topics))
         seen, topics = self._seen, self._topics
-        yield self._with_origin(topics.twin, twin_payload(seen))
+        yield self._with_origin(topics.twin, twin_payload(seen.status))
         yield self._with_origin(topics.of(None, "health"), greenhouse_payload(seen.judged))
         page = seen.board.page
         yield self._with_origin(

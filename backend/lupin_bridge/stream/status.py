@@ -5,14 +5,14 @@ Pure: the time is an argument, seconds of a clock that never jumps.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from typing import Any, Literal
 
+from lupin_bridge.feed.source import TwinUpdate
 from lupin_bridge.stream.state_json import stamp
-from lupin_twin.core.diagnostics import Origin
-from lupin_twin.core.drops import Recent
-from lupin_twin.core.journal_condition import UNKNOWN, Condition, JournalState
-from lupin_twin.core.state import ClockState
+from lupin_twin.core.journal_condition import Condition, JournalState
+from lupin_twin.core.state import ClockState, Snapshot
 
 # The twin publishes at least once a second (parameter state_publish_rate_hz, default 1); three
 # missed publications are no accident.
@@ -53,34 +53,22 @@ _MESSAGES: dict[Reason, str] = {
 }
 
 
-@dataclass(frozen=True, slots=True)
-class Outward:
-    """How a channel does that tells others by itself; `detail` is what is wrong, in a line."""
-
-    channel: str
-    is_failing: bool
-    detail: str
+NO_UPDATE = TwinUpdate(Snapshot(0, "", ()), "")
 
 
 @dataclass(frozen=True, slots=True)
 class Status:
     """`reason` says why the twin counts as live or offline; `state_age_s` is None: never.
 
-    `twin_count` is how many nodes publish the state topic; more than one is a mistake. `has_map`
-    spares a browser requests whose 404 it would show as an error. `origin` is where what the twin
-    observed comes from, as far as it says; `input_problems` is why it does not hear all.
-    `day_length_s` is how long its day takes, s of ROS time: a demo's is shorter.
+    `update` is the twin's newest. `outward` is by channel that tells others by itself what is wrong
+    with it, in a line; empty: nothing. `day_length_s` is how long the twin's day takes, s of ROS
+    time: a demo's is shorter.
     """
 
     reason: Reason
     state_age_s: float | None
-    twin_count: int = 1
-    has_map: bool = False
-    drops: tuple[Recent, ...] = ()
-    journal: Condition = UNKNOWN
-    outward: tuple[Outward, ...] = ()
-    origin: Origin = "unknown"
-    input_problems: tuple[str, ...] = ()
+    update: TwinUpdate = NO_UPDATE
+    outward: Mapping[str, str] = field(default_factory=dict)
     day_length_s: float = 86_400.0
 
     @property
@@ -91,63 +79,67 @@ class Status:
     @property
     def message(self) -> str:
         """What to tell a person."""
-        if self.is_live and self.twin_count > 1:
+        twins = self.update.twin_count
+        if self.is_live and twins > 1:
             return (
-                f"{self.twin_count} twins publish on the same topic, and what you see is a mixture "
-                "of them. Stop all but one, or give them ROS domains of their own."
+                f"{twins} twins publish on the same topic, and what you see is a mixture of them. "
+                "Stop all but one, or give them ROS domains of their own."
             )
         return _MESSAGES[self.reason]
 
     def is_news_after(self, before: Status | None) -> bool:
         """Whether clients have to be told, who were told `before`."""
-        return (
-            before is None
-            or self.has_more_detail_than(before)
-            or before.has_map is not self.has_map
-            or _about(before.drops) != _about(self.drops)
-            or _news_of(before.journal) != _news_of(self.journal)
-            or before.outward != self.outward
-            or before.origin != self.origin
-            or before.input_problems != self.input_problems
-        )
+        return before is None or before.news() != self.news()
 
     def has_more_detail_than(self, before: Status) -> bool:
         """Whether a person has to be told, who was told `before`."""
         return (before.reason, before.message) != (self.reason, self.message)
 
+    def news(self) -> tuple[object, ...]:
+        """What is told at once: how far behind a journal is changes all the time."""
+        now, journal = self.update, self.update.journal
+        return (
+            self.reason,
+            self.message,
+            now.occupancy_map is None,
+            # How often each, roughly: a stream of drops is no stream of statuses.
+            {drop.reason: drop.count.bit_length() for drop in now.drops},
+            journal.state,
+            "" if journal.state == JournalState.SLOW else journal.detail,
+            journal.set_aside,
+            journal.simulated_ns,
+            self.outward,
+            now.origin,
+            now.input_problems,
+        )
+
     def frame(self) -> dict[str, Any]:
         """`schema.StatusFrame`."""
+        now = self.update
         return {
             "type": "status",
             "twin": "live" if self.is_live else "offline",
             "reason": self.reason,
             "message": self.message,
             "state_age_seconds": None if self.state_age_s is None else round(self.state_age_s, 3),
-            "has_map": self.has_map,
-            "origin": self.origin,
-            "input_problems": list(self.input_problems),
+            # Spares a browser requests whose 404 it would show as an error.
+            "has_map": now.occupancy_map is not None,
+            "origin": now.origin,
+            "input_problems": list(now.input_problems),
             "day_length_s": self.day_length_s,
             "drops": [
                 {"reason": drop.reason, "message": drop.message, "count": drop.count}
-                for drop in self.drops
+                for drop in now.drops
             ],
-            "journal": _journal(self.journal),
+            "journal": _journal(now.journal),
             "outward": [
-                {"channel": it.channel, "is_failing": it.is_failing, "detail": it.detail}
-                for it in self.outward
+                {"channel": channel, "is_failing": bool(detail), "detail": detail}
+                for channel, detail in self.outward.items()
             ],
         }
 
 
-def _about(drops: tuple[Recent, ...]) -> dict[str, int]:
-    """How often each, roughly: a stream of drops is no stream of statuses."""
-    return {drop.reason: drop.count.bit_length() for drop in drops}
-
-
-def _news_of(journal: Condition) -> tuple[object, ...]:
-    """What is told of a journal at once: how far behind it is changes all the time."""
-    detail = "" if journal.state == JournalState.SLOW else journal.detail
-    return journal.state, detail, journal.set_aside, journal.simulated_ns
+NEVER_SEEN = Status("never_seen", None)
 
 
 def _journal(journal: Condition) -> dict[str, Any]:
@@ -162,32 +154,33 @@ def _journal(journal: Condition) -> dict[str, Any]:
 
 @dataclass(slots=True)
 class Liveness:
-    """When the twin's last state came and what it said, and whether the thread still runs.
-
-    `silent_s` is for how long the twin had been silent when that came: what an archive tells. Of
-    `known` reason and age are those of then.
-    """
+    """The twin's newest update, when that came, and whether the thread still runs."""
 
     stale_after_s: float = STALE_AFTER_S
-    last_state_s: float | None = None
-    silent_s: float = 0.0
-    clock: ClockState = "running"
-    known: Status = Status("never_seen", None)
+    day_length_s: float = 86_400.0
+    update: TwinUpdate | None = None
+    updated_s: float = 0.0
+    outward: Mapping[str, str] = field(default_factory=dict)
     thread_dead: bool = False
     shutting_down: bool = False
 
+    def silent_s(self, now_s: float) -> float | None:
+        """For how long the twin has said nothing; None: it never has."""
+        if self.update is None:
+            return None
+        # Of an archive's site, it had been silent as that came.
+        return max(0.0, now_s - self.updated_s) + self.update.silent_s
+
     def status(self, now_s: float) -> Status:
         """The status at `now_s`."""
-        age = None
-        if self.last_state_s is not None:
-            age = max(0.0, now_s - self.last_state_s) + self.silent_s
-        return replace(self.known, reason=self._reason(age), state_age_s=age)
+        age_s, update = self.silent_s(now_s), self.update or NO_UPDATE
+        return Status(self._reason(age_s), age_s, update, self.outward, self.day_length_s)
 
     def _reason(self, age_s: float | None) -> Reason:
         if self.shutting_down:
             return "shutting_down"
         if self.thread_dead:
             return "thread_dead"
-        if age_s is None:
+        if age_s is None or self.update is None:
             return "never_seen"
-        return _OF_CLOCK[self.clock] if age_s < self.stale_after_s else "stale"
+        return _OF_CLOCK[self.update.snapshot.clock] if age_s < self.stale_after_s else "stale"

@@ -76,7 +76,7 @@ def test_of_a_silent_twin_readings_grow_old_all_the_same() -> None:
     one = mirror()
     now = seen(tag("a", temperature=21.0))
     told(one, now)
-    silent = replace(now, is_live=False, message="silent", now_ns=NOW_NS + HOLDS_NS + 1)
+    silent = replace(now, status=replace(now.status, reason="stale"), now_ns=NOW_NS + HOLDS_NS + 1)
     news = told(one, silent)
     assert news["lt/house/twin"]["state"] == "OFF"
     assert news["lt/tags/a/readings/temperature"]["value"] is None
@@ -97,7 +97,7 @@ def test_everything_says_where_it_comes_from_and_anew_when_that_is_another_place
     first = told(one, then)
     said = {topic for topic in first if topic.startswith("lt/")}
     assert {first[topic]["origin"] for topic in said} == {"robot"}
-    news = told(one, replace(then, origin="recorded"))
+    news = told(one, seen(state, alarms=(alarm("a"),), origin="recorded"))
     assert {topic: it["origin"] for topic, it in news.items()} == dict.fromkeys(said, "recorded")
 
 

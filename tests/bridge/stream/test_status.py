@@ -5,15 +5,30 @@ from typing import Any, get_args
 import pytest
 
 from lupin_bridge.bridge import WATCH_PERIOD_S
+from lupin_bridge.feed.source import TwinUpdate
 from lupin_bridge.stream import schema
-from lupin_bridge.stream.status import STALE_AFTER_S, Liveness, Outward, Reason, Status
-from lupin_twin.core.drops import Recent
+from lupin_bridge.stream.status import STALE_AFTER_S, Liveness, Reason, Status
+from lupin_twin.core.drops import Counts, Recent
 from lupin_twin.core.journal_condition import Condition, JournalState
-from lupin_twin.core.state import ClockState
+from lupin_twin.core.state import ClockState, Snapshot
+from lupin_twin.ros.convert import map_of
+from tests.support.messages import occupancy_grid
+
+
+def update(clock: ClockState = "running", **says: Any) -> TwinUpdate:
+    return TwinUpdate(Snapshot(0, "map", (), clock=clock), "r", **says)
+
+
+def live(age_s: float = 0.1, **says: Any) -> Status:
+    return Status("live", age_s, update(**says))
+
+
+def heard(at_s: float, clock: ClockState = "running", **says: Any) -> Liveness:
+    return Liveness(update=update(clock, **says), updated_s=at_s)
 
 
 def test_a_twin_is_live_until_it_was_silent_for_the_limit() -> None:
-    liveness = Liveness(last_state_s=100.0)
+    liveness = heard(100.0)
     assert liveness.status(100.0 + STALE_AFTER_S - 0.001).reason == "live"
     assert liveness.status(100.0 + STALE_AFTER_S).reason == "stale"
 
@@ -28,15 +43,15 @@ def test_a_twin_that_was_never_heard_has_no_age() -> None:
 
 
 def test_an_age_is_never_negative() -> None:
-    assert Liveness(last_state_s=10.0).status(9.0) == Status("live", 0.0)
+    assert heard(10.0).status(9.0).state_age_s == 0.0
 
 
 def test_the_reason_nearest_to_the_cure_comes_first() -> None:
-    liveness = Liveness(last_state_s=0.0)
+    liveness = heard(0.0)
     liveness.thread_dead = True
-    assert liveness.status(0.0) == Status("thread_dead", 0.0)
+    assert liveness.status(0.0).reason == "thread_dead"
     liveness.shutting_down = True
-    assert liveness.status(0.0) == Status("shutting_down", 0.0)
+    assert liveness.status(0.0).reason == "shutting_down"
 
 
 @pytest.mark.parametrize("reason", get_args(Reason))
@@ -51,30 +66,31 @@ def test_every_status_has_a_frame_of_the_contract(reason: Reason, age_s: float |
 
 
 def test_more_than_one_twin_is_said_as_long_as_they_live() -> None:
-    liveness = Liveness(last_state_s=0.0, known=Status("live", 0.0, twin_count=2))
+    liveness = heard(0.0, twin_count=2)
     assert liveness.status(0.0).is_live
     assert liveness.status(0.0).message.startswith("2 twins publish on the same topic")
     assert "silent" in liveness.status(10.0).message
 
 
 def test_what_is_news_for_clients_and_what_for_people() -> None:
-    live = Status("live", 0.1)
-    assert live.is_news_after(None)
-    assert not Status("live", 0.9).is_news_after(live), "an age alone is none"
-    for more in (Status("stale", 3.0), Status("live", 0.1, twin_count=2)):
-        assert more.is_news_after(live)
-        assert more.has_more_detail_than(live)
-    recorded = Status("live", 0.1, origin="recorded")
-    assert recorded.is_news_after(live)
+    now = live()
+    assert now.is_news_after(None)
+    assert not live(0.9).is_news_after(now), "an age alone is none"
+    for more in (Status("stale", 3.0), live(twin_count=2)):
+        assert more.is_news_after(now)
+        assert more.has_more_detail_than(now)
+    recorded = live(origin="recorded")
+    assert recorded.is_news_after(now)
     assert schema.StatusFrame.model_validate(recorded.frame()).origin == "recorded"
-    unheard = Status("live", 0.1, input_problems=("use UDP",))
+    unheard = live(input_problems=("use UDP",))
     assert unheard.is_live
-    assert unheard.is_news_after(live)
-    assert not unheard.has_more_detail_than(live)
+    assert unheard.is_news_after(now)
+    assert not unheard.has_more_detail_than(now)
     assert schema.StatusFrame.model_validate(unheard.frame()).input_problems == ["use UDP"]
-    mapped = Status("live", 0.1, has_map=True)
-    assert mapped.is_news_after(live)
-    assert not mapped.has_more_detail_than(live)
+    mapped = live(occupancy_map=map_of(occupancy_grid([[0, 100]]), 1))
+    assert mapped.is_news_after(now)
+    assert schema.StatusFrame.model_validate(mapped.frame()).has_map
+    assert not mapped.has_more_detail_than(now)
 
 
 @pytest.mark.parametrize(
@@ -90,33 +106,33 @@ def test_what_is_news_for_clients_and_what_for_people() -> None:
 def test_a_clock_that_does_not_run_is_said_unless_the_twin_is_silent(
     clock: ClockState, reason: Reason
 ) -> None:
-    liveness = Liveness(last_state_s=0.0, clock=clock)
+    liveness = heard(0.0, clock)
     assert liveness.status(0.1).reason == reason
     assert liveness.status(10.0).reason == "stale"
 
 
 def test_what_was_dropped_is_news_when_it_grows_much_and_when_it_is_long_ago() -> None:
     def status(count: int) -> Status:
-        return Status("live", 0.1, drops=(Recent("frame", "dropped a message", count),))
+        return live(counts=Counts(recent=(Recent("frame", "dropped a message", count),)))
 
-    assert status(1).is_news_after(Status("live", 0.1))
+    assert status(1).is_news_after(live())
     assert status(4).is_news_after(status(3))
     assert not status(5).is_news_after(status(4))
-    assert Status("live", 0.1).is_news_after(status(1))
-    assert not status(1).has_more_detail_than(Status("live", 0.1))
+    assert live().is_news_after(status(1))
+    assert not status(1).has_more_detail_than(live())
     [drop] = schema.StatusFrame.model_validate(status(5).frame()).drops
     assert (drop.reason, drop.message, drop.count) == ("frame", "dropped a message", 5)
 
 
 def test_how_a_channel_does_is_told_when_that_changes() -> None:
-    def status(is_failing: bool, detail: str = "") -> Status:
-        return Status("live", 0.1, outward=(Outward("mqtt", is_failing, detail),))
+    def status(detail: str) -> Status:
+        return Status("live", 0.1, outward={"mqtt": detail})
 
-    failing, well = status(True, "refused"), status(False)
+    failing, well = status("refused"), status("")
     assert failing.is_news_after(well)
-    assert status(True, "no answer").is_news_after(failing)
+    assert status("no answer").is_news_after(failing)
     assert well.is_news_after(failing)
-    assert not status(True, "refused").is_news_after(failing)
+    assert not status("refused").is_news_after(failing)
     assert not failing.has_more_detail_than(well), "the channel has logged it"
     (told,) = schema.StatusFrame.model_validate(failing.frame()).outward
     assert (told.channel, told.is_failing, told.detail) == ("mqtt", True, "refused")
@@ -124,11 +140,11 @@ def test_how_a_channel_does_is_told_when_that_changes() -> None:
 
 def test_how_the_journal_does_is_told_when_that_changes() -> None:
     def status(state: JournalState, detail: str = "", **more: Any) -> Status:
-        return Status("live", 0.1, journal=Condition(state, detail, **more))
+        return live(journal=Condition(state, detail, **more))
 
     failing = status(JournalState.FAILING, "no room")
-    assert failing.is_news_after(Status("live", 0.1))
-    assert not failing.has_more_detail_than(Status("live", 0.1)), "the twin has logged it"
+    assert failing.is_news_after(live())
+    assert not failing.has_more_detail_than(live()), "the twin has logged it"
     assert status(JournalState.FAILING, "read-only").is_news_after(failing)
     recording = status(JournalState.RECORDING, written=1)
     assert recording.is_news_after(failing)

@@ -13,7 +13,7 @@ from typing import Final
 from lupin_bridge.alarms.board import AlarmBoard, Change
 from lupin_bridge.alarms.feed import AlarmFeed, learn_recent
 from lupin_bridge.alarms.notes import NoteBoard
-from lupin_bridge.feed.estimates import EstimateFollower, Reports
+from lupin_bridge.feed.estimates import EstimateFollower
 from lupin_bridge.feed.shared_work import Periodic, Shared, end
 from lupin_bridge.feed.source import TwinSource, TwinUpdate
 from lupin_bridge.judge.judging import NOTHING_JUDGED, Judge, Judged, silenced, unjudged
@@ -95,10 +95,8 @@ class Bridge:
         self._judged = NOTHING_JUDGED
         self._states_unjudged = 0
         self._is_judge_failing = False
-        self.reports = Reports(source)
         self._estimates = EstimateFollower(
             source,
-            self.reports,
             lambda: None if self.latest is None else self.latest.snapshot,
             self._judge.note_changed,
         )

@@ -8,12 +8,10 @@ from __future__ import annotations
 import asyncio
 import logging
 import math
-import time
-from collections import OrderedDict
 from collections.abc import Callable, Mapping
 from typing import Final
 
-from lupin_bridge.feed.shared_work import Periodic, Shared
+from lupin_bridge.feed.shared_work import Periodic
 from lupin_bridge.feed.source import TwinSource, TwinUnavailableError
 from lupin_twin.core.past import NotRemembered
 from lupin_twin.core.state import Snapshot
@@ -22,40 +20,6 @@ from lupin_twin.runtime.estimates import Report, ReportRequest
 from lupin_twin.runtime.workers import in_turns
 
 log = logging.getLogger(__name__)
-
-# A twin makes no report of a sensor so soon again.
-FRESH_S: Final = 2.0
-MAX_CACHED: Final = 64
-
-
-class Reports:
-    """The reports of a source. Belongs to the event loop."""
-
-    def __init__(self, source: TwinSource) -> None:
-        self._source = source
-        self._asking: Shared[Report] = Shared()
-        self._cache: OrderedDict[ReportRequest, tuple[float, Report]] = OrderedDict()
-
-    async def of(self, request: ReportRequest) -> Report:
-        """What is known of a sensor's estimates.
-
-        Raises:
-            Exception: see `TwinSource.estimate_report`.
-
-        """
-        kept = self._cache.get(request)
-        if kept is not None and time.monotonic() - kept[0] < FRESH_S:
-            return kept[1]
-        return await self._asking.get(request, lambda: self._ask(request))
-
-    async def _ask(self, request: ReportRequest) -> Report:
-        report = await self._source.estimate_report(request)
-        self._cache[request] = time.monotonic(), report
-        self._cache.move_to_end(request)
-        if len(self._cache) > MAX_CACHED:
-            self._cache.popitem(last=False)
-        return report
-
 
 # A report serves for 30 s at least (`estimate_service.REST_S`).
 PERIOD_S: Final = 15.0
@@ -78,7 +42,6 @@ class EstimateFollower(Periodic):
     def __init__(
         self,
         source: TwinSource,
-        reports: Reports,
         snapshot: Callable[[], Snapshot | None],
         on_changed: Callable[[Changed], None],
         period_s: float = PERIOD_S,
@@ -86,7 +49,6 @@ class EstimateFollower(Periodic):
         super().__init__(self.update, period_s, "what estimates are worth")
         self.known: dict[str, Report] = {}
         self._source = source
-        self._reports = reports
         self._snapshot = snapshot
         self._on_changed = on_changed
         self._changed: Changed = {}
@@ -104,7 +66,7 @@ class EstimateFollower(Periodic):
         known: dict[str, Report] = {}
         for sensor in sensors:
             try:
-                known[sensor] = await self._reports.of(ReportRequest(sensor))
+                known[sensor] = await self._source.estimate_report(ReportRequest(sensor))
             except (FieldRefused, NotRemembered, TwinUnavailableError) as error:
                 log.debug("what estimates of %s are worth is not known: %s", sensor, error)
                 if sensor in self.known:

@@ -122,7 +122,7 @@ async def quality(request: Request) -> Response:
 
     async def body(bridge: Bridge, query: QualityQuery) -> bytes:
         names = [query.sensor_type] if query.sensor_type else await _sensors(bridge)
-        reports = {name: await bridge.reports.of(ReportRequest(name)) for name in names}
+        reports = {name: await bridge.source.estimate_report(ReportRequest(name)) for name in names}
         return report_json.qualities(reports)
 
     return await _report(request, QualityQuery, body)
@@ -140,7 +140,7 @@ async def tags(request: Request) -> Response:
 
     async def body(bridge: Bridge, query: TagsQuery) -> bytes:
         sensor = query.sensor_type
-        report = await bridge.reports.of(ReportRequest(sensor))
+        report = await bridge.source.estimate_report(ReportRequest(sensor))
         cost_s = len(report.tags) * _WRITE_TAG_S
         return await on_worker(bridge, lambda _: report_json.tags(sensor, report), cost_s)
 
@@ -159,7 +159,7 @@ async def advice(request: Request) -> Response:
 
     async def body(bridge: Bridge, query: AdviceQuery) -> bytes:
         wanted = ReportRequest(query.sensor_type, query.places)
-        return report_json.advice(query.sensor_type, await bridge.reports.of(wanted))
+        return report_json.advice(query.sensor_type, await bridge.source.estimate_report(wanted))
 
     return await _report(request, AdviceQuery, body)
 

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import asyncio
 import logging
-from collections import OrderedDict
 from collections.abc import Awaitable, Callable
 from dataclasses import dataclass, replace
 from functools import partial
@@ -192,8 +191,6 @@ def _published(topic: str, frame: StateFrame) -> bytes:
 
 # The largest message that is sent, bytes of CDR: twice as much in JSON, and more.
 MAX_MESSAGE_BYTES: Final = 24_000_000
-# Frames in the cache for clients that want the same one a little later, bytes.
-MAX_CACHE_BYTES: Final = 32_000_000
 # What writing takes, roughly and at worst, s a byte of CDR.
 _WRITE_S: Final = 1e-7
 
@@ -205,35 +202,21 @@ class Writer:
         self.relay = relay
         self._workers = workers
         self._writing: Shared[bytes] = Shared()
-        # With the sample, whose id is the key.
-        self._cache: OrderedDict[tuple[str, int], tuple[Sample, bytes]] = OrderedDict()
-        self._cache_bytes = 0
 
     async def frame(self, feed: Feed, sample: Sample) -> bytes:
-        """The sample as that feed's client reads it.
+        """The sample as that feed's client reads it; all who want it now get the same.
 
         Raises:
             ValueError: it is none of its type, or too large.
 
         """
-        key = (feed.name, id(sample))
-        cached = self._cache.get(key)
-        if cached is not None:
-            return cached[1]
-        return await self._writing.get(key, lambda: self._write(key, feed, sample))
+        return await self._writing.get((feed.name, id(sample)), lambda: self._write(feed, sample))
 
-    async def _write(self, key: tuple[str, int], feed: Feed, sample: Sample) -> bytes:
-        frame = await asyncio.wrap_future(
-            self._workers.submit(
-                lambda _: _written(self.relay, feed, sample), len(sample.data) * _WRITE_S
-            )
+    async def _write(self, feed: Feed, sample: Sample) -> bytes:
+        cost_s = len(sample.data) * _WRITE_S
+        return await asyncio.wrap_future(
+            self._workers.submit(lambda _: _written(self.relay, feed, sample), cost_s)
         )
-        self._cache[key] = (sample, frame)
-        self._cache_bytes += len(frame)
-        while self._cache_bytes > MAX_CACHE_BYTES:
-            _, (_, oldest) = self._cache.popitem(last=False)
-            self._cache_bytes -= len(oldest)
-        return frame
 
 
 def _written(relay: Relay, feed: Feed, sample: Sample) -> bytes:

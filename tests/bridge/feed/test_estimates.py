@@ -60,11 +60,9 @@ class Stage:
         self.snapshot: Snapshot | None = None
         self.answers: dict[str, Report] = {}
         stage: Any = self
-        self.follower = EstimateFollower(
-            stage, stage, lambda: self.snapshot, self.told.append, period_s
-        )
+        self.follower = EstimateFollower(stage, lambda: self.snapshot, self.told.append, period_s)
 
-    async def of(self, request: ReportRequest) -> Report:
+    async def estimate_report(self, request: ReportRequest) -> Report:
         self.asked.append(request.sensor_type)
         if request.sensor_type not in self.answers:
             raise TwinUnavailableError("nobody is there")

@@ -204,18 +204,3 @@ async def test_whatever_the_error_the_feed_goes_on_and_the_log_has_each_kind_onc
         assert good == json_frame("good")
     assert caplog.text.count("Traceback") == 1
     assert caplog.text.count("not a message") == 1
-
-
-async def test_what_is_kept_is_bounded(
-    relay: Relay, writer: Writer, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(feeds, "MAX_CACHE_BYTES", 2 * len(json_frame("a")))
-
-    samples = [Sample(text.encode(), 0) for text in "abc"]
-    for sample in samples:
-        await writer.frame(feed(), sample)
-    assert relay.read_count == 3
-    await writer.frame(feed(), samples[2])
-    assert relay.read_count == 3
-    await writer.frame(feed(), samples[0])
-    assert relay.read_count == 4

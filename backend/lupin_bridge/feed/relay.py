@@ -128,8 +128,7 @@ class Ros(Protocol):
         """Have `take` called for each sample, until what is returned is called.
 
         Raises:
-            LookupError: the topic's type is not installed.
-            ValueError: ROS takes no such topic.
+            ValueError: the topic's type is not installed, or ROS takes no such topic.
 
         """
 
@@ -322,7 +321,7 @@ class Relay:
             close: Callable[[], None] = await thread.call(
                 lambda node: self._ros.subscribe(node, topic, take)
             )
-        except (LookupError, ValueError) as error:
+        except ValueError as error:
             raise NotRelayedError(f"{topic.name} cannot be relayed here: {error}") from None
         return close
 

@@ -12,17 +12,15 @@ from dataclasses import dataclass
 from struct import Struct
 from typing import Any, Final, TypeVar
 
-import builtin_interfaces.msg
-import geometry_msgs.msg
-import nav_msgs.msg
-import sensor_msgs.msg
-import std_msgs.msg
+from builtin_interfaces.msg import Time
 from rclpy.callback_groups import CallbackGroup
 from rclpy.exceptions import InvalidTopicNameException
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from std_msgs.msg import Header
 
 from lupin_bridge.feed.robot import MAX_AHEAD_NS, Battery, Plan, Position, Robot
 from lupin_twin.adapt.config import POSES
+from lupin_twin.adapt.messages import message_type
 from lupin_twin.core import ingest, interfaces
 from lupin_twin.core.drops import Drop, Reason
 from lupin_twin.core.state import NANOSECONDS_PER_SECOND
@@ -43,14 +41,6 @@ FARTHEST_M: Final = 1e6
 _CDR_HEADER_BYTES: Final = 4
 # Three coordinates and a quaternion.
 _POSE_BYTES: Final = 56
-
-_PACKAGES: Final = {
-    "builtin_interfaces": builtin_interfaces.msg,
-    "geometry_msgs": geometry_msgs.msg,
-    "nav_msgs": nav_msgs.msg,
-    "sensor_msgs": sensor_msgs.msg,
-    "std_msgs": std_msgs.msg,
-}
 
 
 class _OnDemand(CallbackGroup):  # type: ignore[misc]  # rclpy is not typed
@@ -167,11 +157,10 @@ class RobotTopics:
             return
         if topic.subscription is not None:
             node.destroy_subscription(topic.subscription)
-        package, _, name = type_name.partition("/msg/")
-        kind = getattr(_PACKAGES[package], name)
+        kind = message_type(type_name)
         limits = {"poses": MAX_POSES} if type_name == interfaces.ROBOT_PLAN.type_name else {}
         topic.how = how
-        topic.shape = MessageShape(kind, _PACKAGES, max_bytes=1_000_000, limits=limits)
+        topic.shape = MessageShape(kind, max_bytes=1_000_000, limits=limits)
         topic.subscription = node.create_subscription(
             kind,
             topic.name,
@@ -218,8 +207,8 @@ def _read_path(data: bytes, shape: MessageShape) -> _Path | Drop:
         points.append(place_at(body, at))
         at += _POSE_BYTES
     sec, nanosec = Struct(f"{order}iI").unpack_from(body)
-    stamp = builtin_interfaces.msg.Time(sec=sec, nanosec=nanosec)
-    return _Path(std_msgs.msg.Header(stamp=stamp, frame_id=frame_id), points)
+    stamp = Time(sec=sec, nanosec=nanosec)
+    return _Path(Header(stamp=stamp, frame_id=frame_id), points)
 
 
 def _stamp_ns(message: Any, now_ns: int | None) -> int | Drop:

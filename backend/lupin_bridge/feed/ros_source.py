@@ -7,14 +7,10 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Final, Generic, TypeVar
 
-from diagnostic_msgs.msg import DiagnosticArray
-from lupin_msgs.msg import DiscoveredTags, Observation, TwinState
-from nav_msgs.msg import OccupancyGrid
+from lupin_msgs.msg import Observation
 from rclpy.context import Context
 from rclpy.exceptions import InvalidTopicNameException
 from rclpy.qos import QoSProfile
-from sensor_msgs.msg import PointCloud2
-from visualization_msgs.msg import MarkerArray
 
 from lupin_bridge.feed.past_process import PastProcess
 from lupin_bridge.feed.relay import Relay, RosTime, Sample, Topic, TwinNames
@@ -22,7 +18,7 @@ from lupin_bridge.feed.robot import Robot
 from lupin_bridge.feed.robot_ros import RobotTopics
 from lupin_bridge.feed.ros_thread import BridgedNode, RosThread
 from lupin_bridge.feed.source import TwinSource, TwinUpdate
-from lupin_twin.adapt.messages import observation
+from lupin_twin.adapt.messages import message_type, observation
 from lupin_twin.adapt.scans import BuiltScan
 from lupin_twin.core import interfaces
 from lupin_twin.core.drops import Drop
@@ -33,16 +29,6 @@ from lupin_twin.ros import message_limits
 from lupin_twin.ros.base_node import latched, qos_of, read_message
 from lupin_twin.runtime.workers import Workers
 
-# A name that comes from outside imports nothing.
-_CLASSES: Final[Mapping[str, Any]] = {
-    "lupin_msgs/msg/TwinState": TwinState,
-    "lupin_msgs/msg/Observation": Observation,
-    "lupin_msgs/msg/DiscoveredTags": DiscoveredTags,
-    "nav_msgs/msg/OccupancyGrid": OccupancyGrid,
-    "diagnostic_msgs/msg/DiagnosticArray": DiagnosticArray,
-    "sensor_msgs/msg/PointCloud2": PointCloud2,
-    "visualization_msgs/msg/MarkerArray": MarkerArray,
-}
 # What is also made into messages here: the topics of `relay.topics_of`.
 _SHAPES: Final = {
     "lupin_msgs/msg/TwinState": message_limits.STATE,
@@ -60,9 +46,6 @@ class RelayRos:
         self, node: Any, topic: Topic, take: Callable[[Sample], None]
     ) -> Callable[[], None]:
         """Subscribe raw: nothing is made of the bytes in this thread."""
-        message_type = _CLASSES.get(topic.type_name)
-        if message_type is None:
-            raise LookupError(f"messages of {topic.type_name!r} are not relayed")
         clock = node.get_clock()
 
         def hand_over(data: bytes) -> None:
@@ -70,7 +53,7 @@ class RelayRos:
 
         try:
             subscription = node.create_subscription(
-                message_type,
+                message_type(topic.type_name),
                 topic.name,
                 hand_over,
                 latched(topic.depth) if topic.latched else QoSProfile(depth=topic.depth),

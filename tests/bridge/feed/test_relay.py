@@ -52,7 +52,7 @@ class Ros:
         self, node: Any, topic: Topic, take: Callable[[Sample], None]
     ) -> Callable[[], None]:
         if topic.type_name.startswith("unknown"):
-            raise LookupError(f"there is no message {topic.type_name!r}")
+            raise ValueError(f"there is no message {topic.type_name!r}")
         if topic.name.endswith("/"):
             raise ValueError("ROS takes no such name")
         self.subscribed.append(topic.name)

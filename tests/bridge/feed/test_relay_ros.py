@@ -98,7 +98,7 @@ async def test_a_twins_topics_come_as_they_are_on_the_wire(domain: int, source_t
         now = await relay.time()
         assert (now.is_simulated, abs(now.now_ns - came_ns) < 60e9) == (False, True)
         for topic, said in (
-            (Topic("/a", "sensor_smsgs/msg/A"), "are not relayed"),
+            (Topic("/a", "sensor_smsgs/msg/A"), "is not installed here"),
             (Topic("/a b", "lupin_msgs/msg/TwinState"), "topic name"),
         ):
             with pytest.raises(NotRelayedError, match=said):

@@ -2,7 +2,7 @@
 
 import asyncio
 import json
-from typing import Any
+from typing import Any, NoReturn
 
 import pytest
 
@@ -25,6 +25,10 @@ def subscribing(offer: Any, *topics: str) -> bytes:
     return masked(TEXT, json.dumps({"op": "subscribe", "subscriptions": entries}).encode())
 
 
+def refuse(_: int) -> NoReturn:
+    raise ValueError("no subscription to it")
+
+
 async def topics_are_heard_while_they_are_wanted(here: Any) -> None:
     """Where nobody is there any more, and topics end at once."""
     hub, offer, relay = here.bridge.hub, here.bridge.offer, here.bridge.source.relay
@@ -33,7 +37,7 @@ async def topics_are_heard_while_they_are_wanted(here: Any) -> None:
     await until(lambda: len(hub) == 1, "one more")
     got = b""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(ros_source, "_CLASSES", {})
+        patch.setattr(ros_source, "latched", refuse)
         writer.write(subscribing(offer, "/map"))
         while b"cannot be served now" not in got:
             got += await reader.read(1 << 20)

@@ -22,12 +22,11 @@ from lupin_twin.ros.base_node import (
     waker,
 )
 from lupin_twin.ros.message_limits import MessageShape
-from tests.support.hostile import PACKAGES
 from tests.support.messages import INFO, scan
 from tests.support.ros import Peer
 from tests.support.waiting import PATIENCE_S, wait_for
 
-SHAPE = MessageShape(Observation, PACKAGES, max_bytes=1_000)
+SHAPE = MessageShape(Observation, max_bytes=1_000)
 
 
 class Logged:
@@ -63,9 +62,9 @@ def utilities(domain: int, logged: Logged) -> Iterator[NodeUtilities]:
 
 def test_a_message_is_read_up_to_its_limit_and_dropped_past_it() -> None:
     data = serialize_message(scan("1", {"co2": 1.0}))
-    read: Any = read_message(data, MessageShape(Observation, PACKAGES, max_bytes=len(data)))
+    read: Any = read_message(data, MessageShape(Observation, max_bytes=len(data)))
     assert read.tag_reading.tag_id == "1"
-    drop = read_message(data, MessageShape(Observation, PACKAGES, max_bytes=len(data) - 1))
+    drop = read_message(data, MessageShape(Observation, max_bytes=len(data) - 1))
     assert drop == Drop(Reason.SIZE, f"{len(data)} bytes, the limit is {len(data) - 1}")
 
 
@@ -154,7 +153,7 @@ def test_messages_that_wait_are_taken_one_right_behind_the_other(
 ) -> None:
     """In one round of the executor, whatever else is due in it; and before what takes its time."""
     heard: list[float] = []
-    large = MessageShape(Observation, PACKAGES, max_bytes=10_000)
+    large = MessageShape(Observation, max_bytes=10_000)
     group = utilities.node.default_callback_group
     utilities.subscribe(
         "topic",

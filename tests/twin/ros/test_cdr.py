@@ -36,7 +36,7 @@ OTHERS = (
 
 
 def shape_of(message_type: Any, **limits: Any) -> MessageShape:
-    return MessageShape(message_type, PACKAGES, max_bytes=10_000_000, **limits)
+    return MessageShape(message_type, max_bytes=10_000_000, **limits)
 
 
 SHAPES = {message_type: shape_of(message_type) for message_type in (*OURS, *OTHERS)}
@@ -143,7 +143,7 @@ from nav_msgs.msg import OccupancyGrid
 from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.serialization import deserialize_message, serialize_message
 from lupin_twin.ros.message_limits import MalformedError, MessageShape
-from tests.support.hostile import PACKAGES, lies
+from tests.support.hostile import lies
 from tests.support.proc_stat import peak_mb, reset_peak, resident_mb
 
 FILLER = 1_000_000
@@ -153,7 +153,7 @@ messages = (
     OccupancyGrid(),
 )
 for message in messages:
-    shape = MessageShape(type(message), PACKAGES, max_bytes=10_000_000)
+    shape = MessageShape(type(message), max_bytes=10_000_000)
     before = resident_mb(os.getpid())
     reset_peak(os.getpid())
     data = serialize_message(message)

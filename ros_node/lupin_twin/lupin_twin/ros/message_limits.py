@@ -15,14 +15,12 @@ from __future__ import annotations
 import re
 import struct
 from collections.abc import Callable, Mapping, Sequence
+from importlib import import_module
 from typing import Any, Final, NamedTuple
 
-from builtin_interfaces import msg as builtin
-from diagnostic_msgs import msg as diagnostic
-from geometry_msgs import msg as geometry
-from lupin_msgs import msg as lupin
-from nav_msgs import msg as nav
-from std_msgs import msg as std
+from diagnostic_msgs.msg import DiagnosticArray
+from lupin_msgs.msg import DiscoveredTags, Observation, TwinState, TwinTimes
+from nav_msgs.msg import OccupancyGrid
 
 from lupin_twin.core.drops import (
     MAX_BLOOMS_PER_TAG,
@@ -95,20 +93,19 @@ class _Part(NamedTuple):
 class MessageShape:
     """A message type as it is serialised, and the most that one message of it may hold.
 
-    `packages` holds the modules of messages, by the name of the package, that its fields are of.
     `max_bytes` bounds it as a whole, `limits` the elements of a sequence, by its path
     (`tag_reading.readings`), `max_elements` those of all sequences of messages in it together;
     sequences of plain numbers take no more than their bytes.
 
     Raises:
-        TypeError: the type has a field of a kind that is not known here, or none by a limit's path.
+        ImportError: it has a field of a type that is not installed.
+        TypeError: it has no sequence by a limit's path.
 
     """
 
     def __init__(
         self,
         message_type: Any,
-        packages: Mapping[str, Any],
         *,
         max_bytes: int,
         limits: Mapping[str, int] | None = None,
@@ -116,7 +113,6 @@ class MessageShape:
     ) -> None:
         self.message_type = message_type
         self.max_bytes = max_bytes
-        self._packages = packages
         self._limits = dict(limits or {})
         self._max_elements = max_elements
         self._walk = self._message(message_type, "").walk
@@ -162,9 +158,7 @@ class MessageShape:
                 return _fixed(_SIZES[element], count)
             return _in_a_row([self._field(element, path)] * count)
         package, _, name = kind.partition("/")
-        if package not in self._packages:
-            raise TypeError(f"{path} is of type {kind!r}, which is not known here")
-        return self._message(getattr(self._packages[package], name), path)
+        return self._message(getattr(import_module(f"{package}.msg"), name), path)
 
 
 def _number(text: str | None) -> int | None:
@@ -271,19 +265,9 @@ def _total(steps: tuple[int, ...], begin: int, count: int) -> int:
 MAX_STATUSES: Final = 1_000
 MAX_STATUS_VALUES: Final = 10_000
 
-_PACKAGES: Final = {
-    "builtin_interfaces": builtin,
-    "diagnostic_msgs": diagnostic,
-    "geometry_msgs": geometry,
-    "lupin_msgs": lupin,
-    "nav_msgs": nav,
-    "std_msgs": std,
-}
-
 # An observation with 2,000 flowers has some 150 kB.
 OBSERVATION: Final = MessageShape(
-    lupin.Observation,
-    _PACKAGES,
+    Observation,
     max_bytes=1_000_000,
     limits={
         "tag_reading.readings": MAX_SENSORS_PER_TAG,
@@ -293,23 +277,21 @@ OBSERVATION: Final = MessageShape(
 )
 # A discovery of 20,000 tags has 2.5 MB.
 DISCOVERED_TAGS: Final = MessageShape(
-    lupin.DiscoveredTags, _PACKAGES, max_bytes=8_000_000, limits={"tags": MAX_TAGS}
+    DiscoveredTags, max_bytes=8_000_000, limits={"tags": MAX_TAGS}
 )
 # A map of 4,000 × 4,000 cells has 16 MB.
-MAP: Final = MessageShape(nav.OccupancyGrid, _PACKAGES, max_bytes=64_000_000)
+MAP: Final = MessageShape(OccupancyGrid, max_bytes=64_000_000)
 # 20,000 tags with ten sensors and forty flowers each have 48 MB. How many a single tag has is for
 # the twin to bound that publishes it.
 STATE: Final = MessageShape(
-    lupin.TwinState,
-    _PACKAGES,
+    TwinState,
     max_bytes=64_000_000,
     limits={"tags": MAX_TAGS},
     max_elements=MAX_TAGS + MAX_ITEMS,
 )
 # As many tags and readings, each reading with its name and its time.
 TIMES: Final = MessageShape(
-    lupin.TwinTimes,
-    _PACKAGES,
+    TwinTimes,
     max_bytes=64_000_000,
     limits={"tags": MAX_TAGS},
     max_elements=MAX_TAGS + 2 * MAX_ITEMS,
@@ -317,8 +299,7 @@ TIMES: Final = MessageShape(
 # A twin says seven things of itself, with a few dozen values, in some kB. Whoever collects those of
 # a whole robot has more; it is published on a topic that all nodes share.
 DIAGNOSTICS: Final = MessageShape(
-    diagnostic.DiagnosticArray,
-    _PACKAGES,
+    DiagnosticArray,
     max_bytes=1_000_000,
     limits={"status": MAX_STATUSES},
     max_elements=MAX_STATUSES + MAX_STATUS_VALUES,

@@ -19,9 +19,11 @@ TAGS = st.builds(
 
 
 @given(st.lists(TAGS, max_size=6, unique_by=lambda mark: mark.number), st.text("abc", max_size=9))
-def test_an_array_of_parts_is_the_array_that_ros_makes(marks: list[TagMark], frame: str) -> None:
+def test_an_array_has_the_markers_of_all_behind_one_that_deletes(
+    marks: list[TagMark], frame: str
+) -> None:
     arrays = MarkerArrays(tag_markers, frame)
-    arrays.build(marks[::2])  # so that some parts are kept
+    arrays.build(marks[::2])  # so that some are known already
     plain = MarkerArray(markers=[each for mark in marks for each in tag_markers(mark, frame)])
     expected = deserialize_message(serialize_message(plain), MarkerArray)  # in float32
     msg = deserialize_message(arrays.build(marks), MarkerArray)

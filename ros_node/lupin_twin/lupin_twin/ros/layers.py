@@ -11,7 +11,7 @@ import math
 import re
 import sys
 from array import array
-from collections.abc import Hashable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Hashable, Iterable, Mapping
 from itertools import chain
 from typing import Any, Final, Literal, NamedTuple
 
@@ -159,9 +159,6 @@ def points(grid: FieldGrid, estimate: EstimateGrid | None) -> PointArray:
 # --- messages -------------------------------------------------------------------------------
 
 _FLOAT32_BYTES: Final = 4
-# What stands before a serialised message, and the count before a list.
-_CDR_HEAD: Final = 4
-_COUNT: Final = 4
 
 TAG_M: Final = 0.15
 TEXT_M: Final = 0.12
@@ -255,53 +252,27 @@ def _marker(
 
 
 class MarkerArrays:
-    """Builds visualization_msgs/MarkerArray of marks, and caches each one's part until it changes.
+    """Builds visualization_msgs/MarkerArray of marks, and caches each one's markers.
 
     An array says all there is: its first marker deletes what was there before, so nothing that is
     gone stays in a viewer, not even from a twin before this one. Belongs to one thread at a time.
     """
 
-    def __init__(self, make: Any, frame_id: str) -> None:
+    def __init__(self, make: Callable[[Any, str], list[Any]], frame_id: str) -> None:
         """`make(mark, frame_id)` gives the markers of a mark."""
         self._make = make
         self._frame_id = frame_id
-        self._parts: dict[Hashable, list[_Part]] = {}
-        self._clear = _part(Marker(header=Header(frame_id=frame_id), action=Marker.DELETEALL))
+        self._markers: dict[Hashable, list[Any]] = {}
+        self._clear = Marker(header=Header(frame_id=frame_id), action=Marker.DELETEALL)
 
     def build(self, marks: Iterable[Hashable]) -> bytes:
         """The marks' array, serialised; only those that changed are made anew, in turns."""
-        before, self._parts = self._parts, {}
+        before, self._markers = self._markers, {}
         for mark in in_turns(marks):
-            self._parts[mark] = before.get(mark) or [
-                _part(marker) for marker in self._make(mark, self._frame_id)
-            ]
-        parts = [self._clear, *(part for of_mark in self._parts.values() for part in of_mark)]
-        head = bytes(serialize_message(MarkerArray()))[:_CDR_HEAD]
-        return b"".join([head, len(parts).to_bytes(_COUNT, sys.byteorder), *_joined(parts)])
+            self._markers[mark] = before.get(mark) or self._make(mark, self._frame_id)
+        markers = [self._clear, *chain.from_iterable(self._markers.values())]
+        return bytes(serialize_message(MarkerArray(markers=markers)))
 
     def forget(self) -> None:
-        """Drop the parts: nobody subscribes."""
-        self._parts = {}
-
-
-# A marker serialised where the offset is a multiple of 8, and where it is one of 4 alone.
-_Part = tuple[bytes, bytes]
-
-
-def _part(marker: Any) -> _Part:
-    """Its numbers of eight bytes stand at multiples of 8: where it begins decides on the gaps."""
-    alone = bytes(serialize_message(marker))[_CDR_HEAD:]
-    behind = bytes(serialize_message(MarkerArray(markers=[marker])))[_CDR_HEAD + _COUNT :]
-    return _padded(alone), _padded(behind)
-
-
-def _padded(part: bytes) -> bytes:
-    return part + bytes(-len(part) % 4)
-
-
-def _joined(parts: Iterable[_Part]) -> Iterator[bytes]:
-    offset = _COUNT
-    for part in parts:
-        fitting = part[offset % 8 == 4]
-        offset += len(fitting)
-        yield fitting
+        """Drop the markers: nobody subscribes."""
+        self._markers = {}

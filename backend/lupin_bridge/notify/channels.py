@@ -10,10 +10,10 @@ from pathlib import Path
 from lupin_bridge.judge.ranges import Sensors
 from lupin_bridge.notify.daily import DailyReport, DailyTarget
 from lupin_bridge.notify.destinations import Targets
+from lupin_bridge.notify.messages import Source
 from lupin_bridge.notify.mirror import Mirror
 from lupin_bridge.notify.mqtt import Mqtt
 from lupin_bridge.notify.push import Push
-from lupin_bridge.notify.source import Source
 from lupin_bridge.notify.webhook import Webhook
 
 
@@ -60,14 +60,16 @@ class Channels:
             self._mqtt.start(source.seen)
         if targets.webhook is not None:
             self._webhook = Webhook(targets.webhook)
-            self._webhook.start(source.alarms, lambda: source.ros_time_ns, lambda: source.origin)
+            self._webhook.start(source)
         if self.push is not None:
             self.push.start(source)
         if targets.report_at is not None:
             daily = DailyTarget(targets.report_at, source.criteria.clock.zone, self._folder)
-            self._reports = [DailyReport(daily, it) for it in (self._mqtt, self._webhook) if it]
+            self._reports = [
+                DailyReport(daily, it, source) for it in (self._mqtt, self._webhook) if it
+            ]
         for report in self._reports:
-            report.start(source)
+            report.start()
 
     async def stop(self) -> None:
         """Stop all at once."""

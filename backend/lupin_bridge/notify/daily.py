@@ -6,7 +6,6 @@ week of them; a message that is not taken is tried again as those of alarms are.
 
 from __future__ import annotations
 
-import asyncio
 import logging
 import os
 from dataclasses import dataclass
@@ -17,11 +16,11 @@ from typing import Final
 
 import orjson
 
-from lupin_bridge.feed.shared_work import end
+from lupin_bridge.feed.shared_work import Periodic
 from lupin_bridge.feed.source import TwinUnavailableError
 from lupin_bridge.judge.options import unix_s
+from lupin_bridge.notify.messages import Source
 from lupin_bridge.notify.mqtt import Mqtt
-from lupin_bridge.notify.source import Source
 from lupin_bridge.notify.webhook import Webhook
 from lupin_bridge.past.plans import ConditionalQuery
 from lupin_bridge.past.query import compact
@@ -55,43 +54,30 @@ class DailyTarget:
         return int(datetime.combine(day, self.at, self.zone).timestamp()) * 1_000_000_000
 
 
-class DailyReport:
-    """Sends by one channel. Belongs to the event loop."""
+class DailyReport(Periodic):
+    """Sends by one channel; what was not taken at its end is sent after the next start."""
 
     def __init__(
-        self, target: DailyTarget, channel: Mqtt | Webhook, poll_s: float = POLL_S
+        self, target: DailyTarget, channel: Mqtt | Webhook, of: Source, poll_s: float = POLL_S
     ) -> None:
-        self._target, self._channel, self._poll_s = target, channel, poll_s
+        super().__init__(self._try, poll_s, "the report of the day", first_s=0.0)
+        self._target, self._channel, self._of = target, channel, of
         self._why = ""
         # What was sent last: where that cannot be noted, it is not sent again and again.
         self._sent: tuple[Path, int] | None = None
-        self._task: asyncio.Task[None] | None = None
 
-    def start(self, of: Source) -> None:
-        """Begin."""
-        self._task = asyncio.create_task(self._run(of), name=f"report by {self._channel.name}")
-
-    async def stop(self) -> None:
-        """End; what was not taken is sent after the next start."""
-        await end(self._task)
-
-    async def _run(self, of: Source) -> None:
-        while True:
-            try:
-                self._say(await self._look(of))
-            except (NotRemembered, PastRefused, TwinUnavailableError, OSError) as error:
-                self._say(str(error))
-            except Exception:  # nobody waits for this task
-                log.exception("the report of the day met an error and is tried again")
-            await asyncio.sleep(self._poll_s)
-
-    def _say(self, why: str) -> None:
+    async def _try(self) -> None:
+        try:
+            why = await self._look()
+        except (NotRemembered, PastRefused, TwinUnavailableError, OSError) as error:
+            why = str(error)
         if why and why != self._why:
             log.warning("the report of the day is not sent by %s: %s", self._channel.name, why)
         self._why = why
 
-    async def _look(self, of: Source) -> str:
+    async def _look(self) -> str:
         """Send what is due; returns why that cannot be, empty: nothing is wrong."""
+        of = self._of
         now_ns, journal, target = of.ros_time_ns, of.source.journal(), self._target
         if now_ns is None or not journal.journal_id:
             return ""
@@ -116,7 +102,7 @@ class DailyReport:
         report = Report(target.ended_ns(due_ns, -1), due_ns, of.criteria, journal)
         try:
             if self._sent != (file, due_ns):
-                await self._send(report, of)
+                await self._send(report)
         except PastRefused as error:
             if now_ns < due_ns + LATE_NS:
                 raise
@@ -126,8 +112,8 @@ class DailyReport:
         _write(file, due_ns)
         return ""
 
-    async def _send(self, report: Report, of: Source) -> None:
-        answered = await of.source.ask(ConditionalQuery(report), REPORT_S)
+    async def _send(self, report: Report) -> None:
+        answered = await self._of.source.ask(ConditionalQuery(report), REPORT_S)
         assert answered.answer is not None  # no ETag was given
         body, until = orjson.Fragment(answered.answer.body), compact(report.end_ns)
         if not await self._channel.deliver(f"report.{until}", body):

@@ -15,11 +15,14 @@ import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache
-from typing import Any, Final
+from typing import Any, Final, Protocol
 
-from lupin_bridge.alarms.board import Board
+from lupin_bridge.alarms.board import AlarmBoard, Board
+from lupin_bridge.alarms.notes import NoteBoard
+from lupin_bridge.feed.source import TwinSource
 from lupin_bridge.judge.episodes import Alarm
 from lupin_bridge.judge.judging import NOTHING_JUDGED, Judged
+from lupin_bridge.judge.options import Criteria
 from lupin_bridge.judge.ranges import Sensor
 from lupin_bridge.judge.verdict import Health, Verdict
 from lupin_bridge.past.query import iso
@@ -114,6 +117,26 @@ class GreenhouseState:
     def origin(self) -> Origin:
         """Where what was observed comes from."""
         return self.status.update.origin
+
+
+class Source(Protocol):
+    """What the channels need of the bridge."""
+
+    alarms: AlarmBoard
+    notes: NoteBoard
+    source: TwinSource
+    criteria: Criteria
+
+    def seen(self) -> GreenhouseState:
+        """The state of now."""
+
+    @property
+    def ros_time_ns(self) -> int | None:
+        """ROS time now; None: it is not known."""
+
+    @property
+    def origin(self) -> Origin:
+        """Where observations come from."""
 
 
 def holds(reading: Reading, holds_ns: int, now_ns: int | None) -> bool:

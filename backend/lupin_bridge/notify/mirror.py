@@ -32,16 +32,10 @@ from lupin_twin.core.state import TagState
 
 _NEVER: Final = 2**63 - 1
 _UNKNOWN: Final = Health(Verdict.UNKNOWN)
+# Topic and payload.
+Message = tuple[str, bytes]
 # Home Assistant takes an empty announcement for the end of the entity.
 _GONE: Final = b""
-
-
-@dataclass(frozen=True, slots=True)
-class Message:
-    """A message to publish."""
-
-    topic: str
-    payload: bytes
 
 
 @dataclass(slots=True)
@@ -149,7 +143,7 @@ class Mirror:
         tag = self._tags.get(tag_id)
         if tag_id != SITE and tag is None:
             del self._published[tag_id]
-            yield from (Message(topic, _GONE) for topic in sorted(published.configs))
+            yield from ((topic, _GONE) for topic in sorted(published.configs))
             return
         pairs = self._of_greenhouse(published) if tag is None else self._of_tag(tag, published)
         for topic, payload in pairs:
@@ -157,7 +151,7 @@ class Mirror:
             digest = hashlib.blake2b(text, digest_size=16).digest()
             if published.digests.get(topic) != digest:
                 published.digests[topic] = digest
-                yield Message(topic, text)
+                yield topic, text
 
     def _of_greenhouse(self, published: _Published) -> Iterator[tuple[str, dict[str, Any]]]:
         yield from self._announced(published, "house", lambda: greenhouse_configs(self._topics))

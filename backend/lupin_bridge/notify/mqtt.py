@@ -189,7 +189,7 @@ class Mqtt:
                     self._see()
                 self._count(in_flight=1)
                 await asyncio.gather(
-                    *(client.publish(it.topic, it.payload, qos=AT_LEAST_ONCE) for it in batch)
+                    *(client.publish(topic, text, qos=AT_LEAST_ONCE) for topic, text in batch)
                 )
                 self.condition.taken(len(batch))
                 await asyncio.sleep(len(batch) / MAX_PER_S)

@@ -33,8 +33,8 @@ from lupin_bridge.judge.episodes import Alarm
 from lupin_bridge.judge.verdict import Verdict
 from lupin_bridge.notify.destinations import Endpoint, PushTarget
 from lupin_bridge.notify.http_post import PostError, post
+from lupin_bridge.notify.messages import Source
 from lupin_bridge.notify.retry import Backoff, Condition, until_taken
-from lupin_bridge.notify.source import Source
 from lupin_bridge.notify.webhook import AlarmNews
 from lupin_bridge.past.report_page import push_text
 from lupin_bridge.serving.admission import AdmissionError

@@ -19,11 +19,12 @@ from typing import Final, Literal
 
 import orjson
 
-from lupin_bridge.alarms.board import AlarmBoard, Change, happened_ns
+from lupin_bridge.alarms.board import Change, happened_ns
 from lupin_bridge.feed.shared_work import end
 from lupin_bridge.judge.episodes import Alarm
 from lupin_bridge.notify.destinations import WebhookTarget
 from lupin_bridge.notify.http_post import post
+from lupin_bridge.notify.messages import Source
 from lupin_bridge.notify.retry import Backoff, Condition, until_taken
 from lupin_bridge.stream.health_json import alarm_json
 from lupin_twin.core.diagnostics import Origin
@@ -142,7 +143,7 @@ ORIGIN_POLL_S: Final = 0.1
 
 
 class Webhook:
-    """Belongs to the event loop. `now_ns` returns ROS time, None: not known."""
+    """Belongs to the event loop."""
 
     name: Final = "webhook"
 
@@ -166,21 +167,16 @@ class Webhook:
         self._origin: Callable[[], Origin] = lambda: "unknown"
         self._origin_s = origin_s
 
-    def start(
-        self, alarms: AlarmBoard, now_ns: Callable[[], int | None], origin: Callable[[], Origin]
-    ) -> None:
-        """Notify of every change from now on, and of what is active already.
-
-        `origin` returns where observations come from.
-        """
-        self._origin = origin
+    def start(self, source: Source) -> None:
+        """Notify of every change from now on, and of what is active already."""
+        self._origin = lambda: source.origin
 
         def receive(change: Change) -> None:
-            for delivery in self._news.of(change, now_ns(), origin()):
+            for delivery in self._news.of(change, source.ros_time_ns, source.origin):
                 self._wait(delivery)
 
-        self._unsubscribe = alarms.subscribe(receive)
-        receive(Change(alarms.now.alarms, is_past=True))
+        self._unsubscribe = source.alarms.subscribe(receive)
+        receive(Change(source.alarms.now.alarms, is_past=True))
         self._task = asyncio.create_task(self._run(), name="webhook")
 
     @property

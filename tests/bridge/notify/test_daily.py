@@ -48,6 +48,8 @@ class House:
     error: Exception | None = None
     journal_id: str = "j1"
     looks: int = 0
+    origin: str = "robot"
+    alarms: Alarms = field(default_factory=Alarms)
 
     @property
     def source(self) -> Any:
@@ -74,9 +76,10 @@ async def sending(
     target = Targets.of(Settings(webhook_url=f"http://127.0.0.1:{port}/"), SECRETS).webhook
     assert target is not None
     hook = Webhook(target, first_wait_s=0.001)
-    hook.start(Alarms(), lambda: house.ros_time_ns, lambda: "robot")
-    report = DailyReport(DailyTarget(SIX, zone, folder), hook, poll_s=0.005)
-    report.start(house)  # type: ignore[arg-type]  # what it needs of one
+    of: Any = house
+    hook.start(of)
+    report = DailyReport(DailyTarget(SIX, zone, folder), hook, of, poll_s=0.005)
+    report.start()
     try:
         yield hook
     finally:
@@ -286,8 +289,9 @@ async def test_a_broker_gets_it_once_it_is_there_and_keeps_it(tmp_path: Path) ->
     house = House(ns("2026-05-01T07:00Z"))
     channel = Mqtt(target, Mirror(target.topics, SENSORS), first_wait_s=0.001)
     channel.start(lambda: seen(tag("a", temperature=20.0)))
-    report = DailyReport(DailyTarget(SIX, UTC, tmp_path), channel, poll_s=0.005)
-    report.start(house)  # type: ignore[arg-type]  # what it needs of one
+    of: Any = house
+    report = DailyReport(DailyTarget(SIX, UTC, tmp_path), channel, of, poll_s=0.005)
+    report.start()
     try:
         await noted(tmp_path)
         house.ros_time_ns = ns("2026-05-02T07:00Z")

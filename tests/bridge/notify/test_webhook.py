@@ -40,7 +40,15 @@ async def telling(
     target = Targets.of(settings, Secrets(webhook_secret=SECRET)).webhook
     assert target is not None
     hook = Webhook(target, first_wait_s, origin_s)
-    hook.start(board, lambda: NOW_NS, origin)
+
+    class House:
+        alarms, ros_time_ns = board, NOW_NS
+
+        @property
+        def origin(self) -> Origin:
+            return origin()
+
+    hook.start(House())  # type: ignore[arg-type]  # what it needs of one
     try:
         yield hook
     finally:

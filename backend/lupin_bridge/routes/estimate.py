@@ -32,7 +32,7 @@ from lupin_bridge.routes.answers import (
 )
 from lupin_bridge.routes.field import InFormats
 from lupin_bridge.serving.admission import Answer, json_answer
-from lupin_bridge.stream import estimate_schema, report_json
+from lupin_bridge.stream import estimate_schema
 from lupin_twin.field.engine import FieldRefused
 from lupin_twin.runtime.estimates import DEFAULT_PLACES, MAX_PLACES, ReportRequest
 
@@ -123,7 +123,7 @@ async def quality(request: Request) -> Response:
     async def body(bridge: Bridge, query: QualityQuery) -> bytes:
         names = [query.sensor_type] if query.sensor_type else await _sensors(bridge)
         reports = {name: await bridge.source.estimate_report(ReportRequest(name)) for name in names}
-        return report_json.qualities(reports)
+        return estimate_schema.qualities(reports)
 
     return await _report(request, QualityQuery, body)
 
@@ -142,7 +142,7 @@ async def tags(request: Request) -> Response:
         sensor = query.sensor_type
         report = await bridge.source.estimate_report(ReportRequest(sensor))
         cost_s = len(report.tags) * _WRITE_TAG_S
-        return await on_worker(bridge, lambda _: report_json.tags(sensor, report), cost_s)
+        return await on_worker(bridge, lambda _: estimate_schema.tags(sensor, report), cost_s)
 
     return await _report(request, TagsQuery, body)
 
@@ -159,7 +159,9 @@ async def advice(request: Request) -> Response:
 
     async def body(bridge: Bridge, query: AdviceQuery) -> bytes:
         wanted = ReportRequest(query.sensor_type, query.places)
-        return report_json.advice(query.sensor_type, await bridge.source.estimate_report(wanted))
+        return estimate_schema.advice(
+            query.sensor_type, await bridge.source.estimate_report(wanted)
+        )
 
     return await _report(request, AdviceQuery, body)
 

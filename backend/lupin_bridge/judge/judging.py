@@ -102,15 +102,18 @@ def _holds_ns(recent: Recent, recent_s: float | None) -> int:
     return holds_ns(interval_ns(recent.stamps_ns)) if recent_s is None else int(recent_s * 1e9)
 
 
-def _is_once(recent: Recent, recent_s: float | None) -> bool:
-    """Whether a tag was scanned once, and nothing says how long that holds."""
-    return len(recent.stamps_ns) == 1 and recent_s is None
-
-
 @dataclass(slots=True)
 class _Tag:
+    """A tag; for how long its readings hold, and until when what was said of it does.
+
+    `is_once`: it was scanned once, and nothing says how long that holds.
+    """
+
     state: TagState
+    holds_ns: int = SHORTEST_NS
     until_ns: int = _NEVER
+    is_once: bool = False
+    is_failing: bool = False
 
 
 class Judge:
@@ -135,7 +138,6 @@ class Judge:
         self._max_at_once = max_at_once
         self._tags: dict[str, _Tag] = {}
         self._recent = RecentScans(criteria.day)
-        self._holds: dict[str, int] = {}
         self._seen: tuple[TagState, ...] = ()
         # Before that, what was said of each tag holds.
         self._first_until_ns = _NEVER
@@ -146,12 +148,11 @@ class Judge:
         self._counts = Counter[Verdict]()
         self._scans = Scans()
         self._overdue = 0
-        self._once: set[str] = set()
+        self._once = 0
         self._judged = NOTHING_JUDGED
         self._changed: Mapping[str, Mapping[str, int]] = {}
         self._days: Mapping[str, Sequence[Reading]] = {}
         self.errors = 0
-        self._failing: set[str] = set()
         self.knows_recent = knows_recent
 
     def see(self, snapshot: Snapshot) -> Judged:
@@ -210,7 +211,7 @@ class Judge:
 
     def holds_ns(self) -> dict[str, int]:
         """For how long each tag's readings hold, as was last known."""
-        return self._holds.copy()
+        return {tag_id: kept.holds_ns for tag_id, kept in self._tags.items()}
 
     def _news(self, snapshot: Snapshot) -> tuple[dict[str, None], list[str]]:
         """The tags whose state is another than the last one seen, and those that are gone."""
@@ -222,7 +223,6 @@ class Judge:
             kept = self._tags.get(tag.tag_id)
             if kept is None:
                 kept = self._tags[tag.tag_id] = _Tag(tag)
-                self._holds[tag.tag_id] = SHORTEST_NS
             elif kept.state is tag:
                 continue
             kept.state = tag
@@ -236,10 +236,8 @@ class Judge:
             there = {tag.tag_id for tag in snapshot.tags}
             gone = [tag_id for tag_id in self._tags if tag_id not in there]
         for tag_id in gone:
-            del self._tags[tag_id], self._holds[tag_id]
+            self._once -= self._tags.pop(tag_id).is_once
             self._recent.forget(tag_id)
-            self._once.discard(tag_id)
-            self._failing.discard(tag_id)
         self._seen = snapshot.tags
         return news, gone
 
@@ -271,11 +269,12 @@ class Judge:
             health = self._judge(tag_id, now_ns)
         except Exception:  # whatever it is: the other tags, and the state itself, go out
             self.errors += 1
-            if not self._failing:  # once, and not for each of ten thousand tags at each scan
+            # Once, and not for each of ten thousand tags at each scan.
+            if not any(kept.is_failing for kept in self._tags.values()):
                 log.exception("%s could not be judged: its status is unknown", tag_id)
-            self._failing.add(tag_id)
+            self._tags[tag_id].is_failing = True
             return _UNKNOWN
-        self._failing.discard(tag_id)
+        self._tags[tag_id].is_failing = False
         return health
 
     def _judge(self, tag_id: str, now_ns: int | None) -> Health:
@@ -283,8 +282,9 @@ class Judge:
         if now_ns is None:
             return _UNKNOWN
         recent, recent_s = self._recent.tag(tag_id), self._criteria.recent_s
-        holds = self._holds[tag_id] = _holds_ns(recent, recent_s)
-        (self._once.add if _is_once(recent, recent_s) else self._once.discard)(tag_id)
+        holds = kept.holds_ns = _holds_ns(recent, recent_s)
+        was_once, kept.is_once = kept.is_once, len(recent.stamps_ns) == 1 and recent_s is None
+        self._once += kept.is_once - was_once
         health = judge_tag(
             kept.state,
             now_ns,
@@ -328,7 +328,7 @@ class Judge:
             for tag_id in gone:
                 tags.pop(tag_id, None)
         patrol = self._scans.patrol(self._overdue)
-        once = len(self._once) if self.knows_recent else 0
+        once = self._once if self.knows_recent else 0
         stop = stopped(patrol.last_scan_ns, now_ns, once, len(tags))
         house = judge_site(self._counts, is_silent=now_ns is None, stopped=stop)
         is_same = (house, day, patrol) == (before.house, before.day, before.patrol)

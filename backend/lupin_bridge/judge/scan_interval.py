@@ -10,7 +10,7 @@ from bisect import bisect_left, bisect_right
 from collections import deque
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from itertools import pairwise
+from itertools import pairwise, takewhile
 from statistics import median
 from typing import Final
 
@@ -145,9 +145,8 @@ class Stretches:
 
     def has_pause_within(self, start_ns: int, end_ns: int) -> bool:
         """Whether a pause lies between two moments."""
-        return any(
-            start_ns <= first and last <= end_ns for first, last in self._until(start_ns, end_ns)
-        )
+        begun = takewhile(lambda pause: pause[0] <= end_ns, self.pauses(start_ns))
+        return any(start_ns <= first and last <= end_ns for first, last in begun)
 
     def overdue_ns(self, since_ns: int, holds_ns: int) -> int:
         """When what was scanned at `since_ns` has not been for `holds_ns`; pauses do not count.
@@ -161,9 +160,3 @@ class Stretches:
                 break
             due_ns += last - max(first, since_ns)
         return due_ns
-
-    def _until(self, start_ns: int, end_ns: int) -> Iterator[tuple[int, int]]:
-        for pause in self.pauses(start_ns):
-            if pause[0] > end_ns:
-                return
-            yield pause

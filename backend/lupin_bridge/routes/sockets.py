@@ -180,12 +180,11 @@ class _FoxgloveConversation(_Conversation):
 
     async def _begin(self, key: int, channel: Channel) -> None:
         try:
-            topic = self._offer.topics[channel.id]
             async with asyncio.timeout(self._bridge.limits.answer_timeout_s):
                 listening = await self._bridge.source.relay.listen(
-                    topic, partial(self._on_sample, key)
+                    channel.topic, partial(self._on_sample, key)
                 )
-        except (KeyError, NotRelayedError, TwinUnavailableError, TimeoutError) as error:
+        except (NotRelayedError, TwinUnavailableError, TimeoutError) as error:
             self._session.give_up(key)
             text = f"channel {channel.id} cannot be served now: {str(error) or 'ROS is busy'}"
             await self._send(foxglove_protocol.status(foxglove_protocol.ERROR, text))
@@ -224,7 +223,7 @@ class _FoxgloveConversation(_Conversation):
         while self._connection.can_take:
             if self._offer_is_due:
                 self._offer_is_due = False
-                reaction = self._session.offer(self._offer.channels, self._offer.wires)
+                reaction = self._session.offer(self._offer.channels)
                 self._stop_listening(reaction)
                 self._due.extend(reaction.replies)
             elif self._due:

@@ -16,6 +16,7 @@ from typing import Any, Final
 
 import orjson
 
+from lupin_bridge.feed.relay import Topic
 from lupin_bridge.serving.ws_protocol import members_of, shown
 
 # Of the same content. The newer one is what Foxglove asks for today, the older one what Lichtblick
@@ -57,22 +58,20 @@ class Channel:
     """A topic as it is offered; `id` never stands for another topic or type."""
 
     id: int
-    topic: str
-    schema_name: str
+    topic: Topic
     schema: str
 
-    def json(self) -> bytes:
+    @property
+    def json(self) -> dict[str, Any]:
         """As in `advertise`."""
-        return orjson.dumps(
-            {
-                "id": self.id,
-                "topic": self.topic,
-                "encoding": "cdr",
-                "schemaName": self.schema_name,
-                "schemaEncoding": "ros2msg",
-                "schema": self.schema,
-            }
-        )
+        return {
+            "id": self.id,
+            "topic": self.topic.name,
+            "encoding": "cdr",
+            "schemaName": self.topic.type_name,
+            "schemaEncoding": "ros2msg",
+            "schema": self.schema,
+        }
 
 
 def chosen(offered: Iterable[str]) -> str | None:
@@ -149,9 +148,9 @@ def status(level: int, text: str) -> bytes:
     return orjson.dumps({"op": "status", "level": level, "message": text})
 
 
-def advertise(channels: Iterable[bytes]) -> bytes:
-    """Channels that are offered now, each as `Channel.json`."""
-    return b'{"op":"advertise","channels":[%b]}' % b",".join(channels)
+def advertise(channels: Iterable[Channel]) -> bytes:
+    """Channels that are offered now."""
+    return orjson.dumps({"op": "advertise", "channels": [channel.json for channel in channels]})
 
 
 def unadvertise(ids: Iterable[int]) -> bytes:

@@ -70,18 +70,18 @@ class Session:
             return self._subscribe(request)
         return self._unsubscribe(request.ids)
 
-    def offer(self, channels: Mapping[int, Channel], wires: Mapping[int, bytes]) -> Reaction:
+    def offer(self, channels: Mapping[int, Channel]) -> Reaction:
         """What the client needs of the channels that there are now.
 
         Subscriptions to those that are gone end.
         """
         gone = self._advertised.keys() - channels.keys()
-        new = [channel_id for channel_id in channels if channel_id not in self._advertised]
+        new = [it for channel_id, it in channels.items() if channel_id not in self._advertised]
         replies = []
         if gone:
             replies.append(protocol.unadvertise(gone))
         if new or not self._advertised:
-            replies.append(protocol.advertise(wires[channel_id] for channel_id in new))
+            replies.append(protocol.advertise(new))
         self._advertised = dict(channels)
         ended = [key for key, channel in self._subscriptions.items() if channel.id in gone]
         for key in ended:
@@ -162,7 +162,7 @@ class Session:
         self._too_large.add(channel.id)
         return protocol.status(
             protocol.WARNING,
-            f"messages on {shown(channel.topic)} are left out while they are larger than "
+            f"messages on {shown(channel.topic.name)} are left out while they are larger than "
             f"{MAX_MESSAGE_BYTES} bytes: this one has {size}",
         )
 
@@ -185,21 +185,17 @@ _MARKERS: Final = "visualization_msgs/msg/MarkerArray"
 class Offer:
     """What clients may subscribe to; belongs to the event loop.
 
-    `channels`, `wires` (the same as they are advertised) and `topics` go by the channels' ids.
-    `has_time`: time is simulated.
+    `channels` go by their ids. `has_time`: time is simulated.
     """
 
     def __init__(self, source: TwinSource) -> None:
         self.session_id = uuid.uuid4().hex
         self.channels: dict[int, Channel] = {}
-        self.wires: dict[int, bytes] = {}
-        self.topics: dict[int, Topic] = {}
         self.has_time = False
         self._sent_ns: int | None = None
         self.counts = Counts()
         self._source = source
         self._ids = count(1)
-        self._known: dict[Topic, Channel] = {}
         self._missing: set[str] = set()
         self._followers: dict[Callable[[int | None], None], None] = {}
         self._following: asyncio.Task[None] | None = None
@@ -241,20 +237,12 @@ class Offer:
         except TwinUnavailableError:
             published = {}
         wanted += [Topic(name, kind) for name, kind in sorted(published.items())[:MAX_LAYERS]]
-        known = {}
-        for topic in wanted:
-            channel = self._known.get(topic) or await self._channel(topic)
-            if channel is not None:
-                known[topic] = channel
-        if self._known == known:
-            return
-        self._known = known
-        self.topics = {channel.id: topic for topic, channel in known.items()}
-        self.channels = {channel.id: channel for channel in known.values()}
-        self.wires = {
-            key: self.wires.get(key) or channel.json() for key, channel in self.channels.items()
-        }
-        self._notify(None)
+        known = {channel.topic: channel for channel in self.channels.values()}
+        found = [known.get(topic) or await self._channel(topic) for topic in wanted]
+        channels = {channel.id: channel for channel in found if channel is not None}
+        if channels != self.channels:
+            self.channels = channels
+            self._notify(None)
 
     async def _channel(self, topic: Topic) -> Channel | None:
         if topic.type_name in self._missing:
@@ -265,7 +253,7 @@ class Offer:
             self._missing.add(topic.type_name)
             log.warning("%s is not offered to viewers: %s", topic.name, error)
             return None
-        return Channel(next(self._ids), topic.name, topic.type_name, text)
+        return Channel(next(self._ids), topic, text)
 
     async def _follow(self) -> None:
         loop = asyncio.get_running_loop()

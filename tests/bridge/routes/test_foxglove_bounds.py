@@ -20,7 +20,7 @@ SIM = ("--ros-args", "-p", "use_sim_time:=true")
 
 def subscribing(offer: Any, *topics: str) -> bytes:
     """The frame that subscribes to these topics."""
-    ids = {channel.topic: channel.id for channel in offer.channels.values()}
+    ids = {channel.topic.name: channel.id for channel in offer.channels.values()}
     entries = [{"id": n, "channelId": ids[topic]} for n, topic in enumerate(topics)]
     return masked(TEXT, json.dumps({"op": "subscribe", "subscriptions": entries}).encode())
 

@@ -5,12 +5,11 @@ from typing import Any
 
 import pytest
 
-from lupin_bridge.feed.relay import Sample
+from lupin_bridge.feed.relay import Sample, Topic
 from lupin_bridge.viewers.foxglove_protocol import MAX_SUBSCRIPTIONS, Channel
 from lupin_bridge.viewers.foxglove_session import MAX_MESSAGE_BYTES, Counts, Reaction, Session
 
-CHANNELS = {n: Channel(n, f"/topic{n}", "a/msg/B", "int32 x\n") for n in range(1, 201)}
-WIRES = {n: channel.json() for n, channel in CHANNELS.items()}
+CHANNELS = {n: Channel(n, Topic(f"/topic{n}", "a/msg/B"), "int32 x\n") for n in range(1, 201)}
 
 
 class Stage:
@@ -19,7 +18,7 @@ class Stage:
     def __init__(self) -> None:
         self.counts = Counts()
         self.session = Session(self.counts)
-        self.session.offer(CHANNELS, WIRES)
+        self.session.offer(CHANNELS)
 
     def say(self, **members: Any) -> Reaction:
         return self.session.receive(json.dumps(members))
@@ -110,8 +109,8 @@ def test_channels_that_come_and_go_are_told_and_their_subscriptions_end(stage: S
     stage.subscribe((1, 10), (2, 20))
     stage.session.put(1, Sample(b"a", 5))
     now = {n: channel for n, channel in CHANNELS.items() if n != 10}
-    now[300] = Channel(300, "/new", "a/msg/B", "")
-    reaction = stage.session.offer(now, {**WIRES, 300: now[300].json()})
+    now[300] = Channel(300, Topic("/new", "a/msg/B"), "")
+    reaction = stage.session.offer(now)
     gone, new = map(json.loads, reaction.replies)
     assert gone == {"op": "unadvertise", "channelIds": [10]}
     assert [channel["topic"] for channel in new["channels"]] == ["/new"]
@@ -121,7 +120,7 @@ def test_channels_that_come_and_go_are_told_and_their_subscriptions_end(stage: S
     stage.subscribe((1, 300))
     assert stage.session.has(1, now[300])
     assert not stage.session.has(1, CHANNELS[10]), "the id is another channel's now"
-    assert stage.session.offer(now, WIRES) == Reaction()
+    assert stage.session.offer(now) == Reaction()
 
 
 def test_a_subscription_that_cannot_be_served_is_given_up(stage: Stage) -> None:

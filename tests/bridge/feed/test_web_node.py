@@ -7,11 +7,10 @@ from typing import Any
 import pytest
 import rclpy
 from diagnostic_msgs.msg import DiagnosticArray
-from lupin_msgs.msg import SensorReading, TwinState, TwinTagState, TwinTimes
+from lupin_msgs.msg import SensorReading, TwinState, TwinTagState
 from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.parameter import Parameter
-from rclpy.serialization import deserialize_message
 
 from lupin_bridge.feed.ros_thread import forward
 from lupin_bridge.feed.web_node import WebNode
@@ -67,7 +66,7 @@ class Stage:
         """Let a twin publish a state and its times, and return what the node makes of them."""
         self.stamp_s = self.stamp_s + 1 if at_s is None else at_s
         snapshot = Snapshot(self.stamp_s * S, "map", tags)
-        times = deserialize_message(convert.TimesMessages().build(snapshot), TwinTimes)
+        times = convert.StateMessages().times(snapshot)
         peer.publish("/twin/times", times, depth=1)
         peer.publish("/twin/state", convert.StateMessages().build(snapshot), depth=1)
         told = self.told_of(self.stamp_s * S)
@@ -207,7 +206,7 @@ def test_a_state_waits_for_its_times_and_for_no_others(stage: Stage, peer: Peer)
     assert alone.tags[0].readings[0] == Reading("co2", 7.0)
     assert len(stage.told) == count + 1
     # And with them as soon as they come.
-    times = deserialize_message(convert.TimesMessages().build(late), TwinTimes)
+    times = convert.StateMessages().times(late)
     peer.publish("/twin/times", times, depth=1)
     stage.until(lambda: stage.told[-1].has_times, "the times")
     assert stage.told[-1].tags[0].readings[0].observed_at_ns == 80 * S

@@ -11,9 +11,7 @@ from geometry_msgs.msg import Quaternion
 from hypothesis import given
 from hypothesis import strategies as st
 from lupin_msgs.msg import Observation as ObservationMsg
-from lupin_msgs.msg import TwinTimes
 from rclpy.serialization import deserialize_message, serialize_message
-from std_msgs.msg import Header
 
 from lupin_twin.core import history, ingest
 from lupin_twin.core.ingest import ReceivedInspection, ReceivedReading
@@ -55,7 +53,7 @@ UNPINNED = TagState(tag_id="8")
 def test_a_state_survives_the_wire_and_back() -> None:
     snapshot = Snapshot(stamp_ns=9 * S, frame_id="map", tags=(PINNED, UNPINNED))
     state = over_the_wire(convert.StateMessages().build(snapshot))
-    times = deserialize_message(convert.TimesMessages().build(snapshot), TwinTimes)
+    times = over_the_wire(convert.StateMessages().times(snapshot))
     assert convert.snapshot_of(state, None, times) == snapshot
 
 
@@ -76,7 +74,7 @@ def test_without_times_nothing_is_known_but_the_last_observation() -> None:
 def test_a_state_and_its_times_of_the_same_tags_keep_the_very_same_values() -> None:
     snapshot = Snapshot(stamp_ns=9 * S, frame_id="map", tags=(PINNED, UNPINNED))
     state = over_the_wire(convert.StateMessages().build(snapshot))
-    times = deserialize_message(convert.TimesMessages().build(snapshot), TwinTimes)
+    times = over_the_wire(convert.StateMessages().times(snapshot))
     first = convert.snapshot_of(state, None, times)
     second = convert.snapshot_of(state, first, times)
     assert all(one is other for one, other in zip(first.tags, second.tags, strict=True))
@@ -84,33 +82,6 @@ def test_a_state_and_its_times_of_the_same_tags_keep_the_very_same_values() -> N
     third = convert.snapshot_of(state, second, times)
     assert third.tags[0] is not second.tags[0]
     assert third.tags[1] is second.tags[1]
-
-
-TEXT = st.text(st.characters(codec="utf-8", exclude_characters="\0"), max_size=9)
-STAMPS = st.integers(1, 2_000_000_000 * S)
-TAGS_WITH_TIMES = st.builds(
-    TagState,
-    tag_id=TEXT,
-    readings=st.lists(
-        st.builds(Reading, TEXT, st.just(1.0), STAMPS), max_size=4, unique_by=lambda r: r.name
-    ).map(tuple),
-    looked_at_ns=st.none() | STAMPS,
-    last_try=st.none() | st.builds(Attempt, STAMPS, st.integers(0, 255), TEXT),
-)
-
-
-@given(st.lists(TAGS_WITH_TIMES, max_size=4, unique_by=lambda tag: tag.tag_id), TEXT)
-def test_times_put_together_from_parts_are_those_that_ros_would_write(
-    tags: list[TagState], frame_id: str
-) -> None:
-    builder = convert.TimesMessages()
-    builder.build(Snapshot(S, frame_id, tuple(tags[:2])))
-    msg = deserialize_message(builder.build(Snapshot(9 * S + 7, frame_id, tuple(tags))), TwinTimes)
-    assert msg == TwinTimes(
-        header=Header(stamp=convert.time_msg(9 * S + 7), frame_id=frame_id),
-        tags=[convert.times_message(tag) for tag in tags],
-    )
-    assert [each.tag_id for each in msg.tags] == [tag.tag_id for tag in tags]
 
 
 def over_the_wire(msg: Any) -> Any:

@@ -11,7 +11,6 @@ and would serialise a NumPy scalar as garbage.
 from __future__ import annotations
 
 import math
-import sys
 from array import array
 from collections.abc import Iterable, Iterator
 from typing import Any, Final
@@ -30,7 +29,6 @@ from lupin_msgs.msg import (
     TwinTagState,
     TwinTimes,
 )
-from rclpy.serialization import serialize_message
 from std_msgs.msg import Header
 
 from lupin_twin.core.diagnostics import STATE_TOPIC, Finding
@@ -95,8 +93,6 @@ def _node_of(msg: Any, state_topic: str) -> str | None:
 
 UINT16_MAX: Final = 65_535
 INT32_MAX: Final = 2_147_483_647
-# What stands before a serialised message: how it is encoded.
-_CDR_HEAD: Final = 4
 
 
 # --- time -----------------------------------------------------------------------------------
@@ -311,59 +307,37 @@ def _moment(stamp: Any) -> int | None:
 
 
 class StateMessages:
-    """Builds TwinState from snapshots and caches each tag's message until the tag changes.
+    """Builds TwinState and TwinTimes of snapshots; caches each tag's parts until the tag changes.
 
-    The message handed out is the builder's own: publish it at once and do not keep it.
+    The messages handed out are the builder's own: publish them at once and do not keep them.
     """
 
     def __init__(self) -> None:
-        self._cache: dict[str, tuple[TagState, Any]] = {}
+        self._cache: dict[str, tuple[TagState, Any, Any]] = {}
 
     def build(self, snapshot: Snapshot) -> Any:
         """The snapshot as lupin_msgs/TwinState; only tags that changed are built anew."""
-        return TwinState(
-            header=Header(stamp=time_msg(snapshot.stamp_ns), frame_id=snapshot.frame_id),
-            tags=[self._tag(tag, snapshot.now_ns) for tag in snapshot.tags],
-        )
+        tags = []
+        for tag in snapshot.tags:
+            _, msg, _ = self._parts(tag)
+            msg.stale_seconds = tag.stale_seconds(snapshot.now_ns)
+            tags.append(msg)
+        return TwinState(header=_header(snapshot), tags=tags)
 
-    def _tag(self, tag: TagState, now_ns: int | None) -> Any:
-        cached = self._cache.get(tag.tag_id)
-        if cached is not None and cached[0] is tag:
-            msg = cached[1]
-        else:
-            msg = tag_message(tag)
-            self._cache[tag.tag_id] = (tag, msg)
-        msg.stale_seconds = tag.stale_seconds(now_ns)
-        return msg
+    def times(self, snapshot: Snapshot) -> Any:
+        """The snapshot's times as lupin_msgs/TwinTimes, with the same stamp."""
+        times = [self._parts(tag)[2] for tag in snapshot.tags]
+        return TwinTimes(header=_header(snapshot), tags=times)
 
-
-class TimesMessages:
-    """Builds TwinTimes from snapshots, serialised, and caches each tag's part until it changes.
-
-    With no number in it longer than four bytes, the parts fit together at any multiple of four:
-    ten thousand tags of which few have changed are one join.
-    """
-
-    def __init__(self) -> None:
-        self._cache: dict[str, tuple[TagState, bytes]] = {}
-
-    def build(self, snapshot: Snapshot) -> bytes:
-        """The snapshot's times as a serialised lupin_msgs/TwinTimes, to be published as it is."""
-        head = serialize_message(
-            TwinTimes(header=Header(stamp=time_msg(snapshot.stamp_ns), frame_id=snapshot.frame_id))
-        )
-        # It ends with the count of tags, none, which is aligned; there may be padding behind it.
-        end = _CDR_HEAD + -(-(len(head) - _CDR_HEAD) // 4) * 4
-        count = len(snapshot.tags).to_bytes(4, sys.byteorder)
-        return b"".join([head[: end - 4], count, *[self._tag(tag) for tag in snapshot.tags]])
-
-    def _tag(self, tag: TagState) -> bytes:
+    def _parts(self, tag: TagState) -> tuple[TagState, Any, Any]:
         cached = self._cache.get(tag.tag_id)
         if cached is None or cached[0] is not tag:
-            part = serialize_message(times_message(tag))[_CDR_HEAD:]
-            cached = (tag, part + bytes(-len(part) % 4))
-            self._cache[tag.tag_id] = cached
-        return cached[1]
+            cached = self._cache[tag.tag_id] = tag, tag_message(tag), times_message(tag)
+        return cached
+
+
+def _header(snapshot: Snapshot) -> Any:
+    return Header(stamp=time_msg(snapshot.stamp_ns), frame_id=snapshot.frame_id)
 
 
 def times_message(tag: TagState) -> Any:

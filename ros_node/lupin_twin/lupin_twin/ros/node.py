@@ -82,7 +82,6 @@ class TwinNode(AdjustableNode):
         self._topics: dict[str, str] = {}
         self._listeners: list[Callable[[Snapshot], None]] = []
         self._states = convert.StateMessages()
-        self._times = convert.TimesMessages()
         self._group = MutuallyExclusiveCallbackGroup()
         self._workers = Workers("field")
         done = self.create_guard_condition(
@@ -327,7 +326,7 @@ class TwinNode(AdjustableNode):
         snapshot = self.snapshot()
         self._state_publisher.publish(self._states.build(snapshot))
         self.utilities.drain()
-        self._times_publisher.publish(self._times.build(snapshot))
+        self._times_publisher.publish(self._states.times(snapshot))
         topic = self._state_publisher.topic_name
         if self.twins.see(int(self.count_publishers(topic)), time.monotonic()):
             self.utilities.warn(

@@ -62,7 +62,7 @@ class LocalTwin(RosSource[TwinNode]):
                     )
                 )
 
-            node.add_listener(notify, HEARTBEAT_S)
+            node.listen(notify, HEARTBEAT_S)
             return node
 
         await self._start_thread(make_node, on_state, on_death)

@@ -21,7 +21,7 @@ from rclpy.signals import SignalHandlerOptions
 
 from lupin_bridge.feed.source import TwinUnavailableError
 from lupin_twin.core.parameters import TwinParameters
-from lupin_twin.ros.base_node import end_spinning, spin_until_shutdown
+from lupin_twin.ros.base_node import NodeUtilities, end_spinning, spin_until_shutdown
 from lupin_twin.runtime.process import remove_stale_shared_memory
 
 # rcl would write lines of its own to standard error, between those that a log collector reads. Its
@@ -63,11 +63,8 @@ class RosStartError(RuntimeError):
 class BridgedNode(Protocol):
     """What the thread needs of the node it runs."""
 
-    callback_errors: int
+    utilities: NodeUtilities
     parameters: TwinParameters
-
-    def report(self, what: str, error: Exception) -> None:
-        """Count and log an error that left a callback."""
 
     def destroy_node(self) -> object:
         """Give everything back to rclpy."""
@@ -282,10 +279,10 @@ class RosThread(Generic[NodeT, EventT]):
             self._end(error)
 
     def _bring_back(self, beat: asyncio.Future[int]) -> None:
-        self.to_loop(_settle, beat, self.require_node().callback_errors, None)
+        self.to_loop(_settle, beat, self.require_node().utilities.callback_errors, None)
 
     def _report(self, what: str, error: Exception) -> None:
-        self.require_node().report(what, error)
+        self.require_node().utilities.report(what, error)
 
     def _init_ros(self) -> None:
         forward()

@@ -17,10 +17,9 @@ from lupin_msgs.srv import (
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
 from rclpy.validate_topic_name import validate_topic_name
 
-from lupin_twin.core import ingest, interfaces
+from lupin_twin.core import interfaces
 from lupin_twin.core.clock import StampWatch
 from lupin_twin.core.diagnostics import SelfReport, self_report
-from lupin_twin.core.drops import Drop, Reason
 from lupin_twin.core.parameters import TwinParameters
 from lupin_twin.core.state import Snapshot, TagState
 from lupin_twin.field.engine import FieldRules
@@ -111,7 +110,6 @@ class WebNode(AdjustableNode):
         with naming_own_parameters():
             super().__init__(NODE_NAME, context=context)
         self.utilities = NodeUtilities(self)
-        self.report = self.utilities.report
         self.parameters = declare(self, SHARED_PARAMETERS)
         self.rules = FieldRules.of(self.parameters)
         self.adjust_by(self._adjust)
@@ -190,11 +188,6 @@ class WebNode(AdjustableNode):
         self._changes = before._changes
 
     @property
-    def callback_errors(self) -> int:
-        """Errors met by callbacks so far."""
-        return self.utilities.callback_errors
-
-    @property
     def revision(self) -> str:
         """Digests of who publishes the state, of poses and readings, and of the map.
 
@@ -265,7 +258,9 @@ class WebNode(AdjustableNode):
 
     def _show(self, msg: Any, times: Any) -> None:
         self._patience.cancel()
-        self._check_publishers()
+        topic = self._topics["state_topic"]
+        self.publishers_digest = _digest_of_publishers(self.get_publishers_info_by_topic(topic))
+        self.utilities.check_twins(self.twins, topic, "what is shown is a mixture")
         before = self._newest
         snapshot = convert.snapshot_of(msg, before, times)
         now_s = time.monotonic()
@@ -282,31 +277,11 @@ class WebNode(AdjustableNode):
             self._forget_all_but(snapshot.tags)
         self._on_state(snapshot)
 
-    def _check_publishers(self) -> None:
-        topic = self._topics["state_topic"]
-        publishers = self.get_publishers_info_by_topic(topic)
-        publishers_digest = _digest_of_publishers(publishers)
-        if publishers_digest != self.publishers_digest:
-            self.publishers_digest = publishers_digest
-        if self.twins.see(int(self.count_publishers(topic)), time.monotonic()):
-            self.utilities.warn(
-                ("twins", 0),
-                f"{self.twins.value} nodes publish {topic}: what is shown is a mixture; "
-                "stop all twins but one, or give them ROS domains of their own",
-            )
-
     def _take_map(self, msg: Any) -> None:
         # Kept, and told with the next state: a map is no sign of life of the twin.
-        topic = self._topics["map_topic"]
-        if dropped := ingest.wrong_frame(msg.header.frame_id, self.parameters.frame_id):
-            self.utilities.drop(dropped, topic)
-            return
-        try:
-            new = convert.map_of(msg, 0)
-        except ValueError as error:
-            self.utilities.drop(Drop(Reason.MAP, f"{error}; the last one stays", "a map"), topic)
-            return
-        if self.occupancy_map is None or not new.shows_the_same_as(self.occupancy_map):
+        topic, frame_id = self._topics["map_topic"], self.parameters.frame_id
+        new = self.utilities.new_map(msg, topic, frame_id, self.occupancy_map)
+        if new is not None:
             self.occupancy_map = replace(new, revision=_digest_of_map(new))
             self._on_map()
 

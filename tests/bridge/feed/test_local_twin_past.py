@@ -56,7 +56,7 @@ async def test_an_answer_that_takes_too_long_ends_and_delays_no_observation(doma
         await twin.past.ask(Itself(0), await twin.now(), 0.0)
         waiting = asyncio.create_task(twin.ask(Endless(), 0.0))
         await until(lambda: len(twin.past.asked) == 1, "the question")
-        await twin.thread.call(lambda node: node.notify_listeners())
+        await twin.thread.call(lambda node: node.notify_listener())
         assert not waiting.done()
         twin.timeout_s = 0.1
         with pytest.raises(TwinTimeoutError, match=r"within 0\.1 s"):

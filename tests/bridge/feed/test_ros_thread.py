@@ -23,6 +23,7 @@ class Probe(Node):  # type: ignore[misc]  # rclpy is not typed
     def __init__(self, context: Any, post: Callable[[int], None]) -> None:
         super().__init__("probe", context=context)
         self.post = post
+        self.utilities: Any = self
         self.callback_errors = 0
         self.thread = threading.current_thread()
         self.ticks = 0

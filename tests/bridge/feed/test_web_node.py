@@ -244,7 +244,7 @@ def test_a_map_that_cannot_be_used_leaves_the_last_one(
     stage.until(lambda: stage.node.occupancy_map is not good, "the next good map")
     assert stage.node.occupancy_map is not None
     assert stage.node.occupancy_map.width == 3
-    assert stage.node.callback_errors == 0
+    assert stage.node.utilities.callback_errors == 0
 
 
 def test_the_same_map_has_the_same_revision_in_every_replica(domain: int, peer: Peer) -> None:
@@ -330,7 +330,7 @@ def test_a_state_that_breaks_the_callback_is_counted_and_the_next_one_is_taken(
     with monkeypatch.context() as broken:
         broken.setattr(stage.node, "_on_state", fail)
         peer.publish("/twin/state", TwinState(tags=[tag("1")]), depth=1)
-        stage.until(lambda: stage.node.callback_errors == 1, "the error")
+        stage.until(lambda: stage.node.utilities.callback_errors == 1, "the error")
     assert stage.take(peer, tag("2")).tags[0].tag_id == "2"
 
 

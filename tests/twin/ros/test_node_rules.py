@@ -54,7 +54,7 @@ def stage(domain: int) -> Iterator[Stage]:
 def test_a_rule_that_is_changed_takes_effect_at_once(stage: Stage) -> None:
     node = stage.node
     told: list[Any] = []
-    node.add_listener(told.append, heartbeat_s=60.0)
+    node.listen(told.append, heartbeat_s=60.0)
     before, revision = node.rules, node.revision
     [result] = node.set_parameters([Parameter("idw_power", value=3.5)])
     assert (result.successful, result.reason) == (True, "")
@@ -69,7 +69,7 @@ def test_a_rule_that_is_changed_takes_effect_at_once(stage: Stage) -> None:
 def test_the_maps_revision_grows_with_a_map_that_is_accepted_and_new(stage: Stage) -> None:
     node = stage.node
     told: list[Any] = []
-    node.add_listener(told.append, heartbeat_s=1000.0)
+    node.listen(told.append, heartbeat_s=1000.0)
     revisions = []
     broken, again = occupancy_grid([[0, 0]]), occupancy_grid([[0, -1]])
     broken.info.width = 7

@@ -24,11 +24,14 @@ from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.serialization import deserialize_message
 
+from lupin_twin.core import ingest
 from lupin_twin.core.clock import Late
 from lupin_twin.core.diagnostics import MAX_PROBLEMS
 from lupin_twin.core.drops import LATE, LOST, Counts, Drop, Reason, Tally, Throttle
 from lupin_twin.core.interfaces import SERVICE_DEPTH, Topic
-from lupin_twin.ros.inputs import Input
+from lupin_twin.field.explored import OccupancyMap
+from lupin_twin.ros import convert
+from lupin_twin.ros.inputs import Input, TwinCount
 from lupin_twin.ros.message_limits import MessageShape, TooManyError
 from lupin_twin.ros.parameters import naming
 from lupin_twin.runtime import process
@@ -262,6 +265,32 @@ class NodeUtilities:
         # By the clock that the middleware stamped it with, if it did.
         if received_ns and time.time_ns() - received_ns > BEHIND_S * 1e9:
             self._behind_until_s = time.monotonic() + BELIEVED_S
+
+    def new_map(
+        self, msg: Any, topic: str, frame_id: str, before: OccupancyMap | None
+    ) -> OccupancyMap | None:
+        """A map that can be used and shows something else than the one before; else None.
+
+        One that cannot is dropped. Its revision is for the caller to say.
+        """
+        if dropped := ingest.wrong_frame(msg.header.frame_id, frame_id):
+            self.drop(dropped, topic)
+            return None
+        try:
+            new = convert.map_of(msg, 0)
+        except ValueError as error:
+            self.drop(Drop(Reason.MAP, f"{error}; the last one stays", "a map"), topic)
+            return None
+        return None if before is not None and new.shows_the_same_as(before) else new
+
+    def check_twins(self, twins: TwinCount, topic: str, what: str) -> None:
+        """Count who publishes a twin's state; `what` becomes of it where they are several."""
+        if twins.see(int(self.node.count_publishers(topic)), time.monotonic()):
+            self.warn(
+                ("twins", 0),
+                f"{twins.value} nodes publish {topic}: {what}; "
+                "stop all twins but one, or give them ROS domains of their own",
+            )
 
     def drop(self, drop: Drop, topic: str) -> None:
         """Count and report something that was dropped."""

@@ -19,7 +19,7 @@ from rosgraph_msgs.msg import Clock as ClockMessage
 from lupin_twin.core import ingest, interfaces
 from lupin_twin.core.clock import LATCHED_AFTER_S, ClockWatch, Lateness
 from lupin_twin.core.diagnostics import CLOCK, ERROR, Health, Origin, findings, origin_of
-from lupin_twin.core.drops import Drop, Reason
+from lupin_twin.core.drops import Drop
 from lupin_twin.core.history import kind_of
 from lupin_twin.core.parameters import ParameterError, TwinParameters, World
 from lupin_twin.core.state import ClockState, Inspection, Scan, Snapshot, TwinStore, Write
@@ -63,7 +63,6 @@ class TwinNode(AdjustableNode):
         with naming_own_parameters():
             super().__init__(NODE_NAME, context=context, cli_args=cli_args)
         self.utilities = NodeUtilities(self)
-        self.report = self.utilities.report
         self.parameters = declare(self)
         self._world = world
         self.store = TwinStore()
@@ -80,7 +79,7 @@ class TwinNode(AdjustableNode):
         self._map_revision = 0
         self._rules_revision = 0
         self._topics: dict[str, str] = {}
-        self._listeners: list[Callable[[Snapshot], None]] = []
+        self._listener: Callable[[Snapshot], None] | None = None
         self._states = convert.StateMessages()
         self._group = MutuallyExclusiveCallbackGroup()
         self._workers = Workers("field")
@@ -127,27 +126,20 @@ class TwinNode(AdjustableNode):
     # --- for the bridge, on this node's thread ----------------------------------------------
 
     @property
-    def callback_errors(self) -> int:
-        """Errors met by callbacks so far."""
-        return self.utilities.callback_errors
-
-    @property
     def revision(self) -> tuple[int, int, int]:
         """(observation_count, map revision, rules revision): changes exactly when a field could."""
         return self.store.observation_count, self._map_revision, self._rules_revision
 
-    def add_listener(self, listener: Callable[[Snapshot], None], heartbeat_s: float) -> None:
+    def listen(self, listener: Callable[[Snapshot], None], heartbeat_s: float) -> None:
         """Call `listener(snapshot)` on this thread now, after each change, and as a heartbeat.
 
         The heartbeat goes by the steady clock and does not depend on `state_publish_rate_hz`: a
         listener can tell a quiet greenhouse from a dead twin, however rarely the topic is
         published.
         """
-        self._listeners.append(listener)
-        listener(self.snapshot())
-        self.utilities.every(
-            self._group, heartbeat_s, "heartbeat", lambda: listener(self.snapshot())
-        )
+        self._listener = listener
+        self.notify_listener()
+        self.utilities.every(self._group, heartbeat_s, "heartbeat", self.notify_listener)
 
     def snapshot(self) -> Snapshot:
         """Every tag, now by ROS time, and whether that runs."""
@@ -229,7 +221,7 @@ class TwinNode(AdjustableNode):
         if (rules := FieldRules.of(now)) != self.rules:
             self.rules = rules
             self._rules_revision += 1
-            self.notify_listeners()
+            self.notify_listener()
 
     # --- callbacks --------------------------------------------------------------------------
 
@@ -244,7 +236,7 @@ class TwinNode(AdjustableNode):
             self._observed_s = time.monotonic()
             if is_news:
                 self._check_lateness(write, topic)
-            self.notify_listeners()
+            self.notify_listener()
 
     def _check_lateness(self, write: Scan | Inspection, topic: str) -> None:
         late = self.lateness.see(
@@ -265,24 +257,16 @@ class TwinNode(AdjustableNode):
         ):
             self._apply(write, topic)
         if self.store.observation_count != before:
-            self.notify_listeners()
+            self.notify_listener()
 
     def _on_map(self, msg: Any) -> None:
-        topic = self._topics["map_topic"]
-        if dropped := ingest.wrong_frame(msg.header.frame_id, self.parameters.frame_id):
-            self.utilities.drop(dropped, topic)
-            return
-        try:
-            new = convert.map_of(msg, self._map_revision + 1)
-        except ValueError as error:
-            self.utilities.drop(Drop(Reason.MAP, f"{error}; the last one stays", "a map"), topic)
-            return
-        if self.occupancy_map is not None and new.shows_the_same_as(self.occupancy_map):
-            return
-        self.occupancy_map = new
-        self._map_revision += 1
-        self.memory.note_map(new)
-        self.notify_listeners()
+        topic, frame_id = self._topics["map_topic"], self.parameters.frame_id
+        new = self.utilities.new_map(msg, topic, frame_id, self.occupancy_map)
+        if new is not None:
+            self._map_revision += 1
+            self.occupancy_map = replace(new, revision=self._map_revision)
+            self.memory.note_map(self.occupancy_map)
+            self.notify_listener()
 
     def _deliver(self) -> None:
         self.utilities.drain()
@@ -328,12 +312,7 @@ class TwinNode(AdjustableNode):
         self.utilities.drain()
         self._times_publisher.publish(self._states.times(snapshot))
         topic = self._state_publisher.topic_name
-        if self.twins.see(int(self.count_publishers(topic)), time.monotonic()):
-            self.utilities.warn(
-                ("twins", 0),
-                f"{self.twins.value} nodes publish {topic}: consumers get a mixture; "
-                "stop all twins but one, or give them ROS domains of their own",
-            )
+        self.utilities.check_twins(self.twins, topic, "consumers get a mixture")
 
     @property
     def _clock_state(self) -> ClockState:
@@ -353,19 +332,17 @@ class TwinNode(AdjustableNode):
             self.utilities.drop(drop, topic)
         return near is not None and refused is None
 
-    def notify_listeners(self) -> None:
-        """Give all of them the state as it is."""
-        if self._listeners:
-            snapshot = self.snapshot()
-            for listener in self._listeners:
-                listener(snapshot)
+    def notify_listener(self) -> None:
+        """Give it the state as it is."""
+        if self._listener is not None:
+            self._listener(self.snapshot())
 
     def _check_clock(self) -> None:
         self._past_queue.go_on()
         before = self._clock_watch.state
         self.now_ns()
         if self._clock_watch.state != before:
-            self.notify_listeners()
+            self.notify_listener()
         condition = self.memory.condition
         if not condition.is_well:
             self.utilities.warn(("journal", condition.state), f"journal: {condition.detail}")

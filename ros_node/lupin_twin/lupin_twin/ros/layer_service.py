@@ -71,30 +71,12 @@ class _Topic:
     publisher: Any
     key_of: Callable[[], object]
     plan: Callable[[], _Plan]
-    forget: Callable[[], None] = lambda: None
     key: object = None
     begun_s: float = -math.inf
     is_wanted: bool = False
     is_under_way: bool = False
     published: int = 0
     problem: str = ""
-
-
-@dataclass(slots=True)
-class _Marked:
-    """Markers of one kind: belongs to the thread that makes them."""
-
-    marks: Callable[[Snapshot], Sequence[Any]]
-    arrays: MarkerArrays
-    before: Sequence[Any] | None = None
-
-    def make(self, snapshot: Snapshot, *_: object) -> bytes | None:
-        """The array, if it is another than the one before."""
-        marks = self.marks(snapshot)
-        if marks == self.before:
-            return None
-        self.before = marks
-        return self.arrays.build(marks)
 
 
 @dataclass(slots=True)
@@ -148,17 +130,10 @@ class LayerService:
             (TAGS, tag_marks, tag_markers),
             (PLANTERS, planter_marks, planter_markers),
         ):
-            marked = _Marked(marks, MarkerArrays(make, frame_id))
+            arrays = MarkerArrays(marks, make, frame_id)
             publisher = node.create_publisher(MarkerArray, kind.name, qos_of(kind))
             # They age: whether they are the same is found where they are made.
-            self._topics.append(
-                _Topic(
-                    publisher,
-                    lambda: None,
-                    partial(self._plan_marks, marked),
-                    marked.arrays.forget,
-                )
-            )
+            self._topics.append(_Topic(publisher, lambda: None, partial(self._plan_marks, arrays)))
 
     def check(self) -> None:
         """Begin what is wanted and may have changed; to be called every `LAYERS_PERIOD_S`."""
@@ -166,11 +141,8 @@ class LayerService:
         now_s = time.monotonic()
         for topic in self._topics:
             topic.is_wanted = topic.publisher.get_subscription_count() > 0
-            if topic.is_under_way:
-                continue
-            if not topic.is_wanted:
-                topic.forget()
-            elif now_s - topic.begun_s >= PERIOD_S:
+            is_due = now_s - topic.begun_s >= PERIOD_S
+            if topic.is_wanted and not topic.is_under_way and is_due:
                 self._begin(topic, now_s)
 
     def _begin(self, topic: _Topic, now_s: float) -> None:
@@ -254,8 +226,8 @@ class LayerService:
             self._whole = key, default_request(sensor, box, most)
         return replace(self._whole[1], sensor_type=sensor)
 
-    def _plan_marks(self, marked: _Marked) -> _Plan:
-        return None, partial(marked.make, self.snapshot())
+    def _plan_marks(self, arrays: MarkerArrays) -> _Plan:
+        return None, partial(arrays.build, self.snapshot())
 
     # --- the node's -------------------------------------------------------------------------
 

@@ -11,7 +11,7 @@ import math
 import re
 import sys
 from array import array
-from collections.abc import Callable, Hashable, Iterable, Mapping
+from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
 from itertools import chain
 from typing import Any, Final, Literal, NamedTuple
 
@@ -252,27 +252,33 @@ def _marker(
 
 
 class MarkerArrays:
-    """Builds visualization_msgs/MarkerArray of marks, and caches each one's markers.
+    """Builds visualization_msgs/MarkerArray of one kind of marks, and caches each one's markers.
 
     An array says all there is: its first marker deletes what was there before, so nothing that is
     gone stays in a viewer, not even from a twin before this one. Belongs to one thread at a time.
     """
 
-    def __init__(self, make: Callable[[Any, str], list[Any]], frame_id: str) -> None:
-        """`make(mark, frame_id)` gives the markers of a mark."""
+    def __init__(
+        self,
+        marks: Callable[[Snapshot], Sequence[Any]],
+        make: Callable[[Any, str], list[Any]],
+        frame_id: str,
+    ) -> None:
+        """`make(mark, frame_id)` gives the markers of one of the `marks(snapshot)`."""
+        self._marks = marks
         self._make = make
         self._frame_id = frame_id
-        self._markers: dict[Hashable, list[Any]] = {}
+        self._markers: dict[Hashable, list[Any]] | None = None
         self._clear = Marker(header=Header(frame_id=frame_id), action=Marker.DELETEALL)
 
-    def build(self, marks: Iterable[Hashable]) -> bytes:
-        """The marks' array, serialised; only those that changed are made anew, in turns."""
-        before, self._markers = self._markers, {}
+    def build(self, snapshot: Snapshot, *_: object) -> bytes | None:
+        """The array, serialised, if it is another than the one before; made in turns."""
+        marks, before = self._marks(snapshot), self._markers
+        if before is not None and marks == [*before]:
+            return None
+        self._markers = {}
         for mark in in_turns(marks):
-            self._markers[mark] = before.get(mark) or self._make(mark, self._frame_id)
+            known = None if before is None else before.get(mark)
+            self._markers[mark] = known or self._make(mark, self._frame_id)
         markers = [self._clear, *chain.from_iterable(self._markers.values())]
         return bytes(serialize_message(MarkerArray(markers=markers)))
-
-    def forget(self) -> None:
-        """Drop the markers: nobody subscribes."""
-        self._markers = {}

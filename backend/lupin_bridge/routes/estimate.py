@@ -11,7 +11,7 @@ from fastapi import APIRouter, Request, Response
 
 from lupin_bridge.access.middleware import client_of
 from lupin_bridge.bridge import Bridge
-from lupin_bridge.feed.estimates import NAMES_TAG_S, sensors_of
+from lupin_bridge.feed.estimates import sensors_of
 from lupin_bridge.feed.source import TwinUnavailableError
 from lupin_bridge.field import formats
 from lupin_bridge.field.formats import PNG, FieldFormat
@@ -121,7 +121,7 @@ async def quality(request: Request) -> Response:
     """
 
     async def body(bridge: Bridge, query: QualityQuery) -> bytes:
-        names = [query.sensor_type] if query.sensor_type else await _sensors(bridge)
+        names = [query.sensor_type] if query.sensor_type else _sensors(bridge)
         reports = {name: await bridge.source.estimate_report(ReportRequest(name)) for name in names}
         return estimate_schema.qualities(reports)
 
@@ -183,9 +183,7 @@ async def _report(request: Request, kind: type[QueryT], body: Body[QueryT]) -> R
     return await respond(request, query, compute)
 
 
-async def _sensors(bridge: Bridge) -> list[str]:
+def _sensors(bridge: Bridge) -> list[str]:
     if bridge.latest is None:
         raise TwinUnavailableError(NO_TWIN)
-    snapshot = bridge.latest.snapshot
-    cost_s = len(snapshot.tags) * NAMES_TAG_S
-    return await on_worker(bridge, lambda _: sensors_of(snapshot), cost_s)
+    return sensors_of(bridge.latest.snapshot)

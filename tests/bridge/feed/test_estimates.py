@@ -15,7 +15,6 @@ from lupin_bridge.feed.source import TwinUnavailableError
 from lupin_twin.core.state import Pose, Reading, Snapshot, TagState
 from lupin_twin.estimate.grading import Record, Tally
 from lupin_twin.runtime.estimates import Report, ReportRequest, TagCheck
-from lupin_twin.runtime.workers import Workers
 from tests.support.waiting import until
 
 HERE = Pose(1.0, 2.0, 0.5, 0.0, 0.0, 0.0, 1.0)
@@ -54,7 +53,6 @@ class Stage:
     """What a follower asks, and tells."""
 
     def __init__(self, period_s: float = 60.0) -> None:
-        self.workers = Workers("test")
         self.asked: list[str] = []
         self.told: list[Changed] = []
         self.snapshot: Snapshot | None = None
@@ -85,7 +83,6 @@ async def test_changes_are_passed_on_when_they_are_others_than_before() -> None:
     stage.snapshot = snapshot(light=6)
     await stage.follower.update()
     assert stage.told[1:] == [{}], "no tag has that sensor any more"
-    stage.workers.close()
 
 
 async def test_of_a_sensor_that_cannot_be_reported_just_now_the_last_report_stands() -> None:
@@ -95,7 +92,6 @@ async def test_of_a_sensor_that_cannot_be_reported_just_now_the_last_report_stan
     stage.answers = {}
     await stage.follower.update()
     assert stage.told == [{"co2": {"co2": 5}}]
-    stage.workers.close()
 
 
 def test_of_many_sensors_so_many_are_asked_after() -> None:
@@ -105,7 +101,6 @@ def test_of_many_sensors_so_many_are_asked_after() -> None:
     stage.answers = dict.fromkeys(names, report(9, {}))
     asyncio.run(stage.follower.update())
     assert stage.asked == names[:-1]
-    stage.workers.close()
 
 
 async def test_what_cannot_be_answered_ends_nothing() -> None:
@@ -116,4 +111,3 @@ async def test_what_cannot_be_answered_ends_nothing() -> None:
     stage.answers = {"co2": report(9, {"co2": 1})}
     await until(lambda: stage.told, "the answer")
     await stage.follower.stop()
-    stage.workers.close()

@@ -20,7 +20,8 @@ TAGS = st.builds(
 
 def arrays_of(frame_id: str, make: Any = tag_markers) -> Any:
     """Of marks themselves, where a twin has a snapshot."""
-    return MarkerArrays(lambda marks: marks, make, frame_id)
+    same: Any = list
+    return MarkerArrays(same, make, frame_id)
 
 
 @given(st.lists(TAGS, max_size=6, unique_by=lambda mark: mark.number), st.text("abc", max_size=9))

@@ -79,7 +79,7 @@ class LocalTwin(RosSource[TwinNode]):
 
     async def write_note(self, note: Note) -> Note:
         """Through the node's journal, whose thread writes it."""
-        return await self._in_time(self._result(lambda node: node.memory.write_note(note)))
+        return await self._in_time(self._result(lambda node: node.memory.journal.write_note(note)))
 
     async def _result(self, begin: Callable[[TwinNode], Future[ResultT]]) -> ResultT:
         return await asyncio.wrap_future(await self.thread.call(begin))
@@ -92,7 +92,7 @@ class LocalTwin(RosSource[TwinNode]):
     async def _explain(self, error: NotRemembered) -> NotRemembered:
         damage = error.damage
         if damage:
-            await self.thread.call(lambda node: node.memory.heal(damage))
+            await self.thread.call(lambda node: node.memory.journal.heal(damage))
         return error
 
     def _revision_of(self, node: TwinNode) -> str:

@@ -4,7 +4,7 @@
     ...
     listening.close()
 
-`topic` is one of `topics_of(source.names())`, or a `Topic` of one's own. `on_sample(sample)`
+`topic` is one of `topics_of(source.names)`, or a `Topic` of one's own. `on_sample(sample)`
 is called on the event loop for each sample, and must not wait. Of a latched topic the newest ones
 come first. One `Topic` is one subscription, however many listen; it ends some seconds after the
 last of them has closed, so that who comes and goes makes no work in the ROS thread. While nobody

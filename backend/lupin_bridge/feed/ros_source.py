@@ -123,8 +123,6 @@ class RosSource(TwinSource, Generic[NodeT]):
         self.workers = Workers("work")
         self.past = PastProcess()
         self.relay = Relay(lambda: self.thread, RelayRos())
-        self._rules: FieldRules
-        self._names: TwinNames
 
     async def _start_thread(
         self,
@@ -135,7 +133,7 @@ class RosSource(TwinSource, Generic[NodeT]):
         def take(update: TwinUpdate) -> None:
             before, self.update = self.update, update
             if update.rules is not None:
-                self._rules = update.rules
+                self.rules = update.rules
             # A map alone is no sign of life of the twin.
             if before is None or update.made_s != before.made_s:
                 on_state(update)
@@ -148,10 +146,10 @@ class RosSource(TwinSource, Generic[NodeT]):
             make_node, ros_args=self._ros_args, on_event=take, on_death=on_death
         )
         await self.thread.start()
-        self._names, parameters = await self.thread.call(
+        self.names, parameters = await self.thread.call(
             lambda node: (names_of(node), node.parameters)
         )
-        self._rules, self.buffer_len = FieldRules.of(parameters), parameters.buffer_len
+        self.rules, self.buffer_len = FieldRules.of(parameters), parameters.buffer_len
 
     async def stop(self) -> None:
         """Stop the ROS thread, the workers and the process that looks back."""
@@ -162,7 +160,7 @@ class RosSource(TwinSource, Generic[NodeT]):
 
     async def publish_observation(self, scan: BuiltScan, source: str) -> None:
         """See `TwinSource`."""
-        topic = self._names.observations_topic
+        topic = self.names.observations_topic
 
         def publish(node: Any) -> None:
             if self._observations is None:
@@ -187,14 +185,6 @@ class RosSource(TwinSource, Generic[NodeT]):
     async def robot(self, now_ns: int | None) -> Robot | None:
         """From the robot's own topics, the newest message of each."""
         return await self.thread.call(lambda node: self._robot_topics.look(node, now_ns))
-
-    def rules(self) -> FieldRules:
-        """The node's parameters for fields: the twin's, as far as it was given the same."""
-        return self._rules
-
-    def names(self) -> TwinNames:
-        """The twin's, as ROS resolves and remaps them."""
-        return self._names
 
 
 def now_ns_of(update: TwinUpdate) -> int:

@@ -102,10 +102,12 @@ class RosThread(Generic[NodeT, EventT]):
         self._executor: SingleThreadedExecutor | None = None
         self._node: NodeT | None = None
         self._newest: EventT | None = None
-        self._calls_waiting = 0
+        # Calls whose answer has not come yet.
+        self.calls_waiting = 0
         # What is told when the thread is stopped: nothing else would end it.
         self._unanswered: set[asyncio.Future[Any]] = set()
-        self._callback_errors = 0
+        # Errors met by the node's callbacks, as of the last heartbeat.
+        self.callback_errors = 0
         self._beating: asyncio.Task[None] | None = None
         # When the heartbeat was sent that has not come back yet; loop's clock.
         self._beat_sent_s: float | None = None
@@ -157,16 +159,6 @@ class RosThread(Generic[NodeT, EventT]):
         """How long a heartbeat through the thread has been on its way, s; 0: none is."""
         return 0.0 if self._beat_sent_s is None else self._loop.time() - self._beat_sent_s
 
-    @property
-    def calls_waiting(self) -> int:
-        """Calls whose answer has not come yet."""
-        return self._calls_waiting
-
-    @property
-    def callback_errors(self) -> int:
-        """Errors met by the node's callbacks, as of the last heartbeat."""
-        return self._callback_errors
-
     async def call(self, work: Callable[[NodeT], ResultT]) -> ResultT:
         """Run `work(node)` in the ROS thread, between two callbacks, and return its result.
 
@@ -188,11 +180,11 @@ class RosThread(Generic[NodeT, EventT]):
                 self.to_loop(_settle, result, value, None)
 
         self._executor.create_task(run)
-        self._calls_waiting += 1
+        self.calls_waiting += 1
         try:
             return await self._answer(result)
         finally:
-            self._calls_waiting -= 1
+            self.calls_waiting -= 1
 
     async def _answer(self, result: asyncio.Future[ResultT]) -> ResultT:
         if self._is_stopping:  # since it was asked
@@ -249,7 +241,7 @@ class RosThread(Generic[NodeT, EventT]):
             back: asyncio.Future[int] = self._loop.create_future()
             self._beat_sent_s = self._loop.time()
             self._executor.create_task(self._bring_back, back)
-            self._callback_errors = await back
+            self.callback_errors = await back
             self._beat_sent_s = None
             await asyncio.sleep(BEAT_PERIOD_S)
 

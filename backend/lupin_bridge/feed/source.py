@@ -110,8 +110,10 @@ class TwinSource(ABC):
     workers: Workers
     relay: Relay
     timeout_s: float
-    # The twin's: so many of a tag's last scans are told.
+    # The twin's: how fields are made; so many of a tag's last scans are told; names in ROS.
+    rules: FieldRules
     buffer_len: int
+    names: TwinNames
     # Of what comes daily, s of ROS time; a demo's is shorter.
     day_length_s = 86_400.0
     # Who is named where an answer takes too long.
@@ -134,14 +136,6 @@ class TwinSource(ABC):
     @abstractmethod
     def revision(self) -> str:
         """The revision now: opaque, changes exactly when a field could."""
-
-    @abstractmethod
-    def rules(self) -> FieldRules:
-        """The rules by which fields are made, and their limit."""
-
-    @abstractmethod
-    def names(self) -> TwinNames:
-        """What the twin's topics and service are called."""
 
     @abstractmethod
     def journal(self) -> Condition:

@@ -151,7 +151,7 @@ class WebTwin(RosSource[WebNode]):
         self.relay.renew()
 
     def _silence(self, seconds: float) -> str:
-        return f"nothing was received on {self._names.state_topic} for {seconds:g} s"
+        return f"nothing was received on {self.names.state_topic} for {seconds:g} s"
 
     def journal(self) -> Condition:
         """The twin's, as far as it is read here; before that, what is said on `/diagnostics`."""
@@ -208,8 +208,9 @@ class WebTwin(RosSource[WebNode]):
             raise TwinUnavailableError(why)
         return await self._in_time(
             self.thread.ask(
-                lambda node: node.ask(service, request),
-                lambda node, future: node.forget(service, future),
+                lambda node: node.clients_of_twin[service].call_async(request),
+                # Or it would be kept for ever.
+                lambda node, future: node.clients_of_twin[service].remove_pending_request(future),
             )
         )
 

@@ -214,14 +214,6 @@ class WebNode(AdjustableNode):
             guess = "is it running?"
         return f"no twin offers {self.clients_of_twin[service].service_name}: {guess}"
 
-    def ask(self, service: Service, request: Any) -> Any:
-        """Ask the twin; returns the rclpy Future of its response."""
-        return self.clients_of_twin[service].call_async(request)
-
-    def forget(self, service: Service, future: Any) -> None:
-        """Drop a request that nobody waits for any more, or it would be kept for ever."""
-        self.clients_of_twin[service].remove_pending_request(future)
-
     # --- callbacks ----------------------------------------------------------------------------
 
     def _take_state(self, msg: Any) -> None:

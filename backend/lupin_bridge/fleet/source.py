@@ -55,8 +55,10 @@ class SiteTwin(TwinSource):
         self._watching = watching
         # The parameters of a twin are not in its log: where they are others there, fields differ.
         self._parameters = TwinParameters()
-        self._rules = FieldRules.of(self._parameters)
+        self.rules = FieldRules.of(self._parameters)
         self.buffer_len = self._parameters.buffer_len
+        # As a twin's are called unless they are renamed; nobody is heard by them here.
+        self.names = TwinNames("/twin/state", "/twin/get_field")
         self._map: OccupancyMap | None = None
         self._map_hash = 0
         self._told: TwinUpdate | None = None
@@ -159,7 +161,7 @@ class SiteTwin(TwinSource):
             self.revision(),
             occupancy_map=self._map,
             journal=self._condition(reported),
-            rules=self._rules,
+            rules=self.rules,
             origin=reported.origin,
             input_problems=(problem,) if problem else (),
             silent_s=0.0 if is_live else ago_s,
@@ -202,14 +204,6 @@ class SiteTwin(TwinSource):
     def revision(self) -> str:
         """Of what was read: the same in all replicas."""
         return f"{self.site}-{self._seq}-{self._map_hash}"
-
-    def rules(self) -> FieldRules:
-        """A twin's own, unless it was given others."""
-        return self._rules
-
-    def names(self) -> TwinNames:
-        """As a twin's are called unless they are renamed; nobody is heard by them here."""
-        return TwinNames("/twin/state", "/twin/get_field")
 
     def journal(self) -> Condition:
         """The site's log."""

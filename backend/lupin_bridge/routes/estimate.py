@@ -59,7 +59,7 @@ async def _answer(request: Request, field_format: FieldFormat) -> Response:
     now_ns, source = bridge.ros_time_ns, bridge.source
     at_ns = past_query.at_of(query.at, now_ns)
     estimated = Estimated(
-        *(at_ns, query, field_format, source.rules(), None, bridge.criteria),
+        *(at_ns, query, field_format, source.rules, None, bridge.criteria),
         day_length_s=source.day_length_s,
         now_ns=now_ns or 0,
     )

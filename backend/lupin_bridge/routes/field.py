@@ -151,9 +151,7 @@ async def _answer(request: Request, field_format: FieldFormat | None) -> Respons
     at_ns = past_query.at_of(query.at, now_ns)
     if at_ns is None and query.sensor_type in DAILY and now_ns is not None:
         at_ns = now_ns - now_ns % _MINUTE_NS
-    field = Field(
-        at_ns, query, field_format, source.rules(), source.occupancy_map(), bridge.criteria
-    )
+    field = Field(at_ns, query, field_format, source.rules, source.occupancy_map(), bridge.criteria)
     field.check()
     if at_ns is None:
         return await respond_newest(request, field)

@@ -258,7 +258,7 @@ class _RosbridgeConversation(_Conversation):
     """A roslib client: its session, and its calls under way."""
 
     def __init__(self, websocket: WebSocket, bridge: Bridge) -> None:
-        session = self._session = RosbridgeSession(bridge.source.names())
+        session = self._session = RosbridgeSession(bridge.source.names)
         super().__init__(
             websocket,
             bridge,
@@ -353,7 +353,7 @@ class _RosbridgeConversation(_Conversation):
 
     async def _values(self, query: FieldQuery, held: ExitStack) -> bytes:
         bridge, source = self._bridge, self._bridge.source
-        field = Field(None, query, JSON, source.rules(), source.occupancy_map(), bridge.criteria)
+        field = Field(None, query, JSON, source.rules, source.occupancy_map(), bridge.criteria)
         field.check()
         # Under the ETag of the same field over HTTP: it is the same body.
         etag = field.newest_etag(source.revision())

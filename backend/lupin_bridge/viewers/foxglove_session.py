@@ -229,7 +229,7 @@ class Offer:
         await asyncio.shield(self._looking)
 
     async def _look(self) -> None:
-        names = self._source.names()
+        names = self._source.names
         wanted = list(topics_of(names))
         try:
             published = await self._source.relay.published(partial(_is_layer, names))

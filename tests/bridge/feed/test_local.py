@@ -67,13 +67,13 @@ async def test_two_twins_of_the_same_content_have_different_revisions(domain: in
 async def test_parameters_come_from_the_ros_arguments(domain: int) -> None:
     arguments = ["--ros-args", "-p", "max_grid_cells:=9", "-p", "idw_max_distance_m:=0.75"]
     async with started(*arguments, "-r", "/twin/state:=/north/state") as (twin, _):
-        assert (twin.rules().max_grid_cells, twin.rules().max_distance_m) == (9, 0.75)
-        assert twin.names().state_topic == "/north/state"
-        assert twin.names().field_service == "/twin/get_field"
+        assert (twin.rules.max_grid_cells, twin.rules.max_distance_m) == (9, 0.75)
+        assert twin.names.state_topic == "/north/state"
+        assert twin.names.field_service == "/twin/get_field"
         revision = twin.revision()
         wanted = [Parameter("idw_max_distance_m", value=0.25)]
         await twin.thread.call(lambda node: node.set_parameters(wanted))
-        await until(lambda: twin.rules().max_distance_m == 0.25, "the new rules")
+        await until(lambda: twin.rules.max_distance_m == 0.25, "the new rules")
         assert twin.revision() != revision
 
 

@@ -37,7 +37,7 @@ async def test_a_twins_topics_come_as_they_are_on_the_wire(domain: int, source_t
     async with stage_of(source_type, domain) as stage:
         relay: Relay = stage.source.relay
         relay.linger_s = 0.0
-        state, observations, discovered, map_, diagnostics = topics_of(stage.source.names())
+        state, observations, discovered, map_, diagnostics = topics_of(stage.source.names)
         grid, seen = occupancy_grid([[0, 100]]), scan("1", {"co2": 400.0}, stamp_s=5.0)
         stage.peer.publish_map(grid)
         stage.peer.observe(seen)
@@ -84,7 +84,7 @@ async def test_a_twins_topics_come_as_they_are_on_the_wire(domain: int, source_t
         await until_answered(lambda: thread.call(count), "its leaving", lambda it: it == left)
         assert (len(relay), stage.source.thread.callback_errors) == (0, 0)
 
-        names = stage.source.names()
+        names = stage.source.names
         assert (names.field_layers, names.tags_layer, names.planters_layer) == (
             "/twin/field/",
             "/twin/tags",

@@ -110,8 +110,8 @@ async def test_a_source_tells_of_every_change_and_of_what_it_is_asked(
             (5_000_000_000, 400.0)
         ]
         assert stage.told[-1].twin_count == 1
-        assert source.names().state_topic == "/twin/state"
-        assert source.rules().max_grid_cells == 1000
+        assert source.names.state_topic == "/twin/state"
+        assert source.rules.max_grid_cells == 1000
         assert (source.thread.callback_errors, source.thread.calls_waiting) == (0, 0)
     # A thread that has not ended in time is left behind, and ends for itself.
     await until(lambda: not source.thread.is_alive, "its end")

@@ -87,7 +87,7 @@ async def test_after_a_silence_all_goes_on_with_a_new_node(domain: int) -> None:
             Observation, "/floranova/observations", scans.append, latched(50)
         )
         async with started() as (twin, told):
-            state_topic = topics_of(twin.names())[0]
+            state_topic = topics_of(twin.names)[0]
             await twin.relay.listen(state_topic, samples.append)
 
             def received() -> float:
@@ -140,13 +140,13 @@ async def test_what_a_lost_twin_said_last_is_no_news_to_a_new_node(domain: int) 
     samples = list[Sample]()
     with Peer(domain) as peer:
         async with started() as (twin, told):
-            await twin.relay.listen(topics_of(twin.names())[0], samples.append)
+            await twin.relay.listen(topics_of(twin.names)[0], samples.append)
             peer.publish("/twin/state", state_of(1.0), depth=1)
             await until(lambda: told and samples, "the state")
             await twin.thread.call(
                 lambda node: node.set_parameters([Parameter("idw_power", value=3.0)])
             )
-            await until(lambda: twin.rules().idw_power == 3.0, "the parameter")
+            await until(lambda: twin.rules.idw_power == 3.0, "the parameter")
             revision = twin.revision()
             twin.rejoin_after_s = 0.1
             # DDS goes on in a twin that is stuck, and what it latched comes to who is new.
@@ -156,7 +156,7 @@ async def test_what_a_lost_twin_said_last_is_no_news_to_a_new_node(domain: int) 
             await until(twin.occupancy_map, "the map")
             state, _, _ = revision.rpartition("-0-")
             assert state in twin.revision(), "the state is the same"
-            assert twin.rules().idw_power == 3.0
+            assert twin.rules.idw_power == 3.0
             peer.publish("/twin/state", state_of(2.0), depth=1)
             await until(lambda: told[-1].snapshot.tags[0].readings[0].value == 2.0, "the next one")
             assert [it.snapshot.tags[0].readings[0].value for it in told] == [1.0, 2.0]
@@ -173,7 +173,7 @@ async def test_a_node_is_made_again_after_as_long_a_silence_again_and_five_minut
 
     monkeypatch.setattr(web, "time", SimpleNamespace(monotonic=lambda: now_s))
     twin.thread = SimpleNamespace(stop=AsyncMock())  # type: ignore[assignment]
-    twin._join, twin._names = join, TwinNames("/twin/state", NAME)
+    twin._join, twin.names = join, TwinNames("/twin/state", NAME)
     for made_s in (None, 1_000.0, 3_000.0):
         if made_s is not None:
             twin.update = SimpleNamespace(made_s=made_s)  # type: ignore[assignment]

@@ -140,9 +140,9 @@ async def test_what_is_written_counts_for_what_is_large(
     async with house() as it:
         source = it.bridge.source
         asked = FieldRequest("co2", 4.0 / cells, 0.0, 0.0, 4.0, 4.0)
-        assert cost_s(asked, 20, source.rules()) < SMALL_S, "the field alone is not"
+        assert cost_s(asked, 20, source.rules) < SMALL_S, "the field alone is not"
         query = FieldQuery("co2", 4.0 / cells, 0.0, 0.0, 4.0, 4.0, scale)
-        field = fields.Field(None, query, PNG, source.rules(), None, it.bridge.criteria)
+        field = fields.Field(None, query, PNG, source.rules, None, it.bridge.criteria)
         assert (field.write_s(20) > SMALL_S) is large
 
 

@@ -110,7 +110,7 @@ def test_damage_that_somebody_meets_has_the_file_set_aside_while_the_twin_record
         wait_for(lambda: count * 0.9 < how_many(memory) <= count, "what can be read")
         # Were it somebody's error and no damage, the disk would be filled with copies.
         before = memory.condition.set_aside
-        memory.heal("again, the same day")
+        memory.journal.heal("again, the same day")
         memory.apply(replace(SCAN, stamp_ns=NOW + 9, own_stamp_ns=NOW + 9), NOW)
         wait_for(lambda: memory.condition.written == 3, "what came after it")
         assert memory.condition.set_aside == before

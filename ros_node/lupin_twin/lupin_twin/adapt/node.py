@@ -259,7 +259,7 @@ class AdaptNode(Node):  # type: ignore[misc]  # rclpy is not typed
                 self._scans.discover(tag_id, place, *self._at)
         for tag_id, frame in self._frames_to_find():
             with suppress(FrameError):
-                self._scans.survey(tag_id, Place(*self._place(frame)))
+                self._scans.places[tag_id] = Place(*self._place(frame))
         if len(self._scans.places) > known:
             self._publish_tags()
 

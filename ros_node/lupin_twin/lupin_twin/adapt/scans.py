@@ -7,7 +7,7 @@ leaves beyond 1.1 times the reach, or the jitter of a localisation would make ma
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import Final
 
@@ -77,19 +77,16 @@ class Scans:
 
     def __init__(self, config: Config) -> None:
         self._config = config
-        self._places: dict[str, Place] = dict(config.tags)
-        self._tag: str | None = None
+        # Where tags are.
+        self.places: dict[str, Place] = dict(config.tags)
+        # The tag that the robot is at; None: at none, or not known.
+        self.tag: str | None = None
         # Where that is, if it is a cell.
         self._cell: Place | None = None
         self._seen_ns = 0
         self._visit: _Window | None = None
         self._fixed: dict[str, _Window] = {}
         self._now_ns = 0
-
-    @property
-    def tag(self) -> str | None:
-        """The tag that the robot is at; None: at none, or not known."""
-        return self._tag
 
     def move(self, x: float, y: float, now_ns: int) -> Iterator[BuiltScan]:
         """The robot is here, m; yields the scan that ends by it."""
@@ -109,25 +106,16 @@ class Scans:
         yield from self.due(now_ns)
         yield from self._be_at(None, now_ns)
 
-    def survey(self, tag_id: str, place: Place) -> None:
-        """A tag of the configuration is there."""
-        self._places[tag_id] = place
-
     def discover(self, tag_id: str, place: Place, x: float, y: float) -> bool:
         """Whether a tag that is seen from (x, y), m, is new and in reach; if so, it is there.
 
         The first place stays, as in the twin: from then on it is a tag as a surveyed one.
         """
-        is_new = tag_id not in self._places and len(self._places) < MAX_TAGS
+        is_new = tag_id not in self.places and len(self.places) < MAX_TAGS
         if is_new and _distance_m(place, x, y) <= self._config.reach_m:
-            self._places[tag_id] = place
+            self.places[tag_id] = place
             return True
         return False
-
-    @property
-    def places(self) -> Mapping[str, Place]:
-        """Where tags are."""
-        return self._places
 
     def failed(self, tag_id: str, detail: str, now_ns: int, *, is_fixed: bool = False) -> BuiltScan:
         """A failed attempt at a tag."""
@@ -151,7 +139,7 @@ class Scans:
     def due(self, now_ns: int) -> Iterator[BuiltScan]:
         """Scans whose time is over; to be called once a second, and before the robot is moved."""
         if now_ns < self._now_ns:  # the clock has gone back: another world
-            self._tag, self._visit, self._fixed = None, None, {}
+            self.tag, self._visit, self._fixed = None, None, {}
         self._now_ns = now_ns
         window_ns = int(self._config.window_s * NS)
         for tag_id, window in tuple(self._fixed.items()):
@@ -168,14 +156,14 @@ class Scans:
     def _be_at(
         self, tag_id: str | None, now_ns: int, cell: Place | None = None
     ) -> Iterator[BuiltScan]:
-        if tag_id == self._tag:
+        if tag_id == self.tag:
             return
         yield from self._ended(now_ns)
-        self._tag, self._cell = tag_id, cell
+        self.tag, self._cell = tag_id, cell
         self._visit = None if tag_id is None else _Window(now_ns)
 
     def _ended(self, now_ns: int) -> Iterator[BuiltScan]:
-        window, tag_id = self._visit, self._tag
+        window, tag_id = self._visit, self.tag
         if window is None or tag_id is None:
             return
         if window.means:
@@ -192,20 +180,20 @@ class Scans:
         return BuiltScan(tag_id, window.newest_ns, place, readings, detail, is_fixed)
 
     def _place(self, tag_id: str) -> Place | None:
-        return self._places.get(tag_id, self._cell if tag_id == self._tag else None)
+        return self.places.get(tag_id, self._cell if tag_id == self.tag else None)
 
     def _nearest(self, x: float, y: float) -> str | None:
-        reach_m, here = self._config.reach_m, self._tag
-        if here is not None and _distance_m(self._places.get(here), x, y) > LEAVES * reach_m:
+        reach_m, here = self._config.reach_m, self.tag
+        if here is not None and _distance_m(self.places.get(here), x, y) > LEAVES * reach_m:
             here = None
         found = min(
-            ((_distance_m(place, x, y), tag_id) for tag_id, place in self._places.items()),
+            ((_distance_m(place, x, y), tag_id) for tag_id, place in self.places.items()),
             default=(math.inf, ""),
         )
         if found[0] <= reach_m:
             # The other has to be nearer by as much as makes the robot leave.
             stays = here is not None and (
-                _distance_m(self._places.get(here), x, y) - found[0] <= (LEAVES - 1.0) * reach_m
+                _distance_m(self.places.get(here), x, y) - found[0] <= (LEAVES - 1.0) * reach_m
             )
             return here if stays else found[1]
         return here

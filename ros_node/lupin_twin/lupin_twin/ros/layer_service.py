@@ -83,7 +83,7 @@ class _Topic:
 class LayerService:
     """The topics of one node; belongs to the node's thread.
 
-    `wake()` is called in another one when `deliver` has something to do.
+    `wake()` is called in another one when the queue has something to deliver.
     """
 
     utilities: NodeUtilities
@@ -101,13 +101,13 @@ class LayerService:
         default_factory=lambda: Workers("layers", large_threads=1, small_threads=0)
     )
     _topics: list[_Topic] = field(default_factory=list)
-    _queue: JobQueue = field(init=False)
+    queue: JobQueue = field(init=False)
     _whole: tuple[object, FieldRequest] | None = None
     # The sensors whose last message has an estimate.
     _estimated: set[str] = field(default_factory=set)
 
     def __post_init__(self) -> None:
-        self._queue = JobQueue(self._workers, self.wake, lambda: self.utilities.is_behind)
+        self.queue = JobQueue(self._workers, self.wake, lambda: self.utilities.is_behind)
 
     def offer(self, node: Any, sensors: Sequence[str], frame_id: str) -> None:
         """Have `node` offer the topics, by names relative to its namespace.
@@ -137,7 +137,7 @@ class LayerService:
 
     def check(self) -> None:
         """Begin what is wanted and may have changed; to be called every `LAYERS_PERIOD_S`."""
-        self._queue.go_on()
+        self.queue.go_on()
         now_s = time.monotonic()
         for topic in self._topics:
             topic.is_wanted = topic.publisher.get_subscription_count() > 0
@@ -161,7 +161,7 @@ class LayerService:
         def made(found: Any) -> bytes | None:
             return make(found, lambda: not topic.is_wanted)
 
-        self._queue.ask(Query(search, partial(self._publish, topic), made, _COST_S))
+        self.queue.ask(Query(search, partial(self._publish, topic), made, _COST_S))
 
     def _publish(self, topic: _Topic, made: bytes | Exception | None) -> None:
         topic.is_under_way = False
@@ -230,10 +230,6 @@ class LayerService:
         return None, partial(arrays.build, self.snapshot())
 
     # --- the node's -------------------------------------------------------------------------
-
-    def deliver(self) -> None:
-        """Publish what was made."""
-        self._queue.deliver()
 
     def state(self) -> Layers:
         """What is published, for the twin's diagnostics."""

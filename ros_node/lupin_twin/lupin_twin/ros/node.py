@@ -265,14 +265,14 @@ class TwinNode(AdjustableNode):
         if new is not None:
             self._map_revision += 1
             self.occupancy_map = replace(new, revision=self._map_revision)
-            self.memory.note_map(self.occupancy_map)
+            self.memory.journal.write_map(self.occupancy_map)
             self.notify_listener()
 
     def _deliver(self) -> None:
         self.utilities.drain()
         self._field_service.queue.deliver()
         self._past_queue.deliver()
-        self.layers.deliver()
+        self.layers.queue.deliver()
 
     def destroy_node(self) -> None:
         """End the workers and the journal too; what they compute is for nobody then."""

@@ -13,7 +13,6 @@ import tempfile
 import time
 from collections import deque
 from collections.abc import Callable
-from concurrent.futures import Future
 from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
@@ -24,9 +23,7 @@ from lupin_twin.core.diagnostics import Origin
 from lupin_twin.core.drops import Drop
 from lupin_twin.core.history import Repeats
 from lupin_twin.core.journal_condition import Condition
-from lupin_twin.core.notes import Note
 from lupin_twin.core.state import Pin, TwinStore, Write
-from lupin_twin.field.explored import OccupancyMap
 from lupin_twin.journal.fold import Restored
 from lupin_twin.journal.retention import Limits
 from lupin_twin.journal.runs import CORRECTION_NS, Clock, Turn, turn_of
@@ -78,7 +75,7 @@ class Memory:
     ) -> None:
         self._store = store
         self.repeats = Repeats()
-        self._journal = journal
+        self.journal = journal
         self._steady_ns = steady_ns
         self._clock: Clock | None = None
         # What the wall's clock is ahead of the steady one.
@@ -91,7 +88,7 @@ class Memory:
         self._doubt: _Doubt | None = None
         self._is_requested = False
         self._agrees = False
-        self.recall = Recall(lambda: self.condition, heal=self.heal)
+        self.recall = Recall(lambda: self.condition, heal=journal.heal)
 
     def follow(self, now: Clock) -> str | None:
         """Keep to a clock: the first moment of it restores, one that goes back begins a new run.
@@ -107,8 +104,8 @@ class Memory:
         lead_ns = now.arrival_ns - self._steady_ns()
         if before is None:
             self._clock, self._lead_ns = now, lead_ns
-            self._journal.begin(now)
-            return self._take(self._journal.take_restored(_START_WAIT_S), now)
+            self.journal.begin(now)
+            return self._take(self.journal.take_restored(_START_WAIT_S), now)
         if self._doubt is not None:
             self._clock, self._lead_ns = now, lead_ns
             return self._check_doubt(self._doubt, now)
@@ -116,9 +113,9 @@ class Memory:
         if turn in {None, Turn.AHEAD} or self._may_begin(now.arrival_ns):
             self._clock, self._lead_ns = now, lead_ns
             if turn is not None:
-                self._journal.begin(now, turn=turn, before_ns=before.stamp_ns)
+                self.journal.begin(now, turn=turn, before_ns=before.stamp_ns)
                 self._hold_places(now)
-        return self._take(self._journal.take_restored(), now)
+        return self._take(self.journal.take_restored(), now)
 
     def apply(self, write: Write, arrival_ns: int) -> Drop | None:
         """Write what is now and what was, and hand it over; returns what the store refused."""
@@ -139,7 +136,7 @@ class Memory:
     @property
     def condition(self) -> Condition:
         """How the journal is doing."""
-        condition, early = self._journal.condition, self._early
+        condition, early = self.journal.condition, self._early
         if condition.complete_ns is None and self._clock is not None:
             condition = replace(condition, complete_ns=self._clock.stamp_ns)
         if self._doubt is None or early is None:
@@ -147,22 +144,10 @@ class Memory:
         last_ns = self._doubt.last_ns
         return replace(condition, waiting=len(early), lost=self._lost, complete_ns=last_ns)
 
-    def write_note(self, note: Note) -> Future[Note]:
-        """Have it in the journal; see there."""
-        return self._journal.write_note(note)
-
-    def note_map(self, floor: OccupancyMap) -> None:
-        """Have the newest map in the journal; see there."""
-        self._journal.write_map(floor)
-
-    def heal(self, damage: str) -> None:
-        """Have a journal in which somebody has met damage set aside; from any thread."""
-        self._journal.heal(damage)
-
     def close(self) -> None:
         """Answer nothing more, and write what is waiting."""
         self.recall.close()
-        self._journal.close()
+        self.journal.close()
 
     def _may_begin(self, arrival_ns: int) -> bool:
         begun = self._begun_ns
@@ -180,9 +165,9 @@ class Memory:
             if tag and tag.pose and (placed_ns is None or stamp_ns < placed_ns):
                 self._placed_ns[write.tag_id] = stamp_ns
                 pin = Pin(write.tag_id, tag.pose, stamp_ns, write.arrival_ns)
-                self._journal.write(pin, now_ns)
+                self.journal.write(pin, now_ns)
         if not isinstance(write, Pin):
-            self._journal.write(write, now_ns)
+            self.journal.write(write, now_ns)
 
     def _hold_places(self, now: Clock) -> None:
         self._placed_ns = {
@@ -242,16 +227,16 @@ class Memory:
     def _check_doubt(self, doubt: _Doubt, now: Clock) -> str | None:
         """Ask the log again once the clock agrees with it, or has contradicted it for long."""
         if self._is_requested:
-            return self._take(self._journal.take_restored(), now)
+            return self._take(self.journal.take_restored(), now)
         self._agrees = now.is_simulated or now.arrival_ns >= doubt.last_ns - CORRECTION_NS
         if self._agrees:
-            self._journal.begin(now)
+            self.journal.begin(now)
         elif self._steady_ns() - doubt.since_ns >= DOUBT_NS:
-            self._journal.begin(doubt.clock, Turn.BELIEVED)
+            self.journal.begin(doubt.clock, Turn.BELIEVED)
         else:
             return None
         self._is_requested = True
-        return self._take(self._journal.take_restored(_START_WAIT_S), now)
+        return self._take(self.journal.take_restored(_START_WAIT_S), now)
 
 
 def open_journal(

@@ -36,6 +36,7 @@ class Source:
         self.fault: Exception | None = None
         self.has_ended = False
 
+    @property
     def names(self) -> TwinNames:
         return NAMES
 

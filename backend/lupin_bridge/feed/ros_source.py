@@ -24,7 +24,6 @@ from lupin_twin.core import interfaces
 from lupin_twin.core.drops import Drop
 from lupin_twin.core.state import NANOSECONDS_PER_SECOND
 from lupin_twin.field.engine import FieldRules
-from lupin_twin.field.explored import OccupancyMap
 from lupin_twin.ros import message_limits
 from lupin_twin.ros.base_node import latched, qos_of, read_message
 from lupin_twin.runtime.workers import Workers
@@ -112,10 +111,9 @@ Post = Callable[[TwinUpdate], None]
 
 
 class RosSource(TwinSource, Generic[NodeT]):
-    """A source with a node; who extends it says which. `update` is what that told last."""
+    """A source with a node; who extends it says which."""
 
     thread: RosThread[NodeT, TwinUpdate]
-    update: TwinUpdate | None = None
 
     def __init__(self, *, ros_args: Sequence[str], timeout_s: float) -> None:
         self._ros_args = ros_args
@@ -170,17 +168,6 @@ class RosSource(TwinSource, Generic[NodeT]):
             self._observations.publish(observation(scan, "", source))
 
         await self._in_time(self.thread.call(publish))
-
-    def revision(self) -> str:
-        """As updated last; empty before anything was.
-
-        What a call brings from the ROS thread is never newer: what has changed is posted at once.
-        """
-        return "" if self.update is None else self.update.revision
-
-    def occupancy_map(self) -> OccupancyMap | None:
-        """The latest map that the node accepted."""
-        return None if self.update is None else self.update.occupancy_map
 
     async def robot(self, now_ns: int | None) -> Robot | None:
         """From the robot's own topics, the newest message of each."""

@@ -110,6 +110,8 @@ class TwinSource(ABC):
     workers: Workers
     relay: Relay
     timeout_s: float
+    # What was told last, or is newer than that by a map.
+    update: TwinUpdate | None = None
     # The twin's: how fields are made; so many of a tag's last scans are told; names in ROS.
     rules: FieldRules
     buffer_len: int
@@ -133,17 +135,20 @@ class TwinSource(ABC):
     async def stop(self) -> None:
         """Stop and release everything."""
 
-    @abstractmethod
     def revision(self) -> str:
-        """The revision now: opaque, changes exactly when a field could."""
+        """The revision now: opaque, changes exactly when a field could; empty: nothing has come.
+
+        What a call brings from a twin is never newer: what has changed is told at once.
+        """
+        return "" if self.update is None else self.update.revision
 
     @abstractmethod
     def journal(self) -> Condition:
         """How the twin's journal does, as far as it tells."""
 
-    @abstractmethod
     def occupancy_map(self) -> OccupancyMap | None:
         """The latest map, if any has come."""
+        return None if self.update is None else self.update.occupancy_map
 
     @abstractmethod
     async def estimate_report(self, request: ReportRequest) -> Report:

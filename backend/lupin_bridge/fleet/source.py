@@ -61,7 +61,6 @@ class SiteTwin(TwinSource):
         self.names = TwinNames("/twin/state", "/twin/get_field")
         self._map: OccupancyMap | None = None
         self._map_hash = 0
-        self._told: TwinUpdate | None = None
         self._reported: Reported | None = None
         self._read_ns = 0
         self._seq = -1
@@ -156,9 +155,10 @@ class SiteTwin(TwinSource):
         if not is_live:
             # As of when it was last heard: who shows it adds for how long that was ago.
             stamp_ns = site.heard_ns if reported.is_walls else _newest_ns(reported)
-        self._told = TwinUpdate(
+        self.update = TwinUpdate(
             replace(reported.snapshot, stamp_ns=stamp_ns, tags=self._tags(reported)),
-            self.revision(),
+            # Of what was read: the same in all replicas.
+            f"{self.site}-{self._seq}-{self._map_hash}",
             occupancy_map=self._map,
             journal=self._condition(reported),
             rules=self.rules,
@@ -166,11 +166,11 @@ class SiteTwin(TwinSource):
             input_problems=(problem,) if problem else (),
             silent_s=0.0 if is_live else ago_s,
         )
-        on_state(self._told)
+        on_state(self.update)
 
     def _tags(self, reported: Reported) -> tuple[Any, ...]:
         """The very same values as before where nothing has changed."""
-        before = () if self._told is None else self._told.snapshot.tags
+        before = () if self.update is None else self.update.snapshot.tags
         known = {tag.tag_id: tag for tag in before}
         return tuple(
             known[tag.tag_id] if known.get(tag.tag_id) == tag else tag
@@ -201,17 +201,9 @@ class SiteTwin(TwinSource):
 
     # --- see `TwinSource` ---------------------------------------------------------------------
 
-    def revision(self) -> str:
-        """Of what was read: the same in all replicas."""
-        return f"{self.site}-{self._seq}-{self._map_hash}"
-
     def journal(self) -> Condition:
         """The site's log."""
         return self._condition(self._reported)
-
-    def occupancy_map(self) -> OccupancyMap | None:
-        """The newest that the twin had."""
-        return self._map
 
     async def estimate_report(self, request: ReportRequest) -> Report:  # noqa: ARG002  # none
         """None: how right estimates were is counted by the twin."""

@@ -214,14 +214,6 @@ _VERDICT: Final = "{{ value_json.verdict if value_json.verdict != 'unknown' else
 _IS_LIVE: Final = "{{ 'online' if value_json.state == 'ON' else 'offline' }}"
 
 
-@dataclass(frozen=True, slots=True)
-class _Place:
-    """A tag, or the greenhouse (None), and its device in Home Assistant."""
-
-    tag_id: str | None
-    device: dict[str, Any]
-
-
 def expire_after_s(holds_ns: int) -> int:
     """The step that is no shorter than readings hold; s."""
     return next((step for step in STEPS_S if step * 1_000_000_000 >= holds_ns), STEPS_S[-1])
@@ -231,14 +223,6 @@ def tag_configs(
     topics: Topics, tag_id: str, sensors: Sequence[Sensor], holds_ns: int
 ) -> Iterator[tuple[str, dict[str, Any]]]:
     """Topic and payload of each entity of a tag; an entity of no sensor is not announced."""
-    device = {
-        "identifiers": [topics.device(tag_id)],
-        "name": f"Tag {tag_id}",
-        "manufacturer": "lupin-twin",
-        "model": "Tag",
-        "via_device": topics.device(None),
-    }
-    place = _Place(tag_id, device)
     for sensor in sensors:
         what = f"reading_{safe(sensor.name)}"
         found, units = _CLASSES.get(sensor.name, ("", set[str]()))
@@ -253,61 +237,62 @@ def tag_configs(
             **({"unit_of_measurement": sensor.unit} if sensor.unit else {}),
             **({"device_class": found} if sensor.unit in units else {}),
         }
-        yield _config(topics, "sensor", place, what, own)
-    yield from _verdict_and_alarm(topics, place)
+        yield _config(topics, "sensor", tag_id, what, own)
+    yield from _verdict_and_alarm(topics, tag_id)
 
 
 def greenhouse_configs(topics: Topics) -> Iterator[tuple[str, dict[str, Any]]]:
     """The same of the greenhouse."""
-    device = {
-        "identifiers": [topics.device(None)],
-        "name": f"Greenhouse {topics.prefix}",
-        "manufacturer": "lupin-twin",
-        "model": "Greenhouse",
-    }
-    place = _Place(None, device)
     own = {
         "name": "Twin",
         "state_topic": topics.twin,
         "device_class": "connectivity",
         "value_template": _STATE,
     }
-    yield _config(topics, "binary_sensor", place, "twin", own)
-    yield from _verdict_and_alarm(topics, place)
+    yield _config(topics, "binary_sensor", None, "twin", own)
+    yield from _verdict_and_alarm(topics, None)
 
 
-def _verdict_and_alarm(topics: Topics, place: _Place) -> Iterator[tuple[str, dict[str, Any]]]:
+def _device(topics: Topics, tag_id: str | None) -> dict[str, Any]:
+    """What Home Assistant shows of a tag, or of the greenhouse (None)."""
+    device = {"identifiers": [topics.device(tag_id)], "manufacturer": "lupin-twin"}
+    if tag_id is None:
+        return {**device, "name": f"Greenhouse {topics.prefix}", "model": "Greenhouse"}
+    return {**device, "name": f"Tag {tag_id}", "model": "Tag", "via_device": topics.device(None)}
+
+
+def _verdict_and_alarm(topics: Topics, tag_id: str | None) -> Iterator[tuple[str, dict[str, Any]]]:
     own: dict[str, Any] = {
         "name": "Verdict",
-        "state_topic": topics.of(place.tag_id, "health"),
+        "state_topic": topics.of(tag_id, "health"),
         "device_class": "enum",
         "options": [verdict for verdict in Verdict if verdict != Verdict.UNKNOWN],
         "value_template": _VERDICT,
     }
-    yield _config(topics, "sensor", place, "verdict", own)
+    yield _config(topics, "sensor", tag_id, "verdict", own)
     own = {
         "name": "Alarm",
-        "state_topic": topics.of(place.tag_id, "alarms"),
+        "state_topic": topics.of(tag_id, "alarms"),
         "device_class": "problem",
         "value_template": _STATE,
     }
-    yield _config(topics, "binary_sensor", place, "alarm", own)
+    yield _config(topics, "binary_sensor", tag_id, "alarm", own)
 
 
 def _config(
-    topics: Topics, component: str, place: _Place, what: str, own: dict[str, Any]
+    topics: Topics, component: str, tag_id: str | None, what: str, own: dict[str, Any]
 ) -> tuple[str, dict[str, Any]]:
     availability: list[dict[str, str]] = [{"topic": topics.status}]
-    if place.tag_id is not None and what in ("verdict", "alarm"):
+    if tag_id is not None and what in ("verdict", "alarm"):
         # Of a twin that is silent, nobody knows how its tags are.
         availability.append({"topic": topics.twin, "value_template": _IS_LIVE})
-    return topics.config(component, place.tag_id, what), {
-        "unique_id": f"{topics.device(place.tag_id)}_-_{what}",
+    return topics.config(component, tag_id, what), {
+        "unique_id": f"{topics.device(tag_id)}_-_{what}",
         "json_attributes_topic": own["state_topic"],
         "availability": availability,
         "availability_mode": "all",
         "qos": 1,
-        "device": place.device,
+        "device": _device(topics, tag_id),
         "origin": {"name": "lupin-twin"},
         **own,
     }

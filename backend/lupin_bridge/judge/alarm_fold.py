@@ -136,19 +136,10 @@ class Follower:
         if tag is None:
             self._tags += 1
             by = self._criteria
-            recent_ns = None if by.recent_s is None else int(by.recent_s * 1e9)
             days = TagDays(by.sensors, by.is_day, by.day_number)
-            episodes = TagEpisodes(
-                write.tag_id,
-                run.begun_ns,
-                by.sensors,
-                days,
-                recent_ns=recent_ns,
-                max_episodes=self._max_episodes,
-            )
-            tag = run.tags[write.tag_id] = TagPast(
-                episodes, recent_ns, _matters(run), self._is_day(run)
-            )
+            episodes = TagEpisodes(write.tag_id, run.begun_ns, by, days, self._max_episodes)
+            tag = TagPast(episodes, by.holds_ns, _matters(run), self._is_day(run))
+            run.tags[write.tag_id] = tag
         newest_ns = run.stretches.newest_ns
         if newest_ns is not None and write.stamp_ns <= newest_ns:
             # How long a pause may be follows from the scans before it: of earlier ones it stands.

@@ -25,7 +25,7 @@ from typing import Final
 from lupin_bridge.judge.daylight import LIGHT
 from lupin_bridge.judge.days import TagDays
 from lupin_bridge.judge.derived import DAILY, DERIVED, IsDay
-from lupin_bridge.judge.ranges import Sensors
+from lupin_bridge.judge.options import Criteria
 from lupin_bridge.judge.scan_interval import INTERVALS, holds_ns, interval_ns
 from lupin_bridge.judge.verdict import (
     DEADBAND,
@@ -136,15 +136,13 @@ class _Finding:
 class TagEpisodes:
     """A tag's episodes in one run of the clock; `step` takes its occasions in the order of time.
 
-    `recent_ns` fixes how long readings hold; None: it is learnt. Of cleared episodes, the last
-    `max_episodes` are kept.
+    Of cleared episodes, the last `max_episodes` are kept.
     """
 
     tag_id: str
     run_ns: int
-    sensors: Sensors
+    by: Criteria
     days: TagDays
-    recent_ns: int | None = None
     max_episodes: int = MAX_EPISODES
     _species: str = ""
     _scans_ns: tuple[int, ...] = ()
@@ -196,7 +194,7 @@ class TagEpisodes:
         day: bool | None = None
         for reading in (*readings, *derive(readings)):
             name = reading.name
-            sensor = self.sensors.named(name)
+            sensor = self.by.sensors.named(name)
             is_good = sensor.is_plausible(reading.value)
             key = (Kind.READING_FAILED, name, "")
             if name not in DERIVED and (not is_good or key in self._watches):
@@ -223,7 +221,7 @@ class TagEpisodes:
             yield _Finding((Kind.PEST, "", ""), look.anomaly, look.anomaly, reason, max)
 
     def _of_range(self, reading: Reading, *, is_day: bool) -> Iterator[_Finding]:
-        ranges = self.sensors.named(reading.name).ranges(is_day=is_day, species=self._species)
+        ranges = self.by.sensors.named(reading.name).ranges(is_day=is_day, species=self._species)
         ideal, value = ranges.ideal, reading.value
         for side in ("low", "high"):
             key = (Kind.RANGE, reading.name, side)
@@ -248,9 +246,9 @@ class TagEpisodes:
                     yield _Finding(key, holds=False, still_holds=False)
                 continue
             if holds is None:
-                holds = holds_ns(interval_ns(self._scans_ns))
-            own = holds_ns(interval or None)
-            limit_ns = self.recent_ns or max(holds, own)
+                holds = self.by.holds_ns(self._scans_ns)
+            is_fixed = self.by.recent_s is not None
+            limit_ns = holds if is_fixed else max(holds, holds_ns(interval or None))
             is_old = stamp_ns - last_ns > limit_ns
             old = Reason(Kind.OLD, Verdict.UNKNOWN, name, limit=limit_ns / 1e9, since_ns=last_ns)
             yield _Finding(key, is_old, is_old, old)

@@ -18,14 +18,12 @@ from typing import Final
 from lupin_bridge.judge.daylight import Day
 from lupin_bridge.judge.days import COUNTS_NS
 from lupin_bridge.judge.options import Criteria
-from lupin_bridge.judge.recent_scans import Recent, RecentScans
+from lupin_bridge.judge.recent_scans import RecentScans
 from lupin_bridge.judge.scan_interval import (
     NO_PATROL,
     SHORTEST_NS,
     Patrol,
     Scans,
-    holds_ns,
-    interval_ns,
 )
 from lupin_bridge.judge.verdict import (
     FORGOTTEN_NS,
@@ -95,11 +93,6 @@ def judge_once(
     judge.note_days(days)
     judge.learn(writes, snapshot)
     return judge.see(snapshot)
-
-
-def _holds_ns(recent: Recent, recent_s: float | None) -> int:
-    """For how long readings hold; a fixed time goes before what is learnt."""
-    return holds_ns(interval_ns(recent.stamps_ns)) if recent_s is None else int(recent_s * 1e9)
 
 
 @dataclass(slots=True)
@@ -281,14 +274,15 @@ class Judge:
         kept = self._tags[tag_id]
         if now_ns is None:
             return _UNKNOWN
-        recent, recent_s = self._recent.tag(tag_id), self._criteria.recent_s
-        holds = kept.holds_ns = _holds_ns(recent, recent_s)
-        was_once, kept.is_once = kept.is_once, len(recent.stamps_ns) == 1 and recent_s is None
+        recent, by = self._recent.tag(tag_id), self._criteria
+        holds = kept.holds_ns = by.holds_ns(recent.stamps_ns)
+        was_once = kept.is_once
+        kept.is_once = len(recent.stamps_ns) == 1 and by.recent_s is None
         self._once += kept.is_once - was_once
         health = judge_tag(
             kept.state,
             now_ns,
-            self._criteria.sensors,
+            by.sensors,
             recent,
             holds_ns=holds,
             changed=self._changed.get(tag_id, NOTHING_CHANGED),

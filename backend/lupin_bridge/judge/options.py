@@ -14,6 +14,7 @@ from zoneinfo import ZoneInfo
 from lupin_bridge.judge.daylight import ClockDay, Day, judge_day
 from lupin_bridge.judge.derived import DAY_NS
 from lupin_bridge.judge.ranges import Sensors
+from lupin_bridge.judge.scan_interval import holds_ns, interval_ns
 from lupin_bridge.settings import SettingError, Settings
 
 # Nobody writes this much; a device given by mistake is not read to its end.
@@ -40,6 +41,12 @@ class Criteria:
 
         """
         return cls(_sensors(settings), settings.reading_validity_s or None, _clock(settings))
+
+    def holds_ns(self, scans_ns: Sequence[int]) -> int:
+        """How long readings hold after scans, oldest first; a fixed time goes before that."""
+        if self.recent_s is not None:
+            return int(self.recent_s * 1e9)
+        return holds_ns(interval_ns(scans_ns))
 
     def day(self, light: bool | None, stamp_ns: int) -> Day:
         """Whether it was day at a moment of ROS time at which the light said so, or None."""

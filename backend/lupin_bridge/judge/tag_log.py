@@ -17,7 +17,7 @@ from typing import Final, Generic, TypeVar
 from lupin_bridge.judge.daylight import DAY_FROM_LX, LEFT_OUT_NS, LIGHT, Turn
 from lupin_bridge.judge.derived import IsDay
 from lupin_bridge.judge.episodes import TagEpisodes, readings_of
-from lupin_bridge.judge.scan_interval import INTERVALS, SHORTEST_NS, holds_ns, interval_ns
+from lupin_bridge.judge.scan_interval import INTERVALS, SHORTEST_NS
 from lupin_twin.core.writes import PastWrite
 
 # So many occasions lie between two states of a tag that are kept to begin again from.
@@ -38,25 +38,31 @@ class Gap:
 Matters = Callable[[int, int, int], bool]
 
 
+# How long readings hold after scans, the oldest first.
+HoldsNs = Callable[[Sequence[int]], int]
+
+
 @dataclass(frozen=True, slots=True)
 class Trail:
-    """What a tag's scans say of its scan interval and of its light, up to one of them."""
+    """What a tag's scans say of its scan interval and of its light, up to one of them.
+
+    `holds_ns` is how long readings hold after that.
+    """
 
     scans_ns: tuple[int, ...] = ()
     gaps: tuple[Gap, ...] = ()
     turns: tuple[Turn, ...] = ()
     light_ns: int = -1
+    holds_ns: int = 0
 
-    def after(self, writes: Sequence[PastWrite], recent_ns: int | None, matters: Matters) -> Trail:
+    def after(self, writes: Sequence[PastWrite], holds_ns: HoldsNs, matters: Matters) -> Trail:
         """The trail with one more occasion."""
         readings = readings_of(writes)
         if not readings:
             return self
         stamp_ns, gaps, turns = writes[0].stamp_ns, self.gaps, self.turns
-        if self.scans_ns:
-            gap = self._gap(stamp_ns, recent_ns)
-            if matters(gap.start_ns, stamp_ns, gap.holds_ns):
-                gaps = (*gaps, gap)
+        if self.scans_ns and matters(self.scans_ns[-1], stamp_ns, self.holds_ns):
+            gaps = (*gaps, Gap(self.scans_ns[-1], stamp_ns, self.holds_ns))
         said, light_ns = turns[-1][1] if turns else None, self.light_ns
         light = next((reading.value for reading in readings if reading.name == LIGHT), None)
         if light is not None:
@@ -65,26 +71,14 @@ class Trail:
             says = None if stamp_ns - light_ns > LEFT_OUT_NS else said
         if says is not said:
             turns = (*turns, (stamp_ns, says))
-        return Trail((*self.scans_ns, stamp_ns)[-INTERVALS - 1 :], gaps, turns, light_ns)
+        scans_ns = (*self.scans_ns, stamp_ns)[-INTERVALS - 1 :]
+        return Trail(scans_ns, gaps, turns, light_ns, holds_ns(scans_ns))
 
     def since(self, before_ns: int) -> Trail:
         """The trail without what nobody asks for any more: what was over before."""
         gaps = tuple(gap for gap in self.gaps if gap.end_ns is None or gap.end_ns >= before_ns)
         first = bisect_right(self.turns, before_ns, key=lambda turn: turn[0])
         return replace(self, gaps=gaps, turns=self.turns[max(0, first - 1) :])
-
-    def holds_ns(self, recent_ns: int | None) -> int:
-        """How long readings hold after the last scan; a fixed time goes before what is learnt."""
-        return holds_ns(interval_ns(self.scans_ns)) if recent_ns is None else recent_ns
-
-    def open_gap(self, recent_ns: int | None) -> Gap | None:
-        """The gap since the last scan; None: there was none."""
-        if not self.scans_ns:
-            return None
-        return self._gap(None, recent_ns)
-
-    def _gap(self, end_ns: int | None, recent_ns: int | None) -> Gap:
-        return Gap(self.scans_ns[-1], end_ns, self.holds_ns(recent_ns))
 
 
 class TagLog:
@@ -202,12 +196,11 @@ class Replay(Generic[StateT]):
 
 
 class TagPast:
-    """One tag in one run. `recent_ns` fixes how long readings hold; None: it is learnt."""
+    """One tag in one run."""
 
     def __init__(
-        self, episodes: TagEpisodes, recent_ns: int | None, matters: Matters, is_day: IsDay
+        self, episodes: TagEpisodes, holds_ns: HoldsNs, matters: Matters, is_day: IsDay
     ) -> None:
-        self._recent_ns = recent_ns
         self._log = TagLog()
         self._settled_ns = -1
 
@@ -216,7 +209,7 @@ class TagPast:
             return before
 
         self._trail: Replay[Trail] = Replay(
-            Trail(), lambda trail, group: trail.after(group, recent_ns, matters), lambda it: it
+            Trail(), lambda trail, group: trail.after(group, holds_ns, matters), lambda it: it
         )
         self._episodes: Replay[TagEpisodes] = Replay(episodes, stepped, TagEpisodes.copy)
 
@@ -264,8 +257,9 @@ class TagPast:
     def gaps(self) -> Sequence[Gap]:
         """Those that matter, and the one since the last scan."""
         trail = self.trail
-        last = trail.open_gap(self._recent_ns)
-        return trail.gaps if last is None else (*trail.gaps, last)
+        if not trail.scans_ns:
+            return trail.gaps
+        return (*trail.gaps, Gap(trail.scans_ns[-1], None, trail.holds_ns))
 
     def _settle(self, until_ns: int) -> None:
         until_ns = min(until_ns, self._log.last_ns)

@@ -6,8 +6,10 @@ from typing import Any, get_args
 
 import pytest
 
+from lupin_bridge.judge.daylight import ClockDay
 from lupin_bridge.judge.days import TagDays
 from lupin_bridge.judge.episodes import TagEpisodes
+from lupin_bridge.judge.options import Criteria
 from lupin_bridge.judge.ranges import Ranges, Span
 from lupin_bridge.judge.sensors_file import MAX_TEXT, Language, SensorsError, parse
 from lupin_twin.core.writes import PastWrite
@@ -191,7 +193,8 @@ def test_the_widest_and_the_narrowest_ranges_are_judged_by(ideal: list[float]) -
     sensor = {**GOOD["sensors"]["temperature"], "ideal": ideal, "critical": None}
     sensors = parse(text_with("sensors/temperature", sensor))
     assert sensors.named("temperature").day.ideal == Span(*ideal)
-    episodes = TagEpisodes("a", 0, sensors, TagDays(sensors, lambda _: True, int))
+    by = Criteria(sensors, None, ClockDay(None))
+    episodes = TagEpisodes("a", 0, by, TagDays(sensors, lambda _: True, int))
     for at, value in enumerate([-1e300, -1e300, 0.0, 1e308, 1e308, ideal[0], ideal[1], 0.0]):
         scan = PastWrite(at, 1, "a", at, 0, 0, ("temperature",), (value,))
         episodes.step([scan], lambda _: True)

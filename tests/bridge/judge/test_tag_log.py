@@ -1,18 +1,18 @@
+from lupin_bridge.judge.daylight import ClockDay
 from lupin_bridge.judge.days import TagDays
-from lupin_bridge.judge.derived import DAY_NS, IsDay
+from lupin_bridge.judge.derived import IsDay
 from lupin_bridge.judge.episodes import TagEpisodes
-from lupin_bridge.judge.options import own_sensors
+from lupin_bridge.judge.options import Criteria, own_sensors
 from lupin_bridge.judge.tag_log import MARK, TagPast, is_long
 from lupin_twin.core.writes import PastWrite
 
 S = 10**9
 
 
-def tag(recent_ns: int | None = None, is_day: IsDay = lambda _: True) -> TagPast:
-    episodes = TagEpisodes(
-        "a", 0, own_sensors(), TagDays(own_sensors(), lambda _: True, lambda at_ns: at_ns // DAY_NS)
-    )
-    return TagPast(episodes, recent_ns, lambda start, end, _: is_long(start, end), is_day)
+def tag(recent_s: float | None = None, is_day: IsDay = lambda _: True) -> TagPast:
+    by = Criteria(own_sensors(), recent_s, ClockDay(None))
+    episodes = TagEpisodes("a", 0, by, TagDays(by.sensors, lambda _: True, by.day_number))
+    return TagPast(episodes, by.holds_ns, lambda start, end, _: is_long(start, end), is_day)
 
 
 def write(number: int, at_s: int, light: float = 900.0) -> PastWrite:

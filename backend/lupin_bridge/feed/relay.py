@@ -152,31 +152,27 @@ class Bounded:
 
     def __init__(self, topic: Topic) -> None:
         self._topic = topic
-        self._samples: deque[Sample] = deque()
+        self.samples: deque[Sample] = deque()
         self._bytes = 0
 
     def __len__(self) -> int:
-        return len(self._samples)
+        return len(self.samples)
 
     def put(self, sample: Sample) -> int:
         """Take a sample; returns how many others gave way to it."""
-        self._samples.append(sample)
+        self.samples.append(sample)
         self._bytes += len(sample.data)
         given_way = 0
-        while len(self._samples) > self._topic.depth or self._bytes > self._topic.max_bytes:
+        while len(self.samples) > self._topic.depth or self._bytes > self._topic.max_bytes:
             self.take()
             given_way += 1
         return given_way
 
     def take(self) -> Sample:
         """Take the oldest out."""
-        sample = self._samples.popleft()
+        sample = self.samples.popleft()
         self._bytes -= len(sample.data)
         return sample
-
-    def all(self) -> list[Sample]:
-        """Look at them, oldest first."""
-        return list(self._samples)
 
 
 class Listening:
@@ -257,7 +253,7 @@ class Relay:
             relayed = self._topics[topic] = _Relayed(topic)
             self._open(relayed)
         listening = Listening(on_sample, partial(self._leave, relayed))
-        for sample in relayed.latched.all():
+        for sample in list(relayed.latched.samples):
             listening.receive(sample)
         relayed.listeners.append(listening)
         with ExitStack() as undo:

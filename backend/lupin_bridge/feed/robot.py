@@ -7,8 +7,8 @@ frame.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
-from typing import Final
+from dataclasses import dataclass
+from typing import Final, TypeVar
 
 from lupin_twin.core.state import NANOSECONDS_PER_SECOND
 
@@ -22,6 +22,7 @@ TRAIL_POINTS: Final = 720
 # A plan that nobody repeats is none any more after so long, or once the robot is where it ends.
 PLAN_NS: Final = 600 * NANOSECONDS_PER_SECOND
 ARRIVED_M: Final = 0.5
+_FOREVER_NS: Final = 2**63 - 1
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,6 +60,9 @@ class Robot:
     battery: Battery | None = None
 
 
+ValueT = TypeVar("ValueT", Position, Plan, Battery)
+
+
 class RobotLog:
     """The newest of each, and the trail of the last hour, bounded."""
 
@@ -75,34 +79,22 @@ class RobotLog:
         unknown that would be of the future.
         """
         before = self.now
-        self._forget(now_ns)
-        plan, position = self.now.plan, self.now.position
-        if heard.position is not None and _is_newer(heard.position, position):
-            position = heard.position
+        future_ns = _FOREVER_NS if now_ns is None else now_ns + MAX_AHEAD_NS
+        if now_ns is not None:
+            self._cut_trail(now_ns - TRAIL_NS, future_ns)
+        position = _newest(before.position, heard.position, future_ns)
+        if position is not None and position is heard.position:
             self._extend(position)
-        if heard.plan is not None and _is_newer(heard.plan, plan):
-            if plan is None or not _same_end(plan, heard.plan):
-                self._was_away = False
-            plan = heard.plan
-        battery = self.now.battery
-        if heard.battery is not None and _is_newer(heard.battery, battery):
-            battery = heard.battery
+        known = _newest(before.plan, None, future_ns)
+        plan = _newest(known, heard.plan, future_ns)
+        if plan is not None and plan is heard.plan and not (known and _same_end(known, plan)):
+            self._was_away = False
+        battery = _newest(before.battery, heard.battery, future_ns)
         self.now = Robot(position, self._pending(plan, position, now_ns), battery)
         return self.now != before
 
-    def _forget(self, now_ns: int | None) -> None:
-        if now_ns is None:
-            return
-        future_ns = now_ns + MAX_AHEAD_NS
-        now = self.now
-        if now.position is not None and now.position.at_ns > future_ns:
-            now = replace(now, position=None)
-        if now.plan is not None and now.plan.at_ns > future_ns:
-            now = replace(now, plan=None)
-        if now.battery is not None and now.battery.at_ns > future_ns:
-            now = replace(now, battery=None)
-        self.now = now
-        past_ns, trail = now_ns - TRAIL_NS, self.trail
+    def _cut_trail(self, past_ns: int, future_ns: int) -> None:
+        trail = self.trail
         if trail and (trail[0].at_ns < past_ns or trail[-1].at_ns > future_ns):
             self.trail = [it for it in trail if past_ns <= it.at_ns <= future_ns]
 
@@ -138,5 +130,10 @@ def _same_end(a: Plan, b: Plan) -> bool:
     return bool(a.points and b.points) and math.dist(a.points[-1], b.points[-1]) <= ARRIVED_M
 
 
-def _is_newer(heard: Position | Plan | Battery, known: Position | Plan | Battery | None) -> bool:
-    return known is None or heard.at_ns >= known.at_ns
+def _newest(known: ValueT | None, heard: ValueT | None, future_ns: int) -> ValueT | None:
+    """What holds of the two; what was known is not, if it would be of the future."""
+    if known is not None and known.at_ns > future_ns:
+        known = None
+    if known is None or (heard is not None and heard.at_ns >= known.at_ns):
+        return heard
+    return known

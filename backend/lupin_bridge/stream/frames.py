@@ -51,30 +51,22 @@ class StateFrame:
     judged: Judged
     base: StateFrame | None
     _writer: FrameWriter
-    _json: bytes | None = None
-    _message_json: bytes | None = None
-    _wires: dict[str, bytes] = field(default_factory=dict)
+    _written: dict[str, bytes] = field(default_factory=dict)
 
     @property
     def json(self) -> bytes:
         """The state as JSON of `schema.TwinState`; 10 ms of work for 10,000 tags, if asked for."""
-        if self._json is None:
-            self._json = self._writer.json.state(self.snapshot)
-        return self._json
+        return self._once("json", lambda: self._writer.json.state(self.snapshot))
 
     @property
     def message_json(self) -> bytes:
         """The state as JSON of lupin_msgs/TwinState, for who reads the message itself."""
-        if self._message_json is None:
-            self._message_json = self._writer.message_json.state(self.snapshot)
-        return self._message_json
+        return self._once("message", lambda: self._writer.message_json.state(self.snapshot))
 
     def let_go(self) -> None:
         """Keep only what a delta needs: or every frame ever made would stay in memory."""
         self.base = None
-        self._json = None
-        self._message_json = None
-        self._wires.clear()
+        self._written.clear()
 
     def full(self) -> bytes:
         """`schema.StateFrame` as a WebSocket frame."""
@@ -86,9 +78,12 @@ class StateFrame:
 
     def wire(self, kind: str, payload: Callable[[], bytes]) -> bytes:
         """The frame of this kind, from `payload()` if it is the first call."""
-        if kind not in self._wires:
-            self._wires[kind] = text_frame(payload())
-        return self._wires[kind]
+        return self._once(f"wire {kind}", lambda: text_frame(payload()))
+
+    def _once(self, what: str, write: Callable[[], bytes]) -> bytes:
+        if what not in self._written:
+            self._written[what] = write()
+        return self._written[what]
 
     def _full(self) -> bytes:
         return b'{"type":"state","seq":%d,"revision":%b,"state":%b,"health":%b}' % (

@@ -33,6 +33,8 @@ describe('the most basic lack is told first', () => {
   test('no tags; a twin that was heard is there, whatever it lacks', () => {
     showTags([]);
     expect(id()).toBe('no-tags');
+    // Nothing that a lost connection, which the banner tells, makes untrue.
+    expect(noticeFor(store.get())?.hint).not.toContain('running');
     goLive(status({ twin: 'offline', reason: 'no_clock' }));
     expect(noticeFor(store.get())).toMatchObject({
       id: 'no-twin',

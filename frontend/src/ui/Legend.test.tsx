@@ -112,7 +112,7 @@ describe('legend', () => {
       );
     expect(parts()).toEqual([
       'too low below ideal',
-      'night-time ideal for each species ',
+      'night-time ideal per species ',
       'too high above ideal',
     ]);
     expect(at('ideal-species')).toBe('tulip 8.0 – 18.0\u00a0°C; others 15.0 – 24.0\u00a0°C');

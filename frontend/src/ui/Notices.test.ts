@@ -62,6 +62,9 @@ describe('the most basic lack is told first', () => {
   test('a field that could not be loaded, with the server’s reason', () => {
     receive({ type: 'field', field: { value: null, state: 'failed', message: 'too many cells' } });
     expect(noticeFor(store.get())?.title).toContain('too many cells');
+    // Why nothing loads without a connection, the banner says.
+    goLost();
+    expect(id()).toBeUndefined();
   });
 
   test('nothing is lacking', () => {

@@ -52,7 +52,15 @@ describe('card', () => {
   test('tells everything about its tag', () => {
     render(<TagCard tagId="7" />);
     const card = screen.getByRole('complementary', { name: 'Tag 7' });
-    for (const text of ['9.0\u00a0°C', 'low, daytime ideal', 'failed', '6.5', 'tulip', '80', '12']) {
+    for (const text of [
+      '9.0\u00a0°C',
+      'low, daytime ideal',
+      'failed',
+      '6.5',
+      'tulip',
+      '80',
+      '12',
+    ]) {
       expect(card.textContent).toContain(text);
     }
     expect(card.textContent).toContain('3 pests seen');

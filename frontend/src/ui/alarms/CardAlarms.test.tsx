@@ -39,7 +39,7 @@ test('a tag that is well again says what its alarm still waits for', () => {
     tellAlarms(alarm('a', { tag_id: '7' }));
   });
   const line = screen.getByTestId('card-alarms');
-  expect(line.textContent).toContain(' · Active until the next good scan');
+  expect(line.textContent).toContain(' · The next good scan resolves it');
 });
 
 test('all alarms of a tag are acknowledged where it is looked at, and no others', () => {

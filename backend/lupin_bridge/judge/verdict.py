@@ -163,17 +163,12 @@ def _still_out(reading: Reading, ranges: Ranges, sensor: Sensor, recent: Recent)
     That is so since the last scan that was out of it, of those that are recent, unless one since
     was further within.
     """
-    if ranges.ideal is None:
-        return None
-    band = DEADBAND * ranges.ideal.width
-    for verdict, span in (
-        (Verdict.CRITICAL, ranges.critical),
-        (Verdict.STRESSED, ranges.ideal),
-    ):
-        if span is None:
-            continue
-        for sign, limit in ((-1.0, span.low), (1.0, span.high)):
-            release = limit - sign * band
+    for verdict in (Verdict.CRITICAL, Verdict.STRESSED):
+        for sign in (-1.0, 1.0):
+            edge = _edge(ranges, verdict, sign)
+            if edge is None:
+                continue
+            limit, release = edge
             is_near = (reading.value - release) * sign > 0.0
             if is_near and _was_out(reading, verdict, sign, sensor, recent):
                 return Reason(
@@ -188,6 +183,15 @@ def _still_out(reading: Reading, ranges: Ranges, sensor: Sensor, recent: Recent)
     return None
 
 
+def _edge(ranges: Ranges, verdict: Verdict, sign: float) -> tuple[float, float] | None:
+    """The limit below (-1) or above (1), and what a value has to pass that comes back inside it."""
+    span = ranges.critical if verdict is Verdict.CRITICAL else ranges.ideal
+    if span is None or ranges.ideal is None:
+        return None
+    limit = span.low if sign < 0.0 else span.high
+    return limit, limit - sign * DEADBAND * ranges.ideal.width
+
+
 def _was_out(
     reading: Reading, verdict: Verdict, sign: float, sensor: Sensor, recent: Recent
 ) -> bool:
@@ -198,14 +202,13 @@ def _was_out(
         if value is None or not sensor.is_plausible(value):
             continue
         ranges = sensor.ranges(is_day=scan.is_day, species=scan.species)
-        span = ranges.critical if verdict is Verdict.CRITICAL else ranges.ideal
-        if span is None or ranges.ideal is None:
+        edge = _edge(ranges, verdict, sign)
+        if edge is None:
             return False
-        band = DEADBAND * ranges.ideal.width
-        limit, within = (span.low, span.low + band) if sign < 0.0 else (span.high, span.high - band)
+        limit, release = edge
         if (value - limit) * sign > 0.0:
             return True
-        if (value - within) * sign <= 0.0:
+        if (value - release) * sign <= 0.0:
             return False
     return False
 

@@ -52,14 +52,13 @@ MAX_WRITERS: Final = 16
 
 
 class Gaps:
-    """Follows the numbers on one topic; `lost` counts what is known to be lost, never too much."""
+    """Follows the numbers on one topic."""
 
     def __init__(self) -> None:
-        self.lost = 0
         self._next: list[int] = []  # of each writer, the last one at the end
 
     def see(self, number: int, writers: Callable[[], int]) -> int:
-        """Note a message's number; returns how many were lost before it.
+        """Note a message's number; returns how many are known to be lost before it.
 
         `writers` counts those that are there now; called only where the number is not one expected.
         A number that may be the first of a new writer is taken for that.
@@ -76,7 +75,6 @@ class Gaps:
             self._next.remove(nearest)
         self._next.append(number + 1)
         del self._next[:-MAX_WRITERS]
-        self.lost += lost
         return lost
 
     def settle(self, writers: int) -> None:

@@ -58,19 +58,20 @@ PERIOD_S: Final = 1.0
 _COST_S: Final = 1.0
 
 
-# What a topic's message is made of and by: a search that the node's thread begins, if there is
-# one, and what makes the message of its result on a worker; None: it is the one before.
-_Search = Callable[[], Future[Any]]
-_Plan = tuple[_Search | None, Callable[[Any, ShouldStop], bytes | None]]
+# What gets the message that was made; None: it is the one before.
+_Reply = Callable[[bytes | Exception | None], None]
 
 
 @dataclass(slots=True)
 class _Topic:
-    """While `key_of()` is the same, the message would be the same; None: not known before."""
+    """While `key_of()` is the same, the message would be the same; None: not known before.
+
+    `plan(reply, should_stop)` is the query that makes it.
+    """
 
     publisher: Any
     key_of: Callable[[], object]
-    plan: Callable[[], _Plan]
+    plan: Callable[[_Reply, ShouldStop], Query]
     key: object = None
     begun_s: float = -math.inf
     is_wanted: bool = False
@@ -151,17 +152,12 @@ class LayerService:
             return
         topic.key, topic.begun_s = key, now_s
         try:
-            plan = topic.plan()
+            query = topic.plan(partial(self._publish, topic), lambda: not topic.is_wanted)
         except ValueError as error:  # a field that is refused
             self._refuse(topic, error)
             return
         topic.is_under_way = True
-        search, make = plan[0] or _nothing, plan[1]
-
-        def made(found: Any) -> bytes | None:
-            return make(found, lambda: not topic.is_wanted)
-
-        self.queue.ask(Query(search, partial(self._publish, topic), made, _COST_S))
+        self.queue.ask(query)
 
     def _publish(self, topic: _Topic, made: bytes | Exception | None) -> None:
         topic.is_under_way = False
@@ -197,14 +193,16 @@ class LayerService:
         minute_ns = int(self.day_length_s / MINUTES_A_DAY * NANOSECONDS_PER_SECOND)
         return key, self.written(), self.now_ns() // minute_ns
 
-    def _plan_layer(self, sensor: str, frame_id: str) -> _Plan:
+    def _plan_layer(
+        self, sensor: str, frame_id: str, reply: _Reply, should_stop: ShouldStop
+    ) -> Query:
         snapshot = self.snapshot()
         request = self._request(sensor, snapshot)
         samples = self.store.samples_for_sensor(sensor)
         compute = partial(compute_field, request, samples, self.occupancy(), self.rules())
         task = self.estimates.prepare(EstimateRequest(request))
 
-        def make(found: Sequence[TagPast], should_stop: ShouldStop) -> bytes:
+        def make(found: Sequence[TagPast]) -> bytes:
             grid = compute(should_stop)
             estimate = None
             if are_enough(found):
@@ -213,7 +211,7 @@ class LayerService:
             (self._estimated.discard if estimate is None else self._estimated.add)(sensor)
             return cloud(points(grid, estimate), snapshot.stamp_ns, frame_id)
 
-        return partial(_or_nothing, task.look_up), make
+        return Query(partial(_or_nothing, task.look_up), reply, make, _COST_S)
 
     def _request(self, sensor: str, snapshot: Snapshot) -> FieldRequest:
         """The same for all sensors: the box is that of all tags with a place."""
@@ -226,8 +224,10 @@ class LayerService:
             self._whole = key, default_request(sensor, box, most)
         return replace(self._whole[1], sensor_type=sensor)
 
-    def _plan_marks(self, arrays: MarkerArrays) -> _Plan:
-        return None, partial(arrays.build, self.snapshot())
+    def _plan_marks(self, arrays: MarkerArrays, reply: _Reply, _: ShouldStop) -> Query:
+        snapshot = self.snapshot()
+        build = partial(self._workers.submit, lambda _: arrays.build(snapshot), _COST_S)
+        return Query(build, reply, cost_s=_COST_S)
 
     # --- the node's -------------------------------------------------------------------------
 
@@ -246,7 +246,7 @@ class LayerService:
         self._workers.close()
 
 
-def _or_nothing(look_up: _Search) -> Future[Any]:
+def _or_nothing(look_up: Callable[[], Future[Any]]) -> Future[Any]:
     """What is found; without a journal that can be read no reading, and a field has no error."""
     found: Future[Any] = Future()
     look_up().add_done_callback(
@@ -255,9 +255,3 @@ def _or_nothing(look_up: _Search) -> Future[Any]:
         )
     )
     return found
-
-
-def _nothing() -> Future[Any]:
-    nothing: Future[Any] = Future()
-    nothing.set_result(None)
-    return nothing

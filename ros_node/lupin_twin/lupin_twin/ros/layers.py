@@ -271,7 +271,7 @@ class MarkerArrays:
         self._markers: dict[Hashable, list[Any]] | None = None
         self._clear = Marker(header=Header(frame_id=frame_id), action=Marker.DELETEALL)
 
-    def build(self, snapshot: Snapshot, *_: object) -> bytes | None:
+    def build(self, snapshot: Snapshot) -> bytes | None:
         """The array, serialised, if it is another than the one before; made in turns."""
         marks, before = self._marks(snapshot), self._markers
         if before is not None and marks == [*before]:

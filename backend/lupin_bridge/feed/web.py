@@ -13,12 +13,14 @@ from functools import partial
 from pathlib import Path
 from typing import Any, Final
 
+from lupin_msgs.srv import GetEstimateReport, GetWrites
+
 from lupin_bridge.feed.followed_log import FollowedLog
 from lupin_bridge.feed.query import Now
 from lupin_bridge.feed.ros_source import Post, RosSource, now_ns_of
 from lupin_bridge.feed.shared_work import Periodic
 from lupin_bridge.feed.source import TwinUnavailableError, TwinUpdate
-from lupin_bridge.feed.web_node import Service, WebNode
+from lupin_bridge.feed.web_node import WebNode
 from lupin_twin.core.journal_condition import UNKNOWN, Condition
 from lupin_twin.core.past import NotRemembered, lasts, may_pass
 from lupin_twin.core.state import Snapshot
@@ -159,9 +161,8 @@ class WebTwin(RosSource[WebNode]):
 
     async def estimate_report(self, request: ReportRequest) -> Report:
         """What the twin's service says."""
-        response = await self._request(
-            Service.REPORT, convert_field.report_request_message(request)
-        )
+        wanted = convert_field.report_request_message(request)
+        response = await self._request(GetEstimateReport, wanted)
         _check_ok(response)
         cost_s = len(response.tag_ids) * _READ_TAG_S
         reading = self.workers.submit(lambda _: convert_field.report_of(response), cost_s)
@@ -188,11 +189,11 @@ class WebTwin(RosSource[WebNode]):
         return await self._log.explain(error)
 
     async def _rows_behind(self, after: int) -> Lot:
-        response = await self._request(Service.WRITES, convert_past.rows_request_message(after))
+        response = await self._request(GetWrites, convert_past.rows_request_message(after))
         return convert_past.lot_of(response, after)
 
-    async def _request(self, service: Service, request: Any) -> Any:
-        """The twin's response.
+    async def _request(self, service: Any, request: Any) -> Any:
+        """The twin's response; `service` is its type.
 
         Raises:
             TwinUnavailableError: nobody there to answer, or not in time.

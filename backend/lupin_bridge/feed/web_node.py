@@ -6,14 +6,10 @@ import math
 import time
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
-from enum import Enum
 from hashlib import blake2b
 from typing import Any, Final
 
-from lupin_msgs.srv import (
-    GetEstimateReport,
-    GetWrites,
-)
+from lupin_msgs.srv import GetEstimateReport, GetWrites
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
 from rclpy.validate_topic_name import validate_topic_name
 
@@ -36,13 +32,6 @@ from lupin_twin.ros.parameters import (
 )
 
 NODE_NAME: Final = "lupin_web"
-
-
-class Service(Enum):
-    """What a twin is asked for."""
-
-    WRITES = GetWrites
-    REPORT = GetEstimateReport
 
 
 # How long a state waits for the times that a twin publishes right behind it. Without them it is
@@ -158,13 +147,11 @@ class WebNode(AdjustableNode):
         # Nobody calls it from here; roslib's clients are told its name.
         with naming("field_service_name", p.field_service_name):
             validate_topic_name(p.field_service_name, is_service=True)
-        self.clients_of_twin = {
-            service: self.create_client(
-                service.value, name, qos_profile=SERVICE_QOS, callback_group=group
-            )
-            for service, name in (
-                (Service.WRITES, interfaces.GET_WRITES.name),
-                (Service.REPORT, interfaces.GET_ESTIMATE_REPORT.name),
+        self.clients_of_twin: dict[Any, Any] = {
+            kind: self.create_client(kind, name, qos_profile=SERVICE_QOS, callback_group=group)
+            for kind, name in (
+                (GetWrites, interfaces.GET_WRITES.name),
+                (GetEstimateReport, interfaces.GET_ESTIMATE_REPORT.name),
             )
         }
         self._patience = self.utilities.every(
@@ -204,7 +191,7 @@ class WebNode(AdjustableNode):
         is_recent = time.monotonic() - self._reported_s < REPORT_HOLDS_S
         return self._report if is_recent else SelfReport()
 
-    def why_not(self, service: Service) -> str:
+    def why_not(self, service: Any) -> str:
         """What is to be said where no twin offers it; empty: one does."""
         if self.clients_of_twin[service].service_is_ready():
             return ""

@@ -109,16 +109,6 @@ class RosTime:
     is_simulated: bool
 
 
-class RosSide(Protocol):
-    """What is needed of the ROS thread; `RosThread` is it."""
-
-    async def call(self, work: Callable[[Any], Any]) -> Any:
-        """Run `work(node)` there, and return its result."""
-
-    def to_loop(self, callback: Callable[..., None], *args: Any) -> None:
-        """From there, have a callback run on the event loop."""
-
-
 class Ros(Protocol):
     """What ROS does for the relay, in its thread; `ros_source.RelayRos` is it."""
 
@@ -224,10 +214,10 @@ class _Relayed:
 class Relay:
     """All topics that are listened to. Belongs to the event loop.
 
-    `thread()` is asked for with the first topic: it need not run before.
+    `thread()` is the `RosThread`, asked for with the first topic: it need not run before.
     """
 
-    def __init__(self, thread: Callable[[], RosSide], ros: Ros, linger_s: float = LINGER_S) -> None:
+    def __init__(self, thread: Callable[[], Any], ros: Ros, linger_s: float = LINGER_S) -> None:
         self._thread = thread
         self._ros = ros
         self.linger_s = linger_s

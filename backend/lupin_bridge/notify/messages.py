@@ -114,6 +114,11 @@ class GreenhouseState:
         return self.status.update.snapshot.tags
 
     @property
+    def knows_alarms(self) -> bool:
+        """Whether the past has been read that they are of."""
+        return self.board.source != "starting"
+
+    @property
     def origin(self) -> Origin:
         """Where what was observed comes from."""
         return self.status.update.origin

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import hashlib
 import heapq
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
 from typing import Any, Final
 
 import orjson
 
 from lupin_bridge.alarms.board import MAX_WORST, worst_first
-from lupin_bridge.judge.episodes import SITE, Alarm
+from lupin_bridge.judge.episodes import SITE
 from lupin_bridge.judge.ranges import Sensors
 from lupin_bridge.judge.scan_interval import SHORTEST_NS
 from lupin_bridge.judge.verdict import Health, Verdict, derive
@@ -64,8 +64,6 @@ class Mirror:
         self._sensors = sensors
         self._seen = GreenhouseState()
         self._tags: dict[str, TagState] = {}
-        self._alarms: Mapping[str, tuple[Alarm, ...]] = {}
-        self._knows_alarms = False
         self._published: dict[str, _Published] = {}
         # Tags in their turn, each with the state with which it came to wait; HOUSE: the greenhouse.
         self._waiting: dict[str, TagState | None] = {SITE: None}
@@ -99,8 +97,11 @@ class Mirror:
         old, new = before.judged.tags, seen.judged.tags
         if new is not old:
             changed |= dict.fromkeys(t for t, health in new.items() if old.get(t) is not health)
-        if seen.board is not before.board:
-            changed |= self._sort_alarms(seen)
+        if seen.knows_alarms is not before.knows_alarms:
+            changed |= dict.fromkeys(self._tags)
+        elif seen.board is not before.board:
+            was, now = before.board.page.by_tag, seen.board.page.by_tag
+            changed |= dict.fromkeys(t for t in {**was, **now} if was.get(t) != now.get(t))
         if (seen.now_ns is None, seen.origin) != (before.now_ns is None, before.origin):
             changed |= dict.fromkeys(self._tags)
         now_ns = seen.now_ns
@@ -127,17 +128,6 @@ class Mirror:
             self.dropped += 1
         self._waiting[tag_id] = tag
 
-    def _sort_alarms(self, seen: GreenhouseState) -> dict[str, None]:
-        before, now = self._alarms, seen.board.page.by_tag
-        self._alarms = now
-        is_known, did_know = seen.board.source != "starting", self._knows_alarms
-        self._knows_alarms = is_known
-        if is_known is not did_know:
-            return dict.fromkeys(self._tags)
-        return dict.fromkeys(
-            tag_id for tag_id in {**before, **now} if before.get(tag_id) != now.get(tag_id)
-        )
-
     def _turn_of(self, tag_id: str) -> Iterator[Message]:
         published = self._published.setdefault(tag_id, _Published())
         tag = self._tags.get(tag_id)
@@ -161,7 +151,7 @@ class Mirror:
         page = seen.board.page
         yield self._with_origin(
             topics.of(None, "alarms"),
-            alarms_payload(len(page.active), page.worst, is_known=self._knows_alarms),
+            alarms_payload(len(page.active), page.worst, is_known=seen.knows_alarms),
         )
 
     def _of_tag(self, tag: TagState, published: _Published) -> Iterator[tuple[str, dict[str, Any]]]:
@@ -191,11 +181,11 @@ class Mirror:
             topics.of(tag_id, "health"),
             health_payload(seen.judged.tags.get(tag_id, _UNKNOWN)),
         )
-        active = self._alarms.get(tag_id, ())
+        active = seen.board.page.by_tag.get(tag_id, ())
         worst = heapq.nsmallest(MAX_WORST, active, key=worst_first)
         yield self._with_origin(
             topics.of(tag_id, "alarms"),
-            alarms_payload(len(active), worst, is_known=self._knows_alarms),
+            alarms_payload(len(active), worst, is_known=seen.knows_alarms),
         )
 
     def _with_origin(self, topic: str, payload: dict[str, Any]) -> tuple[str, dict[str, Any]]:

@@ -14,7 +14,7 @@ from websockets.frames import Frame, Opcode
 from lupin_bridge.alarms.board import Board
 from lupin_bridge.alarms.notes import notes_of_alarms
 from lupin_bridge.judge.judging import NOTHING_JUDGED, Judged
-from lupin_bridge.stream.health_json import HealthJson, alarms_frame, alarms_in_frame
+from lupin_bridge.stream.health_json import HealthJson, alarms_body, alarms_in_frame
 from lupin_bridge.stream.state_json import StateJson, header
 from lupin_bridge.stream.status import Status
 from lupin_twin.core.notes import Note
@@ -27,10 +27,10 @@ def text_frame(payload: bytes) -> bytes:
 
 
 def alarms_message(now: Board, now_ns: int | None, notes: tuple[Note, ...], count: int) -> bytes:
-    """The message with the alarms of now, and what people said of them: `count` notes in all."""
+    """`schema.AlarmsFrame`: the alarms, and what people said of them; `count` notes in all."""
     said = notes_of_alarms(now.alarms, notes, now_ns)
-    shown = alarms_in_frame(now.page, now_ns)
-    return text_frame(alarms_frame(shown, now.source, now.since_ns, said, count))
+    body = alarms_body(alarms_in_frame(now.page, now_ns), now.source, now.since_ns, said)
+    return text_frame(orjson.dumps({"type": "alarms", "notes": count, **body}))
 
 
 def status_frame(status: Status) -> bytes:

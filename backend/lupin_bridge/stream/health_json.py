@@ -95,18 +95,6 @@ def alarms_in_frame(page: Page, now_ns: int | None) -> list[Alarm]:
     return sorted((*active, *over), key=lambda alarm: (-alarm.raised_at_ns, alarm.id))
 
 
-def alarms_frame(
-    alarms: Iterable[Alarm],
-    source: str,
-    since_ns: int | None,
-    said: Mapping[str, AlarmNotes] = _NOTHING,
-    notes: int = 0,
-) -> bytes:
-    """`schema.AlarmsFrame` as JSON text; `notes`: how many there are."""
-    body = alarms_body(alarms, source, since_ns, said)
-    return orjson.dumps({"type": "alarms", "notes": notes, **body})
-
-
 class HealthJson:
     """Writes what was judged; made for one stream of it."""
 

@@ -1,9 +1,12 @@
 import json
 
+from lupin_bridge.alarms.board import Board, page_of
 from lupin_bridge.judge.episodes import Alarm
 from lupin_bridge.judge.verdict import Kind, Reason, Verdict
 from lupin_bridge.stream import schema
-from lupin_bridge.stream.health_json import alarms_body, alarms_frame
+from lupin_bridge.stream.frames import alarms_message
+from lupin_bridge.stream.health_json import alarms_body
+from tests.bridge.stream.test_frames import received
 
 NIGHT_NS = 1_000_000_000_000
 COLD = Alarm(
@@ -17,7 +20,8 @@ COLD = Alarm(
 
 
 def test_a_frame_is_of_the_contracts_type_to_the_last_field_and_in_its_order() -> None:
-    text = alarms_frame([COLD], "journal", NIGHT_NS)
+    wire = alarms_message(Board(page_of([COLD]), "journal", NIGHT_NS), None, (), 0)
+    text = bytes(received(wire).data)
     schema.AlarmsFrame.model_validate_json(text, strict=True)
     frame = json.loads(text)
     assert list(frame) == ["type", "notes", "alarms", "source", "since"]

@@ -5,8 +5,8 @@ from typing import Any
 
 import pytest
 
-from lupin_bridge.stream.frames import FrameWriter, text_frame
-from lupin_bridge.stream.health_json import alarms_frame
+from lupin_bridge.alarms.board import Board, page_of
+from lupin_bridge.stream.frames import FrameWriter, alarms_message
 from lupin_bridge.stream.hub import CLOSE_POLICY, Client, Hub
 from lupin_bridge.stream.status import Reason, Status
 from lupin_twin.core.state import Snapshot, TagState
@@ -74,8 +74,8 @@ class Stage:
 
     def alarms(self, *tag_ids: str, now_s: float = 0.0) -> None:
         """Tell of active alarms at these tags."""
-        text = alarms_frame([alarm(tag_id) for tag_id in tag_ids], "journal", 0)
-        self.hub.publish_alarms(text_frame(text), now_s)
+        board = Board(page_of(alarm(tag_id) for tag_id in tag_ids), "journal", 0)
+        self.hub.publish_alarms(alarms_message(board, None, (), 0), now_s)
 
     def join(self, socket: Socket, now_s: float = 0.0, **asked: Any) -> Client:
         client = Client(socket, **asked)

@@ -45,10 +45,8 @@ Need = (
     | LatestRequest
     | Step
 )
-# What is known as of then crosses by itself, so it is of any type.
-Found = Any
 # Looks up what is needed of the log, as of one moment of its writing.
-Find = Callable[[Need], Found]
+Find = Callable[[Need], Any]
 
 
 @dataclass(frozen=True, slots=True)

@@ -118,7 +118,6 @@ class WebNode(AdjustableNode):
         self._stamp_watch = StampWatch()
         self._report = SelfReport()
         self._reported_s = -math.inf
-        self._digests: dict[str, tuple[TagState, bytes]] = {}
         self._topics: dict[str, str] = {}
         group = MutuallyExclusiveCallbackGroup()
         p = self.parameters
@@ -251,9 +250,7 @@ class WebNode(AdjustableNode):
         )
         snapshot = replace(snapshot, clock=clock)
         self._newest = snapshot
-        self.digest = self._digest_of(snapshot.tags)
-        if len(self._digests) > len(snapshot.tags):
-            self._forget_all_but(snapshot.tags)
+        self.digest = _digest_of(snapshot.tags)
         self._on_state(snapshot)
 
     def _take_map(self, msg: Any) -> None:
@@ -277,25 +274,13 @@ class WebNode(AdjustableNode):
         self._changes += 1
         self._on_map()
 
-    # --- small parts --------------------------------------------------------------------------
 
-    def _forget_all_but(self, tags: Sequence[TagState]) -> None:
-        ids = {tag.tag_id for tag in tags}
-        self._digests = {tag_id: kept for tag_id, kept in self._digests.items() if tag_id in ids}
-
-    def _digest_of(self, tags: Sequence[TagState]) -> str:
-        total = blake2b(digest_size=12)
-        for tag in tags:
-            kept = self._digests.get(tag.tag_id)
-            if kept is None or kept[0] is not tag:
-                # And which of them are of one scan: only those derive a VPD.
-                times = [reading.observed_at_ns for reading in tag.readings]
-                readings = [
-                    (it.name, it.value, times.index(it.observed_at_ns)) for it in tag.readings
-                ]
-                text = repr((tag.tag_id, tag.pose, readings))
-                digest = blake2b(text.encode("utf-8", "surrogatepass"), digest_size=12).digest()
-                kept = (tag, digest)
-                self._digests[tag.tag_id] = kept
-            total.update(kept[1])
-        return total.hexdigest()
+def _digest_of(tags: Sequence[TagState]) -> str:
+    """Of poses and readings, and of which readings are of one scan: only those derive a VPD."""
+    digest = blake2b(digest_size=12)
+    for tag in tags:
+        times = [reading.observed_at_ns for reading in tag.readings]
+        readings = [(it.name, it.value, times.index(it.observed_at_ns)) for it in tag.readings]
+        text = repr((tag.tag_id, tag.pose, readings))
+        digest.update(text.encode("utf-8", "surrogatepass"))
+    return digest.hexdigest()

@@ -49,20 +49,19 @@ _UNKNOWN: Final = Health(Verdict.UNKNOWN)
 
 @dataclass(frozen=True, slots=True)
 class Judged:
-    """The greenhouse and its tags as of one snapshot; `changed` are the tags that changed.
+    """The greenhouse and its tags as of one snapshot: the very same values where nothing changed.
 
     `number` counts what was told. While the twin's clock does not run, everything is unknown.
     """
 
     house: Health
     tags: Mapping[str, Health]
-    changed: frozenset[str]
     day: Day
     number: int = 0
     patrol: Patrol = NO_PATROL
 
 
-NOTHING_JUDGED: Final = Judged(_UNKNOWN, {}, frozenset(), Day(True, "assumed"))
+NOTHING_JUDGED: Final = Judged(_UNKNOWN, {}, Day(True, "assumed"))
 
 
 def silenced(judged: Judged) -> Judged:
@@ -73,7 +72,7 @@ def silenced(judged: Judged) -> Judged:
 def unjudged(snapshot: Snapshot) -> Judged:
     """Of a snapshot that could not be judged nothing is known; it is next to no other."""
     tags = {tag.tag_id: _UNKNOWN for tag in snapshot.tags}
-    return replace(NOTHING_JUDGED, tags=tags, changed=frozenset(tags), number=-1)
+    return replace(NOTHING_JUDGED, tags=tags, number=-1)
 
 
 def judge_once(
@@ -328,9 +327,7 @@ class Judge:
         is_same = (house, day, patrol) == (before.house, before.day, before.patrol)
         if tags is before.tags and is_same and before.number:
             return before
-        self._judged = Judged(
-            house, tags, frozenset(changed) | frozenset(gone), day, before.number + 1, patrol
-        )
+        self._judged = Judged(house, tags, day, before.number + 1, patrol)
         return self._judged
 
 

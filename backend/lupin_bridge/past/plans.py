@@ -23,7 +23,7 @@ from lupin_bridge.judge.options import Criteria
 from lupin_bridge.past import bodies, derived
 from lupin_bridge.past.query import PeriodQuery
 from lupin_bridge.serving.admission import REVALIDATE, Answer, json_answer
-from lupin_bridge.stream.health_json import HealthJson
+from lupin_bridge.stream.health_json import judgement
 from lupin_bridge.stream.state_json import StateJson, history
 from lupin_twin.core.history import LatestRequest, tag_history
 from lupin_twin.core.journal_condition import Condition
@@ -184,7 +184,7 @@ class Health(StateQuery):
         scans: tuple[PastWrite, ...] = find(ScansRequest(max(0, at_ns - SINCE_NS), at_ns, sensors))
         days = days_of(scans, by.sensors, by.is_day, by.day_number)
         judged = judge_once(snapshot, recent, by, days=days)
-        body = HealthJson().whole(judged)
+        body = judgement(judged)
         return plan_of(etag_of("health", (snapshot.stamp_ns, body.decode())), lambda _: body)
 
 

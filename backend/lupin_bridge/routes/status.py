@@ -40,7 +40,7 @@ from lupin_bridge.routes.answers import (
 )
 from lupin_bridge.serving.admission import REVALIDATE, Answer
 from lupin_bridge.stream import robot_schema, schema
-from lupin_bridge.stream.health_json import alarms_body
+from lupin_bridge.stream.health_json import alarms_body, judgement
 from lupin_bridge.stream.robot import robot_body
 from lupin_bridge.stream.state_json import header, stamp
 from lupin_twin.field.explored import OccupancyMap
@@ -207,7 +207,7 @@ async def health(request: Request) -> Response:
     judged = bridge.judged
 
     async def compute() -> Answer:
-        return Answer(bridge.frames.health.whole(judged), "application/json", NEVER_STORE)
+        return Answer(judgement(judged), "application/json", NEVER_STORE)
 
     key = ("health", judged.number, bridge.status.is_live)
     return await respond(request, key, compute)

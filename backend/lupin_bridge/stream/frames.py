@@ -14,7 +14,7 @@ from websockets.frames import Frame, Opcode
 from lupin_bridge.alarms.board import Board
 from lupin_bridge.alarms.notes import notes_of_alarms
 from lupin_bridge.judge.judging import NOTHING_JUDGED, Judged
-from lupin_bridge.stream.health_json import HealthJson, alarms_body, alarms_in_frame
+from lupin_bridge.stream.health_json import alarms_body, alarms_in_frame, judgement, judgement_since
 from lupin_bridge.stream.state_json import StateJson, header
 from lupin_bridge.stream.status import Status
 from lupin_twin.core.notes import Note
@@ -90,7 +90,7 @@ class StateFrame:
             self.seq,
             orjson.dumps(self.revision),
             self.json,
-            self._writer.health.whole(self.judged),
+            judgement(self.judged),
         )
 
     def _delta(self) -> bytes:
@@ -107,7 +107,7 @@ class StateFrame:
             orjson.dumps(header(stamp_ns, self.snapshot.frame_id)),
             b",".join([self._writer.json.tag(tag, self.snapshot.now_ns) for tag in changed]),
             orjson.dumps(removed),
-            self._writer.health.delta(self.base.judged, self.judged),
+            judgement_since(self.base.judged, self.judged),
         )
 
 
@@ -133,7 +133,6 @@ class FrameWriter:
     def __init__(self) -> None:
         self.json = StateJson()
         self.message_json = StateJson(has_times=False)
-        self.health = HealthJson()
         self._newest: StateFrame | None = None
 
     def state(

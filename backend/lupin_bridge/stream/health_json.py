@@ -1,7 +1,4 @@
-"""What the judge says as JSON text: `schema.Judgement`, whole or only what has changed.
-
-Pure. A tag's text is kept until its health is another: it stays the same for hours.
-"""
+"""What the judge says as JSON text: `schema.Judgement`, whole or only what has changed. Pure."""
 
 from __future__ import annotations
 
@@ -95,40 +92,20 @@ def alarms_in_frame(page: Page, now_ns: int | None) -> list[Alarm]:
     return sorted((*active, *over), key=lambda alarm: (-alarm.raised_at_ns, alarm.id))
 
 
-class HealthJson:
-    """Writes what was judged; made for one stream of it."""
+def judgement(judged: Judged) -> bytes:
+    """The house and every tag."""
+    return _text(judged, judged.tags)
 
-    def __init__(self) -> None:
-        self._cache: dict[str, tuple[Health, bytes]] = {}
-        self._whole: tuple[Judged, bytes] | None = None
 
-    def whole(self, judged: Judged) -> bytes:
-        """The house and every tag."""
-        if self._whole is None or self._whole[0] is not judged:
-            if len(self._cache) > 2 * len(judged.tags):
-                self._cache.clear()
-            self._whole = judged, self._text(judged, judged.tags)
-        return self._whole[1]
+def judgement_since(before: Judged, now: Judged) -> bytes:
+    """The house, and the tags of whom not the same was said `before`; who is gone is absent."""
+    known = before.tags
+    return _text(now, [key for key, one in now.tags.items() if known.get(key) is not one])
 
-    def delta(self, before: Judged, now: Judged) -> bytes:
-        """The house, and the tags of whom not the same was said `before`; who is gone is absent."""
-        if now is before:
-            return self._text(now, ())
-        if now.number == before.number + 1:
-            return self._text(now, sorted(now.changed & now.tags.keys()))
-        known = before.tags
-        return self._text(now, [key for key, one in now.tags.items() if known.get(key) is not one])
 
-    def _text(self, judged: Judged, tag_ids: Iterable[str]) -> bytes:
-        tags = [b"%b:%b" % (orjson.dumps(tag_id), self._tag(tag_id, judged)) for tag_id in tag_ids]
-        return b'{"house":%b,"tags":{%b}}' % (orjson.dumps(_house(judged)), b",".join(tags))
-
-    def _tag(self, tag_id: str, judged: Judged) -> bytes:
-        health = judged.tags[tag_id]
-        kept = self._cache.get(tag_id)
-        if kept is None or kept[0] is not health:
-            kept = self._cache[tag_id] = health, orjson.dumps(_health(health))
-        return kept[1]
+def _text(judged: Judged, tag_ids: Iterable[str]) -> bytes:
+    tags = {tag_id: _health(judged.tags[tag_id]) for tag_id in tag_ids}
+    return orjson.dumps({"house": _house(judged), "tags": tags})
 
 
 def _house(judged: Judged) -> dict[str, Any]:

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from lupin_bridge.judge.judging import NOTHING_JUDGED, Judge, Judged, silenced
 from lupin_bridge.judge.options import own_sensors
 from lupin_bridge.stream import schema
-from lupin_bridge.stream.health_json import HealthJson
+from lupin_bridge.stream.health_json import judgement, judgement_since
 from lupin_twin.core.state import Reading, Snapshot, TagState
 from tests.support.seen import BY_LIGHT
 
@@ -27,7 +27,7 @@ def tag(tag_id: str, value: float, at_ns: int = START) -> TagState:
 
 def test_it_is_of_the_contracts_type_to_the_last_field() -> None:
     judged = see(Judge(BY_LIGHT), START, [tag("a", 6.0), tag('"b"', 22.0)])
-    text = HealthJson().whole(judged)
+    text = judgement(judged)
     body = schema.Judgement.model_validate_json(text, strict=True)
     assert (body.house.verdict, body.house.day.source) == ("critical", "assumed")
     assert body.tags['"b"'].verdict == "healthy"
@@ -54,20 +54,20 @@ def test_what_only_the_deadband_holds_names_its_limit_and_what_ends_it() -> None
     """From 18 to 26 °C the deadband is 0.4."""
     judge = Judge(BY_LIGHT)
     see(judge, START, [tag("a", 17.9)])
-    text = HealthJson().whole(see(judge, START + 1, [tag("a", 18.1, START + 1)]))
+    text = judgement(see(judge, START + 1, [tag("a", 18.1, START + 1)]))
     (reason,) = schema.Judgement.model_validate_json(text, strict=True).tags["a"].reasons
     assert (reason.limit, reason.release) == (18.0, 18.4)
 
 
 def test_of_a_silent_house_it_says_so() -> None:
     judged = silenced(see(Judge(BY_LIGHT), START, [tag("a", 22.0)]))
-    body = schema.Judgement.model_validate_json(HealthJson().whole(judged), strict=True)
+    body = schema.Judgement.model_validate_json(judgement(judged), strict=True)
     assert (body.house.verdict, body.house.reasons[0].kind) == ("unknown", "silent")
     assert body.tags["a"].verdict == "healthy"
 
 
 def test_nothing_judged_yet_is_said_too() -> None:
-    body = schema.Judgement.model_validate_json(HealthJson().whole(NOTHING_JUDGED), strict=True)
+    body = schema.Judgement.model_validate_json(judgement(NOTHING_JUDGED), strict=True)
     assert (body.house.verdict, body.tags) == ("unknown", {})
 
 
@@ -78,8 +78,8 @@ STEPS = st.lists(st.dictionaries(st.sampled_from("abc"), st.sampled_from([6.0, 1
 def test_whole_and_deltas_together_are_always_what_was_judged(
     steps: list[dict[str, float]], skipped: set[int]
 ) -> None:
-    writer, judge = HealthJson(), Judge(BY_LIGHT)
-    told, shown = NOTHING_JUDGED, json.loads(writer.whole(NOTHING_JUDGED))["tags"]
+    judge = Judge(BY_LIGHT)
+    told, shown = NOTHING_JUDGED, json.loads(judgement(NOTHING_JUDGED))["tags"]
     kept: dict[str, TagState] = {}
     for number, values in enumerate(steps):
         kept = {
@@ -91,18 +91,18 @@ def test_whole_and_deltas_together_are_always_what_was_judged(
         now = see(judge, START + number, list(kept.values()))
         if number in skipped:
             continue
-        delta: dict[str, Any] = json.loads(writer.delta(told, now))
+        delta: dict[str, Any] = json.loads(judgement_since(told, now))
         shown = {**{key: one for key, one in shown.items() if key in kept}, **delta["tags"]}
-        assert {"house": delta["house"], "tags": shown} == json.loads(writer.whole(now))
+        assert {"house": delta["house"], "tags": shown} == json.loads(judgement(now))
         if now is told:
             assert delta["tags"] == {}
         told = now
 
 
 def test_a_delta_holds_only_what_is_another() -> None:
-    writer, judge = HealthJson(), Judge(BY_LIGHT)
+    judge = Judge(BY_LIGHT)
     calm = tag("a", 22.0)
     before = see(judge, START, [calm, tag("b", 22.0)])
     now = see(judge, START + 1, [calm, tag("b", 6.0, START + 1)])
-    assert list(json.loads(writer.delta(before, now))["tags"]) == ["b"]
-    assert list(json.loads(writer.delta(before, replace(now, number=9)))["tags"]) == ["b"]
+    assert list(json.loads(judgement_since(before, now))["tags"]) == ["b"]
+    assert list(json.loads(judgement_since(before, replace(now, number=9)))["tags"]) == ["b"]

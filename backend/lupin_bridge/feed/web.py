@@ -22,13 +22,12 @@ from lupin_bridge.feed.shared_work import Periodic
 from lupin_bridge.feed.source import TwinUnavailableError, TwinUpdate
 from lupin_bridge.feed.web_node import WebNode
 from lupin_twin.core.journal_condition import UNKNOWN, Condition
-from lupin_twin.core.past import NotRemembered, lasts, may_pass
+from lupin_twin.core.past import NotRemembered, PastRefused, error_of
 from lupin_twin.core.state import Snapshot
 from lupin_twin.field.engine import FieldRefused
 from lupin_twin.journal.beside import journal_path
 from lupin_twin.journal.follow import Lot
 from lupin_twin.ros import convert_field, convert_past
-from lupin_twin.ros.convert_past import NotAnAnswerError
 from lupin_twin.runtime.estimates import Report, ReportRequest
 
 log = logging.getLogger(__name__)
@@ -168,7 +167,7 @@ class WebTwin(RosSource[WebNode]):
         reading = self.workers.submit(lambda _: convert_field.report_of(response), cost_s)
         try:
             return await asyncio.wrap_future(reading)
-        except NotAnAnswerError as error:
+        except ValueError as error:
             raise TwinUnavailableError(f"the twin's answer cannot be used: {error}") from error
 
     async def now(self) -> Now:
@@ -230,9 +229,7 @@ def _check_ok(response: Any) -> None:
     """Raise what a service's refusal says."""
     if response.ok:
         return
-    if may_pass(response.error_message):
-        raise TwinUnavailableError(response.error_message)
-    why = lasts(response.error_message)
-    if why is not None:
-        raise NotRemembered(why, is_lasting=True)
-    raise FieldRefused(response.error_message)
+    error = error_of(response.error_message)
+    if isinstance(error, PastRefused):
+        raise FieldRefused(str(error))
+    raise error if error.is_lasting else TwinUnavailableError(str(error))

@@ -20,16 +20,6 @@ ASK_AGAIN: Final = "ask again later"
 NOT_REMEMBERED: Final = "not remembered: "
 
 
-def may_pass(message: str) -> bool:
-    """Whether a message says that the same may be requested again."""
-    return message.endswith(ASK_AGAIN)
-
-
-def lasts(message: str) -> str | None:
-    """Why nobody remembers it, of a message that says so; None: it does not."""
-    return message.removeprefix(NOT_REMEMBERED) if message.startswith(NOT_REMEMBERED) else None
-
-
 DEFAULT_POINTS: Final = 500
 MAX_POINTS: Final = 5_000
 # What is derived of a series is made of so many of its readings at most: four weeks, one a minute.
@@ -104,15 +94,14 @@ def message_of(error: Exception) -> str:
             return NOT_REMEMBERED + why
     else:
         why = f"the twin failed to answer: {error}"
-    return why if may_pass(why) else f"{why}: {ASK_AGAIN}"
+    return why if why.endswith(ASK_AGAIN) else f"{why}: {ASK_AGAIN}"
 
 
 def error_of(message: str) -> PastRefused | NotRemembered:
     """What a service's `error_message` says: the other direction of `message_of`."""
-    why = lasts(message)
-    if why is not None:
-        return NotRemembered(why, is_lasting=True)
-    if may_pass(message):
+    if message.startswith(NOT_REMEMBERED):
+        return NotRemembered(message.removeprefix(NOT_REMEMBERED), is_lasting=True)
+    if message.endswith(ASK_AGAIN):
         return NotRemembered(message, is_lasting=False)
     return PastRefused(message)
 

@@ -13,7 +13,6 @@ from lupin_twin.estimate.grading import Record, Tally
 from lupin_twin.field.engine import NUMBERS, FieldRequest
 from lupin_twin.field.grid import FieldGrid
 from lupin_twin.ros import convert
-from lupin_twin.ros.convert_past import NotAnAnswerError
 from lupin_twin.runtime.estimates import (
     DEFAULT_PLACES,
     MAX_PLACES,
@@ -115,7 +114,7 @@ def report_of(response: Any) -> Report:
     """A GetEstimateReport.Response that is `ok`: the other direction of `report_response`.
 
     Raises:
-        NotAnAnswerError: its lists are not of one length, or are longer than a twin's.
+        ValueError: its lists are not of one length, or are longer than a twin's.
 
     """
     tags = [getattr(response, name) for name in ("tag_ids", *_CHECKED, "left_out")]
@@ -123,7 +122,7 @@ def report_of(response: Any) -> Report:
     for what, columns, most in (("tags", tags, MAX_TAGS), ("places", places, MAX_PLACES)):
         lengths = {len(column) for column in columns}
         if len(lengths) > 1 or max(lengths) > most:
-            raise NotAnAnswerError(f"lists of {what} are {sorted(lengths)} long, {most} at most")
+            raise ValueError(f"lists of {what} are {sorted(lengths)} long, {most} at most")
     checks = tuple(
         TagCheck(
             tag_id,

@@ -117,10 +117,6 @@ TAG_S: Final = 60e-6
 ITEM_S: Final = 20e-6
 
 
-class NotAnAnswerError(ValueError):
-    """What a service gave is not what it promises; says what is wrong with it."""
-
-
 # --- the state as of a moment ---------------------------------------------------------------
 
 

@@ -40,20 +40,6 @@ class Refused(ValueError):
 
 
 @dataclass(frozen=True, slots=True)
-class Subscribe:
-    """Subscriptions to channels; each as (the client's own id, the channel's)."""
-
-    subscriptions: tuple[tuple[int, int], ...]
-
-
-@dataclass(frozen=True, slots=True)
-class Unsubscribe:
-    """The end of subscriptions, by the client's own ids."""
-
-    ids: tuple[int, ...]
-
-
-@dataclass(frozen=True, slots=True)
 class Channel:
     """A topic as it is offered; `id` never stands for another topic or type."""
 
@@ -82,8 +68,8 @@ def chosen(offered: Iterable[str]) -> str | None:
 # --- incoming ---------------------------------------------------------------------------------
 
 
-def parse(message: str | bytes) -> Subscribe | Unsubscribe:
-    """Read one message.
+def parse(message: str | bytes) -> tuple[list[tuple[int, int]], list[int]]:
+    """Read one message: subscriptions to begin (the client's own id, the channel's), or to end.
 
     Raises:
         Refused: it is none that is served.
@@ -97,10 +83,10 @@ def parse(message: str | bytes) -> Subscribe | Unsubscribe:
         raise Refused(str(error)) from None
     op = members.get("op")
     if op == "subscribe":
-        return Subscribe(tuple(map(_subscription, _list(members, "subscriptions"))))
+        return [_subscription(value) for value in _list(members, "subscriptions")], []
     if op == "unsubscribe":
         ids = _list(members, "subscriptionIds")
-        return Unsubscribe(tuple(_id("subscriptionIds", value) for value in ids))
+        return [], [_id("subscriptionIds", value) for value in ids]
     if isinstance(op, str):
         raise Refused(f"{op[:64]} is {_REFUSED}")
     raise Refused(f"op is {shown(op)}, expected subscribe or unsubscribe")

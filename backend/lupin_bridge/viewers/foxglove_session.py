@@ -11,7 +11,7 @@ from __future__ import annotations
 import asyncio
 import logging
 import uuid
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import partial
@@ -23,7 +23,7 @@ from lupin_bridge.feed.source import TwinSource, TwinUnavailableError
 from lupin_bridge.message_schemas import schema_text
 from lupin_bridge.serving.ws_protocol import shown
 from lupin_bridge.viewers import foxglove_protocol as protocol
-from lupin_bridge.viewers.foxglove_protocol import MAX_SUBSCRIPTIONS, Channel, Refused, Subscribe
+from lupin_bridge.viewers.foxglove_protocol import MAX_SUBSCRIPTIONS, Channel, Refused
 
 log = logging.getLogger(__name__)
 
@@ -63,12 +63,10 @@ class Session:
     def receive(self, message: str | bytes) -> Reaction:
         """Take one message from the client."""
         try:
-            request = protocol.parse(message)
+            begun, ended = protocol.parse(message)
         except Refused as refused:
             return Reaction((protocol.status(protocol.ERROR, str(refused)),))
-        if isinstance(request, Subscribe):
-            return self._subscribe(request)
-        return self._unsubscribe(request.ids)
+        return self._unsubscribe(ended) if ended else self._subscribe(begun)
 
     def offer(self, channels: Mapping[int, Channel]) -> Reaction:
         """What the client needs of the channels that there are now.
@@ -127,10 +125,10 @@ class Session:
         self._counts.sent += 1
         return protocol.message_head(subscription_id, sample.stamp_ns), sample.data
 
-    def _subscribe(self, request: Subscribe) -> Reaction:
+    def _subscribe(self, subscriptions: Iterable[tuple[int, int]]) -> Reaction:
         begun: list[tuple[int, Channel]] = []
         errors = []
-        for key, channel_id in request.subscriptions:
+        for key, channel_id in subscriptions:
             channel = self._advertised.get(channel_id)
             if channel is None:
                 errors.append(f"there is no channel {channel_id}")
@@ -145,7 +143,7 @@ class Session:
                 begun.append((key, channel))
         return Reaction(_errors(errors), begun=tuple(begun))
 
-    def _unsubscribe(self, ids: tuple[int, ...]) -> Reaction:
+    def _unsubscribe(self, ids: Sequence[int]) -> Reaction:
         ended = [key for key in dict.fromkeys(ids) if key in self._subscriptions]
         for key in ended:
             self._end(key)

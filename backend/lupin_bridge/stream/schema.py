@@ -330,6 +330,9 @@ class StatusFrame(Contract):
         description="where what was observed comes from, as the twin says; sim_time: it goes by "
         "/clock, so from a simulation, or a recording that is played"
     )
+    twin_count: int = Field(
+        description="how many twins publish the state; of more than one it is a mixture"
+    )
     input_problems: list[str] = Field(
         description="why the twin does not hear all that is published for it, with the remedy"
     )

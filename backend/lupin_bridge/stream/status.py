@@ -125,6 +125,7 @@ class Status:
             "state_age_seconds": None if self.state_age_s is None else round(self.state_age_s, 3),
             "has_map": self.has_map,
             "origin": self.origin,
+            "twin_count": self.twin_count,
             "input_problems": list(self.input_problems),
             "day_length_s": self.day_length_s,
             "drops": [

@@ -60,6 +60,9 @@ const shownThen = memoLast((house: House, map: House['map'], moment: number): Sh
 
 export const selectShown = ({ twin, view }: AppState): Shown => shownAt(twin, view.moment);
 
+/** Whether anybody knows what time it is now, whatever is shown. */
+export const selectHasTime = ({ twin }: AppState): boolean => clockOf(twin) !== 'unknown';
+
 /** The newest there is, whatever is shown: for the connection's word, and for what to fetch. */
 export const selectNewest = ({ twin }: AppState): House => twin.latest;
 

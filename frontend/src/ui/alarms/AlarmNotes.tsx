@@ -8,7 +8,7 @@ import { rosText, secondsOf } from '../../domain/rostime';
 import { useApp, type AppState } from '../../store/app';
 import { useSelected } from '../../store/create';
 import { selectNewestHealth } from '../../store/derived';
-import { selectNewest, selectShown, shownAt } from '../../store/moment';
+import { selectHasTime, selectNewest, selectShown } from '../../store/moment';
 import { S } from '../../strings';
 
 /** At how many tags something waits for a second scan; null: none, or nobody knows. */
@@ -27,9 +27,8 @@ export function AlarmsWait(): JSX.Element | null {
 }
 
 // Of a silent twin the bridge goes on to tell: that is an alarm itself. Without a time there is none.
-const isLostOf = ({ twin }: AppState): boolean =>
-  (twin.phase !== 'live' && twin.phase !== 'offline') ||
-  shownAt(twin, null).ageing.kind === 'unknown';
+const isLostOf = (state: AppState): boolean =>
+  !['live', 'offline'].includes(state.twin.phase) || !selectHasTime(state);
 
 const selectIsKnown = (state: AppState): boolean => {
   const { alarms } = state.twin;

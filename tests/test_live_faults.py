@@ -187,7 +187,7 @@ def test_a_second_twin_is_said_loudly_and_its_end_too(domain: int) -> None:
             second.wait_for_output("lupin_twin in ROS domain")
             said = client.until("status", lambda frame: "2 twins" in frame["message"])
             first.wait_for_output("2 nodes publish /twin/state")
-            assert said["twin"] == "live"
+            assert (said["twin"], said["twin_count"]) == ("live", 2)
             assert "mixture" in said["message"]
             assert "2 twins" in live.json("/readyz")["message"]
             process.wait_for_output("2 nodes publish /twin/state")

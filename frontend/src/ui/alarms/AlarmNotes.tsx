@@ -8,7 +8,7 @@ import { rosText, secondsOf } from '../../domain/rostime';
 import { useApp, type AppState } from '../../store/app';
 import { useSelected } from '../../store/create';
 import { selectNewestHealth } from '../../store/derived';
-import { selectHasTime, selectNewest, selectShown } from '../../store/moment';
+import { selectNewest, selectShown } from '../../store/moment';
 import { S } from '../../strings';
 
 /** At how many tags something waits for a second scan; null: none, or nobody knows. */
@@ -26,9 +26,9 @@ export function AlarmsWait(): JSX.Element | null {
   return <p data-note="wait">{S.alarmsWait(waiting)}</p>;
 }
 
-// Of a silent twin the bridge goes on to tell: that is an alarm itself. Without a time there is none.
-const isLostOf = (state: AppState): boolean =>
-  !['live', 'offline'].includes(state.twin.phase) || !selectHasTime(state);
+// Of a silent twin the bridge goes on to tell: that is an alarm itself.
+const isLostOf = ({ twin: { phase } }: AppState): boolean =>
+  phase !== 'live' && phase !== 'offline';
 
 const selectIsKnown = (state: AppState): boolean => {
   const { alarms } = state.twin;

@@ -17,7 +17,11 @@ from tests.support.sabotage import sabotaged
 from tests.support.waiting import wait_for
 from tests.support.web import Bridge, Frame, Listener, bridge, listener, tag_ids
 
-CLI = "lupin_bridge.cli.command"
+# Errors are counted with each heartbeat.
+CLI = (
+    "tests.support.limited",
+    *constants(**{"lupin_bridge.feed.ros_thread:BEAT_PERIOD_S": 0.1}),
+)
 FIELD: dict[str, Any] = {"sensor_type": "co2", "resolution": 0.5}
 
 
@@ -293,7 +297,7 @@ def sabotaged_serve() -> Iterator[Bridge]:
     with (
         own_domain() as domain,
         # The few states that are lost make no silence.
-        sabotaged(domain, options, CLI, "serve", "--port", "0", *OFTEN) as process,
+        sabotaged(domain, options, *CLI, "serve", "--port", "0", *OFTEN) as process,
         Peer(domain) as robot,
         attached(process, robot) as live,
     ):
@@ -312,7 +316,7 @@ def sabotaged_web() -> Iterator[Bridge]:
         own_domain() as domain,
         # The one state that is lost makes no silence.
         twin_node(domain, *OFTEN),
-        sabotaged(domain, options, CLI, "web", "--port", "0") as process,
+        sabotaged(domain, options, *CLI, "web", "--port", "0") as process,
         Peer(domain) as robot,
         attached(process, robot) as live,
     ):

@@ -116,6 +116,18 @@ def test_an_allowed_page_cannot_write_either(open_bridge: Served) -> None:
         assert "may read here, and no more" in refusal_of(answer)
 
 
+def test_a_picture_in_a_foreign_page_is_not_even_computed(open_bridge: Served) -> None:
+    hidden = {"Sec-Fetch-Site": "cross-site", "Sec-Fetch-Mode": "no-cors"}
+    answer = open_bridge.get("/api/field.png?sensor_type=co2", hidden)
+    assert answer.status_code == 403
+    assert "asks without naming itself" in refusal_of(answer)
+    frame = {"Sec-Fetch-Site": "cross-site", "Sec-Fetch-Mode": "navigate"}
+    for dest in ("iframe", "frame", "embed", "object"):
+        framed = open_bridge.get("/api/field?sensor_type=co2", {**frame, "Sec-Fetch-Dest": dest})
+        assert framed.status_code == 403
+    assert open_bridge.get("/", {**frame, "Sec-Fetch-Dest": "document"}).status_code == 200
+
+
 @pytest.mark.parametrize("path", ["/", "/docs", "/signin", "/api/report.html"])
 def test_a_link_to_a_page_may_stand_anywhere(open_bridge: Served, path: str) -> None:
     linked = {**PAGE, "Referer": "http://wiki.example/greenhouse"}

@@ -103,6 +103,10 @@ async def test_a_source_tells_of_every_change_and_of_what_it_is_asked(
         assert [(scan.stamp_ns, scan.readings[0].value) for scan in history] == [
             (5_000_000_000, 400.0)
         ]
+        report = await until_answered(
+            lambda: source.estimate_report(ReportRequest("co2")), "the service", bool
+        )
+        assert (report.fitted_at_ns, report.tags, report.record.since_ns) == (None, (), None)
         assert stage.told[-1].twin_count == 1
         assert source.names().state_topic == "/twin/state"
         assert source.rules().max_grid_cells == 1000

@@ -16,6 +16,7 @@ from rclpy.serialization import deserialize_message, serialize_message
 from std_msgs.msg import Header
 
 from lupin_twin.core import history, ingest
+from lupin_twin.core.ingest import ReceivedReading
 from lupin_twin.core.state import (
     NANOSECONDS_PER_SECOND,
     STATUS_OK,
@@ -126,6 +127,18 @@ def test_only_a_changed_tag_is_built_anew_and_every_age_is_current() -> None:
     assert second.tags[1] is not kept[1]
     assert second.tags[0].stale_seconds == 7.0
     assert [r.value for r in second.tags[1].readings] == [1.0]
+
+
+def test_a_tag_reading_is_heard_field_by_field() -> None:
+    msg = messages.scan(
+        "1", {"co2": 1.0}, at=(1.0, 2.0), status=ObservationMsg.STATUS_SKIPPED, stamp_s=4.0
+    )
+    msg.tag_reading.stamp.sec = 3
+    heard = convert.received(msg)
+    assert (heard.kind, heard.status, heard.frame_id) == (0, 3, "map")
+    assert heard.stamp_ns == 4 * S
+    pose = Pose(1.0, 2.0, 0.0, 0.0, 0.0, 0.0, 1.0)
+    assert heard.part == ReceivedReading("1", 3 * S, (Reading("co2", 1.0),), pose)
 
 
 def test_the_kinds_and_the_status_are_the_messages() -> None:

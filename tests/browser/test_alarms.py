@@ -141,12 +141,17 @@ def test_a_row_has_the_value_of_now_with_its_trend_beside_the_worst(
         expect(fact(row, "worst")).to_have_attribute("data-status", "critical")
         expect(row.locator("[data-trend=up]")).to_contain_text("+11.1\u00a0°C")
         expect(fact(row, "since")).to_contain_text(re.compile(r"^\d+\s\w+"))
+        # On a narrow phone neither breaks within itself.
+        hmi.resize(width=360, height=740)
+        for name in ("now", "worst"):
+            assert place(fact(row, name)).bottom - place(fact(row, name)).top < 24
         # Of a twin that is not heard nobody knows it.
         hmi.allow_noise(SERVER_GONE)
         running.process.kill()
         hmi.expect_phase("reconnecting")
         expect(fact(row, "now")).to_contain_text("now unknown, last 33.1\u00a0°C")
         expect(fact(row, "now")).to_have_attribute("data-status", "unknown")
+        expect(hmi.page.locator(".health-strip")).to_have_css("filter", "grayscale(1)")
 
 
 def test_the_counts_agree_and_healthy_beside_an_alarm_says_why(

@@ -24,7 +24,7 @@ def test_a_low_window_has_one_line_of_sensors_with_the_chosen_one_in_sight(hmi: 
 
 
 def test_a_sensor_has_its_colours_words_legend_and_column(hmi: Hmi) -> None:
-    expect(hmi.test_id("ideal-scale")).to_contain_text("ideal by day 18.0 – 26.0\u00a0°C")
+    expect(hmi.test_id("ideal-scale")).to_contain_text("daytime ideal 18.0 – 26.0\u00a0°C")
     for at, words in (((1.3, 1.3), "ideal"), ((1.3, 3.3), "too high by 5.0\u00a0°C")):
         hmi.point_at(*at)
         expect(hmi.test_id("readout-ideal")).to_have_text(words)
@@ -129,7 +129,7 @@ def test_a_row_and_its_pin_find_each_other_and_the_card_tells_all(hmi: Hmi) -> N
     card = hmi.card("10")
     expect(card).to_contain_text("3 pests seen")
     expect(card.locator("[data-sensor=temperature]")).to_contain_text("31.0\u00a0°C")
-    expect(card.locator("[data-sensor=temperature]")).to_contain_text("high, ideal")
+    expect(card.locator("[data-sensor=temperature]")).to_contain_text("high, daytime ideal")
     expect(card).to_contain_text("lupin")
     expect(card).to_contain_text("x 1.00 m, y 3.00 m")
 

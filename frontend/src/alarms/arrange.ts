@@ -177,7 +177,7 @@ export function causeFacts(
   return [
     counts.filter((text) => text !== null).join(', '),
     current?.now ? `${current.now} (${current.where})` : '',
-    worst?.worst ?? '',
+    worst?.worst ? `${worst.worst} (${worst.where})` : '',
   ];
 }
 

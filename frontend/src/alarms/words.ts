@@ -3,7 +3,7 @@ import type { Alarm, Verdict } from '../contract/types';
 import { ageText, beyondLimitText, clockText, readingText } from '../domain/format';
 import { isOfRange, sideOf } from '../domain/health';
 import { beyondText, reasonText, todoText } from '../domain/reasons';
-import { dayFormat, hasDate, rosText, secondsOf } from '../domain/rostime';
+import { dayFormat, hasDate, secondsOf, shortRosText } from '../domain/rostime';
 import type { Catalogue } from '../domain/sensors';
 import { shown } from '../domain/text';
 import type { TemperatureUnit } from '../domain/units';
@@ -140,9 +140,9 @@ export function timesOf(
 const lengthText = (seconds: number): string =>
   ageText(Math.max(0, seconds)).replace(' ', '\u00a0');
 
-/** A moment: of today the time alone. */
+/** A moment: of today the time alone; an alarm's year goes without saying. */
 export const whenText = (at: number, nowS: number | null): string =>
-  nowS !== null && isSameDay(at, nowS) ? clockOf(at) : rosText(at);
+  nowS !== null && isSameDay(at, nowS) ? clockOf(at) : shortRosText(at);
 
 const isSameDay = (a: number, b: number): boolean =>
   hasDate(a) && hasDate(b) && dayOf(a) === dayOf(b);

@@ -28,8 +28,9 @@ describe('permalink', () => {
       sort: { column: 'soil_moisture', descending: true },
       filter: 'basil & "pest"',
       health: 'unknown',
+      list: 'alarms',
     };
-    expect(fromFragment(`#${toFragment(view)}`)).toEqual(view);
+    expect(fromFragment(`#${toFragment({ ...view, pane: 'tags' })}`)).toEqual(view);
   });
 
   test('the range of the sensor in view has the short name', () => {
@@ -114,6 +115,8 @@ describe('permalink', () => {
     'colour=rainbow',
     'heat=',
     'heat=idw',
+    'list=tags',
+    'list=notes',
   ])('%s is passed over', (fragment) => {
     expect(fromFragment(fragment)).toEqual({
       moment: null,
@@ -130,6 +133,7 @@ describe('permalink', () => {
       sort: DEFAULT_VIEW.sort,
       filter: '',
       health: null,
+      list: 'tags',
     });
   });
 

@@ -36,10 +36,11 @@ export type Linked = Pick<
   | 'sort'
   | 'filter'
   | 'health'
+  | 'list'
 >;
 
 /** The fragment, without "#"; what is as by default is left out. */
-export function toFragment(view: Linked): string {
+export function toFragment(view: Linked & Pick<ViewState, 'pane'>): string {
   const parts = new URLSearchParams();
   if (view.moment !== null) parts.set('at', String(view.moment));
   if (view.period.kind === 'own') parts.set('period', `${view.period.from},${view.period.to}`);
@@ -67,6 +68,7 @@ export function toFragment(view: Linked): string {
   }
   if (view.filter !== '') parts.set('filter', view.filter);
   if (view.health !== null) parts.set('health', view.health);
+  if (view.list !== DEFAULT_VIEW.list && view.pane === 'tags') parts.set('list', view.list);
   return parts.toString().replaceAll('%2C', ',');
 }
 
@@ -91,6 +93,7 @@ export function fromFragment(fragment: string): Linked {
     sort: sortOf(parts.get('sort')),
     filter: (parts.get('filter') ?? '').slice(0, LONGEST_FILTER),
     health: VERDICTS.find((verdict) => verdict === parts.get('health')) ?? null,
+    list: parts.get('list') === 'alarms' ? 'alarms' : DEFAULT_VIEW.list,
   };
 }
 

@@ -1,6 +1,7 @@
 import { expect, test } from 'vitest';
 
-import { DEFAULT_VIEW, fixedRange, reduceView } from './view';
+import { fromFragment, toFragment } from './permalink';
+import { DEFAULT_VIEW, fixedRange, reduceView, type ViewState } from './view';
 
 test('each sensor keeps its own fixed range', () => {
   const range = { low: 1, high: 2 };
@@ -76,5 +77,11 @@ test('the list beside the map: a narrow screen shows it, and a filter of the tab
   const alarms = reduceView(DEFAULT_VIEW, { type: 'list', list: 'alarms' });
   expect(alarms).toMatchObject({ list: 'alarms', pane: 'tags' });
   expect(reduceView(alarms, { type: 'health', verdict: 'critical' }).list).toBe('tags');
-  expect(reduceView(alarms, { type: 'pane', pane: 'map' }).list).toBe('alarms');
+  const map = reduceView(alarms, { type: 'pane', pane: 'map' });
+  expect(map.list).toBe('alarms');
+  // A link shows what was in sight when it was made.
+  const follow = (from: ViewState): ViewState =>
+    reduceView(DEFAULT_VIEW, { type: 'look', view: fromFragment(toFragment(from)) });
+  expect(follow(alarms)).toMatchObject({ list: 'alarms', pane: 'tags' });
+  expect(follow(map)).toMatchObject({ list: 'tags', pane: 'map' });
 });

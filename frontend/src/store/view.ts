@@ -145,7 +145,7 @@ export type ViewAction =
 export function reduceView(view: ViewState, action: ViewAction): ViewState {
   switch (action.type) {
     case 'look':
-      return { ...view, ...action.view };
+      return { ...view, ...action.view, ...(action.view.list === 'alarms' && { pane: 'tags' }) };
     case 'moment': {
       const moment = action.moment === null ? null : roundedMoment(action.moment);
       return moment === view.moment ? view : { ...view, moment };

@@ -62,6 +62,18 @@ test('of many, what ails more than a few has one line, and the rest a line each'
   );
 });
 
+test('of what ails many as well, since when it is active where it is worst', () => {
+  const stop = startAlarms();
+  const cold = (at: number) => reason({ value: 9 - at / 10 });
+  act(() => {
+    tellAlarms(alarm('a', { tag_id: '13', reason: cold(13) }));
+  });
+  show(Object.fromEntries(Array.from({ length: 13 }, (_, at) => [`${at + 1}`, [cold(at + 1)]])));
+  const [cause] = document.querySelectorAll('li[data-cause]');
+  expect(cause?.textContent).toMatch(/Tag 13: Temperature [^·]* · since [^·]* · Tags 13/);
+  stop();
+});
+
 test('ends with how many more tags there are', () => {
   const areas = (at: number) => [reason({ sensor: `s${Math.floor(at / 3)}` })];
   show(Object.fromEntries(Array.from({ length: 43 }, (_, at) => [`t${at}`, areas(at)])));

@@ -109,6 +109,7 @@ function CauseLine({
   const worst = tags.reduce((a, b) => (badness(b) > badness(a) ? b : a));
   const [reason] = worst.reasons;
   const why = S.healthDriver(shown(worst.tagId, 16), useReasonText(reason, true));
+  const since = useSince(worst.tagId, reason);
   return (
     <li data-fits={fits} data-cause={cause} data-health={reason.verdict}>
       <HealthMark verdict={reason.verdict} word={false} />
@@ -117,7 +118,8 @@ function CauseLine({
         <span className="attention-do">
           <Todo reasons={tags.map(({ reasons }) => reasons[0])} />{' '}
           <small className="faint">
-            {why} · {tagsText(tags.map(({ tagId }) => tagId))}
+            {why}
+            {since && ` · ${since}`} · {tagsText(tags.map(({ tagId }) => tagId))}
           </small>
         </span>
       </span>

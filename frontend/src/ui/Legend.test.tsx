@@ -79,7 +79,7 @@ describe('legend', () => {
   ])('of an ideal range from %d to %d no limit is told twice', (low, high, limits) => {
     act({ type: 'range', range: { low, high } });
     render(<Legend kiosk={false} />);
-    expect(at('legend')).toContain(`ideal by day${limits && ` ${limits}`}`);
+    expect(at('legend')).toContain(`daytime ideal${limits && ` ${limits}`}`);
     expect(at('legend').match(/18\.0/g)).toHaveLength(1);
     expect(at('legend').match(/26\.0/g)).toHaveLength(1);
   });
@@ -112,7 +112,7 @@ describe('legend', () => {
       );
     expect(parts()).toEqual([
       'too low below ideal',
-      'ideal by night for each species ',
+      'night-time ideal per species ',
       'too high above ideal',
     ]);
     expect(at('ideal-species')).toBe('tulip 8.0 – 18.0\u00a0°C; others 15.0 – 24.0\u00a0°C');
@@ -124,7 +124,7 @@ describe('legend', () => {
     });
     expect(parts()).toEqual([
       'too low below 15.0',
-      'ideal by night 15.0 – 24.0\u00a0°C',
+      'night-time ideal 15.0 – 24.0\u00a0°C',
       'too high above 24.0\u00a0°C',
     ]);
     fireEvent.click(screen.getByRole('radio', { name: 'Value' }));

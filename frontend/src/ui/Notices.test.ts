@@ -33,6 +33,8 @@ describe('the most basic lack is told first', () => {
   test('no tags; a twin that was heard is there, whatever it lacks', () => {
     showTags([]);
     expect(id()).toBe('no-tags');
+    // Nothing that a lost connection, which the banner tells, makes untrue.
+    expect(noticeFor(store.get())?.hint).not.toContain('running');
     goLive(status({ twin: 'offline', reason: 'no_clock' }));
     expect(noticeFor(store.get())).toMatchObject({
       id: 'no-twin',
@@ -60,6 +62,9 @@ describe('the most basic lack is told first', () => {
   test('a field that could not be loaded, with the server’s reason', () => {
     receive({ type: 'field', field: { value: null, state: 'failed', message: 'too many cells' } });
     expect(noticeFor(store.get())?.title).toContain('too many cells');
+    // Why nothing loads without a connection, the banner says.
+    goLost();
+    expect(id()).toBeUndefined();
   });
 
   test('nothing is lacking', () => {

@@ -66,7 +66,8 @@ export function noticeFor(state: AppState): Notice | null {
     const label = shown(selectSensor(state).label, 32);
     return { id: 'no-reading', title: S.emptyNoReading(label), hint: S.emptyNoReadingHint };
   }
-  if (field.state === 'failed') {
+  // Without a connection nothing loads, as the banner says.
+  if (field.state === 'failed' && phase === 'live') {
     return { id: 'field-failed', title: S.fieldFailed(shown(field.message, 160)) };
   }
   if (!map.value && (!connection.status?.has_map || map.state === 'failed')) {

@@ -52,7 +52,15 @@ describe('card', () => {
   test('tells everything about its tag', () => {
     render(<TagCard tagId="7" />);
     const card = screen.getByRole('complementary', { name: 'Tag 7' });
-    for (const text of ['9.0\u00a0°C', 'low, ideal', 'failed', '6.5', 'tulip', '80', '12']) {
+    for (const text of [
+      '9.0\u00a0°C',
+      'low, daytime ideal',
+      'failed',
+      '6.5',
+      'tulip',
+      '80',
+      '12',
+    ]) {
       expect(card.textContent).toContain(text);
     }
     expect(card.textContent).toContain('3 pests seen');
@@ -84,11 +92,11 @@ describe('card', () => {
       [...document.querySelectorAll('.card-ideal')].map(({ textContent }) => textContent);
     showTags(tags, judgement({ 7: 'healthy' }));
     const { unmount } = render(<TagCard tagId="7" />);
-    expect(ideals()).toEqual(['ideal by day 12.0 to 20.0 °C', 'ideal 25.0 to 60.0 %']);
+    expect(ideals()).toEqual(['daytime ideal 12.0 to 20.0 °C', 'ideal 25.0 to 60.0 %']);
     unmount();
     showTags(tags, judgement({ 7: 'healthy' }, { is_day: false, source: 'light' }));
     render(<TagCard tagId="7" />);
-    expect(ideals()[0]).toBe('ideal by night 8.0 to 18.0 °C');
+    expect(ideals()[0]).toBe('night-time ideal 8.0 to 18.0 °C');
   });
 
   test('a value that reads like its limit says on which side of it it is', () => {
@@ -113,7 +121,7 @@ describe('card', () => {
       screen.getAllByText(/was below 18\.0; stays stressed until 18\.5/).length,
     ).toBeGreaterThan(0);
     const ideal = document.querySelector<HTMLElement>('.card-ideal');
-    expect(ideal?.textContent).toMatch(/^ideal/);
+    expect(ideal?.textContent).toMatch(/^daytime ideal/);
     expect(ideal?.dataset['health']).toBeUndefined();
     expect(document.querySelector('.beyond')).toBeNull();
   });

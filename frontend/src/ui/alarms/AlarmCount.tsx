@@ -2,14 +2,17 @@ import type { JSX } from 'react';
 
 import { calling } from '../../alarms/list';
 import { alarmList } from '../../alarms/watch';
-import { worstNow } from '../../alarms/speech';
+import { countNow, worstNow } from '../../alarms/speech';
 import { useApp } from '../../store/app';
 import { useSelected } from '../../store/create';
 import { S } from '../../strings';
 import { HealthShape } from '../HealthMark';
 import { selectAreAlarmsKnown } from '../Reasons';
 
-/** "Alarms" and how many are active, with the sign of the worst now; none once all are acknowledged. */
+/**
+ * "Alarms" and how many are active; with the sign of the worst now and how many of them are so, until
+ * all are acknowledged.
+ */
 export function AlarmsLabel(): JSX.Element {
   const list = useSelected(alarmList, (it) => it);
   const unacknowledged = calling(list);
@@ -18,12 +21,14 @@ export function AlarmsLabel(): JSX.Element {
   const worst = useApp((state) =>
     unacknowledged.length === 0 ? null : worstNow(state, list.active),
   );
+  const worstCount = useApp((state) => (worst ? countNow(state, list.active, worst) : length));
   return (
     <>
       {S.alarms}
       {length > 0 && (
         <span className="alarm-count" data-testid="alarm-count" aria-hidden="true">
           {worst && <HealthShape verdict={worst} />}
+          {worstCount < length && `${worstCount}/`}
           {length}
         </span>
       )}

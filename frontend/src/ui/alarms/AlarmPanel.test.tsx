@@ -127,7 +127,7 @@ test('what is well again waits for one more good scan, and pests for an inspecti
   const todo = (tag: string): string | null | undefined =>
     document.querySelector(`[data-where='${tag}'] .alarm-do`)?.textContent;
   expect([todo('5'), todo('6')]).toEqual([
-    'Active until the next good scan',
+    'The next good scan resolves it',
     'Inspect again: a second clean inspection resolves it',
   ]);
   // An active alarm is never called healthy.

@@ -10,6 +10,7 @@ import { held, judgement, reason } from '../../testing/health';
 import { showTags } from '../../testing/page';
 import { readings, wireTag } from '../../testing/tags';
 import { Reasons } from '../Reasons';
+import { AlarmsLabel } from './AlarmCount';
 import { CardAlarms } from './CardAlarms';
 
 let stop: () => void;
@@ -38,7 +39,7 @@ test('a tag that is well again says what its alarm still waits for', () => {
     tellAlarms(alarm('a', { tag_id: '7' }));
   });
   const line = screen.getByTestId('card-alarms');
-  expect(line.textContent).toContain(' · Active until the next good scan');
+  expect(line.textContent).toContain(' · The next good scan resolves it');
 });
 
 test('all alarms of a tag are acknowledged where it is looked at, and no others', () => {
@@ -112,4 +113,22 @@ test('what is shelved says until when and why, has its way back, and is no order
   expect(screen.queryByTestId('card-shelved')).toBeNull();
   expect(screen.getByTestId('card-alarms').textContent).toMatch(/^1 alarm · since/);
   expect(order()).toBe('Heat, or close the vents');
+});
+
+test('the count of alarms says how many of them are of its sign, where not all are', () => {
+  render(<AlarmsLabel />);
+  const count = (): string => screen.getByTestId('alarm-count').textContent;
+  const bad = ['8', '9'].map((id) => alarm(id, { tag_id: id, reason: { verdict: 'stressed' } }));
+  flush(() => {
+    tellAlarms(...bad);
+  });
+  expect(count()).toBe('2');
+  flush(() => {
+    tellAlarms(...bad, alarm('c', { reason: { verdict: 'critical' } }));
+  });
+  expect(count()).toBe('1/3');
+  flush(() => {
+    acknowledgeAlarms(alarmList.get().active);
+  });
+  expect(count()).toBe('3');
 });

@@ -69,7 +69,7 @@ export const HEALTH: In<typeof ENGLISH> = {
     other: 'Vor Ort prüfen',
   },
   todoPestAgain: 'Nochmals kontrollieren: Ohne Befund ist der Alarm behoben',
-  todoWell: 'Steht an bis zur nächsten guten Messung',
+  todoWell: 'Mit der nächsten guten Messung behoben',
   todoAlso: (tags) => `auch ${tags}`,
   todoLabel: 'Jetzt zu tun',
   reasonsLabel: 'Warum',

@@ -164,7 +164,7 @@ export const PAGE: In<typeof ENGLISH> = {
   emptyNoTwin: 'Noch kein Zwilling',
   emptyNoTags: 'Noch keine Messpunkte',
   emptyNoTagsHint:
-    'Der Zwilling läuft. Messpunkte erscheinen, sobald der Roboter sie findet oder misst: ' +
+    'Messpunkte erscheinen, sobald der Roboter sie findet oder misst: ' +
     'Schicken Sie ihn auf seine Runde.',
   emptyNoTagsMore: '„lupin-twin demo“ zeigt eine simulierte Runde.',
   emptyNoPins: 'Noch kein Messpunkt hat eine Position',

@@ -69,7 +69,7 @@ export const HEALTH = {
     other: 'Check on site',
   },
   todoPestAgain: 'Inspect again: a second clean inspection resolves it',
-  todoWell: 'Active until the next good scan',
+  todoWell: 'The next good scan resolves it',
   todoAlso: (tags: string): string => `also ${tags}`,
   todoLabel: 'Do this now',
   reasonsLabel: 'Why',
@@ -86,7 +86,7 @@ export const HEALTH = {
     assumed: 'assumed, as neither light nor time is known',
   },
   /** "any": by day and by night it is the same. */
-  idealParts: { any: 'ideal', day: 'ideal by day', night: 'ideal by night' },
+  idealParts: { any: 'ideal', day: 'daytime ideal', night: 'night-time ideal' },
   healthIdeal: (ideal: string, low: string, high: string, unit: string): string =>
     `${ideal} ${low} to ${high} ${unit}`.trim(),
   healthAllWell: 'All assessed readings are within their ideal ranges',

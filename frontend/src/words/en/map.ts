@@ -56,7 +56,7 @@ export const MAP = {
   legendAbove: (value: string): string => `above ${value}`,
   legendAgainst: (sensor: string): string => `${sensor} compared with its ideal range`,
   legendIdeal: (ideal: string, low: string, high: string): string => `${ideal} ${low} to ${high}`,
-  legendEach: (part: string): string => `${part} for each species`,
+  legendEach: (part: string): string => `${part} per species`,
   legendOthers: 'others',
   legendUnknownSpecies: 'Not classified',
   pinLacking: 'no sensor',

@@ -163,8 +163,7 @@ export const PAGE = {
     'The server is the bridge: “lupin-twin serve” on the robot, or “make run” for the demo.',
   emptyNoTwin: 'No twin yet',
   emptyNoTags: 'No tags yet',
-  emptyNoTagsHint:
-    'The twin is running. Tags appear when the robot finds or scans them: ' + 'start its patrol.',
+  emptyNoTagsHint: 'Tags appear when the robot finds or scans them: start its patrol.',
   emptyNoTagsMore: '“lupin-twin demo” shows a simulated patrol.',
   emptyNoPins: 'No tag has a position yet',
   emptyNoPinsHint: 'All tags are listed in the table; a pin appears with the first good scan.',

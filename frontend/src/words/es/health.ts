@@ -75,7 +75,7 @@ export const HEALTH: In<typeof ENGLISH> = {
     other: 'Comprobar in situ',
   },
   todoPestAgain: 'Revisar otra vez: si no hay plaga, queda resuelta',
-  todoWell: 'Activa hasta la próxima medición buena',
+  todoWell: 'Queda resuelta con la próxima medición buena',
   todoAlso: (tags) => `también ${tags}`,
   todoLabel: 'Hacer ahora',
   reasonsLabel: 'Por qué',

@@ -161,8 +161,7 @@ export const PAGE: In<typeof ENGLISH> = {
   emptyNoTwin: 'Aún no hay gemelo',
   emptyNoTags: 'Aún no hay puntos de medida',
   emptyNoTagsHint:
-    'El gemelo está en marcha. Los puntos aparecen cuando el robot los encuentra o los mide: ' +
-    'mándelo a hacer su ronda.',
+    'Los puntos aparecen cuando el robot los encuentra o los mide: ' + 'mándelo a hacer su ronda.',
   emptyNoTagsMore: '«lupin-twin demo» muestra una ronda simulada.',
   emptyNoPins: 'Ningún punto tiene posición todavía',
   emptyNoPinsHint:

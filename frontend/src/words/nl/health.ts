@@ -67,7 +67,7 @@ export const HEALTH: In<typeof ENGLISH> = {
     other: 'Ter plaatse gaan kijken',
   },
   todoPestAgain: 'Nogmaals controleren: zonder plaag is het alarm opgelost',
-  todoWell: 'Actief tot de volgende goede meting',
+  todoWell: 'Opgelost bij de volgende goede meting',
   todoAlso: (tags) => `ook ${tags}`,
   todoLabel: 'Nu doen',
   reasonsLabel: 'Waarom',

@@ -166,8 +166,7 @@ export const PAGE: In<typeof ENGLISH> = {
   emptyNoTwin: 'Nog geen digital twin',
   emptyNoTags: 'Nog geen meetpunten',
   emptyNoTagsHint:
-    'De digital twin draait. Meetpunten verschijnen zodra de robot ze vindt of meet: ' +
-    'stuur hem op zijn ronde.',
+    'Meetpunten verschijnen zodra de robot ze vindt of meet: ' + 'stuur hem op zijn ronde.',
   emptyNoTagsMore: '“lupin-twin demo” toont een gesimuleerde ronde.',
   emptyNoPins: 'Nog geen meetpunt heeft een positie',
   emptyNoPinsHint:

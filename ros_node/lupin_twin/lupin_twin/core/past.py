@@ -12,7 +12,7 @@ from functools import partial
 from typing import Any, Final
 
 from lupin_twin.core.drops import MAX_TEXT_LENGTH
-from lupin_twin.core.state import NANOSECONDS_PER_SECOND
+from lupin_twin.core.state import NANOSECONDS_PER_SECOND, value
 
 # How a message ends of what may be answered a little later, if it is requested again.
 ASK_AGAIN: Final = "ask again later"
@@ -229,7 +229,7 @@ class SeriesPast:
         return self.bucket_ns is not None
 
 
-@dataclass(frozen=True, slots=True)
+@value
 class PastRow:
     """One reading, or one try that brought none (`sensor` is empty, `value` NaN), for an export.
 

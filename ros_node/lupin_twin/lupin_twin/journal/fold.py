@@ -11,6 +11,7 @@ import sqlite3
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
+from itertools import repeat
 from typing import Any, Final
 
 from lupin_twin.core.drops import MAX_SENSORS_PER_TAG, MAX_TAGS
@@ -255,8 +256,8 @@ def _readings(rows: list[tuple[Any, ...]]) -> list[tuple[Reading, ...]]:
     """The readings of rows as `_SCANS` names them."""
     every = named_numbers((row[3] for row in rows), [row[8] for row in rows])
     return [
-        tuple([Reading(name, value, row[5]) for name, value in zip(*scan, strict=True)])
-        for row, scan in zip(rows, every, strict=True)
+        tuple(map(Reading, names, values, repeat(row[5])))
+        for row, (names, values) in zip(rows, every, strict=True)
     ]
 
 

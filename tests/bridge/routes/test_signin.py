@@ -207,13 +207,13 @@ def test_signing_out_closes_what_the_session_has_open_and_nothing_else(
 
 
 def test_a_session_that_ends_by_itself_closes_what_it_has_open(closed: Served) -> None:
-    start_s, mine = time.time(), ending_in(6.0)
+    start_s, mine = time.time(), ending_in(4.0)
     with (
         listening(closed, mine, "/ws/state") as one,
         listening(closed, mine, "/rosbridge") as other,
     ):
         assert last_word(one) == last_word(other) == SIGNED_OUT
-    assert time.time() - start_s >= 5.0, "and not before: its end is in whole seconds"
+    assert time.time() - start_s >= 3.0, "and not before: its end is in whole seconds"
 
 
 def test_a_page_is_told_whether_it_can_sign_out(closed: Served) -> None:

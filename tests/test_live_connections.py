@@ -80,6 +80,13 @@ def test_what_is_no_handshake_is_answered_and_ended(plain: Served, name: str) ->
     assert heard.count(b"HTTP/1.1") == 1
 
 
+@pytest.mark.parametrize("name", ["a body", "a long cookie", "many headers", "a bad key"])
+def test_over_tls_and_with_a_token_too(secret: Served, name: str) -> None:
+    said, expected = NO_HANDSHAKES[name]
+    assert isinstance(secret.trust, ssl.SSLContext)
+    assert status(raw_http.answer(secret.url, said, secret.trust)) == expected
+
+
 def test_a_refusal_says_why(plain: Served) -> None:
     said = {
         "this is no request for a WebSocket: ": asked(b"Cookie: " + b"x" * 9_000),

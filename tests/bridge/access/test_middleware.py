@@ -54,6 +54,11 @@ def refusal_of(answer: httpx.Response) -> str:
 # --- Host ---------------------------------------------------------------------------------------
 
 
+@pytest.mark.parametrize("host", ["127.0.0.1", "localhost:9", "[::1]", "robot.example:8443"])
+def test_own_names_are_served(open_bridge: Served, host: str) -> None:
+    assert open_bridge.get("/api/state", {"Host": host}).status_code == 200
+
+
 @pytest.mark.parametrize("path", ["/api/state", "/healthz", "/", "/signin", "/nowhere"])
 def test_a_rebound_name_gets_nothing(open_bridge: Served, path: str) -> None:
     answer = open_bridge.get(path, {"Host": "evil.example:8000"})
@@ -71,6 +76,16 @@ def test_a_rebound_name_gets_no_websocket(open_bridge: Served) -> None:
 
 
 # --- Origin -------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("origin", ["http://evil.example", "http://127.0.0.1:1", "null"])
+def test_a_foreign_page_gets_neither_an_answer_nor_leave_to_read_it(
+    open_bridge: Served, origin: str
+) -> None:
+    answer = open_bridge.get("/api/state", {"Origin": origin})
+    assert answer.status_code == 403
+    assert repr(origin) in refusal_of(answer)
+    assert not [name for name in answer.headers if name.startswith("access-control-")]
 
 
 @pytest.mark.parametrize("path", ["/ws/state", "/rosbridge", "/foxglove", "/ws/nowhere"])

@@ -173,6 +173,13 @@ def test_two_origin_headers_are_refused_even_if_each_is_allowed() -> None:
     assert judge("127.0.0.1:8000", *origins).refusal is not None
 
 
+def test_a_good_origin_does_not_make_up_for_a_foreign_host() -> None:
+    # This is DNS rebinding: to the browser, page and bridge are one origin.
+    verdict = judge("evil.example:8000", "http://evil.example:8000")
+    assert verdict.refusal is not None
+    assert "name 'evil.example'" in verdict.refusal
+
+
 @pytest.mark.parametrize(
     "text",
     [

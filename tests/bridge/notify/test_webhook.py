@@ -4,12 +4,15 @@ import asyncio
 from collections.abc import AsyncIterator, Callable, Iterator
 from contextlib import asynccontextmanager
 from dataclasses import replace
+from functools import partial
 from types import SimpleNamespace
 from typing import Any
 
 import pytest
 
+from lupin_bridge.notify import webhook as webhook_module
 from lupin_bridge.notify.destinations import Targets
+from lupin_bridge.notify.http_post import post
 from lupin_bridge.notify.retry import MAX_REFUSALS
 from lupin_bridge.notify.webhook import MAX_WAITING, ORIGIN_S, Delivery, Webhook
 from lupin_bridge.settings import Secrets, Settings
@@ -190,6 +193,22 @@ def test_one_that_refuses_and_comes_later_gets_all_of_it() -> None:
     asyncio.run(run())
 
 
+def test_one_that_hangs_is_tried_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(webhook_module, "post", partial(post, answer_s=0.2))
+
+    async def run(server: Receiver) -> None:
+        board = Alarms()
+        board.show([A])
+        async with telling(server.port, board) as hook:
+            await until(lambda: hook.condition.sent == 1, "the alarm")
+
+    with receiver(silence, status(200)) as server:
+        asyncio.run(run(server))
+    # On a busy machine the answer may be late once more.
+    assert len(server.ids) >= 2
+    assert set(server.ids) == {f"{A.id}.raised"}
+
+
 def test_a_message_that_the_receiver_will_not_have_does_not_hold_up_the_others() -> None:
     async def run(server: Receiver) -> None:
         board = Alarms()
@@ -247,3 +266,16 @@ def test_it_ends_at_once_while_somebody_hangs() -> None:
 
     with receiver(silence) as server:
         asyncio.run(run(server))
+
+
+def test_after_a_restart_the_same_is_told_with_the_same_ids() -> None:
+    async def run(server: Receiver) -> None:
+        board = Alarms()
+        board.show([A])
+        for number in (1, 2):
+            async with telling(server.port, board) as hook:
+                await until(lambda: hook.condition.sent == 1, f"start {number}")
+
+    with receiver(status(200)) as server:
+        asyncio.run(run(server))
+    assert server.ids == [f"{A.id}.raised"] * 2

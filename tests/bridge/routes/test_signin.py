@@ -46,6 +46,11 @@ def test_the_page_and_its_parts_need_no_token(closed: Served, path: str, media_t
     assert closed.get(path, method="POST").status_code == 405
 
 
+def test_its_font_needs_no_token(closed: Served) -> None:
+    font = closed.get("/font.woff2")
+    assert font.status_code == 200 or "the page was not built" in font.text
+
+
 def test_the_page_has_nothing_inline_and_nothing_from_elsewhere(closed: Served) -> None:
     page = closed.get("/signin").text
     assert not re.search(r"<script(?![^>]*\ssrc=)|<style|\sstyle=|\son\w+=", page)
@@ -104,12 +109,33 @@ def test_the_token_is_traded_for_a_strict_cookie(closed: Served) -> None:
     assert TOKEN not in answer.headers["set-cookie"]
 
 
+def test_the_cookie_ends_on_the_bridges_clock_too(closed: Served) -> None:
+    expires = int(cookie_of(closed.post("/api/signin", BEARER)).value.partition(".")[0])
+    assert abs(expires - time.time() - SHARED_SESSION_S) < 600
+
+
+def test_the_cookie_opens_everything(closed: Served) -> None:
+    with closed.client() as browser:
+        assert browser.get("/api/state").status_code == 401
+        browser.post("/api/signin", headers={**BEARER, **OWN})
+        for path in ("/api/state", "/docs", "/api/field.png?sensor_type=co2", "/readyz"):
+            assert browser.get(path).status_code == 200
+        assert browser.get("/", headers={"Accept": "text/html"}).status_code != 303
+
+
 def test_a_session_does_not_renew_itself(closed: Served) -> None:
     with closed.client() as browser:
         browser.post("/api/signin", headers={**BEARER, **OWN})
         answer = browser.post("/api/signin", headers=OWN)
         assert answer.status_code == 401
         assert "set-cookie" not in answer.headers
+
+
+@pytest.mark.parametrize("header", [{}, {"Authorization": "Bearer wrong"}])
+def test_no_cookie_without_the_token(closed: Served, header: dict[str, str]) -> None:
+    answer = closed.post("/api/signin", header)
+    assert answer.status_code == 401
+    assert "set-cookie" not in answer.headers
 
 
 def test_a_good_cookie_does_not_excuse_a_wrong_token(closed: Served) -> None:
@@ -207,13 +233,42 @@ def test_signing_out_closes_what_the_session_has_open_and_nothing_else(
 
 
 def test_a_session_that_ends_by_itself_closes_what_it_has_open(closed: Served) -> None:
-    start_s, mine = time.time(), ending_in(4.0)
+    start_s, mine = time.time(), ending_in(6.0)
     with (
         listening(closed, mine, "/ws/state") as one,
         listening(closed, mine, "/rosbridge") as other,
     ):
         assert last_word(one) == last_word(other) == SIGNED_OUT
-    assert time.time() - start_s >= 3.0, "and not before: its end is in whole seconds"
+    assert time.time() - start_s >= 5.0, "and not before: its end is in whole seconds"
+
+
+@pytest.mark.parametrize(
+    "headers",
+    [
+        {"Sec-Fetch-Site": "cross-site", "Sec-Fetch-Mode": "no-cors", "Sec-Fetch-Dest": "image"},
+        {"Sec-Fetch-Site": "same-site", "Sec-Fetch-Mode": "no-cors", "Sec-Fetch-Dest": "image"},
+        {"Sec-Fetch-Site": "same-site", "Sec-Fetch-Mode": "navigate", "Sec-Fetch-Dest": "document"},
+        {
+            "Sec-Fetch-Site": "cross-site",
+            "Sec-Fetch-Mode": "navigate",
+            "Sec-Fetch-Dest": "document",
+        },
+        {"Origin": "http://evil.example"},
+        {"Origin": "http://127.0.0.1:1"},  # the cookie comes along: to a browser, it is one site
+        {"Referer": "http://127.0.0.1:1/page"},
+        {},
+    ],
+)
+@pytest.mark.parametrize("method", ["GET", "POST", "HEAD"])
+def test_no_other_page_signs_anybody_out(
+    closed: Served, headers: dict[str, str], method: str
+) -> None:
+    """With no header but those that a browser sends by itself; over plain http, they are few."""
+    mine = session(closed)
+    answer = closed.get("/api/signout", {**mine, **headers}, method)
+    assert answer.status_code in (403, 405)
+    assert "set-cookie" not in answer.headers
+    assert closed.get("/api/state", mine).status_code == 200
 
 
 def test_a_page_is_told_whether_it_can_sign_out(closed: Served) -> None:

@@ -79,6 +79,11 @@ def test_hundreds_who_connect_at_once_need_no_second_try() -> None:
         wait_for(lambda: len(poll.poll(0)) == len(clients), "all to be let in")
 
 
+def test_ipv6_has_brackets_in_its_address() -> None:
+    with listen("::1", 0) as listener:
+        assert address_of(listener) == f"http://[::1]:{listener.getsockname()[1]}"
+
+
 @pytest.mark.parametrize(
     ("limits", "expected", "clients"),
     [
@@ -197,6 +202,11 @@ def test_frames_are_not_compressed(live: Bridge) -> None:
     with live.listen() as listener:
         assert listener.connection.response is not None
         assert "sec-websocket-extensions" not in listener.connection.response.headers
+
+
+def test_what_a_header_claims_of_a_proxy_is_not_believed(live: Bridge) -> None:
+    page = live.get("/docs", headers={"X-Forwarded-Proto": "https", "X-Forwarded-For": "1.2.3.4"})
+    assert f"curl '{live.url}/api/state'" in page.text
 
 
 # --- the end ------------------------------------------------------------------------------------

@@ -91,6 +91,15 @@ def stage() -> Stage:
 # --- everyone -----------------------------------------------------------------------------------
 
 
+def test_who_joins_gets_the_status_and_then_the_newest_state_at_once(stage: Stage) -> None:
+    stage.announce("live")
+    stage.publish()
+    stage.publish(0.1)
+    late = Socket()
+    stage.join(late, 5.0)
+    assert late.got == ["live", 2]
+
+
 def test_a_status_tells_the_age_of_the_moment_at_which_a_client_gets_it(stage: Stage) -> None:
     stage.announce("stale", 3.0)
     sockets = [Socket(), Socket(), Socket(room=0)]
@@ -102,6 +111,19 @@ def test_a_status_tells_the_age_of_the_moment_at_which_a_client_gets_it(stage: S
     ]
     assert ages == [3_600.0, 3_600.0, 3_700.0]
     assert sockets[0].wires[0] is sockets[1].wires[0], "one serialisation serves all"
+
+
+def test_everyone_gets_every_frame_and_every_status_once(stage: Stage) -> None:
+    sockets = [Socket(), Socket()]
+    for socket in sockets:
+        stage.join(socket)
+    stage.publish()
+    stage.publish(0.1)
+    stage.announce("stale", 4.0)
+    stage.hub.serve_all(5.0)
+    for socket in sockets:
+        assert socket.got == ["live", 1, 2, "stale"]
+    assert sockets[0].wires[1] is sockets[1].wires[1], "one serialisation serves all"
 
 
 def test_who_is_told_nothing_for_a_second_is_told_the_status_again(stage: Stage) -> None:
@@ -163,6 +185,15 @@ def test_only_to_who_has_two_fewer(mine: int, gets_a_place: bool) -> None:
     stage, _ = crowd(mine=mine, many=3)
     assert stage.hub.make_place("mine") == gets_a_place
     assert len(stage.hub) == mine + 3 - gets_a_place
+
+
+def test_one_address_may_have_all_places_and_no_more() -> None:
+    stage, sockets = crowd(many=3)
+    assert not stage.hub.make_place("many")
+    assert all(socket.dismissed is None for socket in sockets["many"])
+    assert stage.hub.make_place("other")
+    stage.join(Socket(), address="other")
+    assert not stage.hub.make_place("many"), "it does not get it back"
 
 
 # --- slow clients -------------------------------------------------------------------------------
@@ -293,6 +324,15 @@ def test_a_pause_is_not_made_up_for_by_a_burst(stage: Stage) -> None:
         stage.publish(now_s)
     # One as soon as there is something, and the next a beat later, a tenth of it forgiven.
     assert socket.got == [1, 2, 5, 7]
+
+
+def test_nor_is_the_time_before_a_client_came(stage: Stage) -> None:
+    socket = Socket()
+    stage.publish(100.0)
+    stage.join(socket, 100.3, min_interval_s=1.0, wants_status=False)
+    for now_s in (100.5, 101.1, 101.25, 102.15, 102.25):
+        stage.publish(now_s)
+    assert socket.got == [1, 4, 6]
 
 
 # --- alarms -------------------------------------------------------------------------------------

@@ -12,6 +12,7 @@ from typing import Any
 
 import pytest
 from lupin_msgs.msg import SensorReading, TwinState
+from lupin_msgs.srv import GetField
 
 from lupin_bridge.stream import schema
 from lupin_twin.core.drops import MAX_BLOOMS_PER_TAG, MAX_SENSORS_PER_TAG, MAX_TAGS, MAX_TEXT_LENGTH
@@ -215,7 +216,9 @@ def test_requests_for_fields_of_any_numbers_are_answered(both: tuple[Bridge, Bri
                 sensor_type=chance.choice((*TEXTS, MEGABYTE)),
                 **{name: chance.choice(numbers) for name in names},
             )
-            assert answer.ok or answer.error_message
+            if not answer.ok:
+                assert answer == GetField.Response(error_message=answer.error_message)
+                assert answer.error_message
 
     survive(both, ask)
 

@@ -166,7 +166,7 @@ def test_a_power_cut_costs_at_most_the_last_second(
     """
     disk.log = tmp_path / "log"
     with feeding(disk, log_bytes=log_bytes) as told:
-        told.wait("recording", written=6 * RATE)
+        told.wait("recording", written=4 * RATE)
     done = notes(disk.log)
     handed_over = [
         (note.at_ns, int(note.data))

@@ -11,13 +11,17 @@ from lupin_bridge.stream.status import STALE_AFTER_S
 from tests.support.domains import own_domain
 from tests.support.live import attached, field_of, wait_until_ready
 from tests.support.messages import discovered, look, occupancy_grid, pose, scan
-from tests.support.processes import OFTEN, limits, lupin_twin, twin_node, url_of
+from tests.support.processes import OFTEN, constants, limits, lupin_twin, twin_node, url_of
 from tests.support.ros import Peer
 from tests.support.sabotage import sabotaged
 from tests.support.waiting import wait_for
 from tests.support.web import Bridge, Frame, Listener, bridge, listener, tag_ids
 
-CLI = "lupin_bridge.cli.command"
+# Errors are counted with each heartbeat.
+CLI = (
+    "tests.support.limited",
+    *constants(**{"lupin_bridge.feed.ros_thread:BEAT_PERIOD_S": 0.1}),
+)
 FIELD: dict[str, Any] = {"sensor_type": "co2", "resolution": 0.5}
 
 
@@ -175,9 +179,10 @@ def test_a_twin_in_another_domain_is_never_seen_until_there_is_one_here(domain: 
 
 
 def test_a_second_twin_is_said_loudly_and_its_end_too(domain: int) -> None:
+    soon = constants(**{"lupin_twin.ros.inputs:LEFT_OVER_S": 2.0})
     with (
-        lupin_twin(domain, "web") as process,
-        twin_node(domain) as first,
+        lupin_twin(domain, "web", *soon) as process,
+        lupin_twin(domain, "serve", *soon) as first,
         Peer(domain) as robot,
         attached(process, robot) as live,
         live.listen() as client,
@@ -187,7 +192,7 @@ def test_a_second_twin_is_said_loudly_and_its_end_too(domain: int) -> None:
             second.wait_for_output("lupin_twin in ROS domain")
             said = client.until("status", lambda frame: "2 twins" in frame["message"])
             first.wait_for_output("2 nodes publish /twin/state")
-            assert said["twin"] == "live"
+            assert (said["twin"], said["twin_count"]) == ("live", 2)
             assert "mixture" in said["message"]
             assert "2 twins" in live.json("/readyz")["message"]
             process.wait_for_output("2 nodes publish /twin/state")
@@ -292,7 +297,7 @@ def sabotaged_serve() -> Iterator[Bridge]:
     with (
         own_domain() as domain,
         # The few states that are lost make no silence.
-        sabotaged(domain, options, CLI, "serve", "--port", "0", *OFTEN) as process,
+        sabotaged(domain, options, *CLI, "serve", "--port", "0", *OFTEN) as process,
         Peer(domain) as robot,
         attached(process, robot) as live,
     ):
@@ -311,7 +316,7 @@ def sabotaged_web() -> Iterator[Bridge]:
         own_domain() as domain,
         # The one state that is lost makes no silence.
         twin_node(domain, *OFTEN),
-        sabotaged(domain, options, CLI, "web", "--port", "0") as process,
+        sabotaged(domain, options, *CLI, "web", "--port", "0") as process,
         Peer(domain) as robot,
         attached(process, robot) as live,
     ):

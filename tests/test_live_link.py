@@ -17,17 +17,18 @@ from lupin_msgs.msg import Observation
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 
 from lupin_bridge.feed.web_node import REPORT_HOLDS_S
-from lupin_twin.ros.inputs import SETTLED_S
 from tests.support.domains import ros_env
 from tests.support.live import attached, wait_until_ready
 from tests.support.messages import scan
-from tests.support.processes import OFTEN, Process, limits, lupin_twin, twin_node
+from tests.support.processes import OFTEN, Process, constants, limits, lupin_twin, twin_node
 from tests.support.ros import Peer
 from tests.support.rosbridge import ros_at
 from tests.support.waiting import wait_for
 from tests.support.web import Bridge, bridge
 
 TOPIC = "/floranova/observations"
+SETTLED_S = 1.0
+SETTLES_SOON = constants(**{"lupin_twin.ros.inputs:SETTLED_S": SETTLED_S})
 
 
 def test_web_knows_its_twin_again_after_a_silence(domain: int) -> None:
@@ -62,7 +63,7 @@ def test_web_joins_ros_again_in_a_silence_and_nobody_notices(domain: int) -> Non
     with (
         Peer(domain) as peer,
         twin_node(domain, *OFTEN) as twin,
-        lupin_twin(domain, "web", *limits(rejoin_after_s=2.0)) as web,
+        lupin_twin(domain, "web", *limits(rejoin_after_s=1.0)) as web,
         attached(web, peer) as live,
         live.listen() as page,
         ros_at(live.url) as viewer,
@@ -136,7 +137,7 @@ def test_a_publisher_of_another_qos_is_heard_and_told_of(
 
 def test_of_a_publisher_that_had_said_nothing_each_loss_is_counted(domain: int) -> None:
     count = 1_000
-    with twin_node(domain, afresh=True) as twin, Peer(domain) as peer:
+    with lupin_twin(domain, "serve", *SETTLES_SOON) as twin, Peer(domain) as peer:
         publisher = peer.publisher(TOPIC, Observation)
         peer.until(publisher.get_subscription_count, "the twin")
         settled_s = time.monotonic() + SETTLED_S + 2.0
@@ -190,7 +191,7 @@ if os.geteuid() == 0:  # nobody else can run a process as another user; see test
     ) -> None:
         with (
             home_for_all() as home,
-            bridge(*OFTEN, domain=domain) as live,
+            bridge(*SETTLES_SOON, *OFTEN, domain=domain) as live,
             Process(
                 [sys.executable, "-c", AS_NOBODY], ros_env(domain, HOME=home, ROS_LOG_DIR=home)
             ),

@@ -24,8 +24,6 @@ from tests.support.web import Bridge
 ROOT = Path(__file__).parents[1]
 # How long Fast DDS keeps a dead process in the graph.
 DDS_LEASE_S = 20.0
-# What a twin was asked as it was killed is waited for so long.
-ANSWER_S = 15.0
 T = 1_700_000_000.0
 OBSERVED = 40
 # Another file for each process, as on another host: that of its own working folder.
@@ -87,7 +85,7 @@ class Apart:
 
     def start_web(self, *more: str, beside: bool = False, state: Path | None = None) -> Bridge:
         program = [sys.executable, "-m", "tests.support.limited", "web", "--port", "0"]
-        held = limits(answer_timeout_s=ANSWER_S, alarm_days=3_652, answers_per_s=10_000)
+        held = limits(alarm_days=3_652, answers_per_s=10_000)
         options = [*held, "--day-hours", "00:00-00:00", *more]
         where = ["env", "-C", str(self.folder)] if beside else []
         env = ros_env(self.domain, XDG_STATE_HOME=str(state or self.state), PYTHONPATH=str(ROOT))

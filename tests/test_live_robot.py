@@ -18,13 +18,14 @@ from lupin_bridge.stream import robot_schema
 from tests.support.domains import own_domain
 from tests.support.live import attached, wait_until_ready
 from tests.support.messages import scan
-from tests.support.processes import limits, lupin_twin
+from tests.support.processes import constants, limits, lupin_twin
 from tests.support.waiting import PATIENCE_S
 from tests.support.web import Bridge, Listener, bridge
 
 QUICK = ("--ros-args", "-p", "state_publish_rate_hz:=10.0")
 # No machine is too busy for an answer.
 PATIENT = limits(answer_timeout_s=PATIENCE_S)
+OFTEN = constants(**{"lupin_bridge.stream.robot:PERIOD_S": 0.1})
 Json = dict[str, Any]
 
 
@@ -32,8 +33,8 @@ Json = dict[str, Any]
 def both() -> Iterator[tuple[Bridge, Bridge]]:
     with (
         own_domain() as domain,
-        bridge(*PATIENT, *QUICK, domain=domain) as twin,
-        lupin_twin(domain, "web", *PATIENT) as process,
+        bridge(*PATIENT, *OFTEN, *QUICK, domain=domain) as twin,
+        lupin_twin(domain, "web", *PATIENT, *OFTEN) as process,
         attached(process, twin.peer) as apart,
     ):
         twin.peer.observe(scan("1", {"co2": 400.0}, (0.0, 0.0)))

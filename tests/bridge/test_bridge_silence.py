@@ -34,3 +34,16 @@ async def test_a_twin_without_a_clock_has_not_been_silent_since_the_year_1970() 
         await until(lambda: stage.bridge.alarms.now.alarms, "its alarm")
     (silent,) = stage.bridge.alarms.now.alarms
     assert (silent.reason.kind, silent.raised_at_ns) == ("silent", 7)
+
+
+async def test_a_twin_whose_clock_stops_is_silent_since_its_last_time() -> None:
+    async with Stage() as stage:
+        stage.script.tell(state(7))
+        for clock in ("stopped", "doubted"):
+            without = replace(state(8).snapshot, clock=clock)
+            stage.script.tell(replace(state(8), snapshot=without))
+        await until(lambda: stage.bridge.alarms.now.page.active, "its alarm")
+        (silent,) = stage.bridge.alarms.now.page.active
+        assert (silent.reason.kind, silent.raised_at_ns) == ("silent", 7)
+        stage.script.tell(state(9))
+        await until(lambda: not stage.bridge.alarms.now.page.active, "its end")

@@ -3,6 +3,7 @@
 import re
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -13,6 +14,7 @@ from tests.support.archive import Archive, forward_once, forwarder
 from tests.support.fleet import Page, fleet, scans_lately, wall, write
 from tests.support.journal import recording, scan
 from tests.support.postgres import server
+from tests.support.waiting import wait_for
 
 PHONE: ViewportSize = {"width": 390, "height": 800}
 HOUR_NS = 3_600_000_000_000
@@ -132,6 +134,8 @@ def test_alarms_of_all_greenhouses_are_counted_listed_and_a_click_away(
 ) -> None:
     with three_sites(archive, tmp_path) as served:
         with opened(browser, served.url) as page:
+            page.clock.install()
+            page.reload()
             expect(page).to_have_title("(6) Greenhouses")
             page.get_by_role("button", name="Alarms 6").click()
             rows = page.locator(".fleet-alarm-list li")
@@ -156,11 +160,14 @@ def test_alarms_of_all_greenhouses_are_counted_listed_and_a_click_away(
             expect(page.get_by_role("button", name="Alarms 5")).to_be_visible()
             expect(rows).to_have_count(4)
             # What people say of one is beside it.
-            name = served.http.get("/api/alarms").json()["alarms"][0]["id"]
+            answer = partial(served.http.get, "/api/alarms")
+            name = answer().json()["alarms"][0]["id"]
             archive.do(
                 f"INSERT INTO note VALUES ('warm', 'n1', {now_ns}, 'Anna', 'acknowledge',"
                 f" 'alarm:{name}', '', NULL)"
             )
+            wait_for(lambda: "Anna" in answer().text, "it at the server")
+            page.clock.fast_forward(10_000)
             expect(rows.first).to_contain_text("acknowledged by Anna,")
             expect_no_wider_than_a_phone(page)
             tag = rows.first.locator("span", has_text=re.compile(r"^Tag \d$")).inner_text()
@@ -296,6 +303,8 @@ def test_an_archive_without_greenhouses_and_one_that_is_down(browser: Browser) -
                 "INSERT INTO site VALUES ('gh1', '');"
                 "INSERT INTO forwarder VALUES ('gh1', 'm', 1, now(), now() + INTERVAL '1 hour')"
             )
+            page.clock.install()
+            page.reload()
             card = page.locator(".fleet-site")
             expect(card).to_have_attribute("data-live", "true")
             own.stop()
@@ -305,6 +314,7 @@ def test_an_archive_without_greenhouses_and_one_that_is_down(browser: Browser) -
             own.start()
             expect(page.get_by_role("alert")).to_be_hidden()
             served.process.freeze()
+            page.clock.fast_forward(12_000)
             expect(page.get_by_role("alert")).to_contain_text("No connection to the server since")
             expect(card).to_contain_text("As of")
             expect(card).to_have_attribute("data-live", "false")

@@ -15,12 +15,14 @@ from sensor_msgs.msg import BatteryState
 from tests.browser.hmi import Hmi, OpenPage
 from tests.browser.test_accessibility import violations
 from tests.support.messages import scan
+from tests.support.processes import OFTEN, constants
 from tests.support.web import Bridge, bridge
 
 
 @pytest.fixture
 def robot() -> Iterator[Bridge]:
-    with bridge("--ros-args", "-p", "state_publish_rate_hz:=10.0") as running:
+    often = constants(**{"lupin_bridge.stream.robot:PERIOD_S": 0.1})
+    with bridge(*often, *OFTEN) as running:
         for tag_id, at in (("a", (0.0, 0.0)), ("b", (4.0, 0.0)), ("c", (4.0, 3.0))):
             running.peer.observe(scan(tag_id, {"temperature": 21.0}, at))
             running.tag(tag_id)
@@ -144,7 +146,7 @@ def test_an_old_position_never_looks_live_and_says_how_old_it_is(
     if folder := os.environ.get("ROBOT_PICTURES"):
         hmi.page.screenshot(path=File(folder) / "robot-old.png")
     # It moves on, and falls silent: what looked live ages before one's eyes.
-    place(robot, 2.5, 1.0)
+    place(robot, 2.5, 1.0, ago_s=5.0)
     expect(hmi.test_id("robot")).to_have_attribute("data-looks", "live")
     expect(hmi.test_id("robot")).to_have_attribute("data-looks", "old")
     expect(hmi.test_id("robot-mark").locator("text")).to_have_text(re.compile(r"1\d\ss ago"))

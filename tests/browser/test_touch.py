@@ -53,6 +53,8 @@ def test_a_tap_on_a_pin_opens_its_card_and_one_beside_closes_it(phone: Hmi) -> N
     phone.map.tap(position={"x": x + 12, "y": y - 12})
     expect(phone.card("10")).to_be_visible()
     expect(phone.card("10")).to_contain_text("31.0\u00a0°C")
+    # The card in short is the mouse's.
+    expect(phone.test_id("hover-card")).to_have_count(0)
     box = phone.card("10").bounding_box()
     assert box is not None
     assert box["x"] >= 0

@@ -196,14 +196,14 @@ def test_it_goes_on_after_it_was_stopped_for_a_while(domain: int) -> None:
     with Peer(domain) as peer, patrol(domain, "--speed", "5") as process:
         heard = Received().listen(peer)
         peer.until(lambda: heard.maps, "the first look around")
-        process.stand_still()
+        process.freeze()
         drained = -1
         while len(heard.observations) > drained:
             drained = len(heard.observations)
             for _ in range(10):
                 peer.spin_briefly()
-        before = len(heard.observations)
-        peer.until(lambda: len(heard.observations) > before + 1, "more observations")
+        process.thaw()
+        peer.until(lambda: len(heard.observations) > drained + 1, "more observations")
         assert process.stop() == 0
 
 

@@ -1,7 +1,8 @@
 """`lupin-twin` with other limits than it has, or of another world: what a test cannot wait for.
 
-`python -m tests.support.limited [--limit NAME=VALUE] [--world NAME=VALUE] ROLE ...`, each as often
-as wanted, is the command `lupin-twin ROLE ...`, whose `Limits` and `World` have these values.
+`python -m tests.support.limited [--limit NAME=VALUE] [--world NAME=VALUE]
+[--constant MODULE:NAME=VALUE] ROLE ...`, each as often as wanted, is the command
+`lupin-twin ROLE ...`, whose `Limits`, `World` and modules have these values.
 """
 
 import argparse
@@ -9,6 +10,7 @@ import json
 import sys
 from collections.abc import Sequence
 from functools import partial
+from importlib import import_module
 from typing import Any
 
 from lupin_bridge.cli import command as cli_command
@@ -25,6 +27,7 @@ def command() -> None:
     parser = argparse.ArgumentParser(allow_abbrev=False)
     parser.add_argument("--limit", action="append", default=[])
     parser.add_argument("--world", action="append", default=[])
+    parser.add_argument("--constant", action="append", default=[])
     options, rest = parser.parse_known_args()
     sys.argv[1:] = rest
     limit_blas_threads()
@@ -36,6 +39,9 @@ def command() -> None:
         from lupin_bridge.cli import fleet
 
         vars(fleet).update(Limits=limits)
+    for place, value in _values(options.constant).items():
+        module, _, name = place.partition(":")
+        vars(import_module(module))[name] = value
     cli_command.command()
 
 

@@ -159,9 +159,8 @@ def twin_node(domain: int, *ros_args: str, afresh: bool = False, **env: str) -> 
 
 def lupin_twin(domain: int, role: str, *args: str, afresh: bool = False, **env: str) -> Process:
     """`lupin-twin ROLE` on a free port; ask `url_of` for its address."""
-    module = (
-        "tests.support.limited" if {"--limit", "--world"} & {*args} else "lupin_bridge.cli.command"
-    )
+    is_other = {"--limit", "--world", "--constant"} & {*args}
+    module = "tests.support.limited" if is_other else "lupin_bridge.cli.command"
     command = [sys.executable, "-m", module, role, "--port", "0", *args]
     return Process(command, ros_env(domain, **env), afresh=afresh)
 
@@ -170,6 +169,12 @@ def limits(**values: float) -> tuple[str, ...]:
     """Arguments of `lupin_twin` for other `Limits` than a bridge has."""
     pairs = [f"{name}={value!r}" for name, value in values.items()]
     return tuple(word for pair in pairs for word in ("--limit", pair))
+
+
+def constants(**values: float) -> tuple[str, ...]:
+    """Arguments of `lupin_twin` for other constants of modules, by `module:NAME`."""
+    pairs = [f"{name}={value!r}" for name, value in values.items()]
+    return tuple(word for pair in pairs for word in ("--constant", pair))
 
 
 def patrols_of(pid: int) -> list[int]:

@@ -92,6 +92,8 @@ class AlarmFeed:
         self._received: list[PastWrite] = []
         self._received_number = _FIRST_RECEIVED
         self._silences: list[Alarm] = []
+        # The twin's last time that was known.
+        self._last_ns: int | None = None
         self._alarms: tuple[Alarm, ...] = ()
         self._page, self._page_of = Page(), _NO_PAGE
         self._again: asyncio.TimerHandle | None = None
@@ -112,6 +114,7 @@ class AlarmFeed:
     def on_state(self, update: TwinUpdate) -> None:
         """The twin has a new state; costs nothing where that and the journal are as before."""
         before, now = self._seen, update.snapshot
+        self._last_ns = self._last_ns if now.now_ns is None else now.now_ns
         is_new = before is None or before.tags != now.tags
         is_kept = update.journal.state not in _NOT_RECORDED
         if is_kept == (self._origin == "heard"):
@@ -135,7 +138,11 @@ class AlarmFeed:
             self._wake.set()
 
     def on_silence(self, *, is_silent: bool, last_ns: int | None) -> None:
-        """The twin has fallen silent, or speaks again; `last_ns` is its newest stamp."""
+        """The twin has fallen silent, or speaks again; `last_ns` is its newest stamp.
+
+        None: it has lost its clock, and is silent since the last time that it knew.
+        """
+        last_ns = self._last_ns if last_ns is None else last_ns
         open_now = self._silences[-1] if self._silences else None
         was_silent = open_now is not None and open_now.is_active
         if is_silent == was_silent or last_ns is None:
@@ -257,6 +264,7 @@ class AlarmFeed:
     async def _publish(self) -> None:
         follower, now_ns = self._follower, self._now_ns()
         if follower is None or now_ns is None:
+            await self._publish_silence(0.0)
             return
         moment_ns, since_ns = now_ns, max(0, now_ns - self._reach_ns)
         beside = tuple(alarm for alarm in self._silences if alarm.raised_at_ns <= moment_ns)

@@ -74,6 +74,11 @@ class Report:
     criteria: Criteria = field(compare=False)
     journal: Condition = field(compare=False)
 
+    @property
+    def known_ns(self) -> int:
+        """Up to when that nothing was observed means that it was so."""
+        return bodies.complete_to(self.journal, self.end_ns) or self.end_ns
+
     def cost_s(self, tags: int) -> float:  # noqa: ARG002
         """See `plans.Query`."""
         return REPORT_S
@@ -281,7 +286,7 @@ class _Fold:
             return []
         return [
             alarm
-            for alarm in self._follower.found(end_ns - 1).alarms
+            for alarm in self._follower.found(self._of.known_ns - 1).alarms
             if alarm.raised_at_ns < end_ns
             and (alarm.cleared_at_ns is None or alarm.cleared_at_ns >= start_ns)
         ]
@@ -306,7 +311,7 @@ class _Fold:
 
     def _silences(self) -> list[tuple[str, Stretch]]:
         """Those of the greenhouse, and then of tags by themselves, the longest first."""
-        start_ns, end_ns = self._of.start_ns, self._of.end_ns
+        start_ns, end_ns = self._of.start_ns, self._of.known_ns
         whole = list(silences(self._attempted_ns, end_ns))
         found = [
             (tag_id, silence)

@@ -330,9 +330,8 @@ class StatusFrame(Contract):
         description="where what was observed comes from, as the twin says; sim_time: it goes by "
         "/clock, so from a simulation, or a recording that is played"
     )
-    input_problems: list[str] = Field(
-        description="why the twin does not hear all that is published for it, with the remedy"
-    )
+    twin_count: int = Field(description="how many publish the state; of more than one, a mixture")
+    input_problems: list[str] = Field(description="why the twin misses messages, with the remedy")
     day_length_s: float = Field(description="s of ROS time that a day takes; fewer in a demo")
     drops: list[RecentDrop] = Field(description="what the twin dropped recently, by reason")
     journal: Journal

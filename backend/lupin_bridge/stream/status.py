@@ -125,6 +125,7 @@ class Status:
             # Spares a browser requests whose 404 it would show as an error.
             "has_map": now.occupancy_map is not None,
             "origin": now.origin,
+            "twin_count": now.twin_count,
             "input_problems": list(now.input_problems),
             "day_length_s": self.day_length_s,
             "drops": [

@@ -57,6 +57,9 @@ test('another sensor’s age does not matter, but of what is derived', () => {
   // Of what is within its range nothing is said: the tag counts as healthy, and so does this.
   expect(nowOf(dry, state(8), null, true)).toMatchObject({ value: null, verdict: 'healthy' });
   expect(nowOf(dry, state(8, others), null, true)).toMatchObject({ kind: 'unknown', last: null });
+  // Without one of the readings that it is computed of, nothing is said of it either.
+  const failed = { kind: 'reading_failed', verdict: 'stressed', sensor: 'humidity' } as const;
+  expect(nowOf(dry, state(8, failed), null, true)).toMatchObject({ kind: 'unknown', last: null });
 });
 
 test('of a pest how many were seen last', () => {

@@ -51,7 +51,9 @@ export function nowOf(
   const isDerived = readings.size > 0 && !readings.has(sensor);
   const last = isDerived ? (said?.value ?? null) : (readings.get(sensor) ?? null);
   // Of what is within its range nothing is said, nor what it is.
-  if (isLive && isDerived && !said && !tag.health.reasons.some((it) => it.verdict === 'unknown')) {
+  const lacks = ({ kind: why, verdict: how }: HealthReason): boolean =>
+    how === 'unknown' || why === 'reading_failed';
+  if (isLive && isDerived && !said && !tag.health.reasons.some(lacks)) {
     return { kind: 'known', value: null, verdict, reason: null, trend: null };
   }
   if (!isLive || last === null || isOldReading(sensor, tag)) {

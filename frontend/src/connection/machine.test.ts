@@ -22,6 +22,7 @@ const status = (twin: StatusFrame['twin']): StatusFrame => ({
   state_age_seconds: 0,
   has_map: true,
   origin: 'robot',
+  twin_count: 1,
   input_problems: [],
   day_length_s: 86_400,
   drops: [],

@@ -13,6 +13,7 @@ const status = {
   state_age_seconds: 4,
   has_map: false,
   origin: 'robot',
+  twin_count: 1,
   input_problems: ['nothing has come yet from /map'],
   day_length_s: 86_400,
   drops: [{ reason: 'frame', message: 'dropped a message', count: 3 }],

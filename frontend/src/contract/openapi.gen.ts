@@ -275,6 +275,7 @@ export interface components {
             readonly has_map: boolean;
             /** @enum {string} */
             readonly origin: "unknown" | "robot" | "simulated" | "recorded" | "sim_time";
+            readonly twin_count: number;
             readonly input_problems: readonly string[];
             readonly day_length_s: number;
             readonly drops: readonly components["schemas"]["RecentDrop"][];

@@ -116,6 +116,11 @@ describe('how ages go on', () => {
     expect(selectShown(store.get())).toBe(shown);
   });
 
+  test('whether a pause goes on nobody knows whose connection is lost', () => {
+    goLive(status({ reason: 'paused' }), 60_000);
+    expect(selectShown(store.get()).ageing.kind).toBe('unknown');
+  });
+
   test('in a pause they stand still, whatever the browser’s clock says', () => {
     goLive(status({ reason: 'paused' }));
     const { ageing, snapshot } = selectShown(store.get());

@@ -32,10 +32,12 @@ export function shownAt(twin: TwinState, moment: Moment): Shown {
 const CLOCKS_LOST = new Set<unknown>(['no_clock', 'clock_stopped', 'clock_doubted']);
 
 /** How the time of the newest house goes on, as far as anybody knows. */
-function clockOf({ isTimeLost, connection }: TwinState): keyof typeof SHOWN_NOW {
+function clockOf({ isTimeLost, connection, phase }: TwinState): keyof typeof SHOWN_NOW {
   const reason = connection.status?.reason;
   if (isTimeLost || CLOCKS_LOST.has(reason)) return 'unknown';
-  return reason === 'paused' ? 'paused' : 'running';
+  if (reason !== 'paused') return 'running';
+  // Cut off, nobody hears that a pause is over.
+  return phase === 'live' ? 'paused' : 'unknown';
 }
 
 const SHOWN_NOW = {
@@ -57,6 +59,9 @@ const shownThen = memoLast((house: House, map: House['map'], moment: number): Sh
 }));
 
 export const selectShown = ({ twin, view }: AppState): Shown => shownAt(twin, view.moment);
+
+/** Whether anybody knows what time it is now, whatever is shown. */
+export const selectHasTime = ({ twin }: AppState): boolean => clockOf(twin) !== 'unknown';
 
 /** The newest there is, whatever is shown: for the connection's word, and for what to fetch. */
 export const selectNewest = ({ twin }: AppState): House => twin.latest;

@@ -18,6 +18,7 @@ export const status = (over: Partial<StatusFrame> = {}): StatusFrame => ({
   state_age_seconds: 0,
   has_map: true,
   origin: 'robot',
+  twin_count: 1,
   input_problems: [],
   day_length_s: 86_400,
   drops: [],

@@ -4,7 +4,7 @@ import { afterEach, beforeEach, expect, test, vi } from 'vitest';
 import { startTitle } from '../alarms/title';
 import { act, receive, store } from '../store/app';
 import { NO_HOUSE } from '../store/twin';
-import { showTags } from '../testing/page';
+import { goLive, showTags, status } from '../testing/page';
 import { stateFrame, wireTag } from '../testing/tags';
 import { PastFrame } from './PastFrame';
 import { PastHeader } from './PastHeader';
@@ -55,9 +55,28 @@ test('header, frame and title say the moment of what is shown, not the one that 
   expect(told()).toEqual([null, false, 'Lupin twin']);
 });
 
-test('how long ago is not told where nobody knows what time it is', () => {
+test.each([
+  [
+    'after a sleep',
+    () => {
+      receive({ type: 'lapse' });
+    },
+  ],
+  [
+    'of a stopped clock',
+    () => {
+      goLive(status({ twin: 'offline', reason: 'clock_stopped' }));
+    },
+  ],
+  [
+    'of an unheard pause',
+    () => {
+      goLive(status({ reason: 'paused' }), 60_000);
+    },
+  ],
+])('how long ago is not told where nobody knows what time it is: %s', (_, lose) => {
   look(2_500, 2_500);
-  receive({ type: 'lapse' });
+  lose();
   render(<PastHeader />);
   expect(screen.getByTestId('past-header').textContent).not.toContain('ago');
 });

@@ -3,7 +3,7 @@ import type { JSX } from 'react';
 import { ageText } from '../domain/format';
 import { rosText } from '../domain/rostime';
 import { store, useApp } from '../store/app';
-import { rosNow, selectShown } from '../store/moment';
+import { rosNow, selectHasTime, selectShown } from '../store/moment';
 import { selectIsRecorded, selectOrigin } from '../store/origin';
 import { S } from '../strings';
 import { useTicking } from '../widgets/useNow';
@@ -19,7 +19,7 @@ export function PastHeader(): JSX.Element | null {
     return nowS === null || moment === null ? null : ageText(Math.max(0, nowS - moment));
   });
   const origin = useApp(selectOrigin);
-  const isTimeLost = useApp((state) => state.twin.isTimeLost);
+  const hasTime = useApp(selectHasTime);
   if (moment === null || !isLooking) return null;
   return (
     <div className="past-header" data-testid="past-header">
@@ -32,7 +32,7 @@ export function PastHeader(): JSX.Element | null {
       )}
       <strong>{rosText(moment)}</strong>
       {/* What counts on by itself is not read out each second. */}
-      {ago !== null && !isTimeLost && (
+      {ago !== null && hasTime && (
         <span className="past-ago" aria-hidden="true">
           {S.agoSuffix(ago)}
         </span>

@@ -41,6 +41,8 @@ export function HouseLine(): JSX.Element | null {
   );
   if (!patrol || !snapshot || snapshot.tags.length === 0 || isSilent(health)) return null;
   const { last_scan: lastScan, overdue } = patrol;
+  // Scanned, and nobody knows when.
+  if (lastScan === null && snapshot.tags.some(({ readings }) => readings.size > 0)) return null;
   if (isLate && last !== null) {
     return (
       <p className="house-line" data-testid="house-line">

@@ -62,6 +62,12 @@ test('what the twin dropped is told with its count, and a pause as one', () => {
   ]);
 });
 
+test('a mixture of two twins is told, for nothing of it is to be relied on', () => {
+  goLive(status({ twin_count: 2 }));
+  render(<Troubles />);
+  expect(lines()).toEqual([expect.stringMatching(/^More than one twin sends data\. /)]);
+});
+
 test('what the twin does not hear is told with the remedy, to its end', () => {
   const why = `/a_node publishes ${'/long'.repeat(60)} as VOLATILE`;
   goLive(status({ input_problems: [`${why}; use TRANSIENT_LOCAL`, 'nothing has come yet'] }));

@@ -36,6 +36,9 @@ export function troublesOf(
     });
   }
   const { status } = connection;
+  if (phase === 'live' && status && status.twin_count > 1) {
+    troubles.push({ id: 'mixture', title: S.mixture });
+  }
   if (phase === 'live' && status?.reason === 'paused') {
     troubles.push(
       status.origin === 'recorded'

@@ -2,7 +2,6 @@
 
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
-from dataclasses import replace
 from typing import Any
 
 import pytest
@@ -18,16 +17,11 @@ from lupin_bridge.feed.source import (
     ailment,
 )
 from lupin_bridge.feed.web import WebTwin
-from lupin_bridge.past.fields import ReadingsAt
 from lupin_twin.core.history import LatestRequest
-from lupin_twin.core.past import PastRefused, SeriesRequest
-from lupin_twin.core.state import Reading
-from lupin_twin.estimate.engine import TagPast
 from lupin_twin.runtime.estimates import ReportRequest
 from tests.support.messages import discovered, occupancy_grid, pose, scan
 from tests.support.processes import OFTEN, twin_node
 from tests.support.ros import Peer
-from tests.support.store import S
 from tests.support.waiting import until, until_answered
 
 SOURCES = [LocalTwin, WebTwin]
@@ -109,6 +103,10 @@ async def test_a_source_tells_of_every_change_and_of_what_it_is_asked(
         assert [(scan.stamp_ns, scan.readings[0].value) for scan in history] == [
             (5_000_000_000, 400.0)
         ]
+        report = await until_answered(
+            lambda: source.estimate_report(ReportRequest("co2")), "the service", bool
+        )
+        assert (report.fitted_at_ns, report.tags, report.record.since_ns) == (None, (), None)
         assert stage.told[-1].twin_count == 1
         assert source.names.state_topic == "/twin/state"
         assert source.rules.max_grid_cells == 1000
@@ -134,55 +132,3 @@ def test_a_thread_that_only_a_restart_helps_is_told(
     is_alive: bool, stuck_s: float, said: str | None
 ) -> None:
     assert ailment(ThreadState(is_alive, stuck_s)) == said
-
-
-@pytest.mark.parametrize("source_type", SOURCES)
-async def test_a_source_tells_of_the_past(domain: int, source_type: type) -> None:
-    async with stage_of(source_type, domain) as stage:
-        source = stage.source
-        stage.peer.observe(
-            scan("1", {"co2": 400.0}, stamp_s=5.0, at=(0.5, 2.5)),
-            scan("1", {"co2": 500.0, "light": 9.0}, stamp_s=50.0),
-            scan("1", status=2, stamp_s=60.0),
-        )
-        co2 = SeriesRequest("1", "co2")
-        await stage.tag("1")
-
-        # The last of them is kept.
-        failures = SeriesRequest("*", "~failures", 1, 100 * S)
-        failed = await until_answered(
-            lambda: source.ask(Itself(failures), 0.0), "the failure", lambda it: it.stamps_ns
-        )
-        past = await source.ask(Itself(co2), 0.0)
-        assert (past.means, past.start_ns) == ((400.0, 500.0), 5 * S)
-        await until(lambda: stage.told[-1].snapshot.stamp_ns >= past.end_ns - 1, "time to pass")
-        assert (failed.stamps_ns, failed.means, failed.bucket_ns) == ((60 * S,), (2.0,), None)
-        few = replace(co2, start_ns=5 * S, end_ns=65 * S, max_points=1)
-        counted = await source.ask(Itself(few), 0.0)
-        assert (counted.counts, counted.bucket_ns) == ((2,), 60 * S)
-
-        then = await source.ask(Itself(49 * S), 0.0)
-        assert (then.stamp_ns, then.frame_id, then.has_times) == (49 * S, "map", True)
-        [tag] = [tag for tag in then.tags if tag.readings]
-        assert tag.readings == (Reading("co2", 400.0, 5 * S),)
-        assert tag.stale_seconds(then.now_ns) == 44.0
-        with pytest.raises(PastRefused, match="later than now"):
-            await source.ask(Itself(2**31 * S - 1), 0.0)
-
-        [read] = await source.ask(Itself(ReadingsAt("co2", 55 * S, source.day_length_s)), 0.0)
-        assert read == TagPast("1", 0.5, 2.5, ((5 * S, 400.0), (50 * S, 500.0)))
-
-        report = await until_answered(
-            lambda: source.estimate_report(ReportRequest("co2")), "the service", bool
-        )
-        assert (report.fitted_at_ns, report.tags, report.record.since_ns) == (None, (), None)
-
-        rows = [row async for lot in source.rows(1, 100 * S, None, None, list) for row in lot]
-        assert [(row.stamp_ns, row.sensor, row.status) for row in rows] == [
-            (5 * S, "co2", 0),
-            (50 * S, "co2", 0),
-            (50 * S, "light", 0),
-            (60 * S, "", 2),
-        ]
-        assert {(row.tag_id, row.x, row.y) for row in rows} == {("1", 0.5, 2.5)}
-        assert {row.source for row in rows} == {"test"}

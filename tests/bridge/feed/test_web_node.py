@@ -188,12 +188,6 @@ def scanned(at_s: int, value: float = 1.0, tag_id: str = "1") -> TagState:
 # --- times --------------------------------------------------------------------------------------
 
 
-def test_a_twin_that_tells_no_times_is_shown_without_them(stage: Stage, peer: Peer) -> None:
-    snapshot = stage.take(peer, tag("1"))
-    assert not snapshot.has_times
-    assert snapshot.tags[0].readings[0].observed_at_ns is None
-
-
 def test_a_state_waits_for_its_times_and_for_no_others(stage: Stage, peer: Peer) -> None:
     told = stage.take_with_times(peer, scanned(5))
     assert told.tags[0].readings[0].observed_at_ns == 5 * S
@@ -213,15 +207,6 @@ def test_a_state_waits_for_its_times_and_for_no_others(stage: Stage, peer: Peer)
 
 
 # --- maps ---------------------------------------------------------------------------------------
-
-
-def test_a_map_is_kept_and_told_with_the_next_state(stage: Stage, peer: Peer) -> None:
-    stage.take(peer, tag("1"))
-    told, before = len(stage.told), stage.node.revision
-    peer.publish_map(occupancy_grid([[0, 100]]))
-    stage.first_map()
-    assert len(stage.told) == told, "a map is no sign of life of the twin"
-    assert stage.node.revision != before
 
 
 @pytest.mark.parametrize(
@@ -319,19 +304,6 @@ def test_only_the_twin_that_is_followed_is_heard_on_diagnostics(stage: Stage, pe
 
 
 # --- the rest -----------------------------------------------------------------------------------
-
-
-def test_a_state_that_breaks_the_callback_is_counted_and_the_next_one_is_taken(
-    stage: Stage, peer: Peer, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    def fail(_: Any) -> None:
-        raise RuntimeError("a defect")
-
-    with monkeypatch.context() as broken:
-        broken.setattr(stage.node, "_on_state", fail)
-        peer.publish("/twin/state", TwinState(tags=[tag("1")]), depth=1)
-        stage.until(lambda: stage.node.utilities.callback_errors == 1, "the error")
-    assert stage.take(peer, tag("2")).tags[0].tag_id == "2"
 
 
 @pytest.mark.parametrize(("topic", "limit"), [("/twin/state", 64_000_000), ("/map", 64_000_000)])

@@ -5,6 +5,7 @@ import signal
 import time
 from collections import deque
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
@@ -19,7 +20,7 @@ from tests.support.archive import Archive, forward_once, forwarder
 from tests.support.fleet import Page, fleet, frames, scans_lately, wall, write
 from tests.support.journal import kept, look, scan
 from tests.support.postgres import Postgres, server
-from tests.support.processes import children_of, limits
+from tests.support.processes import children_of, constants, limits
 from tests.support.raw_http import UPGRADE, status
 from tests.support.waiting import PATIENCE_S, wait_for
 from tests.support.web import deaf_client
@@ -46,7 +47,8 @@ def page(postgresql: Postgres, tmp_path_factory: pytest.TempPathFactory) -> Iter
     """One of which two sites may be open, and a client may have one answer under way."""
     archive = made(postgresql, tmp_path_factory.mktemp("hostile") / "journal", *SITES[1:])
     bounds = limits(client_timeout_s=TIMEOUT_S, open_sites=2, concurrency=1)
-    with fleet(archive, *bounds) as running:
+    soon = constants(**{"lupin_bridge.feed.past_process:REST_S": 0.2})
+    with fleet(archive, *bounds, *soon) as running:
         wait_for(lambda: {*running.sites()} == {*SITES}, "all sites")
         yield running
         assert "Traceback" not in running.process.output
@@ -179,7 +181,7 @@ def test_a_browser_of_the_overview_that_never_reads_is_dismissed(
     sites = [f"gh{number}" for number in range(2, 1_500)]
     archive = made(postgresql, tmp_path / "journal")
     archive.do(f"INSERT INTO site SELECT unnest('{{{','.join(sites)}}}'::text[]), ''")
-    with fleet(archive, *limits(client_timeout_s=TIMEOUT_S)) as running:
+    with fleet(archive, *limits(client_timeout_s=1.5)) as running:
         wait_for(lambda: len(running.sites()) > 1_000, "all sites")
         with frames(running) as received:
             next(received)
@@ -217,7 +219,8 @@ def test_a_process_that_is_killed_is_started_again_and_counted(page: Page) -> No
 def test_an_archive_that_hangs_is_said_and_goes_on(tmp_path: Path) -> None:
     with server() as own:
         archive = made(own, tmp_path / "journal", "gh2")
-        with fleet(archive, *limits(answer_timeout_s=2)) as running:
+        soon = constants(**{"lupin_bridge.fleet.watching:STUCK_S": 3.0})
+        with fleet(archive, *limits(answer_timeout_s=2), *soon) as running:
             for name in SITES[:2]:
                 wait_for(lambda name=name: name in running.sites(), name)  # type: ignore[misc]
                 # The first answer starts a process, which on a busy machine takes more than 2 s.
@@ -230,9 +233,10 @@ def test_an_archive_that_hangs_is_said_and_goes_on(tmp_path: Path) -> None:
                 assert running.http.get("/healthz").status_code == 200
                 assert not running.sites()["gh1"]["is_live"]
                 assert len(running.http.get("/sites/gh1/api/state").json()["tags"]) == 5
-                for name in SITES[:2] * 2:
-                    found = running.http.get(f"/sites/{name}/{HISTORY}&points=7")
-                    assert found.status_code in (503, 504), found.text
+                paths = [f"/sites/{name}/{HISTORY}&points=7" for name in SITES[:2] * 2]
+                with ThreadPoolExecutor() as clients:
+                    for found in clients.map(running.http.get, paths):
+                        assert found.status_code in (503, 504), found.text
                 assert measured(running, "lupin_fleet_archive_reachable") == 0
             finally:
                 own.thaw()
@@ -253,11 +257,14 @@ def test_rows_that_cannot_be_read_are_said_on_their_sites_page(
     journal = tmp_path / "journal"
     now_ns = time.time_ns()
     write(journal, [*scans_lately(), look("1", now_ns - 10**9)])
-    with forwarder(archive, journal), fleet(archive) as running:
+    with (
+        forwarder(archive, journal),
+        fleet(archive, *limits(answer_timeout_s=2)) as running,
+    ):
         running.site(is_live=True, last_verdict="healthy")
         archive.copy_site("gh2")
         wait_for(lambda: "gh2" in running.sites(), "gh2")
-        assert running.http.get("/sites/gh1/api/state").status_code == 200
+        wait_for(lambda: running.http.get("/sites/gh1/api/state").status_code == 200, "gh1")
         archive.do("UPDATE scan SET readings = 'nonsense' WHERE site = 'gh1'")
         archive.do("UPDATE look SET blooms = '[[1' WHERE site = 'gh2'")
         for name, path in (("gh1", HISTORY), ("gh1", "api/export.csv"), ("gh2", HISTORY)):

@@ -261,36 +261,9 @@ def test_whatever_a_verdict_can_be_of_becomes_an_alarm_but_what_the_estimate_say
     assert {kind for _, kind, _ in found} == set(Kind) - {Kind.CHANGED, Kind.SILENT}
 
 
-def test_raised_anew_it_is_another() -> None:
-    newer, older = told(scans([17, 17, 22, 22, 17, 17]))
-    assert newer.id != older.id
-    assert newer.is_active
-    assert not older.is_active
-
-
 @given(st.lists(st.floats(17.61, 18.39), min_size=2, max_size=40))
 def test_what_wobbles_about_a_limit_is_one_episode(values: list[float]) -> None:
     assert len(told(scans([17.0, 17.0, *values]))) == 1
-
-
-def test_too_low_and_too_high_are_two_alarms() -> None:
-    assert [alarm.worst for alarm in told(scans([17, 17, 27, 28]))] == [28, 17]
-
-
-def test_a_silent_patrol_is_one_alarm_of_the_house_and_none_of_its_tags() -> None:
-    heard = [one for tag in "abcdefgh" for one in scans([22] * 5, tag=tag)]
-    heard = [replace(one, number=number) for number, one in enumerate(heard)]
-    last_ns = max(one.stamp_ns for one in heard)
-    assert follow([heard], SPANS[0], last_ns + 10 * MINUTE) == ()
-    (alarm,) = follow([heard], SPANS[0], last_ns + 10 * MINUTE + 1)
-    assert (alarm.reason.kind, alarm.tag_id, alarm.raised_at_ns - last_ns - 1) == (
-        "stopped",
-        "",
-        10 * MINUTE,
-    )
-    again = replace(heard[0], number=99, stamp_ns=last_ns + 30 * MINUTE)
-    (over,) = follow([heard, [again]], SPANS[0], again.stamp_ns)
-    assert (over.id, over.cleared_at_ns) == (alarm.id, again.stamp_ns)
 
 
 @pytest.mark.parametrize(("holds_minutes", "is_overdue"), [(9, True), (10, False), (11, False)])
@@ -313,17 +286,6 @@ def test_in_a_pause_time_stands_from_its_first_moment_on(
                                     for n in (0, 1))])  # fmt: skip
     (late,) = (one for one in follower.found(first + 1).alarms if one.tag_id == "a")
     assert late.raised_at_ns == first + 1
-
-
-def test_a_tag_that_is_passed_by_is_overdue_until_it_is_scanned() -> None:
-    other = scans([22] * 20, tag="b")
-    mine = [replace(one, number=100 + one.number) for one in scans([22, 22])]
-    (alarm,) = told([*mine, *other])
-    assert (alarm.tag_id, alarm.reason.kind) == ("a", "old")
-    assert alarm.raised_at_ns == START + 11 * MINUTE + 1
-    late = replace(mine[0], number=103, stamp_ns=START + 5 * MINUTE)
-    later = replace(mine[0], number=104, stamp_ns=START + 14 * MINUTE)
-    assert told([*mine, *other, late, later]) == []
 
 
 def test_it_says_when_it_will_be_another_by_itself() -> None:

@@ -121,14 +121,6 @@ def test_alarms_are_told_of_the_tag_and_of_the_house() -> None:
     assert (news["lt/tags/a/alarms"]["state"], news["lt/house/alarms"]["state"]) == ("OFF", "OFF")
 
 
-def test_after_a_reconnect_or_a_birth_everything_is_told_again() -> None:
-    one = mirror()
-    now = seen(tag("a", temperature=21.0))
-    first = told(one, now)
-    one.forget()
-    assert told(one, now) == first
-
-
 def test_an_announcement_is_made_anew_where_it_says_something_else() -> None:
     one = mirror()
     state = tag("a", temperature=21.0)
@@ -151,16 +143,6 @@ def test_a_tag_that_is_gone_is_taken_back() -> None:
     assert gone == {topic for topic in announcements(first) if "/tag_b_-_" in topic}
     one.forget()
     assert not [topic for topic in told(one, seen()) if "/tag_b_-_" in topic]
-
-
-def test_a_tag_that_goes_while_the_broker_is_away_is_taken_back_too() -> None:
-    one = mirror()
-    told(one, seen(tag("a", temperature=21.0)))
-    one.forget()
-    news = told(one, seen())
-    assert [topic for topic, payload in news.items() if payload is None] == sorted(
-        topic for topic in news if "/tag_a_-_" in topic
-    )
 
 
 def test_without_a_discovery_prefix_nothing_is_announced() -> None:

@@ -165,7 +165,12 @@ def test_who_says_that_it_is_gone_is_contradicted(
         asyncio.run(run(heard))
 
 
-def test_a_flood_of_good_byes_and_births_is_answered_once_in_a_while(shared: Broker) -> None:
+def test_a_flood_of_good_byes_and_births_is_answered_once_in_a_while(
+    shared: Broker, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for name in ("STATUS_S", "REPEAT_S"):
+        monkeypatch.setattr(mqtt, name, 2.0)
+
     async def run(heard: Subscriber) -> None:
         async with telling(shared, House()) as channel:
             await until(lambda: channel.condition.sent > 10, "the first time")
@@ -203,7 +208,7 @@ def test_a_broker_that_sends_a_packet_of_256_mb_is_left_before_it_is_read() -> N
     async def run(port: int) -> None:
         target = Targets.of(Settings(mqtt_url=f"mqtt://127.0.0.1:{port}"), Secrets()).mqtt
         assert target is not None
-        channel = Mqtt(target, Mirror(target.topics, SENSORS), first_wait_s=PATIENCE_S)
+        channel = Mqtt(target, Mirror(target.topics, SENSORS), PATIENCE_S, answer_s=2.0)
         channel.start(House().look)
         await until(lambda: channel.condition.failed, "the end of the connection")
         await channel.stop()

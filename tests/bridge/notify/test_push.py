@@ -30,6 +30,7 @@ from lupin_bridge.notify.retry import Backoff, Condition, until_taken
 from tests.support.access import refused_start
 from tests.support.messages import look
 from tests.support.people import OWN, TOKEN, add, changing, remove, signed_in
+from tests.support.processes import constants
 from tests.support.receiver import Answer, Posted, Receiver, receiver, status
 from tests.support.seen import NOW_NS, S, alarm
 from tests.support.tls import certificate
@@ -37,6 +38,8 @@ from tests.support.waiting import PATIENCE_S, until, wait_for
 from tests.support.web import Bridge, bridge
 
 CONTACT = "mailto:grower@example.org"
+_PUSH = "lupin_bridge.notify.push"
+SOON = constants(**{f"{_PUSH}:TOGETHER_S": 0.3, f"{_PUSH}:FIRST_WAIT_S": 0.3})
 
 
 @dataclass
@@ -97,7 +100,7 @@ def stage(folder: Path, *answers: Answer) -> Iterator[Stage]:
     with (
         receiver(*(answers or (status(201),)), tls=context) as service,
         bridge(
-            *options, *private, SSL_CERT_FILE=str(authority), LUPIN_TOKEN=f"shared-{TOKEN}"
+            *SOON, *options, *private, SSL_CERT_FILE=str(authority), LUPIN_TOKEN=f"shared-{TOKEN}"
         ) as live,
     ):
         live.peer.wait_for_twin()
@@ -187,7 +190,7 @@ def test_while_the_accounts_cannot_be_read_a_message_waits(tmp_path: Path) -> No
 
 
 def test_a_phone_that_is_switched_off_meanwhile_is_not_tried_again(tmp_path: Path) -> None:
-    answers = (status(503, "Retry-After: 4"), status(201))
+    answers = (status(503, "Retry-After: 3"), status(201))
     bearer = {"Authorization": f"Bearer {TOKEN}"}
     with stage(tmp_path, *answers) as on, signed_in(on.live.url, "anna") as anna:
         one, other = on.phone("one"), on.phone("other")

@@ -95,16 +95,6 @@ def test_between_events_there_are_no_gaps() -> None:
 # --- gaps -----------------------------------------------------------------------------------------
 
 
-def test_a_gap_is_longer_than_three_usual_intervals_and_not_just_as_long() -> None:
-    assert gaps(readings(0, 10, 20, 50, 60, 70, 80, 90), None) == []
-    assert gaps(readings(0, 10, 20, 51, 60, 70, 80, 90), None) == [(20, 51)]
-
-
-def test_before_the_first_and_after_the_last_reading_there_may_be_gaps_too() -> None:
-    assert gaps(readings(30, 40, 50, 60, 70), None) == []
-    assert gaps(readings(31, 40, 50, 60, 69), None) == [(0, 31), (69, 100)]
-
-
 def test_no_gap_is_told_of_what_has_not_come() -> None:
     past = readings(0, 10, 20, 30)
     assert gaps(past, None) == [(30, 100)]

@@ -18,7 +18,7 @@ from lupin_bridge.serving.http_protocol import MAX_BODY_BYTES
 from tests.support import raw_http
 from tests.support.journal import select
 from tests.support.people import OWN, TOKEN, add, signed_in
-from tests.support.processes import limits, lupin_twin, twin_node, url_of
+from tests.support.processes import constants, limits, lupin_twin, twin_node, url_of
 from tests.support.ros import Peer
 from tests.support.waiting import PATIENCE_S, wait_for
 from tests.support.web import Bridge, bridge
@@ -41,8 +41,9 @@ def folder() -> Iterator[Path]:
 
 @pytest.fixture(scope="module")
 def live(folder: Path) -> Iterator[Bridge]:
+    soon = constants(**{"lupin_bridge.routes.answers:BODY_S": 1.5})
     options = ("--accounts", str(folder / "accounts.sqlite"), *ON, *limits(client_timeout_s=3.0))
-    with bridge(*options, "--ros-args", "-p", f"journal:={folder / 'j.sqlite'}") as running:
+    with bridge(*options, *soon, "--ros-args", "-p", f"journal:={folder / 'j.sqlite'}") as running:
         running.peer.wait_for_twin()
         yield running
 

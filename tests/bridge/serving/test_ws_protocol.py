@@ -144,7 +144,7 @@ def drain(client: socket.socket, freed: list[bool]) -> None:
 
 def test_a_client_that_takes_nothing_is_closed_and_told_why_and_the_others_are_not() -> None:
     with (
-        bridge(*limits(client_timeout_s=5), *SILENT) as live,
+        bridge(*limits(client_timeout_s=3), *SILENT) as live,
         live.listen() as healthy,
         deaf_client(live.url) as reads_at_last,
         deaf_client(live.url) as never_reads,
@@ -156,7 +156,7 @@ def test_a_client_that_takes_nothing_is_closed_and_told_why_and_the_others_are_n
         )
         last = read_all(reads_at_last, lambda frame: frame.opcode is Opcode.CLOSE)[-1]
         assert int.from_bytes(last.data[:2]) == CloseCode.POLICY_VIOLATION
-        assert last.data[2:] == b"took no frame for 5 s"
+        assert last.data[2:] == b"took no frame for 3 s"
 
         # Not closed: the kernel would wait for a reader, and keep what it has for it, for minutes.
         wait_for(

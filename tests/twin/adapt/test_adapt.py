@@ -25,7 +25,7 @@ from lupin_twin.adapt.config import config_of, read_config
 from lupin_twin.adapt.node import AdaptNode
 from tests.support.domains import ros_env
 from tests.support.inprocess import ros_domain
-from tests.support.processes import Process, twin_node
+from tests.support.processes import Process, constants, twin_node
 from tests.support.ros import Peer, latched
 from tests.support.waiting import wait_for
 
@@ -49,7 +49,7 @@ def config(tmp_path: Path) -> Path:
 
 
 def adapt(domain: int, *args: str) -> Process:
-    command = [sys.executable, "-m", "lupin_bridge.cli.command", "adapt", *args]
+    command = [sys.executable, "-m", "tests.support.limited", "adapt", *args]
     return Process(command, ros_env(domain))
 
 
@@ -201,7 +201,8 @@ def test_a_name_or_a_type_that_is_wrong_is_named_and_so_is_what_would_be_right(
 ) -> None:
     text = CONFIG.replace("/temperature,", "/temprature,").replace("Float32", "Float64")
     config.write_text(text)
-    with adapt(domain, "--config", str(config)) as process, Peer(domain) as peer:
+    soon = constants(**{"lupin_twin.adapt.node:SILENT_S": 2.0})
+    with adapt(domain, *soon, "--config", str(config)) as process, Peer(domain) as peer:
         robot = Robot(peer)
         for text in (
             "nobody publishes it, did you mean /temperature?",

@@ -9,14 +9,11 @@ from hypothesis import strategies as st
 from lupin_twin.core import ingest
 from lupin_twin.core.history import (
     KNOWN_PER_TAG,
-    PastAttempt,
-    PastScan,
     Repeats,
-    TagHistory,
     tag_history,
 )
-from lupin_twin.core.state import Attempt, Inspection, Reading, Scan, TwinStore
-from tests.support.store import SCAN_FAILED, S, failed_look, look, scan
+from lupin_twin.core.state import Inspection, Reading, Scan, TwinStore
+from tests.support.store import S, look, scan
 
 
 def test_what_was_received_is_known_by_kind_stamp_and_source() -> None:
@@ -53,27 +50,6 @@ def test_after_a_clock_that_went_back_what_was_later_is_news_in_a_simulation(
 
 
 # --- a tag's history ------------------------------------------------------------------------------
-
-
-def test_scans_that_brought_readings_are_there_and_every_attempt() -> None:
-    assert tag_history([], None, 8) == TagHistory()
-    past = tag_history(
-        [
-            scan("1", at_s=1.0, co2=400.0),
-            look("1", at_s=2.0),
-            failed_look("1", at_s=3.0),
-            Scan("1", 4 * S, status=1, status_detail="blocked"),
-        ],
-        None,
-        8,
-    )
-    assert past.scans == (PastScan(S, (Reading("co2", 400.0),)),)
-    assert past.attempts == (
-        PastAttempt(Attempt(S), 0),
-        PastAttempt(Attempt(2 * S), 1),
-        PastAttempt(Attempt(3 * S, SCAN_FAILED), 1),
-        PastAttempt(Attempt(4 * S, 1, "blocked"), 0),
-    )
 
 
 WRITES = st.lists(

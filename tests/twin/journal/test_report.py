@@ -35,8 +35,8 @@ JOURNAL = Condition(JournalState.RECORDING, complete_ns=END, kept_ns=((0, END),)
 _stamps = st.integers(0, LATEST + 100).map(lambda minutes: BEGUN + minutes * MINUTE + 1)
 
 
-def report(log: Any, start_ns: int, end_ns: int) -> dict[str, Any]:
-    query = Report(start_ns, end_ns, CRITERIA, JOURNAL)
+def report(log: Any, start_ns: int, end_ns: int, journal: Condition = JOURNAL) -> dict[str, Any]:
+    query = Report(start_ns, end_ns, CRITERIA, journal)
     found: dict[str, Any] = orjson.loads(answered_by(log, query))
     return found
 
@@ -62,6 +62,22 @@ def test_readings_of_an_attempt_that_failed_are_in_it_as_in_charts_and_alarms(
     (sensor,) = found["sensors"]
     assert (sensor["n"], sensor["high"]["value"]) == (2, 40.0)
     assert (found["counts"]["scans"], found["counts"]["failed"]) == (1, 1)
+
+
+def test_that_nothing_was_scanned_is_said_only_as_far_as_the_log_is_complete(
+    living: Living,
+) -> None:
+    scans = [scan(at_ns=BEGUN + at * MINUTE, temperature=21.0) for at in range(10)]
+    with living([("rows", scans)]) as life:
+        for complete_ns, silences, stops in (
+            (BEGUN + 12 * MINUTE, [], []),
+            (END - MINUTE, [END - MINUTE], ["stopped"]),
+            (END, [END], ["stopped"]),
+        ):
+            journal = replace(JOURNAL, complete_ns=complete_ns)
+            found = report(life.connection, BEGUN, END, journal)
+            assert [ns(it["to"]) for it in found["silences"]] == silences
+            assert [it["reason"]["kind"] for it in found["alarms"]] == stops
 
 
 def test_alarms_of_a_tag_that_has_had_hundreds_are_all_counted(living: Living) -> None:

@@ -14,7 +14,7 @@ from lupin_msgs.msg import Observation as ObservationMsg
 from rclpy.serialization import deserialize_message, serialize_message
 
 from lupin_twin.core import history, ingest
-from lupin_twin.core.ingest import ReceivedInspection, ReceivedReading
+from lupin_twin.core.ingest import ReceivedReading
 from lupin_twin.core.state import (
     NANOSECONDS_PER_SECOND,
     STATUS_OK,
@@ -110,28 +110,6 @@ def test_a_tag_reading_is_heard_field_by_field() -> None:
     assert heard.stamp_ns == 4 * S
     pose = Pose(1.0, 2.0, 0.0, 0.0, 0.0, 0.0, 1.0)
     assert heard.part == ReceivedReading("1", 3 * S, (Reading("co2", 1.0),), pose)
-
-
-def test_a_look_is_heard_field_by_field() -> None:
-    msg = messages.look(
-        "1", "rose", at=(1.0, 2.0), anomaly=True, flower_count=4, bug_count=2,
-        blooms=[(0.5, 0.5)], footprint=[(0.0, 0.0), (1.0, 0.0)], stamp_s=3.0,
-        frame_id="odom", pose_frame_id="map",
-    )  # fmt: skip
-    heard = convert.received(msg)
-    assert (heard.kind, heard.status, heard.frame_id, heard.stamp_ns) == (1, 0, "odom", 3 * S)
-    flower = Flower(
-        species="rose",
-        confidence=0.9,
-        anomaly=True,
-        flower_count=4,
-        bug_count=2,
-        blooms=(Bloom(0.5, 0.5, 0.0, 0.4, "rose", 0.8, anomaly=False),),
-        footprint=((0.0, 0.0, 0.0), (1.0, 0.0, 0.0)),
-    )
-    assert heard.part == ReceivedInspection(
-        "1", "map", flower, Pose(1.0, 2.0, 0.0, 0.0, 0.0, 0.0, 1.0)
-    )
 
 
 def test_the_kinds_and_the_status_are_the_messages() -> None:

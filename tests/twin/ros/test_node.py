@@ -4,12 +4,10 @@ import math
 from collections.abc import Iterator
 from typing import Any
 
-import pytest
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 
-from tests.support import messages
 from tests.support.domains import own_domain
-from tests.support.messages import discovered, look, scan
+from tests.support.messages import scan
 from tests.support.processes import OFTEN, Process, twin_node
 from tests.support.ros import Peer, clock_at
 
@@ -42,12 +40,6 @@ def running_twin(*ros_args: str) -> Iterator[Twin]:
     with own_domain() as domain, twin_node(domain, *ros_args) as process, Peer(domain) as peer:
         peer.wait_for_twin()
         yield Twin(process, peer)
-
-
-@pytest.fixture(scope="module")
-def shared() -> Iterator[Twin]:
-    """One twin for many tests, each with tags of its own."""
-    yield from running_twin(*OFTEN)
 
 
 # --- the state ----------------------------------------------------------------------------------
@@ -101,68 +93,6 @@ def test_fifty_observations_latched_before_the_twin_started_are_all_heard(domain
             state = producer.state(lambda s: len(s.tags) >= 50, "all 50 tags")
     assert [tag.tag_id for tag in state.tags] == [f"t{i}" for i in range(50)]
     assert [tag.readings[0].value for tag in state.tags] == [400.0 + i for i in range(50)]
-
-
-# --- ingestion, rule by rule --------------------------------------------------------------------
-
-
-def test_a_scan_brings_readings_time_and_pose(shared: Twin) -> None:
-    shared.peer.observe(scan("a1", {"temperature": 21.5, "humidity": 60.0}, at=(1.0, 2.0)))
-    tag = shared.peer.tag("a1")
-    assert {r.name: r.value for r in tag.readings} == {"temperature": 21.5, "humidity": 60.0}
-    assert (tag.pose.position.x, tag.pose.position.y, tag.pose.orientation.w) == (1.0, 2.0, 1.0)
-    assert tag.last_observed.sec > 0
-    assert 0.0 <= tag.stale_seconds < 60.0
-
-
-def test_scan_before_discovery_keeps_the_scans_pose_or_takes_the_discoverys(shared: Twin) -> None:
-    shared.peer.observe(scan("a5", {"co2": 1.0}, at=(1, 2)), scan("a6", {"co2": 2.0}))
-    assert shared.peer.tag("a6").pose.orientation.w == 0.0
-    shared.peer.discover(discovered({"a5": messages.pose(3, 3), "a6": messages.pose(4, 4)}))
-    tag = shared.peer.tag("a6", lambda t: t.pose.orientation.w != 0.0)
-    assert (tag.pose.position.x, tag.readings[0].value) == (4.0, 2.0)
-    assert shared.peer.tag("a5").pose.position.x == 1.0
-
-
-def test_flower_results_are_latest_wins_and_a_clean_look_clears_a_pest(shared: Twin) -> None:
-    shared.peer.observe(
-        scan("d1", {"co2": 420.0}),
-        look("d1", "rose", anomaly=True, bug_count=3, flower_count=2, blooms=[(1, 1), (2, 2)]),
-    )
-    tag = shared.peer.tag("d1", lambda t: t.anomaly)
-    assert (tag.bug_count, tag.flower_count, len(tag.flowers)) == (3, 2, 2)
-    shared.peer.observe(look("d1", "lupin", footprint=[(0, 0), (1, 0), (1, 1)]))
-    tag = shared.peer.tag("d1", lambda t: not t.anomaly)
-    assert (tag.species, tag.bug_count, tag.flower_count, len(tag.flowers)) == ("lupin", 0, 0, 0)
-    assert len(tag.box_footprint.points) == 3
-    assert tag.readings[0].value == 420.0
-
-
-# --- the field ----------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize(
-    ("change", "named"),
-    [
-        ({"sensor_type": ""}, "sensor_type"),
-        ({"resolution": math.nan}, "resolution"),
-        ({"resolution": 1e-9, "bbox_max_x": 1000.0, "bbox_max_y": 1000.0}, "1000000"),
-    ],
-)
-def test_a_bad_request_is_refused_with_everything_else_zeroed(
-    shared: Twin, change: dict[str, Any], named: str
-) -> None:
-    request = {"sensor_type": "co2", "resolution": 0.5, "bbox_max_x": 1.0, "bbox_max_y": 1.0}
-    response = shared.peer.get_field(**(request | change))
-    assert not response.ok
-    assert named in response.error_message
-    rest = {
-        name: getattr(response, name)
-        for name in response.get_fields_and_field_types()
-        if name not in ("ok", "error_message", "values")
-    }
-    assert rest == dict.fromkeys(rest, 0)
-    assert len(response.values) == 0
 
 
 # --- time ---------------------------------------------------------------------------------------

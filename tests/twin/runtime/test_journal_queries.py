@@ -14,7 +14,7 @@ from lupin_twin.core.journal_condition import Condition, JournalState
 from lupin_twin.core.past import NotRemembered
 from lupin_twin.runtime.journal_queries import Recall
 from lupin_twin.runtime.workers import ShouldStop
-from tests.support.journal import kept, recording, scan, wait_state
+from tests.support.journal import kept, recording, scan, select, wait_state
 from tests.support.waiting import PATIENCE_S, wait_for
 
 # Counts for longer than any test waits.
@@ -71,10 +71,12 @@ def test_a_question_sees_one_moment(path: Path) -> None:
 
     def twice(connection: sqlite3.Connection, should_stop: ShouldStop) -> tuple[int, int]:
         before = count(connection, should_stop)
-        kept(path, [scan(at_ns=2)])
+        journal.write(scan(at_ns=2))
+        written = "SELECT count(*) FROM scan"
+        wait_for(lambda: select(path, written) == [(2,)], "the row")
         return before, count(connection, should_stop)
 
-    with recalling(path) as recall:
+    with recording(path) as journal, recalling(path) as recall:
         assert recall.query(twice).result(PATIENCE_S) == (1, 1)
         assert answer(recall) == 2
 

@@ -11,7 +11,7 @@ import { differenceShown } from '../../domain/trend';
 import { store, useApp } from '../../store/app';
 import { useSelected } from '../../store/create';
 import { hourAgo, shortHourText } from '../../store/hourAgo';
-import { rosNow } from '../../store/moment';
+import { rosNow, selectHasTime } from '../../store/moment';
 import { S } from '../../strings';
 import { useTicking } from '../../widgets/useNow';
 import { HealthMark } from '../HealthMark';
@@ -119,7 +119,10 @@ function NotKnown({
   state: Extract<Now, { kind: 'unknown' }>;
 }): JSX.Element {
   const speech = useApp(selectSpeech);
-  const text = useTicking((at) => unknownText(alarm, speech, state, ageSeconds(state.lastAt, at)));
+  const hasTime = useApp(selectHasTime);
+  const text = useTicking((at) =>
+    unknownText(alarm, speech, state, hasTime ? ageSeconds(state.lastAt, at) : null),
+  );
   return (
     <span data-fact="now" data-status="unknown" title={text}>
       {text}

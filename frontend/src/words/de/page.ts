@@ -71,6 +71,8 @@ export const PAGE: In<typeof ENGLISH> = {
   unreadLast: (why) => `Die letzte: ${why}`,
   paused: 'Die Zeit ist angehalten.',
   pausedHint: 'Simulation oder Aufzeichnung sind angehalten; die Messwerte altern nicht.',
+  mixture:
+    'Mehr als ein Zwilling sendet. Die Seite zeigt ein Gemisch: Bitte alle bis auf einen beenden.',
   inputProblem: 'Nicht alle Daten kommen hier an.',
   drops: (count) =>
     `Der Zwilling hat in den letzten Minuten ${counted(count, 'Nachricht', 'Nachrichten')} verworfen.`,

@@ -70,6 +70,7 @@ export const PAGE = {
   unreadLast: (why: string): string => `The last: ${why}`,
   paused: 'Time is paused.',
   pausedHint: 'The simulation or recording is paused, so ages do not increase.',
+  mixture: 'More than one twin sends data. The page shows a mixture of them: stop all but one.',
   inputProblem: 'Not all data arrives here.',
   drops: (count: number): string =>
     `The twin dropped ${counted(count, 'message', 'messages')} in the last few minutes.`,

@@ -69,6 +69,7 @@ export const PAGE: In<typeof ENGLISH> = {
   unreadLast: (why) => `El último: ${why}`,
   paused: 'El tiempo está en pausa.',
   pausedHint: 'La simulación o la grabación está en pausa; la antigüedad no aumenta.',
+  mixture: 'Más de un gemelo envía datos. La página muestra una mezcla: detenga todos menos uno.',
   inputProblem: 'No llegan todos los datos.',
   drops: (count) =>
     `El gemelo ha descartado ${counted(count, 'mensaje', 'mensajes')} en los últimos minutos.`,

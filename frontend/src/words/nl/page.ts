@@ -73,6 +73,7 @@ export const PAGE: In<typeof ENGLISH> = {
   unreadLast: (why) => `Het laatste: ${why}`,
   paused: 'De tijd staat stil.',
   pausedHint: 'De simulatie of opname is gepauzeerd; de meetwaarden worden niet ouder.',
+  mixture: 'Er zendt meer dan één digital twin. De pagina toont een mengsel: stop alle op één na.',
   inputProblem: 'Niet alle gegevens komen hier aan.',
   drops: (count) =>
     `De digital twin heeft de afgelopen minuten ${counted(count, 'bericht', 'berichten')} niet verwerkt.`,

@@ -304,9 +304,9 @@ class Journal(Contract):
 
 
 class Outward(Contract):
-    """How a channel of notifications does: MQTT, the webhook."""
+    """How a channel of notifications does: MQTT, the webhook, phones."""
 
-    channel: Literal["mqtt", "webhook"]
+    channel: Literal["mqtt", "webhook", "push"]
     is_failing: bool
     detail: str = Field(description="what is wrong, for a person to read; empty: nothing")
 

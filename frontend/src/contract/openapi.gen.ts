@@ -183,7 +183,7 @@ export interface components {
         };
         readonly Outward: {
             /** @enum {string} */
-            readonly channel: "mqtt" | "webhook";
+            readonly channel: "mqtt" | "webhook" | "push";
             readonly is_failing: boolean;
             readonly detail: string;
         };

@@ -153,6 +153,7 @@ test('a damaged journal that was set aside is told by its name', () => {
 test.each([
   ['mqtt', 'Home automation (MQTT) receives no updates. '],
   ['webhook', 'The webhook receives no alarms. '],
+  ['push', 'Phones receive no alarms. '],
   ['constructor', 'constructor receives no updates. '],
 ])('that %s does not reach its receiver is told until it does', (channel, title) => {
   render(<Troubles />);

@@ -109,6 +109,7 @@ export const PAGE: In<typeof ENGLISH> = {
   outward: {
     mqtt: 'Die Hausautomation (MQTT) empfängt keine Daten.',
     webhook: 'Der Webhook empfängt keine Alarme.',
+    push: 'Handys erhalten keine Alarme.',
   },
   outwardOther: (channel) => `${channel} empfängt keine Daten.`,
   outwardHint: 'Der Server versucht es weiter. Diese Seite ist nicht betroffen.',

@@ -109,6 +109,7 @@ export const PAGE = {
   outward: {
     mqtt: 'Home automation (MQTT) receives no updates.',
     webhook: 'The webhook receives no alarms.',
+    push: 'Phones receive no alarms.',
   },
   outwardOther: (channel: string): string => `${channel} receives no updates.`,
   outwardHint: 'The server keeps trying. This page is not affected.',

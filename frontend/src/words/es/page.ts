@@ -106,6 +106,7 @@ export const PAGE: In<typeof ENGLISH> = {
   outward: {
     mqtt: 'La domótica (MQTT) no recibe datos.',
     webhook: 'El webhook no recibe alarmas.',
+    push: 'Los teléfonos no reciben alarmas.',
   },
   outwardOther: (channel) => `${channel} no recibe datos.`,
   outwardHint: 'El servidor lo sigue intentando. Esta página no se ve afectada.',

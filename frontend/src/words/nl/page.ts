@@ -110,6 +110,7 @@ export const PAGE: In<typeof ENGLISH> = {
   outward: {
     mqtt: 'De domotica (MQTT) ontvangt geen gegevens.',
     webhook: 'De webhook ontvangt geen alarmen.',
+    push: 'Telefoons ontvangen geen alarmen.',
   },
   outwardOther: (channel) => `${channel} ontvangt geen gegevens.`,
   outwardHint: 'De server blijft het proberen. Deze pagina heeft er geen last van.',

@@ -36,6 +36,7 @@ window.house = {};
   const tags = Array.from({ length: COUNT }, (_, index) => tag(index, 18 + index % 12));
   const status = { type: 'status', twin: 'live', reason: 'live', message: '',
                    state_age_seconds: 0, has_map: false, origin: 'robot', drops: [],
+                   twin_count: 1,
                    input_problems: [], day_length_s: 86400,
                    journal: { state: "recording", detail: "", set_aside: "", simulated: null },
                    outward: [] };

@@ -80,6 +80,7 @@ window.network = { frames: 0, fetches: 0 };
         this.onopen?.();
         this.say({ type: 'status', twin: 'live', reason: 'live', message: '',
                    state_age_seconds: 0, has_map: true, origin: 'robot',
+                   twin_count: 1,
                    input_problems: [], day_length_s: 86400, drops: [], outward: [],
                    journal: { state: 'recording', detail: 'recording', set_aside: '',
                               simulated: null } });

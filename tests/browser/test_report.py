@@ -39,9 +39,9 @@ def troubled(browser: Browser) -> Iterator[Bridge]:  # begun before the page
             if number % 20 == 0:  # no queue has room for all
                 wait_for(partial(has_tags, running, number), "tags")
         wait_for(lambda: counts(running)["raised"] == len(TAGS), "the alarms in the report")
-        # A report ends with a whole second, and a page may be quick.
-        end_s = math.floor(time.time()) + 1
-        wait_for(lambda: time.time() >= end_s, "the second to be over")
+        # A report ends with a whole second, of a page whose newest state may be a second old.
+        end_s = math.floor(time.time()) + 2
+        wait_for(lambda: time.time() >= end_s, "the seconds to be over")
         yield running
 
 

@@ -117,9 +117,10 @@ check: setup ## quick checks: lint, types, and every test that needs neither ROS
 	@$(MAKE) --no-print-directory -j 2 --output-sync=target quick lint types hmi-test LINT=lint:changed
 	$(say) 'quick checks passed; `make test` is the whole'
 
+# Four workers here too: they wait for threads and timers.
 quick: setup ## Python tests that need neither ROS nor a browser
 	$(say) 'Python tests without ROS and browser'
-	@$(TEST_ENV) $(BIN)/pytest -q -n 2 --dist worksteal -r fE --quick tests
+	@$(TEST_ENV) $(BIN)/pytest -q -n 4 --dist worksteal -r fE --quick tests
 
 test: setup $(DONE)/tools $(DONE)/test_msgs/built ## all checks: lint, types, guide, unit tests, real ROS, browser
 	@$(MAKE) --no-print-directory -j 2 --output-sync=target lint types docs hmi-test collect

@@ -47,3 +47,21 @@ async def test_a_twin_whose_clock_stops_is_silent_since_its_last_time() -> None:
         assert (silent.reason.kind, silent.raised_at_ns) == ("silent", 7)
         stage.script.tell(state(9))
         await until(lambda: not stage.bridge.alarms.now.page.active, "its end")
+
+
+async def test_a_clock_that_goes_back_withdraws_the_silences_of_what_has_not_been_yet() -> None:
+    async with Stage() as stage:
+        board = stage.bridge.alarms
+
+        def raised_ns() -> list[int]:
+            return [alarm.raised_at_ns for alarm in board.now.alarms]
+
+        for last, back in ((7, 9), (3, None)):
+            stage.script.tell(state(last))
+            stopped = replace(state(last).snapshot, clock="stopped")
+            stage.script.tell(replace(state(last), snapshot=stopped))
+            await until(lambda: board.now.page.active, "its alarm")
+            if back is not None:
+                stage.script.tell(state(back))
+                await until(lambda: not board.now.page.active, "its end")
+        assert raised_ns() == [3]

@@ -114,7 +114,9 @@ class AlarmFeed:
     def on_state(self, update: TwinUpdate) -> None:
         """The twin has a new state; costs nothing where that and the journal are as before."""
         before, now = self._seen, update.snapshot
-        self._last_ns = self._last_ns if now.now_ns is None else now.now_ns
+        if now.now_ns is not None:
+            self._last_ns = now.now_ns
+            self._withdraw_silences_after(now.now_ns)
         is_new = before is None or before.tags != now.tags
         is_kept = update.journal.state not in _NOT_RECORDED
         if is_kept == (self._origin == "heard"):
@@ -153,6 +155,13 @@ class AlarmFeed:
             over_ns = max(last_ns, open_now.raised_at_ns)
             self._silences[-1] = replace(open_now, cleared_at_ns=over_ns)
         self._wake.set()
+
+    def _withdraw_silences_after(self, now_ns: int) -> None:
+        """Where the clock has gone back, those were not yet."""
+        been = [alarm for alarm in self._silences if alarm.raised_at_ns <= now_ns]
+        if been != self._silences:
+            self._silences = been
+            self._wake.set()
 
     # --- following -------------------------------------------------------------------------------
 
@@ -267,7 +276,7 @@ class AlarmFeed:
             await self._publish_silence(0.0)
             return
         moment_ns, since_ns = now_ns, max(0, now_ns - self._reach_ns)
-        beside = tuple(alarm for alarm in self._silences if alarm.raised_at_ns <= moment_ns)
+        beside = tuple(self._silences)
 
         def find(_: object) -> tuple[Page, Change, Found]:
             found = follower.found(moment_ns, since_ns)

@@ -162,6 +162,8 @@ class RosThread(Generic[NodeT, EventT]):
     async def call(self, work: Callable[[NodeT], ResultT]) -> ResultT:
         """Run `work(node)` in the ROS thread, between two callbacks, and return its result.
 
+        It is not begun any more once nobody waits for it.
+
         Raises:
             TwinUnavailableError: the thread has ended.
             Exception: whatever `work` raised.
@@ -172,6 +174,8 @@ class RosThread(Generic[NodeT, EventT]):
         result: asyncio.Future[ResultT] = self._loop.create_future()
 
         def run() -> None:
+            if result.cancelled():
+                return
             try:
                 value = work(self.require_node())
             except Exception as error:  # noqa: BLE001  # handed to the caller
@@ -214,8 +218,6 @@ class RosThread(Generic[NodeT, EventT]):
 
         def begin(node: NodeT) -> None:
             nonlocal future
-            if result.cancelled():
-                return
             future = start(node)
             future.add_done_callback(
                 lambda done: self.to_loop(

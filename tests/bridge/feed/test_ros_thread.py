@@ -89,15 +89,19 @@ async def test_what_a_call_raises_is_its_callers_and_not_the_nodes(domain: int) 
 
 async def test_a_caller_that_leaves_is_not_missed(domain: int) -> None:
     async with Stage() as stage:
-        gate = threading.Event()
+        gate, begun = threading.Event(), list[Probe]()
         held = asyncio.create_task(stage.ros.call(lambda _: gate.wait(20.0)))
         await until(lambda: stage.ros.calls_waiting == 1, "the call to be waiting")
-        held.cancel()
-        with pytest.raises(asyncio.CancelledError):
-            await held
+        behind = asyncio.create_task(stage.ros.call(begun.append))
+        await until(lambda: stage.ros.calls_waiting == 2, "another behind it")
+        for left in (held, behind):
+            left.cancel()
+            with pytest.raises(asyncio.CancelledError):
+                await left
         gate.set()
         assert await stage.ros.call(lambda _: "next") == "next"
         assert stage.ros.calls_waiting == 0
+        assert not begun, "nobody waits for it"
 
 
 async def test_before_the_start_and_after_the_end_there_is_nobody_to_call(domain: int) -> None:

@@ -276,4 +276,14 @@ def test_a_report_serves_for_a_while_and_what_is_wrong_is_said_once(
     assert len(searches) == 3, "it serves for half a minute"
     assert service.state() == Estimates({"co2": report().fit_problem}, (), 1)
     assert reported == [f"no new model of co2: {report().fit_problem}"]
+    searches.clear()
+    left, waits = [service.report(ReportRequest(name)) for name in ("a", "b", "c")][1:]
+    left.cancel()
+
+    def has_come() -> bool:
+        queue.deliver()
+        return waits.done()
+
+    wait_for(has_come, "a report")
+    assert searches == ["a", "c"], "who has left takes nobody's time"
     workers.close()

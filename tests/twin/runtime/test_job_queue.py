@@ -75,6 +75,22 @@ def test_what_cannot_be_looked_up_is_answered_and_holds_up_nobody(made: Stage) -
     assert made.queue.waiting == 0
 
 
+def test_what_nobody_waits_for_any_more_is_not_begun_and_takes_no_place(made: Stage) -> None:
+    are_there = True
+    first = made.ask(cost_s=LARGE_S)
+    for _ in range(MAX_QUERIES - 1):
+        made.queue.ask(
+            Query(pytest.fail, made.answers.append, str, LARGE_S, is_wanted=lambda: are_there)
+        )
+    are_there = False
+    after = made.ask(cost_s=LARGE_S)
+    first.set_result(1)
+    assert made.delivered() == "1"
+    after.set_result(2)
+    assert made.delivered() == "2"
+    assert made.begun == [first, after]
+
+
 def test_an_answer_that_cannot_be_sent_holds_up_nobody(made: Stage) -> None:
     def reply(answer: str) -> None:
         raise RuntimeError(answer)

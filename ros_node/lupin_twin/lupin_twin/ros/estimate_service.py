@@ -122,7 +122,8 @@ class EstimateService:
             else:
                 answer.set_result(report)
 
-        self.queue.ask(self._query(request, reply, lambda report: report))
+        query = self._query(request, reply, lambda report: report)
+        self.queue.ask(replace(query, is_wanted=lambda: not answer.cancelled()))
         return answer
 
     def _query(

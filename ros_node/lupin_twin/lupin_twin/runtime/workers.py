@@ -211,13 +211,15 @@ class Query:
     """What is looked up, what is made of the result, and who gets it.
 
     `look_up` begins the search; `make`, if there is one, is called on a worker with its result, as
-    `cost_s` estimates, s of one core. `reply` gets the answer, or the exception.
+    `cost_s` estimates, s of one core. `reply` gets the answer, or the exception. What is no longer
+    wanted when its turn comes is dropped.
     """
 
     look_up: Callable[[], Future[Any]]
     reply: Callable[[Any], None]
     make: Callable[[Any], Any] | None = None
     cost_s: float = 0.0
+    is_wanted: Callable[[], bool] = lambda: True
 
 
 class JobQueue:
@@ -261,6 +263,7 @@ class JobQueue:
 
         """
         lane = self._lane(query)
+        lane.waiting = deque(it for it in lane.waiting if it.query.is_wanted())
         if lane.count >= MAX_QUERIES:
             raise NotRemembered(
                 f"{MAX_QUERIES} requests wait, which is the limit", is_lasting=False
@@ -302,9 +305,11 @@ class JobQueue:
             now_s = self._clock()
             if self._is_behind() and now_s - lane.begun_s < PACE_S:
                 return
-            lane.begun_s = now_s
-            lane.under_way += 1
-            self._look_up(lane.waiting.popleft())
+            waiting = lane.waiting.popleft()
+            if waiting.query.is_wanted():
+                lane.begun_s = now_s
+                lane.under_way += 1
+                self._look_up(waiting)
 
     def _look_up(self, waiting: _Waiting) -> None:
         query = waiting.query

@@ -94,13 +94,20 @@ def test_the_clock_never_starts_runs_is_paused_stops_and_runs_again(
         twin.peer.observe(scan("1", {"co2": 2.0}, stamp_s=float(seconds)))
         until(lambda live=live: reason(live) == (503, "clock_stopped"), "a clock that stopped")  # type: ignore[misc]
         until(lambda live=live: age(live) is None, "no age")  # type: ignore[misc]
+        until(lambda live=live: is_called_silent(live), "the alarm of that")  # type: ignore[misc]
 
     for live in both:
         until(lambda live=live: runs(live), "a clock that runs again")  # type: ignore[misc]
+        until(lambda live=live: runs(live) and not is_called_silent(live), "its end")  # type: ignore[misc]
     for live in both:
         goes_back_while_the_past_is_asked(twin, live, seconds - 100 * (1 + both.index(live)))
     assert "nothing comes on /clock" in twin.process.output
     assert twin.json("/healthz")["callback_errors"] == 0
+
+
+def is_called_silent(live: Bridge) -> bool:
+    active = live.json("/api/alarms?active=1")["alarms"]
+    return "silent" in [alarm["reason"]["kind"] for alarm in active]
 
 
 def goes_back_while_the_past_is_asked(twin: Bridge, live: Bridge, seconds: int) -> None:

@@ -18,6 +18,7 @@ import logging
 import re
 import sys
 from collections.abc import Iterator
+from contextlib import suppress
 from typing import Any, Final, cast
 
 import h11
@@ -217,7 +218,8 @@ class HttpConnection(H11Protocol):
         # Closed at once, with more of the client's still on its way, the connection would be
         # reset, and the answer lost.
         if self.transport.can_write_eof():
-            self.transport.write_eof()
+            with suppress(OSError):  # the client has left, and nobody has read that yet
+                self.transport.write_eof()
         self.loop.call_later(CLOSE_GRACE_S, self.transport.close)
         self._wait_for_request()
 

@@ -188,7 +188,11 @@ def test_a_stop_amid_a_sign_in_is_no_error(tmp_path: Path) -> None:
     asks += b"Content-Type: application/json\r\nContent-Length: %d\r\n\r\n" % len(body) + body
     with bridge("--accounts", str(path)) as running, raw_http.connect(running.url) as client:
         client.sendall(asks)
-        running.get("/healthz")  # and it is read
+        with raw_http.connect(running.url) as gone:
+            for _ in range(2):  # behind an answer that is awaited no more is read, nor the end
+                gone.sendall(asks)
+                running.get("/healthz")
+        running.get("/healthz")  # and all is read
         assert running.process.stop(signal.SIGTERM) == 0
         assert raw_http.status(raw_http.heard(client)) == 503
         assert "ERROR" not in running.process.output

@@ -5,6 +5,8 @@ from dataclasses import replace
 from tests.bridge.test_bridge import Stage, state
 from tests.support.waiting import until
 
+SECOND = 1_000_000_000
+
 
 async def test_while_the_twin_is_silent_its_status_comes_again_and_again() -> None:
     now_s = 100.0
@@ -56,7 +58,7 @@ async def test_a_clock_that_goes_back_withdraws_the_silences_of_what_has_not_bee
         def raised_ns() -> list[int]:
             return [alarm.raised_at_ns for alarm in board.now.alarms]
 
-        for last, back in ((7, 9), (3, None)):
+        for last, back in ((7 * SECOND, 9 * SECOND), (3 * SECOND, None)):
             stage.script.tell(state(last))
             stopped = replace(state(last).snapshot, clock="stopped")
             stage.script.tell(replace(state(last), snapshot=stopped))
@@ -64,4 +66,4 @@ async def test_a_clock_that_goes_back_withdraws_the_silences_of_what_has_not_bee
             if back is not None:
                 stage.script.tell(state(back))
                 await until(lambda: not board.now.page.active, "its end")
-        assert raised_ns() == [3]
+        assert raised_ns() == [3 * SECOND]

@@ -114,9 +114,8 @@ class AlarmFeed:
     def on_state(self, update: TwinUpdate) -> None:
         """The twin has a new state; costs nothing where that and the journal are as before."""
         before, now = self._seen, update.snapshot
-        if now.now_ns is not None:
-            self._last_ns = now.now_ns
-            self._withdraw_silences_after(now.now_ns)
+        self._last_ns = self._last_ns if now.now_ns is None else now.now_ns
+        self._withdraw_silences()
         is_new = before is None or before.tags != now.tags
         is_kept = update.journal.state not in _NOT_RECORDED
         if is_kept == (self._origin == "heard"):
@@ -156,9 +155,10 @@ class AlarmFeed:
             self._silences[-1] = replace(open_now, cleared_at_ns=over_ns)
         self._wake.set()
 
-    def _withdraw_silences_after(self, now_ns: int) -> None:
-        """Where the clock has gone back, those were not yet."""
-        been = [alarm for alarm in self._silences if alarm.raised_at_ns <= now_ns]
+    def _withdraw_silences(self) -> None:
+        """Where the clock has gone back, those that are yet to come."""
+        now_ns = self._now_ns()
+        been = [it for it in self._silences if now_ns is None or it.raised_at_ns <= now_ns]
         if been != self._silences:
             self._silences = been
             self._wake.set()

@@ -245,3 +245,20 @@ def test_without_a_journal_states_tell_and_a_silent_twin_is_one_alarm_of_the_hou
         assert (over.id, over.cleared_at_ns) == (silent.id, NOW)
 
     follow(test)
+
+
+def test_a_state_as_of_when_a_site_was_heard_last_withdraws_no_silence_since() -> None:
+    async def test(feed: AlarmFeed, board: AlarmBoard, source: Journal) -> None:
+        source.writes_now = [pest(1, 2)]
+        feed.on_state(told(1))
+        await changed(board)
+        feed.on_silence(is_silent=True, last_ns=NOW - 5)
+        await changed(board)
+        heard = replace(told(1).snapshot, stamp_ns=NOW - 10)
+        feed.on_state(replace(told(1), snapshot=heard))
+        feed.on_silence(is_silent=False, last_ns=NOW)
+        await changed(board)
+        over = next(alarm for alarm in board.now.alarms if not alarm.tag_id)
+        assert (over.reason.kind, over.cleared_at_ns) == ("silent", NOW)
+
+    follow(test)

@@ -54,7 +54,7 @@ import {
 } from '../store/derived';
 import { memoLast, memoOne } from '../domain/memo';
 import { selectShown, selectTag, selectTags } from '../store/moment';
-import type { MapPicture } from '../store/picture';
+import type { MapPicture } from '../geometry/image';
 
 export interface Canvases {
   readonly still: HTMLCanvasElement;

@@ -23,10 +23,9 @@ import {
 import { filterRows, inAreas, rowsOf, sortRows, type Row } from '../domain/table';
 import type { Tag } from '../domain/twin';
 import type { AppState } from './app';
-import type { Source } from './heat';
 import { memoLast, memoOne } from '../domain/memo';
 import { isHeardNow, selectIsHeard, selectNewest, selectShown, selectTags } from './moment';
-import type { MapPicture } from './picture';
+import type { MapPicture } from '../geometry/image';
 import type { Difference } from './twin';
 import { isColumnShown } from './settings';
 import { fixedRange, type Sort, type ViewState } from './view';
@@ -57,6 +56,9 @@ export function selectCatalogue(state: AppState): Catalogue {
 /** The one in view. */
 export const selectSensor = (state: AppState): Sensor =>
   selectCatalogue(state).named(state.view.sensor);
+
+/** What the heat map is made of: the estimate and its error come in one. */
+export type Source = 'nearest' | 'estimate';
 
 /** What is computed has no estimate: the twin estimates what tags read. */
 export const sourceOf = (state: AppState): Source =>

@@ -5,11 +5,10 @@
 import { now } from '../clock';
 import { differenceOf, otherMoment, type Compare } from '../domain/difference';
 import type { Snapshot } from '../domain/twin';
-import { boundsOf, type Bounds } from '../geometry/coordinates';
+import type { Bounds } from '../geometry/coordinates';
 import { onChange, receive, store, type AppState } from './app';
 import { sourceOf } from './derived';
-import { fetchHeat } from './heat';
-import { ASSUMED_MARGIN_M, fieldResolution } from './loaders';
+import { ASSUMED_MARGIN_M, boundsOfPins, fetchHeat, fieldResolution } from './heat';
 import { rosNow, selectNewest, selectShown } from './moment';
 import { createFetcher, DRAG_PACE_MS, NOTHING, type Wish } from './fetcher';
 import { type Difference } from './twin';
@@ -103,7 +102,7 @@ function wishFor(state: AppState, compare: Compare): Wish<Difference> | null {
 
 /** Around all pins, in whole cells: both fields lie on the same ones. */
 function boxOf(snapshot: Snapshot | null, resolution: number): Bounds | null {
-  const bounds = boundsOf((snapshot?.tags ?? []).flatMap((tag) => (tag.at ? [tag.at] : [])));
+  const bounds = boundsOfPins(snapshot);
   if (!bounds) return null;
   const down = (metres: number): number => round(Math.floor(metres / resolution) * resolution);
   const up = (metres: number): number => round(Math.ceil(metres / resolution) * resolution);

@@ -1,13 +1,12 @@
 /** Fetches what the frames do not carry, whenever the twin's revision says that it changed. */
 import { fetchQuality, Refusal } from '../contract/api';
 import type { Field, FieldQuality } from '../contract/types';
-import { resolutionFor } from '../domain/field';
 import type { Snapshot } from '../domain/twin';
-import { boundsOf, type Bounds } from '../geometry/coordinates';
-import { loadMap, type MapPicture } from './picture';
+import type { MapPicture } from '../geometry/image';
+import { loadMap } from './picture';
 import { onChange, receive, store, type AppState } from './app';
-import { sourceOf } from './derived';
-import { fetchHeat, type Source } from './heat';
+import { sourceOf, type Source } from './derived';
+import { boundsOfPins, fetchHeat, fieldResolution } from './heat';
 import { selectNewest } from './moment';
 import { createFetcher, NOTHING, type Wish } from './fetcher';
 
@@ -17,12 +16,6 @@ const ESTIMATE_INTERVAL_MS = 1_000;
 const ESTIMATE_TICK_MS = 10_000;
 const MAP_INTERVAL_MS = 1_000;
 const QUALITY_INTERVAL_MS = 3_000;
-/** The server's box is that of the pinned tags widened by its max_distance_m. */
-export const ASSUMED_MARGIN_M = 1.5;
-/** Finer cells than this cannot be told apart on a screen, and cost the Wi-Fi. */
-const MAX_CELLS = 60_000;
-/** As the server has it, where no tag has a place. */
-const DEFAULT_RESOLUTION_M = 0.1;
 
 export function startLoaders(): () => void {
   const field = createFetcher<Field>({
@@ -141,22 +134,4 @@ function fieldTask(
     ...(isEstimate ? { paceMs: ESTIMATE_INTERVAL_MS } : {}),
     run: (signal) => fetchHeat(source, { sensor, resolution }, signal),
   };
-}
-
-const boundsOfPins = (snapshot: Snapshot | null): Bounds | null =>
-  boundsOf((snapshot?.tags ?? []).flatMap((tag) => (tag.at ? [tag.at] : [])));
-
-/** The side of a cell, in metres, for the field of a house as large as this one. */
-export function fieldResolution(snapshot: Snapshot | null): number {
-  const bounds = boundsOfPins(snapshot);
-  if (!bounds) return DEFAULT_RESOLUTION_M;
-  return resolutionFor(
-    {
-      minX: bounds.minX - ASSUMED_MARGIN_M,
-      minY: bounds.minY - ASSUMED_MARGIN_M,
-      maxX: bounds.maxX + ASSUMED_MARGIN_M,
-      maxY: bounds.maxY + ASSUMED_MARGIN_M,
-    },
-    MAX_CELLS,
-  );
 }

@@ -1,15 +1,6 @@
 import { fetchMap, fetchMapPicture } from '../contract/api';
 import type { OccupancyGrid } from '../contract/types';
-import type { MapPoint } from '../geometry/coordinates';
-import { mapPlacement, opaqueBox, pixelBoxCorners, type Placement } from '../geometry/image';
-
-/** The SLAM map, decoded. */
-export interface MapPicture {
-  readonly placement: Placement;
-  readonly pixels: ImageData;
-  /** Corners of the box around what is known of the map; empty while nothing is. */
-  readonly known: readonly MapPoint[];
-}
+import { mapPlacement, opaqueBox, pixelBoxCorners, type MapPicture } from '../geometry/image';
 
 /**
  * Fetches the map's place and its picture. The map may grow between the two requests; a picture

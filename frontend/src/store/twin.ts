@@ -14,7 +14,7 @@ import { heldRange, type Range } from '../domain/ramp';
 import type { Timeline } from '../domain/timeline';
 import { snapshotOf, type Snapshot } from '../domain/twin';
 import { NOTHING, type Fetched } from './fetcher';
-import type { MapPicture } from './picture';
+import type { MapPicture } from '../geometry/image';
 
 /** The greenhouse as it was or is at one moment, and what is fetched about that moment. */
 export interface House {

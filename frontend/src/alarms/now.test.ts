@@ -1,7 +1,7 @@
 import { expect, test } from 'vitest';
 
 import type { HealthReason } from '../contract/types';
-import type { TagThen } from '../domain/trend';
+import type { TagThen } from '../domain/difference';
 import { alarm } from '../testing/alarms';
 import { reason } from '../testing/health';
 import { readings, tag } from '../testing/tags';

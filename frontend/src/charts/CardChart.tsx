@@ -3,15 +3,18 @@ import { useMemo, useRef, type JSX } from 'react';
 import { act, useApp } from '../store/app';
 import { selectCatalogue, selectCatalogues } from '../store/derived';
 import { S } from '../strings';
-import { Icon } from '../widgets/Icon';
-import { modelOf, pairsOf } from './charted';
-import { MarksKey } from './MarksKey';
-import { PlotView } from './PlotView';
-import { SensorChoice } from './SensorChoice';
-import { useLines } from './useLines';
-import { chosenSensor, useChosenSensor, useSensorsOf, useSpeciesOf } from './useSensorsOf';
-import { pointsFor, useSize } from './useSize';
-import { ChartState } from './ChartState';
+import { Icon } from '../widgets/controls';
+import { modelOf, pairsOf } from './model';
+import { ChartState, MarksKey, PlotView, SensorChoice } from './PlotView';
+import {
+  chosenSensor,
+  pointsFor,
+  useChosenSensor,
+  useLines,
+  useSensorsOf,
+  useSize,
+  useSpeciesOf,
+} from './useLines';
 
 const HEIGHT = 172;
 

@@ -8,7 +8,7 @@ import { showTags } from '../testing/page';
 import { sensorNamed } from '../testing/sensors';
 import { seriesWith } from '../testing/series';
 import { timelineWith } from '../testing/timeline';
-import { LineValue } from './LineValue';
+import { LineValue } from './PlotView';
 
 test.each([
   ['temperature_24h_mean', 4_680, 'Needs 24 h of readings; 1\u00a0h 18\u00a0min so far'],

@@ -1,7 +1,7 @@
 import { render, screen } from '@testing-library/react';
 import { expect, test } from 'vitest';
 
-import { MarksKey } from './MarksKey';
+import { MarksKey } from './PlotView';
 
 test('says what the marks are, and how many; where there are none, nothing', () => {
   const mark = { at: 1, widthS: 0, count: 2 } as const;

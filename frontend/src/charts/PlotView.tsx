@@ -1,22 +1,41 @@
 import 'uplot/dist/uPlot.min.css';
 import '../styles/charts.css';
 
-import { useEffect, useLayoutEffect, useRef, useState, type CSSProperties, type JSX } from 'react';
+import {
+  type CSSProperties,
+  type JSX,
+  useEffect,
+  useLayoutEffect,
+  useMemo,
+  useRef,
+  useState,
+} from 'react';
 
+import { ageText, rangeText, readingText } from '../domain/format';
 import { rgbText, sensorColour } from '../domain/ramp';
-import { rosText } from '../domain/rostime';
+import { isHad, isOfDay, type Sensor, type TemperatureUnit, unitOf } from '../domain/sensors';
+import {
+  type Bucket,
+  lastUntil,
+  type Mark,
+  pointAt,
+  type Reading,
+  type Series,
+  summaryOf,
+} from '../domain/series';
 import { shown } from '../domain/text';
-import { unitOf } from '../domain/units';
+import { rosText, type Span } from '../domain/time';
 import { CommentMarks } from '../notes/CommentMarks';
-import { act } from '../store/app';
-import { useSelected } from '../store/create';
-import { pointedBy, pointedTime } from '../store/signals';
+import { act, useApp } from '../store/app';
+import { pointedBy, pointedTime, useSelected } from '../store/create';
+import { selectCatalogue } from '../store/derived';
 import { onThemeChange } from '../store/theme';
 import { S } from '../strings';
-import { LineValue, useTold } from './LineValue';
-import type { PlotModel } from './model';
+import { More, Select } from '../widgets/controls';
+import { isStroked, lookOf, markerPath } from './layers';
+import type { Line, PlotModel } from './model';
 import { createPlot, type Plot } from './plot';
-import { plotText } from './told';
+import { type Asked, useSensorsOf } from './useLines';
 import { zoomTo } from './zoom';
 
 /** One chart. `isAlone`: its one line has the sensor's colour, and no list beside it that says its value. */
@@ -103,4 +122,195 @@ export function PlotView({
       />
     </section>
   );
+}
+
+const DAY_S = 86_400;
+
+/** The time that charts tell of: under the mouse, else the moment that the page shows; null: newest. */
+export function useTold(): { at: number | null; isPointed: boolean } {
+  const pointed = useSelected(pointedTime, (it) => it?.at ?? null);
+  // Beside a house of the past, the newest value would pass for one of then.
+  const moment = useApp((state) => state.view.moment);
+  return { at: pointed ?? moment, isPointed: pointed !== null };
+}
+
+/** What a line says at that time, how far it ranges there, and what it was the day before. */
+export function LineValue({
+  line,
+  model: { sensor, unit, span },
+}: {
+  line: Line;
+  model: PlotModel;
+}): JSX.Element {
+  const { at, isPointed } = useTold();
+  const point = (isPointed ? pointAt : lastUntil)(line.series, at ?? Infinity);
+  const value = valueOf(point);
+  const was = valueOf(beforeAt(line, at));
+  const reach = useApp((state) => state.twin.remembered.value?.reach);
+  if (value === null && isOfDay(sensor)) {
+    const known = reach ? Math.max(0, (at ?? span.to) - reach.from) : 0;
+    return <span className="faint">{S.chartNeedsDay(known < DAY_S ? ageText(known) : null)}</span>;
+  }
+  return (
+    <span className="line-value">
+      {point && 'mean' in point && point.n > 1 && (
+        <span className="faint">{S.chartColumns.mean} </span>
+      )}
+      <strong>{value === null ? S.noValue : readingText(sensor, value, unit)}</strong>
+      {point && 'mean' in point && point.n > 1 && (
+        <span className="faint">
+          {' '}
+          {rangeText(sensor, { low: point.min, high: point.max }, unit)}
+        </span>
+      )}
+      {line.before && (
+        <span className="faint">
+          {' '}
+          {S.chartBeforeWas(was === null ? S.noValue : readingText(sensor, was, unit))}
+        </span>
+      )}
+    </span>
+  );
+}
+
+const valueOf = (point: Reading | Bucket | null): number | null =>
+  !point ? null : 'mean' in point ? point.mean : point.value;
+
+/** The day before, at a moment or when the line's newest was read. */
+function beforeAt({ series, before }: Line, at: number | null): Reading | Bucket | null {
+  const newest = lastUntil(series, Infinity);
+  if (!before || !newest) return null;
+  return pointAt(before, at ?? ('at' in newest ? newest.at : newest.start));
+}
+
+/** A piece of the line with its marker. */
+export function LineSign({ look: index }: { look: number }): JSX.Element {
+  const { colour, dash, marker } = lookOf(index);
+  return (
+    <svg
+      className="line-sign"
+      viewBox="0 0 30 12"
+      width={30}
+      height={12}
+      aria-hidden="true"
+      style={{ color: `var(--chart-${colour + 1})` }}
+    >
+      <path d="M0 6H30" strokeDasharray={dash.join(' ')} />
+      <path d={markerPath(marker, 15, 6, 7)} className={isStroked(marker) ? 'stroked' : 'filled'} />
+    </svg>
+  );
+}
+
+/** What the marks below the lines are, and how many of each; nothing where there are none. */
+export function MarksKey({ marks }: { marks: readonly Mark[] }): JSX.Element | null {
+  const count = (kind: Mark['kind']): number =>
+    marks.reduce((sum, mark) => sum + (mark.kind === kind ? mark.count : 0), 0);
+  const [looks, failures] = [count('look'), count('failure')];
+  if (looks + failures === 0) return null;
+  return (
+    <p className="marks-key" data-testid="marks-key">
+      {looks > 0 && (
+        <span data-mark="look">
+          <span aria-hidden="true">○</span> {S.chartLooks(looks)}
+        </span>
+      )}
+      {failures > 0 && (
+        <span data-mark="failure">
+          <span aria-hidden="true">✕</span> {S.chartFailures(failures)}
+        </span>
+      )}
+    </p>
+  );
+}
+
+/** Why there is no chart (yet), in plain words. */
+export function ChartState({
+  asked: { state, message, span },
+  hasLines,
+  lacks,
+}: {
+  asked: Asked;
+  hasLines: boolean;
+  /** What there is nothing of to chart; null: there is something. */
+  lacks: string | null;
+}): JSX.Element | null {
+  if (state === 'missing') {
+    return (
+      <div className="chart-state" role="status" data-state="missing">
+        <strong>{S.chartMissing}</strong>
+        <p>{S.chartMissingHint}</p>
+        <More label={S.more} text={S.chartMissingMore} />
+        {message && <p className="faint">{shown(message, 300)}</p>}
+      </div>
+    );
+  }
+  const text =
+    lacks ??
+    (span === null
+      ? S.chartNoTime
+      : state === 'failed'
+        ? S.chartFailed(shown(message, 300))
+        : state === 'waiting' && !hasLines
+          ? S.chartLoading
+          : null);
+  if (text === null) return null;
+  return (
+    <div className="chart-state" role="status" data-state={state}>
+      {text}
+    </div>
+  );
+}
+
+/** Which sensor of a tag is charted; what is computed of its sensors is among them. */
+export function SensorChoice({
+  tagId,
+  value,
+  onChange,
+}: {
+  tagId: string;
+  value: string;
+  onChange: (sensor: string) => void;
+}): JSX.Element {
+  const sensors = useSensorsOf(tagId);
+  const catalogue = useApp(selectCatalogue);
+  const choices = useMemo(() => {
+    const computed = catalogue.all.filter((sensor) =>
+      isHad(sensor, (name) => sensors.includes(name)),
+    );
+    return [...new Set([...sensors, ...computed.map(({ name }) => name)])];
+  }, [catalogue, sensors]);
+  return (
+    <Select
+      aria-label={S.sensors}
+      value={value}
+      options={choices}
+      text={(name) => shown(catalogue.named(name).label, 32)}
+      onChange={onChange}
+    />
+  );
+}
+
+/** Charts in words. */
+
+export const spanText = ({ from, to }: Span): string => S.chartSpan(rosText(from), rosText(to));
+
+/** The latest, the least and the most, and how often nothing came. */
+export function seriesText(series: Series, sensor: Sensor, unit: TemperatureUnit): string {
+  const { count, latest, min, max, gaps } = summaryOf(series);
+  if (!latest || min === null || max === null) return S.chartEmpty;
+  const value = (of: number): string => readingText(sensor, of, unit);
+  return S.chartSummary(
+    count,
+    value(latest.value),
+    rosText(latest.at),
+    value(min),
+    value(max),
+    gaps,
+  );
+}
+
+/** What a canvas shows, for those who do not see it. */
+export function plotText({ sensor, unit, lines, span }: PlotModel): string {
+  const each = lines.map(({ series, label }) => `${label}: ${seriesText(series, sensor, unit)}`);
+  return `${S.chartOf(shown(sensor.label, 32))}, ${spanText(span)}. ${each.join(' ')}`;
 }

@@ -5,7 +5,7 @@ import { act, store } from '../store/app';
 import { showTags } from '../testing/page';
 import { readings, wireTag } from '../testing/tags';
 import CardChart from './CardChart';
-import { SensorChoice } from './SensorChoice';
+import { SensorChoice } from './PlotView';
 
 const choices = (): string[] => screen.getAllByRole('option').map((option) => option.textContent);
 

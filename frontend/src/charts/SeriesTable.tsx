@@ -1,14 +1,45 @@
-import type { JSX } from 'react';
+import { type JSX, useState } from 'react';
 
 import { ageText, readingText } from '../domain/format';
-import { rosText } from '../domain/rostime';
-import type { Sensor } from '../domain/sensors';
+import type { Sensor, TemperatureUnit } from '../domain/sensors';
 import { rowsOfSeries, type SeriesRow } from '../domain/series';
 import { shown } from '../domain/text';
-import type { TemperatureUnit } from '../domain/units';
+import { rosText } from '../domain/time';
 import { S } from '../strings';
+import { Select } from '../widgets/controls';
+import { spanText } from './PlotView';
 import type { Line, PlotModel } from './model';
-import { spanText } from './told';
+
+/** The table of one line, and the choice among them. */
+export function ChartTables({ models }: { models: readonly PlotModel[] }): JSX.Element | null {
+  const lines = models.flatMap((model) =>
+    model.lines.map((line) => ({
+      model,
+      line,
+      key: `${model.sensor.name}\u0000${line.series.tagId}`,
+      label: `${line.label}, ${shown(model.sensor.label, 32)}`,
+    })),
+  );
+  const [chosen, setChosen] = useState('');
+  const current = lines.find(({ key }) => key === chosen) ?? lines[0];
+  if (!current) return null;
+  return (
+    <>
+      {lines.length > 1 && (
+        <label className="chart-which">
+          <span>{S.chartWhich}</span>
+          <Select
+            value={current.key}
+            options={lines.map(({ key }) => key)}
+            text={(key) => lines.find((line) => line.key === key)?.label ?? ''}
+            onChange={setChosen}
+          />
+        </label>
+      )}
+      <SeriesTable line={current.line} model={current.model} />
+    </>
+  );
+}
 
 /** The same as a line of a chart, for the keyboard and for screen readers; the newest row first. */
 export function SeriesTable({ line, model }: { line: Line; model: PlotModel }): JSX.Element {

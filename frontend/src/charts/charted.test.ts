@@ -3,8 +3,7 @@ import { expect, test } from 'vitest';
 import { CATALOGUE, FILE } from '../testing/sensors';
 import { cataloguesOf } from '../domain/sensors';
 import { seriesWith } from '../testing/series';
-import { modelOf } from './charted';
-import { pairKey } from './lines';
+import { modelOf, pairKey } from './model';
 
 test('the band is that of the plants, and of several kinds there is none', () => {
   const plan = { sensor: 'temperature', tagIds: ['1', '2'] };

@@ -1,14 +1,19 @@
 /** One chart on the page: uPlot with the layers of `layers.ts`, told what to show and how large. */
 import uPlot from 'uplot';
 
-import type { Span } from '../domain/period';
-import { hasDate } from '../domain/rostime';
-import { timeTicks, type Tick } from '../domain/ticks';
+import { hasDate, type Span } from '../domain/time';
+import { timeTicks, type Tick } from '../domain/timeline';
 import { LOCALE } from '../strings';
-import { drawAbove, drawBelow, drawMarks, MARKS_LANE, type Frame } from './layers';
-import { lookOf } from './looks';
+import {
+  drawAbove,
+  drawBelow,
+  drawMarks,
+  type Frame,
+  lookOf,
+  MARKS_LANE,
+  readPalette,
+} from './layers';
 import { aligned, drawnOf, hasMarks, valueRange, type PlotModel } from './model';
-import { readPalette } from './palette';
 
 export interface PlotHandlers {
   /** The time that the mouse is on, ROS seconds; null: on none. */

@@ -5,7 +5,7 @@ import { act, receive } from '../store/app';
 import { goLive, goLost, showTags, status } from '../testing/page';
 import { stateFrame, wireTag } from '../testing/tags';
 import { wireTime } from '../testing/timeline';
-import { pairKey } from './lines';
+import { pairKey } from './model';
 import { useLines, type Asked } from './useLines';
 
 const pair = { tagId: '1', sensor: 'co2' };

@@ -1,6 +1,6 @@
 import { expect, test } from 'vitest';
 
-import { backoffMs, TRY_AGAIN_LATER } from './backoff';
+import { backoffMs, TRY_AGAIN_LATER } from './machine';
 
 test('doubles with each failure up to 15 s', () => {
   const longest = [1, 2, 3, 4, 5, 6, 50].map((failures) => backoffMs(failures, 1, null));

@@ -3,7 +3,7 @@ import { describe, expect, test } from 'vitest';
 import type { DeltaFrame } from '../contract/types';
 import { NOBODY } from '../testing/health';
 import { stateFrame, wireTag } from '../testing/tags';
-import { latestAfter } from './latest';
+import { latestAfter } from '../contract/frames';
 
 const a = wireTag({
   tag_id: 'a',

@@ -1,6 +1,5 @@
 /** The routes of the estimate: a field with its error, and what the twin says of how good it is. */
-import { fieldParameters, get, numberIn, read, type FieldQuery } from './api';
-import { npyOf } from './npy';
+import { fieldParameters, type FieldQuery, get, npyOf, numberIn, read } from './api';
 import type { Expected, Grade, Place } from './types';
 
 /** As the server sends it; whatever a cell's error is, its mean is told. */

@@ -1,6 +1,6 @@
 import { describe, expect, test } from 'vitest';
 
-import { npyOf, parseNpy } from './npy';
+import { npyOf, parseNpy } from './api';
 
 function npy(header: string, values: readonly number[], version = 1): ArrayBuffer {
   const prefix = version === 1 ? 10 : 12;

@@ -1,6 +1,6 @@
 /** The routes of the past: how it was at a moment, and what happened when. Times are ROS seconds. */
 import { get, read } from './api';
-import { filledHealth, filledTag } from './filled';
+import { filledHealth, filledTag } from './frames';
 import type { Latest, Timeline } from './types';
 
 /** Stamps are exact to the nanosecond, and a moment that is asked for to the millisecond. */

@@ -1,6 +1,6 @@
 /** The bridge's routes for people: who is signed in, and what they say. */
 import { ask, get, read } from './api';
-import type { Session } from './types';
+import type { Note, Session } from './types';
 
 /** A header of our own: no form and no picture of another page can send one. */
 export const OWN = { 'X-Lupin-Twin': '1' };
@@ -39,4 +39,16 @@ export async function withdrawNote(kind: Draft['kind'], subject: string): Promis
   if (note) {
     await ask(`api/notes/${encodeURIComponent(note.id)}`, { method: 'DELETE', headers: OWN });
   }
+}
+
+/** What people said in free words: the bridge's notes of the kind `comment`. */
+
+/** The newest first, withdrawn ones too. */
+export async function fetchComments(signal: AbortSignal): Promise<readonly Note[]> {
+  const response = await get('api/notes?kind=comment', signal);
+  return (await read('Notes', response)).notes;
+}
+
+export async function withdrawComment(id: string): Promise<void> {
+  await ask(`api/notes/${encodeURIComponent(id)}`, { method: 'DELETE', headers: OWN });
 }

@@ -1,6 +1,6 @@
 import { describe, expect, test } from 'vitest';
 
-import { ageSeconds, freshness } from './age';
+import { ageSeconds, freshness } from './time';
 
 describe('age', () => {
   test('is the time since the observation', () => {

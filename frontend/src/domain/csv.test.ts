@@ -1,6 +1,6 @@
 import { expect, test } from 'vitest';
 
-import { csv } from './csv';
+import { csv } from './text';
 
 const line = (cell: string | number | null): string => csv([[cell]]).slice(1, -2);
 

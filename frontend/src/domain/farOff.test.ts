@@ -2,7 +2,7 @@ import { describe, expect, test } from 'vitest';
 
 import cases from '../../../tests/twin/core/far_off.json';
 import { mapPoint } from '../geometry/coordinates';
-import { holds, reachOf } from './farOff';
+import { holds, reachOf } from './twin';
 
 describe('the cases that the twin knows too', () => {
   test.each(Object.entries(cases))('%s', (_, { at, far }) => {

@@ -1,8 +1,8 @@
-import type { Range } from './ramp';
+import { Refusal } from '../contract/api';
 import type { MapPoint } from '../geometry/coordinates';
 import { LOCALE, S } from '../strings';
-import type { Sensor } from './sensors';
-import { differenceToShown, toShown, unitOf, type TemperatureUnit } from './units';
+import type { Range } from './ramp';
+import { differenceToShown, type Sensor, type TemperatureUnit, toShown, unitOf } from './sensors';
 
 /** What stands between the whole and the tenths where the reader lives. */
 const POINT =
@@ -130,3 +130,16 @@ export function metresText(value: number): string {
 /** Why a tag that was pinned there is not on the map. */
 export const farOffText = ({ x, y }: MapPoint): string =>
   S.farOffLong(S.position(metresText(x), metresText(y)));
+
+const TIMEOUT = 504;
+
+/** Why something could not be had: what may pass soon in the reader's language, else as it was said. */
+export function failureText(error: unknown): string {
+  // A server that is busy says when to ask again. Where no answer comes at all, `fetch` throws a TypeError.
+  const isPassing =
+    error instanceof Refusal
+      ? error.retryAfterS !== null || error.status === TIMEOUT
+      : error instanceof TypeError;
+  if (isPassing) return S.serverBusy;
+  return error instanceof Error ? error.message : String(error);
+}

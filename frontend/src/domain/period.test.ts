@@ -1,6 +1,6 @@
 import { expect, test } from 'vitest';
 
-import { endsNow, PERIOD_KINDS, spanOf } from './period';
+import { endsNow, PERIOD_KINDS, spanOf } from './time';
 
 const NOW = 1_794_000_000;
 

@@ -1,7 +1,7 @@
 import { describe, expect, test } from 'vitest';
 
 import { held, reason } from '../testing/health';
-import { reasonsText, reasonText, todoText } from './reasons';
+import { reasonsText, reasonText, todoText } from './health';
 import { S } from '../strings';
 import { CATALOGUE } from '../testing/sensors';
 

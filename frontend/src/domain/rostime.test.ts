@@ -1,6 +1,6 @@
 import { expect, test, vi } from 'vitest';
 
-import { hasDate, rosText, secondsOf, shortRosText } from './rostime';
+import { hasDate, rosText, secondsOf, shortRosText } from './time';
 
 // Half an hour off the full one, and set before any module looks at the clock.
 vi.hoisted(() => {

@@ -3,12 +3,10 @@
  * to show. All times are ROS seconds. Where the robot was away is a gap, and nothing bridges it.
  */
 import type { History, Timeline, WireTime } from '../contract/types';
-import { type Cell, csv } from './csv';
-import type { Span } from './period';
-import { hasDate, secondsOf } from './rostime';
-import type { Catalogue } from './sensors';
+import { type Cell, csv } from './text';
+import { hasDate, secondsOf, type Span } from './time';
+import { type Catalogue, type TemperatureUnit, toShown, unitOf } from './sensors';
 import { type Missing, missingOf } from './timeline';
-import { type TemperatureUnit, toShown, unitOf } from './units';
 
 export interface Reading {
   readonly at: number;

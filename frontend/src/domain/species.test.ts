@@ -1,6 +1,6 @@
 import { expect, test } from 'vitest';
 
-import { speciesLooks, speciesText } from './species';
+import { speciesLooks, speciesText } from './marks';
 
 test('each species has a look of its own, whatever the order of arrival', () => {
   const names = ['rose', 'tulip', 'orchid', 'gerbera', 'lupin'];

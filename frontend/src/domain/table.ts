@@ -1,16 +1,13 @@
 /** Rows of the table: what is in a column, how it sorts, what a filter finds. */
 import type { TagHealth, Verdict, WireTime } from '../contract/types';
 import { S } from '../strings';
-import { ageSeconds } from './age';
-import { csv, type Cell } from './csv';
-import { severity, type HouseHealth } from './health';
+import { ageSeconds } from './time';
+import { type Cell, csv, finder } from './text';
+import { type HouseHealth, reasonsText, severity, tryKind } from './health';
 import { memoLast, memoOne } from './memo';
-import { speciesText } from './species';
-import { reasonsText, tryKind } from './reasons';
-import type { Catalogue, Sensor } from './sensors';
-import { finder } from './text';
+import { speciesText } from './marks';
+import { type Catalogue, type Sensor, type TemperatureUnit, toShown, unitOf } from './sensors';
 import { compareIds, type Tag } from './twin';
-import { toShown, unitOf, type TemperatureUnit } from './units';
 
 export interface Row {
   readonly tag: Tag;

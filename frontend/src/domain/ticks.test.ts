@@ -1,6 +1,6 @@
 import { describe, expect, test, vi } from 'vitest';
 
-import { tickStep, timeTicks } from './ticks';
+import { tickStep, timeTicks } from './timeline';
 
 /** By the operator's clock, whatever zone the tests run in. */
 const local = (text: string): number => new Date(text).getTime() / 1000;

@@ -4,7 +4,7 @@ import type { HealthReason } from '../contract/types';
 import { judgement, reason } from '../testing/health';
 import { sensorNamed } from '../testing/sensors';
 import { tag } from '../testing/tags';
-import { differenceShown, trendOf, type TagThen } from './trend';
+import { differenceShown, trendOf, type TagThen } from './difference';
 
 const NOT_JUDGED = { verdict: 'unknown', reasons: [] } as const;
 

@@ -1,6 +1,6 @@
 import { expect, test } from 'vitest';
 
-import { differenceToShown, fromShown, toShown, unitOf } from './units';
+import { differenceToShown, fromShown, toShown, unitOf } from './sensors';
 import { sensorNamed } from '../testing/sensors';
 
 const temperature = sensorNamed('temperature');

@@ -4,12 +4,10 @@ import { mapPoint } from '../geometry/coordinates';
 import { judgement, reason } from '../testing/health';
 import { sensorNamed } from '../testing/sensors';
 import { readings, wireTag } from '../testing/tags';
-import { IDEAL_ALPHA, idealColour } from './ideal';
-import type { Shade } from './ramp';
-import { rangesFor } from './sensors';
-import { type Tag, tagOf } from './twin';
 import {
   cellsWhere,
+  IDEAL_ALPHA,
+  idealColour,
   idealShade,
   oldCells,
   rangesAt,
@@ -17,7 +15,10 @@ import {
   type Site,
   withOld,
   zonesOf,
-} from './zones';
+} from './ideal';
+import type { Shade } from './ramp';
+import { rangesFor } from './sensors';
+import { type Tag, tagOf } from './twin';
 
 const temperature = sensorNamed('temperature');
 const grid = { width: 40, height: 30, originX: -1, originY: 2, resolution: 0.1 };

@@ -1,7 +1,7 @@
 import { beforeEach, expect, test } from 'vitest';
 
 import { FakeContext } from '../testing/canvas';
-import { drawFooter, FOOTER_PX, type Footer } from './footer';
+import { drawFooter, FOOTER_PX, type Footer } from '../export/actions';
 
 const colours = { ink: 'black', surface: 'white' };
 const footer: Footer = {

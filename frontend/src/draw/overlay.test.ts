@@ -2,9 +2,8 @@ import { expect, test } from 'vitest';
 
 import { mapPoint } from '../geometry/coordinates';
 import { FakeContext } from '../testing/canvas';
-import { drawCrosshair, drawMark, drawPulses, PULSE_MS } from './overlay';
+import { drawCrosshair, drawMark, drawPulses, pinRadius, PULSE_MS } from './pins';
 import { LIGHT } from './palette';
-import { pinRadius } from './pins';
 
 const view = { x: 0, y: 100, scale: 50 };
 const set = (): { context: FakeContext; surface: Parameters<typeof drawPulses>[0] } => {

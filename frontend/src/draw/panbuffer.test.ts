@@ -1,8 +1,7 @@
 import { describe, expect, test, vi } from 'vitest';
 
 import { FakeContext } from '../testing/canvas';
-import { PanBuffer } from './panbuffer';
-import type { Surface } from './surface';
+import { PanBuffer, type Surface } from './surface';
 
 function setUp(): {
   draw: (x: number, y: number, scale?: number) => void;

@@ -1,6 +1,6 @@
 import { describe, expect, test } from 'vitest';
 
-import { GROWING } from '../domain/age';
+import { GROWING } from '../domain/time';
 import { houseHealth } from '../domain/health';
 import { judgement, NOBODY } from '../testing/health';
 import { readings, tag } from '../testing/tags';

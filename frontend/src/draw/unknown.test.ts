@@ -5,7 +5,7 @@ import { estimated, sureness } from '../testing/estimate';
 import { fieldWith } from '../testing/field';
 import { LIGHT } from './palette';
 import { canvasOfPixels, newCanvas } from './surface';
-import { drawEdges, drawUnsure, floorOf, Hatching, knownOf, unsureOf } from './unknown';
+import { drawEdges, drawUnsure, floorOf, Hatching, knownOf, unsureOf } from './still';
 
 const pixelsOf = (canvas: HTMLCanvasElement): number[] => {
   const [put] = FakeContext.recordOf(canvas)?.named('putImageData') ?? [];

@@ -5,7 +5,7 @@ import { snapshotOf } from '../domain/twin';
 import { mapPoint } from '../geometry/coordinates';
 import { judgement, reason } from '../testing/health';
 import { readings, stateFrame, wireTag } from '../testing/tags';
-import { NEAR_M, nearTo } from './EstimateReadout';
+import { NEAR_M, nearTo } from './parts';
 
 const tag = (id: string, x: number, over = {}): ReturnType<typeof wireTag> =>
   wireTag({

@@ -3,7 +3,7 @@ import { beforeEach, describe, expect, test, vi } from 'vitest';
 
 import type { Expected, Field, Grade, Place } from '../contract/types';
 import { mapPoint } from '../geometry/coordinates';
-import { pointedAt } from '../map/pointer';
+import { pointedAt } from '../map/commands';
 import { act, moveViewport, prefer, receive, store } from '../store/app';
 import { selectTag } from '../store/moment';
 import { bodies, estimated, expectedReading, grade } from '../testing/estimate';
@@ -12,9 +12,7 @@ import { goLive, showField, showTags } from '../testing/page';
 import { readings, wireTag } from '../testing/tags';
 import { Legend } from '../ui/Legend';
 import { Readout } from '../ui/Readout';
-import { CardEstimate } from './CardEstimate';
-import { AdviceMarks } from './AdviceMarks';
-import { EstimateFacts } from './EstimateFacts';
+import { AdviceMarks, CardEstimate, EstimateFacts } from './parts';
 
 let grades: Readonly<Record<string, Grade>>;
 let expected: Readonly<Record<string, Expected>>;

@@ -1,7 +1,7 @@
 import { expect, test } from 'vitest';
 
 import { CATALOGUES } from '../testing/sensors';
-import { errorText, estimateText } from './texts';
+import { errorText, estimateText } from './parts';
 
 const sensor = (name: string): ReturnType<typeof CATALOGUES.day.named> =>
   CATALOGUES.day.named(name);

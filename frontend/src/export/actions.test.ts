@@ -7,8 +7,7 @@ import { NO_HOUSE } from '../store/twin';
 import { FakeContext } from '../testing/canvas';
 import { showTags } from '../testing/page';
 import { readings, stateFrame, wireTag } from '../testing/tags';
-import { FOOTER_PX } from '../draw/footer';
-import { saveMap, saveTable } from './actions';
+import { FOOTER_PX, saveMap, saveTable } from './actions';
 import { fileName } from './save';
 
 // Half an hour off the full one, and set before any module looks at the clock.

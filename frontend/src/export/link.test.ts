@@ -3,7 +3,7 @@ import { expect, test, vi } from 'vitest';
 import { act, receive } from '../store/app';
 import { stateFrame, wireTag } from '../testing/tags';
 import { timelineWith } from '../testing/timeline';
-import { copyLink, reported, reportLink } from './link';
+import { copyLink, reported, reportLink } from './actions';
 
 test('without a clipboard copying says no instead of failing', async () => {
   expect(await copyLink()).toBe(false);

@@ -7,8 +7,7 @@ import { shown as shownText } from '../domain/text';
 import { LANGUAGE, S } from '../strings';
 import type { FleetWords } from '../words/fleet';
 import { VIEW_WORDS } from '../words/fleetViews';
-import { namesOf, type Site, type Time } from './sites';
-import { ms, timeText } from './times';
+import { ms, namesOf, type Site, type Time, timeText } from './sites';
 import { useAnswer } from './useAnswer';
 
 const W = VIEW_WORDS[LANGUAGE];

@@ -1,5 +1,7 @@
 /** What the server says of all sites, and in which order and choice it is shown. Pure. */
+import { timeOfDay } from '../clock';
 import type { Verdict } from '../contract/types';
+import { LOCALE } from '../strings';
 
 export interface Time {
   readonly sec: number;
@@ -173,3 +175,20 @@ export function chosen(sites: Sites, filter: Filter, search: string, group = '')
     )
     .sort(worstFirst);
 }
+
+/** Moments as the page over all greenhouses writes them. */
+
+const clockTime = new Intl.DateTimeFormat(LOCALE, { timeStyle: 'medium' });
+const dateAndTime = new Intl.DateTimeFormat(LOCALE, { dateStyle: 'medium', timeStyle: 'short' });
+const DAY_MS = 86_400_000;
+
+/** Of today the time of day is enough. */
+export function timeText(at: number): string {
+  return (Math.abs(timeOfDay() - at) < DAY_MS / 2 ? clockTime : dateAndTime).format(at);
+}
+
+export const ms = ({ sec, nanosec }: Time): number => sec * 1000 + nanosec / 1e6;
+
+/** When that was, so many seconds ago, to the second. */
+export const silentAt = (lagS: number): number =>
+  Math.round((timeOfDay() - lagS * 1000) / 1000) * 1000;

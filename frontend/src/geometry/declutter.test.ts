@@ -1,6 +1,6 @@
 import { describe, expect, test } from 'vitest';
 
-import { placeLabels, type LabelRequest, type PlacedLabel } from './declutter';
+import { placeLabels, type LabelRequest, type PlacedLabel } from './clear';
 
 const HEIGHT = 18;
 

@@ -1,6 +1,6 @@
 import { describe, expect, test } from 'vitest';
 
-import { gridStep, lengthText, niceFloor, scaleBar } from './scale';
+import { gridStep, lengthText, niceFloor, scaleBar } from './coordinates';
 
 test.each([
   [1, 1],

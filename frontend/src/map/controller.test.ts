@@ -6,10 +6,9 @@ import { NOTHING } from '../store/fetcher';
 import { FakeContext } from '../testing/canvas';
 import { showField, showTags } from '../testing/page';
 import { readings, stateFrame, wireTag } from '../testing/tags';
-import { commandMap } from './commands';
+import { commandMap, pinUnderMouse, pointedAt } from './commands';
 import { runMap } from './controller';
 import { startGestures } from './gestures';
-import { pinUnderMouse, pointedAt } from './pointer';
 
 let element: HTMLElement;
 let still: HTMLCanvasElement;

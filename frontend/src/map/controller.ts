@@ -1,7 +1,6 @@
 /** Ties the map's canvases to the store: draws what changed, once a frame, and nothing else. */
 import { now } from '../clock';
-import { PULSE_MS, type Pulse } from '../draw/overlay';
-import { pinRadius } from '../draw/pins';
+import { pinRadius, type Pulse, PULSE_MS } from '../draw/pins';
 import type { Pin } from '../draw/scene';
 import type { Box } from '../geometry/clear';
 import {
@@ -18,12 +17,10 @@ import { selectHeat, selectListed, selectRange, selectSensor } from '../store/de
 import { memoOne } from '../domain/memo';
 import { selectNewest, selectShown, selectTag, type Shown } from '../store/moment';
 import { isPrinting } from '../store/theme';
-import { MapCamera } from './camera';
-import { keyCommand, onMapCommand, type MapCommand } from './commands';
-import { contentOf, coveredBoxes, together, watchCovered, type Content } from './content';
+import { type Content, contentOf, coveredBoxes, MapCamera, together, watchCovered } from './camera';
+import { keyCommand, type MapCommand, onMapCommand, pinUnderMouse, pointedAt } from './commands';
 import { Painter, type Canvases } from './painter';
 import { onPaletteChange, paletteInUse } from './palette';
-import { pinUnderMouse, pointedAt } from './pointer';
 
 /** A finger hits a pin from this far, a mouse from a bit less; CSS pixels. */
 const TOUCH_REACH = 26;

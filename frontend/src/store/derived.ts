@@ -11,7 +11,7 @@ import {
   type Site,
   type Zones,
   zonesOf,
-} from '../domain/zones';
+} from '../domain/ideal';
 import {
   isMeasured,
   NO_CATALOGUES,

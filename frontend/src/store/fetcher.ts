@@ -4,7 +4,7 @@
  */
 import { now } from '../clock';
 import { Refusal } from '../contract/api';
-import { failureText } from '../domain/failure';
+import { failureText } from '../domain/format';
 
 /** While somebody drags: a dozen starts a second, which a server of this kind allows. */
 export const DRAG_PACE_MS = 80;

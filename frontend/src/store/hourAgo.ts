@@ -3,14 +3,13 @@ import { now } from '../clock';
 import { fetchStateAt } from '../contract/past';
 import type { TagHealth } from '../contract/types';
 import { intervalText } from '../domain/format';
-import { secondsOf } from '../domain/rostime';
-import { sameReading, type TagThen } from '../domain/trend';
+import { secondsOf } from '../domain/time';
+import { sameReading, type TagThen } from '../domain/difference';
 import { snapshotOf, type Tag } from '../domain/twin';
 import { store, type AppState } from './app';
 import { createStore } from './create';
 import { createFetcher } from './fetcher';
-import { rosNow, selectNewest, selectShown, selectSnapshot } from './moment';
-import { selectDayS } from './origin';
+import { rosNow, selectDayS, selectNewest, selectShown, selectSnapshot } from './moment';
 import { isColumnShown } from './settings';
 
 /** An hour of the greenhouse's day, seconds of the twin's time: a demo's day is a short one. */

@@ -2,7 +2,7 @@ import { afterEach, beforeEach, describe, expect, test, vi } from 'vitest';
 
 import { now } from '../clock';
 import type { Frame } from '../contract/types';
-import { ageSeconds } from '../domain/age';
+import { ageSeconds } from '../domain/time';
 import { alarm, alarms } from '../testing/alarms';
 import { status } from '../testing/page';
 import { NOBODY } from '../testing/health';

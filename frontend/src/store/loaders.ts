@@ -1,14 +1,15 @@
 /** Fetches what the frames do not carry, whenever the twin's revision says that it changed. */
-import { fetchQuality, Refusal } from '../contract/api';
-import type { Field, FieldQuality } from '../contract/types';
+import { fetchMap, fetchMapPicture, fetchQuality, fetchSensors, Refusal } from '../contract/api';
+import type { Field, FieldQuality, OccupancyGrid, SensorsFile } from '../contract/types';
+import { cataloguesOf } from '../domain/sensors';
 import type { Snapshot } from '../domain/twin';
-import type { MapPicture } from '../geometry/image';
-import { loadMap } from './picture';
-import { onChange, receive, store, type AppState } from './app';
-import { sourceOf, type Source } from './derived';
+import { type MapPicture, mapPlacement, opaqueBox, pixelBoxCorners } from '../geometry/image';
+import { act, type AppState, onChange, receive, store } from './app';
+import { type Source, sourceOf } from './derived';
+import { createFetcher, NOTHING, type Wish } from './fetcher';
 import { boundsOfPins, fetchHeat, fieldResolution } from './heat';
 import { selectNewest } from './moment';
-import { createFetcher, NOTHING, type Wish } from './fetcher';
+import { DEFAULT_VIEW } from './view';
 
 const FIELD_INTERVAL_MS = 500;
 /** An estimate costs the twin more, and goes on by itself: what nobody reads becomes less sure. */
@@ -134,4 +135,79 @@ function fieldTask(
     ...(isEstimate ? { paceMs: ESTIMATE_INTERVAL_MS } : {}),
     run: (signal) => fetchHeat(source, { sensor, resolution }, signal),
   };
+}
+
+/** Fetches the file of sensors: at once, and again on each new connection, behind which may be another. */
+
+const INTERVAL_MS = 500;
+
+export function startSensors(): () => void {
+  let known = '';
+  const sensors = createFetcher<SensorsFile>({
+    paceMs: INTERVAL_MS,
+    onValue: (file) => {
+      const text = JSON.stringify(file);
+      // The browser asks with its ETag, and mostly is told that it has it: nothing follows then.
+      if (text === known) return;
+      known = text;
+      const value = cataloguesOf(file);
+      receive({ type: 'sensors', sensors: { value, state: 'ready', message: '' } });
+      // A file without what the page opens with: then the first that it has.
+      const [first] = value.day.all;
+      const { sensor } = store.get().view;
+      const isChosen = sensor !== DEFAULT_VIEW.sensor || sensor in file.sensors;
+      if (first && !isChosen) act({ type: 'sensor', sensor: first.name });
+    },
+    onError: (message) => {
+      // What was in force before goes on: a bridge that is away has no other ranges.
+      if (known === '') {
+        receive({ type: 'sensors', sensors: { value: null, state: 'failed', message } });
+      }
+    },
+  });
+  const update = (): void => {
+    // The first connection is made while this is fetched, and to the same bridge.
+    const epoch = Math.max(1, store.get().twin.connection.epoch);
+    sensors.want({ key: String(epoch), group: 'sensors', run: fetchSensors });
+  };
+  update();
+  const stop = store.subscribe(update);
+  return () => {
+    stop();
+    sensors.want(null);
+  };
+}
+
+/**
+ * Fetches the map's place and its picture. The map may grow between the two requests; a picture
+ * of another size than announced is an error, and the caller tries again.
+ */
+export async function loadMap(signal: AbortSignal): Promise<MapPicture> {
+  const [grid, blob] = await Promise.all([fetchMap(signal), fetchMapPicture(signal)]);
+  const bitmap = await createImageBitmap(blob);
+  try {
+    return decode(grid, bitmap);
+  } finally {
+    bitmap.close();
+  }
+}
+
+function decode(grid: OccupancyGrid, bitmap: ImageBitmap): MapPicture {
+  const { width, height } = bitmap;
+  const placement = mapPlacement(grid);
+  if (width !== placement.width || height !== placement.height) {
+    throw new Error(
+      `map: the picture is ${width} x ${height}, announced were ` +
+        `${placement.width} x ${placement.height}`,
+    );
+  }
+  const canvas = document.createElement('canvas');
+  canvas.width = width;
+  canvas.height = height;
+  const context = canvas.getContext('2d', { willReadFrequently: true });
+  if (!context) throw new Error('map: this browser has no 2d canvas');
+  context.drawImage(bitmap, 0, 0);
+  const pixels = context.getImageData(0, 0, width, height);
+  const box = opaqueBox(pixels.data, width, height);
+  return { placement, pixels, known: box ? pixelBoxCorners(placement, box) : [] };
 }

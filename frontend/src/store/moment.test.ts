@@ -3,7 +3,7 @@ import { join } from 'node:path';
 
 import { beforeEach, describe, expect, test } from 'vitest';
 
-import { ageSeconds } from '../domain/age';
+import { ageSeconds } from '../domain/time';
 import { snapshotOf } from '../domain/twin';
 import { goLive, showTags, status } from '../testing/page';
 import { judgement, reason } from '../testing/health';

@@ -4,7 +4,7 @@ import { timelineOf } from '../domain/timeline';
 import { wireStretch, wireTimeline } from '../testing/timeline';
 import { act, receive, store } from './app';
 import { startOpening } from './remembered';
-import { fromFragment, toFragment } from './permalink';
+import { fromFragment, toFragment } from './address';
 import { NOT_ASKED } from './twin';
 import { DEFAULT_VIEW } from './view';
 

@@ -1,6 +1,6 @@
 import { describe, expect, test } from 'vitest';
 
-import { fromFragment, toFragment, type Linked } from './permalink';
+import { fromFragment, toFragment, type Linked } from './address';
 import { DEFAULT_LAYERS, DEFAULT_VIEW, LONGEST_FILTER } from './view';
 
 describe('permalink', () => {

@@ -2,7 +2,7 @@
 import { now } from '../clock';
 import { Refusal } from '../contract/api';
 import { fetchTimeline } from '../contract/past';
-import { endsNow, type Period, type Span, spanOf } from '../domain/period';
+import { endsNow, type Period, type Span, spanOf } from '../domain/time';
 import { timelineOf } from '../domain/timeline';
 import { act, onChange, receive, store } from './app';
 import { createFetcher } from './fetcher';

@@ -6,7 +6,7 @@ import { judgement } from '../testing/health';
 import { wireTag } from '../testing/tags';
 import { act, receive, store } from './app';
 import { selectCatalogue, selectHeat, selectSensor, selectSensors } from './derived';
-import { startSensors } from './sensors';
+import { startSensors } from './loaders';
 import { NOTHING } from './fetcher';
 
 const answer = vi.fn<() => Promise<Response>>();

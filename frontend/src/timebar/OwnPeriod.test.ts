@@ -1,6 +1,6 @@
 import { expect, test, vi } from 'vitest';
 
-import { fieldOf, momentOf } from './OwnPeriod';
+import { fieldOf, momentOf } from './TimeBar';
 
 // Half an hour off the full one, and set before any module looks at the clock.
 vi.hoisted(() => {

@@ -3,7 +3,7 @@ import { beforeEach, describe, expect, test, vi } from 'vitest';
 
 import { timelineOf } from '../domain/timeline';
 import { act, receive, store } from '../store/app';
-import { pointedTime } from '../store/signals';
+import { pointedTime } from '../store/create';
 import { NO_HOUSE, NO_TWIN } from '../store/twin';
 import { goLive, goLost, showTags, status } from '../testing/page';
 import { stateFrame, wireTag } from '../testing/tags';

@@ -2,8 +2,7 @@ import { expect, test } from 'vitest';
 
 import type { Happened } from '../domain/timeline';
 import { timelineWith } from '../testing/timeline';
-import type { Axis } from './axis';
-import { beforeMemory, columnAt, columnsOf, runStarts, stretchesOf } from './columns';
+import { type Axis, beforeMemory, columnAt, columnsOf, runStarts, stretchesOf } from './axis';
 
 const AXIS: Axis = { from: 100, to: 200, width: 1_000 };
 

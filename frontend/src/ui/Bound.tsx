@@ -1,7 +1,6 @@
 import { useId, useState, type JSX } from 'react';
 
-import type { Sensor } from '../domain/sensors';
-import { fromShown, toShown, unitOf, type TemperatureUnit } from '../domain/units';
+import { fromShown, type Sensor, type TemperatureUnit, toShown, unitOf } from '../domain/sensors';
 import { S } from '../strings';
 
 /**

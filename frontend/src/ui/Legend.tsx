@@ -4,9 +4,8 @@ import type { FieldQuality } from '../contract/types';
 import { differenceNumber, readingText, valueText, withUnit } from '../domain/format';
 import { idealsText } from '../domain/ideal';
 import { fraction, rgbText, sensorColour, type Range } from '../domain/ramp';
-import type { Sensor, Span } from '../domain/sensors';
+import { type Sensor, type Span, type TemperatureUnit, unitOf } from '../domain/sensors';
 import { shown } from '../domain/text';
-import { unitOf, type TemperatureUnit } from '../domain/units';
 import { useApp } from '../store/app';
 import {
   selectColouring,

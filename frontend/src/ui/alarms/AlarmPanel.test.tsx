@@ -7,7 +7,7 @@ import { startAlarms } from '../../alarms/watch';
 import { notifyState } from '../../alarms/notify';
 import type { Alarm, HealthReason } from '../../contract/types';
 import { act as dispatch, receive, store } from '../../store/app';
-import { person } from '../../store/signals';
+import { person } from '../../store/create';
 import { NO_HOUSE } from '../../store/twin';
 import { alarm, alarms, tellAlarms } from '../../testing/alarms';
 import { goLost, showTags } from '../../testing/page';

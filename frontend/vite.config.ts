@@ -25,7 +25,7 @@ const RULES = [
   'src/{domain,geometry}/**/*.test.ts',
   'src/charts/{looks,model,zoom}.test.ts',
   'src/connection/{backoff,latest,machine}.test.ts',
-  'src/contract/{check,frames,npy}.test.ts',
+  'src/contract/{check,frames}.test.ts',
   'src/draw/palette.test.ts',
   'src/store/{create,fetcher,permalink,twin,view}.test.ts',
   'src/timebar/{axis,columns}.test.ts',

@@ -244,7 +244,7 @@ export async function fetchLines(
   const tagIds = [...new Set(pairs.map(({ tagId }) => tagId))];
   const before = dayS === null ? null : dayBefore(span, dayS);
   const fetched = async ({ from, to }: Span): Promise<[string, Series][]> => {
-    const all = pairs.map((pair) => fetchSeries({ ...pair, from, to, points }, signal));
+    const all = pairs.map((pair) => fetchSeries({ ...pair, from, to }, points, signal));
     return (await Promise.all(all)).map((wire) => [
       pairKey({ tagId: wire.tag_id, sensor: wire.sensor_type }),
       seriesOf(wire, nowS),

@@ -1,11 +1,11 @@
 /** What comes over the WebSocket, checked to the last field: nothing behind it checks again. */
 import { checkOf, isObject } from './check';
-import type { components } from './openapi.gen';
 import type {
   DeltaFrame,
   Frame,
   Judgement,
   Latest,
+  Schemas,
   StateFrame,
   TwinTagState,
   WireTime,
@@ -74,7 +74,6 @@ const isKnown = (type: string): type is Frame['type'] => Object.hasOwn(FRAMES, t
  * behind it every field is there, and each reading has its own age.
  */
 
-type Schemas = components['schemas'];
 type WireTag = Schemas['TwinTagState'];
 
 export function filledTag(tag: WireTag): TwinTagState {

@@ -1,7 +1,7 @@
 /** The web contract's types under short names; generated from the server's schema. */
 import type { components } from './openapi.gen';
 
-type Schemas = components['schemas'];
+export type Schemas = components['schemas'];
 
 /** As `filled.ts` makes it of what the server left out; each reading has its own age. */
 export type TwinTagState = Required<Omit<Schemas['TwinTagState'], 'readings'>> & {

@@ -1,5 +1,5 @@
 /** How sure an estimate is of its cells, and how unsure nobody would call it known. Pure. */
-import type { Estimate } from '../contract/estimate';
+import type { Estimate } from '../contract/api';
 import type { Field, Sureness } from '../contract/types';
 import type { Placement } from '../geometry/image';
 import { fraction, type Range, rangeOf, type Rgb, rgbText, type Shade } from './ramp';
@@ -69,17 +69,11 @@ export function estimatedField(sensor: string, estimate: Estimate): Field {
     stepOf(sd[cell] ?? NaN, sdKnown) < NOT_KNOWN_STEP ? value : NaN,
   );
   const known = rangeOf(values);
-  const { width, height, originX, originY, resolution, sampleCount } = grid;
   return {
+    ...grid,
     sensor,
-    width,
-    height,
-    originX,
-    originY,
-    resolution,
     valueMin: known?.low ?? 0,
     valueMax: known?.high ?? 0,
-    sampleCount,
     values,
     sureness: { sd, sdKnown, readingCount },
   };

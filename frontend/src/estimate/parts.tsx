@@ -2,8 +2,8 @@ import '../styles/estimate.css';
 
 import type { JSX } from 'react';
 
-import { fetchAdvice, fetchExpected, fetchGrade } from '../contract/estimate';
-import type { Field, Grade, NoEstimate, Place, TagHealth } from '../contract/types';
+import { answer } from '../contract/api';
+import type { Field, Grade, NoEstimate, Place, Schemas, TagHealth } from '../contract/types';
 import { cellAt } from '../domain/field';
 import {
   differenceNumber,
@@ -45,7 +45,8 @@ export function EstimateFacts(): JSX.Element {
   const field = useApp((state) => selectShown(state).field.value);
   const isNow = useApp((state) => selectShown(state).moment === null);
   const isError = useApp((state) => state.view.heat === 'error');
-  const grade = useAsked(fetchGrade);
+  const graded = useAsked('EstimateQualities', 'quality').value?.sensors ?? {};
+  const grade = (Object.hasOwn(graded, sensor.name) && graded[sensor.name]) || null;
   if (!isMeasured(sensor)) {
     return (
       <span role="status" className="estimate-missing" data-testid="estimate-missing">
@@ -54,7 +55,7 @@ export function EstimateFacts(): JSX.Element {
     );
   }
   const ofSensor = field?.sensor === sensor.name ? field : null;
-  if (ofSensor?.noEstimate) return <Missing why={ofSensor.noEstimate} grade={grade.value} />;
+  if (ofSensor?.noEstimate) return <Missing why={ofSensor.noEstimate} grade={grade} />;
   if (!ofSensor?.sureness) return <span role="status">{E.onItsWay}</span>;
   return (
     <>
@@ -63,7 +64,7 @@ export function EstimateFacts(): JSX.Element {
           {E.unsure(errorText(sensor, ofSensor.sureness.sdKnown, unit))}
         </span>
       )}
-      {grade.value && <Foretold grade={grade.value} isNow={isNow} />}
+      {grade && <Foretold grade={grade} isNow={isNow} />}
     </>
   );
 }
@@ -225,8 +226,8 @@ export function CardEstimate({
   const unit = useApp((state) => state.settings.unit);
   // Of the past nobody tells what was expected.
   const isNow = useApp((state) => selectShown(state).moment === null);
-  const { value } = useAsked(fetchExpected);
-  const own = isNow && value && Object.hasOwn(value, tag.id) ? value[tag.id] : undefined;
+  const expected = useAsked('ExpectedTags', 'tags').value?.tags ?? {};
+  const own = isNow && Object.hasOwn(expected, tag.id) ? expected[tag.id] : undefined;
   const changed = new Set(
     (health?.reasons ?? []).filter(({ kind }) => kind === 'changed').map((each) => each.sensor),
   );
@@ -255,21 +256,18 @@ export function CardEstimate({
 /** More nobody buys at once. */
 const PLACES = 5;
 
-const ask = (sensor: string, signal: AbortSignal): Promise<readonly Place[]> =>
-  fetchAdvice(sensor, PLACES, signal);
-
 /** Where another tag would help: numbers on the map, which are a list to who does not see it. */
 export function AdviceMarks(): JSX.Element {
   const isNow = useApp((state) => selectShown(state).moment === null);
-  const { value, state, message } = useAsked(ask);
+  const { value, state, message } = useAsked('Advice', 'advice', PLACES);
   if (!isNow) return <Note text={E.adviceNow} />;
   if (!value) {
     return <Note text={state === 'failed' ? E.adviceFailed(shown(message, 160)) : ''} />;
   }
-  if (value.length === 0) return <Note text={E.adviceNone} />;
+  if (value.places.length === 0) return <Note text={E.adviceNone} />;
   return (
     <ol className="advice" aria-label={E.advice} data-testid="advice">
-      {value.map((place, index) => (
+      {value.places.map((place, index) => (
         <Mark key={index} place={place} number={index + 1} />
       ))}
     </ol>
@@ -309,8 +307,6 @@ const Note = ({ text }: { text: string }): JSX.Element => (
   </p>
 );
 
-/** Values with their errors, as the page writes them. */
-
 /** As exact as a value, unless nothing would be left of it. */
 function errorNumber(sensor: Sensor, sd: number, unit: TemperatureUnit): string {
   const text = differenceNumber(sensor, plusMinus(sd), unit);
@@ -341,23 +337,29 @@ const EVERY_MS = 10_000;
  * What the bridge answers about the sensor in view, asked again now and then while it is connected:
  * one question at a time, beside the frames. Of another sensor nothing is left.
  */
-export function useAsked<T>(ask: (sensor: string, signal: AbortSignal) => Promise<T>): Fetched<T> {
+function useAsked<Name extends 'EstimateQualities' | 'ExpectedTags' | 'Advice'>(
+  name: Name,
+  what: string,
+  places?: number,
+): Fetched<Schemas[Name]> {
   const sensor = useApp((state) => state.view.sensor);
   const isOpen = useApp((state) => state.twin.connection.socket.kind === 'open');
   const turn = useTicking((at) => String(Math.floor(at / EVERY_MS)));
-  const { value, ...rest } = useFetched<{ readonly of: string; readonly answer: T }>(
+  const { value, ...rest } = useFetched<{ readonly of: string; readonly told: Schemas[Name] }>(
     isOpen
       ? {
           key: turn,
           group: sensor,
-          run: async (signal) => ({ of: sensor, answer: await ask(sensor, signal) }),
+          run: async (signal) => {
+            const query = { sensor_type: sensor, places };
+            return { of: sensor, told: await answer(name, signal, `api/estimate/${what}`, query) };
+          },
         }
       : null,
     EVERY_MS,
   );
-  return { ...rest, value: value?.of === sensor ? value.answer : null };
+  return { ...rest, value: value?.of === sensor ? value.told : null };
 }
 
 /** Every word of the estimate, in the language that the page speaks. */
-
-export const E = await estimateWordsOf(LANGUAGE);
+const E = await estimateWordsOf(LANGUAGE);

@@ -3,7 +3,7 @@ import '../styles/robot.css';
 import { type JSX, type ReactPortal, useEffect, useMemo, useState } from 'react';
 import { createPortal } from 'react-dom';
 
-import { get, read } from '../contract/api';
+import { answer } from '../contract/api';
 import type { Robot, RobotNow, WireTime } from '../contract/types';
 import { ageText, percentText, written } from '../domain/format';
 import { ageSeconds, ageStep, secondsOf } from '../domain/time';
@@ -170,7 +170,7 @@ export function useTrail(): readonly TrailPoint[] {
     fetcher.want({
       key: 'robot',
       group: 'robot',
-      run: async (signal) => read('Robot', await get('api/robot', signal)),
+      run: (signal) => answer('Robot', signal, 'api/robot'),
     });
     return () => {
       fetcher.want(null);

@@ -1,6 +1,6 @@
 /** Fetches what the heat map is made of: the nearest readings, or the estimate that was chosen. */
 import { now } from '../clock';
-import { fetchField, Refusal, type FieldQuery } from '../contract/api';
+import { fetchEstimate, fetchField, Refusal, type FieldQuery } from '../contract/api';
 import type { Field, NoEstimate } from '../contract/types';
 import { resolutionFor } from '../domain/field';
 import { estimatedField } from '../domain/sureness';
@@ -25,7 +25,6 @@ export async function fetchHeat(
   if (refused?.sensor === query.sensor && now() < refused.until) {
     return inPlace(refused.why, query, signal);
   }
-  const { fetchEstimate } = await import('../contract/estimate');
   try {
     const estimate = await fetchEstimate(query, signal);
     refused = null;

@@ -1,5 +1,5 @@
 /** Fetches what the frames do not carry, whenever the twin's revision says that it changed. */
-import { fetchMap, fetchMapPicture, fetchQuality, fetchSensors, Refusal } from '../contract/api';
+import { answer, bodyOf, fetchQuality, get, Refusal } from '../contract/api';
 import type { Field, FieldQuality, OccupancyGrid, SensorsFile } from '../contract/types';
 import { cataloguesOf } from '../domain/sensors';
 import type { Snapshot } from '../domain/twin';
@@ -141,6 +141,9 @@ function fieldTask(
 
 const INTERVAL_MS = 500;
 
+const fetchFile = async (signal: AbortSignal): Promise<SensorsFile> =>
+  bodyOf(await get('api/sensors', signal));
+
 export function startSensors(): () => void {
   let known = '';
   const sensors = createFetcher<SensorsFile>({
@@ -168,7 +171,7 @@ export function startSensors(): () => void {
   const update = (): void => {
     // The first connection is made while this is fetched, and to the same bridge.
     const epoch = Math.max(1, store.get().twin.connection.epoch);
-    sensors.want({ key: String(epoch), group: 'sensors', run: fetchSensors });
+    sensors.want({ key: String(epoch), group: 'sensors', run: fetchFile });
   };
   update();
   const stop = store.subscribe(update);
@@ -183,7 +186,10 @@ export function startSensors(): () => void {
  * of another size than announced is an error, and the caller tries again.
  */
 export async function loadMap(signal: AbortSignal): Promise<MapPicture> {
-  const [grid, blob] = await Promise.all([fetchMap(signal), fetchMapPicture(signal)]);
+  const [grid, blob] = await Promise.all([
+    answer('OccupancyGrid', signal, 'api/map'),
+    get('api/map.png', signal).then((response) => response.blob()),
+  ]);
   const bitmap = await createImageBitmap(blob);
   try {
     return decode(grid, bitmap);

@@ -1,8 +1,10 @@
 import { describe, expect, test } from 'vitest';
 
+import cases from '../../../tests/twin/core/far_off.json';
 import type { Latest, TwinTagState } from '../contract/types';
+import { mapPoint } from '../geometry/coordinates';
 import { readings, stateFrame, tag, wireTag } from '../testing/tags';
-import { compareIds, snapshotOf, tagOf } from './twin';
+import { compareIds, holds, reachOf, snapshotOf, tagOf } from './twin';
 
 const pose = (x: number | null, w: number | null): ReturnType<typeof wireTag>['pose'] => ({
   position: { x, y: 2, z: 0 },
@@ -206,5 +208,14 @@ describe('a tag that is far off', () => {
     const more = [...wire, at('5', 5001), at('6', 5002)];
     const next = snapshotOf(stateFrame(more, { sec: 6 }), 2000, first);
     expect(next.tags.map((tag) => tag.at?.x)).toEqual([0, 1, 2, 5001, 5002, 5000]);
+  });
+});
+
+describe('the cases that the twin knows too', () => {
+  test.each(Object.entries(cases))('%s', (_, { at, far }) => {
+    const places = at.map(([x, y]) => mapPoint(x ?? NaN, y ?? NaN));
+    const reach = reachOf(places);
+    const found = places.flatMap((place, index) => (holds(reach, place) ? [] : [index]));
+    expect(found).toEqual(far);
   });
 });

@@ -50,6 +50,25 @@ export function toMap(view: View, point: CanvasPoint): MapPoint {
   return mapPoint((point.x - view.x) / view.scale, (view.y - point.y) / view.scale);
 }
 
+/** The item closest to a canvas point within `reach` pixels, of equals the last; null: none. */
+export function nearest<T extends { readonly at: MapPoint }>(
+  items: readonly T[],
+  view: View,
+  point: CanvasPoint,
+  reach: number,
+): T | null {
+  let best: T | null = null;
+  let bestDistance = reach;
+  for (const item of items) {
+    const { x, y } = toCanvas(view, item.at);
+    const distance = Math.hypot(x - point.x, y - point.y);
+    if (distance > bestDistance) continue;
+    best = item;
+    bestDistance = distance;
+  }
+  return best;
+}
+
 /** Smallest box around all points; null without any. */
 export function boundsOf(points: Iterable<MapPoint>): Bounds | null {
   let minX = Infinity;

@@ -5,16 +5,15 @@ import type { Pin } from '../draw/scene';
 import type { Box } from '../geometry/clear';
 import {
   canvasPoint,
+  nearest,
   toCanvas,
   toMap,
   type CanvasPoint,
   type MapPoint,
   type View,
 } from '../geometry/coordinates';
-import { Grid, nearest } from '../geometry/nearest';
 import { act, moveViewport, store, type AppState } from '../store/app';
 import { selectHeat, selectListed, selectRange, selectSensor } from '../store/derived';
-import { memoOne } from '../domain/memo';
 import { selectNewest, selectShown, selectTag, type Shown } from '../store/moment';
 import { isPrinting } from '../store/theme';
 import { type Content, contentOf, coveredBoxes, MapCamera, together, watchCovered } from './camera';
@@ -30,8 +29,6 @@ const TEXT_PX = 14;
 
 /** What is to be drawn anew; "view": nothing but the place and the scale changed. */
 type Part = 'still' | 'pins' | 'overlay' | 'view';
-
-const pinGrid = memoOne((pins: readonly Pin[]) => new Grid(pins));
 
 /**
  * `isFixed`: a wall screen, where nobody who brushes past chooses a tag or moves the map.
@@ -195,7 +192,7 @@ export function runMap(
   const pinAt = (point: CanvasPoint, reach: number): Pin | null => {
     const state = store.get();
     if (!state.view.layers.has('pins')) return null;
-    return nearest(pinGrid(painter.scene(state, now()).pins), state.viewport.view, point, reach);
+    return nearest(painter.scene(state, now()).pins, state.viewport.view, point, reach);
   };
 
   const hover = (pin: Pin | null): void => {

@@ -1,16 +1,17 @@
 import { fireEvent, act as flush, render, screen } from '@testing-library/react';
 import { beforeEach, expect, test, vi } from 'vitest';
 
-import type { Series } from '../domain/series';
+import { readingAt, type Series } from '../domain/series';
 import { act, receive, store } from '../store/app';
 import { NOT_ASKED } from '../store/twin';
 import { showTags } from '../testing/page';
 import { sensorNamed } from '../testing/sensors';
-import { seriesWith } from '../testing/series';
+import { bucketAt, seriesWith } from '../testing/series';
 import { readings, wireTag } from '../testing/tags';
 import { timelineWith } from '../testing/timeline';
 import CardChart from './CardChart';
-import { LineValue, MarksKey, SensorChoice } from './PlotView';
+import type { Line, PlotModel } from './model';
+import { LineValue, MarksKey, PlotView, SensorChoice } from './PlotView';
 
 test.each([
   ['temperature_24h_mean', 4_680, 'Needs 24 h of readings; 1\u00a0h 18\u00a0min so far'],
@@ -29,33 +30,41 @@ test('with a value it says that', () => {
   expect(said('temperature_24h_mean', 4_680, null, readings)).toContain('21.0\u00a0°C');
 });
 
+const plainModel = (sensor: string, lines: PlotModel['lines']): PlotModel => ({
+  ...{ sensor: sensorNamed(sensor), unit: 'C', lines, bands: [], isMixed: false },
+  ...{ span: { from: 90_000, to: 100_000 }, moment: null },
+});
+
+const lineOf = (series: Series): Line => ({ series, before: null, look: 0, label: '1', marks: [] });
+
+test.each([
+  [{}, 'No reading in this period.'],
+  [
+    { points: [readingAt(0, 2), readingAt(40, 4), readingAt(50, null)] },
+    /2 readings, the latest 4\.0.*00:00:40.* 2\.0.* 4\.0/,
+  ],
+  [
+    { bucketS: 10, points: [bucketAt(0, 5, 3), bucketAt(10, 6, 4)], gaps: [{ from: 20, to: 30 }] },
+    /7 readings, the latest 6\.0.*00:00:10.* 4\.0.* 7\.0.* 1 gap/,
+  ],
+])('its picture says what there is, by the least and the most, %#', (over, words) => {
+  const model = plainModel('temperature', [lineOf(seriesWith(over))]);
+  render(<PlotView model={model} height={100} />);
+  expect(screen.getByTestId('plot').getAttribute('aria-label')).toMatch(words);
+});
+
 function said(
   sensor: string,
   known: number,
   moment: number | null = null,
-  readings: Series['readings'] = [],
+  readings: readonly { at: number; value: number }[] = [],
 ): string {
   showTags([]);
   act({ type: 'moment', moment });
   const value = timelineWith({ reach: { from: 100_000 - known, to: 100_000 } });
   receive({ type: 'remembered', remembered: { ...NOT_ASKED, value } });
-  const line = {
-    series: seriesWith({ sensor, readings }),
-    before: null,
-    look: 0,
-    label: '1',
-    marks: [],
-  };
-  const model = {
-    ...{
-      sensor: sensorNamed(sensor),
-      unit: 'C' as const,
-      lines: [line],
-      bands: [],
-      isMixed: false,
-    },
-    ...{ span: { from: 90_000, to: 100_000 }, moment: null },
-  } as const;
+  const line = lineOf(seriesWith({ sensor, readings }));
+  const model = plainModel(sensor, [line]);
   const { container } = render(<LineValue line={line} model={model} />);
   return container.textContent;
 }

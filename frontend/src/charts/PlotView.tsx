@@ -1,28 +1,12 @@
 import 'uplot/dist/uPlot.min.css';
 import '../styles/charts.css';
 
-import {
-  type CSSProperties,
-  type JSX,
-  useEffect,
-  useLayoutEffect,
-  useMemo,
-  useRef,
-  useState,
-} from 'react';
+import { type CSSProperties, type JSX, useEffect, useMemo, useRef } from 'react';
 
 import { ageText, rangeText, readingText } from '../domain/format';
-import { rgbText, sensorColour } from '../domain/ramp';
+import { rangeOf, rgbText, sensorColour } from '../domain/ramp';
 import { isHad, isOfDay, type Sensor, type TemperatureUnit, unitOf } from '../domain/sensors';
-import {
-  type Bucket,
-  lastUntil,
-  type Mark,
-  pointAt,
-  type Reading,
-  type Series,
-  summaryOf,
-} from '../domain/series';
+import { lastUntil, type Mark, type Point, pointAt, type Series } from '../domain/series';
 import { shown } from '../domain/text';
 import { rosText, type Span } from '../domain/time';
 import { CommentMarks } from '../notes/CommentMarks';
@@ -34,9 +18,19 @@ import { S } from '../strings';
 import { More, Select } from '../widgets/controls';
 import { isStroked, lookOf, markerPath } from './layers';
 import type { Line, PlotModel } from './model';
-import { createPlot, type Plot } from './plot';
+import { type PlotHandlers, usePlot } from './plot';
 import { type Asked, useSensorsOf } from './useLines';
 import { zoomTo } from './zoom';
+
+const HANDLERS: PlotHandlers = {
+  onPoint: (at) => {
+    pointedTime.dispatch(at === null ? null : { at, by: 'chart' });
+  },
+  onPick: (moment) => {
+    act({ type: 'moment', moment });
+  },
+  onZoom: zoomTo,
+};
 
 /** One chart. `isAlone`: its one line has the sensor's colour, and no list beside it that says its value. */
 export function PlotView({
@@ -51,46 +45,14 @@ export function PlotView({
   hasTimes?: boolean;
 }): JSX.Element {
   const place = useRef<HTMLDivElement>(null);
-  const plot = useRef<Plot | null>(null);
-  const [width, setWidth] = useState(0);
   const ofBar = useSelected(pointedTime, pointedBy('bar'));
   const { at } = useTold();
   const only = isAlone ? model.lines[0] : undefined;
 
-  useLayoutEffect(() => {
-    const element = place.current;
-    if (!element) return undefined;
-    const mine = createPlot(element, {
-      onPoint: (time) => {
-        pointedTime.dispatch(time === null ? null : { at: time, by: 'chart' });
-      },
-      onPick: (time) => {
-        act({ type: 'moment', moment: time });
-      },
-      onZoom: zoomTo,
-    });
-    plot.current = mine;
-    const resize = new ResizeObserver(([entry]) => {
-      if (entry) setWidth(Math.floor(entry.contentRect.width));
-    });
-    resize.observe(element);
-    const stop = onThemeChange(mine.recolour);
-    return () => {
-      plot.current = null;
-      stop();
-      resize.disconnect();
-      mine.destroy();
-      pointedTime.dispatch(null);
-    };
-  }, []);
-
+  const plot = usePlot(place, model, height, hasTimes, HANDLERS, onThemeChange);
   useEffect(() => {
     plot.current?.point(ofBar);
-  }, [ofBar]);
-
-  useEffect(() => {
-    if (width > 0) plot.current?.show(model, { width, height, hasTimes });
-  }, [model, width, height, hasTimes]);
+  }, [plot, ofBar]);
 
   return (
     <section
@@ -144,8 +106,9 @@ export function LineValue({
 }): JSX.Element {
   const { at, isPointed } = useTold();
   const point = (isPointed ? pointAt : lastUntil)(line.series, at ?? Infinity);
-  const value = valueOf(point);
-  const was = valueOf(beforeAt(line, at));
+  const value = point?.value ?? null;
+  const was = beforeAt(line, at)?.value ?? null;
+  const isMean = point !== null && point.n > 1;
   const reach = useApp((state) => state.twin.remembered.value?.reach);
   if (value === null && isOfDay(sensor)) {
     const known = reach ? Math.max(0, (at ?? span.to) - reach.from) : 0;
@@ -153,15 +116,10 @@ export function LineValue({
   }
   return (
     <span className="line-value">
-      {point && 'mean' in point && point.n > 1 && (
-        <span className="faint">{S.chartColumns.mean} </span>
-      )}
+      {isMean && <span className="faint">{S.chartColumns.mean} </span>}
       <strong>{value === null ? S.noValue : readingText(sensor, value, unit)}</strong>
-      {point && 'mean' in point && point.n > 1 && (
-        <span className="faint">
-          {' '}
-          {rangeText(sensor, { low: point.min, high: point.max }, unit)}
-        </span>
+      {isMean && (
+        <span className="faint"> {rangeText(sensor, rangeOf([point.min, point.max]), unit)}</span>
       )}
       {line.before && (
         <span className="faint">
@@ -173,14 +131,10 @@ export function LineValue({
   );
 }
 
-const valueOf = (point: Reading | Bucket | null): number | null =>
-  !point ? null : 'mean' in point ? point.mean : point.value;
-
 /** The day before, at a moment or when the line's newest was read. */
-function beforeAt({ series, before }: Line, at: number | null): Reading | Bucket | null {
+function beforeAt({ series, before }: Line, at: number | null): Point | null {
   const newest = lastUntil(series, Infinity);
-  if (!before || !newest) return null;
-  return pointAt(before, at ?? ('at' in newest ? newest.at : newest.start));
+  return before && newest && pointAt(before, at ?? newest.at);
 }
 
 /** A piece of the line with its marker. */
@@ -295,17 +249,18 @@ export function SensorChoice({
 export const spanText = ({ from, to }: Span): string => S.chartSpan(rosText(from), rosText(to));
 
 /** The latest, the least and the most, and how often nothing came. */
-export function seriesText(series: Series, sensor: Sensor, unit: TemperatureUnit): string {
-  const { count, latest, min, max, gaps } = summaryOf(series);
-  if (!latest || min === null || max === null) return S.chartEmpty;
+function seriesText({ points, gaps }: Series, sensor: Sensor, unit: TemperatureUnit): string {
+  const latest = points.findLast(({ value }) => value !== null);
+  const range = rangeOf(points.flatMap(({ min, max }) => [min, max]));
+  if (latest?.value == null || !range) return S.chartEmpty;
   const value = (of: number): string => readingText(sensor, of, unit);
   return S.chartSummary(
-    count,
+    points.reduce((sum, { n }) => sum + n, 0),
     value(latest.value),
     rosText(latest.at),
-    value(min),
-    value(max),
-    gaps,
+    value(range.low),
+    value(range.high),
+    gaps.length,
   );
 }
 

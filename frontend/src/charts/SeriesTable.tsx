@@ -102,61 +102,40 @@ function Values({
   sensor: Sensor;
   unit: TemperatureUnit;
 }): JSX.Element {
-  const value = (of: number): string => readingText(sensor, of, unit);
-  switch (row.kind) {
-    case 'reading':
-      return (
-        <>
-          <td>{row.value === null ? S.sensorFailed : value(row.value)}</td>
-          <td />
-        </>
-      );
-    case 'bucket':
-      return (
-        <>
-          <td>{rosText(row.to)}</td>
-          <td>{row.n}</td>
-          <td>{value(row.mean)}</td>
-          <td>{value(row.min)}</td>
-          <td>{value(row.max)}</td>
-          <td />
-        </>
-      );
-    case 'gap':
-      return (
-        <Event row={row} isBucketed={isBucketed} text={S.chartGap(ageText(row.to - row.at))} />
-      );
-    case 'not_kept':
-    case 'not_recorded':
-      return <Event row={row} isBucketed={isBucketed} text={S.missing[row.kind]} />;
-    case 'failure':
-      return <Event row={row} isBucketed={isBucketed} text={S.chartFailures(row.count)} />;
-    case 'look':
-      return <Event row={row} isBucketed={isBucketed} text={S.chartLooks(row.count)} />;
-  }
-}
-
-/** What is no value: when it ended, and what it was. */
-function Event({
-  row,
-  isBucketed,
-  text,
-}: {
-  row: Extract<SeriesRow, { to: number }>;
-  isBucketed: boolean;
-  text: string;
-}): JSX.Element {
+  const value = (of: number | null): JSX.Element => (
+    <td>{of === null ? S.sensorFailed : readingText(sensor, of, unit)}</td>
+  );
+  const event = eventText(row);
   return (
     <>
-      {isBucketed ? (
+      {isBucketed && <td>{row.to !== null && rosText(row.to)}</td>}
+      {row.kind === 'bucket' && <td>{row.n}</td>}
+      {event === '' ? value(row.value) : <td colSpan={isBucketed ? 4 : 1} />}
+      {row.kind === 'bucket' && (
         <>
-          <td>{rosText(row.to)}</td>
-          <td colSpan={4} />
+          {value(row.min)}
+          {value(row.max)}
         </>
-      ) : (
-        <td />
       )}
-      <td>{text}</td>
+      <td>{event}</td>
     </>
   );
+}
+
+/** What is no value; empty: it is one. */
+function eventText({ kind, at, to, n }: SeriesRow): string {
+  switch (kind) {
+    case 'reading':
+    case 'bucket':
+      return '';
+    case 'gap':
+      return S.chartGap(ageText((to ?? at) - at));
+    case 'not_kept':
+    case 'not_recorded':
+      return S.missing[kind];
+    case 'failure':
+      return S.chartFailures(n ?? 0);
+    case 'look':
+      return S.chartLooks(n ?? 0);
+  }
 }

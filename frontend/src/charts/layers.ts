@@ -107,11 +107,11 @@ function drawRanges(frame: Frame, line: Line, model: PlotModel, palette: ChartPa
   context.globalAlpha = model.lines.length === 1 ? 0.28 : 0.14;
   context.fillStyle = palette.lines[lookOf(line.look).colour] ?? palette.ink;
   context.beginPath();
-  for (const { start, min, max } of series.buckets) {
-    const left = x(start);
-    const right = Math.min(x(start + series.bucketS), x(series.to));
-    const top = y(toShown(sensor, max, unit));
-    const height = Math.max(ratio, y(toShown(sensor, min, unit)) - top);
+  for (const { at, min, max } of series.points) {
+    const left = x(at);
+    const right = Math.min(x(at + series.bucketS), x(series.to));
+    const top = y(toShown(sensor, max ?? 0, unit));
+    const height = Math.max(ratio, y(toShown(sensor, min ?? 0, unit)) - top);
     context.rect(left, top, Math.max(ratio, right - left), height);
   }
   context.fill();

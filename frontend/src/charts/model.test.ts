@@ -3,7 +3,7 @@ import { describe, expect, test } from 'vitest';
 import { cataloguesOf, type Ranges } from '../domain/sensors';
 import type { Series } from '../domain/series';
 import { CATALOGUE, FILE, sensorNamed } from '../testing/sensors';
-import { seriesWith } from '../testing/series';
+import { bucketAt, seriesWith } from '../testing/series';
 import {
   aligned,
   bandsOf,
@@ -130,8 +130,7 @@ describe('the points of a line', () => {
   });
 
   test('of buckets are their means, in their middle', () => {
-    const bucket = { start: 40, n: 3, mean: 21, min: 20, max: 22 };
-    expect(pointsOf(seriesWith({ bucketS: 10, buckets: [bucket] }), same)).toEqual([
+    expect(pointsOf(seriesWith({ bucketS: 10, points: [bucketAt(40, 21)] }), same)).toEqual([
       { at: 45, value: 21 },
     ]);
   });
@@ -175,8 +174,8 @@ describe('the axis of the values', () => {
     seriesWith({ readings: values.map((value, at) => ({ at, value })) });
 
   test('takes the least and the most of buckets, not their means alone', () => {
-    const buckets = [{ start: 0, n: 9, mean: 21, min: 10, max: 40 }];
-    const [low, high] = valueRange(model([seriesWith({ bucketS: 10, buckets })]));
+    const points = [{ at: 0, n: 9, value: 21, min: 10, max: 40 }];
+    const [low, high] = valueRange(model([seriesWith({ bucketS: 10, points })]));
     expect(low).toBeCloseTo(10 - 30 * 0.08);
     expect(high).toBeCloseTo(40 + 30 * 0.08);
   });

@@ -10,7 +10,16 @@ import {
   type TemperatureUnit,
   toShown,
 } from '../domain/sensors';
-import { laterBy, type Mark, marksOf, middleOf, type Series, seriesOf } from '../domain/series';
+import { rangeOf } from '../domain/ramp';
+import {
+  laterBy,
+  type Mark,
+  marksOf,
+  middleOf,
+  type Point,
+  type Series,
+  seriesOf,
+} from '../domain/series';
 import { shown } from '../domain/text';
 import type { Span } from '../domain/time';
 import type { Charted } from '../store/view';
@@ -74,19 +83,14 @@ export interface PlotModel {
 }
 
 /** A point of a line in the unit that is shown; null breaks the line. */
-export interface Point {
-  readonly at: number;
-  readonly value: number | null;
-}
+type Drawn = Pick<Point, 'at' | 'value'>;
 
 /** The points of a series in their order, with a break in each gap. */
-export function pointsOf(series: Series, shown: (value: number) => number): Point[] {
-  const value = (of: number | null): number | null => (of === null ? null : shown(of));
-  const points: Point[] = [
-    ...series.readings.map((reading) => ({ at: reading.at, value: value(reading.value) })),
-    ...series.buckets.map((bucket) => ({
-      at: middleOf(bucket, series),
-      value: value(bucket.mean),
+export function pointsOf(series: Series, shown: (value: number) => number): Drawn[] {
+  const points: Drawn[] = [
+    ...series.points.map((point) => ({
+      at: middleOf(point, series),
+      value: point.value === null ? null : shown(point.value),
     })),
     ...series.gaps.map(({ from, to }) => ({ at: (from + to) / 2, value: null })),
   ];
@@ -136,24 +140,14 @@ const LEAST_OF_VALUE = 0.1;
 
 /** The values' axis, in the unit that is shown. */
 export function valueRange({ lines, sensor, bands, unit }: PlotModel): [low: number, high: number] {
-  let low = Infinity;
-  let high = -Infinity;
-  const take = (value: number | null): void => {
-    if (value === null) return;
-    low = Math.min(low, value);
-    high = Math.max(high, value);
-  };
-  for (const { series } of drawnOf({ lines })) {
-    for (const { value } of series.readings) take(value);
-    for (const { min, max } of series.buckets) {
-      take(min);
-      take(max);
-    }
-  }
+  const values = drawnOf({ lines }).flatMap(({ series }) =>
+    series.points.flatMap(({ min, max }) => [min, max]),
+  );
   const all = bands.map(({ ranges }) => ranges);
   const bounds = all.flatMap((ranges) => ranges.ideal ?? []);
   const ideal = bounds.length > 0 ? ([Math.min(...bounds), Math.max(...bounds)] as const) : null;
-  if (low > high) [low, high] = ideal ?? [0, 1];
+  const [least0, most0] = ideal ?? [0, 1];
+  let { low, high } = rangeOf(values) ?? { low: least0, high: most0 };
   const share = LEAST_OF_VALUE * Math.abs(high);
   const least = Math.min(share || 1, ideal ? LEAST_OF_IDEAL * (ideal[1] - ideal[0]) : Infinity);
   if (high - low < least) {

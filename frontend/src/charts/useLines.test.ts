@@ -96,7 +96,7 @@ test('a line is asked for once, with its tag’s timeline', async () => {
   const { state, lines } = shown.current;
   const from = NOW_S - 3_600;
   expect(state).toBe('ready');
-  expect(lines.series.get(pairKey(pair))?.readings).toMatchObject([{ value: 600 }]);
+  expect(lines.series.get(pairKey(pair))?.points).toMatchObject([{ value: 600 }]);
   expect(lines.marks.get('1')).toMatchObject([{ widthS: 10, kind: 'failure', count: 1 }]);
   expect(histories()[0]).toBeCloseTo(from, 0);
 });
@@ -109,7 +109,7 @@ describe('the day before', () => {
     expect(today - yesterday).toBeCloseTo(86_400);
     const { series, before } = shown.current.lines;
     expect(before.get(pairKey(pair))?.from).toBeCloseTo(series.get(pairKey(pair))?.from ?? 0);
-    expect(before.get(pairKey(pair))?.readings).toMatchObject([{ value: 600 }]);
+    expect(before.get(pairKey(pair))?.points).toMatchObject([{ value: 600 }]);
   });
 
   test('is not asked for where the time of a simulation had not begun', async () => {

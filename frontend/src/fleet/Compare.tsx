@@ -2,12 +2,12 @@
 import 'uplot/dist/uPlot.min.css';
 import '../styles/charts.css';
 
-import { type JSX, useEffect, useLayoutEffect, useMemo, useRef, useState } from 'react';
+import { type JSX, useMemo, useRef, useState } from 'react';
 
 import type { Speech } from '../alarms/words';
 import { lookOf } from '../charts/layers';
 import type { Line, PlotModel } from '../charts/model';
-import { createPlot, type Plot } from '../charts/plot';
+import { usePlot } from '../charts/plot';
 import { timeOfDay } from '../clock';
 import { differenceNumber, readingText, withUnit } from '../domain/format';
 import { isMeasured, type Sensor } from '../domain/sensors';
@@ -172,6 +172,14 @@ function deviationText(sensor: Sensor, { deviation }: ComparedSite, { unit }: Sp
   return withUnit(sensor, differenceNumber(sensor, deviation, unit), unit);
 }
 
+function onSystemTheme(listener: () => void): () => void {
+  const system = window.matchMedia('(prefers-color-scheme: dark)');
+  system.addEventListener('change', listener);
+  return () => {
+    system.removeEventListener('change', listener);
+  };
+}
+
 function Chart({
   model,
   onPoint,
@@ -180,30 +188,8 @@ function Chart({
   onPoint: (at: number | null) => void;
 }): JSX.Element {
   const place = useRef<HTMLDivElement>(null);
-  const plot = useRef<Plot | null>(null);
-  const [width, setWidth] = useState(0);
-  useLayoutEffect(() => {
-    const element = place.current;
-    if (!element) return undefined;
-    const none = (): void => undefined;
-    const mine = createPlot(element, { onPoint, onPick: none, onZoom: none });
-    plot.current = mine;
-    const resize = new ResizeObserver(([entry]) => {
-      if (entry) setWidth(Math.floor(entry.contentRect.width));
-    });
-    resize.observe(element);
-    const system = window.matchMedia('(prefers-color-scheme: dark)');
-    system.addEventListener('change', mine.recolour);
-    return () => {
-      plot.current = null;
-      system.removeEventListener('change', mine.recolour);
-      resize.disconnect();
-      mine.destroy();
-    };
-  }, [onPoint]);
-  useEffect(() => {
-    if (width > 0) plot.current?.show(model, { width, height: HEIGHT, hasTimes: true });
-  }, [model, width]);
+  const handlers = useMemo(() => ({ onPoint }), [onPoint]);
+  usePlot(place, model, HEIGHT, true, handlers, onSystemTheme);
   return (
     <div
       ref={place}
@@ -265,22 +251,16 @@ function lineOf(
   ...[low, mean, high]: [low: Values, mean: Values, high: Values]
 ): Line {
   const start = secondsOf(from);
-  const buckets = mean.flatMap((value, index) =>
-    value === null
-      ? []
-      : [
-          {
-            ...{ start: start + index * bucketS, n: 1, mean: value },
-            ...{ min: low[index] ?? value, max: high[index] ?? value },
-          },
-        ],
-  );
+  const points = mean.flatMap((value, index) => {
+    const [min, max] = [low[index] ?? value, high[index] ?? value];
+    return value === null ? [] : [{ at: start + index * bucketS, value, min, max, n: 1 }];
+  });
   const gaps = mean.flatMap((value, index) =>
     value === null ? [{ from: start + index * bucketS, to: start + (index + 1) * bucketS }] : [],
   );
   const series = {
     ...{ from: start, to: secondsOf(to), tagId: label, sensor, bucketS },
-    ...{ readings: [], buckets, gaps, nights: null, missing: [] },
+    ...{ points, gaps, nights: null, missing: [] },
   };
   return { series, before: null, look, label, marks: [] };
 }

@@ -8,7 +8,7 @@ import { shown } from '../domain/text';
 import type { Span } from '../domain/time';
 import { fileName, save } from '../export/save';
 import { act, prefer, store, useApp } from '../store/app';
-import { selectCatalogue, selectCatalogues, selectSensor } from '../store/derived';
+import { selectCatalogue, selectSensor } from '../store/derived';
 import { rosNow, selectTags } from '../store/moment';
 import { type Charted, MOST_CHARTED } from '../store/view';
 import { S } from '../strings';
@@ -16,9 +16,9 @@ import { Icon, IconButton, Segmented } from '../widgets/controls';
 import { useFocusBack } from '../widgets/useFocusBack';
 import { ChartTables } from './SeriesTable';
 import { ChartState, LineSign, LineValue, MarksKey, PlotView, SensorChoice } from './PlotView';
-import { modelOf, pairsOf, plansOf, type PlotModel, tagLabel } from './model';
+import { plansOf, type PlotModel, tagLabel } from './model';
 import { TIMES_HEIGHT } from './plot';
-import { pointsFor, useLines, useSensorsOf, useSize, useSpeciesOf } from './useLines';
+import { pointsFor, useCharts, useSensorsOf, useSize } from './useLines';
 import { useZoomed, zoomBack, zoomBy } from './zoom';
 
 /** Of one chart of a tag's, and of several tags' only one, without the times; CSS pixels. */
@@ -29,11 +29,7 @@ const AROUND = 42;
 /** The charts of a tag, or of a sensor: over the map, above the time bar whose period they have. */
 export default function ChartView({ charted }: { charted: Charted }): JSX.Element {
   const sensor = useApp((state) => state.view.sensor);
-  const unit = useApp((state) => state.settings.unit);
-  const moment = useApp((state) => state.view.moment);
   const hasDayBefore = useApp((state) => state.settings.dayBefore);
-  const catalogue = useApp(selectCatalogue);
-  const both = useApp(selectCatalogues);
   const isZoomed = useZoomed();
   const [isTable, setTable] = useState(false);
   const root = useRef<HTMLElement>(null);
@@ -56,19 +52,8 @@ export default function ChartView({ charted }: { charted: Charted }): JSX.Elemen
   const sensors = useSensorsOf(tagId);
 
   const plans = useMemo(() => plansOf(charted, sensors, sensor), [charted, sensors, sensor]);
-  const pairs = useMemo(() => pairsOf(plans), [plans]);
-  const asked = useLines(pairs, pointsFor(size.width), hasDayBefore);
-  const { lines, span, nowS } = asked;
-  const species = useSpeciesOf(charted.tagIds);
-  const models = useMemo(
-    () =>
-      span
-        ? plans.map((plan) =>
-            modelOf(catalogue, both, plan, species, lines, span, unit, moment, nowS),
-          )
-        : [],
-    [catalogue, both, plans, species, lines, span, unit, moment, nowS],
-  );
+  const { asked, models } = useCharts(plans, pointsFor(size.width), hasDayBefore);
+  const { lines, span } = asked;
   const withLines = models.filter(({ lines }) => lines.length > 0);
   const room = (size.height - TIMES_HEIGHT) / Math.max(1, plans.length);
   const least = LEAST_HEIGHT[charted.by];

@@ -281,9 +281,6 @@ export function plansOf(
   return sensors.map((each) => ({ sensor: each, tagIds: [tagId] }));
 }
 
-export const pairsOf = (plans: readonly Plan[]): Pair[] =>
-  plans.flatMap(({ sensor, tagIds }) => tagIds.map((tagId) => ({ tagId, sensor })));
-
 export const tagLabel = (tagId: string): string => S.card(shown(tagId, 24));
 
 /**

@@ -5,13 +5,22 @@ import { type Catalogue, isHad, isMeasured } from '../domain/sensors';
 import { endsNow, type Span, spanOf } from '../domain/time';
 import { type AppState, store, useApp } from '../store/app';
 import { createStore, useSelected } from '../store/create';
-import { selectCatalogue } from '../store/derived';
+import { selectCatalogue, selectCatalogues } from '../store/derived';
 import type { Fetched } from '../store/fetcher';
 import { rosNow, selectDayS, selectNewestTag, selectTag } from '../store/moment';
 import { turnOf } from '../store/remembered';
 import { useFetched } from '../store/useFetched';
 import { useNow } from '../widgets/useNow';
-import { fetchLines, type Lines, NO_LINES, type Pair, pairKey } from './model';
+import {
+  fetchLines,
+  type Lines,
+  modelOf,
+  NO_LINES,
+  type Pair,
+  pairKey,
+  type Plan,
+  type PlotModel,
+} from './model';
 
 /** Between two questions about the same lines, ms; of many lines longer. */
 const PACE_MS = 3_000;
@@ -73,6 +82,35 @@ export function useLines(pairs: readonly Pair[], points: number, hasDayBefore = 
   };
 }
 
+/** The charts of plans of the same tags, as far as their lines are here. */
+export function useCharts(
+  plans: readonly Plan[],
+  points: number,
+  hasDayBefore = false,
+): { asked: Asked; models: readonly PlotModel[] } {
+  const unit = useApp((state) => state.settings.unit);
+  const moment = useApp((state) => state.view.moment);
+  const catalogue = useApp(selectCatalogue);
+  const both = useApp(selectCatalogues);
+  const species = useSpeciesOf(plans[0]?.tagIds ?? []);
+  const pairs = useMemo(
+    () => plans.flatMap(({ sensor, tagIds }) => tagIds.map((tagId) => ({ tagId, sensor }))),
+    [plans],
+  );
+  const asked = useLines(pairs, points, hasDayBefore);
+  const { lines, span, nowS } = asked;
+  const models = useMemo(
+    () =>
+      span
+        ? plans.map((plan) =>
+            modelOf(catalogue, both, plan, species, lines, span, unit, moment, nowS),
+          )
+        : [],
+    [catalogue, both, plans, species, lines, span, unit, moment, nowS],
+  );
+  return { asked, models };
+}
+
 /** Changes when one of the tags was visited: not in the past, nor for a period that has ended. */
 function useVisits(pairs: readonly Pair[]): string {
   const newest = useApp((state) =>
@@ -131,7 +169,7 @@ export function useSensorsOf(tagId: string): readonly string[] {
 }
 
 /** The species of tags, as far as they are sure, at the moment that is shown; else empty. */
-export function useSpeciesOf(tagIds: readonly string[]): readonly string[] {
+function useSpeciesOf(tagIds: readonly string[]): readonly string[] {
   const species = useApp((state) =>
     tagIds.map((id) => selectTag(state, id)?.sureSpecies ?? '').join('\u0000'),
   );

@@ -15,7 +15,7 @@ export const VERDICTS = [
 ] as const satisfies readonly Verdict[];
 
 /** Who was not judged, or not yet. */
-const NOT_JUDGED: TagHealth = { verdict: 'unknown', reasons: [] };
+export const NOT_JUDGED: TagHealth = { verdict: 'unknown', reasons: [] };
 
 export interface HouseHealth {
   readonly verdict: Verdict;

@@ -16,7 +16,8 @@ import { LANGUAGE, S } from '../strings';
 import { Select } from '../widgets/controls';
 import type { FleetWords } from '../words/fleet';
 import { VIEW_WORDS } from '../words/fleetViews';
-import type { Site, Time } from './sites';
+import type { WireTime } from '../contract/types';
+import type { Site } from './sites';
 import { useAnswer, useSpeech } from './useAnswer';
 
 const W = VIEW_WORDS[LANGUAGE];
@@ -219,8 +220,8 @@ export interface ComparedSite {
 /** `/api/compare`: the outlier first. */
 export interface Compared {
   readonly sensor_type: string;
-  readonly from: Time;
-  readonly to: Time;
+  readonly from: WireTime;
+  readonly to: WireTime;
   readonly bucket_s: number;
   readonly low: Values;
   readonly median: Values;

@@ -1,12 +1,10 @@
 /** What the server says of all sites, and in which order and choice it is shown. Pure. */
 import { timeOfDay } from '../clock';
-import type { Verdict } from '../contract/types';
+import { isObject } from '../contract/check';
+import type { Verdict, WireTime } from '../contract/types';
+import { VERDICTS } from '../domain/health';
+import { secondsOf } from '../domain/time';
 import { LOCALE } from '../strings';
-
-export interface Time {
-  readonly sec: number;
-  readonly nanosec: number;
-}
 
 /** An entry of `/api/sites`; see the server's `overview.py`. */
 export interface Site {
@@ -16,7 +14,7 @@ export interface Site {
   /** That of a silent site as it was known last; null: it is being worked out. */
   readonly last_verdict: Verdict | null;
   readonly active_alarms: number | null;
-  readonly last_received: Time | null;
+  readonly last_received: WireTime | null;
   readonly lag_s: number | null;
   readonly is_live: boolean;
   /** Where what it reports comes from. */
@@ -28,7 +26,7 @@ export interface Site {
 export interface Archive {
   readonly is_reachable: boolean;
   readonly message: string;
-  readonly since: Time | null;
+  readonly since: WireTime | null;
 }
 
 export interface SitesFrame {
@@ -51,23 +49,12 @@ export type Sites = ReadonlyMap<string, Site>;
 export const FILTERS = ['all', 'critical', 'stressed', 'silent', 'healthy'] as const;
 export type Filter = (typeof FILTERS)[number];
 
-const VERDICTS: readonly unknown[] = ['critical', 'stressed', 'unknown', 'healthy'];
-const ORDER: Readonly<Record<Verdict, number>> = {
-  critical: 0,
-  stressed: 1,
-  unknown: 2,
-  healthy: 3,
-};
-
-const isObject = (value: unknown): value is Record<string, unknown> =>
-  typeof value === 'object' && value !== null;
-
 function isSite(value: unknown): value is Site {
   return (
     isObject(value) &&
     typeof value['site'] === 'string' &&
     typeof value['name'] === 'string' &&
-    VERDICTS.includes(value['verdict']) &&
+    VERDICTS.includes(value['verdict'] as Verdict) &&
     typeof value['is_live'] === 'boolean' &&
     typeof value['origin'] === 'string'
   );
@@ -117,7 +104,7 @@ const names = new Intl.Collator('en', { numeric: true, sensitivity: 'base' });
 /** By status, then the most alarms, then by name, as people count. */
 function worstFirst(a: Site, b: Site): number {
   return (
-    ORDER[a.verdict] - ORDER[b.verdict] ||
+    VERDICTS.indexOf(a.verdict) - VERDICTS.indexOf(b.verdict) ||
     (b.active_alarms ?? 0) - (a.active_alarms ?? 0) ||
     names.compare(a.name, b.name)
   );
@@ -187,7 +174,7 @@ export function timeText(at: number): string {
   return (Math.abs(timeOfDay() - at) < DAY_MS / 2 ? clockTime : dateAndTime).format(at);
 }
 
-export const ms = ({ sec, nanosec }: Time): number => sec * 1000 + nanosec / 1e6;
+export const ms = (time: WireTime): number => secondsOf(time) * 1000;
 
 /** When that was, so many seconds ago, to the second. */
 export const silentAt = (lagS: number): number =>

@@ -39,9 +39,6 @@ export function startComments(): () => void {
     onValue: (notes) => {
       comments.dispatch(commentsIn(notes));
     },
-    onError: () => {
-      // It is tried again; until then what is known stays.
-    },
   });
   const update = (): void => {
     const { alarms, connection } = store.get().twin;

@@ -164,8 +164,6 @@ export function useTrail(): readonly TrailPoint[] {
       onValue: (robot) => {
         setTrail(robot.trail.map(trailPoint));
       },
-      // It is asked for again; until then there is what was heard.
-      onError: () => undefined,
     });
     fetcher.want({
       key: 'robot',

@@ -10,7 +10,7 @@ import { onChange, receive, store, type AppState } from './app';
 import { sourceOf } from './derived';
 import { ASSUMED_MARGIN_M, boundsOfPins, fetchHeat, fieldResolution } from './heat';
 import { rosNow, selectNewest, selectShown } from './moment';
-import { createFetcher, DRAG_PACE_MS, NOTHING, type Wish } from './fetcher';
+import { createFetcher, DRAG_PACE_MS, failed, NOTHING, ready, type Wish } from './fetcher';
 import { type Difference } from './twin';
 
 /** Live, the other moment moves on with now; this far at once, seconds. */
@@ -22,10 +22,10 @@ export function startDifference(): () => void {
     paceMs: DRAG_PACE_MS,
     isDragged: true,
     onValue: (value) => {
-      receive({ type: 'difference', difference: { value, state: 'ready', message: '' } });
+      receive({ type: 'difference', difference: ready(value) });
     },
     onError: (message) => {
-      receive({ type: 'difference', difference: { value: null, state: 'failed', message } });
+      receive({ type: 'difference', difference: failed(message) });
     },
   });
   let before: AppState | null = null;

@@ -1,7 +1,6 @@
 /** The house an hour before what is shown, for the table's trends: one request now and then. */
 import { now } from '../clock';
 import { fetchStateAt } from '../contract/past';
-import type { TagHealth } from '../contract/types';
 import { intervalText } from '../domain/format';
 import { secondsOf } from '../domain/time';
 import { sameReading, type TagThen } from '../domain/difference';
@@ -11,6 +10,7 @@ import { createStore } from './create';
 import { createFetcher } from './fetcher';
 import { rosNow, selectDayS, selectNewest, selectShown, selectSnapshot } from './moment';
 import { isColumnShown } from './settings';
+import { NOT_JUDGED } from '../domain/health';
 
 /** An hour of the greenhouse's day, seconds of the twin's time: a demo's day is a short one. */
 const selectHourS = (state: AppState): number => selectDayS(state) / 24;
@@ -34,8 +34,6 @@ export interface HourAgo {
 }
 
 export const hourAgo = createStore<HourAgo | null, HourAgo | null>(null, (_, next) => next);
-
-const NOT_JUDGED: TagHealth = { verdict: 'unknown', reasons: [] };
 
 /** What was known an hour before what is shown, by the state's own stamp; null: not known. */
 export function selectHourAgo(state: AppState, last: HourAgo | null): HourAgo | null {
@@ -81,9 +79,8 @@ export function thenOf(last: HourAgo | null, tag: Tag, sensor: string): TagThen 
 export function startHourAgo(): () => void {
   const fetcher = createFetcher<HourAgo>({
     paceMs: PACE_MS,
+    // Where there is none, the table and the alarms do without.
     onValue: hourAgo.dispatch,
-    // The table and the alarms do without.
-    onError: () => undefined,
   });
   const update = (): void => {
     const state = store.get();

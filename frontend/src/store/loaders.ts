@@ -1,12 +1,12 @@
 /** Fetches what the frames do not carry, whenever the twin's revision says that it changed. */
-import { answer, bodyOf, fetchQuality, get, Refusal } from '../contract/api';
+import { answer, bodyOf, fetchQuality, get } from '../contract/api';
 import type { Field, FieldQuality, OccupancyGrid, SensorsFile } from '../contract/types';
 import { cataloguesOf } from '../domain/sensors';
 import type { Snapshot } from '../domain/twin';
 import { type MapPicture, mapPlacement, opaqueBox, pixelBoxCorners } from '../geometry/image';
 import { act, type AppState, onChange, receive, store } from './app';
 import { type Source, sourceOf } from './derived';
-import { createFetcher, NOTHING, type Wish } from './fetcher';
+import { createFetcher, failed, NOTHING, ready, type Wish } from './fetcher';
 import { boundsOfPins, fetchHeat, fieldResolution } from './heat';
 import { selectNewest } from './moment';
 import { DEFAULT_VIEW } from './view';
@@ -22,24 +22,22 @@ export function startLoaders(): () => void {
   const field = createFetcher<Field>({
     paceMs: FIELD_INTERVAL_MS,
     onValue: (value) => {
-      receive({ type: 'field', field: { value, state: 'ready', message: '' } });
+      receive({ type: 'field', field: ready(value) });
     },
     onError: (message) => {
-      const { value } = selectNewest(store.get()).field;
-      receive({ type: 'field', field: { value, state: 'failed', message } });
+      receive({ type: 'field', field: failed(message, selectNewest(store.get()).field.value) });
     },
   });
   const map = createFetcher<MapPicture>({
     paceMs: MAP_INTERVAL_MS,
     onValue: (value) => {
-      receive({ type: 'map', map: { value, state: 'ready', message: '' } });
+      receive({ type: 'map', map: ready(value) });
     },
     onError: (message) => {
-      const { value } = selectNewest(store.get()).map;
-      receive({ type: 'map', map: { value, state: 'failed', message } });
+      receive({ type: 'map', map: failed(message, selectNewest(store.get()).map.value) });
     },
   });
-  const quality = createFetcher<FieldQuality | null>({
+  const quality = createFetcher<FieldQuality>({
     paceMs: QUALITY_INTERVAL_MS,
     onValue: (value) => {
       receive({ type: 'quality', quality: value });
@@ -49,7 +47,6 @@ export function startLoaders(): () => void {
     },
   });
 
-  let missingSince = -1;
   let ticking: ReturnType<typeof setInterval> | undefined;
   let ticks = 0;
 
@@ -65,7 +62,7 @@ export function startLoaders(): () => void {
       clearInterval(ticking);
       ticking = undefined;
     }
-    const { epoch, status } = state.twin.connection;
+    const { status } = state.twin.connection;
     const newest = selectNewest(state);
     const { sensor } = state.view;
     const base = baseKey(state);
@@ -86,18 +83,12 @@ export function startLoaders(): () => void {
     map.want(status?.has_map ? { key: base, group: 'map', run: loadMap } : null);
     quality.want(
       // Of the nearest readings: an estimate tells its own error.
-      epoch === missingSince || source === 'estimate'
+      source === 'estimate'
         ? null
         : {
             key: `${base}|${sensor}`,
             group: sensor,
-            run: (signal) =>
-              fetchQuality(sensor, signal).catch((error: unknown) => {
-                // A server without this route: the page does without, until the next server.
-                if (!(error instanceof Refusal) || error.status !== 404) throw error;
-                missingSince = epoch;
-                return null;
-              }),
+            run: (signal) => fetchQuality(sensor, signal),
           },
     );
   };
@@ -154,7 +145,7 @@ export function startSensors(): () => void {
       if (text === known) return;
       known = text;
       const value = cataloguesOf(file);
-      receive({ type: 'sensors', sensors: { value, state: 'ready', message: '' } });
+      receive({ type: 'sensors', sensors: ready(value) });
       // A file without what the page opens with: then the first that it has.
       const [first] = value.day.all;
       const { sensor } = store.get().view;
@@ -163,9 +154,7 @@ export function startSensors(): () => void {
     },
     onError: (message) => {
       // What was in force before goes on: a bridge that is away has no other ranges.
-      if (known === '') {
-        receive({ type: 'sensors', sensors: { value: null, state: 'failed', message } });
-      }
+      if (known === '') receive({ type: 'sensors', sensors: failed(message) });
     },
   });
   const update = (): void => {

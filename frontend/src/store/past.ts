@@ -7,7 +7,15 @@ import { onChange, receive, store, type AppState } from './app';
 import { sourceOf, type Source } from './derived';
 import { fetchHeat, fieldResolution } from './heat';
 import { selectNewest, selectPast } from './moment';
-import { createFetcher, DRAG_PACE_MS, type Fetched, NOTHING, type Wish } from './fetcher';
+import {
+  createFetcher,
+  DRAG_PACE_MS,
+  failed,
+  type Fetched,
+  NOTHING,
+  ready,
+  type Wish,
+} from './fetcher';
 import { NO_HOUSE, type Past } from './twin';
 
 /**
@@ -145,11 +153,11 @@ async function cameOf(
   const [latest, field] = await Promise.all([
     fetchStateAt(at, signal),
     fetchHeat(source, { sensor, resolution, at }, signal).then(
-      (value): Fetched<Field> => ({ value, state: 'ready', message: '' }),
+      ready,
       (error: unknown): Fetched<Field> => {
         // What may pass is tried again with the rest.
         if (!(error instanceof Refusal) || error.status !== 400) throw error;
-        return { value: null, state: 'failed', message: error.message };
+        return failed(error.message);
       },
     ),
   ]);

@@ -18,7 +18,7 @@ import './styles/forced.css';
 import { startAlarmsAndTelling } from './alarms/start';
 import { startAddress } from './store/address';
 import { onChange, prefer, store } from './store/app';
-import { askedCycle, startCycle } from './store/cycle';
+import { cycleWish, startCycle } from './store/cycle';
 import { startHourAgo } from './store/hourAgo';
 import { startLive } from './store/live';
 import { startLoaders, startSensors } from './store/loaders';
@@ -41,7 +41,7 @@ onChange(
 );
 
 const kiosk = new URLSearchParams(window.location.search).get('kiosk') === '1';
-const cycle = askedCycle();
+const cycle = cycleWish(window.location.search);
 
 document.documentElement.lang = LANGUAGE;
 document.title = S.product;

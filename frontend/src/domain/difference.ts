@@ -2,7 +2,7 @@
 import type { Field, TagHealth } from '../contract/types';
 import { S } from '../strings';
 import { differenceNumber, withUnit } from './format';
-import { fraction, mix, type Range, rangeOf, type Rgb, rgbText, type Shade } from './ramp';
+import { fraction, mix, paint, type Range, rangeOf, type Rgb, rgbText, type Shade } from './ramp';
 import type { Ranges, Sensor, TemperatureUnit } from './sensors';
 import type { Tag } from './twin';
 
@@ -85,10 +85,7 @@ export const divergingShade =
   (range: Range): Shade =>
   (data, at, value) => {
     const { rgb, alpha } = divergingColour(range, value);
-    data[at] = rgb[0];
-    data[at + 1] = rgb[1];
-    data[at + 2] = rgb[2];
-    data[at + 3] = 255 * alpha;
+    paint(data, at, rgb, alpha);
   };
 
 /** A difference with its sign, without its unit; no sign where nothing is left to show. */

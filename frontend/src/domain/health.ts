@@ -99,12 +99,12 @@ function weight(reason: HealthReason): number {
 export const rangeReason = (
   health: TagHealth | undefined,
   sensor: string,
-): (HealthReason & { readonly value: number; readonly limit: number }) | null =>
+): OfRange | null =>
   health?.reasons.filter(isOfRange).find((reason) => reason.sensor === sensor) ?? null;
 
-export const isOfRange = (
-  reason: HealthReason,
-): reason is HealthReason & { readonly value: number; readonly limit: number } =>
+type OfRange = HealthReason & { readonly value: number; readonly limit: number };
+
+export const isOfRange = (reason: HealthReason): reason is OfRange =>
   reason.kind === 'range' && reason.value !== null && reason.limit !== null;
 
 /** On which side of its range a value is that lies outside, or has yet to pass `release`. */
@@ -112,11 +112,7 @@ export const sideOf = ({
   value,
   limit,
   release,
-}: {
-  readonly value: number;
-  readonly limit: number;
-  readonly release?: number | null;
-}): 'below' | 'above' => (value < (release ?? limit) ? 'below' : 'above');
+}: Pick<OfRange, 'value' | 'limit' | 'release'>): 'below' | 'above' => (value < (release ?? limit) ? 'below' : 'above');
 
 /** The very same as before where nothing else is said: what follows from it is kept then. */
 export function sharedJudgement(before: Judgement | null, now: Judgement): Judgement {
@@ -187,8 +183,6 @@ export function reasonText(
       return R.other(shown((kind as string).replaceAll('_', ' '), LONGEST_NAME), label);
   }
 }
-
-type OfRange = HealthReason & { readonly value: number; readonly limit: number };
 
 /** Whether the value is back in its ideal range, and has yet to lie well within. */
 export const isBack = ({ release, verdict }: HealthReason): boolean =>

@@ -4,7 +4,7 @@ import type { MapPoint } from '../geometry/coordinates';
 import { S } from '../strings';
 import { differenceNumber, rangeText, withUnit } from './format';
 import { speciesText } from './marks';
-import { mix, type Rgb, rgbText, type Shade } from './ramp';
+import { mix, paint, type Rgb, rgbText, type Shade } from './ramp';
 import {
   partsOf,
   type Ranges,
@@ -180,11 +180,7 @@ export const idealShade =
   (zones: Zones): Shade =>
   (data, at, value, cell) => {
     const ranges = rangesAt(zones, cell);
-    const [red, green, blue] = idealColour(ranges ? excess(ranges, value) : null);
-    data[at] = red;
-    data[at + 1] = green;
-    data[at + 2] = blue;
-    data[at + 3] = 255 * IDEAL_ALPHA;
+    paint(data, at, idealColour(ranges ? excess(ranges, value) : null), IDEAL_ALPHA);
   };
 
 /** Where a field stands for a reading that the judge calls too old to say. Pure; judges nothing. */

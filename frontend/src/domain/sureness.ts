@@ -2,7 +2,7 @@
 import type { Estimate } from '../contract/api';
 import type { Field, Sureness } from '../contract/types';
 import type { Placement } from '../geometry/image';
-import { fraction, type Range, rangeOf, type Rgb, rgbText, type Shade } from './ramp';
+import { fraction, paint, type Range, rangeOf, type Rgb, rgbText, type Shade } from './ramp';
 
 /** Nine of ten values of a normal distribution lie within so many standard deviations. */
 export const NINE_OF_TEN = 1.645;
@@ -54,11 +54,7 @@ export const errorColours = (): string[] =>
 export const errorShade =
   (range: Range): Shade =>
   (data, at, value) => {
-    const [red, green, blue] = ERROR;
-    data[at] = red;
-    data[at + 1] = green;
-    data[at + 2] = blue;
-    data[at + 3] = 255 * errorAlpha(fraction(range, value));
+    paint(data, at, ERROR, errorAlpha(fraction(range, value)));
   };
 
 /** A field of an estimate as it came: what is too unsure is not known. Pure. */

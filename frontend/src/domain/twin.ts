@@ -77,10 +77,6 @@ function pointOf(point: WirePoint): MapPoint | null {
   return point.x === null || point.y === null ? null : mapPoint(point.x, point.y);
 }
 
-function presentPoints(points: readonly WirePoint[]): MapPoint[] {
-  return points.map(pointOf).filter((point) => point !== null);
-}
-
 /** The state that a tag is read from. */
 export interface TakenState {
   /** Its ROS time. */
@@ -133,7 +129,7 @@ export function tagOf(wire: TwinTagState, state: TakenState): Tag {
       const at = pointOf(flower.position);
       return at ? [{ at, species: flower.species, anomaly: flower.anomaly }] : [];
     }),
-    footprint: presentPoints(wire.box_footprint.points),
+    footprint: wire.box_footprint.points.flatMap((point) => pointOf(point) ?? []),
     wire,
   };
 }

@@ -8,7 +8,7 @@ import { snapshotOf, type Tag } from '../domain/twin';
 import { store, type AppState } from './app';
 import { createStore } from './create';
 import { createFetcher } from './fetcher';
-import { rosNow, selectDayS, selectNewest, selectShown, selectSnapshot } from './moment';
+import { rosNow, selectDayS, selectNewest, selectShown } from './moment';
 import { isColumnShown } from './settings';
 import { NOT_JUDGED } from '../domain/health';
 
@@ -38,23 +38,17 @@ export const hourAgo = createStore<HourAgo | null, HourAgo | null>(null, (_, nex
 /** What was known an hour before what is shown, by the state's own stamp; null: not known. */
 export function selectHourAgo(state: AppState, last: HourAgo | null): HourAgo | null {
   const { moment } = selectShown(state);
-  const snapshot = selectSnapshot(state);
-  const base = moment ?? (snapshot && secondsOf(snapshot.at));
-  // Now it may be twice as old as it serves: the next answer is on its way.
-  if (!last || base === null) return null;
-  return Math.abs(base - last.of) <= (moment === null ? 2 * SERVES * selectHourS(state) : 1)
-    ? last
-    : null;
+  if (moment === null) return selectHourAgoNow(state, last);
+  return last && Math.abs(moment - last.of) <= 1 ? last : null;
 }
 
 /** What was known an hour before now, whatever moment is shown; null: not known. */
 export function selectHourAgoNow(state: AppState, last: HourAgo | null): HourAgo | null {
   const { snapshot } = selectNewest(state);
-  return snapshot &&
-    last &&
-    Math.abs(secondsOf(snapshot.at) - last.of) <= 2 * SERVES * selectHourS(state)
-    ? last
-    : null;
+  if (!last || !snapshot) return null;
+  // It may be twice as old as it serves: the next answer is on its way.
+  const isNear = Math.abs(secondsOf(snapshot.at) - last.of) <= 2 * SERVES * selectHourS(state);
+  return isNear ? last : null;
 }
 
 /** What a tag's reading of now was compared with first, by the tag and the sensor. */

@@ -62,7 +62,7 @@ function said(
   showTags([]);
   act({ type: 'moment', moment });
   const value = timelineWith({ reach: { from: 100_000 - known, to: 100_000 } });
-  receive({ type: 'remembered', remembered: { ...NOT_ASKED, value } });
+  receive({ type: 'set', part: { remembered: { ...NOT_ASKED, value } } });
   const line = lineOf(seriesWith({ sensor, readings }));
   const model = plainModel(sensor, [line]);
   const { container } = render(<LineValue line={line} model={model} />);

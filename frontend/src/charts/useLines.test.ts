@@ -193,7 +193,7 @@ describe('where there is nothing', () => {
     expect(shown.current).toMatchObject({ state: 'failed', message: 'too many' });
     flush(() => {
       const message = 'no journal is kept';
-      receive({ type: 'remembered', remembered: { value: null, state: 'off', message } });
+      receive({ type: 'set', part: { remembered: { value: null, state: 'off', message } } });
     });
     expect(shown.current).toMatchObject({ state: 'missing', message: 'no journal is kept' });
   });

@@ -62,11 +62,11 @@ describe('table as a file', () => {
     'waits in the first moments until the sensors’ own names are %s, and comes once',
     async (state) => {
       const { sensors } = store.get().twin;
-      receive({ type: 'sensors', sensors: { value: null, state: 'waiting', message: '' } });
+      receive({ type: 'set', part: { sensors: { value: null, state: 'waiting', message: '' } } });
       saveTable();
       act({ type: 'filter', text: '10' });
       expect(names).toEqual([]);
-      receive({ type: 'sensors', sensors: { ...sensors, state } });
+      receive({ type: 'set', part: { sensors: { ...sensors, state } } });
       act({ type: 'filter', text: '' });
       expect(names).toHaveLength(1);
       expect((await lines())[0]).toContain('Temperature [°C]');

@@ -49,7 +49,7 @@ beforeEach(() => {
 /** A frame: the log has so many notes. */
 const tell = (count: number): void => {
   flush(() => {
-    receive({ type: 'alarms', alarms: { ...alarms([alarm('cold')]), notes: count } });
+    receive({ type: 'set', part: { alarms: { ...alarms([alarm('cold')]), notes: count } } });
   });
 };
 

@@ -70,7 +70,7 @@ export function startLive(): () => void {
       const { epoch, status } = connection;
       if (frame.type === 'alarms') {
         // As it is: alarms change seldom, and nobody is to wait for them.
-        receive({ type: 'alarms', alarms: frame });
+        receive({ type: 'set', part: { alarms: frame } });
         return;
       }
       if (frame.type === 'robot') {

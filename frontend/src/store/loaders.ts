@@ -31,19 +31,22 @@ export function startLoaders(): () => void {
   const map = createFetcher<MapPicture>({
     paceMs: MAP_INTERVAL_MS,
     onValue: (value) => {
-      receive({ type: 'map', map: ready(value) });
+      receive({ type: 'latest', part: { map: ready(value) } });
     },
     onError: (message) => {
-      receive({ type: 'map', map: failed(message, selectNewest(store.get()).map.value) });
+      receive({
+        type: 'latest',
+        part: { map: failed(message, selectNewest(store.get()).map.value) },
+      });
     },
   });
   const quality = createFetcher<FieldQuality>({
     paceMs: QUALITY_INTERVAL_MS,
     onValue: (value) => {
-      receive({ type: 'quality', quality: value });
+      receive({ type: 'latest', part: { quality: value } });
     },
     onError: () => {
-      receive({ type: 'quality', quality: null });
+      receive({ type: 'latest', part: { quality: null } });
     },
   });
 
@@ -71,7 +74,7 @@ export function startLoaders(): () => void {
     const { value } = newest.field;
     if (value && (value.sensor !== sensor || (base !== null && !wanted))) {
       receive({ type: 'field', field: NOTHING });
-      receive({ type: 'quality', quality: null });
+      receive({ type: 'latest', part: { quality: null } });
     }
     field.want(wanted);
     if (base === null) {
@@ -79,7 +82,7 @@ export function startLoaders(): () => void {
       quality.want(null);
       return;
     }
-    if (newest.map.value && !status?.has_map) receive({ type: 'map', map: NOTHING });
+    if (newest.map.value && !status?.has_map) receive({ type: 'latest', part: { map: NOTHING } });
     map.want(status?.has_map ? { key: base, group: 'map', run: loadMap } : null);
     quality.want(
       // Of the nearest readings: an estimate tells its own error.
@@ -145,7 +148,7 @@ export function startSensors(): () => void {
       if (text === known) return;
       known = text;
       const value = cataloguesOf(file);
-      receive({ type: 'sensors', sensors: ready(value) });
+      receive({ type: 'set', part: { sensors: ready(value) } });
       // A file without what the page opens with: then the first that it has.
       const [first] = value.day.all;
       const { sensor } = store.get().view;
@@ -154,7 +157,7 @@ export function startSensors(): () => void {
     },
     onError: (message) => {
       // What was in force before goes on: a bridge that is away has no other ranges.
-      if (known === '') receive({ type: 'sensors', sensors: failed(message) });
+      if (known === '') receive({ type: 'set', part: { sensors: failed(message) } });
     },
   });
   const update = (): void => {

@@ -88,7 +88,7 @@ describe('another moment', () => {
 
   test('has the map of now, for of maps nobody keeps a past', () => {
     const picture = { value: null, state: 'failed', message: 'x' } as const;
-    receive({ type: 'map', map: picture });
+    receive({ type: 'latest', part: { map: picture } });
     expect(shownAt(store.get().twin, 77).map).toBe(picture);
   });
 

@@ -86,7 +86,7 @@ export function startPast(): () => void {
       const { moment } = store.get().view;
       if (moment === null) return;
       if (selectPast(store.get()) === null || isLasting) showNothing(moment);
-      receive({ type: 'past-fault', fault: { at: moment, message, isLasting } });
+      receive({ type: 'set', part: { pastFault: { at: moment, message, isLasting } } });
     },
   });
 
@@ -103,7 +103,7 @@ export function startPast(): () => void {
       return;
     }
     const fault = state.twin.pastFault;
-    if (fault && fault.at !== moment) receive({ type: 'past-fault', fault: null });
+    if (fault && fault.at !== moment) receive({ type: 'set', part: { pastFault: null } });
     if (!past && !selectNewest(state).snapshot) showNothing(moment);
     else if (!past) patience ??= setTimeout(losePatience, PATIENCE_MS);
     else patience = undefined;

@@ -20,7 +20,7 @@ beforeEach(() => {
     asked.push(url.searchParams);
     return Promise.resolve(answer());
   });
-  receive({ type: 'remembered', remembered: NOT_ASKED });
+  receive({ type: 'set', part: { remembered: NOT_ASKED } });
   showTags([wireTag()]);
   stop = startRemembered();
 });

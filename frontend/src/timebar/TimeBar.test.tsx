@@ -17,7 +17,7 @@ const remember = (from: number, to: number): void => {
     { start: wireTime(9_000), scans: 3, failures: 1, looks: 0, pests_seen: 1, pests_cleared: 0 },
   ];
   const value = timelineOf(wireTimeline({ from, to, bucket_s: 15, buckets }), NOW);
-  receive({ type: 'remembered', remembered: { value, state: 'ready', message: '' } });
+  receive({ type: 'set', part: { remembered: { value, state: 'ready', message: '' } } });
 };
 
 beforeEach(() => {
@@ -203,8 +203,8 @@ describe('the period', () => {
 
 test('a twin that remembers nothing says so, and how to change it', () => {
   receive({
-    type: 'remembered',
-    remembered: { value: null, state: 'off', message: 'no journal is kept' },
+    type: 'set',
+    part: { remembered: { value: null, state: 'off', message: 'no journal is kept' } },
   });
   render(<TimeBar />);
   const bar = screen.getByTestId('timebar');
@@ -217,8 +217,8 @@ test('a twin that remembers nothing says so, and how to change it', () => {
 test('what could not be loaded is told, beside what is known', () => {
   const { remembered } = store.get().twin;
   receive({
-    type: 'remembered',
-    remembered: { ...remembered, state: 'failed', message: 'too busy' },
+    type: 'set',
+    part: { remembered: { ...remembered, state: 'failed', message: 'too busy' } },
   });
   render(<TimeBar />);
   expect(screen.getByTestId('timebar').textContent).toContain('too busy');

@@ -235,16 +235,10 @@ describe('filled', () => {
     house: { ...NOBODY.house, reasons: undefined },
     tags: { a: { verdict: 'healthy' }, b: { verdict: 'critical', reasons: [reason()] } },
   };
-  const reading = (
-    name: string,
-    value: number,
-    at: number | null,
-    stale: number | null,
-  ): object => ({
+  const reading = (name: string, value: number, at: number | null): object => ({
     name,
     value,
     observed_at: at === null ? null : sec(at),
-    stale_seconds: stale,
   });
   const filled = [
     wireTag({
@@ -254,11 +248,11 @@ describe('filled', () => {
       last_try: sec(100),
       last_try_status: 0,
       readings: [
-        reading('co2', 1, 100, 5),
-        reading('light', 2, 40, 65),
-        reading('ph', 3, 40, 65),
-        reading('ec', 4, null, null),
-        reading('vpd', 5, null, null),
+        reading('co2', 1, 100),
+        reading('light', 2, 40),
+        reading('ph', 3, 40),
+        reading('ec', 4, null),
+        reading('vpd', 5, null),
       ] as never,
     }),
     tags[1],
@@ -290,17 +284,6 @@ describe('filled', () => {
     const told = await fetchStateAt(12, new AbortController().signal);
     expect(told).toMatchObject({ state: { tags: filled }, health: verdicts });
   });
-
-  test('of a clock that does not run, no age is known', () => {
-    const still = { ...tags[0], stale_seconds: null };
-    const frame = { ...stateFrame([]), state: { ...stateFrame([]).state, tags: [still] } };
-    const parsed = parseFrame(JSON.stringify(frame));
-    expect(parsed).toMatchObject({
-      frame: {
-        state: { tags: [{ readings: tags[0]?.readings.map(() => ({ stale_seconds: null })) }] },
-      },
-    });
-  });
 });
 
 describe('latest', () => {
@@ -309,9 +292,9 @@ describe('latest', () => {
     last_observed: { sec: 995, nanosec: 0 },
     readings: [
       // Flowers were looked at since.
-      { name: 'co2', value: 600, observed_at: { sec: 100, nanosec: 0 }, stale_seconds: 900 },
+      { name: 'co2', value: 600, observed_at: { sec: 100, nanosec: 0 } },
       // A twin that does not tell.
-      { name: 'light', value: 9, observed_at: null, stale_seconds: null },
+      { name: 'light', value: 9, observed_at: null },
     ],
   });
   const b = wireTag({ tag_id: 'b', stale_seconds: null, last_observed: { sec: 0, nanosec: 0 } });
@@ -342,21 +325,10 @@ describe('latest', () => {
       expect(after).toMatchObject({ seq: 8, revision: 'r2' });
     });
 
-    test('an unchanged tag grows older by the twin’s clock and shares the rest', () => {
+    test('an unchanged tag is the very same', () => {
       const after = latestAfter(full, delta());
-      const [first, second] = a.readings;
-      expect(after?.state.tags[0]).toEqual({
-        ...a,
-        stale_seconds: 7.5,
-        readings: [{ ...first, stale_seconds: 902.5 }, second],
-      });
-      expect(after?.state.tags[0]?.pose).toBe(a.pose);
-      expect(after?.state.tags[1]?.stale_seconds).toBeNull();
-    });
-
-    test('a clock that jumped back makes no negative age', () => {
-      const header = { stamp: { sec: 3, nanosec: 0 }, frame_id: 'map' };
-      expect(latestAfter(full, delta({ header }))?.state.tags[0]?.stale_seconds).toBe(0);
+      expect(after?.state.tags[0]).toBe(a);
+      expect(after?.state.header.stamp.sec).toBe(1002);
     });
 
     test('a delta on another frame, or on none, cannot be used', () => {

@@ -8,7 +8,6 @@ import type {
   Schemas,
   StateFrame,
   TwinTagState,
-  WireTime,
 } from './types';
 
 /** Most characters of a frame: the largest house that a twin keeps is a bit smaller. */
@@ -69,20 +68,16 @@ function filled(frame: Frame): Frame {
 
 const isKnown = (type: string): type is Frame['type'] => Object.hasOwn(FRAMES, type);
 
-/**
- * What the server leaves out of tags and verdicts because it is as usual, put back. Here alone:
- * behind it every field is there, and each reading has its own age.
- */
+/** What the server leaves out of tags and verdicts because it is as usual, put back here alone. */
 
 type WireTag = Schemas['TwinTagState'];
 
 export function filledTag(tag: WireTag): TwinTagState {
-  const { last_observed: last, stale_seconds: stale } = tag;
+  const { last_observed: last } = tag;
   let observedAt: WireTag['readings'][number]['observed_at'] = last;
   const readings = tag.readings.map((reading) => {
     if (reading.observed_at !== undefined) observedAt = reading.observed_at;
-    const age = stale === null || !observedAt ? null : stale + secondsBetween(observedAt, last);
-    return { ...reading, observed_at: observedAt ?? null, stale_seconds: age };
+    return { ...reading, observed_at: observedAt ?? null };
   });
   return {
     looked_at: null,
@@ -99,12 +94,6 @@ export const filledHealth = ({ house, tags }: Schemas['Judgement']): Judgement =
   tags: Object.fromEntries(Object.entries(tags).map(([id, tag]) => [id, { reasons: [], ...tag }])),
 });
 
-/** Times of the wire. */
-
-/** Never negative: a clock may have gone back. */
-export const secondsBetween = (from: WireTime, to: WireTime): number =>
-  Math.max(0, to.sec - from.sec + (to.nanosec - from.nanosec) / 1e9);
-
 /**
  * The newest state, put together from full frames and deltas. Pure.
  *
@@ -118,12 +107,10 @@ export function latestAfter(latest: Latest | null, frame: StateFrame | DeltaFram
   if (latest?.seq !== frame.base) return null;
   const changed = new Map(frame.changed.map((tag) => [tag.tag_id, tag]));
   const removed = new Set(frame.removed);
-  const { stamp } = frame.header;
   const tags = latest.state.tags.flatMap((tag) => {
-    const now = changed.get(tag.tag_id);
+    const now = changed.get(tag.tag_id) ?? tag;
     changed.delete(tag.tag_id);
-    if (now) return [now];
-    return removed.has(tag.tag_id) ? [] : [aged(tag, stamp)];
+    return removed.has(tag.tag_id) ? [] : [now];
   });
   return {
     seq: frame.seq,
@@ -141,15 +128,4 @@ function healthsAfter({ health }: Latest, frame: DeltaFrame): Latest['health']['
   for (const tagId of frame.removed) tags.delete(tagId);
   for (const [tagId, now] of Object.entries(frame.health.tags)) tags.set(tagId, now);
   return Object.fromEntries(tags);
-}
-
-/** An unchanged tag at a later moment; everything but its age is the very same. */
-function aged(tag: TwinTagState, stamp: WireTime): TwinTagState {
-  if (tag.stale_seconds === null) return tag;
-  const readings = tag.readings.map((reading) =>
-    reading.observed_at === null || reading.stale_seconds === null
-      ? reading
-      : { ...reading, stale_seconds: secondsBetween(reading.observed_at, stamp) },
-  );
-  return { ...tag, readings, stale_seconds: secondsBetween(tag.last_observed, stamp) };
 }

@@ -4,7 +4,7 @@ import type { Field, HealthReason } from '../contract/types';
 import { fieldWith } from '../testing/field';
 import { judgement, reason } from '../testing/health';
 import { sensorNamed } from '../testing/sensors';
-import { tag } from '../testing/tags';
+import { readings, tag } from '../testing/tags';
 import {
   differenceOf,
   differenceShown,
@@ -107,17 +107,7 @@ const at = (
   reasons: readonly HealthReason[] = [],
 ): TagThen => ({
   tag: tag({
-    readings:
-      temperature === undefined
-        ? []
-        : [
-            {
-              name: 'temperature',
-              value: temperature,
-              observed_at: { sec, nanosec: 0 },
-              stale_seconds: 5,
-            },
-          ],
+    readings: temperature === undefined ? [] : readings({ temperature }, sec),
   }),
   health: judgement({ '1': reasons }).tags['1'] ?? NOT_JUDGED,
 });

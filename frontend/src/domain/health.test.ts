@@ -3,7 +3,7 @@ import { describe, expect, test } from 'vitest';
 import { S } from '../strings';
 import { held, judgement, NOBODY, reason } from '../testing/health';
 import { CATALOGUE } from '../testing/sensors';
-import { tag } from '../testing/tags';
+import { readings, tag } from '../testing/tags';
 import {
   houseHealth,
   type HouseHealth,
@@ -40,7 +40,7 @@ describe('house', () => {
   });
 
   test('nothing that is read makes a verdict: only what is said does', () => {
-    const lethal = tag({ readings: [{ name: 'temperature', value: -40 }] as never });
+    const lethal = tag({ readings: readings({ temperature: -40 }) });
     expect(houseHealth([lethal], judgement({ 1: 'healthy' }), true).verdict).toBe('healthy');
     expect(houseHealth([lethal], null, true).verdict).toBe('unknown');
   });

@@ -96,10 +96,7 @@ function weight(reason: HealthReason): number {
 }
 
 /** Why a sensor's value counts as out of its range; null: it does not. */
-export const rangeReason = (
-  health: TagHealth | undefined,
-  sensor: string,
-): OfRange | null =>
+export const rangeReason = (health: TagHealth | undefined, sensor: string): OfRange | null =>
   health?.reasons.filter(isOfRange).find((reason) => reason.sensor === sensor) ?? null;
 
 type OfRange = HealthReason & { readonly value: number; readonly limit: number };
@@ -112,7 +109,8 @@ export const sideOf = ({
   value,
   limit,
   release,
-}: Pick<OfRange, 'value' | 'limit' | 'release'>): 'below' | 'above' => (value < (release ?? limit) ? 'below' : 'above');
+}: Pick<OfRange, 'value' | 'limit' | 'release'>): 'below' | 'above' =>
+  value < (release ?? limit) ? 'below' : 'above';
 
 /** The very same as before where nothing else is said: what follows from it is kept then. */
 export function sharedJudgement(before: Judgement | null, now: Judgement): Judgement {

@@ -72,7 +72,7 @@ export function sortKey({ tag, health }: Row, column: string): Key {
     case 'species':
       return tag.species || null;
     case 'flowers':
-      return tag.observedAt === null ? null : tag.flowerCount;
+      return tag.isObserved ? tag.flowerCount : null;
     case 'age':
       // The age itself grows with the clock; its order does not.
       return typeof tag.scannedAt === 'number' ? -tag.scannedAt : null;

@@ -1,7 +1,7 @@
 import { act as flush, render, screen, waitFor } from '@testing-library/react';
 import { beforeEach, describe, expect, test, vi } from 'vitest';
 
-import type { Expected, Field, Grade, Place } from '../contract/types';
+import type { Expected, Field, Grade, Place, TwinTagState } from '../contract/types';
 import { houseHealth } from '../domain/health';
 import { snapshotOf } from '../domain/twin';
 import { mapPoint } from '../geometry/coordinates';
@@ -10,7 +10,7 @@ import { act, moveViewport, prefer, receive, store } from '../store/app';
 import { selectTag } from '../store/moment';
 import { bodies, estimated, expectedReading, grade } from '../testing/estimate';
 import { judgement, reason } from '../testing/health';
-import { goLive, showField, showTags } from '../testing/page';
+import { goLive, nextStamp, showField, showTags } from '../testing/page';
 import { CATALOGUES } from '../testing/sensors';
 import { readings, stateFrame, wireTag } from '../testing/tags';
 import { Legend } from '../ui/Legend';
@@ -30,11 +30,11 @@ let expected: Readonly<Record<string, Expected>>;
 let places: readonly Place[] | null;
 
 const NBSP = '\u00a0';
-const tags = [
+const tags = (): TwinTagState[] => [
   wireTag({
     tag_id: '7',
     pose: { position: { x: 1, y: 0, z: 0 }, orientation: { x: 0, y: 0, z: 0, w: 1 } },
-    readings: readings({ temperature: 22 }).map((each) => ({ ...each, stale_seconds: 720 })),
+    readings: readings({ temperature: 22 }, nextStamp() - 720),
   }),
 ];
 
@@ -52,7 +52,7 @@ beforeEach(() => {
         : Response.json({ detail: 'no such service' }, { status: 503 }),
     );
   });
-  showTags(tags);
+  showTags(tags());
   goLive();
   act({ type: 'heat', heat: 'estimate' });
 });
@@ -194,7 +194,7 @@ describe('card', () => {
 
   test('says what the estimate leaves out, of every sensor', async () => {
     const changed = reason({ kind: 'changed', sensor: 'humidity', verdict: 'stressed' });
-    showTags(tags, judgement({ '7': [changed] }));
+    showTags(tags(), judgement({ '7': [changed] }));
     expected = { '7': expectedReading({ expected: 19, left_out: true }) };
     card();
     await screen.findByText('Temperature: possible sensor fault, not used in the estimate');

@@ -5,7 +5,7 @@ import { onMapCommand } from '../map/commands';
 import { act, prefer, receive, store } from '../store/app';
 import { NO_HOUSE } from '../store/twin';
 import { FakeContext } from '../testing/canvas';
-import { showTags } from '../testing/page';
+import { nextStamp, showTags } from '../testing/page';
 import { readings, stateFrame, wireTag } from '../testing/tags';
 import { drawFooter, type Footer, FOOTER_PX, saveMap, saveTable } from './actions';
 import { fileName } from './save';
@@ -32,7 +32,11 @@ beforeEach(() => {
   });
   showTags([
     wireTag({ tag_id: '10', readings: readings({ temperature: 20 }) }),
-    wireTag({ tag_id: '=9', readings: readings({ temperature: 30 }), species: 'rose' }),
+    wireTag({
+      tag_id: '=9',
+      readings: readings({ temperature: 30 }, nextStamp() - 5),
+      species: 'rose',
+    }),
   ]);
 });
 
@@ -121,7 +125,7 @@ describe('of another moment', () => {
     [Date.UTC(2026, 4, 1, 8, 33, 22) / 1000, 'lupin-twin-tags-past-2026-05-01T14-03-22.csv'],
     [5_025, 'lupin-twin-tags-past-sim-01-23-45.csv'],
   ])('the file’s name says the moment, and that it is past: %i', async (at, name) => {
-    const then = wireTag({ tag_id: 'then', readings: readings({ temperature: 12 }) });
+    const then = wireTag({ tag_id: 'then', readings: readings({ temperature: 12 }, at - 5) });
     const snapshot = snapshotOf(stateFrame([then], { sec: at }), at * 1000, null);
     receive({ type: 'past', past: { at, house: { ...NO_HOUSE, snapshot } } });
     act({ type: 'moment', moment: at });

@@ -47,6 +47,9 @@ export function showTags(tags: readonly TwinTagState[], health: Judgement = NOBO
   goLive();
 }
 
+/** ROS seconds of the state that `showTags` shows next. */
+export const nextStamp = (): number => stamp + 1;
+
 /** A heat map that has come. */
 export function showField(value: Field): void {
   receive({ type: 'field', field: { value, state: 'ready', message: '' } });

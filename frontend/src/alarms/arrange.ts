@@ -4,7 +4,7 @@ import { type Cell, csv, finder, shown } from '../domain/text';
 import { isOfRange, sideOf, VERDICTS } from '../domain/health';
 import { secondsOf } from '../domain/time';
 import { compareIds } from '../domain/twin';
-import { toShown, unitOf } from '../domain/sensors';
+import { toShown, unitOf } from '../domain/format';
 import { S } from '../strings';
 import type { AlarmList, Item } from './list';
 import { worstOf, type Now } from './now';

@@ -3,9 +3,9 @@ import '../styles/charts.css';
 
 import { type CSSProperties, type JSX, useEffect, useMemo, useRef } from 'react';
 
-import { ageText, rangeText, readingText } from '../domain/format';
+import { ageText, rangeText, readingText, type TemperatureUnit, unitOf } from '../domain/format';
 import { rangeOf, rgbText, sensorColour } from '../domain/ramp';
-import { isHad, isOfDay, type Sensor, type TemperatureUnit, unitOf } from '../domain/sensors';
+import { isHad, isOfDay, type Sensor } from '../domain/sensors';
 import { lastUntil, type Mark, type Point, pointAt, type Series } from '../domain/series';
 import { shown } from '../domain/text';
 import { rosText, type Span } from '../domain/time';

@@ -1,7 +1,7 @@
 import { type JSX, useState } from 'react';
 
-import { ageText, readingText } from '../domain/format';
-import type { Sensor, TemperatureUnit } from '../domain/sensors';
+import { ageText, readingText, type TemperatureUnit } from '../domain/format';
+import type { Sensor } from '../domain/sensors';
 import { rowsOfSeries, type SeriesRow } from '../domain/series';
 import { shown } from '../domain/text';
 import { rosText } from '../domain/time';

@@ -1,6 +1,5 @@
 /** What a chart has below and above its lines: drawn by functions that keep no state. */
-import { valueText } from '../domain/format';
-import { toShown } from '../domain/sensors';
+import { toShown, valueText } from '../domain/format';
 import type { Span } from '../domain/time';
 import { S } from '../strings';
 import { limitsOf, type Line, type PlotModel, pointsOf } from './model';

@@ -7,9 +7,8 @@ import {
   type Ranges,
   rangesFor,
   type Sensor,
-  type TemperatureUnit,
-  toShown,
 } from '../domain/sensors';
+import { type TemperatureUnit, toShown } from '../domain/format';
 import { rangeOf } from '../domain/ramp';
 import {
   laterBy,

@@ -1,9 +1,9 @@
 /** A field less another of the same house at another moment: yesterday against today. Pure. */
 import type { Field, TagHealth } from '../contract/types';
 import { S } from '../strings';
-import { differenceNumber, withUnit } from './format';
+import { differenceNumber, type TemperatureUnit, withUnit } from './format';
 import { fraction, mix, paint, type Range, rangeOf, type Rgb, rgbText, type Shade } from './ramp';
-import type { Ranges, Sensor, TemperatureUnit } from './sensors';
+import type { Ranges, Sensor } from './sensors';
 import type { Tag } from './twin';
 
 /** What the moment that is shown is compared with: so many seconds before it, or one moment. */

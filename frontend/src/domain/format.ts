@@ -2,7 +2,7 @@ import { Refusal } from '../contract/api';
 import type { MapPoint } from '../geometry/coordinates';
 import { LOCALE, S } from '../strings';
 import type { Range } from './ramp';
-import { differenceToShown, type Sensor, type TemperatureUnit, toShown, unitOf } from './sensors';
+import type { Sensor } from './sensors';
 
 /** What stands between the whole and the tenths where the reader lives. */
 const POINT =
@@ -142,4 +142,29 @@ export function failureText(error: unknown): string {
       : error instanceof TypeError;
   if (isPassing) return S.serverBusy;
   return error instanceof Error ? error.message : String(error);
+}
+
+/** What the operator reads temperatures in. Everything inside the page stays in °C. */
+export type TemperatureUnit = 'C' | 'F';
+
+const inFahrenheit = (sensor: Sensor, unit: TemperatureUnit): boolean =>
+  unit === 'F' && sensor.unit === '°C';
+
+export function unitOf(sensor: Sensor, unit: TemperatureUnit): string {
+  return inFahrenheit(sensor, unit) ? '°F' : sensor.unit;
+}
+
+/** A value as shown. */
+export function toShown(sensor: Sensor, value: number, unit: TemperatureUnit): number {
+  return inFahrenheit(sensor, unit) ? value * 1.8 + 32 : value;
+}
+
+/** A difference of two values as shown: the offset of 32 falls out. */
+export function differenceToShown(sensor: Sensor, value: number, unit: TemperatureUnit): number {
+  return inFahrenheit(sensor, unit) ? value * 1.8 : value;
+}
+
+/** The reverse of `toShown`, for numbers that the operator types. */
+export function fromShown(sensor: Sensor, value: number, unit: TemperatureUnit): number {
+  return inFahrenheit(sensor, unit) ? (value - 32) / 1.8 : value;
 }

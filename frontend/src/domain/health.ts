@@ -1,8 +1,15 @@
 /** What the bridge's verdicts come to for the page. Nothing is judged here: no rule, no range. */
 import type { HealthReason, Judgement, TagHealth, Verdict } from '../contract/types';
 import { S } from '../strings';
-import { beyondLimitText, durationText, readingText, shortAgeText, valueText } from './format';
-import type { Catalogue, TemperatureUnit } from './sensors';
+import {
+  beyondLimitText,
+  durationText,
+  readingText,
+  shortAgeText,
+  type TemperatureUnit,
+  valueText,
+} from './format';
+import type { Catalogue } from './sensors';
 import { shown } from './text';
 import type { Tag } from './twin';
 

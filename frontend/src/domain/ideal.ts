@@ -2,17 +2,10 @@
 import type { Field, Judgement } from '../contract/types';
 import type { MapPoint } from '../geometry/coordinates';
 import { S } from '../strings';
-import { differenceNumber, rangeText, withUnit } from './format';
+import { differenceNumber, rangeText, type TemperatureUnit, withUnit } from './format';
 import { speciesText } from './marks';
 import { mix, paint, type Rgb, rgbText, type Shade } from './ramp';
-import {
-  partsOf,
-  type Ranges,
-  rangesFor,
-  type Sensor,
-  type Span,
-  type TemperatureUnit,
-} from './sensors';
+import { partsOf, type Ranges, rangesFor, type Sensor, type Span } from './sensors';
 import type { Tag } from './twin';
 
 /** How far beyond its ideal range a value is, in its unit: below 0 too low, 0 right; null: no ideal. */

@@ -5,7 +5,8 @@
 import type { History, Timeline, WireTime } from '../contract/types';
 import { type Cell, csv } from './text';
 import { hasDate, secondsOf, type Span } from './time';
-import { type Catalogue, type TemperatureUnit, toShown, unitOf } from './sensors';
+import type { Catalogue } from './sensors';
+import { type TemperatureUnit, toShown, unitOf } from './format';
 import { type Missing, missingOf } from './timeline';
 
 /** A reading, or all finite readings of a bucket. */

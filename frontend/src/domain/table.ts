@@ -6,7 +6,8 @@ import { type Cell, csv, finder } from './text';
 import { type HouseHealth, reasonsText, severity, tryKind } from './health';
 import { memoLast, memoOne } from './memo';
 import { speciesText } from './marks';
-import { type Catalogue, type Sensor, type TemperatureUnit, toShown, unitOf } from './sensors';
+import type { Catalogue, Sensor } from './sensors';
+import { type TemperatureUnit, toShown, unitOf } from './format';
 import { compareIds, type Tag } from './twin';
 
 export interface Row {

@@ -1,10 +1,10 @@
 /** What to draw, from the data: one list each of pins, blooms and boxes. Pure. */
 import type { Verdict } from '../contract/types';
 import { ageSeconds, freshness, type Ageing } from '../domain/time';
-import { readingText } from '../domain/format';
+import { readingText, type TemperatureUnit } from '../domain/format';
 import { isBad, type HouseHealth } from '../domain/health';
 import { memoLast, memoOne } from '../domain/memo';
-import { partsOf, type Sensor, type TemperatureUnit } from '../domain/sensors';
+import { partsOf, type Sensor } from '../domain/sensors';
 import { speciesLooks, UNKNOWN_SPECIES, type BloomLook } from '../domain/marks';
 import { shown } from '../domain/text';
 import { equal, type Tag } from '../domain/twin';

@@ -7,20 +7,17 @@ import type { Field, Grade, NoEstimate, Place, Schemas, TagHealth } from '../con
 import { cellAt } from '../domain/field';
 import {
   differenceNumber,
+  differenceToShown,
   metresText,
   numberText,
   percentText,
   shortAgeText,
+  type TemperatureUnit,
   valueText,
   withUnit,
 } from '../domain/format';
 import type { HouseHealth } from '../domain/health';
-import {
-  differenceToShown,
-  isMeasured,
-  type Sensor,
-  type TemperatureUnit,
-} from '../domain/sensors';
+import { isMeasured, type Sensor } from '../domain/sensors';
 import { errorColours, NINE_OF_TEN, plusMinus } from '../domain/sureness';
 import { shown } from '../domain/text';
 import { ageSeconds, type When } from '../domain/time';

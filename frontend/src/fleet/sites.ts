@@ -2,8 +2,6 @@
 import { timeOfDay } from '../clock';
 import { isObject } from '../contract/check';
 import type { Verdict, WireTime } from '../contract/types';
-import { VERDICTS } from '../domain/health';
-import { secondsOf } from '../domain/time';
 import { LOCALE } from '../strings';
 
 /** An entry of `/api/sites`; see the server's `overview.py`. */
@@ -48,6 +46,9 @@ export type Sites = ReadonlyMap<string, Site>;
 
 export const FILTERS = ['all', 'critical', 'stressed', 'silent', 'healthy'] as const;
 export type Filter = (typeof FILTERS)[number];
+
+/** The worst first. Not those of `domain/health`, which the first view here does without. */
+const VERDICTS: readonly Verdict[] = ['critical', 'stressed', 'unknown', 'healthy'];
 
 function isSite(value: unknown): value is Site {
   return (
@@ -174,7 +175,7 @@ export function timeText(at: number): string {
   return (Math.abs(timeOfDay() - at) < DAY_MS / 2 ? clockTime : dateAndTime).format(at);
 }
 
-export const ms = (time: WireTime): number => secondsOf(time) * 1000;
+export const ms = ({ sec, nanosec }: WireTime): number => sec * 1000 + nanosec / 1e6;
 
 /** When that was, so many seconds ago, to the second. */
 export const silentAt = (lagS: number): number =>

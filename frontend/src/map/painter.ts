@@ -5,7 +5,8 @@ import { edgesOf, fieldPixels, smoothDetail } from '../domain/field';
 import type { HouseHealth } from '../domain/health';
 import { fieldShade } from '../domain/ramp';
 import { cellsWhere, idealShade, withOld } from '../domain/ideal';
-import type { Sensor, TemperatureUnit } from '../domain/sensors';
+import type { Sensor } from '../domain/sensors';
+import type { TemperatureUnit } from '../domain/format';
 import type { Tag } from '../domain/twin';
 import { errorShade } from '../domain/sureness';
 import {

@@ -1,6 +1,7 @@
 import { useId, useState, type JSX } from 'react';
 
-import { fromShown, type Sensor, type TemperatureUnit, toShown, unitOf } from '../domain/sensors';
+import type { Sensor } from '../domain/sensors';
+import { fromShown, type TemperatureUnit, toShown, unitOf } from '../domain/format';
 import { S } from '../strings';
 
 /**

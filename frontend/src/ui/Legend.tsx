@@ -1,10 +1,17 @@
 import type { CSSProperties, JSX } from 'react';
 
 import type { FieldQuality } from '../contract/types';
-import { differenceNumber, readingText, valueText, withUnit } from '../domain/format';
+import {
+  differenceNumber,
+  readingText,
+  type TemperatureUnit,
+  unitOf,
+  valueText,
+  withUnit,
+} from '../domain/format';
 import { idealsText } from '../domain/ideal';
 import { fraction, rgbText, sensorColour, type Range } from '../domain/ramp';
-import { type Sensor, type Span, type TemperatureUnit, unitOf } from '../domain/sensors';
+import type { Sensor, Span } from '../domain/sensors';
 import { shown } from '../domain/text';
 import { useApp } from '../store/app';
 import {

@@ -1,8 +1,7 @@
 import type { JSX } from 'react';
 
 import { copyLink, reportLink, saveMap, saveTable, viewAddress } from '../export/actions';
-import { failureText } from '../domain/format';
-import type { TemperatureUnit } from '../domain/sensors';
+import { failureText, type TemperatureUnit } from '../domain/format';
 import { prefer, useApp } from '../store/app';
 import type { Settings } from '../store/settings';
 import { S } from '../strings';

@@ -7,10 +7,12 @@ import {
   metresText,
   percentText,
   readingText,
+  type TemperatureUnit,
+  unitOf,
   valueText,
 } from '../domain/format';
 import { isBack, isBad, rangeReason, sideOf, tryKind } from '../domain/health';
-import { rangesFor, type TemperatureUnit, unitOf } from '../domain/sensors';
+import { rangesFor } from '../domain/sensors';
 import { speciesText } from '../domain/marks';
 import { shown } from '../domain/text';
 import type { Tag } from '../domain/twin';

@@ -1,7 +1,13 @@
 import { Fragment, memo, type JSX, type ReactNode } from 'react';
 
 import type { When } from '../domain/time';
-import { farOffText, percentText, shortAgeText, valueText } from '../domain/format';
+import {
+  farOffText,
+  percentText,
+  shortAgeText,
+  type TemperatureUnit,
+  valueText,
+} from '../domain/format';
 import type { TagHealth } from '../contract/types';
 import {
   beyondText,
@@ -12,7 +18,7 @@ import {
   sideOf,
   worstReason,
 } from '../domain/health';
-import type { Catalogue, Sensor, TemperatureUnit } from '../domain/sensors';
+import type { Catalogue, Sensor } from '../domain/sensors';
 import { speciesText } from '../domain/marks';
 import { shown } from '../domain/text';
 import type { Tag } from '../domain/twin';

@@ -10,7 +10,8 @@ import {
 } from 'react';
 
 import { rgbText, sensorColour } from '../domain/ramp';
-import { type Sensor, unitOf } from '../domain/sensors';
+import type { Sensor } from '../domain/sensors';
+import { unitOf } from '../domain/format';
 import type { AreaHead } from '../domain/table';
 import { shown } from '../domain/text';
 import { act, store, useApp } from '../store/app';

@@ -1,7 +1,8 @@
 import type { JSX } from 'react';
 
 import type { TagHealth } from '../contract/types';
-import type { Sensor, TemperatureUnit } from '../domain/sensors';
+import type { Sensor } from '../domain/sensors';
+import type { TemperatureUnit } from '../domain/format';
 import { shown } from '../domain/text';
 import { differenceShown, trendOf } from '../domain/difference';
 import type { Tag } from '../domain/twin';

@@ -1,6 +1,5 @@
 /** What one chart shows: one sensor, as one or several tags read it. Pure. */
-import { fetchTimeline } from '../contract/past';
-import { fetchSeries } from '../contract/series';
+import { fetchSeries, fetchTimeline } from '../contract/past';
 import {
   type Catalogue,
   type Catalogues,

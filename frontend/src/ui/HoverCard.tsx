@@ -6,7 +6,7 @@ import { rangesFor } from '../domain/sensors';
 import { speciesText } from '../domain/marks';
 import { shown } from '../domain/text';
 import type { Tag } from '../domain/twin';
-import { beside } from '../geometry/beside';
+import { beside } from '../geometry/clear';
 import { pinUnderMouse, type PinUnderMouse } from '../map/commands';
 import { useApp } from '../store/app';
 import { useSelected } from '../store/create';

@@ -1,8 +1,8 @@
 /** What the page has of the estimate, loaded when it is first needed. */
-import type * as EstimateParts from '../estimate/parts';
+import type * as EstimateParts from '../parts/estimate';
 import { inTime } from './inTime';
 
-const parts = (): Promise<typeof EstimateParts> => import('../estimate/parts');
+const parts = (): Promise<typeof EstimateParts> => import('../parts/estimate');
 
 export const AdviceMarks = inTime(async () => (await parts()).AdviceMarks);
 export const CardEstimate = inTime(async () => (await parts()).CardEstimate);

@@ -1,7 +1,7 @@
 /** What comes behind the first view at three places of it; of a robot only where there is one. */
 import type { JSX } from 'react';
 
-import type * as RobotParts from '../robot/parts';
+import type * as RobotParts from '../parts/robot';
 import { useApp } from '../store/app';
 import { robotFrame, useSelected } from '../store/create';
 import { selectShown } from '../store/moment';
@@ -9,7 +9,7 @@ import { HoverCard } from './HoverCard';
 import { inTime } from './inTime';
 import { Keys } from './Keys';
 
-const robot = (): Promise<typeof RobotParts> => import('../robot/parts');
+const robot = (): Promise<typeof RobotParts> => import('../parts/robot');
 const RobotLayer = inTime(async () => (await robot()).RobotLayer);
 const RobotFact = inTime(async () => (await robot()).RobotFact);
 const RobotChoice = inTime(async () => (await robot()).RobotChoice);

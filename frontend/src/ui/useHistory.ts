@@ -2,7 +2,7 @@ import { fetchHistory } from '../contract/api';
 import type { TagHistory, WireTime } from '../contract/types';
 import { secondsOf } from '../domain/time';
 import { memoLast } from '../domain/memo';
-import { useFetched } from '../store/useFetched';
+import { useFetched } from '../store/fetcher';
 
 /** Of the last scans and tries those that had been made by then, ROS seconds; null: now. */
 export const asOf = memoLast((history: TagHistory, moment: number | null): TagHistory => {

@@ -35,7 +35,7 @@ const TABLE: Table = {
   ],
   export: ['strings', 'clock', 'geometry', 'domain', 'draw', 'store', 'map'],
   charts: [
-    ...['strings', 'clock', 'contract', 'geometry', 'domain', 'store', 'widgets', 'export'],
+    ...['strings', 'clock', 'contract', 'geometry', 'domain', 'draw', 'store', 'widgets', 'export'],
     ...['notes', 'styles', 'npm:react', 'npm:uplot'],
   ],
   // Loaded when first needed: what the page has of the estimate, and of the robot.

@@ -19,7 +19,7 @@ const PALETTE: BarPalette = {
   surface: 'surface',
   font: '11px sans-serif',
 };
-const NOTHING = { scans: 0, failures: 0, looks: 0, pestsSeen: 0, pestsCleared: 0 };
+const NOTHING = { scans: 0, failures: 0, looks: 0, pests_seen: 0, pests_cleared: 0 };
 
 const drawn = (
   over: Partial<Timeline>,
@@ -44,10 +44,10 @@ test('scans stand upwards and failures hang downwards, from one line', () => {
 });
 
 test('a pest is a full triangle, one that is gone an empty ring; who needs somebody is on top', () => {
-  const seen = drawn({ buckets: [{ ...NOTHING, start: 150, pestsSeen: 1, pestsCleared: 1 }] });
+  const seen = drawn({ buckets: [{ ...NOTHING, start: 150, pests_seen: 1, pests_cleared: 1 }] });
   expect(seen.named('fill').map(({ state }) => state['fillStyle'])).toEqual(['pest']);
   expect(seen.named('arc')).toEqual([]);
-  const cleared = drawn({ buckets: [{ ...NOTHING, start: 150, pestsCleared: 1 }] });
+  const cleared = drawn({ buckets: [{ ...NOTHING, start: 150, pests_cleared: 1 }] });
   expect(cleared.named('arc')).toHaveLength(1);
   expect(cleared.named('fill').map(({ state }) => state['fillStyle'])).toEqual(['surface']);
 });

@@ -1,6 +1,6 @@
 /** Draws the bar. Each mark has a shape and a place of its own; colour comes on top. */
 import type { Tick, Timeline } from '../domain/timeline';
-import { clear, type Surface } from '../draw/surface';
+import { clear, hatch, type Surface } from '../draw/surface';
 import {
   type Axis,
   beforeMemory,
@@ -49,12 +49,12 @@ export function drawBar(surface: Surface, bar: Bar, palette: BarPalette): void {
   clear(surface);
   context.save();
   const before = timeline && beforeMemory(timeline, axis);
-  if (before) hatch(context, before, palette.line, 1);
+  if (before) hatched(context, before, palette.line, 1);
   for (const missing of stretchesOf(timeline?.missing ?? [], axis)) {
-    hatch(context, missing, palette.line, 1);
+    hatched(context, missing, palette.line, 1);
   }
   for (const silence of stretchesOf(timeline?.silences ?? [], axis)) {
-    hatch(context, silence, palette.silence, -1);
+    hatched(context, silence, palette.silence, -1);
   }
   drawTicks(context, bar, palette);
   context.strokeStyle = palette.muted;
@@ -65,31 +65,15 @@ export function drawBar(surface: Surface, bar: Bar, palette: BarPalette): void {
   context.restore();
 }
 
-/** Slanted lines over a stretch; `slant` 1 leans to the right, -1 to the left. */
-function hatch(
+function hatched(
   context: CanvasRenderingContext2D,
   { x, width }: Stretch,
   colour: string,
   slant: 1 | -1,
 ): void {
-  context.save();
-  context.beginPath();
-  context.rect(x, MARKS_PX, width, SCANS_PX + FAILURES_PX);
-  context.clip();
   context.strokeStyle = colour;
   context.lineWidth = 1.5;
-  const height = SCANS_PX + FAILURES_PX;
-  const first = Math.floor((x - height) / HATCH_PX) * HATCH_PX;
-  for (let at = first; at < x + width + height; at += HATCH_PX) {
-    line(
-      context,
-      at,
-      slant > 0 ? FLOOR_PX : MARKS_PX,
-      at + height,
-      slant > 0 ? MARKS_PX : FLOOR_PX,
-    );
-  }
-  context.restore();
+  hatch(context, x, MARKS_PX, { width, height: SCANS_PX + FAILURES_PX }, HATCH_PX, slant);
 }
 
 function drawTicks(context: CanvasRenderingContext2D, bar: Bar, palette: BarPalette): void {
@@ -120,7 +104,7 @@ function drawColumns(
   axisWidth: number,
   palette: BarPalette,
 ): void {
-  for (const { x, width, scanHeight, failureHeight, pestsSeen, pestsCleared } of columns) {
+  for (const { x, width, scanHeight, failureHeight, pests_seen, pests_cleared } of columns) {
     const inner = Math.max(1, width - 1);
     if (scanHeight > 0) {
       context.fillStyle = palette.scan;
@@ -137,9 +121,9 @@ function drawColumns(
     }
     // Whole, also at the end of the bar.
     const middle = Math.min(x + width / 2, axisWidth - 5);
-    if (pestsSeen > 0) drawPest(context, middle, palette);
+    if (pests_seen > 0) drawPest(context, middle, palette);
     // Where both lie in one column, the one that needs somebody is on top.
-    else if (pestsCleared > 0) drawCleared(context, middle, palette);
+    else if (pests_cleared > 0) drawCleared(context, middle, palette);
   }
 }
 

@@ -259,8 +259,6 @@ function dayBefore({ from, to }: Span, dayS: number): Span | null {
   return to > dayS ? { from: Math.max(0, from - dayS), to: to - dayS } : null;
 }
 
-/** From what is chosen to the charts that it makes. Pure. */
-
 /** One chart: a sensor, and the tags whose readings of it are its lines. */
 export interface Plan {
   readonly sensor: string;

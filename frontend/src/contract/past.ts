@@ -62,8 +62,6 @@ export const fetchTimeline = (
     tag_id: tagId,
   });
 
-/** The route of one sensor's past, and the address of the same as rows to take away. */
-
 /** What the server gives at most of each. */
 const MAX_POINTS = 5_000;
 

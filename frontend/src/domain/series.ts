@@ -106,8 +106,6 @@ export function pointAt(series: Series, moment: number): Point | null {
 export const lastUntil = ({ points }: Series, moment: number): Point | null =>
   points.findLast(({ at }) => at <= moment) ?? null;
 
-/** What a chart shows, as rows: for the keyboard, for screen readers, and to take away. */
-
 /** Times are ROS seconds, values in the sensor's own unit. */
 export interface SeriesRow extends Omit<Point, 'n'> {
   readonly kind: 'reading' | 'bucket' | 'gap' | Missing['why'] | Mark['kind'];

@@ -1,7 +1,7 @@
 /** What happened when, and how far back anything is remembered. Times are ROS seconds. */
 import type { Timeline as WireTimeline } from '../contract/types';
 import { LOCALE } from '../strings';
-import { dayFormat, secondsOf, type Span } from './time';
+import { dayFormat, secondsOf, type Span, two } from './time';
 
 /** What happened in one bucket. */
 export interface Happened extends Omit<WireTimeline['buckets'][number], 'start'> {
@@ -145,8 +145,6 @@ const daysOf = (day: Date): number =>
   Math.round(Date.UTC(day.getFullYear(), day.getMonth(), day.getDate()) / 1000 / DAY) + 3;
 
 const monthFormat = new Intl.DateTimeFormat(LOCALE, { month: 'short' });
-
-const two = (value: number): string => String(value).padStart(2, '0');
 
 function clockText(date: Date, step: number): string {
   const text = `${two(date.getHours())}:${two(date.getMinutes())}`;

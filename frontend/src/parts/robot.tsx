@@ -132,8 +132,6 @@ export function RobotChoice(): JSX.Element {
   );
 }
 
-/** What the robot has said; how old it is by the twin's time; where it has been. */
-
 const NOTHING: RobotNow = { position: null, plan: null, battery: null };
 
 /** What it says of itself. */

@@ -176,7 +176,6 @@ function line(
 }
 
 /** The bar's colours, as the style sheet has them now: light or dark, forced, or for paper. */
-
 export function readBarPalette(): BarPalette {
   const style = getComputedStyle(document.documentElement);
   const isForced = window.matchMedia('(forced-colors: active)').matches;

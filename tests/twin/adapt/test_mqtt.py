@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from lupin_twin.adapt.mqtt_topics import Broker, Measured, broker_of, measured
+from lupin_twin.adapt.mqtt import Broker, Measured, broker_of, measured
 from lupin_twin.adapt.table import ConfigError, Table
 from lupin_twin.core.drops import Rejected
 

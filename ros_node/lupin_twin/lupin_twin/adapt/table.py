@@ -141,7 +141,9 @@ class Value:
             number = float("" if isinstance(raw, bool) else raw) * self.factor + self.offset
         except (TypeError, ValueError, OverflowError):
             raise Rejected(f"{what} is {shown(raw)}, expected a number") from None
-        if not self.low <= number <= self.high or math.isinf(number):  # NaN is in no range
+        if not math.isfinite(number):
+            raise Rejected(f"{what} is {number:g}, expected a finite number")
+        if not self.low <= number <= self.high:
             raise Rejected(f"{what} is {number:g}, must be from {self.low:g} to {self.high:g}")
         return number
 

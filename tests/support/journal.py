@@ -7,6 +7,7 @@ from pathlib import Path
 
 from lupin_twin.core.diagnostics import Origin
 from lupin_twin.core.journal_condition import Condition, JournalState
+from lupin_twin.core.parameters import World
 from lupin_twin.core.state import Bloom, Flower, Inspection, Pin, Pose, Reading, Scan, Write
 from lupin_twin.journal.file import JournalFile
 from lupin_twin.journal.fold import Restored
@@ -145,7 +146,7 @@ def recording(
     origin: Origin = "robot",
 ) -> Iterator[Journal]:
     """A journal at work, its clock begun."""
-    journal = Journal(path, "/test/lupin_twin", limits, max_weight, origin=origin)
+    journal = Journal(path, "/test/lupin_twin", limits, max_weight, world=World(origin))
     try:
         journal.begin(now)
         yield journal

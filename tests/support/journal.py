@@ -5,7 +5,6 @@ from collections.abc import Iterable, Iterator
 from contextlib import closing, contextmanager
 from pathlib import Path
 
-from lupin_twin.core.diagnostics import Origin
 from lupin_twin.core.journal_condition import Condition, JournalState
 from lupin_twin.core.parameters import World
 from lupin_twin.core.state import Bloom, Flower, Inspection, Pin, Pose, Reading, Scan, Write
@@ -143,10 +142,10 @@ def recording(
     *,
     limits: Limits = LIMITS,
     max_weight: int = MAX_WEIGHT,
-    origin: Origin = "robot",
+    world: World = World(),
 ) -> Iterator[Journal]:
     """A journal at work, its clock begun."""
-    journal = Journal(path, "/test/lupin_twin", limits, max_weight, world=World(origin))
+    journal = Journal(path, "/test/lupin_twin", limits, max_weight, world=world)
     try:
         journal.begin(now)
         yield journal

@@ -19,6 +19,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
+from lupin_twin.core.parameters import World
 from lupin_twin.core.past import (
     HOUR_NS,
     MAX_SCANS,
@@ -33,14 +34,14 @@ from lupin_twin.core.past import (
     recent_of,
 )
 from lupin_twin.core.state import sure_species
-from lupin_twin.journal.appending import PURGED_SEQ
+from lupin_twin.journal.appending import PURGED_SEQ, Stretch, simulated
 from lupin_twin.journal.checking import WRITTEN
 from lupin_twin.journal.events import FROM_SCAN
 from lupin_twin.journal.hours import DELETED, FORGOTTEN, count_rows
 from lupin_twin.journal.notes import id_behind, number_of
 from lupin_twin.journal.retention import RECORD, Stretches, delete_recorded, kept
 from lupin_twin.journal.rows import KIND_FLOWER, STATUS_OK, named_numbers, sensor_names
-from lupin_twin.journal.runs import Span, cut, runs, span_at, spans
+from lupin_twin.journal.runs import Span, cut, runs, span_at, spans, world_of
 from lupin_twin.journal.schema import (
     DAY_LENGTH,
     LOCAL_SITE,
@@ -126,12 +127,17 @@ class Lot(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Followed:
-    """How far a file is: the journal it is of, the last number, and as in `Condition`."""
+    """How far a file is: the journal it is of, the last number, what it is of; as in `Condition`.
+
+    A twin's own has no last number, and is complete up to its newest row.
+    """
 
     journal: str
     last: int
+    world: World
     complete_ns: int
     kept_ns: Stretches
+    simulated_ns: Stretch | None
 
 
 class NotALotError(ValueError):
@@ -213,9 +219,14 @@ def followed(path: Path) -> Followed:
 
 
 def _followed(connection: sqlite3.Connection) -> Followed:
-    complete_ns = int(get_meta(connection, _COMPLETE) or 0)
+    log = SiteLog(connection)
     return Followed(
-        _journal_id(SiteLog(connection)), _last(connection), complete_ns, kept(connection)
+        _journal_id(log),
+        _last(connection),
+        world_of(log),
+        int(log.meta(_COMPLETE) or 0) or _newest_ns(connection) or 0,
+        kept(connection),
+        simulated(connection),
     )
 
 

@@ -37,7 +37,7 @@ from lupin_twin.core.state import sure_species
 from lupin_twin.journal.appending import PURGED_SEQ, Stretch, simulated
 from lupin_twin.journal.checking import WRITTEN
 from lupin_twin.journal.events import FROM_SCAN
-from lupin_twin.journal.hours import DELETED, FORGOTTEN, count_rows
+from lupin_twin.journal.hours import DELETED, FORGOTTEN, TALLIED, count_rows
 from lupin_twin.journal.notes import id_behind, number_of
 from lupin_twin.journal.retention import RECORD, Stretches, delete_recorded, kept
 from lupin_twin.journal.rows import KIND_FLOWER, STATUS_OK, named_numbers, sensor_names
@@ -99,9 +99,10 @@ _COUNTED: Final = {
         " WHERE s.site = :site AND s.series > :after AND s.series <= :last"
     ),
     "tally": (
-        f"{_WITH} SELECT t.* FROM tally AS t JOIN purged AS p ON p.run = t.run"
-        " AND t.hour <= p.hour WHERE t.site = :site"
-        " AND (:after = 0 OR (t.run, t.hour) IN (SELECT run, hour FROM late))"
+        f"{_WITH} SELECT t.* FROM purged AS p CROSS JOIN tally AS t ON t.site = :site"
+        " AND t.run = p.run AND t.hour <= p.hour WHERE :after = 0"
+        " UNION SELECT t.* FROM late CROSS JOIN tally AS t ON t.site = :site AND t.run = late.run"
+        f" AND t.event IN {tuple(map(str, TALLIED))} AND t.hour = late.hour"
     ),
     "event": f"{_WITH} SELECT * FROM event WHERE site = :site AND {_EVENTS}",
 }

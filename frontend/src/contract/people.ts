@@ -38,8 +38,8 @@ export async function withdrawNote(kind: Draft['kind'], subject: string): Promis
 }
 
 /** The newest first, withdrawn ones too. */
-export const fetchComments = async (signal: AbortSignal): Promise<readonly Note[]> =>
-  (await answer('Notes', signal, 'api/notes', { kind: 'comment' })).notes;
+export const fetchNotes = async (signal: AbortSignal): Promise<readonly Note[]> =>
+  (await answer('Notes', signal, 'api/notes')).notes;
 
 export async function withdrawComment(id: string): Promise<void> {
   await ask(`api/notes/${encodeURIComponent(id)}`, { method: 'DELETE', headers: OWN });

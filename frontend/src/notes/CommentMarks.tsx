@@ -4,15 +4,15 @@ import { rosText, type Span } from '../domain/time';
 import { shown } from '../domain/text';
 import { act, useApp } from '../store/app';
 import { useSelected } from '../store/create';
-import { C, clustersOf, comments, subjectText, tagOf } from './comments';
+import { C, clustersOf, everySaid, saidText, subjectText, tagOf } from './comments';
 
-/** Comments that the text of one mark holds. */
+/** Notes that the text of one mark holds. */
 const MOST_TOLD = 5;
 /** Characters of each. */
 const LONGEST = 160;
 const NO_ALARMS = [] as const;
 
-/** Above a time axis: who said something about when. A click goes to that moment. */
+/** Above a time axis: who said, acknowledged or shelved what, and when. A click goes there. */
 export function CommentMarks({
   span,
   tagIds,
@@ -21,7 +21,7 @@ export function CommentMarks({
   /** Of these tags and of the greenhouse; none: all. */
   tagIds?: readonly string[];
 }): JSX.Element | null {
-  const all = useSelected(comments, (it) => it);
+  const all = useSelected(everySaid, (it) => it);
   const alarms = useApp((state) => state.twin.alarms?.alarms ?? NO_ALARMS);
   const { from, to } = span;
   const ids = tagIds?.join('\u0001');
@@ -36,12 +36,12 @@ export function CommentMarks({
   if (clusters.length === 0) return null;
   return (
     <ul className="comment-marks" aria-label={C.title} data-testid="comment-marks">
-      {clusters.map(({ at, comments: found }) => {
+      {clusters.map(({ at, said: found }) => {
         const share = (at - from) / (to - from);
-        const told = found.slice(-MOST_TOLD).map(({ id, by, subject, text, at: when }) => (
-          <span key={id}>
-            <bdi>{by}</bdi>, {rosText(when)}, <bdi>{subjectText(subject, alarms)}</bdi>:{' '}
-            <bdi>{shown(text, LONGEST)}</bdi>
+        const told = found.slice(-MOST_TOLD).map((one) => (
+          <span key={one.id}>
+            <bdi>{one.by}</bdi>, {rosText(one.at)}, <bdi>{subjectText(one.subject, alarms)}</bdi>:{' '}
+            <bdi>{shown(saidText(one), LONGEST)}</bdi>
           </span>
         ));
         return (

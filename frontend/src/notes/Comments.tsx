@@ -8,7 +8,7 @@ import { useApp } from '../store/app';
 import { person, useSelected } from '../store/create';
 import { selectShown } from '../store/moment';
 import { Disclosure, useClose } from '../widgets/controls';
-import { C, type Comment, comments } from './comments';
+import { C, everySaid, type Said as Comment } from './comments';
 
 /** Of one subject, the newest. */
 const MOST_SHOWN = 20;
@@ -65,9 +65,11 @@ export function Said({
   subject: string;
   moment: number | null;
 }): JSX.Element | null {
-  const all = useSelected(comments, (it) => it);
+  const all = useSelected(everySaid, (it) => it);
   const who = useSelected(person, (it) => it);
-  const found = all.filter((it) => it.subject === subject && (moment === null || it.at <= moment));
+  const found = all.filter(
+    (it) => it.kind === 'comment' && it.subject === subject && (moment === null || it.at <= moment),
+  );
   if (found.length === 0) return null;
   const mayWithdraw = ({ by }: Comment): boolean =>
     who?.can_write_notes === true && (by === who.name || who.role === 'admin');

@@ -1,32 +1,36 @@
-/** The comments of the log: fetched whenever the bridge says that there are more notes. */
-import { fetchComments } from '../contract/people';
+/** What people said, by the log: fetched whenever the bridge says that there are more notes. */
+import { fetchNotes } from '../contract/people';
 import type { Alarm, Note } from '../contract/types';
 import { shown } from '../domain/text';
-import { secondsOf, type Span } from '../domain/time';
+import { rosText, secondsOf, type Span } from '../domain/time';
 import { store } from '../store/app';
 import { createStore } from '../store/create';
 import { createFetcher } from '../store/fetcher';
 import { LANGUAGE, S } from '../strings';
 import { COMMENTS } from '../words/comments';
 
-export interface Comment {
+export interface Said {
   readonly id: string;
+  readonly kind: Note['kind'];
   readonly subject: string;
   readonly text: string;
   readonly by: string;
   /** The moment that it is about, ROS seconds. */
   readonly at: number;
+  /** Of `shelve` its end, ROS seconds; null: the alarm is not shelved any more. */
+  readonly until: number | null;
 }
 
-/** Those that stand, the oldest moment first. */
-export const comments = createStore<readonly Comment[], readonly Comment[]>([], (_, next) => next);
+/** What stands, the oldest moment first. */
+export const everySaid = createStore<readonly Said[], readonly Said[]>([], (_, next) => next);
 
-export const commentsIn = (notes: readonly Note[]): Comment[] =>
+export const saidIn = (notes: readonly Note[]): Said[] =>
   notes
     .filter(({ withdrawn_by: by }) => by === null)
-    .map(({ id, subject, text, by, made_at: made, until }) => ({
-      ...{ id, subject, by, at: secondsOf(until ?? made) },
-      text: text.replace(/\s+/g, ' '),
+    .map(({ id, kind, subject, text, by, made_at: made, until }) => ({
+      ...{ id, kind, subject, by, text: text.replace(/\s+/g, ' ') },
+      at: secondsOf((kind === 'comment' ? until : null) ?? made),
+      until: until && secondsOf(until),
     }))
     .reverse()
     .sort((one, other) => one.at - other.at);
@@ -37,14 +41,14 @@ export function startComments(): () => void {
   const fetcher = createFetcher<readonly Note[]>({
     paceMs: PACE_MS,
     onValue: (notes) => {
-      comments.dispatch(commentsIn(notes));
+      everySaid.dispatch(saidIn(notes));
     },
   });
   const update = (): void => {
     const { alarms, connection } = store.get().twin;
     // A log without notes is not asked for any.
     if (!alarms?.notes) return;
-    fetcher.want({ key: `${connection.epoch}|${alarms.notes}`, run: fetchComments });
+    fetcher.want({ key: `${connection.epoch}|${alarms.notes}`, run: fetchNotes });
   };
   update();
   const stop = store.subscribe(update);
@@ -54,31 +58,31 @@ export function startComments(): () => void {
   };
 }
 
-/** Comments so near to each other that one mark stands for them. */
+/** So near to each other that one mark stands for them. */
 export interface Cluster {
   readonly at: number;
-  readonly comments: readonly Comment[];
+  readonly said: readonly Said[];
 }
 
 /** Nearer than this, as a share of the span, marks would cover each other. */
 const NEAR = 0.02;
 
 /** From the oldest; `found` is in that order. */
-export function clustersOf(found: readonly Comment[], { from, to }: Span): Cluster[] {
-  const clusters: { at: number; comments: Comment[] }[] = [];
-  for (const comment of found) {
-    const { at } = comment;
+export function clustersOf(found: readonly Said[], { from, to }: Span): Cluster[] {
+  const clusters: { at: number; said: Said[] }[] = [];
+  for (const one of found) {
+    const { at } = one;
     if (at < from || at > to) continue;
     const last = clusters.at(-1);
-    if (last && at - last.at < NEAR * (to - from)) last.comments.push(comment);
-    else clusters.push({ at, comments: [comment] });
+    if (last && at - last.at < NEAR * (to - from)) last.said.push(one);
+    else clusters.push({ at, said: [one] });
   }
   return clusters;
 }
 
 export const C = COMMENTS[LANGUAGE];
 
-/** Which tag a comment is about; null: the greenhouse, or an alarm that the page does not know. */
+/** Which tag it is about; null: the greenhouse, or an alarm that the page does not know. */
 export function tagOf(subject: string, alarms: readonly Alarm[]): string | null {
   const [kind, id] = [
     subject.slice(0, subject.indexOf(':')),
@@ -95,4 +99,12 @@ export function subjectText(subject: string, alarms: readonly Alarm[]): string {
   const tagId = tagOf(subject, alarms);
   const tag = tagId === null ? '' : S.card(shown(tagId, 24));
   return subject.startsWith('alarm:') ? C.alarm(tag) : tag;
+}
+
+/** What was said: a comment's words, or what became of an alarm, and why. */
+export function saidText({ kind, text, until }: Said): string {
+  if (kind === 'comment') return text;
+  const shelved = until === null ? C.unshelved : C.shelved(rosText(until));
+  const what = kind === 'acknowledge' ? C.acknowledged : shelved;
+  return text === '' ? what : `${what}: ${text}`;
 }

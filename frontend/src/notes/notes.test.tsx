@@ -8,7 +8,7 @@ import { alarm, alarms } from '../testing/alarms';
 import { showTags } from '../testing/page';
 import { CommentMarks } from './CommentMarks';
 import { Comments, SiteComment } from './Comments';
-import { clustersOf, comments, commentsIn, startComments } from './comments';
+import { clustersOf, everySaid, saidIn, startComments } from './comments';
 
 const said = (id: string, made: number, over: Partial<Note> = {}): Note => ({
   id,
@@ -37,7 +37,7 @@ let notes: readonly Note[] = [];
 beforeEach(() => {
   asked = [];
   notes = [];
-  comments.dispatch([]);
+  everySaid.dispatch([]);
   person.dispatch(null);
   showTags([]);
   vi.stubGlobal('fetch', (url: URL, { method = 'GET', body }: RequestInit) => {
@@ -56,16 +56,16 @@ const tell = (count: number): void => {
 test('a comment stands where it is about, until it is withdrawn', () => {
   const then = said('then', 900, { until: { sec: 100, nanosec: 0 }, text: 'two\nlines' });
   const gone = said('gone', 950, { withdrawn_by: 'anna' });
-  expect(commentsIn([gone, then, said('now', 800)])).toEqual([
-    { id: 'then', subject: 'tag:7', text: 'two lines', by: 'anna', at: 100 },
-    { id: 'now', subject: 'tag:7', text: 'now', by: 'anna', at: 800 },
+  expect(saidIn([gone, then, said('now', 800)])).toEqual([
+    expect.objectContaining({ id: 'then', text: 'two lines', by: 'anna', at: 100 }),
+    expect.objectContaining({ id: 'now', text: 'now', by: 'anna', at: 800 }),
   ]);
 });
 
 test('marks that would cover each other are one, and those outside of the span none', () => {
-  const found = commentsIn([950, 510, 501, 500, 10].map((at) => said(String(at), at)));
+  const found = saidIn([950, 510, 501, 500, 10].map((at) => said(String(at), at)));
   const clusters = clustersOf(found, { from: 100, to: 1_100 });
-  expect(clusters.map((it) => [it.at, it.comments.length])).toEqual([
+  expect(clusters.map((it) => [it.at, it.said.length])).toEqual([
     [500, 3],
     [950, 1],
   ]);
@@ -83,13 +83,13 @@ test('what is said is fetched when there is more of it, and shown with name and 
   expect(screen.queryByText('other')).toBeNull();
   expect(screen.queryByRole('button')).toBeNull();
   tell(2);
-  expect(asked).toEqual(['GET /api/notes?kind=comment ']);
+  expect(asked).toEqual(['GET /api/notes ']);
   stop();
 });
 
 test('who may write does, and withdraws their own words alone', async () => {
   person.dispatch(ANNA);
-  comments.dispatch(commentsIn([said('mine', 800), said('bert’s', 700, { by: 'bert' })]));
+  everySaid.dispatch(saidIn([said('mine', 800), said('bert’s', 700, { by: 'bert' })]));
   render(<Comments subject="tag:7" name="Tag 7" />);
   expect(screen.getAllByRole('button', { name: /^Withdraw/ })).toHaveLength(1);
   fireEvent.click(screen.getByRole('button', { name: 'Withdraw: mine' }));
@@ -133,8 +133,8 @@ test('who looks back says it about the moment that is shown', async () => {
 
 test('a mark tells on its own who said what of which tag', () => {
   const hidden = 'a\u202ecod';
-  comments.dispatch(
-    commentsIn([said('n', 500, { text: hidden }), said('s', 90, { subject: 'site' })]),
+  everySaid.dispatch(
+    saidIn([said('n', 500, { text: hidden }), said('s', 90, { subject: 'site' })]),
   );
   render(<CommentMarks span={{ from: 0, to: 1_000 }} tagIds={['8']} />);
   expect(screen.getAllByRole('button').map((it) => it.textContent)).toEqual([
@@ -144,4 +144,25 @@ test('a mark tells on its own who said what of which tag', () => {
   expect(screen.getAllByRole('button').at(-1)?.textContent).toBe(
     'anna, sim 00:08:20, Tag 7: a\ufffdcod',
   );
+});
+
+test('a mark tells who acknowledged or shelved an alarm when, and the card lists comments alone', () => {
+  receive({ type: 'set', part: { alarms: alarms([alarm('cold')]) } });
+  const subject = `alarm:${alarm('cold').id}`;
+  everySaid.dispatch(
+    saidIn([
+      said('c', 900, { kind: 'shelve', subject, text: '' }),
+      said('b', 500, { kind: 'shelve', subject, text: 'vents', until: { sec: 900, nanosec: 0 } }),
+      said('a', 90, { kind: 'acknowledge', subject, text: '' }),
+    ]),
+  );
+  render(<CommentMarks span={{ from: 0, to: 1_000 }} />);
+  const name = alarm('cold').tag_id;
+  expect(screen.getAllByRole('button').map((it) => it.textContent)).toEqual([
+    `anna, sim 00:01:30, alarm at Tag ${name}: acknowledged`,
+    `anna, sim 00:08:20, alarm at Tag ${name}: shelved until sim 00:15:00: vents`,
+    `anna, sim 00:15:00, alarm at Tag ${name}: no longer shelved`,
+  ]);
+  render(<Comments subject={subject} name="alarm" />);
+  expect(screen.queryByTestId('comments')).toBeNull();
 });

@@ -1,4 +1,4 @@
-/** The words about comments, which come with what shows them; few, so all languages in one place. */
+/** The words about what people say, which come with what shows them; few, so all languages in one place. */
 import type { Language } from './languages';
 
 export const COMMENTS = {
@@ -8,6 +8,9 @@ export const COMMENTS = {
     commentOf: (name: string): string => `Comment: ${name}`,
     site: 'greenhouse',
     alarm: (tag: string): string => (tag ? `alarm at ${tag}` : 'alarm'),
+    acknowledged: 'acknowledged',
+    shelved: (until: string): string => `shelved until ${until}`,
+    unshelved: 'no longer shelved',
     now: 'Comment (now)',
     then: (at: string): string => `Comment (${at})`,
     send: 'Save',
@@ -22,6 +25,9 @@ export const COMMENTS = {
     commentOf: (name: string): string => `Kommentieren: ${name}`,
     site: 'Gewächshaus',
     alarm: (tag: string): string => (tag ? `Alarm an ${tag}` : 'Alarm'),
+    acknowledged: 'quittiert',
+    shelved: (until: string): string => `zurückgestellt bis ${until}`,
+    unshelved: 'wieder aktiviert',
     now: 'Kommentar (jetzt)',
     then: (at: string): string => `Kommentar (${at})`,
     send: 'Speichern',
@@ -36,6 +42,9 @@ export const COMMENTS = {
     commentOf: (name: string): string => `Opmerking: ${name}`,
     site: 'kas',
     alarm: (tag: string): string => (tag ? `alarm bij ${tag}` : 'alarm'),
+    acknowledged: 'bevestigd',
+    shelved: (until: string): string => `uitgesteld tot ${until}`,
+    unshelved: 'niet meer uitgesteld',
     now: 'Opmerking (nu)',
     then: (at: string): string => `Opmerking (${at})`,
     send: 'Opslaan',
@@ -50,6 +59,9 @@ export const COMMENTS = {
     commentOf: (name: string): string => `Comentar: ${name}`,
     site: 'invernadero',
     alarm: (tag: string): string => (tag ? `alarma en ${tag}` : 'alarma'),
+    acknowledged: 'reconocida',
+    shelved: (until: string): string => `aplazada hasta ${until}`,
+    unshelved: 'reactivada',
     now: 'Comentario (ahora)',
     then: (at: string): string => `Comentario (${at})`,
     send: 'Guardar',

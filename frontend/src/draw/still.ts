@@ -59,7 +59,7 @@ export function drawPicture(
 }
 
 /** A picture that lies in the map, of which only what it covers counts. */
-export interface Mask {
+interface Mask {
   readonly picture: HTMLCanvasElement;
   readonly placement: Placement;
 }

@@ -177,7 +177,7 @@ export function startSensors(): () => void {
  * Fetches the map's place and its picture. The map may grow between the two requests; a picture
  * of another size than announced is an error, and the caller tries again.
  */
-export async function loadMap(signal: AbortSignal): Promise<MapPicture> {
+async function loadMap(signal: AbortSignal): Promise<MapPicture> {
   const [grid, blob] = await Promise.all([
     answer('OccupancyGrid', signal, 'api/map'),
     get('api/map.png', signal).then((response) => response.blob()),

@@ -16,7 +16,7 @@ const PROVEN_MS = 5_000;
 /** What the operator is told. */
 export type Phase = 'connecting' | 'live' | 'stale' | 'offline' | 'reconnecting';
 
-export type Socket =
+type Socket =
   | { readonly kind: 'closed'; readonly retryAt: number }
   | { readonly kind: 'opening'; readonly since: number }
   | {
@@ -74,7 +74,7 @@ export const INITIAL: Connection = {
   status: null,
 };
 
-export interface Step {
+interface Step {
   readonly connection: Connection;
   readonly command: Command;
 }

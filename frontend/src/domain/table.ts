@@ -1,5 +1,6 @@
 /** Rows of the table: what is in a column, how it sorts, what a filter finds. */
 import type { TagHealth, Verdict, WireTime } from '../contract/types';
+import type { MapPoint } from '../geometry/coordinates';
 import { S } from '../strings';
 import { ageSeconds } from './time';
 import { type Cell, csv, finder } from './text';
@@ -33,7 +34,7 @@ export interface AreaHead {
 /** What the table has one below the other. */
 export type Line = Row | AreaHead;
 
-export interface Area {
+interface Area {
   /** Empty: that of the tags that are in none; it comes last. */
   readonly area: string;
   readonly rows: readonly Row[];
@@ -52,6 +53,27 @@ export function inAreas(rows: readonly Row[], areaOf: (tagId: string) => string)
   return found.sort((a, b) => Number(a.area === '') - Number(b.area === ''));
 }
 
+/** An area, and where its tags are. */
+export interface AreaOnMap {
+  readonly name: string;
+  readonly places: readonly MapPoint[];
+}
+
+export function areasOnMap(
+  tags: readonly Tag[],
+  areaOf: (tagId: string) => string,
+): readonly AreaOnMap[] {
+  const areas = new Map<string, MapPoint[]>();
+  for (const { id, at } of tags) {
+    const name = areaOf(id);
+    if (!at || name === '') continue;
+    const there = areas.get(name);
+    if (there) there.push(at);
+    else areas.set(name, [at]);
+  }
+  return [...areas].map(([name, places]) => ({ name, places }));
+}
+
 /** The rows with a head above each area's, if there is any area. */
 export function withHeads(areas: readonly Area[]): readonly Line[] {
   if (areas[0]?.area === '') return areas[0].rows;
@@ -64,7 +86,7 @@ export function withHeads(areas: readonly Area[]): readonly Line[] {
 type Key = number | string | null;
 
 /** What a column sorts by; null sorts last in both directions. */
-export function sortKey({ tag, health }: Row, column: string): Key {
+function sortKey({ tag, health }: Row, column: string): Key {
   switch (column) {
     case 'health':
       return severity(health);

@@ -5,6 +5,7 @@ import { FakeContext } from '../testing/canvas';
 import { estimated, fieldWith, sureness } from '../testing/field';
 import { DARK, LIGHT } from './palette';
 import {
+  drawAreas,
   drawBoxes,
   drawEdges,
   drawGridLabels,
@@ -69,6 +70,14 @@ test('boxes close their outline at the right place', () => {
     [90, 170],
   ]);
   expect(context.named('closePath')).toHaveLength(1);
+});
+
+test('an area is drawn round its tags, and has its name above it', () => {
+  const context = new FakeContext();
+  const places = [mapPoint(0, 0), mapPoint(1, 2)];
+  drawAreas(surface(context), view, [{ name: 'Bay 1', places }], LIGHT);
+  expect(context.named('strokeRect')[0]?.args).toEqual([40, 160, 60, 100]);
+  expect(context.named('fillText')[0]?.args).toEqual(['Bay 1', 40, 157]);
 });
 
 test('the grid’s numbers are round metres at their lines', () => {

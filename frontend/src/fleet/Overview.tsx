@@ -213,7 +213,7 @@ interface CardsProps {
   readonly asOf: number | null;
 }
 
-export function Cards({ shown, groups, words, asOf }: CardsProps): JSX.Element {
+function Cards({ shown, groups, words, asOf }: CardsProps): JSX.Element {
   const parts = useMemo(() => grouped(shown, groups), [shown, groups]);
   if (groups.length === 0) return <List sites={shown} words={words} asOf={asOf} />;
   return (
@@ -257,7 +257,7 @@ function groupText(sites: readonly Site[], words: FleetWords): string {
   ].join(' · ');
 }
 
-export function filterText(filter: Filter, words: FleetWords): string {
+function filterText(filter: Filter, words: FleetWords): string {
   return filter === 'all' || filter === 'silent' ? words[filter] : S.health[filter];
 }
 
@@ -337,7 +337,7 @@ function SmallMap({ src }: { src: string }): JSX.Element {
 }
 
 /** What no robot observed, or not now; null: that is not known, or need not be said. */
-export function originText({ origin }: Site): string | null {
+function originText({ origin }: Site): string | null {
   return origin in S.origin ? S.origin[origin as keyof typeof S.origin] : null;
 }
 

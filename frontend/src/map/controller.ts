@@ -13,7 +13,13 @@ import {
   type View,
 } from '../geometry/coordinates';
 import { act, moveViewport, store, type AppState } from '../store/app';
-import { selectHeat, selectListed, selectRange, selectSensor } from '../store/derived';
+import {
+  selectAreaOf,
+  selectHeat,
+  selectListed,
+  selectRange,
+  selectSensor,
+} from '../store/derived';
 import { selectNewest, selectShown, selectTag, type Shown } from '../store/moment';
 import { isPrinting } from '../store/theme';
 import { type Content, contentOf, coveredBoxes, MapCamera, together, watchCovered } from './camera';
@@ -149,6 +155,7 @@ export function runMap(
       selectSensor(state) !== selectSensor(before) ||
       selectRange(state) !== selectRange(before) ||
       selectHeat(state) !== selectHeat(before) ||
+      selectAreaOf(state) !== selectAreaOf(before) ||
       (changedTags && house.snapshot?.revision !== last.snapshot?.revision);
     if (stillChanged) spoil('still');
     if (

@@ -1,12 +1,14 @@
 import { beforeEach, describe, expect, test } from 'vitest';
 
 import { DARK, LIGHT } from '../draw/palette';
-import { act, receive, store } from '../store/app';
+import { cataloguesOf } from '../domain/sensors';
+import { act, prefer, receive, store } from '../store/app';
 import type { Layer } from '../store/view';
 import { FakeContext } from '../testing/canvas';
 import { fieldWith } from '../testing/field';
 import { judgement, reason } from '../testing/health';
 import { showField, showTags } from '../testing/page';
+import { FILE } from '../testing/sensors';
 import { readings, wireTag } from '../testing/tags';
 import { Painter, type Canvases } from './painter';
 
@@ -152,5 +154,18 @@ describe('painter', () => {
     show('field', 'smooth');
     painter.paintStill(store.get(), view, 0, true);
     expect(width()).toBe(16);
+  });
+
+  test('areas are drawn where the table is grouped by them', () => {
+    const value = cataloguesOf({ ...FILE, areas: { 'Bay 1': ['1'], 'Bay 2': ['2'] } });
+    receive({ type: 'set', part: { sensors: { value, state: 'ready', message: '' } } });
+    show();
+    painter.paintStill(store.get(), view, 0, true);
+    expect(named(canvases.still, 'strokeRect')).toHaveLength(0);
+    prefer({ byArea: true });
+    painter.paintStill(store.get(), view, 0, true);
+    // Tag 2 has no place.
+    expect(named(canvases.still, 'fillText').map(({ args }) => args[0])).toEqual(['Bay 1']);
+    expect(named(canvases.still, 'strokeRect')).toHaveLength(1);
   });
 });

@@ -33,6 +33,8 @@ import {
 } from '../draw/surface';
 import { buildScene, type Scene } from '../draw/scene';
 import {
+  cellsOf,
+  drawAreas,
   drawBoxes,
   drawEdges,
   drawGridLabels,
@@ -52,6 +54,7 @@ import type { Size, View } from '../geometry/coordinates';
 import { type Box, placeLabels, type Room } from '../geometry/clear';
 import type { AppState } from '../store/app';
 import {
+  selectAreas,
   selectHealth,
   selectHeat,
   selectListed,
@@ -83,7 +86,7 @@ const holding = memoLast((field: Field, old: Uint8Array | null) =>
   old ? cellsWhere(field, (cell) => old[cell] === 0) : field,
 );
 const tooOld = memoLast((field: Field, old: Uint8Array) =>
-  knownOf(cellsWhere(field, (cell) => old[cell] !== 0)),
+  cellsOf(field, (cell) => old[cell] !== 0 && !Number.isNaN(field.values[cell])),
 );
 const whole = memoOne((field: Field) => {
   const canvas = newCanvas(field.width, field.height);
@@ -199,6 +202,7 @@ export class Painter {
       const known = holding(heat.field, heat.old);
       if (isTold) drawEdges(surface, view, edges(known), this.#palette);
     }
+    drawAreas(surface, view, selectAreas(state), this.#palette, this.#textScale);
   }
 
   /** Inside the house is the floor of its map; without one, as far as the field was asked for. */

@@ -59,7 +59,7 @@ export function startComments(): () => void {
 }
 
 /** So near to each other that one mark stands for them. */
-export interface Cluster {
+interface Cluster {
   readonly at: number;
   readonly said: readonly Said[];
 }

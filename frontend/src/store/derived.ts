@@ -21,7 +21,15 @@ import {
   type Catalogues,
   type Sensor,
 } from '../domain/sensors';
-import { filterRows, inAreas, rowsOf, sortRows, type Row } from '../domain/table';
+import {
+  type AreaOnMap,
+  areasOnMap,
+  filterRows,
+  inAreas,
+  rowsOf,
+  sortRows,
+  type Row,
+} from '../domain/table';
 import type { Tag } from '../domain/twin';
 import type { AppState } from './app';
 import { memoLast, memoOne } from '../domain/memo';
@@ -261,6 +269,16 @@ const filtered = memoLast(
 /** By what the table's rows are together; null: by nothing. */
 export const selectAreaOf = (state: AppState): Catalogue['areaOf'] | null =>
   state.settings.byArea ? selectCatalogue(state).areaOf : null;
+
+const areasOf = memoLast(areasOnMap);
+
+const NO_AREAS: readonly AreaOnMap[] = [];
+
+/** The areas that the map shows: where the table is grouped by them. */
+export function selectAreas(state: AppState): readonly AreaOnMap[] {
+  const areaOf = selectAreaOf(state);
+  return areaOf ? areasOf(selectTags(state), areaOf) : NO_AREAS;
+}
 
 const sorted = memoLast(
   (rows: readonly Row[], sort: Sort, areaOf: Catalogue['areaOf'] | null): readonly Row[] => {

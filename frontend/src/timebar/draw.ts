@@ -35,7 +35,7 @@ const BASE_PX = MARKS_PX + SCANS_PX;
 const FLOOR_PX = BASE_PX + FAILURES_PX;
 const HATCH_PX = 6;
 
-export interface Bar {
+interface Bar {
   readonly axis: Axis;
   /** Null: it has not come yet. */
   readonly timeline: Timeline | null;

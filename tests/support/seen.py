@@ -5,7 +5,7 @@ from dataclasses import replace
 
 from lupin_bridge.alarms.board import AlarmBoard, AlarmSource, Board, change_between, page_of
 from lupin_bridge.feed.source import TwinUpdate
-from lupin_bridge.judge.daylight import ClockDay, Day, judge_day
+from lupin_bridge.judge.day import ClockDay, Day, judge_day
 from lupin_bridge.judge.episodes import Alarm, alarm_id
 from lupin_bridge.judge.judging import judge_once
 from lupin_bridge.judge.options import Criteria, own_sensors

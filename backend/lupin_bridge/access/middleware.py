@@ -22,9 +22,15 @@ from starlette.websockets import WebSocket
 from websockets.frames import CloseCode
 
 from lupin_bridge.access.accounts import accounts_path
-from lupin_bridge.access.credentials import SHARED, CookieTooLong, Credentials
+from lupin_bridge.access.credentials import (
+    SHARED,
+    WRITER,
+    AccountError,
+    CookieTooLong,
+    Credentials,
+    Person,
+)
 from lupin_bridge.access.people import People
-from lupin_bridge.access.person import WRITER, AccountError, Person
 from lupin_bridge.access.policy import (
     PROXY_USER_KEY,
     AccessPolicy,
@@ -33,8 +39,7 @@ from lupin_bridge.access.policy import (
     RequestSource,
     path_of,
 )
-from lupin_bridge.rate_limit import RateLimit
-from lupin_bridge.serving.admission import client_key
+from lupin_bridge.serving.admission import RateLimit, client_key
 from lupin_bridge.serving.ws_protocol import CONNECTION_KEY, Connection
 from lupin_bridge.settings import SettingError, Settings
 

@@ -20,10 +20,17 @@ from pathlib import Path
 from typing import Any, Final, TypeVar
 
 from lupin_bridge.access.accounts import SESSION_S, Accounts, Audited, digest
-from lupin_bridge.access.credentials import SHARED, SHARED_SESSION_S, Credentials, cookies_of
-from lupin_bridge.access.person import MAX_PASSWORD, AccountError, Person, is_name
-from lupin_bridge.rate_limit import RateLimit
-from lupin_bridge.serving.admission import AdmissionError
+from lupin_bridge.access.credentials import (
+    MAX_PASSWORD,
+    SHARED,
+    SHARED_SESSION_S,
+    AccountError,
+    Credentials,
+    Person,
+    cookies_of,
+    is_name,
+)
+from lupin_bridge.serving.admission import AdmissionError, RateLimit
 
 log = logging.getLogger(__name__)
 

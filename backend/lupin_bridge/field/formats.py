@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 import orjson
 
-from lupin_bridge.judge.ranges import Sensor, Sensors
+from lupin_bridge.judge.quantities import Sensor, Sensors
 from lupin_twin.core.state import TagState
 from lupin_twin.estimate import EstimateGrid
 from lupin_twin.estimate.engine import Estimate
@@ -273,7 +273,7 @@ def write_estimate(
 
 
 def write_estimate_json(estimate: Estimate) -> bytes:
-    """`estimate_schema.GetEstimateResponse`: `mean` and `sd` flat and row-major."""
+    """`estimates.GetEstimateResponse`: `mean` and `sd` flat and row-major."""
     grid = estimate.grid
     rest = orjson.dumps(
         {

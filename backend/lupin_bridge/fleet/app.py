@@ -25,14 +25,28 @@ from lupin_bridge.bridge import Bridge
 from lupin_bridge.feed.past_process import PastProcess
 from lupin_bridge.feed.query import Now
 from lupin_bridge.feed.shared_work import Periodic, Shared
-from lupin_bridge.fleet import small_map
-from lupin_bridge.fleet.compare import COMPARE_S, Compare, OfSites, chosen, compare
+from lupin_bridge.fleet.compare import (
+    COMPARE_S,
+    Compare,
+    OfSites,
+    SitesReport,
+    chosen,
+    compare,
+    sites_report,
+)
 from lupin_bridge.fleet.export import respond_sites
-from lupin_bridge.fleet.overview import Site, SitesFrame, alarms_json, archive_json, etag, site_json
+from lupin_bridge.fleet.overview import (
+    Site,
+    SitesFrame,
+    alarms_json,
+    archive_json,
+    etag,
+    map_svg,
+    map_version,
+    site_json,
+)
 from lupin_bridge.fleet.pages import Opened, SitePage, SitePages, Sites
-from lupin_bridge.fleet.report import SitesReport, sites_report
-from lupin_bridge.fleet.source import SiteTwin
-from lupin_bridge.fleet.watching import Watching
+from lupin_bridge.fleet.source import SiteTwin, Watching
 from lupin_bridge.judge.options import Criteria
 from lupin_bridge.metrics import CONTENT_TYPE
 from lupin_bridge.past.export import CSV, PARQUET
@@ -300,11 +314,11 @@ def _add_overview(app: FastAPI, fleet: Fleet) -> None:
         site = fleet.watching.sites.get(name)
         if site is None or not site.dots:
             return error_response(f"there is no map of a site {name[:64]!r}", 404)
-        tag = f'"{small_map.version(site.dots)}"'
+        tag = f'"{map_version(site.dots)}"'
         if has_etag(request, tag):
             return not_modified(tag)
         headers = {"ETag": tag, **REVALIDATE, "Content-Security-Policy": _PICTURE_POLICY}
-        return Response(small_map.svg(site.dots), 200, headers, "image/svg+xml")
+        return Response(map_svg(site.dots), 200, headers, "image/svg+xml")
 
     @app.websocket("/ws/sites")
     async def ws_sites(websocket: WebSocket) -> None:

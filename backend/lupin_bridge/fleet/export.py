@@ -16,7 +16,7 @@ from lupin_bridge.feed.query import ExportStep, Now
 from lupin_bridge.feed.source import exported
 from lupin_bridge.fleet.compare import chosen
 from lupin_bridge.fleet.overview import Site
-from lupin_bridge.fleet.watching import Watching
+from lupin_bridge.fleet.source import Watching
 from lupin_bridge.judge.options import Criteria
 from lupin_bridge.past import query as past_query
 from lupin_bridge.past.bodies import COMPLETE_TO

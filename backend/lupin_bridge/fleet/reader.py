@@ -23,11 +23,9 @@ from lupin_bridge.archive.database import (
     explained,
     open_archive,
 )
-from lupin_bridge.feed import past_child
-from lupin_bridge.feed.past_child import Child, Search
-from lupin_bridge.feed.query import Now, PastQuery
-from lupin_bridge.fleet.compare import Compare
-from lupin_bridge.fleet.report import SitesReport
+from lupin_bridge.feed import query
+from lupin_bridge.feed.query import Child, Now, PastQuery, Search
+from lupin_bridge.fleet.compare import Compare, SitesReport
 from lupin_twin.core.diagnostics import Origin, origin_of
 from lupin_twin.core.notes import Note
 from lupin_twin.core.past import NotRemembered
@@ -232,4 +230,4 @@ def _is_alive(connection: Any) -> bool:
 
 def main() -> None:
     """Answer the parent until it ends."""
-    past_child.main(ArchiveChild)
+    query.main(ArchiveChild)

@@ -11,10 +11,9 @@ from pathlib import Path
 from typing import Final
 from zoneinfo import ZoneInfo
 
-from lupin_bridge.judge.daylight import ClockDay, Day, judge_day
-from lupin_bridge.judge.derived import DAY_NS
-from lupin_bridge.judge.ranges import Sensors
-from lupin_bridge.judge.scan_interval import holds_ns, interval_ns
+from lupin_bridge.judge.day import ClockDay, Day, judge_day
+from lupin_bridge.judge.quantities import DAY_NS, Sensors
+from lupin_bridge.judge.scans import holds_ns, interval_ns
 from lupin_bridge.settings import SettingError, Settings
 
 # Nobody writes this much; a device given by mistake is not read to its end.

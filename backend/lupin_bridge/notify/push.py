@@ -24,21 +24,19 @@ from urllib.parse import urlsplit
 import orjson
 
 from lupin_bridge.access.accounts import Device
+from lupin_bridge.access.credentials import AccountError
 from lupin_bridge.access.people import People
-from lupin_bridge.access.person import AccountError
-from lupin_bridge.alarms.board import Change
-from lupin_bridge.alarms.notes import NOTHING_SAID, notes_of_alarms
+from lupin_bridge.alarms.board import NOTHING_SAID, Change, notes_of_alarms
 from lupin_bridge.feed.shared_work import end
 from lupin_bridge.judge.episodes import Alarm
 from lupin_bridge.judge.verdict import Verdict
 from lupin_bridge.notify.destinations import Endpoint, PushTarget
-from lupin_bridge.notify.http_post import PostError, post
 from lupin_bridge.notify.messages import Source
-from lupin_bridge.notify.retry import Backoff, Condition, until_taken
+from lupin_bridge.notify.sending import Backoff, Condition, PostError, post, until_taken
 from lupin_bridge.notify.webhook import AlarmNews
 from lupin_bridge.past.report_page import push_text
 from lupin_bridge.serving.admission import AdmissionError
-from lupin_bridge.stream.health_json import alarm_json
+from lupin_bridge.stream.state_json import alarm_json
 
 if TYPE_CHECKING:
     from py_vapid import Vapid02

@@ -15,8 +15,7 @@ from functools import lru_cache
 from itertools import accumulate, pairwise
 from typing import Any, Final
 
-from lupin_bridge.judge.derived import DAILY
-from lupin_bridge.judge.ranges import Sensors
+from lupin_bridge.judge.quantities import DAILY, Sensors
 from lupin_bridge.past.query import PeriodQuery, compact, iso
 from lupin_bridge.stream.state_json import stamp
 from lupin_twin.core.journal_condition import UNKNOWN, Condition
@@ -137,7 +136,7 @@ def unit(request: SeriesRequest, sensors: Sensors) -> str:
 
 
 def stretch(start_ns: int, end_ns: int) -> dict[str, Any]:
-    """`schema.Stretch`."""
+    """`routes_schema.Period`."""
     return {"from": stamp(start_ns), "to": stamp(end_ns)}
 
 

@@ -18,9 +18,8 @@ from lupin_bridge.field import formats
 from lupin_bridge.field import query as field_query
 from lupin_bridge.field.formats import JSON, FieldFormat
 from lupin_bridge.field.query import EstimateQuery, FieldQuery
-from lupin_bridge.judge.derived import DAILY
 from lupin_bridge.judge.options import Criteria
-from lupin_bridge.judge.ranges import Sensor
+from lupin_bridge.judge.quantities import DAILY, Sensor
 from lupin_bridge.judge.verdict import plausible, with_derived
 from lupin_bridge.past import derived
 from lupin_bridge.past.plans import Plan, StateQuery, etag_of, plan_of, series_s

@@ -16,15 +16,14 @@ import orjson
 
 from lupin_bridge.feed.query import Find
 from lupin_bridge.field import query as field_query
-from lupin_bridge.judge.days import SINCE_NS, days_of
-from lupin_bridge.judge.derived import DAILY, DERIVED
+from lupin_bridge.judge.day import SINCE_NS, days_of
 from lupin_bridge.judge.judging import judge_once
 from lupin_bridge.judge.options import Criteria
+from lupin_bridge.judge.quantities import DAILY, DERIVED
 from lupin_bridge.past import bodies, derived
 from lupin_bridge.past.query import PeriodQuery
 from lupin_bridge.serving.admission import REVALIDATE, Answer, json_answer
-from lupin_bridge.stream.health_json import judgement
-from lupin_bridge.stream.state_json import StateJson, history
+from lupin_bridge.stream.state_json import StateJson, history, judgement
 from lupin_twin.core.history import LatestRequest, tag_history
 from lupin_twin.core.journal_condition import Condition
 from lupin_twin.core.past import (

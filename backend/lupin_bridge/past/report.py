@@ -19,19 +19,17 @@ from typing import Any, Final
 
 import orjson
 
-from lupin_bridge.alarms.board import active_first
-from lupin_bridge.alarms.notes import notes_of_alarms
+from lupin_bridge.alarms.board import active_first, notes_of_alarms
 from lupin_bridge.feed.query import Find
 from lupin_bridge.judge.alarm_fold import Follower
 from lupin_bridge.judge.episodes import Alarm, readings_of
 from lupin_bridge.judge.options import Criteria
-from lupin_bridge.judge.scan_interval import SHORTEST_NS, TIMES_MEDIAN
+from lupin_bridge.judge.scans import SHORTEST_NS, TIMES_MEDIAN
 from lupin_bridge.judge.verdict import Verdict, derive
 from lupin_bridge.past import bodies
 from lupin_bridge.past.plans import JSON_TYPE, Plan
 from lupin_bridge.serving.admission import REVALIDATE, Answer
-from lupin_bridge.stream.health_json import alarm_json, note_json
-from lupin_bridge.stream.state_json import stamp
+from lupin_bridge.stream.state_json import alarm_json, note_json, stamp
 from lupin_twin.core.history import KIND_FLOWER
 from lupin_twin.core.journal_condition import Condition
 from lupin_twin.core.notes import WITHDRAW, Note, NotesRequest, PastNotes, withdrawals

@@ -16,7 +16,7 @@ from typing import Any, Final
 import orjson
 
 from lupin_bridge.judge.options import Criteria, unix_s
-from lupin_bridge.judge.ranges import Span
+from lupin_bridge.judge.quantities import Span
 from lupin_bridge.judge.verdict import derive
 from lupin_bridge.past.plans import Plan
 from lupin_bridge.past.report import WHOLE_SITE, Report, planned

@@ -18,8 +18,8 @@ from pydantic import BaseModel, ValidationError
 from starlette.requests import ClientDisconnect, HTTPConnection
 from starlette.types import Receive, Scope, Send
 
+from lupin_bridge.access.credentials import AccountError, Person
 from lupin_bridge.access.middleware import PERSON_KEY, client_of
-from lupin_bridge.access.person import AccountError, Person
 from lupin_bridge.bridge import Bridge
 from lupin_bridge.feed.source import TwinTimeoutError, TwinUnavailableError
 from lupin_bridge.field import query as field_query

@@ -14,7 +14,7 @@ from fastapi import APIRouter, Request, Response
 from starlette.types import Message, Receive, Scope, Send
 
 from lupin_bridge.access.middleware import client_of
-from lupin_bridge.judge.ranges import Sensors
+from lupin_bridge.judge.quantities import Sensors
 from lupin_bridge.past import bodies, query
 from lupin_bridge.past.export import CSV, PARQUET, ExportFormat, MissingPackageError, Writer
 from lupin_bridge.past.query import MAX_SECONDS, PeriodQuery

@@ -34,7 +34,7 @@ from lupin_bridge.routes.answers import (
     while_client_waits,
 )
 from lupin_bridge.serving.admission import REVALIDATE
-from lupin_bridge.stream import people_schema
+from lupin_bridge.stream import routes_schema
 
 router = APIRouter()
 # In the application only where the page was not built.
@@ -263,7 +263,7 @@ async def sign_in(request: Request) -> Response:
             return error_response(
                 "send the token as Authorization: Bearer", 401, {"WWW-Authenticate": "Bearer"}
             )
-        given = await read_body(request, people_schema.SignIn)
+        given = await read_body(request, routes_schema.SignIn)
         person = await while_client_waits(
             request, people.check(given.name, given.password, address)
         )
@@ -299,7 +299,7 @@ async def sign_out(request: Request) -> Response:
     router,
     "/api/session",
     summary="Who makes the request, and is this a session that can be signed out of?",
-    responses={200: {"model": people_schema.Session}},
+    responses={200: {"model": routes_schema.Session}},
 )
 async def session_route(request: Request) -> Response:
     """Who makes the request, and how long a session that it came with still lasts."""

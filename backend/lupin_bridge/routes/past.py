@@ -6,7 +6,7 @@ from datetime import UTC
 
 from fastapi import APIRouter, Request, Response
 
-from lupin_bridge.past import query, schema
+from lupin_bridge.past import query
 from lupin_bridge.past.plans import History, Timeline
 from lupin_bridge.past.report import Report
 from lupin_bridge.past.report_page import (
@@ -27,6 +27,7 @@ from lupin_bridge.routes.answers import (
     respond_past,
 )
 from lupin_bridge.routes.pages import language_of
+from lupin_bridge.stream import routes_schema
 from lupin_twin.core.past import PastRefused
 
 router = APIRouter()
@@ -36,7 +37,7 @@ router = APIRouter()
     router,
     "/api/history",
     summary="The readings of one sensor of one tag over a period",
-    responses={200: {"model": schema.History}, **NOT_REMEMBERED},
+    responses={200: {"model": routes_schema.History}, **NOT_REMEMBERED},
     openapi_extra={"parameters": parameters_of(query.OfHistory)},
 )
 async def history_route(request: Request) -> Response:
@@ -53,7 +54,7 @@ async def history_route(request: Request) -> Response:
     router,
     "/api/timeline",
     summary="What happened when: scans, failures, looks, pests, silences, runs of the clock",
-    responses={200: {"model": schema.Timeline}, **NOT_REMEMBERED},
+    responses={200: {"model": routes_schema.Timeline}, **NOT_REMEMBERED},
     openapi_extra={"parameters": parameters_of(query.OfTimeline)},
 )
 async def timeline_route(request: Request) -> Response:
@@ -67,7 +68,7 @@ async def timeline_route(request: Request) -> Response:
     router,
     "/api/report",
     summary="What happened between two moments: alarms, notes, silences, extremes, scans",
-    responses={200: {"model": schema.ShiftReport}, **NOT_REMEMBERED},
+    responses={200: {"model": routes_schema.ShiftReport}, **NOT_REMEMBERED},
     openapi_extra={"parameters": parameters_of(query.OfReport)},
 )
 async def report_route(request: Request) -> Response:

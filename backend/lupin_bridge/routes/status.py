@@ -14,7 +14,7 @@ import orjson
 from fastapi import APIRouter, Request, Response
 
 from lupin_bridge.access.middleware import client_of
-from lupin_bridge.alarms.notes import notes_of_alarms
+from lupin_bridge.alarms.board import notes_of_alarms
 from lupin_bridge.feed.source import ailment
 from lupin_bridge.judge.episodes import Alarm
 from lupin_bridge.metrics import CONTENT_TYPE
@@ -39,10 +39,9 @@ from lupin_bridge.routes.answers import (
     respond_as_of,
 )
 from lupin_bridge.serving.admission import REVALIDATE, Answer
-from lupin_bridge.stream import robot_schema, schema
-from lupin_bridge.stream.health_json import alarms_body, judgement
+from lupin_bridge.stream import routes_schema, schema
 from lupin_bridge.stream.robot import robot_body
-from lupin_bridge.stream.state_json import header, stamp
+from lupin_bridge.stream.state_json import alarms_body, header, judgement, stamp
 from lupin_twin.field.explored import OccupancyMap
 
 # Grey of a free and of an occupied cell; unknown is transparent. The page decides what is below.
@@ -164,7 +163,7 @@ async def _map(request: Request, kind: str) -> Response:
     router,
     "/api/robot",
     summary="Where the robot is and has been, its plan, its battery",
-    responses={200: {"model": robot_schema.Robot}},
+    responses={200: {"model": routes_schema.Robot}},
 )
 async def robot(request: Request) -> Response:
     """As the robot's own topics say it, of now alone: the journal has nothing of it."""

@@ -11,11 +11,16 @@ from dataclasses import dataclass, field
 import orjson
 from websockets.frames import Frame, Opcode
 
-from lupin_bridge.alarms.board import Board
-from lupin_bridge.alarms.notes import notes_of_alarms
+from lupin_bridge.alarms.board import Board, notes_of_alarms
 from lupin_bridge.judge.judging import NOTHING_JUDGED, Judged
-from lupin_bridge.stream.health_json import alarms_body, alarms_in_frame, judgement, judgement_since
-from lupin_bridge.stream.state_json import StateJson, header
+from lupin_bridge.stream.state_json import (
+    StateJson,
+    alarms_body,
+    alarms_in_frame,
+    header,
+    judgement,
+    judgement_since,
+)
 from lupin_bridge.stream.status import Status
 from lupin_twin.core.notes import Note
 from lupin_twin.core.state import Snapshot, TagState

@@ -16,12 +16,12 @@ from lupin_bridge.stream.state_json import stamp
 
 
 def robot_frame(now: Robot) -> bytes:
-    """`robot_schema.RobotFrame` as a WebSocket frame."""
+    """`routes_schema.RobotFrame` as a WebSocket frame."""
     return text_frame(orjson.dumps({"type": "robot", **_now(now)}))
 
 
 def robot_body(known: RobotLog) -> bytes:
-    """`robot_schema.Robot`."""
+    """`routes_schema.Robot`."""
     return orjson.dumps({**_now(known.now), "trail": [_point(it) for it in known.trail]})
 
 

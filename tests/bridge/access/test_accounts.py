@@ -11,8 +11,8 @@ import pytest
 
 from lupin_bridge.access import people as people_module
 from lupin_bridge.access.accounts import SESSION_S, Accounts, Audited, digest
+from lupin_bridge.access.credentials import AccountError, Person, check_password
 from lupin_bridge.access.people import ATTEMPT_BURST, MAX_WAITING, People, PeopleBusy
-from lupin_bridge.access.person import AccountError, Person, check_password
 from tests.support.people import PASSWORD, TOKEN, add, changing, remove
 
 NOW = 1_800_000_000

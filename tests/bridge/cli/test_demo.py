@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from lupin_bridge.cli.demo import (
+from lupin_bridge.cli.roles import (
     DAY_S,
     Feed,
     fill_past,

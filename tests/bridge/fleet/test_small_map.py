@@ -2,7 +2,7 @@
 
 import random
 
-from lupin_bridge.fleet.small_map import dots, svg, version
+from lupin_bridge.fleet.overview import dots, svg, version
 from lupin_bridge.judge.verdict import Health, Verdict
 from lupin_twin.core.state import Pose, TagState
 

@@ -7,9 +7,9 @@ import orjson
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lupin_bridge.past import schema
 from lupin_bridge.past.bodies import COUNTED, timeline_body, timeline_period
 from lupin_bridge.past.query import PeriodQuery
+from lupin_bridge.stream import routes_schema
 from lupin_twin.core.past import HOUR_NS, Event, Grid, SeriesPast, grid
 
 NS = 10**9
@@ -54,7 +54,7 @@ def parts(
 def written(given_: Parts) -> dict[str, Any]:
     """The body as a client reads it, which has to be what the contract says."""
     text = orjson.dumps(timeline_body(*given_))
-    schema.Timeline.model_validate_json(text)
+    routes_schema.Timeline.model_validate_json(text)
     found: dict[str, Any] = orjson.loads(text)
     return found
 

@@ -41,12 +41,9 @@ ROUTED = (
     state,
     sockets,
     field,
-    field,
     past,
     export,
     status,
-    written,
-    written,
     written,
     pages,
 )

@@ -34,9 +34,8 @@ from lupin_bridge.access.people import People
 from lupin_bridge.access.policy import (
     PROXY_USER_KEY,
     AccessPolicy,
-    HostError,
-    OriginError,
-    RequestSource,
+    parse_host,
+    parse_origin,
     path_of,
 )
 from lupin_bridge.serving.admission import RateLimit, client_key
@@ -190,14 +189,14 @@ class Access:
 
         """
         called = settings.called("token_file") if settings.token_file else "LUPIN_TOKEN"
-        try:
-            policy = AccessPolicy(settings.host, settings.allow_origin, settings.allow_host)
-        except HostError as error:
-            raise SettingError(f"{settings.called('allow_host')}: {error}") from None
-        except OriginError as error:
-            raise SettingError(f"{settings.called('allow_origin')}: {error}") from None
+        for name, parse in (("allow_host", parse_host), ("allow_origin", parse_origin)):
+            try:
+                for text in getattr(settings, name):
+                    parse(text)
+            except ValueError as error:
+                raise SettingError(f"{settings.called(name)}: {error}") from None
         return cls(
-            policy,
+            AccessPolicy(settings.host, settings.allow_origin, settings.allow_host),
             secure=bool(settings.tls_cert),
             people=People(
                 accounts_path(settings),
@@ -231,7 +230,10 @@ class AccessControl:
             await _Refusal(414, detail).send(scope, receive, send)
             return
         request = HTTPConnection(scope)
-        decision = self._access.policy.judge(_source_of(request))
+        scheme = "https" if scope["scheme"] in ("https", "wss") else "http"
+        decision = self._access.policy.judge(
+            scheme, request.headers, wants_page=_wants_page(request)
+        )
         if self._access.policy.origins:
             send = _with_cors(send, decision.foreign)
         if decision.refusal is not None:
@@ -384,20 +386,6 @@ def _sign_in_first(request: HTTPConnection) -> _Refusal:
         return _Refusal(303, "sign in first", {"location": location})
     return _unauthorized(
         "a token is needed: send it as Authorization: Bearer, or sign in at /signin"
-    )
-
-
-def _source_of(request: HTTPConnection) -> RequestSource:
-    headers = request.headers
-    return RequestSource(
-        scheme="https" if request.scope["scheme"] in ("https", "wss") else "http",
-        hosts=headers.getlist("host"),
-        origins=headers.getlist("origin"),
-        fetch_site=headers.get("sec-fetch-site", ""),
-        fetch_mode=headers.get("sec-fetch-mode", ""),
-        fetch_dest=headers.get("sec-fetch-dest", ""),
-        referer=headers.get("referer", ""),
-        wants_page=_wants_page(request),
     )
 
 

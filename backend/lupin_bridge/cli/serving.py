@@ -200,7 +200,7 @@ async def _run_fleet(
     os.environ[variable("archive_url")] = settings.archive_url
     supervisor = Supervisor(os.environ)
     limits = Limits()
-    fleet = Fleet(settings, criteria, access, limits=limits)
+    fleet = Fleet(settings, criteria, access, limits)
     app = create_fleet_app(fleet, access, proxies)
 
     def announce_shutdown() -> None:

@@ -27,12 +27,12 @@ from lupin_bridge.routes.answers import (
     client_left,
     error_response,
     read_route,
+    refusing,
     while_client_waits,
     within_time,
 )
 from lupin_bridge.serving.admission import Admission, Export, Limits
 from lupin_bridge.serving.http_protocol import CONNECTION_KEY, HttpConnection
-from lupin_bridge.stream import schema
 from lupin_twin.core.past import PastRow
 from lupin_twin.core.state import NANOSECONDS_PER_SECOND
 from lupin_twin.runtime.workers import Workers
@@ -87,7 +87,7 @@ async def csv_route(request: Request) -> Response:
     responses={
         200: _content(PARQUET.media_type),
         **_ANSWERS,
-        501: {"model": schema.ErrorMessage, "description": "the extra `science` is not installed"},
+        **refusing({501: "the extra `science` is not installed"}),
     },
     openapi_extra={"parameters": parameters_of(query.OfExport)},
 )

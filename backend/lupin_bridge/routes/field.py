@@ -32,6 +32,7 @@ from lupin_bridge.routes.answers import (
     on_worker,
     read_route,
     refusal,
+    refusing,
     respond,
     respond_as_of,
     respond_newest,
@@ -72,8 +73,9 @@ class InFormats:
             400: {"model": self.model, "description": "refused; error_message says why"},
             429: {"model": self.model, "description": "this client asks for too much"},
             404: NOT_REMEMBERED[404],
-            503: {"model": schema.ErrorMessage, "description": "the twin is not there, or busy"},
-            504: {"model": schema.ErrorMessage, "description": "the twin did not answer in time"},
+            **refusing(
+                {503: "the twin is not there, or busy", 504: "the twin did not answer in time"}
+            ),
         }
 
     async def or_refusal(self, answer: Awaitable[Response]) -> Response:
@@ -105,7 +107,7 @@ class InFormats:
                     "content": {each.media_type: binary for each in FORMATS if each is not JSON},
                 },
                 **self.refusals(),
-                406: {"model": schema.ErrorMessage, "description": "no format that Accept allows"},
+                **refusing({406: "no format that Accept allows"}),
             },
             name=self.name,
             **documented,

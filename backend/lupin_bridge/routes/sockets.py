@@ -20,7 +20,7 @@ import time
 from collections import deque
 from contextlib import ExitStack
 from functools import partial
-from typing import Any, Final
+from typing import Any, Final, Protocol
 
 from fastapi import APIRouter, WebSocket
 
@@ -77,6 +77,34 @@ async def next_message(websocket: WebSocket) -> str | bytes | None:
     text: str | None = event.get("text")
     message: str | bytes = event["bytes"] if text is None else text
     return message
+
+
+class _Listened(Protocol):
+    """A bridge, or the fleet."""
+
+    hub: Hub
+
+    def join(self, client: Client) -> None:
+        """Add a listener; it has what there is when this returns."""
+
+    def serve(self, client: Client) -> None:
+        """A listener's socket is free again."""
+
+
+async def listen(websocket: WebSocket, to: _Listened, **options: Any) -> None:
+    """Send a listener what it lacks until it has gone; what it says is ignored."""
+    if not await has_place(websocket, to.hub):
+        return
+    connection: Connection = getattr(websocket.state, CONNECTION_KEY)
+    client = Client(connection, address=client_of(websocket), **options)
+    connection.on_writable = lambda: to.serve(client)
+    to.join(client)
+    try:
+        while await next_message(websocket) is not None:
+            pass
+    finally:
+        connection.on_writable = None
+        to.hub.leave(client)
 
 
 class _Conversation:

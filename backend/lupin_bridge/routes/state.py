@@ -10,7 +10,6 @@ from typing import Annotated, Final
 from annotated_types import Ge
 from fastapi import APIRouter, Request, Response, WebSocket
 
-from lupin_bridge.access.middleware import client_of
 from lupin_bridge.bridge import Bridge
 from lupin_bridge.past import bodies
 from lupin_bridge.past import query as past_query
@@ -24,15 +23,15 @@ from lupin_bridge.routes.answers import (
     error_response,
     json_response,
     read_route,
+    refusing,
     respond,
     respond_as_of,
     respond_past,
 )
-from lupin_bridge.routes.sockets import has_place, next_message
+from lupin_bridge.routes.sockets import listen
 from lupin_bridge.serving.admission import Answer
-from lupin_bridge.serving.ws_protocol import CONNECTION_KEY, Connection
 from lupin_bridge.stream import schema
-from lupin_bridge.stream.hub import CLOSE_POLICY, Client
+from lupin_bridge.stream.hub import CLOSE_POLICY
 from lupin_twin.core.state import Snapshot, TagState
 
 # Of the reason in a close frame (RFC 6455, section 5.5).
@@ -61,7 +60,7 @@ router = APIRouter()
 # How long the ages of an answer hold: they are shown in seconds.
 AGES_HOLD_S: Final = 0.2
 
-_NO_TAG = {404: {"model": schema.ErrorMessage, "description": "no such tag"}}
+_NO_TAG = refusing({404: "no such tag"})
 
 
 @router.websocket("/ws/state")
@@ -75,23 +74,7 @@ async def ws_state(websocket: WebSocket) -> None:
         reason = str(error).encode("ascii", "backslashreplace")[:MAX_REASON_BYTES].decode()
         await websocket.close(CLOSE_POLICY, reason)
         return
-    if not await has_place(websocket, bridge.hub):
-        return
-    connection: Connection = getattr(websocket.state, CONNECTION_KEY)
-    client = Client(
-        connection,
-        address=client_of(websocket),
-        delta=query.delta,
-        min_interval_s=query.min_interval_s,
-    )
-    connection.on_writable = lambda: bridge.serve(client)
-    bridge.join(client)
-    try:
-        while await next_message(websocket) is not None:
-            pass
-    finally:
-        connection.on_writable = None
-        bridge.hub.leave(client)
+    await listen(websocket, bridge, delta=query.delta, min_interval_s=query.min_interval_s)
 
 
 @read_route(

@@ -26,7 +26,6 @@ from lupin_bridge.routes.answers import (
     NEVER_STORE,
     NO_TWIN,
     NOT_REMEMBERED,
-    TOO_MUCH,
     bridge_of,
     computed,
     error_response,
@@ -35,6 +34,7 @@ from lupin_bridge.routes.answers import (
     not_modified,
     on_worker,
     read_route,
+    refusing,
     respond,
     respond_as_of,
 )
@@ -104,9 +104,13 @@ _DRAW_CELL_S: Final = 50e-9
 
 _NO_MAP = {
     304: {"description": "the ETag still holds"},
-    404: {"model": schema.ErrorMessage, "description": "no map has come yet"},
-    **TOO_MUCH,
-    503: {"model": schema.ErrorMessage, "description": "the twin is not there, or busy"},
+    **refusing(
+        {
+            404: "no map has come yet",
+            429: "this client asks for too much",
+            503: "the twin is not there, or busy",
+        }
+    ),
 }
 
 
@@ -187,7 +191,7 @@ _WRITE_ALARM_S: Final = 10e-6
     responses={
         **NOT_REMEMBERED,
         200: {"model": schema.Judgement},
-        503: {"model": schema.ErrorMessage, "description": "no twin was found yet, or it is busy"},
+        **refusing({503: "no twin was found yet, or it is busy"}),
     },
     openapi_extra={"parameters": parameters_of(past_query.OfMoment)},
 )

@@ -1,4 +1,8 @@
-"""What people say of alarms, tags and the greenhouse: written, withdrawn, read; and the audit."""
+"""What is written: notes of people, readings of programs, devices that want notifications.
+
+Notes are read here too, and who wrote what (the audit trail). The readings are the one route that
+leads to ROS, off unless a setting says otherwise.
+"""
 
 from __future__ import annotations
 
@@ -6,7 +10,7 @@ import logging
 import math
 import time
 from contextlib import suppress
-from typing import Any, Final
+from typing import Final
 
 import orjson
 from fastapi import APIRouter, Request, Response
@@ -27,7 +31,6 @@ from lupin_bridge.routes.answers import (
     NEVER_STORE,
     NO_TWIN,
     NOT_REMEMBERED,
-    TOO_MUCH,
     BodyRefused,
     bridge_of,
     error_response,
@@ -36,11 +39,13 @@ from lupin_bridge.routes.answers import (
     person_of,
     read_body,
     read_route,
+    refusing,
     respond,
+    taking,
 )
 from lupin_bridge.routes.pages import language_of
 from lupin_bridge.serving.admission import AdmissionError, Answer, ClientLimitError
-from lupin_bridge.stream import routes_schema, schema
+from lupin_bridge.stream import routes_schema
 from lupin_bridge.stream.state_json import note_json, stamp
 from lupin_twin.adapt.config import Place
 from lupin_twin.adapt.scans import BuiltScan
@@ -67,19 +72,16 @@ SHELF_S: Final = 8 * 3_600
 # A page's clock may be so much ahead: it asks for an hour from its own now.
 _SLACK_S: Final = 10
 
-_WRITE_ANSWERS: Final[dict[int | str, dict[str, Any]]] = {
-    **{
-        code: {"model": schema.ErrorMessage, "description": what}
-        for code, what in {
-            400: "refused; detail says why",
-            403: "it takes an account with the role operator",
-            404: "there is no such alarm, tag or note",
-            405: "this bridge only reads the log",
-            503: "it was not written",
-        }.items()
-    },
-    **TOO_MUCH,
-}
+_WRITE_ANSWERS: Final = refusing(
+    {
+        400: "refused; detail says why",
+        403: "it takes an account with the role operator",
+        404: "there is no such alarm, tag or note",
+        405: "this bridge only reads the log",
+        429: "this client asks for too much",
+        503: "it was not written",
+    }
+)
 
 
 @read_route(
@@ -120,12 +122,7 @@ async def notes_route(request: Request) -> Response:
     status_code=201,
     response_class=Response,
     responses={201: {"model": routes_schema.Note}, **_WRITE_ANSWERS},
-    openapi_extra={
-        "requestBody": {
-            "required": True,
-            "content": {"application/json": {"schema": {"$ref": "#/components/schemas/NoteDraft"}}},
-        }
-    },
+    openapi_extra=taking(routes_schema.NoteDraft),
 )
 async def write_note(request: Request) -> Response:
     """By an account with the role operator. Of two words on one alarm the later one stands."""
@@ -286,8 +283,7 @@ async def _write(request: Request, bridge: Bridge, note: Note) -> Note:
     summary="Who signed in, and who changed what",
     responses={
         200: {"model": routes_schema.Audit},
-        403: {"model": schema.ErrorMessage, "description": "it takes the role admin"},
-        503: {"model": schema.ErrorMessage, "description": "the accounts cannot be read"},
+        **refusing({403: "it takes the role admin", 503: "the accounts cannot be read"}),
     },
 )
 async def audit_route(request: Request) -> Response:
@@ -313,23 +309,17 @@ MAX_AHEAD_S: Final = 10
     response_class=Response,
     responses={
         202: {"model": routes_schema.PublishedObservation, "description": "published over ROS"},
-        400: {"model": schema.ErrorMessage, "description": "refused; detail says why"},
-        403: {
-            "model": schema.ErrorMessage,
-            "description": "it takes a token of the role writer, and a bridge with "
-            "--http-observations on",
-        },
-        **TOO_MUCH,
-        503: {"model": schema.ErrorMessage, "description": "the twin is silent"},
+        **refusing(
+            {
+                400: "refused; detail says why",
+                403: "it takes a token of the role writer, and a bridge with "
+                "--http-observations on",
+                429: "this client asks for too much",
+                503: "the twin is silent",
+            }
+        ),
     },
-    openapi_extra={
-        "requestBody": {
-            "required": True,
-            "content": {
-                "application/json": {"schema": {"$ref": "#/components/schemas/ObservationDraft"}}
-            },
-        }
-    },
+    openapi_extra=taking(routes_schema.ObservationDraft),
 )
 async def post_observation(request: Request) -> Response:
     """By a token of the role writer. The same tag at the same `observed_at` counts once.
@@ -409,19 +399,16 @@ async def key_route(request: Request) -> Response:
     response_class=Response,
     responses={
         204: {"description": "done"},
-        400: {"model": schema.ErrorMessage, "description": "refused; detail says why"},
-        403: {"model": schema.ErrorMessage, "description": "it takes an account"},
-        404: {"model": schema.ErrorMessage, "description": "this bridge has no Web Push"},
-        **TOO_MUCH,
+        **refusing(
+            {
+                400: "refused; detail says why",
+                403: "it takes an account",
+                404: "this bridge has no Web Push",
+                429: "this client asks for too much",
+            }
+        ),
     },
-    openapi_extra={
-        "requestBody": {
-            "required": True,
-            "content": {
-                "application/json": {"schema": {"$ref": "#/components/schemas/PushSubscription"}}
-            },
-        }
-    },
+    openapi_extra=taking(routes_schema.PushSubscription),
 )
 async def subscribe(request: Request) -> Response:
     """Ten browsers of an account at most: the oldest makes room."""

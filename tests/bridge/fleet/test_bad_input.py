@@ -13,6 +13,7 @@ from lupin_bridge.fleet import source
 from lupin_bridge.fleet.app import Fleet, create_fleet_app
 from lupin_bridge.fleet.source import Watching
 from lupin_bridge.judge.options import Criteria
+from lupin_bridge.serving.admission import Limits
 from lupin_bridge.settings import Settings
 from tests.support.archive import Archive, run
 from tests.support.fleet import fleet
@@ -109,7 +110,7 @@ def test_an_archive_that_answers_late_and_badly_is_said_once(
 
 def test_the_overviews_routes_are_those_of_the_docs() -> None:
     settings = Settings()
-    made = Fleet(settings, Criteria.of(settings), Access())
+    made = Fleet(settings, Criteria.of(settings), Access(), Limits())
     app = create_fleet_app(made, Access(), Proxies())
     paths = {getattr(route, "path", "") for route in app.routes}
     assert paths >= FLEET_ROUTES

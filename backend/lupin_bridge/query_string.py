@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import MISSING, field, fields
+from functools import cache
 from typing import Annotated, Any, Final, TypeVar
 
 from annotated_types import Len
@@ -84,12 +85,8 @@ def _plain(schema: dict[str, Any]) -> dict[str, Any]:
     return {name: value for name, value in plain.items() if name not in ("title", "description")}
 
 
+@cache
 def _adapter(kind: type[Any]) -> Any:
     from pydantic import TypeAdapter  # noqa: PLC0415  # as above
 
-    if kind not in _adapters:
-        _adapters[kind] = TypeAdapter(kind)
-    return _adapters[kind]
-
-
-_adapters: dict[type[Any], Any] = {}
+    return TypeAdapter(kind)

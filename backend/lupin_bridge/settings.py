@@ -397,7 +397,7 @@ def _of_file(path: str, called: str) -> Iterator[_Given]:
         yield key, place, value
 
 
-def read_text(path: str, called: str) -> str:
+def read_text(path: str, called: str, max_bytes: int = MAX_FILE_BYTES) -> str:
     """A small file's text; `called` is the setting that names it.
 
     Raises:
@@ -406,11 +406,11 @@ def read_text(path: str, called: str) -> str:
     """
     try:
         with Path(path).open("rb") as file:
-            content = file.read(MAX_FILE_BYTES + 1)
+            content = file.read(max_bytes + 1)
     except OSError as error:
         raise SettingError(f"{called} {path}: {error.strerror}") from None
-    if len(content) > MAX_FILE_BYTES:
-        raise SettingError(f"{called} {path} has more than {MAX_FILE_BYTES} bytes, the limit")
+    if len(content) > max_bytes:
+        raise SettingError(f"{called} {path} has more than {max_bytes} bytes, the limit")
     try:
         return content.decode()
     except UnicodeDecodeError:

@@ -119,10 +119,6 @@ MAX_SIGNED_OUT: Final = 10_000
 SHARED: Final = Person("", "viewer", by="shared token")
 
 
-class TokenError(SettingError):
-    """A token that cannot be one; the message has its length, never the token."""
-
-
 class Credentials:
     """Tells the shared token and its sessions from all others, in constant time.
 
@@ -131,12 +127,12 @@ class Credentials:
 
     def __init__(self, token: str, called: str = "LUPIN_TOKEN") -> None:
         if len(token) < MIN_TOKEN_LENGTH:
-            raise TokenError(
+            raise SettingError(
                 f"{called} has {len(token)} characters, must have at least {MIN_TOKEN_LENGTH}: "
                 "make one with `openssl rand -hex 32`, or unset it"
             )
         if _TOKEN.fullmatch(token) is None:
-            raise TokenError(
+            raise SettingError(
                 f"{called} holds a character that no bearer token may: use letters, digits and "
                 "-._~+/ (RFC 6750)"
             )

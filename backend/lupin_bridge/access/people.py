@@ -19,7 +19,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final, TypeVar
 
-from lupin_bridge.access.accounts import SESSION_S, Accounts, Audited, digest
+from lupin_bridge.access.accounts import SESSION_S, Accounts, digest
 from lupin_bridge.access.credentials import (
     MAX_PASSWORD,
     SHARED,
@@ -216,24 +216,6 @@ class People:
             return self.shared.cookie_name
         await self.write(lambda it, now_s: it.end_session(person, address, now_s))
         return self._cookie_name()
-
-    async def note(self, who: str, what: str, subject: str, address: str) -> None:
-        """Have it in the audit trail.
-
-        Raises:
-            PeopleBusy, AccountError: see `write`.
-
-        """
-        await self.write(lambda it, now_s: it.note(Audited(now_s, who, what, subject, address)))
-
-    async def audited(self, most: int) -> list[Audited]:
-        """The newest of the audit trail.
-
-        Raises:
-            PeopleBusy, AccountError: see `write`.
-
-        """
-        return await self.write(lambda it, _: it.audited(most))
 
     async def write(self, work: Callable[[Accounts, int], ResultT]) -> ResultT:
         """What `work(accounts, now_s)` gives, on the thread.

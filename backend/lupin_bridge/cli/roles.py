@@ -69,13 +69,25 @@ class Feed:
 def patrolled(
     environ: Mapping[str, str], patrol_args: Sequence[str], ros_args: Sequence[str]
 ) -> Feed:
-    """Feed it by the simulated patrol."""
+    """Feed it by the simulated patrol.
+
+    Its journal is apart from a real twin's, and seeds from each other; whatever is given after our
+    own arguments of ROS counts instead. A past is filled into that journal, and into no other: a
+    file of parameters may name another one, and is not looked at here.
+    """
+    try:
+        path = demo_journal_path(environ, int(_option("seed", patrol_args) or 0))
+    except RuntimeError:
+        path = None
+    is_another = {"--params-file", "use_sim_time:=true"} & {*ros_args} or any(
+        word.startswith("journal:=") for word in ros_args
+    )
     return Feed(
         "patrol",
         ["lupin_patrol", "--end-with-parent", *patrol_args, *ros_args],
-        own_args(environ, patrol_args),
+        [] if path is None else ["--ros-args", "-p", f"journal:={json.dumps(str(path))}", "--"],
         World("simulated", DAY_S / _speed(patrol_args)),
-        journal_of(environ, patrol_args, ros_args),
+        None if is_another else path,
     )
 
 
@@ -106,35 +118,6 @@ def recorded(
         ],
         World("recorded"),
     )
-
-
-def own_args(environ: Mapping[str, str], patrol_args: Sequence[str]) -> list[str]:
-    """ROS arguments of the demo's own; whatever is given after them counts instead.
-
-    Its journal is apart from a real twin's, and seeds from each other.
-    """
-    try:
-        path = demo_journal_path(environ, _seed(patrol_args))
-    except RuntimeError:
-        return []
-    return ["--ros-args", "-p", f"journal:={json.dumps(str(path))}", "--"]
-
-
-def journal_of(
-    environ: Mapping[str, str], patrol_args: Sequence[str], ros_args: Sequence[str]
-) -> Path | None:
-    """The demo's own journal, None where another was given, or none.
-
-    A file of parameters may name another one: what is in it is not looked at here.
-    """
-    if "--params-file" in ros_args or any(word.startswith("journal:=") for word in ros_args):
-        return None
-    if "use_sim_time:=true" in ros_args:
-        return None
-    try:
-        return demo_journal_path(environ, _seed(patrol_args))
-    except RuntimeError:
-        return None
 
 
 def with_past(feed: Feed, path: Path, patrol_args: Sequence[str]) -> Feed:
@@ -198,10 +181,6 @@ def _is_empty(path: Path) -> bool:
         return True
     with closing(open_reader(path)) as connection:
         return is_empty(connection)
-
-
-def _seed(patrol_args: Sequence[str]) -> int:
-    return int(_option("seed", patrol_args) or 0)
 
 
 def _speed(patrol_args: Sequence[str]) -> float:

@@ -8,7 +8,6 @@ both engines: a `SiteLog` stands in the place of a connection to a twin's own jo
 from __future__ import annotations
 
 import logging
-import sqlite3
 from collections.abc import Callable
 from concurrent.futures import CancelledError
 from contextlib import closing, suppress
@@ -103,11 +102,7 @@ class ArchiveChild(Child):
         if isinstance(question, Compare | SitesReport):
             return lambda connection, _: _compared(question, connection)
         found = super()._search(question, now)
-        return lambda connection, stop: found(_as_journal(connection, site), stop)
-
-
-def _as_journal(connection: Any, site: str) -> sqlite3.Connection:
-    return SiteLog(connection, site)  # type: ignore[return-value]  # whose queries are of both
+        return lambda connection, stop: found(SiteLog(connection, site), stop)
 
 
 def _write_note(site: str, note: Note, should_stop: ShouldStop) -> Note:
@@ -190,7 +185,7 @@ class ArchiveRecall(Recall):
                 if isinstance(error, psycopg.Error):
                     connection.close()
                 else:
-                    self._idle_archive.append(connection)
+                    self._idle.append(connection)
                 raise
         except psycopg.Error as error:
             raise NotRemembered(str(explained(error)), is_lasting=False) from error
@@ -199,22 +194,18 @@ class ArchiveRecall(Recall):
         except DamagedFile as error:
             why = f"rows of the site cannot be read: {error}"
             raise NotRemembered(why, is_lasting=False) from error
-        self._idle_archive.append(connection)
+        self._idle.append(connection)
         return answer
 
     def _connection(self) -> Any:
         while True:
             with suppress(IndexError):
-                connection = self._idle_archive.pop()
+                connection = self._idle.pop()
                 # One whose server has gone says so only when it is used.
                 if connection.closed or not _is_alive(connection):
                     continue
                 return connection
             return open_archive(archive_url(), "lupin-twin fleet")
-
-    @property
-    def _idle_archive(self) -> list[Any]:
-        return self._idle  # of psycopg here
 
 
 def _is_alive(connection: Any) -> bool:

@@ -7,16 +7,15 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import time, tzinfo
 from importlib.resources import files
-from pathlib import Path
 from typing import Final
 from zoneinfo import ZoneInfo
 
 from lupin_bridge.judge.day import ClockDay, Day, judge_day
 from lupin_bridge.judge.quantities import DAY_NS, Sensors
 from lupin_bridge.judge.scans import holds_ns, interval_ns
-from lupin_bridge.settings import SettingError, Settings
+from lupin_bridge.settings import SettingError, Settings, read_text
 
-# Nobody writes this much; a device given by mistake is not read to its end.
+# Nobody writes this much.
 MAX_FILE_BYTES: Final = 1_000_000
 _HOUR: Final = r"((?:[01]\d|2[0-3]):[0-5]\d)"
 _HOURS: Final = re.compile(f"{_HOUR}-{_HOUR}")
@@ -81,20 +80,11 @@ def _sensors(settings: Settings) -> Sensors:
         return own_sensors()
     from lupin_bridge.judge.sensors_file import SensorsError, parse  # noqa: PLC0415  # as above
 
-    called = f"{settings.called('sensors')} {settings.sensors}"
+    called = settings.called("sensors")
     try:
-        with Path(settings.sensors).open("rb") as file:
-            found = file.read(MAX_FILE_BYTES + 1)
-    except OSError as error:
-        raise SettingError(f"{called} cannot be read: {error.strerror}") from error
-    if len(found) > MAX_FILE_BYTES:
-        raise SettingError(f"{called} is longer than {MAX_FILE_BYTES} bytes, the limit")
-    try:
-        return parse(found.decode("utf-8"))
-    except UnicodeDecodeError as error:
-        raise SettingError(f"{called} is no UTF-8: {error.reason} at byte {error.start}") from error
+        return parse(read_text(settings.sensors, called, MAX_FILE_BYTES))
     except SensorsError as error:
-        raise SettingError(f"{called}: {error}") from error
+        raise SettingError(f"{called} {settings.sensors}: {error}") from error
 
 
 def _clock(settings: Settings) -> ClockDay:

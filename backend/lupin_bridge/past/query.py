@@ -272,16 +272,6 @@ def zone(name: str) -> ZoneInfo | None:
         return None
 
 
-def of_notes(parameters: Parameters) -> OfNotes:
-    """What `/api/notes` is asked for.
-
-    Raises:
-        PastRefused: see `history`.
-
-    """
-    return read(OfNotes, parameters, PastRefused)
-
-
 def _period(given: OfPeriod | OfHistory, now_ns: int | None) -> tuple[int, int]:
     start_ns = 0 if given.from_ is None else moment("from", given.from_)
     if given.to is not None:

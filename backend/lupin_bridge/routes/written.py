@@ -15,7 +15,7 @@ from typing import Final
 import orjson
 from fastapi import APIRouter, Request, Response
 
-from lupin_bridge.access.accounts import Device
+from lupin_bridge.access.accounts import Audited, Device
 from lupin_bridge.access.credentials import WRITER, AccountError, Person
 from lupin_bridge.access.middleware import OBSERVATIONS, PUSH, Access, client_of
 from lupin_bridge.alarms.board import NOTE_BURST, NOTES_PER_MINUTE
@@ -26,7 +26,7 @@ from lupin_bridge.notify.push import DeviceRefused, check_device
 from lupin_bridge.past import query as past_query
 from lupin_bridge.past.query import moment
 from lupin_bridge.past.report_page import languages
-from lupin_bridge.query_string import parameters_of
+from lupin_bridge.query_string import parameters_of, read
 from lupin_bridge.routes.answers import (
     NEVER_STORE,
     NO_TWIN,
@@ -95,7 +95,7 @@ async def notes_route(request: Request) -> Response:
     """The newest first and 2,000 at most, withdrawn ones too; the same in every replica."""
     bridge = bridge_of(request)
     asked = request.query_params.multi_items()
-    given = past_query.of_notes(asked)
+    given = read(past_query.OfNotes, asked, PastRefused)
     period = past_query.period(past_query.OfNotes, asked, bridge.ros_time_ns)
     notes = _known(bridge)
 
@@ -271,7 +271,8 @@ async def _write(request: Request, bridge: Bridge, note: Note) -> Note:
         await bridge.notes.look()
     if access.people is not None and access.people.has_file:
         try:
-            await access.people.note(note.by, note.kind, note.subject, client_of(request))
+            done = note.by, note.kind, note.subject, client_of(request)
+            await access.people.write(lambda it, now_s: it.note(Audited(now_s, *done)))
         except (AccountError, AdmissionError) as error:
             log.warning("the note %s is not in the audit trail: %s", written.id, error)
     return written
@@ -291,7 +292,7 @@ async def audit_route(request: Request) -> Response:
     access, person = request.app.state.access, person_of(request)
     if person is None or not person.may("admin") or access.people is None:
         return error_response("the audit trail is for the role admin", 403)
-    found = await access.people.audited(MAX_AUDITED)
+    found = await access.people.write(lambda it, _: it.audited(MAX_AUDITED))
     return json_response(orjson.dumps({"audit": [row._asdict() for row in found]}))
 
 

@@ -12,7 +12,7 @@ from collections import deque
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import closing
 from dataclasses import dataclass, field
-from datetime import datetime
+from datetime import UTC, datetime
 from functools import lru_cache, partial
 from itertools import groupby, islice
 from operator import itemgetter
@@ -21,7 +21,7 @@ from typing import Any, Final, TextIO
 from zoneinfo import ZoneInfo
 
 from lupin_bridge.cli.journal import SHOWN, JournalError, add_which, fail, path_of
-from lupin_bridge.console import FAILED, Progress, Roles, say, tell
+from lupin_bridge.console import FAILED, Progress, Roles, add_role, say, tell
 from lupin_twin.adapt.config import read_yaml
 from lupin_twin.adapt.table import ConfigError, Table, is_number, shown
 from lupin_twin.adapt.value import AS_IT_IS, Value, seconds_of, values_of
@@ -121,7 +121,11 @@ class Summary:
         """The same for a person."""
         yield f"{self.rows} rows, {self.scans} scans of {len(self.tags)} tags"
         if self.scans:
-            yield f"from {_iso(self.first_ns)} to {_iso(self.last_ns)}"
+            first, last = (
+                datetime.fromtimestamp(at_ns // NANOSECONDS_PER_SECOND, UTC).isoformat()
+                for at_ns in (self.first_ns, self.last_ns)
+            )
+            yield f"from {first} to {last}"
         for name, (count, low, high) in sorted(self.sensors.items()):
             yield f"{name}: {count:.0f} readings from {low:.6g} to {high:.6g}"
         for reason, (count, *examples) in self.refused.items():
@@ -141,21 +145,24 @@ def columns_of(content: Any) -> Columns:
 
     """
     table = Table("", content)
-    zone = table.text("time_zone") if table.has("time_zone") else ""
+
+    def text(name: str) -> str:
+        return table.text(name) if table.has(name) else ""
+
+    zone = text("time_zone")
     try:
         place = ZoneInfo(zone) if zone else None
     except (KeyError, ValueError, OSError):
-        raise ConfigError(
-            f"time_zone is {shown(zone)}, expected such as Europe/Amsterdam"
-        ) from None
+        why = f"time_zone is {shown(zone)}, expected such as Europe/Amsterdam"
+        raise ConfigError(why) from None
     columns = Columns(
         time=table.text("time"),
         zone=place,
-        tag=table.text("tag") if table.has("tag") else "",
+        tag=text("tag"),
         tag_id=str(table.take("tag_id", "")),
         sensors=values_of(Table("sensors", table.take("sensors", {})), "column"),
-        sensor=table.text("sensor") if table.has("sensor") else "",
-        value=table.text("value") if table.has("value") else "",
+        sensor=text("sensor"),
+        value=text("value"),
         names=values_of(Table("names", table.take("names", {})), "column"),
         places=dict(_places(Table("places", table.take("places", {})))),
     )
@@ -295,12 +302,6 @@ def _moment_ns(text: str, zone: ZoneInfo | None) -> int:
     return int(seconds * 1e6) * 1000
 
 
-def _iso(stamp_ns: int) -> str:
-    return datetime.fromtimestamp(stamp_ns / NANOSECONDS_PER_SECOND, tz=ZoneInfo("UTC")).isoformat(
-        timespec="seconds"
-    )
-
-
 # --- into a journal -------------------------------------------------------------------------------
 
 
@@ -318,7 +319,7 @@ _NO_LIMITS: Final = Limits(days=MAX_JOURNAL_DAYS, max_bytes=2**62)
 
 def add_parser(roles: Roles) -> None:
     """Add `import` to the command's options."""
-    parser = roles.add_parser("import", help=HELP, description=HELP, allow_abbrev=False)
+    parser = add_role(roles, "import", HELP)
     parser.add_argument("file", metavar="FILE.csv", type=Path)
     parser.add_argument(
         "--map",

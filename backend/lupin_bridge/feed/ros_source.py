@@ -20,9 +20,16 @@ from std_msgs.msg import Header
 
 from lupin_bridge.feed.past_process import PastProcess
 from lupin_bridge.feed.relay import Relay, RosTime, Sample, Topic, TwinNames
-from lupin_bridge.feed.robot import MAX_AHEAD_NS, Battery, Plan, Position, Robot
 from lupin_bridge.feed.ros_thread import BridgedNode, RosThread
-from lupin_bridge.feed.source import TwinSource, TwinUpdate
+from lupin_bridge.feed.source import (
+    MAX_AHEAD_NS,
+    Battery,
+    Plan,
+    Position,
+    Robot,
+    TwinSource,
+    TwinUpdate,
+)
 from lupin_twin.adapt.config import POSES
 from lupin_twin.adapt.messages import message_type, observation
 from lupin_twin.adapt.scans import BuiltScan

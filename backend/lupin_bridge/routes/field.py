@@ -39,8 +39,8 @@ from lupin_bridge.routes.answers import (
     respond_past,
 )
 from lupin_bridge.serving.admission import Answer, ClientLimitError, json_answer
-from lupin_bridge.stream import estimates, schema
-from lupin_bridge.stream.estimates import sensors_of
+from lupin_bridge.stream import followers, schema
+from lupin_bridge.stream.followers import sensors_of
 from lupin_twin.core.past import PastRefused
 from lupin_twin.field.engine import FieldRefused
 from lupin_twin.runtime.estimates import DEFAULT_PLACES, MAX_PLACES, ReportRequest
@@ -196,7 +196,7 @@ ESTIMATE: Final = InFormats(
 Made of what the log has up to a moment, the model too. That of now is made for the newest reading
 or the last whole minute of the day, whichever is later: until then its ETag holds.""",
     parameters=parameters_of(EstimateQuery),
-    model=estimates.GetEstimateResponse,
+    model=followers.GetEstimateResponse,
     refusal_json=formats.estimate_refusal_json,
 )
 
@@ -260,7 +260,7 @@ _WRITE_TAG_S: Final = 10e-6
     router,
     "/api/estimate/quality",
     summary="How often the estimates of each sensor were right",
-    responses={**NOT_REMEMBERED, 200: {"model": estimates.EstimateQualities}},
+    responses={**NOT_REMEMBERED, 200: {"model": followers.EstimateQualities}},
     openapi_extra={"parameters": parameters_of(QualityQuery)},
 )
 async def quality(request: Request) -> Response:
@@ -273,7 +273,7 @@ async def quality(request: Request) -> Response:
     async def body(bridge: Bridge, query: QualityQuery) -> bytes:
         names = [query.sensor_type] if query.sensor_type else _sensors(bridge)
         reports = {name: await bridge.source.estimate_report(ReportRequest(name)) for name in names}
-        return estimates.qualities(reports)
+        return followers.qualities(reports)
 
     return await _report(request, QualityQuery, body)
 
@@ -282,7 +282,7 @@ async def quality(request: Request) -> Response:
     router,
     "/api/estimate/tags",
     summary="What was expected of each tag's newest reading, and which tags have changed",
-    responses={**NOT_REMEMBERED, 200: {"model": estimates.ExpectedTags}},
+    responses={**NOT_REMEMBERED, 200: {"model": followers.ExpectedTags}},
     openapi_extra={"parameters": parameters_of(TagsQuery)},
 )
 async def tags(request: Request) -> Response:
@@ -292,7 +292,7 @@ async def tags(request: Request) -> Response:
         sensor = query.sensor_type
         report = await bridge.source.estimate_report(ReportRequest(sensor))
         cost_s = len(report.tags) * _WRITE_TAG_S
-        return await on_worker(bridge, lambda _: estimates.tags(sensor, report), cost_s)
+        return await on_worker(bridge, lambda _: followers.tags(sensor, report), cost_s)
 
     return await _report(request, TagsQuery, body)
 
@@ -301,7 +301,7 @@ async def tags(request: Request) -> Response:
     router,
     "/api/estimate/advice",
     summary="Where another tag helps the estimate most",
-    responses={**NOT_REMEMBERED, 200: {"model": estimates.Advice}},
+    responses={**NOT_REMEMBERED, 200: {"model": followers.Advice}},
     openapi_extra={"parameters": parameters_of(AdviceQuery)},
 )
 async def advice(request: Request) -> Response:
@@ -309,7 +309,7 @@ async def advice(request: Request) -> Response:
 
     async def body(bridge: Bridge, query: AdviceQuery) -> bytes:
         wanted = ReportRequest(query.sensor_type, query.places)
-        return estimates.advice(query.sensor_type, await bridge.source.estimate_report(wanted))
+        return followers.advice(query.sensor_type, await bridge.source.estimate_report(wanted))
 
     return await _report(request, AdviceQuery, body)
 

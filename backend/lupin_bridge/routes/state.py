@@ -1,10 +1,11 @@
-"""The state: over WebSocket, as JSON, and tag by tag."""
+"""The state: over WebSocket, as JSON, tag by tag; and the past."""
 
 from __future__ import annotations
 
 import math
 import time
 from dataclasses import dataclass
+from datetime import UTC
 from typing import Annotated, Final
 
 from annotated_types import Ge
@@ -13,25 +14,38 @@ from fastapi import APIRouter, Request, Response, WebSocket
 from lupin_bridge.bridge import Bridge
 from lupin_bridge.past import bodies
 from lupin_bridge.past import query as past_query
-from lupin_bridge.past.plans import LatestOfTag, NoSuchTag, OneTag, WholeState
+from lupin_bridge.past.plans import History, LatestOfTag, NoSuchTag, OneTag, Timeline, WholeState
+from lupin_bridge.past.report import Report
+from lupin_bridge.past.report_page import (
+    HTML_TYPE,
+    PAGE_HEADERS,
+    ReportPage,
+    languages,
+    refused_page,
+)
 from lupin_bridge.query_string import parameter, parameters_of, read
 from lupin_bridge.routes.answers import (
     NEVER_STORE,
     NO_TWIN,
     NOT_REMEMBERED,
+    REFUSALS,
     bridge_of,
     error_response,
     json_response,
+    list_header,
     read_route,
+    refusal,
     refusing,
     respond,
     respond_as_of,
     respond_past,
 )
+from lupin_bridge.routes.pages import language_of
 from lupin_bridge.routes.sockets import listen
 from lupin_bridge.serving.admission import Answer
-from lupin_bridge.stream import schema
+from lupin_bridge.stream import routes_schema, schema
 from lupin_bridge.stream.hub import CLOSE_POLICY
+from lupin_twin.core.past import PastRefused
 from lupin_twin.core.state import Snapshot, TagState
 
 # Of the reason in a close frame (RFC 6455, section 5.5).
@@ -160,3 +174,109 @@ async def _tag_as_of(request: Request, tag_id: str, at_ns: int) -> Response:
         response = error_response(f"{error}{bodies.why_not(journal, at_ns)}", 404)
         response.headers.update(bodies.moment_headers(journal, at_ns))
         return response
+
+
+# --- the past: one sensor's readings, what happened when, and the shift report of both ------------
+
+
+@read_route(
+    router,
+    "/api/history",
+    summary="The readings of one sensor of one tag over a period",
+    responses={200: {"model": routes_schema.History}, **NOT_REMEMBERED},
+    openapi_extra={"parameters": parameters_of(past_query.OfHistory)},
+)
+async def history_route(request: Request) -> Response:
+    """Readings, or equal buckets if there are more than `points`; `gaps`: where nothing came."""
+    bridge = bridge_of(request)
+    now_ns = bridge.ros_time_ns
+    series = past_query.history(request.query_params.multi_items(), now_ns)
+    journal, has_nights = bridge.source.journal(), bridge.origin != "simulated"
+    history = History(series, now_ns, bridge.criteria, journal, has_nights)
+    return await respond_past(request, history, "history")
+
+
+@read_route(
+    router,
+    "/api/timeline",
+    summary="What happened when: scans, failures, looks, pests, silences, runs of the clock",
+    responses={200: {"model": routes_schema.Timeline}, **NOT_REMEMBERED},
+    openapi_extra={"parameters": parameters_of(past_query.OfTimeline)},
+)
+async def timeline_route(request: Request) -> Response:
+    """Events counted in buckets of equal length, and how far back anything is remembered."""
+    bridge = bridge_of(request)
+    period = past_query.period(
+        past_query.OfTimeline, request.query_params.multi_items(), bridge.ros_time_ns
+    )
+    return await respond_past(request, Timeline(period, bridge.source.journal()), "timeline")
+
+
+@read_route(
+    router,
+    "/api/report",
+    summary="What happened between two moments: alarms, notes, silences, extremes, scans",
+    responses={200: {"model": routes_schema.ShiftReport}, **NOT_REMEMBERED},
+    openapi_extra={"parameters": parameters_of(past_query.OfReport)},
+)
+async def report_route(request: Request) -> Response:
+    """At most 31 days and 100,000 scans and inspections; 500 entries of each list."""
+    given = read(past_query.OfReport, request.query_params.multi_items(), PastRefused)
+    return await respond_past(request, _report(request, given), "report")
+
+
+@read_route(
+    router,
+    "/api/report.html",
+    summary="The same as a page for paper, A4",
+    responses={200: {"content": {"text/html": {"schema": {"type": "string"}}}}, **NOT_REMEMBERED},
+    openapi_extra={"parameters": parameters_of(past_query.OfReportPage)},
+)
+async def report_page_route(request: Request) -> Response:
+    """Without scripts. A browser gets a refusal as a page too."""
+    try:
+        return await _report_page(request)
+    except REFUSALS as error:
+        refused = refusal(error)
+        if "text/html" in list_header(request, "accept"):
+            lang = language_of(
+                request.query_params.get("lang"),
+                list_header(request, "accept-language"),
+                languages(),
+            )
+            page = refused_page(str(error), lang)
+            headers = {**refused.headers, **PAGE_HEADERS}
+            del headers["content-length"], headers["content-type"]
+            return Response(page, refused.status_code, headers, HTML_TYPE)
+        return refused
+
+
+async def _report_page(request: Request) -> Response:
+    given = read(past_query.OfReportPage, request.query_params.multi_items(), PastRefused)
+    found = _report(request, given)
+    name = given.time_zone or ""
+    zone = past_query.zone(name) if name else None
+    unknown_zone = "" if zone else name[:64]
+    page = ReportPage(
+        found.start_ns,
+        found.end_ns,
+        found.criteria,
+        found.journal,
+        lang=given.lang,
+        zone=UTC if unknown_zone else zone,
+        unknown_zone=unknown_zone,
+        origin=bridge_of(request).origin,
+        site=bridge_of(request).site,
+    )
+    return await respond_past(request, page, "report")
+
+
+def _report(request: Request, given: past_query.OfReport) -> Report:
+    bridge = bridge_of(request)
+    journal = bridge.source.journal()
+    now_ns = bridge.ros_time_ns
+    return Report(
+        *past_query.report(given, journal.complete_ns if now_ns is None else now_ns),
+        bridge.criteria,
+        journal,
+    )

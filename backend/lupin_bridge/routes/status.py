@@ -40,7 +40,7 @@ from lupin_bridge.routes.answers import (
 )
 from lupin_bridge.serving.admission import REVALIDATE, Answer
 from lupin_bridge.stream import routes_schema, schema
-from lupin_bridge.stream.robot import robot_body
+from lupin_bridge.stream.followers import robot_body
 from lupin_bridge.stream.state_json import alarms_body, header, judgement, stamp
 from lupin_twin.field.explored import OccupancyMap
 

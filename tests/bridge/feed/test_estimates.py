@@ -5,7 +5,7 @@ import math
 from typing import Any
 
 from lupin_bridge.feed.source import TwinUnavailableError
-from lupin_bridge.stream.estimates import (
+from lupin_bridge.stream.followers import (
     MAX_SENSORS,
     Changed,
     EstimateFollower,

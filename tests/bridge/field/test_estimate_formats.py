@@ -13,7 +13,7 @@ from lupin_bridge.field.formats import JSON, NPY, PNG, FieldFormat
 from lupin_bridge.judge.options import Criteria
 from lupin_bridge.judge.quantities import Ranges, Span
 from lupin_bridge.settings import Settings
-from lupin_bridge.stream.estimates import GetEstimateResponse
+from lupin_bridge.stream.followers import GetEstimateResponse
 from tests.support.estimates import an_estimate
 
 SENSORS = Criteria.of(Settings()).sensors

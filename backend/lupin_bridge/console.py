@@ -72,7 +72,6 @@ def _written(stream: TextIO | None, text: str) -> Exception | None:
 
 # --- what commands share: their actions, and where they write -------------------------------------
 
-
 FAILED: Final = 1
 Roles: TypeAlias = "argparse._SubParsersAction[argparse.ArgumentParser]"  # noqa: SLF001
 

@@ -236,7 +236,6 @@ def variable(name: str) -> str:
 
 # --- where they come from: the command line, the environment, a file, in this order ---------------
 
-
 log = logging.getLogger(__name__)
 
 CONFIG_VARIABLE: Final = variable("config")

@@ -107,7 +107,6 @@ def check_password(password: str) -> None:
 
 # --- the shared token -----------------------------------------------------------------------------
 
-
 MIN_TOKEN_LENGTH: Final = 16
 # RFC 6750, section 2.1: what may stand behind "Bearer" in a header.
 _TOKEN: Final = re.compile(r"[A-Za-z0-9._~+/-]+=*")

@@ -178,7 +178,6 @@ class AlarmBoard:
 
 # --- what people said of alarms -------------------------------------------------------------------
 
-
 POLL_S: Final = 1.0
 OF_ALARM: Final = "alarm:"
 # Notes that one name may write at once, and a minute from then on.

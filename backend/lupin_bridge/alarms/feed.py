@@ -83,7 +83,6 @@ def _of_tag(before: TagState, tag: TagState) -> list[PastWrite]:
 
 # --- what has changed, for the feed ---------------------------------------------------------------
 
-
 log = logging.getLogger(__name__)
 
 DAY_NS: Final = 86_400 * NANOSECONDS_PER_SECOND

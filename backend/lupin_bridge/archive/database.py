@@ -266,7 +266,6 @@ def _text(name: str) -> Any:
 
 # --- what is in it, and what is given up by age ---------------------------------------------------
 
-
 _SITES: Final = (
     "SELECT site.site, machine, process, heard_at > now() - INTERVAL '10 s',"
     " heard_at::timestamptz(0)::text, (SELECT max(epoch) FROM epoch WHERE epoch.site = site.site)"

@@ -221,7 +221,6 @@ def _text(value: Any) -> Any:
 
 # --- again and again ------------------------------------------------------------------------------
 
-
 log = logging.getLogger(__name__)
 
 FIRST_WAIT_S: Final = 0.5

@@ -125,7 +125,6 @@ def set_up_log(log_format: str, level: str = "info") -> None:
 
 # --- the command ----------------------------------------------------------------------------------
 
-
 log = logging.getLogger(__name__)
 
 USAGE_ERROR = 2

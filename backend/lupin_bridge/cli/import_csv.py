@@ -25,12 +25,7 @@ from lupin_bridge.console import FAILED, Progress, Roles, add_role, say, tell
 from lupin_twin.adapt.config import read_yaml
 from lupin_twin.adapt.table import ConfigError, Table, is_number, shown
 from lupin_twin.adapt.value import AS_IT_IS, Value, seconds_of, values_of
-from lupin_twin.core.drops import (
-    MAX_SENSORS_PER_TAG,
-    MAX_TAGS,
-    MAX_TEXT_LENGTH,
-    check_length,
-)
+from lupin_twin.core.drops import MAX_SENSORS_PER_TAG, MAX_TAGS, MAX_TEXT_LENGTH, check_length
 from lupin_twin.core.parameters import MAX_JOURNAL_DAYS
 from lupin_twin.core.state import NANOSECONDS_PER_SECOND, Pin, Pose, Reading, Scan, Write
 from lupin_twin.journal.beside import Lock
@@ -304,11 +299,6 @@ def _moment_ns(text: str, zone: ZoneInfo | None) -> int:
 
 # --- into a journal -------------------------------------------------------------------------------
 
-
-SOURCE: Final = "import"
-HELP: Final = (
-    "readings of before, from CSV, into a journal; without --write, what would be imported"
-)
 # Stamp, tag, and the value of each sensor.
 Merged = tuple[int, str, dict[str, float]]
 _BATCH: Final = 20_000
@@ -319,7 +309,8 @@ _NO_LIMITS: Final = Limits(days=MAX_JOURNAL_DAYS, max_bytes=2**62)
 
 def add_parser(roles: Roles) -> None:
     """Add `import` to the command's options."""
-    parser = add_role(roles, "import", HELP)
+    text = "readings of before, from CSV, into a journal; without --write, what would be imported"
+    parser = add_role(roles, "import", text)
     parser.add_argument("file", metavar="FILE.csv", type=Path)
     parser.add_argument(
         "--map",
@@ -419,7 +410,11 @@ def _write(path: Path, columns: Columns, found: Iterator[Merged]) -> tuple[int, 
         Lock(path, "lupin-twin import"),
         closing(JournalFile(path, _NO_LIMITS, is_sound=None)) as file,
     ):
-        known, placed = _known(path)
+        with closing(open_named(path)) as connection:
+            known = runs(connection.execute)
+            placed = {tag for (tag,) in connection.execute("SELECT DISTINCT tag FROM place")}
+        if any(run.begun.is_simulated for run in known):
+            raise JournalError(f"the journal {path} is of a simulation: import into another")
         while batch := list(islice(found, _BATCH)):
             count += len(batch)
             if not known:
@@ -434,7 +429,7 @@ def _write(path: Path, columns: Columns, found: Iterator[Merged]) -> tuple[int, 
                     tag_id,
                     stamp_ns,
                     readings,
-                    source=SOURCE,
+                    source="import",
                     own_stamp_ns=stamp_ns,
                     arrival_ns=stamp_ns,
                 )
@@ -453,13 +448,3 @@ def _write(path: Path, columns: Columns, found: Iterator[Merged]) -> tuple[int, 
                 ]
             )
     return new, count - new
-
-
-def _known(path: Path) -> tuple[list[Run], set[str]]:
-    """The journal's runs, and the tags whose places it has."""
-    with closing(open_named(path)) as connection:
-        found = runs(connection.execute)
-        placed = {tag_id for (tag_id,) in connection.execute("SELECT DISTINCT tag FROM place")}
-    if any(run.begun.is_simulated for run in found):
-        raise JournalError(f"the journal {path} is of a simulation: import into another")
-    return found, placed

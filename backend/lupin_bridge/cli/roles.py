@@ -196,7 +196,6 @@ def _option(name: str, patrol_args: Sequence[str]) -> str:
 
 # --- roles ----------------------------------------------------------------------------------------
 
-
 FEEDER_STOP_S = 0.9
 
 

@@ -94,7 +94,6 @@ class Supervisor:
 
 # --- listen, warn, say where, serve until a signal ------------------------------------------------
 
-
 log = logging.getLogger("lupin_bridge")
 
 
@@ -156,7 +155,6 @@ def _follow_certificates(settings: Settings, server: BridgeServer) -> asyncio.Ta
 
 
 # --- the page over all greenhouses, until a signal ends it ----------------------------------------
-
 
 # Of the twin's own: a fleet has none.
 _NOT_HERE = ("site", "journal", "mqtt_url", "webhook_url", "http_observations")

@@ -115,7 +115,6 @@ class ExportStep(Generic[ResultT]):
 
 # --- the process that looks back ------------------------------------------------------------------
 
-
 # Before each answer: its number, and how long its pickle is.
 HEAD: Final = struct.Struct(">QQ")
 # nice(2): beside a busy twin it gets a quarter of the core that they share.

@@ -348,7 +348,6 @@ class Relay:
 
 # --- the definition of a message type, with all that it is made of, as bags and viewers want it ---
 
-
 ENCODING: Final = "ros2msg"
 _RULE: Final = "=" * 80
 _NAME: Final = re.compile(r"([A-Za-z]\w*)/msg/([A-Za-z]\w*)", re.ASCII)

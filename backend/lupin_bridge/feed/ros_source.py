@@ -282,7 +282,6 @@ def _is_near(x: float, y: float) -> bool:
 
 # --- the source -----------------------------------------------------------------------------------
 
-
 # What is also made into messages here: the topics of `relay.topics_of`.
 _SHAPES: Final = {
     "lupin_msgs/msg/TwinState": message_limits.STATE,

@@ -159,7 +159,6 @@ def _newest(known: ValueT | None, heard: ValueT | None, future_ns: int) -> Value
 
 # --- what the routes need of a twin ---------------------------------------------------------------
 
-
 ResultT = TypeVar("ResultT")
 
 # What a callback may take at worst, on a slow machine: the largest state there is takes a second.

@@ -226,7 +226,6 @@ def _is_journal(path: Path, journal: str) -> bool:
 
 # --- the source -----------------------------------------------------------------------------------
 
-
 # ROS time beyond this, in 2001, is that of a wall's clock, and goes on while nobody tells it.
 _A_DATE_NS: Final = 10**18
 

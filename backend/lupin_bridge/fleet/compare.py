@@ -205,7 +205,6 @@ def _numbers(values: Any) -> list[float | None]:
 
 # --- what happened at every site ------------------------------------------------------------------
 
-
 # Under the names of `schema.ReportCounts`.
 _COUNTED: Final = {
     Event.SCANS: "scans",

@@ -76,7 +76,6 @@ def map_version(paths: str) -> str | None:
 
 # --- the overview ---------------------------------------------------------------------------------
 
-
 # A forwarder says every two seconds that it lives; this long after the last time it counts as gone.
 LIVE_S: Final = 10.0
 

@@ -128,7 +128,6 @@ class Watching:
 
 # --- the source of one site's page ----------------------------------------------------------------
 
-
 HEARTBEAT_S: Final = 1.0
 _NO_REPORT: Final = "how right estimates were is known to the twin of the greenhouse, not here"
 

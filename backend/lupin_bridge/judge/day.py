@@ -193,7 +193,6 @@ def merged(turns: Mapping[str, Sequence[Turn]]) -> list[tuple[Turn, str]]:
 
 # --- quantities of a day --------------------------------------------------------------------------
 
-
 # A value counts until the next one, and no longer than this after its day was complete.
 COUNTS_NS: Final = 30 * 3600 * 1_000_000_000
 # Scans of so long before a moment say all of the days that count then: one is complete within two.

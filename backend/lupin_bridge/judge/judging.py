@@ -17,13 +17,7 @@ from typing import Final
 
 from lupin_bridge.judge.day import COUNTS_NS, Day
 from lupin_bridge.judge.options import Criteria
-from lupin_bridge.judge.scans import (
-    NO_PATROL,
-    SHORTEST_NS,
-    Patrol,
-    RecentScans,
-    Scans,
-)
+from lupin_bridge.judge.scans import NO_PATROL, SHORTEST_NS, Patrol, RecentScans, Scans
 from lupin_bridge.judge.verdict import (
     FORGOTTEN_NS,
     NOTHING_CHANGED,

@@ -169,7 +169,6 @@ class Stretches:
 
 # --- the recent scans of each tag -----------------------------------------------------------------
 
-
 # Whether it was day at a moment, ns, at which the light said so, or None: nothing.
 DayOf = Callable[[bool | None, int], Day]
 

@@ -94,10 +94,7 @@ class Push:
             AccountError, PeopleBusy: the file of people cannot be written.
 
         """
-        from cryptography.hazmat.primitives.serialization import (  # noqa: PLC0415  # few want it
-            Encoding,
-            PublicFormat,
-        )
+        from cryptography.hazmat.primitives.serialization import Encoding, PublicFormat  # noqa: PLC0415  # few want it
 
         key = (await self._key()).public_key
         return encoded(key.public_bytes(Encoding.X962, PublicFormat.UncompressedPoint))
@@ -299,10 +296,7 @@ def check_device(device: Device, target: PushTarget) -> None:
         DeviceRefused: the address or a key cannot be one.
 
     """
-    from cryptography.hazmat.primitives.asymmetric.ec import (  # noqa: PLC0415  # as above
-        SECP256R1,
-        EllipticCurvePublicKey,
-    )
+    from cryptography.hazmat.primitives.asymmetric.ec import SECP256R1, EllipticCurvePublicKey  # noqa: PLC0415  # as above
 
     endpoint = parsed(device.endpoint, target)
     if endpoint.host not in target.private_hosts:

@@ -132,7 +132,6 @@ def _words_of(error: OSError) -> str:
 
 # --- how a message is tried until it is taken -----------------------------------------------------
 
-
 log = logging.getLogger(__name__)
 
 # What the page and the log say of a failure is one short line, whatever a library has to say.

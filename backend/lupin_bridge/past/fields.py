@@ -26,12 +26,7 @@ from lupin_bridge.past.plans import Plan, StateQuery, etag_of, plan_of, series_s
 from lupin_bridge.serving.admission import REVALIDATE, Answer
 from lupin_twin.core.past import MAX_POINTS
 from lupin_twin.core.state import NANOSECONDS_PER_SECOND, Snapshot, samples_of
-from lupin_twin.estimate.engine import (
-    MINUTES_A_DAY,
-    EstimateRequest,
-    TagPast,
-    moment_of,
-)
+from lupin_twin.estimate.engine import MINUTES_A_DAY, EstimateRequest, TagPast, moment_of
 from lupin_twin.estimate.engine import cost_s as estimate_cost_s
 from lupin_twin.field.engine import (
     FieldRefused,

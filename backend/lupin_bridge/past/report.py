@@ -33,14 +33,7 @@ from lupin_bridge.stream.state_json import alarm_json, note_json, stamp
 from lupin_twin.core.history import KIND_FLOWER
 from lupin_twin.core.journal_condition import Condition
 from lupin_twin.core.notes import WITHDRAW, Note, NotesRequest, PastNotes, withdrawals
-from lupin_twin.core.past import (
-    EVERY_TAG,
-    HOUR_NS,
-    Event,
-    PastRefused,
-    SeriesPast,
-    SeriesRequest,
-)
+from lupin_twin.core.past import EVERY_TAG, HOUR_NS, Event, PastRefused, SeriesPast, SeriesRequest
 from lupin_twin.core.state import STATUS_OK, Snapshot, TagState
 from lupin_twin.core.writes import PastWrite, PastWrites, PeriodRequest, RunSpan
 

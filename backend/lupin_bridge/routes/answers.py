@@ -25,13 +25,7 @@ from lupin_bridge.feed.source import TwinTimeoutError, TwinUnavailableError
 from lupin_bridge.field import query as field_query
 from lupin_bridge.past import bodies
 from lupin_bridge.past.fields import Field
-from lupin_bridge.past.plans import (
-    PLAN_TAG_S,
-    Answered,
-    ConditionalQuery,
-    NoSuchTag,
-    Query,
-)
+from lupin_bridge.past.plans import PLAN_TAG_S, Answered, ConditionalQuery, NoSuchTag, Query
 from lupin_bridge.serving.admission import REVALIDATE, AdmissionError, Answer, BusyError, Limits
 from lupin_bridge.stream import schema
 from lupin_twin.core.notes import NotesUnwritable

@@ -187,7 +187,6 @@ async def field_quality(request: Request) -> Response:
 
 # --- the estimate of one sensor with its error ----------------------------------------------------
 
-
 ESTIMATE: Final = InFormats(
     name="estimate",
     summary="The estimate of one sensor",

@@ -49,14 +49,7 @@ from lupin_bridge.stream import routes_schema
 from lupin_bridge.stream.state_json import note_json, stamp
 from lupin_twin.adapt.config import Place
 from lupin_twin.adapt.scans import BuiltScan
-from lupin_twin.core.notes import (
-    COMMENT,
-    SHELVE,
-    WITHDRAW,
-    WITHDRAWN,
-    Note,
-    withdrawals,
-)
+from lupin_twin.core.notes import COMMENT, SHELVE, WITHDRAW, WITHDRAWN, Note, withdrawals
 from lupin_twin.core.past import NotRemembered, PastRefused
 from lupin_twin.core.state import NANOSECONDS_PER_SECOND
 
@@ -297,7 +290,6 @@ async def audit_route(request: Request) -> Response:
 
 
 # --- readings of programs -------------------------------------------------------------------------
-
 
 # A clock may be so much ahead; what is dated farther is of a clock that is wrong.
 MAX_AHEAD_S: Final = 10

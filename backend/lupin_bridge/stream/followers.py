@@ -165,7 +165,6 @@ def _graded(tally: Tally) -> dict[str, int]:
 
 # --- every sensor's report, every few seconds -----------------------------------------------------
 
-
 log = logging.getLogger(__name__)
 
 # A report serves for 30 s at least (`estimate_service.REST_S`).

@@ -209,7 +209,6 @@ class Robot(RobotNow):
 
 # --- the past -------------------------------------------------------------------------------------
 
-
 _COMPLETE_TO = Field(
     description="all that was received before this is in the journal; null: not known"
 )

@@ -162,7 +162,6 @@ def time(stamp_ns: int) -> bytes:
 
 # --- one client's session -------------------------------------------------------------------------
 
-
 log = logging.getLogger(__name__)
 
 # The largest message that one client is sent: a map of 4,000 × 4,000 cells has 16 MB, a layer of a

@@ -160,7 +160,6 @@ def _id_member(message_id: Id) -> dict[str, Id]:
 
 # --- the services and values ----------------------------------------------------------------------
 
-
 Converter = Callable[[Any], Any]
 
 _ARRAY: Final = re.compile(r"sequence<(?P<kind>[\w/]+)(?:, \d+)?>|(?P<of>[\w/]+)\[\d+\]")

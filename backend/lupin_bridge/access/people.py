@@ -30,7 +30,7 @@ from lupin_bridge.access.credentials import (
     cookies_of,
     is_name,
 )
-from lupin_bridge.serving.admission import AdmissionError, RateLimit
+from lupin_bridge.serving.admission import ClientLimitError, RateLimit
 
 log = logging.getLogger(__name__)
 
@@ -44,10 +44,6 @@ MAX_WAITING: Final = 8
 # Sign-ins that an address may try in vain at once, and a minute from then on.
 ATTEMPT_BURST: Final = 10
 ATTEMPTS_PER_MINUTE: Final = 10
-
-
-class PeopleBusy(AdmissionError):
-    """Too many sign-ins wait already, or one client tries too many."""
 
 
 class People:
@@ -158,14 +154,14 @@ class People:
         Both take the same time.
 
         Raises:
-            PeopleBusy: too many wait, or too many were wrong from that address.
+            ClientLimitError: too many wait, or too many were wrong from that address.
             AccountError: the file cannot be read.
 
         """
         # Many at once are no more than the few that wait for the thread.
         wait_s = self._attempts.wait_s(address, time.monotonic())
         if wait_s > 0.0:
-            raise PeopleBusy(
+            raise ClientLimitError(
                 f"{address} has tried to sign in in vain more than {ATTEMPT_BURST} times and "
                 f"{ATTEMPTS_PER_MINUTE} a minute: try again in {math.ceil(wait_s)} s",
                 wait_s,
@@ -194,7 +190,7 @@ class People:
         """Begin a session; returns its cookie's name and value, and how long it lasts, s.
 
         Raises:
-            PeopleBusy, AccountError: see `write`.
+            ClientLimitError, AccountError: see `write`.
 
         """
         if self.shared is not None and person.by == "shared token":
@@ -208,7 +204,7 @@ class People:
         """End the session that a request came with; returns its cookie's name.
 
         Raises:
-            PeopleBusy, AccountError: see `write`.
+            ClientLimitError, AccountError: see `write`.
 
         """
         if self.shared is not None and person.by == "shared token":
@@ -221,7 +217,7 @@ class People:
         """What `work(accounts, now_s)` gives, on the thread.
 
         Raises:
-            PeopleBusy: too many wait.
+            ClientLimitError: too many wait.
             AccountError: the file cannot be read or written.
 
         """
@@ -234,7 +230,9 @@ class People:
 
     async def _on_thread(self, work: Callable[[], ResultT], most: int = MAX_WAITING) -> ResultT:
         if self._waiting >= most:
-            raise PeopleBusy(f"{MAX_WAITING} sign-ins wait already: try again in a moment", 2.0)
+            raise ClientLimitError(
+                f"{MAX_WAITING} sign-ins wait already: try again in a moment", 2.0
+            )
         self._waiting += 1
         doing = self._thread.submit(work)
         # Not when the client has left: until the thread is free again.

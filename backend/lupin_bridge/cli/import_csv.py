@@ -22,6 +22,7 @@ from zoneinfo import ZoneInfo
 
 from lupin_bridge.cli.journal import SHOWN, JournalError, add_which, fail, path_of
 from lupin_bridge.console import FAILED, Progress, Roles, add_role, say, tell
+from lupin_bridge.judge.options import zone_of
 from lupin_twin.adapt.config import read_yaml
 from lupin_twin.adapt.table import ConfigError, Table, is_number, shown
 from lupin_twin.adapt.value import AS_IT_IS, Value, seconds_of, values_of
@@ -145,11 +146,10 @@ def columns_of(content: Any) -> Columns:
         return table.text(name) if table.has(name) else ""
 
     zone = text("time_zone")
-    try:
-        place = ZoneInfo(zone) if zone else None
-    except (KeyError, ValueError, OSError):
+    place = zone_of(zone) if zone else None
+    if zone and place is None:
         why = f"time_zone is {shown(zone)}, expected such as Europe/Amsterdam"
-        raise ConfigError(why) from None
+        raise ConfigError(why)
     columns = Columns(
         time=table.text("time"),
         zone=place,

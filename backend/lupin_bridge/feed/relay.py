@@ -28,7 +28,7 @@ from contextlib import ExitStack
 from dataclasses import dataclass
 from functools import cache, partial
 from pathlib import Path
-from typing import Any, Final, Protocol
+from typing import Any, Final
 
 from lupin_twin.core import interfaces
 
@@ -113,34 +113,6 @@ class RosTime:
     is_simulated: bool
 
 
-class Ros(Protocol):
-    """What ROS does for the relay, in its thread; `ros_source.RelayRos` is it."""
-
-    def subscribe(
-        self, node: Any, topic: Topic, take: Callable[[Sample], None]
-    ) -> Callable[[], None]:
-        """Have `take` called for each sample, until what is returned is called.
-
-        Raises:
-            ValueError: the topic's type is not installed, or ROS takes no such topic.
-
-        """
-
-    def published(self, node: Any, is_wanted: Callable[[str, str], bool]) -> Mapping[str, str]:
-        """Topics that somebody publishes as a type that is wanted, and that type."""
-
-    def time(self, node: Any) -> RosTime:
-        """What ROS has for now."""
-
-    def read(self, topic: Topic, data: bytes) -> Any:
-        """The message that the bytes hold; in any thread.
-
-        Raises:
-            ValueError: none of this type, or one that is too large.
-
-        """
-
-
 class Bounded:
     """The newest samples of a topic, within its bounds."""
 
@@ -218,10 +190,11 @@ class _Relayed:
 class Relay:
     """All topics that are listened to. Belongs to the event loop.
 
-    `thread()` is the `RosThread`, asked for with the first topic: it need not run before.
+    `thread()` is the `RosThread`, asked for with the first topic: it need not run before. `ros` is
+    `ros_source.RelayRos`: what ROS does for the relay, in its thread.
     """
 
-    def __init__(self, thread: Callable[[], Any], ros: Ros, linger_s: float = LINGER_S) -> None:
+    def __init__(self, thread: Callable[[], Any], ros: Any, linger_s: float = LINGER_S) -> None:
         self._thread = thread
         self._ros = ros
         self.linger_s = linger_s

@@ -293,12 +293,17 @@ _SHAPES: Final = {
 
 
 class RelayRos:
-    """`relay.Ros` over rclpy."""
+    """What rclpy does for the relay."""
 
     def subscribe(
         self, node: Any, topic: Topic, take: Callable[[Sample], None]
     ) -> Callable[[], None]:
-        """Subscribe raw: nothing is made of the bytes in this thread."""
+        """Subscribe raw: nothing is made of the bytes in this thread. What is returned ends it.
+
+        Raises:
+            ValueError: the topic's type is not installed, or ROS takes no such topic.
+
+        """
         clock = node.get_clock()
 
         def hand_over(data: bytes) -> None:
@@ -335,7 +340,12 @@ class RelayRos:
         return RosTime(clock.now().nanoseconds, bool(clock.ros_time_is_active))
 
     def read(self, topic: Topic, data: bytes) -> Any:
-        """As the nodes read it: lengths are checked before anything is made of it."""
+        """As the nodes read it, in any thread: lengths are checked before anything is made of it.
+
+        Raises:
+            ValueError: none of this type, or one that is too large.
+
+        """
         message = read_message(data, _SHAPES[topic.type_name])
         if isinstance(message, Drop):
             raise ValueError(message.why)  # noqa: TRY004  # it is no wrong call

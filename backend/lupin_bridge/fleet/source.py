@@ -8,11 +8,11 @@ import logging
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import replace
-from typing import Any, Final, cast
+from typing import Any, Final
 
 from lupin_bridge.feed.past_process import PastProcess
 from lupin_bridge.feed.query import Now
-from lupin_bridge.feed.relay import Relay, Ros, TwinNames
+from lupin_bridge.feed.relay import Relay, TwinNames
 from lupin_bridge.feed.shared_work import end
 from lupin_bridge.feed.source import TwinSource, TwinUnavailableError, TwinUpdate
 from lupin_bridge.fleet.overview import Archive, Site
@@ -149,7 +149,7 @@ class SiteTwin(TwinSource):
         self.past = past
         self.timeout_s = timeout_s
         self.workers = workers
-        self.relay = Relay(_no_ros, cast("Ros", None))
+        self.relay = Relay(_no_ros, None)
         self._watching = watching
         # The parameters of a twin are not in its log: where they are others there, fields differ.
         self._parameters = TwinParameters()

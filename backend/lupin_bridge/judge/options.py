@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
-from datetime import time, tzinfo
+from datetime import time
 from importlib.resources import files
 from typing import Final
 from zoneinfo import ZoneInfo
@@ -94,20 +94,22 @@ def _clock(settings: Settings) -> ClockDay:
             f"{settings.called('day_hours')} is {settings.day_hours!r}, not such as 06:00-20:00"
         )
     begins, ends = (time.fromisoformat(hour) for hour in hours.groups())
-    return ClockDay(_zone(settings), begins, ends)
-
-
-def _zone(settings: Settings) -> tzinfo | None:
-    """None: this machine's, which changes with summer and winter."""
-    if not settings.time_zone:
-        return None
-    try:
-        return ZoneInfo(settings.time_zone)
-    except (KeyError, OSError, ValueError) as error:
+    # None: this machine's, which changes with summer and winter.
+    zone = zone_of(settings.time_zone) if settings.time_zone else None
+    if settings.time_zone and zone is None:
         raise SettingError(
             f"{settings.called('time_zone')} is {settings.time_zone!r}, which this machine does "
-            f"not know: {error}"
-        ) from error
+            "not know"
+        )
+    return ClockDay(zone, begins, ends)
+
+
+def zone_of(name: str) -> ZoneInfo | None:
+    """The time zone of a name; None: this machine does not know it."""
+    try:
+        return ZoneInfo(name)
+    except (KeyError, OSError, ValueError):
+        return None
 
 
 def unix_s(stamp_ns: int) -> float | None:

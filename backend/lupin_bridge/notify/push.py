@@ -91,7 +91,7 @@ class Push:
         """The key that a browser subscribes with, base64url; made with the first.
 
         Raises:
-            AccountError, PeopleBusy: the file of people cannot be written.
+            AccountError, ClientLimitError: the file of people cannot be written.
 
         """
         from cryptography.hazmat.primitives.serialization import Encoding, PublicFormat  # noqa: PLC0415  # few want it

@@ -15,6 +15,7 @@ from functools import lru_cache
 from itertools import accumulate, pairwise
 from typing import Any, Final
 
+from lupin_bridge.field.query import safe_name
 from lupin_bridge.judge.quantities import DAILY, Sensors
 from lupin_bridge.past.query import PeriodQuery, compact, iso
 from lupin_bridge.stream.state_json import stamp
@@ -294,7 +295,6 @@ _NEEDS_QUOTES: Final = re.compile(r'[",;\r\n\t]')
 # cells by another sign than the comma, behind that one. Names come from the robot, and whoever
 # opens the file must not run what they say.
 _FORMULA: Final = re.compile(r"(^|[;\t\r\n])(?=[=+\-@\uff1d\uff0b\uff0d\uff20\t\r\n])")
-_UNSAFE_IN_NAME: Final = re.compile(r"[^A-Za-z0-9._-]")
 
 
 def csv_lines(rows: Iterable[PastRow], sensors: Sensors, site: str | None = None) -> bytes:
@@ -337,7 +337,7 @@ def csv_number(value: float) -> str:
 
 def export_file_name(query: PeriodQuery, end_ns: int | None, kind: str) -> str:
     """A name that says which tag, sensor and period; `end_ns` is now, where that is known."""
-    of = [_UNSAFE_IN_NAME.sub("_", text) for text in (query.tag_id, query.sensor_type) if text]
+    of = [safe_name(text) for text in (query.tag_id, query.sensor_type) if text]
     since = ["from", compact(query.start_ns)] if query.start_ns else []
     end_ns = query.end_ns or end_ns
     until = ["to", compact(end_ns)] if end_ns else []

@@ -7,7 +7,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
 from typing import Annotated, Final, Literal
-from zoneinfo import ZoneInfo
 
 from annotated_types import Interval
 
@@ -262,14 +261,6 @@ def report(given: OfReport, now_ns: int | None) -> tuple[int, int]:
     if days > MAX_REPORT_DAYS:
         raise PastRefused(f"from and to are {days:.1f} days apart, the limit is {MAX_REPORT_DAYS}")
     return start_ns, end_ns
-
-
-def zone(name: str) -> ZoneInfo | None:
-    """The time zone of a name; None: this machine does not know it."""
-    try:
-        return ZoneInfo(name)
-    except (KeyError, OSError, ValueError):
-        return None
 
 
 def _period(given: OfPeriod | OfHistory, now_ns: int | None) -> tuple[int, int]:

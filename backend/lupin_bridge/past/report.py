@@ -22,7 +22,7 @@ import orjson
 from lupin_bridge.alarms.board import active_first, notes_of_alarms
 from lupin_bridge.feed.query import Find
 from lupin_bridge.judge.alarm_fold import Follower
-from lupin_bridge.judge.episodes import Alarm, readings_of
+from lupin_bridge.judge.episodes import SITE, Alarm, readings_of
 from lupin_bridge.judge.options import Criteria
 from lupin_bridge.judge.scans import SHORTEST_NS, TIMES_MEDIAN
 from lupin_bridge.judge.verdict import Verdict, derive
@@ -50,8 +50,6 @@ _LOT: Final = 2_000
 MAX_LISTED: Final = 500
 # What a report costs, about, s of one core.
 REPORT_S: Final = 3.0
-# A house silence is in the list of silences like a tag's.
-WHOLE_SITE: Final = ""
 
 Stretch = tuple[int, int]
 
@@ -311,10 +309,10 @@ class _Fold:
         ]
         cut = [
             (tag_id, (max(from_ns, start_ns), to_ns))
-            for tag_id, (from_ns, to_ns) in ((*((WHOLE_SITE, it) for it in whole), *found))
+            for tag_id, (from_ns, to_ns) in ((*((SITE, it) for it in whole), *found))
             if to_ns > start_ns
         ]
-        return sorted(cut, key=lambda it: (it[0] != WHOLE_SITE, it[1][0] - it[1][1], *it))
+        return sorted(cut, key=lambda it: (it[0] != SITE, it[1][0] - it[1][1], *it))
 
 
 def silences(

@@ -12,6 +12,7 @@ from annotated_types import Ge
 from fastapi import APIRouter, Request, Response, WebSocket
 
 from lupin_bridge.bridge import Bridge
+from lupin_bridge.judge.options import zone_of
 from lupin_bridge.past import bodies
 from lupin_bridge.past import query as past_query
 from lupin_bridge.past.plans import History, LatestOfTag, NoSuchTag, OneTag, Timeline, WholeState
@@ -255,7 +256,7 @@ async def _report_page(request: Request) -> Response:
     given = read(past_query.OfReportPage, request.query_params.multi_items(), PastRefused)
     found = _report(request, given)
     name = given.time_zone or ""
-    zone = past_query.zone(name) if name else None
+    zone = zone_of(name) if name else None
     unknown_zone = "" if zone else name[:64]
     page = ReportPage(
         found.start_ns,

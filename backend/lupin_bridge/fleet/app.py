@@ -50,7 +50,6 @@ from lupin_bridge.fleet.pages import Opened, SitePage, SitePages, Sites
 from lupin_bridge.fleet.source import SiteTwin, Watching
 from lupin_bridge.judge.options import Criteria
 from lupin_bridge.metrics import CONTENT_TYPE
-from lupin_bridge.past import query as past_query
 from lupin_bridge.past.bodies import COMPLETE_TO
 from lupin_bridge.past.export import CSV, PARQUET, ExportFormat
 from lupin_bridge.past.query import OfExport
@@ -66,7 +65,7 @@ from lupin_bridge.routes.answers import (
     person_of,
     respond,
 )
-from lupin_bridge.routes.export import end_of, respond_export
+from lupin_bridge.routes.export import respond_export, span_of
 from lupin_bridge.routes.sockets import listen
 from lupin_bridge.serving.admission import (
     REVALIDATE,
@@ -248,18 +247,18 @@ class OfSitesExport(OfExport):
 
 async def respond_sites(fleet: Fleet, kind: ExportFormat, request: Request) -> Response:
     """Every row of a period of the sites that are named, or of all."""
-    period = past_query.period(OfSitesExport, request.query_params.multi_items(), None)
+    given = read(OfSitesExport, request.query_params.multi_items(), PastRefused)
     known = fleet.sites_for(request)
-    named = [known[name] for name in chosen(request.query_params.get("sites"), known)]
-    end_ns = end_of(period, None)
-    query = Export(period.start_ns, end_ns, period.tag_id, period.sensor_type)
+    named = [known[name] for name in chosen(given.sites, known)]
+    start_ns, end_ns = span_of(given, None)
+    query = Export(start_ns, end_ns, given.tag_id, given.sensor_type)
     heard_ns = min((site.heard_ns for site in named), default=0)
     return await respond_export(
         request,
         fleet,
         lambda pack: _rows(fleet, [site.site for site in named], query, pack),
         kind,
-        period,
+        given,
         sensors=fleet.criteria.sensors,
         now_ns=fleet.watching.now_ns,
         known={COMPLETE_TO: seconds(min(heard_ns, end_ns))},

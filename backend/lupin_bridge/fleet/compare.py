@@ -139,11 +139,11 @@ def compare(
 
     Raises:
         NotRemembered: see `chosen`.
-        PastRefused: see `past.query.period`; too many sites, too long a period, a derived quantity.
+        PastRefused: see `OfPeriod.span`; too many sites, too long a period, a derived quantity.
 
     """
     given = read(OfCompare, parameters, PastRefused)
-    period = past_query.period(OfCompare, parameters, now_ns)
+    start_ns, end_ns = given.span(now_ns)
     if given.sensor_type in DERIVED or given.sensor_type in DAILY:
         raise PastRefused(
             f"sensor_type is {given.sensor_type!r}, which is derived: measured ones are compared"
@@ -151,8 +151,8 @@ def compare(
     names = chosen(given.sites, known)
     if len(names) > MAX_SITES:
         raise PastRefused(f"sites are {len(names)}, the limit is {MAX_SITES}: name some")
-    end_ns = period.end_ns or now_ns
-    start_ns = period.start_ns if given.from_ is not None else max(0, end_ns - _DAY_NS)
+    end_ns = end_ns or now_ns
+    start_ns = start_ns if given.from_ is not None else max(0, end_ns - _DAY_NS)
     if end_ns - start_ns > MAX_DAYS * _DAY_NS:
         days = (end_ns - start_ns) / _DAY_NS
         raise PastRefused(f"from and to are {days:.1f} days apart, the limit is {MAX_DAYS}")

@@ -17,7 +17,7 @@ from typing import Any, Final
 
 from lupin_bridge.field.query import safe_name
 from lupin_bridge.judge.quantities import DAILY, Sensors
-from lupin_bridge.past.query import PeriodQuery, compact, iso
+from lupin_bridge.past.query import OfExport, compact, iso
 from lupin_bridge.stream.state_json import stamp
 from lupin_twin.core.journal_condition import UNKNOWN, Condition
 from lupin_twin.core.past import Event, Grid, PastRow, SeriesPast, SeriesRequest, grid, seconds
@@ -211,10 +211,10 @@ COUNTED: Final = {
 }
 
 
-def timeline_period(query: PeriodQuery, runs: SeriesPast) -> Grid:
-    """The period of a query; the series of all runs knows the oldest moment, and now."""
-    start_ns = query.start_ns or runs.start_ns
-    return grid(start_ns, max(start_ns, query.end_ns or runs.end_ns), query.points)
+def timeline_period(start_ns: int, end_ns: int, points: int, runs: SeriesPast) -> Grid:
+    """The period of a query; the series of all runs knows the oldest moment (0), and now (0)."""
+    start_ns = start_ns or runs.start_ns
+    return grid(start_ns, max(start_ns, end_ns or runs.end_ns), points)
 
 
 def coarsest(period: Grid, series: Iterable[SeriesPast]) -> Grid:
@@ -335,10 +335,11 @@ def csv_number(value: float) -> str:
     return repr(value) if value - value == 0.0 else ""
 
 
-def export_file_name(query: PeriodQuery, end_ns: int | None, kind: str) -> str:
-    """A name that says which tag, sensor and period; `end_ns` is now, where that is known."""
-    of = [safe_name(text) for text in (query.tag_id, query.sensor_type) if text]
-    since = ["from", compact(query.start_ns)] if query.start_ns else []
-    end_ns = query.end_ns or end_ns
+def export_file_name(given: OfExport, now_ns: int | None, kind: str) -> str:
+    """A name that says which tag, sensor and period."""
+    of = [safe_name(text) for text in (given.tag_id, given.sensor_type) if text]
+    start_ns, end_ns = given.span(None)
+    since = ["from", compact(start_ns)] if start_ns else []
+    end_ns = end_ns or now_ns or 0
     until = ["to", compact(end_ns)] if end_ns else []
     return "_".join(["lupin-twin", *of, *since, *until]) + f".{kind}"

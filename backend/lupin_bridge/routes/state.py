@@ -46,7 +46,7 @@ from lupin_bridge.routes.sockets import listen
 from lupin_bridge.serving.admission import Answer
 from lupin_bridge.stream import routes_schema, schema
 from lupin_bridge.stream.hub import CLOSE_POLICY
-from lupin_twin.core.past import PastRefused
+from lupin_twin.core.past import PastRefused, SeriesRequest
 from lupin_twin.core.state import Snapshot, TagState
 
 # Of the reason in a close frame (RFC 6455, section 5.5).
@@ -191,7 +191,8 @@ async def history_route(request: Request) -> Response:
     """Readings, or equal buckets if there are more than `points`; `gaps`: where nothing came."""
     bridge = bridge_of(request)
     now_ns = bridge.ros_time_ns
-    series = past_query.history(request.query_params.multi_items(), now_ns)
+    given = read(past_query.OfHistory, request.query_params.multi_items(), PastRefused)
+    series = SeriesRequest(given.tag_id, given.sensor_type, *given.span(now_ns), given.points)
     journal, has_nights = bridge.source.journal(), bridge.origin != "simulated"
     history = History(series, now_ns, bridge.criteria, journal, has_nights)
     return await respond_past(request, history, "history")
@@ -207,10 +208,10 @@ async def history_route(request: Request) -> Response:
 async def timeline_route(request: Request) -> Response:
     """Events counted in buckets of equal length, and how far back anything is remembered."""
     bridge = bridge_of(request)
-    period = past_query.period(
-        past_query.OfTimeline, request.query_params.multi_items(), bridge.ros_time_ns
-    )
-    return await respond_past(request, Timeline(period, bridge.source.journal()), "timeline")
+    given = read(past_query.OfTimeline, request.query_params.multi_items(), PastRefused)
+    start_ns, end_ns = given.span(bridge.ros_time_ns)
+    timeline = Timeline(start_ns, end_ns, given.points, given.tag_id, bridge.source.journal())
+    return await respond_past(request, timeline, "timeline")
 
 
 @read_route(

@@ -20,8 +20,7 @@ from lupin_bridge.judge.episodes import Alarm
 from lupin_bridge.metrics import CONTENT_TYPE
 from lupin_bridge.past import query as past_query
 from lupin_bridge.past.plans import Health
-from lupin_bridge.past.query import PeriodQuery
-from lupin_bridge.query_string import parameters_of
+from lupin_bridge.query_string import parameters_of, read
 from lupin_bridge.routes.answers import (
     NEVER_STORE,
     NO_TWIN,
@@ -42,6 +41,7 @@ from lupin_bridge.serving.admission import REVALIDATE, Answer
 from lupin_bridge.stream import routes_schema, schema
 from lupin_bridge.stream.followers import robot_body
 from lupin_bridge.stream.state_json import alarms_body, header, judgement, stamp
+from lupin_twin.core.past import PastRefused
 from lupin_twin.field.explored import OccupancyMap
 
 # Grey of a free and of an occupied cell; unknown is transparent. The page decides what is below.
@@ -244,16 +244,15 @@ async def alarms_route(request: Request) -> Response:
     They follow from what was observed and the ranges of now, the same in every replica.
     """
     bridge = bridge_of(request)
-    query = past_query.period(
-        past_query.OfAlarms, request.query_params.multi_items(), bridge.ros_time_ns
-    )
+    given = read(past_query.OfAlarms, request.query_params.multi_items(), PastRefused)
+    span, active = given.span(bridge.ros_time_ns), given.active
     board = bridge.alarms.now
-    alarms = board.active if query.active else board.alarms
+    alarms = board.active if active == "1" else board.alarms
 
     notes, now_ns = bridge.notes.notes or (), bridge.ros_time_ns
 
     def body() -> bytes:
-        found = list(islice(filter(_is_in(query), alarms), MAX_ALARMS))
+        found = list(islice(filter(_is_in(*span, active), alarms), MAX_ALARMS))
         said = notes_of_alarms(board.alarms, notes, now_ns)
         return orjson.dumps(alarms_body(found, board.source, board.since_ns, said))
 
@@ -262,17 +261,19 @@ async def alarms_route(request: Request) -> Response:
             text = await on_worker(bridge, lambda _: body(), len(alarms) * _WRITE_ALARM_S)
         return Answer(text, "application/json", NEVER_STORE)
 
-    return await respond(request, ("alarms", board.number, bridge.notes.number, query), compute)
+    return await respond(request, ("alarms", board.number, bridge.notes.number, given), compute)
 
 
-def _is_in(query: PeriodQuery) -> Callable[[Alarm], bool]:
+def _is_in(start_ns: int, end_ns: int, active: str | None = None) -> Callable[[Alarm], bool]:
+    """`active` as in the query, `end_ns` 0: now."""
+
     def is_in(alarm: Alarm) -> bool:
-        if query.active is not None and alarm.is_active is not query.active:
+        if active is not None and alarm.is_active != (active == "1"):
             return False
-        if query.end_ns and alarm.raised_at_ns >= query.end_ns:
+        if end_ns and alarm.raised_at_ns >= end_ns:
             return False
         cleared_ns = alarm.cleared_at_ns
-        return cleared_ns is None or cleared_ns >= query.start_ns
+        return cleared_ns is None or cleared_ns >= start_ns
 
     return is_in
 

@@ -87,9 +87,8 @@ _WRITE_ANSWERS: Final = refusing(
 async def notes_route(request: Request) -> Response:
     """The newest first and 2,000 at most, withdrawn ones too; the same in every replica."""
     bridge = bridge_of(request)
-    asked = request.query_params.multi_items()
-    given = read(past_query.OfNotes, asked, PastRefused)
-    period = past_query.period(past_query.OfNotes, asked, bridge.ros_time_ns)
+    given = read(past_query.OfNotes, request.query_params.multi_items(), PastRefused)
+    start_ns, end_ns = given.span(bridge.ros_time_ns)
     notes = _known(bridge)
 
     async def compute() -> Answer:
@@ -100,13 +99,13 @@ async def notes_route(request: Request) -> Response:
             if note.kind != WITHDRAW
             and given.kind in {None, note.kind}
             and given.subject in {None, note.subject}
-            and period.start_ns <= note.about_ns
-            and (not period.end_ns or note.about_ns < period.end_ns)
+            and start_ns <= note.about_ns
+            and (not end_ns or note.about_ns < end_ns)
         ]
         body = orjson.dumps({"notes": found[:MAX_LISTED]})
         return Answer(body, "application/json", NEVER_STORE)
 
-    return await respond(request, ("notes", bridge.notes.number, period, given), compute)
+    return await respond(request, ("notes", bridge.notes.number, given), compute)
 
 
 @router.post(

@@ -8,7 +8,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from lupin_bridge.past.bodies import COUNTED, timeline_body, timeline_period
-from lupin_bridge.past.query import PeriodQuery
 from lupin_bridge.stream import routes_schema
 from lupin_twin.core.past import HOUR_NS, Event, Grid, SeriesPast, grid
 
@@ -122,13 +121,13 @@ def test_the_runs_that_meet_the_period_are_told_and_how_far_all_of_them_reach() 
 
 def test_the_period_is_what_is_asked_for_or_all_that_there_is() -> None:
     runs = SeriesPast(7 * NS, 107 * NS)
-    assert timeline_period(PeriodQuery(0, 0, 100), runs) == Grid(7 * NS, 107 * NS, NS)
-    assert timeline_period(PeriodQuery(57 * NS, 0, 100), runs) == Grid(57 * NS, 107 * NS, NS // 2)
-    assert timeline_period(PeriodQuery(0, 57 * NS, 100), runs) == Grid(7 * NS, 57 * NS, NS // 2)
+    assert timeline_period(0, 0, 100, runs) == Grid(7 * NS, 107 * NS, NS)
+    assert timeline_period(57 * NS, 0, 100, runs) == Grid(57 * NS, 107 * NS, NS // 2)
+    assert timeline_period(0, 57 * NS, 100, runs) == Grid(7 * NS, 57 * NS, NS // 2)
     # Nobody knew when now is, and it was not later than the beginning.
-    assert timeline_period(PeriodQuery(200 * NS, 0, 100), runs).end_ns == 200 * NS
+    assert timeline_period(200 * NS, 0, 100, runs).end_ns == 200 * NS
     # Buckets that were counted before begin on whole slots.
-    month = timeline_period(PeriodQuery(NS, 30 * 86_400 * NS, 500), runs)
+    month = timeline_period(NS, 30 * 86_400 * NS, 500, runs)
     assert (month.start_ns, month.bucket_ns % HOUR_NS) == (0, 0)
 
 

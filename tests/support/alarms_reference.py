@@ -7,7 +7,7 @@ from itertools import groupby, pairwise
 from statistics import median
 
 from lupin_bridge.judge.quantities import Sensors, dew_point_c, vapour_pressure_deficit_kpa
-from lupin_twin.core.writes import PastWrite, RunSpan
+from lupin_twin.core.past import PastWrite, RunSpan
 
 S = 1_000_000_000
 SHORTEST, LONGEST = 600 * S, 86_400 * S

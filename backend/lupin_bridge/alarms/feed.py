@@ -22,7 +22,15 @@ from lupin_bridge.judge.judging import Judge
 from lupin_bridge.judge.options import Criteria
 from lupin_twin.core.history import KIND_FLOWER, KIND_TAG_READING
 from lupin_twin.core.journal_condition import JournalState
-from lupin_twin.core.past import NotRemembered, PastRefused
+from lupin_twin.core.past import (
+    NotRemembered,
+    PastRefused,
+    PastWrite,
+    PastWrites,
+    RecentRequest,
+    RunSpan,
+    WritesRequest,
+)
 from lupin_twin.core.state import (
     NANOSECONDS_PER_SECOND,
     STATUS_OK,
@@ -31,7 +39,6 @@ from lupin_twin.core.state import (
     TagState,
     sure_species,
 )
-from lupin_twin.core.writes import PastWrite, PastWrites, RecentRequest, RunSpan, WritesRequest
 
 # The one run of the clock that is told of here.
 RUN = 0

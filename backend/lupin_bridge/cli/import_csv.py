@@ -24,8 +24,16 @@ from lupin_bridge.cli.journal import SHOWN, JournalError, add_which, fail, path_
 from lupin_bridge.console import FAILED, Progress, Roles, add_role, say, tell
 from lupin_bridge.judge.options import zone_of
 from lupin_twin.adapt.config import read_yaml
-from lupin_twin.adapt.table import ConfigError, Table, is_number, shown
-from lupin_twin.adapt.value import AS_IT_IS, Value, seconds_of, values_of
+from lupin_twin.adapt.table import (
+    AS_IT_IS,
+    ConfigError,
+    Table,
+    Value,
+    is_number,
+    seconds_of,
+    shown,
+    values_of,
+)
 from lupin_twin.core.drops import MAX_SENSORS_PER_TAG, MAX_TAGS, MAX_TEXT_LENGTH, check_length
 from lupin_twin.core.parameters import MAX_JOURNAL_DAYS
 from lupin_twin.core.state import NANOSECONDS_PER_SECOND, Pin, Pose, Reading, Scan, Write

@@ -24,8 +24,15 @@ from typing import IO, Any, Final, Generic, Protocol, TypeVar
 from lupin_twin.core.history import LatestRequest
 from lupin_twin.core.journal_condition import UNKNOWN, Condition
 from lupin_twin.core.notes import NotesRequest
-from lupin_twin.core.past import PastRow, SeriesRequest, check_moment
-from lupin_twin.core.writes import PeriodRequest, RecentRequest, ScansRequest, WritesRequest
+from lupin_twin.core.past import (
+    PastRow,
+    PeriodRequest,
+    RecentRequest,
+    ScansRequest,
+    SeriesRequest,
+    WritesRequest,
+    check_moment,
+)
 from lupin_twin.journal.fold import latest, state_at
 from lupin_twin.journal.follow import observed, recent, scans, writes
 from lupin_twin.journal.notes import notes

@@ -19,9 +19,8 @@ from lupin_twin.core.diagnostics import Origin
 from lupin_twin.core.drops import Counts, Recent
 from lupin_twin.core.journal_condition import UNKNOWN, Condition
 from lupin_twin.core.notes import Note, NotesRequest, NotesUnwritable, PastNotes
-from lupin_twin.core.past import NotRemembered, PastRow
+from lupin_twin.core.past import NotRemembered, PastRow, PastWrites, WritesRequest
 from lupin_twin.core.state import NANOSECONDS_PER_SECOND, Snapshot
-from lupin_twin.core.writes import PastWrites, WritesRequest
 from lupin_twin.field.engine import FieldRules
 from lupin_twin.field.explored import OccupancyMap
 from lupin_twin.journal.follow import WRITES_S

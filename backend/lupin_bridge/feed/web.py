@@ -36,7 +36,7 @@ from lupin_twin.journal.schema import (
     is_damage_error,
     open_reader,
 )
-from lupin_twin.ros import convert_field, convert_past
+from lupin_twin.ros import convert_services
 from lupin_twin.runtime.estimates import Report, ReportRequest
 from lupin_twin.runtime.workers import Workers
 
@@ -354,11 +354,11 @@ class WebTwin(RosSource[WebNode]):
 
     async def estimate_report(self, request: ReportRequest) -> Report:
         """What the twin's service says."""
-        wanted = convert_field.report_request_message(request)
+        wanted = convert_services.report_request_message(request)
         response = await self._request(GetEstimateReport, wanted)
         _check_ok(response)
         cost_s = len(response.tag_ids) * _READ_TAG_S
-        reading = self.workers.submit(lambda _: convert_field.report_of(response), cost_s)
+        reading = self.workers.submit(lambda _: convert_services.report_of(response), cost_s)
         try:
             return await asyncio.wrap_future(reading)
         except ValueError as error:
@@ -382,8 +382,8 @@ class WebTwin(RosSource[WebNode]):
         return await self._log.explain(error)
 
     async def _rows_behind(self, after: int) -> Lot:
-        response = await self._request(GetWrites, convert_past.rows_request_message(after))
-        return convert_past.lot_of(response, after)
+        response = await self._request(GetWrites, convert_services.rows_request_message(after))
+        return convert_services.lot_of(response, after)
 
     async def _request(self, service: Any, request: Any) -> Any:
         """The twin's response; `service` is its type.

@@ -17,8 +17,8 @@ from functools import cache
 from typing import Final, Literal, TypeVar
 
 from lupin_bridge.judge.quantities import DAILY, DAY_NS, Course, IsDay, Sensors
+from lupin_twin.core.past import PastWrite
 from lupin_twin.core.state import Reading
-from lupin_twin.core.writes import PastWrite
 
 # The sensor that tells, by its name.
 LIGHT: Final = "light"

@@ -16,8 +16,8 @@ from statistics import median
 from typing import Final
 
 from lupin_bridge.judge.day import LEFT_OUT_NS, LIGHT, Day, Light
+from lupin_twin.core.past import PastWrite
 from lupin_twin.core.state import TagState, sure_species
-from lupin_twin.core.writes import PastWrite
 
 _S: Final = 1_000_000_000
 SHORTEST_NS: Final = 600 * _S

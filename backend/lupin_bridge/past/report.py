@@ -33,9 +33,19 @@ from lupin_bridge.stream.state_json import alarm_json, note_json, stamp
 from lupin_twin.core.history import KIND_FLOWER
 from lupin_twin.core.journal_condition import Condition
 from lupin_twin.core.notes import WITHDRAW, Note, NotesRequest, PastNotes, withdrawals
-from lupin_twin.core.past import EVERY_TAG, HOUR_NS, Event, PastRefused, SeriesPast, SeriesRequest
+from lupin_twin.core.past import (
+    EVERY_TAG,
+    HOUR_NS,
+    Event,
+    PastRefused,
+    PastWrite,
+    PastWrites,
+    PeriodRequest,
+    RunSpan,
+    SeriesPast,
+    SeriesRequest,
+)
 from lupin_twin.core.state import STATUS_OK, Snapshot, TagState
-from lupin_twin.core.writes import PastWrite, PastWrites, PeriodRequest, RunSpan
 
 # Of a day at a scan a second there are 86,400. Each takes some 25 us to go through, and three times
 # that where alarms are worked out; an answer has ten seconds.

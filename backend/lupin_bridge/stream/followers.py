@@ -21,7 +21,7 @@ from lupin_bridge.stream.schema import Contract, Time
 from lupin_bridge.stream.state_json import moment, stamp
 from lupin_twin.core.past import NotRemembered
 from lupin_twin.core.state import Snapshot
-from lupin_twin.estimate.grading import Tally
+from lupin_twin.estimate.engine import Tally
 from lupin_twin.field.engine import FieldRefused
 from lupin_twin.runtime.estimates import Report, ReportRequest
 from lupin_twin.runtime.workers import in_turns

@@ -18,8 +18,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
-from lupin_twin.core.state import sure_species
-from lupin_twin.core.writes import (
+from lupin_twin.core.past import (
     MAX_SCANS,
     RECENT_COUNT,
     PastWrite,
@@ -31,6 +30,7 @@ from lupin_twin.core.writes import (
     WritesRequest,
     recent_of,
 )
+from lupin_twin.core.state import sure_species
 from lupin_twin.journal.appending import PURGED_SEQ
 from lupin_twin.journal.checking import WRITTEN
 from lupin_twin.journal.events import FROM_SCAN

@@ -227,7 +227,7 @@ def forget(path: Path, tag_id: str, *, pose_only: bool, by: str, at_ns: int) -> 
 
     Raises:
         InUse: a twin has it.
-        NotKnown: the journal knows no such tag, or no place of it.
+        UnknownTagError: the journal knows no such tag, or no place of it.
         Empty, Foreign, DamagedFile, sqlite3.Error, OSError: as `open_named`.
 
     """

@@ -52,7 +52,7 @@ def read(kind: type[QueryT], given: Sequence[tuple[str, str]], refused: type[Exc
             raise refused(f"{name} is given more than once, expected one value")
         values[names[name]] = value
     try:
-        query: QueryT = _adapter(kind).validate_python(values)
+        query: QueryT = _adapter(kind).validate_python(values)  # type: ignore[arg-type]  # hashable
     except ValidationError as error:
         first = error.errors(include_url=False)[0]
         name, why = str(first["loc"][0]).rstrip("_"), first["msg"]
@@ -63,7 +63,7 @@ def read(kind: type[QueryT], given: Sequence[tuple[str, str]], refused: type[Exc
 
 def parameters_of(kind: type[Any]) -> list[dict[str, Any]]:
     """A query's parameters as OpenAPI has them."""
-    described = _adapter(kind).json_schema()["properties"]
+    described = _adapter(kind).json_schema()["properties"]  # type: ignore[arg-type]  # as above
     return [
         {
             "name": spec.name.rstrip("_"),

@@ -21,7 +21,7 @@ from typing import Any, Final, TextIO
 from zoneinfo import ZoneInfo
 
 from lupin_bridge.cli.journal import SHOWN, JournalError, add_which, fail, path_of
-from lupin_bridge.console import FAILED, Progress, Roles, add_role, say, tell
+from lupin_bridge.console import Progress, Roles, add_role, say, tell
 from lupin_bridge.judge.options import zone_of
 from lupin_twin.adapt.config import read_yaml
 from lupin_twin.adapt.table import (
@@ -272,10 +272,6 @@ def _reader(header: list[str], columns: Columns) -> Callable[[list[str]], Found]
     return read
 
 
-# The states of a sensor in Home Assistant that is away.
-_NOT_KNOWN: Final = ("unknown", "unavailable")
-
-
 def _text(what: str, text: str) -> str:
     if not 0 < len(text) <= MAX_TEXT_LENGTH:
         raise ValueError(f"no {what}, or one of more than {MAX_TEXT_LENGTH} characters")
@@ -288,7 +284,7 @@ def _number(name: str, text: str, column: Value) -> float:
     try:
         value = float(text) * column.factor + column.offset
     except ValueError:
-        if text in _NOT_KNOWN:
+        if text in ("unknown", "unavailable"):  # of a sensor in Home Assistant that is away
             raise ValueError(f"{name} is {text}") from None
         raise ValueError(f"{name} is no number") from None
     if not column.low <= value <= column.high or math.isinf(value):
@@ -338,8 +334,6 @@ def run(options: argparse.Namespace, environ: Mapping[str, str]) -> int:
     """Look through the file, and with `--write` import it; returns the process's exit code."""
     try:
         return _run(options, path_of(options, environ, may_be_new=True))
-    except BrokenPipeError:  # the reader has closed the pipe
-        return FAILED
     except KeyboardInterrupt:
         return INTERRUPTED
     except ConfigError as error:
@@ -368,10 +362,8 @@ def _run(options: argparse.Namespace, path: Path) -> int:
         say(f"nothing was written; add --write to import it into {path}")
         return 0
     tell(f"{new} scans are new in {path}; {known} were there before")
-    if (
-        summary.scans
-        and time.time_ns() - summary.first_ns > _RETENTION_DAYS * 86_400 * NANOSECONDS_PER_SECOND
-    ):
+    old_s = _RETENTION_DAYS * 86_400
+    if summary.scans and time.time_ns() - summary.first_ns > old_s * NANOSECONDS_PER_SECOND:
         say(
             "a twin deletes what is older than its parameter journal_days, "
             f"{_RETENTION_DAYS} unless it is set: set it before the twin starts"

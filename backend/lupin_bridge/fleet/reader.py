@@ -200,7 +200,7 @@ class ArchiveRecall(Recall):
     def _connection(self) -> Any:
         while True:
             with suppress(IndexError):
-                connection = self._idle.pop()
+                connection: Any = self._idle.pop()
                 # One whose server has gone says so only when it is used.
                 if connection.closed or not _is_alive(connection):
                     continue

@@ -256,8 +256,8 @@ def test_a_foreign_page_that_does_not_name_itself_gets_nothing(
 
 
 def test_an_allowed_origin_that_names_itself_may_be_cross_site() -> None:
-    fetch = {"sec_fetch_site": "cross-site", "sec_fetch_mode": "cors"}
-    assert judge("127.0.0.1", "http://panel.example:3000", **fetch).refusal is None
+    asked = ("127.0.0.1", "http://panel.example:3000")
+    assert judge(*asked, sec_fetch_site="cross-site", sec_fetch_mode="cors").refusal is None
 
 
 # --- Referer ------------------------------------------------------------------------------------

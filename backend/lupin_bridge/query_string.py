@@ -5,6 +5,7 @@ pydantic reads, and is imported as it does: what looks back knows queries, and h
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import MISSING, field, fields
 from functools import cache
@@ -17,6 +18,7 @@ from lupin_twin.core.drops import MAX_TEXT_LENGTH
 QueryT = TypeVar("QueryT")
 MOMENT: Final = "ROS seconds as a decimal number, or ISO 8601 with an offset"
 AT: Final = f"as of this moment: {MOMENT}; default: now"
+_UNSAFE_IN_NAME: Final = re.compile(r"[^A-Za-z0-9._-]")
 # A tag's, or a sensor's.
 Name = Annotated[str, Len(1, MAX_TEXT_LENGTH)]
 
@@ -74,6 +76,11 @@ def parameters_of(kind: type[Any]) -> list[dict[str, Any]]:
         }
         for spec in fields(kind)
     ]
+
+
+def safe_name(text: str) -> str:
+    """A file's name of it: what a file system or a shell could take amiss becomes an underscore."""
+    return _UNSAFE_IN_NAME.sub("_", text)
 
 
 def _plain(schema: dict[str, Any]) -> dict[str, Any]:

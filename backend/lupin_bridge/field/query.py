@@ -11,7 +11,7 @@ from urllib.parse import quote
 from annotated_types import Gt, Interval
 
 from lupin_bridge.field.formats import FORMATS, JSON, PNG, FieldFormat
-from lupin_bridge.query_string import AT, Name, needed, parameter
+from lupin_bridge.query_string import AT, Name, needed, parameter, safe_name
 from lupin_twin.field.engine import (
     DEFAULT_RESOLUTION_M,
     FieldRefused,
@@ -160,11 +160,6 @@ def headers(metadata: Mapping[str, str], file_name: str, kind: str = "Field") ->
     return result
 
 
-def safe_name(text: str) -> str:
-    """A file's name: what a file system or a shell could take amiss becomes an underscore."""
-    return _UNSAFE_IN_NAME.sub("_", text)
-
-
 def _header_value(text: str) -> str:
     value = quote(text, safe=_SAFE)
     return _OUTER_SPACES.sub(lambda spaces: "%20" * len(spaces[0]), value)
@@ -172,4 +167,3 @@ def _header_value(text: str) -> str:
 
 _OUTER_SPACES: Final = re.compile(r"^ +| +$")
 _SAFE: Final = " !#$&'()*+,-./:;<=>?@[]^_`{|}~"
-_UNSAFE_IN_NAME: Final = re.compile(r"[^A-Za-z0-9._-]")

@@ -10,15 +10,10 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping
 from itertools import islice
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import orjson
 
-from lupin_bridge.alarms.board import AlarmNotes, Page
-from lupin_bridge.judge.episodes import Alarm
-from lupin_bridge.judge.judging import Judged
-from lupin_bridge.judge.scans import Patrol
-from lupin_bridge.judge.verdict import Health, Reason
 from lupin_twin.core.history import TagHistory
 from lupin_twin.core.notes import Note
 from lupin_twin.core.state import (
@@ -29,6 +24,13 @@ from lupin_twin.core.state import (
     TagState,
     age_seconds,
 )
+
+if TYPE_CHECKING:  # who only wants a moment as JSON does without
+    from lupin_bridge.alarms.board import AlarmNotes, Page
+    from lupin_bridge.judge.episodes import Alarm
+    from lupin_bridge.judge.judging import Judged
+    from lupin_bridge.judge.scans import Patrol
+    from lupin_bridge.judge.verdict import Health, Reason
 
 # In place of a moment: that of the snapshot itself.
 OWN_TIME: Final = -1

@@ -1,6 +1,8 @@
 """Lines for people, on streams that may be closed, full, or read by nobody.
 
 A line that cannot be written ends no work and changes no exit code: the files count.
+
+And what commands share: their actions, and where they write.
 """
 
 from __future__ import annotations

@@ -1,6 +1,10 @@
 """The bridge's settings: one table for the command line, environment, file, checks and docs.
 
-A type here says what a value may be; `configuration` has pydantic check it.
+A type here says what a value may be; `settings_from` has pydantic check it.
+
+Where settings come from: the command line, the environment, a file, in this order. pydantic says
+what is wrong with a value. The message names the setting as its operator gave it: as an option, a
+variable, or a file's line and key.
 """
 
 from __future__ import annotations
@@ -31,7 +35,7 @@ def _setting(default: Any, group: str, help_text: str, *, is_private: bool = Fal
 
 @dataclass(frozen=True, slots=True)
 class Settings:
-    """How the bridge serves, as `configuration.settings_from` found it right. Times are seconds."""
+    """How the bridge serves, as `settings_from` found it right. Times are seconds."""
 
     host: Annotated[str, MinLen(1)] = _setting(
         "127.0.0.1", "listening", "address to listen on; other machines need 0.0.0.0 or ::"

@@ -2,6 +2,8 @@
 
 A session of the shared token is a signed cookie (`itsdangerous`) and stands in no table, so it
 survives a restart and holds at every replica that has the same token. A new token ends them all.
+
+Who makes a request and what they may: names, roles, sites.
 """
 
 from __future__ import annotations

@@ -156,12 +156,10 @@ _PREFLIGHT_MAX_AGE_S: Final = "600"
 class Access:
     """Who may read: the hosts and origins, and the people; None: they have been asked already.
 
-    `secure`: the bridge serves TLS itself, so that its cookie may demand it. `site` is the site
-    whose data this bridge has; a fleet has those of all sites.
+    `site` is the site whose data this bridge has; a fleet has those of all sites.
     """
 
     policy: AccessPolicy = field(default_factory=AccessPolicy)
-    secure: bool = False
     people: People | None = None
     site: str = ""
     is_fleet: bool = False
@@ -197,7 +195,6 @@ class Access:
                 raise SettingError(f"{settings.called(name)}: {error}") from None
         return cls(
             AccessPolicy(settings.host, settings.allow_origin, settings.allow_host),
-            secure=bool(settings.tls_cert),
             people=People(
                 accounts_path(settings),
                 None if token is None else Credentials(token, called),

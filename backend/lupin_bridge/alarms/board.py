@@ -2,6 +2,10 @@
 
 A hundred thousand alarms cost the loop nothing: a worker puts them in order, and the loop takes
 over what that hands out. An `AlarmBoard` belongs to the event loop; the rest is pure.
+
+And what people said, as the log has it, and what of it stands of each alarm. On the event loop.
+Every process looks for notes in its log once a second, the one that writes them too: so all
+browsers and replicas are told the same, and nobody has to tell anybody.
 """
 
 from __future__ import annotations

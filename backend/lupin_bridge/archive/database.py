@@ -2,6 +2,9 @@
 """The archive's database: reached, made, brought up to date, and what is wrong with it said.
 
 psycopg is imported where it is needed: it is the extra `fleet`.
+
+And what is in it, by site, whether its rows fit each other, and what is given up by age. Scans and
+inspections are given up. What was counted of them stays.
 """
 
 from __future__ import annotations

@@ -2,6 +2,8 @@
 """Forwarding a journal to the archive: again and again until it is asked to end.
 
 Whatever is wrong is said once, in one line, and tried again later; the twin has no part in it.
+
+The archive's end: a site's rows appended, a batch a transaction, each row once.
 """
 
 from __future__ import annotations

@@ -1,4 +1,7 @@
-"""The command `lupin-twin`: its options, and one clear line where something is wrong with them."""
+"""The command `lupin-twin`: its options, and one clear line where something is wrong with them.
+
+The bridge's log: a line for people, or a JSON object a line for a log collector.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""What `serve`, `demo` and `web` run: a source, a bridge and a server around one event loop."""
+"""What `serve`, `demo` and `web` run: a source, a bridge and a server around one event loop.
+
+What the demo has and no robot needs: who feeds its twin, a journal of its own, and a past.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""What every role that serves a page does: listen, warn, say where, serve until a signal."""
+"""What every role that serves a page does: listen, warn, say where, serve until a signal.
+
+And what the service manager is told, and what `lupin-twin fleet` runs: without ROS.
+"""
 
 from __future__ import annotations
 
@@ -113,7 +116,7 @@ def open_listener(settings: Settings, access: Access) -> socket.socket:
             f"cannot listen on {settings.host} port {settings.port}: {error.strerror}"
         ) from error
     for warning in exposure(
-        listener.getsockname()[0], has_token=access.is_closed, has_tls=access.secure
+        listener.getsockname()[0], has_token=access.is_closed, has_tls=bool(settings.tls_cert)
     ):
         log.warning("%s", warning)
     return listener

@@ -1,4 +1,4 @@
-"""The parent's end of the process that looks back (`past_child`): started, asked, ended.
+"""The parent's end of the process that looks back (`query.Child`): started, asked, ended.
 
 Belongs to the event loop. A process that dies is logged, its questions are answered with that, and
 the next one is started for the first question after a rest.

@@ -13,6 +13,10 @@ listens there is none.
 The ROS thread hands over bytes and does nothing else with them. Of what the loop has not taken yet,
 as of what is kept for who listens later, the oldest give way to the newest. A sample that is larger
 than the topic's bytes is left out, and counted.
+
+The definition of a message type, with all that it is made of, as bags and viewers want it. From the
+`.msg` files that every message package installs, wherever ROS is installed. The form is that of the
+schema encoding `ros2msg` (https://mcap.dev/spec/registry#ros2msg).
 """
 
 from __future__ import annotations

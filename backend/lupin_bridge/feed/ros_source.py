@@ -1,4 +1,9 @@
-"""What both sources over ROS have in common: a node in a thread, and what the relay needs."""
+"""What both sources over ROS have in common: a node in a thread, and what the relay needs.
+
+The robot's layer: the newest message of each of its topics, when asked for. No executor waits for
+these subscriptions. DDS keeps the newest message, and whoever asks takes it: so localisation that
+publishes a hundred times a second costs the ROS thread one message a second.
+"""
 
 from __future__ import annotations
 
@@ -282,7 +287,7 @@ def _is_near(x: float, y: float) -> bool:
 
 # --- the source -----------------------------------------------------------------------------------
 
-# What is also made into messages here: the topics of `relay.topics_of`.
+# Also made into messages here: the topics of `relay.topics_of`.
 _SHAPES: Final = {
     "lupin_msgs/msg/TwinState": message_limits.STATE,
     "lupin_msgs/msg/Observation": message_limits.OBSERVATION,
@@ -400,8 +405,7 @@ class RosSource(TwinSource, Generic[NodeT]):
             if before is None or update.made_s != before.made_s:
                 on_state(update)
 
-        # Both of the ROS thread alone; the publisher is made at the first observation: most bridges
-        # never publish any.
+        # Both of the ROS thread alone; most bridges never publish an observation.
         self._robot_topics = RobotTopics()
         self._observations: Any = None
         self.thread = RosThread(

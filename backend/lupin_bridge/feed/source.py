@@ -1,4 +1,8 @@
-"""What the routes need of a twin, wherever it runs."""
+"""What the routes need of a twin, wherever it runs.
+
+What the robot says of itself: where it is, where it has been, its plan, its battery. Of now alone:
+nothing of it is in the journal. Times are ROS time, ns; positions m in the map frame.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,10 @@
-"""The source of `web`: a twin elsewhere. As many of these as needed may share one twin."""
+"""The source of `web`: a twin elsewhere. As many of these as needed may share one twin.
+
+The log of a twin elsewhere, as a file here: the twin's own, or one that follows it. Which file is
+the twin's own is known by its identity, not by its path alone. Where that cannot be read, the log
+is followed by `get_writes` into a file of this user, one for each journal: a twin that begins
+another one has another file. A file that is damaged is deleted and copied anew.
+"""
 
 from __future__ import annotations
 

@@ -2,6 +2,9 @@
 
 A site's value in a bucket is the mean of all its readings there, whatever their tag. Hours are what
 the log has counted already: reading by reading, a week of fifty sites would take a minute.
+
+What happened between two moments at every site, counted in whole hours, and its newest notes. Each
+site's own report has the rest.
 """
 
 from __future__ import annotations

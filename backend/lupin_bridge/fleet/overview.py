@@ -1,4 +1,8 @@
-"""What the overview says of a site, and how that is put on the wire. Pure."""
+"""What the overview says of a site, and how that is put on the wire. Pure.
+
+A site's small map: where its tags are and how each one is, as an SVG of a few hundred bytes. The
+colours are those of the page's `--pin-*`, in light and in dark.
+"""
 
 from __future__ import annotations
 

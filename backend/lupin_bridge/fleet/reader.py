@@ -1,4 +1,4 @@
-"""The process that reads the sites' logs: `past_child`, over the archive in place of a journal.
+"""The process that reads the sites' logs: `query.Child`, over the archive in place of a journal.
 
 One process answers for all sites that are open here. Which site a question is of stands where the
 path of a journal does otherwise. Every query of the log names its site `:site` and is understood by

@@ -1,4 +1,7 @@
-"""The source of one site's page: its twin as its log in the archive has it."""
+"""The source of one site's page: its twin as its log in the archive has it.
+
+The newest overview of the archive, as the process that watches it says. On the event loop.
+"""
 
 from __future__ import annotations
 

@@ -3,6 +3,8 @@
 Light decides where it was measured lately, for lamps make day in winter and screens make night in
 summer. The greenhouse is one: what half of its sensors say or more, each by its newest reading
 unless scans have left that out for long.
+
+And quantities of a day, one value a day of a tag: from dawn to dawn by the clock.
 """
 
 from __future__ import annotations

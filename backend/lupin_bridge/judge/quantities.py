@@ -1,4 +1,25 @@
-"""The sensors: what each is called, how it is drawn, and which values are good for plants. Pure."""
+"""The sensors: what each is called, how it is drawn, and which values are good for plants. Pure.
+
+And quantities that growers steer by, out of what was measured:
+
+Of one scan. Saturation vapour pressure: Tetens in the form of FAO Irrigation and Drainage Paper 56
+(Allen et al., 1998), equation 11: es = 0.6108 exp(17.27 T / (T + 237.3)) kPa, T in °C. Deficit:
+equations 19 and 26, for one place and moment. Dew point: equation 11 solved for T.
+
+Of one sensor's readings of 24 hours. Between two readings that are no farther apart than
+`MAX_GAP_NS` the course is a straight line; farther apart, nothing is known of the time between. Of
+less than `LEAST_COVERED` of 24 hours, there is no value (NaN).
+
+- Daily light integral, mol/m²/d: the sum of the photons of 400 to 700 nm. In sunlight 54 lx are
+  1 umol/m²/s (Thimijan and Heins, HortScience 18, 1983, 818-822); lamps have other factors.
+- Mean temperature of 24 hours, °C, and the least of the night: Heuvelink (ed.), Tomatoes, 2nd
+  edition, 2018, on temperature integration.
+- Day-night difference (DIF), K: mean by day less mean by night. Erwin, Heins and Karlsson, American
+  Journal of Botany 76, 1989, 47-52.
+- Growing degree days, °C·d, above 10 °C: (highest + lowest) / 2 - base, never below 0. McMaster and
+  Wilhelm, Agricultural and Forest Meteorology 87, 1997, 291-300, method 1.
+- CO2 dose, ppm·h: the sum of the concentration over the hours of day, in which plants take it up.
+"""
 
 from __future__ import annotations
 
@@ -18,9 +39,6 @@ _E0_KPA: Final = 0.6108
 _COLDEST_C, _HOTTEST_C = -40.0, 80.0
 # A sensor in saturated air reads up to this; it is taken for 100 %.
 _SATURATED_PERCENT: Final = 105.0
-
-TEMPERATURE: Final = "temperature"
-HUMIDITY: Final = "humidity"
 
 
 def saturation_kpa(temperature_c: float) -> float:
@@ -67,13 +85,13 @@ def condensation_margin_k(temperature_c: float, humidity_percent: float) -> floa
     return temperature_c - dew_point_c(temperature_c, humidity_percent)
 
 
-VPD: Final = Derived("vpd", (TEMPERATURE, HUMIDITY), vapour_pressure_deficit_kpa)
-DEW_POINT: Final = Derived("dew_point", (TEMPERATURE, HUMIDITY), dew_point_c)
-CONDENSATION_MARGIN: Final = Derived(
-    "condensation_margin", (TEMPERATURE, HUMIDITY), condensation_margin_k
-)
 DERIVED: Final[Mapping[str, Derived]] = {
-    each.name: each for each in (VPD, DEW_POINT, CONDENSATION_MARGIN)
+    name: Derived(name, ("temperature", "humidity"), formula)
+    for name, formula in (
+        ("vpd", vapour_pressure_deficit_kpa),
+        ("dew_point", dew_point_c),
+        ("condensation_margin", condensation_margin_k),
+    )
 }
 
 

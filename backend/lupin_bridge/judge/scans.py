@@ -2,6 +2,10 @@
 
 Pure. Of the state and of what was recent in the log it is worked out for any moment; while states
 come one by one, scan by scan.
+
+How often tags are scanned, and when nothing was. Times are ns of ROS time. A patrol that comes
+every two minutes and stays away for ten has stopped; one that comes twice a day has not. So a tag's
+readings hold for three times the median of its own last intervals.
 """
 
 from __future__ import annotations

@@ -1,4 +1,9 @@
-"""All channels together, for the bridge: started, watched and stopped with it."""
+"""All channels together, for the bridge: started, watched and stopped with it.
+
+The report of a day, sent once a day by one channel, also after a restart. What was sent last stands
+in a small file. A day that was missed is sent at the next start, up to a week of them; a message
+that is not taken is tried again as those of alarms are.
+"""
 
 from __future__ import annotations
 

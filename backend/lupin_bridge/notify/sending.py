@@ -2,6 +2,8 @@
 
 h11 is there for the server already: a client library would bring proxies, redirects, cookies and
 bodies of any size.
+
+How a message is tried until it is taken, and how each channel does.
 """
 
 from __future__ import annotations

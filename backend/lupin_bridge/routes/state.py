@@ -53,10 +53,6 @@ from lupin_twin.core.state import Snapshot, TagState
 MAX_REASON_BYTES: Final = 123
 
 
-class ListenRefused(ValueError):
-    """A query that cannot be served; the message names the parameter, the value and the limit."""
-
-
 @dataclass(frozen=True, slots=True)
 class ListenQuery:
     """How a client wants its frames."""
@@ -84,8 +80,8 @@ async def ws_state(websocket: WebSocket) -> None:
     bridge: Bridge = websocket.app.state.bridge
     await websocket.accept()
     try:
-        query = read(ListenQuery, websocket.query_params.multi_items(), ListenRefused)
-    except ListenRefused as error:
+        query = read(ListenQuery, websocket.query_params.multi_items(), ValueError)
+    except ValueError as error:
         reason = str(error).encode("ascii", "backslashreplace")[:MAX_REASON_BYTES].decode()
         await websocket.close(CLOSE_POLICY, reason)
         return

@@ -1,6 +1,8 @@
 """What is asked of the twin now and then: what estimates are worth, what the robot says of itself.
 
 As types of the web contract (see `schema`), as JSON text, and followed on the loop.
+
+Nothing here is on the way of a frame: what was found is passed to the judge when it is there.
 """
 
 from __future__ import annotations

@@ -3,6 +3,8 @@
 Pure. A tag's text is kept until the tag changes, but for its age, which changes in every frame.
 What the web contract has beside the message's own fields is left out where it is as usual, as
 `schema` tells: every browser gets it ten times a second.
+
+What the judge says as JSON text: `schema.Judgement`, whole or only what has changed.
 """
 
 from __future__ import annotations

@@ -1,4 +1,12 @@
-"""The channels for Foxglove's clients, and one client: its subscriptions, and what waits for it.
+"""The read-only part of Foxglove's WebSocket protocol: what came in, what goes out.
+
+A client may `subscribe` and `unsubscribe`. Whatever else the protocol has (to publish, parameters,
+services, assets, the graph) is refused with a `status` message of level error, and changes nothing:
+none of it is among the capabilities that `serverInfo` names. Payloads are CDR, schemas `ros2msg`.
+
+https://github.com/foxglove/ws-protocol/blob/main/docs/spec.md
+
+The channels for Foxglove's clients, and one client: its subscriptions, and what waits for it.
 
 Channels are a twin's topics, and the layers that somebody publishes now. They are looked up while
 there are clients, once for all of them. A slow client gets the newest message of each subscription

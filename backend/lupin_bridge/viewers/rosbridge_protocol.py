@@ -13,6 +13,15 @@ How the options meet our policy, which keeps the newest for a client and queues 
 - `id` is a string or an integer. null counts as not given, everywhere. Members that are not named
   here are ignored, as rosbridge does.
 
+Its services and values: GetField, a part of rosapi, messages as JSON.
+
+A call of GetField is only checked here, and computed by the caller. rosapi's requests are about
+names that are known, and answered at once. `type`, where a call gives it, is checked for GetField;
+rosapi's packages have other names in ROS 1 than in ROS 2, and rosbridge does not look at it at all.
+
+In JSON, arrays of bytes (uint8, char) are base64, all others lists; a number that is not finite is
+null. A time is `{sec, nanosec}`, as any other message.
+
 https://github.com/RobotWebTools/rosbridge_suite/blob/ros2/ROSBRIDGE_PROTOCOL.md
 """
 

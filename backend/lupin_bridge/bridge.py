@@ -23,9 +23,8 @@ from lupin_bridge.past.plans import Answered
 from lupin_bridge.serving.admission import Admission, Answer, AnswerCache, Limits, RateLimit
 from lupin_bridge.settings import Settings
 from lupin_bridge.stream.followers import EstimateFollower, RobotFollower
-from lupin_bridge.stream.frames import FrameWriter, alarms_message
+from lupin_bridge.stream.frames import FrameWriter, Liveness, Status, alarms_message
 from lupin_bridge.stream.hub import Client, Hub
-from lupin_bridge.stream.status import Liveness, Status
 from lupin_bridge.viewers.foxglove import Offer
 from lupin_bridge.viewers.rosbridge_session import Writer
 from lupin_twin.core.diagnostics import Origin

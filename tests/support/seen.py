@@ -11,7 +11,7 @@ from lupin_bridge.judge.judging import judge_once
 from lupin_bridge.judge.options import Criteria, own_sensors
 from lupin_bridge.judge.verdict import Kind, Reason, Verdict
 from lupin_bridge.notify.messages import GreenhouseState
-from lupin_bridge.stream.status import Status
+from lupin_bridge.stream.frames import Status
 from lupin_twin.core.diagnostics import Origin
 from lupin_twin.core.state import Reading, Snapshot, TagState
 

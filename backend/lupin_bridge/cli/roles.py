@@ -40,7 +40,7 @@ from lupin_bridge.routes.pages import HOW_TO_BUILD
 from lupin_bridge.serving.admission import Limits
 from lupin_bridge.serving.server import BridgeServer, allow_connections
 from lupin_bridge.settings import Secrets, SettingError, Settings
-from lupin_bridge.stream.status import STALE_AFTER_S
+from lupin_bridge.stream.frames import STALE_AFTER_S
 from lupin_twin.core.parameters import ParameterError, World
 from lupin_twin.journal.appending import is_empty, simulated
 from lupin_twin.journal.beside import demo_journal_path

@@ -77,8 +77,8 @@ from lupin_bridge.serving.admission import (
 )
 from lupin_bridge.serving.http_protocol import PieceByPiece
 from lupin_bridge.settings import Settings
+from lupin_bridge.stream.frames import Status
 from lupin_bridge.stream.hub import Client, Hub
-from lupin_bridge.stream.status import Status
 from lupin_twin.core.journal_condition import UNKNOWN, Condition, JournalState
 from lupin_twin.core.past import PastRefused, seconds
 from lupin_twin.journal.queries import STRETCH_S, Export

@@ -25,8 +25,8 @@ from lupin_bridge.judge.options import Criteria
 from lupin_bridge.judge.quantities import Sensor
 from lupin_bridge.judge.verdict import Health, Verdict
 from lupin_bridge.past.query import iso
+from lupin_bridge.stream.frames import NEVER_SEEN, Status
 from lupin_bridge.stream.state_json import alarm_json, moment, reason_json
-from lupin_bridge.stream.status import NEVER_SEEN, Status
 from lupin_twin.core.diagnostics import Origin
 from lupin_twin.core.state import Reading, TagState
 

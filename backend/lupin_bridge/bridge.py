@@ -196,17 +196,13 @@ class Bridge:
         """What was said with the last frame; of a house whose twin is silent, that it is."""
         return self._judged if self.status.is_live else silenced(self._judged)
 
-    def readings_hold_ns(self) -> dict[str, int]:
-        """For how long those of each tag do, by the rhythm of now."""
-        return self._judge.holds_ns()
-
     def seen(self) -> GreenhouseState:
         """How the house is now, for who tells others of it."""
         return GreenhouseState(
             self.status,
             self.judged,
             self.alarms.now,
-            holds_ns=self.readings_hold_ns(),
+            holds_ns=self._judge.holds_ns(),
             now_ns=self.ros_time_ns,
         )
 

@@ -259,7 +259,7 @@ async def test_a_memory_that_is_busy_at_the_start_is_asked_again(
 
         def is_learnt() -> bool:
             stage.script.tell(state(4 * hour_ns))  # judged anew with the next frame
-            return stage.bridge.readings_hold_ns().get(tag_id) == 3 * hour_ns
+            return stage.bridge.seen().holds_ns.get(tag_id) == 3 * hour_ns
 
         await until(is_learnt, "the rhythm")
 

@@ -59,7 +59,7 @@ class Feed:
     """Who feeds a demo's twin: a module to run with its arguments, in a process of its own.
 
     `twin_args` are arguments of ROS for the twin alone, and `world` is what it then observes.
-    `journal` is the file that a past is to be filled into, None where none is.
+    `journal` is the file that a past of such a patrol is to be filled into, None where none is.
     """
 
     what: str
@@ -67,6 +67,7 @@ class Feed:
     twin_args: list[str]
     world: World
     journal: Path | None = None
+    patrol_args: Sequence[str] = ()
 
 
 def patrolled(
@@ -91,6 +92,7 @@ def patrolled(
         [] if path is None else ["--ros-args", "-p", f"journal:={json.dumps(str(path))}", "--"],
         World("simulated", DAY_S / _speed(patrol_args)),
         None if is_another else path,
+        patrol_args,
     )
 
 
@@ -123,15 +125,16 @@ def recorded(
     )
 
 
-def with_past(feed: Feed, path: Path, patrol_args: Sequence[str]) -> Feed:
-    """Fill a journal that is empty; of another one, have the patrol go on with the time of day.
+def with_past(feed: Feed) -> Feed:
+    """Fill its journal that is empty; of another one, have the patrol go on with the time of day.
 
     A demo that is started again would begin a second morning otherwise, and what comes daily in
     its journal would fit no day at all.
     """
-    if fill_past(path, patrol_args):
+    path = feed.journal
+    if path is None or fill_past(path, feed.patrol_args):
         return feed
-    since_s = since_morning_s(path, patrol_args, time.time_ns())
+    since_s = since_morning_s(path, feed.patrol_args, time.time_ns())
     if since_s is None:
         return feed
     module, *words = feed.command
@@ -230,16 +233,7 @@ def run(
                 feed = recorded(recording, play_args, ros_args, Path(folder))
             elif role == "demo":
                 feed = patrolled(os.environ, patrol_args, ros_args)
-            asyncio.run(
-                _run(
-                    role,
-                    settings,
-                    secrets,
-                    ros_args=ros_args,
-                    feed=feed,
-                    patrol_args=patrol_args,
-                )
-            )
+            asyncio.run(_run(role, settings, secrets, ros_args, feed))
         except (ParameterError, RosStartError, RecordingError) as error:
             raise SettingError(str(error)) from error
 
@@ -248,10 +242,8 @@ async def _run(
     role: str,
     settings: Settings,
     secrets: Secrets,
-    *,
     ros_args: Sequence[str],
     feed: Feed | None,
-    patrol_args: Sequence[str],
 ) -> None:
     access = Access.of(settings, secrets.token)
     proxies = Proxies.of(settings)
@@ -268,8 +260,8 @@ async def _run(
     settings = replace(settings, max_clients=allow_connections(settings.max_clients))
     # Before a process is started that would inherit its variables.
     supervisor = Supervisor(os.environ)
-    if feed is not None and feed.journal is not None:
-        feed = await asyncio.to_thread(with_past, feed, feed.journal, patrol_args)
+    if feed is not None:
+        feed = await asyncio.to_thread(with_past, feed)
     limits = Limits()
     source = _source_of(role, settings, ros_args, feed, limits)
     push = None
@@ -290,10 +282,8 @@ async def _run(
     try:
         await serve(server, listener, settings, supervisor, lambda: ailment(source.thread))
     finally:
-        if feeder is not None:
-            feeder.terminate()
-        fed = [] if feeder is None else [feeder.wait()]
-        await asyncio.gather(bridge.stop(), forwarding.stop(), *fed)
+        fed = [] if feeder is None else [feeder.stop()]
+        await asyncio.gather(*fed, bridge.stop(), forwarding.stop())
 
 
 def _source_of(
@@ -330,12 +320,9 @@ class Feeder:
         )
         self._watch = asyncio.create_task(self._report_end())
 
-    def terminate(self) -> None:
-        """Ask it to end."""
+    async def stop(self) -> None:
+        """Ask it to end, and wait for that; kill it if that does not come."""
         self._process.terminate()
-
-    async def wait(self) -> None:
-        """Wait for its end; kill it if that does not come."""
         try:
             await asyncio.wait_for(asyncio.shield(self._watch), FEEDER_STOP_S)
         except TimeoutError:

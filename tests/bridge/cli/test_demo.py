@@ -57,14 +57,14 @@ def test_another_journal_or_none_or_another_clock_gets_no_past(ros_args: list[st
 
 def test_started_again_it_goes_on_with_the_day(tmp_path: Path) -> None:
     path = tmp_path / "demo.sqlite"
-    feed = Feed("patrol", ["lupin_patrol", "--end-with-parent", *SHORT], [], World(), path)
-    assert with_past(feed, path, SHORT) == feed, "the first time it is nine"
+    feed = Feed("patrol", ["lupin_patrol", "--end-with-parent", *SHORT], [], World(), path, SHORT)
+    assert with_past(feed) == feed, "the first time it is nine"
     [(until_ns,)] = select(path, "SELECT value FROM meta WHERE key = 'simulated_until_ns'")
     # Fifty times as fast, a day takes 28.8 s.
     for later_s, since_s in ((0.0, 0.0), (14.4, 720.0), (28.8, 0.0), (2_894.4, 720.0)):
         now_ns = int(str(until_ns)) + round(later_s * 1e9)
         assert since_morning_s(path, SHORT, now_ns) == pytest.approx(since_s, abs=1e-6)
-    again = with_past(feed, path, SHORT)
+    again = with_past(feed)
     module, since, *words = again.command
     assert [module, *words] == feed.command
     assert again == replace(feed, command=again.command)

@@ -126,7 +126,7 @@ def recorded(
 
 
 def with_past(feed: Feed) -> Feed:
-    """Fill its journal that is empty; of another one, have the patrol go on with the time of day.
+    """Fill its journal if that is empty; else have the patrol go on with the time of day.
 
     A demo that is started again would begin a second morning otherwise, and what comes daily in
     its journal would fit no day at all.

@@ -240,7 +240,9 @@ def timeline_body(
     """
 
     def until(at_ns: int, start_ns: int) -> int:
-        return at_ns if at_ns < runs.end_ns else max(start_ns, min(at_ns, period.end_ns))
+        # A run's length is a float in s: of three years it is right to some 10 ns.
+        is_over = at_ns < runs.end_ns - 1_000
+        return at_ns if is_over else max(start_ns, min(at_ns, period.end_ns))
 
     counts = {name: _by_bucket(counted[event], period) for name, event in COUNTED.items()}
     return {

@@ -24,6 +24,7 @@ from lupin_bridge.serving.admission import Limits
 from lupin_bridge.settings import Settings
 from lupin_bridge.stream.hub import Client
 from lupin_twin.core.journal_condition import UNKNOWN, Condition
+from lupin_twin.core.parameters import World
 from lupin_twin.core.past import NotRemembered, PastWrite
 from lupin_twin.core.state import Snapshot, TagState
 from lupin_twin.field.grid import FieldGrid
@@ -40,7 +41,7 @@ from tests.support.web import ws_url
 class Script:
     """A source that tells what the test makes it tell. What a real one does, others test."""
 
-    day_length_s = 86_400.0
+    world = World()
 
     def __init__(self) -> None:
         self.tell: Callable[[TwinUpdate], None]

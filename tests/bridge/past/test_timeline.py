@@ -121,6 +121,17 @@ def test_the_runs_that_meet_the_period_are_told_and_how_far_all_of_them_reach() 
     ]
 
 
+def test_a_run_of_years_that_goes_on_ends_with_the_period_however_its_length_is_rounded() -> None:
+    start_ns, now_ns = 1_700_000_000 * NS, 1_795_920_785_417_813_153
+    length_s = (now_ns - start_ns) / NS
+    assert start_ns + round(length_s * NS) < now_ns
+    runs = SeriesPast(start_ns, now_ns, None, (start_ns,), (1,), (length_s,), (0.0,), (0.0,))
+    end_ns = start_ns + 100 * NS
+    assert written(parts(start_ns, end_ns, runs=runs))["runs"] == [
+        {"from": at(1_700_000_000), "to": at(1_700_000_100), "is_simulated": False}
+    ]
+
+
 def test_the_period_is_what_is_asked_for_or_all_that_there_is() -> None:
     runs = SeriesPast(7 * NS, 107 * NS)
     assert timeline_period(0, 0, 100, runs) == Grid(7 * NS, 107 * NS, NS)

@@ -28,9 +28,9 @@ from lupin_twin.core.past import NotRemembered, PastRow, PastWrites, WritesReque
 from lupin_twin.core.state import NANOSECONDS_PER_SECOND, Snapshot
 from lupin_twin.field.engine import FieldRules
 from lupin_twin.field.explored import OccupancyMap
-from lupin_twin.journal.follow import WRITES_S
 from lupin_twin.journal.notes import NOTES_S
 from lupin_twin.journal.queries import STRETCH_S, Export
+from lupin_twin.journal.received import WRITES_S
 from lupin_twin.runtime.estimates import Report, ReportRequest
 from lupin_twin.runtime.workers import Workers
 

@@ -205,15 +205,12 @@ const STAYS_MS = 200;
 /** So long after its last word a greenhouse counts as silent, and the archive as down. */
 const LIVE_MS = 20_000;
 
-interface CardsProps {
-  readonly shown: readonly Site[];
-  readonly groups: readonly string[];
-  readonly words: FleetWords;
-  /** When all of it was last known, ms since the epoch; null: it is as of now. */
-  readonly asOf: number | null;
-}
-
-function Cards({ shown, groups, words, asOf }: CardsProps): JSX.Element {
+function Cards({
+  shown,
+  groups,
+  words,
+  asOf,
+}: Listed & { shown: readonly Site[]; groups: readonly string[] }): JSX.Element {
   const parts = useMemo(() => grouped(shown, groups), [shown, groups]);
   if (groups.length === 0) return <List sites={shown} words={words} asOf={asOf} />;
   return (
@@ -227,6 +224,7 @@ function Cards({ shown, groups, words, asOf }: CardsProps): JSX.Element {
 
 interface Listed {
   readonly words: FleetWords;
+  /** When all of it was last known, ms since the epoch; null: it is as of now. */
   readonly asOf: number | null;
 }
 

@@ -1,10 +1,115 @@
-import { useMemo, type JSX } from 'react';
+/** What people said, by the log: fetched whenever the bridge says that there are more notes. */
+import { type JSX, useMemo } from 'react';
 
-import { rosText, type Span } from '../domain/time';
+import { fetchNotes } from '../contract/people';
+import type { Alarm, Note } from '../contract/types';
 import { shown } from '../domain/text';
-import { act, useApp } from '../store/app';
-import { useSelected } from '../store/create';
-import { C, clustersOf, everySaid, saidText, subjectText, tagOf } from './comments';
+import { rosText, secondsOf, type Span } from '../domain/time';
+import { act, store, useApp } from '../store/app';
+import { createStore, useSelected } from '../store/create';
+import { createFetcher } from '../store/fetcher';
+import { LANGUAGE, S } from '../strings';
+import { COMMENTS } from '../words/comments';
+
+export interface Said {
+  readonly id: string;
+  readonly kind: Note['kind'];
+  readonly subject: string;
+  readonly text: string;
+  readonly by: string;
+  /** The moment that it is about, ROS seconds. */
+  readonly at: number;
+  /** Of `shelve` its end, ROS seconds; null: the alarm is not shelved any more. */
+  readonly until: number | null;
+}
+
+/** What stands, the oldest moment first. */
+export const everySaid = createStore<readonly Said[], readonly Said[]>([], (_, next) => next);
+
+export const saidIn = (notes: readonly Note[]): Said[] =>
+  notes
+    .filter(({ withdrawn_by: by }) => by === null)
+    .map(({ id, kind, subject, text, by, made_at: made, until }) => ({
+      ...{ id, kind, subject, by, text: text.replace(/\s+/g, ' ') },
+      at: secondsOf((kind === 'comment' ? until : null) ?? made),
+      until: until && secondsOf(until),
+    }))
+    .reverse()
+    .sort((one, other) => one.at - other.at);
+
+const PACE_MS = 500;
+
+export function startComments(): () => void {
+  const fetcher = createFetcher<readonly Note[]>({
+    paceMs: PACE_MS,
+    onValue: (notes) => {
+      everySaid.dispatch(saidIn(notes));
+    },
+  });
+  const update = (): void => {
+    const { alarms, connection } = store.get().twin;
+    // A log without notes is not asked for any.
+    if (!alarms?.notes) return;
+    fetcher.want({ key: `${connection.epoch}|${alarms.notes}`, run: fetchNotes });
+  };
+  update();
+  const stop = store.subscribe(update);
+  return () => {
+    stop();
+    fetcher.want(null);
+  };
+}
+
+/** So near to each other that one mark stands for them. */
+interface Cluster {
+  readonly at: number;
+  readonly said: readonly Said[];
+}
+
+/** Nearer than this, as a share of the span, marks would cover each other. */
+const NEAR = 0.02;
+
+/** From the oldest; `found` is in that order. */
+export function clustersOf(found: readonly Said[], { from, to }: Span): Cluster[] {
+  const clusters: { at: number; said: Said[] }[] = [];
+  for (const one of found) {
+    const { at } = one;
+    if (at < from || at > to) continue;
+    const last = clusters.at(-1);
+    if (last && at - last.at < NEAR * (to - from)) last.said.push(one);
+    else clusters.push({ at, said: [one] });
+  }
+  return clusters;
+}
+
+export const C = COMMENTS[LANGUAGE];
+
+/** Which tag it is about; null: the greenhouse, or an alarm that the page does not know. */
+export function tagOf(subject: string, alarms: readonly Alarm[]): string | null {
+  const [kind, id] = [
+    subject.slice(0, subject.indexOf(':')),
+    subject.slice(subject.indexOf(':') + 1),
+  ];
+  if (kind === 'tag') return id;
+  if (kind !== 'alarm') return null;
+  return alarms.find((alarm) => alarm.id === id)?.tag_id || null;
+}
+
+/** "Tag 7", "alarm at Tag 7", "greenhouse". */
+export function subjectText(subject: string, alarms: readonly Alarm[]): string {
+  if (subject === 'site') return C.site;
+  const tagId = tagOf(subject, alarms);
+  const tag = tagId === null ? '' : S.card(shown(tagId, 24));
+  return subject.startsWith('alarm:') ? C.alarm(tag) : tag;
+}
+
+/** What was said: a comment's words, or what became of an alarm, and why. */
+function saidText({ kind, text, until }: Said): string {
+  if (kind === 'comment') return text;
+  const shelved = until === null ? C.unshelved : C.shelved(rosText(until));
+  const what = kind === 'acknowledge' ? C.acknowledged : shelved;
+  return text === '' ? what : `${what}: ${text}`;
+}
 
 /** Notes that the text of one mark holds. */
 const MOST_TOLD = 5;

@@ -4,7 +4,7 @@ import { goToStart } from '../../alarms/follow';
 import type { Item } from '../../alarms/list';
 import { unacknowledgeAlarm, unshelveAlarm } from '../../alarms/own';
 import { Field } from '../../notes/Comments';
-import { C } from '../../notes/comments';
+import { C } from '../../notes/CommentMarks';
 import { useApp } from '../../store/app';
 import { mayAct, person, useSelected } from '../../store/create';
 import { S } from '../../strings';

@@ -4,9 +4,9 @@ import type { Alarm } from '../contract/types';
 import { alarm } from '../testing/alarms';
 import { cataloguesOf } from '../domain/sensors';
 import { CATALOGUE, FILE } from '../testing/sensors';
-import { alarmsCsv, arranged, causeFacts, causesFirst, filtered, tagsText } from './arrange';
+import { alarmsCsv, arranged, causeFacts, filtered, tagsText } from './arrange';
 import { acknowledge, NOTHING_KEPT, shelve, type Kept } from './kept';
-import { listOf, rankOf, type Item } from './list';
+import { causesFirst, listOf } from './list';
 import type { Now } from './now';
 
 const isTag = (): boolean => false;
@@ -118,10 +118,11 @@ test('the worst cause first, then what nobody has seen to, then what most have',
   const all = [...hots, ...many(dry, 7), worst];
   const order = (kept: Kept) => {
     const items = listOf(all, kept, null, AT).active;
-    const rank = ({ alarm: { reason }, isAcknowledged }: Item) => rankOf(reason, isAcknowledged);
-    return arranged(causesFirst(items, rank, speech), 'cause', speech).map(
-      ({ items: own }) => `${own[0]?.alarm.id.replace(/\d/, '')} ${own.length}`,
-    );
+    return arranged(
+      causesFirst(items, (item) => item.alarm.reason, speech),
+      'cause',
+      speech,
+    ).map(({ items: own }) => `${own[0]?.alarm.id.replace(/\d/, '')} ${own.length}`);
   };
   expect(order(NOTHING_KEPT)).toEqual(['worst 1', 'dry 7', 'hot 5']);
   const seen = many(dry, 7).map((each) => ({ alarm: each, verdict: 'stressed' }) as const);

@@ -7,8 +7,7 @@ import { VERDICTS } from '../domain/health';
 import { memoLast } from '../domain/memo';
 import { todoText } from '../domain/reasons';
 import { isHeardNow, selectNewestTag } from '../store/moment';
-import { causesFirst } from './arrange';
-import { inOrder, rankOf, type Item } from './list';
+import { causesFirst, type Item } from './list';
 import { nowOf, reasonNow, type Now } from './now';
 import { alarmText, type Speech } from './words';
 
@@ -58,12 +57,7 @@ export function todoNow(state: AppState, items: readonly Item[]): string {
 /** What is worst now first, many of one cause together. */
 export function worstNowFirst(state: AppState, items: readonly Item[]): readonly Item[] {
   const reasons = new Map(items.map((item) => [item, reasonIn(state, item.alarm)]));
-  const reasonOf = (item: Item): HealthReason => reasons.get(item) ?? item.alarm.reason;
-  return causesFirst(
-    inOrder(items, reasonOf),
-    (item) => rankOf(reasonOf(item), item.isAcknowledged),
-    selectSpeech(state),
-  );
+  return causesFirst(items, (item) => reasons.get(item) ?? item.alarm.reason, selectSpeech(state));
 }
 
 /** An alarm in one line, as it is now. */

@@ -306,9 +306,9 @@ function CauseHeading({
         )}
         <span className="alarm-text">
           <span>
-            <strong>{cause}</strong>{' '}
+            <strong>{cause}</strong> ·{' '}
             <span className="alarm-many">
-              · {S.alarmCount(own.length)} <Icon name="chevron" />
+              {S.alarmCount(own.length)} <Icon name="chevron" />
             </span>
           </span>
           {group !== 'resolved' && <span className="alarm-do">{todo}</span>}

@@ -107,6 +107,26 @@ def test_the_table_is_filtered_and_sorted_and_health_names_the_tag_that_drives_i
     hmi.expect_rows("failed", "seen")
 
 
+def test_beside_a_card_the_table_keeps_rows_and_none_that_is_chosen_ends_below_its_head(
+    hmi: Hmi,
+) -> None:
+    hmi.resize(1280, 720)
+    hmi.row("3").click()
+    hmi.expect_parts()
+    expect(hmi.card("3")).to_be_visible()
+    frame = hmi.page.locator(".table-scroll")
+    head, table = place(hmi.page.locator("thead")), place(frame)
+    assert (table.bottom - head.bottom) / 45 > 3.4
+    assert place(hmi.card("3")).bottom == 720
+    # Where it comes to stand as the table is sorted anew: half of it below the head.
+    hmi.page.locator("th[data-column=tag] button").hover()
+    frame.evaluate("(frame) => { frame.scrollTop = 112; }")
+    hmi.page.mouse.down()
+    hmi.page.mouse.up()
+    hmi.expect_rows("1", "2", "3", "9", "10", "failed", "seen")
+    hmi.expect(lambda: place(hmi.row("3")).top == head.bottom, "the chosen row below the head")
+
+
 def test_a_row_and_its_pin_find_each_other_and_the_card_tells_all(hmi: Hmi) -> None:
     hmi.click_map(3, 1)
     expect(hmi.card("2")).to_be_visible()

@@ -49,7 +49,6 @@ export function TagTable(): JSX.Element {
   const has = (id: string): boolean => isColumnShown({ hidden }, id);
   const body = useRef<HTMLTableSectionElement>(null);
   const sight = useVisibleRows(body, lines.length);
-  useChosenInSight(body, hasTags ? selected : null, sight.rowHeight);
   // A row that has the focus stays, or the focus would be lost with it; and the rows beside it,
   // where the Tab key leads, past the head of an area.
   const [focused, setFocused] = useState<string | null>(null);
@@ -61,6 +60,7 @@ export function TagTable(): JSX.Element {
     [lines],
   );
   const placeOf = (id: string | null): number => (id === null ? NaN : (places.get(id) ?? NaN));
+  useChosenInSight(body, hasTags ? selected : null, placeOf(selected), sight.rowHeight);
   const held = placeOf(focused);
   const single = [placeOf(selected), held - 2, held - 1, held, held + 1, held + 2];
   return (

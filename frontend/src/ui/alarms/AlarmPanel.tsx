@@ -79,6 +79,7 @@ export function AlarmPanel(): JSX.Element {
   useChosenInSight(
     list,
     useApp((state) => state.view.selected),
+    ids,
   );
   const hasAny = all.active.length + all.shelved.length > 0;
   return (

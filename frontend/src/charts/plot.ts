@@ -7,7 +7,7 @@ import { timeTicks, type Tick } from '../domain/ticks';
 import { LOCALE } from '../strings';
 import { drawAbove, drawBelow, drawMarks, MARKS_LANE, type Frame } from './layers';
 import { lookOf } from './looks';
-import { aligned, drawnOf, hasMarks, valueRange, type PlotModel } from './model';
+import { aligned, drawnOf, hasMarks, limitsOf, valueRange, type PlotModel } from './model';
 import { readPalette } from './palette';
 
 export interface PlotHandlers {
@@ -69,7 +69,7 @@ export function createPlot(element: HTMLElement, handlers: PlotHandlers): Plot {
         ...size,
         class: 'plot',
         legend: { show: false },
-        padding: [8, LIMITS_ROOM * palette.fontPx, 0, 0],
+        padding: [8, (hasNames(first) ? LIMITS_ROOM : 1) * palette.fontPx, 0, 0],
         cursor: {
           y: false,
           dataIdx: heldIndex,
@@ -191,7 +191,8 @@ export function createPlot(element: HTMLElement, handlers: PlotHandlers): Plot {
       const nextShape = drawnOf(next)
         .map(({ look, isBefore }) => `${look}${isBefore ? 'b' : ''}`)
         .join()
-        .concat(hasMarks(next) ? ' marks' : '', size.hasTimes ? ' times' : '');
+        .concat(hasMarks(next) ? ' marks' : '', size.hasTimes ? ' times' : '')
+        .concat(hasNames(next) ? ' names' : '');
       if (!chart || shape !== nextShape) {
         chart?.destroy();
         chart = build(next, size);
@@ -217,6 +218,10 @@ export function createPlot(element: HTMLElement, handlers: PlotHandlers): Plot {
     },
   };
 }
+
+/** Of one line always: it may stand above others, with the same times below each other. */
+const hasNames = (model: PlotModel): boolean =>
+  model.lines.length === 1 || limitsOf(model).length > 0;
 
 /** A tick needs so many pixels of the axis. */
 const TICK_ROOM = 70;

@@ -1,7 +1,6 @@
 import type { JSX } from 'react';
 
 import { errorColours, NINE_OF_TEN } from '../domain/sureness';
-import { shown } from '../domain/text';
 import { useApp } from '../store/app';
 import { selectHeat, selectSensor } from '../store/derived';
 import { errorText } from './texts';
@@ -14,7 +13,6 @@ export function ErrorScale(): JSX.Element {
   const most = useApp((state) => selectHeat(state)?.range.high ?? 0);
   return (
     <div data-testid="error-scale">
-      <p className="faint">{E.errorOf(shown(sensor.label, 32))}</p>
       <div
         className="difference-bar"
         aria-hidden="true"
@@ -22,6 +20,7 @@ export function ErrorScale(): JSX.Element {
       />
       <div className="difference-ends">
         <span>±{'\u00a0'}0</span>
+        <strong>{E.error}</strong>
         <span data-testid="error-high">
           ±{'\u00a0'}
           {errorText(sensor, most / NINE_OF_TEN, unit)}

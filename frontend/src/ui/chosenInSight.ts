@@ -30,7 +30,13 @@ export function useChosenInSight(
   }, [body, chosen, rowHeight]);
   useEffect(() => {
     const frame = body.current?.closest('.table-scroll, .alarms');
-    if (chosen !== null && frame) keep(frame, chosen, frame.clientHeight);
+    if (chosen === null || !frame) return undefined;
+    const painted = requestAnimationFrame(() => {
+      keep(frame, chosen, frame.clientHeight);
+    });
+    return () => {
+      cancelAnimationFrame(painted);
+    };
   }, [body, chosen, place]);
 }
 

@@ -11,13 +11,14 @@ import { selectAreAlarmsKnown } from '../Reasons';
 
 /**
  * "Alarms" and how many are active; with the sign of the worst now and how many of them are so, until
- * all are acknowledged.
+ * all are acknowledged. Who looks back reads that they are those of now.
  */
 export function AlarmsLabel(): JSX.Element {
   const list = useSelected(alarmList, (it) => it);
   const unacknowledged = calling(list);
   const { length } = list.active;
   const isKnown = useApp(selectAreAlarmsKnown);
+  const isNow = useApp((state) => state.view.moment === null);
   const worst = useApp((state) =>
     unacknowledged.length === 0 ? null : worstNow(state, list.active),
   );
@@ -27,9 +28,9 @@ export function AlarmsLabel(): JSX.Element {
       {S.alarms}
       {length > 0 && (
         <span className="alarm-count" data-testid="alarm-count" aria-hidden="true">
-          {worst && <HealthShape verdict={worst} />}
-          {worstCount < length && `${worstCount}/`}
-          {length}
+          {worst && isNow && <HealthShape verdict={worst} />}
+          {worstCount < length && isNow && `${worstCount}/`}
+          {isNow ? length : S.alarmNow(String(length))}
         </span>
       )}
       {isKnown && <span className="unseen">, {S.alarmsCount(unacknowledged.length, length)}</span>}

@@ -4,6 +4,7 @@ import { afterEach, beforeEach, expect, test } from 'vitest';
 import { NOTHING_KEPT } from '../../alarms/kept';
 import { acknowledgeAlarms, own, shelveAlarm } from '../../alarms/own';
 import { alarmList, startAlarms } from '../../alarms/watch';
+import { act } from '../../store/app';
 import { person } from '../../store/signals';
 import { alarm, tellAlarms } from '../../testing/alarms';
 import { held, judgement, reason } from '../../testing/health';
@@ -131,4 +132,8 @@ test('the count of alarms says how many of them are of its sign, where not all a
     acknowledgeAlarms(alarmList.get().active);
   });
   expect(count()).toBe('3');
+  flush(() => {
+    act({ type: 'look', view: { moment: 10 } });
+  });
+  expect(count()).toBe('now 3');
 });

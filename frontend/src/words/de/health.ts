@@ -70,7 +70,7 @@ export const HEALTH: In<typeof ENGLISH> = {
   },
   todoPestAgain: 'Nochmals kontrollieren: Ohne Befund ist der Alarm behoben',
   todoWell: 'Mit der nächsten guten Messung behoben',
-  todoAlso: (tags) => `auch ${tags}`,
+  todoAlso: 'auch',
   todoLabel: 'Jetzt zu tun',
   reasonsLabel: 'Warum',
   healthHeading: 'Zustand des Gewächshauses',

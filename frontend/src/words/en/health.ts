@@ -70,7 +70,7 @@ export const HEALTH = {
   },
   todoPestAgain: 'Inspect again: a second clean inspection resolves it',
   todoWell: 'The next good scan resolves it',
-  todoAlso: (tags: string): string => `also ${tags}`,
+  todoAlso: 'also',
   todoLabel: 'Do this now',
   reasonsLabel: 'Why',
   healthHeading: 'Greenhouse status',

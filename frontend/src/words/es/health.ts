@@ -76,7 +76,7 @@ export const HEALTH: In<typeof ENGLISH> = {
   },
   todoPestAgain: 'Revisar otra vez: si no hay plaga, queda resuelta',
   todoWell: 'Queda resuelta con la próxima medición buena',
-  todoAlso: (tags) => `también ${tags}`,
+  todoAlso: 'también',
   todoLabel: 'Hacer ahora',
   reasonsLabel: 'Por qué',
   healthHeading: 'Estado del invernadero',

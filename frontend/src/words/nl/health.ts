@@ -68,7 +68,7 @@ export const HEALTH: In<typeof ENGLISH> = {
   },
   todoPestAgain: 'Nogmaals controleren: zonder plaag is het alarm opgelost',
   todoWell: 'Opgelost bij de volgende goede meting',
-  todoAlso: (tags) => `ook ${tags}`,
+  todoAlso: 'ook',
   todoLabel: 'Nu doen',
   reasonsLabel: 'Waarom',
   healthHeading: 'Toestand van de kas',

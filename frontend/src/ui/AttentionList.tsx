@@ -12,7 +12,7 @@ import { selectIsHere } from '../store/moment';
 import { S } from '../strings';
 import { useSince, useUrgent, type Urgent } from './DoNow';
 import { useFitting } from './fitting';
-import { HealthMark } from './HealthMark';
+import { HealthShape } from './HealthMark';
 import { Reasons, useReasonText } from './Reasons';
 
 /** Lines that a screen on the wall may have room for. */
@@ -43,15 +43,9 @@ export function AttentionList(): JSX.Element {
     <div className="attention">
       {heading && <h3>{heading}</h3>}
       <ul ref={list} style={{ '--rows': lines.length } as CSSProperties}>
-        {lines
-          .slice(0, MOST_LINES)
-          .map(({ key, cause, tags }, index) =>
-            cause === null ? (
-              <TagLine key={key} of={tags[0]} fits={index < count} />
-            ) : (
-              <CauseLine key={key} cause={cause} tags={tags} fits={index < count} />
-            ),
-          )}
+        {lines.slice(0, MOST_LINES).map(({ key, ...line }, index) => (
+          <Row key={key} {...line} fits={index < count} />
+        ))}
       </ul>
       {rest > 0 && <p className="attention-more">{S.attentionMore(rest)}</p>}
     </div>
@@ -76,51 +70,35 @@ function useLines(urgent: readonly Urgent[]): readonly Line[] {
   });
 }
 
-function TagLine({ of: { tagId, reasons }, fits }: { of: Urgent; fits: boolean }): JSX.Element {
-  const [{ verdict }] = reasons;
-  const since = useSince(tagId, reasons[0]);
-  return (
-    <li data-fits={fits} data-tag-id={tagId} data-health={verdict}>
-      <strong>
-        <bdi>{shown(tagId, 16)}</bdi>
-      </strong>
-      <span className="attention-why">
-        <Reasons health={{ verdict, reasons }} most={MOST_REASONS} />
-        <span className="attention-do">
-          <Todo reasons={reasons.slice(0, MOST_REASONS)} /> <small className="faint">{since}</small>
-        </span>
-      </span>
-    </li>
-  );
-}
-
-/** What ails many tags, what to do about it, where it is worst, and at which tags. */
-function CauseLine({
-  cause,
-  tags,
-  fits,
-}: {
-  cause: string;
-  tags: Line['tags'];
-  fits: boolean;
-}): JSX.Element {
+/** Where, what ails it and what to do; of many tags how many, where it is worst, and at which. */
+function Row({ cause, tags, fits }: Omit<Line, 'key'> & { fits: boolean }): JSX.Element {
   const badness = ({ reasons: [reason] }: Urgent): number =>
     severity({ verdict: reason.verdict, reasons: [reason] });
   const worst = tags.reduce((a, b) => (badness(b) > badness(a) ? b : a));
-  const [reason] = worst.reasons;
-  const why = S.healthDriver(shown(worst.tagId, 16), useReasonText(reason, true));
-  const since = useSince(worst.tagId, reason);
+  const { tagId, reasons } = worst;
+  const [reason] = reasons;
+  const { verdict } = reason;
+  const why = S.healthDriver(shown(tagId, 16), useReasonText(reason, true));
+  const since = useSince(tagId, reason);
+  const isOne = cause === null;
+  const all = isOne ? reasons.slice(0, MOST_REASONS) : tags.map((each) => each.reasons[0]);
+  const facts = isOne ? [since] : [why, since, tagsText(tags.map((each) => each.tagId))];
   return (
-    <li data-fits={fits} data-cause={cause} data-health={reason.verdict}>
-      <HealthMark verdict={reason.verdict} word={false} />
+    <li data-fits={fits} {...(isOne ? { 'data-tag-id': tagId } : { 'data-cause': cause })}>
+      <strong>
+        <bdi>{isOne ? shown(tagId, 16) : `${tags.length}\u202f×`}</bdi>
+      </strong>
       <span className="attention-why">
-        {cause}: {S.shownOf(tags.length, tags.length)}
+        {isOne ? (
+          <Reasons health={{ verdict, reasons }} most={MOST_REASONS} />
+        ) : (
+          <span>
+            <HealthShape verdict={verdict} /> {cause}
+          </span>
+        )}
         <span className="attention-do">
-          <Todo reasons={tags.map(({ reasons }) => reasons[0])} />{' '}
-          <small className="faint">
-            {why}
-            {since && ` · ${since}`} · {tagsText(tags.map(({ tagId }) => tagId))}
-          </small>
+          <Todo reasons={all} />{' '}
+          <small className="faint">{facts.filter(Boolean).join(' · ')}</small>
         </span>
       </span>
     </li>

@@ -21,6 +21,11 @@ def test_a_low_window_has_one_line_of_sensors_with_the_chosen_one_in_sight(hmi: 
         chosen, bar = places(hmi, ".sensors label:has(:checked)", ".sensor-picker")
         assert bar.bottom - bar.top < 60
         assert bar.left <= chosen.left < chosen.right <= bar.right
+    # So has a wide one, where there is the room for it.
+    hmi.resize(1440, 900)
+    names = hmi.page.locator(".sensors label")
+    expect(names).to_have_count(8)
+    assert len({place(name).top for name in names.all()}) == 1
 
 
 def test_a_sensor_has_its_colours_words_legend_and_column(hmi: Hmi) -> None:

@@ -9,7 +9,7 @@ import { toShown, unitOf } from '../domain/units';
 import { S } from '../strings';
 import { causeOf, MOST_LOOSE, type AlarmList, type Item, type Wrong } from './list';
 import { worstOf, type Now } from './now';
-import { nameText, valuesOf, whatText, whereText, type Speech } from './words';
+import { inOnePiece, nameText, valuesOf, whatText, whereText, type Speech } from './words';
 
 export const ORDERS = ['cause', 'newest', 'tag'] as const;
 /** By cause the worst comes first. */
@@ -120,7 +120,12 @@ export function causeFacts(
       .map((each) => ({ each, value: valueOf(each) ?? NaN }))
       .filter(({ value }) => !Number.isNaN(value))
       .sort((a, b) => (isBelow ? a.value - b.value : b.value - a.value))[0]?.each;
-    return found && { ...valuesOf(found.alarm, speech, found.now), where: whereText(found.alarm) };
+    return (
+      found && {
+        ...valuesOf(found.alarm, speech, found.now),
+        where: inOnePiece(whereText(found.alarm)),
+      }
+    );
   };
   const current = furthest(({ value }) => value);
   const worst = furthest(({ alarm, now }) => worstOf(alarm, now));

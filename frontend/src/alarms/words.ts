@@ -136,9 +136,10 @@ export function timesOf(
   return { length: lengthText(until - from), note };
 }
 
-/** In one piece: a line does not break in it. */
-const lengthText = (seconds: number): string =>
-  ageText(Math.max(0, seconds)).replace(' ', '\u00a0');
+const lengthText = (seconds: number): string => inOnePiece(ageText(Math.max(0, seconds)));
+
+/** A line does not break in it. */
+export const inOnePiece = (text: string): string => text.replace(' ', '\u00a0');
 
 /** A moment: of today the time alone; an alarm's year goes without saying. */
 export const whenText = (at: number, nowS: number | null): string =>

@@ -91,9 +91,17 @@ test('of a cause how many are how bad, and the value farthest beyond', () => {
         ? { kind: 'known', value: 10.9, verdict: 'healthy', reason: null, trend: null }
         : null;
   expect(causeFacts([...items.active, ...items.resolved], speech, now)).toEqual([
-    ...['1 stressed, 1 back to normal', 'now 10.4\u00a0°C (Tag\u00a02)', 'worst 2.9\u00a0°C (Tag\u00a04)'],
+    ...[
+      '1 stressed, 1 back to normal',
+      'now 10.4\u00a0°C (Tag\u00a02)',
+      'worst 2.9\u00a0°C (Tag\u00a04)',
+    ],
   ]);
-  expect(causeFacts(items.resolved, speech, now)).toEqual(['', '', 'worst 2.9\u00a0°C (Tag\u00a04)']);
+  expect(causeFacts(items.resolved, speech, now)).toEqual([
+    '',
+    '',
+    'worst 2.9\u00a0°C (Tag\u00a04)',
+  ]);
   const unknown = (): Now => ({ kind: 'unknown', last: 9, lastAt: 'unknown' });
   expect(causeFacts(items.active, speech, unknown)[0]).toBe('2 unknown');
 });

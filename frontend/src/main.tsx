@@ -18,12 +18,11 @@ import './styles/forced.css';
 import { startAlarmsAndTelling } from './alarms/start';
 import { startAddress } from './store/address';
 import { onChange, prefer, store } from './store/app';
-import { askedCycle, startCycle } from './store/cycle';
+import { cycleWish, startCycle } from './store/cycle';
 import { startHourAgo } from './store/hourAgo';
 import { startLive } from './store/live';
-import { startLoaders } from './store/loaders';
+import { startLoaders, startSensors } from './store/loaders';
 import { startPast } from './store/past';
-import { startSensors } from './store/sensors';
 import { keepSettings, openStorage, readSettings } from './store/settings';
 import { startTheme } from './store/theme';
 import { LANGUAGE, S } from './strings';
@@ -42,7 +41,7 @@ onChange(
 );
 
 const kiosk = new URLSearchParams(window.location.search).get('kiosk') === '1';
-const cycle = askedCycle();
+const cycle = cycleWish(window.location.search);
 
 document.documentElement.lang = LANGUAGE;
 document.title = S.product;

@@ -19,7 +19,7 @@ const TABLE: Table = {
   domain: ['contract', 'geometry', 'strings'],
   connection: ['contract', 'clock'],
   draw: ['contract', 'geometry', 'domain'],
-  store: ['clock', 'contract', 'geometry', 'domain', 'connection', 'npm:react'],
+  store: ['strings', 'clock', 'contract', 'geometry', 'domain', 'connection', 'npm:react'],
   map: [
     ...['strings', 'clock', 'contract', 'geometry', 'domain', 'draw', 'store'],
     ...['npm:react', 'npm:d3-selection', 'npm:d3-zoom'],
@@ -33,7 +33,7 @@ const TABLE: Table = {
     ...['strings', 'clock', 'domain', 'draw', 'store', 'widgets', 'notes'],
     ...['npm:react'],
   ],
-  export: ['strings', 'clock', 'domain', 'draw', 'store', 'map'],
+  export: ['strings', 'clock', 'geometry', 'domain', 'draw', 'store', 'map'],
   charts: [
     ...['strings', 'clock', 'contract', 'geometry', 'domain', 'store', 'widgets', 'export'],
     ...['notes', 'styles', 'npm:react', 'npm:uplot'],

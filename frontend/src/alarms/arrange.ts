@@ -1,11 +1,10 @@
 /** The list of alarms as somebody wants to see it: filtered, sorted, grouped by cause and area; and as a file. Pure. */
 import type { Alarm, WireTime } from '../contract/types';
-import { csv, type Cell } from '../domain/csv';
+import { type Cell, csv, finder, shown } from '../domain/text';
 import { isOfRange, sideOf, VERDICTS } from '../domain/health';
-import { secondsOf } from '../domain/rostime';
-import { finder, shown } from '../domain/text';
+import { secondsOf } from '../domain/time';
 import { compareIds } from '../domain/twin';
-import { toShown, unitOf } from '../domain/units';
+import { toShown, unitOf } from '../domain/format';
 import { S } from '../strings';
 import { causeOf, MOST_LOOSE, type AlarmList, type Item, type Wrong } from './list';
 import { worstOf, type Now } from './now';

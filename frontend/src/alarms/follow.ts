@@ -1,8 +1,7 @@
 /** The ways from an alarm: to its tag as it is now, and to the moment when it began. */
 import { now } from '../clock';
 import type { Alarm } from '../contract/types';
-import { spanOf, type Period } from '../domain/period';
-import { secondsOf } from '../domain/rostime';
+import { type Period, secondsOf, spanOf } from '../domain/time';
 import { commandMap } from '../map/commands';
 import { act, store } from '../store/app';
 import { rosNow } from '../store/moment';

@@ -1,7 +1,7 @@
 /** The list of alarms: what is active, shelved and resolved, in its order. Pure. */
 import type { Alarm, HealthReason, Verdict } from '../contract/types';
 import { isOfRange, severity, sideOf } from '../domain/health';
-import { secondsOf } from '../domain/rostime';
+import { secondsOf } from '../domain/time';
 import { compareIds, equal } from '../domain/twin';
 import { isShelfHeld, isWorse, whatOf, type Kept, type Shelf } from './kept';
 import type { Speech } from './words';

@@ -1,7 +1,7 @@
 /** Notifications by the browser, for who looks at something else; only on wish. */
 import { store } from '../store/app';
 import { createStore } from '../store/create';
-import { selectOrigin } from '../store/origin';
+import { selectOrigin } from '../store/moment';
 import { S } from '../strings';
 import { showAlarm } from './follow';
 import type { Item } from './list';

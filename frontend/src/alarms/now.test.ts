@@ -1,7 +1,7 @@
 import { expect, test } from 'vitest';
 
 import type { HealthReason } from '../contract/types';
-import type { TagThen } from '../domain/trend';
+import type { TagThen } from '../domain/difference';
 import { alarm } from '../testing/alarms';
 import { reason } from '../testing/health';
 import { readings, tag } from '../testing/tags';
@@ -28,9 +28,7 @@ test('its trend is that against an hour before', () => {
   const before = {
     ...state(11),
     tag: tag({
-      readings: [
-        { name: 'temperature', value: 11, observed_at: { sec: 1, nanosec: 0 }, stale_seconds: 5 },
-      ],
+      readings: readings({ temperature: 11 }, 1),
     }),
   };
   expect(nowOf(cold, state(8, {}), before, true)).toMatchObject({ trend: -3 });

@@ -1,8 +1,8 @@
 /** What an alarm is about, as it is now: its value, how bad that is, and its trend. Pure. */
 import type { Alarm, HealthReason, Verdict } from '../contract/types';
-import type { When } from '../domain/age';
+import type { When } from '../domain/time';
 import { isOfRange, sideOf } from '../domain/health';
-import { isOldReading, trendOf, type TagThen } from '../domain/trend';
+import { isOldReading, trendOf, type TagThen } from '../domain/difference';
 
 export type Now =
   | {

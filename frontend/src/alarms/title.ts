@@ -1,8 +1,7 @@
 /** The name of the page's tab: how many alarms are active, and which moment is shown. */
-import { rosText } from '../domain/rostime';
+import { rosText } from '../domain/time';
 import { store } from '../store/app';
-import { selectShown } from '../store/moment';
-import { selectIsRecorded } from '../store/origin';
+import { selectIsRecorded, selectShown } from '../store/moment';
 import { S } from '../strings';
 import { alarmList } from './watch';
 

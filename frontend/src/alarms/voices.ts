@@ -1,5 +1,5 @@
 /** What screen readers are told of alarms: one announcement a change, of critical ones at once. */
-import { createVoice } from '../store/signals';
+import { createVoice } from '../store/create';
 import { store } from '../store/app';
 import { S } from '../strings';
 import type { Item, News } from './list';

@@ -78,7 +78,7 @@ test('what the page opens with is no news; what comes later is, once', () => {
 
 test('a bridge that starts anew and goes through the past tells nothing twice', () => {
   tellAlarms(alarm('a'));
-  receive({ type: 'alarms', alarms: alarms([], { source: 'starting', since: null }) });
+  receive({ type: 'set', part: { alarms: alarms([], { source: 'starting', since: null }) } });
   expect(ids()).toEqual([]);
   tellAlarms(alarm('a'), alarm('b', { tag_id: '2' }));
   expect(told).toEqual(['b']);

@@ -1,12 +1,16 @@
 /** An alarm in words: what, where, how bad now and at worst, since when, until when. Pure. */
 import type { Alarm, Verdict } from '../contract/types';
-import { ageText, beyondLimitText, clockText, readingText } from '../domain/format';
-import { isOfRange, sideOf } from '../domain/health';
-import { beyondText, reasonText, todoText } from '../domain/reasons';
-import { dayFormat, hasDate, secondsOf, shortRosText } from '../domain/rostime';
+import {
+  ageText,
+  beyondLimitText,
+  clockText,
+  readingText,
+  type TemperatureUnit,
+} from '../domain/format';
+import { beyondText, isOfRange, reasonText, sideOf, todoText } from '../domain/health';
+import { dayFormat, hasDate, secondsOf, shortRosText } from '../domain/time';
 import type { Catalogue } from '../domain/sensors';
 import { shown } from '../domain/text';
-import type { TemperatureUnit } from '../domain/units';
 import { S } from '../strings';
 import { reasonNow, worstOf, type Now } from './now';
 

@@ -1,53 +1,41 @@
 import { useMemo, useRef, type JSX } from 'react';
 
 import { act, useApp } from '../store/app';
-import { selectCatalogue, selectCatalogues } from '../store/derived';
 import { S } from '../strings';
-import { Icon } from '../widgets/Icon';
-import { modelOf, pairsOf } from './charted';
-import { MarksKey } from './MarksKey';
-import { PlotView } from './PlotView';
-import { SensorChoice } from './SensorChoice';
-import { useLines } from './useLines';
-import { chosenSensor, useChosenSensor, useSensorsOf, useSpeciesOf } from './useSensorsOf';
-import { pointsFor, useSize } from './useSize';
-import { ChartState } from './ChartState';
+import { Icon } from '../widgets/controls';
+import { ChartState, MarksKey, PlotView, SensorChoice } from './PlotView';
+import {
+  chosenSensor,
+  pointsFor,
+  useCharts,
+  useChosenSensor,
+  useSensorsOf,
+  useSize,
+} from './useLines';
 
 const HEIGHT = 172;
 
 /** The sensor that was chosen here, the one in view, or the tag's first, over the period of the time bar. */
 export default function CardChart({ tagId }: { tagId: string }): JSX.Element | null {
   const inView = useApp((state) => state.view.sensor);
-  const unit = useApp((state) => state.settings.unit);
-  const moment = useApp((state) => state.view.moment);
-  const catalogue = useApp(selectCatalogue);
-  const both = useApp(selectCatalogues);
   const sensors = useSensorsOf(tagId);
   const chosen = useChosenSensor();
   const sensor = [chosen, inView].find((name) => sensors.includes(name)) ?? sensors[0];
   const place = useRef<HTMLDivElement>(null);
   const { width } = useSize(place);
-  const plan = useMemo(
-    () => (sensor === undefined ? null : { sensor, tagIds: [tagId] }),
+  const plans = useMemo(
+    () => (sensor === undefined ? [] : [{ sensor, tagIds: [tagId] }]),
     [sensor, tagId],
   );
-  const pairs = useMemo(() => (plan ? pairsOf([plan]) : []), [plan]);
-  const asked = useLines(pairs, pointsFor(width));
-  const { lines, state, span, nowS } = asked;
-  const species = useSpeciesOf([tagId]);
-  const model = useMemo(
-    () =>
-      plan && span
-        ? modelOf(catalogue, both, plan, species, lines, span, unit, moment, nowS)
-        : null,
-    [catalogue, both, plan, species, lines, span, unit, moment, nowS],
-  );
-  if (!plan) return null;
+  const { asked, models } = useCharts(plans, pointsFor(width));
+  const { lines, state } = asked;
+  const [model] = models;
+  if (sensor === undefined) return null;
   return (
     <div className="card-chart" ref={place} data-testid="card-chart" data-state={state}>
       <SensorChoice
         tagId={tagId}
-        value={plan.sensor}
+        value={sensor}
         onChange={(name) => {
           chosenSensor.dispatch({ name, inView });
         }}
@@ -58,7 +46,7 @@ export default function CardChart({ tagId }: { tagId: string }): JSX.Element | n
         <>
           {model && model.lines.length > 0 ? (
             <>
-              <PlotView key={plan.sensor} model={model} height={HEIGHT} />
+              <PlotView key={sensor} model={model} height={HEIGHT} />
               <MarksKey marks={[...lines.marks.values()].flat()} />
             </>
           ) : (

@@ -1,25 +1,24 @@
-import { useEffect, useMemo, useRef, useState, type JSX } from 'react';
+import { Fragment, type JSX, useEffect, useMemo, useRef, useState } from 'react';
 
 import { now } from '../clock';
+import { exportAddress } from '../contract/series';
+import { isHad } from '../domain/sensors';
+import { chartCsv } from '../domain/series';
+import { shown } from '../domain/text';
+import type { Span } from '../domain/time';
+import { fileName, save } from '../export/save';
 import { act, prefer, store, useApp } from '../store/app';
-import { selectCatalogue, selectCatalogues } from '../store/derived';
-import { rosNow } from '../store/moment';
-import type { Charted } from '../store/view';
+import { selectCatalogue, selectSensor } from '../store/derived';
+import { rosNow, selectTags } from '../store/moment';
+import { type Charted, MOST_CHARTED } from '../store/view';
 import { S } from '../strings';
-import { IconButton } from '../widgets/IconButton';
-import { Segmented } from '../widgets/Segmented';
+import { Icon, IconButton, Segmented } from '../widgets/controls';
 import { useFocusBack } from '../widgets/useFocusBack';
-import { modelOf, pairsOf, plansOf, tagLabel } from './charted';
-import { ChartFiles } from './ChartFiles';
-import { ChartState } from './ChartState';
-import { ChartTables } from './ChartTables';
-import { MarksKey } from './MarksKey';
+import { ChartTables } from './SeriesTable';
+import { ChartState, LineSign, LineValue, MarksKey, PlotView, SensorChoice } from './PlotView';
+import { plansOf, type PlotModel, tagLabel } from './model';
 import { TIMES_HEIGHT } from './plot';
-import { PlotView } from './PlotView';
-import { TagChoice } from './TagChoice';
-import { useLines } from './useLines';
-import { useSensorsOf, useSpeciesOf } from './useSensorsOf';
-import { pointsFor, useSize } from './useSize';
+import { pointsFor, useCharts, useSensorsOf, useSize } from './useLines';
 import { useZoomed, zoomBack, zoomBy } from './zoom';
 
 /** Of one chart of a tag's, and of several tags' only one, without the times; CSS pixels. */
@@ -30,11 +29,7 @@ const AROUND = 42;
 /** The charts of a tag, or of a sensor: over the map, above the time bar whose period they have. */
 export default function ChartView({ charted }: { charted: Charted }): JSX.Element {
   const sensor = useApp((state) => state.view.sensor);
-  const unit = useApp((state) => state.settings.unit);
-  const moment = useApp((state) => state.view.moment);
   const hasDayBefore = useApp((state) => state.settings.dayBefore);
-  const catalogue = useApp(selectCatalogue);
-  const both = useApp(selectCatalogues);
   const isZoomed = useZoomed();
   const [isTable, setTable] = useState(false);
   const root = useRef<HTMLElement>(null);
@@ -57,19 +52,8 @@ export default function ChartView({ charted }: { charted: Charted }): JSX.Elemen
   const sensors = useSensorsOf(tagId);
 
   const plans = useMemo(() => plansOf(charted, sensors, sensor), [charted, sensors, sensor]);
-  const pairs = useMemo(() => pairsOf(plans), [plans]);
-  const asked = useLines(pairs, pointsFor(size.width), hasDayBefore);
-  const { lines, span, nowS } = asked;
-  const species = useSpeciesOf(charted.tagIds);
-  const models = useMemo(
-    () =>
-      span
-        ? plans.map((plan) =>
-            modelOf(catalogue, both, plan, species, lines, span, unit, moment, nowS),
-          )
-        : [],
-    [catalogue, both, plans, species, lines, span, unit, moment, nowS],
-  );
+  const { asked, models } = useCharts(plans, pointsFor(size.width), hasDayBefore);
+  const { lines, span } = asked;
   const withLines = models.filter(({ lines }) => lines.length > 0);
   const room = (size.height - TIMES_HEIGHT) / Math.max(1, plans.length);
   const least = LEAST_HEIGHT[charted.by];
@@ -159,5 +143,129 @@ export default function ChartView({ charted }: { charted: Charted }): JSX.Elemen
         />
       )}
     </section>
+  );
+}
+
+/** The tags of one chart with what their lines say: each can go, and another be added. */
+export function TagChoice({
+  tagIds,
+  model,
+}: {
+  tagIds: readonly string[];
+  /** Undefined: nothing of it is here yet. */
+  model: PlotModel | undefined;
+}): JSX.Element {
+  const sensor = useApp(selectSensor);
+  const tags = useApp(selectTags);
+  const others = tags.filter(
+    ({ id, readings }) => isHad(sensor, (name) => readings.has(name)) && !tagIds.includes(id),
+  );
+  const choose = (next: readonly string[]): void => {
+    act({ type: 'chart', chart: { by: 'sensor', tagIds: next } });
+  };
+  return (
+    <div className="chart-tags">
+      <SensorChoice
+        tagId={tagIds[0] ?? ''}
+        value={sensor.name}
+        onChange={(name) => {
+          act({ type: 'sensor', sensor: name });
+        }}
+      />
+      <ul aria-label={S.tags}>
+        {tagIds.map((tagId, look) => (
+          <li key={tagId}>
+            <LineSign look={look} />
+            {/* As the map's labels are. */}
+            <bdi>{shown(tagId, 24)}</bdi>
+            {model?.lines
+              .filter(({ series }) => series.tagId === tagId)
+              .map((line) => (
+                <Fragment key={tagId}>
+                  · <LineValue line={line} model={model} />
+                </Fragment>
+              ))}
+            {tagIds.length > 1 && (
+              <button
+                type="button"
+                className="chip-close"
+                aria-label={S.chartRemoveTag(shown(tagId, 24))}
+                onClick={() => {
+                  choose(tagIds.filter((each) => each !== tagId));
+                }}
+              >
+                <Icon name="close" size={14} />
+              </button>
+            )}
+          </li>
+        ))}
+      </ul>
+      {tagIds.length < MOST_CHARTED && others.length > 0 && (
+        <select
+          aria-label={S.chartAddTag}
+          value=""
+          onChange={(event) => {
+            choose([...tagIds, event.target.value]);
+          }}
+        >
+          <option value="" disabled>
+            {S.chartAddTag}
+          </option>
+          {others.map(({ id }) => (
+            <option key={id} value={id}>
+              {tagLabel(id)}
+            </option>
+          ))}
+        </select>
+      )}
+    </div>
+  );
+}
+
+/** What is shown to take away, and every reading behind it. */
+export function ChartFiles({
+  models,
+  span,
+  tagId,
+  sensor,
+}: {
+  models: readonly PlotModel[];
+  span: Span;
+  tagId: string | undefined;
+  sensor: string | undefined;
+}): JSX.Element {
+  const unit = useApp((state) => state.settings.unit);
+  const catalogue = useApp(selectCatalogue);
+  return (
+    <footer className="chart-files">
+      <p className="faint">{S.chartHint}</p>
+      <button
+        type="button"
+        className="text-button"
+        onClick={() => {
+          const text = chartCsv(
+            catalogue,
+            models.flatMap(({ lines }) => lines),
+            unit,
+          );
+          save(
+            new Blob([text], { type: 'text/csv;charset=utf-8' }),
+            fileName('chart', 'csv', span.to * 1000),
+          );
+        }}
+      >
+        <Icon name="download" size={16} />
+        {S.chartCsvShown}
+      </button>
+      <a
+        className="text-button"
+        download
+        data-testid="export-link"
+        href={exportAddress({ ...span, tagId, sensor })}
+      >
+        <Icon name="download" size={16} />
+        {S.chartCsvAll}
+      </a>
+    </footer>
   );
 }

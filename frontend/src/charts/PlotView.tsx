@@ -1,23 +1,36 @@
 import 'uplot/dist/uPlot.min.css';
 import '../styles/charts.css';
 
-import { useEffect, useLayoutEffect, useRef, useState, type CSSProperties, type JSX } from 'react';
+import { type CSSProperties, type JSX, useEffect, useMemo, useRef } from 'react';
 
-import { rgbText, sensorColour } from '../domain/ramp';
-import { rosText } from '../domain/rostime';
+import { ageText, rangeText, readingText, type TemperatureUnit, unitOf } from '../domain/format';
+import { rangeOf, rgbText, sensorColour } from '../domain/ramp';
+import { isHad, isOfDay, type Sensor } from '../domain/sensors';
+import { lastUntil, type Mark, type Point, pointAt, type Series } from '../domain/series';
 import { shown } from '../domain/text';
-import { unitOf } from '../domain/units';
+import { rosText, type Span } from '../domain/time';
 import { CommentMarks } from '../notes/CommentMarks';
-import { act } from '../store/app';
-import { useSelected } from '../store/create';
-import { pointedBy, pointedTime } from '../store/signals';
+import { act, useApp } from '../store/app';
+import { pointedBy, pointedTime, useSelected } from '../store/create';
+import { selectCatalogue } from '../store/derived';
 import { onThemeChange } from '../store/theme';
 import { S } from '../strings';
-import { LineValue, useTold } from './LineValue';
-import type { PlotModel } from './model';
-import { createPlot, type Plot } from './plot';
-import { plotText } from './told';
+import { More, Select } from '../widgets/controls';
+import { isStroked, lookOf, markerPath } from './layers';
+import type { Line, PlotModel } from './model';
+import { type PlotHandlers, usePlot } from './plot';
+import { type Asked, useSensorsOf } from './useLines';
 import { zoomTo } from './zoom';
+
+const HANDLERS: PlotHandlers = {
+  onPoint: (at) => {
+    pointedTime.dispatch(at === null ? null : { at, by: 'chart' });
+  },
+  onPick: (moment) => {
+    act({ type: 'moment', moment });
+  },
+  onZoom: zoomTo,
+};
 
 /** One chart. `isAlone`: its one line has the sensor's colour, and no list beside it that says its value. */
 export function PlotView({
@@ -32,46 +45,14 @@ export function PlotView({
   hasTimes?: boolean;
 }): JSX.Element {
   const place = useRef<HTMLDivElement>(null);
-  const plot = useRef<Plot | null>(null);
-  const [width, setWidth] = useState(0);
   const ofBar = useSelected(pointedTime, pointedBy('bar'));
   const { at } = useTold();
   const only = isAlone ? model.lines[0] : undefined;
 
-  useLayoutEffect(() => {
-    const element = place.current;
-    if (!element) return undefined;
-    const mine = createPlot(element, {
-      onPoint: (time) => {
-        pointedTime.dispatch(time === null ? null : { at: time, by: 'chart' });
-      },
-      onPick: (time) => {
-        act({ type: 'moment', moment: time });
-      },
-      onZoom: zoomTo,
-    });
-    plot.current = mine;
-    const resize = new ResizeObserver(([entry]) => {
-      if (entry) setWidth(Math.floor(entry.contentRect.width));
-    });
-    resize.observe(element);
-    const stop = onThemeChange(mine.recolour);
-    return () => {
-      plot.current = null;
-      stop();
-      resize.disconnect();
-      mine.destroy();
-      pointedTime.dispatch(null);
-    };
-  }, []);
-
+  const plot = usePlot(place, model, height, hasTimes, HANDLERS, onThemeChange);
   useEffect(() => {
     plot.current?.point(ofBar);
-  }, [ofBar]);
-
-  useEffect(() => {
-    if (width > 0) plot.current?.show(model, { width, height, hasTimes });
-  }, [model, width, height, hasTimes]);
+  }, [plot, ofBar]);
 
   return (
     <section
@@ -103,4 +84,188 @@ export function PlotView({
       />
     </section>
   );
+}
+
+const DAY_S = 86_400;
+
+/** The time that charts tell of: under the mouse, else the moment that the page shows; null: newest. */
+export function useTold(): { at: number | null; isPointed: boolean } {
+  const pointed = useSelected(pointedTime, (it) => it?.at ?? null);
+  // Beside a house of the past, the newest value would pass for one of then.
+  const moment = useApp((state) => state.view.moment);
+  return { at: pointed ?? moment, isPointed: pointed !== null };
+}
+
+/** What a line says at that time, how far it ranges there, and what it was the day before. */
+export function LineValue({
+  line,
+  model: { sensor, unit, span },
+}: {
+  line: Line;
+  model: PlotModel;
+}): JSX.Element {
+  const { at, isPointed } = useTold();
+  const point = (isPointed ? pointAt : lastUntil)(line.series, at ?? Infinity);
+  const value = point?.value ?? null;
+  const was = beforeAt(line, at)?.value ?? null;
+  const isMean = point !== null && point.n > 1;
+  const reach = useApp((state) => state.twin.remembered.value?.reach);
+  if (value === null && isOfDay(sensor)) {
+    const known = reach ? Math.max(0, (at ?? span.to) - reach.from) : 0;
+    return <span className="faint">{S.chartNeedsDay(known < DAY_S ? ageText(known) : null)}</span>;
+  }
+  return (
+    <span className="line-value">
+      {isMean && <span className="faint">{S.chartColumns.mean} </span>}
+      <strong>{value === null ? S.noValue : readingText(sensor, value, unit)}</strong>
+      {isMean && (
+        <span className="faint"> {rangeText(sensor, rangeOf([point.min, point.max]), unit)}</span>
+      )}
+      {line.before && (
+        <span className="faint">
+          {' '}
+          {S.chartBeforeWas(was === null ? S.noValue : readingText(sensor, was, unit))}
+        </span>
+      )}
+    </span>
+  );
+}
+
+/** The day before, at a moment or when the line's newest was read. */
+function beforeAt({ series, before }: Line, at: number | null): Point | null {
+  const newest = lastUntil(series, Infinity);
+  return before && newest && pointAt(before, at ?? newest.at);
+}
+
+/** A piece of the line with its marker. */
+export function LineSign({ look: index }: { look: number }): JSX.Element {
+  const { colour, dash, marker } = lookOf(index);
+  return (
+    <svg
+      className="line-sign"
+      viewBox="0 0 30 12"
+      width={30}
+      height={12}
+      aria-hidden="true"
+      style={{ color: `var(--chart-${colour + 1})` }}
+    >
+      <path d="M0 6H30" strokeDasharray={dash.join(' ')} />
+      <path d={markerPath(marker, 15, 6, 7)} className={isStroked(marker) ? 'stroked' : 'filled'} />
+    </svg>
+  );
+}
+
+/** What the marks below the lines are, and how many of each; nothing where there are none. */
+export function MarksKey({ marks }: { marks: readonly Mark[] }): JSX.Element | null {
+  const count = (kind: Mark['kind']): number =>
+    marks.reduce((sum, mark) => sum + (mark.kind === kind ? mark.count : 0), 0);
+  const [looks, failures] = [count('look'), count('failure')];
+  if (looks + failures === 0) return null;
+  return (
+    <p className="marks-key" data-testid="marks-key">
+      {looks > 0 && (
+        <span data-mark="look">
+          <span aria-hidden="true">○</span> {S.chartLooks(looks)}
+        </span>
+      )}
+      {failures > 0 && (
+        <span data-mark="failure">
+          <span aria-hidden="true">✕</span> {S.chartFailures(failures)}
+        </span>
+      )}
+    </p>
+  );
+}
+
+/** Why there is no chart (yet), in plain words. */
+export function ChartState({
+  asked: { state, message, span },
+  hasLines,
+  lacks,
+}: {
+  asked: Asked;
+  hasLines: boolean;
+  /** What there is nothing of to chart; null: there is something. */
+  lacks: string | null;
+}): JSX.Element | null {
+  if (state === 'missing') {
+    return (
+      <div className="chart-state" role="status" data-state="missing">
+        <strong>{S.chartMissing}</strong>
+        <p>{S.chartMissingHint}</p>
+        <More label={S.more} text={S.chartMissingMore} />
+        {message && <p className="faint">{shown(message, 300)}</p>}
+      </div>
+    );
+  }
+  const text =
+    lacks ??
+    (span === null
+      ? S.chartNoTime
+      : state === 'failed'
+        ? S.chartFailed(shown(message, 300))
+        : state === 'waiting' && !hasLines
+          ? S.chartLoading
+          : null);
+  if (text === null) return null;
+  return (
+    <div className="chart-state" role="status" data-state={state}>
+      {text}
+    </div>
+  );
+}
+
+/** Which sensor of a tag is charted; what is computed of its sensors is among them. */
+export function SensorChoice({
+  tagId,
+  value,
+  onChange,
+}: {
+  tagId: string;
+  value: string;
+  onChange: (sensor: string) => void;
+}): JSX.Element {
+  const sensors = useSensorsOf(tagId);
+  const catalogue = useApp(selectCatalogue);
+  const choices = useMemo(() => {
+    const computed = catalogue.all.filter((sensor) =>
+      isHad(sensor, (name) => sensors.includes(name)),
+    );
+    return [...new Set([...sensors, ...computed.map(({ name }) => name)])];
+  }, [catalogue, sensors]);
+  return (
+    <Select
+      aria-label={S.sensors}
+      value={value}
+      options={choices}
+      text={(name) => shown(catalogue.named(name).label, 32)}
+      onChange={onChange}
+    />
+  );
+}
+
+/** Charts in words. */
+
+export const spanText = ({ from, to }: Span): string => S.chartSpan(rosText(from), rosText(to));
+
+/** The latest, the least and the most, and how often nothing came. */
+function seriesText({ points, gaps }: Series, sensor: Sensor, unit: TemperatureUnit): string {
+  const latest = points.findLast(({ value }) => value !== null);
+  const range = rangeOf(points.flatMap(({ min, max }) => [min, max]));
+  if (latest?.value == null || !range) return S.chartEmpty;
+  const value = (of: number): string => readingText(sensor, of, unit);
+  return S.chartSummary(
+    points.reduce((sum, { n }) => sum + n, 0),
+    value(latest.value),
+    rosText(latest.at),
+    value(range.low),
+    value(range.high),
+    gaps.length,
+  );
+}
+
+/** What a canvas shows, for those who do not see it. */
+export function plotText({ sensor, unit, lines, span }: PlotModel): string {
+  const each = lines.map(({ series, label }) => `${label}: ${seriesText(series, sensor, unit)}`);
+  return `${S.chartOf(shown(sensor.label, 32))}, ${spanText(span)}. ${each.join(' ')}`;
 }

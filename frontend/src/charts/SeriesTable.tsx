@@ -1,14 +1,45 @@
-import type { JSX } from 'react';
+import { type JSX, useState } from 'react';
 
-import { ageText, readingText } from '../domain/format';
-import { rosText } from '../domain/rostime';
+import { ageText, readingText, type TemperatureUnit } from '../domain/format';
 import type { Sensor } from '../domain/sensors';
 import { rowsOfSeries, type SeriesRow } from '../domain/series';
 import { shown } from '../domain/text';
-import type { TemperatureUnit } from '../domain/units';
+import { rosText } from '../domain/time';
 import { S } from '../strings';
+import { Select } from '../widgets/controls';
+import { spanText } from './PlotView';
 import type { Line, PlotModel } from './model';
-import { spanText } from './told';
+
+/** The table of one line, and the choice among them. */
+export function ChartTables({ models }: { models: readonly PlotModel[] }): JSX.Element | null {
+  const lines = models.flatMap((model) =>
+    model.lines.map((line) => ({
+      model,
+      line,
+      key: `${model.sensor.name}\u0000${line.series.tagId}`,
+      label: `${line.label}, ${shown(model.sensor.label, 32)}`,
+    })),
+  );
+  const [chosen, setChosen] = useState('');
+  const current = lines.find(({ key }) => key === chosen) ?? lines[0];
+  if (!current) return null;
+  return (
+    <>
+      {lines.length > 1 && (
+        <label className="chart-which">
+          <span>{S.chartWhich}</span>
+          <Select
+            value={current.key}
+            options={lines.map(({ key }) => key)}
+            text={(key) => lines.find((line) => line.key === key)?.label ?? ''}
+            onChange={setChosen}
+          />
+        </label>
+      )}
+      <SeriesTable line={current.line} model={current.model} />
+    </>
+  );
+}
 
 /** The same as a line of a chart, for the keyboard and for screen readers; the newest row first. */
 export function SeriesTable({ line, model }: { line: Line; model: PlotModel }): JSX.Element {
@@ -71,61 +102,40 @@ function Values({
   sensor: Sensor;
   unit: TemperatureUnit;
 }): JSX.Element {
-  const value = (of: number): string => readingText(sensor, of, unit);
-  switch (row.kind) {
-    case 'reading':
-      return (
-        <>
-          <td>{row.value === null ? S.sensorFailed : value(row.value)}</td>
-          <td />
-        </>
-      );
-    case 'bucket':
-      return (
-        <>
-          <td>{rosText(row.to)}</td>
-          <td>{row.n}</td>
-          <td>{value(row.mean)}</td>
-          <td>{value(row.min)}</td>
-          <td>{value(row.max)}</td>
-          <td />
-        </>
-      );
-    case 'gap':
-      return (
-        <Event row={row} isBucketed={isBucketed} text={S.chartGap(ageText(row.to - row.at))} />
-      );
-    case 'not_kept':
-    case 'not_recorded':
-      return <Event row={row} isBucketed={isBucketed} text={S.missing[row.kind]} />;
-    case 'failure':
-      return <Event row={row} isBucketed={isBucketed} text={S.chartFailures(row.count)} />;
-    case 'look':
-      return <Event row={row} isBucketed={isBucketed} text={S.chartLooks(row.count)} />;
-  }
-}
-
-/** What is no value: when it ended, and what it was. */
-function Event({
-  row,
-  isBucketed,
-  text,
-}: {
-  row: Extract<SeriesRow, { to: number }>;
-  isBucketed: boolean;
-  text: string;
-}): JSX.Element {
+  const value = (of: number | null): JSX.Element => (
+    <td>{of === null ? S.sensorFailed : readingText(sensor, of, unit)}</td>
+  );
+  const event = eventText(row);
   return (
     <>
-      {isBucketed ? (
+      {isBucketed && <td>{row.to !== null && rosText(row.to)}</td>}
+      {row.kind === 'bucket' && <td>{row.n}</td>}
+      {event === '' ? value(row.value) : <td colSpan={isBucketed ? 4 : 1} />}
+      {row.kind === 'bucket' && (
         <>
-          <td>{rosText(row.to)}</td>
-          <td colSpan={4} />
+          {value(row.min)}
+          {value(row.max)}
         </>
-      ) : (
-        <td />
       )}
-      <td>{text}</td>
+      <td>{event}</td>
     </>
   );
+}
+
+/** What is no value; empty: it is one. */
+function eventText({ kind, at, to, n }: SeriesRow): string {
+  switch (kind) {
+    case 'reading':
+    case 'bucket':
+      return '';
+    case 'gap':
+      return S.chartGap(ageText((to ?? at) - at));
+    case 'not_kept':
+    case 'not_recorded':
+      return S.missing[kind];
+    case 'failure':
+      return S.chartFailures(n ?? 0);
+    case 'look':
+      return S.chartLooks(n ?? 0);
+  }
 }

@@ -1,11 +1,8 @@
 /** What a chart has below and above its lines: drawn by functions that keep no state. */
-import { valueText } from '../domain/format';
-import type { Span } from '../domain/period';
-import { toShown } from '../domain/units';
+import { toShown, valueText } from '../domain/format';
+import type { Span } from '../domain/time';
 import { S } from '../strings';
-import { isStroked, lookOf, markerPath } from './looks';
-import { limitsOf, pointsOf, type Line, type PlotModel } from './model';
-import type { ChartPalette } from './palette';
+import { limitsOf, type Line, type PlotModel, pointsOf } from './model';
 
 /** Where things lie on the canvas, in its own pixels. */
 export interface Frame {
@@ -109,11 +106,11 @@ function drawRanges(frame: Frame, line: Line, model: PlotModel, palette: ChartPa
   context.globalAlpha = model.lines.length === 1 ? 0.28 : 0.14;
   context.fillStyle = palette.lines[lookOf(line.look).colour] ?? palette.ink;
   context.beginPath();
-  for (const { start, min, max } of series.buckets) {
-    const left = x(start);
-    const right = Math.min(x(start + series.bucketS), x(series.to));
-    const top = y(toShown(sensor, max, unit));
-    const height = Math.max(ratio, y(toShown(sensor, min, unit)) - top);
+  for (const { at, min, max } of series.points) {
+    const left = x(at);
+    const right = Math.min(x(at + series.bucketS), x(series.to));
+    const top = y(toShown(sensor, max ?? 0, unit));
+    const height = Math.max(ratio, y(toShown(sensor, min ?? 0, unit)) - top);
     context.rect(left, top, Math.max(ratio, right - left), height);
   }
   context.fill();
@@ -233,4 +230,100 @@ function drawMoment(
   context.stroke();
   const size = 9 * ratio;
   context.fill(new Path2D(markerPath('down', at, box.top + size / 2, size)));
+}
+
+/** How the lines of one chart are told apart: by colour, dash and marker, so that none has to do. */
+
+export type Marker = 'circle' | 'square' | 'diamond' | 'up' | 'cross' | 'down' | 'plus' | 'ring';
+
+export interface Look {
+  /** Of `--chart-1` to `--chart-8` in the style sheet. */
+  readonly colour: number;
+  /** Strokes and pauses, CSS pixels; empty: one stroke. */
+  readonly dash: readonly number[];
+  readonly marker: Marker;
+}
+
+const LOOKS: readonly Look[] = [
+  { colour: 0, dash: [], marker: 'circle' },
+  { colour: 1, dash: [8, 4], marker: 'square' },
+  { colour: 2, dash: [2, 3], marker: 'diamond' },
+  { colour: 3, dash: [12, 3, 2, 3], marker: 'up' },
+  { colour: 4, dash: [5, 2], marker: 'cross' },
+  { colour: 5, dash: [8, 3, 2, 3, 2, 3], marker: 'down' },
+  { colour: 6, dash: [3, 6], marker: 'plus' },
+  { colour: 7, dash: [14, 5], marker: 'ring' },
+];
+
+const FIRST: Look = { colour: 0, dash: [], marker: 'circle' };
+
+/** The look of the line with that place in the list; each keeps its own while others go. */
+export const lookOf = (index: number): Look => LOOKS[index % LOOKS.length] ?? FIRST;
+
+/** Outline of a marker around a point; `size` is its width. Filled but for crosses and the ring. */
+export function markerPath(marker: Marker, x: number, y: number, size: number): string {
+  const r = size / 2;
+  const line = (...points: readonly (readonly [number, number])[]): string =>
+    `M${points.map(([dx, dy]) => `${x + dx * r} ${y + dy * r}`).join('L')}`;
+  switch (marker) {
+    case 'circle':
+    case 'ring':
+      return `M${x - r} ${y}a${r} ${r} 0 1 0 ${size} 0a${r} ${r} 0 1 0 ${-size} 0Z`;
+    case 'square':
+      return `${line([-0.9, -0.9], [0.9, -0.9], [0.9, 0.9], [-0.9, 0.9])}Z`;
+    case 'diamond':
+      return `${line([0, -1.2], [1.2, 0], [0, 1.2], [-1.2, 0])}Z`;
+    case 'up':
+      return `${line([0, -1.1], [1.1, 0.9], [-1.1, 0.9])}Z`;
+    case 'down':
+      return `${line([0, 1.1], [1.1, -0.9], [-1.1, -0.9])}Z`;
+    case 'cross':
+      return line([-1, -1], [1, 1]) + line([1, -1], [-1, 1]);
+    case 'plus':
+      return line([-1.2, 0], [1.2, 0]) + line([0, -1.2], [0, 1.2]);
+  }
+}
+
+/** Markers that are strokes alone. */
+export const isStroked = (marker: Marker): boolean =>
+  marker === 'cross' || marker === 'plus' || marker === 'ring';
+
+/** The colours of charts, as the style sheet has them now: light or dark, forced, or for paper. */
+export interface ChartPalette {
+  readonly lines: readonly string[];
+  readonly ink: string;
+  readonly text: string;
+  readonly grid: string;
+  readonly surface: string;
+  readonly ideal: string;
+  readonly idealLine: string;
+  readonly gap: string;
+  readonly failure: string;
+  readonly look: string;
+  readonly moment: string;
+  readonly fontPx: number;
+  readonly font: string;
+}
+
+export function readPalette(element: HTMLElement): ChartPalette {
+  const style = getComputedStyle(element);
+  const root = getComputedStyle(document.documentElement);
+  const read = (name: string): string => style.getPropertyValue(`--chart-${name}`).trim();
+  // Larger where the page's text is.
+  const fontPx = Math.round(11.5 * (parseFloat(root.fontSize) / 16 || 1));
+  return {
+    lines: Array.from({ length: 8 }, (_, index) => read(String(index + 1))),
+    ink: read('ink'),
+    text: read('text'),
+    grid: read('grid'),
+    surface: read('surface'),
+    ideal: read('ideal'),
+    idealLine: read('ideal-line'),
+    gap: read('gap'),
+    failure: read('failure'),
+    look: read('look'),
+    moment: read('moment'),
+    fontPx,
+    font: `${fontPx}px ${style.getPropertyValue('--font')}`,
+  };
 }

@@ -1,10 +1,20 @@
 import { describe, expect, test } from 'vitest';
 
-import type { Ranges } from '../domain/sensors';
+import { cataloguesOf, type Ranges } from '../domain/sensors';
 import type { Series } from '../domain/series';
-import { aligned, bandsOf, drawnOf, limitsOf, pointsOf, valueRange, type PlotModel } from './model';
-import { sensorNamed } from '../testing/sensors';
-import { seriesWith } from '../testing/series';
+import { CATALOGUE, FILE, sensorNamed } from '../testing/sensors';
+import { bucketAt, seriesWith } from '../testing/series';
+import {
+  aligned,
+  bandsOf,
+  drawnOf,
+  limitsOf,
+  modelOf,
+  pairKey,
+  type PlotModel,
+  pointsOf,
+  valueRange,
+} from './model';
 
 const model = (all: readonly Series[], over: Partial<PlotModel> = {}): PlotModel => ({
   sensor: sensorNamed('temperature'),
@@ -120,8 +130,7 @@ describe('the points of a line', () => {
   });
 
   test('of buckets are their means, in their middle', () => {
-    const bucket = { start: 40, n: 3, mean: 21, min: 20, max: 22 };
-    expect(pointsOf(seriesWith({ bucketS: 10, buckets: [bucket] }), same)).toEqual([
+    expect(pointsOf(seriesWith({ bucketS: 10, points: [bucketAt(40, 21)] }), same)).toEqual([
       { at: 45, value: 21 },
     ]);
   });
@@ -165,8 +174,8 @@ describe('the axis of the values', () => {
     seriesWith({ readings: values.map((value, at) => ({ at, value })) });
 
   test('takes the least and the most of buckets, not their means alone', () => {
-    const buckets = [{ start: 0, n: 9, mean: 21, min: 10, max: 40 }];
-    const [low, high] = valueRange(model([seriesWith({ bucketS: 10, buckets })]));
+    const points = [{ at: 0, n: 9, value: 21, min: 10, max: 40 }];
+    const [low, high] = valueRange(model([seriesWith({ bucketS: 10, points })]));
     expect(low).toBeCloseTo(10 - 30 * 0.08);
     expect(high).toBeCloseTo(40 + 30 * 0.08);
   });
@@ -234,4 +243,22 @@ describe('the limits that are named', () => {
       ['ideal', 26, 'above'],
     ]);
   });
+});
+
+test('the band is that of the plants, and of several kinds there is none', () => {
+  const plan = { sensor: 'temperature', tagIds: ['1', '2'] };
+  const series = new Map(
+    plan.tagIds.map((tagId) => [pairKey({ tagId, sensor: plan.sensor }), seriesWith({ tagId })]),
+  );
+  const of = (...species: string[]) => {
+    const lines = { series, before: new Map(), marks: new Map() };
+    const span = { from: 0, to: 100 };
+    return modelOf(CATALOGUE, cataloguesOf(FILE), plan, species, lines, span, 'C', null, null);
+  };
+  const ideals = (...species: string[]) => of(...species).bands.map(({ ranges }) => ranges.ideal);
+  expect(ideals('', 'fern')).toEqual([[18, 26]]);
+  expect(ideals('Tulip', 'tulip')).toEqual([[12, 20]]);
+  expect(of('Tulip', 'tulip').isMixed).toBe(false);
+  expect(ideals('tulip', '')).toEqual([]);
+  expect(of('tulip', '').isMixed).toBe(true);
 });

@@ -1,8 +1,28 @@
 /** What one chart shows: one sensor, as one or several tags read it. Pure. */
-import type { Ranges, Sensor } from '../domain/sensors';
-import type { Span } from '../domain/period';
-import { middleOf, type Mark, type Series } from '../domain/series';
-import { toShown, type TemperatureUnit } from '../domain/units';
+import { fetchTimeline } from '../contract/past';
+import { fetchSeries } from '../contract/series';
+import {
+  type Catalogue,
+  type Catalogues,
+  type Ranges,
+  rangesFor,
+  type Sensor,
+} from '../domain/sensors';
+import { type TemperatureUnit, toShown } from '../domain/format';
+import { rangeOf } from '../domain/ramp';
+import {
+  laterBy,
+  type Mark,
+  marksOf,
+  middleOf,
+  type Point,
+  type Series,
+  seriesOf,
+} from '../domain/series';
+import { shown } from '../domain/text';
+import type { Span } from '../domain/time';
+import type { Charted } from '../store/view';
+import { S } from '../strings';
 
 export interface Line {
   readonly series: Series;
@@ -62,19 +82,14 @@ export interface PlotModel {
 }
 
 /** A point of a line in the unit that is shown; null breaks the line. */
-export interface Point {
-  readonly at: number;
-  readonly value: number | null;
-}
+type Drawn = Pick<Point, 'at' | 'value'>;
 
 /** The points of a series in their order, with a break in each gap. */
-export function pointsOf(series: Series, shown: (value: number) => number): Point[] {
-  const value = (of: number | null): number | null => (of === null ? null : shown(of));
-  const points: Point[] = [
-    ...series.readings.map((reading) => ({ at: reading.at, value: value(reading.value) })),
-    ...series.buckets.map((bucket) => ({
-      at: middleOf(bucket, series),
-      value: value(bucket.mean),
+export function pointsOf(series: Series, shown: (value: number) => number): Drawn[] {
+  const points: Drawn[] = [
+    ...series.points.map((point) => ({
+      at: middleOf(point, series),
+      value: point.value === null ? null : shown(point.value),
     })),
     ...series.gaps.map(({ from, to }) => ({ at: (from + to) / 2, value: null })),
   ];
@@ -124,24 +139,14 @@ const LEAST_OF_VALUE = 0.1;
 
 /** The values' axis, in the unit that is shown. */
 export function valueRange({ lines, sensor, bands, unit }: PlotModel): [low: number, high: number] {
-  let low = Infinity;
-  let high = -Infinity;
-  const take = (value: number | null): void => {
-    if (value === null) return;
-    low = Math.min(low, value);
-    high = Math.max(high, value);
-  };
-  for (const { series } of drawnOf({ lines })) {
-    for (const { value } of series.readings) take(value);
-    for (const { min, max } of series.buckets) {
-      take(min);
-      take(max);
-    }
-  }
+  const values = drawnOf({ lines }).flatMap(({ series }) =>
+    series.points.flatMap(({ min, max }) => [min, max]),
+  );
   const all = bands.map(({ ranges }) => ranges);
   const bounds = all.flatMap((ranges) => ranges.ideal ?? []);
   const ideal = bounds.length > 0 ? ([Math.min(...bounds), Math.max(...bounds)] as const) : null;
-  if (low > high) [low, high] = ideal ?? [0, 1];
+  const [least0, most0] = ideal ?? [0, 1];
+  let { low, high } = rangeOf(values) ?? { low: least0, high: most0 };
   const share = LEAST_OF_VALUE * Math.abs(high);
   const least = Math.min(share || 1, ideal ? LEAST_OF_IDEAL * (ideal[1] - ideal[0]) : Infinity);
   if (high - low < least) {
@@ -189,4 +194,124 @@ export function limitsOf(model: PlotModel): Limit[] {
   ];
   const near = ideal ? (critical ?? []).map(named('critical')) : [];
   return [...edges, ...near.filter(({ side }) => side === 'inside')];
+}
+
+/** What charts show, fetched in one go: the lines, the same a day before, and the marks. */
+
+/** One line of a chart. */
+export interface Pair {
+  readonly tagId: string;
+  readonly sensor: string;
+}
+
+export const pairKey = ({ tagId, sensor }: Pair): string => `${sensor}\u0000${tagId}`;
+
+/** By `pairKey`, and marks by tag, as the server told them. */
+export interface Lines {
+  readonly series: ReadonlyMap<string, Series>;
+  /** A day later than it was; empty: nobody asked for it. */
+  readonly before: ReadonlyMap<string, Series>;
+  readonly marks: ReadonlyMap<string, readonly Mark[]>;
+}
+
+export const NO_LINES: Lines = { series: new Map(), before: new Map(), marks: new Map() };
+
+export interface Question {
+  readonly pairs: readonly Pair[];
+  readonly span: Span;
+  /** The twin's time, ROS seconds: the span may end later. */
+  readonly nowS: number;
+  /** At most so many readings or buckets a line. */
+  readonly points: number;
+  /** How long a day takes, seconds, where the day before is wanted too; null: it is not. */
+  readonly dayS: number | null;
+}
+
+/** Looks and failures are marked to a few pixels. */
+const MARK_POINTS = 200;
+
+export async function fetchLines(
+  { pairs, span, nowS, points, dayS }: Question,
+  signal: AbortSignal,
+): Promise<Lines> {
+  const tagIds = [...new Set(pairs.map(({ tagId }) => tagId))];
+  const before = dayS === null ? null : dayBefore(span, dayS);
+  const fetched = async ({ from, to }: Span): Promise<[string, Series][]> => {
+    const all = pairs.map((pair) => fetchSeries({ ...pair, from, to }, points, signal));
+    return (await Promise.all(all)).map((wire) => [
+      pairKey({ tagId: wire.tag_id, sensor: wire.sensor_type }),
+      seriesOf(wire, nowS),
+    ]);
+  };
+  const [series, earlier, timelines] = await Promise.all([
+    fetched(span),
+    before === null ? [] : fetched(before),
+    Promise.all(tagIds.map((tagId) => fetchTimeline(span, MARK_POINTS, signal, tagId))),
+  ]);
+  return {
+    series: new Map(series),
+    before: new Map(earlier.map(([key, each]) => [key, laterBy(each, dayS ?? 0)])),
+    marks: new Map(timelines.map((timeline, index) => [tagIds[index] ?? '', marksOf(timeline)])),
+  };
+}
+
+/** Null: it was before the twin's time began, as in a simulation. */
+function dayBefore({ from, to }: Span, dayS: number): Span | null {
+  return to > dayS ? { from: Math.max(0, from - dayS), to: to - dayS } : null;
+}
+
+/** From what is chosen to the charts that it makes. Pure. */
+
+/** One chart: a sensor, and the tags whose readings of it are its lines. */
+export interface Plan {
+  readonly sensor: string;
+  readonly tagIds: readonly string[];
+}
+
+/** `sensors`: those of the first tag; `sensor`: the one in view. */
+export function plansOf(
+  { by, tagIds }: Charted,
+  sensors: readonly string[],
+  sensor: string,
+): Plan[] {
+  if (by === 'sensor') return [{ sensor, tagIds }];
+  const [tagId] = tagIds;
+  if (tagId === undefined) return [];
+  return sensors.map((each) => ({ sensor: each, tagIds: [tagId] }));
+}
+
+export const tagLabel = (tagId: string): string => S.card(shown(tagId, 24));
+
+/**
+ * What of a plan is here. A tag keeps its look while others come later, or have nothing. `species` are
+ * those of the plan's tags: what is ideal is drawn where it is the same for all.
+ */
+export function modelOf(
+  catalogue: Catalogue,
+  { day, night }: Catalogues,
+  { sensor, tagIds }: Plan,
+  species: readonly string[],
+  { series, before, marks }: Lines,
+  span: Span,
+  unit: TemperatureUnit,
+  moment: number | null,
+  nowS: number | null,
+): PlotModel {
+  const lines = tagIds.flatMap((tagId, look) => {
+    const key = pairKey({ tagId, sensor });
+    const own = series.get(key);
+    if (!own) return [];
+    const ofDayBefore = before.get(key) ?? null;
+    const label = tagLabel(tagId);
+    return [{ series: own, before: ofDayBefore, look, label, marks: marks.get(tagId) ?? [] }];
+  });
+  const now = catalogue.named(sensor);
+  const isMixed = new Set(tagIds.map((_, index) => rangesFor(now, species[index] ?? ''))).size > 1;
+  const own = (of: Catalogue): Ranges => rangesFor(of.named(sensor), species[0] ?? '');
+  const ranges = { now: own(catalogue), day: own(day), night: own(night) };
+  // The nights are the greenhouse's: each line has the same.
+  const bands = isMixed
+    ? []
+    : bandsOf(span, lines[0]?.series.nights ?? null, ranges, moment ?? nowS);
+  return { sensor: now, unit, span, moment, lines, bands, isMixed };
 }

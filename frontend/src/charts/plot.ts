@@ -1,23 +1,29 @@
 /** One chart on the page: uPlot with the layers of `layers.ts`, told what to show and how large. */
+import { type RefObject, useEffect, useLayoutEffect, useRef, useState } from 'react';
 import uPlot from 'uplot';
 
-import type { Span } from '../domain/period';
-import { hasDate } from '../domain/rostime';
-import { timeTicks, type Tick } from '../domain/ticks';
+import { hasDate, type Span } from '../domain/time';
+import { timeTicks, type Tick } from '../domain/timeline';
 import { LOCALE } from '../strings';
-import { drawAbove, drawBelow, drawMarks, MARKS_LANE, type Frame } from './layers';
-import { lookOf } from './looks';
+import {
+  drawAbove,
+  drawBelow,
+  drawMarks,
+  type Frame,
+  lookOf,
+  MARKS_LANE,
+  readPalette,
+} from './layers';
 import { aligned, drawnOf, hasMarks, limitsOf, valueRange, type PlotModel } from './model';
-import { readPalette } from './palette';
 
 export interface PlotHandlers {
   /** The time that the mouse is on, ROS seconds; null: on none. */
   readonly onPoint: (at: number | null) => void;
-  readonly onPick: (at: number) => void;
-  readonly onZoom: (span: Span) => void;
+  readonly onPick?: (at: number) => void;
+  readonly onZoom?: (span: Span) => void;
 }
 
-export interface PlotSize {
+interface PlotSize {
   readonly width: number;
   readonly height: number;
   /** Times and marks below it: of charts above each other, the last has them for all. */
@@ -38,7 +44,7 @@ const SYNC_KEY = 'lupin-charts';
 /** In the page's language: uPlot goes by the browser's. */
 const AXIS_NUMBER = new Intl.NumberFormat(LOCALE);
 
-export interface Plot {
+interface Plot {
   readonly show: (model: PlotModel, size: PlotSize) => void;
   /** Marks a time, ROS seconds, as the mouse would, and tells nobody; null: none. */
   readonly point: (at: number | null) => void;
@@ -47,7 +53,7 @@ export interface Plot {
   readonly destroy: () => void;
 }
 
-export function createPlot(element: HTMLElement, handlers: PlotHandlers): Plot {
+function createPlot(element: HTMLElement, handlers: PlotHandlers): Plot {
   let palette = readPalette(element);
   let model: PlotModel | null = null;
   let chart: uPlot | null = null;
@@ -152,7 +158,7 @@ export function createPlot(element: HTMLElement, handlers: PlotHandlers): Plot {
               const { left, width } = self.select;
               self.setSelect({ left: 0, top: 0, width: 0, height: 0 }, false);
               if (width < SHORTEST_DRAG) return;
-              handlers.onZoom({
+              handlers.onZoom?.({
                 from: self.posToVal(left, 'x'),
                 to: self.posToVal(left + width, 'x'),
               });
@@ -164,7 +170,7 @@ export function createPlot(element: HTMLElement, handlers: PlotHandlers): Plot {
       element,
     );
     u.over.addEventListener('click', (event) => {
-      handlers.onPick(u.posToVal(event.offsetX, 'x'));
+      handlers.onPick?.(u.posToVal(event.offsetX, 'x'));
     });
     return u;
   };
@@ -222,6 +228,41 @@ export function createPlot(element: HTMLElement, handlers: PlotHandlers): Plot {
 /** Of one line always: it may stand above others, with the same times below each other. */
 const hasNames = (model: PlotModel): boolean =>
   model.lines.length === 1 || limitsOf(model).length > 0;
+
+/** A chart in an element, as large as that; `onLook` calls back when its colours are others. */
+export function usePlot(
+  place: RefObject<HTMLDivElement | null>,
+  model: PlotModel,
+  height: number,
+  hasTimes: boolean,
+  handlers: PlotHandlers,
+  onLook: (listener: () => void) => () => void,
+): RefObject<Plot | null> {
+  const plot = useRef<Plot | null>(null);
+  const [width, setWidth] = useState(0);
+  useLayoutEffect(() => {
+    const element = place.current;
+    if (!element) return undefined;
+    const mine = createPlot(element, handlers);
+    plot.current = mine;
+    const resize = new ResizeObserver(([entry]) => {
+      if (entry) setWidth(Math.floor(entry.contentRect.width));
+    });
+    resize.observe(element);
+    const stop = onLook(mine.recolour);
+    return () => {
+      plot.current = null;
+      stop();
+      resize.disconnect();
+      mine.destroy();
+      handlers.onPoint(null);
+    };
+  }, [place, handlers, onLook]);
+  useEffect(() => {
+    if (width > 0) plot.current?.show(model, { width, height, hasTimes });
+  }, [model, width, height, hasTimes]);
+  return plot;
+}
 
 /** A tick needs so many pixels of the axis. */
 const TICK_ROOM = 70;

@@ -5,7 +5,7 @@ import { act, receive } from '../store/app';
 import { goLive, goLost, showTags, status } from '../testing/page';
 import { stateFrame, wireTag } from '../testing/tags';
 import { wireTime } from '../testing/timeline';
-import { pairKey } from './lines';
+import { pairKey } from './model';
 import { useLines, type Asked } from './useLines';
 
 const pair = { tagId: '1', sensor: 'co2' };
@@ -96,7 +96,7 @@ test('a line is asked for once, with its tag’s timeline', async () => {
   const { state, lines } = shown.current;
   const from = NOW_S - 3_600;
   expect(state).toBe('ready');
-  expect(lines.series.get(pairKey(pair))?.readings).toMatchObject([{ value: 600 }]);
+  expect(lines.series.get(pairKey(pair))?.points).toMatchObject([{ value: 600 }]);
   expect(lines.marks.get('1')).toMatchObject([{ widthS: 10, kind: 'failure', count: 1 }]);
   expect(histories()[0]).toBeCloseTo(from, 0);
 });
@@ -109,7 +109,7 @@ describe('the day before', () => {
     expect(today - yesterday).toBeCloseTo(86_400);
     const { series, before } = shown.current.lines;
     expect(before.get(pairKey(pair))?.from).toBeCloseTo(series.get(pairKey(pair))?.from ?? 0);
-    expect(before.get(pairKey(pair))?.readings).toMatchObject([{ value: 600 }]);
+    expect(before.get(pairKey(pair))?.points).toMatchObject([{ value: 600 }]);
   });
 
   test('is not asked for where the time of a simulation had not begun', async () => {
@@ -193,7 +193,7 @@ describe('where there is nothing', () => {
     expect(shown.current).toMatchObject({ state: 'failed', message: 'too many' });
     flush(() => {
       const message = 'no journal is kept';
-      receive({ type: 'remembered', remembered: { value: null, state: 'off', message } });
+      receive({ type: 'set', part: { remembered: { value: null, state: 'off', message } } });
     });
     expect(shown.current).toMatchObject({ state: 'missing', message: 'no journal is kept' });
   });

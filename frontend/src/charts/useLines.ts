@@ -1,15 +1,26 @@
-import { useRef, useState } from 'react';
+import { type RefObject, useLayoutEffect, useMemo, useRef, useState } from 'react';
 
 import { now, pause } from '../clock';
-import { endsNow, spanOf, type Span } from '../domain/period';
-import { store, useApp, type AppState } from '../store/app';
-import { rosNow, selectNewestTag } from '../store/moment';
-import { selectDayS } from '../store/origin';
-import { turnOf } from '../store/remembered';
+import { type Catalogue, isHad, isMeasured } from '../domain/sensors';
+import { endsNow, type Span, spanOf } from '../domain/time';
+import { type AppState, store, useApp } from '../store/app';
+import { createStore, useSelected } from '../store/create';
+import { selectCatalogue, selectCatalogues } from '../store/derived';
 import type { Fetched } from '../store/fetcher';
+import { rosNow, selectDayS, selectNewestTag, selectTag } from '../store/moment';
+import { turnOf } from '../store/remembered';
 import { useFetched } from '../store/useFetched';
 import { useNow } from '../widgets/useNow';
-import { fetchLines, NO_LINES, pairKey, type Lines, type Pair } from './lines';
+import {
+  fetchLines,
+  type Lines,
+  modelOf,
+  NO_LINES,
+  type Pair,
+  pairKey,
+  type Plan,
+  type PlotModel,
+} from './model';
 
 /** Between two questions about the same lines, ms; of many lines longer. */
 const PACE_MS = 3_000;
@@ -71,6 +82,35 @@ export function useLines(pairs: readonly Pair[], points: number, hasDayBefore = 
   };
 }
 
+/** The charts of plans of the same tags, as far as their lines are here. */
+export function useCharts(
+  plans: readonly Plan[],
+  points: number,
+  hasDayBefore = false,
+): { asked: Asked; models: readonly PlotModel[] } {
+  const unit = useApp((state) => state.settings.unit);
+  const moment = useApp((state) => state.view.moment);
+  const catalogue = useApp(selectCatalogue);
+  const both = useApp(selectCatalogues);
+  const species = useSpeciesOf(plans[0]?.tagIds ?? []);
+  const pairs = useMemo(
+    () => plans.flatMap(({ sensor, tagIds }) => tagIds.map((tagId) => ({ tagId, sensor }))),
+    [plans],
+  );
+  const asked = useLines(pairs, points, hasDayBefore);
+  const { lines, span, nowS } = asked;
+  const models = useMemo(
+    () =>
+      span
+        ? plans.map((plan) =>
+            modelOf(catalogue, both, plan, species, lines, span, unit, moment, nowS),
+          )
+        : [],
+    [catalogue, both, plans, species, lines, span, unit, moment, nowS],
+  );
+  return { asked, models };
+}
+
 /** Changes when one of the tags was visited: not in the past, nor for a period that has ended. */
 function useVisits(pairs: readonly Pair[]): string {
   const newest = useApp((state) =>
@@ -89,3 +129,93 @@ const visitsOf = (state: AppState, pairs: readonly Pair[]): string =>
       return [wire?.last_observed, wire?.last_try];
     }),
   );
+
+interface Chosen {
+  readonly name: string;
+  /** What the map showed then: with another one there, the card follows the map again. */
+  readonly inView: string;
+}
+
+/** What was chosen for the card's chart; the map keeps its own. */
+export const chosenSensor = createStore<Chosen | null, Chosen | null>(null, (_, next) => next);
+
+/** What the card's chart is to show: the sensor in view, unless another was chosen. */
+export function useChosenSensor(): string {
+  const inView = useApp((state) => state.view.sensor);
+  const chosen = useSelected(chosenSensor, (it) => it);
+  return chosen?.inView === inView ? chosen.name : inView;
+}
+
+/**
+ * The sensors that a tag has at the moment that is shown, in their usual order; and what is in view
+ * or chosen, where it is computed of them.
+ */
+export function useSensorsOf(tagId: string): readonly string[] {
+  const chosen = useChosenSensor();
+  const names = useApp((state) => {
+    const readings = selectTag(state, tagId)?.readings;
+    if (!readings) return '';
+    const computed = [state.view.sensor, chosen].filter((name) => {
+      const sensor = selectCatalogue(state).named(name);
+      return !isMeasured(sensor) && isHad(sensor, (each) => readings.has(each));
+    });
+    return [...new Set([...readings.keys(), ...computed])].join('\u0000');
+  });
+  const catalogue = useApp(selectCatalogue);
+  return useMemo(
+    () => inOrder(catalogue, names === '' ? [] : names.split('\u0000')),
+    [catalogue, names],
+  );
+}
+
+/** The species of tags, as far as they are sure, at the moment that is shown; else empty. */
+function useSpeciesOf(tagIds: readonly string[]): readonly string[] {
+  const species = useApp((state) =>
+    tagIds.map((id) => selectTag(state, id)?.sureSpecies ?? '').join('\u0000'),
+  );
+  return useMemo(() => species.split('\u0000'), [species]);
+}
+
+function inOrder({ all }: Catalogue, names: readonly string[]): readonly string[] {
+  const place = (name: string): number => {
+    const index = all.findIndex((sensor) => sensor.name === name);
+    return index < 0 ? all.length : index;
+  };
+  return [...names].sort((a, b) => place(a) - place(b) || (a < b ? -1 : 1));
+}
+
+export interface Size {
+  readonly width: number;
+  readonly height: number;
+}
+
+/** The room inside an element, CSS pixels; none before it is laid out. */
+export function useSize(ref: RefObject<HTMLElement | null>): Size {
+  const [size, setSize] = useState<Size>({ width: 0, height: 0 });
+  useLayoutEffect(() => {
+    const element = ref.current;
+    if (!element) return undefined;
+    const observer = new ResizeObserver(([entry]) => {
+      if (!entry) return;
+      const { width, height } = entry.contentRect;
+      setSize({ width: Math.floor(width), height: Math.floor(height) });
+    });
+    observer.observe(element);
+    return () => {
+      observer.disconnect();
+    };
+  }, [ref]);
+  return size;
+}
+
+/** A bucket of fewer pixels is a line that nobody can tell from the next. */
+const BUCKET_PX = 2;
+const STEP = 50;
+const MOST = 1_000;
+
+/**
+ * So many points or buckets as can be told apart in a chart of that width, in steps: a window
+ * that is resized does not ask anew with each pixel. 0 while there is no width.
+ */
+export const pointsFor = (width: number): number =>
+  width === 0 ? 0 : Math.min(MOST, Math.max(100, Math.ceil(width / BUCKET_PX / STEP) * STEP));

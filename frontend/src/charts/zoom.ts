@@ -1,5 +1,5 @@
 /** A part of the period, chosen in a chart, becomes the period: time bar and link follow. */
-import type { Period, Span } from '../domain/period';
+import type { Period, Span } from '../domain/time';
 import { act, store, useApp } from '../store/app';
 import { createStore, useSelected } from '../store/create';
 

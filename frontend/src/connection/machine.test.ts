@@ -2,6 +2,10 @@ import { describe, expect, test } from 'vitest';
 
 import type { StatusFrame } from '../contract/types';
 import {
+  backoffMs,
+  type Command,
+  type Connection,
+  type ConnectionEvent,
   DEAD_MS,
   INITIAL,
   nextDeadline,
@@ -9,9 +13,7 @@ import {
   phaseOf,
   SILENCE_MS,
   step,
-  type Command,
-  type Connection,
-  type ConnectionEvent,
+  TRY_AGAIN_LATER,
 } from './machine';
 
 const status = (twin: StatusFrame['twin']): StatusFrame => ({
@@ -237,4 +239,18 @@ describe('attempts', () => {
     const second = step(step(live, closed(50)).connection, { type: 'wake', now: 60 }).connection;
     expect(step(second, { type: 'opened', now: 70 }).connection.epoch).toBe(2);
   });
+});
+
+test('doubles with each failure up to 15 s', () => {
+  const longest = [1, 2, 3, 4, 5, 6, 50].map((failures) => backoffMs(failures, 1, null));
+  expect(longest).toEqual([500, 1000, 2000, 4000, 8000, 15_000, 15_000]);
+});
+
+test('jitter spreads over the upper half', () => {
+  expect(backoffMs(3, 0, null)).toBe(1000);
+  expect(backoffMs(3, 0.5, null)).toBe(1500);
+});
+
+test('a full server is left alone longer', () => {
+  expect(backoffMs(1, 0, TRY_AGAIN_LATER)).toBe(5000);
 });

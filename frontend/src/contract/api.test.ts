@@ -1,8 +1,11 @@
 import { beforeEach, describe, expect, test, vi } from 'vitest';
 
-import { fetchHistory, fetchMap, Refusal, route, stateSocketUrl } from './api';
+import { npyEstimate } from '../testing/estimate';
+import { npy as npyGrid } from '../testing/npy';
+import { answer, fetchEstimate, fetchHistory, npyOf, Refusal, route, stateSocketUrl } from './api';
 
 const { signal } = new AbortController();
+const fetchMap = (): Promise<object> => answer('OccupancyGrid', signal, 'api/map');
 
 beforeEach(() => {
   document.head.innerHTML = '';
@@ -36,7 +39,7 @@ describe('refusals', () => {
     ['text', '404'],
   ])('%j becomes %j', async (body, message) => {
     vi.stubGlobal('fetch', () => Promise.resolve(Response.json(body, { status: 404 })));
-    const error: unknown = await fetchMap(signal).catch((reason: unknown) => reason);
+    const error: unknown = await fetchMap().catch((reason: unknown) => reason);
     expect(error).toBeInstanceOf(Refusal);
     expect(error).toMatchObject({ status: 404, message });
   });
@@ -52,5 +55,81 @@ test.each([
 ])('an answer that is no object of JSON is an error that names it, %#', async (answer, message) => {
   Object.defineProperty(answer, 'url', { value: 'http://localhost/api/map' });
   vi.stubGlobal('fetch', () => Promise.resolve(answer));
-  await expect(fetchMap(signal)).rejects.toThrow(message);
+  await expect(fetchMap()).rejects.toThrow(message);
+});
+
+function npy(header: string, values: readonly number[], version = 1): ArrayBuffer {
+  const prefix = version === 1 ? 10 : 12;
+  const text = header + ' '.repeat((64 - ((prefix + header.length + 1) % 64)) % 64) + '\n';
+  const buffer = new ArrayBuffer(prefix + text.length + values.length * 4);
+  const view = new DataView(buffer);
+  new Uint8Array(buffer).set([0x93, 0x4e, 0x55, 0x4d, 0x50, 0x59, version, 0]);
+  if (version === 1) view.setUint16(8, text.length, true);
+  else view.setUint32(8, text.length, true);
+  new Uint8Array(buffer).set(new TextEncoder().encode(text), prefix);
+  values.forEach((value, i) => {
+    view.setFloat32(prefix + text.length + i * 4, value, true);
+  });
+  return buffer;
+}
+
+const HEADER = "{'descr': '<f4', 'fortran_order': False, 'shape': (2, 3), }";
+
+describe('npy', () => {
+  test.each([1, 2])('version %d: rows, columns and values, NaN as NaN', (version) => {
+    const { shape, values } = npyOf(npy(HEADER, [1, 2, 3, NaN, 5, 6.5], version), 2);
+    expect(shape).toEqual([2, 3]);
+    expect([...values]).toEqual([1, 2, 3, NaN, 5, 6.5]);
+  });
+
+  test('as many dimensions as are asked for', () => {
+    const three = npy(HEADER.replace('(2, 3)', '(2, 1, 3)'), [1, 2, 3, NaN, 5, 6.5]);
+    expect(npyOf(three, 3).shape).toEqual([2, 1, 3]);
+    expect(() => npyOf(three, 2)).toThrow('expected 2 dimensions');
+  });
+
+  test.each([
+    ['magic', npy(HEADER, [1, 2, 3, 4, 5, 6]).slice(1), /magic/],
+    ['type', npy(HEADER.replace('<f4', '<f8'), [1, 2, 3, 4, 5, 6]), /<f8/],
+    ['order', npy(HEADER.replace('False', 'True'), [1, 2, 3, 4, 5, 6]), /order/],
+    ['dimensions', npy(HEADER.replace('(2, 3)', '(6,)'), [1, 2, 3, 4, 5, 6]), /2 dimensions/],
+    ['length', npy(HEADER, [1, 2, 3]), /12 bytes .* 2 x 3/],
+    ['stump', new Uint8Array([0x93, 0x4e, 0x55, 0x4d, 0x50, 0x59, 1, 0]).buffer, /8 bytes/],
+  ])('refuses a wrong %s', (_, buffer, message) => {
+    expect(() => npyOf(buffer, 2)).toThrow(message);
+  });
+});
+
+describe('an estimate', () => {
+  test('has means, errors and what counts as known', async () => {
+    let asked = '';
+    vi.stubGlobal('fetch', (url: URL) => {
+      asked = url.pathname + url.search;
+      return Promise.resolve(npyEstimate([21, 22, 23], [0.5, 1, 2], 0.75));
+    });
+    const query = { sensor: 'co2', resolution: 0.1, at: 50 };
+    const estimate = await fetchEstimate(query, signal);
+    expect(asked).toBe('/api/estimate.npy?sensor_type=co2&resolution=0.1&at=50.000');
+    expect([...estimate.mean]).toEqual([21, 22, 23]);
+    expect([...estimate.sd]).toEqual([0.5, 1, 2]);
+    expect(estimate).toMatchObject({
+      ...{ width: 3, height: 1, originX: -1.5, originY: 0.5, resolution: 1 },
+      ...{ sdKnown: 0.75, sampleCount: 4, readingCount: 40 },
+    });
+  });
+
+  test.each([
+    ['one grid alone', new Response(npyGrid(1, 2, [1, 2])), /expected 3 dimensions/],
+    [
+      'a header that is missing',
+      ((response: Response) => {
+        response.headers.delete('X-Estimate-Sd-Known');
+        return response;
+      })(npyEstimate([1], [1])),
+      /X-Estimate-Sd-Known/,
+    ],
+  ])('%s is refused', async (_, response, message) => {
+    vi.stubGlobal('fetch', () => Promise.resolve(response));
+    await expect(fetchEstimate({ sensor: 'co2', resolution: 1 }, signal)).rejects.toThrow(message);
+  });
 });

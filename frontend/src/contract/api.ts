@@ -1,10 +1,6 @@
 /** The bridge's routes. Addresses are relative to the page, so any path prefix works. */
 import { checkOf } from './check';
-import { parseNpy } from './npy';
-import type { components } from './openapi.gen';
-import type { Field, FieldQuality, OccupancyGrid, SensorsFile, TagHistory } from './types';
-
-type Schemas = components['schemas'];
+import type { Field, FieldQuality, Schemas, TagHistory } from './types';
 
 /** A refusal by the server, with its reason. */
 export class Refusal extends Error {
@@ -31,16 +27,33 @@ export function stateSocketUrl(): string {
   return url.href;
 }
 
-/** An answer of the bridge; a refusal is thrown with its reason. */
-export async function get(
-  path: string,
-  signal: AbortSignal,
-  headers?: HeadersInit,
-): Promise<Response> {
-  // "no-cache": the browser asks with its ETag each time, and a 304 costs no body.
-  return ask(path, { signal, cache: 'no-cache', ...(headers ? { headers } : {}) });
+/** What stands behind the "?" of an address; what is undefined is left out. */
+type Query = Readonly<Record<string, string | number | undefined>>;
+
+export function withQuery(path: string, query: Query): string {
+  const parts = new URLSearchParams();
+  for (const [name, value] of Object.entries(query)) {
+    if (value !== undefined) parts.set(name, String(value));
+  }
+  return `${path}?${parts.toString()}`;
 }
 
+/** A moment as the routes read it, never with an exponent; ROS seconds. */
+export const momentParameter = (at: number): string => Math.max(0, at).toFixed(3);
+
+/** An answer of the bridge. The browser asks with its ETag each time, and a 304 costs no body. */
+export const get = (path: string, signal: AbortSignal): Promise<Response> =>
+  ask(path, { signal, cache: 'no-cache' });
+
+/** An answer, checked against the server's schema of that name. */
+export const answer = async <Name extends keyof Schemas>(
+  name: Name,
+  signal: AbortSignal,
+  path: string,
+  query?: Query,
+): Promise<Schemas[Name]> => read(name, await get(query ? withQuery(path, query) : path, signal));
+
+/** A refusal is thrown with its reason. */
 export async function ask(path: string, init: RequestInit): Promise<Response> {
   const response = await fetch(route(path), init);
   if (!response.ok) {
@@ -85,95 +98,111 @@ async function reasonOf(response: Response): Promise<string> {
   return `${response.status} ${response.statusText}`.trim();
 }
 
-const BOX_NAMES = {
-  minX: 'bbox_min_x',
-  minY: 'bbox_min_y',
-  maxX: 'bbox_max_x',
-  maxY: 'bbox_max_y',
-} as const;
-
-/** A box in the map frame, metres. */
-type Box = Readonly<Record<keyof typeof BOX_NAMES, number>>;
-
 export interface FieldQuery {
   readonly sensor: string;
   readonly resolution: number;
   /** ROS seconds; none: now. */
   readonly at?: number;
-  /** Metres; none: around all tags. */
-  readonly box?: Box;
+  /** In the map frame, metres; none: around all tags. */
+  readonly box?: Readonly<Record<'minX' | 'minY' | 'maxX' | 'maxY', number>>;
 }
 
-export function fieldParameters(query: FieldQuery): string {
-  const parts = new URLSearchParams({
-    sensor_type: query.sensor,
-    resolution: String(query.resolution),
-  });
-  if (query.at !== undefined) parts.set('at', query.at.toFixed(3));
-  if (query.box) {
-    for (const [edge, name] of Object.entries(BOX_NAMES) as [keyof Box, string][]) {
-      parts.set(name, String(query.box[edge]));
-    }
-  }
-  return parts.toString();
-}
-
-/** Reads numbers out of an answer's headers. */
-export const numberIn =
-  ({ headers }: Response) =>
-  (name: string): number => {
-    const value = Number(headers.get(name) ?? NaN);
+/** The grid of a field or an estimate, and its numbers by the end of their headers' names. */
+async function fetchGrid(
+  kind: 'Field' | 'Estimate',
+  dimensions: number,
+  { sensor, resolution, at, box }: FieldQuery,
+  signal: AbortSignal,
+) {
+  const query = {
+    ...{ sensor_type: sensor, resolution, at: at?.toFixed(3) },
+    ...{ bbox_min_x: box?.minX, bbox_min_y: box?.minY },
+    ...{ bbox_max_x: box?.maxX, bbox_max_y: box?.maxY },
+  };
+  const response = await get(withQuery(`api/${kind.toLowerCase()}.npy`, query), signal);
+  const { shape, values } = npyOf(await response.arrayBuffer(), dimensions);
+  const [height = 0, width = 0] = shape.slice(-2);
+  const header = (end: string): number => {
+    const name = `X-${kind}-${end}`;
+    const value = Number(response.headers.get(name) ?? NaN);
     if (!Number.isFinite(value)) throw new Error(`field: header ${name} is missing or no number`);
     return value;
   };
+  const grid = {
+    ...{ width, height, originX: header('Origin-X'), originY: header('Origin-Y') },
+    ...{ resolution: header('Resolution'), sampleCount: header('Sample-Count') },
+  };
+  return { grid, shape, values, header };
+}
 
 export async function fetchField(query: FieldQuery, signal: AbortSignal): Promise<Field> {
-  const response = await get(`api/field.npy?${fieldParameters(query)}`, signal);
-  const grid = parseNpy(await response.arrayBuffer());
-  const header = numberIn(response);
+  const { grid, values, header } = await fetchGrid('Field', 2, query, signal);
+  const [valueMin, valueMax] = [header('Value-Min'), header('Value-Max')];
+  return { ...grid, sensor: query.sensor, valueMin, valueMax, values };
+}
+
+export type Estimate = Awaited<ReturnType<typeof fetchEstimate>>;
+
+/** Whatever a cell's error is, its mean is told; not-a-number where the house is not explored. */
+export async function fetchEstimate(query: FieldQuery, signal: AbortSignal) {
+  const { grid, shape, values, header } = await fetchGrid('Estimate', 3, query, signal);
+  if (shape[0] !== 2) throw new Error(`estimate: ${shape[0]} grids, expected mean and sd`);
+  const cells = grid.width * grid.height;
   return {
-    sensor: query.sensor,
-    width: grid.width,
-    height: grid.height,
-    originX: header('X-Field-Origin-X'),
-    originY: header('X-Field-Origin-Y'),
-    resolution: header('X-Field-Resolution'),
-    valueMin: header('X-Field-Value-Min'),
-    valueMax: header('X-Field-Value-Max'),
-    sampleCount: header('X-Field-Sample-Count'),
-    values: grid.values,
+    ...grid,
+    mean: values.subarray(0, cells),
+    sd: values.subarray(cells),
+    sdKnown: header('Sd-Known'),
+    readingCount: header('Reading-Count'),
   };
 }
 
 /** `at`: ROS seconds; none: now. */
-export async function fetchQuality(
+export const fetchQuality = (
   sensor: string,
   signal: AbortSignal,
   at?: number,
-): Promise<FieldQuality> {
-  const parts = new URLSearchParams({ sensor_type: sensor });
-  if (at !== undefined) parts.set('at', at.toFixed(3));
-  const response = await get(`api/field/quality?${parts.toString()}`, signal);
-  return read('FieldQuality', response);
-}
+): Promise<FieldQuality> =>
+  answer('FieldQuality', signal, 'api/field/quality', { sensor_type: sensor, at: at?.toFixed(3) });
 
-export async function fetchMap(signal: AbortSignal): Promise<OccupancyGrid> {
-  const response = await get('api/map', signal);
-  return read('OccupancyGrid', response);
-}
+export const fetchHistory = (tagId: string, signal: AbortSignal): Promise<TagHistory> =>
+  answer('TagHistory', signal, `api/tags/${encodeURIComponent(tagId)}/history`);
 
-export async function fetchMapPicture(signal: AbortSignal): Promise<Blob> {
-  const response = await get('api/map.png', signal);
-  return response.blob();
-}
+const MAGIC = '\x93NUMPY';
 
-/** The file of sensors that is in force. */
-export async function fetchSensors(signal: AbortSignal): Promise<SensorsFile> {
-  const response = await get('api/sensors', signal);
-  return bodyOf(response);
-}
+/**
+ * Numbers in so many dimensions, row-major, of the one NPY flavour that the bridge sends: little-endian
+ * float32, C order. Format: https://numpy.org/doc/stable/reference/generated/numpy.lib.format.html
+ *
+ * @throws Error where the body is anything else.
+ */
+export function npyOf(
+  buffer: ArrayBuffer,
+  dimensions: number,
+): { readonly shape: readonly number[]; readonly values: Float32Array } {
+  const bytes = new Uint8Array(buffer);
+  const magic = String.fromCharCode(...bytes.subarray(0, MAGIC.length));
+  if (magic !== MAGIC) throw new Error(`npy: magic is ${JSON.stringify(magic)}`);
 
-export async function fetchHistory(tagId: string, signal: AbortSignal): Promise<TagHistory> {
-  const response = await get(`api/tags/${encodeURIComponent(tagId)}/history`, signal);
-  return read('TagHistory', response);
+  // Version 1 has a two-byte header length, versions 2 and 3 a four-byte one.
+  const version = bytes[6] ?? 0;
+  const view = new DataView(buffer);
+  const lengthBytes = version === 1 ? 2 : 4;
+  const start = 8 + lengthBytes;
+  if (buffer.byteLength < start) throw new Error(`npy: only ${buffer.byteLength} bytes`);
+  const length = version === 1 ? view.getUint16(8, true) : view.getUint32(8, true);
+  const header = new TextDecoder('latin1').decode(bytes.subarray(start, start + length));
+
+  const type = /'descr':\s*'([^']+)'/.exec(header)?.[1];
+  if (type !== '<f4') throw new Error(`npy: type is ${String(type)}, expected <f4`);
+  if (!/'fortran_order':\s*False/.test(header)) throw new Error('npy: not in C order');
+  const shape = /'shape':\s*\(([\d,\s]+)\)/.exec(header)?.[1]?.match(/\d+/g)?.map(Number) ?? [];
+  if (shape.length !== dimensions) {
+    throw new Error(`npy: header is ${JSON.stringify(header)}, expected ${dimensions} dimensions`);
+  }
+  const body = buffer.slice(start + length);
+  if (body.byteLength !== shape.reduce((size, each) => size * each, 4)) {
+    throw new Error(`npy: ${body.byteLength} bytes of data, expected ${shape.join(' x ')} x 4`);
+  }
+  return { shape, values: new Float32Array(body) };
 }

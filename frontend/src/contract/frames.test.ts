@@ -1,9 +1,11 @@
-import { describe, expect, test } from 'vitest';
+import { describe, expect, test, vi } from 'vitest';
 
 import { alarm } from '../testing/alarms';
-import { NOBODY } from '../testing/health';
+import { judgement, NOBODY, reason } from '../testing/health';
 import { readings, stateFrame, wireTag } from '../testing/tags';
-import { MAX_FRAME_CHARS, parseFrame } from './frames';
+import { latestAfter, MAX_FRAME_CHARS, parseFrame } from './frames';
+import { fetchStateAt } from './past';
+import type { DeltaFrame } from './types';
 
 const status = {
   type: 'status',
@@ -26,7 +28,7 @@ const status = {
   outward: [{ channel: 'mqtt', is_failing: true, detail: 'refused' }],
 };
 const header = { stamp: { sec: 1, nanosec: 0 }, frame_id: 'map' };
-const reason = {
+const bad = {
   kind: 'range',
   verdict: 'critical',
   sensor: 'temperature',
@@ -34,7 +36,7 @@ const reason = {
   limit: 10,
   since: { sec: 1, nanosec: 0 },
 };
-const health = { ...NOBODY, tags: { a: { verdict: 'critical', reasons: [reason] } } } as const;
+const health = { ...NOBODY, tags: { a: { verdict: 'critical', reasons: [bad] } } } as const;
 const delta = {
   type: 'delta',
   seq: 2,
@@ -206,4 +208,146 @@ test.each([
   [{ plan: null }, 'robot.position: is missing'],
 ])('a robot’s frame of %j is refused', (parts, why) => {
   expect(whyBad(JSON.stringify({ type: 'robot', ...parts }))).toContain(why);
+});
+
+describe('filled', () => {
+  const sec = (sec: number): { sec: number; nanosec: number } => ({ sec, nanosec: 0 });
+
+  /** As the server writes it: without what is as usual. */
+  const tags = [
+    {
+      ...wireTag({ tag_id: 'a', last_observed: sec(100), stale_seconds: 5 }),
+      readings: [
+        { name: 'co2', value: 1 },
+        { name: 'light', value: 2, observed_at: sec(40) },
+        { name: 'ph', value: 3 },
+        { name: 'ec', value: 4, observed_at: null },
+        { name: 'vpd', value: 5 },
+      ],
+      looked_at: undefined,
+      last_try: undefined,
+      last_try_status: undefined,
+      last_try_detail: undefined,
+    },
+    wireTag({ tag_id: 'b', last_observed: sec(0), stale_seconds: null }),
+  ];
+  const health = {
+    house: { ...NOBODY.house, reasons: undefined },
+    tags: { a: { verdict: 'healthy' }, b: { verdict: 'critical', reasons: [reason()] } },
+  };
+  const reading = (name: string, value: number, at: number | null): object => ({
+    name,
+    value,
+    observed_at: at === null ? null : sec(at),
+  });
+  const filled = [
+    wireTag({
+      tag_id: 'a',
+      last_observed: sec(100),
+      stale_seconds: 5,
+      last_try: sec(100),
+      last_try_status: 0,
+      readings: [
+        reading('co2', 1, 100),
+        reading('light', 2, 40),
+        reading('ph', 3, 40),
+        reading('ec', 4, null),
+        reading('vpd', 5, null),
+      ] as never,
+    }),
+    tags[1],
+  ];
+  const said = judgement({ a: 'healthy', b: [reason()] });
+  const verdicts = { house: NOBODY.house, tags: said.tags };
+
+  test.each([
+    [
+      { ...stateFrame([]), state: { ...stateFrame([]).state, tags }, health },
+      { state: { tags: filled }, health: verdicts },
+    ],
+    [
+      {
+        ...{ type: 'delta', seq: 2, base: 1, revision: 'r', removed: [], changed: tags, health },
+        header: stateFrame([]).state.header,
+      },
+      { changed: filled, health: verdicts },
+    ],
+  ])('what a frame leaves out is put back, %#', (frame, expected) => {
+    expect(parseFrame(JSON.stringify(frame))).toMatchObject({ kind: 'frame', frame: expected });
+  });
+
+  test('and what a state of the past does', async () => {
+    const state = { ...stateFrame([], { sec: 12 }).state, tags };
+    vi.stubGlobal('fetch', (url: URL) =>
+      Promise.resolve(Response.json(url.pathname === '/api/health' ? health : state)),
+    );
+    const told = await fetchStateAt(12, new AbortController().signal);
+    expect(told).toMatchObject({ state: { tags: filled }, health: verdicts });
+  });
+});
+
+describe('latest', () => {
+  const a = wireTag({
+    tag_id: 'a',
+    last_observed: { sec: 995, nanosec: 0 },
+    readings: [
+      // Flowers were looked at since.
+      { name: 'co2', value: 600, observed_at: { sec: 100, nanosec: 0 } },
+      // A twin that does not tell.
+      { name: 'light', value: 9, observed_at: null },
+    ],
+  });
+  const b = wireTag({ tag_id: 'b', stale_seconds: null, last_observed: { sec: 0, nanosec: 0 } });
+  const full = stateFrame([a, b], { seq: 7, sec: 1000 });
+
+  const delta = (over: Partial<DeltaFrame> = {}): DeltaFrame => ({
+    type: 'delta',
+    seq: 8,
+    base: 7,
+    revision: 'r2',
+    header: { stamp: { sec: 1002, nanosec: 500_000_000 }, frame_id: 'map' },
+    changed: [],
+    removed: [],
+    health: NOBODY,
+    ...over,
+  });
+
+  describe('the newest state', () => {
+    test('a full frame stands for itself, whatever was before', () => {
+      expect(latestAfter(null, full)).toBe(full);
+      expect(latestAfter({ ...full, seq: 900 }, full)).toBe(full);
+    });
+
+    test('changed tags take their place, new ones come behind, removed ones go', () => {
+      const changed = [wireTag({ tag_id: 'b', species: 'rose' }), wireTag({ tag_id: 'c' })];
+      const after = latestAfter(full, delta({ changed, removed: ['a'] }));
+      expect(after?.state.tags).toEqual(changed);
+      expect(after).toMatchObject({ seq: 8, revision: 'r2' });
+    });
+
+    test('an unchanged tag is the very same', () => {
+      const after = latestAfter(full, delta());
+      expect(after?.state.tags[0]).toBe(a);
+      expect(after?.state.header.stamp.sec).toBe(1002);
+    });
+
+    test('a delta on another frame, or on none, cannot be used', () => {
+      expect(latestAfter(full, delta({ base: 6 }))).toBeNull();
+      expect(latestAfter(null, delta())).toBeNull();
+    });
+  });
+
+  test('the health of who has changed is another, and of who is gone none', () => {
+    const critical = { verdict: 'critical', reasons: [] } as const;
+    const healthy = { verdict: 'healthy', reasons: [] } as const;
+    const known = { ...full, health: { ...NOBODY, tags: { a: healthy, b: critical } } };
+    const same = latestAfter(known, delta());
+    expect(same?.health.tags).toBe(known.health.tags);
+    const house = { ...NOBODY.house, verdict: 'critical' } as const;
+    const then = latestAfter(
+      known,
+      delta({ removed: ['b'], health: { house, tags: { a: critical } } }),
+    );
+    expect(then?.health).toEqual({ house, tags: { a: critical } });
+  });
 });

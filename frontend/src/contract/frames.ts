@@ -1,7 +1,14 @@
 /** What comes over the WebSocket, checked to the last field: nothing behind it checks again. */
 import { checkOf, isObject } from './check';
-import { filledHealth, filledTag } from './filled';
-import type { Frame } from './types';
+import type {
+  DeltaFrame,
+  Frame,
+  Judgement,
+  Latest,
+  Schemas,
+  StateFrame,
+  TwinTagState,
+} from './types';
 
 /** Most characters of a frame: the largest house that a twin keeps is a bit smaller. */
 export const MAX_FRAME_CHARS = 128_000_000;
@@ -60,3 +67,65 @@ function filled(frame: Frame): Frame {
 }
 
 const isKnown = (type: string): type is Frame['type'] => Object.hasOwn(FRAMES, type);
+
+/** What the server leaves out of tags and verdicts because it is as usual, put back here alone. */
+
+type WireTag = Schemas['TwinTagState'];
+
+export function filledTag(tag: WireTag): TwinTagState {
+  const { last_observed: last } = tag;
+  let observedAt: WireTag['readings'][number]['observed_at'] = last;
+  const readings = tag.readings.map((reading) => {
+    if (reading.observed_at !== undefined) observedAt = reading.observed_at;
+    return { ...reading, observed_at: observedAt ?? null };
+  });
+  return {
+    looked_at: null,
+    last_try: last,
+    last_try_status: 0,
+    last_try_detail: '',
+    ...tag,
+    readings,
+  };
+}
+
+export const filledHealth = ({ house, tags }: Schemas['Judgement']): Judgement => ({
+  house: { reasons: [], ...house },
+  tags: Object.fromEntries(Object.entries(tags).map(([id, tag]) => [id, { reasons: [], ...tag }])),
+});
+
+/**
+ * The newest state, put together from full frames and deltas. Pure.
+ *
+ * A delta names the frame that it builds on. Frames of one connection come in order, so a delta
+ * that builds on another frame than the last means that the two sides have lost each other.
+ */
+
+/** The state after a frame; null where the frame does not build on what is there. */
+export function latestAfter(latest: Latest | null, frame: StateFrame | DeltaFrame): Latest | null {
+  if (frame.type === 'state') return frame;
+  if (latest?.seq !== frame.base) return null;
+  const changed = new Map(frame.changed.map((tag) => [tag.tag_id, tag]));
+  const removed = new Set(frame.removed);
+  const tags = latest.state.tags.flatMap((tag) => {
+    const now = changed.get(tag.tag_id) ?? tag;
+    changed.delete(tag.tag_id);
+    return removed.has(tag.tag_id) ? [] : [now];
+  });
+  return {
+    seq: frame.seq,
+    revision: frame.revision,
+    state: { header: frame.header, tags: [...tags, ...changed.values()] },
+    health: { house: frame.health.house, tags: healthsAfter(latest, frame) },
+  };
+}
+
+/** The very same where nobody's health is another. */
+function healthsAfter({ health }: Latest, frame: DeltaFrame): Latest['health']['tags'] {
+  const isSame = frame.removed.length === 0 && Object.keys(frame.health.tags).length === 0;
+  if (isSame) return health.tags;
+  const tags = new Map(Object.entries(health.tags));
+  for (const tagId of frame.removed) tags.delete(tagId);
+  for (const [tagId, now] of Object.entries(frame.health.tags)) tags.set(tagId, now);
+  return Object.fromEntries(tags);
+}

@@ -3,7 +3,8 @@ import { describe, expect, test, vi } from 'vitest';
 import { judgement, NOBODY, reason } from '../testing/health';
 import { stateFrame } from '../testing/tags';
 import { wireTimeline } from '../testing/timeline';
-import { fetchStateAt, fetchTimeline, momentParameter } from './past';
+import { momentParameter } from './api';
+import { fetchStateAt, fetchTimeline } from './past';
 
 const { signal } = new AbortController();
 

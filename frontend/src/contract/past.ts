@@ -1,28 +1,25 @@
 /** The routes of the past: how it was at a moment, and what happened when. Times are ROS seconds. */
-import { get, read } from './api';
-import { filledHealth, filledTag } from './filled';
+import { answer, get, momentParameter, read, withQuery } from './api';
+import { filledHealth, filledTag } from './frames';
 import type { Latest, Timeline } from './types';
 
 /** Stamps are exact to the nanosecond, and a moment that is asked for to the millisecond. */
 const SAME_MOMENT_S = 0.0005;
-
-/** A moment as the routes read it: never with an exponent. */
-export const momentParameter = (at: number): string => Math.max(0, at).toFixed(3);
 
 /**
  * Every tag as of a moment, and what is to be said of it. An answer about any other moment is an error: a server that does not
  * know `at` would give the present.
  */
 export async function fetchStateAt(at: number, signal: AbortSignal): Promise<Latest> {
-  const query = `at=${momentParameter(at)}`;
+  const query = { at: momentParameter(at) };
   let isWhole = true;
   // Both or none: no moment has the verdicts of another one.
   const [state, health] = await Promise.all([
-    get(`api/state?${query}`, signal).then((it) => {
+    get(withQuery('api/state', query), signal).then((it) => {
       isWhole = holdsAll(it, at);
       return read('TwinState', it);
     }),
-    get(`api/health?${query}`, signal).then((it) => read('Judgement', it)),
+    answer('Judgement', signal, 'api/health', query),
   ]);
   const { sec, nanosec } = state.header.stamp;
   const told = sec + nanosec / 1e9;
@@ -52,18 +49,15 @@ function holdsAll({ headers }: Response, at: number): boolean {
  * What happened over a period, in so many buckets; without a period, over all that is kept. With
  * a tag only what happened there.
  */
-export async function fetchTimeline(
+export const fetchTimeline = (
   span: { readonly from: number; readonly to: number } | null,
   points: number,
   signal: AbortSignal,
   tagId?: string,
-): Promise<Timeline> {
-  const parts = new URLSearchParams({ points: String(points) });
-  if (span) {
-    parts.set('from', momentParameter(span.from));
-    parts.set('to', momentParameter(span.to));
-  }
-  if (tagId !== undefined) parts.set('tag_id', tagId);
-  const response = await get(`api/timeline?${parts.toString()}`, signal);
-  return read('Timeline', response);
-}
+): Promise<Timeline> =>
+  answer('Timeline', signal, 'api/timeline', {
+    points,
+    from: span ? momentParameter(span.from) : undefined,
+    to: span ? momentParameter(span.to) : undefined,
+    tag_id: tagId,
+  });

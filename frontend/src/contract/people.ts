@@ -1,13 +1,12 @@
 /** The bridge's routes for people: who is signed in, and what they say. */
-import { ask, get, read } from './api';
-import type { Session } from './types';
+import { answer, ask } from './api';
+import type { Note, Session } from './types';
 
 /** A header of our own: no form and no picture of another page can send one. */
 export const OWN = { 'X-Lupin-Twin': '1' };
 
-export async function fetchSession(signal: AbortSignal): Promise<Session> {
-  return read('Session', await get('api/session', signal));
-}
+export const fetchSession = (signal: AbortSignal): Promise<Session> =>
+  answer('Session', signal, 'api/session');
 
 /** Ends the session, and with it the sockets that it has open. */
 export async function signOut(): Promise<void> {
@@ -32,11 +31,18 @@ export async function postNote(note: Draft): Promise<void> {
 
 /** Takes the word back that stands of a subject, if there is one. */
 export async function withdrawNote(kind: Draft['kind'], subject: string): Promise<void> {
-  const query = new URLSearchParams({ subject }).toString();
-  const response = await get(`api/notes?${query}`, new AbortController().signal);
-  const { notes } = await read('Notes', response);
+  const { signal } = new AbortController();
+  const { notes } = await answer('Notes', signal, 'api/notes', { subject });
   const note = notes.find((each) => each.kind === kind && each.withdrawn_by === null);
-  if (note) {
-    await ask(`api/notes/${encodeURIComponent(note.id)}`, { method: 'DELETE', headers: OWN });
-  }
+  if (note) await withdrawComment(note.id);
+}
+
+/** What people said in free words: the bridge's notes of the kind `comment`. */
+
+/** The newest first, withdrawn ones too. */
+export const fetchComments = async (signal: AbortSignal): Promise<readonly Note[]> =>
+  (await answer('Notes', signal, 'api/notes', { kind: 'comment' })).notes;
+
+export async function withdrawComment(id: string): Promise<void> {
+  await ask(`api/notes/${encodeURIComponent(id)}`, { method: 'DELETE', headers: OWN });
 }

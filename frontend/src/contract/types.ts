@@ -1,14 +1,11 @@
 /** The web contract's types under short names; generated from the server's schema. */
 import type { components } from './openapi.gen';
 
-type Schemas = components['schemas'];
+export type Schemas = components['schemas'];
 
-/** As `filled.ts` makes it of what the server left out; each reading has its own age. */
+/** With what the server left out, as `frames.ts` puts it back. */
 export type TwinTagState = Required<Omit<Schemas['TwinTagState'], 'readings'>> & {
-  readonly readings: readonly (Required<Schemas['SensorReading']> & {
-    /** s since it was observed; null: not known. */
-    readonly stale_seconds: number | null;
-  })[];
+  readonly readings: readonly Required<Schemas['SensorReading']>[];
 };
 export type TagHealth = Required<Schemas['TagHealth']>;
 /** What the bridge's judge says of the house and of each tag. */

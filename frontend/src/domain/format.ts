@@ -1,8 +1,8 @@
-import type { Range } from './ramp';
+import { Refusal } from '../contract/api';
 import type { MapPoint } from '../geometry/coordinates';
 import { LOCALE, S } from '../strings';
+import type { Range } from './ramp';
 import type { Sensor } from './sensors';
-import { differenceToShown, toShown, unitOf, type TemperatureUnit } from './units';
 
 /** What stands between the whole and the tenths where the reader lives. */
 const POINT =
@@ -130,3 +130,41 @@ export function metresText(value: number): string {
 /** Why a tag that was pinned there is not on the map. */
 export const farOffText = ({ x, y }: MapPoint): string =>
   S.farOffLong(S.position(metresText(x), metresText(y)));
+
+const TIMEOUT = 504;
+
+/** Why something could not be had: what may pass soon in the reader's language, else as it was said. */
+export function failureText(error: unknown): string {
+  // A server that is busy says when to ask again. Where no answer comes at all, `fetch` throws a TypeError.
+  const isPassing =
+    error instanceof Refusal
+      ? error.retryAfterS !== null || error.status === TIMEOUT
+      : error instanceof TypeError;
+  if (isPassing) return S.serverBusy;
+  return error instanceof Error ? error.message : String(error);
+}
+
+/** What the operator reads temperatures in. Everything inside the page stays in °C. */
+export type TemperatureUnit = 'C' | 'F';
+
+const inFahrenheit = (sensor: Sensor, unit: TemperatureUnit): boolean =>
+  unit === 'F' && sensor.unit === '°C';
+
+export function unitOf(sensor: Sensor, unit: TemperatureUnit): string {
+  return inFahrenheit(sensor, unit) ? '°F' : sensor.unit;
+}
+
+/** A value as shown. */
+export function toShown(sensor: Sensor, value: number, unit: TemperatureUnit): number {
+  return inFahrenheit(sensor, unit) ? value * 1.8 + 32 : value;
+}
+
+/** A difference of two values as shown: the offset of 32 falls out. */
+export function differenceToShown(sensor: Sensor, value: number, unit: TemperatureUnit): number {
+  return inFahrenheit(sensor, unit) ? value * 1.8 : value;
+}
+
+/** The reverse of `toShown`, for numbers that the operator types. */
+export function fromShown(sensor: Sensor, value: number, unit: TemperatureUnit): number {
+  return inFahrenheit(sensor, unit) ? (value - 32) / 1.8 : value;
+}

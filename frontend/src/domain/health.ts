@@ -1,5 +1,16 @@
 /** What the bridge's verdicts come to for the page. Nothing is judged here: no rule, no range. */
 import type { HealthReason, Judgement, TagHealth, Verdict } from '../contract/types';
+import { S } from '../strings';
+import {
+  beyondLimitText,
+  durationText,
+  readingText,
+  shortAgeText,
+  type TemperatureUnit,
+  valueText,
+} from './format';
+import type { Catalogue } from './sensors';
+import { shown } from './text';
 import type { Tag } from './twin';
 
 /** From the worst to the best; of who is unknown, nobody knows that he is well. */
@@ -11,7 +22,7 @@ export const VERDICTS = [
 ] as const satisfies readonly Verdict[];
 
 /** Who was not judged, or not yet. */
-const NOT_JUDGED: TagHealth = { verdict: 'unknown', reasons: [] };
+export const NOT_JUDGED: TagHealth = { verdict: 'unknown', reasons: [] };
 
 export interface HouseHealth {
   readonly verdict: Verdict;
@@ -92,15 +103,12 @@ function weight(reason: HealthReason): number {
 }
 
 /** Why a sensor's value counts as out of its range; null: it does not. */
-export const rangeReason = (
-  health: TagHealth | undefined,
-  sensor: string,
-): (HealthReason & { readonly value: number; readonly limit: number }) | null =>
+export const rangeReason = (health: TagHealth | undefined, sensor: string): OfRange | null =>
   health?.reasons.filter(isOfRange).find((reason) => reason.sensor === sensor) ?? null;
 
-export const isOfRange = (
-  reason: HealthReason,
-): reason is HealthReason & { readonly value: number; readonly limit: number } =>
+type OfRange = HealthReason & { readonly value: number; readonly limit: number };
+
+export const isOfRange = (reason: HealthReason): reason is OfRange =>
   reason.kind === 'range' && reason.value !== null && reason.limit !== null;
 
 /** On which side of its range a value is that lies outside, or has yet to pass `release`. */
@@ -108,11 +116,8 @@ export const sideOf = ({
   value,
   limit,
   release,
-}: {
-  readonly value: number;
-  readonly limit: number;
-  readonly release?: number | null;
-}): 'below' | 'above' => (value < (release ?? limit) ? 'below' : 'above');
+}: Pick<OfRange, 'value' | 'limit' | 'release'>): 'below' | 'above' =>
+  value < (release ?? limit) ? 'below' : 'above';
 
 /** The very same as before where nothing else is said: what follows from it is kept then. */
 export function sharedJudgement(before: Judgement | null, now: Judgement): Judgement {
@@ -120,3 +125,116 @@ export function sharedJudgement(before: Judgement | null, now: Judgement): Judge
     before?.tags === now.tags && JSON.stringify(before.house) === JSON.stringify(now.house);
   return isSame ? before : now;
 }
+
+/** Why a tag or the house has its verdict, in words. */
+
+/** Of a name that some twin made up. */
+const LONGEST_NAME = 32;
+
+/**
+ * A reason as a sentence without its full stop. `age` is how long ago the observation was that
+ * says so, seconds; null: that is told elsewhere, or nobody knows. `isMarked`: a sign beside it says
+ * how bad it is.
+ */
+export function reasonText(
+  sensors: Catalogue,
+  reason: HealthReason,
+  unit: TemperatureUnit,
+  age: number | null,
+  isMarked = false,
+): string {
+  const { kind, sensor: name, value, limit } = reason;
+  const sensor = sensors.named(name);
+  const label = name === '' ? '' : shown(sensor.label, LONGEST_NAME);
+  const R = S.reasons;
+  if (isOfRange(reason)) {
+    const edge = reason.release ?? reason.limit;
+    const reading = beyondLimitText(sensor, reason.value, edge, unit);
+    const isHeld = reason.release !== undefined;
+    // "Just below 350" names the limit itself.
+    const isNear = !isHeld && reading !== readingText(sensor, reason.value, unit);
+    const limit = limitText(reason, (each) => valueText(sensor, each, unit));
+    const isRated = reason.verdict === 'critical' && !isMarked && !isHeld;
+    const rated = isRated ? ` (${S.alarmStatus.critical})` : '';
+    return `${label} ${reading}${isNear ? '' : `, ${limit}`}${rated}`;
+  }
+  switch (kind) {
+    case 'range':
+      // Without its numbers it says no more than that.
+      return R.other(S.reasons.outOfRange, label);
+    case 'reading_failed':
+      return value === null
+        ? R.readingFailed(label)
+        : R.implausible(`${label} ${readingText(sensor, value, unit)}`);
+    case 'scan_failed':
+      return R.scanFailed(S.tried[tryKind(value ?? NaN)], age === null ? null : shortAgeText(age));
+    case 'pest':
+      return R.pest(value ?? 0);
+    case 'old':
+      return R.old(
+        label,
+        age === null ? null : shortAgeText(age),
+        limit === null ? null : durationText(limit),
+        reason.since !== null,
+      );
+    case 'silent':
+      return R.silent;
+    case 'stopped':
+      return R.stopped;
+    case 'changed':
+      return R.changed(value === null ? label : `${label} ${readingText(sensor, value, unit)}`);
+    default:
+      // Of a later server.
+      return R.other(shown((kind as string).replaceAll('_', ' '), LONGEST_NAME), label);
+  }
+}
+
+/** Whether the value is back in its ideal range, and has yet to lie well within. */
+export const isBack = ({ release, verdict }: HealthReason): boolean =>
+  release !== undefined && verdict === 'stressed';
+
+/** On which side of which limit a value is, or was. */
+function limitText(reason: OfRange, text: (value: number) => string): string {
+  const { limit, release = null, verdict } = reason;
+  const side = S.reasons.sides[sideOf(reason)];
+  return release === null
+    ? `${side} ${text(limit)}`
+    : S.reasons.wasBeyond(side, text(limit), S.health[verdict].toLowerCase(), text(release));
+}
+
+/** What lies on which side of which limit, without the value: that changes. */
+export function beyondText(sensors: Catalogue, reason: OfRange, unit: TemperatureUnit): string {
+  const sensor = sensors.named(reason.sensor);
+  const limit = limitText(reason, (value) => readingText(sensor, value, unit));
+  return `${shown(sensor.label, LONGEST_NAME)} ${limit}`;
+}
+
+/**
+ * What somebody does about it; of what is well by now, what its alarm still waits for.
+ * Empty: nothing, as it is back in its range, and the reason says when that ends it.
+ */
+export function todoText(reason: HealthReason): string {
+  if (reason.verdict === 'healthy') return reason.kind === 'pest' ? S.todoPestAgain : S.todoWell;
+  const { sensors, ...kinds } = S.todo;
+  if (isBack(reason)) return '';
+  if (isOfRange(reason) && reason.sensor in sensors) {
+    return sensors[reason.sensor as keyof typeof sensors][sideOf(reason)];
+  }
+  // Of a later server, a kind may be another.
+  return (kinds as Partial<Record<string, string>>)[reason.kind] ?? kinds.other;
+}
+
+/** All reasons in one line, the worst first. */
+export const reasonsText = (
+  sensors: Catalogue,
+  reasons: readonly HealthReason[],
+  unit: TemperatureUnit,
+): string => reasons.map((reason) => reasonText(sensors, reason, unit, null)).join('; ');
+
+/** What became of a try, by the status of its observation (lupin_msgs/Observation). */
+export type TryKind = 'ok' | 'unreachable' | 'undecoded' | 'skipped' | 'failed';
+
+const KINDS: readonly TryKind[] = ['ok', 'unreachable', 'undecoded', 'skipped'];
+
+/** A status that is not known yet is a failure of some kind. */
+export const tryKind = (status: number): TryKind => KINDS[status] ?? 'failed';

@@ -1,7 +1,7 @@
 import { describe, expect, test } from 'vitest';
 
 import { VERDICTS } from './health';
-import { MARKS, svgPath } from './marks';
+import { MARKS, speciesLooks, speciesText, svgPath } from './marks';
 
 describe('marks', () => {
   test('no two verdicts have the same outline and fill', () => {
@@ -26,4 +26,29 @@ describe('marks', () => {
     expect(svgPath([line], 6)).toBe('M2 8L14 11');
     expect(svgPath([line], 6, true)).toBe('M2 8L14 11Z');
   });
+});
+
+test('each species has a look of its own, whatever the order of arrival', () => {
+  const names = ['rose', 'tulip', 'orchid', 'gerbera', 'lupin'];
+  const looks = speciesLooks(names);
+  expect(new Set([...looks.values()].map(({ colour }) => String(colour))).size).toBe(names.length);
+  expect(new Set([...looks.values()].map(({ shape }) => shape)).size).toBe(3);
+  expect(speciesLooks([...names].reverse())).toEqual(looks);
+});
+
+test('beyond the list looks repeat and nothing hangs', () => {
+  const names = Array.from({ length: 40 }, (_, i) => `species ${i}`);
+  expect(speciesLooks(names).size).toBe(40);
+});
+
+test('no name, no look', () => {
+  expect(speciesLooks(['', 'rose']).has('')).toBe(false);
+});
+
+test('a name that the page knows is in its language, in any case; another is shown as it came', () => {
+  expect(['Rose', 'Begonia', 'constructor'].map((name) => speciesText(name))).toEqual([
+    'rose',
+    'Begonia',
+    'constructor',
+  ]);
 });

@@ -43,14 +43,18 @@ export function fieldAlpha({ maxAlpha }: Sensor, range: Range, value: number): n
 /** Colours one pixel, RGBA from `at` on, by the value that it stands for and the cell it lies in. */
 export type Shade = (data: Uint8ClampedArray, at: number, value: number, cell: number) => void;
 
+export function paint(data: Uint8ClampedArray, at: number, colour: Rgb, alpha: number): void {
+  data[at] = colour[0];
+  data[at + 1] = colour[1];
+  data[at + 2] = colour[2];
+  data[at + 3] = 255 * alpha;
+}
+
 /** One colour, and the more of it the higher the value. */
 export function fieldShade(sensor: Sensor, range: Range): Shade {
-  const [red, green, blue] = sensorColour(sensor);
+  const colour = sensorColour(sensor);
   return (data, at, value) => {
-    data[at] = red;
-    data[at + 1] = green;
-    data[at + 2] = blue;
-    data[at + 3] = 255 * fieldAlpha(sensor, range, value);
+    paint(data, at, colour, fieldAlpha(sensor, range, value));
   };
 }
 

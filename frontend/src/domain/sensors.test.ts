@@ -2,6 +2,7 @@ import { describe, expect, test } from 'vitest';
 
 import { CATALOGUE, CATALOGUES, FILE, sensorNamed } from '../testing/sensors';
 import { cataloguesOf, isHad, isMeasured, NO_CATALOGUES, rangesFor } from './sensors';
+import { differenceToShown, fromShown, toShown, unitOf } from './format';
 
 test('every look comes from the file, in its order', () => {
   expect(CATALOGUE.all.map(({ name }) => name)).toEqual(Object.keys(FILE.sensors));
@@ -116,4 +117,23 @@ test.each([
 ] as const)('the largest of all limits tells its digits: %s', (_, ranges, digits) => {
   const sensors = { x: { label: 'x', unit: '', hue: 0, lightness: 50, ...ranges } };
   expect(cataloguesOf({ ...FILE, sensors }).day.named('x').digits).toBe(digits);
+});
+
+const temperature = sensorNamed('temperature');
+const humidity = sensorNamed('humidity');
+
+test('temperatures follow the operator, other units do not', () => {
+  expect(toShown(temperature, 25, 'F')).toBe(77);
+  expect(toShown(temperature, 25, 'C')).toBe(25);
+  expect(unitOf(temperature, 'F')).toBe('°F');
+  expect(toShown(humidity, 25, 'F')).toBe(25);
+  expect(unitOf(humidity, 'F')).toBe('%');
+});
+
+test('a difference has no offset', () => {
+  expect(differenceToShown(temperature, 10, 'F')).toBe(18);
+});
+
+test('what is typed comes back', () => {
+  expect(fromShown(temperature, toShown(temperature, 21.5, 'F'), 'F')).toBeCloseTo(21.5);
 });

@@ -1,82 +1,44 @@
 import { describe, expect, test } from 'vitest';
 
 import { CATALOGUE } from '../testing/sensors';
-import { seriesWith } from '../testing/series';
+import { bucketAt, seriesWith } from '../testing/series';
 import {
   chartCsv,
   lastUntil,
   type Mark,
   middleOf,
   pointAt,
+  readingAt,
   rowsOfSeries,
   type Series,
-  summaryOf,
 } from './series';
 
-const every10 = (count: number): Series['readings'] =>
-  Array.from({ length: count }, (_, index) => ({ at: index * 10, value: index }));
-
-const bucket = (start: number, n = 10, mean = 5): Series['buckets'][number] => ({
-  start,
-  n,
-  mean,
-  min: mean - 1,
-  max: mean + 1,
-});
+const every10 = Array.from({ length: 3 }, (_, index) => readingAt(index * 10, index));
 
 test('a bucket stands in its middle, and never later than the period', () => {
-  const bucketed = seriesWith({ bucketS: 10, buckets: [bucket(0)], to: 4 });
-  expect(middleOf(bucket(0), { ...bucketed, to: 100 })).toBe(5);
-  expect(middleOf(bucket(0), bucketed)).toBe(4);
-});
-
-test('a summary counts readings, and takes the least and the most of buckets', () => {
-  expect(summaryOf(seriesWith())).toEqual({
-    count: 0,
-    latest: null,
-    min: null,
-    max: null,
-    gaps: 0,
-  });
-  const failed = { at: 50, value: null };
-  expect(summaryOf(seriesWith({ readings: [...every10(5), failed] }))).toEqual({
-    count: 5,
-    latest: { at: 40, value: 4 },
-    min: 0,
-    max: 4,
-    gaps: 0,
-  });
-  const bucketed = seriesWith({ bucketS: 10, buckets: [bucket(0, 3, 5), bucket(10, 4, 6)] });
-  expect(summaryOf({ ...bucketed, gaps: [{ from: 20, to: 30 }] })).toEqual({
-    count: 7,
-    latest: { at: 10, value: 6 },
-    min: 4,
-    max: 7,
-    gaps: 1,
-  });
+  expect(middleOf(bucketAt(0, 5), seriesWith({ bucketS: 10 }))).toBe(5);
+  expect(middleOf(bucketAt(0, 5), seriesWith({ bucketS: 10, to: 4 }))).toBe(4);
 });
 
 test('at a moment there is the reading that held, or the bucket that holds it, and nothing in a gap', () => {
-  const readings = every10(3);
-  expect(pointAt(seriesWith({ readings }), 14)).toEqual({ at: 10, value: 1 });
+  expect(pointAt(seriesWith({ points: every10 }), 14)).toEqual(readingAt(10, 1));
   // Table and card say the same of that moment.
-  expect(pointAt(seriesWith({ readings }), 16)).toEqual({ at: 10, value: 1 });
-  expect(pointAt(seriesWith({ readings, gaps: [{ from: 20, to: 90 }] }), 21)).toBeNull();
+  expect(pointAt(seriesWith({ points: every10 }), 16)).toEqual(readingAt(10, 1));
+  expect(pointAt(seriesWith({ points: every10, gaps: [{ from: 20, to: 90 }] }), 21)).toBeNull();
   expect(pointAt(seriesWith(), 21)).toBeNull();
-  const bucketed = seriesWith({ bucketS: 10, buckets: [bucket(0), bucket(30)] });
-  expect(pointAt(bucketed, 39.9)).toEqual(bucket(30));
+  const bucketed = seriesWith({ bucketS: 10, points: [bucketAt(0, 5), bucketAt(30, 5)] });
+  expect(pointAt(bucketed, 39.9)).toEqual(bucketAt(30, 5));
   expect(pointAt(bucketed, 40)).toBeNull();
   expect(pointAt(bucketed, 29.9)).toBeNull();
 });
 
 test('at a moment the last that had been read counts, never a later one', () => {
-  const readings = every10(3);
-  expect(lastUntil(seriesWith({ readings }), 19.9)).toEqual({ at: 10, value: 1 });
-  expect(lastUntil(seriesWith({ readings }), 20)).toEqual({ at: 20, value: 2 });
-  expect(lastUntil(seriesWith({ readings }), Infinity)).toEqual({ at: 20, value: 2 });
-  expect(lastUntil(seriesWith({ readings }), -1)).toBeNull();
-  const buckets = [bucket(0), bucket(50)];
-  expect(lastUntil(seriesWith({ bucketS: 50, buckets }), 49)).toEqual(bucket(0));
+  expect(lastUntil(seriesWith({ points: every10 }), 19.9)).toEqual(readingAt(10, 1));
+  expect(lastUntil(seriesWith({ points: every10 }), 20)).toEqual(readingAt(20, 2));
+  expect(lastUntil(seriesWith({ points: every10 }), Infinity)).toEqual(readingAt(20, 2));
+  expect(lastUntil(seriesWith({ points: every10 }), -1)).toBeNull();
+  const points = [bucketAt(0, 5), bucketAt(50, 5)];
+  expect(lastUntil(seriesWith({ bucketS: 50, points }), 49)).toEqual(bucketAt(0, 5));
 });
 
 /** Noon, 21 November 2026, UTC. */
@@ -88,11 +50,7 @@ const series: Series = {
   from: NOON,
   to: NOON + 100,
   bucketS: null,
-  readings: [
-    { at: NOON, value: 20 },
-    { at: NOON + 10.5, value: null },
-  ],
-  buckets: [],
+  points: [readingAt(NOON, 20), readingAt(NOON + 10.5, null)],
   gaps: [{ from: NOON + 10.5, to: NOON + 100 }],
   nights: null,
   missing: [{ from: NOON + 150, to: NOON + 200, why: 'not_recorded' }],
@@ -102,8 +60,7 @@ const bucketed = (from: number): Series => ({
   from,
   to: from + 100,
   bucketS: 10,
-  readings: [],
-  buckets: [{ start: from, n: 4, mean: 21, min: 20, max: 23 }],
+  points: [{ at: from, n: 4, value: 21, min: 20, max: 23 }],
   gaps: [],
   missing: [],
 });
@@ -111,18 +68,21 @@ const failure = (at: number): Mark => ({ at, widthS: 10, kind: 'failure', count:
 
 describe('the rows of a chart', () => {
   test('are readings, gaps and marks by their time', () => {
-    expect(rowsOfSeries(series, [failure(NOON)])).toEqual([
-      { kind: 'reading', at: NOON, value: 20 },
-      { kind: 'failure', at: NOON, to: NOON + 10, count: 2 },
-      { kind: 'gap', at: NOON + 10.5, to: NOON + 100 },
-      { kind: 'reading', at: NOON + 10.5, value: null },
-      { kind: 'not_recorded', at: NOON + 150, to: NOON + 200 },
+    const rows = rowsOfSeries(series, [failure(NOON)]);
+    expect(
+      rows.map(({ kind, at, to, value, n }) => [kind, at - NOON, to && to - NOON, value, n]),
+    ).toEqual([
+      ['reading', 0, null, 20, 1],
+      ['failure', 0, 10, null, 2],
+      ['gap', 10.5, 100, null, 0],
+      ['reading', 10.5, null, null, 1],
+      ['not_recorded', 150, 200, null, null],
     ]);
   });
 
   test('are buckets with their ends', () => {
     expect(rowsOfSeries(bucketed(NOON), [])).toEqual([
-      { kind: 'bucket', at: NOON, to: NOON + 10, n: 4, mean: 21, min: 20, max: 23 },
+      { kind: 'bucket', at: NOON, to: NOON + 10, n: 4, value: 21, min: 20, max: 23 },
     ]);
   });
 

@@ -3,26 +3,22 @@
  * to show. All times are ROS seconds. Where the robot was away is a gap, and nothing bridges it.
  */
 import type { History, Timeline, WireTime } from '../contract/types';
-import { type Cell, csv } from './csv';
-import type { Span } from './period';
-import { hasDate, secondsOf } from './rostime';
+import { type Cell, csv } from './text';
+import { hasDate, secondsOf, type Span } from './time';
 import type { Catalogue } from './sensors';
+import { type TemperatureUnit, toShown, unitOf } from './format';
 import { type Missing, missingOf } from './timeline';
-import { type TemperatureUnit, toShown, unitOf } from './units';
 
-export interface Reading {
+/** A reading, or all finite readings of a bucket. */
+export interface Point {
+  /** Of the reading, or the bucket's beginning. */
   readonly at: number;
-  /** Null: the sensor gave no number. */
+  /** The mean of a bucket; null: the sensor gave no number. */
   readonly value: number | null;
-}
-
-/** All finite readings of `bucketS` seconds from `start` on. */
-export interface Bucket {
-  readonly start: number;
+  readonly min: number | null;
+  readonly max: number | null;
+  /** How many numbers it is of. */
   readonly n: number;
-  readonly mean: number;
-  readonly min: number;
-  readonly max: number;
 }
 
 /** Tries that came to nothing, or looks at the flowers, somewhere in `widthS` seconds from `at` on. */
@@ -38,9 +34,8 @@ export interface Series extends Span {
   readonly sensor: string;
   /** Width of a bucket, seconds; null: these are readings. */
   readonly bucketS: number | null;
-  /** By their time; one of the two lists is empty. */
-  readonly readings: readonly Reading[];
-  readonly buckets: readonly Bucket[];
+  /** By their time. */
+  readonly points: readonly Point[];
   readonly gaps: readonly Span[];
   /** When it was night by the clock; null: that does not tell. */
   readonly nights: readonly Span[] | null;
@@ -52,14 +47,25 @@ const spanOf = (span: { readonly from: WireTime; readonly to: WireTime }): Span 
   to: secondsOf(span.to),
 });
 
+export const readingAt = (at: number, value: number | null): Point => ({
+  ...{ at, value, min: value, max: value },
+  n: Number(value !== null),
+});
+
 /** The series that the bridge told, at `nowS` of the twin's time, ROS seconds. */
 export const seriesOf = (wire: History, nowS: number): Series => ({
   ...spanOf(wire),
   tagId: wire.tag_id,
   sensor: wire.sensor_type,
   bucketS: wire.bucket_s,
-  readings: wire.readings.map(({ stamp, value }) => ({ at: secondsOf(stamp), value })),
-  buckets: wire.buckets.map((bucket) => ({ ...bucket, start: secondsOf(bucket.start) })),
+  points: [
+    ...wire.readings.map(({ stamp, value }) => readingAt(secondsOf(stamp), value)),
+    ...wire.buckets.map(({ start, mean, ...rest }) => ({
+      ...rest,
+      at: secondsOf(start),
+      value: mean,
+    })),
+  ],
   gaps: wire.gaps.map(spanOf),
   nights: wire.nights?.map(spanOf) ?? null,
   missing: missingOf(wire, nowS),
@@ -70,8 +76,7 @@ export const laterBy = (series: Series, byS: number): Series => ({
   ...series,
   from: series.from + byS,
   to: series.to + byS,
-  readings: series.readings.map(({ at, value }) => ({ at: at + byS, value })),
-  buckets: series.buckets.map((bucket) => ({ ...bucket, start: bucket.start + byS })),
+  points: series.points.map((point) => ({ ...point, at: point.at + byS })),
   gaps: series.gaps.map(({ from, to }) => ({ from: from + byS, to: to + byS })),
   nights: null,
   missing: series.missing.map((each) => ({ ...each, from: each.from + byS, to: each.to + byS })),
@@ -88,105 +93,56 @@ export const marksOf = ({ buckets, bucket_s: widthS }: Timeline): Mark[] =>
     ),
   );
 
-/** Where a bucket stands in a picture: its middle, but never later than the series goes. */
-export const middleOf = ({ start }: Bucket, { bucketS, to }: Series): number =>
-  Math.max(start, Math.min(start + (bucketS ?? 0) / 2, to));
+/** Where a point stands in a picture: a bucket in its middle, but never later than the series goes. */
+export const middleOf = ({ at }: Point, { bucketS, to }: Series): number =>
+  bucketS === null ? at : Math.max(at, Math.min(at + bucketS / 2, to));
 
 /** What a series has at a moment: the reading that held then, or its bucket; null: a gap. */
-export function pointAt(series: Series, at: number): Reading | Bucket | null {
-  const { bucketS, gaps, buckets } = series;
+export function pointAt(series: Series, moment: number): Point | null {
+  const { bucketS, gaps, points } = series;
   if (bucketS !== null) {
-    return buckets.find(({ start }) => at >= start && at < start + bucketS) ?? null;
+    return points.find(({ at }) => moment >= at && moment < at + bucketS) ?? null;
   }
-  if (gaps.some(({ from, to }) => at > from && at < to)) return null;
-  return lastUntil(series, at);
+  if (gaps.some(({ from, to }) => moment > from && moment < to)) return null;
+  return lastUntil(series, moment);
 }
 
 /** The last reading or bucket that had begun by then: what was known at that moment. */
-export function lastUntil({ readings, buckets }: Series, at: number): Reading | Bucket | null {
-  return (
-    readings.findLast((reading) => reading.at <= at) ??
-    buckets.findLast(({ start }) => start <= at) ??
-    null
-  );
-}
+export const lastUntil = ({ points }: Series, moment: number): Point | null =>
+  points.findLast(({ at }) => at <= moment) ?? null;
 
-/** What is to be told of a series in one sentence. */
-export interface SeriesSummary {
-  readonly count: number;
-  readonly latest: { readonly at: number; readonly value: number } | null;
-  readonly min: number | null;
-  readonly max: number | null;
-  readonly gaps: number;
-}
-
-export function summaryOf(series: Series): SeriesSummary {
-  const points =
-    series.bucketS === null
-      ? series.readings.flatMap(({ at, value }) =>
-          value === null ? [] : [{ at, value, n: 1, min: value, max: value }],
-        )
-      : series.buckets.map((bucket) => ({ ...bucket, at: bucket.start, value: bucket.mean }));
-  const last = points.at(-1);
-  return {
-    count: points.reduce((sum, { n }) => sum + n, 0),
-    latest: last ? { at: last.at, value: last.value } : null,
-    min: points.reduce<number | null>((least, { min }) => Math.min(least ?? min, min), null),
-    max: points.reduce<number | null>((most, { max }) => Math.max(most ?? max, max), null),
-    gaps: series.gaps.length,
-  };
-}
-
-/** What a chart shows, as rows: for the keyboard, for screen readers, and to take away. Pure. */
+/** What a chart shows, as rows: for the keyboard, for screen readers, and to take away. */
 
 /** Times are ROS seconds, values in the sensor's own unit. */
-export type SeriesRow =
-  | { readonly kind: 'reading'; readonly at: number; readonly value: number | null }
-  | {
-      readonly kind: 'bucket';
-      readonly at: number;
-      readonly to: number;
-      readonly n: number;
-      readonly mean: number;
-      readonly min: number;
-      readonly max: number;
-    }
-  | {
-      readonly kind: 'gap' | 'not_kept' | 'not_recorded';
-      readonly at: number;
-      readonly to: number;
-    }
-  | {
-      readonly kind: 'failure' | 'look';
-      readonly at: number;
-      readonly to: number;
-      readonly count: number;
-    };
+export interface SeriesRow extends Omit<Point, 'n'> {
+  readonly kind: 'reading' | 'bucket' | 'gap' | Missing['why'] | Mark['kind'];
+  /** When it ended; a reading has no end. */
+  readonly to: number | null;
+  /** How often; null: nobody knows. */
+  readonly n: number | null;
+}
 
 /** By their time; what begins at one moment: what is missing, gap, values, marks. */
 export function rowsOfSeries(series: Series, marks: readonly Mark[]): SeriesRow[] {
-  const width = series.bucketS ?? 0;
+  const { bucketS } = series;
+  const event = (kind: SeriesRow['kind'], { from, to }: Span, n: number | null): SeriesRow => ({
+    ...{ kind, at: from, to, n },
+    ...{ value: null, min: null, max: null },
+  });
   const rows: SeriesRow[] = [
-    ...series.missing.map(({ from, to, why }) => ({ kind: why, at: from, to })),
-    ...series.gaps.map(({ from, to }) => ({ kind: 'gap' as const, at: from, to })),
-    ...series.readings.map((reading) => ({ kind: 'reading' as const, ...reading })),
-    ...series.buckets.map(({ start, ...bucket }) => ({
-      kind: 'bucket' as const,
-      at: start,
-      to: start + width,
-      ...bucket,
-    })),
+    ...series.missing.map((span) => event(span.why, span, null)),
+    ...series.gaps.map((span) => event('gap', span, 0)),
+    ...series.points.map((point): SeriesRow =>
+      bucketS === null
+        ? { ...point, kind: 'reading', to: null, n: 1, min: null, max: null }
+        : { ...point, kind: 'bucket', to: point.at + bucketS },
+    ),
     ...marks
       .filter(({ at, widthS }) => at + widthS >= series.from && at < series.to)
-      .map(({ kind, at, widthS, count }) => ({ kind, at, to: at + widthS, count })),
+      .map(({ kind, at, widthS, count }) => event(kind, { from: at, to: at + widthS }, count)),
   ];
   // The sort is stable: what is first above stays first.
   return rows.sort((a, b) => a.at - b.at);
-}
-
-export interface Charted {
-  readonly series: Series;
-  readonly marks: readonly Mark[];
 }
 
 const HEADER = [
@@ -197,37 +153,20 @@ const HEADER = [
 /** The rows of all that is charted. A simulated clock has no dates: `time_iso` is empty then. */
 export function chartCsv(
   sensors: Catalogue,
-  charted: readonly Charted[],
+  charted: readonly { readonly series: Series; readonly marks: readonly Mark[] }[],
   unit: TemperatureUnit,
 ): string {
   const rows = charted.flatMap(({ series, marks }) => {
     const sensor = sensors.named(series.sensor);
     const shown = (value: number | null): Cell =>
       value === null ? null : Number(toShown(sensor, value, unit).toPrecision(12));
-    return rowsOfSeries(series, marks).map((row): Cell[] => [
-      hasDate(row.at) ? new Date(row.at * 1000).toISOString() : null,
-      Number(row.at.toFixed(6)),
-      row.kind === 'reading' ? null : Number(row.to.toFixed(6)),
-      ...[series.tagId, series.sensor, unitOf(sensor, unit), row.kind],
-      ...valuesOf(row, shown),
+    return rowsOfSeries(series, marks).map(({ kind, at, to, n, value, min, max }): Cell[] => [
+      hasDate(at) ? new Date(at * 1000).toISOString() : null,
+      Number(at.toFixed(6)),
+      to && Number(to.toFixed(6)),
+      ...[series.tagId, series.sensor, unitOf(sensor, unit), kind, n],
+      ...[shown(value), shown(min), shown(max)],
     ]);
   });
   return csv([HEADER, ...rows]);
-}
-
-function valuesOf(row: SeriesRow, shown: (value: number | null) => Cell): Cell[] {
-  switch (row.kind) {
-    case 'reading':
-      return [1, shown(row.value), null, null];
-    case 'bucket':
-      return [row.n, shown(row.mean), shown(row.min), shown(row.max)];
-    case 'gap':
-      return [0, null, null, null];
-    case 'not_kept':
-    case 'not_recorded':
-      return [null, null, null, null];
-    case 'failure':
-    case 'look':
-      return [row.count, null, null, null];
-  }
 }

@@ -1,8 +1,8 @@
 /** How sure an estimate is of its cells, and how unsure nobody would call it known. Pure. */
-import type { Estimate } from '../contract/estimate';
+import type { Estimate } from '../contract/api';
 import type { Field, Sureness } from '../contract/types';
 import type { Placement } from '../geometry/image';
-import { fraction, type Range, rangeOf, type Rgb, rgbText, type Shade } from './ramp';
+import { fraction, paint, type Range, rangeOf, type Rgb, rgbText, type Shade } from './ramp';
 
 /** Nine of ten values of a normal distribution lie within so many standard deviations. */
 export const NINE_OF_TEN = 1.645;
@@ -54,11 +54,7 @@ export const errorColours = (): string[] =>
 export const errorShade =
   (range: Range): Shade =>
   (data, at, value) => {
-    const [red, green, blue] = ERROR;
-    data[at] = red;
-    data[at + 1] = green;
-    data[at + 2] = blue;
-    data[at + 3] = 255 * errorAlpha(fraction(range, value));
+    paint(data, at, ERROR, errorAlpha(fraction(range, value)));
   };
 
 /** A field of an estimate as it came: what is too unsure is not known. Pure. */
@@ -69,17 +65,11 @@ export function estimatedField(sensor: string, estimate: Estimate): Field {
     stepOf(sd[cell] ?? NaN, sdKnown) < NOT_KNOWN_STEP ? value : NaN,
   );
   const known = rangeOf(values);
-  const { width, height, originX, originY, resolution, sampleCount } = grid;
   return {
+    ...grid,
     sensor,
-    width,
-    height,
-    originX,
-    originY,
-    resolution,
     valueMin: known?.low ?? 0,
     valueMax: known?.high ?? 0,
-    sampleCount,
     values,
     sureness: { sd, sdKnown, readingCount },
   };

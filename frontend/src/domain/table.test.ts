@@ -19,7 +19,7 @@ const tags = [
     tag_id: '9',
     // Its flowers were looked at since: that makes no reading younger.
     stale_seconds: 1,
-    readings: readings({ humidity: 60 }).map((each) => ({ ...each, stale_seconds: 80 })),
+    readings: readings({ humidity: 60 }, 25),
   }),
   tag({
     tag_id: '1',

@@ -1,16 +1,14 @@
 /** Rows of the table: what is in a column, how it sorts, what a filter finds. */
 import type { TagHealth, Verdict, WireTime } from '../contract/types';
 import { S } from '../strings';
-import { ageSeconds } from './age';
-import { csv, type Cell } from './csv';
-import { severity, type HouseHealth } from './health';
+import { ageSeconds } from './time';
+import { type Cell, csv, finder } from './text';
+import { type HouseHealth, reasonsText, severity, tryKind } from './health';
 import { memoLast, memoOne } from './memo';
-import { speciesText } from './species';
-import { reasonsText, tryKind } from './reasons';
+import { speciesText } from './marks';
 import type { Catalogue, Sensor } from './sensors';
-import { finder } from './text';
+import { type TemperatureUnit, toShown, unitOf } from './format';
 import { compareIds, type Tag } from './twin';
-import { toShown, unitOf, type TemperatureUnit } from './units';
 
 export interface Row {
   readonly tag: Tag;
@@ -75,7 +73,7 @@ export function sortKey({ tag, health }: Row, column: string): Key {
     case 'species':
       return tag.species || null;
     case 'flowers':
-      return tag.observedAt === null ? null : tag.flowerCount;
+      return tag.isObserved ? tag.flowerCount : null;
     case 'age':
       // The age itself grows with the clock; its order does not.
       return typeof tag.scannedAt === 'number' ? -tag.scannedAt : null;

@@ -1,7 +1,7 @@
 /** What happened when, and how far back anything is remembered. Times are ROS seconds. */
-import type { Timeline as WireTimeline, WireTime } from '../contract/types';
-import type { Span } from './period';
-import { secondsOf } from './rostime';
+import type { WireTime, Timeline as WireTimeline } from '../contract/types';
+import { LOCALE } from '../strings';
+import { dayFormat, secondsOf, type Span } from './time';
 
 /** What happened in one bucket. */
 export interface Happened {
@@ -81,4 +81,103 @@ export function missingOf(told: Told, nowS: number): readonly Missing[] {
     missing.push({ from: Math.max(from, complete), to, why: 'not_recorded' });
   }
   return missing.filter((stretch) => stretch.to > stretch.from);
+}
+
+/** Where a time axis is marked, and with what: round times of the operator's clock. Pure. */
+
+export interface Tick {
+  /** ROS seconds. */
+  readonly at: number;
+  /** The time, and below it the date where it is the first or another than before. */
+  readonly text: string;
+}
+
+const MINUTE = 60;
+const HOUR = 3_600;
+const DAY = 86_400;
+const STEPS = [
+  ...[1, 2, 5, 10, 15, 30],
+  ...[1, 2, 5, 10, 15, 30].map((minutes) => minutes * MINUTE),
+  ...[1, 2, 3, 6, 12].map((hours) => hours * HOUR),
+  ...[1, 2, 7, 14].map((days) => days * DAY),
+  ...[1, 2, 3, 6, 12].map((months) => months * 30 * DAY),
+];
+const LONGEST = 365 * DAY;
+
+/** The shortest round step, in seconds, of which at most `most` fit into the span. */
+export function tickStep({ from, to }: Span, most: number): number {
+  const fit = STEPS.find((step) => (to - from) / step <= Math.max(1, most));
+  return fit ?? Math.ceil((to - from) / Math.max(1, most) / LONGEST) * LONGEST;
+}
+
+/**
+ * At most about `most` ticks. A simulated clock counts from its own beginning and has no dates.
+ */
+export function timeTicks(span: Span, most: number, isSimulated: boolean): readonly Tick[] {
+  const step = tickStep(span, most);
+  const times = isSimulated ? evenTimes(span, step) : clockTimes(span, step);
+  let before = '';
+  return times.map((at) => {
+    if (isSimulated) return { at, text: countText(at, step) };
+    const date = new Date(at * 1000);
+    const below = step < DAY ? dayFormat.format(date) : String(date.getFullYear());
+    const text = step < DAY ? clockText(date, step) : dateText(date, step);
+    const isNew = below !== before;
+    before = below;
+    return { at, text: isNew ? `${text}\n${below}` : text };
+  });
+}
+
+function evenTimes({ from, to }: Span, step: number): number[] {
+  const times: number[] = [];
+  for (let at = Math.ceil(from / step) * step; at <= to; at += step) times.push(at);
+  return times;
+}
+
+/** Times of the operator's own clock, which may lie an hour more or less apart twice a year. */
+function clockTimes({ from, to }: Span, step: number): number[] {
+  const times: number[] = [];
+  const day = new Date(from * 1000);
+  day.setHours(0, 0, 0, 0);
+  if (step >= 30 * DAY) day.setMonth(0, 1);
+  // Weeks begin on Mondays, and other numbers of days always on the same.
+  else if (step >= DAY) day.setDate(day.getDate() - (daysOf(day) % Math.round(step / DAY)));
+  while (day.getTime() / 1000 <= to) {
+    const begin = day.getTime() / 1000;
+    if (step >= 30 * DAY) day.setMonth(day.getMonth() + Math.round(step / (30 * DAY)));
+    else day.setDate(day.getDate() + Math.max(1, Math.round(step / DAY)));
+    // Where summer begins at midnight, that day begins at one, and the next does not.
+    day.setHours(0, 0, 0, 0);
+    if (step >= DAY) {
+      if (begin >= from) times.push(begin);
+      continue;
+    }
+    const end = Math.min(day.getTime() / 1000, to + 1e-6);
+    const first = begin + Math.max(0, Math.ceil((from - begin) / step)) * step;
+    for (let at = first; at < end; at += step) times.push(at);
+  }
+  return times;
+}
+
+/** Whole days since a Monday long ago, by the calendar. */
+const daysOf = (day: Date): number =>
+  Math.round(Date.UTC(day.getFullYear(), day.getMonth(), day.getDate()) / 1000 / DAY) + 3;
+
+const monthFormat = new Intl.DateTimeFormat(LOCALE, { month: 'short' });
+
+const two = (value: number): string => String(value).padStart(2, '0');
+
+function clockText(date: Date, step: number): string {
+  const text = `${two(date.getHours())}:${two(date.getMinutes())}`;
+  return step < MINUTE ? `${text}:${two(date.getSeconds())}` : text;
+}
+
+const dateText = (date: Date, step: number): string =>
+  (step >= 30 * DAY ? monthFormat : dayFormat).format(date);
+
+/** Hours, minutes and seconds since the simulation began. */
+function countText(at: number, step: number): string {
+  const seconds = Math.round(at);
+  const text = `${Math.floor(seconds / HOUR)}:${two(Math.floor(seconds / MINUTE) % 60)}`;
+  return step < MINUTE ? `${text}:${two(seconds % 60)}` : text;
 }

@@ -1,8 +1,10 @@
 import { describe, expect, test } from 'vitest';
 
+import cases from '../../../tests/twin/core/far_off.json';
 import type { Latest, TwinTagState } from '../contract/types';
+import { mapPoint } from '../geometry/coordinates';
 import { readings, stateFrame, tag, wireTag } from '../testing/tags';
-import { compareIds, snapshotOf, tagOf } from './twin';
+import { compareIds, holds, reachOf, snapshotOf, tagOf } from './twin';
 
 const pose = (x: number | null, w: number | null): ReturnType<typeof wireTag>['pose'] => ({
   position: { x, y: 2, z: 0 },
@@ -72,13 +74,6 @@ describe('snapshot', () => {
     expect(news.takenAt).toBe(9500);
   });
 
-  test('a tag’s age is its age on the wire plus the time since the frame', () => {
-    const made = snapshotOf(stateFrame([wireTag({ stale_seconds: 4 })]), 10_000, null);
-    expect(made.tags[0]?.observedAt).toBe(6_000);
-    const never = snapshotOf(stateFrame([wireTag({ stale_seconds: null })]), 10_000, null);
-    expect(never.tags[0]?.observedAt).toBeNull();
-  });
-
   test('an unchanged tag is the same object, whatever its age; a changed one is not', () => {
     const first = snapshotOf(stateFrame([wireTag({ stale_seconds: 1 })], { sec: 1 }), 1_000, null);
     const later = stateFrame([wireTag({ stale_seconds: 2.1 })], { sec: 2 });
@@ -88,9 +83,10 @@ describe('snapshot', () => {
   });
 
   test('in simulation at ten times the speed ages follow the twin’s clock', () => {
-    const first = snapshotOf(stateFrame([wireTag({ stale_seconds: 1 })], { sec: 1 }), 1_000, null);
-    const later = stateFrame([wireTag({ stale_seconds: 11 })], { sec: 11 });
-    expect(snapshotOf(later, 2_000, first).tags[0]?.observedAt).toBe(-9_000);
+    const tags = [wireTag({ readings: readings({ co2: 1 }, 0) })];
+    const first = snapshotOf(stateFrame(tags, { sec: 1 }), 1_000, null);
+    expect(first.tags[0]?.scannedAt).toBe(0);
+    expect(snapshotOf(stateFrame(tags, { sec: 11 }), 2_000, first).tags[0]?.scannedAt).toBe(-9_000);
   });
 
   test('names the tags that were observed since the last one', () => {
@@ -127,18 +123,11 @@ describe('snapshot', () => {
 
 describe('times of their own', () => {
   const at = { sec: 5_000, nanosec: 0 };
-  const reading = (name: string, stale: number | null): TwinTagState['readings'][number] => ({
-    name,
-    value: 1,
-    observed_at: null,
-    stale_seconds: stale,
-  });
+  const unknown = { name: 'a', value: 1, observed_at: null };
 
   test('each reading has its own, and the newest is that of the scan', () => {
-    const { readAt, scannedAt } = tagOf(
-      wireTag({ stale_seconds: 1, readings: [reading('a', 60), reading('b', 30)] }),
-      { at, takenAt: 100_000 },
-    );
+    const both = [...readings({ a: 1 }, 4_940), ...readings({ b: 1 }, 4_970)];
+    const { readAt, scannedAt } = tagOf(wireTag({ readings: both }), { at, takenAt: 100_000 });
     expect([...readAt]).toEqual([
       ['a', 40_000],
       ['b', 70_000],
@@ -147,11 +136,15 @@ describe('times of their own', () => {
   });
 
   test('what the twin does not tell is not known, and never young', () => {
-    const scanned = (...list: TwinTagState['readings']): unknown =>
-      tagOf(wireTag({ readings: list }), { at, takenAt: 0 }).scannedAt;
-    expect(scanned(reading('a', null))).toBe('unknown');
-    expect(scanned(reading('a', null), reading('b', 3))).toBe(-3_000);
-    expect(scanned()).toBe('never');
+    const scanned = (list: TwinTagState['readings'], age: number | null = 1): unknown =>
+      tagOf(wireTag({ readings: list, stale_seconds: age }), { at, takenAt: 0 }).scannedAt;
+    expect(scanned([unknown])).toBe('unknown');
+    expect(scanned([unknown, ...readings({ b: 1 }, 4_997)])).toBe(-3_000);
+    expect(scanned([])).toBe('never');
+    // Of a clock that does not run no age is known.
+    expect(scanned(readings({ b: 1 }, 4_997), null)).toBe('unknown');
+    // One that went back makes no negative age.
+    expect(scanned(readings({ b: 1 }, 6_000))).toBe(0);
   });
 
   test('a look and a try by the state’s time; of a success no more is told', () => {
@@ -171,16 +164,17 @@ describe('times of their own', () => {
   });
 
   test('a tag of which nothing but its ages went on is the very same', () => {
-    const house = (stale: number, own: number | null, sec: number): Latest =>
-      stateFrame([wireTag({ stale_seconds: stale, readings: [reading('a', own)] })], { sec });
-    const first = snapshotOf(house(5, 65, 1_000), 0, null);
-    const later = snapshotOf(house(15, 75, 1_010), 10_000, first);
+    const house = (own: TwinTagState['readings'], sec: number): Latest =>
+      stateFrame([wireTag({ stale_seconds: sec - 900, readings: own })], { sec });
+    const own = readings({ a: 1 }, 935);
+    const first = snapshotOf(house(own, 1_000), 0, null);
+    const later = snapshotOf(house(structuredClone(own), 1_010), 10_000, first);
     expect(later.tags[0]).toBe(first.tags[0]);
     // A light scan, of which the value is the same by chance.
-    const again = snapshotOf(house(25, 0, 1_020), 20_000, later);
+    const again = snapshotOf(house(readings({ a: 1 }, 1_020), 1_020), 20_000, later);
     expect(again.tags[0]?.readAt.get('a')).toBe(20_000);
     // A twin that ceases to tell.
-    const silent = snapshotOf(house(35, null, 1_030), 30_000, again);
+    const silent = snapshotOf(house([unknown], 1_030), 30_000, again);
     expect(silent.tags[0]?.scannedAt).toBe('unknown');
   });
 });
@@ -206,5 +200,14 @@ describe('a tag that is far off', () => {
     const more = [...wire, at('5', 5001), at('6', 5002)];
     const next = snapshotOf(stateFrame(more, { sec: 6 }), 2000, first);
     expect(next.tags.map((tag) => tag.at?.x)).toEqual([0, 1, 2, 5001, 5002, 5000]);
+  });
+});
+
+describe('the cases that the twin knows too', () => {
+  test.each(Object.entries(cases))('%s', (_, { at, far }) => {
+    const places = at.map(([x, y]) => mapPoint(x ?? NaN, y ?? NaN));
+    const reach = reachOf(places);
+    const found = places.flatMap((place, index) => (holds(reach, place) ? [] : [index]));
+    expect(found).toEqual(far);
   });
 });

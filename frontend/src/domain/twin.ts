@@ -1,7 +1,6 @@
 import type { Latest, TwinTagState, WirePoint, WireTime } from '../contract/types';
 import { mapPoint, type MapPoint } from '../geometry/coordinates';
-import type { When } from './age';
-import { holds, reachOf, type Reach } from './farOff';
+import type { When } from './time';
 
 export interface Bloom {
   readonly at: MapPoint;
@@ -35,8 +34,8 @@ export interface Tag {
   readonly lookedAt: When;
   /** The last scan or look, if it brought nothing. */
   readonly failedTry: FailedTry | null;
-  /** When it was last observed in any way, ms on the browser's monotonic clock; null: never. */
-  readonly observedAt: number | null;
+  /** Whether it was ever observed in any way, and how long ago is known. */
+  readonly isObserved: boolean;
   /** ROS time of the last observation, as a key to compare; "0.0" when there was none. */
   readonly observation: string;
   readonly species: string;
@@ -78,10 +77,6 @@ function pointOf(point: WirePoint): MapPoint | null {
   return point.x === null || point.y === null ? null : mapPoint(point.x, point.y);
 }
 
-function presentPoints(points: readonly WirePoint[]): MapPoint[] {
-  return points.map(pointOf).filter((point) => point !== null);
-}
-
 /** The state that a tag is read from. */
 export interface TakenState {
   /** Its ROS time. */
@@ -90,7 +85,10 @@ export interface TakenState {
   readonly takenAt: number;
 }
 
-/** A ROS time on the monotonic clock. A state without a time of its own (0) dates nothing. */
+/**
+ * A ROS time on the monotonic clock: a difference to the wall clock would be wrong in simulation, and
+ * on a tablet that is off. A state without a time of its own (0) dates nothing.
+ */
 export function whenOf(time: WireTime, { at, takenAt }: TakenState): When {
   if (at.sec === 0 && at.nanosec === 0) return 'unknown';
   const age = at.sec - time.sec + (at.nanosec - time.nanosec) / 1e9;
@@ -102,10 +100,9 @@ const SURE = 0.5;
 
 /** Reads a tag of a state. */
 export function tagOf(wire: TwinTagState, state: TakenState): Tag {
-  const { takenAt } = state;
   const { position, orientation } = wire.pose;
   const readAt = new Map(
-    wire.readings.map((reading): [string, When] => [reading.name, readingAt(reading, takenAt)]),
+    wire.readings.map((reading): [string, When] => [reading.name, readAtOf(wire, reading, state)]),
   );
   const { looked_at: looked, last_try: tried, last_try_status: status } = wire;
   return {
@@ -122,7 +119,7 @@ export function tagOf(wire: TwinTagState, state: TakenState): Tag {
       tried === null || status === null || status === 0
         ? null
         : { at: whenOf(tried, state), status, detail: wire.last_try_detail },
-    observedAt: observedAt(wire, takenAt),
+    isObserved: wire.stale_seconds !== null,
     observation: timeKey(wire.last_observed),
     species: wire.species,
     speciesConfidence: wire.species_confidence,
@@ -134,23 +131,17 @@ export function tagOf(wire: TwinTagState, state: TakenState): Tag {
       const at = pointOf(flower.position);
       return at ? [{ at, species: flower.species, anomaly: flower.anomaly }] : [];
     }),
-    footprint: presentPoints(wire.box_footprint.points),
+    footprint: wire.box_footprint.points.flatMap((point) => pointOf(point) ?? []),
     wire,
   };
 }
 
-/**
- * A tag's age on the wire plus the time since the frame, kept as a moment on one monotonic clock.
- * A difference to the wall clock would be wrong in simulation, and on a tablet that is off.
- */
-function observedAt({ stale_seconds: stale }: TwinTagState, takenAt: number): number | null {
-  return stale === null ? null : takenAt - stale * 1000;
-}
-
-const readingAt = (
-  { stale_seconds: stale }: TwinTagState['readings'][number],
-  takenAt: number,
-): When => (stale === null ? 'unknown' : takenAt - stale * 1000);
+/** A tag without an age has no reading of a known one. */
+const readAtOf = (
+  { stale_seconds: age }: TwinTagState,
+  { observed_at: at }: TwinTagState['readings'][number],
+  state: TakenState,
+): When => (age === null || at == null ? 'unknown' : whenOf(at, state));
 
 /** The latest of some times; "unknown" where there are only such, "never" without any. */
 function newest(times: Iterable<When>): When {
@@ -170,22 +161,17 @@ const JITTER_MS = 1_500;
  * the twin's clock runs at another speed (simulation), its ages still win.
  */
 function sharedTag(before: Tag | undefined, wire: TwinTagState, state: TakenState): Tag {
-  if (before && equal(wire, before.wire)) {
-    const { takenAt } = state;
-    const isSame = (known: When | null, now: When | null): boolean =>
-      typeof known === 'number' && typeof now === 'number'
-        ? Math.abs(now - known) < JITTER_MS
-        : known === now;
-    if (
-      isSame(before.observedAt, observedAt(wire, takenAt)) &&
-      wire.readings.every((reading) =>
-        isSame(before.readAt.get(reading.name) ?? null, readingAt(reading, takenAt)),
-      )
-    ) {
-      return before;
-    }
-  }
-  return tagOf(wire, state);
+  const isSame = (name: string, now: When): boolean => {
+    const known = before?.readAt.get(name);
+    return typeof known === 'number' && typeof now === 'number'
+      ? Math.abs(now - known) < JITTER_MS
+      : known === now;
+  };
+  const isShared =
+    before &&
+    equal(wire, before.wire) &&
+    wire.readings.every((reading) => isSame(reading.name, readAtOf(wire, reading, state)));
+  return isShared ? before : tagOf(wire, state);
 }
 
 /** Deep equality of plain JSON values, but for ages. */
@@ -264,7 +250,7 @@ function inOrder(
 
 function freshTags(before: ReadonlyMap<string, Tag>, now: readonly Tag[]): string[] {
   return now
-    .filter((tag) => tag.observedAt !== null && before.get(tag.id)?.observation !== tag.observation)
+    .filter((tag) => tag.isObserved && before.get(tag.id)?.observation !== tag.observation)
     .map((tag) => tag.id);
 }
 
@@ -273,4 +259,49 @@ const collator = new Intl.Collator('en', { numeric: true });
 /** Order of tag ids: numbers by value ("9" before "10"), then letters. */
 export function compareIds(a: string, b: string): number {
   return collator.compare(a, b) || (a < b ? -1 : a > b ? 1 : 0);
+}
+
+/**
+ * Which tags lie so far from the others that they are on no map: `lupin_twin/core/outlying.py`, which says
+ * why, has the same rule. Both are held to the cases of `tests/twin/core/far_off.json`.
+ */
+
+/** A circle about the middle of the tags, metres; what is outside is far off. */
+export interface Reach {
+  readonly x: number;
+  readonly y: number;
+  readonly radius: number;
+}
+
+const FARTHEST_M = 1e6;
+const ALWAYS_NEAR_M = 200;
+const SPREADS = 10;
+const ONE_IN = 3;
+
+const EVERYWHERE: Reach = { x: 0, y: 0, radius: Infinity };
+
+/** Whether a point could be on any map. */
+export const isPossible = ({ x, y }: Readonly<{ x: number; y: number }>): boolean =>
+  Math.abs(x) <= FARTHEST_M && Math.abs(y) <= FARTHEST_M;
+
+/** Whether a point is on the map. */
+export const holds = (reach: Reach, point: MapPoint): boolean =>
+  isPossible(point) && Math.hypot(point.x - reach.x, point.y - reach.y) <= reach.radius;
+
+/** The circle of tags at these places. */
+export function reachOf(places: readonly MapPoint[]): Reach {
+  const possible = places.filter(isPossible);
+  const x = medianLow(possible.map((place) => place.x));
+  const y = medianLow(possible.map((place) => place.y));
+  const distances = possible.map((place) => Math.hypot(place.x - x, place.y - y));
+  const radius = Math.max(ALWAYS_NEAR_M, SPREADS * medianLow(distances));
+  const far = distances.filter((distance) => distance > radius).length;
+  if (possible.length === 0 || far > Math.floor(possible.length / ONE_IN)) return EVERYWHERE;
+  return { x, y, radius };
+}
+
+/** The middle value; of an even count the lower of the two, 0 of none. */
+function medianLow(values: readonly number[]): number {
+  const sorted = Float64Array.from(values).sort();
+  return sorted[(sorted.length - 1) >> 1] ?? 0;
 }

@@ -1,6 +1,6 @@
 import { describe, expect, test } from 'vitest';
 
-import { GROWING } from '../domain/age';
+import { GROWING } from '../domain/time';
 import { houseHealth } from '../domain/health';
 import { judgement, NOBODY } from '../testing/health';
 import { readings, tag } from '../testing/tags';
@@ -120,18 +120,16 @@ describe('pins', () => {
   });
 
   test('by the reading of the sensor in view, not by a later look at the flowers', () => {
-    const old = { name: 'temperature', value: 20, observed_at: null, stale_seconds: 3_600 };
-    const fresh = { ...old, name: 'humidity', stale_seconds: 1 };
-    const [pin] = scene([tag({ stale_seconds: 1, readings: [old, fresh] })]).pins;
+    const old = readings({ temperature: 20 }, -3_495);
+    const [pin] = scene([tag({ readings: [...old, ...readings({ humidity: 20 }, 104)] })]).pins;
     expect(pin?.strength).toBeLessThan(0.5);
-    const unknown = { ...old, stale_seconds: null };
-    expect(scene([tag({ readings: [unknown] })]).pins[0]?.strength).toBeLessThan(0.5);
+    const unknown = old.map((each) => ({ ...each, observed_at: null }));
+    expect(scene([tag({ readings: unknown })]).pins[0]?.strength).toBeLessThan(0.5);
   });
 
   test('what is computed is as old as the oldest that it is computed of', () => {
-    const old = { name: 'temperature', value: 20, observed_at: null, stale_seconds: 3_600 };
-    const fresh = { ...old, name: 'humidity', value: 50, stale_seconds: 1 };
-    const tags = [tag({ stale_seconds: 1, readings: [old, fresh] })];
+    const old = readings({ temperature: 20 }, -3_495);
+    const tags = [tag({ readings: [...old, ...readings({ humidity: 50 }, 104)] })];
     expect(scene(tags, 0, null, NOBODY, null, 'vpd').pins[0]?.strength).toBeLessThan(0.5);
   });
 

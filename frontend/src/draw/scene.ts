@@ -1,14 +1,13 @@
 /** What to draw, from the data: one list each of pins, blooms and boxes. Pure. */
 import type { Verdict } from '../contract/types';
-import { ageSeconds, freshness, type Ageing } from '../domain/age';
-import { readingText } from '../domain/format';
+import { ageSeconds, freshness, type Ageing } from '../domain/time';
+import { readingText, type TemperatureUnit } from '../domain/format';
 import { isBad, type HouseHealth } from '../domain/health';
 import { memoLast, memoOne } from '../domain/memo';
 import { partsOf, type Sensor } from '../domain/sensors';
-import { speciesLooks, UNKNOWN_SPECIES, type BloomLook } from '../domain/species';
+import { speciesLooks, UNKNOWN_SPECIES, type BloomLook } from '../domain/marks';
 import { shown } from '../domain/text';
 import { equal, type Tag } from '../domain/twin';
-import type { TemperatureUnit } from '../domain/units';
 import { boundsOf, type MapPoint } from '../geometry/coordinates';
 
 /** Steps of fading; more cannot be told apart. */

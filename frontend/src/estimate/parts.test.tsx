@@ -1,31 +1,40 @@
 import { act as flush, render, screen, waitFor } from '@testing-library/react';
 import { beforeEach, describe, expect, test, vi } from 'vitest';
 
-import type { Expected, Field, Grade, Place } from '../contract/types';
+import type { Expected, Field, Grade, Place, TwinTagState } from '../contract/types';
+import { houseHealth } from '../domain/health';
+import { snapshotOf } from '../domain/twin';
 import { mapPoint } from '../geometry/coordinates';
-import { pointedAt } from '../map/pointer';
+import { pointedAt } from '../map/commands';
 import { act, moveViewport, prefer, receive, store } from '../store/app';
 import { selectTag } from '../store/moment';
 import { bodies, estimated, expectedReading, grade } from '../testing/estimate';
 import { judgement, reason } from '../testing/health';
-import { goLive, showField, showTags } from '../testing/page';
-import { readings, wireTag } from '../testing/tags';
+import { goLive, nextStamp, showField, showTags } from '../testing/page';
+import { CATALOGUES } from '../testing/sensors';
+import { readings, stateFrame, wireTag } from '../testing/tags';
 import { Legend } from '../ui/Legend';
 import { Readout } from '../ui/Readout';
-import { CardEstimate } from './CardEstimate';
-import { AdviceMarks } from './AdviceMarks';
-import { EstimateFacts } from './EstimateFacts';
+import {
+  AdviceMarks,
+  CardEstimate,
+  errorText,
+  EstimateFacts,
+  estimateText,
+  NEAR_M,
+  nearTo,
+} from './parts';
 
 let grades: Readonly<Record<string, Grade>>;
 let expected: Readonly<Record<string, Expected>>;
 let places: readonly Place[] | null;
 
 const NBSP = '\u00a0';
-const tags = [
+const tags = (): TwinTagState[] => [
   wireTag({
     tag_id: '7',
     pose: { position: { x: 1, y: 0, z: 0 }, orientation: { x: 0, y: 0, z: 0, w: 1 } },
-    readings: readings({ temperature: 22 }).map((each) => ({ ...each, stale_seconds: 720 })),
+    readings: readings({ temperature: 22 }, nextStamp() - 720),
   }),
 ];
 
@@ -43,7 +52,7 @@ beforeEach(() => {
         : Response.json({ detail: 'no such service' }, { status: 503 }),
     );
   });
-  showTags(tags);
+  showTags(tags());
   goLive();
   act({ type: 'heat', heat: 'estimate' });
 });
@@ -188,7 +197,7 @@ describe('card', () => {
 
   test('says what the estimate leaves out, of every sensor', async () => {
     const changed = reason({ kind: 'changed', sensor: 'humidity', verdict: 'stressed' });
-    showTags(tags, judgement({ '7': [changed] }));
+    showTags(tags(), judgement({ '7': [changed] }));
     expected = { '7': expectedReading({ expected: 19, left_out: true }) };
     card();
     await screen.findByText('Temperature: possible sensor fault, not used in the estimate');
@@ -241,4 +250,56 @@ describe('where another tag would help', () => {
     render(<AdviceMarks />);
     await screen.findByText('No suggestion for another tag: no such service');
   });
+});
+
+const tag = (id: string, x: number, over = {}): ReturnType<typeof wireTag> =>
+  wireTag({
+    tag_id: id,
+    pose: { position: { x, y: 0, z: 0 }, orientation: { x: 0, y: 0, z: 0, w: 1 } },
+    readings: readings({ temperature: 20 }),
+    ...over,
+  });
+
+test('counts the tags within reach that read the sensor and are not left out', () => {
+  const wire = [
+    tag('at the limit', NEAR_M),
+    tag('past it', NEAR_M + 0.01),
+    tag('reads another', 1, { readings: readings({ co2: 400 }) }),
+    tag('failed', 1, { readings: readings({ temperature: null }) }),
+    tag('changed', 1),
+    tag('changed in another', 1),
+  ];
+  const { tags } = snapshotOf(stateFrame(wire), 0, null);
+  const health = houseHealth(
+    tags,
+    judgement({
+      changed: [reason({ kind: 'changed', sensor: 'temperature' })],
+      'changed in another': [reason({ kind: 'changed', sensor: 'co2' })],
+    }),
+    true,
+  );
+  expect(nearTo(mapPoint(0, 0), tags, 'temperature', health).count).toBe(2);
+  expect(nearTo(mapPoint(99, 0), tags, 'temperature', health)).toEqual({
+    count: 0,
+    oldest: 'never',
+  });
+});
+
+const sensor = (name: string): ReturnType<typeof CATALOGUES.day.named> =>
+  CATALOGUES.day.named(name);
+const plain = (text: string): string => text.replaceAll('\u00a0', ' ');
+
+test.each([
+  ['temperature', 22.41, 0.79, '22.4 ± 1.3 °C'],
+  ['temperature', 20.2, 0.377, '20.2 ± 0.6 °C'],
+  ['temperature', 20.2, 0.02, '20.2 ± 0.03 °C'],
+  ['temperature', -2, 12, '−2.0 ± 19.7 °C'],
+  ['co2', 536.2, 22, '536 ± 36 ppm'],
+  ['co2', 536.2, 0.2, '536 ± 0.33 ppm'],
+] as const)('%s %d, error %d: %s', (name, mean, sd, text) => {
+  expect(plain(estimateText(sensor(name), mean, sd, 'C'))).toBe(text);
+});
+
+test('an error is a difference: no 32 in it', () => {
+  expect(plain(errorText(sensor('temperature'), 1, 'F'))).toBe('3.0 °F');
 });

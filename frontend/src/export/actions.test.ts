@@ -1,14 +1,13 @@
 import { beforeEach, describe, expect, test, vi } from 'vitest';
 
-import { onMapCommand } from '../map/commands';
 import { snapshotOf } from '../domain/twin';
+import { onMapCommand } from '../map/commands';
 import { act, prefer, receive, store } from '../store/app';
 import { NO_HOUSE } from '../store/twin';
 import { FakeContext } from '../testing/canvas';
-import { showTags } from '../testing/page';
+import { nextStamp, showTags } from '../testing/page';
 import { readings, stateFrame, wireTag } from '../testing/tags';
-import { FOOTER_PX } from '../draw/footer';
-import { saveMap, saveTable } from './actions';
+import { drawFooter, type Footer, FOOTER_PX, saveMap, saveTable } from './actions';
 import { fileName } from './save';
 
 // Half an hour off the full one, and set before any module looks at the clock.
@@ -33,7 +32,11 @@ beforeEach(() => {
   });
   showTags([
     wireTag({ tag_id: '10', readings: readings({ temperature: 20 }) }),
-    wireTag({ tag_id: '=9', readings: readings({ temperature: 30 }), species: 'rose' }),
+    wireTag({
+      tag_id: '=9',
+      readings: readings({ temperature: 30 }, nextStamp() - 5),
+      species: 'rose',
+    }),
   ]);
 });
 
@@ -63,11 +66,11 @@ describe('table as a file', () => {
     'waits in the first moments until the sensors’ own names are %s, and comes once',
     async (state) => {
       const { sensors } = store.get().twin;
-      receive({ type: 'sensors', sensors: { value: null, state: 'waiting', message: '' } });
+      receive({ type: 'set', part: { sensors: { value: null, state: 'waiting', message: '' } } });
       saveTable();
       act({ type: 'filter', text: '10' });
       expect(names).toEqual([]);
-      receive({ type: 'sensors', sensors: { ...sensors, state } });
+      receive({ type: 'set', part: { sensors: { ...sensors, state } } });
       act({ type: 'filter', text: '' });
       expect(names).toHaveLength(1);
       expect((await lines())[0]).toContain('Temperature [°C]');
@@ -122,7 +125,7 @@ describe('of another moment', () => {
     [Date.UTC(2026, 4, 1, 8, 33, 22) / 1000, 'lupin-twin-tags-past-2026-05-01T14-03-22.csv'],
     [5_025, 'lupin-twin-tags-past-sim-01-23-45.csv'],
   ])('the file’s name says the moment, and that it is past: %i', async (at, name) => {
-    const then = wireTag({ tag_id: 'then', readings: readings({ temperature: 12 }) });
+    const then = wireTag({ tag_id: 'then', readings: readings({ temperature: 12 }, at - 5) });
     const snapshot = snapshotOf(stateFrame([then], { sec: at }), at * 1000, null);
     receive({ type: 'past', past: { at, house: { ...NO_HOUSE, snapshot } } });
     act({ type: 'moment', moment: at });
@@ -137,4 +140,60 @@ test('a file’s name sorts by time and is legal everywhere', () => {
   expect(fileName('map', 'png', Date.UTC(2026, 4, 1, 8, 33, 22))).toBe(
     'lupin-twin-map-2026-05-01T14-03-22.png',
   );
+});
+
+const colours = { ink: 'black', surface: 'white' };
+const footer: Footer = {
+  title: 'Temperature',
+  time: '2026-05-01 14:03:22',
+  ends: ['20.0', '31.0\u00a0°C'],
+  maxAlpha: 0.6,
+  colour: [200, 0, 0],
+  scale: 40,
+};
+let context: FakeContext;
+
+beforeEach(() => {
+  context = new FakeContext();
+});
+
+const texts = (): unknown[] => context.named('fillText').map(({ args }) => args[0]);
+
+test('says what, of when, between which values, and how long a metre is', () => {
+  drawFooter(context.asContext(), 360, footer, colours);
+  expect(texts()).toEqual(['Temperature', footer.time, '1 m', '20.0', '31.0\u00a0°C']);
+  // The bar is as long as the metre that it stands for.
+  const [from] = context.named('moveTo').map(({ args }) => Number(args[0]));
+  const to = Math.max(...context.named('lineTo').map(({ args }) => Number(args[0])));
+  expect(to - (from ?? NaN)).toBe(40);
+});
+
+test('the ramp goes from nothing to the sensor’s colour: the pins’, and the heat map’s', () => {
+  drawFooter(context.asContext(), 360, footer, colours);
+  expect(context.named('addColorStop').map(({ args }) => args)).toEqual([
+    [0, 'rgb(200 0 0 / 0)'],
+    [1, 'rgb(200 0 0)'],
+    [0, 'rgb(200 0 0 / 0)'],
+    [1, 'rgb(200 0 0 / 0.6)'],
+  ]);
+});
+
+test('without a reading there is no ramp', () => {
+  drawFooter(context.asContext(), 360, { ...footer, ends: null }, colours);
+  expect(context.named('addColorStop')).toEqual([]);
+  expect(texts()).toEqual(['Temperature', footer.time, '1 m']);
+});
+
+test('nothing of it leaves a phone’s width or covers anything else', () => {
+  drawFooter(context.asContext(), 360, { ...footer, scale: 69 }, colours);
+  const ends = context.named('fillText').at(-1)?.args ?? [];
+  const left = Math.min(...context.named('moveTo').map(({ args }) => Number(args[0])));
+  // The fake letters are 6 pixels wide.
+  expect(Number(ends[1]) + 6 * String(ends[0]).length).toBeLessThan(left);
+  for (const { args } of context.named('fillText')) {
+    expect(Number(args[2])).toBeLessThan(FOOTER_PX);
+  }
+  const length = context.named('fillText').find(({ args }) => args[0] === '1 m')?.args ?? [];
+  const end = Math.max(...context.named('lineTo').map(({ args }) => Number(args[0])));
+  expect(end).toBeLessThan(Number(length[1]) - 6 * String(length[0]).length);
 });

@@ -1,15 +1,16 @@
 /** The exports, as buttons and menu call them. */
-import { epochOf } from '../clock';
+import { epochOf, now as pageNow, timeZone } from '../clock';
 import { differenceText, divergingColours, signedText } from '../domain/difference';
-import { readingText, valueText } from '../domain/format';
+import { readingText, valueText, written } from '../domain/format';
 import { IDEAL_ALPHA, idealParts } from '../domain/ideal';
-import { sensorColour } from '../domain/ramp';
-import { dateText, rosText, secondsOf } from '../domain/rostime';
+import { type Rgb, rgbText, sensorColour } from '../domain/ramp';
 import { tableCsv } from '../domain/table';
 import { shown } from '../domain/text';
-import { drawFooter, FOOTER_PX, type Footer } from '../draw/footer';
+import { dateText, rosText, secondsOf, type Span, spanOf } from '../domain/time';
 import { contextOf, newCanvas } from '../draw/surface';
+import { lengthText, scaleBar } from '../geometry/coordinates';
 import { commandMap } from '../map/commands';
+import { toFragment } from '../store/address';
 import { store } from '../store/app';
 import {
   selectCatalogue,
@@ -20,9 +21,9 @@ import {
   selectRows,
   selectSensor,
 } from '../store/derived';
-import { selectShown } from '../store/moment';
-import { selectHasOwnTime, selectOrigin } from '../store/origin';
-import { S } from '../strings';
+import { rosNow, selectHasOwnTime, selectOrigin, selectShown } from '../store/moment';
+import { isChosen } from '../store/view';
+import { LANGUAGE, S } from '../strings';
 import { fileName, pastFileName, save } from './save';
 
 /**
@@ -133,4 +134,139 @@ export async function saveMap(): Promise<void> {
       blob,
       moment === null ? fileName('map', 'png', takenAt) : pastFileName('map', 'png', moment),
     );
+}
+
+/** What stands below the map in a saved picture: what it shows, of when, and how large it is. */
+
+export const FOOTER_PX = 56;
+const EDGE_PX = 14;
+const GAP_PX = 8;
+const RAMP_PX = { width: 90, height: 12 } as const;
+const LONGEST_BAR_PX = 70;
+const FONT = '13px "Inter Variable", system-ui, sans-serif';
+
+export interface Footer {
+  /** The sensor, and the date and time. */
+  readonly title: string;
+  readonly time: string;
+  /** The ramp's two ends, the upper one with its unit; null: there is no reading. */
+  readonly ends: readonly [low: string, high: string] | null;
+  readonly colour: Rgb;
+  /** Alpha of the heat map at its maximum. */
+  readonly maxAlpha: number;
+  /** Colours from the lowest to the highest of a difference; none: more and more of the one. */
+  readonly diverging?: readonly string[];
+  /** Pixels a metre. */
+  readonly scale: number;
+}
+
+/** Draws in a strip `width` wide and FOOTER_PX high, whose upper left corner is the origin. */
+export function drawFooter(
+  context: CanvasRenderingContext2D,
+  width: number,
+  footer: Footer,
+  { ink, surface }: { readonly ink: string; readonly surface: string },
+): void {
+  context.fillStyle = surface;
+  context.fillRect(0, 0, width, FOOTER_PX);
+  context.fillStyle = ink;
+  context.strokeStyle = ink;
+  context.textBaseline = 'middle';
+  const right = width - EDGE_PX;
+
+  context.font = `600 ${FONT}`;
+  context.fillText(footer.title, EDGE_PX, 18);
+  context.font = `500 ${FONT}`;
+  context.textAlign = 'right';
+  context.fillText(footer.time, right, 18);
+
+  const middle = 40;
+  const bar = scaleBar(footer.scale, LONGEST_BAR_PX);
+  const length = written(lengthText(bar.metres));
+  context.fillText(length, right, middle);
+  const end = right - context.measureText(length).width - GAP_PX;
+  context.textAlign = 'left';
+  context.lineWidth = 2;
+  context.beginPath();
+  context.moveTo(end - bar.pixels, middle - 4);
+  context.lineTo(end - bar.pixels, middle + 3);
+  context.lineTo(end, middle + 3);
+  context.lineTo(end, middle - 4);
+  context.stroke();
+
+  if (!footer.ends) return;
+  const [low, high] = footer.ends;
+  context.fillText(low, EDGE_PX, middle);
+  const left = EDGE_PX + context.measureText(low).width + GAP_PX;
+  drawRamp(context, left, middle - RAMP_PX.height / 2, footer);
+  context.fillStyle = ink;
+  context.fillText(high, left + RAMP_PX.width + GAP_PX, middle);
+}
+
+/** The pins' colours above those of the heat map, as in the page's legend. */
+function drawRamp(
+  context: CanvasRenderingContext2D,
+  x: number,
+  y: number,
+  { colour, maxAlpha, diverging }: Footer,
+): void {
+  const { width, height } = RAMP_PX;
+  [1, maxAlpha].forEach((most, index) => {
+    const gradient = context.createLinearGradient(x, 0, x + width, 0);
+    const stops = diverging ?? [rgbText(colour, 0), rgbText(colour, most)];
+    stops.forEach((stop, place) => {
+      gradient.addColorStop(place / (stops.length - 1), stop);
+    });
+    context.fillStyle = gradient;
+    context.fillRect(x, y + (index * height) / 2, width, height / 2);
+  });
+  context.lineWidth = 1;
+  context.strokeRect(x - 0.5, y - 0.5, width + 1, height + 1);
+}
+
+/** Of the view as it is: that of the page comes behind, and waits while the past is played. */
+export function viewAddress(): URL {
+  const url = new URL(window.location.href);
+  url.hash = toFragment(store.get().view);
+  return url;
+}
+
+/** Copies the address of this view; true when the clipboard took it. */
+export async function copyLink(): Promise<boolean> {
+  // Only secure contexts have a clipboard, and a greenhouse's plain http is none: hence the
+  // look at a property whose type claims that it is always there.
+  const clipboard = navigator.clipboard as Clipboard | undefined;
+  if (!clipboard) return false;
+  return clipboard.writeText(viewAddress().href).then(
+    () => true,
+    () => false,
+  );
+}
+
+/** The address of the shift report, a page of the bridge's own. */
+
+const SHIFT_S = 8 * 3_600;
+/** The bridge reports of no longer a period. */
+const LONGEST_S = 31 * 86_400;
+
+/** Of the period chosen on the time bar; of the last eight hours where none was. */
+export function reportLink(): string {
+  const state = store.get();
+  const now = rosNow(state, pageNow());
+  const query = new URLSearchParams({ lang: LANGUAGE, time_zone: timeZone() });
+  if (now !== null) {
+    const { period } = state.view;
+    const oldest = state.twin.remembered.value?.reach?.from ?? null;
+    const { from, to } = reported(isChosen(period) ? spanOf(period, now, oldest) : null, now);
+    query.set('from', String(from));
+    query.set('to', String(to));
+  }
+  return `api/report.html?${query.toString()}`;
+}
+
+/** In whole seconds; what is to come is no part of it. */
+export function reported(span: Span | null, now: number): Span {
+  const to = Math.max(1, Math.floor(Math.min(span?.to ?? now, now)));
+  const from = Math.floor(span?.from ?? to - SHIFT_S);
+  return { from: Math.max(0, to - LONGEST_S, Math.min(from, to - 1)), to };
 }

@@ -3,7 +3,7 @@ import { expect, test, vi } from 'vitest';
 import { act, receive } from '../store/app';
 import { stateFrame, wireTag } from '../testing/tags';
 import { timelineWith } from '../testing/timeline';
-import { copyLink, reported, reportLink } from './link';
+import { copyLink, reported, reportLink } from './actions';
 
 test('without a clipboard copying says no instead of failing', async () => {
   expect(await copyLink()).toBe(false);
@@ -59,7 +59,7 @@ test('is that of the last eight hours until a period is chosen on the time bar',
   act({ type: 'period', period: { kind: 'own', from: 1_777_000_000, to: 1_777_000_900 } });
   expect([asked().get('from'), asked().get('to')]).toEqual(['1777000000', '1777000900']);
   const value = timelineWith({ reach: { from: 1_777_020_802, to: 1_777_620_802 } });
-  receive({ type: 'remembered', remembered: { value, state: 'ready', message: '' } });
+  receive({ type: 'set', part: { remembered: { value, state: 'ready', message: '' } } });
   act({ type: 'period', period: { kind: 'all' } });
   expect(length()).toBe(600_000);
 });

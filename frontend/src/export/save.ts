@@ -1,5 +1,5 @@
 import { momentText } from '../domain/format';
-import { hasDate, rosText } from '../domain/rostime';
+import { hasDate, rosText } from '../domain/time';
 
 /** Hands a file to the browser's download. */
 export function save(blob: Blob, name: string): void {

@@ -4,15 +4,13 @@ import { useMemo, type JSX } from 'react';
 import { valuesOf, whenText, whereText, type Speech } from '../alarms/words';
 import { timeOfDay } from '../clock';
 import type { Alarm } from '../contract/types';
-import { secondsOf } from '../domain/rostime';
+import { secondsOf } from '../domain/time';
 import { LANGUAGE, S } from '../strings';
 import { HealthMark } from '../ui/HealthMark';
 import type { FleetWords } from '../words/fleet';
 import { VIEW_WORDS } from '../words/fleetViews';
-import { alarmCount, namesOf, type Site } from './sites';
-import { ms, timeText } from './times';
-import { useAnswer } from './useAnswer';
-import { useSpeech } from './useSpeech';
+import { alarmCount, ms, namesOf, type Site, timeText } from './sites';
+import { useAnswer, useSpeech } from './useAnswer';
 
 interface SiteAlarm extends Alarm {
   readonly site: string;

@@ -2,34 +2,23 @@
 import 'uplot/dist/uPlot.min.css';
 import '../styles/charts.css';
 
-import { useEffect, useLayoutEffect, useMemo, useRef, useState, type JSX } from 'react';
+import { type JSX, useMemo, useRef, useState } from 'react';
 
 import type { Speech } from '../alarms/words';
-import { lookOf } from '../charts/looks';
-import type { PlotModel } from '../charts/model';
-import { createPlot, type Plot } from '../charts/plot';
+import { lookOf } from '../charts/layers';
+import type { Line, PlotModel } from '../charts/model';
+import { usePlot } from '../charts/plot';
 import { timeOfDay } from '../clock';
 import { differenceNumber, readingText, withUnit } from '../domain/format';
-import { spanOf as periodSpan } from '../domain/period';
-import { rosText } from '../domain/rostime';
 import { isMeasured, type Sensor } from '../domain/sensors';
+import { spanOf as periodSpan, rosText, secondsOf, type Span } from '../domain/time';
 import { LANGUAGE, S } from '../strings';
-import { Select } from '../widgets/Select';
+import { Select } from '../widgets/controls';
 import type { FleetWords } from '../words/fleet';
 import { VIEW_WORDS } from '../words/fleetViews';
-import {
-  linesOf,
-  MEDIAN_LOOK,
-  MOST_DRAWN,
-  MOST_SITES,
-  spanOf,
-  valueAt,
-  type Compared,
-  type ComparedSite,
-} from './compared';
+import type { WireTime } from '../contract/types';
 import type { Site } from './sites';
-import { useAnswer } from './useAnswer';
-import { useSpeech } from './useSpeech';
+import { useAnswer, useSpeech } from './useAnswer';
 
 const W = VIEW_WORDS[LANGUAGE];
 
@@ -184,6 +173,14 @@ function deviationText(sensor: Sensor, { deviation }: ComparedSite, { unit }: Sp
   return withUnit(sensor, differenceNumber(sensor, deviation, unit), unit);
 }
 
+function onSystemTheme(listener: () => void): () => void {
+  const system = window.matchMedia('(prefers-color-scheme: dark)');
+  system.addEventListener('change', listener);
+  return () => {
+    system.removeEventListener('change', listener);
+  };
+}
+
 function Chart({
   model,
   onPoint,
@@ -192,30 +189,8 @@ function Chart({
   onPoint: (at: number | null) => void;
 }): JSX.Element {
   const place = useRef<HTMLDivElement>(null);
-  const plot = useRef<Plot | null>(null);
-  const [width, setWidth] = useState(0);
-  useLayoutEffect(() => {
-    const element = place.current;
-    if (!element) return undefined;
-    const none = (): void => undefined;
-    const mine = createPlot(element, { onPoint, onPick: none, onZoom: none });
-    plot.current = mine;
-    const resize = new ResizeObserver(([entry]) => {
-      if (entry) setWidth(Math.floor(entry.contentRect.width));
-    });
-    resize.observe(element);
-    const system = window.matchMedia('(prefers-color-scheme: dark)');
-    system.addEventListener('change', mine.recolour);
-    return () => {
-      plot.current = null;
-      system.removeEventListener('change', mine.recolour);
-      resize.disconnect();
-      mine.destroy();
-    };
-  }, [onPoint]);
-  useEffect(() => {
-    if (width > 0) plot.current?.show(model, { width, height: HEIGHT, hasTimes: true });
-  }, [model, width]);
+  const handlers = useMemo(() => ({ onPoint }), [onPoint]);
+  usePlot(place, model, HEIGHT, true, handlers, onSystemTheme);
   return (
     <div
       ref={place}
@@ -226,4 +201,78 @@ function Chart({
       data-testid="plot"
     />
   );
+}
+
+/** What the server says of one sensor of several greenhouses, and the lines of its chart. Pure. */
+
+type Values = readonly (number | null)[];
+
+export interface ComparedSite {
+  readonly site: string;
+  readonly name: string;
+  readonly mean: number | null;
+  /** How far it is from the median of all, in the sensor's unit; null: it has no reading. */
+  readonly deviation: number | null;
+  /** Of each bucket. */
+  readonly means: Values;
+}
+
+/** `/api/compare`: the outlier first. */
+export interface Compared {
+  readonly sensor_type: string;
+  readonly from: WireTime;
+  readonly to: WireTime;
+  readonly bucket_s: number;
+  readonly low: Values;
+  readonly median: Values;
+  readonly high: Values;
+  readonly sites: readonly ComparedSite[];
+}
+
+/** What the server compares at most. */
+export const MOST_SITES = 50;
+/** So many lines can be told apart beside that of the median. */
+export const MOST_DRAWN = 6;
+/** The look that no greenhouse gets: grey, with dashes. */
+export const MEDIAN_LOOK = 6;
+
+/** The median with its band, and the sites that are drawn, each with the look of its place there. */
+export function linesOf(found: Compared, drawn: readonly string[], median: string): Line[] {
+  const sites = drawn.flatMap((name, look) => {
+    const site = found.sites.find((each) => each.site === name);
+    return site ? [lineOf(found, site.name, look, site.means, site.means, site.means)] : [];
+  });
+  return [lineOf(found, median, MEDIAN_LOOK, found.low, found.median, found.high), ...sites];
+}
+
+function lineOf(
+  { from, to, bucket_s: bucketS, sensor_type: sensor }: Compared,
+  label: string,
+  look: number,
+  ...[low, mean, high]: [low: Values, mean: Values, high: Values]
+): Line {
+  const start = secondsOf(from);
+  const points = mean.flatMap((value, index) => {
+    const [min, max] = [low[index] ?? value, high[index] ?? value];
+    return value === null ? [] : [{ at: start + index * bucketS, value, min, max, n: 1 }];
+  });
+  const gaps = mean.flatMap((value, index) =>
+    value === null ? [{ from: start + index * bucketS, to: start + (index + 1) * bucketS }] : [],
+  );
+  const series = {
+    ...{ from: start, to: secondsOf(to), tagId: label, sensor, bucketS },
+    ...{ points, gaps, nights: null, missing: [] },
+  };
+  return { series, before: null, look, label, marks: [] };
+}
+
+export const spanOf = ({ from, to }: Compared): Span => ({
+  from: secondsOf(from),
+  to: secondsOf(to),
+});
+
+/** Of a site, what the bucket at a moment has; of none, its mean. */
+export function valueAt(found: Compared, { mean, means }: ComparedSite, at: number | null) {
+  if (at === null) return mean;
+  return means[Math.floor((at - secondsOf(found.from)) / found.bucket_s)] ?? null;
 }

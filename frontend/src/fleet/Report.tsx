@@ -2,13 +2,12 @@
 import { useState, type JSX } from 'react';
 
 import { timeOfDay, timeZone } from '../clock';
-import type { Note } from '../contract/types';
+import type { Note, WireTime } from '../contract/types';
 import { shown as shownText } from '../domain/text';
 import { LANGUAGE, S } from '../strings';
 import type { FleetWords } from '../words/fleet';
 import { VIEW_WORDS } from '../words/fleetViews';
-import { namesOf, type Site, type Time } from './sites';
-import { ms, timeText } from './times';
+import { ms, namesOf, type Site, timeText } from './sites';
 import { useAnswer } from './useAnswer';
 
 const W = VIEW_WORDS[LANGUAGE];
@@ -23,7 +22,7 @@ interface SiteReport extends Readonly<Record<(typeof COUNTED)[number], number>> 
   readonly site: string;
   readonly name: string;
   readonly active_alarms: number | null;
-  readonly complete_to: Time;
+  readonly complete_to: WireTime;
   /** The address of its own report, as JSON. */
   readonly report: string;
 }

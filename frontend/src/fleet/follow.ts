@@ -1,6 +1,6 @@
 /** The overview as the server sends it: one socket, tried again whenever it ends. */
 import { epochOf, now, onLapse } from '../clock';
-import { backoffMs } from '../connection/backoff';
+import { backoffMs } from '../connection/machine';
 import { signInIfAsked } from '../connection/socket';
 import { parseSites, withFrame, type Archive, type Sites } from './sites';
 

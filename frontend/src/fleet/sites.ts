@@ -1,10 +1,8 @@
 /** What the server says of all sites, and in which order and choice it is shown. Pure. */
-import type { Verdict } from '../contract/types';
-
-export interface Time {
-  readonly sec: number;
-  readonly nanosec: number;
-}
+import { timeOfDay } from '../clock';
+import { isObject } from '../contract/check';
+import type { Verdict, WireTime } from '../contract/types';
+import { LOCALE } from '../strings';
 
 /** An entry of `/api/sites`; see the server's `overview.py`. */
 export interface Site {
@@ -14,7 +12,7 @@ export interface Site {
   /** That of a silent site as it was known last; null: it is being worked out. */
   readonly last_verdict: Verdict | null;
   readonly active_alarms: number | null;
-  readonly last_received: Time | null;
+  readonly last_received: WireTime | null;
   readonly lag_s: number | null;
   readonly is_live: boolean;
   /** Where what it reports comes from. */
@@ -26,7 +24,7 @@ export interface Site {
 export interface Archive {
   readonly is_reachable: boolean;
   readonly message: string;
-  readonly since: Time | null;
+  readonly since: WireTime | null;
 }
 
 export interface SitesFrame {
@@ -49,23 +47,15 @@ export type Sites = ReadonlyMap<string, Site>;
 export const FILTERS = ['all', 'critical', 'stressed', 'silent', 'healthy'] as const;
 export type Filter = (typeof FILTERS)[number];
 
-const VERDICTS: readonly unknown[] = ['critical', 'stressed', 'unknown', 'healthy'];
-const ORDER: Readonly<Record<Verdict, number>> = {
-  critical: 0,
-  stressed: 1,
-  unknown: 2,
-  healthy: 3,
-};
-
-const isObject = (value: unknown): value is Record<string, unknown> =>
-  typeof value === 'object' && value !== null;
+/** The worst first. Not those of `domain/health`, which the first view here does without. */
+const VERDICTS: readonly Verdict[] = ['critical', 'stressed', 'unknown', 'healthy'];
 
 function isSite(value: unknown): value is Site {
   return (
     isObject(value) &&
     typeof value['site'] === 'string' &&
     typeof value['name'] === 'string' &&
-    VERDICTS.includes(value['verdict']) &&
+    VERDICTS.includes(value['verdict'] as Verdict) &&
     typeof value['is_live'] === 'boolean' &&
     typeof value['origin'] === 'string'
   );
@@ -115,7 +105,7 @@ const names = new Intl.Collator('en', { numeric: true, sensitivity: 'base' });
 /** By status, then the most alarms, then by name, as people count. */
 function worstFirst(a: Site, b: Site): number {
   return (
-    ORDER[a.verdict] - ORDER[b.verdict] ||
+    VERDICTS.indexOf(a.verdict) - VERDICTS.indexOf(b.verdict) ||
     (b.active_alarms ?? 0) - (a.active_alarms ?? 0) ||
     names.compare(a.name, b.name)
   );
@@ -173,3 +163,20 @@ export function chosen(sites: Sites, filter: Filter, search: string, group = '')
     )
     .sort(worstFirst);
 }
+
+/** Moments as the page over all greenhouses writes them. */
+
+const clockTime = new Intl.DateTimeFormat(LOCALE, { timeStyle: 'medium' });
+const dateAndTime = new Intl.DateTimeFormat(LOCALE, { dateStyle: 'medium', timeStyle: 'short' });
+const DAY_MS = 86_400_000;
+
+/** Of today the time of day is enough. */
+export function timeText(at: number): string {
+  return (Math.abs(timeOfDay() - at) < DAY_MS / 2 ? clockTime : dateAndTime).format(at);
+}
+
+export const ms = ({ sec, nanosec }: WireTime): number => sec * 1000 + nanosec / 1e6;
+
+/** When that was, so many seconds ago, to the second. */
+export const silentAt = (lagS: number): number =>
+  Math.round((timeOfDay() - lagS * 1000) / 1000) * 1000;

@@ -1,7 +1,13 @@
 /** An answer of the server that is kept up to date while the page is looked at. */
+import { useMemo } from 'react';
+
+import type { Speech } from '../alarms/words';
 import { pause } from '../clock';
 import { bodyOf, get } from '../contract/api';
+import type { SensorsFile } from '../contract/types';
+import { cataloguesOf, NO_CATALOGUES } from '../domain/sensors';
 import type { Fetched } from '../store/fetcher';
+import { openStorage, readSettings } from '../store/settings';
 import { useFetched } from '../store/useFetched';
 import { useTicking } from '../widgets/useNow';
 
@@ -25,5 +31,20 @@ export function useAnswer<T>(path: string, everyMs: number, news = ''): Fetched<
           },
         },
     SETTLE_MS,
+  );
+}
+
+/** What readings are named and written with: the sensors in force, and the reader's unit. */
+
+const EVERY_MS = 600_000;
+
+export function useSpeech(): Speech {
+  const file = useAnswer<SensorsFile>('api/sensors', EVERY_MS).value;
+  return useMemo(
+    () => ({
+      sensors: (file ? cataloguesOf(file) : NO_CATALOGUES).day,
+      unit: readSettings(openStorage()).unit,
+    }),
+    [file],
   );
 }

@@ -6,8 +6,13 @@ import {
   canvasPoint,
   corners,
   fit,
-  MAX_SCALE,
+  gridStep,
+  lengthText,
   mapPoint,
+  MAX_SCALE,
+  nearest,
+  niceFloor,
+  scaleBar,
   toCanvas,
   toMap,
   viewOf,
@@ -79,4 +84,77 @@ describe('a camera does not depend on the screen', () => {
     expect(toMap(shown, canvasPoint(150, 100))).toEqual({ x: 1.5, y: 4 });
     expect(200 / shown.scale).toBeCloseTo(6);
   });
+});
+
+describe('nearest', () => {
+  const view = { x: 0, y: 100, scale: 10 };
+  const items = [
+    { id: 'a', at: mapPoint(1, 1) },
+    { id: 'b', at: mapPoint(2, 1) },
+  ];
+
+  test('the closest within reach, by pixels', () => {
+    expect(nearest(items, view, canvasPoint(18, 90), 16)?.id).toBe('b');
+    expect(nearest(items, view, canvasPoint(11, 95), 16)?.id).toBe('a');
+  });
+
+  test('nothing beyond reach, and what lies at it', () => {
+    expect(nearest(items, view, canvasPoint(10, 40), 16)).toBeNull();
+    expect(nearest(items, view, canvasPoint(10, 74), 16)?.id).toBe('a');
+    expect(nearest(items, view, canvasPoint(10, 73.9), 16)).toBeNull();
+  });
+
+  test('of two at one place the one that is drawn last', () => {
+    const at = mapPoint(1, 1);
+    const pile = [
+      { id: 'below', at },
+      { id: 'above', at },
+    ];
+    expect(nearest(pile, view, canvasPoint(10, 90), 16)?.id).toBe('above');
+  });
+
+  test('none of none', () => {
+    expect(nearest([], view, canvasPoint(0, 0), 16)).toBeNull();
+  });
+});
+
+test.each([
+  [1, 1],
+  [1.9, 1],
+  [2, 2],
+  [4.99, 2],
+  [73, 50],
+  [0.034, 0.02],
+])('round length not above %d is %d', (value, expected) => {
+  expect(niceFloor(value)).toBeCloseTo(expected);
+});
+
+describe('scale bar', () => {
+  test('is never longer than allowed and says its true length', () => {
+    for (const scale of [4, 13, 50, 99, 1234]) {
+      const { metres, pixels } = scaleBar(scale, 110);
+      expect(pixels).toBeLessThanOrEqual(110);
+      expect(pixels).toBeCloseTo(metres * scale);
+    }
+  });
+});
+
+describe('grid', () => {
+  test('lines keep their distance, and no more than about twice of it', () => {
+    for (const scale of [4, 13, 50, 99, 180, 1234]) {
+      const pixels = gridStep(scale, 56) * scale;
+      expect(pixels).toBeGreaterThanOrEqual(56 - 1e-9);
+      expect(pixels).toBeLessThanOrEqual(56 * 2.5 + 1e-9);
+    }
+  });
+});
+
+test.each([
+  [0.05, '5 cm'],
+  [0.5, '50 cm'],
+  [1, '1 m'],
+  [20, '20 m'],
+  [5000, '5 km'],
+])('%d m reads %s', (metres, text) => {
+  expect(lengthText(metres)).toBe(text);
 });

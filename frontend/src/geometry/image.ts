@@ -18,6 +18,14 @@ export interface Placement {
   readonly height: number;
 }
 
+/** The SLAM map, decoded. */
+export interface MapPicture {
+  readonly placement: Placement;
+  readonly pixels: ImageData;
+  /** Corners of the box around what is known of the map; empty while nothing is. */
+  readonly known: readonly MapPoint[];
+}
+
 /** Yaw of a rotation about z; a quaternion of zeros counts as no turn. */
 export function yawOf(q: {
   x: number | null;

@@ -6,10 +6,9 @@ import { NOTHING } from '../store/fetcher';
 import { FakeContext } from '../testing/canvas';
 import { showField, showTags } from '../testing/page';
 import { readings, stateFrame, wireTag } from '../testing/tags';
-import { commandMap } from './commands';
+import { commandMap, pinUnderMouse, pointedAt } from './commands';
 import { runMap } from './controller';
 import { startGestures } from './gestures';
-import { pinUnderMouse, pointedAt } from './pointer';
 
 let element: HTMLElement;
 let still: HTMLCanvasElement;
@@ -340,7 +339,7 @@ describe('nothing is drawn anew but what changed', () => {
     start();
     const { snapshot } = store.get().twin.latest;
     const tags = (snapshot?.tags ?? []).map(({ wire }) => structuredClone(wire));
-    const later = { sec: 9_000, revision: snapshot?.revision ?? '' };
+    const later = { sec: (snapshot?.at.sec ?? 0) + 1, revision: snapshot?.revision ?? '' };
     receive({ type: 'state', latest: stateFrame(tags, later), now: performance.now() });
     expect(store.get().twin.latest.snapshot).not.toBe(snapshot);
     expect(frames).toEqual([]);

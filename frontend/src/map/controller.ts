@@ -1,29 +1,25 @@
 /** Ties the map's canvases to the store: draws what changed, once a frame, and nothing else. */
 import { now } from '../clock';
-import { PULSE_MS, type Pulse } from '../draw/overlay';
-import { pinRadius } from '../draw/pins';
+import { pinRadius, type Pulse, PULSE_MS } from '../draw/pins';
 import type { Pin } from '../draw/scene';
 import type { Box } from '../geometry/clear';
 import {
   canvasPoint,
+  nearest,
   toCanvas,
   toMap,
   type CanvasPoint,
   type MapPoint,
   type View,
 } from '../geometry/coordinates';
-import { Grid, nearest } from '../geometry/nearest';
 import { act, moveViewport, store, type AppState } from '../store/app';
 import { selectHeat, selectListed, selectRange, selectSensor } from '../store/derived';
-import { memoOne } from '../domain/memo';
 import { selectNewest, selectShown, selectTag, type Shown } from '../store/moment';
 import { isPrinting } from '../store/theme';
-import { MapCamera } from './camera';
-import { keyCommand, onMapCommand, type MapCommand } from './commands';
-import { contentOf, coveredBoxes, together, watchCovered, type Content } from './content';
+import { type Content, contentOf, coveredBoxes, MapCamera, together, watchCovered } from './camera';
+import { keyCommand, type MapCommand, onMapCommand, pinUnderMouse, pointedAt } from './commands';
 import { Painter, type Canvases } from './painter';
 import { onPaletteChange, paletteInUse } from './palette';
-import { pinUnderMouse, pointedAt } from './pointer';
 
 /** A finger hits a pin from this far, a mouse from a bit less; CSS pixels. */
 const TOUCH_REACH = 26;
@@ -33,8 +29,6 @@ const TEXT_PX = 14;
 
 /** What is to be drawn anew; "view": nothing but the place and the scale changed. */
 type Part = 'still' | 'pins' | 'overlay' | 'view';
-
-const pinGrid = memoOne((pins: readonly Pin[]) => new Grid(pins));
 
 /**
  * `isFixed`: a wall screen, where nobody who brushes past chooses a tag or moves the map.
@@ -198,7 +192,7 @@ export function runMap(
   const pinAt = (point: CanvasPoint, reach: number): Pin | null => {
     const state = store.get();
     if (!state.view.layers.has('pins')) return null;
-    return nearest(pinGrid(painter.scene(state, now()).pins), state.viewport.view, point, reach);
+    return nearest(painter.scene(state, now()).pins, state.viewport.view, point, reach);
   };
 
   const hover = (pin: Pin | null): void => {

@@ -1,48 +1,55 @@
-import type { Ageing } from '../domain/age';
+import type { Ageing } from '../domain/time';
 import type { Field } from '../contract/types';
 import { divergingShade } from '../domain/difference';
 import { edgesOf, fieldPixels, smoothDetail } from '../domain/field';
 import type { HouseHealth } from '../domain/health';
 import { fieldShade } from '../domain/ramp';
-import { cellsWhere, idealShade, withOld } from '../domain/zones';
+import { cellsWhere, idealShade, withOld } from '../domain/ideal';
 import type { Sensor } from '../domain/sensors';
+import type { TemperatureUnit } from '../domain/format';
 import type { Tag } from '../domain/twin';
 import { errorShade } from '../domain/sureness';
-import type { TemperatureUnit } from '../domain/units';
-import { drawCrosshair, drawMark, drawPulses, type Pulse } from '../draw/overlay';
-import type { Palette } from '../draw/palette';
 import {
   drawBlooms,
+  drawCrosshair,
   drawLabels,
+  drawMark,
   drawPins,
+  drawPulses,
   labelFont,
   labelHeight,
   labelRequests,
+  type Pulse,
 } from '../draw/pins';
-import { PanBuffer } from '../draw/panbuffer';
-import { buildScene, type Scene } from '../draw/scene';
-import {
-  drawBoxes,
-  drawGridLabels,
-  drawGridLines,
-  drawGround,
-  drawPicture,
-  fieldPlacement,
-  LEAST_FREE_GREY,
-  tintMap,
-} from '../draw/still';
+import type { Palette } from '../draw/palette';
 import {
   canvasOfPixels,
   clear,
   contextOf,
   newCanvas,
+  PanBuffer,
   Sprites,
   type Surface,
 } from '../draw/surface';
-import { drawEdges, drawUnsure, floorOf, Hatching, knownOf, unsureOf } from '../draw/unknown';
+import { buildScene, type Scene } from '../draw/scene';
+import {
+  drawBoxes,
+  drawEdges,
+  drawGridLabels,
+  drawGridLines,
+  drawGround,
+  drawPicture,
+  drawUnsure,
+  fieldPlacement,
+  floorOf,
+  Hatching,
+  knownOf,
+  LEAST_FREE_GREY,
+  tintMap,
+  unsureOf,
+} from '../draw/still';
 import type { Size, View } from '../geometry/coordinates';
-import type { Box } from '../geometry/clear';
-import { placeLabels, type Room } from '../geometry/declutter';
+import { type Box, placeLabels, type Room } from '../geometry/clear';
 import type { AppState } from '../store/app';
 import {
   selectHealth,
@@ -54,7 +61,7 @@ import {
 } from '../store/derived';
 import { memoLast, memoOne } from '../domain/memo';
 import { selectShown, selectTag, selectTags } from '../store/moment';
-import type { MapPicture } from '../store/picture';
+import type { MapPicture } from '../geometry/image';
 
 export interface Canvases {
   readonly still: HTMLCanvasElement;

@@ -1,12 +1,10 @@
 import { useMemo, type JSX } from 'react';
 
-import type { Span } from '../domain/period';
-import { rosText } from '../domain/rostime';
+import { rosText, type Span } from '../domain/time';
 import { shown } from '../domain/text';
 import { act, useApp } from '../store/app';
 import { useSelected } from '../store/create';
-import { clustersOf, comments } from './comments';
-import { C, subjectText, tagOf } from './subject';
+import { C, clustersOf, comments, subjectText, tagOf } from './comments';
 
 /** Comments that the text of one mark holds. */
 const MOST_TOLD = 5;

@@ -1,16 +1,14 @@
-import { useRef, useState, type JSX } from 'react';
+import { type JSX, type SyntheticEvent, useEffect, useRef, useState } from 'react';
 
-import { withdrawComment } from '../contract/comments';
-import { failureText } from '../domain/failure';
-import { rosText } from '../domain/rostime';
+import { postNote, withdrawComment } from '../contract/people';
+import { failureText } from '../domain/format';
 import { shown } from '../domain/text';
+import { rosText } from '../domain/time';
 import { useApp } from '../store/app';
-import { useSelected } from '../store/create';
+import { person, useSelected } from '../store/create';
 import { selectShown } from '../store/moment';
-import { person } from '../store/signals';
-import { comments, type Comment } from './comments';
-import { Field, LONGEST } from './Field';
-import { C } from './subject';
+import { Disclosure, useClose } from '../widgets/controls';
+import { C, type Comment, comments } from './comments';
 
 /** Of one subject, the newest. */
 const MOST_SHOWN = 20;
@@ -115,4 +113,87 @@ function One({
       {fault !== '' && <span role="alert">{fault}</span>}
     </li>
   );
+}
+
+/** As the bridge has it. */
+export const LONGEST = 500;
+
+/** Where a comment is written. */
+export function Field({
+  subject,
+  moment,
+  onDone,
+}: {
+  subject: string;
+  /** What the comment is about, ROS seconds; null: now. */
+  moment: number | null;
+  onDone: () => void;
+}): JSX.Element {
+  const [text, setText] = useState('');
+  const [fault, setFault] = useState('');
+  const [isSending, setSending] = useState(false);
+  const field = useRef<HTMLTextAreaElement>(null);
+  useEffect(() => {
+    field.current?.focus();
+  }, []);
+  const send = (event: SyntheticEvent): void => {
+    event.preventDefault();
+    setSending(true);
+    const until = moment === null ? {} : { until: moment.toFixed(3) };
+    postNote({ kind: 'comment', subject, text: text.trim(), ...until }).then(
+      onDone,
+      (error: unknown) => {
+        setSending(false);
+        setFault(C.failed(failureText(error)));
+      },
+    );
+  };
+  return (
+    <form className="comment-field" onSubmit={send}>
+      <label>
+        {moment === null ? C.now : C.then(rosText(moment))}
+        <textarea
+          ref={field}
+          rows={2}
+          maxLength={LONGEST}
+          value={text}
+          required
+          onChange={(event) => {
+            setText(event.target.value);
+          }}
+          onKeyDown={(event) => {
+            if (event.key !== 'Escape') return;
+            // It has been of use here, and is not to close the tag's card too.
+            event.preventDefault();
+            onDone();
+          }}
+        />
+      </label>
+      {fault !== '' && <p role="alert">{fault}</p>}
+      <button type="submit" className="text-button" disabled={isSending || text.trim() === ''}>
+        {C.send}
+      </button>
+    </form>
+  );
+}
+
+/** Beside the time bar: a word about the greenhouse, at the moment that the page shows. */
+export function SiteComment(): JSX.Element | null {
+  const mayWrite = useSelected(person, (it) => it?.can_write_notes === true);
+  if (!mayWrite) return null;
+  return (
+    <Disclosure
+      label={C.commentOf(C.site)}
+      button={C.comment}
+      className="say-site"
+      look="text-button"
+    >
+      <OfMoment />
+    </Disclosure>
+  );
+}
+
+function OfMoment(): JSX.Element {
+  const moment = useApp((state) => state.view.moment);
+  return <Field subject="site" moment={moment} onDone={useClose()} />;
 }

@@ -1,11 +1,13 @@
 /** The comments of the log: fetched whenever the bridge says that there are more notes. */
-import { fetchComments } from '../contract/comments';
-import type { Note } from '../contract/types';
-import type { Span } from '../domain/period';
-import { secondsOf } from '../domain/rostime';
+import { fetchComments } from '../contract/people';
+import type { Alarm, Note } from '../contract/types';
+import { shown } from '../domain/text';
+import { secondsOf, type Span } from '../domain/time';
 import { store } from '../store/app';
 import { createStore } from '../store/create';
 import { createFetcher } from '../store/fetcher';
+import { LANGUAGE, S } from '../strings';
+import { COMMENTS } from '../words/comments';
 
 export interface Comment {
   readonly id: string;
@@ -36,9 +38,6 @@ export function startComments(): () => void {
     paceMs: PACE_MS,
     onValue: (notes) => {
       comments.dispatch(commentsIn(notes));
-    },
-    onError: () => {
-      // It is tried again; until then what is known stays.
     },
   });
   const update = (): void => {
@@ -75,4 +74,25 @@ export function clustersOf(found: readonly Comment[], { from, to }: Span): Clust
     else clusters.push({ at, comments: [comment] });
   }
   return clusters;
+}
+
+export const C = COMMENTS[LANGUAGE];
+
+/** Which tag a comment is about; null: the greenhouse, or an alarm that the page does not know. */
+export function tagOf(subject: string, alarms: readonly Alarm[]): string | null {
+  const [kind, id] = [
+    subject.slice(0, subject.indexOf(':')),
+    subject.slice(subject.indexOf(':') + 1),
+  ];
+  if (kind === 'tag') return id;
+  if (kind !== 'alarm') return null;
+  return alarms.find((alarm) => alarm.id === id)?.tag_id || null;
+}
+
+/** "Tag 7", "alarm at Tag 7", "greenhouse". */
+export function subjectText(subject: string, alarms: readonly Alarm[]): string {
+  if (subject === 'site') return C.site;
+  const tagId = tagOf(subject, alarms);
+  const tag = tagId === null ? '' : S.card(shown(tagId, 24));
+  return subject.startsWith('alarm:') ? C.alarm(tag) : tag;
 }

@@ -3,13 +3,12 @@ import { beforeEach, expect, test, vi } from 'vitest';
 
 import type { Note } from '../contract/types';
 import { act, receive } from '../store/app';
-import { person } from '../store/signals';
+import { person } from '../store/create';
 import { alarm, alarms } from '../testing/alarms';
 import { showTags } from '../testing/page';
 import { CommentMarks } from './CommentMarks';
-import { Comments } from './Comments';
+import { Comments, SiteComment } from './Comments';
 import { clustersOf, comments, commentsIn, startComments } from './comments';
-import { SiteComment } from './SiteComment';
 
 const said = (id: string, made: number, over: Partial<Note> = {}): Note => ({
   id,
@@ -50,7 +49,7 @@ beforeEach(() => {
 /** A frame: the log has so many notes. */
 const tell = (count: number): void => {
   flush(() => {
-    receive({ type: 'alarms', alarms: { ...alarms([alarm('cold')]), notes: count } });
+    receive({ type: 'set', part: { alarms: { ...alarms([alarm('cold')]), notes: count } } });
   });
 };
 

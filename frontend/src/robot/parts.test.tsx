@@ -1,11 +1,10 @@
 import { act as rendered, render, screen } from '@testing-library/react';
 import { beforeEach, expect, test, vi } from 'vitest';
 
-import { robotFrame } from '../store/signals';
+import { robotFrame } from '../store/create';
 import { showTags } from '../testing/page';
 import { wireTag } from '../testing/tags';
-import { RobotFact, robotText } from './RobotFact';
-import { RobotLayer } from './RobotLayer';
+import { RobotFact, RobotLayer, robotText } from './parts';
 
 const time = (sec: number): { sec: number; nanosec: number } => ({ sec, nanosec: 0 });
 const robot = {

@@ -1,6 +1,6 @@
 /** Where the robot has been and will be, as lines; pure. Times are ROS seconds, lengths metres. */
 import type { Robot, RobotNow } from '../contract/types';
-import { secondsOf } from '../domain/rostime';
+import { secondsOf } from '../domain/time';
 
 export interface TrailPoint {
   readonly x: number;

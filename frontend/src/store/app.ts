@@ -24,54 +24,39 @@ export interface AppState {
   readonly settings: Settings;
 }
 
-export type AppAction =
-  | { readonly slice: 'twin'; readonly action: TwinAction }
-  | { readonly slice: 'view'; readonly action: ViewAction }
-  | { readonly slice: 'viewport'; readonly viewport: Partial<Viewport> }
-  | { readonly slice: 'settings'; readonly settings: Partial<Settings> };
+type Change = (state: AppState) => AppState;
 
-export function reduceApp(state: AppState, action: AppAction): AppState {
-  switch (action.slice) {
-    case 'twin': {
-      const twin = reduceTwin(state.twin, action.action);
-      return twin === state.twin ? state : { ...state, twin };
-    }
-    case 'view': {
-      const view = reduceView(state.view, action.action);
-      return view === state.view ? state : { ...state, view };
-    }
-    case 'viewport':
-      return { ...state, viewport: { ...state.viewport, ...action.viewport } };
-    case 'settings':
-      return { ...state, settings: { ...state.settings, ...action.settings } };
-  }
-}
-
-export const store = createStore(
+export const store = createStore<AppState, Change>(
   {
     twin: NO_TWIN,
     view: DEFAULT_VIEW,
     viewport: NO_VIEWPORT,
     settings: DEFAULT_SETTINGS,
   },
-  reduceApp,
+  (state, change) => change(state),
 );
 
 export const act = (action: ViewAction): void => {
-  store.dispatch({ slice: 'view', action });
-};
-
-/** For the map's camera alone, which keeps it in step with wheel, finger and keys. */
-export const moveViewport = (viewport: Partial<Viewport>): void => {
-  store.dispatch({ slice: 'viewport', viewport });
+  store.dispatch((state) => {
+    const view = reduceView(state.view, action);
+    return view === state.view ? state : { ...state, view };
+  });
 };
 
 export const receive = (action: TwinAction): void => {
-  store.dispatch({ slice: 'twin', action });
+  store.dispatch((state) => {
+    const twin = reduceTwin(state.twin, action);
+    return twin === state.twin ? state : { ...state, twin };
+  });
 };
 
-export const prefer = (settings: Partial<Settings>): void => {
-  store.dispatch({ slice: 'settings', settings });
+/** For the map's camera alone, which keeps it in step with wheel, finger and keys. */
+export const moveViewport = (part: Partial<Viewport>): void => {
+  store.dispatch((state) => ({ ...state, viewport: { ...state.viewport, ...part } }));
+};
+
+export const prefer = (part: Partial<Settings>): void => {
+  store.dispatch((state) => ({ ...state, settings: { ...state.settings, ...part } }));
 };
 
 /** Calls back when one of these parts of the state is another; returns the way to stop. */

@@ -2,7 +2,7 @@
 import { now } from '../clock';
 import type { Sensor } from '../domain/sensors';
 import type { Tag } from '../domain/twin';
-import { act, type AppState, store } from './app';
+import { act, store } from './app';
 import { createStore } from './create';
 import { selectSensors } from './derived';
 import { memoLast } from '../domain/memo';
@@ -58,13 +58,6 @@ export const nextSensor = createStore<Next | null, Next | null>(null, (_, next) 
 
 const round = memoLast(sensorsOf);
 
-const after = ({ view }: AppState, sensors: readonly Sensor[]): Sensor | null =>
-  // What once was is looked at in peace.
-  view.moment === null ? sensorAfter(sensors, view.sensor) : null;
-
-/** What the page's address asks for. */
-export const askedCycle = (): CycleWish => cycleWish(window.location.search);
-
 /** Begins the round; returns its end. */
 export function startCycle({ seconds }: CycleWish): () => void {
   if (seconds === null) return () => undefined;
@@ -73,7 +66,10 @@ export function startCycle({ seconds }: CycleWish): () => void {
 
   const update = (): void => {
     const state = store.get();
-    const sensor = after(state, round(selectTags(state), selectSensors(state)));
+    const { view } = state;
+    const sensors = round(selectTags(state), selectSensors(state));
+    // What once was is looked at in peace.
+    const sensor = view.moment === null ? sensorAfter(sensors, view.sensor) : null;
     const before = nextSensor.get();
     if (sensor === null) {
       clearTimeout(timer);
@@ -82,10 +78,10 @@ export function startCycle({ seconds }: CycleWish): () => void {
       return;
     }
     // Whoever chooses a sensor by hand has it for as long as any other.
-    const isSame = before !== null && shown === state.view.sensor;
+    const isSame = before !== null && shown === view.sensor;
     const at = isSame ? before.at : now() + seconds * 1000;
     if (isSame && before.sensor === sensor) return;
-    shown = state.view.sensor;
+    shown = view.sensor;
     nextSensor.dispatch({ sensor, at });
     clearTimeout(timer);
     timer = setTimeout(

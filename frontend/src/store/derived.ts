@@ -5,13 +5,14 @@ import { symmetricRange } from '../domain/difference';
 import { errorField, onExplored } from '../domain/sureness';
 import { type Range, rangeOf, rounded, toldApart, withIdeal } from '../domain/ramp';
 import {
+  type CellGrid,
   oldCells,
   type ReadSite,
   readSites,
   type Site,
   type Zones,
   zonesOf,
-} from '../domain/zones';
+} from '../domain/ideal';
 import {
   isMeasured,
   NO_CATALOGUES,
@@ -23,10 +24,9 @@ import {
 import { filterRows, inAreas, rowsOf, sortRows, type Row } from '../domain/table';
 import type { Tag } from '../domain/twin';
 import type { AppState } from './app';
-import type { Source } from './heat';
 import { memoLast, memoOne } from '../domain/memo';
 import { isHeardNow, selectIsHeard, selectNewest, selectShown, selectTags } from './moment';
-import type { MapPicture } from './picture';
+import type { MapPicture } from '../geometry/image';
 import type { Difference } from './twin';
 import { isColumnShown } from './settings';
 import { fixedRange, type Sort, type ViewState } from './view';
@@ -57,6 +57,9 @@ export function selectCatalogue(state: AppState): Catalogue {
 /** The one in view. */
 export const selectSensor = (state: AppState): Sensor =>
   selectCatalogue(state).named(state.view.sensor);
+
+/** What the heat map is made of: the estimate and its error come in one. */
+export type Source = 'nearest' | 'estimate';
 
 /** What is computed has no estimate: the twin estimates what tags read. */
 export const sourceOf = (state: AppState): Source =>
@@ -119,23 +122,18 @@ const sitesIn = memoOne((tags: readonly Tag[]): readonly Site[] => tags.flatMap(
 const sitesKept = memoLast((key: string): readonly Site[] => JSON.parse(key) as Site[]);
 const keyOf = memoOne((sites: readonly Site[]): string => JSON.stringify(sites));
 
-const zonesBy = memoLast(
-  (
-    sites: readonly Site[],
-    sensor: Sensor,
-    width: number,
-    height: number,
-    originX: number,
-    originY: number,
-    resolution: number,
-  ): Zones => zonesOf({ width, height, originX, originY, resolution }, sites, sensor),
+/** The same for all fields that lie alike. */
+const gridKept = memoLast((key: string) => JSON.parse(key) as CellGrid);
+const gridOf = memoOne(({ width, height, originX, originY, resolution }: Field) =>
+  gridKept(JSON.stringify({ width, height, originX, originY, resolution })),
 );
+
+const zonesBy = memoLast(zonesOf);
 
 /** Which ranges hold where in a field, by the plants of the tags. */
 export function selectZones(state: AppState, field: Field): Zones {
   const sites = sitesKept(keyOf(sitesIn(selectTags(state))));
-  const { width, height, originX, originY, resolution } = field;
-  return zonesBy(sites, selectSensor(state), width, height, originX, originY, resolution);
+  return zonesBy(gridOf(field), sites, selectSensor(state));
 }
 
 /** Whether some plant of the house has an ideal of the sensor. */
@@ -183,19 +181,8 @@ const readSitesBy = memoOne(({ tags: said }: Judgement) =>
 const keyOfRead = memoOne((sites: readonly ReadSite[]): string =>
   sites.some(({ isOld }) => isOld) ? JSON.stringify(sites) : '[]',
 );
-const oldBy = memoLast(
-  (
-    sites: string,
-    width: number,
-    height: number,
-    originX: number,
-    originY: number,
-    resolution: number,
-  ): Uint8Array | null =>
-    oldCells(
-      { width, height, originX, originY, resolution },
-      JSON.parse(sites) as readonly ReadSite[],
-    ),
+const oldBy = memoLast((grid: CellGrid, sites: string) =>
+  oldCells(grid, JSON.parse(sites) as readonly ReadSite[]),
 );
 
 /**
@@ -206,8 +193,7 @@ function selectOld(state: AppState, field: Field): Uint8Array | null {
   const { health } = selectShown(state);
   if (!health || field.sensor !== state.view.sensor) return null;
   const sites = readSitesBy(health)(selectTags(state), selectSensor(state));
-  const { width, height, originX, originY, resolution } = field;
-  return oldBy(keyOfRead(sites), width, height, originX, originY, resolution);
+  return oldBy(gridOf(field), keyOfRead(sites));
 }
 
 const onMap = memoOne((field: Field) =>

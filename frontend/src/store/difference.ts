@@ -5,13 +5,12 @@
 import { now } from '../clock';
 import { differenceOf, otherMoment, type Compare } from '../domain/difference';
 import type { Snapshot } from '../domain/twin';
-import { boundsOf, type Bounds } from '../geometry/coordinates';
+import type { Bounds } from '../geometry/coordinates';
 import { onChange, receive, store, type AppState } from './app';
 import { sourceOf } from './derived';
-import { fetchHeat } from './heat';
-import { ASSUMED_MARGIN_M, fieldResolution } from './loaders';
+import { ASSUMED_MARGIN_M, boundsOfPins, fetchHeat, fieldResolution } from './heat';
 import { rosNow, selectNewest, selectShown } from './moment';
-import { createFetcher, DRAG_PACE_MS, NOTHING, type Wish } from './fetcher';
+import { createFetcher, DRAG_PACE_MS, failed, NOTHING, ready, type Wish } from './fetcher';
 import { type Difference } from './twin';
 
 /** Live, the other moment moves on with now; this far at once, seconds. */
@@ -23,10 +22,10 @@ export function startDifference(): () => void {
     paceMs: DRAG_PACE_MS,
     isDragged: true,
     onValue: (value) => {
-      receive({ type: 'difference', difference: { value, state: 'ready', message: '' } });
+      receive({ type: 'set', part: { difference: ready(value) } });
     },
     onError: (message) => {
-      receive({ type: 'difference', difference: { value: null, state: 'failed', message } });
+      receive({ type: 'set', part: { difference: failed(message) } });
     },
   });
   let before: AppState | null = null;
@@ -36,7 +35,7 @@ export function startDifference(): () => void {
     const { difference } = state.twin;
     if (compare === null) {
       fetcher.want(null);
-      if (difference !== NOTHING) receive({ type: 'difference', difference: NOTHING });
+      if (difference !== NOTHING) receive({ type: 'set', part: { difference: NOTHING } });
       return;
     }
     // Of another sensor or source, or to another moment, it is none of what is wanted.
@@ -45,7 +44,7 @@ export function startDifference(): () => void {
       before.view.sensor !== sensor ||
       sourceOf(before) !== sourceOf(state);
     before = state;
-    if (isOther && difference !== NOTHING) receive({ type: 'difference', difference: NOTHING });
+    if (isOther && difference !== NOTHING) receive({ type: 'set', part: { difference: NOTHING } });
     const wish = wishFor(state, compare);
     if (wish) fetcher.want(wish);
   };
@@ -103,7 +102,7 @@ function wishFor(state: AppState, compare: Compare): Wish<Difference> | null {
 
 /** Around all pins, in whole cells: both fields lie on the same ones. */
 function boxOf(snapshot: Snapshot | null, resolution: number): Bounds | null {
-  const bounds = boundsOf((snapshot?.tags ?? []).flatMap((tag) => (tag.at ? [tag.at] : [])));
+  const bounds = boundsOfPins(snapshot);
   if (!bounds) return null;
   const down = (metres: number): number => round(Math.floor(metres / resolution) * resolution);
   const up = (metres: number): number => round(Math.ceil(metres / resolution) * resolution);

@@ -4,7 +4,7 @@
  */
 import { now } from '../clock';
 import { Refusal } from '../contract/api';
-import { failureText } from '../domain/failure';
+import { failureText } from '../domain/format';
 
 /** While somebody drags: a dozen starts a second, which a server of this kind allows. */
 export const DRAG_PACE_MS = 80;
@@ -34,6 +34,12 @@ export interface Fetched<T> {
 
 export const NOTHING: Fetched<never> = { value: null, state: 'waiting', message: '' };
 
+export const ready = <T>(value: T): Fetched<T> => ({ value, state: 'ready', message: '' });
+
+export const failed = <T>(message: string, value: T | null = null): Fetched<T> => ({
+  ...{ value, state: 'failed', message },
+});
+
 /** Something to fetch. */
 export interface Wish<T> {
   /** What it depends on; a wish with the key of the one before brings nothing new. */
@@ -53,7 +59,7 @@ export interface FetcherOptions<T> {
   /** Something that was wanted, and nothing older than the value before. */
   readonly onValue: (value: T) => void;
   /** What is wanted cannot be had; unless `isLasting`, it is tried again. */
-  readonly onError: (message: string, isLasting: boolean, error: unknown) => void;
+  readonly onError?: (message: string, isLasting: boolean) => void;
 }
 
 export interface Fetcher<T> {
@@ -168,7 +174,7 @@ export function createFetcher<T>({
           if (isLasting) done = wish.key;
           retryAt = now() + Math.min(RETRY_LONGEST_MS, RETRY_FIRST_MS * 2 ** failures);
           failures += 1;
-          onError(failureText(error), isLasting, error);
+          onError?.(failureText(error), isLasting);
         }
         pump();
       },

@@ -1,17 +1,16 @@
 /** The house an hour before what is shown, for the table's trends: one request now and then. */
 import { now } from '../clock';
 import { fetchStateAt } from '../contract/past';
-import type { TagHealth } from '../contract/types';
 import { intervalText } from '../domain/format';
-import { secondsOf } from '../domain/rostime';
-import { sameReading, type TagThen } from '../domain/trend';
+import { secondsOf } from '../domain/time';
+import { sameReading, type TagThen } from '../domain/difference';
 import { snapshotOf, type Tag } from '../domain/twin';
 import { store, type AppState } from './app';
 import { createStore } from './create';
 import { createFetcher } from './fetcher';
-import { rosNow, selectNewest, selectShown, selectSnapshot } from './moment';
-import { selectDayS } from './origin';
+import { rosNow, selectDayS, selectNewest, selectShown } from './moment';
 import { isColumnShown } from './settings';
+import { NOT_JUDGED } from '../domain/health';
 
 /** An hour of the greenhouse's day, seconds of the twin's time: a demo's day is a short one. */
 const selectHourS = (state: AppState): number => selectDayS(state) / 24;
@@ -36,28 +35,20 @@ export interface HourAgo {
 
 export const hourAgo = createStore<HourAgo | null, HourAgo | null>(null, (_, next) => next);
 
-const NOT_JUDGED: TagHealth = { verdict: 'unknown', reasons: [] };
-
 /** What was known an hour before what is shown, by the state's own stamp; null: not known. */
 export function selectHourAgo(state: AppState, last: HourAgo | null): HourAgo | null {
   const { moment } = selectShown(state);
-  const snapshot = selectSnapshot(state);
-  const base = moment ?? (snapshot && secondsOf(snapshot.at));
-  // Now it may be twice as old as it serves: the next answer is on its way.
-  if (!last || base === null) return null;
-  return Math.abs(base - last.of) <= (moment === null ? 2 * SERVES * selectHourS(state) : 1)
-    ? last
-    : null;
+  if (moment === null) return selectHourAgoNow(state, last);
+  return last && Math.abs(moment - last.of) <= 1 ? last : null;
 }
 
 /** What was known an hour before now, whatever moment is shown; null: not known. */
 export function selectHourAgoNow(state: AppState, last: HourAgo | null): HourAgo | null {
   const { snapshot } = selectNewest(state);
-  return snapshot &&
-    last &&
-    Math.abs(secondsOf(snapshot.at) - last.of) <= 2 * SERVES * selectHourS(state)
-    ? last
-    : null;
+  if (!last || !snapshot) return null;
+  // It may be twice as old as it serves: the next answer is on its way.
+  const isNear = Math.abs(secondsOf(snapshot.at) - last.of) <= 2 * SERVES * selectHourS(state);
+  return isNear ? last : null;
 }
 
 /** What a tag's reading of now was compared with first, by the tag and the sensor. */
@@ -82,9 +73,8 @@ export function thenOf(last: HourAgo | null, tag: Tag, sensor: string): TagThen 
 export function startHourAgo(): () => void {
   const fetcher = createFetcher<HourAgo>({
     paceMs: PACE_MS,
+    // Where there is none, the table and the alarms do without.
     onValue: hourAgo.dispatch,
-    // The table and the alarms do without.
-    onError: () => undefined,
   });
   const update = (): void => {
     const state = store.get();

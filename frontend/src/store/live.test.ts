@@ -2,11 +2,11 @@ import { afterEach, beforeEach, describe, expect, test, vi } from 'vitest';
 
 import { now } from '../clock';
 import type { Frame } from '../contract/types';
-import { ageSeconds } from '../domain/age';
+import { ageSeconds } from '../domain/time';
 import { alarm, alarms } from '../testing/alarms';
 import { status } from '../testing/page';
 import { NOBODY } from '../testing/health';
-import { stateFrame, wireTag } from '../testing/tags';
+import { readings, stateFrame, wireTag } from '../testing/tags';
 import { store } from './app';
 import { selectShown } from './moment';
 import { pauseMs, retryConnection, startLive } from './live';
@@ -142,15 +142,15 @@ describe('a machine that slept for an hour', () => {
   const ageing = (): string => selectShown(store.get()).ageing.kind;
   const age = (): number | null => {
     const { snapshot, ageing: how } = selectShown(store.get());
-    return ageSeconds(snapshot?.tags[0]?.observedAt ?? null, now(), how);
+    return ageSeconds(snapshot?.tags[0]?.scannedAt ?? null, now(), how);
   };
   const wake = (): void => {
     // The wall clock went on, the monotonic one stood still.
     vi.setSystemTime(Date.now() + HOUR);
     now();
   };
-  const tagAged = (seconds: number): ReturnType<typeof wireTag> =>
-    wireTag({ stale_seconds: seconds });
+  const scannedAt = (at: number): ReturnType<typeof wireTag> =>
+    wireTag({ readings: readings({ co2: 1 }, at) });
 
   beforeEach(() => {
     stop();
@@ -159,7 +159,7 @@ describe('a machine that slept for an hour', () => {
     stop = startLive();
     FakeSocket.last.onopen?.();
     FakeSocket.last.speak(status());
-    FakeSocket.last.speak(stateFrame([tagAged(5)], { sec }));
+    FakeSocket.last.speak(stateFrame([scannedAt(sec - 5)], { sec }));
     expect(store.get().twin.phase).toBe('live');
     expect(age()).toBe(5);
   });
@@ -174,7 +174,7 @@ describe('a machine that slept for an hour', () => {
     expect([ageing(), store.get().twin.phase]).toEqual(['unknown', 'reconnecting']);
     FakeSocket.last.speak(status());
     expect([ageing(), store.get().twin.phase]).toEqual(['unknown', 'reconnecting']);
-    FakeSocket.last.speak(stateFrame([tagAged(3_605)], { sec: sec + 3_600 }));
+    FakeSocket.last.speak(stateFrame([scannedAt(sec - 5)], { sec: sec + 3_600 }));
     expect([age(), store.get().twin.phase]).toEqual([3_605, 'live']);
   });
 
@@ -182,13 +182,15 @@ describe('a machine that slept for an hour', () => {
     wake();
     FakeSocket.last.onopen?.();
     FakeSocket.last.speak(status({ twin: 'offline', reason: 'stale', state_age_seconds: 3_600 }));
-    FakeSocket.last.speak(stateFrame([tagAged(5)], { sec }));
+    FakeSocket.last.speak(stateFrame([scannedAt(sec - 5)], { sec }));
     expect(age()).toBe(3_605);
     expect(store.get().twin.phase).toBe('offline');
   });
 
   test('takes nothing that came before it slept and was not shown yet', () => {
-    FakeSocket.last.speak(stateFrame([tagAged(6)], { seq: 2, sec: sec + 1, revision: 'waits' }));
+    FakeSocket.last.speak(
+      stateFrame([scannedAt(sec - 5)], { seq: 2, sec: sec + 1, revision: 'waits' }),
+    );
     expect(revision()).not.toBe('waits');
     vi.setSystemTime(Date.now() + HOUR);
     // The timer that was to show it is the first to look at the clock.

@@ -1,11 +1,11 @@
 /** The page's one connection, and what its frames do to the store. */
 import { now, onLapse } from '../clock';
-import { latestAfter } from '../connection/latest';
+import { latestAfter } from '../contract/frames';
 import { connect, signInIfAsked } from '../connection/socket';
 import { stateSocketUrl } from '../contract/api';
 import type { Latest } from '../contract/types';
 import { receive } from './app';
-import { robotFrame } from './signals';
+import { robotFrame } from './create';
 
 /**
  * Frames come up to ten times a second; the page takes the newest four times a second at most.
@@ -70,7 +70,7 @@ export function startLive(): () => void {
       const { epoch, status } = connection;
       if (frame.type === 'alarms') {
         // As it is: alarms change seldom, and nobody is to wait for them.
-        receive({ type: 'alarms', alarms: frame });
+        receive({ type: 'set', part: { alarms: frame } });
         return;
       }
       if (frame.type === 'robot') {

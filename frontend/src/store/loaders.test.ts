@@ -8,16 +8,14 @@ import { startLoaders } from './loaders';
 
 let asked: string[];
 let stop: () => void;
-let qualityStatus: number;
 
 beforeEach(() => {
   vi.useFakeTimers();
   asked = [];
-  qualityStatus = 404;
   vi.stubGlobal('fetch', (url: URL) => {
     asked.push(`${url.pathname}${url.search}`);
     if (url.pathname === '/api/field.npy') return Promise.resolve(npyField([1, 2]));
-    return Promise.resolve(Response.json({ detail: 'none here' }, { status: qualityStatus }));
+    return Promise.resolve(Response.json({ detail: 'none here' }, { status: 404 }));
   });
   showTags([]);
   goLost();
@@ -84,15 +82,6 @@ describe('loaders', () => {
     goLive(status({ has_map: false }));
     await vi.advanceTimersByTimeAsync(40_000);
     expect(count('/api/map')).toBeLessThanOrEqual(2);
-  });
-
-  test('a server without the error’s route is asked once', async () => {
-    showTags(tags);
-    await settle();
-    showTags(tags);
-    await vi.advanceTimersByTimeAsync(20_000);
-    expect(count('quality')).toBe(1);
-    expect(store.get().twin.latest.quality).toBeNull();
   });
 
   test('a refusal is kept with its reason', async () => {

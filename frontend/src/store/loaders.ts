@@ -1,15 +1,15 @@
 /** Fetches what the frames do not carry, whenever the twin's revision says that it changed. */
-import { fetchQuality, Refusal } from '../contract/api';
-import type { Field, FieldQuality } from '../contract/types';
-import { resolutionFor } from '../domain/field';
+import { answer, bodyOf, fetchQuality, get } from '../contract/api';
+import type { Field, FieldQuality, OccupancyGrid, SensorsFile } from '../contract/types';
+import { cataloguesOf } from '../domain/sensors';
 import type { Snapshot } from '../domain/twin';
-import { boundsOf, type Bounds } from '../geometry/coordinates';
-import { loadMap, type MapPicture } from './picture';
-import { onChange, receive, store, type AppState } from './app';
-import { sourceOf } from './derived';
-import { fetchHeat, type Source } from './heat';
+import { type MapPicture, mapPlacement, opaqueBox, pixelBoxCorners } from '../geometry/image';
+import { act, type AppState, onChange, receive, store } from './app';
+import { type Source, sourceOf } from './derived';
+import { createFetcher, failed, NOTHING, ready, type Wish } from './fetcher';
+import { boundsOfPins, fetchHeat, fieldResolution } from './heat';
 import { selectNewest } from './moment';
-import { createFetcher, NOTHING, type Wish } from './fetcher';
+import { DEFAULT_VIEW } from './view';
 
 const FIELD_INTERVAL_MS = 500;
 /** An estimate costs the twin more, and goes on by itself: what nobody reads becomes less sure. */
@@ -17,45 +17,39 @@ const ESTIMATE_INTERVAL_MS = 1_000;
 const ESTIMATE_TICK_MS = 10_000;
 const MAP_INTERVAL_MS = 1_000;
 const QUALITY_INTERVAL_MS = 3_000;
-/** The server's box is that of the pinned tags widened by its max_distance_m. */
-export const ASSUMED_MARGIN_M = 1.5;
-/** Finer cells than this cannot be told apart on a screen, and cost the Wi-Fi. */
-const MAX_CELLS = 60_000;
-/** As the server has it, where no tag has a place. */
-const DEFAULT_RESOLUTION_M = 0.1;
 
 export function startLoaders(): () => void {
   const field = createFetcher<Field>({
     paceMs: FIELD_INTERVAL_MS,
     onValue: (value) => {
-      receive({ type: 'field', field: { value, state: 'ready', message: '' } });
+      receive({ type: 'field', field: ready(value) });
     },
     onError: (message) => {
-      const { value } = selectNewest(store.get()).field;
-      receive({ type: 'field', field: { value, state: 'failed', message } });
+      receive({ type: 'field', field: failed(message, selectNewest(store.get()).field.value) });
     },
   });
   const map = createFetcher<MapPicture>({
     paceMs: MAP_INTERVAL_MS,
     onValue: (value) => {
-      receive({ type: 'map', map: { value, state: 'ready', message: '' } });
+      receive({ type: 'latest', part: { map: ready(value) } });
     },
     onError: (message) => {
-      const { value } = selectNewest(store.get()).map;
-      receive({ type: 'map', map: { value, state: 'failed', message } });
+      receive({
+        type: 'latest',
+        part: { map: failed(message, selectNewest(store.get()).map.value) },
+      });
     },
   });
-  const quality = createFetcher<FieldQuality | null>({
+  const quality = createFetcher<FieldQuality>({
     paceMs: QUALITY_INTERVAL_MS,
     onValue: (value) => {
-      receive({ type: 'quality', quality: value });
+      receive({ type: 'latest', part: { quality: value } });
     },
     onError: () => {
-      receive({ type: 'quality', quality: null });
+      receive({ type: 'latest', part: { quality: null } });
     },
   });
 
-  let missingSince = -1;
   let ticking: ReturnType<typeof setInterval> | undefined;
   let ticks = 0;
 
@@ -71,7 +65,7 @@ export function startLoaders(): () => void {
       clearInterval(ticking);
       ticking = undefined;
     }
-    const { epoch, status } = state.twin.connection;
+    const { status } = state.twin.connection;
     const newest = selectNewest(state);
     const { sensor } = state.view;
     const base = baseKey(state);
@@ -80,7 +74,7 @@ export function startLoaders(): () => void {
     const { value } = newest.field;
     if (value && (value.sensor !== sensor || (base !== null && !wanted))) {
       receive({ type: 'field', field: NOTHING });
-      receive({ type: 'quality', quality: null });
+      receive({ type: 'latest', part: { quality: null } });
     }
     field.want(wanted);
     if (base === null) {
@@ -88,22 +82,16 @@ export function startLoaders(): () => void {
       quality.want(null);
       return;
     }
-    if (newest.map.value && !status?.has_map) receive({ type: 'map', map: NOTHING });
+    if (newest.map.value && !status?.has_map) receive({ type: 'latest', part: { map: NOTHING } });
     map.want(status?.has_map ? { key: base, group: 'map', run: loadMap } : null);
     quality.want(
       // Of the nearest readings: an estimate tells its own error.
-      epoch === missingSince || source === 'estimate'
+      source === 'estimate'
         ? null
         : {
             key: `${base}|${sensor}`,
             group: sensor,
-            run: (signal) =>
-              fetchQuality(sensor, signal).catch((error: unknown) => {
-                // A server without this route: the page does without, until the next server.
-                if (!(error instanceof Refusal) || error.status !== 404) throw error;
-                missingSince = epoch;
-                return null;
-              }),
+            run: (signal) => fetchQuality(sensor, signal),
           },
     );
   };
@@ -143,20 +131,81 @@ function fieldTask(
   };
 }
 
-const boundsOfPins = (snapshot: Snapshot | null): Bounds | null =>
-  boundsOf((snapshot?.tags ?? []).flatMap((tag) => (tag.at ? [tag.at] : [])));
+/** Fetches the file of sensors: at once, and again on each new connection, behind which may be another. */
 
-/** The side of a cell, in metres, for the field of a house as large as this one. */
-export function fieldResolution(snapshot: Snapshot | null): number {
-  const bounds = boundsOfPins(snapshot);
-  if (!bounds) return DEFAULT_RESOLUTION_M;
-  return resolutionFor(
-    {
-      minX: bounds.minX - ASSUMED_MARGIN_M,
-      minY: bounds.minY - ASSUMED_MARGIN_M,
-      maxX: bounds.maxX + ASSUMED_MARGIN_M,
-      maxY: bounds.maxY + ASSUMED_MARGIN_M,
+const INTERVAL_MS = 500;
+
+const fetchFile = async (signal: AbortSignal): Promise<SensorsFile> =>
+  bodyOf(await get('api/sensors', signal));
+
+export function startSensors(): () => void {
+  let known = '';
+  const sensors = createFetcher<SensorsFile>({
+    paceMs: INTERVAL_MS,
+    onValue: (file) => {
+      const text = JSON.stringify(file);
+      // The browser asks with its ETag, and mostly is told that it has it: nothing follows then.
+      if (text === known) return;
+      known = text;
+      const value = cataloguesOf(file);
+      receive({ type: 'set', part: { sensors: ready(value) } });
+      // A file without what the page opens with: then the first that it has.
+      const [first] = value.day.all;
+      const { sensor } = store.get().view;
+      const isChosen = sensor !== DEFAULT_VIEW.sensor || sensor in file.sensors;
+      if (first && !isChosen) act({ type: 'sensor', sensor: first.name });
     },
-    MAX_CELLS,
-  );
+    onError: (message) => {
+      // What was in force before goes on: a bridge that is away has no other ranges.
+      if (known === '') receive({ type: 'set', part: { sensors: failed(message) } });
+    },
+  });
+  const update = (): void => {
+    // The first connection is made while this is fetched, and to the same bridge.
+    const epoch = Math.max(1, store.get().twin.connection.epoch);
+    sensors.want({ key: String(epoch), group: 'sensors', run: fetchFile });
+  };
+  update();
+  const stop = store.subscribe(update);
+  return () => {
+    stop();
+    sensors.want(null);
+  };
+}
+
+/**
+ * Fetches the map's place and its picture. The map may grow between the two requests; a picture
+ * of another size than announced is an error, and the caller tries again.
+ */
+export async function loadMap(signal: AbortSignal): Promise<MapPicture> {
+  const [grid, blob] = await Promise.all([
+    answer('OccupancyGrid', signal, 'api/map'),
+    get('api/map.png', signal).then((response) => response.blob()),
+  ]);
+  const bitmap = await createImageBitmap(blob);
+  try {
+    return decode(grid, bitmap);
+  } finally {
+    bitmap.close();
+  }
+}
+
+function decode(grid: OccupancyGrid, bitmap: ImageBitmap): MapPicture {
+  const { width, height } = bitmap;
+  const placement = mapPlacement(grid);
+  if (width !== placement.width || height !== placement.height) {
+    throw new Error(
+      `map: the picture is ${width} x ${height}, announced were ` +
+        `${placement.width} x ${placement.height}`,
+    );
+  }
+  const canvas = document.createElement('canvas');
+  canvas.width = width;
+  canvas.height = height;
+  const context = canvas.getContext('2d', { willReadFrequently: true });
+  if (!context) throw new Error('map: this browser has no 2d canvas');
+  context.drawImage(bitmap, 0, 0);
+  const pixels = context.getImageData(0, 0, width, height);
+  const box = opaqueBox(pixels.data, width, height);
+  return { placement, pixels, known: box ? pixelBoxCorners(placement, box) : [] };
 }

@@ -3,7 +3,7 @@ import { join } from 'node:path';
 
 import { beforeEach, describe, expect, test } from 'vitest';
 
-import { ageSeconds } from '../domain/age';
+import { ageSeconds } from '../domain/time';
 import { snapshotOf } from '../domain/twin';
 import { goLive, showTags, status } from '../testing/page';
 import { judgement, reason } from '../testing/health';
@@ -17,7 +17,7 @@ const then = (): House => ({
   ...NO_HOUSE,
   snapshot: snapshotOf(
     stateFrame([
-      wireTag({ tag_id: 'old', readings: readings({ temperature: 40, ph: 6 }), stale_seconds: 30 }),
+      wireTag({ tag_id: 'old', readings: readings({ temperature: 40, ph: 6 }, 75) }),
     ]),
     1_000,
     null,
@@ -64,8 +64,8 @@ describe('another moment', () => {
   test('has ages of its own, which do not go on', () => {
     const shown = shownAt(store.get().twin, 77);
     const [tag] = shown.snapshot?.tags ?? [];
-    expect(ageSeconds(tag?.observedAt ?? null, 1_000, shown.ageing)).toBe(30);
-    expect(ageSeconds(tag?.observedAt ?? null, 999_000, shown.ageing)).toBe(30);
+    expect(ageSeconds(tag?.scannedAt ?? null, 1_000, shown.ageing)).toBe(30);
+    expect(ageSeconds(tag?.scannedAt ?? null, 999_000, shown.ageing)).toBe(30);
   });
 
   test('that is not here yet leaves the last one that came, with its own time', () => {
@@ -88,7 +88,7 @@ describe('another moment', () => {
 
   test('has the map of now, for of maps nobody keeps a past', () => {
     const picture = { value: null, state: 'failed', message: 'x' } as const;
-    receive({ type: 'map', map: picture });
+    receive({ type: 'latest', part: { map: picture } });
     expect(shownAt(store.get().twin, 77).map).toBe(picture);
   });
 

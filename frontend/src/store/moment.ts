@@ -2,11 +2,14 @@
  * What the page shows: a function of what came and of the moment to show. Table, card, legend,
  * map, notices and exports all ask here, so that another moment moves them all at once.
  */
-import { AGES_UNKNOWN, GROWING, type Ageing } from '../domain/age';
-import { secondsOf } from '../domain/rostime';
-import type { Snapshot, Tag } from '../domain/twin';
-import type { AppState } from './app';
+import { now } from '../clock';
+import type { StatusFrame } from '../contract/types';
+import { type Ageing, AGES_UNKNOWN, GROWING, secondsOf, type Span, spanOf } from '../domain/time';
+import { DAY_S } from '../domain/difference';
 import { memoLast, memoOne } from '../domain/memo';
+import type { Snapshot, Tag } from '../domain/twin';
+import { S } from '../strings';
+import { act, type AppState, store } from './app';
 import type { House, Past, TwinState } from './twin';
 
 /** The moment to show: null is now, a number a moment in the past, ROS seconds. */
@@ -118,3 +121,60 @@ export const selectTag = (state: AppState, tagId: string): Tag | undefined =>
 /** The same tag as it is now, whatever moment is shown. */
 export const selectNewestTag = ({ twin }: AppState, tagId: string): Tag | undefined =>
   byId(twin.latest.snapshot?.tags ?? NO_TAGS).get(tagId);
+
+/**
+ * Where what the twin observed comes from, as it says. A simulation is told as such; a recording that
+ * is played is, in nothing, of now.
+ */
+
+/** Those that have to be told; null: a robot's, or of a twin that does not say. */
+export type Origin = Exclude<StatusFrame['origin'], 'robot' | 'unknown'> | null;
+
+export function selectOrigin({ twin }: AppState): Origin {
+  const origin = twin.connection.status?.origin;
+  return origin === 'simulated' || origin === 'recorded' || origin === 'sim_time' ? origin : null;
+}
+
+/** How long a day of the greenhouse takes, seconds of its time: in a demo it is a short one. */
+export const selectDayS = ({ twin }: AppState): number =>
+  twin.connection.status?.day_length_s ?? DAY_S;
+
+export const selectIsRecorded = (state: AppState): boolean => selectOrigin(state) === 'recorded';
+
+/** Whether the twin's time may be another than that of the clock on the wall. */
+export const selectHasOwnTime = (state: AppState): boolean =>
+  selectIsRecorded(state) || selectOrigin(state) === 'sim_time';
+
+/** The newest moment there is where that is not the time on the wall, ROS seconds; else null. */
+export function ownTime(state: AppState, at: number): number | null {
+  if (!selectHasOwnTime(state)) return null;
+  const { snapshot } = selectNewest(state);
+  if (!snapshot) return null;
+  const taken = secondsOf(snapshot.at);
+  if (taken === 0) return null;
+  return isHeardNow(state) ? rosNow(state, at) : taken;
+}
+
+/** The stretch of time that the bar has now, and the twin's time. */
+
+/** What is drawn is what was fetched; until then it is what was asked for. */
+export function barSpan(state: AppState, nowS: number): Span {
+  const { value } = state.twin.remembered;
+  if (value && value.to > value.from) return value;
+  const { from, to } = spanOf(state.view.period, nowS, null);
+  return { from, to: Math.max(to, from + 1) };
+}
+
+/** The twin's time now, ROS seconds; null: nobody knows. */
+export const twinNow = (): number | null => rosNow(store.get(), now());
+
+/** What the end of the bar is called: of a recording it is no present, nor while nothing comes. */
+export const newestWord = (): string => {
+  const { phase } = store.get().twin;
+  if (phase !== 'live') return S.phase[phase];
+  return selectIsRecorded(store.get()) ? S.origin.recorded : S.timebarLive;
+};
+
+export function backToLive(): void {
+  act({ type: 'moment', moment: null });
+}

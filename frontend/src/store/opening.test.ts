@@ -4,7 +4,7 @@ import { timelineOf } from '../domain/timeline';
 import { wireStretch, wireTimeline } from '../testing/timeline';
 import { act, receive, store } from './app';
 import { startOpening } from './remembered';
-import { fromFragment, toFragment } from './permalink';
+import { fromFragment, toFragment } from './address';
 import { NOT_ASKED } from './twin';
 import { DEFAULT_VIEW } from './view';
 
@@ -16,7 +16,7 @@ let stop: () => void;
 const remember = (seconds: number | null): void => {
   const reach = seconds === null ? null : wireStretch(NOW - seconds, NOW);
   const value = timelineOf(wireTimeline({ from: NOW - 86_400, to: NOW, reach }), NOW);
-  receive({ type: 'remembered', remembered: { value, state: 'ready', message: '' } });
+  receive({ type: 'set', part: { remembered: { value, state: 'ready', message: '' } } });
 };
 const follow = (fragment: string): void => {
   act({ type: 'look', view: fromFragment(fragment) });
@@ -25,7 +25,7 @@ const period = (): unknown => store.get().view.period;
 const address = (): string => toFragment(store.get().view);
 
 beforeEach(() => {
-  receive({ type: 'remembered', remembered: NOT_ASKED });
+  receive({ type: 'set', part: { remembered: NOT_ASKED } });
   act({ type: 'look', view: DEFAULT_VIEW });
   stop = startOpening();
 });

@@ -4,11 +4,18 @@ import { fetchStateAt } from '../contract/past';
 import type { Field, Judgement } from '../contract/types';
 import { snapshotOf, type Snapshot } from '../domain/twin';
 import { onChange, receive, store, type AppState } from './app';
-import { sourceOf } from './derived';
-import { fetchHeat, type Source } from './heat';
-import { fieldResolution } from './loaders';
+import { sourceOf, type Source } from './derived';
+import { fetchHeat, fieldResolution } from './heat';
 import { selectNewest, selectPast } from './moment';
-import { createFetcher, DRAG_PACE_MS, type Fetched, NOTHING, type Wish } from './fetcher';
+import {
+  createFetcher,
+  DRAG_PACE_MS,
+  failed,
+  type Fetched,
+  NOTHING,
+  ready,
+  type Wish,
+} from './fetcher';
 import { NO_HOUSE, type Past } from './twin';
 
 /**
@@ -79,7 +86,7 @@ export function startPast(): () => void {
       const { moment } = store.get().view;
       if (moment === null) return;
       if (selectPast(store.get()) === null || isLasting) showNothing(moment);
-      receive({ type: 'past-fault', fault: { at: moment, message, isLasting } });
+      receive({ type: 'set', part: { pastFault: { at: moment, message, isLasting } } });
     },
   });
 
@@ -96,7 +103,7 @@ export function startPast(): () => void {
       return;
     }
     const fault = state.twin.pastFault;
-    if (fault && fault.at !== moment) receive({ type: 'past-fault', fault: null });
+    if (fault && fault.at !== moment) receive({ type: 'set', part: { pastFault: null } });
     if (!past && !selectNewest(state).snapshot) showNothing(moment);
     else if (!past) patience ??= setTimeout(losePatience, PATIENCE_MS);
     else patience = undefined;
@@ -146,11 +153,11 @@ async function cameOf(
   const [latest, field] = await Promise.all([
     fetchStateAt(at, signal),
     fetchHeat(source, { sensor, resolution, at }, signal).then(
-      (value): Fetched<Field> => ({ value, state: 'ready', message: '' }),
+      ready,
       (error: unknown): Fetched<Field> => {
         // What may pass is tried again with the rest.
         if (!(error instanceof Refusal) || error.status !== 400) throw error;
-        return { value: null, state: 'failed', message: error.message };
+        return failed(error.message);
       },
     ),
   ]);

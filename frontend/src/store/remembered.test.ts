@@ -4,7 +4,7 @@ import { goLive, goLost, showTags } from '../testing/page';
 import { stateFrame, wireTag } from '../testing/tags';
 import { wireStretch, wireTimeline } from '../testing/timeline';
 import { act, receive, store } from './app';
-import { fromFragment } from './permalink';
+import { fromFragment } from './address';
 import { askedSpan, startOpening, startRemembered, turnOf } from './remembered';
 import { NOT_ASKED } from './twin';
 
@@ -20,7 +20,7 @@ beforeEach(() => {
     asked.push(url.searchParams);
     return Promise.resolve(answer());
   });
-  receive({ type: 'remembered', remembered: NOT_ASKED });
+  receive({ type: 'set', part: { remembered: NOT_ASKED } });
   showTags([wireTag()]);
   stop = startRemembered();
 });

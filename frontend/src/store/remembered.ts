@@ -2,7 +2,7 @@
 import { now } from '../clock';
 import { Refusal } from '../contract/api';
 import { fetchTimeline } from '../contract/past';
-import { endsNow, type Period, type Span, spanOf } from '../domain/period';
+import { endsNow, type Period, type Span, spanOf } from '../domain/time';
 import { timelineOf } from '../domain/timeline';
 import { act, onChange, receive, store } from './app';
 import { createFetcher } from './fetcher';
@@ -43,11 +43,11 @@ export function startRemembered(): () => void {
   const fetcher = createFetcher<Remembered>({
     paceMs: INTERVAL_MS,
     onValue: (remembered) => {
-      receive({ type: 'remembered', remembered });
+      receive({ type: 'set', part: { remembered } });
     },
     onError: (message) => {
       const { value } = store.get().twin.remembered;
-      receive({ type: 'remembered', remembered: { value, state: 'failed', message } });
+      receive({ type: 'set', part: { remembered: { value, state: 'failed', message } } });
     },
   });
 
@@ -63,7 +63,7 @@ export function startRemembered(): () => void {
       group = next;
       // What is known of another period is of no use; how far memory reaches stays true.
       fetcher.want(null);
-      if (value) receive({ type: 'remembered', remembered: NOT_ASKED });
+      if (value) receive({ type: 'set', part: { remembered: NOT_ASKED } });
       // Which may have led back to the period before.
       if (store.get().view.period !== period) return;
     }

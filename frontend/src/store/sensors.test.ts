@@ -6,7 +6,7 @@ import { judgement } from '../testing/health';
 import { wireTag } from '../testing/tags';
 import { act, receive, store } from './app';
 import { selectCatalogue, selectHeat, selectSensor, selectSensors } from './derived';
-import { startSensors } from './sensors';
+import { startSensors } from './loaders';
 import { NOTHING } from './fetcher';
 
 const answer = vi.fn<() => Promise<Response>>();
@@ -23,7 +23,7 @@ beforeEach(() => {
   answer.mockImplementation(() => fileWith(FILE.sensors));
   vi.stubGlobal('fetch', answer);
   showTags([wireTag()]);
-  receive({ type: 'sensors', sensors: NOTHING });
+  receive({ type: 'set', part: { sensors: NOTHING } });
 });
 
 afterEach(() => {
@@ -86,14 +86,14 @@ test('a file without the sensor that the page opens with shows its first, unless
   expect(store.get().view.sensor).toBe('ph');
   stop();
   act({ type: 'sensor', sensor: 'humidity' });
-  receive({ type: 'sensors', sensors: NOTHING });
+  receive({ type: 'set', part: { sensors: NOTHING } });
   stop = startSensors();
   await come();
   expect(store.get().view.sensor).toBe('humidity');
 });
 
 test('ranges are of the day or of the night, as the judge says', () => {
-  receive({ type: 'sensors', sensors: { value: CATALOGUES, state: 'ready', message: '' } });
+  receive({ type: 'set', part: { sensors: { value: CATALOGUES, state: 'ready', message: '' } } });
   expect(selectCatalogue(store.get())).toBe(CATALOGUES.day);
   showTags([wireTag()], judgement({}, { is_day: false, source: 'clock' }));
   expect(selectCatalogue(store.get())).toBe(CATALOGUES.night);

@@ -1,5 +1,5 @@
 /** What the operator prefers on this device; kept in the browser's local storage. */
-import type { TemperatureUnit } from '../domain/units';
+import type { TemperatureUnit } from '../domain/format';
 
 export interface Settings {
   readonly theme: 'system' | 'light' | 'dark';

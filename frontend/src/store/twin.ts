@@ -14,7 +14,7 @@ import { heldRange, type Range } from '../domain/ramp';
 import type { Timeline } from '../domain/timeline';
 import { snapshotOf, type Snapshot } from '../domain/twin';
 import { NOTHING, type Fetched } from './fetcher';
-import type { MapPicture } from './picture';
+import type { MapPicture } from '../geometry/image';
 
 /** The greenhouse as it was or is at one moment, and what is fetched about that moment. */
 export interface House {
@@ -122,19 +122,17 @@ export type TwinAction =
       /** Set on the first frame of a connection: how old the state was when it was sent. */
       readonly stateAgeSeconds?: number | null;
     }
-  | { readonly type: 'alarms'; readonly alarms: Alarms | null }
   /** The machine slept, or its clock was set. */
   | { readonly type: 'lapse' }
   /** A message was dropped, for this reason; null: that was long ago. */
   | { readonly type: 'unread'; readonly why: string | null }
   | { readonly type: 'field'; readonly field: Fetched<Field> }
-  | { readonly type: 'map'; readonly map: Fetched<MapPicture> }
-  | { readonly type: 'quality'; readonly quality: FieldQuality | null }
+  | { readonly type: 'latest'; readonly part: Partial<Pick<House, 'map' | 'quality'>> }
   | { readonly type: 'past'; readonly past: Past | null }
-  | { readonly type: 'past-fault'; readonly fault: PastFault | null }
-  | { readonly type: 'remembered'; readonly remembered: Remembered }
-  | { readonly type: 'difference'; readonly difference: Fetched<Difference> }
-  | { readonly type: 'sensors'; readonly sensors: Fetched<Catalogues> };
+  /** What nothing else follows from. */
+  | { readonly type: 'set'; readonly part: Partial<Pick<TwinState, Plain>> };
+
+type Plain = 'alarms' | 'pastFault' | 'remembered' | 'difference' | 'sensors';
 
 export function reduceTwin(state: TwinState, action: TwinAction): TwinState {
   switch (action.type) {
@@ -152,8 +150,6 @@ export function reduceTwin(state: TwinState, action: TwinAction): TwinState {
       const health = sharedJudgement(state.latest.health, action.latest.health);
       return withLatest({ ...state, isTimeLost: false }, { snapshot, health });
     }
-    case 'alarms':
-      return { ...state, alarms: action.alarms };
     case 'lapse':
       return { ...state, isTimeLost: true };
     case 'unread': {
@@ -166,20 +162,12 @@ export function reduceTwin(state: TwinState, action: TwinAction): TwinState {
         field: action.field,
         held: heldAfter(state.latest.held, action.field.value),
       });
-    case 'map':
-      return withLatest(state, { map: action.map });
-    case 'quality':
-      return withLatest(state, { quality: action.quality });
+    case 'latest':
+      return withLatest(state, action.part);
     case 'past':
       return { ...state, past: action.past && heldPast(state, action.past), pastFault: null };
-    case 'past-fault':
-      return { ...state, pastFault: action.fault };
-    case 'remembered':
-      return { ...state, remembered: action.remembered };
-    case 'difference':
-      return { ...state, difference: action.difference };
-    case 'sensors':
-      return { ...state, sensors: action.sensors };
+    case 'set':
+      return { ...state, ...action.part };
   }
 }
 

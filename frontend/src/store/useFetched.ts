@@ -1,6 +1,6 @@
 import { useEffect, useState } from 'react';
 
-import { createFetcher, type Fetched, NOTHING, type Wish } from './fetcher';
+import { createFetcher, failed, type Fetched, NOTHING, ready, type Wish } from './fetcher';
 
 /**
  * What a component wishes for just now; null: nothing more. The value before stays until the next
@@ -13,10 +13,10 @@ export function useFetched<T>(wish: Wish<T> | null, paceMs: number): Fetched<T> 
     createFetcher<T>({
       paceMs,
       onValue: (value) => {
-        setFetched({ value, state: 'ready', message: '' });
+        setFetched(ready(value));
       },
       onError: (message) => {
-        setFetched(({ value }) => ({ value, state: 'failed', message }));
+        setFetched(({ value }) => failed(message, value));
       },
     }),
   );

@@ -1,6 +1,6 @@
 import { expect, test } from 'vitest';
 
-import { fromFragment, toFragment } from './permalink';
+import { fromFragment, toFragment } from './address';
 import { DEFAULT_VIEW, fixedRange, reduceView, type ViewState } from './view';
 
 test('each sensor keeps its own fixed range', () => {

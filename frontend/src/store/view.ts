@@ -2,7 +2,7 @@
 import type { Verdict } from '../contract/types';
 import type { Range } from '../domain/ramp';
 import type { Compare } from '../domain/difference';
-import type { Period } from '../domain/period';
+import type { Period } from '../domain/time';
 import type { Camera } from '../geometry/coordinates';
 
 export const LAYERS = [

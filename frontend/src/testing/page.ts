@@ -33,19 +33,22 @@ let stamp = 1;
 export function showTags(tags: readonly TwinTagState[], health: Judgement = NOBODY): void {
   act({ type: 'look', view: DEFAULT_VIEW });
   prefer(DEFAULT_SETTINGS);
-  receive({ type: 'sensors', sensors: { value: CATALOGUES, state: 'ready', message: '' } });
+  receive({ type: 'set', part: { sensors: { value: CATALOGUES, state: 'ready', message: '' } } });
   receive({ type: 'field', field: NOTHING });
-  receive({ type: 'map', map: NOTHING });
-  receive({ type: 'quality', quality: null });
+  receive({ type: 'latest', part: { map: NOTHING } });
+  receive({ type: 'latest', part: { quality: null } });
   receive({ type: 'unread', why: null });
   receive({ type: 'past', past: null });
-  receive({ type: 'alarms', alarms: null });
-  receive({ type: 'remembered', remembered: NOT_ASKED });
+  receive({ type: 'set', part: { alarms: null } });
+  receive({ type: 'set', part: { remembered: NOT_ASKED } });
   stamp += 1;
   const latest = stateFrame(tags, { sec: stamp, revision: `r${stamp}`, health });
   receive({ type: 'state', latest, now: performance.now() });
   goLive();
 }
+
+/** ROS seconds of the state that `showTags` shows next. */
+export const nextStamp = (): number => stamp + 1;
 
 /** A heat map that has come. */
 export function showField(value: Field): void {

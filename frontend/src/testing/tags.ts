@@ -28,17 +28,19 @@ export function wireTag(over: Partial<TwinTagState> = {}): TwinTagState {
 export const tag = (over: Partial<TwinTagState> = {}): Tag =>
   tagOf(wireTag(over), { at: { sec: 105, nanosec: 0 }, takenAt: 0 });
 
-export const readings = (values: Record<string, number | null>): TwinTagState['readings'] =>
+export const readings = (
+  values: Record<string, number | null>,
+  sec = 100,
+): TwinTagState['readings'] =>
   Object.entries(values).map(([name, value]) => ({
     name,
     value,
-    observed_at: { sec: 100, nanosec: 0 },
-    stale_seconds: 5,
+    observed_at: { sec, nanosec: 0 },
   }));
 
 export function stateFrame(
   tags: readonly TwinTagState[],
-  { seq = 1, sec = 1000, revision = 'r1', health = NOBODY } = {},
+  { seq = 1, sec = 105, revision = 'r1', health = NOBODY } = {},
 ): StateFrame {
   return {
     type: 'state',

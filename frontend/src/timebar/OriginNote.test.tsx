@@ -3,14 +3,12 @@ import { beforeEach, expect, test } from 'vitest';
 
 import type { StatusFrame } from '../contract/types';
 import { act, receive, store } from '../store/app';
-import { selectOrigin } from '../store/origin';
+import { selectOrigin } from '../store/moment';
 import { NO_HOUSE } from '../store/twin';
 import { goLive, goLost, showTags, status } from '../testing/page';
 import { wireTag } from '../testing/tags';
 import { ConnectionBadge } from '../ui/ConnectionBadge';
-import { LiveButton } from './PastHeader';
-import { OriginNote } from './OriginNote';
-import { PastFrame } from './PastFrame';
+import { LiveButton, OriginNote, PastFrame } from './Past';
 
 const shows = (origin: StatusFrame['origin'], reason: StatusFrame['reason'] = 'live'): void => {
   flush(() => {

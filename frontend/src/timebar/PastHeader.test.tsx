@@ -6,8 +6,7 @@ import { act, receive, store } from '../store/app';
 import { NO_HOUSE } from '../store/twin';
 import { goLive, showTags, status } from '../testing/page';
 import { stateFrame, wireTag } from '../testing/tags';
-import { PastFrame } from './PastFrame';
-import { PastHeader } from './PastHeader';
+import { PastFrame, PastHeader } from './Past';
 
 let stop: () => void;
 

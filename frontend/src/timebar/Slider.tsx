@@ -8,22 +8,27 @@ import {
   type PointerEvent,
 } from 'react';
 
-import { endsNow, type Span } from '../domain/period';
-import { hasDate, rosText } from '../domain/rostime';
-import { timeTicks } from '../domain/ticks';
-import type { Timeline } from '../domain/timeline';
+import { endsNow, hasDate, rosText, type Span } from '../domain/time';
+import { type Timeline, timeTicks } from '../domain/timeline';
 import { contextOf } from '../draw/surface';
 import { act, store, useApp } from '../store/app';
-import { useSelected } from '../store/create';
-import { pointedBy, pointedTime } from '../store/signals';
-import { selectAwaited, selectShown } from '../store/moment';
+import { pointedBy, pointedTime, useSelected } from '../store/create';
+import { newestWord, selectAwaited, selectShown } from '../store/moment';
 import { onThemeChange } from '../store/theme';
 import { S } from '../strings';
-import { chosenAt, momentAt, pixelS, stepped, xOf, type Axis } from './axis';
-import { columnAt, columnsOf, type Column } from './columns';
+import {
+  type Axis,
+  chosenAt,
+  type Column,
+  columnAt,
+  columnsOf,
+  momentAt,
+  pixelS,
+  stepped,
+  xOf,
+} from './axis';
 import { BAR_PX, drawBar, readBarPalette } from './draw';
 import { pause } from './playback';
-import { newestWord } from './span';
 
 /** Room that the text of a time needs, CSS pixels. */
 const TICK_ROOM_PX = 76;

@@ -1,14 +1,14 @@
-import { act as flush, fireEvent, render, screen } from '@testing-library/react';
+import { fireEvent, act as flush, render, screen } from '@testing-library/react';
 import { beforeEach, describe, expect, test, vi } from 'vitest';
 
 import { timelineOf } from '../domain/timeline';
 import { act, receive, store } from '../store/app';
-import { pointedTime } from '../store/signals';
+import { pointedTime } from '../store/create';
 import { NO_HOUSE, NO_TWIN } from '../store/twin';
 import { goLive, goLost, showTags, status } from '../testing/page';
 import { stateFrame, wireTag } from '../testing/tags';
 import { wireTime, wireTimeline } from '../testing/timeline';
-import { TimeBar } from './TimeBar';
+import { fieldOf, momentOf, TimeBar } from './TimeBar';
 
 const NOW = 10_000;
 
@@ -17,7 +17,7 @@ const remember = (from: number, to: number): void => {
     { start: wireTime(9_000), scans: 3, failures: 1, looks: 0, pests_seen: 1, pests_cleared: 0 },
   ];
   const value = timelineOf(wireTimeline({ from, to, bucket_s: 15, buckets }), NOW);
-  receive({ type: 'remembered', remembered: { value, state: 'ready', message: '' } });
+  receive({ type: 'set', part: { remembered: { value, state: 'ready', message: '' } } });
 };
 
 beforeEach(() => {
@@ -203,8 +203,8 @@ describe('the period', () => {
 
 test('a twin that remembers nothing says so, and how to change it', () => {
   receive({
-    type: 'remembered',
-    remembered: { value: null, state: 'off', message: 'no journal is kept' },
+    type: 'set',
+    part: { remembered: { value: null, state: 'off', message: 'no journal is kept' } },
   });
   render(<TimeBar />);
   const bar = screen.getByTestId('timebar');
@@ -217,8 +217,8 @@ test('a twin that remembers nothing says so, and how to change it', () => {
 test('what could not be loaded is told, beside what is known', () => {
   const { remembered } = store.get().twin;
   receive({
-    type: 'remembered',
-    remembered: { ...remembered, state: 'failed', message: 'too busy' },
+    type: 'set',
+    part: { remembered: { ...remembered, state: 'failed', message: 'too busy' } },
   });
   render(<TimeBar />);
   expect(screen.getByTestId('timebar').textContent).toContain('too busy');
@@ -229,4 +229,35 @@ test('before the twin has told its time there is no bar', () => {
   vi.spyOn(store, 'get').mockReturnValue({ ...store.get(), twin: NO_TWIN });
   const { container } = render(<TimeBar />);
   expect(container.childElementCount).toBe(0);
+});
+
+// Half an hour off the full one, and set before any module looks at the clock.
+vi.hoisted(() => {
+  process.env['TZ'] = 'Asia/Kolkata';
+});
+
+const AT = Date.UTC(2026, 10, 13, 21, 42, 5) / 1000;
+
+test('a date is on the operator’s clock, there and back', () => {
+  expect(fieldOf(AT + 0.9, false)).toBe('2026-11-14T03:12:05');
+  expect(momentOf('2026-11-14T03:12:05', false)).toBe(AT);
+  expect(momentOf('2026-11-14T03:12', false)).toBe(AT - 5);
+});
+
+test('a simulation counts hours from its beginning', () => {
+  expect(fieldOf(3_723, true)).toBe('1:02:03');
+  expect(momentOf('1:02:03', true)).toBe(3_723);
+  expect(momentOf(' 100:00 ', true)).toBe(360_000);
+});
+
+test.each([
+  ['', false],
+  ['yesterday', false],
+  ['2026-11', false],
+  ['1960-01-01T00:00', false],
+  ['', true],
+  ['1:60:00', true],
+  ['7', true],
+])('%j is no time', (text, isSimulated) => {
+  expect(momentOf(text, isSimulated)).toBeNull();
 });

@@ -1,5 +1,6 @@
 /** Where a moment lies on the bar. Pure. */
-import type { Span } from '../domain/period';
+import type { Span } from '../domain/time';
+import type { Happened, Timeline } from '../domain/timeline';
 
 /** The bar's stretch of time, ROS seconds, over its width in CSS pixels. */
 export interface Axis extends Span {
@@ -39,3 +40,93 @@ export function stepped(
   if (at >= now) return null;
   return Math.max(Math.min(axis.from, from ?? axis.from), at);
 }
+
+/** What the bar shows where: buckets become columns that an eye can tell apart. Pure. */
+
+/** CSS pixels; narrower columns cannot be told apart. */
+const LEAST_COLUMN_PX = 3;
+
+/** What happened within a few pixels. */
+export interface Column extends Happened {
+  readonly end: number;
+  readonly x: number;
+  readonly width: number;
+  /** Of the tallest column, 0 to 1; any scan at all can be seen. */
+  readonly scanHeight: number;
+  readonly failureHeight: number;
+}
+
+/** A stretch in pixels. */
+export interface Stretch {
+  readonly x: number;
+  readonly width: number;
+}
+
+/**
+ * A few scans beside many would vanish; by their root they stay in sight. The smallest is a tenth.
+ */
+const height = (count: number, most: number): number =>
+  count === 0 ? 0 : Math.max(0.1, Math.sqrt(count / most));
+
+export function columnsOf({ buckets, bucketS }: Timeline, axis: Axis): readonly Column[] {
+  const bucketPx = (bucketS / (axis.to - axis.from)) * axis.width;
+  const together = Math.max(1, Math.ceil(LEAST_COLUMN_PX / Math.max(1e-9, bucketPx)));
+  const wide = together * bucketS;
+  const sums = new Map<number, Happened>();
+  for (const bucket of buckets) {
+    const place = Math.floor((bucket.start - axis.from) / wide + 1e-6);
+    sums.set(place, added(sums.get(place), bucket, axis.from + place * wide));
+  }
+  const all = [...sums.values()].filter(({ start }) => start < axis.to && start + wide > axis.from);
+  const most = Math.max(1, ...all.map(({ scans, failures }) => Math.max(scans, failures)));
+  return all.map((sum) => {
+    const x = xOf(axis, sum.start);
+    // None beyond the end of the bar, which is mostly now.
+    const end = Math.min(sum.start + wide, axis.to);
+    return {
+      ...sum,
+      end,
+      x,
+      width: Math.max(1, xOf(axis, end) - x),
+      scanHeight: height(sum.scans, most),
+      failureHeight: height(sum.failures, most),
+    };
+  });
+}
+
+const added = (sum: Happened | undefined, bucket: Happened, start: number): Happened => ({
+  start,
+  scans: (sum?.scans ?? 0) + bucket.scans,
+  failures: (sum?.failures ?? 0) + bucket.failures,
+  looks: (sum?.looks ?? 0) + bucket.looks,
+  pestsSeen: (sum?.pestsSeen ?? 0) + bucket.pestsSeen,
+  pestsCleared: (sum?.pestsCleared ?? 0) + bucket.pestsCleared,
+});
+
+/** The parts of spans that lie on the bar; what is less than a pixel is shown as one. */
+export function stretchesOf(spans: readonly Span[], axis: Axis): readonly Stretch[] {
+  return spans
+    .filter(({ from, to }) => to > axis.from && from < axis.to)
+    .map(({ from, to }) => {
+      const x = Math.max(0, xOf(axis, from));
+      return { x, width: Math.max(1, Math.min(axis.width, xOf(axis, to)) - x) };
+    });
+}
+
+/** Where a run of the clock begins that is not the first, in pixels. */
+export function runStarts({ runs }: Timeline, axis: Axis): readonly number[] {
+  const first = Math.min(...runs.map(({ from }) => from));
+  return runs
+    .filter(({ from }) => from > first && from > axis.from && from < axis.to)
+    .map(({ from }) => xOf(axis, from));
+}
+
+/** The part of the bar that memory does not reach: before its beginning; null: none. */
+export function beforeMemory({ reach }: Timeline, axis: Axis): Stretch | null {
+  const until = reach ? Math.min(axis.width, xOf(axis, reach.from)) : axis.width;
+  return until > 0 ? { x: 0, width: until } : null;
+}
+
+/** The column that a point of the bar lies on. */
+export const columnAt = (columns: readonly Column[], x: number): Column | undefined =>
+  columns.find((column) => x >= column.x && x < column.x + column.width);

@@ -3,8 +3,7 @@ import { expect, test } from 'vitest';
 import type { Timeline } from '../domain/timeline';
 import { FakeContext } from '../testing/canvas';
 import { timelineWith } from '../testing/timeline';
-import type { Axis } from './axis';
-import { columnsOf } from './columns';
+import { type Axis, columnsOf } from './axis';
 import { BAR_PX, drawBar, type BarPalette } from './draw';
 
 const AXIS: Axis = { from: 100, to: 200, width: 1_000 };

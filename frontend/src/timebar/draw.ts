@@ -1,9 +1,15 @@
 /** Draws the bar. Each mark has a shape and a place of its own; colour comes on top. */
-import type { Tick } from '../domain/ticks';
-import type { Timeline } from '../domain/timeline';
+import type { Tick, Timeline } from '../domain/timeline';
 import { clear, type Surface } from '../draw/surface';
-import { type Axis, xOf } from './axis';
-import { beforeMemory, type Column, runStarts, type Stretch, stretchesOf } from './columns';
+import {
+  type Axis,
+  beforeMemory,
+  type Column,
+  runStarts,
+  type Stretch,
+  stretchesOf,
+  xOf,
+} from './axis';
 
 export interface BarPalette {
   readonly ink: string;

@@ -68,11 +68,11 @@ describe('playback', () => {
     expect(playback.get().isPlaying).toBe(false);
     play();
     const fault = { at: 80_000, message: 'no journal is kept', isLasting: true };
-    receive({ type: 'past-fault', fault });
+    receive({ type: 'set', part: { pastFault: fault } });
     vi.advanceTimersByTime(200);
     expect(playback.get().isPlaying).toBe(false);
     expect(moment()).toBe(80_000);
-    receive({ type: 'past-fault', fault: null });
+    receive({ type: 'set', part: { pastFault: null } });
   });
 
   test('is begun and ended by one key; another speed holds at once', () => {

@@ -5,7 +5,7 @@
 import { now } from '../clock';
 import { act, store } from '../store/app';
 import { createStore } from '../store/create';
-import { barSpan, twinNow } from './span';
+import { barSpan, twinNow } from '../store/moment';
 
 /** Seconds of the past a second. */
 export const SPEEDS = [60, 300, 900, 3_600] as const;

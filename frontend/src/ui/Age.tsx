@@ -1,9 +1,9 @@
 import type { JSX } from 'react';
 
-import { ageSeconds, ageStep, type When } from '../domain/age';
+import { ageSeconds, ageStep, type When } from '../domain/time';
 import { ageText } from '../domain/format';
 import { shown } from '../domain/text';
-import { tryKind } from '../domain/reasons';
+import { tryKind } from '../domain/health';
 import type { FailedTry } from '../domain/twin';
 import { useApp } from '../store/app';
 import { selectShown } from '../store/moment';

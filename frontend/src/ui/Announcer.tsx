@@ -1,8 +1,7 @@
 import type { JSX } from 'react';
 
 import { politeVoice, urgentVoice } from '../alarms/voices';
-import type { Announcement } from '../store/signals';
-import { useSelected, type Store } from '../store/create';
+import { type Announcement, type Store, useSelected } from '../store/create';
 import { chosenTag } from './announce';
 
 /** A voice each, so that none cuts off another; only a critical alarm may cut in. */

@@ -2,7 +2,7 @@ import { act as flush, fireEvent, render, screen, within } from '@testing-librar
 import { beforeAll, beforeEach, describe, expect, test, vi } from 'vitest';
 
 import { mapPoint } from '../geometry/coordinates';
-import { pointedAt } from '../map/pointer';
+import { pointedAt } from '../map/commands';
 import { act, receive, store } from '../store/app';
 import { NO_HOUSE } from '../store/twin';
 import { S } from '../strings';

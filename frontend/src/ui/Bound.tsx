@@ -1,7 +1,7 @@
 import { useId, useState, type JSX } from 'react';
 
 import type { Sensor } from '../domain/sensors';
-import { fromShown, toShown, unitOf, type TemperatureUnit } from '../domain/units';
+import { fromShown, type TemperatureUnit, toShown, unitOf } from '../domain/format';
 import { S } from '../strings';
 
 /**

@@ -2,7 +2,7 @@ import type { JSX } from 'react';
 
 import { act, useApp } from '../store/app';
 import { S } from '../strings';
-import { Segmented } from '../widgets/Segmented';
+import { Segmented } from '../widgets/controls';
 
 /** How the heat map is coloured; in the link, and by one click. */
 export function ColouringControl(): JSX.Element {

@@ -2,13 +2,12 @@ import { useState, type JSX } from 'react';
 
 import { now } from '../clock';
 import type { Compare } from '../domain/difference';
-import { hasDate, rosText } from '../domain/rostime';
+import { hasDate, rosText } from '../domain/time';
 import { act, store, useApp } from '../store/app';
-import { rosNow } from '../store/moment';
-import { selectDayS } from '../store/origin';
+import { rosNow, selectDayS } from '../store/moment';
 import { S } from '../strings';
-import { fieldOf, momentOf } from '../timebar/OwnPeriod';
-import { Select } from '../widgets/Select';
+import { fieldOf, momentOf } from '../timebar/TimeBar';
+import { Select } from '../widgets/controls';
 
 const CHOICES = ['none', 'day', 'week', 'own'] as const;
 type Choice = (typeof CHOICES)[number];

@@ -1,8 +1,7 @@
 import type { JSX } from 'react';
 
 import { useApp } from '../store/app';
-import { selectShown } from '../store/moment';
-import { selectHasOwnTime, selectIsRecorded } from '../store/origin';
+import { selectHasOwnTime, selectIsRecorded, selectShown } from '../store/moment';
 import { S } from '../strings';
 
 /** The connection's state in a shape and a word; told to screen readers when it changes. */

@@ -1,9 +1,9 @@
 import type { JSX } from 'react';
 
 import { differenceText, divergingColours, signedText } from '../domain/difference';
-import { rosText } from '../domain/rostime';
+import { rosText } from '../domain/time';
 import { shown } from '../domain/text';
-import { unitOf } from '../domain/units';
+import { unitOf } from '../domain/format';
 import { useApp } from '../store/app';
 import { selectHeat, selectSensor } from '../store/derived';
 import { S } from '../strings';

@@ -7,7 +7,7 @@ import { retryConnection } from '../store/live';
 import { useApp } from '../store/app';
 import { selectNewest, selectShown } from '../store/moment';
 import { S } from '../strings';
-import { More } from '../widgets/More';
+import { More } from '../widgets/controls';
 import { useNow } from '../widgets/useNow';
 
 /** Why the bridge calls the twin offline, for a person. */

@@ -1,10 +1,8 @@
 import type { JSX, ReactNode } from 'react';
 
 import { S } from '../strings';
-import { OriginNote } from '../timebar/OriginNote';
-import { PastHeader } from '../timebar/PastHeader';
-import { Disclosure } from '../widgets/Disclosure';
-import { Icon } from '../widgets/Icon';
+import { OriginNote, PastHeader } from '../timebar/Past';
+import { Disclosure, Icon } from '../widgets/controls';
 import { ConnectionBadge } from './ConnectionBadge';
 import { WithParts } from './WithParts';
 

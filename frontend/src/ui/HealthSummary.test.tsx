@@ -37,7 +37,7 @@ test('says what to do first, and since when', () => {
   const stop = startAlarms();
   render(<HealthSummary kiosk={false} />);
   act(() => {
-    receive({ type: 'alarms', alarms: alarms([], { source: 'starting' }) });
+    receive({ type: 'set', part: { alarms: alarms([], { source: 'starting' }) } });
   });
   expect(house().textContent).not.toContain('second scan');
   act(() => {

@@ -3,7 +3,7 @@ import type { JSX } from 'react';
 import { act, useApp } from '../store/app';
 import { HEATS } from '../store/view';
 import { S } from '../strings';
-import { Select } from '../widgets/Select';
+import { Select } from '../widgets/controls';
 
 /**
  * What the heat map is made of; in the link. On a narrow screen it is among the layers, elsewhere in

@@ -2,8 +2,7 @@ import { useEffect, useRef, type JSX } from 'react';
 
 import { prefer, useApp } from '../store/app';
 import { S } from '../strings';
-import { Check } from '../widgets/Check';
-import { Icon } from '../widgets/Icon';
+import { Check, Icon } from '../widgets/controls';
 
 const ID = 'help-dialog';
 

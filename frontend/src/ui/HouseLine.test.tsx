@@ -42,7 +42,7 @@ test.each([null, 0.04])('without a rhythm it has none to tell: %s', (interval_s)
 
 test('nothing is told of readings of which nobody knows when they were', () => {
   const patrol = { interval_s: null, last_scan: null, overdue: 1 };
-  const told = [{ name: 'temperature', value: 22, observed_at: null, stale_seconds: null }];
+  const told = [{ name: 'temperature', value: 22, observed_at: null }];
   showTags([wireTag({ readings: told })], judgement({ '1': 'unknown' }, undefined, patrol));
   render(<HouseLine />);
   expect(screen.queryByTestId('house-line')).toBeNull();

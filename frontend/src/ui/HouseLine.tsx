@@ -1,6 +1,6 @@
 import type { JSX } from 'react';
 
-import { ageSeconds } from '../domain/age';
+import { ageSeconds } from '../domain/time';
 import { intervalText, ageText } from '../domain/format';
 import { whenOf } from '../domain/twin';
 import { isSilent } from '../domain/health';

@@ -2,7 +2,7 @@ import { act as flush, render, screen } from '@testing-library/react';
 import { beforeEach, describe, expect, test, vi } from 'vitest';
 
 import { canvasPoint } from '../geometry/coordinates';
-import { pinUnderMouse } from '../map/pointer';
+import { pinUnderMouse } from '../map/commands';
 import { act } from '../store/app';
 import { judgement, reason } from '../testing/health';
 import { showTags } from '../testing/page';

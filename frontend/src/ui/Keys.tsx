@@ -2,7 +2,7 @@ import { useMemo, type JSX, type ReactNode } from 'react';
 
 import { VERDICTS } from '../domain/health';
 import { rgbText } from '../domain/ramp';
-import { speciesLooks, UNKNOWN_SPECIES, type BloomLook, speciesText } from '../domain/species';
+import { speciesLooks, UNKNOWN_SPECIES, type BloomLook, speciesText } from '../domain/marks';
 import { speciesOf } from '../draw/scene';
 import { useApp } from '../store/app';
 import { selectTags } from '../store/moment';

@@ -34,16 +34,18 @@ describe('legend', () => {
     const { rerender } = render(<Legend kiosk={false} />);
     expect(screen.queryByTestId('rmse')).toBeNull();
     receive({
-      type: 'quality',
-      quality: {
-        sensor_type: 'temperature',
-        unit: '°C',
-        sample_count: 9,
-        judged_count: 9,
-        rmse: 1.5,
-        worst: null,
-        painted_share: 0.5,
-        far_off_tags: [],
+      type: 'latest',
+      part: {
+        quality: {
+          sensor_type: 'temperature',
+          unit: '°C',
+          sample_count: 9,
+          judged_count: 9,
+          rmse: 1.5,
+          worst: null,
+          painted_share: 0.5,
+          far_off_tags: [],
+        },
       },
     });
     prefer({ unit: 'F' });

@@ -1,12 +1,18 @@
 import type { CSSProperties, JSX } from 'react';
 
 import type { FieldQuality } from '../contract/types';
-import { differenceNumber, readingText, valueText, withUnit } from '../domain/format';
+import {
+  differenceNumber,
+  readingText,
+  type TemperatureUnit,
+  unitOf,
+  valueText,
+  withUnit,
+} from '../domain/format';
 import { idealsText } from '../domain/ideal';
 import { fraction, rgbText, sensorColour, type Range } from '../domain/ramp';
 import type { Sensor, Span } from '../domain/sensors';
 import { shown } from '../domain/text';
-import { unitOf, type TemperatureUnit } from '../domain/units';
 import { useApp } from '../store/app';
 import {
   selectColouring,

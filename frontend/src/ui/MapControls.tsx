@@ -4,10 +4,7 @@ import { commandMap } from '../map/commands';
 import { act, useApp } from '../store/app';
 import { LAYERS } from '../store/view';
 import { S } from '../strings';
-import { Check } from '../widgets/Check';
-import { Disclosure } from '../widgets/Disclosure';
-import { Icon, type IconName } from '../widgets/Icon';
-import { IconButton } from '../widgets/IconButton';
+import { Check, Disclosure, Icon, IconButton, type IconName } from '../widgets/controls';
 import { HeatControl } from './HeatControl';
 import { WithParts } from './WithParts';
 

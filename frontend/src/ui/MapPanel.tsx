@@ -4,7 +4,7 @@ import { MapView } from '../map/MapView';
 import { useApp } from '../store/app';
 import { selectShown } from '../store/moment';
 import { S } from '../strings';
-import { PastFrame } from '../timebar/PastFrame';
+import { PastFrame } from '../timebar/Past';
 import { HealthStrip } from './DoNow';
 import { AdviceMarks } from './estimate';
 import { inTime } from './inTime';

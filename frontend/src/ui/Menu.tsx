@@ -1,14 +1,11 @@
 import type { JSX } from 'react';
 
-import { saveMap, saveTable } from '../export/actions';
-import { copyLink, reportLink, viewAddress } from '../export/link';
-import { failureText } from '../domain/failure';
-import type { TemperatureUnit } from '../domain/units';
+import { copyLink, reportLink, saveMap, saveTable, viewAddress } from '../export/actions';
+import { failureText, type TemperatureUnit } from '../domain/format';
 import { prefer, useApp } from '../store/app';
 import type { Settings } from '../store/settings';
 import { S } from '../strings';
-import { useClose } from '../widgets/Disclosure';
-import { Segmented } from '../widgets/Segmented';
+import { Segmented, useClose } from '../widgets/controls';
 import { openHelp } from './HelpDialog';
 import { LanguageChoice } from './LanguageChoice';
 import { SignOut } from './SignOut';

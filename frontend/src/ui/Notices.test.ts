@@ -91,7 +91,10 @@ describe('of a moment in the past', () => {
 
   test('that cannot be had, the reason is told', () => {
     come(NO_HOUSE);
-    receive({ type: 'past-fault', fault: { at, message: 'no journal is kept', isLasting: true } });
+    receive({
+      type: 'set',
+      part: { pastFault: { at, message: 'no journal is kept', isLasting: true } },
+    });
     expect(noticeFor(store.get())).toMatchObject({ id: 'past-failed', hint: 'no journal is kept' });
   });
 
@@ -102,14 +105,14 @@ describe('of a moment in the past', () => {
       hint: 'Nothing has been recorded yet.',
     });
     const value = timelineOf(wireTimeline({ from: 7_200, to: 9_000 }), 9_000);
-    receive({ type: 'remembered', remembered: { value, state: 'ready', message: '' } });
+    receive({ type: 'set', part: { remembered: { value, state: 'ready', message: '' } } });
     expect(noticeFor(store.get())?.hint).toBe('Recorded data begins at sim 02:00:00.');
   });
 
   test('that the journal does not have all of is not said to have been empty', () => {
     come({ ...NO_HOUSE, snapshot: { ...snapshot([]), isWhole: false } });
     const value = timelineOf(wireTimeline({ from: 0, to: 9_000 }), 9_000);
-    receive({ type: 'remembered', remembered: { value, state: 'ready', message: '' } });
+    receive({ type: 'set', part: { remembered: { value, state: 'ready', message: '' } } });
     expect(noticeFor(store.get())?.hint).toBe('This is no longer stored, or was not recorded yet.');
   });
 

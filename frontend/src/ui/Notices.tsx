@@ -1,13 +1,13 @@
 import type { JSX } from 'react';
 
-import { rosText } from '../domain/rostime';
+import { rosText } from '../domain/time';
 import { shown } from '../domain/text';
 import type { Snapshot } from '../domain/twin';
 import { useApp, type AppState } from '../store/app';
 import { selectSensor } from '../store/derived';
 import { selectShown, selectTags } from '../store/moment';
 import { S } from '../strings';
-import { More } from '../widgets/More';
+import { More } from '../widgets/controls';
 import { offlineMore, offlineReason } from './FrozenBanner';
 
 interface Notice {

@@ -4,12 +4,17 @@ import { flushSync } from 'react-dom';
 import { epochOf, timeOfDay } from '../clock';
 import { rangeText } from '../domain/format';
 import { idealsText } from '../domain/ideal';
-import { dateText, rosText, secondsOf } from '../domain/rostime';
+import { dateText, rosText, secondsOf } from '../domain/time';
 import { shown } from '../domain/text';
 import { useApp } from '../store/app';
 import { selectColouring, selectRange, selectSensor } from '../store/derived';
-import { selectShown, selectSnapshot, selectTags } from '../store/moment';
-import { selectHasOwnTime, selectOrigin } from '../store/origin';
+import {
+  selectHasOwnTime,
+  selectOrigin,
+  selectShown,
+  selectSnapshot,
+  selectTags,
+} from '../store/moment';
 import { S } from '../strings';
 
 /** What and when, on paper alone: "Live" and "5 s" mean nothing an hour later. */

@@ -7,7 +7,7 @@ import { act, useApp } from '../store/app';
 import { fixedRange } from '../store/view';
 import { S } from '../strings';
 import { Bound } from './Bound';
-import { Segmented } from '../widgets/Segmented';
+import { Segmented } from '../widgets/controls';
 
 /** Automatic colours follow the data; a fixed range lets two moments be compared. */
 export function RangeControl({

@@ -4,7 +4,7 @@ import { rgbText, sensorColour } from '../domain/ramp';
 import { act, useApp } from '../store/app';
 import { selectSensors } from '../store/derived';
 import { S } from '../strings';
-import { Segmented } from '../widgets/Segmented';
+import { Segmented } from '../widgets/controls';
 import { SensorLabel } from './SensorLabel';
 
 /** Which sensor the map shows. */

@@ -3,7 +3,7 @@ import { useEffect, useState, type JSX } from 'react';
 import { route } from '../contract/api';
 import { fetchSession, signOut } from '../contract/people';
 import type { Session } from '../contract/types';
-import { failureText } from '../domain/failure';
+import { failureText } from '../domain/format';
 import { S } from '../strings';
 import { say } from './toast';
 

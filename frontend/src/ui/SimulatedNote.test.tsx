@@ -2,7 +2,7 @@ import { act as flush, render, screen } from '@testing-library/react';
 import { beforeEach, expect, test } from 'vitest';
 
 import type { StatusFrame } from '../contract/types';
-import { rosText } from '../domain/rostime';
+import { rosText } from '../domain/time';
 import { act, receive } from '../store/app';
 import { NO_HOUSE } from '../store/twin';
 import { goLive, showTags, status } from '../testing/page';

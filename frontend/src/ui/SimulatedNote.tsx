@@ -1,9 +1,8 @@
 import type { JSX } from 'react';
 
-import { rosText, secondsOf } from '../domain/rostime';
+import { rosText, secondsOf } from '../domain/time';
 import { useApp, type AppState } from '../store/app';
-import { selectShown } from '../store/moment';
-import { selectOrigin } from '../store/origin';
+import { selectOrigin, selectShown } from '../store/moment';
 import { S } from '../strings';
 
 /** Where the simulated past ends, if the moment that is shown lies in it, and not all is simulated; ROS seconds. */

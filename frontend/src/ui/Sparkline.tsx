@@ -1,10 +1,9 @@
 import type { JSX } from 'react';
 
 import type { TagHistory } from '../contract/types';
-import { readingText } from '../domain/format';
+import { readingText, type TemperatureUnit } from '../domain/format';
 import { rangeOf, rgbText, sensorColour } from '../domain/ramp';
 import type { Sensor } from '../domain/sensors';
-import type { TemperatureUnit } from '../domain/units';
 import { S } from '../strings';
 
 type Values = TagHistory['sensors'][number]['values'];

@@ -6,8 +6,7 @@ import { selectCatalogue, selectColumns } from '../store/derived';
 import { selectTags } from '../store/moment';
 import { isColumnShown, withColumn, type Settings } from '../store/settings';
 import { S } from '../strings';
-import { Check } from '../widgets/Check';
-import { Segmented } from '../widgets/Segmented';
+import { Check, Segmented } from '../widgets/controls';
 
 /** What can be chosen of the table: its columns, and how high its rows are. */
 export function TableChoices(): JSX.Element {

@@ -1,8 +1,7 @@
 import type { JSX } from 'react';
 
 import { S } from '../strings';
-import { Disclosure } from '../widgets/Disclosure';
-import { Icon } from '../widgets/Icon';
+import { Disclosure, Icon } from '../widgets/controls';
 import { WithParts } from './WithParts';
 
 /** Which columns the table has, and how high its rows are: kept in this browser. */

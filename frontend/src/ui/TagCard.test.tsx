@@ -4,7 +4,7 @@ import { beforeEach, describe, expect, test, vi } from 'vitest';
 import { act, receive, store } from '../store/app';
 import { NO_HOUSE } from '../store/twin';
 import { held, judgement, reason } from '../testing/health';
-import { showTags } from '../testing/page';
+import { nextStamp, showTags } from '../testing/page';
 import { readings, stateFrame, wireTag } from '../testing/tags';
 import { TagCard } from './TagCard';
 import { TagTable } from './TagTable';
@@ -172,18 +172,15 @@ describe('card', () => {
   });
 
   test('each reading is as old as it is itself, and the look at the flowers apart', () => {
-    const reading = (name: string, stale: number | null): unknown => ({
-      name,
-      value: 20,
-      observed_at: null,
-      stale_seconds: stale,
-    });
     showTags([
       wireTag({
         tag_id: '7',
         stale_seconds: 2,
         looked_at: { sec: 0, nanosec: 0 },
-        readings: [reading('temperature', 7_200), reading('co2', null)] as never,
+        readings: [
+          ...readings({ temperature: 20 }, nextStamp() - 7_200),
+          { name: 'co2', value: 20, observed_at: null },
+        ],
       }),
     ]);
     render(<TagCard tagId="7" />);

@@ -1,21 +1,21 @@
 import { useRef, type JSX } from 'react';
 
-import type { When } from '../domain/age';
+import type { When } from '../domain/time';
 import {
   beyondLimitText,
   farOffText,
   metresText,
   percentText,
   readingText,
+  type TemperatureUnit,
+  unitOf,
   valueText,
 } from '../domain/format';
-import { isBad, rangeReason, sideOf } from '../domain/health';
-import { isBack, tryKind } from '../domain/reasons';
+import { isBack, isBad, rangeReason, sideOf, tryKind } from '../domain/health';
 import { rangesFor } from '../domain/sensors';
-import { speciesText } from '../domain/species';
+import { speciesText } from '../domain/marks';
 import { shown } from '../domain/text';
 import type { Tag } from '../domain/twin';
-import { unitOf, type TemperatureUnit } from '../domain/units';
 import type { TagHealth, TagHistory } from '../contract/types';
 import { commandMap } from '../map/commands';
 import { Comments } from '../notes/Comments';
@@ -28,7 +28,7 @@ import { Age, AgeFact, useAgeStep } from './Age';
 import { CardEstimate } from './estimate';
 import { HealthMark } from './HealthMark';
 import { inTime } from './inTime';
-import { IconButton } from '../widgets/IconButton';
+import { IconButton } from '../widgets/controls';
 import { useFocusBack } from '../widgets/useFocusBack';
 import { Reasons } from './Reasons';
 import { Sparkline } from './Sparkline';

@@ -1,15 +1,27 @@
 import { Fragment, memo, type JSX, type ReactNode } from 'react';
 
-import type { When } from '../domain/age';
-import { farOffText, percentText, shortAgeText, valueText } from '../domain/format';
+import type { When } from '../domain/time';
+import {
+  farOffText,
+  percentText,
+  shortAgeText,
+  type TemperatureUnit,
+  valueText,
+} from '../domain/format';
 import type { TagHealth } from '../contract/types';
-import { rangeReason, sideOf, worstReason } from '../domain/health';
-import { beyondText, isBack, reasonsText, reasonText } from '../domain/reasons';
+import {
+  beyondText,
+  isBack,
+  rangeReason,
+  reasonsText,
+  reasonText,
+  sideOf,
+  worstReason,
+} from '../domain/health';
 import type { Catalogue, Sensor } from '../domain/sensors';
-import { speciesText } from '../domain/species';
+import { speciesText } from '../domain/marks';
 import { shown } from '../domain/text';
 import type { Tag } from '../domain/twin';
-import type { TemperatureUnit } from '../domain/units';
 import { S } from '../strings';
 import { Age, Tried, useAgeStep } from './Age';
 import { HealthMark } from './HealthMark';

@@ -173,14 +173,7 @@ describe('table', () => {
     expect(document.querySelector('.trend')).toBeNull();
     const before = tag({
       tag_id: 'a',
-      readings: [
-        {
-          name: 'temperature',
-          value: 20.5,
-          observed_at: { sec: 1, nanosec: 0 },
-          stale_seconds: 1,
-        },
-      ],
+      readings: readings({ temperature: 20.5 }, 1),
     });
     const { at } = store.get().twin.latest.snapshot ?? { at: { sec: 0 } };
     const hourBefore = (): void => {

@@ -11,9 +11,9 @@ import {
 
 import { rgbText, sensorColour } from '../domain/ramp';
 import type { Sensor } from '../domain/sensors';
+import { unitOf } from '../domain/format';
 import type { AreaHead } from '../domain/table';
 import { shown } from '../domain/text';
-import { unitOf } from '../domain/units';
 import { act, store, useApp } from '../store/app';
 import { selectCatalogue, selectShownColumns } from '../store/derived';
 import { useSelected } from '../store/create';
@@ -21,7 +21,7 @@ import { hourAgo, selectHourAgo } from '../store/hourAgo';
 import { selectTags } from '../store/moment';
 import { isColumnShown } from '../store/settings';
 import { S } from '../strings';
-import { Icon } from '../widgets/Icon';
+import { Icon } from '../widgets/controls';
 import { HealthMark } from './HealthMark';
 import { TagRow } from './TagRow';
 import { useChosenInSight } from './chosenInSight';

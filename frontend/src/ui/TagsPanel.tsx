@@ -8,7 +8,7 @@ import { S } from '../strings';
 import { ListChoice } from './alarms/ListChoice';
 import { HealthSummary } from './HealthSummary';
 import { loadParts } from './later';
-import { Icon } from '../widgets/Icon';
+import { Icon } from '../widgets/controls';
 import { EmptyTable } from './Notices';
 import { FILTER_ID } from './filterField';
 import { TableSettings } from './TableSettings';

@@ -2,10 +2,10 @@ import type { JSX } from 'react';
 
 import type { TagHealth } from '../contract/types';
 import type { Sensor } from '../domain/sensors';
+import type { TemperatureUnit } from '../domain/format';
 import { shown } from '../domain/text';
-import { differenceShown, trendOf } from '../domain/trend';
+import { differenceShown, trendOf } from '../domain/difference';
 import type { Tag } from '../domain/twin';
-import type { TemperatureUnit } from '../domain/units';
 import { shortHourText, thenOf, type HourAgo } from '../store/hourAgo';
 import { S } from '../strings';
 

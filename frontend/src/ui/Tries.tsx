@@ -2,7 +2,7 @@ import type { JSX } from 'react';
 
 import type { PastAttempt } from '../contract/types';
 import { shown } from '../domain/text';
-import { tryKind } from '../domain/reasons';
+import { tryKind } from '../domain/health';
 import { whenOf } from '../domain/twin';
 import { useApp } from '../store/app';
 import { selectSnapshot } from '../store/moment';

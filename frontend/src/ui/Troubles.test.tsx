@@ -178,7 +178,10 @@ test.each([
 test('a moment that could not be loaded, and which one is shown instead', () => {
   receive({ type: 'past', past: { at: 5_025, house: NO_HOUSE } });
   act({ type: 'moment', moment: 3_600 });
-  receive({ type: 'past-fault', fault: { at: 3_600, message: 'too busy', isLasting: false } });
+  receive({
+    type: 'set',
+    part: { pastFault: { at: 3_600, message: 'too busy', isLasting: false } },
+  });
   render(<Troubles />);
   expect(lines()).toEqual([
     'sim 01:00:00 could not be loaded. Showing sim 01:23:45 while the page retries. too busy',

@@ -1,14 +1,14 @@
 import type { JSX } from 'react';
 
 import type { Journal, Outward } from '../contract/types';
-import { rosText } from '../domain/rostime';
+import { rosText } from '../domain/time';
 import { shown } from '../domain/text';
 import { useApp } from '../store/app';
 import { useSelected } from '../store/create';
 import { selectShown, type Moment } from '../store/moment';
 import type { TwinState } from '../store/twin';
 import { LANGUAGE_TROUBLE, S } from '../strings';
-import { More } from '../widgets/More';
+import { More } from '../widgets/controls';
 import { later } from './later';
 
 /** Something that an operator should know of while the page goes on. */

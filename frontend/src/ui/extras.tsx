@@ -3,9 +3,8 @@ import type { JSX } from 'react';
 
 import type * as RobotParts from '../robot/parts';
 import { useApp } from '../store/app';
-import { useSelected } from '../store/create';
+import { robotFrame, useSelected } from '../store/create';
 import { selectShown } from '../store/moment';
-import { robotFrame } from '../store/signals';
 import { HoverCard } from './HoverCard';
 import { inTime } from './inTime';
 import { Keys } from './Keys';

@@ -7,7 +7,7 @@ import { snapshotOf } from '../domain/twin';
 import { Painter } from '../map/painter';
 import { act, receive, store } from '../store/app';
 import { NO_HOUSE } from '../store/twin';
-import { showTags } from '../testing/page';
+import { nextStamp, showTags } from '../testing/page';
 import { judgement, reason } from '../testing/health';
 import { readings, stateFrame, wireTag } from '../testing/tags';
 import { HealthSummary } from './HealthSummary';
@@ -15,17 +15,16 @@ import { Legend } from './Legend';
 import { TagCard } from './TagCard';
 import { TagTable } from './TagTable';
 
-const tagWith = (temperature: number, stale: number, x: number): ReturnType<typeof wireTag> =>
+const tagWith = (temperature: number, sec: number, x: number): ReturnType<typeof wireTag> =>
   wireTag({
     tag_id: 'a',
-    readings: readings({ temperature }).map((each) => ({ ...each, stale_seconds: stale })),
-    stale_seconds: stale,
+    readings: readings({ temperature }, sec),
     pose: { position: { x, y: 0, z: 0 }, orientation: { x: 0, y: 0, z: 0, w: 1 } },
   });
 
 beforeEach(() => {
   vi.stubGlobal('fetch', () => Promise.reject(new Error('no server')));
-  showTags([tagWith(22, 5, 1)], judgement({ a: 'healthy' }));
+  showTags([tagWith(22, nextStamp() - 5, 1)], judgement({ a: 'healthy' }));
 });
 
 /** Text without what a screen reader or a title adds. */
@@ -46,7 +45,7 @@ test('table, card, legend, health and map are those of the moment', () => {
     },
     LIGHT,
   );
-  const then = stateFrame([tagWith(40, 7_200, 3)], { sec: 500 });
+  const then = stateFrame([tagWith(40, -6_700, 3)], { sec: 500 });
   receive({
     type: 'past',
     past: {

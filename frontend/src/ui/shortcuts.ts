@@ -6,7 +6,7 @@ import { selectRows, selectSensors } from '../store/derived';
 import { isDark } from '../store/theme';
 import type { ViewState } from '../store/view';
 import { S } from '../strings';
-import { backToLive } from '../timebar/span';
+import { backToLive } from '../store/moment';
 import { togglePlayback } from '../timebar/playback';
 import { ALARMS_ID } from './alarms/ListChoice';
 import { chosenTag } from './announce';

@@ -1,6 +1,6 @@
 import { fetchHistory } from '../contract/api';
 import type { TagHistory, WireTime } from '../contract/types';
-import { secondsOf } from '../domain/rostime';
+import { secondsOf } from '../domain/time';
 import { memoLast } from '../domain/memo';
 import { useFetched } from '../store/useFetched';
 

@@ -1,7 +1,7 @@
 import { fireEvent, render, screen } from '@testing-library/react';
 import { describe, expect, test, vi } from 'vitest';
 
-import { Disclosure, useClose } from './Disclosure';
+import { Disclosure, useClose } from './controls';
 
 function Inside(): React.JSX.Element {
   return (

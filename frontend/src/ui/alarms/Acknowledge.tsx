@@ -1,7 +1,6 @@
 import type { JSX } from 'react';
 
-import { mayAct, person } from '../../store/signals';
-import { useSelected } from '../../store/create';
+import { mayAct, person, useSelected } from '../../store/create';
 import { once } from './once';
 
 /** The button that acknowledges, and in its place what has been done already: nothing moves for it. */

@@ -4,7 +4,7 @@ import { epochOf } from '../../clock';
 import { alarmOf, isAwaited } from '../../alarms/list';
 import { alarmList } from '../../alarms/watch';
 import { clockText } from '../../domain/format';
-import { rosText, secondsOf } from '../../domain/rostime';
+import { rosText, secondsOf } from '../../domain/time';
 import { useApp, type AppState } from '../../store/app';
 import { useSelected } from '../../store/create';
 import { selectNewestHealth } from '../../store/derived';

@@ -7,7 +7,7 @@ import { startAlarms } from '../../alarms/watch';
 import { notifyState } from '../../alarms/notify';
 import type { Alarm, HealthReason } from '../../contract/types';
 import { act as dispatch, receive, store } from '../../store/app';
-import { person } from '../../store/signals';
+import { person } from '../../store/create';
 import { NO_HOUSE } from '../../store/twin';
 import { alarm, alarms, tellAlarms } from '../../testing/alarms';
 import { goLost, showTags } from '../../testing/page';
@@ -294,7 +294,7 @@ test('a row leads to its tag', () => {
 test('without an alarm it says so; where that is not known it says that', () => {
   expect(notes()).toEqual(['unknown']);
   flush(() => {
-    receive({ type: 'alarms', alarms: alarms([], { source: 'starting', since: null }) });
+    receive({ type: 'set', part: { alarms: alarms([], { source: 'starting', since: null }) } });
   });
   expect(notes()).toEqual(['starting', 'unknown']);
   tell();
@@ -325,7 +325,7 @@ test('without an alarm it says so; where that is not known it says that', () => 
   expect(group('shelved')).toHaveLength(1);
   expect(screen.queryByText(wait)).toBeNull();
   flush(() => {
-    receive({ type: 'alarms', alarms: alarms([], { source: 'heard' }) });
+    receive({ type: 'set', part: { alarms: alarms([], { source: 'heard' }) } });
   });
   expect(notes()).toEqual(['none', 'wait', 'heard']);
   tell();

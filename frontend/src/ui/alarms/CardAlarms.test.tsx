@@ -5,7 +5,7 @@ import { NOTHING_KEPT } from '../../alarms/kept';
 import { acknowledgeAlarms, own, shelveAlarm } from '../../alarms/own';
 import { alarmList, startAlarms } from '../../alarms/watch';
 import { act } from '../../store/app';
-import { person } from '../../store/signals';
+import { person } from '../../store/create';
 import { alarm, tellAlarms } from '../../testing/alarms';
 import { held, judgement, reason } from '../../testing/health';
 import { showTags } from '../../testing/page';

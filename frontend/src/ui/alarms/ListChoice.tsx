@@ -3,7 +3,7 @@ import type { JSX } from 'react';
 import { act, useApp } from '../../store/app';
 import type { ViewState } from '../../store/view';
 import { S } from '../../strings';
-import { Segmented } from '../../widgets/Segmented';
+import { Segmented } from '../../widgets/controls';
 import { AlarmsLabel } from './AlarmCount';
 
 /** Of the list of alarms, once it is there. */

@@ -3,14 +3,12 @@ import { useLayoutEffect, useRef, useState, type JSX } from 'react';
 import { goToStart } from '../../alarms/follow';
 import type { Item } from '../../alarms/list';
 import { unacknowledgeAlarm, unshelveAlarm } from '../../alarms/own';
-import { Field } from '../../notes/Field';
-import { C } from '../../notes/subject';
+import { Field } from '../../notes/Comments';
+import { C } from '../../notes/comments';
 import { useApp } from '../../store/app';
-import { useSelected } from '../../store/create';
-import { mayAct, person } from '../../store/signals';
+import { mayAct, person, useSelected } from '../../store/create';
 import { S } from '../../strings';
-import { Disclosure, useClose } from '../../widgets/Disclosure';
-import { Icon } from '../../widgets/Icon';
+import { Disclosure, Icon, useClose } from '../../widgets/controls';
 import { once } from './once';
 import { Shelving } from './Shelving';
 

@@ -4,7 +4,7 @@ import { LONGEST_REASON, needsReason, shelfMinutes } from '../../alarms/kept';
 import type { Item } from '../../alarms/list';
 import { shelveAlarm } from '../../alarms/own';
 import { S } from '../../strings';
-import { useClose } from '../../widgets/Disclosure';
+import { useClose } from '../../widgets/controls';
 import { once } from './once';
 
 /** Shelves an alarm for a while; a critical one for a shorter while, and with a reason. */

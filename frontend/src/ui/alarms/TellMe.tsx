@@ -5,7 +5,7 @@ import { own } from '../../alarms/own';
 import { soundState, wishSound, type SoundState } from '../../alarms/sound';
 import { useSelected } from '../../store/create';
 import { S } from '../../strings';
-import { Check } from '../../widgets/Check';
+import { Check } from '../../widgets/controls';
 
 /** What is to be said of it; asked for anew each time, for words come in several languages. */
 const soundHint = (state: SoundState): string =>

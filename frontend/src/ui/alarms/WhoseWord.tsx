@@ -2,11 +2,10 @@ import type { JSX } from 'react';
 
 import { whenText } from '../../alarms/words';
 import type { Alarm, Session } from '../../contract/types';
-import { secondsOf } from '../../domain/rostime';
+import { secondsOf } from '../../domain/time';
 import { store } from '../../store/app';
-import { useSelected } from '../../store/create';
+import { person, useSelected } from '../../store/create';
 import { rosNow } from '../../store/moment';
-import { person } from '../../store/signals';
 import { S } from '../../strings';
 import { useTicking } from '../../widgets/useNow';
 import { P } from './people';

@@ -3,7 +3,7 @@ import { afterEach, beforeEach, expect, test, vi } from 'vitest';
 import { alarm, tellAlarms } from '../../testing/alarms';
 import { NOTHING_KEPT, whatOf } from '../../alarms/kept';
 import { acknowledgeAlarms, done, own, undo } from '../../alarms/own';
-import { person } from '../../store/signals';
+import { person } from '../../store/create';
 import { SILENCE_MS } from '../../connection/machine';
 import { goLive, goLost, status as told } from '../../testing/page';
 import { toast } from '../toast';

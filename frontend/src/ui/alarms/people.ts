@@ -6,13 +6,13 @@
 import { now, timeOfDay } from '../../clock';
 import { fetchSession, postNote, withdrawNote } from '../../contract/people';
 import type { Alarm, Session } from '../../contract/types';
-import { failureText } from '../../domain/failure';
-import { secondsOf } from '../../domain/rostime';
+import { failureText } from '../../domain/format';
+import { secondsOf } from '../../domain/time';
 import { shown } from '../../domain/text';
 import { onChange, store } from '../../store/app';
 import { createFetcher } from '../../store/fetcher';
 import { rosNow } from '../../store/moment';
-import { person } from '../../store/signals';
+import { person } from '../../store/create';
 import { say } from '../toast';
 import { LANGUAGE, S } from '../../strings';
 import { PEOPLE } from '../../words/people';

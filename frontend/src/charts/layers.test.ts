@@ -1,7 +1,7 @@
 import { expect, test } from 'vitest';
 
 import { MOST_CHARTED } from '../store/view';
-import { lookOf, markerPath } from './looks';
+import { lookOf, markerPath } from './layers';
 
 const all = Array.from({ length: MOST_CHARTED }, (_, index) => lookOf(index));
 

@@ -1,0 +1,121 @@
+import type { WireTime } from '../contract/types';
+import { LOCALE } from '../strings';
+import { clockText } from './format';
+
+/** A reading is drawn at full strength up to this age, in seconds... */
+const FADE_FROM_S = 60;
+/** ...and at its faintest from this age on. */
+const FADE_TO_S = 1800;
+const FAINTEST = 0.35;
+
+/**
+ * How ages go on in what is shown: with the browser's clock; or not, as of one moment (a past
+ * one, ms on the monotonic clock); or nobody knows.
+ */
+export type Ageing =
+  | { readonly kind: 'growing' }
+  | { readonly kind: 'as-of'; readonly at: number }
+  | { readonly kind: 'unknown' };
+
+export const GROWING: Ageing = { kind: 'growing' };
+export const AGES_UNKNOWN: Ageing = { kind: 'unknown' };
+
+/** When something was, ms on the monotonic clock. */
+export type When = number | 'never' | 'unknown';
+
+/** Seconds since then; null: it never was, or nobody knows. */
+export function ageSeconds(
+  observedAt: When | null,
+  now: number,
+  ageing: Ageing = GROWING,
+): number | null {
+  if (typeof observedAt !== 'number' || ageing.kind === 'unknown') return null;
+  const asOf = ageing.kind === 'as-of' ? ageing.at : now;
+  return Math.max(0, asOf - observedAt) / 1000;
+}
+
+/** How old something looks in text, which does not fade as a picture does. */
+export function ageStep(age: number | null): 'fresh' | 'fading' | 'old' {
+  if (age === null || age >= FADE_TO_S) return 'old';
+  return age < FADE_FROM_S ? 'fresh' : 'fading';
+}
+
+/** How strongly to draw something of that age, 0.35 to 1, even in ratios of age; null: faintest. */
+export function freshness(age: number | null): number {
+  if (age === null) return FAINTEST;
+  const share =
+    Math.log(Math.max(age, FADE_FROM_S) / FADE_FROM_S) / Math.log(FADE_TO_S / FADE_FROM_S);
+  return 1 - (1 - FAINTEST) * Math.min(1, share);
+}
+
+/** ROS times as seconds, and for a person to read. */
+
+/** Stamps before September 2001 are no dates: a simulation counts from its own beginning. */
+const FIRST_DATE_S = 1e9;
+
+export const hasDate = (at: number): boolean => at >= FIRST_DATE_S;
+
+export const secondsOf = ({ sec, nanosec }: WireTime): number => sec + nanosec / 1e9;
+
+const date = new Intl.DateTimeFormat(LOCALE, { day: 'numeric', month: 'short', year: 'numeric' });
+
+/** "14 Nov 2026, 03:12:40" on the operator's own clock; of a simulation "sim 01:23:45". */
+export function rosText(at: number): string {
+  return hasDate(at) ? dateText(Math.floor(at) * 1000) : simText(at);
+}
+
+/** "14 Nov": for where the year stands beside it, or goes without saying. */
+export const dayFormat = new Intl.DateTimeFormat(LOCALE, { day: 'numeric', month: 'short' });
+
+/** "14 Nov, 03:12:40", as `rosText` without the year. */
+export function shortRosText(at: number): string {
+  const epochMs = Math.floor(at) * 1000;
+  return hasDate(at) ? `${dayFormat.format(epochMs)}, ${clockText(epochMs)}` : simText(at);
+}
+
+/** "14 Nov 2026, 03:12:40" on the operator's own clock. */
+export const dateText = (epochMs: number): string =>
+  `${date.format(epochMs)}, ${clockText(epochMs)}`;
+
+function simText(at: number): string {
+  const seconds = Math.floor(at);
+  const parts = [Math.floor(seconds / 3_600), Math.floor(seconds / 60) % 60, seconds % 60];
+  return `sim ${parts.map((part) => String(part).padStart(2, '0')).join(':')}`;
+}
+
+/** A stretch of time that the page looks at: the same for the time bar and for charts. */
+
+/** Lengths that end now, in seconds. */
+const LENGTHS = { hour: 3_600, day: 86_400, week: 604_800, month: 2_592_000 } as const;
+
+/** Those without a number of their own, in the order in which they are offered. */
+export const PERIOD_KINDS = ['hour', 'day', 'week', 'month', 'all'] as const;
+
+/** "own" is between two moments, ROS seconds; the others end now, and "all" begins with memory. */
+export type Period =
+  | { readonly kind: (typeof PERIOD_KINDS)[number] }
+  | { readonly kind: 'own'; readonly from: number; readonly to: number };
+
+/** From one moment to another, ROS seconds. */
+export interface Span {
+  readonly from: number;
+  readonly to: number;
+}
+
+/** A period's stretch. `now` is the twin's time, `oldest` what memory reaches back to; null: not known. */
+export function spanOf(period: Period, now: number, oldest: number | null): Span {
+  switch (period.kind) {
+    case 'own':
+      return { from: period.from, to: period.to };
+    case 'all':
+      return { from: Math.min(oldest ?? now - LENGTHS.day, now - 1), to: now };
+    case 'hour':
+    case 'day':
+    case 'week':
+    case 'month':
+      return { from: Math.max(0, now - LENGTHS[period.kind]), to: now };
+  }
+}
+
+/** Whether a period goes on with the time. */
+export const endsNow = (period: Period): boolean => period.kind !== 'own';

@@ -1,0 +1,362 @@
+import '../styles/estimate.css';
+
+import type { JSX } from 'react';
+
+import { answer } from '../contract/api';
+import type { Field, Grade, NoEstimate, Place, Schemas, TagHealth } from '../contract/types';
+import { cellAt } from '../domain/field';
+import {
+  differenceNumber,
+  differenceToShown,
+  metresText,
+  numberText,
+  percentText,
+  shortAgeText,
+  type TemperatureUnit,
+  valueText,
+  withUnit,
+} from '../domain/format';
+import type { HouseHealth } from '../domain/health';
+import { isMeasured, type Sensor } from '../domain/sensors';
+import { errorColours, NINE_OF_TEN, plusMinus } from '../domain/sureness';
+import { shown } from '../domain/text';
+import { ageSeconds, type When } from '../domain/time';
+import type { Tag } from '../domain/twin';
+import { type MapPoint, mapPoint, toCanvas } from '../geometry/coordinates';
+import { useApp } from '../store/app';
+import { selectCatalogue, selectHealth, selectHeat, selectSensor } from '../store/derived';
+import type { Fetched } from '../store/fetcher';
+import { selectShown, selectTags } from '../store/moment';
+import { useFetched } from '../store/useFetched';
+import { LANGUAGE, S } from '../strings';
+import { More } from '../widgets/controls';
+import { useTicking } from '../widgets/useNow';
+import { estimateWordsOf } from '../words/estimate';
+
+const NOT_FOUND = 404;
+
+/** How sure the estimate in view is, and how well it has foretold; or why there is none. */
+export function EstimateFacts(): JSX.Element {
+  const sensor = useApp(selectSensor);
+  const unit = useApp((state) => state.settings.unit);
+  const field = useApp((state) => selectShown(state).field.value);
+  const isNow = useApp((state) => selectShown(state).moment === null);
+  const isError = useApp((state) => state.view.heat === 'error');
+  const graded = useAsked('EstimateQualities', 'quality').value?.sensors ?? {};
+  const grade = (Object.hasOwn(graded, sensor.name) && graded[sensor.name]) || null;
+  if (!isMeasured(sensor)) {
+    return (
+      <span role="status" className="estimate-missing" data-testid="estimate-missing">
+        {E.computed}
+      </span>
+    );
+  }
+  const ofSensor = field?.sensor === sensor.name ? field : null;
+  if (ofSensor?.noEstimate) return <Missing why={ofSensor.noEstimate} grade={grade} />;
+  if (!ofSensor?.sureness) return <span role="status">{E.onItsWay}</span>;
+  return (
+    <>
+      {!isError && (
+        <span className="estimate-key" data-testid="estimate-key">
+          {E.unsure(errorText(sensor, ofSensor.sureness.sdKnown, unit))}
+        </span>
+      )}
+      {grade && <Foretold grade={grade} isNow={isNow} />}
+    </>
+  );
+}
+
+/** The nearest readings are shown, and why: once, in plain words. */
+function Missing({ why, grade }: { why: NoEstimate; grade: Grade | null }): JSX.Element {
+  const text =
+    why.status === NOT_FOUND ? E.noService : grade?.fitted_at === null ? E.noModel : E.noneNow;
+  const reason = grade?.fit_problem ? E.fitProblem(shown(grade.fit_problem, 160)) : why.message;
+  return (
+    <>
+      <span role="status" className="estimate-missing" data-testid="estimate-missing">
+        {text}
+      </span>
+      <More label={S.more} text={shown(reason, 300)} />
+    </>
+  );
+}
+
+/** Of fewer than ten scans each counts. */
+function foretoldText({ day, share_day: share }: Grade): string {
+  if (share === null) return E.foretoldNone;
+  return day.scans < 10
+    ? E.foretold(day.inside, day.scans)
+    : E.foretold(Math.round(share * 10), 10);
+}
+
+function Foretold({ grade, isNow }: { grade: Grade; isNow: boolean }): JSX.Element {
+  const { day, week } = grade;
+  const least = Math.min(grade.share_day ?? 1, grade.share_week ?? 1);
+  const behind = [
+    E.aboutText,
+    `${E.foretoldDay(day.inside, day.scans)}, ${E.foretoldWeek(week.inside, week.scans)}.`,
+    ...(grade.fit_problem ? [`${E.fitProblem(shown(grade.fit_problem, 160))}.`] : []),
+  ];
+  return (
+    <>
+      {grade.is_trusted === false && (
+        <strong role="status" className="estimate-warning" data-testid="estimate-warning">
+          {E.notTrusted(Math.floor(least * 10))}
+        </strong>
+      )}
+      {/* Of now, whatever moment is shown: beside another one it would be taken for that of then. */}
+      {isNow && <span data-testid="foretold">{foretoldText(grade)}</span>}
+      <More label={E.about} text={behind.join(' ')} />
+    </>
+  );
+}
+
+/** The estimate at a point with its error, and what it has to go by there. */
+export function EstimateReadout({
+  point,
+  field,
+  value,
+  isError,
+}: {
+  point: MapPoint;
+  field: Field;
+  /** Of the cell that holds the point; null: it is not known. */
+  value: number | null;
+  isError: boolean;
+}): JSX.Element {
+  const sensor = useApp(selectSensor);
+  const unit = useApp((state) => state.settings.unit);
+  const tags = useApp(selectTags);
+  const health = useApp(selectHealth);
+  const ageing = useApp((state) => selectShown(state).ageing);
+  const { count, oldest } = nearTo(point, tags, sensor.name, health);
+  const age = useTicking((now) => {
+    const seconds = ageSeconds(oldest, now, ageing);
+    return seconds === null ? null : shortAgeText(seconds);
+  });
+  const sd = field.sureness?.sd[cellAt(field, point) ?? -1] ?? NaN;
+  const text =
+    value === null
+      ? S.notKnown
+      : isError
+        ? `±\u00a0${errorText(sensor, sd, unit)}`
+        : estimateText(sensor, value, sd, unit);
+  return (
+    <>
+      <strong>{text}</strong>
+      <span data-testid="readout-near">
+        {E.near(count)}
+        {count > 0 && age !== null && `, ${E.oldest(age)}`}
+      </span>
+    </>
+  );
+}
+
+/** What an estimate at a point has to go by: the tags near it. Pure. */
+
+/** As far as what is read at one place is usually like what is read at another, metres. */
+export const NEAR_M = 2.5;
+
+export interface Near {
+  readonly count: number;
+  /** When the oldest of their readings was made; "never": there is none. */
+  readonly oldest: When;
+}
+
+/** The tags with a reading of the sensor within reach; not those that the estimate leaves out. */
+export function nearTo(
+  point: MapPoint,
+  tags: readonly Tag[],
+  sensor: string,
+  { byTag }: Pick<HouseHealth, 'byTag'>,
+): Near {
+  const hasChanged = ({ id }: Tag): boolean =>
+    byTag.get(id)?.reasons.some((each) => each.kind === 'changed' && each.sensor === sensor) ??
+    false;
+  const near = tags.filter(
+    (tag) =>
+      tag.at &&
+      tag.readings.get(sensor) != null &&
+      Math.hypot(tag.at.x - point.x, tag.at.y - point.y) <= NEAR_M &&
+      !hasChanged(tag),
+  );
+  const times = near.map(({ readAt }) => readAt.get(sensor) ?? 'unknown');
+  const known = times.filter((when) => typeof when === 'number');
+  const oldest = known.length < times.length ? 'unknown' : Math.min(...known);
+  return { count: near.length, oldest: near.length === 0 ? 'never' : oldest };
+}
+
+/** The colours of the error alone. */
+export function ErrorScale(): JSX.Element {
+  const sensor = useApp(selectSensor);
+  const unit = useApp((state) => state.settings.unit);
+  const most = useApp((state) => selectHeat(state)?.range.high ?? 0);
+  return (
+    <div data-testid="error-scale">
+      <div
+        className="difference-bar"
+        aria-hidden="true"
+        style={{ backgroundImage: `linear-gradient(to right, ${errorColours().join(', ')})` }}
+      />
+      <div className="difference-ends">
+        <span>±{'\u00a0'}0</span>
+        <strong>{E.error}</strong>
+        <span data-testid="error-high">
+          ±{'\u00a0'}
+          {errorText(sensor, most / NINE_OF_TEN, unit)}
+        </span>
+      </div>
+    </div>
+  );
+}
+
+/** What was measured at a tag against what all else foretells for it, and what was left out. */
+export function CardEstimate({
+  tag,
+  health,
+}: {
+  tag: Tag;
+  health: TagHealth | undefined;
+}): JSX.Element | null {
+  const sensor = useApp(selectSensor);
+  const catalogue = useApp(selectCatalogue);
+  const unit = useApp((state) => state.settings.unit);
+  // Of the past nobody tells what was expected.
+  const isNow = useApp((state) => selectShown(state).moment === null);
+  const expected = useAsked('ExpectedTags', 'tags').value?.tags ?? {};
+  const own = isNow && Object.hasOwn(expected, tag.id) ? expected[tag.id] : undefined;
+  const changed = new Set(
+    (health?.reasons ?? []).filter(({ kind }) => kind === 'changed').map((each) => each.sensor),
+  );
+  if (own?.left_out) changed.add(sensor.name);
+  if (!own && changed.size === 0) return null;
+  return (
+    <div className="card-estimate" data-testid="card-estimate">
+      {own && (
+        <p>
+          {shown(sensor.label, 32)}:{' '}
+          {E.expected(
+            valueText(sensor, own.measured, unit),
+            estimateText(sensor, own.expected, own.expected_sd, unit),
+          )}
+        </p>
+      )}
+      {[...changed].map((name) => (
+        <p key={name} data-left-out={name}>
+          {E.leftOut(shown(catalogue.named(name).label, 32))}
+        </p>
+      ))}
+    </div>
+  );
+}
+
+/** More nobody buys at once. */
+const PLACES = 5;
+
+/** Where another tag would help: numbers on the map, which are a list to who does not see it. */
+export function AdviceMarks(): JSX.Element {
+  const isNow = useApp((state) => selectShown(state).moment === null);
+  const { value, state, message } = useAsked('Advice', 'advice', PLACES);
+  if (!isNow) return <Note text={E.adviceNow} />;
+  if (!value) {
+    return <Note text={state === 'failed' ? E.adviceFailed(shown(message, 160)) : ''} />;
+  }
+  if (value.places.length === 0) return <Note text={E.adviceNone} />;
+  return (
+    <ol className="advice" aria-label={E.advice} data-testid="advice">
+      {value.places.map((place, index) => (
+        <Mark key={index} place={place} number={index + 1} />
+      ))}
+    </ol>
+  );
+}
+
+function Mark({ place, number }: { place: Place; number: number }): JSX.Element {
+  const view = useApp((state) => state.viewport.view);
+  const { width, height } = useApp((state) => state.viewport.size);
+  const { x, y } = toCanvas(view, mapPoint(place.x, place.y));
+  const isInView = x >= 0 && y >= 0 && x <= width && y <= height;
+  const text = E.advised(
+    S.position(metresText(place.x), metresText(place.y)),
+    percentText(place.error_ratio),
+    number === 1,
+  );
+  return (
+    <li
+      style={{ transform: `translate(${Math.round(x)}px, ${Math.round(y)}px)` }}
+      data-side={x > width / 2 ? 'left' : 'right'}
+      data-in-view={isInView}
+    >
+      {/* A button, so that the keyboard comes to what a mouse that rests on it is told. */}
+      <button type="button" aria-label={`${number}. ${text}`}>
+        <span aria-hidden="true">{number}</span>
+      </button>
+      <span className="advice-text" aria-hidden="true">
+        {text}
+      </span>
+    </li>
+  );
+}
+
+const Note = ({ text }: { text: string }): JSX.Element => (
+  <p className="advice-note" role="status" data-testid="advice-note">
+    {text}
+  </p>
+);
+
+/** As exact as a value, unless nothing would be left of it. */
+function errorNumber(sensor: Sensor, sd: number, unit: TemperatureUnit): string {
+  const text = differenceNumber(sensor, plusMinus(sd), unit);
+  return /[1-9]/.test(text) ? text : numberText(differenceToShown(sensor, plusMinus(sd), unit));
+}
+
+/** Half the width of the range that nine of ten values lie in: "1.3 °C". */
+export const errorText = (sensor: Sensor, sd: number, unit: TemperatureUnit): string =>
+  withUnit(sensor, errorNumber(sensor, sd, unit), unit);
+
+/** "22.4 ± 1.3 °C". */
+export const estimateText = (
+  sensor: Sensor,
+  mean: number,
+  sd: number,
+  unit: TemperatureUnit,
+): string =>
+  withUnit(
+    sensor,
+    `${valueText(sensor, mean, unit)}\u00a0±\u00a0${errorNumber(sensor, sd, unit)}`,
+    unit,
+  );
+
+/** What the twin says of its estimate changes slowly. */
+const EVERY_MS = 10_000;
+
+/**
+ * What the bridge answers about the sensor in view, asked again now and then while it is connected:
+ * one question at a time, beside the frames. Of another sensor nothing is left.
+ */
+function useAsked<Name extends 'EstimateQualities' | 'ExpectedTags' | 'Advice'>(
+  name: Name,
+  what: string,
+  places?: number,
+): Fetched<Schemas[Name]> {
+  const sensor = useApp((state) => state.view.sensor);
+  const isOpen = useApp((state) => state.twin.connection.socket.kind === 'open');
+  const turn = useTicking((at) => String(Math.floor(at / EVERY_MS)));
+  const { value, ...rest } = useFetched<{ readonly of: string; readonly told: Schemas[Name] }>(
+    isOpen
+      ? {
+          key: turn,
+          group: sensor,
+          run: async (signal) => {
+            const query = { sensor_type: sensor, places };
+            return { of: sensor, told: await answer(name, signal, `api/estimate/${what}`, query) };
+          },
+        }
+      : null,
+    EVERY_MS,
+  );
+  return { ...rest, value: value?.of === sensor ? value.told : null };
+}
+
+/** Every word of the estimate, in the language that the page speaks. */
+const E = await estimateWordsOf(LANGUAGE);

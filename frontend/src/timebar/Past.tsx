@@ -1,0 +1,116 @@
+import type { JSX } from 'react';
+
+import { DAY_S } from '../domain/difference';
+import { ageText, intervalText } from '../domain/format';
+import { rosText } from '../domain/time';
+import { store, useApp } from '../store/app';
+import {
+  backToLive,
+  ownTime,
+  rosNow,
+  selectDayS,
+  selectHasTime,
+  selectIsRecorded,
+  selectOrigin,
+  selectShown,
+} from '../store/moment';
+import { S } from '../strings';
+import { useTicking } from '../widgets/useNow';
+
+/** In the header while the page shows another moment: which one, and the way back. */
+export function PastHeader(): JSX.Element | null {
+  const moment = useApp((state) => selectShown(state).moment);
+  const isLooking = useApp((state) => state.view.moment !== null);
+  // Of a twin that has no time nobody knows how long ago.
+  const ago = useTicking((now) => {
+    const nowS = rosNow(store.get(), now);
+    return nowS === null || moment === null ? null : ageText(Math.max(0, nowS - moment));
+  });
+  const origin = useApp(selectOrigin);
+  const hasTime = useApp(selectHasTime);
+  if (moment === null || !isLooking) return null;
+  return (
+    <div className="past-header" data-testid="past-header">
+      <span className="past-word">{S.past}</span>
+      {/* In place of the header's own mark, where a phone has no room for it. */}
+      {origin !== null && (
+        <span className="past-origin" aria-hidden="true">
+          {S.origin[origin]}
+        </span>
+      )}
+      <strong>{rosText(moment)}</strong>
+      {/* What counts on by itself is not read out each second. */}
+      {ago !== null && hasTime && (
+        <span className="past-ago" aria-hidden="true">
+          {S.agoSuffix(ago)}
+        </span>
+      )}
+      <LiveButton />
+    </div>
+  );
+}
+
+export function LiveButton(): JSX.Element {
+  const words = useApp(selectIsRecorded) ? S.backToRecording : S.backToLive;
+  return (
+    <button type="button" className="back-to-live" title={`${words} (L)`} onClick={backToLive}>
+      {words}
+    </button>
+  );
+}
+
+/** The newest moment of a recording or a simulation, as a text that goes on. */
+export function useOwnTime(): string | null {
+  return useTicking((now) => {
+    const at = ownTime(store.get(), now);
+    return at === null ? null : rosText(at);
+  });
+}
+
+/** In the header: that what is shown is no robot's, or not of now; and of a recording, of when. */
+export function OriginNote(): JSX.Element | null {
+  const origin = useApp(selectOrigin);
+  const isPast = useApp((state) => selectShown(state).moment !== null);
+  const time = useOwnTime();
+  // In a demo a short one.
+  const dayS = useApp(selectDayS);
+  if (origin === null) return null;
+  return (
+    <div className="origin" data-testid="origin" data-origin={origin} title={S.originHint[origin]}>
+      <span className="origin-word">
+        {S.origin[origin]}
+        {dayS < DAY_S && <span className="origin-day"> · {S.originDay(intervalText(dayS))}</span>}
+      </span>
+      <span className="unseen">{S.originHint[origin]}</span>
+      {/* What counts on by itself is not read out each second. */}
+      {origin === 'recorded' && time !== null && !isPast && (
+        <strong aria-hidden="true">{time}</strong>
+      )}
+    </div>
+  );
+}
+
+/** Around the map, for eyes: the header tells everybody. */
+export function PastFrame(): JSX.Element | null {
+  const moment = useApp((state) => selectShown(state).moment);
+  const isRecorded = useApp(selectIsRecorded);
+  const time = useOwnTime();
+  if (moment === null && isRecorded) {
+    return (
+      <div className="past-frame recorded" data-testid="recorded-frame" aria-hidden="true">
+        <span>
+          {time === null ? (
+            S.origin.recorded
+          ) : (
+            <>
+              <span className="past-word-short">{S.origin.recorded}: </span>
+              {time}
+            </>
+          )}
+        </span>
+      </div>
+    );
+  }
+  if (moment === null) return null;
+  return <div className="past-frame" data-testid="past-frame" aria-hidden="true" />;
+}

@@ -1,0 +1,266 @@
+import {
+  type ComponentProps,
+  createContext,
+  type JSX,
+  type ReactNode,
+  useCallback,
+  useContext,
+  useEffect,
+  useId,
+  useRef,
+  useState,
+} from 'react';
+
+const PATHS = {
+  plus: 'M12 5v14M5 12h14',
+  minus: 'M5 12h14',
+  chevron: 'm6 9 6 6 6-6',
+  dots: 'M5 12h.01M12 12h.01M19 12h.01',
+  fit: 'M4 9V4h5M20 9V4h-5M4 15v5h5M20 15v5h-5',
+  layers: 'M12 3 3 8l9 5 9-5-9-5ZM3 12.5l9 5 9-5M3 17l9 5 9-5',
+  menu: 'M4 7h16M4 12h16M4 17h16',
+  columns: 'M4 5h16v14H4ZM9.5 5v14M14.5 5v14',
+  close: 'M6 6l12 12M18 6 6 18',
+  download: 'M12 4v11m0 0-4-4m4 4 4-4M5 20h14',
+  search: 'M11 4a7 7 0 1 0 0 14 7 7 0 0 0 0-14Zm5 12 4 4',
+  map: 'M9 4 3 6v14l6-2 6 2 6-2V4l-6 2-6-2Zm0 0v14m6-12v14',
+  list: 'M8 6h12M8 12h12M8 18h12M4 6h.01M4 12h.01M4 18h.01',
+  up: 'M12 19V5m0 0-6 6m6-6 6 6',
+  down: 'M12 5v14m0 0 6-6m-6 6-6-6',
+  chart: 'M4 4v16h16M7 15l4-5 3 3 5-7',
+  bell: 'M6 17V11a6 6 0 0 1 12 0v6M4 17h16M10 20.500h4M12 5V3',
+  later: 'M12 4a8 8 0 1 0 0 16 8 8 0 0 0 0-16Zm0 4v4l3 2',
+  check: 'M5 12.500l4.500 4.500L19 7',
+  pin: 'M12 3l7 9-7 9-7-9 7-9Z',
+} as const;
+
+export type IconName = keyof typeof PATHS;
+
+/** A line drawing; always beside a text or inside a labelled button, so hidden from readers. */
+export function Icon({ name, size = 20 }: { name: IconName; size?: number }): JSX.Element {
+  return (
+    <svg className="icon" viewBox="0 0 24 24" width={size} height={size} aria-hidden="true">
+      <path d={PATHS[name]} />
+    </svg>
+  );
+}
+
+interface IconButtonProps extends ComponentProps<'button'> {
+  readonly icon: IconName;
+  readonly label: string;
+}
+
+/** A button that is a picture, with its word for who does not see it. */
+export const IconButton = ({ icon, label, ...rest }: IconButtonProps): JSX.Element => (
+  <button type="button" className="icon-button" aria-label={label} title={label} {...rest}>
+    <Icon name={icon} />
+  </button>
+);
+
+interface CheckProps extends Omit<ComponentProps<'input'>, 'type' | 'checked' | 'onChange'> {
+  readonly label: ReactNode;
+  readonly isOn: boolean;
+  readonly onChange: (isOn: boolean) => void;
+}
+
+/** What is on or off. */
+export const Check = ({ label, isOn, onChange, ...rest }: CheckProps): JSX.Element => (
+  <label className="check">
+    <input
+      {...rest}
+      type="checkbox"
+      checked={isOn}
+      onChange={(event) => {
+        onChange(event.target.checked);
+      }}
+    />
+    <span>{label}</span>
+  </label>
+);
+
+/** What only who looks after the machines needs to read, behind a word that opens it. */
+export function More({ label, text }: { label: string; text: string }): JSX.Element | null {
+  if (text === '') return null;
+  return (
+    <details className="more">
+      <summary>{label}</summary>
+      {text}
+    </details>
+  );
+}
+
+interface Option<Value extends string> {
+  readonly value: Value;
+  readonly label: ReactNode;
+}
+
+interface SegmentedProps<Value extends string> {
+  readonly legend: string;
+  readonly options: readonly Option<Value>[];
+  readonly value: Value;
+  readonly onChange: (value: Value) => void;
+  readonly className?: string;
+}
+
+/** A choice of one among a few, as native radio buttons: arrow keys and screen readers know them. */
+export function Segmented<Value extends string>({
+  legend,
+  options,
+  value,
+  onChange,
+  className = '',
+}: SegmentedProps<Value>): JSX.Element {
+  const name = useId();
+  return (
+    <fieldset className={`segmented ${className}`}>
+      <legend className="unseen">{legend}</legend>
+      {options.map((option) => (
+        <label key={option.value}>
+          <input
+            type="radio"
+            name={name}
+            value={option.value}
+            checked={option.value === value}
+            onChange={() => {
+              onChange(option.value);
+            }}
+          />
+          <span>{option.label}</span>
+        </label>
+      ))}
+    </fieldset>
+  );
+}
+
+interface SelectProps<Value extends string | number> extends Omit<
+  ComponentProps<'select'>,
+  'value' | 'onChange' | 'children'
+> {
+  readonly value: Value;
+  readonly options: readonly Value[];
+  readonly text: (option: Value) => string;
+  readonly onChange: (value: Value) => void;
+}
+
+/** A choice of one among more than fit beside each other. */
+export function Select<Value extends string | number>({
+  options,
+  text,
+  onChange,
+  ...rest
+}: SelectProps<Value>): JSX.Element {
+  return (
+    <select
+      {...rest}
+      onChange={(event) => {
+        const chosen = options[event.target.selectedIndex];
+        if (chosen !== undefined) onChange(chosen);
+      }}
+    >
+      {options.map((option) => (
+        <option key={option} value={option}>
+          {text(option)}
+        </option>
+      ))}
+    </select>
+  );
+}
+
+const Close = createContext<() => void>(() => undefined);
+
+/** Closes the panel that the caller is in, and gives the focus back to its button. */
+export const useClose = (): (() => void) => useContext(Close);
+
+interface DisclosureProps {
+  readonly label: string;
+  readonly button: ReactNode;
+  readonly className: string;
+  /** Of the button. */
+  readonly look?: string;
+  readonly children: ReactNode;
+}
+
+/** A button that opens a panel beside it; Escape, a click elsewhere or leaving it closes. */
+export function Disclosure({
+  label,
+  button,
+  className,
+  look = 'icon-button',
+  children,
+}: DisclosureProps): JSX.Element {
+  const [open, setOpen] = useState(false);
+  const root = useRef<HTMLDivElement>(null);
+  const trigger = useRef<HTMLButtonElement>(null);
+  const id = useId();
+  const close = useCallback(() => {
+    setOpen(false);
+    trigger.current?.focus();
+  }, []);
+
+  useEffect(() => {
+    if (!open) return;
+    const isOutside = ({ target }: Event): boolean => !root.current?.contains(target as Node);
+    let byFinger = false;
+    const onPointerDown = (event: PointerEvent): void => {
+      byFinger = event.pointerType === 'touch';
+      if (!byFinger && isOutside(event)) setOpen(false);
+    };
+    // A finger that closes a panel does nothing else: it cannot see what it would press behind it.
+    const onClick = (event: MouseEvent): void => {
+      if (!byFinger || !isOutside(event)) return;
+      event.preventDefault();
+      event.stopPropagation();
+      setOpen(false);
+    };
+    const onKeyDown = (event: KeyboardEvent): void => {
+      if (event.key !== 'Escape') return;
+      event.stopPropagation();
+      setOpen(false);
+      trigger.current?.focus();
+    };
+    const onFocusIn = (event: FocusEvent): void => {
+      if (!byFinger && isOutside(event)) setOpen(false);
+    };
+    document.addEventListener('pointerdown', onPointerDown);
+    document.addEventListener('click', onClick, true);
+    document.addEventListener('keydown', onKeyDown, true);
+    document.addEventListener('focusin', onFocusIn);
+    return () => {
+      document.removeEventListener('pointerdown', onPointerDown);
+      document.removeEventListener('click', onClick, true);
+      document.removeEventListener('keydown', onKeyDown, true);
+      document.removeEventListener('focusin', onFocusIn);
+    };
+  }, [open]);
+
+  return (
+    <div className={`disclosure ${className}`} ref={root}>
+      <button
+        type="button"
+        className={look}
+        ref={trigger}
+        aria-label={label}
+        title={label}
+        aria-expanded={open}
+        aria-controls={id}
+        onClick={(event) => {
+          // The second of a double click opens nothing that the first has closed, nor closes it.
+          if (event.detail < 2) setOpen(!open);
+        }}
+      >
+        {button}
+      </button>
+      {/* Takes the focus of a click beside its controls: else what scrolls behind it would. */}
+      <div
+        id={id}
+        className="disclosure-panel"
+        hidden={!open}
+        role="group"
+        aria-label={label}
+        tabIndex={-1}
+      >
+        {open && <Close value={close}>{children}</Close>}
+      </div>
+    </div>
+  );
+}

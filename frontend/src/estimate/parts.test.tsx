@@ -14,7 +14,7 @@ import { goLive, nextStamp, showField, showTags } from '../testing/page';
 import { CATALOGUES } from '../testing/sensors';
 import { readings, stateFrame, wireTag } from '../testing/tags';
 import { Legend } from '../ui/Legend';
-import { Readout } from '../ui/Readout';
+import { Readout } from '../ui/MapPanel';
 import {
   AdviceMarks,
   CardEstimate,

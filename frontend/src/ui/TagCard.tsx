@@ -25,9 +25,8 @@ import { selectIsHere, selectNewestTag, selectShown, selectTag } from '../store/
 import { S } from '../strings';
 import { CardAlarms } from './alarms/CardAlarms';
 import { Age, AgeFact, useAgeStep } from './Age';
-import { CardEstimate } from './estimate';
+import { CardEstimate, inTime } from './inTime';
 import { HealthMark } from './HealthMark';
-import { inTime } from './inTime';
 import { IconButton } from '../widgets/controls';
 import { useFocusBack } from '../widgets/useFocusBack';
 import { Reasons } from './Reasons';

@@ -24,9 +24,7 @@ import { S } from '../strings';
 import { Icon } from '../widgets/controls';
 import { HealthMark } from './HealthMark';
 import { TagRow } from './TagRow';
-import { useChosenInSight } from './chosenInSight';
-import { useHeldRows } from './useHeldRows';
-import { partsOf, SHORT_TABLE, useVisibleRows } from './visibleRows';
+import { partsOf, SHORT_TABLE, useChosenInSight, useHeldRows, useVisibleRows } from './visibleRows';
 
 /** Every tag, also those without a pin and those whose scan failed. */
 export function TagTable(): JSX.Element {

@@ -8,10 +8,9 @@ import type { ViewState } from '../store/view';
 import { S } from '../strings';
 import { backToLive } from '../store/moment';
 import { togglePlayback } from '../timebar/playback';
-import { ALARMS_ID } from './alarms/ListChoice';
-import { chosenTag } from './announce';
+import { ALARMS_ID, FILTER_ID } from './alarms/ListChoice';
+import { chosenTag } from './Announcer';
 import { openHelp } from './HelpDialog';
-import { FILTER_ID } from './filterField';
 
 /** What a key that was pressed stands for. */
 export function onKey(event: KeyboardEvent): void {

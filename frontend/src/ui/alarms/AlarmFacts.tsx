@@ -15,7 +15,7 @@ import { rosNow, selectHasTime } from '../../store/moment';
 import { S } from '../../strings';
 import { useTicking } from '../../widgets/useNow';
 import { HealthMark } from '../HealthMark';
-import { ARROWS } from '../TrendLine';
+import { ARROWS } from '../TagRow';
 
 interface ValuesNow extends Values {
   readonly state: Now | null;

@@ -11,7 +11,7 @@ import { held, judgement, reason } from '../../testing/health';
 import { showTags } from '../../testing/page';
 import { readings, wireTag } from '../../testing/tags';
 import { Reasons } from '../Reasons';
-import { AlarmsLabel } from './AlarmCount';
+import { AlarmsLabel } from './ListChoice';
 import { CardAlarms } from './CardAlarms';
 
 let stop: () => void;

@@ -5,9 +5,9 @@ import { alarm } from '../testing/alarms';
 import { cataloguesOf } from '../domain/sensors';
 import { CATALOGUE, FILE } from '../testing/sensors';
 import { alarmsCsv, arranged, causeFacts, filtered, tagsText } from './arrange';
-import { acknowledge, NOTHING_KEPT, shelve, type Kept } from './kept';
+import { acknowledge, NOTHING_KEPT, shelve, type Kept } from './own';
 import { causesFirst, listOf } from './list';
-import type { Now } from './now';
+import type { Now } from './words';
 
 const isTag = (): boolean => false;
 const speech = { sensors: CATALOGUE, unit: 'C' } as const;

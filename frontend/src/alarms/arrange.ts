@@ -7,8 +7,16 @@ import { compareIds } from '../domain/twin';
 import { toShown, unitOf } from '../domain/format';
 import { S } from '../strings';
 import { causeOf, MOST_LOOSE, type AlarmList, type Item, type Wrong } from './list';
-import { worstOf, type Now } from './now';
-import { inOnePiece, nameText, valuesOf, whatText, whereText, type Speech } from './words';
+import {
+  inOnePiece,
+  nameText,
+  valuesOf,
+  whatText,
+  whereText,
+  worstOf,
+  type Now,
+  type Speech,
+} from './words';
 
 export const ORDERS = ['cause', 'newest', 'tag'] as const;
 /** By cause the worst comes first. */

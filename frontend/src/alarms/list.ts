@@ -3,7 +3,7 @@ import type { Alarm, HealthReason, Verdict } from '../contract/types';
 import { isOfRange, severity, sideOf } from '../domain/health';
 import { secondsOf } from '../domain/time';
 import { compareIds, equal } from '../domain/twin';
-import { isShelfHeld, isWorse, whatOf, type Kept, type Shelf } from './kept';
+import { isShelfHeld, isWorse, whatOf, type Kept, type Shelf } from './own';
 import type { Speech } from './words';
 
 /** What is resolved stays listed for so long, seconds. */

@@ -7,8 +7,7 @@ import { todoText, VERDICTS } from '../domain/health';
 import { memoLast } from '../domain/memo';
 import { isHeardNow, selectNewestTag } from '../store/moment';
 import { causesFirst, type Item } from './list';
-import { nowOf, reasonNow, type Now } from './now';
-import { alarmText, type Speech } from './words';
+import { alarmText, nowOf, reasonNow, type Now, type Speech } from './words';
 
 const speech = memoLast((sensors: Speech['sensors'], unit: Speech['unit']): Speech => ({
   sensors,

@@ -1,6 +1,6 @@
 import type { JSX } from 'react';
 
-import { politeVoice, urgentVoice } from '../alarms/voices';
+import { politeVoice, urgentVoice } from '../alarms/watch';
 import { createVoice, useSelected, type Announcement, type Store } from '../store/create';
 
 /** A voice each, so that none cuts off another; only a critical alarm may cut in. */

@@ -1,8 +1,7 @@
 import { act as flush, fireEvent, render, screen } from '@testing-library/react';
 import { afterEach, beforeEach, expect, test } from 'vitest';
 
-import { NOTHING_KEPT } from '../../alarms/kept';
-import { acknowledgeAlarms, own, shelveAlarm } from '../../alarms/own';
+import { acknowledgeAlarms, NOTHING_KEPT, own, shelveAlarm } from '../../alarms/own';
 import { alarmList, startAlarms } from '../../alarms/watch';
 import { act } from '../../store/app';
 import { person } from '../../store/create';

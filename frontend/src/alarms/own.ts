@@ -25,7 +25,7 @@ export const LONGEST_REASON = 120;
 /** Nobody shelves a critical alarm by the way: it takes a word why. */
 export const needsReason = (verdict: Verdict): boolean => verdict === 'critical';
 
-export interface Acknowledgement {
+interface Acknowledgement {
   /** How bad it was when it was acknowledged. */
   readonly verdict: Verdict;
   /** When it was acknowledged. */

@@ -134,7 +134,7 @@ export const politeVoice = createVoice();
 /** Cuts in. */
 export const urgentVoice = createVoice();
 
-export function newsText({ raised, cleared }: News): string {
+function newsText({ raised, cleared }: News): string {
   const text = (
     items: readonly Item[],
     say: (texts: readonly string[], more: number) => string,

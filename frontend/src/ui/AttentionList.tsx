@@ -155,7 +155,7 @@ export function KioskNote({ wish }: { wish: CycleWish }): JSX.Element {
 }
 
 /** To the same view, to be operated; Back leads to the wall screen again. */
-export function leaveKiosk(): void {
+function leaveKiosk(): void {
   const { search, hash } = window.location;
   window.location.assign(addressOfPage(search, hash));
 }

@@ -76,7 +76,7 @@ export function ConnectionBadge(): JSX.Element {
 }
 
 /** Where the simulated past ends, if the moment that is shown lies in it, and not all is simulated; ROS seconds. */
-export function selectSimulatedUntil(state: AppState): number | null {
+function selectSimulatedUntil(state: AppState): number | null {
   const { moment } = selectShown(state);
   const simulated = state.twin.connection.status?.journal.simulated;
   // Of a simulation what comes after is no more real.

@@ -224,7 +224,7 @@ function Ramp({
 }
 
 /** What the colours mean while they tell how values lie against their ideal. */
-export function IdealLegend({ sensor }: { sensor: Sensor }): JSX.Element {
+function IdealLegend({ sensor }: { sensor: Sensor }): JSX.Element {
   const unit = useApp((state) => state.settings.unit);
   const { ideal } = sensor;
   const colours = idealParts(IDEAL_ALPHA);
@@ -278,7 +278,7 @@ export function HeatControl({ place }: { place: 'legend' | 'layers' }): JSX.Elem
 }
 
 /** How the heat map is coloured; in the link, and by one click. */
-export function ColouringControl(): JSX.Element {
+function ColouringControl(): JSX.Element {
   const colouring = useApp((state) => state.view.colouring);
   return (
     <Segmented

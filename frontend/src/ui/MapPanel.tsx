@@ -54,7 +54,7 @@ export function MapPanel({ kiosk }: { kiosk: boolean }): JSX.Element {
   );
 }
 
-export function MapControls(): JSX.Element {
+function MapControls(): JSX.Element {
   const button = (label: string, icon: IconName, action: () => void): JSX.Element => (
     <IconButton label={label} icon={icon} onClick={action} />
   );

@@ -112,7 +112,7 @@ async function saveMapOrSay(): Promise<void> {
 }
 
 /** The page's language: another one is another address, which keeps all else of the link. */
-export function LanguageChoice(): JSX.Element {
+function LanguageChoice(): JSX.Element {
   return (
     <label className="language">
       {S.language}

@@ -314,7 +314,7 @@ export const asOf = memoLast((history: TagHistory, moment: number | null): TagHi
 const PACE_MS = 500;
 
 /** The last scans of a tag, fetched anew after each observation; null until they are here. */
-export function useHistory(tagId: string, observation: string | undefined): TagHistory | null {
+function useHistory(tagId: string, observation: string | undefined): TagHistory | null {
   const { value } = useFetched<TagHistory>(
     // A tag that a link names and the twin does not know.
     observation === undefined

@@ -263,7 +263,7 @@ function Reading({
 export const ARROWS = { up: '\u2197', down: '\u2198', level: '\u2192' } as const;
 
 /** A reading against an hour ago: an arrow and the difference, or why there is none. */
-export function TrendLine({
+function TrendLine({
   sensor,
   tag,
   health,

@@ -108,7 +108,7 @@ function FilterBar(): JSX.Element {
 }
 
 /** Which columns the table has, and how high its rows are: kept in this browser. */
-export function TableSettings(): JSX.Element {
+function TableSettings(): JSX.Element {
   return (
     <Disclosure label={S.tableButton} button={<Icon name="columns" />} className="table-settings">
       <WithParts>{(parts) => <parts.TableChoices />}</WithParts>

@@ -24,7 +24,7 @@ export interface Trouble {
   readonly more?: string;
 }
 
-export function troublesOf(
+function troublesOf(
   { unread, phase, connection, pastFault }: TwinState,
   moment: Moment = null,
   isLate = false,

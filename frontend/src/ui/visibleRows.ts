@@ -56,7 +56,7 @@ export function rangeInSight(top: number, rowHeight: number, windowHeight: numbe
   };
 }
 
-export interface Visible extends Range {
+interface Visible extends Range {
   /** Pixels. */
   readonly rowHeight: number;
 }

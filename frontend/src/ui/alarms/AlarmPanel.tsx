@@ -340,7 +340,7 @@ interface HeldOrder extends HeldList {
 }
 
 /** While a pointer, a finger or the keyboard's focus is in the list, no row of it moves. */
-export function useHeldOrder(list: AlarmList): HeldOrder {
+function useHeldOrder(list: AlarmList): HeldOrder {
   const [hasPointer, setPointer] = useState(false);
   const [hasFocus, setFocus] = useState(false);
   const [held, setHeld] = useState<AlarmList | null>(null);

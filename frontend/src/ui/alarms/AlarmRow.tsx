@@ -119,7 +119,7 @@ function useStatus(item: Item, group: keyof AlarmList): string | null {
 }
 
 /** What else can be done to an alarm. */
-export function RowMenu({ item, name }: { item: Item; name: string }): JSX.Element {
+function RowMenu({ item, name }: { item: Item; name: string }): JSX.Element {
   return (
     <Disclosure label={S.alarmActionsOf(name)} button={<Icon name="dots" />} className="row-menu">
       <Actions item={item} name={name} />
@@ -177,7 +177,7 @@ function Actions({ item, name }: { item: Item; name: string }): JSX.Element {
 }
 
 /** Shelves an alarm for a while; a critical one for a shorter while, and with a reason. */
-export function Shelving({ item, name }: { item: Item; name: string }): JSX.Element {
+function Shelving({ item, name }: { item: Item; name: string }): JSX.Element {
   const [reason, setReason] = useState('');
   const close = useClose();
   const root = useRef<HTMLDivElement>(null);

@@ -200,7 +200,7 @@ def test_a_double_click_shelves_nothing_and_a_critical_alarm_takes_a_reason(
             hmi.resize(**viewport)
             for row in rows(hmi, "active").all():
                 expect(row).to_be_in_viewport(ratio=1)
-                # Two lines of text; on a phone four, and what can be done beside them (test_layout).
+                # Two lines; on a phone four, and what can be done beside them (test_layout).
                 high = place(row).bottom - place(row).top
                 assert high <= (64 if viewport == WIDE else 96)
                 if viewport == WIDE:

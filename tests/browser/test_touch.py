@@ -80,6 +80,8 @@ def test_most_of_the_height_is_for_what_is_looked_at(phone: Hmi) -> None:
     show(phone, "Tags")
     phone.row("2").tap()
     assert heights(".card")[0] >= tall
+    # How old and how it should be share a line.
+    assert heights(".card-readings li:has(.card-ideal)")[0] < 84
     phone.page.get_by_role("navigation").get_by_role("button", name="Map").tap()
     expect(phone.map).to_be_visible()
     frame, card = heights(".map-frame", ".card")

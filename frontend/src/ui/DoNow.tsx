@@ -178,7 +178,11 @@ function Also({ of, than }: { of: readonly Urgent[]; than: Verdict }): JSX.Eleme
       {of.slice(0, MOST_ALSO).map(({ tagId, reasons: [{ verdict }] }, index) => (
         <Fragment key={tagId}>
           {index > 0 && ', '}
-          {verdict !== verdicts[index] && <HealthMark verdict={verdict} word={false} />}
+          {verdict !== verdicts[index] && (
+            <>
+              <HealthMark verdict={verdict} word={false} />{' '}
+            </>
+          )}
           {shown(tagId, 16)}
         </Fragment>
       ))}

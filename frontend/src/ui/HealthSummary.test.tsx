@@ -87,7 +87,7 @@ test('nobody is called for what is shelved, and all the rest is counted', () => 
     tellAlarms(alarm('fan', { tag_id: '1' }));
   });
   expect(todo.textContent).toMatch(
-    /^CriticalTag 1: .*also Stressed2, 3 .*StressedTag 4: .*Alarms \(1\)$/,
+    /^CriticalTag 1: .*also Stressed 2, 3 .*StressedTag 4: .*Alarms \(1\)$/,
   );
   fireEvent.click(screen.getByRole('button', { name: 'Alarms (1)' }));
   expect(store.get().view.list).toBe('alarms');
@@ -168,7 +168,7 @@ test('of tags that need the same done the worst stands for all, some by name', (
   act(() => {
     showTags(tags, judgement({ ...all, 3: mild, 4: mild, 5: mild }));
   });
-  expect(todo.textContent).toMatch(/Heat, or close the vents also 2, Stressed3, 4 \+ 1 $/);
+  expect(todo.textContent).toMatch(/Heat, or close the vents also 2, Stressed 3, 4 \+ 1 $/);
   act(() => {
     showTags(tags, judgement({ ...all, 6: [humid] }));
   });

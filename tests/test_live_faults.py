@@ -288,7 +288,7 @@ def sabotaged_serve() -> Iterator[Bridge]:
         "lupin_twin.core.state:TwinStore.record_inspection:boom-look",
         "lupin_twin.core.state:TwinStore.pin:boom-find",
         "lupin_twin.ros.convert:map_of:width=13",
-        "lupin_twin.ros.convert_field:field_request_of:boom-field",
+        "lupin_twin.ros.convert_services:field_request_of:boom-field",
         "lupin_twin.ros.convert:StateMessages.build:boom-state:2",
         # Called for listeners, by the heartbeat and by the state's timer.
         "lupin_twin.core.state:TwinStore.snapshot:boom-snapshot:3",

@@ -1,11 +1,13 @@
 import { beforeEach, describe, expect, test, vi } from 'vitest';
 
+import type * as Clock from './clock';
+
 const LAPSE_MS = 2_000;
 
 const HOUR = 3_600_000;
 let monotonic: number;
 let wall: number;
-let clock: typeof import('./clock');
+let clock: typeof Clock;
 let lapses: number;
 
 /** Both clocks go on. */

@@ -35,15 +35,12 @@ const TABLE: Table = {
   ],
   export: ['strings', 'clock', 'geometry', 'domain', 'draw', 'store', 'map'],
   charts: [
-    ...['strings', 'clock', 'contract', 'geometry', 'domain', 'store', 'widgets', 'export'],
+    ...['strings', 'clock', 'contract', 'geometry', 'domain', 'draw', 'store', 'widgets', 'export'],
     ...['notes', 'styles', 'npm:react', 'npm:uplot'],
   ],
-  estimate: [
+  // Loaded when first needed: what the page has of the estimate, and of the robot.
+  parts: [
     ...['words', 'strings', 'contract', 'geometry', 'domain', 'store', 'widgets', 'styles'],
-    ...['npm:react'],
-  ],
-  robot: [
-    ...['strings', 'contract', 'geometry', 'domain', 'store', 'widgets', 'styles'],
     ...['npm:react', 'npm:react-dom'],
   ],
   ui: [
@@ -59,7 +56,7 @@ const TABLE: Table = {
       'map',
       'export',
     ],
-    ...['styles', 'widgets', 'alarms', 'timebar', 'charts', 'estimate', 'robot', 'notes'],
+    ...['styles', 'widgets', 'alarms', 'timebar', 'charts', 'parts', 'notes'],
     ...['npm:react', 'npm:react-dom'],
   ],
   // The page over all greenhouses, a bundle of its own.

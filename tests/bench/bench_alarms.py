@@ -23,8 +23,8 @@ from lupin_bridge.judge.options import own_sensors
 from lupin_bridge.notify.messages import GreenhouseState, Topics
 from lupin_bridge.notify.mirror import Mirror
 from lupin_bridge.stream.status import Status
+from lupin_twin.core.past import PastWrite, RunSpan
 from lupin_twin.core.state import Reading, Snapshot, TagState
-from lupin_twin.core.writes import PastWrite, RunSpan
 from tests.support.ordinary_day import DAY_NS, S, ordinary_days
 from tests.support.proc_stat import resident_mb
 from tests.support.seen import BY_LIGHT, alarm

@@ -14,8 +14,7 @@ from collections import Counter
 import numpy as np
 
 from lupin_twin.estimate import Posterior, Readings, fit
-from lupin_twin.estimate.engine import thinned
-from lupin_twin.estimate.grading import Record, Tally
+from lupin_twin.estimate.engine import Record, Tally, thinned
 from tests.bench.bench_estimate import INTERVAL_SDS, case_of
 from tests.bench.other_worlds import (
     CHOOSING,

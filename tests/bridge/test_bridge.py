@@ -24,9 +24,8 @@ from lupin_bridge.serving.admission import Limits
 from lupin_bridge.settings import Settings
 from lupin_bridge.stream.hub import Client
 from lupin_twin.core.journal_condition import UNKNOWN, Condition
-from lupin_twin.core.past import NotRemembered
+from lupin_twin.core.past import NotRemembered, PastWrite
 from lupin_twin.core.state import Snapshot, TagState
-from lupin_twin.core.writes import PastWrite
 from lupin_twin.field.grid import FieldGrid
 from lupin_twin.field.idw import compute_idw_field
 from lupin_twin.runtime.workers import Workers

@@ -8,8 +8,8 @@ import pytest
 from lupin_bridge.feed.source import TwinUnavailableError, TwinUpdate
 from lupin_bridge.judge.verdict import Health, judge_site, judge_tag
 from lupin_bridge.stream.hub import Client
+from lupin_twin.core.past import PastWrite
 from lupin_twin.core.state import Reading, Snapshot, TagState
-from lupin_twin.core.writes import PastWrite
 from tests.bridge.test_bridge import Ear, Stage
 from tests.support.waiting import until
 

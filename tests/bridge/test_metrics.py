@@ -9,7 +9,7 @@ from websockets.sync.client import connect
 from lupin_bridge.bridge import Bridge
 from lupin_bridge.metrics import CONTENT_TYPE, HISTOGRAMS, METRICS, Metrics
 from lupin_bridge.settings import Settings
-from lupin_twin.estimate.grading import Record, Tally
+from lupin_twin.estimate.engine import Record, Tally
 from lupin_twin.runtime.estimates import Report
 from tests.bridge.test_bridge import Script
 from tests.support.messages import scan

@@ -8,7 +8,7 @@ from statistics import median
 
 from lupin_bridge.judge.derived import dew_point_c, vapour_pressure_deficit_kpa
 from lupin_bridge.judge.ranges import Sensors
-from lupin_twin.core.writes import PastWrite, RunSpan
+from lupin_twin.core.past import PastWrite, RunSpan
 
 S = 1_000_000_000
 SHORTEST, LONGEST = 600 * S, 86_400 * S

@@ -13,8 +13,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any, Final
 
-from lupin_twin.core.past import SeriesRequest
-from lupin_twin.core.writes import WritesRequest
+from lupin_twin.core.past import SeriesRequest, WritesRequest
 from lupin_twin.journal.fold import state_at
 from lupin_twin.journal.follow import writes
 from lupin_twin.journal.queries import rows, series

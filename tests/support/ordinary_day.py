@@ -8,8 +8,8 @@ from typing import Final
 
 from lupin_patrol.cli import parse
 from lupin_patrol.past import DAYS, past
+from lupin_twin.core.past import PastWrite
 from lupin_twin.core.state import NO_FLOWER, Inspection, Pin, Scan
-from lupin_twin.core.writes import PastWrite
 
 S: Final = 1_000_000_000
 DAY_NS: Final = 86_400 * S

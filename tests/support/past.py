@@ -13,9 +13,18 @@ from lupin_bridge.feed.query import Now, PastQuery
 from lupin_bridge.past.plans import ConditionalQuery, Query
 from lupin_twin.core.journal_condition import UNKNOWN
 from lupin_twin.core.notes import NotesRequest, PastNotes
-from lupin_twin.core.past import Event, NotRemembered, PastRow, SeriesPast, SeriesRequest
+from lupin_twin.core.past import (
+    Event,
+    NotRemembered,
+    PastRow,
+    PastWrite,
+    RecentRequest,
+    ScansRequest,
+    SeriesPast,
+    SeriesRequest,
+    WritesRequest,
+)
 from lupin_twin.core.state import Snapshot
-from lupin_twin.core.writes import PastWrite, RecentRequest, ScansRequest, WritesRequest
 from lupin_twin.runtime.workers import Workers
 
 NS = 10**9

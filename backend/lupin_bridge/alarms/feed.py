@@ -22,9 +22,16 @@ from lupin_bridge.judge.episodes import Alarm, silence
 from lupin_bridge.judge.judging import Judge
 from lupin_bridge.judge.options import Criteria
 from lupin_twin.core.journal_condition import JournalState
-from lupin_twin.core.past import NotRemembered, PastRefused
+from lupin_twin.core.past import (
+    NotRemembered,
+    PastRefused,
+    PastWrite,
+    PastWrites,
+    RecentRequest,
+    RunSpan,
+    WritesRequest,
+)
 from lupin_twin.core.state import NANOSECONDS_PER_SECOND, Reading, Snapshot
-from lupin_twin.core.writes import PastWrite, PastWrites, RecentRequest, RunSpan, WritesRequest
 
 log = logging.getLogger(__name__)
 

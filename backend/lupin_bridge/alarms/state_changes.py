@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 
 from lupin_twin.core.history import KIND_FLOWER, KIND_TAG_READING
+from lupin_twin.core.past import PastWrite
 from lupin_twin.core.state import STATUS_OK, Snapshot, TagState, sure_species
-from lupin_twin.core.writes import PastWrite
 
 # The one run of the clock that is told of here.
 RUN = 0

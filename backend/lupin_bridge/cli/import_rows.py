@@ -16,8 +16,16 @@ from functools import lru_cache, partial
 from typing import Any, Final, TextIO
 from zoneinfo import ZoneInfo
 
-from lupin_twin.adapt.table import ConfigError, Table, is_number, shown
-from lupin_twin.adapt.value import AS_IT_IS, Value, seconds_of, values_of
+from lupin_twin.adapt.table import (
+    AS_IT_IS,
+    ConfigError,
+    Table,
+    Value,
+    is_number,
+    seconds_of,
+    shown,
+    values_of,
+)
 from lupin_twin.core.drops import (
     MAX_SENSORS_PER_TAG,
     MAX_TAGS,

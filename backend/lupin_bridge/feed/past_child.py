@@ -25,8 +25,14 @@ from lupin_bridge.feed.query import Now, PastQuery
 from lupin_twin.core.history import LatestRequest
 from lupin_twin.core.journal_condition import UNKNOWN
 from lupin_twin.core.notes import NotesRequest
-from lupin_twin.core.past import SeriesRequest, check_moment
-from lupin_twin.core.writes import PeriodRequest, RecentRequest, ScansRequest, WritesRequest
+from lupin_twin.core.past import (
+    PeriodRequest,
+    RecentRequest,
+    ScansRequest,
+    SeriesRequest,
+    WritesRequest,
+    check_moment,
+)
 from lupin_twin.journal.fold import latest, state_at
 from lupin_twin.journal.follow import observed, recent, scans, writes
 from lupin_twin.journal.notes import notes

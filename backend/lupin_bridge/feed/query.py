@@ -14,8 +14,14 @@ from typing import Any, Generic, Protocol, TypeVar
 from lupin_twin.core.history import LatestRequest
 from lupin_twin.core.journal_condition import Condition
 from lupin_twin.core.notes import NotesRequest
-from lupin_twin.core.past import PastRow, SeriesRequest
-from lupin_twin.core.writes import PeriodRequest, RecentRequest, ScansRequest, WritesRequest
+from lupin_twin.core.past import (
+    PastRow,
+    PeriodRequest,
+    RecentRequest,
+    ScansRequest,
+    SeriesRequest,
+    WritesRequest,
+)
 from lupin_twin.journal.queries import Export, lots
 from lupin_twin.runtime.workers import ShouldStop
 

@@ -22,12 +22,13 @@ from lupin_bridge.feed.shared_work import Periodic
 from lupin_bridge.feed.source import TwinUnavailableError, TwinUpdate
 from lupin_bridge.feed.web_node import WebNode
 from lupin_twin.core.journal_condition import UNKNOWN, Condition
+from lupin_twin.core.parameters import World
 from lupin_twin.core.past import NotRemembered, PastRefused, error_of
 from lupin_twin.core.state import Snapshot
 from lupin_twin.field.engine import FieldRefused
 from lupin_twin.journal.beside import journal_path
 from lupin_twin.journal.follow import Lot
-from lupin_twin.ros import convert_field, convert_past
+from lupin_twin.ros import convert_services
 from lupin_twin.runtime.estimates import Report, ReportRequest
 
 log = logging.getLogger(__name__)
@@ -154,17 +155,22 @@ class WebTwin(RosSource[WebNode]):
     def _silence(self, seconds: float) -> str:
         return f"nothing was received on {self.names.state_topic} for {seconds:g} s"
 
+    @property
+    def world(self) -> World:
+        """As the log says, where it is read here."""
+        return self._log.world
+
     def journal(self) -> Condition:
         """The twin's, as far as it is read here; before that, what is said on `/diagnostics`."""
         return self._log.condition or (UNKNOWN if self.update is None else self.update.journal)
 
     async def estimate_report(self, request: ReportRequest) -> Report:
         """What the twin's service says."""
-        wanted = convert_field.report_request_message(request)
+        wanted = convert_services.report_request_message(request)
         response = await self._request(GetEstimateReport, wanted)
         _check_ok(response)
         cost_s = len(response.tag_ids) * _READ_TAG_S
-        reading = self.workers.submit(lambda _: convert_field.report_of(response), cost_s)
+        reading = self.workers.submit(lambda _: convert_services.report_of(response), cost_s)
         try:
             return await asyncio.wrap_future(reading)
         except ValueError as error:
@@ -188,8 +194,8 @@ class WebTwin(RosSource[WebNode]):
         return await self._log.explain(error)
 
     async def _rows_behind(self, after: int) -> Lot:
-        response = await self._request(GetWrites, convert_past.rows_request_message(after))
-        return convert_past.lot_of(response, after)
+        response = await self._request(GetWrites, convert_services.rows_request_message(after))
+        return convert_services.lot_of(response, after)
 
     async def _request(self, service: Any, request: Any) -> Any:
         """The twin's response; `service` is its type.

@@ -38,9 +38,8 @@ from lupin_bridge.settings import Settings
 from lupin_bridge.stream.health_json import alarm_json
 from lupin_twin.core.diagnostics import Origin, origin_of
 from lupin_twin.core.notes import Note, NotesRequest
-from lupin_twin.core.past import NotRemembered
+from lupin_twin.core.past import NotRemembered, RecentRequest, WritesRequest
 from lupin_twin.core.state import Snapshot, TagState
-from lupin_twin.core.writes import RecentRequest, WritesRequest
 from lupin_twin.journal.fold import state_at
 from lupin_twin.journal.follow import recent, writes
 from lupin_twin.journal.notes import notes

@@ -19,8 +19,8 @@ from lupin_bridge.judge.options import Criteria
 from lupin_bridge.judge.scan_interval import LONGEST_NS, SHORTEST_NS, Stretches
 from lupin_bridge.judge.tag_log import Gap, TagPast, is_long
 from lupin_bridge.judge.verdict import Kind, Reason, Verdict
+from lupin_twin.core.past import PastWrite, RunSpan
 from lupin_twin.core.state import Reading
-from lupin_twin.core.writes import PastWrite, RunSpan
 
 # Writes that are kept, of all tags about; of a tag its share of these.
 KEPT: Final = 100_000

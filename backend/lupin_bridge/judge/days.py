@@ -10,8 +10,8 @@ from typing import Final, TypeVar
 
 from lupin_bridge.judge.derived import DAILY, DAY_NS, Course, IsDay
 from lupin_bridge.judge.ranges import Sensors
+from lupin_twin.core.past import PastWrite
 from lupin_twin.core.state import Reading
-from lupin_twin.core.writes import PastWrite
 
 # A value counts until the next one, and no longer than this after its day was complete.
 COUNTS_NS: Final = 30 * 3600 * 1_000_000_000

@@ -39,8 +39,8 @@ from lupin_bridge.judge.verdict import (
     worst,
 )
 from lupin_twin.core.history import KIND_FLOWER
+from lupin_twin.core.past import PastWrite
 from lupin_twin.core.state import STATUS_OK, Reading
-from lupin_twin.core.writes import PastWrite
 
 # The `tag_id` of an alarm of the whole greenhouse.
 SITE = ""

@@ -36,8 +36,8 @@ from lupin_bridge.judge.verdict import (
     judge_tag,
     stopped,
 )
+from lupin_twin.core.past import PastWrite
 from lupin_twin.core.state import Reading, Snapshot, TagState
-from lupin_twin.core.writes import PastWrite
 
 log = logging.getLogger(__name__)
 

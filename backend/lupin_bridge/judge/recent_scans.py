@@ -15,8 +15,8 @@ from operator import attrgetter, itemgetter
 
 from lupin_bridge.judge.daylight import LEFT_OUT_NS, LIGHT, Day, Light
 from lupin_bridge.judge.scan_interval import INTERVALS
+from lupin_twin.core.past import PastWrite
 from lupin_twin.core.state import TagState, sure_species
-from lupin_twin.core.writes import PastWrite
 
 # Whether it was day at a moment, ns, at which the light said so, or None: nothing.
 DayOf = Callable[[bool | None, int], Day]

@@ -32,11 +32,13 @@ from lupin_twin.core.past import (
     EVERY_TAG,
     MAX_POINTS,
     Event,
+    PastWrite,
+    RecentRequest,
+    ScansRequest,
     SeriesPast,
     SeriesRequest,
 )
 from lupin_twin.core.state import Inspection, Scan, Snapshot, TagState
-from lupin_twin.core.writes import PastWrite, RecentRequest, ScansRequest
 from lupin_twin.journal.fold import STATE_S_PER_TAG
 from lupin_twin.journal.queries import SERIES_S, SERIES_S_PER_TAG
 from lupin_twin.runtime.workers import ShouldStop

@@ -40,11 +40,14 @@ from lupin_twin.core.past import (
     HOUR_NS,
     Event,
     PastRefused,
+    PastWrite,
+    PastWrites,
+    PeriodRequest,
+    RunSpan,
     SeriesPast,
     SeriesRequest,
 )
 from lupin_twin.core.state import STATUS_OK, Snapshot, TagState
-from lupin_twin.core.writes import PastWrite, PastWrites, PeriodRequest, RunSpan
 
 # Of a day at a scan a second there are 86,400. Each takes some 25 us to go through, and three times
 # that where alarms are worked out; an answer has ten seconds.

@@ -10,7 +10,7 @@ from pydantic import Field
 
 from lupin_bridge.stream.schema import Contract, Time
 from lupin_bridge.stream.state_json import moment, stamp
-from lupin_twin.estimate.grading import Tally
+from lupin_twin.estimate.engine import Tally
 from lupin_twin.runtime.estimates import Report
 from lupin_twin.runtime.workers import in_turns
 

@@ -1,7 +1,7 @@
 import { Fragment, type JSX, useEffect, useMemo, useRef, useState } from 'react';
 
 import { now } from '../clock';
-import { exportAddress } from '../contract/series';
+import { exportAddress } from '../contract/past';
 import { isHad } from '../domain/sensors';
 import { chartCsv } from '../domain/series';
 import { shown } from '../domain/text';
@@ -12,8 +12,7 @@ import { selectCatalogue, selectSensor } from '../store/derived';
 import { rosNow, selectTags } from '../store/moment';
 import { type Charted, MOST_CHARTED } from '../store/view';
 import { S } from '../strings';
-import { Icon, IconButton, Segmented } from '../widgets/controls';
-import { useFocusBack } from '../widgets/useFocusBack';
+import { Icon, IconButton, Segmented, useFocusBack } from '../widgets/controls';
 import { ChartTables } from './SeriesTable';
 import { ChartState, LineSign, LineValue, MarksKey, PlotView, SensorChoice } from './PlotView';
 import { plansOf, type PlotModel, tagLabel } from './model';

@@ -21,6 +21,7 @@ import type { Line, PlotModel } from './model';
 import { type PlotHandlers, usePlot } from './plot';
 import { type Asked, useSensorsOf } from './useLines';
 import { zoomTo } from './zoom';
+import { DAY_S } from '../domain/difference';
 
 const HANDLERS: PlotHandlers = {
   onPoint: (at) => {
@@ -85,8 +86,6 @@ export function PlotView({
     </section>
   );
 }
-
-const DAY_S = 86_400;
 
 /** The time that charts tell of: under the mouse, else the moment that the page shows; null: newest. */
 export function useTold(): { at: number | null; isPointed: boolean } {
@@ -243,8 +242,6 @@ export function SensorChoice({
     />
   );
 }
-
-/** Charts in words. */
 
 export const spanText = ({ from, to }: Span): string => S.chartSpan(rosText(from), rosText(to));
 

@@ -1,6 +1,7 @@
 /** What a chart has below and above its lines: drawn by functions that keep no state. */
 import { toShown, valueText } from '../domain/format';
 import type { Span } from '../domain/time';
+import { hatch } from '../draw/surface';
 import { S } from '../strings';
 import { limitsOf, type Line, type PlotModel, pointsOf } from './model';
 
@@ -72,28 +73,17 @@ function drawIdeal(frame: Frame, { sensor, bands, unit }: PlotModel, palette: Ch
 function drawGaps(frame: Frame, { series }: Line, palette: ChartPalette): void {
   frame.context.strokeStyle = palette.gap;
   frame.context.lineWidth = frame.ratio;
-  hatch(frame, series.gaps, 1);
+  hatched(frame, series.gaps, 1);
   // Leaning to the other side: of these nobody knows whether anything came.
-  hatch(frame, series.missing, -1);
+  hatched(frame, series.missing, -1);
 }
 
-function hatch({ context, box, ratio, x }: Frame, spans: readonly Span[], slant: 1 | -1): void {
+function hatched({ context, box, ratio, x }: Frame, spans: readonly Span[], slant: 1 | -1): void {
   for (const { from, to } of spans) {
     const left = Math.max(box.left, x(from));
-    const right = Math.min(box.left + box.width, x(to));
-    if (right - left < 3 * ratio) continue;
-    context.save();
-    context.beginPath();
-    context.rect(left, box.top, right - left, box.height);
-    context.clip();
-    context.beginPath();
-    const step = 9 * ratio;
-    for (let at = left - box.height - ((left - box.height) % step); at < right; at += step) {
-      context.moveTo(at, slant > 0 ? box.top + box.height : box.top);
-      context.lineTo(at + box.height, slant > 0 ? box.top : box.top + box.height);
-    }
-    context.stroke();
-    context.restore();
+    const width = Math.min(box.left + box.width, x(to)) - left;
+    if (width < 3 * ratio) continue;
+    hatch(context, left, box.top, { width, height: box.height }, 9 * ratio, slant);
   }
 }
 

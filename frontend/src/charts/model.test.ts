@@ -3,7 +3,7 @@ import { describe, expect, test } from 'vitest';
 import { cataloguesOf, type Ranges } from '../domain/sensors';
 import type { Series } from '../domain/series';
 import { CATALOGUE, FILE, sensorNamed } from '../testing/sensors';
-import { bucketAt, seriesWith } from '../testing/series';
+import { bucketAt, seriesWith } from '../testing/timeline';
 import {
   aligned,
   bandsOf,

@@ -1,6 +1,5 @@
 /** What one chart shows: one sensor, as one or several tags read it. Pure. */
-import { fetchTimeline } from '../contract/past';
-import { fetchSeries } from '../contract/series';
+import { fetchSeries, fetchTimeline } from '../contract/past';
 import {
   type Catalogue,
   type Catalogues,
@@ -259,8 +258,6 @@ export async function fetchLines(
 function dayBefore({ from, to }: Span, dayS: number): Span | null {
   return to > dayS ? { from: Math.max(0, from - dayS), to: to - dayS } : null;
 }
-
-/** From what is chosen to the charts that it makes. Pure. */
 
 /** One chart: a sensor, and the tags whose readings of it are its lines. */
 export interface Plan {

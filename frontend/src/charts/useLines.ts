@@ -6,10 +6,9 @@ import { endsNow, type Span, spanOf } from '../domain/time';
 import { type AppState, store, useApp } from '../store/app';
 import { createStore, useSelected } from '../store/create';
 import { selectCatalogue, selectCatalogues } from '../store/derived';
-import type { Fetched } from '../store/fetcher';
+import { type Fetched, useFetched } from '../store/fetcher';
 import { rosNow, selectDayS, selectNewestTag, selectTag } from '../store/moment';
 import { turnOf } from '../store/remembered';
-import { useFetched } from '../store/useFetched';
 import { useNow } from '../widgets/useNow';
 import {
   fetchLines,

@@ -2,6 +2,7 @@
 import type { Period, Span } from '../domain/time';
 import { act, store, useApp } from '../store/app';
 import { createStore, useSelected } from '../store/create';
+import { roundedMoment } from '../store/view';
 
 /** Nothing is to be seen in less, seconds. */
 export const SHORTEST_S = 10;
@@ -14,11 +15,12 @@ export function zoomedSpan({ from, to }: Span): Span {
   const middle = (from + to) / 2;
   const half = Math.max(to - from, SHORTEST_S) / 2;
   const start = Math.max(0, middle - half);
-  return { from: round(start), to: round(Math.max(start + SHORTEST_S, middle + half)) };
+  // As the link holds it.
+  return {
+    from: roundedMoment(start),
+    to: roundedMoment(Math.max(start + SHORTEST_S, middle + half)),
+  };
 }
-
-/** To the millisecond, as the link holds it. */
-const round = (at: number): number => Math.round(at * 1000) / 1000;
 
 export function zoomTo(span: Span): void {
   const { period } = store.get().view;

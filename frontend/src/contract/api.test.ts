@@ -1,7 +1,6 @@
 import { beforeEach, describe, expect, test, vi } from 'vitest';
 
-import { npyEstimate } from '../testing/estimate';
-import { npy as npyGrid } from '../testing/npy';
+import { npyEstimate, npy as npyGrid } from '../testing/field';
 import { answer, fetchEstimate, fetchHistory, npyOf, Refusal, route, stateSocketUrl } from './api';
 
 const { signal } = new AbortController();

@@ -3,424 +3,396 @@
 export type paths = Record<string, never>;
 export type webhooks = Record<string, never>;
 export interface components {
-  schemas: {
-    readonly Advice: {
-      readonly sensor_type: string;
-      readonly places: readonly components['schemas']['AdvisedPlace'][];
+    schemas: {
+        readonly Advice: {
+            readonly sensor_type: string;
+            readonly places: readonly components["schemas"]["AdvisedPlace"][];
+        };
+        readonly AdvisedPlace: {
+            readonly x: number;
+            readonly y: number;
+            readonly error_ratio: number;
+        };
+        readonly Alarm: {
+            readonly id: string;
+            readonly reason: components["schemas"]["HealthReason"];
+            readonly tag_id: string;
+            readonly raised_at: components["schemas"]["Time"];
+            readonly cleared_at: components["schemas"]["Time"] | null;
+            readonly worst: number | null;
+            readonly acknowledged_by?: string | null;
+            readonly acknowledged_at?: components["schemas"]["Time"] | null;
+            readonly shelved_by?: string | null;
+            readonly shelved_until?: components["schemas"]["Time"] | null;
+            readonly shelved_reason?: string | null;
+        };
+        readonly Alarms: {
+            readonly alarms: readonly components["schemas"]["Alarm"][];
+            /** @enum {string} */
+            readonly source: "starting" | "journal" | "heard";
+            readonly since: components["schemas"]["Time"] | null;
+        };
+        readonly Bucket: {
+            readonly start: components["schemas"]["Time"];
+            readonly n: number;
+            readonly mean: number;
+            readonly min: number;
+            readonly max: number;
+        };
+        readonly ClockRun: {
+            readonly from: components["schemas"]["Time"];
+            readonly to: components["schemas"]["Time"];
+            readonly is_simulated: boolean;
+        };
+        readonly Day: {
+            readonly is_day: boolean;
+            /** @enum {string} */
+            readonly source: "light" | "clock" | "assumed";
+        };
+        readonly EstimateQualities: {
+            readonly sensors: {
+                readonly [key: string]: components["schemas"]["EstimateQuality"];
+            };
+        };
+        readonly EstimateQuality: {
+            readonly fitted_at: components["schemas"]["Time"] | null;
+            readonly fit_problem: string;
+            readonly graded_since: components["schemas"]["Time"] | null;
+            readonly day: components["schemas"]["Graded"];
+            readonly week: components["schemas"]["Graded"];
+            readonly share_day: number | null;
+            readonly share_week: number | null;
+            readonly is_trusted: boolean | null;
+        };
+        readonly ExpectedReading: {
+            readonly measured: number;
+            readonly observed_at: components["schemas"]["Time"];
+            readonly expected: number;
+            readonly expected_sd: number;
+            readonly z: number;
+            readonly offset: number;
+            readonly left_out: boolean;
+        };
+        readonly ExpectedTags: {
+            readonly sensor_type: string;
+            readonly at: components["schemas"]["Time"];
+            readonly tags: {
+                readonly [key: string]: components["schemas"]["ExpectedReading"];
+            };
+        };
+        readonly FieldQuality: {
+            readonly sensor_type: string;
+            readonly unit: string;
+            readonly sample_count: number;
+            readonly judged_count: number;
+            readonly rmse: number | null;
+            readonly worst: components["schemas"]["TagError"] | null;
+            readonly painted_share: number;
+            readonly far_off_tags: readonly string[];
+        };
+        readonly FlowerPoint: {
+            readonly position: components["schemas"]["Point"];
+            readonly height_m: number | null;
+            readonly species: string;
+            readonly confidence: number | null;
+            readonly anomaly: boolean;
+        };
+        readonly Graded: {
+            readonly scans: number;
+            readonly inside: number;
+        };
+        readonly Header: {
+            readonly stamp: components["schemas"]["Time"];
+            readonly frame_id: string;
+        };
+        readonly HealthReason: {
+            /** @enum {string} */
+            readonly kind: "range" | "reading_failed" | "scan_failed" | "pest" | "old" | "changed" | "silent" | "stopped";
+            /** @enum {string} */
+            readonly verdict: "critical" | "stressed" | "unknown" | "healthy";
+            readonly sensor: string;
+            readonly value: number | null;
+            readonly limit: number | null;
+            readonly since: components["schemas"]["Time"] | null;
+            readonly release?: number | null;
+        };
+        readonly History: {
+            readonly from: components["schemas"]["Time"];
+            readonly to: components["schemas"]["Time"];
+            readonly tag_id: string;
+            readonly sensor_type: string;
+            readonly unit: string;
+            readonly is_bucketed: boolean;
+            readonly bucket_s: number | null;
+            readonly readings: readonly components["schemas"]["HistoryReading"][];
+            readonly buckets: readonly components["schemas"]["Bucket"][];
+            readonly gaps: readonly components["schemas"]["lupin_bridge__past__schema__Stretch"][];
+            readonly nights: readonly components["schemas"]["lupin_bridge__past__schema__Stretch"][] | null;
+            readonly complete_to: components["schemas"]["Time"] | null;
+            readonly kept_from: components["schemas"]["Time"] | null;
+        };
+        readonly HistoryReading: {
+            readonly stamp: components["schemas"]["Time"];
+            readonly value: number | null;
+        };
+        readonly HouseHealth: {
+            /** @enum {string} */
+            readonly verdict: "critical" | "stressed" | "unknown" | "healthy";
+            readonly reasons?: readonly components["schemas"]["HealthReason"][];
+            readonly day: components["schemas"]["Day"];
+            readonly patrol: components["schemas"]["Patrol"];
+        };
+        readonly Journal: {
+            /** @enum {string} */
+            readonly state: "unknown" | "off" | "starting" | "upgrading" | "recording" | "slow" | "failing" | "doubting" | "in_use" | "foreign";
+            readonly detail: string;
+            readonly set_aside: string;
+            readonly simulated: components["schemas"]["Stretch"] | null;
+        };
+        readonly Judgement: {
+            readonly house: components["schemas"]["HouseHealth"];
+            readonly tags: {
+                readonly [key: string]: components["schemas"]["TagHealth"];
+            };
+        };
+        readonly MapMetaData: {
+            readonly map_load_time: components["schemas"]["Time"];
+            readonly resolution: number;
+            readonly width: number;
+            readonly height: number;
+            readonly origin: components["schemas"]["Pose"];
+        };
+        readonly Note: {
+            readonly id: string;
+            /** @enum {string} */
+            readonly kind: "acknowledge" | "shelve" | "comment";
+            readonly subject: string;
+            readonly text: string;
+            readonly until: components["schemas"]["Time"] | null;
+            readonly made_at: components["schemas"]["Time"];
+            readonly by: string;
+            readonly withdrawn_by: string | null;
+            readonly withdrawn_at: components["schemas"]["Time"] | null;
+        };
+        readonly Notes: {
+            readonly notes: readonly components["schemas"]["Note"][];
+        };
+        readonly OccupancyGrid: {
+            readonly header: components["schemas"]["Header"];
+            readonly info: components["schemas"]["MapMetaData"];
+        };
+        readonly Outward: {
+            /** @enum {string} */
+            readonly channel: "mqtt" | "webhook" | "push";
+            readonly is_failing: boolean;
+            readonly detail: string;
+        };
+        readonly PastAttempt: {
+            readonly stamp: components["schemas"]["Time"];
+            readonly status: number;
+            readonly status_detail: string;
+            readonly kind: number | null;
+        };
+        readonly Patrol: {
+            readonly interval_s: number | null;
+            readonly last_scan: components["schemas"]["Time"] | null;
+            readonly overdue: number;
+        };
+        readonly Point: {
+            readonly x: number | null;
+            readonly y: number | null;
+            readonly z: number | null;
+        };
+        readonly Polygon: {
+            readonly points: readonly components["schemas"]["Point"][];
+        };
+        readonly Pose: {
+            readonly position: components["schemas"]["Point"];
+            readonly orientation: components["schemas"]["Quaternion"];
+        };
+        readonly Quaternion: {
+            readonly x: number | null;
+            readonly y: number | null;
+            readonly z: number | null;
+            readonly w: number | null;
+        };
+        readonly RecentDrop: {
+            readonly reason: string;
+            readonly message: string;
+            readonly count: number;
+        };
+        readonly Robot: {
+            readonly position: components["schemas"]["RobotPosition"] | null;
+            readonly plan: components["schemas"]["RobotPlan"] | null;
+            readonly battery: components["schemas"]["RobotBattery"] | null;
+            readonly trail: readonly components["schemas"]["RobotPoint"][];
+        };
+        readonly RobotBattery: {
+            readonly percent: number;
+            readonly observed_at: components["schemas"]["Time"];
+        };
+        readonly RobotPlan: {
+            readonly points: readonly (readonly number[])[];
+            readonly observed_at: components["schemas"]["Time"];
+        };
+        readonly RobotPoint: {
+            readonly x: number;
+            readonly y: number;
+            readonly observed_at: components["schemas"]["Time"];
+        };
+        readonly RobotPosition: {
+            readonly x: number;
+            readonly y: number;
+            readonly observed_at: components["schemas"]["Time"];
+            readonly heading: number | null;
+        };
+        readonly SensorHistory: {
+            readonly name: string;
+            readonly values: readonly components["schemas"]["HistoryReading"][];
+        };
+        readonly SensorReading: {
+            readonly name: string;
+            readonly value: number | null;
+            readonly observed_at?: components["schemas"]["Time"] | null;
+        };
+        readonly Session: {
+            readonly can_sign_out: boolean;
+            readonly seconds_left: number | null;
+            readonly name: string | null;
+            /** @enum {string} */
+            readonly role: "viewer" | "operator" | "admin";
+            readonly can_write_notes: boolean;
+        };
+        readonly StatusFrame: {
+            /** @constant */
+            readonly type: "status";
+            /** @enum {string} */
+            readonly twin: "live" | "offline";
+            /** @enum {string} */
+            readonly reason: "live" | "paused" | "no_clock" | "clock_stopped" | "clock_doubted" | "never_seen" | "stale" | "thread_dead" | "shutting_down";
+            readonly message: string;
+            readonly state_age_seconds: number | null;
+            readonly has_map: boolean;
+            /** @enum {string} */
+            readonly origin: "unknown" | "robot" | "simulated" | "recorded" | "sim_time";
+            readonly twin_count: number;
+            readonly input_problems: readonly string[];
+            readonly day_length_s: number;
+            readonly drops: readonly components["schemas"]["RecentDrop"][];
+            readonly journal: components["schemas"]["Journal"];
+            readonly outward: readonly components["schemas"]["Outward"][];
+        };
+        readonly TagError: {
+            readonly tag_id: string;
+            readonly measured: number;
+            readonly predicted: number;
+            readonly error: number;
+        };
+        readonly TagHealth: {
+            /** @enum {string} */
+            readonly verdict: "critical" | "stressed" | "unknown" | "healthy";
+            readonly reasons?: readonly components["schemas"]["HealthReason"][];
+        };
+        readonly TagHistory: {
+            readonly tag_id: string;
+            readonly source: string | null;
+            readonly sensors: readonly components["schemas"]["SensorHistory"][];
+            readonly tries: readonly components["schemas"]["PastAttempt"][];
+        };
+        readonly Time: {
+            readonly sec: number;
+            readonly nanosec: number;
+        };
+        readonly Timeline: {
+            readonly from: components["schemas"]["Time"];
+            readonly to: components["schemas"]["Time"];
+            readonly bucket_s: number;
+            readonly reach: components["schemas"]["lupin_bridge__past__schema__Stretch"] | null;
+            readonly buckets: readonly components["schemas"]["TimelineBucket"][];
+            readonly silences: readonly components["schemas"]["lupin_bridge__past__schema__Stretch"][];
+            readonly runs: readonly components["schemas"]["ClockRun"][];
+            readonly complete_to: components["schemas"]["Time"] | null;
+            readonly kept_from: components["schemas"]["Time"] | null;
+        };
+        readonly TimelineBucket: {
+            readonly start: components["schemas"]["Time"];
+            readonly scans: number;
+            readonly failures: number;
+            readonly looks: number;
+            readonly pests_seen: number;
+            readonly pests_cleared: number;
+        };
+        readonly TwinState: {
+            readonly header: components["schemas"]["Header"];
+            readonly tags: readonly components["schemas"]["TwinTagState"][];
+        };
+        readonly TwinTagState: {
+            readonly tag_id: string;
+            readonly pose: components["schemas"]["Pose"];
+            readonly readings: readonly components["schemas"]["SensorReading"][];
+            readonly last_observed: components["schemas"]["Time"];
+            readonly stale_seconds: number | null;
+            readonly species: string;
+            readonly species_confidence: number | null;
+            readonly anomaly: boolean;
+            readonly flower_count: number;
+            readonly bug_count: number;
+            readonly flowers: readonly components["schemas"]["FlowerPoint"][];
+            readonly box_footprint: components["schemas"]["Polygon"];
+            readonly looked_at?: components["schemas"]["Time"] | null;
+            readonly last_try?: components["schemas"]["Time"] | null;
+            readonly last_try_status?: number | null;
+            readonly last_try_detail?: string;
+        };
+        readonly lupin_bridge__past__schema__Stretch: {
+            readonly from: components["schemas"]["Time"];
+            readonly to: components["schemas"]["Time"];
+        };
+        readonly StateFrame: {
+            /** @constant */
+            readonly type: "state";
+            readonly seq: number;
+            readonly revision: string;
+            readonly state: components["schemas"]["TwinState"];
+            readonly health: components["schemas"]["Judgement"];
+        };
+        readonly DeltaFrame: {
+            /** @constant */
+            readonly type: "delta";
+            readonly seq: number;
+            readonly base: number;
+            readonly revision: string;
+            readonly header: components["schemas"]["Header"];
+            readonly changed: readonly components["schemas"]["TwinTagState"][];
+            readonly removed: readonly string[];
+            readonly health: components["schemas"]["Judgement"];
+        };
+        readonly Stretch: {
+            readonly start: components["schemas"]["Time"];
+            readonly end: components["schemas"]["Time"];
+        };
+        readonly AlarmsFrame: {
+            readonly alarms: readonly components["schemas"]["Alarm"][];
+            /** @enum {string} */
+            readonly source: "starting" | "journal" | "heard";
+            readonly since: components["schemas"]["Time"] | null;
+            /** @constant */
+            readonly type: "alarms";
+            readonly notes: number;
+        };
+        readonly RobotFrame: {
+            readonly position: components["schemas"]["RobotPosition"] | null;
+            readonly plan: components["schemas"]["RobotPlan"] | null;
+            readonly battery: components["schemas"]["RobotBattery"] | null;
+            /** @constant */
+            readonly type: "robot";
+        };
     };
-    readonly AdvisedPlace: {
-      readonly x: number;
-      readonly y: number;
-      readonly error_ratio: number;
-    };
-    readonly Alarm: {
-      readonly id: string;
-      readonly reason: components['schemas']['HealthReason'];
-      readonly tag_id: string;
-      readonly raised_at: components['schemas']['Time'];
-      readonly cleared_at: components['schemas']['Time'] | null;
-      readonly worst: number | null;
-      readonly acknowledged_by?: string | null;
-      readonly acknowledged_at?: components['schemas']['Time'] | null;
-      readonly shelved_by?: string | null;
-      readonly shelved_until?: components['schemas']['Time'] | null;
-      readonly shelved_reason?: string | null;
-    };
-    readonly Alarms: {
-      readonly alarms: readonly components['schemas']['Alarm'][];
-      /** @enum {string} */
-      readonly source: 'starting' | 'journal' | 'heard';
-      readonly since: components['schemas']['Time'] | null;
-    };
-    readonly Bucket: {
-      readonly start: components['schemas']['Time'];
-      readonly n: number;
-      readonly mean: number;
-      readonly min: number;
-      readonly max: number;
-    };
-    readonly ClockRun: {
-      readonly from: components['schemas']['Time'];
-      readonly to: components['schemas']['Time'];
-      readonly is_simulated: boolean;
-    };
-    readonly Day: {
-      readonly is_day: boolean;
-      /** @enum {string} */
-      readonly source: 'light' | 'clock' | 'assumed';
-    };
-    readonly EstimateQualities: {
-      readonly sensors: {
-        readonly [key: string]: components['schemas']['EstimateQuality'];
-      };
-    };
-    readonly EstimateQuality: {
-      readonly fitted_at: components['schemas']['Time'] | null;
-      readonly fit_problem: string;
-      readonly graded_since: components['schemas']['Time'] | null;
-      readonly day: components['schemas']['Graded'];
-      readonly week: components['schemas']['Graded'];
-      readonly share_day: number | null;
-      readonly share_week: number | null;
-      readonly is_trusted: boolean | null;
-    };
-    readonly ExpectedReading: {
-      readonly measured: number;
-      readonly observed_at: components['schemas']['Time'];
-      readonly expected: number;
-      readonly expected_sd: number;
-      readonly z: number;
-      readonly offset: number;
-      readonly left_out: boolean;
-    };
-    readonly ExpectedTags: {
-      readonly sensor_type: string;
-      readonly at: components['schemas']['Time'];
-      readonly tags: {
-        readonly [key: string]: components['schemas']['ExpectedReading'];
-      };
-    };
-    readonly FieldQuality: {
-      readonly sensor_type: string;
-      readonly unit: string;
-      readonly sample_count: number;
-      readonly judged_count: number;
-      readonly rmse: number | null;
-      readonly worst: components['schemas']['TagError'] | null;
-      readonly painted_share: number;
-      readonly far_off_tags: readonly string[];
-    };
-    readonly FlowerPoint: {
-      readonly position: components['schemas']['Point'];
-      readonly height_m: number | null;
-      readonly species: string;
-      readonly confidence: number | null;
-      readonly anomaly: boolean;
-    };
-    readonly Graded: {
-      readonly scans: number;
-      readonly inside: number;
-    };
-    readonly Header: {
-      readonly stamp: components['schemas']['Time'];
-      readonly frame_id: string;
-    };
-    readonly HealthReason: {
-      /** @enum {string} */
-      readonly kind:
-        | 'range'
-        | 'reading_failed'
-        | 'scan_failed'
-        | 'pest'
-        | 'old'
-        | 'changed'
-        | 'silent'
-        | 'stopped';
-      /** @enum {string} */
-      readonly verdict: 'critical' | 'stressed' | 'unknown' | 'healthy';
-      readonly sensor: string;
-      readonly value: number | null;
-      readonly limit: number | null;
-      readonly since: components['schemas']['Time'] | null;
-      readonly release?: number | null;
-    };
-    readonly History: {
-      readonly from: components['schemas']['Time'];
-      readonly to: components['schemas']['Time'];
-      readonly tag_id: string;
-      readonly sensor_type: string;
-      readonly unit: string;
-      readonly is_bucketed: boolean;
-      readonly bucket_s: number | null;
-      readonly readings: readonly components['schemas']['HistoryReading'][];
-      readonly buckets: readonly components['schemas']['Bucket'][];
-      readonly gaps: readonly components['schemas']['lupin_bridge__past__schema__Stretch'][];
-      readonly nights:
-        readonly components['schemas']['lupin_bridge__past__schema__Stretch'][] | null;
-      readonly complete_to: components['schemas']['Time'] | null;
-      readonly kept_from: components['schemas']['Time'] | null;
-    };
-    readonly HistoryReading: {
-      readonly stamp: components['schemas']['Time'];
-      readonly value: number | null;
-    };
-    readonly HouseHealth: {
-      /** @enum {string} */
-      readonly verdict: 'critical' | 'stressed' | 'unknown' | 'healthy';
-      readonly reasons?: readonly components['schemas']['HealthReason'][];
-      readonly day: components['schemas']['Day'];
-      readonly patrol: components['schemas']['Patrol'];
-    };
-    readonly Journal: {
-      /** @enum {string} */
-      readonly state:
-        | 'unknown'
-        | 'off'
-        | 'starting'
-        | 'upgrading'
-        | 'recording'
-        | 'slow'
-        | 'failing'
-        | 'doubting'
-        | 'in_use'
-        | 'foreign';
-      readonly detail: string;
-      readonly set_aside: string;
-      readonly simulated: components['schemas']['Stretch'] | null;
-    };
-    readonly Judgement: {
-      readonly house: components['schemas']['HouseHealth'];
-      readonly tags: {
-        readonly [key: string]: components['schemas']['TagHealth'];
-      };
-    };
-    readonly MapMetaData: {
-      readonly map_load_time: components['schemas']['Time'];
-      readonly resolution: number;
-      readonly width: number;
-      readonly height: number;
-      readonly origin: components['schemas']['Pose'];
-    };
-    readonly Note: {
-      readonly id: string;
-      /** @enum {string} */
-      readonly kind: 'acknowledge' | 'shelve' | 'comment';
-      readonly subject: string;
-      readonly text: string;
-      readonly until: components['schemas']['Time'] | null;
-      readonly made_at: components['schemas']['Time'];
-      readonly by: string;
-      readonly withdrawn_by: string | null;
-      readonly withdrawn_at: components['schemas']['Time'] | null;
-    };
-    readonly Notes: {
-      readonly notes: readonly components['schemas']['Note'][];
-    };
-    readonly OccupancyGrid: {
-      readonly header: components['schemas']['Header'];
-      readonly info: components['schemas']['MapMetaData'];
-    };
-    readonly Outward: {
-      /** @enum {string} */
-      readonly channel: 'mqtt' | 'webhook' | 'push';
-      readonly is_failing: boolean;
-      readonly detail: string;
-    };
-    readonly PastAttempt: {
-      readonly stamp: components['schemas']['Time'];
-      readonly status: number;
-      readonly status_detail: string;
-      readonly kind: number | null;
-    };
-    readonly Patrol: {
-      readonly interval_s: number | null;
-      readonly last_scan: components['schemas']['Time'] | null;
-      readonly overdue: number;
-    };
-    readonly Point: {
-      readonly x: number | null;
-      readonly y: number | null;
-      readonly z: number | null;
-    };
-    readonly Polygon: {
-      readonly points: readonly components['schemas']['Point'][];
-    };
-    readonly Pose: {
-      readonly position: components['schemas']['Point'];
-      readonly orientation: components['schemas']['Quaternion'];
-    };
-    readonly Quaternion: {
-      readonly x: number | null;
-      readonly y: number | null;
-      readonly z: number | null;
-      readonly w: number | null;
-    };
-    readonly RecentDrop: {
-      readonly reason: string;
-      readonly message: string;
-      readonly count: number;
-    };
-    readonly Robot: {
-      readonly position: components['schemas']['RobotPosition'] | null;
-      readonly plan: components['schemas']['RobotPlan'] | null;
-      readonly battery: components['schemas']['RobotBattery'] | null;
-      readonly trail: readonly components['schemas']['RobotPoint'][];
-    };
-    readonly RobotBattery: {
-      readonly percent: number;
-      readonly observed_at: components['schemas']['Time'];
-    };
-    readonly RobotPlan: {
-      readonly points: readonly (readonly number[])[];
-      readonly observed_at: components['schemas']['Time'];
-    };
-    readonly RobotPoint: {
-      readonly x: number;
-      readonly y: number;
-      readonly observed_at: components['schemas']['Time'];
-    };
-    readonly RobotPosition: {
-      readonly x: number;
-      readonly y: number;
-      readonly observed_at: components['schemas']['Time'];
-      readonly heading: number | null;
-    };
-    readonly SensorHistory: {
-      readonly name: string;
-      readonly values: readonly components['schemas']['HistoryReading'][];
-    };
-    readonly SensorReading: {
-      readonly name: string;
-      readonly value: number | null;
-      readonly observed_at?: components['schemas']['Time'] | null;
-    };
-    readonly Session: {
-      readonly can_sign_out: boolean;
-      readonly seconds_left: number | null;
-      readonly name: string | null;
-      /** @enum {string} */
-      readonly role: 'viewer' | 'operator' | 'admin';
-      readonly can_write_notes: boolean;
-    };
-    readonly StatusFrame: {
-      /** @constant */
-      readonly type: 'status';
-      /** @enum {string} */
-      readonly twin: 'live' | 'offline';
-      /** @enum {string} */
-      readonly reason:
-        | 'live'
-        | 'paused'
-        | 'no_clock'
-        | 'clock_stopped'
-        | 'clock_doubted'
-        | 'never_seen'
-        | 'stale'
-        | 'thread_dead'
-        | 'shutting_down';
-      readonly message: string;
-      readonly state_age_seconds: number | null;
-      readonly has_map: boolean;
-      /** @enum {string} */
-      readonly origin: 'unknown' | 'robot' | 'simulated' | 'recorded' | 'sim_time';
-      readonly twin_count: number;
-      readonly input_problems: readonly string[];
-      readonly day_length_s: number;
-      readonly drops: readonly components['schemas']['RecentDrop'][];
-      readonly journal: components['schemas']['Journal'];
-      readonly outward: readonly components['schemas']['Outward'][];
-    };
-    readonly TagError: {
-      readonly tag_id: string;
-      readonly measured: number;
-      readonly predicted: number;
-      readonly error: number;
-    };
-    readonly TagHealth: {
-      /** @enum {string} */
-      readonly verdict: 'critical' | 'stressed' | 'unknown' | 'healthy';
-      readonly reasons?: readonly components['schemas']['HealthReason'][];
-    };
-    readonly TagHistory: {
-      readonly tag_id: string;
-      readonly source: string | null;
-      readonly sensors: readonly components['schemas']['SensorHistory'][];
-      readonly tries: readonly components['schemas']['PastAttempt'][];
-    };
-    readonly Time: {
-      readonly sec: number;
-      readonly nanosec: number;
-    };
-    readonly Timeline: {
-      readonly from: components['schemas']['Time'];
-      readonly to: components['schemas']['Time'];
-      readonly bucket_s: number;
-      readonly reach: components['schemas']['lupin_bridge__past__schema__Stretch'] | null;
-      readonly buckets: readonly components['schemas']['TimelineBucket'][];
-      readonly silences: readonly components['schemas']['lupin_bridge__past__schema__Stretch'][];
-      readonly runs: readonly components['schemas']['ClockRun'][];
-      readonly complete_to: components['schemas']['Time'] | null;
-      readonly kept_from: components['schemas']['Time'] | null;
-    };
-    readonly TimelineBucket: {
-      readonly start: components['schemas']['Time'];
-      readonly scans: number;
-      readonly failures: number;
-      readonly looks: number;
-      readonly pests_seen: number;
-      readonly pests_cleared: number;
-    };
-    readonly TwinState: {
-      readonly header: components['schemas']['Header'];
-      readonly tags: readonly components['schemas']['TwinTagState'][];
-    };
-    readonly TwinTagState: {
-      readonly tag_id: string;
-      readonly pose: components['schemas']['Pose'];
-      readonly readings: readonly components['schemas']['SensorReading'][];
-      readonly last_observed: components['schemas']['Time'];
-      readonly stale_seconds: number | null;
-      readonly species: string;
-      readonly species_confidence: number | null;
-      readonly anomaly: boolean;
-      readonly flower_count: number;
-      readonly bug_count: number;
-      readonly flowers: readonly components['schemas']['FlowerPoint'][];
-      readonly box_footprint: components['schemas']['Polygon'];
-      readonly looked_at?: components['schemas']['Time'] | null;
-      readonly last_try?: components['schemas']['Time'] | null;
-      readonly last_try_status?: number | null;
-      readonly last_try_detail?: string;
-    };
-    readonly lupin_bridge__past__schema__Stretch: {
-      readonly from: components['schemas']['Time'];
-      readonly to: components['schemas']['Time'];
-    };
-    readonly StateFrame: {
-      /** @constant */
-      readonly type: 'state';
-      readonly seq: number;
-      readonly revision: string;
-      readonly state: components['schemas']['TwinState'];
-      readonly health: components['schemas']['Judgement'];
-    };
-    readonly DeltaFrame: {
-      /** @constant */
-      readonly type: 'delta';
-      readonly seq: number;
-      readonly base: number;
-      readonly revision: string;
-      readonly header: components['schemas']['Header'];
-      readonly changed: readonly components['schemas']['TwinTagState'][];
-      readonly removed: readonly string[];
-      readonly health: components['schemas']['Judgement'];
-    };
-    readonly Stretch: {
-      readonly start: components['schemas']['Time'];
-      readonly end: components['schemas']['Time'];
-    };
-    readonly AlarmsFrame: {
-      readonly alarms: readonly components['schemas']['Alarm'][];
-      /** @enum {string} */
-      readonly source: 'starting' | 'journal' | 'heard';
-      readonly since: components['schemas']['Time'] | null;
-      /** @constant */
-      readonly type: 'alarms';
-      readonly notes: number;
-    };
-    readonly RobotFrame: {
-      readonly position: components['schemas']['RobotPosition'] | null;
-      readonly plan: components['schemas']['RobotPlan'] | null;
-      readonly battery: components['schemas']['RobotBattery'] | null;
-      /** @constant */
-      readonly type: 'robot';
-    };
-  };
-  responses: never;
-  parameters: never;
-  requestBodies: never;
-  headers: never;
-  pathItems: never;
+    responses: never;
+    parameters: never;
+    requestBodies: never;
+    headers: never;
+    pathItems: never;
 }
 export type $defs = Record<string, never>;
 export type operations = Record<string, never>;

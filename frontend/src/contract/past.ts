@@ -1,7 +1,7 @@
 /** The routes of the past: how it was at a moment, and what happened when. Times are ROS seconds. */
-import { answer, get, momentParameter, read, withQuery } from './api';
+import { answer, get, momentParameter, read, route, withQuery } from './api';
 import { filledHealth, filledTag } from './frames';
-import type { Latest, Timeline } from './types';
+import type { History, Latest, Timeline } from './types';
 
 /** Stamps are exact to the nanosecond, and a moment that is asked for to the millisecond. */
 const SAME_MOMENT_S = 0.0005;
@@ -61,3 +61,31 @@ export const fetchTimeline = (
     to: span ? momentParameter(span.to) : undefined,
     tag_id: tagId,
   });
+
+/** What the server gives at most of each. */
+const MAX_POINTS = 5_000;
+
+/** Times are ROS seconds. */
+interface Asked {
+  readonly tagId: string | undefined;
+  readonly sensor: string | undefined;
+  readonly from: number;
+  readonly to: number;
+}
+
+const parameters = ({ tagId, sensor, from, to }: Asked) => ({
+  tag_id: tagId,
+  sensor_type: sensor,
+  from: momentParameter(from),
+  to: momentParameter(to),
+});
+
+export const fetchSeries = (asked: Asked, points: number, signal: AbortSignal): Promise<History> =>
+  answer('History', signal, 'api/history', {
+    ...parameters(asked),
+    points: Math.min(MAX_POINTS, points),
+  });
+
+/** Where every reading and try of a period is to be had, of one tag and of one sensor if named. */
+export const exportAddress = (asked: Asked): string =>
+  route(withQuery('api/export.csv', parameters(asked))).href;

@@ -37,8 +37,6 @@ export async function withdrawNote(kind: Draft['kind'], subject: string): Promis
   if (note) await withdrawComment(note.id);
 }
 
-/** What people said in free words: the bridge's notes of the kind `comment`. */
-
 /** The newest first, withdrawn ones too. */
 export const fetchComments = async (signal: AbortSignal): Promise<readonly Note[]> =>
   (await answer('Notes', signal, 'api/notes', { kind: 'comment' })).notes;

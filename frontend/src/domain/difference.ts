@@ -101,8 +101,6 @@ export function differenceText(sensor: Sensor, value: number, unit: TemperatureU
   return withUnit(sensor, signedText(sensor, value, unit), unit);
 }
 
-/** A reading against the same an hour before, as far as the bridge lets either stand. Pure. */
-
 /** A tag, and what the bridge said of it at that moment. */
 export interface TagThen {
   readonly tag: Tag;

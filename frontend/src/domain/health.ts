@@ -126,8 +126,6 @@ export function sharedJudgement(before: Judgement | null, now: Judgement): Judge
   return isSame ? before : now;
 }
 
-/** Why a tag or the house has its verdict, in words. */
-
 /** Of a name that some twin made up. */
 const LONGEST_NAME = 32;
 

@@ -1,7 +1,7 @@
 import { describe, expect, test } from 'vitest';
 
 import { CATALOGUE } from '../testing/sensors';
-import { bucketAt, seriesWith } from '../testing/series';
+import { bucketAt, seriesWith } from '../testing/timeline';
 import {
   chartCsv,
   lastUntil,

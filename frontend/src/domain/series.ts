@@ -2,12 +2,12 @@
  * What one sensor of one tag read over a period: each reading, or buckets where there are too many
  * to show. All times are ROS seconds. Where the robot was away is a gap, and nothing bridges it.
  */
-import type { History, Timeline, WireTime } from '../contract/types';
+import type { History, Timeline } from '../contract/types';
 import { type Cell, csv } from './text';
 import { hasDate, secondsOf, type Span } from './time';
 import type { Catalogue } from './sensors';
 import { type TemperatureUnit, toShown, unitOf } from './format';
-import { type Missing, missingOf } from './timeline';
+import { type Missing, missingOf, spanOfWire } from './timeline';
 
 /** A reading, or all finite readings of a bucket. */
 export interface Point {
@@ -42,11 +42,6 @@ export interface Series extends Span {
   readonly missing: readonly Missing[];
 }
 
-const spanOf = (span: { readonly from: WireTime; readonly to: WireTime }): Span => ({
-  from: secondsOf(span.from),
-  to: secondsOf(span.to),
-});
-
 export const readingAt = (at: number, value: number | null): Point => ({
   ...{ at, value, min: value, max: value },
   n: Number(value !== null),
@@ -54,7 +49,7 @@ export const readingAt = (at: number, value: number | null): Point => ({
 
 /** The series that the bridge told, at `nowS` of the twin's time, ROS seconds. */
 export const seriesOf = (wire: History, nowS: number): Series => ({
-  ...spanOf(wire),
+  ...spanOfWire(wire),
   tagId: wire.tag_id,
   sensor: wire.sensor_type,
   bucketS: wire.bucket_s,
@@ -66,8 +61,8 @@ export const seriesOf = (wire: History, nowS: number): Series => ({
       value: mean,
     })),
   ],
-  gaps: wire.gaps.map(spanOf),
-  nights: wire.nights?.map(spanOf) ?? null,
+  gaps: wire.gaps.map(spanOfWire),
+  nights: wire.nights?.map(spanOfWire) ?? null,
   missing: missingOf(wire, nowS),
 });
 
@@ -110,8 +105,6 @@ export function pointAt(series: Series, moment: number): Point | null {
 /** The last reading or bucket that had begun by then: what was known at that moment. */
 export const lastUntil = ({ points }: Series, moment: number): Point | null =>
   points.findLast(({ at }) => at <= moment) ?? null;
-
-/** What a chart shows, as rows: for the keyboard, for screen readers, and to take away. */
 
 /** Times are ROS seconds, values in the sensor's own unit. */
 export interface SeriesRow extends Omit<Point, 'n'> {

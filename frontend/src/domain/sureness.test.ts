@@ -1,6 +1,6 @@
 import { describe, expect, test } from 'vitest';
 
-import { estimated, sureness } from '../testing/estimate';
+import { estimated, sureness } from '../testing/field';
 import {
   errorField,
   errorShade,

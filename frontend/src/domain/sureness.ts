@@ -58,7 +58,6 @@ export const errorShade =
   };
 
 /** A field of an estimate as it came: what is too unsure is not known. Pure. */
-
 export function estimatedField(sensor: string, estimate: Estimate): Field {
   const { mean, sd, sdKnown, readingCount, ...grid } = estimate;
   const values = mean.map((value, cell) =>

@@ -48,8 +48,6 @@ export function freshness(age: number | null): number {
   return 1 - (1 - FAINTEST) * Math.min(1, share);
 }
 
-/** ROS times as seconds, and for a person to read. */
-
 /** Stamps before September 2001 are no dates: a simulation counts from its own beginning. */
 const FIRST_DATE_S = 1e9;
 
@@ -77,13 +75,14 @@ export function shortRosText(at: number): string {
 export const dateText = (epochMs: number): string =>
   `${date.format(epochMs)}, ${clockText(epochMs)}`;
 
+/** Of a number of hours, minutes or seconds, two digits at least. */
+export const two = (value: number): string => String(value).padStart(2, '0');
+
 function simText(at: number): string {
   const seconds = Math.floor(at);
   const parts = [Math.floor(seconds / 3_600), Math.floor(seconds / 60) % 60, seconds % 60];
-  return `sim ${parts.map((part) => String(part).padStart(2, '0')).join(':')}`;
+  return `sim ${parts.map(two).join(':')}`;
 }
-
-/** A stretch of time that the page looks at: the same for the time bar and for charts. */
 
 /** Lengths that end now, in seconds. */
 const LENGTHS = { hour: 3_600, day: 86_400, week: 604_800, month: 2_592_000 } as const;

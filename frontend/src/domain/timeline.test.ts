@@ -26,9 +26,9 @@ test('a timeline has its times in seconds', () => {
     to: 340,
     bucketS: 1,
     reach: { from: 20, to: 340.5 },
-    buckets: [{ start: 101.5, scans: 5, failures: 1, looks: 2, pestsSeen: 3, pestsCleared: 4 }],
+    buckets: [{ start: 101.5, scans: 5, failures: 1, looks: 2, pests_seen: 3, pests_cleared: 4 }],
     silences: [{ from: 110, to: 120 }],
-    runs: [{ from: 20, to: 340, isSimulated: true }],
+    runs: [{ from: 20, to: 340 }],
     missing: [{ from: 100, to: 105, why: 'not_kept' }],
   });
   expect(timelineOf({ ...wire, reach: null }, 400).reach).toBeNull();

@@ -1,21 +1,12 @@
 /** What happened when, and how far back anything is remembered. Times are ROS seconds. */
-import type { WireTime, Timeline as WireTimeline } from '../contract/types';
+import type { Timeline as WireTimeline } from '../contract/types';
 import { LOCALE } from '../strings';
-import { dayFormat, secondsOf, type Span } from './time';
+import { dayFormat, secondsOf, type Span, two } from './time';
 
 /** What happened in one bucket. */
-export interface Happened {
+export interface Happened extends Omit<WireTimeline['buckets'][number], 'start'> {
   /** When the bucket begins. */
   readonly start: number;
-  readonly scans: number;
-  readonly failures: number;
-  readonly looks: number;
-  readonly pestsSeen: number;
-  readonly pestsCleared: number;
-}
-
-export interface ClockRun extends Span {
-  readonly isSimulated: boolean;
 }
 
 export interface Timeline extends Span {
@@ -26,13 +17,17 @@ export interface Timeline extends Span {
   /** By their time; one in which nothing happened is left out. */
   readonly buckets: readonly Happened[];
   readonly silences: readonly Span[];
-  readonly runs: readonly ClockRun[];
+  /** Of the clock. */
+  readonly runs: readonly Span[];
   readonly missing: readonly Missing[];
 }
 
 type WireSpan = WireTimeline['silences'][number];
 
-const spanOfWire = ({ from, to }: WireSpan): Span => ({ from: secondsOf(from), to: secondsOf(to) });
+export const spanOfWire = ({ from, to }: WireSpan): Span => ({
+  from: secondsOf(from),
+  to: secondsOf(to),
+});
 
 /** `nowS`: the twin's time, ROS seconds, as it was told. */
 export function timelineOf(wire: WireTimeline, nowS: number): Timeline {
@@ -40,16 +35,9 @@ export function timelineOf(wire: WireTimeline, nowS: number): Timeline {
     ...spanOfWire(wire),
     bucketS: wire.bucket_s,
     reach: wire.reach && spanOfWire(wire.reach),
-    buckets: wire.buckets.map((bucket) => ({
-      start: secondsOf(bucket.start),
-      scans: bucket.scans,
-      failures: bucket.failures,
-      looks: bucket.looks,
-      pestsSeen: bucket.pests_seen,
-      pestsCleared: bucket.pests_cleared,
-    })),
+    buckets: wire.buckets.map((bucket) => ({ ...bucket, start: secondsOf(bucket.start) })),
     silences: wire.silences.map(spanOfWire),
-    runs: wire.runs.map((run) => ({ ...spanOfWire(run), isSimulated: run.is_simulated })),
+    runs: wire.runs.map(spanOfWire),
     missing: missingOf(wire, nowS),
   };
 }
@@ -61,12 +49,7 @@ export interface Missing extends Span {
   readonly why: 'not_kept' | 'not_recorded';
 }
 
-interface Told {
-  readonly from: WireTime;
-  readonly to: WireTime;
-  readonly complete_to: WireTime | null;
-  readonly kept_from: WireTime | null;
-}
+type Told = Pick<WireTimeline, 'from' | 'to' | 'complete_to' | 'kept_from'>;
 
 /** The twin says once a second how far its journal is. */
 const SLACK_S = 5;
@@ -82,8 +65,6 @@ export function missingOf(told: Told, nowS: number): readonly Missing[] {
   }
   return missing.filter((stretch) => stretch.to > stretch.from);
 }
-
-/** Where a time axis is marked, and with what: round times of the operator's clock. Pure. */
 
 export interface Tick {
   /** ROS seconds. */
@@ -164,8 +145,6 @@ const daysOf = (day: Date): number =>
   Math.round(Date.UTC(day.getFullYear(), day.getMonth(), day.getDate()) / 1000 / DAY) + 3;
 
 const monthFormat = new Intl.DateTimeFormat(LOCALE, { month: 'short' });
-
-const two = (value: number): string => String(value).padStart(2, '0');
 
 function clockText(date: Date, step: number): string {
   const text = `${two(date.getHours())}:${two(date.getMinutes())}`;

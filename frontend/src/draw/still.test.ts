@@ -2,8 +2,7 @@ import { describe, expect, test } from 'vitest';
 
 import { mapPoint } from '../geometry/coordinates';
 import { FakeContext } from '../testing/canvas';
-import { estimated, sureness } from '../testing/estimate';
-import { fieldWith } from '../testing/field';
+import { estimated, fieldWith, sureness } from '../testing/field';
 import { DARK, LIGHT } from './palette';
 import {
   drawBoxes,

@@ -21,6 +21,29 @@ export function contextOf(canvas: HTMLCanvasElement): CanvasRenderingContext2D {
   return context;
 }
 
+/** Slanted lines over a box, in the stroke that is set; `slant` 1 leans to the right, -1 to the left. */
+export function hatch(
+  context: CanvasRenderingContext2D,
+  left: number,
+  top: number,
+  { width, height }: Size,
+  step: number,
+  slant: 1 | -1,
+): void {
+  const [from, to] = slant > 0 ? [top + height, top] : [top, top + height];
+  context.save();
+  context.beginPath();
+  context.rect(left, top, width, height);
+  context.clip();
+  context.beginPath();
+  for (let at = Math.floor((left - height) / step) * step; at < left + width; at += step) {
+    context.moveTo(at, from);
+    context.lineTo(at + height, to);
+  }
+  context.stroke();
+  context.restore();
+}
+
 /** Goes back to CSS pixels and empties the canvas. */
 export function clear({ context, size, ratio }: Surface): void {
   context.setTransform(ratio, 0, 0, ratio, 0, 0);

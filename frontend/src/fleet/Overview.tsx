@@ -201,8 +201,6 @@ function Trouble({ seen, words }: { seen: Seen; words: FleetWords }): JSX.Elemen
   );
 }
 
-/** A card a greenhouse; in groups where there are some. */
-
 const STAYS_MS = 200;
 /** So long after its last word a greenhouse counts as silent, and the archive as down. */
 const LIVE_MS = 20_000;

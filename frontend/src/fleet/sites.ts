@@ -164,8 +164,6 @@ export function chosen(sites: Sites, filter: Filter, search: string, group = '')
     .sort(worstFirst);
 }
 
-/** Moments as the page over all greenhouses writes them. */
-
 const clockTime = new Intl.DateTimeFormat(LOCALE, { timeStyle: 'medium' });
 const dateAndTime = new Intl.DateTimeFormat(LOCALE, { dateStyle: 'medium', timeStyle: 'short' });
 const DAY_MS = 86_400_000;

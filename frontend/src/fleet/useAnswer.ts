@@ -6,9 +6,8 @@ import { pause } from '../clock';
 import { bodyOf, get } from '../contract/api';
 import type { SensorsFile } from '../contract/types';
 import { cataloguesOf, NO_CATALOGUES } from '../domain/sensors';
-import type { Fetched } from '../store/fetcher';
+import { type Fetched, useFetched } from '../store/fetcher';
 import { openStorage, readSettings } from '../store/settings';
-import { useFetched } from '../store/useFetched';
 import { useTicking } from '../widgets/useNow';
 
 /** What is asked for changes faster than anybody reads. */

@@ -47,8 +47,6 @@ export function useSelected<State, Action, Part>(
   return useSyncExternalStore(store.subscribe, () => select(store.get()));
 }
 
-/** Small stores beside the page's state. */
-
 /** What a screen reader is told beside what it is led to. */
 export interface Announcement {
   readonly text: string;

@@ -1,7 +1,7 @@
 import { afterEach, beforeEach, expect, test, vi } from 'vitest';
 
 import { readings, wireTag } from '../testing/tags';
-import { npy } from '../testing/npy';
+import { npy } from '../testing/field';
 import { showTags } from '../testing/page';
 import { act, store } from './app';
 import { selectHeat } from './derived';

@@ -2,6 +2,8 @@
  * Fetches what is wanted just now: the latest wish wins, nothing queues, and a failure is tried
  * again, ever more slowly.
  */
+import { useEffect, useState } from 'react';
+
 import { now } from '../clock';
 import { Refusal } from '../contract/api';
 import { failureText } from '../domain/format';
@@ -204,4 +206,39 @@ export function createFetcher<T>({
       else pump();
     },
   };
+}
+
+/**
+ * What a component wishes for just now; null: nothing more. The value before stays until the next
+ * has come, also that of another group: "waiting" then.
+ */
+export function useFetched<T>(wish: Wish<T> | null, paceMs: number): Fetched<T> {
+  const [fetched, setFetched] = useState<Fetched<T>>(NOTHING);
+  const [group, setGroup] = useState(wish?.group);
+  const [fetcher] = useState(() =>
+    createFetcher<T>({
+      paceMs,
+      onValue: (value) => {
+        setFetched(ready(value));
+      },
+      onError: (message) => {
+        setFetched(({ value }) => failed(message, value));
+      },
+    }),
+  );
+  if (wish && wish.group !== group) {
+    setGroup(wish.group);
+    setFetched(({ value }) => ({ value, state: 'waiting', message: '' }));
+  }
+  // The same wish as before changes nothing.
+  useEffect(() => {
+    fetcher.want(wish);
+  });
+  useEffect(
+    () => () => {
+      fetcher.want(null);
+    },
+    [fetcher],
+  );
+  return fetched;
 }

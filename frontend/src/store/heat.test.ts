@@ -1,7 +1,6 @@
 import { afterEach, beforeEach, expect, test, vi } from 'vitest';
 
-import { npyEstimate } from '../testing/estimate';
-import { npyField } from '../testing/field';
+import { npyEstimate, npyField } from '../testing/field';
 import { goLost, showTags } from '../testing/page';
 import { readings, stateFrame, wireTag } from '../testing/tags';
 import { act, receive, store } from './app';

@@ -16,9 +16,7 @@ import { NO_HOUSE, NO_TWIN, type House } from './twin';
 const then = (): House => ({
   ...NO_HOUSE,
   snapshot: snapshotOf(
-    stateFrame([
-      wireTag({ tag_id: 'old', readings: readings({ temperature: 40, ph: 6 }, 75) }),
-    ]),
+    stateFrame([wireTag({ tag_id: 'old', readings: readings({ temperature: 40, ph: 6 }, 75) })]),
     1_000,
     null,
   ),

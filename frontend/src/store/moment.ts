@@ -155,8 +155,6 @@ export function ownTime(state: AppState, at: number): number | null {
   return isHeardNow(state) ? rosNow(state, at) : taken;
 }
 
-/** The stretch of time that the bar has now, and the twin's time. */
-
 /** What is drawn is what was fetched; until then it is what was asked for. */
 export function barSpan(state: AppState, nowS: number): Span {
   const { value } = state.twin.remembered;

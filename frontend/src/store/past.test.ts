@@ -1,7 +1,6 @@
 import { afterEach, beforeEach, describe, expect, test, vi } from 'vitest';
 
-import { npyEstimate } from '../testing/estimate';
-import { npyField } from '../testing/field';
+import { npyEstimate, npyField } from '../testing/field';
 import { goLive, goLost, showTags } from '../testing/page';
 import { judgement, reason } from '../testing/health';
 import { readings, stateFrame, wireTag } from '../testing/tags';

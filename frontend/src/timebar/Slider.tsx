@@ -203,8 +203,8 @@ function stepOf({ key, shiftKey }: KeyboardEvent, axis: Axis): number | null {
   }
 }
 
-const countsText = ({ scans, failures, pestsSeen, pestsCleared }: Column): string =>
-  S.timebarCounts(scans, failures, pestsSeen, pestsCleared);
+const countsText = ({ scans, failures, pests_seen, pests_cleared }: Column): string =>
+  S.timebarCounts(scans, failures, pests_seen, pests_cleared);
 
 const valueText = (moment: number | null, column: Column | undefined, newest: string): string => {
   const time = moment === null ? newest : rosText(moment);

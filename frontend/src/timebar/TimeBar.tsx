@@ -1,7 +1,7 @@
 import { type JSX, type ReactNode, useState } from 'react';
 
 import { shown } from '../domain/text';
-import { hasDate, type Period, PERIOD_KINDS, shortRosText } from '../domain/time';
+import { hasDate, type Period, PERIOD_KINDS, shortRosText, two } from '../domain/time';
 import { CommentMarks } from '../notes/CommentMarks';
 import { SiteComment } from '../notes/Comments';
 import { act, store, useApp } from '../store/app';
@@ -210,10 +210,6 @@ export function OwnPeriod({
     </div>
   );
 }
-
-/** Moments as the fields of an own period have them. Pure but for the operator's time zone. */
-
-const two = (value: number): string => String(value).padStart(2, '0');
 
 /** "2026-11-14T03:12:40" on the operator's clock; of a simulation "1:02:03". */
 export function fieldOf(at: number, isSimulated: boolean): string {

@@ -62,8 +62,8 @@ describe('columns', () => {
     scans: 0,
     failures: 0,
     looks: 0,
-    pestsSeen: 0,
-    pestsCleared: 0,
+    pests_seen: 0,
+    pests_cleared: 0,
     ...over,
   });
 
@@ -83,8 +83,8 @@ describe('columns', () => {
     const columns = columnsOf(
       timelineWith({
         buckets: [
-          bucket(100, { scans: 1, pestsSeen: 1 }),
-          bucket(102, { scans: 2, pestsCleared: 2, looks: 3 }),
+          bucket(100, { scans: 1, pests_seen: 1 }),
+          bucket(102, { scans: 2, pests_cleared: 2, looks: 3 }),
           bucket(103, { scans: 5 }),
         ],
       }),
@@ -93,8 +93,8 @@ describe('columns', () => {
     expect(columns).toHaveLength(2);
     expect(columns[0]).toMatchObject({
       scans: 3,
-      pestsSeen: 1,
-      pestsCleared: 2,
+      pests_seen: 1,
+      pests_cleared: 2,
       looks: 3,
       width: 3,
     });

@@ -99,8 +99,8 @@ const added = (sum: Happened | undefined, bucket: Happened, start: number): Happ
   scans: (sum?.scans ?? 0) + bucket.scans,
   failures: (sum?.failures ?? 0) + bucket.failures,
   looks: (sum?.looks ?? 0) + bucket.looks,
-  pestsSeen: (sum?.pestsSeen ?? 0) + bucket.pestsSeen,
-  pestsCleared: (sum?.pestsCleared ?? 0) + bucket.pestsCleared,
+  pests_seen: (sum?.pests_seen ?? 0) + bucket.pests_seen,
+  pests_cleared: (sum?.pests_cleared ?? 0) + bucket.pests_cleared,
 });
 
 /** The parts of spans that lie on the bar; what is less than a pixel is shown as one. */

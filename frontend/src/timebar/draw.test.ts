@@ -19,7 +19,7 @@ const PALETTE: BarPalette = {
   surface: 'surface',
   font: '11px sans-serif',
 };
-const NOTHING = { scans: 0, failures: 0, looks: 0, pestsSeen: 0, pestsCleared: 0 };
+const NOTHING = { scans: 0, failures: 0, looks: 0, pests_seen: 0, pests_cleared: 0 };
 
 const drawn = (
   over: Partial<Timeline>,
@@ -44,18 +44,18 @@ test('scans stand upwards and failures hang downwards, from one line', () => {
 });
 
 test('a pest is a full triangle, one that is gone an empty ring; who needs somebody is on top', () => {
-  const seen = drawn({ buckets: [{ ...NOTHING, start: 150, pestsSeen: 1, pestsCleared: 1 }] });
+  const seen = drawn({ buckets: [{ ...NOTHING, start: 150, pests_seen: 1, pests_cleared: 1 }] });
   expect(seen.named('fill').map(({ state }) => state['fillStyle'])).toEqual(['pest']);
   expect(seen.named('arc')).toEqual([]);
-  const cleared = drawn({ buckets: [{ ...NOTHING, start: 150, pestsCleared: 1 }] });
+  const cleared = drawn({ buckets: [{ ...NOTHING, start: 150, pests_cleared: 1 }] });
   expect(cleared.named('arc')).toHaveLength(1);
   expect(cleared.named('fill').map(({ state }) => state['fillStyle'])).toEqual(['surface']);
   // Beside it without room, before it or behind.
   const close = [
-    { ...NOTHING, start: 149.4, pestsCleared: 1 },
-    { ...NOTHING, start: 150, pestsSeen: 1 },
-    { ...NOTHING, start: 150.5, pestsSeen: 1 },
-    { ...NOTHING, start: 152, pestsCleared: 1 },
+    { ...NOTHING, start: 149.4, pests_cleared: 1 },
+    { ...NOTHING, start: 150, pests_seen: 1 },
+    { ...NOTHING, start: 150.5, pests_seen: 1 },
+    { ...NOTHING, start: 152, pests_cleared: 1 },
   ];
   const marks = drawn({ bucketS: 0.1, buckets: close }).named('fill');
   expect(marks.map(({ state }) => state['fillStyle'])).toEqual(['pest', 'surface']);

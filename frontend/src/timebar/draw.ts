@@ -1,6 +1,6 @@
 /** Draws the bar. Each mark has a shape and a place of its own; colour comes on top. */
 import type { Tick, Timeline } from '../domain/timeline';
-import { clear, type Surface } from '../draw/surface';
+import { clear, hatch, type Surface } from '../draw/surface';
 import {
   type Axis,
   beforeMemory,
@@ -50,12 +50,12 @@ export function drawBar(surface: Surface, bar: Bar, palette: BarPalette): void {
   clear(surface);
   context.save();
   const before = timeline && beforeMemory(timeline, axis);
-  if (before) hatch(context, before, palette.line, 1);
+  if (before) hatched(context, before, palette.line, 1);
   for (const missing of stretchesOf(timeline?.missing ?? [], axis)) {
-    hatch(context, missing, palette.line, 1);
+    hatched(context, missing, palette.line, 1);
   }
   for (const silence of stretchesOf(timeline?.silences ?? [], axis)) {
-    hatch(context, silence, palette.silence, -1);
+    hatched(context, silence, palette.silence, -1);
   }
   drawTicks(context, bar, palette);
   context.strokeStyle = palette.muted;
@@ -66,31 +66,15 @@ export function drawBar(surface: Surface, bar: Bar, palette: BarPalette): void {
   context.restore();
 }
 
-/** Slanted lines over a stretch; `slant` 1 leans to the right, -1 to the left. */
-function hatch(
+function hatched(
   context: CanvasRenderingContext2D,
   { x, width }: Stretch,
   colour: string,
   slant: 1 | -1,
 ): void {
-  context.save();
-  context.beginPath();
-  context.rect(x, MARKS_PX, width, SCANS_PX + FAILURES_PX);
-  context.clip();
   context.strokeStyle = colour;
   context.lineWidth = 1.5;
-  const height = SCANS_PX + FAILURES_PX;
-  const first = Math.floor((x - height) / HATCH_PX) * HATCH_PX;
-  for (let at = first; at < x + width + height; at += HATCH_PX) {
-    line(
-      context,
-      at,
-      slant > 0 ? FLOOR_PX : MARKS_PX,
-      at + height,
-      slant > 0 ? MARKS_PX : FLOOR_PX,
-    );
-  }
-  context.restore();
+  hatch(context, x, MARKS_PX, { width, height: SCANS_PX + FAILURES_PX }, HATCH_PX, slant);
 }
 
 function drawTicks(context: CanvasRenderingContext2D, bar: Bar, palette: BarPalette): void {
@@ -140,8 +124,8 @@ function drawColumns(
   // Where they have no room beside each other, that which needs somebody stays.
   const taken: number[] = [];
   for (const [kind, draw] of [
-    ['pestsSeen', drawPest],
-    ['pestsCleared', drawCleared],
+    ['pests_seen', drawPest],
+    ['pests_cleared', drawCleared],
   ] as const) {
     for (const { x, width, [kind]: count } of columns) {
       // Whole, also at the end of the bar.
@@ -202,7 +186,6 @@ function line(
 }
 
 /** The bar's colours, as the style sheet has them now: light or dark, forced, or for paper. */
-
 export function readBarPalette(): BarPalette {
   const style = getComputedStyle(document.documentElement);
   const isForced = window.matchMedia('(forced-colors: active)').matches;

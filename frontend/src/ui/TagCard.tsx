@@ -30,10 +30,9 @@ import {
   selectSnapshot,
   selectTag,
 } from '../store/moment';
-import { useFetched } from '../store/useFetched';
+import { useFetched } from '../store/fetcher';
 import { S } from '../strings';
-import { IconButton } from '../widgets/controls';
-import { useFocusBack } from '../widgets/useFocusBack';
+import { IconButton, useFocusBack } from '../widgets/controls';
 import { Age, AgeFact, useAgeStep } from './Age';
 import { CardAlarms } from './alarms/CardAlarms';
 import { HealthMark } from './HealthMark';

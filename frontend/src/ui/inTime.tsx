@@ -1,7 +1,7 @@
 /** What is loaded when it is first shown, and not by who never looks at it. */
 import { createElement, lazy, Suspense, type ComponentType, type JSX } from 'react';
 
-import type * as EstimateParts from '../estimate/parts';
+import type * as EstimateParts from '../parts/estimate';
 import { S } from '../strings';
 
 /** A component that cannot be loaded says so; the rest of the page goes on. */
@@ -26,7 +26,7 @@ const Missing = (): JSX.Element => (
   </span>
 );
 
-const parts = (): Promise<typeof EstimateParts> => import('../estimate/parts');
+const parts = (): Promise<typeof EstimateParts> => import('../parts/estimate');
 
 export const AdviceMarks = inTime(async () => (await parts()).AdviceMarks);
 export const CardEstimate = inTime(async () => (await parts()).CardEstimate);

@@ -13,7 +13,7 @@ from lupin_bridge.feed.estimates import (
 )
 from lupin_bridge.feed.source import TwinUnavailableError
 from lupin_twin.core.state import Pose, Reading, Snapshot, TagState
-from lupin_twin.estimate.grading import Record, Tally
+from lupin_twin.estimate.engine import Record, Tally
 from lupin_twin.runtime.estimates import Report, ReportRequest, TagCheck
 from tests.support.waiting import until
 

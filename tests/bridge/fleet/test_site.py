@@ -10,8 +10,7 @@ import httpx
 import psycopg
 from PIL import Image
 
-from lupin_twin.core.past import SeriesRequest
-from lupin_twin.core.writes import RecentRequest, ScansRequest, WritesRequest
+from lupin_twin.core.past import RecentRequest, ScansRequest, SeriesRequest, WritesRequest
 from lupin_twin.field.explored import OccupancyMap, text_of
 from lupin_twin.journal.fold import state_at
 from lupin_twin.journal.follow import recent, scans, writes

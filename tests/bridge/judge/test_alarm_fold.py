@@ -16,7 +16,7 @@ from lupin_bridge.judge.daylight import ClockDay, Day
 from lupin_bridge.judge.episodes import Alarm
 from lupin_bridge.judge.options import Criteria, own_sensors
 from lupin_bridge.judge.verdict import Kind
-from lupin_twin.core.writes import PastWrite, RunSpan
+from lupin_twin.core.past import PastWrite, RunSpan
 from tests.support.alarms_reference import Plain, S, alarms
 from tests.support.ordinary_day import DAY_NS, ordinary_days
 

@@ -15,8 +15,8 @@ from lupin_bridge.judge.derived import DAILY, DAY_NS
 from lupin_bridge.judge.episodes import Alarm
 from lupin_bridge.judge.options import Criteria, own_sensors
 from lupin_bridge.judge.verdict import Verdict
+from lupin_twin.core.past import PastWrite, RunSpan
 from lupin_twin.core.state import Reading
-from lupin_twin.core.writes import PastWrite, RunSpan
 from tests.support.ordinary_day import ordinary_days
 
 HOUR = 3600 * 10**9

@@ -11,6 +11,7 @@ from lupin_bridge.judge.judging import MAX_AT_ONCE, Judge, Judged, judge_once, s
 from lupin_bridge.judge.scan_interval import Patrol
 from lupin_bridge.judge.sensors_file import parse
 from lupin_bridge.judge.verdict import Health, Kind, Reason, Verdict, judge_tag
+from lupin_twin.core.past import PastWrite, recent_of
 from lupin_twin.core.state import (
     Flower,
     Inspection,
@@ -21,7 +22,6 @@ from lupin_twin.core.state import (
     TwinStore,
     sure_species,
 )
-from lupin_twin.core.writes import PastWrite, recent_of
 from tests.support.seen import BY_LIGHT
 
 SENSORS = parse(files("lupin_bridge").joinpath("sensors.json").read_text(encoding="utf-8"))

@@ -24,8 +24,8 @@ from lupin_bridge.judge.daylight import ClockDay
 from lupin_bridge.judge.judging import Judge, Judged, silenced
 from lupin_bridge.judge.options import Criteria, own_sensors
 from lupin_bridge.judge.verdict import Health, Kind
+from lupin_twin.core.past import PastWrite
 from lupin_twin.core.state import Flower, Inspection, Pose, Reading, Scan, TwinStore
-from lupin_twin.core.writes import PastWrite
 from tests.bridge.alarms.test_feed import Journal, changed
 
 TABLE = json.loads(Path(__file__).with_name("states.json").read_text(encoding="utf-8"))

@@ -12,7 +12,7 @@ from lupin_bridge.judge.episodes import TagEpisodes
 from lupin_bridge.judge.options import Criteria
 from lupin_bridge.judge.ranges import Ranges, Span
 from lupin_bridge.judge.sensors_file import MAX_TEXT, Language, SensorsError, parse
-from lupin_twin.core.writes import PastWrite
+from lupin_twin.core.past import PastWrite
 
 GOOD: dict[str, Any] = {
     "ramp": {"saturation": 72, "max_alpha": 0.6},

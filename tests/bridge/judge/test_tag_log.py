@@ -4,7 +4,7 @@ from lupin_bridge.judge.derived import IsDay
 from lupin_bridge.judge.episodes import TagEpisodes
 from lupin_bridge.judge.options import Criteria, own_sensors
 from lupin_bridge.judge.tag_log import MARK, TagPast, is_long
-from lupin_twin.core.writes import PastWrite
+from lupin_twin.core.past import PastWrite
 
 S = 10**9
 

@@ -18,8 +18,8 @@ from lupin_bridge.past.fields import Estimated, Field
 from lupin_bridge.past.plans import Health, OneTag, Plan, WholeState
 from lupin_bridge.query_string import read
 from lupin_bridge.stream import schema
+from lupin_twin.core.past import PastWrite, RecentRequest
 from lupin_twin.core.state import Pose, Reading, Snapshot, TagState
-from lupin_twin.core.writes import PastWrite, RecentRequest
 from lupin_twin.estimate.engine import TagPast
 from lupin_twin.field.engine import FieldRefused, FieldRules
 from lupin_twin.field.explored import OccupancyMap

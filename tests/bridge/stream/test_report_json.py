@@ -7,7 +7,7 @@ import json
 from lupin_bridge.stream import estimate_schema
 from lupin_bridge.stream.estimate_schema import Advice, EstimateQualities, ExpectedTags
 from lupin_twin.estimate import Place
-from lupin_twin.estimate.grading import Record, Tally
+from lupin_twin.estimate.engine import Record, Tally
 from lupin_twin.runtime.estimates import Report, TagCheck
 
 S = 1_000_000_000

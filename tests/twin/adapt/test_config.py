@@ -8,8 +8,7 @@ import pytest
 import yaml
 
 from lupin_twin.adapt.config import Place, Robot, Sensor, config_of, read_config
-from lupin_twin.adapt.table import ConfigError
-from lupin_twin.adapt.value import Value
+from lupin_twin.adapt.table import ConfigError, Value
 from tests.support.docs import block_named
 
 LEAST = """

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from lupin_twin.adapt.config import Config, Place, Robot
 from lupin_twin.adapt.scans import BuiltScan, Scans
-from lupin_twin.adapt.value import number_of
+from lupin_twin.adapt.table import number_of
 from lupin_twin.core.drops import MAX_SENSORS_PER_TAG, MAX_TAGS, Rejected
 
 S = 1_000_000_000

@@ -1,7 +1,6 @@
 import pytest
 
-from lupin_twin.core.past import PastRefused
-from lupin_twin.core.writes import MAX_WRITES, WritesRequest
+from lupin_twin.core.past import MAX_WRITES, PastRefused, WritesRequest
 
 
 def test_limits_are_allowed() -> None:

@@ -1,6 +1,6 @@
 """Whether an estimate keeps its word, counted by the hour."""
 
-from lupin_twin.estimate.grading import LEAST_SCANS, Grades, Record, Tally
+from lupin_twin.estimate.engine import LEAST_SCANS, Grades, Record, Tally
 from tests.bench.bench_estimate_checks import AT_S, ROUNDS, trust
 from tests.bench.other_worlds import restless, world_of
 

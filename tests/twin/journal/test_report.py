@@ -21,8 +21,8 @@ from lupin_bridge.judge.verdict import derive
 from lupin_bridge.past.report import Report
 from lupin_twin.core.history import kind_of
 from lupin_twin.core.journal_condition import Condition, JournalState
+from lupin_twin.core.past import PastWrite, RunSpan
 from lupin_twin.core.state import Inspection, Pin, Reading
-from lupin_twin.core.writes import PastWrite, RunSpan
 from lupin_twin.journal.runs import runs, spans
 from tests.support.alarms_reference import Plain, alarms
 from tests.support.log_life import BEGUN, LATEST, MINUTE, Life, scan, steps

@@ -3,8 +3,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from lupin_twin.core.past import PastWrite, PastWrites, RecentRequest, WritesRequest, recent_of
 from lupin_twin.core.state import NO_FLOWER
-from lupin_twin.core.writes import PastWrite, PastWrites, RecentRequest, WritesRequest, recent_of
 from lupin_twin.journal.follow import recent, writes
 from tests.support.log_life import BEGUN, SECOND, Life, failure, lived, look, pin, scan
 from tests.twin.journal.conftest import Copied

@@ -6,9 +6,9 @@ import pytest
 
 from lupin_twin.core.state import NANOSECONDS_PER_SECOND as S
 from lupin_twin.estimate import Place
-from lupin_twin.estimate.grading import Record, Tally
+from lupin_twin.estimate.engine import Record, Tally
 from lupin_twin.field.engine import FieldRefused
-from lupin_twin.ros import convert_field
+from lupin_twin.ros import convert_services
 from lupin_twin.runtime.estimates import DEFAULT_PLACES, Report, ReportRequest, TagCheck
 
 REPORT = Report(
@@ -28,27 +28,27 @@ REPORT = Report(
     "report", [REPORT, Report(S, None, "", Record(None, Tally(), Tally()))], ids=["full", "bare"]
 )
 def test_a_report_comes_back_as_it_was(report: Report) -> None:
-    assert convert_field.report_of(convert_field.report_response(report)) == report
+    assert convert_services.report_of(convert_services.report_response(report)) == report
 
 
 def test_a_question_for_a_report_comes_back_as_it_was() -> None:
     asked = ReportRequest("co2", 7)
-    message = convert_field.report_request_message(asked)
-    assert convert_field.report_request_of(message) == asked
+    message = convert_services.report_request_message(asked)
+    assert convert_services.report_request_of(message) == asked
     message.max_places = 0
-    assert convert_field.report_request_of(message) == ReportRequest("co2", DEFAULT_PLACES)
+    assert convert_services.report_request_of(message) == ReportRequest("co2", DEFAULT_PLACES)
     message.max_places = 21
     with pytest.raises(FieldRefused, match="max_places is 21, the limits are 1 and 20"):
-        convert_field.report_request_of(message)
+        convert_services.report_request_of(message)
 
 
 def test_a_report_with_lists_of_several_lengths_is_not_believed() -> None:
-    response = convert_field.report_response(REPORT)
+    response = convert_services.report_response(REPORT)
     response.z = array("d", [1.0])
     with pytest.raises(ValueError, match=r"lists of tags are \[1, 2\] long"):
-        convert_field.report_of(response)
-    response = convert_field.report_response(REPORT)
+        convert_services.report_of(response)
+    response = convert_services.report_response(REPORT)
     for name in ("place_x", "place_y", "error_ratio"):
         setattr(response, name, array("d", [1.0] * 21))
     with pytest.raises(ValueError, match="20 at most"):
-        convert_field.report_of(response)
+        convert_services.report_of(response)

@@ -6,7 +6,7 @@ import pytest
 from rclpy.serialization import deserialize_message, serialize_message
 
 from lupin_twin.journal.follow import Lot, NotALotError
-from lupin_twin.ros.convert_past import lot_of, rows_request_message, rows_response
+from lupin_twin.ros.convert_services import lot_of, rows_request_message, rows_response
 
 LOT = Lot("0123456789abcdef" * 2, ('["run",1,0,1,1,1,null,null]', '["meta","ä","5"]'), 9, True)
 

@@ -10,8 +10,8 @@ from lupin_msgs.srv import GetField
 from rcl_interfaces.srv import GetParameters
 from rclpy.qos import DurabilityPolicy, QoSProfile
 
-from lupin_twin.ros import responses as module
-from lupin_twin.ros.responses import (
+from lupin_twin.ros import services as module
+from lupin_twin.ros.services import (
     MAX_ATTEMPT_S,
     MAX_UNSENT,
     PATIENCE_S,

@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 
 from lupin_twin.core.state import NANOSECONDS_PER_SECOND, Reading
-from lupin_twin.estimate.engine import EstimateRequest, TagPast
-from lupin_twin.estimate.grading import Grades, Tally
+from lupin_twin.estimate.engine import EstimateRequest, Grades, TagPast, Tally
 from lupin_twin.field.engine import FieldRefused, FieldRequest
 from lupin_twin.field.idw import Abandoned
 from lupin_twin.journal.fold import state_at

@@ -15,11 +15,11 @@ from lupin_twin.adapt.messages import (
     DETECTIONS_TYPE,
     TF_STATIC,
     TF_TYPE,
+    Source,
     message_type,
     transform_of,
 )
 from lupin_twin.adapt.node import ANY_PUBLISHER, TF_STATIC_QOS, AdaptNode
-from lupin_twin.adapt.source import Source
 from lupin_twin.adapt.table import ConfigError
 from lupin_twin.core.diagnostics import OK
 

@@ -11,9 +11,17 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final
 
-from lupin_twin.adapt.mqtt_topics import Broker, broker_of
-from lupin_twin.adapt.table import ConfigError, Table, check_text, is_number, shown
-from lupin_twin.adapt.value import AS_IT_IS, Value, value_of
+from lupin_twin.adapt.mqtt import Broker, broker_of
+from lupin_twin.adapt.table import (
+    AS_IT_IS,
+    ConfigError,
+    Table,
+    Value,
+    check_text,
+    is_number,
+    shown,
+    value_of,
+)
 from lupin_twin.core.drops import MAX_SENSORS_PER_TAG, MAX_TAGS
 
 MAX_FILE_BYTES: Final = 4_000_000

@@ -1,8 +1,10 @@
-"""Messages of `adapt`: types by their names, scans as observations."""
+"""Messages of `adapt`: types by their names, scans as observations, what is said of a source."""
 
 from __future__ import annotations
 
 import importlib
+import time
+from dataclasses import dataclass, field
 from typing import Any, Final
 
 from geometry_msgs.msg import Point, Pose, Quaternion
@@ -13,6 +15,8 @@ from lupin_twin.adapt.config import Place
 from lupin_twin.adapt.frames import Transform
 from lupin_twin.adapt.scans import BuiltScan
 from lupin_twin.adapt.table import ConfigError
+from lupin_twin.core.diagnostics import OK, WARN, Finding
+from lupin_twin.core.drops import Tally
 from lupin_twin.ros import convert
 
 # Of a robot's visit, and of a sensor that stands at its tag.
@@ -83,3 +87,43 @@ def pose_of(place: Place | None) -> Pose:
     if place is None:  # `w` is 1 in ROS 2 unless it is set: a pose at the origin
         return Pose(orientation=Quaternion(x=0.0, y=0.0, z=0.0, w=0.0))
     return Pose(position=Point(x=float(place.x), y=float(place.y), z=float(place.z)))
+
+
+# The source that all topics of the broker are.
+MQTT: Final = "MQTT"
+
+
+@dataclass(slots=True)
+class Source:
+    """What came, what of it is in a scan, and what was dropped.
+
+    `problem` is what is wrong with it now, `shown` what it said last. `dropped` counts by case:
+    what is wrong with one sensor must not hide what is wrong with another. `name` is the topic's
+    in ROS.
+    """
+
+    name: str
+    type_name: str = ""
+    received: int = 0
+    used: int = 0
+    received_s: float = 0.0
+    problem: str = ""
+    shown: dict[str, str] = field(default_factory=dict)
+    dropped: Tally = field(default_factory=Tally)
+
+    def finding(self, topic: str) -> Finding:
+        """The same for `/diagnostics`."""
+        counts = self.dropped.value(time.monotonic())
+        wrong = [self.problem] if self.problem else []
+        wrong += [recent.message for recent in counts.recent]
+        return Finding(
+            topic,
+            WARN if wrong else OK,
+            "; ".join(wrong) or ("connected" if topic == MQTT else "receiving"),
+            {
+                "received": str(self.received),
+                "used": str(self.used),
+                **self.shown,
+                **{f"dropped: {case}": str(count) for case, count in counts.dropped.items()},
+            },
+        )

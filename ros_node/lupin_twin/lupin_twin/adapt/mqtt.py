@@ -1,15 +1,280 @@
-"""The broker's client: a thread of paho's hands over what comes, the node's thread takes it."""
+"""MQTT in: which topics, what stands where in a payload, what it says of which tag; the client.
+
+A thread of paho's hands over what comes, the node's thread takes it.
+"""
 
 from __future__ import annotations
 
+import json
+import re
 import secrets
 import ssl
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field
+from datetime import UTC
+from functools import lru_cache
+from pathlib import Path
 from typing import Any, Final
+from urllib.parse import urlsplit
 
-from lupin_twin.adapt.mqtt_topics import MAX_PAYLOAD_BYTES, Broker
-from lupin_twin.adapt.table import ConfigError
+from lupin_twin.adapt.table import (
+    AS_IT_IS,
+    ConfigError,
+    Table,
+    Value,
+    seconds_of,
+    shown,
+    value_of,
+    values_of,
+)
+from lupin_twin.core.drops import Rejected, check_texts
+
+PORTS: Final = {"mqtt": 1883, "mqtts": 8883}
+MAX_TOPICS: Final = 100
+MAX_PAYLOAD_BYTES: Final = 65_536
+# In 2001. A device whose clock was never set begins in 1970.
+_EARLIEST_S: Final = 1e9
+_PLACEHOLDER: Final = re.compile(r"\{(tag|sensor)\}|(\+)")
+
+
+# What Zigbee2MQTT calls it: https://www.zigbee2mqtt.io/guide/usage/exposes.html
+_ZIGBEE: Final = {
+    "temperature": Value("temperature"),
+    "humidity": Value("humidity", low=0.0, high=100.0),
+    "soil_moisture": Value("soil_moisture", low=0.0, high=100.0),
+    "light": Value("illuminance", low=0.0),
+    "co2": Value("co2", low=0.0),
+}
+# What Home Assistant's statestream has behind the last underscore of an entity:
+# https://www.home-assistant.io/integrations/mqtt_statestream/
+_HOME_ASSISTANT: Final = {
+    "temperature": "temperature",
+    "humidity": "humidity",
+    "illuminance": "light",
+    "carbon_dioxide": "co2",
+    "co2": "co2",
+    "soil_moisture": "soil_moisture",
+    "moisture": "soil_moisture",
+}
+# And how it says that the sensor is away, or has not said anything yet.
+_AWAY, _UNKNOWN = b"unavailable", b"unknown"
+PRESETS: Final = ("zigbee2mqtt", "homeassistant")
+
+
+@dataclass(frozen=True, slots=True)
+class Pattern:
+    """One line of the configuration: a topic, and what its payloads mean.
+
+    `values` by sensor; without any, the payload is one number, of the sensor in the topic. `names`
+    are what the topic may call a sensor, by what it is here. `time` is where a payload says when it
+    was measured. With `is_availability`, the payload says whether the tag's sensor is there.
+    """
+
+    topic: str
+    tag: str = ""
+    sensor: str = ""
+    values: Mapping[str, Value] = field(default_factory=dict)
+    plain: Value = AS_IT_IS
+    names: Mapping[str, str] = field(default_factory=dict)
+    time: str = ""
+    is_availability: bool = False
+
+    @property
+    def filter(self) -> str:
+        """What to subscribe to: a level with a placeholder is any."""
+        return "/".join("+" if _PLACEHOLDER.search(part) else part for part in self._levels)
+
+    @property
+    def _levels(self) -> list[str]:
+        return self.topic.split("/")
+
+    def match(self, topic: str) -> tuple[str, str] | None:
+        """Tag and sensor of a topic, each empty where it says none; None: it is another's."""
+        found = _regex(self.topic, tuple(self.names)).fullmatch(topic)
+        if found is None:
+            return None
+        named = found.groupdict()
+        sensor = named.get("sensor", self.sensor)
+        return named.get("tag", self.tag), self.names.get(sensor, sensor)
+
+
+@dataclass(frozen=True, slots=True)
+class Broker:
+    """Where the broker is, who we are to it, and what is listened to there."""
+
+    host: str
+    port: int
+    patterns: tuple[Pattern, ...]
+    user: str = ""
+    password: str = ""
+    is_tls: bool = False
+    ca: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Measured:
+    """What one message says: readings of a tag, or that its sensor is not there.
+
+    `stamp_s` is seconds since the epoch, None: the payload does not say.
+    """
+
+    tag: str
+    readings: tuple[tuple[str, float], ...] = ()
+    stamp_s: float | None = None
+    is_away: bool = False
+
+
+def measured(pattern: Pattern, tag: str, sensor: str, payload: bytes) -> Measured:
+    """What a payload says.
+
+    Raises:
+        Rejected: it has no number where one was expected, or one out of range; a name is too long.
+
+    """
+    check_texts(tag, sensor)
+    if len(payload) > MAX_PAYLOAD_BYTES:
+        raise Rejected(f"it has more than {MAX_PAYLOAD_BYTES} bytes, the limit")
+    if pattern.is_availability:
+        return Measured(tag, is_away=b"offline" in payload.lower())
+    if pattern.names and payload in (_AWAY, _UNKNOWN):
+        return Measured(tag, is_away=payload == _AWAY)
+    if not pattern.values:
+        return Measured(tag, ((sensor, pattern.plain.reading(payload, "the payload")),))
+    try:
+        content = json.loads(payload)
+    except (ValueError, RecursionError):
+        raise Rejected(f"it is no JSON: {shown(payload[:40])}") from None
+    readings = []
+    for name, value in pattern.values.items():
+        found = _at(content, value.path)
+        if found is not None:  # a device says what it has
+            readings.append((name, value.reading(found, value.path)))
+    if not readings:
+        paths = ", ".join(value.path for value in pattern.values.values())
+        raise Rejected(f"it has none of {paths}")
+    stamp = _at(content, pattern.time) if pattern.time else None
+    return Measured(tag, tuple(readings), None if stamp is None else _seconds(stamp))
+
+
+def broker_of(table: Table, folder: Path) -> Broker:
+    """The broker of the configuration.
+
+    Raises:
+        ConfigError: a key that cannot be.
+
+    """
+    text = table.text("url")
+    try:
+        url = urlsplit(text)
+        port = url.port
+    except ValueError:
+        url, port = urlsplit(""), 0
+    if url.scheme not in PORTS or not url.hostname or port == 0 or url.path.strip("/"):
+        raise ConfigError(f"mqtt.url is {shown(text)}, expected such as mqtt://broker.lan:1883")
+    if "@" in url.netloc:
+        raise ConfigError("mqtt.url has a user in it: use mqtt.user and mqtt.password_file")
+    listed = table.take("topics")
+    if not isinstance(listed, list) or not 0 < len(listed) <= MAX_TOPICS:
+        raise ConfigError(f"mqtt.topics is {shown(listed)}, expected a list of 1 to {MAX_TOPICS}")
+    patterns: list[Pattern] = []
+    for number, each in enumerate(listed):
+        patterns.extend(_patterns(Table(f"mqtt.topics[{number}]", each)))
+    broker = Broker(
+        url.hostname,
+        port or PORTS[url.scheme],
+        tuple(patterns),
+        user=str(table.take("user", "")),
+        password=_password(table, folder),
+        is_tls=url.scheme == "mqtts",
+        ca=str(table.take("ca", "")),
+    )
+    table.end()
+    return broker
+
+
+def _password(table: Table, folder: Path) -> str:
+    file = table.take("password_file", "")
+    if not file:
+        return ""
+    try:
+        with (folder / str(file)).open(encoding="utf-8") as opened:
+            return opened.read(MAX_PAYLOAD_BYTES).strip()
+    except (OSError, UnicodeDecodeError) as error:
+        reason = getattr(error, "strerror", None) or "it is no text"
+        raise ConfigError(f"mqtt.password_file {file}: {reason}") from None
+
+
+def _patterns(table: Table) -> Iterator[Pattern]:
+    topic = table.text("topic")
+    if "#" in topic or topic.startswith("/") or "$" in topic:
+        raise ConfigError(
+            f"{table.name}.topic is {shown(topic)}, expected levels with {{tag}}, {{sensor}} or +"
+        )
+    preset = table.one_of("preset", PRESETS) if table.has("preset") else ""
+    tag = str(table.take("tag", ""))
+    there = table.text("availability") if table.has("availability") else ""
+    for each in (topic, there or topic):
+        if each.count("{tag}") > 1 or each.count("{sensor}") > 1:
+            raise ConfigError(f"{table.name}: {shown(each)} has one of them twice")
+        if bool(tag) == ("{tag}" in each):
+            raise ConfigError(
+                f"{table.name}: expected {{tag}} in {shown(each)}, or the key tag; one of them"
+            )
+    sensor = table.text("sensor") if table.has("sensor") else ""
+    values = values_of(Table(f"{table.name}.values", table.take("values", {})), "path")
+    if preset == "zigbee2mqtt":
+        values = {**_ZIGBEE, **values}
+        yield Pattern(f"{topic}/availability", tag, is_availability=True)
+    names = _HOME_ASSISTANT if preset == "homeassistant" else {}
+    if not values and bool(sensor) == ("{sensor}" in topic):
+        raise ConfigError(
+            f"{table.name}: a payload that is a number needs {{sensor}} in its topic, or sensor; "
+            "JSON needs values, or a preset"
+        )
+    if there:
+        yield Pattern(there, tag, is_availability=True)
+    default = "last_seen" if preset == "zigbee2mqtt" else ""
+    time = table.text("time") if table.has("time") else default
+    yield Pattern(topic, tag, sensor, values, value_of(table), names, time)
+    table.end()
+
+
+@lru_cache(maxsize=2 * MAX_TOPICS)
+def _regex(topic: str, sensors: tuple[str, ...]) -> re.Pattern[str]:
+    """A topic's pattern; a sensor is one of those names, where there are any."""
+    # A tag is as short as can be, so the longest sensor is found: `soil_moisture`, not `moisture`.
+    known = "|".join(map(re.escape, sensors))
+    parts, at = [], 0
+    for found in _PLACEHOLDER.finditer(topic):
+        parts.append(re.escape(topic[at : found.start()]))
+        name = found[1]
+        any_level = known if known and name == "sensor" else "[^/]+?"
+        parts.append(f"(?P<{name}>{any_level})" if name else "[^/]+")
+        at = found.end()
+    return re.compile("".join(parts) + re.escape(topic[at:]))
+
+
+def _at(content: Any, path: str) -> Any:
+    for key in path.split("."):
+        if isinstance(content, list) and key.isdecimal() and int(key) < len(content):
+            content = content[int(key)]
+        elif isinstance(content, dict):
+            content = content.get(key)
+        else:
+            return None
+    return content
+
+
+def _seconds(stamp: Any) -> float:
+    try:
+        seconds = seconds_of(stamp, UTC)
+    except Rejected as error:
+        raise Rejected(f"its time is {shown(stamp)}: {error}") from None
+    if seconds < _EARLIEST_S:
+        raise Rejected(f"its time is {shown(stamp)}, before 2001: was its clock ever set?")
+    return seconds
+
 
 # Messages that wait for the node's thread; of more, the oldest is lost and counted. All of them
 # at their largest take 65 MB.

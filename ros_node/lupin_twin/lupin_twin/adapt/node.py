@@ -24,20 +24,19 @@ from lupin_twin.adapt.config import POSES, TAG_FRAME, Config, Place, Robot, Sens
 from lupin_twin.adapt.frames import FrameError, Frames, Sightings
 from lupin_twin.adapt.messages import (
     DETECTIONS_TYPE,
+    MQTT,
     TF,
     TF_STATIC,
     TF_TYPE,
+    Source,
     message_type,
     observation,
     pose_of,
     transform_of,
 )
-from lupin_twin.adapt.mqtt import MqttClient
-from lupin_twin.adapt.mqtt_topics import Pattern, measured
+from lupin_twin.adapt.mqtt import MqttClient, Pattern, measured
 from lupin_twin.adapt.scans import BuiltScan, Scans
-from lupin_twin.adapt.source import MQTT, Source
-from lupin_twin.adapt.table import ConfigError
-from lupin_twin.adapt.value import number_of
+from lupin_twin.adapt.table import ConfigError, number_of
 from lupin_twin.core import interfaces
 from lupin_twin.core.diagnostics import OK, WARN, Finding
 from lupin_twin.core.drops import Drop, Reason, Rejected

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Container, Iterable
-from dataclasses import astuple, dataclass, field, replace
+from dataclasses import dataclass, field, replace
 from typing import Literal, TypeVar, dataclass_transform
 
 from lupin_twin.core.drops import (
@@ -61,7 +61,8 @@ class Pose:
     @property
     def is_finite(self) -> bool:
         """Whether all seven numbers are finite; a pose that is not counts as no pose."""
-        return all(map(math.isfinite, astuple(self)))
+        numbers = (self.x, self.y, self.z, self.qx, self.qy, self.qz, self.qw)
+        return all(map(math.isfinite, numbers))
 
 
 @value

@@ -161,9 +161,9 @@ class Overview:
     """What a journal holds.
 
     `rows` counts by table, and `tag` by name; `failures` the scans that failed; copies are rows
-    too.  `kept_ns` and `kept_bytes` are the
-    limits that its last twin was given, 0 where none has said; `quarantined` names damaged journals
-    beside it, with their sizes; `forgotten` are the records of `forgetting`.
+    too. `kept_ns` and `kept_bytes` are the limits that its last twin was given, 0 where none has
+    said; `quarantined` names damaged journals beside it, with their sizes; `forgotten` are the
+    `records` of tags that were forgotten.
     """
 
     file_bytes: int

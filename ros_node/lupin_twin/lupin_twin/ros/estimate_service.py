@@ -25,9 +25,9 @@ from lupin_twin.field.explored import OccupancyMap
 from lupin_twin.field.idw import never
 from lupin_twin.journal.fold import STATE_S_PER_TAG
 from lupin_twin.journal.queries import NEWEST_S_PER_TAG
-from lupin_twin.ros import convert_field
+from lupin_twin.ros import convert_services
 from lupin_twin.ros.base_node import SERVICE_QOS, NodeUtilities
-from lupin_twin.ros.responses import answer_later
+from lupin_twin.ros.services import answer_later
 from lupin_twin.runtime.estimates import (
     AS_OF,
     Known,
@@ -197,11 +197,11 @@ class EstimateService:
 
     def _on_get_estimate(self, request: Any, response: Any) -> Any:
         def prepare(reply: Callable[[Any], None]) -> Query:
-            task = self.prepare(convert_field.estimate_request_of(request))
+            task = self.prepare(convert_services.estimate_request_of(request))
             return Query(
                 task.look_up,
                 reply,
-                lambda found: convert_field.response_of(task.make(found, never)),
+                lambda found: convert_services.response_of(task.make(found, never)),
                 task.cost_s,
             )
 
@@ -209,8 +209,8 @@ class EstimateService:
 
     def _on_get_report(self, request: Any, response: Any) -> Any:
         def prepare(reply: Callable[[Any], None]) -> Query:
-            wanted = convert_field.report_request_of(request)
-            return self._query(wanted, reply, convert_field.report_response)
+            wanted = convert_services.report_request_of(request)
+            return self._query(wanted, reply, convert_services.report_response)
 
         return answer_later(self.queue, prepare, response, self.utilities.report)
 

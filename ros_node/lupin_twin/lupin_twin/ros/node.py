@@ -34,8 +34,7 @@ from lupin_twin.ros.estimate_service import EstimateService
 from lupin_twin.ros.inputs import TwinCount
 from lupin_twin.ros.layer_service import LAYERS_PERIOD_S, LayerService
 from lupin_twin.ros.parameters import AdjustableNode, declare, naming, naming_own_parameters
-from lupin_twin.ros.responses import RETRY_S, Responses
-from lupin_twin.ros.services import FieldService, PastService
+from lupin_twin.ros.services import RETRY_S, FieldService, PastService, Responses
 from lupin_twin.runtime.memory import Memory, open_journal
 from lupin_twin.runtime.workers import LARGE_THREADS, JobQueue, Workers
 
@@ -159,7 +158,7 @@ class TwinNode(AdjustableNode):
                 f"parameter journal is empty, and there is no home to keep one in: {error}"
             ) from error
         name = self.get_fully_qualified_name()
-        journal = open_journal(path, name, p.journal_days, p.journal_max_mb, self._world.origin)
+        journal = open_journal(path, name, p.journal_days, p.journal_max_mb, self._world)
         return Memory(self.store, journal)
 
     def _connect(self) -> None:

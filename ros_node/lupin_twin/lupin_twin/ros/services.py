@@ -1,21 +1,34 @@
-"""The services of fields and of the past: requests in, responses made off the node's thread."""
+"""The services of fields and of the past; responses of any service that are sent later.
+
+They are made off the node's thread, or cannot be sent yet. A service may get a request before its
+middleware has found the reader of the response: where a machine is busy that takes seconds. The
+middleware waits 0.1 s, then drops the response; rclpy says so in a Python warning, once in the life
+of a process, and the client waits for ever. Known as ros2/rmw_fastrtps issue 842; of a client that
+came to a twin beside four busy processes, the first request met it once in 162. So such a response
+is tried again for a while.
+"""
 
 from __future__ import annotations
 
+import re
 import sqlite3
+import time
+import warnings
+from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 from lupin_msgs.srv import GetField, GetHistory, GetStateAt, GetWrites
 
 from lupin_twin.core.interfaces import GET_HISTORY, GET_STATE_AT, GET_WRITES
-from lupin_twin.core.past import EVERY_TAG, check_moment
+from lupin_twin.core.past import EVERY_TAG, NotRemembered, PastRefused, check_moment, message_of
 from lupin_twin.core.state import TwinStore
 from lupin_twin.field.engine import (
     FieldCache,
     FieldKey,
+    FieldRefused,
     FieldRules,
     check_request,
     compute_field,
@@ -26,10 +39,9 @@ from lupin_twin.journal import follow
 from lupin_twin.journal.fold import STATE_S_PER_TAG, state_at
 from lupin_twin.journal.follow import WRITES_S, writes
 from lupin_twin.journal.queries import SERIES_S, SERIES_S_PER_TAG, series
-from lupin_twin.ros import convert, convert_field, convert_past
+from lupin_twin.ros import convert, convert_services
 from lupin_twin.ros.base_node import SERVICE_QOS, NodeUtilities
 from lupin_twin.ros.parameters import naming
-from lupin_twin.ros.responses import answer_later, refusal
 from lupin_twin.runtime.journal_queries import Recall
 from lupin_twin.runtime.workers import SMALL_S, JobQueue, Query, Workers
 
@@ -61,7 +73,7 @@ class FieldService:
     def _on_get_field(self, request: Any, response: Any) -> Any:
         report = self.utilities.report
         try:
-            wanted = convert_field.field_request_of(request)
+            wanted = convert_services.field_request_of(request)
             rules, occupancy = self.rules(), self.occupancy()
             check_request(wanted, rules.max_grid_cells)
         except Exception as error:  # noqa: BLE001  # no client waits for ever
@@ -69,7 +81,7 @@ class FieldService:
         revision = None if occupancy is None else occupancy.revision
         key = FieldKey(wanted, self.store.observation_count, revision, rules)
         if (found := self.cache.get(key)) is not None:
-            return convert_field.fill_response(response, found)
+            return convert_services.fill_response(response, found)
         samples = self.store.samples_for_sensor(wanted.sensor_type)
         compute = partial(compute_field, wanted, samples, occupancy, rules)
         cost = cost_s(wanted, len(samples), rules)
@@ -78,7 +90,7 @@ class FieldService:
             def keep(grid: Any) -> None:
                 if not isinstance(grid, Exception):
                     self.cache.put(key, grid)
-                    grid = convert_field.fill_response(response, grid)
+                    grid = convert_services.fill_response(response, grid)
                 reply(grid)
 
             return Query(partial(self.workers.submit, compute, cost), keep, cost_s=cost)
@@ -126,28 +138,30 @@ class PastService:
             response,
             check,
             tags * STATE_S_PER_TAG,
-            convert_past.state_response,
-            tags * convert_past.TAG_S + items * convert_past.ITEM_S,
+            convert_services.state_response,
+            tags * convert_services.TAG_S + items * convert_services.ITEM_S,
         )
 
     def _on_get_history(self, request: Any, response: Any) -> Any:
         def check() -> Callable[[sqlite3.Connection], Any]:
-            query, now_ns = convert_past.series_request(request), self.now_ns()
+            query, now_ns = convert_services.series_request(request), self.now_ns()
             return lambda connection: series(connection, query, now_ns)
 
         tags = self.store.size[0] if request.tag_id == EVERY_TAG else 0
         search_s = SERIES_S + tags * SERIES_S_PER_TAG
         make_s = EVERY_TAG_S if request.tag_id == EVERY_TAG else MESSAGE_S
-        return self._ask(response, check, search_s, convert_past.series_response, make_s)
+        return self._ask(response, check, search_s, convert_services.series_response, make_s)
 
     def _on_get_writes(self, request: Any, response: Any) -> Any:
         def check() -> Callable[[sqlite3.Connection], Any]:
-            query = convert_past.writes_request(request)
+            query = convert_services.writes_request(request)
             if request.as_rows:
                 return lambda connection: follow.read(connection, query.after, query.max_count)
             return lambda connection: writes(connection, query)
 
-        make = convert_past.rows_response if request.as_rows else convert_past.writes_response
+        make = (
+            convert_services.rows_response if request.as_rows else convert_services.writes_response
+        )
         return self._ask(response, check, WRITES_S, make, MESSAGE_S)
 
     def _ask(
@@ -168,3 +182,160 @@ class PastService:
             )
 
         return answer_later(self.queue, prepare, response, self.utilities.report)
+
+
+# How rclpy's warning begins (7.1.6), that the middleware has dropped a response.
+UNSENT: Final = "failed to send response (timeout)"
+# How often responses are tried again, s, and for how long. Discovery that lost a message makes up
+# for it within some 3 s, more on a busy machine.
+RETRY_S: Final = 0.5
+PATIENCE_S: Final = 30.0
+# Responses that are retained; what took longer to try, s, needs too much memory (60 MB took 0.5 s).
+MAX_UNSENT: Final = 8
+MAX_ATTEMPT_S: Final = 0.5
+
+Send = Callable[[Any, Any], None]
+Report = Callable[[str, Exception], None]
+
+
+class Later:
+    """What a callback returns in place of its response. Belongs to the executor's thread."""
+
+    def __init__(self) -> None:
+        self._send: Callable[[Any], None] | None = None
+        self._response: Any = None
+
+    def answer(self, response: Any) -> None:
+        """Send the response: now, or as soon as rclpy has named the client."""
+        if self._send is None:
+            self._response = response
+        else:
+            self._send(response)
+
+    def goes_to(self, send: Callable[[Any], None]) -> None:
+        """Have the response sent by `send(response)`."""
+        self._send = send
+        if self._response is not None:
+            send(self._response)
+
+
+def answer_later(
+    queue: JobQueue,
+    prepare: Callable[[Callable[[Any], None]], Query],
+    response: Any,
+    report: Report,
+) -> Any:
+    """What a service's callback returns: the response to come of a query, or a `refusal`.
+
+    `prepare(reply)` makes the query, or raises.
+    """
+    later = Later()
+
+    def reply(answer: Any) -> None:
+        is_error = isinstance(answer, Exception)
+        later.answer(refusal(response, answer, report) if is_error else answer)
+
+    try:
+        queue.ask(prepare(reply))
+    except Exception as error:  # noqa: BLE001  # no client waits for ever
+        return refusal(response, error, report)
+    return later
+
+
+def refusal(response: Any, error: Exception, report: Report) -> Any:
+    """A fresh response of the same type, empty but for why; what nobody expected is reported."""
+    if isinstance(error, FieldRefused):
+        return type(response)(error_message=str(error))
+    if not isinstance(error, PastRefused | NotRemembered):
+        report(type(response).__qualname__, error)
+    return type(response)(error_message=message_of(error))
+
+
+class _Unsent(NamedTuple):
+    name: str
+    send: Send
+    response: Any
+    header: Any
+    since_s: float
+
+
+class Responses:
+    """Sends the responses of one node's services; belongs to the node's thread.
+
+    `warn(key, text)` reports a response that was given up; `drain()` takes the messages that came
+    during an attempt: observations must not be lost for a client that is never found.
+    """
+
+    def __init__(
+        self, warn: Callable[[tuple[str, object], str], None], drain: Callable[[], None]
+    ) -> None:
+        self._warn = warn
+        self._drain = drain
+        self._unsent: deque[_Unsent] = deque()  # the first is tried next
+        warnings.filterwarnings("error", re.escape(UNSENT), RuntimeWarning)
+
+    def __len__(self) -> int:
+        """How many responses wait to be sent again."""
+        return len(self._unsent)
+
+    def watch(self, service: Any) -> None:
+        """Let the callback of an rclpy Service return a `Later`; retry what cannot be sent."""
+        send_now: Send = service.send_response
+
+        def send(response: Any, header: Any) -> None:
+            began_s = time.monotonic()
+            if not _was_sent(send_now, response, header):
+                unsent = _Unsent(service.service_name, send_now, response, header, began_s)
+                self._retain(unsent, time.monotonic() - began_s)
+                self._drain()
+
+        def send_response(response: Any, header: Any) -> None:
+            if isinstance(response, Later):
+                response.goes_to(lambda answer: send(answer, header))
+            else:
+                send(response, header)
+
+        service.send_response = send_response
+
+    def go_on(self) -> None:
+        """Try again until an attempt fails; to be called every `RETRY_S`.
+
+        An attempt that fails blocks the node's thread for 0.1 s. The newest first, and what failed
+        goes to the end: one that can be sent does not wait long behind others that never will be.
+        """
+        while self._unsent:
+            one = self._unsent.popleft()
+            if time.monotonic() - one.since_s >= PATIENCE_S:
+                self._give_up(one, f"for {PATIENCE_S:g} s DDS has found no reader for it")
+            elif not _was_sent(one.send, one.response, one.header):
+                self._unsent.append(one)
+                self._drain()
+                return
+
+    def _retain(self, new: _Unsent, took_s: float) -> None:
+        if took_s > MAX_ATTEMPT_S:
+            self._give_up(new, "it is too large to be retained")
+            return
+        self._unsent.appendleft(new)
+        if len(self._unsent) > MAX_UNSENT:
+            self._give_up(self._unsent.pop(), "too much else waits to be sent again")
+
+    def _give_up(self, unsent: _Unsent, why: str) -> None:
+        self._warn(
+            ("unsent", unsent.name),
+            f"gave up a response of {unsent.name}: {why}; is the QoS of a client another than the "
+            "default of services?",
+        )
+
+
+def _was_sent(send: Send, response: Any, header: Any) -> bool:
+    try:
+        send(response, header)
+    except (RuntimeWarning, SystemError) as error:
+        # Of a warning that is an error, Python makes the cause of a SystemError where it comes out
+        # of C++ that does not look for one.
+        for each in (error, error.__cause__):
+            if isinstance(each, RuntimeWarning) and str(each).startswith(UNSENT):
+                return False
+        raise
+    return True

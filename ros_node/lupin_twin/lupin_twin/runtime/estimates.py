@@ -27,14 +27,17 @@ from lupin_twin.estimate import (
     fit,
 )
 from lupin_twin.estimate.engine import (
+    HALF_WIDTH_SDS,
     Estimate,
     EstimateRequest,
+    Grades,
+    Record,
     TagPast,
+    Tally,
     is_usable,
     readings_of,
     unchanged,
 )
-from lupin_twin.estimate.grading import HALF_WIDTH_SDS, Grades, Record, Tally
 from lupin_twin.field.engine import FieldRefused, check_sensor_type
 from lupin_twin.field.explored import OccupancyMap, floor, free_of
 from lupin_twin.field.idw import never

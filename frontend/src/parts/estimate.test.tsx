@@ -8,7 +8,7 @@ import { mapPoint } from '../geometry/coordinates';
 import { pointedAt } from '../map/commands';
 import { act, moveViewport, prefer, receive, store } from '../store/app';
 import { selectTag } from '../store/moment';
-import { bodies, estimated, expectedReading, grade } from '../testing/estimate';
+import { bodies, estimated, expectedReading, grade } from '../testing/field';
 import { judgement, reason } from '../testing/health';
 import { goLive, nextStamp, showField, showTags } from '../testing/page';
 import { CATALOGUES } from '../testing/sensors';
@@ -23,7 +23,7 @@ import {
   estimateText,
   NEAR_M,
   nearTo,
-} from './parts';
+} from './estimate';
 
 let grades: Readonly<Record<string, Grade>>;
 let expected: Readonly<Record<string, Expected>>;

@@ -25,9 +25,8 @@ import type { Tag } from '../domain/twin';
 import { type MapPoint, mapPoint, toCanvas } from '../geometry/coordinates';
 import { useApp } from '../store/app';
 import { selectCatalogue, selectHealth, selectHeat, selectSensor } from '../store/derived';
-import type { Fetched } from '../store/fetcher';
+import { type Fetched, useFetched } from '../store/fetcher';
 import { selectShown, selectTags } from '../store/moment';
-import { useFetched } from '../store/useFetched';
 import { LANGUAGE, S } from '../strings';
 import { More } from '../widgets/controls';
 import { useTicking } from '../widgets/useNow';
@@ -43,7 +42,7 @@ export function EstimateFacts(): JSX.Element {
   const isNow = useApp((state) => selectShown(state).moment === null);
   const isError = useApp((state) => state.view.heat === 'error');
   const graded = useAsked('EstimateQualities', 'quality').value?.sensors ?? {};
-  const grade = (Object.hasOwn(graded, sensor.name) && graded[sensor.name]) || null;
+  const grade = Object.hasOwn(graded, sensor.name) ? (graded[sensor.name] ?? null) : null;
   if (!isMeasured(sensor)) {
     return (
       <span role="status" className="estimate-missing" data-testid="estimate-missing">

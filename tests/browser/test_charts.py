@@ -19,7 +19,6 @@ from PIL import Image
 from playwright.sync_api import Locator, expect
 
 from tests.browser.hmi import PHONE, Hmi, OpenPage
-from tests.browser.places import place
 from tests.support.messages import look, scan, set_stamp
 from tests.support.waiting import wait_for
 from tests.support.web import Bridge, bridge
@@ -350,12 +349,6 @@ def test_on_a_phone_the_card_makes_room_for_its_charts(garden: Garden, open_page
     expect(tab).to_have_attribute("aria-pressed", "true")
     expect(charts).to_be_focused()
     expect(hmi.test_id("card-chart")).to_be_in_viewport()
-    # Of several tags all tools have one line, and the lines the whole width.
-    hmi.turn(f"chart.sensor=1&chart.sensor=2&{garden.period}")
-    tools = hmi.page.locator(".chart-tags")
-    expect(tools.locator("li")).to_have_count(2)
-    assert place(tools).bottom - place(tools).top < 60
-    assert place(hmi.page.locator(".u-over")).right > PHONE["width"] - 30
 
 
 def test_what_is_observed_flows_in_and_a_gap_in_the_hearing_is_refilled(

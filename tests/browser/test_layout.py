@@ -10,7 +10,7 @@ from PIL import Image
 from playwright.sync_api import Locator, expect
 
 from tests.browser.hmi import PHONE, Box, Hmi, OpenPage, Pixel
-from tests.browser.places import expect_in_reach, place, places
+from tests.browser.places import expect_in_reach, place, places, words_below
 from tests.support.messages import scan
 from tests.support.web import Bridge, bridge
 
@@ -400,23 +400,6 @@ _LINES = f"(e) => {{ {_RECTS} return new Set([...range.getClientRects()].map((r)
 _CUT_REASONS = """() => [...document.querySelectorAll('tbody .cell-health > div')]
   .filter((e) => e.scrollHeight > e.clientHeight + 1).map((e) => e.textContent)"""
 
-# Words of a row of alarms that lie below what can be done to it, on a phone.
-_BELOW_TOOLS = """() => [...document.querySelectorAll('.alarm-go')].flatMap((go) => {
-  const tools = [...go.parentElement.querySelectorAll('.alarm-tools > *')]
-    .map((each) => each.getBoundingClientRect());
-  const words = document.createTreeWalker(go, NodeFilter.SHOW_TEXT);
-  const found = [];
-  while (words.nextNode()) {
-    const range = document.createRange();
-    range.selectNode(words.currentNode);
-    if (words.currentNode.parentElement.closest('.unseen')) continue;
-    for (const box of range.getClientRects())
-      if (tools.some((tool) => tool.left < box.right - 1 && box.left < tool.right - 1 &&
-        tool.top < box.bottom - 1 && box.top < tool.bottom - 1)) found.push(range.toString());
-  }
-  return found;
-})"""
-
 # What a phone says in each, and how it writes a number.
 LANGUAGES = {
     "en": ("tags contribute", "20.0"),
@@ -443,14 +426,11 @@ def test_every_language_has_room_on_a_phone(house: Bridge, open_page: OpenPage) 
         tools = hmi.page.locator("[data-group=active] .alarm-tools").first
         expect(tools).to_be_visible()
         assert hmi.page.evaluate(_TOO_LONG) == []
-        # Both beside the words, and over none of them.
-        assert hmi.page.evaluate(_BELOW_TOOLS) == []
-        for each in [hmi.page.locator(".pane-tabs .alarm-count"), *tools.locator("button").all()]:
-            assert place(each).right <= PHONE["width"]
-        for each in tools.locator("button").all():
-            assert place(each).bottom - place(each).top >= 44
-        row = place(tools.locator("xpath=.."))
+        assert words_below(hmi, ".alarm-go", ".alarm-tools > *") == []
+        row, *buttons = map(place, (tools.locator("xpath=.."), *tools.locator("button").all()))
+        assert all(each.bottom - each.top >= 44 for each in buttons)
         assert row.bottom - row.top < 2.75 * 44, language
+        assert place(hmi.page.locator(".pane-tabs .alarm-count")).right <= PHONE["width"]
         hmi.page.locator(".pane-tabs button").nth(1).click()
         expect(hmi.cell("1", "temperature")).to_contain_text(reading)
         assert hmi.page.evaluate(_TOO_LONG) == []

@@ -89,6 +89,15 @@ def test_most_of_the_height_is_for_what_is_looked_at(phone: Hmi) -> None:
     assert frame + card >= tall
 
 
+def test_charts_of_several_tags_have_one_line_of_tools_and_the_whole_width(phone: Hmi) -> None:
+    phone.turn("chart.sensor=1&chart.sensor=10&sensor=dew_point")
+    expect(phone.page.locator(".chart-tags li")).to_have_count(2)
+    expect(phone.page.locator(".u-over")).to_be_visible()
+    tools, inside = places(phone, ".chart-tags", ".u-over")
+    assert tools.bottom - tools.top < 60
+    assert inside.right > PHONE["width"] - 30
+
+
 def test_one_finger_moves_the_map_and_two_zoom_about_their_middle(phone: Hmi) -> None:
     before = phone.view()
     drag(phone, [(150 + 10 * step, 150 + 5 * step) for step in range(5)])

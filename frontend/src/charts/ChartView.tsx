@@ -146,7 +146,7 @@ export default function ChartView({ charted }: { charted: Charted }): JSX.Elemen
 }
 
 /** The tags of one chart with what their lines say: each can go, and another be added. */
-export function TagChoice({
+function TagChoice({
   tagIds,
   model,
 }: {
@@ -222,7 +222,7 @@ export function TagChoice({
 }
 
 /** What is shown to take away, and every reading behind it. */
-export function ChartFiles({
+function ChartFiles({
   models,
   span,
   tagId,

@@ -88,7 +88,7 @@ export function PlotView({
 }
 
 /** The time that charts tell of: under the mouse, else the moment that the page shows; null: newest. */
-export function useTold(): { at: number | null; isPointed: boolean } {
+function useTold(): { at: number | null; isPointed: boolean } {
   const pointed = useSelected(pointedTime, (it) => it?.at ?? null);
   // Beside a house of the past, the newest value would pass for one of then.
   const moment = useApp((state) => state.view.moment);
@@ -262,7 +262,7 @@ function seriesText({ points, gaps }: Series, sensor: Sensor, unit: TemperatureU
 }
 
 /** What a canvas shows, for those who do not see it. */
-export function plotText({ sensor, unit, lines, span }: PlotModel): string {
+function plotText({ sensor, unit, lines, span }: PlotModel): string {
   const each = lines.map(({ series, label }) => `${label}: ${seriesText(series, sensor, unit)}`);
   return `${S.chartOf(shown(sensor.label, 32))}, ${spanText(span)}. ${each.join(' ')}`;
 }

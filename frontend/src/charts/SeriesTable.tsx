@@ -42,7 +42,7 @@ export function ChartTables({ models }: { models: readonly PlotModel[] }): JSX.E
 }
 
 /** The same as a line of a chart, for the keyboard and for screen readers; the newest row first. */
-export function SeriesTable({ line, model }: { line: Line; model: PlotModel }): JSX.Element {
+function SeriesTable({ line, model }: { line: Line; model: PlotModel }): JSX.Element {
   const { series } = line;
   const { sensor, unit } = model;
   const isBucketed = series.bucketS !== null;

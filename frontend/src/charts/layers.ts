@@ -224,9 +224,9 @@ function drawMoment(
 
 /** How the lines of one chart are told apart: by colour, dash and marker, so that none has to do. */
 
-export type Marker = 'circle' | 'square' | 'diamond' | 'up' | 'cross' | 'down' | 'plus' | 'ring';
+type Marker = 'circle' | 'square' | 'diamond' | 'up' | 'cross' | 'down' | 'plus' | 'ring';
 
-export interface Look {
+interface Look {
   /** Of `--chart-1` to `--chart-8` in the style sheet. */
   readonly colour: number;
   /** Strokes and pauses, CSS pixels; empty: one stroke. */
@@ -279,7 +279,7 @@ export const isStroked = (marker: Marker): boolean =>
   marker === 'cross' || marker === 'plus' || marker === 'ring';
 
 /** The colours of charts, as the style sheet has them now: light or dark, forced, or for paper. */
-export interface ChartPalette {
+interface ChartPalette {
   readonly lines: readonly string[];
   readonly ink: string;
   readonly text: string;

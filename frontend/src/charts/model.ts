@@ -34,7 +34,7 @@ export interface Line {
 }
 
 /** What is ideal, and what critical, for a while. */
-export interface Band extends Span {
+interface Band extends Span {
   readonly ranges: Ranges;
 }
 
@@ -109,7 +109,7 @@ export const hasMarks = ({ lines }: PlotModel): boolean =>
   lines.some(({ marks }) => marks.length > 0);
 
 /** Common times, and per `drawnOf` its values: null is a break, undefined not of this line. */
-export type Aligned = [number[], ...(number | null | undefined)[][]];
+type Aligned = [number[], ...(number | null | undefined)[][]];
 
 export function aligned({ lines, sensor, unit }: PlotModel): Aligned {
   const all = drawnOf({ lines }).map(({ series }) =>
@@ -170,7 +170,7 @@ export function valueRange({ lines, sensor, bands, unit }: PlotModel): [low: num
 }
 
 /** A limit that is named at the picture's edge, and where its line lies. */
-export interface Limit {
+interface Limit {
   readonly kind: 'ideal' | 'critical';
   readonly value: number;
   readonly side: 'below' | 'inside' | 'above';
@@ -215,7 +215,7 @@ export interface Lines {
 
 export const NO_LINES: Lines = { series: new Map(), before: new Map(), marks: new Map() };
 
-export interface Question {
+interface Question {
   readonly pairs: readonly Pair[];
   readonly span: Span;
   /** The twin's time, ROS seconds: the span may end later. */

@@ -183,7 +183,7 @@ function inOrder({ all }: Catalogue, names: readonly string[]): readonly string[
   return [...names].sort((a, b) => place(a) - place(b) || (a < b ? -1 : 1));
 }
 
-export interface Size {
+interface Size {
   readonly width: number;
   readonly height: number;
 }

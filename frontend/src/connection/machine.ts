@@ -16,7 +16,7 @@ const PROVEN_MS = 5_000;
 /** What the operator is told. */
 export type Phase = 'connecting' | 'live' | 'stale' | 'offline' | 'reconnecting';
 
-export type Socket =
+type Socket =
   | { readonly kind: 'closed'; readonly retryAt: number }
   | { readonly kind: 'opening'; readonly since: number }
   | {
@@ -74,7 +74,7 @@ export const INITIAL: Connection = {
   status: null,
 };
 
-export interface Step {
+interface Step {
   readonly connection: Connection;
   readonly command: Command;
 }
@@ -93,22 +93,19 @@ export function step(connection: Connection, event: ConnectionEvent): Step {
         socket: { kind: 'open', since: now, lastFrameAt: null, hasState: false },
       });
     case 'frame':
+    case 'heard': {
       if (socket.kind !== 'open') return stay(connection);
       // It has waited for a page that stood still, nobody knows how long.
       if (silence(socket, now) >= DEAD_MS) return open(connection, now);
+      const heard = { ...socket, lastFrameAt: now };
+      if (event.type === 'heard') return stay({ ...connection, socket: heard });
+      const { status } = event;
       return stay({
         ...connection,
-        status: event.status ?? connection.status,
-        socket: {
-          ...socket,
-          lastFrameAt: now,
-          hasState: socket.hasState || event.status === null,
-        },
+        status: status ?? connection.status,
+        socket: { ...heard, hasState: heard.hasState || status === null },
       });
-    case 'heard':
-      if (socket.kind !== 'open') return stay(connection);
-      if (silence(socket, now) >= DEAD_MS) return open(connection, now);
-      return stay({ ...connection, socket: { ...socket, lastFrameAt: now } });
+    }
     case 'closed':
       if (socket.kind === 'closed') return stay(connection);
       return { connection: fail(connection, now, event.code, event.random), command: null };

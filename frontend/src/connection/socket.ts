@@ -4,7 +4,7 @@ import { parseFrame } from '../contract/frames';
 import type { Frame } from '../contract/types';
 import { type Connection, type ConnectionEvent, INITIAL, nextDeadline, step } from './machine';
 
-export interface ConnectionHandlers {
+interface ConnectionHandlers {
   /** The connection changed, or a deadline passed and its phase may have. */
   readonly onConnection: (connection: Connection) => void;
   readonly onFrame: (frame: Frame, connection: Connection) => void;

@@ -5,7 +5,7 @@
  */
 import schemas from './schemas.gen.json';
 
-export type Check = (value: unknown) => string | null;
+type Check = (value: unknown) => string | null;
 
 /** What the generated schemas use of JSON Schema. */
 interface Schema {

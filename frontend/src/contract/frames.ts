@@ -22,7 +22,7 @@ const FRAMES: Readonly<Record<Frame['type'], string>> = {
 };
 
 /** "passed over": a type of a later server. */
-export type Parsed =
+type Parsed =
   | { readonly kind: 'frame'; readonly frame: Frame }
   | { readonly kind: 'passed over' }
   | { readonly kind: 'bad'; readonly why: string; readonly isDelta: boolean };

@@ -3,7 +3,7 @@ import { answer, ask } from './api';
 import type { Note, Session } from './types';
 
 /** A header of our own: no form and no picture of another page can send one. */
-export const OWN = { 'X-Lupin-Twin': '1' };
+const OWN = { 'X-Lupin-Twin': '1' };
 
 export const fetchSession = (signal: AbortSignal): Promise<Session> =>
   answer('Session', signal, 'api/session');
@@ -13,7 +13,7 @@ export async function signOut(): Promise<void> {
   await ask('api/signout', { method: 'POST', headers: OWN });
 }
 
-export interface Draft {
+interface Draft {
   readonly kind: 'acknowledge' | 'shelve' | 'comment';
   readonly subject: string;
   readonly text?: string;

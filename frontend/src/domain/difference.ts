@@ -107,7 +107,7 @@ export interface TagThen {
   readonly health: TagHealth;
 }
 
-export type Trend =
+type Trend =
   /** `by`: what is now less what was then, in the sensor's unit. */
   | { readonly kind: 'by'; readonly by: number }
   /** No reading of then, or none that held then. */

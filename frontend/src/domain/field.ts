@@ -27,7 +27,7 @@ export function resolutionFor(bounds: Bounds, maxCells: number): number {
   return finest;
 }
 
-export interface Pixels {
+interface Pixels {
   readonly width: number;
   readonly height: number;
   /** RGBA, top row first. */

@@ -230,7 +230,7 @@ export const reasonsText = (
 ): string => reasons.map((reason) => reasonText(sensors, reason, unit, null)).join('; ');
 
 /** What became of a try, by the status of its observation (lupin_msgs/Observation). */
-export type TryKind = 'ok' | 'unreachable' | 'undecoded' | 'skipped' | 'failed';
+type TryKind = 'ok' | 'unreachable' | 'undecoded' | 'skipped' | 'failed';
 
 const KINDS: readonly TryKind[] = ['ok', 'unreachable', 'undecoded', 'skipped'];
 

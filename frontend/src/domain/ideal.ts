@@ -124,10 +124,7 @@ export const rangesAt = ({ kinds, byCell }: Zones, cell: number): Ranges | undef
  * Index of the nearest site for each cell, by handing on from cell to cell (Danielsson 1980): what it
  * costs depends on the cells alone. A cell as good as halfway between two may get either.
  */
-export function nearestSites(
-  grid: CellGrid,
-  sites: readonly { readonly at: MapPoint }[],
-): Int32Array {
+function nearestSites(grid: CellGrid, sites: readonly { readonly at: MapPoint }[]): Int32Array {
   const { width, height, originX, originY, resolution } = grid;
   const nearest = new Int32Array(width * height).fill(-1);
   const squared = new Float64Array(width * height).fill(Infinity);

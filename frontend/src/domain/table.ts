@@ -33,7 +33,7 @@ export interface AreaHead {
 /** What the table has one below the other. */
 export type Line = Row | AreaHead;
 
-export interface Area {
+interface Area {
   /** Empty: that of the tags that are in none; it comes last. */
   readonly area: string;
   readonly rows: readonly Row[];
@@ -64,7 +64,7 @@ export function withHeads(areas: readonly Area[]): readonly Line[] {
 type Key = number | string | null;
 
 /** What a column sorts by; null sorts last in both directions. */
-export function sortKey({ tag, health }: Row, column: string): Key {
+function sortKey({ tag, health }: Row, column: string): Key {
   switch (column) {
     case 'health':
       return severity(health);

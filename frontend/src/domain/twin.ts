@@ -2,7 +2,7 @@ import type { Latest, TwinTagState, WirePoint, WireTime } from '../contract/type
 import { mapPoint, type MapPoint } from '../geometry/coordinates';
 import type { When } from './time';
 
-export interface Bloom {
+interface Bloom {
   readonly at: MapPoint;
   readonly species: string;
   readonly anomaly: boolean;
@@ -78,7 +78,7 @@ function pointOf(point: WirePoint): MapPoint | null {
 }
 
 /** The state that a tag is read from. */
-export interface TakenState {
+interface TakenState {
   /** Its ROS time. */
   readonly at: WireTime;
   /** When it was new, ms on the monotonic clock. */
@@ -267,7 +267,7 @@ export function compareIds(a: string, b: string): number {
  */
 
 /** A circle about the middle of the tags, metres; what is outside is far off. */
-export interface Reach {
+interface Reach {
   readonly x: number;
   readonly y: number;
   readonly radius: number;

@@ -1,7 +1,7 @@
 import type { Verdict } from '../contract/types';
 import { mix, rgbText, type Rgb } from '../domain/ramp';
 
-export interface VerdictColours {
+interface VerdictColours {
   readonly body: string;
   /** The sign on its body. */
   readonly ink: string;

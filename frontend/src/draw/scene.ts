@@ -49,7 +49,7 @@ export interface Scene {
   readonly spacing: number;
 }
 
-export interface SceneInput {
+interface SceneInput {
   readonly tags: readonly Tag[];
   readonly health: HouseHealth;
   readonly sensor: Sensor;

@@ -55,10 +55,24 @@ export function drawPicture(
   picture: HTMLCanvasElement,
   placement: Placement,
 ): void {
-  const [a, b, c, d, e, f] = imageToCanvas(placement, view);
+  place(context, view, { picture, placement }, view.scale * placement.resolution * ratio < 1);
+}
+
+/** A picture that lies in the map, of which only what it covers counts. */
+interface Mask {
+  readonly picture: HTMLCanvasElement;
+  readonly placement: Placement;
+}
+
+function place(
+  context: CanvasRenderingContext2D,
+  view: View,
+  { picture, placement }: Mask,
+  isSmooth = false,
+): void {
   context.save();
-  context.transform(a, b, c, d, e, f);
-  context.imageSmoothingEnabled = view.scale * placement.resolution * ratio < 1;
+  context.transform(...imageToCanvas(placement, view));
+  context.imageSmoothingEnabled = isSmooth;
   context.drawImage(picture, 0, 0);
   context.restore();
 }
@@ -183,12 +197,6 @@ const GAP_PX = 9;
 /** The same over what is known ever less surely: each has all strokes of the one before it. */
 const UNSURE_GAPS_PX = [18, 9, 4.5] as const;
 
-/** A picture that lies in the map, of which only what it covers counts. */
-export interface Mask {
-  readonly picture: HTMLCanvasElement;
-  readonly placement: Placement;
-}
-
 /** The floor of the SLAM map: what is inside the house. `free` is the least grey that is no wall. */
 export function floorOf(pixels: ImageData, free: number): HTMLCanvasElement {
   const { data, width, height } = pixels;
@@ -199,37 +207,36 @@ export function floorOf(pixels: ImageData, free: number): HTMLCanvasElement {
   return canvasOfPixels({ data: floor, width, height });
 }
 
-/** The cells of a field that are known, top row first. */
-export function knownOf({ width, height, values }: Field): HTMLCanvasElement {
+/** The cells of a field for which `isIn` holds, top row first. */
+export function cellsOf(
+  { width, height }: Field,
+  isIn: (cell: number) => boolean,
+): HTMLCanvasElement {
   const data = new Uint8ClampedArray(width * height * 4);
-  for (let y = 0; y < height; y++) {
-    for (let x = 0; x < width; x++) {
-      if (Number.isNaN(values[y * width + x])) continue;
-      data[((height - 1 - y) * width + x) * 4 + 3] = 255;
-    }
+  for (let cell = 0; cell < width * height; cell++) {
+    const row = height - 1 - Math.floor(cell / width);
+    if (isIn(cell)) data[(row * width + (cell % width)) * 4 + 3] = 255;
   }
   return canvasOfPixels({ data, width, height });
 }
 
+const isKnown =
+  ({ values }: Field) =>
+  (cell: number): boolean =>
+    !Number.isNaN(values[cell]);
+
+export const knownOf = (field: Field): HTMLCanvasElement => cellsOf(field, isKnown(field));
+
 /**
- * The cells of each step of being unsure, top row first, from the first that is hatched to the last that
- * is still known; null: none is so.
+ * The cells of each step of being unsure, from the first that is hatched to the last that is still
+ * known; null: none is so.
  */
 export function unsureOf(field: Field, sureness: Sureness): (HTMLCanvasElement | null)[] {
-  const steps = stepsIn(sureness);
-  const { values, width, height } = field;
-  return UNSURE_GAPS_PX.map((_, index) => {
-    const isIt = steps.map((step, cell) =>
-      Number(step === index + 1 && !isNaN(values[cell] ?? NaN)),
-    );
-    if (!isIt.includes(1)) return null;
-    return knownOf({
-      ...field,
-      values: Float32Array.from(isIt, (is) => (is ? 1 : NaN)),
-      width,
-      height,
-    });
-  });
+  const known = isKnown(field);
+  const steps = stepsIn(sureness).map((step, cell) => (known(cell) ? step : 0));
+  return UNSURE_GAPS_PX.map((_, index) =>
+    steps.includes(index + 1) ? cellsOf(field, (cell) => steps[cell] === index + 1) : null,
+  );
 }
 
 /** Keeps the one canvas that the hatching is cut out on. */
@@ -257,10 +264,10 @@ export class Hatching {
     context.clearRect(0, 0, size.width, size.height);
     strokes({ context, size, ratio }, view, palette, gap);
     context.globalCompositeOperation = 'destination-in';
-    cut(context, view, inside);
+    place(context, view, inside);
     if (known) {
       context.globalCompositeOperation = 'destination-out';
-      cut(context, view, known);
+      place(context, view, known);
     }
     surface.context.drawImage(this.#canvas, 0, 0, size.width, size.height);
   }
@@ -292,15 +299,6 @@ function strokes({ context, size }: Surface, view: View, palette: Palette, gap: 
     context.lineTo(x - height, height);
   }
   context.stroke();
-}
-
-function cut(context: CanvasRenderingContext2D, view: View, { picture, placement }: Mask): void {
-  const [a, b, c, d, e, f] = imageToCanvas(placement, view);
-  context.save();
-  context.transform(a, b, c, d, e, f);
-  context.imageSmoothingEnabled = false;
-  context.drawImage(picture, 0, 0);
-  context.restore();
 }
 
 /** The lines of `edgesOf`. */

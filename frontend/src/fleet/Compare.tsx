@@ -230,14 +230,14 @@ export interface Compared {
 }
 
 /** What the server compares at most. */
-export const MOST_SITES = 50;
+const MOST_SITES = 50;
 /** So many lines can be told apart beside that of the median. */
-export const MOST_DRAWN = 6;
+const MOST_DRAWN = 6;
 /** The look that no greenhouse gets: grey, with dashes. */
-export const MEDIAN_LOOK = 6;
+const MEDIAN_LOOK = 6;
 
 /** The median with its band, and the sites that are drawn, each with the look of its place there. */
-export function linesOf(found: Compared, drawn: readonly string[], median: string): Line[] {
+function linesOf(found: Compared, drawn: readonly string[], median: string): Line[] {
   const sites = drawn.flatMap((name, look) => {
     const site = found.sites.find((each) => each.site === name);
     return site ? [lineOf(found, site.name, look, site.means, site.means, site.means)] : [];
@@ -266,13 +266,13 @@ function lineOf(
   return { series, before: null, look, label, marks: [] };
 }
 
-export const spanOf = ({ from, to }: Compared): Span => ({
+const spanOf = ({ from, to }: Compared): Span => ({
   from: secondsOf(from),
   to: secondsOf(to),
 });
 
 /** Of a site, what the bucket at a moment has; of none, its mean. */
-export function valueAt(found: Compared, { mean, means }: ComparedSite, at: number | null) {
+function valueAt(found: Compared, { mean, means }: ComparedSite, at: number | null) {
   if (at === null) return mean;
   return means[Math.floor((at - secondsOf(found.from)) / found.bucket_s)] ?? null;
 }

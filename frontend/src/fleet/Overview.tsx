@@ -205,15 +205,12 @@ const STAYS_MS = 200;
 /** So long after its last word a greenhouse counts as silent, and the archive as down. */
 const LIVE_MS = 20_000;
 
-interface CardsProps {
-  readonly shown: readonly Site[];
-  readonly groups: readonly string[];
-  readonly words: FleetWords;
-  /** When all of it was last known, ms since the epoch; null: it is as of now. */
-  readonly asOf: number | null;
-}
-
-export function Cards({ shown, groups, words, asOf }: CardsProps): JSX.Element {
+function Cards({
+  shown,
+  groups,
+  words,
+  asOf,
+}: Listed & { shown: readonly Site[]; groups: readonly string[] }): JSX.Element {
   const parts = useMemo(() => grouped(shown, groups), [shown, groups]);
   if (groups.length === 0) return <List sites={shown} words={words} asOf={asOf} />;
   return (
@@ -227,6 +224,7 @@ export function Cards({ shown, groups, words, asOf }: CardsProps): JSX.Element {
 
 interface Listed {
   readonly words: FleetWords;
+  /** When all of it was last known, ms since the epoch; null: it is as of now. */
   readonly asOf: number | null;
 }
 
@@ -257,7 +255,7 @@ function groupText(sites: readonly Site[], words: FleetWords): string {
   ].join(' · ');
 }
 
-export function filterText(filter: Filter, words: FleetWords): string {
+function filterText(filter: Filter, words: FleetWords): string {
   return filter === 'all' || filter === 'silent' ? words[filter] : S.health[filter];
 }
 
@@ -337,7 +335,7 @@ function SmallMap({ src }: { src: string }): JSX.Element {
 }
 
 /** What no robot observed, or not now; null: that is not known, or need not be said. */
-export function originText({ origin }: Site): string | null {
+function originText({ origin }: Site): string | null {
   return origin in S.origin ? S.origin[origin as keyof typeof S.origin] : null;
 }
 

@@ -85,7 +85,7 @@ export function withFrame(before: Sites, frame: SitesFrame): Sites {
 }
 
 /** Which button it counts for; one that is live and not judged yet counts for none. */
-export function filterOf(site: Site): Filter {
+function filterOf(site: Site): Filter {
   if (!site.is_live) return 'silent';
   return site.verdict === 'unknown' ? 'all' : site.verdict;
 }

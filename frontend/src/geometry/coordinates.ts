@@ -157,7 +157,7 @@ export function niceFloor(value: number): number {
   return (digit >= 5 ? 5 : digit >= 2 ? 2 : 1) * power;
 }
 
-export interface ScaleBar {
+interface ScaleBar {
   readonly metres: number;
   readonly pixels: number;
 }

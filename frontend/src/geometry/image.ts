@@ -2,7 +2,7 @@ import type { OccupancyGrid } from '../contract/types';
 import { mapPoint, type MapPoint, type View } from './coordinates';
 
 /** Canvas transform (a, b, c, d, e, f) as CanvasRenderingContext2D.setTransform takes it. */
-export type Affine = readonly [number, number, number, number, number, number];
+type Affine = readonly [number, number, number, number, number, number];
 
 /** Where an upright or turned picture lies in the map: its lower left corner, size and yaw. */
 export interface Placement {

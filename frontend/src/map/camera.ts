@@ -24,7 +24,7 @@ import type { Viewport } from '../store/app';
 import { createStore } from '../store/create';
 import type { House } from '../store/twin';
 
-export interface CameraHandlers {
+interface CameraHandlers {
   /** What is on the screen now; the store has it, and nobody but this camera moves it. */
   readonly viewport: () => Viewport;
   readonly onView: (view: View) => void;
@@ -49,7 +49,7 @@ export interface Held {
   readonly onEnd: () => void;
 }
 
-export type Gestures = (element: HTMLElement, held: Held) => Hand;
+type Gestures = (element: HTMLElement, held: Held) => Hand;
 
 /** Null until they are loaded, right behind the first view: the map is painted without. */
 export const gestures = createStore<Gestures | null, Gestures>(null, (_, next) => next);
@@ -61,7 +61,7 @@ const isSame = (a: View, b: View): boolean =>
   Math.abs(a.scale / b.scale - 1) < 1e-9;
 
 /** Space around what is fitted: less on a phone, also on its side, where each pixel counts. */
-export function fitInsets({ width, height }: Size): Insets {
+function fitInsets({ width, height }: Size): Insets {
   return width < 560 || height < 280
     ? { top: 26, right: 60, bottom: 40, left: 26 }
     : { top: 30, right: 76, bottom: 52, left: 40 };

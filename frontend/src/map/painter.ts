@@ -33,6 +33,7 @@ import {
 } from '../draw/surface';
 import { buildScene, type Scene } from '../draw/scene';
 import {
+  cellsOf,
   drawBoxes,
   drawEdges,
   drawGridLabels,
@@ -83,7 +84,7 @@ const holding = memoLast((field: Field, old: Uint8Array | null) =>
   old ? cellsWhere(field, (cell) => old[cell] === 0) : field,
 );
 const tooOld = memoLast((field: Field, old: Uint8Array) =>
-  knownOf(cellsWhere(field, (cell) => old[cell] !== 0)),
+  cellsOf(field, (cell) => old[cell] !== 0 && !Number.isNaN(field.values[cell])),
 );
 const whole = memoOne((field: Field) => {
   const canvas = newCanvas(field.width, field.height);

@@ -116,7 +116,7 @@ function One({
 }
 
 /** As the bridge has it. */
-export const LONGEST = 500;
+const LONGEST = 500;
 
 /** Where a comment is written. */
 export function Field({

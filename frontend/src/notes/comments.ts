@@ -55,7 +55,7 @@ export function startComments(): () => void {
 }
 
 /** Comments so near to each other that one mark stands for them. */
-export interface Cluster {
+interface Cluster {
   readonly at: number;
   readonly comments: readonly Comment[];
 }

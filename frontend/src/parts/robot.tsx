@@ -27,14 +27,13 @@ export function RobotLayer(): ReactPortal | null {
   const view = useApp((state) => state.viewport.view);
   const isHeard = useApp(isHeardNow);
   const trail = useTrail();
+  const ageAt = (now: number): number | null =>
+    position && ageOf(position.observed_at, timeOf(store.get(), now));
   const age = useTicking((now) => {
-    const known = position && ageOf(position.observed_at, timeOf(store.get(), now));
+    const known = ageAt(now);
     return known === null ? null : ageText(known);
   });
-  const isLive = useTicking((now) => {
-    const known = position && ageOf(position.observed_at, timeOf(store.get(), now));
-    return known !== null && known < LIVE_S ? 'live' : 'old';
-  });
+  const isLive = useTicking((now) => ((ageAt(now) ?? LIVE_S) < LIVE_S ? 'live' : 'old'));
   const time = useTicking((now) => {
     const known = timeOf(store.get(), now);
     return known === null ? null : String(Math.floor(known / FADE_S) * FADE_S);

@@ -68,7 +68,7 @@ export const person = createStore<Session | null, Session | null>(null, (_, next
 export const mayAct = (who: Session | null): boolean => who?.can_write_notes ?? true;
 
 /** The time that the mouse is on: in a chart, or on the time bar; each shows the other's. */
-export interface PointedTime {
+interface PointedTime {
   /** ROS seconds. */
   readonly at: number;
   readonly by: 'chart' | 'bar';

@@ -49,7 +49,7 @@ export function addressOfPage(search: string, hash: string): string {
 }
 
 /** What comes next, and when, ms on the page's clock; null: the sensor in view stays. */
-export interface Next {
+interface Next {
   readonly sensor: Sensor;
   readonly at: number;
 }

@@ -72,20 +72,9 @@ function wishFor(state: AppState, compare: Compare): Wish<Difference> | null {
   const source = sourceOf(state);
   const at = moment ?? Math.floor(nowS / STEP_S) * STEP_S;
   const against = otherMoment(compare, at);
-  const { minX, minY, maxX, maxY } = box;
-  const what = [
-    epoch,
-    sensor,
-    source,
-    moment ?? snapshot.revision,
-    against,
-    minX,
-    minY,
-    maxX,
-    maxY,
-  ];
+  const what = [epoch, sensor, source, moment ?? snapshot.revision, against, box];
   return {
-    key: what.join('|'),
+    key: JSON.stringify(what),
     run: (signal) => {
       const query = { sensor, resolution, box };
       return Promise.all([

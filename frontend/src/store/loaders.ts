@@ -2,10 +2,9 @@
 import { answer, bodyOf, fetchQuality, get } from '../contract/api';
 import type { Field, FieldQuality, OccupancyGrid, SensorsFile } from '../contract/types';
 import { cataloguesOf } from '../domain/sensors';
-import type { Snapshot } from '../domain/twin';
 import { type MapPicture, mapPlacement, opaqueBox, pixelBoxCorners } from '../geometry/image';
 import { act, type AppState, onChange, receive, store } from './app';
-import { type Source, sourceOf } from './derived';
+import { sourceOf } from './derived';
 import { createFetcher, failed, NOTHING, ready, type Wish } from './fetcher';
 import { boundsOfPins, fetchHeat, fieldResolution } from './heat';
 import { selectNewest } from './moment';
@@ -56,7 +55,8 @@ export function startLoaders(): () => void {
   const update = (): void => {
     const state = store.get();
     const source = sourceOf(state);
-    if (source === 'estimate') {
+    const isEstimate = source === 'estimate';
+    if (isEstimate) {
       ticking ??= setInterval(() => {
         ticks += 1;
         update();
@@ -69,7 +69,16 @@ export function startLoaders(): () => void {
     const newest = selectNewest(state);
     const { sensor } = state.view;
     const base = baseKey(state);
-    const wanted = base === null ? null : fieldTask(base, sensor, source, ticks, newest.snapshot);
+    const resolution = fieldResolution(newest.snapshot);
+    const wanted: Wish<Field> | null =
+      base === null || !boundsOfPins(newest.snapshot)
+        ? null
+        : {
+            key: [base, sensor, resolution, source, isEstimate ? ticks : ''].join('|'),
+            group: `${sensor}|${source}`,
+            paceMs: isEstimate ? ESTIMATE_INTERVAL_MS : FIELD_INTERVAL_MS,
+            run: (signal) => fetchHeat(source, { sensor, resolution }, signal),
+          };
     // What the page does not show any more goes at once: a restarted twin begins empty.
     const { value } = newest.field;
     if (value && (value.sensor !== sensor || (base !== null && !wanted))) {
@@ -86,7 +95,7 @@ export function startLoaders(): () => void {
     map.want(status?.has_map ? { key: base, group: 'map', run: loadMap } : null);
     quality.want(
       // Of the nearest readings: an estimate tells its own error.
-      source === 'estimate'
+      isEstimate
         ? null
         : {
             key: `${base}|${sensor}`,
@@ -111,24 +120,6 @@ function baseKey(state: AppState): string | null {
   const { snapshot } = selectNewest(state);
   const { epoch, socket, status } = state.twin.connection;
   return snapshot && status && socket.kind === 'open' ? `${epoch}|${snapshot.revision}` : null;
-}
-
-function fieldTask(
-  base: string,
-  sensor: string,
-  source: Source,
-  ticks: number,
-  snapshot: Snapshot | null,
-): Wish<Field> | null {
-  if (!boundsOfPins(snapshot)) return null;
-  const resolution = fieldResolution(snapshot);
-  const isEstimate = source === 'estimate';
-  return {
-    key: [base, sensor, resolution, source, isEstimate ? ticks : ''].join('|'),
-    group: `${sensor}|${source}`,
-    ...(isEstimate ? { paceMs: ESTIMATE_INTERVAL_MS } : {}),
-    run: (signal) => fetchHeat(source, { sensor, resolution }, signal),
-  };
 }
 
 /** Fetches the file of sensors: at once, and again on each new connection, behind which may be another. */
@@ -177,7 +168,7 @@ export function startSensors(): () => void {
  * Fetches the map's place and its picture. The map may grow between the two requests; a picture
  * of another size than announced is an error, and the caller tries again.
  */
-export async function loadMap(signal: AbortSignal): Promise<MapPicture> {
+async function loadMap(signal: AbortSignal): Promise<MapPicture> {
   const [grid, blob] = await Promise.all([
     answer('OccupancyGrid', signal, 'api/map'),
     get('api/map.png', signal).then((response) => response.blob()),

@@ -128,7 +128,7 @@ export const selectNewestTag = ({ twin }: AppState, tagId: string): Tag | undefi
  */
 
 /** Those that have to be told; null: a robot's, or of a twin that does not say. */
-export type Origin = Exclude<StatusFrame['origin'], 'robot' | 'unknown'> | null;
+type Origin = Exclude<StatusFrame['origin'], 'robot' | 'unknown'> | null;
 
 export function selectOrigin({ twin }: AppState): Origin {
   const origin = twin.connection.status?.origin;

@@ -1,10 +1,10 @@
 /** Fetches the greenhouse as of the moment that is wanted, and the field of that moment with it. */
 import { fetchQuality, Refusal } from '../contract/api';
 import { fetchStateAt } from '../contract/past';
-import type { Field, Judgement } from '../contract/types';
-import { snapshotOf, type Snapshot } from '../domain/twin';
+import type { Field } from '../contract/types';
+import { snapshotOf } from '../domain/twin';
 import { onChange, receive, store, type AppState } from './app';
-import { sourceOf, type Source } from './derived';
+import { sourceOf } from './derived';
 import { fetchHeat, fieldResolution } from './heat';
 import { selectNewest, selectPast } from './moment';
 import {
@@ -26,13 +26,6 @@ const PATIENCE_MS = 300;
 /** How far off a field is, is asked for once the moment stays. */
 const QUALITY_AFTER_MS = 400;
 
-interface Came {
-  readonly at: number;
-  readonly snapshot: Snapshot;
-  readonly health: Judgement;
-  readonly field: Fetched<Field>;
-}
-
 export function startPast(): () => void {
   let patience: ReturnType<typeof setTimeout> | undefined;
   let calm: ReturnType<typeof setTimeout> | undefined;
@@ -40,15 +33,12 @@ export function startPast(): () => void {
   /** The last connection that was open. */
   let heardOn = 0;
 
-  const show = ({ at, snapshot, health, field }: Came): void => {
+  const show = (past: Past): void => {
     clearTimeout(patience);
-    receive({ type: 'past', past: { at, house: { ...NO_HOUSE, snapshot, health, field } } });
-    forgetQuality();
-    calm = setTimeout(askQuality, QUALITY_AFTER_MS);
+    receive({ type: 'past', past });
   };
   const showNothing = (at: number): void => {
-    clearTimeout(patience);
-    receive({ type: 'past', past: { at, house: NO_HOUSE } });
+    show({ at, house: NO_HOUSE });
   };
 
   const losePatience = (): void => {
@@ -78,10 +68,14 @@ export function startPast(): () => void {
     );
   };
 
-  const fetcher = createFetcher<Came>({
+  const fetcher = createFetcher<Past>({
     paceMs: DRAG_PACE_MS,
     isDragged: true,
-    onValue: show,
+    onValue: (past) => {
+      show(past);
+      forgetQuality();
+      calm = setTimeout(askQuality, QUALITY_AFTER_MS);
+    },
     onError: (message, isLasting) => {
       const { moment } = store.get().view;
       if (moment === null) return;
@@ -132,38 +126,31 @@ const withoutField = (past: Past): Past => ({
   house: { ...past.house, field: NOTHING, quality: null },
 });
 
-function wishFor(state: AppState, at: number, epoch: number): Wish<Came> {
+function wishFor(state: AppState, at: number, epoch: number): Wish<Past> {
   const { sensor } = state.view;
   const source = sourceOf(state);
   const resolution = fieldResolution(selectNewest(state).snapshot);
   return {
     key: `${epoch}|${at}|${sensor}|${resolution}|${source}`,
-    run: (signal) => cameOf(at, sensor, resolution, source, signal),
+    run: async (signal) => {
+      // Both or none: no moment has the field of another one.
+      const [latest, field] = await Promise.all([
+        fetchStateAt(at, signal),
+        fetchHeat(source, { sensor, resolution, at }, signal).then(
+          ready,
+          (error: unknown): Fetched<Field> => {
+            // What may pass is tried again with the rest.
+            if (!(error instanceof Refusal) || error.status !== 400) throw error;
+            return failed(error.message);
+          },
+        ),
+      ]);
+      const before = selectPast(store.get())?.house.snapshot ?? null;
+      // In milliseconds of ROS time, where nothing but differences counts.
+      const snapshot = snapshotOf(latest, at * 1000, before);
+      const hasPins = snapshot.tags.some((tag) => tag.at);
+      const { health } = latest;
+      return { at, house: { ...NO_HOUSE, snapshot, health, field: hasPins ? field : NOTHING } };
+    },
   };
-}
-
-async function cameOf(
-  at: number,
-  sensor: string,
-  resolution: number,
-  source: Source,
-  signal: AbortSignal,
-): Promise<Came> {
-  // Both or none: no moment has the field of another one.
-  const [latest, field] = await Promise.all([
-    fetchStateAt(at, signal),
-    fetchHeat(source, { sensor, resolution, at }, signal).then(
-      ready,
-      (error: unknown): Fetched<Field> => {
-        // What may pass is tried again with the rest.
-        if (!(error instanceof Refusal) || error.status !== 400) throw error;
-        return failed(error.message);
-      },
-    ),
-  ]);
-  const before = selectPast(store.get())?.house.snapshot ?? null;
-  // In milliseconds of ROS time, where nothing but differences counts.
-  const snapshot = snapshotOf(latest, at * 1000, before);
-  const hasPins = snapshot.tags.some((tag) => tag.at);
-  return { at, snapshot, health: latest.health, field: hasPins ? field : NOTHING };
 }

@@ -28,7 +28,7 @@ export interface House {
   readonly held: Held | null;
 }
 
-export interface Held {
+interface Held {
   readonly sensor: string;
   readonly range: Range;
 }
@@ -51,7 +51,7 @@ export interface Past {
 }
 
 /** Why a moment that was asked for is not here. */
-export interface PastFault {
+interface PastFault {
   /** ROS seconds. */
   readonly at: number;
   readonly message: string;

@@ -22,7 +22,7 @@ export type Layer = (typeof LAYERS)[number];
 
 /** What the heat map is made of: the readings nearest to a cell, an estimate, or its error alone. */
 export const HEATS = ['nearest', 'estimate', 'error'] as const;
-export type HeatKind = (typeof HEATS)[number];
+type HeatKind = (typeof HEATS)[number];
 
 /** What the page takes for a filter of the table, characters. */
 export const LONGEST_FILTER = 200;

@@ -60,7 +60,7 @@ export function LiveButton(): JSX.Element {
 }
 
 /** The newest moment of a recording or a simulation, as a text that goes on. */
-export function useOwnTime(): string | null {
+function useOwnTime(): string | null {
   return useTicking((now) => {
     const at = ownTime(store.get(), now);
     return at === null ? null : rosText(at);

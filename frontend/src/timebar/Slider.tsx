@@ -187,20 +187,11 @@ export function Slider({
 function stepOf({ key, shiftKey }: KeyboardEvent, axis: Axis): number | null {
   const step = pixelS(axis) * (shiftKey ? FAR : 1);
   const page = (axis.to - axis.from) / PAGES;
-  switch (key) {
-    case 'ArrowLeft':
-    case 'ArrowDown':
-      return -step;
-    case 'ArrowRight':
-    case 'ArrowUp':
-      return step;
-    case 'PageDown':
-      return -page;
-    case 'PageUp':
-      return page;
-    default:
-      return null;
-  }
+  const steps: Readonly<Record<string, number>> = {
+    ...{ ArrowLeft: -step, ArrowDown: -step, ArrowRight: step, ArrowUp: step },
+    ...{ PageDown: -page, PageUp: page },
+  };
+  return steps[key] ?? null;
 }
 
 const countsText = ({ scans, failures, pests_seen, pests_cleared }: Column): string =>

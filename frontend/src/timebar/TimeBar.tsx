@@ -122,7 +122,7 @@ function PeriodChoice({ period, nowS }: { period: Period; nowS: number }): JSX.E
 }
 
 /** What the marks of the bar mean, in words, each beside its shape. */
-export function Marks(): JSX.Element {
+function Marks(): JSX.Element {
   const mark = (name: keyof typeof S.timebarMark, picture: ReactNode): JSX.Element => (
     <li>
       <svg viewBox="0 0 16 16" width="16" height="16" aria-hidden="true" data-mark={name}>
@@ -164,13 +164,7 @@ function periodOf(typed: Typed, isSimulated: boolean): Own | null {
 }
 
 /** From when to when; what makes no period is not in use, and says so. */
-export function OwnPeriod({
-  period,
-  isSimulated,
-}: {
-  period: Own;
-  isSimulated: boolean;
-}): JSX.Element {
+function OwnPeriod({ period, isSimulated }: { period: Own; isSimulated: boolean }): JSX.Element {
   const inForce = {
     of: period,
     from: fieldOf(period.from, isSimulated),

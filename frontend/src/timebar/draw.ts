@@ -36,7 +36,7 @@ const FLOOR_PX = BASE_PX + FAILURES_PX;
 const HATCH_PX = 6;
 const MARK_WIDTH_PX = 10;
 
-export interface Bar {
+interface Bar {
   readonly axis: Axis;
   /** Null: it has not come yet. */
   readonly timeline: Timeline | null;

@@ -9,12 +9,12 @@ import { barSpan, twinNow } from '../store/moment';
 
 /** Seconds of the past a second. */
 export const SPEEDS = [60, 300, 900, 3_600] as const;
-export type Speed = (typeof SPEEDS)[number];
+type Speed = (typeof SPEEDS)[number];
 
 /** Ten moments a second. */
 const TICK_MS = 100;
 
-export interface Playback {
+interface Playback {
   readonly isPlaying: boolean;
   readonly speed: Speed;
 }

@@ -219,6 +219,10 @@ def test_a_double_click_shelves_nothing_and_a_critical_alarm_takes_a_reason(
             # Nor does the heading of the next section lie over it.
             panel.get_by_role("textbox").click()
             expect(hmi.page.get_by_role("button", name="Unshelve")).to_have_count(0)
+        # A small laptop has no more lines.
+        hmi.resize(1280, 720)
+        assert all(place(row).bottom - place(row).top <= 64 for row in rows(hmi, "active").all())
+        hmi.resize(**WIDE)
         # Of the critical one.
         expect(times).to_have_text(["For 15 min", "For 1 h"])
         for each in times.all():

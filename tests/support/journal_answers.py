@@ -15,8 +15,8 @@ from typing import Any, Final
 
 from lupin_twin.core.past import SeriesRequest, WritesRequest
 from lupin_twin.journal.fold import state_at
-from lupin_twin.journal.follow import writes
 from lupin_twin.journal.queries import rows, series
+from lupin_twin.journal.received import writes
 
 JOURNALS: Final = Path(__file__).parents[1] / "fixtures" / "journals"
 NAMES: Final = sorted(path.stem for path in JOURNALS.glob("*.sqlite"))

@@ -89,6 +89,12 @@ describe('snapshot', () => {
     expect(snapshotOf(stateFrame(tags, { sec: 11 }), 2_000, first).tags[0]?.scannedAt).toBe(-9_000);
   });
 
+  test('a tag whose age becomes known is another, also without a reading', () => {
+    const first = snapshotOf(stateFrame([wireTag({ stale_seconds: null })], { sec: 1 }), 0, null);
+    const later = snapshotOf(stateFrame([wireTag({ stale_seconds: 2 })], { sec: 2 }), 1_000, first);
+    expect([first.tags[0]?.isObserved, later.tags[0]?.isObserved]).toEqual([false, true]);
+  });
+
   test('names the tags that were observed since the last one', () => {
     const a = wireTag({ tag_id: 'a' });
     const b = wireTag({ tag_id: 'b' });

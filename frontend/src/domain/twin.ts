@@ -168,7 +168,7 @@ function sharedTag(before: Tag | undefined, wire: TwinTagState, state: TakenStat
       : known === now;
   };
   const isShared =
-    before &&
+    before?.isObserved === (wire.stale_seconds !== null) &&
     equal(wire, before.wire) &&
     wire.readings.every((reading) => isSame(reading.name, readAtOf(wire, reading, state)));
   return isShared ? before : tagOf(wire, state);

@@ -2,7 +2,7 @@
 import type { Field, Sureness } from '../contract/types';
 import { written } from '../domain/format';
 import { mix, rgbText } from '../domain/ramp';
-import { stepsIn } from '../domain/sureness';
+import { stepsIn } from '../domain/field';
 import {
   canvasPoint,
   gridStep,

@@ -1,14 +1,13 @@
 import type { Ageing } from '../domain/time';
 import type { Field } from '../contract/types';
 import { divergingShade } from '../domain/difference';
-import { edgesOf, fieldPixels, smoothDetail } from '../domain/field';
+import { edgesOf, errorShade, fieldPixels, smoothDetail } from '../domain/field';
 import type { HouseHealth } from '../domain/health';
 import { fieldShade } from '../domain/ramp';
 import { cellsWhere, idealShade, withOld } from '../domain/ideal';
 import type { Sensor } from '../domain/sensors';
 import type { TemperatureUnit } from '../domain/format';
 import type { Tag } from '../domain/twin';
-import { errorShade } from '../domain/sureness';
 import {
   drawBlooms,
   drawCrosshair,

@@ -8,7 +8,7 @@ import { useApp } from '../store/app';
 import { person, useSelected } from '../store/create';
 import { selectShown } from '../store/moment';
 import { Disclosure, useClose } from '../widgets/controls';
-import { C, type Comment, comments } from './comments';
+import { C, type Comment, comments } from './CommentMarks';
 
 /** Of one subject, the newest. */
 const MOST_SHOWN = 20;

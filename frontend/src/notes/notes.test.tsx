@@ -6,9 +6,8 @@ import { act, receive } from '../store/app';
 import { person } from '../store/create';
 import { alarm, alarms } from '../testing/alarms';
 import { showTags } from '../testing/page';
-import { CommentMarks } from './CommentMarks';
+import { clustersOf, CommentMarks, comments, commentsIn, startComments } from './CommentMarks';
 import { Comments, SiteComment } from './Comments';
-import { clustersOf, comments, commentsIn, startComments } from './comments';
 
 const said = (id: string, made: number, over: Partial<Note> = {}): Note => ({
   id,

@@ -4,7 +4,7 @@ import type { JSX } from 'react';
 
 import { answer } from '../contract/api';
 import type { Field, Grade, NoEstimate, Place, Schemas, TagHealth } from '../contract/types';
-import { cellAt } from '../domain/field';
+import { cellAt, errorColours, NINE_OF_TEN, plusMinus } from '../domain/field';
 import {
   differenceNumber,
   differenceToShown,
@@ -18,7 +18,6 @@ import {
 } from '../domain/format';
 import type { HouseHealth } from '../domain/health';
 import { isMeasured, type Sensor } from '../domain/sensors';
-import { errorColours, NINE_OF_TEN, plusMinus } from '../domain/sureness';
 import { shown } from '../domain/text';
 import { ageSeconds, type When } from '../domain/time';
 import type { Tag } from '../domain/twin';

@@ -2,7 +2,7 @@
 import { houseHealth, type HouseHealth } from '../domain/health';
 import type { Field, Judgement } from '../contract/types';
 import { symmetricRange } from '../domain/difference';
-import { errorField, onExplored } from '../domain/sureness';
+import { errorField, onExplored } from '../domain/field';
 import { type Range, rangeOf, rounded, toldApart, withIdeal } from '../domain/ramp';
 import {
   type CellGrid,

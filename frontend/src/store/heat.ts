@@ -2,8 +2,7 @@
 import { now } from '../clock';
 import { fetchEstimate, fetchField, Refusal, type FieldQuery } from '../contract/api';
 import type { Field, NoEstimate } from '../contract/types';
-import { resolutionFor } from '../domain/field';
-import { estimatedField } from '../domain/sureness';
+import { estimatedField, resolutionFor } from '../domain/field';
 import type { Snapshot } from '../domain/twin';
 import { boundsOf, type Bounds } from '../geometry/coordinates';
 import type { Source } from './derived';

@@ -20,7 +20,7 @@ export { startNotify } from '../alarms/notify';
 export { startSound } from '../alarms/notify';
 export { saveTable } from '../export/actions';
 export { startGestures } from '../map/gestures';
-export { startComments } from '../notes/comments';
+export { startComments } from '../notes/CommentMarks';
 export { startDifference } from '../store/difference';
 export { startOpening } from '../store/remembered';
 export { startRemembered } from '../store/remembered';

@@ -14,8 +14,8 @@ import {
 import { selectSpeech } from '../../alarms/speech';
 import { nameText, whereText } from '../../alarms/words';
 import { clockText } from '../../domain/format';
+import { C } from '../../notes/CommentMarks';
 import { Field, Said } from '../../notes/Comments';
-import { C } from '../../notes/comments';
 import { useApp } from '../../store/app';
 import { mayAct, person, useSelected } from '../../store/create';
 import { S } from '../../strings';

@@ -15,7 +15,7 @@ import './styles/frozen.css';
 import './styles/troubles.css';
 import './styles/past.css';
 import './styles/forced.css';
-import { startAlarmsAndTelling } from './alarms/start';
+import { startAlarmsAndTelling } from './alarms/watch';
 import { startAddress } from './store/address';
 import { onChange, prefer, store } from './store/app';
 import { cycleWish, startCycle } from './store/cycle';

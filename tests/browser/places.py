@@ -23,6 +23,23 @@ _PLACES = """(selectors) => selectors.map((selector) => {
   return [box.left, box.top, box.right, box.bottom];
 })"""
 
+# Words within one that lie below the other, in the same row.
+_WORDS_BELOW = """([selector, above]) => [...document.querySelectorAll(selector)].flatMap((it) => {
+  const over = [...it.parentElement.querySelectorAll(above)]
+    .map((each) => each.getBoundingClientRect());
+  const words = document.createTreeWalker(it, NodeFilter.SHOW_TEXT);
+  const found = [];
+  while (words.nextNode()) {
+    if (words.currentNode.parentElement.closest('.unseen')) continue;
+    const range = document.createRange();
+    range.selectNode(words.currentNode);
+    for (const box of range.getClientRects())
+      if (over.some((one) => one.left < box.right - 1 && box.left < one.right - 1 &&
+        one.top < box.bottom - 1 && box.top < one.bottom - 1)) found.push(range.toString());
+  }
+  return found;
+})"""
+
 
 def place(thing: Locator) -> Box:
     """Where it is in the window, pixels."""
@@ -36,6 +53,12 @@ def places(hmi: Hmi, *selectors: str) -> list[Box]:
     """Where the first of each is in the window, pixels; all of one moment."""
     found = hmi.page.evaluate(_PLACES, selectors)
     return [Box(*(round(each) for each in box)) for box in found]
+
+
+def words_below(hmi: Hmi, selector: str, above: str) -> list[str]:
+    found = hmi.page.evaluate(_WORDS_BELOW, [selector, above])
+    assert isinstance(found, list)
+    return found
 
 
 def out_of_reach(hmi: Hmi, selector: str) -> list[str]:

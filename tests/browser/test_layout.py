@@ -10,7 +10,7 @@ from PIL import Image
 from playwright.sync_api import Locator, expect
 
 from tests.browser.hmi import PHONE, Box, Hmi, OpenPage, Pixel
-from tests.browser.places import expect_in_reach, place, places
+from tests.browser.places import expect_in_reach, place, places, words_below
 from tests.support.messages import scan
 from tests.support.web import Bridge, bridge
 
@@ -426,7 +426,11 @@ def test_every_language_has_room_on_a_phone(house: Bridge, open_page: OpenPage) 
         tools = hmi.page.locator("[data-group=active] .alarm-tools").first
         expect(tools).to_be_visible()
         assert hmi.page.evaluate(_TOO_LONG) == []
-        assert len({place(each).top for each in tools.locator("button").all()}) == 1
+        assert words_below(hmi, ".alarm-go", ".alarm-tools > *") == []
+        row, *buttons = map(place, (tools.locator("xpath=.."), *tools.locator("button").all()))
+        assert all(each.bottom - each.top >= 44 for each in buttons)
+        assert row.bottom - row.top < 2.75 * 44, language
+        assert place(hmi.page.locator(".pane-tabs .alarm-count")).right <= PHONE["width"]
         hmi.page.locator(".pane-tabs button").nth(1).click()
         expect(hmi.cell("1", "temperature")).to_contain_text(reading)
         assert hmi.page.evaluate(_TOO_LONG) == []

@@ -21,6 +21,11 @@ def test_a_low_window_has_one_line_of_sensors_with_the_chosen_one_in_sight(hmi: 
         chosen, bar = places(hmi, ".sensors label:has(:checked)", ".sensor-picker")
         assert bar.bottom - bar.top < 60
         assert bar.left <= chosen.left < chosen.right <= bar.right
+    # So has a wide one, where there is the room for it.
+    hmi.resize(1440, 900)
+    names = hmi.page.locator(".sensors label")
+    expect(names).to_have_count(8)
+    assert len({place(name).top for name in names.all()}) == 1
 
 
 def test_a_sensor_has_its_colours_words_legend_and_column(hmi: Hmi) -> None:
@@ -105,6 +110,26 @@ def test_the_table_is_filtered_and_sorted_and_health_names_the_tag_that_drives_i
     expect(hmi.card("10")).to_be_visible()
     hmi.page.locator(".health-counts [data-health=unknown]").first.click()
     hmi.expect_rows("failed", "seen")
+
+
+def test_beside_a_card_the_table_keeps_rows_and_none_that_is_chosen_ends_below_its_head(
+    hmi: Hmi,
+) -> None:
+    hmi.resize(1280, 720)
+    hmi.row("3").click()
+    hmi.expect_parts()
+    expect(hmi.card("3")).to_be_visible()
+    frame = hmi.page.locator(".table-scroll")
+    head, table = place(hmi.page.locator("thead")), place(frame)
+    assert (table.bottom - head.bottom) / 45 > 3.4
+    assert place(hmi.card("3")).bottom == 720
+    # Where it comes to stand as the table is sorted anew: half of it below the head.
+    hmi.page.locator("th[data-column=tag] button").hover()
+    frame.evaluate("(frame) => { frame.scrollTop = 112; }")
+    hmi.page.mouse.down()
+    hmi.page.mouse.up()
+    hmi.expect_rows("1", "2", "3", "9", "10", "failed", "seen")
+    hmi.expect(lambda: place(hmi.row("3")).top == head.bottom, "the chosen row below the head")
 
 
 def test_a_row_and_its_pin_find_each_other_and_the_card_tells_all(hmi: Hmi) -> None:

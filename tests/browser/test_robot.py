@@ -104,6 +104,12 @@ def test_the_robot_its_trail_its_way_and_its_battery_are_shown_and_told(
     place(robot, 3.2, 1.6, math.pi / 2)
     expect(layer).to_have_attribute("data-looks", "live")
     hmi.expect(lambda: mark(hmi) == pytest.approx((3.2, 1.6), abs=0.05), "the mark where it is")
+    # Pins' labels are read over it.
+    heights = [
+        int(hmi.page.locator(layer).evaluate("it => +getComputedStyle(it).zIndex || 0"))
+        for layer in (".robot-now", ".map-view [data-layer=pins]")
+    ]
+    assert heights[0] < heights[1]
     arrow = hmi.test_id("robot-mark").locator("path")
     assert float(re.findall(r"-?[\d.]+", arrow.get_attribute("transform") or "")[0]) == (
         pytest.approx(-90.0, abs=0.1)

@@ -80,11 +80,22 @@ def test_most_of_the_height_is_for_what_is_looked_at(phone: Hmi) -> None:
     show(phone, "Tags")
     phone.row("2").tap()
     assert heights(".card")[0] >= tall
+    # How old and how it should be share a line.
+    assert heights(".card-readings li:has(.card-ideal)")[0] < 84
     phone.page.get_by_role("navigation").get_by_role("button", name="Map").tap()
     expect(phone.map).to_be_visible()
     frame, card = heights(".map-frame", ".card")
     assert frame >= 200
     assert frame + card >= tall
+
+
+def test_charts_of_several_tags_have_one_line_of_tools_and_the_whole_width(phone: Hmi) -> None:
+    phone.turn("chart.sensor=1&chart.sensor=10&sensor=dew_point")
+    expect(phone.page.locator(".chart-tags li")).to_have_count(2)
+    expect(phone.page.locator(".u-over")).to_be_visible()
+    tools, inside = places(phone, ".chart-tags", ".u-over")
+    assert tools.bottom - tools.top < 60
+    assert inside.right > PHONE["width"] - 30
 
 
 def test_one_finger_moves_the_map_and_two_zoom_about_their_middle(phone: Hmi) -> None:

@@ -4,10 +4,10 @@ import type { Alarm } from '../contract/types';
 import { alarm } from '../testing/alarms';
 import { cataloguesOf } from '../domain/sensors';
 import { CATALOGUE, FILE } from '../testing/sensors';
-import { alarmsCsv, arranged, causeFacts, causesFirst, filtered, tagsText } from './arrange';
-import { acknowledge, NOTHING_KEPT, shelve, type Kept } from './kept';
-import { listOf, rankOf, type Item } from './list';
-import type { Now } from './now';
+import { alarmsCsv, arranged, causeFacts, filtered, tagsText } from './arrange';
+import { acknowledge, NOTHING_KEPT, shelve, type Kept } from './own';
+import { causesFirst, listOf } from './list';
+import type { Now } from './words';
 
 const isTag = (): boolean => false;
 const speech = { sensors: CATALOGUE, unit: 'C' } as const;
@@ -91,9 +91,17 @@ test('of a cause how many are how bad, and the value farthest beyond', () => {
         ? { kind: 'known', value: 10.9, verdict: 'healthy', reason: null, trend: null }
         : null;
   expect(causeFacts([...items.active, ...items.resolved], speech, now)).toEqual([
-    ...['1 stressed, 1 back to normal', 'now 10.4\u00a0°C (Tag 2)', 'worst 2.9\u00a0°C (Tag 4)'],
+    ...[
+      '1 stressed, 1 back to normal',
+      'now 10.4\u00a0°C (Tag\u00a02)',
+      'worst 2.9\u00a0°C (Tag\u00a04)',
+    ],
   ]);
-  expect(causeFacts(items.resolved, speech, now)).toEqual(['', '', 'worst 2.9\u00a0°C (Tag 4)']);
+  expect(causeFacts(items.resolved, speech, now)).toEqual([
+    '',
+    '',
+    'worst 2.9\u00a0°C (Tag\u00a04)',
+  ]);
   const unknown = (): Now => ({ kind: 'unknown', last: 9, lastAt: 'unknown' });
   expect(causeFacts(items.active, speech, unknown)[0]).toBe('2 unknown');
 });
@@ -118,10 +126,11 @@ test('the worst cause first, then what nobody has seen to, then what most have',
   const all = [...hots, ...many(dry, 7), worst];
   const order = (kept: Kept) => {
     const items = listOf(all, kept, null, AT).active;
-    const rank = ({ alarm: { reason }, isAcknowledged }: Item) => rankOf(reason, isAcknowledged);
-    return arranged(causesFirst(items, rank, speech), 'cause', speech).map(
-      ({ items: own }) => `${own[0]?.alarm.id.replace(/\d/, '')} ${own.length}`,
-    );
+    return arranged(
+      causesFirst(items, (item) => item.alarm.reason, speech),
+      'cause',
+      speech,
+    ).map(({ items: own }) => `${own[0]?.alarm.id.replace(/\d/, '')} ${own.length}`);
   };
   expect(order(NOTHING_KEPT)).toEqual(['worst 1', 'dry 7', 'hot 5']);
   const seen = many(dry, 7).map((each) => ({ alarm: each, verdict: 'stressed' }) as const);

@@ -6,24 +6,24 @@ import { secondsOf } from '../domain/time';
 import { compareIds } from '../domain/twin';
 import { toShown, unitOf } from '../domain/format';
 import { S } from '../strings';
-import type { AlarmList, Item } from './list';
-import { worstOf, type Now } from './now';
-import { nameText, valuesOf, whatText, whereText, type Speech } from './words';
+import { causeOf, MOST_LOOSE, type AlarmList, type Item, type Wrong } from './list';
+import {
+  inOnePiece,
+  nameText,
+  valuesOf,
+  whatText,
+  whereText,
+  worstOf,
+  type Now,
+  type Speech,
+} from './words';
 
 export const ORDERS = ['cause', 'newest', 'tag'] as const;
 /** By cause the worst comes first. */
 export type Order = (typeof ORDERS)[number];
 
-/** More alarms than this of one cause stand below one heading. */
-const MOST_LOOSE = 4;
-
 /** Tags that a cause names. */
 const MOST_NAMED = 8;
-
-/** What is wrong where: an alarm, or what has none yet. */
-export interface Wrong {
-  readonly alarm: Pick<Alarm, 'id' | 'tag_id' | 'reason'>;
-}
 
 /** Alarms in a row; with a cause they are many, all of that cause. */
 export interface Block<T extends Wrong = Item> {
@@ -87,41 +87,6 @@ export function byCause<T extends Wrong>(items: readonly T[], speech: Speech): r
   return blocks;
 }
 
-/**
- * In the order of their blocks: by how bad the worst alarm of a block is, then whether that is not
- * acknowledged (both are the whole part of `severity`), then by how many they are. `items` come the worst first.
- */
-export function causesFirst(
-  items: readonly Item[],
-  rankOf: (item: Item) => number,
-  speech: Speech,
-): readonly Item[] {
-  const causes = new Map<string, { readonly urgency: number; count: number }>();
-  const keys = new Map<Item, string>();
-  for (const item of items) {
-    const key = causeOf(item.alarm, speech);
-    keys.set(item, key);
-    const own = causes.get(key);
-    if (own) own.count += 1;
-    else causes.set(key, { urgency: Math.floor(rankOf(item)), count: 1 });
-  }
-  const blockOf = (item: Item) => {
-    const own = causes.get(keys.get(item) ?? '');
-    return own && own.count > MOST_LOOSE ? own : { urgency: Math.floor(rankOf(item)), count: 1 };
-  };
-  return items
-    .map((item) => ({ item, block: blockOf(item) }))
-    .sort((a, b) => b.block.urgency - a.block.urgency || b.block.count - a.block.count)
-    .map(({ item }) => item);
-}
-
-/** What is wrong in which area, by whatever limit. */
-const causeOf = ({ reason, tag_id }: Wrong['alarm'], { sensors }: Speech): string =>
-  [
-    ...[reason.kind, reason.sensor, isOfRange(reason) ? sideOf(reason) : ''],
-    sensors.areaOf(tag_id),
-  ].join('|');
-
 function causeText(alarm: Wrong['alarm'], speech: Speech): string {
   const area = speech.sensors.areaOf(alarm.tag_id);
   return [...(area === '' ? [] : [shown(area, 32)]), causeWords(alarm, speech)].join(' · ');
@@ -162,7 +127,12 @@ export function causeFacts(
       .map((each) => ({ each, value: valueOf(each) ?? NaN }))
       .filter(({ value }) => !Number.isNaN(value))
       .sort((a, b) => (isBelow ? a.value - b.value : b.value - a.value))[0]?.each;
-    return found && { ...valuesOf(found.alarm, speech, found.now), where: whereText(found.alarm) };
+    return (
+      found && {
+        ...valuesOf(found.alarm, speech, found.now),
+        where: inOnePiece(whereText(found.alarm)),
+      }
+    );
   };
   const current = furthest(({ value }) => value);
   const worst = furthest(({ alarm, now }) => worstOf(alarm, now));

@@ -6,9 +6,8 @@ import { alarm, tellAlarms } from '../testing/alarms';
 import { showTags } from '../testing/page';
 import { stateFrame, wireTag } from '../testing/tags';
 import { goToStart, periodWith, showAlarm } from './follow';
-import { NOTHING_KEPT } from './kept';
+import { NOTHING_KEPT, own } from './own';
 import { calling } from './list';
-import { own } from './own';
 import { alarmList, startAlarms } from './watch';
 
 describe('period', () => {

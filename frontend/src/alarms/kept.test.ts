@@ -19,7 +19,7 @@ import {
   writeKept,
   type Kept,
   type Rated,
-} from './kept';
+} from './own';
 
 const AT = 1_800_000_000_000;
 const rated = (id: string, verdict: Rated['verdict'] = 'stressed'): Rated => ({

@@ -3,7 +3,7 @@ import { describe, expect, test } from 'vitest';
 import type { Alarm } from '../contract/types';
 import { alarm } from '../testing/alarms';
 import { reason } from '../testing/health';
-import { acknowledge, NOTHING_KEPT, shelve, type Kept } from './kept';
+import { acknowledge, NOTHING_KEPT, shelve, type Kept } from './own';
 import {
   calling,
   EMPTY_LIST,

@@ -1,12 +1,21 @@
 /** The list of alarms: what is active, shelved and resolved, in its order. Pure. */
 import type { Alarm, HealthReason, Verdict } from '../contract/types';
-import { severity } from '../domain/health';
+import { isOfRange, severity, sideOf } from '../domain/health';
 import { secondsOf } from '../domain/time';
 import { compareIds, equal } from '../domain/twin';
-import { isShelfHeld, isWorse, whatOf, type Kept, type Shelf } from './kept';
+import { isShelfHeld, isWorse, whatOf, type Kept, type Shelf } from './own';
+import type { Speech } from './words';
 
 /** What is resolved stays listed for so long, seconds. */
 export const LISTED_S = 86_400;
+
+/** More alarms than this of one cause stand below one heading. */
+export const MOST_LOOSE = 4;
+
+/** What is wrong where: an alarm, or what has none yet. */
+export interface Wrong {
+  readonly alarm: Pick<Alarm, 'id' | 'tag_id' | 'reason'>;
+}
 
 export interface Item {
   readonly alarm: Alarm;
@@ -71,21 +80,51 @@ const isListed = (end: number, nowS: number | null): boolean =>
 const endOf = ({ cleared_at }: Alarm): number => (cleared_at ? secondsOf(cleared_at) : Infinity);
 
 /** In the order of `severity`, by the reasons that are given; of equals it is the same each time. */
-export const inOrder = (
-  items: readonly Item[],
-  reasonOf: (item: Item) => HealthReason,
-): readonly Item[] =>
+const inOrder = (items: readonly Item[], reasonOf: (item: Item) => HealthReason): readonly Item[] =>
   items
     .map((item) => ({ item, rank: rankOf(reasonOf(item), item.isAcknowledged) }))
     .sort((a, b) => b.rank - a.rank || byName(a.item, b.item))
     .map(({ item }) => item);
 
 /** An alarm's `severity`, for that reason. */
-export const rankOf = (reason: HealthReason, isAcknowledged: boolean): number =>
+const rankOf = (reason: HealthReason, isAcknowledged: boolean): number =>
   severity({ verdict: reason.verdict, reasons: [reason] }, isAcknowledged);
 
 const byName = ({ alarm: a }: Item, { alarm: b }: Item): number =>
   compareIds(a.tag_id, b.tag_id) || (a.id < b.id ? -1 : 1);
+
+/**
+ * By how bad the worst alarm of a block is, then whether that is not acknowledged (both are the whole part
+ * of `severity`), then by how many they are; in a block as `inOrder`.
+ */
+export function causesFirst(
+  items: readonly Item[],
+  reasonOf: (item: Item) => HealthReason,
+  speech: Speech,
+): readonly Item[] {
+  const causes = new Map<string, { readonly urgency: number; count: number }>();
+  const blockOf = ({ urgency, cause }: (typeof ranked)[number]) =>
+    cause.count > MOST_LOOSE ? cause : { urgency, count: 1 };
+  const ranked = inOrder(items, reasonOf).map((item) => {
+    const urgency = Math.floor(rankOf(reasonOf(item), item.isAcknowledged));
+    const key = causeOf(item.alarm, speech);
+    const cause = causes.get(key) ?? { urgency, count: 0 };
+    cause.count += 1;
+    causes.set(key, cause);
+    return { item, urgency, cause };
+  });
+  return ranked
+    .map((each) => ({ item: each.item, block: blockOf(each) }))
+    .sort((a, b) => b.block.urgency - a.block.urgency || b.block.count - a.block.count)
+    .map(({ item }) => item);
+}
+
+/** What is wrong in which area, by whatever limit. */
+export const causeOf = ({ reason, tag_id }: Wrong['alarm'], { sensors }: Speech): string =>
+  [
+    ...[reason.kind, reason.sensor, isOfRange(reason) ? sideOf(reason) : ''],
+    sensors.areaOf(tag_id),
+  ].join('|');
 
 /** The one that was raised first. */
 export const oldestOf = (items: readonly Item[]): Alarm | undefined =>

@@ -5,7 +5,7 @@ import type { TagThen } from '../domain/difference';
 import { alarm } from '../testing/alarms';
 import { reason } from '../testing/health';
 import { readings, tag } from '../testing/tags';
-import { nowOf } from './now';
+import { nowOf } from './words';
 
 const cold = alarm('a', { worst: 4 });
 const state = (value: number | null, ...reasons: readonly Partial<HealthReason>[]): TagThen => ({

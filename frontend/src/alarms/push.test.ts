@@ -1,6 +1,6 @@
 import { afterEach, expect, test, vi } from 'vitest';
 
-import { wishPush } from './push';
+import { wishPush } from './notify';
 
 afterEach(() => vi.unstubAllGlobals());
 

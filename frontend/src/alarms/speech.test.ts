@@ -5,7 +5,7 @@ import { alarm } from '../testing/alarms';
 import { held, judgement, reason } from '../testing/health';
 import { showTags } from '../testing/page';
 import { readings, wireTag } from '../testing/tags';
-import { NOTHING_KEPT } from './kept';
+import { NOTHING_KEPT } from './own';
 import { listOf } from './list';
 import { todoNow } from './speech';
 

@@ -6,10 +6,8 @@ import { hourAgo, selectHourAgoNow, thenOf, type HourAgo } from '../store/hourAg
 import { todoText, VERDICTS } from '../domain/health';
 import { memoLast } from '../domain/memo';
 import { isHeardNow, selectNewestTag } from '../store/moment';
-import { causesFirst } from './arrange';
-import { inOrder, rankOf, type Item } from './list';
-import { nowOf, reasonNow, type Now } from './now';
-import { alarmText, type Speech } from './words';
+import { causesFirst, type Item } from './list';
+import { alarmText, nowOf, reasonNow, type Now, type Speech } from './words';
 
 const speech = memoLast((sensors: Speech['sensors'], unit: Speech['unit']): Speech => ({
   sensors,
@@ -57,12 +55,7 @@ export function todoNow(state: AppState, items: readonly Item[]): string {
 /** What is worst now first, many of one cause together. */
 export function worstNowFirst(state: AppState, items: readonly Item[]): readonly Item[] {
   const reasons = new Map(items.map((item) => [item, reasonIn(state, item.alarm)]));
-  const reasonOf = (item: Item): HealthReason => reasons.get(item) ?? item.alarm.reason;
-  return causesFirst(
-    inOrder(items, reasonOf),
-    (item) => rankOf(reasonOf(item), item.isAcknowledged),
-    selectSpeech(state),
-  );
+  return causesFirst(items, (item) => reasons.get(item) ?? item.alarm.reason, selectSpeech(state));
 }
 
 /** An alarm in one line, as it is now. */

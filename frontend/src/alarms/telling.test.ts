@@ -7,15 +7,28 @@ import { NO_HOUSE } from '../store/twin';
 import { alarm, tellAlarms } from '../testing/alarms';
 import { showTags } from '../testing/page';
 import { wireTag } from '../testing/tags';
-import { badgeOf, startBadge } from './badge';
-import { NOTHING_KEPT } from './kept';
+import {
+  badgeOf,
+  notifyState,
+  QUIET_MS,
+  soundState,
+  startBadge,
+  startNotify,
+  startSound,
+  wishNotify,
+  wishSound,
+} from './notify';
+import { acknowledgeAlarms, NOTHING_KEPT, own } from './own';
 import { calling } from './list';
-import { notifyState, startNotify, wishNotify } from './notify';
-import { own, acknowledgeAlarms } from './own';
-import { QUIET_MS, soundState, startSound, wishSound } from './sound';
-import { startTitle, titleOf } from './title';
-import { politeVoice, startVoices, urgentVoice } from './voices';
-import { alarmList, startAlarms } from './watch';
+import {
+  alarmList,
+  politeVoice,
+  startAlarms,
+  startTitle,
+  startVoices,
+  titleOf,
+  urgentVoice,
+} from './watch';
 
 const STRESSED = { verdict: 'stressed' } as const;
 const cold = alarm('cold', { tag_id: '1' });

@@ -4,12 +4,10 @@ import { act, receive } from '../store/app';
 import { alarm, alarms, tellAlarms } from '../testing/alarms';
 import { showTags } from '../testing/page';
 import { wireTag } from '../testing/tags';
-import { NOTHING_KEPT } from './kept';
-import { calling } from './list';
-import { meanwhile, startMeanwhile } from './meanwhile';
 import {
   acknowledgeAlarms,
   done,
+  NOTHING_KEPT,
   own,
   shelveAlarm,
   startOwn,
@@ -18,7 +16,8 @@ import {
   UNDO_MS,
   unshelveAlarm,
 } from './own';
-import { alarmList, onNews, startAlarms } from './watch';
+import { calling } from './list';
+import { alarmList, meanwhile, onNews, startAlarms, startMeanwhile } from './watch';
 
 const STRESSED = { verdict: 'stressed' } as const;
 let stops: (() => void)[];

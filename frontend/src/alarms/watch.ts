@@ -1,12 +1,24 @@
 /** Keeps the list of alarms up to date, whatever moment the page shows, and tells what is new. */
 import { now, timeOfDay } from '../clock';
 import type { Alarms } from '../contract/types';
+import { rosText } from '../domain/time';
 import { onChange, store } from '../store/app';
-import { createStore } from '../store/create';
-import { rosNow } from '../store/moment';
-import { nextEnd, pruned } from './kept';
-import { EMPTY_LIST, listOf, newsOf, sharedList, type AlarmList, type News } from './list';
-import { own } from './own';
+import { createStore, createVoice } from '../store/create';
+import { rosNow, selectIsRecorded, selectShown } from '../store/moment';
+import { S } from '../strings';
+import { nextEnd, own, pruned, startOwn } from './own';
+import {
+  calling,
+  EMPTY_LIST,
+  listOf,
+  newsOf,
+  sharedList,
+  type AlarmList,
+  type Item,
+  type News,
+} from './list';
+import { textNow } from './speech';
+import { severalText } from './words';
 
 /** The alarms of now. */
 export const alarmList = createStore<AlarmList, AlarmList>(EMPTY_LIST, (_, next) => next);
@@ -66,3 +78,91 @@ export function startAlarms(): () => void {
 /** Until the past has been gone through nobody knows what is listed. */
 const idsOf = (alarms: Alarms | null): ReadonlySet<string> =>
   new Set(alarms?.alarms.map(({ id }) => id));
+
+/** Alarms that have come since somebody looks at another moment, the worst first; without those that were acknowledged or shelved since, or are resolved. */
+export const meanwhile = createStore<readonly Item[], readonly Item[]>([], (before, next) =>
+  next.length === before.length && next.every((item, index) => item === before[index])
+    ? before
+    : next,
+);
+
+export function startMeanwhile(): () => void {
+  let ids: ReadonlySet<string> = new Set();
+  const update = (): void => {
+    if (store.get().view.moment === null) ids = new Set();
+    meanwhile.dispatch(calling(alarmList.get()).filter(({ alarm }) => ids.has(alarm.id)));
+  };
+  const stops = [
+    onNews(({ raised }) => {
+      if (store.get().view.moment === null) return;
+      ids = new Set([...ids, ...raised.map(({ alarm }) => alarm.id)]);
+      update();
+    }),
+    alarmList.subscribe(update),
+    store.subscribe(update),
+  ];
+  update();
+  return () => {
+    for (const stop of stops) stop();
+  };
+}
+
+/** The name of the page's tab: how many alarms are active, and which moment is shown. */
+export const titleOf = (count: number, moment: number | null, isRecorded = false): string => {
+  const shown = moment === null ? S.product : S.pastTitle(rosText(moment));
+  const title = isRecorded ? `${S.origin.recorded} · ${shown}` : shown;
+  return count === 0 ? title : `(${count}) ${title}`;
+};
+
+/** Keeps the tab's name so; returns the way to stop. */
+export function startTitle(): () => void {
+  const update = (): void => {
+    const state = store.get();
+    const { moment } = selectShown(state);
+    const title = titleOf(alarmList.get().active.length, moment, selectIsRecorded(state));
+    if (document.title !== title) document.title = title;
+  };
+  update();
+  const stops = [store.subscribe(update), alarmList.subscribe(update)];
+  return () => {
+    for (const stop of stops) stop();
+  };
+}
+
+/** To screen readers: waits until what is being read is read. */
+export const politeVoice = createVoice();
+/** Cuts in. */
+export const urgentVoice = createVoice();
+
+function newsText({ raised, cleared }: News): string {
+  const text = (
+    items: readonly Item[],
+    say: (texts: readonly string[], more: number) => string,
+  ): string[] =>
+    items.length === 0
+      ? []
+      : [
+          severalText(
+            items.map(({ alarm }) => alarm),
+            (alarm) => textNow(store.get(), alarm),
+            say,
+          ),
+        ];
+  return [...text(raised, S.alarmsRaised), ...text(cleared, S.alarmsCleared)].join('. ');
+}
+
+/** Announces what is new; returns the way to stop. */
+export const startVoices = (): (() => void) =>
+  onNews((news) => {
+    const isUrgent = news.raised.some(({ verdict }) => verdict === 'critical');
+    const voice = isUrgent ? urgentVoice : politeVoice;
+    voice.dispatch(newsText(news));
+  });
+
+export function startAlarmsAndTelling(storage: Pick<Storage, 'getItem' | 'setItem'>): () => void {
+  // What was kept comes first: nothing is told of that was acknowledged on another day.
+  const stops = [startOwn(storage), startAlarms(), startTitle(), startVoices(), startMeanwhile()];
+  return () => {
+    for (const stop of stops.reverse()) stop();
+  };
+}

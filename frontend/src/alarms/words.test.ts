@@ -5,7 +5,6 @@ import { alarm } from '../testing/alarms';
 import { held, reason } from '../testing/health';
 import { S } from '../strings';
 import { CATALOGUE } from '../testing/sensors';
-import type { Now } from './now';
 import {
   alarmText,
   nameText,
@@ -15,6 +14,7 @@ import {
   unknownText,
   valuesOf,
   whenText,
+  type Now,
 } from './words';
 
 const C = { sensors: CATALOGUE, unit: 'C' } as const;

@@ -14,7 +14,7 @@ import {
   MARKS_LANE,
   readPalette,
 } from './layers';
-import { aligned, drawnOf, hasMarks, valueRange, type PlotModel } from './model';
+import { aligned, drawnOf, hasMarks, limitsOf, valueRange, type PlotModel } from './model';
 
 export interface PlotHandlers {
   /** The time that the mouse is on, ROS seconds; null: on none. */
@@ -75,7 +75,7 @@ function createPlot(element: HTMLElement, handlers: PlotHandlers): Plot {
         ...size,
         class: 'plot',
         legend: { show: false },
-        padding: [8, LIMITS_ROOM * palette.fontPx, 0, 0],
+        padding: [8, (hasNames(first) ? LIMITS_ROOM : 1) * palette.fontPx, 0, 0],
         cursor: {
           y: false,
           dataIdx: heldIndex,
@@ -197,7 +197,8 @@ function createPlot(element: HTMLElement, handlers: PlotHandlers): Plot {
       const nextShape = drawnOf(next)
         .map(({ look, isBefore }) => `${look}${isBefore ? 'b' : ''}`)
         .join()
-        .concat(hasMarks(next) ? ' marks' : '', size.hasTimes ? ' times' : '');
+        .concat(hasMarks(next) ? ' marks' : '', size.hasTimes ? ' times' : '')
+        .concat(hasNames(next) ? ' names' : '');
       if (!chart || shape !== nextShape) {
         chart?.destroy();
         chart = build(next, size);
@@ -223,6 +224,10 @@ function createPlot(element: HTMLElement, handlers: PlotHandlers): Plot {
     },
   };
 }
+
+/** Of one line always: it may stand above others, with the same times below each other. */
+const hasNames = (model: PlotModel): boolean =>
+  model.lines.length === 1 || limitsOf(model).length > 0;
 
 /** A chart in an element, as large as that; `onLook` calls back when its colours are others. */
 export function usePlot(

@@ -14,7 +14,7 @@ import { goLive, nextStamp, showField, showTags } from '../testing/page';
 import { CATALOGUES } from '../testing/sensors';
 import { readings, stateFrame, wireTag } from '../testing/tags';
 import { Legend } from '../ui/Legend';
-import { Readout } from '../ui/Readout';
+import { Readout } from '../ui/MapPanel';
 import {
   AdviceMarks,
   CardEstimate,
@@ -173,6 +173,9 @@ describe('legend', () => {
     act({ type: 'heat', heat: 'error' });
     render(<Legend kiosk={false} />);
     expect((await screen.findByTestId('error-high')).textContent).toBe(`±${NBSP}3.3${NBSP}°C`);
+    expect(text('error-scale')).toContain('Uncertainty of the estimate');
+    // Its sensor is named once.
+    expect(text('legend').match(/Temperature/g)).toHaveLength(1);
     expect(screen.queryByTestId('ideal-scale')).toBeNull();
     expect(screen.queryByTestId('estimate-key')).toBeNull();
   });

@@ -191,7 +191,6 @@ export function ErrorScale(): JSX.Element {
   const most = useApp((state) => selectHeat(state)?.range.high ?? 0);
   return (
     <div data-testid="error-scale">
-      <p className="faint">{E.errorOf(shown(sensor.label, 32))}</p>
       <div
         className="difference-bar"
         aria-hidden="true"
@@ -199,6 +198,7 @@ export function ErrorScale(): JSX.Element {
       />
       <div className="difference-ends">
         <span>±{'\u00a0'}0</span>
+        <strong>{E.error}</strong>
         <span data-testid="error-high">
           ±{'\u00a0'}
           {errorText(sensor, most / NINE_OF_TEN, unit)}

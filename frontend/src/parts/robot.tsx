@@ -64,6 +64,7 @@ export function RobotLayer(): ReactPortal | null {
       {position && at && (
         <svg className="robot-layer robot-now" aria-hidden="true" data-looks={looks}>
           <g transform={`translate(${at.x} ${at.y})`} data-testid="robot-mark">
+            <circle className="robot-ring" r="16" />
             <circle className="robot-body" r="11" />
             {position.heading === null ? (
               <circle className="robot-heading" r="4" />

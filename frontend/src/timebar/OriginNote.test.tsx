@@ -7,7 +7,7 @@ import { selectOrigin } from '../store/moment';
 import { NO_HOUSE } from '../store/twin';
 import { goLive, goLost, showTags, status } from '../testing/page';
 import { wireTag } from '../testing/tags';
-import { ConnectionBadge } from '../ui/ConnectionBadge';
+import { ConnectionBadge } from '../ui/Header';
 import { LiveButton, OriginNote, PastFrame } from './Past';
 
 const shows = (origin: StatusFrame['origin'], reason: StatusFrame['reason'] = 'live'): void => {

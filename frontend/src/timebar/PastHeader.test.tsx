@@ -1,7 +1,7 @@
 import { act as flush, fireEvent, render, screen } from '@testing-library/react';
 import { afterEach, beforeEach, expect, test, vi } from 'vitest';
 
-import { startTitle } from '../alarms/title';
+import { startTitle } from '../alarms/watch';
 import { act, receive, store } from '../store/app';
 import { NO_HOUSE } from '../store/twin';
 import { goLive, showTags, status } from '../testing/page';

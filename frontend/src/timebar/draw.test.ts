@@ -50,6 +50,15 @@ test('a pest is a full triangle, one that is gone an empty ring; who needs someb
   const cleared = drawn({ buckets: [{ ...NOTHING, start: 150, pests_cleared: 1 }] });
   expect(cleared.named('arc')).toHaveLength(1);
   expect(cleared.named('fill').map(({ state }) => state['fillStyle'])).toEqual(['surface']);
+  // Beside it without room, before it or behind.
+  const close = [
+    { ...NOTHING, start: 149.4, pests_cleared: 1 },
+    { ...NOTHING, start: 150, pests_seen: 1 },
+    { ...NOTHING, start: 150.5, pests_seen: 1 },
+    { ...NOTHING, start: 152, pests_cleared: 1 },
+  ];
+  const marks = drawn({ bucketS: 0.1, buckets: close }).named('fill');
+  expect(marks.map(({ state }) => state['fillStyle'])).toEqual(['pest', 'surface']);
 });
 
 test('silence and what is not remembered lean to different sides', () => {

@@ -34,6 +34,7 @@ export const BAR_PX = MARKS_PX + SCANS_PX + FAILURES_PX + TICKS_PX;
 const BASE_PX = MARKS_PX + SCANS_PX;
 const FLOOR_PX = BASE_PX + FAILURES_PX;
 const HATCH_PX = 6;
+const MARK_WIDTH_PX = 10;
 
 interface Bar {
   readonly axis: Axis;
@@ -104,7 +105,7 @@ function drawColumns(
   axisWidth: number,
   palette: BarPalette,
 ): void {
-  for (const { x, width, scanHeight, failureHeight, pests_seen, pests_cleared } of columns) {
+  for (const { x, width, scanHeight, failureHeight } of columns) {
     const inner = Math.max(1, width - 1);
     if (scanHeight > 0) {
       context.fillStyle = palette.scan;
@@ -119,11 +120,20 @@ function drawColumns(
       context.fillStyle = palette.failure;
       context.fillRect(x, BASE_PX + 1, inner, Math.max(3, failureHeight * (FAILURES_PX - 1)));
     }
-    // Whole, also at the end of the bar.
-    const middle = Math.min(x + width / 2, axisWidth - 5);
-    if (pests_seen > 0) drawPest(context, middle, palette);
-    // Where both lie in one column, the one that needs somebody is on top.
-    else if (pests_cleared > 0) drawCleared(context, middle, palette);
+  }
+  // Where they have no room beside each other, that which needs somebody stays.
+  const taken: number[] = [];
+  for (const [kind, draw] of [
+    ['pests_seen', drawPest],
+    ['pests_cleared', drawCleared],
+  ] as const) {
+    for (const { x, width, [kind]: count } of columns) {
+      // Whole, also at the end of the bar.
+      const middle = Math.min(x + width / 2, axisWidth - 5);
+      if (count === 0 || taken.some((at) => Math.abs(at - middle) < MARK_WIDTH_PX)) continue;
+      taken.push(middle);
+      draw(context, middle, palette);
+    }
   }
 }
 

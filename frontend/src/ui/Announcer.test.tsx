@@ -1,7 +1,7 @@
 import { act as settle, fireEvent, render, screen } from '@testing-library/react';
 import { afterEach, beforeAll, beforeEach, expect, test } from 'vitest';
 
-import { politeVoice, urgentVoice } from '../alarms/voices';
+import { politeVoice, urgentVoice } from '../alarms/watch';
 import { judgement, reason } from '../testing/health';
 import { showTags } from '../testing/page';
 import { readings, wireTag } from '../testing/tags';

@@ -1,8 +1,7 @@
 import type { JSX } from 'react';
 
-import { politeVoice, urgentVoice } from '../alarms/voices';
-import { type Announcement, type Store, useSelected } from '../store/create';
-import { chosenTag } from './announce';
+import { politeVoice, urgentVoice } from '../alarms/watch';
+import { createVoice, useSelected, type Announcement, type Store } from '../store/create';
 
 /** A voice each, so that none cuts off another; only a critical alarm may cut in. */
 export function Announcer(): JSX.Element {
@@ -32,3 +31,6 @@ function Voice({
     </div>
   );
 }
+
+/** The tag that a key has chosen. */
+export const chosenTag = createVoice();

@@ -6,18 +6,16 @@ import { useSelected } from '../store/create';
 import { selectHealth } from '../store/derived';
 import { selectIsHere, selectIsRecorded, selectShown } from '../store/moment';
 import { S } from '../strings';
-import { AlarmsLabel } from './alarms/AlarmCount';
+import { AlarmsLabel } from './alarms/ListChoice';
 import { Announcer } from './Announcer';
-import { FrozenBanner } from './FrozenBanner';
-import { Header } from './Header';
+import { FrozenBanner, Troubles } from './Troubles';
+import { Header, SimulatedNote } from './Header';
 import { HealthMark } from './HealthMark';
 import { Icon } from '../widgets/controls';
 import { MapPanel } from './MapPanel';
 import { TagsPanel } from './TagsPanel';
 import { toast } from './toast';
-import { SimulatedNote } from './SimulatedNote';
-import { Troubles } from './Troubles';
-import { WithParts } from './WithParts';
+import { WithParts } from './later';
 
 export function App({
   kiosk,

@@ -58,7 +58,7 @@ test('of many, what ails more than a few has one line, and the rest a line each'
   expect(ids()).toEqual(['bug']);
   const [cause] = document.querySelectorAll('li[data-cause]');
   expect(cause?.textContent).toMatch(
-    /Temperature too low: 12 tagsHeat, or close the vents Tag 12: Temperature 7.9.*Tags 12, 11, .* 5 and 4 more/,
+    /^12\u202f×.*Temperature too lowHeat, or close the vents Tag 12: Temperature 7.9.*Tags 12, 11, .* 5 and 4 more/,
   );
 });
 

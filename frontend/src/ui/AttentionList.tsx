@@ -2,16 +2,21 @@ import { useRef, type CSSProperties, type JSX } from 'react';
 
 import { byCause, tagsText } from '../alarms/arrange';
 import { selectSpeech } from '../alarms/speech';
+import { timeOfDay } from '../clock';
 import type { HealthReason } from '../contract/types';
-import { type HouseHealth, isBad, severity, todoText } from '../domain/health';
+import { clockText, shortAgeText } from '../domain/format';
+import { isBad, severity, todoText, type HouseHealth } from '../domain/health';
 import { shown } from '../domain/text';
 import { useApp } from '../store/app';
-import { selectHealth } from '../store/derived';
+import { useSelected } from '../store/create';
+import { addressOfPage, CYCLE_LIMITS, nextSensor, type CycleWish } from '../store/cycle';
+import { selectHealth, selectSensor } from '../store/derived';
 import { selectIsHere } from '../store/moment';
 import { S } from '../strings';
+import { useTicking } from '../widgets/useNow';
 import { useSince, useUrgent, type Urgent } from './DoNow';
 import { useFitting } from './fitting';
-import { HealthMark } from './HealthMark';
+import { HealthShape } from './HealthMark';
 import { Reasons, useReasonText } from './Reasons';
 
 /** Lines that a screen on the wall may have room for. */
@@ -42,15 +47,9 @@ export function AttentionList(): JSX.Element {
     <div className="attention">
       {heading && <h3>{heading}</h3>}
       <ul ref={list} style={{ '--rows': lines.length } as CSSProperties}>
-        {lines
-          .slice(0, MOST_LINES)
-          .map(({ key, cause, tags }, index) =>
-            cause === null ? (
-              <TagLine key={key} of={tags[0]} fits={index < count} />
-            ) : (
-              <CauseLine key={key} cause={cause} tags={tags} fits={index < count} />
-            ),
-          )}
+        {lines.slice(0, MOST_LINES).map(({ key, ...line }, index) => (
+          <Row key={key} {...line} fits={index < count} />
+        ))}
       </ul>
       {rest > 0 && <p className="attention-more">{S.attentionMore(rest)}</p>}
     </div>
@@ -75,51 +74,35 @@ function useLines(urgent: readonly Urgent[]): readonly Line[] {
   });
 }
 
-function TagLine({ of: { tagId, reasons }, fits }: { of: Urgent; fits: boolean }): JSX.Element {
-  const [{ verdict }] = reasons;
-  const since = useSince(tagId, reasons[0]);
-  return (
-    <li data-fits={fits} data-tag-id={tagId} data-health={verdict}>
-      <strong>
-        <bdi>{shown(tagId, 16)}</bdi>
-      </strong>
-      <span className="attention-why">
-        <Reasons health={{ verdict, reasons }} most={MOST_REASONS} />
-        <span className="attention-do">
-          <Todo reasons={reasons.slice(0, MOST_REASONS)} /> <small className="faint">{since}</small>
-        </span>
-      </span>
-    </li>
-  );
-}
-
-/** What ails many tags, what to do about it, where it is worst, and at which tags. */
-function CauseLine({
-  cause,
-  tags,
-  fits,
-}: {
-  cause: string;
-  tags: Line['tags'];
-  fits: boolean;
-}): JSX.Element {
+/** Where, what ails it and what to do; of many tags how many, where it is worst, and at which. */
+function Row({ cause, tags, fits }: Omit<Line, 'key'> & { fits: boolean }): JSX.Element {
   const badness = ({ reasons: [reason] }: Urgent): number =>
     severity({ verdict: reason.verdict, reasons: [reason] });
   const worst = tags.reduce((a, b) => (badness(b) > badness(a) ? b : a));
-  const [reason] = worst.reasons;
-  const why = S.healthDriver(shown(worst.tagId, 16), useReasonText(reason, true));
-  const since = useSince(worst.tagId, reason);
+  const { tagId, reasons } = worst;
+  const [reason] = reasons;
+  const { verdict } = reason;
+  const why = S.healthDriver(shown(tagId, 16), useReasonText(reason, true));
+  const since = useSince(tagId, reason);
+  const isOne = cause === null;
+  const all = isOne ? reasons.slice(0, MOST_REASONS) : tags.map((each) => each.reasons[0]);
+  const facts = isOne ? [since] : [why, since, tagsText(tags.map((each) => each.tagId))];
   return (
-    <li data-fits={fits} data-cause={cause} data-health={reason.verdict}>
-      <HealthMark verdict={reason.verdict} word={false} />
+    <li data-fits={fits} {...(isOne ? { 'data-tag-id': tagId } : { 'data-cause': cause })}>
+      <strong>
+        <bdi>{isOne ? shown(tagId, 16) : `${tags.length}\u202f×`}</bdi>
+      </strong>
       <span className="attention-why">
-        {cause}: {S.shownOf(tags.length, tags.length)}
+        {isOne ? (
+          <Reasons health={{ verdict, reasons }} most={MOST_REASONS} />
+        ) : (
+          <span>
+            <HealthShape verdict={verdict} /> {cause}
+          </span>
+        )}
         <span className="attention-do">
-          <Todo reasons={tags.map(({ reasons }) => reasons[0])} />{' '}
-          <small className="faint">
-            {why}
-            {since && ` · ${since}`} · {tagsText(tags.map(({ tagId }) => tagId))}
-          </small>
+          <Todo reasons={all} />{' '}
+          <small className="faint">{facts.filter(Boolean).join(' · ')}</small>
         </span>
       </span>
     </li>
@@ -137,4 +120,53 @@ function noneText({ verdict, reasons, counts: { unknown } }: HouseHealth): strin
   if (isBad(verdict) || reasons.length > 0) return null;
   // Of whom nothing is known, nobody knows that he needs nothing.
   return unknown > 0 ? S.attentionNoneKnown(unknown) : S.attentionNone;
+}
+
+/** Longest part of a wish that is told back. */
+const LONGEST_WISH = 12;
+
+/** In the header of a wall screen: the time, which sensor is shown until when, and how to leave. */
+export function KioskNote({ wish }: { wish: CycleWish }): JSX.Element {
+  const next = useSelected(nextSensor, (coming) => coming);
+  const sensor = useApp(selectSensor);
+  const left = useTicking((now) =>
+    next ? shortAgeText(Math.max(0, Math.ceil((next.at - now) / 1000))) : null,
+  );
+  const time = useTicking(() => clockText(timeOfDay()).slice(0, -3));
+  return (
+    <div className="kiosk-note" data-testid="kiosk-note">
+      {wish.refused !== null && (
+        <span role="status">
+          {S.cycleRefused(shown(wish.refused, LONGEST_WISH), CYCLE_LIMITS.least, CYCLE_LIMITS.most)}
+        </span>
+      )}
+      {next && left !== null && (
+        <span className="kiosk-round" data-testid="cycle">
+          <strong>{shown(sensor.label, 24)}</strong>{' '}
+          <span>{S.cycleNext(shown(next.sensor.label, 24), left)}</span>
+        </span>
+      )}
+      <button type="button" className="text-button" onClick={leaveKiosk}>
+        {S.kioskLeave} <kbd>Esc</kbd>
+      </button>
+      <time className="kiosk-clock">{time}</time>
+    </div>
+  );
+}
+
+/** To the same view, to be operated; Back leads to the wall screen again. */
+function leaveKiosk(): void {
+  const { search, hash } = window.location;
+  window.location.assign(addressOfPage(search, hash));
+}
+
+/** The key that the note names. */
+export function startLeaving(): () => void {
+  const onKeyDown = (event: KeyboardEvent): void => {
+    if (event.key === 'Escape' && !event.defaultPrevented) leaveKiosk();
+  };
+  document.addEventListener('keydown', onKeyDown);
+  return () => {
+    document.removeEventListener('keydown', onKeyDown);
+  };
 }

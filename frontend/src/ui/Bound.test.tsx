@@ -1,7 +1,7 @@
 import { fireEvent, render, screen } from '@testing-library/react';
 import { beforeEach, describe, expect, test, vi, type Mock } from 'vitest';
 
-import { Bound } from './Bound';
+import { Bound } from './RangeControl';
 import { sensorNamed } from '../testing/sensors';
 
 let onChange: Mock<(value: number) => void>;

@@ -1,10 +1,10 @@
-import { useMemo, type JSX } from 'react';
+import { Fragment, useMemo, type JSX } from 'react';
 
 import { whenText } from '../alarms/words';
 import { alarmOf, isAwaited, type Item } from '../alarms/list';
 import { alarmList } from '../alarms/watch';
 import { epochOf, now } from '../clock';
-import type { HealthReason } from '../contract/types';
+import type { HealthReason, Verdict } from '../contract/types';
 import { clockText } from '../domain/format';
 import { type HouseHealth, isBad, isSilent, severity, todoText, VERDICTS } from '../domain/health';
 import { secondsOf } from '../domain/time';
@@ -122,7 +122,7 @@ export function DoNow({
               <Todo
                 tagId={tagId}
                 reason={reasons[0]}
-                also={others.map((other) => other.tagId)}
+                also={others}
                 id={index === 0 ? id : undefined}
               />
             </button>
@@ -168,10 +168,27 @@ function byTodo(urgent: readonly Urgent[]): readonly (readonly [Urgent, ...Urgen
   return [...found.values()];
 }
 
-function alsoText(ids: readonly string[]): string {
-  const named = ids.slice(0, MOST_ALSO).map((id) => shown(id, 16));
-  const more = ids.length - named.length;
-  return named.join(', ') + (more > 0 ? ` + ${more}` : '');
+/** Some by name; those that are less bad come behind the sign of it. */
+function Also({ of, than }: { of: readonly Urgent[]; than: Verdict }): JSX.Element {
+  const more = of.length - MOST_ALSO;
+  const verdicts = [than, ...of.map(({ reasons: [{ verdict }] }) => verdict)];
+  return (
+    <span>
+      {S.todoAlso}{' '}
+      {of.slice(0, MOST_ALSO).map(({ tagId, reasons: [{ verdict }] }, index) => (
+        <Fragment key={tagId}>
+          {index > 0 && ', '}
+          {verdict !== verdicts[index] && (
+            <>
+              <HealthMark verdict={verdict} word={false} />{' '}
+            </>
+          )}
+          {shown(tagId, 16)}
+        </Fragment>
+      ))}
+      {more > 0 && ` + ${more}`}{' '}
+    </span>
+  );
 }
 
 function Todo({
@@ -183,7 +200,7 @@ function Todo({
   tagId: string;
   reason: HealthReason;
   /** Other tags that need the same. */
-  also: readonly string[];
+  also: readonly Urgent[];
   id: string | undefined;
 }): JSX.Element {
   const why = S.healthDriver(shown(tagId, 24), useReasonText(reason, true));
@@ -197,7 +214,7 @@ function Todo({
       </span>
       <span className="do-what">
         {isNow && <strong>{todoText(reason)}</strong>}{' '}
-        {also.length > 0 && <span>{S.todoAlso(alsoText(also))} </span>}
+        {also.length > 0 && <Also of={also} than={reason.verdict} />}
         {since && <small>{since}</small>}
       </span>
     </>

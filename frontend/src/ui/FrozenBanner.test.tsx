@@ -7,8 +7,8 @@ import { act, receive, store } from '../store/app';
 import { NO_HOUSE } from '../store/twin';
 import { goLive, goLost, showTags, status } from '../testing/page';
 import { wireTag } from '../testing/tags';
-import { ConnectionBadge } from './ConnectionBadge';
-import { FrozenBanner } from './FrozenBanner';
+import { ConnectionBadge } from './Header';
+import { FrozenBanner } from './Troubles';
 
 // The time of the last frame is read from two clocks, which go on between two looks.
 beforeEach(() => {

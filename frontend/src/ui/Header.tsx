@@ -1,10 +1,12 @@
 import type { JSX, ReactNode } from 'react';
 
+import { rosText, secondsOf } from '../domain/time';
+import { useApp, type AppState } from '../store/app';
+import { selectHasOwnTime, selectIsRecorded, selectOrigin, selectShown } from '../store/moment';
 import { S } from '../strings';
 import { OriginNote, PastHeader } from '../timebar/Past';
 import { Disclosure, Icon } from '../widgets/controls';
-import { ConnectionBadge } from './ConnectionBadge';
-import { WithParts } from './WithParts';
+import { WithParts } from './later';
 
 /** Which of a fleet's greenhouses the page shows; a page of one greenhouse is below no `/sites/`. */
 function siteName(): string | undefined {
@@ -30,5 +32,69 @@ export function Header({ kiosk, children }: { kiosk: boolean; children?: ReactNo
         </Disclosure>
       )}
     </header>
+  );
+}
+
+/** The connection's state in a shape and a word; told to screen readers when it changes. */
+export function ConnectionBadge(): JSX.Element {
+  const phase = useApp((state) => state.twin.phase);
+  const isPast = useApp((state) => selectShown(state).moment !== null);
+  const isRecorded = useApp(selectIsRecorded);
+  const isOfNow = !useApp(selectHasOwnTime);
+  const isPaused = useApp((state) => state.twin.connection.status?.reason === 'paused');
+  const word =
+    isRecorded && phase === 'live' && !isPast
+      ? S.recordedIs[isPaused ? 'paused' : 'playing']
+      : (isPast ? S.phasePast : S.phase)[phase];
+  return (
+    <div
+      className="connection"
+      role="status"
+      data-testid="connection"
+      data-phase={phase}
+      data-past={isPast}
+      data-of-now={isOfNow}
+    >
+      <span className="unseen">{S.phaseLabel}: </span>
+      <svg viewBox="0 0 16 16" width="14" height="14" aria-hidden="true">
+        {phase === 'live' && !isPast && (
+          <circle cx="8" cy="8" r="6" className={isOfNow ? 'solid' : 'ring'} />
+        )}
+        {(phase === 'connecting' || phase === 'reconnecting') && (
+          <circle cx="8" cy="8" r="6" className="ring turning" />
+        )}
+        {(phase === 'stale' || phase === 'offline') && (
+          <>
+            <circle cx="8" cy="8" r="6" className="ring" />
+            <path d="M3.8 12.2l8.4-8.4" className="ring" />
+          </>
+        )}
+      </svg>
+      <span>{word}</span>
+    </div>
+  );
+}
+
+/** Where the simulated past ends, if the moment that is shown lies in it, and not all is simulated; ROS seconds. */
+function selectSimulatedUntil(state: AppState): number | null {
+  const { moment } = selectShown(state);
+  const simulated = state.twin.connection.status?.journal.simulated;
+  // Of a simulation what comes after is no more real.
+  if (moment === null || !simulated || selectOrigin(state) === 'simulated') return null;
+  const end = secondsOf(simulated.end);
+  return moment < end ? end : null;
+}
+
+/** Says that what is shown was not observed: a demo begins with days that a simulation made. */
+export function SimulatedNote(): JSX.Element {
+  const until = useApp(selectSimulatedUntil);
+  return (
+    <div role="status" className="troubles simulated" data-testid="simulated">
+      {until !== null && (
+        <p>
+          <strong>{S.simulated}</strong> <span>{S.simulatedHint(rosText(until))}</span>
+        </p>
+      )}
+    </div>
   );
 }

@@ -86,7 +86,9 @@ test('nobody is called for what is shelved, and all the rest is counted', () => 
   act(() => {
     tellAlarms(alarm('fan', { tag_id: '1' }));
   });
-  expect(todo.textContent).toMatch(/^CriticalTag 1: .*also 2, 3 .*StressedTag 4: .*Alarms \(1\)$/);
+  expect(todo.textContent).toMatch(
+    /^CriticalTag 1: .*also Stressed 2, 3 .*StressedTag 4: .*Alarms \(1\)$/,
+  );
   fireEvent.click(screen.getByRole('button', { name: 'Alarms (1)' }));
   expect(store.get().view.list).toBe('alarms');
   expect(house().textContent).not.toContain('Shelved');
@@ -161,6 +163,15 @@ test('of tags that need the same done the worst stands for all, some by name', (
     expect.stringMatching(/^CriticalTag 1: .*Heat, or close the vents also 2, 3, 4 \+ 1 $/),
     expect.stringMatching(/^StressedTag 6: Humidity/),
   ]);
+  // Those that are less bad come behind their sign.
+  const mild = [reason({ verdict: 'stressed', value: 12, limit: 18 })];
+  act(() => {
+    showTags(tags, judgement({ ...all, 3: mild, 4: mild, 5: mild }));
+  });
+  expect(todo.textContent).toMatch(/Heat, or close the vents also 2, Stressed 3, 4 \+ 1 $/);
+  act(() => {
+    showTags(tags, judgement({ ...all, 6: [humid] }));
+  });
   unmount();
   render(<HealthSummary kiosk />);
   expect(screen.queryByTestId('health-driver')).toBeNull();

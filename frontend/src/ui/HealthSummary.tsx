@@ -1,13 +1,16 @@
 import type { JSX } from 'react';
 
+import { ageText, intervalText } from '../domain/format';
 import { isSilent, VERDICTS, type HouseHealth } from '../domain/health';
+import { ageSeconds } from '../domain/time';
+import { whenOf } from '../domain/twin';
 import { act, useApp } from '../store/app';
 import { selectHealth } from '../store/derived';
-import { selectIsHere } from '../store/moment';
+import { selectIsHere, selectShown } from '../store/moment';
 import { S } from '../strings';
+import { useTicking } from '../widgets/useNow';
 import { DoNow, Overall, ShelvedCount } from './DoNow';
 import { HealthMark, HealthShape } from './HealthMark';
-import { HouseLine } from './HouseLine';
 
 /** How the house is, why, and how many tags are how. */
 export function HealthSummary({ kiosk }: { kiosk: boolean }): JSX.Element {
@@ -64,4 +67,61 @@ export function HealthSummary({ kiosk }: { kiosk: boolean }): JSX.Element {
 /** Whose ranges hold, and how that is known. */
 function dayText({ day }: HouseHealth): string | undefined {
   return day ? S.healthDay(day.is_day, S.healthDaySource[day.source]) : undefined;
+}
+
+/** Of tags that report by themselves, all at once: no rhythm of anything. */
+const LEAST_INTERVAL_S = 0.1;
+/** No scan for longer than this, and than so many usual intervals: the robot may stand still. */
+const LATE_S = 60;
+const LATE_INTERVALS = 10;
+
+/** What the house is doing, as the bridge tells it: how often it is scanned, when last, who is overdue. */
+export function HouseLine(): JSX.Element | null {
+  const health = useApp(selectHealth);
+  const { patrol } = health;
+  const { snapshot, ageing } = useApp(selectShown);
+  const interval = patrol?.interval_s ?? 0;
+  const hasInterval = interval >= LEAST_INTERVAL_S;
+  const ageOf = (now: number): number | null =>
+    patrol?.last_scan && snapshot
+      ? ageSeconds(whenOf(patrol.last_scan, snapshot), now, ageing)
+      : null;
+  const last = useTicking((now) => {
+    const age = ageOf(now);
+    return age === null ? null : ageText(age);
+  });
+  // A moment of the past, and a clock that is paused, have no robot that could be looked after.
+  const isLate = useTicking((now) =>
+    hasInterval &&
+    ageing.kind === 'growing' &&
+    (ageOf(now) ?? 0) > Math.max(LATE_S, LATE_INTERVALS * interval)
+      ? 'late'
+      : null,
+  );
+  if (!patrol || !snapshot || snapshot.tags.length === 0 || isSilent(health)) return null;
+  const { last_scan: lastScan, overdue } = patrol;
+  // Scanned, and nobody knows when.
+  if (lastScan === null && snapshot.tags.some(({ readings }) => readings.size > 0)) return null;
+  if (isLate && last !== null) {
+    return (
+      <p className="house-line" data-testid="house-line">
+        <span data-overdue>{S.houseLate(last, intervalText(interval))}</span>
+        {/* Else its own reason says so. */}
+        {health.reasons.length === 0 && <strong> · {S.todo.stopped}</strong>}
+      </p>
+    );
+  }
+  const rest = [
+    lastScan === null ? S.houseNever : last === null ? null : S.houseLast(last),
+    hasInterval ? S.houseRhythm(intervalText(interval)) : null,
+  ].filter((part) => part !== null);
+  return (
+    <p className="house-line" data-testid="house-line">
+      {/* First: a narrow screen cuts the end. */}
+      <span data-overdue={overdue > 0}>{S.houseOverdue(overdue)}</span>
+      {rest.map((part, index) => (
+        <span key={index}> · {part}</span>
+      ))}
+    </p>
+  );
 }

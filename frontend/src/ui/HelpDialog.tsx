@@ -1,8 +1,17 @@
 import { useEffect, useRef, type JSX } from 'react';
 
-import { prefer, useApp } from '../store/app';
+import { shown } from '../domain/text';
+import { commandMap } from '../map/commands';
+import { act, prefer, store, useApp } from '../store/app';
+import { selectRows, selectSensors } from '../store/derived';
+import { backToLive } from '../store/moment';
+import { isDark } from '../store/theme';
+import type { ViewState } from '../store/view';
 import { S } from '../strings';
+import { togglePlayback } from '../timebar/playback';
 import { Check, Icon } from '../widgets/controls';
+import { ALARMS_ID, FILTER_ID } from './alarms/ListChoice';
+import { chosenTag } from './Announcer';
 
 const ID = 'help-dialog';
 
@@ -73,4 +82,121 @@ function Keys({
       </dl>
     </>
   );
+}
+
+/** What a key that was pressed stands for. */
+export function onKey(event: KeyboardEvent): void {
+  if (event.defaultPrevented || event.ctrlKey || event.metaKey || event.altKey) return;
+  if (document.querySelector('dialog[open]')) return;
+  if (event.key === 'Escape') {
+    escape(event);
+    return;
+  }
+  if (!store.get().settings.shortcuts || isTyping(event.target)) return;
+  if (event.key === ' ' && takesSpace(event.target)) return;
+  if (runKey(event.key)) event.preventDefault();
+}
+
+function isTyping(target: EventTarget | null): boolean {
+  return (
+    target instanceof HTMLTextAreaElement ||
+    target instanceof HTMLSelectElement ||
+    (target instanceof HTMLInputElement && target.type !== 'radio' && target.type !== 'checkbox')
+  );
+}
+
+function escape(event: KeyboardEvent): void {
+  if (event.target instanceof HTMLInputElement && event.target.id === FILTER_ID) {
+    act({ type: 'filter', text: '' });
+    return;
+  }
+  // What lies on top goes first.
+  const { chart, selected } = store.get().view;
+  if (chart) act({ type: 'chart', chart: null });
+  else if (selected !== null) act({ type: 'select', tagId: null });
+  else backToLive();
+}
+
+/** Whether the space bar is the element's own: it presses buttons, and opens the nearest tag. */
+const takesSpace = (target: EventTarget | null): boolean =>
+  target instanceof Element &&
+  target.closest('button, a, input, select, [role=application]') !== null;
+
+/** Does what a key stands for; false: nothing. */
+function runKey(key: string): boolean {
+  const state = store.get();
+  const { settings, view } = state;
+  if (/^[1-9]$/.test(key)) {
+    const sensor = selectSensors(state)[Number(key) - 1];
+    if (sensor) act({ type: 'sensor', sensor: sensor.name });
+    return sensor !== undefined;
+  }
+  switch (key.toLowerCase()) {
+    case '/':
+      act({ type: 'list', list: 'tags' });
+      // The pane may only now become visible.
+      requestAnimationFrame(() => document.getElementById(FILTER_ID)?.focus());
+      return true;
+    case 'f':
+      commandMap({ type: 'fit' });
+      return true;
+    case 'n':
+      stepTag(1);
+      return true;
+    case 'p':
+      stepTag(-1);
+      return true;
+    case 's':
+      act({ type: 'layer', layer: 'smooth', on: !view.layers.has('smooth') });
+      return true;
+    case 'l':
+      if (view.moment === null) return false;
+      backToLive();
+      return true;
+    case 'y':
+      document.querySelector<HTMLButtonElement>('.layers > button')?.click();
+      return true;
+    case 'c':
+      return toggleCharts(view);
+    case ' ':
+      togglePlayback();
+      return true;
+    case 'a':
+      act({ type: 'list', list: 'alarms' });
+      requestAnimationFrame(() => document.getElementById(ALARMS_ID)?.focus());
+      return true;
+    case 'u':
+      prefer({ unit: settings.unit === 'C' ? 'F' : 'C' });
+      return true;
+    case 't':
+      prefer({ theme: isDark() ? 'light' : 'dark' });
+      return true;
+    case '?':
+      openHelp();
+      return true;
+    default:
+      return false;
+  }
+}
+
+/** Opens the charts of the chosen tag, or closes them; false: no tag is chosen. */
+function toggleCharts({ chart, selected }: ViewState): boolean {
+  if (!chart && selected === null) return false;
+  act({ type: 'chart', chart: chart ? null : { by: 'tag', tagIds: [selected ?? ''] } });
+  return true;
+}
+
+/** The tag after or before the chosen one, in the table's order. */
+function stepTag(by: 1 | -1): void {
+  const state = store.get();
+  const rows = selectRows(state);
+  if (rows.length === 0) return;
+  const index = rows.findIndex(({ tag }) => tag.id === state.view.selected);
+  const next = index < 0 ? (by > 0 ? 0 : rows.length - 1) : index + by;
+  const at = (next + rows.length) % rows.length;
+  const row = rows[at];
+  if (!row) return;
+  const { tag, health } = row;
+  act({ type: 'select', tagId: tag.id });
+  chosenTag.dispatch(S.tagChosen(shown(tag.id, 24), S.health[health.verdict], at + 1, rows.length));
 }

@@ -8,7 +8,7 @@ import { NO_HOUSE } from '../store/twin';
 import { judgement, reason } from '../testing/health';
 import { goLive, goLost, showTags, status } from '../testing/page';
 import { stateFrame, wireTag } from '../testing/tags';
-import { HouseLine } from './HouseLine';
+import { HouseLine } from './HealthSummary';
 
 const line = (patrol: Judgement['house']['patrol']): string | undefined => {
   const health = judgement({ '1': 'healthy' }, undefined, patrol);

@@ -7,7 +7,7 @@ import { act } from '../store/app';
 import { judgement, reason } from '../testing/health';
 import { showTags } from '../testing/page';
 import { readings, wireTag } from '../testing/tags';
-import { HoverCard } from './HoverCard';
+import { HoverCard } from './extras';
 
 const point = (tagId: string | null, x = 100): void => {
   flush(() => {

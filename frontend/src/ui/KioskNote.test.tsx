@@ -4,7 +4,7 @@ import { afterEach, expect, test } from 'vitest';
 import { sensorNamed } from '../testing/sensors';
 import { nextSensor } from '../store/cycle';
 import { showTags } from '../testing/page';
-import { KioskNote } from './KioskNote';
+import { KioskNote } from './AttentionList';
 
 const NONE = { seconds: null, refused: null };
 

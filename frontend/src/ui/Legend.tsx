@@ -4,16 +4,16 @@ import type { FieldQuality } from '../contract/types';
 import {
   differenceNumber,
   readingText,
-  type TemperatureUnit,
   unitOf,
   valueText,
   withUnit,
+  type TemperatureUnit,
 } from '../domain/format';
-import { idealsText } from '../domain/ideal';
+import { IDEAL_ALPHA, idealParts, idealsText } from '../domain/ideal';
 import { fraction, rgbText, sensorColour, type Range } from '../domain/ramp';
 import type { Sensor, Span } from '../domain/sensors';
 import { shown } from '../domain/text';
-import { useApp } from '../store/app';
+import { act, useApp } from '../store/app';
 import {
   selectColouring,
   selectHasIdeal,
@@ -22,13 +22,12 @@ import {
   selectSensor,
 } from '../store/derived';
 import { selectIsHere, selectShown, selectTags } from '../store/moment';
+import { HEATS } from '../store/view';
 import { S } from '../strings';
-import { ColouringControl } from './ColouringControl';
-import { ErrorScale, EstimateFacts } from './estimate';
-import { HeatControl } from './HeatControl';
-import { IdealLegend } from './IdealLegend';
-import { SensorLabel } from './SensorLabel';
-import { WithParts } from './WithParts';
+import { Segmented, Select } from '../widgets/controls';
+import { ErrorScale, EstimateFacts } from './inTime';
+import { WithParts } from './later';
+import { SensorLabel } from './SensorPicker';
 
 export function Legend({ kiosk }: { kiosk: boolean }): JSX.Element {
   const sensor = useApp(selectSensor);
@@ -221,5 +220,78 @@ function Ramp({
         <span data-testid="range-high">{high}</span>
       </div>
     </div>
+  );
+}
+
+/** What the colours mean while they tell how values lie against their ideal. */
+function IdealLegend({ sensor }: { sensor: Sensor }): JSX.Element {
+  const unit = useApp((state) => state.settings.unit);
+  const { ideal } = sensor;
+  const colours = idealParts(IDEAL_ALPHA);
+  const part = S.idealParts[sensor.part ?? 'any'];
+  const species = useApp((state) => idealsText(sensor, selectTags(state), unit));
+  // Of one range alone the limits stand beside the colours: each plant is coloured by its own.
+  const low = species === '' && ideal && valueText(sensor, ideal[0], unit);
+  const high = species === '' && ideal && readingText(sensor, ideal[1], unit);
+  const step = (
+    name: keyof typeof colours,
+    word: string,
+    limits: string | false | null,
+  ): JSX.Element => (
+    <div data-part={name}>
+      <span
+        className="ideal-bar"
+        aria-hidden="true"
+        style={{ backgroundImage: `linear-gradient(to right, ${colours[name].join(', ')})` }}
+      />
+      <strong>{word}</strong> {limits && <span>{limits}</span>}
+    </div>
+  );
+  return (
+    <div className="ideal-scale" data-testid="ideal-scale" title={species}>
+      {step('low', S.tooLow(null), low ? S.legendBelow(low) : S.below)}
+      {step('right', species === '' ? part : S.legendEach(part), low && high && `${low} – ${high}`)}
+      {step('high', S.tooHigh(null), high ? S.legendAbove(high) : S.above)}
+    </div>
+  );
+}
+
+/**
+ * What the heat map is made of; in the link. On a narrow screen it is among the layers, elsewhere in
+ * the legend.
+ */
+export function HeatControl({ place }: { place: 'legend' | 'layers' }): JSX.Element {
+  const heat = useApp((state) => state.view.heat);
+  return (
+    <Select
+      className="heat-choice"
+      aria-label={S.heat}
+      data-testid={`heat-${place}`}
+      value={heat}
+      options={HEATS}
+      text={(kind) => S.heats[kind]}
+      onChange={(chosen) => {
+        act({ type: 'heat', heat: chosen });
+      }}
+    />
+  );
+}
+
+/** How the heat map is coloured; in the link, and by one click. */
+function ColouringControl(): JSX.Element {
+  const colouring = useApp((state) => state.view.colouring);
+  return (
+    <Segmented
+      legend={S.colouring}
+      className="colouring"
+      value={colouring}
+      options={(['ideal', 'value'] as const).map((value) => ({
+        value,
+        label: S.colourings[value],
+      }))}
+      onChange={(chosen) => {
+        act({ type: 'colouring', colouring: chosen });
+      }}
+    />
   );
 }

@@ -1,19 +1,27 @@
 import type { JSX } from 'react';
 
+import { DAY_S, differenceText, WEEK_S, type Compare } from '../domain/difference';
+import { cellAt, valueAt } from '../domain/field';
+import { metresText, readingText, written } from '../domain/format';
+import { idealText, rangesAt } from '../domain/ideal';
+import { rosText } from '../domain/time';
+import { lengthText, scaleBar } from '../geometry/coordinates';
+import { commandMap, pointedAt } from '../map/commands';
 import { MapView } from '../map/MapView';
-import { useApp } from '../store/app';
+import { act, useApp } from '../store/app';
+import { useSelected } from '../store/create';
+import { selectHeat, selectSensor, selectZones } from '../store/derived';
 import { selectShown } from '../store/moment';
+import { LAYERS } from '../store/view';
 import { S } from '../strings';
 import { PastFrame } from '../timebar/Past';
+import { Check, Disclosure, Icon, IconButton, type IconName } from '../widgets/controls';
 import { HealthStrip } from './DoNow';
-import { AdviceMarks } from './estimate';
-import { inTime } from './inTime';
-import { Legend } from './Legend';
-import { MapControls } from './MapControls';
+import { AdviceMarks, EstimateReadout, inTime } from './inTime';
+import { WithParts } from './later';
+import { HeatControl, Legend } from './Legend';
 import { Notices } from './Notices';
-import { Readout, ScaleBar } from './Readout';
 import { SensorPicker } from './SensorPicker';
-import { WithParts } from './WithParts';
 
 // Charts come after the first paint, and their library with them.
 const ChartView = inTime(async () => (await import('../charts/ChartView')).default);
@@ -43,5 +51,121 @@ export function MapPanel({ kiosk }: { kiosk: boolean }): JSX.Element {
       <Legend kiosk={kiosk} />
       {!kiosk && <WithParts>{(parts) => <parts.TimeBar />}</WithParts>}
     </section>
+  );
+}
+
+function MapControls(): JSX.Element {
+  const button = (label: string, icon: IconName, action: () => void): JSX.Element => (
+    <IconButton label={label} icon={icon} onClick={action} />
+  );
+  return (
+    <div className="map-controls" data-over-map>
+      <div className="stack">
+        {button(S.zoomIn, 'plus', () => {
+          commandMap({ type: 'zoom', factor: 1.5 });
+        })}
+        {button(S.zoomOut, 'minus', () => {
+          commandMap({ type: 'zoom', factor: 1 / 1.5 });
+        })}
+        {button(S.fit, 'fit', () => {
+          commandMap({ type: 'fit' });
+        })}
+      </div>
+      <Disclosure label={S.layersButton} button={<Icon name="layers" />} className="layers">
+        <LayerList />
+      </Disclosure>
+    </div>
+  );
+}
+
+/** Of a robot there may be none. */
+const LISTED = LAYERS.filter((layer) => layer !== 'robot');
+
+function LayerList(): JSX.Element {
+  const on = useApp((state) => state.view.layers);
+  return (
+    <>
+      <div className="layer-list">
+        {LISTED.map((layer) => (
+          <Check
+            key={layer}
+            label={S.layers[layer]}
+            isOn={on.has(layer)}
+            onChange={(isOn) => {
+              act({ type: 'layer', layer, on: isOn });
+            }}
+          />
+        ))}
+        <WithParts>{(parts) => <parts.InLayers />}</WithParts>
+      </div>
+      <label className="layer-choice heat-choice">
+        <span>{S.heat}</span>
+        <HeatControl place="layers" />
+      </label>
+      <WithParts>{(parts) => <parts.CompareControl />}</WithParts>
+    </>
+  );
+}
+
+/** The field's value at the point that mouse or crosshair is on. */
+export function Readout(): JSX.Element | null {
+  const point = useSelected(pointedAt, (at) => at);
+  const heat = useApp(selectHeat);
+  const compare = useApp((state) => state.view.compare);
+  const sensor = useApp(selectSensor);
+  const unit = useApp((state) => state.settings.unit);
+  const difference = heat?.difference;
+  const value = point && heat?.field.sensor === sensor.name ? valueAt(heat.field, point) : null;
+  const isOld = Boolean(point && heat?.old?.[cellAt(heat.field, point) ?? -1]);
+  const ranges = useApp((state) => {
+    if (!point || !heat || heat.difference || heat.isError) return null;
+    const cell = cellAt(heat.field, point);
+    return cell === null ? null : (rangesAt(selectZones(state, heat.field), cell) ?? null);
+  });
+  if (!point) return null;
+  const how = value !== null && !isOld && ranges && idealText(sensor, ranges, value, unit);
+  const text = difference ? differenceText : readingText;
+  return (
+    <output className="readout" data-testid="readout">
+      {heat?.field.sureness ? (
+        <EstimateReadout point={point} field={heat.field} value={value} isError={heat.isError} />
+      ) : (
+        <strong>
+          {value === null ? S.notKnown : text(sensor, value, unit)}
+          {difference && value !== null && (
+            <span> {sinceText(rosText(difference.against), compare)}</span>
+          )}
+        </strong>
+      )}
+      {value !== null && isOld && <span data-testid="readout-old">{S.readoutOld}</span>}
+      {how && <span data-testid="readout-ideal">{how}</span>}
+      <span>{S.position(metresText(point.x), metresText(point.y))}</span>
+    </output>
+  );
+}
+
+/** What a difference is to; of a day or a week ago the time of day says it, if they are real ones. */
+function sinceText(against: string, compare: Compare | null): string {
+  const seconds = compare?.by === 'ago' ? compare.seconds : null;
+  const clock = against.slice(-8, -3);
+  if (seconds === DAY_S) return S.differenceSinceYesterday(clock);
+  return seconds === WEEK_S ? S.differenceSinceWeek(clock) : S.differenceSince(against);
+}
+
+const LONGEST_BAR_PX = 110;
+
+/** A round length and how long it is on the map. */
+export function ScaleBar(): JSX.Element {
+  const scale = useApp((state) => state.viewport.view.scale);
+  const bar = scaleBar(scale, LONGEST_BAR_PX);
+  const length = written(lengthText(bar.metres));
+  return (
+    // The view that is fitted keeps clear of the place, which must not depend on that view.
+    <div className="scale-place" data-over-map>
+      <div className="scale-bar" role="img" aria-label={S.scaleBar(length)}>
+        <span className="bar" style={{ width: `${bar.pixels}px` }} />
+        <span>{length}</span>
+      </div>
+    </div>
   );
 }

@@ -1,14 +1,16 @@
-import type { JSX } from 'react';
+import { useEffect, useState, type JSX } from 'react';
 
-import { copyLink, reportLink, saveMap, saveTable, viewAddress } from '../export/actions';
+import { route } from '../contract/api';
+import { fetchSession, signOut } from '../contract/people';
+import type { Session } from '../contract/types';
 import { failureText, type TemperatureUnit } from '../domain/format';
+import { copyLink, reportLink, saveMap, saveTable, viewAddress } from '../export/actions';
 import { prefer, useApp } from '../store/app';
 import type { Settings } from '../store/settings';
-import { S } from '../strings';
+import { LANGUAGE, S } from '../strings';
 import { Segmented, useClose } from '../widgets/controls';
+import { inLanguage, LANGUAGE_NAMES, LANGUAGES, type Language } from '../words/languages';
 import { openHelp } from './HelpDialog';
-import { LanguageChoice } from './LanguageChoice';
-import { SignOut } from './SignOut';
 import { say } from './toast';
 
 /** What the menu of the header holds. */
@@ -107,4 +109,74 @@ async function saveMapOrSay(): Promise<void> {
   } catch (error) {
     say(S.exportFailed(failureText(error)));
   }
+}
+
+/** The page's language: another one is another address, which keeps all else of the link. */
+function LanguageChoice(): JSX.Element {
+  return (
+    <label className="language">
+      {S.language}
+      <select
+        value={LANGUAGE}
+        data-testid="language"
+        onChange={(event) => {
+          window.location.assign(inLanguage(window.location, event.target.value as Language));
+        }}
+      >
+        {LANGUAGES.map((each) => (
+          <option key={each} value={each} lang={each}>
+            {LANGUAGE_NAMES[each]}
+          </option>
+        ))}
+      </select>
+    </label>
+  );
+}
+
+/** The menu's last entry, where there is a session to end. */
+export function SignOut({
+  close,
+  leave = goTo,
+}: {
+  close: () => void;
+  leave?: (url: URL) => void;
+}): JSX.Element | null {
+  const [session, setSession] = useState<Session | null>(null);
+  useEffect(() => {
+    const abort = new AbortController();
+    fetchSession(abort.signal).then(setSession, () => {
+      // Without an answer there is nothing to offer.
+    });
+    return () => {
+      abort.abort();
+    };
+  }, []);
+  if (!session?.can_sign_out) return null;
+  const end = async (): Promise<void> => {
+    close();
+    try {
+      await signOut();
+    } catch (error) {
+      say(S.signOutFailed(failureText(error)));
+      return;
+    }
+    leave(route('signin'));
+  };
+  return (
+    <li>
+      <button type="button" onClick={() => void end()}>
+        {S.signOut}
+        {session.name && (
+          <>
+            {' '}
+            <bdi data-testid="person">({session.name})</bdi>
+          </>
+        )}
+      </button>
+    </li>
+  );
+}
+
+function goTo(url: URL): void {
+  window.location.assign(url);
 }

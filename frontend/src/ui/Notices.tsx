@@ -8,7 +8,7 @@ import { selectSensor } from '../store/derived';
 import { selectShown, selectTags } from '../store/moment';
 import { S } from '../strings';
 import { More } from '../widgets/controls';
-import { offlineMore, offlineReason } from './FrozenBanner';
+import { offlineMore, offlineReason } from './Troubles';
 
 interface Notice {
   readonly id: string;

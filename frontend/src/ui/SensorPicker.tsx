@@ -1,11 +1,12 @@
 import { useEffect, useRef, type JSX } from 'react';
 
 import { rgbText, sensorColour } from '../domain/ramp';
+import type { Sensor } from '../domain/sensors';
+import { shown } from '../domain/text';
 import { act, useApp } from '../store/app';
 import { selectSensors } from '../store/derived';
 import { S } from '../strings';
 import { Segmented } from '../widgets/controls';
-import { SensorLabel } from './SensorLabel';
 
 /** Which sensor the map shows. */
 export function SensorPicker(): JSX.Element {
@@ -65,5 +66,19 @@ export function SensorPicker(): JSX.Element {
         }}
       />
     </div>
+  );
+}
+
+/** In short where the name is long: the full one to be heard, and to be had by pointing at it. */
+export function SensorLabel({ sensor }: { sensor: Sensor }): JSX.Element {
+  const names: Partial<Record<string, string>> = S.sensorShort;
+  const short = Object.hasOwn(names, sensor.name) ? names[sensor.name] : undefined;
+  const label = shown(sensor.label, 32);
+  if (short === undefined) return <span>{label}</span>;
+  return (
+    <span title={label}>
+      <span aria-hidden="true">{short}</span>
+      <span className="unseen">{label}</span>
+    </span>
   );
 }

@@ -2,7 +2,7 @@ import { fireEvent, render, screen, waitFor } from '@testing-library/react';
 import { expect, test, vi } from 'vitest';
 
 import { useSelected } from '../store/create';
-import { SignOut } from './SignOut';
+import { SignOut } from './Menu';
 import { toast } from './toast';
 
 const server = (session: unknown, status = 204): string[] => {

@@ -6,7 +6,7 @@ import { rosText } from '../domain/time';
 import { act, receive } from '../store/app';
 import { NO_HOUSE } from '../store/twin';
 import { goLive, showTags, status } from '../testing/page';
-import { SimulatedNote } from './SimulatedNote';
+import { SimulatedNote } from './Header';
 
 const START = 1_763_440_800;
 const END = 1_763_700_000;

@@ -8,7 +8,7 @@ import { S } from '../strings';
 
 type Values = TagHistory['sensors'][number]['values'];
 
-export interface SparkPoint {
+interface SparkPoint {
   readonly x: number;
   readonly y: number;
 }

@@ -1,38 +1,44 @@
 import { useRef, type JSX } from 'react';
 
-import type { When } from '../domain/time';
+import { fetchHistory } from '../contract/api';
+import type { PastAttempt, TagHealth, TagHistory, WireTime } from '../contract/types';
 import {
   beyondLimitText,
   farOffText,
   metresText,
   percentText,
   readingText,
-  type TemperatureUnit,
   unitOf,
   valueText,
+  type TemperatureUnit,
 } from '../domain/format';
 import { isBack, isBad, rangeReason, sideOf, tryKind } from '../domain/health';
-import { rangesFor } from '../domain/sensors';
 import { speciesText } from '../domain/marks';
+import { memoLast } from '../domain/memo';
+import { rangesFor } from '../domain/sensors';
 import { shown } from '../domain/text';
-import type { Tag } from '../domain/twin';
-import type { TagHealth, TagHistory } from '../contract/types';
+import { secondsOf, type When } from '../domain/time';
+import { whenOf, type Tag } from '../domain/twin';
 import { commandMap } from '../map/commands';
 import { Comments } from '../notes/Comments';
 import { act, useApp } from '../store/app';
 import { selectCatalogue, selectHealth } from '../store/derived';
-import { selectIsHere, selectNewestTag, selectShown, selectTag } from '../store/moment';
+import {
+  selectIsHere,
+  selectNewestTag,
+  selectShown,
+  selectSnapshot,
+  selectTag,
+} from '../store/moment';
+import { useFetched } from '../store/fetcher';
 import { S } from '../strings';
-import { CardAlarms } from './alarms/CardAlarms';
-import { Age, AgeFact, useAgeStep } from './Age';
-import { CardEstimate } from './estimate';
-import { HealthMark } from './HealthMark';
-import { inTime } from './inTime';
 import { IconButton, useFocusBack } from '../widgets/controls';
-import { Reasons } from './Reasons';
+import { Age, AgeFact, useAgeStep } from './Age';
+import { CardAlarms } from './alarms/CardAlarms';
+import { HealthMark } from './HealthMark';
 import { Sparkline } from './Sparkline';
-import { Tries } from './Tries';
-import { asOf, useHistory } from './useHistory';
+import { CardEstimate, inTime } from './inTime';
+import { Reasons } from './Reasons';
 
 // Charts come after the first paint, and their library with them.
 const CardChart = inTime(async () => (await import('../charts/CardChart')).default);
@@ -257,4 +263,63 @@ function CardReading({
       )}
     </li>
   );
+}
+
+const LONGEST = 5;
+
+/** The last scans and looks of a tag, newest first, those that came to nothing too. */
+export function Tries({ tries }: { tries: readonly PastAttempt[] }): JSX.Element | null {
+  const snapshot = useApp(selectSnapshot);
+  if (!snapshot || tries.length === 0) return null;
+  return (
+    <section className="card-tries" aria-label={S.cardTries}>
+      <h3>{S.cardTries}</h3>
+      <ol>
+        {tries
+          .slice(-LONGEST)
+          .reverse()
+          .map((each, index) => (
+            <li key={index} data-status={each.status}>
+              <Age when={whenOf(each.stamp, snapshot)} />
+              <span>{kindOf(each.kind)}</span>
+              <span>
+                {S.tried[tryKind(each.status)]}
+                {each.status_detail && (
+                  <span className="faint"> {shown(each.status_detail, 160)}</span>
+                )}
+              </span>
+            </li>
+          ))}
+      </ol>
+    </section>
+  );
+}
+
+const kindOf = (kind: number | null): string =>
+  kind === 0 ? S.cardTryKinds.scan : kind === 1 ? S.cardTryKinds.look : S.cardTryKinds.any;
+
+/** Of the last scans and tries those that had been made by then, ROS seconds; null: now. */
+export const asOf = memoLast((history: TagHistory, moment: number | null): TagHistory => {
+  if (moment === null) return history;
+  const wasMade = ({ stamp }: { readonly stamp: WireTime }): boolean => secondsOf(stamp) <= moment;
+  return {
+    ...history,
+    tries: history.tries.filter(wasMade),
+    sensors: history.sensors.map(({ name, values }) => ({ name, values: values.filter(wasMade) })),
+  };
+});
+
+/** Whoever stands at a tag that is scanned over and over does not ask each time, ms. */
+const PACE_MS = 500;
+
+/** The last scans of a tag, fetched anew after each observation; null until they are here. */
+function useHistory(tagId: string, observation: string | undefined): TagHistory | null {
+  const { value } = useFetched<TagHistory>(
+    // A tag that a link names and the twin does not know.
+    observation === undefined
+      ? null
+      : { key: observation, group: tagId, run: (signal) => fetchHistory(tagId, signal) },
+    PACE_MS,
+  );
+  return value?.tag_id === tagId ? value : null;
 }

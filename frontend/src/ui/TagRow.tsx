@@ -1,14 +1,14 @@
 import { Fragment, memo, type JSX, type ReactNode } from 'react';
 
-import type { When } from '../domain/time';
+import type { TagHealth } from '../contract/types';
+import { differenceShown, trendOf } from '../domain/difference';
 import {
   farOffText,
   percentText,
   shortAgeText,
-  type TemperatureUnit,
   valueText,
+  type TemperatureUnit,
 } from '../domain/format';
-import type { TagHealth } from '../contract/types';
 import {
   beyondText,
   isBack,
@@ -18,16 +18,16 @@ import {
   sideOf,
   worstReason,
 } from '../domain/health';
-import type { Catalogue, Sensor } from '../domain/sensors';
 import { speciesText } from '../domain/marks';
+import type { Catalogue, Sensor } from '../domain/sensors';
 import { shown } from '../domain/text';
+import type { When } from '../domain/time';
 import type { Tag } from '../domain/twin';
+import { shortHourText, thenOf, type HourAgo } from '../store/hourAgo';
+import { isColumnShown } from '../store/settings';
 import { S } from '../strings';
 import { Age, Tried, useAgeStep } from './Age';
 import { HealthMark } from './HealthMark';
-import type { HourAgo } from '../store/hourAgo';
-import { isColumnShown } from '../store/settings';
-import { TrendLine } from './TrendLine';
 
 interface Props {
   /** Its place among all rows, from 0. */
@@ -257,5 +257,45 @@ function Reading({
       )}
       {valueText(sensor, value, unit)}
     </>
+  );
+}
+
+export const ARROWS = { up: '\u2197', down: '\u2198', level: '\u2192' } as const;
+
+/** A reading against an hour ago: an arrow and the difference, or why there is none. */
+function TrendLine({
+  sensor,
+  tag,
+  health,
+  then,
+  unit,
+}: {
+  sensor: Sensor;
+  tag: Tag;
+  health: TagHealth;
+  /** Null: nobody knows what was an hour ago. */
+  then: HourAgo | null;
+  unit: TemperatureUnit;
+}): JSX.Element | null {
+  const value = tag.readings.get(sensor.name);
+  const trend = trendOf(sensor.name, { tag, health }, thenOf(then, tag, sensor.name));
+  if (!trend || value == null) return null;
+  const title = S.trendTitle(shown(sensor.label, 32), shortHourText());
+  if (!then || trend.kind !== 'by') {
+    if (then && trend.kind === 'same')
+      return (
+        <span className="trend" data-trend="same" title={S.trendSame}>
+          {S.trendSame}
+        </span>
+      );
+    // Only to be heard: with a young memory it would stand in every row.
+    return <span className="unseen">{then ? S.trendNone : S.trendUnknown}</span>;
+  }
+  const { way, text } = differenceShown(sensor, trend.by, unit);
+  return (
+    <span className="trend" data-trend={way} title={`${title}: ${text}`}>
+      <span aria-hidden="true">{ARROWS[way]}</span> <span className="unseen">{title}: </span>
+      {text}
+    </span>
   );
 }

@@ -24,9 +24,7 @@ import { S } from '../strings';
 import { Icon } from '../widgets/controls';
 import { HealthMark } from './HealthMark';
 import { TagRow } from './TagRow';
-import { useChosenInSight } from './chosenInSight';
-import { useHeldRows } from './useHeldRows';
-import { partsOf, SHORT_TABLE, useVisibleRows } from './visibleRows';
+import { partsOf, SHORT_TABLE, useChosenInSight, useHeldRows, useVisibleRows } from './visibleRows';
 
 /** Every tag, also those without a pin and those whose scan failed. */
 export function TagTable(): JSX.Element {
@@ -49,7 +47,6 @@ export function TagTable(): JSX.Element {
   const has = (id: string): boolean => isColumnShown({ hidden }, id);
   const body = useRef<HTMLTableSectionElement>(null);
   const sight = useVisibleRows(body, lines.length);
-  useChosenInSight(body, hasTags ? selected : null, sight.rowHeight);
   // A row that has the focus stays, or the focus would be lost with it; and the rows beside it,
   // where the Tab key leads, past the head of an area.
   const [focused, setFocused] = useState<string | null>(null);
@@ -61,6 +58,7 @@ export function TagTable(): JSX.Element {
     [lines],
   );
   const placeOf = (id: string | null): number => (id === null ? NaN : (places.get(id) ?? NaN));
+  useChosenInSight(body, hasTags ? selected : null, placeOf(selected), sight.rowHeight);
   const held = placeOf(focused);
   const single = [placeOf(selected), held - 2, held - 1, held, held + 1, held + 2];
   return (

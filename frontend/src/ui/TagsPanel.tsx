@@ -5,16 +5,13 @@ import { selectRows } from '../store/derived';
 import { selectIsHere, selectTags } from '../store/moment';
 import { LONGEST_FILTER } from '../store/view';
 import { S } from '../strings';
-import { ListChoice } from './alarms/ListChoice';
+import { Disclosure, Icon } from '../widgets/controls';
+import { FILTER_ID, ListChoice } from './alarms/ListChoice';
 import { HealthSummary } from './HealthSummary';
-import { loadParts } from './later';
-import { Icon } from '../widgets/controls';
+import { loadParts, WithParts } from './later';
 import { EmptyTable } from './Notices';
-import { FILTER_ID } from './filterField';
-import { TableSettings } from './TableSettings';
 import { TagTable } from './TagTable';
 import { LONGEST_ON_PAPER } from './visibleRows';
-import { WithParts } from './WithParts';
 
 export function TagsPanel({ kiosk }: { kiosk: boolean }): JSX.Element {
   const list = useApp((state) => state.view.list);
@@ -107,5 +104,14 @@ function FilterBar(): JSX.Element {
       </button>
       <TableSettings />
     </div>
+  );
+}
+
+/** Which columns the table has, and how high its rows are: kept in this browser. */
+function TableSettings(): JSX.Element {
+  return (
+    <Disclosure label={S.tableButton} button={<Icon name="columns" />} className="table-settings">
+      <WithParts>{(parts) => <parts.TableChoices />}</WithParts>
+    </Disclosure>
   );
 }

@@ -1,14 +1,18 @@
 import type { JSX } from 'react';
 
-import type { Journal, Outward } from '../contract/types';
-import { rosText } from '../domain/time';
+import { epochOf } from '../clock';
+import type { Journal, Outward, StatusFrame } from '../contract/types';
+import { ageText, clockText } from '../domain/format';
 import { shown } from '../domain/text';
+import { rosText } from '../domain/time';
 import { useApp } from '../store/app';
 import { useSelected } from '../store/create';
-import { selectShown, type Moment } from '../store/moment';
+import { retryConnection } from '../store/live';
+import { selectNewest, selectShown, type Moment } from '../store/moment';
 import type { TwinState } from '../store/twin';
 import { LANGUAGE_TROUBLE, S } from '../strings';
 import { More } from '../widgets/controls';
+import { useNow } from '../widgets/useNow';
 import { later } from './later';
 
 /** Something that an operator should know of while the page goes on. */
@@ -20,7 +24,7 @@ export interface Trouble {
   readonly more?: string;
 }
 
-export function troublesOf(
+function troublesOf(
   { unread, phase, connection, pastFault }: TwinState,
   moment: Moment = null,
   isLate = false,
@@ -128,6 +132,52 @@ export function Troubles(): JSX.Element {
           {more && <More label={S.more} text={more} />}
         </div>
       ))}
+    </div>
+  );
+}
+
+/** Why the bridge calls the twin offline, for a person. */
+export function offlineReason(status: StatusFrame | null): string {
+  return (status && S.offlineWhy[status.reason]) || S.frozenWhy.offline;
+}
+
+/** The same for whoever looks after the machines; empty: there is nothing to add. */
+export const offlineMore = (status: StatusFrame | null): string =>
+  status ? S.offlineMore[status.reason] : '';
+
+/** Across the page whenever what it shows is not the present. */
+export function FrozenBanner(): JSX.Element | null {
+  const phase = useApp((state) => state.twin.phase);
+  const takenAt = useApp((state) => selectNewest(state).snapshot?.takenAt);
+  const isTimeLost = useApp((state) => state.twin.isTimeLost);
+  const connection = useApp((state) => state.twin.connection);
+  const isPast = useApp((state) => selectShown(state).moment !== null);
+  const now = useNow();
+  if (phase === 'live' || takenAt === undefined) return null;
+  const { socket } = connection;
+  const wait = socket.kind === 'closed' ? Math.ceil((socket.retryAt - now) / 1000) : 0;
+  return (
+    <div className="frozen" role="alert" data-testid="frozen">
+      <strong>{(isPast ? S.frozenBehindPast : S.frozenSince)(clockText(epochOf(takenAt)))}</strong>
+      {/* What counts on by itself is not read out each second. */}
+      {!isTimeLost && (
+        <span aria-hidden="true" className="frozen-age">
+          {S.agoSuffix(ageText(Math.max(0, now - takenAt) / 1000))}
+        </span>
+      )}
+      <span className="frozen-why">
+        {phase === 'offline' ? offlineReason(connection.status) : S.frozenWhy[phase]}
+      </span>
+      {phase === 'offline' && <More label={S.more} text={offlineMore(connection.status)} />}
+      {isPast && <span>{S.frozenPastStays}</span>}
+      {phase === 'reconnecting' && (
+        <>
+          <span aria-hidden="true">{S.nextTry(Math.max(0, wait))}</span>
+          <button type="button" onClick={retryConnection}>
+            {S.retryNow}
+          </button>
+        </>
+      )}
     </div>
   );
 }

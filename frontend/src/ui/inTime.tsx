@@ -1,6 +1,7 @@
 /** What is loaded when it is first shown, and not by who never looks at it. */
 import { createElement, lazy, Suspense, type ComponentType, type JSX } from 'react';
 
+import type * as EstimateParts from '../parts/estimate';
 import { S } from '../strings';
 
 /** A component that cannot be loaded says so; the rest of the page goes on. */
@@ -24,3 +25,11 @@ const Missing = (): JSX.Element => (
     {S.partMissing}
   </span>
 );
+
+const parts = (): Promise<typeof EstimateParts> => import('../parts/estimate');
+
+export const AdviceMarks = inTime(async () => (await parts()).AdviceMarks);
+export const CardEstimate = inTime(async () => (await parts()).CardEstimate);
+export const ErrorScale = inTime(async () => (await parts()).ErrorScale);
+export const EstimateFacts = inTime(async () => (await parts()).EstimateFacts);
+export const EstimateReadout = inTime(async () => (await parts()).EstimateReadout);

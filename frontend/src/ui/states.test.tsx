@@ -135,7 +135,7 @@ describe.each(['en', 'de'] as const)('%s', (language) => {
     ...(await import('../testing/tags')),
     ...(await import('./HealthSummary')),
     ...(await import('./TagTable')),
-    ...(await import('../alarms/title')),
+    ...(await import('../alarms/watch')),
     ...(await import('../alarms/speech')),
     ...(await import('../store/app')),
   });

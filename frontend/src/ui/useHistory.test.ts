@@ -1,7 +1,7 @@
 import { expect, test } from 'vitest';
 
 import { wireTime } from '../testing/timeline';
-import { asOf } from './useHistory';
+import { asOf } from './TagCard';
 
 test('of another moment the card tells what had been tried by then', () => {
   const history = {

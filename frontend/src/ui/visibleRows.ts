@@ -1,6 +1,10 @@
 /** Which rows of a long table are in the page: those in sight, some around them, and some more. */
-import { useEffect, useState, type RefObject } from 'react';
+import { useEffect, useMemo, useState, type RefObject } from 'react';
 import { flushSync } from 'react-dom';
+
+import { inAreas, withHeads, type Line, type Row } from '../domain/table';
+import { useApp } from '../store/app';
+import { selectAreaOf, selectRows } from '../store/derived';
 
 /** Up to so many rows all of them are in the page. */
 export const SHORT_TABLE = 100;
@@ -52,7 +56,7 @@ export function rangeInSight(top: number, rowHeight: number, windowHeight: numbe
   };
 }
 
-export interface Visible extends Range {
+interface Visible extends Range {
   /** Pixels. */
   readonly rowHeight: number;
 }
@@ -121,4 +125,91 @@ export function usePaper(): boolean {
     };
   }, []);
   return isPaper;
+}
+
+/**
+ * In view once its card has taken its place, and again once the rows have been measured: there may
+ * be thousands above it. A chart that comes into the card later takes its room from the table.
+ * `place`: as rows sort anew, none that is chosen stays half below the head.
+ */
+export function useChosenInSight(
+  body: RefObject<Element | null>,
+  chosen: string | null,
+  place: unknown,
+  rowHeight = 0,
+): void {
+  useEffect(() => {
+    const frame = body.current?.closest('.table-scroll, .alarms');
+    if (chosen === null || !frame) return undefined;
+    const painted = requestAnimationFrame(() => rowOf(frame, chosen)?.scrollIntoView(NEAREST));
+    let height = frame.clientHeight;
+    const size = new ResizeObserver(() => {
+      const before = height;
+      height = frame.clientHeight;
+      if (frame.scrollHeight > height) keep(frame, chosen, before);
+    });
+    size.observe(frame);
+    return () => {
+      cancelAnimationFrame(painted);
+      size.disconnect();
+    };
+  }, [body, chosen, rowHeight]);
+  useEffect(() => {
+    const frame = body.current?.closest('.table-scroll, .alarms');
+    if (chosen === null || !frame) return undefined;
+    const painted = requestAnimationFrame(() => {
+      keep(frame, chosen, frame.clientHeight);
+    });
+    return () => {
+      cancelAnimationFrame(painted);
+    };
+  }, [body, chosen, place]);
+}
+
+const NEAREST = { block: 'nearest' } as const;
+
+const rowOf = (frame: Element, chosen: string): Element | null => {
+  const id = CSS.escape(chosen);
+  // Of several alarms the one that was clicked.
+  return (
+    frame.querySelector(`[data-where="${id}"]:focus-within`) ??
+    frame.querySelector(`tr[data-tag-id="${id}"], [data-where="${id}"]`)
+  );
+};
+
+/** Who has scrolled elsewhere is left there. */
+function keep(frame: Element, chosen: string, height: number): void {
+  const row = rowOf(frame, chosen);
+  const down = row && row.getBoundingClientRect().bottom - frame.getBoundingClientRect().top;
+  if (row && down && down > 0 && down - row.clientHeight < height) row.scrollIntoView(NEAREST);
+}
+
+interface HeldRows {
+  /** Rows, and heads of areas between them. */
+  readonly lines: readonly Line[];
+  readonly onPointerEnter: () => void;
+  readonly onPointerLeave: () => void;
+}
+
+/** The table's rows. While a pointer or a finger is on them none moves; what is new comes last. */
+export function useHeldRows(): HeldRows {
+  const rows = useApp(selectRows);
+  const areaOf = useApp(selectAreaOf);
+  const [held, setHeld] = useState<ReadonlyMap<string, number> | null>(null);
+  const lines = useMemo(() => {
+    const place = ({ tag }: Row): number => held?.get(tag.id) ?? Infinity;
+    const shown = held
+      ? [...rows].sort((a, b) => (place(a) === place(b) ? 0 : place(a) - place(b)))
+      : rows;
+    return areaOf ? withHeads(inAreas(shown, areaOf)) : shown;
+  }, [rows, held, areaOf]);
+  return {
+    lines,
+    onPointerEnter: () => {
+      setHeld(new Map(rows.map(({ tag }, index) => [tag.id, index])));
+    },
+    onPointerLeave: () => {
+      setHeld(null);
+    },
+  };
 }

@@ -1,11 +1,7 @@
 /** English, whose words say what there is to be said: the other languages have their shape. */
-import { ALARMS } from './en/alarms';
-import { CHARTS } from './en/charts';
-import { HEALTH } from './en/health';
-import { MAP } from './en/map';
-import { PAGE } from './en/page';
-import { PAST } from './en/past';
-import { TAGS } from './en/tags';
+import { ALARMS, HEALTH } from './en/alarms';
+import { CHARTS, MAP, TAGS } from './en/map';
+import { PAGE, PAST } from './en/page';
 
 export const ENGLISH = {
   ...PAGE,

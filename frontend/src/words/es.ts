@@ -1,11 +1,7 @@
 /** Spanish. */
-import { ALARMS } from './es/alarms';
-import { CHARTS } from './es/charts';
-import { HEALTH } from './es/health';
-import { MAP } from './es/map';
-import { PAGE } from './es/page';
-import { PAST } from './es/past';
-import { TAGS } from './es/tags';
+import { ALARMS, HEALTH } from './es/alarms';
+import { CHARTS, MAP, TAGS } from './es/map';
+import { PAGE, PAST } from './es/page';
 import type { Words } from './shape';
 
 export const SPANISH: Words = {

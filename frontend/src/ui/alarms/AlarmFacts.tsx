@@ -1,10 +1,16 @@
 import type { JSX } from 'react';
 
-import { isWorse } from '../../alarms/kept';
+import { isWorse } from '../../alarms/own';
 import type { Item } from '../../alarms/list';
-import type { Now } from '../../alarms/now';
+import {
+  spanText,
+  timesOf,
+  unknownText,
+  valuesOf,
+  type Now,
+  type Values,
+} from '../../alarms/words';
 import { selectNow, selectSpeech } from '../../alarms/speech';
-import { spanText, timesOf, unknownText, valuesOf, type Values } from '../../alarms/words';
 import type { Alarm, Verdict } from '../../contract/types';
 import { ageSeconds } from '../../domain/time';
 import { differenceShown } from '../../domain/difference';
@@ -15,7 +21,7 @@ import { rosNow, selectHasTime } from '../../store/moment';
 import { S } from '../../strings';
 import { useTicking } from '../../widgets/useNow';
 import { HealthMark } from '../HealthMark';
-import { ARROWS } from '../TrendLine';
+import { ARROWS } from '../TagRow';
 
 interface ValuesNow extends Values {
   readonly state: Now | null;

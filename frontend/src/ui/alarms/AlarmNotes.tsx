@@ -1,15 +1,29 @@
-import { useMemo, type JSX } from 'react';
+import { useId, useMemo, type JSX, type ReactNode } from 'react';
 
-import { epochOf } from '../../clock';
 import { alarmOf, isAwaited } from '../../alarms/list';
-import { alarmList } from '../../alarms/watch';
+import {
+  notifyState,
+  soundState,
+  wishNotify,
+  wishSound,
+  type NotifyState,
+  type SoundState,
+} from '../../alarms/notify';
+import { done, own, undo } from '../../alarms/own';
+import { textNow } from '../../alarms/speech';
+import { alarmList, meanwhile } from '../../alarms/watch';
+import { epochOf } from '../../clock';
 import { clockText } from '../../domain/format';
+import { shown } from '../../domain/text';
 import { rosText, secondsOf } from '../../domain/time';
-import { useApp, type AppState } from '../../store/app';
-import { useSelected } from '../../store/create';
+import { act, useApp, type AppState } from '../../store/app';
+import { person, useSelected } from '../../store/create';
 import { selectNewestHealth } from '../../store/derived';
 import { selectNewest, selectShown } from '../../store/moment';
 import { S } from '../../strings';
+import { Check } from '../../widgets/controls';
+import { once } from './AlarmRow';
+import { whoseWord } from './people';
 
 /** At how many tags something waits for a second scan; null: none, or nobody knows. */
 export function AlarmsWait(): JSX.Element | null {
@@ -60,6 +74,142 @@ export function AlarmNotes({ isEmpty }: { isEmpty: boolean }): JSX.Element {
           {S.alarmsHeard(rosText(secondsOf(alarms.since)))}
         </p>
       )}
+    </div>
+  );
+}
+
+/** Below the list: whether what is done here is this browser's own, or everybody's. */
+export function WhoseWord(): JSX.Element {
+  const who = useSelected(person, (it) => it);
+  return <p className="alarms-mine faint">{whoseWord(who)}</p>;
+}
+
+/** Says that an alarm has come while another moment is shown, and leads to now. */
+export function Meanwhile(): JSX.Element | null {
+  const items = useSelected(meanwhile, (it) => it);
+  const [worst] = items;
+  const text = useApp((state) => (worst ? textNow(state, worst.alarm) : ''));
+  if (!worst) return null;
+  const { alarm } = worst;
+  return (
+    <div className="meanwhile" data-testid="meanwhile" data-health={worst.verdict}>
+      <strong>{S.alarmsMeanwhile(text, items.length - 1)}</strong>
+      <button
+        type="button"
+        onClick={() => {
+          act({ type: 'look', view: { moment: null, selected: alarm.tag_id || null } });
+        }}
+      >
+        {alarm.tag_id === '' ? S.backToLive : S.meanwhileShow(shown(alarm.tag_id, 24))}
+      </button>
+    </div>
+  );
+}
+
+/** Above the list, in a place of its own: what is new in a list that is held, and what can be undone. */
+export function DoneLine({
+  added,
+  onShow,
+  children,
+}: {
+  /** Alarms that are new and not listed yet. */
+  added: number;
+  onShow: () => void;
+  /** What can be done to the whole list. */
+  children: ReactNode;
+}): JSX.Element {
+  const last = useSelected(done, (it) => it);
+  return (
+    <div className="alarm-line">
+      {children}
+      <div className="alarm-news" role="status" data-testid="alarm-line">
+        {added > 0 && (
+          <button type="button" data-line="new" title={S.alarmsNewHint} onClick={onShow}>
+            {S.alarmsNew(added)}
+          </button>
+        )}
+        {last && (
+          <span data-line="done">
+            {S.alarmDone[last.what](last.count)}{' '}
+            <button type="button" onClick={once(undo)}>
+              {S.alarmUndo}
+            </button>
+          </span>
+        )}
+      </div>
+    </div>
+  );
+}
+
+/** What is to be said of it; asked for anew each time, for words come in several languages. */
+const soundHint = (state: SoundState): string =>
+  ({ ready: S.alarmSoundHint, waits: S.alarmSoundWaits, none: S.alarmSoundNone })[state];
+
+const notifyHint = (state: NotifyState): string =>
+  ({
+    granted: S.alarmNotifyHint,
+    asks: S.alarmNotifyHint,
+    refused: S.alarmNotifyRefused,
+    insecure: S.alarmNotifyInsecure,
+    none: S.alarmNotifyNone,
+  })[state];
+
+/** How alarms come to who is not looking: nothing but what is wished. */
+export function TellMe(): JSX.Element {
+  const kept = useSelected(own, (it) => it);
+  const sound = useSelected(soundState, (it) => it);
+  const notify = useSelected(notifyState, (it) => it);
+  return (
+    <>
+      <Way
+        name="sound"
+        label={S.alarmSound}
+        isOn={kept.sound && sound !== 'none'}
+        isPossible={sound !== 'none'}
+        // Until it is wished, nothing has to wait.
+        hint={soundHint(kept.sound || sound === 'none' ? sound : 'ready')}
+        onChange={wishSound}
+      />
+      <Way
+        name="notify"
+        label={S.alarmNotify}
+        isOn={kept.notify && notify === 'granted'}
+        isPossible={notify === 'granted' || notify === 'asks'}
+        hint={notifyHint(notify)}
+        onChange={wishNotify}
+      />
+    </>
+  );
+}
+
+function Way({
+  name,
+  label,
+  isOn,
+  isPossible,
+  hint,
+  onChange,
+}: {
+  name: string;
+  label: string;
+  isOn: boolean;
+  isPossible: boolean;
+  hint: string;
+  onChange: (isWished: boolean) => Promise<void>;
+}): JSX.Element {
+  const id = useId();
+  return (
+    <div data-way={name}>
+      <Check
+        label={label}
+        isOn={isOn}
+        disabled={!isPossible}
+        aria-describedby={id}
+        onChange={(isWished) => void onChange(isWished)}
+      />
+      <p className="faint" id={id} role="status">
+        {hint}
+      </p>
     </div>
   );
 }

@@ -1,8 +1,7 @@
 import { act as flush, fireEvent, render, screen, within } from '@testing-library/react';
 import { afterEach, beforeEach, expect, test, vi } from 'vitest';
 
-import { acknowledge, NOTHING_KEPT } from '../../alarms/kept';
-import { done, own, shelveAlarm } from '../../alarms/own';
+import { acknowledge, done, NOTHING_KEPT, own, shelveAlarm } from '../../alarms/own';
 import { startAlarms } from '../../alarms/watch';
 import { notifyState } from '../../alarms/notify';
 import type { Alarm, HealthReason } from '../../contract/types';

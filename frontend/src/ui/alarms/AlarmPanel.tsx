@@ -1,4 +1,4 @@
-import { Fragment, useMemo, useRef, useState, type JSX } from 'react';
+import { Fragment, useMemo, useRef, useState, type FocusEvent, type JSX } from 'react';
 
 import {
   alarmsCsv,
@@ -13,9 +13,12 @@ import {
 import {
   calling,
   groupOf,
+  heldList,
+  itemsOf,
   oldestOf,
   unacknowledged,
   type AlarmList,
+  type HeldList,
   type Item,
 } from '../../alarms/list';
 import { acknowledgeAlarms } from '../../alarms/own';
@@ -29,19 +32,12 @@ import { selectNewestTag } from '../../store/moment';
 import { LONGEST_FILTER } from '../../store/view';
 import { S } from '../../strings';
 import { Disclosure, Icon, Select } from '../../widgets/controls';
-import { useChosenInSight } from '../chosenInSight';
-import { usePaper } from '../visibleRows';
 import { HealthMark } from '../HealthMark';
-import { Acknowledge } from './Acknowledge';
-import { AlarmNotes, AlarmsWait } from './AlarmNotes';
+import { useChosenInSight, usePaper } from '../visibleRows';
 import { AlarmTimes } from './AlarmFacts';
-import { AlarmRow } from './AlarmRow';
-import { DoneLine } from './DoneLine';
+import { AlarmNotes, AlarmsWait, DoneLine, TellMe, WhoseWord } from './AlarmNotes';
+import { Acknowledge, AlarmRow, once } from './AlarmRow';
 import { ALARMS_ID, ListChoice } from './ListChoice';
-import { once } from './once';
-import { TellMe } from './TellMe';
-import { useHeldOrder } from './useHeldOrder';
-import { WhoseWord } from './WhoseWord';
 
 /** Rows of one cause at first; of others, and with each wish for more, as many as a page draws at once. */
 const MOST_OF_CAUSE = 5;
@@ -76,6 +72,7 @@ export function AlarmPanel(): JSX.Element {
   useChosenInSight(
     list,
     useApp((state) => state.view.selected),
+    ids,
   );
   const hasAny = all.active.length + all.shelved.length > 0;
   return (
@@ -303,9 +300,9 @@ function CauseHeading({
         )}
         <span className="alarm-text">
           <span>
-            <strong>{cause}</strong>{' '}
+            <strong>{cause}</strong> ·{' '}
             <span className="alarm-many">
-              · {S.alarmCount(own.length)} <Icon name="chevron" />
+              {S.alarmCount(own.length)} <Icon name="chevron" />
             </span>
           </span>
           {group !== 'resolved' && <span className="alarm-do">{todo}</span>}
@@ -331,4 +328,43 @@ function CauseHeading({
       )}
     </div>
   );
+}
+
+interface HeldOrder extends HeldList {
+  /** Shows what is new, and holds that. */
+  readonly release: () => void;
+  readonly onPointerEnter: () => void;
+  readonly onPointerLeave: () => void;
+  readonly onFocus: (event: FocusEvent) => void;
+  readonly onBlur: (event: FocusEvent) => void;
+}
+
+/** While a pointer, a finger or the keyboard's focus is in the list, no row of it moves. */
+function useHeldOrder(list: AlarmList): HeldOrder {
+  const [hasPointer, setPointer] = useState(false);
+  const [hasFocus, setFocus] = useState(false);
+  const [held, setHeld] = useState<AlarmList | null>(null);
+  const isHeld = hasPointer || hasFocus;
+  // Where there is no row, none can move.
+  const hasRows = held !== null && itemsOf(held).length > 0;
+  if (isHeld ? !hasRows && held !== list : held !== null) setHeld(isHeld ? list : null);
+  return {
+    ...heldList(held ?? list, list),
+    release: () => {
+      setHeld(null);
+    },
+    onPointerEnter: () => {
+      setPointer(true);
+    },
+    onPointerLeave: () => {
+      setPointer(false);
+    },
+    // A button that was clicked keeps the focus, and holds nothing once the pointer has left.
+    onFocus: ({ target, currentTarget }) => {
+      setFocus(target !== currentTarget && target.matches(':focus-visible'));
+    },
+    onBlur: ({ relatedTarget, currentTarget }) => {
+      if (!currentTarget.contains(relatedTarget)) setFocus(false);
+    },
+  };
 }

@@ -1,19 +1,27 @@
-import { memo, type JSX } from 'react';
+import { memo, useLayoutEffect, useRef, useState, type JSX, type MouseEvent } from 'react';
 
-import { showAlarm } from '../../alarms/follow';
+import { goToStart, showAlarm } from '../../alarms/follow';
 import { groupOf, type AlarmList, type Item } from '../../alarms/list';
-import { acknowledgeAlarms } from '../../alarms/own';
+import {
+  acknowledgeAlarms,
+  LONGEST_REASON,
+  needsReason,
+  shelfMinutes,
+  shelveAlarm,
+  unacknowledgeAlarm,
+  unshelveAlarm,
+} from '../../alarms/own';
 import { selectSpeech } from '../../alarms/speech';
 import { nameText, whereText } from '../../alarms/words';
 import { clockText } from '../../domain/format';
-import { Said } from '../../notes/Comments';
+import { C } from '../../notes/CommentMarks';
+import { Field, Said } from '../../notes/Comments';
 import { useApp } from '../../store/app';
+import { mayAct, person, useSelected } from '../../store/create';
 import { S } from '../../strings';
-import { Acknowledge } from './Acknowledge';
+import { Disclosure, Icon, useClose } from '../../widgets/controls';
 import { AlarmFacts, AlarmTimes, useValues } from './AlarmFacts';
-import { once } from './once';
-import { RowMenu } from './RowMenu';
-import { useWhoAcknowledged } from './WhoseWord';
+import { useWhoAcknowledged } from './people';
 
 /** One alarm: for how long, what and where, now and at worst; it leads to its tag as it is now. */
 export const AlarmRow = memo(function AlarmRow({
@@ -109,3 +117,170 @@ function useStatus(item: Item, group: keyof AlarmList): string | null {
   }
   return isAcknowledged ? (who ?? S.healthAcknowledged) : null;
 }
+
+/** What else can be done to an alarm. */
+function RowMenu({ item, name }: { item: Item; name: string }): JSX.Element {
+  return (
+    <Disclosure label={S.alarmActionsOf(name)} button={<Icon name="dots" />} className="row-menu">
+      <Actions item={item} name={name} />
+    </Disclosure>
+  );
+}
+
+function Actions({ item, name }: { item: Item; name: string }): JSX.Element {
+  const { alarm, isAcknowledged, shelf } = item;
+  const [form, setForm] = useState<'shelve' | 'comment' | null>(null);
+  const close = useClose();
+  const root = useRef<HTMLDivElement>(null);
+  const who = useSelected(person, (it) => it);
+  const canLookBack = useApp((state) => state.twin.remembered.state !== 'off');
+  useLayoutEffect(() => {
+    root.current?.scrollIntoView({ block: 'nearest' });
+  }, [form]);
+  const act = (text: string, action: () => void, isPossible = true): JSX.Element => (
+    <li>
+      <button type="button" disabled={!isPossible} onClick={once(action)}>
+        {text}
+      </button>
+    </li>
+  );
+  const then = (action: (alarm: Item['alarm']) => void) => () => {
+    close();
+    action(alarm);
+  };
+  return (
+    <div className="row-actions" ref={root}>
+      {form === 'shelve' && <Shelving item={item} name={name} />}
+      {form === 'comment' && <Field subject={`alarm:${alarm.id}`} moment={null} onDone={close} />}
+      {form === null && (
+        <ul className="menu-list">
+          {act(S.alarmStart, then(goToStart), canLookBack)}
+          {mayAct(who) && (
+            <>
+              {isAcknowledged && act(S.alarmUnacknowledge, then(unacknowledgeAlarm))}
+              {shelf !== null
+                ? act(S.alarmUnshelve, then(unshelveAlarm))
+                : alarm.cleared_at === null &&
+                  act(S.alarmShelve, () => {
+                    setForm('shelve');
+                  })}
+            </>
+          )}
+          {who?.can_write_notes === true &&
+            act(C.comment, () => {
+              setForm('comment');
+            })}
+        </ul>
+      )}
+    </div>
+  );
+}
+
+/** Shelves an alarm for a while; a critical one for a shorter while, and with a reason. */
+function Shelving({ item, name }: { item: Item; name: string }): JSX.Element {
+  const [reason, setReason] = useState('');
+  const close = useClose();
+  const root = useRef<HTMLDivElement>(null);
+  const field = useRef<HTMLInputElement>(null);
+  const isNeeded = needsReason(item.verdict);
+  useLayoutEffect(() => {
+    // What is typed at once is the reason, and no shortcut.
+    (isNeeded ? field : root).current?.focus({ preventScroll: true });
+  }, [isNeeded]);
+  const given = reason.trim();
+  return (
+    <div className="shelf" ref={root} tabIndex={-1}>
+      <strong>{S.alarmWhat(S.alarmShelve, name)}</strong>
+      <p className="faint">{isNeeded ? S.alarmShelveCritical : S.alarmShelveHint}</p>
+      <label>
+        {isNeeded ? S.alarmShelfReason : S.alarmShelfReasonOptional}
+        <input
+          ref={field}
+          type="text"
+          value={reason}
+          required={isNeeded}
+          maxLength={LONGEST_REASON}
+          autoComplete="off"
+          onChange={(event) => {
+            setReason(event.target.value);
+          }}
+        />
+      </label>
+      <div className="shelf-times">
+        {shelfMinutes(item.verdict).map((minutes) => (
+          <button
+            key={minutes}
+            type="button"
+            disabled={isNeeded && given === ''}
+            onClick={once(() => {
+              close();
+              shelveAlarm(item, minutes, given);
+            })}
+          >
+            {minutes < 60 ? S.alarmShelveMinutes(minutes) : S.alarmShelveHours(minutes / 60)}
+          </button>
+        ))}
+      </div>
+    </div>
+  );
+}
+
+/** The button that acknowledges, and in its place what has been done already: nothing moves for it. */
+export function Acknowledge({
+  label,
+  text,
+  status,
+  onAcknowledge,
+}: {
+  label: string;
+  text: string;
+  /** What has been done; null: there is something to acknowledge. */
+  status: string | null;
+  onAcknowledge: () => void;
+}): JSX.Element | null {
+  const isAble = useSelected(person, mayAct);
+  if (!isAble) {
+    return status === null ? null : (
+      <span className="alarm-status" title={status}>
+        <span>{status}</span>
+      </span>
+    );
+  }
+  // It stays the same button, and keeps the focus: a keyboard goes on from here.
+  return (
+    <button
+      type="button"
+      className={status === null ? 'text-button' : 'alarm-status'}
+      title={status ?? undefined}
+      aria-label={status === null ? label : undefined}
+      aria-disabled={status !== null}
+      onClick={once(() => {
+        if (status === null) onAcknowledge();
+      })}
+    >
+      <span>{status ?? text}</span>
+    </button>
+  );
+}
+
+/** A second click at the same place within so many ms is none of its own. */
+const AGAIN_MS = 600;
+const SAME_PLACE_PX = 5;
+
+let last = { at: -Infinity, x: 0, y: 0 };
+
+/**
+ * Heeds the first click of a double click alone: the second would take back what the first did, or
+ * do the same to what has come there since.
+ */
+export const once =
+  (act: () => void) =>
+  ({ detail, timeStamp, clientX, clientY }: MouseEvent): void => {
+    const isAgain =
+      timeStamp - last.at < AGAIN_MS &&
+      Math.hypot(clientX - last.x, clientY - last.y) < SAME_PLACE_PX;
+    // By a key it is meant each time.
+    if (detail > 0 && isAgain) return;
+    last = { at: timeStamp, x: clientX, y: clientY };
+    act();
+  };

@@ -1,16 +1,16 @@
 import { act as flush, fireEvent, render, screen } from '@testing-library/react';
 import { afterEach, beforeEach, expect, test } from 'vitest';
 
-import { NOTHING_KEPT } from '../../alarms/kept';
-import { acknowledgeAlarms, own, shelveAlarm } from '../../alarms/own';
+import { acknowledgeAlarms, NOTHING_KEPT, own, shelveAlarm } from '../../alarms/own';
 import { alarmList, startAlarms } from '../../alarms/watch';
+import { act } from '../../store/app';
 import { person } from '../../store/create';
 import { alarm, tellAlarms } from '../../testing/alarms';
 import { held, judgement, reason } from '../../testing/health';
 import { showTags } from '../../testing/page';
 import { readings, wireTag } from '../../testing/tags';
 import { Reasons } from '../Reasons';
-import { AlarmsLabel } from './AlarmCount';
+import { AlarmsLabel } from './ListChoice';
 import { CardAlarms } from './CardAlarms';
 
 let stop: () => void;
@@ -131,4 +131,8 @@ test('the count of alarms says how many of them are of its sign, where not all a
     acknowledgeAlarms(alarmList.get().active);
   });
   expect(count()).toBe('3');
+  flush(() => {
+    act({ type: 'look', view: { moment: 10 } });
+  });
+  expect(count()).toBe('now 3');
 });

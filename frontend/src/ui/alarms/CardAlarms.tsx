@@ -11,8 +11,8 @@ import { mayAct, person, useSelected } from '../../store/create';
 import { rosNow } from '../../store/moment';
 import { S } from '../../strings';
 import { useTicking } from '../../widgets/useNow';
-import { once } from './once';
-import { useWhoAcknowledged } from './WhoseWord';
+import { once } from './AlarmRow';
+import { useWhoAcknowledged } from './people';
 
 /** A tag's alarms: since when they are active, or until when shelved; for whoever stands at the tag. */
 export function CardAlarms({ tagId }: { tagId: string }): JSX.Element {

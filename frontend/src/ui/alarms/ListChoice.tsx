@@ -1,13 +1,21 @@
 import type { JSX } from 'react';
 
+import { calling } from '../../alarms/list';
+import { countNow, worstNow } from '../../alarms/speech';
+import { alarmList } from '../../alarms/watch';
 import { act, useApp } from '../../store/app';
+import { useSelected } from '../../store/create';
 import type { ViewState } from '../../store/view';
 import { S } from '../../strings';
 import { Segmented } from '../../widgets/controls';
-import { AlarmsLabel } from './AlarmCount';
+import { HealthShape } from '../HealthMark';
+import { selectAreAlarmsKnown } from '../Reasons';
 
 /** Of the list of alarms, once it is there. */
 export const ALARMS_ID = 'alarms';
+
+/** Of the field that filters the table, for what moves the focus there. */
+export const FILTER_ID = 'tag-filter';
 
 /** What stands beside the map; a narrow screen has tabs for it at its foot. */
 export function ListChoice(): JSX.Element {
@@ -25,5 +33,34 @@ export function ListChoice(): JSX.Element {
         act({ type: 'list', list: chosen });
       }}
     />
+  );
+}
+
+/**
+ * "Alarms" and how many are active; with the sign of the worst now and how many of them are so, until
+ * all are acknowledged. Who looks back reads that they are those of now.
+ */
+export function AlarmsLabel(): JSX.Element {
+  const list = useSelected(alarmList, (it) => it);
+  const unacknowledged = calling(list);
+  const { length } = list.active;
+  const isKnown = useApp(selectAreAlarmsKnown);
+  const isNow = useApp((state) => state.view.moment === null);
+  const worst = useApp((state) =>
+    unacknowledged.length === 0 ? null : worstNow(state, list.active),
+  );
+  const worstCount = useApp((state) => (worst ? countNow(state, list.active, worst) : length));
+  return (
+    <>
+      {S.alarms}
+      {length > 0 && (
+        <span className="alarm-count" data-testid="alarm-count" aria-hidden="true">
+          {worst && isNow && <HealthShape verdict={worst} />}
+          {worstCount < length && isNow && `${worstCount}/`}
+          {isNow ? length : S.alarmNow(String(length))}
+        </span>
+      )}
+      {isKnown && <span className="unseen">, {S.alarmsCount(unacknowledged.length, length)}</span>}
+    </>
   );
 }

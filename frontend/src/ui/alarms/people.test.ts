@@ -1,14 +1,12 @@
 import { afterEach, beforeEach, expect, test, vi } from 'vitest';
 
 import { alarm, tellAlarms } from '../../testing/alarms';
-import { NOTHING_KEPT, whatOf } from '../../alarms/kept';
-import { acknowledgeAlarms, done, own, undo } from '../../alarms/own';
+import { acknowledgeAlarms, done, NOTHING_KEPT, own, undo, whatOf } from '../../alarms/own';
 import { person } from '../../store/create';
 import { SILENCE_MS } from '../../connection/machine';
 import { goLive, goLost, status as told } from '../../testing/page';
 import { toast } from '../toast';
-import { merged, startPeople, wordsFor } from './people';
-import { whoseWord } from './WhoseWord';
+import { merged, startPeople, whoseWord, wordsFor } from './people';
 
 const COLD = alarm('cold');
 const STAMP = { sec: 1_000, nanosec: 0 };

@@ -6,6 +6,7 @@
 import { now, timeOfDay } from '../../clock';
 import { fetchSession, postNote, withdrawNote } from '../../contract/people';
 import type { Alarm, Session } from '../../contract/types';
+import { whenText } from '../../alarms/words';
 import { failureText } from '../../domain/format';
 import { secondsOf } from '../../domain/time';
 import { shown } from '../../domain/text';
@@ -15,9 +16,9 @@ import { rosNow } from '../../store/moment';
 import { person } from '../../store/create';
 import { say } from '../toast';
 import { LANGUAGE, S } from '../../strings';
+import { useTicking } from '../../widgets/useNow';
 import { PEOPLE } from '../../words/people';
-import { LONGEST_REASON, whatOf, type Kept } from '../../alarms/kept';
-import { acting, done, own } from '../../alarms/own';
+import { acting, done, LONGEST_REASON, own, whatOf, type Kept } from '../../alarms/own';
 
 export const P = PEOPLE[LANGUAGE];
 
@@ -157,4 +158,19 @@ export function startPeople(): () => void {
     acting.tell = null;
     person.dispatch(null);
   };
+}
+
+/** Whether what is done here is this browser's own, or everybody's. */
+export function whoseWord(who: Session | null): string {
+  if (!who?.name) return S.alarmsMine;
+  if (who.can_write_notes) return P.shared(who.name);
+  return (who.role === 'viewer' ? P.reads : P.elsewhere)(who.name);
+}
+
+/** Who acknowledged an alarm, and when; null: no name is known. */
+export function useWhoAcknowledged(alarm: Alarm | null): string | null {
+  const name = alarm?.acknowledged_by;
+  const at = alarm?.acknowledged_at;
+  const when = useTicking((tick) => (at ? whenText(secondsOf(at), rosNow(store.get(), tick)) : ''));
+  return name && when !== '' ? P.acknowledged(name, when) : null;
 }

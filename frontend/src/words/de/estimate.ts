@@ -16,7 +16,7 @@ export const ESTIMATE: In<typeof ENGLISH> = {
     'Eine berechnete Größe wird nicht geschätzt: Angezeigt werden die nächstgelegenen Messwerte',
   noModel: 'Noch keine Schätzung: Sie braucht zehn Messungen eines Sensors',
   unsure: (error) => `Schraffiert: ungenauer als ±${error}. Ohne Farbe: keine Daten`,
-  errorOf: (sensor) => `${sensor}: Unsicherheit der Schätzung`,
+  error: 'Unsicherheit der Schätzung',
   foretold: (inside, scans) =>
     `${whole(inside)} von ${counted(scans, 'Messung', 'Messungen')} im vorhergesagten Bereich`,
   foretoldNone: 'Noch mit keiner Messung verglichen',

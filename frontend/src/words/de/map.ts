@@ -1,9 +1,9 @@
 /** Die Karte: Bedienung, Legende, Farbbereich, Vergleich. */
-import type { MAP as ENGLISH } from '../en/map';
+import type * as EN from '../en/map';
 import type { In } from '../shape';
-import { counted } from './counted';
+import { counted, whole } from './counted';
 
-export const MAP: In<typeof ENGLISH> = {
+export const MAP: In<typeof EN.MAP> = {
   sensors: 'Sensor',
   mapRegion: 'Karte',
   mapPicture:
@@ -101,4 +101,153 @@ export const MAP: In<typeof ENGLISH> = {
   robotAgeUnknown: 'Alter unbekannt',
   robotBattery: (percent) => `Akku ${percent}`,
   robotReported: (percent, ago) => `Akku ${percent}, gemeldet ${ago}`,
+};
+
+/** Die Messpunkte: ihre Tabelle und die Ansicht eines einzelnen. */
+export const TAGS: In<typeof EN.TAGS> = {
+  tags: 'Messpunkte',
+  tableCaption: 'Alle Messpunkte mit ihren neuesten Messwerten',
+  filter: 'Messpunkte filtern',
+  filterHint: 'Nr., Art, Schädling …',
+  filterClear: 'Filter löschen',
+  shownOf: (shown, all) =>
+    shown === all
+      ? counted(all, 'Messpunkt', 'Messpunkte')
+      : `${whole(shown)} von ${counted(all, 'Messpunkt', 'Messpunkten')}`,
+  nothingMatches: 'Kein Messpunkt passt zum Filter.',
+  columns: {
+    health: 'Zustand',
+    tag: 'Nr.',
+    species: 'Art',
+    flowers: 'Blüten',
+    age: 'Alter',
+  },
+  pest: 'Schädling',
+  pestCount: (count) => counted(count, 'Schädling', 'Schädlinge'),
+  notOnMap: 'Keine Position',
+  notOnMapLong: 'Die Position ist noch nicht bekannt; der Messpunkt fehlt auf der Karte.',
+  farOff: 'Zu weit entfernt, nicht auf der Karte',
+  farOffLong: (place) =>
+    `Die Position (${place}) ist weit von allen anderen Messpunkten entfernt; der Messpunkt fehlt auf der Karte.`,
+  ageUnknown: 'unbekannt',
+  ageUnknownLong: 'Das Alter ist unbekannt, bis der Zwilling wieder eine Zeit meldet.',
+  neverObserved: 'nie',
+  neverObservedLong: 'Noch keine Messung hat einen Wert geliefert.',
+  notKnownThen: 'unbekannt',
+  notKnownThenLong: 'Das ist nicht mehr gespeichert oder war noch nicht aufgezeichnet.',
+  ageUntoldLong: 'Dieser Zwilling meldet nicht, von wann seine Messwerte sind.',
+  tried: {
+    ok: 'OK',
+    unreachable: 'nicht erreichbar',
+    undecoded: 'nicht lesbar',
+    skipped: 'übersprungen',
+    failed: 'fehlgeschlagen',
+  },
+  triedAgo: (age, outcome) => `Versuch vor ${age}: ${outcome}`,
+  triedSometime: (outcome) => `Versuch: ${outcome}`,
+  noValue: '–',
+  noSensorLong: 'kein Sensor',
+  sensorFailed: 'ausgefallen',
+  sensorFailedLong: 'Der Sensor hat keinen Wert geliefert',
+  confidence: (percent) => `zu ${percent} sicher`,
+  notSure: 'unsicher',
+  speciesNames: {
+    lupin: 'Lupine',
+    tulip: 'Tulpe',
+    gerbera: 'Gerbera',
+    orchid: 'Orchidee',
+    rose: 'Rose',
+    lettuce: 'Salat',
+    tomato: 'Tomate',
+    cucumber: 'Gurke',
+    strawberry: 'Erdbeere',
+  },
+  unclassified: 'nicht bestimmt',
+  tableButton: 'Spalten und Zeilen',
+  tableColumns: 'Spalten',
+  columnNoRoom: 'Fenster zu schmal',
+  tableByArea: 'Nach Bereich gruppieren',
+  areaNone: 'Kein Bereich',
+  trend: 'Tendenz',
+  trendTitle: (sensor, hour) =>
+    `${sensor}: Änderung seit einer ${hour ? `Gewächshausstunde (${hour})` : 'Stunde'}`,
+  trendNone: 'vor einer Stunde kein Messwert',
+  trendSame: 'kein neuer Wert',
+  trendLevel: 'unverändert',
+  trendUnknown: 'vor einer Stunde: unbekannt',
+  density: 'Zeilen',
+  densities: { usual: 'Normal', compact: 'Kompakt' },
+
+  card: (tag) => `Messpunkt ${tag}`,
+  cardClose: 'Schließen',
+  cardGone: 'Der Zwilling kennt diesen Messpunkt nicht.',
+  cardGoneThen: 'Der Zwilling kannte diesen Messpunkt damals nicht.',
+  cardShow: 'Auf der Karte anzeigen',
+  cardMore: (count) => `${count} weitere`,
+  cardNoReadings: 'Noch keine Messwerte.',
+  cardHistory: (count, from, to) => `Letzte ${count} Messwerte, zwischen ${from} und ${to}`,
+  cardBlooms: 'Blüten',
+  cardSource: 'Quelle',
+  cardFixed: 'Fester Sensor',
+  cardVisited: 'Vom Roboter gemessen',
+  cardScanned: 'Letzter Messwert',
+  cardLooked: 'Blüten kontrolliert',
+  cardTry: 'Letzter Versuch',
+  cardTries: 'Letzte Versuche',
+  cardTryKinds: { scan: 'Messung', look: 'Blütenkontrolle', any: 'Versuch' },
+  cardArea: 'Bereich',
+  cardPosition: 'Position',
+};
+
+/** Die Verläufe und ihre Tabellen. */
+export const CHARTS: In<typeof EN.CHARTS> = {
+  charts: 'Verläufe',
+  chartOf: (sensor) => `Verlauf: ${sensor}`,
+  chartsBy: { tag: 'Ein Messpunkt', sensor: 'Mehrere' },
+  chartsByLegend: 'Was gezeigt wird',
+  chartSpan: (from, to) => `${from} bis ${to}`,
+  chartSummary: (count, latest, at, low, high, gaps) =>
+    `${counted(count, 'Messwert', 'Messwerte')}, der letzte ${latest} (${at}), ` +
+    `zwischen ${low} und ${high}, ${gaps === 0 ? 'keine Lücke' : counted(gaps, 'Lücke', 'Lücken')}.`,
+  chartEmpty: 'Kein Messwert in diesem Zeitraum.',
+  chartNeedsDay: (known) =>
+    known === null
+      ? 'Braucht 24 h Messwerte ohne Lücke von über 3 h'
+      : `Braucht 24 h Messwerte; bisher ${known}`,
+  chartLoading: 'Frühere Daten werden geladen',
+  chartFailed: (reason) =>
+    `Frühere Daten konnten nicht geladen werden; die Seite versucht es weiter. ${reason}`,
+  chartMissing: 'Dieser Zwilling zeichnet nichts auf.',
+  chartMissingHint: 'Ohne Aufzeichnung gibt es keine Verläufe, nur die letzten Messungen.',
+  chartMissingMore:
+    'Den Zwilling ohne „journal:=off“ starten oder im Parameter „journal“ eine Datei nennen.',
+  chartMissingShort: 'Kein Verlauf: Dieser Zwilling zeichnet nichts auf.',
+  chartNoTime: 'Der Zwilling kennt noch keine Uhrzeit; es gibt noch keine früheren Daten.',
+  chartIdealsDiffer: 'Idealbereiche je nach Art verschieden',
+  chartNoSensors: 'Dieser Messpunkt hat keinen Sensor.',
+  chartTable: 'Als Tabelle anzeigen',
+  chartPlots: 'Als Verlauf anzeigen',
+  chartDayBefore: 'Vortag',
+  chartBeforeWas: (value) => `Vortag ${value}`,
+  chartWhole: 'Ganzer Zeitraum',
+  chartCsvShown: 'CSV der Anzeige',
+  chartCsvAll: 'CSV aller Messwerte',
+  chartAddTag: 'Messpunkt hinzufügen',
+  chartRemoveTag: (tag) => `Messpunkt ${tag} aus dem Verlauf entfernen`,
+  chartWhich: 'Tabelle von',
+  chartHint: 'Ziehen zum Vergrößern; klicken, um zu dieser Zeit zu springen.',
+  chartColumns: {
+    time: 'Zeit',
+    until: 'Bis',
+    value: 'Wert',
+    count: 'Messwerte',
+    mean: 'Mittelwert',
+    min: 'Minimum',
+    max: 'Maximum',
+    event: 'Ereignis',
+  },
+  chartGap: (length) => `${length} lang keine Daten`,
+  missing: { not_kept: 'nicht mehr gespeichert', not_recorded: 'nicht aufgezeichnet' },
+  chartFailures: (count) => counted(count, 'fehlgeschlagener Versuch', 'fehlgeschlagene Versuche'),
+  chartLooks: (count) => counted(count, 'Blütenkontrolle', 'Blütenkontrollen'),
 };

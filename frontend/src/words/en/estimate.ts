@@ -14,7 +14,7 @@ export const ESTIMATE = {
   noModel: 'No estimate yet: it needs ten scans of a sensor',
   unsure: (error: string): string => `Hatched: less certain than ±${error}. No colour: no data`,
   /** Beside the colours of the error. */
-  errorOf: (sensor: string): string => `${sensor}: uncertainty of the estimate`,
+  error: 'Uncertainty of the estimate',
   foretold: (inside: number, scans: number): string =>
     `${whole(inside)} of ${counted(scans, 'scan', 'scans')} were within the predicted range`,
   foretoldNone: 'No scan has been compared with it yet',

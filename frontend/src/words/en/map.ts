@@ -1,5 +1,5 @@
 /** The map: its controls, legend, colour range, and what is compared on it. */
-import { counted } from './counted';
+import { counted, whole } from './counted';
 
 export const MAP = {
   sensors: 'Sensor',
@@ -98,4 +98,164 @@ export const MAP = {
   robotAgeUnknown: 'age unknown',
   robotBattery: (percent: string): string => `battery ${percent}`,
   robotReported: (percent: string, ago: string): string => `battery ${percent}, reported ${ago}`,
+} as const;
+
+/** The tags: their table and the card of one. */
+export const TAGS = {
+  tags: 'Tags',
+  tableCaption: 'All tags with their latest readings',
+  filter: 'Filter tags',
+  filterHint: 'Tag, species, pest …',
+  filterClear: 'Clear filter',
+  shownOf: (shown: number, all: number): string =>
+    shown === all
+      ? counted(all, 'tag', 'tags')
+      : `${whole(shown)} of ${counted(all, 'tag', 'tags')}`,
+  nothingMatches: 'No tag matches the filter.',
+  columns: {
+    health: 'Health',
+    tag: 'Tag',
+    species: 'Species',
+    flowers: 'Blooms',
+    age: 'Age',
+  },
+  pest: 'Pest',
+  pestCount: (count: number): string => counted(count, 'pest', 'pests'),
+  notOnMap: 'No pin',
+  notOnMapLong: 'No position known yet, so the tag has no pin on the map.',
+  farOff: 'Too far away, not on the map',
+  farOffLong: (place: string): string =>
+    `Its position (${place}) is far from all other tags, so the tag has no pin on the map.`,
+  ageUnknown: 'unknown',
+  ageUnknownLong: 'The age is unknown until the twin reports its time again.',
+  neverObserved: 'never',
+  neverObservedLong: 'No scan has returned a reading yet.',
+  notKnownThen: 'unknown',
+  notKnownThenLong: 'This is no longer stored, or was not recorded yet.',
+  ageUntoldLong: 'This twin does not report when readings were taken.',
+  tried: {
+    ok: 'OK',
+    unreachable: 'not reachable',
+    undecoded: 'not readable',
+    skipped: 'skipped',
+    failed: 'failed',
+  },
+  triedAgo: (age: string, outcome: string): string => `attempt ${age} ago: ${outcome}`,
+  triedSometime: (outcome: string): string => `attempt: ${outcome}`,
+  noValue: '–',
+  noSensorLong: 'no sensor',
+  sensorFailed: 'failed',
+  sensorFailedLong: 'The sensor returned no value',
+  confidence: (percent: string): string => `${percent} certain`,
+  notSure: 'uncertain',
+  /** Those that many greenhouses grow, by the name on the wire; others are shown as they came. */
+  speciesNames: {
+    lupin: 'lupin',
+    tulip: 'tulip',
+    gerbera: 'gerbera',
+    orchid: 'orchid',
+    rose: 'rose',
+    lettuce: 'lettuce',
+    tomato: 'tomato',
+    cucumber: 'cucumber',
+    strawberry: 'strawberry',
+  },
+  unclassified: 'not classified',
+  tableButton: 'Columns and rows',
+  tableColumns: 'Columns',
+  columnNoRoom: 'window too narrow',
+  tableByArea: 'Group by area',
+  areaNone: 'No area',
+  trend: 'Trend',
+  /** `hour` is how long a greenhouse's hour is; null: one of the clock. */
+  trendTitle: (sensor: string, hour: string | null): string =>
+    `${sensor} compared with ${hour ? `a greenhouse hour (${hour})` : 'an hour'} ago`,
+  trendNone: 'no reading an hour ago',
+  trendSame: 'no new reading',
+  trendLevel: 'steady',
+  trendUnknown: 'an hour ago: unknown',
+  density: 'Rows',
+  densities: { usual: 'Normal', compact: 'Compact' },
+
+  card: (tag: string): string => `Tag ${tag}`,
+  cardClose: 'Close',
+  cardGone: 'The twin does not know this tag.',
+  cardGoneThen: 'The twin did not know this tag then.',
+  cardShow: 'Show on map',
+  cardMore: (count: number): string => `${count} more`,
+  cardNoReadings: 'No readings yet.',
+  cardHistory: (count: number, from: string, to: string): string =>
+    `Last ${count} readings, between ${from} and ${to}`,
+  cardBlooms: 'Blooms',
+  cardSource: 'Source',
+  cardFixed: 'Fixed sensor',
+  cardVisited: 'Visited by the robot',
+  cardScanned: 'Last reading',
+  cardLooked: 'Flowers inspected',
+  cardTry: 'Last attempt',
+  cardTries: 'Last attempts',
+  cardTryKinds: { scan: 'scan', look: 'inspection', any: 'attempt' },
+  cardArea: 'Area',
+  cardPosition: 'Position',
+} as const;
+
+/** The charts and their tables. */
+export const CHARTS = {
+  charts: 'Charts',
+  chartOf: (sensor: string): string => `Chart of ${sensor}`,
+  chartsBy: { tag: 'One tag', sensor: 'Several tags' },
+  chartsByLegend: 'What is charted',
+  chartSpan: (from: string, to: string): string => `${from} to ${to}`,
+  chartSummary: (
+    count: number,
+    latest: string,
+    at: string,
+    low: string,
+    high: string,
+    gaps: number,
+  ): string =>
+    `${counted(count, 'reading', 'readings')}, the latest ${latest} (${at}), ` +
+    `between ${low} and ${high}, ${gaps === 0 ? 'no gap' : counted(gaps, 'gap', 'gaps')}.`,
+  chartEmpty: 'No reading in this period.',
+  /** Of a quantity of a day. `known`: how far back anything is known; null: a day, with a gap. */
+  chartNeedsDay: (known: string | null): string =>
+    known === null
+      ? 'Needs 24 h of readings without a gap of over 3 h'
+      : `Needs 24 h of readings; ${known} so far`,
+  chartLoading: 'Loading history',
+  chartFailed: (reason: string): string =>
+    `History could not be loaded; the page keeps trying. ${reason}`,
+  chartMissing: 'This twin records nothing.',
+  chartMissingHint: 'Without a recording, the card shows only the last scans.',
+  chartMissingMore:
+    'Start the twin without “journal:=off”, or name a file in the parameter “journal”.',
+  chartMissingShort: 'No chart: this twin records nothing.',
+  chartNoTime: 'The twin has no time yet, so there is no history.',
+  chartIdealsDiffer: 'Ideal ranges differ by species',
+  chartNoSensors: 'This tag has no sensor.',
+  chartTable: 'Show as table',
+  chartPlots: 'Show as charts',
+  chartDayBefore: 'Day before',
+  chartBeforeWas: (value: string): string => `day before ${value}`,
+  chartWhole: 'Whole period',
+  chartCsvShown: 'CSV of this view',
+  chartCsvAll: 'CSV of all readings',
+  chartAddTag: 'Add a tag',
+  chartRemoveTag: (tag: string): string => `Remove tag ${tag} from the chart`,
+  chartWhich: 'Table of',
+  chartHint: 'Drag to zoom; click to go to that time.',
+  chartColumns: {
+    time: 'Time',
+    until: 'Until',
+    value: 'Value',
+    count: 'Readings',
+    mean: 'Mean',
+    min: 'Lowest',
+    max: 'Highest',
+    event: 'Event',
+  },
+  chartGap: (length: string): string => `no data for ${length}`,
+  missing: { not_kept: 'no longer stored', not_recorded: 'not recorded' },
+  chartFailures: (count: number): string => counted(count, 'failed attempt', 'failed attempts'),
+  chartLooks: (count: number): string => counted(count, 'flower inspection', 'flower inspections'),
 } as const;

@@ -15,7 +15,7 @@ export const ESTIMATE: In<typeof ENGLISH> = {
   computed: 'Una magnitud calculada no se estima: se muestran las lecturas más cercanas',
   noModel: 'Aún no hay estimación: hacen falta diez mediciones de un sensor',
   unsure: (error) => `Rayado: menos preciso que ±${error}. Sin color: sin datos`,
-  errorOf: (sensor) => `${sensor}: incertidumbre de la estimación`,
+  error: 'Incertidumbre de la estimación',
   foretold: (inside, scans) =>
     `${whole(inside)} de ${counted(scans, 'medición', 'mediciones')} dentro del rango previsto`,
   foretoldNone: 'Aún no se ha comparado con ninguna medición',

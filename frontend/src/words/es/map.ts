@@ -1,9 +1,9 @@
 /** El mapa: mandos, leyenda, escala de colores, comparación. */
-import type { MAP as ENGLISH } from '../en/map';
+import type * as EN from '../en/map';
 import type { In } from '../shape';
-import { counted } from './counted';
+import { counted, whole } from './counted';
 
-export const MAP: In<typeof ENGLISH> = {
+export const MAP: In<typeof EN.MAP> = {
   sensors: 'Sensor',
   mapRegion: 'Mapa',
   mapPicture: 'Mapa del invernadero. La lista de al lado indica los puntos que requieren atención.',
@@ -99,4 +99,153 @@ export const MAP: In<typeof ENGLISH> = {
   robotAgeUnknown: 'antigüedad desconocida',
   robotBattery: (percent) => `batería ${percent}`,
   robotReported: (percent, ago) => `batería ${percent}, dato de ${ago}`,
+};
+
+/** Los puntos de medida: su tabla y la ficha de cada uno. */
+export const TAGS: In<typeof EN.TAGS> = {
+  tags: 'Puntos',
+  tableCaption: 'Todos los puntos de medida con sus últimas lecturas',
+  filter: 'Filtrar los puntos',
+  filterHint: 'N.º, especie, plaga …',
+  filterClear: 'Borrar el filtro',
+  shownOf: (shown, all) =>
+    shown === all
+      ? counted(all, 'punto', 'puntos')
+      : `${whole(shown)} de ${counted(all, 'punto', 'puntos')}`,
+  nothingMatches: 'Ningún punto coincide con el filtro.',
+  columns: {
+    health: 'Estado',
+    tag: 'N.º',
+    species: 'Especie',
+    flowers: 'Flores',
+    age: 'Hace',
+  },
+  pest: 'Plaga',
+  pestCount: (count) => counted(count, 'individuo', 'individuos'),
+  notOnMap: 'Sin posición',
+  notOnMapLong: 'Aún no se conoce su posición, así que el punto no está en el mapa.',
+  farOff: 'Demasiado lejos, fuera del mapa',
+  farOffLong: (place) =>
+    `Su posición (${place}) está muy lejos de los demás puntos, así que el punto no está en el mapa.`,
+  ageUnknown: 'desconocida',
+  ageUnknownLong: 'Se desconoce la antigüedad hasta que el gemelo vuelva a comunicar su hora.',
+  neverObserved: 'nunca',
+  neverObservedLong: 'Ninguna medición ha dado todavía una lectura.',
+  notKnownThen: 'desconocido',
+  notKnownThenLong: 'Esto ya no se conserva o aún no estaba registrado.',
+  ageUntoldLong: 'Este gemelo no comunica de cuándo son sus lecturas.',
+  tried: {
+    ok: 'OK',
+    unreachable: 'inaccesible',
+    undecoded: 'ilegible',
+    skipped: 'omitido',
+    failed: 'fallido',
+  },
+  triedAgo: (age, outcome) => `intento hace ${age}: ${outcome}`,
+  triedSometime: (outcome) => `intento: ${outcome}`,
+  noValue: '–',
+  noSensorLong: 'sin sensor',
+  sensorFailed: 'averiado',
+  sensorFailedLong: 'El sensor no dio ningún valor',
+  confidence: (percent) => `${percent} de certeza`,
+  notSure: 'dudoso',
+  speciesNames: {
+    lupin: 'lupino',
+    tulip: 'tulipán',
+    gerbera: 'gerbera',
+    orchid: 'orquídea',
+    rose: 'rosa',
+    lettuce: 'lechuga',
+    tomato: 'tomate',
+    cucumber: 'pepino',
+    strawberry: 'fresa',
+  },
+  unclassified: 'sin clasificar',
+  tableButton: 'Columnas y filas',
+  tableColumns: 'Columnas',
+  columnNoRoom: 'ventana demasiado estrecha',
+  tableByArea: 'Agrupar por zona',
+  areaNone: 'Sin zona',
+  trend: 'Tendencia',
+  trendTitle: (sensor, hour) =>
+    `${sensor} frente a hace una hora${hour ? ` de invernadero (${hour})` : ''}`,
+  trendNone: 'sin lectura hace una hora',
+  trendSame: 'sin dato nuevo',
+  trendLevel: 'estable',
+  trendUnknown: 'hace una hora: desconocido',
+  density: 'Filas',
+  densities: { usual: 'Normales', compact: 'Compactas' },
+
+  card: (tag) => `Punto ${tag}`,
+  cardClose: 'Cerrar',
+  cardGone: 'El gemelo no conoce este punto.',
+  cardGoneThen: 'El gemelo no conocía este punto entonces.',
+  cardShow: 'Mostrar en el mapa',
+  cardMore: (count) => `${count} más`,
+  cardNoReadings: 'Aún no hay lecturas.',
+  cardHistory: (count, from, to) => `Últimas ${count} lecturas, entre ${from} y ${to}`,
+  cardBlooms: 'Flores',
+  cardSource: 'Origen',
+  cardFixed: 'Sensor fijo',
+  cardVisited: 'Medido por el robot',
+  cardScanned: 'Última lectura',
+  cardLooked: 'Flores revisadas',
+  cardTry: 'Último intento',
+  cardTries: 'Últimos intentos',
+  cardTryKinds: { scan: 'medición', look: 'revisión de flores', any: 'intento' },
+  cardArea: 'Zona',
+  cardPosition: 'Posición',
+};
+
+/** Las gráficas y sus tablas. */
+export const CHARTS: In<typeof EN.CHARTS> = {
+  charts: 'Gráficas',
+  chartOf: (sensor) => `Gráfica: ${sensor}`,
+  chartsBy: { tag: 'Un punto', sensor: 'Varios puntos' },
+  chartsByLegend: 'Qué se muestra',
+  chartSpan: (from, to) => `${from} a ${to}`,
+  chartSummary: (count, latest, at, low, high, gaps) =>
+    `${counted(count, 'lectura', 'lecturas')}, la última ${latest} (${at}), ` +
+    `entre ${low} y ${high}, ${gaps === 0 ? 'sin huecos' : counted(gaps, 'hueco', 'huecos')}.`,
+  chartEmpty: 'No hay lecturas en este periodo.',
+  chartNeedsDay: (known) =>
+    known === null
+      ? 'Requiere 24 h de lecturas sin huecos de más de 3 h'
+      : `Requiere 24 h de lecturas; hasta ahora ${known}`,
+  chartLoading: 'Cargando el histórico',
+  chartFailed: (reason) =>
+    `No se pudo cargar el histórico; la página lo sigue intentando. ${reason}`,
+  chartMissing: 'Este gemelo no registra nada.',
+  chartMissingHint: 'Sin registro no hay gráficas: la ficha solo muestra las últimas mediciones.',
+  chartMissingMore:
+    'Inicie el gemelo sin «journal:=off» o indique un archivo en el parámetro «journal».',
+  chartMissingShort: 'Sin gráfica: este gemelo no registra nada.',
+  chartNoTime: 'El gemelo aún no tiene hora: todavía no hay histórico.',
+  chartIdealsDiffer: 'El rango ideal depende de la especie',
+  chartNoSensors: 'Este punto no tiene sensores.',
+  chartTable: 'Mostrar como tabla',
+  chartPlots: 'Mostrar como gráfica',
+  chartDayBefore: 'Día anterior',
+  chartBeforeWas: (value) => `día anterior ${value}`,
+  chartWhole: 'Todo el periodo',
+  chartCsvShown: 'CSV de la vista',
+  chartCsvAll: 'CSV de todas las lecturas',
+  chartAddTag: 'Añadir un punto',
+  chartRemoveTag: (tag) => `Quitar el punto ${tag} de la gráfica`,
+  chartWhich: 'Tabla de',
+  chartHint: 'Arrastre para ampliar; haga clic para ir a ese momento.',
+  chartColumns: {
+    time: 'Hora',
+    until: 'Hasta',
+    value: 'Valor',
+    count: 'Lecturas',
+    mean: 'Media',
+    min: 'Mínimo',
+    max: 'Máximo',
+    event: 'Evento',
+  },
+  chartGap: (length) => `sin datos durante ${length}`,
+  missing: { not_kept: 'ya no se conserva', not_recorded: 'sin registro' },
+  chartFailures: (count) => counted(count, 'intento fallido', 'intentos fallidos'),
+  chartLooks: (count) => counted(count, 'revisión de flores', 'revisiones de flores'),
 };

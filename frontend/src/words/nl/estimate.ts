@@ -15,7 +15,7 @@ export const ESTIMATE: In<typeof ENGLISH> = {
   computed: 'Van een berekende waarde is er geen schatting: u ziet de dichtstbijzijnde waarden',
   noModel: 'Nog geen schatting: er zijn tien metingen van een sensor nodig',
   unsure: (error) => `Gearceerd: minder zeker dan ±${error}. Geen kleur: geen gegevens`,
-  errorOf: (sensor) => `${sensor}: onzekerheid van de schatting`,
+  error: 'Onzekerheid van de schatting',
   foretold: (inside, scans) =>
     `${whole(inside)} van ${counted(scans, 'meting', 'metingen')} binnen het voorspelde bereik`,
   foretoldNone: 'Er is nog geen meting mee vergeleken',

@@ -1,9 +1,9 @@
 /** De kaart: bediening, legenda, kleurbereik, vergelijking. */
-import type { MAP as ENGLISH } from '../en/map';
+import type * as EN from '../en/map';
 import type { In } from '../shape';
-import { counted } from './counted';
+import { counted, whole } from './counted';
 
-export const MAP: In<typeof ENGLISH> = {
+export const MAP: In<typeof EN.MAP> = {
   sensors: 'Sensor',
   mapRegion: 'Kaart',
   mapPicture: 'Kaart van de kas. De lijst ernaast noemt de meetpunten die aandacht vragen.',
@@ -100,4 +100,154 @@ export const MAP: In<typeof ENGLISH> = {
   robotAgeUnknown: 'tijd onbekend',
   robotBattery: (percent) => `accu ${percent}`,
   robotReported: (percent, ago) => `accu ${percent}, gemeld: ${ago}`,
+};
+
+/** De meetpunten: hun tabel en de kaart van één ervan. */
+export const TAGS: In<typeof EN.TAGS> = {
+  tags: 'Meetpunten',
+  tableCaption: 'Alle meetpunten met hun nieuwste meetwaarden',
+  filter: 'Meetpunten filteren',
+  filterHint: 'Nr., soort, plaag …',
+  filterClear: 'Filter wissen',
+  shownOf: (shown, all) =>
+    shown === all
+      ? counted(all, 'meetpunt', 'meetpunten')
+      : `${whole(shown)} van ${counted(all, 'meetpunt', 'meetpunten')}`,
+  nothingMatches: 'Geen meetpunt voldoet aan het filter.',
+  columns: {
+    health: 'Toestand',
+    tag: 'Nr.',
+    species: 'Soort',
+    flowers: 'Bloemen',
+    age: 'Geleden',
+  },
+  pest: 'Plaag',
+  pestCount: (count) => counted(count, 'plaagdier', 'plaagdieren'),
+  notOnMap: 'Geen positie',
+  notOnMapLong: 'De positie is nog niet bekend; het meetpunt staat niet op de kaart.',
+  farOff: 'Te ver weg, niet op de kaart',
+  farOffLong: (place) =>
+    `De positie (${place}) ligt ver van alle andere meetpunten; het meetpunt staat niet op de kaart.`,
+  ageUnknown: 'onbekend',
+  ageUnknownLong: 'Onbekend hoe lang geleden, tot de digital twin weer zijn tijd meldt.',
+  neverObserved: 'nooit',
+  neverObservedLong: 'Nog geen meting heeft een waarde opgeleverd.',
+  notKnownThen: 'onbekend',
+  notKnownThenLong: 'Dit wordt niet meer bewaard of was nog niet vastgelegd.',
+  ageUntoldLong: 'Deze digital twin meldt niet van wanneer zijn meetwaarden zijn.',
+  tried: {
+    ok: 'OK',
+    unreachable: 'niet bereikbaar',
+    undecoded: 'niet leesbaar',
+    skipped: 'overgeslagen',
+    failed: 'mislukt',
+  },
+  triedAgo: (age, outcome) => `poging ${age} geleden: ${outcome}`,
+  triedSometime: (outcome) => `poging: ${outcome}`,
+  noValue: '–',
+  noSensorLong: 'geen sensor',
+  sensorFailed: 'uitgevallen',
+  sensorFailedLong: 'De sensor gaf geen waarde',
+  confidence: (percent) => `${percent} zeker`,
+  notSure: 'onzeker',
+  speciesNames: {
+    lupin: 'lupine',
+    tulip: 'tulp',
+    gerbera: 'gerbera',
+    orchid: 'orchidee',
+    rose: 'roos',
+    lettuce: 'sla',
+    tomato: 'tomaat',
+    cucumber: 'komkommer',
+    strawberry: 'aardbei',
+  },
+  unclassified: 'niet herkend',
+  tableButton: 'Kolommen en rijen',
+  tableColumns: 'Kolommen',
+  columnNoRoom: 'venster te smal',
+  tableByArea: 'Groeperen per afdeling',
+  areaNone: 'Geen afdeling',
+  trend: 'Trend',
+  trendTitle: (sensor, hour) =>
+    `${sensor} vergeleken met een ${hour ? `kasuur (${hour})` : 'uur'} geleden`,
+  trendNone: 'een uur geleden geen meting',
+  trendSame: 'niets nieuws',
+  trendLevel: 'gelijk',
+  trendUnknown: 'een uur geleden: onbekend',
+  density: 'Rijen',
+  densities: { usual: 'Normaal', compact: 'Compact' },
+
+  card: (tag) => `Meetpunt ${tag}`,
+  cardClose: 'Sluiten',
+  cardGone: 'De digital twin kent dit meetpunt niet.',
+  cardGoneThen: 'De digital twin kende dit meetpunt toen niet.',
+  cardShow: 'Op de kaart tonen',
+  cardMore: (count) => `nog ${count}`,
+  cardNoReadings: 'Nog geen meetwaarden.',
+  cardHistory: (count, from, to) => `Laatste ${count} meetwaarden, tussen ${from} en ${to}`,
+  cardBlooms: 'Bloemen',
+  cardSource: 'Bron',
+  cardFixed: 'Vaste sensor',
+  cardVisited: 'Bezocht door de robot',
+  cardScanned: 'Laatste meetwaarde',
+  cardLooked: 'Bloemen gecontroleerd',
+  cardTry: 'Laatste poging',
+  cardTries: 'Laatste pogingen',
+  cardTryKinds: { scan: 'meting', look: 'bloemcontrole', any: 'poging' },
+  cardArea: 'Afdeling',
+  cardPosition: 'Positie',
+};
+
+/** De grafieken en hun tabellen. */
+export const CHARTS: In<typeof EN.CHARTS> = {
+  charts: 'Grafieken',
+  chartOf: (sensor) => `Grafiek: ${sensor}`,
+  chartsBy: { tag: 'Eén meetpunt', sensor: 'Meerdere' },
+  chartsByLegend: 'Wat er getoond wordt',
+  chartSpan: (from, to) => `${from} tot ${to}`,
+  chartSummary: (count, latest, at, low, high, gaps) =>
+    `${counted(count, 'meetwaarde', 'meetwaarden')}, de laatste ${latest} (${at}), ` +
+    `tussen ${low} en ${high}, ${gaps === 0 ? 'geen gat' : counted(gaps, 'gat', 'gaten')}.`,
+  chartEmpty: 'Geen meetwaarde in deze periode.',
+  chartNeedsDay: (known) =>
+    known === null
+      ? 'Heeft 24 u aan meetwaarden nodig, zonder gat van meer dan 3 u'
+      : `Heeft 24 u aan meetwaarden nodig; tot nu toe ${known}`,
+  chartLoading: 'De historie wordt geladen',
+  chartFailed: (reason) =>
+    `De historie kon niet worden geladen; de pagina blijft het proberen. ${reason}`,
+  chartMissing: 'Deze digital twin legt niets vast.',
+  chartMissingHint:
+    'Zonder vastgelegde gegevens zijn er geen grafieken, alleen de laatste metingen.',
+  chartMissingMore:
+    'Start de digital twin zonder “journal:=off”, of geef een bestand op in de parameter “journal”.',
+  chartMissingShort: 'Geen grafiek: deze digital twin legt niets vast.',
+  chartNoTime: 'De digital twin heeft nog geen tijd; er is nog geen historie.',
+  chartIdealsDiffer: 'Ideaal bereik verschilt per soort',
+  chartNoSensors: 'Dit meetpunt heeft geen sensor.',
+  chartTable: 'Als tabel tonen',
+  chartPlots: 'Als grafiek tonen',
+  chartDayBefore: 'Dag ervoor',
+  chartBeforeWas: (value) => `dag ervoor ${value}`,
+  chartWhole: 'Hele periode',
+  chartCsvShown: 'CSV van de weergave',
+  chartCsvAll: 'CSV van alle meetwaarden',
+  chartAddTag: 'Meetpunt toevoegen',
+  chartRemoveTag: (tag) => `Meetpunt ${tag} uit de grafiek halen`,
+  chartWhich: 'Tabel van',
+  chartHint: 'Sleep om in te zoomen; klik om naar dat moment te gaan.',
+  chartColumns: {
+    time: 'Tijd',
+    until: 'Tot',
+    value: 'Waarde',
+    count: 'Meetwaarden',
+    mean: 'Gemiddelde',
+    min: 'Laagste',
+    max: 'Hoogste',
+    event: 'Gebeurtenis',
+  },
+  chartGap: (length) => `${length} geen gegevens`,
+  missing: { not_kept: 'niet meer bewaard', not_recorded: 'niet vastgelegd' },
+  chartFailures: (count) => counted(count, 'mislukte poging', 'mislukte pogingen'),
+  chartLooks: (count) => counted(count, 'bloemcontrole', 'bloemcontroles'),
 };

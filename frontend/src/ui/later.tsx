@@ -1,6 +1,8 @@
 /** Loads what the first view can do without (`behind.ts`), and keeps trying where it does not come. */
+import type { JSX } from 'react';
+
 import { pause } from '../clock';
-import { createStore } from '../store/create';
+import { createStore, useSelected } from '../store/create';
 import type * as everyPart from './behind';
 
 export type Parts = typeof everyPart;
@@ -35,4 +37,14 @@ async function tried(load: () => Promise<Parts>): Promise<Parts> {
     }
     await pause(waitMs);
   }
+}
+
+/** What needs the parts that come behind the first view; nothing until they are here. */
+export function WithParts({
+  children,
+}: {
+  children: (parts: Parts) => JSX.Element | null;
+}): JSX.Element | null {
+  const parts = useSelected(later, (it) => it.parts);
+  return parts && children(parts);
 }

@@ -312,8 +312,9 @@ class AccessPolicy:
             is_link = source.fetch_mode == "navigate" and source.fetch_dest == "document"
             if source.fetch_site in ("cross-site", "same-site") and not is_link:
                 return Decision(
-                    "a page of another origin asks without naming itself: load it in CORS mode "
-                    "(<img crossorigin>, or fetch) and start the bridge with --allow-origin for it"
+                    "a page of another origin sends a request without naming itself: load it in"
+                    " CORS mode (<img crossorigin>, or fetch) and start the bridge with"
+                    " --allow-origin for it"
                 )
         elif source.referer and not source.wants_page:
             return self._judge_origin("/".join(source.referer.split("/", 3)[:3]), source)

@@ -1,4 +1,4 @@
-"""The process that looks back: reads the journal, makes answers, and ends with its parent.
+"""The process that reads the past: reads the journal, makes answers, and ends with its parent.
 
 Questions come in on standard input, and their answers go out on standard output, finished: whatever
 they take, they take no turn of the parent's interpreter. It loads no ROS.
@@ -164,7 +164,7 @@ def _portable(error: BaseException) -> BaseException:
     except Exception:  # noqa: BLE001  # there are those that cannot be made again
         portable = RuntimeError(repr(error))
     trace = "".join(traceback.format_exception(error))
-    portable.add_note(f"in the process that looks back:\n{trace}")
+    portable.add_note(f"in the process that reads the past:\n{trace}")
     return portable
 
 

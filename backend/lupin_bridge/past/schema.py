@@ -11,7 +11,7 @@ _COMPLETE_TO = Field(
     description="all that was received before this is in the journal; null: not known"
 )
 _KEPT_FROM = Field(
-    description="from here on every single reading and event is kept; null: not known"
+    description="from here on every single reading and event is in the journal; null: not known"
 )
 
 
@@ -56,11 +56,11 @@ class TimelineBucket(Contract):
     """What happened within `bucket_s`."""
 
     start: Time
-    scans: int = Field(description="tries at sensors that succeeded")
-    failures: int = Field(description="tries that failed, looks too")
-    looks: int = Field(description="looks that saw the flowers")
-    pests_seen: int = Field(description="looks with an anomaly where the look before had none")
-    pests_cleared: int = Field(description="looks without one where the look before had one")
+    scans: int = Field(description="scans that succeeded")
+    failures: int = Field(description="scans and inspections that failed")
+    looks: int = Field(description="inspections that saw the flowers")
+    pests_seen: int = Field(description="inspections with an anomaly where the one before had none")
+    pests_cleared: int = Field(description="inspections without one where the one before had one")
 
 
 class ClockRun(Stretch):
@@ -77,7 +77,7 @@ class Timeline(Stretch):
     buckets: list[TimelineBucket] = Field(
         description="oldest first; one in which nothing happened is absent"
     )
-    silences: list[Stretch] = Field(description="stretches in which nothing was tried")
+    silences: list[Stretch] = Field(description="stretches without any attempt")
     runs: list[ClockRun] = Field(description="the runs of the clock that meet this period")
     complete_to: Time | None = _COMPLETE_TO
     kept_from: Time | None = _KEPT_FROM

@@ -39,20 +39,20 @@ from lupin_twin.core.past import NotRemembered, PastRefused
 from lupin_twin.runtime.workers import SMALL_S, ShouldStop
 
 NEVER_STORE: Final = {"Cache-Control": "no-store"}
-NO_TWIN: Final = "no twin has been heard yet"
+NO_TWIN: Final = "nothing has been received from a twin yet"
 # For the few kB of a body.
 BODY_S: Final = 5.0
 # nginx's "client closed request"; nobody receives it.
 CLIENT_DISCONNECTED: Final = 499
 
 TOO_MUCH: Final[dict[int | str, dict[str, Any]]] = {
-    429: {"model": schema.ErrorMessage, "description": "this client asks for too much"}
+    429: {"model": schema.ErrorMessage, "description": "too many requests from this client"}
 }
 # What `add_refusals` makes of refusals, for the OpenAPI document.
 NOT_REMEMBERED: Final[dict[int | str, dict[str, Any]]] = {
     304: {"description": "the ETag still holds"},
-    400: {"model": schema.ErrorMessage, "description": "refused; detail says why"},
-    404: {"model": schema.ErrorMessage, "description": "nothing of the past is kept here"},
+    400: {"model": schema.ErrorMessage, "description": "refused; detail has the reason"},
+    404: {"model": schema.ErrorMessage, "description": "there is no journal, so no past"},
     **TOO_MUCH,
     503: {"model": schema.ErrorMessage, "description": "it cannot be read now, or too much is"},
     504: {"model": schema.ErrorMessage, "description": "it took too long"},

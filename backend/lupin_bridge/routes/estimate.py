@@ -114,9 +114,9 @@ _WRITE_TAG_S: Final = 10e-6
     openapi_extra={"parameters": parameters_of(QualityQuery)},
 )
 async def quality(request: Request) -> Response:
-    """Each new scan is held against what all but its own tag, and those beside it, say of it.
+    """Each new scan is compared with the prediction from all tags but its own and those beside it.
 
-    So it tells how right the estimate is between tags: 9 of 10 are to lie inside. Counts are by
+    So it shows how right the estimate is between tags: 9 of 10 are to lie inside. Counts are by
     the hour, over the last day and week, since the twin was started.
     """
 

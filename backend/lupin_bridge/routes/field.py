@@ -59,8 +59,8 @@ class InFormats:
         """What stands in the way of an answer, for the OpenAPI document."""
         return {
             304: {"description": "the ETag still holds"},
-            400: {"model": self.model, "description": "refused; error_message says why"},
-            429: {"model": self.model, "description": "this client asks for too much"},
+            400: {"model": self.model, "description": "refused; error_message has the reason"},
+            429: {"model": self.model, "description": "too many requests from this client"},
             404: NOT_REMEMBERED[404],
             503: {"model": schema.ErrorMessage, "description": "the twin is not there, or busy"},
             504: {"model": schema.ErrorMessage, "description": "the twin did not answer in time"},
@@ -87,7 +87,7 @@ class InFormats:
         @read_route(
             router,
             f"/api/{self.name}",
-            summary=f"{self.summary}, in the format that Accept asks for",
+            summary=f"{self.summary}, in the format of the header Accept",
             description=self.description,
             responses={
                 200: {

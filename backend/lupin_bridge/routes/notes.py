@@ -63,7 +63,7 @@ _WRITE_ANSWERS: Final[dict[int | str, dict[str, Any]]] = {
     **{
         code: {"model": schema.ErrorMessage, "description": what}
         for code, what in {
-            400: "refused; detail says why",
+            400: "refused; detail has the reason",
             403: "it takes an account with the role operator",
             404: "there is no such alarm, tag or note",
             405: "this bridge only reads the log",
@@ -77,7 +77,7 @@ _WRITE_ANSWERS: Final[dict[int | str, dict[str, Any]]] = {
 @read_route(
     router,
     "/api/notes",
-    summary="What people said of alarms, tags and the greenhouse",
+    summary="Notes of people about alarms, tags and the greenhouse",
     responses={200: {"model": people_schema.Notes}, **NOT_REMEMBERED},
     openapi_extra={"parameters": parameters_of(past_query.OfNotes)},
 )

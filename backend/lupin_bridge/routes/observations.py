@@ -42,7 +42,7 @@ MAX_AHEAD_S: Final = 10
     response_class=Response,
     responses={
         202: {"model": people_schema.PublishedObservation, "description": "published over ROS"},
-        400: {"model": schema.ErrorMessage, "description": "refused; detail says why"},
+        400: {"model": schema.ErrorMessage, "description": "refused; detail has the reason"},
         403: {
             "model": schema.ErrorMessage,
             "description": "it takes a token of the role writer, and a bridge with "

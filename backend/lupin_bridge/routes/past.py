@@ -52,7 +52,7 @@ async def history_route(request: Request) -> Response:
 @read_route(
     router,
     "/api/timeline",
-    summary="What happened when: scans, failures, looks, pests, silences, runs of the clock",
+    summary="What happened when: scans, failures, inspections, pests, silences, runs of the clock",
     responses={200: {"model": schema.Timeline}, **NOT_REMEMBERED},
     openapi_extra={"parameters": parameters_of(query.OfTimeline)},
 )

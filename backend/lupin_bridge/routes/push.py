@@ -51,7 +51,7 @@ async def key_route(request: Request) -> Response:
     response_class=Response,
     responses={
         204: {"description": "done"},
-        400: {"model": schema.ErrorMessage, "description": "refused; detail says why"},
+        400: {"model": schema.ErrorMessage, "description": "refused; detail has the reason"},
         403: {"model": schema.ErrorMessage, "description": "it takes an account"},
         404: {"model": schema.ErrorMessage, "description": "this bridge has no Web Push"},
         **TOO_MUCH,

@@ -102,7 +102,7 @@ class PublishedObservation(Contract):
 
 
 class Note(Contract):
-    """What somebody said; it is never changed. Times are ROS time."""
+    """What somebody wrote; it is never changed. Times are ROS time."""
 
     id: str = Field(description="opaque")
     kind: Literal["acknowledge", "shelve", "comment"]

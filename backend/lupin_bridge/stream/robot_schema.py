@@ -21,7 +21,7 @@ class RobotPosition(RobotPoint):
     """Where the robot was last."""
 
     heading: float | None = Field(
-        description="where it faces, rad from x towards y; null: it does not say"
+        description="where it faces, rad from x towards y; null: not reported"
     )
 
 
@@ -50,7 +50,7 @@ class RobotNow(Contract):
 
 
 class RobotFrame(RobotNow):
-    """WebSocket frame: once the robot has said something; on change, at most once a second."""
+    """WebSocket frame: once the robot has published something; on change, at most once a second."""
 
     type: Literal["robot"]
 
@@ -59,5 +59,5 @@ class Robot(RobotNow):
     """`/api/robot`: the same, and where the robot has been."""
 
     trail: list[RobotPoint] = Field(
-        description="the last hour as this process heard it, oldest first; at most 720 points"
+        description="the last hour as this process received it, oldest first; at most 720 points"
     )

@@ -118,7 +118,7 @@ def test_the_audit_trail_is_csv_with_the_newest_first(file: Path) -> None:
     [
         ("user add no/name --role viewer --no-password", "the name is 'no/name'"),
         ("user add anna --role viewer --no-password", "there is account 'anna' already"),
-        ("user add bert --role viewer", "there is no terminal to ask for the password"),
+        ("user add bert --role viewer", "there is no terminal to enter the password"),
         ("user add bert --role viewer --password-file /nowhere", "--password-file /nowhere: No "),
         ("user remove bert", "there is no account 'bert'"),
         ("token revoke anna", "there is no token 'anna'"),

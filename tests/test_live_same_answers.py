@@ -89,6 +89,7 @@ def plain(path: str, answer: list[Any]) -> list[Any]:
         # After a restart that build told one look of each tag, however many it had told before.
         value = value.get("sensors")
     if isinstance(value, dict):
+        end_runs(value)
         if "alarms" in value:
             # To that build a pest was over after one clean inspection.
             of_climate = [it for it in value["alarms"] if it["reason"]["kind"] != "pest"]
@@ -102,6 +103,13 @@ def plain(path: str, answer: list[Any]) -> list[Any]:
             if isinstance(tag, dict):
                 fill(tag)
     return [status, kind, value]
+
+
+def end_runs(timeline: dict[str, Any]) -> None:
+    """To that build all that goes on reached until now, whatever the period was."""
+    for goes_on in filter(None, (timeline.get("reach"), *timeline.get("runs", ()))):
+        if goes_on["to"] == "now":
+            goes_on["to"] = timeline["to"]
 
 
 def fill(tag: dict[str, Any]) -> None:

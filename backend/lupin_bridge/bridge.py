@@ -81,7 +81,7 @@ class Bridge:
         self.source = source
         self.site = settings.site
         self.limits = limits
-        self.liveness = Liveness(day_length_s=source.day_length_s)
+        self.liveness = Liveness(lambda: source.world)
         self.hub = Hub(settings.max_clients, limits.client_timeout_s, self.liveness.status)
         self.admission = admission or Admission(limits)
         self.cache = AnswerCache() if cache is None else cache
@@ -182,7 +182,7 @@ class Bridge:
 
     @property
     def origin(self) -> Origin:
-        """Where observations come from, as the twin says."""
+        """Where observations come from, as the twin says, or the log of one that is not heard."""
         return self.status.update.origin
 
     @property

@@ -10,6 +10,7 @@ import pytest
 from playwright.sync_api import Browser, ViewportSize, expect
 from playwright.sync_api import Page as BrowserPage
 
+from lupin_twin.core.parameters import World
 from tests.support.archive import Archive, forward_once, forwarder
 from tests.support.fleet import Page, fleet, scans_lately, wall, write
 from tests.support.journal import recording, scan
@@ -281,7 +282,7 @@ def test_groups_fold_and_can_be_chosen(browser: Browser, archive: Archive) -> No
 
 def test_what_is_simulated_says_so(browser: Browser, archive: Archive, tmp_path: Path) -> None:
     journal = tmp_path / "journal.sqlite"
-    with recording(journal, wall(), origin="simulated") as twin:
+    with recording(journal, wall(), world=World("simulated")) as twin:
         for row in scans_lately():
             twin.write(row)
     forward_once(archive, journal)

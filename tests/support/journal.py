@@ -5,8 +5,8 @@ from collections.abc import Iterable, Iterator
 from contextlib import closing, contextmanager
 from pathlib import Path
 
-from lupin_twin.core.diagnostics import Origin
 from lupin_twin.core.journal_condition import Condition, JournalState
+from lupin_twin.core.parameters import World
 from lupin_twin.core.state import Bloom, Flower, Inspection, Pin, Pose, Reading, Scan, Write
 from lupin_twin.journal.file import JournalFile
 from lupin_twin.journal.fold import Restored
@@ -142,10 +142,10 @@ def recording(
     *,
     limits: Limits = LIMITS,
     max_weight: int = MAX_WEIGHT,
-    origin: Origin = "robot",
+    world: World = World(),
 ) -> Iterator[Journal]:
     """A journal at work, its clock begun."""
-    journal = Journal(path, "/test/lupin_twin", limits, max_weight, origin=origin)
+    journal = Journal(path, "/test/lupin_twin", limits, max_weight, world=world)
     try:
         journal.begin(now)
         yield journal

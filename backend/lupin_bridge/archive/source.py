@@ -21,7 +21,15 @@ from lupin_twin.core.past import HOUR_NS, Event
 from lupin_twin.journal.appending import LAST_SEQ, PURGED_SEQ
 from lupin_twin.journal.beside import forwarded_seq, note_forwarded
 from lupin_twin.journal.retention import RECORD
-from lupin_twin.journal.schema import LOCAL_SITE, MAP, ORIGIN, get_meta, one_view, open_named
+from lupin_twin.journal.schema import (
+    DAY_LENGTH,
+    LOCAL_SITE,
+    MAP,
+    ORIGIN,
+    get_meta,
+    one_view,
+    open_named,
+)
 
 Row = tuple[Any, ...]
 
@@ -305,7 +313,7 @@ class Source:
                 record["seq"] = record.get("seq", 0) + asked["seqs"]
                 moved = f"{key}:{asked['epoch']}"
                 found.append((asked["site"], moved, json.dumps(record)))
-            elif key in {ORIGIN, MAP} or key.startswith("simulated_"):
+            elif key in {ORIGIN, DAY_LENGTH, MAP} or key.startswith("simulated_"):
                 found.append((asked["site"], key, value))
         return found
 

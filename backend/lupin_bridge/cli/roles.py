@@ -103,6 +103,16 @@ async def _run(
         raise SettingError(
             f"{settings.called('journal')} is for web; a twin's own file is its parameter journal"
         )
+    if "://" in settings.journal:
+        raise SettingError(
+            f"{settings.called('journal')} is {settings.journal!r}, expected a file; an archive is "
+            "shown by lupin-twin fleet"
+        )
+    if settings.journal and not Path(settings.journal).exists():
+        log.warning(
+            "%s: there is no file %s; until there is, the twin's log is copied over ROS",
+            *(settings.called("journal"), settings.journal),
+        )
     listener = open_listener(settings, access)
     if not has_page():
         log.warning("the page was not built, / says so: %s", HOW_TO_BUILD)

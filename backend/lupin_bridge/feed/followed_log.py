@@ -20,13 +20,15 @@ from typing import Final, TypeVar
 from lupin_bridge.feed.shared_work import end
 from lupin_bridge.feed.source import TwinUnavailableError
 from lupin_twin.core.journal_condition import UNKNOWN, Condition, JournalState
+from lupin_twin.core.parameters import World
 from lupin_twin.core.past import NotRemembered, PastRefused
 from lupin_twin.journal.follow import Followed, Lot, NotALotError, followed, write
+from lupin_twin.journal.runs import world_of
 from lupin_twin.journal.schema import (
     FILE_ERRORS,
     Empty,
     Foreign,
-    get_meta,
+    SiteLog,
     is_damage_error,
     open_reader,
 )
@@ -57,7 +59,8 @@ class FollowedLog:
     """`condition` is that of the log which is read here; None: there is none yet.
 
     `query(after)` gives the rows behind a number. `named` is the twin's own file as it is called
-    here, None: as the twin calls it. Belongs to the event loop.
+    here, and is read before its twin is heard; None: as the twin calls it. `world` is what is
+    observed, as the log says. Belongs to the event loop.
     """
 
     def __init__(
@@ -70,7 +73,9 @@ class FollowedLog:
         self._named = named
         self._workers = workers
         self._folder: Path | None = None
+        self.world = World("unknown")
         self._reported = UNKNOWN
+        self._is_heard = False
         self._own: Path | None = None
         self._followed: Followed | None = None
         self._is_known = asyncio.Event()
@@ -91,12 +96,13 @@ class FollowedLog:
             written=self._followed.last,
             complete_ns=self._followed.complete_ns,
             kept_ns=self._followed.kept_ns,
+            simulated_ns=self._followed.simulated_ns,
         )
 
     def on_update(self, journal: Condition) -> None:
         """What the twin says of its journal; what it said last holds while it says nothing."""
         if journal.state is not JournalState.UNKNOWN and journal.journal_id:
-            self._reported = journal
+            self._reported, self._is_heard = journal, True
 
     async def explain(self, error: NotRemembered) -> NotRemembered:
         """The same error, but of a copy: that is made anew here, and not by the twin."""
@@ -121,6 +127,7 @@ class FollowedLog:
         if folder is not None:
             with contextlib.suppress(*_ERRORS):
                 self._followed = await self._on_worker(lambda: _newest(folder))
+                self.world = self._followed.world if self._followed else self.world
         self._task = asyncio.create_task(self._keep(), name="log")
 
     async def stop(self) -> None:
@@ -150,13 +157,24 @@ class FollowedLog:
 
     async def _look(self) -> float:
         """See where the log is, or take what is new of it; returns when to look again, s."""
+        named = self._named
+        if named is not None and not self._is_heard:
+            found = await self._on_worker(lambda: followed(named))
+            self._reported = Condition(
+                JournalState.RECORDING,
+                complete_ns=found.complete_ns,
+                kept_ns=found.kept_ns,
+                journal_id=found.journal,
+                simulated_ns=found.simulated_ns,
+            )
         twin = self._reported
         if not twin.journal_id:
             return POLL_S
-        own = self._named or Path(twin.path)
-        is_own = await self._on_worker(lambda: _is_journal(own, twin.journal_id))
-        self._own = own if is_own else None
-        if is_own or self._folder is None:
+        own = named or Path(twin.path)
+        world = await self._on_worker(lambda: _world_of(own, twin.journal_id))
+        self._own = None if world is None else own
+        self.world = world or self.world
+        if world is not None or self._folder is None:
             return RETRY_S
         here = self._path(twin.journal_id)
         try:
@@ -168,6 +186,7 @@ class FollowedLog:
             self._followed = await self._on_worker(
                 lambda: write(here, lot, twin.complete_ns, after)
             )
+            self.world = self._followed.world
         except _FILE_ERRORS as error:
             if isinstance(error, Foreign) or is_damage_error(error) or here.is_dir():
                 self._followed = None
@@ -208,9 +227,11 @@ def _last(path: Path) -> int:
         return 0
 
 
-def _is_journal(path: Path, journal: str) -> bool:
+def _world_of(path: Path, journal: str) -> World | None:
+    """What a file says is observed; None: it is not that journal's."""
     try:
         with contextlib.closing(open_reader(path)) as connection:
-            return get_meta(connection, "journal_id") == journal
+            log = SiteLog(connection)
+            return world_of(log) if log.meta("journal_id") == journal else None
     except _FILE_ERRORS:
-        return False
+        return None

@@ -33,7 +33,6 @@ class LocalTwin(RosSource[TwinNode]):
     ) -> None:
         super().__init__(ros_args=ros_args, timeout_s=timeout_s)
         self._world = world
-        self.day_length_s = world.day_length_s
         # A restarted server must never match an ETag of its predecessor, whose counts it repeats.
         self.identity = uuid.uuid4().hex[:12]
         # The first comes before the start is over.
@@ -66,6 +65,11 @@ class LocalTwin(RosSource[TwinNode]):
             return node
 
         await self._start_thread(make_node, on_state, on_death)
+
+    @property
+    def world(self) -> World:
+        """See `TwinSource`."""
+        return self._world
 
     def journal(self) -> Condition:
         """The node's journal."""

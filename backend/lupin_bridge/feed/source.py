@@ -19,6 +19,7 @@ from lupin_twin.core.diagnostics import Origin
 from lupin_twin.core.drops import Counts, Recent
 from lupin_twin.core.journal_condition import UNKNOWN, Condition
 from lupin_twin.core.notes import Note, NotesRequest, NotesUnwritable, PastNotes
+from lupin_twin.core.parameters import World
 from lupin_twin.core.past import NotRemembered, PastRow, PastWrites, WritesRequest
 from lupin_twin.core.state import Snapshot
 from lupin_twin.field.engine import FieldRules
@@ -115,8 +116,6 @@ class TwinSource(ABC):
     rules: FieldRules
     buffer_len: int
     names: TwinNames
-    # Of what comes daily, s of ROS time; a demo's is shorter.
-    day_length_s = 86_400.0
     # Who is named where an answer takes too long.
     answerer = "the twin"
     # A `RosThread`, or what is said where there is none.
@@ -133,6 +132,11 @@ class TwinSource(ABC):
     @abstractmethod
     async def stop(self) -> None:
         """Stop and release everything."""
+
+    @property
+    def world(self) -> World:
+        """What is observed, as far as the twin or its log says; a demo's day is shorter."""
+        return World("unknown")
 
     def revision(self) -> str:
         """The revision now: opaque, changes exactly when a field could; empty: nothing has come.

@@ -22,6 +22,7 @@ from lupin_bridge.feed.shared_work import Periodic
 from lupin_bridge.feed.source import TwinUnavailableError, TwinUpdate
 from lupin_bridge.feed.web_node import WebNode
 from lupin_twin.core.journal_condition import UNKNOWN, Condition
+from lupin_twin.core.parameters import World
 from lupin_twin.core.past import NotRemembered, PastRefused, error_of
 from lupin_twin.core.state import Snapshot
 from lupin_twin.field.engine import FieldRefused
@@ -153,6 +154,11 @@ class WebTwin(RosSource[WebNode]):
 
     def _silence(self, seconds: float) -> str:
         return f"nothing was received on {self.names.state_topic} for {seconds:g} s"
+
+    @property
+    def world(self) -> World:
+        """As the log says, where it is read here."""
+        return self._log.world
 
     def journal(self) -> Condition:
         """The twin's, as far as it is read here; before that, what is said on `/diagnostics`."""

@@ -28,8 +28,8 @@ from lupin_bridge.feed.past_child import Child, Search
 from lupin_bridge.feed.query import Now, PastQuery
 from lupin_bridge.fleet.compare import Compare
 from lupin_bridge.fleet.report import SitesReport
-from lupin_twin.core.diagnostics import Origin, origin_of
 from lupin_twin.core.notes import Note
+from lupin_twin.core.parameters import World
 from lupin_twin.core.past import NotRemembered
 from lupin_twin.core.state import Snapshot
 from lupin_twin.field.explored import OccupancyMap, map_of
@@ -37,8 +37,8 @@ from lupin_twin.journal.appending import simulated
 from lupin_twin.journal.fold import state_at
 from lupin_twin.journal.notes import last_number, put_note
 from lupin_twin.journal.retention import Stretches, kept
-from lupin_twin.journal.runs import FOREVER_NS, runs, span_at
-from lupin_twin.journal.schema import MAP, ORIGIN, DamagedFile, SiteLog
+from lupin_twin.journal.runs import FOREVER_NS, runs, span_at, world_of
+from lupin_twin.journal.schema import MAP, DamagedFile, SiteLog
 from lupin_twin.runtime.journal_queries import Recall
 from lupin_twin.runtime.workers import ShouldStop
 
@@ -74,13 +74,13 @@ class Latest:
 class Reported:
     """All tags as of the site's time now; what is kept of the past, and what of it is simulated.
 
-    `is_walls`: that time is the wall's, so it goes on also while nothing comes. `origin` is where
-    observations come from.
+    `is_walls`: that time is the wall's, so it goes on also while nothing comes. `world` is what is
+    observed.
     """
 
     snapshot: Snapshot
     is_walls: bool
-    origin: Origin
+    world: World
     kept_ns: Stretches
     simulated_ns: tuple[int, int] | None
     # By what the newest map is known; and itself, where that is another one.
@@ -158,7 +158,7 @@ def _latest(log: SiteLog, asked: Latest) -> Reported:
     return Reported(
         Snapshot(max(now_ns, stamp_ns or 0), asked.frame_id, known.tags),
         is_walls,
-        origin_of(log.meta(ORIGIN) or "", is_simulated=not is_walls),
+        world_of(log),
         kept(journal),
         None if found is None else (found.start_ns, found.end_ns),
         *_newer_map(log, asked.map_hash),

@@ -20,7 +20,7 @@ from lupin_bridge.fleet.reader import Latest, Reported
 from lupin_bridge.fleet.watching import Watching
 from lupin_twin.core.journal_condition import Condition, JournalState
 from lupin_twin.core.notes import Note, NotesUnwritable
-from lupin_twin.core.parameters import TwinParameters
+from lupin_twin.core.parameters import TwinParameters, World
 from lupin_twin.core.past import NotRemembered
 from lupin_twin.field.engine import FieldRules
 from lupin_twin.field.explored import OccupancyMap
@@ -94,6 +94,11 @@ class SiteTwin(TwinSource):
             self._wake.set()
 
     @property
+    def world(self) -> World:
+        """As the site's log says."""
+        return World("unknown") if self._reported is None else self._reported.world
+
+    @property
     def _site(self) -> Site:
         return self._watching.sites.get(self.site, Site(self.site))
 
@@ -162,7 +167,7 @@ class SiteTwin(TwinSource):
             occupancy_map=self._map,
             journal=self._condition(reported),
             rules=self.rules,
-            origin=reported.origin,
+            origin=reported.world.origin,
             input_problems=(problem,) if problem else (),
             silent_s=0.0 if is_live else ago_s,
         )

@@ -236,13 +236,19 @@ def timeline_body(
     """`schema.Timeline` in the buckets of `period`, which is the `coarsest`.
 
     Silences may be too many and come in buckets. Then the longest of each is given, as if it began
-    with its bucket.
+    with its bucket. What goes on ends with the period here: a period that is over has one answer.
     """
+
+    def until(at_ns: int, start_ns: int) -> int:
+        return at_ns if at_ns < runs.end_ns else max(start_ns, min(at_ns, period.end_ns))
+
     counts = {name: _by_bucket(counted[event], period) for name, event in COUNTED.items()}
     return {
         **stretch(period.start_ns, period.end_ns),
         "bucket_s": period.bucket_ns / NANOSECONDS_PER_SECOND,
-        "reach": stretch(runs.start_ns, runs.end_ns) if runs.stamps_ns else None,
+        "reach": stretch(runs.start_ns, until(runs.end_ns, runs.start_ns))
+        if runs.stamps_ns
+        else None,
         "buckets": [
             {
                 "start": stamp(period.start_ns + number * period.bucket_ns),
@@ -255,7 +261,7 @@ def timeline_body(
             for at_ns, longest_s in zip(silences.stamps_ns, silences.maxima, strict=True)
         ],
         "runs": [
-            {**stretch(at_ns, until_ns), "is_simulated": is_simulated == 1.0}
+            {**stretch(at_ns, until(until_ns, at_ns)), "is_simulated": is_simulated == 1.0}
             for at_ns, length_s, is_simulated in zip(
                 runs.stamps_ns, runs.means, runs.maxima, strict=True
             )

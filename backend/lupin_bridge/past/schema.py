@@ -73,7 +73,9 @@ class Timeline(Stretch):
     """What happened over a period, and what of the past is remembered at all."""
 
     bucket_s: float = Field(description="s, length of a bucket")
-    reach: Stretch | None = Field(description="what is remembered at all; null: nothing is")
+    reach: Stretch | None = Field(
+        description="what is remembered at all, up to the end of the period; null: nothing is"
+    )
     buckets: list[TimelineBucket] = Field(
         description="oldest first; one in which nothing happened is absent"
     )

@@ -60,7 +60,7 @@ async def _answer(request: Request, field_format: FieldFormat) -> Response:
     at_ns = past_query.at_of(query.at, now_ns)
     estimated = Estimated(
         *(at_ns, query, field_format, source.rules, None, bridge.criteria),
-        day_length_s=source.day_length_s,
+        day_length_s=source.world.day_length_s,
         now_ns=now_ns or 0,
     )
     estimated.check()

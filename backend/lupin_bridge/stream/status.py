@@ -5,13 +5,14 @@ Pure: the time is an argument, seconds of a clock that never jumps.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
 from typing import Any, Literal
 
 from lupin_bridge.feed.source import TwinUpdate
 from lupin_bridge.stream.state_json import stamp
 from lupin_twin.core.journal_condition import Condition, JournalState
+from lupin_twin.core.parameters import World
 from lupin_twin.core.state import ClockState, Snapshot
 
 # The twin publishes at least once a second (parameter state_publish_rate_hz, default 1); three
@@ -155,10 +156,13 @@ def _journal(journal: Condition) -> dict[str, Any]:
 
 @dataclass(slots=True)
 class Liveness:
-    """The twin's newest update, when that came, and whether the thread still runs."""
+    """The twin's newest update, when that came, and whether the thread still runs.
 
+    `world()` is what is observed, as far as it is known without an update.
+    """
+
+    world: Callable[[], World] = lambda: World("unknown")
     stale_after_s: float = STALE_AFTER_S
-    day_length_s: float = 86_400.0
     update: TwinUpdate | None = None
     updated_s: float = 0.0
     outward: Mapping[str, str] = field(default_factory=dict)
@@ -174,8 +178,9 @@ class Liveness:
 
     def status(self, now_s: float) -> Status:
         """The status at `now_s`."""
-        age_s, update = self.silent_s(now_s), self.update or NO_UPDATE
-        return Status(self._reason(age_s), age_s, update, self.outward, self.day_length_s)
+        age_s, world = self.silent_s(now_s), self.world()
+        update = self.update or replace(NO_UPDATE, origin=world.origin)
+        return Status(self._reason(age_s), age_s, update, self.outward, world.day_length_s)
 
     def _reason(self, age_s: float | None) -> Reason:
         if self.shutting_down:

@@ -60,6 +60,11 @@ def test_a_bad_ros_argument_is_named(domain: int, arguments: list[str], named: s
         assert named in refused(process)
 
 
+def test_an_archive_is_no_journal_of_a_web(domain: int) -> None:
+    with lupin_twin(domain, "web", "--journal", "postgresql://db/lupin") as process:
+        assert "'postgresql://db/lupin', expected a file" in refused(process)
+
+
 # --- roles --------------------------------------------------------------------------------------
 
 

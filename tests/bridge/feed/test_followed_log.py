@@ -6,9 +6,12 @@ import time
 from pathlib import Path
 
 from lupin_bridge.feed.followed_log import RETAINED_S, FollowedLog
+from lupin_twin.core.parameters import World
 from lupin_twin.core.past import NotRemembered
 from lupin_twin.journal.follow import Lot, write
 from lupin_twin.runtime.workers import Workers
+from tests.support.journal import NOW, recording, scan
+from tests.support.waiting import wait_for
 
 
 def copies(folder: Path, *ages_s: float) -> list[Path]:
@@ -45,3 +48,25 @@ def test_a_copy_that_was_not_written_for_long_is_deleted_at_the_start(tmp_path: 
 def test_the_newest_stays_however_old_it_is(tmp_path: Path) -> None:
     newest, _ = copies(tmp_path, RETAINED_S + 60.0, RETAINED_S + 120.0)
     assert left_after_start(tmp_path) == (str(newest), [newest])
+
+
+def test_a_file_that_is_named_is_read_before_its_twin_is_heard(tmp_path: Path) -> None:
+    journal = tmp_path / "j.sqlite"
+    with recording(journal, world=World("simulated", 1_440.0)) as twin:
+        twin.write(scan())
+        wait_for(lambda: twin.condition.written == 1, "it")
+
+    async def test() -> None:
+        async def query(_after: int) -> Lot:
+            raise NotRemembered("nobody is there", is_lasting=False)
+
+        log = FollowedLog(query, Workers("test"), journal)
+        await log.start(tmp_path / "copies")
+        await log.wait()
+        condition = log.condition
+        assert condition is not None
+        assert (condition.path, condition.complete_ns) == (str(journal), NOW)
+        assert log.world == World("simulated", 1_440.0)
+        await log.stop()
+
+    asyncio.run(test())

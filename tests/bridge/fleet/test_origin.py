@@ -4,6 +4,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from lupin_twin.core.diagnostics import Origin
+from lupin_twin.core.parameters import World
 from tests.support.archive import Archive, forward_once
 from tests.support.fleet import fleet, scans_lately, wall, write
 from tests.support.journal import recording
@@ -19,7 +20,9 @@ SITES: tuple[tuple[str, Origin, bool, str], ...] = (
 
 
 def forward(archive: Archive, journal: Path, origin: Origin, *, is_simulated: bool = False) -> None:
-    with recording(journal, replace(wall(), is_simulated=is_simulated), origin=origin) as twin:
+    with recording(
+        journal, replace(wall(), is_simulated=is_simulated), world=World(origin)
+    ) as twin:
         for row in scans_lately():
             twin.write(row)
     forward_once(archive, journal)

@@ -106,17 +106,19 @@ def test_the_runs_that_meet_the_period_are_told_and_how_far_all_of_them_reach() 
         2 * NS,
         500 * NS,
         None,
-        (2 * NS, 10 * NS, 80 * NS, 200 * NS),
-        (1, 1, 1, 1),
-        (3.0, 40.0, 100.0, 300.0),
-        (0.0, 1.0, 0.0, 0.0),
-        (0.0, 1.0, 0.0, 0.0),
+        (2 * NS, 10 * NS, 80 * NS, 90 * NS, 200 * NS),
+        (1, 1, 1, 1, 1),
+        (3.0, 40.0, 100.0, 410.0, 300.0),
+        (0.0, 1.0, 0.0, 0.0, 0.0),
+        (0.0, 1.0, 0.0, 0.0, 0.0),
     )
     found = written(parts(50 * NS, 100 * NS, runs=runs))
-    assert found["reach"] == {"from": at(2), "to": at(500)}
+    assert found["reach"] == {"from": at(2), "to": at(100)}
     assert found["runs"] == [
         {"from": at(10), "to": at(50), "is_simulated": True},
         {"from": at(80), "to": at(180), "is_simulated": False},
+        # Until now, which is later than the period.
+        {"from": at(90), "to": at(100), "is_simulated": False},
     ]
 
 

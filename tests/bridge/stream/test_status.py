@@ -10,6 +10,7 @@ from lupin_bridge.stream import schema
 from lupin_bridge.stream.status import STALE_AFTER_S, Liveness, Reason, Status
 from lupin_twin.core.drops import Counts, Recent
 from lupin_twin.core.journal_condition import Condition, JournalState
+from lupin_twin.core.parameters import World
 from lupin_twin.core.state import ClockState, Snapshot
 from lupin_twin.ros.convert import map_of
 from tests.support.messages import occupancy_grid
@@ -40,6 +41,14 @@ def test_a_silence_is_told_in_the_time_that_is_promised() -> None:
 
 def test_a_twin_that_was_never_heard_has_no_age() -> None:
     assert Liveness().status(5.0) == Status("never_seen", None)
+
+
+def test_what_is_observed_is_known_by_the_log_before_the_twin_is_heard() -> None:
+    status = Liveness(lambda: World("simulated", 1_440.0)).status(5.0)
+    assert (status.reason, status.update.origin, status.day_length_s) == (
+        *("never_seen", "simulated"),
+        1_440.0,
+    )
 
 
 def test_an_age_is_never_negative() -> None:

@@ -11,8 +11,8 @@ from lupin_twin.core.state import Write
 from lupin_twin.journal import follow
 from lupin_twin.journal.follow import Followed, Lot, NotALotError
 from lupin_twin.journal.rebuild import upgrade
-from lupin_twin.journal.retention import Limits, purge_step
-from lupin_twin.journal.schema import open_reader, open_writer, transaction
+from lupin_twin.journal.retention import Limits, forget, purge_step
+from lupin_twin.journal.schema import DamagedFile, open_reader, open_writer, transaction
 from tests.support.journal import NOW, SECOND, kept, look, pin, scan
 from tests.support.journal_answers import NAMES, answer, answers, old, same
 
@@ -31,7 +31,7 @@ def copy(source: Path, target: Path, most: int = 7) -> Followed:
     while True:
         with reading(source) as connection:
             lot = follow.read(connection, after, most)
-        found = follow.write(target, lot, NOW)
+        found = follow.write(target, lot, NOW, after)
         after = lot.last
         if lot.is_all:
             return found
@@ -94,6 +94,59 @@ def test_what_the_journal_deletes_is_deleted_in_the_copy_and_its_hours_stay(
     assert follow.followed(target).kept_ns == follow.followed(source).kept_ns != ((NOW, 2**63 - 1),)
 
 
+def purge(path: Path, upto_ns: int) -> None:
+    with closing(open_writer(path)) as connection, transaction(connection):
+        assert purge_step(connection, Limits(1.0, 10**12), upto_ns)
+
+
+def test_a_copy_begun_after_rows_were_deleted_has_what_was_counted_of_them(
+    source: Path, tmp_path: Path
+) -> None:
+    target = tmp_path / "web.sqlite"
+    # Behind a pause of 20 minutes, which a late scan halves: it is none any more.
+    kept(source, [scan(at_ns=NOW + 31 * 600 * SECOND)])
+    purge(source, NOW + 6 * 3_600 * SECOND)
+    copy(source, target, 2)
+    assert contents(target) == contents(source)
+    kept(source, [scan(at_ns=NOW + 30 * 600 * SECOND)])
+    copy(source, target, 2)
+    assert contents(target) == contents(source)
+    # Late ones, of hours that have lost rows and of others; the pests of one were never there.
+    late = NOW + 2 * 3_600 * SECOND
+    kept(source, [scan(at_ns=late, co2=9e3), look("8", at_ns=late), scan("9", NOW + 1, co2=1.0)])
+    kept(source, [scan(at_ns=NOW + 60 * 3_600 * SECOND)])
+    copy(source, target, 2)
+    assert contents(target) == contents(source)
+
+
+def test_a_copy_that_lacks_what_was_deleted_meanwhile_is_made_anew(
+    source: Path, tmp_path: Path
+) -> None:
+    target = tmp_path / "web.sqlite"
+    copy(source, target)
+    kept(source, [scan(at_ns=NOW + (n + 60) * 600 * SECOND) for n in range(30)])
+    purge(source, NOW + 85 * 600 * SECOND)
+    with pytest.raises(DamagedFile, match="were deleted in the journal"):
+        copy(source, target)
+    target.unlink()
+    copy(source, target)
+    assert contents(target) == contents(source)
+
+
+@pytest.mark.parametrize("pose_only", [True, False])
+def test_a_tag_that_is_forgotten_is_gone_from_the_copy(
+    source: Path, tmp_path: Path, *, pose_only: bool
+) -> None:
+    target = tmp_path / "web.sqlite"
+    copy(source, target)
+    forget(source, "7", pose_only=pose_only, by="who", at_ns=NOW)
+    kept(source, [scan(at_ns=NOW + 500 * 600 * SECOND)])
+    copy(source, target)
+    assert contents(target) == contents(source)
+    copy(source, tmp_path / "new.sqlite")
+    assert contents(tmp_path / "new.sqlite") == contents(source)
+
+
 def test_a_lot_is_never_cut_between_a_series_and_its_first_row(source: Path) -> None:
     with reading(source) as connection:
         for most in range(1, 6):
@@ -103,7 +156,9 @@ def test_a_lot_is_never_cut_between_a_series_and_its_first_row(source: Path) -> 
                 after = lot.last
 
 
-@pytest.mark.parametrize("name", [name for name in NAMES if name in {"day", "runs", "late"}])
+@pytest.mark.parametrize(
+    "name", [name for name in NAMES if name in {"day", "runs", "late", "purged"}]
+)
 def test_a_copy_answers_as_the_journal_does(name: str, tmp_path: Path) -> None:
     source = old(name, tmp_path)
     upgrade(source, lambda _: None)

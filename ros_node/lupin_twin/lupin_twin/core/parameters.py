@@ -119,7 +119,8 @@ class TwinParameters:
 
     journal: str = _parameter(
         "",
-        "file that keeps what was observed; off: none; empty: the user's, by domain and namespace",
+        "file that keeps what was observed; off: a temporary one; empty: the user's, by domain and "
+        "namespace",
         may_be_empty=True,
         fixed=_MADE,
     )

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Final
 
 from lupin_twin.core.notes import Note
+from lupin_twin.core.parameters import World
 from lupin_twin.core.state import Write
 from lupin_twin.journal.appending import Appender, Stretch, copy_known, simulated
 from lupin_twin.journal.beside import Syncing, forwarded_seq
@@ -42,6 +43,7 @@ from lupin_twin.journal.runs import (
 )
 from lupin_twin.journal.salvage import quarantine, salvage
 from lupin_twin.journal.schema import (
+    DAY_LENGTH,
     FILE_ERRORS,
     LOCAL_SITE,
     MAP,
@@ -164,10 +166,11 @@ class JournalFile:
                 note_lost(self._connection, run.root, self._last(run).stamp_ns)
             self._connection.execute("DELETE FROM meta WHERE key = ?", (_SALVAGE,))
 
-    def note_origin(self, origin: str) -> None:
-        """Have it in the file where what is recorded from now on comes from."""
-        if get_meta(self._connection, ORIGIN) != origin:
-            set_meta(self._connection, ORIGIN, origin)
+    def note_world(self, world: World) -> None:
+        """Have it in the file what is observed from now on."""
+        for key, value in ((ORIGIN, world.origin), (DAY_LENGTH, str(world.day_length_s))):
+            if get_meta(self._connection, key) != value:
+                set_meta(self._connection, key, value)
 
     def put_map(self, floor: object, text_of: Callable[[], str]) -> None:
         """Have the newest map in the file, by this call or one to come; empty: it is too large."""

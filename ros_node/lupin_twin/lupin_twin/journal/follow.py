@@ -3,8 +3,9 @@
 
 At least once on the way, exactly once in the file: a lot is one transaction, and rows that are
 there are known by their numbers. A file holds one journal and has its identity; of another journal
-another file is made. What is counted by the hour is counted anew of the rows that come; what the
-journal deletes meanwhile is deleted here too.
+another file is made. What is counted by the hour is counted anew of the rows that come; up to where
+the journal has deleted rows, it comes as it was counted there. What is deleted or forgotten
+meanwhile is deleted here too.
 """
 
 from __future__ import annotations
@@ -18,7 +19,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
+from lupin_twin.core.parameters import World
 from lupin_twin.core.past import (
+    HOUR_NS,
     MAX_SCANS,
     RECENT_COUNT,
     PastWrite,
@@ -31,16 +34,18 @@ from lupin_twin.core.past import (
     recent_of,
 )
 from lupin_twin.core.state import sure_species
-from lupin_twin.journal.appending import PURGED_SEQ
+from lupin_twin.journal.appending import PURGED_SEQ, Stretch, simulated
 from lupin_twin.journal.checking import WRITTEN
 from lupin_twin.journal.events import FROM_SCAN
-from lupin_twin.journal.hours import count_rows
+from lupin_twin.journal.hours import DELETED, FORGOTTEN, TALLIED, count_rows
 from lupin_twin.journal.notes import id_behind, number_of
-from lupin_twin.journal.retention import Stretches, kept
+from lupin_twin.journal.retention import RECORD, Stretches, delete_recorded, kept
 from lupin_twin.journal.rows import KIND_FLOWER, STATUS_OK, named_numbers, sensor_names
-from lupin_twin.journal.runs import Span, cut, runs, span_at, spans
+from lupin_twin.journal.runs import Span, cut, runs, span_at, spans, world_of
 from lupin_twin.journal.schema import (
+    DAY_LENGTH,
     LOCAL_SITE,
+    ORIGIN,
     DamagedFile,
     SiteLog,
     get_meta,
@@ -54,12 +59,59 @@ MAX_ROWS: Final = 2_000
 _MAX_BYTES: Final = 1_000_000
 # In the order in which rows of one number belong.
 _NUMBERED: Final = ("series", "scan", "look", "place", "note")
-_FACTS: Final = ("purged_ns:", "lost_ns:", PURGED_SEQ, "simulated_")
+_FACTS: Final = (
+    *(DELETED, FORGOTTEN, "lost_ns:", PURGED_SEQ, "simulated_", RECORD, ORIGIN, DAY_LENGTH),
+)
 _FOLLOWED: Final = "followed_seq"
 _COMPLETE: Final = "followed_to_ns"
 _COLUMNS: Final = {
     "run": 7, "meta": 2, "series": 5, "scan": 11, "look": 16, "place": 13, "note": 7,
+    "hour": 6, "tally": 9, "event": 6,
 }  # fmt: skip
+# Up to this hour rows of a run were deleted, or may have been.
+_PURGED: Final = (
+    "SELECT CAST(substr(key, instr(key, ':') + 1) AS INTEGER) AS run,"
+    f" max(CAST(value AS INTEGER)) / {HOUR_NS} AS hour FROM meta WHERE site = :site"
+    f" AND (key LIKE '{DELETED}%' OR key LIKE '{FORGOTTEN}%') GROUP BY 1"
+)
+_ATTEMPTS: Final = (
+    f"SELECT series, run, stamp_ns / {HOUR_NS} AS hour FROM scan JOIN series USING (site, series)"
+    " WHERE site = :site AND seq > :after AND seq <= :last AND is_copy = 0 UNION"
+    f" SELECT NULL, run, stamp_ns / {HOUR_NS} FROM look"
+    " WHERE site = :site AND seq > :after AND seq <= :last AND is_copy = 0"
+)
+# What is counted of such hours comes with the series, the rest with the first lot; and whenever
+# attempts come late.
+_WITH: Final = (
+    f"WITH purged AS ({_PURGED}), late AS (SELECT DISTINCT a.series, a.run, a.hour"
+    f" FROM ({_ATTEMPTS}) AS a JOIN purged AS p ON p.run = a.run AND a.hour <= p.hour)"
+)
+_EVENTS: Final = (
+    "EXISTS (SELECT 1 FROM purged AS p WHERE p.run = event.run"
+    f" AND event.stamp_ns < (p.hour + 1) * {HOUR_NS})"
+    " AND (:after = 0 OR run IN (SELECT run FROM late))"
+)
+_COUNTED: Final = {
+    "hour": (
+        f"{_WITH} SELECT * FROM hour WHERE site = :site AND (series, hour) IN (SELECT series, hour"
+        " FROM late) UNION SELECT h.* FROM series AS s JOIN purged AS p USING (run) JOIN hour AS h"
+        " ON h.site = s.site AND h.series = s.series AND h.hour <= p.hour"
+        " WHERE s.site = :site AND s.series > :after AND s.series <= :last"
+    ),
+    "tally": (
+        f"{_WITH} SELECT t.* FROM purged AS p CROSS JOIN tally AS t ON t.site = :site"
+        " AND t.run = p.run AND t.hour <= p.hour WHERE :after = 0"
+        " UNION SELECT t.* FROM late CROSS JOIN tally AS t ON t.site = :site AND t.run = late.run"
+        f" AND t.event IN {tuple(map(str, TALLIED))} AND t.hour = late.hour"
+    ),
+    "event": f"{_WITH} SELECT * FROM event WHERE site = :site AND {_EVENTS}",
+}
+_OTHER_EVENTS: Final = f"{_WITH} DELETE FROM event WHERE site = :site AND {_EVENTS}"
+_HOURS_OF: Final = (
+    "SELECT count(*) FROM hour WHERE site = :site AND series = :series AND hour <= :hour"
+)
+# What an hour takes as a row.
+_HOUR_BYTES: Final = 120
 
 
 class Lot(NamedTuple):
@@ -76,12 +128,17 @@ class Lot(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Followed:
-    """How far a file is: the journal it is of, the last number, and as in `Condition`."""
+    """How far a file is: the journal it is of, the last number, what it is of; as in `Condition`.
+
+    A twin's own has no last number, and is complete up to its newest row.
+    """
 
     journal: str
     last: int
+    world: World
     complete_ns: int
     kept_ns: Stretches
+    simulated_ns: Stretch | None
 
 
 class NotALotError(ValueError):
@@ -99,13 +156,22 @@ def read(connection: sqlite3.Connection, after: int, most: int = MAX_ROWS) -> Lo
         for row in _behind(log, table, after, most)
     ]
     found.sort(key=lambda entry: entry[:2])
-    last, weight = after, 0
+    purged: dict[int, int] = dict(log.execute(_PURGED).fetchall())
+    last, weight, is_all = after, 0, True
     for place, (number, rank, row) in enumerate(found):
         if (place >= most or weight > _MAX_BYTES) and number != last:
-            return Lot(_journal_id(log), tuple(texts), last, is_all=False)
+            is_all = False
+            break
         texts.append(_text(_NUMBERED[rank], row))
         last, weight = number, weight + len(texts[-1])
-    return Lot(_journal_id(log), tuple(texts), last, is_all=True)
+        if _NUMBERED[rank] == "series" and row[2] in purged:
+            of_series = {"series": number, "hour": purged[row[2]]}
+            weight += log.execute(_HOURS_OF, of_series).fetchone()[0] * _HOUR_BYTES
+    if purged:
+        for table, sql in _COUNTED.items():
+            rows = log.execute(sql, {"after": after, "last": last}).fetchall()
+            texts += [_text(table, row) for row in rows]
+    return Lot(_journal_id(log), tuple(texts), last, is_all)
 
 
 def write(path: Path, lot: Lot, complete_ns: int | None, behind: int = 0) -> Followed:
@@ -116,6 +182,7 @@ def write(path: Path, lot: Lot, complete_ns: int | None, behind: int = 0) -> Fol
 
     Raises:
         NotALotError: it cannot be what it says, or the file is no longer as far as `behind`.
+        DamagedFile: it is not whole any more, and has to be made anew.
         Foreign, sqlite3.Error, OSError: as `open_writer`.
 
     """
@@ -124,11 +191,14 @@ def write(path: Path, lot: Lot, complete_ns: int | None, behind: int = 0) -> Fol
         with transaction(connection):
             if _last(connection) < behind:
                 raise NotALotError(f"rows behind number {behind} for a file that ends before it")
+            purged = _purged_seq(connection)
             set_meta(connection, "journal_id", lot.journal)
             try:
                 _put(connection, lot)
             except (ValueError, TypeError, KeyError, IndexError, DamagedFile) as error:
                 raise NotALotError(f"rows that are none of a log: {error}") from error
+            if 0 < behind < _purged_seq(connection) != purged:
+                raise DamagedFile("rows that it does not have yet were deleted in the journal")
             set_meta(connection, _FOLLOWED, max(lot.last, _last(connection)))
             if not lot.is_all or complete_ns is None:
                 complete_ns = _newest_ns(connection)
@@ -150,9 +220,14 @@ def followed(path: Path) -> Followed:
 
 
 def _followed(connection: sqlite3.Connection) -> Followed:
-    complete_ns = int(get_meta(connection, _COMPLETE) or 0)
+    log = SiteLog(connection)
     return Followed(
-        _journal_id(SiteLog(connection)), _last(connection), complete_ns, kept(connection)
+        _journal_id(log),
+        _last(connection),
+        world_of(log),
+        int(log.meta(_COMPLETE) or 0) or _newest_ns(connection) or 0,
+        kept(connection),
+        simulated(connection),
     )
 
 
@@ -205,17 +280,39 @@ def _journal_id(log: SiteLog) -> str:
 
 
 def _put(connection: sqlite3.Connection, lot: Lot) -> None:
-    after = _last(connection)
-    for table, *row in _rows(lot.rows):
-        if table in WRITTEN and row[0] <= after:
-            continue
-        way = "REPLACE" if table in {"run", "meta"} else "IGNORE"
-        marks = ", ?" * len(row)
-        connection.execute(f"INSERT OR {way} INTO {table} VALUES ('{LOCAL_SITE}'{marks})", row)
-    count_rows(SiteLog(connection), after, lot.last)
-    purged = int(get_meta(connection, PURGED_SEQ) or 0)
+    after, log = _last(connection), SiteLog(connection)
+    rows, counted = list(_rows(lot.rows)), []
+    # First: what came since may be of a series with the same tag and sensors.
+    for table, *row in rows:
+        if table == "meta" and row[0].startswith(RECORD) and log.meta(row[0]) != row[1]:
+            delete_recorded(connection, row[1])
+    for table, *row in rows:
+        if table in _COUNTED:
+            counted.append((table, row))
+        elif table not in WRITTEN or row[0] > after:
+            _insert(connection, table, row, replaces=table in {"run", "meta"})
+    purged = log.execute(_PURGED).fetchall()
+    counted_ns = {run: (hour + 1) * HOUR_NS - 1 for run, hour in purged}
+    count_rows(log, after, lot.last, counted_ns)
+    # Another process may have put newer ones in.
+    if lot.last >= after:
+        log.execute(_OTHER_EVENTS, {"after": after, "last": lot.last})
+        for table, row in counted:
+            _insert(connection, table, row, replaces=True)
     for table in WRITTEN:
-        connection.execute(f"DELETE FROM {table} WHERE site = ? AND seq <= ?", (LOCAL_SITE, purged))
+        connection.execute(
+            f"DELETE FROM {table} WHERE site = ? AND seq <= ?",
+            (LOCAL_SITE, _purged_seq(connection)),
+        )
+
+
+def _insert(connection: sqlite3.Connection, table: str, row: list[Any], *, replaces: bool) -> None:
+    way, marks = "REPLACE" if replaces else "IGNORE", ", ?" * len(row)
+    connection.execute(f"INSERT OR {way} INTO {table} VALUES ('{LOCAL_SITE}'{marks})", row)
+
+
+def _purged_seq(connection: sqlite3.Connection) -> int:
+    return int(get_meta(connection, PURGED_SEQ) or 0)
 
 
 def _rows(texts: Iterable[str]) -> Iterator[list[Any]]:

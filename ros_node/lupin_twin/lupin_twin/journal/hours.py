@@ -21,6 +21,8 @@ from lupin_twin.journal.schema import DamagedFile, SiteLog
 SILENCE_NS: Final = 600 * 1_000_000_000
 # With the number of a run behind it: the last stamp of what was deleted of it.
 DELETED: Final = "purged_ns:"
+# The same: up to when the site's counts have what was forgotten since.
+FORGOTTEN: Final = "counted_ns:"
 # What is counted by the hour.
 TALLIED: Final = (Event.SCANS, Event.FAILURES, Event.INSPECTIONS)
 # A sum of larger readings could be beyond any number, which PostgreSQL refuses.

@@ -17,7 +17,7 @@ from typing import Final
 from lupin_twin.core.past import HOUR_NS
 from lupin_twin.journal.appending import LAST_SEQ, PURGED_SEQ, Appender
 from lupin_twin.journal.beside import InUse, Lock
-from lupin_twin.journal.hours import DELETED, deleted_ns, extent
+from lupin_twin.journal.hours import DELETED, FORGOTTEN, deleted_ns, extent
 from lupin_twin.journal.runs import runs, spans
 from lupin_twin.journal.schema import (
     LOCAL_SITE,
@@ -203,8 +203,11 @@ def _pages(connection: sqlite3.Connection) -> tuple[int, int, int]:
 
 
 RECORD: Final = "forgotten:"
+_POSE: Final = "pose"
 _OF_TAG: Final = "site = :site AND tag = :tag"
-_OF_SERIES: Final = f"site = :site AND series IN (SELECT series FROM series WHERE {_OF_TAG})"  # noqa: S608
+_OF_SERIES: Final = (
+    f"site = :site AND series IN (SELECT series FROM series WHERE {_OF_TAG} AND series <= :upto)"  # noqa: S608
+)
 
 
 class UnknownTagError(Exception):
@@ -243,10 +246,14 @@ def forget(path: Path, tag_id: str, *, pose_only: bool, by: str, at_ns: int) -> 
         # The numbers go on, also when the newest rows are gone.
         last_seq = Appender(connection).last_seq
         set_meta(connection, LAST_SEQ, last_seq)
-        forgotten = _delete(connection, tag_id, pose_only=pose_only)
+        forgotten = delete_tag(connection, tag_id, last_seq, pose_only=pose_only)
         if pose_only and not forgotten.places:
             raise UnknownTagError(f"the journal {path} knows no place of tag {tag_id!r}")
-        what = "pose" if pose_only else "all"
+        what = _POSE if pose_only else "all"
+        log = SiteLog(connection)
+        for run in runs(connection.execute):
+            if (attempts := extent(log, run.id)) is not None:
+                set_meta(connection, f"{FORGOTTEN}{run.id}", attempts[1])
         record = {"tag": tag_id, "what": what, "by": by, "at": at_ns, "seq": last_seq}
         number = 1 + sum(1 for _ in records(connection))
         set_meta(connection, f"{RECORD}{number}", json.dumps(record))
@@ -275,16 +282,33 @@ def _check_known(connection: sqlite3.Connection, path: Path, tag_id: str) -> Non
     raise UnknownTagError(f"the journal {path} knows no tag {tag_id!r}")
 
 
-def _delete(connection: sqlite3.Connection, tag_id: str, *, pose_only: bool) -> Forgotten:
-    def gone(table: str, which: str = _OF_TAG) -> int:
-        query = {"site": LOCAL_SITE, "tag": tag_id}
+def delete_recorded(connection: sqlite3.Connection, record: str) -> None:
+    """Delete in a copy of the log what one of the `records`, JSON, says was deleted in it.
+
+    Raises:
+        ValueError, KeyError, TypeError: it is none.
+
+    """
+    found = json.loads(record)
+    is_pose = found["what"] == _POSE
+    delete_tag(connection, found["tag"], found["seq"], pose_only=is_pose)
+
+
+def delete_tag(
+    connection: sqlite3.Connection, tag_id: str, upto: int, *, pose_only: bool
+) -> Forgotten:
+    """Delete a tag's places, or all that is known of it, up to a number."""
+
+    def gone(table: str, which: str) -> int:
+        query = {"site": LOCAL_SITE, "tag": tag_id, "upto": upto}
         return connection.execute(f"DELETE FROM {table} WHERE {which}", query).rowcount  # noqa: S608
 
-    places = gone("place")
+    of_tag = f"{_OF_TAG} AND seq <= :upto"
+    places = gone("place", of_tag)
     if pose_only:
         return Forgotten(0, 0, places)
     gone("hour", _OF_SERIES)
-    gone("event")
-    scans, inspections = gone("scan", _OF_SERIES), gone("look")
-    gone("series")
+    gone("event", of_tag)
+    scans, inspections = gone("scan", _OF_SERIES), gone("look", of_tag)
+    gone("series", f"{_OF_TAG} AND series <= :upto")
     return Forgotten(scans, inspections, places)

@@ -16,7 +16,9 @@ from dataclasses import dataclass
 from enum import Enum, IntEnum
 from typing import Any, Final
 
-from lupin_twin.journal.schema import LOCAL_SITE
+from lupin_twin.core.diagnostics import origin_of
+from lupin_twin.core.parameters import World
+from lupin_twin.journal.schema import DAY_LENGTH, LOCAL_SITE, ORIGIN, SiteLog
 
 # A wall clock that is set back by no more is the same clock, corrected.
 CORRECTION_NS: Final = 300 * 1_000_000_000
@@ -142,6 +144,15 @@ def span_at(every: Iterable[Run], at_ns: int) -> Span | None:
     found = spans(every)
     index = bisect_right([span.start_ns for span in found], at_ns)
     return found[index - 1] if index else None
+
+
+def world_of(log: SiteLog) -> World:
+    """What is observed, as whoever wrote last has noted it."""
+    span = span_at(runs(log.execute), FOREVER_NS)
+    is_simulated = span is not None and span.run.begun.is_simulated
+    origin = origin_of(log.meta(ORIGIN) or "", is_simulated=is_simulated)
+    day = log.meta(DAY_LENGTH)
+    return World(origin) if day is None else World(origin, float(day))
 
 
 def cut(axis: Iterable[Span], start_ns: int, end_ns: int) -> list[Span]:

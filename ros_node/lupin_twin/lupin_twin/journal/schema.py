@@ -325,8 +325,9 @@ def _own_tables() -> frozenset[bytes]:
         return frozenset(sql for (sql,) in new.execute(_SCHEMA))
 
 
-# A fact: where what is recorded comes from, see `core.diagnostics.Origin`.
+# Facts: where what is recorded comes from, and how long a day takes there, see `World`.
 ORIGIN: Final = "origin"
+DAY_LENGTH: Final = "day_length_s"
 # Another: the newest map, see `explored.text_of`.
 MAP: Final = "map"
 

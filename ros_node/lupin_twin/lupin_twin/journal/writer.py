@@ -19,9 +19,9 @@ from itertools import islice
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
-from lupin_twin.core.diagnostics import Origin
 from lupin_twin.core.journal_condition import Condition, JournalState
 from lupin_twin.core.notes import Note
+from lupin_twin.core.parameters import World
 from lupin_twin.core.state import Write
 from lupin_twin.field.explored import OccupancyMap, text_of
 from lupin_twin.journal.beside import InUse, Lock
@@ -156,12 +156,12 @@ class Journal:
         limits: Limits,
         max_weight: int = MAX_WEIGHT,
         *,
-        origin: Origin = "robot",
+        world: World = World(),
         is_temporary: bool = False,
     ) -> None:
         self._path = path
         self._holder = holder
-        self._origin = origin
+        self._world = world
         self._limits = limits
         self._is_temporary = is_temporary
         self._pending = Pending(max_weight)
@@ -304,7 +304,7 @@ class Journal:
         try:
             self._is_sound = True
             self._quarantined = file.quarantined or self._quarantined
-            file.note_origin(self._origin)
+            file.note_world(self._world)
             if self._runs:
                 file.retain_run(self._runs[-1])
             is_last = False

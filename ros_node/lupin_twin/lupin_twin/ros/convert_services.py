@@ -174,8 +174,8 @@ def report_of(response: Any) -> Report:
     )
 
 
-# Of tables that are small the rows come each time.
-_MAX_ROWS: Final = 50_000
+# Of tables that are small the rows come each time; of one series, decades of hours.
+_MAX_ROWS: Final = 500_000
 # It becomes the name of a file.
 _ID: Final = re.compile("[0-9a-f]{32}")
 

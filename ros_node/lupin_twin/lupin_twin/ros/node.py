@@ -158,7 +158,7 @@ class TwinNode(AdjustableNode):
                 f"parameter journal is empty, and there is no home to keep one in: {error}"
             ) from error
         name = self.get_fully_qualified_name()
-        journal = open_journal(path, name, p.journal_days, p.journal_max_mb, self._world.origin)
+        journal = open_journal(path, name, p.journal_days, p.journal_max_mb, self._world)
         return Memory(self.store, journal)
 
     def _connect(self) -> None:

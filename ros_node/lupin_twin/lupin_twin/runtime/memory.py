@@ -19,10 +19,10 @@ from pathlib import Path
 from typing import Final, NamedTuple
 
 from lupin_twin.core import ingest
-from lupin_twin.core.diagnostics import Origin
 from lupin_twin.core.drops import Drop
 from lupin_twin.core.history import Repeats
 from lupin_twin.core.journal_condition import Condition
+from lupin_twin.core.parameters import World
 from lupin_twin.core.state import Pin, TwinStore, Write
 from lupin_twin.journal.fold import Restored
 from lupin_twin.journal.retention import Limits
@@ -240,18 +240,18 @@ class Memory:
 
 
 def open_journal(
-    path: Path | None, holder: str, days: float, max_mb: float, origin: Origin = "robot"
+    path: Path | None, holder: str, days: float, max_mb: float, world: World = World()
 ) -> Journal:
     """A journal at work; without a path it is in a temporary file, gone at the end.
 
-    `holder` names this process to others; `origin` is where what it records comes from.
+    `holder` names this process to others; `world` is what is observed.
     """
     limits = Limits(days, int(max_mb * 1e6))
     if path is not None:
-        return Journal(path, holder, limits, origin=origin)
+        return Journal(path, holder, limits, world=world)
     folder = Path(tempfile.mkdtemp(prefix="lupin-twin-"))
     file = folder / "journal.sqlite"
-    return Journal(file, holder, limits, origin=origin, is_temporary=True)
+    return Journal(file, holder, limits, world=world, is_temporary=True)
 
 
 def _moved(early: _Early, by_ns: int) -> _Early:

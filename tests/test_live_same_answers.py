@@ -55,7 +55,7 @@ def test_a_fleet_answers_of_a_site_byte_for_byte_as_its_serve(
         with httpx.Client(base_url=f"{page.url}/sites/gh1", timeout=PATIENCE_S) as site:
             wait_for(lambda: site.get("/api/alarms").status_code == 200, "its alarms")
             different = [path for path, _ in asked if ask(site, path) != ask(serve.http, path)]
-    assert different == []
+    assert different == [], different
 
 
 def test_a_moment_is_judged_by_the_log_up_to_then_in_serve_in_web_and_after_a_restart(

@@ -239,8 +239,11 @@ def timeline_body(
     with its bucket. What goes on ends with the period here: a period that is over has one answer.
     """
 
+    # The length of a run is a float: of a year's it misses some ns.
+    goes_on_ns = runs.end_ns - 1_000
+
     def until(at_ns: int, start_ns: int) -> int:
-        return at_ns if at_ns < runs.end_ns else max(start_ns, min(at_ns, period.end_ns))
+        return at_ns if at_ns < goes_on_ns else max(start_ns, min(at_ns, period.end_ns))
 
     counts = {name: _by_bucket(counted[event], period) for name, event in COUNTED.items()}
     return {

@@ -13,6 +13,7 @@ from lupin_bridge.past.query import PeriodQuery
 from lupin_twin.core.past import HOUR_NS, Event, Grid, SeriesPast, grid
 
 NS = 10**9
+YEAR_NS = 31_536_000 * NS
 # The runs, the period, what is counted, the silences.
 Parts = tuple[SeriesPast, Grid, dict[Event, SeriesPast], SeriesPast]
 
@@ -120,6 +121,14 @@ def test_the_runs_that_meet_the_period_are_told_and_how_far_all_of_them_reach() 
         # Until now, which is later than the period.
         {"from": at(90), "to": at(100), "is_simulated": False},
     ]
+
+
+def test_a_run_of_a_year_that_goes_on_ends_with_the_period_too() -> None:
+    for end_ns in range(YEAR_NS, YEAR_NS + 20):
+        length_s = (end_ns - 7) / NS
+        runs = SeriesPast(7, end_ns, None, (7,), (1,), (length_s,), (0.0,), (0.0,))
+        (run,) = written(parts(50 * NS, 100 * NS, runs=runs))["runs"]
+        assert run["to"] == at(100)
 
 
 def test_the_period_is_what_is_asked_for_or_all_that_there_is() -> None:

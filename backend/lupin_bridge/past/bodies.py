@@ -238,7 +238,6 @@ def timeline_body(
     Silences may be too many and come in buckets. Then the longest of each is given, as if it began
     with its bucket. What goes on ends with the period here: a period that is over has one answer.
     """
-
     # The length of a run is a float: of a year's it misses some ns.
     goes_on_ns = runs.end_ns - 1_000
 

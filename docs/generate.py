@@ -19,8 +19,7 @@ from xml.sax.saxutils import escape
 from lupin_bridge import metrics
 from lupin_bridge.app import FRAMES, ROUTED, create_app
 from lupin_bridge.cli import command
-from lupin_bridge.cli.configuration import CONFIG_VARIABLE, SECRETS
-from lupin_bridge.settings import limits_of, option, table, variable
+from lupin_bridge.settings import CONFIG_VARIABLE, SECRETS, limits_of, option, table, variable
 from lupin_patrol import cli as patrol_cli
 from lupin_twin.core import interfaces
 from lupin_twin.core.parameters import TwinParameters, describe

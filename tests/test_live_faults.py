@@ -7,7 +7,7 @@ import httpx
 import pytest
 from websockets.exceptions import ConnectionClosed
 
-from lupin_bridge.stream.status import STALE_AFTER_S
+from lupin_bridge.stream.frames import STALE_AFTER_S
 from tests.support.domains import own_domain
 from tests.support.live import attached, field_of, wait_until_ready
 from tests.support.messages import discovered, look, occupancy_grid, pose, scan

@@ -7,7 +7,7 @@ from typing import Any
 
 import httpx
 
-from lupin_bridge.past.schema import ShiftReport
+from lupin_bridge.stream.routes_schema import ShiftReport
 from tests.support.http_answers import HOUR, T0, bridges
 from tests.support.journal_answers import JOURNALS
 from tests.support.messages import scan

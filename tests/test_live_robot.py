@@ -14,7 +14,7 @@ from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import BatteryState
 
-from lupin_bridge.stream import robot_schema
+from lupin_bridge.stream import routes_schema
 from tests.support.domains import own_domain
 from tests.support.live import attached, wait_until_ready
 from tests.support.messages import scan
@@ -25,7 +25,7 @@ from tests.support.web import Bridge, Listener, bridge
 QUICK = ("--ros-args", "-p", "state_publish_rate_hz:=10.0")
 # No machine is too busy for an answer.
 PATIENT = limits(answer_timeout_s=PATIENCE_S)
-OFTEN = constants(**{"lupin_bridge.stream.robot:PERIOD_S": 0.1})
+OFTEN = constants(**{"lupin_bridge.stream.followers:ROBOT_PERIOD_S": 0.1})
 Json = dict[str, Any]
 
 
@@ -73,7 +73,7 @@ def amcl(x: float, y: float, yaw: float = 0.0) -> PoseWithCovarianceStamped:
 
 def robot(live: Bridge) -> Json:
     answer: Json = live.json("/api/robot")
-    robot_schema.Robot.model_validate(answer)
+    routes_schema.Robot.model_validate(answer)
     return answer
 
 
@@ -153,7 +153,7 @@ def test_a_frame_of_the_robot_comes_behind_the_first_state_and_then_on_change_al
             kinds = [client.next()["type"] for _ in range(2)]
             assert kinds == ["status", "state"]
             frame = client.until("robot")
-            robot_schema.RobotFrame.model_validate(frame)
+            routes_schema.RobotFrame.model_validate(frame)
             assert frame["position"]["x"] == 1.0
             assert "trail" not in frame
             assert_says_nothing_of_a_robot(client)

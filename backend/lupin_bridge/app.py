@@ -19,22 +19,10 @@ from lupin_bridge.access.middleware import Access, AccessControl, ReadOnly
 from lupin_bridge.access.policy import BehindProxies, Proxies
 from lupin_bridge.bridge import Bridge
 from lupin_bridge.metrics import Metered
-from lupin_bridge.routes import (
-    estimate,
-    export,
-    field,
-    notes,
-    observations,
-    pages,
-    past,
-    push,
-    sockets,
-    state,
-    status,
-)
+from lupin_bridge.routes import export, field, pages, sockets, state, status, written
 from lupin_bridge.routes.answers import add_refusals, error_response
 from lupin_bridge.serving.http_protocol import PieceByPiece
-from lupin_bridge.stream import people_schema, robot_schema, schema
+from lupin_bridge.stream import routes_schema, schema
 
 STATIC_FOLDER = Path(__file__).parent / "static"
 GUIDE_FOLDER = Path(__file__).parent / "guide"
@@ -44,13 +32,9 @@ ROUTED = (
     state,
     sockets,
     field,
-    estimate,
-    past,
     export,
     status,
-    notes,
-    push,
-    observations,
+    written,
     pages,
 )
 
@@ -133,11 +117,11 @@ FRAMES = (
     schema.DeltaFrame,
     schema.StatusFrame,
     schema.AlarmsFrame,
-    robot_schema.RobotFrame,
+    routes_schema.RobotFrame,
     schema.Alarms,
-    people_schema.NoteDraft,
-    people_schema.ObservationDraft,
-    people_schema.PushSubscription,
+    routes_schema.NoteDraft,
+    routes_schema.ObservationDraft,
+    routes_schema.PushSubscription,
 )
 
 

@@ -10,10 +10,8 @@ from collections import Counter
 from collections.abc import Callable, Hashable, Iterator
 from typing import Final
 
-from lupin_bridge.alarms.board import AlarmBoard, Change
+from lupin_bridge.alarms.board import AlarmBoard, Change, NoteBoard
 from lupin_bridge.alarms.feed import AlarmFeed, learn_recent
-from lupin_bridge.alarms.notes import NoteBoard
-from lupin_bridge.feed.estimates import EstimateFollower
 from lupin_bridge.feed.shared_work import Periodic, Shared, end
 from lupin_bridge.feed.source import TwinSource, TwinUpdate
 from lupin_bridge.judge.judging import NOTHING_JUDGED, Judge, Judged, silenced, unjudged
@@ -22,14 +20,12 @@ from lupin_bridge.metrics import Metrics, Sample, route_class
 from lupin_bridge.notify.channels import Channels
 from lupin_bridge.notify.messages import GreenhouseState
 from lupin_bridge.past.plans import Answered
-from lupin_bridge.rate_limit import RateLimit
-from lupin_bridge.serving.admission import Admission, Answer, AnswerCache, Limits
+from lupin_bridge.serving.admission import Admission, Answer, AnswerCache, Limits, RateLimit
 from lupin_bridge.settings import Settings
-from lupin_bridge.stream.frames import FrameWriter, alarms_message
+from lupin_bridge.stream.followers import EstimateFollower, RobotFollower
+from lupin_bridge.stream.frames import FrameWriter, Liveness, Status, alarms_message
 from lupin_bridge.stream.hub import Client, Hub
-from lupin_bridge.stream.robot import RobotFollower
-from lupin_bridge.stream.status import Liveness, Status
-from lupin_bridge.viewers.foxglove_session import Offer
+from lupin_bridge.viewers.foxglove import Offer
 from lupin_bridge.viewers.rosbridge_session import Writer
 from lupin_twin.core.diagnostics import Origin
 from lupin_twin.core.drops import LATE, LOST, Reason
@@ -200,17 +196,13 @@ class Bridge:
         """What was said with the last frame; of a house whose twin is silent, that it is."""
         return self._judged if self.status.is_live else silenced(self._judged)
 
-    def readings_hold_ns(self) -> dict[str, int]:
-        """For how long those of each tag do, by the rhythm of now."""
-        return self._judge.holds_ns()
-
     def seen(self) -> GreenhouseState:
         """How the house is now, for who tells others of it."""
         return GreenhouseState(
             self.status,
             self.judged,
             self.alarms.now,
-            holds_ns=self.readings_hold_ns(),
+            holds_ns=self._judge.holds_ns(),
             now_ns=self.ros_time_ns,
         )
 

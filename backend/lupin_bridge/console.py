@@ -1,14 +1,20 @@
 """Lines for people, on streams that may be closed, full, or read by nobody.
 
 A line that cannot be written ends no work and changes no exit code: the files count.
+
+And what commands share: their actions, and where they write.
 """
 
 from __future__ import annotations
 
+import argparse
+import sqlite3
 import sys
 import time
-from contextlib import suppress
-from typing import Final, TextIO
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import ExitStack, closing, suppress
+from pathlib import Path
+from typing import Final, TextIO, TypeAlias
 
 from lupin_twin.runtime.process import discard_output
 
@@ -64,3 +70,95 @@ def _written(stream: TextIO | None, text: str) -> Exception | None:
             discard_output(stream)  # or Python would try once more as it ends, and complain
         return error
     return None
+
+
+# --- what commands share: their actions, and where they write -------------------------------------
+
+FAILED: Final = 1
+Roles: TypeAlias = "argparse._SubParsersAction[argparse.ArgumentParser]"  # noqa: SLF001
+
+
+def add_role(roles: Roles, role: str, text: str) -> argparse.ArgumentParser:
+    """Add a role without abbreviations: what one means would change with the next option."""
+    return roles.add_parser(role, help=text, description=text, allow_abbrev=False)
+
+
+def add_actions(
+    roles: Roles, role: str, text: str, actions: Mapping[str, str]
+) -> Iterator[tuple[str, argparse.ArgumentParser]]:
+    """Add a role with its actions; yields each with its parser."""
+    added = add_role(roles, role, text).add_subparsers(
+        dest="action", required=True, metavar="ACTION"
+    )
+    for action, what in actions.items():
+        yield action, add_role(added, action, what)
+
+
+# Of these two, only the copy is written.
+_NOT_WRITTEN: Final = {
+    sqlite3.SQLITE_FULL,
+    sqlite3.SQLITE_IOERR_WRITE,
+    sqlite3.SQLITE_IOERR_FSYNC,
+    sqlite3.SQLITE_IOERR_TRUNCATE,
+}
+# So that Ctrl-C ends it in between.
+_PAGES_AT_ONCE: Final = 1000
+
+
+def backup(journal: sqlite3.Connection, target: Path, report: Callable[[float], None]) -> int:
+    """Copy it to a new file by SQLite's own online backup; returns the file's size, bytes.
+
+    `report` gets the share that is copied.
+
+    Raises:
+        CannotWrite: there is such a file, or it cannot be made or written.
+        sqlite3.Error: the journal cannot be read.
+
+    """
+    # Without a transaction, each write of the twin would have SQLite begin the copy anew.
+    journal.execute("BEGIN")
+    journal.execute("SELECT count(*) FROM sqlite_schema").fetchone()
+    try:
+        target.open("xb").close()
+    except FileExistsError as error:
+        raise CannotWrite(f"{target} is there already, and nothing is overwritten") from error
+    except OSError as error:
+        raise CannotWrite(f"cannot write {target}: {error.strerror}") from error
+    # Half of a copy looks like all of it: whatever ends this, Ctrl-C too, removes it.
+    with ExitStack() as if_unfinished:
+        if_unfinished.callback(target.unlink)
+        try:
+            with closing(sqlite3.connect(target)) as copy:
+                journal.backup(
+                    copy,
+                    pages=_PAGES_AT_ONCE,
+                    progress=lambda _, rest, total: report(1 - rest / max(total, 1)),
+                )
+        except sqlite3.Error as error:
+            if getattr(error, "sqlite_errorcode", None) in _NOT_WRITTEN:
+                raise CannotWrite(f"cannot write {target}: {error}") from error
+            raise
+        if_unfinished.pop_all()
+    return target.stat().st_size
+
+
+class CannotWrite(Exception):
+    """The output cannot be written; the message is the one line that says why."""
+
+
+def standard(data: bytes) -> None:
+    """Write to the standard output, at once.
+
+    Raises:
+        CannotWrite: it does not take it.
+        BrokenPipeError: who read it has gone.
+
+    """
+    try:
+        sys.stdout.buffer.write(data)
+        sys.stdout.buffer.flush()
+    except OSError as error:
+        discard_output(sys.stdout)
+        if isinstance(error, BrokenPipeError):
+            raise
+        raise CannotWrite(f"cannot write to the standard output: {error.strerror}") from error

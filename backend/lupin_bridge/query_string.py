@@ -5,8 +5,10 @@ pydantic reads, and is imported as it does: what looks back knows queries, and h
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import MISSING, field, fields
+from functools import cache
 from typing import Annotated, Any, Final, TypeVar
 
 from annotated_types import Len
@@ -16,6 +18,7 @@ from lupin_twin.core.drops import MAX_TEXT_LENGTH
 QueryT = TypeVar("QueryT")
 MOMENT: Final = "ROS seconds as a decimal number, or ISO 8601 with an offset"
 AT: Final = f"as of this moment: {MOMENT}; default: now"
+_UNSAFE_IN_NAME: Final = re.compile(r"[^A-Za-z0-9._-]")
 # A tag's, or a sensor's.
 Name = Annotated[str, Len(1, MAX_TEXT_LENGTH)]
 
@@ -51,7 +54,7 @@ def read(kind: type[QueryT], given: Sequence[tuple[str, str]], refused: type[Exc
             raise refused(f"{name} is given more than once, expected one value")
         values[names[name]] = value
     try:
-        query: QueryT = _adapter(kind).validate_python(values)
+        query: QueryT = _adapter(kind).validate_python(values)  # type: ignore[arg-type]  # hashable
     except ValidationError as error:
         first = error.errors(include_url=False)[0]
         name, why = str(first["loc"][0]).rstrip("_"), first["msg"]
@@ -62,7 +65,7 @@ def read(kind: type[QueryT], given: Sequence[tuple[str, str]], refused: type[Exc
 
 def parameters_of(kind: type[Any]) -> list[dict[str, Any]]:
     """A query's parameters as OpenAPI has them."""
-    described = _adapter(kind).json_schema()["properties"]
+    described = _adapter(kind).json_schema()["properties"]  # type: ignore[arg-type]  # as above
     return [
         {
             "name": spec.name.rstrip("_"),
@@ -75,6 +78,11 @@ def parameters_of(kind: type[Any]) -> list[dict[str, Any]]:
     ]
 
 
+def safe_name(text: str) -> str:
+    """A file's name of it: what a file system or a shell could take amiss becomes an underscore."""
+    return _UNSAFE_IN_NAME.sub("_", text)
+
+
 def _plain(schema: dict[str, Any]) -> dict[str, Any]:
     """Without null: in a query string, what is not given is left out."""
     kinds = schema.get("anyOf", [schema])
@@ -84,12 +92,8 @@ def _plain(schema: dict[str, Any]) -> dict[str, Any]:
     return {name: value for name, value in plain.items() if name not in ("title", "description")}
 
 
+@cache
 def _adapter(kind: type[Any]) -> Any:
     from pydantic import TypeAdapter  # noqa: PLC0415  # as above
 
-    if kind not in _adapters:
-        _adapters[kind] = TypeAdapter(kind)
-    return _adapters[kind]
-
-
-_adapters: dict[type[Any], Any] = {}
+    return TypeAdapter(kind)

@@ -22,7 +22,7 @@ from lupin_bridge.judge.judging import Judge
 from lupin_bridge.judge.options import own_sensors
 from lupin_bridge.notify.messages import GreenhouseState, Topics
 from lupin_bridge.notify.mirror import Mirror
-from lupin_bridge.stream.status import Status
+from lupin_bridge.stream.frames import Status
 from lupin_twin.core.past import PastWrite, RunSpan
 from lupin_twin.core.state import Reading, Snapshot, TagState
 from tests.support.ordinary_day import DAY_NS, S, ordinary_days

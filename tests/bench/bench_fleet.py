@@ -22,8 +22,7 @@ from pathlib import Path
 
 import psycopg
 
-from lupin_bridge.archive.forwarding import Forwarder
-from lupin_bridge.archive.sink import Sink
+from lupin_bridge.archive.forwarding import Forwarder, Sink
 from lupin_bridge.archive.source import Batch, Epoch
 from lupin_twin.core.past import SeriesRequest
 from lupin_twin.journal.fold import state_at

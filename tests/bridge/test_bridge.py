@@ -24,6 +24,7 @@ from lupin_bridge.serving.admission import Limits
 from lupin_bridge.settings import Settings
 from lupin_bridge.stream.hub import Client
 from lupin_twin.core.journal_condition import UNKNOWN, Condition
+from lupin_twin.core.parameters import World
 from lupin_twin.core.past import NotRemembered, PastWrite
 from lupin_twin.core.state import Snapshot, TagState
 from lupin_twin.field.grid import FieldGrid
@@ -40,7 +41,7 @@ from tests.support.web import ws_url
 class Script:
     """A source that tells what the test makes it tell. What a real one does, others test."""
 
-    day_length_s = 86_400.0
+    world = World()
 
     def __init__(self) -> None:
         self.tell: Callable[[TwinUpdate], None]
@@ -259,7 +260,7 @@ async def test_a_memory_that_is_busy_at_the_start_is_asked_again(
 
         def is_learnt() -> bool:
             stage.script.tell(state(4 * hour_ns))  # judged anew with the next frame
-            return stage.bridge.readings_hold_ns().get(tag_id) == 3 * hour_ns
+            return stage.bridge.seen().holds_ns.get(tag_id) == 3 * hour_ns
 
         await until(is_learnt, "the rhythm")
 

@@ -10,7 +10,7 @@ import httpx
 import pytest
 
 from lupin_bridge.cli.command import main
-from lupin_bridge.cli.output import backup
+from lupin_bridge.console import backup
 from tests.support.journal import NOW, kept
 from tests.support.journal import scan as row
 from tests.support.messages import scan

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from lupin_bridge import logs
+from lupin_bridge.cli import command
 
 LEVELS = ["debug", "info", "warning", "error"]
 
@@ -23,7 +23,7 @@ def untouched_root(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
 
 
 def test_json_is_one_object_a_line_with_the_error(capsys: pytest.CaptureFixture[str]) -> None:
-    logs.set_up("json")
+    command.set_up_log("json")
     log = logging.getLogger("lupin_bridge.test")
     log.info("tag %s\nsecond line", "7°")
     log.error("failed", exc_info=ValueError("broken"))
@@ -36,14 +36,14 @@ def test_json_is_one_object_a_line_with_the_error(capsys: pytest.CaptureFixture[
 
 
 def test_text_is_a_line_for_people(capsys: pytest.CaptureFixture[str]) -> None:
-    logs.set_up("text")
+    command.set_up_log("text")
     logging.getLogger("lupin_bridge.test").warning("hello")
     assert capsys.readouterr().err.endswith(" WARNING lupin_bridge.test: hello\n")
 
 
 @pytest.mark.parametrize("level", LEVELS)
 def test_what_is_below_the_level_stays_out(level: str, capsys: pytest.CaptureFixture[str]) -> None:
-    logs.set_up("text", level)
+    command.set_up_log("text", level)
     for least in LEVELS:
         logging.getLogger("lupin_bridge.test").log(getattr(logging, least.upper()), "ours")
         # As the nodes' lines come: past every logger.
@@ -57,7 +57,7 @@ def test_what_is_below_the_level_stays_out(level: str, capsys: pytest.CaptureFix
 
 
 def test_the_web_servers_own_news_stay_out(capsys: pytest.CaptureFixture[str]) -> None:
-    logs.set_up("text")
+    command.set_up_log("text")
     logging.getLogger("uvicorn.error").info("Started server process")
     logging.getLogger("uvicorn.error").warning("something is wrong")
     assert capsys.readouterr().err.count("\n") == 1
@@ -68,12 +68,12 @@ def test_what_strangers_cause_is_logged_once_in_a_while(
 ) -> None:
     now_s = [100.0]
     monkeypatch.setattr(time, "monotonic", lambda: now_s[0])
-    logs.set_up("text")
+    command.set_up_log("text")
     web_server = logging.getLogger("uvicorn.error")
     for _ in range(1_000):
         web_server.warning("Invalid HTTP request received.")
     web_server.warning("%s is another matter", "this")
-    now_s[0] += logs.PERIOD_S
+    now_s[0] += command.PERIOD_S
     web_server.warning("Invalid HTTP request received.")
     said = [line.partition(": ")[2] for line in capsys.readouterr().err.splitlines()]
     assert said == [
@@ -86,7 +86,7 @@ def test_what_strangers_cause_is_logged_once_in_a_while(
 def test_each_of_our_own_errors_leaves_its_trace_and_a_strangers_bytes_leave_none(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    logs.set_up("text")
+    command.set_up_log("text")
     web_server = logging.getLogger("uvicorn.error")
     for error in (ValueError("ours"), KeyError("ours too")):
         web_server.error("Exception in ASGI application", exc_info=error)
@@ -111,13 +111,13 @@ def test_of_our_own_some_are_said_at_once(
 ) -> None:
     now_s = [100.0]
     monkeypatch.setattr(time, "monotonic", lambda: now_s[0])
-    logs.set_up("text")
+    command.set_up_log("text")
     log = logging.getLogger(name)
-    for number in range(logs.AT_ONCE + 7):
+    for number in range(command.AT_ONCE + 7):
         log.warning("wrong token from %s", f"10.0.0.{number}")
     log.warning("something else")
-    assert len(said_by(name, capsys)) == logs.AT_ONCE + 1
-    now_s[0] += logs.PERIOD_S
+    assert len(said_by(name, capsys)) == command.AT_ONCE + 1
+    now_s[0] += command.PERIOD_S
     log.warning("wrong token from %s", "10.0.0.9")
     log.warning("wrong token from %s", "10.0.0.9")
     assert said_by(name, capsys) == ["wrong token from 10.0.0.9 (7 more since the last time)"]
@@ -127,7 +127,7 @@ def test_of_our_own_some_are_said_at_once(
 def test_every_librarys_traces_are_rationed_whatever_numbers_stand_in_them(
     name: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    logs.set_up("text")
+    command.set_up_log("text")
     for number in range(1_000):
         text = f"Fatal error on <Transport fd={number} at {number * 7919:#x}>\nprotocol: {number}"
         logging.getLogger(name).error(text, exc_info=ValueError(str(number)))
@@ -138,10 +138,10 @@ def test_one_logger_has_an_end_whatever_it_thinks_of(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(time, "monotonic", lambda: 100.0)
-    logs.set_up("text")
-    for number in range(10 * logs.LOGGER_AT_ONCE):
+    command.set_up_log("text")
+    for number in range(10 * command.LOGGER_AT_ONCE):
         logging.getLogger("lupin_twin").warning("%s", "x" * number)
     logging.getLogger("lupin_bridge").warning("is heard")
     err = capsys.readouterr().err
-    assert err.count(" lupin_twin: ") == logs.LOGGER_AT_ONCE
+    assert err.count(" lupin_twin: ") == command.LOGGER_AT_ONCE
     assert "is heard" in err

@@ -7,7 +7,7 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from lupin_msgs.msg import SensorReading, TagTimes, TwinState, TwinTagState, TwinTimes
 from rclpy.serialization import deserialize_message, serialize_message
 
-from lupin_bridge.message_schemas import schema_text
+from lupin_bridge.feed.relay import schema_text
 from tests.support.bags import by_mcap_ros2, by_rosbags, plain
 from tests.support.messages import discovered, look, occupancy_grid, pose, scan
 from tests.support.ros import clock_at

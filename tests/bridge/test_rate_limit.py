@@ -4,8 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lupin_bridge.rate_limit import RateLimit
-from lupin_bridge.serving.admission import client_key
+from lupin_bridge.serving.admission import RateLimit, client_key
 
 
 def taken(limit: RateLimit, client: str, now_s: float, tries: int) -> int:

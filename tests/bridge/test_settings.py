@@ -5,13 +5,13 @@ from typing import Any, get_args, get_origin
 import pytest
 from annotated_types import Interval
 
-from lupin_bridge.cli.configuration import settings_from
 from lupin_bridge.settings import (
     SettingError,
     Settings,
     limits_of,
     one_of,
     option,
+    settings_from,
     table,
     types,
     variable,

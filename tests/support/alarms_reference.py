@@ -6,8 +6,7 @@ from dataclasses import dataclass, replace
 from itertools import groupby, pairwise
 from statistics import median
 
-from lupin_bridge.judge.derived import dew_point_c, vapour_pressure_deficit_kpa
-from lupin_bridge.judge.ranges import Sensors
+from lupin_bridge.judge.quantities import Sensors, dew_point_c, vapour_pressure_deficit_kpa
 from lupin_twin.core.past import PastWrite, RunSpan
 
 S = 1_000_000_000

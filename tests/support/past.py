@@ -8,8 +8,7 @@ from dataclasses import dataclass, field, replace
 from statistics import fmean
 from typing import Any, TypeVar
 
-from lupin_bridge.feed.past_child import _found
-from lupin_bridge.feed.query import Now, PastQuery
+from lupin_bridge.feed.query import Now, PastQuery, _found
 from lupin_bridge.past.plans import ConditionalQuery, Query
 from lupin_twin.core.journal_condition import UNKNOWN
 from lupin_twin.core.notes import NotesRequest, PastNotes

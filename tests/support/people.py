@@ -10,7 +10,7 @@ import httpx
 from argon2 import PasswordHasher
 
 from lupin_bridge.access.accounts import Accounts, digest, make_file
-from lupin_bridge.access.person import Kind, Role
+from lupin_bridge.access.credentials import Kind, Role
 from tests.support.waiting import PATIENCE_S
 
 OWN = {"X-Lupin-Twin": "1"}

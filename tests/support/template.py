@@ -41,7 +41,7 @@ IMPORTED: Final = (
     "lupin_twin.ros.node",
     "lupin_twin.ros.parameters",
     "lupin_twin.ros.base_node",
-    "lupin_bridge.cli.fleet",
+    "lupin_bridge.cli.serving",
     "lupin_patrol.mission",
     "lupin_patrol.node",
     "greenhouse_sim.simulator",

@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Final, NamedTuple
 from urllib.parse import quote
 
-from lupin_bridge.access.person import (
+from lupin_bridge.access.credentials import (
     ROLES,
     TOKEN_ROLES,
     AccountError,

@@ -22,19 +22,23 @@ from starlette.websockets import WebSocket
 from websockets.frames import CloseCode
 
 from lupin_bridge.access.accounts import accounts_path
-from lupin_bridge.access.credentials import SHARED, CookieTooLong, Credentials
+from lupin_bridge.access.credentials import (
+    SHARED,
+    WRITER,
+    AccountError,
+    CookieTooLong,
+    Credentials,
+    Person,
+)
 from lupin_bridge.access.people import People
-from lupin_bridge.access.person import WRITER, AccountError, Person
 from lupin_bridge.access.policy import (
     PROXY_USER_KEY,
     AccessPolicy,
-    HostError,
-    OriginError,
-    RequestSource,
+    parse_host,
+    parse_origin,
     path_of,
 )
-from lupin_bridge.rate_limit import RateLimit
-from lupin_bridge.serving.admission import client_key
+from lupin_bridge.serving.admission import RateLimit, client_key
 from lupin_bridge.serving.ws_protocol import CONNECTION_KEY, Connection
 from lupin_bridge.settings import SettingError, Settings
 
@@ -152,12 +156,10 @@ _PREFLIGHT_MAX_AGE_S: Final = "600"
 class Access:
     """Who may read: the hosts and origins, and the people; None: they have been asked already.
 
-    `secure`: the bridge serves TLS itself, so that its cookie may demand it. `site` is the site
-    whose data this bridge has; a fleet has those of all sites.
+    `site` is the site whose data this bridge has; a fleet has those of all sites.
     """
 
     policy: AccessPolicy = field(default_factory=AccessPolicy)
-    secure: bool = False
     people: People | None = None
     site: str = ""
     is_fleet: bool = False
@@ -185,15 +187,14 @@ class Access:
 
         """
         called = settings.called("token_file") if settings.token_file else "LUPIN_TOKEN"
-        try:
-            policy = AccessPolicy(settings.host, settings.allow_origin, settings.allow_host)
-        except HostError as error:
-            raise SettingError(f"{settings.called('allow_host')}: {error}") from None
-        except OriginError as error:
-            raise SettingError(f"{settings.called('allow_origin')}: {error}") from None
+        for name, parse in (("allow_host", parse_host), ("allow_origin", parse_origin)):
+            try:
+                for text in getattr(settings, name):
+                    parse(text)
+            except ValueError as error:
+                raise SettingError(f"{settings.called(name)}: {error}") from None
         return cls(
-            policy,
-            secure=bool(settings.tls_cert),
+            AccessPolicy(settings.host, settings.allow_origin, settings.allow_host),
             people=People(
                 accounts_path(settings),
                 None if token is None else Credentials(token, called),
@@ -226,7 +227,10 @@ class AccessControl:
             await _Refusal(414, detail).send(scope, receive, send)
             return
         request = HTTPConnection(scope)
-        decision = self._access.policy.judge(_source_of(request))
+        scheme = "https" if scope["scheme"] in ("https", "wss") else "http"
+        decision = self._access.policy.judge(
+            scheme, request.headers, wants_page=_wants_page(request)
+        )
         if self._access.policy.origins:
             send = _with_cors(send, decision.foreign)
         if decision.refusal is not None:
@@ -379,20 +383,6 @@ def _sign_in_first(request: HTTPConnection) -> _Refusal:
         return _Refusal(303, "sign in first", {"location": location})
     return _unauthorized(
         "a token is needed: send it as Authorization: Bearer, or sign in at /signin"
-    )
-
-
-def _source_of(request: HTTPConnection) -> RequestSource:
-    headers = request.headers
-    return RequestSource(
-        scheme="https" if request.scope["scheme"] in ("https", "wss") else "http",
-        hosts=headers.getlist("host"),
-        origins=headers.getlist("origin"),
-        fetch_site=headers.get("sec-fetch-site", ""),
-        fetch_mode=headers.get("sec-fetch-mode", ""),
-        fetch_dest=headers.get("sec-fetch-dest", ""),
-        referer=headers.get("referer", ""),
-        wants_page=_wants_page(request),
     )
 
 

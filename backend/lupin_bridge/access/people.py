@@ -19,11 +19,18 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final, TypeVar
 
-from lupin_bridge.access.accounts import SESSION_S, Accounts, Audited, digest
-from lupin_bridge.access.credentials import SHARED, SHARED_SESSION_S, Credentials, cookies_of
-from lupin_bridge.access.person import MAX_PASSWORD, AccountError, Person, is_name
-from lupin_bridge.rate_limit import RateLimit
-from lupin_bridge.serving.admission import AdmissionError
+from lupin_bridge.access.accounts import SESSION_S, Accounts, digest
+from lupin_bridge.access.credentials import (
+    MAX_PASSWORD,
+    SHARED,
+    SHARED_SESSION_S,
+    AccountError,
+    Credentials,
+    Person,
+    cookies_of,
+    is_name,
+)
+from lupin_bridge.serving.admission import ClientLimitError, RateLimit
 
 log = logging.getLogger(__name__)
 
@@ -37,10 +44,6 @@ MAX_WAITING: Final = 8
 # Sign-ins that an address may try in vain at once, and a minute from then on.
 ATTEMPT_BURST: Final = 10
 ATTEMPTS_PER_MINUTE: Final = 10
-
-
-class PeopleBusy(AdmissionError):
-    """Too many sign-ins wait already, or one client tries too many."""
 
 
 class People:
@@ -151,14 +154,14 @@ class People:
         Both take the same time.
 
         Raises:
-            PeopleBusy: too many wait, or too many were wrong from that address.
+            ClientLimitError: too many wait, or too many were wrong from that address.
             AccountError: the file cannot be read.
 
         """
         # Many at once are no more than the few that wait for the thread.
         wait_s = self._attempts.wait_s(address, time.monotonic())
         if wait_s > 0.0:
-            raise PeopleBusy(
+            raise ClientLimitError(
                 f"{address} has failed to sign in more than {ATTEMPT_BURST} times and "
                 f"{ATTEMPTS_PER_MINUTE} a minute: try again in {math.ceil(wait_s)} s",
                 wait_s,
@@ -187,7 +190,7 @@ class People:
         """Begin a session; returns its cookie's name and value, and how long it lasts, s.
 
         Raises:
-            PeopleBusy, AccountError: see `write`.
+            ClientLimitError, AccountError: see `write`.
 
         """
         if self.shared is not None and person.by == "shared token":
@@ -201,7 +204,7 @@ class People:
         """End the session that a request came with; returns its cookie's name.
 
         Raises:
-            PeopleBusy, AccountError: see `write`.
+            ClientLimitError, AccountError: see `write`.
 
         """
         if self.shared is not None and person.by == "shared token":
@@ -210,29 +213,11 @@ class People:
         await self.write(lambda it, now_s: it.end_session(person, address, now_s))
         return self._cookie_name()
 
-    async def note(self, who: str, what: str, subject: str, address: str) -> None:
-        """Have it in the audit trail.
-
-        Raises:
-            PeopleBusy, AccountError: see `write`.
-
-        """
-        await self.write(lambda it, now_s: it.note(Audited(now_s, who, what, subject, address)))
-
-    async def audited(self, most: int) -> list[Audited]:
-        """The newest of the audit trail.
-
-        Raises:
-            PeopleBusy, AccountError: see `write`.
-
-        """
-        return await self.write(lambda it, _: it.audited(most))
-
     async def write(self, work: Callable[[Accounts, int], ResultT]) -> ResultT:
         """What `work(accounts, now_s)` gives, on the thread.
 
         Raises:
-            PeopleBusy: too many wait.
+            ClientLimitError: too many wait.
             AccountError: the file cannot be read or written.
 
         """
@@ -245,7 +230,9 @@ class People:
 
     async def _on_thread(self, work: Callable[[], ResultT], most: int = MAX_WAITING) -> ResultT:
         if self._waiting >= most:
-            raise PeopleBusy(f"{MAX_WAITING} sign-ins wait already: try again in a moment", 2.0)
+            raise ClientLimitError(
+                f"{MAX_WAITING} sign-ins wait already: try again in a moment", 2.0
+            )
         self._waiting += 1
         doing = self._thread.submit(work)
         # Not when the client has left: until the thread is free again.

@@ -201,14 +201,6 @@ _AUTHORITY: Final = re.compile(
 _ORIGIN: Final = re.compile(r"(?P<scheme>https?)://(?P<authority>[^/]+)/?", re.IGNORECASE)
 
 
-class OriginError(ValueError):
-    """Not an origin; the message says what was expected and got."""
-
-
-class HostError(ValueError):
-    """Not a host's name; the message says what was expected and got."""
-
-
 def host_of(authority: str) -> str | None:
     """The host of a Host header, in lower case and without brackets; None: not a Host header."""
     match = _AUTHORITY.fullmatch(authority)
@@ -219,13 +211,13 @@ def parse_origin(text: str) -> str:
     """An origin as browsers write it: scheme and host in lower case, no default port, no slash.
 
     Raises:
-        OriginError: it is none.
+        ValueError: it is none.
 
     """
     match = _ORIGIN.fullmatch(text)
     authority = None if match is None else _AUTHORITY.fullmatch(match["authority"])
     if match is None or authority is None:
-        raise OriginError(
+        raise ValueError(
             f"{text[:128]!r} is not an origin, expected http:// or https://, a host and a port"
         )
     scheme, port = match["scheme"].lower(), authority["port"]
@@ -237,31 +229,15 @@ def parse_host(text: str) -> str:
     """A host's name as `host_of` gives it.
 
     Raises:
-        HostError: it is none, or has a scheme or port.
+        ValueError: it is none, or has a scheme or port.
 
     """
     match = _AUTHORITY.fullmatch(text)
     if match is None or match["port"] is not None:
-        raise HostError(f"{text[:128]!r} is not a host's name, expected it without scheme and port")
+        raise ValueError(
+            f"{text[:128]!r} is not a host's name, expected it without scheme and port"
+        )
     return match["host"].strip("[]").rstrip(".").lower()
-
-
-@dataclass(frozen=True, slots=True)
-class RequestSource:
-    """What a request says of where it comes from; headers in the order of their appearance.
-
-    `scheme` is http or https, for WebSockets too; the values of Sec-Fetch headers and Referer are
-    "" if absent. `wants_page`: it may be a person who follows a link to one of our pages.
-    """
-
-    scheme: str
-    hosts: Sequence[str]
-    origins: Sequence[str] = ()
-    fetch_site: str = ""
-    fetch_mode: str = ""
-    fetch_dest: str = ""
-    referer: str = ""
-    wants_page: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -285,10 +261,32 @@ class AccessPolicy:
         named = (host_of(origin.partition("://")[2]) for origin in self.origins)
         self._hosts = {host.rstrip(".").lower(), *named, *map(parse_host, allowed_hosts)}
 
-    def judge(self, source: RequestSource) -> Decision:
-        """Decide whether a request may pass."""
-        refusal = self._refusal_of_host(source.hosts)
-        return Decision(refusal) if refusal is not None else self._judge_page(source)
+    def judge(self, scheme: str, headers: Headers, *, wants_page: bool = False) -> Decision:
+        """Decide whether a request may pass.
+
+        `scheme` is http or https, for WebSockets too. `wants_page`: it may be a person who follows
+        a link to one of our pages.
+        """
+        refusal = self._refusal_of_host(headers.getlist("host"))
+        if refusal is not None:
+            return Decision(refusal)
+        own = f"{scheme}://{headers['host']}"
+        if origins := headers.getlist("origin"):
+            return self._judge_origin(" ".join(origins), own)
+        referer = headers.get("referer", "")
+        if site := headers.get("sec-fetch-site"):
+            # A link shows our page to a person; the page that led there does not see it. A frame,
+            # or an object, is a navigation too, of which the person need not see anything.
+            how = headers.get("sec-fetch-mode"), headers.get("sec-fetch-dest")
+            if site in ("cross-site", "same-site") and how != ("navigate", "document"):
+                return Decision(
+                    "a page of another origin sends a request without naming itself: load it in"
+                    " CORS mode (<img crossorigin>, or fetch) and start the bridge with"
+                    " --allow-origin for it"
+                )
+        elif referer and not wants_page:
+            return self._judge_origin("/".join(referer.split("/", 3)[:3]), own)
+        return Decision()
 
     def _refusal_of_host(self, hosts: Sequence[str]) -> str | None:
         if len(hosts) != 1:
@@ -303,23 +301,6 @@ class AccessPolicy:
             )
         return None
 
-    def _judge_page(self, source: RequestSource) -> Decision:
-        if source.origins:
-            return self._judge_origin(" ".join(source.origins), source)
-        if source.fetch_site:
-            # A link shows our page to a person; the page that led there does not see it. A frame,
-            # or an object, is a navigation too, of which the person need not see anything.
-            is_link = source.fetch_mode == "navigate" and source.fetch_dest == "document"
-            if source.fetch_site in ("cross-site", "same-site") and not is_link:
-                return Decision(
-                    "a page of another origin sends a request without naming itself: load it in"
-                    " CORS mode (<img crossorigin>, or fetch) and start the bridge with"
-                    " --allow-origin for it"
-                )
-        elif source.referer and not source.wants_page:
-            return self._judge_origin("/".join(source.referer.split("/", 3)[:3]), source)
-        return Decision()
-
     def _is_own_name(self, host: str) -> bool:
         # RFC 6761, section 6.3: localhost and what is below it never leave the machine.
         return (
@@ -329,13 +310,13 @@ class AccessPolicy:
             or _is_ip(host)
         )
 
-    def _judge_origin(self, named: str, source: RequestSource) -> Decision:
+    def _judge_origin(self, named: str, own: str) -> Decision:
         try:
             origin = parse_origin(named)
-        except OriginError:
+        except ValueError:
             # "null", for one: a page from a file, or in a sandbox.
             return Decision(f"pages of the origin {named[:128]!r} may not read this bridge")
-        if origin == parse_origin(f"{source.scheme}://{source.hosts[0]}"):
+        if origin == parse_origin(own):
             return Decision()
         if origin in self.origins:
             return Decision(foreign=origin)

@@ -1,33 +1,227 @@
+# ruff: noqa: S608  # SQL is put together of constants
 """Forwarding a journal to the archive: again and again until it is asked to end.
 
 Whatever is wrong is said once, in one line, and tried again later; the twin has no part in it.
+
+The archive's end: a site's rows appended, a batch a transaction, each row once.
 """
 
 from __future__ import annotations
 
 import asyncio
+import json
 import logging
 import os
+import socket
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import closing
+from dataclasses import replace
+from datetime import UTC, datetime
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 from lupin_bridge.archive.database import (
+    CHANNEL,
+    META_AGAIN,
     ArchiveError,
     UsageError,
     check_site,
     check_url,
+    check_version,
+    connect,
     explained,
     place_of,
 )
-from lupin_bridge.archive.sink import Sink
-from lupin_bridge.archive.source import Source
+from lupin_bridge.archive.source import Batch, Epoch, Row, Source
 from lupin_bridge.feed.shared_work import end
 from lupin_bridge.settings import SettingError, Settings, option, variable
+from lupin_twin.journal.retention import DAY_NS, RECORD
 from lupin_twin.journal.schema import FILE_ERRORS, Foreign
+
+_COLUMNS: Final = {
+    "meta": 3, "run": 8, "series": 6, "scan": 12, "look": 17, "place": 14, "hour": 7, "tally": 10,
+    "event": 7, "note": 8,
+}  # fmt: skip
+# Where the tables that are in parts by month have the stamp.
+_STAMP: Final = {"scan": 3, "look": 4}
+# What is said anew of a row that is there; of other tables a row stays as it came first.
+_SAID_ANEW: Final = {
+    "run": ("site, run", "joins ended_stamp_ns"),
+    "hour": ("site, series, hour", "n total low high"),
+    "tally": ("site, run, event, hour", "n total low high first_ns last_ns"),
+}
+
+
+def _insert(table: str) -> str:
+    marks = ", ".join(["%s"] * _COLUMNS[table])
+    if table == "meta":
+        return f"INSERT INTO meta VALUES ({marks}) {META_AGAIN}"
+    if table not in _SAID_ANEW:
+        return f"INSERT INTO {table} VALUES ({marks}) ON CONFLICT DO NOTHING"
+    key, columns = _SAID_ANEW[table]
+    news = ", ".join(f"{column} = excluded.{column}" for column in columns.split())
+    return f"INSERT INTO {table} VALUES ({marks}) ON CONFLICT ({key}) DO UPDATE SET {news}"
+
+
+_INSERT: Final = {table: _insert(table) for table in _COLUMNS}
+_EPOCH: Final = (
+    "SELECT journal_id, epoch, seq_offset, run_offset, forwarded_seq FROM epoch WHERE site = %s"
+    " ORDER BY epoch DESC LIMIT 1"
+)
+_ARRIVAL: Final = " UNION ALL ".join(
+    f"SELECT arrival_ns FROM {table} WHERE site = %(site)s AND seq = %(seq)s"
+    for table in ("scan", "look", "place")
+)
+_HERE: Final = (
+    "INSERT INTO forwarder VALUES (%s, %s, %s, now(), now()) ON CONFLICT (site) DO UPDATE SET"
+    " machine = excluded.machine, process = excluded.process, since = excluded.since,"
+    " heard_at = excluded.heard_at"
+)
+
+
+class Sink:
+    """A connection to the archive that writes a site, from `begin` on it alone; in one thread.
+
+    Raises:
+        ArchiveError: there is none.
+        psycopg.Error: anything else that the database says; also of every method.
+
+    """
+
+    def __init__(self, url: str, site: str) -> None:
+        check_site(site)
+        self._site = site
+        self._connection: Any = connect(url, f"lupin-twin forward {site}")
+        self._months: set[int] = set()
+
+    def close(self) -> None:
+        """Let others write the site."""
+        self._connection.close()
+
+    def _lock(self) -> None:
+        check_version(self._connection)
+        execute = self._connection.execute
+        # The server lets go of it when the connection ends, however that ends.
+        name = f"lupin-twin forward {self._site}"
+        (is_ours,) = execute(
+            "SELECT pg_try_advisory_lock(hashtextextended(%s, 0))", (name,)
+        ).fetchone()
+        if not is_ours:
+            other = execute(
+                "SELECT machine, process, since::timestamptz(0)::text FROM forwarder"
+                " WHERE site = %s",
+                (self._site,),
+            ).fetchone()
+            told = "{} (process {}) since {}".format(*other) if other else "another machine"
+            raise ArchiveError(f"site {self._site} is forwarded by {told}: one alone may")
+        execute(_HERE, (self._site, socket.gethostname(), os.getpid()))
+        execute("INSERT INTO site VALUES (%s, '') ON CONFLICT DO NOTHING", (self._site,))
+
+    def heard(self) -> None:
+        """Have it in the archive that this forwarder lives."""
+        self._connection.execute(
+            "UPDATE forwarder SET heard_at = now() WHERE site = %s", (self._site,)
+        )
+
+    def begin(self, source: Source, say: Callable[[str], None]) -> Epoch:
+        """Keep others from the site; returns where the journal goes on.
+
+        One that is not what was forwarded last begins an epoch. So does one that was put back from
+        a copy: its numbers are given to other rows now.
+
+        Raises:
+            ArchiveError: the archive is of another version, or another forwarder writes the site.
+
+        """
+        self._lock()
+        found = self._connection.execute(_EPOCH, (self._site,)).fetchone()
+        if found is None:
+            return self._new_epoch(source, Epoch(self._site, 1, 0, 0, 0))
+        journal_id, *numbers = found
+        last = Epoch(self._site, *numbers)
+        if journal_id == source.journal_id and self._goes_on(source, last):
+            return last
+        say(f"site {self._site} has another journal than before: all of it is forwarded")
+        (runs,) = self._connection.execute(
+            "SELECT coalesce(max(run), 0) FROM run WHERE site = %s", (self._site,)
+        ).fetchone()
+        seqs = last.seq_offset + last.forwarded_seq
+        return self._new_epoch(source, Epoch(self._site, last.number + 1, seqs, runs, 0))
+
+    def _goes_on(self, source: Source, last: Epoch) -> bool:
+        if source.last_seq() < last.forwarded_seq:
+            return False
+        here = self._connection.execute(
+            _ARRIVAL, {"site": self._site, "seq": last.seq_offset + last.forwarded_seq}
+        ).fetchone()
+        there = source.arrival_of(last.forwarded_seq)
+        # One that is no longer here or there was deleted.
+        return here is None or there is None or here == (there,)
+
+    def _new_epoch(self, source: Source, epoch: Epoch) -> Epoch:
+        # Before the epoch: if this is cut short it is done again, to the same numbers.
+        for table, rows in source.counted(epoch):
+            self._put({table: rows})
+        self._connection.execute(
+            "INSERT INTO epoch VALUES (%s, %s, %s, now(), %s, %s, 0)",
+            (self._site, epoch.number, source.journal_id, epoch.seq_offset, epoch.run_offset),
+        )
+        return epoch
+
+    def put(self, batch: Batch, epoch: Epoch) -> Epoch:
+        """Append a batch, all or nothing; returns where the epoch stands now."""
+        upto = max(batch.upto, epoch.forwarded_seq)
+        self._make_months(batch)
+        with self._connection.pipeline(), self._connection.transaction():
+            # First: what came since may be of a series with the same tag and sensors.
+            for _, key, value in batch.rows.get("meta", ()):
+                if key.startswith(RECORD):
+                    record = json.loads(value)
+                    gone = (_text(record["tag"]), record["seq"], record["what"] == "pose")
+                    self._connection.execute("SELECT forget_tag(%s, %s, %s)", gone)
+            self._put(batch.rows)
+            for (run, since_ns), rows in batch.events.items():
+                self._connection.execute(
+                    "DELETE FROM event WHERE site = %s AND run = %s AND stamp_ns >= %s",
+                    (self._site, run, since_ns),
+                )
+                self._put({"event": rows})
+            self._connection.execute(
+                "UPDATE epoch SET forwarded_seq = %s WHERE site = %s AND epoch = %s",
+                (upto, self._site, epoch.number),
+            )
+            self._connection.execute("SELECT pg_notify(%s, %s)", (CHANNEL, self._site))
+        return replace(epoch, forwarded_seq=upto)
+
+    def _make_months(self, batch: Batch) -> None:
+        """Have a part of the tables for each month, and for the one behind it."""
+        days = {
+            row[column] // DAY_NS
+            for table, column in _STAMP.items()
+            for row in batch.rows.get(table, ())
+        }
+        for day in days:
+            month = int(f"{datetime.fromtimestamp(day * 86_400, UTC):%Y%m}")
+            if month not in self._months:
+                self._connection.execute("SELECT make_months(%s)", (day * 86_400,))
+                self._months.add(month)
+
+    def _put(self, rows: dict[str, list[Row]] | dict[str, Sequence[Row]]) -> None:
+        with self._connection.cursor() as cursor:
+            for table, of_table in rows.items():
+                if of_table:
+                    values = ([_text(value) for value in row] for row in of_table)
+                    cursor.executemany(_INSERT[table], values)
+
+
+def _text(value: Any) -> Any:
+    """What PostgreSQL can hold: its text has no NUL, and a batch with one would never go in."""
+    return value.replace("\0", "\ufffd") if isinstance(value, str) else value
+
+
+# --- again and again ------------------------------------------------------------------------------
 
 log = logging.getLogger(__name__)
 

@@ -33,8 +33,7 @@ from lupin_bridge.bags.recording import (
     OBSERVATION_TYPE,
     TAGS_TYPE,
 )
-from lupin_bridge.feed.relay import Topic
-from lupin_bridge.message_schemas import ENCODING, schema_text
+from lupin_bridge.feed.relay import ENCODING, Topic, schema_text
 from lupin_twin.core.history import kind_of
 from lupin_twin.core.parameters import TwinParameters
 from lupin_twin.core.state import NO_FLOWER, Inspection, Pin, Pose, Scan, Write

@@ -15,18 +15,19 @@ from typing import Any, Final
 from lupin_bridge.archive.database import (
     ArchiveError,
     UsageError,
+    check,
     check_version,
     connect,
     explained,
     init,
     migrate,
+    overview,
     place_of,
+    retain,
 )
 from lupin_bridge.archive.forwarding import Forwarder
-from lupin_bridge.archive.upkeep import check, overview, retain
 from lupin_bridge.cli import journal
-from lupin_bridge.cli.output import FAILED, Roles, add_actions, add_role
-from lupin_bridge.console import say, tell
+from lupin_bridge.console import FAILED, Roles, add_actions, add_role, say, tell
 from lupin_bridge.settings import option, variable
 from lupin_twin.core.parameters import MAX_JOURNAL_DAYS
 from lupin_twin.runtime.process import INTERRUPTED

@@ -4,25 +4,39 @@ from __future__ import annotations
 
 import argparse
 import csv
+import math
 import sqlite3
 import time
 from array import array
 from collections import deque
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import closing
+from dataclasses import dataclass, field
+from datetime import UTC, datetime
+from functools import lru_cache, partial
 from itertools import groupby, islice
 from operator import itemgetter
 from pathlib import Path
-from typing import Final
+from typing import Any, Final, TextIO
+from zoneinfo import ZoneInfo
 
-from lupin_bridge.cli.import_rows import Columns, Found, Summary, columns_of, counted, scans
 from lupin_bridge.cli.journal import SHOWN, JournalError, add_which, fail, path_of
-from lupin_bridge.cli.output import FAILED, Roles
-from lupin_bridge.console import Progress, say, tell
+from lupin_bridge.console import Progress, Roles, add_role, say, tell
+from lupin_bridge.judge.options import zone_of
 from lupin_twin.adapt.config import read_yaml
-from lupin_twin.adapt.table import ConfigError
+from lupin_twin.adapt.table import (
+    AS_IT_IS,
+    ConfigError,
+    Table,
+    Value,
+    is_number,
+    seconds_of,
+    shown,
+    values_of,
+)
+from lupin_twin.core.drops import MAX_SENSORS_PER_TAG, MAX_TAGS, MAX_TEXT_LENGTH, check_length
 from lupin_twin.core.parameters import MAX_JOURNAL_DAYS
-from lupin_twin.core.state import NANOSECONDS_PER_SECOND, Pin, Reading, Scan, Write
+from lupin_twin.core.state import NANOSECONDS_PER_SECOND, Pin, Pose, Reading, Scan, Write
 from lupin_twin.journal.beside import Lock
 from lupin_twin.journal.file import JournalFile
 from lupin_twin.journal.retention import Limits
@@ -30,10 +44,265 @@ from lupin_twin.journal.runs import Clock, Run, runs, span_at
 from lupin_twin.journal.schema import FILE_ERRORS, open_named
 from lupin_twin.runtime.process import INTERRUPTED
 
-SOURCE: Final = "import"
-HELP: Final = (
-    "readings of before, from CSV, into a journal; without --write, what would be imported"
-)
+_TOLD_EVERY: Final = 20_000
+# Characters of a line; a field of the csv module has 131,072 at most.
+_MAX_LINE: Final = 1_000_000
+# Lines that are named of each reason; their count is before them.
+_EXAMPLES: Final = 3
+
+
+@dataclass(frozen=True, slots=True)
+class Columns:
+    """What stands where. `tag_id` is every row's tag where there is no column `tag`.
+
+    `sensors` by sensor; or `sensor` is the column that names it, `value` the one with the number,
+    and `names` is what that calls each sensor.
+    """
+
+    time: str
+    zone: ZoneInfo | None
+    tag: str = ""
+    tag_id: str = ""
+    sensors: Mapping[str, Value] = field(default_factory=dict)
+    sensor: str = ""
+    value: str = ""
+    names: Mapping[str, Value] = field(default_factory=dict)
+    places: Mapping[str, Pose] = field(default_factory=dict)
+
+
+# A scan as the file has it: ROS time in ns, tag, and a value for each name of a sensor.
+Found = tuple[int, str, tuple[str, ...], list[float]]
+
+
+@dataclass(slots=True)
+class Summary:
+    """What was found in the file. `refused`: of each reason how often, and in which first lines.
+
+    `sensors` has of each sensor how many readings, the least and the greatest.
+    """
+
+    rows: int = 0
+    scans: int = 0
+    repeated: int = 0
+    tags: set[str] = field(default_factory=set)
+    sensors: dict[str, list[float]] = field(default_factory=dict)
+    first_ns: int = 0
+    last_ns: int = 0
+    refused: dict[str, list[int]] = field(default_factory=dict)
+
+    def refuse(self, reason: str, line: int) -> None:
+        """A row, or a reading of it, that is not imported."""
+        lines = self.refused.setdefault(reason[:120], [0])
+        lines[0] += 1
+        if len(lines) <= _EXAMPLES:
+            lines.append(line)
+
+    def take(self, found: Found) -> None:
+        """A scan that can be imported.
+
+        Raises:
+            ValueError: with it there would be more tags or sensors than a twin takes.
+
+        """
+        _, tag_id, names, values = found
+        if tag_id not in self.tags:
+            check_length("tags", len(self.tags) + 1, MAX_TAGS)
+            self.tags.add(tag_id)
+        for name, value in zip(names, values, strict=True):
+            sensor = self.sensors.get(name)
+            if sensor is None:
+                check_length("sensors", len(self.sensors) + 1, MAX_SENSORS_PER_TAG)
+                self.sensors[name] = [1, value, value]
+                continue
+            sensor[0] += 1
+            if value < sensor[1]:
+                sensor[1] = value
+            elif value > sensor[2]:
+                sensor[2] = value
+        self.scans += 1
+
+    def lines(self) -> Iterator[str]:
+        """The same for a person."""
+        yield f"{self.rows} rows, {self.scans} scans of {len(self.tags)} tags"
+        if self.scans:
+            first, last = (
+                datetime.fromtimestamp(at_ns // NANOSECONDS_PER_SECOND, UTC).isoformat()
+                for at_ns in (self.first_ns, self.last_ns)
+            )
+            yield f"from {first} to {last}"
+        for name, (count, low, high) in sorted(self.sensors.items()):
+            yield f"{name}: {count:.0f} readings from {low:.6g} to {high:.6g}"
+        for reason, (count, *examples) in self.refused.items():
+            yield f"refused: {count}: {reason} (line {', '.join(map(str, examples))})"
+        if self.repeated:
+            yield (
+                f"refused: {self.repeated}: the sensor has another reading of that moment; "
+                "where clocks are set back in autumn, times need an offset"
+            )
+
+
+def columns_of(content: Any) -> Columns:
+    """What stands where, as the file of columns says it.
+
+    Raises:
+        ConfigError: a key that cannot be.
+
+    """
+    table = Table("", content)
+
+    def text(name: str) -> str:
+        return table.text(name) if table.has(name) else ""
+
+    zone = text("time_zone")
+    place = zone_of(zone) if zone else None
+    if zone and place is None:
+        why = f"time_zone is {shown(zone)}, expected such as Europe/Amsterdam"
+        raise ConfigError(why)
+    columns = Columns(
+        time=table.text("time"),
+        zone=place,
+        tag=text("tag"),
+        tag_id=str(table.take("tag_id", "")),
+        sensors=values_of(Table("sensors", table.take("sensors", {})), "column"),
+        sensor=text("sensor"),
+        value=text("value"),
+        names=values_of(Table("names", table.take("names", {})), "column"),
+        places=dict(_places(Table("places", table.take("places", {})))),
+    )
+    table.end()
+    if bool(columns.tag) == bool(columns.tag_id):
+        raise ConfigError("expected tag, a column, or tag_id, every row's tag; one of them")
+    if bool(columns.sensors) == bool(columns.sensor and columns.value):
+        raise ConfigError("expected sensors, or sensor and value; one of them")
+    return columns
+
+
+def _places(table: Table) -> Iterator[tuple[str, Pose]]:
+    for tag_id in tuple(table.content):
+        at = table.take(tag_id)
+        if not isinstance(at, list) or len(at) != 2 or not all(map(is_number, at)):
+            raise ConfigError(f"places.{tag_id} is {shown(at)}, expected [x, y] in m")
+        yield str(tag_id), Pose(float(at[0]), float(at[1]), 0.0, 0.0, 0.0, 0.0, 1.0)
+
+
+def counted(file: TextIO, report_every: Callable[[int], None]) -> Iterator[str]:
+    """The lines of a file, telling now and then how many bytes in it is.
+
+    Raises:
+        csv.Error: a line is too long.
+
+    """
+    at = 0
+    for number, line in enumerate(iter(partial(file.readline, _MAX_LINE), "")):
+        if len(line) == _MAX_LINE:
+            raise csv.Error(f"line {number + 1} has {_MAX_LINE:,} characters or more")
+        at += len(line)
+        if number % _TOLD_EVERY == 0:
+            report_every(at)
+        # InfluxDB's annotations
+        yield "\n" if line.startswith("#") else line
+
+
+def scans(lines: Iterator[str], columns: Columns, summary: Summary) -> Iterator[Found]:
+    """The scans of a CSV file with a header; what is refused is in the summary.
+
+    Raises:
+        ConfigError: the header has not the columns.
+        csv.Error: it is no CSV.
+
+    """
+    reader = csv.reader(lines)
+    header = next((row for row in reader if row), [])
+    read, is_table_over = _reader(header, columns), False
+    for row in reader:
+        if not row:
+            is_table_over = True
+            continue
+        # InfluxDB's next table has a header of its own, with other columns where its tags differ.
+        if is_table_over and columns.time in row:
+            read, is_table_over = _reader(row, columns), False
+            continue
+        is_table_over = False
+        summary.rows += 1
+        try:
+            found = read(row)
+            summary.take(found)
+        except (ValueError, IndexError) as error:
+            reason = "too few columns" if isinstance(error, IndexError) else str(error)
+            summary.refuse(reason, reader.line_num)
+            continue
+        yield found
+
+
+def _reader(header: list[str], columns: Columns) -> Callable[[list[str]], Found]:
+    def at(name: str) -> int:
+        if name not in header:
+            raise ConfigError(
+                f"there is no column {name!r}, but {', '.join(header)[:200] or 'none'}"
+            )
+        return header.index(name)
+
+    time_at = at(columns.time)
+    tag_at = at(columns.tag) if columns.tag else -1
+    wide = [(name, column, at(column.path)) for name, column in columns.sensors.items()]
+    every = tuple(columns.sensors)
+    sensor_at = at(columns.sensor) if columns.sensor else -1
+    value_at = at(columns.value) if columns.value else -1
+    by_name = {column.path: (name, column) for name, column in columns.names.items()}
+
+    def readings_of(row: list[str]) -> tuple[tuple[str, ...], list[float]]:
+        if wide:
+            given = [entry for entry in wide if row[entry[2]].strip()]
+            values = [_number(name, row[index], column) for name, column, index in given]
+            names = every if len(given) == len(every) else tuple(name for name, _, _ in given)
+            return names, values
+        called = row[sensor_at]
+        if by_name and called not in by_name:
+            raise ValueError(f"{columns.sensor} {called[:40]!r} is not one of names")
+        name, column = by_name.get(called) or (_text(columns.sensor, called), AS_IT_IS)
+        return (name,), [_number(name, row[value_at], column)]
+
+    def read(row: list[str]) -> Found:
+        tag_id = _text("tag", row[tag_at].strip()) if columns.tag else columns.tag_id
+        names, values = readings_of(row)
+        if not values:
+            raise ValueError("no reading")
+        return _moment_ns(row[time_at], columns.zone), tag_id, names, values
+
+    return read
+
+
+def _text(what: str, text: str) -> str:
+    if not 0 < len(text) <= MAX_TEXT_LENGTH:
+        raise ValueError(f"no {what}, or one of more than {MAX_TEXT_LENGTH} characters")
+    if "\0" in text:
+        raise ValueError(f"a {what} with NUL")
+    return text
+
+
+def _number(name: str, text: str, column: Value) -> float:
+    try:
+        value = float(text) * column.factor + column.offset
+    except ValueError:
+        if text in ("unknown", "unavailable"):  # of a sensor in Home Assistant that is away
+            raise ValueError(f"{name} is {text}") from None
+        raise ValueError(f"{name} is no number") from None
+    if not column.low <= value <= column.high or math.isinf(value):
+        raise ValueError(f"{name} is not from {column.low:g} to {column.high:g}")
+    return value
+
+
+# Rows of many tags have the same moment, one behind the other.
+@lru_cache(maxsize=256)
+def _moment_ns(text: str, zone: ZoneInfo | None) -> int:
+    seconds = seconds_of(text, zone)
+    if seconds > time.time():
+        raise ValueError("the time is ahead of now")
+    return int(seconds * 1e6) * 1000
+
+
+# --- into a journal -------------------------------------------------------------------------------
+
 # Stamp, tag, and the value of each sensor.
 Merged = tuple[int, str, dict[str, float]]
 _BATCH: Final = 20_000
@@ -44,7 +313,8 @@ _NO_LIMITS: Final = Limits(days=MAX_JOURNAL_DAYS, max_bytes=2**62)
 
 def add_parser(roles: Roles) -> None:
     """Add `import` to the command's options."""
-    parser = roles.add_parser("import", help=HELP, description=HELP, allow_abbrev=False)
+    text = "readings of before, from CSV, into a journal; without --write, what would be imported"
+    parser = add_role(roles, "import", text)
     parser.add_argument("file", metavar="FILE.csv", type=Path)
     parser.add_argument(
         "--map",
@@ -64,8 +334,6 @@ def run(options: argparse.Namespace, environ: Mapping[str, str]) -> int:
     """Look through the file, and with `--write` import it; returns the process's exit code."""
     try:
         return _run(options, path_of(options, environ, may_be_new=True))
-    except BrokenPipeError:  # the reader has closed the pipe
-        return FAILED
     except KeyboardInterrupt:
         return INTERRUPTED
     except ConfigError as error:
@@ -94,10 +362,8 @@ def _run(options: argparse.Namespace, path: Path) -> int:
         say(f"nothing was written; add --write to import it into {path}")
         return 0
     tell(f"{new} scans are new in {path}; {known} were there before")
-    if (
-        summary.scans
-        and time.time_ns() - summary.first_ns > _RETENTION_DAYS * 86_400 * NANOSECONDS_PER_SECOND
-    ):
+    old_s = _RETENTION_DAYS * 86_400
+    if summary.scans and time.time_ns() - summary.first_ns > old_s * NANOSECONDS_PER_SECOND:
         say(
             "a twin deletes what is older than its parameter journal_days, "
             f"{_RETENTION_DAYS} unless it is set: set it before the twin starts"
@@ -144,7 +410,11 @@ def _write(path: Path, columns: Columns, found: Iterator[Merged]) -> tuple[int, 
         Lock(path, "lupin-twin import"),
         closing(JournalFile(path, _NO_LIMITS, is_sound=None)) as file,
     ):
-        known, placed = _known(path)
+        with closing(open_named(path)) as connection:
+            known = runs(connection.execute)
+            placed = {tag for (tag,) in connection.execute("SELECT DISTINCT tag FROM place")}
+        if any(run.begun.is_simulated for run in known):
+            raise JournalError(f"the journal {path} is of a simulation: import into another")
         while batch := list(islice(found, _BATCH)):
             count += len(batch)
             if not known:
@@ -159,7 +429,7 @@ def _write(path: Path, columns: Columns, found: Iterator[Merged]) -> tuple[int, 
                     tag_id,
                     stamp_ns,
                     readings,
-                    source=SOURCE,
+                    source="import",
                     own_stamp_ns=stamp_ns,
                     arrival_ns=stamp_ns,
                 )
@@ -178,13 +448,3 @@ def _write(path: Path, columns: Columns, found: Iterator[Merged]) -> tuple[int, 
                 ]
             )
     return new, count - new
-
-
-def _known(path: Path) -> tuple[list[Run], set[str]]:
-    """The journal's runs, and the tags whose places it has."""
-    with closing(open_named(path)) as connection:
-        found = runs(connection.execute)
-        placed = {tag_id for (tag_id,) in connection.execute("SELECT DISTINCT tag FROM place")}
-    if any(run.begun.is_simulated for run in found):
-        raise JournalError(f"the journal {path} is of a simulation: import into another")
-    return found, placed

@@ -17,20 +17,20 @@ from pathlib import Path
 from typing import Any, Final
 
 from lupin_bridge.bags.recording import SUFFIX
-from lupin_bridge.cli.configuration import settings_from
-from lupin_bridge.cli.output import (
+from lupin_bridge.console import (
     FAILED,
     CannotWrite,
+    Progress,
     Roles,
     add_actions,
     backup,
+    say,
     standard,
 )
-from lupin_bridge.console import Progress, say
 from lupin_bridge.judge.options import Criteria
 from lupin_bridge.past import bodies
 from lupin_bridge.past.query import MAX_SECONDS, moment
-from lupin_bridge.settings import SettingError, variable
+from lupin_bridge.settings import SettingError, settings_from, variable
 from lupin_twin.core.past import NotRemembered, PastRefused, seconds
 from lupin_twin.journal.beside import InUse, demo_journal_path, holder_of, journal_path
 from lupin_twin.journal.checking import Overview, RunExtent, find_all_damage, overview

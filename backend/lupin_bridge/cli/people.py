@@ -16,8 +16,7 @@ from pathlib import Path
 from typing import Final
 
 from lupin_bridge.access.accounts import Accounts, accounts_path, digest, make_file
-from lupin_bridge.access.people import hashed
-from lupin_bridge.access.person import (
+from lupin_bridge.access.credentials import (
     ROLES,
     TOKEN_ROLES,
     AccountError,
@@ -26,10 +25,25 @@ from lupin_bridge.access.person import (
     check_password,
     check_site,
 )
-from lupin_bridge.cli.configuration import CONFIG_VARIABLE, read_text, settings_from
-from lupin_bridge.cli.output import FAILED, CannotWrite, Roles, add_actions, add_role, standard
-from lupin_bridge.console import say, tell
-from lupin_bridge.settings import SettingError, option, variable
+from lupin_bridge.access.people import hashed
+from lupin_bridge.console import (
+    FAILED,
+    CannotWrite,
+    Roles,
+    add_actions,
+    add_role,
+    say,
+    standard,
+    tell,
+)
+from lupin_bridge.settings import (
+    CONFIG_VARIABLE,
+    SettingError,
+    option,
+    read_text,
+    settings_from,
+    variable,
+)
 from lupin_twin.runtime.process import INTERRUPTED
 
 USER_ACTIONS: Final[Mapping[str, str]] = {

@@ -1,28 +1,33 @@
-"""What `serve`, `demo` and `web` run: a source, a bridge and a server around one event loop."""
+"""What `serve`, `demo` and `web` run: a source, a bridge and a server around one event loop.
+
+What the demo has and no robot needs: who feeds its twin, a journal of its own, and a past.
+"""
 
 from __future__ import annotations
 
 import asyncio
+import json
 import logging
+import math
 import os
 import subprocess
 import sys
 import tempfile
-from collections.abc import Callable, Sequence
-from contextlib import ExitStack
-from dataclasses import replace
+import time
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import ExitStack, closing
+from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Final
 
 from lupin_bridge.access.accounts import accounts_path
 from lupin_bridge.access.middleware import Access
 from lupin_bridge.access.policy import Proxies
 from lupin_bridge.app import create_app, has_page
 from lupin_bridge.archive import forwarding as archive
-from lupin_bridge.bags.recording import RecordingError
+from lupin_bridge.bags.recording import INPUTS, Recording, RecordingError
 from lupin_bridge.bridge import Bridge
-from lupin_bridge.cli import demo
-from lupin_bridge.cli.serving import open_listener, serve
-from lupin_bridge.cli.supervisor import Supervisor
+from lupin_bridge.cli.serving import Supervisor, open_listener, serve
 from lupin_bridge.feed.local import LocalTwin
 from lupin_bridge.feed.ros_thread import RosStartError
 from lupin_bridge.feed.source import ailment
@@ -35,10 +40,167 @@ from lupin_bridge.routes.pages import HOW_TO_BUILD
 from lupin_bridge.serving.admission import Limits
 from lupin_bridge.serving.server import BridgeServer, allow_connections
 from lupin_bridge.settings import Secrets, SettingError, Settings
-from lupin_bridge.stream.status import STALE_AFTER_S
+from lupin_bridge.stream.frames import STALE_AFTER_S
 from lupin_twin.core.parameters import ParameterError, World
+from lupin_twin.journal.appending import is_empty, simulated
+from lupin_twin.journal.beside import demo_journal_path
+from lupin_twin.journal.schema import FILE_ERRORS, Foreign, open_reader
 
 log = logging.getLogger(__name__)
+
+# How long the patrol's day takes at its usual speed, s: the sun goes 60 times as fast.
+DAY_S: Final = 86_400.0 / 60.0
+# Mostly it takes two, and on a busy machine many more.
+_TIMEOUT_S: Final = 30.0
+
+
+@dataclass(frozen=True, slots=True)
+class Feed:
+    """Who feeds a demo's twin: a module to run with its arguments, in a process of its own.
+
+    `twin_args` are arguments of ROS for the twin alone, and `world` is what it then observes.
+    `journal` is the file that a past of such a patrol is to be filled into, None where none is.
+    """
+
+    what: str
+    command: list[str]
+    twin_args: list[str]
+    world: World
+    journal: Path | None = None
+    patrol_args: Sequence[str] = ()
+
+
+def patrolled(
+    environ: Mapping[str, str], patrol_args: Sequence[str], ros_args: Sequence[str]
+) -> Feed:
+    """Feed it by the simulated patrol.
+
+    Its journal is apart from a real twin's, and seeds from each other; whatever is given after our
+    own arguments of ROS counts instead. A past is filled into that journal, and into no other: a
+    file of parameters may name another one, and is not looked at here.
+    """
+    try:
+        path = demo_journal_path(environ, int(_option("seed", patrol_args) or 0))
+    except RuntimeError:
+        path = None
+    is_another = {"--params-file", "use_sim_time:=true"} & {*ros_args} or any(
+        word.startswith("journal:=") for word in ros_args
+    )
+    return Feed(
+        "patrol",
+        ["lupin_patrol", "--end-with-parent", *patrol_args, *ros_args],
+        [] if path is None else ["--ros-args", "-p", f"journal:={json.dumps(str(path))}", "--"],
+        World("simulated", DAY_S / _speed(patrol_args)),
+        None if is_another else path,
+        patrol_args,
+    )
+
+
+def recorded(
+    files: Sequence[str], play_args: Sequence[str], ros_args: Sequence[str], folder: Path
+) -> Feed:
+    """Feed it by a recording, which `lupin_bridge.bags.player` plays with these options.
+
+    Its journal is in `folder`, and of this recording alone. The twin subscribes to the topics as
+    they were recorded, and at the end the time stands.
+
+    Raises:
+        lupin_bridge.bags.recording.RecordingError: it cannot be played.
+
+    """
+    with Recording([Path(file) for file in files]) as recording:
+        inputs = recording.inputs
+    journal = folder / "journal.sqlite"
+    values = {INPUTS[kind]: json.dumps(name) for name, kind in inputs.items()}
+    values |= {"journal": json.dumps(str(journal)), "use_sim_time": "true"}
+    return Feed(
+        "player",
+        ["lupin_bridge.bags.player", *files, *play_args, *ros_args],
+        [
+            "--ros-args",
+            *(word for name, value in values.items() for word in ("-p", f"{name}:={value}")),
+            "--",
+        ],
+        World("recorded"),
+    )
+
+
+def with_past(feed: Feed) -> Feed:
+    """Fill its journal if that is empty; else have the patrol go on with the time of day.
+
+    A demo that is started again would begin a second morning otherwise, and what comes daily in
+    its journal would fit no day at all.
+    """
+    path = feed.journal
+    if path is None or fill_past(path, feed.patrol_args):
+        return feed
+    since_s = since_morning_s(path, feed.patrol_args, time.time_ns())
+    if since_s is None:
+        return feed
+    module, *words = feed.command
+    return replace(feed, command=[module, f"--since-morning={since_s!r}", *words])
+
+
+def since_morning_s(path: Path, patrol_args: Sequence[str], now_ns: int) -> float | None:
+    """Patrol seconds from the last nine o'clock of the past in a journal to now; None: it has none.
+
+    The filled in past ends at nine, and days have gone on since, as long as they are now.
+    """
+    try:
+        with closing(open_reader(path)) as connection:
+            past = simulated(connection)
+    except (Foreign, OSError, *FILE_ERRORS):
+        return None  # the twin reports it when it opens it
+    if past is None:
+        return None
+    return (now_ns - past.end_ns) / 1e9 * _speed(patrol_args) % DAY_S
+
+
+def fill_past(path: Path, patrol_args: Sequence[str]) -> bool:
+    """Fill a journal that is not there, or empty, with what the patrol would have observed.
+
+    Returns whether it had none. Whatever hinders it is logged, and the demo goes on without.
+    """
+    try:
+        if path.exists() and not _is_empty(path):
+            return False
+        subprocess.run(  # noqa: S603  # the operator's own words, no shell
+            [sys.executable, "-P", "-m", "lupin_patrol.past", str(path), *patrol_args],
+            stdin=subprocess.DEVNULL,
+            capture_output=True,
+            text=True,
+            timeout=_TIMEOUT_S,
+            check=True,
+        )
+    except subprocess.CalledProcessError as error:
+        why = (error.stderr.splitlines() or [str(error)])[-1]
+    except (Foreign, subprocess.TimeoutExpired, OSError, *FILE_ERRORS) as error:
+        why = str(error)
+    else:
+        return True
+    log.warning("the demo starts without a past: %s", why)
+    return False
+
+
+def _is_empty(path: Path) -> bool:
+    if path.stat().st_size == 0:
+        return True
+    with closing(open_reader(path)) as connection:
+        return is_empty(connection)
+
+
+def _speed(patrol_args: Sequence[str]) -> float:
+    speed = float(_option("speed", patrol_args) or 1.0)
+    # The patrol itself refuses what is no speed.
+    return speed if 0.0 < speed < math.inf else 1.0
+
+
+def _option(name: str, patrol_args: Sequence[str]) -> str:
+    given = [word for word in patrol_args if word.startswith(f"--{name}=")]
+    return given[-1].partition("=")[2] if given else ""
+
+
+# --- roles ----------------------------------------------------------------------------------------
 
 FEEDER_STOP_S = 0.9
 
@@ -68,19 +230,10 @@ def run(
             feed = None
             if recording:
                 folder = ending.enter_context(tempfile.TemporaryDirectory(prefix="lupin-twin-"))
-                feed = demo.recorded(recording, play_args, ros_args, Path(folder))
+                feed = recorded(recording, play_args, ros_args, Path(folder))
             elif role == "demo":
-                feed = demo.patrolled(os.environ, patrol_args, ros_args)
-            asyncio.run(
-                _run(
-                    role,
-                    settings,
-                    secrets,
-                    ros_args=ros_args,
-                    feed=feed,
-                    patrol_args=patrol_args,
-                )
-            )
+                feed = patrolled(os.environ, patrol_args, ros_args)
+            asyncio.run(_run(role, settings, secrets, ros_args, feed))
         except (ParameterError, RosStartError, RecordingError) as error:
             raise SettingError(str(error)) from error
 
@@ -89,10 +242,8 @@ async def _run(
     role: str,
     settings: Settings,
     secrets: Secrets,
-    *,
     ros_args: Sequence[str],
-    feed: demo.Feed | None,
-    patrol_args: Sequence[str],
+    feed: Feed | None,
 ) -> None:
     access = Access.of(settings, secrets.token)
     proxies = Proxies.of(settings)
@@ -119,8 +270,8 @@ async def _run(
     settings = replace(settings, max_clients=allow_connections(settings.max_clients))
     # Before a process is started that would inherit its variables.
     supervisor = Supervisor(os.environ)
-    if feed is not None and feed.journal is not None:
-        feed = await asyncio.to_thread(demo.with_past, feed, feed.journal, patrol_args)
+    if feed is not None:
+        feed = await asyncio.to_thread(with_past, feed)
     limits = Limits()
     source = _source_of(role, settings, ros_args, feed, limits)
     push = None
@@ -141,17 +292,15 @@ async def _run(
     try:
         await serve(server, listener, settings, supervisor, lambda: ailment(source.thread))
     finally:
-        if feeder is not None:
-            feeder.terminate()
-        fed = [] if feeder is None else [feeder.wait()]
-        await asyncio.gather(bridge.stop(), forwarding.stop(), *fed)
+        fed = [] if feeder is None else [feeder.stop()]
+        await asyncio.gather(*fed, bridge.stop(), forwarding.stop())
 
 
 def _source_of(
     role: str,
     settings: Settings,
     ros_args: Sequence[str],
-    feed: demo.Feed | None,
+    feed: Feed | None,
     limits: Limits,
 ) -> LocalTwin | WebTwin:
     timeout_s = limits.answer_timeout_s
@@ -172,7 +321,7 @@ def _source_of(
 class Feeder:
     """The patrol, or a recording's player: a process of its own, so that its data crosses DDS."""
 
-    def __init__(self, feed: demo.Feed, is_stopping: Callable[[], bool]) -> None:
+    def __init__(self, feed: Feed, is_stopping: Callable[[], bool]) -> None:
         self._what = feed.what
         self._is_stopping = is_stopping
         # The environment goes along whole: the ROS wheels' own variables only work together.
@@ -181,12 +330,9 @@ class Feeder:
         )
         self._watch = asyncio.create_task(self._report_end())
 
-    def terminate(self) -> None:
-        """Ask it to end."""
+    async def stop(self) -> None:
+        """Ask it to end, and wait for that; kill it if that does not come."""
         self._process.terminate()
-
-    async def wait(self) -> None:
-        """Wait for its end; kill it if that does not come."""
         try:
             await asyncio.wait_for(asyncio.shield(self._watch), FEEDER_STOP_S)
         except TimeoutError:

@@ -1,4 +1,4 @@
-"""The parent's end of the process that reads the past (`past_child`): started, asked, ended.
+"""The parent's end of the process that reads the past (`query.Child`): started, asked, ended.
 
 Belongs to the event loop. A process that dies is logged, its questions are answered with that, and
 the next one is started for the first question after a rest.
@@ -17,8 +17,7 @@ import signal
 import sys
 from typing import Any, Final, TypeVar
 
-from lupin_bridge.feed.past_child import HEAD
-from lupin_bridge.feed.query import Now, PastQuery
+from lupin_bridge.feed.query import HEAD, Now, PastQuery
 from lupin_bridge.feed.shared_work import end
 from lupin_twin.core.past import NotRemembered
 from lupin_twin.field.explored import OccupancyMap
@@ -32,7 +31,7 @@ REST_S: Final = 2.0
 
 AnswerT = TypeVar("AnswerT")
 # Imported and not run as a module: what is pickled here is of that name there too.
-_CHILD: Final = "lupin_bridge.feed.past_child"
+_CHILD: Final = "lupin_bridge.feed.query"
 
 
 class PastProcess:

@@ -1,18 +1,30 @@
 """Questions about the past as values, so that another process may answer them.
 
-`past_child` answers them, over a journal: it gives each what it looks up there.
+It reads the journal, makes answers, and ends with its parent. Questions
+come in on standard input, and their answers go out on standard output, finished: whatever they
+take, they take no turn of the parent's interpreter. It loads no ROS.
 """
 
 from __future__ import annotations
 
+import gc
+import io
+import os
 import pickle
+import signal
 import sqlite3
+import struct
+import sys
+import threading
+import traceback
 from collections.abc import Callable, Sequence
+from concurrent.futures import Future
 from dataclasses import dataclass
-from typing import Any, Generic, Protocol, TypeVar
+from functools import partial
+from typing import IO, Any, Final, Generic, Protocol, TypeVar
 
 from lupin_twin.core.history import LatestRequest
-from lupin_twin.core.journal_condition import Condition
+from lupin_twin.core.journal_condition import UNKNOWN, Condition
 from lupin_twin.core.notes import NotesRequest
 from lupin_twin.core.past import (
     PastRow,
@@ -21,8 +33,13 @@ from lupin_twin.core.past import (
     ScansRequest,
     SeriesRequest,
     WritesRequest,
+    check_moment,
 )
-from lupin_twin.journal.queries import Export, lots
+from lupin_twin.journal.fold import latest, state_at
+from lupin_twin.journal.notes import notes
+from lupin_twin.journal.queries import Export, lots, series
+from lupin_twin.journal.received import observed, recent, scans, writes
+from lupin_twin.runtime.journal_queries import Recall
 from lupin_twin.runtime.workers import ShouldStop
 
 ResultT = TypeVar("ResultT")
@@ -103,3 +120,150 @@ class ExportStep(Generic[ResultT]):
         if rows is None:
             return None, []
         return pickle.dumps(export, 5), [self.write(lot) for lot in lots(rows)]
+
+
+# --- the process that reads the past --------------------------------------------------------------
+
+# Before each answer: its number, and how long its pickle is.
+HEAD: Final = struct.Struct(">QQ")
+# nice(2): beside a busy twin it gets a quarter of the core that they share.
+NICENESS: Final = 5
+
+Search = Callable[[Any, ShouldStop], Any]
+
+
+class Child:
+    """Answers what comes in until that ends; `recall` is where the log is asked.
+
+    In come pairs of a number and: a question, pickled with its `Now` and its cost; None, nobody
+    waits for that answer any more; or the map that questions from here on mean.
+    """
+
+    def __init__(self, recall: type[Recall] = Recall) -> None:
+        self._condition = UNKNOWN
+        self._recall = recall(lambda: self._condition)
+        self._running: dict[int, Future[Any]] = {}
+        # Of its type nothing is imported before one comes.
+        self._map: Any = None
+        self._sending = threading.Lock()
+        self._out: IO[bytes]
+
+    def run(self, questions: IO[bytes], answers: IO[bytes]) -> None:
+        """Take questions until the parent is gone."""
+        self._out = answers
+        while True:
+            try:
+                number, message = pickle.load(questions)  # noqa: S301  # the parent's own
+            except EOFError:
+                return
+            if isinstance(message, bytes):
+                self._ask(number, message)
+            elif message is not None:
+                self._map = message
+            elif (running := self._running.pop(number, None)) is not None:
+                running.cancel()
+
+    def _ask(self, number: int, message: bytes) -> None:
+        try:
+            question, now, cost_s = _Unpickler(message, self._map).load()
+            search = self._search(question, now)
+        except Exception as error:  # noqa: BLE001  # goes to the caller
+            self._send(number, True, error)
+            return
+        self._condition = now.condition
+        running = self._recall.query(search, cost_s)
+        self._running[number] = running
+        running.add_done_callback(partial(self._reply, number))
+
+    def _search(self, question: PastQuery[Any], now: Now) -> Search:
+        def search(log: sqlite3.Connection, should_stop: ShouldStop) -> Any:
+            def find(need: Any) -> Any:
+                if should_stop():  # as a statement ends that is interrupted
+                    raise sqlite3.OperationalError("interrupted")
+                return _found(need, now, log)
+
+            return question.answer(find, should_stop)
+
+        return search
+
+    # --- in a worker's thread -------------------------------------------------------------------
+
+    def _reply(self, number: int, done: Future[Any]) -> None:
+        if self._running.pop(number, None) is not None:  # or nobody waits
+            error = done.exception()
+            self._send(number, error is not None, error or done.result())
+
+    def _send(self, number: int, is_error: bool, value: Any) -> None:
+        try:
+            answer = pickle.dumps((is_error, _portable(value) if is_error else value), 5)
+        except Exception as unfit:  # noqa: BLE001  # an answer of any kind may not be for pickling
+            answer = pickle.dumps((True, _portable(unfit)))
+        # Whoever sends waits until the parent has taken it: so much is kept for it, and no more.
+        with self._sending:
+            self._out.writelines((HEAD.pack(number, len(answer)), answer))
+            self._out.flush()
+
+
+class _Unpickler(pickle.Unpickler):
+    """Reads a question, of which the map was sent before (see `past_process`)."""
+
+    def __init__(self, message: bytes, occupancy_map: Any) -> None:
+        super().__init__(io.BytesIO(message))
+        self._map = occupancy_map
+
+    def persistent_load(self, _: Any) -> Any:
+        """The map."""
+        return self._map
+
+
+_OF_LOG: Final[dict[Any, Callable[[sqlite3.Connection, Any], Any]]] = {
+    WritesRequest: writes,
+    PeriodRequest: observed,
+    NotesRequest: notes,
+    LatestRequest: latest,
+}
+
+
+def _found(need: Any, now: Now, log: sqlite3.Connection) -> Any:
+    match need:
+        case SeriesRequest():
+            return series(log, need, now.stamp_ns)
+        case WritesRequest() | PeriodRequest() | NotesRequest() | LatestRequest():
+            return _OF_LOG[type(need)](log, need)
+        case RecentRequest() | ScansRequest():
+            check_moment(need.at_ns, now.stamp_ns)
+            return recent(log, need) if isinstance(need, RecentRequest) else scans(log, need)
+        case int():
+            check_moment(need, now.stamp_ns)
+            return state_at(log, need, now.frame_id)
+        case _:
+            return need.step(log)
+
+
+def _portable(error: BaseException) -> BaseException:
+    """An error as it can cross, with its trace as a note."""
+    portable = error
+    try:
+        pickle.loads(pickle.dumps(error))  # noqa: S301  # our own
+    except Exception:  # noqa: BLE001  # there are those that cannot be made again
+        portable = RuntimeError(repr(error))
+    trace = "".join(traceback.format_exception(error))
+    portable.add_note(f"in the process that reads the past:\n{trace}")
+    return portable
+
+
+def main(child: Callable[[], Child] = Child) -> None:
+    """Answer the parent until it ends, however that is."""
+    # Ctrl-C and a service manager's signal to all are the parent's to act on.
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signal.signal(signal.SIGTERM, signal.SIG_IGN)
+    os.nice(NICENESS)
+    gc.freeze()
+    # Whatever is printed here is no answer.
+    with os.fdopen(os.dup(1), "wb") as answers:
+        os.dup2(2, 1)
+        try:
+            child().run(sys.stdin.buffer, answers)
+        finally:
+            # At once: nobody waits for what is under way, and nothing here is to be put away.
+            os._exit(0)

@@ -13,18 +13,26 @@ listens there is none.
 The ROS thread hands over bytes and does nothing else with them. Of what the loop has not taken yet,
 as of what is kept for who listens later, the oldest give way to the newest. A sample that is larger
 than the topic's bytes is left out, and counted.
+
+The definition of a message type, with all that it is made of, as bags and viewers want it. From the
+`.msg` files that every message package installs, wherever ROS is installed. The form is that of the
+schema encoding `ros2msg` (https://mcap.dev/spec/registry#ros2msg).
 """
 
 from __future__ import annotations
 
 import asyncio
 import logging
+import os
+import re
+import sys
 from collections import deque
 from collections.abc import Callable, Mapping
 from contextlib import ExitStack
 from dataclasses import dataclass
-from functools import partial
-from typing import Any, Final, Protocol
+from functools import cache, partial
+from pathlib import Path
+from typing import Any, Final
 
 from lupin_twin.core import interfaces
 
@@ -109,34 +117,6 @@ class RosTime:
     is_simulated: bool
 
 
-class Ros(Protocol):
-    """What ROS does for the relay, in its thread; `ros_source.RelayRos` is it."""
-
-    def subscribe(
-        self, node: Any, topic: Topic, take: Callable[[Sample], None]
-    ) -> Callable[[], None]:
-        """Have `take` called for each sample, until what is returned is called.
-
-        Raises:
-            ValueError: the topic's type is not installed, or ROS takes no such topic.
-
-        """
-
-    def published(self, node: Any, is_wanted: Callable[[str, str], bool]) -> Mapping[str, str]:
-        """Topics that somebody publishes as a type that is wanted, and that type."""
-
-    def time(self, node: Any) -> RosTime:
-        """What ROS has for now."""
-
-    def read(self, topic: Topic, data: bytes) -> Any:
-        """The message that the bytes hold; in any thread.
-
-        Raises:
-            ValueError: none of this type, or one that is too large.
-
-        """
-
-
 class Bounded:
     """The newest samples of a topic, within its bounds."""
 
@@ -214,10 +194,11 @@ class _Relayed:
 class Relay:
     """All topics that are listened to. Belongs to the event loop.
 
-    `thread()` is the `RosThread`, asked for with the first topic: it need not run before.
+    `thread()` is the `RosThread`, asked for with the first topic: it need not run before. `ros` is
+    `ros_source.RelayRos`: what ROS does for the relay, in its thread.
     """
 
-    def __init__(self, thread: Callable[[], Any], ros: Ros, linger_s: float = LINGER_S) -> None:
+    def __init__(self, thread: Callable[[], Any], ros: Any, linger_s: float = LINGER_S) -> None:
         self._thread = thread
         self._ros = ros
         self.linger_s = linger_s
@@ -340,3 +321,81 @@ class Relay:
         except Exception as error:  # noqa: BLE001  # nobody waits for this task
             # As a rule the thread has ended, and all with it.
             log.info("%s was not unsubscribed: %r", relayed.topic.name, error)
+
+
+# --- the definition of a message type, with all that it is made of, as bags and viewers want it ---
+
+ENCODING: Final = "ros2msg"
+_RULE: Final = "=" * 80
+_NAME: Final = re.compile(r"([A-Za-z]\w*)/msg/([A-Za-z]\w*)", re.ASCII)
+# A field, or a constant: its type without bounds and array, `pkg/Name` or `Name`.
+_LINE: Final = re.compile(r"\s*([A-Za-z]\w*(?:/[A-Za-z]\w*){0,2})", re.ASCII)
+# https://docs.ros.org/en/jazzy/Concepts/Basic/About-Interfaces.html#field-types
+_PRIMITIVES: Final = frozenset(
+    (
+        *("bool", "byte", "char", "float32", "float64", "string", "wstring"),
+        *(f"{sign}int{bits}" for sign in ("", "u") for bits in (8, 16, 32, 64)),
+    )
+)
+
+
+def schema_text(type_name: str, environ: Mapping[str, str] = os.environ) -> str:
+    """The text of `package/msg/Name` and, each once, of all types that it is made of.
+
+    Looked for as ROS does: in the prefixes of AMENT_PREFIX_PATH, then in Python's own, where the
+    wheels of ROS put it.
+
+    Raises:
+        LookupError: it, or a type that it is made of, is not installed, or it is no such name.
+
+    """
+    prefixes = [prefix for prefix in environ.get("AMENT_PREFIX_PATH", "").split(":") if prefix]
+    return _schema_text(type_name, (*prefixes, sys.prefix))
+
+
+@cache
+def _schema_text(type_name: str, prefixes: tuple[str, ...]) -> str:
+    texts: dict[str, str] = {}
+    wanted = [(type_name, "")]
+    while wanted:
+        name, needed_by = wanted.pop(0)
+        if name not in texts:
+            texts[name] = _definition(name, needed_by, prefixes)
+            wanted += [(part, f", a part of {name},") for part in _parts(texts[name], name)]
+    own, *others = texts
+    # A part is known by `package/Name` there, without the `msg`.
+    return "\n".join(
+        (
+            texts[own],
+            *(f"{_RULE}\nMSG: {name.replace('/msg/', '/')}\n{texts[name]}" for name in others),
+        )
+    )
+
+
+def _definition(type_name: str, needed_by: str, prefixes: tuple[str, ...]) -> str:
+    parts = _NAME.fullmatch(type_name)
+    if parts is None:
+        raise LookupError(f"{type_name!r} is no message type, must be package/msg/Name")
+    package, name = parts.groups()
+    for prefix in prefixes:
+        try:
+            return Path(prefix, "share", package, "msg", f"{name}.msg").read_text(encoding="utf-8")
+        except (FileNotFoundError, NotADirectoryError):
+            continue
+    raise LookupError(
+        f"the message type {type_name}{needed_by} is not installed: there is no "
+        f"share/{package}/msg/{name}.msg in {', '.join(prefixes)}"
+    )
+
+
+def _parts(text: str, type_name: str) -> list[str]:
+    """The message types that the fields of a definition have, in their order."""
+    package = type_name.partition("/")[0]
+    found = []
+    for line in text.splitlines():
+        field = _LINE.match(line)
+        if field is None or field[1] in _PRIMITIVES:
+            continue
+        words = field[1].split("/")
+        found.append(f"{words[0] if len(words) > 1 else package}/msg/{words[-1]}")
+    return found

@@ -1,34 +1,293 @@
-"""What both sources over ROS have in common: a node in a thread, and what the relay needs."""
+"""What both sources over ROS have in common: a node in a thread, and what the relay needs.
+
+The robot's layer: the newest message of each of its topics, when asked for. No executor waits for
+these subscriptions. DDS keeps the newest message, and whoever asks takes it: so localisation that
+publishes a hundred times a second costs the ROS thread one message a second.
+"""
 
 from __future__ import annotations
 
 import asyncio
+import math
 import time
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from struct import Struct
 from typing import Any, Final, Generic, TypeVar
 
+from builtin_interfaces.msg import Time
 from lupin_msgs.msg import Observation
+from rclpy.callback_groups import CallbackGroup
 from rclpy.context import Context
 from rclpy.exceptions import InvalidTopicNameException
-from rclpy.qos import QoSProfile
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from std_msgs.msg import Header
 
 from lupin_bridge.feed.past_process import PastProcess
 from lupin_bridge.feed.relay import Relay, RosTime, Sample, Topic, TwinNames
-from lupin_bridge.feed.robot import Robot
-from lupin_bridge.feed.robot_ros import RobotTopics
 from lupin_bridge.feed.ros_thread import BridgedNode, RosThread
-from lupin_bridge.feed.source import TwinSource, TwinUpdate
+from lupin_bridge.feed.source import (
+    MAX_AHEAD_NS,
+    Battery,
+    Plan,
+    Position,
+    Robot,
+    TwinSource,
+    TwinUpdate,
+)
+from lupin_twin.adapt.config import POSES
 from lupin_twin.adapt.messages import message_type, observation
 from lupin_twin.adapt.scans import BuiltScan
-from lupin_twin.core import interfaces
-from lupin_twin.core.drops import Drop
+from lupin_twin.core import ingest, interfaces
+from lupin_twin.core.drops import Drop, Reason
 from lupin_twin.core.state import NANOSECONDS_PER_SECOND
 from lupin_twin.field.engine import FieldRules
-from lupin_twin.ros import message_limits
+from lupin_twin.ros import convert, message_limits
 from lupin_twin.ros.base_node import latched, qos_of, read_message
+from lupin_twin.ros.message_limits import MalformedError, MessageShape, TooManyError
 from lupin_twin.runtime.workers import Workers
 
-# What is also made into messages here: the topics of `relay.topics_of`.
+ValueT = TypeVar("ValueT", Position, Plan, Battery)
+
+# A way of 250 m by Nav2's planners; of more, reading it would take too long.
+MAX_POSES: Final = 5_000
+# What is shown of it: a frame holds it whole.
+SHOWN_POINTS: Final = 60
+# Farther is no greenhouse, m.
+FARTHEST_M: Final = 1e6
+
+# CDR (OMG DDS-XTypes, 7.4): four bytes say how, numbers lie at multiples of their size behind them.
+_CDR_HEADER_BYTES: Final = 4
+# Three coordinates and a quaternion.
+_POSE_BYTES: Final = 56
+
+
+class _OnDemand(CallbackGroup):  # type: ignore[misc]  # rclpy is not typed
+    """Of subscriptions that nobody waits for."""
+
+    def can_execute(self, _entity: Any) -> bool:
+        return False
+
+    def beginning_execution(self, _entity: Any) -> bool:
+        return False
+
+    def ending_execution(self, _entity: Any) -> None:
+        pass
+
+
+@dataclass(slots=True)
+class _ReceivedTopic:
+    """A topic, and how it is subscribed to: as it is published, once somebody does."""
+
+    name: str
+    types: tuple[str, ...]
+    how: tuple[str, bool] | None = None
+    subscription: Any = None
+    shape: MessageShape | None = None
+
+
+class RobotTopics:
+    """The robot's topics as one node hears them; all of it on that node's thread."""
+
+    def __init__(self) -> None:
+        self._group = _OnDemand()
+        self._pose = _ReceivedTopic(interfaces.ROBOT_POSE.name, tuple(POSES))
+        self._plan = _ReceivedTopic(interfaces.ROBOT_PLAN.name, (interfaces.ROBOT_PLAN.type_name,))
+        self._battery = _ReceivedTopic(
+            interfaces.ROBOT_BATTERY.name, (interfaces.ROBOT_BATTERY.type_name,)
+        )
+
+    def look(self, node: Any, now_ns: int | None) -> Robot:
+        """What has come since the last look; `now_ns` is the twin's time, None: not known.
+
+        What cannot be used is dropped, with a warning, and counted as all that the node drops.
+        """
+        return Robot(
+            self._read(node, self._pose, _position, now_ns),
+            self._read(node, self._plan, _plan, now_ns),
+            self._read(node, self._battery, _battery, now_ns),
+        )
+
+    def _read(
+        self,
+        node: Any,
+        topic: _ReceivedTopic,
+        read: Callable[[_ReceivedTopic, Any, int], ValueT | Drop | None],
+        now_ns: int | None,
+    ) -> ValueT | None:
+        message = self._take(node, topic)
+        if message is None:
+            return None
+        # Of a battery, the frame says where in the robot it is.
+        value: ValueT | Drop | None = None
+        if topic is not self._battery:
+            value = ingest.wrong_frame(message.header.frame_id, node.parameters.frame_id)
+        if value is None:
+            stamp_ns = _stamp_ns(message, now_ns)
+            value = stamp_ns if isinstance(stamp_ns, Drop) else read(topic, message, stamp_ns)
+        if isinstance(value, Drop):
+            node.utilities.drop(value, topic.subscription.topic_name)
+            return None
+        return value
+
+    def _take(self, node: Any, topic: _ReceivedTopic) -> Any:
+        self._subscribe(node, topic)
+        if topic.subscription is None or topic.shape is None:
+            return None
+        handle = topic.subscription.handle
+        with handle:
+            taken = handle.take_message(topic.subscription.msg_type, True)
+        if taken is None:
+            return None
+        read = _read_path if topic is self._plan else read_message
+        message = read(taken[0], topic.shape)
+        if isinstance(message, Drop):
+            node.utilities.drop(message, topic.subscription.topic_name)
+            return None
+        return message
+
+    def _subscribe(self, node: Any, topic: _ReceivedTopic) -> None:
+        """Subscribe as the topic is published; again where that has changed."""
+        try:
+            found = node.get_publishers_info_by_topic(topic.name)
+        except InvalidTopicNameException as error:
+            node.utilities.warn(("robot", topic.name), f"{topic.name}: {error}")
+            return
+        usable = [it for it in found if it.topic_type in topic.types]
+        if not usable:
+            if found:
+                node.utilities.warn(
+                    ("robot", topic.name),
+                    f"{topic.name} is published as {found[0].topic_type}, and not used: "
+                    f"expected {' or '.join(topic.types)}",
+                )
+            return  # what was subscribed to may come back
+        type_name = min((it.topic_type for it in usable), key=topic.types.index)
+        how = (
+            type_name,
+            all(
+                it.qos_profile.durability == DurabilityPolicy.TRANSIENT_LOCAL
+                and it.qos_profile.reliability == ReliabilityPolicy.RELIABLE
+                for it in usable
+                if it.topic_type == type_name
+            ),
+        )
+        if how == topic.how:
+            return
+        if topic.subscription is not None:
+            node.destroy_subscription(topic.subscription)
+        kind = message_type(type_name)
+        limits = {"poses": MAX_POSES} if type_name == interfaces.ROBOT_PLAN.type_name else {}
+        topic.how = how
+        topic.shape = MessageShape(kind, max_bytes=1_000_000, limits=limits)
+        topic.subscription = node.create_subscription(
+            kind,
+            topic.name,
+            lambda _: None,
+            latched(1)
+            if how[1]
+            else QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT),
+            callback_group=self._group,
+            raw=True,
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class _Path:
+    """nav_msgs/Path, of each pose its place on the floor alone."""
+
+    header: Any
+    points: list[tuple[float, float]]
+
+
+def _read_path(data: bytes, shape: MessageShape) -> _Path | Drop:
+    """Read it from its bytes: rclpy makes eight objects of each pose, 70 ms of work a thousand."""
+    try:
+        shape.check(data)
+    except MalformedError as error:
+        reason = Reason.SIZE if isinstance(error, TooManyError) else Reason.UNREADABLE
+        return Drop(reason, str(error))
+    order = "<" if data[1] & 1 else ">"
+    length_at, place_at = Struct(f"{order}I").unpack_from, Struct(f"{order}dd").unpack_from
+    body = data[_CDR_HEADER_BYTES:]
+
+    def behind_header(at: int) -> int:
+        # sec and nanosec, and the text of frame_id behind its length.
+        return int(at + 12 + length_at(body, at + 8)[0])
+
+    at = behind_header(0)
+    frame_id = body[12 : at - 1].decode("utf-8", "replace")
+    at += -at % 4
+    (count,), points = length_at(body, at), []
+    at += 4
+    for _ in range(count):
+        at = behind_header(at + -at % 4)
+        at += -at % 8
+        points.append(place_at(body, at))
+        at += _POSE_BYTES
+    sec, nanosec = Struct(f"{order}iI").unpack_from(body)
+    stamp = Time(sec=sec, nanosec=nanosec)
+    return _Path(Header(stamp=stamp, frame_id=frame_id), points)
+
+
+def _stamp_ns(message: Any, now_ns: int | None) -> int | Drop:
+    """When it was said: by its header, or now."""
+    stamp_ns = convert.nanoseconds(message.header.stamp)
+    if now_ns is None:
+        return stamp_ns
+    if stamp_ns > now_ns + MAX_AHEAD_NS:
+        ahead_s = (stamp_ns - now_ns) / NANOSECONDS_PER_SECOND
+        limit_s = MAX_AHEAD_NS / NANOSECONDS_PER_SECOND
+        return Drop(
+            Reason.REJECTED,
+            f"its stamp is {ahead_s:.0f} s ahead of the twin's time, the limit is {limit_s:g} s: "
+            "is a clock wrong, or use_sim_time?",
+            case="clock",
+        )
+    return min(stamp_ns, now_ns) or now_ns
+
+
+def _position(topic: _ReceivedTopic, message: Any, stamp_ns: int) -> Position | Drop:
+    at = message
+    assert topic.how is not None
+    for part in POSES[topic.how[0]].split("."):
+        at = getattr(at, part)
+    x, y, turned = at.position.x, at.position.y, at.orientation
+    if not _is_near(x, y):
+        return Drop(Reason.POSE, f"its position is ({x:g}, {y:g}) m")
+    length = math.hypot(turned.x, turned.y, turned.z, turned.w)
+    has_heading = 0.5 < length < 2.0  # all zeros: none was given; false for NaN too
+    return Position(x, y, convert.yaw(turned) if has_heading else None, stamp_ns)
+
+
+def _plan(_topic: _ReceivedTopic, message: Any, stamp_ns: int) -> Plan | Drop:
+    points = message.points
+    for x, y in points:
+        if not _is_near(x, y):
+            return Drop(Reason.POSE, f"a position of it is ({x:g}, {y:g}) m")
+    steps = -(-(len(points) - 1) // (SHOWN_POINTS - 1)) if len(points) > 1 else 1
+    shown = points[:-1:steps] + points[-1:]
+    return Plan(tuple(shown), stamp_ns)
+
+
+def _battery(_topic: _ReceivedTopic, message: Any, stamp_ns: int) -> Battery | Drop | None:
+    share = float(message.percentage)
+    if math.isnan(share):  # not measured, says the message's definition
+        return None
+    if not 0.0 <= share <= 1.0:
+        return Drop(
+            Reason.REJECTED, f"its percentage is {share:g}, must be from 0 to 1", case="battery"
+        )
+    return Battery(100.0 * share, stamp_ns)
+
+
+def _is_near(x: float, y: float) -> bool:
+    return abs(x) < FARTHEST_M and abs(y) < FARTHEST_M  # NaN is neither
+
+
+# --- the source -----------------------------------------------------------------------------------
+
+# Also made into messages here: the topics of `relay.topics_of`.
 _SHAPES: Final = {
     "lupin_msgs/msg/TwinState": message_limits.STATE,
     "lupin_msgs/msg/Observation": message_limits.OBSERVATION,
@@ -39,12 +298,17 @@ _SHAPES: Final = {
 
 
 class RelayRos:
-    """`relay.Ros` over rclpy."""
+    """What rclpy does for the relay."""
 
     def subscribe(
         self, node: Any, topic: Topic, take: Callable[[Sample], None]
     ) -> Callable[[], None]:
-        """Subscribe raw: nothing is made of the bytes in this thread."""
+        """Subscribe raw: nothing is made of the bytes in this thread. What is returned ends it.
+
+        Raises:
+            ValueError: the topic's type is not installed, or ROS takes no such topic.
+
+        """
         clock = node.get_clock()
 
         def hand_over(data: bytes) -> None:
@@ -81,7 +345,12 @@ class RelayRos:
         return RosTime(clock.now().nanoseconds, bool(clock.ros_time_is_active))
 
     def read(self, topic: Topic, data: bytes) -> Any:
-        """As the nodes read it: lengths are checked before anything is made of it."""
+        """As the nodes read it, in any thread: lengths are checked before anything is made of it.
+
+        Raises:
+            ValueError: none of this type, or one that is too large.
+
+        """
         message = read_message(data, _SHAPES[topic.type_name])
         if isinstance(message, Drop):
             raise ValueError(message.why)  # noqa: TRY004  # it is no wrong call
@@ -136,8 +405,7 @@ class RosSource(TwinSource, Generic[NodeT]):
             if before is None or update.made_s != before.made_s:
                 on_state(update)
 
-        # Both of the ROS thread alone; the publisher is made at the first observation: most bridges
-        # never publish any.
+        # Both of the ROS thread alone; most bridges never publish an observation.
         self._robot_topics = RobotTopics()
         self._observations: Any = None
         self.thread = RosThread(

@@ -1,37 +1,252 @@
-"""The source of `web`: a twin elsewhere. As many of these as needed may share one twin."""
+"""The source of `web`: a twin elsewhere. As many of these as needed may share one twin.
+
+The log of a twin elsewhere, as a file here: the twin's own, or one that follows it. Which file is
+the twin's own is known by its identity, not by its path alone. Where that cannot be read, the log
+is followed by `get_writes` into a file of this user, one for each journal: a twin that begins
+another one has another file. A file that is damaged is deleted and copied anew.
+"""
 
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import logging
 import math
 import os
+import shutil
 import time
 from collections.abc import Awaitable, Callable, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, TypeVar
 
 from lupin_msgs.srv import GetEstimateReport, GetWrites
 
-from lupin_bridge.feed.followed_log import FollowedLog
 from lupin_bridge.feed.query import Now
 from lupin_bridge.feed.ros_source import Post, RosSource, now_ns_of
-from lupin_bridge.feed.shared_work import Periodic
+from lupin_bridge.feed.shared_work import Periodic, end
 from lupin_bridge.feed.source import TwinUnavailableError, TwinUpdate
-from lupin_bridge.feed.web_node import WebNode
-from lupin_twin.core.journal_condition import UNKNOWN, Condition
+from lupin_bridge.feed.web_node import WebNode, check_ok
+from lupin_twin.core.journal_condition import UNKNOWN, Condition, JournalState
 from lupin_twin.core.parameters import World
-from lupin_twin.core.past import NotRemembered, PastRefused, error_of
+from lupin_twin.core.past import NotRemembered, PastRefused
 from lupin_twin.core.state import Snapshot
-from lupin_twin.field.engine import FieldRefused
 from lupin_twin.journal.beside import journal_path
-from lupin_twin.journal.follow import Lot
+from lupin_twin.journal.follow import Followed, Lot, NotALotError, followed, write
+from lupin_twin.journal.runs import world_of
+from lupin_twin.journal.schema import (
+    FILE_ERRORS,
+    Empty,
+    Foreign,
+    SiteLog,
+    is_damage_error,
+    open_reader,
+)
 from lupin_twin.ros import convert_services
 from lupin_twin.runtime.estimates import Report, ReportRequest
+from lupin_twin.runtime.workers import Workers
 
 log = logging.getLogger(__name__)
+
+ResultT = TypeVar("ResultT")
+
+# How often it is looked whether more was written; what is shown as past is as old at most.
+POLL_S: Final = 0.3
+# After an error, and where there is nothing to follow.
+RETRY_S: Final = 1.0
+# A twin that is heard says within a second where its journal is.
+FOUND_S: Final = 3.0
+# A copy that was not written for so long is deleted at the start, unless it is the newest.
+RETAINED_S: Final = 90 * 86_400.0
+# What putting a lot into the file takes, about, s.
+_WRITE_S: Final = 0.05
+_FILE_ERRORS: Final = (Foreign, OSError, *FILE_ERRORS)
+_ERRORS: Final = (
+    *(NotALotError, NotRemembered, PastRefused, TwinUnavailableError),
+    *_FILE_ERRORS,
+)
+
+
+class FollowedLog:
+    """`condition` is that of the log which is read here; None: there is none yet.
+
+    `query(after)` gives the rows behind a number. `named` is the twin's own file as it is called
+    here, and is read before its twin is heard; None: as the twin calls it. `world` is what is
+    observed, as the log says. Belongs to the event loop.
+    """
+
+    def __init__(
+        self,
+        query: Callable[[int], Awaitable[Lot]],
+        workers: Workers,
+        named: Path | None = None,
+    ) -> None:
+        self._query = query
+        self._named = named
+        self._workers = workers
+        self._folder: Path | None = None
+        self.world = World("unknown")
+        self._reported = UNKNOWN
+        self._is_heard = False
+        self._own: Path | None = None
+        self._followed: Followed | None = None
+        self._is_known = asyncio.Event()
+        self._task: asyncio.Task[None] | None = None
+
+    @property
+    def condition(self) -> Condition | None:
+        """See above."""
+        if self._own is not None:
+            return replace(self._reported, path=str(self._own))
+        if self._followed is None:
+            return None
+        # A twin that cannot write its journal, or is gone, keeps nobody from reading what is here.
+        return replace(
+            self._reported,
+            state=JournalState.RECORDING,
+            path=str(self._path(self._followed.journal)),
+            written=self._followed.last,
+            complete_ns=self._followed.complete_ns,
+            kept_ns=self._followed.kept_ns,
+            simulated_ns=self._followed.simulated_ns,
+        )
+
+    def on_update(self, journal: Condition) -> None:
+        """What the twin says of its journal; what it said last holds while it says nothing."""
+        if journal.state is not JournalState.UNKNOWN and journal.journal_id:
+            self._reported, self._is_heard = journal, True
+
+    async def explain(self, error: NotRemembered) -> NotRemembered:
+        """The same error, but of a copy: that is made anew here, and not by the twin."""
+        if self._own is not None or self._followed is None:
+            return error
+        path = self._path(self._followed.journal)
+        if str(path) not in str(error):
+            return error
+        if error.damage:
+            await self._on_worker(lambda: _delete(path))
+        why = f"{path}, the copy of the twin's journal, cannot be read; it is made anew"
+        return NotRemembered(f"{why} as soon as the twin answers", is_lasting=False)
+
+    async def wait(self) -> None:
+        """Return once a log is known; wait no longer than it usually takes."""
+        with contextlib.suppress(TimeoutError):
+            await asyncio.wait_for(self._is_known.wait(), FOUND_S)
+
+    async def start(self, folder: Path | None) -> None:
+        """Begin with the file that was followed last into a folder; None: there is no place."""
+        self._folder = folder
+        if folder is not None:
+            with contextlib.suppress(*_ERRORS):
+                self._followed = await self._on_worker(lambda: _newest(folder))
+                self.world = self._followed.world if self._followed else self.world
+        self._task = asyncio.create_task(self._keep(), name="log")
+
+    async def stop(self) -> None:
+        """End; the next one goes on where this one was."""
+        await end(self._task)
+
+    def _path(self, journal: str) -> Path:
+        assert self._folder is not None
+        return self._folder / f"{journal}.sqlite"
+
+    async def _keep(self) -> None:
+        why = ""
+        while True:
+            if self.condition is not None:
+                self._is_known.set()
+            try:
+                await asyncio.sleep(await self._look())
+                why = ""
+            except _ERRORS as error:
+                if str(error) != why:
+                    why = str(error)
+                    log.info("the twin's journal is not followed: %s", why)
+                await asyncio.sleep(RETRY_S)
+            except Exception:  # nobody waits for this task, and all of the past depends on it
+                log.exception("the twin's journal is not followed")
+                await asyncio.sleep(RETRY_S)
+
+    async def _look(self) -> float:
+        """See where the log is, or take what is new of it; returns when to look again, s."""
+        named = self._named
+        if named is not None and not self._is_heard:
+            found = await self._on_worker(lambda: followed(named))
+            self._reported = Condition(
+                JournalState.RECORDING,
+                complete_ns=found.complete_ns,
+                kept_ns=found.kept_ns,
+                journal_id=found.journal,
+                simulated_ns=found.simulated_ns,
+            )
+        twin = self._reported
+        if not twin.journal_id:
+            return POLL_S
+        own = named or Path(twin.path)
+        world = await self._on_worker(lambda: _world_of(own, twin.journal_id))
+        self._own = None if world is None else own
+        self.world = world or self.world
+        if world is not None or self._folder is None:
+            return RETRY_S
+        here = self._path(twin.journal_id)
+        try:
+            # Each time: another `web` may write it too, and anybody may delete it.
+            after = await self._on_worker(lambda: _last(here))
+            lot = await self._query(after)
+            if lot.journal != twin.journal_id:
+                return RETRY_S  # it is another one since, and says so soon
+            self._followed = await self._on_worker(
+                lambda: write(here, lot, twin.complete_ns, after)
+            )
+            self.world = self._followed.world
+        except _FILE_ERRORS as error:
+            if isinstance(error, Foreign) or is_damage_error(error) or here.is_dir():
+                self._followed = None
+                await self._on_worker(lambda: _delete(here))
+                log.warning("%s cannot be used (%s): the log is copied anew", here, error)
+            raise
+        return POLL_S if lot.is_all else 0.0
+
+    async def _on_worker(self, work: Callable[[], ResultT]) -> ResultT:
+        return await asyncio.wrap_future(self._workers.submit(lambda _: work(), _WRITE_S))
+
+
+def _newest(folder: Path) -> Followed | None:
+    """The copy that was written last; others that are old are deleted."""
+    files = sorted(folder.glob("*.sqlite"), key=lambda it: it.stat().st_mtime)
+    for path in files[:-1]:
+        if path.stat().st_mtime < time.time() - RETAINED_S:
+            log.info("%s is deleted: its twin has written nothing for 90 days", path)
+            _delete(path)
+    return followed(files[-1]) if files else None
+
+
+def _delete(path: Path) -> None:
+    if path.is_dir():
+        shutil.rmtree(path)
+    for suffix in ("", "-wal", "-shm"):
+        path.with_name(path.name + suffix).unlink(missing_ok=True)
+
+
+def _last(path: Path) -> int:
+    try:
+        return followed(path).last if path.exists() else 0
+    except Empty:  # whoever began it was killed
+        return 0
+
+
+def _world_of(path: Path, journal: str) -> World | None:
+    """What a file says is observed; None: it is not that journal's."""
+    try:
+        with contextlib.closing(open_reader(path)) as connection:
+            log = SiteLog(connection)
+            return world_of(log) if log.meta("journal_id") == journal else None
+    except _FILE_ERRORS:
+        return None
+
+
+# --- the source -----------------------------------------------------------------------------------
 
 # ROS time beyond this, in 2001, is that of a wall's clock, and goes on while nobody tells it.
 _A_DATE_NS: Final = 10**18
@@ -168,7 +383,7 @@ class WebTwin(RosSource[WebNode]):
         """What the twin's service says."""
         wanted = convert_services.report_request_message(request)
         response = await self._request(GetEstimateReport, wanted)
-        _check_ok(response)
+        check_ok(response)
         cost_s = len(response.tag_ids) * _READ_TAG_S
         reading = self.workers.submit(lambda _: convert_services.report_of(response), cost_s)
         try:
@@ -229,13 +444,3 @@ def _folder(node: WebNode) -> Path | None:
     except RuntimeError:
         return None
     return None if journal is None else journal.with_suffix(".followed")
-
-
-def _check_ok(response: Any) -> None:
-    """Raise what a service's refusal says."""
-    if response.ok:
-        return
-    error = error_of(response.error_message)
-    if isinstance(error, PastRefused):
-        raise FieldRefused(str(error))
-    raise error if error.is_lasting else TwinUnavailableError(str(error))

@@ -13,12 +13,14 @@ from lupin_msgs.srv import GetEstimateReport, GetWrites
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
 from rclpy.validate_topic_name import validate_topic_name
 
+from lupin_bridge.feed.source import TwinUnavailableError
 from lupin_twin.core import interfaces
 from lupin_twin.core.clock import StampWatch
 from lupin_twin.core.diagnostics import SelfReport, self_report
 from lupin_twin.core.parameters import TwinParameters
+from lupin_twin.core.past import PastRefused, error_of
 from lupin_twin.core.state import Snapshot, TagState
-from lupin_twin.field.engine import FieldRules
+from lupin_twin.field.engine import FieldRefused, FieldRules
 from lupin_twin.field.explored import OccupancyMap
 from lupin_twin.ros import convert, message_limits
 from lupin_twin.ros.base_node import SERVICE_QOS, NodeUtilities
@@ -284,3 +286,13 @@ def _digest_of(tags: Sequence[TagState]) -> str:
         text = repr((tag.tag_id, tag.pose, readings))
         digest.update(text.encode("utf-8", "surrogatepass"))
     return digest.hexdigest()
+
+
+def check_ok(response: Any) -> None:
+    """Raise what a service's refusal says."""
+    if response.ok:
+        return
+    error = error_of(response.error_message)
+    if isinstance(error, PastRefused):
+        raise FieldRefused(str(error))
+    raise error if error.is_lasting else TwinUnavailableError(str(error))

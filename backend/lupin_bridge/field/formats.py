@@ -5,7 +5,7 @@ from __future__ import annotations
 import colorsys
 import io
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Final
 
@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 import orjson
 
-from lupin_bridge.judge.ranges import Sensor, Sensors
+from lupin_bridge.judge.quantities import Sensor, Sensors
 from lupin_twin.core.state import TagState
 from lupin_twin.estimate import EstimateGrid
 from lupin_twin.estimate.engine import Estimate
@@ -91,12 +91,7 @@ def write_json(grid: FieldGrid) -> bytes:
     """`schema.GetFieldResponse`: `values` flat and row-major, NaN as null."""
     rest = orjson.dumps(
         {
-            "width": grid.width,
-            "height": grid.height,
-            # GetField's float32, and so the shortest decimals that are the same float32: 0.1.
-            "origin_x": np.float32(grid.origin_x),
-            "origin_y": np.float32(grid.origin_y),
-            "resolution_used": np.float32(grid.resolution),
+            **_place(grid),
             "value_min": np.float32(grid.value_min),
             "value_max": np.float32(grid.value_max),
             "sample_count": grid.sample_count,
@@ -107,6 +102,17 @@ def write_json(grid: FieldGrid) -> bytes:
     return b"".join(
         (b'{"ok":true,"error_message":"","values":[', *numbers(grid.values), b"],", rest[1:])
     )
+
+
+def _place(grid: FieldGrid | EstimateGrid) -> dict[str, Any]:
+    """As in the services' float32, and so the shortest decimals that are the same one: 0.1."""
+    return {
+        "width": grid.width,
+        "height": grid.height,
+        "origin_x": np.float32(grid.origin_x),
+        "origin_y": np.float32(grid.origin_y),
+        "resolution_used": np.float32(grid.resolution),
+    }
 
 
 def numbers(cells: npt.NDArray[np.float32]) -> Iterator[bytes]:
@@ -156,19 +162,20 @@ def write_quality(
 
 def refusal_json(reason: str) -> bytes:
     """GetField's failure body: the reason, and every other field zeroed."""
+    return _refusal(reason, ("values",), ("value_min", "value_max"), ("sample_count",))
+
+
+def _refusal(
+    reason: str, cells: Iterable[str], numbers: Iterable[str], counts: Iterable[str]
+) -> bytes:
     return orjson.dumps(
         {
             "ok": False,
             "error_message": reason,
-            "values": [],
-            "width": 0,
-            "height": 0,
-            "origin_x": 0.0,
-            "origin_y": 0.0,
-            "resolution_used": 0.0,
-            "value_min": 0.0,
-            "value_max": 0.0,
-            "sample_count": 0,
+            **{name: [] for name in cells},
+            **dict.fromkeys(("width", "height"), 0),
+            **dict.fromkeys(("origin_x", "origin_y", "resolution_used", *numbers), 0.0),
+            **dict.fromkeys(counts, 0),
         }
     )
 
@@ -273,15 +280,11 @@ def write_estimate(
 
 
 def write_estimate_json(estimate: Estimate) -> bytes:
-    """`estimate_schema.GetEstimateResponse`: `mean` and `sd` flat and row-major."""
+    """`estimates.GetEstimateResponse`: `mean` and `sd` flat and row-major."""
     grid = estimate.grid
     rest = orjson.dumps(
         {
-            "width": grid.width,
-            "height": grid.height,
-            "origin_x": np.float32(grid.origin_x),
-            "origin_y": np.float32(grid.origin_y),
-            "resolution_used": np.float32(grid.resolution),
+            **_place(grid),
             "sd_known": np.float32(grid.sd_known),
             "sample_count": estimate.sample_count,
             "reading_count": estimate.reading_count,
@@ -303,21 +306,7 @@ def write_estimate_json(estimate: Estimate) -> bytes:
 
 def estimate_refusal_json(reason: str) -> bytes:
     """GetEstimate's failure body: the reason, and every other field zeroed."""
-    empty: dict[str, Any] = {
-        "ok": False,
-        "error_message": reason,
-        "mean": [],
-        "sd": [],
-        "width": 0,
-        "height": 0,
-        "origin_x": 0.0,
-        "origin_y": 0.0,
-        "resolution_used": 0.0,
-        "sd_known": 0.0,
-        "sample_count": 0,
-        "reading_count": 0,
-    }
-    return orjson.dumps(empty)
+    return _refusal(reason, ("mean", "sd"), ("sd_known",), ("sample_count", "reading_count"))
 
 
 def write_estimate_npy(estimate: Estimate) -> bytes:

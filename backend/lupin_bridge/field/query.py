@@ -11,7 +11,7 @@ from urllib.parse import quote
 from annotated_types import Gt, Interval
 
 from lupin_bridge.field.formats import FORMATS, JSON, PNG, FieldFormat
-from lupin_bridge.query_string import AT, Name, needed, parameter
+from lupin_bridge.query_string import AT, Name, needed, parameter, safe_name
 from lupin_twin.field.engine import (
     DEFAULT_RESOLUTION_M,
     FieldRefused,
@@ -105,7 +105,7 @@ def negotiate(accept: str | None) -> FieldFormat | None:
     """
     if not accept or not accept.strip():
         return JSON
-    ranges = [_media_range(part) for part in accept.split(",") if part.strip()]
+    ranges = weighted(accept)
     best, best_weight = None, 0.0
     for candidate in FORMATS:
         weight = _weight(candidate.media_type, ranges)
@@ -114,17 +114,24 @@ def negotiate(accept: str | None) -> FieldFormat | None:
     return best
 
 
-def _media_range(text: str) -> tuple[str, float]:
-    media_type, *options = (part.strip().lower() for part in text.split(";"))
-    weight = 1.0
-    for option in options:
-        name, _, value = option.partition("=")
-        if name.strip() == "q":
-            try:
-                weight = min(1.0, max(0.0, float(value)))
-            except ValueError:
-                weight = 0.0
-    return media_type, weight if weight == weight else 0.0  # noqa: PLR0124  # NaN
+def weighted(header: str) -> list[tuple[str, float]]:
+    """What a header accepts, in lower case, and each one's weight (RFC 9110, section 12.4.2).
+
+    What is no weight counts as 0.
+    """
+    found = []
+    for part in header.lower().split(","):
+        name, *options = (piece.strip() for piece in part.split(";"))
+        weight = 1.0
+        for option in options:
+            key, _, value = option.partition("=")
+            if key.strip() == "q":
+                try:
+                    weight = min(1.0, max(0.0, float(value)))
+                except ValueError:
+                    weight = 0.0
+        found.append((name, weight if weight == weight else 0.0))  # noqa: PLR0124  # NaN
+    return found
 
 
 def _weight(media_type: str, ranges: Iterable[tuple[str, float]]) -> float:
@@ -146,11 +153,10 @@ def headers(metadata: Mapping[str, str], file_name: str, kind: str = "Field") ->
     """A field's metadata as `X-Field-…` headers, and a name for who saves it.
 
     Header values are ASCII and neither begin nor end with a space; what is not so is
-    percent-encoded as UTF-8. In the file's name, anything that a file system or a shell could take
-    amiss becomes an underscore.
+    percent-encoded as UTF-8.
     """
     result = {f"X-{kind}-{name}": _header_value(value) for name, value in metadata.items()}
-    result["Content-Disposition"] = f'inline; filename="{_UNSAFE_IN_NAME.sub("_", file_name)}"'
+    result["Content-Disposition"] = f'inline; filename="{safe_name(file_name)}"'
     return result
 
 
@@ -161,4 +167,3 @@ def _header_value(text: str) -> str:
 
 _OUTER_SPACES: Final = re.compile(r"^ +| +$")
 _SAFE: Final = " !#$&'()*+,-./:;<=>?@[]^_`{|}~"
-_UNSAFE_IN_NAME: Final = re.compile(r"[^A-Za-z0-9._-]")

@@ -5,11 +5,12 @@ from __future__ import annotations
 import asyncio
 import math
 import time
-from collections.abc import Iterator, Mapping
-from dataclasses import replace
+from collections.abc import AsyncGenerator, Awaitable, Callable, Iterable, Iterator, Mapping
+from contextlib import aclosing
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import Final, cast
+from typing import Any, Final, cast
 
 import orjson
 from fastapi import FastAPI, Request, Response, WebSocket
@@ -23,20 +24,36 @@ from lupin_bridge.access.policy import BehindProxies, Proxies
 from lupin_bridge.app import STATIC_FOLDER, create_app
 from lupin_bridge.bridge import Bridge
 from lupin_bridge.feed.past_process import PastProcess
-from lupin_bridge.feed.query import Now
+from lupin_bridge.feed.query import ExportStep, Now
 from lupin_bridge.feed.shared_work import Periodic, Shared
-from lupin_bridge.fleet import small_map
-from lupin_bridge.fleet.compare import COMPARE_S, Compare, OfSites, chosen, compare
-from lupin_bridge.fleet.export import respond_sites
-from lupin_bridge.fleet.overview import Site, SitesFrame, alarms_json, archive_json, etag, site_json
+from lupin_bridge.feed.source import exported
+from lupin_bridge.fleet.compare import (
+    COMPARE_S,
+    Compare,
+    OfSites,
+    SitesReport,
+    chosen,
+    compare,
+    sites_report,
+)
+from lupin_bridge.fleet.overview import (
+    Site,
+    SitesFrame,
+    alarms_json,
+    archive_json,
+    etag,
+    map_svg,
+    map_version,
+    site_json,
+)
 from lupin_bridge.fleet.pages import Opened, SitePage, SitePages, Sites
-from lupin_bridge.fleet.report import SitesReport, sites_report
-from lupin_bridge.fleet.source import SiteTwin
-from lupin_bridge.fleet.watching import Watching
+from lupin_bridge.fleet.source import SiteTwin, Watching
 from lupin_bridge.judge.options import Criteria
 from lupin_bridge.metrics import CONTENT_TYPE
-from lupin_bridge.past.export import CSV, PARQUET
-from lupin_bridge.query_string import read
+from lupin_bridge.past.bodies import COMPLETE_TO
+from lupin_bridge.past.export import CSV, PARQUET, ExportFormat
+from lupin_bridge.past.query import OfExport
+from lupin_bridge.query_string import parameter, read
 from lupin_bridge.routes import pages, status
 from lupin_bridge.routes.answers import (
     NEVER_STORE,
@@ -48,7 +65,8 @@ from lupin_bridge.routes.answers import (
     person_of,
     respond,
 )
-from lupin_bridge.routes.sockets import has_place, next_message
+from lupin_bridge.routes.export import respond_export, span_of
+from lupin_bridge.routes.sockets import listen
 from lupin_bridge.serving.admission import (
     REVALIDATE,
     Admission,
@@ -58,12 +76,12 @@ from lupin_bridge.serving.admission import (
     json_answer,
 )
 from lupin_bridge.serving.http_protocol import PieceByPiece
-from lupin_bridge.serving.ws_protocol import CONNECTION_KEY, Connection
 from lupin_bridge.settings import Settings
+from lupin_bridge.stream.frames import Status
 from lupin_bridge.stream.hub import Client, Hub
-from lupin_bridge.stream.status import Status
-from lupin_twin.core.journal_condition import UNKNOWN
-from lupin_twin.core.past import PastRefused
+from lupin_twin.core.journal_condition import UNKNOWN, Condition, JournalState
+from lupin_twin.core.past import PastRefused, seconds
+from lupin_twin.journal.queries import STRETCH_S, Export
 from lupin_twin.runtime.workers import Workers
 
 _TIDY_S: Final = 5.0
@@ -89,12 +107,7 @@ class Fleet:
     """Everything between the archive and the browsers. Belongs to the event loop."""
 
     def __init__(
-        self,
-        settings: Settings,
-        criteria: Criteria,
-        access: Access,
-        *,
-        limits: Limits = Limits(),
+        self, settings: Settings, criteria: Criteria, access: Access, limits: Limits
     ) -> None:
         self.watching = Watching(settings, self._on_news)
         self.past = PastProcess("lupin_bridge.fleet.reader")
@@ -169,8 +182,13 @@ class Fleet:
 
     def join(self, client: Client) -> None:
         """Add a browser; it has every site when this returns."""
-        self._push_now()
+        if self._frame is None:
+            self._push()
         self.hub.join(client, time.monotonic())
+
+    def serve(self, client: Client) -> None:
+        """A browser's socket is free again."""
+        self.hub.serve(client, time.monotonic())
 
     def _on_news(self) -> None:
         for opened in self.pages:
@@ -186,10 +204,6 @@ class Fleet:
         watching = self.watching
         self._frame = SitesFrame(watching.sites, watching.archive, watching.now_ns, self._frame)
         self.hub.publish(self._frame, now_s)  # type: ignore[arg-type]  # all that the hub needs of one
-
-    def _push_now(self) -> None:
-        if self._frame is None:
-            self._push()
 
     # --- several sites ------------------------------------------------------------------------
 
@@ -226,6 +240,50 @@ class Fleet:
         yield "lupin_clients", "WebSocket clients that follow the overview", len(self.hub)
         dismissed = self.hub.clients_dismissed
         yield "lupin_clients_dismissed", "of them, those that took no frame", dismissed
+
+
+@dataclass(frozen=True, slots=True)
+class OfSitesExport(OfExport):
+    """The parameters of an export of many sites."""
+
+    sites: str | None = parameter("names of sites, with a comma between; default: all")
+
+
+async def respond_sites(fleet: Fleet, kind: ExportFormat, request: Request) -> Response:
+    """Every row of a period of the sites that are named, or of all."""
+    given = read(OfSitesExport, request.query_params.multi_items(), PastRefused)
+    known = fleet.sites_for(request)
+    named = [known[name] for name in chosen(given.sites, known)]
+    start_ns, end_ns = span_of(given, None)
+    query = Export(start_ns, end_ns, given.tag_id, given.sensor_type)
+    heard_ns = min((site.heard_ns for site in named), default=0)
+    return await respond_export(
+        request,
+        fleet,
+        lambda pack: _rows(fleet, [site.site for site in named], query, pack),
+        kind,
+        given,
+        sensors=fleet.criteria.sensors,
+        now_ns=fleet.watching.now_ns,
+        known={COMPLETE_TO: seconds(min(heard_ns, end_ns))},
+        has_site=True,
+    )
+
+
+async def _rows(
+    fleet: Fleet, sites: Iterable[str], period: Export, pack: Callable[..., bytes]
+) -> AsyncGenerator[bytes]:
+    """The rows of one site after the other, see `exported`; each lot through `pack`."""
+    for site in sites:
+        log = Condition(JournalState.RECORDING, path=site, journal_id=site)
+        now = Now(fleet.watching.now_ns, "", log)
+
+        def ask(step: ExportStep[bytes], now: Now = now) -> Awaitable[Any]:
+            return fleet.past.ask(step, now, STRETCH_S)
+
+        async with aclosing(exported(ask, period, partial(pack, site=site))) as lots:
+            async for lot in lots:
+                yield lot
 
 
 def create_fleet_app(
@@ -272,7 +330,6 @@ def create_fleet_app(
     if page.is_file():
         app.mount("/assets", StaticFiles(directory=static_folder / "assets"), name="assets")
     app.add_exception_handler(404, _not_found)
-    add_refusals(app)
     return app
 
 
@@ -304,37 +361,26 @@ def _add_overview(app: FastAPI, fleet: Fleet) -> None:
         site = fleet.watching.sites.get(name)
         if site is None or not site.dots:
             return error_response(f"there is no map of a site {name[:64]!r}", 404)
-        tag = f'"{small_map.version(site.dots)}"'
+        tag = f'"{map_version(site.dots)}"'
         if has_etag(request, tag):
             return not_modified(tag)
         headers = {"ETag": tag, **REVALIDATE, "Content-Security-Policy": _PICTURE_POLICY}
-        return Response(small_map.svg(site.dots), 200, headers, "image/svg+xml")
+        return Response(map_svg(site.dots), 200, headers, "image/svg+xml")
 
     @app.websocket("/ws/sites")
     async def ws_sites(websocket: WebSocket) -> None:
         """Every site at once, then what has changed; a client is not listened to."""
         await websocket.accept()
-        if not await has_place(websocket, fleet.hub):
-            return
-        connection: Connection = getattr(websocket.state, CONNECTION_KEY)
         person = person_of(websocket)
         only = () if person is None else person.sites
-        client = Client(
-            connection,
-            address=client_of(websocket),
+        await listen(
+            websocket,
+            fleet,
             delta=True,
             wants_status=False,
             wants_alarms=False,
             wire=lambda it, frame: sites_wire(it, cast("SitesFrame", frame), only),
         )
-        connection.on_writable = lambda: fleet.hub.serve(client, time.monotonic())
-        fleet.join(client)
-        try:
-            while await next_message(websocket) is not None:
-                pass
-        finally:
-            connection.on_writable = None
-            fleet.hub.leave(client)
 
 
 def _add_answers(app: FastAPI, fleet: Fleet) -> None:

@@ -2,27 +2,33 @@
 
 A site's value in a bucket is the mean of all its readings there, whatever their tag. Hours are what
 the log has counted already: reading by reading, a week of fifty sites would take a minute.
+
+What happened between two moments at every site, counted in whole hours, and its newest notes. Each
+site's own report has the rest.
 """
 
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Annotated, Any, Final
+from urllib.parse import quote
 
 import numpy as np
 import orjson
 from annotated_types import Interval
 
-from lupin_bridge.judge.derived import DAILY, DERIVED
-from lupin_bridge.judge.ranges import Sensors
+from lupin_bridge.fleet.overview import MAX_LISTED
+from lupin_bridge.judge.quantities import DAILY, DERIVED, Sensors
 from lupin_bridge.past import query as past_query
-from lupin_bridge.past.query import OfPeriod, Parameters
+from lupin_bridge.past.query import OfPeriod, OfReport, Parameters
 from lupin_bridge.query_string import Name, needed, parameter, read
 from lupin_bridge.serving.admission import Answer, json_answer
-from lupin_bridge.stream.state_json import stamp
-from lupin_twin.core.past import HOUR_NS, Grid, NotRemembered, PastRefused, grid
+from lupin_bridge.stream.state_json import note_json, stamp
+from lupin_twin.core.notes import WITHDRAW, WITHDRAWN, Note
+from lupin_twin.core.past import HOUR_NS, Event, Grid, NotRemembered, PastRefused, grid, seconds
 from lupin_twin.core.state import NANOSECONDS_PER_SECOND
 
 MAX_SITES: Final = 50
@@ -136,11 +142,11 @@ def compare(
 
     Raises:
         NotRemembered: see `chosen`.
-        PastRefused: see `past.query.period`; too many sites, too long a period, a derived quantity.
+        PastRefused: see `OfPeriod.span`; too many sites, too long a period, a derived quantity.
 
     """
     given = read(OfCompare, parameters, PastRefused)
-    period = past_query.period(OfCompare, parameters, now_ns)
+    start_ns, end_ns = given.span(now_ns)
     if given.sensor_type in DERIVED or given.sensor_type in DAILY:
         raise PastRefused(
             f"sensor_type is {given.sensor_type!r}, which is derived: measured ones are compared"
@@ -148,8 +154,8 @@ def compare(
     names = chosen(given.sites, known)
     if len(names) > MAX_SITES:
         raise PastRefused(f"sites are {len(names)}, the limit is {MAX_SITES}: name some")
-    end_ns = period.end_ns or now_ns
-    start_ns = period.start_ns if given.from_ is not None else max(0, end_ns - _DAY_NS)
+    end_ns = end_ns or now_ns
+    start_ns = start_ns if given.from_ is not None else max(0, end_ns - _DAY_NS)
     if end_ns - start_ns > MAX_DAYS * _DAY_NS:
         days = (end_ns - start_ns) / _DAY_NS
         raise PastRefused(f"from and to are {days:.1f} days apart, the limit is {MAX_DAYS}")
@@ -198,3 +204,116 @@ def _number(value: float) -> float | None:
 
 def _numbers(values: Any) -> list[float | None]:
     return [_number(value) for value in values]
+
+
+# --- what happened at every site ------------------------------------------------------------------
+
+# Under the names of `schema.ReportCounts`.
+_COUNTED: Final = {
+    Event.SCANS: "scans",
+    Event.FAILURES: "failed",
+    Event.INSPECTIONS: "inspections",
+    "notes": "notes",
+}
+_COUNTS: Final = """
+SELECT site, event, sum(n) FROM tally
+WHERE site = ANY(%(sites)s) AND hour >= %(first)s AND hour < %(last)s GROUP BY site, event
+UNION ALL SELECT site, 'notes', count(*) FROM note
+WHERE site = ANY(%(sites)s) AND kind != %(withdraw)s
+    AND made_at_ns >= %(start)s AND made_at_ns < %(end)s GROUP BY site
+"""
+_NOTES: Final = """
+SELECT site, id, made_at_ns, made_by, kind, subject, text, until_ns, gone.by, gone.at_ns
+FROM (
+    SELECT * FROM note WHERE site = ANY(%(sites)s) AND kind != %(withdraw)s
+        AND made_at_ns >= %(start)s AND made_at_ns < %(end)s
+    ORDER BY made_at_ns DESC, site, id LIMIT %(most)s
+) AS newest LEFT JOIN LATERAL (
+    SELECT made_by AS by, made_at_ns AS at_ns FROM note AS other
+    WHERE other.site = newest.site AND kind = %(withdraw)s AND subject = %(withdrawn)s || newest.id
+    ORDER BY other.id LIMIT 1
+) AS gone ON true
+ORDER BY made_at_ns DESC, site, id
+"""
+
+
+@dataclass(frozen=True, slots=True)
+class OfSitesReport(OfReport):
+    """The parameters of `/api/report` of the fleet."""
+
+    sites: str | None = parameter("names with commas between them; default: all")
+
+
+@dataclass(frozen=True, slots=True)
+class SitesReport:
+    """`sites` are a site, its name, its active alarms, and up to when it was heard, ns."""
+
+    sites: tuple[tuple[str, str, int | None, int], ...]
+    start_ns: int
+    end_ns: int
+
+    def read(self, connection: Any) -> tuple[Sequence[Any], Sequence[Any]]:
+        """What was counted, by site and event, and the newest notes."""
+        query = {
+            "sites": [site for site, *_ in self.sites],
+            "first": self.start_ns // HOUR_NS,
+            "last": self.end_ns // HOUR_NS,
+            "start": self.start_ns,
+            "end": self.end_ns,
+            "withdraw": WITHDRAW,
+            "withdrawn": WITHDRAWN,
+            "most": MAX_LISTED,
+        }
+        return tuple(connection.execute(text, query).fetchall() for text in (_COUNTS, _NOTES))
+
+    def answer(self, found: tuple[Sequence[Any], Sequence[Any]]) -> Answer:
+        """The answer of what was read."""
+        counts = Counter({(site, event): int(n) for site, event, n in found[0]})
+        asked = f"from={seconds(self.start_ns)}&to={seconds(self.end_ns)}"
+        rows = [
+            {
+                "site": site,
+                "name": name,
+                **{key: counts[site, event] for event, key in _COUNTED.items()},
+                "active_alarms": active,
+                "complete_to": stamp(min(heard_ns, self.end_ns)),
+                "report": f"sites/{quote(site, safe='')}/api/report?{asked}",
+            }
+            for site, name, active, heard_ns in self.sites
+        ]
+        names = {site: name for site, name, *_ in self.sites}
+        notes = [
+            {"site": site, "name": names[site], **_note_json(Note(*note), by, at_ns)}
+            for site, *note, by, at_ns in found[1]
+        ]
+        body = {
+            "from": stamp(self.start_ns),
+            "to": stamp(self.end_ns),
+            "sites": rows,
+            "notes": notes,
+        }
+        return json_answer(orjson.dumps(body))
+
+
+def _note_json(note: Note, gone_by: str | None, gone_ns: int) -> dict[str, Any]:
+    """`routes_schema.Note`; who took it back, if anybody did, and when."""
+    gone = {} if gone_by is None else {note.id: Note("", gone_ns, gone_by, WITHDRAW, "")}
+    return note_json(note, gone)
+
+
+def sites_report(parameters: Parameters, known: Mapping[str, Any], now_ns: int) -> SitesReport:
+    """The query of `/api/report`; `known` has all sites.
+
+    Raises:
+        NotRemembered: see `compare.chosen`.
+        PastRefused: see `past.query.report`.
+
+    """
+    given = read(OfSitesReport, parameters, PastRefused)
+    start_ns, end_ns = past_query.report(given, now_ns)
+    sites = [known[name] for name in chosen(given.sites, known)]
+    return SitesReport(
+        tuple((it.site, it.name or it.site, it.active_alarms, it.heard_ns) for it in sites),
+        start_ns // HOUR_NS * HOUR_NS,
+        -(-end_ns // HOUR_NS) * HOUR_NS,
+    )

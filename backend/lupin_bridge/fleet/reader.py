@@ -1,4 +1,4 @@
-"""The process that reads the sites' logs: `past_child`, over the archive in place of a journal.
+"""The process that reads the sites' logs: `query.Child`, over the archive in place of a journal.
 
 One process answers for all sites that are open here. Which site a question is of stands where the
 path of a journal does otherwise. Every query of the log names its site `:site` and is understood by
@@ -8,7 +8,6 @@ both engines: a `SiteLog` stands in the place of a connection to a twin's own jo
 from __future__ import annotations
 
 import logging
-import sqlite3
 from collections.abc import Callable
 from concurrent.futures import CancelledError
 from contextlib import closing, suppress
@@ -23,11 +22,9 @@ from lupin_bridge.archive.database import (
     explained,
     open_archive,
 )
-from lupin_bridge.feed import past_child
-from lupin_bridge.feed.past_child import Child, Search
-from lupin_bridge.feed.query import Now, PastQuery
-from lupin_bridge.fleet.compare import Compare
-from lupin_bridge.fleet.report import SitesReport
+from lupin_bridge.feed import query
+from lupin_bridge.feed.query import Child, Now, PastQuery, Search
+from lupin_bridge.fleet.compare import Compare, SitesReport
 from lupin_twin.core.notes import Note
 from lupin_twin.core.parameters import World
 from lupin_twin.core.past import NotRemembered
@@ -105,11 +102,7 @@ class ArchiveChild(Child):
         if isinstance(question, Compare | SitesReport):
             return lambda connection, _: _compared(question, connection)
         found = super()._search(question, now)
-        return lambda connection, stop: found(_as_journal(connection, site), stop)
-
-
-def _as_journal(connection: Any, site: str) -> sqlite3.Connection:
-    return SiteLog(connection, site)  # type: ignore[return-value]  # whose queries are of both
+        return lambda connection, stop: found(SiteLog(connection, site), stop)
 
 
 def _write_note(site: str, note: Note, should_stop: ShouldStop) -> Note:
@@ -192,7 +185,7 @@ class ArchiveRecall(Recall):
                 if isinstance(error, psycopg.Error):
                     connection.close()
                 else:
-                    self._idle_archive.append(connection)
+                    self._idle.append(connection)
                 raise
         except psycopg.Error as error:
             raise NotRemembered(str(explained(error)), is_lasting=False) from error
@@ -201,22 +194,18 @@ class ArchiveRecall(Recall):
         except DamagedFile as error:
             why = f"rows of the site cannot be read: {error}"
             raise NotRemembered(why, is_lasting=False) from error
-        self._idle_archive.append(connection)
+        self._idle.append(connection)
         return answer
 
     def _connection(self) -> Any:
         while True:
             with suppress(IndexError):
-                connection = self._idle_archive.pop()
+                connection: Any = self._idle.pop()
                 # One whose server has gone says so only when it is used.
                 if connection.closed or not _is_alive(connection):
                     continue
                 return connection
             return open_archive(archive_url(), "lupin-twin fleet")
-
-    @property
-    def _idle_archive(self) -> list[Any]:
-        return self._idle  # of psycopg here
 
 
 def _is_alive(connection: Any) -> bool:
@@ -232,4 +221,4 @@ def _is_alive(connection: Any) -> bool:
 
 def main() -> None:
     """Answer the parent until it ends."""
-    past_child.main(ArchiveChild)
+    query.main(ArchiveChild)

@@ -15,8 +15,7 @@ from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from typing import Any, Final, TypeVar
 
-from lupin_bridge.alarms.board import worst_first
-from lupin_bridge.alarms.notes import notes_of_alarms
+from lupin_bridge.alarms.board import notes_of_alarms, worst_first
 from lupin_bridge.archive.database import (
     CHANNEL,
     ArchiveError,
@@ -24,25 +23,23 @@ from lupin_bridge.archive.database import (
     explained,
     open_archive,
 )
-from lupin_bridge.feed import past_child
-from lupin_bridge.feed.past_child import Child, Search
-from lupin_bridge.feed.query import Now
-from lupin_bridge.fleet.overview import LIVE_S, Site
-from lupin_bridge.fleet.small_map import dots
+from lupin_bridge.feed import query
+from lupin_bridge.feed.query import Child, Now, Search
+from lupin_bridge.fleet.overview import LIVE_S, Site, dots
 from lupin_bridge.judge.alarm_fold import Follower
 from lupin_bridge.judge.episodes import Alarm, silence
 from lupin_bridge.judge.judging import Judge
 from lupin_bridge.judge.options import Criteria
 from lupin_bridge.serving.admission import Limits
 from lupin_bridge.settings import Settings
-from lupin_bridge.stream.health_json import alarm_json
+from lupin_bridge.stream.state_json import alarm_json
 from lupin_twin.core.diagnostics import Origin, origin_of
 from lupin_twin.core.notes import Note, NotesRequest
 from lupin_twin.core.past import NotRemembered, RecentRequest, WritesRequest
 from lupin_twin.core.state import Snapshot, TagState
 from lupin_twin.journal.fold import state_at
-from lupin_twin.journal.follow import recent, writes
 from lupin_twin.journal.notes import notes
+from lupin_twin.journal.received import recent, writes
 from lupin_twin.journal.runs import FOREVER_NS, runs, span_at
 from lupin_twin.journal.schema import ORIGIN, DamagedFile, SiteLog
 from lupin_twin.runtime.journal_queries import Recall
@@ -376,4 +373,4 @@ class _WithoutJournal(Recall):
 def main() -> None:
     """Answer the parent until it ends."""
     logging.getLogger("psycopg").setLevel(logging.CRITICAL)
-    past_child.main(WatchChild)
+    query.main(WatchChild)

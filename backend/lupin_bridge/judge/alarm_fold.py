@@ -12,11 +12,10 @@ from itertools import chain
 from statistics import median
 from typing import Final
 
-from lupin_bridge.judge.daylight import DayLine
-from lupin_bridge.judge.days import TagDays
+from lupin_bridge.judge.day import DayLine, TagDays
 from lupin_bridge.judge.episodes import MAX_EPISODES, SITE, Alarm, TagEpisodes, alarm_id
 from lupin_bridge.judge.options import Criteria
-from lupin_bridge.judge.scan_interval import LONGEST_NS, SHORTEST_NS, Stretches
+from lupin_bridge.judge.scans import LONGEST_NS, SHORTEST_NS, Stretches
 from lupin_bridge.judge.tag_log import Gap, TagPast, is_long
 from lupin_bridge.judge.verdict import Kind, Reason, Verdict
 from lupin_twin.core.past import PastWrite, RunSpan

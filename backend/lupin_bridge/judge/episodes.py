@@ -22,11 +22,10 @@ from dataclasses import dataclass, field, replace
 from hashlib import blake2b
 from typing import Final
 
-from lupin_bridge.judge.daylight import LIGHT
-from lupin_bridge.judge.days import TagDays
-from lupin_bridge.judge.derived import DAILY, DERIVED, IsDay
+from lupin_bridge.judge.day import LIGHT, TagDays
 from lupin_bridge.judge.options import Criteria
-from lupin_bridge.judge.scan_interval import INTERVALS, holds_ns, interval_ns
+from lupin_bridge.judge.quantities import DAILY, DERIVED, IsDay
+from lupin_bridge.judge.scans import INTERVALS, holds_ns, interval_ns
 from lupin_bridge.judge.verdict import (
     DEADBAND,
     Kind,

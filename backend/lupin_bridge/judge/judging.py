@@ -15,16 +15,9 @@ from itertools import islice
 from types import MappingProxyType
 from typing import Final
 
-from lupin_bridge.judge.daylight import Day
-from lupin_bridge.judge.days import COUNTS_NS
+from lupin_bridge.judge.day import COUNTS_NS, Day
 from lupin_bridge.judge.options import Criteria
-from lupin_bridge.judge.recent_scans import RecentScans
-from lupin_bridge.judge.scan_interval import (
-    NO_PATROL,
-    SHORTEST_NS,
-    Patrol,
-    Scans,
-)
+from lupin_bridge.judge.scans import NO_PATROL, SHORTEST_NS, Patrol, RecentScans, Scans
 from lupin_bridge.judge.verdict import (
     FORGOTTEN_NS,
     NOTHING_CHANGED,

@@ -5,19 +5,17 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
-from datetime import time, tzinfo
+from datetime import time
 from importlib.resources import files
-from pathlib import Path
 from typing import Final
 from zoneinfo import ZoneInfo
 
-from lupin_bridge.judge.daylight import ClockDay, Day, judge_day
-from lupin_bridge.judge.derived import DAY_NS
-from lupin_bridge.judge.ranges import Sensors
-from lupin_bridge.judge.scan_interval import holds_ns, interval_ns
-from lupin_bridge.settings import SettingError, Settings
+from lupin_bridge.judge.day import ClockDay, Day, judge_day
+from lupin_bridge.judge.quantities import DAY_NS, Sensors
+from lupin_bridge.judge.scans import holds_ns, interval_ns
+from lupin_bridge.settings import SettingError, Settings, read_text
 
-# Nobody writes this much; a device given by mistake is not read to its end.
+# Nobody writes this much.
 MAX_FILE_BYTES: Final = 1_000_000
 _HOUR: Final = r"((?:[01]\d|2[0-3]):[0-5]\d)"
 _HOURS: Final = re.compile(f"{_HOUR}-{_HOUR}")
@@ -82,20 +80,11 @@ def _sensors(settings: Settings) -> Sensors:
         return own_sensors()
     from lupin_bridge.judge.sensors_file import SensorsError, parse  # noqa: PLC0415  # as above
 
-    called = f"{settings.called('sensors')} {settings.sensors}"
+    called = settings.called("sensors")
     try:
-        with Path(settings.sensors).open("rb") as file:
-            found = file.read(MAX_FILE_BYTES + 1)
-    except OSError as error:
-        raise SettingError(f"{called} cannot be read: {error.strerror}") from error
-    if len(found) > MAX_FILE_BYTES:
-        raise SettingError(f"{called} is longer than {MAX_FILE_BYTES} bytes, the limit")
-    try:
-        return parse(found.decode("utf-8"))
-    except UnicodeDecodeError as error:
-        raise SettingError(f"{called} is no UTF-8: {error.reason} at byte {error.start}") from error
+        return parse(read_text(settings.sensors, called, MAX_FILE_BYTES))
     except SensorsError as error:
-        raise SettingError(f"{called}: {error}") from error
+        raise SettingError(f"{called} {settings.sensors}: {error}") from error
 
 
 def _clock(settings: Settings) -> ClockDay:
@@ -105,20 +94,22 @@ def _clock(settings: Settings) -> ClockDay:
             f"{settings.called('day_hours')} is {settings.day_hours!r}, not such as 06:00-20:00"
         )
     begins, ends = (time.fromisoformat(hour) for hour in hours.groups())
-    return ClockDay(_zone(settings), begins, ends)
-
-
-def _zone(settings: Settings) -> tzinfo | None:
-    """None: this machine's, which changes with summer and winter."""
-    if not settings.time_zone:
-        return None
-    try:
-        return ZoneInfo(settings.time_zone)
-    except (KeyError, OSError, ValueError) as error:
+    # None: this machine's, which changes with summer and winter.
+    zone = zone_of(settings.time_zone) if settings.time_zone else None
+    if settings.time_zone and zone is None:
         raise SettingError(
             f"{settings.called('time_zone')} is {settings.time_zone!r}, which this machine does "
-            f"not know: {error}"
-        ) from error
+            "not know"
+        )
+    return ClockDay(zone, begins, ends)
+
+
+def zone_of(name: str) -> ZoneInfo | None:
+    """The time zone of a name; None: this machine does not know it."""
+    try:
+        return ZoneInfo(name)
+    except (KeyError, OSError, ValueError):
+        return None
 
 
 def unix_s(stamp_ns: int) -> float | None:

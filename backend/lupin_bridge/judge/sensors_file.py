@@ -9,8 +9,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
-from lupin_bridge.judge.derived import DAILY, DERIVED
-from lupin_bridge.judge.ranges import Ranges, Sensor, Sensors, Span
+from lupin_bridge.judge.quantities import DAILY, DERIVED, Ranges, Sensor, Sensors, Span
 
 MAX_TEXT = 64
 

@@ -14,10 +14,10 @@ from dataclasses import dataclass, replace
 from itertools import groupby
 from typing import Final, Generic, TypeVar
 
-from lupin_bridge.judge.daylight import DAY_FROM_LX, LEFT_OUT_NS, LIGHT, Turn
-from lupin_bridge.judge.derived import IsDay
+from lupin_bridge.judge.day import DAY_FROM_LX, LEFT_OUT_NS, LIGHT, Turn
 from lupin_bridge.judge.episodes import TagEpisodes, readings_of
-from lupin_bridge.judge.scan_interval import INTERVALS, SHORTEST_NS
+from lupin_bridge.judge.quantities import IsDay
+from lupin_bridge.judge.scans import INTERVALS, SHORTEST_NS
 from lupin_twin.core.past import PastWrite
 
 # So many occasions lie between two states of a tag that are kept to begin again from.

@@ -13,10 +13,9 @@ from enum import StrEnum
 from types import MappingProxyType
 from typing import Final
 
-from lupin_bridge.judge.days import COUNTS_NS
-from lupin_bridge.judge.derived import DERIVED
-from lupin_bridge.judge.ranges import Ranges, Sensor, Sensors
-from lupin_bridge.judge.recent_scans import Recent, Scanned
+from lupin_bridge.judge.day import COUNTS_NS
+from lupin_bridge.judge.quantities import DERIVED, Ranges, Sensor, Sensors
+from lupin_bridge.judge.scans import Recent, Scanned
 from lupin_twin.core.state import NO_FLOWER, STATUS_OK, Reading, TagState
 
 # Readings that do not hold any more say nothing about now, but until then nobody may forget that

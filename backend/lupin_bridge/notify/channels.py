@@ -1,20 +1,159 @@
-"""All channels together, for the bridge: started, watched and stopped with it."""
+"""All channels together, for the bridge: started, watched and stopped with it.
+
+The report of a day, sent once a day by one channel, also after a restart. What was sent last stands
+in a small file. A day that was missed is sent at the next start, up to a week of them; a message
+that is not taken is tried again as those of alarms are.
+"""
 
 from __future__ import annotations
 
 import asyncio
+import logging
+import os
 from collections.abc import Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from datetime import datetime, time, timedelta, tzinfo
+from hashlib import blake2b
 from pathlib import Path
+from typing import Final
 
-from lupin_bridge.judge.ranges import Sensors
-from lupin_bridge.notify.daily import DailyReport, DailyTarget
+import orjson
+
+from lupin_bridge.feed.shared_work import Periodic
+from lupin_bridge.feed.source import TwinUnavailableError
+from lupin_bridge.judge.options import unix_s
+from lupin_bridge.judge.quantities import Sensors
 from lupin_bridge.notify.destinations import Targets
 from lupin_bridge.notify.messages import Source
 from lupin_bridge.notify.mirror import Mirror
 from lupin_bridge.notify.mqtt import Mqtt
 from lupin_bridge.notify.push import Push
 from lupin_bridge.notify.webhook import Webhook
+from lupin_bridge.past.plans import ConditionalQuery
+from lupin_bridge.past.query import compact
+from lupin_bridge.past.report import REPORT_S, Report
+from lupin_twin.core.past import NotRemembered, PastRefused
+
+log = logging.getLogger(__name__)
+
+POLL_S: Final = 2.0
+# For so long the log may lack the last moments of a day.
+LATE_NS: Final = 300 * 1_000_000_000
+MOST_DAYS: Final = 7
+
+
+@dataclass(frozen=True, slots=True)
+class DailyTarget:
+    """When a day ends for the operator, by which zone (None: this machine's), and where to note it.
+
+    `folder` keeps a file for each channel and journal.
+    """
+
+    at: time
+    zone: tzinfo | None
+    folder: Path
+
+    def ended_ns(self, now_ns: int, days: int = 0) -> int:
+        """The end of the last day that is over at a moment, or of so many days after it."""
+        now = datetime.fromtimestamp(now_ns // 1_000_000_000, self.zone)
+        passed = 0 if now.timetz().replace(tzinfo=None) >= self.at else 1
+        day = now.date() + timedelta(days=days - passed)
+        return int(datetime.combine(day, self.at, self.zone).timestamp()) * 1_000_000_000
+
+
+class DailyReport(Periodic):
+    """Sends by one channel; what was not taken at its end is sent after the next start."""
+
+    def __init__(
+        self, target: DailyTarget, channel: Mqtt | Webhook, of: Source, poll_s: float = POLL_S
+    ) -> None:
+        super().__init__(self._try, poll_s, "the report of the day", first_s=0.0)
+        self._target, self._channel, self._of = target, channel, of
+        self._why = ""
+        # What was sent last: where that cannot be noted, it is not sent again and again.
+        self._sent: tuple[Path, int] | None = None
+
+    async def _try(self) -> None:
+        try:
+            why = await self._look()
+        except (NotRemembered, PastRefused, TwinUnavailableError, OSError) as error:
+            why = str(error)
+        if why and why != self._why:
+            log.warning("the report of the day is not sent by %s: %s", self._channel.name, why)
+        self._why = why
+
+    async def _look(self) -> str:
+        """Send what is due; returns why that cannot be, empty: nothing is wrong."""
+        of = self._of
+        now_ns, journal, target = of.ros_time_ns, of.source.journal(), self._target
+        if now_ns is None or not journal.journal_id:
+            return ""
+        if unix_s(now_ns) is None:
+            return "the time is simulated, and has no hours of the day"
+        file = self._file(journal.journal_id)
+        newest_ns = target.ended_ns(now_ns)
+        last_ns = _read(file)
+        if last_ns is None or last_ns > now_ns:
+            _write(file, newest_ns)  # the first one will be the next day's
+            return ""
+        if last_ns >= newest_ns:
+            return ""
+        oldest_ns = target.ended_ns(now_ns, 1 - MOST_DAYS)
+        due_ns = target.ended_ns(last_ns, 1)
+        if due_ns < oldest_ns:
+            log.error("reports before %s are not sent: too many were missed", compact(oldest_ns))
+            due_ns = oldest_ns
+        complete_ns = journal.complete_ns or 0
+        if complete_ns < due_ns and now_ns < due_ns + LATE_NS:
+            return ""
+        report = Report(target.ended_ns(due_ns, -1), due_ns, of.criteria, journal)
+        try:
+            if self._sent != (file, due_ns):
+                await self._send(report)
+        except PastRefused as error:
+            if now_ns < due_ns + LATE_NS:
+                raise
+            # It would be refused for ever, and hold up the days after it.
+            log.error("the report up to %s is left out: %s", compact(due_ns), error)  # noqa: TRY400
+        self._sent = file, due_ns
+        _write(file, due_ns)
+        return ""
+
+    async def _send(self, report: Report) -> None:
+        answered = await self._of.source.ask(ConditionalQuery(report), REPORT_S)
+        assert answered.answer is not None  # no ETag was given
+        body, until = orjson.Fragment(answered.answer.body), compact(report.end_ns)
+        if not await self._channel.deliver(f"report.{until}", body):
+            log.error("the report up to %s was given up by %s", until, self._channel.name)
+
+    def _file(self, journal_id: str) -> Path:
+        text = f"{self._channel.called} {journal_id}".encode()
+        return self._target.folder / f"report-{blake2b(text, digest_size=12).hexdigest()}.sent"
+
+
+def _read(file: Path) -> int | None:
+    try:
+        return int(file.read_text(encoding="ascii"))
+    except FileNotFoundError:
+        return None
+    except ValueError:
+        log.error("%s is damaged: the next report is that of tomorrow", file)  # noqa: TRY400  # one line
+        return None
+
+
+def _write(file: Path, sent_ns: int) -> None:
+    """Note it durably: what is not noted is sent again."""
+    file.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
+    new = file.with_suffix(".new")
+    with new.open("w", encoding="ascii") as out:
+        out.write(str(sent_ns))
+        out.flush()
+        os.fsync(out.fileno())
+    new.replace(file)
+
+
+# --- all channels together ------------------------------------------------------------------------
 
 
 class DetachedThreads(ThreadPoolExecutor):

@@ -17,18 +17,16 @@ from dataclasses import dataclass, field
 from functools import lru_cache
 from typing import Any, Final, Protocol
 
-from lupin_bridge.alarms.board import AlarmBoard, Board
-from lupin_bridge.alarms.notes import NoteBoard
+from lupin_bridge.alarms.board import AlarmBoard, Board, NoteBoard
 from lupin_bridge.feed.source import TwinSource
 from lupin_bridge.judge.episodes import Alarm
 from lupin_bridge.judge.judging import NOTHING_JUDGED, Judged
 from lupin_bridge.judge.options import Criteria
-from lupin_bridge.judge.ranges import Sensor
+from lupin_bridge.judge.quantities import Sensor
 from lupin_bridge.judge.verdict import Health, Verdict
 from lupin_bridge.past.query import iso
-from lupin_bridge.stream.health_json import alarm_json, reason_json
-from lupin_bridge.stream.state_json import moment
-from lupin_bridge.stream.status import NEVER_SEEN, Status
+from lupin_bridge.stream.frames import NEVER_SEEN, Status
+from lupin_bridge.stream.state_json import alarm_json, moment, reason_json
 from lupin_twin.core.diagnostics import Origin
 from lupin_twin.core.state import Reading, TagState
 

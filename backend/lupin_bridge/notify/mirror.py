@@ -12,8 +12,8 @@ import orjson
 
 from lupin_bridge.alarms.board import MAX_WORST, worst_first
 from lupin_bridge.judge.episodes import SITE
-from lupin_bridge.judge.ranges import Sensors
-from lupin_bridge.judge.scan_interval import SHORTEST_NS
+from lupin_bridge.judge.quantities import Sensors
+from lupin_bridge.judge.scans import SHORTEST_NS
 from lupin_bridge.judge.verdict import Health, Verdict, derive
 from lupin_bridge.notify.messages import (
     GreenhouseState,

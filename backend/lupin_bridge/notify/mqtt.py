@@ -26,7 +26,7 @@ from paho.mqtt.properties import Properties
 from lupin_bridge.notify.destinations import MqttTarget
 from lupin_bridge.notify.messages import GreenhouseState
 from lupin_bridge.notify.mirror import Mirror
-from lupin_bridge.notify.retry import Backoff, Condition
+from lupin_bridge.notify.sending import Backoff, Condition
 
 log = logging.getLogger(__name__)
 

@@ -24,21 +24,19 @@ from urllib.parse import urlsplit
 import orjson
 
 from lupin_bridge.access.accounts import Device
+from lupin_bridge.access.credentials import AccountError
 from lupin_bridge.access.people import People
-from lupin_bridge.access.person import AccountError
-from lupin_bridge.alarms.board import Change
-from lupin_bridge.alarms.notes import NOTHING_SAID, notes_of_alarms
+from lupin_bridge.alarms.board import NOTHING_SAID, Change, notes_of_alarms
 from lupin_bridge.feed.shared_work import end
 from lupin_bridge.judge.episodes import Alarm
 from lupin_bridge.judge.verdict import Verdict
 from lupin_bridge.notify.destinations import Endpoint, PushTarget
-from lupin_bridge.notify.http_post import PostError, post
 from lupin_bridge.notify.messages import Source
-from lupin_bridge.notify.retry import Backoff, Condition, until_taken
+from lupin_bridge.notify.sending import Backoff, Condition, PostError, post, until_taken
 from lupin_bridge.notify.webhook import AlarmNews
 from lupin_bridge.past.report_page import push_text
 from lupin_bridge.serving.admission import AdmissionError
-from lupin_bridge.stream.health_json import alarm_json
+from lupin_bridge.stream.state_json import alarm_json
 
 if TYPE_CHECKING:
     from py_vapid import Vapid02
@@ -93,13 +91,10 @@ class Push:
         """The key that a browser subscribes with, base64url; made with the first.
 
         Raises:
-            AccountError, PeopleBusy: the file of people cannot be written.
+            AccountError, ClientLimitError: the file of people cannot be written.
 
         """
-        from cryptography.hazmat.primitives.serialization import (  # noqa: PLC0415  # few want it
-            Encoding,
-            PublicFormat,
-        )
+        from cryptography.hazmat.primitives.serialization import Encoding, PublicFormat  # noqa: PLC0415  # few want it
 
         key = (await self._key()).public_key
         return encoded(key.public_bytes(Encoding.X962, PublicFormat.UncompressedPoint))
@@ -301,10 +296,7 @@ def check_device(device: Device, target: PushTarget) -> None:
         DeviceRefused: the address or a key cannot be one.
 
     """
-    from cryptography.hazmat.primitives.asymmetric.ec import (  # noqa: PLC0415  # as above
-        SECP256R1,
-        EllipticCurvePublicKey,
-    )
+    from cryptography.hazmat.primitives.asymmetric.ec import SECP256R1, EllipticCurvePublicKey  # noqa: PLC0415  # as above
 
     endpoint = parsed(device.endpoint, target)
     if endpoint.host not in target.private_hosts:

@@ -23,10 +23,9 @@ from lupin_bridge.alarms.board import Change, happened_ns
 from lupin_bridge.feed.shared_work import end
 from lupin_bridge.judge.episodes import Alarm
 from lupin_bridge.notify.destinations import WebhookTarget
-from lupin_bridge.notify.http_post import post
 from lupin_bridge.notify.messages import Source
-from lupin_bridge.notify.retry import Backoff, Condition, until_taken
-from lupin_bridge.stream.health_json import alarm_json
+from lupin_bridge.notify.sending import Backoff, Condition, post, until_taken
+from lupin_bridge.stream.state_json import alarm_json
 from lupin_twin.core.diagnostics import Origin
 
 log = logging.getLogger(__name__)

@@ -15,9 +15,9 @@ from functools import lru_cache
 from itertools import accumulate, pairwise
 from typing import Any, Final
 
-from lupin_bridge.judge.derived import DAILY
-from lupin_bridge.judge.ranges import Sensors
-from lupin_bridge.past.query import PeriodQuery, compact, iso
+from lupin_bridge.judge.quantities import DAILY, Sensors
+from lupin_bridge.past.query import OfExport, compact, iso
+from lupin_bridge.query_string import safe_name
 from lupin_bridge.stream.state_json import stamp
 from lupin_twin.core.journal_condition import UNKNOWN, Condition
 from lupin_twin.core.past import Event, Grid, PastRow, SeriesPast, SeriesRequest, grid, seconds
@@ -137,7 +137,7 @@ def unit(request: SeriesRequest, sensors: Sensors) -> str:
 
 
 def stretch(start_ns: int, end_ns: int) -> dict[str, Any]:
-    """`schema.Stretch`."""
+    """`routes_schema.Period`."""
     return {"from": stamp(start_ns), "to": stamp(end_ns)}
 
 
@@ -211,10 +211,10 @@ COUNTED: Final = {
 }
 
 
-def timeline_period(query: PeriodQuery, runs: SeriesPast) -> Grid:
-    """The period of a query; the series of all runs knows the oldest moment, and now."""
-    start_ns = query.start_ns or runs.start_ns
-    return grid(start_ns, max(start_ns, query.end_ns or runs.end_ns), query.points)
+def timeline_period(start_ns: int, end_ns: int, points: int, runs: SeriesPast) -> Grid:
+    """The period of a query; the series of all runs knows the oldest moment (0), and now (0)."""
+    start_ns = start_ns or runs.start_ns
+    return grid(start_ns, max(start_ns, end_ns or runs.end_ns), points)
 
 
 def coarsest(period: Grid, series: Iterable[SeriesPast]) -> Grid:
@@ -238,11 +238,11 @@ def timeline_body(
     Silences may be too many and come in buckets. Then the longest of each is given, as if it began
     with its bucket. What goes on ends with the period here: a period that is over has one answer.
     """
-    # The length of a run is a float: of a year's it misses some ns.
-    goes_on_ns = runs.end_ns - 1_000
 
     def until(at_ns: int, start_ns: int) -> int:
-        return at_ns if at_ns < goes_on_ns else max(start_ns, min(at_ns, period.end_ns))
+        # A run's length is a float in s: of three years it is right to some 10 ns.
+        is_over = at_ns < runs.end_ns - 1_000
+        return at_ns if is_over else max(start_ns, min(at_ns, period.end_ns))
 
     counts = {name: _by_bucket(counted[event], period) for name, event in COUNTED.items()}
     return {
@@ -303,7 +303,6 @@ _NEEDS_QUOTES: Final = re.compile(r'[",;\r\n\t]')
 # cells by another sign than the comma, behind that one. Names come from the robot, and whoever
 # opens the file must not run what they say.
 _FORMULA: Final = re.compile(r"(^|[;\t\r\n])(?=[=+\-@\uff1d\uff0b\uff0d\uff20\t\r\n])")
-_UNSAFE_IN_NAME: Final = re.compile(r"[^A-Za-z0-9._-]")
 
 
 def csv_lines(rows: Iterable[PastRow], sensors: Sensors, site: str | None = None) -> bytes:
@@ -344,10 +343,11 @@ def csv_number(value: float) -> str:
     return repr(value) if value - value == 0.0 else ""
 
 
-def export_file_name(query: PeriodQuery, end_ns: int | None, kind: str) -> str:
-    """A name that says which tag, sensor and period; `end_ns` is now, where that is known."""
-    of = [_UNSAFE_IN_NAME.sub("_", text) for text in (query.tag_id, query.sensor_type) if text]
-    since = ["from", compact(query.start_ns)] if query.start_ns else []
-    end_ns = query.end_ns or end_ns
+def export_file_name(given: OfExport, now_ns: int | None, kind: str) -> str:
+    """A name that says which tag, sensor and period."""
+    of = [safe_name(text) for text in (given.tag_id, given.sensor_type) if text]
+    start_ns, end_ns = given.span(None)
+    since = ["from", compact(start_ns)] if start_ns else []
+    end_ns = end_ns or now_ns or 0
     until = ["to", compact(end_ns)] if end_ns else []
     return "_".join(["lupin-twin", *of, *since, *until]) + f".{kind}"

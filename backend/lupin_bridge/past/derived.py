@@ -12,8 +12,7 @@ from dataclasses import replace
 from functools import partial
 from typing import Final
 
-from lupin_bridge.judge.derived import DAILY, DAY_NS, DERIVED, Daily, Derived, IsDay
-from lupin_bridge.judge.ranges import Sensors
+from lupin_bridge.judge.quantities import DAILY, DAY_NS, DERIVED, Daily, Derived, IsDay, Sensors
 from lupin_twin.core.past import (
     HOUR_NS,
     MAX_POINTS,

@@ -13,7 +13,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Final, Protocol
 
-from lupin_bridge.judge.ranges import Sensors
+from lupin_bridge.judge.quantities import Sensors
 from lupin_bridge.past import bodies
 from lupin_twin.core.past import PastRow
 

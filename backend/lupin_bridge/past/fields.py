@@ -18,21 +18,15 @@ from lupin_bridge.field import formats
 from lupin_bridge.field import query as field_query
 from lupin_bridge.field.formats import JSON, FieldFormat
 from lupin_bridge.field.query import EstimateQuery, FieldQuery
-from lupin_bridge.judge.derived import DAILY
 from lupin_bridge.judge.options import Criteria
-from lupin_bridge.judge.ranges import Sensor
+from lupin_bridge.judge.quantities import DAILY, Sensor
 from lupin_bridge.judge.verdict import plausible, with_derived
 from lupin_bridge.past import derived
 from lupin_bridge.past.plans import Plan, StateQuery, etag_of, plan_of, series_s
 from lupin_bridge.serving.admission import REVALIDATE, Answer
 from lupin_twin.core.past import MAX_POINTS
 from lupin_twin.core.state import NANOSECONDS_PER_SECOND, Snapshot, samples_of
-from lupin_twin.estimate.engine import (
-    MINUTES_A_DAY,
-    EstimateRequest,
-    TagPast,
-    moment_of,
-)
+from lupin_twin.estimate.engine import MINUTES_A_DAY, EstimateRequest, TagPast, moment_of
 from lupin_twin.estimate.engine import cost_s as estimate_cost_s
 from lupin_twin.field.engine import (
     FieldRefused,

@@ -16,15 +16,13 @@ import orjson
 
 from lupin_bridge.feed.query import Find
 from lupin_bridge.field import query as field_query
-from lupin_bridge.judge.days import SINCE_NS, days_of
-from lupin_bridge.judge.derived import DAILY, DERIVED
+from lupin_bridge.judge.day import SINCE_NS, days_of
 from lupin_bridge.judge.judging import judge_once
 from lupin_bridge.judge.options import Criteria
+from lupin_bridge.judge.quantities import DAILY, DERIVED
 from lupin_bridge.past import bodies, derived
-from lupin_bridge.past.query import PeriodQuery
 from lupin_bridge.serving.admission import REVALIDATE, Answer, json_answer
-from lupin_bridge.stream.health_json import judgement
-from lupin_bridge.stream.state_json import StateJson, history
+from lupin_bridge.stream.state_json import StateJson, history, judgement
 from lupin_twin.core.history import LatestRequest, tag_history
 from lupin_twin.core.journal_condition import Condition
 from lupin_twin.core.past import (
@@ -229,12 +227,15 @@ class History:
 class Timeline:
     """What happened when."""
 
-    query: PeriodQuery
+    start_ns: int
+    end_ns: int
+    points: int
+    tag_id: str | None
     journal: Condition = field(compare=False)
 
     def cost_s(self, tags: int) -> float:
         """See `Query`: as if every event had to be counted twice."""
-        counted_s = series_s(self._tag_id, self.query.points, tags)
+        counted_s = series_s(self._tag_id, self.points, tags)
         runs_s = series_s(EVERY_TAG, DEFAULT_POINTS, tags)
         silences_s = series_s(self._tag_id, MAX_POINTS, tags)
         return runs_s + 2 * len(bodies.COUNTED) * counted_s + silences_s
@@ -242,7 +243,7 @@ class Timeline:
     def look(self, find: Find) -> Plan:
         """See `Query`: the runs, every event over the one period, the silences."""
         runs: SeriesPast = find(SeriesRequest(EVERY_TAG, Event.RUNS))
-        period = bodies.timeline_period(self.query, runs)
+        period = bodies.timeline_period(self.start_ns, self.end_ns, self.points, runs)
         counted = self._counted(find, period.start_ns, period.end_ns)
         coarsest = bodies.coarsest(period, counted.values())
         if coarsest != period:
@@ -258,7 +259,7 @@ class Timeline:
         return of_content(bodies.timeline_body(runs, period, counted, silences, self.journal))
 
     def _counted(self, find: Find, start_ns: int, end_ns: int) -> dict[Event, SeriesPast]:
-        points = self.query.points
+        points = self.points
         return {
             event: find(SeriesRequest(self._tag_id, event, start_ns, end_ns, points))
             for event in bodies.COUNTED.values()
@@ -266,7 +267,7 @@ class Timeline:
 
     @property
     def _tag_id(self) -> str:
-        return self.query.tag_id or EVERY_TAG
+        return self.tag_id or EVERY_TAG
 
 
 # What writing a scan takes, roughly and at worst, s of one core.

@@ -7,7 +7,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
 from typing import Annotated, Final, Literal
-from zoneinfo import ZoneInfo
 
 from annotated_types import Interval
 
@@ -17,7 +16,6 @@ from lupin_twin.core.past import (
     MAX_POINTS,
     Event,
     PastRefused,
-    SeriesRequest,
     check_moment,
     seconds,
 )
@@ -100,17 +98,34 @@ class OfPeriod:
     from_: str | None = parameter(_FROM)
     to: str | None = parameter(_TO)
 
+    def span(self, now_ns: int | None) -> tuple[int, int]:
+        """From when to when, ns; 0: from the oldest, to now. `now_ns` is None: it is not known.
 
-@dataclass(frozen=True, slots=True)
-class OfHistory:
+        Raises:
+            PastRefused: no moment, or a period that cannot be.
+
+        """
+        start_ns = 0 if self.from_ is None else moment("from", self.from_)
+        if self.to is not None:
+            end_ns = moment("to", self.to)
+            if end_ns == 0:
+                raise PastRefused("to is 0 s of ROS time, must be later")
+            if end_ns < start_ns:
+                raise PastRefused(f"to is {seconds(end_ns)} s, before from, {seconds(start_ns)} s")
+            return start_ns, end_ns
+        if now_ns is not None and start_ns > now_ns:
+            raise PastRefused(f"from is {seconds(start_ns)} s, later than now, {seconds(now_ns)} s")
+        return start_ns, 0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class OfHistory(OfPeriod):
     """The parameters of `/api/history`."""
 
     tag_id: Name = needed("one tag; for events, `*` is the whole greenhouse")
     sensor_type: Name = needed(
         f"name of a sensor, as in a reading; or an event: {', '.join(Event)}"
     )
-    from_: str | None = parameter(_FROM)
-    to: str | None = parameter(_TO)
     points: Points = parameter(_POINTS, DEFAULT_POINTS)
 
 
@@ -173,18 +188,6 @@ class OfExport(OfPeriod):
     sensor_type: Name | None = parameter("one sensor alone; default: all")
 
 
-@dataclass(frozen=True, slots=True)
-class PeriodQuery:
-    """A period; 0 ns: from the oldest, to now. None: every tag, sensor, active or not."""
-
-    start_ns: int
-    end_ns: int
-    points: int = DEFAULT_POINTS
-    tag_id: str | None = None
-    sensor_type: str | None = None
-    active: bool | None = None
-
-
 def at(parameters: Parameters, now_ns: int | None) -> int | None:
     """The moment of `at`, ns; None: now. `now_ns` is None where it is not known.
 
@@ -210,38 +213,6 @@ def at_of(text: str | None, now_ns: int | None) -> int | None:
     return at_ns
 
 
-def history(parameters: Parameters, now_ns: int | None) -> SeriesRequest:
-    """The query of `/api/history`.
-
-    Raises:
-        PastRefused: an unknown or repeated parameter, or a value that cannot be.
-
-    """
-    given = read(OfHistory, parameters, PastRefused)
-    return SeriesRequest(given.tag_id, given.sensor_type, *_period(given, now_ns), given.points)
-
-
-def period(kind: type[OfPeriod], parameters: Parameters, now_ns: int | None) -> PeriodQuery:
-    """The query of a period, with what its `kind` has beside that.
-
-    Raises:
-        PastRefused: see `history`.
-
-    """
-    given = read(kind, parameters, PastRefused)
-    start_ns, end_ns = _period(given, now_ns)
-    match given:
-        case OfTimeline():
-            return PeriodQuery(start_ns, end_ns, given.points, given.tag_id)
-        case OfExport():
-            tag_id, sensor_type = given.tag_id, given.sensor_type
-            return PeriodQuery(start_ns, end_ns, tag_id=tag_id, sensor_type=sensor_type)
-        case OfAlarms():
-            active = None if given.active is None else given.active == "1"
-            return PeriodQuery(start_ns, end_ns, active=active)
-    return PeriodQuery(start_ns, end_ns)
-
-
 def report(given: OfReport, now_ns: int | None) -> tuple[int, int]:
     """The period of a report, ns of ROS time; it ends now at the latest.
 
@@ -262,35 +233,3 @@ def report(given: OfReport, now_ns: int | None) -> tuple[int, int]:
     if days > MAX_REPORT_DAYS:
         raise PastRefused(f"from and to are {days:.1f} days apart, the limit is {MAX_REPORT_DAYS}")
     return start_ns, end_ns
-
-
-def zone(name: str) -> ZoneInfo | None:
-    """The time zone of a name; None: this machine does not know it."""
-    try:
-        return ZoneInfo(name)
-    except (KeyError, OSError, ValueError):
-        return None
-
-
-def of_notes(parameters: Parameters) -> OfNotes:
-    """What `/api/notes` is asked for.
-
-    Raises:
-        PastRefused: see `history`.
-
-    """
-    return read(OfNotes, parameters, PastRefused)
-
-
-def _period(given: OfPeriod | OfHistory, now_ns: int | None) -> tuple[int, int]:
-    start_ns = 0 if given.from_ is None else moment("from", given.from_)
-    if given.to is not None:
-        end_ns = moment("to", given.to)
-        if end_ns == 0:
-            raise PastRefused("to is 0 s of ROS time, must be later")
-        if end_ns < start_ns:
-            raise PastRefused(f"to is {seconds(end_ns)} s, before from, {seconds(start_ns)} s")
-        return start_ns, end_ns
-    if now_ns is not None and start_ns > now_ns:
-        raise PastRefused(f"from is {seconds(start_ns)} s, later than now, {seconds(now_ns)} s")
-    return start_ns, 0

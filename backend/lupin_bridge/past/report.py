@@ -19,19 +19,17 @@ from typing import Any, Final
 
 import orjson
 
-from lupin_bridge.alarms.board import active_first
-from lupin_bridge.alarms.notes import notes_of_alarms
+from lupin_bridge.alarms.board import active_first, notes_of_alarms
 from lupin_bridge.feed.query import Find
 from lupin_bridge.judge.alarm_fold import Follower
-from lupin_bridge.judge.episodes import Alarm, readings_of
+from lupin_bridge.judge.episodes import SITE, Alarm, readings_of
 from lupin_bridge.judge.options import Criteria
-from lupin_bridge.judge.scan_interval import SHORTEST_NS, TIMES_MEDIAN
+from lupin_bridge.judge.scans import SHORTEST_NS, TIMES_MEDIAN
 from lupin_bridge.judge.verdict import Verdict, derive
 from lupin_bridge.past import bodies
 from lupin_bridge.past.plans import JSON_TYPE, Plan
 from lupin_bridge.serving.admission import REVALIDATE, Answer
-from lupin_bridge.stream.health_json import alarm_json, note_json
-from lupin_bridge.stream.state_json import stamp
+from lupin_bridge.stream.state_json import alarm_json, note_json, stamp
 from lupin_twin.core.history import KIND_FLOWER
 from lupin_twin.core.journal_condition import Condition
 from lupin_twin.core.notes import WITHDRAW, Note, NotesRequest, PastNotes, withdrawals
@@ -62,8 +60,6 @@ _LOT: Final = 2_000
 MAX_LISTED: Final = 500
 # What a report costs, about, s of one core.
 REPORT_S: Final = 3.0
-# A house silence is in the list of silences like a tag's.
-WHOLE_SITE: Final = ""
 
 Stretch = tuple[int, int]
 
@@ -323,10 +319,10 @@ class _Fold:
         ]
         cut = [
             (tag_id, (max(from_ns, start_ns), to_ns))
-            for tag_id, (from_ns, to_ns) in ((*((WHOLE_SITE, it) for it in whole), *found))
+            for tag_id, (from_ns, to_ns) in ((*((SITE, it) for it in whole), *found))
             if to_ns > start_ns
         ]
-        return sorted(cut, key=lambda it: (it[0] != WHOLE_SITE, it[1][0] - it[1][1], *it))
+        return sorted(cut, key=lambda it: (it[0] != SITE, it[1][0] - it[1][1], *it))
 
 
 def silences(

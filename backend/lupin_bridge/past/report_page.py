@@ -15,11 +15,12 @@ from typing import Any, Final
 
 import orjson
 
+from lupin_bridge.judge.episodes import SITE
 from lupin_bridge.judge.options import Criteria, unix_s
-from lupin_bridge.judge.ranges import Span
+from lupin_bridge.judge.quantities import Span
 from lupin_bridge.judge.verdict import derive
 from lupin_bridge.past.plans import Plan
-from lupin_bridge.past.report import WHOLE_SITE, Report, planned
+from lupin_bridge.past.report import Report, planned
 from lupin_twin.core.diagnostics import Origin
 from lupin_twin.core.state import TagState
 
@@ -385,7 +386,7 @@ class _Page:
         return self._labels.get(sensor) or self._criteria.sensors.named(sensor).label
 
     def _where(self, tag_id: str) -> str:
-        return self.say("house") if tag_id in (WHOLE_SITE, "site") else self.say("tag", name=tag_id)
+        return self.say("house") if tag_id in (SITE, "site") else self.say("tag", name=tag_id)
 
     def _at(self, when: Mapping[str, int]) -> str:
         """A moment as the page writes it; of a simulation, the time since its beginning."""

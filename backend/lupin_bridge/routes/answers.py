@@ -18,20 +18,14 @@ from pydantic import BaseModel, ValidationError
 from starlette.requests import ClientDisconnect, HTTPConnection
 from starlette.types import Receive, Scope, Send
 
+from lupin_bridge.access.credentials import AccountError, Person
 from lupin_bridge.access.middleware import PERSON_KEY, client_of
-from lupin_bridge.access.person import AccountError, Person
 from lupin_bridge.bridge import Bridge
 from lupin_bridge.feed.source import TwinTimeoutError, TwinUnavailableError
 from lupin_bridge.field import query as field_query
 from lupin_bridge.past import bodies
 from lupin_bridge.past.fields import Field
-from lupin_bridge.past.plans import (
-    PLAN_TAG_S,
-    Answered,
-    ConditionalQuery,
-    NoSuchTag,
-    Query,
-)
+from lupin_bridge.past.plans import PLAN_TAG_S, Answered, ConditionalQuery, NoSuchTag, Query
 from lupin_bridge.serving.admission import REVALIDATE, AdmissionError, Answer, BusyError, Limits
 from lupin_bridge.stream import schema
 from lupin_twin.core.notes import NotesUnwritable
@@ -45,17 +39,35 @@ BODY_S: Final = 5.0
 # nginx's "client closed request"; nobody receives it.
 CLIENT_DISCONNECTED: Final = 499
 
-TOO_MUCH: Final[dict[int | str, dict[str, Any]]] = {
-    429: {"model": schema.ErrorMessage, "description": "too many requests from this client"}
-}
-# What `add_refusals` makes of refusals, for the OpenAPI document.
-NOT_REMEMBERED: Final[dict[int | str, dict[str, Any]]] = {
+Documented = dict[int | str, dict[str, Any]]
+
+
+def refusing(reasons: Mapping[int, str]) -> Documented:
+    """Refusals by their status, for the OpenAPI document."""
+    return {
+        status: {"model": schema.ErrorMessage, "description": why}
+        for status, why in reasons.items()
+    }
+
+
+def taking(body: type[BaseModel]) -> dict[str, Any]:
+    """The body that `read_body` reads, for the OpenAPI document."""
+    content = {"application/json": {"schema": {"$ref": f"#/components/schemas/{body.__name__}"}}}
+    return {"requestBody": {"required": True, "content": content}}
+
+
+# What `add_refusals` makes of refusals.
+NOT_REMEMBERED: Final[Documented] = {
     304: {"description": "the ETag still holds"},
-    400: {"model": schema.ErrorMessage, "description": "refused; detail has the reason"},
-    404: {"model": schema.ErrorMessage, "description": "there is no journal, so no past"},
-    **TOO_MUCH,
-    503: {"model": schema.ErrorMessage, "description": "it cannot be read now, or too much is"},
-    504: {"model": schema.ErrorMessage, "description": "it took too long"},
+    **refusing(
+        {
+            400: "refused; detail has the reason",
+            404: "there is no journal, so no past",
+            429: "too many requests from this client",
+            503: "it cannot be read now, or too much is",
+            504: "it took too long",
+        }
+    ),
 }
 
 ResultT = TypeVar("ResultT")

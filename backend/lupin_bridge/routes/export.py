@@ -14,11 +14,11 @@ from fastapi import APIRouter, Request, Response
 from starlette.types import Message, Receive, Scope, Send
 
 from lupin_bridge.access.middleware import client_of
-from lupin_bridge.judge.ranges import Sensors
+from lupin_bridge.judge.quantities import Sensors
 from lupin_bridge.past import bodies, query
 from lupin_bridge.past.export import CSV, PARQUET, ExportFormat, MissingPackageError, Writer
-from lupin_bridge.past.query import MAX_SECONDS, PeriodQuery
-from lupin_bridge.query_string import parameters_of
+from lupin_bridge.past.query import MAX_SECONDS, OfExport
+from lupin_bridge.query_string import parameters_of, read
 from lupin_bridge.routes.answers import (
     CLIENT_DISCONNECTED,
     NEVER_STORE,
@@ -27,13 +27,13 @@ from lupin_bridge.routes.answers import (
     client_left,
     error_response,
     read_route,
+    refusing,
     while_client_waits,
     within_time,
 )
 from lupin_bridge.serving.admission import Admission, Export, Limits
 from lupin_bridge.serving.http_protocol import CONNECTION_KEY, HttpConnection
-from lupin_bridge.stream import schema
-from lupin_twin.core.past import PastRow
+from lupin_twin.core.past import PastRefused, PastRow
 from lupin_twin.core.state import NANOSECONDS_PER_SECOND
 from lupin_twin.runtime.workers import Workers
 
@@ -87,7 +87,7 @@ async def csv_route(request: Request) -> Response:
     responses={
         200: _content(PARQUET.media_type),
         **_ANSWERS,
-        501: {"model": schema.ErrorMessage, "description": "the extra `science` is not installed"},
+        **refusing({501: "the extra `science` is not installed"}),
     },
     openapi_extra={"parameters": parameters_of(query.OfExport)},
 )
@@ -99,22 +99,23 @@ async def parquet_route(request: Request) -> Response:
 async def _of_site(request: Request, kind: ExportFormat) -> Response:
     bridge = bridge_of(request)
     now_ns = bridge.ros_time_ns
-    period = query.period(query.OfExport, request.query_params.multi_items(), now_ns)
-    end_ns = end_of(period, now_ns)
-    known = bodies.period_headers(bridge.source.journal(), period.start_ns, end_ns)
+    given = read(query.OfExport, request.query_params.multi_items(), PastRefused)
+    start_ns, end_ns = span_of(given, now_ns)
+    known = bodies.period_headers(bridge.source.journal(), start_ns, end_ns)
 
     def rows(pack: Pack) -> Lots:
-        return bridge.source.rows(period.start_ns, end_ns, period.tag_id, period.sensor_type, pack)
+        return bridge.source.rows(start_ns, end_ns, given.tag_id, given.sensor_type, pack)
 
     return await respond_export(
-        request, bridge, rows, kind, period, sensors=bridge.criteria.sensors, now_ns=now_ns,
+        request, bridge, rows, kind, given, sensors=bridge.criteria.sensors, now_ns=now_ns,
         known=known,
     )  # fmt: skip
 
 
-def end_of(period: PeriodQuery, now_ns: int | None) -> int:
-    """Up to when, ns."""
-    return period.end_ns or now_ns or MAX_SECONDS * NANOSECONDS_PER_SECOND
+def span_of(given: OfExport, now_ns: int | None) -> tuple[int, int]:
+    """From when to when, ns."""
+    start_ns, end_ns = given.span(now_ns)
+    return start_ns, end_ns or now_ns or MAX_SECONDS * NANOSECONDS_PER_SECOND
 
 
 async def respond_export(
@@ -122,7 +123,7 @@ async def respond_export(
     of: Exporting,
     rows: Callable[[Pack], Lots],
     kind: ExportFormat,
-    period: PeriodQuery,
+    given: OfExport,
     *,
     sensors: Sensors,
     now_ns: int | None,
@@ -136,7 +137,7 @@ async def respond_export(
         Exception: what the first rows met.
 
     """
-    name = bodies.export_file_name(period, now_ns, kind.name)
+    name = bodies.export_file_name(given, now_ns, kind.name)
     headers = {
         **NEVER_STORE, **known, "Content-Disposition": f'attachment; filename="{name}"',
     }  # fmt: skip
@@ -148,10 +149,10 @@ async def respond_export(
         log.warning("the export of %s is slow and makes place for another one", client)
         connection.break_off()
 
-    facts = {"title": "lupin-twin: readings and failed attempts", **_facts(known, period, now_ns)}
+    facts = {"title": "lupin-twin: readings and failed attempts", **_facts(known, given, now_ns)}
 
     async def begin() -> tuple[Writer, Lots, bytes | None]:
-        opened = partial(kind.open, sensors, facts, period.sensor_type, has_site)
+        opened = partial(kind.open, sensors, facts, given.sensor_type, has_site)
         writer = await _written(of, kind, opened)
         lots = rows(partial(kind.pack, sensors=sensors))
         return writer, lots, await anext(lots, None)
@@ -171,12 +172,13 @@ async def respond_export(
         )
 
 
-def _facts(known: Mapping[str, str], period: PeriodQuery, now_ns: int | None) -> dict[str, str]:
+def _facts(known: Mapping[str, str], given: OfExport, now_ns: int | None) -> dict[str, str]:
     """What a file says of itself; moments in ISO 8601, or in ROS seconds as in the headers."""
     facts = {name.removeprefix("X-").lower().replace("-", "_"): it for name, it in known.items()}
-    if period.start_ns:
-        facts["from"] = query.iso(period.start_ns)
-    return {**facts, "to": query.iso(end_of(period, now_ns))}
+    start_ns, end_ns = span_of(given, now_ns)
+    if start_ns:
+        facts["from"] = query.iso(start_ns)
+    return {**facts, "to": query.iso(end_ns)}
 
 
 async def _written(of: Exporting, kind: ExportFormat, write: Callable[[], ResultT]) -> ResultT:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 import time
 from collections.abc import Callable, Collection
 from functools import cache
@@ -20,6 +19,7 @@ from lupin_bridge.access.credentials import SHARED
 from lupin_bridge.access.middleware import CONTENT_POLICY, Access, client_of
 from lupin_bridge.bridge import Bridge
 from lupin_bridge.feed.source import TwinSource
+from lupin_bridge.field.query import weighted
 from lupin_bridge.routes.answers import (
     CLIENT_DISCONNECTED,
     NEVER_STORE,
@@ -34,7 +34,7 @@ from lupin_bridge.routes.answers import (
     while_client_waits,
 )
 from lupin_bridge.serving.admission import REVALIDATE
-from lupin_bridge.stream import people_schema
+from lupin_bridge.stream import routes_schema
 
 router = APIRouter()
 # In the application only where the page was not built.
@@ -217,10 +217,6 @@ async def no_page() -> Response:
     return Response(_NO_PAGE, 503, NEVER_STORE, "text/html; charset=utf-8")
 
 
-# RFC 9110, section 12.5.4; what is no weight counts as 1, which is what browsers leave out.
-_WEIGHT: Final = re.compile(r";\s*q=(0(?:\.\d{0,3})?)\s*$")
-
-
 def language_of(wanted: str | None, accepted: str, known: Collection[str]) -> str:
     """One of `known`: what `?lang=` asks for, else the best of `Accept-Language`, else English.
 
@@ -229,12 +225,10 @@ def language_of(wanted: str | None, accepted: str, known: Collection[str]) -> st
     if wanted is not None:
         return _known_language(wanted, known) or "en"
     found = "en", 0.0
-    for part in accepted.split(","):
-        language = _known_language(part.partition(";")[0], known)
-        weight = _WEIGHT.search(part)
-        share = 1.0 if weight is None else float(weight.group(1))
-        if language is not None and share > found[1]:  # of equals the first
-            found = language, share
+    for tag, weight in weighted(accepted):
+        language = _known_language(tag, known)
+        if language is not None and weight > found[1]:  # of equals the first
+            found = language, weight
     return found[0]
 
 
@@ -263,7 +257,7 @@ async def sign_in(request: Request) -> Response:
             return error_response(
                 "send the token as Authorization: Bearer", 401, {"WWW-Authenticate": "Bearer"}
             )
-        given = await read_body(request, people_schema.SignIn)
+        given = await read_body(request, routes_schema.SignIn)
         person = await while_client_waits(
             request, people.check(given.name, given.password, address)
         )
@@ -299,7 +293,7 @@ async def sign_out(request: Request) -> Response:
     router,
     "/api/session",
     summary="Who makes the request, and is this a session that can be signed out of?",
-    responses={200: {"model": people_schema.Session}},
+    responses={200: {"model": routes_schema.Session}},
 )
 async def session_route(request: Request) -> Response:
     """Who makes the request, and how long a session that it came with still lasts."""

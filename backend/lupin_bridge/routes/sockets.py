@@ -20,7 +20,7 @@ import time
 from collections import deque
 from contextlib import ExitStack
 from functools import partial
-from typing import Any, Final
+from typing import Any, Final, Protocol
 
 from fastapi import APIRouter, WebSocket
 
@@ -37,10 +37,17 @@ from lupin_bridge.serving.admission import AdmissionError
 from lupin_bridge.serving.ws_protocol import BINARY, CONNECTION_KEY, Connection, frame_head
 from lupin_bridge.stream.frames import text_frame
 from lupin_bridge.stream.hub import CLOSE_TRY_AGAIN_LATER, Client, Hub
-from lupin_bridge.viewers import foxglove_protocol, foxglove_session
-from lupin_bridge.viewers.foxglove_protocol import SUBPROTOCOLS, Channel
-from lupin_bridge.viewers.rosbridge_protocol import service_failure, service_response
-from lupin_bridge.viewers.rosbridge_services import FieldCall
+from lupin_bridge.viewers.foxglove import (
+    ERROR,
+    SUBPROTOCOLS,
+    Channel,
+    Reaction,
+    Session,
+    chosen,
+    server_info,
+    status,
+)
+from lupin_bridge.viewers.rosbridge_protocol import FieldCall, service_failure, service_response
 from lupin_bridge.viewers.rosbridge_session import Feeds
 from lupin_bridge.viewers.rosbridge_session import Session as RosbridgeSession
 from lupin_twin.field.engine import FieldRefused
@@ -70,6 +77,34 @@ async def next_message(websocket: WebSocket) -> str | bytes | None:
     text: str | None = event.get("text")
     message: str | bytes = event["bytes"] if text is None else text
     return message
+
+
+class _Listened(Protocol):
+    """A bridge, or the fleet."""
+
+    hub: Hub
+
+    def join(self, client: Client) -> None:
+        """Add a listener; it has what there is when this returns."""
+
+    def serve(self, client: Client) -> None:
+        """A listener's socket is free again."""
+
+
+async def listen(websocket: WebSocket, to: _Listened, **options: Any) -> None:
+    """Send a listener what it lacks until it has gone; what it says is ignored."""
+    if not await has_place(websocket, to.hub):
+        return
+    connection: Connection = getattr(websocket.state, CONNECTION_KEY)
+    client = Client(connection, address=client_of(websocket), **options)
+    connection.on_writable = lambda: to.serve(client)
+    to.join(client)
+    try:
+        while await next_message(websocket) is not None:
+            pass
+    finally:
+        connection.on_writable = None
+        to.hub.leave(client)
 
 
 class _Conversation:
@@ -133,7 +168,7 @@ class _Conversation:
 async def foxglove(websocket: WebSocket) -> None:
     """The read-only part of Foxglove's WebSocket protocol."""
     bridge: Bridge = websocket.app.state.bridge
-    subprotocol = foxglove_protocol.chosen(websocket.scope["subprotocols"])
+    subprotocol = chosen(websocket.scope["subprotocols"])
     if subprotocol is None:
         await websocket.send_denial_response(error_response(_WRONG_SUBPROTOCOL, 400))
         return
@@ -149,7 +184,7 @@ class _FoxgloveConversation(_Conversation):
     def __init__(self, websocket: WebSocket, bridge: Bridge) -> None:
         super().__init__(websocket, bridge)
         self._offer = bridge.offer
-        self._session = foxglove_session.Session(bridge.offer.counts)
+        self._session = Session(bridge.offer.counts)
         self._listening: dict[int, Listening] = {}
         # Messages that answer nothing, such as notes and advertisements.
         self._due: deque[bytes] = deque()
@@ -157,7 +192,7 @@ class _FoxgloveConversation(_Conversation):
 
     async def _converse(self) -> None:
         await self._offer.look()
-        info = foxglove_protocol.server_info(self._offer.session_id, has_time=self._offer.has_time)
+        info = server_info(self._offer.session_id, has_time=self._offer.has_time)
         await self._send(info)
         with self._offer.followed(self._on_news):
             self._on_news(None)
@@ -187,14 +222,14 @@ class _FoxgloveConversation(_Conversation):
         except (NotRelayedError, TwinUnavailableError, TimeoutError) as error:
             self._session.give_up(key)
             text = f"channel {channel.id} cannot be served now: {str(error) or 'ROS is busy'}"
-            await self._send(foxglove_protocol.status(foxglove_protocol.ERROR, text))
+            await self._send(status(ERROR, text))
             return
         if self._session.has(key, channel):
             self._listening[key] = listening
         else:
             listening.close()  # the channel has gone meanwhile
 
-    def _stop_listening(self, reaction: foxglove_session.Reaction) -> None:
+    def _stop_listening(self, reaction: Reaction) -> None:
         for key in reaction.ended:
             if (listening := self._listening.pop(key, None)) is not None:
                 listening.close()

@@ -1,46 +1,56 @@
-"""The state: over WebSocket, as JSON, and tag by tag."""
+"""The state: over WebSocket, as JSON, tag by tag; and the past."""
 
 from __future__ import annotations
 
 import math
 import time
 from dataclasses import dataclass
+from datetime import UTC
 from typing import Annotated, Final
 
 from annotated_types import Ge
 from fastapi import APIRouter, Request, Response, WebSocket
 
-from lupin_bridge.access.middleware import client_of
 from lupin_bridge.bridge import Bridge
+from lupin_bridge.judge.options import zone_of
 from lupin_bridge.past import bodies
 from lupin_bridge.past import query as past_query
-from lupin_bridge.past.plans import LatestOfTag, NoSuchTag, OneTag, WholeState
+from lupin_bridge.past.plans import History, LatestOfTag, NoSuchTag, OneTag, Timeline, WholeState
+from lupin_bridge.past.report import Report
+from lupin_bridge.past.report_page import (
+    HTML_TYPE,
+    PAGE_HEADERS,
+    ReportPage,
+    languages,
+    refused_page,
+)
 from lupin_bridge.query_string import parameter, parameters_of, read
 from lupin_bridge.routes.answers import (
     NEVER_STORE,
     NO_TWIN,
     NOT_REMEMBERED,
+    REFUSALS,
     bridge_of,
     error_response,
     json_response,
+    list_header,
     read_route,
+    refusal,
+    refusing,
     respond,
     respond_as_of,
     respond_past,
 )
-from lupin_bridge.routes.sockets import has_place, next_message
+from lupin_bridge.routes.pages import language_of
+from lupin_bridge.routes.sockets import listen
 from lupin_bridge.serving.admission import Answer
-from lupin_bridge.serving.ws_protocol import CONNECTION_KEY, Connection
-from lupin_bridge.stream import schema
-from lupin_bridge.stream.hub import CLOSE_POLICY, Client
+from lupin_bridge.stream import routes_schema, schema
+from lupin_bridge.stream.hub import CLOSE_POLICY
+from lupin_twin.core.past import PastRefused, SeriesRequest
 from lupin_twin.core.state import Snapshot, TagState
 
 # Of the reason in a close frame (RFC 6455, section 5.5).
 MAX_REASON_BYTES: Final = 123
-
-
-class ListenRefused(ValueError):
-    """A query that cannot be served; the message names the parameter, the value and the limit."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,7 +71,7 @@ router = APIRouter()
 # How long the ages of an answer hold: they are shown in seconds.
 AGES_HOLD_S: Final = 0.2
 
-_NO_TAG = {404: {"model": schema.ErrorMessage, "description": "no such tag"}}
+_NO_TAG = refusing({404: "no such tag"})
 
 
 @router.websocket("/ws/state")
@@ -70,28 +80,12 @@ async def ws_state(websocket: WebSocket) -> None:
     bridge: Bridge = websocket.app.state.bridge
     await websocket.accept()
     try:
-        query = read(ListenQuery, websocket.query_params.multi_items(), ListenRefused)
-    except ListenRefused as error:
+        query = read(ListenQuery, websocket.query_params.multi_items(), ValueError)
+    except ValueError as error:
         reason = str(error).encode("ascii", "backslashreplace")[:MAX_REASON_BYTES].decode()
         await websocket.close(CLOSE_POLICY, reason)
         return
-    if not await has_place(websocket, bridge.hub):
-        return
-    connection: Connection = getattr(websocket.state, CONNECTION_KEY)
-    client = Client(
-        connection,
-        address=client_of(websocket),
-        delta=query.delta,
-        min_interval_s=query.min_interval_s,
-    )
-    connection.on_writable = lambda: bridge.serve(client)
-    bridge.join(client)
-    try:
-        while await next_message(websocket) is not None:
-            pass
-    finally:
-        connection.on_writable = None
-        bridge.hub.leave(client)
+    await listen(websocket, bridge, delta=query.delta, min_interval_s=query.min_interval_s)
 
 
 @read_route(
@@ -177,3 +171,110 @@ async def _tag_as_of(request: Request, tag_id: str, at_ns: int) -> Response:
         response = error_response(f"{error}{bodies.why_not(journal, at_ns)}", 404)
         response.headers.update(bodies.moment_headers(journal, at_ns))
         return response
+
+
+# --- the past: one sensor's readings, what happened when, and the shift report of both ------------
+
+
+@read_route(
+    router,
+    "/api/history",
+    summary="The readings of one sensor of one tag over a period",
+    responses={200: {"model": routes_schema.History}, **NOT_REMEMBERED},
+    openapi_extra={"parameters": parameters_of(past_query.OfHistory)},
+)
+async def history_route(request: Request) -> Response:
+    """Readings, or equal buckets if there are more than `points`; `gaps`: where nothing came."""
+    bridge = bridge_of(request)
+    now_ns = bridge.ros_time_ns
+    given = read(past_query.OfHistory, request.query_params.multi_items(), PastRefused)
+    series = SeriesRequest(given.tag_id, given.sensor_type, *given.span(now_ns), given.points)
+    journal, has_nights = bridge.source.journal(), bridge.origin != "simulated"
+    history = History(series, now_ns, bridge.criteria, journal, has_nights)
+    return await respond_past(request, history, "history")
+
+
+@read_route(
+    router,
+    "/api/timeline",
+    summary="What happened when: scans, failures, inspections, pests, silences, runs of the clock",
+    responses={200: {"model": routes_schema.Timeline}, **NOT_REMEMBERED},
+    openapi_extra={"parameters": parameters_of(past_query.OfTimeline)},
+)
+async def timeline_route(request: Request) -> Response:
+    """Events counted in buckets of equal length, and how far back anything is remembered."""
+    bridge = bridge_of(request)
+    given = read(past_query.OfTimeline, request.query_params.multi_items(), PastRefused)
+    start_ns, end_ns = given.span(bridge.ros_time_ns)
+    timeline = Timeline(start_ns, end_ns, given.points, given.tag_id, bridge.source.journal())
+    return await respond_past(request, timeline, "timeline")
+
+
+@read_route(
+    router,
+    "/api/report",
+    summary="What happened between two moments: alarms, notes, silences, extremes, scans",
+    responses={200: {"model": routes_schema.ShiftReport}, **NOT_REMEMBERED},
+    openapi_extra={"parameters": parameters_of(past_query.OfReport)},
+)
+async def report_route(request: Request) -> Response:
+    """At most 31 days and 100,000 scans and inspections; 500 entries of each list."""
+    given = read(past_query.OfReport, request.query_params.multi_items(), PastRefused)
+    return await respond_past(request, _report(request, given), "report")
+
+
+@read_route(
+    router,
+    "/api/report.html",
+    summary="The same as a page for paper, A4",
+    responses={200: {"content": {"text/html": {"schema": {"type": "string"}}}}, **NOT_REMEMBERED},
+    openapi_extra={"parameters": parameters_of(past_query.OfReportPage)},
+)
+async def report_page_route(request: Request) -> Response:
+    """Without scripts. A browser gets a refusal as a page too."""
+    try:
+        return await _report_page(request)
+    except REFUSALS as error:
+        refused = refusal(error)
+        if "text/html" in list_header(request, "accept"):
+            lang = language_of(
+                request.query_params.get("lang"),
+                list_header(request, "accept-language"),
+                languages(),
+            )
+            page = refused_page(str(error), lang)
+            headers = {**refused.headers, **PAGE_HEADERS}
+            del headers["content-length"], headers["content-type"]
+            return Response(page, refused.status_code, headers, HTML_TYPE)
+        return refused
+
+
+async def _report_page(request: Request) -> Response:
+    given = read(past_query.OfReportPage, request.query_params.multi_items(), PastRefused)
+    found = _report(request, given)
+    name = given.time_zone or ""
+    zone = zone_of(name) if name else None
+    unknown_zone = "" if zone else name[:64]
+    page = ReportPage(
+        found.start_ns,
+        found.end_ns,
+        found.criteria,
+        found.journal,
+        lang=given.lang,
+        zone=UTC if unknown_zone else zone,
+        unknown_zone=unknown_zone,
+        origin=bridge_of(request).origin,
+        site=bridge_of(request).site,
+    )
+    return await respond_past(request, page, "report")
+
+
+def _report(request: Request, given: past_query.OfReport) -> Report:
+    bridge = bridge_of(request)
+    journal = bridge.source.journal()
+    now_ns = bridge.ros_time_ns
+    return Report(
+        *past_query.report(given, journal.complete_ns if now_ns is None else now_ns),
+        bridge.criteria,
+        journal,
+    )

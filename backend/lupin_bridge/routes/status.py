@@ -14,19 +14,17 @@ import orjson
 from fastapi import APIRouter, Request, Response
 
 from lupin_bridge.access.middleware import client_of
-from lupin_bridge.alarms.notes import notes_of_alarms
+from lupin_bridge.alarms.board import notes_of_alarms
 from lupin_bridge.feed.source import ailment
 from lupin_bridge.judge.episodes import Alarm
 from lupin_bridge.metrics import CONTENT_TYPE
 from lupin_bridge.past import query as past_query
 from lupin_bridge.past.plans import Health
-from lupin_bridge.past.query import PeriodQuery
-from lupin_bridge.query_string import parameters_of
+from lupin_bridge.query_string import parameters_of, read
 from lupin_bridge.routes.answers import (
     NEVER_STORE,
     NO_TWIN,
     NOT_REMEMBERED,
-    TOO_MUCH,
     bridge_of,
     computed,
     error_response,
@@ -35,14 +33,15 @@ from lupin_bridge.routes.answers import (
     not_modified,
     on_worker,
     read_route,
+    refusing,
     respond,
     respond_as_of,
 )
 from lupin_bridge.serving.admission import REVALIDATE, Answer
-from lupin_bridge.stream import robot_schema, schema
-from lupin_bridge.stream.health_json import alarms_body, judgement
-from lupin_bridge.stream.robot import robot_body
-from lupin_bridge.stream.state_json import header, stamp
+from lupin_bridge.stream import routes_schema, schema
+from lupin_bridge.stream.followers import robot_body
+from lupin_bridge.stream.state_json import alarms_body, header, judgement, stamp
+from lupin_twin.core.past import PastRefused
 from lupin_twin.field.explored import OccupancyMap
 
 # Grey of a free and of an occupied cell; unknown is transparent. The page decides what is below.
@@ -105,9 +104,13 @@ _DRAW_CELL_S: Final = 50e-9
 
 _NO_MAP = {
     304: {"description": "the ETag still holds"},
-    404: {"model": schema.ErrorMessage, "description": "no map has come yet"},
-    **TOO_MUCH,
-    503: {"model": schema.ErrorMessage, "description": "the twin is not there, or busy"},
+    **refusing(
+        {
+            404: "no map has come yet",
+            429: "too many requests from this client",
+            503: "the twin is not there, or busy",
+        }
+    ),
 }
 
 
@@ -164,7 +167,7 @@ async def _map(request: Request, kind: str) -> Response:
     router,
     "/api/robot",
     summary="Where the robot is and has been, its plan, its battery",
-    responses={200: {"model": robot_schema.Robot}},
+    responses={200: {"model": routes_schema.Robot}},
 )
 async def robot(request: Request) -> Response:
     """From the robot's own topics, of now only: the journal does not hold it."""
@@ -188,7 +191,7 @@ _WRITE_ALARM_S: Final = 10e-6
     responses={
         **NOT_REMEMBERED,
         200: {"model": schema.Judgement},
-        503: {"model": schema.ErrorMessage, "description": "no twin was found yet, or it is busy"},
+        **refusing({503: "no twin was found yet, or it is busy"}),
     },
     openapi_extra={"parameters": parameters_of(past_query.OfMoment)},
 )
@@ -241,16 +244,15 @@ async def alarms_route(request: Request) -> Response:
     They follow from what was observed and the ranges of now, the same in every replica.
     """
     bridge = bridge_of(request)
-    query = past_query.period(
-        past_query.OfAlarms, request.query_params.multi_items(), bridge.ros_time_ns
-    )
+    given = read(past_query.OfAlarms, request.query_params.multi_items(), PastRefused)
+    span, active = given.span(bridge.ros_time_ns), given.active
     board = bridge.alarms.now
-    alarms = board.active if query.active else board.alarms
+    alarms = board.active if active == "1" else board.alarms
 
     notes, now_ns = bridge.notes.notes or (), bridge.ros_time_ns
 
     def body() -> bytes:
-        found = list(islice(filter(_is_in(query), alarms), MAX_ALARMS))
+        found = list(islice(filter(_is_in(*span, active), alarms), MAX_ALARMS))
         said = notes_of_alarms(board.alarms, notes, now_ns)
         return orjson.dumps(alarms_body(found, board.source, board.since_ns, said))
 
@@ -259,17 +261,19 @@ async def alarms_route(request: Request) -> Response:
             text = await on_worker(bridge, lambda _: body(), len(alarms) * _WRITE_ALARM_S)
         return Answer(text, "application/json", NEVER_STORE)
 
-    return await respond(request, ("alarms", board.number, bridge.notes.number, query), compute)
+    return await respond(request, ("alarms", board.number, bridge.notes.number, given), compute)
 
 
-def _is_in(query: PeriodQuery) -> Callable[[Alarm], bool]:
+def _is_in(start_ns: int, end_ns: int, active: str | None = None) -> Callable[[Alarm], bool]:
+    """`active` as in the query, `end_ns` 0: now."""
+
     def is_in(alarm: Alarm) -> bool:
-        if query.active is not None and alarm.is_active is not query.active:
+        if active is not None and alarm.is_active != (active == "1"):
             return False
-        if query.end_ns and alarm.raised_at_ns >= query.end_ns:
+        if end_ns and alarm.raised_at_ns >= end_ns:
             return False
         cleared_ns = alarm.cleared_at_ns
-        return cleared_ns is None or cleared_ns >= query.start_ns
+        return cleared_ns is None or cleared_ns >= start_ns
 
     return is_in
 

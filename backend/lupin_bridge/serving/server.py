@@ -32,15 +32,11 @@ log = logging.getLogger(__name__)
 WATCH_PERIOD_S: Final = 2.0
 
 
-class TlsError(SettingError):
-    """A certificate or key that cannot be served; the message names the option and the file."""
-
-
 def check_pair(cert_file: str, key_file: str) -> None:
     """Load a certificate chain and its private key, both PEM, and forget them again.
 
     Raises:
-        TlsError: a file that cannot be read or is not what it should be, or a pair that is none.
+        SettingError: a file that cannot be read, or is not what it should be, or no pair.
 
     """
     for option, path in (("--tls-cert", cert_file), ("--tls-key", key_file)):
@@ -48,24 +44,24 @@ def check_pair(cert_file: str, key_file: str) -> None:
             with open(path, "rb"):  # noqa: PTH123  # read rights, whatever kind of file it is
                 pass
         except OSError as error:
-            raise TlsError(f"{option} {path}: {error.strerror}") from None
+            raise SettingError(f"{option} {path}: {error.strerror}") from None
 
     def no_password() -> NoReturn:
         # Without this, OpenSSL would ask the terminal.
-        raise TlsError(f"--tls-key {key_file} is encrypted: give a key without a passphrase")
+        raise SettingError(f"--tls-key {key_file} is encrypted: give a key without a passphrase")
 
     context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
     try:
         context.load_verify_locations(cert_file)
     except ssl.SSLError:
-        raise TlsError(f"--tls-cert {cert_file} holds no PEM certificate") from None
+        raise SettingError(f"--tls-cert {cert_file} holds no PEM certificate") from None
     try:
         context.load_cert_chain(cert_file, key_file, no_password)
     except ssl.SSLError as error:
         if error.reason == "KEY_VALUES_MISMATCH":
-            raise TlsError(f"--tls-key {key_file} is not the key of {cert_file}") from None
+            raise SettingError(f"--tls-key {key_file} is not the key of {cert_file}") from None
         reason = error.reason or "not PEM"
-        raise TlsError(f"--tls-key {key_file} is no usable private key ({reason})") from None
+        raise SettingError(f"--tls-key {key_file} is no usable private key ({reason})") from None
 
 
 class Certificates:
@@ -96,7 +92,7 @@ class Certificates:
             # Not into the live context: a pair that is none would leave it with neither.
             check_pair(*self._files)
             self._context.load_cert_chain(*self._files)
-        except (TlsError, OSError) as error:  # ssl.SSLError is an OSError
+        except (SettingError, OSError) as error:  # ssl.SSLError is an OSError
             if str(error) != self._warned:
                 log.warning("the new TLS certificate is refused, the old one goes on: %s", error)
             self._warned = str(error)

@@ -17,8 +17,7 @@ from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIO
 from websockets.frames import CloseCode, Frame
 from websockets.protocol import State
 
-from lupin_bridge.rate_limit import RateLimit
-from lupin_bridge.serving.admission import client_key
+from lupin_bridge.serving.admission import RateLimit, client_key
 from lupin_bridge.serving.connections import CLOSE_GRACE_S, refusal, tear_down
 
 # No message that we serve has more than some hundred bytes.

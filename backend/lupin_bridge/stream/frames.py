@@ -1,24 +1,215 @@
 """WebSocket frames of the state: each written once, and shared by every client.
 
 Pure. A frame is written when the first client asks for it, and kept for the others.
+
+And the status: whether the twin behind the bridge is alive, as one value that everything else
+tells. The time is an argument, seconds of a clock that never jumps.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any, Literal
 
 import orjson
 from websockets.frames import Frame, Opcode
 
-from lupin_bridge.alarms.board import Board
-from lupin_bridge.alarms.notes import notes_of_alarms
+from lupin_bridge.alarms.board import Board, notes_of_alarms
+from lupin_bridge.feed.source import TwinUpdate
 from lupin_bridge.judge.judging import NOTHING_JUDGED, Judged
-from lupin_bridge.stream.health_json import alarms_body, alarms_in_frame, judgement, judgement_since
-from lupin_bridge.stream.state_json import StateJson, header
-from lupin_bridge.stream.status import Status
+from lupin_bridge.stream.state_json import (
+    StateJson,
+    alarms_body,
+    alarms_in_frame,
+    header,
+    judgement,
+    judgement_since,
+    stamp,
+)
+from lupin_twin.core.journal_condition import Condition, JournalState
 from lupin_twin.core.notes import Note
-from lupin_twin.core.state import Snapshot, TagState
+from lupin_twin.core.parameters import World
+from lupin_twin.core.state import ClockState, Snapshot, TagState
+
+# The twin publishes at least once a second (parameter state_publish_rate_hz, default 1); three
+# missed publications are no accident.
+STALE_AFTER_S = 3.0
+
+Reason = Literal[
+    "live",
+    "paused",
+    "no_clock",
+    "clock_stopped",
+    "clock_doubted",
+    "never_seen",
+    "stale",
+    "thread_dead",
+    "shutting_down",
+]
+_OF_CLOCK: dict[ClockState, Reason] = {
+    "running": "live",
+    "paused": "paused",
+    "stopped": "clock_stopped",
+    "none": "no_clock",
+    "doubted": "clock_doubted",
+}
+
+_MESSAGES: dict[Reason, str] = {
+    "live": "The twin is live.",
+    "paused": "The twin is live, and its simulated time is paused.",
+    "no_clock": "The twin has no time: nothing has come on /clock yet. Ages are not known. "
+    "Start the simulation, or the twin without use_sim_time.",
+    "clock_stopped": "The twin's time has stopped: nothing comes on /clock any more. Ages are not "
+    "known. Check the simulation.",
+    "clock_doubted": "The twin's clock contradicts its journal. Ages are not known. Set the clock; "
+    "after ten minutes it is believed as it is.",
+    "never_seen": "Nothing has been received from a twin yet. Start it, or check ROS_DOMAIN_ID.",
+    "stale": "The twin has fallen silent. Check that its process runs and is reachable.",
+    "thread_dead": "The bridge's ROS thread has ended. Restart the bridge.",
+    "shutting_down": "The bridge is shutting down.",
+}
+
+
+NO_UPDATE = TwinUpdate(Snapshot(0, "", ()), "")
+
+
+@dataclass(frozen=True, slots=True)
+class Status:
+    """`reason` says why the twin counts as live or offline; `state_age_s` is None: never.
+
+    `update` is the twin's newest. `outward` is by channel that tells others by itself what is wrong
+    with it, in a line; empty: nothing. `day_length_s` is how long the twin's day takes, s of ROS
+    time: a demo's is shorter.
+    """
+
+    reason: Reason
+    state_age_s: float | None
+    update: TwinUpdate = NO_UPDATE
+    outward: Mapping[str, str] = field(default_factory=dict)
+    day_length_s: float = 86_400.0
+
+    @property
+    def is_live(self) -> bool:
+        """Whether what the bridge serves is current."""
+        return self.reason in ("live", "paused")
+
+    @property
+    def message(self) -> str:
+        """What to tell a person."""
+        twins = self.update.twin_count
+        if self.is_live and twins > 1:
+            return (
+                f"{twins} twins publish on the same topic, and what you see is a mixture of them. "
+                "Stop all but one, or give them ROS domains of their own."
+            )
+        return _MESSAGES[self.reason]
+
+    def is_news_after(self, before: Status | None) -> bool:
+        """Whether clients have to be told, who were told `before`."""
+        return before is None or before.news() != self.news()
+
+    def has_more_detail_than(self, before: Status) -> bool:
+        """Whether a person has to be told, who was told `before`."""
+        return (before.reason, before.message) != (self.reason, self.message)
+
+    def news(self) -> tuple[object, ...]:
+        """What is told at once: how far behind a journal is changes all the time."""
+        now, journal = self.update, self.update.journal
+        return (
+            self.reason,
+            self.message,
+            now.occupancy_map is None,
+            # How often each, roughly: a stream of drops is no stream of statuses.
+            {drop.reason: drop.count.bit_length() for drop in now.drops},
+            journal.state,
+            "" if journal.state == JournalState.SLOW else journal.detail,
+            journal.set_aside,
+            journal.simulated_ns,
+            self.outward,
+            now.origin,
+            now.input_problems,
+        )
+
+    def frame(self) -> dict[str, Any]:
+        """`schema.StatusFrame`."""
+        now = self.update
+        return {
+            "type": "status",
+            "twin": "live" if self.is_live else "offline",
+            "reason": self.reason,
+            "message": self.message,
+            "state_age_seconds": None if self.state_age_s is None else round(self.state_age_s, 3),
+            # Spares a browser requests whose 404 it would show as an error.
+            "has_map": now.occupancy_map is not None,
+            "origin": now.origin,
+            "twin_count": now.twin_count,
+            "input_problems": list(now.input_problems),
+            "day_length_s": self.day_length_s,
+            "drops": [
+                {"reason": drop.reason, "message": drop.message, "count": drop.count}
+                for drop in now.drops
+            ],
+            "journal": _journal(now.journal),
+            "outward": [
+                {"channel": channel, "is_failing": bool(detail), "detail": detail}
+                for channel, detail in self.outward.items()
+            ],
+        }
+
+
+NEVER_SEEN = Status("never_seen", None)
+
+
+def _journal(journal: Condition) -> dict[str, Any]:
+    simulated = journal.simulated_ns
+    return {
+        "state": journal.state.value,
+        "detail": journal.detail,
+        "set_aside": journal.set_aside,
+        "simulated": simulated and {"start": stamp(simulated[0]), "end": stamp(simulated[1])},
+    }
+
+
+@dataclass(slots=True)
+class Liveness:
+    """The twin's newest update, when that came, and whether the thread still runs.
+
+    `world()` is what is observed, as far as it is known without an update.
+    """
+
+    world: Callable[[], World] = lambda: World("unknown")
+    stale_after_s: float = STALE_AFTER_S
+    update: TwinUpdate | None = None
+    updated_s: float = 0.0
+    outward: Mapping[str, str] = field(default_factory=dict)
+    thread_dead: bool = False
+    shutting_down: bool = False
+
+    def silent_s(self, now_s: float) -> float | None:
+        """For how long the twin has said nothing; None: it never has."""
+        if self.update is None:
+            return None
+        # Of an archive's site, it had been silent as that came.
+        return max(0.0, now_s - self.updated_s) + self.update.silent_s
+
+    def status(self, now_s: float) -> Status:
+        """The status at `now_s`."""
+        age_s, world = self.silent_s(now_s), self.world()
+        update = self.update or replace(NO_UPDATE, origin=world.origin)
+        return Status(self._reason(age_s), age_s, update, self.outward, world.day_length_s)
+
+    def _reason(self, age_s: float | None) -> Reason:
+        if self.shutting_down:
+            return "shutting_down"
+        if self.thread_dead:
+            return "thread_dead"
+        if age_s is None or self.update is None:
+            return "never_seen"
+        return _OF_CLOCK[self.update.snapshot.clock] if age_s < self.stale_after_s else "stale"
+
+
+# --- frames of the state --------------------------------------------------------------------------
 
 
 def text_frame(payload: bytes) -> bytes:

@@ -16,8 +16,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Final, Generic, Protocol, TypeVar
 
-from lupin_bridge.stream.frames import StateFrame, status_frame
-from lupin_bridge.stream.status import Status
+from lupin_bridge.stream.frames import StateFrame, Status, status_frame
 
 # Large messages that wait for sockets, of all clients together. Pure; belongs to one thread.
 #

@@ -12,7 +12,7 @@ from typing import Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from lupin_bridge.stream.status import Reason
+from lupin_bridge.stream.frames import Reason
 from lupin_twin.core.diagnostics import Origin
 
 

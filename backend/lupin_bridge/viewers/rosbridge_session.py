@@ -31,17 +31,20 @@ from lupin_bridge.serving.ws_protocol import shown
 from lupin_bridge.stream.frames import StateFrame, text_frame
 from lupin_bridge.viewers.rosbridge_protocol import (
     CallService,
+    FieldCall,
     Id,
     Refused,
     Subscribe,
     Unsubscribe,
+    answer,
+    is_type,
+    json_of,
     parse,
     publish,
     service_failure,
     service_response,
     status,
 )
-from lupin_bridge.viewers.rosbridge_services import FieldCall, answer, is_type, json_of
 from lupin_twin.runtime.workers import Workers
 
 log = logging.getLogger(__name__)

@@ -126,8 +126,8 @@ export interface components {
             readonly bucket_s: number | null;
             readonly readings: readonly components["schemas"]["HistoryReading"][];
             readonly buckets: readonly components["schemas"]["Bucket"][];
-            readonly gaps: readonly components["schemas"]["lupin_bridge__past__schema__Stretch"][];
-            readonly nights: readonly components["schemas"]["lupin_bridge__past__schema__Stretch"][] | null;
+            readonly gaps: readonly components["schemas"]["Period"][];
+            readonly nights: readonly components["schemas"]["Period"][] | null;
             readonly complete_to: components["schemas"]["Time"] | null;
             readonly kept_from: components["schemas"]["Time"] | null;
         };
@@ -197,6 +197,10 @@ export interface components {
             readonly interval_s: number | null;
             readonly last_scan: components["schemas"]["Time"] | null;
             readonly overdue: number;
+        };
+        readonly Period: {
+            readonly from: components["schemas"]["Time"];
+            readonly to: components["schemas"]["Time"];
         };
         readonly Point: {
             readonly x: number | null;
@@ -282,6 +286,10 @@ export interface components {
             readonly journal: components["schemas"]["Journal"];
             readonly outward: readonly components["schemas"]["Outward"][];
         };
+        readonly Stretch: {
+            readonly start: components["schemas"]["Time"];
+            readonly end: components["schemas"]["Time"];
+        };
         readonly TagError: {
             readonly tag_id: string;
             readonly measured: number;
@@ -307,9 +315,9 @@ export interface components {
             readonly from: components["schemas"]["Time"];
             readonly to: components["schemas"]["Time"];
             readonly bucket_s: number;
-            readonly reach: components["schemas"]["lupin_bridge__past__schema__Stretch"] | null;
+            readonly reach: components["schemas"]["Period"] | null;
             readonly buckets: readonly components["schemas"]["TimelineBucket"][];
-            readonly silences: readonly components["schemas"]["lupin_bridge__past__schema__Stretch"][];
+            readonly silences: readonly components["schemas"]["Period"][];
             readonly runs: readonly components["schemas"]["ClockRun"][];
             readonly complete_to: components["schemas"]["Time"] | null;
             readonly kept_from: components["schemas"]["Time"] | null;
@@ -344,10 +352,6 @@ export interface components {
             readonly last_try_status?: number | null;
             readonly last_try_detail?: string;
         };
-        readonly lupin_bridge__past__schema__Stretch: {
-            readonly from: components["schemas"]["Time"];
-            readonly to: components["schemas"]["Time"];
-        };
         readonly StateFrame: {
             /** @constant */
             readonly type: "state";
@@ -366,10 +370,6 @@ export interface components {
             readonly changed: readonly components["schemas"]["TwinTagState"][];
             readonly removed: readonly string[];
             readonly health: components["schemas"]["Judgement"];
-        };
-        readonly Stretch: {
-            readonly start: components["schemas"]["Time"];
-            readonly end: components["schemas"]["Time"];
         };
         readonly AlarmsFrame: {
             readonly alarms: readonly components["schemas"]["Alarm"][];

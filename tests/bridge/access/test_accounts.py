@@ -11,8 +11,9 @@ import pytest
 
 from lupin_bridge.access import people as people_module
 from lupin_bridge.access.accounts import SESSION_S, Accounts, Audited, digest
-from lupin_bridge.access.people import ATTEMPT_BURST, MAX_WAITING, People, PeopleBusy
-from lupin_bridge.access.person import AccountError, Person, check_password
+from lupin_bridge.access.credentials import AccountError, Person, check_password
+from lupin_bridge.access.people import ATTEMPT_BURST, MAX_WAITING, People
+from lupin_bridge.serving.admission import ClientLimitError
 from tests.support.people import PASSWORD, TOKEN, add, changing, remove
 
 NOW = 1_800_000_000
@@ -161,15 +162,15 @@ def test_a_flood_of_sign_ins_waits_in_a_short_queue_and_an_address_has_few(
         tries = (people.check("anna", "x", str(n)) for n in range(3 * MAX_WAITING))
         found = await asyncio.gather(*tries, return_exceptions=True)
         assert found.count(None) == MAX_WAITING
-        assert sum(isinstance(it, PeopleBusy) for it in found) == 2 * MAX_WAITING
+        assert sum(isinstance(it, ClientLimitError) for it in found) == 2 * MAX_WAITING
         flood = [asyncio.ensure_future(people.check("anna", "x", f"b{n}")) for n in range(20)]
         await asyncio.sleep(0)
-        await people.note("anna", "comment", "site", "")
-        assert (await people.audited(1))[0].what == "comment"
+        await people.write(lambda it, at_s: it.note(Audited(at_s, "anna", "comment", "site", "")))
+        assert (await people.write(lambda it, _: it.audited(1)))[0].what == "comment"
         await asyncio.gather(*flood, return_exceptions=True)
         for _ in range(ATTEMPT_BURST):
             assert await people.check("anna", "x", "one address") is None
-        with pytest.raises(PeopleBusy, match="one address has failed"):
+        with pytest.raises(ClientLimitError, match="one address has failed"):
             await people.check("anna", "x", "one address")
 
     with_people(path, test)
@@ -183,8 +184,8 @@ def test_whoever_leaves_amid_a_sign_in_has_tried(path: Path) -> None:
             leaving = asyncio.create_task(people.check("anna", PASSWORD, "1"))
             await asyncio.sleep(0)
             leaving.cancel()
-            await people.audited(1)  # behind it on the thread
-        with pytest.raises(PeopleBusy, match="1 has failed"):
+            await people.write(lambda it, _: it.audited(1))  # behind it on the thread
+        with pytest.raises(ClientLimitError, match="1 has failed"):
             await people.check("anna", PASSWORD, "1")
 
     with_people(path, test)

@@ -7,8 +7,8 @@ from lupin_bridge.access.credentials import (
     MIN_TOKEN_LENGTH,
     SHARED_SESSION_S,
     Credentials,
-    TokenError,
 )
+from lupin_bridge.settings import SettingError
 
 TOKEN = "correct-horse~battery.staple/42+x="
 OURS = Credentials(TOKEN)
@@ -17,7 +17,7 @@ NOW_S = 1_700_000_000.0
 
 @pytest.mark.parametrize("token", ["", "short", "x" * (MIN_TOKEN_LENGTH - 1)])
 def test_a_short_token_is_refused_by_its_length_and_never_shown(token: str) -> None:
-    with pytest.raises(TokenError) as refused:
+    with pytest.raises(SettingError) as refused:
         Credentials(token)
     message = str(refused.value)
     assert f"LUPIN_TOKEN has {len(token)} characters" in message
@@ -28,7 +28,7 @@ def test_a_short_token_is_refused_by_its_length_and_never_shown(token: str) -> N
 @pytest.mark.parametrize("odd", [" ", "\n", "ä", '"', ";", ",", "\x00", "=x"])
 def test_a_token_that_no_header_can_carry_is_refused_and_never_shown(odd: str) -> None:
     token = f"0123456789abcdef{odd}0123456789"
-    with pytest.raises(TokenError, match="RFC 6750") as refused:
+    with pytest.raises(SettingError, match="RFC 6750") as refused:
         Credentials(token)
     assert "0123456789" not in str(refused.value)
 

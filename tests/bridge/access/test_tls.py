@@ -16,7 +16,8 @@ from cryptography.hazmat.primitives.serialization import (
     load_pem_private_key,
 )
 
-from lupin_bridge.serving.server import TlsError, check_pair
+from lupin_bridge.serving.server import check_pair
+from lupin_bridge.settings import SettingError
 from tests.support.access import BEARER, TOKEN, Served, refused_start, served
 from tests.support.processes import limits
 from tests.support.raw_ws import frames_of, handshake_request
@@ -38,7 +39,7 @@ def secure(ours: Certificate) -> Iterator[Served]:
 
 
 def refusal(cert: Path, key: Path) -> str:
-    with pytest.raises(TlsError) as refused:
+    with pytest.raises(SettingError) as refused:
         check_pair(str(cert), str(key))
     message = str(refused.value)
     assert "\n" not in message

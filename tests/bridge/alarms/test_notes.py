@@ -2,10 +2,10 @@
 
 from dataclasses import replace
 
-from lupin_bridge.alarms.notes import notes_of_alarms
+from lupin_bridge.alarms.board import notes_of_alarms
 from lupin_bridge.judge.episodes import Alarm
 from lupin_bridge.judge.verdict import Kind, Reason, Verdict
-from lupin_bridge.stream.health_json import alarm_json
+from lupin_bridge.stream.state_json import alarm_json
 from lupin_twin.core.notes import ACKNOWLEDGE, SHELVE, WITHDRAW, Note
 
 NOW = 10**18

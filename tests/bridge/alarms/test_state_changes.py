@@ -1,6 +1,6 @@
 from dataclasses import replace
 
-from lupin_bridge.alarms.state_changes import writes_between
+from lupin_bridge.alarms.feed import writes_between
 from lupin_twin.core.state import Flower, Inspection, Reading, Scan, Snapshot, TwinStore
 
 NOW = 10**12

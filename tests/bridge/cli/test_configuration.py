@@ -6,13 +6,18 @@ from typing import Any, get_args
 
 import pytest
 
-from lupin_bridge.cli.configuration import (
+from lupin_bridge.settings import (
     MAX_FILE_BYTES,
+    Secrets,
+    SettingError,
+    Settings,
     settings_from,
     strange_variables,
+    table,
     take_secrets,
+    types,
+    variable,
 )
-from lupin_bridge.settings import Secrets, SettingError, Settings, table, types, variable
 from tests.support.access import TOKEN, refused_start, served
 
 

@@ -5,12 +5,10 @@ from pathlib import Path
 
 import pytest
 
-from lupin_bridge.cli.demo import (
+from lupin_bridge.cli.roles import (
     DAY_S,
     Feed,
     fill_past,
-    journal_of,
-    own_args,
     patrolled,
     since_morning_s,
     with_past,
@@ -28,8 +26,8 @@ def test_a_demo_keeps_a_journal_of_its_own_by_seed() -> None:
     for patrol_args, name in (([], "demo-seed-0"), (["--seed=3"], "demo-seed-3")):
         path = f"/state/lupin-twin/{name}.sqlite"
         args = ["--ros-args", "-p", f'journal:="{path}"', "--"]
-        assert own_args(ENV, patrol_args) == args
-        assert journal_of(ENV, patrol_args, ["--ros-args", "-p", "idw_power:=3.0"]) == Path(path)
+        feed = patrolled(ENV, patrol_args, ["--ros-args", "-p", "idw_power:=3.0"])
+        assert (feed.twin_args, feed.journal) == (args, Path(path))
 
 
 @pytest.mark.parametrize("patrol_args", [[], ["--speed=1"], ["--speed=50"], ["--speed=0.5"]])
@@ -54,19 +52,19 @@ def test_what_is_no_speed_is_left_for_the_patrol_to_refuse(speed: str) -> None:
     ],
 )
 def test_another_journal_or_none_or_another_clock_gets_no_past(ros_args: list[str]) -> None:
-    assert journal_of(ENV, [], ["--ros-args", *ros_args]) is None
+    assert patrolled(ENV, [], ["--ros-args", *ros_args]).journal is None
 
 
 def test_started_again_it_goes_on_with_the_day(tmp_path: Path) -> None:
     path = tmp_path / "demo.sqlite"
-    feed = Feed("patrol", ["lupin_patrol", "--end-with-parent", *SHORT], [], World(), path)
-    assert with_past(feed, path, SHORT) == feed, "the first time it is nine"
+    feed = Feed("patrol", ["lupin_patrol", "--end-with-parent", *SHORT], [], World(), path, SHORT)
+    assert with_past(feed) == feed, "the first time it is nine"
     [(until_ns,)] = select(path, "SELECT value FROM meta WHERE key = 'simulated_until_ns'")
     # Fifty times as fast, a day takes 28.8 s.
     for later_s, since_s in ((0.0, 0.0), (14.4, 720.0), (28.8, 0.0), (2_894.4, 720.0)):
         now_ns = int(str(until_ns)) + round(later_s * 1e9)
         assert since_morning_s(path, SHORT, now_ns) == pytest.approx(since_s, abs=1e-6)
-    again = with_past(feed, path, SHORT)
+    again = with_past(feed)
     module, since, *words = again.command
     assert [module, *words] == feed.command
     assert again == replace(feed, command=again.command)

@@ -4,14 +4,14 @@ import asyncio
 import math
 from typing import Any
 
-from lupin_bridge.feed.estimates import (
+from lupin_bridge.feed.source import TwinUnavailableError
+from lupin_bridge.stream.followers import (
     MAX_SENSORS,
     Changed,
     EstimateFollower,
     changed_of,
     sensors_of,
 )
-from lupin_bridge.feed.source import TwinUnavailableError
 from lupin_twin.core.state import Pose, Reading, Snapshot, TagState
 from lupin_twin.estimate.engine import Record, Tally
 from lupin_twin.runtime.estimates import Report, ReportRequest, TagCheck

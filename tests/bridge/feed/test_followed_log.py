@@ -5,7 +5,7 @@ import os
 import time
 from pathlib import Path
 
-from lupin_bridge.feed.followed_log import RETAINED_S, FollowedLog
+from lupin_bridge.feed.web import RETAINED_S, FollowedLog
 from lupin_twin.core.parameters import World
 from lupin_twin.core.past import NotRemembered
 from lupin_twin.journal.follow import Lot, write

@@ -14,9 +14,8 @@ import numpy as np
 import pytest
 
 from lupin_bridge.feed import past_process
-from lupin_bridge.feed.past_child import NICENESS
 from lupin_bridge.feed.past_process import MAX_PENDING, PastProcess
-from lupin_bridge.feed.query import ExportStep, Now
+from lupin_bridge.feed.query import NICENESS, ExportStep, Now
 from lupin_bridge.past.plans import Answered
 from lupin_twin.core.journal_condition import Condition, JournalState
 from lupin_twin.core.past import NotRemembered, PastRefused

@@ -2,7 +2,7 @@
 
 import pytest
 
-from lupin_bridge.feed.robot import TRAIL_POINTS, Battery, Plan, Position, Robot, RobotLog
+from lupin_bridge.feed.source import TRAIL_POINTS, Battery, Plan, Position, Robot, RobotLog
 
 S = 10**9
 

@@ -11,9 +11,9 @@ from PIL import Image
 from lupin_bridge.field import formats
 from lupin_bridge.field.formats import JSON, NPY, PNG, FieldFormat
 from lupin_bridge.judge.options import Criteria
-from lupin_bridge.judge.ranges import Ranges, Span
+from lupin_bridge.judge.quantities import Ranges, Span
 from lupin_bridge.settings import Settings
-from lupin_bridge.stream.estimate_schema import GetEstimateResponse
+from lupin_bridge.stream.followers import GetEstimateResponse
 from tests.support.estimates import an_estimate
 
 SENSORS = Criteria.of(Settings()).sensors

@@ -9,10 +9,11 @@ import pytest
 
 from lupin_bridge.access.middleware import Access
 from lupin_bridge.access.policy import Proxies
-from lupin_bridge.fleet import watching
+from lupin_bridge.fleet import source
 from lupin_bridge.fleet.app import Fleet, create_fleet_app
-from lupin_bridge.fleet.watching import Watching
+from lupin_bridge.fleet.source import Watching
 from lupin_bridge.judge.options import Criteria
+from lupin_bridge.serving.admission import Limits
 from lupin_bridge.settings import Settings
 from tests.support.archive import Archive, run
 from tests.support.fleet import fleet
@@ -100,7 +101,7 @@ def test_an_archive_that_answers_late_and_badly_is_said_once(
             await is_over.wait()
             await made.stop()
 
-    monkeypatch.setattr(watching, "_START_S", 0.5)
+    monkeypatch.setattr(source, "_START_S", 0.5)
     asyncio.run(run_against_it())
     assert len(said) == 2, said
     assert "has not answered" in said[0]
@@ -109,13 +110,13 @@ def test_an_archive_that_answers_late_and_badly_is_said_once(
 
 def test_the_overviews_routes_are_those_of_the_docs() -> None:
     settings = Settings()
-    made = Fleet(settings, Criteria.of(settings), Access())
+    made = Fleet(settings, Criteria.of(settings), Access(), Limits())
     app = create_fleet_app(made, Access(), Proxies())
     paths = {getattr(route, "path", "") for route in app.routes}
     assert paths >= FLEET_ROUTES
 
 
 def test_a_fleet_is_shown_without_ros() -> None:
-    code = "import sys, lupin_bridge.cli.fleet; print('rclpy' in sys.modules)"
+    code = "import sys, lupin_bridge.cli.serving; print('rclpy' in sys.modules)"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout == "False\n"

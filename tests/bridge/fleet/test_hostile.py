@@ -219,7 +219,7 @@ def test_a_process_that_is_killed_is_started_again_and_counted(page: Page) -> No
 def test_an_archive_that_hangs_is_said_and_goes_on(tmp_path: Path) -> None:
     with server() as own:
         archive = made(own, tmp_path / "journal", "gh2")
-        soon = constants(**{"lupin_bridge.fleet.watching:STUCK_S": 3.0})
+        soon = constants(**{"lupin_bridge.fleet.source:STUCK_S": 3.0})
         with fleet(archive, *limits(answer_timeout_s=2), *soon) as running:
             for name in SITES[:2]:
                 wait_for(lambda name=name: name in running.sites(), name)  # type: ignore[misc]

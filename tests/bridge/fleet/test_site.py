@@ -13,8 +13,8 @@ from PIL import Image
 from lupin_twin.core.past import RecentRequest, ScansRequest, SeriesRequest, WritesRequest
 from lupin_twin.field.explored import OccupancyMap, text_of
 from lupin_twin.journal.fold import state_at
-from lupin_twin.journal.follow import recent, scans, writes
 from lupin_twin.journal.queries import series
+from lupin_twin.journal.received import recent, scans, writes
 from lupin_twin.journal.retention import kept
 from lupin_twin.journal.rows import newest_of_tag
 from lupin_twin.journal.schema import SiteLog, open_reader

@@ -2,7 +2,7 @@
 
 import random
 
-from lupin_bridge.fleet.small_map import dots, svg, version
+from lupin_bridge.fleet.overview import dots, map_svg, map_version
 from lupin_bridge.judge.verdict import Health, Verdict
 from lupin_twin.core.state import Pose, TagState
 
@@ -43,7 +43,7 @@ def test_ten_thousand_tags_are_no_more_than_seven_kb() -> None:
         (chance.uniform(0, 100), chance.uniform(0, 60), chance.choice([WELL, BAD]))
         for _ in range(10_000)
     ]
-    assert len(svg(drawn(*many))) < 7_500
+    assert len(map_svg(drawn(*many))) < 7_500
 
 
 def test_a_tag_that_is_far_off_leaves_the_others_as_they_are() -> None:
@@ -53,5 +53,5 @@ def test_a_tag_that_is_far_off_leaves_the_others_as_they_are() -> None:
 
 def test_a_tag_without_a_place_is_not_drawn_and_nothing_has_no_version() -> None:
     assert dots([TagState("a")], {"a": Health(WELL)}) == ""
-    assert version("") is None
-    assert version(drawn((0.0, 0.0, WELL))) != version(drawn((0.0, 0.0, BAD)))
+    assert map_version("") is None
+    assert map_version(drawn((0.0, 0.0, WELL))) != map_version(drawn((0.0, 0.0, BAD)))

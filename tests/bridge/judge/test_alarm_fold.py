@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from lupin_bridge.alarms.board import page_of
 from lupin_bridge.judge import alarm_fold, tag_log
 from lupin_bridge.judge.alarm_fold import Follower
-from lupin_bridge.judge.daylight import ClockDay, Day
+from lupin_bridge.judge.day import ClockDay, Day
 from lupin_bridge.judge.episodes import Alarm
 from lupin_bridge.judge.options import Criteria, own_sensors
 from lupin_bridge.judge.verdict import Kind

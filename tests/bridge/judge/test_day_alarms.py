@@ -9,11 +9,10 @@ from itertools import count
 import pytest
 
 from lupin_bridge.judge.alarm_fold import Follower
-from lupin_bridge.judge.daylight import ClockDay, Day
-from lupin_bridge.judge.days import COUNTS_NS, SINCE_NS, days_of
-from lupin_bridge.judge.derived import DAILY, DAY_NS
+from lupin_bridge.judge.day import COUNTS_NS, SINCE_NS, ClockDay, Day, days_of
 from lupin_bridge.judge.episodes import Alarm
 from lupin_bridge.judge.options import Criteria, own_sensors
+from lupin_bridge.judge.quantities import DAILY, DAY_NS
 from lupin_bridge.judge.verdict import Verdict
 from lupin_twin.core.past import PastWrite, RunSpan
 from lupin_twin.core.state import Reading

@@ -3,7 +3,7 @@ import random
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lupin_bridge.judge.daylight import DayLine, Light, Turn
+from lupin_bridge.judge.day import DayLine, Light, Turn
 
 LX = {True: 900.0, False: 0.0, None: None}
 SAYS = st.sampled_from([True, False, None])

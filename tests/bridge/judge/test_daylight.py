@@ -2,7 +2,7 @@ from datetime import UTC, datetime, time, timedelta, timezone
 
 import pytest
 
-from lupin_bridge.judge.daylight import DAY_FROM_LX, ClockDay, Day, Light, judge_day
+from lupin_bridge.judge.day import DAY_FROM_LX, ClockDay, Day, Light, judge_day
 
 NOON_S = datetime(2026, 6, 1, 12, tzinfo=UTC).timestamp()
 MIDNIGHT_S = datetime(2026, 6, 1, tzinfo=UTC).timestamp()

@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lupin_bridge.judge.derived import (
+from lupin_bridge.judge.quantities import (
     DERIVED,
     dew_point_c,
     saturation_kpa,

@@ -6,9 +6,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from lupin_bridge.judge.daylight import Day
+from lupin_bridge.judge.day import Day
 from lupin_bridge.judge.judging import MAX_AT_ONCE, Judge, Judged, judge_once, silenced
-from lupin_bridge.judge.scan_interval import Patrol
+from lupin_bridge.judge.scans import Patrol
 from lupin_bridge.judge.sensors_file import parse
 from lupin_bridge.judge.verdict import Health, Kind, Reason, Verdict, judge_tag
 from lupin_twin.core.past import PastWrite, recent_of

@@ -1,7 +1,7 @@
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lupin_bridge.judge.scan_interval import LAP_INTERVALS, NO_PATROL, Patrol, Scans
+from lupin_bridge.judge.scans import LAP_INTERVALS, NO_PATROL, Patrol, Scans
 from lupin_bridge.judge.verdict import Health, Kind, Reason, Verdict, is_overdue
 
 S = 1_000_000_000

@@ -4,8 +4,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lupin_bridge.judge import scan_interval
-from lupin_bridge.judge.scan_interval import SHORTEST_NS, Stretches
+from lupin_bridge.judge import scans
+from lupin_bridge.judge.scans import SHORTEST_NS, Stretches
 
 STAMPS = st.lists(st.integers(0, 60).map(lambda n: n * SHORTEST_NS // 4), min_size=1, max_size=30)
 
@@ -45,8 +45,8 @@ def test_what_is_old_is_forgotten_and_so_many_pauses_are_kept(
     assert next(stretches.pauses()) == (2 * SHORTEST_NS, 4 * SHORTEST_NS)
     assert stretches.forget(4 * SHORTEST_NS + 1) == 4 * SHORTEST_NS + 1
     assert next(stretches.pauses()) == (4 * SHORTEST_NS, 6 * SHORTEST_NS)
-    monkeypatch.setattr(scan_interval, "MAX_PAUSES", 5)
+    monkeypatch.setattr(scans, "MAX_PAUSES", 5)
     assert stretches.forget(0) == 0
-    monkeypatch.setattr(scan_interval, "MAX_PAUSES", 4)
+    monkeypatch.setattr(scans, "MAX_PAUSES", 4)
     assert stretches.forget(0) == 6 * SHORTEST_NS
     assert len([*stretches.pauses()]) == 4

@@ -1,4 +1,4 @@
-from lupin_bridge.judge.scan_interval import LONGEST_NS, SHORTEST_NS, holds_ns, interval_ns
+from lupin_bridge.judge.scans import LONGEST_NS, SHORTEST_NS, holds_ns, interval_ns
 
 MINUTE = 60_000_000_000
 

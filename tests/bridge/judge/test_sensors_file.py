@@ -6,11 +6,10 @@ from typing import Any, get_args
 
 import pytest
 
-from lupin_bridge.judge.daylight import ClockDay
-from lupin_bridge.judge.days import TagDays
+from lupin_bridge.judge.day import ClockDay, TagDays
 from lupin_bridge.judge.episodes import TagEpisodes
 from lupin_bridge.judge.options import Criteria
-from lupin_bridge.judge.ranges import Ranges, Span
+from lupin_bridge.judge.quantities import Ranges, Span
 from lupin_bridge.judge.sensors_file import MAX_TEXT, Language, SensorsError, parse
 from lupin_twin.core.past import PastWrite
 

@@ -9,8 +9,8 @@ from typing import Any
 
 import pytest
 
-from lupin_bridge.judge.daylight import Day
-from lupin_bridge.judge.recent_scans import RecentScans
+from lupin_bridge.judge.day import Day
+from lupin_bridge.judge.scans import RecentScans
 from lupin_bridge.judge.sensors_file import parse
 from lupin_bridge.judge.verdict import Health, Kind, Verdict, judge_site, judge_tag, worst
 from lupin_twin.core.state import NO_FLOWER, Attempt, Flower, Reading, TagState

@@ -5,8 +5,7 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
-from lupin_bridge.alarms.board import AlarmBoard
-from lupin_bridge.alarms.notes import NoteBoard
+from lupin_bridge.alarms.board import AlarmBoard, NoteBoard
 from lupin_bridge.judge.options import Criteria
 from lupin_bridge.notify.channels import Channels
 from lupin_bridge.notify.destinations import Targets

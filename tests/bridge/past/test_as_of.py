@@ -11,9 +11,9 @@ import pytest
 
 from lupin_bridge.field.formats import FORMATS, JSON, PNG, FieldFormat
 from lupin_bridge.field.query import EstimateQuery, FieldQuery
-from lupin_bridge.judge.daylight import ClockDay
-from lupin_bridge.judge.derived import vapour_pressure_deficit_kpa
+from lupin_bridge.judge.day import ClockDay
 from lupin_bridge.judge.options import Criteria, own_sensors
+from lupin_bridge.judge.quantities import vapour_pressure_deficit_kpa
 from lupin_bridge.past.fields import Estimated, Field
 from lupin_bridge.past.plans import Health, OneTag, Plan, WholeState
 from lupin_bridge.query_string import read

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from lupin_bridge.judge.options import own_sensors
 from lupin_bridge.past import bodies
-from lupin_bridge.past.query import PeriodQuery
+from lupin_bridge.past.query import OfExport
 from lupin_twin.core.past import PastRow
 
 NS = 10**9
@@ -105,17 +105,21 @@ def test_numbers_are_read_back_to_the_last_bit_and_stay_numbers(value: float) ->
 @pytest.mark.parametrize(
     ("asked", "now_ns", "expected"),
     [
-        (PeriodQuery(0, 0), None, "lupin-twin.csv"),
-        (PeriodQuery(0, 0), 86_400 * NS, "lupin-twin_to_19700102T000000Z.csv"),
+        (OfExport(), None, "lupin-twin.csv"),
+        (OfExport(), 86_400 * NS, "lupin-twin_to_19700102T000000Z.csv"),
         (
-            PeriodQuery(NS, 60 * NS, tag_id="a/b", sensor_type="co2"),
+            OfExport("1", "60", tag_id="a/b", sensor_type="co2"),
             None,
             "lupin-twin_a_b_co2_from_19700101T000001Z_to_19700101T000100Z.csv",
         ),
-        (PeriodQuery(0, NS, tag_id='"; x=\r\né'), 5, "lupin-twin____x_____to_19700101T000001Z.csv"),
+        (
+            OfExport(None, "1", tag_id='"; x=\r\né'),
+            5,
+            "lupin-twin____x_____to_19700101T000001Z.csv",
+        ),
     ],
 )
 def test_the_file_is_named_by_what_is_in_it(
-    asked: PeriodQuery, now_ns: int | None, expected: str
+    asked: OfExport, now_ns: int | None, expected: str
 ) -> None:
     assert bodies.export_file_name(asked, now_ns, "csv") == expected

@@ -5,9 +5,9 @@ from dataclasses import replace
 
 import pytest
 
-from lupin_bridge.judge.derived import DAILY, DAY_NS
-from lupin_bridge.judge.derived import vapour_pressure_deficit_kpa as vpd
 from lupin_bridge.judge.options import own_sensors
+from lupin_bridge.judge.quantities import DAILY, DAY_NS
+from lupin_bridge.judge.quantities import vapour_pressure_deficit_kpa as vpd
 from lupin_bridge.past import derived
 from lupin_twin.core.past import (
     MAX_POINTS,

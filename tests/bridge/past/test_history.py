@@ -10,8 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from lupin_bridge.judge.options import own_sensors
-from lupin_bridge.past import schema
 from lupin_bridge.past.bodies import gaps, history_body
+from lupin_bridge.stream import routes_schema
 from lupin_twin.core.past import SeriesPast, SeriesRequest
 
 NS = 10**9
@@ -35,7 +35,7 @@ def buckets(width_ns: int, counts: dict[int, int], end_ns: int = 100) -> SeriesP
 def written(past: SeriesPast, asked: SeriesRequest = ASKED) -> dict[str, Any]:
     """The body as a client reads it, which has to be what the contract says."""
     text = orjson.dumps(history_body(asked, past, None, SENSORS))
-    schema.History.model_validate_json(text)
+    routes_schema.History.model_validate_json(text)
     found: dict[str, Any] = orjson.loads(text)
     return found
 

@@ -21,7 +21,6 @@ from lupin_bridge.past.plans import (
     Timeline,
     WholeState,
 )
-from lupin_bridge.past.query import PeriodQuery
 from lupin_bridge.settings import Settings
 from lupin_twin.core.history import LatestRequest
 from lupin_twin.core.journal_condition import UNKNOWN
@@ -40,7 +39,7 @@ QUESTIONS: tuple[Query, ...] = (
     replace(asked(), at_ns=5 * NS, field_format=PNG),
     replace(asked(), at_ns=5 * NS),
     History(SeriesRequest("a", "co2"), 9 * NS, CRITERIA, UNKNOWN),
-    Timeline(PeriodQuery(0, 9 * NS, 5), UNKNOWN),
+    Timeline(0, 9 * NS, 5, None, UNKNOWN),
 )
 
 
@@ -74,7 +73,7 @@ def test_a_timeline_asks_for_its_parts_one_by_one() -> None:
         needs.append(need)
         return found(need)
 
-    Timeline(PeriodQuery(0, 9 * NS, 5), UNKNOWN).look(find)
+    Timeline(0, 9 * NS, 5, None, UNKNOWN).look(find)
     assert {need.sensor_type for need in needs if isinstance(need, SeriesRequest)} == set(Event)
 
 
@@ -94,7 +93,7 @@ def test_a_large_house_and_a_large_field_cost_more_than_small_ones() -> None:
     # All that is looked up counts, and not the first of it alone.
     history = History(SeriesRequest("a", "co2"), None, CRITERIA, UNKNOWN)
     assert history.cost_s(30) < SMALL_S
-    assert Timeline(PeriodQuery(0, 0, 1, "a"), UNKNOWN).cost_s(30) > SMALL_S
+    assert Timeline(0, 0, 1, "a", UNKNOWN).cost_s(30) > SMALL_S
     for question in QUESTIONS[:5]:
         assert json.dumps(question.cost_s(0))
 

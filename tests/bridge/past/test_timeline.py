@@ -7,13 +7,11 @@ import orjson
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lupin_bridge.past import schema
 from lupin_bridge.past.bodies import COUNTED, timeline_body, timeline_period
-from lupin_bridge.past.query import PeriodQuery
+from lupin_bridge.stream import routes_schema
 from lupin_twin.core.past import HOUR_NS, Event, Grid, SeriesPast, grid
 
 NS = 10**9
-YEAR_NS = 31_536_000 * NS
 # The runs, the period, what is counted, the silences.
 Parts = tuple[SeriesPast, Grid, dict[Event, SeriesPast], SeriesPast]
 
@@ -55,7 +53,7 @@ def parts(
 def written(given_: Parts) -> dict[str, Any]:
     """The body as a client reads it, which has to be what the contract says."""
     text = orjson.dumps(timeline_body(*given_))
-    schema.Timeline.model_validate_json(text)
+    routes_schema.Timeline.model_validate_json(text)
     found: dict[str, Any] = orjson.loads(text)
     return found
 
@@ -123,23 +121,26 @@ def test_the_runs_that_meet_the_period_are_told_and_how_far_all_of_them_reach() 
     ]
 
 
-def test_a_run_of_a_year_that_goes_on_ends_with_the_period_too() -> None:
-    for end_ns in range(YEAR_NS, YEAR_NS + 20):
-        length_s = (end_ns - 7) / NS
-        runs = SeriesPast(7, end_ns, None, (7,), (1,), (length_s,), (0.0,), (0.0,))
-        (run,) = written(parts(50 * NS, 100 * NS, runs=runs))["runs"]
-        assert run["to"] == at(100)
+def test_a_run_of_years_that_goes_on_ends_with_the_period_however_its_length_is_rounded() -> None:
+    start_ns, now_ns = 1_700_000_000 * NS, 1_795_920_785_417_813_153
+    length_s = (now_ns - start_ns) / NS
+    assert start_ns + round(length_s * NS) < now_ns
+    runs = SeriesPast(start_ns, now_ns, None, (start_ns,), (1,), (length_s,), (0.0,), (0.0,))
+    end_ns = start_ns + 100 * NS
+    assert written(parts(start_ns, end_ns, runs=runs))["runs"] == [
+        {"from": at(1_700_000_000), "to": at(1_700_000_100), "is_simulated": False}
+    ]
 
 
 def test_the_period_is_what_is_asked_for_or_all_that_there_is() -> None:
     runs = SeriesPast(7 * NS, 107 * NS)
-    assert timeline_period(PeriodQuery(0, 0, 100), runs) == Grid(7 * NS, 107 * NS, NS)
-    assert timeline_period(PeriodQuery(57 * NS, 0, 100), runs) == Grid(57 * NS, 107 * NS, NS // 2)
-    assert timeline_period(PeriodQuery(0, 57 * NS, 100), runs) == Grid(7 * NS, 57 * NS, NS // 2)
+    assert timeline_period(0, 0, 100, runs) == Grid(7 * NS, 107 * NS, NS)
+    assert timeline_period(57 * NS, 0, 100, runs) == Grid(57 * NS, 107 * NS, NS // 2)
+    assert timeline_period(0, 57 * NS, 100, runs) == Grid(7 * NS, 57 * NS, NS // 2)
     # Nobody knew when now is, and it was not later than the beginning.
-    assert timeline_period(PeriodQuery(200 * NS, 0, 100), runs).end_ns == 200 * NS
+    assert timeline_period(200 * NS, 0, 100, runs).end_ns == 200 * NS
     # Buckets that were counted before begin on whole slots.
-    month = timeline_period(PeriodQuery(NS, 30 * 86_400 * NS, 500), runs)
+    month = timeline_period(NS, 30 * 86_400 * NS, 500, runs)
     assert (month.start_ns, month.bucket_ns % HOUR_NS) == (0, 0)
 
 

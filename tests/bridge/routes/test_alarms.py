@@ -9,7 +9,6 @@ import pytest
 
 from lupin_bridge.judge.episodes import Alarm
 from lupin_bridge.judge.verdict import Kind, Reason, Verdict
-from lupin_bridge.past.query import PeriodQuery
 from lupin_bridge.routes.status import _is_in
 from lupin_bridge.stream import schema
 from tests.support.messages import look
@@ -75,11 +74,11 @@ def test_a_period_has_what_was_active_at_any_time_of_it() -> None:
     reason = Reason(Kind.PEST, Verdict.CRITICAL)
     over, still = Alarm("1", reason, "a", 20, 30), Alarm("2", reason, "a", 40)
 
-    def found(start: int, end: int, active: bool | None = None) -> list[str]:
-        is_asked = _is_in(PeriodQuery(start, end, active=active))
+    def found(start: int, end: int, active: str | None = None) -> list[str]:
+        is_asked = _is_in(start, end, active)
         return [alarm.id for alarm in (over, still) if is_asked(alarm)]
 
     assert found(0, 0) == found(30, 41) == ["1", "2"]
-    assert found(31, 41) == found(31, 0) == found(0, 0, active=True) == ["2"]
-    assert found(21, 40) == found(0, 21) == found(0, 0, active=False) == ["1"]
+    assert found(31, 41) == found(31, 0) == found(0, 0, active="1") == ["2"]
+    assert found(21, 40) == found(0, 21) == found(0, 0, active="0") == ["1"]
     assert found(0, 20) == found(31, 40) == []

@@ -10,8 +10,8 @@ import pytest
 from lupin_bridge.bridge import Bridge
 from lupin_bridge.feed.query import PastQuery
 from lupin_bridge.feed.source import TwinTimeoutError, TwinUnavailableError
-from lupin_bridge.past import schema
 from lupin_bridge.serving.admission import Limits
+from lupin_bridge.stream import routes_schema
 from lupin_twin.core.past import Event, NotRemembered, PastRefused, SeriesPast, SeriesRequest, grid
 from tests.support.inprocess import Running, running
 from tests.support.past import NS, MadeUp, look_up
@@ -39,11 +39,11 @@ async def test_a_history_is_readings_and_buckets_where_there_are_too_many(domain
     points = [(number * NS, float(number)) for number in range(100)]
     async with remembering(MadeUp(points={("7", "co2"): points})) as it:
         answer = await it.http.get(f"{HISTORY}&from=10&to=1970-01-01T00:00:20Z")
-        found = schema.History.model_validate_json(answer.content)
+        found = routes_schema.History.model_validate_json(answer.content)
         assert [reading.value for reading in found.readings] == list(map(float, range(10, 20)))
         assert (found.unit, found.from_.sec, found.to.sec) == ("ppm", 10, 20)
         answer = await it.http.get(f"{HISTORY}&from=10&to=20&points=5")
-        found = schema.History.model_validate_json(answer.content)
+        found = routes_schema.History.model_validate_json(answer.content)
         assert (found.is_bucketed, found.bucket_s, len(found.buckets)) == (True, 2.0, 5)
         assert found.buckets[0].model_dump() == {
             "start": {"sec": 10, "nanosec": 0},
@@ -70,7 +70,7 @@ async def test_a_timeline_asks_for_every_event_of_one_period(domain: int) -> Non
     past.points["7", "~scans"] = [(NS, 5.0)]
     async with remembering(past) as it:
         answer = await it.http.get("/api/timeline?points=10")
-        found = schema.Timeline.model_validate_json(answer.content)
+        found = routes_schema.Timeline.model_validate_json(answer.content)
         assert [(b.start.sec, b.scans) for b in found.buckets] == [(0, 2)]
         assert (found.bucket_s, found.reach is None, len(found.runs)) == (100.0, False, 1)
         asked = [request for request in past.asked if isinstance(request, SeriesRequest)]
@@ -79,7 +79,7 @@ async def test_a_timeline_asks_for_every_event_of_one_period(domain: int) -> Non
         # The first one says when now is; that holds for all others.
         assert [request.end_ns for request in asked] == [0, *[past.now_ns] * 6]
         answer = await it.http.get("/api/timeline?points=10&tag_id=7")
-        found = schema.Timeline.model_validate_json(answer.content)
+        found = routes_schema.Timeline.model_validate_json(answer.content)
         assert [b.scans for b in found.buckets] == [1]
 
 
@@ -104,7 +104,7 @@ async def test_events_that_come_in_five_minutes_share_one_grid_with_those_that_c
     async with remembering(past) as it:
         past.series = series  # type: ignore[method-assign]
         answer = await it.http.get("/api/timeline?from=400&to=700&points=100")
-        found = schema.Timeline.model_validate_json(answer.content)
+        found = routes_schema.Timeline.model_validate_json(answer.content)
         assert (found.from_.sec, found.to.sec, found.bucket_s) == (300, 900, 300.0)
         assert [(b.start.sec, b.scans, b.failures) for b in found.buckets] == [
             (300, 20_000, 2),

@@ -14,8 +14,8 @@ from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import ClientConnection
 
 from lupin_bridge.access.accounts import digest
-from lupin_bridge.alarms.notes import NOTE_BURST, NOTES_PER_MINUTE
-from lupin_bridge.stream import people_schema
+from lupin_bridge.alarms.board import NOTE_BURST, NOTES_PER_MINUTE
+from lupin_bridge.stream import routes_schema
 from tests.support.messages import look
 from tests.support.people import OWN, PASSWORD, TOKEN, add, remove, sign_in, signed_in, write
 from tests.support.waiting import PATIENCE_S, wait_for
@@ -57,9 +57,9 @@ def alarm(live: Bridge, tag_id: str = "a") -> str:
     return f"alarm:{found}"
 
 
-def notes(live: Bridge, **query: str) -> list[people_schema.Note]:
+def notes(live: Bridge, **query: str) -> list[routes_schema.Note]:
     answer = live.get("/api/notes", BEARER, **query)
-    return people_schema.Notes.model_validate_json(answer.content).notes
+    return routes_schema.Notes.model_validate_json(answer.content).notes
 
 
 def in_s(live: Bridge, seconds: float) -> str:
@@ -85,7 +85,7 @@ def test_with_accounts_nobody_reads_without_a_name(live: Bridge) -> None:
 
 def test_a_session_says_who_it_is_and_ends_at_the_sign_out(live: Bridge) -> None:
     with signed_in(live.url, "anna") as browser:
-        told = people_schema.Session.model_validate(browser.get("/api/session").json())
+        told = routes_schema.Session.model_validate(browser.get("/api/session").json())
         assert (told.name, told.role, told.can_write_notes) == ("anna", "operator", True)
         assert told.can_sign_out
         cookie = dict(browser.cookies)
@@ -187,7 +187,7 @@ def test_the_audit_trail_is_the_admins(live: Bridge) -> None:
         assert browser.get("/api/audit").status_code == 403
     assert live.get("/api/audit", BEARER).status_code == 403
     with signed_in(live.url, "boss") as browser:
-        found = people_schema.Audit.model_validate(browser.get("/api/audit").json()).audit
+        found = routes_schema.Audit.model_validate(browser.get("/api/audit").json()).audit
     assert (found[0].who, found[0].what, found[0].address) == ("boss", "sign in", "127.0.0.1")
     assert {(row.what, row.subject) for row in found} >= {("add account", "anna operator")}
 
@@ -203,7 +203,7 @@ def test_a_word_is_shared_with_every_browser_at_once_and_can_be_taken_back(live:
     ):
         answer = write(anna, kind="acknowledge", subject=alarm(live), text=" <b>on my way</b>\n")
         assert answer.status_code == 201, answer.text
-        note = people_schema.Note.model_validate_json(answer.content)
+        note = routes_schema.Note.model_validate_json(answer.content)
         assert (note.by, note.text, note.until) == ("anna", "<b>on my way</b>", None)
         assert alarms(live)["a"]["acknowledged_by"] == "anna"
         assert notes(live)[0] == note

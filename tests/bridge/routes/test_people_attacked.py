@@ -17,8 +17,8 @@ from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import ClientConnection
 
 from lupin_bridge.access.accounts import digest
-from lupin_bridge.routes.notes import MAX_LISTED
-from lupin_bridge.stream import people_schema
+from lupin_bridge.routes.written import MAX_LISTED
+from lupin_bridge.stream import routes_schema
 from lupin_twin.core.notes import COMMENT
 from tests.support import raw_http
 from tests.support.journal import kept
@@ -56,9 +56,9 @@ def anna(live: Bridge) -> Iterator[httpx.Client]:
         yield browser
 
 
-def notes(live: Bridge, **query: str) -> list[people_schema.Note]:
+def notes(live: Bridge, **query: str) -> list[routes_schema.Note]:
     answer = live.get("/api/notes", BEARER, **query)
-    return people_schema.Notes.model_validate_json(answer.content).notes
+    return routes_schema.Notes.model_validate_json(answer.content).notes
 
 
 def in_s(live: Bridge, seconds: float) -> str:

@@ -16,7 +16,7 @@ SPOKEN = ("en", "de", "nl", "es")
         (None, "de;q=0", "en"),
         (None, "*", "en"),
         (None, "fr,pl;q=0.9", "en"),
-        (None, ";q=1,,de;q=oops", "de"),
+        (None, ";q=1,,de;q=0.1", "de"),
         ("nl", "de", "nl"),
         ("DE-ch", "", "de"),
         # What is not spoken is not the browser's own language either.

@@ -239,7 +239,9 @@ def test_every_route_of_a_field_has_the_limit(slow: Served, route: str) -> None:
         refusal = schema.GetFieldResponse.model_validate_json(second.content)
         assert not refusal.ok
         assert (refusal.values, refusal.width, refusal.sample_count) == ([], 0, 0)
-        assert "requests more than 0.01 computed answers a second, the limit" in (refusal.error_message)
+        assert (
+            "requests more than 0.01 computed answers a second, the limit" in refusal.error_message
+        )
 
 
 def test_what_needs_no_computing_costs_no_turn(slow: Served) -> None:

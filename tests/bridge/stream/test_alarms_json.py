@@ -5,7 +5,7 @@ from lupin_bridge.judge.episodes import Alarm
 from lupin_bridge.judge.verdict import Kind, Reason, Verdict
 from lupin_bridge.stream import schema
 from lupin_bridge.stream.frames import alarms_message
-from lupin_bridge.stream.health_json import alarms_body
+from lupin_bridge.stream.state_json import alarms_body
 from tests.bridge.stream.test_frames import received
 
 NIGHT_NS = 1_000_000_000_000

@@ -2,7 +2,7 @@
 
 from lupin_msgs.srv import GetEstimate
 
-from lupin_bridge.stream.estimate_schema import GetEstimateResponse
+from lupin_bridge.stream.followers import GetEstimateResponse
 
 
 def test_the_answer_is_named_as_the_service_s() -> None:

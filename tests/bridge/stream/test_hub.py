@@ -6,9 +6,8 @@ from typing import Any
 import pytest
 
 from lupin_bridge.alarms.board import Board, page_of
-from lupin_bridge.stream.frames import FrameWriter, alarms_message
+from lupin_bridge.stream.frames import FrameWriter, Reason, Status, alarms_message
 from lupin_bridge.stream.hub import CLOSE_POLICY, Client, Hub
-from lupin_bridge.stream.status import Reason, Status
 from lupin_twin.core.state import Snapshot, TagState
 from tests.bridge.stream.test_frames import received
 from tests.support.seen import alarm

@@ -24,9 +24,9 @@ from lupin_twin.core.past import (
 )
 from lupin_twin.journal.appending import Appender
 from lupin_twin.journal.fold import state_at
-from lupin_twin.journal.follow import observed, recent, scans, writes
 from lupin_twin.journal.hours import count_rows
 from lupin_twin.journal.queries import Export, lots, newest, series
+from lupin_twin.journal.received import observed, recent, scans, writes
 from lupin_twin.journal.runs import runs, span_at
 from lupin_twin.journal.schema import SiteLog
 from tests.support.log_life import BEGUN, LATEST, MINUTE, Life, check, one_run, periods, steps

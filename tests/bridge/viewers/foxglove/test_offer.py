@@ -10,8 +10,8 @@ import pytest
 
 from lupin_bridge.feed.relay import RosTime, TwinNames, topics_of
 from lupin_bridge.feed.source import TwinUnavailableError
-from lupin_bridge.viewers import foxglove_session as module
-from lupin_bridge.viewers.foxglove_session import MAX_LAYERS, Offer
+from lupin_bridge.viewers import foxglove as module
+from lupin_bridge.viewers.foxglove import MAX_LAYERS, Offer
 from tests.support.waiting import until
 
 LAYOUT = Path(__file__).parents[4] / "backend" / "foxglove" / "lupin-twin.json"

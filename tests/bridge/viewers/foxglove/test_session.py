@@ -6,8 +6,14 @@ from typing import Any
 import pytest
 
 from lupin_bridge.feed.relay import Sample, Topic
-from lupin_bridge.viewers.foxglove_protocol import MAX_SUBSCRIPTIONS, Channel
-from lupin_bridge.viewers.foxglove_session import MAX_MESSAGE_BYTES, Counts, Reaction, Session
+from lupin_bridge.viewers.foxglove import (
+    MAX_MESSAGE_BYTES,
+    MAX_SUBSCRIPTIONS,
+    Channel,
+    Counts,
+    Reaction,
+    Session,
+)
 
 CHANNELS = {n: Channel(n, Topic(f"/topic{n}", "a/msg/B"), "int32 x\n") for n in range(1, 201)}
 

@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 import numpy as np
 import pytest
 
-from lupin_bridge.viewers.rosbridge_services import json_of
+from lupin_bridge.viewers.rosbridge_protocol import json_of
 
 
 class Stamp:

@@ -1,49 +1,55 @@
-"""What people say of alarms, tags and the greenhouse: written, withdrawn, read; and the audit."""
+"""What is written: notes of people, readings of programs, devices that want notifications.
+
+Notes are read here too, and who wrote what (the audit trail). The readings are the one route that
+leads to ROS, off unless a setting says otherwise.
+"""
 
 from __future__ import annotations
 
 import logging
+import math
 import time
 from contextlib import suppress
-from typing import Any, Final
+from typing import Final
 
 import orjson
 from fastapi import APIRouter, Request, Response
 
-from lupin_bridge.access.middleware import Access, client_of
-from lupin_bridge.access.person import AccountError, Person
-from lupin_bridge.alarms.notes import NOTE_BURST, NOTES_PER_MINUTE
+from lupin_bridge.access.accounts import Audited, Device
+from lupin_bridge.access.credentials import WRITER, AccountError, Person
+from lupin_bridge.access.middleware import OBSERVATIONS, PUSH, Access, client_of
+from lupin_bridge.alarms.board import NOTE_BURST, NOTES_PER_MINUTE
 from lupin_bridge.bridge import Bridge
 from lupin_bridge.feed.source import ELSEWHERE, TwinUnavailableError
 from lupin_bridge.judge.verdict import Verdict
+from lupin_bridge.notify.push import DeviceRefused, check_device
 from lupin_bridge.past import query as past_query
 from lupin_bridge.past.query import moment
-from lupin_bridge.query_string import parameters_of
+from lupin_bridge.past.report_page import languages
+from lupin_bridge.query_string import parameters_of, read
 from lupin_bridge.routes.answers import (
     NEVER_STORE,
     NO_TWIN,
     NOT_REMEMBERED,
-    TOO_MUCH,
     BodyRefused,
     bridge_of,
     error_response,
     json_response,
+    list_header,
     person_of,
     read_body,
     read_route,
+    refusing,
     respond,
+    taking,
 )
+from lupin_bridge.routes.pages import language_of
 from lupin_bridge.serving.admission import AdmissionError, Answer, ClientLimitError
-from lupin_bridge.stream import people_schema, schema
-from lupin_bridge.stream.health_json import note_json
-from lupin_twin.core.notes import (
-    COMMENT,
-    SHELVE,
-    WITHDRAW,
-    WITHDRAWN,
-    Note,
-    withdrawals,
-)
+from lupin_bridge.stream import routes_schema
+from lupin_bridge.stream.state_json import note_json, stamp
+from lupin_twin.adapt.config import Place
+from lupin_twin.adapt.scans import BuiltScan
+from lupin_twin.core.notes import COMMENT, SHELVE, WITHDRAW, WITHDRAWN, Note, withdrawals
 from lupin_twin.core.past import NotRemembered, PastRefused
 from lupin_twin.core.state import NANOSECONDS_PER_SECOND
 
@@ -59,34 +65,30 @@ SHELF_S: Final = 8 * 3_600
 # A page's clock may be so much ahead: it asks for an hour from its own now.
 _SLACK_S: Final = 10
 
-_WRITE_ANSWERS: Final[dict[int | str, dict[str, Any]]] = {
-    **{
-        code: {"model": schema.ErrorMessage, "description": what}
-        for code, what in {
-            400: "refused; detail has the reason",
-            403: "it takes an account with the role operator",
-            404: "there is no such alarm, tag or note",
-            405: "this bridge only reads the log",
-            503: "it was not written",
-        }.items()
-    },
-    **TOO_MUCH,
-}
+_WRITE_ANSWERS: Final = refusing(
+    {
+        400: "refused; detail has the reason",
+        403: "it takes an account with the role operator",
+        404: "there is no such alarm, tag or note",
+        405: "this bridge only reads the log",
+        429: "too many requests from this client",
+        503: "it was not written",
+    }
+)
 
 
 @read_route(
     router,
     "/api/notes",
     summary="Notes of people about alarms, tags and the greenhouse",
-    responses={200: {"model": people_schema.Notes}, **NOT_REMEMBERED},
+    responses={200: {"model": routes_schema.Notes}, **NOT_REMEMBERED},
     openapi_extra={"parameters": parameters_of(past_query.OfNotes)},
 )
 async def notes_route(request: Request) -> Response:
     """The newest first and 2,000 at most, withdrawn ones too; the same in every replica."""
     bridge = bridge_of(request)
-    asked = request.query_params.multi_items()
-    given = past_query.of_notes(asked)
-    period = past_query.period(past_query.OfNotes, asked, bridge.ros_time_ns)
+    given = read(past_query.OfNotes, request.query_params.multi_items(), PastRefused)
+    start_ns, end_ns = given.span(bridge.ros_time_ns)
     notes = _known(bridge)
 
     async def compute() -> Answer:
@@ -97,13 +99,13 @@ async def notes_route(request: Request) -> Response:
             if note.kind != WITHDRAW
             and given.kind in {None, note.kind}
             and given.subject in {None, note.subject}
-            and period.start_ns <= note.about_ns
-            and (not period.end_ns or note.about_ns < period.end_ns)
+            and start_ns <= note.about_ns
+            and (not end_ns or note.about_ns < end_ns)
         ]
         body = orjson.dumps({"notes": found[:MAX_LISTED]})
         return Answer(body, "application/json", NEVER_STORE)
 
-    return await respond(request, ("notes", bridge.notes.number, period, given), compute)
+    return await respond(request, ("notes", bridge.notes.number, given), compute)
 
 
 @router.post(
@@ -111,13 +113,8 @@ async def notes_route(request: Request) -> Response:
     summary="Acknowledge or shelve an alarm, or comment on something",
     status_code=201,
     response_class=Response,
-    responses={201: {"model": people_schema.Note}, **_WRITE_ANSWERS},
-    openapi_extra={
-        "requestBody": {
-            "required": True,
-            "content": {"application/json": {"schema": {"$ref": "#/components/schemas/NoteDraft"}}},
-        }
-    },
+    responses={201: {"model": routes_schema.Note}, **_WRITE_ANSWERS},
+    openapi_extra=taking(routes_schema.NoteDraft),
 )
 async def write_note(request: Request) -> Response:
     """By an account with the role operator. Of two words on one alarm the later one stands."""
@@ -125,7 +122,7 @@ async def write_note(request: Request) -> Response:
     person = _writer(request, bridge)
     if isinstance(person, Response):
         return person
-    draft = await read_body(request, people_schema.NoteDraft)
+    draft = await read_body(request, routes_schema.NoteDraft)
     # They may have taken their time with it.
     people = request.app.state.access.people
     if people is not None and not people.still(person):
@@ -138,7 +135,7 @@ async def write_note(request: Request) -> Response:
     "/api/notes/{note_id}",
     summary="Withdraw a note: it is kept, with who withdrew it and when",
     response_class=Response,
-    responses={200: {"model": people_schema.Note}, **_WRITE_ANSWERS},
+    responses={200: {"model": routes_schema.Note}, **_WRITE_ANSWERS},
 )
 async def withdraw_note(request: Request, note_id: str) -> Response:
     """By its author or an admin."""
@@ -192,7 +189,7 @@ def _now_ns(bridge: Bridge) -> int:
     return now_ns
 
 
-def _checked(draft: people_schema.NoteDraft, person: Person, bridge: Bridge) -> Note:
+def _checked(draft: routes_schema.NoteDraft, person: Person, bridge: Bridge) -> Note:
     """The note, if it can be one."""
     now_ns = _now_ns(bridge)
     kind, _, name = draft.subject.partition(":")
@@ -216,7 +213,7 @@ def _checked(draft: people_schema.NoteDraft, person: Person, bridge: Bridge) -> 
     return Note("", now_ns, person.name, draft.kind, draft.subject, draft.text, until_ns)
 
 
-def _until(draft: people_schema.NoteDraft, now_ns: int, *, is_critical: bool) -> int | None:
+def _until(draft: routes_schema.NoteDraft, now_ns: int, *, is_critical: bool) -> int | None:
     """When a shelf ends, or what a comment is about; None: it ends now, or is about now."""
     if draft.kind == SHELVE and "until" not in draft.model_fields_set:
         raise BodyRefused("until is missing: a moment, or null where it is not shelved any more")
@@ -266,7 +263,8 @@ async def _write(request: Request, bridge: Bridge, note: Note) -> Note:
         await bridge.notes.look()
     if access.people is not None and access.people.has_file:
         try:
-            await access.people.note(note.by, note.kind, note.subject, client_of(request))
+            done = note.by, note.kind, note.subject, client_of(request)
+            await access.people.write(lambda it, now_s: it.note(Audited(now_s, *done)))
         except (AccountError, AdmissionError) as error:
             log.warning("the note %s is not in the audit trail: %s", written.id, error)
     return written
@@ -277,9 +275,8 @@ async def _write(request: Request, bridge: Bridge, note: Note) -> Note:
     "/api/audit",
     summary="Who signed in, and who changed what",
     responses={
-        200: {"model": people_schema.Audit},
-        403: {"model": schema.ErrorMessage, "description": "it takes the role admin"},
-        503: {"model": schema.ErrorMessage, "description": "the accounts cannot be read"},
+        200: {"model": routes_schema.Audit},
+        **refusing({403: "it takes the role admin", 503: "the accounts cannot be read"}),
     },
 )
 async def audit_route(request: Request) -> Response:
@@ -287,5 +284,149 @@ async def audit_route(request: Request) -> Response:
     access, person = request.app.state.access, person_of(request)
     if person is None or not person.may("admin") or access.people is None:
         return error_response("the audit trail is for the role admin", 403)
-    found = await access.people.audited(MAX_AUDITED)
+    found = await access.people.write(lambda it, _: it.audited(MAX_AUDITED))
     return json_response(orjson.dumps({"audit": [row._asdict() for row in found]}))
+
+
+# --- readings of programs -------------------------------------------------------------------------
+
+# A clock may be so much ahead; what is dated farther is of a clock that is wrong.
+MAX_AHEAD_S: Final = 10
+
+
+@router.post(
+    OBSERVATIONS,
+    summary="Post the readings of one tag: they reach the twin over ROS, as a robot's do",
+    status_code=202,
+    response_class=Response,
+    responses={
+        202: {"model": routes_schema.PublishedObservation, "description": "published over ROS"},
+        **refusing(
+            {
+                400: "refused; detail has the reason",
+                403: "it takes a token of the role writer, and a bridge with "
+                "--http-observations on",
+                429: "too many requests from this client",
+                503: "the twin is silent",
+            }
+        ),
+    },
+    openapi_extra=taking(routes_schema.ObservationDraft),
+)
+async def post_observation(request: Request) -> Response:
+    """By a token of the role writer. The same tag at the same `observed_at` counts once.
+
+    The twin goes by its own rules: what it drops is on `/diagnostics`.
+    """
+    bridge, person = bridge_of(request), person_of(request)
+    if person is None or person.role != WRITER:
+        return error_response(
+            f"observations take a token of the role {WRITER} "
+            f"(`lupin-twin token add NAME --role {WRITER}`), as Authorization: Bearer",
+            403,
+        )
+    if not bridge.takes_observations:
+        return error_response(
+            "this bridge takes no observations: start serve or web with --http-observations on", 403
+        )
+    limits = bridge.limits
+    wait_s = bridge.observations_pace.take(person.name, time.monotonic())
+    if wait_s > 0.0:
+        raise ClientLimitError(
+            f"{person.name} has posted more than {limits.observation_burst} observations and "
+            f"{limits.observations_per_s:g} a second",
+            wait_s,
+        )
+    draft = await read_body(request, routes_schema.ObservationDraft)
+    now_ns = bridge.ros_time_ns
+    if now_ns is None or not bridge.status.is_live:
+        raise TwinUnavailableError("the twin is silent: post it again later")
+    stamp_ns = _stamp_ns(draft.observed_at, now_ns)
+    place = None if draft.place is None else Place(*draft.place)
+    scan = BuiltScan(draft.tag_id, stamp_ns, place, tuple(draft.readings.items()), "")
+    source = f"http/{person.name}"
+    await bridge.source.publish_observation(scan, source)
+    body = {"tag_id": draft.tag_id, "observed_at": stamp(stamp_ns), "source": source}
+    return json_response(orjson.dumps(body), 202)
+
+
+def _stamp_ns(observed_at: str | float | None, now_ns: int) -> int:
+    if observed_at is None:
+        return now_ns
+    text = observed_at if isinstance(observed_at, str) else f"{observed_at:.9f}"
+    stamp_ns = moment("observed_at", text)
+    ahead_s = (stamp_ns - now_ns) / NANOSECONDS_PER_SECOND
+    if ahead_s > MAX_AHEAD_S:
+        raise BodyRefused(
+            f"observed_at is {math.ceil(ahead_s)} s ahead of ROS time, the limit is "
+            f"{MAX_AHEAD_S} s: is a clock wrong?"
+        )
+    if not stamp_ns:
+        raise BodyRefused("observed_at is 0, which is no moment: leave it out for now")
+    return min(stamp_ns, now_ns)
+
+
+# --- devices of people that want notifications of critical alarms (Web Push) ----------------------
+
+
+@read_route(
+    router,
+    PUSH,
+    summary="The key that a browser subscribes to notifications with",
+    responses={200: {"model": routes_schema.PushKey}},
+)
+async def key_route(request: Request) -> Response:
+    """For people with an account, where the bridge has `--push-contact`."""
+    push, person = bridge_of(request).outward.push, person_of(request)
+    key = None
+    if push is not None and person is not None and _has_account(request, person):
+        key = await push.public_key()
+    return json_response(orjson.dumps({"public_key": key}))
+
+
+@router.post(
+    PUSH,
+    summary="Have a browser notified of critical alarms, or not any more",
+    status_code=204,
+    response_class=Response,
+    responses={
+        204: {"description": "done"},
+        **refusing(
+            {
+                400: "refused; detail has the reason",
+                403: "it takes an account",
+                404: "this bridge has no Web Push",
+                429: "too many requests from this client",
+            }
+        ),
+    },
+    openapi_extra=taking(routes_schema.PushSubscription),
+)
+async def subscribe(request: Request) -> Response:
+    """Ten browsers of an account at most: the oldest makes room."""
+    push, person = bridge_of(request).outward.push, person_of(request)
+    access: Access = request.app.state.access
+    if push is None or access.people is None:
+        return error_response("this bridge has no Web Push: start it with --push-contact", 404)
+    if person is None or not _has_account(request, person):
+        return error_response("notifications take an account: sign in by name", 403)
+    pace_note(bridge_of(request), person.name)
+    given = await read_body(request, routes_schema.PushSubscription)
+    if given.keys is None:
+        await access.people.write(lambda it, _: it.remove_device(given.endpoint, person.name))
+        return Response(status_code=204, headers=NEVER_STORE)
+    language = language_of(None, list_header(request, "accept-language"), languages())
+    device = Device(given.endpoint, given.keys.p256dh, given.keys.auth, language)
+    try:
+        check_device(device, push.target)
+    except DeviceRefused as error:
+        raise BodyRefused(str(error)) from None
+    address = client_of(request)
+    await access.people.write(lambda it, now_s: it.add_device(person.name, device, address, now_s))
+    return Response(status_code=204, headers=NEVER_STORE)
+
+
+def _has_account(request: Request, person: Person) -> bool:
+    """Not a token's or the shared token's: what they have could not be ended with an account."""
+    people = request.app.state.access.people
+    return people is not None and people.has_account(person)

@@ -1,4 +1,12 @@
-"""The channels for Foxglove's clients, and one client: its subscriptions, and what waits for it.
+"""The read-only part of Foxglove's WebSocket protocol: what came in, what goes out.
+
+A client may `subscribe` and `unsubscribe`. Whatever else the protocol has (to publish, parameters,
+services, assets, the graph) is refused with a `status` message of level error, and changes nothing:
+none of it is among the capabilities that `serverInfo` names. Payloads are CDR, schemas `ros2msg`.
+
+https://github.com/foxglove/ws-protocol/blob/main/docs/spec.md
+
+The channels for Foxglove's clients, and one client: its subscriptions, and what waits for it.
 
 Channels are a twin's topics, and the layers that somebody publishes now. They are looked up while
 there are clients, once for all of them. A slow client gets the newest message of each subscription
@@ -10,20 +18,157 @@ from __future__ import annotations
 
 import asyncio
 import logging
+import struct
 import uuid
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import partial
 from itertools import count
-from typing import Final
+from typing import Any, Final
 
-from lupin_bridge.feed.relay import Sample, Topic, TwinNames, topics_of
+import orjson
+
+from lupin_bridge.feed.relay import Sample, Topic, TwinNames, schema_text, topics_of
 from lupin_bridge.feed.source import TwinSource, TwinUnavailableError
-from lupin_bridge.message_schemas import schema_text
-from lupin_bridge.serving.ws_protocol import shown
-from lupin_bridge.viewers import foxglove_protocol as protocol
-from lupin_bridge.viewers.foxglove_protocol import MAX_SUBSCRIPTIONS, Channel, Refused
+from lupin_bridge.serving.ws_protocol import members_of, shown
+
+# Of the same content. The newer one is what Foxglove asks for today, the older one what Lichtblick
+# does; a client that offers both gets the first that it names.
+SUBPROTOCOLS: Final = ("foxglove.sdk.v1", "foxglove.websocket.v1")
+
+MAX_SUBSCRIPTIONS: Final = 128
+_MAX_ID: Final = 2**32 - 1
+
+WARNING: Final = 1
+ERROR: Final = 2
+
+_MESSAGE_DATA: Final = 1
+_TIME: Final = 2
+
+_REFUSED: Final = "refused: lupin-twin only reads, expected subscribe or unsubscribe"
+
+
+class Refused(ValueError):
+    """A message that is not served; the text names the member, the value and the limit."""
+
+
+@dataclass(frozen=True, slots=True)
+class Channel:
+    """A topic as it is offered; `id` never stands for another topic or type."""
+
+    id: int
+    topic: Topic
+    schema: str
+
+    @property
+    def json(self) -> dict[str, Any]:
+        """As in `advertise`."""
+        return {
+            "id": self.id,
+            "topic": self.topic.name,
+            "encoding": "cdr",
+            "schemaName": self.topic.type_name,
+            "schemaEncoding": "ros2msg",
+            "schema": self.schema,
+        }
+
+
+def chosen(offered: Iterable[str]) -> str | None:
+    """The first of the subprotocols that a client offers that is served here."""
+    return next((name for name in offered if name in SUBPROTOCOLS), None)
+
+
+# --- incoming ---------------------------------------------------------------------------------
+
+
+def parse(message: str | bytes) -> tuple[list[tuple[int, int]], list[int]]:
+    """Read one message: subscriptions to begin (the client's own id, the channel's), or to end.
+
+    Raises:
+        Refused: it is none that is served.
+
+    """
+    if isinstance(message, bytes):
+        raise Refused(f"a binary message is {_REFUSED}")
+    try:
+        members = members_of(message)
+    except ValueError as error:
+        raise Refused(str(error)) from None
+    op = members.get("op")
+    if op == "subscribe":
+        return [_subscription(value) for value in _list(members, "subscriptions")], []
+    if op == "unsubscribe":
+        ids = _list(members, "subscriptionIds")
+        return [], [_id("subscriptionIds", value) for value in ids]
+    if isinstance(op, str):
+        raise Refused(f"{op[:64]} is {_REFUSED}")
+    raise Refused(f"op is {shown(op)}, expected subscribe or unsubscribe")
+
+
+def _list(members: Mapping[str, Any], name: str) -> list[Any]:
+    value = members.get(name)
+    if not isinstance(value, list):
+        raise Refused(f"{name} is {shown(value)}, expected an array")
+    if len(value) > MAX_SUBSCRIPTIONS:
+        raise Refused(f"{name} has {len(value)} entries, the limit is {MAX_SUBSCRIPTIONS}")
+    return value
+
+
+def _subscription(value: Any) -> tuple[int, int]:
+    if not isinstance(value, dict):
+        raise Refused(f"an entry of subscriptions is {shown(value)}, expected an object")
+    return _id("id", value.get("id")), _id("channelId", value.get("channelId"))
+
+
+def _id(name: str, value: Any) -> int:
+    if type(value) is not int or not 0 <= value <= _MAX_ID:
+        raise Refused(f"{name} is {shown(value)}, expected an integer from 0 to {_MAX_ID}")
+    return value
+
+
+# --- outgoing ---------------------------------------------------------------------------------
+
+
+def server_info(session_id: str, *, has_time: bool) -> bytes:
+    """The first message; `session_id` is another one after a restart."""
+    return orjson.dumps(
+        {
+            "op": "serverInfo",
+            "name": "lupin-twin",
+            "capabilities": ["time"] if has_time else [],
+            "supportedEncodings": [],
+            "sessionId": session_id,
+        }
+    )
+
+
+def status(level: int, text: str) -> bytes:
+    """A message about a message, or about a channel."""
+    return orjson.dumps({"op": "status", "level": level, "message": text})
+
+
+def advertise(channels: Iterable[Channel]) -> bytes:
+    """Channels that are offered now."""
+    return orjson.dumps({"op": "advertise", "channels": [channel.json for channel in channels]})
+
+
+def unadvertise(ids: Iterable[int]) -> bytes:
+    """Channels that are offered no more."""
+    return orjson.dumps({"op": "unadvertise", "channelIds": sorted(ids)})
+
+
+def message_head(subscription_id: int, stamp_ns: int) -> bytes:
+    """What stands before the payload of a message; the payload follows in the same frame."""
+    return struct.pack("<BIQ", _MESSAGE_DATA, subscription_id, max(0, stamp_ns))
+
+
+def time(stamp_ns: int) -> bytes:
+    """Simulated time."""
+    return struct.pack("<BQ", _TIME, max(0, stamp_ns))
+
+
+# --- one client's session -------------------------------------------------------------------------
 
 log = logging.getLogger(__name__)
 
@@ -63,9 +208,9 @@ class Session:
     def receive(self, message: str | bytes) -> Reaction:
         """Take one message from the client."""
         try:
-            begun, ended = protocol.parse(message)
+            begun, ended = parse(message)
         except Refused as refused:
-            return Reaction((protocol.status(protocol.ERROR, str(refused)),))
+            return Reaction((status(ERROR, str(refused)),))
         return self._unsubscribe(ended) if ended else self._subscribe(begun)
 
     def offer(self, channels: Mapping[int, Channel]) -> Reaction:
@@ -77,9 +222,9 @@ class Session:
         new = [it for channel_id, it in channels.items() if channel_id not in self._advertised]
         replies = []
         if gone:
-            replies.append(protocol.unadvertise(gone))
+            replies.append(unadvertise(gone))
         if new or not self._advertised:
-            replies.append(protocol.advertise(new))
+            replies.append(advertise(new))
         self._advertised = dict(channels)
         ended = [key for key, channel in self._subscriptions.items() if channel.id in gone]
         for key in ended:
@@ -115,7 +260,7 @@ class Session:
     def next(self) -> tuple[bytes, bytes] | None:
         """What is to be written next, as a binary message in two parts; None: nothing waits."""
         if self._time_ns is not None:
-            head = protocol.time(self._time_ns)
+            head = time(self._time_ns)
             self._time_ns = None
             return head, b""
         if not self._waiting:
@@ -123,7 +268,7 @@ class Session:
         subscription_id = next(iter(self._waiting))
         sample = self._waiting.pop(subscription_id)
         self._counts.sent += 1
-        return protocol.message_head(subscription_id, sample.stamp_ns), sample.data
+        return message_head(subscription_id, sample.stamp_ns), sample.data
 
     def _subscribe(self, subscriptions: Iterable[tuple[int, int]]) -> Reaction:
         begun: list[tuple[int, Channel]] = []
@@ -158,8 +303,8 @@ class Session:
         if channel.id in self._too_large:
             return None  # said once
         self._too_large.add(channel.id)
-        return protocol.status(
-            protocol.WARNING,
+        return status(
+            WARNING,
             f"messages on {shown(channel.topic.name)} are left out while they are larger than "
             f"{MAX_MESSAGE_BYTES} bytes: this one has {size}",
         )
@@ -167,7 +312,7 @@ class Session:
 
 def _errors(errors: list[str]) -> tuple[bytes, ...]:
     # One for all: the answer is never longer than the request.
-    return (protocol.status(protocol.ERROR, "; ".join(errors)),) if errors else ()
+    return (status(ERROR, "; ".join(errors)),) if errors else ()
 
 
 # How often layers are looked for, s.

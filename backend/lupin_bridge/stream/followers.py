@@ -1,0 +1,311 @@
+"""What is asked of the twin now and then: what estimates are worth, what the robot says of itself.
+
+As types of the web contract (see `schema`), as JSON text, and followed on the loop.
+
+Nothing here is on the way of a frame: what was found is passed to the judge when it is there.
+"""
+
+from __future__ import annotations
+
+import logging
+import math
+from collections.abc import Callable, Mapping
+from typing import Any, Final
+
+import orjson
+from pydantic import Field
+
+from lupin_bridge.feed.shared_work import Periodic
+from lupin_bridge.feed.source import Position, Robot, RobotLog, TwinSource, TwinUnavailableError
+from lupin_bridge.stream.frames import text_frame
+from lupin_bridge.stream.hub import Hub
+from lupin_bridge.stream.schema import Contract, Time
+from lupin_bridge.stream.state_json import moment, stamp
+from lupin_twin.core.past import NotRemembered
+from lupin_twin.core.state import Snapshot
+from lupin_twin.estimate.engine import Tally
+from lupin_twin.field.engine import FieldRefused
+from lupin_twin.runtime.estimates import Report, ReportRequest
+from lupin_twin.runtime.workers import in_turns
+
+
+class GetEstimateResponse(Contract):
+    """GetEstimate's response. A refusal has `ok` false, the reason, and everything else zero."""
+
+    ok: bool
+    error_message: str
+    mean: list[float | None] = Field(description="sensor's unit, row-major, row 0 at bbox_min_y")
+    sd: list[float | None] = Field(
+        description="sensor's unit, as mean: 9 of 10 times the truth is within 1.645 sd"
+    )
+    width: int
+    height: int
+    origin_x: float
+    origin_y: float
+    resolution_used: float
+    sd_known: float = Field(description="a cell whose sd is not below this is not known")
+    sample_count: int = Field(description="tags that contribute")
+    reading_count: int = Field(description="readings that contribute")
+
+
+class Graded(Contract):
+    """New scans that were predicted without their tag, and those in the interval for 9 of 10."""
+
+    scans: int
+    inside: int
+
+
+class EstimateQuality(Contract):
+    """How often a sensor's estimates were right; a day is one of the twin's `day_length_s`."""
+
+    fitted_at: Time | None = Field(description="null: no model was fitted yet")
+    fit_problem: str = Field(description="why the last fit came to nothing; empty: it did not")
+    graded_since: Time | None = Field(description="the counts are since then; null: none yet")
+    day: Graded
+    week: Graded
+    share_day: float | None = Field(description="inside of scans; null: there are none")
+    share_week: float | None
+    is_trusted: bool | None = Field(
+        description="false: a share is under 0.8, the intervals are too narrow; null: fewer than "
+        "40 scans could be compared with other tags, so there is no claim"
+    )
+
+
+class EstimateQualities(Contract):
+    """`/api/estimate/quality`: by sensor."""
+
+    sensors: dict[str, EstimateQuality]
+
+
+class ExpectedReading(Contract):
+    """A tag's newest reading beside the prediction from all others; sensor's unit."""
+
+    measured: float
+    observed_at: Time
+    expected: float
+    expected_sd: float = Field(description="a reading's noise included")
+    z: float = Field(description="how far its last readings are off together, in sds")
+    offset: float = Field(description="by how much they are off")
+    left_out: bool = Field(
+        description="the sensor has changed: the estimate does without what it read since then"
+    )
+
+
+class ExpectedTags(Contract):
+    """`/api/estimate/tags`: what was expected of each tag with a place, as of a moment."""
+
+    sensor_type: str
+    at: Time
+    tags: dict[str, ExpectedReading]
+
+
+class AdvisedPlace(Contract):
+    """Where another tag helps; m, map frame."""
+
+    x: float
+    y: float
+    error_ratio: float = Field(
+        description="the error with a tag there, and at the places before it, without: 1"
+    )
+
+
+class Advice(Contract):
+    """`/api/estimate/advice`: where another tag helps most, the best place first."""
+
+    sensor_type: str
+    places: list[AdvisedPlace]
+
+
+# --- as JSON text --------------------------------------------------------------------------------
+
+
+def qualities(reports: Mapping[str, Report]) -> bytes:
+    """`EstimateQualities`."""
+    return orjson.dumps({"sensors": {name: _quality(one) for name, one in reports.items()}})
+
+
+def tags(sensor_type: str, report: Report) -> bytes:
+    """`ExpectedTags`; of thousands of tags it takes a while, so call it on a worker."""
+    found = {
+        tag.tag_id: {
+            "measured": tag.measured,
+            "observed_at": stamp(tag.observed_at_ns),
+            "expected": tag.expected,
+            "expected_sd": tag.expected_sd,
+            "z": tag.z,
+            "offset": tag.offset,
+            "left_out": tag.changed_since_ns is not None,
+        }
+        for tag in in_turns(report.tags)
+    }
+    return orjson.dumps({"sensor_type": sensor_type, "at": stamp(report.at_ns), "tags": found})
+
+
+def advice(sensor_type: str, report: Report) -> bytes:
+    """`Advice`."""
+    places = [{"x": one.x, "y": one.y, "error_ratio": one.error_ratio} for one in report.places]
+    return orjson.dumps({"sensor_type": sensor_type, "places": places})
+
+
+def _quality(report: Report) -> dict[str, Any]:
+    record = report.record
+    return {
+        "fitted_at": moment(report.fitted_at_ns),
+        "fit_problem": report.fit_problem,
+        "graded_since": moment(record.since_ns),
+        "day": _graded(record.day),
+        "week": _graded(record.week),
+        "share_day": record.day.share,
+        "share_week": record.week.share,
+        "is_trusted": record.is_trusted,
+    }
+
+
+def _graded(tally: Tally) -> dict[str, int]:
+    return {"scans": tally.scans, "inside": tally.inside}
+
+
+# --- every sensor's report, every few seconds -----------------------------------------------------
+
+log = logging.getLogger(__name__)
+
+# A report serves for 30 s at least (`estimate_service.REST_S`).
+PERIOD_S: Final = 15.0
+# A greenhouse has a handful of sensors; of more, the first in the alphabet.
+MAX_SENSORS: Final = 32
+
+# By tag and sensor: the reading since which it holds, ns of ROS time.
+Changed = Mapping[str, Mapping[str, int]]
+
+
+class EstimateFollower(Periodic):
+    """Fetches reports from `start` to `stop`. Belongs to the event loop.
+
+    `snapshot` gives the newest state; `on_changed` gets the tags that have changed, each time that
+    they are others than before.
+    """
+
+    def __init__(
+        self,
+        source: TwinSource,
+        snapshot: Callable[[], Snapshot | None],
+        on_changed: Callable[[Changed], None],
+        period_s: float = PERIOD_S,
+    ) -> None:
+        super().__init__(self.update, period_s, "what estimates are worth")
+        self.known: dict[str, Report] = {}
+        self._source = source
+        self._snapshot = snapshot
+        self._on_changed = on_changed
+        self._changed: Changed = {}
+
+    async def update(self) -> None:
+        """Fetch the report of each sensor, one after the other."""
+        snapshot = self._snapshot()
+        if snapshot is None:
+            return
+        known: dict[str, Report] = {}
+        for sensor in sensors_of(snapshot):
+            try:
+                known[sensor] = await self._source.estimate_report(ReportRequest(sensor))
+            except (FieldRefused, NotRemembered, TwinUnavailableError) as error:
+                log.debug("what estimates of %s are worth is not known: %s", sensor, error)
+                if sensor in self.known:
+                    known[sensor] = self.known[sensor]
+        self.known = known
+        changed = changed_of(known)
+        if changed != self._changed:
+            self._changed = changed
+            self._on_changed(changed)
+
+
+def sensors_of(snapshot: Snapshot) -> list[str]:
+    """Those that estimates can be made of, at most `MAX_SENSORS`; 2 ms for 10,000 tags."""
+    names = {
+        reading.name
+        for tag in snapshot.tags
+        if tag.pose is not None
+        for reading in tag.readings
+        if math.isfinite(reading.value)
+    }
+    return sorted(names)[:MAX_SENSORS]
+
+
+def changed_of(known: Mapping[str, Report]) -> Changed:
+    """The tags that estimates do without, by tag and sensor."""
+    changed: dict[str, dict[str, int]] = {}
+    for sensor, report in known.items():
+        for tag in report.tags:
+            if tag.changed_since_ns is not None:
+                changed.setdefault(tag.tag_id, {})[sensor] = tag.changed_since_ns
+    return changed
+
+
+# --- what the robot says of itself ----------------------------------------------------------------
+
+
+def robot_frame(now: Robot) -> bytes:
+    """`routes_schema.RobotFrame` as a WebSocket frame."""
+    return text_frame(orjson.dumps({"type": "robot", **_now(now)}))
+
+
+def robot_body(known: RobotLog) -> bytes:
+    """`routes_schema.Robot`."""
+    return orjson.dumps({**_now(known.now), "trail": [_point(it) for it in known.trail]})
+
+
+def _now(now: Robot) -> dict[str, Any]:
+    position, plan, battery = now.position, now.plan, now.battery
+    return {
+        "position": position
+        and {
+            **_point(position),
+            "heading": None if position.heading is None else round(position.heading, 3),
+        },
+        "plan": plan
+        and {
+            "points": [(round(x, 2), round(y, 2)) for x, y in plan.points],
+            "observed_at": stamp(plan.at_ns),
+        },
+        "battery": battery
+        and {"percent": round(battery.percent, 1), "observed_at": stamp(battery.at_ns)},
+    }
+
+
+def _point(at: Position) -> dict[str, Any]:
+    return {"x": round(at.x, 2), "y": round(at.y, 2), "observed_at": stamp(at.at_ns)}
+
+
+# How often the newest message of each topic is taken: no frame comes more often.
+ROBOT_PERIOD_S: Final = 1.0
+
+
+class RobotFollower(Periodic):
+    """Keeps what is known of the robot; a frame goes out when anything is another.
+
+    `now_ns()` is the twin's time, None: not known; `clock` tells seconds and never jumps. Belongs
+    to the event loop.
+    """
+
+    def __init__(
+        self,
+        source: TwinSource,
+        hub: Hub,
+        now_ns: Callable[[], int | None],
+        clock: Callable[[], float],
+    ) -> None:
+        super().__init__(self._look, ROBOT_PERIOD_S, "what the robot says of itself")
+        self.log = RobotLog()
+        self._source = source
+        self._hub = hub
+        self._now_ns = now_ns
+        self._clock = clock
+
+    async def _look(self) -> None:
+        now_ns = self._now_ns()
+        try:
+            heard = await self._source.robot(now_ns)
+        except TwinUnavailableError:  # its thread has ended, which others tell
+            return
+        if heard is not None and self.log.take(heard, now_ns):
+            self._hub.publish_robot(robot_frame(self.log.now), self._clock())

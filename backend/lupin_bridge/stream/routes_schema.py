@@ -1,0 +1,357 @@
+"""What the routes of people, of the robot and of the past carry, as types; see `schema`."""
+
+from __future__ import annotations
+
+from typing import Annotated, Final, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, StringConstraints
+
+from lupin_bridge.stream.schema import Alarm, Contract, HistoryReading, Time
+from lupin_twin.core.drops import MAX_SENSORS_PER_TAG, MAX_TEXT_LENGTH
+
+# Of a note, characters; no control character but tab and newline is in it.
+MAX_TEXT: Final = 500
+_Text = Annotated[
+    str,
+    StringConstraints(
+        max_length=MAX_TEXT, strip_whitespace=True, pattern=r"^[^\x00-\x08\x0b-\x1f\x7f-\x9f]*$"
+    ),
+]
+Role = Literal["viewer", "operator", "admin"]
+
+# A text of ROS ends at its first NUL.
+_Name = Annotated[
+    str,
+    StringConstraints(
+        min_length=1, max_length=MAX_TEXT_LENGTH, pattern=r"^[^\x00-\x1f\x7f-\x9f]*$"
+    ),
+]
+
+
+class _Given(BaseModel):
+    model_config = ConfigDict(extra="forbid", strict=True)
+
+
+class SignIn(_Given):
+    """The body of `POST /api/signin`, of an account."""
+
+    name: str
+    password: str
+    ends_others: bool = Field(default=False, description="sign this name out everywhere else")
+
+
+class _Keys(_Given):
+    p256dh: str = Field(max_length=100, description="of the browser, base64url (RFC 8291)")
+    auth: str = Field(max_length=30, description="of the browser, base64url (RFC 8291)")
+
+
+class PushSubscription(_Given):
+    """The body of `POST /api/push`: a browser's own, as its `toJSON()` gives it."""
+
+    endpoint: str = Field(max_length=1_000, description="the push service's address")
+    keys: _Keys | None = Field(default=None, description="null: notify it no more")
+    expirationTime: float | None = None  # noqa: N815  # as browsers write it
+
+
+class PushKey(Contract):
+    """`/api/push`: whether notifications can be had, and by which key."""
+
+    public_key: str | None = Field(description="base64url; null: not here, or not for them")
+
+
+class NoteDraft(_Given):
+    """The body of `POST /api/notes`."""
+
+    kind: Literal["acknowledge", "shelve", "comment"]
+    subject: str = Field(
+        max_length=300, description="`alarm:` and its id, `tag:` and its id, or `site`"
+    )
+    text: _Text = Field(default="", description=f"at most {MAX_TEXT} characters")
+    until: str | None = Field(
+        default=None,
+        max_length=64,
+        description="as `at`. Of shelve, its end; null: not any more. Of comment, the moment that "
+        "it is about; null: now",
+    )
+
+
+class ObservationDraft(_Given):
+    """The body of `POST /api/observations`: what one tag's sensors read at one moment."""
+
+    tag_id: _Name
+    readings: dict[_Name, Annotated[float, Field(allow_inf_nan=False)]] = Field(
+        min_length=1, max_length=MAX_SENSORS_PER_TAG, description="by sensor, in its own unit"
+    )
+    observed_at: str | float | None = Field(
+        default=None, description="ISO 8601 or ROS seconds, as `at`; null: now"
+    )
+    place: list[Annotated[float, Field(allow_inf_nan=False, ge=-1e6, le=1e6)]] | None = Field(
+        default=None,
+        min_length=2,
+        max_length=3,
+        description="x, y and z of the tag, m; the first place stays",
+    )
+
+
+class PublishedObservation(Contract):
+    """What was published of it."""
+
+    tag_id: str
+    observed_at: Time
+    source: str = Field(description="`http/` and the name of the token")
+
+
+class Note(Contract):
+    """What somebody wrote; it is never changed. Times are ROS time."""
+
+    id: str = Field(description="opaque")
+    kind: Literal["acknowledge", "shelve", "comment"]
+    subject: str
+    text: str
+    until: Time | None = Field(
+        description="of shelve, its end; null: not any more. Of comment, the moment that it is "
+        "about; null: `made_at`"
+    )
+    made_at: Time
+    by: str = Field(description="name of an account or of a token")
+    withdrawn_by: str | None = Field(description="null: it stands")
+    withdrawn_at: Time | None
+
+
+class Notes(Contract):
+    """`/api/notes`."""
+
+    notes: list[Note] = Field(description="newest first")
+
+
+class Session(Contract):
+    """`/api/session`: who makes the request, and whether `/api/signout` would end a session."""
+
+    can_sign_out: bool
+    seconds_left: float | None = Field(description="of the session; null: there is none")
+    name: str | None = Field(description="null: nobody that is known by name")
+    role: Role
+    can_write_notes: bool = Field(description="whether `POST /api/notes` is for them, and is here")
+
+
+class AuditRow(Contract):
+    """Who did what to what, from where, and when."""
+
+    at_s: int = Field(description="s since the epoch, by the wall's clock")
+    who: str
+    what: str
+    subject: str
+    address: str
+
+
+class Audit(Contract):
+    """`/api/audit`."""
+
+    audit: list[AuditRow] = Field(description="newest first")
+
+
+# --- the robot's layer ----------------------------------------------------------------------------
+
+
+class RobotPoint(Contract):
+    """A place of the robot's, m in the map frame, and when it was there."""
+
+    x: float
+    y: float
+    observed_at: Time = Field(description="ROS time; sec and nanosec 0: not known")
+
+
+class RobotPosition(RobotPoint):
+    """Where the robot was last."""
+
+    heading: float | None = Field(
+        description="where it faces, rad from x towards y; null: not reported"
+    )
+
+
+class RobotPlan(Contract):
+    """The way that the robot means to take."""
+
+    points: list[list[float]] = Field(
+        description="of each x and y, m in the map frame; at most 60, the last is where it ends"
+    )
+    observed_at: Time
+
+
+class RobotBattery(Contract):
+    """How full the robot's battery was."""
+
+    percent: float = Field(description="0 to 100")
+    observed_at: Time
+
+
+class RobotNow(Contract):
+    """What the robot says of itself; null: nothing that still holds."""
+
+    position: RobotPosition | None
+    plan: RobotPlan | None
+    battery: RobotBattery | None
+
+
+class RobotFrame(RobotNow):
+    """WebSocket frame: once the robot has published something; on change, at most once a second."""
+
+    type: Literal["robot"]
+
+
+class Robot(RobotNow):
+    """`/api/robot`: the same, and where the robot has been."""
+
+    trail: list[RobotPoint] = Field(
+        description="the last hour as this process received it, oldest first; at most 720 points"
+    )
+
+
+# --- the past -------------------------------------------------------------------------------------
+
+_COMPLETE_TO = Field(
+    description="all that was received before this is in the journal; null: not known"
+)
+_KEPT_FROM = Field(
+    description="from here on every single reading and event is in the journal; null: not known"
+)
+
+
+class Period(Contract):
+    """A stretch of time, `from` <= t < `to`."""
+
+    from_: Time = Field(alias="from")
+    to: Time
+
+
+class Bucket(Contract):
+    """The readings of a stretch of `bucket_s`; only finite ones count."""
+
+    start: Time
+    n: int
+    mean: float
+    min: float
+    max: float
+
+
+class History(Period):
+    """One sensor of one tag over a period: `readings`, or `buckets` where they are too many."""
+
+    tag_id: str
+    sensor_type: str
+    unit: str
+    is_bucketed: bool
+    bucket_s: float | None = Field(description="s, length of a bucket; null: these are readings")
+    readings: list[HistoryReading] = Field(description="oldest first")
+    buckets: list[Bucket] = Field(description="oldest first; one without a reading is absent")
+    gaps: list[Period] = Field(
+        description="no reading for longer than three times what is usual here: draw no line"
+    )
+    nights: list[Period] | None = Field(
+        description="nights by the clock that meet it; null: simulated, or over 400 days"
+    )
+    complete_to: Time | None = _COMPLETE_TO
+    kept_from: Time | None = _KEPT_FROM
+
+
+class TimelineBucket(Contract):
+    """What happened within `bucket_s`."""
+
+    start: Time
+    scans: int = Field(description="scans that succeeded")
+    failures: int = Field(description="scans and inspections that failed")
+    looks: int = Field(description="inspections that saw the flowers")
+    pests_seen: int = Field(description="inspections with an anomaly where the one before had none")
+    pests_cleared: int = Field(description="inspections without one where the one before had one")
+
+
+class ClockRun(Period):
+    """A run of the clock: a simulated one that starts over begins another."""
+
+    is_simulated: bool
+
+
+class Timeline(Period):
+    """What happened over a period, and what of the past is remembered at all."""
+
+    bucket_s: float = Field(description="s, length of a bucket")
+    reach: Period | None = Field(
+        description="what is remembered at all, up to the end of the period; null: nothing is"
+    )
+    buckets: list[TimelineBucket] = Field(
+        description="oldest first; one in which nothing happened is absent"
+    )
+    silences: list[Period] = Field(description="stretches without any attempt")
+    runs: list[ClockRun] = Field(description="the runs of the clock that meet this period")
+    complete_to: Time | None = _COMPLETE_TO
+    kept_from: Time | None = _KEPT_FROM
+
+
+class ReportCounts(Contract):
+    """How much happened in a period."""
+
+    raised: int = Field(description="alarms that were raised in it")
+    cleared: int = Field(description="alarms that were cleared in it")
+    active: int = Field(description="alarms that were active at its end")
+    critical: int = Field(description="of those, the critical ones")
+    notes: int
+    scans: int = Field(description="attempts at sensors that succeeded")
+    failed: int = Field(description="attempts that failed, inspections too")
+    inspections: int = Field(description="inspections that saw the flowers")
+    tags: int = Field(description="tags that were known at its end")
+    tags_scanned: int = Field(description="of those, with a scan in it")
+
+
+class ReportSilence(Period):
+    """A stretch without an attempt; a tag's does not count while the whole greenhouse paused."""
+
+    tag_id: str = Field(description="empty: the whole greenhouse")
+
+
+class ReportExtreme(Contract):
+    """The lowest or highest reading of a sensor."""
+
+    value: float
+    tag_id: str
+    stamp: Time
+
+
+class ReportSensor(Contract):
+    """The readings of a sensor, or of a quantity that is derived of each scan."""
+
+    sensor_type: str
+    unit: str
+    n: int = Field(description="plausible readings, of which the rest is")
+    failed: int = Field(description="readings that no working sensor gives")
+    mean: float | None
+    low: ReportExtreme | None
+    high: ReportExtreme | None
+
+
+class ReportLeftOut(Contract):
+    """How many entries of each list are left out."""
+
+    alarms: int
+    notes: int
+    silences: int
+    sensors: int
+    never_scanned: int
+
+
+class ShiftReport(Period):
+    """What happened between two moments, as it was known at the second one."""
+
+    counts: ReportCounts
+    alarms_from: Time = Field(
+        description="from here on alarms are worked out: `from`, unless too much was scanned"
+    )
+    alarms: list[Alarm] = Field(
+        description="active at any time of the period: first those at its end; the worst first"
+    )
+    notes: list[Note] = Field(description="newest first")
+    silences: list[ReportSilence] = Field(description="of the greenhouse, then of tags")
+    sensors: list[ReportSensor]
+    never_scanned: list[str] = Field(description="tags without a scan in the period")
+    left_out: ReportLeftOut
+    complete_to: Time | None = _COMPLETE_TO
+    kept_from: Time | None = _KEPT_FROM

@@ -8,27 +8,54 @@ from contextlib import closing
 from pathlib import Path
 from typing import Any
 
+import httpx
 import pytest
 
-from tests.support.http_answers import HOUR, T0, ask, bridges
+from tests.support.archive import Archive, forwarder, wait_until_equal
+from tests.support.fleet import fleet
+from tests.support.http_answers import HOUR, OPTIONS, T0, ask, bridges
 from tests.support.journal_answers import JOURNALS, same
+from tests.support.waiting import PATIENCE_S, wait_for
 
 
+# Of the other seven journals no HTTP answers were kept: `test_upgrade` asks those below HTTP.
 @pytest.mark.parametrize("name", ["day", "runs", "purged"])
-def test_serve_answers_as_the_old_build_did(name: str, tmp_path: Path) -> None:
+def test_serve_and_web_answer_as_the_old_build_did(name: str, tmp_path: Path) -> None:
     journal = Path(shutil.copy(JOURNALS / f"{name}.sqlite", tmp_path / "j.sqlite"))
     old = json.loads(gzip.decompress((JOURNALS / f"{name}.http.json.gz").read_bytes()))
+    # Where `web` answered otherwise.
+    of_web = {path: it for path, it in old["web"] if not web_knew_less(path)}
     different = []
-    with bridges(journal) as (serve, _):
-        for path, right in old["serve"]:
-            found = ask(serve, path)
-            if found[0] == right[0] == 400:
-                continue  # what is refused is; in which words is no contract
-            if path == "/api/sensors":
-                continue  # the file that was handed in: what is derived says of what, since then
-            if not same(known(plain(path, found), plain(path, right)), plain(path, right)):
-                different.append(path)
+    with bridges(journal) as (serve, web):
+        for bridge, others in ((serve, {}), (web, of_web)):
+            for path, of_serve in old["serve"]:
+                found, right = ask(bridge.http, path), others.get(path, of_serve)
+                if found[0] == right[0] == 400:
+                    continue  # what is refused is; in which words is no contract
+                if path == "/api/sensors":
+                    continue  # the file handed in: what is derived says of what, since then
+                if not same(known(plain(path, found), plain(path, right)), plain(path, right)):
+                    different.append(path)
     assert [path for path in different if not is_another(name, path)] == []
+
+
+def test_a_fleet_answers_of_a_site_byte_for_byte_as_its_serve(
+    tmp_path: Path, archive: Archive
+) -> None:
+    journal = Path(shutil.copy(JOURNALS / "day.sqlite", tmp_path / "j.sqlite"))
+    asked = json.loads(gzip.decompress((JOURNALS / "day.http.json.gz").read_bytes()))["serve"]
+    asked.append([f"/api/report?from={T0}&to={T0 + 24 * HOUR}", None])
+    with (
+        bridges(journal) as (serve, _),
+        forwarder(archive, journal),
+        fleet(archive, *OPTIONS) as page,
+    ):
+        wait_until_equal(archive, journal)
+        page.site(is_live=True)
+        with httpx.Client(base_url=f"{page.url}/sites/gh1", timeout=PATIENCE_S) as site:
+            wait_for(lambda: site.get("/api/alarms").status_code == 200, "its alarms")
+            different = [path for path, _ in asked if ask(site, path) != ask(serve.http, path)]
+    assert different == [], different
 
 
 def test_a_moment_is_judged_by_the_log_up_to_then_in_serve_in_web_and_after_a_restart(
@@ -40,7 +67,7 @@ def test_a_moment_is_judged_by_the_log_up_to_then_in_serve_in_web_and_after_a_re
     found = []
     for _ in range(2):
         with bridges(journal) as both:
-            found += [[ask(bridge, path) for path in asked] for bridge in both]
+            found += [[ask(bridge.http, path) for path in asked] for bridge in both]
         # As if nothing had come after that.
         with closing(sqlite3.connect(journal)) as log, log:
             for table in ("scan", "look"):
@@ -111,6 +138,14 @@ def known(found: Any, right: Any) -> Any:
     if isinstance(found, list) and isinstance(right, list) and len(found) == len(right):
         return list(map(known, found, right))
     return found
+
+
+def web_knew_less(path: str) -> bool:
+    """Whether the old `web` left something out, which it has now as `serve` has it.
+
+    It had no source of a scan, and of each tag only what it had received itself.
+    """
+    return path.startswith(("/api/export.csv", "/api/tags/"))
 
 
 def is_another(name: str, path: str) -> bool:

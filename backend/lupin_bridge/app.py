@@ -92,11 +92,11 @@ def create_app(
 
 
 _DESCRIPTION = """
-Every route answers GET and HEAD alone, but sign-in, notes and observations. Nothing here writes to
-ROS but `POST /api/observations`, which is off unless the bridge is started with it on.
+Every route answers GET and HEAD alone, but sign-in, notes, devices for notifications and
+observations. Nothing here writes to ROS but `POST /api/observations`, which is off by default.
 Positions are metres in the map frame, values are in the sensor's unit, what is not known is null.
 `/ws/state` is a WebSocket that sends `StateFrame`, `StatusFrame`, `AlarmsFrame` and `RobotFrame` as
-JSON text: the current ones at once, then every change. A bridge with a token (`LUPIN_TOKEN`) wants
+JSON text: the current ones at once, then every change. A bridge with a token (`LUPIN_TOKEN`) needs
 it as `Authorization: Bearer` with every request, `/healthz` excepted; a browser signs in at
 `/signin`.
 """

@@ -34,7 +34,7 @@ counter = partial(Described, "counter")
 METRICS: Final = {
     "lupin_clients": gauge("WebSocket clients that follow the state"),
     "lupin_clients_blocked": gauge("clients whose socket takes nothing just now"),
-    "lupin_topics_relayed": gauge("ROS topics that are listened to for viewers"),
+    "lupin_topics_relayed": gauge("ROS topics that are subscribed for viewers"),
     "lupin_ros_thread_alive": gauge("1 while the ROS thread runs"),
     "lupin_ros_calls_waiting": gauge("calls that wait for the ROS thread"),
     "lupin_twin_live": gauge("1 while the twin is live"),
@@ -46,13 +46,13 @@ METRICS: Final = {
     "lupin_alarms_active": gauge("alarms that are active"),
     "lupin_fields_computing": gauge("field requests being computed now"),
     "lupin_exports_running": gauge("exports being sent now"),
-    "lupin_journal_recording": gauge("1 while the journal keeps what is observed, as promised"),
+    "lupin_journal_recording": gauge("1 while the journal records what is observed"),
     "lupin_journal_rows_waiting": gauge("observations that are not in the journal yet"),
     "lupin_journal_behind_seconds": gauge("for how long the oldest of those has been waiting"),
     "lupin_journal_file_bytes": gauge("size of the journal on the disk"),
     "lupin_outward_connected": gauge("1 while the other side takes messages", "channel"),
     "lupin_estimate_trusted": gauge(
-        "1 while its estimates are about as often right as they say; absent while nobody knows",
+        "1 while about as many scans lie in the predicted range as should; absent: too few scans",
         "sensor",
     ),
     "lupin_estimate_fit_failing": gauge("1 while its last model could not be fitted", "sensor"),
@@ -125,7 +125,7 @@ class Metrics(Collector):
         )
         self.past_seconds = Histogram(
             "lupin_past_seconds",
-            "until a question of the past is answered, by its kind",
+            "until a request about the past is answered, by its kind",
             ["question"],
             buckets=_SECONDS,
             registry=self._registry,

@@ -11,7 +11,7 @@ from urllib.parse import parse_qs, urlsplit
 
 import pytest
 from PIL import Image, ImageStat
-from playwright.sync_api import Download, expect
+from playwright.sync_api import Download, ViewportSize, expect
 
 from tests.browser.hmi import PHONE, Hmi, OpenPage, changed_box
 from tests.browser.house import TAGS
@@ -203,6 +203,24 @@ def typical_luminance(picture: Image.Image) -> float:
     return float(ImageStat.Stat(picture.convert("L")).median[0])
 
 
+A4: ViewportSize = {"width": 702, "height": 1032}  # but for the margins, CSS pixels
+# What is shown of the page's controls, but for buttons that are content: a row, a tag, a status.
+CONTROLS = """[...document.querySelectorAll('button, input, select, summary, [role=slider]')]
+    .filter(it => it.checkVisibility({ visibilityProperty: true }))
+    .filter(it => !it.matches('thead *, .row-button, [data-tag-id], [data-health]'))
+    .map(it => it.outerHTML)"""
+# What the names of columns are drawn as: a sheet repeats a header group whose cells stay in it.
+HEAD = """[...document.querySelectorAll('.tags thead, .tags thead th')]
+    .filter(it => it.checkVisibility())
+    .map(it => getComputedStyle(it))
+    .map(it => `${it.display} ${it.position}`)"""
+# What of a cell, or of what stands in it, hides a part of its words.
+CUT = """it => [it, ...it.closest('td').querySelectorAll('*'), it.closest('td')]
+    .filter(each => getComputedStyle(each).overflow !== 'visible' && !each.matches('.unseen'))
+    .filter(each => each.scrollWidth > each.clientWidth || each.scrollHeight > each.clientHeight)
+    .map(each => each.outerHTML)"""
+
+
 def test_paper_has_every_row_says_when_and_is_light(house: Bridge, open_page: OpenPage) -> None:
     # Where the floor is most of the picture, and the coloured field is not.
     hmi = open_page(house.url, "view=2,2,20", color_scheme="dark")
@@ -217,6 +235,8 @@ def test_paper_has_every_row_says_when_and_is_light(house: Bridge, open_page: Op
     hmi.page.emulate_media(media="print")
     hmi.page.evaluate("dispatchEvent(new Event('beforeprint'))")
     expect(hmi.row("seen")).to_be_visible()
+    screen = hmi.page.viewport_size
+    hmi.page.set_viewport_size(A4)
     expect(hmi.page.get_by_role("button", name="Menu")).to_be_hidden()
     expect(hmi.page.locator(".connection")).to_be_hidden()
     moment = r"\d{1,2} \w+ \d{4}, \d\d:\d\d:\d\d"
@@ -226,6 +246,19 @@ def test_paper_has_every_row_says_when_and_is_light(house: Bridge, open_page: Op
         re.compile(rf"{taken}Temperature compared with its ideal range 18\.0 – 26\.0\s°C$")
     )
     expect(line).to_be_visible()
+    assert hmi.page.evaluate(CONTROLS) == []
+    assert set(hmi.page.evaluate(HEAD)) == {"table-header-group static", "table-cell static"}
+    # All reasons, where the screen has a line of them and how many there are besides.
+    reasons = (
+        "Vapour pressure deficit 2.70 kPa, above 2.50; 3 pests seen;"
+        " Temperature 31.0\u00a0°C, above 26.0; Humidity 40.0\u00a0%, below 50.0"
+    )
+    why = hmi.row("10").locator(".why")
+    expect(why).to_have_text(reasons, use_inner_text=True)
+    expect(why.locator(".why-count")).to_be_hidden()
+    assert why.evaluate(CUT) == []
+    assert screen is not None
+    hmi.page.set_viewport_size(screen)
     # Of a PDF each canvas must be a group of its own, or the clearing of one whitens those below.
     alone = "each => each.every(canvas => getComputedStyle(canvas).opacity === '0.999')"
     assert hmi.page.locator(".map-view canvas").evaluate_all(alone)

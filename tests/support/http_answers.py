@@ -29,23 +29,24 @@ _NOW = re.compile(r'\{"sec":1(?:7[89]|[89]\d)\d{7},"nanosec":\d+\}|later than no
 _AGE = re.compile(r'"(stale_seconds|age_s|since_s)":[-+.0-9e]+')
 
 
+# With the ranges of the build that answered first.
+OPTIONS = (
+    *("--sensors", str(Path(__file__).parents[1] / "fixtures" / "journals" / "sensors.json")),
+    *("--time-zone", "UTC", "--day-hours", "06:00-20:00"),
+    *limits(alarm_days=3_652, answers_per_s=10_000),
+)
+
+
 @contextmanager
 def bridges(journal: Path) -> Iterator[tuple[Bridge, Bridge]]:
     """`serve` on a journal, and `web` beside it."""
     with ExitStack() as stack:
         domain = stack.enter_context(own_domain())
-        # The ranges of the build that answered first.
-        sensors = Path(__file__).parents[1] / "fixtures" / "journals" / "sensors.json"
-        options = (
-            *("--sensors", str(sensors)),
-            *("--time-zone", "UTC", "--day-hours", "06:00-20:00"),
-            *limits(alarm_days=3_652, answers_per_s=10_000),
-        )
         serve = stack.enter_context(
-            lupin_twin(domain, "serve", *options, *OFTEN, "-p", f"journal:={journal}", *_KEPT)
+            lupin_twin(domain, "serve", *OPTIONS, *OFTEN, "-p", f"journal:={journal}", *_KEPT)
         )
         peer = stack.enter_context(Peer(domain))
-        web = stack.enter_context(lupin_twin(domain, "web", *options))
+        web = stack.enter_context(lupin_twin(domain, "web", *OPTIONS))
         found = [stack.enter_context(attached(process, peer)) for process in (serve, web)]
         for bridge in found:
             wait_until_ready(bridge)
@@ -57,9 +58,9 @@ def _remembers(bridge: Bridge) -> bool:
     return bridge.http.get(f"/api/state?at={T0}").status_code == 200
 
 
-def ask(bridge: Bridge, path: str) -> list[Any]:
+def ask(http: httpx.Client, path: str) -> list[Any]:
     """[status, media type, body] of an answer, of any but texts the body in base64."""
-    response = bridge.http.get(path)
+    response = http.get(path)
     kind = response.headers.get("content-type", "")
     if not kind.startswith(("text/", "application/json")):
         return [response.status_code, kind, base64.b64encode(response.content).decode()]

@@ -13,10 +13,9 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any, Final
 
-from lupin_twin.core.past import SeriesRequest, WritesRequest
+from lupin_twin.core.past import SeriesRequest
 from lupin_twin.journal.fold import state_at
 from lupin_twin.journal.queries import rows, series
-from lupin_twin.journal.received import writes
 
 JOURNALS: Final = Path(__file__).parents[1] / "fixtures" / "journals"
 NAMES: Final = sorted(path.stem for path in JOURNALS.glob("*.sqlite"))
@@ -56,17 +55,10 @@ def _export(connection: sqlite3.Connection, *arguments: Any) -> Any:
     return [list(asdict(row).values()) for lot in rows(connection, *arguments) for row in lot]
 
 
-def _writes(connection: sqlite3.Connection) -> Any:
-    """All of them; a write's number is that of its file."""
-    found = writes(connection, WritesRequest(0, 5_000)).writes
-    return [[value for name, value in asdict(write).items() if name != "number"] for write in found]
-
-
 _ANSWERS: dict[str, Callable[..., Any]] = {
     "state": _state,
     "series": _series,
     "export": _export,
-    "writes": _writes,
 }
 
 

@@ -317,7 +317,7 @@ class AccessControl:
             return _Refusal(
                 429,
                 f"{client} has sent more than {GUESS_BURST} wrong tokens and {GUESSES_PER_MINUTE} "
-                "a minute: no token is looked at until Retry-After",
+                "a minute: no token is checked until Retry-After",
                 {"retry-after": str(math.ceil(wait_s))},
             )
         scheme, _, token = header.partition(" ")

@@ -162,7 +162,7 @@ class People:
         wait_s = self._attempts.wait_s(address, time.monotonic())
         if wait_s > 0.0:
             raise ClientLimitError(
-                f"{address} has tried to sign in in vain more than {ATTEMPT_BURST} times and "
+                f"{address} has failed to sign in more than {ATTEMPT_BURST} times and "
                 f"{ATTEMPTS_PER_MINUTE} a minute: try again in {math.ceil(wait_s)} s",
                 wait_s,
             )

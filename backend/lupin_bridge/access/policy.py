@@ -280,8 +280,9 @@ class AccessPolicy:
             how = headers.get("sec-fetch-mode"), headers.get("sec-fetch-dest")
             if site in ("cross-site", "same-site") and how != ("navigate", "document"):
                 return Decision(
-                    "a page of another origin asks without naming itself: load it in CORS mode "
-                    "(<img crossorigin>, or fetch) and start the bridge with --allow-origin for it"
+                    "a page of another origin sends a request without naming itself: load it in"
+                    " CORS mode (<img crossorigin>, or fetch) and start the bridge with"
+                    " --allow-origin for it"
                 )
         elif referer and not wants_page:
             return self._judge_origin("/".join(referer.split("/", 3)[:3]), own)

@@ -280,7 +280,7 @@ class Forwarder:
         except ArchiveError as error:
             if str(error) != self._told:
                 self._told = str(error)
-                again = "" if once else "; it is tried again and again"
+                again = "" if once else "; it will be retried"
                 self._say(f"site {self._site} is not forwarded: {error}{again}")
             return True
         return False

@@ -137,7 +137,7 @@ def _act(options: argparse.Namespace, connection: Any, place: str) -> int:
         tell(*(f"deleted {line}" for line in gone or ["nothing"]))
         return 0
     wrong = check(connection)
-    tell(*wrong, f"{place} is {'wrong in what is told above' if wrong else 'whole'}")
+    tell(*wrong, f"{place} is {'wrong as stated above' if wrong else 'whole'}")
     return FAILED if wrong else 0
 
 

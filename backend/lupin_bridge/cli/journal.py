@@ -43,7 +43,7 @@ from lupin_twin.runtime.process import INTERRUPTED
 ACTIONS: Final[Mapping[str, str]] = {
     "info": "what is in it: size, rows, tags, sensors, how far back, runs of the clock",
     "check": "read all of it for damage; exit code 1 if there is any",
-    "export": "its readings and failed tries as CSV, or its observations as a recording",
+    "export": "its readings and failed attempts as CSV, or its observations as a recording",
     "backup": "copy it to a new file, also while its twin writes",
     "forget": "forget a tag, or its place alone, so that it is pinned anew; stop its twin first",
     "vacuum": "make a whole file as small as what is in it; its twin has to be stopped",

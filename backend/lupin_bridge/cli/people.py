@@ -47,7 +47,7 @@ from lupin_bridge.settings import (
 from lupin_twin.runtime.process import INTERRUPTED
 
 USER_ACTIONS: Final[Mapping[str, str]] = {
-    "add": "add an account; its password is asked for, or in a file",
+    "add": "add an account; the command prompts for the password, or reads it from a file",
     "list": "all accounts, with their roles",
     "remove": "remove an account; its sessions end",
 }
@@ -159,7 +159,7 @@ def _password(options: argparse.Namespace) -> str:
         if getpass.getpass("The same again: ") != password:
             raise AccountError("the two passwords are not the same")
     else:
-        raise AccountError("there is no terminal to ask for the password: use --password-file")
+        raise AccountError("there is no terminal to enter the password: use --password-file")
     check_password(password)
     return password
 

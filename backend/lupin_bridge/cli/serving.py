@@ -222,4 +222,4 @@ def _report_error(url: str) -> None:
         with closing(open_archive(url, "lupin-twin fleet")):
             pass
     except ArchiveError as error:
-        log.error("%s; it is tried again and again", error)  # noqa: TRY400  # one line
+        log.error("%s; it will be retried", error)  # noqa: TRY400  # one line

@@ -1,4 +1,4 @@
-"""The parent's end of the process that looks back (`query.Child`): started, asked, ended.
+"""The parent's end of the process that reads the past (`query.Child`): started, asked, ended.
 
 Belongs to the event loop. A process that dies is logged, its questions are answered with that, and
 the next one is started for the first question after a rest.
@@ -56,7 +56,7 @@ class PastProcess:
 
     async def stop(self) -> None:
         """End it; what is being asked has no answer."""
-        self.why_down = "the process that looks back is ending"
+        self.why_down = "the process that reads the past is ending"
         await end(self._life)
         self._refuse_all()
 
@@ -71,7 +71,7 @@ class PastProcess:
         if self.why_down:
             raise _passing(self.why_down)
         if len(self.asked) >= MAX_PENDING:
-            raise _passing(f"{MAX_PENDING} questions about the past are under way, the limit")
+            raise _passing(f"{MAX_PENDING} requests about the past are under way, the limit")
         packer = _Packer()
         packer.dump((question, now, cost_s))
         number = next(self._numbers)
@@ -114,10 +114,10 @@ class PastProcess:
         except OSError as error:
             ended = f"cannot be started: {error}"
         except Exception as error:  # or nobody would ever be answered again
-            log.exception("the process that looks back met an error here")
+            log.exception("the process that reads the past met an error here")
             ended = f"met an error: {error}"
-        log.error("the process that looks back %s", ended)
-        self.why_down = f"the process that looks back {ended}; it is about to be started again"
+        log.error("the process that reads the past %s", ended)
+        self.why_down = f"the process that reads the past {ended}; it is about to be started again"
         self._refuse_all()
         await asyncio.sleep(REST_S)
         self._life, self.why_down = None, ""

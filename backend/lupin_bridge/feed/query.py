@@ -1,6 +1,6 @@
 """Questions about the past as values, so that another process may answer them.
 
-The process that looks back: reads the journal, makes answers, and ends with its parent. Questions
+It reads the journal, makes answers, and ends with its parent. Questions
 come in on standard input, and their answers go out on standard output, finished: whatever they
 take, they take no turn of the parent's interpreter. It loads no ROS.
 """
@@ -122,7 +122,7 @@ class ExportStep(Generic[ResultT]):
         return pickle.dumps(export, 5), [self.write(lot) for lot in lots(rows)]
 
 
-# --- the process that looks back ------------------------------------------------------------------
+# --- the process that reads the past --------------------------------------------------------------
 
 # Before each answer: its number, and how long its pickle is.
 HEAD: Final = struct.Struct(">QQ")
@@ -248,7 +248,7 @@ def _portable(error: BaseException) -> BaseException:
     except Exception:  # noqa: BLE001  # there are those that cannot be made again
         portable = RuntimeError(repr(error))
     trace = "".join(traceback.format_exception(error))
-    portable.add_note(f"in the process that looks back:\n{trace}")
+    portable.add_note(f"in the process that reads the past:\n{trace}")
     return portable
 
 

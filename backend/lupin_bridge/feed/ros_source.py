@@ -418,7 +418,7 @@ class RosSource(TwinSource, Generic[NodeT]):
         self.rules, self.buffer_len = FieldRules.of(parameters), parameters.buffer_len
 
     async def stop(self) -> None:
-        """Stop the ROS thread, the workers and the process that looks back."""
+        """Stop the ROS thread, the workers and the process that reads the past."""
         self.workers.close()
         await asyncio.gather(self.past.stop(), self.thread.stop())
 

@@ -364,7 +364,7 @@ class TwinSource(ABC):
         sensor_type: str | None,
         write: Callable[[Sequence[PastRow]], ResultT],
     ) -> AsyncGenerator[ResultT]:
-        """Every reading and failed try of a period, at the pace of whoever takes them.
+        """Every reading and failed attempt of a period, at the pace of whoever takes them.
 
         They come in lots, each through `write`, which is called in another process. None: all tags,
         all sensors.
@@ -399,7 +399,7 @@ async def exported(
 ) -> AsyncGenerator[ResultT]:
     """The rows of a period, lot by lot through `write`; the next ones are asked for as it is taken.
 
-    `ask` asks the process that looks back.
+    `ask` asks the process that reads the past.
     """
     export: bytes | None = pickle.dumps(period)
     while export is not None:

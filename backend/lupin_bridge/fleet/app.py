@@ -227,9 +227,9 @@ class Fleet:
         is_reachable = watching.archive.is_reachable
         yield "lupin_fleet_sites_live", "sites that are live", live if is_reachable else 0
         yield "lupin_fleet_archive_reachable", "1 while the archive answers", is_reachable
-        yield "lupin_fleet_looks", "looks at the archive since the start", watching.looks
+        yield "lupin_fleet_looks", "queries of the archive for changes", watching.looks
         starts = watching.starts
-        yield "lupin_fleet_watcher_starts", "starts of the process that looks at it", starts
+        yield "lupin_fleet_watcher_starts", "starts of the process that makes these queries", starts
         starts = self.past.starts
         yield "lupin_fleet_reader_starts", "starts of the process that reads sites", starts
         yield "lupin_fleet_sites_open", "sites whose page is open here", len(self.pages)

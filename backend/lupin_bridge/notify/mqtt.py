@@ -251,7 +251,7 @@ class Mqtt:
         self.condition.failing(f"{why} ({self._target.called})")
         problem = self.condition.detail
         if problem != before:
-            log.warning("MQTT: %s; it is tried again", problem)
+            log.warning("MQTT: %s; it will be retried", problem)
         # So that what changes meanwhile is seen to wait.
         self._see()
         self._count()

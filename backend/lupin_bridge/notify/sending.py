@@ -223,7 +223,7 @@ async def until_taken(
                 log.error("%s was not taken and is given up: %s", what, why)  # noqa: TRY400
                 return False
             if condition.detail != before:
-                log.warning("%s was not taken, and is tried again: %s", what, condition.detail)
+                log.warning("%s was not taken, and will be retried: %s", what, condition.detail)
             await asyncio.sleep(max(backoff.wait_s(), min(error.retry_after_s, backoff.most_s)))
         else:
             if condition.detail:

@@ -77,7 +77,7 @@ def compact(stamp_ns: int) -> str:
 
 Parameters = Sequence[tuple[str, str]]
 
-_FROM: Final = f"{MOMENT}; default: the oldest that is kept"
+_FROM: Final = f"{MOMENT}; default: the oldest in the journal"
 _TO: Final = "as `from`; this moment itself is not in the period; default: now"
 _POINTS: Final = "at most so many readings or buckets"
 _ONE_TAG: Final = "one tag alone; default: all"

@@ -33,7 +33,7 @@ from lupin_twin.core.past import NotRemembered, PastRefused
 from lupin_twin.runtime.workers import SMALL_S, ShouldStop
 
 NEVER_STORE: Final = {"Cache-Control": "no-store"}
-NO_TWIN: Final = "no twin has been heard yet"
+NO_TWIN: Final = "nothing has been received from a twin yet"
 # For the few kB of a body.
 BODY_S: Final = 5.0
 # nginx's "client closed request"; nobody receives it.
@@ -61,9 +61,9 @@ NOT_REMEMBERED: Final[Documented] = {
     304: {"description": "the ETag still holds"},
     **refusing(
         {
-            400: "refused; detail says why",
-            404: "nothing of the past is kept here",
-            429: "this client asks for too much",
+            400: "refused; detail has the reason",
+            404: "there is no journal, so no past",
+            429: "too many requests from this client",
             503: "it cannot be read now, or too much is",
             504: "it took too long",
         }

@@ -68,14 +68,14 @@ def _content(media_type: str) -> dict[str, Any]:
 @read_route(
     router,
     "/api/export.csv",
-    summary="Every reading and failed try of a period, as CSV",
+    summary="Every reading and failed attempt of a period, as CSV",
     responses={200: _content(CSV.media_type), **_ANSWERS},
     openapi_extra={"parameters": parameters_of(query.OfExport)},
 )
 async def csv_route(request: Request) -> Response:
-    """A row for each reading, and one without a sensor for each try that brought none.
+    """A row for each reading, and one without a sensor for each attempt that brought none.
 
-    It is streamed: one that does not end as HTTP says it must (the last chunk) is not whole.
+    It is streamed: one without HTTP's last chunk is not whole.
     """
     return await _of_site(request, CSV)
 

@@ -70,8 +70,8 @@ class InFormats:
         """What stands in the way of an answer, for the OpenAPI document."""
         return {
             304: {"description": "the ETag still holds"},
-            400: {"model": self.model, "description": "refused; error_message says why"},
-            429: {"model": self.model, "description": "this client asks for too much"},
+            400: {"model": self.model, "description": "refused; error_message has the reason"},
+            429: {"model": self.model, "description": "too many requests from this client"},
             404: NOT_REMEMBERED[404],
             **refusing(
                 {503: "the twin is not there, or busy", 504: "the twin did not answer in time"}
@@ -99,7 +99,7 @@ class InFormats:
         @read_route(
             router,
             f"/api/{self.name}",
-            summary=f"{self.summary}, in the format that Accept asks for",
+            summary=f"{self.summary}, in the format of the header Accept",
             description=self.description,
             responses={
                 200: {
@@ -263,9 +263,9 @@ _WRITE_TAG_S: Final = 10e-6
     openapi_extra={"parameters": parameters_of(QualityQuery)},
 )
 async def quality(request: Request) -> Response:
-    """Each new scan is held against what all but its own tag, and those beside it, say of it.
+    """Each new scan is compared with the prediction from all tags but its own and those beside it.
 
-    So it tells how right the estimate is between tags: 9 of 10 are to lie inside. Counts are by
+    So it shows how right the estimate is between tags: 9 of 10 are to lie inside. Counts are by
     the hour, over the last day and week, since the twin was started.
     """
 

@@ -250,7 +250,7 @@ async def sign_in(request: Request) -> Response:
     """
     people, person = _access_of(request).people, person_of(request)
     if people is None or not people.is_on:
-        return error_response("this bridge asks for no token: there is nothing to sign in to", 404)
+        return error_response("this bridge needs no token: there is nothing to sign in to", 404)
     address, ends_others = client_of(request), False
     if "authorization" not in request.headers:
         if not people.has_file:  # a session must not renew itself
@@ -280,7 +280,7 @@ async def sign_out(request: Request) -> Response:
     """End the session that the request comes with, and everything that it has open."""
     people, person = _access_of(request).people, person_of(request)
     if people is None or person is None:
-        return error_response("this bridge asks for no token: there is nothing to sign out of", 404)
+        return error_response("this bridge needs no token: there is nothing to sign out of", 404)
     response = Response(status_code=204, headers=NEVER_STORE)
     if person.session:
         response.delete_cookie(

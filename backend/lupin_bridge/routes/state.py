@@ -126,11 +126,11 @@ async def state(request: Request) -> Response:
 @read_route(
     router,
     "/api/tags/{tag_id:path}/history",
-    summary="The last scans and tries of one tag",
+    summary="The last scans and attempts of one tag",
     responses={200: {"model": schema.TagHistory}, **NOT_REMEMBERED, **_NO_TAG},
 )
 async def history(request: Request, tag_id: str) -> Response:
-    """The tag's last scans that brought readings, sensor by sensor, and its last tries."""
+    """The tag's last scans that brought readings, sensor by sensor, and its last attempts."""
     bridge = bridge_of(request)
     newest = None if bridge.latest is None else _tag_of(bridge.latest.snapshot, tag_id)
     query = LatestOfTag(tag_id, newest, bridge.source.buffer_len)
@@ -197,7 +197,7 @@ async def history_route(request: Request) -> Response:
 @read_route(
     router,
     "/api/timeline",
-    summary="What happened when: scans, failures, looks, pests, silences, runs of the clock",
+    summary="What happened when: scans, failures, inspections, pests, silences, runs of the clock",
     responses={200: {"model": routes_schema.Timeline}, **NOT_REMEMBERED},
     openapi_extra={"parameters": parameters_of(past_query.OfTimeline)},
 )

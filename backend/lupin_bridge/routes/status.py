@@ -107,7 +107,7 @@ _NO_MAP = {
     **refusing(
         {
             404: "no map has come yet",
-            429: "this client asks for too much",
+            429: "too many requests from this client",
             503: "the twin is not there, or busy",
         }
     ),
@@ -170,7 +170,7 @@ async def _map(request: Request, kind: str) -> Response:
     responses={200: {"model": routes_schema.Robot}},
 )
 async def robot(request: Request) -> Response:
-    """As the robot's own topics say it, of now alone: the journal has nothing of it."""
+    """From the robot's own topics, of now only: the journal does not hold it."""
     known = bridge_of(request).robot.log
 
     async def compute() -> Answer:
@@ -199,7 +199,7 @@ async def health(request: Request) -> Response:
     """The verdicts that stand in the frames of `/ws/state`, with the reasons for each.
 
     As of a moment that has passed, what was known then is judged by the ranges of now, and by the
-    scans of each tag up to then; a reason's `since` is the observation of then that says so.
+    scans of each tag up to then; a reason's `since` is the first observation with it.
     """
     bridge = bridge_of(request)
     at_ns = past_query.at(request.query_params.multi_items(), bridge.ros_time_ns)

@@ -67,11 +67,11 @@ _SLACK_S: Final = 10
 
 _WRITE_ANSWERS: Final = refusing(
     {
-        400: "refused; detail says why",
+        400: "refused; detail has the reason",
         403: "it takes an account with the role operator",
         404: "there is no such alarm, tag or note",
         405: "this bridge only reads the log",
-        429: "this client asks for too much",
+        429: "too many requests from this client",
         503: "it was not written",
     }
 )
@@ -80,7 +80,7 @@ _WRITE_ANSWERS: Final = refusing(
 @read_route(
     router,
     "/api/notes",
-    summary="What people said of alarms, tags and the greenhouse",
+    summary="Notes of people about alarms, tags and the greenhouse",
     responses={200: {"model": routes_schema.Notes}, **NOT_REMEMBERED},
     openapi_extra={"parameters": parameters_of(past_query.OfNotes)},
 )
@@ -303,10 +303,10 @@ MAX_AHEAD_S: Final = 10
         202: {"model": routes_schema.PublishedObservation, "description": "published over ROS"},
         **refusing(
             {
-                400: "refused; detail says why",
+                400: "refused; detail has the reason",
                 403: "it takes a token of the role writer, and a bridge with "
                 "--http-observations on",
-                429: "this client asks for too much",
+                429: "too many requests from this client",
                 503: "the twin is silent",
             }
         ),
@@ -393,10 +393,10 @@ async def key_route(request: Request) -> Response:
         204: {"description": "done"},
         **refusing(
             {
-                400: "refused; detail says why",
+                400: "refused; detail has the reason",
                 403: "it takes an account",
                 404: "this bridge has no Web Push",
-                429: "this client asks for too much",
+                429: "too many requests from this client",
             }
         ),
     },

@@ -203,7 +203,7 @@ class Admission:
         if wait_s > 0.0:
             self.refused[RATE] += 1
             raise ClientLimitError(
-                f"{client} asks for more than {self._limits.answers_per_s:g} computed answers a "
+                f"{client} requests more than {self._limits.answers_per_s:g} computed answers a "
                 "second, the limit",
                 wait_s,
             )

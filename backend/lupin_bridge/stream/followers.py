@@ -67,7 +67,7 @@ class EstimateQuality(Contract):
     share_week: float | None
     is_trusted: bool | None = Field(
         description="false: a share is under 0.8, the intervals are too narrow; null: fewer than "
-        "40 scans could be held against other tags, so nothing is said"
+        "40 scans could be compared with other tags, so there is no claim"
     )
 
 
@@ -78,7 +78,7 @@ class EstimateQualities(Contract):
 
 
 class ExpectedReading(Contract):
-    """A tag's newest reading beside what all others say of it; sensor's unit."""
+    """A tag's newest reading beside the prediction from all others; sensor's unit."""
 
     measured: float
     observed_at: Time

@@ -64,7 +64,7 @@ _MESSAGES: dict[Reason, str] = {
     "known. Check the simulation.",
     "clock_doubted": "The twin's clock contradicts its journal. Ages are not known. Set the clock; "
     "after ten minutes it is believed as it is.",
-    "never_seen": "No twin has been heard yet. Start it, or check ROS_DOMAIN_ID.",
+    "never_seen": "Nothing has been received from a twin yet. Start it, or check ROS_DOMAIN_ID.",
     "stale": "The twin has fallen silent. Check that its process runs and is reachable.",
     "thread_dead": "The bridge's ROS thread has ended. Restart the bridge.",
     "shutting_down": "The bridge is shutting down.",

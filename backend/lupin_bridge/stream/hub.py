@@ -223,7 +223,7 @@ class Hub:
         """
         if len(message) >= LARGE_BYTES and client in self._clients:
             for slowest in self.unsent.hold(client, message):
-                self.turn_out(slowest, "slow to take what it asked for, and others need the memory")
+                self.turn_out(slowest, "slow to take what it requested, and others need the memory")
 
     def is_free(self, client: Client) -> None:
         """A client's socket has taken everything."""

@@ -102,7 +102,7 @@ class PublishedObservation(Contract):
 
 
 class Note(Contract):
-    """What somebody said; it is never changed. Times are ROS time."""
+    """What somebody wrote; it is never changed. Times are ROS time."""
 
     id: str = Field(description="opaque")
     kind: Literal["acknowledge", "shelve", "comment"]
@@ -165,7 +165,7 @@ class RobotPosition(RobotPoint):
     """Where the robot was last."""
 
     heading: float | None = Field(
-        description="where it faces, rad from x towards y; null: it does not say"
+        description="where it faces, rad from x towards y; null: not reported"
     )
 
 
@@ -194,7 +194,7 @@ class RobotNow(Contract):
 
 
 class RobotFrame(RobotNow):
-    """WebSocket frame: once the robot has said something; on change, at most once a second."""
+    """WebSocket frame: once the robot has published something; on change, at most once a second."""
 
     type: Literal["robot"]
 
@@ -203,7 +203,7 @@ class Robot(RobotNow):
     """`/api/robot`: the same, and where the robot has been."""
 
     trail: list[RobotPoint] = Field(
-        description="the last hour as this process heard it, oldest first; at most 720 points"
+        description="the last hour as this process received it, oldest first; at most 720 points"
     )
 
 
@@ -213,7 +213,7 @@ _COMPLETE_TO = Field(
     description="all that was received before this is in the journal; null: not known"
 )
 _KEPT_FROM = Field(
-    description="from here on every single reading and event is kept; null: not known"
+    description="from here on every single reading and event is in the journal; null: not known"
 )
 
 
@@ -258,11 +258,11 @@ class TimelineBucket(Contract):
     """What happened within `bucket_s`."""
 
     start: Time
-    scans: int = Field(description="tries at sensors that succeeded")
-    failures: int = Field(description="tries that failed, looks too")
-    looks: int = Field(description="looks that saw the flowers")
-    pests_seen: int = Field(description="looks with an anomaly where the look before had none")
-    pests_cleared: int = Field(description="looks without one where the look before had one")
+    scans: int = Field(description="scans that succeeded")
+    failures: int = Field(description="scans and inspections that failed")
+    looks: int = Field(description="inspections that saw the flowers")
+    pests_seen: int = Field(description="inspections with an anomaly where the one before had none")
+    pests_cleared: int = Field(description="inspections without one where the one before had one")
 
 
 class ClockRun(Period):
@@ -281,7 +281,7 @@ class Timeline(Period):
     buckets: list[TimelineBucket] = Field(
         description="oldest first; one in which nothing happened is absent"
     )
-    silences: list[Period] = Field(description="stretches in which nothing was tried")
+    silences: list[Period] = Field(description="stretches without any attempt")
     runs: list[ClockRun] = Field(description="the runs of the clock that meet this period")
     complete_to: Time | None = _COMPLETE_TO
     kept_from: Time | None = _KEPT_FROM

@@ -67,14 +67,14 @@ class SensorReading(Contract):
     value: float | None
     observed_at: Time | None = Field(
         default_factory=lambda: None,
-        description="ROS time; null: the twin does not tell; absent: as of the reading before it, "
-        "of the first the tag's last_observed. Its age is stale_seconds of the tag, and what "
+        description="ROS time; null: the twin does not report it; absent: as of the reading before "
+        "it, of the first the tag's last_observed. Its age is stale_seconds of the tag, and what "
         "last_observed is later",
     )
 
 
 class FlowerPoint(Contract):
-    """One flower of the latest look."""
+    """One flower of the latest inspection."""
 
     position: Point
     height_m: float | None
@@ -113,15 +113,15 @@ class TwinTagState(Contract):
     )
     last_try: Time | None = Field(
         default_factory=lambda: None,
-        description="ROS time of the latest scan or look, with success or without; null: none, or "
+        description="ROS time of the latest scan or inspection, successful or not; null: none, or "
         "not known; absent, and so are the next two: it was OK, at last_observed",
     )
     last_try_status: int | None = Field(
         default_factory=lambda: None,
-        description="of the last try, as in lupin_msgs/Observation: 0 OK, 1 unreachable, 2 scan "
-        "failed, 3 skipped; null: as last_try",
+        description="of the last attempt, as in lupin_msgs/Observation: 0 OK, 1 unreachable, 2 "
+        "scan failed, 3 skipped; null: as last_try",
     )
-    last_try_detail: str = Field(default_factory=str, description="why the last try was not OK")
+    last_try_detail: str = Field(default_factory=str, description="why it was not OK")
 
 
 class TwinState(Contract):
@@ -135,7 +135,7 @@ class HealthReason(Contract):
     """Why a tag, or the greenhouse, has its verdict.
 
     The last two are the greenhouse's. `silent`: nothing comes from the twin, or its clock does
-    not run. `stopped`: no tag was scanned for longer than the patrol's own rhythm allows.
+    not run. `stopped`: no tag was scanned for longer than the patrol's own scan interval allows.
     """
 
     kind: Literal[
@@ -167,7 +167,7 @@ class TagHealth(Contract):
 
 
 class Day(Contract):
-    """Whether the ranges of the day hold or those of the night, and what says so."""
+    """Whether the ranges of the day hold or those of the night, and by what that was decided."""
 
     is_day: bool
     source: Literal["light", "clock", "assumed"]
@@ -230,7 +230,7 @@ class Alarm(Contract):
 class Alarms(Contract):
     """`/api/alarms`: what the past and now give.
 
-    `starting`: the past is still being read; `heard`: no journal is kept, and only what this
+    `starting`: the past is still being read; `heard`: there is no journal, and only what this
     process received since its start is in it.
     """
 
@@ -247,7 +247,7 @@ class AlarmsFrame(Alarms):
 
 
 class StateFrame(Contract):
-    """WebSocket frame: the state. `seq` grows by one a frame; a gap tells what was skipped."""
+    """WebSocket frame: the state. `seq` grows by one a frame; a gap shows what was skipped."""
 
     type: Literal["state"]
     seq: int
@@ -295,7 +295,7 @@ class Journal(Contract):
     state: Literal[
         "unknown", "off", "starting", "upgrading", "recording", "slow", "failing", "doubting",
         "in_use", "foreign",
-    ] = Field(description="unknown: the twin does not say")  # fmt: skip
+    ] = Field(description="unknown: the twin does not report it")  # fmt: skip
     detail: str = Field(description="for a person to read")
     set_aside: str = Field(description="the last damaged file, by its new name; empty: none")
     simulated: Stretch | None = Field(
@@ -327,7 +327,7 @@ class StatusFrame(Contract):
     )
     has_map: bool = Field(description="false: /api/map answers 404, no map has come yet")
     origin: Origin = Field(
-        description="where what was observed comes from, as the twin says; sim_time: it goes by "
+        description="where what was observed comes from, as the twin reports; sim_time: it goes by "
         "/clock, so from a simulation, or a recording that is played"
     )
     twin_count: int = Field(description="how many publish the state; of more than one, a mixture")
@@ -357,7 +357,7 @@ class GetFieldResponse(Contract):
 
 
 class TagError(Contract):
-    """One tag's reading against what the other tags say of its place."""
+    """One tag's reading against the prediction from the other tags."""
 
     tag_id: str
     measured: float
@@ -366,7 +366,7 @@ class TagError(Contract):
 
 
 class FieldQuality(Contract):
-    """What an honest map should also tell: its leave-one-out error and how much of it is known."""
+    """What an honest map should also show: its leave-one-out error and how much of it is known."""
 
     sensor_type: str
     unit: str
@@ -412,19 +412,19 @@ class SensorHistory(Contract):
 
 
 class PastAttempt(Contract):
-    """One scan or look, with success or without."""
+    """One scan or inspection, successful or not."""
 
     stamp: Time
     status: int = Field(description="as in lupin_msgs/Observation: 0 is OK")
     status_detail: str = Field(description="why the status is not OK, for a person to read")
     kind: int | None = Field(
-        description="as in lupin_msgs/Observation: 0 scan, 1 look; null: of a try that failed, and "
-        "is not in the journal yet"
+        description="as in lupin_msgs/Observation: 0 scan, 1 inspection; null: of an attempt that "
+        "failed, and is not in the journal yet"
     )
 
 
 class TagHistory(Contract):
-    """The last scans and tries of one tag (as many of each as the twin's `buffer_len`)."""
+    """The last scans and attempts of one tag (as many of each as the twin's `buffer_len`)."""
 
     tag_id: str
     source: str | None = Field(

@@ -5,7 +5,7 @@ import type { Field, FieldQuality, Schemas, TagHistory } from './types';
 /** A refusal by the server, with its reason. */
 export class Refusal extends Error {
   readonly status: number;
-  /** How long the server wants to be left alone, seconds; null: it does not say. */
+  /** How long the server wants to be left alone, seconds; null: not reported. */
   readonly retryAfterS: number | null;
 
   constructor(status: number, message: string, retryAfterS: number | null = null) {

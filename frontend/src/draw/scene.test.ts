@@ -2,6 +2,7 @@ import { describe, expect, test } from 'vitest';
 
 import { GROWING } from '../domain/time';
 import { houseHealth } from '../domain/health';
+import { NO_CATALOGUES } from '../domain/sensors';
 import { judgement, NOBODY } from '../testing/health';
 import { readings, tag } from '../testing/tags';
 import type { TwinTagState as WireTag } from '../contract/types';
@@ -63,6 +64,17 @@ describe('pins', () => {
       ['failed', ['1']],
       ['lacking', ['1']],
     ]);
+  });
+
+  test('after a reload it is full once it is known what its sensor is computed of, and how the tag is', () => {
+    const tags = [tag({ readings: readings({ temperature: 20, humidity: 50 }) })];
+    const input = { tags, unit: 'C' as const, now: 0, ageing: GROWING, listed: null };
+    const unread = NO_CATALOGUES.day.named('vpd');
+    const first = buildScene({ ...input, sensor: unread, health: houseHealth(tags, NOBODY, true) });
+    expect(first.pins[0]).toMatchObject({ kind: 'lacking', verdict: 'unknown' });
+    const health = houseHealth(tags, judgement({ '1': 'healthy' }), true);
+    const [pin] = buildScene({ ...input, sensor: sensorNamed('vpd'), health }, first).pins;
+    expect(pin).toMatchObject({ kind: 'value', verdict: 'healthy' });
   });
 
   test('has the verdict that was given, unknown where none was', () => {

@@ -135,7 +135,7 @@ def test_a_picture_in_a_foreign_page_is_not_even_computed(open_bridge: Served) -
     hidden = {"Sec-Fetch-Site": "cross-site", "Sec-Fetch-Mode": "no-cors"}
     answer = open_bridge.get("/api/field.png?sensor_type=co2", hidden)
     assert answer.status_code == 403
-    assert "asks without naming itself" in refusal_of(answer)
+    assert "without naming itself" in refusal_of(answer)
     frame = {"Sec-Fetch-Site": "cross-site", "Sec-Fetch-Mode": "navigate"}
     for dest in ("iframe", "frame", "embed", "object"):
         framed = open_bridge.get("/api/field?sensor_type=co2", {**frame, "Sec-Fetch-Dest": dest})

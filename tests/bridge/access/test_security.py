@@ -88,7 +88,7 @@ def test_what_is_posted_has_a_header_that_no_form_can_send(live: Bridge, path: s
     answer = live.http.post(path)
     assert answer.status_code == 403
     assert answer.json() == {"detail": "POST without the header X-Lupin-Twin, expected any value"}
-    assert live.http.post(path, headers=OWN).status_code == 404, "this bridge asks for no token"
+    assert live.http.post(path, headers=OWN).status_code == 404, "this bridge needs no token"
 
 
 @pytest.mark.parametrize(

@@ -125,7 +125,7 @@ def test_what_nobody_waits_for_any_more_ends_there(path: Path, shared: Shared) -
             asyncio.create_task(past.ask(Endless(), now(path), 1.0)) for _ in range(MAX_PENDING)
         ]
         await until(lambda: len(past.asked) == MAX_PENDING, "all of them")
-        with pytest.raises(NotRemembered, match=f"{MAX_PENDING} questions .* the limit"):
+        with pytest.raises(NotRemembered, match=f"{MAX_PENDING} requests .* the limit"):
             await past.ask(Running(), now(path), 0.0)
         asking.pop().cancel()
         await until(lambda: len(past.asked) < MAX_PENDING, "one to go")
@@ -194,8 +194,8 @@ async def test_one_that_dies_is_told_of_and_started_again(
         assert await past.ask(Count(NOW_NS), now(path), 0.0) == 1
         told = [r.getMessage() for r in caplog.records if r.levelno == logging.ERROR]
         assert told == [
-            "the process that looks back was killed by SIGKILL",
-            "the process that looks back was killed by SIGABRT",
+            "the process that reads the past was killed by SIGKILL",
+            "the process that reads the past was killed by SIGABRT",
         ]
 
 

@@ -183,7 +183,7 @@ def test_while_the_accounts_cannot_be_read_a_message_waits(tmp_path: Path) -> No
         aside.rename(on.accounts)
         wait_for(lambda: on.service.posted, "the first attempt")
         on.accounts.rename(aside)
-        on.live.process.wait_for_output("is tried again: the file of accounts")
+        on.live.process.wait_for_output("will be retried: the file of accounts")
         aside.rename(on.accounts)
         wait_for(lambda: len(on.service.posted) == 2, "the next attempt")
 

@@ -137,6 +137,6 @@ def test_the_limits_of_fields_hold_here_too() -> None:
         response = ros.call(FIELD, args=other)
         assert response["result"] is False
         assert response["values"] == (
-            "127.0.0.1 asks for more than 0.01 computed answers a second, the limit"
+            "127.0.0.1 requests more than 0.01 computed answers a second, the limit"
         )
         assert house.get("/api/field", **other).status_code == 429, "of one client, together"

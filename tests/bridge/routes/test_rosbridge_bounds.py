@@ -96,7 +96,10 @@ async def test_an_answer_that_takes_too_long_ends_a_call(
 @pytest.mark.parametrize(
     ("error", "text"),
     [
-        (TwinUnavailableError("no twin has been heard yet"), "no twin has been heard yet"),
+        (
+            TwinUnavailableError("nothing has been received from a twin yet"),
+            "nothing has been received from a twin yet",
+        ),
         (RuntimeError("a bug"), "the bridge met an error of its own, see its log"),
     ],
 )

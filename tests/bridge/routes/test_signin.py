@@ -151,7 +151,7 @@ def test_without_a_token_there_is_nothing_to_sign_in_to() -> None:
         assert (page.status_code, page.headers["location"]) == (303, "./")
         exchange = live.post("/api/signin", BEARER)
         assert exchange.status_code == 404
-        assert "asks for no token" in exchange.json()["detail"]
+        assert "needs no token" in exchange.json()["detail"]
         assert "set-cookie" not in exchange.headers
 
 
@@ -284,4 +284,4 @@ def test_a_page_is_told_whether_it_can_sign_out(closed: Served) -> None:
         assert live.get("/api/session").json() == program
         answer = live.post("/api/signout")
         assert answer.status_code == 404
-        assert "asks for no token" in answer.json()["detail"]
+        assert "needs no token" in answer.json()["detail"]

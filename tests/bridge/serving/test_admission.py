@@ -128,7 +128,7 @@ def test_a_client_has_its_rate_and_is_told_when_to_come_back() -> None:
         pass
     with pytest.raises(ClientLimitError) as refused, admission.request("a", 0.25):
         pytest.fail("let in")
-    assert str(refused.value) == "a asks for more than 0.5 computed answers a second, the limit"
+    assert str(refused.value) == "a requests more than 0.5 computed answers a second, the limit"
     assert refused.value.retry_after_s == pytest.approx(1.75)
     assert refused.value.headers == {"Retry-After": "2"}
     with admission.request("b", 0.25), admission.request("a", 2.0):
@@ -239,7 +239,9 @@ def test_every_route_of_a_field_has_the_limit(slow: Served, route: str) -> None:
         refusal = schema.GetFieldResponse.model_validate_json(second.content)
         assert not refusal.ok
         assert (refusal.values, refusal.width, refusal.sample_count) == ([], 0, 0)
-        assert "for more than 0.01 computed answers a second, the limit" in (refusal.error_message)
+        assert (
+            "requests more than 0.01 computed answers a second, the limit" in refusal.error_message
+        )
 
 
 def test_what_needs_no_computing_costs_no_turn(slow: Served) -> None:
@@ -263,7 +265,7 @@ def test_every_other_answer_that_is_computed_has_it_too(slow: Served, route: str
         assert 1 <= int(answer.headers["retry-after"]) <= 1 / RATE_HZ
         detail = schema.ErrorMessage.model_validate_json(answer.content).detail
         assert detail == (
-            f"{address} asks for more than {RATE_HZ} computed answers a second, the limit"
+            f"{address} requests more than {RATE_HZ} computed answers a second, the limit"
         )
 
 

@@ -10,10 +10,24 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from lupin_twin.core.past import EVERY_TAG, MAX_POINTS, Event, SeriesRequest
+from lupin_twin.core.past import (
+    EVERY_TAG,
+    MAX_POINTS,
+    MAX_WRITES,
+    Event,
+    PeriodRequest,
+    RecentRequest,
+    ScansRequest,
+    SeriesRequest,
+    WritesRequest,
+    recent_of,
+)
 from lupin_twin.journal.appending import Appender
+from lupin_twin.journal.fold import state_at
 from lupin_twin.journal.hours import count_rows
 from lupin_twin.journal.queries import Export, lots, newest, series
+from lupin_twin.journal.received import observed, recent, scans, writes
+from lupin_twin.journal.runs import runs, span_at
 from lupin_twin.journal.schema import SiteLog
 from tests.support.log_life import BEGUN, LATEST, MINUTE, Life, check, one_run, periods, steps
 from tests.twin.journal.conftest import Engines, Living
@@ -42,6 +56,7 @@ def test_its_answers_are_those_of_a_plain_list_on_either_engine(  # noqa: PLR091
             for sensor in ("temperature", "co2"):
                 check_readings(life, connection, SeriesRequest("7", sensor, *period, points))
             check_export(life, connection, period, None if tag_id == EVERY_TAG else tag_id)
+        check_writes(local, archive, period[0], random)
         check_counts(life, archive, random)
 
 
@@ -111,6 +126,45 @@ def check_export(life: Life, connection: Any, period: Period, tag: str | None) -
         found = [lot for step in iter(partial(export.step, connection), None) for lot in lots(step)]
     assert repr([row for lot in found for row in lot]) == repr(expected)
     assert all(0 < len(lot) <= 3 for lot in found)
+
+
+def check_writes(local: Any, archive: SiteLog, start_ns: int, random: Any) -> None:
+    """Both engines give the same; what is asked of a period is that part of all writes."""
+    whole = WritesRequest(max_count=MAX_WRITES)
+    every = writes(local, whole).writes
+    end_ns = random.choice([END, *(write.stamp_ns for write in every)])  # at the very end
+    sensors = frozenset({"temperature", "co2"})
+
+    def found(log: Any) -> list[Any]:
+        return [
+            recent(log, RecentRequest(end_ns)),
+            scans(log, ScansRequest(start_ns, end_ns, sensors)),
+            observed(log, PeriodRequest(start_ns, end_ns)).writes,
+            writes(log, whole),
+            [state_at(log, at_ns, "map") for at_ns in (start_ns, end_ns)],
+        ]
+
+    here, there = found(local), found(archive)
+    assert repr(there) == repr(here)  # in which no number is itself
+    axis = runs(local.execute)
+    by_stamp = sorted(every, key=lambda write: (write.stamp_ns, write.number))
+    held = [(write, span_at(axis, write.stamp_ns)) for write in by_stamp]
+    last = span_at(axis, end_ns)
+    run = [write for write in by_stamp if last and write.run == last.run.id]
+    expected = [
+        recent_of(run, end_ns),
+        tuple(
+            write
+            for write in run
+            if start_ns <= write.stamp_ns <= end_ns and not sensors.isdisjoint(write.sensors)
+        ),
+        tuple(
+            write
+            for write, span in held
+            if start_ns <= write.stamp_ns < end_ns and span and span.run.id == write.run
+        ),
+    ]
+    assert repr(here[:3]) == repr(expected)
 
 
 def check_counts(life: Life, archive: SiteLog, random: Any) -> None:

@@ -8,6 +8,7 @@ import pytest
 
 from lupin_twin.journal import schema
 from lupin_twin.journal.checking import find_damage
+from lupin_twin.journal.rebuild import is_version3
 from lupin_twin.journal.schema import (
     FILE_ERRORS,
     VERSION,
@@ -91,11 +92,14 @@ def test_a_file_that_is_being_made_is_called_empty_and_is_not_damaged(tmp_path: 
         assert find_damage(path) is None
 
 
-def test_a_newer_version_is_told_and_left(path: Path) -> None:
-    connection = sqlite3.connect(path)
-    connection.execute(f"PRAGMA user_version = {VERSION + 1}")
-    connection.close()
-    with pytest.raises(Foreign, match=f"version {VERSION + 1}, this is version {VERSION}"):
+@pytest.mark.parametrize("version", [1, 2, 3, VERSION + 1])
+def test_another_version_is_left_and_the_message_says_what_becomes_of_it(
+    path: Path, version: int
+) -> None:
+    with closing(sqlite3.connect(path)) as connection:
+        connection.execute(f"PRAGMA user_version = {version}")
+    what = "a twin that starts with it upgrades it" if is_version3(path) else "it cannot be read"
+    with pytest.raises(Foreign, match=f"version {version}, this is version {VERSION}: {what}"):
         open_writer(path)
 
 

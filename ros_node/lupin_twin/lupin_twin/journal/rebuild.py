@@ -271,7 +271,7 @@ def vacuum(path: Path, holder: str, report: Progress) -> tuple[int, int]:
         if first is not None:
             raise NotPossible(
                 f"{path} is damaged and left as it is ({first});"
-                " lupin-twin journal check tells all that is"
+                " lupin-twin journal check lists all damage"
             )
         connection.execute("VACUUM")
         if _is_read(connection):

@@ -122,11 +122,7 @@ _BAD_TEXT: Final = ("Could not decode to UTF-8", "malformed JSON")
 
 
 class Foreign(Exception):
-    """A file of somebody else, or of a newer version: it is left as it is."""
-
-
-class Older(Foreign):
-    """A journal of an older version: it is upgraded by the twin that starts with it."""
+    """A file of somebody else, or of another version: it is left as it is."""
 
 
 class Empty(FileNotFoundError):
@@ -160,7 +156,7 @@ def open_writer(path: Path) -> sqlite3.Connection:
     syncs that. Nothing is checkpointed unless requested.
 
     Raises:
-        Foreign: the file is somebody else's, `Older`: it is of an older version.
+        Foreign: the file is somebody else's, or of another version.
         sqlite3.Error, OSError: it cannot be opened, or is damaged (`is_damage_error`).
 
     """
@@ -304,13 +300,13 @@ def _check_identity(connection: sqlite3.Connection, path: Path) -> frozenset[byt
         if ours:
             raise DamagedFile(f"{path} is a journal with a damaged header")
         raise Foreign(f"{path} is a database, but not a journal of lupin-twin")
-    if 0 < version < VERSION:
-        raise Older(
-            f"{path} is a journal of version {version}, this is version {VERSION}:"
-            " a twin that starts with it upgrades it"
-        )
     if version != VERSION:
-        raise Foreign(f"{path} is a journal of version {version}, this is version {VERSION}")
+        # No release wrote an earlier one than that (`rebuild`).
+        is_before = version == VERSION - 1
+        what = "a twin that starts with it upgrades it" if is_before else "it cannot be read"
+        raise Foreign(
+            f"{path} is a journal of version {version}, this is version {VERSION}: {what}"
+        )
     found = {sql for (sql,) in connection.execute(_SCHEMA)}
     lacking = _own_tables() - found
     if found - _own_tables() or any(sql.startswith(b"CREATE TABLE") for sql in lacking):

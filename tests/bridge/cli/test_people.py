@@ -1,0 +1,143 @@
+"""`lupin-twin user`, `token` and `audit`: what they print, and whom a bridge's file then knows."""
+
+import csv
+import os
+import re
+import sys
+import time
+from contextlib import closing
+from pathlib import Path
+from subprocess import CompletedProcess
+
+import pytest
+
+from lupin_bridge.access.accounts import Accounts, digest
+from lupin_bridge.access.credentials import Person
+from lupin_bridge.access.people import verify
+from tests.support.people import PASSWORD
+from tests.support.processes import run
+
+NOW = r"20\d\d-\d\d-\d\dT\d\d:\d\d:\d\dZ"
+
+
+@pytest.fixture
+def file(tmp_path: Path) -> Path:
+    return tmp_path / "accounts.sqlite"
+
+
+def ended(file: Path, words: str) -> CompletedProcess[str]:
+    """The command on this file."""
+    command = [sys.executable, "-m", "lupin_bridge.cli.command", *words.split()]
+    return run([*command, "--accounts", str(file)], os.environ)
+
+
+def printed(file: Path, words: str) -> str:
+    """What it prints; it must end well."""
+    done = ended(file, words)
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+def add_user(
+    file: Path, name: str, options: str, password: str = PASSWORD
+) -> CompletedProcess[str]:
+    """A user whose password stands in a file."""
+    kept = file.with_name("password")
+    kept.write_text(f"{password}\n", encoding="utf-8")
+    return ended(file, f"user add {name} {options} --password-file {kept}")
+
+
+def test_a_user_is_added_listed_and_removed(file: Path) -> None:
+    added = add_user(file, "anna", "--role operator --for-site gh1 --for-site gh2")
+    assert (added.returncode, added.stdout) == (
+        0,
+        "account anna is added, with the role operator\n",
+    )
+    assert f"{file} is made: from now on, bridges" in added.stderr
+    assert printed(file, "user add bert --role viewer --no-password") == (
+        "account bert is added, with the role viewer\n"
+    )
+    assert re.fullmatch(
+        rf"anna  operator  {NOW}  gh1 gh2\nbert  viewer  {NOW}\n", printed(file, "user list")
+    )
+    with closing(Accounts(file, is_writer=True)) as accounts:
+        found = accounts.of_name("anna")
+        assert found is not None
+        person, kept = found
+        assert person == Person("anna", "operator", sites=("gh1", "gh2"))
+        assert verify(kept, PASSWORD)
+        session = digest(accounts.begin_session("anna", "::1", int(time.time())))
+    assert printed(file, "user remove anna") == "account anna is removed\n"
+    assert printed(file, "user list").startswith("bert ")
+    with closing(Accounts(file)) as accounts:
+        assert accounts.of_name("anna") is None
+        assert accounts.of_session(session, int(time.time())) is None
+    last = ended(file, "user remove bert")
+    assert (last.returncode, printed(file, "user list")) == (0, "")
+    assert "nobody is left who could sign in" in last.stderr
+
+
+def test_a_token_is_printed_once_listed_and_revoked(file: Path) -> None:
+    token = printed(file, "token add scada --role viewer --for-site gh1").strip()
+    listed = printed(file, "token list")
+    assert re.fullmatch(rf"scada  viewer  {NOW}  gh1\n", listed)
+    assert printed(file, "user list") == ""
+    with closing(Accounts(file)) as accounts:
+        found = accounts.of_token(digest(token))
+        assert found is not None
+        assert (found.name, found.role, found.sites) == ("scada", "viewer", ("gh1",))
+    assert printed(file, "token revoke scada") == "token scada is removed\n"
+    assert printed(file, "token list") == ""
+    with closing(Accounts(file)) as accounts:
+        assert accounts.of_token(digest(token)) is None
+
+
+def test_the_audit_trail_is_csv_with_the_newest_first(file: Path) -> None:
+    printed(file, "user add anna --role admin --no-password")
+    token = printed(file, "token add scada --role viewer").strip()
+    with closing(Accounts(file, is_writer=True)) as accounts:
+        accounts.begin_session("anna", "192.0.2.7", int(time.time()))
+    printed(file, "token revoke scada")
+    text = printed(file, "audit")
+    header, *rows = csv.reader(text.splitlines())
+    assert header == ["time", "who", "what", "subject", "address"]
+    assert all(re.fullmatch(NOW, row[0]) for row in rows)
+    by = rows[0][1]
+    assert by.endswith(" on this machine")
+    assert [row[1:] for row in rows] == [
+        [by, "remove token", "scada", ""],
+        ["anna", "sign in", "", "192.0.2.7"],
+        [by, "add token", "scada viewer", ""],
+        [by, "add account", "anna admin", ""],
+    ]
+    assert token not in text
+
+
+@pytest.mark.parametrize(
+    ("words", "reason"),
+    [
+        ("user add no/name --role viewer --no-password", "the name is 'no/name'"),
+        ("user add anna --role viewer --no-password", "there is account 'anna' already"),
+        ("user add bert --role viewer", "there is no terminal to enter the password"),
+        ("user add bert --role viewer --password-file /nowhere", "--password-file /nowhere: No "),
+        ("user remove bert", "there is no account 'bert'"),
+        ("token revoke anna", "there is no token 'anna'"),
+    ],
+)
+def test_what_cannot_be_done_is_one_line_and_changes_nothing(
+    file: Path, words: str, reason: str
+) -> None:
+    printed(file, "user add anna --role viewer --no-password")
+    before = printed(file, "user list"), printed(file, "audit")
+    done = ended(file, words)
+    assert (done.returncode, done.stdout) == (1, "")
+    (line,) = done.stderr.splitlines()
+    assert line.startswith(f"lupin-twin: {reason}")
+    assert (printed(file, "user list"), printed(file, "audit")) == before
+
+
+def test_a_password_that_is_too_short_adds_nobody(file: Path) -> None:
+    done = add_user(file, "anna", "--role viewer", "short")
+    assert done.returncode == 1
+    assert "has 5 characters, must have 10 to 512" in done.stderr
+    assert not file.exists()

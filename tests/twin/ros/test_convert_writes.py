@@ -28,7 +28,7 @@ def test_rows_survive_the_wire() -> None:
         LOT._replace(last=8, is_all=False),
         LOT._replace(journal="../../home"),
         LOT._replace(journal=""),
-        LOT._replace(rows=("[]",) * 50_001),
+        LOT._replace(rows=("[]",) * 500_001),
     ],
 )
 def test_what_leads_nowhere_or_names_no_journal_is_no_lot(lot: Lot) -> None:

@@ -12,7 +12,7 @@ from lupin_twin.journal import follow
 from lupin_twin.journal.follow import Followed, Lot, NotALotError
 from lupin_twin.journal.rebuild import upgrade
 from lupin_twin.journal.retention import Limits, forget, purge_step
-from lupin_twin.journal.schema import DamagedFile, open_reader, open_writer, transaction
+from lupin_twin.journal.schema import DamagedFile, open_reader, open_writer, set_meta, transaction
 from tests.support.journal import NOW, SECOND, kept, look, pin, scan
 from tests.support.journal_answers import NAMES, answer, answers, old, same
 
@@ -74,12 +74,27 @@ def test_a_lot_that_was_broken_off_leaves_the_file_as_it_was(source: Path, tmp_p
     copy(source, target)
     before = contents(target)
     id_ = follow.followed(source).journal
-    bad = ('["scan",1]', "[]", "{", '["notes",1]', '["scan",99,98,1,null,1,0,"","","",0,"[1]"]')
+    bad = (
+        *('["scan",1]', "[]", "{", '["notes",1]', '["scan",99,98,1,null,1,0,"","","",0,"[1]"]'),
+        *('["meta","purged_ns:1","x"]', '["meta","lost_ns:1","1e3"]', '["meta",7,"1"]'),
+        *('["meta","day_length_s","x"]', '["meta","purged_seq","1.5"]', "[" * 100_000),
+        *('["run",1,0,"x",1,1,null,null]', f'["run",{10**30},0,1,1,1,null,null]'),
+        *('["hour",null,1,"","","",""]', '["meta","forgotten:1","{\\"tag\\":[],\\"what\\":1}"]'),
+    )
     for text in bad:
         with pytest.raises(NotALotError):
             follow.write(target, Lot(id_, ('["meta","purged_ns:1","5"]', text), 999, True), NOW)
     assert contents(target) == before
     assert follow.followed(target).last == follow.followed(target).last < 999
+
+
+def test_a_copy_that_says_nonsense_of_itself_is_damaged(source: Path, tmp_path: Path) -> None:
+    target = tmp_path / "web.sqlite"
+    copy(source, target)
+    with closing(open_writer(target)) as connection, transaction(connection):
+        set_meta(connection, "purged_ns:1", "x")
+    with pytest.raises(DamagedFile, match="nonsense"):
+        follow.followed(target)
 
 
 def test_what_the_journal_deletes_is_deleted_in_the_copy_and_its_hours_stay(

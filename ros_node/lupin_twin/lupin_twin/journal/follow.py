@@ -98,6 +98,11 @@ _HOURS_OF: Final = (
 )
 # What an hour takes as a row.
 _HOUR_BYTES: Final = 120
+# What rows of a liar, or of a damaged log, raise; `sqlite3` itself says of a file what it is.
+_UNUSABLE: Final = (
+    *(ValueError, TypeError, LookupError, ArithmeticError, AttributeError, RecursionError),
+    *(sqlite3.IntegrityError, sqlite3.ProgrammingError, DamagedFile),
+)
 
 
 class Lot(NamedTuple):
@@ -181,7 +186,8 @@ def write(path: Path, lot: Lot, complete_ns: int | None, behind: int = 0) -> Fol
             set_meta(connection, "journal_id", lot.journal)
             try:
                 _put(connection, lot)
-            except (ValueError, TypeError, KeyError, IndexError, DamagedFile) as error:
+                _followed(connection)
+            except _UNUSABLE as error:
                 raise NotALotError(f"rows that are none of a log: {error}") from error
             if 0 < behind < _purged_seq(connection) != purged:
                 raise DamagedFile("rows that it does not have yet were deleted in the journal")
@@ -202,7 +208,10 @@ def followed(path: Path) -> Followed:
 
     """
     with closing(open_reader(path)) as connection:
-        return _followed(connection)
+        try:
+            return _followed(connection)
+        except _UNUSABLE as error:
+            raise DamagedFile(f"{path} says nonsense of itself: {error}") from error
 
 
 def _followed(connection: sqlite3.Connection) -> Followed:

@@ -77,7 +77,7 @@ def test_a_lot_that_was_broken_off_leaves_the_file_as_it_was(source: Path, tmp_p
     bad = (
         *('["scan",1]', "[]", "{", '["notes",1]', '["scan",99,98,1,null,1,0,"","","",0,"[1]"]'),
         *('["meta","purged_ns:1","x"]', '["meta","lost_ns:1","1e3"]', '["meta",7,"1"]'),
-        *('["meta","day_length_s","x"]', '["meta","purged_seq","1.5"]', "[" * 100_000),
+        *('["meta","purged_seq","1.5"]', "[" * 100_000),
         *('["run",1,0,"x",1,1,null,null]', f'["run",{10**30},0,1,1,1,null,null]'),
         *('["hour",null,1,"","","",""]', '["meta","forgotten:1","{\\"tag\\":[],\\"what\\":1}"]'),
     )
@@ -141,6 +141,29 @@ def test_a_copy_that_lacks_what_was_deleted_meanwhile_is_made_anew(
     copy(source, target)
     kept(source, [scan(at_ns=NOW + (n + 60) * 600 * SECOND) for n in range(30)])
     purge(source, NOW + 85 * 600 * SECOND)
+    with pytest.raises(DamagedFile, match="were deleted in the journal"):
+        copy(source, target)
+    target.unlink()
+    copy(source, target)
+    assert contents(target) == contents(source)
+
+
+@pytest.mark.parametrize("said", ["x", "nan", "-5", "0", "1e-300", "inf", "1e300"])
+def test_a_day_of_no_length_is_the_usual_one(said: str, source: Path) -> None:
+    with closing(open_writer(source)) as connection, transaction(connection):
+        set_meta(connection, "day_length_s", said)
+    assert follow.followed(source).world.day_length_s == 86_400.0
+
+
+def test_a_copy_that_was_behind_when_a_tag_was_forgotten_is_made_anew(
+    source: Path, tmp_path: Path
+) -> None:
+    target = tmp_path / "web.sqlite"
+    copy(source, target)
+    # Scans that stay in the site's counts, and of which the copy never hears.
+    kept(source, [scan(at_ns=NOW + 600 * 600 * SECOND)])
+    forget(source, "7", pose_only=False, by="who", at_ns=NOW)
+    kept(source, [scan("8", NOW + 601 * 600 * SECOND)])
     with pytest.raises(DamagedFile, match="were deleted in the journal"):
         copy(source, target)
     target.unlink()

@@ -26,7 +26,7 @@ from lupin_twin.journal.appending import PURGED_SEQ, Stretch, simulated
 from lupin_twin.journal.checking import WRITTEN
 from lupin_twin.journal.hours import DELETED, FORGOTTEN, TALLIED, count_rows
 from lupin_twin.journal.notes import id_behind, number_of
-from lupin_twin.journal.retention import RECORD, Stretches, delete_recorded, kept
+from lupin_twin.journal.retention import RECORD, Stretches, delete_recorded, kept, records
 from lupin_twin.journal.runs import world_of
 from lupin_twin.journal.schema import (
     DAY_LENGTH,
@@ -182,14 +182,14 @@ def write(path: Path, lot: Lot, complete_ns: int | None, behind: int = 0) -> Fol
         with transaction(connection):
             if _last(connection) < behind:
                 raise NotALotError(f"rows behind number {behind} for a file that ends before it")
-            purged = _purged_seq(connection)
+            gone = _gone_seq(connection)
             set_meta(connection, "journal_id", lot.journal)
             try:
                 _put(connection, lot)
                 _followed(connection)
             except _UNUSABLE as error:
                 raise NotALotError(f"rows that are none of a log: {error}") from error
-            if 0 < behind < _purged_seq(connection) != purged:
+            if 0 < behind < _gone_seq(connection) != gone:
                 raise DamagedFile("rows that it does not have yet were deleted in the journal")
             set_meta(connection, _FOLLOWED, max(lot.last, _last(connection)))
             if not lot.is_all or complete_ns is None:
@@ -308,6 +308,12 @@ def _insert(connection: sqlite3.Connection, table: str, row: list[Any], *, repla
 
 def _purged_seq(connection: sqlite3.Connection) -> int:
     return int(get_meta(connection, PURGED_SEQ) or 0)
+
+
+def _gone_seq(connection: sqlite3.Connection) -> int:
+    """Up to this number rows were deleted that had been counted: by age, by size, or forgotten."""
+    forgotten = (int(str(record["seq"])) for record in records(connection))
+    return max(_purged_seq(connection), *forgotten, 0)
 
 
 def _rows(texts: Iterable[str]) -> Iterator[list[Any]]:

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from lupin_twin.core.past import HOUR_NS
 from lupin_twin.core.state import Write
 from lupin_twin.journal import follow
 from lupin_twin.journal.follow import Followed, Lot, NotALotError
@@ -77,7 +78,7 @@ def test_a_lot_that_was_broken_off_leaves_the_file_as_it_was(source: Path, tmp_p
     bad = (
         *('["scan",1]', "[]", "{", '["notes",1]', '["scan",99,98,1,null,1,0,"","","",0,"[1]"]'),
         *('["meta","purged_ns:1","x"]', '["meta","lost_ns:1","1e3"]', '["meta",7,"1"]'),
-        *('["meta","purged_seq","1.5"]', "[" * 100_000),
+        *('["meta","purged_seq","1.5"]', '["meta","followed_from_seq","x"]', "[" * 100_000),
         *('["run",1,0,"x",1,1,null,null]', f'["run",{10**30},0,1,1,1,null,null]'),
         *('["hour",null,1,"","","",""]', '["meta","forgotten:1","{\\"tag\\":[],\\"what\\":1}"]'),
     )
@@ -145,6 +146,24 @@ def test_a_copy_that_lacks_what_was_deleted_meanwhile_is_made_anew(
         copy(source, target)
     target.unlink()
     copy(source, target)
+    assert contents(target) == contents(source)
+
+
+def test_a_copy_is_whole_in_the_end_though_the_journal_deletes_all_the_time(tmp_path: Path) -> None:
+    source, target = tmp_path / "twin.sqlite", tmp_path / "web.sqlite"
+    first = NOW // HOUR_NS * HOUR_NS
+    at = [first + n * 10 * SECOND for n in range(60)]
+    kept(source, [scan(str(n % 12), at_ns) for n, at_ns in enumerate(at)])
+    purge(source, at[20])
+    after, is_all, lots = 0, False, 0
+    while not is_all:
+        with reading(source) as connection:
+            lot = follow.read(connection, after, 2)
+        follow.write(target, lot, NOW, after)
+        after, is_all, lots = lot.last, lot.is_all, lots + 1
+        if lots < 20:
+            purge(source, at[20 + lots])
+    assert lots > 6
     assert contents(target) == contents(source)
 
 

@@ -1,5 +1,6 @@
 """A log copied lot by lot: the same answers, each row once, wherever it was broken off."""
 
+import shutil
 import sqlite3
 from collections.abc import Iterator
 from contextlib import closing, contextmanager
@@ -185,6 +186,24 @@ def test_a_copy_that_was_behind_when_a_tag_was_forgotten_is_made_anew(
     kept(source, [scan("8", NOW + 601 * 600 * SECOND)])
     with pytest.raises(DamagedFile, match="were deleted in the journal"):
         copy(source, target)
+    target.unlink()
+    copy(source, target)
+    assert contents(target) == contents(source)
+
+
+def test_a_copy_of_a_journal_that_was_put_back_from_a_backup_is_made_anew(
+    source: Path, tmp_path: Path
+) -> None:
+    target, backup = tmp_path / "web.sqlite", tmp_path / "backup.sqlite"
+    shutil.copy(source, backup)
+    kept(source, [scan(at_ns=NOW + (n + 60) * 600 * SECOND) for n in range(4)])
+    copy(source, target)
+    shutil.copy(backup, source)
+    for more in range(6):
+        if more:
+            kept(source, [scan(at_ns=NOW + (more + 60) * 600 * SECOND + 1)])
+        with pytest.raises(DamagedFile, match="has other rows by now"):
+            copy(source, target)
     target.unlink()
     copy(source, target)
     assert contents(target) == contents(source)

@@ -50,6 +50,7 @@ _FACTS: Final = (
 )
 _FOLLOWED: Final = "followed_seq"
 _COMPLETE: Final = "followed_to_ns"
+_UP_TO: Final = "followed_row"
 # The last number of the journal when the first lot was read.
 _BEGUN: Final = "followed_from_seq"
 _COLUMNS: Final = {
@@ -162,6 +163,7 @@ def read(connection: sqlite3.Connection, after: int, most: int = MAX_ROWS) -> Lo
         if _NUMBERED[rank] == "series" and row[2] in purged:
             of_series = {"series": number, "hour": purged[row[2]]}
             weight += log.execute(_HOURS_OF, of_series).fetchone()[0] * _HOUR_BYTES
+    texts.append(_text("meta", ("", _UP_TO, _up_to(log, after))))
     if purged:
         for table, sql in _COUNTED.items():
             rows = log.execute(sql, {"after": after, "last": last}).fetchall()
@@ -194,6 +196,11 @@ def write(path: Path, lot: Lot, complete_ns: int | None, behind: int = 0) -> Fol
                 upto, begun = _gone_seq(connection), int(get_meta(connection, _BEGUN) or 0)
             except _UNUSABLE as error:
                 raise NotALotError(f"rows that are none of a log: {error}") from error
+            # One that was put back from a backup gives its numbers to other rows.
+            told = get_meta(connection, _UP_TO) or ""
+            here = _up_to(SiteLog(connection), behind)
+            if told.startswith(f"{behind} ") and told != here:
+                raise DamagedFile("the journal has other rows by now")
             # What came before the copy began is in the counts of those hours; without this, none
             # would ever be whole where a journal deletes every minute.
             is_counted = upto <= begun and _purged(connection) == hours
@@ -267,6 +274,20 @@ def _behind(log: SiteLog, table: str, after: int, most: int) -> list[tuple[Any, 
             {"after": id_behind(after) if table == "note" else after, "most": most + 1},
         ).fetchall()
     )
+
+
+def _up_to(log: SiteLog, after: int) -> str:
+    """A number, and by what the last row up to it is known: its own, and its arrival."""
+    last = [
+        row
+        for table in WRITTEN
+        for row in log.execute(
+            f"SELECT seq, arrival_ns FROM {table} WHERE site = :site AND seq <= :after"
+            " ORDER BY seq DESC LIMIT 1",
+            {"after": after},
+        ).fetchall()
+    ]
+    return " ".join(map(str, (after, *max(last, default=()))))
 
 
 def _text(table: str, row: Iterable[Any]) -> str:

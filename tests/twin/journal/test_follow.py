@@ -1,9 +1,10 @@
 """A log copied lot by lot: the same answers, each row once, wherever it was broken off."""
 
+import random
 import shutil
 import sqlite3
 from collections.abc import Iterator
-from contextlib import closing, contextmanager
+from contextlib import closing, contextmanager, suppress
 from pathlib import Path
 
 import pytest
@@ -13,7 +14,7 @@ from lupin_twin.core.state import Write
 from lupin_twin.journal import follow
 from lupin_twin.journal.follow import Followed, Lot, NotALotError
 from lupin_twin.journal.rebuild import upgrade
-from lupin_twin.journal.retention import Limits, forget, purge_step
+from lupin_twin.journal.retention import Limits, UnknownTagError, forget, purge_step
 from lupin_twin.journal.schema import DamagedFile, open_reader, open_writer, set_meta, transaction
 from tests.support.journal import NOW, SECOND, kept, look, pin, scan
 from tests.support.journal_answers import NAMES, answer, answers, old, same
@@ -27,15 +28,15 @@ def reading(path: Path) -> Iterator[sqlite3.Connection]:
         yield connection
 
 
-def copy(source: Path, target: Path, most: int = 7) -> Followed:
-    """All that the target has not got yet."""
+def copy(source: Path, target: Path, most: int = 7, *, lots: int | None = None) -> Followed:
+    """All that the target has not got yet, or so many lots of it."""
     after = follow.followed(target).last if target.exists() else 0
     while True:
         with reading(source) as connection:
             lot = follow.read(connection, after, most)
         found = follow.write(target, lot, NOW, after)
-        after = lot.last
-        if lot.is_all:
+        after, lots = lot.last, lots and lots - 1
+        if lot.is_all or lots == 0:
             return found
 
 
@@ -243,3 +244,49 @@ def test_a_copy_answers_as_the_journal_does(name: str, tmp_path: Path) -> None:
     with reading(source) as one, reading(target) as other:
         for question, _ in answers(name):
             assert same(answer(other, question), answer(one, question)), question
+
+
+@pytest.mark.parametrize("seed", range(60))
+def test_whatever_happens_to_a_journal_a_whole_copy_has_the_same(  # noqa: C901  # the cases
+    seed: int, tmp_path: Path
+) -> None:
+    """Scans and inspections, late ones, deleted and forgotten ones, copied lot by lot."""
+    chance = random.Random(seed)
+    source, target = tmp_path / "twin.sqlite", tmp_path / "web.sqlite"
+    now_ns = NOW
+    kept(source, [scan(at_ns=now_ns)])
+
+    def some(at_ns: int) -> Write:
+        tag, made = chance.choice("789"), chance.randrange(3)
+        if made == 0:
+            return look(tag, at_ns, anomaly=chance.random() < 0.5)
+        return scan(tag, at_ns, **({"co2": 400.0} if made == 1 else {}))
+
+    for _ in range(chance.randrange(4, 20)):
+        match chance.choice(("new", "new", "late", "delete", "forget", "copy", "whole")):
+            case "new":
+                rows: list[Write] = [pin(chance.choice("789"), now_ns, x=chance.random())]
+                for _ in range(chance.randrange(1, 10)):
+                    now_ns += chance.choice((1, 60, 700, 3_600, 9_000)) * SECOND
+                    rows.append(some(now_ns))
+                kept(source, rows)
+            case "late":
+                kept(source, [some(NOW + chance.randrange(now_ns - NOW + 1))])
+            case "delete":
+                with closing(open_writer(source)) as connection, transaction(connection):
+                    purge_step(connection, Limits(1.0, 10**12), chance.randrange(NOW, now_ns + 1))
+            case "forget":
+                with suppress(UnknownTagError):
+                    pose_only = chance.random() < 0.5
+                    forget(source, chance.choice("789"), pose_only=pose_only, by="who", at_ns=NOW)
+            case how:
+                most = chance.choice((1, 3, 500))
+                try:
+                    copy(source, target, most, lots=1 if how == "copy" else None)
+                except DamagedFile:
+                    target.unlink()
+                    copy(source, target, most)
+                    how = "whole"
+                if how == "whole":
+                    assert contents(target) == contents(source)
+                    assert follow.followed(target).kept_ns == follow.followed(source).kept_ns

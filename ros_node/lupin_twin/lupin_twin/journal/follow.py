@@ -21,6 +21,7 @@ from typing import Any, Final, NamedTuple
 from lupin_twin.core.parameters import World
 from lupin_twin.core.past import (
     HOUR_NS,
+    Event,
 )
 from lupin_twin.journal.appending import PURGED_SEQ, Stretch, simulated
 from lupin_twin.journal.checking import WRITTEN
@@ -75,10 +76,11 @@ _WITH: Final = (
     f"WITH purged AS ({_PURGED}), late AS (SELECT DISTINCT a.series, a.run, a.hour"
     f" FROM ({_ATTEMPTS}) AS a JOIN purged AS p ON p.run = a.run AND a.hour <= p.hour)"
 )
+# A pause that ends later is counted here, by the first attempt behind it.
 _EVENTS: Final = (
-    "EXISTS (SELECT 1 FROM purged AS p WHERE p.run = event.run"
-    f" AND event.stamp_ns < (p.hour + 1) * {HOUR_NS})"
-    " AND (:after = 0 OR run IN (SELECT run FROM late))"
+    "(run IN (SELECT run FROM late) OR :after = 0 AND EXISTS (SELECT 1 FROM purged AS p"
+    " WHERE p.run = event.run AND (p.hour + 1) *"
+    f" {HOUR_NS} > event.stamp_ns + iif(event.event = '{Event.SILENCES}', event.value, 0)))"
 )
 _COUNTED: Final = {
     "hour": (
@@ -315,13 +317,14 @@ def _put(connection: sqlite3.Connection, lot: Lot) -> None:
             counted.append((table, row))
         elif table not in WRITTEN or row[0] > after:
             _insert(connection, table, row, replaces=table in {"run", "meta"})
-    counted_ns = {run: (hour + 1) * HOUR_NS - 1 for run, hour in _purged(connection).items()}
-    count_rows(log, after, lot.last, counted_ns)
     # Another process may have put newer ones in.
     if lot.last >= after:
         log.execute(_OTHER_EVENTS, {"after": after, "last": lot.last})
         for table, row in counted:
             _insert(connection, table, row, replaces=True)
+    # Then the rest: whether pests are new in it is known by what was before.
+    counted_ns = {run: (hour + 1) * HOUR_NS - 1 for run, hour in _purged(connection).items()}
+    count_rows(log, after, lot.last, counted_ns)
     for table in WRITTEN:
         connection.execute(
             f"DELETE FROM {table} WHERE site = ? AND seq <= ?",

@@ -7,12 +7,13 @@ from pathlib import Path
 
 import pytest
 
+from lupin_twin.core.past import HOUR_NS
 from lupin_twin.core.state import Write
 from lupin_twin.journal import follow
 from lupin_twin.journal.follow import Followed, Lot, NotALotError
 from lupin_twin.journal.rebuild import upgrade
 from lupin_twin.journal.retention import Limits, forget, purge_step
-from lupin_twin.journal.schema import DamagedFile, open_reader, open_writer, transaction
+from lupin_twin.journal.schema import DamagedFile, open_reader, open_writer, set_meta, transaction
 from tests.support.journal import NOW, SECOND, kept, look, pin, scan
 from tests.support.journal_answers import NAMES, answer, answers, old, same
 
@@ -74,12 +75,27 @@ def test_a_lot_that_was_broken_off_leaves_the_file_as_it_was(source: Path, tmp_p
     copy(source, target)
     before = contents(target)
     id_ = follow.followed(source).journal
-    bad = ('["scan",1]', "[]", "{", '["notes",1]', '["scan",99,98,1,null,1,0,"","","",0,"[1]"]')
+    bad = (
+        *('["scan",1]', "[]", "{", '["notes",1]', '["scan",99,98,1,null,1,0,"","","",0,"[1]"]'),
+        *('["meta","purged_ns:1","x"]', '["meta","lost_ns:1","1e3"]', '["meta",7,"1"]'),
+        *('["meta","purged_seq","1.5"]', '["meta","followed_from_seq","x"]', "[" * 100_000),
+        *('["run",1,0,"x",1,1,null,null]', f'["run",{10**30},0,1,1,1,null,null]'),
+        *('["hour",null,1,"","","",""]', '["meta","forgotten:1","{\\"tag\\":[],\\"what\\":1}"]'),
+    )
     for text in bad:
         with pytest.raises(NotALotError):
             follow.write(target, Lot(id_, ('["meta","purged_ns:1","5"]', text), 999, True), NOW)
     assert contents(target) == before
     assert follow.followed(target).last == follow.followed(target).last < 999
+
+
+def test_a_copy_that_says_nonsense_of_itself_is_damaged(source: Path, tmp_path: Path) -> None:
+    target = tmp_path / "web.sqlite"
+    copy(source, target)
+    with closing(open_writer(target)) as connection, transaction(connection):
+        set_meta(connection, "purged_ns:1", "x")
+    with pytest.raises(DamagedFile, match="nonsense"):
+        follow.followed(target)
 
 
 def test_what_the_journal_deletes_is_deleted_in_the_copy_and_its_hours_stay(
@@ -126,6 +142,47 @@ def test_a_copy_that_lacks_what_was_deleted_meanwhile_is_made_anew(
     copy(source, target)
     kept(source, [scan(at_ns=NOW + (n + 60) * 600 * SECOND) for n in range(30)])
     purge(source, NOW + 85 * 600 * SECOND)
+    with pytest.raises(DamagedFile, match="were deleted in the journal"):
+        copy(source, target)
+    target.unlink()
+    copy(source, target)
+    assert contents(target) == contents(source)
+
+
+def test_a_copy_is_whole_in_the_end_though_the_journal_deletes_all_the_time(tmp_path: Path) -> None:
+    source, target = tmp_path / "twin.sqlite", tmp_path / "web.sqlite"
+    first = NOW // HOUR_NS * HOUR_NS
+    at = [first + n * 10 * SECOND for n in range(60)]
+    kept(source, [scan(str(n % 12), at_ns) for n, at_ns in enumerate(at)])
+    purge(source, at[20])
+    after, is_all, lots = 0, False, 0
+    while not is_all:
+        with reading(source) as connection:
+            lot = follow.read(connection, after, 2)
+        follow.write(target, lot, NOW, after)
+        after, is_all, lots = lot.last, lot.is_all, lots + 1
+        if lots < 20:
+            purge(source, at[20 + lots])
+    assert lots > 6
+    assert contents(target) == contents(source)
+
+
+@pytest.mark.parametrize("said", ["x", "nan", "-5", "0", "1e-300", "inf", "1e300"])
+def test_a_day_of_no_length_is_the_usual_one(said: str, source: Path) -> None:
+    with closing(open_writer(source)) as connection, transaction(connection):
+        set_meta(connection, "day_length_s", said)
+    assert follow.followed(source).world.day_length_s == 86_400.0
+
+
+def test_a_copy_that_was_behind_when_a_tag_was_forgotten_is_made_anew(
+    source: Path, tmp_path: Path
+) -> None:
+    target = tmp_path / "web.sqlite"
+    copy(source, target)
+    # Scans that stay in the site's counts, and of which the copy never hears.
+    kept(source, [scan(at_ns=NOW + 600 * 600 * SECOND)])
+    forget(source, "7", pose_only=False, by="who", at_ns=NOW)
+    kept(source, [scan("8", NOW + 601 * 600 * SECOND)])
     with pytest.raises(DamagedFile, match="were deleted in the journal"):
         copy(source, target)
     target.unlink()

@@ -26,7 +26,7 @@ from lupin_twin.journal.appending import PURGED_SEQ, Stretch, simulated
 from lupin_twin.journal.checking import WRITTEN
 from lupin_twin.journal.hours import DELETED, FORGOTTEN, TALLIED, count_rows
 from lupin_twin.journal.notes import id_behind, number_of
-from lupin_twin.journal.retention import RECORD, Stretches, delete_recorded, kept
+from lupin_twin.journal.retention import RECORD, Stretches, delete_recorded, kept, records
 from lupin_twin.journal.runs import world_of
 from lupin_twin.journal.schema import (
     DAY_LENGTH,
@@ -50,6 +50,8 @@ _FACTS: Final = (
 )
 _FOLLOWED: Final = "followed_seq"
 _COMPLETE: Final = "followed_to_ns"
+# The last number of the journal when the first lot was read.
+_BEGUN: Final = "followed_from_seq"
 _COLUMNS: Final = {
     "run": 7, "meta": 2, "series": 5, "scan": 11, "look": 16, "place": 13, "note": 7,
     "hour": 6, "tally": 9, "event": 6,
@@ -98,6 +100,11 @@ _HOURS_OF: Final = (
 )
 # What an hour takes as a row.
 _HOUR_BYTES: Final = 120
+# What rows of a liar, or of a damaged log, raise; `sqlite3` itself says of a file what it is.
+_UNUSABLE: Final = (
+    *(ValueError, TypeError, LookupError, ArithmeticError, AttributeError, RecursionError),
+    *(sqlite3.IntegrityError, sqlite3.ProgrammingError, DamagedFile),
+)
 
 
 class Lot(NamedTuple):
@@ -136,13 +143,15 @@ def read(connection: sqlite3.Connection, after: int, most: int = MAX_ROWS) -> Lo
     log = SiteLog(connection)
     texts = [_text("run", row) for row in _all(log, "run")]
     texts += [_text("meta", row) for row in _all(log, "meta") if row[1].startswith(_FACTS)]
+    if after == 0 and (newest := _newest(connection)):
+        texts.append(_text("meta", (LOCAL_SITE, _BEGUN, str(newest[0]))))
     found = [
         (number_of(row[1]) if table == "note" else row[1], rank, row)
         for rank, table in enumerate(_NUMBERED)
         for row in _behind(log, table, after, most)
     ]
     found.sort(key=lambda entry: entry[:2])
-    purged: dict[int, int] = dict(log.execute(_PURGED).fetchall())
+    purged = _purged(connection)
     last, weight, is_all = after, 0, True
     for place, (number, rank, row) in enumerate(found):
         if (place >= most or weight > _MAX_BYTES) and number != last:
@@ -177,17 +186,22 @@ def write(path: Path, lot: Lot, complete_ns: int | None, behind: int = 0) -> Fol
         with transaction(connection):
             if _last(connection) < behind:
                 raise NotALotError(f"rows behind number {behind} for a file that ends before it")
-            purged = _purged_seq(connection)
+            gone, hours = _gone_seq(connection), _purged(connection)
             set_meta(connection, "journal_id", lot.journal)
             try:
                 _put(connection, lot)
-            except (ValueError, TypeError, KeyError, IndexError, DamagedFile) as error:
+                _followed(connection)
+                upto, begun = _gone_seq(connection), int(get_meta(connection, _BEGUN) or 0)
+            except _UNUSABLE as error:
                 raise NotALotError(f"rows that are none of a log: {error}") from error
-            if 0 < behind < _purged_seq(connection) != purged:
+            # What came before the copy began is in the counts of those hours; without this, none
+            # would ever be whole where a journal deletes every minute.
+            is_counted = upto <= begun and _purged(connection) == hours
+            if 0 < behind < upto != gone and not is_counted:
                 raise DamagedFile("rows that it does not have yet were deleted in the journal")
             set_meta(connection, _FOLLOWED, max(lot.last, _last(connection)))
             if not lot.is_all or complete_ns is None:
-                complete_ns = _newest_ns(connection)
+                complete_ns = (_newest(connection) or (0, None))[1]
             if complete_ns is not None:
                 set_meta(connection, _COMPLETE, complete_ns)
         connection.execute("PRAGMA wal_checkpoint(PASSIVE)").fetchall()
@@ -202,7 +216,10 @@ def followed(path: Path) -> Followed:
 
     """
     with closing(open_reader(path)) as connection:
-        return _followed(connection)
+        try:
+            return _followed(connection)
+        except _UNUSABLE as error:
+            raise DamagedFile(f"{path} says nonsense of itself: {error}") from error
 
 
 def _followed(connection: sqlite3.Connection) -> Followed:
@@ -211,7 +228,7 @@ def _followed(connection: sqlite3.Connection) -> Followed:
         _journal_id(log),
         _last(connection),
         world_of(log),
-        int(log.meta(_COMPLETE) or 0) or _newest_ns(connection) or 0,
+        int(log.meta(_COMPLETE) or 0) or (_newest(connection) or (0, 0))[1],
         kept(connection),
         simulated(connection),
     )
@@ -221,8 +238,8 @@ def _last(connection: sqlite3.Connection) -> int:
     return int(get_meta(connection, _FOLLOWED) or 0)
 
 
-def _newest_ns(connection: sqlite3.Connection) -> int | None:
-    """The stamp of what was received last."""
+def _newest(connection: sqlite3.Connection) -> tuple[int, int] | None:
+    """The number and the stamp of what was received last."""
     found = [
         row
         for table in WRITTEN
@@ -231,7 +248,7 @@ def _newest_ns(connection: sqlite3.Connection) -> int | None:
             (LOCAL_SITE,),
         )
     ]
-    return max(found)[1] if found else None
+    return max(found, default=None)
 
 
 # --- out of a log ---------------------------------------------------------------------------------
@@ -277,8 +294,7 @@ def _put(connection: sqlite3.Connection, lot: Lot) -> None:
             counted.append((table, row))
         elif table not in WRITTEN or row[0] > after:
             _insert(connection, table, row, replaces=table in {"run", "meta"})
-    purged = log.execute(_PURGED).fetchall()
-    counted_ns = {run: (hour + 1) * HOUR_NS - 1 for run, hour in purged}
+    counted_ns = {run: (hour + 1) * HOUR_NS - 1 for run, hour in _purged(connection).items()}
     count_rows(log, after, lot.last, counted_ns)
     # Another process may have put newer ones in.
     if lot.last >= after:
@@ -299,6 +315,16 @@ def _insert(connection: sqlite3.Connection, table: str, row: list[Any], *, repla
 
 def _purged_seq(connection: sqlite3.Connection) -> int:
     return int(get_meta(connection, PURGED_SEQ) or 0)
+
+
+def _purged(connection: sqlite3.Connection) -> dict[int, int]:
+    return dict(SiteLog(connection).execute(_PURGED).fetchall())
+
+
+def _gone_seq(connection: sqlite3.Connection) -> int:
+    """Up to this number rows were deleted that had been counted: by age, by size, or forgotten."""
+    forgotten = (int(str(record["seq"])) for record in records(connection))
+    return max(_purged_seq(connection), *forgotten, 0)
 
 
 def _rows(texts: Iterable[str]) -> Iterator[list[Any]]:

@@ -151,8 +151,12 @@ def world_of(log: SiteLog) -> World:
     span = span_at(runs(log.execute), FOREVER_NS)
     is_simulated = span is not None and span.run.begun.is_simulated
     origin = origin_of(log.meta(ORIGIN) or "", is_simulated=is_simulated)
-    day = log.meta(DAY_LENGTH)
-    return World(origin) if day is None else World(origin, float(day))
+    try:
+        day_s = float(log.meta(DAY_LENGTH) or "")
+    except ValueError:
+        day_s = 0.0
+    # Else it is none: all that shows or estimates by the day would end in it.
+    return World(origin, day_s) if 1.0 <= day_s <= World().day_length_s else World(origin)
 
 
 def cut(axis: Iterable[Span], start_ns: int, end_ns: int) -> list[Span]:

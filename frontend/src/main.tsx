@@ -40,7 +40,7 @@ onChange(
   },
 );
 
-const kiosk = new URLSearchParams(window.location.search).get('kiosk') === '1';
+const kiosk = new URLSearchParams(window.location.search).has('kiosk');
 const cycle = cycleWish(window.location.search);
 
 document.documentElement.lang = LANGUAGE;

@@ -375,6 +375,29 @@ _BROKEN = """() => [...document.querySelectorAll('thead button > span:first-chil
   }).map(([word]) => word))"""
 
 
+# Two heads whose words stand closer together than the words of one; and those that are cut.
+_HEADS_TOO_CLOSE = """() => {
+  const boxes = [...document.querySelectorAll('thead button')]
+    .filter((head) => head.checkVisibility())
+    .map((head) => [head, document.createRange()])
+    .map(([head, range]) => (range.selectNodeContents(head.firstChild), [head, range]));
+  const cut = boxes.filter(([head]) => head.scrollHeight > head.clientHeight + 1);
+  const close = boxes.filter(([, range], at) => at > 0 && range.getBoundingClientRect().left
+    < boxes[at - 1][1].getBoundingClientRect().right + 8);
+  return [...cut, ...close].map(([head]) => head.textContent);
+}"""
+
+
+def test_two_heads_of_the_table_do_not_read_as_one(house: Bridge, open_page: OpenPage) -> None:
+    hmi = open_page(house.url, go=False)
+    for language in ("en", "es"):
+        hmi.go(query=f"?lang={language}")
+        for width in (1100, 1280, 1440):
+            hmi.resize(width, 800)
+            expect(hmi.row("1")).to_be_visible()
+            assert hmi.page.evaluate(_HEADS_TOO_CLOSE) == [], (language, width)
+
+
 def test_a_head_breaks_no_word_and_the_chosen_sensor_moves_no_age(
     house: Bridge, open_page: OpenPage
 ) -> None:

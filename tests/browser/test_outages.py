@@ -100,7 +100,7 @@ def test_a_server_that_is_killed_and_starts_anew_with_other_tags(
         old.kill()
     hmi.allow_noise(SERVER_GONE)
     hmi.expect_phase("reconnecting")
-    expect_frozen(hmi, "reconnects automatically")
+    expect_frozen(hmi, "Connection to the server lost")
     hmi.expect_rows("a", "gone")
 
     with (

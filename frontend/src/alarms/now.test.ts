@@ -5,7 +5,7 @@ import type { TagThen } from '../domain/difference';
 import { alarm } from '../testing/alarms';
 import { reason } from '../testing/health';
 import { readings, tag } from '../testing/tags';
-import { nowOf } from './words';
+import { nowOf, reasonNow } from './words';
 
 const cold = alarm('a', { worst: 4 });
 const state = (value: number | null, ...reasons: readonly Partial<HealthReason>[]): TagThen => ({
@@ -43,6 +43,15 @@ test.each([
   ['there is no such tag', null, true, null],
 ] as const)('it is not known where %s', (_, then, isLive, last) => {
   expect(nowOf(cold, then, null, isLive)).toMatchObject({ kind: 'unknown', last });
+});
+
+test.each([
+  [state(8, { verdict: 'stressed' }), 'stressed'],
+  [state(20), 'healthy'],
+  [state(8, { ...old, sensor: 'temperature' }), 'critical'],
+] as const)('of a silent twin it counts as bad as it was last', (then, verdict) => {
+  const raised = alarm('a', { reason: { verdict: 'critical' } });
+  expect(reasonNow(raised, nowOf(raised, then, null, false)).verdict).toBe(verdict);
 });
 
 test('another sensor’s age does not matter, but of what is derived', () => {

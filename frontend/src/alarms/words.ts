@@ -184,9 +184,15 @@ export type Now =
       readonly kind: 'unknown';
       readonly last: number | null;
       readonly lastAt: When;
+      /** How it was when the twin fell silent; null: not known then either. */
+      readonly before?: Extract<Now, { kind: 'known' }> | null;
     };
 
-const unknown = (last: number | null, lastAt: When): Now => ({ kind: 'unknown', last, lastAt });
+const unknown = (
+  last: number | null,
+  lastAt: When,
+  before: Extract<Now, { kind: 'known' }> | null = null,
+): Now => ({ kind: 'unknown', last, lastAt, before });
 
 /**
  * `tag` and `hourAgo` are the alarm's tag as the bridge judged it last, and an hour before; null: not
@@ -194,15 +200,22 @@ const unknown = (last: number | null, lastAt: When): Now => ({ kind: 'unknown', 
  * value, or is resolved.
  */
 export function nowOf(
-  { reason, cleared_at: clearedAt }: Alarm,
+  alarm: Alarm,
   tag: TagThen | null,
   hourAgo: TagThen | null,
   isLive: boolean,
 ): Now | null {
-  const { kind, sensor } = reason;
+  const { kind, sensor } = alarm.reason;
   const isPest = kind === 'pest';
-  if (clearedAt !== null || !(isPest || kind === 'range' || kind === 'changed')) return null;
-  if (!tag || (isPest && !isLive)) return unknown(null, 'unknown');
+  if (alarm.cleared_at !== null || !(isPest || kind === 'range' || kind === 'changed')) return null;
+  if (!tag) return unknown(null, 'unknown');
+  if (!isLive) {
+    const before = nowOf(alarm, tag, hourAgo, true);
+    if (before?.kind !== 'known') return before;
+    return isPest
+      ? unknown(null, 'unknown', before)
+      : unknown(before.value, tag.tag.readAt.get(sensor) ?? 'unknown', before);
+  }
   const said = tag.health.reasons.find((each) => each.kind === kind && each.sensor === sensor);
   const verdict = said?.verdict ?? 'healthy';
   if (isPest) {
@@ -216,10 +229,10 @@ export function nowOf(
   // Of what is within its range nothing is said, nor what it is.
   const lacks = ({ kind: why, verdict: how }: HealthReason): boolean =>
     how === 'unknown' || why === 'reading_failed';
-  if (isLive && isDerived && !said && !tag.health.reasons.some(lacks)) {
+  if (isDerived && !said && !tag.health.reasons.some(lacks)) {
     return { kind: 'known', value: null, verdict, reason: null, trend: null };
   }
-  if (!isLive || last === null || isOldReading(sensor, tag)) {
+  if (last === null || isOldReading(sensor, tag)) {
     return unknown(last, readAt.get(sensor) ?? 'unknown');
   }
   const trend = trendOf(sensor, tag, hourAgo);
@@ -232,12 +245,17 @@ export function nowOf(
   };
 }
 
+/** How it is now, or was when the twin fell silent; nothing: nobody knows. */
+export const lastKnown = (now: Now | null): Extract<Now, { kind: 'known' }> | null | undefined =>
+  now?.kind === 'unknown' ? now.before : now;
+
 /** Why, as it is now, and how bad that is; as it was said last where nobody knows, or it has no value. */
 export function reasonNow({ reason }: Alarm, now: Now | null): HealthReason {
-  if (now?.kind !== 'known') return reason;
-  return now.reason
-    ? { ...now.reason, value: now.value ?? reason.value }
-    : { ...reason, verdict: now.verdict };
+  const known = lastKnown(now);
+  if (!known) return reason;
+  return known.reason
+    ? { ...known.reason, value: known.value ?? reason.value }
+    : { ...reason, verdict: known.verdict };
 }
 
 /** Its worst value, never better than that of now, which may come first; null: there is none. */

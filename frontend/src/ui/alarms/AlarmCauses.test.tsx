@@ -48,4 +48,5 @@ test('many of one cause that are resolved have nothing to do, and no time in com
   fireEvent.click(screen.getByText('Resolved in the last 24 h (5)'));
   const heading = screen.getByRole('button', { name: /Temperature too low · 5 alarms/ });
   expect(heading.querySelector('.alarm-do, [data-fact=since]')).toBeNull();
+  expect(heading.parentElement?.querySelector('.alarm-tools')).toBeNull();
 });

@@ -103,6 +103,9 @@ test('the value of now follows the newest state, with its own severity', () => {
   const now = fact(first('active'), 'now');
   expect([now.textContent, now.dataset['status']]).toEqual([' now 12.3\u00a0°C', 'stressed']);
   expect(fact(first('active'), 'worst').dataset['status']).toBe('critical');
+  // A connection that is lost makes nothing worse.
+  flush(goLost);
+  expect(fact(first('active'), 'since').textContent).toContain('Stressed');
 });
 
 test('what is worse now than the alarm has said yet is the worst, with its severity', () => {

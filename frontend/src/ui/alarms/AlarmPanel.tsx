@@ -312,7 +312,7 @@ function CauseHeading({
         <span data-fact="now">{current}</span>
         <span data-fact="worst">{worst}</span>
       </button>
-      {group !== 'shelved' && (
+      {group === 'active' && (
         <div className="alarm-tools">
           <Acknowledge
             label={S.alarmAcknowledgeOf(cause)}

@@ -12,7 +12,7 @@ import {
   unshelveAlarm,
 } from '../../alarms/own';
 import { selectSpeech } from '../../alarms/speech';
-import { nameText, whereText } from '../../alarms/words';
+import { lastKnown, nameText, whereText } from '../../alarms/words';
 import { clockText } from '../../domain/format';
 import { C } from '../../notes/CommentMarks';
 import { Field, Said } from '../../notes/Comments';
@@ -35,7 +35,7 @@ export const AlarmRow = memo(function AlarmRow({
   const { alarm, verdict, isAcknowledged } = item;
   const isSelected = useApp((state) => state.view.selected === alarm.tag_id);
   const values = useValues(alarm);
-  const current = values.state?.kind === 'known' ? values.state.verdict : verdict;
+  const current = lastKnown(values.state)?.verdict ?? verdict;
   const name = useApp((state) => nameText(alarm, selectSpeech(state)));
   const status = useStatus(item, group);
   // While the order is held, it has no line for that: nothing is to be done meanwhile.

@@ -33,8 +33,7 @@ export const PAGE: In<typeof EN.PAGE> = {
   hours: 'h',
   frozenWhy: {
     stale: 'Die Verbindung besteht, aber es kommt nichts mehr an.',
-    reconnecting:
-      'Die Verbindung zum Server ist unterbrochen; die Seite verbindet sich von selbst wieder.',
+    reconnecting: 'Die Verbindung zum Server ist unterbrochen.',
     connecting: 'Warten auf Antwort des Servers.',
     live: '',
     offline: 'Der Server antwortet, der Zwilling aber nicht.',

@@ -32,7 +32,7 @@ export const PAGE = {
   hours: 'h',
   frozenWhy: {
     stale: 'The connection is open, but no data arrives.',
-    reconnecting: 'Connection to the server lost. The page reconnects automatically.',
+    reconnecting: 'Connection to the server lost.',
     connecting: 'Waiting for the server to respond.',
     live: '',
     offline: 'The server responds, but the twin does not.',

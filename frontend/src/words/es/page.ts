@@ -31,7 +31,7 @@ export const PAGE: In<typeof EN.PAGE> = {
   hours: 'h',
   frozenWhy: {
     stale: 'La conexión está abierta, pero no llegan datos.',
-    reconnecting: 'Se ha perdido la conexión con el servidor; la página se reconecta sola.',
+    reconnecting: 'Se ha perdido la conexión con el servidor.',
     connecting: 'Esperando la respuesta del servidor.',
     live: '',
     offline: 'El servidor responde, pero el gemelo no.',

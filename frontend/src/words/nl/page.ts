@@ -31,8 +31,7 @@ export const PAGE: In<typeof EN.PAGE> = {
   hours: 'u',
   frozenWhy: {
     stale: 'De verbinding is er, maar er komen geen gegevens binnen.',
-    reconnecting:
-      'De verbinding met de server is verbroken; de pagina maakt vanzelf opnieuw verbinding.',
+    reconnecting: 'De verbinding met de server is verbroken.',
     connecting: 'Wachten op antwoord van de server.',
     live: '',
     offline: 'De server antwoordt, maar de digital twin niet.',

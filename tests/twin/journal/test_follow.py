@@ -260,7 +260,7 @@ def test_whatever_happens_to_a_journal_a_whole_copy_has_the_same(  # noqa: C901 
         tag, made = chance.choice("789"), chance.randrange(3)
         if made == 0:
             return look(tag, at_ns, anomaly=chance.random() < 0.5)
-        return scan(tag, at_ns, **({"co2": 400.0} if made == 1 else {}))
+        return scan(tag, at_ns) if made == 1 else scan(tag, at_ns, co2=400.0)
 
     for _ in range(chance.randrange(4, 20)):
         match chance.choice(("new", "new", "late", "delete", "forget", "copy", "whole")):

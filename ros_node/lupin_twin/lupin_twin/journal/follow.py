@@ -19,10 +19,7 @@ from pathlib import Path
 from typing import Any, Final, NamedTuple
 
 from lupin_twin.core.parameters import World
-from lupin_twin.core.past import (
-    HOUR_NS,
-    Event,
-)
+from lupin_twin.core.past import HOUR_NS, Event
 from lupin_twin.journal.appending import PURGED_SEQ, Stretch, simulated
 from lupin_twin.journal.checking import WRITTEN
 from lupin_twin.journal.hours import DELETED, FORGOTTEN, TALLIED, count_rows
@@ -146,8 +143,9 @@ def read(connection: sqlite3.Connection, after: int, most: int = MAX_ROWS) -> Lo
     log = SiteLog(connection)
     texts = [_text("run", row) for row in _all(log, "run")]
     texts += [_text("meta", row) for row in _all(log, "meta") if row[1].startswith(_FACTS)]
-    if after == 0 and (newest := _newest(connection)):
-        texts.append(_text("meta", (LOCAL_SITE, _BEGUN, str(newest[0]))))
+    if after == 0:
+        newest = max((_newest(connection) or (0,))[0], _gone_seq(connection))
+        texts.append(_text("meta", ("", _BEGUN, str(newest))))
     found = [
         (number_of(row[1]) if table == "note" else row[1], rank, row)
         for rank, table in enumerate(_NUMBERED)
@@ -188,14 +186,14 @@ def write(path: Path, lot: Lot, complete_ns: int | None, behind: int = 0) -> Fol
     path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
     with closing(open_writer(path)) as connection:
         with transaction(connection):
-            if _last(connection) < behind:
+            last, purged = _last(connection), _purged(connection)
+            if last < behind:
                 raise NotALotError(f"rows behind number {behind} for a file that ends before it")
-            gone, hours = _gone_seq(connection), _purged(connection)
             set_meta(connection, "journal_id", lot.journal)
             try:
                 _put(connection, lot)
                 _followed(connection)
-                upto, begun = _gone_seq(connection), int(get_meta(connection, _BEGUN) or 0)
+                gone, begun = _gone_seq(connection), int(get_meta(connection, _BEGUN) or 0)
             except _UNUSABLE as error:
                 raise NotALotError(f"rows that are none of a log: {error}") from error
             # One that was put back from a backup gives its numbers to other rows.
@@ -205,10 +203,10 @@ def write(path: Path, lot: Lot, complete_ns: int | None, behind: int = 0) -> Fol
                 raise DamagedFile("the journal has other rows by now")
             # What came before the copy began is in the counts of those hours; without this, none
             # would ever be whole where a journal deletes every minute.
-            is_counted = upto <= begun and _purged(connection) == hours
-            if 0 < behind < upto != gone and not is_counted:
+            is_counted = gone <= begun and _purged(connection) == purged
+            if 0 < last < gone and not is_counted:
                 raise DamagedFile("rows that it does not have yet were deleted in the journal")
-            set_meta(connection, _FOLLOWED, max(lot.last, _last(connection)))
+            set_meta(connection, _FOLLOWED, max(lot.last, last))
             if not lot.is_all or complete_ns is None:
                 complete_ns = (_newest(connection) or (0, None))[1]
             if complete_ns is not None:

@@ -1,9 +1,7 @@
-"""The shared token, the sessions of browsers that it opens, and our cookies in a request. Pure.
+"""Who makes a request and what they may; the shared token, its sessions, and our cookies. Pure.
 
 A session of the shared token is a signed cookie (`itsdangerous`) and stands in no table, so it
 survives a restart and holds at every replica that has the same token. A new token ends them all.
-
-Who makes a request and what they may: names, roles, sites.
 """
 
 from __future__ import annotations
@@ -187,12 +185,11 @@ def _digest(secret: str) -> bytes:
     return hashlib.sha256(secret.encode()).digest()
 
 
-# Our own cookie out of a request's headers, by one look along them. Pure.
-#
+# --- our own cookie, out of a request's headers ---------------------------------------------------
+
 # The standard library's parser undoes quotes and escapes, before Python 3.11.10 and 3.12.6 in a
 # time that grows with the square of the length (CVE-2024-7592): 40 kB of backslashes held up
 # everybody for two seconds. Ours is never quoted, and nobody else's is looked at.
-
 
 # What a browser keeps for one host may be more, but no WebSocket handshake with a longer line gets
 # through: without this limit, the page would come and its data would not.

@@ -1,8 +1,8 @@
 """Questions about the past as values, so that another process may answer them.
 
-It reads the journal, makes answers, and ends with its parent. Questions
-come in on standard input, and their answers go out on standard output, finished: whatever they
-take, they take no turn of the parent's interpreter. It loads no ROS.
+That reads the journal, makes answers, and ends with its parent. Questions come in on standard
+input, and their answers go out on standard output, finished: whatever they take, they take no turn
+of the parent's interpreter. It loads no ROS.
 """
 
 from __future__ import annotations

@@ -209,19 +209,23 @@ class Robot(RobotNow):
 
 # --- the past -------------------------------------------------------------------------------------
 
-_COMPLETE_TO = Field(
-    description="all that was received before this is in the journal; null: not known"
-)
-_KEPT_FROM = Field(
-    description="from here on every single reading and event is in the journal; null: not known"
-)
-
 
 class Period(Contract):
     """A stretch of time, `from` <= t < `to`."""
 
     from_: Time = Field(alias="from")
     to: Time
+
+
+class PastPeriod(Period):
+    """What the log has of a period, and of which part of it all."""
+
+    complete_to: Time | None = Field(
+        description="all that was received before this is in the journal; null: not known"
+    )
+    kept_from: Time | None = Field(
+        description="from here on every single reading and event is in the journal; null: not known"
+    )
 
 
 class Bucket(Contract):
@@ -234,7 +238,7 @@ class Bucket(Contract):
     max: float
 
 
-class History(Period):
+class History(PastPeriod):
     """One sensor of one tag over a period: `readings`, or `buckets` where they are too many."""
 
     tag_id: str
@@ -250,8 +254,6 @@ class History(Period):
     nights: list[Period] | None = Field(
         description="nights by the clock that meet it; null: simulated, or over 400 days"
     )
-    complete_to: Time | None = _COMPLETE_TO
-    kept_from: Time | None = _KEPT_FROM
 
 
 class TimelineBucket(Contract):
@@ -271,7 +273,7 @@ class ClockRun(Period):
     is_simulated: bool
 
 
-class Timeline(Period):
+class Timeline(PastPeriod):
     """What happened over a period, and what of the past is remembered at all."""
 
     bucket_s: float = Field(description="s, length of a bucket")
@@ -283,8 +285,6 @@ class Timeline(Period):
     )
     silences: list[Period] = Field(description="stretches without any attempt")
     runs: list[ClockRun] = Field(description="the runs of the clock that meet this period")
-    complete_to: Time | None = _COMPLETE_TO
-    kept_from: Time | None = _KEPT_FROM
 
 
 class ReportCounts(Contract):
@@ -338,7 +338,7 @@ class ReportLeftOut(Contract):
     never_scanned: int
 
 
-class ShiftReport(Period):
+class ShiftReport(PastPeriod):
     """What happened between two moments, as it was known at the second one."""
 
     counts: ReportCounts
@@ -353,5 +353,3 @@ class ShiftReport(Period):
     sensors: list[ReportSensor]
     never_scanned: list[str] = Field(description="tags without a scan in the period")
     left_out: ReportLeftOut
-    complete_to: Time | None = _COMPLETE_TO
-    kept_from: Time | None = _KEPT_FROM

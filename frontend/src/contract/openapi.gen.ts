@@ -119,6 +119,8 @@ export interface components {
         readonly History: {
             readonly from: components["schemas"]["Time"];
             readonly to: components["schemas"]["Time"];
+            readonly complete_to: components["schemas"]["Time"] | null;
+            readonly kept_from: components["schemas"]["Time"] | null;
             readonly tag_id: string;
             readonly sensor_type: string;
             readonly unit: string;
@@ -128,8 +130,6 @@ export interface components {
             readonly buckets: readonly components["schemas"]["Bucket"][];
             readonly gaps: readonly components["schemas"]["Period"][];
             readonly nights: readonly components["schemas"]["Period"][] | null;
-            readonly complete_to: components["schemas"]["Time"] | null;
-            readonly kept_from: components["schemas"]["Time"] | null;
         };
         readonly HistoryReading: {
             readonly stamp: components["schemas"]["Time"];
@@ -314,13 +314,13 @@ export interface components {
         readonly Timeline: {
             readonly from: components["schemas"]["Time"];
             readonly to: components["schemas"]["Time"];
+            readonly complete_to: components["schemas"]["Time"] | null;
+            readonly kept_from: components["schemas"]["Time"] | null;
             readonly bucket_s: number;
             readonly reach: components["schemas"]["Period"] | null;
             readonly buckets: readonly components["schemas"]["TimelineBucket"][];
             readonly silences: readonly components["schemas"]["Period"][];
             readonly runs: readonly components["schemas"]["ClockRun"][];
-            readonly complete_to: components["schemas"]["Time"] | null;
-            readonly kept_from: components["schemas"]["Time"] | null;
         };
         readonly TimelineBucket: {
             readonly start: components["schemas"]["Time"];

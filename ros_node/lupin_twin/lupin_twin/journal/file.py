@@ -168,9 +168,8 @@ class JournalFile:
 
     def note_world(self, world: World) -> None:
         """Have it in the file what is observed from now on."""
-        for key, value in ((ORIGIN, world.origin), (DAY_LENGTH, str(world.day_length_s))):
-            if get_meta(self._connection, key) != value:
-                set_meta(self._connection, key, value)
+        set_meta(self._connection, ORIGIN, world.origin)
+        set_meta(self._connection, DAY_LENGTH, world.day_length_s)
 
     def put_map(self, floor: object, text_of: Callable[[], str]) -> None:
         """Have the newest map in the file, by this call or one to come; empty: it is too large."""

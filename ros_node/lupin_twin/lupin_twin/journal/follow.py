@@ -51,6 +51,7 @@ _COMPLETE: Final = "followed_to_ns"
 _UP_TO: Final = "followed_row"
 # The last number of the journal when the first lot was read.
 _BEGUN: Final = "followed_from_seq"
+_NO_END: Final = 2**63 - 1
 _COLUMNS: Final = {
     "run": 7, "meta": 2, "series": 5, "scan": 11, "look": 16, "place": 13, "note": 7,
     "hour": 6, "tally": 9, "event": 6,
@@ -144,8 +145,8 @@ def read(connection: sqlite3.Connection, after: int, most: int = MAX_ROWS) -> Lo
     texts = [_text("run", row) for row in _all(log, "run")]
     texts += [_text("meta", row) for row in _all(log, "meta") if row[1].startswith(_FACTS)]
     if after == 0:
-        newest = max((_newest(connection) or (0,))[0], _gone_seq(connection))
-        texts.append(_text("meta", ("", _BEGUN, str(newest))))
+        begun = max(_newest(connection)[0], _gone_seq(connection))
+        texts.append(_text("meta", ("", _BEGUN, str(begun))))
     found = [
         (number_of(row[1]) if table == "note" else row[1], rank, row)
         for rank, table in enumerate(_NUMBERED)
@@ -163,7 +164,7 @@ def read(connection: sqlite3.Connection, after: int, most: int = MAX_ROWS) -> Lo
         if _NUMBERED[rank] == "series" and row[2] in purged:
             of_series = {"series": number, "hour": purged[row[2]]}
             weight += log.execute(_HOURS_OF, of_series).fetchone()[0] * _HOUR_BYTES
-    texts.append(_text("meta", ("", _UP_TO, _up_to(log, after))))
+    texts.append(_text("meta", ("", _UP_TO, _up_to(connection, after))))
     if purged:
         for table, sql in _COUNTED.items():
             rows = log.execute(sql, {"after": after, "last": last}).fetchall()
@@ -197,9 +198,8 @@ def write(path: Path, lot: Lot, complete_ns: int | None, behind: int = 0) -> Fol
             except _UNUSABLE as error:
                 raise NotALotError(f"rows that are none of a log: {error}") from error
             # One that was put back from a backup gives its numbers to other rows.
-            told = get_meta(connection, _UP_TO) or ""
-            here = _up_to(SiteLog(connection), behind)
-            if told.startswith(f"{behind} ") and told != here:
+            there, here = get_meta(connection, _UP_TO) or "", _up_to(connection, behind)
+            if there.startswith(f"{behind} ") and there != here:
                 raise DamagedFile("the journal has other rows by now")
             # What came before the copy began is in the counts of those hours; without this, none
             # would ever be whole where a journal deletes every minute.
@@ -208,8 +208,8 @@ def write(path: Path, lot: Lot, complete_ns: int | None, behind: int = 0) -> Fol
                 raise DamagedFile("rows that it does not have yet were deleted in the journal")
             set_meta(connection, _FOLLOWED, max(lot.last, last))
             if not lot.is_all or complete_ns is None:
-                complete_ns = (_newest(connection) or (0, None))[1]
-            if complete_ns is not None:
+                complete_ns = _newest(connection)[1]
+            if complete_ns:
                 set_meta(connection, _COMPLETE, complete_ns)
         connection.execute("PRAGMA wal_checkpoint(PASSIVE)").fetchall()
         return _followed(connection)
@@ -235,7 +235,7 @@ def _followed(connection: sqlite3.Connection) -> Followed:
         _journal_id(log),
         _last(connection),
         world_of(log),
-        int(log.meta(_COMPLETE) or 0) or (_newest(connection) or (0, 0))[1],
+        int(log.meta(_COMPLETE) or 0) or _newest(connection)[1],
         kept(connection),
         simulated(connection),
     )
@@ -245,17 +245,18 @@ def _last(connection: sqlite3.Connection) -> int:
     return int(get_meta(connection, _FOLLOWED) or 0)
 
 
-def _newest(connection: sqlite3.Connection) -> tuple[int, int] | None:
-    """The number and the stamp of what was received last."""
+def _newest(connection: sqlite3.Connection, upto: int = _NO_END) -> tuple[int, int, int]:
+    """The number, stamp and arrival of what was received last, up to a number; 0: nothing."""
     found = [
         row
         for table in WRITTEN
         for row in connection.execute(
-            f"SELECT seq, stamp_ns FROM {table} WHERE site = ? ORDER BY seq DESC LIMIT 1",
-            (LOCAL_SITE,),
+            f"SELECT seq, stamp_ns, arrival_ns FROM {table} WHERE site = ? AND seq <= ?"
+            " ORDER BY seq DESC LIMIT 1",
+            (LOCAL_SITE, upto),
         )
     ]
-    return max(found, default=None)
+    return max(found, default=(0, 0, 0))
 
 
 # --- out of a log ---------------------------------------------------------------------------------
@@ -276,18 +277,10 @@ def _behind(log: SiteLog, table: str, after: int, most: int) -> list[tuple[Any, 
     )
 
 
-def _up_to(log: SiteLog, after: int) -> str:
+def _up_to(connection: sqlite3.Connection, after: int) -> str:
     """A number, and by what the last row up to it is known: its own, and its arrival."""
-    last = [
-        row
-        for table in WRITTEN
-        for row in log.execute(
-            f"SELECT seq, arrival_ns FROM {table} WHERE site = :site AND seq <= :after"
-            " ORDER BY seq DESC LIMIT 1",
-            {"after": after},
-        ).fetchall()
-    ]
-    return " ".join(map(str, (after, *max(last, default=()))))
+    seq, _, arrival_ns = _newest(connection, after)
+    return f"{after} {seq} {arrival_ns}"
 
 
 def _text(table: str, row: Iterable[Any]) -> str:

@@ -59,12 +59,8 @@ class Limits:
 
 def note_limits(connection: sqlite3.Connection, limits: Limits) -> None:
     """Have the limits in the file."""
-    for key, value in (
-        (RETENTION_NS, int(limits.days * DAY_NS)),
-        (RETENTION_BYTES, limits.max_bytes),
-    ):
-        if get_meta(connection, key) != str(value):
-            set_meta(connection, key, value)
+    set_meta(connection, RETENTION_NS, int(limits.days * DAY_NS))
+    set_meta(connection, RETENTION_BYTES, limits.max_bytes)
 
 
 def used_bytes(connection: sqlite3.Connection) -> int:

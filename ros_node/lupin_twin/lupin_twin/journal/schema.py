@@ -339,6 +339,7 @@ _META: Final = "SELECT value FROM meta WHERE site = :site AND key = :key"
 _SET_META: Final = (
     "INSERT INTO meta VALUES (:site, :key, :value)"
     " ON CONFLICT (site, key) DO UPDATE SET value = excluded.value"
+    " WHERE meta.value != excluded.value"
 )
 _NAME: Final = re.compile(r":([a-z_]+)")
 

@@ -97,8 +97,6 @@ class Supervisor:
 
 # --- listen, warn, say where, serve until a signal ------------------------------------------------
 
-log = logging.getLogger("lupin_bridge")
-
 
 def open_listener(settings: Settings, access: Access) -> socket.socket:
     """Listen, and warn of who may read.

@@ -21,7 +21,7 @@ from lupin_twin.runtime.estimates import Report, ReportRequest
 
 ResultT = TypeVar("ResultT")
 
-# A third of what counts as silence (`status.STALE_AFTER_S`).
+# A third of what counts as silence (`frames.STALE_AFTER_S`).
 HEARTBEAT_S = 1.0
 
 

@@ -168,7 +168,6 @@ ResultT = TypeVar("ResultT")
 # What a callback may take at worst, on a slow machine: the largest state there is takes a second.
 STUCK_AFTER_S: Final = 10.0
 
-
 ELSEWHERE: Final = (
     "this bridge only reads the log; notes are written at the bridge of the process that keeps the "
     "journal, `lupin-twin serve`"

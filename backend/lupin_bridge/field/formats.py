@@ -280,7 +280,7 @@ def write_estimate(
 
 
 def write_estimate_json(estimate: Estimate) -> bytes:
-    """`estimates.GetEstimateResponse`: `mean` and `sd` flat and row-major."""
+    """`followers.GetEstimateResponse`: `mean` and `sd` flat and row-major."""
     grid = estimate.grid
     rest = orjson.dumps(
         {

@@ -208,7 +208,7 @@ def _numbers(values: Any) -> list[float | None]:
 
 # --- what happened at every site ------------------------------------------------------------------
 
-# Under the names of `schema.ReportCounts`.
+# Under the names of `routes_schema.ReportCounts`.
 _COUNTED: Final = {
     Event.SCANS: "scans",
     Event.FAILURES: "failed",
@@ -305,7 +305,7 @@ def sites_report(parameters: Parameters, known: Mapping[str, Any], now_ns: int) 
     """The query of `/api/report`; `known` has all sites.
 
     Raises:
-        NotRemembered: see `compare.chosen`.
+        NotRemembered: see `chosen`.
         PastRefused: see `past.query.report`.
 
     """

@@ -100,7 +100,7 @@ def history_body(
     *,
     nights: Stretches | None = None,
 ) -> dict[str, Any]:
-    """`schema.History`; no gap reaches past `now_ns`, or into what is not written yet."""
+    """`routes_schema.History`; no gap reaches past `now_ns`, or into what is not written yet."""
     known = [at_ns for at_ns in (now_ns, journal.complete_ns) if at_ns is not None]
     now_ns = min(known, default=None)
     entries = list(
@@ -233,7 +233,7 @@ def timeline_body(
     silences: SeriesPast,
     journal: Condition = UNKNOWN,
 ) -> dict[str, Any]:
-    """`schema.Timeline` in the buckets of `period`, which is the `coarsest`.
+    """`routes_schema.Timeline` in the buckets of `period`, which is the `coarsest`.
 
     Silences may be too many and come in buckets. Then the longest of each is given, as if it began
     with its bucket. What goes on ends with the period here: a period that is over has one answer.

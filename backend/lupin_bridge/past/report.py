@@ -229,7 +229,7 @@ class _Fold:
     # --- what it leads to -------------------------------------------------------------------------
 
     def body(self, notes: Sequence[Note], known: Sequence[str]) -> dict[str, Any]:
-        """`schema.ShiftReport`; `known` are the tags by then."""
+        """`routes_schema.ShiftReport`; `known` are the tags by then."""
         start_ns, end_ns = self._of.start_ns, self._of.end_ns
         notes = [note for note in notes if note.made_at_ns < end_ns]
         alarms = self._alarms()

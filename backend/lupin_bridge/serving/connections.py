@@ -112,7 +112,7 @@ class Evictable(Protocol):
 
     @property
     def address(self) -> str:
-        """The client that it comes from (`rate_limit.client_key`)."""
+        """The client that it comes from (`admission.client_key`)."""
 
     @property
     def waiting_since_s(self) -> float | None:

@@ -34,15 +34,7 @@ from lupin_twin.core.past import NotRemembered, PastRefused
 from lupin_twin.core.state import Snapshot
 from lupin_twin.journal.beside import journal_path
 from lupin_twin.journal.follow import Followed, Lot, NotALotError, followed, write
-from lupin_twin.journal.runs import world_of
-from lupin_twin.journal.schema import (
-    FILE_ERRORS,
-    Empty,
-    Foreign,
-    SiteLog,
-    is_damage_error,
-    open_reader,
-)
+from lupin_twin.journal.schema import FILE_ERRORS, Empty, Foreign, is_damage_error
 from lupin_twin.ros import convert_services
 from lupin_twin.runtime.estimates import Report, ReportRequest
 from lupin_twin.runtime.workers import Workers
@@ -170,9 +162,9 @@ class FollowedLog:
 
     async def _look(self) -> float:
         """See where the log is, or take what is new of it; returns when to look again, s."""
-        named = self._named
-        if named is not None and not self._is_heard:
-            found = await self._on_worker(lambda: followed(named))
+        own = self._named or Path(self._reported.path)
+        found = await self._on_worker(lambda: _found(own))
+        if found is not None and self._named is not None and not self._is_heard:
             self._reported = Condition(
                 JournalState.RECORDING,
                 complete_ns=found.complete_ns,
@@ -183,11 +175,10 @@ class FollowedLog:
         twin = self._reported
         if not twin.journal_id:
             return POLL_S
-        own = named or Path(twin.path)
-        world = await self._on_worker(lambda: _world_of(own, twin.journal_id))
-        self._own = None if world is None else own
-        self.world = world or self.world
-        if world is not None or self._folder is None:
+        self._own = None
+        if found is not None and found.journal == twin.journal_id:
+            self._own, self.world = own, found.world
+        if self._own is not None or self._folder is None:
             return RETRY_S
         here = self._path(twin.journal_id)
         try:
@@ -236,12 +227,10 @@ def _last(path: Path) -> int:
         return 0
 
 
-def _world_of(path: Path, journal: str) -> World | None:
-    """What a file says is observed; None: it is not that journal's."""
+def _found(path: Path) -> Followed | None:
+    """What a file says of itself; None: it is not there, or cannot be read."""
     try:
-        with contextlib.closing(open_reader(path)) as connection:
-            log = SiteLog(connection)
-            return world_of(log) if log.meta("journal_id") == journal else None
+        return followed(path)
     except _FILE_ERRORS:
         return None
 

@@ -193,11 +193,11 @@ class Bridge:
 
     @property
     def judged(self) -> Judged:
-        """What was said with the last frame; of a house whose twin is silent, that it is."""
+        """What was said with the last frame; of a greenhouse whose twin is silent, that it is."""
         return self._judged if self.status.is_live else silenced(self._judged)
 
     def seen(self) -> GreenhouseState:
-        """How the house is now, for who tells others of it."""
+        """How the greenhouse is now, for notifications of it."""
         return GreenhouseState(
             self.status,
             self.judged,

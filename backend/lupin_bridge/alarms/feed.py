@@ -46,9 +46,9 @@ _UNKNOWN = TagState("")
 
 
 def writes_between(before: Snapshot | None, now: Snapshot, number: int) -> list[PastWrite]:
-    """The scans, looks and failed tries that are new, numbered from `number` on.
+    """The scans, inspections and failed attempts that are new, numbered from `number` on.
 
-    Of tries of one tag that lie closer together than two states, all but the last may be missed,
+    Of attempts at one tag that lie closer together than two states, all but the last may be missed,
     and one that failed counts as one at its sensors.
     """
     known = {} if before is None else {tag.tag_id: tag for tag in before.tags}
@@ -88,7 +88,7 @@ def _of_tag(before: TagState, tag: TagState) -> list[PastWrite]:
     return sorted(found, key=lambda write: write.stamp_ns)
 
 
-# --- what has changed, for the feed ---------------------------------------------------------------
+# --- the feed -------------------------------------------------------------------------------------
 
 log = logging.getLogger(__name__)
 
@@ -96,7 +96,7 @@ DAY_NS: Final = 86_400 * NANOSECONDS_PER_SECOND
 # Writes that are read at once: some tens of milliseconds of a worker.
 LOT: Final = 500
 LOT_S: Final = 0.05
-# And of the past in all: a large house's last day, a small one's weeks.
+# And of the past in all: a large greenhouse's last day, a small one's weeks.
 REACH_COUNT: Final = 300_000
 # What is observed stands in the journal so long after; and once more, for a disk that is slow.
 JOURNAL_S: Final = 0.15

@@ -274,12 +274,12 @@ def alarms_in_frame(page: Page, now_ns: int | None) -> list[Alarm]:
 
 
 def judgement(judged: Judged) -> bytes:
-    """The house and every tag."""
+    """The greenhouse and every tag."""
     return _text(judged, judged.tags)
 
 
 def judgement_since(before: Judged, now: Judged) -> bytes:
-    """The house, and the tags of whom not the same was said `before`; who is gone is absent."""
+    """The greenhouse, and the tags that are not as `before`; one that is gone is absent."""
     known = before.tags
     return _text(now, [key for key, one in now.tags.items() if known.get(key) is not one])
 

@@ -44,7 +44,7 @@ from lupin_twin.journal.runs import Clock, Run, runs, span_at
 from lupin_twin.journal.schema import FILE_ERRORS, open_named
 from lupin_twin.runtime.process import INTERRUPTED
 
-_TOLD_EVERY: Final = 20_000
+_REPORT_EVERY: Final = 20_000
 # Characters of a line; a field of the csv module has 131,072 at most.
 _MAX_LINE: Final = 1_000_000
 # Lines that are named of each reason; their count is before them.
@@ -197,7 +197,7 @@ def counted(file: TextIO, report_every: Callable[[int], None]) -> Iterator[str]:
         if len(line) == _MAX_LINE:
             raise csv.Error(f"line {number + 1} has {_MAX_LINE:,} characters or more")
         at += len(line)
-        if number % _TOLD_EVERY == 0:
+        if number % _REPORT_EVERY == 0:
             report_every(at)
         # InfluxDB's annotations
         yield "\n" if line.startswith("#") else line

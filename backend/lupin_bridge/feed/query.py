@@ -228,8 +228,6 @@ def _found(need: Any, now: Now, log: sqlite3.Connection) -> Any:
     match need:
         case SeriesRequest():
             return series(log, need, now.stamp_ns)
-        case WritesRequest() | PeriodRequest() | NotesRequest() | LatestRequest():
-            return _OF_LOG[type(need)](log, need)
         case RecentRequest() | ScansRequest():
             check_moment(need.at_ns, now.stamp_ns)
             return recent(log, need) if isinstance(need, RecentRequest) else scans(log, need)
@@ -237,7 +235,8 @@ def _found(need: Any, now: Now, log: sqlite3.Connection) -> Any:
             check_moment(need, now.stamp_ns)
             return state_at(log, need, now.frame_id)
         case _:
-            return need.step(log)
+            look = _OF_LOG.get(type(need))
+            return need.step(log) if look is None else look(log, need)
 
 
 def _portable(error: BaseException) -> BaseException:

@@ -123,11 +123,9 @@ export const selectNewestTag = ({ twin }: AppState, tagId: string): Tag | undefi
   byId(twin.latest.snapshot?.tags ?? NO_TAGS).get(tagId);
 
 /**
- * Where what the twin observed comes from, as it says. A simulation is told as such; a recording that
- * is played is, in nothing, of now.
+ * Where what the twin observed comes from, as it says, if that has to be told; null: a robot's, or of a twin
+ * that does not say. A recording that is played is, in nothing, of now.
  */
-
-/** Those that have to be told; null: a robot's, or of a twin that does not say. */
 type Origin = Exclude<StatusFrame['origin'], 'robot' | 'unknown'> | null;
 
 export function selectOrigin({ twin }: AppState): Origin {

@@ -2,7 +2,7 @@ import { type JSX, type ReactNode, useState } from 'react';
 
 import { shown } from '../domain/text';
 import { hasDate, type Period, PERIOD_KINDS, shortRosText, two } from '../domain/time';
-import { CommentMarks } from '../notes/CommentMarks';
+import { NoteMarks } from '../notes/NoteMarks';
 import { SiteComment } from '../notes/Comments';
 import { act, store, useApp } from '../store/app';
 import { useSelected } from '../store/create';
@@ -37,7 +37,7 @@ export function TimeBar(): JSX.Element | null {
         <SiteComment />
       </div>
       {period.kind === 'own' && <OwnPeriod period={period} isSimulated={!hasDate(nowS)} />}
-      <CommentMarks span={span} />
+      <NoteMarks span={span} />
       <Slider span={span} timeline={remembered.value} nowS={nowS} />
       {remembered.state === 'failed' && (
         <p className="timebar-note" role="status">

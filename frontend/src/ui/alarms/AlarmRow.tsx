@@ -14,8 +14,8 @@ import {
 import { selectSpeech } from '../../alarms/speech';
 import { lastKnown, nameText, whereText } from '../../alarms/words';
 import { clockText } from '../../domain/format';
-import { C } from '../../notes/CommentMarks';
-import { Field, Said } from '../../notes/Comments';
+import { C } from '../../notes/NoteMarks';
+import { CommentField, CommentList } from '../../notes/Comments';
 import { useApp } from '../../store/app';
 import { mayAct, person, useSelected } from '../../store/create';
 import { S } from '../../strings';
@@ -101,7 +101,7 @@ export const AlarmRow = memo(function AlarmRow({
         />
         <RowMenu item={item} name={name} />
       </div>
-      <Said subject={`alarm:${alarm.id}`} moment={null} />
+      <CommentList subject={`alarm:${alarm.id}`} moment={null} />
     </li>
   );
 });
@@ -151,7 +151,9 @@ function Actions({ item, name }: { item: Item; name: string }): JSX.Element {
   return (
     <div className="row-actions" ref={root}>
       {form === 'shelve' && <Shelving item={item} name={name} />}
-      {form === 'comment' && <Field subject={`alarm:${alarm.id}`} moment={null} onDone={close} />}
+      {form === 'comment' && (
+        <CommentField subject={`alarm:${alarm.id}`} moment={null} onDone={close} />
+      )}
       {form === null && (
         <ul className="menu-list">
           {act(S.alarmStart, then(goToStart), canLookBack)}

@@ -98,6 +98,10 @@ export function rosNow({ twin }: AppState, at: number): number | null {
 export const selectIsHeard = (state: AppState): boolean =>
   selectShown(state).moment !== null || isHeardNow(state);
 
+/** Whether the bridge does not answer: nothing comes, and nothing that is done here gets there. */
+export const selectIsCut = ({ twin: { phase } }: AppState): boolean =>
+  phase === 'stale' || phase === 'reconnecting';
+
 export const isHeardNow = ({ twin }: AppState): boolean =>
   twin.phase === 'live' && !twin.isTimeLost;
 

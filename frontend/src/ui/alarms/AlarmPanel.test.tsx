@@ -159,6 +159,20 @@ test('who may not act on what is shared is offered nothing of it', () => {
     person.dispatch({ ...session, name: 'anna', role: 'operator', can_write_notes: true });
   });
   expect(actions('6')).toEqual(['Go to start', 'Shelve', 'Comment']);
+  const possible = (): string[] =>
+    [...document.querySelectorAll<HTMLButtonElement>('.all-seen, .alarm-tools button')]
+      .filter(({ disabled, className }) => !disabled && className !== 'icon-button')
+      .map(({ textContent }) => textContent.trim());
+  const every = ['Acknowledge all (2)', 'Acknowledge', 'Acknowledge', 'Go to start'];
+  expect(possible()).toEqual([...every, 'Shelve', 'Comment']);
+  // What would be refused looks so.
+  flush(goLost);
+  expect(possible()).toEqual(['Go to start']);
+  // What stays this browser's own does not need the bridge.
+  flush(() => {
+    person.dispatch(null);
+  });
+  expect(possible()).toEqual([...every, 'Shelve']);
 });
 
 test('acknowledged, shelved, and back', () => {

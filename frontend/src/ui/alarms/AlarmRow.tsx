@@ -21,7 +21,7 @@ import { mayAct, person, useSelected } from '../../store/create';
 import { S } from '../../strings';
 import { Disclosure, Icon, useClose } from '../../widgets/controls';
 import { AlarmFacts, AlarmTimes, useValues } from './AlarmFacts';
-import { useWhoAcknowledged } from './people';
+import { useIsRefused, useWhoAcknowledged } from './people';
 
 /** One alarm: for how long, what and where, now and at worst; it leads to its tag as it is now. */
 export const AlarmRow = memo(function AlarmRow({
@@ -133,11 +133,12 @@ function Actions({ item, name }: { item: Item; name: string }): JSX.Element {
   const close = useClose();
   const root = useRef<HTMLDivElement>(null);
   const who = useSelected(person, (it) => it);
+  const isRefused = useIsRefused();
   const canLookBack = useApp((state) => state.twin.remembered.state !== 'off');
   useLayoutEffect(() => {
     root.current?.scrollIntoView({ block: 'nearest' });
   }, [form]);
-  const act = (text: string, action: () => void, isPossible = true): JSX.Element => (
+  const act = (text: string, action: () => void, isPossible = !isRefused): JSX.Element => (
     <li>
       <button type="button" disabled={!isPossible} onClick={once(action)}>
         {text}
@@ -241,6 +242,7 @@ export function Acknowledge({
   onAcknowledge: () => void;
 }): JSX.Element | null {
   const isAble = useSelected(person, mayAct);
+  const isRefused = useIsRefused();
   if (!isAble) {
     return status === null ? null : (
       <span className="alarm-status" title={status}>
@@ -256,6 +258,7 @@ export function Acknowledge({
       title={status ?? undefined}
       aria-label={status === null ? label : undefined}
       aria-disabled={status !== null}
+      disabled={isRefused}
       onClick={once(() => {
         if (status === null) onAcknowledge();
       })}

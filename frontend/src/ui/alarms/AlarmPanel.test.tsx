@@ -1,5 +1,5 @@
 import { act as flush, fireEvent, render, screen, within } from '@testing-library/react';
-import { afterEach, beforeEach, expect, test, vi } from 'vitest';
+import { beforeEach, expect, test, vi } from 'vitest';
 
 import { acknowledge, done, NOTHING_KEPT, own, shelveAlarm } from '../../alarms/own';
 import { startAlarms } from '../../alarms/watch';
@@ -14,18 +14,14 @@ import { judgement, reason } from '../../testing/health';
 import { readings, wireTag } from '../../testing/tags';
 import { AlarmPanel } from './AlarmPanel';
 
-let stop: () => void;
-
 beforeEach(() => {
   own.dispatch(NOTHING_KEPT);
   done.dispatch(null);
   person.dispatch(null);
   showTags([wireTag()]);
-  stop = startAlarms();
+  const stop = startAlarms();
   render(<AlarmPanel />);
-});
-afterEach(() => {
-  stop();
+  return stop;
 });
 
 const tell = (...list: readonly Alarm[]): void => {
@@ -157,22 +153,10 @@ test('who may not act on what is shared is offered nothing of it', () => {
   fireEvent.keyDown(document, { key: 'Escape' });
   flush(() => {
     person.dispatch({ ...session, name: 'anna', role: 'operator', can_write_notes: true });
+    goLost();
   });
   expect(actions('6')).toEqual(['Go to start', 'Shelve', 'Comment']);
-  const possible = (): string[] =>
-    [...document.querySelectorAll<HTMLButtonElement>('.all-seen, .alarm-tools button')]
-      .filter(({ disabled, className }) => !disabled && className !== 'icon-button')
-      .map(({ textContent }) => textContent.trim());
-  const every = ['Acknowledge all (2)', 'Acknowledge', 'Acknowledge', 'Go to start'];
-  expect(possible()).toEqual([...every, 'Shelve', 'Comment']);
-  // What would be refused looks so.
-  flush(goLost);
-  expect(possible()).toEqual(['Go to start']);
-  // What stays this browser's own does not need the bridge.
-  flush(() => {
-    person.dispatch(null);
-  });
-  expect(possible()).toEqual([...every, 'Shelve']);
+  expect(document.querySelectorAll('.all-seen:enabled, .alarm-tools li :enabled')).toHaveLength(1);
 });
 
 test('acknowledged, shelved, and back', () => {

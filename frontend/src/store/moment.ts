@@ -133,13 +133,12 @@ export const selectNewestTag = ({ twin }: AppState, tagId: string): Tag | undefi
 type Origin = Exclude<StatusFrame['origin'], 'robot' | 'unknown'> | null;
 
 export function selectOrigin({ twin }: AppState): Origin {
-  const origin = twin.connection.status?.origin;
+  const origin = twin.lastStatus?.origin;
   return origin === 'simulated' || origin === 'recorded' || origin === 'sim_time' ? origin : null;
 }
 
 /** How long a day of the greenhouse takes, seconds of its time: in a demo it is a short one. */
-export const selectDayS = ({ twin }: AppState): number =>
-  twin.connection.status?.day_length_s ?? DAY_S;
+export const selectDayS = ({ twin }: AppState): number => twin.lastStatus?.day_length_s ?? DAY_S;
 
 export const selectIsRecorded = (state: AppState): boolean => selectOrigin(state) === 'recorded';
 

@@ -56,7 +56,9 @@ export default defineConfig({
       output: {
         // In one piece: what later parts share with it would else be a file each, and more in all.
         codeSplitting: {
-          groups: [{ name: (id, modules) => (isFirst(id, modules) ? 'first' : null) }],
+          groups: [
+            { debugName: 'first', name: (id, modules) => (isFirst(id, modules) ? 'first' : null) },
+          ],
         },
       },
     },

@@ -70,7 +70,7 @@ void loadParts().then((parts) => {
   if (kiosk) {
     parts.startLeaving();
   } else {
-    parts.startComments();
+    parts.startNotes();
     parts.startRemembered();
     parts.startOpening();
   }

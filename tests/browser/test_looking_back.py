@@ -16,6 +16,7 @@ from lupin_twin.journal.fold import state_at
 from lupin_twin.journal.runs import Clock
 from lupin_twin.journal.schema import open_reader
 from tests.browser.hmi import PHONE, Hmi, OpenPage, point, press_at, slider
+from tests.browser.places import place
 from tests.browser.test_accessibility import violations
 from tests.support.journal import SECOND, kept, look, pin, scan
 from tests.support.messages import scan as observed
@@ -250,6 +251,15 @@ def test_a_lost_connection_is_told_and_the_past_stays(page: Hmi, hour: Hour) -> 
     expect(banner).to_contain_text("The past shown is not affected")
     expect(page.cell("a", "temperature")).to_have_text(then)
     expect(page.page.locator("canvas[data-layer=pins]")).to_have_css("opacity", "1")
+    page.resize(**PHONE)
+    # As wide as the words of a simulation make it.
+    page.page.locator(".past-word").evaluate(
+        "(it) => it.insertAdjacentHTML('afterend', '<span class=past-origin>Simulated</span>')"
+    )
+    back, badge = page.page.locator(".back-to-live"), page.test_id("connection")
+    assert place(back).right <= place(badge).left
+    expect(badge).to_have_text("Connection: Past · reconnecting")
+    page.resize(1280, 800)
     page.page.context.set_offline(False)
     page.page.clock.run_for(20_000)
     page.expect_phase("live")

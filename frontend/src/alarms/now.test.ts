@@ -10,8 +10,11 @@ import { nowOf, reasonNow } from './words';
 const cold = alarm('a', { worst: 4 });
 const state = (value: number | null, ...reasons: readonly Partial<HealthReason>[]): TagThen => ({
   tag: tag({ readings: readings({ temperature: value }) }),
-  health: { verdict: 'unknown', reasons: reasons.map(reason) },
+  // What this is about reads the reasons alone, but where there are none.
+  health: { verdict: reasons.length > 0 ? 'unknown' : 'healthy', reasons: reasons.map(reason) },
 });
+/** As without a clock. */
+const unjudged: TagThen = { ...state(8), health: { verdict: 'unknown', reasons: [] } };
 const old = { kind: 'old', verdict: 'unknown', value: null } as const;
 
 test('the reading of now, as bad as the bridge says it is now', () => {
@@ -40,6 +43,7 @@ test.each([
   ['all readings are too old', state(8, {}, { ...old, sensor: '' }), true, 8],
   ['the sensor gives none', state(null), true, null],
   ['the twin is silent', state(8, {}), false, 8],
+  ['nothing is judged', unjudged, true, 8],
   ['there is no such tag', null, true, null],
 ] as const)('it is not known where %s', (_, then, isLive, last) => {
   expect(nowOf(cold, then, null, isLive)).toMatchObject({ kind: 'unknown', last });
@@ -49,6 +53,7 @@ test.each([
   [state(8, { verdict: 'stressed' }), 'stressed'],
   [state(20), 'healthy'],
   [state(8, { ...old, sensor: 'temperature' }), 'critical'],
+  [unjudged, 'critical'],
 ] as const)('of a silent twin it counts as bad as it was last', (then, verdict) => {
   const raised = alarm('a', { reason: { verdict: 'critical' } });
   expect(reasonNow(raised, nowOf(raised, then, null, false)).verdict).toBe(verdict);
@@ -79,6 +84,7 @@ test('of a pest how many were seen last', () => {
   expect(nowOf(seen, infested, null, true)).toMatchObject({ value: 3, verdict: 'critical' });
   expect(nowOf(seen, state(8), null, true)).toMatchObject({ value: null, verdict: 'healthy' });
   expect(nowOf(seen, infested, null, false)).toMatchObject({ kind: 'unknown' });
+  expect(reasonNow(seen, nowOf(seen, unjudged, null, false)).verdict).toBe('critical');
 });
 
 test('what is resolved, or of no value, has none', () => {

@@ -1,6 +1,7 @@
 /**
  * What this browser keeps about alarms, the same in every tab: which are acknowledged, which are shelved,
- * and whether it may make itself heard. Nothing of it goes to a server. Moments are ms since the epoch.
+ * and whether it may make itself heard. What who has signed in does, `people.ts` says to the bridge too. Moments
+ * are ms since the epoch.
  */
 import { timeOfDay } from '../clock';
 import type { Alarm, Verdict } from '../contract/types';

@@ -1,4 +1,7 @@
-/** Keeps the list of alarms up to date, whatever moment the page shows, and tells what is new. */
+/**
+ * Keeps the list of alarms up to date, whatever moment the page shows, and reports what is new: to the page, its
+ * title and screen readers.
+ */
 import { now, timeOfDay } from '../clock';
 import type { Alarms } from '../contract/types';
 import { rosText } from '../domain/time';

@@ -216,20 +216,25 @@ export function nowOf(
       ? unknown(null, 'unknown', before)
       : unknown(before.value, tag.tag.readAt.get(sensor) ?? 'unknown', before);
   }
-  const said = tag.health.reasons.find((each) => each.kind === kind && each.sensor === sensor);
+  const { readings, readAt } = tag.tag;
+  const { reasons } = tag.health;
+  // Not judged, as without a clock: that nothing is said of it does not make it well.
+  if (tag.health.verdict === 'unknown' && reasons.length === 0) {
+    return unknown(readings.get(sensor) ?? null, readAt.get(sensor) ?? 'unknown');
+  }
+  const said = reasons.find((each) => each.kind === kind && each.sensor === sensor);
   const verdict = said?.verdict ?? 'healthy';
   if (isPest) {
     const value = said ? (said.value ?? 0) : null;
     return { kind: 'known', value, verdict, reason: said ?? null, trend: null };
   }
-  const { readings, readAt } = tag.tag;
   // What is derived has no reading: what there is of it stands in its reason.
   const isDerived = readings.size > 0 && !readings.has(sensor);
   const last = isDerived ? (said?.value ?? null) : (readings.get(sensor) ?? null);
   // Of what is within its range nothing is said, nor what it is.
   const lacks = ({ kind: why, verdict: how }: HealthReason): boolean =>
     how === 'unknown' || why === 'reading_failed';
-  if (isDerived && !said && !tag.health.reasons.some(lacks)) {
+  if (isDerived && !said && !reasons.some(lacks)) {
     return { kind: 'known', value: null, verdict, reason: null, trend: null };
   }
   if (last === null || isOldReading(sensor, tag)) {

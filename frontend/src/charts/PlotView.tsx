@@ -9,7 +9,7 @@ import { isHad, isOfDay, type Sensor } from '../domain/sensors';
 import { lastUntil, type Mark, type Point, pointAt, type Series } from '../domain/series';
 import { shown } from '../domain/text';
 import { rosText, type Span } from '../domain/time';
-import { CommentMarks } from '../notes/CommentMarks';
+import { NoteMarks } from '../notes/NoteMarks';
 import { act, useApp } from '../store/app';
 import { pointedBy, pointedTime, useSelected } from '../store/create';
 import { selectCatalogue } from '../store/derived';
@@ -73,7 +73,7 @@ export function PlotView({
         {at !== null && <span className="plot-time faint">{rosText(at)}</span>}
       </header>
       <div className="plot-comments">
-        <CommentMarks span={model.span} tagIds={model.lines.map(({ series }) => series.tagId)} />
+        <NoteMarks span={model.span} tagIds={model.lines.map(({ series }) => series.tagId)} />
       </div>
       <div
         ref={place}

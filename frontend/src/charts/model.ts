@@ -195,8 +195,6 @@ export function limitsOf(model: PlotModel): Limit[] {
   return [...edges, ...near.filter(({ side }) => side === 'inside')];
 }
 
-/** What charts show, fetched in one go: the lines, the same a day before, and the marks. */
-
 /** One line of a chart. */
 export interface Pair {
   readonly tagId: string;
@@ -205,7 +203,7 @@ export interface Pair {
 
 export const pairKey = ({ tagId, sensor }: Pair): string => `${sensor}\u0000${tagId}`;
 
-/** By `pairKey`, and marks by tag, as the server told them. */
+/** What charts show, fetched in one go: lines by `pairKey`, and marks by tag. */
 export interface Lines {
   readonly series: ReadonlyMap<string, Series>;
   /** A day later than it was; empty: nobody asked for it. */

@@ -99,7 +99,7 @@ function mutations(frame: unknown, wrong: unknown): [string, unknown][] {
   });
 }
 
-/** What `filled.ts` makes, whatever is sent. */
+/** What the page works out itself, whatever is sent. */
 const OF_THE_PAGE = /\.readings\.\d+\.stale_seconds$/;
 
 const paths = (frame: unknown): string[] => mutations(frame, undefined).map(([path]) => path);

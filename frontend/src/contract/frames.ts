@@ -68,10 +68,9 @@ function filled(frame: Frame): Frame {
 
 const isKnown = (type: string): type is Frame['type'] => Object.hasOwn(FRAMES, type);
 
-/** What the server leaves out of tags and verdicts because it is as usual, put back here alone. */
-
 type WireTag = Schemas['TwinTagState'];
 
+/** With what the server leaves out because it is as usual; `filledHealth` does so for verdicts. */
 export function filledTag(tag: WireTag): TwinTagState {
   const { last_observed: last } = tag;
   let observedAt: WireTag['readings'][number]['observed_at'] = last;
@@ -95,13 +94,10 @@ export const filledHealth = ({ house, tags }: Schemas['Judgement']): Judgement =
 });
 
 /**
- * The newest state, put together from full frames and deltas. Pure.
- *
- * A delta names the frame that it builds on. Frames of one connection come in order, so a delta
- * that builds on another frame than the last means that the two sides have lost each other.
+ * The state after a frame; null where a delta does not build on what is there. It names the frame that it
+ * builds on: frames of one connection come in order, so another one than the last means that the two sides
+ * have lost each other.
  */
-
-/** The state after a frame; null where the frame does not build on what is there. */
 export function latestAfter(latest: Latest | null, frame: StateFrame | DeltaFrame): Latest | null {
   if (frame.type === 'state') return frame;
   if (latest?.seq !== frame.base) return null;

@@ -144,8 +144,6 @@ export function edgesOf({ width, height, originX, originY, resolution, values }:
   return lines;
 }
 
-/** How sure an estimate is of its cells, and how unsure nobody would call it known. Pure. */
-
 /** Nine of ten values of a normal distribution lie within so many standard deviations. */
 export const NINE_OF_TEN = 1.645;
 

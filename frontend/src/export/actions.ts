@@ -136,8 +136,7 @@ export async function saveMap(): Promise<void> {
     );
 }
 
-/** What stands below the map in a saved picture: what it shows, of when, and how large it is. */
-
+/** Below the map in a saved picture. */
 export const FOOTER_PX = 56;
 const EDGE_PX = 14;
 const GAP_PX = 8;
@@ -243,13 +242,11 @@ export async function copyLink(): Promise<boolean> {
   );
 }
 
-/** The address of the shift report, a page of the bridge's own. */
-
 const SHIFT_S = 8 * 3_600;
 /** The bridge reports of no longer a period. */
 const LONGEST_S = 31 * 86_400;
 
-/** Of the period chosen on the time bar; of the last eight hours where none was. */
+/** The address of the shift report: of the period chosen on the time bar, else of the last eight hours. */
 export function reportLink(): string {
   const state = store.get();
   const now = rosNow(state, pageNow());

@@ -207,7 +207,7 @@ function Chart({
 
 type Values = readonly (number | null)[];
 
-export interface ComparedSite {
+interface ComparedSite {
   readonly site: string;
   readonly name: string;
   readonly mean: number | null;
@@ -218,7 +218,7 @@ export interface ComparedSite {
 }
 
 /** `/api/compare`: the outlier first. */
-export interface Compared {
+interface Compared {
   readonly sensor_type: string;
   readonly from: WireTime;
   readonly to: WireTime;

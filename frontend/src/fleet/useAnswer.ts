@@ -33,10 +33,9 @@ export function useAnswer<T>(path: string, everyMs: number, news = ''): Fetched<
   );
 }
 
-/** What readings are named and written with: the sensors in force, and the reader's unit. */
-
 const EVERY_MS = 600_000;
 
+/** What readings are named and written with: the sensors in force, and the reader's unit. */
 export function useSpeech(): Speech {
   const file = useAnswer<SensorsFile>('api/sensors', EVERY_MS).value;
   return useMemo(

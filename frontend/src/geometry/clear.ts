@@ -1,4 +1,4 @@
-/** Keeping pins clear of what stands on the map: buttons, scale bar, notices. */
+/** Keeps pins clear of what stands on the map, and labels clear of each other. Pure. */
 import {
   type Bounds,
   canvasPoint,

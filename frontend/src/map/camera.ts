@@ -184,8 +184,7 @@ export class MapCamera {
   }
 }
 
-/** What there is to show on the map, and what stands on it. */
-
+/** What there is to show on the map. */
 export interface Content {
   readonly bounds: Bounds;
   readonly pins: readonly MapPoint[];

@@ -8,7 +8,7 @@ import { useApp } from '../store/app';
 import { person, useSelected } from '../store/create';
 import { selectShown } from '../store/moment';
 import { Disclosure, useClose } from '../widgets/controls';
-import { C, everySaid, type Said as Comment } from './CommentMarks';
+import { C, standingNotes, type StandingNote } from './NoteMarks';
 
 /** Of one subject, the newest. */
 const MOST_SHOWN = 20;
@@ -42,9 +42,9 @@ export function Comments({
           {C.comment}
         </button>
       )}
-      <Said subject={subject} moment={moment} />
+      <CommentList subject={subject} moment={moment} />
       {isOpen && (
-        <Field
+        <CommentField
           subject={subject}
           moment={moment}
           onDone={() => {
@@ -58,37 +58,37 @@ export function Comments({
 }
 
 /** What was said of a subject until a moment, ROS seconds; null: until now. */
-export function Said({
+export function CommentList({
   subject,
   moment,
 }: {
   subject: string;
   moment: number | null;
 }): JSX.Element | null {
-  const all = useSelected(everySaid, (it) => it);
+  const all = useSelected(standingNotes, (it) => it);
   const who = useSelected(person, (it) => it);
   const found = all.filter(
     (it) => it.kind === 'comment' && it.subject === subject && (moment === null || it.at <= moment),
   );
   if (found.length === 0) return null;
-  const mayWithdraw = ({ by }: Comment): boolean =>
+  const mayWithdraw = ({ by }: StandingNote): boolean =>
     who?.can_write_notes === true && (by === who.name || who.role === 'admin');
   return (
     <div className="comments" data-testid="comments">
       <ul aria-label={C.title}>
         {found.slice(-MOST_SHOWN).map((comment) => (
-          <One key={comment.id} comment={comment} mayWithdraw={mayWithdraw(comment)} />
+          <CommentRow key={comment.id} comment={comment} mayWithdraw={mayWithdraw(comment)} />
         ))}
       </ul>
     </div>
   );
 }
 
-function One({
+function CommentRow({
   comment: { id, by, at, text },
   mayWithdraw,
 }: {
-  comment: Comment;
+  comment: StandingNote;
   mayWithdraw: boolean;
 }): JSX.Element {
   const [fault, setFault] = useState('');
@@ -121,7 +121,7 @@ function One({
 const LONGEST = 500;
 
 /** Where a comment is written. */
-export function Field({
+export function CommentField({
   subject,
   moment,
   onDone,
@@ -197,5 +197,5 @@ export function SiteComment(): JSX.Element | null {
 
 function OfMoment(): JSX.Element {
   const moment = useApp((state) => state.view.moment);
-  return <Field subject="site" moment={moment} onDone={useClose()} />;
+  return <CommentField subject="site" moment={moment} onDone={useClose()} />;
 }

@@ -6,7 +6,7 @@ import { act, receive } from '../store/app';
 import { person } from '../store/create';
 import { alarm, alarms } from '../testing/alarms';
 import { showTags } from '../testing/page';
-import { clustersOf, CommentMarks, everySaid, saidIn, startComments } from './CommentMarks';
+import { clustersOf, NoteMarks, standing, standingNotes, startNotes } from './NoteMarks';
 import { Comments, SiteComment } from './Comments';
 
 const said = (id: string, made: number, over: Partial<Note> = {}): Note => ({
@@ -36,7 +36,7 @@ let notes: readonly Note[] = [];
 beforeEach(() => {
   asked = [];
   notes = [];
-  everySaid.dispatch([]);
+  standingNotes.dispatch([]);
   person.dispatch(null);
   showTags([]);
   vi.stubGlobal('fetch', (url: URL, { method = 'GET', body }: RequestInit) => {
@@ -55,23 +55,23 @@ const tell = (count: number): void => {
 test('a comment stands where it is about, until it is withdrawn', () => {
   const then = said('then', 900, { until: { sec: 100, nanosec: 0 }, text: 'two\nlines' });
   const gone = said('gone', 950, { withdrawn_by: 'anna' });
-  expect(saidIn([gone, then, said('now', 800)])).toEqual([
+  expect(standing([gone, then, said('now', 800)])).toEqual([
     expect.objectContaining({ id: 'then', text: 'two lines', by: 'anna', at: 100 }),
     expect.objectContaining({ id: 'now', text: 'now', by: 'anna', at: 800 }),
   ]);
 });
 
 test('marks that would cover each other are one, and those outside of the span none', () => {
-  const found = saidIn([950, 510, 501, 500, 10].map((at) => said(String(at), at)));
+  const found = standing([950, 510, 501, 500, 10].map((at) => said(String(at), at)));
   const clusters = clustersOf(found, { from: 100, to: 1_100 });
-  expect(clusters.map((it) => [it.at, it.said.length])).toEqual([
+  expect(clusters.map((it) => [it.at, it.notes.length])).toEqual([
     [500, 3],
     [950, 1],
   ]);
 });
 
 test('what is said is fetched when there is more of it, and shown with name and time', async () => {
-  const stop = startComments();
+  const stop = startNotes();
   render(<Comments subject="tag:7" name="Tag 7" />);
   tell(0);
   expect(asked).toEqual([]);
@@ -88,7 +88,7 @@ test('what is said is fetched when there is more of it, and shown with name and 
 
 test('who may write does, and withdraws their own words alone', async () => {
   person.dispatch(ANNA);
-  everySaid.dispatch(saidIn([said('mine', 800), said('bert’s', 700, { by: 'bert' })]));
+  standingNotes.dispatch(standing([said('mine', 800), said('bert’s', 700, { by: 'bert' })]));
   render(<Comments subject="tag:7" name="Tag 7" />);
   expect(screen.getAllByRole('button', { name: /^Withdraw/ })).toHaveLength(1);
   fireEvent.click(screen.getByRole('button', { name: 'Withdraw: mine' }));
@@ -132,14 +132,14 @@ test('who looks back says it about the moment that is shown', async () => {
 
 test('a mark tells on its own who said what of which tag', () => {
   const hidden = 'a\u202ecod';
-  everySaid.dispatch(
-    saidIn([said('n', 500, { text: hidden }), said('s', 90, { subject: 'site' })]),
+  standingNotes.dispatch(
+    standing([said('n', 500, { text: hidden }), said('s', 90, { subject: 'site' })]),
   );
-  render(<CommentMarks span={{ from: 0, to: 1_000 }} tagIds={['8']} />);
+  render(<NoteMarks span={{ from: 0, to: 1_000 }} tagIds={['8']} />);
   expect(screen.getAllByRole('button').map((it) => it.textContent)).toEqual([
     'anna, sim 00:01:30, greenhouse: s',
   ]);
-  render(<CommentMarks span={{ from: 0, to: 1_000 }} tagIds={['7']} />);
+  render(<NoteMarks span={{ from: 0, to: 1_000 }} tagIds={['7']} />);
   expect(screen.getAllByRole('button').at(-1)?.textContent).toBe(
     'anna, sim 00:08:20, Tag 7: a\ufffdcod',
   );
@@ -148,14 +148,14 @@ test('a mark tells on its own who said what of which tag', () => {
 test('a mark tells who acknowledged or shelved an alarm when, and the card lists comments alone', () => {
   receive({ type: 'set', part: { alarms: alarms([alarm('cold')]) } });
   const subject = `alarm:${alarm('cold').id}`;
-  everySaid.dispatch(
-    saidIn([
+  standingNotes.dispatch(
+    standing([
       said('c', 900, { kind: 'shelve', subject, text: '' }),
       said('b', 500, { kind: 'shelve', subject, text: 'vents', until: { sec: 900, nanosec: 0 } }),
       said('a', 90, { kind: 'acknowledge', subject, text: '' }),
     ]),
   );
-  render(<CommentMarks span={{ from: 0, to: 1_000 }} />);
+  render(<NoteMarks span={{ from: 0, to: 1_000 }} />);
   const name = alarm('cold').tag_id;
   expect(screen.getAllByRole('button').map((it) => it.textContent)).toEqual([
     `anna, sim 00:01:30, alarm at Tag ${name}: acknowledged`,

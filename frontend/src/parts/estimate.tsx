@@ -155,7 +155,7 @@ export function EstimateReadout({
 /** As far as what is read at one place is usually like what is read at another, metres. */
 export const NEAR_M = 2.5;
 
-export interface Near {
+interface Near {
   readonly count: number;
   /** When the oldest of their readings was made; "never": there is none. */
   readonly oldest: When;

@@ -138,7 +138,7 @@ const NOTHING: RobotNow = { position: null, plan: null, battery: null };
 export const useRobot = (): RobotNow => useSelected(robotFrame, (frame) => frame ?? NOTHING);
 
 /** The twin's time, ROS seconds; null where no age is known. */
-export const timeOf = (state: AppState, now: number): number | null =>
+const timeOf = (state: AppState, now: number): number | null =>
   selectShown(state).ageing.kind === 'unknown' ? null : rosNow(state, now);
 
 /** How long ago that was, s; null: nobody knows. */
@@ -151,7 +151,7 @@ export function ageOf(stamp: WireTime, time: number | null): number | null {
 const PACE_MS = 5_000;
 
 /** Where the robot has been: as the bridge has it, and what was heard since. */
-export function useTrail(): readonly TrailPoint[] {
+function useTrail(): readonly TrailPoint[] {
   const isOpen = useApp((state) => state.twin.connection.socket.kind === 'open');
   const [trail, setTrail] = useState<readonly TrailPoint[]>([]);
   useEffect(() => {
@@ -182,8 +182,7 @@ export function useTrail(): readonly TrailPoint[] {
   return trail;
 }
 
-/** Where the robot has been and will be, as lines; pure. Times are ROS seconds, lengths metres. */
-
+/** Where the robot has been; ROS seconds, metres. */
 export interface TrailPoint {
   readonly x: number;
   readonly y: number;
@@ -203,7 +202,7 @@ const MOST_POINTS = 2_000;
 const GAP_S = 60;
 const GAP_M = 1;
 
-export const trailPoint = ({ x, y, observed_at: at }: Robot['trail'][number]): TrailPoint => ({
+const trailPoint = ({ x, y, observed_at: at }: Robot['trail'][number]): TrailPoint => ({
   x,
   y,
   at: secondsOf(at),

@@ -122,17 +122,16 @@ function baseKey(state: AppState): string | null {
   return snapshot && status && socket.kind === 'open' ? `${epoch}|${snapshot.revision}` : null;
 }
 
-/** Fetches the file of sensors: at once, and again on each new connection, behind which may be another. */
-
-const INTERVAL_MS = 500;
+const SENSORS_INTERVAL_MS = 500;
 
 const fetchFile = async (signal: AbortSignal): Promise<SensorsFile> =>
   bodyOf(await get('api/sensors', signal));
 
+/** Fetches the file of sensors: at once, and again on each new connection, behind which may be another. */
 export function startSensors(): () => void {
   let known = '';
   const sensors = createFetcher<SensorsFile>({
-    paceMs: INTERVAL_MS,
+    paceMs: SENSORS_INTERVAL_MS,
     onValue: (file) => {
       const text = JSON.stringify(file);
       // The browser asks with its ETag, and mostly is told that it has it: nothing follows then.

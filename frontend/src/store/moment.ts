@@ -98,6 +98,10 @@ export function rosNow({ twin }: AppState, at: number): number | null {
 export const selectIsHeard = (state: AppState): boolean =>
   selectShown(state).moment !== null || isHeardNow(state);
 
+/** Whether the bridge does not answer: nothing comes, and nothing that is done here gets there. */
+export const selectIsCut = ({ twin: { phase } }: AppState): boolean =>
+  phase === 'stale' || phase === 'reconnecting';
+
 export const isHeardNow = ({ twin }: AppState): boolean =>
   twin.phase === 'live' && !twin.isTimeLost;
 
@@ -123,21 +127,18 @@ export const selectNewestTag = ({ twin }: AppState, tagId: string): Tag | undefi
   byId(twin.latest.snapshot?.tags ?? NO_TAGS).get(tagId);
 
 /**
- * Where what the twin observed comes from, as it says. A simulation is told as such; a recording that
- * is played is, in nothing, of now.
+ * Where what the twin observed comes from, as it says, if that has to be told; null: a robot's, or of a twin
+ * that does not say. A recording that is played is, in nothing, of now.
  */
-
-/** Those that have to be told; null: a robot's, or of a twin that does not say. */
 type Origin = Exclude<StatusFrame['origin'], 'robot' | 'unknown'> | null;
 
 export function selectOrigin({ twin }: AppState): Origin {
-  const origin = twin.connection.status?.origin;
+  const origin = twin.lastStatus?.origin;
   return origin === 'simulated' || origin === 'recorded' || origin === 'sim_time' ? origin : null;
 }
 
 /** How long a day of the greenhouse takes, seconds of its time: in a demo it is a short one. */
-export const selectDayS = ({ twin }: AppState): number =>
-  twin.connection.status?.day_length_s ?? DAY_S;
+export const selectDayS = ({ twin }: AppState): number => twin.lastStatus?.day_length_s ?? DAY_S;
 
 export const selectIsRecorded = (state: AppState): boolean => selectOrigin(state) === 'recorded';
 

@@ -98,8 +98,6 @@ export function startRemembered(): () => void {
   };
 }
 
-/** The period that the page opens on, where neither link nor person has chosen one. */
-
 /** In a day's bar, memory that is shorter than this is squeezed into its right end, seconds. */
 const SHORT_S = 10_800;
 /** How long SHORT_PERIOD is, seconds. */
@@ -110,7 +108,10 @@ function isShort(reach: Span, moment: number | null): boolean {
   return reach.to - reach.from < SHORT_S && (moment === null || moment >= reach.to - HOUR_S);
 }
 
-/** Decides once, as soon as it is known how far memory reaches: no period changes by itself later. */
+/**
+ * Decides on which period the page opens, where neither link nor person has chosen one: once, as soon as it is
+ * known how far memory reaches. No period changes by itself later.
+ */
 export function startOpening(): () => void {
   let opensShort: boolean | null = null;
   const update = (): void => {

@@ -81,6 +81,8 @@ export const NOT_ASKED: Remembered = { value: null, state: 'waiting', message: '
 export interface TwinState {
   readonly phase: Phase;
   readonly connection: Connection;
+  /** The last one of a bridge that has received something: it is about what is shown. */
+  readonly lastStatus: StatusFrame | null;
   /** Time has lapsed since the newest state: how old it is nobody knows. */
   readonly isTimeLost: boolean;
   /** Messages of late that were no frames, and what was wrong with the last; null: none. */
@@ -102,6 +104,7 @@ export interface TwinState {
 export const NO_TWIN: TwinState = {
   phase: 'connecting',
   connection: INITIAL,
+  lastStatus: null,
   isTimeLost: false,
   unread: null,
   latest: NO_HOUSE,
@@ -139,7 +142,9 @@ export function reduceTwin(state: TwinState, action: TwinAction): TwinState {
     case 'connection': {
       const phase = phaseOf(action.connection, action.now);
       if (phase === state.phase && sameToTheEye(action.connection, state.connection)) return state;
-      return { ...state, phase, connection: action.connection };
+      const { status } = action.connection;
+      const lastStatus = status && status.reason !== 'never_seen' ? status : state.lastStatus;
+      return { ...state, phase, connection: action.connection, lastStatus };
     }
     case 'state': {
       // No comparison of seq: one socket delivers in order, and a restarted server counts anew.

@@ -51,6 +51,14 @@ test('a simulation is live, and told at first sight; one by /clock is not green'
   expect(screen.queryByTestId('recorded-frame')).toBeNull();
 });
 
+test('what is still shown stays simulated at a bridge that has received nothing yet', () => {
+  shows('simulated');
+  shows('unknown', 'never_seen');
+  expect(screen.getByTestId('origin').textContent).toMatch(/^Simulated/);
+  shows('robot');
+  expect(screen.queryByTestId('origin')).toBeNull();
+});
+
 test('a day of the greenhouse that is a short one is told', () => {
   const day = (day_length_s: number): boolean => {
     flush(() => {

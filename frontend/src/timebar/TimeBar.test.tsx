@@ -223,6 +223,9 @@ test('what could not be loaded is told, beside what is known', () => {
   render(<TimeBar />);
   expect(screen.getByTestId('timebar').textContent).toContain('too busy');
   expect(slider()).not.toBeNull();
+  // Cut off, the page says so above.
+  flush(goLost);
+  expect(screen.getByTestId('timebar').textContent).not.toContain('too busy');
 });
 
 test('before the twin has told its time there is no bar', () => {

@@ -2,11 +2,11 @@ import { type JSX, type ReactNode, useState } from 'react';
 
 import { shown } from '../domain/text';
 import { hasDate, type Period, PERIOD_KINDS, shortRosText, two } from '../domain/time';
-import { CommentMarks } from '../notes/CommentMarks';
+import { NoteMarks } from '../notes/NoteMarks';
 import { SiteComment } from '../notes/Comments';
 import { act, store, useApp } from '../store/app';
 import { useSelected } from '../store/create';
-import { barSpan, newestWord, rosNow } from '../store/moment';
+import { barSpan, newestWord, rosNow, selectIsCut } from '../store/moment';
 import { S } from '../strings';
 import { Disclosure, Select } from '../widgets/controls';
 import { useNow } from '../widgets/useNow';
@@ -17,6 +17,7 @@ import { chooseSpeed, playback, SPEEDS, togglePlayback } from './playback';
 export function TimeBar(): JSX.Element | null {
   const remembered = useApp((state) => state.twin.remembered);
   const period = useApp((state) => state.view.period);
+  const isCut = useApp(selectIsCut);
   const tick = useNow();
   const nowS = rosNow(store.get(), tick);
   if (nowS === null) return null;
@@ -37,9 +38,10 @@ export function TimeBar(): JSX.Element | null {
         <SiteComment />
       </div>
       {period.kind === 'own' && <OwnPeriod period={period} isSimulated={!hasDate(nowS)} />}
-      <CommentMarks span={span} />
+      <NoteMarks span={span} />
       <Slider span={span} timeline={remembered.value} nowS={nowS} />
-      {remembered.state === 'failed' && (
+      {/* Cut off, the banner says so. */}
+      {remembered.state === 'failed' && !isCut && (
         <p className="timebar-note" role="status">
           {S.chartFailed(shown(remembered.message, 160))}
         </p>

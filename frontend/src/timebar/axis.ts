@@ -1,4 +1,4 @@
-/** Where a moment lies on the bar. Pure. */
+/** Where a moment lies on the bar, and what the bar shows where. Pure. */
 import type { Span } from '../domain/time';
 import type { Happened, Timeline } from '../domain/timeline';
 
@@ -40,8 +40,6 @@ export function stepped(
   if (at >= now) return null;
   return Math.max(Math.min(axis.from, from ?? axis.from), at);
 }
-
-/** What the bar shows where: buckets become columns that an eye can tell apart. Pure. */
 
 /** CSS pixels; narrower columns cannot be told apart. */
 const LEAST_COLUMN_PX = 3;

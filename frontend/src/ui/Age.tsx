@@ -64,7 +64,7 @@ export function AgeFact({ label, when }: { label: string; when: When }): JSX.Ele
 export function Tried({ failed }: { failed: FailedTry }): JSX.Element {
   const age = useAgeText(failed.at, ageText);
   const outcome = S.tried[tryKind(failed.status)];
-  const text = age === null ? S.triedSometime(outcome) : S.triedAgo(age, outcome);
+  const text = S.reasons.scanFailed(outcome, age);
   const detail = failed.detail === '' ? '' : `: ${shown(failed.detail, 160)}`;
   return <span title={text + detail}>{text}</span>;
 }

@@ -65,8 +65,12 @@ describe('table', () => {
     );
     showTags(tags, judgement({ 9: [hot, failed], 10: [failed] }));
     render(<TagTable />);
-    expect(row('9').querySelector('.why')?.textContent).toMatch(/^Temperature .*; attempt /);
-    expect(row('10').querySelector('.why')?.textContent).toMatch(/^attempt /);
+    expect(row('9').querySelector('.why')?.textContent).toMatch(
+      /^Temperature .*; Last scan failed: not readable, /,
+    );
+    expect(row('10').querySelector('.why')?.textContent).toMatch(
+      /^Last scan failed: not readable, /,
+    );
   });
 
   test('no row moves below a pointer, and all do once it has left', () => {

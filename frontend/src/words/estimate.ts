@@ -3,7 +3,7 @@ import { ESTIMATE } from './en/estimate';
 import type { Language } from './languages';
 import type { In } from './shape';
 
-export type EstimateWords = In<typeof ESTIMATE>;
+type EstimateWords = In<typeof ESTIMATE>;
 
 export async function estimateWordsOf(language: Language): Promise<EstimateWords> {
   try {

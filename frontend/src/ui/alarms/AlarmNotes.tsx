@@ -19,9 +19,10 @@ import { rosText, secondsOf } from '../../domain/time';
 import { act, useApp, type AppState } from '../../store/app';
 import { person, useSelected } from '../../store/create';
 import { selectNewestHealth } from '../../store/derived';
-import { selectNewest, selectShown } from '../../store/moment';
+import { selectIsCut, selectNewest, selectShown } from '../../store/moment';
 import { S } from '../../strings';
 import { Check } from '../../widgets/controls';
+import { selectAreAlarmsKnown } from '../Reasons';
 import { once } from './AlarmRow';
 import { whoseWord } from './people';
 
@@ -41,13 +42,8 @@ export function AlarmsWait(): JSX.Element | null {
 }
 
 // Of a silent twin the bridge goes on to tell: that is an alarm itself.
-const isLostOf = ({ twin: { phase } }: AppState): boolean =>
-  phase !== 'live' && phase !== 'offline';
-
-const selectIsKnown = (state: AppState): boolean => {
-  const { alarms } = state.twin;
-  return alarms !== null && alarms.source !== 'starting' && !isLostOf(state);
-};
+const selectIsKnown = (state: AppState): boolean =>
+  selectAreAlarmsKnown(state) && !selectIsCut(state);
 
 /** What the list is about, and what it does not know. */
 export function AlarmNotes({ isEmpty }: { isEmpty: boolean }): JSX.Element {
@@ -56,7 +52,7 @@ export function AlarmNotes({ isEmpty }: { isEmpty: boolean }): JSX.Element {
   const takenAt = useApp((state) => selectNewest(state).snapshot?.takenAt ?? null);
   const isStarting = alarms?.source === 'starting';
   const isKnown = useApp(selectIsKnown);
-  const isLast = useApp(isLostOf) && takenAt !== null;
+  const isLast = useApp(selectIsCut) && takenAt !== null;
   return (
     <div className="alarm-notes">
       {moment !== null && <p data-note="now">{S.alarmsOfNow(rosText(moment))}</p>}

@@ -1,5 +1,5 @@
 import { act as flush, fireEvent, render, screen, within } from '@testing-library/react';
-import { afterEach, beforeEach, expect, test, vi } from 'vitest';
+import { beforeEach, expect, test, vi } from 'vitest';
 
 import { acknowledge, done, NOTHING_KEPT, own, shelveAlarm } from '../../alarms/own';
 import { startAlarms } from '../../alarms/watch';
@@ -14,18 +14,14 @@ import { judgement, reason } from '../../testing/health';
 import { readings, wireTag } from '../../testing/tags';
 import { AlarmPanel } from './AlarmPanel';
 
-let stop: () => void;
-
 beforeEach(() => {
   own.dispatch(NOTHING_KEPT);
   done.dispatch(null);
   person.dispatch(null);
   showTags([wireTag()]);
-  stop = startAlarms();
+  const stop = startAlarms();
   render(<AlarmPanel />);
-});
-afterEach(() => {
-  stop();
+  return stop;
 });
 
 const tell = (...list: readonly Alarm[]): void => {
@@ -157,8 +153,10 @@ test('who may not act on what is shared is offered nothing of it', () => {
   fireEvent.keyDown(document, { key: 'Escape' });
   flush(() => {
     person.dispatch({ ...session, name: 'anna', role: 'operator', can_write_notes: true });
+    goLost();
   });
   expect(actions('6')).toEqual(['Go to start', 'Shelve', 'Comment']);
+  expect(document.querySelectorAll('.all-seen:enabled, .alarm-tools li :enabled')).toHaveLength(1);
 });
 
 test('acknowledged, shelved, and back', () => {

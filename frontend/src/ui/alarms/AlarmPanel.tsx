@@ -38,6 +38,7 @@ import { AlarmTimes } from './AlarmFacts';
 import { AlarmNotes, AlarmsWait, DoneLine, TellMe, WhoseWord } from './AlarmNotes';
 import { Acknowledge, AlarmRow, once } from './AlarmRow';
 import { ALARMS_ID, ListChoice } from './ListChoice';
+import { useIsRefused } from './people';
 
 /** Rows of one cause at first; of others, and with each wish for more, as many as a page draws at once. */
 const MOST_OF_CAUSE = 5;
@@ -67,6 +68,7 @@ export function AlarmPanel(): JSX.Element {
   const counted = filtered(all, filter, speech, isTag);
   const waiting = calling(seen);
   const isAble = useSelected(person, mayAct);
+  const isRefused = useIsRefused();
   const count = seen.active.length + seen.shelved.length + seen.resolved.length;
   const list = useRef<HTMLDivElement>(null);
   useChosenInSight(
@@ -126,7 +128,7 @@ export function AlarmPanel(): JSX.Element {
           <button
             type="button"
             className="text-button all-seen"
-            disabled={waiting.length === 0}
+            disabled={waiting.length === 0 || isRefused}
             onClick={once(() => {
               acknowledgeAlarms(waiting);
             })}

@@ -14,14 +14,14 @@ import {
 import { selectSpeech } from '../../alarms/speech';
 import { lastKnown, nameText, whereText } from '../../alarms/words';
 import { clockText } from '../../domain/format';
-import { C } from '../../notes/CommentMarks';
-import { Field, Said } from '../../notes/Comments';
+import { C } from '../../notes/NoteMarks';
+import { CommentField, CommentList } from '../../notes/Comments';
 import { useApp } from '../../store/app';
 import { mayAct, person, useSelected } from '../../store/create';
 import { S } from '../../strings';
 import { Disclosure, Icon, useClose } from '../../widgets/controls';
 import { AlarmFacts, AlarmTimes, useValues } from './AlarmFacts';
-import { useWhoAcknowledged } from './people';
+import { useIsRefused, useWhoAcknowledged } from './people';
 
 /** One alarm: for how long, what and where, now and at worst; it leads to its tag as it is now. */
 export const AlarmRow = memo(function AlarmRow({
@@ -101,7 +101,7 @@ export const AlarmRow = memo(function AlarmRow({
         />
         <RowMenu item={item} name={name} />
       </div>
-      <Said subject={`alarm:${alarm.id}`} moment={null} />
+      <CommentList subject={`alarm:${alarm.id}`} moment={null} />
     </li>
   );
 });
@@ -133,11 +133,12 @@ function Actions({ item, name }: { item: Item; name: string }): JSX.Element {
   const close = useClose();
   const root = useRef<HTMLDivElement>(null);
   const who = useSelected(person, (it) => it);
+  const isRefused = useIsRefused();
   const canLookBack = useApp((state) => state.twin.remembered.state !== 'off');
   useLayoutEffect(() => {
     root.current?.scrollIntoView({ block: 'nearest' });
   }, [form]);
-  const act = (text: string, action: () => void, isPossible = true): JSX.Element => (
+  const act = (text: string, action: () => void, isPossible = !isRefused): JSX.Element => (
     <li>
       <button type="button" disabled={!isPossible} onClick={once(action)}>
         {text}
@@ -151,7 +152,9 @@ function Actions({ item, name }: { item: Item; name: string }): JSX.Element {
   return (
     <div className="row-actions" ref={root}>
       {form === 'shelve' && <Shelving item={item} name={name} />}
-      {form === 'comment' && <Field subject={`alarm:${alarm.id}`} moment={null} onDone={close} />}
+      {form === 'comment' && (
+        <CommentField subject={`alarm:${alarm.id}`} moment={null} onDone={close} />
+      )}
       {form === null && (
         <ul className="menu-list">
           {act(S.alarmStart, then(goToStart), canLookBack)}
@@ -239,6 +242,7 @@ export function Acknowledge({
   onAcknowledge: () => void;
 }): JSX.Element | null {
   const isAble = useSelected(person, mayAct);
+  const isRefused = useIsRefused();
   if (!isAble) {
     return status === null ? null : (
       <span className="alarm-status" title={status}>
@@ -254,6 +258,7 @@ export function Acknowledge({
       title={status ?? undefined}
       aria-label={status === null ? label : undefined}
       aria-disabled={status !== null}
+      disabled={isRefused}
       onClick={once(() => {
         if (status === null) onAcknowledge();
       })}

@@ -7,7 +7,7 @@ import { act } from '../../store/app';
 import { person } from '../../store/create';
 import { alarm, tellAlarms } from '../../testing/alarms';
 import { held, judgement, reason } from '../../testing/health';
-import { showTags } from '../../testing/page';
+import { goLost, showTags } from '../../testing/page';
 import { readings, wireTag } from '../../testing/tags';
 import { Reasons } from '../Reasons';
 import { AlarmsLabel } from './ListChoice';
@@ -57,6 +57,11 @@ test('all alarms of a tag are acknowledged where it is looked at, and no others'
     person.dispatch({ ...vera, can_write_notes: false });
   });
   expect(screen.queryByRole('button')).toBeNull();
+  flush(() => {
+    person.dispatch({ ...vera, can_write_notes: true });
+    goLost();
+  });
+  expect(screen.getByRole<HTMLButtonElement>('button').disabled).toBe(true);
   flush(() => {
     person.dispatch(null);
   });

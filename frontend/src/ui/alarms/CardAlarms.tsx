@@ -12,7 +12,7 @@ import { rosNow } from '../../store/moment';
 import { S } from '../../strings';
 import { useTicking } from '../../widgets/useNow';
 import { once } from './AlarmRow';
-import { useWhoAcknowledged } from './people';
+import { useIsRefused, useWhoAcknowledged } from './people';
 
 /** A tag's alarms: since when they are active, or until when shelved; for whoever stands at the tag. */
 export function CardAlarms({ tagId }: { tagId: string }): JSX.Element {
@@ -34,6 +34,7 @@ function Active({ tagId }: { tagId: string }): JSX.Element | null {
     worstNow(state, items) === 'healthy' ? todoNow(state, items) : '',
   );
   const isAble = useSelected(person, mayAct);
+  const isRefused = useIsRefused();
   if (items.length === 0) return null;
   return (
     <div className="card-alarms" data-testid="card-alarms">
@@ -44,6 +45,7 @@ function Active({ tagId }: { tagId: string }): JSX.Element | null {
       {isAble && waiting.length > 0 && (
         <button
           type="button"
+          disabled={isRefused}
           onClick={once(() => {
             acknowledgeAlarms(waiting);
           })}
@@ -69,6 +71,7 @@ function Shelved({ tagId }: { tagId: string }): JSX.Element {
   const shelved = useSelected(alarmList, (list) => list.shelved);
   const speech = useApp(selectSpeech);
   const isAble = useSelected(person, mayAct);
+  const isRefused = useIsRefused();
   return (
     <>
       {shelved.map(
@@ -85,6 +88,7 @@ function Shelved({ tagId }: { tagId: string }): JSX.Element {
               {isAble && (
                 <button
                   type="button"
+                  disabled={isRefused}
                   onClick={once(() => {
                     unshelveAlarm(alarm);
                   })}

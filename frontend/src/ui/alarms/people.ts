@@ -10,10 +10,10 @@ import { whenText } from '../../alarms/words';
 import { failureText } from '../../domain/format';
 import { secondsOf } from '../../domain/time';
 import { shown } from '../../domain/text';
-import { onChange, store } from '../../store/app';
+import { onChange, store, useApp } from '../../store/app';
 import { createFetcher } from '../../store/fetcher';
-import { rosNow } from '../../store/moment';
-import { person } from '../../store/create';
+import { rosNow, selectIsCut } from '../../store/moment';
+import { person, useSelected } from '../../store/create';
 import { say } from '../toast';
 import { LANGUAGE, S } from '../../strings';
 import { useTicking } from '../../widgets/useNow';
@@ -110,9 +110,9 @@ async function tell(before: Kept, next: Kept): Promise<void> {
   const words = wordsFor(before, next, alarmsNow(), (until) =>
     nowS === null ? null : nowS + (until - at) / 1000,
   );
-  const { alarms, phase } = store.get().twin;
+  const { alarms } = store.get().twin;
   // What nobody answers is not even sent: until it failed, it would look done.
-  let failure = phase === 'stale' || phase === 'reconnecting' ? S.serverBusy : null;
+  let failure = selectIsCut(store.get()) ? S.serverBusy : null;
   pending += 1;
   try {
     // One behind the other, in the order of the list: of two words the later one stands.
@@ -158,6 +158,12 @@ export function startPeople(): () => void {
     acting.tell = null;
     person.dispatch(null);
   };
+}
+
+/** Whether what is done here would be refused: it is everybody's, and the bridge does not answer. */
+export function useIsRefused(): boolean {
+  const isShared = useSelected(person, (who) => who?.can_write_notes === true);
+  return useApp(selectIsCut) && isShared;
 }
 
 /** Whether what is done here is this browser's own, or everybody's. */

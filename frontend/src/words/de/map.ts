@@ -143,8 +143,6 @@ export const TAGS: In<typeof EN.TAGS> = {
     skipped: 'übersprungen',
     failed: 'fehlgeschlagen',
   },
-  triedAgo: (age, outcome) => `Versuch vor ${age}: ${outcome}`,
-  triedSometime: (outcome) => `Versuch: ${outcome}`,
   noValue: '–',
   noSensorLong: 'kein Sensor',
   sensorFailed: 'ausgefallen',

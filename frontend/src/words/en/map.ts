@@ -140,8 +140,6 @@ export const TAGS = {
     skipped: 'skipped',
     failed: 'failed',
   },
-  triedAgo: (age: string, outcome: string): string => `attempt ${age} ago: ${outcome}`,
-  triedSometime: (outcome: string): string => `attempt: ${outcome}`,
   noValue: '–',
   noSensorLong: 'no sensor',
   sensorFailed: 'failed',

@@ -141,8 +141,6 @@ export const TAGS: In<typeof EN.TAGS> = {
     skipped: 'omitido',
     failed: 'fallido',
   },
-  triedAgo: (age, outcome) => `intento hace ${age}: ${outcome}`,
-  triedSometime: (outcome) => `intento: ${outcome}`,
   noValue: '–',
   noSensorLong: 'sin sensor',
   sensorFailed: 'averiado',

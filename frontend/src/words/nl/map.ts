@@ -142,8 +142,6 @@ export const TAGS: In<typeof EN.TAGS> = {
     skipped: 'overgeslagen',
     failed: 'mislukt',
   },
-  triedAgo: (age, outcome) => `poging ${age} geleden: ${outcome}`,
-  triedSometime: (outcome) => `poging: ${outcome}`,
   noValue: '–',
   noSensorLong: 'geen sensor',
   sensorFailed: 'uitgevallen',

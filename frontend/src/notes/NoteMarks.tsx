@@ -1,4 +1,4 @@
-/** What people said, by the log: fetched whenever the bridge says that there are more notes. */
+/** The notes of the log, fetched whenever there are more of them, and their marks above a time axis. */
 import { type JSX, useMemo } from 'react';
 
 import { fetchNotes } from '../contract/people';
@@ -11,7 +11,7 @@ import { createFetcher } from '../store/fetcher';
 import { LANGUAGE, S } from '../strings';
 import { COMMENTS } from '../words/comments';
 
-export interface Said {
+export interface StandingNote {
   readonly id: string;
   readonly kind: Note['kind'];
   readonly subject: string;
@@ -24,9 +24,12 @@ export interface Said {
 }
 
 /** What stands, the oldest moment first. */
-export const everySaid = createStore<readonly Said[], readonly Said[]>([], (_, next) => next);
+export const standingNotes = createStore<readonly StandingNote[], readonly StandingNote[]>(
+  [],
+  (_, next) => next,
+);
 
-export const saidIn = (notes: readonly Note[]): Said[] =>
+export const standing = (notes: readonly Note[]): StandingNote[] =>
   notes
     .filter(({ withdrawn_by: by }) => by === null)
     .map(({ id, kind, subject, text, by, made_at: made, until }) => ({
@@ -39,11 +42,11 @@ export const saidIn = (notes: readonly Note[]): Said[] =>
 
 const PACE_MS = 500;
 
-export function startComments(): () => void {
+export function startNotes(): () => void {
   const fetcher = createFetcher<readonly Note[]>({
     paceMs: PACE_MS,
     onValue: (notes) => {
-      everySaid.dispatch(saidIn(notes));
+      standingNotes.dispatch(standing(notes));
     },
   });
   const update = (): void => {
@@ -63,21 +66,21 @@ export function startComments(): () => void {
 /** So near to each other that one mark stands for them. */
 interface Cluster {
   readonly at: number;
-  readonly said: readonly Said[];
+  readonly notes: readonly StandingNote[];
 }
 
 /** Nearer than this, as a share of the span, marks would cover each other. */
 const NEAR = 0.02;
 
 /** From the oldest; `found` is in that order. */
-export function clustersOf(found: readonly Said[], { from, to }: Span): Cluster[] {
-  const clusters: { at: number; said: Said[] }[] = [];
+export function clustersOf(found: readonly StandingNote[], { from, to }: Span): Cluster[] {
+  const clusters: { at: number; notes: StandingNote[] }[] = [];
   for (const one of found) {
     const { at } = one;
     if (at < from || at > to) continue;
     const last = clusters.at(-1);
-    if (last && at - last.at < NEAR * (to - from)) last.said.push(one);
-    else clusters.push({ at, said: [one] });
+    if (last && at - last.at < NEAR * (to - from)) last.notes.push(one);
+    else clusters.push({ at, notes: [one] });
   }
   return clusters;
 }
@@ -85,7 +88,7 @@ export function clustersOf(found: readonly Said[], { from, to }: Span): Cluster[
 export const C = COMMENTS[LANGUAGE];
 
 /** Which tag it is about; null: the greenhouse, or an alarm that the page does not know. */
-export function tagOf(subject: string, alarms: readonly Alarm[]): string | null {
+export function tagIdOf(subject: string, alarms: readonly Alarm[]): string | null {
   const [kind, id] = [
     subject.slice(0, subject.indexOf(':')),
     subject.slice(subject.indexOf(':') + 1),
@@ -96,15 +99,15 @@ export function tagOf(subject: string, alarms: readonly Alarm[]): string | null 
 }
 
 /** "Tag 7", "alarm at Tag 7", "greenhouse". */
-export function subjectText(subject: string, alarms: readonly Alarm[]): string {
+function subjectText(subject: string, alarms: readonly Alarm[]): string {
   if (subject === 'site') return C.site;
-  const tagId = tagOf(subject, alarms);
+  const tagId = tagIdOf(subject, alarms);
   const tag = tagId === null ? '' : S.card(shown(tagId, 24));
   return subject.startsWith('alarm:') ? C.alarm(tag) : tag;
 }
 
 /** What was said: a comment's words, or what became of an alarm, and why. */
-function saidText({ kind, text, until }: Said): string {
+function noteText({ kind, text, until }: StandingNote): string {
   if (kind === 'comment') return text;
   const shelved = until === null ? C.unshelved : C.shelved(rosText(until));
   const what = kind === 'acknowledge' ? C.acknowledged : shelved;
@@ -112,13 +115,13 @@ function saidText({ kind, text, until }: Said): string {
 }
 
 /** Notes that the text of one mark holds. */
-const MOST_TOLD = 5;
+const MOST_NOTES = 5;
 /** Characters of each. */
 const LONGEST = 160;
 const NO_ALARMS = [] as const;
 
 /** Above a time axis: who said, acknowledged or shelved what, and when. A click goes there. */
-export function CommentMarks({
+export function NoteMarks({
   span,
   tagIds,
 }: {
@@ -126,14 +129,14 @@ export function CommentMarks({
   /** Of these tags and of the greenhouse; none: all. */
   tagIds?: readonly string[];
 }): JSX.Element | null {
-  const all = useSelected(everySaid, (it) => it);
+  const all = useSelected(standingNotes, (it) => it);
   const alarms = useApp((state) => state.twin.alarms?.alarms ?? NO_ALARMS);
   const { from, to } = span;
   const ids = tagIds?.join('\u0001');
   const clusters = useMemo(() => {
     const wanted = ids === undefined ? null : new Set(ids.split('\u0001'));
     const found = all.filter(({ subject }) => {
-      const tagId = tagOf(subject, alarms);
+      const tagId = tagIdOf(subject, alarms);
       return wanted === null || (tagId === null ? subject === 'site' : wanted.has(tagId));
     });
     return clustersOf(found, { from, to });
@@ -141,12 +144,12 @@ export function CommentMarks({
   if (clusters.length === 0) return null;
   return (
     <ul className="comment-marks" aria-label={C.title} data-testid="comment-marks">
-      {clusters.map(({ at, said: found }) => {
+      {clusters.map(({ at, notes: found }) => {
         const share = (at - from) / (to - from);
-        const told = found.slice(-MOST_TOLD).map((one) => (
+        const texts = found.slice(-MOST_NOTES).map((one) => (
           <span key={one.id}>
             <bdi>{one.by}</bdi>, {rosText(one.at)}, <bdi>{subjectText(one.subject, alarms)}</bdi>:{' '}
-            <bdi>{shown(saidText(one), LONGEST)}</bdi>
+            <bdi>{shown(noteText(one), LONGEST)}</bdi>
           </span>
         ));
         return (
@@ -161,8 +164,8 @@ export function CommentMarks({
                 <path d="M2 2h12v9H8l-4 4v-4H2z" />
               </svg>
               <span className="comment-text" data-side={share > 0.5 ? 'before' : 'after'}>
-                {told}
-                {found.length > told.length && <span>{C.more(found.length - told.length)}</span>}
+                {texts}
+                {found.length > texts.length && <span>{C.more(found.length - texts.length)}</span>}
               </span>
             </button>
           </li>

@@ -40,6 +40,7 @@ _PHRASES: Final = {
     413: "Content Too Large",
     414: "URI Too Long",
     431: "Request Header Fields Too Large",
+    501: "Not Implemented",  # an unknown Transfer-Encoding, says h11
     503: "Service Unavailable",
 }
 

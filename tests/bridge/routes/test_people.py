@@ -383,6 +383,7 @@ def raw(live: Bridge, request: bytes) -> bytes:
         (b"POST /api/notes HTTP/1.1\r\nContent-Length: 8193", b"413"),
         (b"POST /api/notes HTTP/1.1\r\nContent-Length: 99999999999999999999", b"413"),
         (b"POST /api/notes HTTP/1.1\r\nTransfer-Encoding: chunked", b"413"),
+        (b"POST /api/notes HTTP/1.1\r\nTransfer-Encoding: gzip", b"501"),
         (b"POST /api/signout HTTP/1.1\r\nContent-Length: 1", b"413"),
         (b"GET /api/notes HTTP/1.1\r\nContent-Length: 1", b"413"),
         (b"DELETE /api/notes/1 HTTP/1.1\r\nContent-Length: 1", b"413"),

@@ -91,11 +91,14 @@ def test_a_lot_that_was_broken_off_leaves_the_file_as_it_was(source: Path, tmp_p
     assert follow.followed(target).last == follow.followed(target).last < 999
 
 
-def test_a_copy_that_says_nonsense_of_itself_is_damaged(source: Path, tmp_path: Path) -> None:
+@pytest.mark.parametrize("key", ["purged_ns:1", "purged_seq", "forgotten:1"])
+def test_a_copy_that_says_nonsense_of_itself_is_damaged(
+    key: str, source: Path, tmp_path: Path
+) -> None:
     target = tmp_path / "web.sqlite"
     copy(source, target)
     with closing(open_writer(target)) as connection, transaction(connection):
-        set_meta(connection, "purged_ns:1", "x")
+        set_meta(connection, key, "x")
     with pytest.raises(DamagedFile, match="nonsense"):
         follow.followed(target)
 

@@ -1,3 +1,4 @@
+import os
 import sqlite3
 from contextlib import closing, suppress
 from functools import partial
@@ -117,6 +118,13 @@ def test_a_named_file_that_is_no_database_is_somebody_elses(content: bytes, path
     path.write_bytes(content)
     with pytest.raises(Foreign, match="is no journal: it does not begin as SQLite's files do"):
         open_named(path)
+
+
+def test_what_is_no_file_is_not_waited_for(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "fifo")
+    for path in (tmp_path / "fifo", tmp_path, Path("/dev/zero")):
+        with pytest.raises(Foreign, match="is no journal: it is no regular file"):
+            open_reader(path)
 
 
 def test_a_journal_with_a_damaged_header_is_damaged_and_not_somebody_elses(path: Path) -> None:

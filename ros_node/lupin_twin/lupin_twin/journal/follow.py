@@ -224,6 +224,7 @@ def followed(path: Path) -> Followed:
     """
     with closing(open_reader(path)) as connection:
         try:
+            _gone_seq(connection)  # which `write` goes by
             return _followed(connection)
         except _UNUSABLE as error:
             raise DamagedFile(f"{path} says nonsense of itself: {error}") from error

@@ -243,9 +243,12 @@ def open_reader(path: Path, *, is_still: bool = False) -> sqlite3.Connection:
 
     Raises:
         Empty: nothing is in it yet.
-        Foreign, DamagedFile, sqlite3.Error: as `open_writer`.
+        Foreign, DamagedFile, sqlite3.Error, OSError: as `open_writer`.
 
     """
+    # To open a FIFO would wait for ever.
+    if path.exists() and not path.is_file():
+        raise Foreign(f"{path} is no journal: it is no regular file")
     connection = sqlite3.connect(
         f"file:{quote(os.fsencode(path))}?mode=ro{'&immutable=1' if is_still else ''}",
         uri=True,

@@ -1,4 +1,4 @@
-"""`pip install .` from a fresh clone, with the page built and without."""
+"""`pip install .` from a clone whose page was not built; `test_install_dist` has the page."""
 
 import os
 import shutil
@@ -14,7 +14,6 @@ from tests.support.processes import Process, url_of
 from tests.support.waiting import PATIENCE_S
 
 ROOT = Path(__file__).parents[1]
-STATIC = Path("backend", "lupin_bridge", "static")
 
 
 @pytest.fixture(scope="module")
@@ -65,20 +64,3 @@ def test_without_the_page_the_start_and_the_address_say_how_to_build_it(
         # The rest is there, what the package brings beside its modules included.
         for path in ("/healthz", "/docs", "/signin.css"):
             assert httpx.get(url + path, trust_env=False, timeout=PATIENCE_S).status_code == 200
-
-
-def test_with_the_page_it_is_in_the_package(clone: Path, domain: int, tmp_path: Path) -> None:
-    shutil.copytree(ROOT / STATIC, clone / STATIC)
-    try:
-        package = installed(clone, tmp_path)
-    finally:
-        shutil.rmtree(clone / STATIC)
-    with started(package, domain) as process:
-        url = url_of(process)
-        page = httpx.get(f"{url}/", trust_env=False, timeout=PATIENCE_S)
-        assert (page.status_code, "Lupin twin" in page.text) == (200, True)
-        for name in (part.split('"')[0] for part in page.text.split('="./')[1:]):
-            assert (
-                httpx.get(f"{url}/{name}", trust_env=False, timeout=PATIENCE_S).status_code == 200
-            ), name
-        assert "was not built" not in process.output

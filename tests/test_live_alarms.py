@@ -1,16 +1,13 @@
 """Alarms over DDS: raised, cleared, the same after a kill, and in a `web` beside it."""
 
-import sqlite3
 import time
-from contextlib import ExitStack, closing
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
-import pytest
-
 from lupin_bridge.stream import schema
 from tests.support.domains import own_domain
-from tests.support.live import attached, wait_until_ready
+from tests.support.live import attached
 from tests.support.messages import look, scan
 from tests.support.processes import OFTEN, lupin_twin
 from tests.support.ros import Peer
@@ -82,53 +79,3 @@ def test_observations_raise_and_clear_alarms_and_every_replica_and_restart_has_t
         peer.observe(at(0.5, 20.0), at(0.6, 20.0))
         wait_for(lambda: ("a", "range", False) not in kinds(again), "an alarm taken back")
         wait_for(lambda: ("a", "range", False) not in kinds(replica), "and in the replica")
-
-
-def test_a_cold_day_is_a_status_and_an_alarm_live_and_as_of_a_moment_in_serve_and_web(
-    tmp_path: Path,
-) -> None:
-    journal = ("--ros-args", "-p", f"journal:={tmp_path / 'j.sqlite'}")
-    hour, now = 60 * MINUTE, time.time() - 5.0
-    processes: list[Any] = []
-    with own_domain() as domain, Peer(domain) as peer, ExitStack() as stack:
-
-        def start(role: str, *options: str) -> Bridge:
-            processes.append(stack.enter_context(lupin_twin(domain, role, *options)))
-            return stack.enter_context(attached(processes[-1], peer))
-
-        def reasons(live: Bridge, **query: Any) -> set[tuple[str, str]]:
-            tag = live.json("/api/health", **query)["tags"].get("a", {})
-            return {(one["sensor"], one["verdict"]) for one in tag.get("reasons", ())}
-
-        live = start("serve", *journal)
-        peer.wait_for_twin()
-        replica = start("web")
-        wait_until_ready(replica)
-        for back in range(50, -1, -1):
-            peer.observe(scan("a", {"temperature": 16.0}, stamp_s=now - back * hour))
-        cold = ("temperature_24h_mean", "stressed")
-        for one in (live, replica):
-            wait_for(lambda one=one: cold in reasons(one), "a status by the day before")  # type: ignore[misc]
-
-        def of_the_day(one: Bridge) -> list[dict[str, Any]]:
-            return [it for it in alarms(one) if it["reason"]["sensor"] == cold[0]]
-
-        last = int(now)
-        live.tag("a", lambda tag: tag["last_observed"]["sec"] == last)
-        wait_for(lambda: of_the_day(live) == of_the_day(replica) != [], "the same in both")
-        [alarm] = of_the_day(live)
-        assert alarm["reason"]["value"] == pytest.approx(16.0)
-        raised = alarm["raised_at"]["sec"]
-        for one in (live, replica):
-            assert cold not in reasons(one, at=raised - 60)
-            assert cold in reasons(one, at=raised + 60)
-        before = live.get(f"/api/health?at={raised + 60}").content
-        for process in processes:
-            process.kill()
-        # As if nothing had come after that, and no alarm had ever been told.
-        with closing(sqlite3.connect(tmp_path / "j.sqlite")) as log, log:
-            log.execute("DELETE FROM scan WHERE stamp_ns > ?", ((raised + 60) * 10**9,))
-        again = start("serve", *journal)
-        peer.wait_for_twin()
-        wait_for(lambda: again.get("/api/health?at=1").status_code == 200, "the journal again")
-        assert again.get(f"/api/health?at={raised + 60}").content == before

@@ -3,19 +3,16 @@
 from collections.abc import Callable, Iterator
 from typing import Any
 
-import httpx
 import pytest
-from websockets.exceptions import ConnectionClosed
 
-from lupin_bridge.stream.frames import STALE_AFTER_S
 from tests.support.domains import own_domain
 from tests.support.live import attached, field_of, wait_until_ready
 from tests.support.messages import discovered, look, occupancy_grid, pose, scan
-from tests.support.processes import OFTEN, constants, limits, lupin_twin, twin_node, url_of
+from tests.support.processes import OFTEN, constants, limits, lupin_twin, twin_node
 from tests.support.ros import Peer
 from tests.support.sabotage import sabotaged
 from tests.support.waiting import wait_for
-from tests.support.web import Bridge, Frame, Listener, bridge, listener, tag_ids
+from tests.support.web import Bridge, Frame, Listener, listener, tag_ids
 
 # Errors are counted with each heartbeat.
 CLI = (
@@ -28,11 +25,6 @@ FIELD: dict[str, Any] = {"sensor_type": "co2", "resolution": 0.5}
 def reason(client: Listener, expected: str) -> Frame:
     """Read on to the status frame with this reason."""
     return client.until("status", lambda frame: frame["reason"] == expected)
-
-
-def refuse_connections(live: Bridge) -> None:
-    with pytest.raises(httpx.ConnectError):
-        live.get("/healthz")
 
 
 # --- the twin goes ------------------------------------------------------------------------------
@@ -118,64 +110,16 @@ def test_a_twin_is_stopped_and_goes_on(domain: int) -> None:
 
         twin.thaw()
         wait_until_ready(live)
+        wait_for(
+            lambda: live.json("/readyz")["journal"]["state"] == "recording",
+            "what the twin says of itself",
+        )
         robot.observe(scan("b", {"co2": 2.0}, (1, 0)))
         client.until_tag("b")
         wait_for(
             lambda: live.get("/api/field", **FIELD).json().get("sample_count") == 2,
             "a field with both tags",
         )
-
-
-def test_who_joins_a_silent_twin_is_told_how_long_it_has_been_silent(domain: int) -> None:
-    with (
-        lupin_twin(domain, "web") as process,
-        Peer(domain) as robot,
-        twin_node(domain) as twin,
-        attached(process, robot) as live,
-    ):
-        wait_until_ready(live)
-        robot.observe(scan("a", {"co2": 1.0}, (0, 0)))
-        live.tag("a")
-        twin.kill()
-
-        def silent_s() -> float:
-            return float(live.get("/readyz").json()["state_age_seconds"])
-
-        wait_for(lambda: silent_s() > STALE_AFTER_S, "silence")
-        tag_s, first_s = live.tag("a")["stale_seconds"], silent_s()
-        # Past the moment at which those who were there were told.
-        wait_for(lambda: silent_s() > first_s + 2.0, "a longer silence")
-        before_s = silent_s()
-        with live.listen() as late:
-            status, state = late.next(), late.next()
-        assert status["reason"] == "stale"
-        assert status["state_age_seconds"] >= before_s
-        assert tag_ids(state["state"]) == ["a"]
-        for answer in (live.tag("a"), live.json("/api/tags/a")):
-            assert answer["stale_seconds"] >= tag_s + before_s - first_s - 0.01  # rounded
-
-
-def test_a_twin_in_another_domain_is_never_seen_until_there_is_one_here(domain: int) -> None:
-    with (
-        own_domain() as elsewhere,
-        twin_node(elsewhere),
-        Peer(elsewhere) as far_robot,
-        lupin_twin(domain, "web") as process,
-        attached(process, far_robot) as live,
-        live.listen() as client,
-    ):
-        far_robot.observe(scan("far", {"co2": 1.0}, (0, 0)))
-        far_robot.tag("far")
-        said = client.next()
-        assert (said["twin"], said["reason"]) == ("offline", "never_seen")
-        assert "ROS_DOMAIN_ID" in said["message"]
-        assert live.get("/readyz").status_code == 503
-        for path in ("/api/state", "/api/tags/a", "/api/tags/a/history"):
-            assert live.get(path).status_code == 503
-        assert live.get("/api/field", **FIELD).status_code == 503
-        with twin_node(domain):
-            reason(client, "live")
-            assert client.until("state")["state"]["tags"] == []
 
 
 def test_a_second_twin_is_said_loudly_and_its_end_too(domain: int) -> None:
@@ -198,84 +142,6 @@ def test_a_second_twin_is_said_loudly_and_its_end_too(domain: int) -> None:
             process.wait_for_output("2 nodes publish /twin/state")
             second.stop()
             client.until("status", lambda frame: frame["message"] == "The twin is live.")
-
-
-def test_the_shadow_of_a_killed_twin_is_no_second_one(domain: int) -> None:
-    with (
-        lupin_twin(domain, "web") as process,
-        Peer(domain) as robot,
-        attached(process, robot) as live,
-        live.listen() as client,
-    ):
-        with twin_node(domain) as first:
-            reason(client, "live")
-            robot.until(lambda: robot.node.count_publishers("/twin/state") == 1, "the twin")
-            first.kill()
-        with twin_node(domain) as second:
-            robot.observe(scan("a", {"co2": 1.0}))
-            client.until_tag("a")
-            robot.until(
-                lambda: robot.node.count_publishers("/twin/state") == 2, "the twin and the shadow"
-            )
-            for _ in range(5):
-                client.until("state")
-            assert "nodes publish" not in process.output + second.output
-            assert "2 twins" not in live.json("/readyz")["message"]
-
-
-# --- the bridge goes ----------------------------------------------------------------------------
-
-
-def etag_before_its_end(live: Bridge) -> str:
-    """The ETag of a field with tag "a"; the bridge is killed after it, and its clients see that."""
-    with live.listen() as client:
-        client.until_tag("a")
-        etag = field_of(live, **FIELD).headers["etag"]
-        live.process.kill()
-        with pytest.raises(ConnectionClosed):
-            client.until("never", lambda _: False)
-    refuse_connections(live)
-    return str(etag)
-
-
-def test_a_bridge_is_killed_and_its_successor_serves_the_same_address(domain: int) -> None:
-    with bridge(domain=domain) as first:
-        robot = first.peer
-        robot.observe(scan("a", {"co2": 1.0}, (0, 0)))
-        old = etag_before_its_end(first)
-        port = str(httpx.URL(first.url).port)
-        with lupin_twin(domain, "serve", "--port", port) as process:
-            assert url_of(process) == first.url
-            with listener(first.url) as client:
-                # The robot has latched what it saw; nobody has to tell the new twin.
-                client.until_tag("a")
-            wait_for(lambda: first.json("/api/field", **FIELD)["sample_count"] == 1, "the field")
-            again = first.get("/api/field", headers={"If-None-Match": old}, **FIELD)
-            assert again.status_code == 200, "an ETag of the predecessor means nothing here"
-
-
-def test_a_bridge_for_a_twin_elsewhere_is_killed_and_its_successor_knows_what_the_twin_knows(
-    domain: int,
-) -> None:
-    with (
-        twin_node(domain),
-        Peer(domain) as robot,
-        lupin_twin(domain, "web") as process,
-        attached(process, robot) as first,
-    ):
-        robot.observe(scan("a", {"co2": 1.0}, (0, 0)))
-        old = etag_before_its_end(first)
-        port = str(httpx.URL(first.url).port)
-        with lupin_twin(domain, "web", "--port", port) as successor:
-            assert url_of(successor) == first.url
-            with listener(first.url) as client:
-                client.until_tag("a")
-                field_of(first, **FIELD)
-                again = first.get("/api/field", headers={"If-None-Match": old}, **FIELD)
-                assert again.status_code == 304, "the same twin, and nothing has changed"
-                robot.observe(scan("b", {"co2": 2.0}, (1, 0)))
-                client.until_tag("b")
-            assert first.json("/api/field", **FIELD)["sample_count"] == 2
 
 
 # --- an exception in a callback -----------------------------------------------------------------

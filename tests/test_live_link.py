@@ -16,13 +16,10 @@ from diagnostic_msgs.msg import DiagnosticArray
 from lupin_msgs.msg import Observation
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 
-from lupin_bridge.feed.web_node import REPORT_HOLDS_S
 from tests.support.domains import ros_env
-from tests.support.live import attached, wait_until_ready
 from tests.support.messages import scan
-from tests.support.processes import OFTEN, Process, constants, limits, lupin_twin, twin_node
+from tests.support.processes import OFTEN, Process, constants, lupin_twin
 from tests.support.ros import Peer
-from tests.support.rosbridge import ros_at
 from tests.support.waiting import wait_for
 from tests.support.web import Bridge, bridge
 
@@ -31,63 +28,10 @@ SETTLED_S = 1.0
 SETTLES_SOON = constants(**{"lupin_twin.ros.inputs:SETTLED_S": SETTLED_S})
 
 
-def test_web_knows_its_twin_again_after_a_silence(domain: int) -> None:
-    with (
-        Peer(domain) as peer,
-        twin_node(domain, *OFTEN, afresh=True) as twin,
-        lupin_twin(domain, "web") as web,
-        attached(web, peer) as live,
-    ):
-
-        def is_known() -> bool:
-            told = live.get("/readyz").json()
-            return (told["reason"], told["origin"], told["journal"]["state"]) == (
-                "live",
-                "robot",
-                "recording",
-            )
-
-        wait_until_ready(live)
-        wait_for(is_known, "what the twin says of itself")
-        twin.freeze()
-        # What the twin said before must not stand for what it says then.
-        ended_s = time.monotonic() + REPORT_HOLDS_S
-        wait_for(lambda: time.monotonic() > ended_s, "what was said before to be too old")
-        assert live.get("/readyz").json()["reason"] == "stale"
-        twin.thaw()
-        wait_for(is_known, "what the twin says of itself, after the silence")
-
-
-def test_web_joins_ros_again_in_a_silence_and_nobody_notices(domain: int) -> None:
-    again = "joining ROS again"
-    with (
-        Peer(domain) as peer,
-        twin_node(domain, *OFTEN) as twin,
-        lupin_twin(domain, "web", *limits(rejoin_after_s=1.0)) as web,
-        attached(web, peer) as live,
-        live.listen() as page,
-        ros_at(live.url) as viewer,
-    ):
-        viewer.subscribe()
-        # The second silence is longer: the next time comes after as long again.
-        for silence, joined in ((1, 1), (2, 3)):
-            peer.observe(scan(f"before {silence}", {"co2": 1.0}))
-            page.until_tag(f"before {silence}")
-            viewer.until_tag(f"before {silence}")
-            twin.freeze()
-            wait_for(lambda least=joined: web.output.count(again) >= least, "the new node")  # type: ignore[misc]
-            peer.observe(scan(f"after {silence}", {"co2": 1.0}))
-            twin.thaw()
-            page.until_tag(f"after {silence}")
-            viewer.until_tag(f"after {silence}")
-            (known,) = live.json(f"/api/tags/after {silence}/history")["tries"]
-            assert known["status"] == 0
-
-
 # --- publishers that the contract's QoS does not match --------------------------------------------
 
 
-@pytest.fixture
+@pytest.fixture(scope="module")
 def running() -> Iterator[Bridge]:
     with bridge(*OFTEN) as live:
         yield live
@@ -107,12 +51,13 @@ def running() -> Iterator[Bridge]:
 def test_a_publisher_of_another_qos_is_heard_and_told_of(
     running: Bridge, qos: QoSProfile, remedy: str
 ) -> None:
+    foreign, ours, last = (f"{name} {remedy[-8:]}" for name in ("foreign", "ours", "last"))
     peer = running.peer
     publisher = peer.node.create_publisher(Observation, TOPIC, qos)
 
     def is_heard() -> bool:
-        publisher.publish(scan("foreign", {"co2": 1.0}))
-        return running.get("/api/tags/foreign").status_code == 200
+        publisher.publish(scan(foreign, {"co2": 1.0}))
+        return running.get(f"/api/tags/{foreign}").status_code == 200
 
     wait_for(is_heard, "what it says")
     (said,) = wait_for(lambda: running.json("/readyz")["input_problems"], "the problem")
@@ -122,11 +67,11 @@ def test_a_publisher_of_another_qos_is_heard_and_told_of(
     assert diagnosed(peer, lambda values: said in values.get("inputs", {}).values())
     # Who keeps to the contract is heard by both subscriptions, and counts once; it gives no stamp.
     for value in range(20):
-        peer.observe(scan("ours", {"co2": float(value)}))
-    running.tag("ours", lambda tag: tag["readings"][0]["value"] == 19.0)
-    publisher.publish(scan("the last", {"co2": 1.0}))
-    running.tag("the last")
-    assert len(running.json("/api/tags/ours/history")["tries"]) == 20
+        peer.observe(scan(ours, {"co2": float(value)}))
+    running.tag(ours, lambda tag: tag["readings"][0]["value"] == 19.0)
+    publisher.publish(scan(last, {"co2": 1.0}))
+    running.tag(last)
+    assert len(running.json(f"/api/tags/{ours}/history")["tries"]) == 20
     assert running.json("/readyz")["drops"] == []
     peer.node.destroy_publisher(publisher)
     wait_for(lambda: not running.json("/readyz")["input_problems"], "nothing to be wrong")
@@ -154,6 +99,7 @@ def test_of_a_publisher_that_had_said_nothing_each_loss_is_counted(domain: int) 
             return lost > 0 and lost + int(values["journal"]["written"]) == count
 
         assert diagnosed(peer, is_all)
+        assert f"on {TOPIC}: they came too fast" in twin.output
 
 
 # --- other users ----------------------------------------------------------------------------------

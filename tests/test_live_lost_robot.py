@@ -57,15 +57,3 @@ def test_a_box_of_one_s_own_shows_the_tag_that_is_far_off(far: Bridge) -> None:
     box: dict[str, Any] = {"bbox_min_x": 4999, "bbox_min_y": 0, "bbox_max_x": 5001, "bbox_max_y": 2}
     body = far.json("/api/field", sensor_type="temperature", resolution=0.5, **box)
     assert set(body["values"]) == {40.0}
-
-
-def test_the_default_field_of_a_house_too_large_for_fine_cells_has_wider_ones() -> None:
-    with bridge("--ros-args", "-p", "max_grid_cells:=1000") as running:
-        at_home(running)
-        body = running.json("/api/field", sensor_type="temperature")
-        assert (body["width"], body["height"]) == (25, 25)
-        assert body["resolution_used"] == 0.2
-        # Who says how wide has to be told that it is too fine.
-        fine = running.get("/api/field", sensor_type="temperature", resolution=0.1)
-        assert fine.status_code == 400
-        assert "the limit is 1000" in fine.json()["error_message"]

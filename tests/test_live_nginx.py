@@ -4,7 +4,7 @@ import signal
 import threading
 import time
 from collections.abc import Iterator
-from contextlib import ExitStack
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -40,8 +40,8 @@ class House:
     peer: Peer
 
 
-@pytest.fixture
-def house(tmp_path: Path) -> Iterator[House]:
+@contextmanager
+def running(folder: Path) -> Iterator[House]:
     with ExitStack() as stack:
         domain = stack.enter_context(own_domain())
         stack.enter_context(twin_node(domain, *OFTEN))
@@ -60,7 +60,13 @@ def house(tmp_path: Path) -> Iterator[House]:
         for replica in replicas:
             replica.tag("a")
         ports = [int(replica.url.rpartition(":")[2]) for replica in replicas]
-        yield House(stack.enter_context(nginx(tmp_path, ports)), replicas, peer)
+        yield House(stack.enter_context(nginx(folder, ports)), replicas, peer)
+
+
+@pytest.fixture(scope="module")
+def house(tmp_path_factory: pytest.TempPathFactory) -> Iterator[House]:
+    with running(tmp_path_factory.mktemp("nginx")) as it:
+        yield it
 
 
 # --- everything below the prefix ------------------------------------------------------------------
@@ -188,8 +194,13 @@ def longest_gap_s(house: House, screens: list[Screen], replica: Bridge, number: 
 
 @pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGTERM])
 def test_clients_of_a_replica_that_stops_under_load_are_back_in_time(
-    house: House, number: signal.Signals
+    tmp_path: Path, number: signal.Signals
 ) -> None:
+    with running(tmp_path) as house:
+        stop_under_load(house, number)
+
+
+def stop_under_load(house: House, number: signal.Signals) -> None:
     screens = [Screen(ws(house)) for _ in range(CLIENTS)]
     threads = [threading.Thread(target=screen.run) for screen in screens]
     load = Load(f"{house.url}/gh1/api/field?sensor_type=co2&resolution=0.02")

@@ -1,11 +1,10 @@
-"""Notes are where the log is: after a restart, and at `web` on the same file or on a copy."""
+"""Notes are where the log is: at `web` they come over ROS, and are written at `serve` alone."""
 
 import sys
 from pathlib import Path
 from typing import Any
 
 import httpx
-import pytest
 
 from tests.support.docs import ROOT
 from tests.support.domains import own_domain, ros_env
@@ -15,14 +14,7 @@ from tests.support.people import OWN, add, signed_in, write
 from tests.support.processes import Process, lupin_twin
 from tests.support.ros import Peer
 from tests.support.waiting import wait_for
-from tests.support.web import Bridge, bridge
-
-
-@pytest.fixture
-def accounts(tmp_path: Path) -> Path:
-    path = tmp_path / "accounts.sqlite"
-    add(path, anna="operator", vera="viewer")
-    return path
+from tests.support.web import Bridge
 
 
 def told(browser: httpx.Client) -> dict[str, Any] | None:
@@ -44,24 +36,11 @@ def acknowledged(live: Bridge) -> dict[str, Any]:
         return note
 
 
-def test_a_note_outlives_the_process_that_wrote_it(accounts: Path, tmp_path: Path) -> None:
-    journal = f"journal:={tmp_path / 'j.sqlite'}"
-    options = ("--accounts", str(accounts), "--ros-args", "-p", journal)
-    with bridge(*options) as live:
-        note = acknowledged(live)
-    with bridge(*options) as again, signed_in(again.url, "vera") as vera:
-        alarm = wait_for(lambda: told(vera), "the word of before")
-        assert alarm is not None
-        assert (alarm["acknowledged_by"], alarm["acknowledged_at"]) == ("anna", note["made_at"])
-        assert vera.get("/api/notes").json() == {"notes": [note]}
-
-
-@pytest.mark.parametrize("is_copy", [False, True], ids=["the same file", "a copy over ROS"])
-def test_web_shows_the_same_notes_and_says_where_to_write_them(
-    accounts: Path, tmp_path: Path, is_copy: bool
-) -> None:
+def test_web_shows_the_same_notes_and_says_where_to_write_them(tmp_path: Path) -> None:
+    accounts = tmp_path / "accounts.sqlite"
+    add(accounts, anna="operator")
     # Another file for each process, as on another host: that of its own working folder.
-    journal = "/proc/self/cwd/j.sqlite" if is_copy else str(tmp_path / "j.sqlite")
+    journal = "/proc/self/cwd/j.sqlite"
     options = ["--accounts", str(accounts)]
     serve = [sys.executable, "-m", "lupin_bridge.cli.command", "serve", "--port", "0", *options]
     command = ["env", "-C", str(tmp_path), *serve, "--ros-args", "-p", f"journal:={journal}"]

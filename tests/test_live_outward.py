@@ -4,7 +4,6 @@ import signal
 from pathlib import Path
 from typing import Any
 
-from tests.support.access import refused_start
 from tests.support.domains import own_domain
 from tests.support.messages import look, scan
 from tests.support.mosquitto import PASSWORD, USER, Broker, Subscriber
@@ -119,13 +118,3 @@ def test_frames_flow_and_it_ends_while_a_broker_and_a_receiver_hang(tmp_path: Pa
             assert live.process.stop(signal.SIGINT) == 0
             assert "Traceback" not in live.process.output
             assert " ERROR " not in live.process.output
-
-
-def test_what_is_wrong_with_a_channel_is_told_at_the_start(tmp_path: Path) -> None:
-    secret = tmp_path / "secret"
-    secret.write_text("short\n", encoding="ascii")
-    secret.chmod(0o600)
-    line = refused_start(
-        "--webhook-url", "https://hook.example/", LUPIN_WEBHOOK_SECRET_FILE=str(secret)
-    )
-    assert line.startswith("lupin-twin: the webhook's secret has 5 characters, must have at least")

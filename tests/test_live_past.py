@@ -120,6 +120,16 @@ def test_as_of_now_it_is_the_state_of_now(peer: Peer) -> None:
     assert by_id["pinned"].pose.orientation.w == 1.0
 
 
+def test_what_cannot_be_answered_is_refused_by_name_and_empty(peer: Peer) -> None:
+    later = peer.ask(GetStateAt, STATE_AT, at=Time(sec=2**31 - 1))
+    assert "at is 2147483647.000000000 s, later than now, 1" in later.error_message
+    assert later == GetStateAt.Response(error_message=later.error_message)
+    nameless = peer.ask(GetHistory, HISTORY, sensor_type="co2")
+    assert nameless == GetHistory.Response(error_message="tag_id is empty")
+    many = peer.ask(GetHistory, HISTORY, tag_id="a", sensor_type="co2", max_points=5001)
+    assert many.error_message == "max_points is 5001, the limits are 1 and 5000"
+
+
 def test_readings_are_told_one_by_one_or_in_buckets(peer: Peer) -> None:
     assert told(series(peer, "a", "co2")) == [(0.0, 400.0), (100.5, 500.0)]
     half = series(peer, "a", "co2", start=stamp(T + 0.0), end=stamp(T + 100.5))

@@ -15,14 +15,12 @@ from tests.support.domains import own_domain, ros_env
 from tests.support.journal import select
 from tests.support.live import attached, wait_until_ready
 from tests.support.messages import look, scan
-from tests.support.processes import OFTEN, Process, limits, lupin_twin, twin_node
+from tests.support.processes import OFTEN, Process, limits
 from tests.support.ros import Peer
-from tests.support.waiting import PATIENCE_S, wait_for
+from tests.support.waiting import wait_for
 from tests.support.web import Bridge
 
 ROOT = Path(__file__).parents[1]
-# How long Fast DDS keeps a dead process in the graph.
-DDS_LEASE_S = 20.0
 T = 1_700_000_000.0
 OBSERVED = 40
 # Another file for each process, as on another host: that of its own working folder.
@@ -189,32 +187,6 @@ def tags(live: Bridge) -> list[str]:
     return [tag["tag_id"] for tag in found]
 
 
-def test_a_killed_twin_is_asked_nothing(domain: int) -> None:
-    """DDS takes twenty seconds to miss it; so long it offers its services."""
-    past: dict[str, Any] = {"tag_id": "a", "sensor_type": "co2"}
-    with (
-        lupin_twin(domain, "web", *limits(answer_timeout_s=PATIENCE_S)) as process,
-        Peer(domain) as robot,
-        twin_node(domain, "--ros-args", "-p", "journal:=off") as twin,
-        attached(process, robot) as live,
-    ):
-        wait_until_ready(live)
-        robot.observe(scan("a", {"co2": 1.0}, (0, 0)))
-        live.tag("a")
-        wait_for(lambda: live.get("/api/history", **past).status_code == 200, "its journal")
-        twin.kill()
-        killed_s = time.monotonic()
-        wait_for(lambda: live.get("/readyz").status_code == 503, "its silence")
-        answer = live.get("/api/estimate/advice", sensor_type="humidity")
-        assert live.get("/api/history", **past).status_code == 200, "its journal is still there"
-        assert live.json("/api/field", sensor_type="co2")["sample_count"] == 1, "as it was last"
-        # None has waited for the time-out, nor until DDS missed the twin.
-        assert time.monotonic() - killed_s < DDS_LEASE_S
-        assert answer.status_code == 503, answer.text
-        assert int(answer.headers["retry-after"]) >= 1
-        assert "nothing was received on /twin/state for 3 s" in answer.json()["detail"]
-
-
 def test_what_is_followed_answers_as_the_file_itself_does(apart: Apart) -> None:
     assert len(apart.followed()) == 1
     apart.are_same(apart.beside, apart.following)
@@ -277,16 +249,4 @@ def test_a_followed_file_that_is_harmed_is_copied_anew(apart: Apart, harm: str) 
     at_s = T + 60.0 * OBSERVED
     apart.peer.observe(scan(harm, {"co2": 1.0}, stamp_s=at_s))
     asked(apart.following, f"/api/tags/{harm}", at=at_s)
-    apart.are_same(apart.beside, apart.following)
     assert apart.followed() == [file]
-
-
-def test_the_twins_file_may_be_named_where_it_has_another_path_here(
-    apart: Apart, tmp_path: Path
-) -> None:
-    named = apart.start_web("--journal", str(apart.folder / "j.sqlite"), state=tmp_path)
-    wait_until_ready(named)
-    path = f"/api/state?at={T + 100}"
-    wait_for(lambda: named.http.get(path).status_code == 200, "the past")
-    assert still(named.http.get(path)) == still(apart.beside.http.get(path))
-    assert list(tmp_path.rglob("*.sqlite")) == []  # nothing was followed

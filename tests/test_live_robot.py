@@ -194,13 +194,12 @@ def test_another_frame_and_what_is_no_place_are_dropped_named_and_counted(
         )
 
 
-def test_before_a_robot_has_said_anything_nothing_is_known(alone: Bridge) -> None:
+def test_before_a_robot_has_said_anything_nothing_is_known_and_odometry_is_taken_by_its_type(
+    alone: Bridge,
+) -> None:
     assert robot(alone) == {"position": None, "plan": None, "battery": None, "trail": []}
     with alone.listen() as client:
         assert_says_nothing_of_a_robot(client)
-
-
-def test_odometry_in_the_maps_frame_is_taken_by_its_type(alone: Bridge) -> None:
     message = Odometry()
     message.pose.pose = on_floor(7.0, 8.0)
     best_effort = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)

@@ -17,6 +17,14 @@ from tests.support.http_answers import HOUR, OPTIONS, T0, ask, bridges
 from tests.support.journal_answers import JOURNALS, same
 from tests.support.waiting import PATIENCE_S, wait_for
 
+OF_A_MOMENT = (
+    "/api/state?",
+    "/api/tags/0?",
+    "/api/field.json?sensor_type=temperature&",
+    "/api/field.npy?sensor_type=vpd&",
+    "/api/field/quality?sensor_type=temperature&",
+)
+
 
 # Of the other seven journals no HTTP answers were kept: `test_upgrade` asks those below HTTP.
 @pytest.mark.parametrize("name", ["day", "runs", "purged"])
@@ -58,16 +66,18 @@ def test_a_fleet_answers_of_a_site_byte_for_byte_as_its_serve(
     assert different == [], different
 
 
-def test_a_moment_is_judged_by_the_log_up_to_then_in_serve_in_web_and_after_a_restart(
+def test_a_moment_is_told_by_the_log_up_to_then_in_serve_in_web_and_after_a_restart(
     tmp_path: Path,
 ) -> None:
-    """By no interval, day or plants of later."""
+    """Judged by no interval, day or plants of later; and with the same ETags."""
     journal = Path(shutil.copy(JOURNALS / "day.sqlite", tmp_path / "j.sqlite"))
     asked = [f"/api/health?at={T0 + minutes * 60 + 0.5}" for minutes in range(-30, 14 * 60, 31)]
+    asked += [f"{path}at={T0 + 9 * HOUR}" for path in OF_A_MOMENT]
+    asked += [f"/api/report.html?from={T0 - HOUR}&to={T0 + 14 * HOUR}&lang=nl"]
     found = []
     for _ in range(2):
         with bridges(journal) as both:
-            found += [[ask(bridge.http, path) for path in asked] for bridge in both]
+            found += [[told(bridge.http, path) for path in asked] for bridge in both]
         # As if nothing had come after that.
         with closing(sqlite3.connect(journal)) as log, log:
             for table in ("scan", "look"):
@@ -76,6 +86,11 @@ def test_a_moment_is_judged_by_the_log_up_to_then_in_serve_in_web_and_after_a_re
     assert len({answer[2] for answer in found[0]}) > 10
     for other in found[1:]:
         assert other == found[0]
+
+
+def told(http: httpx.Client, path: str) -> list[Any]:
+    answer = http.get(path)
+    return [answer.status_code, answer.headers["etag"], answer.content]
 
 
 def plain(path: str, answer: list[Any]) -> list[Any]:

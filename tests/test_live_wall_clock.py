@@ -26,7 +26,6 @@ from tests.support.web import Bridge, bridge
 DAY_S = 86_400
 # Years.
 BEHIND_S = -6 * 365 * DAY_S
-AHEAD_S = 365 * DAY_S
 DAYS = 365
 TAGS = ("1", "2", "3")
 
@@ -46,10 +45,10 @@ class Year:
         ]
         kept(path, rows)
 
-    def options(self, days: int = 400) -> tuple[str, ...]:
-        parameters = {"journal": self.path, "journal_days": float(days)}
-        given = [word for item in parameters.items() for word in ("-p", "{}:={}".format(*item))]
-        return (*limits(answer_timeout_s=PATIENCE_S), *OFTEN, *given)
+    @property
+    def options(self) -> tuple[str, ...]:
+        kept = ("-p", f"journal:={self.path}", "-p", "journal_days:=400.0")
+        return (*limits(answer_timeout_s=PATIENCE_S), *OFTEN, *kept)
 
     def scans(self) -> int:
         [(count,)] = select(self.path, "SELECT count(*) FROM scan WHERE is_copy = 0")
@@ -63,11 +62,11 @@ def year(tmp_path: Path) -> Year:
 
 
 @contextmanager
-def both(year: Year, clock: WallClock, days: int = 400) -> Iterator[tuple[Bridge, Bridge]]:
+def both(year: Year, clock: WallClock) -> Iterator[tuple[Bridge, Bridge]]:
     """`serve` by the clock, and a `web` of it on a host whose clock is right."""
     with (
         own_domain() as domain,
-        bridge(*year.options(days), domain=domain, afresh=True, **clock.env) as twin,
+        bridge(*year.options, domain=domain, afresh=True, **clock.env) as twin,
         lupin_twin(domain, "web", *limits(answer_timeout_s=PATIENCE_S)) as process,
         attached(process, twin.peer) as apart,
     ):
@@ -83,18 +82,18 @@ def values(tags: list[Any]) -> dict[str, list[float]]:
     return {tag["tag_id"]: [reading["value"] for reading in tag["readings"]] for tag in tags}
 
 
-def check_year(live: Bridge, year: Year, *, from_day: int = 0) -> None:
+def check_year(live: Bridge, year: Year) -> None:
     """All of it is told: as of each month, the history, the timeline, and the export."""
-    for number in range(from_day, DAYS, 30):
+    for number in range(0, DAYS, 30):
         state = live.json("/api/state", at=year.stamps_s[number] + 60)
         assert values(state["tags"]) == {tag: [number + float(tag) / 10] for tag in TAGS}
-    of: dict[str, Any] = {"from": year.stamps_s[from_day], "to": year.stamps_s[-1] + 1}
+    of: dict[str, Any] = {"from": year.stamps_s[0], "to": year.stamps_s[-1] + 1}
     for tag in TAGS:
         told = live.json("/api/history", tag_id=tag, sensor_type="co2", points=5_000, **of)
         assert [it["value"] for it in told["readings"]] == [
-            number + float(tag) / 10 for number in range(from_day, DAYS)
+            number + float(tag) / 10 for number in range(DAYS)
         ]
-    scans = (DAYS - from_day) * len(TAGS)
+    scans = DAYS * len(TAGS)
     timeline = live.json("/api/timeline", **of)
     assert sum(bucket["scans"] for bucket in timeline["buckets"]) == scans
     assert timeline["reach"]["from"]["sec"] == year.stamps_s[0]
@@ -161,50 +160,3 @@ def test_a_start_in_the_past_hides_nothing_for_longer_than_the_clock_is_wrong(
             live.tag("1", lambda tag: tag["stale_seconds"] is not None)
             assert values(live.json("/api/state")["tags"]) == now
             check_year(live, year)
-
-
-def test_a_start_a_year_ahead_gives_up_a_day_a_minute_at_most_and_the_rest_is_there_afterwards(
-    year: Year, tmp_path: Path
-) -> None:
-    clock = WallClock(tmp_path, AHEAD_S)
-    begun_s = time.monotonic()
-    with both(year, clock, days=300) as (twin, apart):
-        peer = twin.peer
-        peer.observe(scan("1", {"co2": 1_000.0}, stamp_s=clock.now_s()))
-        twin.tag("1", lambda tag: values([tag])["1"] == [1_000.0])
-        peer.until(
-            lambda: select(year.path, "SELECT 1 FROM meta WHERE key = 'purged_ns:1'"),
-            "what is too old by any clock",
-        )
-        clock.be_off(0)
-        twin.process.wait_for_output("ROS time has gone back")
-        peer.observe(scan("1", {"co2": 1_001.0}, stamp_s=clock.now_s()))
-        now = {tag: [DAYS - 1 + float(tag) / 10] for tag in TAGS} | {"1": [1_001.0]}
-        for live in (twin, apart):
-            live.tag("1", lambda tag: values([tag])["1"] == [1_001.0])
-            assert values(live.json("/api/state")["tags"]) == now
-            check_year(live, year, from_day=30)
-    rounds = 1 + int((time.monotonic() - begun_s) // 60)
-    assert year.scans() >= (DAYS - rounds) * len(TAGS) + 2
-    assert select(year.path, "SELECT run, joins FROM run") == [(1, None), (2, None)]
-
-
-def test_who_started_a_year_ahead_and_starts_again_by_a_right_clock_knows_all_at_once(
-    year: Year, tmp_path: Path
-) -> None:
-    clock = WallClock(tmp_path, AHEAD_S)
-    with both(year, clock) as (twin, _):
-        twin.peer.observe(scan("1", {"co2": 1_000.0}, stamp_s=clock.now_s()))
-        twin.peer.until(lambda: year.scans() == DAYS * len(TAGS) + 1, "it in the journal")
-    clock.be_off(0)
-    now = {tag: [DAYS - 1 + float(tag) / 10] for tag in TAGS} | {"1": [1_000.0]}
-    with both(year, clock) as (twin, apart):
-        for live in (twin, apart):
-            live.tag("1")
-            twin.peer.until(
-                lambda live=live: status(live)["journal"]["state"] == "doubting",  # type: ignore[misc]
-                "the doubt",
-            )
-            assert values(live.json("/api/state")["tags"]) == now
-            check_year(live, year)
-    assert select(year.path, "SELECT run, joins FROM run") == [(1, None)]

@@ -10,7 +10,7 @@ import pytest
 
 from tests.support import messages
 from tests.support.domains import own_domain, ros_env
-from tests.support.processes import Process, lupin_twin, twin_node, url_of
+from tests.support.processes import Process, lupin_twin, url_of
 from tests.support.ros import Peer
 from tests.support.web import Bridge, bridge, listener
 
@@ -147,24 +147,3 @@ def test_a_subscription_outlives_the_bridge() -> None:
     assert [tag["tag_id"] for tag in told["before"]["tags"]] == ["old"]
     # The robot's topics are latched, too: the new twin may know the tag again by now.
     assert [tag["tag_id"] for tag in told["after"]["tags"]] in ([], ["old"])
-
-
-def test_the_last_state_is_there_although_the_twin_is_silent() -> None:
-    with (
-        own_domain() as domain,
-        twin_node(domain) as twin,
-        lupin_twin(domain, "web") as web,
-        Peer(domain) as peer,
-    ):
-        url = url_of(web)
-        peer.wait_for_twin()
-        peer.observe(messages.scan("1", {"temperature": 20.0}))
-        peer.spin_briefly()
-        with listener(url) as frames:
-            frames.until_tag("1")
-            # No tag has a pose: all cells are unknown, and that is an answer of the twin.
-            assert set(play(url, "field")["known"]["values"]["values"]) == {None}
-            twin.kill()
-            frames.until("status", lambda frame: bool(frame["twin"] == "offline"))
-        state = play(url, "latch")["state"]
-    assert [tag["tag_id"] for tag in state["tags"]] == ["1"]

@@ -15,7 +15,6 @@ BENCHES = (
     "bench_log",
     "bench_alarms",
     "bench_bridge",
-    "bench_past",
     "bench_page",
     "bench_house",
     "bench_import",

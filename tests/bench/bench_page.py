@@ -1,19 +1,15 @@
-"""The page: its size, its first paint, panning a large house, and memory over eight hours.
+"""The page: its first paint, and panning a large house.
 
 Chromium draws without a GPU, one pixel a CSS pixel, on this machine beside the server.
 """
 
-import gzip
 import statistics
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from itertools import pairwise
-from pathlib import Path
 
 from playwright.sync_api import Browser, Page, ViewportSize, expect, sync_playwright
 
-import lupin_bridge
-from tests.bench.page_double import NETWORK, STEP_S
 from tests.browser.conftest import CHROMIUM, CHROMIUM_ARGS
 from tests.support.messages import look, occupancy_grid, scan
 from tests.support.waiting import wait_for
@@ -22,7 +18,6 @@ from tests.support.web import Bridge, bridge
 VIEWPORTS = ((1440, 900), (1920, 1080))
 NAVIGATIONS = 7
 PAN_S = 5
-HEAP_LOOKS_H = (0, 0.25, 0.5, 1, 2, 4, 6, 8)
 PATIENCE_MS = 120_000
 
 # Told to the page before its own scripts run: when the first row and the first heat map were there.
@@ -64,8 +59,7 @@ async (seconds) => {
 
 
 def main() -> None:
-    """Measure all four and print them."""
-    print_size()
+    """Measure both and print them."""
     expect.set_options(timeout=PATIENCE_MS)
     with sync_playwright() as playwright:
         chromium = playwright.chromium.launch(
@@ -74,22 +68,6 @@ def main() -> None:
         with chromium:
             print_first_paint(chromium)
             print_panning(chromium)
-            print_memory(chromium)
-
-
-def print_size() -> None:
-    """Script and style as they travel to a browser that takes gzip: at first, and for charts."""
-    static = Path(lupin_bridge.__file__).parent / "static"
-    page = (static / "index.html").read_text()
-    sizes = {"first": 0, "later": 0}
-    for path in (static / "assets").iterdir():
-        if path.suffix in (".js", ".css"):
-            part = "first" if path.name in page else "later"
-            sizes[part] += len(gzip.compress(path.read_bytes(), 6))
-    print(
-        f"size, gzip: script and style {sizes['first'] / 1e3:.1f} kB (to reach: under 150), "
-        f"with the first chart {sizes['later'] / 1e3:.1f} kB more"
-    )
 
 
 @contextmanager
@@ -191,36 +169,6 @@ def processor_s(browser: Browser) -> float:
     processes = session.send("SystemInfo.getProcessInfo")["processInfo"]
     session.detach()
     return float(sum(process["cpuTime"] for process in processes))
-
-
-def print_memory(browser: Browser) -> None:
-    """The heap while the page takes eight hours of frames, ten a second, by a clock that runs."""
-    with bridge() as running, page_of(browser, 1200, 700) as page:
-        page.emulate_media(reduced_motion="reduce")  # else it draws 60 times a second of that clock
-        page.clock.install()
-        page.add_init_script(NETWORK)
-        page.goto(running.url)
-        expect(page.locator("tr[data-tag-id]")).to_have_count(29)
-        session = page.context.new_cdp_session(page)
-
-        def heap_text() -> str:
-            for _ in range(4):  # again for what a collection has only let go
-                session.send("HeapProfiler.collectGarbage")
-            usage: dict[str, float] = session.send("Runtime.getHeapUsage")
-            script = usage["usedSize"] / 1e6
-            rest = (usage["embedderHeapUsedSize"] + usage["backingStorageSize"]) / 1e6
-            frames, fetches = page.evaluate("[network.frames, network.fetches]")
-            return f"{frames:>9,} {fetches:>9,} {script:>9.2f} {rest:>9.2f}"
-
-        print(
-            f"memory, MB after a collection: {'frames':>9} {'fetches':>9} {'script':>9} {'rest':>9}"
-        )
-        passed_s = 0
-        for hours in HEAP_LOOKS_H:
-            while passed_s < hours * 3600:
-                page.clock.run_for(STEP_S * 1000)
-                passed_s += STEP_S
-            print(f"{f'{hours:g} h':>30} {heap_text()}", flush=True)
 
 
 if __name__ == "__main__":

@@ -33,14 +33,13 @@ _BATCH: Final = 20_000
 class House:
     """What is heard of a house.
 
-    `sets` is in how many messages a scan comes, each with its sensors; `look_days` how often
-    somebody looks at a tag's flowers, 0 for never; `failing` every so many tries fail, 0: none.
+    `look_days` is how often somebody looks at a tag's flowers, 0 for never; `failing` every so many
+    tries fail, 0: none.
     """
 
     tags: int
     days: float
     every_s: float
-    sets: int = 1
     look_days: float = 1.0
     failing: int = 50
 
@@ -57,7 +56,6 @@ class House:
     def rows(self) -> Iterator[Write]:
         """All that is heard, by time."""
         step_ns = int(self.every_s * SECOND / self.tags)
-        sets = [SENSORS[part :: self.sets] for part in range(self.sets)]
         ids = [str(number + 1) for number in range(self.tags)]
         looks_every = max(1, int(self.look_days * DAY_S / self.every_s))
         for turn in range(self.scans):
@@ -73,23 +71,14 @@ class House:
                     )
                     continue
                 base = round(20.0 + 4.0 * by_day + (tag * 37 + turn) % 16 / 8.0, 1)
-                for names in sets:
-                    readings = tuple(
-                        Reading(name, base + 10.0 * index) for index, name in enumerate(names)
-                    )
-                    yield Scan(
-                        tag_id, at_ns, readings, None, 0, "", "robot", at_ns, "patrol", arrival_ns
-                    )
+                readings = tuple(
+                    Reading(name, base + 10.0 * index) for index, name in enumerate(SENSORS)
+                )
+                yield Scan(
+                    tag_id, at_ns, readings, None, 0, "", "robot", at_ns, "patrol", arrival_ns
+                )
                 if self.look_days and turn % looks_every == tag % looks_every:
                     yield _look(tag, at_ns, has_pest=(turn + tag) % 97 == 0)
-
-
-# What the benchmarks of the past ask of: a usual house for long, and the largest, which a robot
-# needs twelve hours to drive through.
-YEAR: Final = House(tags=30, days=365.0, every_s=1800.0)
-MONTH: Final = House(tags=10_000, days=30.0, every_s=43_200.0, look_days=10.0)
-QUICK_YEAR: Final = House(tags=30, days=20.0, every_s=1800.0)
-QUICK_MONTH: Final = House(tags=10_000, days=1.0, every_s=43_200.0)
 
 
 def _place(tag: int) -> Pose:
@@ -114,21 +103,12 @@ class Filled:
     path: Path
     house: House
     readings: int
-    rows: int
-
-    @property
-    def bytes(self) -> int:
-        """The file's size, its log included."""
-        log = self.path.with_name(self.path.name + "-wal")
-        return self.path.stat().st_size + (log.stat().st_size if log.exists() else 0)
 
 
 @cache
 def filled(house: House) -> Filled:
     """The journal of a house, made once a process; it goes with the process."""
-    return fill(
-        _folder() / f"{house.tags}-{house.days:g}-{house.every_s:g}-{house.sets}.sqlite", house
-    )
+    return fill(_folder() / f"{house.tags}-{house.days:g}-{house.every_s:g}.sqlite", house)
 
 
 @cache
@@ -140,14 +120,13 @@ def _folder() -> Path:
 
 def fill(path: Path, house: House) -> Filled:
     """Write all that is heard of a house, as a twin would that lived through it."""
-    readings = rows = 0
+    readings = 0
     file = JournalFile(path, LIMITS, is_sound=True)
     with closing(file):
         run = file.start(Clock(BEGUN_NS, BEGUN_NS, is_simulated=False), is_believed=True).run
         heard = house.rows()
         while lot := list(islice(heard, _BATCH)):
             file.append([(run, row) for row in lot])
-            rows += len(lot)
             readings += sum(len(row.readings) for row in lot if isinstance(row, Scan))
             file.check_size(may_purge=False)
-    return Filled(path, house, readings, rows)
+    return Filled(path, house, readings)

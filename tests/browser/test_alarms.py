@@ -4,15 +4,13 @@ from __future__ import annotations
 
 import itertools
 import re
-import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
 
-import pytest
 from playwright.sync_api import Locator, expect
 
-from tests.browser.hmi import PHONE, SERVER_GONE, WIDE, Hmi, OpenPage
+from tests.browser.hmi import PHONE, WIDE, Hmi, OpenPage
 from tests.browser.places import place
 from tests.support.messages import scan
 from tests.support.waiting import wait_for
@@ -117,41 +115,6 @@ def test_an_alarm_comes_is_acknowledged_shelved_and_resolved(
         expect(row).to_have_count(0)
         expect(hmi.page).to_have_title("Lupin twin")
         hmi.expect(lambda: icon(hmi) == own_icon, "its own icon")
-
-
-def test_a_row_has_the_value_of_now_with_its_trend_beside_the_worst(
-    domain: int, open_page: OpenPage
-) -> None:
-    with bridge(domain=domain) as running:
-        robot = running.peer
-        robot.wait_for_twin()
-        robot.observe(warm("a", 22.0, at=(1, 1), stamp_s=time.time() - 3_700))
-        robot.observe(*[warm("a", value) for value in (41.0, 43.5)])
-        hmi = open_page(running.url)
-        hmi.page.keyboard.press("a")
-        row = rows(hmi, "active")
-        expect(fact(row, "since")).to_have_attribute("title", re.compile("43.5.* when raised"))
-        robot.observe(warm("a", 47.0))
-        expect(fact(row, "now")).to_contain_text("now 47.0\u00a0°C")
-        robot.observe(warm("a", 33.1))
-        # Each as bad as it is: what was critical at worst is not so any more.
-        expect(fact(row, "now")).to_contain_text("now 33.1\u00a0°C")
-        expect(fact(row, "now")).to_have_attribute("data-status", "stressed")
-        expect(fact(row, "worst")).to_contain_text("worst 47.0\u00a0°C")
-        expect(fact(row, "worst")).to_have_attribute("data-status", "critical")
-        expect(row.locator("[data-trend=up]")).to_contain_text("+11.1\u00a0°C")
-        expect(fact(row, "since")).to_contain_text(re.compile(r"^\d+\s\w+"))
-        # On a narrow phone neither breaks within itself.
-        hmi.resize(width=360, height=740)
-        for name in ("now", "worst"):
-            assert place(fact(row, name)).bottom - place(fact(row, name)).top < 24
-        # Of a twin that is not heard nobody knows it.
-        hmi.allow_noise(SERVER_GONE)
-        running.process.kill()
-        hmi.expect_phase("reconnecting")
-        expect(fact(row, "now")).to_contain_text("now unknown, last 33.1\u00a0°C")
-        expect(fact(row, "now")).to_have_attribute("data-status", "unknown")
-        expect(hmi.page.locator(".health-strip")).to_have_css("filter", "grayscale(1)")
 
 
 def test_the_counts_agree_and_healthy_beside_an_alarm_says_why(
@@ -296,21 +259,19 @@ def test_a_row_leads_to_its_tag_as_it_is_now_and_a_button_to_its_start(
         expect(hmi.app).to_have_attribute("data-moment", "now")
 
 
-@pytest.mark.parametrize("pointer", ["mouse", "finger"])
-def test_nothing_moves_while_a_pointer_rests_on_the_list(
-    domain: int, open_page: OpenPage, pointer: str
-) -> None:
+def test_nothing_moves_while_a_finger_rests_on_the_list(domain: int, open_page: OpenPage) -> None:
+    """For the mouse `AlarmPanel.test.tsx` holds that."""
     with bridge(domain=domain) as running:
         robot = running.peer
         robot.observe(*[warm(tag, 27.0, at=(1, 1)) for tag in ("a", "b") * 2])
-        hmi = open_page(running.url, has_touch=pointer == "finger")
+        hmi = open_page(running.url, has_touch=True)
         hmi.page.keyboard.press("a")
         expect(rows(hmi, "active")).to_have_count(2)
         order = where(hmi)
         button = rows(hmi, "active").last.get_by_role("button", name="Acknowledge")
         box = button.bounding_box()
         assert box is not None
-        with resting(hmi, pointer, box["x"] + 9, box["y"] + 9):
+        with resting(hmi, box["x"] + 9, box["y"] + 9):
             # Worse than both, so it would stand before them; one of them is resolved.
             robot.observe(*[warm("c", 43.5, at=(2, 1))] * 2, *[warm(order[0], 22.0)] * 2)
             expect(hmi.page).to_have_title("(2) Lupin twin")
@@ -334,33 +295,10 @@ def where(hmi: Hmi) -> list[str]:
 
 
 @contextmanager
-def resting(hmi: Hmi, pointer: str, x: float, y: float) -> Iterator[None]:
-    """The mouse, or a finger, rests on a point of the page, pixels; at the end it is taken off."""
-    if pointer == "mouse":
-        hmi.page.mouse.move(x, y)
-        yield
-        leave(hmi)
-        return
+def resting(hmi: Hmi, x: float, y: float) -> Iterator[None]:
+    """A finger rests on a point of the page, pixels; at the end it is taken off."""
     session = hmi.page.context.new_cdp_session(hmi.page)
     touch = "Input.dispatchTouchEvent"
     session.send(touch, {"type": "touchStart", "touchPoints": [{"x": x, "y": y}]})
     yield
     session.send(touch, {"type": "touchCancel", "touchPoints": []})
-
-
-def test_sound_and_notification_are_had_on_wish_alone(house: Bridge, open_page: OpenPage) -> None:
-    hmi = open_page(house.url, permissions=["notifications"])
-    hmi.page.keyboard.press("a")
-    hmi.page.get_by_role("button", name="Notify me of alarms").click()
-    sound, notify = hmi.page.get_by_label("Sound"), hmi.page.get_by_label("Notification")
-    expect(sound).not_to_be_checked()
-    expect(notify).not_to_be_checked()
-    notify.check()
-    sound.check()
-    expect(notify).to_be_checked()
-    expect(hmi.page.locator("[data-way=sound] p")).to_contain_text("at most one in 10 s")
-    hmi.page.reload()
-    hmi.page.keyboard.press("a")
-    hmi.page.get_by_role("button", name="Notify me of alarms").click()
-    expect(sound).to_be_checked()
-    expect(notify).to_be_checked()

@@ -7,14 +7,12 @@ import re
 import time
 from collections.abc import Iterator, Sequence
 from functools import partial
-from itertools import pairwise
 from typing import Any, Final
 from urllib.parse import parse_qsl, urlsplit
 
 import numpy as np
 import pytest
 from lupin_msgs.msg import Observation
-from numpy.typing import NDArray
 from PIL import Image
 from playwright.sync_api import Locator, expect
 
@@ -29,12 +27,6 @@ MANY: Final = 420
 LOT: Final = 40
 # Temperature's colour as the style sheet darkens it, light.
 LINE: Final = (186, 51, 31)
-
-
-# What is written into pictures.
-WATCH_TEXTS: Final = """const paint = CanvasRenderingContext2D.prototype.fillText;
-window.texts = []; CanvasRenderingContext2D.prototype.fillText = function (text, ...place) {
-  texts.push(text); return paint.call(this, text, ...place); };"""
 
 
 class Garden:
@@ -247,93 +239,6 @@ def test_hover_tells_the_time_and_a_click_goes_there(garden: Garden, open_page: 
     expect(hmi.test_id("chart-view")).to_have_count(0)
 
 
-def test_a_quantity_of_the_day_is_charted_where_its_sensor_is(
-    garden: Garden, open_page: OpenPage
-) -> None:
-    running, now_s = garden.bridge, time.time()
-    for start in range(0, 56, 28):
-        running.peer.observe(
-            *(
-                scan(
-                    "5",
-                    {"light": 10_000.0 + index},
-                    at=(1, 3),
-                    stamp_s=now_s - 100_000 + index * 1800,
-                )
-                for index in range(start, start + 28)
-            )
-        )
-        wait_for(
-            partial(_reads, running, "5", "light", 10_000.0 + start + 27), f"lot {start} of light"
-        )
-    period = f"period={round(now_s - 20_000, 3)},{round(now_s, 3)}"
-    hmi = open_page(running.url, f"tag=5&{period}")
-    expect(plot(hmi, "Light")).to_be_visible()
-    hmi.test_id("card-chart").get_by_label("Sensor").select_option("Daily light integral")
-    expect(plot(hmi, "Daily light integral")).to_be_visible()
-    told = running.json("/api/history", **asked(hmi, "daily_light_integral"))
-    assert told["unit"] == "mol/m²/d"
-    # 10,000 lx all day long.
-    assert told["readings"][-1]["value"] == pytest.approx(10_000 / 54 * 86_400 / 1e6, rel=0.03)
-    summary = plot(hmi, "Daily light integral").get_attribute("aria-label") or ""
-    assert f"{len(told['readings'])} readings" in summary
-    hmi.page.keyboard.press("c")
-    expect(hmi.test_id("chart-view").get_by_test_id("plot")).to_have_count(2)
-    # The axis is of the page's language, whatever the browser's is.
-    dutch = open_page(running.url, go=False)
-    dutch.page.add_init_script(WATCH_TEXTS)
-    dutch.go(f"tag=5&{period}", "?lang=nl")
-    dutch.expect(lambda: "10.000" in dutch.page.evaluate("texts"), "thousands as in Dutch")
-    # A tag without light has nothing to make it of: its own sensors are shown.
-    hmi = open_page(running.url, f"tag=2&sensor=daily_light_integral&{garden.period}")
-    expect(plot(hmi)).to_be_visible()
-    assert "daily_light_integral" not in {question["sensor_type"] for question in questions(hmi)}
-
-
-def test_the_day_before_lies_below_today_and_the_legend_compares(
-    garden: Garden, open_page: OpenPage
-) -> None:
-    running, now_s, day_s = garden.bridge, time.time(), 86_400.0
-    ago = range(3000, 0, -300)
-    running.peer.observe(
-        *(scan("6", {"co2": 500.0}, at=(5, 1), stamp_s=now_s - day_s - each) for each in ago),
-        *(scan("6", {"co2": 600.0}, at=(5, 1), stamp_s=now_s - each) for each in ago),
-    )
-    wait_for(partial(_reads, running, "6", "co2", 600.0), "today's readings")
-    from_s = round(now_s - 3600, 3)
-    hmi = open_page(running.url, f"chart.tag=6&period={from_s},{round(now_s, 3)}")
-    legend = hmi.page.get_by_role("region", name="Chart of CO₂").locator(".line-value")
-    expect(legend).to_have_text(re.compile("600"))
-    expect(legend).not_to_contain_text("day before")
-    inside = plot(hmi, "CO₂").locator(".u-over")
-    alone = line_rows(inside)
-    hmi.page.get_by_role("button", name="Day before").click()
-    expect(legend).to_contain_text("day before 500\u00a0ppm")
-    assert from_s - day_s in [float(question["from"]) for question in questions(hmi)]
-    # Of two levels one is new, and it lies lower.
-    hmi.expect(lambda: line_rows(inside) > alone, "a second line in the chart")
-    hmi.page.reload()
-    expect(legend).to_contain_text("day before 500")
-
-
-def line_rows(inside: Locator) -> int:
-    """How far apart the highest and the lowest row with the hue of CO₂ are."""
-    pixels = np.asarray(Image.open(io.BytesIO(inside.screenshot())).convert("RGB"), dtype=int)
-    is_purple = (pixels[..., 2] - pixels[..., 1] > 60).any(axis=1)
-    rows = np.flatnonzero(is_purple)
-    return int(np.ptp(rows)) if rows.size else 0
-
-
-def _reads(running: Bridge, tag_id: str, sensor: str, value: float) -> bool:
-    tags = running.json("/api/state")["tags"]
-    return any(
-        (reading["name"], reading["value"]) == (sensor, value)
-        for tag in tags
-        if tag["tag_id"] == tag_id
-        for reading in tag["readings"]
-    )
-
-
 def test_on_a_phone_the_card_makes_room_for_its_charts(garden: Garden, open_page: OpenPage) -> None:
     hmi = open_page(garden.bridge.url, f"tag=1&{garden.period}", viewport=PHONE)
     card = hmi.test_id("tag-card")
@@ -351,47 +256,6 @@ def test_on_a_phone_the_card_makes_room_for_its_charts(garden: Garden, open_page
     expect(hmi.test_id("card-chart")).to_be_in_viewport()
 
 
-def test_what_is_observed_flows_in_and_a_gap_in_the_hearing_is_refilled(
-    garden: Garden, open_page: OpenPage
-) -> None:
-    hmi = open_page(garden.bridge.url, go=False)
-    hmi.page.clock.install()
-    hmi.go("chart.tag=3&tag=3&period=hour")
-    hmi.expect_phase("live")
-    garden.bridge.peer.observe(scan("3", {"temperature": 19.5}, at=(2, 2)))
-    region = hmi.page.get_by_role("region", name="Chart of Temperature")
-    expect(region.locator("strong").first).to_have_text("19.5\u00a0°C")
-    garden.bridge.peer.observe(scan("3", {"temperature": 20.5}, at=(2, 2)))
-    expect(region.locator("strong").first).to_have_text("20.5\u00a0°C")
-    # For each visit, but each chart at most once in three seconds, and anew on each connection, of
-    # which a busy machine may lose one.
-    charts = {each["points"] for each in questions(hmi)}
-    asked_at = [
-        sorted(float(each["to"]) for each in questions(hmi) if each["points"] == points)
-        for points in charts
-    ]
-    soon = [later - at for each in asked_at for at, later in pairwise(each) if later - at < 2.5]
-    assert len(soon) < sum(url.startswith("ws:") for url in hmi.requests)
-    hmi.allow_noise("ERR_INTERNET_DISCONNECTED")
-    hmi.allow_noise("WebSocket")
-    hmi.page.context.set_offline(True)
-    hmi.page.clock.fast_forward(20_000)
-    hmi.expect_phase("reconnecting")
-    garden.bridge.peer.observe(scan("3", {"temperature": 21.5}, at=(2, 2)))
-    garden.bridge.peer.observe(scan("3", {"temperature": 22.5}, at=(2, 2)))
-    hmi.page.context.set_offline(False)
-    hmi.page.clock.run_for(20_000)
-    hmi.expect_phase("live")
-    hmi.page.get_by_role("button", name="Show as table").click()
-    hmi.expect(
-        lambda: (
-            [row["text"].split("|")[1] for row in rows(hmi) if row["kind"] == "reading"]
-            == [f"{value}\u00a0°C" for value in (22.5, 21.5, 20.5, 19.5)]
-        ),
-        "what was missed",
-    )
-
-
 def test_each_of_several_tags_has_the_colour_that_its_name_has(
     garden: Garden, open_page: OpenPage
 ) -> None:
@@ -405,45 +269,3 @@ def test_each_of_several_tags_has_the_colour_that_its_name_has(
     colour = [int(part) for part in re.findall(r"\d+", drawn)]
     hmi.expect(lambda: bool(columns(inside, colour)), f"a line in {colour}")
     assert not columns(inside)
-
-
-def test_the_difference_layer_is_one_field_less_the_other(
-    garden: Garden, open_page: OpenPage
-) -> None:
-    then = round(garden.now_s - 6000, 3)
-    hmi = open_page(garden.bridge.url, f"compare={then}")
-    expect(hmi.test_id("difference-high")).to_be_visible()
-    asked_for = [
-        dict(parse_qsl(urlsplit(url).query))
-        for url in hmi.requests
-        if "/api/field.npy?" in url and "bbox_min_x" in url
-    ]
-    before_query = next(query for query in asked_for if "at" in query)
-    assert float(before_query.pop("at")) == then
-    moments: list[dict[str, Any]] = [{}, {"at": str(then)}]
-    question: dict[str, Any] = {**before_query}
-    shown, before = (
-        np.load(io.BytesIO(garden.bridge.get("/api/field.npy", **question, **at).content))
-        for at in moments
-    )
-    between: NDArray[np.float64] = shown - before
-    most = float(np.nanmax(np.abs(between)))
-    text = hmi.test_id("difference-high").inner_text().split("\u00a0")[0]
-    assert float(text) == pytest.approx(most, abs=0.06)
-    expect(hmi.test_id("difference-legend")).to_contain_text("minus")
-    # Right on a tag: its own two values.
-    hmi.point_at(1.0, 1.0)
-    values = [
-        next(
-            reading["value"]
-            for tag in garden.bridge.json("/api/state", **at)["tags"]
-            if tag["tag_id"] == "1"
-            for reading in tag["readings"]
-            if reading["name"] == "temperature"
-        )
-        for at in moments
-    ]
-    sign = "+" if values[0] > values[1] else "\u2212"
-    expect(hmi.test_id("readout").locator("strong")).to_have_text(
-        re.compile(rf"^\{sign}{abs(values[0] - values[1]):.1f}")
-    )

@@ -101,6 +101,13 @@ def test_the_worst_first_and_a_click_away(browser: Browser, sites: Page) -> None
         expect(page).to_have_url(re.compile(r"/sites/gh1/"))
         expect(page.get_by_role("banner")).to_contain_text("gh1")
         expect(page.locator(".tag-table, table").first).to_contain_text("4")
+        # Nothing is pushed out of sight by the way back.
+        assert page.evaluate("document.documentElement.scrollHeight <= innerHeight")
+        page.get_by_role("link", name="All greenhouses").click()
+        expect(page.get_by_role("heading", level=1)).to_have_text("Greenhouses")
+    with opened(browser, f"{sites.url}/sites/gh1/?kiosk") as page:
+        expect(page.get_by_role("banner")).to_contain_text("gh1")
+        expect(page.locator(".fleet-back")).to_have_count(0)
     with opened(browser, f"{sites.url}/sites/silent/") as page:
         expect(page.get_by_role("banner")).not_to_contain_text("Live", timeout=10_000)
     with opened(browser, f"{sites.url}?kiosk&lang=de", viewport=PHONE) as page:
@@ -108,26 +115,6 @@ def test_the_worst_first_and_a_click_away(browser: Browser, sites: Page) -> None
         expect(page.get_by_role("searchbox")).to_have_count(0)
         expect(page.locator(".fleet-site")).to_have_count(3)
         expect_no_wider_than_a_phone(page)
-
-
-def test_the_way_back_from_a_greenhouse_to_all_of_them(browser: Browser, archive: Archive) -> None:
-    archive.do("INSERT INTO site VALUES ('gh1', '')")
-    with fleet(archive) as served:
-        served.site("gh1")
-        for query, words, title in (
-            ("", "All greenhouses", "Greenhouses"),
-            ("?lang=de", "Alle Gewächshäuser", "Gewächshäuser"),
-        ):
-            with opened(browser, f"{served.url}/sites/gh1/{query}") as page:
-                link = page.get_by_role("link", name=words)
-                expect(link).to_be_visible()
-                # Nothing is pushed out of sight by it.
-                assert page.evaluate("document.documentElement.scrollHeight <= innerHeight")
-                link.click()
-                expect(page.get_by_role("heading", level=1)).to_have_text(title)
-        with opened(browser, f"{served.url}/sites/gh1/?kiosk") as page:
-            expect(page.get_by_role("banner")).to_contain_text("gh1")
-            expect(page.locator(".fleet-back")).to_have_count(0)
 
 
 def test_alarms_of_all_greenhouses_are_counted_listed_and_a_click_away(
@@ -321,18 +308,3 @@ def test_an_archive_without_greenhouses_and_one_that_is_down(browser: Browser) -
             expect(card).to_have_attribute("data-live", "false")
             served.process.thaw()
             expect(page.get_by_role("alert")).to_be_hidden()
-
-
-def test_a_thousand_are_shown_without_delay(browser: Browser, archive: Archive) -> None:
-    archive.do(
-        "INSERT INTO site SELECT 'gh' || n % 9 || '-' || n, '' FROM generate_series(1, 1000) AS n;"
-        "INSERT INTO forwarder SELECT site, 'm', 1, now(), now() + INTERVAL '1 hour' FROM site"
-    )
-    with fleet(archive) as served:
-        served.site("gh1-1000", is_live=True)
-        begun = "performance.now()"
-        with opened(browser, served.url) as page:
-            expect(page.locator(".fleet-site")).to_have_count(1000)
-            print("painted after", page.evaluate(begun), "ms")
-            page.get_by_role("searchbox").fill("-77")
-            expect(page.locator(".fleet-site")).to_have_count(11)

@@ -11,7 +11,7 @@ from playwright.sync_api import expect
 
 import lupin_bridge
 from tests.browser.hmi import OpenPage, Pixel
-from tests.support.messages import look, occupancy_grid, scan
+from tests.support.messages import occupancy_grid, scan
 from tests.support.web import Bridge, bridge
 
 SENSORS: Any = json.loads((Path(lupin_bridge.__file__).parent / "sensors.json").read_text())
@@ -180,35 +180,6 @@ def test_a_pin_sits_on_its_pose_and_in_its_cell(domain: int, open_page: OpenPage
         metre = hmi.view().scale
         above, corner = (at[0], at[1] + 7 / metre), (at[0] + 9 / metre, at[1] + 9 / metre)
         hmi.expect_pixels(lambda pixel: close(pixel, CRITICAL), above, corner, what="a red square")
-
-
-def test_a_planter_box_and_its_blooms_lie_where_they_were_seen(
-    domain: int, open_page: OpenPage
-) -> None:
-    box = [(1.0, 4.0), (2.5, 4.0), (2.5, 4.5), (1.0, 4.5)]
-    with bridge(domain=domain) as running:
-        running.peer.publish_map(floor(6, 6))
-        running.peer.observe(
-            scan("a", {"co2": 900.0}, at=(5, 1)),
-            look("a", footprint=box, blooms=[(1.25, 4.25), (2.25, 4.3)], flower_count=2),
-        )
-        running.tag("a", lambda tag: tag["flowers"])
-        hmi = open_page(running.url, "view=3,3,6&layers=map")
-        expect(hmi.row("a")).to_be_visible()
-        bare = hmi.settled_picture()
-        view = hmi.view()
-        hmi.turn("view=3,3,6&layers=map,boxes")
-        outline = hmi.lasting_change(bare)
-        wanted = (*view.pixel(1.0, 4.5), *view.pixel(2.5, 4.0))
-        assert max(abs(a - b) for a, b in zip(outline, wanted, strict=True)) <= 2
-        hmi.turn("view=3,3,6&layers=map,blooms")
-        dots = hmi.lasting_change(bare)
-        # One dot is at the lower left of the other: as far from the box on each side.
-        left, bottom = view.pixel(1.25, 4.25)
-        right, top = view.pixel(2.25, 4.3)
-        reach = (left - dots.left, top - dots.top, dots.right - 1 - right, dots.bottom - 1 - bottom)
-        assert max(reach) <= 5
-        assert max(reach) - min(reach) <= 1
 
 
 def test_a_map_with_a_yaw_lies_turned_about_its_origin(domain: int, open_page: OpenPage) -> None:

@@ -149,43 +149,10 @@ def test_what_is_deep_beside_the_contract_does_no_harm(tapped: tuple[Hmi, Tap]) 
     expect(hmi.test_id("failed-page")).to_have_count(0)
 
 
-@pytest.mark.parametrize("answer", [None, {"tag_id": "1", "sensors": [{"name": 1}]}])
-def test_a_history_that_is_none_leaves_the_card_as_it_is(
-    house: Bridge, open_page: OpenPage, answer: Any
-) -> None:
-    hmi = open_page(house.url, go=False)
-    asked: list[str] = []
-
-    def fulfill(route: Any) -> None:
-        asked.append(route.request.url)
-        route.fulfill(json=answer)
-
-    hmi.page.route(re.compile("/history"), fulfill)
-    hmi.go("tag=1")
-    expect(hmi.card("1").locator("[data-sensor=temperature]")).to_contain_text("20.0")
-    hmi.expect(lambda: len(asked) > 0, "the history asked for")
-    hmi.expect_samples(3)
-    expect(hmi.card("1")).to_be_visible()
-
-
 BREAK: Final = """() => {
   window.stayed = true;
   CanvasRenderingContext2D.prototype.clearRect = () => { throw new Error('no more canvas'); };
 }"""
-
-
-def test_a_page_that_fails_offers_to_be_loaded_anew(house: Bridge, open_page: OpenPage) -> None:
-    hmi = open_page(house.url)
-    hmi.expect_rows(*TAGS)
-    hmi.allow_noise("no more canvas")
-    hmi.page.evaluate(BREAK)
-    hmi.page.set_viewport_size({"width": 1000, "height": 700})
-    failed = hmi.test_id("failed-page")
-    expect(failed).to_contain_text("Error: no more canvas")
-    assert hmi.page.evaluate("window.stayed") is True
-    failed.get_by_role("button", name="Reload").click()
-    hmi.expect_rows(*TAGS)
-    assert hmi.page.evaluate("window.stayed") is None
 
 
 def test_a_wall_screen_that_fails_comes_back_by_itself(house: Bridge, open_page: OpenPage) -> None:

@@ -16,7 +16,6 @@ from lupin_twin.journal.fold import state_at
 from lupin_twin.journal.runs import Clock
 from lupin_twin.journal.schema import open_reader
 from tests.browser.hmi import PHONE, Hmi, OpenPage, point, press_at, slider
-from tests.browser.places import place
 from tests.browser.test_accessibility import violations
 from tests.support.journal import SECOND, kept, look, pin, scan
 from tests.support.messages import scan as observed
@@ -210,86 +209,6 @@ def test_a_link_shows_the_same_moment_to_somebody_else_and_back_leads_to_now(
     assert expect_past(page) == at
 
 
-def test_a_twin_without_a_memory_says_so_and_how_to_have_one(
-    hour: Hour, open_page: OpenPage
-) -> None:
-    hmi = open_page(hour.bridge.url, go=False)
-    hmi.allow_noise(r"404 .*/api/(timeline|state|field)")
-    hmi.page.route(
-        re.compile(r"/api/(timeline|state\?at=|field.*at=)"),
-        lambda route: route.fulfill(status=404, json={"detail": "no journal is kept"}),
-    )
-    hmi.go()
-    bar = hmi.test_id("timebar")
-    expect(bar).to_have_attribute("data-state", "off")
-    expect(bar).to_contain_text("this twin records nothing")
-    expect(bar).to_contain_text("Recording is turned on when the twin is started")
-    expect(bar).not_to_contain_text("journal")  # plain words
-    expect(hmi.cell("a", "temperature")).to_have_text("25.5")
-    hmi.go(f"at={hour.begun_s + 600}")
-    expect(hmi.test_id("notice")).to_have_attribute("data-notice", "past-failed")
-    expect(hmi.test_id("notice")).to_contain_text("no journal is kept")
-    assert hmi.rows() == []
-    hmi.page.get_by_role("button", name="Back to live").click()
-    expect(hmi.cell("a", "temperature")).to_have_text("25.5")
-
-
-def test_a_lost_connection_is_told_and_the_past_stays(page: Hmi, hour: Hour) -> None:
-    page.allow_noise("ERR_INTERNET_DISCONNECTED|closed before the connection is established")
-    page.page.clock.install()
-    page.go("period=hour")
-    press_at(page, 0.5)
-    at = expect_past(page)
-    then = hour.read_then(at)["a"]
-    # It is here: what is only asked for would be lost.
-    expect(page.cell("a", "temperature")).to_have_text(then)
-    page.page.context.set_offline(True)
-    page.page.clock.fast_forward(20_000)
-    page.expect_phase("reconnecting")
-    banner = page.test_id("frozen")
-    expect(banner).to_contain_text("Live data has stopped")
-    expect(banner).to_contain_text("The past shown is not affected")
-    expect(page.cell("a", "temperature")).to_have_text(then)
-    expect(page.page.locator("canvas[data-layer=pins]")).to_have_css("opacity", "1")
-    page.resize(**PHONE)
-    # As wide as the words of a simulation make it.
-    page.page.locator(".past-word").evaluate(
-        "(it) => it.insertAdjacentHTML('afterend', '<span class=past-origin>Simulated</span>')"
-    )
-    back, badge = page.page.locator(".back-to-live"), page.test_id("connection")
-    assert place(back).right <= place(badge).left
-    expect(badge).to_have_text("Connection: Past · reconnecting")
-    page.resize(1280, 800)
-    page.page.context.set_offline(False)
-    page.page.clock.run_for(20_000)
-    page.expect_phase("live")
-    assert expect_past(page) == at
-    expect(page.cell("a", "temperature")).to_have_text(then)
-    check_seen(page, hour)
-
-
-def test_what_becomes_critical_meanwhile_is_told_and_leads_to_now(page: Hmi, hour: Hour) -> None:
-    robot = hour.bridge.peer
-    press_at(page, 0.5)
-    expect_past(page)
-    expect(page.test_id("meanwhile")).to_have_count(0)
-    robot.observe(*[observed("c", {"temperature": 60.0})] * 2)
-    expect(page.test_id("meanwhile")).to_contain_text("New alarm: Tag c: Temperature above")
-    # The list is that of now, and says so.
-    expect(page.page).to_have_title(re.compile(r"^\(1\) .* \(past\) · Lupin twin$"))
-    page.page.keyboard.press("a")
-    expect(page.page.locator("[data-note=now]")).to_contain_text("These are the current alarms")
-    expect(page.page.locator("[data-group=active] li")).to_contain_text("Tag c")
-    page.page.locator(".list-choice label").first.click()
-    assert moment(page) is not None
-    page.page.get_by_role("button", name="Back to live, show tag c").click()
-    expect_now(page)
-    expect(page.card("c")).to_contain_text("60.0")
-    expect(page.test_id("meanwhile")).to_have_count(0)
-    # To have gone there resolves nothing.
-    expect(page.page).to_have_title("(1) Lupin twin")
-
-
 def test_axe_has_no_objection_to_the_past(hour: Hour, open_page: OpenPage) -> None:
     past = f"at={hour.begun_s + 700}&tag=b&period=hour"
     hmi = open_page(hour.bridge.url, past, bypass_csp=True)
@@ -301,37 +220,6 @@ def test_axe_has_no_objection_to_the_past(hour: Hour, open_page: OpenPage) -> No
     hmi.card("b").get_by_role("button", name="Close").click()
     hmi.page.get_by_label("Period", exact=True).select_option("own")
     assert violations(hmi) == []
-
-
-def test_the_estimate_says_plus_or_minus_what_now_and_then_and_in_its_link(
-    hour: Hour, open_page: OpenPage
-) -> None:
-    hmi = open_page(hour.bridge.url, "period=hour", color_scheme="dark", bypass_csp=True)
-    hmi.expect_samples(3)
-    hmi.test_id("heat-legend").select_option("estimate")
-    expect(hmi.test_id("estimate-key")).to_contain_text("Hatched: less certain than")
-    expect(hmi.test_id("foretold")).to_be_visible()
-    # The error alone, which is said also where a house that has just jumped is not known.
-    hmi.test_id("heat-legend").select_option("error")
-    hmi.point_at(3.3, 2.3)
-    read = hmi.test_id("readout")
-    expect(read).to_contain_text(re.compile(r"±\s\d\.\d+\s°C"))
-    expect(read).to_contain_text(re.compile("[23] tags near, oldest reading"))
-    assert violations(hmi) == []
-    press_at(hmi, 0.5)
-    at = expect_past(hmi)
-    hmi.point_at(3.3, 2.3)
-    expect(read).to_contain_text(re.compile(r"±\s\d\.\d+\s°C"))
-    hmi.test_id("heat-legend").select_option("estimate")
-    hmi.expect(lambda: "heat=estimate" in hmi.address(), "the link")
-    theirs = open_page(hour.bridge.url, hmi.address().partition("#")[2])
-    assert expect_past(theirs) == at
-    key = "estimate-key"
-    theirs.expect(
-        lambda: theirs.test_id(key).inner_text() == hmi.test_id(key).inner_text(), "the same key"
-    )
-    theirs.test_id("heat-legend").select_option("error")
-    expect(theirs.test_id("error-scale")).to_be_visible()
 
 
 def test_a_phone_has_the_menu_and_every_count_on_its_screen(

@@ -96,22 +96,6 @@ def test_the_page_opens_on_the_tags_at_home_and_lists_those_far_off(hmi: Hmi) ->
     assert hmi.view().scale > 50
 
 
-def test_a_site_of_two_tags_that_are_far_apart_is_shown_as_a_whole(open_page: OpenPage) -> None:
-    with bridge() as running:
-        for tag_id, x in (("west", -450.0), ("east", 450.0)):
-            running.peer.observe(scan(tag_id, {"temperature": 20.0}, at=(x, 0.0)))
-            running.tag(tag_id)
-        hmi = open_page(running.url)
-        hmi.expect_samples(2)
-
-        def are_both_in_sight() -> bool:
-            box, view = hmi.map.bounding_box(), hmi.view()
-            assert box is not None
-            return view.pixel(-450, 0)[0] > 0 and view.pixel(450, 0)[0] < box["width"]
-
-        hmi.expect(are_both_in_sight, "both tags")
-
-
 def test_that_it_stands_still_lies_under_no_other_word(site: Bridge, open_page: OpenPage) -> None:
     hmi = open_page(site.url, go=False, viewport={"width": 1100, "height": 800})
     no_value = {"sensor": "", "value": None, "limit": None, "since": None}

@@ -7,7 +7,6 @@ import pytest
 from playwright.sync_api import expect
 
 from tests.browser.hmi import Hmi, OpenPage
-from tests.browser.house import TAGS
 from tests.browser.places import place, places
 from tests.support.web import Bridge
 
@@ -64,52 +63,7 @@ def test_a_sensor_has_its_colours_words_legend_and_column(hmi: Hmi) -> None:
     expect(hmi.test_id("notice")).to_have_attribute("data-notice", "no-reading")
 
 
-def test_a_range_is_fixed_to_the_ideal_one_and_fahrenheit_is_kept(hmi: Hmi) -> None:
-    hmi.colour_by_value()
-    hmi.page.get_by_role("radio", name="Fixed").check()
-    hmi.page.get_by_role("button", name="Use ideal range").click()
-    expect(hmi.test_id("range-low")).to_have_text("18.0")
-    expect(hmi.test_id("range-high")).to_have_text("26.0\u00a0°C")
-    hmi.page.keyboard.press("u")
-    expect(hmi.test_id("range-high")).to_have_text("78.8\u00a0°F")
-    hmi.page.reload()
-    expect(hmi.cell("1", "temperature")).to_have_text("68.0")
-
-
 # --- table --------------------------------------------------------------------------------------
-
-
-def test_the_table_is_filtered_and_sorted_and_health_names_the_tag_that_drives_it(hmi: Hmi) -> None:
-    field = hmi.page.get_by_role("searchbox")
-    field.fill("pest lup")
-    hmi.expect_rows("10")
-    expect(hmi.test_id("row-count")).to_have_text("1 of 7 tags")
-    field.fill("no such thing")
-    expect(hmi.page.locator("tr.no-match")).to_contain_text("No tag matches")
-    hmi.page.get_by_role("button", name="Clear filter").click()
-    hmi.expect_rows(*TAGS)
-
-    header = hmi.page.locator("th[data-column=temperature]")
-    expect(header).to_have_attribute("aria-sort", "none")
-    expect(hmi.page.locator("th[data-column=health]")).to_have_attribute("aria-sort", "descending")
-
-    header.get_by_role("button").click()
-    expect(header).to_have_attribute("aria-sort", "ascending")
-    hmi.expect_rows("1", "9", "2", "10", "3", "failed", "seen")
-    header.get_by_role("button").click()
-    expect(header).to_have_attribute("aria-sort", "descending")
-    # Who has no reading stays last.
-    hmi.expect_rows("10", "2", "9", "1", "3", "failed", "seen")
-    expect(hmi.page.locator("th[aria-sort=ascending], th[aria-sort=descending]")).to_have_count(1)
-
-    # 31 °C at 40 % is air just too dry for any leaf, and there are pests, which go first.
-    expect(hmi.test_id("house-health")).to_have_attribute("data-health", "critical")
-    driver = hmi.test_id("health-driver")
-    expect(driver).to_contain_text("Tag 10: 3 pests seen")
-    driver.click()
-    expect(hmi.card("10")).to_be_visible()
-    hmi.page.locator(".health-counts [data-health=unknown]").first.click()
-    hmi.expect_rows("failed", "seen")
 
 
 def test_beside_a_card_the_table_keeps_rows_and_none_that_is_chosen_ends_below_its_head(

@@ -9,7 +9,6 @@ from tests.browser.hmi import SERVER_GONE, Hmi, OpenPage
 from tests.support.messages import occupancy_grid, scan
 from tests.support.processes import lupin_twin, twin_node, url_of
 from tests.support.ros import Peer
-from tests.support.web import bridge
 
 CLOCK = re.compile(r"Last data at \d\d:\d\d:\d\d")
 
@@ -117,35 +116,3 @@ def test_a_server_that_is_killed_and_starts_anew_with_other_tags(
         expect(hmi.test_id("sample-count")).to_have_text("No tag contributes")
         hmi.expect(lambda: len(set(hmi.pixels([ground, hot, floor]))) == 1, "bare ground")
     assert min(seqs(hmi)[len(old_seqs) :]) < old_seqs[-1]
-
-
-def test_thirty_seconds_without_a_network(domain: int, open_page: OpenPage) -> None:
-    with bridge(domain=domain) as running:
-        running.peer.publish_map(occupancy_grid([[0] * 6] * 6))
-        running.peer.observe(scan("a", {"temperature": 20.0}, at=(1, 1)))
-        hmi = open_page(running.url, go=False)
-        hmi.page.clock.install()
-        hmi.go("sort=tag")
-        stay(hmi)
-        hmi.expect_rows("a")
-        hmi.expect_samples(1)
-        hmi.expect_phase("live")
-
-        hmi.allow_noise("ERR_INTERNET_DISCONNECTED|closed before the connection is established")
-        hmi.page.context.set_offline(True)
-        running.peer.observe(scan("b", {"temperature": 30.0}, at=(2, 1)))
-        running.tag("b")
-        hmi.page.clock.fast_forward(30_000)
-        hmi.expect_phase("reconnecting")
-        expect_frozen(hmi, "Connection to the server lost")
-        expect(hmi.test_id("frozen")).to_contain_text(re.compile(r"([3-5]\d\ss|1\smin) ago"))
-        expect(hmi.row("a").locator(".cell-age")).to_have_text(re.compile(r"[3-5]\d\ss|1\smin"))
-        hmi.expect_rows("a")
-
-        # At once: nobody waits for the back-off, whose pause is up to 15 s by now.
-        hmi.page.clock.pause_at(hmi.page.evaluate("Date.now() / 1000 + 10"))
-        hmi.page.context.set_offline(False)
-        hmi.expect_rows("a", "b")
-        hmi.page.clock.resume()
-        hmi.expect_samples(2)
-        expect_live(hmi)

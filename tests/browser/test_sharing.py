@@ -1,12 +1,9 @@
 """What leaves the page: links, CSV, PNG, and the settings that a browser keeps."""
 
-import csv
 import io
 import math
 import re
-from datetime import UTC, datetime, timedelta
 from functools import partial
-from pathlib import Path
 from urllib.parse import parse_qs, urlsplit
 
 import pytest
@@ -75,52 +72,6 @@ def save(hmi: Hmi, name: str) -> Download:
     with hmi.page.expect_download() as download:
         hmi.page.get_by_role("button", name=name).click()
     return download.value
-
-
-def read_csv(download: Download) -> list[dict[str, str]]:
-    text = Path(download.path()).read_bytes()
-    assert text.startswith(b"\xef\xbb\xbf")  # spreadsheets take it for Latin-1 without
-    return list(csv.DictReader(io.StringIO(text.decode("utf-8-sig"), newline="")))
-
-
-def utc(text: str) -> datetime:
-    assert text.endswith("Z")
-    return datetime.fromisoformat(text)
-
-
-def test_the_table_as_csv_holds_every_tag_with_raw_values_or_those_that_are_shown(
-    house: Bridge, open_page: OpenPage
-) -> None:
-    hmi = open_page(house.url)
-    hmi.expect_rows(*TAGS)
-    download = save(hmi, "Save table as CSV")
-    assert download.suggested_filename.startswith("lupin-twin-tags-")
-    assert download.suggested_filename.endswith(".csv")
-    rows = {row["tag"]: row for row in read_csv(download)}
-    assert list(rows) == list(TAGS)
-    pest = rows["10"]
-    assert (pest["Temperature [°C]"], pest["Humidity [%]"], pest["CO₂ [ppm]"]) == ("31", "40", "")
-    assert (pest["species"], pest["bugs"], pest["pest"]) == ("lupin", "3", "yes")
-    assert (pest["x [m]"], pest["y [m]"]) == ("1", "3")
-    assert (rows["9"]["x [m]"], rows["9"]["Light [lx]"]) == ("", "900")  # no pose
-    assert rows["3"]["CO₂ [ppm]"] == ""  # the sensor gave no number
-    assert rows["seen"]["age [s]"] == ""  # never observed
-    assert int(rows["1"]["age [s]"]) >= 0
-    assert rows["seen"]["last observed [UTC]"] == ""
-    assert abs(utc(rows["1"]["last observed [UTC]"]) - datetime.now(UTC)) < timedelta(hours=1)
-
-    # As it is filtered and sorted, and in its units.
-    hmi.page.keyboard.press("u")
-    hmi.page.get_by_role("searchbox").fill("temperature")
-    header = hmi.page.locator("th[data-column=temperature]").get_by_role("button")
-    header.click()
-    header.click()
-    hmi.expect_rows("10", "2", "9", "1")
-    with hmi.page.expect_download() as later:
-        hmi.page.get_by_role("button", name="CSV").click()
-    shown = read_csv(later.value)
-    assert [row["tag"] for row in shown] == ["10", "2", "9", "1"]
-    assert shown[0]["Temperature [°F]"] == "87.8"
 
 
 FOOTER_PX = 56

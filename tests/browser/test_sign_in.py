@@ -9,7 +9,6 @@ from playwright.sync_api import Browser, BrowserContext, Page, expect
 
 from tests.browser.hmi import FONTS, slow_down
 from tests.support.access import TOKEN, Served, served
-from tests.support.tls import Certificate, certificate
 from tests.support.waiting import PATIENCE_S
 
 
@@ -105,20 +104,6 @@ def test_a_link_on_another_page_leads_in_although_the_cookie_is_strict(
     page.goto(closed.url)
     expect(page).to_have_url(closed.url + "/signin")
     expect(page.get_by_test_id("app")).to_have_count(0)
-
-
-def test_over_tls_the_cookie_is_secure(
-    context: BrowserContext, tmp_path_factory: pytest.TempPathFactory
-) -> None:
-    ours: Certificate = certificate(tmp_path_factory.mktemp("tls"))
-    with served(*ours.options, trust=ours.trust, LUPIN_TOKEN=TOKEN) as secure:
-        page = new_page(context)
-        page.goto(secure.url)
-        sign_in(page, TOKEN)
-        expect_live(page)
-        (cookie,) = context.cookies()
-        assert cookie["secure"]
-        assert page.evaluate("isSecureContext")
 
 
 def test_a_page_whose_session_has_ended_leaves_for_the_sign_in(page: Page) -> None:

@@ -4,7 +4,6 @@ import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import Future
 from functools import cache
-from pathlib import Path
 from threading import Event
 from types import SimpleNamespace
 from typing import Any
@@ -197,30 +196,6 @@ def test_a_flood_of_the_dearest_holds_up_no_observation_and_no_field(peer: Peer)
     assert all(one.error_message.endswith("ask again later") for one in answers(False))
     for client in clients:
         peer.node.destroy_client(client)
-
-
-def test_after_a_restart_models_are_made_of_what_the_journal_holds(tmp_path: Path) -> None:
-    journal = tmp_path / "j.sqlite"
-    arguments = (*OFTEN, "-p", f"journal:={journal}")
-    with own_domain() as domain, twin_node(domain, *arguments), Peer(domain) as peer:
-        peer.wait_for_twin()
-        for stamp_s in sorted(times()["a"] + times()["b"]):
-            tag_id = "a" if stamp_s in times()["a"] else "b"
-            peer.observe(messages.scan(tag_id, {"co2": 400.0}, stamp_s=stamp_s, at=PLACES[tag_id]))
-        rows = "SELECT count(*) FROM scan"
-        wait_for(lambda: select(journal, rows) == [(14,)], "all of it in the journal")
-    # Where the one that has ended is not found any more.
-    with own_domain() as domain, twin_node(domain, *arguments), Peer(domain) as peer:
-        peer.wait_for_twin()
-
-        def report() -> Any:
-            found = peer.ask(GetEstimateReport, REPORT_SERVICE, sensor_type="co2")
-            return found if found.tag_ids else None
-
-        found = wait_for(report, "a model")
-    assert sorted(found.tag_ids) == ["a", "b"]
-    assert found.fitted_at.sec > 0
-    assert (found.week_scans, found.graded_since) == (0, Time())
 
 
 def test_a_report_serves_for_a_while_and_what_is_wrong_is_said_once(

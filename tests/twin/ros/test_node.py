@@ -4,8 +4,6 @@ import math
 from collections.abc import Iterator
 from typing import Any
 
-from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
-
 from tests.support.domains import own_domain
 from tests.support.messages import scan
 from tests.support.processes import OFTEN, Process, twin_node
@@ -51,37 +49,6 @@ def test_a_twin_alone_publishes_an_empty_state_at_once(domain: int) -> None:
     assert list(state.tags) == []
     assert state.header.frame_id == "map"
     assert state.header.stamp.sec > 0
-
-
-def test_late_joiner_gets_the_latched_state_and_a_volatile_one_waits_for_the_next(
-    domain: int,
-) -> None:
-    rate = ("--ros-args", "-p", "state_publish_rate_hz:=0.5")
-    with twin_node(domain, *rate), Peer(domain, "first") as first:
-        first.state(lambda _: True, "the first state")
-        with Peer(domain, "late") as late:
-            # One after the other, or both may begin with a state that comes in between.
-            late.listen()
-            late.until(lambda: late.states, "the latched state")
-            # By its stamp, not by the time: one that is on its way was stamped before.
-            latched_ns = stamp_ns(late.states[-1])
-            volatile: list[Any] = []
-            late.node.create_subscription(
-                type(first.states[0]),
-                "/twin/state",
-                volatile.append,
-                QoSProfile(
-                    depth=1,
-                    reliability=ReliabilityPolicy.RELIABLE,
-                    durability=DurabilityPolicy.VOLATILE,
-                ),
-            )
-            late.until(lambda: volatile, "the next state, for the volatile one")
-    assert stamp_ns(volatile[0]) > latched_ns
-
-
-def stamp_ns(state: Any) -> int:
-    return int(state.header.stamp.sec * 1_000_000_000 + state.header.stamp.nanosec)
 
 
 def test_fifty_observations_latched_before_the_twin_started_are_all_heard(domain: int) -> None:

@@ -1,18 +1,14 @@
 """What a node drops, and how loudly; over real DDS, each with a twin of its own."""
 
-import math
 from collections.abc import Iterator
 
 import pytest
-from lupin_msgs.msg import Observation
 from rcl_interfaces.srv import SetParameters
 from rclpy.parameter import Parameter
-from rclpy.serialization import serialize_message
 
 from tests.support import messages
 from tests.support.messages import discovered, look, occupancy_grid, scan
-from tests.support.processes import OFTEN, twin_node
-from tests.support.ros import Peer
+from tests.support.processes import OFTEN
 from tests.twin.ros.test_node import Twin, running_twin
 
 
@@ -35,53 +31,6 @@ def test_a_wrong_frame_is_dropped_on_each_path_and_names_both_frames(twin: Twin)
     twin.warning("/map", "'other_map'", "'map'")
     twin.settled()
     assert set(twin.tags()) == {"marker"}
-
-
-def test_an_anomaly_and_an_unknown_kind_are_dropped_with_a_throttled_warning(twin: Twin) -> None:
-    anomaly, unknown = scan("x", {"co2": 1.0}), scan("y", {"co2": 1.0})
-    anomaly.kind, unknown.kind = Observation.KIND_ANOMALY, 9
-    # Kind comes before frame: a wrong frame in an anomaly is not what the warning is about.
-    anomaly.header.frame_id = "odom"
-    twin.peer.observe(*[anomaly] * 10, *[unknown] * 10)
-    twin.warning("KIND_ANOMALY")
-    twin.warning("kind 9")
-    twin.settled()
-    assert set(twin.tags()) == {"marker"}
-    assert twin.process.output.count("KIND_ANOMALY") == 1
-    assert twin.process.output.count("kind 9") == 1
-    assert "odom" not in twin.process.output
-
-
-def test_a_message_cut_short_or_too_large_is_dropped_and_the_node_lives(twin: Twin) -> None:
-    data = bytes(serialize_message(scan("broken", {"co2": 1.0})))
-    publisher = twin.peer.publisher("/floranova/observations", Observation)
-    publisher.publish(data[:40])
-    twin.warning("unreadable")
-    publisher.publish(scan("large", {f"sensor{i}": 1.0 for i in range(50_000)}))
-    twin.warning("bytes", "limit is 1000000")
-    twin.settled()
-    assert set(twin.tags()) == {"marker"}
-
-
-def test_a_malformed_map_is_refused_and_the_last_good_one_stays(domain: int) -> None:
-    with twin_node(domain, *OFTEN) as process, Peer(domain) as peer:
-        peer.wait_for_twin()
-        twin = Twin(process, peer)
-        peer.observe(scan("1", {"co2": 500.0}, at=(0.5, 0.5)))
-        peer.publish_map(occupancy_grid([[0, -1]]))
-        peer.until(lambda: known_cells(peer) == [True, False], "the clipped field")
-        broken = occupancy_grid([[0, 0]])
-        broken.info.width = 7
-        peer.publish_map(broken)
-        twin.warning("map data holds 2 cells", "the last one stays")
-        assert known_cells(peer) == [True, False]
-        peer.publish_map(occupancy_grid([[-1, 0]]))
-        peer.until(lambda: known_cells(peer) == [False, True], "the field of the next map")
-
-
-def known_cells(peer: Peer) -> list[bool]:
-    response = peer.get_field(sensor_type="co2", resolution=1.0, bbox_max_x=2.0, bbox_max_y=1.0)
-    return [not math.isnan(value) for value in response.values]
 
 
 def test_a_pose_too_far_off_is_dropped_on_each_path_and_the_readings_stay(twin: Twin) -> None:

@@ -29,6 +29,12 @@ LOT: Final = 40
 LINE: Final = (186, 51, 31)
 
 
+# What is written into pictures.
+WATCH_TEXTS: Final = """const paint = CanvasRenderingContext2D.prototype.fillText;
+window.texts = []; CanvasRenderingContext2D.prototype.fillText = function (text, ...place) {
+  texts.push(text); return paint.call(this, text, ...place); };"""
+
+
 class Garden:
     """Two hours of tag 1 with twenty minutes of nothing; of tag 2 more than a chart has points."""
 
@@ -237,6 +243,29 @@ def test_hover_tells_the_time_and_a_click_goes_there(garden: Garden, open_page: 
     assert at == pytest.approx(quarter, abs=60)
     hmi.page.keyboard.press("Escape")
     expect(hmi.test_id("chart-view")).to_have_count(0)
+
+
+def test_the_day_before_is_compared_and_the_axis_is_of_the_pages_language(
+    garden: Garden, open_page: OpenPage
+) -> None:
+    now_s = time.time()
+    scans = (
+        scan("6", {"light": 20_000.0 - ago_s / 100}, at=(5, 1), stamp_s=now_s - ago_s)
+        for ago_s in (86_400 + 1_500, 1_500, 1_000)
+    )
+    garden.bridge.peer.observe(*scans)
+    garden.bridge.tag("6", lambda tag: tag["readings"][0]["value"] == 19_990.0)
+    hmi = open_page(garden.bridge.url, go=False)
+    hmi.page.add_init_script(WATCH_TEXTS)
+    hmi.go(f"chart.tag=6&period={now_s - 3_600:.3f},{now_s:.3f}", "?lang=nl")
+    legend = hmi.page.locator(".line-value")
+    expect(legend).to_have_text(re.compile("19"))
+    thousands = "texts.some((text) => /^\\d\\d\\.\\d{3}$/.test(text))"
+    hmi.expect(lambda: bool(hmi.page.evaluate(thousands)), "thousands as in Dutch")
+    hmi.page.get_by_role("button", name="Dag ervoor").click()
+    expect(legend).to_contain_text("dag ervoor")
+    hmi.page.reload()
+    expect(legend).to_contain_text("dag ervoor")
 
 
 def test_on_a_phone_the_card_makes_room_for_its_charts(garden: Garden, open_page: OpenPage) -> None:

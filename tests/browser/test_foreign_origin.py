@@ -6,23 +6,18 @@ The operator's browser reaches the bridge, and every page that it shows may try 
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
-from functools import partial
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from typing import Any
 
 import pytest
-from playwright.sync_api import Browser, Page, expect
+from playwright.sync_api import Browser, Page
 
-from tests.browser.conftest import CHROMIUM, CHROMIUM_ARGS
-from tests.support.access import BEARER, OWN, TOKEN, Served, served
 from tests.support.domains import own_domain
 from tests.support.messages import scan
-from tests.support.waiting import PATIENCE_S, wait_for
+from tests.support.waiting import PATIENCE_S
 from tests.support.web import Bridge, bridge
 
 FIELD = "/api/field.png?sensor_type=co2&resolution=0.5"
-COUNT_OF_403 = 'lupin_http_answers_total{status="403"}'
-
 # Everything that a page can try, each answering with what it got out of the bridge.
 TRY = """
 async ({ url, field, init }) => {
@@ -175,86 +170,3 @@ def test_an_allowed_page_gets_what_it_names_itself_for(page: Page) -> None:
         # These do not say whose page asks.
         assert got["image"] == "refused: <img>"
         assert got["script"] == "refused: <script>"
-
-
-def test_an_allowed_page_may_send_the_token(page: Page) -> None:
-    with (
-        foreign_page("localhost") as origin,
-        served("--allow-origin", origin, LUPIN_TOKEN=TOKEN) as it,
-    ):
-        assert '"tags":[]' in try_all(page, origin, it.url, headers=BEARER)["fetch"]
-        without = try_all(page, origin, it.url)
-        assert "a token is needed" in without["fetch"]
-        assert without["socket"] == "refused: WebSocket"
-
-
-def test_a_name_that_is_rebound_to_the_bridge_gets_nothing(
-    browser: Browser, running: Bridge
-) -> None:
-    """To the browser, the attacker's page and the bridge are one origin then."""
-    rebound = "--host-resolver-rules=MAP evil.example 127.0.0.1"
-    port = running.url.rpartition(":")[2]
-    with browser.browser_type.launch(
-        executable_path=CHROMIUM, args=[*CHROMIUM_ARGS, rebound], headless=True
-    ) as another:
-        page = another.new_page()
-        answer = page.goto(f"http://evil.example:{port}/")
-        assert answer is not None
-        assert answer.status == 403
-        got = page.evaluate(
-            "async () => { const a = await fetch('/api/state'); return [a.status, await a.text()] }"
-        )
-        assert got[0] == 403
-        assert "secret tag" not in got[1]
-
-
-def test_an_open_session_is_of_no_use_to_a_foreign_page(page: Page) -> None:
-    with served(LUPIN_TOKEN=TOKEN) as it, foreign_page("127.0.0.1") as origin:
-        page.goto(f"{it.url}/signin")
-        status = page.evaluate(
-            "async (headers) => (await fetch('api/signin', { method: 'POST', headers })).status",
-            {**BEARER, **OWN},
-        )
-        assert status == 204
-        # On the same site, the browser sends the cookie along.
-        assert try_all(page, origin, it.url, credentials="include") == NOTHING
-
-
-def has_refused(it: Served, number: int) -> bool:
-    """Whether so many requests have got a 403; of a refused image Chromium tells nothing."""
-    lines = it.get("/metrics", BEARER).text.splitlines()
-    return [line for line in lines if line.startswith(COUNT_OF_403)] == (
-        [f"{COUNT_OF_403} {number}.0"] if number else []
-    )
-
-
-def test_over_plain_http_a_page_of_the_same_host_computes_nothing_and_signs_nobody_out(
-    browser: Browser,
-) -> None:
-    """There, the browser sends no Sec-Fetch headers; and to another port, the cookie."""
-    rules = "--host-resolver-rules=MAP twin.example 127.0.0.1"
-    with (
-        served("--allow-host", "twin.example", LUPIN_TOKEN=TOKEN) as it,
-        foreign_page("twin.example") as origin,
-        browser.browser_type.launch(
-            executable_path=CHROMIUM, args=[*CHROMIUM_ARGS, rules], headless=True
-        ) as another,
-    ):
-        page = another.new_page()
-        url = f"http://twin.example:{it.url.rpartition(':')[2]}"
-        page.goto(f"{url}/signin")
-        page.get_by_role("textbox", name="Access token").fill(TOKEN)
-        page.locator("button").click()
-        expect(page).to_have_url(f"{url}/")
-        page.goto(origin)
-        assert has_refused(it, 0)
-        for number, path in enumerate((FIELD, "/api/state", "/api/signout"), 1):
-            page.evaluate("(src) => { new Image().src = src }", url + path)
-            wait_for(partial(has_refused, it, number), "the refusal")
-        page.set_content(f"<form method=post action={url}/api/signout><button>Win</button></form>")
-        with page.expect_response(f"{url}/api/signout") as answer:
-            page.locator("button").click()
-        assert answer.value.status == 403
-        page.goto(f"{url}/")
-        expect(page).to_have_url(f"{url}/")
-        assert page.evaluate("async () => (await fetch('api/state')).status") == 200

@@ -7,6 +7,7 @@ import pytest
 from playwright.sync_api import expect
 
 from tests.browser.hmi import Hmi, OpenPage
+from tests.browser.house import TAGS
 from tests.browser.places import place, places
 from tests.support.web import Bridge
 
@@ -61,6 +62,18 @@ def test_a_sensor_has_its_colours_words_legend_and_column(hmi: Hmi) -> None:
     hmi.choose_sensor("Light")  # the only tag that carries it has no pose
     expect(hmi.test_id("sample-count")).to_have_text("No tag contributes")
     expect(hmi.test_id("notice")).to_have_attribute("data-notice", "no-reading")
+
+
+def test_a_range_is_fixed_to_the_ideal_one_and_fahrenheit_is_kept(hmi: Hmi) -> None:
+    hmi.colour_by_value()
+    hmi.page.get_by_role("radio", name="Fixed").check()
+    hmi.page.get_by_role("button", name="Use ideal range").click()
+    expect(hmi.test_id("range-low")).to_have_text("18.0")
+    expect(hmi.test_id("range-high")).to_have_text("26.0\u00a0°C")
+    hmi.page.keyboard.press("u")
+    expect(hmi.test_id("range-high")).to_have_text("78.8\u00a0°F")
+    hmi.page.reload()
+    expect(hmi.cell("1", "temperature")).to_have_text("68.0")
 
 
 # --- table --------------------------------------------------------------------------------------

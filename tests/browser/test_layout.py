@@ -314,66 +314,6 @@ def test_the_row_of_sensors_fades_where_it_has_more(open_at: Callable[..., Hmi])
         assert width != 1440 or bar.bottom - bar.top < 90
 
 
-PINS = {f"{x}-{y}": (x, y) for x in (0, 2, 4, 6) for y in (0, 2, 4, 6)}
-
-
-def hidden_pins(hmi: Hmi) -> list[str]:
-    """The tags whose pins lie below a button, the scale bar or a notice."""
-    view, frame = hmi.view(), place(hmi.map)
-    covered = [
-        place(thing) for thing in hmi.page.locator("[data-over-map]").all() if thing.is_visible()
-    ]
-    pixels = {tag_id: view.pixel(*at) for tag_id, at in PINS.items()}
-    return [
-        tag_id
-        for tag_id, (x, y) in pixels.items()
-        if any(
-            box.left - 8 < x + frame.left < box.right + 8
-            and box.top - 8 < y + frame.top < box.bottom + 8
-            for box in covered
-        )
-    ]
-
-
-def test_no_pin_lies_below_what_stands_on_the_map(domain: int, open_page: OpenPage) -> None:
-    """Neither as the page opens nor when the tag is chosen: it could not be seen, nor hit."""
-    with bridge(domain=domain) as running:
-        running.peer.observe(
-            *(scan(tag_id, {"temperature": 20.0}, at=at) for tag_id, at in PINS.items())
-        )
-        hmi = open_page(running.url, go=False)
-        for size in FEW:
-            hmi.resize(*size)
-            hmi.go()
-            hmi.expect_samples(len(PINS))
-            hmi.expect_parts()
-            hmi.expect(partial(no_pin_hidden, hmi), f"all pins in sight at {size}")
-            drag_below_buttons(hmi, "6-6")
-            assert "6-6" in hidden_pins(hmi)
-            hmi.page.keyboard.press("p")  # the last of the table
-            expect(hmi.test_id("said-choice")).to_contain_text("Tag 6-6")
-            hmi.expect(partial(no_pin_hidden, hmi, "6-6"), f"the chosen pin at {size}")
-
-
-def no_pin_hidden(hmi: Hmi, *among: str) -> bool:
-    """Of these tags, or of all."""
-    return not set(hidden_pins(hmi)) & set(among or PINS)
-
-
-def drag_below_buttons(hmi: Hmi, tag_id: str) -> None:
-    """Drag the map until the pin of a tag lies below the first of the buttons."""
-    frame, button = place(hmi.map), place(hmi.page.get_by_role("button", name="Zoom in"))
-    x, y = hmi.view().pixel(*PINS[tag_id])
-    start = (frame.left + 100, frame.top + 100)
-    hmi.page.mouse.move(*start)
-    hmi.page.mouse.down()
-    hmi.page.mouse.move(
-        start[0] + (button.left + button.right) // 2 - frame.left - x,
-        start[1] + (button.top + button.bottom) // 2 - frame.top - y,
-    )
-    hmi.page.mouse.up()
-
-
 # What sticks out of the window, or of its own place, and is no list to be scrolled. Of a column's
 # head its words count; the arrow beside them may be hidden.
 _TOO_LONG = """() => [...document.querySelectorAll('body *')].filter((e) => {

@@ -86,20 +86,6 @@ def test_the_chosen_row_comes_into_view_and_the_focus_is_never_lost(open_house: 
     expect(focused).to_be_in_viewport()
 
 
-def test_a_filter_and_an_order_have_their_rows_in_sight(open_house: OpenHouse) -> None:
-    hmi = open_house()
-    hmi.page.locator(".table-scroll").evaluate("e => { e.scrollTop = e.scrollHeight; }")
-    expect(hmi.row(str(TAGS))).to_be_in_viewport()
-    hmi.page.get_by_role("searchbox").fill("pest basil")
-    # Every 50th tag has a pest, and every third of those is basil.
-    expect(hmi.test_id("row-count")).to_contain_text(f"of {TAGS:,} tags")
-    expect(hmi.page.locator("tr[data-tag-id]").first).to_be_in_viewport()
-    hmi.page.get_by_role("searchbox").fill("")
-    hmi.page.locator("th[data-column=tag] button").dblclick()
-    hmi.page.locator(".table-scroll").evaluate("e => { e.scrollTop = 0; }")
-    expect(hmi.row(str(TAGS))).to_be_in_viewport()
-
-
 def test_axe_and_windows_of_any_size(open_house: OpenHouse) -> None:
     hmi = open_house(1_000, "tag=3", bypass_csp=True)
     for viewport in (WIDE, PHONE):

@@ -7,7 +7,6 @@ import pytest
 from playwright.sync_api import expect
 
 from tests.browser.hmi import Hmi, OpenPage
-from tests.browser.house import TAGS
 from tests.browser.places import place, places
 from tests.support.web import Bridge
 

@@ -15,7 +15,6 @@ from lupin_patrol.mission import (
     DOCK,
     START_OF_DAY_S,
     Event,
-    FlowersSeen,
     MapGrown,
     Mission,
     PassCompleted,
@@ -84,16 +83,6 @@ def test_the_map_grows_and_never_forgets(first_pass: list[Event]) -> None:
         assert (new[old != -1] == old[old != -1]).all()
 
 
-def test_the_whole_house_is_known_after_one_pass_and_the_map_is_silent_then(
-    patrol: list[Event], many_first_passes: list[list[Event]]
-) -> None:
-    for events in many_first_passes:
-        grid = only(MapGrown, events)[-1].grid
-        assert known_in(grid) == grid.width * grid.height
-    last = only(MapGrown, patrol)[-1]
-    assert last.at_s <= only(PassCompleted, patrol)[0].at_s
-
-
 # --- discovery -----------------------------------------------------------------------------------
 
 
@@ -123,13 +112,6 @@ def test_every_tag_is_read_within_a_minute_its_retries_included(
         assert completed.at_s <= 55.0
 
 
-def test_a_tags_readings_are_exactly_the_sensors_it_carries(patrol: list[Event]) -> None:
-    tags = GreenhouseSimulator().tag_manager.get_tags()
-    for scan in only(TagScanned, patrol):
-        if scan.status is ScanStatus.OK:
-            assert [name for name, _ in scan.readings] == tags[scan.tag_id]["sensors"]
-
-
 def test_readings_are_in_the_contracts_units(patrol: list[Event]) -> None:
     plausible = {
         "temperature": (0.0, 40.0),
@@ -142,20 +124,6 @@ def test_readings_are_in_the_contracts_units(patrol: list[Event]) -> None:
         for name, value in scan.readings:
             low, high = plausible[name]
             assert low < value < high, (name, value)
-
-
-def test_some_scans_fail_in_both_ways_and_a_failed_one_has_neither_readings_nor_pose(
-    many_first_passes: list[list[Event]],
-) -> None:
-    for events in many_first_passes:
-        failed = [scan for scan in only(TagScanned, events) if scan.status is not ScanStatus.OK]
-        assert {scan.status for scan in failed} == {ScanStatus.UNREACHABLE, ScanStatus.SCAN_FAILED}
-        for scan in failed:
-            assert scan.readings == ()
-            assert scan.pose is None
-            assert scan.status_detail
-            later = [s for s in only(TagScanned, events) if s.tag_id == scan.tag_id][1:]
-            assert [s.status for s in later] == [ScanStatus.OK]
 
 
 def test_a_retry_may_fail_too_and_a_later_pass_brings_the_tag_back(patrol: list[Event]) -> None:
@@ -194,24 +162,6 @@ def test_poses_are_the_tags_own_at_first_and_jitter_a_little_later(patrol: list[
 
 
 # --- flowers -------------------------------------------------------------------------------------
-
-
-def test_a_look_at_the_flowers_follows_every_scan_that_went_well(patrol: list[Event]) -> None:
-    observations = [e for e in patrol if isinstance(e, TagScanned | FlowersSeen)]
-    for scan, following in pairwise(observations):
-        if isinstance(scan, TagScanned) and scan.status is ScanStatus.OK:
-            assert isinstance(following, FlowersSeen)
-            assert (following.tag_id, following.pose) == (scan.tag_id, scan.pose)
-        elif isinstance(scan, TagScanned):
-            assert isinstance(following, TagScanned)
-
-
-def test_blooms_stand_in_the_box_and_the_box_is_the_tags_table(patrol: list[Event]) -> None:
-    greenhouse = Mission(GreenhouseSimulator(), 0, DAY_SPEED).greenhouse
-    for event in only(FlowersSeen, patrol):
-        box = greenhouse.tag(event.tag_id).table.rect
-        assert event.flower.footprint == tuple((x, y, 0.0) for x, y in box.corners)
-        assert all(box.contains((bloom.x, bloom.y)) for bloom in event.flower.blooms)
 
 
 # --- the robot and the day -----------------------------------------------------------------------

@@ -10,7 +10,7 @@ from lupin_patrol.cli import parse
 from lupin_patrol.greenhouse import read_greenhouse
 from lupin_patrol.mission import START_OF_DAY_S
 from lupin_patrol.past import DAYS, SOURCE, main, past
-from lupin_twin.core.state import Inspection, Pin, Scan, Write
+from lupin_twin.core.state import Pin, Scan, Write
 from tests.support.climate import Truth
 from tests.support.journal import NOW, kept, scan, select
 
@@ -55,15 +55,6 @@ def test_every_tag_is_scanned_in_every_pass_and_some_scans_fail(scans: list[Scan
         assert {row.status for row in failed} == {1, 2}
         assert all(row.status_detail for row in failed)
         assert not any(row.readings for row in failed)
-
-
-def test_pests_come_and_are_cleared(rows: list[Write]) -> None:
-    seen = [(row.tag_id, row.flower) for row in rows if isinstance(row, Inspection) and row.flower]
-    assert all(flower.anomaly == (flower.bug_count > 0) for _, flower in seen)
-    infested = {tag for tag, flower in seen if flower.bug_count}
-    assert len(infested) > 5
-    last = {tag for tag, flower in dict(seen).items() if flower.bug_count}
-    assert len(last) < len(infested)
 
 
 def test_each_tag_gets_its_exact_place_before_anything_else(rows: list[Write]) -> None:

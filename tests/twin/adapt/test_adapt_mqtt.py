@@ -16,13 +16,10 @@ from paho.mqtt.enums import CallbackAPIVersion
 from lupin_twin.adapt.check import report
 from lupin_twin.adapt.config import config_of
 from lupin_twin.adapt.node import AdaptNode
-from tests.support.domains import own_domain
-from tests.support.messages import scan
 from tests.support.mosquitto import Broker
 from tests.support.processes import Process, twin_node
 from tests.support.ros import Peer
 from tests.support.waiting import wait_for
-from tests.support.web import bridge
 from tests.twin.adapt.test_adapt import Robot, adapt, listening
 
 CONFIG = """
@@ -99,42 +96,6 @@ def test_what_zigbee_sensors_say_is_on_the_state_and_so_is_that_one_is_gone(
         assert process.exit_code is None
 
 
-def test_home_assistants_entities_are_on_the_state_and_so_is_that_one_is_away(
-    domain: int, tmp_path: Path
-) -> None:
-    """As its statestream publishes them: each state by itself, and all of them retained."""
-    broker = Broker(tmp_path)
-    entity = "homeassistant/sensor/north_bay_{}/state"
-    with broker.running(), device(broker) as client:
-        before = {"temperature": "19.0", "soil_moisture": "unknown"}
-        for name, value in before.items():
-            client.publish(entity.format(name), value, 1, retain=True).wait_for_publish(60.0)
-        with twin_node(domain), adapted(domain, broker) as process, Peer(domain) as peer:
-            robot = Robot(peer)
-            peer.listen()
-            # What was retained says nothing of when it was measured.
-            peer.until(lambda: robot.said("it is retained and says no time"), "the complaint")
-            states = {"temperature": "21.5", "humidity": "60", "carbon_dioxide": "800"}
-
-            def is_known() -> bool:
-                for name, value in {**states, "battery": "90"}.items():
-                    client.publish(entity.format(name), value, 1, retain=True)
-                return len(readings(peer, "north_bay")) == 3
-
-            peer.until(is_known, "three sensors on the state")
-            known = {"temperature": 21.5, "humidity": 60.0, "co2": 800.0}
-            assert readings(peer, "north_bay") == known
-            client.publish(entity.format("humidity"), "unavailable", 1, retain=True)
-
-            def has_failed() -> bool:
-                return any(it.status_detail == "its sensor is offline" for it in robot.observations)
-
-            peer.until(has_failed, "the failed attempt")
-            assert readings(peer, "north_bay") == known
-            assert not robot.said("unknown")
-            assert process.exit_code is None
-
-
 def test_the_last_will_of_a_sensor_that_dies_is_a_failed_scan(domain: int, tmp_path: Path) -> None:
     broker = Broker(tmp_path)
     with broker.running(), adapted(domain, broker), Peer(domain) as peer:
@@ -202,48 +163,6 @@ def test_a_flood_a_megabyte_and_a_topic_for_each_message_harm_nothing(
         peer.until(is_known, "a good reading behind all that")
         peer.until(lambda: robot.said("it is no JSON"), "the complaint")
         assert process.output.count("it is no JSON") < 10
-        assert process.exit_code is None
-
-
-def test_a_broker_that_falls_silent_is_an_alarm_of_its_tags_while_a_robot_goes_on(
-    tmp_path: Path,
-) -> None:
-    broker = Broker(tmp_path)
-    sim = ("--ros-args", "-p", "use_sim_time:=true")
-    path = tmp_path / "adapt.yaml"
-    path.write_text(CONFIG.format(url=broker.url))
-    with (
-        own_domain() as domain,
-        bridge(*sim, "-p", "state_publish_rate_hz:=10.0", domain=domain) as live,
-        adapt(domain, "--config", str(path), *sim) as process,
-    ):
-        peer, seconds = live.peer, 1_000.0
-
-        def later(step_s: float) -> None:
-            """Time goes on, and a robot scans another tag."""
-            nonlocal seconds
-            seconds += step_s
-            peer.set_clock(seconds)
-            peer.observe(scan("robot", {"co2": 500.0}, stamp_s=seconds))
-
-        def alarms() -> list[tuple[str, str]]:
-            body = live.json("/api/alarms", active=1)
-            return [(it["tag_id"], it["reason"]["kind"]) for it in body["alarms"]]
-
-        later(0.0)
-        with broker.running(), device(broker) as client:
-            for value in ("801", "802", "803"):
-
-                def is_known(value: str = value) -> bool:
-                    client.publish("plain/bench/co2", value)
-                    later(1.0)
-                    return readings(peer, "bench").get("co2") == float(value)
-
-                peer.until(is_known, f"{value} on the state")
-            assert alarms() == []
-        for _ in range(4):
-            later(200.0)
-        peer.until(lambda: alarms() == [("bench", "old")], "the alarm of the tag")
         assert process.exit_code is None
 
 

@@ -51,38 +51,21 @@ def test_systemd_finds_nothing_wrong_with_the_unit(tmp_path: Path) -> None:
     assert (result.returncode, result.stderr) == (0, "")
 
 
-def test_it_starts_behind_a_clock_that_is_set() -> None:
+def test_the_unit_has_what_the_service_needs(environment: dict[str, str]) -> None:
     for directive in ("Wants", "After"):
         assert "time-sync.target" in unit()[directive][0].split()
-
-
-def test_bad_settings_are_not_tried_again_for_ever() -> None:
     assert unit()["Restart"] == ["always"]
     assert unit()["RestartPreventExitStatus"] == [str(USAGE_ERROR)]
-
-
-def test_the_watchdog_waits_longer_than_a_callback_may_take() -> None:
     assert unit()["Type"] == ["notify"]
     (seconds,) = unit()["WatchdogSec"]
     assert int(seconds) > STUCK_AFTER_S
-
-
-def test_it_has_a_place_to_write_in_and_needs_no_memory_of_other_nodes(
-    environment: dict[str, str],
-) -> None:
     assert unit()["ProtectSystem"] == ["strict"]
     assert unit()["PrivateTmp"] == ["yes"], "/tmp would be read-only"
     assert environment["FASTDDS_BUILTIN_TRANSPORTS"] == "UDPv4", "it is another user"
     assert environment["ROS_LOG_DIR"] == f"/var/log/{unit()['LogsDirectory'][0]}"
-
-
-def test_the_token_is_a_credential(environment: dict[str, str]) -> None:
     (credential,) = unit()["LoadCredential"]
     assert environment[variable("token_file")] == f"%d/{credential.partition(':')[0]}"
     assert "EnvironmentFile" not in unit()
-
-
-def test_systemd_makes_the_user_and_the_folders() -> None:
     assert unit()["DynamicUser"] == ["yes"]
     assert unit()["StateDirectory"] == unit()["LogsDirectory"] == unit()["User"]
 

@@ -1,4 +1,4 @@
-"""Verdicts and alarms of a large house: the start over its past, one change, nothing new.
+"""Alarms of a large house: the start over its past, one change, nothing new.
 
 What runs on the event loop is marked so; the rest is a worker's.
 
@@ -98,31 +98,6 @@ def alarms_of(tags: int) -> None:
     row(tags, "alarms: one scan, hours to days late", statistics.median(took), max(took))
 
 
-def verdicts_of(tags: int) -> None:
-    def tag(index: int, at_ns: int) -> TagState:
-        readings = tuple(Reading(name, value, at_ns) for name, value in MIDDLE.items())
-        return TagState(tag_id=str(index), readings=readings, last_observed_ns=at_ns)
-
-    now_ns = DAY_NS
-    house = [tag(index, now_ns) for index in range(tags)]
-    judge = Judge(replace(BY_LIGHT, recent_s=3_600.0))
-    snapshot = Snapshot(now_ns, "map", tuple(house))
-    for _ in range(tags // 500 + 2):  # so many at once
-        judge.see(snapshot)
-    for name, changes in (("verdicts: nothing new", 0), ("verdicts: one scan", 1)):
-        took = []
-        for turn in range(CHANGES):
-            now_ns += S
-            for index in range(changes):
-                house[(turn + index) % tags] = tag((turn + index) % tags, now_ns)
-            states = tuple(house) if changes else snapshot.tags
-            snapshot = Snapshot(now_ns, "map", states)
-            start = time.thread_time()
-            judge.see(snapshot)
-            took.append(ms_since(start))
-        row(tags, name, statistics.median(took), max(took))
-
-
 def loop_of(tags: int) -> None:
     """What a hundred thousand alarms, and a second in which nothing happens, cost the loop."""
     many = [
@@ -195,7 +170,6 @@ def main() -> None:
     """Print all of it."""
     print(f"\n{'tags':>7}  {'five sensors each':<44}{'ms':>12}{'at most':>12}")
     for tags in SIZES:
-        verdicts_of(tags)
         alarms_of(tags)
         loop_of(tags)
     ordinary()

@@ -67,23 +67,6 @@ def hot_corner(running: Bridge) -> None:
 VIEW = "view=2,1.5,7"
 
 
-def test_the_heat_map_is_the_right_way_up(domain: int, open_page: OpenPage) -> None:
-    with bridge(domain=domain) as running:
-        hot_corner(running)
-        running.tag("hot")
-        hmi = open_page(running.url, f"{VIEW}&colour=value&layers=map,field")
-        hmi.expect_samples(4)
-        hmi.settled_picture()
-        beside_hot = (HOT[0] + 0.5, HOT[1] + 0.5)
-        beside_cold = [(x + 0.5, y + 0.5) for x, y in COLD]
-        [ground] = hmi.pixels([(2.0, -1.9)])  # on the floor, beyond the field
-        hmi.expect_pixels(
-            lambda pixel: close(pixel, over(ground, "temperature", 1.0)), beside_hot, what="heat"
-        )
-        # Transparent at the minimum.
-        assert hmi.pixels(beside_cold) == [ground] * 3
-
-
 def test_a_cell_that_is_not_known_shows_the_map_below_it(domain: int, open_page: OpenPage) -> None:
     with bridge(domain=domain) as running:
         hot_corner(running)
@@ -120,35 +103,6 @@ def test_a_cell_that_is_not_known_shows_the_map_below_it(domain: int, open_page:
 def rgb(picture: Any, at: tuple[int, int]) -> Pixel:
     red, green, blue = picture.getpixel(at)
     return red, green, blue
-
-
-def test_the_field_ends_on_the_cells_where_the_server_says(
-    domain: int, open_page: OpenPage
-) -> None:
-    with bridge(domain=domain) as running:
-        running.peer.publish_map(floor(6, 6))
-        running.peer.observe(scan("a", {"co2": 900.0}, at=(3.1, 2.3)))
-        running.tag("a")
-        hmi = open_page(running.url, "sensor=co2&view=3,3,6&layers=map")
-        expect(hmi.row("a")).to_be_visible()
-        bare = hmi.settled_picture()
-        hmi.turn("sensor=co2&view=3,3,6&layers=map,field")
-        hmi.expect_samples(1)
-        disc = hmi.lasting_change(bare)
-        view = hmi.view()
-        grid = running.json("/api/field.json", sensor_type="co2", resolution=0.05)
-        cells = [
-            (index % grid["width"], index // grid["width"])
-            for index, value in enumerate(grid["values"])
-            if value is not None
-        ]
-        step = grid["resolution_used"]
-        left = grid["origin_x"] + min(i for i, _ in cells) * step
-        right = grid["origin_x"] + (max(i for i, _ in cells) + 1) * step
-        bottom = grid["origin_y"] + min(j for _, j in cells) * step
-        top = grid["origin_y"] + (max(j for _, j in cells) + 1) * step
-        wanted = (*view.pixel(left, top), *view.pixel(right, bottom))
-        assert max(abs(a - b) for a, b in zip(disc, wanted, strict=True)) <= 1
 
 
 def test_a_pin_sits_on_its_pose_and_in_its_cell(domain: int, open_page: OpenPage) -> None:

@@ -2,8 +2,7 @@
 
 from playwright.sync_api import Locator, expect
 
-from tests.browser.hmi import PHONE, Hmi, OpenPage
-from tests.support.web import Bridge
+from tests.browser.hmi import Hmi
 
 # Where the pins of `house.py` are.
 PINS = {"10": (1, 3), "1": (1, 1), "2": (3, 1), "3": (3, 3), "seen": (4, 2)}
@@ -59,15 +58,3 @@ def test_it_goes_when_the_map_moves_and_lets_every_click_through(hmi: Hmi) -> No
     hmi.click_map(1, 3)
     expect(hmi.card("10")).to_be_visible()
     expect(hover_card(hmi)).to_have_count(0)
-
-
-def test_a_finger_gets_the_tags_card_alone(house: Bridge, open_page: OpenPage) -> None:
-    phone = open_page(house.url, viewport=PHONE, has_touch=True, is_mobile=True)
-    phone.expect_samples(3)
-    phone.settled_picture()
-    x, y = phone.view().pixel(1, 3)
-    phone.map.tap(position={"x": x, "y": y})
-    expect(phone.card("10")).to_be_visible()
-    phone.page.get_by_role("button", name="Close").first.tap()
-    expect(phone.card("10")).to_have_count(0)
-    expect(hover_card(phone)).to_have_count(0)

@@ -149,36 +149,32 @@ def test_who_comes_late_gets_the_latched_map_and_list(domain: int) -> None:
             late.until(lambda: len(second.read_tags) == 29, "a reading of every tag")
 
 
-def test_topics_and_frame_are_parameters(domain: int) -> None:
+def test_topics_and_frame_are_parameters_and_stamps_follow_simulated_time(domain: int) -> None:
     parameters = {
         "observations_topic": "robot/observations",
         "discovered_tags_topic": "/elsewhere/tags",
         "map_topic": "/elsewhere/map",
         "frame_id": "greenhouse",
+        "use_sim_time": "true",
     }
     arguments = [part for name, value in parameters.items() for part in ("-p", f"{name}:={value}")]
     with Peer(domain) as peer:
         heard = Received().listen(peer, "/robot/observations", "/elsewhere/tags", "/elsewhere/map")
-        with patrol(domain, "--speed", "20", "--ros-args", *arguments):
-            peer.until(
-                lambda: heard.observations and heard.discovered_tags and heard.maps, "every topic"
-            )
-    for message in (heard.observations[0], heard.discovered_tags[0], heard.maps[0]):
-        assert message.header.frame_id == "greenhouse"
-
-
-def test_stamps_follow_simulated_time(domain: int) -> None:
-    with Peer(domain) as peer:
-        heard = Received().listen(peer)
 
         def heard_simulated_time() -> bool:
             # Again and again: who listens to /clock does not ask for the latched one.
             peer.publish("/clock", Clock(clock=Time(sec=1234, nanosec=500_000_000)), depth=1)
-            return bool(heard.observations) and heard.observations[-1].header.stamp.sec == 1234
+            return bool(
+                heard.discovered_tags
+                and heard.maps
+                and heard.observations
+                and heard.observations[-1].header.stamp == Time(sec=1234, nanosec=500_000_000)
+            )
 
-        with patrol(domain, "--speed", "20", "--ros-args", "-p", "use_sim_time:=true"):
-            peer.until(heard_simulated_time, "a stamp in simulated time")
-    assert heard.observations[-1].header.stamp.nanosec == 500_000_000
+        with patrol(domain, "--speed", "20", "--ros-args", *arguments):
+            peer.until(heard_simulated_time, "every topic, and a stamp in simulated time")
+    for message in (heard.observations[0], heard.discovered_tags[0], heard.maps[0]):
+        assert message.header.frame_id == "greenhouse"
 
 
 def test_a_signal_ends_it_cleanly_even_while_it_waits_for_long(domain: int) -> None:

@@ -37,24 +37,6 @@ def quality_of(spots: Sequence[Spot], **changes: Any) -> FieldQuality:
     return leave_one_out(tags_at(spots), "temperature", **{**RULES, **changes})
 
 
-def test_each_tag_is_predicted_from_the_others() -> None:
-    # Between the others, nearer to one of them, the middle tag is predicted as (4·10 + 16) / 5.
-    quality = quality_of([(0.0, 0.0, 10.0), (0.5, 0.0, 12.0), (1.5, 0.0, 16.0)])
-    errors = [
-        (12 * 2.25 + 16 * 0.25) / 2.5 - 10,
-        (10 * 4 + 16) / 5 - 12,
-        (12 * 2.25 + 10) / 3.25 - 16,
-    ]
-    assert (quality.judged, quality.unjudged) == (3, 0)
-    assert quality.rmse == pytest.approx(math.sqrt(sum(error**2 for error in errors) / 3))
-    assert quality.worst is not None
-    assert quality.worst.tag_id == "tag-2"
-    assert quality.worst.measured == 16.0
-    assert quality.worst.predicted == pytest.approx(errors[2] + 16.0)
-    assert quality.worst.error == pytest.approx(errors[2])
-    assert quality.worst.error < 0
-
-
 def test_nothing_can_be_said_about_lonely_tags() -> None:
     for spots in ([], [(0.0, 0.0, 10.0)], [(0.0, 0.0, 10.0), (9.0, 0.0, 10.0)]):
         assert quality_of(spots) == FieldQuality("temperature", 0, len(spots), None, None)
@@ -106,6 +88,8 @@ def test_error_is_the_definitions(
         assert abs(quality.worst.error) == pytest.approx(max(map(abs, known)), abs=1e-9)
         index = int(quality.worst.tag_id.removeprefix("tag-"))
         assert quality.worst.error == pytest.approx(errors[index], abs=1e-9)
+        assert quality.worst.measured == spots[index][2]
+        assert quality.worst.predicted == pytest.approx(errors[index] + spots[index][2], abs=1e-9)
 
 
 def test_memory_does_not_grow_with_the_square_of_the_tags() -> None:

@@ -7,7 +7,7 @@ valid: states, fields, the map.
 import json
 import random
 from collections.abc import Callable, Iterator
-from itertools import count, islice
+from itertools import count
 from typing import Any
 
 import pytest
@@ -188,21 +188,6 @@ def test_bytes_that_are_no_message_are_survived(both: tuple[Bridge, Bridge], top
 
     for number in range(1, LOTS + 1):
         survive(both, publish, fully=number % FULLY == 0)
-
-
-@pytest.mark.parametrize("topic", ANY)
-def test_lengths_that_lie_cost_no_more_than_their_bytes(
-    both: tuple[Bridge, Bridge], topic: str
-) -> None:
-    message_type = type(ANY[topic](random.Random(topic)))
-
-    def publish(peer: Peer) -> None:
-        for lie in lot:
-            peer.publisher(topic, message_type).publish(lie)
-
-    every = iter(long_lies(message_type))
-    while lot := list(islice(every, 10)):
-        survive(both, publish)
 
 
 def test_requests_for_fields_of_any_numbers_are_answered(both: tuple[Bridge, Bridge]) -> None:

@@ -151,7 +151,11 @@ def test_the_robot_that_the_tutorial_starts_is_on_the_twins_state(
     robot = Process([sys.executable, standard_robot.__file__], ros_env(domain))
     with twin_node(domain), robot, adapt(domain, "--config", str(path)), Peer(domain) as peer:
         for tag_id, celsius in (("A", 21.5), ("B", 24.0)):
-            peer.tag(tag_id, lambda tag, it=celsius: any(r.value == it for r in tag.readings))
+            peer.tag(tag_id, partial(has_read, celsius))
+
+
+def has_read(value: float, tag: Any) -> bool:
+    return any(reading.value == value for reading in tag.readings)
 
 
 @pytest.mark.parametrize("kind", [PoseStamped, Odometry])

@@ -37,7 +37,6 @@ class Stream:
     """One client: its socket, the bytes of an unfinished frame, and the newest beat it saw."""
 
     socket: socket.socket
-    pending: bytes = b""
     missing: int = 0
     is_upgraded: bool = False
     beat: float = 0.0

@@ -82,7 +82,6 @@ class Life:
     connection: sqlite3.Connection
     rows: list[tuple[int, Write]] = field(default_factory=list)
     run: int = 0
-    batches: list[list[Write]] = field(default_factory=list)
     _known: dict[object, set[str]] = field(default_factory=dict)
     _copied: dict[object, Write] = field(default_factory=dict)
 

@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from lupin_bridge.app import document
-from lupin_bridge.field.query import EstimateQuery, FieldQuery
+from lupin_bridge.field import EstimateQuery, FieldQuery
 from lupin_bridge.past import query
 from lupin_bridge.query_string import Name, needed, parameter, parameters_of, read
 from lupin_bridge.routes.state import ListenQuery

@@ -168,14 +168,12 @@ def main(argv: Sequence[str] | None = None) -> int:
         for warning in strange_variables(os.environ):
             log.warning("%s", warning)
         secrets = take_secrets(settings, os.environ)
+        from lupin_bridge.cli import roles  # noqa: PLC0415  # see above
+
         if options.role == "fleet":
-            from lupin_bridge.cli.serving import run_fleet  # noqa: PLC0415  # without ROS
-
-            run_fleet(settings, secrets, ros_args)
+            roles.run_fleet(settings, secrets, ros_args)
             return 0
-        from lupin_bridge.cli.roles import run  # noqa: PLC0415  # see above
-
-        run(
+        roles.run(
             options.role,
             settings,
             secrets,

@@ -10,13 +10,11 @@ from annotated_types import Interval
 from fastapi import APIRouter, Request, Response
 from pydantic import BaseModel
 
+from lupin_bridge import field as formats
 from lupin_bridge.access.middleware import client_of
 from lupin_bridge.bridge import Bridge
 from lupin_bridge.feed.source import TwinUnavailableError
-from lupin_bridge.field import formats
-from lupin_bridge.field import query as field_query
-from lupin_bridge.field.formats import FORMATS, JSON, PNG, FieldFormat
-from lupin_bridge.field.query import EstimateQuery, FieldQuery
+from lupin_bridge.field import FORMATS, JSON, PNG, EstimateQuery, FieldFormat, FieldQuery
 from lupin_bridge.judge.quantities import DAILY
 from lupin_bridge.past import query as past_query
 from lupin_bridge.past.fields import Estimated, Field
@@ -113,7 +111,7 @@ class InFormats:
             **documented,
         )
         async def in_accepted_format(request: Request) -> Response:
-            field_format = field_query.negotiate(list_header(request, "accept"))
+            field_format = formats.negotiate(list_header(request, "accept"))
             if field_format is None:
                 types = ", ".join(known.media_type for known in FORMATS)
                 return error_response(f"Accept allows none of {types}", 406, {"Vary": "Accept"})

@@ -19,7 +19,7 @@ from lupin_bridge.access.credentials import SHARED
 from lupin_bridge.access.middleware import CONTENT_POLICY, Access, client_of
 from lupin_bridge.bridge import Bridge
 from lupin_bridge.feed.source import TwinSource
-from lupin_bridge.field.query import weighted
+from lupin_bridge.field import weighted
 from lupin_bridge.routes.answers import (
     CLIENT_DISCONNECTED,
     NEVER_STORE,

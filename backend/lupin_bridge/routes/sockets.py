@@ -28,9 +28,7 @@ from lupin_bridge.access.middleware import client_of
 from lupin_bridge.bridge import Bridge
 from lupin_bridge.feed.relay import Listening, NotRelayedError, Sample
 from lupin_bridge.feed.source import TwinUnavailableError
-from lupin_bridge.field import formats as field_formats
-from lupin_bridge.field.formats import JSON
-from lupin_bridge.field.query import FieldQuery
+from lupin_bridge.field import JSON, FieldQuery, refusal_json
 from lupin_bridge.past.fields import Field
 from lupin_bridge.routes.answers import error_response, newest_field
 from lupin_bridge.serving.admission import AdmissionError
@@ -376,7 +374,7 @@ class _RosbridgeConversation(_Conversation):
             response = service_failure(call.id, call.service, text)
         except FieldRefused as error:
             # The service has answered, and the answer is no: as over ROS, `ok` says so.
-            values = field_formats.refusal_json(str(error))
+            values = refusal_json(str(error))
             response = service_response(call.id, call.service, values, result=True)
         except (AdmissionError, TwinUnavailableError) as error:
             response = service_failure(call.id, call.service, str(error))

@@ -15,7 +15,15 @@ from lupin_bridge.bridge import Bridge
 from lupin_bridge.judge.options import zone_of
 from lupin_bridge.past import bodies
 from lupin_bridge.past import query as past_query
-from lupin_bridge.past.plans import History, LatestOfTag, NoSuchTag, OneTag, Timeline, WholeState
+from lupin_bridge.past.plans import (
+    History,
+    LatestOfTag,
+    NoSuchTag,
+    OneTag,
+    Timeline,
+    WholeState,
+    tag_of,
+)
 from lupin_bridge.past.report import Report
 from lupin_bridge.past.report_page import (
     HTML_TYPE,
@@ -46,8 +54,7 @@ from lupin_bridge.routes.sockets import listen
 from lupin_bridge.serving.admission import Answer
 from lupin_bridge.stream import routes_schema, schema
 from lupin_bridge.stream.hub import CLOSE_POLICY
-from lupin_twin.core.past import PastRefused, SeriesRequest
-from lupin_twin.core.state import Snapshot, TagState
+from lupin_twin.core.past import EVERY_TAG, PastRefused, SeriesRequest
 
 # Of the reason in a close frame (RFC 6455, section 5.5).
 MAX_REASON_BYTES: Final = 123
@@ -132,7 +139,7 @@ async def state(request: Request) -> Response:
 async def history(request: Request, tag_id: str) -> Response:
     """The tag's last scans that brought readings, sensor by sensor, and its last attempts."""
     bridge = bridge_of(request)
-    newest = None if bridge.latest is None else _tag_of(bridge.latest.snapshot, tag_id)
+    newest = None if bridge.latest is None else tag_of(bridge.latest.snapshot, tag_id)
     query = LatestOfTag(tag_id, newest, bridge.source.buffer_len)
     return await respond_past(request, query, "latest")
 
@@ -152,15 +159,8 @@ async def tag(request: Request, tag_id: str) -> Response:
         return await _tag_as_of(request, tag_id, at_ns)
     if bridge.latest is None:
         return error_response(NO_TWIN, 503)
-    found = _tag_of(bridge.latest.snapshot, tag_id)
+    found = tag_of(bridge.latest.snapshot, tag_id)
     return json_response(bridge.frames.json.tag(found, bridge.ros_time_ns))
-
-
-def _tag_of(snapshot: Snapshot, tag_id: str) -> TagState:
-    for found in snapshot.tags:
-        if found.tag_id == tag_id:
-            return found
-    raise NoSuchTag(tag_id, len(snapshot.tags))
 
 
 async def _tag_as_of(request: Request, tag_id: str, at_ns: int) -> Response:
@@ -206,7 +206,8 @@ async def timeline_route(request: Request) -> Response:
     bridge = bridge_of(request)
     given = read(past_query.OfTimeline, request.query_params.multi_items(), PastRefused)
     start_ns, end_ns = given.span(bridge.ros_time_ns)
-    timeline = Timeline(start_ns, end_ns, given.points, given.tag_id, bridge.source.journal())
+    tag_id = given.tag_id or EVERY_TAG
+    timeline = Timeline(start_ns, end_ns, given.points, tag_id, bridge.source.journal())
     return await respond_past(request, timeline, "timeline")
 
 

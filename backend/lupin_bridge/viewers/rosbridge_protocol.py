@@ -39,7 +39,7 @@ import orjson
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from lupin_bridge.feed.relay import TwinNames, absolute, topics_of
-from lupin_bridge.field.query import BOX_NAMES, FieldQuery
+from lupin_bridge.field import BOX_NAMES, FieldQuery
 from lupin_bridge.serving.ws_protocol import members_of, shown
 
 MAX_NAME_LENGTH: Final = 256

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from lupin_bridge.field import formats
-from lupin_bridge.field.formats import JSON, NPY, PNG, FieldFormat
+from lupin_bridge import field as formats
+from lupin_bridge.field import JSON, NPY, PNG, EstimateQuery, FieldFormat
 from lupin_bridge.judge.options import Criteria
 from lupin_bridge.judge.quantities import Ranges, Span
 from lupin_bridge.settings import Settings
@@ -22,7 +22,9 @@ ESTIMATE = an_estimate(width=3, height=2)
 
 
 def written(field_format: FieldFormat, layer: str = "mean") -> bytes:
-    return formats.write_estimate(ESTIMATE, field_format, "co2", SENSORS, layer=layer)
+    return formats.write_estimate(
+        ESTIMATE, field_format, EstimateQuery("co2", layer=layer), SENSORS
+    )
 
 
 def test_json_is_the_service_s_response() -> None:

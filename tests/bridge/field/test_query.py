@@ -8,9 +8,8 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from lupin_bridge.field import query as field_query
-from lupin_bridge.field.formats import FORMATS, JSON, NPY, PNG, FieldFormat
-from lupin_bridge.field.query import FieldQuery
+from lupin_bridge import field as field_query
+from lupin_bridge.field import FORMATS, JSON, NPY, PNG, FieldFormat, FieldQuery
 from lupin_bridge.query_string import read
 from lupin_twin.field.engine import FieldRefused, FieldRequest
 

@@ -117,6 +117,6 @@ def test_the_overviews_routes_are_those_of_the_docs() -> None:
 
 
 def test_a_fleet_is_shown_without_ros() -> None:
-    code = "import sys, lupin_bridge.cli.serving; print('rclpy' in sys.modules)"
+    code = "import sys, lupin_bridge.cli.roles; print('rclpy' in sys.modules)"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout == "False\n"

@@ -9,8 +9,7 @@ from typing import Any
 
 import pytest
 
-from lupin_bridge.field.formats import FORMATS, JSON, PNG, FieldFormat
-from lupin_bridge.field.query import EstimateQuery, FieldQuery
+from lupin_bridge.field import FORMATS, JSON, PNG, EstimateQuery, FieldFormat, FieldQuery
 from lupin_bridge.judge.day import ClockDay
 from lupin_bridge.judge.options import Criteria, own_sensors
 from lupin_bridge.judge.quantities import vapour_pressure_deficit_kpa

@@ -244,7 +244,7 @@ def test_clients_that_do_not_read_do_not_hold_up_the_end_nor_does_a_second_signa
 # hangs for a sensor of its own, which is asked for by that path.
 HANGS = (
     ("lupin_bridge.past.fields:compute_field:co2", MILLION_CELLS),
-    ("lupin_bridge.field.formats:write:light", MILLION_CELLS),
+    ("lupin_bridge.field:write:light", MILLION_CELLS),
     ("lupin_twin.ros.estimate_service:EstimateService.report:humidity", REPORT),
 )
 

@@ -14,8 +14,7 @@ from lupin_bridge.alarms.board import AlarmBoard, Change, NoteBoard
 from lupin_bridge.alarms.feed import AlarmFeed, learn_recent
 from lupin_bridge.feed.shared_work import Periodic, Shared, end
 from lupin_bridge.feed.source import TwinSource, TwinUpdate
-from lupin_bridge.judge.judging import NOTHING_JUDGED, Judge, Judged, silenced, unjudged
-from lupin_bridge.judge.options import Criteria
+from lupin_bridge.judge.judging import NOTHING_JUDGED, Criteria, Judge, Judged, silenced, unjudged
 from lupin_bridge.metrics import Metrics, Sample, route_class
 from lupin_bridge.notify.channels import Channels
 from lupin_bridge.notify.messages import GreenhouseState

@@ -301,12 +301,11 @@ def _checked(name: str, called: str, value: Any, *, is_text: bool) -> Any:
         )
     except ValidationError as error:
         why = error.errors(include_url=False)[0]["msg"]
-        shown = _shown(name, value)
-        raise SettingError(f"{called} is {shown}: {why[0].lower()}{why[1:]}") from None
+        why = f"{why[0].lower()}{why[1:]}"
+        raise SettingError(f"{called} is {_shown(name, value)}: {why}") from None
     texts = found if isinstance(found, tuple) else (found,)
     if any(isinstance(text, str) and _CONTROL.search(text) for text in texts):
-        shown = _shown(name, value)
-        raise SettingError(f"{called} is {shown}: there is a control character in it")
+        raise SettingError(f"{called} is {_shown(name, value)}: there is a control character in it")
     return found
 
 

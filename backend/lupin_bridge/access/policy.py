@@ -294,21 +294,14 @@ class AccessPolicy:
         host = host_of(hosts[0])
         if host is None:
             return f"Host is {hosts[0][:128]!r}, expected a host and a port"
-        if not self._is_own_name(host):
+        # RFC 6761, section 6.3: localhost and what is below it never leave the machine.
+        is_local = host == "localhost" or host.endswith(".localhost") or _is_ip(host)
+        if not is_local and host not in self._hosts:
             return (
                 f"this bridge is not known by the name {host[:128]!r}: use its IP address, or "
                 f"start it with --allow-host {host[:128]}"
             )
         return None
-
-    def _is_own_name(self, host: str) -> bool:
-        # RFC 6761, section 6.3: localhost and what is below it never leave the machine.
-        return (
-            host in self._hosts
-            or host == "localhost"
-            or host.endswith(".localhost")
-            or _is_ip(host)
-        )
 
     def _judge_origin(self, named: str, own: str) -> Decision:
         try:

@@ -149,13 +149,8 @@ class AlarmBoard:
     """Holds the newest `Board`; each change of it is told to all who subscribed, on the loop."""
 
     def __init__(self) -> None:
-        self._now = Board()
+        self.now = Board()
         self._listeners: dict[Listener, None] = {}
-
-    @property
-    def now(self) -> Board:
-        """The alarms as they stand."""
-        return self._now
 
     def subscribe(self, listener: Listener) -> Callable[[], None]:
         """Tell `listener` of every change from now on; what comes back ends that.
@@ -168,10 +163,10 @@ class AlarmBoard:
 
     def put(self, page: Page, change: Change, source: AlarmSource, since_ns: int | None) -> bool:
         """Take these for the alarms as they stand; returns whether anything is as it was not."""
-        before = self._now
+        before = self.now
         if page is before.page and (source, since_ns) == (before.source, before.since_ns):
             return False
-        self._now = Board(page, source, since_ns, before.number + 1)
+        self.now = Board(page, source, since_ns, before.number + 1)
         for listener in tuple(self._listeners):
             try:
                 listener(change)

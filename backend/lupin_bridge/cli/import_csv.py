@@ -22,7 +22,7 @@ from zoneinfo import ZoneInfo
 
 from lupin_bridge.cli.journal import SHOWN, JournalError, add_which, fail, path_of
 from lupin_bridge.console import Progress, Roles, add_role, say, tell
-from lupin_bridge.judge.options import zone_of
+from lupin_bridge.judge.judging import zone_of
 from lupin_twin.adapt.config import read_yaml
 from lupin_twin.adapt.table import (
     AS_IT_IS,

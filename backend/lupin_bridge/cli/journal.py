@@ -6,8 +6,6 @@ Everything but `forget` and `vacuum` reads, also while a twin writes.
 from __future__ import annotations
 
 import argparse
-import getpass
-import os
 import sqlite3
 import time
 from collections.abc import Mapping
@@ -26,8 +24,9 @@ from lupin_bridge.console import (
     backup,
     say,
     standard,
+    user,
 )
-from lupin_bridge.judge.options import Criteria
+from lupin_bridge.judge.judging import Criteria
 from lupin_bridge.past import bodies
 from lupin_bridge.past.query import MAX_SECONDS, moment
 from lupin_bridge.settings import SettingError, settings_from, variable
@@ -338,18 +337,15 @@ def _record(path: Path, options: argparse.Namespace, start_ns: int, end_ns: int)
         from lupin_bridge.bags.journal_export import export  # noqa: PLC0415
 
         with closing(_reader(path)) as connection:
-            made = export(connection, target, start_ns, end_ns, options.namespace)
+            observations, tags = export(connection, target, start_ns, end_ns, options.namespace)
     except FileExistsError as error:
         raise JournalError(f"{target} is there already, and nothing is overwritten") from error
     except (OSError, LookupError) as error:
         why = getattr(error, "strerror", None) or str(error)
         raise JournalError(f"cannot make {target}: {why}") from error
-    if not made.observations + made.tags:
+    if not observations + tags:
         raise JournalError(f"the journal {path} holds nothing of that period")
-    _say(
-        f"{made.observations:,} observations and {made.tags:,} messages of discovered tags are in"
-        f" {target}"
-    )
+    _say(f"{observations:,} observations and {tags:,} messages of discovered tags are in {target}")
     return 0
 
 
@@ -369,7 +365,7 @@ def _backup(path: Path, target: Path) -> int:
 
 
 def _forget(path: Path, options: argparse.Namespace) -> int:
-    gone = forget(path, options.tag, pose_only=options.pose, by=_user(), at_ns=time.time_ns())
+    gone = forget(path, options.tag, pose_only=options.pose, by=user(), at_ns=time.time_ns())
     if options.pose:
         _say(f"{path}: the pose of tag {options.tag!r} is forgotten; the next twin pins it anew")
     else:
@@ -379,13 +375,6 @@ def _forget(path: Path, options: argparse.Namespace) -> int:
             " counts of the timeline still have them"
         )
     return 0
-
-
-def _user() -> str:
-    try:
-        return getpass.getuser()
-    except (KeyError, OSError):
-        return f"user {os.getuid()}"
 
 
 # --- vacuum --------------------------------------------------------------------------------------

@@ -35,6 +35,7 @@ from lupin_bridge.console import (
     say,
     standard,
     tell,
+    user,
 )
 from lupin_bridge.settings import (
     CONFIG_VARIABLE,
@@ -141,7 +142,7 @@ def _add(path: Path, options: argparse.Namespace) -> int:
             kind,
             options.given_role,
             secret,
-            by=_who(),
+            by=f"{user()} on this machine",
             now_s=int(time.time()),
             sites=options.for_site,
         )
@@ -167,7 +168,7 @@ def _password(options: argparse.Namespace) -> str:
 def _remove(path: Path, options: argparse.Namespace) -> int:
     kind = _WHAT[options.role]
     with closing(Accounts(path, is_writer=True)) as accounts:
-        accounts.remove(options.name, kind, by=_who(), now_s=int(time.time()))
+        accounts.remove(options.name, kind, by=f"{user()} on this machine", now_s=int(time.time()))
         is_last = not accounts.listed("account") and not accounts.listed("token")
     tell(f"{kind} {options.name} is removed")
     if is_last:
@@ -203,11 +204,3 @@ def _audit(path: Path) -> int:
 
 def _iso(at_s: int) -> str:
     return f"{datetime.fromtimestamp(at_s, UTC):%Y-%m-%dT%H:%M:%SZ}"
-
-
-def _who() -> str:
-    """Who runs the command, as the audit trail names them."""
-    try:
-        return f"{getpass.getuser()} on this machine"
-    except (KeyError, OSError):  # a user without a name
-        return "somebody on this machine"

@@ -26,11 +26,11 @@ from lupin_bridge.access.middleware import Access
 from lupin_bridge.access.policy import Proxies, exposure
 from lupin_bridge.app import create_app, has_page
 from lupin_bridge.archive import forwarding as archive
-from lupin_bridge.archive.database import ArchiveError, UsageError, check_url, open_archive
+from lupin_bridge.archive.database import ArchiveError, check_url, open_archive
 from lupin_bridge.bags.recording import INPUTS, Recording, RecordingError
 from lupin_bridge.bridge import Bridge
 from lupin_bridge.feed.source import TwinSource, ailment
-from lupin_bridge.judge.options import Criteria
+from lupin_bridge.judge.judging import Criteria
 from lupin_bridge.notify.channels import Channels
 from lupin_bridge.notify.destinations import Targets
 from lupin_bridge.notify.push import Push
@@ -400,10 +400,7 @@ def run_fleet(settings: Settings, secrets: Secrets, ros_args: Sequence[str]) -> 
     for name in _NOT_HERE:
         if getattr(settings, name) not in ("", "off"):
             raise SettingError(f"{settings.called(name)} is for a twin, not for lupin-twin fleet")
-    try:
-        check_url(settings.archive_url)
-    except UsageError as error:
-        raise SettingError(str(error)) from None
+    check_url(settings.archive_url)
     access = Access.of(settings, secrets.token, is_fleet=True)
     proxies = Proxies.of(settings)
     criteria = Criteria.of(settings)

@@ -48,10 +48,10 @@ from lupin_bridge.fleet.overview import (
 )
 from lupin_bridge.fleet.pages import Opened, SitePage, SitePages, Sites
 from lupin_bridge.fleet.source import SiteTwin, Watching
-from lupin_bridge.judge.options import Criteria
+from lupin_bridge.judge.judging import Criteria
 from lupin_bridge.metrics import CONTENT_TYPE
 from lupin_bridge.past.bodies import COMPLETE_TO
-from lupin_bridge.past.export import CSV, PARQUET, ExportFormat
+from lupin_bridge.past.export import Csv, Parquet
 from lupin_bridge.past.query import OfExport
 from lupin_bridge.query_string import parameter, read
 from lupin_bridge.routes import pages, status
@@ -65,7 +65,7 @@ from lupin_bridge.routes.answers import (
     person_of,
     respond,
 )
-from lupin_bridge.routes.export import respond_export, span_of
+from lupin_bridge.routes.export import Format, respond_export, span_of
 from lupin_bridge.routes.sockets import listen
 from lupin_bridge.serving.admission import (
     REVALIDATE,
@@ -245,7 +245,7 @@ class OfSitesExport(OfExport):
     sites: str | None = parameter("names of sites, with a comma between; default: all")
 
 
-async def respond_sites(fleet: Fleet, kind: ExportFormat, request: Request) -> Response:
+async def respond_sites(fleet: Fleet, kind: Format, request: Request) -> Response:
     """Every row of a period of the sites that are named, or of all."""
     given = read(OfSitesExport, request.query_params.multi_items(), PastRefused)
     known = fleet.sites_for(request)
@@ -381,7 +381,7 @@ def _add_overview(app: FastAPI, fleet: Fleet) -> None:
 
 def _add_answers(app: FastAPI, fleet: Fleet) -> None:
     """Routes over several sites at once."""
-    for kind in (CSV, PARQUET):
+    for kind in (Csv, Parquet):
         path = f"/api/export.{kind.name}"
         app.api_route(path, methods=["GET", "HEAD"])(partial(respond_sites, fleet, kind))
 

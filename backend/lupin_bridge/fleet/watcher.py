@@ -28,8 +28,7 @@ from lupin_bridge.feed.query import Child, Now, Search
 from lupin_bridge.fleet.overview import LIVE_S, Site, dots
 from lupin_bridge.judge.alarm_fold import Follower
 from lupin_bridge.judge.episodes import Alarm, silence
-from lupin_bridge.judge.judging import Judge
-from lupin_bridge.judge.options import Criteria
+from lupin_bridge.judge.judging import Criteria, Judge
 from lupin_bridge.serving.admission import Limits
 from lupin_bridge.settings import Settings
 from lupin_bridge.stream.state_json import alarm_json

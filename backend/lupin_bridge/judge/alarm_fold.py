@@ -14,7 +14,7 @@ from typing import Final
 
 from lupin_bridge.judge.day import DayLine, TagDays
 from lupin_bridge.judge.episodes import MAX_EPISODES, SITE, Alarm, TagEpisodes, alarm_id
-from lupin_bridge.judge.options import Criteria
+from lupin_bridge.judge.judging import Criteria
 from lupin_bridge.judge.scans import LONGEST_NS, SHORTEST_NS, Stretches
 from lupin_bridge.judge.tag_log import Gap, TagPast, is_long
 from lupin_bridge.judge.verdict import Kind, Reason, Verdict

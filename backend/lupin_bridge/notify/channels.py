@@ -22,7 +22,7 @@ import orjson
 
 from lupin_bridge.feed.shared_work import Periodic
 from lupin_bridge.feed.source import TwinUnavailableError
-from lupin_bridge.judge.options import unix_s
+from lupin_bridge.judge.judging import unix_s
 from lupin_bridge.judge.quantities import Sensors
 from lupin_bridge.notify.destinations import Targets
 from lupin_bridge.notify.messages import Source

@@ -21,8 +21,7 @@ from typing import Any, Final, Protocol
 from lupin_bridge.alarms.board import AlarmBoard, Board, NoteBoard
 from lupin_bridge.feed.source import TwinSource
 from lupin_bridge.judge.episodes import Alarm
-from lupin_bridge.judge.judging import NOTHING_JUDGED, Judged
-from lupin_bridge.judge.options import Criteria
+from lupin_bridge.judge.judging import NOTHING_JUDGED, Criteria, Judged
 from lupin_bridge.judge.quantities import Sensor
 from lupin_bridge.judge.verdict import Health, Verdict
 from lupin_bridge.past.query import iso

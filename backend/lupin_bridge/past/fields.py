@@ -18,7 +18,7 @@ import orjson
 from lupin_bridge import field as formats
 from lupin_bridge.feed.query import Find
 from lupin_bridge.field import JSON, EstimateQuery, FieldFormat, FieldQuery
-from lupin_bridge.judge.options import Criteria
+from lupin_bridge.judge.judging import Criteria
 from lupin_bridge.judge.quantities import DAILY, Sensor
 from lupin_bridge.judge.verdict import plausible, with_derived
 from lupin_bridge.past.plans import Plan, StateQuery, etag_of, plan_of, series_s, with_daily

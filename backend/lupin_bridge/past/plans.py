@@ -19,8 +19,7 @@ import orjson
 from lupin_bridge.feed.query import Find
 from lupin_bridge.field import matches
 from lupin_bridge.judge.day import SINCE_NS, days_of
-from lupin_bridge.judge.judging import judge_once
-from lupin_bridge.judge.options import Criteria
+from lupin_bridge.judge.judging import Criteria, judge_once
 from lupin_bridge.judge.quantities import DAILY, DAY_NS, DERIVED, Daily, Derived, IsDay, Sensors
 from lupin_bridge.past import bodies
 from lupin_bridge.serving.admission import REVALIDATE, Answer, json_answer

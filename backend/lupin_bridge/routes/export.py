@@ -16,7 +16,7 @@ from starlette.types import Message, Receive, Scope, Send
 from lupin_bridge.access.middleware import client_of
 from lupin_bridge.judge.quantities import Sensors
 from lupin_bridge.past import bodies, query
-from lupin_bridge.past.export import CSV, PARQUET, ExportFormat, MissingPackageError, Writer
+from lupin_bridge.past.export import Csv, MissingPackageError, Parquet
 from lupin_bridge.past.query import MAX_SECONDS, OfExport
 from lupin_bridge.query_string import parameters_of, read
 from lupin_bridge.routes.answers import (
@@ -47,6 +47,7 @@ _WRITE_S = 0.5
 # An export's rows as they were packed, in lots.
 Lots = AsyncIterator[bytes]
 Pack = Callable[[Sequence[PastRow]], bytes]
+Format = type[Csv] | type[Parquet]
 ResultT = TypeVar("ResultT")
 
 
@@ -69,7 +70,7 @@ def _content(media_type: str) -> dict[str, Any]:
     router,
     "/api/export.csv",
     summary="Every reading and failed attempt of a period, as CSV",
-    responses={200: _content(CSV.media_type), **_ANSWERS},
+    responses={200: _content(Csv.media_type), **_ANSWERS},
     openapi_extra={"parameters": parameters_of(query.OfExport)},
 )
 async def csv_route(request: Request) -> Response:
@@ -77,7 +78,7 @@ async def csv_route(request: Request) -> Response:
 
     It is streamed: one without HTTP's last chunk is not whole.
     """
-    return await _of_site(request, CSV)
+    return await _of_site(request, Csv)
 
 
 @read_route(
@@ -85,7 +86,7 @@ async def csv_route(request: Request) -> Response:
     "/api/export.parquet",
     summary="The same as Parquet, with units and coordinates",
     responses={
-        200: _content(PARQUET.media_type),
+        200: _content(Parquet.media_type),
         **_ANSWERS,
         **refusing({501: "the extra `science` is not installed"}),
     },
@@ -93,10 +94,10 @@ async def csv_route(request: Request) -> Response:
 )
 async def parquet_route(request: Request) -> Response:
     """The columns of the CSV; `time` is a timestamp. Fields and file have attributes."""
-    return await _of_site(request, PARQUET)
+    return await _of_site(request, Parquet)
 
 
-async def _of_site(request: Request, kind: ExportFormat) -> Response:
+async def _of_site(request: Request, kind: Format) -> Response:
     bridge = bridge_of(request)
     now_ns = bridge.ros_time_ns
     given = read(query.OfExport, request.query_params.multi_items(), PastRefused)
@@ -122,7 +123,7 @@ async def respond_export(
     request: Request,
     of: Exporting,
     rows: Callable[[Pack], Lots],
-    kind: ExportFormat,
+    kind: Format,
     given: OfExport,
     *,
     sensors: Sensors,
@@ -151,8 +152,8 @@ async def respond_export(
 
     facts = {"title": "lupin-twin: readings and failed attempts", **_facts(known, given, now_ns)}
 
-    async def begin() -> tuple[Writer, Lots, bytes | None]:
-        opened = partial(kind.open, sensors, facts, given.sensor_type, has_site)
+    async def begin() -> tuple[Csv | Parquet, Lots, bytes | None]:
+        opened = partial(kind, sensors, facts, given.sensor_type, has_site)
         writer = await _written(of, kind, opened)
         lots = rows(partial(kind.pack, sensors=sensors))
         return writer, lots, await anext(lots, None)
@@ -181,9 +182,9 @@ def _facts(known: Mapping[str, str], given: OfExport, now_ns: int | None) -> dic
     return {**facts, "to": query.iso(end_ns)}
 
 
-async def _written(of: Exporting, kind: ExportFormat, write: Callable[[], ResultT]) -> ResultT:
+async def _written(of: Exporting, kind: Format, write: Callable[[], ResultT]) -> ResultT:
     """What is written, on a worker; CSV is passed on as it came, and takes no time."""
-    if kind is CSV:
+    if kind is Csv:
         return write()
     return await asyncio.wrap_future(of.workers.submit(lambda _: write(), _WRITE_S))
 
@@ -195,12 +196,12 @@ class ExportResponse(Response):
         self,
         of: Exporting,
         export: Export,
-        writer: Writer,
+        writer: Csv | Parquet,
         lots: Lots,
         first: bytes | None,
         *,
         headers: dict[str, str],
-        kind: ExportFormat,
+        kind: Format,
         release: Callable[[], None],
     ) -> None:
         super().__init__(headers=headers, media_type=kind.media_type)

@@ -12,7 +12,7 @@ from annotated_types import Ge
 from fastapi import APIRouter, Request, Response, WebSocket
 
 from lupin_bridge.bridge import Bridge
-from lupin_bridge.judge.options import zone_of
+from lupin_bridge.judge.judging import zone_of
 from lupin_bridge.past import bodies
 from lupin_bridge.past import query as past_query
 from lupin_bridge.past.plans import (

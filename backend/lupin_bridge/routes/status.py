@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import io
 import math
-from collections.abc import Callable
 from hashlib import blake2b
 from itertools import islice
 from typing import Final
@@ -252,7 +251,7 @@ async def alarms_route(request: Request) -> Response:
     notes, now_ns = bridge.notes.notes or (), bridge.ros_time_ns
 
     def body() -> bytes:
-        found = list(islice(filter(_is_in(*span, active), alarms), MAX_ALARMS))
+        found = list(islice((it for it in alarms if _is_in(it, *span, active)), MAX_ALARMS))
         said = notes_of_alarms(board.alarms, notes, now_ns)
         return orjson.dumps(alarms_body(found, board.source, board.since_ns, said))
 
@@ -264,18 +263,13 @@ async def alarms_route(request: Request) -> Response:
     return await respond(request, ("alarms", board.number, bridge.notes.number, given), compute)
 
 
-def _is_in(start_ns: int, end_ns: int, active: str | None = None) -> Callable[[Alarm], bool]:
+def _is_in(alarm: Alarm, start_ns: int, end_ns: int, active: str | None) -> bool:
     """`active` as in the query, `end_ns` 0: now."""
-
-    def is_in(alarm: Alarm) -> bool:
-        if active is not None and alarm.is_active != (active == "1"):
-            return False
-        if end_ns and alarm.raised_at_ns >= end_ns:
-            return False
-        cleared_ns = alarm.cleared_at_ns
-        return cleared_ns is None or cleared_ns >= start_ns
-
-    return is_in
+    if active is not None and alarm.is_active != (active == "1"):
+        return False
+    if end_ns and alarm.raised_at_ns >= end_ns:
+        return False
+    return alarm.cleared_at_ns is None or alarm.cleared_at_ns >= start_ns
 
 
 @read_route(

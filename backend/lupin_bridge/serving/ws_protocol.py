@@ -88,7 +88,8 @@ def pieces(frame: bytes, rest: bytes = b"") -> Iterator[Piece]:
     if len(frame) + len(rest) <= PIECE_BYTES:
         yield frame, rest
         return
-    parts = [part for part in (memoryview(frame)[_head_bytes(frame) :], memoryview(rest)) if part]
+    head_bytes = {126: 4, 127: 10}.get(frame[1], 2)
+    parts = [part for part in (memoryview(frame)[head_bytes:], memoryview(rest)) if part]
     opcode = frame[0] & _OPCODE
     for part in parts:
         for start in range(0, len(part), PIECE_BYTES):
@@ -96,10 +97,6 @@ def pieces(frame: bytes, rest: bytes = b"") -> Iterator[Piece]:
             is_last = part is parts[-1] and start + PIECE_BYTES >= len(part)
             yield frame_head(opcode | (_FIN if is_last else 0), len(payload)), payload
             opcode = _CONTINUATION
-
-
-def _head_bytes(frame: bytes) -> int:
-    return {126: 4, 127: 10}.get(frame[1], 2)
 
 
 def frame_head(first: int, length: int) -> bytes:

@@ -61,18 +61,6 @@ class Channel:
     topic: Topic
     schema: str
 
-    @property
-    def json(self) -> dict[str, Any]:
-        """As in `advertise`."""
-        return {
-            "id": self.id,
-            "topic": self.topic.name,
-            "encoding": "cdr",
-            "schemaName": self.topic.type_name,
-            "schemaEncoding": "ros2msg",
-            "schema": self.schema,
-        }
-
 
 def chosen(offered: Iterable[str]) -> str | None:
     """The first of the subprotocols that a client offers that is served here."""
@@ -150,22 +138,23 @@ def status(level: int, text: str) -> bytes:
 
 def advertise(channels: Iterable[Channel]) -> bytes:
     """Channels that are offered now."""
-    return orjson.dumps({"op": "advertise", "channels": [channel.json for channel in channels]})
+    entries = [
+        {
+            "id": channel.id,
+            "topic": channel.topic.name,
+            "encoding": "cdr",
+            "schemaName": channel.topic.type_name,
+            "schemaEncoding": "ros2msg",
+            "schema": channel.schema,
+        }
+        for channel in channels
+    ]
+    return orjson.dumps({"op": "advertise", "channels": entries})
 
 
 def unadvertise(ids: Iterable[int]) -> bytes:
     """Channels that are offered no more."""
     return orjson.dumps({"op": "unadvertise", "channelIds": sorted(ids)})
-
-
-def message_head(subscription_id: int, stamp_ns: int) -> bytes:
-    """What stands before the payload of a message; the payload follows in the same frame."""
-    return struct.pack("<BIQ", _MESSAGE_DATA, subscription_id, max(0, stamp_ns))
-
-
-def time(stamp_ns: int) -> bytes:
-    """Simulated time."""
-    return struct.pack("<BQ", _TIME, max(0, stamp_ns))
 
 
 # --- one client's session -------------------------------------------------------------------------
@@ -260,7 +249,7 @@ class Session:
     def next(self) -> tuple[bytes, bytes] | None:
         """What is to be written next, as a binary message in two parts; None: nothing waits."""
         if self._time_ns is not None:
-            head = time(self._time_ns)
+            head = struct.pack("<BQ", _TIME, max(0, self._time_ns))
             self._time_ns = None
             return head, b""
         if not self._waiting:
@@ -268,7 +257,8 @@ class Session:
         subscription_id = next(iter(self._waiting))
         sample = self._waiting.pop(subscription_id)
         self._counts.sent += 1
-        return message_head(subscription_id, sample.stamp_ns), sample.data
+        stamp_ns = max(0, sample.stamp_ns)
+        return struct.pack("<BIQ", _MESSAGE_DATA, subscription_id, stamp_ns), sample.data
 
     def _subscribe(self, subscriptions: Iterable[tuple[int, int]]) -> Reaction:
         begun: list[tuple[int, Channel]] = []

@@ -3,7 +3,6 @@
 import asyncio
 import logging
 import os
-import pickle
 import signal
 import sys
 from collections.abc import AsyncIterator, Iterator
@@ -161,7 +160,7 @@ async def test_an_export_goes_on_where_it_was_in_another_process_too(
 ) -> None:
     monkeypatch.setattr(past_process, "REST_S", 0.0)
     async with looking_back() as past:
-        export: bytes | None = pickle.dumps(Export(0, NOW_NS, None, None))
+        export: Export | None = Export(0, NOW_NS, None, None)
         found: list[int] = []
         while export is not None:
             export, lots = await past.ask(ExportStep(export, len), now(path), 0.0)

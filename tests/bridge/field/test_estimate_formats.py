@@ -10,7 +10,7 @@ from PIL import Image
 
 from lupin_bridge import field as formats
 from lupin_bridge.field import JSON, NPY, PNG, EstimateQuery, FieldFormat
-from lupin_bridge.judge.options import Criteria
+from lupin_bridge.judge.judging import Criteria
 from lupin_bridge.judge.quantities import Ranges, Span
 from lupin_bridge.settings import Settings
 from lupin_bridge.stream.followers import GetEstimateResponse

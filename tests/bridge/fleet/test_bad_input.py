@@ -12,7 +12,7 @@ from lupin_bridge.access.policy import Proxies
 from lupin_bridge.fleet import source
 from lupin_bridge.fleet.app import Fleet, create_fleet_app
 from lupin_bridge.fleet.source import Watching
-from lupin_bridge.judge.options import Criteria
+from lupin_bridge.judge.judging import Criteria
 from lupin_bridge.serving.admission import Limits
 from lupin_bridge.settings import Settings
 from tests.support.archive import Archive, run

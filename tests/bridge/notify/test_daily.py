@@ -12,7 +12,7 @@ from zoneinfo import ZoneInfo
 import orjson
 import pytest
 
-from lupin_bridge.judge.options import Criteria
+from lupin_bridge.judge.judging import Criteria
 from lupin_bridge.notify.channels import MOST_DAYS, DailyReport, DailyTarget
 from lupin_bridge.notify.destinations import Targets
 from lupin_bridge.notify.mqtt import Mirror, Mqtt

@@ -11,7 +11,7 @@ import pytest
 
 from lupin_bridge.field import FORMATS, JSON, PNG, EstimateQuery, FieldFormat, FieldQuery
 from lupin_bridge.judge.day import ClockDay
-from lupin_bridge.judge.options import Criteria, own_sensors
+from lupin_bridge.judge.judging import Criteria, own_sensors
 from lupin_bridge.judge.quantities import vapour_pressure_deficit_kpa
 from lupin_bridge.past.fields import Estimated, Field
 from lupin_bridge.past.plans import Health, OneTag, Plan, WholeState

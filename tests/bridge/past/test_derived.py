@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import pytest
 
-from lupin_bridge.judge.options import own_sensors
+from lupin_bridge.judge.judging import own_sensors
 from lupin_bridge.judge.quantities import DAILY, DAY_NS
 from lupin_bridge.judge.quantities import vapour_pressure_deficit_kpa as vpd
 from lupin_bridge.past import plans as derived

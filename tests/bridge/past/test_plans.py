@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from lupin_bridge.field import PNG
-from lupin_bridge.judge.options import Criteria
+from lupin_bridge.judge.judging import Criteria
 from lupin_bridge.past.plans import (
     Answered,
     ConditionalQuery,

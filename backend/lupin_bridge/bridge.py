@@ -29,7 +29,6 @@ from lupin_bridge.viewers.rosbridge_session import Writer
 from lupin_twin.core.diagnostics import Origin
 from lupin_twin.core.drops import LATE, LOST, Reason
 from lupin_twin.core.state import NANOSECONDS_PER_SECOND, Snapshot
-from lupin_twin.runtime.workers import Workers
 
 log = logging.getLogger(__name__)
 
@@ -74,6 +73,7 @@ class Bridge:
     ) -> None:
         self._clock = clock
         self.source = source
+        self.workers = source.workers
         self.site = settings.site
         self.limits = limits
         self.liveness = Liveness(lambda: source.world)
@@ -159,11 +159,6 @@ class Bridge:
         self._publish_status()
 
     # --- for the routes -----------------------------------------------------------------------
-
-    @property
-    def workers(self) -> Workers:
-        """Where the source computes."""
-        return self.source.workers
 
     @property
     def latest(self) -> TwinUpdate | None:

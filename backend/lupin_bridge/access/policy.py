@@ -68,20 +68,19 @@ class Proxies:
         """
         prefix = settings.path_prefix
         if prefix and _PATH_PREFIX.fullmatch(prefix) is None:
-            raise SettingError(
-                f"{settings.called('path_prefix')} is {prefix[:128]!r}, must be a path such as "
-                "/gh1, without a slash at its end"
+            raise settings.wrong(
+                "path_prefix",
+                f"is {prefix[:128]!r}, must be a path such as /gh1, without a slash at its end",
             )
         header = settings.proxy_user_header
         if header and _HEADER.fullmatch(header) is None:
-            raise SettingError(
-                f"{settings.called('proxy_user_header')} is {header[:128]!r}, must be a header's "
-                "name, such as Remote-User"
+            raise settings.wrong(
+                "proxy_user_header",
+                f"is {header[:128]!r}, must be a header's name, such as Remote-User",
             )
         if header and not settings.trusted_proxy:
-            raise SettingError(
-                f"{settings.called('proxy_user_header')} is given without --trusted-proxy: nobody "
-                "is believed"
+            raise settings.wrong(
+                "proxy_user_header", "is given without --trusted-proxy: nobody is believed"
             )
         called = settings.called("trusted_proxy")
         proxies = tuple(_network(text, called) for text in settings.trusted_proxy)

@@ -278,13 +278,11 @@ async def _run(
     targets = Targets.of(settings, secrets)
     archive.check(settings, role)
     if settings.journal and role != "web":
-        raise SettingError(
-            f"{settings.called('journal')} is for web; a twin's own file is its parameter journal"
-        )
+        raise settings.wrong("journal", "is for web; a twin's own file is its parameter journal")
     if "://" in settings.journal:
-        raise SettingError(
-            f"{settings.called('journal')} is {settings.journal!r}, expected a file; an archive is "
-            "shown by lupin-twin fleet"
+        raise settings.wrong(
+            "journal",
+            f"is {settings.journal!r}, expected a file; an archive is shown by lupin-twin fleet",
         )
     if settings.journal and not Path(settings.journal).exists():
         log.warning(
@@ -399,7 +397,7 @@ def run_fleet(settings: Settings, secrets: Secrets, ros_args: Sequence[str]) -> 
         raise SettingError(f"{option('archive_url')} is missing, or {variable('archive_url')}")
     for name in _NOT_HERE:
         if getattr(settings, name) not in ("", "off"):
-            raise SettingError(f"{settings.called(name)} is for a twin, not for lupin-twin fleet")
+            raise settings.wrong(name, "is for a twin, not for lupin-twin fleet")
     check_url(settings.archive_url)
     access = Access.of(settings, secrets.token, is_fleet=True)
     proxies = Proxies.of(settings)

@@ -228,7 +228,7 @@ class Fleet:
         yield "lupin_fleet_sites_live", "sites that are live", live if is_reachable else 0
         yield "lupin_fleet_archive_reachable", "1 while the archive answers", is_reachable
         yield "lupin_fleet_looks", "queries of the archive for changes", watching.looks
-        starts = watching.starts
+        starts = watching.process.starts
         yield "lupin_fleet_watcher_starts", "starts of the process that makes these queries", starts
         starts = self.past.starts
         yield "lupin_fleet_reader_starts", "starts of the process that reads sites", starts
@@ -259,7 +259,6 @@ async def respond_sites(fleet: Fleet, kind: Format, request: Request) -> Respons
         lambda pack: _rows(fleet, [site.site for site in named], query, pack),
         kind,
         given,
-        sensors=fleet.criteria.sensors,
         now_ns=fleet.watching.now_ns,
         known={COMPLETE_TO: seconds(min(heard_ns, end_ns))},
         has_site=True,

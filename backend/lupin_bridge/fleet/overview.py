@@ -14,11 +14,11 @@ from typing import Any, Final
 
 import orjson
 
-from lupin_bridge.judge.verdict import Health, Verdict, worst
+from lupin_bridge.judge.verdict import ORDER, Health, Verdict, worst
 from lupin_bridge.stream.frames import text_frame
 from lupin_bridge.stream.state_json import moment, stamp
 from lupin_twin.core.diagnostics import Origin
-from lupin_twin.core.state import TagState
+from lupin_twin.core.state import Snapshot, TagState
 from lupin_twin.field.grid import reach_of
 
 # Places along each side. Of tags at the same place the worst is drawn, so that no map is larger
@@ -64,6 +64,15 @@ def dots(tags: Iterable[TagState], healths: Mapping[str, Health]) -> str:
         if path:
             paths.append(f'<path class="{verdict}" d="{path}"/>')
     return "".join(paths)
+
+
+def same_tags(before: Snapshot | None, now: Snapshot) -> tuple[TagState, ...]:
+    """The tags of now, the very same values as before where nothing has changed."""
+    known = {} if before is None else {tag.tag_id: tag for tag in before.tags}
+    return tuple(
+        old if (old := known.get(tag.tag_id)) is not None and old == tag else tag
+        for tag in now.tags
+    )
 
 
 def map_svg(paths: str) -> bytes:
@@ -151,7 +160,6 @@ def _lasting(site: Site) -> tuple[object, ...]:
 
 # Of an answer; who has more to look at begins with the worst.
 MAX_LISTED: Final = 200
-_ORDER: Final = {verdict: index for index, verdict in enumerate(Verdict)}
 
 
 def alarms_json(sites: Iterable[Site], archive: Archive) -> dict[str, Any]:
@@ -176,7 +184,7 @@ def alarms_json(sites: Iterable[Site], archive: Archive) -> dict[str, Any]:
 
 def _worst_first(alarm: Mapping[str, Any]) -> tuple[Any, ...]:
     raised = alarm["raised_at"]
-    verdict = _ORDER[Verdict(alarm["reason"]["verdict"])]
+    verdict = ORDER[Verdict(alarm["reason"]["verdict"])]
     return verdict, -raised["sec"], -raised["nanosec"], alarm["site"], alarm["id"]
 
 

@@ -120,16 +120,13 @@ def _sensors(settings: Settings) -> Sensors:
 def _clock(settings: Settings) -> ClockDay:
     hours = _HOURS.fullmatch(settings.day_hours)
     if hours is None:
-        raise SettingError(
-            f"{settings.called('day_hours')} is {settings.day_hours!r}, not such as 06:00-20:00"
-        )
+        raise settings.wrong("day_hours", f"is {settings.day_hours!r}, not such as 06:00-20:00")
     begins, ends = (time.fromisoformat(hour) for hour in hours.groups())
     # None: this machine's, which changes with summer and winter.
     zone = zone_of(settings.time_zone) if settings.time_zone else None
     if settings.time_zone and zone is None:
-        raise SettingError(
-            f"{settings.called('time_zone')} is {settings.time_zone!r}, which this machine does "
-            "not know"
+        raise settings.wrong(
+            "time_zone", f"is {settings.time_zone!r}, which this machine does not know"
         )
     return ClockDay(zone, begins, ends)
 

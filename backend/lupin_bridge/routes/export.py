@@ -14,7 +14,7 @@ from fastapi import APIRouter, Request, Response
 from starlette.types import Message, Receive, Scope, Send
 
 from lupin_bridge.access.middleware import client_of
-from lupin_bridge.judge.quantities import Sensors
+from lupin_bridge.judge.judging import Criteria
 from lupin_bridge.past import bodies, query
 from lupin_bridge.past.export import Csv, MissingPackageError, Parquet
 from lupin_bridge.past.query import MAX_SECONDS, OfExport
@@ -56,10 +56,8 @@ class Exporting(Protocol):
 
     limits: Limits
     admission: Admission
-
-    @property
-    def workers(self) -> Workers:
-        """Where a file is written."""
+    criteria: Criteria
+    workers: Workers
 
 
 def _content(media_type: str) -> dict[str, Any]:
@@ -107,10 +105,7 @@ async def _of_site(request: Request, kind: Format) -> Response:
     def rows(pack: Pack) -> Lots:
         return bridge.source.rows(start_ns, end_ns, given.tag_id, given.sensor_type, pack)
 
-    return await respond_export(
-        request, bridge, rows, kind, given, sensors=bridge.criteria.sensors, now_ns=now_ns,
-        known=known,
-    )  # fmt: skip
+    return await respond_export(request, bridge, rows, kind, given, now_ns=now_ns, known=known)
 
 
 def span_of(given: OfExport, now_ns: int | None) -> tuple[int, int]:
@@ -126,7 +121,6 @@ async def respond_export(
     kind: Format,
     given: OfExport,
     *,
-    sensors: Sensors,
     now_ns: int | None,
     known: Mapping[str, str],
     has_site: bool = False,
@@ -144,6 +138,7 @@ async def respond_export(
     }  # fmt: skip
     if request.method == "HEAD":
         return Response(headers=headers, media_type=kind.media_type)
+    sensors = of.criteria.sensors
     client, connection = client_of(request), request.scope["state"][CONNECTION_KEY]
 
     def evict() -> None:

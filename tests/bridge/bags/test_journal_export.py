@@ -74,11 +74,11 @@ def test_who_hears_it_knows_what_the_journal_says_of_its_end(tmp_path: Path, unt
     path, target = tmp_path / "j.sqlite", tmp_path / "a.mcap"
     kept(path, ROWS)
     end_ns = NOW + until_s * SECOND
-    made = exported(path, target, 0, end_ns + 1)
+    observations, tags = exported(path, target, 0, end_ns + 1)
     with closing(open_reader(path)) as connection:
         assert fed(target) == by_id(state_at(connection, end_ns, "map").tags)
     messages = [row for row in ROWS if row.stamp_ns <= end_ns]
-    assert made.observations + made.tags == len(messages) == len(read(target))
+    assert observations + tags == len(messages) == len(read(target))
     assert [entry[1] for entry in read(target)] == [row.arrival_ns for row in messages]
 
 

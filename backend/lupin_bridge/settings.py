@@ -302,10 +302,7 @@ def _shown(name: str, value: Any) -> str:
             type(value).__name__, "a number or date"
         )
         return f"{kind} that may hold a password, and is not shown"
-    try:
-        return repr(str(value)[:128])
-    except ValueError:  # Python writes no number of so many digits
-        return "a number of thousands of digits"
+    return repr(str(value)[:128])
 
 
 def _of_environment(environment: Mapping[str, str]) -> Iterator[_Given]:
@@ -369,8 +366,7 @@ def _of_file(path: str, called: str) -> Iterator[_Given]:
     text = read_text(path, called)
     try:
         content = tomllib.loads(text)
-    # It lets through what Python says of a number of thousands of digits, and of [[[[[...
-    except (ValueError, RecursionError) as error:
+    except ValueError as error:
         raise SettingError(f"{path} is not TOML: {error}") from None
     names = [spec.name for spec in table()]
     for key, value in content.items():

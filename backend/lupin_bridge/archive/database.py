@@ -146,7 +146,7 @@ def archive_url() -> str:
     return os.environ[variable("archive_url")]
 
 
-def open_archive(url: str, name: str) -> Any:
+def open_archive(url: str) -> Any:
     """A connection that cannot write, to the primary or to a standby.
 
     Raises:
@@ -155,7 +155,7 @@ def open_archive(url: str, name: str) -> Any:
     """
     import psycopg  # noqa: PLC0415  # the extra `fleet`
 
-    connection = connect(url, name, session="any")
+    connection = connect(url, "lupin-twin fleet", session="any")
     try:
         connection.read_only = True
         # All that is read in one transaction is of one moment.

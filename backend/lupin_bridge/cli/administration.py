@@ -17,7 +17,6 @@ import threading
 import time
 from collections.abc import Mapping
 from contextlib import closing
-from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any, Final
 
@@ -337,12 +336,9 @@ def _remove(path: Path, options: argparse.Namespace) -> int:
 def _list(path: Path, options: argparse.Namespace) -> int:
     with closing(Accounts(path)) as accounts:
         listed = accounts.listed(_WHAT[options.role])
-    tell(
-        *(
-            f"{it.name}  {it.role}  {_iso(it.made_at_s)}  {it.sites.replace(chr(10), ' ')}".rstrip()
-            for it in listed
-        )
-    )
+    for it in listed:
+        made_at, sites = journal.iso(it.made_at_s * 10**9), it.sites.replace("\n", " ")
+        tell(f"{it.name}  {it.role}  {made_at}  {sites}".rstrip())
     return 0
 
 
@@ -352,10 +348,6 @@ def _audit(path: Path) -> int:
     writer.writerow(("time", "who", "what", "subject", "address"))
     with closing(Accounts(path)) as accounts:
         for row in accounts.audited():
-            writer.writerow((_iso(row.at_s), *row[1:]))
+            writer.writerow((journal.iso(row.at_s * 10**9), *row[1:]))
     standard(text.getvalue().encode())
     return 0
-
-
-def _iso(at_s: int) -> str:
-    return f"{datetime.fromtimestamp(at_s, UTC):%Y-%m-%dT%H:%M:%SZ}"

@@ -305,12 +305,8 @@ async def _run(
     outward = Channels(targets, accounts_path(settings).parent, push)
     bridge = Bridge(source, settings, criteria=criteria, outward=outward, limits=limits)
     app = create_app(bridge, access=access, proxies=proxies)
-
-    def announce_shutdown() -> None:
-        supervisor.stopping()
-        bridge.announce_shutdown()
-
-    server = BridgeServer(app, settings, announce_shutdown, limits)
+    announcements = (supervisor.stopping, bridge.announce_shutdown)
+    server = BridgeServer(app, settings, announcements, limits)
     await bridge.start()
     feeder = None if feed is None else Feeder(feed, lambda: server.should_exit)
     forwarding = archive.Forwarding(settings, lambda: source.journal().path)
@@ -419,12 +415,8 @@ async def _run_fleet(
     limits = Limits()
     fleet = Fleet(settings, criteria, access, limits)
     app = create_fleet_app(fleet, access, proxies)
-
-    def announce_shutdown() -> None:
-        supervisor.stopping()
-        fleet.announce_shutdown()
-
-    server = BridgeServer(app, settings, announce_shutdown, limits)
+    announcements = (supervisor.stopping, fleet.announce_shutdown)
+    server = BridgeServer(app, settings, announcements, limits)
     await fleet.start()
     try:
         await serve(server, listener, settings, supervisor, lambda: None)
@@ -435,7 +427,7 @@ async def _run_fleet(
 def _report_error(url: str) -> None:
     """At once, in one line; it may pass, so the page is served all the same, and says so."""
     try:
-        with closing(open_archive(url, "lupin-twin fleet")):
+        with closing(open_archive(url)):
             pass
     except ArchiveError as error:
         log.error("%s; it will be retried", error)  # noqa: TRY400  # one line

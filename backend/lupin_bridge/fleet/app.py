@@ -80,7 +80,7 @@ from lupin_bridge.settings import Settings
 from lupin_bridge.stream.frames import Status
 from lupin_bridge.stream.hub import Client, Hub
 from lupin_twin.core.journal_condition import UNKNOWN, Condition, JournalState
-from lupin_twin.core.past import PastRefused, seconds
+from lupin_twin.core.past import seconds
 from lupin_twin.journal.queries import STRETCH_S, Export
 from lupin_twin.runtime.workers import Workers
 
@@ -247,7 +247,7 @@ class OfSitesExport(OfExport):
 
 async def respond_sites(fleet: Fleet, kind: Format, request: Request) -> Response:
     """Every row of a period of the sites that are named, or of all."""
-    given = read(OfSitesExport, request.query_params.multi_items(), PastRefused)
+    given = read(OfSitesExport, request.query_params.multi_items())
     known = fleet.sites_for(request)
     named = [known[name] for name in chosen(given.sites, known)]
     start_ns, end_ns = span_of(given, None)
@@ -387,7 +387,7 @@ def _add_answers(app: FastAPI, fleet: Fleet) -> None:
     @app.api_route("/api/alarms", methods=["GET", "HEAD"])
     async def alarms(request: Request) -> Response:
         """Active alarms of all sites, the worst first."""
-        given = read(OfSites, request.query_params.multi_items(), PastRefused)
+        given = read(OfSites, request.query_params.multi_items())
         watching = fleet.watching
         names = chosen(given.sites, fleet.sites_for(request))
         key = ("alarms", watching.looks, watching.archive.is_reachable, *names)

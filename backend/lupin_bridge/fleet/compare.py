@@ -141,7 +141,7 @@ def compare(
         PastRefused: see `OfPeriod.span`; too many sites, too long a period, a derived quantity.
 
     """
-    given = read(OfCompare, parameters, PastRefused)
+    given = read(OfCompare, parameters)
     start_ns, end_ns = given.span(now_ns)
     if given.sensor_type in DERIVED or given.sensor_type in DAILY:
         raise PastRefused(
@@ -303,7 +303,7 @@ def sites_report(parameters: Parameters, known: Mapping[str, Any], now_ns: int) 
         PastRefused: see `past.query.report`.
 
     """
-    given = read(OfSitesReport, parameters, PastRefused)
+    given = read(OfSitesReport, parameters)
     start_ns, end_ns = past_query.report(given, now_ns)
     sites = [known[name] for name in chosen(given.sites, known)]
     return SitesReport(

@@ -200,7 +200,7 @@ class ArchiveRecall(Recall):
                 if connection.closed or not _is_alive(connection):
                     continue
                 return connection
-            return open_archive(archive_url(), "lupin-twin fleet")
+            return open_archive(archive_url())
 
 
 def _is_alive(connection: Any) -> bool:

@@ -346,7 +346,7 @@ class WatchChild(Child):
 
         try:
             if self._watcher is None:
-                connection = open_archive(archive_url(), "lupin-twin fleet")
+                connection = open_archive(archive_url())
                 self._watcher = Watcher(connection, Criteria.of(settings))
             return self._watcher.news()
         except (ArchiveError, psycopg.Error) as error:

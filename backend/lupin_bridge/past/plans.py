@@ -150,7 +150,7 @@ class WholeState(StateQuery):
     def plan(self, snapshot: Snapshot) -> Plan:
         """See `StateQuery`."""
         etag = etag_of("state", (snapshot.stamp_ns, snapshot.frame_id, snapshot.tags))
-        return plan_of(etag, lambda _: StateJson().state(snapshot))
+        return plan_of(etag, lambda _: StateJson().state(snapshot, snapshot.now_ns))
 
 
 @dataclass(frozen=True, slots=True)
@@ -327,10 +327,11 @@ _POINTS_A_DAY: Final = DAY_NS // (60 * NANOSECONDS_PER_SECOND)
 # (ns of ROS time, value), oldest first; and with the period that they are of.
 Readings = list[tuple[int, float]]
 OfPeriod = tuple[tuple[int, int], Readings]
+FindSeries = Callable[[SeriesRequest], SeriesPast]
 
 
 def derived_series(
-    request: SeriesRequest, sensors: Sensors, is_day: IsDay, find: Find
+    request: SeriesRequest, sensors: Sensors, is_day: IsDay, find: FindSeries
 ) -> SeriesPast:
     """The series of a request; a derived one, unless a sensor has its name, of its parts."""
     measured = find(request)
@@ -363,31 +364,29 @@ def with_daily(
     *,
     sensors: Sensors,
     is_day: IsDay,
-    find: Find,
+    find: FindSeries,
 ) -> list[TagState]:
     """The tags as of a moment, those of which it is known with a reading of the quantity too."""
     found = []
     for tag in tags:
         names = {reading.name for reading in tag.readings}
-        if daily.sensor not in names or daily.name in names:
-            found.append(tag)
-            continue
-        start_ns = max(1, at_ns - DAY_NS)
-        part = find(SeriesRequest(tag.tag_id, daily.sensor, start_ns, at_ns + 1, _POINTS_A_DAY))
-        value = daily.at(at_ns, _readings_of(daily, sensors, part, at_ns), is_day)
-        if math.isfinite(value):
-            readings = (*tag.readings, Reading(daily.name, value, at_ns))
-            tag = replace(tag, readings=readings)  # noqa: PLW2901
+        if daily.sensor in names and daily.name not in names:
+            span = max(1, at_ns - DAY_NS), at_ns + 1
+            part = find(SeriesRequest(tag.tag_id, daily.sensor, *span, _POINTS_A_DAY))
+            value = daily.at(at_ns, _readings_of(daily, sensors, part, at_ns), is_day)
+            if math.isfinite(value):
+                readings = (*tag.readings, Reading(daily.name, value, at_ns))
+                tag = replace(tag, readings=readings)  # noqa: PLW2901
         found.append(tag)
     return found
 
 
 def _of_days(
-    daily: Daily, sensors: Sensors, is_day: IsDay, find: Find, request: SeriesRequest
+    daily: Daily, sensors: Sensors, is_day: IsDay, find: FindSeries, request: SeriesRequest
 ) -> OfPeriod:
     """A value at the last reading of each hour."""
     first_ns = max(1, request.start_ns - DAY_NS) if request.start_ns else 0
-    part: SeriesPast = find(
+    part = find(
         replace(request, sensor_type=daily.sensor, start_ns=first_ns, max_points=MAX_POINTS)
     )
     start_ns = request.start_ns or part.start_ns
@@ -426,7 +425,7 @@ def _readings_of(daily: Daily, sensors: Sensors, part: SeriesPast, until_ns: int
     return readings
 
 
-def _readings(derived: Derived, find: Find, request: SeriesRequest) -> OfPeriod:
+def _readings(derived: Derived, find: FindSeries, request: SeriesRequest) -> OfPeriod:
     """What can be derived: of readings of one moment, one scan."""
     parts: list[SeriesPast] = []
     for name in derived.sources:

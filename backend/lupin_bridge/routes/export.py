@@ -33,7 +33,7 @@ from lupin_bridge.routes.answers import (
 )
 from lupin_bridge.serving.admission import Admission, Export, Limits
 from lupin_bridge.serving.http_protocol import CONNECTION_KEY, HttpConnection
-from lupin_twin.core.past import PastRefused, PastRow
+from lupin_twin.core.past import PastRow
 from lupin_twin.core.state import NANOSECONDS_PER_SECOND
 from lupin_twin.runtime.workers import Workers
 
@@ -98,7 +98,7 @@ async def parquet_route(request: Request) -> Response:
 async def _of_site(request: Request, kind: Format) -> Response:
     bridge = bridge_of(request)
     now_ns = bridge.ros_time_ns
-    given = read(query.OfExport, request.query_params.multi_items(), PastRefused)
+    given = read(query.OfExport, request.query_params.multi_items())
     start_ns, end_ns = span_of(given, now_ns)
     known = bodies.period_headers(bridge.source.journal(), start_ns, end_ns)
 
@@ -148,7 +148,9 @@ async def respond_export(
     facts = {"title": "lupin-twin: readings and failed attempts", **_facts(known, given, now_ns)}
 
     async def begin() -> tuple[Csv | Parquet, Lots, bytes | None]:
-        opened = partial(kind, sensors, facts, given.sensor_type, has_site)
+        def opened() -> Csv | Parquet:
+            return kind(sensors, facts, given.sensor_type, has_site)
+
         writer = await _written(of, kind, opened)
         lots = rows(partial(kind.pack, sensors=sensors))
         return writer, lots, await anext(lots, None)

@@ -157,7 +157,7 @@ async def _answer(request: Request, field_format: FieldFormat | None) -> Respons
     """The field in a format; None: its quality."""
     bridge = bridge_of(request)
     source, now_ns = bridge.source, bridge.ros_time_ns
-    query = read(FieldQuery, request.query_params.multi_items(), FieldRefused)
+    query = read(FieldQuery, request.query_params.multi_items())
     at_ns = past_query.at_of(query.at, now_ns)
     if at_ns is None and query.sensor_type in DAILY and now_ns is not None:
         at_ns = now_ns - now_ns % _MINUTE_NS
@@ -200,7 +200,7 @@ or the last whole minute of the day, whichever is later: until then its ETag hol
 
 async def _estimate(request: Request, field_format: FieldFormat) -> Response:
     bridge = bridge_of(request)
-    query = read(EstimateQuery, request.query_params.multi_items(), FieldRefused)
+    query = read(EstimateQuery, request.query_params.multi_items())
     if query.layer != "mean" and field_format != PNG:
         raise FieldRefused(f"layer is {query.layer!r}, but only a PNG has one")
     now_ns, source = bridge.ros_time_ns, bridge.source
@@ -316,10 +316,7 @@ Body = Callable[[Bridge, QueryT], Awaitable[bytes]]
 
 async def _report(request: Request, kind: type[QueryT], body: Body[QueryT]) -> Response:
     bridge = bridge_of(request)
-    try:
-        query = read(kind, request.query_params.multi_items(), FieldRefused)
-    except FieldRefused as error:
-        return error_response(str(error), 400)
+    query = read(kind, request.query_params.multi_items())
 
     async def compute() -> Answer:
         with bridge.admission.computing(client_of(request), is_large=True):

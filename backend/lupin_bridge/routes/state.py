@@ -54,7 +54,7 @@ from lupin_bridge.routes.sockets import listen
 from lupin_bridge.serving.admission import Answer
 from lupin_bridge.stream import routes_schema, schema
 from lupin_bridge.stream.hub import CLOSE_POLICY
-from lupin_twin.core.past import EVERY_TAG, PastRefused, SeriesRequest
+from lupin_twin.core.past import EVERY_TAG, SeriesRequest
 
 # Of the reason in a close frame (RFC 6455, section 5.5).
 MAX_REASON_BYTES: Final = 123
@@ -87,7 +87,7 @@ async def ws_state(websocket: WebSocket) -> None:
     bridge: Bridge = websocket.app.state.bridge
     await websocket.accept()
     try:
-        query = read(ListenQuery, websocket.query_params.multi_items(), ValueError)
+        query = read(ListenQuery, websocket.query_params.multi_items())
     except ValueError as error:
         reason = str(error).encode("ascii", "backslashreplace")[:MAX_REASON_BYTES].decode()
         await websocket.close(CLOSE_POLICY, reason)
@@ -187,7 +187,7 @@ async def history_route(request: Request) -> Response:
     """Readings, or equal buckets if there are more than `points`; `gaps`: where nothing came."""
     bridge = bridge_of(request)
     now_ns = bridge.ros_time_ns
-    given = read(past_query.OfHistory, request.query_params.multi_items(), PastRefused)
+    given = read(past_query.OfHistory, request.query_params.multi_items())
     series = SeriesRequest(given.tag_id, given.sensor_type, *given.span(now_ns), given.points)
     journal, has_nights = bridge.source.journal(), bridge.origin != "simulated"
     history = History(series, now_ns, bridge.criteria, journal, has_nights)
@@ -204,7 +204,7 @@ async def history_route(request: Request) -> Response:
 async def timeline_route(request: Request) -> Response:
     """Events counted in buckets of equal length, and how far back anything is remembered."""
     bridge = bridge_of(request)
-    given = read(past_query.OfTimeline, request.query_params.multi_items(), PastRefused)
+    given = read(past_query.OfTimeline, request.query_params.multi_items())
     start_ns, end_ns = given.span(bridge.ros_time_ns)
     tag_id = given.tag_id or EVERY_TAG
     timeline = Timeline(start_ns, end_ns, given.points, tag_id, bridge.source.journal())
@@ -220,7 +220,7 @@ async def timeline_route(request: Request) -> Response:
 )
 async def report_route(request: Request) -> Response:
     """At most 31 days and 100,000 scans and inspections; 500 entries of each list."""
-    given = read(past_query.OfReport, request.query_params.multi_items(), PastRefused)
+    given = read(past_query.OfReport, request.query_params.multi_items())
     return await respond_past(request, _report(request, given), "report")
 
 
@@ -238,12 +238,7 @@ async def report_page_route(request: Request) -> Response:
     except REFUSALS as error:
         refused = refusal(error)
         if "text/html" in list_header(request, "accept"):
-            lang = language_of(
-                request.query_params.get("lang"),
-                list_header(request, "accept-language"),
-                languages(),
-            )
-            page = refused_page(str(error), lang)
+            page = refused_page(str(error), language_of(request, languages()))
             headers = {**refused.headers, **PAGE_HEADERS}
             del headers["content-length"], headers["content-type"]
             return Response(page, refused.status_code, headers, HTML_TYPE)
@@ -251,7 +246,7 @@ async def report_page_route(request: Request) -> Response:
 
 
 async def _report_page(request: Request) -> Response:
-    given = read(past_query.OfReportPage, request.query_params.multi_items(), PastRefused)
+    given = read(past_query.OfReportPage, request.query_params.multi_items())
     found = _report(request, given)
     name = given.time_zone or ""
     zone = zone_of(name) if name else None

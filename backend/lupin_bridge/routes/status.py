@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import io
 import math
-from hashlib import blake2b
 from itertools import islice
 from typing import Final
 
@@ -36,11 +35,10 @@ from lupin_bridge.routes.answers import (
     respond,
     respond_as_of,
 )
-from lupin_bridge.serving.admission import REVALIDATE, Answer
+from lupin_bridge.serving.admission import REVALIDATE, Answer, json_answer
 from lupin_bridge.stream import routes_schema, schema
 from lupin_bridge.stream.followers import robot_body
 from lupin_bridge.stream.state_json import alarms_body, header, judgement, stamp
-from lupin_twin.core.past import PastRefused
 from lupin_twin.field.explored import OccupancyMap
 
 # Grey of a free and of an occupied cell; unknown is transparent. The page decides what is below.
@@ -223,11 +221,10 @@ async def health(request: Request) -> Response:
 )
 async def sensors(request: Request) -> Response:
     """`sensors.json`, or the file that the operator gave instead, as it stands."""
-    body = bridge_of(request).criteria.sensors.text.encode()
-    etag = f'"{blake2b(body, digest_size=12).hexdigest()}"'
-    if has_etag(request, etag):
+    answer = json_answer(bridge_of(request).criteria.sensors.text.encode())
+    if has_etag(request, etag := answer.headers["ETag"]):
         return not_modified(etag)
-    return json_response(body, headers={"ETag": etag, **REVALIDATE})
+    return json_response(answer.body, headers=answer.headers)
 
 
 @read_route(
@@ -243,7 +240,7 @@ async def alarms_route(request: Request) -> Response:
     They follow from what was observed and the ranges of now, the same in every replica.
     """
     bridge = bridge_of(request)
-    given = read(past_query.OfAlarms, request.query_params.multi_items(), PastRefused)
+    given = read(past_query.OfAlarms, request.query_params.multi_items())
     span, active = given.span(bridge.ros_time_ns), given.active
     board = bridge.alarms.now
     alarms = board.active if active == "1" else board.alarms

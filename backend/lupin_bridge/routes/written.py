@@ -35,7 +35,6 @@ from lupin_bridge.routes.answers import (
     bridge_of,
     error_response,
     json_response,
-    list_header,
     person_of,
     read_body,
     read_route,
@@ -87,7 +86,7 @@ _WRITE_ANSWERS: Final = refusing(
 async def notes_route(request: Request) -> Response:
     """The newest first and 2,000 at most, withdrawn ones too; the same in every replica."""
     bridge = bridge_of(request)
-    given = read(past_query.OfNotes, request.query_params.multi_items(), PastRefused)
+    given = read(past_query.OfNotes, request.query_params.multi_items())
     start_ns, end_ns = given.span(bridge.ros_time_ns)
     notes = _known(bridge)
 
@@ -415,7 +414,7 @@ async def subscribe(request: Request) -> Response:
     if given.keys is None:
         await access.people.write(lambda it, _: it.remove_device(given.endpoint, person.name))
         return Response(status_code=204, headers=NEVER_STORE)
-    language = language_of(None, list_header(request, "accept-language"), languages())
+    language = language_of(request, languages())
     device = Device(given.endpoint, given.keys.p256dh, given.keys.auth, language)
     try:
         check_device(device, push.target)

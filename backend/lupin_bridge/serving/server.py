@@ -11,7 +11,7 @@ import resource
 import signal
 import socket
 import ssl
-from collections.abc import Callable, Iterator, MutableMapping
+from collections.abc import Callable, Iterator, MutableMapping, Sequence
 from contextlib import contextmanager
 from types import FrameType
 from typing import Any, Final, NoReturn
@@ -137,7 +137,7 @@ class BridgeServer(uvicorn.Server):
         self,
         app: FastAPI,
         settings: Settings,
-        announce_shutdown: Callable[[], None],
+        announcements: Sequence[Callable[[], None]],
         limits: Limits = Limits(),
     ) -> None:
         super().__init__(
@@ -159,7 +159,8 @@ class BridgeServer(uvicorn.Server):
                 timeout_graceful_shutdown=GRACEFUL_SHUTDOWN_S,
             )
         )
-        self._announce_shutdown = announce_shutdown
+        # Called first as it ends.
+        self._announcements = announcements
         # Connections that are being closed, and since when, s.
         self._closing_since_s: dict[Any, float] = {}
 
@@ -227,7 +228,8 @@ class BridgeServer(uvicorn.Server):
         uvicorn would wait a second for the answers under way and then cancel them, each with a
         trace in the log and a bare 500.
         """
-        self._announce_shutdown()
+        for announce in self._announcements:
+            announce()
         for connection in list(self.server_state.connections):
             if isinstance(connection, HttpConnection):
                 connection.end_waiting()

@@ -33,10 +33,6 @@ if TYPE_CHECKING:  # who only wants a moment as JSON does without
     from lupin_bridge.judge.judging import Judged
     from lupin_bridge.judge.verdict import Health, Reason
 
-# In place of a moment: that of the snapshot itself.
-OWN_TIME: Final = -1
-
-
 # It cannot occur inside a string: there the quotes of the key would be escaped.
 _NO_AGE: Final = b'"stale_seconds":null'
 
@@ -53,13 +49,8 @@ class StateJson:
         # What stands before a tag's age and behind it.
         self._cache: dict[str, tuple[TagState, bytes, bytes]] = {}
 
-    def state(self, snapshot: Snapshot, now_ns: int | None = OWN_TIME) -> bytes:
-        """The snapshot as JSON of `schema.TwinState`, ages as of `now_ns`, or of its own time.
-
-        None: now is not known, and no age is.
-        """
-        if now_ns == OWN_TIME:
-            now_ns = snapshot.now_ns
+    def state(self, snapshot: Snapshot, now_ns: int | None) -> bytes:
+        """The snapshot as JSON of `schema.TwinState`, its ages as of `now_ns`; None: not known."""
         return b'{"header":%b,"tags":[%b]}' % (
             orjson.dumps(header(snapshot.stamp_ns, snapshot.frame_id)),
             b",".join([self.tag(tag, now_ns) for tag in snapshot.tags]),

@@ -217,17 +217,17 @@ class Session:
         self._advertised = dict(channels)
         ended = [key for key, channel in self._subscriptions.items() if channel.id in gone]
         for key in ended:
-            self._end(key)
+            self.end(key)
         return Reaction(tuple(replies), ended=tuple(ended))
 
     def has(self, subscription_id: int, channel: Channel) -> bool:
         """Whether this subscription is open."""
         return self._subscriptions.get(subscription_id) is channel
 
-    def give_up(self, subscription_id: int) -> None:
-        """A subscription cannot be served after all."""
-        if subscription_id in self._subscriptions:
-            self._end(subscription_id)
+    def end(self, subscription_id: int) -> None:
+        """It is served no more; harmless if there is none."""
+        self._subscriptions.pop(subscription_id, None)
+        self._waiting.pop(subscription_id, None)
 
     def put(self, subscription_id: int, sample: Sample) -> bytes | None:
         """A message has come for a subscription; returns a reply, if there is something to say."""
@@ -235,7 +235,14 @@ class Session:
         if channel is None:
             return None
         if len(sample.data) > MAX_MESSAGE_BYTES:
-            return self._leave_out(channel, len(sample.data))
+            if channel.id in self._too_large:
+                return None  # said once
+            self._too_large.add(channel.id)
+            return status(
+                WARNING,
+                f"messages on {shown(channel.topic.name)} are left out while they are larger than "
+                f"{MAX_MESSAGE_BYTES} bytes: this one has {len(sample.data)}",
+            )
         self._counts.skipped += subscription_id in self._waiting
         # Behind the others that wait: one fast channel must not keep them from their turn.
         self._waiting.pop(subscription_id, None)
@@ -281,23 +288,9 @@ class Session:
     def _unsubscribe(self, ids: Sequence[int]) -> Reaction:
         ended = [key for key in dict.fromkeys(ids) if key in self._subscriptions]
         for key in ended:
-            self._end(key)
+            self.end(key)
         errors = [f"there is no subscription {key}" for key in ids if key not in ended]
         return Reaction(_errors(errors), ended=tuple(ended))
-
-    def _end(self, subscription_id: int) -> None:
-        del self._subscriptions[subscription_id]
-        self._waiting.pop(subscription_id, None)
-
-    def _leave_out(self, channel: Channel, size: int) -> bytes | None:
-        if channel.id in self._too_large:
-            return None  # said once
-        self._too_large.add(channel.id)
-        return status(
-            WARNING,
-            f"messages on {shown(channel.topic.name)} are left out while they are larger than "
-            f"{MAX_MESSAGE_BYTES} bytes: this one has {size}",
-        )
 
 
 def _errors(errors: list[str]) -> tuple[bytes, ...]:

@@ -254,7 +254,7 @@ class Feeds:
             has_come.set()
 
         try:
-            listening = await self._writer.relay.listen(feed.topic, take)
+            close = await self._writer.relay.listen(feed.topic, take)
         except (NotRelayedError, TwinUnavailableError) as error:
             await self._report(feed, str(error))
             return
@@ -267,7 +267,7 @@ class Feeds:
                     if feed.min_interval_s:
                         await asyncio.sleep(feed.min_interval_s)
         finally:
-            listening.close()
+            close()
 
     async def _send_sample(self, feed: Feed, sample: Sample) -> None:
         if len(sample.data) > MAX_MESSAGE_BYTES:

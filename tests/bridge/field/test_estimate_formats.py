@@ -3,6 +3,7 @@
 import io
 import json
 from dataclasses import replace
+from typing import Literal
 
 import numpy as np
 import pytest
@@ -21,7 +22,7 @@ SENSORS = Criteria.of(Settings()).sensors
 ESTIMATE = an_estimate(width=3, height=2)
 
 
-def written(field_format: FieldFormat, layer: str = "mean") -> bytes:
+def written(field_format: FieldFormat, layer: Literal["mean", "sd"] = "mean") -> bytes:
     return formats.write_estimate(
         ESTIMATE, field_format, EstimateQuery("co2", layer=layer), SENSORS
     )
@@ -57,7 +58,9 @@ def test_npy_is_mean_and_sd() -> None:
 
 
 @pytest.mark.parametrize(("layer", "highest"), [("mean", 24.0), ("sd", 2.0)])
-def test_a_picture_is_transparent_where_it_is_not_known(layer: str, highest: float) -> None:
+def test_a_picture_is_transparent_where_it_is_not_known(
+    layer: Literal["mean", "sd"], highest: float
+) -> None:
     field = formats.estimate_picture(ESTIMATE, layer)
     assert field.value_max == highest
     assert np.isnan(field.values).tolist() == [False] * 5 + [True]

@@ -46,7 +46,7 @@ def asked(
     rules: FieldRules = RULES, occupancy: OccupancyMap | None = None, **parameters: Any
 ) -> Field:
     values = {"sensor_type": "co2", **parameters}
-    query = read(FieldQuery, [(name, str(value)) for name, value in values.items()], FieldRefused)
+    query = read(FieldQuery, [(name, str(value)) for name, value in values.items()])
     return Field(None, query, None, rules, occupancy, CRITERIA)
 
 
@@ -80,7 +80,7 @@ def test_a_broken_sensor_is_no_part_of_a_field() -> None:
 
 
 def test_a_broken_sensor_is_no_part_of_an_estimate() -> None:
-    query = read(EstimateQuery, [("sensor_type", "co2")], FieldRefused)
+    query = read(EstimateQuery, [("sensor_type", "co2")])
     estimated = Estimated(5 * NS, query, JSON, RULES, None, CRITERIA, 86_400.0)
 
     def made_of(*readings: tuple[int, float]) -> str:

@@ -188,10 +188,7 @@ class Child:
             self._send(number, error is not None, error or done.result())
 
     def _send(self, number: int, is_error: bool, value: Any) -> None:
-        try:
-            answer = pickle.dumps((is_error, _portable(value) if is_error else value), 5)
-        except Exception as unfit:  # noqa: BLE001  # an answer of any kind may not be for pickling
-            answer = pickle.dumps((True, _portable(unfit)))
+        answer = pickle.dumps((is_error, _portable(value) if is_error else value), 5)
         # Whoever sends waits until the parent has taken it: so much is kept for it, and no more.
         with self._sending:
             self._out.writelines((HEAD.pack(number, len(answer)), answer))

@@ -40,7 +40,6 @@ STUCK_S: Final = 6.0
 _START_S: Final = 15.0
 _RETRY_S: Final = 1.0
 _POLL_S: Final = 0.5
-_MAX_SITES: Final = 20_000
 
 
 class Watching:
@@ -111,7 +110,7 @@ class Watching:
         known = {} if news.is_whole else self.sites
         sites = {name: site for name, site in known.items() if name not in news.gone}
         sites |= {site.site: site for site in news.sites}
-        self.sites = dict(sorted(sites.items())[:_MAX_SITES])
+        self.sites = dict(sorted(sites.items()))
         self.archive = Archive(is_reachable=True)
         self._on_news()
 

@@ -104,10 +104,6 @@ def test_what_it_meets_is_raised_here(path: Path, shared: Shared) -> None:
         assert "in _fail" in caught.value.__notes__[0], "where it was"
         with pytest.raises(RuntimeError, match=r"LocalError.*nobody's knowledge"):
             await past.ask(Failing("local"), now(path), 0.0)
-        with pytest.raises(AttributeError, match="Can't pickle"):
-            await past.ask(Failing("unfit"), now(path), 0.0)
-        with pytest.raises(ValueError, match="no number"):
-            await past.ask(Failing("unreadable"), now(path), 0.0)
         with pytest.raises(NotRemembered, match="is not there") as missing:
             await past.ask(Count(1), now(path.with_name("none")), 0.0)
         assert not missing.value.is_lasting

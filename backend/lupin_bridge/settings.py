@@ -27,6 +27,14 @@ class SettingError(ValueError):
     """A setting that cannot be; the message names it, its value and the limit."""
 
 
+UNIX: Final = "unix:"
+
+
+def unix_path(host: str) -> Path | None:
+    """The file of a Unix socket, if `host` names one: `unix:PATH`."""
+    return Path(host.removeprefix(UNIX)) if host.startswith(UNIX) else None
+
+
 _groups: list[str] = []
 
 
@@ -46,7 +54,10 @@ class Settings:
     """How the bridge serves, as `settings_from` found it right. Times are seconds."""
 
     host: Annotated[str, MinLen(1)] = _setting(
-        "127.0.0.1", "address to listen on; other machines need 0.0.0.0 or ::", group="listening"
+        "127.0.0.1",
+        "address to listen on; other machines need 0.0.0.0 or ::, and a reverse proxy of this "
+        "machine a Unix socket, such as unix:/run/lupin-twin/http.sock",
+        group="listening",
     )
     port: Annotated[int, Interval(ge=0, le=65_535)] = _setting(
         8000, "port to listen on; 0: any free one"

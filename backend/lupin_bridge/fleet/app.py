@@ -288,13 +288,7 @@ def create_fleet_app(
     static_folder: Path = STATIC_FOLDER,
 ) -> FastAPI:
     """The application around a fleet that its caller starts and stops."""
-    app = FastAPI(
-        title="lupin-twin fleet",
-        version=__version__,
-        docs_url=None,
-        redoc_url=None,
-        openapi_url=None,
-    )
+    app = FastAPI(title="lupin-twin fleet", version=__version__, openapi_url=None)
     app.state.access = access
     app.state.bridge = fleet
     add_refusals(app)

@@ -54,7 +54,7 @@ from lupin_twin.core.state import NANOSECONDS_PER_SECOND
 
 log = logging.getLogger(__name__)
 
-router = APIRouter()
+router = APIRouter(default_response_class=Response)
 
 MAX_LISTED: Final = 2_000
 MAX_AUDITED: Final = 2_000
@@ -111,7 +111,6 @@ async def notes_route(request: Request) -> Response:
     "/api/notes",
     summary="Acknowledge or shelve an alarm, or comment on something",
     status_code=201,
-    response_class=Response,
     responses={201: {"model": routes_schema.Note}, **_WRITE_ANSWERS},
     openapi_extra=taking(routes_schema.NoteDraft),
 )
@@ -133,7 +132,6 @@ async def write_note(request: Request) -> Response:
 @router.delete(
     "/api/notes/{note_id}",
     summary="Withdraw a note: it is kept, with who withdrew it and when",
-    response_class=Response,
     responses={200: {"model": routes_schema.Note}, **_WRITE_ANSWERS},
 )
 async def withdraw_note(request: Request, note_id: str) -> Response:
@@ -297,7 +295,6 @@ MAX_AHEAD_S: Final = 10
     OBSERVATIONS,
     summary="Post the readings of one tag: they reach the twin over ROS, as a robot's do",
     status_code=202,
-    response_class=Response,
     responses={
         202: {"model": routes_schema.PublishedObservation, "description": "published over ROS"},
         **refusing(
@@ -387,7 +384,6 @@ async def key_route(request: Request) -> Response:
     PUSH,
     summary="Have a browser notified of critical alarms, or not any more",
     status_code=204,
-    response_class=Response,
     responses={
         204: {"description": "done"},
         **refusing(

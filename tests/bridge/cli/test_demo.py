@@ -14,7 +14,7 @@ from lupin_bridge.cli.roles import (
     with_past,
 )
 from lupin_patrol.cli import parse as patrol_options
-from lupin_patrol.plants import SECONDS_PER_DAY
+from lupin_patrol.perception import SECONDS_PER_DAY
 from lupin_twin.core.parameters import World
 from tests.support.journal import CLOCK, NOW, kept, scan, select
 

@@ -1,4 +1,4 @@
-"""Messages of `adapt`: types by their names, scans as observations, what is said of a source."""
+"""Messages of `adapt`: types by their names, transforms, what is said of a source."""
 
 from __future__ import annotations
 
@@ -7,21 +7,11 @@ import time
 from dataclasses import dataclass, field
 from typing import Any, Final
 
-from geometry_msgs.msg import Point, Pose, Quaternion
-from lupin_msgs.msg import Observation, SensorReading
-from std_msgs.msg import Header
-
-from lupin_twin.adapt.config import Place
 from lupin_twin.adapt.frames import Transform
-from lupin_twin.adapt.scans import BuiltScan
 from lupin_twin.adapt.table import ConfigError
 from lupin_twin.core.diagnostics import OK, WARN, Finding
 from lupin_twin.core.drops import Tally
-from lupin_twin.ros import convert
 
-# Of a robot's visit, and of a sensor that stands at its tag.
-VISIT_SOURCE: Final = "adapt"
-FIXED_SOURCE: Final = "adapt/fixed"
 # Their packages have no wheels: they are looked up when they are wanted.
 TF_TYPE: Final = "tf2_msgs/msg/TFMessage"
 DETECTIONS_TYPE: Final = "apriltag_msgs/msg/AprilTagDetectionArray"
@@ -58,35 +48,6 @@ def transform_of(message: Any, stamp_ns: int | None) -> tuple[str, Transform]:
         (at.x, at.y, at.z),
         (turn.x, turn.y, turn.z, turn.w),
     )
-
-
-def observation(scan: BuiltScan, frame_id: str, source: str = "") -> Observation:
-    """A scan as lupin_msgs/Observation; without readings, a failed one.
-
-    Without a source, it is the adapter's own.
-    """
-    stamp = convert.time_msg(scan.stamp_ns)
-    message = Observation(
-        header=Header(stamp=stamp, frame_id=frame_id),
-        source=source or (FIXED_SOURCE if scan.is_fixed else VISIT_SOURCE),
-        kind=Observation.KIND_TAG_READING,
-        status=Observation.STATUS_OK if scan.readings else Observation.STATUS_SCAN_FAILED,
-        status_detail=scan.detail[:256],
-        tag_pose_in_map=pose_of(scan.place),
-    )
-    message.tag_reading.tag_id = scan.tag_id
-    message.tag_reading.stamp = stamp
-    message.tag_reading.readings = [
-        SensorReading(name=name, value=float(value)) for name, value in scan.readings
-    ]
-    return message
-
-
-def pose_of(place: Place | None) -> Pose:
-    """A place as a pose; of none, one that says so."""
-    if place is None:  # `w` is 1 in ROS 2 unless it is set: a pose at the origin
-        return Pose(orientation=Quaternion(x=0.0, y=0.0, z=0.0, w=0.0))
-    return Pose(position=Point(x=float(place.x), y=float(place.y), z=float(place.z)))
 
 
 # The source that all topics of the broker are.

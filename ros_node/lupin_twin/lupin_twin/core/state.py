@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Container, Iterable
 from dataclasses import dataclass, field, replace
-from typing import Literal, TypeVar, dataclass_transform
+from typing import Literal, Self, TypeVar, dataclass_transform
 
 from lupin_twin.core.drops import (
     MAX_BLOOMS_PER_TAG,
@@ -57,6 +57,11 @@ class Pose:
     qy: float
     qz: float
     qw: float
+
+    @classmethod
+    def at(cls, x: float, y: float, z: float = 0.0) -> Self:
+        """A place, m, turned by nothing."""
+        return cls(float(x), float(y), float(z), 0.0, 0.0, 0.0, 1.0)
 
     @property
     def is_finite(self) -> bool:

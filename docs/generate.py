@@ -23,7 +23,7 @@ from lupin_bridge.settings import CONFIG_VARIABLE, SECRETS, limits_of, option, t
 from lupin_patrol import cli as patrol_cli
 from lupin_twin.core import interfaces
 from lupin_twin.core.parameters import TwinParameters, describe
-from lupin_twin.ros.launch_arguments import ARGUMENTS
+from lupin_twin.ros.parameters import ARGUMENTS
 
 ROOT: Final = Path(__file__).resolve().parents[1]
 MESSAGES: Final = ROOT / "ros_node" / "lupin_msgs"

@@ -21,13 +21,15 @@ from rclpy.serialization import deserialize_message
 from std_msgs.msg import Header
 
 from lupin_twin.adapt.config import POSES, TAG_FRAME, Config, Robot, Sensor
-from lupin_twin.adapt.frames import FrameError, Frames, Sightings
 from lupin_twin.adapt.messages import (
     DETECTIONS_TYPE,
     MQTT,
     TF,
     TF_STATIC,
     TF_TYPE,
+    FrameError,
+    Frames,
+    Sightings,
     Source,
     message_type,
     transform_of,

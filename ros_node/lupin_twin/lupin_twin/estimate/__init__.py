@@ -3,8 +3,7 @@
 Pure: numpy and the standard library only.
 """
 
-from lupin_twin.estimate.cholesky import MAX_EXACT, PER_TAG
-from lupin_twin.estimate.cross_validation import Change, Place
+from lupin_twin.estimate.cholesky import MAX_EXACT, PER_TAG, Change, Place
 from lupin_twin.estimate.kernel import MAX_PER_TAG, Readings
 from lupin_twin.estimate.model import FitFailed, Model, fit
 from lupin_twin.estimate.posterior import EstimateGrid, Posterior

@@ -15,8 +15,19 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
-from lupin_twin.estimate.cholesky import MAX_EXACT, Factor, Neighbours, Solved, shared_out
-from lupin_twin.estimate.cross_validation import Change, Gain, LeftOut, Place, best_places, gap_of
+from lupin_twin.estimate.cholesky import (
+    MAX_EXACT,
+    Change,
+    Factor,
+    Gain,
+    LeftOut,
+    Neighbours,
+    Place,
+    Solved,
+    best_places,
+    gap_of,
+    shared_out,
+)
 from lupin_twin.estimate.kernel import Hyper, IntArray, Readings, Scale
 from lupin_twin.field.grid import BoolArray, CellGrid, FloatArray, cell_centres, grid_dimensions
 from lupin_twin.field.idw import Abandoned, never

@@ -81,7 +81,7 @@ from lupin_bridge.stream.frames import Status
 from lupin_bridge.stream.hub import Client, Hub
 from lupin_twin.core.journal_condition import UNKNOWN, Condition, JournalState
 from lupin_twin.core.past import PastRefused, seconds
-from lupin_twin.journal.queries import STRETCH_S, Export
+from lupin_twin.journal.received import STRETCH_S, Export
 from lupin_twin.runtime.workers import Workers
 
 _TIDY_S: Final = 5.0

@@ -20,7 +20,7 @@ from lupin_bridge.past.plans import Answered
 from lupin_twin.core.journal_condition import Condition, JournalState
 from lupin_twin.core.past import NotRemembered, PastRefused
 from lupin_twin.field.explored import OccupancyMap
-from lupin_twin.journal.queries import Export
+from lupin_twin.journal.received import Export
 from tests.support.domains import ros_env
 from tests.support.journal import NOW, SECOND, kept, scan
 from tests.support.looking import Body, Count, Dying, Endless, Failing, MapCells, Running

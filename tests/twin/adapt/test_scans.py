@@ -175,7 +175,7 @@ def test_mean_and_spread_are_the_definitions(values: list[float]) -> None:
     for value in values:
         read(scans, 1, value)
     (scan,) = move(scans, 2, 9.0)
-    assert scan.readings[0][1] == pytest.approx(statistics.fmean(values), abs=1e-6)
+    assert scan.readings[0].value == pytest.approx(statistics.fmean(values), abs=1e-6)
     spread = float(scan.status_detail.split("±")[1].split()[0])
     assert spread == pytest.approx(statistics.stdev(values), rel=0.06, abs=1e-6)
 

@@ -1,15 +1,23 @@
 # ruff: noqa: S608  # SQL is put together of constants
-"""What was received, write by write: behind a number, recently, in a period; copies left out."""
+"""What was received, write by write: behind a number, recently, in a period; copies left out.
+
+An export reads a stretch of time in one short transaction, so that a reader that takes an hour over
+ten million rows keeps the log from being put into the file for no longer than that.
+"""
 
 from __future__ import annotations
 
+import math
 import time
+from collections import deque
 from collections.abc import Iterable, Iterator
 from typing import Any, Final
 
 from lupin_twin.core.past import (
     MAX_SCANS,
     RECENT_COUNT,
+    NotRemembered,
+    PastRow,
     PastWrite,
     PastWrites,
     PeriodRequest,
@@ -21,10 +29,11 @@ from lupin_twin.core.past import (
 )
 from lupin_twin.core.state import sure_species
 from lupin_twin.journal.checking import WRITTEN
-from lupin_twin.journal.events import FROM_SCAN
+from lupin_twin.journal.hours import deleted_ns
+from lupin_twin.journal.queries import FROM_SCAN
 from lupin_twin.journal.rows import KIND_FLOWER, STATUS_OK, named_numbers, sensor_names
-from lupin_twin.journal.runs import Span, cut, runs, span_at, spans
-from lupin_twin.journal.schema import SiteLog
+from lupin_twin.journal.runs import Run, Span, cut, runs, span_at, spans, spans_within
+from lupin_twin.journal.schema import SiteLog, one_view
 
 # What an answer of so many writes takes, about, s.
 WRITES_S: Final = 0.05
@@ -182,3 +191,135 @@ def _of_inspections(rows: list[tuple[Any, ...]]) -> Iterator[PastWrite]:
     for seq, run, tag, stamp_ns, species, confidence, anomaly, bug_count in rows:
         seen = (sure_species(species, confidence), bool(anomaly), bug_count)
         yield PastWrite(seq, run, tag, stamp_ns, KIND_FLOWER, STATUS_OK, (), (), True, *seen)
+
+
+# --- an export -----------------------------------------------------------------------------------
+
+LOT: Final = 1_000
+# Readings that are read in one go, about, and what that costs, s.
+_STRETCH: Final = 40_000
+STRETCH_S: Final = 0.1
+_FIRST_STRETCH_NS: Final = 60 * 1_000_000_000
+_NOWHERE: Final = (math.nan, math.nan)
+_NO_READING: Final = (("", math.nan),)
+
+_EXPORTED: Final = f"SELECT stamp_ns, seq, tag, sensors, status, source, readings {FROM_SCAN}"
+_NEXT: Final = f"SELECT min(stamp_ns) {FROM_SCAN}"  # constants
+
+
+def rows(
+    connection: Any,
+    start_ns: int,
+    end_ns: int,
+    tag_id: str | None = None,
+    sensor_type: str | None = None,
+) -> Iterator[list[PastRow]]:
+    """Lots of at most `LOT` rows, see `Export`."""
+    export = Export(start_ns, end_ns, tag_id, sensor_type)
+    while True:
+        with one_view(connection):
+            found = export.step(connection)
+        if found is None:
+            return
+        yield from lots(found)
+
+
+def lots(found: list[PastRow]) -> Iterator[list[PastRow]]:
+    """Rows, `LOT` at a time."""
+    for first in range(0, len(found), LOT):
+        yield found[first : first + LOT]
+
+
+class Export:
+    """The rows of a period; None: of all tags; of all sensors, and of attempts without a reading.
+
+    Each step may be over another connection. An export that deleting has overtaken is not whole,
+    and does not look so.
+    """
+
+    def __init__(
+        self, start_ns: int, end_ns: int, tag_id: str | None, sensor_type: str | None
+    ) -> None:
+        self._period = (start_ns, end_ns)
+        self._tag_id = tag_id
+        self._sensor_type = sensor_type
+        self._spans: deque[Span] | None = None
+        self._at_ns = 0
+        self._length_ns = _FIRST_STRETCH_NS
+        self._run: Run | None = None
+        self._places: dict[str, tuple[float, float]] = {}
+        # The last stamp of each run that was deleted when the first row was given.
+        self._deleted_ns: dict[int, int] = {}
+        self._has_begun = False
+
+    def step(self, connection: Any) -> list[PastRow] | None:
+        """The rows of the next stretch of time, maybe none; None: that was all.
+
+        Raises:
+            NotRemembered: behind rows that were given, some are deleted since.
+
+        """
+        log = SiteLog(connection)
+        if self._spans is None:
+            self._spans = deque(spans_within(runs(log.execute), *self._period))
+        if not self._has_begun:
+            self._deleted_ns = {s.run.id: deleted_ns(log, s.run.id) for s in self._spans}
+        while self._spans and self._spans[0].end_ns <= self._at_ns:
+            self._spans.popleft()
+        return self._stretch(log, self._spans[0]) if self._spans else None
+
+    def _stretch(self, log: SiteLog, span: Span) -> list[PastRow]:
+        if self._run != span.run:
+            self._run, self._places = span.run, _places(log, span.run)
+        start_ns = max(self._at_ns, span.start_ns)
+        horizon_ns = deleted_ns(log, span.run.id)
+        if horizon_ns >= start_ns and horizon_ns > self._deleted_ns[span.run.id]:
+            why = "scans that come next were deleted while others were taken: begin again"
+            raise NotRemembered(why, is_lasting=False)
+        while True:
+            until_ns = min(start_ns + self._length_ns, span.end_ns)
+            # Of one stamp there are as many scans as there are.
+            limit = "" if self._length_ns == 1 else f" LIMIT {_STRETCH}"
+            scans = self._ask(log, _EXPORTED + limit, start_ns, until_ns)
+            read = sum(1 + scan[-1].count(",") for scan in scans)
+            if self._length_ns == 1 or read < _STRETCH:
+                break
+            self._length_ns = max(1, self._length_ns // 8)
+        self._at_ns = until_ns
+        if not scans:
+            ((next_ns,),) = self._ask(log, _NEXT, until_ns, span.end_ns)
+            self._at_ns = span.end_ns if next_ns is None else next_ns
+        more = _STRETCH / 4 / max(read, _STRETCH // 32)
+        self._length_ns = max(1, int(self._length_ns * more))
+        self._has_begun |= bool(scans)
+        return self._read(sorted(scans))
+
+    def _ask(self, log: SiteLog, sql: str, start_ns: int, end_ns: int) -> list[tuple[Any, ...]]:
+        assert self._run is not None
+        of_tag = "" if self._tag_id is None else " AND tag = :tag"
+        query = {"run": self._run.id, "tag": self._tag_id, "start": start_ns, "end": end_ns}
+        return list(log.execute(sql.replace("{tag}", of_tag), query).fetchall())
+
+    def _read(self, scans: list[tuple[Any, ...]]) -> list[PastRow]:
+        found: list[PastRow] = []
+        every = named_numbers((scan[3] for scan in scans), [scan[-1] for scan in scans])
+        for (stamp_ns, _, tag, _, status, source, _), (names, values) in zip(
+            scans, every, strict=True
+        ):
+            x, y = self._places.get(tag, _NOWHERE)
+            readings = zip(names, values, strict=True) if values else _NO_READING
+            found += [
+                PastRow(stamp_ns, tag, x, y, sensor, value, status, source)
+                for sensor, value in readings
+                if self._sensor_type in (None, sensor)
+            ]
+        return found
+
+
+def _places(log: SiteLog, run: Run) -> dict[str, tuple[float, float]]:
+    """Where tags are: what was known first holds, what was carried into the run before all."""
+    found = log.execute(
+        "SELECT tag, x, y FROM place WHERE site = :site AND run = :run ORDER BY seq DESC",
+        {"run": run.id},
+    )
+    return {tag: (x, y) for tag, x, y in found.fetchall()}

@@ -18,7 +18,6 @@ from threading import Thread
 from time import monotonic
 from typing import Any
 
-import rclpy
 from builtin_interfaces.msg import Time
 from geometry_msgs.msg import Point, Pose, PoseStamped, PoseWithCovarianceStamped, Quaternion
 from lupin_msgs.msg import DiscoveredTag, DiscoveredTags, Observation
@@ -26,7 +25,6 @@ from nav_msgs.msg import OccupancyGrid, Path
 from rclpy.duration import Duration
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
-from rclpy.signals import SignalHandlerOptions
 from sensor_msgs.msg import BatteryState
 from std_msgs.msg import Header
 
@@ -44,11 +42,16 @@ from lupin_patrol.mission import (
 from lupin_patrol.perception import Sighting
 from lupin_twin.core import interfaces
 from lupin_twin.core.state import STATUS_OK
-from lupin_twin.ros.base_node import NodeUtilities, end_spinning, latched, spin_until_shutdown
+from lupin_twin.ros.base_node import (
+    NodeUtilities,
+    end_spinning,
+    latched,
+    running_ros,
+    spin_until_shutdown,
+)
 from lupin_twin.ros.convert import nanoseconds, observation_message, pose_message
 from lupin_twin.ros.parameters import declare, naming, naming_own_parameters
 from lupin_twin.runtime import process
-from lupin_twin.runtime.process import remove_stale_shared_memory
 
 # A twin that already runs is discovered within this time. Without the wait the first observations
 # of a fast patrol would have left the latch before anyone could hear them.
@@ -152,11 +155,8 @@ def play(
 @contextmanager
 def _running_node(ros_arguments: list[str]) -> Iterator[PatrolNode]:
     """Start a node that listens (to /clock, to parameter services) in a thread of its own."""
-    rclpy.init(args=ros_arguments, signal_handler_options=SignalHandlerOptions.NO)
-    remove_stale_shared_memory(rclpy.get_default_context().get_domain_id())
-    executor = SingleThreadedExecutor()
-    try:
-        node = PatrolNode()
+    with running_ros(ros_arguments):
+        executor, node = SingleThreadedExecutor(), PatrolNode()
         executor.add_node(node)
         thread = Thread(
             target=spin_until_shutdown, args=(executor, node.utilities.report), name="ros"
@@ -168,8 +168,6 @@ def _running_node(ros_arguments: list[str]) -> Iterator[PatrolNode]:
             end_spinning(executor)
             thread.join()
             node.destroy_node()
-    finally:
-        rclpy.try_shutdown()
 
 
 def _stop_flag() -> Flag:

@@ -276,26 +276,19 @@ def self_report(reported: Iterable[Finding]) -> SelfReport:
         for number in range(1, MAX_PROBLEMS + 1)
         if (key := f"{_PROBLEM}{number}") in inputs
     )
-    if "drops" not in values:
-        return SelfReport(clock, journal=journal, origin=origin, input_problems=problems)
-    both = {**values["drops"], **values.get("queues", {})}
+    both = {**values.get("drops", {}), **values.get("queues", {})}
     dropped = {reason: _number(both, reason) for reason in _REASONS}
     recent = tuple(
         Recent(reason, _shown(both.get(_LAST + reason, "")), count)
         for reason in _REASONS
         if (count := _number(both, _RECENTLY + reason))
     )
-    return SelfReport(
-        clock,
-        Counts(
-            MappingProxyType({reason: count for reason, count in dropped.items() if count}),
-            _number(both, _ERRORS),
-            recent,
-        ),
-        journal,
-        origin,
-        problems,
+    counts = Counts(
+        MappingProxyType({reason: count for reason, count in dropped.items() if count}),
+        _number(both, _ERRORS),
+        recent,
     )
+    return SelfReport(clock, counts if "drops" in values else None, journal, origin, problems)
 
 
 def _journal(finding: Finding) -> Condition:

@@ -136,11 +136,6 @@ class Scan:
     mission: str = ""
     arrival_ns: int = 0
 
-    @property
-    def succeeded(self) -> bool:
-        """Whether the scan brought all it should."""
-        return self.status == STATUS_OK
-
 
 @value
 class Inspection:
@@ -287,7 +282,7 @@ class TwinStore:
                 readings[reading.name] = new
         check_length("readings of a tag", len(readings), MAX_SENSORS_PER_TAG)
         tag = replace(tag, readings=tuple(readings.values()), pose=tag.pose or scan.pose)
-        self._store_attempt(tag, scan, brought=scan.succeeded or bool(scan.readings))
+        self._store_attempt(tag, scan, brought=scan.status == STATUS_OK or bool(scan.readings))
 
     def record_inspection(self, inspection: Inspection) -> None:
         """Store an inspection: it replaces an earlier one, unless it failed; readings stay.

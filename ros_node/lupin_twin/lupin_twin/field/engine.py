@@ -17,7 +17,7 @@ from typing import Final, NamedTuple, Self
 
 import numpy as np
 
-from lupin_twin.core.drops import MAX_TEXT_LENGTH
+from lupin_twin.core.drops import too_long
 from lupin_twin.core.parameters import TwinParameters
 from lupin_twin.core.state import TagState, samples_of
 from lupin_twin.field.explored import OccupancyMap, explored_mask
@@ -41,10 +41,9 @@ MAX_BYTES: Final = 64_000_000
 DEFAULT_RESOLUTION_M: Final = 0.1
 
 # What computing takes, roughly and at worst: for each cell, and for each pair of a cell and a
-# sample that reaches it, at power 2 or any other.
+# sample that reaches it.
 _CELL_S: Final = 20e-9
-_PAIR_S: Final = 5e-9
-_POWER_PAIR_S: Final = 15e-9
+_PAIR_S: Final = 15e-9
 
 
 class FieldRefused(ValueError):
@@ -162,8 +161,7 @@ def cost_s(request: FieldRequest, samples: int, rules: FieldRules) -> float:
     width, height = check_request(request, rules.max_grid_cells)
     reach = 2.0 * max(rules.falloff_radius_m, rules.max_distance_m) / request.resolution
     pairs = samples * min(width, reach) * min(height, reach)
-    pair_s = _PAIR_S if rules.idw_power == 2.0 else _POWER_PAIR_S
-    return width * height * _CELL_S + pairs * pair_s
+    return width * height * _CELL_S + pairs * _PAIR_S
 
 
 def check_sensor_type(name: str) -> None:
@@ -175,10 +173,8 @@ def check_sensor_type(name: str) -> None:
     """
     if not name:
         raise FieldRefused("sensor_type is empty, must name a sensor")
-    if len(name) > MAX_TEXT_LENGTH:
-        raise FieldRefused(
-            f"sensor_type {name[:24]!r}… has {len(name)} characters, the limit is {MAX_TEXT_LENGTH}"
-        )
+    if why := too_long("sensor_type", name):
+        raise FieldRefused(why)
 
 
 def check_request(request: FieldRequest, max_grid_cells: int) -> tuple[int, int]:
@@ -323,12 +319,8 @@ def leave_one_out(
         Abandoned: `should_stop` was true.
 
     """
-    tag_ids: list[str] = []
-    samples: list[tuple[float, float, float]] = []
-    for tag in tags:
-        for sample in samples_of((tag,), sensor_type):
-            tag_ids.append(tag.tag_id)
-            samples.append(sample)
+    named = [(tag.tag_id, sample) for tag in tags for sample in samples_of((tag,), sensor_type)]
+    samples = [sample for _, sample in named]
     x, y, measured = sample_columns(samples)
     idw = PairwiseIdw(falloff_radius_m=falloff_radius_m, max_distance_m=max_distance_m, power=power)
     predicted = _predictions(x, y, measured, idw, should_stop)
@@ -344,7 +336,7 @@ def leave_one_out(
         unjudged=len(samples) - judged.size,
         rmse=math.hypot(*errors.tolist()) / math.sqrt(judged.size),
         worst=TagError(
-            tag_id=tag_ids[index],
+            tag_id=named[index][0],
             measured=float(measured[index]),
             predicted=float(predicted[index]),
             error=float(errors[worst]),

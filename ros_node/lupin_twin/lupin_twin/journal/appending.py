@@ -287,7 +287,7 @@ class Appender:
             series = group.series[names] = self.last_seq
             self._connection.execute(
                 "INSERT INTO series VALUES (?, ?, ?, ?, ?, ?)",
-                (LOCAL_SITE, series, run, tag, kind, json.dumps(names, separators=(",", ":"))),
+                (LOCAL_SITE, series, run, tag, kind, json_text(names)),
             )
         return series
 
@@ -300,25 +300,30 @@ def _own_ns(write: Scan | Inspection) -> int | None:
 def _numbers(values: Iterable[float]) -> str:
     """A JSON list; what is not finite is null."""
     text = ",".join(map(repr, values))
-    if "n" in text:  # nan, inf
-        finite = (float(value) if math.isfinite(value) else None for value in values)
-        return json.dumps(list(finite), separators=(",", ":"))
-    return f"[{text}]"
+    return json_text(list(map(_finite, values))) if "n" in text else f"[{text}]"  # nan, inf
+
+
+def _finite(value: float) -> float | None:
+    return value if math.isfinite(value) else None
+
+
+def json_text(values: Sequence[object]) -> str:
+    """A JSON list as the tables have it."""
+    return json.dumps(values, separators=(",", ":"))
 
 
 def _blooms(flower: Flower) -> str:
     """A JSON list of lists: x, y, z, height, species, confidence, anomaly."""
-    return json.dumps(
+    return json_text(
         [
             [
-                *json.loads(_numbers((bloom.x, bloom.y, bloom.z, bloom.height_m))),
+                *map(_finite, (bloom.x, bloom.y, bloom.z, bloom.height_m)),
                 bloom.species,
-                *json.loads(_numbers((bloom.confidence,))),
+                _finite(bloom.confidence),
                 int(bloom.anomaly),
             ]
             for bloom in flower.blooms
-        ],
-        separators=(",", ":"),
+        ]
     )
 
 

@@ -15,7 +15,7 @@ from functools import partial
 from pathlib import Path
 from typing import Final
 
-from lupin_twin.journal.retention import RETENTION_BYTES, RETENTION_NS, records
+from lupin_twin.journal.retention import RETENTION_BYTES, RETENTION_NS, pages_of, records
 from lupin_twin.journal.rows import sensor_names
 from lupin_twin.journal.runs import Run, runs
 from lupin_twin.journal.schema import (
@@ -186,10 +186,7 @@ def overview(connection: sqlite3.Connection, path: Path) -> Overview:
         sqlite3.Error: it cannot be read.
 
     """
-    pages, free, size = (
-        int(connection.execute(f"PRAGMA {name}").fetchone()[0])
-        for name in ("page_count", "freelist_count", "page_size")
-    )
+    pages, free, size = pages_of(connection)
     rows = {
         table: int(connection.execute(f"SELECT count(*) FROM {table}").fetchone()[0])
         for table in _COUNTED
@@ -204,7 +201,7 @@ def overview(connection: sqlite3.Connection, path: Path) -> Overview:
     return Overview(
         file_bytes=pages * size,
         free_bytes=free * size,
-        log_bytes=_size(path.with_name(path.name + "-wal")),
+        log_bytes=size_of(path.with_name(path.name + "-wal")),
         rows=rows,
         failures=int(failures),
         sensors=_sensors(connection),
@@ -220,7 +217,7 @@ def quarantined_beside(path: Path) -> tuple[tuple[str, int], ...]:
     """(name, bytes) of the damaged journals that were quarantined, the newest last."""
     prefix = f"{path.name}.damaged-"
     return tuple(
-        (file.name, _size(file))
+        (file.name, size_of(file))
         for file in sorted(path.parent.iterdir())
         if file.name.startswith(prefix) and not file.name.endswith(("-wal", "-shm"))
     )
@@ -253,7 +250,8 @@ def _extents(connection: sqlite3.Connection) -> tuple[RunExtent, ...]:
     )
 
 
-def _size(path: Path) -> int:
+def size_of(path: Path) -> int:
+    """Bytes of a file; 0: there is none."""
     try:
         return path.stat().st_size
     except FileNotFoundError:

@@ -16,7 +16,7 @@ from lupin_twin.core.parameters import World
 from lupin_twin.core.state import Write
 from lupin_twin.journal.appending import Appender, Stretch, copy_known, simulated
 from lupin_twin.journal.beside import Syncing, forwarded_seq
-from lupin_twin.journal.checking import find_damage
+from lupin_twin.journal.checking import find_damage, size_of
 from lupin_twin.journal.fold import Restored, copies, fold
 from lupin_twin.journal.notes import put_note
 from lupin_twin.journal.retention import (
@@ -120,9 +120,7 @@ class JournalFile:
     # --- opening ------------------------------------------------------------------------------
 
     def _is_damaged(self) -> bool:
-        if not self._path.exists() or not 0 < self._path.stat().st_size <= _CHECKED_BYTES:
-            return False
-        return find_damage(self._path) is not None
+        return 0 < size_of(self._path) <= _CHECKED_BYTES and find_damage(self._path) is not None
 
     def _quarantine(self) -> None:
         # Wall time, as whoever looks for the file reads it.
@@ -403,10 +401,7 @@ class JournalFile:
         return self._purges_before_ns is not None or self._is_shrinking
 
     def _log_bytes(self) -> int:
-        try:
-            return self._path.with_name(self._path.name + "-wal").stat().st_size
-        except FileNotFoundError:
-            return 0
+        return size_of(self._path.with_name(self._path.name + "-wal"))
 
     @contextmanager
     def _transaction(self) -> Iterator[None]:

@@ -169,7 +169,7 @@ def read(connection: sqlite3.Connection, after: int, most: int = MAX_ROWS) -> Lo
         for table, sql in _COUNTED.items():
             rows = log.execute(sql, {"after": after, "last": last}).fetchall()
             texts += [_text(table, row) for row in rows]
-    return Lot(_journal_id(log), tuple(texts), last, is_all)
+    return Lot(log.journal_id, tuple(texts), last, is_all)
 
 
 def write(path: Path, lot: Lot, complete_ns: int | None, behind: int = 0) -> Followed:
@@ -233,7 +233,7 @@ def followed(path: Path) -> Followed:
 def _followed(connection: sqlite3.Connection) -> Followed:
     log = SiteLog(connection)
     return Followed(
-        _journal_id(log),
+        log.journal_id,
         _last(connection),
         world_of(log),
         int(log.meta(_COMPLETE) or 0) or _newest(connection)[1],
@@ -287,11 +287,6 @@ def _up_to(connection: sqlite3.Connection, after: int) -> str:
 def _text(table: str, row: Iterable[Any]) -> str:
     _, *columns = row
     return json.dumps([table, *columns], separators=(",", ":"), ensure_ascii=False)
-
-
-def _journal_id(log: SiteLog) -> str:
-    """One log's name among logs: what was quarantined has another in its place."""
-    return log.meta("journal_id") or ""
 
 
 # --- into a file ----------------------------------------------------------------------------------

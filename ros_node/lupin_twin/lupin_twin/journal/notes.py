@@ -61,7 +61,7 @@ def put_note(log: SiteLog, number: int, note: Note) -> Note:
 def notes(connection: Any, request: NotesRequest) -> PastNotes:
     """What a log has of notes."""
     log = SiteLog(connection)
-    journal = log.meta("journal_id") or ""
+    journal = log.journal_id
     (count,) = log.execute(_COUNT).fetchone()
     if (journal, count) == (request.journal, request.count):
         return PastNotes(journal, count, None)

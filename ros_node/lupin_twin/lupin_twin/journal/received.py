@@ -95,7 +95,7 @@ def observed(connection: Any, request: PeriodRequest) -> PastWrites:
         found += _of_scans(log.execute(_SCANS_BETWEEN, query).fetchall())
         found += _of_inspections(log.execute(_INSPECTIONS_BETWEEN, query).fetchall())
     found.sort(key=lambda write: (write.stamp_ns, write.number))
-    return PastWrites(log.meta("journal_id") or "", _axis(axis), tuple(found), 0, is_all=True)
+    return PastWrites(log.journal_id, _axis(axis), tuple(found), 0, is_all=True)
 
 
 _SCANS_UP_TO: Final = (
@@ -155,7 +155,7 @@ def writes(connection: Any, request: WritesRequest) -> PastWrites:
     found = found[: request.max_count]
     last = max(newest, after) if is_all else found[-1].number
     axis = _axis(spans(runs(log.execute)))
-    return PastWrites(log.meta("journal_id") or "", axis, tuple(found), last, is_all)
+    return PastWrites(log.journal_id, axis, tuple(found), last, is_all)
 
 
 def _axis(found: Iterable[Span]) -> tuple[RunSpan, ...]:

@@ -65,7 +65,7 @@ def note_limits(connection: sqlite3.Connection, limits: Limits) -> None:
 
 def used_bytes(connection: sqlite3.Connection) -> int:
     """What is in use of the file."""
-    pages, free, size = _pages(connection)
+    pages, free, size = pages_of(connection)
     return (pages - free) * size
 
 
@@ -181,7 +181,7 @@ def _write_horizons(connection: sqlite3.Connection, last: int) -> None:
 
 def shrink_step(connection: sqlite3.Connection) -> bool:
     """Give some free pages back to the disk; returns whether there are more."""
-    pages, free, _ = _pages(connection)
+    pages, free, _ = pages_of(connection)
     spare = free - max(_FREE_PAGES, pages // 100)
     if spare <= 0:
         return False
@@ -190,7 +190,8 @@ def shrink_step(connection: sqlite3.Connection) -> bool:
     return spare > _PAGES
 
 
-def _pages(connection: sqlite3.Connection) -> tuple[int, int, int]:
+def pages_of(connection: sqlite3.Connection) -> tuple[int, int, int]:
+    """How many pages a file has, how many of them are free, and their size."""
     pages, free, size = (
         int(connection.execute(f"PRAGMA {name}").fetchone()[0])
         for name in ("page_count", "freelist_count", "page_size")

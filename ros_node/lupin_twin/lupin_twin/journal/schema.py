@@ -193,7 +193,7 @@ def _create(connection: sqlite3.Connection, path: Path) -> None:
     connection.execute("PRAGMA synchronous = FULL")
     connection.executescript(_NEW)
     connection.execute("PRAGMA journal_mode = WAL")
-    sync_folder(path.parent)
+    sync(path.parent)
 
 
 def empty_file() -> tuple[bytes, frozenset[int]]:
@@ -227,9 +227,9 @@ def one_view(connection: sqlite3.Connection) -> Iterator[None]:
         connection.rollback()  # does nothing where an interrupted statement has ended it
 
 
-def sync_folder(folder: Path) -> None:
-    """Make the names in a folder last."""
-    descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
+def sync(path: Path) -> None:
+    """Make a file last, or the names in a folder."""
+    descriptor = os.open(path, os.O_RDONLY)
     try:
         os.fsync(descriptor)
     finally:
@@ -370,6 +370,11 @@ class SiteLog:
         """A noted fact about the log as a whole, None where it is not noted."""
         found = self.execute(_META, {"key": key}).fetchone()
         return None if found is None else str(found[0])
+
+    @property
+    def journal_id(self) -> str:
+        """One log's name among logs: what was quarantined has another in its place."""
+        return self.meta("journal_id") or ""
 
     def _of_engine(self, sql: str) -> str:
         return sql if isinstance(self.connection, sqlite3.Connection) else _for_psycopg(sql)

@@ -68,8 +68,7 @@ class Pending:
         with self._lock:
             self._entries.append(entry)
             self._weight += weight(entry.row)
-            if self._weight > self._max_weight:
-                self._shed()
+            self._shed()
         if not self.arrived.is_set():
             self.arrived.set()
 
@@ -90,8 +89,7 @@ class Pending:
             self._taken = []
             self._entries.extendleft(reversed(entries))
             self._weight += sum(weight(entry.row) for entry in entries)
-            if self._weight > self._max_weight:
-                self._shed()
+            self._shed()
 
     def _shed(self) -> None:
         while self._weight > self._max_weight and len(self._entries) > 1:

@@ -10,12 +10,13 @@ import math
 import signal
 import time
 import traceback
-from collections.abc import Callable
-from contextlib import suppress
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, suppress
 from threading import Event, Thread, main_thread
 from time import sleep
 from typing import Any, Final
 
+import rclpy
 from rclpy.clock import Clock, ClockType
 from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.exceptions import InvalidHandle
@@ -23,12 +24,14 @@ from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.serialization import deserialize_message
+from rclpy.signals import SignalHandlerOptions
 
 from lupin_twin.core import ingest
 from lupin_twin.core.clock import Late
 from lupin_twin.core.diagnostics import MAX_PROBLEMS
 from lupin_twin.core.drops import LATE, LOST, Counts, Drop, Reason, Tally, Throttle
 from lupin_twin.core.interfaces import SERVICE_DEPTH, Topic
+from lupin_twin.core.parameters import ParameterError
 from lupin_twin.field.explored import OccupancyMap
 from lupin_twin.ros import convert
 from lupin_twin.ros.inputs import Input, TwinCount
@@ -375,6 +378,25 @@ def end_spinning(executor: Any) -> None:
     to run where nothing waits: in the spinning thread itself.
     """
     executor.create_task(executor.shutdown)
+
+
+@contextmanager
+def running_ros(args: Sequence[str] | None) -> Iterator[None]:
+    """ROS until the end of this; whoever calls it has blocked the signals.
+
+    Raises:
+        ParameterError: arguments that ROS cannot take.
+
+    """
+    try:
+        rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
+    except RuntimeError as error:  # the parent of all that rclpy raises for bad arguments
+        raise ParameterError(f"cannot start ROS: {error}") from error
+    process.remove_stale_shared_memory(rclpy.get_default_context().get_domain_id())
+    try:
+        yield
+    finally:
+        rclpy.try_shutdown()
 
 
 def run_until_signal(node: Any) -> int:

@@ -98,6 +98,10 @@ def report_request_message(request: ReportRequest) -> Any:
     )
 
 
+# Of a `TagCheck` and of the response.
+_NUMBERS: Final = ("measured", "expected", "expected_sd", "z", "offset")
+
+
 def report_response(report: Report) -> Any:
     """A report as GetEstimateReport.Response."""
     record, tags, places = report.record, report.tags, report.places
@@ -112,12 +116,8 @@ def report_response(report: Report) -> Any:
         week_scans=record.week.scans,
         week_inside=record.week.inside,
         tag_ids=[tag.tag_id for tag in tags],
-        measured=[tag.measured for tag in tags],
+        **{name: [getattr(tag, name) for tag in tags] for name in _NUMBERS},
         observed_at=[convert.time_msg(tag.observed_at_ns) for tag in tags],
-        expected=[tag.expected for tag in tags],
-        expected_sd=[tag.expected_sd for tag in tags],
-        z=[tag.z for tag in tags],
-        offset=[tag.offset for tag in tags],
         left_out=[tag.changed_since_ns is not None for tag in tags],
         changed_since=[convert.time_msg(tag.changed_since_ns or 0) for tag in tags],
         place_x=[place.x for place in places],

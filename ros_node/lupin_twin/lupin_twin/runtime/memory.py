@@ -201,7 +201,7 @@ class Memory:
     def _restore(self, restored: Restored) -> None:
         count = self._store.observation_count
         self._store.restore(restored.known.tags, restored.known.observed)
-        self.repeats.clear()
+        self.repeats = Repeats()
         for row in restored.rows:
             self.repeats.add(row)
         # From before what was handed over meanwhile, if it was earlier.

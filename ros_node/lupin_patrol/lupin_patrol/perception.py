@@ -204,8 +204,8 @@ class Sighting:
     tag: Tag
     species: str
     species_confidence: float
-    anomaly: bool
-    sightings: int
+    anomaly: bool = False
+    sightings: int = 0
 
 
 class TagDetector:
@@ -216,36 +216,24 @@ class TagDetector:
         self._tables = [table.rect for table in greenhouse.tables]
         self._plants = plants
         self._seed = seed
-        self._guesses: dict[str, tuple[str, float]] = {}
-        self._anomalies: dict[str, bool] = {}
-        self._counts: dict[str, int] = {}
+        self._seen: dict[str, Sighting] = {}
 
     def observe_from(self, position: Point, pass_index: int) -> bool:
         """Take one picture all around; returns whether it shows a tag for the first time."""
-        found = False
+        before = len(self._seen)
         for tag in self._greenhouse.tags:
-            if not self._in_view(tag, position):
-                continue
-            if tag.tag_id not in self._guesses:
-                self._guesses[tag.tag_id] = self._guess(tag)
-                self._counts[tag.tag_id] = 0
-                found = True
-            self._counts[tag.tag_id] += 1
-            self._anomalies[tag.tag_id] = self._plants.bugs(tag.tag_id, pass_index) > 0
-        return found
+            if self._in_view(tag, position):
+                known = self._seen.get(tag.tag_id) or Sighting(tag, *self._guess(tag))
+                self._seen[tag.tag_id] = replace(
+                    known,
+                    anomaly=self._plants.bugs(tag.tag_id, pass_index) > 0,
+                    sightings=known.sightings + 1,
+                )
+        return len(self._seen) > before
 
     def sightings(self) -> tuple[Sighting, ...]:
         """Return every tag discovered so far, the first one first."""
-        return tuple(
-            Sighting(
-                tag=self._greenhouse.tag(tag_id),
-                species=species,
-                species_confidence=confidence,
-                anomaly=self._anomalies[tag_id],
-                sightings=self._counts[tag_id],
-            )
-            for tag_id, (species, confidence) in self._guesses.items()
-        )
+        return tuple(self._seen.values())
 
     def _in_view(self, tag: Tag, position: Point) -> bool:
         face = (tag.edge[0] + tag.facing[0] * _PROUD_M, tag.edge[1] + tag.facing[1] * _PROUD_M)

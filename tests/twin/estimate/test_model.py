@@ -67,21 +67,6 @@ def test_the_day_s_course_bridges_an_outage_only_where_the_day_is_as_long_as_tol
     assert np.abs(off[0] - true).mean() > 1.0
 
 
-def test_what_cannot_be_is_refused() -> None:
-    day = a_day()
-    none = day.take(np.array([], dtype=np.int64))
-    with pytest.raises(ValueError, match="there are no readings"):
-        fit(none)
-    with pytest.raises(ValueError, match="there are no readings"):
-        model_of(Hyper(*[1.0] * 10)).posterior(none, 0.0)
-    newest_s = float(day.time_s.max())
-    model_of(Hyper(*[1.0] * 10)).posterior(day, newest_s)
-    with pytest.raises(ValueError, match=r"at_s is .*, the newest reading is of"):
-        model_of(Hyper(*[1.0] * 10)).posterior(day, newest_s - 1.0)
-    with pytest.raises(ValueError, match=r"day_length_s is 0.0, must be greater than 0"):
-        fit(day, day_length_s=0.0)
-
-
 @pytest.mark.parametrize("value", [3e38, -3e38, 1e-300])
 @pytest.mark.parametrize("metres", [0.0, 1e300])
 def test_numbers_at_the_end_of_what_there_is_make_an_estimate_or_say_so(

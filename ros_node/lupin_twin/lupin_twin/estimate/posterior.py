@@ -259,14 +259,8 @@ class Posterior:
 
         Each is the one where a single reading now, with those at the places before it, leaves the
         least error: the root of the mean variance at `over` (m, 2), m. It takes 8 k (k + m) bytes.
-
-        Raises:
-            ValueError: `over` is empty.
-
         """
         candidates, targets = (np.asarray(one, float).reshape(-1, 2) for one in (places, over))
-        if not len(targets):
-            raise ValueError("there is nowhere that a tag is to help")
         gains = []
         for solved, rows in self._around(np.vstack((candidates, targets))):
             of_candidates = candidates[rows[rows < len(candidates)]]

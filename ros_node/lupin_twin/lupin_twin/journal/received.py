@@ -42,14 +42,17 @@ _NEWEST: Final = "SELECT max(seq) FROM {} WHERE site = :site"
 _ARRIVAL: Final = (
     "SELECT seq, arrival_ns FROM scan WHERE site = :site AND seq > :after ORDER BY seq LIMIT 1"
 )
+_SCAN: Final = "SELECT seq, run, tag, stamp_ns, kind, status, sensors, readings"
+_INSPECTION: Final = (
+    "SELECT seq, run, tag, stamp_ns, species, confidence, anomaly, bug_count FROM look"
+)
 _SCANS: Final = (
-    "SELECT seq, run, tag, stamp_ns, kind, status, sensors, readings FROM scan JOIN series"
+    f"{_SCAN} FROM scan JOIN series"
     " ON series.site = scan.site AND series.series = scan.series"
     " WHERE scan.site = :site AND seq > :after AND is_copy = 0 ORDER BY seq LIMIT :count"
 )
 _INSPECTIONS: Final = (
-    "SELECT seq, run, tag, stamp_ns, species, confidence, anomaly, bug_count FROM look"
-    " WHERE site = :site AND seq > :after AND is_copy = 0 ORDER BY seq LIMIT :count"
+    f"{_INSPECTION} WHERE site = :site AND seq > :after AND is_copy = 0 ORDER BY seq LIMIT :count"
 )
 # Of each series, or tag, from the stamp on of the last that is recent. With a limit neither engine
 # makes the search part of the join, where PostgreSQL would do it again for each row.
@@ -67,21 +70,17 @@ _FIRST_INSPECTION: Final = _FIRST_RECENT.format(
 )
 _IN_TIME: Final = "r.is_copy = 0 AND r.stamp_ns <= :at AND r.stamp_ns >= s.first_ns"
 _RECENT_SCANS: Final = (
-    "SELECT r.seq, s.run, s.tag, r.stamp_ns, s.kind,"
-    f" r.status, s.sensors, r.readings FROM {_FIRST_SCAN}"
-    f" WHERE r.site = s.site AND r.series = s.series AND {_IN_TIME}"
+    f"{_SCAN} FROM {_FIRST_SCAN} WHERE r.site = s.site AND r.series = s.series AND {_IN_TIME}"
 )
 _RECENT_INSPECTIONS: Final = (
     "SELECT r.seq, r.run, r.tag, r.stamp_ns, r.species, r.confidence,"
     f" r.anomaly, r.bug_count FROM {_FIRST_INSPECTION}"
     f" WHERE r.site = s.site AND r.run = s.run AND r.tag = s.tag AND {_IN_TIME}"
 )
-_SCANS_BETWEEN: Final = (
-    "SELECT seq, run, tag, stamp_ns, kind, status, sensors, readings " + FROM_SCAN.format(tag="")
-)
+_SCANS_BETWEEN: Final = f"{_SCAN} {FROM_SCAN.format(tag='')}"
 _INSPECTIONS_BETWEEN: Final = (
-    "SELECT seq, run, tag, stamp_ns, species, confidence, anomaly, bug_count FROM look"
-    " WHERE site = :site AND run = :run AND stamp_ns >= :start AND stamp_ns < :end AND is_copy = 0"
+    f"{_INSPECTION} WHERE site = :site AND run = :run"
+    " AND stamp_ns >= :start AND stamp_ns < :end AND is_copy = 0"
 )
 
 
@@ -98,25 +97,13 @@ def observed(connection: Any, request: PeriodRequest) -> PastWrites:
     return PastWrites(log.journal_id, _axis(axis), tuple(found), 0, is_all=True)
 
 
-_SCANS_UP_TO: Final = (
-    "SELECT seq, run, tag, stamp_ns, kind, status, sensors, readings"
-    " FROM series AS s CROSS JOIN scan AS r WHERE s.site = :site AND run = :run AND kind = 0"
-    " AND r.site = s.site AND r.series = s.series AND stamp_ns >= :since AND stamp_ns <= :at"
-    " AND is_copy = 0 LIMIT :most"
-)
-
-
 def recent(connection: Any, request: RecentRequest) -> tuple[PastWrite, ...]:
     """What was recent at a moment."""
     log = SiteLog(connection)
     span = span_at(runs(log.execute), request.at_ns)
     if span is None:
         return ()
-    query = {
-        "run": span.run.id,
-        "at": request.at_ns,
-        "more": RECENT_COUNT - 1,
-    }
+    query = {"run": span.run.id, "at": request.at_ns, "more": RECENT_COUNT - 1}
     scans = log.execute(_RECENT_SCANS, query).fetchall()
     inspections = log.execute(_RECENT_INSPECTIONS, query).fetchall()
     return recent_of([*_of_scans(scans), *_of_inspections(inspections)], request.at_ns)
@@ -128,8 +115,9 @@ def scans(connection: Any, request: ScansRequest) -> tuple[PastWrite, ...]:
     span = span_at(runs(log.execute), request.at_ns)
     if span is None:
         return ()
-    query = {"run": span.run.id, "since": request.since_ns, "at": request.at_ns}
-    rows = log.execute(_SCANS_UP_TO, query | {"most": MAX_SCANS + 1}).fetchall()
+    query = {"run": span.run.id, "start": request.since_ns, "end": request.at_ns + 1}
+    sql = f"{_SCANS_BETWEEN} AND kind = 0 LIMIT {MAX_SCANS + 1}"
+    rows = log.execute(sql, query).fetchall()
     if len(rows) > MAX_SCANS:
         return ()
     wanted = {

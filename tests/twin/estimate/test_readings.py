@@ -1,5 +1,7 @@
 """What an estimate is made of: which readings count, how they are scaled."""
 
+import math
+
 import numpy as np
 import pytest
 from hypothesis import given

@@ -15,8 +15,8 @@ import orjson
 
 from lupin_bridge.judge.quantities import Sensor, Sensors
 from lupin_twin.core.state import TagState
-from lupin_twin.estimate import EstimateGrid
 from lupin_twin.estimate.engine import Estimate
+from lupin_twin.estimate.posterior import EstimateGrid
 from lupin_twin.field.engine import FieldRules, leave_one_out, painted_share
 from lupin_twin.field.grid import FieldGrid, far_off_tags
 from lupin_twin.field.idw import never

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 
-from lupin_twin.estimate import Model, Readings, fit
-from lupin_twin.estimate.kernel import Hyper, Scale
+from lupin_twin.estimate.kernel import Hyper, Readings, Scale
+from lupin_twin.estimate.model import Model, fit
 from tests.support import textbook_gp
 from tests.support.estimates import DAY_S, a_day, hypers, some_readings, spot_at, spots_of
 

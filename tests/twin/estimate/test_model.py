@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lupin_twin.estimate import FitFailed, Model, Readings, fit
-from lupin_twin.estimate.kernel import Hyper, Scale
+from lupin_twin.estimate.kernel import Hyper, Readings, Scale
+from lupin_twin.estimate.model import FitFailed, Model, fit
 from lupin_twin.estimate.posterior import INFLATION
 from tests.support import textbook_gp
 from tests.support.estimates import DAY_S, a_day, hypers, readings_of, some_readings, spots_of

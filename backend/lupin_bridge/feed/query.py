@@ -36,9 +36,8 @@ from lupin_twin.core.past import (
     check_moment,
 )
 from lupin_twin.journal.fold import latest, state_at
-from lupin_twin.journal.notes import notes
 from lupin_twin.journal.queries import series
-from lupin_twin.journal.received import Export, lots, observed, recent, scans, writes
+from lupin_twin.journal.received import Export, lots, notes, observed, recent, scans, writes
 from lupin_twin.runtime.journal_queries import Recall
 from lupin_twin.runtime.workers import ShouldStop
 

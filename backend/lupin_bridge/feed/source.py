@@ -27,8 +27,7 @@ from lupin_twin.core.past import NotRemembered, PastRow, PastWrites, WritesReque
 from lupin_twin.core.state import NANOSECONDS_PER_SECOND, Scan, Snapshot
 from lupin_twin.field.engine import FieldRules
 from lupin_twin.field.explored import OccupancyMap
-from lupin_twin.journal.notes import NOTES_S
-from lupin_twin.journal.received import STRETCH_S, WRITES_S, Export
+from lupin_twin.journal.received import NOTES_S, STRETCH_S, WRITES_S, Export
 from lupin_twin.runtime.estimates import Report, ReportRequest
 from lupin_twin.runtime.workers import Workers
 

@@ -48,7 +48,7 @@ def test_places_are_discovered_again() -> None:
     data = journal_messages.discovered([replace(pin("7"), stamp_ns=NOW - 1), half_turn])
     assert convert.nanoseconds(deserialize_message(data, DiscoveredTags).header.stamp) == NOW
     heard = convert.received_tags(deserialize_message(data, DiscoveredTags))
-    found = list(ingest.discoveries(heard, "map", lambda _: False))
+    found = list(ingest.discoveries(heard, "", "map", lambda _: False))
     assert found == [Pin("7", pin().pose), Pin("8", half_turn.pose)]
 
 

@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import pytest
@@ -9,7 +10,7 @@ import pytest
 from lupin_twin.core import ingest
 from lupin_twin.core.drops import MAX_TEXT_LENGTH, Drop, Reason
 from lupin_twin.core.history import Repeats
-from lupin_twin.core.ingest import Received, ReceivedTags
+from lupin_twin.core.ingest import Received
 from lupin_twin.core.state import Flower, Inspection, Pin, Pose, Reading, Scan, TwinStore
 from lupin_twin.ros.convert import pose_message, pose_of
 from tests.support.store import S, at
@@ -149,8 +150,8 @@ def test_a_discovery_pins_what_has_no_pose_yet_and_makes_no_other_pose() -> None
         asked.append(index)
         return at(math.nan if index == 3 else index)
 
-    heard = ReceivedTags("map", ["a", "b", "", "broken"], pose)
-    made = list(ingest.discoveries(heard, "map", is_pinned=lambda tag_id: tag_id == "a"))
+    heard = [(name, partial(pose, n)) for n, name in enumerate(["a", "b", "", "broken"])]
+    made = list(ingest.discoveries(heard, "map", "map", is_pinned=lambda tag_id: tag_id == "a"))
     assert made[0] == Pin("b", at(1.0))
     assert [drop.reason for drop in made[1:] if isinstance(drop, Drop)] == [
         Reason.TAG_ID,
@@ -160,8 +161,8 @@ def test_a_discovery_pins_what_has_no_pose_yet_and_makes_no_other_pose() -> None
 
 
 def test_a_discovery_in_another_frame_is_dropped_once_whatever_it_holds() -> None:
-    heard = ReceivedTags("odom", ["a", ""], lambda _: at(0.0))
-    [drop] = ingest.discoveries(heard, "map", is_pinned=lambda _: False)
+    heard = [("a", partial(at, 0.0)), ("", partial(at, 0.0))]
+    [drop] = ingest.discoveries(heard, "odom", "map", is_pinned=lambda _: False)
     assert isinstance(drop, Drop)
     assert drop.on("/t") == "dropped a message on /t: its frame is 'odom', expected 'map'"
 

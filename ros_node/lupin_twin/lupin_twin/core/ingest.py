@@ -7,7 +7,7 @@ Times are nanoseconds of ROS time, positions metres in the map frame.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
 from typing import Final
 
@@ -46,16 +46,9 @@ class Received:
     sent: Scan | Inspection | None
 
 
-@dataclass(frozen=True, slots=True)
-class ReceivedTags:
-    """Discovered tags as plain values; `pose(i)` is that of `tag_ids[i]`, as it was sent.
-
-    A producer publishes all tags again and again: no pose is made before it is needed.
-    """
-
-    frame_id: str
-    tag_ids: Sequence[str]
-    pose: Callable[[int], Pose]
+# Discovered tags, each with what makes its pose, as it was sent: a producer publishes all tags
+# again and again, and no pose is made before it is needed.
+ReceivedTags = Iterable[tuple[str, Callable[[], Pose]]]
 
 
 def observation(received: Received, frame_id: str, now_ns: int) -> Scan | Inspection | Drop:
@@ -90,17 +83,17 @@ def _cut(text: str) -> str:
 
 
 def discoveries(
-    received: ReceivedTags, frame_id: str, is_pinned: Callable[[str], bool]
+    received: ReceivedTags, own_frame_id: str, frame_id: str, is_pinned: Callable[[str], bool]
 ) -> Iterator[Pin | Drop]:
     """What discovered tags write, one by one: a pin each that `is_pinned` does not know by then."""
-    if dropped := wrong_frame(received.frame_id, frame_id):
+    if dropped := wrong_frame(own_frame_id, frame_id):
         yield dropped
         return
-    for index, tag_id in enumerate(received.tag_ids):
+    for tag_id, sent_pose in received:
         if dropped := no_tag_id(tag_id):
             yield dropped
         elif not is_pinned(tag_id):
-            pose = discovered_pose(received.pose(index))
+            pose = discovered_pose(sent_pose())
             yield (
                 Drop(Reason.POSE, "its pose is not finite", f"tag {tag_id[:_QUOTED]!r}")
                 if pose is None

@@ -20,7 +20,7 @@ from lupin_twin.core.history import KNOWN_BY_NOTHING, kind_of
 from lupin_twin.core.state import Flower, Inspection, Pin, Scan, Write
 from lupin_twin.journal.beside import Lock
 from lupin_twin.journal.hours import WrittenInspection, WrittenScan, count
-from lupin_twin.journal.notes import last_number
+from lupin_twin.journal.received import last_number
 from lupin_twin.journal.rows import (
     KIND_FLOWER,
     sensor_names,

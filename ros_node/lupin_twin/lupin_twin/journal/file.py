@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sqlite3
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from itertools import groupby
@@ -14,11 +14,12 @@ from typing import Final
 from lupin_twin.core.notes import Note
 from lupin_twin.core.parameters import World
 from lupin_twin.core.state import Write
+from lupin_twin.field.explored import OccupancyMap, text_of
 from lupin_twin.journal.appending import Appender, Stretch, copy_known, simulated
 from lupin_twin.journal.beside import Syncing, forwarded_seq
 from lupin_twin.journal.checking import find_damage, size_of
 from lupin_twin.journal.fold import Restored, copies, fold
-from lupin_twin.journal.notes import put_note
+from lupin_twin.journal.received import put_note
 from lupin_twin.journal.retention import (
     Limits,
     Stretches,
@@ -102,7 +103,7 @@ class JournalFile:
         self.unmet_limit = ""
         self._path = path
         self._limits = limits
-        self._map: object = None
+        self._map: OccupancyMap | None = None
         self._map_rests_until_s = 0.0
         self.quarantined = ""
         if is_sound is False or (is_sound is None and self._is_damaged()):
@@ -144,7 +145,6 @@ class JournalFile:
             self._purged_s = self._polled_s = 0.0
             self._purges_before_ns: int | None = None
             self._is_shrinking = False
-            self._kept: Stretches | None = None
             self._syncing = Syncing(self._path)
         except BaseException:  # whatever it was: nobody has this object, and could close it
             self._connection.close()
@@ -169,13 +169,13 @@ class JournalFile:
         set_meta(self._connection, ORIGIN, world.origin)
         set_meta(self._connection, DAY_LENGTH, world.day_length_s)
 
-    def put_map(self, floor: object, text_of: Callable[[], str]) -> None:
-        """Have the newest map in the file, by this call or one to come; empty: it is too large."""
+    def put_map(self, floor: OccupancyMap) -> None:
+        """Have the newest map in the file, by this call or one to come."""
         now_s = time.monotonic()
         if floor is self._map or now_s < self._map_rests_until_s:
             return
         self._map, self._map_rests_until_s = floor, now_s + _MAP_REST_S
-        text = text_of()
+        text = text_of(floor)
         if (get_meta(self._connection, MAP) or "") != text:
             set_meta(self._connection, MAP, text)
 
@@ -267,7 +267,6 @@ class JournalFile:
     def retain_run(self, run: Run) -> None:
         """Have the run in the file, as it was in another one that is gone."""
         if all(known.id != run.root for known in self._runs()):
-            self._kept = None
             with self._transaction():
                 begun_seq = self._appender.last_seq + 1
                 put_run(self._connection, Run(run.root, run.begun, begun_seq))
@@ -289,7 +288,6 @@ class JournalFile:
 
     def _go_on_with(self, run: int) -> None:
         """One run goes on; another, whose end nobody saw, ended with the last received in it."""
-        self._kept = None
         execute = self._connection.execute
         execute("UPDATE run SET ended_stamp_ns = NULL WHERE run = ?", (run,))
         for other in self._runs():
@@ -327,9 +325,6 @@ class JournalFile:
             for root, of_run in groupby(rows, lambda entry: entry[0].root):
                 written += self._appender.append(root, [row for _, row in of_run])
             self._appender.flush()
-        # What comes late may be of before the log.
-        if self._kept and any(row.stamp_ns < self._kept[0][0] for _, row in rows):
-            self._kept = None
         return written
 
     def put_note(self, note: Note) -> Note:
@@ -345,15 +340,12 @@ class JournalFile:
 
     def note_lost(self, run: Run, at_ns: int) -> None:
         """Have it in the file that some of what was received up to a moment never came here."""
-        self._kept = None
         with self._transaction():
             note_lost(self._connection, run.root, at_ns)
 
     def kept(self) -> Stretches:
         """Of which stretches of ROS time all is here."""
-        if self._kept is None:
-            self._kept = kept(self._connection)
-        return self._kept
+        return kept(self._connection)
 
     def size(self) -> int:
         """Bytes on the disk, the log included."""
@@ -394,7 +386,6 @@ class JournalFile:
                 if not purge_step(self._connection, self._limits, before_ns, forwarded):
                     self.unmet_limit = unmet_limit(self._connection, self._limits, before_ns)
                     self._purges_before_ns = None
-                self._kept = None
             self._is_shrinking = True
         else:
             self._is_shrinking = shrink_step(self._connection)

@@ -14,6 +14,7 @@ import math
 from array import array
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
+from functools import partial
 from typing import Any, Final
 
 import numpy as np
@@ -178,13 +179,8 @@ def received(msg: Any) -> Received:
 
 
 def received_tags(msg: Any) -> ReceivedTags:
-    """lupin_msgs/DiscoveredTags as values."""
-    tags = msg.tags
-    return ReceivedTags(
-        frame_id=msg.header.frame_id,
-        tag_ids=[tag.tag_id for tag in tags],
-        pose=lambda index: pose_of(tags[index].pose_in_map),
-    )
+    """The tags of lupin_msgs/DiscoveredTags as values."""
+    return ((tag.tag_id, partial(pose_of, tag.pose_in_map)) for tag in msg.tags)
 
 
 def _flower(msg: Any, confidence: float) -> Flower:

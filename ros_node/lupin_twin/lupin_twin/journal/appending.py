@@ -7,7 +7,6 @@ part of the same scan.
 
 from __future__ import annotations
 
-import json
 import math
 import sqlite3
 from collections.abc import Iterable, Sequence
@@ -31,6 +30,7 @@ from lupin_twin.journal.schema import (
     LOCAL_SITE,
     SiteLog,
     get_meta,
+    json_text,
     open_writer,
     set_meta,
     transaction,
@@ -305,11 +305,6 @@ def _numbers(values: Iterable[float]) -> str:
 
 def _finite(value: float) -> float | None:
     return value if math.isfinite(value) else None
-
-
-def json_text(values: Sequence[object]) -> str:
-    """A JSON list as the tables have it."""
-    return json.dumps(values, separators=(",", ":"))
 
 
 def _blooms(flower: Flower) -> str:

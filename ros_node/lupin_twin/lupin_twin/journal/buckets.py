@@ -147,10 +147,7 @@ class Buckets:
 
     def add(self, index: int, n: int, total: float, low: float, high: float) -> None:
         """Add some to a bucket."""
-        bucket = self._found.get(index)
-        if bucket is None:
-            self._found[index] = [n, total, low, high]
-            return
+        bucket = self._found.setdefault(index, [0, 0.0, low, high])
         bucket[0] += n
         bucket[1] += total
         bucket[2], bucket[3] = min(bucket[2], low), max(bucket[3], high)

@@ -31,7 +31,6 @@ from lupin_twin.journal.schema import (
 # A lot is one short read of the file: a check that takes minutes must not keep the log growing.
 _ROWS: Final = 5_000
 _MAX_STRUCTURE: Final = 100
-WRITTEN: Final = ("scan", "look")
 # What is wrong with rows behind :after up to :until, as (seq, tag).
 _WRONG: Final = {
     "scan": (

@@ -21,7 +21,6 @@ from typing import Any, Final, NamedTuple
 from lupin_twin.core.parameters import World
 from lupin_twin.core.past import HOUR_NS, Event
 from lupin_twin.journal.appending import PURGED_SEQ, Stretch, simulated
-from lupin_twin.journal.checking import WRITTEN
 from lupin_twin.journal.hours import DELETED, FORGOTTEN, TALLIED, count_rows
 from lupin_twin.journal.received import id_behind, number_of
 from lupin_twin.journal.retention import RECORD, Stretches, delete_recorded, kept, records
@@ -30,6 +29,7 @@ from lupin_twin.journal.schema import (
     DAY_LENGTH,
     LOCAL_SITE,
     ORIGIN,
+    WRITTEN,
     DamagedFile,
     SiteLog,
     get_meta,

@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Final
 
 from lupin_twin.core.past import HOUR_NS
-from lupin_twin.journal.appending import Appender, copy_known, json_text
+from lupin_twin.journal.appending import Appender, copy_known
 from lupin_twin.journal.beside import Lock
 from lupin_twin.journal.checking import Progress, find_all_damage
 from lupin_twin.journal.fold import copies
@@ -29,6 +29,7 @@ from lupin_twin.journal.schema import (
     APPLICATION_ID,
     LOCAL_SITE,
     DamagedFile,
+    json_text,
     open_named,
     open_writer,
     set_meta,

@@ -34,12 +34,11 @@ from lupin_twin.core.past import (
     recent_of,
 )
 from lupin_twin.core.state import sure_species
-from lupin_twin.journal.checking import WRITTEN
 from lupin_twin.journal.hours import deleted_ns
 from lupin_twin.journal.queries import FROM_SCAN
 from lupin_twin.journal.rows import KIND_FLOWER, STATUS_OK, named_numbers, sensor_names
 from lupin_twin.journal.runs import Run, Span, cut, runs, span_at, spans, spans_within
-from lupin_twin.journal.schema import SiteLog, one_view
+from lupin_twin.journal.schema import WRITTEN, SiteLog, one_view
 
 # What an answer of so many writes takes, about, s.
 WRITES_S: Final = 0.05

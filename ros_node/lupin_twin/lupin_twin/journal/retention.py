@@ -21,6 +21,7 @@ from lupin_twin.journal.hours import DELETED, FORGOTTEN, deleted_ns, extent
 from lupin_twin.journal.runs import runs, spans
 from lupin_twin.journal.schema import (
     LOCAL_SITE,
+    WRITTEN,
     SiteLog,
     get_meta,
     open_named,
@@ -120,7 +121,7 @@ def purge_step(
     """
     oldest = sorted(
         row
-        for table in ("scan", "look")
+        for table in WRITTEN
         for row in connection.execute(
             f"SELECT seq, arrival_ns FROM {table} WHERE site = ? ORDER BY seq LIMIT ?",  # noqa: S608
             (LOCAL_SITE, _ROWS),
@@ -136,7 +137,7 @@ def purge_step(
     if not last:
         return False
     _write_horizons(connection, last)
-    for table in ("scan", "look"):
+    for table in WRITTEN:
         connection.execute(
             f"DELETE FROM {table} WHERE site = ? AND seq <= ?",  # noqa: S608  # constants
             (LOCAL_SITE, last),
@@ -159,7 +160,7 @@ def _arrivals(connection: sqlite3.Connection, way: str) -> list[int]:
     """When the first (ASC) or last (DESC) scan and inspection were received that are there."""
     return [
         row[0]
-        for table in ("scan", "look")
+        for table in WRITTEN
         for row in connection.execute(
             f"SELECT arrival_ns FROM {table} WHERE site = ? ORDER BY seq {way} LIMIT 1",  # noqa: S608
             (LOCAL_SITE,),

@@ -20,12 +20,13 @@ from urllib.parse import quote
 
 from lupin_twin.core.past import HOUR_NS
 from lupin_twin.journal.appending import LAST_SEQ, PURGED_SEQ
-from lupin_twin.journal.checking import WRITTEN, delete_wrong
+from lupin_twin.journal.checking import delete_wrong
 from lupin_twin.journal.hours import DELETED, count_rows
 from lupin_twin.journal.schema import (
     FILE_ERRORS,
     LOCAL_SITE,
     PAGE_SIZE,
+    WRITTEN,
     SiteLog,
     empty_file,
     is_damage_error,

@@ -22,6 +22,7 @@ of bugs, and stretches of more than ten minutes without an attempt, in ns.
 
 from __future__ import annotations
 
+import json
 import os
 import re
 import sqlite3
@@ -36,6 +37,8 @@ from urllib.parse import quote
 APPLICATION_ID: Final = 0x4C55504A  # "LUPJ"
 VERSION: Final = 4
 LOCAL_SITE: Final = "local"
+# The tables of what was received.
+WRITTEN: Final = ("scan", "look")
 
 # A commit writes whole pages, and a commit is a few scans: measured, fewest bytes to the disk.
 PAGE_SIZE: Final = 1024
@@ -383,6 +386,11 @@ class SiteLog:
 @cache
 def _for_psycopg(sql: str) -> str:
     return _NAME.sub(r"%(\1)s", sql).replace("?", "%s")
+
+
+def json_text(values: Sequence[object]) -> str:
+    """A JSON list as the tables have it."""
+    return json.dumps(values, separators=(",", ":"))
 
 
 def get_meta(connection: sqlite3.Connection, key: str) -> str | None:

@@ -23,8 +23,8 @@ from dataclasses import dataclass
 from functools import partial
 from typing import IO, Any, Final, Generic, Protocol, TypeVar
 
+from lupin_twin.core.diagnostics import UNKNOWN, Condition
 from lupin_twin.core.history import LatestRequest
-from lupin_twin.core.journal_condition import UNKNOWN, Condition
 from lupin_twin.core.notes import NotesRequest
 from lupin_twin.core.past import (
     PastRow,

@@ -18,9 +18,8 @@ from typing import Any, Final, TypeVar
 from lupin_bridge.feed.past_process import PastProcess
 from lupin_bridge.feed.query import ExportStep, Itself, Now, PastQuery
 from lupin_bridge.feed.relay import Relay, TwinNames
-from lupin_twin.core.diagnostics import Origin
+from lupin_twin.core.diagnostics import UNKNOWN, Condition, Origin
 from lupin_twin.core.drops import Counts, Recent
-from lupin_twin.core.journal_condition import UNKNOWN, Condition
 from lupin_twin.core.notes import Note, NotesRequest, NotesUnwritable, PastNotes
 from lupin_twin.core.parameters import World
 from lupin_twin.core.past import NotRemembered, PastRow, PastWrites, WritesRequest

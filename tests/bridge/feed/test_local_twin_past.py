@@ -8,7 +8,7 @@ import pytest
 
 from lupin_bridge.feed.query import Itself
 from lupin_bridge.feed.source import TwinTimeoutError
-from lupin_twin.core.journal_condition import JournalState
+from lupin_twin.core.diagnostics import JournalState
 from lupin_twin.core.past import NotRemembered
 from lupin_twin.journal.runs import Clock
 from tests.bridge.feed.test_local import started

@@ -11,7 +11,7 @@ from typing import Any
 from lupin_bridge.judge.day import ClockDay
 from lupin_bridge.judge.options import Criteria, own_sensors
 from lupin_bridge.past.report import Report
-from lupin_twin.core.journal_condition import Condition, JournalState
+from lupin_twin.core.diagnostics import Condition, JournalState
 from lupin_twin.core.state import Scan, Write
 from lupin_twin.journal.schema import open_reader
 from tests.support.archive import Archive, forward_once

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from lupin_twin.core.journal_condition import JournalState
+from lupin_twin.core.diagnostics import JournalState
 from lupin_twin.core.notes import (
     ACKNOWLEDGE,
     MAX_NOTES,

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from lupin_twin.core.journal_condition import JournalState
+from lupin_twin.core.diagnostics import JournalState
 from lupin_twin.core.state import Write
 from lupin_twin.journal.file import JournalFile
 from lupin_twin.journal.retention import Limits

@@ -19,9 +19,9 @@ from pathlib import Path
 from typing import Final, NamedTuple
 
 from lupin_twin.core import ingest
+from lupin_twin.core.diagnostics import Condition
 from lupin_twin.core.drops import Drop
 from lupin_twin.core.history import Repeats
-from lupin_twin.core.journal_condition import Condition
 from lupin_twin.core.parameters import World
 from lupin_twin.core.state import Pin, TwinStore, Write
 from lupin_twin.journal.fold import Restored

@@ -11,7 +11,14 @@ from array import array
 from typing import Any, Final
 
 from lupin_msgs.msg import TwinState, TwinTimes
-from lupin_msgs.srv import GetEstimate, GetEstimateReport, GetHistory, GetStateAt, GetWrites
+from lupin_msgs.srv import (
+    GetEstimate,
+    GetEstimateReport,
+    GetField,
+    GetHistory,
+    GetStateAt,
+    GetWrites,
+)
 from std_msgs.msg import Header
 
 from lupin_twin.core.drops import MAX_TAGS
@@ -54,14 +61,14 @@ def field_request_of(msg: Any) -> FieldRequest:
     return FieldRequest(msg.sensor_type, **{name: float(getattr(msg, name)) for name in NUMBERS})
 
 
-def fill_response(response: Any, grid: FieldGrid) -> Any:
-    """Fill a GetField.Response from a grid, whose values are copied."""
-    response.ok = True
-    response.values = convert.floats(grid.values)
-    response.resolution_used = grid.resolution
-    for name in _SHARED:
-        setattr(response, name, getattr(grid, name))
-    return response
+def field_response(grid: FieldGrid) -> Any:
+    """A field as GetField.Response; its values are copied."""
+    return GetField.Response(
+        ok=True,
+        values=convert.floats(grid.values),
+        **{name: getattr(grid, name) for name in _SHARED},
+        resolution_used=grid.resolution,
+    )
 
 
 def estimate_request_of(msg: Any) -> EstimateRequest:

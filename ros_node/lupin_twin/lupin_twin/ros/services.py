@@ -69,36 +69,29 @@ class FieldService:
 
         """
         with naming("field_service_name", name):
-            node.create_service(
-                GetField, name, self._on_get_field, qos_profile=SERVICE_QOS, callback_group=group
-            )
+            plans = ((GetField, name, self._field),)
+            offer(node, group, plans, self.queue, self.utilities.report)
 
-    def _on_get_field(self, request: Any, response: Any) -> Any:
-        report = self.utilities.report
-        try:
-            wanted = convert_services.field_request_of(request)
-            rules, occupancy = self.rules(), self.occupancy()
-            check_request(wanted, rules.max_grid_cells)
-        except Exception as error:  # noqa: BLE001  # no client waits for ever
-            return refusal(response, error, report)
+    def _field(self, request: Any, reply: Callable[[Any], None]) -> Query | None:
+        wanted = convert_services.field_request_of(request)
+        rules, occupancy = self.rules(), self.occupancy()
+        check_request(wanted, rules.max_grid_cells)
         revision = None if occupancy is None else occupancy.revision
         key = FieldKey(wanted, self.store.observation_count, revision, rules)
         if (found := self.cache.get(key)) is not None:
-            return convert_services.fill_response(response, found)
+            reply(convert_services.field_response(found))
+            return None
         samples = self.store.samples_for_sensor(wanted.sensor_type)
         compute = partial(compute_field, wanted, samples, occupancy, rules)
         cost = cost_s(wanted, len(samples), rules)
 
-        def prepare(reply: Callable[[Any], None]) -> Query:
-            def keep(grid: Any) -> None:
-                if not isinstance(grid, Exception):
-                    self.cache.put(key, grid)
-                    grid = convert_services.fill_response(response, grid)
-                reply(grid)
+        def keep(grid: Any) -> None:
+            if not isinstance(grid, Exception):
+                self.cache.put(key, grid)
+                grid = convert_services.field_response(grid)
+            reply(grid)
 
-            return Query(partial(self.workers.submit, compute, cost), keep, cost_s=cost)
-
-        return answer_later(self.queue, prepare, response, report)
+        return Query(partial(self.workers.submit, compute, cost), keep, cost_s=cost)
 
 
 # What the message of a series takes at worst, s of one core; and that of all tags.
@@ -171,15 +164,29 @@ class PastService:
 def offer(
     node: Any,
     group: Any,
-    services: Iterable[tuple[Any, str, Callable[[Any, Callable[[Any], None]], Query]]],
+    services: Iterable[tuple[Any, str, Callable[[Any, Callable[[Any], None]], Query | None]]],
     queue: JobQueue,
     report: Report,
 ) -> None:
-    """Have `node` offer services: type, name, and what makes the query of `request` and `reply`."""
+    """Have `node` offer services: type, name, and what makes the query of `request` and `reply`.
+
+    None: there is none, for it has replied already.
+    """
     for kind, name, plan in services:
 
-        def answer(request: Any, response: Any, plan: Any = plan) -> Any:
-            return answer_later(queue, partial(plan, request), response, report)
+        def answer(request: Any, _: Any, kind: Any = kind, plan: Any = plan) -> Any:
+            later = Later()
+
+            def reply(found: Any) -> None:
+                is_error = isinstance(found, Exception)
+                later.answer(refusal(kind, found, report) if is_error else found)
+
+            try:
+                if (query := plan(request, reply)) is not None:
+                    queue.ask(query)
+            except Exception as error:  # noqa: BLE001  # no client waits for ever
+                return refusal(kind, error, report)
+            return later
 
         node.create_service(kind, name, answer, qos_profile=SERVICE_QOS, callback_group=group)
 
@@ -218,36 +225,13 @@ class Later:
             send(self._response)
 
 
-def answer_later(
-    queue: JobQueue,
-    prepare: Callable[[Callable[[Any], None]], Query],
-    response: Any,
-    report: Report,
-) -> Any:
-    """What a service's callback returns: the response to come of a query, or a `refusal`.
-
-    `prepare(reply)` makes the query, or raises.
-    """
-    later = Later()
-
-    def reply(answer: Any) -> None:
-        is_error = isinstance(answer, Exception)
-        later.answer(refusal(response, answer, report) if is_error else answer)
-
-    try:
-        queue.ask(prepare(reply))
-    except Exception as error:  # noqa: BLE001  # no client waits for ever
-        return refusal(response, error, report)
-    return later
-
-
-def refusal(response: Any, error: Exception, report: Report) -> Any:
-    """A fresh response of the same type, empty but for why; what nobody expected is reported."""
+def refusal(kind: Any, error: Exception, report: Report) -> Any:
+    """A response of a service that is empty but for why; what nobody expected is reported."""
     if isinstance(error, FieldRefused):
-        return type(response)(error_message=str(error))
+        return kind.Response(error_message=str(error))
     if not isinstance(error, PastRefused | NotRemembered):
-        report(type(response).__qualname__, error)
-    return type(response)(error_message=message_of(error))
+        report(kind.__qualname__, error)
+    return kind.Response(error_message=message_of(error))
 
 
 class _Unsent(NamedTuple):

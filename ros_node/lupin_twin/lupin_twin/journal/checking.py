@@ -31,31 +31,31 @@ from lupin_twin.journal.schema import (
 # A lot is one short read of the file: a check that takes minutes must not keep the log growing.
 _ROWS: Final = 5_000
 _MAX_STRUCTURE: Final = 100
+_NO_STAMP: Final = "typeof(stamp_ns) != 'integer' OR stamp_ns NOT BETWEEN 0 AND 4611686018427387904"
+_BEHIND: Final = "r.seq > :after AND r.seq <= :until AND r.site = :site"
 # What is wrong with rows behind :after up to :until, as (seq, tag).
 _WRONG: Final = {
     "scan": (
         "SELECT seq, tag FROM scan AS r LEFT JOIN series AS s"
         " ON s.site = r.site AND s.series = r.series"
-        " WHERE r.seq > :after AND r.seq <= :until AND r.site = :site AND (tag IS NULL"
+        f" WHERE {_BEHIND} AND (tag IS NULL"
         " OR CASE WHEN json_valid(sensors) AND json_valid(readings)"
         " THEN json_array_length(sensors) != json_array_length(readings)"
         " OR EXISTS (SELECT 1 FROM json_each(readings) WHERE type IN ('text', 'array', 'object'))"
-        " ELSE 1 END OR typeof(stamp_ns) != 'integer' OR typeof(status) != 'integer'"
-        " OR stamp_ns NOT BETWEEN 0 AND 4611686018427387904)"
+        f" ELSE 1 END OR typeof(status) != 'integer' OR {_NO_STAMP})"
     ),
     "look": (
         "SELECT seq, tag FROM look AS r LEFT JOIN run ON run.site = r.site AND run.run = r.run"
-        " WHERE r.seq > :after AND r.seq <= :until AND r.site = :site AND (run.run IS NULL"
+        f" WHERE {_BEHIND} AND (run.run IS NULL"
         " OR CASE WHEN json_valid(blooms) AND json_valid(box)"
         " THEN EXISTS (SELECT 1 FROM json_each(blooms) WHERE json_array_length(value) != 7)"
         " OR EXISTS (SELECT 1 FROM json_each(box) WHERE json_array_length(value) != 3)"
-        " ELSE 1 END OR typeof(stamp_ns) != 'integer' OR typeof(bug_count) != 'integer'"
-        " OR stamp_ns NOT BETWEEN 0 AND 4611686018427387904)"
+        f" ELSE 1 END OR typeof(bug_count) != 'integer' OR {_NO_STAMP})"
     ),
     "place": (
         "SELECT seq, tag FROM place AS r LEFT JOIN run ON run.site = r.site AND run.run = r.run"
-        " WHERE r.seq > :after AND r.seq <= :until AND r.site = :site"
-        " AND (run.run IS NULL OR typeof(stamp_ns) != 'integer' OR typeof(x + y + qw) != 'real')"
+        f" WHERE {_BEHIND} AND (run.run IS NULL OR typeof(x + y + qw) != 'real'"
+        f" OR {_NO_STAMP})"
     ),
 }
 

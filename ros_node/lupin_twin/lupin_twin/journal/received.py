@@ -325,7 +325,7 @@ _OURS: Final = re.compile(rf"[0-9a-f]{{{_DIGITS}}}", re.ASCII)
 # No log counts so far; SQLite counts to twice that.
 _MOST: Final = 2**62
 _COUNT: Final = "SELECT count(*) FROM note WHERE site = :site"
-_NEWEST: Final = (
+_NEWEST_NOTES: Final = (
     "SELECT id, made_at_ns, made_by, kind, subject, text, until_ns FROM note WHERE site = :site"
     " ORDER BY made_at_ns DESC, id DESC LIMIT :most"
 )
@@ -370,7 +370,7 @@ def notes(connection: Any, request: NotesRequest) -> PastNotes:
     (count,) = log.execute(_COUNT).fetchone()
     if (journal, count) == (request.journal, request.count):
         return PastNotes(journal, count, None)
-    rows = log.execute(_NEWEST, {"most": MAX_NOTES}).fetchall()
+    rows = log.execute(_NEWEST_NOTES, {"most": MAX_NOTES}).fetchall()
     found = sorted((Note(*row) for row in rows), key=lambda note: note.id)
     return PastNotes(journal, count, tuple(found))
 

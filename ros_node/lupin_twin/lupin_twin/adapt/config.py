@@ -174,9 +174,7 @@ def _robot(table: Table) -> Robot:
 
 
 def _detections(table: Table) -> Detections:
-    detections = Detections(
-        table.text("topic"), table.text("name") if table.has("name") else TAG_FRAME
-    )
+    detections = Detections(table.text("topic"), table.text("name", TAG_FRAME))
     table.end()
     if "{id}" not in detections.name:
         raise ConfigError(

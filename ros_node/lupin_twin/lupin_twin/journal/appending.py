@@ -143,24 +143,18 @@ class Appender:
     def _put_scan(self, run: int, tag: str, scan: Scan | Inspection, is_copy: int) -> bool:
         """A scan, or an attempt of either kind that failed."""
         kind = kind_of(scan)
-        group = self._group(run, tag, kind)
         sent = scan.readings if isinstance(scan, Scan) else ()
         readings = {_unicode(reading.name): reading.value for reading in sent}
         stamp_ns, own_ns, source = scan.stamp_ns, _own_ns(scan), _unicode(scan.source)
-        key = own_ns or stamp_ns
-        if is_copy or key > group.newest_ns:
-            group.newest_ns = max(group.newest_ns, key)
-        else:
-            self.flush()
-            known = self._known((run, tag, kind), key, source)
-            if known is not None:
-                known_ns, own_ns, sensors = known
-                stamp_ns = min(stamp_ns, known_ns)
-                readings = {name: value for name, value in readings.items() if name not in sensors}
-                if not readings:
-                    return False
+        known = self._known((run, tag, kind), own_ns or stamp_ns, source, is_copy)
+        if known is not None:
+            known_ns, own_ns, sensors = known
+            stamp_ns = min(stamp_ns, known_ns)
+            readings = {name: value for name, value in readings.items() if name not in sensors}
+            if not readings:
+                return False
         self.last_seq += 1
-        series = self._series(group, run, tag, kind, tuple(readings))
+        series = self._series((run, tag, kind), tuple(readings))
         values = list(readings.values())
         self._waiting["scan"].append(
             (
@@ -184,16 +178,12 @@ class Appender:
     def _put_inspection(
         self, run: int, tag: str, inspection: Inspection, flower: Flower, is_copy: int
     ) -> bool:
-        group = self._group(run, tag, KIND_FLOWER)
+        at = (run, tag, KIND_FLOWER)
         source, key = _unicode(inspection.source), inspection.own_stamp_ns or inspection.stamp_ns
-        if is_copy or key > group.newest_ns:
-            group.newest_ns = max(group.newest_ns, key)
-        else:
-            self.flush()
-            if self._known((run, tag, KIND_FLOWER), key, source) is not None:
-                return False
+        if self._known(at, key, source, is_copy) is not None:
+            return False
         self.last_seq += 1
-        self._series(group, run, tag, KIND_FLOWER, ())
+        self._series(at, ())
         self._waiting["look"].append(
             (
                 self.last_seq,
@@ -225,10 +215,14 @@ class Appender:
     # --- what is there already ----------------------------------------------------------------
 
     def _known(
-        self, at: tuple[int, str, int], key: int, source: str
+        self, at: tuple[int, str, int], key: int, source: str, is_copy: int
     ) -> tuple[int, int | None, set[str]] | None:
         """The stamps of the write that is known by `key`, and its sensors; None: there is none."""
-        run, tag, kind = at
+        (run, tag, kind), group = at, self._group(at)
+        if is_copy or key > group.newest_ns:
+            group.newest_ns = max(group.newest_ns, key)
+            return None
+        self.flush()
         query = {
             "site": LOCAL_SITE, "run": run, "tag": tag, "key": key, "source": source, "series": 0,
         }  # fmt: skip
@@ -237,7 +231,7 @@ class Appender:
             return 0, None, set()
         stamps: tuple[int, int | None] | None = None
         sensors: set[str] = set()
-        for names, series in self._group(run, tag, kind).series.items():
+        for names, series in group.series.items():
             query["series"] = series
             found = execute(_KNOWN_SCAN, query).fetchone()
             if found is not None:
@@ -245,13 +239,13 @@ class Appender:
                 sensors.update(names)
         return None if stamps is None else (*stamps, sensors)
 
-    def _group(self, run: int, tag: str, kind: int) -> _Group:
-        group = self._groups.get((run, tag, kind))
+    def _group(self, at: tuple[int, str, int]) -> _Group:
+        group = self._groups.get(at)
         if group is None:
             if len(self._groups) >= _MAX_AT_HAND:
                 self.flush()
                 self._groups.clear()
-            group = self._groups[run, tag, kind] = self._look_up(run, tag, kind)
+            group = self._groups[at] = self._look_up(*at)
         return group
 
     def _look_up(self, run: int, tag: str, kind: int) -> _Group:
@@ -280,14 +274,15 @@ class Appender:
             max(stamp_ns for stamp_ns in newest if stamp_ns is not None),
         )
 
-    def _series(self, group: _Group, run: int, tag: str, kind: int, names: tuple[str, ...]) -> int:
+    def _series(self, at: tuple[int, str, int], names: tuple[str, ...]) -> int:
         """The series of a write, the newest one, which is its first if there is none."""
-        series = group.series.get(names)
+        of_group = self._group(at).series
+        series = of_group.get(names)
         if series is None:
-            series = group.series[names] = self.last_seq
+            series = of_group[names] = self.last_seq
             self._connection.execute(
                 "INSERT INTO series VALUES (?, ?, ?, ?, ?, ?)",
-                (LOCAL_SITE, series, run, tag, kind, json_text(names)),
+                (LOCAL_SITE, series, *at, json_text(names)),
             )
         return series
 

@@ -121,11 +121,9 @@ class FieldKey(NamedTuple):
 
 
 class FieldCache:
-    """An LRU of at most `max_entries` fields whose values take at most `max_bytes` together."""
+    """An LRU of at most `MAX_ENTRIES` fields whose values take at most `MAX_BYTES` together."""
 
-    def __init__(self, max_bytes: int = MAX_BYTES, max_entries: int = MAX_ENTRIES) -> None:
-        self.max_bytes = max_bytes
-        self.max_entries = max_entries
+    def __init__(self) -> None:
         self.bytes = 0
         self._grids: OrderedDict[FieldKey, FieldGrid] = OrderedDict()
 
@@ -141,14 +139,14 @@ class FieldCache:
 
     def put(self, key: FieldKey, grid: FieldGrid) -> None:
         """Cache `grid`, dropping the least recently used; not one past the whole bound."""
-        if grid.values.nbytes > self.max_bytes:
+        if grid.values.nbytes > MAX_BYTES:
             return
         replaced = self._grids.pop(key, None)
         if replaced is not None:
             self.bytes -= replaced.values.nbytes
         self._grids[key] = grid
         self.bytes += grid.values.nbytes
-        while len(self._grids) > self.max_entries or self.bytes > self.max_bytes:
+        while len(self._grids) > MAX_ENTRIES or self.bytes > MAX_BYTES:
             _, dropped = self._grids.popitem(last=False)
             self.bytes -= dropped.values.nbytes
 

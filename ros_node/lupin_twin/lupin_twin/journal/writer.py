@@ -52,9 +52,8 @@ class Pending:
     What is newest is what a twin that starts again needs.
     """
 
-    def __init__(self, max_weight: int = MAX_WEIGHT) -> None:
+    def __init__(self) -> None:
         self.arrived = threading.Event()
-        self._max_weight = max_weight
         self._lock = threading.Lock()
         self._entries: deque[Entry] = deque()
         self._weight = 0
@@ -91,7 +90,7 @@ class Pending:
             self._shed()
 
     def _shed(self) -> None:
-        while self._weight > self._max_weight and len(self._entries) > 1:
+        while self._weight > MAX_WEIGHT and len(self._entries) > 1:
             lost = self._entries.popleft()
             self._weight -= weight(lost.row)
             self._lost += 1
@@ -151,7 +150,6 @@ class Journal:
         path: Path,
         holder: str,
         limits: Limits,
-        max_weight: int = MAX_WEIGHT,
         *,
         world: World = World(),
         is_temporary: bool = False,
@@ -161,7 +159,7 @@ class Journal:
         self._world = world
         self._limits = limits
         self._is_temporary = is_temporary
-        self._pending = Pending(max_weight)
+        self._pending = Pending()
         self._notes = NoteQueue()
         self._map: OccupancyMap | None = None
         self._eras: list[_Era] = []

@@ -6,11 +6,12 @@ from collections.abc import Sequence
 from typing import NoReturn
 
 from lupin_twin.runtime import process
+from lupin_twin.runtime.process import limit_blas_threads
 
 
 def main(args: Sequence[str] | None = None) -> int:
     """Run the twin until a signal ends it; returns the exit code, 1 if its thread has died."""
-    process.limit_blas_threads()
+    limit_blas_threads()
     process.return_large_blocks()
     process.block()  # before anything slow is imported
     from lupin_twin.core.parameters import ParameterError  # noqa: PLC0415  # see above

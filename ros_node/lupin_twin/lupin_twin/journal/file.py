@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sqlite3
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from itertools import groupby
@@ -14,7 +14,6 @@ from typing import Final
 from lupin_twin.core.notes import Note
 from lupin_twin.core.parameters import World
 from lupin_twin.core.state import Write
-from lupin_twin.field.explored import OccupancyMap, text_of
 from lupin_twin.journal.appending import Appender, Stretch, copy_known, simulated
 from lupin_twin.journal.beside import Syncing, forwarded_seq
 from lupin_twin.journal.checking import find_damage, size_of
@@ -103,7 +102,7 @@ class JournalFile:
         self.unmet_limit = ""
         self._path = path
         self._limits = limits
-        self._map: OccupancyMap | None = None
+        self._map: object = None
         self._map_rests_until_s = 0.0
         self.quarantined = ""
         if is_sound is False or (is_sound is None and self._is_damaged()):
@@ -169,13 +168,13 @@ class JournalFile:
         set_meta(self._connection, ORIGIN, world.origin)
         set_meta(self._connection, DAY_LENGTH, world.day_length_s)
 
-    def put_map(self, floor: OccupancyMap) -> None:
-        """Have the newest map in the file, by this call or one to come."""
+    def put_map(self, floor: object, text_of: Callable[[], str]) -> None:
+        """Have the newest map in the file, by this call or one to come; empty: it is too large."""
         now_s = time.monotonic()
         if floor is self._map or now_s < self._map_rests_until_s:
             return
         self._map, self._map_rests_until_s = floor, now_s + _MAP_REST_S
-        text = text_of(floor)
+        text = text_of()
         if (get_meta(self._connection, MAP) or "") != text:
             set_meta(self._connection, MAP, text)
 

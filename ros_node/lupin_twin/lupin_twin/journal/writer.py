@@ -14,6 +14,7 @@ from collections import deque
 from collections.abc import Sequence
 from concurrent.futures import Future
 from dataclasses import replace
+from functools import partial
 from itertools import islice
 from pathlib import Path
 from typing import Any, Final, NamedTuple
@@ -22,7 +23,7 @@ from lupin_twin.core.diagnostics import Condition, JournalState
 from lupin_twin.core.notes import Note
 from lupin_twin.core.parameters import World
 from lupin_twin.core.state import Write
-from lupin_twin.field.explored import OccupancyMap
+from lupin_twin.field.explored import OccupancyMap, text_of
 from lupin_twin.journal.beside import InUse, Lock
 from lupin_twin.journal.file import JournalFile
 from lupin_twin.journal.fold import Restored
@@ -310,7 +311,7 @@ class Journal:
                 self._write(file, all_that_waits=is_last)
                 self._notes.write(file.put_note)
                 if self._map is not None:
-                    file.put_map(self._map)
+                    file.put_map(self._map, partial(text_of, self._map))
                 has_more = not is_last and file.check_size(may_purge=bool(self._runs))
                 self._unmet_limit = file.unmet_limit
                 self._report_well(file)

@@ -20,7 +20,7 @@ SKIPPED = 3
 READINGS = (Reading("co2", 1.0),)
 
 
-SENT = {"pose": at(1.0, 2.0), "source": "robot", "own_stamp_ns": 4 * S}
+SENT: dict[str, Any] = {"pose": at(1.0, 2.0), "source": "robot", "own_stamp_ns": 4 * S}
 
 
 def heard_reading(tag_id: str = "1", frame_id: str = "map", **changes: Any) -> Received:

@@ -213,7 +213,8 @@ def flower_of(row: Sequence[Any]) -> Flower:
 
 def _bloom(*of: Any) -> Bloom:
     *at, species, confidence, anomaly = of
-    return Bloom(*map(_number, at), species, _number(confidence), bool(anomaly))
+    x, y, z, height_m = map(_number, at)
+    return Bloom(x, y, z, height_m, species, _number(confidence), bool(anomaly))
 
 
 def _point(x: Any, y: Any, z: Any) -> tuple[float, float, float]:

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 from array import array
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from dataclasses import replace
 from math import cos, sin
 from threading import Event as Flag
@@ -23,7 +22,6 @@ from geometry_msgs.msg import Point, Pose, PoseStamped, PoseWithCovarianceStampe
 from lupin_msgs.msg import DiscoveredTag, DiscoveredTags, Observation
 from nav_msgs.msg import OccupancyGrid, Path
 from rclpy.duration import Duration
-from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from sensor_msgs.msg import BatteryState
 from std_msgs.msg import Header
@@ -42,13 +40,7 @@ from lupin_patrol.mission import (
 from lupin_patrol.perception import Sighting
 from lupin_twin.core import interfaces
 from lupin_twin.core.state import STATUS_OK
-from lupin_twin.ros.base_node import (
-    NodeUtilities,
-    end_spinning,
-    latched,
-    running_ros,
-    spin_until_shutdown,
-)
+from lupin_twin.ros.base_node import NodeUtilities, latched, running_ros, spinning
 from lupin_twin.ros.convert import nanoseconds, observation_message, pose_message
 from lupin_twin.ros.parameters import declare, naming, naming_own_parameters
 from lupin_twin.runtime import process
@@ -137,37 +129,21 @@ def play(
     Raises ParameterError, before anything was published.
     """
     stop = _stop_flag()
-    with _running_node(ros_arguments) as node:
-        node.get_logger().info(f"patrol starts at speed {speed:g}")
-        subscribers = node.observations.get_subscription_count
-        if _stopped_before(stop, lambda: subscribers() > 0, _SUBSCRIBERS_S):
-            return
-        start = monotonic()
-        for event in events:
-            if stop.wait(max(0.0, start + (event.at_s - begin_s) / speed - monotonic())):
-                return
-            node.publish(event)
-            if once and isinstance(event, PassCompleted):
-                break
-        _stopped_before(stop, lambda: node.wait_for_delivery(0.0), _DELIVERY_S)
-
-
-@contextmanager
-def _running_node(ros_arguments: list[str]) -> Iterator[PatrolNode]:
-    """Start a node that listens (to /clock, to parameter services) in a thread of its own."""
     with running_ros(ros_arguments):
-        executor, node = SingleThreadedExecutor(), PatrolNode()
-        executor.add_node(node)
-        thread = Thread(
-            target=spin_until_shutdown, args=(executor, node.utilities.report), name="ros"
-        )
-        thread.start()
-        try:
-            yield node
-        finally:
-            end_spinning(executor)
-            thread.join()
-            node.destroy_node()
+        node = PatrolNode()
+        with spinning(node):
+            node.get_logger().info(f"patrol starts at speed {speed:g}")
+            subscribers = node.observations.get_subscription_count
+            if _stopped_before(stop, lambda: subscribers() > 0, _SUBSCRIBERS_S):
+                return
+            start = monotonic()
+            for event in events:
+                if stop.wait(max(0.0, start + (event.at_s - begin_s) / speed - monotonic())):
+                    return
+                node.publish(event)
+                if once and isinstance(event, PassCompleted):
+                    break
+            _stopped_before(stop, lambda: node.wait_for_delivery(0.0), _DELIVERY_S)
 
 
 def _stop_flag() -> Flag:

@@ -399,27 +399,39 @@ def running_ros(args: Sequence[str] | None) -> Iterator[None]:
         rclpy.try_shutdown()
 
 
-def run_until_signal(node: Any) -> int:
-    """Spin a node in a thread of its own until a stop signal comes; `process.block` was called.
-
-    Returns the exit code: 1 if its thread has died.
-    """
+@contextmanager
+def spinning(node: Any, at_end: Callable[[], None] = lambda: None) -> Iterator[None]:
+    """Spin a node in a thread of its own until the end of this; `at_end` is called there."""
     executor = SingleThreadedExecutor()
     executor.add_node(node)
-    ended = Event()
 
     def spin() -> None:
         try:
             spin_until_shutdown(executor, node.utilities.report)
         finally:
-            ended.set()
-            signal.pthread_kill(main_thread().ident or 0, signal.SIGTERM)  # it waits, see below
+            at_end()
 
     thread = Thread(target=spin, name="ros")
     thread.start()
-    process.wait()
-    exit_code = 1 if ended.is_set() else 0
-    end_spinning(executor)
-    thread.join()
-    node.destroy_node()
-    return exit_code
+    try:
+        yield
+    finally:
+        end_spinning(executor)
+        thread.join()
+        node.destroy_node()
+
+
+def run_until_signal(node: Any) -> int:
+    """Spin a node until a stop signal comes; `process.block` was called.
+
+    Returns the exit code: 1 if its thread has died.
+    """
+    ended = Event()
+
+    def end() -> None:
+        ended.set()
+        signal.pthread_kill(main_thread().ident or 0, signal.SIGTERM)  # it waits, see below
+
+    with spinning(node, end):
+        process.wait()
+        return 1 if ended.is_set() else 0

@@ -1,4 +1,3 @@
-# SQL is put together of constants
 """How a period is answered: each entry where they are few, buckets of them else.
 
 Buckets of an hour and more are made of hours, where these are whole; so are all where rows were

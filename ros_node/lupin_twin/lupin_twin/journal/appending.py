@@ -11,7 +11,7 @@ import math
 import sqlite3
 from collections.abc import Iterable, Sequence
 from contextlib import closing
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Final, NamedTuple
 
@@ -64,14 +64,12 @@ _KNOWN_INSPECTION: Final = (
 )
 
 
+@dataclass(slots=True)
 class _Group:
     """The series of one tag and kind in a run, and the latest stamp that anything is known by."""
 
-    __slots__ = ("newest_ns", "series")
-
-    def __init__(self, series: dict[tuple[str, ...], int], newest_ns: int) -> None:
-        self.series = series
-        self.newest_ns = newest_ns
+    series: dict[tuple[str, ...], int]
+    newest_ns: int
 
 
 class Appender:

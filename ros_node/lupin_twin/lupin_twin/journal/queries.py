@@ -200,7 +200,7 @@ def _events(log: SiteLog, request: SeriesRequest, now_ns: int) -> SeriesPast:
     end_ns = max(request.end_ns or now_ns + 1, request.start_ns)
     start_ns = request.start_ns
     if not start_ns:
-        oldest_ns = _first(source, axis)
+        oldest_ns = _outermost(source, axis, 0)
         start_ns = end_ns if oldest_ns is None else min(oldest_ns, end_ns)
     period = start_ns, end_ns
     match request.event:
@@ -251,12 +251,12 @@ def _silences(
     held = [span for span in axis if span.end_ns > start_ns and span.start_ns < end_ns]
     later = [span for span in axis if span.start_ns >= end_ns]
     found = [extent for span in held for extent in source.stretches(span, longest_ns, period)]
-    before_ns = _last(source, earlier)
+    before_ns = _outermost(source, reversed(earlier), 1)
     if before_ns is not None:
         found.insert(0, (before_ns, before_ns))
     if not found:
         return
-    after_ns = _first(source, later)
+    after_ns = _outermost(source, later, 0)
     last_ns = max(now_ns, *(last for _, last in found)) if after_ns is None else after_ns
     found.append((last_ns, last_ns))
     for (_, silent_ns), (until_ns, _) in pairwise(found):
@@ -276,14 +276,10 @@ def _usual_ns(source: _Source, within: Sequence[Span], period_ns: int) -> float:
     return median(b - a for a, b in pairwise(stamps)) if len(stamps) > 1 else 0.0
 
 
-def _first(source: _Source, axis: Iterable[Span]) -> int | None:
-    found = (ends for span in axis if (ends := source.ends(span)) is not None)
-    return next((first for first, _ in found), None)
-
-
-def _last(source: _Source, axis: Sequence[Span]) -> int | None:
-    found = (ends for span in reversed(axis) if (ends := source.ends(span)) is not None)
-    return next((last for _, last in found), None)
+def _outermost(source: _Source, axis: Iterable[Span], which: int) -> int | None:
+    """The first (0) or last (1) attempt of the first span with any."""
+    found = (ends[which] for span in axis if (ends := source.ends(span)) is not None)
+    return next(found, None)
 
 
 # --- where it stands ------------------------------------------------------------------------------

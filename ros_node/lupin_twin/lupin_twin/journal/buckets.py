@@ -22,6 +22,12 @@ MAX_ROWS: Final = 50_000
 Entry = tuple[int, int, float]
 
 
+def bounds(span: Span) -> dict[str, Any]:
+    """A span, and the hours that it touches, as the SQL names them."""
+    hours = {"first": span.start_ns // HOUR_NS, "last": -(-span.end_ns // HOUR_NS)}
+    return {"start": span.start_ns, "end": span.end_ns, **hours}
+
+
 @dataclass(frozen=True, slots=True)
 class Table:
     """Where something stands, as SQL: `rows`, and of what is counted by the hour the `hours`.
@@ -49,10 +55,8 @@ class Part:
 
     def ask(self, sql: str, span: Span | None = None, /, **more: int) -> list[tuple[Any, ...]]:
         """Rows within a part of the span, or all of it."""
-        span = span or self.span
-        hours = {"first": span.start_ns // HOUR_NS, "last": -(-span.end_ns // HOUR_NS)}
-        within = {"start": span.start_ns, "end": span.end_ns, **hours, **self._of, **more}
-        return list(self._log.execute(sql, within).fetchall())
+        query = {**bounds(span or self.span), **self._of, **more}
+        return list(self._log.execute(sql, query).fetchall())
 
     def is_deleted(self) -> bool:
         """Whether only hours are left of some of it."""

@@ -24,7 +24,7 @@ from lupin_twin.core.past import (
     SeriesRequest,
     grid,
 )
-from lupin_twin.journal.buckets import Buckets, Entry, Part, Table, answer, individually
+from lupin_twin.journal.buckets import Buckets, Entry, Part, Table, answer, bounds, individually
 from lupin_twin.journal.hours import (
     SILENCE_NS,
     TALLIED,
@@ -310,8 +310,11 @@ class _Source:
 
     def attempts(self, span: Span) -> int:
         """How many there were, at least."""
-        whole = -(-span.start_ns // HOUR_NS), span.end_ns // HOUR_NS
-        return self.tallied(span, whole, TALLIED) if self.tag is None else 0
+        if self.tag is not None:
+            return 0
+        first, last = -(-span.start_ns // HOUR_NS), span.end_ns // HOUR_NS
+        sql = f"SELECT coalesce(sum(n), 0) {_FROM_TALLY}"
+        return int(self.ask(sql, span, first=first, last=last)[0][0])
 
     def stamps(self, span: Span) -> Iterator[int]:
         """Of each attempt; what was deleted of the site is spread over its hour."""
@@ -323,7 +326,7 @@ class _Source:
                 yield stamp_ns
         for part in cut([span], 0, kept_ns):
             sql = f"SELECT n, first_ns, last_ns {_FROM_TALLY}"
-            for n, first_ns, last_ns in self.ask(sql, part, hours=_hours(part)):
+            for n, first_ns, last_ns in self.ask(sql, part):
                 for number in range(n):
                     stamp_ns = first_ns + (last_ns - first_ns) * number // max(1, n - 1)
                     if part.start_ns <= stamp_ns < part.end_ns:
@@ -380,30 +383,12 @@ class _Source:
             return at_ns
         return min(found) if which else max(found)
 
-    def tallied(self, span: Span, hours: Extent, which: Sequence[Event]) -> int:
-        """How many there were in hours of a span."""
-        sql = f"SELECT coalesce(sum(n), 0) {_FROM_TALLY} AND event = :event"
-        return sum(int(self.ask(sql, span, event, hours)[0][0]) for event in which)
-
-    def ask(
-        self, sql: str, span: Span, event: Event | None = None, hours: Extent = (0, 0)
-    ) -> list[tuple[Any, ...]]:
-        query: dict[str, Any] = {
-            "start": span.start_ns,
-            "end": span.end_ns,
-            "first": hours[0],
-            "last": hours[1],
-        }
-        query |= {"run": span.run.id, "tag": self.tag, "event": event}
+    def ask(self, sql: str, span: Span, **more: int) -> list[tuple[Any, ...]]:
+        query = bounds(span) | {"run": span.run.id, "tag": self.tag} | more
         return list(self._log.execute(self._of_tag(sql), query).fetchall())
 
     def _of_tag(self, sql: str) -> str:
         return sql.replace("{tag}", "" if self.tag is None else " AND tag = :tag")
-
-
-def _hours(span: Span) -> Extent:
-    """The hours that a span touches, first to before last."""
-    return span.start_ns // HOUR_NS, -(-span.end_ns // HOUR_NS)
 
 
 def _numbers(values: list[int | str]) -> list[float]:

@@ -124,8 +124,12 @@ class FieldCache:
     """An LRU of at most `MAX_ENTRIES` fields whose values take at most `MAX_BYTES` together."""
 
     def __init__(self) -> None:
-        self.bytes = 0
         self._grids: OrderedDict[FieldKey, FieldGrid] = OrderedDict()
+
+    @property
+    def bytes(self) -> int:
+        """What the values take."""
+        return sum(grid.values.nbytes for grid in self._grids.values())
 
     def __len__(self) -> int:
         return len(self._grids)
@@ -141,14 +145,10 @@ class FieldCache:
         """Cache `grid`, dropping the least recently used; not one past the whole bound."""
         if grid.values.nbytes > MAX_BYTES:
             return
-        replaced = self._grids.pop(key, None)
-        if replaced is not None:
-            self.bytes -= replaced.values.nbytes
         self._grids[key] = grid
-        self.bytes += grid.values.nbytes
+        self._grids.move_to_end(key)
         while len(self._grids) > MAX_ENTRIES or self.bytes > MAX_BYTES:
-            _, dropped = self._grids.popitem(last=False)
-            self.bytes -= dropped.values.nbytes
+            self._grids.popitem(last=False)
 
 
 def cost_s(request: FieldRequest, samples: int, rules: FieldRules) -> float:

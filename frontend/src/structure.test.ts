@@ -67,7 +67,7 @@ const TABLE: Table = {
   main: ['styles', 'strings', 'store', 'alarms', 'ui', 'npm:react', 'npm:react-dom'],
   // For tests alone: no part above names it.
   testing: [
-    ...['contract', 'domain', 'connection', 'store'],
+    ...['contract', 'domain', 'draw', 'connection', 'store'],
     // The file that comes with the bridge: the page itself has no copy of it.
     '../../backend/lupin_bridge/sensors.json',
     ...['npm:vitest', 'npm:@testing-library/react', 'npm:typescript', 'npm:node:path'],

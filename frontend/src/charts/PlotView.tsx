@@ -13,7 +13,6 @@ import { NoteMarks } from '../notes/NoteMarks';
 import { act, useApp } from '../store/app';
 import { pointedBy, pointedTime, useSelected } from '../store/create';
 import { selectCatalogue } from '../store/derived';
-import { onThemeChange } from '../store/theme';
 import { S } from '../strings';
 import { More, Select } from '../widgets/controls';
 import { isStroked, lookOf, markerPath } from './layers';
@@ -25,10 +24,10 @@ import { DAY_S } from '../domain/difference';
 
 const HANDLERS: PlotHandlers = {
   onPoint: (at) => {
-    pointedTime.dispatch(at === null ? null : { at, by: 'chart' });
+    pointedTime.set(at === null ? null : { at, by: 'chart' });
   },
   onPick: (moment) => {
-    act({ type: 'moment', moment });
+    act({ moment });
   },
   onZoom: zoomTo,
 };
@@ -50,7 +49,7 @@ export function PlotView({
   const { at } = useTold();
   const only = isAlone ? model.lines[0] : undefined;
 
-  const plot = usePlot(place, model, height, hasTimes, HANDLERS, onThemeChange);
+  const plot = usePlot(place, model, height, hasTimes, HANDLERS);
   useEffect(() => {
     plot.current?.point(ofBar);
   }, [plot, ofBar]);

@@ -4,6 +4,7 @@ import uPlot from 'uplot';
 
 import { hasDate, type Span } from '../domain/time';
 import { timeTicks, type Tick } from '../domain/timeline';
+import { onThemeChange } from '../store/theme';
 import { LOCALE } from '../strings';
 import {
   drawAbove,
@@ -229,14 +230,13 @@ function createPlot(element: HTMLElement, handlers: PlotHandlers): Plot {
 const hasNames = (model: PlotModel): boolean =>
   model.lines.length === 1 || limitsOf(model).length > 0;
 
-/** A chart in an element, as large as that; `onLook` calls back when its colours are others. */
+/** A chart in an element, as large as that. */
 export function usePlot(
   place: RefObject<HTMLDivElement | null>,
   model: PlotModel,
   height: number,
   hasTimes: boolean,
   handlers: PlotHandlers,
-  onLook: (listener: () => void) => () => void,
 ): RefObject<Plot | null> {
   const plot = useRef<Plot | null>(null);
   const [width, setWidth] = useState(0);
@@ -249,7 +249,7 @@ export function usePlot(
       if (entry) setWidth(Math.floor(entry.contentRect.width));
     });
     resize.observe(element);
-    const stop = onLook(mine.recolour);
+    const stop = onThemeChange(mine.recolour);
     return () => {
       plot.current = null;
       stop();
@@ -257,7 +257,7 @@ export function usePlot(
       mine.destroy();
       handlers.onPoint(null);
     };
-  }, [place, handlers, onLook]);
+  }, [place, handlers]);
   useEffect(() => {
     if (width > 0) plot.current?.show(model, { width, height, hasTimes });
   }, [model, width, height, hasTimes]);

@@ -136,12 +136,12 @@ interface Chosen {
 }
 
 /** What was chosen for the card's chart; the map keeps its own. */
-export const chosenSensor = createStore<Chosen | null, Chosen | null>(null, (_, next) => next);
+export const chosenSensor = createStore<Chosen | null>(null);
 
 /** What the card's chart is to show: the sensor in view, unless another was chosen. */
 export function useChosenSensor(): string {
   const inView = useApp((state) => state.view.sensor);
-  const chosen = useSelected(chosenSensor, (it) => it);
+  const chosen = useSelected(chosenSensor);
   return chosen?.inView === inView ? chosen.name : inView;
 }
 

@@ -40,28 +40,20 @@ export interface Connection {
 
 /** All times are ms on the monotonic clock. */
 export type ConnectionEvent =
-  | { readonly type: 'start'; readonly now: number }
-  | { readonly type: 'opened'; readonly now: number }
+  | { readonly type: Plain; readonly now: number }
   /** A status frame brings its status, a state frame none. */
   | { readonly type: 'frame'; readonly now: number; readonly status: StatusFrame | null }
-  /** What came is neither: a sign of life alone. */
-  | { readonly type: 'heard'; readonly now: number }
-  | {
-      readonly type: 'closed';
-      readonly now: number;
-      readonly code: number | null;
-      readonly random: number;
-    }
-  /** What came cannot be used: the two sides have lost each other. */
-  | { readonly type: 'broken'; readonly now: number; readonly random: number }
-  /** The tab became visible, or the operator does not want to wait. */
-  | { readonly type: 'wake'; readonly now: number }
-  /** The machine slept, or its clock was set: what still comes may be old, and so are deadlines. */
-  | { readonly type: 'lapse'; readonly now: number }
-  /** The network returned: an attempt that is under way began without it. */
-  | { readonly type: 'online'; readonly now: number }
-  /** A deadline of `nextDeadline` may have passed. */
-  | { readonly type: 'tick'; readonly now: number; readonly random: number };
+  | { readonly type: 'closed'; readonly now: number; readonly code: number | null };
+
+/**
+ * - start: make a new connection, whatever there is; after a lapse what still comes may be old
+ * - heard: what came is neither status nor state, a sign of life alone
+ * - broken: what came cannot be used, the two sides have lost each other
+ * - wake: the tab became visible, or the operator does not want to wait
+ * - online: the network returned, and an attempt that is under way began without it
+ * - tick: a deadline of `nextDeadline` may have passed
+ */
+export type Plain = 'start' | 'opened' | 'heard' | 'broken' | 'wake' | 'online' | 'tick';
 
 /** What the shell has to do. "reopen": drop the socket, if any, and make a new one. */
 export type Command = 'reopen' | 'drop' | null;
@@ -79,7 +71,8 @@ interface Step {
   readonly command: Command;
 }
 
-export function step(connection: Connection, event: ConnectionEvent): Step {
+/** `random`: from 0 to 1. */
+export function step(connection: Connection, event: ConnectionEvent, random: number): Step {
   const { socket } = connection;
   const { now } = event;
   switch (event.type) {
@@ -98,7 +91,7 @@ export function step(connection: Connection, event: ConnectionEvent): Step {
       // It has waited for a page that stood still, nobody knows how long.
       if (silence(socket, now) >= DEAD_MS) return open(connection, now);
       const heard = { ...socket, lastFrameAt: now };
-      if (event.type === 'heard') return stay({ ...connection, socket: heard });
+      if (event.type !== 'frame') return stay({ ...connection, socket: heard });
       const { status } = event;
       return stay({
         ...connection,
@@ -108,17 +101,15 @@ export function step(connection: Connection, event: ConnectionEvent): Step {
     }
     case 'closed':
       if (socket.kind === 'closed') return stay(connection);
-      return { connection: fail(connection, now, event.code, event.random), command: null };
+      return { connection: fail(connection, now, event.code, random), command: null };
     case 'broken':
       return socket.kind === 'open'
-        ? { connection: fail(connection, now, null, event.random), command: 'drop' }
+        ? { connection: fail(connection, now, null, random), command: 'drop' }
         : stay(connection);
-    case 'lapse':
-      return open(connection, now);
     case 'online':
       return socket.kind === 'opening'
         ? open(connection, now)
-        : step(connection, { type: 'wake', now });
+        : step(connection, { type: 'wake', now }, random);
     case 'wake':
       if (socket.kind === 'closed') return open(connection, now);
       // After a sleep the socket often looks open and is not.
@@ -134,7 +125,7 @@ export function step(connection: Connection, event: ConnectionEvent): Step {
           ? now - socket.since >= OPENING_MS
           : silence(socket, now) >= DEAD_MS
       ) {
-        return { connection: fail(connection, now, null, event.random), command: 'drop' };
+        return { connection: fail(connection, now, null, random), command: 'drop' };
       }
       return stay(connection);
   }

@@ -165,7 +165,9 @@ describe('socket shell', () => {
 
   test('what waits in a socket as the machine wakes is not heard: a new connection is made', () => {
     vi.useFakeTimers({ toFake: ['setTimeout', 'clearTimeout', 'performance', 'Date'] });
-    const unhear = onLapse(link.lapse);
+    const unhear = onLapse(() => {
+      link.tell('start');
+    });
     socket(0).onopen?.();
     socket(0).speak(status());
     socket(0).speak(stateFrame([]));

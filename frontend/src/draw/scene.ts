@@ -49,7 +49,7 @@ export interface Scene {
   readonly spacing: number;
 }
 
-interface SceneInput {
+export interface SceneInput {
   readonly tags: readonly Tag[];
   readonly health: HouseHealth;
   readonly sensor: Sensor;

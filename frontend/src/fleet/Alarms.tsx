@@ -7,9 +7,8 @@ import type { Alarm } from '../contract/types';
 import { secondsOf } from '../domain/time';
 import { LANGUAGE, S } from '../strings';
 import { HealthMark } from '../ui/HealthMark';
-import type { FleetWords } from '../words/fleet';
 import { VIEW_WORDS } from '../words/fleetViews';
-import { alarmCount, ms, namesOf, type Site, timeText } from './sites';
+import { alarmCount, ms, namesOf, type Site, timeText, words } from './sites';
 import { useAnswer, useSpeech } from './useAnswer';
 
 interface SiteAlarm extends Alarm {
@@ -22,12 +21,7 @@ const W = VIEW_WORDS[LANGUAGE];
 
 const EVERY_MS = 10_000;
 
-interface Props {
-  readonly shown: readonly Site[];
-  readonly words: FleetWords;
-}
-
-export default function Alarms({ shown, words }: Props): JSX.Element {
+export default function Alarms({ shown }: { shown: readonly Site[] }): JSX.Element {
   const speech = useSpeech();
   const having = shown.filter((site) => (site.active_alarms ?? 0) > 0);
   const names = namesOf(having);

@@ -14,10 +14,9 @@ import { isMeasured, type Sensor } from '../domain/sensors';
 import { spanOf as periodSpan, rosText, secondsOf, type Span } from '../domain/time';
 import { LANGUAGE, S } from '../strings';
 import { Select } from '../widgets/controls';
-import type { FleetWords } from '../words/fleet';
 import { VIEW_WORDS } from '../words/fleetViews';
 import type { WireTime } from '../contract/types';
-import type { Site } from './sites';
+import { type Site, words } from './sites';
 import { useAnswer, useSpeech } from './useAnswer';
 
 const W = VIEW_WORDS[LANGUAGE];
@@ -30,12 +29,7 @@ const HEIGHT = 320;
 /** Drawn unless others are chosen. */
 const DRAWN = 3;
 
-interface Props {
-  readonly shown: readonly Site[];
-  readonly words: FleetWords;
-}
-
-export default function Compare({ shown, words }: Props): JSX.Element {
+export default function Compare({ shown }: { shown: readonly Site[] }): JSX.Element {
   const speech = useSpeech();
   const { sensors, unit } = speech;
   const [name, setName] = useState('temperature');
@@ -173,14 +167,6 @@ function deviationText(sensor: Sensor, { deviation }: ComparedSite, { unit }: Sp
   return withUnit(sensor, differenceNumber(sensor, deviation, unit), unit);
 }
 
-function onSystemTheme(listener: () => void): () => void {
-  const system = window.matchMedia('(prefers-color-scheme: dark)');
-  system.addEventListener('change', listener);
-  return () => {
-    system.removeEventListener('change', listener);
-  };
-}
-
 function Chart({
   model,
   onPoint,
@@ -190,7 +176,7 @@ function Chart({
 }): JSX.Element {
   const place = useRef<HTMLDivElement>(null);
   const handlers = useMemo(() => ({ onPoint }), [onPoint]);
-  usePlot(place, model, HEIGHT, true, handlers, onSystemTheme);
+  usePlot(place, model, HEIGHT, true, handlers);
   return (
     <div
       ref={place}

@@ -5,9 +5,8 @@ import { timeOfDay, timeZone } from '../clock';
 import type { Note, WireTime } from '../contract/types';
 import { shown as shownText } from '../domain/text';
 import { LANGUAGE, S } from '../strings';
-import type { FleetWords } from '../words/fleet';
 import { VIEW_WORDS } from '../words/fleetViews';
-import { ms, namesOf, type Site, timeText } from './sites';
+import { ms, namesOf, type Site, timeText, words } from './sites';
 import { useAnswer } from './useAnswer';
 
 const W = VIEW_WORDS[LANGUAGE];
@@ -37,12 +36,7 @@ interface Answer {
   readonly notes: readonly SiteNote[];
 }
 
-interface Props {
-  readonly shown: readonly Site[];
-  readonly words: FleetWords;
-}
-
-export default function Report({ shown, words }: Props): JSX.Element {
+export default function Report({ shown }: { shown: readonly Site[] }): JSX.Element {
   const [hours, setHours] = useState<number>(HOURS[0]);
   const names = namesOf(shown);
   const from = (Math.floor(timeOfDay() / 3_600_000) - hours) * 3600;

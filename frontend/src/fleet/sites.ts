@@ -2,7 +2,10 @@
 import { timeOfDay } from '../clock';
 import { isObject } from '../contract/check';
 import type { Verdict, WireTime } from '../contract/types';
-import { LOCALE } from '../strings';
+import { LANGUAGE, LOCALE } from '../strings';
+import { fleetWordsOf } from '../words/fleet';
+
+export const words = fleetWordsOf(LANGUAGE);
 
 /** An entry of `/api/sites`; see the server's `overview.py`. */
 export interface Site {

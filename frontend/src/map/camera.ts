@@ -52,7 +52,7 @@ export interface Held {
 type Gestures = (element: HTMLElement, held: Held) => Hand;
 
 /** Null until they are loaded, right behind the first view: the map is painted without. */
-export const gestures = createStore<Gestures | null, Gestures>(null, (_, next) => next);
+export const gestures = createStore<Gestures | null>(null);
 
 /** A view that was told as a camera and comes back differs in its last digits, and moves nothing. */
 const isSame = (a: View, b: View): boolean =>

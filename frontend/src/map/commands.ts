@@ -54,7 +54,7 @@ export function keyCommand({ key, shiftKey }: KeyboardEvent): MapCommand | null 
  * Where the operator points at in the map: the mouse, or the crosshair of the keyboard. Apart
  * from the page's state, because it moves sixty times a second and only the read-out follows.
  */
-export const pointedAt = createStore<MapPoint | null, MapPoint | null>(null, (_, next) => next);
+export const pointedAt = createStore<MapPoint | null>(null);
 
 export interface PinUnderMouse {
   readonly tagId: string;
@@ -65,11 +65,5 @@ export interface PinUnderMouse {
   readonly within: Size;
 }
 
-/** The pin that the mouse rests on; the same object as long as it is the same pin and place. */
-export const pinUnderMouse = createStore<PinUnderMouse | null, PinUnderMouse | null>(
-  null,
-  (before, next) =>
-    before?.tagId === next?.tagId && before?.at.x === next?.at.x && before?.at.y === next?.at.y
-      ? before
-      : next,
-);
+/** The pin that the mouse rests on. */
+export const pinUnderMouse = createStore<PinUnderMouse | null>(null);

@@ -24,10 +24,7 @@ export interface StandingNote {
 }
 
 /** What stands, the oldest moment first. */
-export const standingNotes = createStore<readonly StandingNote[], readonly StandingNote[]>(
-  [],
-  (_, next) => next,
-);
+export const standingNotes = createStore<readonly StandingNote[]>([]);
 
 export const standing = (notes: readonly Note[]): StandingNote[] =>
   notes
@@ -46,7 +43,7 @@ export function startNotes(): () => void {
   const fetcher = createFetcher<readonly Note[]>({
     paceMs: PACE_MS,
     onValue: (notes) => {
-      standingNotes.dispatch(standing(notes));
+      standingNotes.set(standing(notes));
     },
   });
   const update = (): void => {
@@ -129,7 +126,7 @@ export function NoteMarks({
   /** Of these tags and of the greenhouse; none: all. */
   tagIds?: readonly string[];
 }): JSX.Element | null {
-  const all = useSelected(standingNotes, (it) => it);
+  const all = useSelected(standingNotes);
   const alarms = useApp((state) => state.twin.alarms?.alarms ?? NO_ALARMS);
   const { from, to } = span;
   const ids = tagIds?.join('\u0001');
@@ -157,7 +154,7 @@ export function NoteMarks({
             <button
               type="button"
               onClick={() => {
-                act({ type: 'moment', moment: at });
+                act({ moment: at });
               }}
             >
               <svg viewBox="0 0 16 16" width="14" height="14" aria-hidden="true">

@@ -9,6 +9,7 @@ import { ageText, percentText, written } from '../domain/format';
 import { ageSeconds, ageStep, secondsOf } from '../domain/time';
 import { mapPoint, toCanvas } from '../geometry/coordinates';
 import { act, type AppState, store, useApp } from '../store/app';
+import { withLayer } from '../store/view';
 import { robotFrame, useSelected } from '../store/create';
 import { createFetcher } from '../store/fetcher';
 import { isHeardNow, rosNow, selectShown } from '../store/moment';
@@ -126,7 +127,7 @@ export function RobotChoice(): JSX.Element {
       label={S.robotLayer}
       isOn={isOn}
       onChange={(on) => {
-        act({ type: 'layer', layer: 'robot', on });
+        act(withLayer('robot', on));
       }}
     />
   );

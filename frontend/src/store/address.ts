@@ -21,27 +21,12 @@ import {
   type ViewState,
 } from './view';
 
-export type Linked = Pick<
-  ViewState,
-  | 'moment'
-  | 'period'
-  | 'compare'
-  | 'chart'
-  | 'sensor'
-  | 'selected'
-  | 'layers'
-  | 'heat'
-  | 'colouring'
-  | 'ranges'
-  | 'camera'
-  | 'sort'
-  | 'filter'
-  | 'health'
-  | 'list'
->;
+/** Which half a narrow screen shows is told by the alarms alone. */
+export type Linked = Omit<ViewState, 'hovered' | 'chartedFrom' | 'pane'> &
+  Partial<Pick<ViewState, 'pane'>>;
 
 /** The fragment, without "#"; what is as by default is left out. */
-export function toFragment(view: Linked & Pick<ViewState, 'pane'>): string {
+export function toFragment(view: Linked): string {
   const parts = new URLSearchParams();
   if (view.moment !== null) parts.set('at', String(view.moment));
   if (view.period.kind === 'own') parts.set('period', `${view.period.from},${view.period.to}`);
@@ -94,7 +79,9 @@ export function fromFragment(fragment: string): Linked {
     sort: sortOf(parts.get('sort')),
     filter: (parts.get('filter') ?? '').slice(0, LONGEST_FILTER),
     health: VERDICTS.find((verdict) => verdict === parts.get('health')) ?? null,
-    list: parts.get('list') === 'alarms' ? 'alarms' : DEFAULT_VIEW.list,
+    ...(parts.get('list') === 'alarms'
+      ? { list: 'alarms', pane: 'tags' }
+      : { list: DEFAULT_VIEW.list }),
   };
 }
 
@@ -209,17 +196,14 @@ function keepToLink(isRound: boolean): () => void {
   let timer: ReturnType<typeof setTimeout> | undefined;
   let { view } = store.get();
   const follow = (): void => {
-    act({
-      type: 'look',
-      view: { ...fromFragment(window.location.hash), selected: null, moment: null },
-    });
+    act({ ...fromFragment(window.location.hash), selected: null, moment: null });
     // What the link says needs no return to it.
     clearTimeout(timer);
   };
   const comeBack = (): void => {
     const { sensor } = view;
     follow();
-    if (isRound) act({ type: 'sensor', sensor });
+    if (isRound) act({ sensor });
     clearTimeout(timer);
   };
   const onStore = (): void => {
@@ -273,7 +257,7 @@ function keepLink(): () => void {
   const follow = (): void => {
     const linked = fromFragment(window.location.hash);
     entry = { ...entry, ...placeOf(linked) };
-    act({ type: 'look', view: linked });
+    act(linked);
     clearTimeout(timer);
     mark(window.location.href.slice(window.location.origin.length));
   };
@@ -305,7 +289,7 @@ function keepLink(): () => void {
     const isOtherTime = (now.moment === null) !== (shown.moment === null);
     if (isOtherTime || now.tag !== shown.selected) {
       const moment = isOtherTime ? now.moment : shown.moment;
-      act({ type: 'look', view: { selected: now.tag, moment } });
+      act({ selected: now.tag, moment });
     }
     write();
   };

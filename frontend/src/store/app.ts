@@ -1,8 +1,8 @@
 import type { Size, View } from '../geometry/coordinates';
-import { createStore, useSelected } from './create';
+import { type Change, changed, createStore, useSelected } from './create';
 import { DEFAULT_SETTINGS, type Settings } from './settings';
-import { NO_TWIN, reduceTwin, type TwinAction, type TwinState } from './twin';
-import { DEFAULT_VIEW, reduceView, type ViewAction, type ViewState } from './view';
+import { NO_TWIN, type TwinState } from './twin';
+import { DEFAULT_VIEW, type ViewState, viewAfter } from './view';
 
 /** What of the map is on the screen just now; what the operator chose is the view's camera. */
 export interface Viewport {
@@ -24,39 +24,34 @@ export interface AppState {
   readonly settings: Settings;
 }
 
-type Change = (state: AppState) => AppState;
+export const store = createStore<AppState>({
+  twin: NO_TWIN,
+  view: DEFAULT_VIEW,
+  viewport: NO_VIEWPORT,
+  settings: DEFAULT_SETTINGS,
+});
 
-export const store = createStore<AppState, Change>(
-  {
-    twin: NO_TWIN,
-    view: DEFAULT_VIEW,
-    viewport: NO_VIEWPORT,
-    settings: DEFAULT_SETTINGS,
-  },
-  (state, change) => change(state),
-);
-
-export const act = (action: ViewAction): void => {
-  store.dispatch((state) => {
-    const view = reduceView(state.view, action);
-    return view === state.view ? state : { ...state, view };
-  });
+const put = (part: Partial<AppState>): void => {
+  store.set(changed(store.get(), part));
 };
 
-export const receive = (action: TwinAction): void => {
-  store.dispatch((state) => {
-    const twin = reduceTwin(state.twin, action);
-    return twin === state.twin ? state : { ...state, twin };
-  });
+/** What the operator does. */
+export const act = (change: Change<ViewState>): void => {
+  put({ view: viewAfter(store.get().view, change) });
+};
+
+/** What comes from the server. */
+export const receive = (change: Change<TwinState>): void => {
+  put({ twin: changed(store.get().twin, change) });
 };
 
 /** For the map's camera alone, which keeps it in step with wheel, finger and keys. */
 export const moveViewport = (part: Partial<Viewport>): void => {
-  store.dispatch((state) => ({ ...state, viewport: { ...state.viewport, ...part } }));
+  put({ viewport: { ...store.get().viewport, ...part } });
 };
 
 export const prefer = (part: Partial<Settings>): void => {
-  store.dispatch((state) => ({ ...state, settings: { ...state.settings, ...part } }));
+  put({ settings: { ...store.get().settings, ...part } });
 };
 
 /** Calls back when one of these parts of the state is another; returns the way to stop. */

@@ -54,7 +54,7 @@ interface Next {
   readonly at: number;
 }
 
-export const nextSensor = createStore<Next | null, Next | null>(null, (_, next) => next);
+export const nextSensor = createStore<Next | null>(null);
 
 const round = memoLast(sensorsOf);
 
@@ -74,7 +74,7 @@ export function startCycle({ seconds }: CycleWish): () => void {
     if (sensor === null) {
       clearTimeout(timer);
       shown = null;
-      nextSensor.dispatch(null);
+      nextSensor.set(null);
       return;
     }
     // Whoever chooses a sensor by hand has it for as long as any other.
@@ -82,12 +82,12 @@ export function startCycle({ seconds }: CycleWish): () => void {
     const at = isSame ? before.at : now() + seconds * 1000;
     if (isSame && before.sensor === sensor) return;
     shown = view.sensor;
-    nextSensor.dispatch({ sensor, at });
+    nextSensor.set({ sensor, at });
     clearTimeout(timer);
     timer = setTimeout(
       () => {
         const next = nextSensor.get();
-        if (next) act({ type: 'sensor', sensor: next.sensor.name });
+        if (next) act({ sensor: next.sensor.name });
       },
       Math.max(0, at - now()),
     );
@@ -98,6 +98,6 @@ export function startCycle({ seconds }: CycleWish): () => void {
   return () => {
     clearTimeout(timer);
     stop();
-    nextSensor.dispatch(null);
+    nextSensor.set(null);
   };
 }

@@ -22,10 +22,10 @@ export function startDifference(): () => void {
     paceMs: DRAG_PACE_MS,
     isDragged: true,
     onValue: (value) => {
-      receive({ type: 'set', part: { difference: ready(value) } });
+      receive({ difference: ready(value) });
     },
     onError: (message) => {
-      receive({ type: 'set', part: { difference: failed(message) } });
+      receive({ difference: failed(message) });
     },
   });
   let before: AppState | null = null;
@@ -35,7 +35,7 @@ export function startDifference(): () => void {
     const { difference } = state.twin;
     if (compare === null) {
       fetcher.want(null);
-      if (difference !== NOTHING) receive({ type: 'set', part: { difference: NOTHING } });
+      if (difference !== NOTHING) receive({ difference: NOTHING });
       return;
     }
     // Of another sensor or source, or to another moment, it is none of what is wanted.
@@ -44,7 +44,7 @@ export function startDifference(): () => void {
       before.view.sensor !== sensor ||
       sourceOf(before) !== sourceOf(state);
     before = state;
-    if (isOther && difference !== NOTHING) receive({ type: 'set', part: { difference: NOTHING } });
+    if (isOther && difference !== NOTHING) receive({ difference: NOTHING });
     const wish = wishFor(state, compare);
     if (wish) fetcher.want(wish);
   };

@@ -175,5 +175,5 @@ export const newestWord = (): string => {
 };
 
 export function backToLive(): void {
-  act({ type: 'moment', moment: null });
+  act({ moment: null });
 }

@@ -43,11 +43,11 @@ export function startRemembered(): () => void {
   const fetcher = createFetcher<Remembered>({
     paceMs: INTERVAL_MS,
     onValue: (remembered) => {
-      receive({ type: 'set', part: { remembered } });
+      receive({ remembered });
     },
     onError: (message) => {
       const { value } = store.get().twin.remembered;
-      receive({ type: 'set', part: { remembered: { value, state: 'failed', message } } });
+      receive({ remembered: { value, state: 'failed', message } });
     },
   });
 
@@ -63,7 +63,7 @@ export function startRemembered(): () => void {
       group = next;
       // What is known of another period is of no use; how far memory reaches stays true.
       fetcher.want(null);
-      if (value) receive({ type: 'set', part: { remembered: NOT_ASKED } });
+      if (value) receive({ remembered: NOT_ASKED });
       // Which may have led back to the period before.
       if (store.get().view.period !== period) return;
     }
@@ -119,7 +119,7 @@ export function startOpening(): () => void {
     const reach = twin.remembered.value?.reach;
     if (reach) opensShort ??= isShort(reach, view.moment);
     if (opensShort && view.period === DEFAULT_VIEW.period) {
-      act({ type: 'period', period: SHORT_PERIOD });
+      act({ period: SHORT_PERIOD });
     }
   };
   update();

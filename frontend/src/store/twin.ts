@@ -116,65 +116,52 @@ export const NO_TWIN: TwinState = {
   sensors: NOTHING,
 };
 
-export type TwinAction =
-  | { readonly type: 'connection'; readonly connection: Connection; readonly now: number }
-  | {
-      readonly type: 'state';
-      readonly latest: Latest;
-      readonly now: number;
-      /** Set on the first frame of a connection: how old the state was when it was sent. */
-      readonly stateAgeSeconds?: number | null;
-    }
-  /** The machine slept, or its clock was set. */
-  | { readonly type: 'lapse' }
-  /** A message was dropped, for this reason; null: that was long ago. */
-  | { readonly type: 'unread'; readonly why: string | null }
-  | { readonly type: 'field'; readonly field: Fetched<Field> }
-  | { readonly type: 'latest'; readonly part: Partial<Pick<House, 'map' | 'quality'>> }
-  | { readonly type: 'past'; readonly past: Past | null }
-  /** What nothing else follows from. */
-  | { readonly type: 'set'; readonly part: Partial<Pick<TwinState, Plain>> };
+type With = (twin: TwinState) => Partial<TwinState>;
 
-type Plain = 'alarms' | 'pastFault' | 'remembered' | 'difference' | 'sensors';
+/** `now`: ms on the monotonic clock. */
+export const withConnection =
+  (connection: Connection, now: number): With =>
+  (twin) => {
+    const phase = phaseOf(connection, now);
+    if (phase === twin.phase && sameToTheEye(connection, twin.connection)) return {};
+    const { status } = connection;
+    const lastStatus = status && status.reason !== 'never_seen' ? status : twin.lastStatus;
+    return { phase, connection, lastStatus };
+  };
 
-export function reduceTwin(state: TwinState, action: TwinAction): TwinState {
-  switch (action.type) {
-    case 'connection': {
-      const phase = phaseOf(action.connection, action.now);
-      if (phase === state.phase && sameToTheEye(action.connection, state.connection)) return state;
-      const { status } = action.connection;
-      const lastStatus = status && status.reason !== 'never_seen' ? status : state.lastStatus;
-      return { ...state, phase, connection: action.connection, lastStatus };
-    }
-    case 'state': {
-      // No comparison of seq: one socket delivers in order, and a restarted server counts anew.
-      const arrivedAt = action.now - (action.stateAgeSeconds ?? 0) * 1000;
-      // What was there before a lapse says nothing about how old a state that is sent again is.
-      const before = state.isTimeLost ? null : state.latest.snapshot;
-      const snapshot = snapshotOf(action.latest, arrivedAt, before);
-      const health = sharedJudgement(state.latest.health, action.latest.health);
-      return withLatest({ ...state, isTimeLost: false }, { snapshot, health });
-    }
-    case 'lapse':
-      return { ...state, isTimeLost: true };
-    case 'unread': {
-      const { why } = action;
-      const count = (state.unread?.count ?? 0) + 1;
-      return { ...state, unread: why === null ? null : { count, why } };
-    }
-    case 'field':
-      return withLatest(state, {
-        field: action.field,
-        held: heldAfter(state.latest.held, action.field.value),
-      });
-    case 'latest':
-      return withLatest(state, action.part);
-    case 'past':
-      return { ...state, past: action.past && heldPast(state, action.past), pastFault: null };
-    case 'set':
-      return { ...state, ...action.part };
-  }
-}
+/** `ageSeconds`: how old the state was when it was sent, of the first one of a connection. */
+export const withState =
+  (latest: Latest, now: number, ageSeconds: number | null = null): With =>
+  ({ isTimeLost, latest: last }) => {
+    // No comparison of seq: one socket delivers in order, and a restarted server counts anew.
+    const arrivedAt = now - (ageSeconds ?? 0) * 1000;
+    // What was there before a lapse says nothing about how old a state that is sent again is.
+    const before = isTimeLost ? null : last.snapshot;
+    const snapshot = snapshotOf(latest, arrivedAt, before);
+    const health = sharedJudgement(last.health, latest.health);
+    return { latest: { ...last, snapshot, health }, isTimeLost: false };
+  };
+
+/** A message was dropped, for this reason. */
+export const withUnread =
+  (why: string): With =>
+  ({ unread }) => ({ unread: { count: (unread?.count ?? 0) + 1, why } });
+
+export const withLatest =
+  (part: Partial<House>): With =>
+  ({ latest }) => ({ latest: { ...latest, ...part } });
+
+export const withField =
+  (field: Fetched<Field>): With =>
+  ({ latest }) => ({ latest: { ...latest, field, held: heldAfter(latest.held, field.value) } });
+
+/** Whoever drags through time begins with the colours of now. */
+export const withPast =
+  (next: Past | null): With =>
+  ({ past, latest }) => {
+    const held = next && heldAfter(past?.house.held ?? latest.held, next.house.field.value);
+    return { past: next && { at: next.at, house: { ...next.house, held } }, pastFault: null };
+  };
 
 function heldAfter(before: Held | null, field: Field | null): Held | null {
   // Of an estimate that knows nothing there is no range, however many tags contribute.
@@ -184,17 +171,6 @@ function heldAfter(before: Held | null, field: Field | null): Held | null {
   const range = heldRange(held, { low, high });
   return before && range === held ? before : { sensor, range };
 }
-
-/** Whoever drags through time begins with the colours of now. */
-function heldPast({ past, latest }: TwinState, { at, house }: Past): Past {
-  const before = past?.house.held ?? latest.held;
-  return { at, house: { ...house, held: heldAfter(before, house.field.value) } };
-}
-
-const withLatest = (state: TwinState, part: Partial<House>): TwinState => ({
-  ...state,
-  latest: { ...state.latest, ...part },
-});
 
 /** Each frame moves the connection's clock; only the rest is worth a render. */
 function sameToTheEye(a: Connection, b: Connection): boolean {

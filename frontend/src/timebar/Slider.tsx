@@ -95,7 +95,7 @@ export function Slider({
   const at = (event: PointerEvent): number =>
     event.clientX - (element.current?.getBoundingClientRect().left ?? 0);
   const go = (next: number | null): void => {
-    act({ type: 'moment', moment: next });
+    act({ moment: next });
   };
   const onPointerDown = (event: PointerEvent): void => {
     if (event.button !== 0) return;
@@ -107,13 +107,13 @@ export function Slider({
   const onPointerMove = (event: PointerEvent): void => {
     const x = event.pointerType === 'touch' && !held ? null : at(event);
     setPointed(x);
-    pointedTime.dispatch(x === null ? null : { at: momentAt(axis, x), by: 'bar' });
+    pointedTime.set(x === null ? null : { at: momentAt(axis, x), by: 'bar' });
     if (held) go(chosenAt(axis, at(event), nowS));
   };
   const letGo = (): void => {
     setHeld(null);
     setPointed(null);
-    pointedTime.dispatch(null);
+    pointedTime.set(null);
   };
   const onKeyDown = (event: KeyboardEvent): void => {
     if (event.altKey || event.ctrlKey || event.metaKey) return;
@@ -153,7 +153,7 @@ export function Slider({
       onLostPointerCapture={letGo}
       onPointerLeave={() => {
         setPointed(null);
-        pointedTime.dispatch(null);
+        pointedTime.set(null);
       }}
       onKeyDown={onKeyDown}
     >

@@ -62,7 +62,7 @@ function Off(): JSX.Element {
 }
 
 function Player(): JSX.Element {
-  const { isPlaying, speed } = useSelected(playback, (state) => state);
+  const { isPlaying, speed } = useSelected(playback);
   const isNow = useApp((state) => state.view.moment === null);
   const label = isPlaying ? S.timebarPause : S.timebarPlay;
   return (
@@ -117,7 +117,7 @@ function PeriodChoice({ period, nowS }: { period: Period; nowS: number }): JSX.E
         // An own period begins as what is in view.
         const { from, to } = barSpan(store.get(), nowS);
         const own = { kind: 'own', from: Math.floor(from), to: Math.ceil(to) } as const;
-        act({ type: 'period', period: kind === 'own' ? own : { kind } });
+        act({ period: kind === 'own' ? own : { kind } });
       }}
     />
   );
@@ -179,7 +179,7 @@ function OwnPeriod({ period, isSimulated }: { period: Own; isSimulated: boolean 
   const take = (next: Typed): void => {
     const own = periodOf(next, isSimulated);
     setTyped({ ...next, of: own ?? period });
-    if (own) act({ type: 'period', period: own });
+    if (own) act({ period: own });
   };
   const input = (name: keyof Typed, label: string): JSX.Element => (
     <label>

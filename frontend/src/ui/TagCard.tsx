@@ -22,6 +22,7 @@ import { whenOf, type Tag } from '../domain/twin';
 import { commandMap } from '../map/commands';
 import { Comments } from '../notes/Comments';
 import { act, useApp } from '../store/app';
+import { withTag } from '../store/view';
 import { selectCatalogue, selectHealth } from '../store/derived';
 import {
   selectIsHere,
@@ -75,7 +76,7 @@ export function TagCard({ tagId }: { tagId: string }): JSX.Element {
           icon="close"
           label={S.cardClose}
           onClick={() => {
-            act({ type: 'select', tagId: null });
+            act(withTag(null));
           }}
         />
       </header>
@@ -188,7 +189,7 @@ function CardBody({
                 className="text-button"
                 title={S.cardShow}
                 onClick={() => {
-                  act({ type: 'pane', pane: 'map' });
+                  act({ pane: 'map', chartedFrom: null });
                   commandMap({ type: 'show', tagId: tag.id });
                 }}
               >

@@ -59,7 +59,7 @@ function drawIdeal(frame: Frame, { sensor, bands, unit }: PlotModel, palette: Ch
     if (!ideal) continue;
     context.fillStyle = palette.ideal;
     context.fillRect(left, y(ideal[1]), right - left, y(ideal[0]) - y(ideal[1]));
-    context.strokeStyle = palette.idealLine;
+    context.strokeStyle = palette['ideal-line'];
     context.setLineDash([2 * ratio, 4 * ratio]);
     lines(ideal);
     context.setLineDash([]);
@@ -278,41 +278,25 @@ export function markerPath(marker: Marker, x: number, y: number, size: number): 
 export const isStroked = (marker: Marker): boolean =>
   marker === 'cross' || marker === 'plus' || marker === 'ring';
 
-/** The colours of charts, as the style sheet has them now: light or dark, forced, or for paper. */
-interface ChartPalette {
-  readonly lines: readonly string[];
-  readonly ink: string;
-  readonly text: string;
-  readonly grid: string;
-  readonly surface: string;
-  readonly ideal: string;
-  readonly idealLine: string;
-  readonly gap: string;
-  readonly failure: string;
-  readonly look: string;
-  readonly moment: string;
-  readonly fontPx: number;
-  readonly font: string;
-}
+/** The colours of charts beside those of the lines, by their names in the style sheet. */
+const COLOURS = [
+  ...(['ink', 'text', 'grid', 'surface', 'ideal', 'ideal-line'] as const),
+  ...(['gap', 'failure', 'look', 'moment'] as const),
+];
 
-export function readPalette(element: HTMLElement): ChartPalette {
+type Colours = Readonly<Record<(typeof COLOURS)[number], string>>;
+type ChartPalette = ReturnType<typeof readPalette>;
+
+/** As the style sheet has them now: light or dark, forced, or for paper. */
+export function readPalette(element: HTMLElement) {
   const style = getComputedStyle(element);
   const root = getComputedStyle(document.documentElement);
   const read = (name: string): string => style.getPropertyValue(`--chart-${name}`).trim();
   // Larger where the page's text is.
   const fontPx = Math.round(11.5 * (parseFloat(root.fontSize) / 16 || 1));
   return {
-    lines: Array.from({ length: 8 }, (_, index) => read(String(index + 1))),
-    ink: read('ink'),
-    text: read('text'),
-    grid: read('grid'),
-    surface: read('surface'),
-    ideal: read('ideal'),
-    idealLine: read('ideal-line'),
-    gap: read('gap'),
-    failure: read('failure'),
-    look: read('look'),
-    moment: read('moment'),
+    ...(Object.fromEntries(COLOURS.map((name) => [name, read(name)])) as Colours),
+    lines: LOOKS.map((_, index) => read(String(index + 1))),
     fontPx,
     font: `${fontPx}px ${style.getPropertyValue('--font')}`,
   };

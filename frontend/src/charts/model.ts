@@ -1,12 +1,6 @@
 /** What one chart shows: one sensor, as one or several tags read it. Pure. */
 import { fetchSeries, fetchTimeline } from '../contract/past';
-import {
-  type Catalogue,
-  type Catalogues,
-  type Ranges,
-  rangesFor,
-  type Sensor,
-} from '../domain/sensors';
+import { type Catalogue, type Catalogues, type Ranges, rangesFor } from '../domain/sensors';
 import { type TemperatureUnit, toShown } from '../domain/format';
 import { rangeOf } from '../domain/ramp';
 import {
@@ -67,18 +61,7 @@ export function bandsOf(
   return bands;
 }
 
-export interface PlotModel {
-  readonly sensor: Sensor;
-  /** By their time, over all of the span. */
-  readonly bands: readonly Band[];
-  /** The lines' plants have ranges of their own, and no band is that of all. */
-  readonly isMixed: boolean;
-  readonly unit: TemperatureUnit;
-  readonly lines: readonly Line[];
-  readonly span: Span;
-  /** The moment that the page shows, ROS seconds; null: now. */
-  readonly moment: number | null;
-}
+export type PlotModel = ReturnType<typeof modelOf>;
 
 /** A point of a line in the unit that is shown; null breaks the line. */
 type Drawn = Pick<Point, 'at' | 'value'>;
@@ -291,7 +274,7 @@ export function modelOf(
   unit: TemperatureUnit,
   moment: number | null,
   nowS: number | null,
-): PlotModel {
+) {
   const lines = tagIds.flatMap((tagId, look) => {
     const key = pairKey({ tagId, sensor });
     const own = series.get(key);

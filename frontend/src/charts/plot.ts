@@ -45,16 +45,9 @@ const SYNC_KEY = 'lupin-charts';
 /** In the page's language: uPlot goes by the browser's. */
 const AXIS_NUMBER = new Intl.NumberFormat(LOCALE);
 
-interface Plot {
-  readonly show: (model: PlotModel, size: PlotSize) => void;
-  /** Marks a time, ROS seconds, as the mouse would, and tells nobody; null: none. */
-  readonly point: (at: number | null) => void;
-  /** Draws anew in the colours that are in force now, at once: a printer does not wait. */
-  readonly recolour: () => void;
-  readonly destroy: () => void;
-}
+type Plot = ReturnType<typeof createPlot>;
 
-function createPlot(element: HTMLElement, handlers: PlotHandlers): Plot {
+function createPlot(element: HTMLElement, handlers: PlotHandlers) {
   let palette = readPalette(element);
   let model: PlotModel | null = null;
   let chart: uPlot | null = null;
@@ -192,7 +185,7 @@ function createPlot(element: HTMLElement, handlers: PlotHandlers): Plot {
   };
 
   return {
-    show: (next, size) => {
+    show: (next: PlotModel, size: PlotSize): void => {
       const before = model;
       model = next;
       const nextShape = drawnOf(next)
@@ -209,17 +202,19 @@ function createPlot(element: HTMLElement, handlers: PlotHandlers): Plot {
       if (chart.width !== size.width || chart.height !== size.height) chart.setSize(size);
       if (before !== next) chart.setData(aligned(next));
     },
-    point: (at) => {
+    /** Marks a time, ROS seconds, as the mouse would, and tells nobody; null: none. */
+    point: (at: number | null): void => {
       const left = at === null ? -10 : (chart?.valToPos(at, 'x') ?? -10);
       chart?.setCursor({ left, top: at === null ? -10 : 0 }, false);
     },
-    recolour: () => {
+    /** Draws anew in the colours that are in force now, at once: a printer does not wait. */
+    recolour: (): void => {
       palette = readPalette(element);
       chart?.batch(() => {
         chart?.redraw();
       });
     },
-    destroy: () => {
+    destroy: (): void => {
       chart?.destroy();
       chart = null;
     },

@@ -24,16 +24,7 @@ export const VERDICTS = [
 /** Who was not judged, or not yet. */
 export const NOT_JUDGED: TagHealth = { verdict: 'unknown', reasons: [] };
 
-export interface HouseHealth {
-  readonly verdict: Verdict;
-  readonly reasons: readonly HealthReason[];
-  /** Whose ranges hold, and what says so; null: nobody was asked. */
-  readonly day: Judgement['house']['day'] | null;
-  /** What it is doing; null: nobody was asked. */
-  readonly patrol: Judgement['house']['patrol'] | null;
-  readonly counts: Readonly<Record<Verdict, number>>;
-  readonly byTag: ReadonlyMap<string, TagHealth>;
-}
+export type HouseHealth = ReturnType<typeof houseHealth>;
 
 const SILENT: HealthReason = {
   kind: 'silent',
@@ -48,11 +39,7 @@ const SILENT: HealthReason = {
  * The house as it was judged. `isHeard`: false, and nothing is known of it as a whole, whatever
  * was said last; of its tags that stands, with the age of their readings beside it.
  */
-export function houseHealth(
-  tags: readonly Tag[],
-  judgement: Judgement | null,
-  isHeard: boolean,
-): HouseHealth {
+export function houseHealth(tags: readonly Tag[], judgement: Judgement | null, isHeard: boolean) {
   const counts = { critical: 0, stressed: 0, unknown: 0, healthy: 0 };
   const byTag = new Map<string, TagHealth>();
   for (const { id } of tags) {
@@ -64,6 +51,7 @@ export function houseHealth(
   return {
     verdict,
     reasons,
+    /** Whose ranges hold, and what says so; null: nobody was asked. */
     day: judgement?.house.day ?? null,
     patrol: judgement?.house.patrol ?? null,
     counts,

@@ -37,3 +37,18 @@ export function keeping<Kept extends object>(
   let last: Kept | null = null;
   return (next) => (last = last && isSame(last, next) ? last : next);
 }
+
+/** Items by their groups, which stand in the order in which the first of each comes. */
+export function groupedBy<Item>(
+  items: readonly Item[],
+  groupOf: (item: Item) => string,
+): ReadonlyMap<string, readonly Item[]> {
+  const groups = new Map<string, Item[]>();
+  for (const item of items) {
+    const group = groupOf(item);
+    const there = groups.get(group);
+    if (there) there.push(item);
+    else groups.set(group, [item]);
+  }
+  return groups;
+}

@@ -5,7 +5,7 @@ import { S } from '../strings';
 import { ageSeconds } from './time';
 import { type Cell, csv, finder } from './text';
 import { type HouseHealth, reasonsText, severity, tryKind } from './health';
-import { memoLast, memoOne } from './memo';
+import { groupedBy, memoLast, memoOne } from './memo';
 import { speciesText } from './marks';
 import type { Catalogue, Sensor } from './sensors';
 import { type TemperatureUnit, toShown, unitOf } from './format';
@@ -42,13 +42,7 @@ interface Area {
 
 /** Rows by their area, in the order in which the first of each comes. */
 export function inAreas(rows: readonly Row[], areaOf: (tagId: string) => string): readonly Area[] {
-  const areas = new Map<string, Row[]>();
-  for (const row of rows) {
-    const area = areaOf(row.tag.id);
-    const there = areas.get(area);
-    if (there) there.push(row);
-    else areas.set(area, [row]);
-  }
+  const areas = groupedBy(rows, ({ tag }) => areaOf(tag.id));
   const found = [...areas].map(([area, own]) => ({ area, rows: own }));
   return found.sort((a, b) => Number(a.area === '') - Number(b.area === ''));
 }
@@ -63,15 +57,11 @@ export function areasOnMap(
   tags: readonly Tag[],
   areaOf: (tagId: string) => string,
 ): readonly AreaOnMap[] {
-  const areas = new Map<string, MapPoint[]>();
-  for (const { id, at } of tags) {
-    const name = areaOf(id);
-    if (!at || name === '') continue;
-    const there = areas.get(name);
-    if (there) there.push(at);
-    else areas.set(name, [at]);
-  }
-  return [...areas].map(([name, places]) => ({ name, places }));
+  const pinned = tags.filter(({ id, at }) => at && areaOf(id) !== '');
+  return [...groupedBy(pinned, ({ id }) => areaOf(id))].map(([name, own]) => ({
+    name,
+    places: own.flatMap(({ at }) => at ?? []),
+  }));
 }
 
 /** The rows with a head above each area's, if there is any area. */

@@ -3,24 +3,10 @@ import type { Timeline as WireTimeline } from '../contract/types';
 import { LOCALE } from '../strings';
 import { dayFormat, secondsOf, type Span, two } from './time';
 
-/** What happened in one bucket. */
-export interface Happened extends Omit<WireTimeline['buckets'][number], 'start'> {
-  /** When the bucket begins. */
-  readonly start: number;
-}
+/** What happened in one bucket, from when it begins, ROS seconds. */
+export type Happened = Timeline['buckets'][number];
 
-export interface Timeline extends Span {
-  /** How long a bucket is, seconds. */
-  readonly bucketS: number;
-  /** What memory holds at all; null: nothing yet. */
-  readonly reach: Span | null;
-  /** By their time; one in which nothing happened is left out. */
-  readonly buckets: readonly Happened[];
-  readonly silences: readonly Span[];
-  /** Of the clock. */
-  readonly runs: readonly Span[];
-  readonly missing: readonly Missing[];
-}
+export type Timeline = ReturnType<typeof timelineOf>;
 
 type WireSpan = WireTimeline['silences'][number];
 
@@ -30,13 +16,16 @@ export const spanOfWire = ({ from, to }: WireSpan): Span => ({
 });
 
 /** `nowS`: the twin's time, ROS seconds, as it was told. */
-export function timelineOf(wire: WireTimeline, nowS: number): Timeline {
+export function timelineOf(wire: WireTimeline, nowS: number) {
   return {
     ...spanOfWire(wire),
     bucketS: wire.bucket_s,
+    /** What memory holds at all; null: nothing yet. */
     reach: wire.reach && spanOfWire(wire.reach),
+    /** By their time; one in which nothing happened is left out. */
     buckets: wire.buckets.map((bucket) => ({ ...bucket, start: secondsOf(bucket.start) })),
     silences: wire.silences.map(spanOfWire),
+    /** Of the clock. */
     runs: wire.runs.map(spanOfWire),
     missing: missingOf(wire, nowS),
   };

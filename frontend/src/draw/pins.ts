@@ -1,6 +1,6 @@
 /** Pins, blooms, pest rings and labels: what the data moves. All from cached sprites. */
 import { isBad, VERDICTS } from '../domain/health';
-import { type BloomLook, type Mark, MARKS, type Point } from '../domain/marks';
+import { type BloomLook, lineOf, type Mark, MARKS, type Point } from '../domain/marks';
 import { rgbText } from '../domain/ramp';
 import type { LabelRequest, PlacedLabel } from '../geometry/clear';
 import { type MapPoint, toCanvas } from '../geometry/coordinates';
@@ -157,12 +157,7 @@ function paintPin(
 }
 
 /** There is such a sensor, and it gives no number. */
-const STRUCK: Mark['sign'] = [
-  [
-    [-0.45, 0.45],
-    [0.45, -0.45],
-  ],
-];
+const STRUCK: Mark['sign'] = [lineOf('-.45,.45 .45,-.45')];
 
 function traceOutline(context: CanvasRenderingContext2D, { outline }: Mark, radius: number): void {
   if (outline === 'circle') {

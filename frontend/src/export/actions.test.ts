@@ -13,7 +13,7 @@ import { fileName } from './save';
 
 // Half an hour off the full one, and set before any module looks at the clock.
 vi.hoisted(() => {
-  process.env['TZ'] = 'Asia/Kolkata';
+  vi.stubEnv('TZ', 'Asia/Kolkata');
 });
 
 let saved: Blob[];

@@ -8,7 +8,7 @@ import { secondsOf } from '../domain/time';
 import { LANGUAGE, S } from '../strings';
 import { HealthMark } from '../ui/HealthMark';
 import { VIEW_WORDS } from '../words/fleetViews';
-import { alarmCount, ms, namesOf, type Site, timeText, words } from './sites';
+import { alarmCount, ms, namesOf, type Site, siteLink, timeText, words } from './sites';
 import { useAnswer, useSpeech } from './useAnswer';
 
 interface SiteAlarm extends Alarm {
@@ -90,9 +90,9 @@ function saidOf(alarm: SiteAlarm): readonly string[] {
 }
 
 /** The page of its site as it was then, with the tag's card open. */
-function linkOf({ site, tag_id: tag }: SiteAlarm, raised: number): string {
+function linkOf(alarm: SiteAlarm, raised: number): string {
   // To the millisecond that holds the observation, and not to the one before it.
   const parts = new URLSearchParams({ at: String(Math.ceil(raised * 1000) / 1000) });
-  if (tag) parts.set('tag', tag);
-  return `sites/${encodeURIComponent(site)}/${window.location.search}#${parts.toString()}`;
+  if (alarm.tag_id) parts.set('tag', alarm.tag_id);
+  return `${siteLink(alarm)}#${parts.toString()}`;
 }

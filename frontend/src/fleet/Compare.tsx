@@ -16,7 +16,8 @@ import { LANGUAGE, S } from '../strings';
 import { Select } from '../widgets/controls';
 import { VIEW_WORDS } from '../words/fleetViews';
 import type { WireTime } from '../contract/types';
-import { type Site, words } from './sites';
+import { Choice } from './Choice';
+import { type Site, siteLink, words } from './sites';
 import { useAnswer, useSpeech } from './useAnswer';
 
 const W = VIEW_WORDS[LANGUAGE];
@@ -71,20 +72,13 @@ export default function Compare({ shown }: { shown: readonly Site[] }): JSX.Elem
           text={(each) => sensors.named(each).label}
           onChange={setName}
         />
-        <div className="fleet-filters" role="group" aria-label={S.timebarPeriod}>
-          {PERIODS.map((each) => (
-            <button
-              key={each}
-              type="button"
-              aria-pressed={period === each}
-              onClick={() => {
-                setPeriod(each);
-              }}
-            >
-              {S.timebarPeriods[each]}
-            </button>
-          ))}
-        </div>
+        <Choice
+          label={S.timebarPeriod}
+          options={PERIODS}
+          value={period}
+          onChange={setPeriod}
+          text={(each) => S.timebarPeriods[each]}
+        />
         {compared.length < shown.length && (
           <p className="fleet-note">{W.someCompared(compared.length, shown.length)}</p>
         )}
@@ -126,7 +120,7 @@ export default function Compare({ shown }: { shown: readonly Site[] }): JSX.Elem
                     </label>
                   </td>
                   <th scope="row">
-                    <a href={linkOf(site, name)}>{site.name}</a>
+                    <a href={`${siteLink(site)}#sensor=${encodeURIComponent(name)}`}>{site.name}</a>
                   </th>
                   <td>{readingOrNone(model.sensor, valueAt(found, site, at), speech)}</td>
                   <td>{deviationText(model.sensor, site, speech)}</td>
@@ -155,9 +149,6 @@ function Look({ place }: { place: number }): JSX.Element | null {
     </svg>
   );
 }
-
-const linkOf = ({ site }: ComparedSite, sensor: string): string =>
-  `sites/${encodeURIComponent(site)}/${window.location.search}#sensor=${encodeURIComponent(sensor)}`;
 
 const readingOrNone = (sensor: Sensor, value: number | null, { unit }: Speech): string =>
   value === null ? S.noValue : readingText(sensor, value, unit);

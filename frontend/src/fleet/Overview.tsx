@@ -14,6 +14,7 @@ import {
 import { S } from '../strings';
 import { HealthMark } from '../ui/HealthMark';
 import { Select } from '../widgets/controls';
+import { Choice } from './Choice';
 import type { Seen } from './follow';
 import {
   alarmCount,
@@ -27,6 +28,7 @@ import {
   ms,
   silentAt,
   type Site,
+  siteLink,
   timeText,
   words,
 } from './sites';
@@ -88,26 +90,13 @@ export function Overview({ seen, isKiosk }: Props): JSX.Element {
         )}
         {!isKiosk && (
           <>
-            <nav className="fleet-filters">
-              {VIEWS.map((each) => (
-                <button
-                  key={each}
-                  type="button"
-                  aria-pressed={view === each}
-                  onClick={() => {
-                    setView(each);
-                  }}
-                >
-                  {each === 'alarms' || each === 'report' ? S[each] : words[each]}
-                  {each === 'alarms' && (
-                    <>
-                      {' '}
-                      <span className="fleet-count">{isHere && alarms}</span>
-                    </>
-                  )}
-                </button>
-              ))}
-            </nav>
+            <Choice
+              options={VIEWS}
+              value={view}
+              onChange={setView}
+              text={(each) => (each === 'alarms' || each === 'report' ? S[each] : words[each])}
+              count={(each) => (each === 'alarms' && isHere ? alarms : null)}
+            />
             <input
               ref={field}
               type="search"
@@ -130,20 +119,14 @@ export function Overview({ seen, isKiosk }: Props): JSX.Element {
                 onChange={setGroup}
               />
             )}
-            <div className="fleet-filters" role="group" aria-label={words.filter}>
-              {FILTERS.map((each) => (
-                <button
-                  key={each}
-                  type="button"
-                  aria-pressed={filter === each}
-                  onClick={() => {
-                    setFilter(each);
-                  }}
-                >
-                  {filterText(each)} <span className="fleet-count">{isHere && counts[each]}</span>
-                </button>
-              ))}
-            </div>
+            <Choice
+              label={words.filter}
+              options={FILTERS}
+              value={filter}
+              onChange={setFilter}
+              text={filterText}
+              count={(each) => (isHere ? counts[each] : null)}
+            />
           </>
         )}
       </header>
@@ -271,7 +254,7 @@ const SiteCard = memo(function SiteCard({ site, asOf }: Listed & { site: Site })
   const origin = originText(site);
   return (
     <li className="fleet-site" data-health={verdict} data-live={isLive}>
-      <a href={`sites/${encodeURIComponent(site.site)}/${window.location.search}`}>
+      <a href={siteLink(site)}>
         <h3>
           <span className="fleet-name">{name}</span>
           {origin && <span className="fleet-origin">{origin}</span>}

@@ -6,6 +6,7 @@ import type { Note, WireTime } from '../contract/types';
 import { shown as shownText } from '../domain/text';
 import { LANGUAGE, S } from '../strings';
 import { VIEW_WORDS } from '../words/fleetViews';
+import { Choice } from './Choice';
 import { ms, namesOf, type Site, timeText, words } from './sites';
 import { useAnswer } from './useAnswer';
 
@@ -37,7 +38,7 @@ interface Answer {
 }
 
 export default function Report({ shown }: { shown: readonly Site[] }): JSX.Element {
-  const [hours, setHours] = useState<number>(HOURS[0]);
+  const [hours, setHours] = useState<(typeof HOURS)[number]>(HOURS[0]);
   const names = namesOf(shown);
   const from = (Math.floor(timeOfDay() / 3_600_000) - hours) * 3600;
   const path = `api/report?from=${from}${names === '' ? '' : `&sites=${names}`}`;
@@ -48,20 +49,13 @@ export default function Report({ shown }: { shown: readonly Site[] }): JSX.Eleme
   return (
     <section className="fleet-compare" aria-label={S.report}>
       <div className="fleet-head">
-        <div className="fleet-filters" role="group" aria-label={S.timebarPeriod}>
-          {HOURS.map((each) => (
-            <button
-              key={each}
-              type="button"
-              aria-pressed={hours === each}
-              onClick={() => {
-                setHours(each);
-              }}
-            >
-              {W.hours(each)}
-            </button>
-          ))}
-        </div>
+        <Choice
+          label={S.timebarPeriod}
+          options={HOURS}
+          value={hours}
+          onChange={setHours}
+          text={W.hours}
+        />
       </div>
       {message && <p className="fleet-note">{W.notFetched(message)}</p>}
       {!value && !message && <p className="fleet-empty">{S.chartLoading}</p>}

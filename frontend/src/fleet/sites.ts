@@ -2,6 +2,7 @@
 import { timeOfDay } from '../clock';
 import { isObject } from '../contract/check';
 import type { Verdict, WireTime } from '../contract/types';
+import { groupedBy } from '../domain/memo';
 import { LANGUAGE, LOCALE } from '../strings';
 import { fleetWordsOf } from '../words/fleet';
 
@@ -44,6 +45,10 @@ const MOST_NAMED = 50;
 /** Sites for a query; empty: too many, so that all are asked for. Where the worst one moves, it stays. */
 export const namesOf = (sites: readonly Site[]): string =>
   sites.length > MOST_NAMED ? '' : String(sites.map(({ site }) => site).sort());
+
+/** The page of a site, as this one was asked for. */
+export const siteLink = ({ site }: Pick<Site, 'site'>): string =>
+  `sites/${encodeURIComponent(site)}/${window.location.search}`;
 
 export type Sites = ReadonlyMap<string, Site>;
 
@@ -142,15 +147,10 @@ export interface Group {
 
 /** Sites in their groups, in the order in which the first of each comes. */
 export function grouped(shown: readonly Site[], known: readonly string[]): readonly Group[] {
-  const groups = new Map<string, Site[]>();
-  const isKnown = new Set(known);
-  for (const site of shown) {
+  const groups = groupedBy(shown, (site) => {
     const prefix = prefixOf(site);
-    const name = isKnown.has(prefix) ? prefix : '';
-    const there = groups.get(name);
-    if (there) there.push(site);
-    else groups.set(name, [site]);
-  }
+    return known.includes(prefix) ? prefix : '';
+  });
   return [...groups].map(([name, sites]) => ({ name, sites }));
 }
 

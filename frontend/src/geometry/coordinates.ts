@@ -157,13 +157,8 @@ export function niceFloor(value: number): number {
   return (digit >= 5 ? 5 : digit >= 2 ? 2 : 1) * power;
 }
 
-interface ScaleBar {
-  readonly metres: number;
-  readonly pixels: number;
-}
-
 /** The longest round length that fits into `maxPixels`. */
-export function scaleBar(scale: number, maxPixels: number): ScaleBar {
+export function scaleBar(scale: number, maxPixels: number) {
   const metres = niceFloor(maxPixels / scale);
   return { metres, pixels: metres * scale };
 }

@@ -11,27 +11,19 @@ import { createFetcher } from '../store/fetcher';
 import { LANGUAGE, S } from '../strings';
 import { COMMENTS } from '../words/comments';
 
-export interface StandingNote {
-  readonly id: string;
-  readonly kind: Note['kind'];
-  readonly subject: string;
-  readonly text: string;
-  readonly by: string;
-  /** The moment that it is about, ROS seconds. */
-  readonly at: number;
-  /** Of `shelve` its end, ROS seconds; null: the alarm is not shelved any more. */
-  readonly until: number | null;
-}
+export type StandingNote = ReturnType<typeof standing>[number];
 
 /** What stands, the oldest moment first. */
 export const standingNotes = createStore<readonly StandingNote[]>([]);
 
-export const standing = (notes: readonly Note[]): StandingNote[] =>
+export const standing = (notes: readonly Note[]) =>
   notes
     .filter(({ withdrawn_by: by }) => by === null)
     .map(({ id, kind, subject, text, by, made_at: made, until }) => ({
       ...{ id, kind, subject, by, text: text.replace(/\s+/g, ' ') },
+      /** The moment that it is about, ROS seconds. */
       at: secondsOf((kind === 'comment' ? until : null) ?? made),
+      /** Of `shelve` its end, ROS seconds; null: the alarm is not shelved any more. */
       until: until && secondsOf(until),
     }))
     .reverse()

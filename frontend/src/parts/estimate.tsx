@@ -155,19 +155,13 @@ export function EstimateReadout({
 /** As far as what is read at one place is usually like what is read at another, metres. */
 export const NEAR_M = 2.5;
 
-interface Near {
-  readonly count: number;
-  /** When the oldest of their readings was made; "never": there is none. */
-  readonly oldest: When;
-}
-
 /** The tags with a reading of the sensor within reach; not those that the estimate leaves out. */
 export function nearTo(
   point: MapPoint,
   tags: readonly Tag[],
   sensor: string,
   { byTag }: Pick<HouseHealth, 'byTag'>,
-): Near {
+) {
   const hasChanged = ({ id }: Tag): boolean =>
     byTag.get(id)?.reasons.some((each) => each.kind === 'changed' && each.sensor === sensor) ??
     false;
@@ -181,7 +175,8 @@ export function nearTo(
   const times = near.map(({ readAt }) => readAt.get(sensor) ?? 'unknown');
   const known = times.filter((when) => typeof when === 'number');
   const oldest = known.length < times.length ? 'unknown' : Math.min(...known);
-  return { count: near.length, oldest: near.length === 0 ? 'never' : oldest };
+  const when: When = near.length === 0 ? 'never' : oldest;
+  return { count: near.length, oldest: when };
 }
 
 /** The colours of the error alone. */

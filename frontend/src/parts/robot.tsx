@@ -183,13 +183,6 @@ function useTrail(): readonly TrailPoint[] {
   return trail;
 }
 
-/** Where the robot has been; ROS seconds, metres. */
-export interface TrailPoint {
-  readonly x: number;
-  readonly y: number;
-  readonly at: number;
-}
-
 type Position = NonNullable<RobotNow['position']>;
 
 /** As the bridge keeps them: no closer in place, nor in time. */
@@ -203,7 +196,10 @@ const MOST_POINTS = 2_000;
 const GAP_S = 60;
 const GAP_M = 1;
 
-const trailPoint = ({ x, y, observed_at: at }: Robot['trail'][number]): TrailPoint => ({
+/** ROS seconds, metres. */
+export type TrailPoint = ReturnType<typeof trailPoint>;
+
+const trailPoint = ({ x, y, observed_at: at }: Robot['trail'][number]) => ({
   x,
   y,
   at: secondsOf(at),

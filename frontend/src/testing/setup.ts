@@ -1,11 +1,11 @@
 /** What jsdom lacks of a browser, as far as the page's modules touch it on import or mount. */
 import { cleanup, configure } from '@testing-library/react';
-import { afterEach } from 'vitest';
+import { afterAll, afterEach } from 'vitest';
 
-import { leaveAsFound } from './asFound';
+import { asFound } from './asFound';
 import { FakeContext } from './canvas';
 
-leaveAsFound();
+afterAll(asFound());
 
 // How long a busy machine takes is no matter.
 configure({ asyncUtilTimeout: 20_000 });

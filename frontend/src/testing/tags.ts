@@ -54,7 +54,6 @@ export function stateFrame(
 export const snapshot = (tags: readonly Tag[]): Snapshot => ({
   tags,
   revision: 'r1',
-  stamp: '1000.0',
   at: { sec: 1000, nanosec: 0 },
   takenAt: 0,
   fresh: [],

@@ -230,7 +230,7 @@ test('before the twin has told its time there is no bar', () => {
 
 // Half an hour off the full one, and set before any module looks at the clock.
 vi.hoisted(() => {
-  process.env['TZ'] = 'Asia/Kolkata';
+  vi.stubEnv('TZ', 'Asia/Kolkata');
 });
 
 const AT = Date.UTC(2026, 10, 13, 21, 42, 5) / 1000;

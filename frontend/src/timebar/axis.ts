@@ -45,14 +45,7 @@ export function stepped(
 const LEAST_COLUMN_PX = 3;
 
 /** What happened within a few pixels. */
-export interface Column extends Happened {
-  readonly end: number;
-  readonly x: number;
-  readonly width: number;
-  /** Of the tallest column, 0 to 1; any scan at all can be seen. */
-  readonly scanHeight: number;
-  readonly failureHeight: number;
-}
+export type Column = ReturnType<typeof columnsOf>[number];
 
 /** A stretch in pixels. */
 export interface Stretch {
@@ -66,7 +59,7 @@ export interface Stretch {
 const height = (count: number, most: number): number =>
   count === 0 ? 0 : Math.max(0.1, Math.sqrt(count / most));
 
-export function columnsOf({ buckets, bucketS }: Timeline, axis: Axis): readonly Column[] {
+export function columnsOf({ buckets, bucketS }: Timeline, axis: Axis) {
   const bucketPx = (bucketS / (axis.to - axis.from)) * axis.width;
   const together = Math.max(1, Math.ceil(LEAST_COLUMN_PX / Math.max(1e-9, bucketPx)));
   const wide = together * bucketS;
@@ -86,6 +79,7 @@ export function columnsOf({ buckets, bucketS }: Timeline, axis: Axis): readonly 
       end,
       x,
       width: Math.max(1, xOf(axis, end) - x),
+      // Of the tallest column, 0 to 1; any scan at all can be seen.
       scanHeight: height(sum.scans, most),
       failureHeight: height(sum.failures, most),
     };

@@ -52,7 +52,9 @@ export function TagCard({ tagId }: { tagId: string }): JSX.Element {
   const moment = useApp((state) => selectShown(state).moment);
   const isHere = useApp(selectIsHere);
   // What is newest says whether there is more to fetch, whatever moment is shown.
-  const newest = useApp((state) => selectNewestTag(state, tagId)?.observation);
+  const newest = useApp((state) =>
+    JSON.stringify(selectNewestTag(state, tagId)?.wire.last_observed),
+  );
   const fetched = useHistory(tagId, newest);
   const history = fetched && asOf(fetched, moment);
   const root = useRef<HTMLElement>(null);

@@ -221,7 +221,6 @@ function TagChoice({
   );
 }
 
-/** What is shown to take away, and every reading behind it. */
 function ChartFiles({
   models,
   span,

@@ -25,7 +25,6 @@ export interface Frame {
 const MARKER_ROOM = 9;
 const MARKER_SIZE = 6;
 
-/** Gaps, what is missing, ideal range, critical limits and what buckets range over. */
 export function drawBelow(frame: Frame, model: PlotModel, palette: ChartPalette): void {
   const { context, box } = frame;
   context.save();
@@ -107,7 +106,6 @@ function drawRanges(frame: Frame, line: Line, model: PlotModel, palette: ChartPa
   context.globalAlpha = 1;
 }
 
-/** Markers of readings, the names of limits, and the moment that is shown. */
 export function drawAbove(frame: Frame, model: PlotModel, palette: ChartPalette): void {
   const { context, box } = frame;
   // The last line's dashes are still in force.
@@ -183,7 +181,6 @@ const MARK_SIZE = 7;
 /** Between the values and their times, marks have a lane of their own; CSS pixels. */
 export const MARKS_LANE = 24;
 
-/** A cross for what failed, a flower's ring for a look. */
 export function drawMarks(frame: Frame, { marks }: Line, palette: ChartPalette): void {
   const { context, ratio, x, box } = frame;
   const bottom = box.top + box.height;
@@ -221,8 +218,6 @@ function drawMoment(
   const size = 9 * ratio;
   context.fill(new Path2D(markerPath('down', at, box.top + size / 2, size)));
 }
-
-/** How the lines of one chart are told apart: by colour, dash and marker, so that none has to do. */
 
 type Marker = 'circle' | 'square' | 'diamond' | 'up' | 'cross' | 'down' | 'plus' | 'ring';
 
@@ -274,7 +269,6 @@ export function markerPath(marker: Marker, x: number, y: number, size: number): 
   }
 }
 
-/** Markers that are strokes alone. */
 export const isStroked = (marker: Marker): boolean =>
   marker === 'cross' || marker === 'plus' || marker === 'ring';
 

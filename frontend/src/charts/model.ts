@@ -21,13 +21,11 @@ export interface Line {
   readonly series: Series;
   /** The day before, a day later than it was; null: it is not shown. */
   readonly before: Series | null;
-  /** Place among the looks. */
   readonly look: number;
   readonly label: string;
   readonly marks: readonly Mark[];
 }
 
-/** What is ideal, and what critical, for a while. */
 interface Band extends Span {
   readonly ranges: Ranges;
 }
@@ -178,7 +176,6 @@ export function limitsOf(model: PlotModel): Limit[] {
   return [...edges, ...near.filter(({ side }) => side === 'inside')];
 }
 
-/** One line of a chart. */
 export interface Pair {
   readonly tagId: string;
   readonly sensor: string;

@@ -225,7 +225,6 @@ function createPlot(element: HTMLElement, handlers: PlotHandlers) {
 const hasNames = (model: PlotModel): boolean =>
   model.lines.length === 1 || limitsOf(model).length > 0;
 
-/** A chart in an element, as large as that. */
 export function usePlot(
   place: RefObject<HTMLDivElement | null>,
   model: PlotModel,
@@ -259,7 +258,6 @@ export function usePlot(
   return plot;
 }
 
-/** A tick needs so many pixels of the axis. */
 const TICK_ROOM = 70;
 
 const ticksOf = (model: PlotModel | null, width: number): readonly Tick[] =>

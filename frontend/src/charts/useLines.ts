@@ -31,11 +31,9 @@ export interface Asked {
   readonly lines: Lines;
   /** "missing": this twin keeps no past. While it is fetched again, what was there stays. */
   readonly state: Fetched<Lines>['state'] | 'missing';
-  /** Why there is nothing, for a person to read. */
   readonly message: string;
   /** The period of the time bar; null while nobody knows what time it is. */
   readonly span: Span | null;
-  /** The time of the twin, ROS seconds. */
   readonly nowS: number | null;
 }
 
@@ -120,7 +118,6 @@ function useVisits(pairs: readonly Pair[]): string {
   return visits;
 }
 
-/** When each was observed last, and tried last. */
 const visitsOf = (state: AppState, pairs: readonly Pair[]): string =>
   JSON.stringify(
     pairs.map(({ tagId }) => {

@@ -42,7 +42,6 @@ export function zoomBack(): void {
   act({ period });
 }
 
-/** Whether there is a whole period to go back to. */
 export function useZoomed(): boolean {
   const whole = useSelected(wholePeriod);
   const isOwn = useApp((state) => state.view.period.kind === 'own');

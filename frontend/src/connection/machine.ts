@@ -13,7 +13,6 @@ export const OPENING_MS = 6_000;
 /** A connection that held this long starts the back-off afresh when it breaks. */
 const PROVEN_MS = 5_000;
 
-/** What the operator is told. */
 export type Phase = 'connecting' | 'live' | 'stale' | 'offline' | 'reconnecting';
 
 type Socket =
@@ -31,7 +30,6 @@ export interface Connection {
   readonly socket: Socket;
   /** Grows by one with each connection that opened; what was fetched before is out of date. */
   readonly epoch: number;
-  /** Attempts failed in a row. */
   readonly failures: number;
   readonly closeCode: number | null;
   /** The bridge's last word about the twin, on this connection. */
@@ -154,7 +152,6 @@ function fail(
 const silence = (socket: Socket & { kind: 'open' }, now: number): number =>
   now - (socket.lastFrameAt ?? socket.since);
 
-/** When to send the next tick. */
 export function nextDeadline({ socket }: Connection, now: number): number {
   switch (socket.kind) {
     case 'closed':

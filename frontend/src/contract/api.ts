@@ -2,7 +2,6 @@
 import { checkOf } from './check';
 import type { Field, FieldQuality, Schemas, TagHistory } from './types';
 
-/** A refusal by the server, with its reason. */
 export class Refusal extends Error {
   readonly status: number;
   /** How long the server wants to be left alone, seconds; null: not reported. */
@@ -64,7 +63,6 @@ export async function ask(path: string, init: RequestInit): Promise<Response> {
   return response;
 }
 
-/** The body, an object of JSON; what a proxy in between answers is none. */
 export async function bodyOf<T>(response: Response): Promise<T> {
   const type = response.headers.get('Content-Type') ?? 'no type';
   const body: unknown = type.includes('json') ? await response.json() : type;

@@ -13,7 +13,6 @@ export type Compare =
 export const DAY_S = 86_400;
 export const WEEK_S = 7 * DAY_S;
 
-/** The other moment, ROS seconds. */
 export const otherMoment = (compare: Compare, shownAt: number): number =>
   compare.by === 'moment' ? compare.at : shownAt - compare.seconds;
 
@@ -112,7 +111,6 @@ type Trend =
   | { readonly kind: 'by'; readonly by: number }
   /** No reading of then, or none that held then. */
   | { readonly kind: 'none' }
-  /** The reading of now is that of then. */
   | { readonly kind: 'same' };
 
 /** Null: there is no reading now that holds, and nothing to compare. */
@@ -138,7 +136,6 @@ export function isOldReading(sensor: string, { tag, health }: TagThen): boolean 
   );
 }
 
-/** Whether both have the very same reading of a sensor. */
 export function sameReading(sensor: string, a: Tag, b: Tag): boolean {
   const at = ({ wire }: Tag): string =>
     JSON.stringify(wire.readings.find(({ name }) => name === sensor)?.observed_at ?? null);

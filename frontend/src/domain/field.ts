@@ -96,7 +96,6 @@ export function smoothDetail(field: Field): number {
   return Math.max(1, Math.min(8, Math.floor(Math.sqrt(2_000_000 / cells))));
 }
 
-/** Lower left and upper right corner of the grid. */
 export function fieldCorners(field: Field): readonly [MapPoint, MapPoint] {
   const { originX, originY, width, height, resolution } = field;
   return [
@@ -186,11 +185,9 @@ const STRONGEST = 0.82;
 
 const errorAlpha = (share: number): number => FAINTEST + (STRONGEST - FAINTEST) * share;
 
-/** The colours of the error, from none to the most. */
 export const errorColours = (): string[] =>
   [0, 1].map((share) => rgbText(ERROR, errorAlpha(share)));
 
-/** The more colour, the less sure. */
 export const errorShade =
   (range: Range): Shade =>
   (data, at, value) => {
@@ -213,8 +210,6 @@ export function estimatedField(sensor: string, estimate: Estimate): Field {
     sureness: { sd, sdKnown, readingCount },
   };
 }
-
-/** What of an estimate lies on explored ground, as the twin clips the nearest readings. Pure. */
 
 /** A map's picture: RGBA, top row first; transparent is not explored. */
 interface Explored {

@@ -21,7 +21,6 @@ export const VERDICTS = [
   'healthy',
 ] as const satisfies readonly Verdict[];
 
-/** Who was not judged, or not yet. */
 export const NOT_JUDGED: TagHealth = { verdict: 'unknown', reasons: [] };
 
 export type HouseHealth = ReturnType<typeof houseHealth>;
@@ -59,7 +58,6 @@ export function houseHealth(tags: readonly Tag[], judgement: Judgement | null, i
   };
 }
 
-/** Whether something is known to be wrong. */
 export const isBad = (verdict: Verdict): boolean =>
   verdict === 'critical' || verdict === 'stressed';
 
@@ -210,7 +208,6 @@ export function todoText(reason: HealthReason): string {
   return (kinds as Partial<Record<string, string>>)[reason.kind] ?? kinds.other;
 }
 
-/** All reasons in one line, the worst first. */
 export const reasonsText = (
   sensors: Catalogue,
   reasons: readonly HealthReason[],

@@ -63,7 +63,6 @@ export function idealColour(by: number | null): Rgb {
   return by < 0 ? mix(LOW, FAR_LOW, -by) : mix(HIGH, FAR_HIGH, by);
 }
 
-/** The colours of the three parts, each from left to right. */
 export const idealParts = (alpha = 1): Readonly<Record<'low' | 'right' | 'high', string[]>> => ({
   low: [rgbText(FAR_LOW, alpha), rgbText(LOW, alpha)],
   right: [rgbText(RIGHT, alpha), rgbText(RIGHT, alpha)],
@@ -86,22 +85,17 @@ export function idealText(
   return by < 0 ? S.tooLow(how) : S.tooHigh(how);
 }
 
-/** Whose plants a cell of a field stands for: those of the nearest tag. Pure. */
-
 export interface Site {
   readonly at: MapPoint;
   readonly species: string;
 }
 
-/** The ranges that hold in a house, and which of them holds in each cell. */
 export interface Zones {
-  /** Different ones, each once. */
   readonly kinds: readonly Ranges[];
   /** Index into `kinds`, cell by cell, row 0 at the bottom; null: all have the first. */
   readonly byCell: Uint8Array | null;
 }
 
-/** How a field lies in the map. */
 export type CellGrid = Pick<Field, 'width' | 'height' | 'originX' | 'originY' | 'resolution'>;
 
 export function zonesOf(grid: CellGrid, sites: readonly Site[], sensor: Sensor): Zones {
@@ -116,7 +110,6 @@ export function zonesOf(grid: CellGrid, sites: readonly Site[], sensor: Sensor):
   return { kinds, byCell: Uint8Array.from(nearest, (site) => bySite[site] ?? 0) };
 }
 
-/** The ranges that hold at a cell. */
 export const rangesAt = ({ kinds, byCell }: Zones, cell: number): Ranges | undefined =>
   kinds[byCell?.[cell] ?? 0];
 
@@ -165,7 +158,6 @@ function nearestSites(grid: CellGrid, sites: readonly { readonly at: MapPoint }[
   return nearest;
 }
 
-/** Colours a field by how its values lie against the ranges of the plants that are nearest. */
 export const idealShade =
   (zones: Zones): Shade =>
   (data, at, value, cell) => {
@@ -173,15 +165,11 @@ export const idealShade =
     paint(data, at, idealColour(ranges ? excess(ranges, value) : null), IDEAL_ALPHA);
   };
 
-/** Where a field stands for a reading that the judge calls too old to say. Pure; judges nothing. */
-
-/** A tag that a field has a reading from. */
 export interface ReadSite {
   readonly at: MapPoint;
   readonly isOld: boolean;
 }
 
-/** The tags that a field of the sensor is made of. */
 export function readSites(
   tags: readonly Tag[],
   said: Judgement['tags'],

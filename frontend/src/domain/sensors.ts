@@ -64,9 +64,7 @@ export const rangesFor = (sensor: Sensor, species: string): Ranges =>
 /** So many names that the file does not have are remembered; tags may make up any number. */
 const MOST_OTHERS = 1_000;
 
-/** The sensors of a file, by day or by night. */
 export class Catalogue {
-  /** Those of the file, in its order. */
   readonly all: readonly Sensor[];
   readonly #known: ReadonlyMap<string, Sensor>;
   readonly #others = new Map<string, Sensor>();
@@ -105,7 +103,6 @@ export class Catalogue {
   }
 }
 
-/** One file: what holds by day, and what by night. */
 export interface Catalogues {
   readonly day: Catalogue;
   readonly night: Catalogue;

@@ -34,7 +34,6 @@ export interface Series extends Span {
   readonly sensor: string;
   /** Width of a bucket, seconds; null: these are readings. */
   readonly bucketS: number | null;
-  /** By their time. */
   readonly points: readonly Point[];
   readonly gaps: readonly Span[];
   /** When it was night by the clock; null: that does not tell. */

@@ -23,7 +23,6 @@ export function rowsOf(tags: readonly Tag[], health: HouseHealth): Row[] {
   });
 }
 
-/** Stands above the rows of an area. */
 export interface AreaHead {
   /** Empty: of the tags that are in none. */
   readonly area: string;
@@ -31,7 +30,6 @@ export interface AreaHead {
   readonly worst: Verdict;
 }
 
-/** What the table has one below the other. */
 export type Line = Row | AreaHead;
 
 interface Area {
@@ -47,7 +45,6 @@ export function inAreas(rows: readonly Row[], areaOf: (tagId: string) => string)
   return found.sort((a, b) => Number(a.area === '') - Number(b.area === ''));
 }
 
-/** An area, and where its tags are. */
 export interface AreaOnMap {
   readonly name: string;
   readonly places: readonly MapPoint[];

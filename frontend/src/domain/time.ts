@@ -116,5 +116,4 @@ export function spanOf(period: Period, now: number, oldest: number | null): Span
   }
 }
 
-/** Whether a period goes on with the time. */
 export const endsNow = (period: Period): boolean => period.kind !== 'own';

@@ -25,7 +25,6 @@ export function timelineOf(wire: WireTimeline, nowS: number) {
     /** By their time; one in which nothing happened is left out. */
     buckets: wire.buckets.map((bucket) => ({ ...bucket, start: secondsOf(bucket.start) })),
     silences: wire.silences.map(spanOfWire),
-    /** Of the clock. */
     runs: wire.runs.map(spanOfWire),
     missing: missingOf(wire, nowS),
   };
@@ -143,7 +142,6 @@ function clockText(date: Date, step: number): string {
 const dateText = (date: Date, step: number): string =>
   (step >= 30 * DAY ? monthFormat : dayFormat).format(date);
 
-/** Hours, minutes and seconds since the simulation began. */
 function countText(at: number, step: number): string {
   const seconds = Math.round(at);
   const text = `${Math.floor(seconds / HOUR)}:${two(Math.floor(seconds / MINUTE) % 60)}`;

@@ -14,7 +14,6 @@ export interface FailedTry {
 /** One tag as the page uses it. Strings are as they came: show them through `domain/text`. */
 export type Tag = ReturnType<typeof tagOf>;
 
-/** The greenhouse at one moment. */
 export interface Snapshot {
   /** By their ids; the same list as before if nothing but the time went on. */
   readonly tags: readonly Tag[];
@@ -35,7 +34,6 @@ function pointOf(point: WirePoint): MapPoint | null {
   return point.x === null || point.y === null ? null : mapPoint(point.x, point.y);
 }
 
-/** The state that a tag is read from. */
 type TakenState = Pick<Snapshot, 'at' | 'takenAt'>;
 
 /**
@@ -90,9 +88,7 @@ export function tagOf(wire: TwinTagState, state: TakenState) {
       const at = pointOf(flower.position);
       return at ? [{ at, species: flower.species, anomaly: flower.anomaly }] : [];
     }),
-    /** Outline of the planter box. */
     footprint: wire.box_footprint.points.flatMap((point) => pointOf(point) ?? []),
-    /** What all this was read from. */
     wire,
   };
 }
@@ -174,7 +170,6 @@ export function snapshotOf(latest: Latest, arrivedAt: number, before: Snapshot |
   };
 }
 
-/** How far a map of these tags goes. */
 export const reachOfTags = (tags: readonly Tag[]): Reach =>
   reachOf(tags.flatMap((tag) => tag.at ?? tag.farOff ?? []));
 
@@ -242,15 +237,12 @@ const ONE_IN = 3;
 
 const EVERYWHERE: Reach = { x: 0, y: 0, radius: Infinity };
 
-/** Whether a point could be on any map. */
 export const isPossible = ({ x, y }: Readonly<{ x: number; y: number }>): boolean =>
   Math.abs(x) <= FARTHEST_M && Math.abs(y) <= FARTHEST_M;
 
-/** Whether a point is on the map. */
 export const holds = (reach: Reach, point: MapPoint): boolean =>
   isPossible(point) && Math.hypot(point.x - reach.x, point.y - reach.y) <= reach.radius;
 
-/** The circle of tags at these places. */
 export function reachOf(places: readonly MapPoint[]): Reach {
   const possible = places.filter(isPossible);
   const x = medianLow(possible.map((place) => place.x));

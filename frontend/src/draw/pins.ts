@@ -80,10 +80,8 @@ function paintBloom(
   context.stroke();
 }
 
-/** Warnings are larger than the rest. */
 const WARNING_PX = 1;
 
-/** Those who need somebody lie on top of their neighbours. */
 const BY_SEVERITY = [...VERDICTS].reverse();
 
 export function drawPins(pen: Pen, pins: readonly Pin[], spacing: number): void {
@@ -264,8 +262,6 @@ export function drawLabels(pen: Pen, labels: readonly PlacedLabel[]): void {
     sprites.draw(pen, sprite, view.x + x, view.y + y);
   }
 }
-
-/** What moves by itself or with the pointer: pulses, the chosen pin, the crosshair. */
 
 /** How long the ring of a fresh observation grows, ms. */
 export const PULSE_MS = 1_200;

@@ -136,7 +136,6 @@ const textsOf = memoOne((tag: Tag) =>
   }),
 );
 
-/** Every species of some tags: the planters' and those of single blooms. */
 export function speciesOf(tags: readonly Tag[]): Set<string> {
   const names = new Set<string>();
   for (const tag of tags) {

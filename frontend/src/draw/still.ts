@@ -27,7 +27,6 @@ export function drawGround({ context, size, palette }: Pen): void {
 /** The greys of /api/map.png between which a cell lies, from occupied to free. */
 const OCCUPIED_GREY = 70;
 const FREE_GREY = 236;
-/** Lighter is floor. */
 export const LEAST_FREE_GREY = (OCCUPIED_GREY + FREE_GREY) / 2;
 
 /** The SLAM map in the theme's colours: its grey becomes the way from wall to floor. */
@@ -50,7 +49,6 @@ export function tintMap(pixels: ImageData, palette: Palette): HTMLCanvasElement 
   return canvasOfPixels({ data, width: pixels.width, height: pixels.height });
 }
 
-/** A picture that lies in the map. */
 interface Placed {
   readonly picture: HTMLCanvasElement;
   readonly placement: Placement;
@@ -79,7 +77,6 @@ export function placedField(field: Field, picture: HTMLCanvasElement): Placed {
 
 const GRID_GAP_PX = 56;
 
-/** Round metres within the surface. */
 function gridTicks({ size, view, textScale }: Pen) {
   const step = gridStep(view.scale, GRID_GAP_PX * textScale);
   const topLeft = toMap(view, canvasPoint(0, 0));
@@ -169,7 +166,6 @@ export function drawBoxes(
 /** How far round its tags an area is drawn, m. */
 const AREA_M = 0.25;
 
-/** Where each area is, with its name above it. */
 export function drawAreas(
   { context, view, palette, textScale }: Pen,
   areas: readonly AreaOnMap[],
@@ -199,8 +195,6 @@ export function drawAreas(
     context.fillText(name, x, y);
   }
 }
-
-/** What is not known, and where it begins: hatched inside the house, outlined at its edge. */
 
 /** From stroke to stroke of the hatching, pixels of the page. */
 const GAP_PX = 9;
@@ -285,7 +279,6 @@ export function drawUnsure(pen: Pen, steps: readonly (Placed | null)[], hatching
   });
 }
 
-/** Diagonals that move with the map. */
 function strokes({ context, size, view, palette }: Pen, gap: number): void {
   const { width, height } = size;
   const first = ((view.x + view.y) % gap) - gap;
@@ -299,7 +292,6 @@ function strokes({ context, size, view, palette }: Pen, gap: number): void {
   context.stroke();
 }
 
-/** The lines of `edgesOf`. */
 export function drawEdges({ context, size, view, palette }: Pen, lines: readonly number[]): void {
   context.strokeStyle = palette.edge;
   context.lineWidth = 1.25;

@@ -54,7 +54,6 @@ export function hatch(
   context.restore();
 }
 
-/** Goes back to CSS pixels and empties the canvas. */
 export function clear({ context, size, ratio }: Surface): void {
   context.setTransform(ratio, 0, 0, ratio, 0, 0);
   context.globalAlpha = 1;

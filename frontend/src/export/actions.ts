@@ -145,7 +145,6 @@ const LONGEST_BAR_PX = 70;
 const FONT = '13px "Inter Variable", system-ui, sans-serif';
 
 export interface Footer {
-  /** The sensor, and the date and time. */
   readonly title: string;
   readonly time: string;
   /** The ramp's two ends, the upper one with its unit; null: there is no reading. */

@@ -1,7 +1,6 @@
 import { momentText } from '../domain/format';
 import { hasDate, rosText } from '../domain/time';
 
-/** Hands a file to the browser's download. */
 export function save(blob: Blob, name: string): void {
   const link = document.createElement('a');
   link.href = URL.createObjectURL(blob);

@@ -80,7 +80,6 @@ function Row({ alarm, speech }: { alarm: SiteAlarm; speech: Speech }): JSX.Eleme
   );
 }
 
-/** What people said of it. */
 function saidOf(alarm: SiteAlarm): readonly string[] {
   const { acknowledged_by: by, acknowledged_at: at, shelved_by: who, shelved_until: until } = alarm;
   return [
@@ -89,7 +88,6 @@ function saidOf(alarm: SiteAlarm): readonly string[] {
   ];
 }
 
-/** The page of its site as it was then, with the tag's card open. */
 function linkOf(alarm: SiteAlarm, raised: number): string {
   // To the millisecond that holds the observation, and not to the one before it.
   const parts = new URLSearchParams({ at: String(Math.ceil(raised * 1000) / 1000) });

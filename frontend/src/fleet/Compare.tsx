@@ -134,7 +134,6 @@ export default function Compare({ shown }: { shown: readonly Site[] }): JSX.Elem
   );
 }
 
-/** A piece of a line. */
 function Look({ place }: { place: number }): JSX.Element | null {
   if (place < 0) return null;
   const { colour, dash } = lookOf(place);
@@ -180,8 +179,6 @@ function Chart({
   );
 }
 
-/** What the server says of one sensor of several greenhouses, and the lines of its chart. Pure. */
-
 type Values = readonly (number | null)[];
 
 interface ComparedSite {
@@ -190,7 +187,6 @@ interface ComparedSite {
   readonly mean: number | null;
   /** How far it is from the median of all, in the sensor's unit; null: it has no reading. */
   readonly deviation: number | null;
-  /** Of each bucket. */
   readonly means: Values;
 }
 

@@ -222,7 +222,6 @@ function GroupOf({ group, asOf }: Listed & { group: Group }): JSX.Element {
   );
 }
 
-/** How many, and what is wrong with them. */
 function groupText(sites: readonly Site[]): string {
   const counts = countsOf(sites);
   const alarms = alarmCount(sites);

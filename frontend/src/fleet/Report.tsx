@@ -12,7 +12,6 @@ import { useAnswer } from './useAnswer';
 
 const W = VIEW_WORDS[LANGUAGE];
 
-/** Shifts, and a day. */
 const HOURS = [12, 24] as const;
 const EVERY_MS = 60_000;
 
@@ -23,7 +22,6 @@ interface SiteReport extends Readonly<Record<(typeof COUNTED)[number], number>> 
   readonly name: string;
   readonly active_alarms: number | null;
   readonly complete_to: WireTime;
-  /** The address of its own report, as JSON. */
   readonly report: string;
 }
 

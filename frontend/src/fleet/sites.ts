@@ -19,7 +19,6 @@ export interface Site {
   readonly last_received: WireTime | null;
   readonly lag_s: number | null;
   readonly is_live: boolean;
-  /** Where what it reports comes from. */
   readonly origin: string;
   /** Another one where its small map is another; null: it has none. */
   readonly map: string | null;
@@ -39,7 +38,6 @@ export interface SitesFrame {
   readonly gone: readonly string[];
 }
 
-/** So many names are in one address. */
 const MOST_NAMED = 50;
 
 /** Sites for a query; empty: too many, so that all are asked for. Where the worst one moves, it stays. */
@@ -84,7 +82,6 @@ export function parseSites(data: unknown): SitesFrame | null {
   return sites.every(isSite) ? (frame as unknown as SitesFrame) : null;
 }
 
-/** The sites after a frame. */
 export function withFrame(before: Sites, frame: SitesFrame): Sites {
   const sites = new Map(frame.is_whole ? [] : before);
   for (const name of frame.gone) sites.delete(name);
@@ -119,7 +116,6 @@ function worstFirst(a: Site, b: Site): number {
   );
 }
 
-/** All active alarms of some sites. */
 export const alarmCount = (sites: Iterable<Site>): number =>
   [...sites].reduce((sum, { active_alarms: count }) => sum + (count ?? 0), 0);
 

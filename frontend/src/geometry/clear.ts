@@ -22,7 +22,6 @@ export interface Box {
 /** Half of the largest pin with its ring and its warning sign, pixels. */
 const REACH_PX = 21;
 
-/** Whether a pin there can be seen and clicked. */
 export function isClear(view: View, point: MapPoint, covered: readonly Box[]): boolean {
   const { x, y } = toCanvas(view, point);
   return covered.every(
@@ -90,7 +89,6 @@ export interface LabelRequest {
   readonly y: number;
   /** Half of the pin's size, pixels. */
   readonly radius: number;
-  /** Higher is placed first. */
   readonly priority: number;
   /** Texts from the most to the least telling, each with its width in pixels. */
   readonly texts: readonly { readonly text: string; readonly width: number }[];
@@ -109,7 +107,6 @@ export interface PlacedLabel {
 export interface Room {
   /** What is in sight; a label of a pin in there is not cut off. */
   readonly within: Box;
-  /** Buttons and the like. */
   readonly covered: readonly Box[];
 }
 

@@ -26,7 +26,6 @@ export interface Size {
   readonly height: number;
 }
 
-/** An upright box in metres. */
 export interface Bounds {
   readonly minX: number;
   readonly minY: number;
@@ -34,7 +33,6 @@ export interface Bounds {
   readonly maxY: number;
 }
 
-/** Pixels to leave free at each side when fitting. */
 export interface Insets {
   readonly top: number;
   readonly right: number;

@@ -18,7 +18,6 @@ export interface Placement {
   readonly height: number;
 }
 
-/** The SLAM map, decoded. */
 export interface MapPicture {
   readonly placement: Placement;
   readonly pixels: ImageData;

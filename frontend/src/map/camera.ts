@@ -32,14 +32,12 @@ interface CameraHandlers {
   readonly onCamera: (camera: Camera) => void;
 }
 
-/** A hand on the map, as the camera sees it. */
 export interface Hand {
   /** The map was moved by something else; the hand goes on from there. */
   readonly follow: (view: View) => void;
   readonly stop: () => void;
 }
 
-/** What a hand may do, and whom it tells. */
 export interface Held {
   readonly viewport: () => Viewport;
   readonly leastScale: () => number;
@@ -139,7 +137,6 @@ export class MapCamera {
     this.#handlers.onCamera(cameraOf(view, size));
   }
 
-  /** A step that the operator asked for by a key or a button. */
   #step(view: View): void {
     const before = this.#handlers.viewport().view;
     const within = this.#inSight(view);
@@ -152,7 +149,6 @@ export class MapCamera {
     return this.#held !== null;
   }
 
-  /** About the middle. */
   zoomBy(factor: number): void {
     const { view, size } = this.#handlers.viewport();
     const scale = Math.min(MAX_SCALE, Math.max(this.#leastScale, view.scale * factor));
@@ -184,7 +180,6 @@ export class MapCamera {
   }
 }
 
-/** What there is to show on the map. */
 export interface Content {
   readonly bounds: Bounds;
   readonly pins: readonly MapPoint[];
@@ -215,7 +210,6 @@ export function contentOf({ snapshot, map }: House, field: Field | null): Conten
   return bounds && { bounds, pins };
 }
 
-/** Both, as one. */
 export function together(a: Content | null, b: Content | null): Content | null {
   if (!a || !b) return a ?? b;
   const bounds = boundsOf([...corners(a.bounds), ...corners(b.bounds)]);
@@ -225,7 +219,6 @@ export function together(a: Content | null, b: Content | null): Content | null {
 /** What in the page stands on the map and hides a pin: buttons, scale bar, notices. */
 const OVER_MAP = '[data-over-map]';
 
-/** The boxes in the map view that something of the page covers. */
 export function coveredBoxes(element: HTMLElement): Box[] {
   const map = element.getBoundingClientRect();
   return [...(element.parentElement?.querySelectorAll(OVER_MAP) ?? [])].flatMap((each) => {

@@ -1,13 +1,11 @@
 import type { CanvasPoint, MapPoint, Size } from '../geometry/coordinates';
 import { createStore } from '../store/create';
 
-/** What buttons and keys ask of the map, wherever in the page they are. */
 export type MapCommand =
   | { readonly type: 'fit' }
   | { readonly type: 'zoom'; readonly factor: number }
   /** Share of the view's size to move by; x to the right, y down. */
   | { readonly type: 'pan'; readonly x: number; readonly y: number }
-  /** Brings a tag's pin into view. */
   | { readonly type: 'show'; readonly tagId: string }
   /** Shows the layers as on paper, without what moves or follows the pointer, while `take` runs. */
   | { readonly type: 'picture'; readonly take: () => void };
@@ -61,9 +59,7 @@ export interface PinUnderMouse {
   readonly at: CanvasPoint;
   /** Half the pin's size, pixels. */
   readonly reach: number;
-  /** Of the map view. */
   readonly within: Size;
 }
 
-/** The pin that the mouse rests on. */
 export const pinUnderMouse = createStore<PinUnderMouse | null>(null);

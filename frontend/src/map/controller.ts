@@ -60,7 +60,6 @@ export function runMap(
   let frame = 0;
   let pulses: readonly Pulse[] = [];
   let crosshair = false;
-  /** A picture of the map is being taken. */
   let isTaken = false;
   /** What of the map the page stands on. */
   let covered: readonly Box[] = [];

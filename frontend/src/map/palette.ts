@@ -21,7 +21,6 @@ export function onPaletteChange(listener: () => void): () => void {
   };
 }
 
-/** A colour of the system, as it is now. */
 function systemColour(name: string): Rgb {
   const probe = document.body.appendChild(document.createElement('i'));
   probe.style.color = name;

@@ -117,10 +117,8 @@ function CommentRow({
   );
 }
 
-/** As the bridge has it. */
 const LONGEST = 500;
 
-/** Where a comment is written. */
 export function CommentField({
   subject,
   moment,

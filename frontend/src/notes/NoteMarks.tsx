@@ -105,7 +105,6 @@ function noteText({ kind, text, until }: StandingNote): string {
 
 /** Notes that the text of one mark holds. */
 const MOST_NOTES = 5;
-/** Characters of each. */
 const LONGEST = 160;
 const NO_ALARMS = [] as const;
 

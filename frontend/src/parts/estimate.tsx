@@ -150,8 +150,6 @@ export function EstimateReadout({
   );
 }
 
-/** What an estimate at a point has to go by: the tags near it. Pure. */
-
 /** As far as what is read at one place is usually like what is read at another, metres. */
 export const NEAR_M = 2.5;
 
@@ -179,7 +177,6 @@ export function nearTo(
   return { count: near.length, oldest: when };
 }
 
-/** The colours of the error alone. */
 export function ErrorScale(): JSX.Element {
   const sensor = useApp(selectSensor);
   const unit = useApp((state) => state.settings.unit);
@@ -351,5 +348,4 @@ function useAsked<Name extends 'EstimateQualities' | 'ExpectedTags' | 'Advice'>(
   return { ...rest, value: value?.of === sensor ? value.told : null };
 }
 
-/** Every word of the estimate, in the language that the page speaks. */
 const E = await estimateWordsOf(LANGUAGE);

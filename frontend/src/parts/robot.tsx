@@ -119,7 +119,6 @@ export function RobotFact(): JSX.Element | null {
   );
 }
 
-/** The layer's entry in the list of layers. */
 export function RobotChoice(): JSX.Element {
   const isOn = useApp((state) => state.view.layers.has('robot'));
   return (
@@ -135,7 +134,6 @@ export function RobotChoice(): JSX.Element {
 
 const NOTHING: RobotNow = { position: null, plan: null, battery: null };
 
-/** What it says of itself. */
 export const useRobot = (): RobotNow => useSelected(robotFrame, (frame) => frame ?? NOTHING);
 
 /** The twin's time, ROS seconds; null where no age is known. */

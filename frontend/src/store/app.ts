@@ -6,7 +6,6 @@ import { DEFAULT_VIEW, type ViewState, viewAfter } from './view';
 
 /** What of the map is on the screen just now; what the operator chose is the view's camera. */
 export interface Viewport {
-  /** Where the map is on its canvas. */
   readonly view: View;
   /** Of the canvas, CSS pixels; 0 until it is laid out. */
   readonly size: Size;
@@ -35,12 +34,10 @@ const put = (part: Partial<AppState>): void => {
   store.set(changed(store.get(), part));
 };
 
-/** What the operator does. */
 export const act = (change: Change<ViewState>): void => {
   put({ view: viewAfter(store.get().view, change) });
 };
 
-/** What comes from the server. */
 export const receive = (change: Change<TwinState>): void => {
   put({ twin: changed(store.get().twin, change) });
 };

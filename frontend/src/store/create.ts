@@ -80,7 +80,6 @@ interface PointedTime {
   readonly by: 'chart' | 'bar';
 }
 
-/** Null: it is on none. */
 export const pointedTime = createStore<PointedTime | null>(null);
 
 /** What the other of the two points at, ROS seconds. */

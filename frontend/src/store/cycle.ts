@@ -8,7 +8,6 @@ import { selectSensors } from './derived';
 import { memoLast } from '../domain/memo';
 import { selectTags } from './moment';
 
-/** Seconds that one sensor may be shown. */
 export const CYCLE_LIMITS = { least: 5, most: 3_600 } as const;
 
 export interface CycleWish {
@@ -28,7 +27,6 @@ export function cycleWish(search: string): CycleWish {
     : { seconds: null, refused: text };
 }
 
-/** The sensors that some tag has. */
 export const sensorsOf = (tags: readonly Tag[], offered: readonly Sensor[]): readonly Sensor[] =>
   offered.filter(({ name }) => tags.some((tag) => tag.readings.has(name)));
 
@@ -58,7 +56,6 @@ export const nextSensor = createStore<Next | null>(null);
 
 const round = memoLast(sensorsOf);
 
-/** Begins the round; returns its end. */
 export function startCycle({ seconds }: CycleWish): () => void {
   if (seconds === null) return () => undefined;
   let timer: ReturnType<typeof setTimeout> | undefined;

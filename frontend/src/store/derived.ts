@@ -52,7 +52,6 @@ export function selectNewestHealth(state: AppState): HouseHealth | null {
   return snapshot && healthNow(snapshot.tags, health, isHeardNow(state));
 }
 
-/** The sensors by day and by night. */
 export const selectCatalogues = (state: AppState): Catalogues =>
   state.twin.sensors.value ?? NO_CATALOGUES;
 
@@ -62,7 +61,6 @@ export function selectCatalogue(state: AppState): Catalogue {
   return (selectShown(state).health?.house.day.is_day ?? true) ? day : night;
 }
 
-/** The one in view. */
 export const selectSensor = (state: AppState): Sensor =>
   selectCatalogue(state).named(state.view.sensor);
 
@@ -87,7 +85,6 @@ export const selectSensors = (state: AppState): readonly Sensor[] =>
 
 const measuredIn = memoOne((sensors: readonly Sensor[]) => sensors.filter(isMeasured));
 
-/** Those that have a column in the table. */
 export const selectColumns = (state: AppState): readonly Sensor[] =>
   measuredIn(selectSensors(state));
 
@@ -95,7 +92,6 @@ const notHidden = memoLast((columns: readonly Sensor[], hidden: readonly string[
   columns.filter(({ name }) => isColumnShown({ hidden }, name)),
 );
 
-/** Those of them that the operator has not hidden. */
 export const selectShownColumns = (state: AppState): readonly Sensor[] =>
   notHidden(selectColumns(state), state.settings.hidden);
 
@@ -158,14 +154,12 @@ export interface Heat {
   readonly zones: Zones | null;
   /** What it is the difference of; null: it is the field itself. */
   readonly difference: Difference | null;
-  /** It is the estimate's error alone. */
   readonly isError: boolean;
   /** 1 in each cell whose reading is too old to say, row 0 at the bottom; null: none is. */
   readonly old: Uint8Array | null;
 }
 
 const keptHeat = keeping<Heat>();
-/** By value, of nothing else. */
 const PLAIN = { zones: null, difference: null, isError: false, old: null } as const;
 
 const keptRead = keeping<readonly ReadSite[]>(equal);

@@ -14,7 +14,6 @@ export const DRAG_PACE_MS = 80;
 const MOST_DRAGGED = 2;
 /** A wish that has stood for so long is what the operator has come to; older fetches then end. */
 const SETTLED_MS = 250;
-/** A fetch that takes longer has failed. */
 const TIMEOUT_MS = 30_000;
 /** While somebody drags, an answer serves again for so long: late readings may still change the past. */
 const KEEP_MS = 30_000;
@@ -30,7 +29,6 @@ const CALM_LONGEST_MS = 60_000;
 export interface Fetched<T> {
   readonly value: T | null;
   readonly state: 'waiting' | 'ready' | 'failed';
-  /** Why it failed, for a person to read. */
   readonly message: string;
 }
 
@@ -42,7 +40,6 @@ export const failed = <T>(message: string, value: T | null = null): Fetched<T> =
   ...{ value, state: 'failed', message },
 });
 
-/** Something to fetch. */
 export interface Wish<T> {
   /** What it depends on; a wish with the key of the one before brings nothing new. */
   readonly key: string;

@@ -15,7 +15,6 @@ import type { House, Past, TwinState } from './twin';
 /** The moment to show: null is now, a number a moment in the past, ROS seconds. */
 export type Moment = number | null;
 
-/** The greenhouse at the moment that is shown, and how its ages go on. */
 export interface Shown extends House {
   readonly moment: Moment;
   readonly ageing: Ageing;
@@ -69,7 +68,6 @@ export const selectHasTime = ({ twin }: AppState): boolean => clockOf(twin) !== 
 /** The newest there is, whatever is shown: for the connection's word, and for what to fetch. */
 export const selectNewest = ({ twin }: AppState): House => twin.latest;
 
-/** What has come of the past, for its loader. */
 export const selectPast = ({ twin }: AppState): Past | null => twin.past;
 
 /** The moment that is wanted and not shown yet, ROS seconds; null: what is shown is wanted. */
@@ -122,7 +120,6 @@ const byId = memoOne(
 export const selectTag = (state: AppState, tagId: string): Tag | undefined =>
   byId(selectTags(state)).get(tagId);
 
-/** The same tag as it is now, whatever moment is shown. */
 export const selectNewestTag = ({ twin }: AppState, tagId: string): Tag | undefined =>
   byId(twin.latest.snapshot?.tags ?? NO_TAGS).get(tagId);
 

@@ -30,7 +30,6 @@ export function startPast(): () => void {
   let patience: ReturnType<typeof setTimeout> | undefined;
   let calm: ReturnType<typeof setTimeout> | undefined;
   let judging: AbortController | null = null;
-  /** The last connection that was open. */
   let heardOn = 0;
 
   const show = (past: Past): void => {

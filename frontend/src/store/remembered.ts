@@ -100,7 +100,6 @@ export function startRemembered(): () => void {
 
 /** In a day's bar, memory that is shorter than this is squeezed into its right end, seconds. */
 const SHORT_S = 10_800;
-/** How long SHORT_PERIOD is, seconds. */
 const HOUR_S = 3_600;
 
 /** Whether the last hour tells more than the last day; a moment to show has to be in it. */

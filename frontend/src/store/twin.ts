@@ -42,7 +42,6 @@ export const NO_HOUSE: House = {
   held: null,
 };
 
-/** What was fetched about a moment in the past. */
 export interface Past {
   /** The moment that the data are of, ROS seconds. */
   readonly at: number;
@@ -50,7 +49,6 @@ export interface Past {
   readonly house: House;
 }
 
-/** Why a moment that was asked for is not here. */
 interface PastFault {
   /** ROS seconds. */
   readonly at: number;
@@ -66,7 +64,6 @@ export interface Remembered {
   readonly message: string;
 }
 
-/** The field of one moment less that of another. */
 export interface Difference {
   /** Null: nothing is known of the other moment. */
   readonly field: Field | null;
@@ -87,7 +84,6 @@ export interface TwinState {
   readonly isTimeLost: boolean;
   /** Messages of late that were no frames, and what was wrong with the last; null: none. */
   readonly unread: { readonly count: number; readonly why: string } | null;
-  /** As the frames tell it. */
   readonly latest: House;
   /** The alarms of now and of the last day, whatever moment is shown; null: none were told of yet. */
   readonly alarms: Alarms | null;
@@ -95,9 +91,7 @@ export interface TwinState {
   readonly past: Past | null;
   readonly pastFault: PastFault | null;
   readonly remembered: Remembered;
-  /** What the heat map is when it is compared. */
   readonly difference: Fetched<Difference>;
-  /** The file of sensors that is in force. */
   readonly sensors: Fetched<Catalogues>;
 }
 

@@ -1,4 +1,3 @@
-/** What the operator chose to look at. */
 import type { Verdict } from '../contract/types';
 import type { Range } from '../domain/ramp';
 import type { Compare } from '../domain/difference';
@@ -58,7 +57,6 @@ export interface ViewState {
   readonly heat: HeatKind;
   /** What the heat map is the difference to; null: it is the field itself. */
   readonly compare: Compare | null;
-  /** What the charts show; null: they are closed. */
   readonly chart: Charted | null;
   /** The half that the charts took the place of, and lead back to; null: none that is still wanted. */
   readonly chartedFrom: ViewState['pane'] | null;
@@ -119,7 +117,6 @@ export function fixedRange({ ranges, sensor }: ViewState): Range | null {
 export const roundedMoment = (moment: number): number =>
   Math.max(0, Math.round(moment * 1000) / 1000);
 
-/** The view with other parts. */
 export function viewAfter(view: ViewState, change: Change<ViewState>): ViewState {
   const next = changed(view, change);
   return next.moment === null

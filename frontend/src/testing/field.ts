@@ -100,7 +100,6 @@ export const expectedReading = (over: Partial<Expected> = {}): Expected => ({
   ...over,
 });
 
-/** What the routes beside the field answer. */
 export const bodies = {
   quality: (sensors: Readonly<Record<string, Grade>>): object => ({ sensors }),
   tags: (tags: Readonly<Record<string, object>>): object => ({

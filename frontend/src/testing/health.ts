@@ -37,5 +37,4 @@ export function judgement(
   return { house: { verdict, reasons: [], day, patrol }, tags };
 }
 
-/** Nobody was judged. */
 export const NOBODY: Judgement = judgement({});

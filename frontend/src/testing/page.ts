@@ -45,7 +45,6 @@ export function showTags(tags: readonly TwinTagState[], health: Judgement = NOBO
 /** ROS seconds of the state that `showTags` shows next. */
 export const nextStamp = (): number => stamp + 1;
 
-/** A heat map that has come. */
 export function showField(value: Field): void {
   receive(withField({ value, state: 'ready', message: '' }));
 }

@@ -1,4 +1,3 @@
-/** Small builders for tests. */
 import type { StateFrame, TwinTagState } from '../contract/types';
 import { tagOf, type Snapshot, type Tag } from '../domain/twin';
 import { NOBODY } from './health';

@@ -35,7 +35,6 @@ const TICK_ROOM_PX = 76;
 const FAR = 10;
 const PAGES = 10;
 
-/** The bar itself: a slider whose right end is now. */
 export function Slider({
   span,
   timeline,

@@ -16,7 +16,6 @@ export const xOf = ({ from, to, width }: Axis, at: number): number =>
 export const momentAt = ({ from, to, width }: Axis, x: number): number =>
   from + (Math.min(width, Math.max(0, x)) / Math.max(1, width)) * (to - from);
 
-/** What a pixel is worth, seconds. */
 export const pixelS = ({ from, to, width }: Axis): number => (to - from) / Math.max(1, width);
 
 /**
@@ -47,7 +46,6 @@ const LEAST_COLUMN_PX = 3;
 /** What happened within a few pixels. */
 export type Column = ReturnType<typeof columnsOf>[number];
 
-/** A stretch in pixels. */
 export interface Stretch {
   readonly x: number;
   readonly width: number;
@@ -119,6 +117,5 @@ export function beforeMemory({ reach }: Timeline, axis: Axis): Stretch | null {
   return until > 0 ? { x: 0, width: until } : null;
 }
 
-/** The column that a point of the bar lies on. */
 export const columnAt = (columns: readonly Column[], x: number): Column | undefined =>
   columns.find((column) => x >= column.x && x < column.x + column.width);

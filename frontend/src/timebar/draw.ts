@@ -124,7 +124,6 @@ function drawColumns(
   }
 }
 
-/** A full triangle on its tip. */
 function drawPest(context: CanvasRenderingContext2D, x: number, palette: BarPalette): void {
   context.beginPath();
   context.moveTo(x - 5, 2.5);
@@ -138,7 +137,6 @@ function drawPest(context: CanvasRenderingContext2D, x: number, palette: BarPale
   context.stroke();
 }
 
-/** An empty ring. */
 function drawCleared(context: CanvasRenderingContext2D, x: number, palette: BarPalette): void {
   context.beginPath();
   context.arc(x, MARKS_PX / 2, 4, 0, 2 * Math.PI);
@@ -149,7 +147,6 @@ function drawCleared(context: CanvasRenderingContext2D, x: number, palette: BarP
   context.stroke();
 }
 
-/** A dashed line over the whole height. */
 function drawRunStart(context: CanvasRenderingContext2D, x: number, palette: BarPalette): void {
   context.save();
   context.strokeStyle = palette.ink;

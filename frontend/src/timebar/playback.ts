@@ -11,7 +11,6 @@ import { barSpan, twinNow } from '../store/moment';
 export const SPEEDS = [60, 300, 900, 3_600] as const;
 type Speed = (typeof SPEEDS)[number];
 
-/** Ten moments a second. */
 const TICK_MS = 100;
 
 interface Playback {

@@ -65,7 +65,6 @@ interface CheckProps extends Omit<ComponentProps<'input'>, 'type' | 'checked' | 
   readonly onChange: (isOn: boolean) => void;
 }
 
-/** What is on or off. */
 export const Check = ({ label, isOn, onChange, ...rest }: CheckProps): JSX.Element => (
   <label className="check">
     <input
@@ -177,7 +176,6 @@ interface DisclosureProps {
   readonly label: string;
   readonly button: ReactNode;
   readonly className: string;
-  /** Of the button. */
   readonly look?: string;
   readonly children: ReactNode;
 }

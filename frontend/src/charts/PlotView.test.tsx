@@ -3,7 +3,7 @@ import { beforeEach, expect, test, vi } from 'vitest';
 
 import { readingAt, type Series } from '../domain/series';
 import { act, receive, store } from '../store/app';
-import { NOT_ASKED } from '../store/twin';
+import { NOTHING } from '../store/fetcher';
 import { showTags } from '../testing/page';
 import { sensorNamed } from '../testing/sensors';
 import { bucketAt, seriesWith, timelineWith } from '../testing/timeline';
@@ -61,7 +61,7 @@ function said(
   showTags([]);
   act({ moment });
   const value = timelineWith({ reach: { from: 100_000 - known, to: 100_000 } });
-  receive({ remembered: { ...NOT_ASKED, value } });
+  receive({ remembered: { ...NOTHING, value } });
   const line = lineOf(seriesWith({ sensor, readings }));
   const model = plainModel(sensor, [line]);
   const { container } = render(<LineValue line={line} model={model} />);

@@ -8,12 +8,7 @@ import { limitsOf, type Line, type PlotModel, pointsOf } from './model';
 /** Where things lie on the canvas, in its own pixels. */
 export interface Frame {
   readonly context: CanvasRenderingContext2D;
-  readonly box: {
-    readonly left: number;
-    readonly top: number;
-    readonly width: number;
-    readonly height: number;
-  };
+  readonly box: Readonly<Record<'left' | 'top' | 'width' | 'height', number>>;
   /** Canvas pixels a CSS pixel. */
   readonly ratio: number;
   readonly x: (at: number) => number;
@@ -221,29 +216,24 @@ function drawMoment(
 
 type Marker = 'circle' | 'square' | 'diamond' | 'up' | 'cross' | 'down' | 'plus' | 'ring';
 
-interface Look {
-  /** Of `--chart-1` to `--chart-8` in the style sheet. */
-  readonly colour: number;
-  /** Strokes and pauses, CSS pixels; empty: one stroke. */
-  readonly dash: readonly number[];
-  readonly marker: Marker;
-}
-
-const LOOKS: readonly Look[] = [
-  { colour: 0, dash: [], marker: 'circle' },
-  { colour: 1, dash: [8, 4], marker: 'square' },
-  { colour: 2, dash: [2, 3], marker: 'diamond' },
-  { colour: 3, dash: [12, 3, 2, 3], marker: 'up' },
-  { colour: 4, dash: [5, 2], marker: 'cross' },
-  { colour: 5, dash: [8, 3, 2, 3, 2, 3], marker: 'down' },
-  { colour: 6, dash: [3, 6], marker: 'plus' },
-  { colour: 7, dash: [14, 5], marker: 'ring' },
+/** How the lines of one chart are told apart: by colour, dash and marker, so that none has to do. */
+const LOOKS: readonly { readonly dash: readonly number[]; readonly marker: Marker }[] = [
+  { dash: [], marker: 'circle' },
+  { dash: [8, 4], marker: 'square' },
+  { dash: [2, 3], marker: 'diamond' },
+  { dash: [12, 3, 2, 3], marker: 'up' },
+  { dash: [5, 2], marker: 'cross' },
+  { dash: [8, 3, 2, 3, 2, 3], marker: 'down' },
+  { dash: [3, 6], marker: 'plus' },
+  { dash: [14, 5], marker: 'ring' },
 ];
 
-const FIRST: Look = { colour: 0, dash: [], marker: 'circle' };
-
 /** The look of the line with that place in the list; each keeps its own while others go. */
-export const lookOf = (index: number): Look => LOOKS[index % LOOKS.length] ?? FIRST;
+export function lookOf(index: number) {
+  const colour = index % LOOKS.length;
+  const { dash, marker } = LOOKS[colour] ?? { dash: [], marker: 'circle' };
+  return { colour, dash, marker };
+}
 
 /** Outline of a marker around a point; `size` is its width. Filled but for crosses and the ring. */
 export function markerPath(marker: Marker, x: number, y: number, size: number): string {

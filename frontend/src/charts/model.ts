@@ -151,22 +151,16 @@ export function valueRange({ lines, sensor, bands, unit }: PlotModel): [low: num
 }
 
 /** A limit that is named at the picture's edge, and where its line lies. */
-interface Limit {
-  readonly kind: 'ideal' | 'critical';
-  readonly value: number;
-  readonly side: 'below' | 'inside' | 'above';
-}
-
 /** Those of the end of the span: the ideal range's, of one out of sight the nearer, and critical ones in sight. */
-export function limitsOf(model: PlotModel): Limit[] {
+export function limitsOf(model: PlotModel) {
   const { ideal, critical } = model.bands.at(-1)?.ranges ?? {};
   const [low, high] = valueRange(model);
-  const named =
-    (kind: Limit['kind']) =>
-    (value: number): Limit => {
-      const at = toShown(model.sensor, value, model.unit);
-      return { kind, value, side: at < low ? 'below' : at > high ? 'above' : 'inside' };
-    };
+  const named = (kind: 'ideal' | 'critical') => (value: number) => {
+    const at = toShown(model.sensor, value, model.unit);
+    const side =
+      at < low ? ('below' as const) : at > high ? ('above' as const) : ('inside' as const);
+    return { kind, value, side };
+  };
   const [first, last] = (ideal ?? []).map(named('ideal'));
   const edges = [
     ...(first && last?.side !== 'below' ? [first] : []),

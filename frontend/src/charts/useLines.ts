@@ -2,24 +2,15 @@ import { type RefObject, useLayoutEffect, useMemo, useRef, useState } from 'reac
 
 import { now, pause } from '../clock';
 import { type Catalogue, isHad, isMeasured } from '../domain/sensors';
-import { endsNow, type Span, spanOf } from '../domain/time';
+import { endsNow, spanOf } from '../domain/time';
 import { type AppState, store, useApp } from '../store/app';
 import { createStore, useSelected } from '../store/create';
 import { selectCatalogue, selectCatalogues } from '../store/derived';
-import { type Fetched, useFetched } from '../store/fetcher';
+import { useFetched } from '../store/fetcher';
 import { rosNow, selectDayS, selectNewestTag, selectTag } from '../store/moment';
 import { turnOf } from '../store/remembered';
 import { useNow } from '../widgets/useNow';
-import {
-  fetchLines,
-  type Lines,
-  modelOf,
-  NO_LINES,
-  type Pair,
-  pairKey,
-  type Plan,
-  type PlotModel,
-} from './model';
+import { fetchLines, type Lines, modelOf, NO_LINES, type Pair, pairKey, type Plan } from './model';
 
 /** Between two questions about the same lines, ms; of many lines longer. */
 const PACE_MS = 3_000;
@@ -27,21 +18,13 @@ const PACE_A_LINE_MS = 1_000;
 /** What was heard is in the journal within 100 ms, and in another host's copy of it soon after. */
 const WRITTEN_MS = 1_000;
 
-export interface Asked {
-  readonly lines: Lines;
-  /** "missing": this twin keeps no past. While it is fetched again, what was there stays. */
-  readonly state: Fetched<Lines>['state'] | 'missing';
-  readonly message: string;
-  /** The period of the time bar; null while nobody knows what time it is. */
-  readonly span: Span | null;
-  readonly nowS: number | null;
-}
+export type Asked = ReturnType<typeof useLines>;
 
 /**
  * What these lines have over the period of the time bar: asked for again when one of the tags was
  * visited, on each connection, and now and then.
  */
-export function useLines(pairs: readonly Pair[], points: number, hasDayBefore = false): Asked {
+export function useLines(pairs: readonly Pair[], points: number, hasDayBefore = false) {
   const period = useApp((state) => state.view.period);
   const remembered = useApp((state) => state.twin.remembered);
   const epoch = useApp((state) => state.twin.connection.epoch);
@@ -74,17 +57,18 @@ export function useLines(pairs: readonly Pair[], points: number, hasDayBefore = 
     PACE_MS,
   );
   return {
-    ...{ lines: fetched.value ?? NO_LINES, span, nowS },
-    ...(isOff ? { state: 'missing', message: remembered.message } : fetched),
+    lines: fetched.value ?? NO_LINES,
+    /** Null while nobody knows what time it is. */
+    span,
+    nowS,
+    /** "missing": this twin keeps no past. While it is fetched again, what was there stays. */
+    state: isOff ? ('missing' as const) : fetched.state,
+    message: isOff ? remembered.message : fetched.message,
   };
 }
 
 /** The charts of plans of the same tags, as far as their lines are here. */
-export function useCharts(
-  plans: readonly Plan[],
-  points: number,
-  hasDayBefore = false,
-): { asked: Asked; models: readonly PlotModel[] } {
+export function useCharts(plans: readonly Plan[], points: number, hasDayBefore = false) {
   const unit = useApp((state) => state.settings.unit);
   const moment = useApp((state) => state.view.moment);
   const catalogue = useApp(selectCatalogue);

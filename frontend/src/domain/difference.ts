@@ -106,21 +106,14 @@ export interface TagThen {
   readonly health: TagHealth;
 }
 
-type Trend =
-  /** `by`: what is now less what was then, in the sensor's unit. */
-  | { readonly kind: 'by'; readonly by: number }
-  /** No reading of then, or none that held then. */
-  | { readonly kind: 'none' }
-  | { readonly kind: 'same' };
-
 /** Null: there is no reading now that holds, and nothing to compare. */
-export function trendOf(sensor: string, now: TagThen, then: TagThen | null): Trend | null {
+export function trendOf(sensor: string, now: TagThen, then: TagThen | null) {
   const value = held(sensor, now);
   if (value === null) return null;
   const before = then && held(sensor, then);
-  if (then === null || before === null) return { kind: 'none' };
-  if (sameReading(sensor, now.tag, then.tag)) return { kind: 'same' };
-  return { kind: 'by', by: value - before };
+  if (then === null || before === null) return { kind: 'none' } as const;
+  if (sameReading(sensor, now.tag, then.tag)) return { kind: 'same' } as const;
+  return { kind: 'by', by: value - before } as const;
 }
 
 /** The value of a reading that has not grown too old; null: there is none. */

@@ -165,16 +165,13 @@ export const idealShade =
     paint(data, at, idealColour(ranges ? excess(ranges, value) : null), IDEAL_ALPHA);
   };
 
-export interface ReadSite {
-  readonly at: MapPoint;
-  readonly isOld: boolean;
-}
+export type ReadSite = ReturnType<typeof readSites>[number];
 
 export function readSites(
   tags: readonly Tag[],
   said: Judgement['tags'],
   sensor: Pick<Sensor, 'name' | 'madeOf'>,
-): ReadSite[] {
+) {
   return tags.flatMap(({ id, at, readings }) => {
     const parts = partsOf(sensor, (part) => readings.has(part));
     if (!at || parts.some((part) => (readings.get(part) ?? null) === null)) return [];

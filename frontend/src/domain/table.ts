@@ -1,6 +1,5 @@
 /** Rows of the table: what is in a column, how it sorts, what a filter finds. */
 import type { TagHealth, Verdict, WireTime } from '../contract/types';
-import type { MapPoint } from '../geometry/coordinates';
 import { S } from '../strings';
 import { ageSeconds } from './time';
 import { type Cell, csv, finder } from './text';
@@ -32,28 +31,18 @@ export interface AreaHead {
 
 export type Line = Row | AreaHead;
 
-interface Area {
-  /** Empty: that of the tags that are in none; it comes last. */
-  readonly area: string;
-  readonly rows: readonly Row[];
-}
+type Area = ReturnType<typeof inAreas>[number];
 
-/** Rows by their area, in the order in which the first of each comes. */
-export function inAreas(rows: readonly Row[], areaOf: (tagId: string) => string): readonly Area[] {
+/** Rows by their area, in the order in which the first of each comes; last those that are in none. */
+export function inAreas(rows: readonly Row[], areaOf: (tagId: string) => string) {
   const areas = groupedBy(rows, ({ tag }) => areaOf(tag.id));
   const found = [...areas].map(([area, own]) => ({ area, rows: own }));
   return found.sort((a, b) => Number(a.area === '') - Number(b.area === ''));
 }
 
-export interface AreaOnMap {
-  readonly name: string;
-  readonly places: readonly MapPoint[];
-}
+export type AreaOnMap = ReturnType<typeof areasOnMap>[number];
 
-export function areasOnMap(
-  tags: readonly Tag[],
-  areaOf: (tagId: string) => string,
-): readonly AreaOnMap[] {
+export function areasOnMap(tags: readonly Tag[], areaOf: (tagId: string) => string) {
   const pinned = tags.filter(({ id, at }) => at && areaOf(id) !== '');
   return [...groupedBy(pinned, ({ id }) => areaOf(id))].map(([name, own]) => ({
     name,

@@ -24,7 +24,7 @@ import {
 import { rosNow, selectHasOwnTime, selectOrigin, selectShown } from '../store/moment';
 import { isChosen } from '../store/view';
 import { LANGUAGE, S } from '../strings';
-import { fileName, pastFileName, save } from './save';
+import { fileName, save } from './save';
 
 /**
  * The table as the operator sees it, filtered and sorted; ages are those of the state's time. Asked
@@ -55,12 +55,8 @@ function writeTable(): void {
     unit,
     snapshot.takenAt,
   );
-  save(
-    new Blob([text], { type: 'text/csv;charset=utf-8' }),
-    moment === null
-      ? fileName('tags', 'csv', epochOf(snapshot.takenAt))
-      : pastFileName('tags', 'csv', moment),
-  );
+  const blob = new Blob([text], { type: 'text/csv;charset=utf-8' });
+  save(blob, fileName('tags', 'csv', epochOf(snapshot.takenAt), moment));
 }
 
 /** The map as the operator sees it, with a footer that says what, when and how large. */
@@ -129,11 +125,7 @@ export async function saveMap(): Promise<void> {
   const blob = await new Promise<Blob | null>((resolve) => {
     canvas.toBlob(resolve, 'image/png');
   });
-  if (blob)
-    save(
-      blob,
-      moment === null ? fileName('map', 'png', takenAt) : pastFileName('map', 'png', moment),
-    );
+  if (blob) save(blob, fileName('map', 'png', takenAt, moment));
 }
 
 /** Below the map in a saved picture. */

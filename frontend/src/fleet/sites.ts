@@ -135,14 +135,10 @@ export function groupNames(sites: Iterable<Site>): readonly string[] {
   return found.map(([name]) => name).sort(names.compare);
 }
 
-export interface Group {
-  /** Empty: those of no group. */
-  readonly name: string;
-  readonly sites: readonly Site[];
-}
+export type Group = ReturnType<typeof grouped>[number];
 
-/** Sites in their groups, in the order in which the first of each comes. */
-export function grouped(shown: readonly Site[], known: readonly string[]): readonly Group[] {
+/** Sites in their groups, in the order in which the first of each comes; nameless: those of none. */
+export function grouped(shown: readonly Site[], known: readonly string[]) {
   const groups = groupedBy(shown, (site) => {
     const prefix = prefixOf(site);
     return known.includes(prefix) ? prefix : '';

@@ -1,23 +1,15 @@
 /** Keeps pins clear of what stands on the map, and labels clear of each other. Pure. */
 import {
   type Bounds,
+  type Box,
   canvasPoint,
   type CanvasPoint,
   fit,
-  type Insets,
   type MapPoint,
   type Size,
   toCanvas,
   type View,
 } from './coordinates';
-
-/** An upright box in pixels; of the map view unless it says otherwise. */
-export interface Box {
-  readonly left: number;
-  readonly top: number;
-  readonly right: number;
-  readonly bottom: number;
-}
 
 /** Half of the largest pin with its ring and its warning sign, pixels. */
 const REACH_PX = 21;
@@ -41,14 +33,14 @@ export function fitClear(
   bounds: Bounds,
   pins: readonly MapPoint[],
   size: Size,
-  insets: Insets,
+  insets: Box,
   covered: readonly Box[],
 ): View {
   const clear = (view: View): boolean => pins.every((pin) => isClear(view, pin, covered));
   const plain = fit(bounds, size, insets);
   if (clear(plain)) return plain;
   const views = covered
-    .reduce<readonly Insets[]>(
+    .reduce<readonly Box[]>(
       (all, box) =>
         all.flatMap((own) =>
           waysAround(box, size).map(([side, depth]) => ({
@@ -64,8 +56,8 @@ export function fitClear(
 }
 
 /** The sides that a box leaves a third of the view to at least, and how deep it is from there. */
-function waysAround(box: Box, { width, height }: Size): (readonly [keyof Insets, number])[] {
-  const ways: (readonly [keyof Insets, number, number])[] = [
+function waysAround(box: Box, { width, height }: Size): (readonly [keyof Box, number])[] {
+  const ways: (readonly [keyof Box, number, number])[] = [
     ['top', box.bottom + REACH_PX, height],
     ['right', width - box.left + REACH_PX, width],
     ['bottom', height - box.top + REACH_PX, height],

@@ -33,12 +33,8 @@ export interface Bounds {
   readonly maxY: number;
 }
 
-export interface Insets {
-  readonly top: number;
-  readonly right: number;
-  readonly bottom: number;
-  readonly left: number;
-}
+/** The four sides of an upright box in pixels, or what is left free at each. */
+export type Box = Readonly<Record<'left' | 'top' | 'right' | 'bottom', number>>;
 
 export function toCanvas(view: View, point: MapPoint): CanvasPoint {
   return canvasPoint(view.x + point.x * view.scale, view.y - point.y * view.scale);
@@ -82,6 +78,11 @@ export function boundsOf(points: Iterable<MapPoint>): Bounds | null {
   return minX <= maxX ? { minX, minY, maxX, maxY } : null;
 }
 
+/** Wider by so much on each side. */
+export const widened = ({ minX, minY, maxX, maxY }: Bounds, by: number): Bounds => ({
+  ...{ minX: minX - by, minY: minY - by, maxX: maxX + by, maxY: maxY + by },
+});
+
 export function corners(bounds: Bounds): MapPoint[] {
   return [
     mapPoint(bounds.minX, bounds.minY),
@@ -98,7 +99,7 @@ export const MAX_SCALE = 2000;
 const MIN_EXTENT_M = 2;
 
 /** The view that shows all of `bounds`, centred in what the insets leave free. */
-export function fit(bounds: Bounds, size: Size, insets: Insets): View {
+export function fit(bounds: Bounds, size: Size, insets: Box): View {
   const width = Math.max(1, size.width - insets.left - insets.right);
   const height = Math.max(1, size.height - insets.top - insets.bottom);
   const extentX = Math.max(MIN_EXTENT_M, bounds.maxX - bounds.minX);

@@ -1,5 +1,5 @@
 import type { OccupancyGrid } from '../contract/types';
-import { mapPoint, type MapPoint, type View } from './coordinates';
+import { type Box, mapPoint, type MapPoint, type View } from './coordinates';
 
 /** Canvas transform (a, b, c, d, e, f) as CanvasRenderingContext2D.setTransform takes it. */
 type Affine = readonly [number, number, number, number, number, number];
@@ -26,16 +26,8 @@ export interface MapPicture {
 }
 
 /** Yaw of a rotation about z; a quaternion of zeros counts as no turn. */
-export function yawOf(q: {
-  x: number | null;
-  y: number | null;
-  z: number | null;
-  w: number | null;
-}): number {
-  const x = q.x ?? 0;
-  const y = q.y ?? 0;
-  const z = q.z ?? 0;
-  const w = q.w ?? 0;
+export function yawOf(of: Readonly<Record<'x' | 'y' | 'z' | 'w', number | null>>): number {
+  const [x, y, z, w] = [of.x ?? 0, of.y ?? 0, of.z ?? 0, of.w ?? 0];
   return Math.atan2(2 * (w * z + x * y), w * w + x * x - y * y - z * z);
 }
 
@@ -73,10 +65,7 @@ export function imageToCanvas(placement: Placement, view: View): Affine {
 }
 
 /** Corners in the map frame of the pixels from (left, top) to (right, bottom), exclusive. */
-export function pixelBoxCorners(
-  placement: Placement,
-  box: { left: number; top: number; right: number; bottom: number },
-): MapPoint[] {
+export function pixelBoxCorners(placement: Placement, box: Box): MapPoint[] {
   const { originX, originY, yaw, resolution, height } = placement;
   const place = (column: number, row: number): MapPoint => {
     const u = column * resolution;
@@ -95,11 +84,7 @@ export function pixelBoxCorners(
 }
 
 /** The smallest pixel box that holds every pixel which is not fully transparent. */
-export function opaqueBox(
-  rgba: Uint8ClampedArray,
-  width: number,
-  height: number,
-): { left: number; top: number; right: number; bottom: number } | null {
+export function opaqueBox(rgba: Uint8ClampedArray, width: number, height: number): Box | null {
   let left = width;
   let right = 0;
   let top = height;

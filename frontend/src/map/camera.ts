@@ -3,14 +3,14 @@ import type { Field } from '../contract/types';
 import { fieldCorners } from '../domain/field';
 import { memoOne } from '../domain/memo';
 import { holds, isPossible, reachOfTags, type Tag } from '../domain/twin';
-import { type Box, fitClear, isClear } from '../geometry/clear';
+import { fitClear, isClear } from '../geometry/clear';
 import {
   type Bounds,
   boundsOf,
+  type Box,
   type Camera,
   cameraOf,
   corners,
-  type Insets,
   inSight,
   type MapPoint,
   MAX_SCALE,
@@ -59,7 +59,7 @@ const isSame = (a: View, b: View): boolean =>
   Math.abs(a.scale / b.scale - 1) < 1e-9;
 
 /** Space around what is fitted: less on a phone, also on its side, where each pixel counts. */
-function fitInsets({ width, height }: Size): Insets {
+function fitInsets({ width, height }: Size): Box {
   return width < 560 || height < 280
     ? { top: 26, right: 60, bottom: 40, left: 26 }
     : { top: 30, right: 76, bottom: 52, left: 40 };
@@ -224,14 +224,8 @@ export function coveredBoxes(element: HTMLElement): Box[] {
   return [...(element.parentElement?.querySelectorAll(OVER_MAP) ?? [])].flatMap((each) => {
     const { left, top, right, bottom, width, height } = each.getBoundingClientRect();
     if (width === 0 || height === 0) return [];
-    return [
-      {
-        left: left - map.left,
-        top: top - map.top,
-        right: right - map.left,
-        bottom: bottom - map.top,
-      },
-    ];
+    const [x, y] = [map.left, map.top];
+    return [{ left: left - x, top: top - y, right: right - x, bottom: bottom - y }];
   });
 }
 

@@ -20,6 +20,9 @@ let stop: () => void;
 let frames: FrameRequestCallback[];
 let calm: boolean;
 
+const fail = (error: unknown): void => {
+  throw error;
+};
 const SIZE = { width: 600, height: 400 };
 const tagAt = (id: string, x: number, y: number, sec = 100): ReturnType<typeof wireTag> =>
   wireTag({
@@ -34,7 +37,7 @@ const start = (isFixed = false): void => {
   overlay = canvas();
   pins = canvas();
   still = canvas();
-  stop = runMap(element, { still, pins, overlay }, isFixed);
+  stop = runMap(element, { still, pins, overlay }, isFixed, fail);
   paint();
 };
 /** Runs what waits for the next frame. */
@@ -306,7 +309,7 @@ test('everything is in sight, the heat map too', () => {
 
 test('a map of another size is drawn at once, and not empty for a frame', () => {
   const still = document.createElement('canvas');
-  stop = runMap(element, { still, pins, overlay });
+  stop = runMap(element, { still, pins, overlay }, false, fail);
   expect(FakeContext.recordOf(still)?.named('clearRect').length).toBeGreaterThan(0);
 });
 

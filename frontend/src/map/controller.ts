@@ -2,8 +2,8 @@
 import { now } from '../clock';
 import { pinRadius, type Pulse, PULSE_MS } from '../draw/pins';
 import type { Pin } from '../draw/scene';
-import type { Box } from '../geometry/clear';
 import {
+  type Box,
   canvasPoint,
   nearest,
   toCanvas,
@@ -44,8 +44,8 @@ type Part = 'still' | 'pins' | 'overlay' | 'view';
 export function runMap(
   element: HTMLElement,
   canvases: Canvases,
-  isFixed = false,
-  onFailure: (error: unknown) => void = rethrow,
+  isFixed: boolean,
+  onFailure: (error: unknown) => void,
 ): () => void {
   const guarded = (work: () => void) => (): void => {
     try {
@@ -380,10 +380,6 @@ export function runMap(
     cancelAnimationFrame(frame);
     camera.destroy();
   };
-}
-
-function rethrow(error: unknown): never {
-  throw error;
 }
 
 function newPulses({ snapshot }: Shown): Pulse[] {

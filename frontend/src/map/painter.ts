@@ -46,8 +46,8 @@ import {
   tintMap,
   unsureOf,
 } from '../draw/still';
-import type { Size, View } from '../geometry/coordinates';
-import { type Box, placeLabels, type Room } from '../geometry/clear';
+import type { Box, Size, View } from '../geometry/coordinates';
+import { placeLabels, type Room } from '../geometry/clear';
 import type { AppState } from '../store/app';
 import {
   selectAreas,

@@ -213,16 +213,13 @@ export function extended(trail: readonly TrailPoint[], position: Position): read
   return [...trail.slice(1 - MOST_POINTS), next];
 }
 
-export interface Line {
-  readonly points: readonly (readonly [number, number])[];
-  /** 0: of now, to 5: two minutes ago. */
-  readonly step: number;
-}
-
 export const STEPS = 6;
 
-/** The trail in lines that are alike in age; null: the time is not known, and all is the oldest. */
-export function trailLines(trail: readonly TrailPoint[], now: number | null): readonly Line[] {
+/**
+ * The trail in lines that are alike in age, from step 0, now, to 5, two minutes ago. Null: the time is not
+ * known, and all is the oldest.
+ */
+export function trailLines(trail: readonly TrailPoint[], now: number | null) {
   const lines: { points: [number, number][]; step: number }[] = [];
   let last: TrailPoint | null = null;
   for (const point of trail) {

@@ -5,7 +5,7 @@
 import { now } from '../clock';
 import { differenceOf, otherMoment, type Compare } from '../domain/difference';
 import type { Snapshot } from '../domain/twin';
-import type { Bounds } from '../geometry/coordinates';
+import { type Bounds, widened } from '../geometry/coordinates';
 import { onChange, receive, store, type AppState } from './app';
 import { sourceOf } from './derived';
 import { ASSUMED_MARGIN_M, boundsOfPins, fetchHeat, fieldResolution } from './heat';
@@ -95,12 +95,8 @@ function boxOf(snapshot: Snapshot | null, resolution: number): Bounds | null {
   if (!bounds) return null;
   const down = (metres: number): number => round(Math.floor(metres / resolution) * resolution);
   const up = (metres: number): number => round(Math.ceil(metres / resolution) * resolution);
-  return {
-    minX: down(bounds.minX - ASSUMED_MARGIN_M),
-    minY: down(bounds.minY - ASSUMED_MARGIN_M),
-    maxX: up(bounds.maxX + ASSUMED_MARGIN_M),
-    maxY: up(bounds.maxY + ASSUMED_MARGIN_M),
-  };
+  const { minX, minY, maxX, maxY } = widened(bounds, ASSUMED_MARGIN_M);
+  return { minX: down(minX), minY: down(minY), maxX: up(maxX), maxY: up(maxY) };
 }
 
 const round = (metres: number): number => Math.round(metres * 1e6) / 1e6;

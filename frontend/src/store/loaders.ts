@@ -1,6 +1,6 @@
 /** Fetches what the frames do not carry, whenever the twin's revision says that it changed. */
 import { answer, bodyOf, fetchQuality, get } from '../contract/api';
-import type { Field, FieldQuality, OccupancyGrid, SensorsFile } from '../contract/types';
+import type { Field, FieldQuality, SensorsFile } from '../contract/types';
 import { cataloguesOf } from '../domain/sensors';
 import { type MapPicture, mapPlacement, opaqueBox, pixelBoxCorners } from '../geometry/image';
 import { act, type AppState, onChange, receive, store } from './app';
@@ -171,14 +171,6 @@ async function loadMap(signal: AbortSignal): Promise<MapPicture> {
     get('api/map.png', signal).then((response) => response.blob()),
   ]);
   const bitmap = await createImageBitmap(blob);
-  try {
-    return decode(grid, bitmap);
-  } finally {
-    bitmap.close();
-  }
-}
-
-function decode(grid: OccupancyGrid, bitmap: ImageBitmap): MapPicture {
   const { width, height } = bitmap;
   const placement = mapPlacement(grid);
   if (width !== placement.width || height !== placement.height) {
@@ -193,6 +185,7 @@ function decode(grid: OccupancyGrid, bitmap: ImageBitmap): MapPicture {
   const context = canvas.getContext('2d', { willReadFrequently: true });
   if (!context) throw new Error('map: this browser has no 2d canvas');
   context.drawImage(bitmap, 0, 0);
+  bitmap.close();
   const pixels = context.getImageData(0, 0, width, height);
   const box = opaqueBox(pixels.data, width, height);
   return { placement, pixels, known: box ? pixelBoxCorners(placement, box) : [] };

@@ -12,11 +12,9 @@ import { S } from '../strings';
 import { act, type AppState, store } from './app';
 import type { House, Past, TwinState } from './twin';
 
-/** The moment to show: null is now, a number a moment in the past, ROS seconds. */
-export type Moment = number | null;
-
 export interface Shown extends House {
-  readonly moment: Moment;
+  /** Null: now. */
+  readonly moment: number | null;
   readonly ageing: Ageing;
 }
 
@@ -25,7 +23,7 @@ export interface Shown extends House {
  * another one is on its way, the last that came stays, with its own time. Data and moment are told
  * in one, so that nothing can be taken for what it is not.
  */
-export function shownAt(twin: TwinState, moment: Moment): Shown {
+export function shownAt(twin: TwinState, moment: number | null): Shown {
   if (moment === null || twin.past === null) return SHOWN_NOW[clockOf(twin)](twin.latest);
   const { at, house } = twin.past;
   return shownThen(house, twin.latest.map, at);

@@ -5,7 +5,7 @@ import { wireStretch, wireTimeline } from '../testing/timeline';
 import { act, receive, store } from './app';
 import { startOpening } from './remembered';
 import { fromFragment, toFragment } from './address';
-import { NOT_ASKED } from './twin';
+import { NOTHING } from './fetcher';
 import { DEFAULT_VIEW } from './view';
 
 const NOW = 1_000_000;
@@ -25,7 +25,7 @@ const period = (): unknown => store.get().view.period;
 const address = (): string => toFragment(store.get().view);
 
 beforeEach(() => {
-  receive({ remembered: NOT_ASKED });
+  receive({ remembered: NOTHING });
   act(DEFAULT_VIEW);
   stop = startOpening();
 });

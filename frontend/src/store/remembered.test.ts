@@ -6,7 +6,8 @@ import { wireStretch, wireTimeline } from '../testing/timeline';
 import { act, receive, store } from './app';
 import { fromFragment } from './address';
 import { askedSpan, startOpening, startRemembered, turnOf } from './remembered';
-import { NOT_ASKED, withConnection, withState } from './twin';
+import { withConnection, withState } from './twin';
+import { NOTHING } from './fetcher';
 
 let asked: URLSearchParams[];
 let answer: () => Response;
@@ -20,7 +21,7 @@ beforeEach(() => {
     asked.push(url.searchParams);
     return Promise.resolve(answer());
   });
-  receive({ remembered: NOT_ASKED });
+  receive({ remembered: NOTHING });
   showTags([wireTag()]);
   stop = startRemembered();
 });
@@ -67,7 +68,7 @@ test('another period is fetched at once, and nothing of the last is left', async
   await pass(0);
   answer = () => Response.json({ detail: 'busy' }, { status: 503 });
   act({ period: { kind: 'all' } });
-  expect(store.get().twin.remembered).toEqual(NOT_ASKED);
+  expect(store.get().twin.remembered).toEqual(NOTHING);
   await pass(0);
   expect(asked.at(-1)?.has('from')).toBe(false);
   expect(store.get().twin.remembered).toMatchObject({ state: 'failed', message: 'busy' });

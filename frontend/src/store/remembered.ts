@@ -7,7 +7,8 @@ import { timelineOf } from '../domain/timeline';
 import { act, onChange, receive, store } from './app';
 import { createFetcher } from './fetcher';
 import { rosNow, selectNewest } from './moment';
-import { NOT_ASKED, type Remembered } from './twin';
+import { type Remembered } from './twin';
+import { NOTHING } from './fetcher';
 import { DEFAULT_VIEW, SHORT_PERIOD } from './view';
 
 /** Enough for the widest bar: a bucket is two or three pixels there. */
@@ -63,7 +64,7 @@ export function startRemembered(): () => void {
       group = next;
       // What is known of another period is of no use; how far memory reaches stays true.
       fetcher.want(null);
-      if (value) receive({ remembered: NOT_ASKED });
+      if (value) receive({ remembered: NOTHING });
       // Which may have led back to the period before.
       if (store.get().view.period !== period) return;
     }

@@ -25,12 +25,7 @@ export interface House {
   readonly map: Fetched<MapPicture>;
   readonly quality: FieldQuality | null;
   /** The range of the field's values, held calm over the fields before it. */
-  readonly held: Held | null;
-}
-
-interface Held {
-  readonly sensor: string;
-  readonly range: Range;
+  readonly held: { readonly sensor: string; readonly range: Range } | null;
 }
 
 export const NO_HOUSE: House = {
@@ -58,10 +53,8 @@ interface PastFault {
 }
 
 /** What is remembered of the period in view; "off": this twin remembers nothing. */
-export interface Remembered {
-  readonly value: Timeline | null;
-  readonly state: 'waiting' | 'ready' | 'failed' | 'off';
-  readonly message: string;
+export interface Remembered extends Omit<Fetched<Timeline>, 'state'> {
+  readonly state: Fetched<Timeline>['state'] | 'off';
 }
 
 export interface Difference {
@@ -71,8 +64,6 @@ export interface Difference {
   readonly at: number;
   readonly against: number;
 }
-
-export const NOT_ASKED: Remembered = { value: null, state: 'waiting', message: '' };
 
 /** Read by `moment.ts` alone, which chooses what the page shows; everyone else asks there. */
 export interface TwinState {
@@ -105,7 +96,7 @@ export const NO_TWIN: TwinState = {
   alarms: null,
   past: null,
   pastFault: null,
-  remembered: NOT_ASKED,
+  remembered: NOTHING,
   difference: NOTHING,
   sensors: NOTHING,
 };
@@ -157,7 +148,7 @@ export const withPast =
     return { past: next && { at: next.at, house: { ...next.house, held } }, pastFault: null };
   };
 
-function heldAfter(before: Held | null, field: Field | null): Held | null {
+function heldAfter(before: House['held'], field: Field | null): House['held'] {
   // Of an estimate that knows nothing there is no range, however many tags contribute.
   if (!field?.values.some((value) => !Number.isNaN(value))) return before;
   const { sensor, valueMin: low, valueMax: high } = field;

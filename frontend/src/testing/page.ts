@@ -3,7 +3,7 @@ import type { Field, Judgement, StatusFrame, TwinTagState } from '../contract/ty
 import { INITIAL, step, type ConnectionEvent } from '../connection/machine';
 import { prefer, receive, act } from '../store/app';
 import { DEFAULT_SETTINGS } from '../store/settings';
-import { NOT_ASKED, withConnection, withField, withLatest, withState } from '../store/twin';
+import { withConnection, withField, withLatest, withState } from '../store/twin';
 import { NOTHING } from '../store/fetcher';
 import { DEFAULT_VIEW } from '../store/view';
 import { NOBODY } from './health';
@@ -33,7 +33,7 @@ let stamp = 1;
 export function showTags(tags: readonly TwinTagState[], health: Judgement = NOBODY): void {
   act(DEFAULT_VIEW);
   prefer(DEFAULT_SETTINGS);
-  receive({ sensors: { value: CATALOGUES, state: 'ready', message: '' }, remembered: NOT_ASKED });
+  receive({ sensors: { value: CATALOGUES, state: 'ready', message: '' }, remembered: NOTHING });
   receive({ unread: null, alarms: null, past: null, pastFault: null });
   receive(withLatest({ field: NOTHING, map: NOTHING, quality: null }));
   stamp += 1;

@@ -13,6 +13,7 @@ import { NoteMarks } from '../notes/NoteMarks';
 import { act, useApp } from '../store/app';
 import { pointedBy, pointedTime, useSelected } from '../store/create';
 import { selectCatalogue } from '../store/derived';
+import { onThemeChange } from '../store/theme';
 import { S } from '../strings';
 import { More, Select } from '../widgets/controls';
 import { isStroked, lookOf, markerPath } from './layers';
@@ -49,7 +50,7 @@ export function PlotView({
   const { at } = useTold();
   const only = isAlone ? model.lines[0] : undefined;
 
-  const plot = usePlot(place, model, height, hasTimes, HANDLERS);
+  const plot = usePlot(place, model, height, hasTimes, HANDLERS, onThemeChange);
   useEffect(() => {
     plot.current?.point(ofBar);
   }, [plot, ofBar]);

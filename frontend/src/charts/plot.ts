@@ -4,7 +4,6 @@ import uPlot from 'uplot';
 
 import { hasDate, type Span } from '../domain/time';
 import { timeTicks, type Tick } from '../domain/timeline';
-import { onThemeChange } from '../store/theme';
 import { LOCALE } from '../strings';
 import {
   drawAbove,
@@ -225,12 +224,14 @@ function createPlot(element: HTMLElement, handlers: PlotHandlers) {
 const hasNames = (model: PlotModel): boolean =>
   model.lines.length === 1 || limitsOf(model).length > 0;
 
+/** `onLook` calls back when a chart's colours are others. */
 export function usePlot(
   place: RefObject<HTMLDivElement | null>,
   model: PlotModel,
   height: number,
   hasTimes: boolean,
   handlers: PlotHandlers,
+  onLook: (listener: () => void) => () => void,
 ): RefObject<Plot | null> {
   const plot = useRef<Plot | null>(null);
   const [width, setWidth] = useState(0);
@@ -243,7 +244,7 @@ export function usePlot(
       if (entry) setWidth(Math.floor(entry.contentRect.width));
     });
     resize.observe(element);
-    const stop = onThemeChange(mine.recolour);
+    const stop = onLook(mine.recolour);
     return () => {
       plot.current = null;
       stop();
@@ -251,7 +252,7 @@ export function usePlot(
       mine.destroy();
       handlers.onPoint(null);
     };
-  }, [place, handlers]);
+  }, [place, handlers, onLook]);
   useEffect(() => {
     if (width > 0) plot.current?.show(model, { width, height, hasTimes });
   }, [model, width, height, hasTimes]);

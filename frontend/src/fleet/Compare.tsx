@@ -157,6 +157,14 @@ function deviationText(sensor: Sensor, { deviation }: ComparedSite, { unit }: Sp
   return withUnit(sensor, differenceNumber(sensor, deviation, unit), unit);
 }
 
+function onSystemTheme(listener: () => void): () => void {
+  const system = window.matchMedia('(prefers-color-scheme: dark)');
+  system.addEventListener('change', listener);
+  return () => {
+    system.removeEventListener('change', listener);
+  };
+}
+
 function Chart({
   model,
   onPoint,
@@ -166,7 +174,7 @@ function Chart({
 }): JSX.Element {
   const place = useRef<HTMLDivElement>(null);
   const handlers = useMemo(() => ({ onPoint }), [onPoint]);
-  usePlot(place, model, HEIGHT, true, handlers);
+  usePlot(place, model, HEIGHT, true, handlers, onSystemTheme);
   return (
     <div
       ref={place}

@@ -1,5 +1,5 @@
 /** What a chart has below and above its lines: drawn by functions that keep no state. */
-import { toShown, valueText } from '../domain/format';
+import { valueText } from '../domain/format';
 import type { Span } from '../domain/time';
 import { hatch } from '../draw/surface';
 import { S } from '../strings';
@@ -12,33 +12,37 @@ export interface Frame {
   /** Canvas pixels a CSS pixel. */
   readonly ratio: number;
   readonly x: (at: number) => number;
-  /** Of a value in the unit that is shown. */
+  /** Of a value in the sensor's own unit. */
   readonly y: (value: number) => number;
+  readonly model: PlotModel;
+  readonly palette: ChartPalette;
 }
 
 /** Closer together than this, markers would hide the line; CSS pixels. */
 const MARKER_ROOM = 9;
 const MARKER_SIZE = 6;
 
-export function drawBelow(frame: Frame, model: PlotModel, palette: ChartPalette): void {
-  const { context, box } = frame;
+function clip({ context, box }: Frame): void {
   context.save();
   context.beginPath();
   context.rect(box.left, box.top, box.width, box.height);
   context.clip();
-  drawIdeal(frame, model, palette);
+}
+
+export function drawBelow(frame: Frame): void {
+  const { context, model } = frame;
+  clip(frame);
+  drawIdeal(frame);
   // With several, one's gap lies behind another's line.
   const [only] = model.lines;
-  if (only && model.lines.length === 1) drawGaps(frame, only, palette);
-  for (const line of model.lines) drawRanges(frame, line, model, palette);
+  if (only && model.lines.length === 1) drawGaps(frame, only);
+  for (const line of model.lines) drawRanges(frame, line);
   context.restore();
 }
 
-function drawIdeal(frame: Frame, { sensor, bands, unit }: PlotModel, palette: ChartPalette): void {
-  const { context, ratio, x } = frame;
-  const y = (value: number): number => frame.y(toShown(sensor, value, unit));
+function drawIdeal({ context, ratio, x, y, model, palette }: Frame): void {
   context.lineWidth = ratio;
-  for (const { from, to, ranges } of bands) {
+  for (const { from, to, ranges } of model.bands) {
     const [left, right] = [x(from), x(to)];
     const lines = (values: readonly number[]): void => {
       context.beginPath();
@@ -64,8 +68,8 @@ function drawIdeal(frame: Frame, { sensor, bands, unit }: PlotModel, palette: Ch
 }
 
 /** Hatched, so that an empty stretch is seen to be told and not forgotten. */
-function drawGaps(frame: Frame, { series }: Line, palette: ChartPalette): void {
-  frame.context.strokeStyle = palette.gap;
+function drawGaps(frame: Frame, { series }: Line): void {
+  frame.context.strokeStyle = frame.palette.gap;
   frame.context.lineWidth = frame.ratio;
   hatched(frame, series.gaps, 1);
   // Leaning to the other side: of these nobody knows whether anything came.
@@ -82,39 +86,32 @@ function hatched({ context, box, ratio, x }: Frame, spans: readonly Span[], slan
 }
 
 /** From the least to the most of each bucket, as wide as the bucket: none joins two of them. */
-function drawRanges(frame: Frame, line: Line, model: PlotModel, palette: ChartPalette): void {
+function drawRanges({ context, ratio, x, y, model, palette }: Frame, line: Line): void {
   const { series } = line;
   if (series.bucketS === null) return;
-  const { context, ratio, x, y } = frame;
-  const { sensor, unit } = model;
   context.globalAlpha = model.lines.length === 1 ? 0.28 : 0.14;
   context.fillStyle = palette.lines[lookOf(line.look).colour] ?? palette.ink;
   context.beginPath();
   for (const { at, min, max } of series.points) {
     const left = x(at);
     const right = Math.min(x(at + series.bucketS), x(series.to));
-    const top = y(toShown(sensor, max ?? 0, unit));
-    const height = Math.max(ratio, y(toShown(sensor, min ?? 0, unit)) - top);
+    const top = y(max ?? 0);
+    const height = Math.max(ratio, y(min ?? 0) - top);
     context.rect(left, top, Math.max(ratio, right - left), height);
   }
   context.fill();
   context.globalAlpha = 1;
 }
 
-export function drawAbove(frame: Frame, model: PlotModel, palette: ChartPalette): void {
-  const { context, box } = frame;
+export function drawAbove(frame: Frame): void {
+  const { context, model } = frame;
   // The last line's dashes are still in force.
   context.setLineDash([]);
-  context.save();
-  context.beginPath();
-  context.rect(box.left, box.top, box.width, box.height);
-  context.clip();
-  for (const line of model.lines) {
-    drawMarkers(frame, line, model, palette);
-  }
-  drawMoment(frame, model, palette);
+  clip(frame);
+  for (const line of model.lines) drawMarkers(frame, line);
+  drawMoment(frame);
   context.restore();
-  drawNames(frame, model, palette);
+  drawNames(frame);
 }
 
 /** A limit's name right of the plot needs so much of it in height; CSS pixels. */
@@ -122,11 +119,7 @@ const NAME_HEIGHT = 13;
 const NAME_GAP = 6;
 
 /** Each limit at its line, and with an arrow where its line lies above or below the picture. */
-function drawNames(
-  { context, box, ratio, y }: Frame,
-  model: PlotModel,
-  palette: ChartPalette,
-): void {
+function drawNames({ context, box, ratio, y, model, palette }: Frame): void {
   const height = NAME_HEIGHT * ratio;
   const names = limitsOf(model).sort((a, b) => b.value - a.value);
   context.font = palette.font.replace(/[\d.]+(?=px)/, (size) => String(Number(size) * ratio));
@@ -135,7 +128,7 @@ function drawNames(
   let least = box.top;
   names.forEach(({ kind, value, side }, index) => {
     const most = box.top + box.height - (names.length - 1 - index) * height;
-    const at = Math.max(least, Math.min(y(toShown(model.sensor, value, model.unit)), most));
+    const at = Math.max(least, Math.min(y(value), most));
     least = at + height;
     const word = kind === 'ideal' ? S.idealParts.any : S.alarmStatus.critical;
     const text = `${ARROWS[side]}${word} ${valueText(model.sensor, value, model.unit)}`;
@@ -147,10 +140,9 @@ function drawNames(
 const ARROWS = { below: '↓ ', inside: '', above: '↑ ' } as const;
 
 /** Each reading where there is room; a point between two breaks always, or it would not be seen. */
-function drawMarkers(frame: Frame, line: Line, model: PlotModel, palette: ChartPalette): void {
-  const { context, ratio, x, y, box } = frame;
+function drawMarkers({ context, ratio, x, y, box, model, palette }: Frame, line: Line): void {
   const { colour, marker } = lookOf(line.look);
-  const points = pointsOf(line.series, (value) => toShown(model.sensor, value, model.unit));
+  const points = pointsOf(line.series);
   const seen = points.filter(
     ({ at, value }) => value !== null && at >= model.span.from && at <= model.span.to,
   );
@@ -176,8 +168,7 @@ const MARK_SIZE = 7;
 /** Between the values and their times, marks have a lane of their own; CSS pixels. */
 export const MARKS_LANE = 24;
 
-export function drawMarks(frame: Frame, { marks }: Line, palette: ChartPalette): void {
-  const { context, ratio, x, box } = frame;
+export function drawMarks({ context, ratio, x, box, palette }: Frame, { marks }: Line): void {
   const bottom = box.top + box.height;
   context.lineWidth = 1.75 * ratio;
   for (const kind of ['look', 'failure'] as const) {
@@ -196,11 +187,7 @@ export function drawMarks(frame: Frame, { marks }: Line, palette: ChartPalette):
   }
 }
 
-function drawMoment(
-  { context, box, ratio, x }: Frame,
-  { moment }: PlotModel,
-  palette: ChartPalette,
-): void {
+function drawMoment({ context, box, ratio, x, model: { moment }, palette }: Frame): void {
   if (moment === null) return;
   const at = Math.round(x(moment));
   context.strokeStyle = palette.moment;

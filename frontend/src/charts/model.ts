@@ -3,28 +3,13 @@ import { fetchSeries, fetchTimeline } from '../contract/past';
 import { type Catalogue, type Catalogues, type Ranges, rangesFor } from '../domain/sensors';
 import { type TemperatureUnit, toShown } from '../domain/format';
 import { rangeOf } from '../domain/ramp';
-import {
-  laterBy,
-  type Mark,
-  marksOf,
-  middleOf,
-  type Point,
-  type Series,
-  seriesOf,
-} from '../domain/series';
+import { laterBy, marksOf, middleOf, type Point, type Series, seriesOf } from '../domain/series';
 import { shown } from '../domain/text';
 import type { Span } from '../domain/time';
 import type { Charted } from '../store/view';
 import { S } from '../strings';
 
-export interface Line {
-  readonly series: Series;
-  /** The day before, a day later than it was; null: it is not shown. */
-  readonly before: Series | null;
-  readonly look: number;
-  readonly label: string;
-  readonly marks: readonly Mark[];
-}
+export type Line = PlotModel['lines'][number];
 
 interface Band extends Span {
   readonly ranges: Ranges;
@@ -65,7 +50,7 @@ export type PlotModel = ReturnType<typeof modelOf>;
 type Drawn = Pick<Point, 'at' | 'value'>;
 
 /** The points of a series in their order, with a break in each gap. */
-export function pointsOf(series: Series, shown: (value: number) => number): Drawn[] {
+export function pointsOf(series: Series, shown = (value: number): number => value): Drawn[] {
   const points: Drawn[] = [
     ...series.points.map((point) => ({
       at: middleOf(point, series),
@@ -178,12 +163,7 @@ export interface Pair {
 export const pairKey = ({ tagId, sensor }: Pair): string => `${sensor}\u0000${tagId}`;
 
 /** What charts show, fetched in one go: lines by `pairKey`, and marks by tag. */
-export interface Lines {
-  readonly series: ReadonlyMap<string, Series>;
-  /** A day later than it was; empty: nobody asked for it. */
-  readonly before: ReadonlyMap<string, Series>;
-  readonly marks: ReadonlyMap<string, readonly Mark[]>;
-}
+export type Lines = Awaited<ReturnType<typeof fetchLines>>;
 
 export const NO_LINES: Lines = { series: new Map(), before: new Map(), marks: new Map() };
 
@@ -204,7 +184,7 @@ const MARK_POINTS = 200;
 export async function fetchLines(
   { pairs, span, nowS, points, dayS }: Question,
   signal: AbortSignal,
-): Promise<Lines> {
+) {
   const tagIds = [...new Set(pairs.map(({ tagId }) => tagId))];
   const before = dayS === null ? null : dayBefore(span, dayS);
   const fetched = async ({ from, to }: Span): Promise<[string, Series][]> => {
@@ -221,6 +201,7 @@ export async function fetchLines(
   ]);
   return {
     series: new Map(series),
+    /** A day later than it was; empty: nobody asked for it. */
     before: new Map(earlier.map(([key, each]) => [key, laterBy(each, dayS ?? 0)])),
     marks: new Map(timelines.map((timeline, index) => [tagIds[index] ?? '', marksOf(timeline)])),
   };

@@ -2,6 +2,7 @@
 import { type RefObject, useEffect, useLayoutEffect, useRef, useState } from 'react';
 import uPlot from 'uplot';
 
+import { toShown } from '../domain/format';
 import { hasDate, type Span } from '../domain/time';
 import { timeTicks, type Tick } from '../domain/timeline';
 import { LOCALE } from '../strings';
@@ -53,12 +54,21 @@ function createPlot(element: HTMLElement, handlers: PlotHandlers) {
   let shape = '';
   let ticks: readonly Tick[] = [];
 
-  const frameOf = (u: uPlot): Frame => ({
+  const frameOf = (u: uPlot, model: PlotModel): Frame => ({
     context: u.ctx,
     box: u.bbox,
     ratio: uPlot.pxRatio,
     x: (at) => u.valToPos(at, 'x', true),
-    y: (value) => u.valToPos(value, 'y', true),
+    y: (value) => u.valToPos(toShown(model.sensor, value, model.unit), 'y', true),
+    model,
+    palette,
+  });
+
+  const axis = (): Partial<uPlot.Axis> => ({
+    stroke: () => palette.text,
+    grid: { stroke: () => palette.grid, width: 1 },
+    ticks: { stroke: () => palette.grid, width: 1, size: 5 },
+    font: palette.font,
   });
 
   const build = (first: PlotModel, { hasTimes, ...size }: PlotSize): uPlot => {
@@ -100,11 +110,7 @@ function createPlot(element: HTMLElement, handlers: PlotHandlers) {
         ],
         axes: [
           {
-            ...axisLook(
-              () => palette.text,
-              () => palette.grid,
-            ),
-            font: palette.font,
+            ...axis(),
             size: hasTimes ? TIMES_HEIGHT - MARKS_LANE + lane : NO_TIMES_HEIGHT,
             gap: 5 + lane,
             lineGap: 1.2,
@@ -115,11 +121,7 @@ function createPlot(element: HTMLElement, handlers: PlotHandlers) {
             values: () => ticks.map(({ text }) => (hasTimes ? text : '')),
           },
           {
-            ...axisLook(
-              () => palette.text,
-              () => palette.grid,
-            ),
-            font: palette.font,
+            ...axis(),
             size: 48,
             // Steps come in ones, twos and fives: in six of these there are three ticks.
             space: (_self, _axis, _min, _max, height) => Math.min(34, height / 6),
@@ -129,15 +131,16 @@ function createPlot(element: HTMLElement, handlers: PlotHandlers) {
         hooks: {
           drawAxes: [
             (self) => {
-              if (model) drawBelow(frameOf(self), model, palette);
+              if (model) drawBelow(frameOf(self, model));
             },
           ],
           draw: [
             (self) => {
               if (!model) return;
-              drawAbove(frameOf(self), model, palette);
+              const frame = frameOf(self, model);
+              drawAbove(frame);
               if (!hasTimes) return;
-              for (const line of model.lines) drawMarks(frameOf(self), line, palette);
+              for (const line of model.lines) drawMarks(frame, line);
             },
           ],
           setCursor: [
@@ -263,9 +266,3 @@ const TICK_ROOM = 70;
 
 const ticksOf = (model: PlotModel | null, width: number): readonly Tick[] =>
   model ? timeTicks(model.span, width / TICK_ROOM, !hasDate(model.span.to)) : [];
-
-const axisLook = (text: () => string, grid: () => string): Partial<uPlot.Axis> => ({
-  stroke: text,
-  grid: { stroke: grid, width: 1 },
-  ticks: { stroke: grid, width: 1, size: 5 },
-});

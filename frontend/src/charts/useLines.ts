@@ -110,14 +110,8 @@ const visitsOf = (state: AppState, pairs: readonly Pair[]): string =>
     }),
   );
 
-interface Chosen {
-  readonly name: string;
-  /** What the map showed then: with another one there, the card follows the map again. */
-  readonly inView: string;
-}
-
-/** What was chosen for the card's chart; the map keeps its own. */
-export const chosenSensor = createStore<Chosen | null>(null);
+/** What was chosen for the card's chart, and what the map showed then: with another, the card follows it. */
+export const chosenSensor = createStore<{ name: string; inView: string } | null>(null);
 
 /** What the card's chart is to show: the sensor in view, unless another was chosen. */
 export function useChosenSensor(): string {

@@ -86,14 +86,7 @@ export interface LabelRequest {
   readonly texts: readonly { readonly text: string; readonly width: number }[];
 }
 
-export interface PlacedLabel {
-  readonly id: string;
-  readonly text: string;
-  /** Top left corner, pixels. */
-  readonly x: number;
-  readonly y: number;
-  readonly width: number;
-}
+export type PlacedLabel = ReturnType<typeof placeLabels>[number];
 
 /** Where labels may be seen: boxes in pixels relative to the map's origin. */
 export interface Room {
@@ -111,7 +104,7 @@ export function placeLabels(
   requests: readonly LabelRequest[],
   height: number,
   room: Room | null = null,
-): PlacedLabel[] {
+) {
   const taken = new Buckets();
   for (const box of room?.covered ?? []) taken.add(box);
   const ordered = requests
@@ -124,23 +117,16 @@ export function placeLabels(
     })
     .sort((a, b) => b.request.priority - a.request.priority || a.index - b.index);
 
-  const placed: PlacedLabel[] = [];
-  for (const { request, pin } of ordered) {
+  return ordered.flatMap(({ request, pin }) => {
     // Among pins that overlap only those that need somebody: of more labels none would be read.
-    if (request.priority < URGENT && !taken.isFree(pin, pin)) continue;
+    if (request.priority < URGENT && !taken.isFree(pin, pin)) return [];
     const spot = firstFree(request, height, taken, room?.within ?? null);
-    if (!spot) continue;
-    taken.add(spot.box);
-    placed.push({
-      id: request.id,
-      text: spot.text,
-      x: spot.box.left,
-      y: spot.box.top,
-      // Not right less left, which is off by float noise and so by a pixel.
-      width: spot.width,
-    });
-  }
-  return placed;
+    if (!spot) return [];
+    const { text, box, width } = spot;
+    taken.add(box);
+    // Its width is not right less left, which is off by float noise and so by a pixel.
+    return [{ id: request.id, text, x: box.left, y: box.top, width }];
+  });
 }
 
 function firstFree(

@@ -5,15 +5,12 @@ import { NO_TWIN, type TwinState } from './twin';
 import { DEFAULT_VIEW, type ViewState, viewAfter } from './view';
 
 /** What of the map is on the screen just now; what the operator chose is the view's camera. */
-export interface Viewport {
-  readonly view: View;
-  /** Of the canvas, CSS pixels; 0 until it is laid out. */
-  readonly size: Size;
-}
+export type Viewport = typeof NO_VIEWPORT;
 
-export const NO_VIEWPORT: Viewport = {
-  view: { x: 0, y: 0, scale: 50 },
-  size: { width: 0, height: 0 },
+export const NO_VIEWPORT = {
+  view: { x: 0, y: 0, scale: 50 } as View,
+  /** Of the canvas, CSS pixels; 0 until it is laid out. */
+  size: { width: 0, height: 0 } as Size,
 };
 
 export interface AppState {

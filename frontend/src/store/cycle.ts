@@ -10,21 +10,14 @@ import { selectTags } from './moment';
 
 export const CYCLE_LIMITS = { least: 5, most: 3_600 } as const;
 
-export interface CycleWish {
-  /** Seconds a sensor; null: the sensor stays. */
-  readonly seconds: number | null;
-  /** What was asked for and cannot be had, as it was written; null: nothing. */
-  readonly refused: string | null;
-}
+export type CycleWish = ReturnType<typeof cycleWish>;
 
-/** The wish in an address: `?kiosk=1&cycle=30`. A bad one is told and counts as none. */
-export function cycleWish(search: string): CycleWish {
+/** The wish in an address: `?kiosk=1&cycle=30`. A bad one counts as none, and is told as it was written. */
+export function cycleWish(search: string) {
   const text = new URLSearchParams(search).get('cycle');
-  if (text === null) return { seconds: null, refused: null };
-  const seconds = /^\d{1,4}$/.test(text) ? Number(text) : NaN;
-  return seconds >= CYCLE_LIMITS.least && seconds <= CYCLE_LIMITS.most
-    ? { seconds, refused: null }
-    : { seconds: null, refused: text };
+  const seconds = text !== null && /^\d{1,4}$/.test(text) ? Number(text) : NaN;
+  const isAllowed = seconds >= CYCLE_LIMITS.least && seconds <= CYCLE_LIMITS.most;
+  return { seconds: isAllowed ? seconds : null, refused: isAllowed ? null : text };
 }
 
 export const sensorsOf = (tags: readonly Tag[], offered: readonly Sensor[]): readonly Sensor[] =>
@@ -47,12 +40,9 @@ export function addressOfPage(search: string, hash: string): string {
 }
 
 /** What comes next, and when, ms on the page's clock; null: the sensor in view stays. */
-interface Next {
-  readonly sensor: Sensor;
-  readonly at: number;
-}
-
-export const nextSensor = createStore<Next | null>(null);
+export const nextSensor = createStore<{ readonly sensor: Sensor; readonly at: number } | null>(
+  null,
+);
 
 const round = memoLast(sensorsOf);
 

@@ -46,10 +46,7 @@ const LEAST_COLUMN_PX = 3;
 /** What happened within a few pixels. */
 export type Column = ReturnType<typeof columnsOf>[number];
 
-export interface Stretch {
-  readonly x: number;
-  readonly width: number;
-}
+export type Stretch = Pick<Column, 'x' | 'width'>;
 
 /**
  * A few scans beside many would vanish; by their root they stay in sight. The smallest is a tenth.

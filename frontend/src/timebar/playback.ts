@@ -13,12 +13,7 @@ type Speed = (typeof SPEEDS)[number];
 
 const TICK_MS = 100;
 
-interface Playback {
-  readonly isPlaying: boolean;
-  readonly speed: Speed;
-}
-
-export const playback = createStore<Playback>({ isPlaying: false, speed: 300 });
+export const playback = createStore({ isPlaying: false, speed: 300 as Speed });
 
 let timer: ReturnType<typeof setInterval> | undefined;
 let unsubscribe: () => void = () => undefined;

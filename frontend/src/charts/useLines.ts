@@ -9,6 +9,7 @@ import { selectCatalogue, selectCatalogues } from '../store/derived';
 import { useFetched } from '../store/fetcher';
 import { rosNow, selectDayS, selectNewestTag, selectTag } from '../store/moment';
 import { turnOf } from '../store/remembered';
+import type { Size } from '../geometry/coordinates';
 import { useNow } from '../widgets/useNow';
 import { fetchLines, type Lines, modelOf, NO_LINES, type Pair, pairKey, type Plan } from './model';
 
@@ -142,7 +143,6 @@ export function useSensorsOf(tagId: string): readonly string[] {
   );
 }
 
-/** The species of tags, as far as they are sure, at the moment that is shown; else empty. */
 function useSpeciesOf(tagIds: readonly string[]): readonly string[] {
   const species = useApp((state) =>
     tagIds.map((id) => selectTag(state, id)?.sureSpecies ?? '').join('\u0000'),
@@ -156,11 +156,6 @@ function inOrder({ all }: Catalogue, names: readonly string[]): readonly string[
     return index < 0 ? all.length : index;
   };
   return [...names].sort((a, b) => place(a) - place(b) || (a < b ? -1 : 1));
-}
-
-interface Size {
-  readonly width: number;
-  readonly height: number;
 }
 
 /** The room inside an element, CSS pixels; none before it is laid out. */

@@ -64,13 +64,12 @@ export const INITIAL: Connection = {
   status: null,
 };
 
-interface Step {
-  readonly connection: Connection;
-  readonly command: Command;
-}
-
 /** `random`: from 0 to 1. */
-export function step(connection: Connection, event: ConnectionEvent, random: number): Step {
+export function step(
+  connection: Connection,
+  event: ConnectionEvent,
+  random: number,
+): { readonly connection: Connection; readonly command: Command } {
   const { socket } = connection;
   const { now } = event;
   switch (event.type) {
@@ -99,10 +98,10 @@ export function step(connection: Connection, event: ConnectionEvent, random: num
     }
     case 'closed':
       if (socket.kind === 'closed') return stay(connection);
-      return { connection: fail(connection, now, event.code, random), command: null };
+      return stay(fail(connection, now, event.code, random));
     case 'broken':
       return socket.kind === 'open'
-        ? { connection: fail(connection, now, null, random), command: 'drop' }
+        ? stay(fail(connection, now, null, random), 'drop')
         : stay(connection);
     case 'online':
       return socket.kind === 'opening'
@@ -123,18 +122,16 @@ export function step(connection: Connection, event: ConnectionEvent, random: num
           ? now - socket.since >= OPENING_MS
           : silence(socket, now) >= DEAD_MS
       ) {
-        return { connection: fail(connection, now, null, random), command: 'drop' };
+        return stay(fail(connection, now, null, random), 'drop');
       }
       return stay(connection);
   }
 }
 
-const stay = (connection: Connection): Step => ({ connection, command: null });
+const stay = (connection: Connection, command: Command = null) => ({ connection, command });
 
-const open = (connection: Connection, now: number): Step => ({
-  connection: { ...connection, socket: { kind: 'opening', since: now } },
-  command: 'reopen',
-});
+const open = (connection: Connection, now: number) =>
+  stay({ ...connection, socket: { kind: 'opening', since: now } }, 'reopen');
 
 function fail(
   connection: Connection,
@@ -188,9 +185,7 @@ export const TRY_AGAIN_LATER = 1013;
 /**
  * Pause before the next attempt: doubled at each failure up to 15 s, and then anything from half
  * of that to all of it, so that a hundred screens do not return to a restarted server at once.
- *
- * @param failures attempts failed in a row, from 1
- * @param random from 0 to 1
+ * `failures` in a row, from 1; `random` from 0 to 1.
  */
 export function backoffMs(failures: number, random: number, closeCode: number | null): number {
   const doubled = FIRST_MS * 2 ** Math.min(failures - 1, 10);

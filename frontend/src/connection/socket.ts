@@ -21,13 +21,10 @@ interface ConnectionHandlers {
   readonly onRefused: () => void;
 }
 
-export interface Link {
-  readonly tell: (event: Plain) => void;
-  readonly stop: () => void;
-}
+export type Link = ReturnType<typeof connect>;
 
 /** The thin shell around `machine.ts`: one socket, one timer, the browser's wake-up events. */
-export function connect(url: string, handlers: ConnectionHandlers): Link {
+export function connect(url: string, handlers: ConnectionHandlers) {
   let connection = INITIAL;
   let socket: WebSocket | null = null;
   let timer: ReturnType<typeof setTimeout> | undefined;

@@ -3,15 +3,13 @@ import { checkOf } from './check';
 import type { Field, FieldQuality, Schemas, TagHistory } from './types';
 
 export class Refusal extends Error {
-  readonly status: number;
-  /** How long the server wants to be left alone, seconds; null: not reported. */
-  readonly retryAfterS: number | null;
-
-  constructor(status: number, message: string, retryAfterS: number | null = null) {
+  constructor(
+    readonly status: number,
+    message: string,
+    /** How long the server wants to be left alone, seconds; null: not reported. */
+    readonly retryAfterS: number | null = null,
+  ) {
     super(message);
-    this.name = 'Refusal';
-    this.status = status;
-    this.retryAfterS = retryAfterS;
   }
 }
 
@@ -171,8 +169,6 @@ const MAGIC = '\x93NUMPY';
 /**
  * Numbers in so many dimensions, row-major, of the one NPY flavour that the bridge sends: version 1,
  * little-endian float32, C order. Format: https://numpy.org/doc/stable/reference/generated/numpy.lib.format.html
- *
- * @throws Error where the body is anything else.
  */
 export function npyOf(
   buffer: ArrayBuffer,

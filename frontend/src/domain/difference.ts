@@ -19,8 +19,6 @@ export const otherMoment = (compare: Compare, shownAt: number): number =>
 /**
  * What is shown less what was then, cell by cell, on their one grid; not known where either is
  * not. `valueMin` and `valueMax` range over what is known; both are 0 where nothing is.
- *
- * @throws Error where the two do not lie on one grid.
  */
 export function differenceOf(shown: Field, then: Field): Field {
   for (const key of ['sensor', 'width', 'height', 'originX', 'originY', 'resolution'] as const) {
@@ -61,7 +59,6 @@ const SAME: Rgb = [128, 128, 128];
 const FAINTEST = 0.2;
 const STRONGEST = 0.8;
 
-/** Colour and alpha of a difference in a symmetric range. */
 export function divergingColour(range: Range, value: number): { rgb: Rgb; alpha: number } {
   const signed = range.high > 0 ? 2 * fraction(range, value) - 1 : 0;
   const size = Math.abs(signed);
@@ -73,7 +70,6 @@ export function divergingColour(range: Range, value: number): { rgb: Rgb; alpha:
 
 const STOPS = [-1, -0.75, -0.5, -0.25, 0, 0.25, 0.5, 0.75, 1];
 
-/** The colours from the most that it is less to the most that it is more, evenly apart. */
 export const divergingColours = (): string[] =>
   STOPS.map((stop) => {
     const { rgb, alpha } = divergingColour({ low: -1, high: 1 }, stop);
@@ -100,7 +96,6 @@ export function differenceText(sensor: Sensor, value: number, unit: TemperatureU
   return withUnit(sensor, signedText(sensor, value, unit), unit);
 }
 
-/** A tag, and what the bridge said of it at that moment. */
 export interface TagThen {
   readonly tag: Tag;
   readonly health: TagHealth;

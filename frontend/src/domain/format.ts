@@ -125,7 +125,6 @@ export function metresText(value: number): string {
   return written(value.toFixed(2));
 }
 
-/** Why a tag that was pinned there is not on the map. */
 export const farOffText = ({ x, y }: MapPoint): string =>
   S.farOffLong(S.position(metresText(x), metresText(y)));
 

@@ -177,7 +177,6 @@ export function reasonText(
 export const isBack = ({ release, verdict }: HealthReason): boolean =>
   release !== undefined && verdict === 'stressed';
 
-/** On which side of which limit a value is, or was. */
 function limitText(reason: OfRange, text: (value: number) => string): string {
   const { limit, release = null, verdict } = reason;
   const side = S.reasons.sides[sideOf(reason)];

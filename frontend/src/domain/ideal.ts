@@ -196,7 +196,6 @@ export const cellsWhere = (field: Field, isIn: (cell: number) => boolean): Field
   values: field.values.map((value, cell) => (isIn(cell) ? value : NaN)),
 });
 
-/** What is left of a colour whose reading is too old. */
 const FAINT = 0.22;
 
 /** Colours what is too old faintly: it is hatched besides, and `isHatched` false leaves it bare. */

@@ -146,7 +146,6 @@ function rangesOf(entry: SensorRanges, isDay: boolean): Ranges {
   return { ideal: spanOf(ideal), critical: spanOf(critical) };
 }
 
-/** All that entries have, of day, night and species. */
 const idealsOf = (entries: readonly (SensorEntry | undefined)[]): Span[] =>
   entries
     .flatMap((entry) => [entry, ...Object.values(entry?.species ?? {})])

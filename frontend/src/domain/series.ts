@@ -87,7 +87,6 @@ export function pointAt(series: Series, moment: number): Point | null {
   return lastUntil(series, moment);
 }
 
-/** The last reading or bucket that had begun by then: what was known at that moment. */
 export const lastUntil = ({ points }: Series, moment: number): Point | null =>
   points.findLast(({ at }) => at <= moment) ?? null;
 

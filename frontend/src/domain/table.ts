@@ -50,7 +50,6 @@ export function areasOnMap(tags: readonly Tag[], areaOf: (tagId: string) => stri
   }));
 }
 
-/** The rows with a head above each area's, if there is any area. */
 export function withHeads(areas: readonly Area[]): readonly Line[] {
   if (areas[0]?.area === '') return areas[0].rows;
   return areas.flatMap(({ area, rows }): readonly Line[] => {

@@ -2,12 +2,10 @@ import type { Latest, TwinTagState, WirePoint, WireTime } from '../contract/type
 import { mapPoint, type MapPoint } from '../geometry/coordinates';
 import type { When } from './time';
 
-/** A try that came to nothing. */
 export interface FailedTry {
   readonly at: When;
   /** As in lupin_msgs/Observation; never 0, which is a success. */
   readonly status: number;
-  /** Why, for a person; may be empty. */
   readonly detail: string;
 }
 
@@ -173,7 +171,6 @@ export function snapshotOf(latest: Latest, arrivedAt: number, before: Snapshot |
 export const reachOfTags = (tags: readonly Tag[]): Reach =>
   reachOf(tags.flatMap((tag) => tag.at ?? tag.farOff ?? []));
 
-/** The tag as the map shows it: one that is far off has no place there. */
 function within(reach: Reach, tag: Tag): Tag {
   const place = tag.at ?? tag.farOff;
   const isFar = place !== null && !holds(reach, place);

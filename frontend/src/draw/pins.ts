@@ -5,7 +5,7 @@ import { rgbText } from '../domain/ramp';
 import type { LabelRequest, PlacedLabel } from '../geometry/clear';
 import { type MapPoint, toCanvas } from '../geometry/coordinates';
 import type { Palette } from './palette';
-import type { BloomDot, Pin } from './scene';
+import type { Pin, Scene } from './scene';
 import type { Pen, Surface } from './surface';
 
 /** `text`: how large the page's text is, 1 as usual. */
@@ -35,7 +35,7 @@ export function bloomRadius(scale: number): number {
 const inside = ({ size }: Surface, x: number, y: number, margin: number): boolean =>
   x > -margin && y > -margin && x < size.width + margin && y < size.height + margin;
 
-export function drawBlooms(pen: Pen, blooms: readonly BloomDot[]): void {
+export function drawBlooms(pen: Pen, blooms: Scene['blooms']): void {
   const { view, sprites, palette } = pen;
   const radius = bloomRadius(view.scale);
   const box = Math.ceil(radius * 1.3 + 2) * 2;

@@ -19,14 +19,9 @@ const LEFT_OUT = 1 / 6;
 
 export type Pin = ReturnType<typeof pinOf>;
 
-export interface BloomDot {
-  readonly at: MapPoint;
-  readonly look: BloomLook;
-}
-
 export interface Scene {
   readonly pins: readonly Pin[];
-  readonly blooms: readonly BloomDot[];
+  readonly blooms: readonly { readonly at: MapPoint; readonly look: BloomLook }[];
   readonly boxes: readonly (readonly MapPoint[])[];
   /** How far pins are apart where they are many, m; else infinite. */
   readonly spacing: number;
@@ -47,16 +42,11 @@ export interface SceneInput {
 /** What neither fades nor follows the sensor. */
 const planted = memoOne((tags: readonly Tag[]): Pick<Scene, 'blooms' | 'boxes'> => {
   const looks = speciesLooks(speciesOf(tags));
-  const boxes = new Map<string, readonly MapPoint[]>();
-  const blooms: BloomDot[] = [];
-  for (const tag of tags) {
-    if (tag.footprint.length >= 3) {
-      boxes.set(tag.footprint.map(({ x, y }) => `${x},${y}`).join(' '), tag.footprint);
-    }
-    for (const { at, species } of tag.blooms) {
-      blooms.push({ at, look: looks.get(species) ?? UNKNOWN_SPECIES });
-    }
-  }
+  const blooms = tags.flatMap((tag) =>
+    tag.blooms.map(({ at, species }) => ({ at, look: looks.get(species) ?? UNKNOWN_SPECIES })),
+  );
+  const planters = tags.map(({ footprint }) => footprint).filter(({ length }) => length >= 3);
+  const boxes = new Map(planters.map((box) => [JSON.stringify(box), box]));
   return { blooms, boxes: [...boxes.values()] };
 });
 

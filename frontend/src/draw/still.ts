@@ -112,7 +112,6 @@ export function drawGridLines(pen: Pen): void {
 /** Clear of the frame that the past has, CSS pixels. */
 const EDGE_PX = 8;
 
-/** The grid's numbers, along the left and the upper edge of the view. */
 export function drawGridLabels(pen: Pen): void {
   const { context, size, view, palette, textScale } = pen;
   const { columns, rows } = gridTicks(pen);
@@ -142,7 +141,6 @@ const tick = (metres: number): string =>
   (metres < 0 ? '\u2212' : '') +
   (Math.abs(metres) < 1e-9 ? '0' : written(lengthText(Math.abs(metres)))).replace('\u00a0', ' ');
 
-/** Outlines of the planter boxes; several tags of one box draw it once. */
 export function drawBoxes(
   { context, view, palette }: Pen,
   boxes: readonly (readonly MapPoint[])[],
@@ -271,7 +269,6 @@ export class Hatching {
   }
 }
 
-/** Hatches what an estimate is unsure of, the denser the less it is sure. */
 export function drawUnsure(pen: Pen, steps: readonly (Placed | null)[], hatching: Hatching): void {
   UNSURE_GAPS_PX.forEach((gap, index) => {
     const step = steps[index];

@@ -60,11 +60,9 @@ export function clear({ context, size, ratio }: Surface): void {
   context.clearRect(0, 0, size.width, size.height);
 }
 
-export function canvasOfPixels(pixels: {
-  readonly data: Uint8ClampedArray<ArrayBuffer>;
-  readonly width: number;
-  readonly height: number;
-}): HTMLCanvasElement {
+export function canvasOfPixels(
+  pixels: Pick<ImageData, 'data' | 'width' | 'height'>,
+): HTMLCanvasElement {
   const canvas = newCanvas(pixels.width, pixels.height);
   if (pixels.width > 0 && pixels.height > 0) {
     contextOf(canvas).putImageData(new ImageData(pixels.data, pixels.width, pixels.height), 0, 0);
@@ -78,13 +76,11 @@ export function canvasOfPixels(pixels: {
  */
 export class Sprites {
   readonly #sprites = new Map<string, HTMLCanvasElement>();
-  readonly #ratio: number;
-  readonly #limit: number;
 
-  constructor(ratio: number, limit = 1_000) {
-    this.#ratio = ratio;
-    this.#limit = limit;
-  }
+  constructor(
+    private readonly ratio: number,
+    private readonly limit = 1_000,
+  ) {}
 
   get(
     key: string,
@@ -94,10 +90,10 @@ export class Sprites {
   ): HTMLCanvasElement {
     const known = this.#sprites.get(key);
     if (known) return known;
-    if (this.#sprites.size >= this.#limit) this.#sprites.clear();
-    const sprite = newCanvas(Math.ceil(width) * this.#ratio, Math.ceil(height) * this.#ratio);
+    if (this.#sprites.size >= this.limit) this.#sprites.clear();
+    const sprite = newCanvas(Math.ceil(width) * this.ratio, Math.ceil(height) * this.ratio);
     const context = contextOf(sprite);
-    context.scale(this.#ratio, this.#ratio);
+    context.scale(this.ratio, this.ratio);
     paint(context);
     this.#sprites.set(key, sprite);
     return sprite;

@@ -148,8 +148,10 @@ const footer: Footer = {
   title: 'Temperature',
   time: '2026-05-01 14:03:22',
   ends: ['20.0', '31.0\u00a0°C'],
-  maxAlpha: 0.6,
-  colour: [200, 0, 0],
+  ramps: [
+    ['rgb(200 0 0 / 0)', 'rgb(200 0 0)'],
+    ['rgb(200 0 0 / 0)', 'rgb(200 0 0 / 0.6)'],
+  ],
   scale: 40,
 };
 let context: FakeContext;

@@ -10,7 +10,6 @@ interface Props<Option extends string | number> {
   readonly count?: (option: Option) => number | null;
 }
 
-/** Buttons, of which one is pressed. */
 export function Choice<Option extends string | number>(props: Props<Option>): JSX.Element {
   const { label, options, value, onChange, text, count = () => null } = props;
   const buttons = options.map((each) => (

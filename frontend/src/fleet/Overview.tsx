@@ -163,7 +163,6 @@ function nothingText({ archive, sites }: Seen): string {
   return archive.is_reachable ? words.empty : '';
 }
 
-/** What keeps anything here from being as it is now. */
 function Trouble({ seen }: { seen: Seen }): JSX.Element {
   const { archive, lostAt } = seen;
   let text = '';

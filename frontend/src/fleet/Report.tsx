@@ -30,17 +30,15 @@ interface SiteNote extends Note {
   readonly name: string;
 }
 
-interface Answer {
-  readonly sites: readonly SiteReport[];
-  readonly notes: readonly SiteNote[];
-}
-
 export default function Report({ shown }: { shown: readonly Site[] }): JSX.Element {
   const [hours, setHours] = useState<(typeof HOURS)[number]>(HOURS[0]);
   const names = namesOf(shown);
   const from = (Math.floor(timeOfDay() / 3_600_000) - hours) * 3600;
   const path = `api/report?from=${from}${names === '' ? '' : `&sites=${names}`}`;
-  const { value, message } = useAnswer<Answer>(path, EVERY_MS);
+  const { value, message } = useAnswer<{
+    sites: readonly SiteReport[];
+    notes: readonly SiteNote[];
+  }>(path, EVERY_MS);
   const found = new Map(value?.sites.map((each) => [each.site, each]));
   const sites = new Set(shown.map(({ site }) => site));
   const notes = value?.notes.filter(({ site }) => sites.has(site)) ?? [];

@@ -63,7 +63,6 @@ export function nearest<T extends { readonly at: MapPoint }>(
   return best;
 }
 
-/** Smallest box around all points; null without any. */
 export function boundsOf(points: Iterable<MapPoint>): Bounds | null {
   let minX = Infinity;
   let minY = Infinity;

@@ -157,7 +157,6 @@ export class MapCamera {
     this.#step({ scale, x: about(view.x, size.width), y: about(view.y, size.height) });
   }
 
-  /** Moves what is seen, by a share of the view's size. */
   panBy(x: number, y: number): void {
     const { view, size } = this.#handlers.viewport();
     this.#step({ ...view, x: view.x - x * size.width, y: view.y - y * size.height });

@@ -10,11 +10,9 @@ export type MapCommand =
   /** Shows the layers as on paper, without what moves or follows the pointer, while `take` runs. */
   | { readonly type: 'picture'; readonly take: () => void };
 
-type Listener = (command: MapCommand) => void;
+const listeners = new Set<(command: MapCommand) => void>();
 
-const listeners = new Set<Listener>();
-
-export function onMapCommand(listener: Listener): () => void {
+export function onMapCommand(listener: (command: MapCommand) => void): () => void {
   listeners.add(listener);
   return () => listeners.delete(listener);
 }
@@ -23,7 +21,6 @@ export function commandMap(command: MapCommand): void {
   for (const listener of [...listeners]) listener(command);
 }
 
-/** What a key stands for on the map; null: nothing. */
 export function keyCommand({ key, shiftKey }: KeyboardEvent): MapCommand | null {
   const far = shiftKey ? 0.5 : 0.1;
   switch (key) {

@@ -22,11 +22,11 @@ import {
   selectSensor,
 } from '../store/derived';
 import { selectNewest, selectShown, selectTag, type Shown } from '../store/moment';
-import { isPrinting } from '../store/theme';
+import { isPrinting, onThemeChange } from '../store/theme';
 import { type Content, contentOf, coveredBoxes, MapCamera, together, watchCovered } from './camera';
 import { keyCommand, type MapCommand, onMapCommand, pinUnderMouse, pointedAt } from './commands';
 import { Painter, type Canvases } from './painter';
-import { onPaletteChange, paletteInUse } from './palette';
+import { paletteInUse } from './palette';
 
 /** A finger hits a pin from this far, a mouse from a bit less; CSS pixels. */
 const TOUCH_REACH = 26;
@@ -355,7 +355,7 @@ export function runMap(
   const stops = [
     store.subscribe(guarded(update)),
     onMapCommand(run),
-    onPaletteChange(() => {
+    onThemeChange(() => {
       painter.setPalette(paletteInUse());
       spoil('still', 'pins', 'overlay');
       // Not with the next frame: a page on its way to the printer gets none.

@@ -62,11 +62,7 @@ import { keeping, memoLast, memoOne } from '../domain/memo';
 import { selectShown, selectTag, selectTags } from '../store/moment';
 import type { MapPicture } from '../geometry/image';
 
-export interface Canvases {
-  readonly still: HTMLCanvasElement;
-  readonly pins: HTMLCanvasElement;
-  readonly overlay: HTMLCanvasElement;
-}
+export type Canvases = Readonly<Record<'still' | 'pins' | 'overlay', HTMLCanvasElement>>;
 
 /** Fading is worked out anew this often even when nothing else changes, ms. */
 const FADE_TICK_MS = 5_000;
@@ -96,11 +92,9 @@ interface RoomAt extends Room {
  * data that it was made from.
  */
 export class Painter {
-  readonly #canvases: Canvases;
   #size: Size = { width: 0, height: 0 };
   #ratio = 1;
   #textScale = 1;
-  #palette: Palette;
   #sprites = new Sprites(1);
   #widths = new Map<string, number>();
   // Off the page, like those of the sprites: one in the page inherits the font's features from
@@ -115,10 +109,10 @@ export class Painter {
   readonly #stillBuffer = new PanBuffer();
   readonly #pinBuffer = new PanBuffer();
 
-  constructor(canvases: Canvases, palette: Palette) {
-    this.#canvases = canvases;
-    this.#palette = palette;
-  }
+  constructor(
+    private readonly canvases: Canvases,
+    private palette: Palette,
+  ) {}
 
   /** `textScale`: how large the page's text is there, 1 as usual. */
   resize(size: Size, ratio: number, textScale = 1): void {
@@ -127,7 +121,7 @@ export class Painter {
     this.#size = { width: Math.ceil(size.width), height: Math.ceil(size.height) };
     this.#ratio = ratio;
     this.#textScale = textScale;
-    for (const canvas of Object.values(this.#canvases) as HTMLCanvasElement[]) {
+    for (const canvas of Object.values(this.canvases)) {
       canvas.width = Math.round(this.#size.width * ratio);
       canvas.height = Math.round(this.#size.height * ratio);
       canvas.style.width = `${canvas.width / ratio}px`;
@@ -137,7 +131,7 @@ export class Painter {
   }
 
   setPalette(palette: Palette): void {
-    this.#palette = palette;
+    this.palette = palette;
     this.forget();
   }
 
@@ -153,7 +147,7 @@ export class Painter {
   #penOn(canvas: HTMLCanvasElement, view: View): Pen {
     const pen = {
       ...{ context: contextOf(canvas), size: this.#size, ratio: this.#ratio, view },
-      ...{ palette: this.#palette, sprites: this.#sprites, textScale: this.#textScale },
+      ...{ palette: this.palette, sprites: this.#sprites, textScale: this.#textScale },
     };
     clear(pen);
     return pen;
@@ -161,7 +155,7 @@ export class Painter {
 
   /** `isNew`: more than the view changed since the last time. */
   paintStill(state: AppState, view: View, now: number, isNew: boolean): void {
-    const pen = this.#penOn(this.#canvases.still, view);
+    const pen = this.#penOn(this.canvases.still, view);
     if (isNew) this.#stillBuffer.spoil();
     this.#stillBuffer.draw(pen, (target) => {
       this.#drawStill(target, state, now);
@@ -176,7 +170,7 @@ export class Painter {
     const picture = house.map.value;
     if (picture && layers.has('map')) {
       const { placement } = picture;
-      drawPicture(pen, { picture: this.#mapPicture(picture, this.#palette), placement });
+      drawPicture(pen, { picture: this.#mapPicture(picture, this.palette), placement });
     }
     const isTold = layers.has('field') && layers.has('unknown');
     const mapped = isTold ? selectMapped(state) : null;
@@ -216,7 +210,7 @@ export class Painter {
     isNew: boolean,
     covered: readonly Box[] | null,
   ): void {
-    const pen = this.#penOn(this.#canvases.pins, view);
+    const pen = this.#penOn(this.canvases.pins, view);
     if (covered) {
       const { width, height } = this.#size;
       // From pixels of the map view to those relative to the map's origin.
@@ -258,7 +252,7 @@ export class Painter {
       readonly crosshair: boolean;
     },
   ): void {
-    const pen = this.#penOn(this.#canvases.overlay, view);
+    const pen = this.#penOn(this.canvases.overlay, view);
     if (state.view.layers.has('pins')) drawPulses(pen, moving.pulses, moving.now);
     const { selected, hovered } = state.view;
     for (const tagId of new Set([hovered, selected])) {
@@ -268,12 +262,10 @@ export class Painter {
     if (moving.crosshair) drawCrosshair(pen);
   }
 
-  /** Whether pins look otherwise by now than they were painted. */
   hasFaded(state: AppState, now: number): boolean {
     return this.scene(state, now) !== this.#paintedScene;
   }
 
-  /** The same object as long as it looks the same. */
   scene(state: AppState, now: number): Scene {
     return this.#scene(
       this.#sceneInput({

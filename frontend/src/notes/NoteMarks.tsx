@@ -95,7 +95,6 @@ function subjectText(subject: string, alarms: readonly Alarm[]): string {
   return subject.startsWith('alarm:') ? C.alarm(tag) : tag;
 }
 
-/** What was said: a comment's words, or what became of an alarm, and why. */
 function noteText({ kind, text, until }: StandingNote): string {
   if (kind === 'comment') return text;
   const shelved = until === null ? C.unshelved : C.shelved(rosText(until));

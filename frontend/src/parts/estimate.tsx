@@ -64,7 +64,6 @@ export function EstimateFacts(): JSX.Element {
   );
 }
 
-/** The nearest readings are shown, and why: once, in plain words. */
 function Missing({ why, grade }: { why: NoEstimate; grade: Grade | null }): JSX.Element {
   const text =
     why.status === NOT_FOUND ? E.noService : grade?.fitted_at === null ? E.noModel : E.noneNow;

@@ -140,7 +140,6 @@ export const useRobot = (): RobotNow => useSelected(robotFrame, (frame) => frame
 const timeOf = (state: AppState, now: number): number | null =>
   selectShown(state).ageing.kind === 'unknown' ? null : rosNow(state, now);
 
-/** How long ago that was, s; null: nobody knows. */
 export function ageOf(stamp: WireTime, time: number | null): number | null {
   const at = secondsOf(stamp);
   return time === null || at === 0 ? null : ageSeconds(at * 1_000, time * 1_000);

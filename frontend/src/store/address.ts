@@ -1,6 +1,6 @@
 /** The part of the view that a link carries, in the URL's fragment: it never reaches a server. */
 import type { Compare } from '../domain/difference';
-import { isPossible } from '../domain/twin';
+import { equal, isPossible } from '../domain/twin';
 import { VERDICTS } from '../domain/health';
 import { type Period, PERIOD_KINDS } from '../domain/time';
 import type { Range } from '../domain/ramp';
@@ -175,12 +175,8 @@ const placeOf = (view: Pick<ViewState, 'selected' | 'moment'>): Pick<Entry, 'tag
   moment: view.moment,
 });
 
-function entryNow(): Entry | null {
-  const state: unknown = history.state;
-  return typeof state === 'object' && state !== null && 'link' in state && 'opened' in state
-    ? (state as Entry)
-    : null;
-}
+/** Null: a link was opened just now; nobody else keeps anything there. */
+const entryNow = (): Entry | null => history.state as Entry | null;
 
 /**
  * Keeps the address a link to what is on the screen, and follows a link that is opened. A card
@@ -238,13 +234,7 @@ function keepLink(): () => void {
   /** Tells the browser's entry what it is for, and keeps its address or gives it another. */
   const mark = (to: string): void => {
     const { pathname, search, hash } = window.location;
-    const now = entryNow();
-    const isSame =
-      to === `${pathname}${search}${hash}` &&
-      now?.tag === entry.tag &&
-      now.moment === entry.moment &&
-      now.link === entry.link &&
-      now.opened === entry.opened;
+    const isSame = to === `${pathname}${search}${hash}` && equal(entryNow(), entry);
     if (!isSame) history.replaceState(entry, '', to);
   };
   const write = (): void => {

@@ -13,14 +13,9 @@ export const NO_VIEWPORT = {
   size: { width: 0, height: 0 } as Size,
 };
 
-export interface AppState {
-  readonly twin: TwinState;
-  readonly view: ViewState;
-  readonly viewport: Viewport;
-  readonly settings: Settings;
-}
+export type AppState = ReturnType<typeof store.get>;
 
-export const store = createStore<AppState>({
+export const store = createStore({
   twin: NO_TWIN,
   view: DEFAULT_VIEW,
   viewport: NO_VIEWPORT,

@@ -6,7 +6,6 @@ import { withParts } from '../domain/memo';
 export interface Store<State> {
   readonly get: () => State;
   readonly set: (next: State) => void;
-  /** Calls back after every change; returns the way to stop. */
   readonly subscribe: (listener: () => void) => () => void;
 }
 
@@ -60,7 +59,6 @@ export interface Announcement {
   readonly key: number;
 }
 
-/** A voice of its own, silent at first. */
 export const createVoice = (): Store<Announcement> => createStore({ text: '', key: 0 });
 
 export const announce = (voice: Store<Announcement>, text: string): void => {

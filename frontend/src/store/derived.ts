@@ -42,7 +42,6 @@ import { fixedRange, type Sort, type ViewState } from './view';
 const healthShown = memoLast(houseHealth);
 const healthNow = memoLast(houseHealth);
 
-/** As the bridge judged the moment that is shown. */
 export const selectHealth = (state: AppState): HouseHealth =>
   healthShown(selectTags(state), selectShown(state).health, selectIsHeard(state));
 
@@ -132,7 +131,6 @@ const zonesBy = memoLast(zonesOf);
 export const selectZones = (state: AppState, field: Field): Zones =>
   zonesBy(gridOf(field), sitesIn(selectTags(state)), selectSensor(state));
 
-/** Whether some plant of the house has an ideal of the sensor. */
 export function selectHasIdeal(state: AppState): boolean {
   const sensor = selectSensor(state);
   return (
@@ -146,7 +144,6 @@ export function selectHasIdeal(state: AppState): boolean {
 export const selectColouring = (state: AppState): ViewState['colouring'] =>
   selectHasIdeal(state) ? state.view.colouring : 'value';
 
-/** What the heat map shows, and in which range of colours. */
 export interface Heat {
   readonly field: Field;
   readonly range: Range;
@@ -251,7 +248,6 @@ const areasOf = memoLast(areasOnMap);
 
 const NO_AREAS: readonly AreaOnMap[] = [];
 
-/** The areas that the map shows: where the table is grouped by them. */
 export function selectAreas(state: AppState): readonly AreaOnMap[] {
   const areaOf = selectAreaOf(state);
   return areaOf ? areasOf(selectTags(state), areaOf) : NO_AREAS;
@@ -272,7 +268,6 @@ export function selectListed(state: AppState): ReadonlySet<string> | null {
   return filter.trim() === '' && health === null ? null : idsOf(selectRows(state));
 }
 
-/** The table's rows as the operator sees them: filtered, sorted, and together by area. */
 export function selectRows(state: AppState): readonly Row[] {
   const { filter, health, sort } = state.view;
   const catalogue = selectCatalogue(state);

@@ -61,11 +61,6 @@ interface FetcherOptions<T> {
   readonly onError?: (message: string, isLasting: boolean) => void;
 }
 
-export interface Fetcher<T> {
-  /** Null: nothing any more; all that is under way ends. */
-  readonly want: (wish: Wish<T> | null) => void;
-}
-
 /** A refusal that the same request gets again. */
 const isRefused = (error: unknown): boolean =>
   error instanceof Refusal && (error.status === 400 || error.status === 404);
@@ -75,7 +70,7 @@ export function createFetcher<T>({
   isDragged = false,
   onValue,
   onError,
-}: FetcherOptions<T>): Fetcher<T> {
+}: FetcherOptions<T>) {
   interface Running {
     readonly key: string;
     readonly order: number;
@@ -181,7 +176,8 @@ export function createFetcher<T>({
   };
 
   return {
-    want: (wish) => {
+    /** Null: nothing any more; all that is under way ends. */
+    want: (wish: Wish<T> | null): void => {
       if (wish?.key === wanted?.key && wish?.group === wanted?.group) return;
       const isOther = !wish || wish.group !== wanted?.group;
       wanted = wish;

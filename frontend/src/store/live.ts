@@ -1,7 +1,7 @@
 /** The page's one connection, and what its frames do to the store. */
 import { now, onLapse } from '../clock';
 import { latestAfter } from '../contract/frames';
-import { connect, signInIfAsked } from '../connection/socket';
+import { connect, type Link, signInIfAsked } from '../connection/socket';
 import { stateSocketUrl } from '../contract/api';
 import type { Latest } from '../contract/types';
 import { receive } from './app';
@@ -20,11 +20,11 @@ export function pauseMs(tags: number): number {
 /** A message that could not be read is told of for so long after the last one. */
 const TOLD_MS = 60_000;
 
-let retry: (() => void) | null = null;
+let current: Link | null = null;
 
 /** Does not wait for the back-off any longer. */
 export function retryConnection(): void {
-  retry?.();
+  current?.tell('wake');
 }
 
 export function startLive(): () => void {
@@ -105,9 +105,7 @@ export function startLive(): () => void {
       else timer ??= setTimeout(take, pause, null);
     },
   });
-  retry = () => {
-    link.tell('wake');
-  };
+  current = link;
   const unhear = onLapse(() => {
     latest = null;
     isNew = false;
@@ -119,6 +117,6 @@ export function startLive(): () => void {
     clearTimeout(timer);
     clearTimeout(forget);
     link.stop();
-    retry = null;
+    current = null;
   };
 }

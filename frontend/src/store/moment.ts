@@ -103,7 +103,6 @@ export const isHeardNow = ({ twin }: AppState): boolean =>
 
 export const selectSnapshot = (state: AppState): Snapshot | null => selectShown(state).snapshot;
 
-/** Whether what is shown has come; before, there is nothing to judge or to count. */
 export const selectIsHere = (state: AppState): boolean => selectSnapshot(state) !== null;
 
 const NO_TAGS: readonly Tag[] = [];

@@ -108,7 +108,6 @@ export const SHORT_PERIOD: Period = { kind: 'hour' };
 export const isChosen = (period: Period): boolean =>
   period !== DEFAULT_VIEW.period && period !== SHORT_PERIOD;
 
-/** The fixed colour scale of the sensor in view; null: that of the field itself. */
 export function fixedRange({ ranges, sensor }: ViewState): Range | null {
   return ranges.get(sensor) ?? null;
 }

@@ -36,21 +36,17 @@ function replacedAsFound(): () => void {
 /** Timers that still run when the file ends would call into the next one's window. */
 function timersEnd(): () => void {
   const stops: (() => void)[] = [];
-  const { setTimeout, setInterval, clearTimeout, clearInterval } = globalThis;
-  globalThis.setTimeout = ((...given: Parameters<typeof setTimeout>) => {
-    const timer = setTimeout(...given);
-    stops.push(() => {
-      clearTimeout(timer);
-    });
-    return timer;
-  }) as typeof setTimeout;
-  globalThis.setInterval = ((...given: Parameters<typeof setInterval>) => {
-    const timer = setInterval(...given);
-    stops.push(() => {
-      clearInterval(timer);
-    });
-    return timer;
-  }) as typeof setInterval;
+  for (const name of ['setTimeout', 'setInterval'] as const) {
+    const start = globalThis[name] as typeof setTimeout;
+    globalThis[name] = ((...given: Parameters<typeof setTimeout>) => {
+      const timer = start(...given);
+      stops.push(() => {
+        // Which ends either.
+        clearTimeout(timer);
+      });
+      return timer;
+    }) as never;
+  }
   return () => {
     for (const stop of stops) stop();
   };

@@ -55,26 +55,20 @@ export function connection(now: number, ...events: readonly ConnectionEvent[]): 
   receive(withConnection(last, now));
 }
 
+const heard = (now: number, bridge: StatusFrame): ConnectionEvent[] => [
+  { type: 'start', now },
+  { type: 'opened', now },
+  { type: 'frame', now, status: bridge },
+  { type: 'frame', now, status: null },
+];
+
 /** Heard of, the last time so long ago. */
 export function goLive(bridge: StatusFrame = status(), silentMs = 0): void {
   const now = performance.now();
-  connection(
-    now + silentMs,
-    { type: 'start', now },
-    { type: 'opened', now },
-    { type: 'frame', now, status: bridge },
-    { type: 'frame', now, status: null },
-  );
+  connection(now + silentMs, ...heard(now, bridge));
 }
 
 export function goLost(): void {
   const now = performance.now();
-  connection(
-    now,
-    { type: 'start', now },
-    { type: 'opened', now },
-    { type: 'frame', now, status: status() },
-    { type: 'frame', now, status: null },
-    { type: 'closed', now, code: 1006 },
-  );
+  connection(now, ...heard(now, status()), { type: 'closed', now, code: 1006 });
 }

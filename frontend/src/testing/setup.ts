@@ -34,14 +34,10 @@ globalThis.ImageData = class {
   ) {}
 } as unknown as typeof ImageData;
 
+// Nothing has a size here.
+const nothing = (): void => undefined;
 globalThis.ResizeObserver = class {
-  observe(): void {
-    // Nothing has a size here.
-  }
-  unobserve(): void {
-    // See above.
-  }
-  disconnect(): void {
-    // See above.
-  }
+  observe = nothing;
+  unobserve = nothing;
+  disconnect = nothing;
 };

@@ -201,7 +201,6 @@ const valueText = (moment: number | null, column: Column | undefined, newest: st
   return column ? `${time}, ${countsText(column)}` : time;
 };
 
-/** Beside the mouse: which moment that is, and what happened about then. */
 function Bubble({
   axis,
   x,

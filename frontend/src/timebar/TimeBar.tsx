@@ -21,7 +21,15 @@ export function TimeBar(): JSX.Element | null {
   const tick = useNow();
   const nowS = rosNow(store.get(), tick);
   if (nowS === null) return null;
-  if (remembered.state === 'off') return <Off />;
+  if (remembered.state === 'off') {
+    return (
+      <section className="timebar" aria-label={S.timebar} data-testid="timebar" data-state="off">
+        <p className="timebar-note">
+          <strong>{S.timebarOff}</strong> {S.timebarOffHint}
+        </p>
+      </section>
+    );
+  }
   const span = barSpan(store.get(), nowS);
   return (
     <section
@@ -46,17 +54,6 @@ export function TimeBar(): JSX.Element | null {
           {S.chartFailed(shown(remembered.message, 160))}
         </p>
       )}
-    </section>
-  );
-}
-
-/** A twin that keeps nothing: what is missing, and how to have it. */
-function Off(): JSX.Element {
-  return (
-    <section className="timebar" aria-label={S.timebar} data-testid="timebar" data-state="off">
-      <p className="timebar-note">
-        <strong>{S.timebarOff}</strong> {S.timebarOffHint}
-      </p>
     </section>
   );
 }
@@ -123,7 +120,6 @@ function PeriodChoice({ period, nowS }: { period: Period; nowS: number }): JSX.E
   );
 }
 
-/** What the marks of the bar mean, in words, each beside its shape. */
 function Marks(): JSX.Element {
   const mark = (name: keyof typeof S.timebarMark, picture: ReactNode): JSX.Element => (
     <li>
@@ -154,10 +150,7 @@ function Marks(): JSX.Element {
 
 type Own = Extract<Period, { kind: 'own' }>;
 
-interface Typed {
-  readonly from: string;
-  readonly to: string;
-}
+type Typed = Readonly<Record<'from' | 'to', string>>;
 
 /** Null: what is typed makes no period. */
 function periodOf(typed: Typed, isSimulated: boolean): Own | null {

@@ -90,14 +90,9 @@ export function More({ label, text }: { label: string; text: string }): JSX.Elem
   );
 }
 
-interface Option<Value extends string> {
-  readonly value: Value;
-  readonly label: ReactNode;
-}
-
 interface SegmentedProps<Value extends string> {
   readonly legend: string;
-  readonly options: readonly Option<Value>[];
+  readonly options: readonly { readonly value: Value; readonly label: ReactNode }[];
   readonly value: Value;
   readonly onChange: (value: Value) => void;
   readonly className?: string;

@@ -194,11 +194,6 @@ describe('attempts', () => {
     expect(connection.failures).toBe(5);
   });
 
-  test('the tab or the network coming back does not wait', () => {
-    const lost = step(live, closed(100)).connection;
-    expect(step(lost, { type: 'wake', now: 101 }).command).toBe('reopen');
-  });
-
   test('a network that returns starts an attempt anew that began without it', () => {
     const { connection } = run({ type: 'start', now: 0 });
     expect(step(connection, { type: 'wake', now: 5 }).command).toBeNull();

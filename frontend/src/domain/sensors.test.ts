@@ -130,10 +130,6 @@ test('temperatures follow the operator, other units do not', () => {
   expect(unitOf(humidity, 'F')).toBe('%');
 });
 
-test('a difference has no offset', () => {
-  expect(differenceToShown(temperature, 10, 'F')).toBe(18);
-});
-
 test('what is typed comes back', () => {
   expect(fromShown(temperature, toShown(temperature, 21.5, 'F'), 'F')).toBeCloseTo(21.5);
 });

@@ -40,12 +40,6 @@ describe('camera', () => {
     expect(onCamera).not.toHaveBeenCalled();
   });
 
-  test('going where it is changes nothing', () => {
-    camera.goTo(null, content);
-    camera.goTo(null, content);
-    expect(onView).toHaveBeenCalledTimes(1);
-  });
-
   test('going to what the operator chose changes nothing', () => {
     camera.goTo(null, content);
     for (let step = 0; step < 40; step++) {

@@ -1,6 +1,7 @@
 import { describe, expect, test } from 'vitest';
 
 import type { StatusFrame } from '../contract/types';
+import { status as statusWith } from '../testing/page';
 import {
   backoffMs,
   type Command,
@@ -16,21 +17,8 @@ import {
   TRY_AGAIN_LATER,
 } from './machine';
 
-const status = (twin: StatusFrame['twin']): StatusFrame => ({
-  type: 'status',
-  twin,
-  reason: twin === 'live' ? 'live' : 'stale',
-  message: '',
-  state_age_seconds: 0,
-  has_map: true,
-  origin: 'robot',
-  twin_count: 1,
-  input_problems: [],
-  day_length_s: 86_400,
-  drops: [],
-  journal: { state: 'recording', detail: '', set_aside: '', simulated: null },
-  outward: [],
-});
+const status = (twin: StatusFrame['twin']): StatusFrame =>
+  statusWith({ twin, reason: twin === 'live' ? 'live' : 'stale' });
 
 const step = (connection: Connection, event: ConnectionEvent): ReturnType<typeof stepBy> =>
   stepBy(connection, event, 1);

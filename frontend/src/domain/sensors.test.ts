@@ -2,7 +2,7 @@ import { describe, expect, test } from 'vitest';
 
 import { CATALOGUE, CATALOGUES, FILE, sensorNamed } from '../testing/sensors';
 import { cataloguesOf, isHad, isMeasured, NO_CATALOGUES, rangesFor } from './sensors';
-import { differenceToShown, fromShown, toShown, unitOf } from './format';
+import { fromShown, toShown, unitOf } from './format';
 
 test('every look comes from the file, in its order', () => {
   expect(CATALOGUE.all.map(({ name }) => name)).toEqual(Object.keys(FILE.sensors));

@@ -8,9 +8,7 @@ export type Happened = Timeline['buckets'][number];
 
 export type Timeline = ReturnType<typeof timelineOf>;
 
-type WireSpan = WireTimeline['silences'][number];
-
-export const spanOfWire = ({ from, to }: WireSpan): Span => ({
+export const spanOfWire = ({ from, to }: WireTimeline['silences'][number]): Span => ({
   from: secondsOf(from),
   to: secondsOf(to),
 });
@@ -37,13 +35,14 @@ export interface Missing extends Span {
   readonly why: 'not_kept' | 'not_recorded';
 }
 
-type Told = Pick<WireTimeline, 'from' | 'to' | 'complete_to' | 'kept_from'>;
-
 /** The twin says once a second how far its journal is. */
 const SLACK_S = 5;
 
 /** `nowS` is the twin's time at which it was told: of what comes later nothing is missing. */
-export function missingOf(told: Told, nowS: number): readonly Missing[] {
+export function missingOf(
+  told: Pick<WireTimeline, 'from' | 'to' | 'complete_to' | 'kept_from'>,
+  nowS: number,
+): readonly Missing[] {
   const [from, to] = [secondsOf(told.from), Math.min(secondsOf(told.to), nowS)];
   const missing: Missing[] = [];
   if (told.kept_from) missing.push({ from, to: secondsOf(told.kept_from), why: 'not_kept' });

@@ -1,9 +1,6 @@
 import type { OccupancyGrid } from '../contract/types';
 import { type Box, mapPoint, type MapPoint, type View } from './coordinates';
 
-/** Canvas transform (a, b, c, d, e, f) as CanvasRenderingContext2D.setTransform takes it. */
-type Affine = readonly [number, number, number, number, number, number];
-
 /** Where an upright or turned picture lies in the map: its lower left corner, size and yaw. */
 export interface Placement {
   /** Lower left corner of the grid's cell (0, 0), metres in the map frame. */
@@ -48,7 +45,7 @@ export function mapPlacement(grid: OccupancyGrid): Placement {
  * the grid's last row: pixel (column, row) lies at ((column), (height - row)) * resolution in
  * the grid, which is then turned by yaw and moved to the origin.
  */
-export function imageToCanvas(placement: Placement, view: View): Affine {
+export function imageToCanvas(placement: Placement, view: View) {
   const { originX, originY, yaw, resolution, height } = placement;
   const cos = Math.cos(yaw) * resolution;
   const sin = Math.sin(yaw) * resolution;
@@ -61,7 +58,7 @@ export function imageToCanvas(placement: Placement, view: View): Affine {
     cos * view.scale,
     view.x + leftTopX * view.scale,
     view.y - leftTopY * view.scale,
-  ];
+  ] as const;
 }
 
 /** Corners in the map frame of the pixels from (left, top) to (right, bottom), exclusive. */

@@ -52,17 +52,11 @@ export function startNotes(): () => void {
   };
 }
 
-/** So near to each other that one mark stands for them. */
-interface Cluster {
-  readonly at: number;
-  readonly notes: readonly StandingNote[];
-}
-
 /** Nearer than this, as a share of the span, marks would cover each other. */
 const NEAR = 0.02;
 
-/** From the oldest; `found` is in that order. */
-export function clustersOf(found: readonly StandingNote[], { from, to }: Span): Cluster[] {
+/** Those so near to each other that one mark stands for them; from the oldest, as `found` is. */
+export function clustersOf(found: readonly StandingNote[], { from, to }: Span) {
   const clusters: { at: number; notes: StandingNote[] }[] = [];
   for (const one of found) {
     const { at } = one;

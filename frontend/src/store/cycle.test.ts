@@ -1,11 +1,11 @@
 import { afterEach, beforeEach, describe, expect, test, vi } from 'vitest';
 
 import { showTags } from '../testing/page';
-import { CATALOGUE, sensorNamed } from '../testing/sensors';
+import { CATALOGUE } from '../testing/sensors';
 import { readings, stateFrame, tag, wireTag } from '../testing/tags';
 import { act, receive, store } from './app';
 import { withState } from './twin';
-import { addressOfPage, cycleWish, nextSensor, sensorAfter, sensorsOf, startCycle } from './cycle';
+import { addressOfPage, cycleWish, nextSensor, sensorsOf, startCycle } from './cycle';
 import { DEFAULT_VIEW } from './view';
 
 let stop: () => void;

@@ -24,7 +24,7 @@ export const sensorsOf = (tags: readonly Tag[], offered: readonly Sensor[]): rea
   offered.filter(({ name }) => tags.some((tag) => tag.readings.has(name)));
 
 /** The one after `current`, the first after the last; null: there is no other. */
-export function sensorAfter(sensors: readonly Sensor[], current: string): Sensor | null {
+function sensorAfter(sensors: readonly Sensor[], current: string): Sensor | null {
   const index = sensors.findIndex(({ name }) => name === current);
   const next = sensors[(index + 1) % Math.max(1, sensors.length)];
   return next && next.name !== current ? next : null;

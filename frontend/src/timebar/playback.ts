@@ -13,7 +13,10 @@ type Speed = (typeof SPEEDS)[number];
 
 const TICK_MS = 100;
 
-export const playback = createStore({ isPlaying: false, speed: 300 as Speed });
+export const playback = createStore<{ isPlaying: boolean; speed: Speed }>({
+  isPlaying: false,
+  speed: 300,
+});
 
 let timer: ReturnType<typeof setInterval> | undefined;
 let unsubscribe: () => void = () => undefined;

@@ -19,7 +19,6 @@ import { useTicking } from '../widgets/useNow';
 
 /** A position that is older never looks like one of now, s. */
 const LIVE_S = 10;
-/** The trail is looked at anew so often, s. */
 const FADE_S = 10;
 
 /** Where the robot is, has been and will be; to who does not see it, `RobotFact` says so. */

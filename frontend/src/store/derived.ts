@@ -127,7 +127,6 @@ const gridOf = memoOne(({ width, height, originX, originY, resolution }: Field) 
 
 const zonesBy = memoLast(zonesOf);
 
-/** Which ranges hold where in a field, by the plants of the tags. */
 export const selectZones = (state: AppState, field: Field): Zones =>
   zonesBy(gridOf(field), sitesIn(selectTags(state)), selectSensor(state));
 

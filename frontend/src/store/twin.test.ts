@@ -9,12 +9,6 @@ import { NO_TWIN, withConnection, withState } from './twin';
 const late = stateFrame([wireTag({ tag_id: 'a' }), wireTag({ tag_id: 'b' })], { seq: 900 });
 
 describe('state frames', () => {
-  test('one frame is enough for a page that comes late', () => {
-    const { snapshot } = changed(NO_TWIN, withState(late, 50)).latest;
-    expect(snapshot?.tags.map(({ id }) => id)).toEqual(['a', 'b']);
-    expect(snapshot?.takenAt).toBe(50);
-  });
-
   test('an old state that the bridge kept is as old as the bridge says', () => {
     const { snapshot } = changed(NO_TWIN, withState(late, 100_000, 40)).latest;
     expect(snapshot?.takenAt).toBe(60_000);

@@ -7,7 +7,6 @@ import {
   viewAfter,
   type ViewState,
   withChart,
-  withLayer,
   withList,
   withRange,
   withSort,
@@ -37,13 +36,6 @@ test('a column sorts upwards first, then downwards, then upwards', () => {
   const twice = viewAfter(once, withSort('age'));
   const thrice = viewAfter(twice, withSort('age'));
   expect([once, twice, thrice].map(({ sort }) => sort.descending)).toEqual([false, true, false]);
-});
-
-test('layers go on and off without touching the old set', () => {
-  const off = viewAfter(DEFAULT_VIEW, withLayer('pins', false));
-  expect(off.layers.has('pins')).toBe(false);
-  expect(DEFAULT_VIEW.layers.has('pins')).toBe(true);
-  expect(viewAfter(off, withLayer('pins', true)).layers.has('pins')).toBe(true);
 });
 
 test('smooth is on demand, everything else is on', () => {

@@ -19,10 +19,10 @@ from lupin_patrol.mission import (
     Mission,
     PassCompleted,
     ScanStatus,
-    TagScanned,
     TagsDiscovered,
+    Visited,
 )
-from lupin_twin.core.state import Pose
+from lupin_twin.core.state import Pose, Scan
 from tests.support.climate import known_in
 
 DEFAULT_SEED = 0
@@ -45,6 +45,10 @@ def until(passes: int, events: Iterator[Event]) -> Iterator[Event]:
 
 def only(kind: type[EventT], events: list[Event]) -> list[EventT]:
     return [event for event in events if isinstance(event, kind)]
+
+
+def scans_of(events: list[Event]) -> list[Scan]:
+    return [visit.write for visit in only(Visited, events) if isinstance(visit.write, Scan)]
 
 
 @pytest.fixture(scope="module")
@@ -92,8 +96,8 @@ def test_a_tag_is_discovered_before_it_is_tried(many_first_passes: list[list[Eve
         for event in events:
             if isinstance(event, TagsDiscovered):
                 discovered = {sighting.tag.tag_id for sighting in event.sightings}
-            elif isinstance(event, TagScanned):
-                assert event.tag_id in discovered
+            elif isinstance(event, Visited):
+                assert event.write.tag_id in discovered
 
 
 # --- scans ---------------------------------------------------------------------------------------
@@ -103,8 +107,8 @@ def test_every_tag_is_read_within_a_minute_its_retries_included(
     many_first_passes: list[list[Event]],
 ) -> None:
     for events in many_first_passes:
-        scans = only(TagScanned, events)
-        assert len({scan.tag_id for scan in scans if scan.status is ScanStatus.OK}) == 29
+        scans = scans_of(events)
+        assert len({scan.tag_id for scan in scans if scan.status == ScanStatus.OK}) == 29
         [completed] = only(PassCompleted, events)
         assert completed.failed == ()
         # Patrol time: a second of it is a second at the default speed. Five seconds are left for
@@ -120,25 +124,28 @@ def test_readings_are_in_the_contracts_units(patrol: list[Event]) -> None:
         "light": (500.0, 1_200.0),
         "soil_moisture": (20.0, 100.0),
     }
-    for scan in only(TagScanned, patrol):
-        for name, value in scan.readings:
-            low, high = plausible[name]
-            assert low < value < high, (name, value)
+    for scan in scans_of(patrol):
+        for reading in scan.readings:
+            low, high = plausible[reading.name]
+            assert low < reading.value < high, reading
 
 
 def test_a_retry_may_fail_too_and_a_later_pass_brings_the_tag_back(patrol: list[Event]) -> None:
     lost = [(done.pass_index, tag) for done in only(PassCompleted, patrol) for tag in done.failed]
     assert lost
     for pass_index, tag_id in lost:
-        attempts = [s for s in only(TagScanned, patrol) if s.tag_id == tag_id]
-        in_pass = [s.status for s in attempts if s.pass_index == pass_index]
+        in_pass = [
+            visit.write.status
+            for visit in only(Visited, patrol)
+            if visit.write.tag_id == tag_id and visit.pass_index == pass_index
+        ]
         assert len(in_pass) == 2
         assert ScanStatus.OK not in in_pass
     pass_index, tag_id = lost[0]
     assert any(
-        scan.status is ScanStatus.OK
-        for scan in only(TagScanned, patrol)
-        if scan.tag_id == tag_id and scan.pass_index > pass_index
+        visit.write.status == ScanStatus.OK
+        for visit in only(Visited, patrol)
+        if visit.write.tag_id == tag_id and visit.pass_index > pass_index
     )
 
 
@@ -148,12 +155,13 @@ def yaw_of(pose: Pose) -> float:
 
 def test_poses_are_the_tags_own_at_first_and_jitter_a_little_later(patrol: list[Event]) -> None:
     greenhouse = Mission(GreenhouseSimulator(), 0, DAY_SPEED).greenhouse
-    for scan in only(TagScanned, patrol):
+    for visit in only(Visited, patrol):
+        scan = visit.write
         if scan.pose is None:
             continue
         tag = greenhouse.tag(scan.tag_id)
         off = dist((scan.pose.x, scan.pose.y), tag.position)
-        if scan.pass_index == 0:
+        if visit.pass_index == 0:
             assert off == 0.0
             assert yaw_of(scan.pose) == pytest.approx(tag.yaw)
         else:
@@ -186,7 +194,8 @@ def test_the_robot_never_enters_a_table_nor_jumps(monkeypatch: pytest.MonkeyPatc
 
 
 def test_the_day_goes_on_at_its_own_speed_and_wraps_at_midnight() -> None:
-    scans = only(TagScanned, played(passes=2, day_speed=1_000.0))
+    played_visits = only(Visited, played(passes=2, day_speed=1_000.0))
+    scans = [visit for visit in played_visits if isinstance(visit.write, Scan)]
     for scan in scans:
         assert 0.0 <= scan.time_of_day_s < 86_400.0
         assert scan.time_of_day_s == pytest.approx(

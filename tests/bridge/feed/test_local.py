@@ -53,6 +53,11 @@ async def test_its_names_and_its_rules_are_those_of_its_node(domain: int) -> Non
         assert twin.revision() != revision
 
 
+async def test_two_twins_of_the_same_content_have_different_revisions(domain: int) -> None:
+    async with started(LocalTwin) as (first, _), started(LocalTwin) as (second, _):
+        assert first.revision() != second.revision()
+
+
 @pytest.mark.usefixtures("children_know_the_tests")
 async def test_damage_that_is_met_looking_back_has_the_file_set_aside(
     domain: int, tmp_path: Path

@@ -19,7 +19,6 @@ from websockets.asyncio.client import connect
 from lupin_bridge.bridge import Bridge
 from lupin_bridge.feed.relay import Relay
 from lupin_bridge.feed.source import ThreadState, TwinUnavailableError, TwinUpdate
-from lupin_bridge.field import formats as field_formats
 from lupin_bridge.serving.admission import Limits
 from lupin_bridge.settings import Settings
 from lupin_bridge.stream.hub import Client
@@ -27,13 +26,9 @@ from lupin_twin.core.journal_condition import UNKNOWN, Condition
 from lupin_twin.core.parameters import World
 from lupin_twin.core.past import NotRemembered, PastWrite
 from lupin_twin.core.state import Snapshot, TagState
-from lupin_twin.field.grid import FieldGrid
-from lupin_twin.field.idw import compute_idw_field
 from lupin_twin.runtime.workers import Workers
 from tests.bridge.stream.test_frames import received
-from tests.support.inprocess import Running, run, running
-from tests.support.messages import scan
-from tests.support.ros import Peer
+from tests.support.inprocess import run, running
 from tests.support.waiting import PATIENCE_S, until, wait_for
 from tests.support.web import ws_url
 
@@ -146,17 +141,6 @@ class Beat:
             self.now_s += self.waits_s.pop()
             self.stage.bridge._push_when_due()
         return self.now_s - at_s
-
-
-async def test_two_changes_go_out_at_once_and_the_next_by_the_rate(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    beat = Beat(monkeypatch)
-    async with Stage(clock=lambda: beat.now_s, frames_per_s=20.0) as stage:
-        beat.hold(stage)
-        waits = [beat.change(at_s) for at_s in (100.0, 100.01, 100.02, 100.08, 200.0, 200.01)]
-        assert waits == pytest.approx([0.0, 0.0, 0.03, 0.02, 0.0, 0.0])
-        assert beat.change(200.02) == pytest.approx(0.03), "a pause is made up for by one"
 
 
 async def test_of_a_producer_that_keeps_to_the_rate_no_change_waits(
@@ -311,65 +295,6 @@ async def test_who_asked_for_a_low_rate_gets_the_newest_although_nothing_more_ha
 
 
 # --- with a real twin ---------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("stage", ["compute", "encode"])
-def test_while_a_field_is_made_states_are_answered_and_frames_keep_coming(
-    domain: int, monkeypatch: pytest.MonkeyPatch, stage: str
-) -> None:
-    gate, reached = threading.Event(), threading.Event()
-
-    def hold() -> None:
-        reached.set()
-        gate.wait(PATIENCE_S)
-
-    compute, write = compute_idw_field, field_formats.write
-
-    def held_compute(*args: Any, **kwargs: Any) -> FieldGrid:
-        hold()
-        return compute(*args, **kwargs)
-
-    def held_write(*args: Any) -> bytes:
-        hold()
-        return write(*args)
-
-    if stage == "compute":
-        monkeypatch.setattr("lupin_twin.field.engine.compute_idw_field", held_compute)
-    else:
-        monkeypatch.setattr(field_formats, "write", held_write)
-
-    async def test(served: Running, peer: Peer) -> None:
-        heavy = asyncio.create_task(served.http.get(MILLION_CELLS))
-        await until(reached.is_set, "the heavy request to be at work")
-        async with connect(
-            ws_url(served.url), proxy=None, max_size=None, open_timeout=PATIENCE_S
-        ) as listener:
-            for number in range(3):
-                peer.observe(scan(f"meanwhile {number}", {"co2": 1.0}))
-                while f"meanwhile {number}" not in str(await listener.recv()):
-                    pass
-                answer = await served.http.get("/api/state")
-                assert f"meanwhile {number}" in answer.text
-        assert not heavy.done()
-        gate.set()
-        answer = await heavy
-        assert (answer.status_code, answer.headers["x-field-width"]) == (200, "1000")
-
-    async def with_twin() -> None:
-        async with running() as served:
-            with Peer(domain) as peer:
-                try:
-                    await test(served, peer)
-                finally:
-                    gate.set()
-
-    run(domain, with_twin())
-
-
-MILLION_CELLS = (
-    "/api/field.npy?sensor_type=co2&resolution=0.001"
-    "&bbox_min_x=0&bbox_min_y=0&bbox_max_x=1&bbox_max_y=1"
-)
 
 
 def test_no_thread_and_no_descriptor_is_left_behind(domain: int) -> None:

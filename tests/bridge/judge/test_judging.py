@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from lupin_bridge.judge.day import Day
-from lupin_bridge.judge.judging import MAX_AT_ONCE, Judge, Judged, judge_once, silenced
+from lupin_bridge.judge.judging import MAX_AT_ONCE, Judge, Judged, judge_once
 from lupin_bridge.judge.scans import Patrol
 from lupin_bridge.judge.sensors_file import parse
 from lupin_bridge.judge.verdict import Health, Kind, Reason, Verdict, judge_tag
@@ -60,15 +60,6 @@ def test_nothing_that_stays_is_told_again() -> None:
     assert first.tags.keys() == {"a", "b"}
     assert first.house.verdict is Verdict.CRITICAL
     assert judge.see(snapshot(START + S, GOOD, COLD)) is first
-
-
-def test_only_who_has_changed_is_told() -> None:
-    judge = Judge(BY_LIGHT)
-    first = judge.see(snapshot(START, GOOD, COLD))
-    warm = tag("b", START + MINUTE, temperature=20.0)
-    then = judge.see(snapshot(START + MINUTE, GOOD, warm))
-    assert others(first, then) == {"b"}
-    assert then.house.verdict is Verdict.HEALTHY
 
 
 def test_time_alone_makes_readings_old() -> None:
@@ -141,18 +132,6 @@ def scan(tag_id: str, at_ns: int, **values: float) -> PastWrite:
     return PastWrite(at_ns, 1, tag_id, at_ns, 0, 0, names, numbers)
 
 
-def test_what_was_scanned_before_makes_a_rhythm_too() -> None:
-    judge = Judge(BY_LIGHT)
-    old = tag("a", START, temperature=22.0)
-    hours = 3600 * S
-    before = [scan(name, START - back * hours, temperature=9.0) for name in ("a", "gone")
-              for back in (2, 1)]  # fmt: skip
-    judge.see(snapshot(START, old))
-    judge.learn(before)
-    judge.see(snapshot(START, old))
-    assert judge.holds_ns() == {"a": 3 * hours}
-
-
 def test_after_a_restart_the_patrol_has_the_interval_that_it_had_before() -> None:
     judge, now_ns = Judge(BY_LIGHT), START + 3 * MINUTE
     judge.see(snapshot(now_ns, tag("a", START + 2 * MINUTE, temperature=22.0)))
@@ -222,15 +201,6 @@ def test_a_reason_that_lasts_keeps_its_beginning() -> None:
     assert (reason.value, reason.since_ns) == (6.5, START)
 
 
-def test_silence_makes_the_house_unknown_and_leaves_the_tags() -> None:
-    judged = Judge(BY_LIGHT).see(snapshot(START, GOOD))
-    assert judged.house.verdict is Verdict.HEALTHY
-    silent = silenced(judged)
-    assert silent.house.verdict is Verdict.UNKNOWN
-    assert [reason.kind for reason in silent.house.reasons] == [Kind.SILENT]
-    assert silent.tags == judged.tags
-
-
 def test_as_of_a_moment_a_tag_that_cannot_be_judged_is_unknown_and_the_others_are_judged(
     monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
@@ -276,15 +246,6 @@ def test_what_the_house_is_doing_is_told_beside_its_verdict() -> None:
     # A clock that goes back has nothing of what is still to come.
     begun = tag("b", START, temperature=22.0)
     assert judge.see(snapshot(START, begun)).patrol == Patrol(None, START, 0)
-
-
-def test_a_tag_that_is_gone_is_forgotten() -> None:
-    judge = Judge(BY_LIGHT)
-    judge.see(snapshot(START, GOOD, COLD))
-    gone = judge.see(snapshot(START + S, GOOD))
-    assert gone.tags.keys() == {"a"}
-    assert gone.tags.keys() == {"a"}
-    assert gone.house.verdict is Verdict.HEALTHY
 
 
 VALUES = st.dictionaries(

@@ -1,7 +1,6 @@
 """Answers that are computed: how many and how often, each client by itself and all together."""
 
 import asyncio
-import math
 from collections import Counter
 from collections.abc import Iterator
 from contextlib import ExitStack, suppress
@@ -10,11 +9,8 @@ import pytest
 
 from lupin_bridge.routes import answers as answers_of
 from lupin_bridge.serving.admission import (
-    ALL_EXPORTS,
     BURST_S,
-    CLIENT_EXPORTS,
     EXPORTS,
-    LARGE,
     TOTAL,
     Admission,
     BusyError,
@@ -36,31 +32,6 @@ COMPUTED = ("/api/state", "/api/history?tag_id=1&sensor_type=co2", "/metrics", "
 # --- the rules ----------------------------------------------------------------------------------
 
 
-def test_a_client_has_its_number_in_flight_and_the_next_is_refused_by_name() -> None:
-    admission = Admission(Limits(answers_per_s=1000.0, concurrency=2, total_concurrency=10))
-    with admission.request("a", 0.0):
-        with admission.request("a", 0.0), admission.request("b", 0.0):
-            with pytest.raises(ClientLimitError) as refused, admission.request("a", 0.0):
-                pytest.fail("let in")
-            assert str(refused.value) == (
-                "a has 2 requests for computed answers in flight, the limit"
-            )
-            assert refused.value.headers == {"Retry-After": "1"}
-        with admission.request("a", 0.0):
-            pass
-
-
-def test_a_request_that_fails_gives_its_place_back() -> None:
-    admission = Admission(Limits(answers_per_s=1000.0, concurrency=1, total_concurrency=1))
-    for _ in range(3):
-        with (
-            pytest.raises(ZeroDivisionError),
-            admission.request("a", 0.0),
-            admission.computing("a"),
-        ):
-            raise ZeroDivisionError
-
-
 def admitted(rate_hz: float, seconds: float) -> int:
     """How many requests of a client get in that come evenly, by the limits as they are set."""
     limits = Limits()
@@ -78,24 +49,6 @@ def test_a_page_that_is_dragged_through_the_past_is_let_in_and_a_flood_is_not() 
     assert admitted(3 * moments_hz, seconds) == 3 * moments_hz * seconds
     allowed = Limits().answers_per_s * (seconds + BURST_S)
     assert admitted(1_000.0, seconds) == pytest.approx(allowed, abs=1)
-
-
-def test_a_client_has_one_export_at_a_time_and_all_together_have_few() -> None:
-    admission = Admission(Limits(answers_per_s=1000.0, concurrency=9, total_concurrency=9))
-    with ExitStack() as running_:
-        running_.enter_context(admission.export("a", 0.0, pytest.fail))
-        with pytest.raises(ClientLimitError, match="a has 1 export under way, the limit") as more:
-            running_.enter_context(admission.export("a", 99.0, pytest.fail))
-        assert more.value.headers == {"Retry-After": "5"}
-        for number in range(EXPORTS - 1):
-            running_.enter_context(admission.export(str(number), 0.0, pytest.fail))
-        assert admission.exporting == EXPORTS
-        with pytest.raises(BusyError, match=f"{EXPORTS} exports are under way, the limit"):
-            running_.enter_context(admission.export("b", 4.9, pytest.fail))
-    assert admission.exporting == 0
-    with admission.export("a", 5.0, pytest.fail):
-        pass
-    assert admission.refused == {CLIENT_EXPORTS: 1, ALL_EXPORTS: 1}
 
 
 def test_the_slowest_export_makes_place_and_who_takes_enough_does_not() -> None:
@@ -145,43 +98,6 @@ def test_a_request_refused_for_its_number_costs_no_turn() -> None:
         pass
 
 
-def test_all_together_have_a_number_too() -> None:
-    admission = Admission(Limits(answers_per_s=1.0, concurrency=1, total_concurrency=2))
-    with admission.computing("a"):
-        with (
-            admission.computing("b"),
-            pytest.raises(BusyError) as refused,
-            admission.computing("c"),
-        ):
-            pytest.fail("let in")
-        assert str(refused.value) == (
-            "2 answers are being computed, 0 of them for c: the limit is 2, "
-            "and no client takes more than it leaves free"
-        )
-        with admission.computing("b"):
-            pass
-
-
-def test_large_computations_leave_a_quarter_of_the_places_to_small_ones() -> None:
-    admission = Admission(Limits(answers_per_s=1.0, concurrency=1, total_concurrency=8))
-    with ExitStack() as taken:
-        for client in range(6):
-            taken.enter_context(admission.computing(str(client), is_large=True))
-        with pytest.raises(BusyError) as refused, admission.computing("new", is_large=True):
-            pytest.fail("let in")
-        assert str(refused.value) == (
-            "6 large answers are being computed, 0 of them for new: the limit is 6, "
-            "and no client takes more than it leaves free"
-        )
-        for client in range(2):
-            taken.enter_context(admission.computing(f"small {client}"))
-        with pytest.raises(BusyError, match="8 answers are"), admission.computing("new"):
-            pytest.fail("let in")
-        assert admission.refused == {LARGE: 1, TOTAL: 1}
-    with admission.computing("a", is_large=True):
-        assert admission.being_computed == 1
-
-
 @pytest.mark.parametrize("total", [1, 2, 3])
 def test_few_places_are_for_large_computations_too(total: int) -> None:
     admission = Admission(Limits(answers_per_s=1.0, concurrency=1, total_concurrency=total))
@@ -206,18 +122,9 @@ def test_of_six_clients_that_ask_for_all_they_may_each_has_a_place(is_large: boo
     assert admission.being_computed == 0
 
 
-def test_clients_that_are_gone_leave_nothing_behind() -> None:
-    admission = Admission(Limits(answers_per_s=1000.0, concurrency=1, total_concurrency=1))
-    for number in range(100):
-        with admission.request(f"client {number}", 0.0):
-            assert len(admission.in_flight) == 1
-    assert not admission.in_flight
-
-
 # --- at the routes ------------------------------------------------------------------------------
 
 RATE_HZ = 0.01
-BURST = max(1, math.floor(RATE_HZ * BURST_S))
 
 
 @pytest.fixture(scope="module")
@@ -273,14 +180,6 @@ def test_every_other_answer_that_is_computed_has_it_too(slow: Served, route: str
 def test_what_is_written_once_passes(slow: Served, route: str) -> None:
     with slow.client(address=f"127.0.5.{len(route)}") as client:
         assert [client.get(route).status_code for _ in range(5)] == [200] * 5
-
-
-def test_a_client_past_its_limit_holds_up_no_other(slow: Served) -> None:
-    with slow.client("127.0.3.1") as greedy, slow.client("127.0.3.2") as modest:
-        fields = [f"/api/field{QUERY.replace('co2', f'greedy {n}')}" for n in range(20)]
-        answers = [greedy.get(field).status_code for field in fields]
-        assert answers == [200] * BURST + [429] * (20 - BURST)
-        assert modest.get(fields[-1]).status_code == 200
 
 
 async def test_with_all_places_taken_it_is_503_until_one_is_free(domain: int) -> None:

@@ -2,7 +2,6 @@
 
 from typing import Any
 
-import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -30,22 +29,6 @@ def holds(kept: AnswerCache, key: object, expected: Answer) -> bool:
     if lent is not None:
         lent[1]()
     return lent is not None and lent[0] is expected
-
-
-def test_what_was_put_is_lent() -> None:
-    kept, given_answer = kept_for(10), answer(10)
-    assert kept.lend("a") is None
-    kept.put("a", given_answer)
-    lent = kept.lend("a")
-    assert lent is not None
-    assert lent[0] is given_answer, "and its body is the very same: nothing is copied"
-
-
-@pytest.mark.parametrize(("size", "is_kept"), [(10, True), (11, False)])
-def test_one_past_the_whole_bound_is_not_kept(size: int, is_kept: bool) -> None:
-    kept = kept_for(10)
-    kept.put("a", answer(size))
-    assert has(kept, "a") is is_kept
 
 
 def test_the_least_recently_used_goes_first() -> None:

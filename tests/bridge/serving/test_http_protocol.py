@@ -1,14 +1,11 @@
 """Answers go out as their readers take them: in pieces, and not at all to who takes nothing."""
 
-import asyncio
 import contextlib
 import socket
 from collections.abc import Iterator
-from typing import Any
 
 import pytest
 
-from lupin_bridge.serving.http_protocol import PIECE_BYTES, PieceByPiece
 from tests.support.access import Served, served
 from tests.support.processes import limits
 from tests.support.waiting import PATIENCE_S, wait_for
@@ -24,60 +21,6 @@ TIMEOUT_S = 3
 
 
 # --- in pieces ----------------------------------------------------------------------------------
-
-
-class Reader:
-    """Takes whatever is sent."""
-
-    def __init__(self) -> None:
-        self.messages: list[dict[str, Any]] = []
-
-    async def send(self, message: Any) -> None:
-        self.messages.append(message)
-
-    @property
-    def body(self) -> bytes:
-        return b"".join(message.get("body", b"") for message in self.messages)
-
-
-def answer(reader: Reader, *bodies: bytes) -> None:
-    """Send an answer of these bodies to a reader."""
-
-    async def app(_scope: Any, _receive: Any, send: Any) -> None:
-        await send({"type": "http.response.start", "status": 200, "headers": []})
-        for number, body in enumerate(bodies):
-            more = number + 1 < len(bodies)
-            await send({"type": "http.response.body", "body": body, "more_body": more})
-
-    async def receive() -> Any:
-        raise AssertionError("nobody asked")
-
-    asyncio.run(PieceByPiece(app)({"type": "http"}, receive, reader.send))
-
-
-def test_a_large_body_goes_out_in_pieces_that_add_up_to_it() -> None:
-    body = bytes(range(256)) * (10 * PIECE_BYTES // 256) + b"the rest"
-    reader = Reader()
-    answer(reader, body)
-    assert reader.body == body
-    assert max(len(message.get("body", b"")) for message in reader.messages) == PIECE_BYTES
-    more = [message["more_body"] for message in reader.messages[1:]]
-    assert more == [True] * 11 + [False], "one end, and it is last"
-
-
-@pytest.mark.parametrize("body", [b"", b"x", b"x" * PIECE_BYTES])
-def test_a_small_body_goes_out_whole(body: bytes) -> None:
-    reader = Reader()
-    answer(reader, body)
-    assert [message.get("body") for message in reader.messages] == [None, body]
-
-
-def test_a_streamed_body_goes_on_after_a_large_part() -> None:
-    large = b"x" * (PIECE_BYTES + 1)
-    reader = Reader()
-    answer(reader, b"head", large, b"tail")
-    assert reader.body == b"head" + large + b"tail"
-    assert [message["more_body"] for message in reader.messages[1:]].count(False) == 1
 
 
 # --- served -------------------------------------------------------------------------------------

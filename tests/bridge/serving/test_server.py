@@ -21,7 +21,6 @@ from lupin_bridge.feed.ros_thread import STOP_TIMEOUT_S
 from lupin_bridge.serving.server import (
     CLOSE_AFTER_S,
     GRACEFUL_SHUTDOWN_S,
-    MAX_INBOUND_BYTES,
     BridgeServer,
     address_of,
     allow_connections,
@@ -60,13 +59,6 @@ def open_files() -> set[str]:
 # --- the socket ---------------------------------------------------------------------------------
 
 
-def test_who_connects_before_the_server_serves_has_only_to_wait() -> None:
-    with listen("127.0.0.1", 0) as listener:
-        with socket.create_connection(listener.getsockname()) as client:
-            assert client.getpeername() == listener.getsockname()
-        assert address_of(listener) == f"http://127.0.0.1:{listener.getsockname()[1]}"
-
-
 def test_hundreds_who_connect_at_once_need_no_second_try() -> None:
     with listen("127.0.0.1", 0) as listener, ExitStack() as stack:
         clients = [stack.enter_context(socket.socket()) for _ in range(400)]
@@ -88,12 +80,9 @@ def test_ipv6_has_brackets_in_its_address() -> None:
     ("limits", "expected", "clients"),
     [
         ((1_024, 20_000), 5_512, 5_000),
-        ((1_024, 5_512), 5_512, 5_000),
         ((1_024, 5_511), 5_511, 4_999),
         ((8_000, 20_000), 8_000, 5_000),
-        ((5_511, 5_511), 5_511, 4_999),
         ((5_512, 5_512), 5_512, 5_000),
-        ((1_024, 4_096), 4_096, 3_584),
         ((256, 256), 256, 64),
         ((1_024, resource.RLIM_INFINITY), 5_512, 5_000),
         ((resource.RLIM_INFINITY, resource.RLIM_INFINITY), resource.RLIM_INFINITY, 5_000),
@@ -172,41 +161,13 @@ def last_words(listener: Listener) -> tuple[str, int]:
         return reason, 0 if closed.rcvd is None else closed.rcvd.code
 
 
-# As SECURITY.md says: 64 kB.
-LARGEST_MESSAGE = 65_536
-
 # --- limits -------------------------------------------------------------------------------------
-
-
-def test_what_a_client_says_is_read_and_thrown_away(live: Bridge) -> None:
-    with live.listen() as listener:
-        for _ in range(50):
-            listener.connection.send("x" * 10_000)
-            listener.connection.send(b"\x00\xff")
-        listener.until("state", lambda frame: frame["seq"] > 1)
-
-
-def test_a_message_past_the_limit_ends_that_client_alone(live: Bridge) -> None:
-    assert MAX_INBOUND_BYTES == LARGEST_MESSAGE
-    with live.listen() as healthy, live.listen() as loud:
-        for _ in range(10):
-            loud.connection.send("x" * LARGEST_MESSAGE)
-        loud.until("state", lambda frame: frame["seq"] > 1)
-        loud.connection.send("x" * (LARGEST_MESSAGE + 1))
-        assert last_words(loud)[1] == 1009
-        newest = healthy.until("state")["seq"]
-        healthy.until("state", lambda frame: frame["seq"] > newest)
 
 
 def test_frames_are_not_compressed(live: Bridge) -> None:
     with live.listen() as listener:
         assert listener.connection.response is not None
         assert "sec-websocket-extensions" not in listener.connection.response.headers
-
-
-def test_what_a_header_claims_of_a_proxy_is_not_believed(live: Bridge) -> None:
-    page = live.get("/docs", headers={"X-Forwarded-Proto": "https", "X-Forwarded-For": "1.2.3.4"})
-    assert f"curl '{live.url}/api/state'" in page.text
 
 
 # --- the end ------------------------------------------------------------------------------------

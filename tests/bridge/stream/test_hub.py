@@ -306,34 +306,6 @@ def test_a_late_frame_does_not_delay_those_after_it_unless_the_interval_is_stric
     assert strict.got == [1, 2, 4, 6]
 
 
-@pytest.mark.parametrize("late_s", [0.0, 0.05, 0.099])
-def test_of_a_source_that_keeps_to_the_rate_nothing_is_missed(stage: Stage, late_s: float) -> None:
-    socket = Socket()
-    stage.join(socket, min_interval_s=1.0, wants_status=False)
-    for second in range(100):
-        stage.publish(second + (late_s if second % 3 == 0 else 0.0))
-    assert len(socket.got) == 100
-
-
-def test_a_pause_is_not_made_up_for_by_a_burst(stage: Stage) -> None:
-    socket = Socket()
-    stage.join(socket, min_interval_s=1.0, wants_status=False)
-    stage.publish(0.0)
-    for now_s in (100.0, 100.1, 100.85, 100.95, 101.85, 101.95):
-        stage.publish(now_s)
-    # One as soon as there is something, and the next a beat later, a tenth of it forgiven.
-    assert socket.got == [1, 2, 5, 7]
-
-
-def test_nor_is_the_time_before_a_client_came(stage: Stage) -> None:
-    socket = Socket()
-    stage.publish(100.0)
-    stage.join(socket, 100.3, min_interval_s=1.0, wants_status=False)
-    for now_s in (100.5, 101.1, 101.25, 102.15, 102.25):
-        stage.publish(now_s)
-    assert socket.got == [1, 4, 6]
-
-
 # --- alarms -------------------------------------------------------------------------------------
 
 
@@ -382,15 +354,6 @@ def test_a_blocked_client_gets_only_the_newest_alarms(stage: Stage) -> None:
     stage.hub.serve(client, 2.0)
     assert socket.got == [1, 2, {"c"}]
     assert client.blocked_since_s is None
-
-
-def test_a_rate_for_states_does_not_hold_up_alarms(stage: Stage) -> None:
-    socket = Socket()
-    stage.publish()
-    stage.join(socket, min_interval_s=100.0, wants_status=False)
-    stage.publish(1.0)
-    stage.alarms("a", now_s=1.0)
-    assert socket.got == [1, {"a"}]
 
 
 def test_who_does_not_want_alarms_gets_none_and_is_not_taken_for_stuck(stage: Stage) -> None:

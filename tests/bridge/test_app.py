@@ -6,6 +6,7 @@ from typing import Any
 
 import httpx
 import pytest
+from fastapi import FastAPI
 
 from lupin_bridge.app import create_app
 from lupin_bridge.stream import schema
@@ -24,15 +25,20 @@ def static(tmp_path: Path) -> Path:
     return folder
 
 
-def ask(static_folder: Path, method: str, path: str) -> httpx.Response:
-    """One request to an application without a twin, answered in this process."""
+def request(app: FastAPI, method: str, path: str, prefix: str = "") -> httpx.Response:
+    """One request to an application, answered in this process."""
 
-    async def request() -> httpx.Response:
-        transport = httpx.ASGITransport(create_app(None, static_folder))
+    async def answer() -> httpx.Response:
+        transport = httpx.ASGITransport(app, root_path=prefix)
         async with httpx.AsyncClient(transport=transport, base_url="http://localhost") as client:
             return await client.request(method, path)
 
-    return asyncio.run(request())
+    return asyncio.run(answer())
+
+
+def ask(static_folder: Path, method: str, path: str) -> httpx.Response:
+    """Of one without a twin."""
+    return request(create_app(None, static_folder), method, path)
 
 
 def test_it_describes_itself_without_a_twin_and_the_frameworks_own_pages_are_off(

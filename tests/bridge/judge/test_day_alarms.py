@@ -177,3 +177,23 @@ def counting(days: Mapping[str, Sequence[Reading]], at_ns: int) -> set[Reading]:
     """Those that count at a moment."""
     every = [day for of_tag in days.values() for day in of_tag]
     return {day for day in every if at_ns - (day.observed_at_ns or 0) <= COUNTS_NS}
+
+
+def test_the_value_of_the_last_whole_day_is_known_until_the_next_scan_after_a_dawn() -> None:
+    heard = scans({"temperature": [14.0, 20.0, 20.0]})
+
+    def mean(at_ns: int) -> float | None:
+        follower = new_follower()
+        follower.take(one for one in heard if one.stamp_ns <= at_ns)
+        days = follower.found(at_ns).days.get("a", ())
+        return next((day.value for day in days if day.name == MEAN), None)
+
+    assert mean(dawn(1) - 1) is None
+    assert mean(dawn(1)) == mean(dawn(2) - 1) == pytest.approx(14.0, abs=0.2)
+    assert mean(dawn(2)) == pytest.approx(20.0, abs=0.2)
+
+
+def test_a_day_that_was_left_out_is_not_judged_by_the_one_before() -> None:
+    heard = scans({"temperature": [14.0, 14.0, 14.0, 14.0]})
+    late = [one for one in heard if not dawn(1) <= one.stamp_ns < dawn(2)]
+    assert [one.raised_at_ns for one in found(late)] == [dawn(3)]

@@ -10,6 +10,7 @@ def test_what_is_old_is_forgotten_and_so_many_pauses_are_kept(
     stretches = Stretches()
     for number in range(8):
         stretches.add(2 * number * SHORTEST_NS)
+    assert not stretches.add(0), "it is no news"
     # The pause that ends at the moment itself is kept.
     assert stretches.forget(4 * SHORTEST_NS) == 4 * SHORTEST_NS
     assert next(stretches.pauses()) == (2 * SHORTEST_NS, 4 * SHORTEST_NS)

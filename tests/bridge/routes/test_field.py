@@ -10,6 +10,7 @@ import httpx
 import numpy as np
 import numpy.typing as npt
 import pytest
+from PIL import Image
 
 from lupin_bridge.stream import schema
 from tests.oracle_idw import field_by_loop
@@ -262,3 +263,17 @@ def test_readings_past_float32_do_not_break_the_answer(changing: Bridge) -> None
     text = changing.get("/api/field.json", **QUERY).text
     json.loads(text, parse_constant=pytest.fail)
     schema.GetFieldResponse.model_validate_json(text, strict=True)
+
+
+def test_a_picture_is_the_array_turned_over(live: Bridge) -> None:
+    array = npy(live, **QUERY)
+    answer = live.get("/api/field.png", **QUERY, scale=3)
+    with Image.open(io.BytesIO(answer.content)) as image:
+        image.load()
+        assert image.size == (24 * 3, 14 * 3)
+        assert image.text["Sample-Count"] == "3"  # type: ignore[attr-defined]
+        alpha = np.asarray(image.convert("RGBA"))[:, :, 3]
+    cells = np.flipud(alpha[1::3, 1::3]).astype(float)
+    span = np.nanmax(array) - np.nanmin(array)
+    expected = np.nan_to_num((array - np.nanmin(array)) / span * 153)
+    np.testing.assert_allclose(cells, expected, atol=0.81)

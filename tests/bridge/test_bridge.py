@@ -72,7 +72,7 @@ class Ear:
         self.heard: list[dict[str, Any]] = []
 
     def write(self, wire: bytes) -> None:
-        self.heard.append(json.loads(bytes(received(wire).data)))
+        self.heard.append(json.loads(received(wire)))
 
     def dismiss(self, code: int, reason: str) -> None:
         raise AssertionError(f"dismissed: {code} {reason}")

@@ -1,6 +1,5 @@
 """People at a bridge: who may, what they say, who hears of it. A real server, real sockets."""
 
-import tempfile
 from collections import Counter
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
@@ -9,29 +8,36 @@ from typing import Any
 
 import httpx
 import pytest
-from websockets.exceptions import ConnectionClosed
-from websockets.sync.client import ClientConnection
 
-from lupin_bridge.access.accounts import digest
 from lupin_bridge.alarms.board import NOTE_BURST, NOTES_PER_MINUTE
 from lupin_bridge.stream import routes_schema
 from tests.support import raw_http
 from tests.support.messages import look
-from tests.support.people import OWN, PASSWORD, TOKEN, add, remove, sign_in, signed_in, write
+from tests.support.people import (
+    BEARER,
+    OWN,
+    PASSWORD,
+    TOKEN,
+    add,
+    end_of,
+    in_s,
+    notes,
+    remove,
+    sign_in,
+    signed_in,
+    write,
+)
 from tests.support.waiting import PATIENCE_S, wait_for
 from tests.support.web import Bridge, bridge
 from tests.support.ws_client import open_websocket
 
-BEARER = {"Authorization": f"Bearer {TOKEN}"}
-
 
 @pytest.fixture(scope="module")
-def accounts() -> Iterator[Path]:
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / "accounts.sqlite"
-        add(path, anna="operator", bert="operator", vera="viewer", boss="admin")
-        add(path, "token", scada="viewer")
-        yield path
+def accounts(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("people") / "accounts.sqlite"
+    add(path, anna="operator", bert="operator", vera="viewer", boss="admin")
+    add(path, "token", scada="viewer")
+    return path
 
 
 @pytest.fixture(scope="module")
@@ -55,17 +61,6 @@ def alarms(live: Bridge) -> dict[str, dict[str, Any]]:
 def alarm(live: Bridge, tag_id: str = "a") -> str:
     found: str = alarms(live)[tag_id]["id"]
     return f"alarm:{found}"
-
-
-def notes(live: Bridge, **query: str) -> list[routes_schema.Note]:
-    answer = live.get("/api/notes", BEARER, **query)
-    return routes_schema.Notes.model_validate_json(answer.content).notes
-
-
-def in_s(live: Bridge, seconds: float) -> str:
-    """A moment of the twin's time."""
-    now = live.get("/api/state", BEARER).json()["header"]["stamp"]
-    return f"{now['sec'] + seconds:.0f}"
 
 
 # --- who may ------------------------------------------------------------------------------------
@@ -147,27 +142,6 @@ def test_what_a_removed_account_has_open_ends(live: Bridge, accounts: Path) -> N
             remove(accounts, "gone")
             assert browser.get("/api/state").status_code == 401
             assert "the session has ended" in end_of(socket_of_theirs)
-
-
-def end_of(connection: ClientConnection) -> str:
-    """Why a WebSocket ended."""
-    try:
-        while True:
-            connection.recv(timeout=PATIENCE_S)
-    except ConnectionClosed as ended:
-        return "" if ended.rcvd is None else ended.rcvd.reason
-
-
-def test_a_revoked_token_opens_nothing_and_its_sessions_end(live: Bridge, accounts: Path) -> None:
-    secret = "another-token-of-43-characters-0123456789-ab"
-    add(accounts, "token", digest(secret), plc="operator")
-    bearer = {"Authorization": f"Bearer {secret}"}
-    with httpx.Client(base_url=live.url, timeout=PATIENCE_S, headers=OWN) as program:
-        assert program.post("/api/signin", headers=bearer).status_code == 204
-        assert program.get("/api/session").json()["name"] == "plc"
-        remove(accounts, "plc", "token")
-        assert program.get("/api/state").status_code == 401
-        assert program.get("/api/state", headers=bearer).status_code == 401
 
 
 def test_the_audit_trail_is_the_admins(live: Bridge) -> None:

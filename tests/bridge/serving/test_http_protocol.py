@@ -1,14 +1,15 @@
 """Answers go out as their readers take them: in pieces, and not at all to who takes nothing."""
 
 import contextlib
-import socket
 from collections.abc import Iterator
 
 import pytest
 
+from tests.support import raw_http
 from tests.support.access import Served, served
 from tests.support.processes import limits
-from tests.support.waiting import PATIENCE_S, wait_for
+from tests.support.waiting import wait_for
+from tests.support.web import deaf_client
 
 # 1,000,000 cells, 5 MB of JSON: more than two sockets hold between them.
 LARGE_FIELD = (
@@ -20,38 +21,11 @@ CONCURRENCY = 3
 TIMEOUT_S = 3
 
 
-# --- in pieces ----------------------------------------------------------------------------------
-
-
-# --- served -------------------------------------------------------------------------------------
-
-
 @pytest.fixture(scope="module")
 def live() -> Iterator[Served]:
     options = limits(client_timeout_s=TIMEOUT_S, concurrency=CONCURRENCY)
     with served(*options) as running:
         yield running
-
-
-@contextlib.contextmanager
-def deaf_reader(live: Served, path: str) -> Iterator[socket.socket]:
-    """A client that asks and reads nothing, with little room for the answer."""
-    host, port = live.url.removeprefix("http://").split(":")
-    with socket.socket() as client:
-        client.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
-        client.settimeout(PATIENCE_S)
-        client.connect((host, int(port)))
-        client.sendall(f"GET {path} HTTP/1.1\r\nHost: {host}\r\n\r\n".encode())
-        yield client
-
-
-def rest_of(client: socket.socket) -> int:
-    """How many bytes still come before the connection ends."""
-    size = 0
-    with contextlib.suppress(ConnectionResetError):
-        while piece := client.recv(65_536):
-            size += len(piece)
-    return size
 
 
 def test_a_large_field_arrives_whole(live: Served) -> None:
@@ -70,12 +44,12 @@ def test_deaf_readers_keep_their_own_places_and_are_cut_off(live: Served) -> Non
     with contextlib.ExitStack() as readers:
         # Of one kept field, as many readers as there are might be deaf.
         large = [LARGE_FIELD.replace("co2", f"co2_{number}") for number in range(CONCURRENCY)]
-        deaf = [readers.enter_context(deaf_reader(live, field)) for field in large]
+        deaf = [readers.enter_context(deaf_client(live.url, field)) for field in large]
         wait_for(lambda: refused in live.get(SMALL_FIELD).text, "the deaf readers' places")
         with live.client("127.0.4.1") as other:
             assert other.get(SMALL_FIELD).status_code == 200, "it is another client"
         line = f"cut off a reader that took nothing for {TIMEOUT_S} s"
         wait_for(lambda: live.process.output.count(line) == CONCURRENCY, "their end")
-        assert all(rest_of(client) < 4_000_000 for client in deaf)
+        assert all(len(raw_http.heard(client)) < 4_000_000 for client in deaf)
     wait_for(lambda: live.get(SMALL_FIELD).status_code == 200, "their places to be free")
     assert "ERROR" not in live.process.output

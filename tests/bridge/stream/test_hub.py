@@ -38,7 +38,7 @@ class Socket:
     @property
     def got(self) -> list[Any]:
         """What came, in short: a status's reason, a state's number, a delta's two."""
-        return [in_short(json.loads(bytes(received(wire).data))) for wire in self.wires]
+        return [in_short(json.loads(received(wire))) for wire in self.wires]
 
 
 def in_short(frame: dict[str, Any]) -> Any:
@@ -105,9 +105,7 @@ def test_a_status_tells_the_age_of_the_moment_at_which_a_client_gets_it(stage: S
     clients = [stage.join(socket, 3_600.0) for socket in sockets]
     sockets[2].room = 1
     stage.hub.serve(clients[2], 3_700.0)
-    ages = [
-        json.loads(bytes(received(socket.wires[0]).data))["state_age_seconds"] for socket in sockets
-    ]
+    ages = [json.loads(received(socket.wires[0]))["state_age_seconds"] for socket in sockets]
     assert ages == [3_600.0, 3_600.0, 3_700.0]
     assert sockets[0].wires[0] is sockets[1].wires[0], "one serialisation serves all"
 

@@ -36,8 +36,3 @@ def scan(
 def look(tag_id: str, at_s: float = 1.0, pose: Pose | None = None, **flower: object) -> Inspection:
     """A look at the flowers; keyword arguments are what was seen."""
     return Inspection(tag_id, round(at_s * S), Flower(**flower), pose)  # type: ignore[arg-type]
-
-
-def failed_look(tag_id: str, at_s: float = 1.0) -> Inspection:
-    """A look that saw no flowers."""
-    return Inspection(tag_id, round(at_s * S), None, status=SCAN_FAILED)

@@ -213,6 +213,7 @@ def test_two_scans_raise_and_two_clear() -> None:
     (alarm,) = told(scans([22, 17, 16, 22, 16.5, 22, 22, 17]))
     at = [(at_ns - START) // MINUTE for at_ns in (alarm.raised_at_ns, alarm.cleared_at_ns or 0)]
     assert at == [2, 6]
+    assert alarm.id == "512f1a86ed4ca811ba00eed7", "the same in every process and version"
     reason = alarm.reason
     assert (reason.value, reason.limit, reason.verdict) == (16, 18, "stressed")
     assert reason.since_ns == START + MINUTE

@@ -22,20 +22,12 @@ from lupin_twin.core.state import (
     TwinStore,
     sure_species,
 )
-from tests.support.seen import BY_LIGHT
+from tests.support.seen import BY_LIGHT, tag
 
 SENSORS = parse(files("lupin_bridge").joinpath("sensors.json").read_text(encoding="utf-8"))
 S = 1_000_000_000
 MINUTE = 60 * S
 START = 1_000_000 * S
-
-
-def tag(tag_id: str, at_ns: int, **values: float) -> TagState:
-    return TagState(
-        tag_id,
-        readings=tuple(Reading(name, value, at_ns) for name, value in values.items()),
-        last_observed_ns=at_ns,
-    )
 
 
 def snapshot(now_ns: int, *tags: TagState) -> Snapshot:

@@ -9,7 +9,6 @@ from collections.abc import Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
-from urllib.parse import urlsplit
 
 import httpx
 import pytest
@@ -28,6 +27,7 @@ from lupin_bridge.serving.server import (
 )
 from lupin_bridge.settings import Settings
 from lupin_twin.runtime.process import END_S, IDLE_WORKERS_END_S
+from tests.support import raw_http
 from tests.support.inprocess import running
 from tests.support.live import attached, wait_until_ready
 from tests.support.processes import Process, lupin_twin, twin_node, url_of
@@ -173,31 +173,24 @@ def test_frames_are_not_compressed(live: Bridge) -> None:
 # --- the end ------------------------------------------------------------------------------------
 
 
-def test_a_signal_ends_it_and_every_client_is_told() -> None:
-    with bridge() as running_bridge, running_bridge.listen() as one, running_bridge.listen() as two:
-        one.until("state")
-        running_bridge.get("/api/state")  # and its connection is kept alive
-        address = urlsplit(running_bridge.url)
-        with socket.create_connection((address.hostname, address.port)) as refused:
-            refused.sendall(b"GET /api/state HTTP/1.1\r\nHost: x\r\nContent-Length: 9\r\n\r\n")
-            assert refused.recv(1_024).startswith(b"HTTP/1.1 413")
-            assert running_bridge.process.stop(signal.SIGINT) == 0
-        assert last_words(one) == last_words(two) == ("shutting_down", 1012)
-        assert_quiet(running_bridge.process)
-
-
-def test_clients_that_do_not_read_do_not_hold_up_the_end_nor_does_a_second_signal() -> None:
+def test_a_signal_ends_it_and_all_are_told_whoever_reads_and_however_often_it_comes() -> None:
     with (
         bridge() as running_bridge,
-        running_bridge.listen() as healthy,
+        running_bridge.listen() as one,
+        running_bridge.listen() as two,
         deaf_client(running_bridge.url),
         deaf_client(running_bridge.url, MILLION_CELLS),
+        raw_http.connect(running_bridge.url) as refused,
     ):
-        overfill(running_bridge, healthy)
-        running_bridge.process.send(signal.SIGTERM)
-        running_bridge.process.send(signal.SIGTERM)
+        two.until("state")
+        overfill(running_bridge, one)
+        running_bridge.get("/api/state")  # and its connection is kept alive
+        refused.sendall(b"GET /api/state HTTP/1.1\r\nHost: x\r\nContent-Length: 9\r\n\r\n")
+        assert refused.recv(1_024).startswith(b"HTTP/1.1 413")
+        running_bridge.process.send(signal.SIGINT)
+        running_bridge.process.send(signal.SIGINT)
         assert running_bridge.process.wait() == 0
-        assert last_words(healthy) == ("shutting_down", 1012)
+        assert last_words(one) == last_words(two) == ("shutting_down", 1012)
         assert_quiet(running_bridge.process)
 
 

@@ -39,13 +39,6 @@ def snapshot(*tags: TagState, stamp_ns: int = 10**10) -> Snapshot:
     return Snapshot(stamp_ns, "map", tags)
 
 
-def test_a_state_frame_is_the_contracts_and_carries_its_revision() -> None:
-    frame = FrameWriter().state(snapshot(tag("7", 412.5)), 'a"b-7')
-    state = schema.StateFrame.model_validate(content(frame.full()))
-    assert (state.seq, state.revision) == (frame.seq, frame.revision) == (1, 'a"b-7')
-    assert state.state.tags[0].readings[0].value == 412.5
-
-
 def test_a_delta_frame_is_the_contracts() -> None:
     writer = FrameWriter()
     same = tag("same")
@@ -59,14 +52,6 @@ def test_a_delta_frame_is_the_contracts() -> None:
 
 
 # --- made once, kept no longer than needed ------------------------------------------------------
-
-
-def test_a_frame_is_written_once_for_all_clients() -> None:
-    writer = FrameWriter()
-    writer.state(snapshot(), "r")
-    frame = writer.state(snapshot(tag("7")), "r")
-    assert frame.full() is frame.full()
-    assert frame.delta() is frame.delta()
 
 
 def test_no_more_than_two_frames_are_kept() -> None:
@@ -123,18 +108,6 @@ def test_who_applies_the_deltas_has_the_state(steps: list[dict[str, int]]) -> No
         assert len(delta["changed"]) <= len(step)
         mine = apply(mine, delta)
         assert ageless(mine) == ageless(whole)
-
-
-def test_a_delta_leaves_out_what_did_not_change_and_appends_what_is_new_in_order() -> None:
-    writer = FrameWriter()
-    tags = [tag("a"), tag("b")]
-    first = writer.state(snapshot(*tags), "r")
-    tags = [tags[0], replace(tags[1], readings=()), tag("z"), tag("c")]
-    second = writer.state(snapshot(*tags), "r")
-    delta = content(second.delta())
-    assert [changed["tag_id"] for changed in delta["changed"]] == ["b", "z", "c"]
-    whole = content(second.full())["state"]
-    assert apply(content(first.full())["state"], delta)["tags"] == whole["tags"]
 
 
 # --- weight -------------------------------------------------------------------------------------

@@ -373,15 +373,6 @@ def test_a_first_round_that_stops_is_not_healthy_for_a_day() -> None:
 def writes_of(*tags: TagState) -> list[PastWrite]:
     """The scans of these states, as the log has them."""
     return [
-        PastWrite(
-            number,
-            1,
-            one.tag_id,
-            one.last_observed_ns or 0,
-            0,
-            0,
-            tuple(reading.name for reading in one.readings),
-            tuple(reading.value for reading in one.readings),
-        )
-        for number, one in enumerate(tags, start=1)
+        scan(one.tag_id, one.last_observed_ns or 0, **{it.name: it.value for it in one.readings})
+        for one in tags
     ]

@@ -67,25 +67,14 @@ def test_a_receiver_is_named_without_its_path(url: str, port: int, path: str, ca
         ("mqtt://me:hunter2@a", "--mqtt-url has a user or a password in it"),
         ("mqtt://a b", "--mqtt-url is longer than 2000 characters, or has one that"),
         ("mqtt://" + "a" * (MAX_URL - 6), "--mqtt-url is longer than 2000 characters"),
-    ],
-)
-def test_what_is_no_address_of_a_broker_is_refused(url: str, named: str) -> None:
-    said = refusal(mqtt_url=url)
-    assert said.startswith(named)
-    assert "hunter2" not in said
-
-
-@pytest.mark.parametrize(
-    ("url", "named"),
-    [
         ("ftp://a", "--webhook-url has to begin with http:// or https://"),
         ("http://a/#b", "--webhook-url has a fragment (#)"),
         ("http://a/\r\nX: y", "--webhook-url is longer than 2000 characters, or has one that"),
         ("https://me:hunter2@a", "--webhook-url has a user or a password in it"),
     ],
 )
-def test_what_is_no_address_of_a_receiver_is_refused(url: str, named: str) -> None:
-    said = refusal(webhook_url=url)
+def test_what_is_no_address_is_refused(url: str, named: str) -> None:
+    said = refusal(mqtt_url=url) if "mqtt" in named else refusal(webhook_url=url)
     assert said.startswith(named)
     assert "hunter2" not in said
 

@@ -31,15 +31,6 @@ def holds(kept: AnswerCache, key: object, expected: Answer) -> bool:
     return lent is not None and lent[0] is expected
 
 
-def test_the_least_recently_used_goes_first() -> None:
-    kept = kept_for(10, 10, 10)
-    for key in "abc":
-        kept.put(key, answer(10))
-    assert has(kept, "a")
-    kept.put("d", answer(10))
-    assert [has(kept, key) for key in "abcd"] == [True, False, True, True]
-
-
 def test_what_is_being_sent_stays_and_counts_until_it_is_given_back() -> None:
     kept = kept_for(10, 10)
     kept.put("a", answer(10))

@@ -53,6 +53,8 @@ def test_what_replaces_another_takes_its_place() -> None:
     for number in range(100):
         kept.put(("state", number), answer(10), instead_of=("state", number - 1))
     assert has(kept, "field"), "the many states in between did not drive it out"
+    kept.put("huge", answer(1_000_000))
+    assert has(kept, "field"), "nor what there is no room for"
     assert len(kept) == 2
 
 

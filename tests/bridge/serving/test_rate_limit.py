@@ -15,6 +15,8 @@ def test_a_burst_is_taken_at_once_and_the_next_turn_waits_an_interval() -> None:
     assert limit.take("a", 100.0) == pytest.approx(0.05)
     assert limit.wait_s("a", 100.04) == pytest.approx(0.01)
     assert taken(limit, "a", 100.05, 2) == 1
+    assert taken(limit, "a", 3_600.0, 60) == 40
+    assert taken(limit, "a", 3_600.0, 60) == 0, "a long rest saves up one burst and no more"
 
 
 def test_many_turns_are_taken_together_or_not_at_all() -> None:

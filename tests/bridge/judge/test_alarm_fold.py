@@ -193,6 +193,7 @@ def test_nothing_grows_with_the_days() -> None:
     assert (len(trail.gaps), len(trail.turns)) == (7, 15)
     assert len([*run.stretches.pauses()]) == 7
     assert len(run.limits) == 7
+    assert len(run.tags["a"]._log) <= 16
     assert [run.days.is_day(stamp_ns - at) for at in (0, MINUTE)] == [False, True]
 
 

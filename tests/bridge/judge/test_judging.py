@@ -68,6 +68,7 @@ def test_time_alone_makes_readings_old() -> None:
 
 def test_scanned_once_a_tag_has_a_day_as_it_has_for_alarms() -> None:
     judge, day = Judge(BY_LIGHT), 24 * 60 * MINUTE
+    judge.see(snapshot(START, GOOD, COLD))
     judge.learn([scan("b", START - day, temperature=6.0)])  # and no interval makes it longer
     judge.see(snapshot(START, GOOD, COLD))
     assert judge.holds_ns() == {"a": day, "b": day}

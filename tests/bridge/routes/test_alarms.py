@@ -7,6 +7,9 @@ from typing import Any
 
 import pytest
 
+from lupin_bridge.judge.episodes import Alarm
+from lupin_bridge.judge.verdict import Kind, Reason, Verdict
+from lupin_bridge.routes.status import _is_in
 from lupin_bridge.stream import schema
 from tests.support.messages import look
 from tests.support.rosbridge import ros_at
@@ -65,3 +68,17 @@ def test_it_tells_of_the_journal_and_says_so(live: Bridge) -> None:
 def test_what_cannot_be_meant_is_refused(live: Bridge, query: dict[str, Any], says: str) -> None:
     answer = live.get("/api/alarms", **query)
     assert (answer.status_code, says in answer.json()["detail"]) == (400, True)
+
+
+def test_a_period_has_what_was_active_at_any_time_of_it() -> None:
+    reason = Reason(Kind.PEST, Verdict.CRITICAL)
+    over, still = Alarm("1", reason, "a", 20, 30), Alarm("2", reason, "a", 40)
+
+    def found(start: int, end: int, active: str | None = None) -> list[str]:
+        is_asked = _is_in(start, end, active)
+        return [alarm.id for alarm in (over, still) if is_asked(alarm)]
+
+    assert found(0, 0) == found(30, 41) == ["1", "2"]
+    assert found(31, 41) == found(31, 0) == found(0, 0, active="1") == ["2"]
+    assert found(21, 40) == found(0, 21) == found(0, 0, active="0") == ["1"]
+    assert found(0, 20) == found(31, 40) == []

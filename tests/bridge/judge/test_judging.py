@@ -377,3 +377,11 @@ def writes_of(*tags: TagState) -> list[PastWrite]:
         scan(one.tag_id, one.last_observed_ns or 0, **{it.name: it.value for it in one.readings})
         for one in tags
     ]
+
+
+def test_a_tag_that_is_gone_is_forgotten() -> None:
+    judge = Judge(BY_LIGHT)
+    judge.see(snapshot(START, GOOD, COLD))
+    gone = judge.see(snapshot(START + S, GOOD))
+    assert gone.tags.keys() == {"a"}
+    assert gone.house.verdict is Verdict.HEALTHY

@@ -37,6 +37,7 @@ def test_a_large_field_arrives_whole(live: Served) -> None:
         b"",
         response.headers["content-length"],
     )
+    assert "ERROR" not in live.process.output
 
 
 def test_deaf_readers_keep_their_own_places_and_are_cut_off(live: Served) -> None:

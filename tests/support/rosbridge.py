@@ -8,7 +8,7 @@ from typing import Any
 from websockets.frames import Frame, Opcode
 from websockets.sync.client import ClientConnection
 
-from tests.support.waiting import PATIENCE_S
+from tests.support.waiting import PATIENCE_S, wait_for
 from tests.support.ws_client import open_websocket
 
 TOPIC = "/twin/state"
@@ -64,6 +64,21 @@ class Ros:
         while message["op"] != op:
             message = self.next()
         return message
+
+    def until_tag(self, tag_id: str) -> Message:
+        """Read on to the first state that has the tag."""
+
+        def look() -> Message | None:
+            message = self.next()
+            return message if message["op"] == "publish" and tag_id in tags(message) else None
+
+        found = wait_for(look, f"a state with tag {tag_id}", meanwhile=lambda _: None)
+        assert found is not None
+        return found
+
+
+def tags(message: Message) -> list[str]:
+    return [tag["tag_id"] for tag in message["msg"]["tags"]]
 
 
 @contextmanager

@@ -132,6 +132,18 @@ def live_from(live: Bridge, address: str) -> httpx.Client:
     return httpx.Client(base_url=live.url, transport=transport, timeout=PATIENCE_S)
 
 
+def test_trying_is_slowed_down_for_the_address_that_tries(live: Bridge) -> None:
+    with live_from(live, "127.0.7.2") as guesser, live_from(live, "127.0.7.3") as other:
+
+        def is_slowed() -> bool:
+            answer = sign_in(guesser, "anna", "guess")
+            assert answer.status_code in {401, 429}
+            return answer.status_code == 429
+
+        wait_for(is_slowed, "an end to guessing")
+        assert sign_in(other, "anna").status_code == 204
+
+
 def test_what_a_removed_account_has_open_ends(live: Bridge, accounts: Path) -> None:
     add(accounts, gone="operator")
     with signed_in(live.url, "gone") as browser:

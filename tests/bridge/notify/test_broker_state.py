@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from lupin_bridge.alarms.board import Board
 from lupin_bridge.judge.verdict import Health, Verdict
 from lupin_bridge.notify.messages import GreenhouseState, Topics, reading_payload
-from lupin_bridge.notify.mirror import Mirror
+from lupin_bridge.notify.mqtt import Mirror
 from lupin_twin.core.state import Reading
 from tests.support.seen import HOLDS_NS, NOW_NS, SENSORS, S, alarm, seen, tag
 

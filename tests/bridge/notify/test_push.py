@@ -24,11 +24,12 @@ from lupin_bridge.access.accounts import Device
 from lupin_bridge.access.people import People
 from lupin_bridge.alarms.board import AlarmBoard, Change, page_of
 from lupin_bridge.judge.episodes import Alarm
-from lupin_bridge.judge.options import Criteria
+from lupin_bridge.judge.judging import Criteria
 from lupin_bridge.notify import push as push_module
 from lupin_bridge.notify.destinations import PushTarget
+from lupin_bridge.notify.messages import Backoff, Condition
 from lupin_bridge.notify.push import FIRST_WAIT_S, MOST_WAIT_S, TRIES, Push, encoded
-from lupin_bridge.notify.sending import Backoff, Condition, PostError, until_taken
+from lupin_bridge.notify.webhook import PostError, until_taken
 from lupin_bridge.settings import Settings
 from tests.support.access import refused_start
 from tests.support.messages import look
@@ -226,7 +227,7 @@ async def test_without_internet_for_half_an_hour_nothing_is_lost(
         if now_s < 1800.0:
             raise PostError("its host is not known")
 
-    monkeypatch.setattr("lupin_bridge.notify.sending.asyncio.sleep", sleep)
+    monkeypatch.setattr("lupin_bridge.notify.webhook.asyncio.sleep", sleep)
     backoff, condition = Backoff(FIRST_WAIT_S, MOST_WAIT_S), Condition()
     assert await until_taken(
         attempt, condition, backoff, "an alarm", "push.example", most_tries=TRIES

@@ -7,7 +7,7 @@ from typing import Any
 
 from PIL import Image
 
-from lupin_bridge.judge.options import own_sensors
+from lupin_bridge.judge.judging import own_sensors
 from lupin_bridge.stream import schema
 from tests.support.messages import scan
 from tests.support.waiting import wait_for

@@ -28,9 +28,7 @@ _NUMBERS = count()
 class Archive:
     """A database of its own on a server, with the user of a site."""
 
-    def __init__(
-        self, server: Postgres, site: str = "gh1", *, tablespace: str = "pg_default"
-    ) -> None:
+    def __init__(self, server: Postgres, site: str = "gh1") -> None:
         self.server = server
         self.name = f"archive_{next(_NUMBERS)}"
         # Where clients look for it: standbys may be among them.
@@ -42,9 +40,7 @@ class Archive:
                 connection.execute("CREATE DATABASE template_archive")
                 made = run("archive", "init", "--archive-url", server.url_of("template_archive"))
                 assert made.returncode == 0, made.stderr
-            connection.execute(
-                f'CREATE DATABASE "{self.name}" TEMPLATE template_archive TABLESPACE {tablespace}'
-            )
+            connection.execute(f'CREATE DATABASE "{self.name}" TEMPLATE template_archive')
         self.add_user(site)
 
     def drop(self) -> None:

@@ -11,7 +11,7 @@ import httpx
 
 from lupin_twin.core.state import Write
 from lupin_twin.journal.runs import Clock
-from tests.support.archive import Archive
+from tests.support.archive import Archive, forward_once
 from tests.support.journal import SECOND, kept, pin, scan
 from tests.support.processes import Process, lupin_twin, url_of
 from tests.support.waiting import PATIENCE_S, wait_for
@@ -40,6 +40,12 @@ def write(journal: Path, rows: list[Write]) -> None:
     kept(journal, rows, wall())
 
 
+def forward(archive: Archive, journal: Path, rows: list[Write]) -> None:
+    """Write a journal, and have it in the archive."""
+    write(journal, rows)
+    forward_once(archive, journal)
+
+
 class Page:
     """The fleet's page at an address."""
 
@@ -54,9 +60,9 @@ class Page:
         assert answer.status_code == 200, answer.text
         return {site["site"]: site for site in answer.json()["sites"]}
 
-    def metric(self, name: str) -> float:
-        """A number of `/metrics`."""
-        lines = self.http.get("/metrics").text.splitlines()
+    def metric(self, name: str, below: str = "") -> float:
+        """A number of `/metrics`, or of those below a site's path."""
+        lines = self.http.get(f"{below}/metrics").text.splitlines()
         return next(float(line.split()[1]) for line in lines if line.startswith(f"{name} "))
 
     def site(self, name: str = "gh1", **said: Any) -> dict[str, Any]:

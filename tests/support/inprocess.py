@@ -13,6 +13,8 @@ import httpx
 from lupin_bridge.app import create_app
 from lupin_bridge.bridge import Bridge
 from lupin_bridge.feed.local import LocalTwin
+from lupin_bridge.feed.source import TwinUpdate
+from lupin_bridge.feed.web import WebTwin
 from lupin_bridge.serving.admission import Limits
 from lupin_bridge.serving.server import BridgeServer, address_of, listen
 from lupin_bridge.settings import Settings
@@ -20,6 +22,7 @@ from lupin_twin.ros.node import TwinNode
 from tests.support.waiting import PATIENCE_S
 
 T = TypeVar("T")
+SourceT = TypeVar("SourceT", LocalTwin, WebTwin)
 
 
 @contextmanager
@@ -52,6 +55,21 @@ def run(domain: int, test: Coroutine[Any, Any, T]) -> T:
     gc.collect()  # a task complains of an error that nobody looked at when it is collected
     assert errors == []
     return result
+
+
+@asynccontextmanager
+async def started(
+    make: Callable[..., SourceT], *ros_args: str, timeout_s: float = 20.0
+) -> AsyncIterator[tuple[SourceT, list[TwinUpdate]]]:
+    """A source from its start to its stop, and what it has told; it does not die meanwhile."""
+    source = make(ros_args=ros_args, timeout_s=timeout_s)
+    told, deaths = list[TwinUpdate](), list[None]()
+    await source.start(told.append, lambda: deaths.append(None))
+    try:
+        yield source, told
+    finally:
+        await source.stop()
+    assert deaths == []
 
 
 @dataclass

@@ -101,12 +101,3 @@ def _local_error() -> Exception:
         pass
 
     return LocalError("of nobody's knowledge")
-
-
-@dataclass(frozen=True, slots=True)
-class Dying:
-    """The process that is asked this dies of it."""
-
-    def answer(self, find: Find, should_stop: ShouldStop) -> None:
-        """See `PastQuery`."""
-        os.abort()

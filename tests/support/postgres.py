@@ -14,15 +14,16 @@ from pathlib import Path
 
 import psycopg
 
+from tests.support.processes import is_running
 from tests.support.waiting import wait_for
 
 _USER = "postgres"
 _BIN = Path("/usr/lib/postgresql/15/bin")
 
 
-def _run(*command: str, as_root: bool = False) -> None:
+def _run(*command: str) -> None:
     # It refuses to be root's.
-    user = _USER if os.geteuid() == 0 and not as_root else None
+    user = _USER if os.geteuid() == 0 else None
     done = subprocess.run(
         command, user=user, group=user, cwd="/", capture_output=True, text=True, check=False
     )
@@ -37,7 +38,6 @@ class Postgres:
         folder: Path,
         *,
         fsync: bool,
-        small_mb: int = 0,
         connections: int = 100,
         primary: Postgres | None = None,
     ) -> None:
@@ -47,7 +47,6 @@ class Postgres:
         self._pg_ctl = str(found.with_name("pg_ctl"))
         self._data = folder / "data"
         self._fsync = "on" if fsync else "off"
-        self._small_mb = small_mb
         self._connections = connections
         self._listens = "-c listen_addresses=''"
         if os.geteuid() == 0:
@@ -71,18 +70,7 @@ class Postgres:
             f" -c max_connections={self._connections}"
         )
         log = str(self.folder / "log")
-        start = (self._pg_ctl, "-D", str(self._data), "-o", options, "-l", log, "-w", "start")
-        if not self._small_mb:
-            _run(*start)
-            return
-        # A disk that the server alone sees, and that goes with it.
-        small = self.folder / "small"
-        small.mkdir()
-        mount = f"mount -t tmpfs -o size={self._small_mb}m,uid=$(id -u {_USER}) none {small}"
-        script = f'{mount} && cd / && exec setpriv --reuid {_USER} --clear-groups "$0" "$@"'
-        _run("unshare", "-m", "--", "sh", "-c", script, *start, as_root=True)
-        with psycopg.connect(self.url, autocommit=True) as connection:
-            connection.execute(f"CREATE TABLESPACE small LOCATION '{small}'")
+        _run(self._pg_ctl, "-D", str(self._data), "-o", options, "-l", log, "-w", "start")
 
     def listen_with_tls(self, address: str, cert: Path, key: Path) -> None:
         """Start it again, on an address of this machine's own, with a certificate."""
@@ -132,38 +120,27 @@ class Postgres:
         children = Path(f"/proc/{pid}/task/{pid}/children").read_text().split()
         os.kill(pid, signal.SIGKILL)
         # They are nobody's children here: adopted, and waited for, elsewhere.
-        wait_for(lambda: all(map(_has_ended, [str(pid), *children])), "the end of all of it")
+        wait_for(lambda: not any(map(is_running, [str(pid), *children])), "the end of all of it")
         # Where nobody buries the dead, their number counts as one that lives.
         (self._data / "postmaster.pid").unlink()
         (self.folder / ".s.PGSQL.5432.lock").unlink()
-
-
-def _has_ended(pid: str) -> bool:
-    try:
-        return Path(f"/proc/{pid}/stat").read_text().rpartition(") ")[2].startswith("Z")
-    except (FileNotFoundError, ProcessLookupError):
-        return True
 
 
 @contextmanager
 def server(
     *,
     fsync: bool = False,
-    small_mb: int = 0,
     connections: int = 100,
     primary: Postgres | None = None,
 ) -> Iterator[Postgres]:
     """One that runs; it ends, and is gone, with the block.
 
-    `small_mb`: it has a tablespace `small` on a disk of that size; only root may have that made.
     `primary`: it is the standby of that one, which from now on waits for it at each commit.
     """
     # Short: the path of a socket has 107 bytes at most.
     folder = Path(tempfile.mkdtemp(prefix="pg", dir="/tmp"))
     try:
-        made = Postgres(
-            folder, fsync=fsync, small_mb=small_mb, connections=connections, primary=primary
-        )
+        made = Postgres(folder, fsync=fsync, connections=connections, primary=primary)
         made.start()
         try:
             if primary is not None:

@@ -1,6 +1,7 @@
 """Real processes: started, watched, and ended without a trace."""
 
 import contextlib
+import io
 import os
 import signal
 import subprocess
@@ -151,6 +152,22 @@ def run(command: Sequence[str], env: Mapping[str, str]) -> subprocess.CompletedP
         return subprocess.CompletedProcess(command, code, out.read(), err.read())
 
 
+def said(*words: object) -> subprocess.CompletedProcess[str]:
+    """What a command that needs no ROS says and ends with; it runs in this process."""
+    from lupin_bridge.cli.command import main
+
+    own = [str(word) for word in words]
+    out, err = io.BytesIO(), io.StringIO()
+    stdout = io.TextIOWrapper(out, "utf-8", "surrogateescape", write_through=True)
+    with contextlib.redirect_stdout(stdout), contextlib.redirect_stderr(err):
+        try:
+            code = main(own)
+        except SystemExit as ended:
+            code = int(ended.code or 0)
+    printed = out.getvalue().decode(errors="surrogateescape")
+    return subprocess.CompletedProcess(own, code, printed, err.getvalue())
+
+
 def twin_node(domain: int, *ros_args: str, afresh: bool = False, **env: str) -> Process:
     """The twin alone, as the executable `twin_node`."""
     command = [sys.executable, "-m", "lupin_twin.cli", *ros_args]
@@ -191,6 +208,15 @@ def children_of(pid: int, word: bytes) -> list[int]:
         for child in (task / "children").read_text(encoding="ascii").split()
     ]
     return [child for child in children if word in _command(child)]
+
+
+def is_running(pid: int | str) -> bool:
+    """Whether a process is there, and no zombie (proc_pid_stat(5))."""
+    try:
+        stat = Path(f"/proc/{pid}/stat").read_text(encoding="ascii")
+    except (FileNotFoundError, ProcessLookupError):  # gone before or while it is read
+        return False
+    return stat.rpartition(") ")[2][0] != "Z"
 
 
 def url_of(process: Process) -> str:

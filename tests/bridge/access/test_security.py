@@ -8,7 +8,6 @@ import pytest
 from lupin_bridge.stream import schema
 from tests.support.access import OWN
 from tests.support.messages import occupancy_grid, scan
-from tests.support.waiting import wait_for
 from tests.support.web import ROUTES, Bridge, bridge
 
 PATHS = [path.replace("{tag_id}", "7") for path in ROUTES]
@@ -41,27 +40,12 @@ def ask(live: Bridge, method: str, path: str) -> httpx.Response:
 
 @pytest.mark.parametrize("path", PATHS)
 def test_head_is_get_without_the_body(live: Bridge, path: str) -> None:
-    def kept(answer: httpx.Response) -> dict[str, str]:
-        # The length of an age in seconds changes while one looks.
-        changing = ("date", "content-length") if "no-store" in str(answer.headers) else ("date",)
-        # A timeline and a report are of a period up to now, and so is what nothing is known of yet;
-        # what is streamed has no length.
-        is_up_to_now = any(what in path for what in ("timeline", "report", "estimate/tags"))
-        changing = (*changing, "etag", "content-length") if is_up_to_now else changing
-        changing = (*changing, "transfer-encoding") if "export" in path else changing
-        return {name: value for name, value in answer.headers.items() if name not in changing}
-
-    def at_one_moment() -> tuple[httpx.Response, httpx.Response] | None:
-        # An estimate of now has another ETag with every minute: one may end between two looks.
-        got, head, again = (ask(live, method, path) for method in ("GET", "HEAD", "GET"))
-        return (got, head) if kept(got) == kept(again) else None
-
-    found = wait_for(at_one_moment, f"two answers of {path} that are alike")
-    assert found is not None
-    got, head = found
+    got, head = (ask(live, method, path) for method in ("GET", "HEAD"))
     assert (got.status_code, head.status_code, head.content) == (200, 200, b"")
     assert got.content
-    assert kept(head) == kept(got)
+    # What else there is goes by the moment: lengths, ETags, names of files.
+    for name in ("content-type", "cache-control", "vary"):
+        assert head.headers.get(name) == got.headers.get(name), name
 
 
 @pytest.mark.parametrize("path", [*(path for path in PATHS if path != "/api/notes"), *ELSEWHERE])
@@ -75,16 +59,12 @@ def test_anything_but_a_read_is_refused(live: Bridge, path: str, method: str) ->
 
 
 @pytest.mark.parametrize("path", POSTED)
-@pytest.mark.parametrize("method", ["GET", "HEAD", "PUT", "DELETE", "OPTIONS"])
-def test_signing_in_and_out_is_posted_and_nothing_else(
-    live: Bridge, path: str, method: str
+def test_signing_in_and_out_is_posted_with_a_header_that_no_form_can_send(
+    live: Bridge, path: str
 ) -> None:
-    answer = live.http.request(method, path, headers=OWN)
-    assert (answer.status_code, answer.headers["allow"]) == (405, "POST")
-
-
-@pytest.mark.parametrize("path", POSTED)
-def test_what_is_posted_has_a_header_that_no_form_can_send(live: Bridge, path: str) -> None:
+    for method in ("GET", "HEAD", "PUT", "DELETE", "OPTIONS"):
+        answer = live.http.request(method, path, headers=OWN)
+        assert (answer.status_code, answer.headers["allow"]) == (405, "POST"), method
     answer = live.http.post(path)
     assert answer.status_code == 403
     assert answer.json() == {"detail": "POST without the header X-Lupin-Twin, expected any value"}
@@ -120,9 +100,4 @@ def test_every_answer_has_the_security_headers(
     assert answer.headers["referrer-policy"] == "no-referrer"
     assert answer.headers["cross-origin-opener-policy"] == "same-origin"
     assert answer.headers["cross-origin-resource-policy"] == "same-origin"
-
-
-def test_nothing_is_said_of_the_server_and_nothing_is_opened_to_other_origins(live: Bridge) -> None:
-    headers = live.get("/api/state", headers={"Origin": "http://elsewhere"}).headers
-    assert "server" not in headers
-    assert not [name for name in headers if name.startswith("access-control-")]
+    assert "server" not in answer.headers

@@ -49,40 +49,24 @@ def refusal(cert: Path, key: Path) -> str:
 # --- the files ----------------------------------------------------------------------------------
 
 
-def test_a_certificate_and_its_key_will_do(ours: Certificate) -> None:
-    check_pair(str(ours.cert), str(ours.key))
-
-
-def test_a_missing_file_is_named(ours: Certificate, tmp_path: Path) -> None:
-    nowhere = tmp_path / "nowhere.pem"
+def test_a_pair_that_cannot_be_served_is_named(ours: Certificate, tmp_path: Path) -> None:
+    nowhere, odd = tmp_path / "nowhere.pem", tmp_path / "odd.pem"
     assert refusal(nowhere, ours.key) == f"--tls-cert {nowhere}: No such file or directory"
     assert refusal(ours.cert, nowhere) == f"--tls-key {nowhere}: No such file or directory"
     assert refusal(tmp_path, ours.key) == f"--tls-cert {tmp_path}: Is a directory"
-
-
-def test_a_file_that_is_not_what_it_should_be_is_named(ours: Certificate, tmp_path: Path) -> None:
     for content in (b"", b"hello", b"\x00\xff" * 100, ours.key.read_bytes()):
-        odd = tmp_path / "odd.pem"
         odd.write_bytes(content)
         assert refusal(odd, ours.key) == f"--tls-cert {odd} holds no PEM certificate"
     odd.write_bytes(ours.cert.read_bytes())
     assert f"--tls-key {odd} is no usable private key" in refusal(ours.cert, odd)
-
-
-def test_another_certificates_key_is_refused(ours: Certificate, tmp_path: Path) -> None:
     other = certificate(tmp_path)
     assert refusal(ours.cert, other.key) == f"--tls-key {other.key} is not the key of {ours.cert}"
-
-
-def test_an_encrypted_key_is_refused_without_asking_the_terminal(
-    ours: Certificate, tmp_path: Path
-) -> None:
+    # Without asking the terminal.
     key = load_pem_private_key(ours.key.read_bytes(), None)
-    encrypted = tmp_path / "encrypted.key"
-    encrypted.write_bytes(
+    odd.write_bytes(
         key.private_bytes(Encoding.PEM, PrivateFormat.PKCS8, BestAvailableEncryption(b"secret"))
     )
-    assert "is encrypted: give a key without a passphrase" in refusal(ours.cert, encrypted)
+    assert "is encrypted: give a key without a passphrase" in refusal(ours.cert, odd)
 
 
 def test_a_bad_file_ends_the_start_with_one_line(ours: Certificate) -> None:
@@ -93,15 +77,10 @@ def test_a_bad_file_ends_the_start_with_one_line(ours: Certificate) -> None:
 # --- served -------------------------------------------------------------------------------------
 
 
-def test_https_and_wss_are_served_and_announced(secure: Served) -> None:
+def test_https_and_wss_are_served_and_announced(secure: Served, ours: Certificate) -> None:
     assert secure.url.startswith("https://127.0.0.1:")
     assert secure.get("/api/state", BEARER).json()["tags"] == []
-    assert secure.handshake(headers=BEARER) == 101
-
-
-def test_every_frame_comes_over_wss(secure: Served, ours: Certificate) -> None:
-    url = ws_url(secure.url)
-    with wss(url, ours.trust, BEARER) as connection:
+    with wss(ws_url(secure.url), ours.trust, BEARER) as connection:
         first = connection.next_state()["seq"]
         for number in range(1, 4):
             assert connection.next_state()["seq"] == first + number
@@ -144,35 +123,22 @@ def test_who_asks_in_one_piece_with_the_end_of_the_handshake_is_not_cut_off(
         assert "cut off" not in live.process.output
 
 
-def test_the_own_origin_is_https_then(secure: Served) -> None:
-    own, plain = secure.url, secure.url.replace("https", "http")
-    for origin, status, handshake in ((own, 200, 101), (plain, 403, 403)):
-        headers = {**BEARER, "Origin": origin}
-        assert secure.get("/api/state", headers).status_code == status
-        assert secure.handshake(headers=headers) == handshake
-
-
-def test_the_cookie_never_leaves_tls(secure: Served) -> None:
+def test_the_own_origin_is_https_and_the_cookie_never_leaves_tls(secure: Served) -> None:
+    for origin, status in ((secure.url, 200), (secure.url.replace("https", "http"), 403)):
+        assert secure.get("/api/state", {**BEARER, "Origin": origin}).status_code == status
     cookie = secure.post("/api/signin", BEARER).headers["set-cookie"]
     assert "secure" in [part.strip().lower() for part in cookie.split(";")]
-
-
-def test_a_self_signed_certificate_is_not_nailed_down(secure: Served) -> None:
+    # A certificate that may be self-signed is not nailed down in a browser.
     assert "strict-transport-security" not in secure.get("/signin").headers
 
 
 def test_old_versions_of_tls_are_refused(secure: Served, ours: Certificate) -> None:
     old = ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT)
-    old.load_verify_locations(cadata=ssl.DER_cert_to_PEM_cert(_authority(ours.trust)))
+    ours.authority.configure_trust(old)
     with pytest.warns(DeprecationWarning, match="TLSv1_1"):
         old.maximum_version = ssl.TLSVersion.TLSv1_1
     with pytest.raises(httpx.ConnectError), Served(secure.process, secure.url, old).client() as it:
         it.get("/healthz")
-
-
-def test_plain_http_gets_nowhere(secure: Served) -> None:
-    with pytest.raises(httpx.TransportError):
-        Served(secure.process, secure.url.replace("https", "http")).get("/healthz")
 
 
 # --- renewed ------------------------------------------------------------------------------------
@@ -251,7 +217,3 @@ def test_a_broken_new_pair_is_told_once_and_the_old_one_goes_on(tmp_path: Path) 
         put(ours.key, key)
         live.process.wait_for_output("new connections get the TLS certificate")
         assert is_trusted(live, ours.trust)
-
-
-def _authority(trust: ssl.SSLContext) -> bytes:
-    return next(der for der in trust.get_ca_certs(binary_form=True))

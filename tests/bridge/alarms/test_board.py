@@ -1,9 +1,26 @@
+"""The board, a page of its alarms, and what people said, joined to them."""
+
+import random
 from dataclasses import replace
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
-from lupin_bridge.alarms.board import AlarmBoard, Change, active_first
-from lupin_bridge.judge.verdict import Verdict
+from lupin_bridge.alarms.board import (
+    MAX_WORST,
+    AlarmBoard,
+    Change,
+    Page,
+    active_first,
+    change_between,
+    notes_of_alarms,
+    page_of,
+)
+from lupin_bridge.judge.episodes import MAX_EPISODES, Alarm
+from lupin_bridge.judge.verdict import Kind, Reason, Verdict
+from lupin_bridge.stream.state_json import alarm_json
+from lupin_twin.core.notes import ACKNOWLEDGE, SHELVE, WITHDRAW, Note
 from tests.support.seen import Alarms, alarm
 
 A, B = alarm("a"), alarm("b", raised_ns=2)
@@ -61,3 +78,135 @@ def test_those_that_are_active_come_before_worse_ones_that_are_over() -> None:
     over, still = alarm(cleared_ns=9), alarm("b", Verdict.STRESSED)
     worst = alarm("c")
     assert sorted([over, still, worst], key=active_first) == [worst, still, over]
+
+
+# --- a page of alarms -----------------------------------------------------------------------------
+
+VERDICTS = [Verdict.CRITICAL, Verdict.STRESSED, Verdict.UNKNOWN]
+
+
+def some_alarm(chance: random.Random) -> Alarm:
+    name = chance.choice("abcdefghij")
+    made = alarm(name, chance.choice(VERDICTS), chance.randint(0, 5))
+    over = None if chance.random() < 0.5 else made.raised_at_ns + chance.randint(0, 9)
+    return replace(made, id=name, cleared_at_ns=over)
+
+
+def plain(alarms: dict[str, Alarm]) -> Page:
+    order = sorted(alarms.values(), key=lambda it: (-it.raised_at_ns, it.id))
+    active = [it for it in order if it.is_active]
+    worst = sorted(active, key=lambda it: VERDICTS.index(it.reason.verdict))
+    tags = {tag_id: tuple(it for it in active if it.tag_id == tag_id) for tag_id in alarms}
+    by_tag = {tag_id: mine for tag_id, mine in tags.items() if mine}
+    return Page(tuple(order), tuple(active), tuple(worst), by_tag)
+
+
+@given(st.integers(0, 2**32))
+def test_a_page_has_all_in_their_order_and_a_change_is_what_differs(seed: int) -> None:
+    chance, since_ns, before = random.Random(seed), 0, Page()
+    for _ in range(12):
+        every = {it.id: it for it in (some_alarm(chance) for _ in range(chance.randint(0, 9)))}
+        since_ns += chance.randint(0, 2)
+        known = {
+            name: it
+            for name, it in every.items()
+            if it.cleared_at_ns is None or it.cleared_at_ns >= since_ns
+        }
+        page = page_of(every.values(), since_ns)
+        assert page == plain(known)
+        was, change = {it.id: it for it in before.alarms}, change_between(before, page, since_ns)
+        assert {it.id for it in change.changed} == {
+            name for name, it in known.items() if was.get(name) != it
+        }
+        # What is old falls out without a word; what never was is said to be none.
+        assert {it.id for it in change.withdrawn} == {
+            name
+            for name, it in was.items()
+            if name not in known and (it.is_active or (it.cleared_at_ns or 0) >= since_ns)
+        }
+        before = page
+
+
+def test_changes_are_told_in_the_order_in_which_they_happened_and_what_stays_is_not() -> None:
+    first, second = alarm("a", raised_ns=3), alarm("b", raised_ns=5)
+    before = page_of([second, first])
+    assert change_between(before, page_of([first, second])) == Change(())
+    third, cleared = alarm("c", raised_ns=7), replace(second, cleared_at_ns=9)
+    page = page_of([cleared, first, third])
+    assert change_between(before, page) == Change((third, cleared))
+    assert page.alarms == (third, cleared, first)
+
+
+def test_what_its_tag_has_had_too_many_since_was_all_the_same() -> None:
+    many = [
+        replace(alarm("a", raised_ns=number), id=str(number), cleared_at_ns=number + 1)
+        for number in range(MAX_EPISODES + 1)
+    ]
+    before, now = page_of(many[:-1]), page_of(many[1:])
+    assert change_between(before, now) == Change((many[-1],))
+    assert change_between(page_of(many[:2]), page_of(many[1:2])) == Change((), (many[0],))
+
+
+def test_the_worst_come_first() -> None:
+    many = [
+        replace(alarm(str(number), raised_ns=number), id=str(number))
+        for number in range(MAX_WORST + 1)
+    ]
+    assert page_of(many).worst == tuple(reversed(many))[:MAX_WORST]
+
+
+# --- what people said of alarms -------------------------------------------------------------------
+
+NOW = 10**18
+HOUR = 3_600 * 10**9
+COLD = Alarm("a", Reason(Kind.RANGE, Verdict.STRESSED, "temperature", 9.0, 12.0), "7", NOW - 1)
+SHELF = Note("1", NOW, "anna", SHELVE, "alarm:a", "heater", NOW + HOUR)
+
+
+def test_who_acknowledged_and_who_shelved_until_when_is_told_and_nothing_else() -> None:
+    said = [Note("0", NOW, "bert", ACKNOWLEDGE, "alarm:a"), SHELF]
+    found = alarm_json(COLD, notes_of_alarms([COLD], said, NOW).get("a"))
+    assert {name: value for name, value in found.items() if "_by" in name} == {
+        "acknowledged_by": "bert",
+        "shelved_by": "anna",
+    }
+    assert found["acknowledged_at"] == {"sec": 10**9, "nanosec": 0}
+    assert found["shelved_until"] == {"sec": 10**9 + 3_600, "nanosec": 0}
+    assert found["shelved_reason"] == "heater"
+    assert "acknowledged_by" not in alarm_json(COLD)
+    assert notes_of_alarms([COLD], said, None) == {}
+
+
+def test_a_shelf_ends_in_its_time_by_a_later_word_and_by_withdrawal() -> None:
+    assert "a" in notes_of_alarms([COLD], [SHELF], NOW + HOUR - 1)
+    assert notes_of_alarms([COLD], [SHELF], NOW + HOUR) == {}
+    ended = Note("2", NOW, "bert", SHELVE, "alarm:a")
+    assert notes_of_alarms([COLD], [SHELF, ended], NOW) == {}
+    assert notes_of_alarms([COLD], [SHELF, Note("2", NOW, "anna", WITHDRAW, "note:1")], NOW) == {}
+
+
+def test_a_shelf_ends_when_its_alarm_gets_worse_and_one_of_later_holds() -> None:
+    bad = replace(COLD.reason, verdict=Verdict.CRITICAL)
+    worse = replace(COLD, reason=bad, raised_as=Verdict.STRESSED, worse_at_ns=NOW + 1)
+    assert notes_of_alarms([worse], [SHELF], NOW + 1) == {}
+    again = replace(SHELF, id="2", made_at_ns=NOW + 2)
+    assert "a" in notes_of_alarms([worse], [SHELF, again], NOW + 2)
+
+
+def test_nobody_has_acknowledged_what_an_alarm_became_later() -> None:
+    bad = replace(COLD.reason, verdict=Verdict.CRITICAL)
+    worse = replace(COLD, reason=bad, raised_as=Verdict.STRESSED, worse_at_ns=NOW + 1)
+    seen = Note("0", NOW, "bert", ACKNOWLEDGE, "alarm:a")
+    assert "a" in notes_of_alarms([COLD], [seen], NOW + 1)
+    assert notes_of_alarms([worse], [seen], NOW + 1) == {}
+    again = replace(seen, id="2", made_at_ns=NOW + 1)
+    assert "a" in notes_of_alarms([worse], [seen, again], NOW + 2)
+
+
+def test_what_comes_back_is_shelved_too_unless_it_is_worse_or_another_thing() -> None:
+    again = replace(COLD, id="b")
+    worse = replace(again, reason=replace(COLD.reason, verdict=Verdict.CRITICAL))
+    warm = replace(again, reason=replace(COLD.reason, value=40.0, limit=30.0))
+    elsewhere = replace(again, tag_id="8")
+    for other, is_shelved in ((again, True), (worse, False), (warm, False), (elsewhere, False)):
+        assert ("b" in notes_of_alarms([COLD, other], [SHELF], NOW)) is is_shelved, other

@@ -1,25 +1,32 @@
 """The feed by itself: with journals and replicas it is in test_live_alarms."""
 
 import asyncio
-from collections.abc import Callable
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
 from dataclasses import replace
 
 import pytest
 
 from lupin_bridge.alarms import feed as feed_module
 from lupin_bridge.alarms.board import AlarmBoard, Change
-from lupin_bridge.alarms.feed import AlarmFeed
+from lupin_bridge.alarms.feed import AlarmFeed, writes_between
 from lupin_bridge.feed.source import TwinUnavailableError, TwinUpdate
 from lupin_bridge.judge import alarm_fold
 from lupin_bridge.judge.judging import Criteria
 from lupin_bridge.settings import Settings
 from lupin_twin.core.journal_condition import Condition, JournalState
 from lupin_twin.core.past import PastWrite, PastWrites, RunSpan, WritesRequest
-from lupin_twin.core.state import Flower, Inspection, Snapshot, TwinStore
+from lupin_twin.core.state import Flower, Inspection, Reading, Scan, Snapshot, TwinStore
 from lupin_twin.runtime.workers import Workers
 from tests.support.waiting import PATIENCE_S, until
 
 NOW = 10**15
+
+
+@pytest.fixture(autouse=True)
+def without_pauses(monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in ("JOURNAL_S", "REST_S"):
+        monkeypatch.setattr(feed_module, name, 0.01)
 
 
 class Journal:
@@ -62,19 +69,17 @@ def told(number: int, **over: object) -> TwinUpdate:
     return TwinUpdate(snapshot, str(number), **over)  # type: ignore[arg-type]
 
 
-def follow(test: Callable[[AlarmFeed, AlarmBoard, Journal], object]) -> None:
-    async def run() -> None:
-        source, board = Journal(), AlarmBoard()
-        criteria = Criteria.of(Settings())
-        feed = AlarmFeed(source, criteria, board, lambda: NOW, 7.0, note_days=lambda _: None)  # type: ignore[arg-type]
-        feed.start()
-        try:
-            await test(feed, board, source)  # type: ignore[misc]
-        finally:
-            await feed.stop()
-            source.workers.close()
-
-    asyncio.run(run())
+@asynccontextmanager
+async def following() -> AsyncIterator[tuple[AlarmFeed, AlarmBoard, Journal]]:
+    source, board = Journal(), AlarmBoard()
+    criteria = Criteria.of(Settings())
+    feed = AlarmFeed(source, criteria, board, lambda: NOW, 7.0, note_days=lambda _: None)  # type: ignore[arg-type]
+    feed.start()
+    try:
+        yield feed, board, source
+    finally:
+        await feed.stop()
+        source.workers.close()
 
 
 async def changed(board: AlarmBoard) -> None:
@@ -86,8 +91,10 @@ async def changed(board: AlarmBoard) -> None:
     end()
 
 
-def test_it_reads_the_past_once_then_what_is_new_and_another_journal_from_its_beginning() -> None:
-    async def test(feed: AlarmFeed, board: AlarmBoard, source: Journal) -> None:
+async def test_it_reads_the_past_once_then_what_is_new_and_another_journal_from_its_beginning() -> (
+    None
+):
+    async with following() as (feed, board, source):
         source.writes_now = [pest(number, number % 2) for number in range(1, 1_200)]
         heard: list[Change] = []
         board.subscribe(heard.append)
@@ -113,11 +120,9 @@ def test_it_reads_the_past_once_then_what_is_new_and_another_journal_from_its_be
         await changed(board)
         assert [alarm.worst for alarm in board.now.alarms] == [4.0]
 
-    follow(test)
 
-
-def test_what_is_written_is_read_also_where_the_state_stays_as_it_is() -> None:
-    async def test(feed: AlarmFeed, board: AlarmBoard, source: Journal) -> None:
+async def test_what_is_written_is_read_also_where_the_state_stays_as_it_is() -> None:
+    async with following() as (feed, board, source):
         source.writes_now, source.written = [pest(1, 2)], 1
         feed.on_state(told(1))
         await changed(board)
@@ -129,51 +134,15 @@ def test_what_is_written_is_read_also_where_the_state_stays_as_it_is() -> None:
         await changed(board)
         assert board.now.active == ()
 
-    follow(test)
 
-
-def test_what_comes_late_finds_its_place_however_late_it_is(
-    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
-) -> None:
-    """Hundreds of looks later, one comes that saw the pest earlier; then one of another tag."""
-    for name in ("AGAIN_S", "JOURNAL_S", "REST_S"):
-        monkeypatch.setattr(feed_module, name, 0.01)
-
-    def look(number: int, tag_id: str, at: int, bugs: int) -> PastWrite:
-        return replace(pest(number, bugs), tag_id=tag_id, stamp_ns=NOW - 10_000 + at)
-
-    async def test(feed: AlarmFeed, board: AlarmBoard, source: Journal) -> None:
-        source.writes_now = [
-            look(2 * number + which, tag_id, 10 * number, bugs=int(number > 300))
-            for number in range(1, 800)
-            for which, tag_id in enumerate("ab")
-        ]
-        feed.on_state(told(1))
-        await changed(board)
-        for number, tag_id, at in ((5_000, "a", 2_005), (5_001, "b", 1_005), (5_002, "a", 505)):
-            source.writes_now.append(look(number, tag_id, at, 3))
-            feed.on_state(told(number))
-            late_ns = NOW - 10_000 + at
-
-            def is_told(tag_id: str = tag_id, late_ns: int = late_ns) -> bool:
-                raised = [it.raised_at_ns for it in board.now.alarms if it.tag_id == tag_id]
-                return late_ns in raised and len(board.now.active) == 2
-
-            await until(is_told, f"the alarm that {tag_id} had then")
-        assert feed.missed == 0
-
-    follow(test)
-    assert "so late" not in caplog.text
-
-
-def test_what_is_older_than_what_is_kept_is_counted_and_told(
+async def test_what_is_older_than_what_is_kept_is_counted_and_told(
     monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
     defaults = alarm_fold.Follower.__init__.__kwdefaults__
     assert defaults is not None
     monkeypatch.setitem(defaults, "kept", 8)
 
-    async def test(feed: AlarmFeed, board: AlarmBoard, source: Journal) -> None:
+    async with following() as (feed, board, source):
         source.writes_now = [
             replace(pest(number, 1), stamp_ns=NOW - 1_000 + number) for number in range(1, 70)
         ]
@@ -183,13 +152,11 @@ def test_what_is_older_than_what_is_kept_is_counted_and_told(
         feed.on_state(told(2))
         await until(lambda: feed.missed == 1, "that it was missed")
         assert len(board.now.active) == 1
-
-    follow(test)
     assert "too late for its alarms" in caplog.text
 
 
-def test_a_twin_that_is_gone_answers_nothing_and_is_an_alarm_beside_those_of_before() -> None:
-    async def test(feed: AlarmFeed, board: AlarmBoard, source: Journal) -> None:
+async def test_a_twin_that_is_gone_answers_nothing_and_is_an_alarm_beside_those_of_before() -> None:
+    async with following() as (feed, board, source):
         source.writes_now = [pest(1, 2)]
         feed.on_state(told(1))
         await changed(board)
@@ -203,15 +170,13 @@ def test_a_twin_that_is_gone_answers_nothing_and_is_an_alarm_beside_those_of_bef
         await changed(board)
         assert [alarm.reason.kind for alarm in board.now.active] == ["pest"]
 
-    follow(test)
 
-
-def test_alarms_that_a_journal_has_not_confirmed_for_long_are_not_told_as_all_there_is(
+async def test_alarms_that_a_journal_has_not_confirmed_for_long_are_not_told_as_all_there_is(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr("lupin_bridge.alarms.feed.UNANSWERED_S", 0.0)
 
-    async def test(feed: AlarmFeed, board: AlarmBoard, source: Journal) -> None:
+    async with following() as (feed, board, source):
         source.writes_now = [pest(1, 2)]
         feed.on_state(told(1))
         await changed(board)
@@ -225,11 +190,9 @@ def test_alarms_that_a_journal_has_not_confirmed_for_long_are_not_told_as_all_th
         await changed(board)
         assert (board.now.source, len(board.now.alarms)) == ("journal", 1)
 
-    follow(test)
 
-
-def test_without_a_journal_states_tell_and_a_silent_twin_is_one_alarm_of_the_house() -> None:
-    async def test(feed: AlarmFeed, board: AlarmBoard, source: Journal) -> None:
+async def test_without_a_journal_states_tell_and_a_silent_twin_is_one_alarm_of_the_house() -> None:
+    async with following() as (feed, board, source):
         feed.on_state(told(3, journal=Condition(JournalState.FAILING)))
         await changed(board)
         assert (board.now.source, source.asked) == ("heard", 0)
@@ -244,11 +207,9 @@ def test_without_a_journal_states_tell_and_a_silent_twin_is_one_alarm_of_the_hou
         over = next(alarm for alarm in board.now.alarms if not alarm.tag_id)
         assert (over.id, over.cleared_at_ns) == (silent.id, NOW)
 
-    follow(test)
 
-
-def test_a_state_as_of_when_a_site_was_heard_last_withdraws_no_silence_since() -> None:
-    async def test(feed: AlarmFeed, board: AlarmBoard, source: Journal) -> None:
+async def test_a_state_as_of_when_a_site_was_heard_last_withdraws_no_silence_since() -> None:
+    async with following() as (feed, board, source):
         source.writes_now = [pest(1, 2)]
         feed.on_state(told(1))
         await changed(board)
@@ -261,4 +222,37 @@ def test_a_state_as_of_when_a_site_was_heard_last_withdraws_no_silence_since() -
         over = next(alarm for alarm in board.now.alarms if not alarm.tag_id)
         assert (over.reason.kind, over.cleared_at_ns) == ("silent", NOW)
 
-    follow(test)
+
+# --- without a journal ----------------------------------------------------------------------------
+
+
+def after(store: TwinStore, *writes: Scan | Inspection) -> Snapshot:
+    for write in writes:
+        if isinstance(write, Scan):
+            store.record(write)
+        else:
+            store.record_inspection(write)
+    return store.snapshot(NOW, "map")
+
+
+def test_what_is_new_is_told_once_in_the_order_of_time_and_numbered() -> None:
+    store = TwinStore()
+    pest = Flower(species="tulip", confidence=0.9, anomaly=True, bug_count=3)
+    first = after(
+        store,
+        Scan("a", 5, (Reading("co2", 400.0), Reading("light", 1.0))),
+        Inspection("a", 4, pest),
+        Scan("b", 6, (), status=2),
+    )
+    told = writes_between(None, first, 7)
+    assert [(w.number, w.tag_id, w.stamp_ns, w.kind, w.status) for w in told] == [
+        (7, "a", 4, 1, 0),
+        (8, "a", 5, 0, 0),
+        (9, "b", 6, 0, 2),
+    ]
+    assert (told[0].species, told[0].anomaly, told[0].bug_count) == ("tulip", True, 3)
+    assert (told[1].sensors, told[1].values) == (("co2", "light"), (400.0, 1.0))
+    second = after(store, Scan("a", 9, (Reading("co2", 410.0),)))
+    (new,) = writes_between(first, second, 10)
+    assert (new.stamp_ns, new.sensors, new.values) == (9, ("co2",), (410.0,))
+    assert writes_between(second, replace(second, stamp_ns=NOW + 1), 11) == []

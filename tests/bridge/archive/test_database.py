@@ -1,13 +1,17 @@
 """The archive's tables, and who may do what with them."""
 
+import random
 from pathlib import Path
+from subprocess import CompletedProcess
 
 import psycopg
 import pytest
 
 from tests.support.archive import Archive, forward_once, run
+from tests.support.fleet import scans_lately, write
 from tests.support.journal import kept, scan
-from tests.support.postgres import Postgres
+from tests.support.postgres import Postgres, server
+from tests.support.tls import certificate
 
 
 @pytest.fixture
@@ -76,56 +80,51 @@ def test_the_page_reads_every_site_and_writes_notes_alone(two_sites: Archive) ->
         assert refused(two_sites, "page", sql), sql
 
 
+def command(action: str, url: str, **env: str) -> CompletedProcess[str]:
+    """`lupin-twin archive` of that archive."""
+    return run("archive", action, "--archive-url", url, **env)
+
+
 def test_info_has_a_line_a_site(two_sites: Archive) -> None:
     two_sites.do("INSERT INTO site VALUES ('gh3', 'Named before it is forwarded')")
-    told = run("archive", "info", "--archive-url", two_sites.owner).stdout.splitlines()
+    told = command("info", two_sites.owner).stdout.splitlines()
     assert told.pop().endswith("the last received never; never forwarded; 0 journals")
-    assert [line.partition(", 0 looks, 0 places; ")[0] for line in told] == [
-        "gh1: 1 scans",
-        "gh2: 1 scans",
-    ]
+    found = [line.partition(", 0 looks, 0 places; ")[0] for line in told]
+    assert found == ["gh1: 1 scans", "gh2: 1 scans"]
 
 
 def test_check_tells_rows_that_fit_no_other(two_sites: Archive) -> None:
-    assert "is whole" in run("archive", "check", "--archive-url", two_sites.owner).stdout
-    with psycopg.connect(two_sites.owner) as connection:
-        connection.execute("DELETE FROM series WHERE site = 'gh1'")
-    done = run("archive", "check", "--archive-url", two_sites.owner)
+    assert "is whole" in command("check", two_sites.owner).stdout
+    two_sites.do("DELETE FROM series WHERE site = 'gh1'")
+    done = command("check", two_sites.owner)
     assert done.returncode == 1
     assert "1 scans without a series" in done.stdout
     assert "1 hours without a series" in done.stdout
 
 
 def test_an_archive_is_made_once(archive: Archive) -> None:
-    again = run("archive", "init", "--archive-url", archive.owner)
+    again = command("init", archive.owner)
     assert (again.returncode, len(again.stderr.splitlines())) == (1, 1)
     assert "has an archive already" in again.stderr
 
 
 def test_migrating_gives_the_roles_back_what_they_may(two_sites: Archive) -> None:
-    with psycopg.connect(two_sites.owner) as connection:
-        connection.execute("REVOKE ALL ON scan FROM lupin_page")
-    assert run("archive", "migrate", "--archive-url", two_sites.owner).returncode == 0
+    two_sites.do("REVOKE ALL ON scan FROM lupin_page")
+    assert command("migrate", two_sites.owner).returncode == 0
     with psycopg.connect(two_sites.url("page")) as connection:
         assert len(connection.execute("SELECT site FROM scan").fetchall()) == 2
 
 
 def test_an_archive_of_another_version_is_left_alone(archive: Archive) -> None:
-    with psycopg.connect(archive.owner) as connection:
-        connection.execute("UPDATE archive SET version = 9")
+    archive.do("UPDATE archive SET version = 9")
     for action in ("migrate", "info", "check"):
-        done = run("archive", action, "--archive-url", archive.owner)
+        done = command(action, archive.owner)
         assert done.returncode == 1
         assert "is of version 9, expected 1: update lupin-twin here" in done.stderr
 
 
 def test_a_database_without_an_archive_is_named_so(postgresql: Postgres) -> None:
-    done = run(
-        "archive",
-        "info",
-        "--archive-url",
-        f"postgresql:///postgres?host={postgresql.folder}&user=postgres",
-    )
+    done = command("info", postgresql.url_of("postgres"))
     assert done.returncode == 1
     assert "the database has no archive: lupin-twin archive init makes it" in done.stderr
 
@@ -138,19 +137,50 @@ def test_a_wrong_password_is_said_and_not_repeated(archive: Archive) -> None:
         hba.write_text(f"local {archive.name} gh1 scram-sha-256\n{before}")
         owner.execute("SELECT pg_reload_conf()")
         try:
-            words = ("archive", "info", "--archive-url", archive.url("gh1"))
-            done = run(*words, PGPASSWORD="wrong")
+            done = command("info", archive.url("gh1"), PGPASSWORD="wrong")
             assert done.returncode == 1
             assert 'password authentication failed for user "gh1"' in done.stderr
             assert "wrong" not in done.stderr
-            assert run(*words, PGPASSWORD="right").returncode == 0
+            assert command("info", archive.url("gh1"), PGPASSWORD="right").returncode == 0
         finally:
             hba.write_text(before)
             owner.execute("SELECT pg_reload_conf()")
 
 
 def test_part_of_a_password_is_never_taken_for_a_host() -> None:
-    done = run("archive", "info", "--archive-url", "postgresql://gh1:one@two@127.0.0.1:1/lupin")
+    done = command("info", "postgresql://gh1:one@two@127.0.0.1:1/lupin")
     assert done.returncode == 2
     assert "--archive-url is no address of a PostgreSQL" in done.stderr
     assert "two@" not in done.stderr
+
+
+# --- TLS ------------------------------------------------------------------------------------------
+
+
+def test_the_servers_certificate_is_checked(tmp_path: Path) -> None:
+    journal = tmp_path / "journal.sqlite"
+    write(journal, scans_lately())
+    made, other = certificate(tmp_path), certificate(tmp_path, "other")
+    trusted, foreign = tmp_path / "trusted.pem", tmp_path / "foreign.pem"
+    made.authority.cert_pem.write_to_path(str(trusted))
+    other.authority.cert_pem.write_to_path(str(foreign))
+    # Of its own, so that no other test's server has the port.
+    address = f"127.{random.randint(1, 250)}.{random.randint(1, 250)}.{random.randint(2, 250)}"
+    with server() as own:
+        archive = Archive(own)
+        own.listen_with_tls(address, made.cert, made.key)
+
+        def forwarded(root: Path) -> CompletedProcess[str]:
+            where = f"gh1@localhost/{archive.name}?hostaddr={address}"
+            url = f"postgresql://{where}&sslmode=verify-full&sslrootcert={root}"
+            words = ("forward", "--site", "gh1", "--journal", str(journal), "--once")
+            return run(*words, "--archive-url", url)
+
+        refused = forwarded(foreign)
+        assert refused.returncode == 1
+        assert "certificate verify failed" in refused.stderr
+        assert len(refused.stderr.splitlines()) == 1
+        assert archive.rows()["scan"] == []
+        done = forwarded(trusted)
+        assert done.returncode == 0, done.stderr
+        assert len(archive.rows()["scan"]) == len(scans_lately()) - 5

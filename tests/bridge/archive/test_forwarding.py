@@ -11,11 +11,9 @@ import psycopg
 import pytest
 
 from lupin_twin.core.notes import NotesRequest
-from lupin_twin.core.past import SeriesRequest
 from lupin_twin.core.state import Write
 from lupin_twin.journal.beside import mark_of
 from lupin_twin.journal.notes import notes
-from lupin_twin.journal.queries import series
 from lupin_twin.journal.rebuild import vacuum
 from lupin_twin.journal.retention import Limits, forget
 from lupin_twin.journal.runs import Clock
@@ -42,6 +40,11 @@ def journal(tmp_path: Path) -> Path:
     return tmp_path / "journal.sqlite"
 
 
+def forward(archive: Archive, journal: Path, rows: list[Write], now: Clock | None = None) -> None:
+    kept(journal, rows, now)
+    forward_once(archive, journal)
+
+
 def scans(start: int, count: int) -> list[Write]:
     """A scan a minute, round five tags."""
     return [
@@ -50,19 +53,8 @@ def scans(start: int, count: int) -> list[Write]:
     ]
 
 
-def test_archive_and_journal_have_the_same_rows(archive: Archive, journal: Path) -> None:
-    kept(
-        journal, [pin(), *scans(0, 300), look("7", NOW + HOUR, anomaly=True), look("7", NOW + DAY)]
-    )
-    forward_once(archive, journal)
-    assert archive.rows() == rows_of(journal)
-    assert len(archive.rows()["scan"]) == 300
-    assert archive.rows()["event"]
-
-
 def test_what_comes_later_goes_after_it_late_writes_too(archive: Archive, journal: Path) -> None:
-    kept(journal, [*scans(0, 50), scan("9", NOW + DAY), look("7", NOW + DAY)])
-    forward_once(archive, journal)
+    forward(archive, journal, [*scans(0, 50), scan("9", NOW + DAY), look("7", NOW + DAY)])
     # A pause is cut in two, a pest is seen before a look that saw none; a sensor comes later.
     kept(journal, [scan("9", NOW + DAY // 2), look("7", NOW + HOUR, anomaly=True)])
     kept(journal, [scan("9", NOW + DAY, temperature=1.0, humidity=50.0), *scans(50, 20)])
@@ -72,47 +64,35 @@ def test_what_comes_later_goes_after_it_late_writes_too(archive: Archive, journa
 
 
 def test_runs_of_the_clock_and_their_ends(archive: Archive, journal: Path) -> None:
-    kept(journal, scans(0, 50))
-    forward_once(archive, journal)
+    forward(archive, journal, scans(0, 50))
     back = Clock(10 * SECOND, NOW + DAY, is_simulated=True)
     kept(journal, [scan("1", 11 * SECOND), scan("2", 12 * SECOND)], back)
     again = Clock(SECOND, NOW + DAY + HOUR, is_simulated=True)
-    kept(journal, [scan("1", 2 * SECOND)], again)
-    forward_once(archive, journal)
+    forward(archive, journal, [scan("1", 2 * SECOND)], again)
     assert archive.rows() == rows_of(journal)
     assert len(archive.rows()["run"]) == 3
 
 
-def test_the_same_question_has_the_same_answer(archive: Archive, journal: Path) -> None:
-    kept(journal, scans(0, 3000))
-    forward_once(archive, journal)
-    asked = SeriesRequest("1", "a", NOW, NOW + 2 * DAY, 40)
-    with closing(open_reader(journal)) as here, psycopg.connect(archive.owner) as there:
-        there.autocommit = True
-        gh1 = SiteLog(there, "gh1")
-        assert series(gh1, asked, NOW + 2 * DAY) == series(here, asked, NOW + 2 * DAY)
-
-
 def test_a_nul_in_a_name_does_not_stop_its_site(archive: Archive, journal: Path) -> None:
-    kept(journal, [scan("a\0b", NOW, a=1.0), scan("c", NOW + SECOND, a=2.0)])
-    forward_once(archive, journal)
+    forward(archive, journal, [scan("a\0b", NOW, a=1.0), scan("c", NOW + SECOND, a=2.0)])
     assert archive.select("SELECT DISTINCT tag FROM series ORDER BY tag") == [("a\ufffdb",), ("c",)]
 
 
 def test_more_rows_than_go_at_once(archive: Archive, journal: Path) -> None:
-    kept(journal, [pin("1"), *scans(0, 6_000), *(look("7", NOW + n * HOUR) for n in range(600))])
-    forward_once(archive, journal)
+    forward(
+        archive,
+        journal,
+        [pin("1"), *scans(0, 6_000), *(look("7", NOW + n * HOUR) for n in range(600))],
+    )
     assert archive.rows() == rows_of(journal)
 
 
 def test_the_archive_keeps_what_the_journal_deletes(archive: Archive, journal: Path) -> None:
-    kept(journal, scans(0, 50))
-    forward_once(archive, journal)
+    forward(archive, journal, scans(0, 50))
     before = archive.rows()
     purge(journal)
     assert len(rows_of(journal)["scan"]) == 1  # the last is never too old
-    kept(journal, scans(60, 10))
-    forward_once(archive, journal)
+    forward(archive, journal, scans(60, 10))
     there = {*before["scan"], *rows_of(journal)["scan"]}
     assert archive.rows()["scan"] == sorted(there, key=repr)
     assert len(there) == 60
@@ -125,8 +105,7 @@ def test_of_what_was_deleted_before_it_is_known_what_was_counted(
 ) -> None:
     kept(journal, scans(0, 50))
     purge(journal)
-    kept(journal, scans(60, 10))
-    forward_once(archive, journal)
+    forward(archive, journal, scans(60, 10))
     assert archive.rows() == rows_of(journal)
     assert archive.rows()["hour"]
     assert archive.select("SELECT key FROM meta WHERE key LIKE 'purged%'") == [("purged_ns:1",)]
@@ -140,8 +119,7 @@ def purge(journal: Path) -> None:
 
 
 def test_a_journal_keeps_what_is_not_forwarded_and_says_so(archive: Archive, journal: Path) -> None:
-    kept(journal, scans(0, 50))
-    forward_once(archive, journal)
+    forward(archive, journal, scans(0, 50))
     kept(journal, scans(50, 25))
     purge(journal)
     assert len(rows_of(journal)["scan"]) == 25
@@ -167,12 +145,15 @@ def test_a_disk_that_is_full_is_not_kept_for_the_archive(archive: Archive, journ
 
 
 def test_another_journal_overwrites_nothing(archive: Archive, journal: Path) -> None:
-    kept(journal, [pin(), *scans(0, 50)])
-    forward_once(archive, journal)
+    forward(archive, journal, [pin(), *scans(0, 50)])
     before = archive.rows()
     journal.unlink()
-    kept(journal, [pin(), look(), *scans(200, 20)], Clock(NOW + DAY, NOW + DAY, is_simulated=False))
-    forward_once(archive, journal)
+    forward(
+        archive,
+        journal,
+        [pin(), look(), *scans(200, 20)],
+        Clock(NOW + DAY, NOW + DAY, is_simulated=False),
+    )
     after = archive.rows()
     for table in TABLES:
         assert [row for row in before[table] if row not in after[table]] == [], table
@@ -190,12 +171,10 @@ def test_a_backup_that_is_put_back_loses_and_overwrites_nothing(
 ) -> None:
     kept(journal, scans(0, 50))
     backup = shutil.copy(journal, tmp_path / "backup")
-    kept(journal, scans(50, 10))
-    forward_once(archive, journal)
+    forward(archive, journal, scans(50, 10))
     before = archive.rows()
     shutil.copy(backup, journal)
-    kept(journal, scans(100, 30))
-    forward_once(archive, journal)
+    forward(archive, journal, scans(100, 30))
     after = archive.rows()
     assert [row for row in before["scan"] if row not in after["scan"]] == []
     assert len(after["scan"]) == 60 + 80
@@ -216,11 +195,9 @@ def test_a_forwarder_follows_a_journal_that_is_replaced_under_it(
 
 
 def test_a_journal_without_gaps_is_the_same_journal(archive: Archive, journal: Path) -> None:
-    kept(journal, scans(0, 50))
-    forward_once(archive, journal)
+    forward(archive, journal, scans(0, 50))
     vacuum(journal, "test", lambda what, share: None)
-    kept(journal, scans(50, 5))
-    forward_once(archive, journal)
+    forward(archive, journal, scans(50, 5))
     assert archive.rows() == rows_of(journal)
 
 
@@ -228,11 +205,9 @@ def test_a_journal_without_gaps_is_the_same_journal(archive: Archive, journal: P
 def test_a_tag_that_its_journal_forgets_is_forgotten_in_the_archive(
     archive: Archive, journal: Path, *, pose_only: bool
 ) -> None:
-    kept(journal, [pin("4"), *scans(0, 50), look("4", NOW + HOUR, anomaly=True)])
-    forward_once(archive, journal)
+    forward(archive, journal, [pin("4"), *scans(0, 50), look("4", NOW + HOUR, anomaly=True)])
     forget(journal, "4", pose_only=pose_only, by="test", at_ns=NOW)
-    kept(journal, [pin("4"), *scans(54, 6), look("4", NOW + DAY, anomaly=True)])
-    forward_once(archive, journal)
+    forward(archive, journal, [pin("4"), *scans(54, 6), look("4", NOW + DAY, anomaly=True)])
     assert archive.rows() == rows_of(journal)
     # What was scanned since stays, also when the forwarder begins anew.
     forward_once(archive, journal)
@@ -275,32 +250,6 @@ def test_notes_are_forwarded_as_they_were_written(archive: Archive, journal: Pat
         assert notes(SiteLog(there, "gh2"), NotesRequest()).notes == ()
 
 
-def test_what_is_received_is_in_the_archive_soon(archive: Archive, journal: Path) -> None:
-    with recording(journal) as twin, forwarder(archive, journal) as following:
-        following.wait_for_output("is forwarded to")
-        for n in range(5):
-            twin.write(scan("1", NOW + n * SECOND))
-            wait_for(lambda n=n: len(archive.rows()["scan"]) == n + 1, "the scan", 5.0)  # type: ignore[misc]
-        wait_until_equal(archive, journal)
-
-
-def test_a_forwarder_that_is_killed_in_the_middle_of_a_batch_loses_nothing(
-    archive: Archive, journal: Path
-) -> None:
-    waiting = "SELECT 1 FROM pg_locks WHERE NOT granted AND relation = 'scan'::regclass"
-    kept(journal, scans(0, 50))
-    with forwarder(archive, journal) as following:
-        wait_until_equal(archive, journal)
-        with psycopg.connect(archive.owner) as other:
-            other.execute("LOCK TABLE scan IN SHARE MODE")
-            kept(journal, scans(50, 10))
-            wait_for(lambda: archive.select(waiting), "a batch that is held up")
-            following.kill()
-    forward_once(archive, journal)
-    assert archive.rows() == rows_of(journal)
-    assert len(archive.rows()["scan"]) == 60
-
-
 def test_a_second_forwarder_of_a_site_is_refused_by_name(archive: Archive, journal: Path) -> None:
     kept(journal, scans(0, 5))
     with forwarder(archive, journal) as first:
@@ -316,20 +265,6 @@ def words(archive: Archive, path: Path, **more: str) -> list[str]:
     given = {"site": archive.site, "archive_url": archive.url(), "journal": str(path)} | more
     pairs = [(f"--{name.replace('_', '-')}", value) for name, value in given.items()]
     return ["forward", "--once", *(word for pair in pairs for word in pair)]
-
-
-def test_offline_and_back(archive: Archive, journal: Path) -> None:
-    kept(journal, scans(0, 5))
-    with psycopg.connect(archive.server.url, autocommit=True) as server:
-        server.execute(f"ALTER DATABASE {archive.name} ALLOW_CONNECTIONS false")
-        with forwarder(archive, journal) as following:
-            line = following.wait_for_output("is not forwarded")
-            assert "not currently accepting connections" in line
-            kept(journal, scans(5, 50))
-            server.execute(f"ALTER DATABASE {archive.name} ALLOW_CONNECTIONS true")
-            following.wait_for_output("is forwarded to")
-            wait_until_equal(archive, journal)
-            assert following.output.count("is not forwarded") == 1
 
 
 def test_an_archive_that_is_reached_and_takes_nothing_is_said_once(

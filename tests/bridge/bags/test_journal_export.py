@@ -1,28 +1,34 @@
+"""A period of a journal as a recording, and what a twin knows that hears it."""
+
 from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import pytest
+import yaml
 from lupin_msgs.msg import DiscoveredTags, Observation
 from mcap.reader import make_reader
 from rclpy.serialization import deserialize_message
 from rosgraph_msgs.msg import Clock as ClockMessage
 
-from lupin_bridge.bags.journal_export import LOT, export, offered_qos
-from lupin_bridge.feed.relay import Topic
+from lupin_bridge.bags import journal_export
+from lupin_bridge.bags.journal_export import JournalRows, export
 from lupin_twin.core import ingest
 from lupin_twin.core.drops import Drop
 from lupin_twin.core.history import Repeats
-from lupin_twin.core.state import TagState, TwinStore, Write
+from lupin_twin.core.state import Inspection, Pin, Pose, TagState, TwinStore, Write
 from lupin_twin.journal.fold import state_at
-from lupin_twin.journal.runs import Clock
+from lupin_twin.journal.runs import Carries, Clock
 from lupin_twin.journal.schema import open_reader
 from lupin_twin.ros import convert
-from tests.bridge.bags.test_journal_messages import FAILED_LOOK
-from tests.bridge.cli.test_journal import Said
 from tests.support.bags import is_open, no_file_above, read
-from tests.support.journal import NOW, SECOND, kept, look, pin, scan
+from tests.support.journal import NOW, SECOND, kept, look, opened, pin, scan
+from tests.support.processes import said
 
+FAILED_LOOK = Inspection(
+    "7", NOW, None, status=2, status_detail="dark", source="robot", mission="m1"
+)
 ROWS: list[Write] = [
     pin("7"),
     scan("7", temperature=20.0, humidity=60.0),
@@ -30,11 +36,25 @@ ROWS: list[Write] = [
     look("8", NOW + SECOND, anomaly=True),
     scan("7", NOW + 2 * SECOND, temperature=21.0, light=float("nan")),
     replace(FAILED_LOOK, arrival_ns=NOW + 2000),
-    scan("8", NOW + SECOND),
+    # Late, and of a robot whose clock goes ahead: by which it does not count.
+    replace(scan("8", NOW + SECOND), own_stamp_ns=NOW * 3),
+    replace(scan("8", NOW + 3 * SECOND), readings=(), status=1, status_detail="no way"),
     look("7", NOW + 4 * SECOND),
-    pin("9", NOW + 5 * SECOND),
-    *(scan("7", NOW + 6 * SECOND + n, temperature=float(n)) for n in range(LOT + 1)),
+    replace(pin("9", NOW + 5 * SECOND), pose=Pose(1.0, 2.0, 3.0, 0.0, 0.0, 1.0, 1e-9)),
+    *(scan("7", NOW + 6 * SECOND + n, temperature=float(n)) for n in range(9)),
 ]
+SIMULATED = Clock(50 * SECOND, 50 * SECOND, is_simulated=True)
+FOR_EVER = {"sec": 9223372036, "nsec": 854775807}
+# All that rosbag2 reads.
+QOS: dict[str, Any] = {
+    "history": "keep_last",
+    "reliability": "reliable",
+    "deadline": FOR_EVER,
+    "lifespan": FOR_EVER,
+    "liveliness": "automatic",
+    "liveliness_lease_duration": FOR_EVER,
+    "avoid_ros_namespace_conventions": False,
+}
 
 
 def exported(
@@ -44,21 +64,22 @@ def exported(
         return export(connection, target, start_ns, end_ns, namespace)
 
 
-def fed(target: Path) -> dict[str, str]:
-    """The tags of a fresh twin that hears a recording."""
-    store, repeats = TwinStore(), Repeats()
+def fed(target: Path) -> tuple[dict[str, str], list[str]]:
+    """The tags of a fresh twin that hears a recording, and what it writes of observations."""
+    store, repeats, written = TwinStore(), Repeats(), list[str]()
     for topic, log_ns, _, data in read(target):
         if topic == "/floranova/observations":
             msg = deserialize_message(data, Observation)
             write = ingest.observation(convert.received(msg), "map", log_ns)
             assert not isinstance(write, Drop)
             assert ingest.apply(write, store, repeats) is None
+            written.append(repr(write))
         elif topic == "/perception/discovered_tags":
             heard = convert.received_tags(deserialize_message(data, DiscoveredTags))
             for pinned in list(ingest.discoveries(heard, "map", store.is_pinned)):
                 assert not isinstance(pinned, Drop)
                 assert ingest.apply(pinned, store, repeats) is None
-    return by_id(store.snapshot(NOW * 2, "map").tags)
+    return by_id(store.snapshot(NOW * 2, "map").tags), written
 
 
 def by_id(tags: tuple[TagState, ...]) -> dict[str, str]:
@@ -69,22 +90,31 @@ def by_id(tags: tuple[TagState, ...]) -> dict[str, str]:
     }
 
 
-@pytest.mark.parametrize("until_s", [0, 2, 5, 7])
-def test_who_hears_it_knows_what_the_journal_says_of_its_end(tmp_path: Path, until_s: int) -> None:
+@pytest.mark.parametrize(("until_s", "lot"), [(0, 2_000), (2, 3), (5, 2), (7, 1)])
+def test_who_hears_it_knows_what_the_journal_says_of_its_end(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, until_s: int, lot: int
+) -> None:
     path, target = tmp_path / "j.sqlite", tmp_path / "a.mcap"
     kept(path, ROWS)
+    monkeypatch.setattr(journal_export, "LOT", lot)
     end_ns = NOW + until_s * SECOND
-    observations, tags = exported(path, target, 0, end_ns + 1)
+    made = exported(path, target, 0, end_ns + 1)
+    tags, written = fed(target)
     with closing(open_reader(path)) as connection:
-        assert fed(target) == by_id(state_at(connection, end_ns, "map").tags)
+        assert tags == by_id(state_at(connection, end_ns, "map").tags)
     messages = [row for row in ROWS if row.stamp_ns <= end_ns]
-    assert observations + tags == len(messages) == len(read(target))
+    assert sum(made) == len(messages) == len(read(target))
     assert [entry[1] for entry in read(target)] == [row.arrival_ns for row in messages]
+    assert written == [
+        repr(replace(row, own_stamp_ns=row.stamp_ns, arrival_ns=0))
+        for row in messages
+        if not isinstance(row, Pin)
+    ]
 
 
 def test_other_programs_learn_types_and_qos_from_the_file(tmp_path: Path) -> None:
     path, target = tmp_path / "j.sqlite", tmp_path / "a.mcap"
-    kept(path, ROWS)
+    kept(path, [scan("7", 60 * SECOND)], SIMULATED)
     exported(path, target)
     with target.open("rb") as opened:
         reader = make_reader(opened)
@@ -94,8 +124,12 @@ def test_other_programs_learn_types_and_qos_from_the_file(tmp_path: Path) -> Non
     for channel in summary.channels.values():
         schema = summary.schemas[channel.schema_id]
         assert (channel.message_encoding, schema.encoding) == ("cdr", "ros2msg")
-        topic = Topic(channel.topic, schema.name, depth=50)
-        assert channel.metadata == {"offered_qos_profiles": offered_qos(topic)}
+        is_clock = schema.name == "rosgraph_msgs/msg/Clock"
+        [profile] = yaml.safe_load(channel.metadata["offered_qos_profiles"])
+        assert profile == QOS | {
+            "depth": 10 if is_clock else 50,
+            "durability": "volatile" if is_clock else "transient_local",
+        }
 
 
 def test_a_period_begins_with_the_places_of_before(tmp_path: Path) -> None:
@@ -105,8 +139,10 @@ def test_a_period_begins_with_the_places_of_before(tmp_path: Path) -> None:
     assert made == (1, 2)
     first, *_ = read(target)
     assert first[:2] == ("/house/perception/discovered_tags", NOW + 4 * SECOND + 2000)
-    tags = deserialize_message(first[3], DiscoveredTags).tags
-    assert [(tag.tag_id, tag.pose_in_map.position.x) for tag in tags] == [("7", 1.5), ("8", 8.5)]
+    message = deserialize_message(first[3], DiscoveredTags)
+    assert convert.nanoseconds(message.header.stamp) == NOW + SECOND
+    found = [(tag.tag_id, tag.pose_in_map.position.x) for tag in message.tags]
+    assert found == [("7", 1.5), ("8", 8.5)]
     target.unlink()
     made = exported(path, target, NOW + 5 * SECOND, NOW + 6 * SECOND + 1)
     assert made == (1, 2)
@@ -116,7 +152,7 @@ def test_simulated_time_is_told_by_the_clock(tmp_path: Path) -> None:
     path, target = tmp_path / "j.sqlite", tmp_path / "a.mcap"
     row = scan("7", 60 * SECOND)
     late = replace(scan("7", 61 * SECOND), arrival_ns=65 * SECOND)
-    kept(path, [row, late], Clock(50 * SECOND, 50 * SECOND, is_simulated=True))
+    kept(path, [row, late], SIMULATED)
     exported(path, target)
     (topic, log_ns, _, data), observation, (*_, later), _ = read(target)
     assert (topic, log_ns) == ("/clock", row.arrival_ns)
@@ -125,6 +161,35 @@ def test_simulated_time_is_told_by_the_clock(tmp_path: Path) -> None:
     assert observation[:2] == ("/floranova/observations", row.arrival_ns)
     # Not when it was observed, but when it was heard: a clock does not go back.
     assert convert.nanoseconds(deserialize_message(later, ClockMessage).clock) == 65 * SECOND
+
+
+def test_what_comes_while_it_is_read_is_read_too(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path, later = tmp_path / "j.sqlite", scan("10", NOW + 9 * SECOND, light=1.0)
+    kept(path, ROWS[:4])
+    monkeypatch.setattr(journal_export, "LOT", 1)
+    with closing(open_reader(path)) as connection:
+        reading = iter(JournalRows(connection, 0, 2**62))
+        first = [next(reading)[1] for _ in range(2)]
+        kept(path, [later])
+        assert [*first, *(row for _, row in reading)] == [*ROWS[:4], later]
+
+
+def test_of_an_earlier_run_the_places_are_known(tmp_path: Path) -> None:
+    path, target = tmp_path / "j.sqlite", tmp_path / "a.mcap"
+    again = Clock(50 * SECOND, NOW + 60 * SECOND, is_simulated=True)
+    row = replace(scan("7", 60 * SECOND), arrival_ns=NOW + 70 * SECOND)
+    with opened(path) as file:
+        first = file.start(Clock(100 * SECOND, NOW, is_simulated=True), is_believed=False).run
+        file.append([(first, pin("7", 100 * SECOND)), (first, scan("7", 100 * SECOND))])
+        file.append([(file.begin(again, first, Carries.ALL), row)])
+    assert exported(path, target, 55 * SECOND, 90 * SECOND) == (1, 1)
+    assert [(entry[0], entry[1]) for entry in read(target)] == [
+        ("/clock", row.arrival_ns),
+        ("/perception/discovered_tags", row.arrival_ns),
+        ("/floranova/observations", row.arrival_ns),
+    ]
 
 
 def test_of_nothing_or_a_part_no_file_is_left_and_none_is_overwritten(tmp_path: Path) -> None:
@@ -138,6 +203,7 @@ def test_of_nothing_or_a_part_no_file_is_left_and_none_is_overwritten(tmp_path: 
     assert target.read_bytes() == b"mine"
     target.unlink()
     # Room for what SQLite has beside a journal that is read, 32 KiB, and not for all of it.
+    kept(path, [scan("7", NOW + 9 * SECOND + n, temperature=float(n)) for n in range(2_000)])
     with no_file_above(45_000), pytest.raises(OSError, match="File too large"):
         exported(path, target)
     assert not target.exists()
@@ -154,13 +220,11 @@ def path(tmp_path: Path) -> Path:
     return made
 
 
-def test_export_writes_a_recording_of_a_period(
-    path: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_export_writes_a_recording_of_a_period(path: Path, tmp_path: Path) -> None:
     target = tmp_path / "a.mcap"
     words = ("export", target, "--journal", path, "--from", "1763700003", "--to", "1763700005")
-    said = Said(capsys, *words)
-    assert (said.code, said.out, said.err) == (
+    done = said("journal", *words)
+    assert (done.returncode, done.stdout, done.stderr) == (
         0,
         f"2 observations and 1 messages of discovered tags are in {target}\n",
         "",
@@ -170,8 +234,8 @@ def test_export_writes_a_recording_of_a_period(
         "/floranova/observations",
         "/floranova/observations",
     ]
-    said = Said(capsys, *words)
-    assert (said.code, f"{target} is there already" in said.err) == (1, True)
+    done = said("journal", *words)
+    assert (done.returncode, f"{target} is there already" in done.stderr) == (1, True)
 
 
 @pytest.mark.parametrize(
@@ -187,12 +251,11 @@ def test_export_writes_a_recording_of_a_period(
 def test_a_recording_that_cannot_be_made_is_one_clear_line(
     path: Path,
     tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
     words: tuple[str, ...],
     text: str,
 ) -> None:
-    said = Said(capsys, "export", tmp_path / words[0], *words[1:], "--journal", path)
-    assert said.code == 1
-    assert text in said.err
-    assert said.err.count("\n") == 1
+    done = said("journal", "export", tmp_path / words[0], *words[1:], "--journal", path)
+    assert done.returncode == 1
+    assert text in done.stderr
+    assert done.stderr.count("\n") == 1
     assert not list(tmp_path.glob("*.mcap"))

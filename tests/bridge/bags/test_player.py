@@ -10,15 +10,15 @@ from builtin_interfaces.msg import Time
 from rosgraph_msgs.msg import Clock
 
 from tests.support.messages import occupancy_grid, scan
-from tests.support.processes import Process, lupin_twin, twin_node, url_of
+from tests.support.processes import Process, children_of, is_running, lupin_twin, twin_node, url_of
 from tests.support.recordings import OBSERVATIONS, Sent, write_bag
-from tests.support.web import listener, tag_ids
+from tests.support.web import Listener, listener, tag_ids
 
 DAY_S = 86_400.0
 
 
-def seen(tag_id: str, at_s: float) -> Sent:
-    return Sent(OBSERVATIONS, at_s, scan(tag_id, {"co2": 1.0}, stamp_s=at_s))
+def seen(tag_id: str, at_s: float, topic: str = OBSERVATIONS) -> Sent:
+    return Sent(topic, at_s, scan(tag_id, {"co2": 1.0}, stamp_s=at_s))
 
 
 def time_of(frame: Any) -> int:
@@ -26,14 +26,19 @@ def time_of(frame: Any) -> int:
 
 
 @contextmanager
-def demo_of(domain: int, path: Path, *words: str) -> Iterator[tuple[Process, Any]]:
+def demo_of(domain: int, *words: object) -> Iterator[tuple[Process, Listener]]:
+    """A demo of recordings and what it shows; of its journal and its player nothing is left."""
+    folder = Path(str(words[0])).parent
     with (
-        lupin_twin(domain, "demo", "--from", str(path), *words, TMPDIR=str(path.parent)) as demo,
+        lupin_twin(domain, "demo", "--from", *map(str, words), TMPDIR=str(folder)) as demo,
         listener(url_of(demo)) as screen,
     ):
         yield demo, screen
+        players = children_of(demo.pid, b"bags.player")
         assert demo.stop() == 0
         assert "Traceback" not in demo.output
+        assert list(folder.glob("lupin-twin-*")) == []
+        assert not any(map(is_running, players))
 
 
 def test_silences_are_announced_and_jumped_over_on_request(domain: int, tmp_path: Path) -> None:
@@ -64,23 +69,31 @@ def test_what_came_before_the_start_is_known_and_of_maps_the_last(
 
 
 def test_a_recorded_clock_is_the_time(domain: int, tmp_path: Path) -> None:
-    """Though everything was recorded by another clock."""
+    """Though everything was recorded by another clock; and at the end the time stands."""
     sent = [Sent("/clock", 90_000.0 + it, Clock(clock=Time(sec=5_000 + it))) for it in range(20)]
     sent.append(Sent(OBSERVATIONS, 90_010.5, scan("1", {"co2": 1.0}, stamp_s=5_010.0)))
     path = write_bag(tmp_path / "run.mcap", sorted(sent, key=lambda it: it.at_s))
     with demo_of(domain, path, "--speed", "10") as (_, screen):
+        status = screen.until(
+            "status", lambda frame: bool(frame["journal"]["state"] == "recording")
+        )
+        assert status["origin"] == "recorded"
         shown = screen.until(
             "state", lambda frame: time_of(frame) == 5_019 and tag_ids(frame["state"]) == ["1"]
         )
         assert shown["state"]["tags"][0]["stale_seconds"] == 9.0
+        assert len(list(tmp_path.glob("lupin-twin-*/journal.sqlite"))) == 1
 
 
 def test_a_loop_begins_again_with_nothing_of_what_is_to_come(domain: int, tmp_path: Path) -> None:
-    path = write_bag(tmp_path / "run.mcap", [seen("a", 5_000.0), seen("b", 5_020.0)])
-    with demo_of(domain, path, "--loop", "--speed", "5") as (_, screen):
-        screen.until("state", lambda frame: time_of(frame) == 5_020)
-        again = screen.until("state", lambda frame: time_of(frame) < 5_010)
-        assert again
+    """Of files in any order, and of a topic that has another name here."""
+    later = write_bag(tmp_path / "run_1.mcap", [seen("b", 5_020.0, "/gh1/seen")])
+    first = write_bag(tmp_path / "run.mcap", [seen("a", 5_000.0, "/gh1/seen")])
+    with demo_of(domain, later, first, "--loop", "--speed", "5") as (_, screen):
+        screen.until(
+            "state", lambda frame: time_of(frame) == 5_020 and len(tag_ids(frame["state"])) == 2
+        )
+        assert screen.until("state", lambda frame: time_of(frame) < 5_010)
 
 
 def test_a_second_twin_ends_the_player_for_its_journal_would_keep_what_is_played(

@@ -100,23 +100,22 @@ def test_what_a_twin_cannot_use_is_refused(tmp_path: Path, messages: list[Sent],
         _ = recording.inputs
 
 
-def test_other_encodings_types_and_names_are_refused(tmp_path: Path) -> None:
-    json = write_bag(tmp_path / "a.mcap", sent(1), encoding="json")
-    with pytest.raises(RecordingError, match="encoded as 'json', must be 'cdr'"):
-        Recording([json])
+def test_what_is_no_recording_is_refused(tmp_path: Path) -> None:
     one = write_bag(tmp_path / "b.mcap", sent(1))
+    json = write_bag(tmp_path / "a.mcap", sent(1), encoding="json")
     tags = write_bag(tmp_path / "c.mcap", [Sent(OBSERVATIONS, 1, discovered({"a": pose(1, 2)}))])
-    with pytest.raises(RecordingError, match="they are not of one recording"):
-        Recording([one, tags])
-    with pytest.raises(RecordingError, match="No such file"):
-        Recording([tmp_path / "none.mcap"])
-    (tmp_path / "folder").mkdir()
-    with pytest.raises(RecordingError, match="no file ends in"):
-        Recording([tmp_path / "folder"])
-    fifo = tmp_path / "fifo"
+    folder, fifo = tmp_path / "folder", tmp_path / "fifo"
+    folder.mkdir()
     os.mkfifo(fifo)
-    with pytest.raises(RecordingError, match="is no file"):
-        Recording([fifo])
+    for paths, why in (
+        ([json], "encoded as 'json', must be 'cdr'"),
+        ([one, tags], "they are not of one recording"),
+        ([tmp_path / "none.mcap"], "No such file"),
+        ([folder], "no file ends in"),
+        ([fifo], "is no file"),
+    ):
+        with pytest.raises(RecordingError, match=why):
+            Recording(paths)
 
 
 def test_a_start_behind_the_end_is_refused(tmp_path: Path) -> None:

@@ -1,15 +1,17 @@
 """The command: its options, ROS's arguments, and one clear line where something is wrong."""
 
+import json
+import logging
 import signal
+import time
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
-from lupin_bridge.cli.command import main, split_ros_args
-from tests.support.processes import lupin_twin
+from lupin_bridge.cli import command
+from lupin_bridge.cli.command import split_ros_args
+from tests.support.processes import lupin_twin, said
 from tests.support.waiting import wait_for
 from tests.support.web import bridge
 
@@ -30,12 +32,6 @@ def signals() -> Iterator[None]:
     [
         ([], [], []),
         (["serve", "--port", "1"], ["serve", "--port", "1"], []),
-        (["serve", "--ros-args", "-p", "a:=1"], ["serve"], ["--ros-args", "-p", "a:=1"]),
-        (
-            ["--ros-args", "-r", "x:=y", "--", "serve", "--port", "1"],
-            ["serve", "--port", "1"],
-            ["--ros-args", "-r", "x:=y", "--"],
-        ),
         (
             ["serve", "--ros-args", "-p", "a:=1", "--", "--port", "1", "--ros-args", "-p", "b:=2"],
             ["serve", "--port", "1"],
@@ -50,13 +46,6 @@ def test_what_follows_ros_args_is_ros_up_to_a_double_dash(
     assert split_ros_args(given_) == (own, ros)
 
 
-@given(st.lists(st.sampled_from(["--ros-args", "--", "-p", "a:=1", "serve"]), max_size=12))
-def test_no_argument_is_lost_but_for_what_ends_a_ros_part(arguments: list[str]) -> None:
-    own, ros = split_ros_args(arguments)
-    assert sorted(own + ros) == sorted(arguments)
-    assert "--ros-args" not in own
-
-
 # --- mistakes ------------------------------------------------------------------------------------
 
 
@@ -64,10 +53,6 @@ def test_no_argument_is_lost_but_for_what_ends_a_ros_part(arguments: list[str]) 
     ("arguments", "named"),
     [
         (["serve", "--port", "70000"], "--port is '70000': input should be less than or equal"),
-        (["web", "--max-clients", "0"], "--max-clients is '0': input should be greater than or"),
-        (["demo", "--reading-validity-s", "nan"], "--reading-validity-s is 'nan': input should"),
-        (["serve", "--host", ""], "--host is '': string should have at least 1 char"),
-        (["serve", "--port", "http"], "--port is 'http': input should be a valid integer"),
         (["serve", "--max-client", "5"], "unrecognized arguments: --max-client 5"),
         (["demo", "--speed", "abc"], "argument --speed: invalid float value: 'abc'"),
         (["demo", "--seed", "x"], "argument --seed: invalid int value: 'x'"),
@@ -76,12 +61,11 @@ def test_no_argument_is_lost_but_for_what_ends_a_ros_part(arguments: list[str]) 
     ],
 )
 def test_a_mistake_in_the_command_line_is_named(
-    arguments: list[str], named: str, capsys: pytest.CaptureFixture[str], signals: None
+    arguments: list[str], named: str, signals: None
 ) -> None:
-    with pytest.raises(SystemExit) as ended:
-        main(arguments)
-    assert ended.value.code == 2
-    assert named in capsys.readouterr().err.splitlines()[-1]
+    done = said(*arguments)
+    assert done.returncode == 2
+    assert named in done.stderr.splitlines()[-1]
 
 
 # --- the process ----------------------------------------------------------------------------------
@@ -107,3 +91,120 @@ def blocked_signals(pid: int) -> int:
     status = Path(f"/proc/{pid}/status").read_text(encoding="ascii")
     (mask,) = [line.split()[1] for line in status.splitlines() if line.startswith("SigBlk")]
     return int(mask, 16)
+
+
+# --- the log --------------------------------------------------------------------------------------
+
+LEVELS = ["debug", "info", "warning", "error"]
+
+
+@pytest.fixture(autouse=True)
+def untouched_root(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    """`set_up` works on the root logger, which the test run has set up for itself."""
+    monkeypatch.setattr(logging.root, "handlers", [])
+    monkeypatch.setattr(logging.root, "level", logging.WARNING)
+    yield
+    for name in ("lupin_bridge", "lupin_twin"):
+        logging.getLogger(name).setLevel(logging.NOTSET)
+
+
+def test_json_is_one_object_a_line_with_the_error(capsys: pytest.CaptureFixture[str]) -> None:
+    command.set_up_log("json")
+    log = logging.getLogger("lupin_bridge.test")
+    log.info("tag %s\nsecond line", "7°")
+    log.error("failed", exc_info=ValueError("broken"))
+    first, second = (json.loads(line) for line in capsys.readouterr().err.splitlines())
+    assert first["message"] == "tag 7°\nsecond line"
+    assert (first["level"], first["logger"]) == ("info", "lupin_bridge.test")
+    assert first["time"].endswith("+00:00")
+    assert "error" not in first
+    assert second["error"].endswith("ValueError: broken")
+
+
+@pytest.mark.parametrize("level", LEVELS)
+def test_what_is_below_the_level_stays_out(level: str, capsys: pytest.CaptureFixture[str]) -> None:
+    command.set_up_log("text", level)
+    for least in LEVELS:
+        logging.getLogger("lupin_bridge.test").log(getattr(logging, least.upper()), "ours")
+        # As the nodes' lines come: past every logger.
+        record = logging.LogRecord("ros", getattr(logging, least.upper()), "", 0, "ros", (), None)
+        logging.root.handle(record)
+    logging.getLogger("asyncio").debug("a library's")
+    logging.getLogger("uvicorn.error").info("a library's: Started server process")
+    said = capsys.readouterr().err
+    expected = len(LEVELS) - LEVELS.index(level)
+    assert (said.count(": ours"), said.count(": ros")) == (expected, expected)
+    assert "library" not in said
+
+
+def test_each_of_our_own_errors_leaves_its_trace_and_a_strangers_bytes_leave_none(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    command.set_up_log("text")
+    web_server = logging.getLogger("uvicorn.error")
+    for error in (ValueError("ours"), KeyError("ours too")):
+        web_server.error("Exception in ASGI application", exc_info=error)
+    no_text = UnicodeDecodeError("utf-8", b"\xff", 0, 1, "invalid")
+    web_server.error("Invalid UTF-8 sequence received from client.", exc_info=no_text)
+    err = capsys.readouterr().err
+    assert "ValueError: ours" in err
+    assert "KeyError: 'ours too'" in err
+    assert "Invalid UTF-8" in err
+    assert "UnicodeDecodeError" not in err
+
+
+def said_by(name: str, capsys: pytest.CaptureFixture[str]) -> list[str]:
+    """What a logger has said so far, line by line."""
+    lines = capsys.readouterr().err.splitlines()
+    return [line.partition(f" {name}: ")[2] for line in lines if f" {name}: " in line]
+
+
+@pytest.mark.parametrize("name", ["lupin_bridge.access", "lupin_twin", "lupin_web"])
+def test_of_our_own_some_are_said_at_once(
+    name: str, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    now_s = [100.0]
+    monkeypatch.setattr(time, "monotonic", lambda: now_s[0])
+    command.set_up_log("text")
+    log = logging.getLogger(name)
+    for number in range(command.AT_ONCE + 7):
+        log.warning("wrong token from %s", f"10.0.0.{number}")
+    log.warning("something else")
+    assert len(said_by(name, capsys)) == command.AT_ONCE + 1
+    now_s[0] += command.PERIOD_S
+    log.warning("wrong token from %s", "10.0.0.9")
+    log.warning("wrong token from %s", "10.0.0.9")
+    assert said_by(name, capsys) == ["wrong token from 10.0.0.9 (7 more since the last time)"]
+
+
+@pytest.mark.parametrize("name", ["asyncio", "uvicorn.error", "websockets.server", "nobodys"])
+def test_every_librarys_words_are_rationed_whatever_numbers_stand_in_them(
+    name: str, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    now_s = [100.0]
+    monkeypatch.setattr(time, "monotonic", lambda: now_s[0])
+    command.set_up_log("text")
+    log = logging.getLogger(name)
+    for number in range(1_000):
+        text = f"Fatal error on <Transport fd={number} at {number * 7919:#x}>\nprotocol: {number}"
+        log.error(text, exc_info=ValueError(str(number)))
+    log.warning("%s is another matter", "this")
+    err = capsys.readouterr().err
+    assert err.count("ValueError") == 1
+    assert f" WARNING {name}: this is another matter\n" in err
+    now_s[0] += command.PERIOD_S
+    log.error("Fatal error on <Transport fd=7 at 0x7>", exc_info=ValueError("7"))
+    assert "<Transport fd=7 at 0x7> (999 more since the last time)" in capsys.readouterr().err
+
+
+def test_one_logger_has_an_end_whatever_it_thinks_of(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(time, "monotonic", lambda: 100.0)
+    command.set_up_log("text")
+    for number in range(10 * command.LOGGER_AT_ONCE):
+        logging.getLogger("lupin_twin").warning("%s", "x" * number)
+    logging.getLogger("lupin_bridge").warning("is heard")
+    err = capsys.readouterr().err
+    assert err.count(" lupin_twin: ") == command.LOGGER_AT_ONCE
+    assert "is heard" in err

@@ -2,20 +2,20 @@
 
 from __future__ import annotations
 
-import sys
 from datetime import UTC, datetime
 from pathlib import Path
+from subprocess import CompletedProcess
 from typing import Any
 
+import httpx
 import pytest
 import yaml
 
-from lupin_bridge.cli.command import main
 from lupin_twin.journal.beside import Lock
+from lupin_twin.journal.runs import Clock
 from tests.support.docs import block_named
-from tests.support.domains import ros_env
 from tests.support.journal import NOW, SECOND, kept, scan, select
-from tests.support.processes import Process, lupin_twin, url_of
+from tests.support.processes import lupin_twin, said, url_of
 from tests.support.waiting import PATIENCE_S, wait_for
 
 WIDE = {
@@ -35,19 +35,6 @@ ROWS = """at,bench,t,rh,note
 2024-05-01T10:05:00Z,A,22.5,,wet
 1714558200,B,20.0,0.6,
 """
-INFLUX = """#datatype,string,long,dateTime:RFC3339,double,string,string
-#group,false,false,false,false,true,true
-,result,table,_time,_value,_field,room
-
-,,0,2024-05-01T10:00:00Z,21.5,temp,A
-,,0,2024-05-01T10:00:10Z,22.5,temp,A
-
-,result,table,_time,_value,_field,room
-,,1,2024-05-01T10:00:00Z,800,co2,A
-,,1,2024-05-01T10:00:00Z,3.1,battery,A
-""".replace("\n,", "\n")
-
-
 # As InfluxDB 2 exports it: lines end with CRLF, the first column is empty, and series with other
 # tags have a header of their own.
 ANNOTATED = """#group,false,false,true,true,false,false,true,true,true
@@ -89,9 +76,14 @@ class Import:
         self.file.write_bytes(rows.encode() if isinstance(rows, str) else rows)
         return self
 
-    def run(self, *more: str) -> int:
-        own = ["import", str(self.file), "--map", str(self.map), "--journal", str(self.journal)]
-        return main([*own, *more])
+    def run(self, *more: str) -> CompletedProcess[str]:
+        return said("import", self.file, "--map", self.map, "--journal", self.journal, *more)
+
+    def written(self) -> str:
+        """What it says of what it has written."""
+        done = self.run("--write")
+        assert done.returncode == 0, done.stderr
+        return done.stdout
 
     def rows(self) -> list[tuple[object, ...]]:
         """Tag, stamp, arrival, sensors, readings and source of each scan, by stamp."""
@@ -107,60 +99,40 @@ def importing(tmp_path: Path) -> Import:
     return Import(tmp_path)
 
 
-def test_without_write_it_says_what_it_would_do_and_does_nothing(
-    importing: Import, capsys: pytest.CaptureFixture[str]
-) -> None:
-    assert importing.given(WIDE, ROWS).run() == 0
-    out, err = capsys.readouterr()
-    assert out.splitlines() == [
+def test_without_write_it_says_what_it_would_do_and_does_nothing(importing: Import) -> None:
+    done = importing.given(WIDE, ROWS).run()
+    assert done.returncode == 0
+    assert done.stdout.splitlines() == [
         "3 rows, 3 scans of 2 tags",
         "from 2024-05-01T10:00:00+00:00 to 2024-05-01T10:10:00+00:00",
         "humidity: 2 readings from 55 to 60",
         "temperature: 3 readings from 20 to 22.5",
     ]
-    assert "nothing was written; add --write" in err
+    assert "nothing was written; add --write" in done.stderr
     assert not importing.journal.exists()
 
 
-def test_what_is_written_is_in_the_journal_once(
-    importing: Import, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_what_is_written_is_in_the_journal_once(importing: Import) -> None:
     importing.given(WIDE | {"places": {"A": [1.5, 2]}}, ROWS)
-    assert importing.run("--write") == 0
+    assert "3 scans are new" in importing.written()
     then_ns = int(datetime(2024, 5, 1, 10, tzinfo=UTC).timestamp()) * SECOND
     rows = importing.rows()
     assert rows[0] == (
         "A", then_ns, then_ns, '["temperature","humidity"]', "[21.5,55.00000000000001]", "import"
     )  # fmt: skip
     assert [(row[0], row[4]) for row in rows[1:]] == [("A", "[22.5]"), ("B", "[20.0,60.0]")]
-    assert "3 scans are new" in capsys.readouterr().out
-    assert importing.run("--write") == 0
-    assert "0 scans are new" in capsys.readouterr().out
+    assert "0 scans are new" in importing.written()
     assert importing.rows() == rows
     assert select(importing.journal, "SELECT tag, x, y FROM place") == [("A", 1.5, 2.0)]
 
 
-def test_a_databases_export_names_the_sensor_in_a_column(
-    importing: Import, capsys: pytest.CaptureFixture[str]
-) -> None:
-    assert importing.given(LONG, INFLUX).run("--write") == 0
-    assert [row[3:5] for row in importing.rows()] == [
-        ('["temperature","co2"]', "[21.5,800.0]"),
-        ('["temperature"]', "[22.5]"),
-    ]
-    assert "refused: 1: _field 'battery' is not one of names (line 10)" in capsys.readouterr().out
-
-
-def test_influxdbs_annotated_export_has_tables_of_their_own_columns(
-    importing: Import, capsys: pytest.CaptureFixture[str]
-) -> None:
-    assert importing.given(LONG, ANNOTATED).run("--write") == 0
+def test_influxdbs_annotated_export_has_tables_of_their_own_columns(importing: Import) -> None:
+    out = importing.given(LONG, ANNOTATED).written().splitlines()
     then_ns = int(datetime(2024, 5, 1, 10, tzinfo=UTC).timestamp()) * SECOND
     assert [(row[1], row[3], row[4]) for row in importing.rows()] == [
         (then_ns + 123_456_000, '["temperature"]', "[21.5]"),
         (then_ns + 10 * SECOND, '["temperature","co2"]', "[22.5,800.0]"),
     ]
-    out = capsys.readouterr().out.splitlines()
     assert out[0] == "4 rows, 3 scans of 1 tags"
     assert [line for line in out if "refused" in line] == [
         "refused: 1: _field 'battery' is not one of names (line 13)"
@@ -168,15 +140,14 @@ def test_influxdbs_annotated_export_has_tables_of_their_own_columns(
 
 
 def test_home_assistants_history_names_its_entities_and_says_what_is_not_known(
-    importing: Import, capsys: pytest.CaptureFixture[str]
+    importing: Import,
 ) -> None:
     columns = yaml.safe_load(block_named("import-home-assistant").text)
-    assert importing.given(columns, HISTORY).run("--write") == 0
+    out = importing.given(columns, HISTORY).written().splitlines()
     assert [(row[0], row[3], row[4]) for row in importing.rows()] == [
         ("bench-1", '["temperature","humidity"]', "[21.5,55.0]"),
         ("bench-1", '["temperature"]', "[22.5]"),
     ]
-    out = capsys.readouterr().out.splitlines()
     assert [line for line in out if "refused" in line] == [
         "refused: 1: temperature is unknown (line 2)",
         "refused: 1: temperature is unavailable (line 4)",
@@ -197,22 +168,13 @@ def test_home_assistants_history_names_its_entities_and_says_what_is_not_known(
     ],
 )
 def test_a_time_is_a_date_or_seconds_or_parts_of_them(importing: Import, text: str) -> None:
-    importing.given(WIDE, f"\ufeffat,bench,t,rh\n{text},A,1,\n").run("--write")
+    importing.given(WIDE, f"\ufeffat,bench,t,rh\n{text},A,1,\n").written()
     assert importing.rows()[0][1] == 1_714_558_200 * SECOND
-
-
-def test_of_many_refused_lines_the_first_are_named(
-    importing: Import, capsys: pytest.CaptureFixture[str]
-) -> None:
-    importing.given(WIDE, "at,bench,t,rh\n" + "never,A,1,\n" * 9).run()
-    assert "refused: 9: the time is no ISO 8601, and no seconds since 1970 (line 2, 3, 4)" in (
-        capsys.readouterr().out
-    )
 
 
 def test_what_came_before_a_twin_is_in_its_past(importing: Import) -> None:
     kept(importing.journal, [scan("A", NOW, temperature=25.0)])
-    assert importing.given(WIDE, ROWS).run("--write") == 0
+    importing.given(WIDE, ROWS).written()
     assert [row[5] for row in importing.rows()] == ["import"] * 3 + ["robot"]
 
 
@@ -225,7 +187,6 @@ def test_what_came_before_a_twin_is_in_its_past(importing: Import) -> None:
         ("9999-12-31T23:59:59Z,A,1,", "the time is ahead of now"),
         ("9e10,A,1,", "the time is ahead of now"),
         ("-5,A,1,", "the time is no moment since 1970"),
-        ("1e30,A,1,", "the time is no moment since 1970"),
         ("1714558200,,1,", "no tag, or one of more than 256 characters"),
         ("1714558200,A,,", "no reading"),
         ("1714558200,A,warm,", "temperature is no number"),
@@ -233,38 +194,32 @@ def test_what_came_before_a_twin_is_in_its_past(importing: Import) -> None:
         ("1714558200,A,1,1.01", "humidity is not from -inf to 100"),
         ("1714558200,A", "too few columns"),
         ("1714558200,A\0B,1,", "a tag with NUL"),
-        ("05/01/2024 10:00,A,1,", "the time is no ISO 8601, and no seconds since 1970"),
     ],
 )
 def test_a_row_that_cannot_be_is_counted_and_named_and_the_others_come(
-    importing: Import, capsys: pytest.CaptureFixture[str], row: str, reason: str
+    importing: Import, row: str, reason: str
 ) -> None:
-    assert importing.given(WIDE, f"at,bench,t,rh\n{row}\n1714558200,B,20,0.5\n").run("--write") == 0
-    assert f"refused: 1: {reason} (line 2)" in capsys.readouterr().out
+    out = importing.given(WIDE, f"at,bench,t,rh\n{row}\n1714558200,B,20,0.5\n").written()
+    assert f"refused: 1: {reason} (line 2)" in out
     assert len(importing.rows()) == 1
 
 
-def test_the_hour_that_comes_twice_in_autumn_is_named(
-    importing: Import, capsys: pytest.CaptureFixture[str]
-) -> None:
-    rows = "at,bench,t,rh\n" + "2024-10-27T02:30,A,9,\n2024-10-27T02:30,A,8,\n"
-    assert importing.given(WIDE | {"time_zone": "Europe/Amsterdam"}, rows).run() == 0
-    assert "refused: 1: the sensor has another reading of that moment" in capsys.readouterr().out
-
-
-def test_more_sensors_than_a_tag_may_have_are_refused(
-    importing: Import, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_more_sensors_than_a_tag_may_have_are_refused(importing: Import) -> None:
     columns = {key: value for key, value in LONG.items() if key != "names"}
     rows = "".join(f"1714558200,A,s{n},1\n" for n in range(70))
-    assert importing.given(columns, "_time,room,_field,_value\n" + rows).run() == 0
-    assert "refused: 6: sensors: 65, the limit is 64 (line 66, 67, 68)" in capsys.readouterr().out
+    done = importing.given(columns, "_time,room,_field,_value\n" + rows).run()
+    assert "refused: 6: sensors: 65, the limit is 64 (line 66, 67, 68)" in done.stdout
 
 
-def test_a_time_without_offset_is_in_the_zone_that_is_given(importing: Import) -> None:
-    columns = WIDE | {"time_zone": "Europe/Amsterdam"}
-    importing.given(columns, "at,bench,t,rh\n2024-05-01T12:00,A,1,\n").run("--write")
+def test_a_time_without_offset_is_in_the_zone_that_is_given_and_an_hour_may_come_twice(
+    importing: Import,
+) -> None:
+    rows = (
+        "at,bench,t,rh\n2024-05-01T12:00,A,1,\n" + "2024-10-27T02:30,A,9,\n2024-10-27T02:30,A,8,\n"
+    )
+    out = importing.given(WIDE | {"time_zone": "Europe/Amsterdam"}, rows).written()
     assert importing.rows()[0][1] == 1_714_557_600 * SECOND
+    assert "refused: 1: the sensor has another reading of that moment" in out
 
 
 @pytest.mark.parametrize(
@@ -276,59 +231,42 @@ def test_a_time_without_offset_is_in_the_zone_that_is_given(importing: Import) -
         (WIDE | {"tag_id": "A"}, ROWS, "expected tag, a column, or tag_id, every row's tag"),
         (WIDE | {"sensor": "a", "value": "b"}, ROWS, "expected sensors, or sensor and value"),
         (WIDE | {"sensors": {"t": 5}}, ROWS, "sensors.t is 5, expected keys and values"),
-        (WIDE | {"places": {"A": [1]}}, ROWS, "places.A is [1], expected [x, y] in m"),
         (WIDE | {"places": {"A": [1, "x"]}}, ROWS, "places.A is [1, 'x'], expected [x, y] in m"),
         (WIDE, b"\xff\xfe\x00", "is no CSV in UTF-8"),
         (WIDE, 'at,bench,t,rh\n"' + "x" * 200_000, "is no CSV in UTF-8: field larger than"),
         (WIDE, "at,bench,t,rh\n" + "," * 1_000_001, "line 2 has 1,000,000 characters or more"),
-        (WIDE, "at,bench,t,rh\n1,A,1,1".encode("utf-16"), "is no CSV in UTF-8"),
-        (WIDE, "", "there is no column 'at', but none"),
     ],
 )
 def test_what_cannot_be_imported_at_all_is_one_line(
     importing: Import,
-    capsys: pytest.CaptureFixture[str],
     columns: Any,
     rows: str | bytes,
     complaint: str,
 ) -> None:
-    assert importing.given(columns, rows).run("--write") == 1
-    err = capsys.readouterr().err
-    assert complaint in err
-    assert "Traceback" not in err
+    done = importing.given(columns, rows).run("--write")
+    assert done.returncode == 1
+    assert complaint in done.stderr
+    assert "Traceback" not in done.stderr
     assert importing.rows() == []
 
 
-def test_a_journal_that_a_twin_writes_is_in_use(
-    importing: Import, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_journal_that_a_twin_writes_is_in_use(importing: Import) -> None:
     with Lock(importing.journal, "/lupin_twin"):
-        assert importing.given(WIDE, ROWS).run("--write") == 1
-    assert "is in use by /lupin_twin" in capsys.readouterr().err
+        done = importing.given(WIDE, ROWS).run("--write")
+    assert done.returncode == 1
+    assert "is in use by /lupin_twin" in done.stderr
 
 
-def test_a_journal_of_a_simulation_is_left_alone(
-    importing: Import, capsys: pytest.CaptureFixture[str]
-) -> None:
-    from lupin_twin.journal.runs import Clock
-
+def test_a_journal_of_a_simulation_is_left_alone(importing: Import) -> None:
     kept(importing.journal, [scan("A", 5 * SECOND)], Clock(5 * SECOND, NOW, is_simulated=True))
-    assert importing.given(WIDE, ROWS).run("--write") == 1
-    assert "is of a simulation: import into another" in capsys.readouterr().err
+    done = importing.given(WIDE, ROWS).run("--write")
+    assert done.returncode == 1
+    assert "is of a simulation: import into another" in done.stderr
 
 
 def test_the_page_has_what_was_imported(domain: int, importing: Import) -> None:
     columns = yaml.safe_load(block_named("import").text)
-    importing.given(columns, block_named("import-rows").text)
-    own = [
-        *("import", str(importing.file), "--map", str(importing.map), "--write"),
-        *("--journal", str(importing.journal)),
-    ]
-    command = [sys.executable, "-m", "lupin_bridge.cli.command", *own]
-    with Process(command, ros_env(domain)) as process:
-        assert process.wait() == 0, process.output
-    import httpx
-
+    importing.given(columns, block_named("import-rows").text).written()
     parameters = ("-p", f"journal:={importing.journal}", "-p", "journal_days:=3650")
     with lupin_twin(domain, "serve", "--ros-args", *parameters) as server:
         address = f"{url_of(server)}/api/history?tag_id=bench-1&sensor_type=temperature&from=0"

@@ -1,9 +1,7 @@
 """`lupin-twin user`, `token` and `audit`: what they print, and whom a bridge's file then knows."""
 
 import csv
-import os
 import re
-import sys
 import time
 from contextlib import closing
 from pathlib import Path
@@ -15,7 +13,7 @@ from lupin_bridge.access.accounts import Accounts, digest
 from lupin_bridge.access.credentials import Person
 from lupin_bridge.access.people import verify
 from tests.support.people import PASSWORD
-from tests.support.processes import run
+from tests.support.processes import said
 
 NOW = r"20\d\d-\d\d-\d\dT\d\d:\d\d:\d\dZ"
 
@@ -27,8 +25,7 @@ def file(tmp_path: Path) -> Path:
 
 def ended(file: Path, words: str) -> CompletedProcess[str]:
     """The command on this file."""
-    command = [sys.executable, "-m", "lupin_bridge.cli.command", *words.split()]
-    return run([*command, "--accounts", str(file)], os.environ)
+    return said(*words.split(), "--accounts", file)
 
 
 def printed(file: Path, words: str) -> str:
@@ -38,17 +35,15 @@ def printed(file: Path, words: str) -> str:
     return done.stdout
 
 
-def add_user(
-    file: Path, name: str, options: str, password: str = PASSWORD
-) -> CompletedProcess[str]:
-    """A user whose password stands in a file."""
-    kept = file.with_name("password")
-    kept.write_text(f"{password}\n", encoding="utf-8")
-    return ended(file, f"user add {name} {options} --password-file {kept}")
-
-
 def test_a_user_is_added_listed_and_removed(file: Path) -> None:
-    added = add_user(file, "anna", "--role operator --for-site gh1 --for-site gh2")
+    secret = file.with_name("password")
+    secret.write_text("short\n")
+    words = "user add anna --role operator --for-site gh1 --for-site gh2 --password-file"
+    refused = ended(file, f"{words} {secret}")
+    assert (refused.returncode, file.exists()) == (1, False)
+    assert "has 5 characters, must have 10 to 512" in refused.stderr
+    secret.write_text(f"{PASSWORD}\n")
+    added = ended(file, f"{words} {secret}")
     assert (added.returncode, added.stdout) == (
         0,
         "account anna is added, with the role operator\n",
@@ -134,10 +129,3 @@ def test_what_cannot_be_done_is_one_line_and_changes_nothing(
     (line,) = done.stderr.splitlines()
     assert line.startswith(f"lupin-twin: {reason}")
     assert (printed(file, "user list"), printed(file, "audit")) == before
-
-
-def test_a_password_that_is_too_short_adds_nobody(file: Path) -> None:
-    done = add_user(file, "anna", "--role viewer", "short")
-    assert done.returncode == 1
-    assert "has 5 characters, must have 10 to 512" in done.stderr
-    assert not file.exists()

@@ -2,17 +2,30 @@
 
 import os
 import signal
-import socket
+from dataclasses import replace
 from pathlib import Path
 
+import httpx
 import pytest
 
+from lupin_bridge.cli.roles import (
+    DAY_S,
+    Feed,
+    fill_past,
+    patrolled,
+    since_morning_s,
+    with_past,
+)
 from lupin_bridge.serving.server import listen
-from tests.support.journal import is_whole, select
+from lupin_patrol.cli import parse as patrol_options
+from lupin_patrol.plants import SECONDS_PER_DAY
+from lupin_twin.core.parameters import World
+from tests.support.journal import CLOCK, NOW, is_whole, kept, select
+from tests.support.journal import scan as row
 from tests.support.messages import scan
-from tests.support.processes import Process, children_of, lupin_twin, patrols_of, url_of
+from tests.support.processes import Process, children_of, is_running, lupin_twin, patrols_of, url_of
 from tests.support.recordings import OBSERVATIONS, Sent, write_bag
-from tests.support.waiting import wait_for
+from tests.support.waiting import PATIENCE_S, wait_for
 from tests.support.web import listener, tag_ids
 
 ROLES = ["serve", "demo", "web"]
@@ -42,17 +55,11 @@ def test_a_port_in_use_is_named(domain: int, role: str) -> None:
     assert line == f"lupin-twin: cannot listen on 127.0.0.1 port {port}: Address already in use"
 
 
-def test_an_address_of_another_machine_is_named(domain: int) -> None:
-    with lupin_twin(domain, "serve", "--host", "192.0.2.1") as process:
-        assert "cannot listen on 192.0.2.1 port 0" in refused(process)
-
-
 @pytest.mark.parametrize(
     ("arguments", "named"),
     [
         (["-p", "idw_power:=-1.0"], "parameter idw_power is -1.0, expected 0.01 to 100.0"),
         (["-p", "nonsense"], "parse parameter override rule: '-p nonsense'"),
-        (["--params-file", "/nonexistent.yaml"], "/nonexistent.yaml"),
     ],
 )
 def test_a_bad_ros_argument_is_named(domain: int, arguments: list[str], named: str) -> None:
@@ -76,58 +83,6 @@ def test_the_web_role_ends_at_once_and_quietly(domain: int, number: signal.Signa
         assert "Traceback" not in process.output
 
 
-def is_running(pid: int) -> bool:
-    """Whether a process is there, and no zombie."""
-    try:
-        stat = Path(f"/proc/{pid}/stat").read_text(encoding="ascii")
-    except (FileNotFoundError, ProcessLookupError):  # gone before or while it is read
-        return False
-    return stat.rpartition(") ")[2][0] != "Z"
-
-
-def test_a_demo_of_a_recording_shows_its_tags_at_their_time_and_leaves_nothing(
-    domain: int, tmp_path: Path
-) -> None:
-    """By the recorded name of the topic; and at the end the time stands."""
-    sent = [
-        Sent(
-            "/gh1/seen", 5_000.0 + at_s, scan(f"tag {at_s}", {"co2": 1.0}, (1, 2), stamp_s=5_000.0)
-        )
-        for at_s in (0, 20, 40)
-    ]
-    paths = [
-        str(write_bag(tmp_path / "run_1.mcap", sent[2:])),
-        str(write_bag(tmp_path / "run.mcap", sent[:2])),
-    ]
-    with (
-        lupin_twin(
-            domain, "demo", "--from", *paths, "--speed", "100", TMPDIR=str(tmp_path)
-        ) as demo,
-        listener(url_of(demo)) as screen,
-    ):
-        # The clock goes ahead of what was observed by then.
-        shown = screen.until(
-            "state",
-            lambda frame: (
-                frame["state"]["header"]["stamp"]["sec"] == 5040
-                and len(tag_ids(frame["state"])) == 3
-            ),
-        )
-        assert set(tag_ids(shown["state"])) == {"tag 0", "tag 20", "tag 40"}
-        (tag, *_) = shown["state"]["tags"]
-        assert tag["stale_seconds"] == 40.0
-        status = screen.until(
-            "status", lambda frame: bool(frame["journal"]["state"] == "recording")
-        )
-        assert status["origin"] == "recorded"
-        (player,) = children_of(demo.pid, b"bags.player")
-        assert len(list(tmp_path.glob("lupin-twin-*/journal.sqlite"))) == 1
-        assert demo.stop(signal.SIGINT) == 0
-        assert not is_running(player)
-        assert list(tmp_path.glob("lupin-twin-*")) == []
-        assert "Traceback" not in demo.output
-
-
 def test_the_patrol_ends_although_the_demo_is_killed(domain: int) -> None:
     with lupin_twin(domain, "demo", *NO_JOURNAL) as demo:
         url_of(demo)
@@ -149,22 +104,21 @@ def test_the_player_ends_although_the_demo_is_killed(domain: int, tmp_path: Path
         wait_for(lambda: not is_running(player), "the end of the player")
 
 
-def test_ipv6_is_served_too(domain: int) -> None:
-    with lupin_twin(domain, "serve", "--host", "::1") as process:
-        url = url_of(process)
-        assert url.startswith("http://[::1]:")
-        port = int(url.rpartition(":")[2])
-        with socket.create_connection(("::1", port)) as client:
-            client.sendall(b"GET /healthz HTTP/1.1\r\nHost: [::1]\r\nConnection: close\r\n\r\n")
-            assert client.recv(12) == b"HTTP/1.1 200"
-
-
-def test_a_patrol_that_ends_by_itself_is_told(domain: int) -> None:
-    with lupin_twin(domain, "demo", "--speed", "0", *NO_JOURNAL) as demo:
-        url_of(demo)
-        demo.wait_for_output("the patrol has ended with code 2")
-        assert "argument --speed" in demo.output
-        assert demo.stop() == 0
+def test_the_process_that_looks_back_ends_with_its_bridge_and_not_before(
+    domain: int,
+) -> None:
+    with lupin_twin(domain, "serve") as parent:
+        url = f"{url_of(parent)}/api/timeline"
+        wait_for(lambda: httpx.get(url, timeout=PATIENCE_S).status_code == 200, "the past")
+        (child,) = children_of(parent.pid, b"feed.query")
+        assert os.getpgid(child) != os.getpgid(parent.pid), "a terminal's Ctrl-C"
+        for number in (signal.SIGINT, signal.SIGTERM):
+            os.kill(child, number)
+        parent.freeze()  # so that nobody could start another one
+        assert is_running(child)
+        parent.thaw()
+        parent.kill()
+        wait_for(lambda: not is_running(child), "the end of the child")
 
 
 def test_a_demo_has_a_past_from_its_first_moment_on(domain: int, tmp_path: Path) -> None:
@@ -193,3 +147,90 @@ def test_a_demo_has_a_past_from_its_first_moment_on(domain: int, tmp_path: Path)
     assert pasts[0][1] > 2500  # type: ignore[operator]
     (after,) = select(path, "SELECT min(stamp_ns) FROM scan WHERE source = 'lupin_patrol'")
     assert after[0] is None or after[0] > until_ns
+
+
+# --- a demo's past --------------------------------------------------------------------------------
+
+ENV = {"XDG_STATE_HOME": "/state"}
+SHORT = ["--speed=50"]
+
+
+def test_a_demo_keeps_a_journal_of_its_own_by_seed() -> None:
+    for patrol_args, name in (([], "demo-seed-0"), (["--seed=3"], "demo-seed-3")):
+        path = f"/state/lupin-twin/{name}.sqlite"
+        args = ["--ros-args", "-p", f'journal:="{path}"', "--"]
+        feed = patrolled(ENV, patrol_args, ["--ros-args", "-p", "idw_power:=3.0"])
+        assert (feed.twin_args, feed.journal) == (args, Path(path))
+
+
+@pytest.mark.parametrize("patrol_args", [[], ["--speed=1"], ["--speed=50"], ["--speed=0.5"]])
+def test_a_demo_s_twin_knows_how_long_its_patrol_s_day_takes(patrol_args: list[str]) -> None:
+    patrol = patrol_options(patrol_args)
+    day_s = SECONDS_PER_DAY / patrol.day_speed / patrol.speed
+    assert patrolled(ENV, patrol_args, []).world == World("simulated", day_s)
+
+
+@pytest.mark.parametrize("speed", ["0", "nan", "inf", "-1"])
+def test_what_is_no_speed_is_left_for_the_patrol_to_refuse(speed: str) -> None:
+    assert patrolled(ENV, [f"--speed={speed}"], []).world.day_length_s == 1440.0
+
+
+@pytest.mark.parametrize(
+    "ros_args",
+    [
+        ["-p", "journal:=off"],
+        ["-p", "journal:=/somewhere/else.sqlite"],
+        ["--params-file", "twin.yaml"],
+        ["-p", "use_sim_time:=true"],
+    ],
+)
+def test_another_journal_or_none_or_another_clock_gets_no_past(ros_args: list[str]) -> None:
+    assert patrolled(ENV, [], ["--ros-args", *ros_args]).journal is None
+
+
+def test_started_again_it_goes_on_with_the_day(tmp_path: Path) -> None:
+    path = tmp_path / "demo.sqlite"
+    feed = Feed("patrol", ["lupin_patrol", "--end-with-parent", *SHORT], [], World(), path, SHORT)
+    assert with_past(feed) == feed, "the first time it is nine"
+    [(until_ns,)] = select(path, "SELECT value FROM meta WHERE key = 'simulated_until_ns'")
+    # Fifty times as fast, a day takes 28.8 s.
+    for later_s, since_s in ((0.0, 0.0), (14.4, 720.0), (28.8, 0.0), (2_894.4, 720.0)):
+        now_ns = int(str(until_ns)) + round(later_s * 1e9)
+        assert since_morning_s(path, SHORT, now_ns) == pytest.approx(since_s, abs=1e-6)
+    again = with_past(feed)
+    module, since, *words = again.command
+    assert [module, *words] == feed.command
+    assert again == replace(feed, command=again.command)
+    assert 0.0 <= patrol_options([since]).since_morning < DAY_S
+
+
+@pytest.mark.parametrize("journal", ["another's", "empty", "none", "no journal"])
+def test_of_a_journal_without_such_a_past_there_is_no_day_to_go_on_with(
+    tmp_path: Path, journal: str
+) -> None:
+    path = tmp_path / "demo.sqlite"
+    if journal == "another's":
+        kept(path, [row()], CLOCK)
+    elif journal != "none":
+        path.write_text("" if journal == "empty" else "nonsense" * 1_000)
+    assert since_morning_s(path, SHORT, NOW) is None
+
+
+def test_somebody_s_journal_is_left(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    path = tmp_path / "demo.sqlite"
+    kept(path, [row()], CLOCK)
+    assert not fill_past(path, SHORT)
+    assert select(path, "SELECT count(*) FROM scan") == [(1,)]
+    assert caplog.records == []
+
+
+def test_what_hinders_it_is_told_and_is_no_end(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    assert not fill_past(tmp_path / "demo.sqlite", ["--speed=0"])
+    (tmp_path / "no").write_text("a file where a folder should be")
+    assert not fill_past(tmp_path / "no" / "demo.sqlite", SHORT)
+    told = [record.message for record in caplog.records]
+    assert len(told) == 2
+    assert "argument --speed" in told[0]
+    assert "File exists" in told[1]

@@ -2,33 +2,24 @@
 
 import asyncio
 import threading
-from collections.abc import AsyncIterator
-from contextlib import asynccontextmanager
+import time
+from pathlib import Path
 
 import pytest
 from rclpy.parameter import Parameter
 
 from lupin_bridge.feed.local import LocalTwin
-from lupin_bridge.feed.source import TwinTimeoutError, TwinUpdate
-from lupin_twin.core.parameters import ParameterError
+from lupin_bridge.feed.query import Itself
+from lupin_bridge.feed.source import TwinTimeoutError
+from lupin_twin.core.journal_condition import JournalState
+from lupin_twin.core.past import NotRemembered
+from lupin_twin.journal.runs import Clock
 from lupin_twin.ros.node import TwinNode
 from lupin_twin.runtime.estimates import ReportRequest
+from tests.support.inprocess import started
+from tests.support.journal import SECOND, kept, scan
+from tests.support.looking import Endless
 from tests.support.waiting import PATIENCE_S, until
-
-SILENT = ("--ros-args", "-p", "state_publish_rate_hz:=0.01")
-
-
-@asynccontextmanager
-async def started(
-    *ros_args: str, timeout_s: float = PATIENCE_S
-) -> AsyncIterator[tuple[LocalTwin, list[TwinUpdate]]]:
-    """A twin that is started, and what it has told."""
-    twin, told = LocalTwin(ros_args=ros_args, timeout_s=timeout_s), list[TwinUpdate]()
-    await twin.start(told.append, lambda: None)
-    try:
-        yield twin, told
-    finally:
-        await twin.stop()
 
 
 async def test_a_thread_that_is_held_up_ends_a_request_by_the_setting_that_says_so(
@@ -40,7 +31,7 @@ async def test_a_thread_that_is_held_up_ends_a_request_by_the_setting_that_says_
         busy.set()
         return gate.wait(20.0)
 
-    async with started(timeout_s=0.2) as (twin, _):
+    async with started(LocalTwin, timeout_s=0.2) as (twin, _):
         held = asyncio.create_task(twin.thread.call(hold))
         await until(busy.is_set, "the thread to be held")
         with pytest.raises(TwinTimeoutError, match=r"within 0\.2 s"):
@@ -51,23 +42,8 @@ async def test_a_thread_that_is_held_up_ends_a_request_by_the_setting_that_says_
         assert (await twin.estimate_report(ReportRequest("co2"))).tags == ()
 
 
-async def test_a_silent_node_is_heard_of_all_the_same(domain: int) -> None:
-    async with started(*SILENT) as (_, told):
-        await until(lambda: len(told) >= 2, "a heartbeat")
-        first, second = told[:2]
-        assert first.revision == second.revision
-        assert first.snapshot.stamp_ns < second.snapshot.stamp_ns
-
-
-async def test_two_twins_of_the_same_content_have_different_revisions(domain: int) -> None:
-    async with started() as (first, _), started() as (second, _):
-        assert first.revision() != second.revision()
-
-
-async def test_parameters_come_from_the_ros_arguments(domain: int) -> None:
-    arguments = ["--ros-args", "-p", "max_grid_cells:=9", "-p", "idw_max_distance_m:=0.75"]
-    async with started(*arguments, "-r", "/twin/state:=/north/state") as (twin, _):
-        assert (twin.rules.max_grid_cells, twin.rules.max_distance_m) == (9, 0.75)
+async def test_its_names_and_its_rules_are_those_of_its_node(domain: int) -> None:
+    async with started(LocalTwin, "--ros-args", "-r", "/twin/state:=/north/state") as (twin, _):
         assert twin.names.state_topic == "/north/state"
         assert twin.names.field_service == "/twin/get_field"
         revision = twin.revision()
@@ -77,8 +53,48 @@ async def test_parameters_come_from_the_ros_arguments(domain: int) -> None:
         assert twin.revision() != revision
 
 
-async def test_a_parameter_out_of_its_range_fails_the_start(domain: int) -> None:
-    twin = LocalTwin(ros_args=["--ros-args", "-p", "idw_power:=-1.0"], timeout_s=20.0)
-    with pytest.raises(ParameterError, match=r"parameter idw_power is -1\.0"):
-        await twin.start(lambda _: None, lambda: None)
-    await twin.stop()
+@pytest.mark.usefixtures("children_know_the_tests")
+async def test_damage_that_is_met_looking_back_has_the_file_set_aside(
+    domain: int, tmp_path: Path
+) -> None:
+    path = tmp_path / "j.sqlite"
+    begun_ns = time.time_ns() - 9_000 * SECOND
+    kept(
+        path,
+        [scan(str(n % 9), begun_ns + n * SECOND, t=n) for n in range(5_000)],
+        Clock(begun_ns, begun_ns, is_simulated=False),
+    )
+    end_ns = begun_ns + 5_000 * SECOND
+
+    async with started(LocalTwin, "--ros-args", "-p", f"journal:={path}") as (twin, _):
+        with path.open("r+b") as file:
+            file.seek(path.stat().st_size // 4)
+            file.write(b"\xff" * (path.stat().st_size // 2))
+        # The twin may meet the damage first by itself: then nothing is left to refuse.
+        refused = None
+        try:
+            [lot async for lot in twin.rows(0, end_ns, None, None, len)]
+        except NotRemembered as error:
+            refused = error
+        assert refused is None or ("is damaged" in str(refused) and not refused.is_lasting)
+        await until(lambda: twin.journal().set_aside, "the damaged file to be set aside")
+        assert Path(twin.journal().set_aside).exists()
+        await until(lambda: twin.journal().state is JournalState.RECORDING, "a new file")
+        assert 0 < sum([lot async for lot in twin.rows(0, end_ns, None, None, len)]) < 5_000
+
+
+@pytest.mark.usefixtures("children_know_the_tests")
+async def test_an_answer_that_takes_too_long_ends_and_delays_no_observation(domain: int) -> None:
+    async with started(LocalTwin) as (twin, _):
+        await until(lambda: twin.journal().state == "recording", "the journal")
+        await twin.past.ask(Itself(0), await twin.now(), 0.0)
+        waiting = asyncio.create_task(twin.ask(Endless(), 0.0))
+        await until(lambda: len(twin.past.asked) == 1, "the question")
+        # Meanwhile the ROS thread answers as ever.
+        await twin.thread.call(lambda node: node.notify_listener())
+        assert not waiting.done()
+        twin.timeout_s = 0.1
+        with pytest.raises(TwinTimeoutError, match=r"within 0\.1 s"):
+            await twin.ask(Endless(), 0.0)
+        waiting.cancel()
+        await until(lambda: twin.past.asked == {}, "the end of both")

@@ -1,13 +1,14 @@
-"""The process that looks back: asked, cancelled, killed, started again, ended with its parent."""
+"""The process that looks back: asked, cancelled, killed, started again."""
 
 import asyncio
 import logging
 import os
 import signal
 import sys
-from collections.abc import AsyncIterator, Iterator
+from collections.abc import AsyncIterator, Callable, Coroutine, Iterator
 from contextlib import asynccontextmanager
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -20,12 +21,10 @@ from lupin_twin.core.journal_condition import Condition, JournalState
 from lupin_twin.core.past import NotRemembered, PastRefused
 from lupin_twin.field.explored import OccupancyMap
 from lupin_twin.journal.queries import Export
-from tests.support.domains import ros_env
 from tests.support.journal import NOW, SECOND, kept, scan
-from tests.support.looking import Body, Count, Dying, Endless, Failing, MapCells, Running
+from tests.support.looking import Body, Count, Endless, Failing, MapCells, Running
 from tests.support.maps import map_of
-from tests.support.processes import Process
-from tests.support.waiting import until, wait_for
+from tests.support.waiting import until
 
 pytestmark = pytest.mark.usefixtures("children_know_the_tests")
 
@@ -40,12 +39,15 @@ def path(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return found
 
 
+Run = Callable[[Callable[[PastProcess], Coroutine[Any, Any, None]]], None]
+
+
 @pytest.fixture(scope="module")
-def shared() -> Iterator[tuple[asyncio.Runner, PastProcess]]:
-    """One process for all who only ask, and the loop that it belongs to."""
+def run() -> Iterator[Run]:
+    """Runs a test with the one process of all that only ask."""
     past = PastProcess()
     with asyncio.Runner() as runner:
-        yield runner, past
+        yield lambda test: runner.run(test(past))
         runner.run(past.stop())
 
 
@@ -62,39 +64,22 @@ def now(path: Path) -> Now:
     return Now(NOW_NS, "map", Condition(JournalState.RECORDING, path=str(path)))
 
 
-def is_there(pid: int) -> bool:
-    """Whether a process runs; a dead one that nobody asked after does not."""
-    try:
-        state = Path(f"/proc/{pid}/stat").read_text().rpartition(") ")[2][:1]
-    except (FileNotFoundError, ProcessLookupError):
-        return False
-    return state != "Z"
-
-
-Shared = tuple[asyncio.Runner, PastProcess]
-
-
-def test_it_answers_at_a_lower_priority_and_with_bodies_of_any_size(
-    path: Path, shared: Shared
-) -> None:
-    runner, past = shared
-
-    async def test() -> None:
+def test_it_answers_at_a_lower_priority_and_with_bodies_of_any_size(path: Path, run: Run) -> None:
+    async def test(past: PastProcess) -> None:
         assert await past.ask(Count(NOW_NS), now(path), 0.0) == 1
-        assert await past.ask(Running(), now(path), 0.0) == (0, NICENESS)
+        nice = os.getpriority(os.PRIO_PROCESS, 0) + NICENESS
+        assert await past.ask(Running(), now(path), 0.0) == (0, nice)
         for count in (0, 3_000_000):
             answered: Answered = await past.ask(Body(count), now(path), 0.0)
             assert answered.answer is not None
             assert answered.answer.body == b"7" * count
         assert past.starts == 1
 
-    runner.run(test())
+    run(test)
 
 
-def test_what_it_meets_is_raised_here(path: Path, shared: Shared) -> None:
-    runner, past = shared
-
-    async def test() -> None:
+def test_what_it_meets_is_raised_here(path: Path, run: Run) -> None:
+    async def test(past: PastProcess) -> None:
         with pytest.raises(PastRefused, match="x is 7, the limit is 6"):
             await past.ask(Failing("refused"), now(path), 0.0)
         with pytest.raises(PastRefused, match="later than now"):
@@ -109,13 +94,11 @@ def test_what_it_meets_is_raised_here(path: Path, shared: Shared) -> None:
         assert not missing.value.is_lasting
         assert past.starts == 1
 
-    runner.run(test())
+    run(test)
 
 
-def test_what_nobody_waits_for_any_more_ends_there(path: Path, shared: Shared) -> None:
-    runner, past = shared
-
-    async def test() -> None:
+def test_what_nobody_waits_for_any_more_ends_there(path: Path, run: Run) -> None:
+    async def test(past: PastProcess) -> None:
         asking = [
             asyncio.create_task(past.ask(Endless(), now(path), 1.0)) for _ in range(MAX_PENDING)
         ]
@@ -132,23 +115,21 @@ def test_what_nobody_waits_for_any_more_ends_there(path: Path, shared: Shared) -
             pass
         assert past.asked == {}
 
-    runner.run(test())
+    run(test)
 
 
-def test_a_map_is_sent_once(path: Path, shared: Shared) -> None:
-    runner, past = shared
-
+def test_a_map_is_sent_once(path: Path, run: Run) -> None:
     def a_map(revision: int) -> OccupancyMap:
         return map_of(np.zeros((revision, 1_000)), revision=revision)
 
-    async def test() -> None:
+    async def test(past: PastProcess) -> None:
         first, second = a_map(1), a_map(2)
         cells, over_there = await past.ask(MapCells(first), now(path), 0.0)
         assert cells == 1_000
         assert (await past.ask(MapCells(first), now(path), 0.0))[1] == over_there
         assert (await past.ask(MapCells(second), now(path), 0.0))[0] == 2_000
 
-    runner.run(test())
+    run(test)
 
 
 async def test_an_export_goes_on_where_it_was_in_another_process_too(
@@ -168,85 +149,26 @@ async def test_an_export_goes_on_where_it_was_in_another_process_too(
         assert (found, past.starts) == ([1_000, 1_000, 500], 2)
 
 
-async def test_one_that_dies_is_told_of_and_started_again(
+async def test_one_that_dies_or_cannot_be_started_is_told_of_and_another_is_started(
     path: Path, caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(past_process, "REST_S", 0.2)
     async with looking_back() as past:
+        with monkeypatch.context() as nowhere:
+            nowhere.setattr(sys, "executable", "/nowhere/python")
+            with pytest.raises(NotRemembered, match="cannot be started"):
+                await past.ask(Count(NOW_NS), now(path), 0.0)
+        with pytest.raises(NotRemembered, match="is about to be started again"):
+            await past.ask(Count(NOW_NS), now(path), 0.0)
+        await until(lambda: not past.why_down, "the rest")
         waiting = asyncio.create_task(past.ask(Endless(), now(path), 0.0))
         await until(lambda: past.pid is not None, "a process")
         os.kill(past.pid or 0, signal.SIGKILL)
         with pytest.raises(NotRemembered, match="was killed by SIGKILL") as caught:
             await waiting
         assert not caught.value.is_lasting
-        with pytest.raises(NotRemembered, match="is about to be started again"):
-            await past.ask(Count(NOW_NS), now(path), 0.0)
         await until(lambda: not past.why_down, "the next one")
         assert past.pid is None, "nobody asked"
-        with pytest.raises(NotRemembered, match="was killed by SIGABRT"):
-            await past.ask(Dying(), now(path), 0.0)
-        await until(lambda: not past.why_down, "another one")
         assert await past.ask(Count(NOW_NS), now(path), 0.0) == 1
         told = [r.getMessage() for r in caplog.records if r.levelno == logging.ERROR]
-        assert told == [
-            "the process that reads the past was killed by SIGKILL",
-            "the process that reads the past was killed by SIGABRT",
-        ]
-
-
-async def test_one_that_cannot_be_started_is_tried_again(
-    path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(past_process, "REST_S", 0.01)
-    async with looking_back() as past:
-        with monkeypatch.context() as nowhere:
-            nowhere.setattr(sys, "executable", "/nowhere/python")
-            with pytest.raises(NotRemembered, match="cannot be started"):
-                await past.ask(Count(NOW_NS), now(path), 0.0)
-        await until(lambda: not past.why_down, "the rest")
-        assert await past.ask(Count(NOW_NS), now(path), 0.0) == 1
-
-
-PARENT = """
-import asyncio, sys
-from pathlib import Path
-from tests.bridge.feed.test_past_process import looking_back, now
-from tests.support.looking import Count, Endless
-
-async def main():
-    async with looking_back() as past:
-        await past.ask(Count(1), now(Path(sys.argv[1])), 0.0)
-        asking = asyncio.create_task(past.ask(Endless(), now(Path(sys.argv[1])), 0.0))
-        print("child", past.pid, flush=True)
-        await asking
-
-asyncio.run(main())
-"""
-
-
-@pytest.fixture
-def parent(path: Path) -> Iterator[tuple[Process, int]]:
-    command = [sys.executable, "-c", PARENT, str(path)]
-    with Process(command, ros_env(0)) as process:
-        child = int(process.wait_for_output("child").split()[1])
-        assert is_there(child)
-        yield process, child
-
-
-@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGINT])
-def test_it_ends_with_its_parent(parent: tuple[Process, int], number: signal.Signals) -> None:
-    process, child = parent
-    process.stop(number)
-    wait_for(lambda: not is_there(child), "the end of the child")
-
-
-def test_ctrl_c_and_a_signal_to_all_are_the_parents(parent: tuple[Process, int]) -> None:
-    process, child = parent
-    assert os.getpgid(child) != os.getpgid(process.pid), "a terminal's Ctrl-C"
-    for number in (signal.SIGINT, signal.SIGTERM):
-        os.kill(child, number)
-    process.freeze()  # so that nobody could start another one
-    assert is_there(child)
-    process.thaw()
-    process.kill()
-    wait_for(lambda: not is_there(child), "the end of the child")
+        assert told[-1] == "the process that reads the past was killed by SIGKILL"

@@ -2,12 +2,13 @@
 
 import asyncio
 import weakref
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import pytest
 
-from lupin_bridge.feed.relay import NotRelayedError, Relay, RosTime, Sample, Topic
+from lupin_bridge.feed.relay import Relay, Sample, Topic, schema_text
 from lupin_bridge.feed.source import TwinUnavailableError
 from tests.support.waiting import until
 
@@ -51,22 +52,9 @@ class Ros:
     def subscribe(
         self, node: Any, topic: Topic, take: Callable[[Sample], None]
     ) -> Callable[[], None]:
-        if topic.type_name.startswith("unknown"):
-            raise ValueError(f"there is no message {topic.type_name!r}")
-        if topic.name.endswith("/"):
-            raise ValueError("ROS takes no such name")
         self.subscribed.append(topic.name)
         self.takes[topic.name] = take
         return lambda: self.takes.__delitem__(topic.name)
-
-    def read(self, topic: Topic, data: bytes) -> Any:
-        return topic.name, data
-
-    def published(self, node: Any, is_wanted: Callable[[str, str], bool]) -> Mapping[str, str]:
-        return {name: "a/msg/B" for name in ("/a", "/b") if is_wanted(name, "a/msg/B")}
-
-    def time(self, node: Any) -> RosTime:
-        return RosTime(5, is_simulated=True)
 
     async def publish(self, *samples: bytes, topic: Topic = STATE) -> None:
         """Until the loop has handed out what it was woken for."""
@@ -141,19 +129,6 @@ async def test_the_oldest_give_way_within_depth_and_bytes_and_the_too_large_neve
     assert relay.skipped == 2, "the oldest, and the one that is too large"
 
 
-async def test_what_comes_while_it_is_handed_out_is_handed_out_too(ros: Ros, relay: Relay) -> None:
-    heard: list[bytes] = []
-
-    def receive(sample: Sample) -> None:
-        heard.append(sample.data)
-        if sample.data == b"1":
-            ros.takes[STATE.name](Sample(b"2", 2))
-
-    await relay.listen(STATE, receive)
-    await ros.publish(b"1")
-    assert (heard, ros.wake_ups) == ([b"1", b"2"], 2)
-
-
 async def test_a_topic_is_heard_until_the_last_has_closed(ros: Ros, relay: Relay) -> None:
     relay.linger_s = 0.0
     ear = Ear()
@@ -197,17 +172,6 @@ async def test_who_comes_just_in_time_keeps_it(ros: Ros, relay: Relay) -> None:
     assert (ear.heard, ros.subscribed) == ([b"1"], ["/twin/state", "/diagnostics"])
 
 
-async def test_a_topic_of_no_known_type_is_refused_and_can_be_asked_for_again(
-    ros: Ros, relay: Relay
-) -> None:
-    for _ in range(2):
-        with pytest.raises(NotRelayedError, match=r"/x cannot be relayed .*'unknown/msg/X'"):
-            await relay.listen(Topic("/x", "unknown/msg/X"), Ear())
-    with pytest.raises(NotRelayedError, match="/x/ cannot be relayed here: ROS takes no such"):
-        await relay.listen(Topic("/x/", "a/msg/B"), Ear())
-    assert len(relay) == 0
-
-
 async def test_one_who_leaves_while_it_opens_spoils_it_for_nobody(ros: Ros, relay: Relay) -> None:
     ros.gate.clear()
     ear = Ear()
@@ -246,5 +210,49 @@ async def test_without_its_thread_nothing_is_heard_and_nothing_breaks(
     await until(lambda: len(relay) == 0, "its end")
     with pytest.raises(TwinUnavailableError):
         await relay.listen(LIVE, Ear())
-    with pytest.raises(TwinUnavailableError):
-        await relay.published(lambda _name, _type: True)
+
+
+# --- definitions of message types -----------------------------------------------------------------
+
+
+def package(prefix: Path, name: str, **messages: str) -> None:
+    folder = prefix / "share" / name / "msg"
+    folder.mkdir(parents=True)
+    for message, text in messages.items():
+        (folder / f"{message}.msg").write_text(text, encoding="utf-8")
+
+
+def test_the_prefixes_of_a_sourced_ros_come_first(tmp_path: Path) -> None:
+    package(tmp_path / "overlay", "here_msgs", One="Two[<=3] twos  # of them\nuint8 X=1\n")
+    package(tmp_path / "overlay", "std_msgs", Header="string<=5 mine\n")
+    package(tmp_path / "ros", "here_msgs", One="", Two="std_msgs/msg/Header header 'x'")
+    sourced = {"AMENT_PREFIX_PATH": f"{tmp_path}/nowhere:{tmp_path}/overlay::{tmp_path}/ros"}
+    rule = "=" * 80
+    assert schema_text("here_msgs/msg/One", sourced) == (
+        "Two[<=3] twos  # of them\nuint8 X=1\n\n"
+        f"{rule}\nMSG: here_msgs/Two\nstd_msgs/msg/Header header 'x'\n"
+        f"{rule}\nMSG: std_msgs/Header\nstring<=5 mine\n"
+    )
+    # What is in none of them is where Python keeps it.
+    assert "sec" in schema_text("builtin_interfaces/msg/Time", sourced)
+
+
+@pytest.mark.parametrize(
+    ("type_name", "said"),
+    [
+        ("nobody_msgs/msg/Thing", "nobody_msgs/msg/Thing is not installed"),
+        ("lupin_msgs/msg/Nothing", "lupin_msgs/msg/Nothing is not installed"),
+        ("lupin_msgs/Observation", "'lupin_msgs/Observation' is no message type"),
+        ("../msg/Observation", "'../msg/Observation' is no message type"),
+        ("", "'' is no message type"),
+    ],
+)
+def test_what_is_not_installed_is_named(type_name: str, said: str) -> None:
+    with pytest.raises(LookupError, match=said):
+        schema_text(type_name)
+
+
+def test_a_part_that_is_not_installed_is_named_with_the_whole(tmp_path: Path) -> None:
+    package(tmp_path, "here_msgs", One="gone_msgs/Two two\n")
+    with pytest.raises(LookupError, match="gone_msgs/msg/Two, a part of here_msgs/msg/One, is not"):
+        schema_text("here_msgs/msg/One", {"AMENT_PREFIX_PATH": str(tmp_path)})

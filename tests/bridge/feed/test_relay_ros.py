@@ -1,5 +1,7 @@
 """Real topics, heard raw in both roles: the bytes are the message, and nothing is made of them."""
 
+from collections.abc import Iterator
+from contextlib import nullcontext
 from typing import Any
 
 import pytest
@@ -9,12 +11,30 @@ from nav_msgs.msg import OccupancyGrid
 from rclpy.serialization import deserialize_message
 from sensor_msgs.msg import PointCloud2
 
+from lupin_bridge.feed.local import LocalTwin
 from lupin_bridge.feed.relay import NotRelayedError, Relay, Sample, Topic, topics_of
+from lupin_bridge.feed.source import TwinUnavailableError
+from lupin_bridge.feed.web import WebTwin
 from lupin_twin.ros import convert
-from tests.bridge.feed.test_source import SOURCES, stage_of
+from lupin_twin.runtime.estimates import ReportRequest
+from tests.support.inprocess import started
 from tests.support.messages import occupancy_grid, scan
+from tests.support.processes import OFTEN, twin_node
 from tests.support.ros import Peer
 from tests.support.waiting import until, until_answered
+
+
+@pytest.fixture
+def peer(domain: int) -> Iterator[Peer]:
+    with Peer(domain) as robot:
+        yield robot
+
+
+@pytest.fixture(params=[LocalTwin, WebTwin])
+def source_type(request: pytest.FixtureRequest, domain: int) -> Iterator[type]:
+    """A kind of source; for `WebTwin`, with a twin in a process of its own."""
+    with twin_node(domain, *OFTEN) if request.param is WebTwin else nullcontext():
+        yield request.param
 
 
 async def only_what_is_published_as_wanted(relay: Relay, topic: Topic, domain: int) -> None:
@@ -32,16 +52,17 @@ async def only_what_is_published_as_wanted(relay: Relay, topic: Topic, domain: i
         assert await published_as(topic.type_name) == {}
 
 
-@pytest.mark.parametrize("source_type", SOURCES)
-async def test_a_twins_topics_come_as_they_are_on_the_wire(domain: int, source_type: type) -> None:
-    async with stage_of(source_type, domain) as stage:
-        relay: Relay = stage.source.relay
+async def test_a_twins_topics_come_as_they_are_on_the_wire(
+    domain: int, source_type: Any, peer: Peer
+) -> None:
+    async with started(source_type, *OFTEN) as (source, told):
+        relay: Relay = source.relay
         relay.linger_s = 0.0
-        state, observations, discovered, map_, diagnostics = topics_of(stage.source.names)
+        state, observations, discovered, map_, diagnostics = topics_of(source.names)
         grid, seen = occupancy_grid([[0, 100]]), scan("1", {"co2": 400.0}, stamp_s=5.0)
-        stage.peer.publish_map(grid)
-        stage.peer.observe(seen)
-        await stage.tag("1")
+        peer.publish_map(grid)
+        peer.observe(seen)
+        await until(lambda: told and told[-1].snapshot.tags, "the tag")
         assert len(relay) == 0, "nobody has asked"
 
         heard: dict[str, list[Sample]] = {}
@@ -82,9 +103,9 @@ async def test_a_twins_topics_come_as_they_are_on_the_wire(domain: int, source_t
             each()
         left = before - len(listening)
         await until_answered(lambda: thread.call(count), "its leaving", lambda it: it == left)
-        assert (len(relay), stage.source.thread.callback_errors) == (0, 0)
+        assert (len(relay), source.thread.callback_errors) == (0, 0)
 
-        names = stage.source.names
+        names = source.names
         assert (names.field_layers, names.tags_layer, names.planters_layer) == (
             "/twin/field/",
             "/twin/tags",
@@ -101,5 +122,11 @@ async def test_a_twins_topics_come_as_they_are_on_the_wire(domain: int, source_t
             (Topic("/a", "sensor_smsgs/msg/A"), "is not installed here"),
             (Topic("/a b", "lupin_msgs/msg/TwinState"), "topic name"),
         ):
-            with pytest.raises(NotRelayedError, match=said):
-                await relay.listen(topic, lambda _: None)
+            for _ in range(2):
+                with pytest.raises(NotRelayedError, match=f"{topic.name} cannot be .*{said}"):
+                    await relay.listen(topic, lambda _: None)
+        assert len(relay) == 0
+    # A thread that has not ended in time is left behind, and ends for itself.
+    await until(lambda: not source.thread.is_alive, "its end")
+    with pytest.raises(TwinUnavailableError):
+        await source.estimate_report(ReportRequest("co2"))

@@ -1,19 +1,30 @@
 """The ROS thread, with real nodes: what crosses, in both directions, and how it ends."""
 
 import asyncio
+import json
 import logging
 import sys
 import threading
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from typing import Any, Self
 
 import pytest
+from rclpy.logging import get_logger
 from rclpy.node import Node
 from rclpy.task import Future
 
-from lupin_bridge.feed.ros_thread import STOP_TIMEOUT_S, RosThread
-from lupin_bridge.feed.source import TwinUnavailableError
+from lupin_bridge.feed.ros_thread import RosThread, forward
+from lupin_bridge.feed.source import (
+    STUCK_AFTER_S,
+    ThreadState,
+    TwinUnavailableError,
+    ailment,
+)
 from tests.support.inprocess import ros_domain
+from tests.support.messages import scan
+from tests.support.processes import url_of
+from tests.support.ros import Peer
+from tests.support.sabotage import sabotaged
 from tests.support.waiting import until
 
 
@@ -39,16 +50,12 @@ class Probe(Node):  # type: ignore[misc]  # rclpy is not typed
 class Stage:
     """A ROS thread with a probe, and what the loop has been told."""
 
-    def __init__(
-        self,
-        make_node: Callable[[Any, Callable[[int], None]], Probe] = Probe,
-        ros_args: Sequence[str] = (),
-    ) -> None:
+    def __init__(self) -> None:
         self.events: list[int] = []
         self.told_by: set[threading.Thread] = set()
         self.deaths = 0
         self.ros: RosThread[Probe, int] = RosThread(
-            make_node, ros_args=ros_args, on_event=self._on_event, on_death=self._on_death
+            Probe, ros_args=(), on_event=self._on_event, on_death=self._on_death
         )
 
     def _on_event(self, event: int) -> None:
@@ -70,7 +77,10 @@ class Stage:
 
 
 async def test_a_call_runs_in_the_nodes_thread_and_its_result_comes_back(domain: int) -> None:
-    async with Stage() as stage:
+    stage = Stage()
+    with pytest.raises(TwinUnavailableError, match="not running"):
+        await stage.ros.call(lambda _: None)
+    async with stage:
         thread = await stage.ros.call(lambda _: threading.current_thread())
         assert thread is stage.ros.require_node().thread
         assert thread is not threading.current_thread()
@@ -78,10 +88,6 @@ async def test_a_call_runs_in_the_nodes_thread_and_its_result_comes_back(domain:
         results = [stage.ros.call(lambda _, n=n: n * n) for n in range(50)]  # type: ignore[misc]
         assert await asyncio.gather(*results) == [n * n for n in range(50)]
         assert stage.ros.calls_waiting == 0
-
-
-async def test_what_a_call_raises_is_its_callers_and_not_the_nodes(domain: int) -> None:
-    async with Stage() as stage:
         with pytest.raises(ZeroDivisionError):
             await stage.ros.call(lambda _: 1 / 0)
         assert (stage.ros.is_alive, stage.ros.callback_errors) == (True, 0)
@@ -104,22 +110,11 @@ async def test_a_caller_that_leaves_is_not_missed(domain: int) -> None:
         assert not begun, "nobody waits for it"
 
 
-async def test_before_the_start_and_after_the_end_there_is_nobody_to_call(domain: int) -> None:
-    stage = Stage()
-    with pytest.raises(TwinUnavailableError, match="not running"):
-        await stage.ros.call(lambda _: None)
-    async with stage:
-        pass
-    with pytest.raises(TwinUnavailableError, match="not running"):
-        await stage.ros.call(lambda _: None)
-
-
 async def test_a_heartbeat_tells_of_a_callback_that_hangs_and_that_it_goes_on(domain: int) -> None:
     async with Stage() as stage:
         gate = threading.Event()
         held = asyncio.create_task(stage.ros.call(lambda _: gate.wait(20.0)))
         await until(lambda: stage.ros.stuck_s > 0.5, "a heartbeat that does not come back")
-        assert stage.ros.is_alive
         gate.set()
         await held
         await until(lambda: stage.ros.stuck_s == 0.0, "it to come back")
@@ -142,27 +137,6 @@ async def test_the_loop_is_told_the_newest_and_skips_what_came_in_between(domain
         assert stage.told_by == {threading.current_thread()}
 
 
-async def test_an_event_from_a_nodes_first_moment_finds_a_node_to_look_at(domain: int) -> None:
-    seen: list[int] = []
-
-    def make_node(context: Any, post: Callable[[int], None]) -> Probe:
-        post(1)
-        loop_had_a_turn.wait(20.0)
-        return Probe(context, post)
-
-    loop_had_a_turn = threading.Event()
-    asyncio.get_running_loop().call_later(0.05, loop_had_a_turn.set)
-    ros: RosThread[Probe, int] = RosThread(
-        make_node,
-        ros_args=(),
-        on_event=lambda event: seen.append(event + ros.require_node().ticks),
-        on_death=lambda: None,
-    )
-    await ros.start()
-    await until(lambda: seen == [1], "the first event")
-    await ros.stop()
-
-
 def test_events_of_a_node_whose_loop_is_gone_do_no_harm(domain: int) -> None:
     with ros_domain(domain):
         stage = Stage()
@@ -183,24 +157,15 @@ def test_events_of_a_node_whose_loop_is_gone_do_no_harm(domain: int) -> None:
 # --- futures of ROS -----------------------------------------------------------------------------
 
 
-async def test_a_future_of_ros_is_awaited_without_spinning(domain: int) -> None:
+async def test_what_a_future_of_ros_meets_is_raised(domain: int) -> None:
+    def start(node: Probe) -> Future:
+        future = Future(executor=node.executor)
+        future.set_exception(OSError("no"))
+        return future
+
     async with Stage() as stage:
-        futures: list[Future] = []
-
-        def start(node: Probe) -> Future:
-            futures.append(Future(executor=node.executor))
-            return futures[-1]
-
-        good = asyncio.create_task(stage.ros.ask(start, lambda *_: None))
-        await until(lambda: len(futures) == 1, "the question")
-        await stage.ros.call(lambda _: futures[0].set_result("answer"))
-        assert await good == "answer"
-
-        bad = asyncio.create_task(stage.ros.ask(start, lambda *_: None))
-        await until(lambda: len(futures) == 2, "the next question")
-        await stage.ros.call(lambda _: futures[1].set_exception(OSError("no")))
         with pytest.raises(OSError, match="no"):
-            await bad
+            await stage.ros.ask(start, lambda *_: None)
 
 
 async def test_who_waits_no_longer_gives_the_future_up_in_the_nodes_thread(domain: int) -> None:
@@ -220,32 +185,20 @@ async def test_who_waits_no_longer_gives_the_future_up_in_the_nodes_thread(domai
         assert given_up == [(asked, stage.ros.require_node().thread)]
 
 
-@pytest.mark.parametrize("has_begun", [True, False])
-async def test_who_leaves_before_the_question_is_asked_leaves_nothing_behind(
-    domain: int, has_begun: bool
-) -> None:
+async def test_who_leaves_while_the_question_is_asked_leaves_nothing_behind(domain: int) -> None:
     async with Stage() as stage:
         gate, busy = threading.Event(), threading.Event()
         open_questions: list[Future] = []
 
-        def hold() -> None:
+        def start(_: Probe) -> Future:
             busy.set()
             gate.wait(20.0)
-
-        def start(_: Probe) -> Future:
-            if has_begun:
-                hold()
             open_questions.append(Future())
             return open_questions[-1]
 
-        if not has_begun:
-            held = asyncio.create_task(stage.ros.call(lambda _: hold()))
-            await until(busy.is_set, "a busy thread")
         waiting = asyncio.create_task(
             stage.ros.ask(start, lambda _, future: open_questions.remove(future))
         )
-        waiting_calls = 1 if has_begun else 2
-        await until(lambda: stage.ros.calls_waiting == waiting_calls, "the question to wait")
         await until(busy.is_set, "a busy thread")
         waiting.cancel()
         with pytest.raises(asyncio.CancelledError):
@@ -256,8 +209,6 @@ async def test_who_leaves_before_the_question_is_asked_leaves_nothing_behind(
             await stage.ros.call(lambda _: None)
         assert open_questions == []
         assert stage.ros.callback_errors == 0
-        if not has_begun:
-            await held
 
 
 # --- the end ------------------------------------------------------------------------------------
@@ -265,11 +216,7 @@ async def test_who_leaves_before_the_question_is_asked_leaves_nothing_behind(
 
 async def test_a_callback_that_raises_is_reported_and_the_thread_lives_on(domain: int) -> None:
     async with Stage() as stage:
-
-        def fail() -> None:
-            raise RuntimeError("a callback's own")
-
-        await stage.ros.call(lambda node: node.create_timer(0.01, fail))
+        await stage.ros.call(lambda node: node.create_timer(0.01, lambda: 1 / 0))
         await until(lambda: stage.ros.callback_errors > 2, "errors of the callback")
         assert await stage.ros.call(lambda _: "alive") == "alive"
         assert stage.deaths == 0
@@ -302,40 +249,61 @@ async def test_a_thread_that_is_being_stopped_has_not_died(domain: int) -> None:
         assert not stage.ros.is_alive
 
 
-async def test_what_the_making_of_a_node_raises_is_the_starts(domain: int) -> None:
-    def make_node(context: Any, post: Callable[[int], None]) -> Probe:
-        raise LookupError("no node today")
-
-    stage = Stage(make_node)
-    with pytest.raises(LookupError, match="no node today"):
-        await stage.ros.start()
-    await until(lambda: not stage.ros.is_alive, "the end of the thread")
-    await stage.ros.stop()
-    assert stage.deaths == 0
+def test_a_thread_that_only_a_restart_helps_is_told() -> None:
+    assert ailment(ThreadState(is_alive=True, stuck_s=STUCK_AFTER_S - 0.001)) is None
+    stuck = "The ROS thread has been stuck in a callback for 10 s. Restart."
+    assert ailment(ThreadState(is_alive=True, stuck_s=STUCK_AFTER_S)) == stuck
+    for stuck_s in (0.0, 60.0):
+        ended = ThreadState(is_alive=False, stuck_s=stuck_s)
+        assert ailment(ended) == "The ROS thread has ended. Restart."
 
 
-async def test_arguments_that_ros_does_not_understand_fail_the_start(domain: int) -> None:
-    stage = Stage(ros_args=["--ros-args", "--remap", "nonsense"])
-    with pytest.raises(Exception, match="nonsense"):
-        await stage.ros.start()
-    await stage.ros.stop()
+# --- what nodes log -------------------------------------------------------------------------------
+
+BROKEN = ("--raise", "lupin_twin.core.state:TwinStore.record:boom")
 
 
-async def test_a_stop_does_not_wait_for_ever_for_a_callback(
-    domain: int, caplog: pytest.LogCaptureFixture
+def entries(output: str) -> list[dict[str, Any]]:
+    """The log of a process, of which every line but the address is an object."""
+    lines = [line for line in output.splitlines() if not line.startswith("lupin-twin: http")]
+    return [json.loads(line) for line in lines]
+
+
+def test_of_a_bridge_that_logs_json_every_line_is_an_object(domain: int) -> None:
+    arguments = ("serve", "--port", "0", "--log-format", "json", "--ros-args", "-p", "idw_power:=3")
+    with (
+        sabotaged(domain, BROKEN, "lupin_bridge.cli.command", *arguments) as process,
+        Peer(domain) as robot,
+    ):
+        url_of(process)
+        robot.observe(scan("elsewhere", {"co2": 1.0}, frame_id="odom"), scan("boom", {"co2": 1.0}))
+        process.wait_for_output("odom")
+        process.wait_for_output("sabotage of")
+        process.stop()
+        written = entries(process.output)
+    told = {entry["level"]: entry for entry in written if entry["logger"] == "lupin_twin"}
+    assert "'odom'" in told["warning"]["message"]
+    assert "Traceback" in told["error"]["message"], "a trace of many lines is in one"
+
+
+def test_all_severities_are_handed_on_once_and_as_they_are(
+    caplog: pytest.LogCaptureFixture,
 ) -> None:
-    stage, gate, busy = Stage(), threading.Event(), threading.Event()
-
-    def hold(_: Probe) -> bool:
-        busy.set()
-        return gate.wait(20.0)
-
-    await stage.ros.start()
-    held = asyncio.create_task(stage.ros.call(hold))
-    await until(busy.is_set, "a busy thread")
-    await stage.ros.stop()
-    assert f"did not end within {STOP_TIMEOUT_S} s" in caplog.text
-    with pytest.raises(TwinUnavailableError, match="not running"):
-        await held
-    gate.set()
-    await until(lambda: not stage.ros.is_alive, "the end of the thread")
+    forward()
+    forward()
+    logger = get_logger("probe")
+    logger.info("100 %s")
+    logger.warning("careful")
+    logger.error("broken")
+    logger.fatal("gone")
+    for _ in range(2):
+        logger.warning("told once", once=True)
+    logger.debug("not told")
+    told = [(record.levelno, record.message) for record in caplog.records if record.name == "probe"]
+    assert told == [
+        (logging.INFO, "100 %s"),
+        (logging.WARNING, "careful"),
+        (logging.ERROR, "broken"),
+        (logging.CRITICAL, "gone"),
+        (logging.WARNING, "told once"),
+    ]

@@ -2,8 +2,9 @@
 
 import asyncio
 import math
-from collections.abc import AsyncIterator
-from contextlib import asynccontextmanager
+import os
+import time
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 from unittest.mock import AsyncMock
@@ -16,15 +17,21 @@ from rclpy.parameter import Parameter
 
 from lupin_bridge.feed import web
 from lupin_bridge.feed.relay import Sample, TwinNames, topics_of
-from lupin_bridge.feed.source import TwinTimeoutError, TwinUnavailableError, TwinUpdate
-from lupin_bridge.feed.web import WebTwin
+from lupin_bridge.feed.source import TwinTimeoutError, TwinUnavailableError
+from lupin_bridge.feed.web import RETAINED_S, FollowedLog, WebTwin
 from lupin_bridge.serving.admission import Limits
 from lupin_twin.adapt.scans import BuiltScan
+from lupin_twin.core.parameters import World
+from lupin_twin.core.past import NotRemembered
 from lupin_twin.field.engine import FieldRefused
+from lupin_twin.journal.follow import Lot, write
 from lupin_twin.runtime.estimates import ReportRequest
+from lupin_twin.runtime.workers import Workers
+from tests.support.inprocess import started
+from tests.support.journal import NOW, recording, scan
 from tests.support.messages import occupancy_grid
 from tests.support.ros import Peer, latched
-from tests.support.waiting import until, until_answered
+from tests.support.waiting import until, until_answered, wait_for
 
 SAYS = {"refused": "not that one", "busy": "32 fields are being computed: ask again later"}
 NAME = "/twin/get_estimate_report"
@@ -36,24 +43,9 @@ def state_of(value: float) -> TwinState:
     return TwinState(tags=[TwinTagState(tag_id="1", readings=[reading])])
 
 
-@asynccontextmanager
-async def started(
-    timeout_s: float = 20.0,
-) -> AsyncIterator[tuple[WebTwin, list[TwinUpdate]]]:
-    twin = WebTwin(ros_args=(), timeout_s=timeout_s)
-    told, deaths = list[TwinUpdate](), list[None]()
-    await twin.start(told.append, lambda: deaths.append(None))
-    try:
-        yield twin, told
-    finally:
-        await twin.stop()
-    assert deaths == []
-    assert all(task.get_name() != LOOK for task in asyncio.all_tasks()), "it looks on"
-
-
 async def test_a_map_alone_is_another_revision_and_no_sign_of_life(domain: int) -> None:
     with Peer(domain) as peer:
-        async with started() as (twin, told):
+        async with started(WebTwin) as (twin, told):
             states = peer.publish("/twin/state", state_of(1.0), depth=1)
             await until(lambda: told and twin.revision() == told[-1].revision, "a state")
             before = len(told)
@@ -74,9 +66,10 @@ async def test_a_map_alone_is_another_revision_and_no_sign_of_life(domain: int) 
 
 
 async def test_without_a_twin_its_service_is_named(domain: int) -> None:
-    async with started() as (twin, _):
+    async with started(WebTwin) as (twin, _):
         with pytest.raises(TwinUnavailableError, match=f"no twin offers {NAME}: is it running"):
             await twin.estimate_report(ReportRequest("co2"))
+    assert all(task.get_name() != LOOK for task in asyncio.all_tasks()), "it looks on"
 
 
 async def test_after_a_silence_all_goes_on_with_a_new_node(domain: int) -> None:
@@ -86,7 +79,7 @@ async def test_after_a_silence_all_goes_on_with_a_new_node(domain: int) -> None:
         peer.node.create_subscription(
             Observation, "/floranova/observations", scans.append, latched(50)
         )
-        async with started() as (twin, told):
+        async with started(WebTwin) as (twin, told):
             state_topic = topics_of(twin.names)[0]
             await twin.relay.listen(state_topic, samples.append)
 
@@ -139,15 +132,17 @@ async def test_after_a_silence_all_goes_on_with_a_new_node(domain: int) -> None:
 async def test_what_a_lost_twin_said_last_is_no_news_to_a_new_node(domain: int) -> None:
     samples = list[Sample]()
     with Peer(domain) as peer:
-        async with started() as (twin, told):
+        async with started(WebTwin) as (twin, told):
             await twin.relay.listen(topics_of(twin.names)[0], samples.append)
             peer.publish("/twin/state", state_of(1.0), depth=1)
             await until(lambda: told and samples, "the state")
+            before = twin.revision()
             await twin.thread.call(
                 lambda node: node.set_parameters([Parameter("idw_power", value=3.0)])
             )
             await until(lambda: twin.rules.idw_power == 3.0, "the parameter")
             revision = twin.revision()
+            assert revision != before, "what is made by other rules is another answer"
             twin.rejoin_after_s = 0.1
             # DDS goes on in a twin that is stuck, and what it latched comes to who is new.
             await until(lambda: len(samples) > 1, "what is latched, again")
@@ -191,7 +186,7 @@ async def test_refusals_are_the_services_and_no_answer_is_waited_for_for_ever(do
 
     with Peer(domain) as peer:
         peer.node.create_service(GetEstimateReport, NAME, answer)
-        async with started(timeout_s=0.5) as (twin, _):
+        async with started(WebTwin, timeout_s=0.5) as (twin, _):
 
             async def is_given_up() -> bool:
                 try:
@@ -210,3 +205,64 @@ async def test_refusals_are_the_services_and_no_answer_is_waited_for_for_ever(do
                     await asyncio.to_thread(peer.spin_briefly)
                 with pytest.raises(kind, match=SAYS[sensor]):
                     await asked
+
+
+# --- copies of journals ---------------------------------------------------------------------------
+
+
+def copies(folder: Path, *ages_s: float) -> list[Path]:
+    """One file for each age, of a journal of its own."""
+    paths = [folder / f"{number:032}.sqlite" for number in range(len(ages_s))]
+    for path, age_s in zip(paths, ages_s, strict=True):
+        write(path, Lot(path.stem, (), 0, is_all=True), 1)
+        os.utime(path, (time.time() - age_s,) * 2)
+    return paths
+
+
+def left_after_start(folder: Path) -> tuple[str | None, list[Path]]:
+    """The file that is read at once, and those that are left."""
+
+    async def test() -> str | None:
+        async def query(_after: int) -> Lot:
+            raise NotRemembered("nobody is there", is_lasting=False)
+
+        log = FollowedLog(query, Workers("test"))
+        await log.start(folder)
+        condition = log.condition
+        await log.stop()
+        return None if condition is None else condition.path
+
+    return asyncio.run(test()), sorted(folder.glob("*.sqlite"))
+
+
+def test_a_copy_that_was_not_written_for_long_is_deleted_at_the_start(tmp_path: Path) -> None:
+    newest, recent, _ = paths = copies(tmp_path, 60.0, RETAINED_S - 60.0, RETAINED_S + 60.0)
+    assert left_after_start(tmp_path) == (str(newest), paths[:2])
+    assert recent.exists()
+
+
+def test_the_newest_stays_however_old_it_is(tmp_path: Path) -> None:
+    newest, _ = copies(tmp_path, RETAINED_S + 60.0, RETAINED_S + 120.0)
+    assert left_after_start(tmp_path) == (str(newest), [newest])
+
+
+def test_a_file_that_is_named_is_read_before_its_twin_is_heard(tmp_path: Path) -> None:
+    journal = tmp_path / "j.sqlite"
+    with recording(journal, world=World("simulated", 1_440.0)) as twin:
+        twin.write(scan())
+        wait_for(lambda: twin.condition.written == 1, "it")
+
+    async def test() -> None:
+        async def query(_after: int) -> Lot:
+            raise NotRemembered("nobody is there", is_lasting=False)
+
+        log = FollowedLog(query, Workers("test"), journal)
+        await log.start(tmp_path / "copies")
+        await log.wait()
+        condition = log.condition
+        assert condition is not None
+        assert (condition.path, condition.complete_ns) == (str(journal), NOW)
+        assert log.world == World("simulated", 1_440.0)
+        await log.stop()
+
+    asyncio.run(test())

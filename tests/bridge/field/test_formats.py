@@ -1,22 +1,22 @@
-"""The three formats of a field: decoded again and compared with the grid, cell by cell."""
+"""The formats of a field and of an estimate: decoded again and compared with the grid."""
 
 import io
 import json
 import math
+from dataclasses import replace
+from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
-import orjson
 import pytest
-from hypothesis import example, given, settings
-from hypothesis import strategies as st
 from PIL import Image
 
-from lupin_bridge import field as field_formats
-from lupin_bridge.field import FORMATS, JSON, NPY, PNG, rgb
+from lupin_bridge import field as formats
+from lupin_bridge.field import PNG, EstimateQuery, FieldFormat, rgb
 from lupin_bridge.judge.judging import own_sensors
-from lupin_bridge.stream import schema
+from lupin_bridge.judge.quantities import Ranges, Span
 from lupin_twin.field.grid import FieldGrid
+from tests.support.estimates import an_estimate
 
 SENSORS = own_sensors()
 TEMPERATURE_RGB = rgb(8, 72, 50)
@@ -49,40 +49,28 @@ def decoded(png: bytes) -> npt.NDArray[np.uint8]:
 ROWS = [[10.0, math.nan, 20.0], [12.5, 15.0, 30.0]]
 GRID = grid_of(ROWS, origin=(-1.25, 2.5))
 
-GRIDS = st.tuples(st.integers(1, 6), st.integers(1, 6)).flatmap(
-    lambda shape: st.lists(
-        st.lists(
-            st.one_of(
-                st.just(math.nan), st.floats(width=32, allow_nan=False, allow_infinity=False)
-            ),
-            min_size=shape[0],
-            max_size=shape[0],
-        ),
-        min_size=shape[1],
-        max_size=shape[1],
-    ).map(grid_of)
+
+@pytest.mark.parametrize(
+    ("hue", "saturation", "lightness", "red_green_blue"),
+    [  # worked examples of CSS Color 4, section 7
+        (0, 100, 50, (255, 0, 0)),
+        (120, 100, 25, (0, 128, 0)),
+        (240, 100, 50, (0, 0, 255)),
+        (30, 50, 50, (191, 128, 64)),
+        (200, 0, 40, (102, 102, 102)),
+    ],
 )
+def test_a_colour_is_the_one_that_a_browser_shows(
+    hue: float, saturation: float, lightness: float, red_green_blue: tuple[int, int, int]
+) -> None:
+    assert rgb(hue, saturation, lightness) == red_green_blue
 
 
 # --- JSON ---------------------------------------------------------------------------------------
 
 
-@given(GRIDS)
-@settings(max_examples=150)
-def test_json_carries_every_value_with_null_for_nan(grid: FieldGrid) -> None:
-    text = field_formats.write_json(grid)
-    response = schema.GetFieldResponse.model_validate_json(text, strict=True)
-    assert (response.ok, response.error_message) == (True, "")
-    assert (response.width, response.height) == (grid.width, grid.height)
-    assert [None if math.isnan(v) else v for v in grid.values.tolist()] == [
-        None if v is None else float(np.float32(v)) for v in response.values
-    ]
-    assert np.float32(response.value_min) == np.float32(grid.value_min)
-    assert np.float32(response.value_max) == np.float32(grid.value_max)
-
-
 def test_json_has_no_number_that_json_does_not_know_and_short_decimals() -> None:
-    text = field_formats.write_json(GRID)
+    text = formats.write_json(GRID)
     body = json.loads(text, parse_constant=pytest.fail)
     assert body["values"] == [10.0, None, 20.0, 12.5, 15.0, 30.0]
     assert (body["origin_x"], body["origin_y"]) == (-1.25, 2.5)
@@ -93,49 +81,30 @@ def test_json_has_no_number_that_json_does_not_know_and_short_decimals() -> None
 def test_a_large_field_is_written_in_parts_that_are_one_list(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    whole = field_formats.write_json(GRID)
-    monkeypatch.setattr(field_formats, "_AT_ONCE", 4)
-    assert field_formats.write_json(GRID) == whole
-    parts = list(field_formats.numbers(GRID.values))
+    whole = formats.write_json(GRID)
+    monkeypatch.setattr(formats, "_AT_ONCE", 4)
+    assert formats.write_json(GRID) == whole
+    parts = list(formats.numbers(GRID.values))
     assert parts == [b"10.0,null,20.0,12.5", b",", b"15.0,30.0"]
-
-
-def test_a_refusal_is_get_fields_failure_body() -> None:
-    refused = schema.GetFieldResponse.model_validate_json(field_formats.refusal_json('no "x"'))
-    assert (refused.ok, refused.error_message) == (False, 'no "x"')
-    rest = refused.model_dump(exclude={"ok", "error_message", "values"})
-    assert rest == dict.fromkeys(rest, 0)
-    assert refused.values == []
-    assert list(orjson.loads(field_formats.refusal_json(""))) == list(
-        orjson.loads(field_formats.write_json(GRID))
-    )
-
-
-# --- NPY ----------------------------------------------------------------------------------------
-
-
-@given(GRIDS)
-@settings(max_examples=50)
-def test_npy_is_the_array_itself(grid: FieldGrid) -> None:
-    array = np.load(io.BytesIO(field_formats.write_npy(grid)), allow_pickle=False)
-    assert (array.dtype, array.shape) == (np.dtype("<f4"), (grid.height, grid.width))
-    assert array.ravel().tobytes() == grid.values.tobytes()
-
-
-def test_row_0_of_npy_lies_at_the_smallest_y() -> None:
-    array = np.load(io.BytesIO(field_formats.write_npy(GRID)))
-    np.testing.assert_array_equal(array, np.array(ROWS, dtype=np.float32))
 
 
 # --- PNG ----------------------------------------------------------------------------------------
 
 
-@given(GRIDS, st.integers(1, 3))
-@example(grid_of([[-3e38, 2e38, 3e38]]), 1)  # the span is past float32
-@example(grid_of([[0.0, 1.4e-45, 4.2e-45]]), 1)  # its inverse is
-@settings(max_examples=200)
-def test_every_pixel_of_a_png_is_the_ramps(grid: FieldGrid, scale: int) -> None:
-    picture = decoded(field_formats.write_png(grid, "temperature", SENSORS, scale))
+@pytest.mark.parametrize("scale", [1, 3])
+@pytest.mark.parametrize(
+    "rows",
+    [
+        ROWS,
+        [[7.0, 7.0]],  # one value everywhere
+        [[math.nan, math.nan]],
+        [[-3e38, 2e38, 3e38]],  # the span is past float32
+        [[0.0, 1.4e-45, 4.2e-45]],  # its inverse is
+    ],
+)
+def test_every_pixel_of_a_png_is_the_ramps(rows: list[list[float]], scale: int) -> None:
+    grid = grid_of(rows)
+    picture = decoded(formats.write_png(grid, "temperature", SENSORS, scale))
     assert picture.shape == (grid.height * scale, grid.width * scale, 4)
     span = grid.value_max - grid.value_min
     for row in range(grid.height):
@@ -154,48 +123,57 @@ def test_every_pixel_of_a_png_is_the_ramps(grid: FieldGrid, scale: int) -> None:
             assert abs(alpha - exact) <= 0.81
 
 
-def test_the_top_row_of_a_png_lies_at_the_largest_y() -> None:
-    alphas = decoded(field_formats.write_png(GRID, "temperature", SENSORS))[:, :, 3]
-    bottom = [0, 0, ALPHA_MAX / 2]  # 10 is the minimum, NaN is transparent, 20 is half-way
-    top = [ALPHA_MAX / 8, ALPHA_MAX / 4, ALPHA_MAX]
-    np.testing.assert_allclose(alphas.astype(float), [top, bottom], atol=0.81)
+# --- estimates ------------------------------------------------------------------------------------
+
+# Known are the first five of six: sds 0, 0.5, .. below 2.25.
+ESTIMATE = an_estimate(width=3, height=2)
 
 
-def test_one_value_everywhere_is_shown_and_no_value_anywhere_is_not() -> None:
-    one = decoded(field_formats.write_png(grid_of([[7.0, 7.0]]), "co2", SENSORS))
-    assert one[:, :, 3].tolist() == [[ALPHA_MAX, ALPHA_MAX]]
-    none = decoded(field_formats.write_png(grid_of([[math.nan, math.nan]]), "co2", SENSORS))
-    assert none[:, :, 3].tolist() == [[0, 0]]
+def written(field_format: FieldFormat, layer: Literal["mean", "sd"] = "mean") -> bytes:
+    return formats.write_estimate(
+        ESTIMATE, field_format, EstimateQuery("co2", layer=layer), SENSORS
+    )
 
 
-def test_a_png_says_what_it_shows() -> None:
-    with Image.open(io.BytesIO(field_formats.write_png(GRID, "temperature", SENSORS, 2))) as image:
-        image.load()
-        assert image.size == (6, 4)
-        assert image.text == {  # type: ignore[attr-defined]  # Pillow's PngImageFile
-            "Sensor": "temperature",
-            "Unit": "°C",
-            "Width": "3",
-            "Height": "2",
-            "Origin-X": "-1.25",
-            "Origin-Y": "2.5",
-            "Resolution": "0.1",
-            "Value-Min": "10.0",
-            "Value-Max": "30.0",
-            "Sample-Count": "5",
-        }
+@pytest.mark.parametrize(("layer", "highest"), [("mean", 24.0), ("sd", 2.0)])
+def test_a_picture_is_transparent_where_it_is_not_known(
+    layer: Literal["mean", "sd"], highest: float
+) -> None:
+    field = formats.estimate_picture(ESTIMATE, layer)
+    assert field.value_max == highest
+    assert np.isnan(field.values).tolist() == [False] * 5 + [True]
+    alpha = np.asarray(Image.open(io.BytesIO(written(PNG, layer))).convert("RGBA"))[..., 3]
+    # Its top row is the one of the greatest y.
+    assert alpha[0, 2] == alpha[1, 0] == 0
+    assert alpha[1, 1] < alpha[1, 2] < alpha[0, 0] < alpha[0, 1]
 
 
-# --- all ----------------------------------------------------------------------------------------
+def test_a_picture_of_nothing_known_is_transparent() -> None:
+    field = formats.estimate_picture(an_estimate(2, 2, sd_known=0.0), "mean")
+    assert (field.value_min, field.value_max) == (0.0, 0.0)
+    assert np.isnan(field.values).all()
 
 
-def test_write_goes_by_the_format() -> None:
-    assert field_formats.write(GRID, JSON, "co2", SENSORS) == field_formats.write_json(GRID)
-    assert field_formats.write(GRID, NPY, "co2", SENSORS) == field_formats.write_npy(GRID)
-    picture = field_formats.write_png(GRID, "co2", SENSORS, 3)
-    assert field_formats.write(GRID, PNG, "co2", SENSORS, 3) == picture
-    assert [known.media_type for known in FORMATS] == [
-        "application/json",
-        "image/png",
-        "application/x-npy",
-    ]
+def test_headers_say_what_an_array_cannot() -> None:
+    assert formats.estimate_metadata(ESTIMATE, SENSORS.named("co2")) == {
+        "Sensor": "co2",
+        "Unit": "ppm",
+        "Width": "3",
+        "Height": "2",
+        "Origin-X": "-1.0",
+        "Origin-Y": "2.0",
+        "Resolution": "0.5",
+        "Sd-Known": "2.25",
+        "Sample-Count": "3",
+        "Reading-Count": "7",
+    }
+
+
+def test_known_is_only_what_is_sure_to_a_part_of_the_narrowest_ideal_range() -> None:
+    wide, narrow = (Ranges(ideal=Span(20.0, high)) for high in (60.0, 26.0))
+    sensor = replace(SENSORS.named("ph"), day=wide, night=narrow)
+    found = formats.within_ideal(ESTIMATE, sensor).grid
+    assert found.sd_known == 1.0
+    assert found.known.ravel().tolist() == [True, True, False, False, False, False]
+    for other in (replace(sensor, night=wide), SENSORS.named("ph")):
+        assert formats.within_ideal(ESTIMATE, other) is ESTIMATE

@@ -1,5 +1,6 @@
 """The page over all sites: who lives, how each one is, and what is said where nobody knows."""
 
+import random
 import time
 from dataclasses import replace
 from itertools import chain
@@ -9,9 +10,14 @@ from xml.etree import ElementTree
 
 import pytest
 
+from lupin_bridge.fleet.overview import dots, map_svg, map_version
+from lupin_bridge.judge.verdict import Health, Verdict
+from lupin_twin.core.diagnostics import Origin
+from lupin_twin.core.parameters import World
+from lupin_twin.core.state import Pose, TagState
 from tests.support.archive import Archive, forward_once, forwarder
-from tests.support.fleet import fleet, frames, scans_lately, wall, write
-from tests.support.journal import kept, scan
+from tests.support.fleet import fleet, forward, frames, scans_lately, wall, write
+from tests.support.journal import kept, recording, scan
 from tests.support.waiting import wait_for
 
 
@@ -113,8 +119,7 @@ def test_what_was_known_last_of_a_silent_site_does_not_grow_old(
 def test_a_small_map_of_each_site(archive: Archive, journal: Path, tmp_path: Path) -> None:
     write(journal, scans_lately(tags=30))
     bare = archive.of_site("bare")
-    write(tmp_path / "bare", [scan("0", wall().stamp_ns)])  # no tag has a place
-    forward_once(bare, tmp_path / "bare")
+    forward(bare, tmp_path / "bare", [scan("0", wall().stamp_ns)])  # no tag has a place
     with forwarder(archive, journal), fleet(archive) as page:
         found = page.site(is_live=True, verdict="healthy")
         path = "/api/sites/gh1/map.svg"
@@ -123,8 +128,6 @@ def test_a_small_map_of_each_site(archive: Archive, journal: Path, tmp_path: Pat
         assert ElementTree.fromstring(picture.text).tag.endswith("svg")
         assert dots_of(picture.text).keys() == {"healthy"}
         assert len(dots_of(picture.text)["healthy"]) == 30
-        # A few hundred bytes, of which the dots are sent to nobody who does not look.
-        assert len(picture.content) < 1_000
         again = page.http.get(path, headers={"If-None-Match": picture.headers["etag"]})
         assert again.status_code == 304
         now_ns = wall().stamp_ns
@@ -141,3 +144,90 @@ def dots_of(picture: str) -> dict[str, list[str]]:
     """Places by verdict."""
     paths = [it for it in ElementTree.fromstring(picture) if it.tag.endswith("path")]
     return {it.attrib["class"]: it.attrib["d"].split("M")[1:] for it in paths}
+
+
+# --- where it comes from --------------------------------------------------------------------------
+
+# Site, what its twin says, by which clock, and what is shown.
+SITES: tuple[tuple[str, Origin, bool, str], ...] = (
+    ("robot", "robot", False, "robot"),
+    ("simulated", "simulated", False, "simulated"),
+    ("recorded", "recorded", True, "recorded"),
+    # By such a clock no robot works.
+    ("clock", "robot", True, "sim_time"),
+)
+
+
+def record(archive: Archive, journal: Path, origin: Origin, *, is_simulated: bool = False) -> None:
+    with recording(
+        journal, replace(wall(), is_simulated=is_simulated), world=World(origin)
+    ) as twin:
+        for row in scans_lately():
+            twin.write(row)
+    forward_once(archive, journal)
+
+
+def test_where_it_comes_from_is_in_the_log(archive: Archive, tmp_path: Path) -> None:
+    for site, origin, is_simulated, _ in SITES:
+        record(archive.of_site(site), tmp_path / site, origin, is_simulated=is_simulated)
+    forward(archive, tmp_path / "gh1", scans_lately())  # which does not say it
+    with fleet(archive) as page:
+        for site, said in [*((site, said) for site, _, _, said in SITES), ("gh1", "unknown")]:
+            page.site(site, origin=said)
+            assert page.http.get(f"/sites/{site}/readyz").json()["origin"] == said
+        # A journal that is used for something else says that.
+        record(archive.of_site("simulated"), tmp_path / "simulated", "robot")
+        page.site("simulated", origin="robot")
+
+
+# --- small maps -----------------------------------------------------------------------------------
+
+
+def drawn(*tags: tuple[float, float, Verdict]) -> str:
+    states = [
+        TagState(str(n), pose=Pose(x, y, 0.0, 0.0, 0.0, 0.0, 1.0))
+        for n, (x, y, _) in enumerate(tags)
+    ]
+    return dots(states, {str(n): Health(verdict) for n, (_, _, verdict) in enumerate(tags)})
+
+
+WELL, BAD = Verdict.HEALTHY, Verdict.CRITICAL
+
+
+def test_y_grows_upwards_and_the_worst_is_drawn_last() -> None:
+    assert drawn((0.0, 0.0, BAD), (4.0, 2.0, WELL)) == (
+        '<path class="healthy" d="M40 0h0"/><path class="critical" d="M0 20h0"/>'
+    )
+
+
+def test_it_is_in_the_middle_and_as_wide_as_it_is_high() -> None:
+    assert drawn((0.0, 0.0, WELL), (0.0, 5.0, WELL)) == (
+        '<path class="healthy" d="M20 0h0M20 20h0"/>'
+    )
+    assert drawn((7.0, 3.0, WELL)) == '<path class="healthy" d="M20 10h0"/>'
+
+
+def test_of_tags_at_one_place_the_worst_is_drawn() -> None:
+    one = drawn((0.0, 0.0, WELL), (0.001, 0.0, BAD), (10.0, 0.0, WELL))
+    assert one.count("M") == 2
+    assert 'class="critical" d="M0 10h0"' in one
+
+
+def test_ten_thousand_tags_are_no_more_than_seven_kb() -> None:
+    chance = random.Random(1)
+    many = [
+        (chance.uniform(0, 100), chance.uniform(0, 60), chance.choice([WELL, BAD]))
+        for _ in range(10_000)
+    ]
+    assert len(map_svg(drawn(*many))) < 7_500
+
+
+def test_a_tag_that_is_far_off_leaves_the_others_as_they_are() -> None:
+    near = [(float(n % 6), float(n // 6), WELL) for n in range(30)]
+    assert drawn(*near, (5e5, 0.0, BAD)) == drawn(*near)
+
+
+def test_a_tag_without_a_place_is_not_drawn_and_nothing_has_no_version() -> None:
+    assert dots([TagState("a")], {"a": Health(WELL)}) == ""
+    assert map_version("") is None
+    assert map_version(drawn((0.0, 0.0, WELL))) != map_version(drawn((0.0, 0.0, BAD)))

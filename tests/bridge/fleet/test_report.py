@@ -2,22 +2,19 @@
 
 from __future__ import annotations
 
+import csv
+import io
 import time
-from datetime import UTC
 from datetime import time as dtime
 from pathlib import Path
-from typing import Any
 
-from lupin_bridge.judge.day import ClockDay
-from lupin_bridge.judge.judging import Criteria, own_sensors
-from lupin_bridge.past.report import Report
-from lupin_twin.core.journal_condition import Condition, JournalState
+import pyarrow
+from pyarrow import parquet
+
 from lupin_twin.core.state import Scan, Write
-from lupin_twin.journal.schema import open_reader
-from tests.support.archive import Archive, forward_once
-from tests.support.fleet import Page, fleet, write
+from tests.support.archive import Archive
+from tests.support.fleet import fleet, forward, scans_lately
 from tests.support.journal import SECOND, look, scan
-from tests.support.past import answered_by
 from tests.support.waiting import wait_for
 
 HOUR_S = 3600
@@ -45,22 +42,13 @@ def test_a_sites_report_is_that_of_its_journal_and_all_are_counted(
 ) -> None:
     begun_s = int(time.time()) // HOUR_S * HOUR_S - 4 * HOUR_S
     for site, rows in (("gh1", rows_of(begun_s)), ("gh2", rows_of(begun_s)[:10]), ("no", [])):
-        write(tmp_path / f"{site}.sqlite", rows)
-        forward_once(archive.of_site(site), tmp_path / f"{site}.sqlite")
+        forward(archive.of_site(site), tmp_path / f"{site}.sqlite", rows)
     asked = f"from={begun_s + 1800}&to={begun_s + 3 * HOUR_S}"
     with fleet(archive, "--time-zone", "UTC") as page:
         page.site("gh1")
-        own = wait_for(lambda: answered(page, f"/sites/gh1/api/report?{asked}"), "the report")
-        assert own is not None
-        path = tmp_path / "gh1.sqlite"
-        right = of_journal(path, begun_s + 1800, begun_s + 3 * HOUR_S)
-        assert own.content == right
-        report = own.json()
-        assert {it["reason"]["kind"] for it in report["alarms"]} >= {"range", "pest"}
-        assert {it["tag_id"] for it in report["silences"]} == {"", "a", "b"}
-        html = page.http.get(f"/sites/gh1/api/report.html?{asked}&lang=nl")
-        assert (html.status_code, "Dienstrapport: gh1</h1>" in html.text) == (200, True)
-
+        path = f"/sites/gh1/api/report.html?{asked}&lang=nl"
+        wait_for(lambda: page.http.get(path).status_code == 200, "the report")
+        assert "Dienstrapport: gh1</h1>" in page.http.get(path).text
         every = page.http.get(f"/api/report?from={begun_s}&to={begun_s + 3 * HOUR_S}").json()
         whole = {it["site"]: it for it in every["sites"]}
         assert [it["site"] for it in every["sites"]] == ["gh1", "gh2", "no"]
@@ -74,14 +62,20 @@ def test_a_sites_report_is_that_of_its_journal_and_all_are_counted(
         some = page.http.get(f"/api/report?{asked}&sites=gh2").json()
         assert (some["from"]["sec"], len(some["sites"])) == (begun_s, 1)
         assert (every["notes"], some["notes"]) == ([], [])
-        check_refusals(page)
+        for query, status in (
+            ("sites=gh9", 404),
+            ("from=5&to=4", 400),
+            ("from=0&to=99999999", 400),
+            ("lang=de", 400),
+        ):
+            answer = page.http.get(f"/api/report?{query}")
+            assert answer.status_code == status, answer.text
 
 
 def test_the_newest_notes_of_all_and_who_took_one_back(archive: Archive, tmp_path: Path) -> None:
     at_s = int(time.time()) // HOUR_S * HOUR_S - 2 * HOUR_S
     for site in ("gh1", "gh2"):
-        write(tmp_path / f"{site}.sqlite", rows_of(at_s)[:10])
-        forward_once(archive.of_site(site), tmp_path / f"{site}.sqlite")
+        forward(archive.of_site(site), tmp_path / f"{site}.sqlite", rows_of(at_s)[:10])
     said = (
         ("gh1", "1", at_s, "Anna", "comment", "site", "vents checked"),
         ("gh1", "2", at_s + 60, "Anna", "acknowledge", "alarm:x", ""),
@@ -118,29 +112,38 @@ def test_the_newest_notes_of_all_and_who_took_one_back(archive: Archive, tmp_pat
         assert len(page.http.get(f"/api/report?from={at_s - HOUR_S}").json()["notes"]) == 200
 
 
-def check_refusals(page: Page) -> None:
-    for query, status in (
-        ("sites=gh9", 404),
-        ("from=5&to=4", 400),
-        ("from=0&to=99999999", 400),
-        ("lang=de", 400),
-    ):
-        answer = page.http.get(f"/api/report?{query}")
-        assert answer.status_code == status, answer.text
+# --- rows -----------------------------------------------------------------------------------------
 
 
-def answered(page: Page, path: str) -> Any:
-    answer = page.http.get(path)
-    return answer if answer.status_code == 200 else None
-
-
-def of_journal(path: Path, start_s: int, end_s: int) -> bytes:
-    """What `serve` says of the same log."""
-    end_ns = end_s * SECOND
-    criteria = Criteria(own_sensors(), None, ClockDay(UTC, CLOCK_OF_TESTS, CLOCK_OF_TESTS))
-    journal = Condition(JournalState.RECORDING, complete_ns=end_ns, kept_ns=((0, end_ns),))
-    connection = open_reader(path)
-    try:
-        return answered_by(connection, Report(start_s * SECOND, end_ns, criteria, journal))
-    finally:
-        connection.close()
+def test_sites_are_exported_together_or_by_name(archive: Archive, tmp_path: Path) -> None:
+    forward(archive, tmp_path / "journal", scans_lately(tags=2, scans=3))
+    archive.copy_site("gh2", "gh3")
+    with fleet(archive) as page:
+        wait_for(lambda: len(page.sites()) == 3, "all sites")
+        one = page.http.get("/sites/gh1/api/export.csv").text
+        both = page.http.get("/api/export.csv?sites=gh3,gh1,gh3").text
+        rows = list(csv.DictReader(io.StringIO(both, newline=""), strict=True))
+        assert [row.pop("site") for row in rows] == ["gh3"] * 6 + ["gh1"] * 6
+        assert rows[6:] == list(csv.DictReader(io.StringIO(one, newline="")))
+        every = page.http.get("/api/export.parquet?sensor_type=temperature")
+        assert "X-Complete-To" in every.headers
+        table = parquet.read_table(pyarrow.BufferReader(every.content))
+        assert table["site"].to_pylist() == [
+            name for name in ("gh1", "gh2", "gh3") for _ in "6rows!"
+        ]
+        assert table.schema.field("value").metadata[b"units"] == "°C".encode()
+        of_site = page.http.get("/sites/gh2/api/export.parquet")
+        alone = parquet.read_table(pyarrow.BufferReader(of_site.content))
+        assert "site" not in alone.column_names
+        assert alone["value"] == table.slice(6, 6)["value"]
+        for query, status, said in (
+            ("sites=gh1,gh9", 404, "there is no site 'gh9' in the archive (3 others are)"),
+            ("sites=", 404, "there is no site ''"),
+            ("site=gh1", 400, "parameter 'site' is unknown, expected from, to, tag_id,"),
+            ("from=5&to=4", 400, "to is 4.000000000 s, before from,"),
+        ):
+            for kind in ("csv", "parquet"):
+                answer = page.http.get(f"/api/export.{kind}?{query}")
+                assert answer.status_code == status, query
+                assert said in answer.json()["detail"]
+        assert page.http.head("/api/export.parquet").headers["content-disposition"]

@@ -1,14 +1,20 @@
 """A site's page, and every answer below it, is that of its log: as the journal itself gives it."""
 
 import io
+import signal
 import time
-from contextlib import closing
+from collections.abc import Iterator
+from contextlib import ExitStack, closing
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
 import httpx
 import psycopg
+import pytest
 from PIL import Image
+from websockets.exceptions import ConnectionClosed
+from websockets.sync.client import ClientConnection
 
 from lupin_twin.core.past import RecentRequest, ScansRequest, SeriesRequest, WritesRequest
 from lupin_twin.field.explored import OccupancyMap, text_of
@@ -19,10 +25,13 @@ from lupin_twin.journal.retention import kept
 from lupin_twin.journal.rows import newest_of_tag
 from lupin_twin.journal.schema import SiteLog, open_reader
 from tests.support import maps
-from tests.support.archive import Archive, forward_once, forwarder
-from tests.support.fleet import fleet, scans_lately, write
-from tests.support.journal import SECOND, look, opened, pin, scan
-from tests.support.waiting import wait_for
+from tests.support.archive import Archive, forwarder
+from tests.support.docs import block_named
+from tests.support.fleet import Page, fleet, forward, scans_lately, write
+from tests.support.journal import look, opened, scan
+from tests.support.nginx import nginx
+from tests.support.waiting import PATIENCE_S, wait_for
+from tests.support.ws_client import open_websocket
 
 MINUTE_NS = 60_000_000_000
 
@@ -31,12 +40,12 @@ def test_every_query_of_a_journal_is_answered_alike(archive: Archive, tmp_path: 
     journal = tmp_path / "journal.sqlite"
     now_ns = time.time_ns()
     rows = [*scans_lately(), look("1", now_ns - MINUTE_NS, anomaly=True), look("7", now_ns)]
-    write(journal, [*rows, scan("3", now_ns - 2 * MINUTE_NS, temperature=1.5, humidity=40.0)])
-    forward_once(archive, journal)
+    forward(
+        archive, journal, [*rows, scan("3", now_ns - 2 * MINUTE_NS, temperature=1.5, humidity=40.0)]
+    )
     archive.site = "gh2"
     archive.add_user("gh2")
-    write(journal, [scan("other", now_ns)])
-    forward_once(archive, journal)
+    forward(archive, journal, [scan("other", now_ns)])
     with closing(open_reader(journal)) as local, psycopg.connect(archive.owner) as remote:
         logs = local, SiteLog(remote, "gh2")
         for at_ns in (now_ns, now_ns - 2 * MINUTE_NS, now_ns - 5 * MINUTE_NS, 0):
@@ -77,45 +86,34 @@ def test_a_greenhouse_is_also_judged_by_its_last_day_as_on_its_own_page(
         assert reasons(f"?at={now_ns / 1e9 + 0.001:.3f}") == ["temperature_24h_mean"]
 
 
-def test_the_whole_page_below_its_path_live_and_past(archive: Archive, tmp_path: Path) -> None:
+def test_a_sites_page_is_below_its_path_and_follows_its_log(
+    archive: Archive, tmp_path: Path
+) -> None:
+    """Answer by answer it is compared with `serve` in `test_live_same_answers`."""
     journal = tmp_path / "journal.sqlite"
     write(journal, scans_lately())
     with forwarder(archive, journal), fleet(archive) as page:
         page.site(is_live=True, verdict="healthy")
         moved = page.http.get("/sites/gh1")
-        assert moved.status_code == 307
-        assert moved.headers["location"] == "gh1/"
+        assert (moved.status_code, moved.headers["location"]) == (307, "gh1/")
 
-        def get(path: str) -> httpx.Response:
-            return page.http.get(f"/sites/gh1/{path}")
+        def get(path: str, **headers: str) -> httpx.Response:
+            return page.http.get(f"/sites/gh1/{path}", headers=headers)
 
-        state = get("api/state").json()
-        assert [tag["tag_id"] for tag in state["tags"]] == ["0", "1", "2", "3", "4"]
         assert get("readyz").json()["twin"] == "live"
-        assert get("api/health").json()["house"]["verdict"] == "healthy"
-        field = get("api/field?sensor_type=temperature&resolution=0.5")
+        path = "api/field?sensor_type=temperature&resolution=0.5"
+        field = get(path)
         assert field.json()["sample_count"] == 5
-        again = page.http.get(
-            "/sites/gh1/api/field?sensor_type=temperature&resolution=0.5",
-            headers={"If-None-Match": field.headers["etag"]},
-        )
-        assert again.status_code == 304
-        now_ns = time.time_ns()
-        at = f"{(now_ns - 3 * MINUTE_NS) / 1e9:.3f}"
+        assert get(path, **{"If-None-Match": field.headers["etag"]}).status_code == 304
+        estimate = get("api/estimate?sensor_type=temperature&resolution=0.5").json()
+        assert estimate["sample_count"] == 5
+        at = f"{time.time_ns() / 1e9 - 180:.3f}"
         past = get(f"api/state?at={at}").json()
         assert len(past["tags"]) == 5
         assert past["header"]["stamp"]["sec"] == int(float(at))
-        history = get("api/history?tag_id=0&sensor_type=temperature").json()
-        assert len(history["readings"]) == 6
-        assert len(get("api/tags/0/history").json()["sensors"][0]["values"]) == 6
-        assert get("api/export.csv").text.count("\n") == 31
-        assert get("api/timeline").status_code == 200
-        estimate = get(f"api/estimate?sensor_type=temperature&resolution=0.5&at={at}").json()
-        assert estimate["sample_count"] == 5
         # The twin has sent no map; and how right estimates were, it has counted itself.
         assert get("api/map").status_code == 404
         assert "is known to the twin" in get("api/estimate/quality").json()["detail"]
-        wait_for(lambda: get("api/alarms").json()["source"] == "journal", "its alarms")
         write(journal, [scan("new", time.time_ns(), temperature=22.0)])
         wait_for(lambda: len(get("api/state").json()["tags"]) == 6, "the tag that is new")
 
@@ -165,32 +163,93 @@ def known(field: httpx.Response) -> int:
     return sum(value is not None for value in field.json()["values"])
 
 
-def test_estimates_are_made_of_the_log(archive: Archive, tmp_path: Path) -> None:
-    journal = tmp_path / "journal.sqlite"
-    now_ns = time.time_ns()
-    pins = [pin(str(tag), now_ns - 3600 * SECOND, float(tag)) for tag in range(6)]
-    scans = [
-        scan(str(tag), now_ns - minute * 60 * SECOND + tag, temperature=20.0 + tag)
-        for minute in range(50, 1, -2)
-        for tag in range(6)
-    ]
-    write(journal, [*pins, *scans])
-    forward_once(archive, journal)
-    archive.keep_live()
-    asked = {"sensor_type": "temperature", "resolution": "0.5"}
-    with fleet(archive) as page:
-        page.site(verdict="healthy")
+# --- three replicas behind a real nginx as the guide configures it --------------------------------
 
-        def estimate(**more: str) -> httpx.Response:
-            return page.http.get("/sites/gh1/api/estimate", params={**asked, **more})
+SHOWN = ("--trusted-proxy", "127.0.0.1", "--allow-host", "fleet.example")
+BROWSERS = 4
 
-        wait_for(lambda: estimate().status_code == 200, "a site that was read")
-        found = estimate().json()
-        assert found["sample_count"] == 6
-        # Warmer to the east, as the tags are.
-        means = found["mean"][: found["width"]]
-        assert means[0] < means[-1]
-        past = estimate(at=f"{now_ns / 1e9 - 1200:.0f}")
-        assert past.status_code == 200, past.text
-        assert past.json()["reading_count"] < found["reading_count"]
-        assert estimate(sensor_type="nothing").status_code == 400
+
+@dataclass
+class Replicas:
+    url: str
+    pages: list[Page]
+    journal: Path
+    archive: Archive
+
+
+@pytest.fixture(scope="module")
+def replicas(
+    shared_archive: Archive, tmp_path_factory: pytest.TempPathFactory
+) -> Iterator[Replicas]:
+    archive, folder = shared_archive, tmp_path_factory.mktemp("replicas")
+    journal = folder / "journal"
+    forward(archive, journal, scans_lately())
+    archive.do("UPDATE forwarder SET heard_at = now() - INTERVAL '1 hour'")
+    with ExitStack() as stack:
+        pages = [stack.enter_context(fleet(archive, *SHOWN)) for _ in range(3)]
+        ports = [int(page.url.rpartition(":")[2]) for page in pages]
+        text = block_named("fleet-nginx").text
+        url = stack.enter_context(nginx(folder, ports, text))
+        yield Replicas(url, pages, journal, archive)
+
+
+ANSWERS = (
+    "api/sites",
+    "sites/gh1/api/field?sensor_type=temperature&resolution=0.5",
+    "sites/gh1/api/field.png?sensor_type=temperature&resolution=0.5",
+    "sites/gh1/api/state?at={at}",
+    "sites/gh1/api/health?at={at}",
+    "sites/gh1/api/field?sensor_type=temperature&resolution=0.5&at={at}",
+    "sites/gh1/api/estimate?sensor_type=temperature&resolution=0.5&at={at}",
+)
+
+
+def test_an_answer_has_one_etag_on_all_replicas(replicas: Replicas) -> None:
+    for page in replicas.pages:
+        # Silent, so that nothing changes any more.
+        page.site(is_live=False, last_verdict="healthy", active_alarms=1)
+    at = int(time.time()) - 90
+    with httpx.Client(base_url=replicas.url, trust_env=False, timeout=PATIENCE_S) as browser:
+        for path in (f"/{it.format(at=at)}" for it in ANSWERS):
+            found = [page.http.get(path) for page in replicas.pages]
+            assert [it.status_code for it in found] == [200] * 3, path
+            (etag,) = {it.headers["etag"] for it in found}
+            if path != "/api/sites":  # which says how long ago it was that something came
+                assert len({it.content for it in found}) == 1, path
+            # From whichever nginx takes next.
+            for _ in range(3):
+                again = browser.get(path, headers={"If-None-Match": etag})
+                assert again.status_code == 304, path
+
+
+def until_critical(browser: ClientConnection) -> None:
+    while '"critical"' not in str(browser.recv(timeout=PATIENCE_S)):
+        pass
+
+
+def test_a_replica_that_is_killed_is_missed_by_nobody(replicas: Replicas) -> None:
+    for page in replicas.pages:
+        page.site(last_verdict="healthy")
+        assert page.http.get("/sites/gh1/api/state").status_code == 200
+    base = replicas.url.replace("http", "ws", 1)
+    with ExitStack() as stack, forwarder(replicas.archive, replicas.journal):
+        browsers = []
+        # One after the other, so that each replica has some of them.
+        for path in ("/ws/sites", "/sites/gh1/ws/state") * BROWSERS:
+            browsers.append((path, stack.enter_context(open_websocket(base + path))))
+            browsers[-1][1].recv(timeout=PATIENCE_S)
+        replicas.pages[0].process.send(signal.SIGKILL)
+        with httpx.Client(base_url=replicas.url, trust_env=False, timeout=PATIENCE_S) as client:
+            for path in ("/api/sites", f"/{ANSWERS[1]}") * 10:
+                assert client.get(path).status_code in (200, 429), "nginx asks another replica"
+        for _ in range(2):
+            write(replicas.journal, [scan("new", time.time_ns(), temperature=50.0)])
+        returns = 0
+        for path, browser in browsers:
+            try:
+                until_critical(browser)
+            except ConnectionClosed:
+                # Another replica takes whoever was cut off, at the first attempt.
+                returns += 1
+                until_critical(stack.enter_context(open_websocket(base + path)))
+        assert 0 < returns < len(browsers), "browsers are spread"

@@ -22,8 +22,7 @@ from lupin_bridge.cli import command
 from lupin_bridge.settings import CONFIG_VARIABLE, SECRETS, limits_of, option, table, variable
 from lupin_patrol import cli as patrol_cli
 from lupin_twin.core import interfaces
-from lupin_twin.core.parameters import TwinParameters, describe
-from lupin_twin.ros.launch_arguments import ARGUMENTS
+from lupin_twin.core.parameters import ARGUMENTS, TwinParameters, describe
 
 ROOT: Final = Path(__file__).resolve().parents[1]
 MESSAGES: Final = ROOT / "ros_node" / "lupin_msgs"

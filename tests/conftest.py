@@ -135,5 +135,5 @@ def shared_archive(postgresql: Postgres) -> Iterator[Archive]:
 def children_know_the_tests() -> Iterator[None]:
     """Our Python children look for modules neither here nor in their folder (`-P`)."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("PYTHONPATH", str(Path(__file__).parents[1]))
+        patch.setenv("PYTHONPATH", str(Path(__file__).parents[1]), prepend=os.pathsep)
         yield

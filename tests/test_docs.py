@@ -14,8 +14,7 @@ from lupin_bridge import metrics
 from lupin_bridge.app import FRAMES, ROUTED, create_app
 from lupin_bridge.cli.command import parser
 from lupin_twin.core import interfaces
-from lupin_twin.core.parameters import TwinParameters
-from lupin_twin.ros.launch_arguments import ARGUMENTS
+from lupin_twin.core.parameters import ARGUMENTS, TwinParameters
 from tests.support.docs import DOCS, ROOT, blocks, name_of, pages, without_blocks
 from tests.support.structure import PACKAGES, ROOMS
 

@@ -21,8 +21,8 @@ from annotated_types import Gt, Interval
 
 from lupin_bridge.judge.quantities import Sensor, Sensors
 from lupin_bridge.query_string import AT, Name, needed, parameter, safe_name
-from lupin_twin.estimate import EstimateGrid
 from lupin_twin.estimate.engine import Estimate
+from lupin_twin.estimate.posterior import EstimateGrid
 from lupin_twin.field.engine import (
     DEFAULT_RESOLUTION_M,
     FieldRefused,

@@ -12,16 +12,13 @@ const LAPSE_MS = 2_000;
 /** Lapses that are remembered for the time of day of what came before them. */
 const MOST_ERAS = 100;
 
-/** A stretch without a lapse: from when on, and wall less monotonic clock in it. */
-interface Era {
-  readonly from: number;
-  readonly offset: number;
-}
-
 const listeners = new Set<() => void>();
 /** Never goes back, may stand still while the machine sleeps. */
 let last = performance.now();
-let eras: readonly Era[] = [{ from: -Infinity, offset: Date.now() - last }];
+/** Stretches without a lapse: from when on, and wall less monotonic clock in it. */
+let eras: readonly { readonly from: number; readonly offset: number }[] = [
+  { from: -Infinity, offset: Date.now() - last },
+];
 
 /**
  * ms on the monotonic clock: for differences, never for a time of day. Each call looks whether

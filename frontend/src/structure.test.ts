@@ -1,10 +1,74 @@
 /** One direction of imports, held by a table. What it does not name is not allowed. */
 import { readdirSync, readFileSync } from 'node:fs';
-import { join } from 'node:path';
+import { dirname, join, normalize } from 'node:path/posix';
 
+import ts from 'typescript';
 import { expect, test } from 'vitest';
 
-import { fileGraph, partOf, ringIn, wrongImports, type Table } from './testing/imports';
+/** Where each part may import from: other parts of the source, and packages. */
+type Table = Readonly<Record<string, readonly string[]>>;
+
+/**
+ * The part that a file belongs to: its first folder, however deep it lies; at the top, itself. A
+ * file outside the source is a part of its own.
+ */
+const partOf = (path: string): string => {
+  if (path.startsWith('../')) return path;
+  const [first = '', ...rest] = path.split('/');
+  return rest.length > 0 ? first : first.replace(/\.tsx?$/, '');
+};
+
+/** What a file imports, types and dynamic imports too: paths from the root, or packages' names. */
+function importsOf(path: string, text: string): string[] {
+  return ts.preProcessFile(text, true, true).importedFiles.map(({ fileName }) => {
+    if (fileName.startsWith('.')) return normalize(join(dirname(path), fileName));
+    const [scope = '', name = ''] = fileName.split('/');
+    return `npm:${scope.startsWith('@') ? `${scope}/${name}` : scope}`;
+  });
+}
+
+/** Every import that the table does not name, as "from -> to". */
+function wrongImports(sources: ReadonlyMap<string, string>, table: Table): string[] {
+  return [...sources].flatMap(([path, text]) => {
+    const own = partOf(path);
+    const allowed = table[own] ?? [];
+    return importsOf(path, text)
+      .filter((target) => {
+        const part = target.startsWith('npm:') ? target : partOf(target);
+        return part !== own && !allowed.includes(part);
+      })
+      .map((target) => `${path} -> ${target}`);
+  });
+}
+
+/** A ring of files that import each other, or one of parts if the table allows it; null: none. */
+function ringIn(graph: ReadonlyMap<string, readonly string[]>): string[] | null {
+  const done = new Set<string>();
+  const walk = (node: string, path: readonly string[]): string[] | null => {
+    if (path.includes(node)) return [...path.slice(path.indexOf(node)), node];
+    if (done.has(node)) return null;
+    for (const next of graph.get(node) ?? []) {
+      const ring = walk(next, [...path, node]);
+      if (ring) return ring;
+    }
+    done.add(node);
+    return null;
+  };
+  for (const node of graph.keys()) {
+    const ring = walk(node, []);
+    if (ring) return ring;
+  }
+  return null;
+}
+
+/** Files and the files that they import. */
+function fileGraph(sources: ReadonlyMap<string, string>): Map<string, string[]> {
+  const resolve = (target: string): string[] =>
+    [`${target}.ts`, `${target}.tsx`, target].filter((name) => sources.has(name)).slice(0, 1);
+  return new Map(
+    [...sources].map(([path, text]) => [path, importsOf(path, text).flatMap(resolve)]),
+  );
+}
 
 /**
  * From the lowest to the highest: each part may import from those that it names, from itself,
@@ -67,10 +131,10 @@ const TABLE: Table = {
   main: ['styles', 'strings', 'store', 'alarms', 'ui', 'npm:react', 'npm:react-dom'],
   // For tests alone: no part above names it.
   testing: [
-    ...['contract', 'domain', 'connection', 'store'],
+    ...['contract', 'domain', 'draw', 'connection', 'store'],
     // The file that comes with the bridge: the page itself has no copy of it.
     '../../backend/lupin_bridge/sensors.json',
-    ...['npm:vitest', 'npm:@testing-library/react', 'npm:typescript', 'npm:node:path'],
+    ...['npm:vitest', 'npm:@testing-library/react'],
   ],
 };
 

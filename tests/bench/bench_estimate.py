@@ -17,8 +17,9 @@ from typing import NamedTuple
 import numpy as np
 
 from lupin_twin.core.parameters import TwinParameters
-from lupin_twin.estimate import Model, Readings, fit
 from lupin_twin.estimate.engine import TagPast, readings_of
+from lupin_twin.estimate.kernel import Readings
+from lupin_twin.estimate.model import Model, fit
 from lupin_twin.field.engine import FieldRules
 from lupin_twin.field.idw import compute_idw_field
 from tests.bench import plain_estimate

@@ -13,8 +13,10 @@ from collections import Counter
 
 import numpy as np
 
-from lupin_twin.estimate import Posterior, Readings, fit
 from lupin_twin.estimate.engine import Record, Tally, thinned
+from lupin_twin.estimate.kernel import Readings
+from lupin_twin.estimate.model import fit
+from lupin_twin.estimate.posterior import Posterior
 from tests.bench.bench_estimate import INTERVAL_SDS, case_of
 from tests.bench.other_worlds import (
     CHOOSING,

@@ -13,8 +13,9 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import numpy as np  # its threads are counted when it is loaded
 
-from lupin_twin.estimate import Readings, fit
 from lupin_twin.estimate.engine import thinned
+from lupin_twin.estimate.kernel import Readings
+from lupin_twin.estimate.model import fit
 from lupin_twin.field.idw import compute_idw_field
 from tests.bench.bench_estimate import INTERVAL_SDS, RULES, rmse
 from tests.bench.other_worlds import DAY_S, HOUR_S, Floats

@@ -8,8 +8,9 @@ from typing import TypeVar
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
-from lupin_twin.estimate import Posterior, fit
 from lupin_twin.estimate.engine import thinned
+from lupin_twin.estimate.model import fit
+from lupin_twin.estimate.posterior import Posterior
 from lupin_twin.field.idw import FieldSample, compute_idw_field
 from tests.support.estimates import DAY_S, many_tags
 

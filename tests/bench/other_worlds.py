@@ -13,7 +13,7 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
-from lupin_twin.estimate import Readings
+from lupin_twin.estimate.kernel import Readings
 
 HOUR_S: Final = 3_600.0
 DAY_S: Final = 86_400.0

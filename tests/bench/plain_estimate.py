@@ -8,7 +8,7 @@ from typing import Final
 
 import numpy as np
 
-from lupin_twin.estimate import Readings
+from lupin_twin.estimate.kernel import Readings
 from lupin_twin.estimate.model import minimise
 from tests.bench.other_worlds import HOUR_S, Floats
 

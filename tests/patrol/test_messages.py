@@ -4,22 +4,22 @@ from math import cos, pi, sin
 from typing import Any
 
 import pytest
-from builtin_interfaces.msg import Time
 from lupin_msgs.msg import Observation
 from rclpy.serialization import deserialize_message, serialize_message
 
 from lupin_patrol import node as messages
 from lupin_patrol.greenhouse import Rect
-from lupin_patrol.mission import FlowersSeen, ScanStatus, TagScanned, pose_of
-from lupin_twin.core.state import Bloom, Flower
+from lupin_patrol.mission import ScanStatus, Visited, pose_of
+from lupin_twin.core.state import Bloom, Flower, Inspection, Scan
 
-STAMP = Time(sec=12, nanosec=34)
+STAMP_NS = 12_000_000_034
 POSE = pose_of((1.5, 2.5), pi / 2)
 # Numbers that a float32 holds exactly: what was sent equals what comes.
 BLOOM = Bloom(1.5, 2.2, 0.6, 0.25, "lupin", 0.875, anomaly=True)
 BOX = Rect(1.0, 2.0, 2.0, 2.25)
 CORNERS = tuple((x, y, 0.0) for x, y in BOX.corners)
-FLOWERS = FlowersSeen(3.2, 4, "7", POSE, Flower("lupin", 0.75, True, 12, 3, (BLOOM,), CORNERS))
+FLOWER = Flower("lupin", 0.75, True, 12, 3, (BLOOM,), CORNERS)
+FLOWERS = Visited(3.2, 4, 0.0, Inspection("7", 0, FLOWER, POSE))
 
 
 @pytest.fixture(autouse=True)
@@ -42,8 +42,8 @@ def over_the_wire(message: Any) -> Any:
     ],
 )
 def test_a_failed_scan_says_why_and_has_no_pose(status: ScanStatus, expected: int) -> None:
-    failed = TagScanned(3.0, 0, "7", status, "the way is blocked", 0.0, (), None)
-    message = over_the_wire(messages.tag_reading(failed, STAMP, "map"))
+    failed = Visited(3.0, 0, 0.0, Scan("7", 0, (), None, status, "the way is blocked"))
+    message = over_the_wire(messages.observation(failed, STAMP_NS, "map"))
     assert message.status == expected
     assert message.status_detail == "the way is blocked"
     assert message.tag_reading.tag_id == "7"
@@ -53,7 +53,7 @@ def test_a_failed_scan_says_why_and_has_no_pose(status: ScanStatus, expected: in
 
 
 def test_a_flower_observation() -> None:
-    message = over_the_wire(messages.inspection(FLOWERS, STAMP, "map"))
+    message = over_the_wire(messages.observation(FLOWERS, STAMP_NS, "map"))
     assert message.kind == Observation.KIND_FLOWER
     assert message.status == Observation.STATUS_OK
     assert message.mission_id == "patrol-0005"

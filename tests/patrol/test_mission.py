@@ -15,15 +15,14 @@ from lupin_patrol.mission import (
     DOCK,
     START_OF_DAY_S,
     Event,
-    FlowersSeen,
     MapGrown,
     Mission,
     PassCompleted,
     ScanStatus,
-    TagScanned,
     TagsDiscovered,
+    Visited,
 )
-from lupin_twin.core.state import Pose
+from lupin_twin.core.state import Inspection, Pose, Scan
 from tests.support.climate import known_in
 
 DEFAULT_SEED = 0
@@ -46,6 +45,10 @@ def until(passes: int, events: Iterator[Event]) -> Iterator[Event]:
 
 def only(kind: type[EventT], events: list[Event]) -> list[EventT]:
     return [event for event in events if isinstance(event, kind)]
+
+
+def scans_of(events: list[Event]) -> list[Scan]:
+    return [visit.write for visit in only(Visited, events) if isinstance(visit.write, Scan)]
 
 
 @pytest.fixture(scope="module")
@@ -103,8 +106,8 @@ def test_a_tag_is_discovered_before_it_is_tried(many_first_passes: list[list[Eve
         for event in events:
             if isinstance(event, TagsDiscovered):
                 discovered = {sighting.tag.tag_id for sighting in event.sightings}
-            elif isinstance(event, TagScanned):
-                assert event.tag_id in discovered
+            elif isinstance(event, Visited):
+                assert event.write.tag_id in discovered
 
 
 # --- scans ---------------------------------------------------------------------------------------
@@ -114,8 +117,8 @@ def test_every_tag_is_read_within_a_minute_its_retries_included(
     many_first_passes: list[list[Event]],
 ) -> None:
     for events in many_first_passes:
-        scans = only(TagScanned, events)
-        assert len({scan.tag_id for scan in scans if scan.status is ScanStatus.OK}) == 29
+        scans = scans_of(events)
+        assert len({scan.tag_id for scan in scans if scan.status == ScanStatus.OK}) == 29
         [completed] = only(PassCompleted, events)
         assert completed.failed == ()
         # Patrol time: a second of it is a second at the default speed. Five seconds are left for
@@ -125,9 +128,9 @@ def test_every_tag_is_read_within_a_minute_its_retries_included(
 
 def test_a_tags_readings_are_exactly_the_sensors_it_carries(patrol: list[Event]) -> None:
     tags = GreenhouseSimulator().tag_manager.get_tags()
-    for scan in only(TagScanned, patrol):
-        if scan.status is ScanStatus.OK:
-            assert [name for name, _ in scan.readings] == tags[scan.tag_id]["sensors"]
+    for scan in scans_of(patrol):
+        if scan.status == ScanStatus.OK:
+            assert [reading.name for reading in scan.readings] == tags[scan.tag_id]["sensors"]
 
 
 def test_readings_are_in_the_contracts_units(patrol: list[Event]) -> None:
@@ -138,23 +141,23 @@ def test_readings_are_in_the_contracts_units(patrol: list[Event]) -> None:
         "light": (500.0, 1_200.0),
         "soil_moisture": (20.0, 100.0),
     }
-    for scan in only(TagScanned, patrol):
-        for name, value in scan.readings:
-            low, high = plausible[name]
-            assert low < value < high, (name, value)
+    for scan in scans_of(patrol):
+        for reading in scan.readings:
+            low, high = plausible[reading.name]
+            assert low < reading.value < high, reading
 
 
 def test_some_scans_fail_in_both_ways_and_a_failed_one_has_neither_readings_nor_pose(
     many_first_passes: list[list[Event]],
 ) -> None:
     for events in many_first_passes:
-        failed = [scan for scan in only(TagScanned, events) if scan.status is not ScanStatus.OK]
+        failed = [scan for scan in scans_of(events) if scan.status != ScanStatus.OK]
         assert {scan.status for scan in failed} == {ScanStatus.UNREACHABLE, ScanStatus.SCAN_FAILED}
         for scan in failed:
             assert scan.readings == ()
             assert scan.pose is None
             assert scan.status_detail
-            later = [s for s in only(TagScanned, events) if s.tag_id == scan.tag_id][1:]
+            later = [s for s in scans_of(events) if s.tag_id == scan.tag_id][1:]
             assert [s.status for s in later] == [ScanStatus.OK]
 
 
@@ -162,15 +165,18 @@ def test_a_retry_may_fail_too_and_a_later_pass_brings_the_tag_back(patrol: list[
     lost = [(done.pass_index, tag) for done in only(PassCompleted, patrol) for tag in done.failed]
     assert lost
     for pass_index, tag_id in lost:
-        attempts = [s for s in only(TagScanned, patrol) if s.tag_id == tag_id]
-        in_pass = [s.status for s in attempts if s.pass_index == pass_index]
+        in_pass = [
+            visit.write.status
+            for visit in only(Visited, patrol)
+            if visit.write.tag_id == tag_id and visit.pass_index == pass_index
+        ]
         assert len(in_pass) == 2
         assert ScanStatus.OK not in in_pass
     pass_index, tag_id = lost[0]
     assert any(
-        scan.status is ScanStatus.OK
-        for scan in only(TagScanned, patrol)
-        if scan.tag_id == tag_id and scan.pass_index > pass_index
+        visit.write.status == ScanStatus.OK
+        for visit in only(Visited, patrol)
+        if visit.write.tag_id == tag_id and visit.pass_index > pass_index
     )
 
 
@@ -180,12 +186,13 @@ def yaw_of(pose: Pose) -> float:
 
 def test_poses_are_the_tags_own_at_first_and_jitter_a_little_later(patrol: list[Event]) -> None:
     greenhouse = Mission(GreenhouseSimulator(), 0, DAY_SPEED).greenhouse
-    for scan in only(TagScanned, patrol):
+    for visit in only(Visited, patrol):
+        scan = visit.write
         if scan.pose is None:
             continue
         tag = greenhouse.tag(scan.tag_id)
         off = dist((scan.pose.x, scan.pose.y), tag.position)
-        if scan.pass_index == 0:
+        if visit.pass_index == 0:
             assert off == 0.0
             assert yaw_of(scan.pose) == pytest.approx(tag.yaw)
         else:
@@ -197,21 +204,23 @@ def test_poses_are_the_tags_own_at_first_and_jitter_a_little_later(patrol: list[
 
 
 def test_a_look_at_the_flowers_follows_every_scan_that_went_well(patrol: list[Event]) -> None:
-    observations = [e for e in patrol if isinstance(e, TagScanned | FlowersSeen)]
+    observations = [visit.write for visit in only(Visited, patrol)]
     for scan, following in pairwise(observations):
-        if isinstance(scan, TagScanned) and scan.status is ScanStatus.OK:
-            assert isinstance(following, FlowersSeen)
+        if isinstance(scan, Scan) and scan.status == ScanStatus.OK:
+            assert isinstance(following, Inspection)
             assert (following.tag_id, following.pose) == (scan.tag_id, scan.pose)
-        elif isinstance(scan, TagScanned):
-            assert isinstance(following, TagScanned)
+        elif isinstance(scan, Scan):
+            assert isinstance(following, Scan)
 
 
 def test_blooms_stand_in_the_box_and_the_box_is_the_tags_table(patrol: list[Event]) -> None:
     greenhouse = Mission(GreenhouseSimulator(), 0, DAY_SPEED).greenhouse
-    for event in only(FlowersSeen, patrol):
-        box = greenhouse.tag(event.tag_id).table.rect
-        assert event.flower.footprint == tuple((x, y, 0.0) for x, y in box.corners)
-        assert all(box.contains((bloom.x, bloom.y)) for bloom in event.flower.blooms)
+    seen = [visit.write for visit in only(Visited, patrol) if isinstance(visit.write, Inspection)]
+    for inspection in seen:
+        box, flower = greenhouse.tag(inspection.tag_id).table.rect, inspection.flower
+        assert flower is not None
+        assert flower.footprint == tuple((x, y, 0.0) for x, y in box.corners)
+        assert all(box.contains((bloom.x, bloom.y)) for bloom in flower.blooms)
 
 
 # --- the robot and the day -----------------------------------------------------------------------
@@ -236,7 +245,8 @@ def test_the_robot_never_enters_a_table_nor_jumps(monkeypatch: pytest.MonkeyPatc
 
 
 def test_the_day_goes_on_at_its_own_speed_and_wraps_at_midnight() -> None:
-    scans = only(TagScanned, played(passes=2, day_speed=1_000.0))
+    played_visits = only(Visited, played(passes=2, day_speed=1_000.0))
+    scans = [visit for visit in played_visits if isinstance(visit.write, Scan)]
     for scan in scans:
         assert 0.0 <= scan.time_of_day_s < 86_400.0
         assert scan.time_of_day_s == pytest.approx(

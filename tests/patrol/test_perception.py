@@ -6,8 +6,7 @@ import pytest
 from greenhouse_sim.simulator import GreenhouseSimulator
 
 from lupin_patrol.greenhouse import Greenhouse, Point, Rect, Table, Tag, read_greenhouse
-from lupin_patrol.perception import TAG_RANGE_M, TagDetector
-from lupin_patrol.plants import Plants
+from lupin_patrol.perception import TAG_RANGE_M, Plants, TagDetector
 
 TABLE = Table("one", Rect(1.0, 1.0, 2.0, 2.0))
 TAG = Tag("7", (1.05, 1.5), ("co2",), TABLE, (1.0, 1.5), (-1.0, 0.0), (0.6, 1.5))

@@ -4,7 +4,7 @@ import pytest
 from greenhouse_sim.simulator import GreenhouseSimulator
 
 from lupin_patrol.greenhouse import TABLE_HEIGHT_M, Greenhouse, read_greenhouse
-from lupin_patrol.plants import SPECIES, Plants
+from lupin_patrol.perception import SPECIES, Plants
 
 PASSES = range(30)
 

@@ -6,8 +6,7 @@ from typing import Any
 from greenhouse_sim.simulator import SensorRegistry
 
 from lupin_patrol.greenhouse import Point
-from lupin_patrol.perception import UNKNOWN, Grid
-from lupin_patrol.plants import value_of
+from lupin_patrol.perception import UNKNOWN, Grid, value_of
 
 
 class Truth:

@@ -3,9 +3,9 @@
 import numpy as np
 from hypothesis import strategies as st
 
-from lupin_twin.estimate import EstimateGrid, Readings
 from lupin_twin.estimate.engine import Estimate
-from lupin_twin.estimate.kernel import Hyper
+from lupin_twin.estimate.kernel import Hyper, Readings
+from lupin_twin.estimate.posterior import EstimateGrid
 from lupin_twin.field.grid import FloatArray
 from tests.support.textbook_gp import Spot
 

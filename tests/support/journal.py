@@ -5,7 +5,7 @@ from collections.abc import Iterable, Iterator
 from contextlib import closing, contextmanager
 from pathlib import Path
 
-from lupin_twin.core.journal_condition import Condition, JournalState
+from lupin_twin.core.diagnostics import Condition, JournalState
 from lupin_twin.core.parameters import World
 from lupin_twin.core.state import Bloom, Flower, Inspection, Pin, Pose, Reading, Scan, Write
 from lupin_twin.journal.file import JournalFile
@@ -13,7 +13,7 @@ from lupin_twin.journal.fold import Restored
 from lupin_twin.journal.retention import Limits
 from lupin_twin.journal.runs import Clock
 from lupin_twin.journal.schema import Empty, open_reader
-from lupin_twin.journal.writer import MAX_WEIGHT, Journal
+from lupin_twin.journal.writer import Journal
 from tests.support.waiting import wait_for
 
 SECOND = 1_000_000_000
@@ -141,11 +141,10 @@ def recording(
     now: Clock = CLOCK,
     *,
     limits: Limits = LIMITS,
-    max_weight: int = MAX_WEIGHT,
     world: World = World(),
 ) -> Iterator[Journal]:
     """A journal at work, its clock begun."""
-    journal = Journal(path, "/test/lupin_twin", limits, max_weight, world=world)
+    journal = Journal(path, "/test/lupin_twin", limits, world=world)
     try:
         journal.begin(now)
         yield journal

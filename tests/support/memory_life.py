@@ -3,12 +3,22 @@
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 from lupin_twin.core import ingest
 from lupin_twin.core.drops import Drop
-from lupin_twin.core.history import KIND_FLOWER, KIND_TAG_READING
-from lupin_twin.core.ingest import Received, ReceivedInspection, ReceivedReading
-from lupin_twin.core.state import Flower, Pose, Reading, Snapshot, TagState, TwinStore
+from lupin_twin.core.history import kind_of
+from lupin_twin.core.ingest import Received
+from lupin_twin.core.state import (
+    Flower,
+    Inspection,
+    Pose,
+    Reading,
+    Scan,
+    Snapshot,
+    TagState,
+    TwinStore,
+)
 from lupin_twin.journal.fold import state_at
 from lupin_twin.journal.runs import Clock
 from lupin_twin.runtime.memory import Memory, open_journal
@@ -56,13 +66,18 @@ class Twin:
         """An observation comes, now, with this stamp; with a flower it is a look."""
         stamp_ns = 0 if stamp_s is None else int(stamp_s * S)
         stamp_ns += 0 if self.is_simulated or stamp_s is None else NOW
-        part = (
-            ReceivedReading(tag, 0, tuple(Reading(*each) for each in readings.items()), pose)
+        of: dict[str, Any] = {
+            "pose": pose,
+            "status": status,
+            "source": source,
+            "own_stamp_ns": stamp_ns,
+        }
+        sent = (
+            Scan(tag, 0, tuple(Reading(*each) for each in readings.items()), **of)
             if flower is None
-            else ReceivedInspection(tag, "", flower, pose)
+            else Inspection(tag, 0, flower, **of)
         )
-        kind = KIND_TAG_READING if flower is None else KIND_FLOWER
-        heard = Received(kind, source, status, "", "", stamp_ns, part)
+        heard = Received(kind_of(sent), "", sent)
         write = ingest.observation(heard, "map", self.now_ns)
         assert not isinstance(write, Drop)
         assert self.memory.apply(write, self.wall_ns) is None

@@ -10,7 +10,7 @@ from typing import Any, TypeVar
 
 from lupin_bridge.feed.query import Now, PastQuery, _found
 from lupin_bridge.past.plans import ConditionalQuery, Query
-from lupin_twin.core.journal_condition import UNKNOWN
+from lupin_twin.core.diagnostics import UNKNOWN
 from lupin_twin.core.notes import NotesRequest, PastNotes
 from lupin_twin.core.past import (
     Event,

@@ -19,8 +19,8 @@ from lupin_bridge.feed.source import TwinSource, TwinUnavailableError, TwinUpdat
 from lupin_bridge.judge.alarm_fold import FORGET_EVERY_NS, Follower, Found
 from lupin_bridge.judge.episodes import Alarm, silence
 from lupin_bridge.judge.judging import Criteria, Judge
+from lupin_twin.core.diagnostics import JournalState
 from lupin_twin.core.history import KIND_FLOWER, KIND_TAG_READING
-from lupin_twin.core.journal_condition import JournalState
 from lupin_twin.core.past import (
     NotRemembered,
     PastRefused,

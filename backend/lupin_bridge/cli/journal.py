@@ -33,8 +33,8 @@ from lupin_bridge.settings import SettingError, settings_from, variable
 from lupin_twin.core.past import NotRemembered, PastRefused, seconds
 from lupin_twin.journal.beside import InUse, demo_journal_path, holder_of, journal_path
 from lupin_twin.journal.checking import Overview, RunExtent, find_all_damage, overview
-from lupin_twin.journal.queries import rows
 from lupin_twin.journal.rebuild import NotPossible, handle_interrupts, vacuum
+from lupin_twin.journal.received import rows
 from lupin_twin.journal.retention import UnknownTagError, forget
 from lupin_twin.journal.schema import FILE_ERRORS, Empty, Foreign, is_damage_error, open_named
 from lupin_twin.runtime.process import INTERRUPTED

@@ -11,7 +11,7 @@ from typing import Any, TypeVar
 from lupin_bridge.feed.query import Now
 from lupin_bridge.feed.ros_source import Post, RosSource, now_ns_of
 from lupin_bridge.feed.source import TwinUpdate
-from lupin_twin.core.journal_condition import Condition
+from lupin_twin.core.diagnostics import Condition
 from lupin_twin.core.notes import Note
 from lupin_twin.core.parameters import World
 from lupin_twin.core.past import NotRemembered

@@ -23,8 +23,8 @@ from dataclasses import dataclass
 from functools import partial
 from typing import IO, Any, Final, Generic, Protocol, TypeVar
 
+from lupin_twin.core.diagnostics import UNKNOWN, Condition
 from lupin_twin.core.history import LatestRequest
-from lupin_twin.core.journal_condition import UNKNOWN, Condition
 from lupin_twin.core.notes import NotesRequest
 from lupin_twin.core.past import (
     PastRow,
@@ -36,9 +36,8 @@ from lupin_twin.core.past import (
     check_moment,
 )
 from lupin_twin.journal.fold import latest, state_at
-from lupin_twin.journal.notes import notes
-from lupin_twin.journal.queries import Export, lots, series
-from lupin_twin.journal.received import observed, recent, scans, writes
+from lupin_twin.journal.queries import series
+from lupin_twin.journal.received import Export, lots, notes, observed, recent, scans, writes
 from lupin_twin.runtime.journal_queries import Recall
 from lupin_twin.runtime.workers import ShouldStop
 

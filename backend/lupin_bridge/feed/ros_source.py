@@ -36,11 +36,10 @@ from lupin_bridge.feed.source import (
     TwinUpdate,
 )
 from lupin_twin.adapt.config import POSES
-from lupin_twin.adapt.messages import message_type, observation
-from lupin_twin.adapt.scans import BuiltScan
+from lupin_twin.adapt.messages import message_type
 from lupin_twin.core import ingest, interfaces
 from lupin_twin.core.drops import Drop, Reason
-from lupin_twin.core.state import NANOSECONDS_PER_SECOND
+from lupin_twin.core.state import NANOSECONDS_PER_SECOND, Scan
 from lupin_twin.field.engine import FieldRules
 from lupin_twin.ros import convert, message_limits
 from lupin_twin.ros.base_node import latched, qos_of, read_message
@@ -424,7 +423,7 @@ class RosSource(TwinSource, Generic[NodeT]):
 
     takes_observations = True
 
-    async def publish_observation(self, scan: BuiltScan, source: str) -> None:
+    async def publish_observation(self, scan: Scan) -> None:
         """See `TwinSource`."""
         topic = self.names.observations_topic
 
@@ -433,7 +432,7 @@ class RosSource(TwinSource, Generic[NodeT]):
                 self._observations = node.create_publisher(
                     Observation, topic, qos_of(interfaces.OBSERVATIONS)
                 )
-            self._observations.publish(observation(scan, "", source))
+            self._observations.publish(convert.observation_message(scan, ""))
 
         await self._in_time(self.thread.call(publish))
 

@@ -17,19 +17,15 @@ from typing import Any, Final, TypeVar
 from lupin_bridge.feed.past_process import PastProcess
 from lupin_bridge.feed.query import ExportStep, Itself, Now, PastQuery
 from lupin_bridge.feed.relay import Relay, TwinNames
-from lupin_twin.adapt.scans import BuiltScan
-from lupin_twin.core.diagnostics import Origin
+from lupin_twin.core.diagnostics import UNKNOWN, Condition, Origin
 from lupin_twin.core.drops import Counts, Recent
-from lupin_twin.core.journal_condition import UNKNOWN, Condition
 from lupin_twin.core.notes import Note, NotesRequest, NotesUnwritable, PastNotes
 from lupin_twin.core.parameters import World
 from lupin_twin.core.past import NotRemembered, PastRow, PastWrites, WritesRequest
-from lupin_twin.core.state import NANOSECONDS_PER_SECOND, Snapshot
+from lupin_twin.core.state import NANOSECONDS_PER_SECOND, Scan, Snapshot
 from lupin_twin.field.engine import FieldRules
 from lupin_twin.field.explored import OccupancyMap
-from lupin_twin.journal.notes import NOTES_S
-from lupin_twin.journal.queries import STRETCH_S, Export
-from lupin_twin.journal.received import WRITES_S
+from lupin_twin.journal.received import NOTES_S, STRETCH_S, WRITES_S, Export
 from lupin_twin.runtime.estimates import Report, ReportRequest
 from lupin_twin.runtime.workers import Workers
 
@@ -338,14 +334,14 @@ class TwinSource(ABC):
     # Whether there is a node to publish by.
     takes_observations = False
 
-    async def publish_observation(self, scan: BuiltScan, source: str) -> None:
+    async def publish_observation(self, scan: Scan) -> None:
         """Publish readings over ROS, as a robot does; whether the twin takes them is the twin's.
 
         Raises:
             TwinUnavailableError: there is no node.
 
         """
-        raise TwinUnavailableError(f"readings of {source} at {scan.tag_id} have no way to ROS")
+        raise TwinUnavailableError(f"readings of {scan.source} at {scan.tag_id} have no way to ROS")
 
     async def rows(
         self,

@@ -28,7 +28,7 @@ from lupin_bridge.feed.ros_source import Post, RosSource, now_ns_of
 from lupin_bridge.feed.shared_work import Periodic, end
 from lupin_bridge.feed.source import TwinUnavailableError, TwinUpdate
 from lupin_bridge.feed.web_node import WebNode, check_ok
-from lupin_twin.core.journal_condition import UNKNOWN, Condition, JournalState
+from lupin_twin.core.diagnostics import UNKNOWN, Condition, JournalState
 from lupin_twin.core.parameters import World
 from lupin_twin.core.past import NotRemembered, PastRefused
 from lupin_twin.core.state import Snapshot

@@ -79,9 +79,9 @@ from lupin_bridge.serving.http_protocol import PieceByPiece
 from lupin_bridge.settings import Settings
 from lupin_bridge.stream.frames import Status
 from lupin_bridge.stream.hub import Client, Hub
-from lupin_twin.core.journal_condition import UNKNOWN, Condition, JournalState
+from lupin_twin.core.diagnostics import UNKNOWN, Condition, JournalState
 from lupin_twin.core.past import seconds
-from lupin_twin.journal.queries import STRETCH_S, Export
+from lupin_twin.journal.received import STRETCH_S, Export
 from lupin_twin.runtime.workers import Workers
 
 _TIDY_S: Final = 5.0

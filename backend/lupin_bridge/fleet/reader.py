@@ -32,7 +32,7 @@ from lupin_twin.core.state import Snapshot
 from lupin_twin.field.explored import OccupancyMap, map_of
 from lupin_twin.journal.appending import simulated
 from lupin_twin.journal.fold import state_at
-from lupin_twin.journal.notes import last_number, put_note
+from lupin_twin.journal.received import last_number, put_note
 from lupin_twin.journal.retention import Stretches, kept
 from lupin_twin.journal.runs import FOREVER_NS, runs, span_at, world_of
 from lupin_twin.journal.schema import MAP, DamagedFile, SiteLog

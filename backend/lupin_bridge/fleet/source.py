@@ -22,7 +22,7 @@ from lupin_bridge.fleet.overview import Archive, Site, same_tags
 from lupin_bridge.fleet.reader import Latest, Reported
 from lupin_bridge.fleet.watcher import News
 from lupin_bridge.settings import Settings
-from lupin_twin.core.journal_condition import UNKNOWN, Condition, JournalState
+from lupin_twin.core.diagnostics import UNKNOWN, Condition, JournalState
 from lupin_twin.core.notes import Note, NotesUnwritable
 from lupin_twin.core.parameters import TwinParameters, World
 from lupin_twin.core.past import NotRemembered

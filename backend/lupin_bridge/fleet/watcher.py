@@ -37,8 +37,7 @@ from lupin_twin.core.notes import Note, NotesRequest
 from lupin_twin.core.past import NotRemembered, RecentRequest, WritesRequest
 from lupin_twin.core.state import Snapshot
 from lupin_twin.journal.fold import state_at
-from lupin_twin.journal.notes import notes
-from lupin_twin.journal.received import recent, writes
+from lupin_twin.journal.received import notes, recent, writes
 from lupin_twin.journal.runs import FOREVER_NS, runs, span_at
 from lupin_twin.journal.schema import ORIGIN, DamagedFile, SiteLog
 from lupin_twin.runtime.journal_queries import Recall

@@ -19,7 +19,7 @@ from lupin_bridge.judge.quantities import DAILY, Sensors
 from lupin_bridge.past.query import OfExport, compact, iso
 from lupin_bridge.query_string import safe_name
 from lupin_bridge.stream.state_json import moment, stamp
-from lupin_twin.core.journal_condition import UNKNOWN, Condition
+from lupin_twin.core.diagnostics import UNKNOWN, Condition
 from lupin_twin.core.past import Event, Grid, PastRow, SeriesPast, SeriesRequest, grid, seconds
 from lupin_twin.core.state import NANOSECONDS_PER_SECOND
 

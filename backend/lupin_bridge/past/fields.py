@@ -35,10 +35,11 @@ from lupin_twin.field.engine import (
     compute_field,
     cost_s,
     default_box,
+    leave_one_out,
+    painted_share,
 )
 from lupin_twin.field.explored import OccupancyMap
 from lupin_twin.field.grid import FieldGrid, far_off_tags
-from lupin_twin.field.quality import leave_one_out, painted_share
 from lupin_twin.journal.queries import NEWEST_S_PER_TAG
 from lupin_twin.runtime.estimates import AS_OF, estimate_at, readings_at
 from lupin_twin.runtime.workers import ShouldStop

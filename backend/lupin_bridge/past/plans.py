@@ -24,8 +24,8 @@ from lupin_bridge.judge.quantities import DAILY, DAY_NS, DERIVED, Daily, Derived
 from lupin_bridge.past import bodies
 from lupin_bridge.serving.admission import REVALIDATE, Answer, json_answer
 from lupin_bridge.stream.state_json import StateJson, history, judgement
+from lupin_twin.core.diagnostics import Condition
 from lupin_twin.core.history import LatestRequest, tag_history
-from lupin_twin.core.journal_condition import Condition
 from lupin_twin.core.past import (
     DEFAULT_POINTS,
     EVERY_TAG,

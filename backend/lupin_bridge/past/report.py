@@ -30,8 +30,8 @@ from lupin_bridge.past import bodies
 from lupin_bridge.past.plans import JSON_TYPE, Plan
 from lupin_bridge.serving.admission import REVALIDATE, Answer
 from lupin_bridge.stream.state_json import alarm_json, note_json, stamp
+from lupin_twin.core.diagnostics import Condition
 from lupin_twin.core.history import KIND_FLOWER
-from lupin_twin.core.journal_condition import Condition
 from lupin_twin.core.notes import WITHDRAW, Note, NotesRequest, PastNotes, withdrawals
 from lupin_twin.core.past import (
     EVERY_TAG,

@@ -46,11 +46,9 @@ from lupin_bridge.routes.pages import language_of
 from lupin_bridge.serving.admission import AdmissionError, Answer, ClientLimitError
 from lupin_bridge.stream import routes_schema
 from lupin_bridge.stream.state_json import note_json, stamp
-from lupin_twin.adapt.config import Place
-from lupin_twin.adapt.scans import BuiltScan
 from lupin_twin.core.notes import COMMENT, SHELVE, WITHDRAW, WITHDRAWN, Note, withdrawals
 from lupin_twin.core.past import NotRemembered, PastRefused
-from lupin_twin.core.state import NANOSECONDS_PER_SECOND
+from lupin_twin.core.state import NANOSECONDS_PER_SECOND, Pose, Reading, Scan
 
 log = logging.getLogger(__name__)
 
@@ -338,10 +336,12 @@ async def post_observation(request: Request) -> Response:
     if now_ns is None or not bridge.status.is_live:
         raise TwinUnavailableError("the twin is silent: post it again later")
     stamp_ns = _stamp_ns(draft.observed_at, now_ns)
-    place = None if draft.place is None else Place(*draft.place)
-    scan = BuiltScan(draft.tag_id, stamp_ns, place, tuple(draft.readings.items()), "")
+    pose = None if draft.place is None else Pose.at(*draft.place)
+    readings = tuple(Reading(*each) for each in draft.readings.items())
     source = f"http/{person.name}"
-    await bridge.source.publish_observation(scan, source)
+    await bridge.source.publish_observation(
+        Scan(draft.tag_id, stamp_ns, readings, pose, source=source)
+    )
     body = {"tag_id": draft.tag_id, "observed_at": stamp(stamp_ns), "source": source}
     return json_response(orjson.dumps(body), 202)
 

@@ -27,7 +27,7 @@ from lupin_bridge.stream.state_json import (
     judgement_since,
     stamp,
 )
-from lupin_twin.core.journal_condition import Condition, JournalState
+from lupin_twin.core.diagnostics import Condition, JournalState
 from lupin_twin.core.notes import Note
 from lupin_twin.core.parameters import World
 from lupin_twin.core.state import ClockState, Snapshot, TagState

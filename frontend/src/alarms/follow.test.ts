@@ -2,6 +2,8 @@ import { afterEach, beforeEach, describe, expect, test, vi } from 'vitest';
 
 import { onMapCommand } from '../map/commands';
 import { act, receive, store } from '../store/app';
+import { withState } from '../store/twin';
+import { withList, withTag } from '../store/view';
 import { alarm, tellAlarms } from '../testing/alarms';
 import { showTags } from '../testing/page';
 import { stateFrame, wireTag } from '../testing/tags';
@@ -43,10 +45,10 @@ describe('follow', () => {
   beforeEach(() => {
     vi.spyOn(performance, 'now').mockReturnValue(performance.now());
     commands.length = 0;
-    own.dispatch(NOTHING_KEPT);
+    own.set(NOTHING_KEPT);
     showTags([]);
     const latest = stateFrame([wireTag()], { sec: 10_000 });
-    receive({ type: 'state', latest, now: performance.now() });
+    receive(withState(latest, performance.now()));
     stops = [startAlarms(), onMapCommand((command) => commands.push(command))];
   });
   afterEach(() => {
@@ -57,9 +59,9 @@ describe('follow', () => {
   test('an alarm leads to its tag and sensor as they are now, and is not acknowledged by that', () => {
     const co2 = alarm('a', { tag_id: '5', raised: 9_000, reason: { sensor: 'co2' } });
     tellAlarms(co2);
-    act({ type: 'compare', compare: { by: 'ago', seconds: 60 } });
-    act({ type: 'moment', moment: 9_100 });
-    act({ type: 'list', list: 'alarms' });
+    act({ compare: { by: 'ago', seconds: 60 } });
+    act({ moment: 9_100 });
+    act(withList('alarms'));
     showAlarm(co2);
     const { view } = store.get();
     expect(view).toMatchObject({ moment: null, selected: '5', sensor: 'co2', pane: 'tags' });
@@ -73,7 +75,7 @@ describe('follow', () => {
       ...alarm('a', { tag_id: '5', reason: { sensor: 'co2' } }),
       raised_at: { sec: 9_000, nanosec: 1_200_001 },
     };
-    act({ type: 'list', list: 'alarms' });
+    act(withList('alarms'));
     goToStart(co2);
     const { view } = store.get();
     expect(view).toMatchObject({ moment: 9_000.002, selected: '5', sensor: 'co2', pane: 'map' });
@@ -82,13 +84,13 @@ describe('follow', () => {
   });
 
   test('of the greenhouse it leads to the moment alone; there is none that has not come yet', () => {
-    act({ type: 'select', tagId: '1' });
+    act(withTag('1'));
     const silent = alarm('a', {
       tag_id: '',
       raised: 9_500,
       reason: { kind: 'silent', sensor: '' },
     });
-    act({ type: 'list', list: 'alarms' });
+    act(withList('alarms'));
     showAlarm(silent);
     // No card says it.
     expect(store.get().view).toMatchObject({ moment: null, selected: null, pane: 'map' });

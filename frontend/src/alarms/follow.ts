@@ -49,14 +49,11 @@ export function goToStart(alarm: Alarm): void {
 function look(alarm: Alarm, when: Partial<Pick<ViewState, 'moment' | 'period' | 'pane'>>): void {
   const { view } = store.get();
   act({
-    type: 'look',
-    view: {
-      ...when,
-      selected: alarm.tag_id || null,
-      sensor: alarm.reason.sensor || view.sensor,
-      chart: null,
-      compare: null,
-    },
+    ...when,
+    selected: alarm.tag_id || null,
+    sensor: alarm.reason.sensor || view.sensor,
+    chart: null,
+    compare: null,
   });
   if (alarm.tag_id !== '') commandMap({ type: 'show', tagId: alarm.tag_id });
 }

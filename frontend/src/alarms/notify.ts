@@ -26,14 +26,14 @@ function stateNow(): NotifyState {
   return permission === 'granted' ? 'granted' : permission === 'denied' ? 'refused' : 'asks';
 }
 
-export const notifyState = createStore<NotifyState, NotifyState>('none', (_, next) => next);
+export const notifyState = createStore<NotifyState>('none');
 
 /** The operator's wish, told by a click: only then the browser is asked. */
 export async function wishNotify(isWished: boolean): Promise<void> {
-  notifyState.dispatch(stateNow());
+  notifyState.set(stateNow());
   if (isWished && notifyState.get() === 'asks') {
     await Notification.requestPermission();
-    notifyState.dispatch(stateNow());
+    notifyState.set(stateNow());
   }
   const isOn = isWished && notifyState.get() === 'granted';
   preferTold({ notify: isOn });
@@ -71,16 +71,16 @@ function show(raised: readonly Item[]): void {
     };
   } catch {
     // Some browsers let no page make them, and say so only now.
-    notifyState.dispatch('none');
+    notifyState.set('none');
     preferTold({ notify: false });
   }
 }
 
 /** Tells of what is new where that is wished and nobody looks; returns the way to stop. */
 export function startNotify(): () => void {
-  notifyState.dispatch(stateNow());
+  notifyState.set(stateNow());
   return onNews(({ raised }) => {
-    notifyState.dispatch(stateNow());
+    notifyState.set(stateNow());
     const isLooking = document.visibilityState === 'visible' && document.hasFocus();
     if (own.get().notify && notifyState.get() === 'granted' && !isLooking) show(raised);
   });
@@ -173,7 +173,7 @@ export const QUIET_MS = 10_000;
  */
 export type SoundState = 'ready' | 'waits' | 'none';
 
-export const soundState = createStore<SoundState, SoundState>('waits', (_, next) => next);
+export const soundState = createStore<SoundState>('waits');
 
 /** Notes of a critical alarm and of any other: Hz, one after the other. */
 const NOTES = { critical: [880, 660, 880, 660], other: [660, 880] } as const;
@@ -205,11 +205,11 @@ async function wake(make: () => AudioContext): Promise<void> {
   try {
     context ??= make();
   } catch {
-    soundState.dispatch('none');
+    soundState.set('none');
     return;
   }
   await context.resume().catch(() => undefined);
-  soundState.dispatch(context.state === 'running' ? 'ready' : 'waits');
+  soundState.set(context.state === 'running' ? 'ready' : 'waits');
 }
 
 function sound(notes: readonly number[]): void {
@@ -251,6 +251,6 @@ export function startSound(make: () => AudioContext = () => new AudioContext()):
     void context?.close().catch(() => undefined);
     context = null;
     playedAt = -Infinity;
-    soundState.dispatch('waits');
+    soundState.set('waits');
   };
 }

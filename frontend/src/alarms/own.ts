@@ -196,7 +196,7 @@ export function writeKept(storage: Pick<Storage, 'setItem'>, kept: Kept): void {
   }
 }
 
-export const own = createStore<Kept, Kept>(NOTHING_KEPT, (_, next) => next);
+export const own = createStore<Kept>(NOTHING_KEPT);
 
 /** For so long the last action can be undone where it was done, ms; later in the list. */
 export const UNDO_MS = 10_000;
@@ -211,7 +211,7 @@ export interface Done {
 }
 
 /** The last action, as long as it can be undone; null: there is none. */
-export const done = createStore<Done | null, Done | null>(null, (_, next) => next);
+export const done = createStore<Done | null>(null);
 
 /** Told of what is done here, with what was kept before and after; null: it stays here. */
 export const acting: { tell: ((before: Kept, next: Kept) => void) | null } = { tell: null };
@@ -220,13 +220,13 @@ let timer: ReturnType<typeof setTimeout> | undefined;
 
 function setDone(action: Done | null): void {
   clearTimeout(timer);
-  done.dispatch(action);
+  done.set(action);
   if (action) timer = setTimeout(setDone, UNDO_MS, null);
 }
 
 function change(what: Done['what'], count: number, next: Kept): void {
   const before = own.get();
-  own.dispatch(next);
+  own.set(next);
   setDone({ what, count, before });
   acting.tell?.(before, next);
 }
@@ -253,25 +253,25 @@ export function undo(): void {
   if (!last) return;
   const { acknowledged, shelved } = last.before;
   const now = own.get();
-  own.dispatch({ ...now, acknowledged, shelved });
+  own.set({ ...now, acknowledged, shelved });
   setDone(null);
   acting.tell?.(now, own.get());
 }
 
 export const preferTold = (way: Partial<Pick<Kept, 'sound' | 'notify'>>): void => {
-  own.dispatch({ ...own.get(), ...way });
+  own.set({ ...own.get(), ...way });
 };
 
 /** Takes what was kept, and keeps what is done from now on; returns the way to stop. */
 export function startOwn(storage: Pick<Storage, 'getItem' | 'setItem'>): () => void {
-  own.dispatch(readKept(storage));
+  own.set(readKept(storage));
   const stop = own.subscribe(() => {
     writeKept(storage, own.get());
   });
   // Another tab has kept something: to undo what was done here would undo that as well.
   const onStorage = ({ key }: StorageEvent): void => {
     if (!isKept(key)) return;
-    own.dispatch(readKept(storage));
+    own.set(readKept(storage));
     setDone(null);
   };
   window.addEventListener('storage', onStorage);

@@ -3,7 +3,8 @@ import { afterEach, beforeEach, describe, expect, test, vi } from 'vitest';
 
 import type { Alarm } from '../contract/types';
 import { act, receive, store } from '../store/app';
-import { NO_HOUSE } from '../store/twin';
+import { announce } from '../store/create';
+import { NO_HOUSE, withPast } from '../store/twin';
 import { alarm, tellAlarms } from '../testing/alarms';
 import { showTags } from '../testing/page';
 import { wireTag } from '../testing/tags';
@@ -42,7 +43,7 @@ const start = (...starts: (() => () => void)[]): void => {
 };
 
 beforeEach(() => {
-  own.dispatch(NOTHING_KEPT);
+  own.set(NOTHING_KEPT);
   showTags([wireTag()]);
 });
 afterEach(() => {
@@ -57,8 +58,8 @@ describe('title', () => {
     expect(document.title).toBe('Lupin twin');
     tellAlarms(cold, warm, alarm('over', { cleared: 950 }));
     expect(document.title).toBe('(2) Lupin twin');
-    act({ type: 'moment', moment: 50 });
-    receive({ type: 'past', past: { at: 50, house: NO_HOUSE } });
+    act({ moment: 50 });
+    receive(withPast({ at: 50, house: NO_HOUSE }));
     expect(document.title).toBe('(2) sim 00:00:50 (past) · Lupin twin');
     acknowledgeAlarms(calling(alarmList.get()));
     expect(document.title).toBe('(2) sim 00:00:50 (past) · Lupin twin');
@@ -99,8 +100,8 @@ describe('voices', () => {
   const keys = (): number => politeVoice.get().key + urgentVoice.get().key;
 
   test('one announcement a change; only a critical alarm cuts in', () => {
-    politeVoice.dispatch('');
-    urgentVoice.dispatch('');
+    announce(politeVoice, '');
+    announce(urgentVoice, '');
     start(startVoices);
     const before = keys();
     tellAlarms(warm);
@@ -190,7 +191,7 @@ describe('sound', () => {
 
   test('kept from another day it waits for a click, and says so', async () => {
     const audio = new Audio(false);
-    own.dispatch({ ...NOTHING_KEPT, sound: true });
+    own.set({ ...NOTHING_KEPT, sound: true });
     start(() => startSound(() => audio as unknown as AudioContext));
     expect(soundState.get()).toBe('waits');
     document.dispatchEvent(new Event('pointerup'));
@@ -215,7 +216,7 @@ describe('sound', () => {
       throw new Error('no device');
     });
     expect(soundState.get()).toBe('none');
-    soundState.dispatch('waits');
+    soundState.set('waits');
   });
 });
 

@@ -47,7 +47,7 @@ beforeEach(() => {
   vi.useFakeTimers({ toFake: ['setTimeout', 'clearTimeout', 'Date'] });
   told = [];
   kept.clear();
-  own.dispatch(NOTHING_KEPT);
+  own.set(NOTHING_KEPT);
   showTags([wireTag()]);
   start();
 });
@@ -77,7 +77,7 @@ test('what the page opens with is no news; what comes later is, once', () => {
 
 test('a bridge that starts anew and goes through the past tells nothing twice', () => {
   tellAlarms(alarm('a'));
-  receive({ type: 'set', part: { alarms: alarms([], { source: 'starting', since: null }) } });
+  receive({ alarms: alarms([], { source: 'starting', since: null }) });
   expect(ids()).toEqual([]);
   tellAlarms(alarm('a'), alarm('b', { tag_id: '2' }));
   expect(told).toEqual(['b']);
@@ -100,7 +100,7 @@ test('acknowledged holds after a reload, and what is done here is no news', () =
   unshelveAlarm(item('b').alarm);
   expect(ids()).toEqual(['b']);
   stop();
-  own.dispatch(NOTHING_KEPT);
+  own.set(NOTHING_KEPT);
   start();
   tellAlarms(alarm('a'), alarm('b', { tag_id: '2' }));
   expect(ids()).toEqual(['b']);
@@ -158,7 +158,7 @@ test('what another tab of the browser has acknowledged is so here', () => {
 test('while another moment is shown, what comes is told apart until it is acknowledged or resolved', () => {
   const now = (): string[] => meanwhile.get().map(({ alarm: { id } }) => id);
   tellAlarms(alarm('a'));
-  act({ type: 'moment', moment: 50 });
+  act({ moment: 50 });
   expect(now()).toEqual([]);
   const b = alarm('b', { tag_id: '2', reason: STRESSED });
   const c = alarm('c', { tag_id: '3' });
@@ -171,8 +171,8 @@ test('while another moment is shown, what comes is told apart until it is acknow
   expect(now()).toEqual([]);
   tellAlarms(alarm('d', { tag_id: '4' }), alarm('a'));
   expect(now()).toEqual(['d']);
-  act({ type: 'moment', moment: null });
+  act({ moment: null });
   expect(now()).toEqual([]);
-  act({ type: 'moment', moment: 60 });
+  act({ moment: 60 });
   expect(now()).toEqual([]);
 });

@@ -6,7 +6,7 @@ import { now, timeOfDay } from '../clock';
 import type { Alarms } from '../contract/types';
 import { rosText } from '../domain/time';
 import { onChange, store } from '../store/app';
-import { createStore, createVoice } from '../store/create';
+import { announce, createStore, createVoice } from '../store/create';
 import { rosNow, selectIsRecorded, selectShown } from '../store/moment';
 import { S } from '../strings';
 import { nextEnd, own, pruned, startOwn } from './own';
@@ -24,7 +24,7 @@ import { textNow } from './speech';
 import { severalText } from './words';
 
 /** The alarms of now. */
-export const alarmList = createStore<AlarmList, AlarmList>(EMPTY_LIST, (_, next) => next);
+export const alarmList = createStore<AlarmList>(EMPTY_LIST);
 
 type Listener = (news: News) => void;
 const listeners = new Set<Listener>();
@@ -52,13 +52,13 @@ export function startAlarms(): () => void {
     const kept = pruned(own.get(), idsOf(alarms), at);
     looked = kept;
     timer = setTimeout(look, Math.min(SWEEP_MS, (nextEnd(kept, at) ?? Infinity) - at), false);
-    if (kept !== own.get()) own.dispatch(kept);
+    if (kept !== own.get()) own.set(kept);
     if (!alarms) return;
     const list = listOf(alarms.alarms, kept, rosNow(state, now()), at);
     const news = told && !isOwnDoing ? newsOf(told, list) : null;
     // While the past is gone through, what is missing from the list is not resolved.
     if (alarms.source !== 'starting') told = list;
-    alarmList.dispatch(sharedList(alarmList.get(), list));
+    alarmList.set(sharedList(alarmList.get(), list));
     if (news && news.raised.length + news.cleared.length > 0) {
       for (const listener of [...listeners]) listener(news);
     }
@@ -74,7 +74,7 @@ export function startAlarms(): () => void {
   return () => {
     clearTimeout(timer);
     for (const stop of stops) stop();
-    alarmList.dispatch(EMPTY_LIST);
+    alarmList.set(EMPTY_LIST);
   };
 }
 
@@ -83,17 +83,16 @@ const idsOf = (alarms: Alarms | null): ReadonlySet<string> =>
   new Set(alarms?.alarms.map(({ id }) => id));
 
 /** Alarms that have come since somebody looks at another moment, the worst first; without those that were acknowledged or shelved since, or are resolved. */
-export const meanwhile = createStore<readonly Item[], readonly Item[]>([], (before, next) =>
-  next.length === before.length && next.every((item, index) => item === before[index])
-    ? before
-    : next,
-);
+export const meanwhile = createStore<readonly Item[]>([]);
 
 export function startMeanwhile(): () => void {
   let ids: ReadonlySet<string> = new Set();
   const update = (): void => {
     if (store.get().view.moment === null) ids = new Set();
-    meanwhile.dispatch(calling(alarmList.get()).filter(({ alarm }) => ids.has(alarm.id)));
+    const before = meanwhile.get();
+    const next = calling(alarmList.get()).filter(({ alarm }) => ids.has(alarm.id));
+    const isSame = next.length === before.length && next.every((it, at) => it === before[at]);
+    if (!isSame) meanwhile.set(next);
   };
   const stops = [
     onNews(({ raised }) => {
@@ -158,8 +157,7 @@ function newsText({ raised, cleared }: News): string {
 export const startVoices = (): (() => void) =>
   onNews((news) => {
     const isUrgent = news.raised.some(({ verdict }) => verdict === 'critical');
-    const voice = isUrgent ? urgentVoice : politeVoice;
-    voice.dispatch(newsText(news));
+    announce(isUrgent ? urgentVoice : politeVoice, newsText(news));
   });
 
 export function startAlarmsAndTelling(storage: Pick<Storage, 'getItem' | 'setItem'>): () => void {

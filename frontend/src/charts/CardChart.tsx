@@ -1,6 +1,7 @@
 import { useMemo, useRef, type JSX } from 'react';
 
 import { act, useApp } from '../store/app';
+import { withChart } from '../store/view';
 import { S } from '../strings';
 import { Icon } from '../widgets/controls';
 import { ChartState, MarksKey, PlotView, SensorChoice } from './PlotView';
@@ -37,7 +38,7 @@ export default function CardChart({ tagId }: { tagId: string }): JSX.Element | n
         tagId={tagId}
         value={sensor}
         onChange={(name) => {
-          chosenSensor.dispatch({ name, inView });
+          chosenSensor.set({ name, inView });
         }}
       />
       {state === 'missing' ? (
@@ -56,7 +57,7 @@ export default function CardChart({ tagId }: { tagId: string }): JSX.Element | n
             type="button"
             className="text-button"
             onClick={() => {
-              act({ type: 'chart', chart: { by: 'tag', tagIds: [tagId] } });
+              act(withChart({ by: 'tag', tagIds: [tagId] }));
             }}
           >
             <Icon name="chart" size={16} />

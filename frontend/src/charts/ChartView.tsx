@@ -10,7 +10,7 @@ import { fileName, save } from '../export/save';
 import { act, prefer, store, useApp } from '../store/app';
 import { selectCatalogue, selectSensor } from '../store/derived';
 import { rosNow, selectTags } from '../store/moment';
-import { type Charted, MOST_CHARTED } from '../store/view';
+import { type Charted, MOST_CHARTED, withChart } from '../store/view';
 import { S } from '../strings';
 import { Icon, IconButton, Segmented, useFocusBack } from '../widgets/controls';
 import { ChartTables } from './SeriesTable';
@@ -77,7 +77,7 @@ export default function ChartView({ charted }: { charted: Charted }): JSX.Elemen
             { value: 'sensor', label: S.chartsBy.sensor },
           ]}
           onChange={(by) => {
-            act({ type: 'chart', chart: { by, tagIds: charted.tagIds } });
+            act(withChart({ by, tagIds: charted.tagIds }));
           }}
         />
         <div className="chart-tools">
@@ -103,7 +103,7 @@ export default function ChartView({ charted }: { charted: Charted }): JSX.Elemen
             icon="close"
             label={S.cardClose}
             onClick={() => {
-              act({ type: 'chart', chart: null });
+              act(withChart(null));
             }}
           />
         </div>
@@ -160,7 +160,7 @@ function TagChoice({
     ({ id, readings }) => isHad(sensor, (name) => readings.has(name)) && !tagIds.includes(id),
   );
   const choose = (next: readonly string[]): void => {
-    act({ type: 'chart', chart: { by: 'sensor', tagIds: next } });
+    act(withChart({ by: 'sensor', tagIds: next }));
   };
   return (
     <div className="chart-tags">
@@ -168,7 +168,7 @@ function TagChoice({
         tagId={tagIds[0] ?? ''}
         value={sensor.name}
         onChange={(name) => {
-          act({ type: 'sensor', sensor: name });
+          act({ sensor: name });
         }}
       />
       <ul aria-label={S.tags}>
@@ -221,7 +221,6 @@ function TagChoice({
   );
 }
 
-/** What is shown to take away, and every reading behind it. */
 function ChartFiles({
   models,
   span,

@@ -3,7 +3,7 @@ import { beforeEach, expect, test, vi } from 'vitest';
 
 import { readingAt, type Series } from '../domain/series';
 import { act, receive, store } from '../store/app';
-import { NOT_ASKED } from '../store/twin';
+import { NOTHING } from '../store/fetcher';
 import { showTags } from '../testing/page';
 import { sensorNamed } from '../testing/sensors';
 import { bucketAt, seriesWith, timelineWith } from '../testing/timeline';
@@ -59,9 +59,9 @@ function said(
   readings: readonly { at: number; value: number }[] = [],
 ): string {
   showTags([]);
-  act({ type: 'moment', moment });
+  act({ moment });
   const value = timelineWith({ reach: { from: 100_000 - known, to: 100_000 } });
-  receive({ type: 'set', part: { remembered: { ...NOT_ASKED, value } } });
+  receive({ remembered: { ...NOTHING, value } });
   const line = lineOf(seriesWith({ sensor, readings }));
   const model = plainModel(sensor, [line]);
   const { container } = render(<LineValue line={line} model={model} />);
@@ -108,7 +108,7 @@ test('what takes two sensors needs both', () => {
 });
 
 test('what the card charts is no choice of the map’s, whose next choice it follows again', () => {
-  act({ type: 'sensor', sensor: 'light' });
+  act({ sensor: 'light' });
   render(<CardChart tagId="1" />);
   const choice = screen.getByLabelText('Sensor');
   expect(choice).toHaveProperty('value', 'light');
@@ -116,13 +116,13 @@ test('what the card charts is no choice of the map’s, whose next choice it fol
   expect(choice).toHaveProperty('value', 'daily_light_integral');
   expect(store.get().view.sensor).toBe('light');
   flush(() => {
-    act({ type: 'sensor', sensor: 'ph' });
+    act({ sensor: 'ph' });
   });
   expect(choice).toHaveProperty('value', 'ph');
 });
 
 test('what the map shows is no choice at a tag that lacks what it is computed of', () => {
-  act({ type: 'sensor', sensor: 'vpd' });
+  act({ sensor: 'vpd' });
   render(<CardChart tagId="1" />);
   expect(screen.getByLabelText('Sensor')).toHaveProperty('value', 'light');
 });

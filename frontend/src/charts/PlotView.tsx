@@ -25,10 +25,10 @@ import { DAY_S } from '../domain/difference';
 
 const HANDLERS: PlotHandlers = {
   onPoint: (at) => {
-    pointedTime.dispatch(at === null ? null : { at, by: 'chart' });
+    pointedTime.set(at === null ? null : { at, by: 'chart' });
   },
   onPick: (moment) => {
-    act({ type: 'moment', moment });
+    act({ moment });
   },
   onZoom: zoomTo,
 };
@@ -136,7 +136,6 @@ function beforeAt({ series, before }: Line, at: number | null): Point | null {
   return before && newest && pointAt(before, at ?? newest.at);
 }
 
-/** A piece of the line with its marker. */
 export function LineSign({ look: index }: { look: number }): JSX.Element {
   const { colour, dash, marker } = lookOf(index);
   return (
@@ -176,7 +175,6 @@ export function MarksKey({ marks }: { marks: readonly Mark[] }): JSX.Element | n
   );
 }
 
-/** Why there is no chart (yet), in plain words. */
 export function ChartState({
   asked: { state, message, span },
   hasLines,
@@ -261,7 +259,6 @@ function seriesText({ points, gaps }: Series, sensor: Sensor, unit: TemperatureU
   );
 }
 
-/** What a canvas shows, for those who do not see it. */
 function plotText({ sensor, unit, lines, span }: PlotModel): string {
   const each = lines.map(({ series, label }) => `${label}: ${seriesText(series, sensor, unit)}`);
   return `${S.chartOf(shown(sensor.label, 32))}, ${spanText(span)}. ${each.join(' ')}`;

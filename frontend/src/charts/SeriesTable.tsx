@@ -10,7 +10,6 @@ import { Select } from '../widgets/controls';
 import { spanText } from './PlotView';
 import type { Line, PlotModel } from './model';
 
-/** The table of one line, and the choice among them. */
 export function ChartTables({ models }: { models: readonly PlotModel[] }): JSX.Element | null {
   const lines = models.flatMap((model) =>
     model.lines.map((line) => ({

@@ -1,5 +1,5 @@
 /** What a chart has below and above its lines: drawn by functions that keep no state. */
-import { toShown, valueText } from '../domain/format';
+import { valueText } from '../domain/format';
 import type { Span } from '../domain/time';
 import { hatch } from '../draw/surface';
 import { S } from '../strings';
@@ -8,43 +8,41 @@ import { limitsOf, type Line, type PlotModel, pointsOf } from './model';
 /** Where things lie on the canvas, in its own pixels. */
 export interface Frame {
   readonly context: CanvasRenderingContext2D;
-  readonly box: {
-    readonly left: number;
-    readonly top: number;
-    readonly width: number;
-    readonly height: number;
-  };
+  readonly box: Readonly<Record<'left' | 'top' | 'width' | 'height', number>>;
   /** Canvas pixels a CSS pixel. */
   readonly ratio: number;
   readonly x: (at: number) => number;
-  /** Of a value in the unit that is shown. */
+  /** Of a value in the sensor's own unit. */
   readonly y: (value: number) => number;
+  readonly model: PlotModel;
+  readonly palette: ChartPalette;
 }
 
 /** Closer together than this, markers would hide the line; CSS pixels. */
 const MARKER_ROOM = 9;
 const MARKER_SIZE = 6;
 
-/** Gaps, what is missing, ideal range, critical limits and what buckets range over. */
-export function drawBelow(frame: Frame, model: PlotModel, palette: ChartPalette): void {
-  const { context, box } = frame;
+function clip({ context, box }: Frame): void {
   context.save();
   context.beginPath();
   context.rect(box.left, box.top, box.width, box.height);
   context.clip();
-  drawIdeal(frame, model, palette);
+}
+
+export function drawBelow(frame: Frame): void {
+  const { context, model } = frame;
+  clip(frame);
+  drawIdeal(frame);
   // With several, one's gap lies behind another's line.
   const [only] = model.lines;
-  if (only && model.lines.length === 1) drawGaps(frame, only, palette);
-  for (const line of model.lines) drawRanges(frame, line, model, palette);
+  if (only && model.lines.length === 1) drawGaps(frame, only);
+  for (const line of model.lines) drawRanges(frame, line);
   context.restore();
 }
 
-function drawIdeal(frame: Frame, { sensor, bands, unit }: PlotModel, palette: ChartPalette): void {
-  const { context, ratio, x } = frame;
-  const y = (value: number): number => frame.y(toShown(sensor, value, unit));
+function drawIdeal({ context, ratio, x, y, model, palette }: Frame): void {
   context.lineWidth = ratio;
-  for (const { from, to, ranges } of bands) {
+  for (const { from, to, ranges } of model.bands) {
     const [left, right] = [x(from), x(to)];
     const lines = (values: readonly number[]): void => {
       context.beginPath();
@@ -59,7 +57,7 @@ function drawIdeal(frame: Frame, { sensor, bands, unit }: PlotModel, palette: Ch
     if (!ideal) continue;
     context.fillStyle = palette.ideal;
     context.fillRect(left, y(ideal[1]), right - left, y(ideal[0]) - y(ideal[1]));
-    context.strokeStyle = palette.idealLine;
+    context.strokeStyle = palette['ideal-line'];
     context.setLineDash([2 * ratio, 4 * ratio]);
     lines(ideal);
     context.setLineDash([]);
@@ -70,8 +68,8 @@ function drawIdeal(frame: Frame, { sensor, bands, unit }: PlotModel, palette: Ch
 }
 
 /** Hatched, so that an empty stretch is seen to be told and not forgotten. */
-function drawGaps(frame: Frame, { series }: Line, palette: ChartPalette): void {
-  frame.context.strokeStyle = palette.gap;
+function drawGaps(frame: Frame, { series }: Line): void {
+  frame.context.strokeStyle = frame.palette.gap;
   frame.context.lineWidth = frame.ratio;
   hatched(frame, series.gaps, 1);
   // Leaning to the other side: of these nobody knows whether anything came.
@@ -88,40 +86,32 @@ function hatched({ context, box, ratio, x }: Frame, spans: readonly Span[], slan
 }
 
 /** From the least to the most of each bucket, as wide as the bucket: none joins two of them. */
-function drawRanges(frame: Frame, line: Line, model: PlotModel, palette: ChartPalette): void {
+function drawRanges({ context, ratio, x, y, model, palette }: Frame, line: Line): void {
   const { series } = line;
   if (series.bucketS === null) return;
-  const { context, ratio, x, y } = frame;
-  const { sensor, unit } = model;
   context.globalAlpha = model.lines.length === 1 ? 0.28 : 0.14;
   context.fillStyle = palette.lines[lookOf(line.look).colour] ?? palette.ink;
   context.beginPath();
   for (const { at, min, max } of series.points) {
     const left = x(at);
     const right = Math.min(x(at + series.bucketS), x(series.to));
-    const top = y(toShown(sensor, max ?? 0, unit));
-    const height = Math.max(ratio, y(toShown(sensor, min ?? 0, unit)) - top);
+    const top = y(max ?? 0);
+    const height = Math.max(ratio, y(min ?? 0) - top);
     context.rect(left, top, Math.max(ratio, right - left), height);
   }
   context.fill();
   context.globalAlpha = 1;
 }
 
-/** Markers of readings, the names of limits, and the moment that is shown. */
-export function drawAbove(frame: Frame, model: PlotModel, palette: ChartPalette): void {
-  const { context, box } = frame;
+export function drawAbove(frame: Frame): void {
+  const { context, model } = frame;
   // The last line's dashes are still in force.
   context.setLineDash([]);
-  context.save();
-  context.beginPath();
-  context.rect(box.left, box.top, box.width, box.height);
-  context.clip();
-  for (const line of model.lines) {
-    drawMarkers(frame, line, model, palette);
-  }
-  drawMoment(frame, model, palette);
+  clip(frame);
+  for (const line of model.lines) drawMarkers(frame, line);
+  drawMoment(frame);
   context.restore();
-  drawNames(frame, model, palette);
+  drawNames(frame);
 }
 
 /** A limit's name right of the plot needs so much of it in height; CSS pixels. */
@@ -129,11 +119,7 @@ const NAME_HEIGHT = 13;
 const NAME_GAP = 6;
 
 /** Each limit at its line, and with an arrow where its line lies above or below the picture. */
-function drawNames(
-  { context, box, ratio, y }: Frame,
-  model: PlotModel,
-  palette: ChartPalette,
-): void {
+function drawNames({ context, box, ratio, y, model, palette }: Frame): void {
   const height = NAME_HEIGHT * ratio;
   const names = limitsOf(model).sort((a, b) => b.value - a.value);
   context.font = palette.font.replace(/[\d.]+(?=px)/, (size) => String(Number(size) * ratio));
@@ -142,7 +128,7 @@ function drawNames(
   let least = box.top;
   names.forEach(({ kind, value, side }, index) => {
     const most = box.top + box.height - (names.length - 1 - index) * height;
-    const at = Math.max(least, Math.min(y(toShown(model.sensor, value, model.unit)), most));
+    const at = Math.max(least, Math.min(y(value), most));
     least = at + height;
     const word = kind === 'ideal' ? S.idealParts.any : S.alarmStatus.critical;
     const text = `${ARROWS[side]}${word} ${valueText(model.sensor, value, model.unit)}`;
@@ -154,10 +140,9 @@ function drawNames(
 const ARROWS = { below: '↓ ', inside: '', above: '↑ ' } as const;
 
 /** Each reading where there is room; a point between two breaks always, or it would not be seen. */
-function drawMarkers(frame: Frame, line: Line, model: PlotModel, palette: ChartPalette): void {
-  const { context, ratio, x, y, box } = frame;
+function drawMarkers({ context, ratio, x, y, box, model, palette }: Frame, line: Line): void {
   const { colour, marker } = lookOf(line.look);
-  const points = pointsOf(line.series, (value) => toShown(model.sensor, value, model.unit));
+  const points = pointsOf(line.series);
   const seen = points.filter(
     ({ at, value }) => value !== null && at >= model.span.from && at <= model.span.to,
   );
@@ -183,9 +168,7 @@ const MARK_SIZE = 7;
 /** Between the values and their times, marks have a lane of their own; CSS pixels. */
 export const MARKS_LANE = 24;
 
-/** A cross for what failed, a flower's ring for a look. */
-export function drawMarks(frame: Frame, { marks }: Line, palette: ChartPalette): void {
-  const { context, ratio, x, box } = frame;
+export function drawMarks({ context, ratio, x, box, palette }: Frame, { marks }: Line): void {
   const bottom = box.top + box.height;
   context.lineWidth = 1.75 * ratio;
   for (const kind of ['look', 'failure'] as const) {
@@ -204,11 +187,7 @@ export function drawMarks(frame: Frame, { marks }: Line, palette: ChartPalette):
   }
 }
 
-function drawMoment(
-  { context, box, ratio, x }: Frame,
-  { moment }: PlotModel,
-  palette: ChartPalette,
-): void {
+function drawMoment({ context, box, ratio, x, model: { moment }, palette }: Frame): void {
   if (moment === null) return;
   const at = Math.round(x(moment));
   context.strokeStyle = palette.moment;
@@ -222,33 +201,26 @@ function drawMoment(
   context.fill(new Path2D(markerPath('down', at, box.top + size / 2, size)));
 }
 
-/** How the lines of one chart are told apart: by colour, dash and marker, so that none has to do. */
-
 type Marker = 'circle' | 'square' | 'diamond' | 'up' | 'cross' | 'down' | 'plus' | 'ring';
 
-interface Look {
-  /** Of `--chart-1` to `--chart-8` in the style sheet. */
-  readonly colour: number;
-  /** Strokes and pauses, CSS pixels; empty: one stroke. */
-  readonly dash: readonly number[];
-  readonly marker: Marker;
-}
-
-const LOOKS: readonly Look[] = [
-  { colour: 0, dash: [], marker: 'circle' },
-  { colour: 1, dash: [8, 4], marker: 'square' },
-  { colour: 2, dash: [2, 3], marker: 'diamond' },
-  { colour: 3, dash: [12, 3, 2, 3], marker: 'up' },
-  { colour: 4, dash: [5, 2], marker: 'cross' },
-  { colour: 5, dash: [8, 3, 2, 3, 2, 3], marker: 'down' },
-  { colour: 6, dash: [3, 6], marker: 'plus' },
-  { colour: 7, dash: [14, 5], marker: 'ring' },
+/** How the lines of one chart are told apart: by colour, dash and marker, so that none has to do. */
+const LOOKS: readonly { readonly dash: readonly number[]; readonly marker: Marker }[] = [
+  { dash: [], marker: 'circle' },
+  { dash: [8, 4], marker: 'square' },
+  { dash: [2, 3], marker: 'diamond' },
+  { dash: [12, 3, 2, 3], marker: 'up' },
+  { dash: [5, 2], marker: 'cross' },
+  { dash: [8, 3, 2, 3, 2, 3], marker: 'down' },
+  { dash: [3, 6], marker: 'plus' },
+  { dash: [14, 5], marker: 'ring' },
 ];
 
-const FIRST: Look = { colour: 0, dash: [], marker: 'circle' };
-
 /** The look of the line with that place in the list; each keeps its own while others go. */
-export const lookOf = (index: number): Look => LOOKS[index % LOOKS.length] ?? FIRST;
+export function lookOf(index: number) {
+  const colour = index % LOOKS.length;
+  const { dash, marker } = LOOKS[colour] ?? { dash: [], marker: 'circle' };
+  return { colour, dash, marker };
+}
 
 /** Outline of a marker around a point; `size` is its width. Filled but for crosses and the ring. */
 export function markerPath(marker: Marker, x: number, y: number, size: number): string {
@@ -274,45 +246,28 @@ export function markerPath(marker: Marker, x: number, y: number, size: number): 
   }
 }
 
-/** Markers that are strokes alone. */
 export const isStroked = (marker: Marker): boolean =>
   marker === 'cross' || marker === 'plus' || marker === 'ring';
 
-/** The colours of charts, as the style sheet has them now: light or dark, forced, or for paper. */
-interface ChartPalette {
-  readonly lines: readonly string[];
-  readonly ink: string;
-  readonly text: string;
-  readonly grid: string;
-  readonly surface: string;
-  readonly ideal: string;
-  readonly idealLine: string;
-  readonly gap: string;
-  readonly failure: string;
-  readonly look: string;
-  readonly moment: string;
-  readonly fontPx: number;
-  readonly font: string;
-}
+/** The colours of charts beside those of the lines, by their names in the style sheet. */
+const COLOURS = [
+  ...(['ink', 'text', 'grid', 'surface', 'ideal', 'ideal-line'] as const),
+  ...(['gap', 'failure', 'look', 'moment'] as const),
+];
 
-export function readPalette(element: HTMLElement): ChartPalette {
+type Colours = Readonly<Record<(typeof COLOURS)[number], string>>;
+type ChartPalette = ReturnType<typeof readPalette>;
+
+/** As the style sheet has them now: light or dark, forced, or for paper. */
+export function readPalette(element: HTMLElement) {
   const style = getComputedStyle(element);
   const root = getComputedStyle(document.documentElement);
   const read = (name: string): string => style.getPropertyValue(`--chart-${name}`).trim();
   // Larger where the page's text is.
   const fontPx = Math.round(11.5 * (parseFloat(root.fontSize) / 16 || 1));
   return {
-    lines: Array.from({ length: 8 }, (_, index) => read(String(index + 1))),
-    ink: read('ink'),
-    text: read('text'),
-    grid: read('grid'),
-    surface: read('surface'),
-    ideal: read('ideal'),
-    idealLine: read('ideal-line'),
-    gap: read('gap'),
-    failure: read('failure'),
-    look: read('look'),
-    moment: read('moment'),
+    ...(Object.fromEntries(COLOURS.map((name) => [name, read(name)])) as Colours),
+    lines: LOOKS.map((_, index) => read(String(index + 1))),
     fontPx,
     font: `${fontPx}px ${style.getPropertyValue('--font')}`,
   };

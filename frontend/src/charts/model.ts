@@ -1,39 +1,16 @@
 /** What one chart shows: one sensor, as one or several tags read it. Pure. */
 import { fetchSeries, fetchTimeline } from '../contract/past';
-import {
-  type Catalogue,
-  type Catalogues,
-  type Ranges,
-  rangesFor,
-  type Sensor,
-} from '../domain/sensors';
+import { type Catalogue, type Catalogues, type Ranges, rangesFor } from '../domain/sensors';
 import { type TemperatureUnit, toShown } from '../domain/format';
 import { rangeOf } from '../domain/ramp';
-import {
-  laterBy,
-  type Mark,
-  marksOf,
-  middleOf,
-  type Point,
-  type Series,
-  seriesOf,
-} from '../domain/series';
+import { laterBy, marksOf, middleOf, type Point, type Series, seriesOf } from '../domain/series';
 import { shown } from '../domain/text';
 import type { Span } from '../domain/time';
 import type { Charted } from '../store/view';
 import { S } from '../strings';
 
-export interface Line {
-  readonly series: Series;
-  /** The day before, a day later than it was; null: it is not shown. */
-  readonly before: Series | null;
-  /** Place among the looks. */
-  readonly look: number;
-  readonly label: string;
-  readonly marks: readonly Mark[];
-}
+export type Line = PlotModel['lines'][number];
 
-/** What is ideal, and what critical, for a while. */
 interface Band extends Span {
   readonly ranges: Ranges;
 }
@@ -67,24 +44,13 @@ export function bandsOf(
   return bands;
 }
 
-export interface PlotModel {
-  readonly sensor: Sensor;
-  /** By their time, over all of the span. */
-  readonly bands: readonly Band[];
-  /** The lines' plants have ranges of their own, and no band is that of all. */
-  readonly isMixed: boolean;
-  readonly unit: TemperatureUnit;
-  readonly lines: readonly Line[];
-  readonly span: Span;
-  /** The moment that the page shows, ROS seconds; null: now. */
-  readonly moment: number | null;
-}
+export type PlotModel = ReturnType<typeof modelOf>;
 
 /** A point of a line in the unit that is shown; null breaks the line. */
 type Drawn = Pick<Point, 'at' | 'value'>;
 
 /** The points of a series in their order, with a break in each gap. */
-export function pointsOf(series: Series, shown: (value: number) => number): Drawn[] {
+export function pointsOf(series: Series, shown = (value: number): number => value): Drawn[] {
   const points: Drawn[] = [
     ...series.points.map((point) => ({
       at: middleOf(point, series),
@@ -170,22 +136,16 @@ export function valueRange({ lines, sensor, bands, unit }: PlotModel): [low: num
 }
 
 /** A limit that is named at the picture's edge, and where its line lies. */
-interface Limit {
-  readonly kind: 'ideal' | 'critical';
-  readonly value: number;
-  readonly side: 'below' | 'inside' | 'above';
-}
-
 /** Those of the end of the span: the ideal range's, of one out of sight the nearer, and critical ones in sight. */
-export function limitsOf(model: PlotModel): Limit[] {
+export function limitsOf(model: PlotModel) {
   const { ideal, critical } = model.bands.at(-1)?.ranges ?? {};
   const [low, high] = valueRange(model);
-  const named =
-    (kind: Limit['kind']) =>
-    (value: number): Limit => {
-      const at = toShown(model.sensor, value, model.unit);
-      return { kind, value, side: at < low ? 'below' : at > high ? 'above' : 'inside' };
-    };
+  const named = (kind: 'ideal' | 'critical') => (value: number) => {
+    const at = toShown(model.sensor, value, model.unit);
+    const side =
+      at < low ? ('below' as const) : at > high ? ('above' as const) : ('inside' as const);
+    return { kind, value, side };
+  };
   const [first, last] = (ideal ?? []).map(named('ideal'));
   const edges = [
     ...(first && last?.side !== 'below' ? [first] : []),
@@ -195,7 +155,6 @@ export function limitsOf(model: PlotModel): Limit[] {
   return [...edges, ...near.filter(({ side }) => side === 'inside')];
 }
 
-/** One line of a chart. */
 export interface Pair {
   readonly tagId: string;
   readonly sensor: string;
@@ -204,12 +163,7 @@ export interface Pair {
 export const pairKey = ({ tagId, sensor }: Pair): string => `${sensor}\u0000${tagId}`;
 
 /** What charts show, fetched in one go: lines by `pairKey`, and marks by tag. */
-export interface Lines {
-  readonly series: ReadonlyMap<string, Series>;
-  /** A day later than it was; empty: nobody asked for it. */
-  readonly before: ReadonlyMap<string, Series>;
-  readonly marks: ReadonlyMap<string, readonly Mark[]>;
-}
+export type Lines = Awaited<ReturnType<typeof fetchLines>>;
 
 export const NO_LINES: Lines = { series: new Map(), before: new Map(), marks: new Map() };
 
@@ -230,7 +184,7 @@ const MARK_POINTS = 200;
 export async function fetchLines(
   { pairs, span, nowS, points, dayS }: Question,
   signal: AbortSignal,
-): Promise<Lines> {
+) {
   const tagIds = [...new Set(pairs.map(({ tagId }) => tagId))];
   const before = dayS === null ? null : dayBefore(span, dayS);
   const fetched = async ({ from, to }: Span): Promise<[string, Series][]> => {
@@ -247,6 +201,7 @@ export async function fetchLines(
   ]);
   return {
     series: new Map(series),
+    /** A day later than it was; empty: nobody asked for it. */
     before: new Map(earlier.map(([key, each]) => [key, laterBy(each, dayS ?? 0)])),
     marks: new Map(timelines.map((timeline, index) => [tagIds[index] ?? '', marksOf(timeline)])),
   };
@@ -291,7 +246,7 @@ export function modelOf(
   unit: TemperatureUnit,
   moment: number | null,
   nowS: number | null,
-): PlotModel {
+) {
   const lines = tagIds.flatMap((tagId, look) => {
     const key = pairKey({ tagId, sensor });
     const own = series.get(key);

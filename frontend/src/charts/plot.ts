@@ -2,6 +2,7 @@
 import { type RefObject, useEffect, useLayoutEffect, useRef, useState } from 'react';
 import uPlot from 'uplot';
 
+import { toShown } from '../domain/format';
 import { hasDate, type Span } from '../domain/time';
 import { timeTicks, type Tick } from '../domain/timeline';
 import { LOCALE } from '../strings';
@@ -44,28 +45,30 @@ const SYNC_KEY = 'lupin-charts';
 /** In the page's language: uPlot goes by the browser's. */
 const AXIS_NUMBER = new Intl.NumberFormat(LOCALE);
 
-interface Plot {
-  readonly show: (model: PlotModel, size: PlotSize) => void;
-  /** Marks a time, ROS seconds, as the mouse would, and tells nobody; null: none. */
-  readonly point: (at: number | null) => void;
-  /** Draws anew in the colours that are in force now, at once: a printer does not wait. */
-  readonly recolour: () => void;
-  readonly destroy: () => void;
-}
+type Plot = ReturnType<typeof createPlot>;
 
-function createPlot(element: HTMLElement, handlers: PlotHandlers): Plot {
+function createPlot(element: HTMLElement, handlers: PlotHandlers) {
   let palette = readPalette(element);
   let model: PlotModel | null = null;
   let chart: uPlot | null = null;
   let shape = '';
   let ticks: readonly Tick[] = [];
 
-  const frameOf = (u: uPlot): Frame => ({
+  const frameOf = (u: uPlot, model: PlotModel): Frame => ({
     context: u.ctx,
     box: u.bbox,
     ratio: uPlot.pxRatio,
     x: (at) => u.valToPos(at, 'x', true),
-    y: (value) => u.valToPos(value, 'y', true),
+    y: (value) => u.valToPos(toShown(model.sensor, value, model.unit), 'y', true),
+    model,
+    palette,
+  });
+
+  const axis = (): Partial<uPlot.Axis> => ({
+    stroke: () => palette.text,
+    grid: { stroke: () => palette.grid, width: 1 },
+    ticks: { stroke: () => palette.grid, width: 1, size: 5 },
+    font: palette.font,
   });
 
   const build = (first: PlotModel, { hasTimes, ...size }: PlotSize): uPlot => {
@@ -107,11 +110,7 @@ function createPlot(element: HTMLElement, handlers: PlotHandlers): Plot {
         ],
         axes: [
           {
-            ...axisLook(
-              () => palette.text,
-              () => palette.grid,
-            ),
-            font: palette.font,
+            ...axis(),
             size: hasTimes ? TIMES_HEIGHT - MARKS_LANE + lane : NO_TIMES_HEIGHT,
             gap: 5 + lane,
             lineGap: 1.2,
@@ -122,11 +121,7 @@ function createPlot(element: HTMLElement, handlers: PlotHandlers): Plot {
             values: () => ticks.map(({ text }) => (hasTimes ? text : '')),
           },
           {
-            ...axisLook(
-              () => palette.text,
-              () => palette.grid,
-            ),
-            font: palette.font,
+            ...axis(),
             size: 48,
             // Steps come in ones, twos and fives: in six of these there are three ticks.
             space: (_self, _axis, _min, _max, height) => Math.min(34, height / 6),
@@ -136,15 +131,16 @@ function createPlot(element: HTMLElement, handlers: PlotHandlers): Plot {
         hooks: {
           drawAxes: [
             (self) => {
-              if (model) drawBelow(frameOf(self), model, palette);
+              if (model) drawBelow(frameOf(self, model));
             },
           ],
           draw: [
             (self) => {
               if (!model) return;
-              drawAbove(frameOf(self), model, palette);
+              const frame = frameOf(self, model);
+              drawAbove(frame);
               if (!hasTimes) return;
-              for (const line of model.lines) drawMarks(frameOf(self), line, palette);
+              for (const line of model.lines) drawMarks(frame, line);
             },
           ],
           setCursor: [
@@ -191,7 +187,7 @@ function createPlot(element: HTMLElement, handlers: PlotHandlers): Plot {
   };
 
   return {
-    show: (next, size) => {
+    show: (next: PlotModel, size: PlotSize): void => {
       const before = model;
       model = next;
       const nextShape = drawnOf(next)
@@ -208,17 +204,19 @@ function createPlot(element: HTMLElement, handlers: PlotHandlers): Plot {
       if (chart.width !== size.width || chart.height !== size.height) chart.setSize(size);
       if (before !== next) chart.setData(aligned(next));
     },
-    point: (at) => {
+    /** Marks a time, ROS seconds, as the mouse would, and tells nobody; null: none. */
+    point: (at: number | null): void => {
       const left = at === null ? -10 : (chart?.valToPos(at, 'x') ?? -10);
       chart?.setCursor({ left, top: at === null ? -10 : 0 }, false);
     },
-    recolour: () => {
+    /** Draws anew in the colours that are in force now, at once: a printer does not wait. */
+    recolour: (): void => {
       palette = readPalette(element);
       chart?.batch(() => {
         chart?.redraw();
       });
     },
-    destroy: () => {
+    destroy: (): void => {
       chart?.destroy();
       chart = null;
     },
@@ -229,7 +227,7 @@ function createPlot(element: HTMLElement, handlers: PlotHandlers): Plot {
 const hasNames = (model: PlotModel): boolean =>
   model.lines.length === 1 || limitsOf(model).length > 0;
 
-/** A chart in an element, as large as that; `onLook` calls back when its colours are others. */
+/** `onLook` calls back when a chart's colours are others. */
 export function usePlot(
   place: RefObject<HTMLDivElement | null>,
   model: PlotModel,
@@ -264,14 +262,7 @@ export function usePlot(
   return plot;
 }
 
-/** A tick needs so many pixels of the axis. */
 const TICK_ROOM = 70;
 
 const ticksOf = (model: PlotModel | null, width: number): readonly Tick[] =>
   model ? timeTicks(model.span, width / TICK_ROOM, !hasDate(model.span.to)) : [];
-
-const axisLook = (text: () => string, grid: () => string): Partial<uPlot.Axis> => ({
-  stroke: text,
-  grid: { stroke: grid, width: 1 },
-  ticks: { stroke: grid, width: 1, size: 5 },
-});

@@ -2,6 +2,7 @@ import { act as flush, renderHook } from '@testing-library/react';
 import { afterAll, beforeAll, beforeEach, describe, expect, test, vi } from 'vitest';
 
 import { act, receive } from '../store/app';
+import { withState } from '../store/twin';
 import { goLive, goLost, showTags, status } from '../testing/page';
 import { stateFrame, wireTag } from '../testing/tags';
 import { wireTime } from '../testing/timeline';
@@ -50,7 +51,7 @@ function answer(url: URL): Response {
 function visit(sec: number, over: Parameters<typeof wireTag>[0] = {}): void {
   flush(() => {
     const latest = stateFrame([wireTag({ last_observed: wireTime(sec), ...over })], { sec });
-    receive({ type: 'state', latest, now: performance.now() });
+    receive(withState(latest, performance.now()));
   });
 }
 
@@ -81,7 +82,7 @@ beforeEach(() => {
     return Promise.resolve(answer(url));
   });
   showTags([]);
-  act({ type: 'period', period: { kind: 'hour' } });
+  act({ period: { kind: 'hour' } });
   visit(NOW_S);
 });
 afterAll(() => {
@@ -162,7 +163,7 @@ describe('the server is asked anew', () => {
     const shown = show();
     await passed(100);
     flush(() => {
-      act({ type: 'period', period: { kind: 'own', from: 2_000, to: 2_100 } });
+      act({ period: { kind: 'own', from: 2_000, to: 2_100 } });
     });
     expect(shown.current).toMatchObject({ state: 'waiting', lines: { series: { size: 1 } } });
     await passed(10);
@@ -177,7 +178,7 @@ describe('the server is asked anew', () => {
     show();
     await passed(100);
     flush(() => {
-      act({ type: 'moment', moment: NOW_S - 100 });
+      act({ moment: NOW_S - 100 });
     });
     visit(NOW_S + 1);
     await passed(5_000);
@@ -193,7 +194,7 @@ describe('where there is nothing', () => {
     expect(shown.current).toMatchObject({ state: 'failed', message: 'too many' });
     flush(() => {
       const message = 'no journal is kept';
-      receive({ type: 'set', part: { remembered: { value: null, state: 'off', message } } });
+      receive({ remembered: { value: null, state: 'off', message } });
     });
     expect(shown.current).toMatchObject({ state: 'missing', message: 'no journal is kept' });
   });

@@ -2,24 +2,16 @@ import { type RefObject, useLayoutEffect, useMemo, useRef, useState } from 'reac
 
 import { now, pause } from '../clock';
 import { type Catalogue, isHad, isMeasured } from '../domain/sensors';
-import { endsNow, type Span, spanOf } from '../domain/time';
+import { endsNow, spanOf } from '../domain/time';
 import { type AppState, store, useApp } from '../store/app';
 import { createStore, useSelected } from '../store/create';
 import { selectCatalogue, selectCatalogues } from '../store/derived';
-import { type Fetched, useFetched } from '../store/fetcher';
+import { useFetched } from '../store/fetcher';
 import { rosNow, selectDayS, selectNewestTag, selectTag } from '../store/moment';
 import { turnOf } from '../store/remembered';
+import type { Size } from '../geometry/coordinates';
 import { useNow } from '../widgets/useNow';
-import {
-  fetchLines,
-  type Lines,
-  modelOf,
-  NO_LINES,
-  type Pair,
-  pairKey,
-  type Plan,
-  type PlotModel,
-} from './model';
+import { fetchLines, type Lines, modelOf, NO_LINES, type Pair, pairKey, type Plan } from './model';
 
 /** Between two questions about the same lines, ms; of many lines longer. */
 const PACE_MS = 3_000;
@@ -27,23 +19,13 @@ const PACE_A_LINE_MS = 1_000;
 /** What was heard is in the journal within 100 ms, and in another host's copy of it soon after. */
 const WRITTEN_MS = 1_000;
 
-export interface Asked {
-  readonly lines: Lines;
-  /** "missing": this twin keeps no past. While it is fetched again, what was there stays. */
-  readonly state: Fetched<Lines>['state'] | 'missing';
-  /** Why there is nothing, for a person to read. */
-  readonly message: string;
-  /** The period of the time bar; null while nobody knows what time it is. */
-  readonly span: Span | null;
-  /** The time of the twin, ROS seconds. */
-  readonly nowS: number | null;
-}
+export type Asked = ReturnType<typeof useLines>;
 
 /**
  * What these lines have over the period of the time bar: asked for again when one of the tags was
  * visited, on each connection, and now and then.
  */
-export function useLines(pairs: readonly Pair[], points: number, hasDayBefore = false): Asked {
+export function useLines(pairs: readonly Pair[], points: number, hasDayBefore = false) {
   const period = useApp((state) => state.view.period);
   const remembered = useApp((state) => state.twin.remembered);
   const epoch = useApp((state) => state.twin.connection.epoch);
@@ -76,17 +58,18 @@ export function useLines(pairs: readonly Pair[], points: number, hasDayBefore = 
     PACE_MS,
   );
   return {
-    ...{ lines: fetched.value ?? NO_LINES, span, nowS },
-    ...(isOff ? { state: 'missing', message: remembered.message } : fetched),
+    lines: fetched.value ?? NO_LINES,
+    /** Null while nobody knows what time it is. */
+    span,
+    nowS,
+    /** "missing": this twin keeps no past. While it is fetched again, what was there stays. */
+    state: isOff ? ('missing' as const) : fetched.state,
+    message: isOff ? remembered.message : fetched.message,
   };
 }
 
 /** The charts of plans of the same tags, as far as their lines are here. */
-export function useCharts(
-  plans: readonly Plan[],
-  points: number,
-  hasDayBefore = false,
-): { asked: Asked; models: readonly PlotModel[] } {
+export function useCharts(plans: readonly Plan[], points: number, hasDayBefore = false) {
   const unit = useApp((state) => state.settings.unit);
   const moment = useApp((state) => state.view.moment);
   const catalogue = useApp(selectCatalogue);
@@ -120,7 +103,6 @@ function useVisits(pairs: readonly Pair[]): string {
   return visits;
 }
 
-/** When each was observed last, and tried last. */
 const visitsOf = (state: AppState, pairs: readonly Pair[]): string =>
   JSON.stringify(
     pairs.map(({ tagId }) => {
@@ -129,19 +111,13 @@ const visitsOf = (state: AppState, pairs: readonly Pair[]): string =>
     }),
   );
 
-interface Chosen {
-  readonly name: string;
-  /** What the map showed then: with another one there, the card follows the map again. */
-  readonly inView: string;
-}
-
-/** What was chosen for the card's chart; the map keeps its own. */
-export const chosenSensor = createStore<Chosen | null, Chosen | null>(null, (_, next) => next);
+/** What was chosen for the card's chart, and what the map showed then: with another, the card follows it. */
+export const chosenSensor = createStore<{ name: string; inView: string } | null>(null);
 
 /** What the card's chart is to show: the sensor in view, unless another was chosen. */
 export function useChosenSensor(): string {
   const inView = useApp((state) => state.view.sensor);
-  const chosen = useSelected(chosenSensor, (it) => it);
+  const chosen = useSelected(chosenSensor);
   return chosen?.inView === inView ? chosen.name : inView;
 }
 
@@ -167,7 +143,6 @@ export function useSensorsOf(tagId: string): readonly string[] {
   );
 }
 
-/** The species of tags, as far as they are sure, at the moment that is shown; else empty. */
 function useSpeciesOf(tagIds: readonly string[]): readonly string[] {
   const species = useApp((state) =>
     tagIds.map((id) => selectTag(state, id)?.sureSpecies ?? '').join('\u0000'),
@@ -181,11 +156,6 @@ function inOrder({ all }: Catalogue, names: readonly string[]): readonly string[
     return index < 0 ? all.length : index;
   };
   return [...names].sort((a, b) => place(a) - place(b) || (a < b ? -1 : 1));
-}
-
-interface Size {
-  readonly width: number;
-  readonly height: number;
 }
 
 /** The room inside an element, CSS pixels; none before it is laid out. */

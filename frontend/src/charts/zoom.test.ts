@@ -7,8 +7,8 @@ import { SHORTEST_S, wholePeriod, zoomBack, zoomBy, zoomedSpan, zoomTo } from '.
 const period = (): unknown => store.get().view.period;
 
 beforeEach(() => {
-  act({ type: 'look', view: DEFAULT_VIEW });
-  wholePeriod.dispatch(null);
+  act(DEFAULT_VIEW);
+  wholePeriod.set(null);
 });
 
 test('a part of the period becomes the period, and there is a way back to the whole', () => {
@@ -23,7 +23,7 @@ test('a part of the period becomes the period, and there is a way back to the wh
 
 test('a period that was chosen after a zoom is the whole one of the next', () => {
   zoomTo({ from: 1_000, to: 2_000 });
-  act({ type: 'period', period: { kind: 'week' } });
+  act({ period: { kind: 'week' } });
   zoomTo({ from: 1_000, to: 2_000 });
   zoomBack();
   expect(period()).toEqual({ kind: 'week' });

@@ -8,7 +8,7 @@ import { roundedMoment } from '../store/view';
 export const SHORTEST_S = 10;
 
 /** The period before the first zoom; null: nobody has zoomed. */
-export const wholePeriod = createStore<Period | null, Period | null>(null, (_, period) => period);
+export const wholePeriod = createStore<Period | null>(null);
 
 /** Widened to what a chart can show, around its middle; never before the beginning of time. */
 export function zoomedSpan({ from, to }: Span): Span {
@@ -24,8 +24,8 @@ export function zoomedSpan({ from, to }: Span): Span {
 
 export function zoomTo(span: Span): void {
   const { period } = store.get().view;
-  if (period.kind !== 'own' || wholePeriod.get() === null) wholePeriod.dispatch(period);
-  act({ type: 'period', period: { kind: 'own', ...zoomedSpan(span) } });
+  if (period.kind !== 'own' || wholePeriod.get() === null) wholePeriod.set(period);
+  act({ period: { kind: 'own', ...zoomedSpan(span) } });
 }
 
 /** In (below 1) or out around the middle, but never beyond now. */
@@ -38,13 +38,12 @@ export function zoomBy(span: Span, factor: number, now: number): void {
 export function zoomBack(): void {
   const period = wholePeriod.get();
   if (!period) return;
-  wholePeriod.dispatch(null);
-  act({ type: 'period', period });
+  wholePeriod.set(null);
+  act({ period });
 }
 
-/** Whether there is a whole period to go back to. */
 export function useZoomed(): boolean {
-  const whole = useSelected(wholePeriod, (period) => period);
+  const whole = useSelected(wholePeriod);
   const isOwn = useApp((state) => state.view.period.kind === 'own');
   return isOwn && whole !== null;
 }

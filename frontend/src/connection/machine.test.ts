@@ -1,6 +1,7 @@
 import { describe, expect, test } from 'vitest';
 
 import type { StatusFrame } from '../contract/types';
+import { status as statusWith } from '../testing/page';
 import {
   backoffMs,
   type Command,
@@ -12,25 +13,15 @@ import {
   OPENING_MS,
   phaseOf,
   SILENCE_MS,
-  step,
+  step as stepBy,
   TRY_AGAIN_LATER,
 } from './machine';
 
-const status = (twin: StatusFrame['twin']): StatusFrame => ({
-  type: 'status',
-  twin,
-  reason: twin === 'live' ? 'live' : 'stale',
-  message: '',
-  state_age_seconds: 0,
-  has_map: true,
-  origin: 'robot',
-  twin_count: 1,
-  input_problems: [],
-  day_length_s: 86_400,
-  drops: [],
-  journal: { state: 'recording', detail: '', set_aside: '', simulated: null },
-  outward: [],
-});
+const status = (twin: StatusFrame['twin']): StatusFrame =>
+  statusWith({ twin, reason: twin === 'live' ? 'live' : 'stale' });
+
+const step = (connection: Connection, event: ConnectionEvent): ReturnType<typeof stepBy> =>
+  stepBy(connection, event, 1);
 
 /** Runs events one after another. */
 function run(...events: ConnectionEvent[]): { connection: Connection; commands: Command[] } {
@@ -54,7 +45,6 @@ const closed = (now: number, code: number | null = 1006): ConnectionEvent => ({
   type: 'closed',
   now,
   code,
-  random: 1,
 });
 
 describe('phases', () => {
@@ -96,7 +86,7 @@ describe('phases', () => {
   test('lost is reconnecting, also while the next attempt opens', () => {
     const lost = step(live, closed(100)).connection;
     expect(phaseOf(lost, 101)).toBe('reconnecting');
-    const opening = step(lost, { type: 'tick', now: 10_000, random: 0 }).connection;
+    const opening = step(lost, { type: 'tick', now: 10_000 }).connection;
     expect(phaseOf(opening, 10_001)).toBe('reconnecting');
     const open = step(opening, { type: 'opened', now: 10_010 }).connection;
     expect(phaseOf(open, 10_011)).toBe('reconnecting');
@@ -124,7 +114,7 @@ describe('phases', () => {
       ...started,
       { type: 'frame', now: 30, status: status('offline') },
       closed(40),
-      { type: 'tick', now: 9_999, random: 0 },
+      { type: 'tick', now: 9_999 },
       { type: 'opened', now: 10_000 },
       { type: 'frame', now: 10_001, status: null },
     );
@@ -139,11 +129,11 @@ describe('phases', () => {
   });
 
   test('after a lapse nothing is live before a state has come anew', () => {
-    const lapsed = step(live, { type: 'lapse', now: 100 });
+    const lapsed = step(live, { type: 'start', now: 100 });
     expect(lapsed.command).toBe('reopen');
     expect(phaseOf(lapsed.connection, 100)).toBe('reconnecting');
     const waiting = step(live, closed(50)).connection;
-    expect(step(waiting, { type: 'lapse', now: 60 }).command).toBe('reopen');
+    expect(step(waiting, { type: 'start', now: 60 }).command).toBe('reopen');
   });
 
   test('a frame that waited for a page that stood still is not believed', () => {
@@ -160,8 +150,8 @@ describe('attempts', () => {
     const lost = step(live, closed(100)).connection;
     expect(lost.socket).toEqual({ kind: 'closed', retryAt: 600 });
     expect(nextDeadline(lost, 100)).toBe(600);
-    expect(step(lost, { type: 'tick', now: 599, random: 1 }).command).toBeNull();
-    expect(step(lost, { type: 'tick', now: 600, random: 1 }).command).toBe('reopen');
+    expect(step(lost, { type: 'tick', now: 599 }).command).toBeNull();
+    expect(step(lost, { type: 'tick', now: 600 }).command).toBe('reopen');
   });
 
   test('failures in a row wait longer; a connection that held starts afresh', () => {
@@ -169,7 +159,7 @@ describe('attempts', () => {
     const pauses: number[] = [];
     for (let i = 0; i < 4; i++) {
       const at = nextDeadline(connection, 0);
-      connection = step(connection, { type: 'tick', now: at, random: 1 }).connection;
+      connection = step(connection, { type: 'tick', now: at }).connection;
       connection = step(connection, closed(at)).connection;
       pauses.push(nextDeadline(connection, at) - at);
     }
@@ -192,11 +182,6 @@ describe('attempts', () => {
     expect(connection.failures).toBe(5);
   });
 
-  test('the tab or the network coming back does not wait', () => {
-    const lost = step(live, closed(100)).connection;
-    expect(step(lost, { type: 'wake', now: 101 }).command).toBe('reopen');
-  });
-
   test('a network that returns starts an attempt anew that began without it', () => {
     const { connection } = run({ type: 'start', now: 0 });
     expect(step(connection, { type: 'wake', now: 5 }).command).toBeNull();
@@ -215,20 +200,20 @@ describe('attempts', () => {
   test('an attempt that hangs is given up', () => {
     const { connection } = run({ type: 'start', now: 0 });
     expect(nextDeadline(connection, 0)).toBe(OPENING_MS);
-    const given = step(connection, { type: 'tick', now: OPENING_MS, random: 1 });
+    const given = step(connection, { type: 'tick', now: OPENING_MS });
     expect(given.command).toBe('drop');
     expect(given.connection.failures).toBe(1);
   });
 
   test('a connection silent for long is dropped although nobody closed it', () => {
     expect(nextDeadline(live, 30)).toBe(25 + SILENCE_MS);
-    expect(step(live, { type: 'tick', now: 25 + SILENCE_MS, random: 1 }).command).toBeNull();
+    expect(step(live, { type: 'tick', now: 25 + SILENCE_MS }).command).toBeNull();
     expect(nextDeadline(live, 25 + SILENCE_MS)).toBe(25 + DEAD_MS);
-    expect(step(live, { type: 'tick', now: 25 + DEAD_MS, random: 1 }).command).toBe('drop');
+    expect(step(live, { type: 'tick', now: 25 + DEAD_MS }).command).toBe('drop');
   });
 
   test('a connection that sends what cannot be used is replaced', () => {
-    const broken = step(live, { type: 'broken', now: 9_000, random: 1 });
+    const broken = step(live, { type: 'broken', now: 9_000 });
     expect(broken.command).toBe('drop');
     expect(phaseOf(broken.connection, 9_001)).toBe('reconnecting');
     expect(nextDeadline(broken.connection, 9_000)).toBe(9_500);

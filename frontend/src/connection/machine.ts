@@ -13,7 +13,6 @@ export const OPENING_MS = 6_000;
 /** A connection that held this long starts the back-off afresh when it breaks. */
 const PROVEN_MS = 5_000;
 
-/** What the operator is told. */
 export type Phase = 'connecting' | 'live' | 'stale' | 'offline' | 'reconnecting';
 
 type Socket =
@@ -31,7 +30,6 @@ export interface Connection {
   readonly socket: Socket;
   /** Grows by one with each connection that opened; what was fetched before is out of date. */
   readonly epoch: number;
-  /** Attempts failed in a row. */
   readonly failures: number;
   readonly closeCode: number | null;
   /** The bridge's last word about the twin, on this connection. */
@@ -40,28 +38,20 @@ export interface Connection {
 
 /** All times are ms on the monotonic clock. */
 export type ConnectionEvent =
-  | { readonly type: 'start'; readonly now: number }
-  | { readonly type: 'opened'; readonly now: number }
+  | { readonly type: Plain; readonly now: number }
   /** A status frame brings its status, a state frame none. */
   | { readonly type: 'frame'; readonly now: number; readonly status: StatusFrame | null }
-  /** What came is neither: a sign of life alone. */
-  | { readonly type: 'heard'; readonly now: number }
-  | {
-      readonly type: 'closed';
-      readonly now: number;
-      readonly code: number | null;
-      readonly random: number;
-    }
-  /** What came cannot be used: the two sides have lost each other. */
-  | { readonly type: 'broken'; readonly now: number; readonly random: number }
-  /** The tab became visible, or the operator does not want to wait. */
-  | { readonly type: 'wake'; readonly now: number }
-  /** The machine slept, or its clock was set: what still comes may be old, and so are deadlines. */
-  | { readonly type: 'lapse'; readonly now: number }
-  /** The network returned: an attempt that is under way began without it. */
-  | { readonly type: 'online'; readonly now: number }
-  /** A deadline of `nextDeadline` may have passed. */
-  | { readonly type: 'tick'; readonly now: number; readonly random: number };
+  | { readonly type: 'closed'; readonly now: number; readonly code: number | null };
+
+/**
+ * - start: make a new connection, whatever there is; after a lapse what still comes may be old
+ * - heard: what came is neither status nor state, a sign of life alone
+ * - broken: what came cannot be used, the two sides have lost each other
+ * - wake: the tab became visible, or the operator does not want to wait
+ * - online: the network returned, and an attempt that is under way began without it
+ * - tick: a deadline of `nextDeadline` may have passed
+ */
+export type Plain = 'start' | 'opened' | 'heard' | 'broken' | 'wake' | 'online' | 'tick';
 
 /** What the shell has to do. "reopen": drop the socket, if any, and make a new one. */
 export type Command = 'reopen' | 'drop' | null;
@@ -74,12 +64,12 @@ export const INITIAL: Connection = {
   status: null,
 };
 
-interface Step {
-  readonly connection: Connection;
-  readonly command: Command;
-}
-
-export function step(connection: Connection, event: ConnectionEvent): Step {
+/** `random`: from 0 to 1. */
+export function step(
+  connection: Connection,
+  event: ConnectionEvent,
+  random: number,
+): { readonly connection: Connection; readonly command: Command } {
   const { socket } = connection;
   const { now } = event;
   switch (event.type) {
@@ -98,7 +88,7 @@ export function step(connection: Connection, event: ConnectionEvent): Step {
       // It has waited for a page that stood still, nobody knows how long.
       if (silence(socket, now) >= DEAD_MS) return open(connection, now);
       const heard = { ...socket, lastFrameAt: now };
-      if (event.type === 'heard') return stay({ ...connection, socket: heard });
+      if (event.type !== 'frame') return stay({ ...connection, socket: heard });
       const { status } = event;
       return stay({
         ...connection,
@@ -108,17 +98,15 @@ export function step(connection: Connection, event: ConnectionEvent): Step {
     }
     case 'closed':
       if (socket.kind === 'closed') return stay(connection);
-      return { connection: fail(connection, now, event.code, event.random), command: null };
+      return stay(fail(connection, now, event.code, random));
     case 'broken':
       return socket.kind === 'open'
-        ? { connection: fail(connection, now, null, event.random), command: 'drop' }
+        ? stay(fail(connection, now, null, random), 'drop')
         : stay(connection);
-    case 'lapse':
-      return open(connection, now);
     case 'online':
       return socket.kind === 'opening'
         ? open(connection, now)
-        : step(connection, { type: 'wake', now });
+        : step(connection, { type: 'wake', now }, random);
     case 'wake':
       if (socket.kind === 'closed') return open(connection, now);
       // After a sleep the socket often looks open and is not.
@@ -134,18 +122,16 @@ export function step(connection: Connection, event: ConnectionEvent): Step {
           ? now - socket.since >= OPENING_MS
           : silence(socket, now) >= DEAD_MS
       ) {
-        return { connection: fail(connection, now, null, event.random), command: 'drop' };
+        return stay(fail(connection, now, null, random), 'drop');
       }
       return stay(connection);
   }
 }
 
-const stay = (connection: Connection): Step => ({ connection, command: null });
+const stay = (connection: Connection, command: Command = null) => ({ connection, command });
 
-const open = (connection: Connection, now: number): Step => ({
-  connection: { ...connection, socket: { kind: 'opening', since: now } },
-  command: 'reopen',
-});
+const open = (connection: Connection, now: number) =>
+  stay({ ...connection, socket: { kind: 'opening', since: now } }, 'reopen');
 
 function fail(
   connection: Connection,
@@ -163,7 +149,6 @@ function fail(
 const silence = (socket: Socket & { kind: 'open' }, now: number): number =>
   now - (socket.lastFrameAt ?? socket.since);
 
-/** When to send the next tick. */
 export function nextDeadline({ socket }: Connection, now: number): number {
   switch (socket.kind) {
     case 'closed':
@@ -200,9 +185,7 @@ export const TRY_AGAIN_LATER = 1013;
 /**
  * Pause before the next attempt: doubled at each failure up to 15 s, and then anything from half
  * of that to all of it, so that a hundred screens do not return to a restarted server at once.
- *
- * @param failures attempts failed in a row, from 1
- * @param random from 0 to 1
+ * `failures` in a row, from 1; `random` from 0 to 1.
  */
 export function backoffMs(failures: number, random: number, closeCode: number | null): number {
   const doubled = FIRST_MS * 2 ** Math.min(failures - 1, 10);

@@ -2,7 +2,14 @@ import { now } from '../clock';
 import { route } from '../contract/api';
 import { parseFrame } from '../contract/frames';
 import type { Frame } from '../contract/types';
-import { type Connection, type ConnectionEvent, INITIAL, nextDeadline, step } from './machine';
+import {
+  type Connection,
+  type ConnectionEvent,
+  INITIAL,
+  nextDeadline,
+  type Plain,
+  step,
+} from './machine';
 
 interface ConnectionHandlers {
   /** The connection changed, or a deadline passed and its phase may have. */
@@ -14,34 +21,27 @@ interface ConnectionHandlers {
   readonly onRefused: () => void;
 }
 
-export interface Link {
-  /** Does not wait for the back-off any longer. */
-  readonly retry: () => void;
-  /** Gives the present connection up, for what it sends cannot be used. */
-  readonly giveUp: () => void;
-  /** Makes a new connection: time has lapsed, and what waits in the present one may be old. */
-  readonly lapse: () => void;
-  readonly stop: () => void;
-}
+export type Link = ReturnType<typeof connect>;
 
 /** The thin shell around `machine.ts`: one socket, one timer, the browser's wake-up events. */
-export function connect(url: string, handlers: ConnectionHandlers): Link {
+export function connect(url: string, handlers: ConnectionHandlers) {
   let connection = INITIAL;
   let socket: WebSocket | null = null;
   let timer: ReturnType<typeof setTimeout> | undefined;
 
   const send = (event: ConnectionEvent): void => {
-    const { connection: next, command } = step(connection, event);
+    const { connection: next, command } = step(connection, event, Math.random());
     connection = next;
     if (command !== null) drop();
     if (command === 'reopen') open();
     clearTimeout(timer);
-    timer = setTimeout(tick, Math.max(0, nextDeadline(connection, event.now) - event.now));
+    const wait = Math.max(0, nextDeadline(connection, event.now) - event.now);
+    timer = setTimeout(tell, wait, 'tick');
     handlers.onConnection(connection);
   };
 
-  const tick = (): void => {
-    send({ type: 'tick', now: now(), random: Math.random() });
+  const tell = (type: Plain): void => {
+    send({ type, now: now() });
   };
 
   // Handlers are taken off before closing: a dropped socket that still speaks is not heard.
@@ -70,7 +70,7 @@ export function connect(url: string, handlers: ConnectionHandlers): Link {
     own.onclose = ({ code }) => {
       if (look() === null) return;
       socket = null;
-      send({ type: 'closed', now: now(), code, random: Math.random() });
+      send({ type: 'closed', now: now(), code });
       if (!isOpened) handlers.onRefused();
     };
     own.onmessage = ({ data }) => {
@@ -82,7 +82,7 @@ export function connect(url: string, handlers: ConnectionHandlers): Link {
         handlers.onBad(parsed.why);
         // What it would have changed is lost, and later deltas build on it: a new connection
         // begins with a full state.
-        if (parsed.isDelta) giveUp();
+        if (parsed.isDelta) tell('broken');
         return;
       }
       const { frame } = parsed;
@@ -93,26 +93,17 @@ export function connect(url: string, handlers: ConnectionHandlers): Link {
     };
   };
 
-  const retry = (): void => {
-    send({ type: 'wake', now: now() });
-  };
-  const giveUp = (): void => {
-    send({ type: 'broken', now: now(), random: Math.random() });
-  };
-  const lapse = (): void => {
-    send({ type: 'lapse', now: now() });
-  };
   const wake = (): void => {
-    if (document.visibilityState === 'visible') retry();
+    if (document.visibilityState === 'visible') tell('wake');
   };
   const online = (): void => {
-    send({ type: 'online', now: now() });
+    tell('online');
   };
   document.addEventListener('visibilitychange', wake);
   window.addEventListener('online', online);
   window.addEventListener('pageshow', wake);
 
-  send({ type: 'start', now: now() });
+  tell('start');
 
   const stop = (): void => {
     document.removeEventListener('visibilitychange', wake);
@@ -121,7 +112,7 @@ export function connect(url: string, handlers: ConnectionHandlers): Link {
     clearTimeout(timer);
     drop();
   };
-  return { retry, giveUp, lapse, stop };
+  return { tell, stop };
 }
 
 /**

@@ -2,17 +2,14 @@
 import { checkOf } from './check';
 import type { Field, FieldQuality, Schemas, TagHistory } from './types';
 
-/** A refusal by the server, with its reason. */
 export class Refusal extends Error {
-  readonly status: number;
-  /** How long the server wants to be left alone, seconds; null: not reported. */
-  readonly retryAfterS: number | null;
-
-  constructor(status: number, message: string, retryAfterS: number | null = null) {
+  constructor(
+    readonly status: number,
+    message: string,
+    /** How long the server wants to be left alone, seconds; null: not reported. */
+    readonly retryAfterS: number | null = null,
+  ) {
     super(message);
-    this.name = 'Refusal';
-    this.status = status;
-    this.retryAfterS = retryAfterS;
   }
 }
 
@@ -64,7 +61,6 @@ export async function ask(path: string, init: RequestInit): Promise<Response> {
   return response;
 }
 
-/** The body, an object of JSON; what a proxy in between answers is none. */
 export async function bodyOf<T>(response: Response): Promise<T> {
   const type = response.headers.get('Content-Type') ?? 'no type';
   const body: unknown = type.includes('json') ? await response.json() : type;
@@ -171,10 +167,8 @@ export const fetchHistory = (tagId: string, signal: AbortSignal): Promise<TagHis
 const MAGIC = '\x93NUMPY';
 
 /**
- * Numbers in so many dimensions, row-major, of the one NPY flavour that the bridge sends: little-endian
- * float32, C order. Format: https://numpy.org/doc/stable/reference/generated/numpy.lib.format.html
- *
- * @throws Error where the body is anything else.
+ * Numbers in so many dimensions, row-major, of the one NPY flavour that the bridge sends: version 1,
+ * little-endian float32, C order. Format: https://numpy.org/doc/stable/reference/generated/numpy.lib.format.html
  */
 export function npyOf(
   buffer: ArrayBuffer,
@@ -184,13 +178,10 @@ export function npyOf(
   const magic = String.fromCharCode(...bytes.subarray(0, MAGIC.length));
   if (magic !== MAGIC) throw new Error(`npy: magic is ${JSON.stringify(magic)}`);
 
-  // Version 1 has a two-byte header length, versions 2 and 3 a four-byte one.
-  const version = bytes[6] ?? 0;
-  const view = new DataView(buffer);
-  const lengthBytes = version === 1 ? 2 : 4;
-  const start = 8 + lengthBytes;
+  // Behind the version, 1.0, and the header's length.
+  const start = 10;
   if (buffer.byteLength < start) throw new Error(`npy: only ${buffer.byteLength} bytes`);
-  const length = version === 1 ? view.getUint16(8, true) : view.getUint32(8, true);
+  const length = new DataView(buffer).getUint16(8, true);
   const header = new TextDecoder('latin1').decode(bytes.subarray(start, start + length));
 
   const type = /'descr':\s*'([^']+)'/.exec(header)?.[1];

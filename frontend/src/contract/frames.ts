@@ -29,7 +29,6 @@ type Parsed =
 
 const bad = (why: string, isDelta = false): Parsed => ({ kind: 'bad', why, isDelta });
 
-/** Reads one WebSocket message. */
 export function parseFrame(data: unknown): Parsed {
   if (typeof data !== 'string') return bad('a message that is no text');
   if (data.length > MAX_FRAME_CHARS) {

@@ -29,7 +29,6 @@ export type DeltaFrame = Omit<Schemas['DeltaFrame'], 'changed' | 'health'> & {
   readonly changed: readonly TwinTagState[];
   readonly health: Judgement;
 };
-/** What a robot says of itself. */
 export type RobotFrame = Schemas['RobotFrame'];
 export type Frame = StateFrame | DeltaFrame | StatusFrame | AlarmsFrame | RobotFrame;
 export type OccupancyGrid = Schemas['OccupancyGrid'];
@@ -40,22 +39,15 @@ export type History = Schemas['History'];
 export type Timeline = Schemas['Timeline'];
 /** One episode of something wrong at a tag, or in the house. */
 export type Alarm = Schemas['Alarm'];
-/** Who is signed in, and what they said. */
 export type Session = Schemas['Session'];
 export type Note = Schemas['Note'];
-export type Notes = Schemas['Notes'];
 export type AlarmsFrame = Schemas['AlarmsFrame'];
 /** A frame also says how many notes the log has. */
 export type Alarms = Schemas['Alarms'] & { readonly notes?: number };
 export type HealthReason = Schemas['HealthReason'];
 export type Verdict = TagHealth['verdict'];
-/** How well the estimates of a sensor have foretold. */
 export type Grade = Schemas['EstimateQualities']['sensors'][string];
-/** What was measured at the tags against what all else foretells. */
-export type ExpectedTags = Schemas['ExpectedTags'];
 export type Expected = Schemas['ExpectedReading'];
-/** Where another tag helps. */
-export type Advice = Schemas['Advice'];
 export type Place = Schemas['AdvisedPlace'];
 /** What a robot says of itself; and where it has been. */
 export type RobotNow = Omit<RobotFrame, 'type'>;
@@ -74,7 +66,6 @@ export interface SensorRanges extends Bounds {
   readonly night?: Bounds;
 }
 
-/** What the file of sensors says of one. */
 export interface SensorEntry extends SensorRanges {
   readonly label: string;
   /** In other languages, some or all. */
@@ -114,15 +105,12 @@ export interface Sureness {
 
 /** Why a field is not the estimate that was asked for. */
 export interface NoEstimate {
-  /** Of the refusal. */
   readonly status: number;
   readonly message: string;
 }
 
-/** A reconstructed field of one sensor. */
 export interface Field {
   readonly sensor: string;
-  /** Cells. */
   readonly width: number;
   readonly height: number;
   /** Lower left corner of cell (0, 0), metres in the map frame. */
@@ -137,7 +125,6 @@ export interface Field {
   readonly sampleCount: number;
   /** Row-major, row 0 at the bottom (lowest y); not-a-number: not known. */
   readonly values: Float32Array;
-  /** Of an estimate. */
   readonly sureness?: Sureness;
   /** Of the nearest readings in place of an estimate. */
   readonly noEstimate?: NoEstimate;

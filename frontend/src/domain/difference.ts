@@ -13,15 +13,12 @@ export type Compare =
 export const DAY_S = 86_400;
 export const WEEK_S = 7 * DAY_S;
 
-/** The other moment, ROS seconds. */
 export const otherMoment = (compare: Compare, shownAt: number): number =>
   compare.by === 'moment' ? compare.at : shownAt - compare.seconds;
 
 /**
  * What is shown less what was then, cell by cell, on their one grid; not known where either is
  * not. `valueMin` and `valueMax` range over what is known; both are 0 where nothing is.
- *
- * @throws Error where the two do not lie on one grid.
  */
 export function differenceOf(shown: Field, then: Field): Field {
   for (const key of ['sensor', 'width', 'height', 'originX', 'originY', 'resolution'] as const) {
@@ -62,7 +59,6 @@ const SAME: Rgb = [128, 128, 128];
 const FAINTEST = 0.2;
 const STRONGEST = 0.8;
 
-/** Colour and alpha of a difference in a symmetric range. */
 export function divergingColour(range: Range, value: number): { rgb: Rgb; alpha: number } {
   const signed = range.high > 0 ? 2 * fraction(range, value) - 1 : 0;
   const size = Math.abs(signed);
@@ -74,7 +70,6 @@ export function divergingColour(range: Range, value: number): { rgb: Rgb; alpha:
 
 const STOPS = [-1, -0.75, -0.5, -0.25, 0, 0.25, 0.5, 0.75, 1];
 
-/** The colours from the most that it is less to the most that it is more, evenly apart. */
 export const divergingColours = (): string[] =>
   STOPS.map((stop) => {
     const { rgb, alpha } = divergingColour({ low: -1, high: 1 }, stop);
@@ -101,28 +96,19 @@ export function differenceText(sensor: Sensor, value: number, unit: TemperatureU
   return withUnit(sensor, signedText(sensor, value, unit), unit);
 }
 
-/** A tag, and what the bridge said of it at that moment. */
 export interface TagThen {
   readonly tag: Tag;
   readonly health: TagHealth;
 }
 
-type Trend =
-  /** `by`: what is now less what was then, in the sensor's unit. */
-  | { readonly kind: 'by'; readonly by: number }
-  /** No reading of then, or none that held then. */
-  | { readonly kind: 'none' }
-  /** The reading of now is that of then. */
-  | { readonly kind: 'same' };
-
 /** Null: there is no reading now that holds, and nothing to compare. */
-export function trendOf(sensor: string, now: TagThen, then: TagThen | null): Trend | null {
+export function trendOf(sensor: string, now: TagThen, then: TagThen | null) {
   const value = held(sensor, now);
   if (value === null) return null;
   const before = then && held(sensor, then);
-  if (then === null || before === null) return { kind: 'none' };
-  if (sameReading(sensor, now.tag, then.tag)) return { kind: 'same' };
-  return { kind: 'by', by: value - before };
+  if (then === null || before === null) return { kind: 'none' } as const;
+  if (sameReading(sensor, now.tag, then.tag)) return { kind: 'same' } as const;
+  return { kind: 'by', by: value - before } as const;
 }
 
 /** The value of a reading that has not grown too old; null: there is none. */
@@ -138,7 +124,6 @@ export function isOldReading(sensor: string, { tag, health }: TagThen): boolean 
   );
 }
 
-/** Whether both have the very same reading of a sensor. */
 export function sameReading(sensor: string, a: Tag, b: Tag): boolean {
   const at = ({ wire }: Tag): string =>
     JSON.stringify(wire.readings.find(({ name }) => name === sensor)?.observed_at ?? null);

@@ -186,7 +186,7 @@ const map = (yaw = 0): Parameters<typeof onExplored>[1] => {
   data[2 * 4 + 3] = 255;
   return {
     placement: { originX: 1, originY: 0, yaw, resolution: 1, width: 2, height: 2 },
-    pixels: { data, width: 2, height: 2 },
+    pixels: { data, width: 2, height: 2 } as ImageData,
   };
 };
 const known = (values: Float32Array | undefined): boolean[] =>

@@ -1,7 +1,7 @@
 import type { Estimate } from '../contract/api';
 import type { Field, Sureness } from '../contract/types';
 import { type Bounds, mapPoint, type MapPoint } from '../geometry/coordinates';
-import type { Placement } from '../geometry/image';
+import type { MapPicture } from '../geometry/image';
 import { fraction, paint, type Range, rangeOf, type Rgb, rgbText, type Shade } from './ramp';
 
 /** The cell that holds the point; null outside the grid. */
@@ -29,20 +29,13 @@ export function resolutionFor(bounds: Bounds, maxCells: number): number {
   return finest;
 }
 
-interface Pixels {
-  readonly width: number;
-  readonly height: number;
-  /** RGBA, top row first. */
-  readonly data: Uint8ClampedArray<ArrayBuffer>;
-}
-
 /**
  * Colours a field. Not-a-number is fully transparent. The picture's top row is the grid's last
  * row. With `detail` above 1 every cell becomes detail x detail pixels whose values are
  * interpolated between cell centres, in values and not in colours: a picture scaled by the
  * browser would let colour bleed into cells that are not known.
  */
-export function fieldPixels(field: Field, shade: Shade, detail: number): Pixels {
+export function fieldPixels(field: Field, shade: Shade, detail: number) {
   const width = field.width * detail;
   const height = field.height * detail;
   const data = new Uint8ClampedArray(width * height * 4);
@@ -96,7 +89,6 @@ export function smoothDetail(field: Field): number {
   return Math.max(1, Math.min(8, Math.floor(Math.sqrt(2_000_000 / cells))));
 }
 
-/** Lower left and upper right corner of the grid. */
 export function fieldCorners(field: Field): readonly [MapPoint, MapPoint] {
   const { originX, originY, width, height, resolution } = field;
   return [
@@ -160,7 +152,6 @@ export function stepOf(sd: number, sdKnown: number): number {
   return STEPS.filter((step) => !(sd < step * sdKnown)).length;
 }
 
-/** The steps cell by cell, row 0 at the bottom. */
 export const stepsIn = ({ sd, sdKnown }: Sureness): Uint8Array =>
   Uint8Array.from(sd, (each) => stepOf(each, sdKnown));
 
@@ -186,11 +177,9 @@ const STRONGEST = 0.82;
 
 const errorAlpha = (share: number): number => FAINTEST + (STRONGEST - FAINTEST) * share;
 
-/** The colours of the error, from none to the most. */
 export const errorColours = (): string[] =>
   [0, 1].map((share) => rgbText(ERROR, errorAlpha(share)));
 
-/** The more colour, the less sure. */
 export const errorShade =
   (range: Range): Shade =>
   (data, at, value) => {
@@ -214,16 +203,11 @@ export function estimatedField(sensor: string, estimate: Estimate): Field {
   };
 }
 
-/** What of an estimate lies on explored ground, as the twin clips the nearest readings. Pure. */
-
-/** A map's picture: RGBA, top row first; transparent is not explored. */
-interface Explored {
-  readonly placement: Placement;
-  readonly pixels: Pick<ImageData, 'data' | 'width' | 'height'>;
-}
-
 /** An estimate tells a number for every cell, outside the house too; there it is not asked. */
-export function onExplored(field: Field, { placement, pixels }: Explored): Field {
+export function onExplored(
+  field: Field,
+  { placement, pixels }: Pick<MapPicture, 'placement' | 'pixels'>,
+): Field {
   const { sureness, width, originX, originY, resolution } = field;
   if (!sureness) return field;
   const cos = Math.cos(placement.yaw);

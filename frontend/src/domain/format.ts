@@ -51,7 +51,6 @@ function digitsOfSmall(value: number): number | null {
   return size === 0 || size >= 0.1 ? null : Math.min(6, 1 + Math.ceil(-Math.log10(size)));
 }
 
-/** A reading with its unit. */
 export const readingText = (sensor: Sensor, value: number, unit: TemperatureUnit): string =>
   withUnit(sensor, valueText(sensor, value, unit), unit);
 
@@ -109,7 +108,6 @@ const clock = new Intl.DateTimeFormat(LOCALE, {
   hourCycle: 'h23',
 });
 
-/** Time of day on the operator's own clock. */
 export function clockText(epochMs: number): string {
   return clock.format(epochMs);
 }
@@ -127,7 +125,6 @@ export function metresText(value: number): string {
   return written(value.toFixed(2));
 }
 
-/** Why a tag that was pinned there is not on the map. */
 export const farOffText = ({ x, y }: MapPoint): string =>
   S.farOffLong(S.position(metresText(x), metresText(y)));
 
@@ -154,7 +151,6 @@ export function unitOf(sensor: Sensor, unit: TemperatureUnit): string {
   return inFahrenheit(sensor, unit) ? '°F' : sensor.unit;
 }
 
-/** A value as shown. */
 export function toShown(sensor: Sensor, value: number, unit: TemperatureUnit): number {
   return inFahrenheit(sensor, unit) ? value * 1.8 + 32 : value;
 }

@@ -21,19 +21,9 @@ export const VERDICTS = [
   'healthy',
 ] as const satisfies readonly Verdict[];
 
-/** Who was not judged, or not yet. */
 export const NOT_JUDGED: TagHealth = { verdict: 'unknown', reasons: [] };
 
-export interface HouseHealth {
-  readonly verdict: Verdict;
-  readonly reasons: readonly HealthReason[];
-  /** Whose ranges hold, and what says so; null: nobody was asked. */
-  readonly day: Judgement['house']['day'] | null;
-  /** What it is doing; null: nobody was asked. */
-  readonly patrol: Judgement['house']['patrol'] | null;
-  readonly counts: Readonly<Record<Verdict, number>>;
-  readonly byTag: ReadonlyMap<string, TagHealth>;
-}
+export type HouseHealth = ReturnType<typeof houseHealth>;
 
 const SILENT: HealthReason = {
   kind: 'silent',
@@ -48,11 +38,7 @@ const SILENT: HealthReason = {
  * The house as it was judged. `isHeard`: false, and nothing is known of it as a whole, whatever
  * was said last; of its tags that stands, with the age of their readings beside it.
  */
-export function houseHealth(
-  tags: readonly Tag[],
-  judgement: Judgement | null,
-  isHeard: boolean,
-): HouseHealth {
+export function houseHealth(tags: readonly Tag[], judgement: Judgement | null, isHeard: boolean) {
   const counts = { critical: 0, stressed: 0, unknown: 0, healthy: 0 };
   const byTag = new Map<string, TagHealth>();
   for (const { id } of tags) {
@@ -64,6 +50,7 @@ export function houseHealth(
   return {
     verdict,
     reasons,
+    /** Whose ranges hold, and what says so; null: nobody was asked. */
     day: judgement?.house.day ?? null,
     patrol: judgement?.house.patrol ?? null,
     counts,
@@ -71,7 +58,6 @@ export function houseHealth(
   };
 }
 
-/** Whether something is known to be wrong. */
 export const isBad = (verdict: Verdict): boolean =>
   verdict === 'critical' || verdict === 'stressed';
 
@@ -191,7 +177,6 @@ export function reasonText(
 export const isBack = ({ release, verdict }: HealthReason): boolean =>
   release !== undefined && verdict === 'stressed';
 
-/** On which side of which limit a value is, or was. */
 function limitText(reason: OfRange, text: (value: number) => string): string {
   const { limit, release = null, verdict } = reason;
   const side = S.reasons.sides[sideOf(reason)];
@@ -222,7 +207,6 @@ export function todoText(reason: HealthReason): string {
   return (kinds as Partial<Record<string, string>>)[reason.kind] ?? kinds.other;
 }
 
-/** All reasons in one line, the worst first. */
 export const reasonsText = (
   sensors: Catalogue,
   reasons: readonly HealthReason[],

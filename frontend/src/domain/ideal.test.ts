@@ -102,7 +102,7 @@ function lab(colour: Rgb, seen: readonly number[]): [number, number, number] {
 }
 
 describe.each(Object.entries(SEEN))('colours as seen with %s', (_, seen) => {
-  test.each([LIGHT, DARK])('are apart from each other and from the floor, $name', ({ floor }) => {
+  test.each([LIGHT, DARK])('are apart from each other and from the floor, %#', ({ floor }) => {
     const painted = (by: number): Rgb => mix(floor, idealColour(by), IDEAL_ALPHA);
     const all = [floor, painted(-1), painted(-0.01), painted(0), painted(0.01), painted(1)];
     const labs = all.map((colour) => lab(colour, seen));

@@ -63,7 +63,6 @@ export function idealColour(by: number | null): Rgb {
   return by < 0 ? mix(LOW, FAR_LOW, -by) : mix(HIGH, FAR_HIGH, by);
 }
 
-/** The colours of the three parts, each from left to right. */
 export const idealParts = (alpha = 1): Readonly<Record<'low' | 'right' | 'high', string[]>> => ({
   low: [rgbText(FAR_LOW, alpha), rgbText(LOW, alpha)],
   right: [rgbText(RIGHT, alpha), rgbText(RIGHT, alpha)],
@@ -86,22 +85,17 @@ export function idealText(
   return by < 0 ? S.tooLow(how) : S.tooHigh(how);
 }
 
-/** Whose plants a cell of a field stands for: those of the nearest tag. Pure. */
-
 export interface Site {
   readonly at: MapPoint;
   readonly species: string;
 }
 
-/** The ranges that hold in a house, and which of them holds in each cell. */
 export interface Zones {
-  /** Different ones, each once. */
   readonly kinds: readonly Ranges[];
   /** Index into `kinds`, cell by cell, row 0 at the bottom; null: all have the first. */
   readonly byCell: Uint8Array | null;
 }
 
-/** How a field lies in the map. */
 export type CellGrid = Pick<Field, 'width' | 'height' | 'originX' | 'originY' | 'resolution'>;
 
 export function zonesOf(grid: CellGrid, sites: readonly Site[], sensor: Sensor): Zones {
@@ -116,7 +110,6 @@ export function zonesOf(grid: CellGrid, sites: readonly Site[], sensor: Sensor):
   return { kinds, byCell: Uint8Array.from(nearest, (site) => bySite[site] ?? 0) };
 }
 
-/** The ranges that hold at a cell. */
 export const rangesAt = ({ kinds, byCell }: Zones, cell: number): Ranges | undefined =>
   kinds[byCell?.[cell] ?? 0];
 
@@ -165,7 +158,6 @@ function nearestSites(grid: CellGrid, sites: readonly { readonly at: MapPoint }[
   return nearest;
 }
 
-/** Colours a field by how its values lie against the ranges of the plants that are nearest. */
 export const idealShade =
   (zones: Zones): Shade =>
   (data, at, value, cell) => {
@@ -173,20 +165,13 @@ export const idealShade =
     paint(data, at, idealColour(ranges ? excess(ranges, value) : null), IDEAL_ALPHA);
   };
 
-/** Where a field stands for a reading that the judge calls too old to say. Pure; judges nothing. */
+export type ReadSite = ReturnType<typeof readSites>[number];
 
-/** A tag that a field has a reading from. */
-export interface ReadSite {
-  readonly at: MapPoint;
-  readonly isOld: boolean;
-}
-
-/** The tags that a field of the sensor is made of. */
 export function readSites(
   tags: readonly Tag[],
   said: Judgement['tags'],
   sensor: Pick<Sensor, 'name' | 'madeOf'>,
-): ReadSite[] {
+) {
   return tags.flatMap(({ id, at, readings }) => {
     const parts = partsOf(sensor, (part) => readings.has(part));
     if (!at || parts.some((part) => (readings.get(part) ?? null) === null)) return [];
@@ -211,7 +196,6 @@ export const cellsWhere = (field: Field, isIn: (cell: number) => boolean): Field
   values: field.values.map((value, cell) => (isIn(cell) ? value : NaN)),
 });
 
-/** What is left of a colour whose reading is too old. */
 const FAINT = 0.22;
 
 /** Colours what is too old faintly: it is hatched besides, and `isHatched` false leaves it bare. */

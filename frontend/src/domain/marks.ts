@@ -19,58 +19,26 @@ export interface Mark {
   readonly isHollow: boolean;
 }
 
-const SQUARE = 0.92;
+/** Its points as "x,y x,y". */
+export const lineOf = (points: string): Point[] =>
+  points.split(' ').map((point) => {
+    const [x = 0, y = 0] = point.split(',').map(Number);
+    return [x, y];
+  });
 
 export const MARKS: Readonly<Record<Verdict, Mark>> = {
   critical: {
-    outline: [
-      [-SQUARE, -SQUARE],
-      [SQUARE, -SQUARE],
-      [SQUARE, SQUARE],
-      [-SQUARE, SQUARE],
-    ],
-    sign: [
-      [
-        [-0.42, -0.42],
-        [0.42, 0.42],
-      ],
-      [
-        [0.42, -0.42],
-        [-0.42, 0.42],
-      ],
-    ],
+    outline: lineOf('-.92,-.92 .92,-.92 .92,.92 -.92,.92'),
+    sign: [lineOf('-.42,-.42 .42,.42'), lineOf('.42,-.42 -.42,.42')],
     isHollow: false,
   },
   stressed: {
-    outline: [
-      [0, -1.08],
-      [1.14, 0.9],
-      [-1.14, 0.9],
-    ],
-    sign: [
-      [
-        [0, -0.34],
-        [0, 0.24],
-      ],
-      [
-        [0, 0.6],
-        [0, 0.61],
-      ],
-    ],
+    outline: lineOf('0,-1.08 1.14,.9 -1.14,.9'),
+    sign: [lineOf('0,-.34 0,.24'), lineOf('0,.6 0,.61')],
     isHollow: false,
   },
   unknown: { outline: 'circle', sign: [], isHollow: true },
-  healthy: {
-    outline: 'circle',
-    sign: [
-      [
-        [-0.44, 0.04],
-        [-0.12, 0.36],
-        [0.46, -0.3],
-      ],
-    ],
-    isHollow: false,
-  },
+  healthy: { outline: 'circle', sign: [lineOf('-.44,.04 -.12,.36 .46,-.3')], isHollow: false },
 };
 
 /** The lines as an SVG path in the middle of a box of 16 by 16; `closed`: each ends where it began. */

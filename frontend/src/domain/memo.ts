@@ -23,3 +23,32 @@ export function memoOne<Arg extends object, Result>(
     return known.result;
   };
 }
+
+/** With these parts; the very same object where none of them is another. */
+export function withParts<Whole extends object>(whole: Whole, parts: Partial<Whole>): Whole {
+  const keys = Object.keys(parts) as (keyof Whole)[];
+  return keys.every((key) => parts[key] === whole[key]) ? whole : { ...whole, ...parts };
+}
+
+/** What it was given last time, as long as that is the same: by its parts, or as `isSame` says. */
+export function keeping<Kept extends object>(
+  isSame = (last: Kept, next: Kept): boolean => withParts(last, next) === last,
+): (next: Kept) => Kept {
+  let last: Kept | null = null;
+  return (next) => (last = last && isSame(last, next) ? last : next);
+}
+
+/** Items by their groups, which stand in the order in which the first of each comes. */
+export function groupedBy<Item>(
+  items: readonly Item[],
+  groupOf: (item: Item) => string,
+): ReadonlyMap<string, readonly Item[]> {
+  const groups = new Map<string, Item[]>();
+  for (const item of items) {
+    const group = groupOf(item);
+    const there = groups.get(group);
+    if (there) there.push(item);
+    else groups.set(group, [item]);
+  }
+  return groups;
+}

@@ -50,7 +50,6 @@ export function paint(data: Uint8ClampedArray, at: number, colour: Rgb, alpha: n
   data[at + 3] = 255 * alpha;
 }
 
-/** One colour, and the more of it the higher the value. */
 export function fieldShade(sensor: Sensor, range: Range): Shade {
   const colour = sensorColour(sensor);
   return (data, at, value) => {
@@ -78,8 +77,6 @@ export function rangeOf(values: Iterable<number | null | undefined>): Range | nu
   }
   return low <= high ? { low, high } : null;
 }
-
-/** The range of colours where nobody has fixed one: calm, and no alarm where nothing is wrong. Pure. */
 
 /** A side gives way only when this share of the range lies idle behind it. */
 const IDLE = 0.3;

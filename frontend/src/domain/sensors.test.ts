@@ -2,7 +2,7 @@ import { describe, expect, test } from 'vitest';
 
 import { CATALOGUE, CATALOGUES, FILE, sensorNamed } from '../testing/sensors';
 import { cataloguesOf, isHad, isMeasured, NO_CATALOGUES, rangesFor } from './sensors';
-import { differenceToShown, fromShown, toShown, unitOf } from './format';
+import { fromShown, toShown, unitOf } from './format';
 
 test('every look comes from the file, in its order', () => {
   expect(CATALOGUE.all.map(({ name }) => name)).toEqual(Object.keys(FILE.sensors));
@@ -128,10 +128,6 @@ test('temperatures follow the operator, other units do not', () => {
   expect(unitOf(temperature, 'F')).toBe('°F');
   expect(toShown(humidity, 25, 'F')).toBe(25);
   expect(unitOf(humidity, 'F')).toBe('%');
-});
-
-test('a difference has no offset', () => {
-  expect(differenceToShown(temperature, 10, 'F')).toBe(18);
 });
 
 test('what is typed comes back', () => {

@@ -13,31 +13,10 @@ export interface Ranges {
 }
 
 /** A kind of sensor, with the ranges of the day or of the night, whichever it is. */
-export interface Sensor extends Ranges {
-  /** Name on the wire. */
-  readonly name: string;
-  /** In the page's language; where the file has none, as in every language. */
-  readonly label: string;
-  /** The same in every language, for files that programs read. */
-  readonly dataLabel: string;
-  /** Unit of its readings; empty when unknown. */
-  readonly unit: string;
-  /** Degrees and percents of the ramp's colour, and the heat map's alpha at the maximum. */
-  readonly hue: number;
-  readonly saturation: number;
-  readonly lightness: number;
-  readonly maxAlpha: number;
-  /** After the point, wherever a value of it stands; null: as the value's size deserves. */
-  readonly digits: number | null;
-  /** The sensors that it is computed of: there are fields and a past of it, and no readings. */
-  readonly madeOf: readonly string[];
-  /** Whose its ranges are; null: by day and by night they are the same. */
-  readonly part: 'day' | 'night' | null;
-  /** Species with ranges of their own, by their name in lower case. */
-  readonly species: ReadonlyMap<string, Ranges>;
-  /** All ideal ranges that the file has of it, of day, night and species. */
-  readonly ideals: readonly Span[];
-}
+export type Sensor = ReturnType<typeof sensorOf>;
+export type Catalogue = ReturnType<typeof catalogueOf>;
+/** By day and by night. */
+export type Catalogues = ReturnType<typeof cataloguesOf>;
 
 /** Whether tags can have readings of it: what is derived is told where it is a reason. */
 export const isMeasured = ({ madeOf }: Sensor): boolean => madeOf.length === 0;
@@ -64,51 +43,40 @@ export const rangesFor = (sensor: Sensor, species: string): Ranges =>
 /** So many names that the file does not have are remembered; tags may make up any number. */
 const MOST_OTHERS = 1_000;
 
-/** The sensors of a file, by day or by night. */
-export class Catalogue {
-  /** Those of the file, in its order. */
-  readonly all: readonly Sensor[];
-  readonly #known: ReadonlyMap<string, Sensor>;
-  readonly #others = new Map<string, Sensor>();
-  readonly #other: (name: string) => Sensor;
-  /** Of the tag with that id; empty: in none. */
-  readonly areaOf: (tagId: string) => string;
-
-  constructor(
-    all: readonly Sensor[],
-    other: (name: string) => Sensor,
-    areaOf: (tagId: string) => string = () => '',
-  ) {
-    this.all = all;
-    this.#known = new Map(all.map((sensor) => [sensor.name, sensor]));
-    this.#other = other;
-    this.areaOf = areaOf;
-  }
-
-  /** A sensor by its name on the wire; one that nobody declared gets the fallback's look. */
-  named(name: string): Sensor {
-    const found = this.#known.get(name) ?? this.#others.get(name);
+function catalogueOf(
+  file: SensorsFile,
+  isDay: boolean,
+  language: string,
+  areaOf: (tagId: string) => string,
+) {
+  const all = Object.entries(file.sensors).map(([name, entry]) =>
+    sensorOf(file, name, entry, isDay, language),
+  );
+  const known = new Map(all.map((sensor) => [sensor.name, sensor]));
+  const others = new Map<string, Sensor>();
+  const named = (name: string): Sensor => {
+    const found = known.get(name) ?? others.get(name);
     if (found) return found;
-    const other = this.#other(name);
-    if (this.#others.size >= MOST_OTHERS) this.#others.clear();
-    this.#others.set(name, other);
+    const other = sensorOf(file, name, file.fallback, isDay, language);
+    if (others.size >= MOST_OTHERS) others.clear();
+    others.set(name, other);
     return other;
-  }
-
-  /** All to offer: of the declared ones what some tag reports or allows to compute; others by name. */
-  with(reported: Iterable<string>): readonly Sensor[] {
-    const names = new Set(reported);
-    const others = [...names].filter((name) => !this.#known.has(name)).sort();
-    const isOffered = (sensor: Sensor): boolean =>
-      names.has(sensor.name) || (!isOfDay(sensor) && isHad(sensor, (name) => names.has(name)));
-    return [...this.all.filter(isOffered), ...others.map((name) => this.named(name))];
-  }
-}
-
-/** One file: what holds by day, and what by night. */
-export interface Catalogues {
-  readonly day: Catalogue;
-  readonly night: Catalogue;
+  };
+  return {
+    all: all as readonly Sensor[],
+    /** Of the tag with that id; empty: in none. */
+    areaOf,
+    /** A sensor by its name on the wire; one that nobody declared gets the fallback's look. */
+    named,
+    /** All to offer: of the declared ones what some tag reports or allows to compute; others by name. */
+    with: (reported: Iterable<string>): readonly Sensor[] => {
+      const names = new Set(reported);
+      const isOffered = (sensor: Sensor): boolean =>
+        names.has(sensor.name) || (!isOfDay(sensor) && isHad(sensor, (name) => names.has(name)));
+      const rest = [...names].filter((name) => !known.has(name)).sort();
+      return [...all.filter(isOffered), ...rest.map(named)];
+    },
+  };
 }
 
 /** Which area of a file a tag is in: the first that names it. */
@@ -125,34 +93,51 @@ function areasOf({ areas = {} }: SensorsFile): (tagId: string) => string {
     byId.get(tagId) ?? begins.find(([prefix]) => tagId.startsWith(prefix))?.[1] ?? '';
 }
 
-export function cataloguesOf(file: SensorsFile, language: string = LANGUAGE): Catalogues {
+export function cataloguesOf(file: SensorsFile, language: string = LANGUAGE) {
   const areaOf = areasOf(file);
-  const by = (isDay: boolean): Catalogue => {
-    const made = (name: string, entry: SensorEntry): Sensor => ({
-      name,
-      label: entry.labels?.[language] ?? (entry.label || name),
-      dataLabel: entry.label || name,
-      unit: entry.unit,
-      hue: entry.hue,
-      lightness: entry.lightness,
-      saturation: file.ramp.saturation,
-      maxAlpha: file.ramp.max_alpha,
-      digits: digitsOf([entry]) ?? digitsOf((entry.derived ?? []).map((of) => file.sensors[of])),
-      madeOf: entry.derived ?? [],
-      part: entry.night ? (isDay ? 'day' : 'night') : null,
-      ...rangesOf(entry, isDay),
-      species: new Map(
-        Object.entries(entry.species ?? {}).map(([species, ranges]) => [
-          species.toLowerCase(),
-          rangesOf(ranges, isDay),
-        ]),
-      ),
-      ideals: idealsOf([entry]),
-    });
-    const all = Object.entries(file.sensors).map(([name, entry]) => made(name, entry));
-    return new Catalogue(all, (name) => made(name, file.fallback), areaOf);
-  };
+  const by = (isDay: boolean): Catalogue => catalogueOf(file, isDay, language, areaOf);
   return { day: by(true), night: by(false) };
+}
+
+function sensorOf(
+  file: SensorsFile,
+  name: string,
+  entry: SensorEntry,
+  isDay: boolean,
+  language: string,
+) {
+  const { unit, hue, lightness, derived: madeOf = [] } = entry;
+  return {
+    /** On the wire. */
+    name,
+    /** In the page's language; where the file has none, as in every language. */
+    label: entry.labels?.[language] ?? (entry.label || name),
+    /** The same in every language, for files that programs read. */
+    dataLabel: entry.label || name,
+    /** Empty when unknown. */
+    unit,
+    hue,
+    lightness,
+    saturation: file.ramp.saturation,
+    /** Of the heat map at the maximum. */
+    maxAlpha: file.ramp.max_alpha,
+    /** After the point, wherever a value of it stands; null: as the value's size deserves. */
+    digits: digitsOf([entry]) ?? digitsOf(madeOf.map((of) => file.sensors[of])),
+    /** The sensors that it is computed of: there are fields and a past of it, and no readings. */
+    madeOf,
+    /** Whose its ranges are; null: by day and by night they are the same. */
+    part: entry.night ? (isDay ? ('day' as const) : ('night' as const)) : null,
+    ...rangesOf(entry, isDay),
+    /** Species with ranges of their own, by their name in lower case. */
+    species: new Map(
+      Object.entries(entry.species ?? {}).map(([species, ranges]) => [
+        species.toLowerCase(),
+        rangesOf(ranges, isDay),
+      ]),
+    ),
+    /** All that the file has of it, of day, night and species. */
+    ideals: idealsOf([entry]),
+  };
 }
 
 /** Of a night that says nothing, what holds by day. */
@@ -161,7 +146,6 @@ function rangesOf(entry: SensorRanges, isDay: boolean): Ranges {
   return { ideal: spanOf(ideal), critical: spanOf(critical) };
 }
 
-/** All that entries have, of day, night and species. */
 const idealsOf = (entries: readonly (SensorEntry | undefined)[]): Span[] =>
   entries
     .flatMap((entry) => [entry, ...Object.values(entry?.species ?? {})])

@@ -22,25 +22,8 @@ export interface Point {
 }
 
 /** Tries that came to nothing, or looks at the flowers, somewhere in `widthS` seconds from `at` on. */
-export interface Mark {
-  readonly at: number;
-  readonly widthS: number;
-  readonly kind: 'failure' | 'look';
-  readonly count: number;
-}
-
-export interface Series extends Span {
-  readonly tagId: string;
-  readonly sensor: string;
-  /** Width of a bucket, seconds; null: these are readings. */
-  readonly bucketS: number | null;
-  /** By their time. */
-  readonly points: readonly Point[];
-  readonly gaps: readonly Span[];
-  /** When it was night by the clock; null: that does not tell. */
-  readonly nights: readonly Span[] | null;
-  readonly missing: readonly Missing[];
-}
+export type Mark = ReturnType<typeof marksOf>[number];
+export type Series = ReturnType<typeof seriesOf>;
 
 export const readingAt = (at: number, value: number | null): Point => ({
   ...{ at, value, min: value, max: value },
@@ -48,10 +31,11 @@ export const readingAt = (at: number, value: number | null): Point => ({
 });
 
 /** The series that the bridge told, at `nowS` of the twin's time, ROS seconds. */
-export const seriesOf = (wire: History, nowS: number): Series => ({
+export const seriesOf = (wire: History, nowS: number) => ({
   ...spanOfWire(wire),
   tagId: wire.tag_id,
   sensor: wire.sensor_type,
+  /** Width of a bucket, seconds; null: these are readings. */
   bucketS: wire.bucket_s,
   points: [
     ...wire.readings.map(({ stamp, value }) => readingAt(secondsOf(stamp), value)),
@@ -60,8 +44,9 @@ export const seriesOf = (wire: History, nowS: number): Series => ({
       at: secondsOf(start),
       value: mean,
     })),
-  ],
+  ] as readonly Point[],
   gaps: wire.gaps.map(spanOfWire),
+  /** When it was night by the clock; null: that does not tell. */
   nights: wire.nights?.map(spanOfWire) ?? null,
   missing: missingOf(wire, nowS),
 });
@@ -78,7 +63,7 @@ export const laterBy = (series: Series, byS: number): Series => ({
 });
 
 /** What a tag's timeline tells of tries and looks; scans are told by the readings themselves. */
-export const marksOf = ({ buckets, bucket_s: widthS }: Timeline): Mark[] =>
+export const marksOf = ({ buckets, bucket_s: widthS }: Timeline) =>
   buckets.flatMap(({ start, failures, looks }) =>
     [
       { kind: 'failure' as const, count: failures },
@@ -102,7 +87,6 @@ export function pointAt(series: Series, moment: number): Point | null {
   return lastUntil(series, moment);
 }
 
-/** The last reading or bucket that had begun by then: what was known at that moment. */
 export const lastUntil = ({ points }: Series, moment: number): Point | null =>
   points.findLast(({ at }) => at <= moment) ?? null;
 

@@ -1,11 +1,10 @@
 /** Rows of the table: what is in a column, how it sorts, what a filter finds. */
 import type { TagHealth, Verdict, WireTime } from '../contract/types';
-import type { MapPoint } from '../geometry/coordinates';
 import { S } from '../strings';
 import { ageSeconds } from './time';
 import { type Cell, csv, finder } from './text';
 import { type HouseHealth, reasonsText, severity, tryKind } from './health';
-import { memoLast, memoOne } from './memo';
+import { groupedBy, memoLast, memoOne } from './memo';
 import { speciesText } from './marks';
 import type { Catalogue, Sensor } from './sensors';
 import { type TemperatureUnit, toShown, unitOf } from './format';
@@ -23,7 +22,6 @@ export function rowsOf(tags: readonly Tag[], health: HouseHealth): Row[] {
   });
 }
 
-/** Stands above the rows of an area. */
 export interface AreaHead {
   /** Empty: of the tags that are in none. */
   readonly area: string;
@@ -31,50 +29,27 @@ export interface AreaHead {
   readonly worst: Verdict;
 }
 
-/** What the table has one below the other. */
 export type Line = Row | AreaHead;
 
-interface Area {
-  /** Empty: that of the tags that are in none; it comes last. */
-  readonly area: string;
-  readonly rows: readonly Row[];
-}
+type Area = ReturnType<typeof inAreas>[number];
 
-/** Rows by their area, in the order in which the first of each comes. */
-export function inAreas(rows: readonly Row[], areaOf: (tagId: string) => string): readonly Area[] {
-  const areas = new Map<string, Row[]>();
-  for (const row of rows) {
-    const area = areaOf(row.tag.id);
-    const there = areas.get(area);
-    if (there) there.push(row);
-    else areas.set(area, [row]);
-  }
+/** Rows by their area, in the order in which the first of each comes; last those that are in none. */
+export function inAreas(rows: readonly Row[], areaOf: (tagId: string) => string) {
+  const areas = groupedBy(rows, ({ tag }) => areaOf(tag.id));
   const found = [...areas].map(([area, own]) => ({ area, rows: own }));
   return found.sort((a, b) => Number(a.area === '') - Number(b.area === ''));
 }
 
-/** An area, and where its tags are. */
-export interface AreaOnMap {
-  readonly name: string;
-  readonly places: readonly MapPoint[];
+export type AreaOnMap = ReturnType<typeof areasOnMap>[number];
+
+export function areasOnMap(tags: readonly Tag[], areaOf: (tagId: string) => string) {
+  const pinned = tags.filter(({ id, at }) => at && areaOf(id) !== '');
+  return [...groupedBy(pinned, ({ id }) => areaOf(id))].map(([name, own]) => ({
+    name,
+    places: own.flatMap(({ at }) => at ?? []),
+  }));
 }
 
-export function areasOnMap(
-  tags: readonly Tag[],
-  areaOf: (tagId: string) => string,
-): readonly AreaOnMap[] {
-  const areas = new Map<string, MapPoint[]>();
-  for (const { id, at } of tags) {
-    const name = areaOf(id);
-    if (!at || name === '') continue;
-    const there = areas.get(name);
-    if (there) there.push(at);
-    else areas.set(name, [at]);
-  }
-  return [...areas].map(([name, places]) => ({ name, places }));
-}
-
-/** The rows with a head above each area's, if there is any area. */
 export function withHeads(areas: readonly Area[]): readonly Line[] {
   if (areas[0]?.area === '') return areas[0].rows;
   return areas.flatMap(({ area, rows }): readonly Line[] => {

@@ -43,7 +43,6 @@ export function shown(text: string, longest = LONGEST): string {
   return letters.length > longest ? `${letters.slice(0, longest - 1).join('')}…` : clean;
 }
 
-/** A cell: text, a number, or nothing. */
 export type Cell = string | number | null;
 
 /**

@@ -39,7 +39,7 @@ describe('freshness', () => {
 
 // Half an hour off the full one, and set before any module looks at the clock.
 vi.hoisted(() => {
-  process.env['TZ'] = 'Asia/Kolkata';
+  vi.stubEnv('TZ', 'Asia/Kolkata');
 });
 
 test('a moment is a date on the operator’s own clock', () => {

@@ -75,7 +75,6 @@ export function shortRosText(at: number): string {
 export const dateText = (epochMs: number): string =>
   `${date.format(epochMs)}, ${clockText(epochMs)}`;
 
-/** Of a number of hours, minutes or seconds, two digits at least. */
 export const two = (value: number): string => String(value).padStart(2, '0');
 
 function simText(at: number): string {
@@ -116,5 +115,4 @@ export function spanOf(period: Period, now: number, oldest: number | null): Span
   }
 }
 
-/** Whether a period goes on with the time. */
 export const endsNow = (period: Period): boolean => period.kind !== 'own';

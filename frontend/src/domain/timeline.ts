@@ -3,38 +3,24 @@ import type { Timeline as WireTimeline } from '../contract/types';
 import { LOCALE } from '../strings';
 import { dayFormat, secondsOf, type Span, two } from './time';
 
-/** What happened in one bucket. */
-export interface Happened extends Omit<WireTimeline['buckets'][number], 'start'> {
-  /** When the bucket begins. */
-  readonly start: number;
-}
+/** What happened in one bucket, from when it begins, ROS seconds. */
+export type Happened = Timeline['buckets'][number];
 
-export interface Timeline extends Span {
-  /** How long a bucket is, seconds. */
-  readonly bucketS: number;
-  /** What memory holds at all; null: nothing yet. */
-  readonly reach: Span | null;
-  /** By their time; one in which nothing happened is left out. */
-  readonly buckets: readonly Happened[];
-  readonly silences: readonly Span[];
-  /** Of the clock. */
-  readonly runs: readonly Span[];
-  readonly missing: readonly Missing[];
-}
+export type Timeline = ReturnType<typeof timelineOf>;
 
-type WireSpan = WireTimeline['silences'][number];
-
-export const spanOfWire = ({ from, to }: WireSpan): Span => ({
+export const spanOfWire = ({ from, to }: WireTimeline['silences'][number]): Span => ({
   from: secondsOf(from),
   to: secondsOf(to),
 });
 
 /** `nowS`: the twin's time, ROS seconds, as it was told. */
-export function timelineOf(wire: WireTimeline, nowS: number): Timeline {
+export function timelineOf(wire: WireTimeline, nowS: number) {
   return {
     ...spanOfWire(wire),
     bucketS: wire.bucket_s,
+    /** What memory holds at all; null: nothing yet. */
     reach: wire.reach && spanOfWire(wire.reach),
+    /** By their time; one in which nothing happened is left out. */
     buckets: wire.buckets.map((bucket) => ({ ...bucket, start: secondsOf(bucket.start) })),
     silences: wire.silences.map(spanOfWire),
     runs: wire.runs.map(spanOfWire),
@@ -49,13 +35,14 @@ export interface Missing extends Span {
   readonly why: 'not_kept' | 'not_recorded';
 }
 
-type Told = Pick<WireTimeline, 'from' | 'to' | 'complete_to' | 'kept_from'>;
-
 /** The twin says once a second how far its journal is. */
 const SLACK_S = 5;
 
 /** `nowS` is the twin's time at which it was told: of what comes later nothing is missing. */
-export function missingOf(told: Told, nowS: number): readonly Missing[] {
+export function missingOf(
+  told: Pick<WireTimeline, 'from' | 'to' | 'complete_to' | 'kept_from'>,
+  nowS: number,
+): readonly Missing[] {
   const [from, to] = [secondsOf(told.from), Math.min(secondsOf(told.to), nowS)];
   const missing: Missing[] = [];
   if (told.kept_from) missing.push({ from, to: secondsOf(told.kept_from), why: 'not_kept' });
@@ -154,7 +141,6 @@ function clockText(date: Date, step: number): string {
 const dateText = (date: Date, step: number): string =>
   (step >= 30 * DAY ? monthFormat : dayFormat).format(date);
 
-/** Hours, minutes and seconds since the simulation began. */
 function countText(at: number, step: number): string {
   const seconds = Math.round(at);
   const text = `${Math.floor(seconds / HOUR)}:${two(Math.floor(seconds / MINUTE) % 60)}`;

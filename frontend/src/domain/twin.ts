@@ -2,65 +2,22 @@ import type { Latest, TwinTagState, WirePoint, WireTime } from '../contract/type
 import { mapPoint, type MapPoint } from '../geometry/coordinates';
 import type { When } from './time';
 
-interface Bloom {
-  readonly at: MapPoint;
-  readonly species: string;
-  readonly anomaly: boolean;
-}
-
-/** A try that came to nothing. */
 export interface FailedTry {
   readonly at: When;
   /** As in lupin_msgs/Observation; never 0, which is a success. */
   readonly status: number;
-  /** Why, for a person; may be empty. */
   readonly detail: string;
 }
 
 /** One tag as the page uses it. Strings are as they came: show them through `domain/text`. */
-export interface Tag {
-  readonly id: string;
-  /** Metres; null: the tag has no pose, or one that is far off, and gets no pin. */
-  readonly at: MapPoint | null;
-  /** Where it was pinned, too far from the others for any map; null: it was not. */
-  readonly farOff: MapPoint | null;
-  /** Latest reading by sensor, in its unit; null: the sensor gave not-a-number. */
-  readonly readings: ReadonlyMap<string, number | null>;
-  /** When each reading was made: a look at the flowers makes none younger. */
-  readonly readAt: ReadonlyMap<string, When>;
-  /** When the newest reading was made. */
-  readonly scannedAt: When;
-  /** When the flowers were last looked at; "never" also where the twin does not tell. */
-  readonly lookedAt: When;
-  /** The last scan or look, if it brought nothing. */
-  readonly failedTry: FailedTry | null;
-  /** Whether it was ever observed in any way, and how long ago is known. */
-  readonly isObserved: boolean;
-  /** ROS time of the last observation, as a key to compare; "0.0" when there was none. */
-  readonly observation: string;
-  readonly species: string;
-  readonly speciesConfidence: number | null;
-  /** The species whose ranges hold; empty where the camera was not sure, as the bridge judges. */
-  readonly sureSpecies: string;
-  readonly anomaly: boolean;
-  readonly flowerCount: number;
-  readonly bugCount: number;
-  readonly blooms: readonly Bloom[];
-  /** Outline of the planter box. */
-  readonly footprint: readonly MapPoint[];
-  /** What all this was read from. */
-  readonly wire: TwinTagState;
-}
+export type Tag = ReturnType<typeof tagOf>;
 
-/** The greenhouse at one moment. */
 export interface Snapshot {
   /** By their ids; the same list as before if nothing but the time went on. */
   readonly tags: readonly Tag[];
   /** Changes exactly when a field or the map could have changed. */
   readonly revision: string;
-  /** ROS time of the state, as a key to compare. */
-  readonly stamp: string;
-  /** The same as it came. */
+  /** ROS time of the state. */
   readonly at: WireTime;
   /** When this state was new, ms on the browser's monotonic clock. */
   readonly takenAt: number;
@@ -70,20 +27,12 @@ export interface Snapshot {
   readonly isWhole: boolean;
 }
 
-const timeKey = (time: WireTime): string => `${time.sec}.${time.nanosec}`;
-
 /** A point with a coordinate that is not finite (null on the wire) is no point. */
 function pointOf(point: WirePoint): MapPoint | null {
   return point.x === null || point.y === null ? null : mapPoint(point.x, point.y);
 }
 
-/** The state that a tag is read from. */
-interface TakenState {
-  /** Its ROS time. */
-  readonly at: WireTime;
-  /** When it was new, ms on the monotonic clock. */
-  readonly takenAt: number;
-}
+type TakenState = Pick<Snapshot, 'at' | 'takenAt'>;
 
 /**
  * A ROS time on the monotonic clock: a difference to the wall clock would be wrong in simulation, and
@@ -98,8 +47,7 @@ export function whenOf(time: WireTime, { at, takenAt }: TakenState): When {
 /** Below it the bridge judges by what holds for all: `sure_species` of the twin. */
 const SURE = 0.5;
 
-/** Reads a tag of a state. */
-export function tagOf(wire: TwinTagState, state: TakenState): Tag {
+export function tagOf(wire: TwinTagState, state: TakenState) {
   const { position, orientation } = wire.pose;
   const readAt = new Map(
     wire.readings.map((reading): [string, When] => [reading.name, readAtOf(wire, reading, state)]),
@@ -107,22 +55,29 @@ export function tagOf(wire: TwinTagState, state: TakenState): Tag {
   const { looked_at: looked, last_try: tried, last_try_status: status } = wire;
   return {
     id: wire.tag_id,
+    // Metres; null: the tag has no pose, or one that is far off, and gets no pin.
     // w is exactly 0 where the twin has no pose; every rotation about z by less than half a
     // turn has another w, and ROS itself defaults it to 1.
     at: orientation.w === 0 || orientation.w === null ? null : pointOf(position),
-    farOff: null,
+    /** Where it was pinned, too far from the others for any map; null: it was not. */
+    farOff: null as MapPoint | null,
+    /** Latest reading by sensor, in its unit; null: the sensor gave not-a-number. */
     readings: new Map(wire.readings.map(({ name, value }) => [name, value])),
+    /** When each reading was made: a look at the flowers makes none younger. */
     readAt,
     scannedAt: newest(readAt.values()),
+    /** "never" also where the twin does not tell. */
     lookedAt: looked === null ? 'never' : whenOf(looked, state),
+    /** The last scan or look, if it brought nothing. */
     failedTry:
       tried === null || status === null || status === 0
         ? null
-        : { at: whenOf(tried, state), status, detail: wire.last_try_detail },
+        : ({ at: whenOf(tried, state), status, detail: wire.last_try_detail } as FailedTry),
+    /** Whether it was ever observed in any way, and how long ago is known. */
     isObserved: wire.stale_seconds !== null,
-    observation: timeKey(wire.last_observed),
     species: wire.species,
     speciesConfidence: wire.species_confidence,
+    /** The species whose ranges hold; empty where the camera was not sure, as the bridge judges. */
     sureSpecies: (wire.species_confidence ?? 0) >= SURE ? wire.species : '',
     anomaly: wire.anomaly,
     flowerCount: wire.flower_count,
@@ -197,29 +152,25 @@ export function equal(a: unknown, b: unknown): boolean {
  * it keeps the older `takenAt`, or every heartbeat would make the readings look fresh again.
  */
 export function snapshotOf(latest: Latest, arrivedAt: number, before: Snapshot | null): Snapshot {
-  const stamp = timeKey(latest.state.header.stamp);
-  const repeated = before?.stamp === stamp;
-  const takenAt = repeated ? Math.min(before.takenAt, arrivedAt) : arrivedAt;
-  const state = { at: latest.state.header.stamp, takenAt };
+  const at = latest.state.header.stamp;
+  const isRepeated = before !== null && equal(before.at, at);
+  const takenAt = isRepeated ? Math.min(before.takenAt, arrivedAt) : arrivedAt;
+  const state = { at, takenAt };
   const known = new Map(before?.tags.map((tag) => [tag.id, tag]));
   const read = latest.state.tags.map((wire) => sharedTag(known.get(wire.tag_id), wire, state));
   const tags = inOrder(read, known, before?.tags ?? []);
   return {
     tags,
     revision: latest.revision,
-    stamp,
-    at: state.at,
-    takenAt,
+    ...state,
     fresh: before && tags !== before.tags ? freshTags(known, tags) : [],
     isWhole: latest.isWhole ?? true,
   };
 }
 
-/** How far a map of these tags goes. */
 export const reachOfTags = (tags: readonly Tag[]): Reach =>
   reachOf(tags.flatMap((tag) => tag.at ?? tag.farOff ?? []));
 
-/** The tag as the map shows it: one that is far off has no place there. */
 function within(reach: Reach, tag: Tag): Tag {
   const place = tag.at ?? tag.farOff;
   const isFar = place !== null && !holds(reach, place);
@@ -250,7 +201,10 @@ function inOrder(
 
 function freshTags(before: ReadonlyMap<string, Tag>, now: readonly Tag[]): string[] {
   return now
-    .filter((tag) => tag.isObserved && before.get(tag.id)?.observation !== tag.observation)
+    .filter(({ id, isObserved, wire }) => {
+      const was = before.get(id)?.wire.last_observed;
+      return isObserved && !equal(was, wire.last_observed);
+    })
     .map((tag) => tag.id);
 }
 
@@ -280,15 +234,12 @@ const ONE_IN = 3;
 
 const EVERYWHERE: Reach = { x: 0, y: 0, radius: Infinity };
 
-/** Whether a point could be on any map. */
 export const isPossible = ({ x, y }: Readonly<{ x: number; y: number }>): boolean =>
   Math.abs(x) <= FARTHEST_M && Math.abs(y) <= FARTHEST_M;
 
-/** Whether a point is on the map. */
 export const holds = (reach: Reach, point: MapPoint): boolean =>
   isPossible(point) && Math.hypot(point.x - reach.x, point.y - reach.y) <= reach.radius;
 
-/** The circle of tags at these places. */
 export function reachOf(places: readonly MapPoint[]): Reach {
   const possible = places.filter(isPossible);
   const x = medianLow(possible.map((place) => place.x));

@@ -1,52 +1,20 @@
-import type { Verdict } from '../contract/types';
 import { mix, rgbText, type Rgb } from '../domain/ramp';
 
-interface VerdictColours {
-  readonly body: string;
-  /** The sign on its body. */
-  readonly ink: string;
-  /** Line and sign of one whose body is empty. */
-  readonly line: string;
-}
-
 /** Colours of the map view; those of the page itself are in `styles/tokens.css`. */
-export interface Palette {
-  readonly name: 'light' | 'dark' | 'forced';
+export const LIGHT = {
   /** Behind everything: what nobody has explored. */
-  readonly ground: Rgb;
+  ground: [232, 235, 231] as Rgb,
   /** Free floor and walls of the SLAM map. */
-  readonly floor: Rgb;
-  readonly wall: Rgb;
+  floor: [253, 253, 252] as Rgb,
+  wall: [84, 94, 88] as Rgb,
   /** Strokes over what is not known, and the line where the known ends. */
-  readonly hatch: string;
-  readonly edge: string;
-  readonly gridLine: string;
-  readonly gridText: string;
-  readonly boxFill: string;
-  readonly boxLine: string;
-  /** Marks of verdicts, as the style sheet has them (`--pin-…`). */
-  readonly verdicts: Readonly<Record<Verdict, VerdictColours>>;
-  readonly pinLine: string;
-  readonly labelFill: string;
-  readonly labelText: string;
-  readonly bloomLine: string;
-  readonly pest: string;
-  readonly pestInk: string;
-  readonly accent: string;
-  readonly halo: string;
-}
-
-export const LIGHT: Palette = {
-  name: 'light',
-  ground: [232, 235, 231],
-  floor: [253, 253, 252],
-  wall: [84, 94, 88],
   hatch: 'rgb(60 72 65 / 0.34)',
   edge: 'rgb(40 52 45 / 0.7)',
   gridLine: 'rgb(23 33 27 / 0.09)',
   gridText: 'rgb(23 33 27 / 0.62)',
   boxFill: 'rgb(110 84 52 / 0.14)',
   boxLine: 'rgb(110 84 52 / 0.75)',
+  /** Marks of verdicts, as the style sheet has them (`--pin-…`); `line`: of one whose body is empty. */
   verdicts: {
     critical: { body: '#c4211a', ink: '#ffffff', line: '#b3261e' },
     stressed: { body: '#f5a800', ink: '#17211b', line: '#855300' },
@@ -63,8 +31,9 @@ export const LIGHT: Palette = {
   halo: 'rgb(255 255 255 / 0.9)',
 };
 
+export type Palette = typeof LIGHT;
+
 export const DARK: Palette = {
-  name: 'dark',
   ground: [16, 21, 19],
   floor: [32, 40, 36],
   wall: [140, 153, 146],
@@ -102,7 +71,6 @@ export function forcedPalette(of: (name: string) => Rgb): Palette {
   const full = { body: text, ink: paper, line: text };
   const empty = { body: paper, ink: text, line: text };
   return {
-    name: 'forced',
     ground,
     floor: mix(ground, ink, 0.08),
     wall: ink,

@@ -1,12 +1,12 @@
 /** Pins, blooms, pest rings and labels: what the data moves. All from cached sprites. */
 import { isBad, VERDICTS } from '../domain/health';
-import { type BloomLook, type Mark, MARKS, type Point } from '../domain/marks';
+import { type BloomLook, lineOf, type Mark, MARKS, type Point } from '../domain/marks';
 import { rgbText } from '../domain/ramp';
 import type { LabelRequest, PlacedLabel } from '../geometry/clear';
-import { type MapPoint, toCanvas, type View } from '../geometry/coordinates';
+import { type MapPoint, toCanvas } from '../geometry/coordinates';
 import type { Palette } from './palette';
-import type { BloomDot, Pin } from './scene';
-import type { Sprites, Surface } from './surface';
+import type { Pin, Scene } from './scene';
+import type { Pen, Surface } from './surface';
 
 /** `text`: how large the page's text is, 1 as usual. */
 export const labelHeight = (text: number): number => Math.round(18 * text);
@@ -35,24 +35,19 @@ export function bloomRadius(scale: number): number {
 const inside = ({ size }: Surface, x: number, y: number, margin: number): boolean =>
   x > -margin && y > -margin && x < size.width + margin && y < size.height + margin;
 
-export function drawBlooms(
-  surface: Surface,
-  view: View,
-  blooms: readonly BloomDot[],
-  sprites: Sprites,
-  palette: Palette,
-): void {
+export function drawBlooms(pen: Pen, blooms: Scene['blooms']): void {
+  const { view, sprites, palette } = pen;
   const radius = bloomRadius(view.scale);
   const box = Math.ceil(radius * 1.3 + 2) * 2;
   for (const { at, look } of blooms) {
     const { x, y } = toCanvas(view, at);
-    if (!inside(surface, x, y, box)) continue;
+    if (!inside(pen, x, y, box)) continue;
     const key = `bloom ${radius} ${look.shape} ${look.colour.join()}`;
     const sprite = sprites.get(key, box, box, (context) => {
       context.translate(box / 2, box / 2);
       paintBloom(context, radius, look, palette);
     });
-    sprites.draw(surface, sprite, x - box / 2, y - box / 2);
+    sprites.draw(pen, sprite, x - box / 2, y - box / 2);
   }
 }
 
@@ -85,20 +80,12 @@ function paintBloom(
   context.stroke();
 }
 
-/** Warnings are larger than the rest. */
 const WARNING_PX = 1;
 
-/** Those who need somebody lie on top of their neighbours. */
 const BY_SEVERITY = [...VERDICTS].reverse();
 
-export function drawPins(
-  surface: Surface,
-  view: View,
-  pins: readonly Pin[],
-  sprites: Sprites,
-  palette: Palette,
-  spacing = Infinity,
-): void {
+export function drawPins(pen: Pen, pins: readonly Pin[], spacing: number): void {
+  const { context: target, view, sprites, palette } = pen;
   const usual = pinRadius(view.scale, spacing);
   for (const verdict of BY_SEVERITY) {
     const radius = Math.max(usual, LEAST_PX[verdict]);
@@ -106,15 +93,15 @@ export function drawPins(
     for (const pin of pins) {
       if (pin.verdict !== verdict) continue;
       const { x, y } = toCanvas(view, pin.at);
-      if (!inside(surface, x, y, box)) continue;
+      if (!inside(pen, x, y, box)) continue;
       const key = `pin ${radius} ${verdict} ${pin.kind}`;
       const sprite = sprites.get(key, box, box, (context) => {
         context.translate(box / 2, box / 2);
         paintPin(context, radius, pin, palette);
       });
-      surface.context.globalAlpha = pin.strength;
-      sprites.draw(surface, sprite, x - box / 2, y - box / 2);
-      surface.context.globalAlpha = 1;
+      target.globalAlpha = pin.strength;
+      sprites.draw(pen, sprite, x - box / 2, y - box / 2);
+      target.globalAlpha = 1;
     }
   }
   // Last, so that no neighbour covers a warning; and never faded.
@@ -122,7 +109,7 @@ export function drawPins(
     if (!pin.pest) continue;
     const { x, y } = toCanvas(view, pin.at);
     const radius = Math.max(usual, LEAST_PX.critical);
-    if (inside(surface, x, y, radius * 8)) drawPest(surface, x, y, radius, sprites, palette);
+    if (inside(pen, x, y, radius * 8)) drawPest(pen, x, y, radius);
   }
 }
 
@@ -168,12 +155,7 @@ function paintPin(
 }
 
 /** There is such a sensor, and it gives no number. */
-const STRUCK: Mark['sign'] = [
-  [
-    [-0.45, 0.45],
-    [0.45, -0.45],
-  ],
-];
+const STRUCK: Mark['sign'] = [lineOf('-.45,.45 .45,-.45')];
 
 function traceOutline(context: CanvasRenderingContext2D, { outline }: Mark, radius: number): void {
   if (outline === 'circle') {
@@ -197,14 +179,8 @@ function traceLine(
   }
 }
 
-function drawPest(
-  surface: Surface,
-  x: number,
-  y: number,
-  radius: number,
-  sprites: Sprites,
-  palette: Palette,
-): void {
+function drawPest(pen: Pen, x: number, y: number, radius: number): void {
+  const { sprites, palette } = pen;
   const ring = radius + 6;
   const box = (ring + 10) * 2;
   const sprite = sprites.get(`pest ${radius}`, box, box, (context) => {
@@ -221,7 +197,7 @@ function drawPest(
     context.scale(radius < 8 ? 0.8 : 1, radius < 8 ? 0.8 : 1);
     paintBug(context, palette);
   });
-  sprites.draw(surface, sprite, x - box / 2, y - box / 2);
+  sprites.draw(pen, sprite, x - box / 2, y - box / 2);
 }
 
 /** A bug on a disc about the origin: no shape of any verdict. */
@@ -268,17 +244,11 @@ export function labelRequests(
   }));
 }
 
-export function drawLabels(
-  surface: Surface,
-  view: View,
-  labels: readonly PlacedLabel[],
-  sprites: Sprites,
-  palette: Palette,
-  textScale = 1,
-): void {
+export function drawLabels(pen: Pen, labels: readonly PlacedLabel[]): void {
+  const { view, sprites, palette, textScale } = pen;
   const height = labelHeight(textScale);
   for (const { text, x, y, width } of labels) {
-    if (!inside(surface, view.x + x, view.y + y, width + height)) continue;
+    if (!inside(pen, view.x + x, view.y + y, width + height)) continue;
     const sprite = sprites.get(`label ${text}`, width, height, (context) => {
       context.fillStyle = palette.labelFill;
       context.beginPath();
@@ -289,11 +259,9 @@ export function drawLabels(
       context.textBaseline = 'middle';
       context.fillText(text, LABEL_PADDING, height / 2 + 0.5);
     });
-    sprites.draw(surface, sprite, view.x + x, view.y + y);
+    sprites.draw(pen, sprite, view.x + x, view.y + y);
   }
 }
-
-/** What moves by itself or with the pointer: pulses, the chosen pin, the crosshair. */
 
 /** How long the ring of a fresh observation grows, ms. */
 export const PULSE_MS = 1_200;
@@ -305,11 +273,9 @@ export interface Pulse {
 }
 
 export function drawPulses(
-  { context }: Surface,
-  view: View,
+  { context, view, palette }: Pen,
   pulses: readonly Pulse[],
   now: number,
-  palette: Palette,
 ): void {
   const radius = pinRadius(view.scale);
   context.strokeStyle = palette.accent;
@@ -325,13 +291,7 @@ export function drawPulses(
   context.globalAlpha = 1;
 }
 
-export function drawMark(
-  { context }: Surface,
-  view: View,
-  at: MapPoint,
-  strong: boolean,
-  palette: Palette,
-): void {
+export function drawMark({ context, view, palette }: Pen, at: MapPoint, strong: boolean): void {
   // Outside of the ring that tells a pest.
   const radius = pinRadius(view.scale) + 9;
   const { x, y } = toCanvas(view, at);
@@ -346,7 +306,7 @@ export function drawMark(
 }
 
 /** The point whose value the keyboard reads: the middle of the view. */
-export function drawCrosshair({ context, size }: Surface, palette: Palette): void {
+export function drawCrosshair({ context, size, palette }: Pen): void {
   const x = Math.round(size.width / 2) + 0.5;
   const y = Math.round(size.height / 2) + 0.5;
   for (const [colour, width] of [

@@ -17,39 +17,17 @@ const FAINTEST_WARNING = 5 / 6;
 /** What the filter leaves out stays in its place, and is not looked at. */
 const LEFT_OUT = 1 / 6;
 
-export interface Pin {
-  readonly id: string;
-  readonly at: MapPoint;
-  /**
-   * - value: the tag has this sensor and a reading, or all that it is computed of
-   * - failed: it has this sensor, whose reading is not a number
-   * - lacking: it has no such sensor
-   */
-  readonly kind: 'value' | 'failed' | 'lacking';
-  /** As the bridge judged the tag. */
-  readonly verdict: Verdict;
-  /** How fresh, 0.35 to 1; of a warning never faint; less where the filter leaves it out. */
-  readonly strength: number;
-  readonly pest: boolean;
-  /** Label texts from the most to the least telling. */
-  readonly texts: readonly string[];
-  readonly priority: number;
-}
-
-export interface BloomDot {
-  readonly at: MapPoint;
-  readonly look: BloomLook;
-}
+export type Pin = ReturnType<typeof pinOf>;
 
 export interface Scene {
   readonly pins: readonly Pin[];
-  readonly blooms: readonly BloomDot[];
+  readonly blooms: readonly { readonly at: MapPoint; readonly look: BloomLook }[];
   readonly boxes: readonly (readonly MapPoint[])[];
   /** How far pins are apart where they are many, m; else infinite. */
   readonly spacing: number;
 }
 
-interface SceneInput {
+export interface SceneInput {
   readonly tags: readonly Tag[];
   readonly health: HouseHealth;
   readonly sensor: Sensor;
@@ -64,16 +42,11 @@ interface SceneInput {
 /** What neither fades nor follows the sensor. */
 const planted = memoOne((tags: readonly Tag[]): Pick<Scene, 'blooms' | 'boxes'> => {
   const looks = speciesLooks(speciesOf(tags));
-  const boxes = new Map<string, readonly MapPoint[]>();
-  const blooms: BloomDot[] = [];
-  for (const tag of tags) {
-    if (tag.footprint.length >= 3) {
-      boxes.set(tag.footprint.map(({ x, y }) => `${x},${y}`).join(' '), tag.footprint);
-    }
-    for (const { at, species } of tag.blooms) {
-      blooms.push({ at, look: looks.get(species) ?? UNKNOWN_SPECIES });
-    }
-  }
+  const blooms = tags.flatMap((tag) =>
+    tag.blooms.map(({ at, species }) => ({ at, look: looks.get(species) ?? UNKNOWN_SPECIES })),
+  );
+  const planters = tags.map(({ footprint }) => footprint).filter(({ length }) => length >= 3);
+  const boxes = new Map(planters.map((box) => [JSON.stringify(box), box]));
   return { blooms, boxes: [...boxes.values()] };
 });
 
@@ -106,7 +79,7 @@ function spacingOf(pins: readonly Pin[]): number {
   return Math.sqrt(((maxX - minX) * (maxY - minY)) / pins.length) || Infinity;
 }
 
-function pinOf(tag: Tag, at: MapPoint, input: SceneInput): Pin {
+function pinOf(tag: Tag, at: MapPoint, input: SceneInput) {
   const { health, sensor, unit, now, ageing, listed } = input;
   const isLeftOut = listed !== null && !listed.has(tag.id);
   // The number of what is computed is the field's, which neighbours have a part in: it is no label.
@@ -119,17 +92,24 @@ function pinOf(tag: Tag, at: MapPoint, input: SceneInput): Pin {
       freshness(ageSeconds(tag.readAt.get(part) ?? tag.scannedAt, now, ageing)),
     ),
   );
-  const verdict = health.byTag.get(tag.id)?.verdict ?? 'unknown';
+  const verdict: Verdict = health.byTag.get(tag.id)?.verdict ?? 'unknown';
   const isWarning = isBad(verdict);
   return {
     id: tag.id,
     at,
-    kind: isLacking ? 'lacking' : isFailed ? 'failed' : 'value',
+    /**
+     * - value: the tag has this sensor and a reading, or all that it is computed of
+     * - failed: it has this sensor, whose reading is not a number
+     * - lacking: it has no such sensor
+     */
+    kind: isLacking ? ('lacking' as const) : isFailed ? ('failed' as const) : ('value' as const),
     verdict,
+    /** How fresh, 0.35 to 1; of a warning never faint; less where the filter leaves it out. */
     strength: isLeftOut
       ? LEFT_OUT
       : Math.max(quantised(fresh, FADE_STEPS), isWarning ? FAINTEST_WARNING : 0),
     pest: tag.anomaly && !isLeftOut,
+    /** Label texts from the most to the least telling. */
     texts: isLeftOut ? [] : textsOf(tag)(sensor, unit),
     priority:
       (tag.anomaly ? 4 : 0) +
@@ -146,7 +126,6 @@ const textsOf = memoOne((tag: Tag) =>
   }),
 );
 
-/** Every species of some tags: the planters' and those of single blooms. */
 export function speciesOf(tags: readonly Tag[]): Set<string> {
   const names = new Set<string>();
   for (const tag of tags) {

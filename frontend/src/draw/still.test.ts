@@ -3,6 +3,7 @@ import { describe, expect, test } from 'vitest';
 import { mapPoint } from '../geometry/coordinates';
 import { FakeContext } from '../testing/canvas';
 import { estimated, fieldWith, sureness } from '../testing/field';
+import { penOn } from '../testing/pen';
 import { DARK, LIGHT } from './palette';
 import {
   drawAreas,
@@ -11,51 +12,34 @@ import {
   drawGridLabels,
   drawPicture,
   drawUnsure,
-  fieldPlacement,
   floorOf,
   Hatching,
   knownOf,
+  placedField,
   unsureOf,
 } from './still';
 import { canvasOfPixels, newCanvas } from './surface';
 
-const surface = (context: FakeContext): Parameters<typeof drawPicture>[0] => ({
-  context: context.asContext(),
-  size: { width: 400, height: 300 },
-  ratio: 1,
-});
-const view = { x: 50, y: 250, scale: 40 };
-
 describe('a picture in the map', () => {
   const placement = { originX: 0, originY: 0, yaw: 0, resolution: 0.5, width: 4, height: 4 };
+  const picture = newCanvas(4, 4);
 
   test('cells that are larger than a pixel are never blurred', () => {
     const context = new FakeContext();
-    drawPicture(surface(context), view, newCanvas(4, 4), placement);
+    drawPicture(penOn(context), { picture, placement });
     expect(context.named('drawImage')[0]?.state['imageSmoothingEnabled']).toBe(false);
   });
 
   test('cells that are smaller are averaged, or walls would drop out', () => {
     const context = new FakeContext();
-    drawPicture(surface(context), view, newCanvas(4, 4), { ...placement, resolution: 0.01 });
+    drawPicture(penOn(context), { picture, placement: { ...placement, resolution: 0.01 } });
     expect(context.named('drawImage')[0]?.state['imageSmoothingEnabled']).toBe(true);
   });
 });
 
 test('a field lies where it says, whatever its picture’s detail', () => {
-  const field = {
-    sensor: 't',
-    width: 10,
-    height: 20,
-    originX: -1,
-    originY: 2,
-    resolution: 0.1,
-    valueMin: 0,
-    valueMax: 1,
-    sampleCount: 1,
-    values: new Float32Array(200),
-  };
-  const placement = fieldPlacement(field, newCanvas(40, 80));
+  const over = { width: 10, height: 20, originX: -1, originY: 2, resolution: 0.1 };
+  const { placement } = placedField(fieldWith([], over), newCanvas(40, 80));
   expect(placement).toMatchObject({ originX: -1, originY: 2, yaw: 0, width: 40, height: 80 });
   expect(placement.resolution * placement.width).toBeCloseTo(1);
 });
@@ -63,7 +47,7 @@ test('a field lies where it says, whatever its picture’s detail', () => {
 test('boxes close their outline at the right place', () => {
   const context = new FakeContext();
   const box = [mapPoint(0, 0), mapPoint(1, 0), mapPoint(1, 2)];
-  drawBoxes(surface(context), view, [box], LIGHT);
+  drawBoxes(penOn(context), [box]);
   expect(context.named('moveTo')[0]?.args).toEqual([50, 250]);
   expect(context.named('lineTo').map(({ args }) => args)).toEqual([
     [90, 250],
@@ -75,14 +59,14 @@ test('boxes close their outline at the right place', () => {
 test('an area is drawn round its tags, and has its name above it', () => {
   const context = new FakeContext();
   const places = [mapPoint(0, 0), mapPoint(1, 2)];
-  drawAreas(surface(context), view, [{ name: 'Bay 1', places }], LIGHT);
+  drawAreas(penOn(context), [{ name: 'Bay 1', places }]);
   expect(context.named('strokeRect')[0]?.args).toEqual([40, 160, 60, 100]);
   expect(context.named('fillText')[0]?.args).toEqual(['Bay 1', 40, 157]);
 });
 
 test('the grid’s numbers are round metres at their lines', () => {
   const context = new FakeContext();
-  drawGridLabels(surface(context), view, LIGHT);
+  drawGridLabels(penOn(context));
   const labels = context.named('fillText').map(({ args }) => args);
   const two = labels.find(([text, , y]) => text === '2 m' && y === 8);
   expect(two?.[1]).toBe(50 + 2 * 40 + 4);
@@ -90,7 +74,7 @@ test('the grid’s numbers are round metres at their lines', () => {
 
 test.each([1, 1.5, 2, 3])('the grid’s numbers keep apart at %d times the text', (textScale) => {
   const context = new FakeContext();
-  drawGridLabels(surface(context), view, LIGHT, textScale);
+  drawGridLabels(penOn(context, { textScale }));
   const along = context
     .named('fillText')
     .filter(({ args }) => args[2] === 8)
@@ -129,14 +113,8 @@ test('hatching is cut to the inside of the house, and out of what is known', () 
   const picture = canvasOfPixels({ data: new Uint8ClampedArray(4), width: 1, height: 1 });
   const placement = { originX: 0, originY: 0, yaw: 0, resolution: 1, width: 1, height: 1 };
   const context = new FakeContext();
-  const surface = {
-    context: context.asContext(),
-    size: { width: 30, height: 20 },
-    ratio: 2,
-  };
   const mask = { picture, placement };
-  const view = { x: 3, y: 4, scale: 10 };
-  new Hatching().draw(surface, view, mask, mask, LIGHT);
+  new Hatching().draw(penOn(context, { size: { width: 30, height: 20 }, ratio: 2 }), mask, mask);
   const [drawn] = context.named('drawImage');
   expect(drawn?.args.slice(1)).toEqual([0, 0, 30, 20]);
   const canvas = drawn?.args[0] as HTMLCanvasElement;
@@ -159,11 +137,10 @@ test('what an estimate is unsure of is hatched, the denser the less it is sure',
   ]);
   const strokes = (index: number): number => {
     const context = new FakeContext();
-    const surface = { context: context.asContext(), size: { width: 90, height: 90 }, ratio: 1 };
     const placement = { originX: 0, originY: 0, yaw: 0, resolution: 1, width: 4, height: 1 };
     const picture = newCanvas(1, 1);
     const steps = [0, 1, 2].map((each) => (each === index ? { picture, placement } : null));
-    drawUnsure(surface, { x: 0, y: 0, scale: 10 }, steps, new Hatching(), LIGHT);
+    drawUnsure(penOn(context), steps, new Hatching());
     const [drawn] = context.named('drawImage');
     return FakeContext.recordOf(drawn?.args[0] as HTMLCanvasElement)?.named('moveTo').length ?? 0;
   };
@@ -173,8 +150,8 @@ test('what an estimate is unsure of is hatched, the denser the less it is sure',
 
 test('an edge is drawn where it is in sight', () => {
   const context = new FakeContext(newCanvas(1, 1));
-  const surface = { context: context.asContext(), size: { width: 100, height: 100 }, ratio: 1 };
-  drawEdges(surface, { x: 0, y: 50, scale: 10 }, [1, 1, 2, 1, 500, 1, 501, 1], LIGHT);
+  const pen = penOn(context, { view: { x: 0, y: 50, scale: 10 } });
+  drawEdges(pen, [1, 1, 2, 1, 500, 1, 501, 1]);
   expect(context.named('moveTo').map(({ args }) => args)).toEqual([[10, 40]]);
   expect(context.named('lineTo').map(({ args }) => args)).toEqual([[20, 40]]);
 });

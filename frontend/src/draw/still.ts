@@ -14,13 +14,12 @@ import {
   mapPoint,
   toCanvas,
   toMap,
-  type View,
 } from '../geometry/coordinates';
 import { imageToCanvas, type Placement } from '../geometry/image';
 import type { Palette } from './palette';
-import { canvasOfPixels, contextOf, newCanvas, type Surface } from './surface';
+import { canvasOfPixels, contextOf, newCanvas, type Pen } from './surface';
 
-export function drawGround({ context, size }: Surface, palette: Palette): void {
+export function drawGround({ context, size, palette }: Pen): void {
   context.fillStyle = rgbText(palette.ground);
   context.fillRect(0, 0, size.width, size.height);
 }
@@ -28,7 +27,6 @@ export function drawGround({ context, size }: Surface, palette: Palette): void {
 /** The greys of /api/map.png between which a cell lies, from occupied to free. */
 const OCCUPIED_GREY = 70;
 const FREE_GREY = 236;
-/** Lighter is floor. */
 export const LEAST_FREE_GREY = (OCCUPIED_GREY + FREE_GREY) / 2;
 
 /** The SLAM map in the theme's colours: its grey becomes the way from wall to floor. */
@@ -51,28 +49,17 @@ export function tintMap(pixels: ImageData, palette: Palette): HTMLCanvasElement 
   return canvasOfPixels({ data, width: pixels.width, height: pixels.height });
 }
 
-/** Draws a picture that lies in the map, cell for cell and never blurred. */
-export function drawPicture(
-  { context, ratio }: Surface,
-  view: View,
-  picture: HTMLCanvasElement,
-  placement: Placement,
-): void {
-  place(context, view, { picture, placement }, view.scale * placement.resolution * ratio < 1);
-}
-
-/** A picture that lies in the map, of which only what it covers counts. */
-interface Mask {
+interface Placed {
   readonly picture: HTMLCanvasElement;
   readonly placement: Placement;
 }
 
-function place(
-  context: CanvasRenderingContext2D,
-  view: View,
-  { picture, placement }: Mask,
-  isSmooth = false,
-): void {
+/** Cell for cell and never blurred, unless cells are smaller than pixels. */
+export function drawPicture(pen: Pen, picture: Placed): void {
+  place(pen, picture, pen.view.scale * picture.placement.resolution * pen.ratio < 1);
+}
+
+function place({ context, view }: Pen, { picture, placement }: Placed, isSmooth = false): void {
   context.save();
   context.transform(...imageToCanvas(placement, view));
   context.imageSmoothingEnabled = isSmooth;
@@ -80,27 +67,17 @@ function place(
   context.restore();
 }
 
-export function fieldPlacement(field: Field, picture: HTMLCanvasElement): Placement {
-  const detail = picture.width / Math.max(1, field.width);
-  return {
-    originX: field.originX,
-    originY: field.originY,
-    yaw: 0,
-    resolution: field.resolution / detail,
-    width: picture.width,
-    height: picture.height,
-  };
+/** A picture of a field, in any detail, where the field lies. */
+export function placedField(field: Field, picture: HTMLCanvasElement): Placed {
+  const { originX, originY } = field;
+  const { width, height } = picture;
+  const resolution = (field.resolution * Math.max(1, field.width)) / width;
+  return { picture, placement: { originX, originY, yaw: 0, resolution, width, height } };
 }
 
 const GRID_GAP_PX = 56;
 
-interface GridTicks {
-  readonly columns: readonly number[];
-  readonly rows: readonly number[];
-}
-
-/** Round metres within the surface. */
-function gridTicks({ size }: Surface, view: View, textScale: number): GridTicks {
+function gridTicks({ size, view, textScale }: Pen) {
   const step = gridStep(view.scale, GRID_GAP_PX * textScale);
   const topLeft = toMap(view, canvasPoint(0, 0));
   const bottomRight = toMap(view, canvasPoint(size.width, size.height));
@@ -111,9 +88,9 @@ function gridTicks({ size }: Surface, view: View, textScale: number): GridTicks 
 }
 
 /** Lines at round metres, so far apart that their numbers have room. */
-export function drawGridLines(surface: Surface, view: View, palette: Palette, textScale = 1): void {
-  const { context, size } = surface;
-  const { columns, rows } = gridTicks(surface, view, textScale);
+export function drawGridLines(pen: Pen): void {
+  const { context, size, view, palette } = pen;
+  const { columns, rows } = gridTicks(pen);
   const sharp = (value: number): number => Math.round(value) + 0.5;
 
   context.strokeStyle = palette.gridLine;
@@ -135,15 +112,9 @@ export function drawGridLines(surface: Surface, view: View, palette: Palette, te
 /** Clear of the frame that the past has, CSS pixels. */
 const EDGE_PX = 8;
 
-/** The grid's numbers, along the left and the upper edge of the view. */
-export function drawGridLabels(
-  surface: Surface,
-  view: View,
-  palette: Palette,
-  textScale = 1,
-): void {
-  const { context, size } = surface;
-  const { columns, rows } = gridTicks(surface, view, textScale);
+export function drawGridLabels(pen: Pen): void {
+  const { context, size, view, palette, textScale } = pen;
+  const { columns, rows } = gridTicks(pen);
   context.fillStyle = palette.gridText;
   context.font = `500 ${10.5 * textScale}px "Inter Variable", system-ui, sans-serif`;
   context.textBaseline = 'top';
@@ -170,12 +141,9 @@ const tick = (metres: number): string =>
   (metres < 0 ? '\u2212' : '') +
   (Math.abs(metres) < 1e-9 ? '0' : written(lengthText(Math.abs(metres)))).replace('\u00a0', ' ');
 
-/** Outlines of the planter boxes; several tags of one box draw it once. */
 export function drawBoxes(
-  { context }: Surface,
-  view: View,
+  { context, view, palette }: Pen,
   boxes: readonly (readonly MapPoint[])[],
-  palette: Palette,
 ): void {
   context.fillStyle = palette.boxFill;
   context.strokeStyle = palette.boxLine;
@@ -196,13 +164,9 @@ export function drawBoxes(
 /** How far round its tags an area is drawn, m. */
 const AREA_M = 0.25;
 
-/** Where each area is, with its name above it. */
 export function drawAreas(
-  { context }: Surface,
-  view: View,
+  { context, view, palette, textScale }: Pen,
   areas: readonly AreaOnMap[],
-  palette: Palette,
-  textScale = 1,
 ): void {
   if (areas.length === 0) return;
   context.strokeStyle = context.fillStyle = palette.gridText;
@@ -229,8 +193,6 @@ export function drawAreas(
     context.fillText(name, x, y);
   }
 }
-
-/** What is not known, and where it begins: hatched inside the house, outlined at its edge. */
 
 /** From stroke to stroke of the hatching, pixels of the page. */
 const GAP_PX = 9;
@@ -284,15 +246,8 @@ export class Hatching {
   #canvas: HTMLCanvasElement | null = null;
 
   /** Hatches all that `inside` covers and `known` does not. */
-  draw(
-    surface: Surface,
-    view: View,
-    inside: Mask,
-    known: Mask | null,
-    palette: Palette,
-    gap = GAP_PX,
-  ): void {
-    const { size, ratio } = surface;
+  draw(pen: Pen, inside: Placed, known: Placed | null, gap = GAP_PX): void {
+    const { size, ratio } = pen;
     const width = Math.max(1, Math.round(size.width * ratio));
     const height = Math.max(1, Math.round(size.height * ratio));
     if (this.#canvas?.width !== width || this.#canvas.height !== height) {
@@ -302,33 +257,26 @@ export class Hatching {
     context.setTransform(ratio, 0, 0, ratio, 0, 0);
     context.globalCompositeOperation = 'source-over';
     context.clearRect(0, 0, size.width, size.height);
-    strokes({ context, size, ratio }, view, palette, gap);
+    const own = { ...pen, context };
+    strokes(own, gap);
     context.globalCompositeOperation = 'destination-in';
-    place(context, view, inside);
+    place(own, inside);
     if (known) {
       context.globalCompositeOperation = 'destination-out';
-      place(context, view, known);
+      place(own, known);
     }
-    surface.context.drawImage(this.#canvas, 0, 0, size.width, size.height);
+    pen.context.drawImage(this.#canvas, 0, 0, size.width, size.height);
   }
 }
 
-/** Hatches what an estimate is unsure of, the denser the less it is sure. */
-export function drawUnsure(
-  surface: Surface,
-  view: View,
-  steps: readonly (Mask | null)[],
-  hatching: Hatching,
-  palette: Palette,
-): void {
+export function drawUnsure(pen: Pen, steps: readonly (Placed | null)[], hatching: Hatching): void {
   UNSURE_GAPS_PX.forEach((gap, index) => {
     const step = steps[index];
-    if (step) hatching.draw(surface, view, step, null, palette, gap);
+    if (step) hatching.draw(pen, step, null, gap);
   });
 }
 
-/** Diagonals that move with the map. */
-function strokes({ context, size }: Surface, view: View, palette: Palette, gap: number): void {
+function strokes({ context, size, view, palette }: Pen, gap: number): void {
   const { width, height } = size;
   const first = ((view.x + view.y) % gap) - gap;
   context.strokeStyle = palette.hatch;
@@ -341,13 +289,7 @@ function strokes({ context, size }: Surface, view: View, palette: Palette, gap: 
   context.stroke();
 }
 
-/** The lines of `edgesOf`. */
-export function drawEdges(
-  { context, size }: Surface,
-  view: View,
-  lines: readonly number[],
-  palette: Palette,
-): void {
+export function drawEdges({ context, size, view, palette }: Pen, lines: readonly number[]): void {
   context.strokeStyle = palette.edge;
   context.lineWidth = 1.25;
   context.beginPath();

@@ -1,7 +1,8 @@
 import { describe, expect, test, vi } from 'vitest';
 
 import { FakeContext } from '../testing/canvas';
-import { clear, newCanvas, PanBuffer, Sprites, type Surface } from './surface';
+import { penOn } from '../testing/pen';
+import { clear, newCanvas, PanBuffer, Sprites } from './surface';
 
 test('a sprite is painted once, at the screen’s pixel ratio', () => {
   const sprites = new Sprites(2);
@@ -21,14 +22,13 @@ test('the cache does not grow without end', () => {
 
 test('a copy lands on whole device pixels', () => {
   const context = new FakeContext();
-  const surface = { context: context.asContext(), size: { width: 9, height: 9 }, ratio: 2 };
-  new Sprites(2).draw(surface, newCanvas(4, 4), 1.3, 2.74);
+  new Sprites(2).draw(penOn(context, { ratio: 2 }), newCanvas(4, 4), 1.3, 2.74);
   expect(context.named('drawImage')[0]?.args.slice(1)).toEqual([1.5, 2.5, 2, 2]);
 });
 
 test('clearing goes back to CSS pixels', () => {
   const context = new FakeContext();
-  clear({ context: context.asContext(), size: { width: 9, height: 7 }, ratio: 3 });
+  clear(penOn(context, { size: { width: 9, height: 7 }, ratio: 3 }));
   expect(context.named('setTransform')[0]?.args).toEqual([3, 0, 0, 3, 0, 0]);
   expect(context.named('clearRect')[0]?.args).toEqual([0, 0, 9, 7]);
 });
@@ -44,15 +44,11 @@ function setUp(): {
   buffer: PanBuffer;
 } {
   const screen = new FakeContext();
-  const surface: Surface = {
-    context: screen.asContext(),
-    size: { width: 300, height: 200 },
-    ratio: 2,
-  };
+  const size = { width: 300, height: 200 };
   const buffer = new PanBuffer();
   const paint = vi.fn();
   const draw = (x: number, y: number, scale = 10): void => {
-    buffer.draw(surface, { x, y, scale }, paint as never);
+    buffer.draw(penOn(screen, { size, ratio: 2, view: { x, y, scale } }), paint as never);
   };
   return { draw, paint, screen, buffer };
 }

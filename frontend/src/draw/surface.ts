@@ -1,4 +1,5 @@
 import type { Size, View } from '../geometry/coordinates';
+import type { Palette } from './palette';
 
 /** A canvas ready to draw on in CSS pixels. */
 export interface Surface {
@@ -6,6 +7,15 @@ export interface Surface {
   readonly size: Size;
   /** Device pixels a CSS pixel. */
   readonly ratio: number;
+}
+
+/** What everything of the map is drawn with. */
+export interface Pen extends Surface {
+  readonly view: View;
+  readonly palette: Palette;
+  readonly sprites: Sprites;
+  /** How large the page's text is, 1 as usual. */
+  readonly textScale: number;
 }
 
 export function newCanvas(width: number, height: number): HTMLCanvasElement {
@@ -44,18 +54,15 @@ export function hatch(
   context.restore();
 }
 
-/** Goes back to CSS pixels and empties the canvas. */
 export function clear({ context, size, ratio }: Surface): void {
   context.setTransform(ratio, 0, 0, ratio, 0, 0);
   context.globalAlpha = 1;
   context.clearRect(0, 0, size.width, size.height);
 }
 
-export function canvasOfPixels(pixels: {
-  readonly data: Uint8ClampedArray<ArrayBuffer>;
-  readonly width: number;
-  readonly height: number;
-}): HTMLCanvasElement {
+export function canvasOfPixels(
+  pixels: Pick<ImageData, 'data' | 'width' | 'height'>,
+): HTMLCanvasElement {
   const canvas = newCanvas(pixels.width, pixels.height);
   if (pixels.width > 0 && pixels.height > 0) {
     contextOf(canvas).putImageData(new ImageData(pixels.data, pixels.width, pixels.height), 0, 0);
@@ -69,13 +76,11 @@ export function canvasOfPixels(pixels: {
  */
 export class Sprites {
   readonly #sprites = new Map<string, HTMLCanvasElement>();
-  readonly #ratio: number;
-  readonly #limit: number;
 
-  constructor(ratio: number, limit = 1_000) {
-    this.#ratio = ratio;
-    this.#limit = limit;
-  }
+  constructor(
+    private readonly ratio: number,
+    private readonly limit = 1_000,
+  ) {}
 
   get(
     key: string,
@@ -85,10 +90,10 @@ export class Sprites {
   ): HTMLCanvasElement {
     const known = this.#sprites.get(key);
     if (known) return known;
-    if (this.#sprites.size >= this.#limit) this.#sprites.clear();
-    const sprite = newCanvas(Math.ceil(width) * this.#ratio, Math.ceil(height) * this.#ratio);
+    if (this.#sprites.size >= this.limit) this.#sprites.clear();
+    const sprite = newCanvas(Math.ceil(width) * this.ratio, Math.ceil(height) * this.ratio);
     const context = contextOf(sprite);
-    context.scale(this.#ratio, this.#ratio);
+    context.scale(this.ratio, this.ratio);
     paint(context);
     this.#sprites.set(key, sprite);
     return sprite;
@@ -124,18 +129,18 @@ export class PanBuffer {
     this.#held = null;
   }
 
-  draw(surface: Surface, view: View, paint: (surface: Surface, view: View) => void): void {
+  draw(pen: Pen, paint: (pen: Pen) => void): void {
+    const { context, ratio, view } = pen;
     const last = this.#last;
     this.#last = view;
     const isPan = last?.scale === view.scale && (last.x !== view.x || last.y !== view.y);
     if (!isPan) {
       this.#held = null;
-      paint(surface, view);
+      paint(pen);
       return;
     }
-    const shift = this.#shiftTo(view) ?? this.#hold(surface, view, paint);
+    const shift = this.#shiftTo(view) ?? this.#hold(pen, paint);
     if (!this.#canvas) return;
-    const { context, ratio } = surface;
     context.setTransform(1, 0, 0, 1, 0, 0);
     context.drawImage(this.#canvas, Math.round(shift.x * ratio), Math.round(shift.y * ratio));
     context.setTransform(ratio, 0, 0, ratio, 0, 0);
@@ -150,11 +155,8 @@ export class PanBuffer {
     return isCovered ? { x, y } : null;
   }
 
-  #hold(
-    { size, ratio }: Surface,
-    view: View,
-    paint: (surface: Surface, view: View) => void,
-  ): { x: number; y: number } {
+  #hold(pen: Pen, paint: (pen: Pen) => void): { x: number; y: number } {
+    const { size, ratio, view } = pen;
     const width = size.width + 2 * MARGIN_PX;
     const height = size.height + 2 * MARGIN_PX;
     const wanted = newCanvas(width * ratio, height * ratio);
@@ -162,9 +164,9 @@ export class PanBuffer {
       this.#canvas = wanted;
     }
     const held = { ...view, x: view.x + MARGIN_PX, y: view.y + MARGIN_PX };
-    const surface = { context: contextOf(this.#canvas), size: { width, height }, ratio };
-    clear(surface);
-    paint(surface, held);
+    const own = { ...pen, context: contextOf(this.#canvas), size: { width, height }, view: held };
+    clear(own);
+    paint(own);
     this.#held = held;
     return { x: -MARGIN_PX, y: -MARGIN_PX };
   }

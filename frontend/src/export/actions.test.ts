@@ -3,7 +3,8 @@ import { beforeEach, describe, expect, test, vi } from 'vitest';
 import { snapshotOf } from '../domain/twin';
 import { onMapCommand } from '../map/commands';
 import { act, prefer, receive, store } from '../store/app';
-import { NO_HOUSE } from '../store/twin';
+import { withSort } from '../store/view';
+import { NO_HOUSE, withPast } from '../store/twin';
 import { FakeContext } from '../testing/canvas';
 import { nextStamp, showTags } from '../testing/page';
 import { readings, stateFrame, wireTag } from '../testing/tags';
@@ -12,7 +13,7 @@ import { fileName } from './save';
 
 // Half an hour off the full one, and set before any module looks at the clock.
 vi.hoisted(() => {
-  process.env['TZ'] = 'Asia/Kolkata';
+  vi.stubEnv('TZ', 'Asia/Kolkata');
 });
 
 let saved: Blob[];
@@ -44,7 +45,7 @@ describe('table as a file', () => {
   const lines = async (): Promise<string[]> => (await saved[0]?.text())?.split('\r\n') ?? [];
 
   test('is what the operator sees: filter, order and unit', async () => {
-    act({ type: 'filter', text: 'rose' });
+    act({ filter: 'rose' });
     prefer({ unit: 'F' });
     saveTable();
     const [head, first, ...rest] = await lines();
@@ -66,20 +67,20 @@ describe('table as a file', () => {
     'waits in the first moments until the sensors’ own names are %s, and comes once',
     async (state) => {
       const { sensors } = store.get().twin;
-      receive({ type: 'set', part: { sensors: { value: null, state: 'waiting', message: '' } } });
+      receive({ sensors: { value: null, state: 'waiting', message: '' } });
       saveTable();
-      act({ type: 'filter', text: '10' });
+      act({ filter: '10' });
       expect(names).toEqual([]);
-      receive({ type: 'set', part: { sensors: { ...sensors, state } } });
-      act({ type: 'filter', text: '' });
+      receive({ sensors: { ...sensors, state } });
+      act({ filter: '' });
       expect(names).toHaveLength(1);
       expect((await lines())[0]).toContain('Temperature [°C]');
     },
   );
 
   test('is sorted as the table is', async () => {
-    act({ type: 'sort', column: 'temperature' });
-    act({ type: 'sort', column: 'temperature' });
+    act(withSort('temperature'));
+    act(withSort('temperature'));
     saveTable();
     expect((await lines())[1]).toMatch(/^'=9/);
   });
@@ -127,8 +128,8 @@ describe('of another moment', () => {
   ])('the file’s name says the moment, and that it is past: %i', async (at, name) => {
     const then = wireTag({ tag_id: 'then', readings: readings({ temperature: 12 }, at - 5) });
     const snapshot = snapshotOf(stateFrame([then], { sec: at }), at * 1000, null);
-    receive({ type: 'past', past: { at, house: { ...NO_HOUSE, snapshot } } });
-    act({ type: 'moment', moment: at });
+    receive(withPast({ at, house: { ...NO_HOUSE, snapshot } }));
+    act({ moment: at });
     saveTable();
     expect(names).toEqual([name]);
     expect((await saved[0]?.text())?.split('\r\n')[1]).toMatch(/^then,.*,5,/);
@@ -147,8 +148,10 @@ const footer: Footer = {
   title: 'Temperature',
   time: '2026-05-01 14:03:22',
   ends: ['20.0', '31.0\u00a0°C'],
-  maxAlpha: 0.6,
-  colour: [200, 0, 0],
+  ramps: [
+    ['rgb(200 0 0 / 0)', 'rgb(200 0 0)'],
+    ['rgb(200 0 0 / 0)', 'rgb(200 0 0 / 0.6)'],
+  ],
   scale: 40,
 };
 let context: FakeContext;

@@ -3,7 +3,7 @@ import { epochOf, now as pageNow, timeZone } from '../clock';
 import { differenceText, divergingColours, signedText } from '../domain/difference';
 import { readingText, valueText, written } from '../domain/format';
 import { IDEAL_ALPHA, idealParts } from '../domain/ideal';
-import { type Rgb, rgbText, sensorColour } from '../domain/ramp';
+import { rgbText, sensorColour } from '../domain/ramp';
 import { tableCsv } from '../domain/table';
 import { shown } from '../domain/text';
 import { dateText, rosText, secondsOf, type Span, spanOf } from '../domain/time';
@@ -24,7 +24,7 @@ import {
 import { rosNow, selectHasOwnTime, selectOrigin, selectShown } from '../store/moment';
 import { isChosen } from '../store/view';
 import { LANGUAGE, S } from '../strings';
-import { fileName, pastFileName, save } from './save';
+import { fileName, save } from './save';
 
 /**
  * The table as the operator sees it, filtered and sorted; ages are those of the state's time. Asked
@@ -55,12 +55,8 @@ function writeTable(): void {
     unit,
     snapshot.takenAt,
   );
-  save(
-    new Blob([text], { type: 'text/csv;charset=utf-8' }),
-    moment === null
-      ? fileName('tags', 'csv', epochOf(snapshot.takenAt))
-      : pastFileName('tags', 'csv', moment),
-  );
+  const blob = new Blob([text], { type: 'text/csv;charset=utf-8' });
+  save(blob, fileName('tags', 'csv', epochOf(snapshot.takenAt), moment));
 }
 
 /** The map as the operator sees it, with a footer that says what, when and how large. */
@@ -93,16 +89,17 @@ export async function saveMap(): Promise<void> {
   // Of a run with a time of its own: that, and not when it came here.
   const then = moment ?? (selectHasOwnTime(state) ? secondsOf(snapshot.at) : null);
   const time = then === null ? dateText(takenAt) : S.asOf(rosText(then));
+  const colour = sensorColour(sensor);
   const footer: Footer = {
-    colour: sensorColour(sensor),
-    maxAlpha: sensor.maxAlpha,
     scale: state.viewport.view.scale,
+    // The pins' colours above those of the heat map, as in the page's legend.
+    ramps: [1, sensor.maxAlpha].map((most) => [rgbText(colour, 0), rgbText(colour, most)]),
     ...(difference && change
       ? {
           title: S.difference(label),
           time: S.differenceTimes(rosText(difference.at), rosText(difference.against)),
           ends: [signedText(sensor, change.low, unit), differenceText(sensor, change.high, unit)],
-          diverging: divergingColours(),
+          ramps: [divergingColours()],
         }
       : {
           title: isIdeal ? S.legendAgainst(label) : label,
@@ -110,7 +107,7 @@ export async function saveMap(): Promise<void> {
           ...(isIdeal
             ? {
                 ends: [S.below, S.above] as const,
-                diverging: Object.values(idealParts(IDEAL_ALPHA)).flat(),
+                ramps: [Object.values(idealParts(IDEAL_ALPHA)).flat()],
               }
             : {
                 ends: range && [
@@ -129,11 +126,7 @@ export async function saveMap(): Promise<void> {
   const blob = await new Promise<Blob | null>((resolve) => {
     canvas.toBlob(resolve, 'image/png');
   });
-  if (blob)
-    save(
-      blob,
-      moment === null ? fileName('map', 'png', takenAt) : pastFileName('map', 'png', moment),
-    );
+  if (blob) save(blob, fileName('map', 'png', takenAt, moment));
 }
 
 /** Below the map in a saved picture. */
@@ -145,16 +138,12 @@ const LONGEST_BAR_PX = 70;
 const FONT = '13px "Inter Variable", system-ui, sans-serif';
 
 export interface Footer {
-  /** The sensor, and the date and time. */
   readonly title: string;
   readonly time: string;
   /** The ramp's two ends, the upper one with its unit; null: there is no reading. */
   readonly ends: readonly [low: string, high: string] | null;
-  readonly colour: Rgb;
-  /** Alpha of the heat map at its maximum. */
-  readonly maxAlpha: number;
-  /** Colours from the lowest to the highest of a difference; none: more and more of the one. */
-  readonly diverging?: readonly string[];
+  /** Below each other, each from the lowest to the highest. */
+  readonly ramps: readonly (readonly string[])[];
   /** Pixels a metre. */
   readonly scale: number;
 }
@@ -202,22 +191,21 @@ export function drawFooter(
   context.fillText(high, left + RAMP_PX.width + GAP_PX, middle);
 }
 
-/** The pins' colours above those of the heat map, as in the page's legend. */
 function drawRamp(
   context: CanvasRenderingContext2D,
   x: number,
   y: number,
-  { colour, maxAlpha, diverging }: Footer,
+  { ramps }: Footer,
 ): void {
   const { width, height } = RAMP_PX;
-  [1, maxAlpha].forEach((most, index) => {
+  const each = height / ramps.length;
+  ramps.forEach((stops, index) => {
     const gradient = context.createLinearGradient(x, 0, x + width, 0);
-    const stops = diverging ?? [rgbText(colour, 0), rgbText(colour, most)];
     stops.forEach((stop, place) => {
       gradient.addColorStop(place / (stops.length - 1), stop);
     });
     context.fillStyle = gradient;
-    context.fillRect(x, y + (index * height) / 2, width, height / 2);
+    context.fillRect(x, y + index * each, width, each);
   });
   context.lineWidth = 1;
   context.strokeRect(x - 0.5, y - 0.5, width + 1, height + 1);

@@ -1,6 +1,8 @@
 import { expect, test, vi } from 'vitest';
 
 import { act, receive } from '../store/app';
+import { withState } from '../store/twin';
+import { withTag } from '../store/view';
 import { stateFrame, wireTag } from '../testing/tags';
 import { timelineWith } from '../testing/timeline';
 import { copyLink, reported, reportLink } from './actions';
@@ -12,8 +14,8 @@ test('without a clipboard copying says no instead of failing', async () => {
   expect(await copyLink()).toBe(true);
   expect(writeText).toHaveBeenLastCalledWith(window.location.href);
   // While the past is played, the address of the page waits.
-  act({ type: 'select', tagId: 'a/b #' });
-  act({ type: 'moment', moment: 9 });
+  act(withTag('a/b #'));
+  act({ moment: 9 });
   await copyLink();
   const { origin, pathname } = window.location;
   expect(writeText).toHaveBeenLastCalledWith(`${origin}${pathname}#at=9&tag=a%2Fb+%23`);
@@ -50,16 +52,16 @@ test('is that of the last eight hours until a period is chosen on the time bar',
   const length = (): number => Number(asked().get('to')) - Number(asked().get('from'));
   expect(asked().has('from')).toBe(false);
   const latest = stateFrame([wireTag()], { sec: 1_777_620_802 });
-  receive({ type: 'state', latest, now: performance.now() });
+  receive(withState(latest, performance.now()));
   expect(length()).toBe(8 * HOUR);
   expect(asked().get('lang')).toBe('en');
   expect(asked().get('time_zone')).toBe(new Intl.DateTimeFormat().resolvedOptions().timeZone);
-  act({ type: 'period', period: { kind: 'hour' } });
+  act({ period: { kind: 'hour' } });
   expect(length()).toBe(HOUR);
-  act({ type: 'period', period: { kind: 'own', from: 1_777_000_000, to: 1_777_000_900 } });
+  act({ period: { kind: 'own', from: 1_777_000_000, to: 1_777_000_900 } });
   expect([asked().get('from'), asked().get('to')]).toEqual(['1777000000', '1777000900']);
   const value = timelineWith({ reach: { from: 1_777_020_802, to: 1_777_620_802 } });
-  receive({ type: 'set', part: { remembered: { value, state: 'ready', message: '' } } });
-  act({ type: 'period', period: { kind: 'all' } });
+  receive({ remembered: { value, state: 'ready', message: '' } });
+  act({ period: { kind: 'all' } });
   expect(length()).toBe(600_000);
 });

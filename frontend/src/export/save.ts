@@ -1,7 +1,6 @@
 import { momentText } from '../domain/format';
 import { hasDate, rosText } from '../domain/time';
 
-/** Hands a file to the browser's download. */
 export function save(blob: Blob, name: string): void {
   const link = document.createElement('a');
   link.href = URL.createObjectURL(blob);
@@ -13,18 +12,18 @@ export function save(blob: Blob, name: string): void {
   }, 60_000);
 }
 
-/** A name that sorts by time and is legal everywhere, local time: 2026-05-01T14-03-22. */
-export function fileName(kind: string, extension: string, epochMs: number): string {
-  return named(kind, extension, momentText(epochMs));
-}
-
-/** The same for what was at a moment in the past, ROS seconds; the name says so. */
-export function pastFileName(kind: string, extension: string, moment: number): string {
-  const time = hasDate(moment) ? momentText(moment * 1000) : rosText(moment);
-  return named(`${kind}-past`, extension, time);
-}
-
-function named(kind: string, extension: string, time: string): string {
+/**
+ * A name that sorts by time and is legal everywhere, local time: 2026-05-01T14-03-22. `moment`, ROS
+ * seconds: of what was then, and the name says so.
+ */
+export function fileName(
+  kind: string,
+  extension: string,
+  epochMs: number,
+  moment: number | null = null,
+): string {
+  const at = moment === null ? epochMs : moment * 1000;
+  const time = moment === null || hasDate(moment) ? momentText(at) : rosText(moment);
   const stamp = time.replace(' ', /^\d/.test(time) ? 'T' : '-').replaceAll(':', '-');
-  return `lupin-twin-${kind}-${stamp}.${extension}`;
+  return `lupin-twin-${kind}${moment === null ? '' : '-past'}-${stamp}.${extension}`;
 }

@@ -7,9 +7,8 @@ import type { Alarm } from '../contract/types';
 import { secondsOf } from '../domain/time';
 import { LANGUAGE, S } from '../strings';
 import { HealthMark } from '../ui/HealthMark';
-import type { FleetWords } from '../words/fleet';
 import { VIEW_WORDS } from '../words/fleetViews';
-import { alarmCount, ms, namesOf, type Site, timeText } from './sites';
+import { alarmCount, ms, namesOf, type Site, siteLink, timeText, words } from './sites';
 import { useAnswer, useSpeech } from './useAnswer';
 
 interface SiteAlarm extends Alarm {
@@ -22,12 +21,7 @@ const W = VIEW_WORDS[LANGUAGE];
 
 const EVERY_MS = 10_000;
 
-interface Props {
-  readonly shown: readonly Site[];
-  readonly words: FleetWords;
-}
-
-export default function Alarms({ shown, words }: Props): JSX.Element {
+export default function Alarms({ shown }: { shown: readonly Site[] }): JSX.Element {
   const speech = useSpeech();
   const having = shown.filter((site) => (site.active_alarms ?? 0) > 0);
   const names = namesOf(having);
@@ -86,7 +80,6 @@ function Row({ alarm, speech }: { alarm: SiteAlarm; speech: Speech }): JSX.Eleme
   );
 }
 
-/** What people said of it. */
 function saidOf(alarm: SiteAlarm): readonly string[] {
   const { acknowledged_by: by, acknowledged_at: at, shelved_by: who, shelved_until: until } = alarm;
   return [
@@ -95,10 +88,9 @@ function saidOf(alarm: SiteAlarm): readonly string[] {
   ];
 }
 
-/** The page of its site as it was then, with the tag's card open. */
-function linkOf({ site, tag_id: tag }: SiteAlarm, raised: number): string {
+function linkOf(alarm: SiteAlarm, raised: number): string {
   // To the millisecond that holds the observation, and not to the one before it.
   const parts = new URLSearchParams({ at: String(Math.ceil(raised * 1000) / 1000) });
-  if (tag) parts.set('tag', tag);
-  return `sites/${encodeURIComponent(site)}/${window.location.search}#${parts.toString()}`;
+  if (alarm.tag_id) parts.set('tag', alarm.tag_id);
+  return `${siteLink(alarm)}#${parts.toString()}`;
 }

@@ -14,10 +14,10 @@ import { isMeasured, type Sensor } from '../domain/sensors';
 import { spanOf as periodSpan, rosText, secondsOf, type Span } from '../domain/time';
 import { LANGUAGE, S } from '../strings';
 import { Select } from '../widgets/controls';
-import type { FleetWords } from '../words/fleet';
 import { VIEW_WORDS } from '../words/fleetViews';
 import type { WireTime } from '../contract/types';
-import type { Site } from './sites';
+import { Choice } from './Choice';
+import { type Site, siteLink, words } from './sites';
 import { useAnswer, useSpeech } from './useAnswer';
 
 const W = VIEW_WORDS[LANGUAGE];
@@ -30,12 +30,7 @@ const HEIGHT = 320;
 /** Drawn unless others are chosen. */
 const DRAWN = 3;
 
-interface Props {
-  readonly shown: readonly Site[];
-  readonly words: FleetWords;
-}
-
-export default function Compare({ shown, words }: Props): JSX.Element {
+export default function Compare({ shown }: { shown: readonly Site[] }): JSX.Element {
   const speech = useSpeech();
   const { sensors, unit } = speech;
   const [name, setName] = useState('temperature');
@@ -77,20 +72,13 @@ export default function Compare({ shown, words }: Props): JSX.Element {
           text={(each) => sensors.named(each).label}
           onChange={setName}
         />
-        <div className="fleet-filters" role="group" aria-label={S.timebarPeriod}>
-          {PERIODS.map((each) => (
-            <button
-              key={each}
-              type="button"
-              aria-pressed={period === each}
-              onClick={() => {
-                setPeriod(each);
-              }}
-            >
-              {S.timebarPeriods[each]}
-            </button>
-          ))}
-        </div>
+        <Choice
+          label={S.timebarPeriod}
+          options={PERIODS}
+          value={period}
+          onChange={setPeriod}
+          text={(each) => S.timebarPeriods[each]}
+        />
         {compared.length < shown.length && (
           <p className="fleet-note">{W.someCompared(compared.length, shown.length)}</p>
         )}
@@ -132,7 +120,7 @@ export default function Compare({ shown, words }: Props): JSX.Element {
                     </label>
                   </td>
                   <th scope="row">
-                    <a href={linkOf(site, name)}>{site.name}</a>
+                    <a href={`${siteLink(site)}#sensor=${encodeURIComponent(name)}`}>{site.name}</a>
                   </th>
                   <td>{readingOrNone(model.sensor, valueAt(found, site, at), speech)}</td>
                   <td>{deviationText(model.sensor, site, speech)}</td>
@@ -146,7 +134,6 @@ export default function Compare({ shown, words }: Props): JSX.Element {
   );
 }
 
-/** A piece of a line. */
 function Look({ place }: { place: number }): JSX.Element | null {
   if (place < 0) return null;
   const { colour, dash } = lookOf(place);
@@ -161,9 +148,6 @@ function Look({ place }: { place: number }): JSX.Element | null {
     </svg>
   );
 }
-
-const linkOf = ({ site }: ComparedSite, sensor: string): string =>
-  `sites/${encodeURIComponent(site)}/${window.location.search}#sensor=${encodeURIComponent(sensor)}`;
 
 const readingOrNone = (sensor: Sensor, value: number | null, { unit }: Speech): string =>
   value === null ? S.noValue : readingText(sensor, value, unit);
@@ -203,8 +187,6 @@ function Chart({
   );
 }
 
-/** What the server says of one sensor of several greenhouses, and the lines of its chart. Pure. */
-
 type Values = readonly (number | null)[];
 
 interface ComparedSite {
@@ -213,7 +195,6 @@ interface ComparedSite {
   readonly mean: number | null;
   /** How far it is from the median of all, in the sensor's unit; null: it has no reading. */
   readonly deviation: number | null;
-  /** Of each bucket. */
   readonly means: Values;
 }
 

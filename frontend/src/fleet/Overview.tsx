@@ -14,7 +14,7 @@ import {
 import { S } from '../strings';
 import { HealthMark } from '../ui/HealthMark';
 import { Select } from '../widgets/controls';
-import type { FleetWords } from '../words/fleet';
+import { Choice } from './Choice';
 import type { Seen } from './follow';
 import {
   alarmCount,
@@ -28,7 +28,9 @@ import {
   ms,
   silentAt,
   type Site,
+  siteLink,
   timeText,
+  words,
 } from './sites';
 
 // Loaded when somebody asks for them.
@@ -43,11 +45,10 @@ const asked = new URLSearchParams(window.location.search);
 
 interface Props {
   readonly seen: Seen;
-  readonly words: FleetWords;
   readonly isKiosk: boolean;
 }
 
-export function Overview({ seen, words, isKiosk }: Props): JSX.Element {
+export function Overview({ seen, isKiosk }: Props): JSX.Element {
   const [view, setView] = useState<View>('sites');
   const [filter, setFilter] = useState<Filter>('all');
   const [search, setSearch] = useState('');
@@ -64,7 +65,7 @@ export function Overview({ seen, words, isKiosk }: Props): JSX.Element {
 
   useEffect(() => {
     document.title = alarms === 0 ? words.sites : `(${alarms}) ${words.sites}`;
-  }, [alarms, words]);
+  }, [alarms]);
 
   useEffect(() => {
     const onKey = (event: KeyboardEvent): void => {
@@ -89,26 +90,13 @@ export function Overview({ seen, words, isKiosk }: Props): JSX.Element {
         )}
         {!isKiosk && (
           <>
-            <nav className="fleet-filters">
-              {VIEWS.map((each) => (
-                <button
-                  key={each}
-                  type="button"
-                  aria-pressed={view === each}
-                  onClick={() => {
-                    setView(each);
-                  }}
-                >
-                  {each === 'alarms' || each === 'report' ? S[each] : words[each]}
-                  {each === 'alarms' && (
-                    <>
-                      {' '}
-                      <span className="fleet-count">{isHere && alarms}</span>
-                    </>
-                  )}
-                </button>
-              ))}
-            </nav>
+            <Choice
+              options={VIEWS}
+              value={view}
+              onChange={setView}
+              text={(each) => (each === 'alarms' || each === 'report' ? S[each] : words[each])}
+              count={(each) => (each === 'alarms' && isHere ? alarms : null)}
+            />
             <input
               ref={field}
               type="search"
@@ -131,38 +119,31 @@ export function Overview({ seen, words, isKiosk }: Props): JSX.Element {
                 onChange={setGroup}
               />
             )}
-            <div className="fleet-filters" role="group" aria-label={words.filter}>
-              {FILTERS.map((each) => (
-                <button
-                  key={each}
-                  type="button"
-                  aria-pressed={filter === each}
-                  onClick={() => {
-                    setFilter(each);
-                  }}
-                >
-                  {filterText(each, words)}{' '}
-                  <span className="fleet-count">{isHere && counts[each]}</span>
-                </button>
-              ))}
-            </div>
+            <Choice
+              label={words.filter}
+              options={FILTERS}
+              value={filter}
+              onChange={setFilter}
+              text={filterText}
+              count={(each) => (isHere ? counts[each] : null)}
+            />
           </>
         )}
       </header>
-      <Trouble seen={seen} words={words} />
+      <Trouble seen={seen} />
       <main aria-label={view === 'alarms' ? words.alarmList : words.list}>
         <p className="unseen" role="status">
           {search || group || filter !== 'all' ? words.shown(shown.length, sites.size) : ''}
         </p>
         {shown.length === 0 ? (
-          <p className="fleet-empty">{nothingText(seen, words)}</p>
+          <p className="fleet-empty">{nothingText(seen)}</p>
         ) : view === 'sites' ? (
-          <Cards shown={shown} groups={groups} words={words} asOf={asOfWhen(seen)} />
+          <Cards shown={shown} groups={groups} asOf={asOfWhen(seen)} />
         ) : (
           <Suspense fallback={<p className="fleet-empty">{words.connecting}</p>}>
-            {view === 'alarms' && <Alarms shown={shown} words={words} />}
-            {view === 'compare' && <Compare shown={shown} words={words} />}
-            {view === 'report' && <Report shown={shown} words={words} />}
+            {view === 'alarms' && <Alarms shown={shown} />}
+            {view === 'compare' && <Compare shown={shown} />}
+            {view === 'report' && <Report shown={shown} />}
           </Suspense>
         )}
       </main>
@@ -176,14 +157,13 @@ function asOfWhen({ archive, lostAt }: Seen): number | null {
   return archive.since && ms(archive.since);
 }
 
-function nothingText({ archive, sites }: Seen, words: FleetWords): string {
+function nothingText({ archive, sites }: Seen): string {
   if (archive === null) return words.connecting;
   if (sites.size > 0) return words.noMatch;
   return archive.is_reachable ? words.empty : '';
 }
 
-/** What keeps anything here from being as it is now. */
-function Trouble({ seen, words }: { seen: Seen; words: FleetWords }): JSX.Element {
+function Trouble({ seen }: { seen: Seen }): JSX.Element {
   const { archive, lostAt } = seen;
   let text = '';
   let detail = '';
@@ -208,27 +188,25 @@ const LIVE_MS = 20_000;
 function Cards({
   shown,
   groups,
-  words,
   asOf,
 }: Listed & { shown: readonly Site[]; groups: readonly string[] }): JSX.Element {
   const parts = useMemo(() => grouped(shown, groups), [shown, groups]);
-  if (groups.length === 0) return <List sites={shown} words={words} asOf={asOf} />;
+  if (groups.length === 0) return <List sites={shown} asOf={asOf} />;
   return (
     <>
       {parts.map((part) => (
-        <GroupOf key={part.name} group={part} words={words} asOf={asOf} />
+        <GroupOf key={part.name} group={part} asOf={asOf} />
       ))}
     </>
   );
 }
 
 interface Listed {
-  readonly words: FleetWords;
   /** When all of it was last known, ms since the epoch; null: it is as of now. */
   readonly asOf: number | null;
 }
 
-function GroupOf({ group, words, asOf }: Listed & { group: Group }): JSX.Element {
+function GroupOf({ group, asOf }: Listed & { group: Group }): JSX.Element {
   const { name, sites } = group;
   const worst = sites[0];
   return (
@@ -236,50 +214,45 @@ function GroupOf({ group, words, asOf }: Listed & { group: Group }): JSX.Element
       <summary>
         <h2>{name || words.others}</h2>
         {worst && <HealthMark verdict={worst.verdict} word={false} />}
-        <span className="fleet-line">{groupText(sites, words)}</span>
+        <span className="fleet-line">{groupText(sites)}</span>
       </summary>
-      <List sites={sites} words={words} asOf={asOf} />
+      <List sites={sites} asOf={asOf} />
     </details>
   );
 }
 
-/** How many, and what is wrong with them. */
-function groupText(sites: readonly Site[], words: FleetWords): string {
+function groupText(sites: readonly Site[]): string {
   const counts = countsOf(sites);
   const alarms = alarmCount(sites);
   const texts = FILTERS.filter((each) => each !== 'all' && each !== 'healthy' && counts[each] > 0);
   return [
     String(sites.length),
-    ...texts.map((each) => `${counts[each]} ${filterText(each, words)}`),
+    ...texts.map((each) => `${counts[each]} ${filterText(each)}`),
     ...(alarms > 0 ? [S.alarmCount(alarms)] : []),
   ].join(' · ');
 }
 
-function filterText(filter: Filter, words: FleetWords): string {
+function filterText(filter: Filter): string {
   return filter === 'all' || filter === 'silent' ? words[filter] : S.health[filter];
 }
 
-function List({ sites, words, asOf }: Listed & { sites: readonly Site[] }): JSX.Element {
+function List({ sites, asOf }: Listed & { sites: readonly Site[] }): JSX.Element {
   return (
     <ul className="fleet-sites">
       {sites.map((site) => (
-        <SiteCard key={site.site} site={site} words={words} asOf={asOf} />
+        <SiteCard key={site.site} site={site} asOf={asOf} />
       ))}
     </ul>
   );
 }
 
-const SiteCard = memo(function SiteCard({
-  site,
-  words,
-  asOf,
-}: Listed & { site: Site }): JSX.Element {
+const SiteCard = memo(function SiteCard({ site, asOf }: Listed & { site: Site }): JSX.Element {
   const { name, verdict, last_verdict: last, map } = site;
   const isLive = site.is_live && asOf === null;
   const origin = originText(site);
   return (
     <li className="fleet-site" data-health={verdict} data-live={isLive}>
-      <a href={`sites/${encodeURIComponent(site.site)}/${window.location.search}`}>
+      <a href={siteLink(site)}>
         <h3>
           <span className="fleet-name">{name}</span>
           {origin && <span className="fleet-origin">{origin}</span>}
@@ -288,14 +261,14 @@ const SiteCard = memo(function SiteCard({
         {isLive ? (
           <HealthMark verdict={verdict} />
         ) : (
-          <span className="fleet-silent">{silentText(site, words, asOf)}</span>
+          <span className="fleet-silent">{silentText(site, asOf)}</span>
         )}
         {isLive && last === null && <span className="fleet-line">{words.judging}</span>}
         {!isLive && last !== null && (
           <span className="fleet-line">{words.lastKnown(S.health[last])}</span>
         )}
         <span className="fleet-alarms" data-any={(site.active_alarms ?? 0) > 0}>
-          {countText(site.active_alarms, words)}
+          {countText(site.active_alarms)}
         </span>
         <span className="fleet-line">
           {site.last_received
@@ -339,14 +312,14 @@ function originText({ origin }: Site): string | null {
   return origin in S.origin ? S.origin[origin as keyof typeof S.origin] : null;
 }
 
-function silentText(site: Site, words: FleetWords, asOf: number | null): string {
+function silentText(site: Site, asOf: number | null): string {
   if (site.lag_s === null) return words.neverForwarded;
   const at = silentAt(site.lag_s);
   const wasLive = site.is_live || (asOf !== null && at > asOf - LIVE_MS);
   return wasLive && asOf !== null ? words.asOf(timeText(asOf)) : words.silentSince(timeText(at));
 }
 
-function countText(count: number | null, words: FleetWords): string {
+function countText(count: number | null): string {
   if (count === null) return words.alarmsBeingRead;
   return count === 0 ? words.noAlarms : S.alarmCount(count);
 }

@@ -5,14 +5,13 @@ import { timeOfDay, timeZone } from '../clock';
 import type { Note, WireTime } from '../contract/types';
 import { shown as shownText } from '../domain/text';
 import { LANGUAGE, S } from '../strings';
-import type { FleetWords } from '../words/fleet';
 import { VIEW_WORDS } from '../words/fleetViews';
-import { ms, namesOf, type Site, timeText } from './sites';
+import { Choice } from './Choice';
+import { ms, namesOf, type Site, timeText, words } from './sites';
 import { useAnswer } from './useAnswer';
 
 const W = VIEW_WORDS[LANGUAGE];
 
-/** Shifts, and a day. */
 const HOURS = [12, 24] as const;
 const EVERY_MS = 60_000;
 
@@ -23,7 +22,6 @@ interface SiteReport extends Readonly<Record<(typeof COUNTED)[number], number>> 
   readonly name: string;
   readonly active_alarms: number | null;
   readonly complete_to: WireTime;
-  /** The address of its own report, as JSON. */
   readonly report: string;
 }
 
@@ -32,42 +30,28 @@ interface SiteNote extends Note {
   readonly name: string;
 }
 
-interface Answer {
-  readonly sites: readonly SiteReport[];
-  readonly notes: readonly SiteNote[];
-}
-
-interface Props {
-  readonly shown: readonly Site[];
-  readonly words: FleetWords;
-}
-
-export default function Report({ shown, words }: Props): JSX.Element {
-  const [hours, setHours] = useState<number>(HOURS[0]);
+export default function Report({ shown }: { shown: readonly Site[] }): JSX.Element {
+  const [hours, setHours] = useState<(typeof HOURS)[number]>(HOURS[0]);
   const names = namesOf(shown);
   const from = (Math.floor(timeOfDay() / 3_600_000) - hours) * 3600;
   const path = `api/report?from=${from}${names === '' ? '' : `&sites=${names}`}`;
-  const { value, message } = useAnswer<Answer>(path, EVERY_MS);
+  const { value, message } = useAnswer<{
+    sites: readonly SiteReport[];
+    notes: readonly SiteNote[];
+  }>(path, EVERY_MS);
   const found = new Map(value?.sites.map((each) => [each.site, each]));
   const sites = new Set(shown.map(({ site }) => site));
   const notes = value?.notes.filter(({ site }) => sites.has(site)) ?? [];
   return (
     <section className="fleet-compare" aria-label={S.report}>
       <div className="fleet-head">
-        <div className="fleet-filters" role="group" aria-label={S.timebarPeriod}>
-          {HOURS.map((each) => (
-            <button
-              key={each}
-              type="button"
-              aria-pressed={hours === each}
-              onClick={() => {
-                setHours(each);
-              }}
-            >
-              {W.hours(each)}
-            </button>
-          ))}
-        </div>
+        <Choice
+          label={S.timebarPeriod}
+          options={HOURS}
+          value={hours}
+          onChange={setHours}
+          text={W.hours}
+        />
       </div>
       {message && <p className="fleet-note">{W.notFetched(message)}</p>}
       {!value && !message && <p className="fleet-empty">{S.chartLoading}</p>}

@@ -80,6 +80,7 @@ export function follow(url: string, onSeen: (seen: Seen) => void): () => void {
   });
   document.addEventListener('visibilitychange', again);
   window.addEventListener('online', again);
+  onSeen(seen);
   open();
   return () => {
     stopLapse();

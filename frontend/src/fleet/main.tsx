@@ -7,11 +7,10 @@ import '../styles/health.css';
 import '../styles/fleet.css';
 import { LANGUAGE } from '../strings';
 import { ErrorBoundary } from '../ui/ErrorBoundary';
-import { fleetWordsOf } from '../words/fleet';
 import { follow, type Seen } from './follow';
 import { Overview } from './Overview';
+import { words } from './sites';
 
-const words = fleetWordsOf(LANGUAGE);
 const isKiosk = new URLSearchParams(window.location.search).has('kiosk');
 const system = window.matchMedia('(prefers-color-scheme: dark)');
 const theme = (): void => {
@@ -33,11 +32,10 @@ if (element) {
     root.render(
       <StrictMode>
         <ErrorBoundary kiosk={isKiosk}>
-          <Overview seen={seen} words={words} isKiosk={isKiosk} />
+          <Overview seen={seen} isKiosk={isKiosk} />
         </ErrorBoundary>
       </StrictMode>,
     );
   };
   follow(address.href, show);
-  show({ sites: new Map(), archive: null, lostAt: null });
 }

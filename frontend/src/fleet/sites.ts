@@ -2,7 +2,11 @@
 import { timeOfDay } from '../clock';
 import { isObject } from '../contract/check';
 import type { Verdict, WireTime } from '../contract/types';
-import { LOCALE } from '../strings';
+import { groupedBy } from '../domain/memo';
+import { LANGUAGE, LOCALE } from '../strings';
+import { fleetWordsOf } from '../words/fleet';
+
+export const words = fleetWordsOf(LANGUAGE);
 
 /** An entry of `/api/sites`; see the server's `overview.py`. */
 export interface Site {
@@ -15,7 +19,6 @@ export interface Site {
   readonly last_received: WireTime | null;
   readonly lag_s: number | null;
   readonly is_live: boolean;
-  /** Where what it reports comes from. */
   readonly origin: string;
   /** Another one where its small map is another; null: it has none. */
   readonly map: string | null;
@@ -35,12 +38,15 @@ export interface SitesFrame {
   readonly gone: readonly string[];
 }
 
-/** So many names are in one address. */
 const MOST_NAMED = 50;
 
 /** Sites for a query; empty: too many, so that all are asked for. Where the worst one moves, it stays. */
 export const namesOf = (sites: readonly Site[]): string =>
   sites.length > MOST_NAMED ? '' : String(sites.map(({ site }) => site).sort());
+
+/** The page of a site, as this one was asked for. */
+export const siteLink = ({ site }: Pick<Site, 'site'>): string =>
+  `sites/${encodeURIComponent(site)}/${window.location.search}`;
 
 export type Sites = ReadonlyMap<string, Site>;
 
@@ -76,7 +82,6 @@ export function parseSites(data: unknown): SitesFrame | null {
   return sites.every(isSite) ? (frame as unknown as SitesFrame) : null;
 }
 
-/** The sites after a frame. */
 export function withFrame(before: Sites, frame: SitesFrame): Sites {
   const sites = new Map(frame.is_whole ? [] : before);
   for (const name of frame.gone) sites.delete(name);
@@ -111,7 +116,6 @@ function worstFirst(a: Site, b: Site): number {
   );
 }
 
-/** All active alarms of some sites. */
 export const alarmCount = (sites: Iterable<Site>): number =>
   [...sites].reduce((sum, { active_alarms: count }) => sum + (count ?? 0), 0);
 
@@ -131,23 +135,14 @@ export function groupNames(sites: Iterable<Site>): readonly string[] {
   return found.map(([name]) => name).sort(names.compare);
 }
 
-export interface Group {
-  /** Empty: those of no group. */
-  readonly name: string;
-  readonly sites: readonly Site[];
-}
+export type Group = ReturnType<typeof grouped>[number];
 
-/** Sites in their groups, in the order in which the first of each comes. */
-export function grouped(shown: readonly Site[], known: readonly string[]): readonly Group[] {
-  const groups = new Map<string, Site[]>();
-  const isKnown = new Set(known);
-  for (const site of shown) {
+/** Sites in their groups, in the order in which the first of each comes; nameless: those of none. */
+export function grouped(shown: readonly Site[], known: readonly string[]) {
+  const groups = groupedBy(shown, (site) => {
     const prefix = prefixOf(site);
-    const name = isKnown.has(prefix) ? prefix : '';
-    const there = groups.get(name);
-    if (there) there.push(site);
-    else groups.set(name, [site]);
-  }
+    return known.includes(prefix) ? prefix : '';
+  });
   return [...groups].map(([name, sites]) => ({ name, sites }));
 }
 

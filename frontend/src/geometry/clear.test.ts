@@ -2,7 +2,6 @@ import { describe, expect, test } from 'vitest';
 
 import {
   beside,
-  type Box,
   fitClear,
   isClear,
   type LabelRequest,
@@ -10,6 +9,7 @@ import {
   placeLabels,
 } from './clear';
 import {
+  type Box,
   type Bounds,
   boundsOf,
   canvasPoint,

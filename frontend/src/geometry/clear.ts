@@ -1,28 +1,19 @@
 /** Keeps pins clear of what stands on the map, and labels clear of each other. Pure. */
 import {
   type Bounds,
+  type Box,
   canvasPoint,
   type CanvasPoint,
   fit,
-  type Insets,
   type MapPoint,
   type Size,
   toCanvas,
   type View,
 } from './coordinates';
 
-/** An upright box in pixels; of the map view unless it says otherwise. */
-export interface Box {
-  readonly left: number;
-  readonly top: number;
-  readonly right: number;
-  readonly bottom: number;
-}
-
 /** Half of the largest pin with its ring and its warning sign, pixels. */
 const REACH_PX = 21;
 
-/** Whether a pin there can be seen and clicked. */
 export function isClear(view: View, point: MapPoint, covered: readonly Box[]): boolean {
   const { x, y } = toCanvas(view, point);
   return covered.every(
@@ -42,14 +33,14 @@ export function fitClear(
   bounds: Bounds,
   pins: readonly MapPoint[],
   size: Size,
-  insets: Insets,
+  insets: Box,
   covered: readonly Box[],
 ): View {
   const clear = (view: View): boolean => pins.every((pin) => isClear(view, pin, covered));
   const plain = fit(bounds, size, insets);
   if (clear(plain)) return plain;
   const views = covered
-    .reduce<readonly Insets[]>(
+    .reduce<readonly Box[]>(
       (all, box) =>
         all.flatMap((own) =>
           waysAround(box, size).map(([side, depth]) => ({
@@ -65,8 +56,8 @@ export function fitClear(
 }
 
 /** The sides that a box leaves a third of the view to at least, and how deep it is from there. */
-function waysAround(box: Box, { width, height }: Size): (readonly [keyof Insets, number])[] {
-  const ways: (readonly [keyof Insets, number, number])[] = [
+function waysAround(box: Box, { width, height }: Size): (readonly [keyof Box, number])[] {
+  const ways: (readonly [keyof Box, number, number])[] = [
     ['top', box.bottom + REACH_PX, height],
     ['right', width - box.left + REACH_PX, width],
     ['bottom', height - box.top + REACH_PX, height],
@@ -90,26 +81,17 @@ export interface LabelRequest {
   readonly y: number;
   /** Half of the pin's size, pixels. */
   readonly radius: number;
-  /** Higher is placed first. */
   readonly priority: number;
   /** Texts from the most to the least telling, each with its width in pixels. */
   readonly texts: readonly { readonly text: string; readonly width: number }[];
 }
 
-export interface PlacedLabel {
-  readonly id: string;
-  readonly text: string;
-  /** Top left corner, pixels. */
-  readonly x: number;
-  readonly y: number;
-  readonly width: number;
-}
+export type PlacedLabel = ReturnType<typeof placeLabels>[number];
 
 /** Where labels may be seen: boxes in pixels relative to the map's origin. */
 export interface Room {
   /** What is in sight; a label of a pin in there is not cut off. */
   readonly within: Box;
-  /** Buttons and the like. */
   readonly covered: readonly Box[];
 }
 
@@ -122,7 +104,7 @@ export function placeLabels(
   requests: readonly LabelRequest[],
   height: number,
   room: Room | null = null,
-): PlacedLabel[] {
+) {
   const taken = new Buckets();
   for (const box of room?.covered ?? []) taken.add(box);
   const ordered = requests
@@ -135,23 +117,16 @@ export function placeLabels(
     })
     .sort((a, b) => b.request.priority - a.request.priority || a.index - b.index);
 
-  const placed: PlacedLabel[] = [];
-  for (const { request, pin } of ordered) {
+  return ordered.flatMap(({ request, pin }) => {
     // Among pins that overlap only those that need somebody: of more labels none would be read.
-    if (request.priority < URGENT && !taken.isFree(pin, pin)) continue;
+    if (request.priority < URGENT && !taken.isFree(pin, pin)) return [];
     const spot = firstFree(request, height, taken, room?.within ?? null);
-    if (!spot) continue;
-    taken.add(spot.box);
-    placed.push({
-      id: request.id,
-      text: spot.text,
-      x: spot.box.left,
-      y: spot.box.top,
-      // Not right less left, which is off by float noise and so by a pixel.
-      width: spot.width,
-    });
-  }
-  return placed;
+    if (!spot) return [];
+    const { text, box, width } = spot;
+    taken.add(box);
+    // Its width is not right less left, which is off by float noise and so by a pixel.
+    return [{ id: request.id, text, x: box.left, y: box.top, width }];
+  });
 }
 
 function firstFree(

@@ -26,7 +26,6 @@ export interface Size {
   readonly height: number;
 }
 
-/** An upright box in metres. */
 export interface Bounds {
   readonly minX: number;
   readonly minY: number;
@@ -34,13 +33,8 @@ export interface Bounds {
   readonly maxY: number;
 }
 
-/** Pixels to leave free at each side when fitting. */
-export interface Insets {
-  readonly top: number;
-  readonly right: number;
-  readonly bottom: number;
-  readonly left: number;
-}
+/** The four sides of an upright box in pixels, or what is left free at each. */
+export type Box = Readonly<Record<'left' | 'top' | 'right' | 'bottom', number>>;
 
 export function toCanvas(view: View, point: MapPoint): CanvasPoint {
   return canvasPoint(view.x + point.x * view.scale, view.y - point.y * view.scale);
@@ -69,7 +63,6 @@ export function nearest<T extends { readonly at: MapPoint }>(
   return best;
 }
 
-/** Smallest box around all points; null without any. */
 export function boundsOf(points: Iterable<MapPoint>): Bounds | null {
   let minX = Infinity;
   let minY = Infinity;
@@ -83,6 +76,11 @@ export function boundsOf(points: Iterable<MapPoint>): Bounds | null {
   }
   return minX <= maxX ? { minX, minY, maxX, maxY } : null;
 }
+
+/** Wider by so much on each side. */
+export const widened = ({ minX, minY, maxX, maxY }: Bounds, by: number): Bounds => ({
+  ...{ minX: minX - by, minY: minY - by, maxX: maxX + by, maxY: maxY + by },
+});
 
 export function corners(bounds: Bounds): MapPoint[] {
   return [
@@ -100,7 +98,7 @@ export const MAX_SCALE = 2000;
 const MIN_EXTENT_M = 2;
 
 /** The view that shows all of `bounds`, centred in what the insets leave free. */
-export function fit(bounds: Bounds, size: Size, insets: Insets): View {
+export function fit(bounds: Bounds, size: Size, insets: Box): View {
   const width = Math.max(1, size.width - insets.left - insets.right);
   const height = Math.max(1, size.height - insets.top - insets.bottom);
   const extentX = Math.max(MIN_EXTENT_M, bounds.maxX - bounds.minX);
@@ -157,13 +155,8 @@ export function niceFloor(value: number): number {
   return (digit >= 5 ? 5 : digit >= 2 ? 2 : 1) * power;
 }
 
-interface ScaleBar {
-  readonly metres: number;
-  readonly pixels: number;
-}
-
 /** The longest round length that fits into `maxPixels`. */
-export function scaleBar(scale: number, maxPixels: number): ScaleBar {
+export function scaleBar(scale: number, maxPixels: number) {
   const metres = niceFloor(maxPixels / scale);
   return { metres, pixels: metres * scale };
 }

@@ -1,8 +1,5 @@
 import type { OccupancyGrid } from '../contract/types';
-import { mapPoint, type MapPoint, type View } from './coordinates';
-
-/** Canvas transform (a, b, c, d, e, f) as CanvasRenderingContext2D.setTransform takes it. */
-type Affine = readonly [number, number, number, number, number, number];
+import { type Box, mapPoint, type MapPoint, type View } from './coordinates';
 
 /** Where an upright or turned picture lies in the map: its lower left corner, size and yaw. */
 export interface Placement {
@@ -18,7 +15,6 @@ export interface Placement {
   readonly height: number;
 }
 
-/** The SLAM map, decoded. */
 export interface MapPicture {
   readonly placement: Placement;
   readonly pixels: ImageData;
@@ -27,16 +23,8 @@ export interface MapPicture {
 }
 
 /** Yaw of a rotation about z; a quaternion of zeros counts as no turn. */
-export function yawOf(q: {
-  x: number | null;
-  y: number | null;
-  z: number | null;
-  w: number | null;
-}): number {
-  const x = q.x ?? 0;
-  const y = q.y ?? 0;
-  const z = q.z ?? 0;
-  const w = q.w ?? 0;
+export function yawOf(of: Readonly<Record<'x' | 'y' | 'z' | 'w', number | null>>): number {
+  const [x, y, z, w] = [of.x ?? 0, of.y ?? 0, of.z ?? 0, of.w ?? 0];
   return Math.atan2(2 * (w * z + x * y), w * w + x * x - y * y - z * z);
 }
 
@@ -57,7 +45,7 @@ export function mapPlacement(grid: OccupancyGrid): Placement {
  * the grid's last row: pixel (column, row) lies at ((column), (height - row)) * resolution in
  * the grid, which is then turned by yaw and moved to the origin.
  */
-export function imageToCanvas(placement: Placement, view: View): Affine {
+export function imageToCanvas(placement: Placement, view: View) {
   const { originX, originY, yaw, resolution, height } = placement;
   const cos = Math.cos(yaw) * resolution;
   const sin = Math.sin(yaw) * resolution;
@@ -70,14 +58,11 @@ export function imageToCanvas(placement: Placement, view: View): Affine {
     cos * view.scale,
     view.x + leftTopX * view.scale,
     view.y - leftTopY * view.scale,
-  ];
+  ] as const;
 }
 
 /** Corners in the map frame of the pixels from (left, top) to (right, bottom), exclusive. */
-export function pixelBoxCorners(
-  placement: Placement,
-  box: { left: number; top: number; right: number; bottom: number },
-): MapPoint[] {
+export function pixelBoxCorners(placement: Placement, box: Box): MapPoint[] {
   const { originX, originY, yaw, resolution, height } = placement;
   const place = (column: number, row: number): MapPoint => {
     const u = column * resolution;
@@ -96,11 +81,7 @@ export function pixelBoxCorners(
 }
 
 /** The smallest pixel box that holds every pixel which is not fully transparent. */
-export function opaqueBox(
-  rgba: Uint8ClampedArray,
-  width: number,
-  height: number,
-): { left: number; top: number; right: number; bottom: number } | null {
+export function opaqueBox(rgba: Uint8ClampedArray, width: number, height: number): Box | null {
   let left = width;
   let right = 0;
   let top = height;

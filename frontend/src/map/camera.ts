@@ -3,14 +3,14 @@ import type { Field } from '../contract/types';
 import { fieldCorners } from '../domain/field';
 import { memoOne } from '../domain/memo';
 import { holds, isPossible, reachOfTags, type Tag } from '../domain/twin';
-import { type Box, fitClear, isClear } from '../geometry/clear';
+import { fitClear, isClear } from '../geometry/clear';
 import {
   type Bounds,
   boundsOf,
+  type Box,
   type Camera,
   cameraOf,
   corners,
-  type Insets,
   inSight,
   type MapPoint,
   MAX_SCALE,
@@ -32,14 +32,12 @@ interface CameraHandlers {
   readonly onCamera: (camera: Camera) => void;
 }
 
-/** A hand on the map, as the camera sees it. */
 export interface Hand {
   /** The map was moved by something else; the hand goes on from there. */
   readonly follow: (view: View) => void;
   readonly stop: () => void;
 }
 
-/** What a hand may do, and whom it tells. */
 export interface Held {
   readonly viewport: () => Viewport;
   readonly leastScale: () => number;
@@ -52,7 +50,7 @@ export interface Held {
 type Gestures = (element: HTMLElement, held: Held) => Hand;
 
 /** Null until they are loaded, right behind the first view: the map is painted without. */
-export const gestures = createStore<Gestures | null, Gestures>(null, (_, next) => next);
+export const gestures = createStore<Gestures | null>(null);
 
 /** A view that was told as a camera and comes back differs in its last digits, and moves nothing. */
 const isSame = (a: View, b: View): boolean =>
@@ -61,7 +59,7 @@ const isSame = (a: View, b: View): boolean =>
   Math.abs(a.scale / b.scale - 1) < 1e-9;
 
 /** Space around what is fitted: less on a phone, also on its side, where each pixel counts. */
-function fitInsets({ width, height }: Size): Insets {
+function fitInsets({ width, height }: Size): Box {
   return width < 560 || height < 280
     ? { top: 26, right: 60, bottom: 40, left: 26 }
     : { top: 30, right: 76, bottom: 52, left: 40 };
@@ -139,7 +137,6 @@ export class MapCamera {
     this.#handlers.onCamera(cameraOf(view, size));
   }
 
-  /** A step that the operator asked for by a key or a button. */
   #step(view: View): void {
     const before = this.#handlers.viewport().view;
     const within = this.#inSight(view);
@@ -152,7 +149,6 @@ export class MapCamera {
     return this.#held !== null;
   }
 
-  /** About the middle. */
   zoomBy(factor: number): void {
     const { view, size } = this.#handlers.viewport();
     const scale = Math.min(MAX_SCALE, Math.max(this.#leastScale, view.scale * factor));
@@ -161,7 +157,6 @@ export class MapCamera {
     this.#step({ scale, x: about(view.x, size.width), y: about(view.y, size.height) });
   }
 
-  /** Moves what is seen, by a share of the view's size. */
   panBy(x: number, y: number): void {
     const { view, size } = this.#handlers.viewport();
     this.#step({ ...view, x: view.x - x * size.width, y: view.y - y * size.height });
@@ -184,7 +179,6 @@ export class MapCamera {
   }
 }
 
-/** What there is to show on the map. */
 export interface Content {
   readonly bounds: Bounds;
   readonly pins: readonly MapPoint[];
@@ -215,7 +209,6 @@ export function contentOf({ snapshot, map }: House, field: Field | null): Conten
   return bounds && { bounds, pins };
 }
 
-/** Both, as one. */
 export function together(a: Content | null, b: Content | null): Content | null {
   if (!a || !b) return a ?? b;
   const bounds = boundsOf([...corners(a.bounds), ...corners(b.bounds)]);
@@ -225,20 +218,13 @@ export function together(a: Content | null, b: Content | null): Content | null {
 /** What in the page stands on the map and hides a pin: buttons, scale bar, notices. */
 const OVER_MAP = '[data-over-map]';
 
-/** The boxes in the map view that something of the page covers. */
 export function coveredBoxes(element: HTMLElement): Box[] {
   const map = element.getBoundingClientRect();
   return [...(element.parentElement?.querySelectorAll(OVER_MAP) ?? [])].flatMap((each) => {
     const { left, top, right, bottom, width, height } = each.getBoundingClientRect();
     if (width === 0 || height === 0) return [];
-    return [
-      {
-        left: left - map.left,
-        top: top - map.top,
-        right: right - map.left,
-        bottom: bottom - map.top,
-      },
-    ];
+    const [x, y] = [map.left, map.top];
+    return [{ left: left - x, top: top - y, right: right - x, bottom: bottom - y }];
   });
 }
 

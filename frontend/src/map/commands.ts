@@ -1,22 +1,18 @@
 import type { CanvasPoint, MapPoint, Size } from '../geometry/coordinates';
 import { createStore } from '../store/create';
 
-/** What buttons and keys ask of the map, wherever in the page they are. */
 export type MapCommand =
   | { readonly type: 'fit' }
   | { readonly type: 'zoom'; readonly factor: number }
   /** Share of the view's size to move by; x to the right, y down. */
   | { readonly type: 'pan'; readonly x: number; readonly y: number }
-  /** Brings a tag's pin into view. */
   | { readonly type: 'show'; readonly tagId: string }
   /** Shows the layers as on paper, without what moves or follows the pointer, while `take` runs. */
   | { readonly type: 'picture'; readonly take: () => void };
 
-type Listener = (command: MapCommand) => void;
+const listeners = new Set<(command: MapCommand) => void>();
 
-const listeners = new Set<Listener>();
-
-export function onMapCommand(listener: Listener): () => void {
+export function onMapCommand(listener: (command: MapCommand) => void): () => void {
   listeners.add(listener);
   return () => listeners.delete(listener);
 }
@@ -25,7 +21,6 @@ export function commandMap(command: MapCommand): void {
   for (const listener of [...listeners]) listener(command);
 }
 
-/** What a key stands for on the map; null: nothing. */
 export function keyCommand({ key, shiftKey }: KeyboardEvent): MapCommand | null {
   const far = shiftKey ? 0.5 : 0.1;
   switch (key) {
@@ -54,22 +49,14 @@ export function keyCommand({ key, shiftKey }: KeyboardEvent): MapCommand | null 
  * Where the operator points at in the map: the mouse, or the crosshair of the keyboard. Apart
  * from the page's state, because it moves sixty times a second and only the read-out follows.
  */
-export const pointedAt = createStore<MapPoint | null, MapPoint | null>(null, (_, next) => next);
+export const pointedAt = createStore<MapPoint | null>(null);
 
 export interface PinUnderMouse {
   readonly tagId: string;
   readonly at: CanvasPoint;
   /** Half the pin's size, pixels. */
   readonly reach: number;
-  /** Of the map view. */
   readonly within: Size;
 }
 
-/** The pin that the mouse rests on; the same object as long as it is the same pin and place. */
-export const pinUnderMouse = createStore<PinUnderMouse | null, PinUnderMouse | null>(
-  null,
-  (before, next) =>
-    before?.tagId === next?.tagId && before?.at.x === next?.at.x && before?.at.y === next?.at.y
-      ? before
-      : next,
-);
+export const pinUnderMouse = createStore<PinUnderMouse | null>(null);

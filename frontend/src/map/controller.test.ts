@@ -2,6 +2,8 @@ import { afterEach, beforeEach, describe, expect, test, vi } from 'vitest';
 
 import { canvasPoint, mapPoint, toCanvas, type View } from '../geometry/coordinates';
 import { act, receive, store } from '../store/app';
+import { withField, withState } from '../store/twin';
+import { withLayer } from '../store/view';
 import { NOTHING } from '../store/fetcher';
 import { FakeContext } from '../testing/canvas';
 import { showField, showTags } from '../testing/page';
@@ -18,6 +20,9 @@ let stop: () => void;
 let frames: FrameRequestCallback[];
 let calm: boolean;
 
+const fail = (error: unknown): void => {
+  throw error;
+};
 const SIZE = { width: 600, height: 400 };
 const tagAt = (id: string, x: number, y: number, sec = 100): ReturnType<typeof wireTag> =>
   wireTag({
@@ -32,7 +37,7 @@ const start = (isFixed = false): void => {
   overlay = canvas();
   pins = canvas();
   still = canvas();
-  stop = runMap(element, { still, pins, overlay }, isFixed);
+  stop = runMap(element, { still, pins, overlay }, isFixed, fail);
   paint();
 };
 /** Runs what waits for the next frame. */
@@ -59,8 +64,8 @@ const press = (key: string): void => {
 beforeEach(() => {
   startGestures();
   frames = [];
-  pointedAt.dispatch(null);
-  pinUnderMouse.dispatch(null);
+  pointedAt.set(null);
+  pinUnderMouse.set(null);
   calm = false;
   vi.stubGlobal('requestAnimationFrame', (frame: FrameRequestCallback) => frames.push(frame));
   vi.stubGlobal('cancelAnimationFrame', () => {
@@ -106,7 +111,7 @@ const place = (x: number, y: number): readonly [number, number] => {
 const observeAgain = (): void => {
   const tags = [tagAt('a', 1, 1, 200), tagAt('b', 3, 2)];
   const latest = stateFrame(tags, { sec: 5_000, revision: 'later' });
-  receive({ type: 'state', latest, now: performance.now() });
+  receive(withState(latest, performance.now()));
   paint();
 };
 
@@ -148,7 +153,7 @@ describe('pulses', () => {
 
   test('not where the pins are switched off', () => {
     start();
-    act({ type: 'layer', layer: 'pins', on: false });
+    act(withLayer('pins', false));
     observeAgain();
     expect(drawn('arc')).toBe(0);
   });
@@ -185,7 +190,11 @@ describe('mouse and finger', () => {
     const [x, y] = place(3, 2);
     pointer('pointermove', x + 3, y - 2);
     expect(store.get().view.hovered).toBe('b');
-    expect(pinUnderMouse.get()).toMatchObject({ tagId: 'b', at: canvasPoint(x, y) });
+    const shown = pinUnderMouse.get();
+    expect(shown).toMatchObject({ tagId: 'b', at: canvasPoint(x, y) });
+    // Whoever moves about on a pin draws nothing anew.
+    pointer('pointermove', x + 4, y - 2);
+    expect(pinUnderMouse.get()).toBe(shown);
     pointer('pointerleave', 0, 0);
     expect(store.get().view.hovered).toBeNull();
     expect(pinUnderMouse.get()).toBeNull();
@@ -218,7 +227,7 @@ describe('mouse and finger', () => {
 
   test('pins that are switched off are not hit', () => {
     start();
-    act({ type: 'layer', layer: 'pins', on: false });
+    act(withLayer('pins', false));
     pointer('click', ...place(3, 2));
     expect(store.get().view.selected).toBeNull();
   });
@@ -267,7 +276,7 @@ describe('keyboard', () => {
 
   test('Enter chooses the tag nearest to the crosshair', () => {
     start();
-    act({ type: 'camera', camera: { x: 3, y: 2, span: 8 } });
+    act({ camera: { x: 3, y: 2, span: 8 } });
     press('Enter');
     expect(store.get().view.selected).toBe('b');
   });
@@ -293,14 +302,14 @@ test('everything is in sight, the heat map too', () => {
   }
   // Another sensor's heat map, which has the same grid, is on its way.
   const before = view();
-  receive({ type: 'field', field: NOTHING });
+  receive(withField(NOTHING));
   observeAgain();
   expect(view()).toEqual(before);
 });
 
 test('a map of another size is drawn at once, and not empty for a frame', () => {
   const still = document.createElement('canvas');
-  stop = runMap(element, { still, pins, overlay });
+  stop = runMap(element, { still, pins, overlay }, false, fail);
   expect(FakeContext.recordOf(still)?.named('clearRect').length).toBeGreaterThan(0);
 });
 
@@ -340,7 +349,7 @@ describe('nothing is drawn anew but what changed', () => {
     const { snapshot } = store.get().twin.latest;
     const tags = (snapshot?.tags ?? []).map(({ wire }) => structuredClone(wire));
     const later = { sec: (snapshot?.at.sec ?? 0) + 1, revision: snapshot?.revision ?? '' };
-    receive({ type: 'state', latest: stateFrame(tags, later), now: performance.now() });
+    receive(withState(stateFrame(tags, later), performance.now()));
     expect(store.get().twin.latest.snapshot).not.toBe(snapshot);
     expect(frames).toEqual([]);
   });

@@ -2,8 +2,8 @@
 import { now } from '../clock';
 import { pinRadius, type Pulse, PULSE_MS } from '../draw/pins';
 import type { Pin } from '../draw/scene';
-import type { Box } from '../geometry/clear';
 import {
+  type Box,
   canvasPoint,
   nearest,
   toCanvas,
@@ -13,6 +13,7 @@ import {
   type View,
 } from '../geometry/coordinates';
 import { act, moveViewport, store, type AppState } from '../store/app';
+import { withTag } from '../store/view';
 import {
   selectAreaOf,
   selectHeat,
@@ -21,11 +22,11 @@ import {
   selectSensor,
 } from '../store/derived';
 import { selectNewest, selectShown, selectTag, type Shown } from '../store/moment';
-import { isPrinting } from '../store/theme';
+import { isPrinting, onThemeChange } from '../store/theme';
 import { type Content, contentOf, coveredBoxes, MapCamera, together, watchCovered } from './camera';
 import { keyCommand, type MapCommand, onMapCommand, pinUnderMouse, pointedAt } from './commands';
 import { Painter, type Canvases } from './painter';
-import { onPaletteChange, paletteInUse } from './palette';
+import { paletteInUse } from './palette';
 
 /** A finger hits a pin from this far, a mouse from a bit less; CSS pixels. */
 const TOUCH_REACH = 26;
@@ -43,8 +44,8 @@ type Part = 'still' | 'pins' | 'overlay' | 'view';
 export function runMap(
   element: HTMLElement,
   canvases: Canvases,
-  isFixed = false,
-  onFailure: (error: unknown) => void = rethrow,
+  isFixed: boolean,
+  onFailure: (error: unknown) => void,
 ): () => void {
   const guarded = (work: () => void) => (): void => {
     try {
@@ -59,7 +60,6 @@ export function runMap(
   let frame = 0;
   let pulses: readonly Pulse[] = [];
   let crosshair = false;
-  /** A picture of the map is being taken. */
   let isTaken = false;
   /** What of the map the page stands on. */
   let covered: readonly Box[] = [];
@@ -74,11 +74,11 @@ export function runMap(
         moveViewport({ view });
         publish(view);
         // The pin has moved away from under the mouse.
-        pinUnderMouse.dispatch(null);
+        pinUnderMouse.set(null);
         spoil('view');
       },
       onCamera: (chosen) => {
-        act({ type: 'camera', camera: chosen });
+        act({ camera: chosen });
         // Labels find their places anew.
         spoil('pins');
       },
@@ -88,7 +88,7 @@ export function runMap(
 
   const publish = ({ x, y, scale }: View): void => {
     canvases.overlay.dataset['view'] = [x, y, scale].map((n) => n.toFixed(4)).join(',');
-    if (crosshair) pointedAt.dispatch(centre());
+    if (crosshair) pointedAt.set(centre());
   };
 
   // A map that comes back into the page may never have to move.
@@ -203,9 +203,10 @@ export function runMap(
   };
 
   const hover = (pin: Pin | null): void => {
-    act({ type: 'hover', tagId: pin?.id ?? null });
+    act({ hovered: pin?.id ?? null });
+    if (pinUnderMouse.get()?.tagId === pin?.id) return;
     const { view, size } = store.get().viewport;
-    pinUnderMouse.dispatch(
+    pinUnderMouse.set(
       pin && {
         tagId: pin.id,
         at: toCanvas(view, pin.at),
@@ -223,25 +224,25 @@ export function runMap(
   const onPointerMove = (event: PointerEvent): void => {
     if (event.pointerType === 'touch') return;
     const point = pointOf(event);
-    pointedAt.dispatch(toMap(store.get().viewport.view, point));
+    pointedAt.set(toMap(store.get().viewport.view, point));
     const pin = event.buttons === 0 ? pinAt(point, MOUSE_REACH) : null;
     hover(pin);
     const hand = pin === null || isFixed ? 'grab' : 'point';
     if (element.dataset['hand'] !== hand) element.dataset['hand'] = hand;
   };
   const onPointerLeave = (): void => {
-    pointedAt.dispatch(crosshair ? centre() : null);
+    pointedAt.set(crosshair ? centre() : null);
     hover(null);
   };
   const onClick = (event: MouseEvent): void => {
     const isTouch = event instanceof PointerEvent && event.pointerType === 'touch';
     const point = pointOf(event);
-    if (isTouch) pointedAt.dispatch(toMap(store.get().viewport.view, point));
-    act({ type: 'select', tagId: pinAt(point, isTouch ? TOUCH_REACH : MOUSE_REACH)?.id ?? null });
+    if (isTouch) pointedAt.set(toMap(store.get().viewport.view, point));
+    act(withTag(pinAt(point, isTouch ? TOUCH_REACH : MOUSE_REACH)?.id ?? null));
   };
   const setCrosshair = (on: boolean): void => {
     crosshair = on;
-    pointedAt.dispatch(on ? centre() : null);
+    pointedAt.set(on ? centre() : null);
     spoil('overlay');
   };
   /** From now on the keyboard is at work: the read-out is the crosshair's. */
@@ -258,7 +259,7 @@ export function runMap(
     if (event.altKey || event.ctrlKey || event.metaKey) return;
     if (event.key === 'Enter' || event.key === ' ') {
       aim();
-      act({ type: 'select', tagId: pinAt(middle(), 60)?.id ?? null });
+      act(withTag(pinAt(middle(), 60)?.id ?? null));
       event.preventDefault();
       return;
     }
@@ -272,7 +273,7 @@ export function runMap(
   const run = (command: MapCommand): void => {
     switch (command.type) {
       case 'fit':
-        act({ type: 'camera', camera: null });
+        act({ camera: null });
         camera.goTo(null, content(store.get()), covered);
         break;
       case 'zoom':
@@ -354,7 +355,7 @@ export function runMap(
   const stops = [
     store.subscribe(guarded(update)),
     onMapCommand(run),
-    onPaletteChange(() => {
+    onThemeChange(() => {
       painter.setPalette(paletteInUse());
       spoil('still', 'pins', 'overlay');
       // Not with the next frame: a page on its way to the printer gets none.
@@ -379,10 +380,6 @@ export function runMap(
     cancelAnimationFrame(frame);
     camera.destroy();
   };
-}
-
-function rethrow(error: unknown): never {
-  throw error;
 }
 
 function newPulses({ snapshot }: Shown): Pulse[] {

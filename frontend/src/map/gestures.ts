@@ -54,5 +54,5 @@ function takeHold(element: HTMLElement, held: Held): Hand {
 }
 
 export const startGestures = (): void => {
-  gestures.dispatch(takeHold);
+  gestures.set(takeHold);
 };

@@ -13,7 +13,6 @@ Object.assign(selection.prototype, {
   },
 });
 
-/** Of animated moves alone. */
 export const interpolateZoom = (): never => {
   throw new Error('the map is not animated');
 };

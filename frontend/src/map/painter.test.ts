@@ -3,7 +3,8 @@ import { beforeEach, describe, expect, test } from 'vitest';
 import { DARK, LIGHT } from '../draw/palette';
 import { cataloguesOf } from '../domain/sensors';
 import { act, prefer, receive, store } from '../store/app';
-import type { Layer } from '../store/view';
+import { withField } from '../store/twin';
+import { type Layer, withTag } from '../store/view';
 import { FakeContext } from '../testing/canvas';
 import { fieldWith } from '../testing/field';
 import { judgement, reason } from '../testing/health';
@@ -45,7 +46,7 @@ beforeEach(() => {
 });
 
 const show = (...layers: Layer[]): void => {
-  act({ type: 'look', view: { layers: new Set(layers) } });
+  act({ layers: new Set(layers) });
 };
 
 describe('painter', () => {
@@ -96,8 +97,8 @@ describe('painter', () => {
       const paint = (kind: 'old' | 'range'): { pictures: number; alpha: number | undefined } => {
         const field = store.get().twin.latest.field;
         showTags([wireTag({ tag_id: '1', readings: readings({ temperature: 20 }) })], said(kind));
-        receive({ type: 'field', field });
-        act({ type: 'colouring', colouring });
+        receive(withField(field));
+        act({ colouring });
         show('field', 'unknown');
         calls(canvases.still).length = 0;
         painter.paintStill(store.get(), view, 0, true);
@@ -124,7 +125,7 @@ describe('painter', () => {
   });
 
   test('the chosen and the hovered tag are marked', () => {
-    act({ type: 'select', tagId: '1' });
+    act(withTag('1'));
     painter.paintOverlay(store.get(), view, { pulses: [], now: 0, crosshair: false });
     expect(named(canvases.overlay, 'stroke').length).toBeGreaterThan(0);
   });
@@ -158,7 +159,7 @@ describe('painter', () => {
 
   test('areas are drawn where the table is grouped by them', () => {
     const value = cataloguesOf({ ...FILE, areas: { 'Bay 1': ['1'], 'Bay 2': ['2'] } });
-    receive({ type: 'set', part: { sensors: { value, state: 'ready', message: '' } } });
+    receive({ sensors: { value, state: 'ready', message: '' } });
     show();
     painter.paintStill(store.get(), view, 0, true);
     expect(named(canvases.still, 'strokeRect')).toHaveLength(0);

@@ -1,13 +1,10 @@
-import type { Ageing } from '../domain/time';
 import type { Field } from '../contract/types';
 import { divergingShade } from '../domain/difference';
 import { edgesOf, errorShade, fieldPixels, smoothDetail } from '../domain/field';
-import type { HouseHealth } from '../domain/health';
 import { fieldShade } from '../domain/ramp';
 import { cellsWhere, idealShade, withOld } from '../domain/ideal';
 import type { Sensor } from '../domain/sensors';
-import type { TemperatureUnit } from '../domain/format';
-import type { Tag } from '../domain/twin';
+import { equal } from '../domain/twin';
 import {
   drawBlooms,
   drawCrosshair,
@@ -27,10 +24,10 @@ import {
   contextOf,
   newCanvas,
   PanBuffer,
+  type Pen,
   Sprites,
-  type Surface,
 } from '../draw/surface';
-import { buildScene, type Scene } from '../draw/scene';
+import { buildScene, type Scene, type SceneInput } from '../draw/scene';
 import {
   cellsOf,
   drawAreas,
@@ -41,16 +38,16 @@ import {
   drawGround,
   drawPicture,
   drawUnsure,
-  fieldPlacement,
   floorOf,
   Hatching,
   knownOf,
   LEAST_FREE_GREY,
+  placedField,
   tintMap,
   unsureOf,
 } from '../draw/still';
-import type { Size, View } from '../geometry/coordinates';
-import { type Box, placeLabels, type Room } from '../geometry/clear';
+import type { Box, Size, View } from '../geometry/coordinates';
+import { placeLabels, type Room } from '../geometry/clear';
 import type { AppState } from '../store/app';
 import {
   selectAreas,
@@ -61,15 +58,11 @@ import {
   selectSensor,
   type Heat,
 } from '../store/derived';
-import { memoLast, memoOne } from '../domain/memo';
+import { keeping, memoLast, memoOne } from '../domain/memo';
 import { selectShown, selectTag, selectTags } from '../store/moment';
 import type { MapPicture } from '../geometry/image';
 
-export interface Canvases {
-  readonly still: HTMLCanvasElement;
-  readonly pins: HTMLCanvasElement;
-  readonly overlay: HTMLCanvasElement;
-}
+export type Canvases = Readonly<Record<'still' | 'pins' | 'overlay', HTMLCanvasElement>>;
 
 /** Fading is worked out anew this often even when nothing else changes, ms. */
 const FADE_TICK_MS = 5_000;
@@ -87,11 +80,11 @@ const holding = memoLast((field: Field, old: Uint8Array | null) =>
 const tooOld = memoLast((field: Field, old: Uint8Array) =>
   cellsOf(field, (cell) => old[cell] !== 0 && !Number.isNaN(field.values[cell])),
 );
-const whole = memoOne((field: Field) => {
-  const canvas = newCanvas(field.width, field.height);
-  contextOf(canvas).fillRect(0, 0, field.width, field.height);
-  return canvas;
-});
+const whole = memoOne((field: Field) => cellsOf(field, () => true));
+
+interface RoomAt extends Room {
+  readonly scale: number;
+}
 
 /**
  * Puts the state on three canvases: the still layers, the pins, and what moves by itself. It
@@ -99,28 +92,27 @@ const whole = memoOne((field: Field) => {
  * data that it was made from.
  */
 export class Painter {
-  readonly #canvases: Canvases;
   #size: Size = { width: 0, height: 0 };
   #ratio = 1;
   #textScale = 1;
-  #palette: Palette;
   #sprites = new Sprites(1);
   #widths = new Map<string, number>();
   // Off the page, like those of the sprites: one in the page inherits the font's features from
   // the style sheet. Made anew for another font: one off the page keeps what it first found.
   #ruler = contextOf(newCanvas(1, 1));
   /** Where labels found their places when the map last came to rest, and at which scale. */
-  #room: (Room & { readonly scale: number }) | null = null;
+  #room: RoomAt | null = null;
+  readonly #keptRoom = keeping<RoomAt>(equal);
   #lastScene: Scene | null = null;
   #paintedScene: Scene | null = null;
   readonly #hatching = new Hatching();
   readonly #stillBuffer = new PanBuffer();
   readonly #pinBuffer = new PanBuffer();
 
-  constructor(canvases: Canvases, palette: Palette) {
-    this.#canvases = canvases;
-    this.#palette = palette;
-  }
+  constructor(
+    private readonly canvases: Canvases,
+    private palette: Palette,
+  ) {}
 
   /** `textScale`: how large the page's text is there, 1 as usual. */
   resize(size: Size, ratio: number, textScale = 1): void {
@@ -129,7 +121,7 @@ export class Painter {
     this.#size = { width: Math.ceil(size.width), height: Math.ceil(size.height) };
     this.#ratio = ratio;
     this.#textScale = textScale;
-    for (const canvas of Object.values(this.#canvases) as HTMLCanvasElement[]) {
+    for (const canvas of Object.values(this.canvases)) {
       canvas.width = Math.round(this.#size.width * ratio);
       canvas.height = Math.round(this.#size.height * ratio);
       canvas.style.width = `${canvas.width / ratio}px`;
@@ -139,7 +131,7 @@ export class Painter {
   }
 
   setPalette(palette: Palette): void {
-    this.#palette = palette;
+    this.palette = palette;
     this.forget();
   }
 
@@ -152,66 +144,62 @@ export class Painter {
     this.#ruler = contextOf(newCanvas(1, 1));
   }
 
-  #surface(canvas: HTMLCanvasElement): Surface {
-    const surface = { context: contextOf(canvas), size: this.#size, ratio: this.#ratio };
-    clear(surface);
-    return surface;
+  #penOn(canvas: HTMLCanvasElement, view: View): Pen {
+    const pen = {
+      ...{ context: contextOf(canvas), size: this.#size, ratio: this.#ratio, view },
+      ...{ palette: this.palette, sprites: this.#sprites, textScale: this.#textScale },
+    };
+    clear(pen);
+    return pen;
   }
 
   /** `isNew`: more than the view changed since the last time. */
   paintStill(state: AppState, view: View, now: number, isNew: boolean): void {
-    const surface = this.#surface(this.#canvases.still);
+    const pen = this.#penOn(this.canvases.still, view);
     if (isNew) this.#stillBuffer.spoil();
-    this.#stillBuffer.draw(surface, view, (target, seen) => {
-      this.#drawStill(target, seen, state, now);
+    this.#stillBuffer.draw(pen, (target) => {
+      this.#drawStill(target, state, now);
     });
-    if (state.view.layers.has('grid'))
-      drawGridLabels(surface, view, this.#palette, this.#textScale);
+    if (state.view.layers.has('grid')) drawGridLabels(pen);
   }
 
-  #drawStill(surface: Surface, view: View, state: AppState, now: number): void {
+  #drawStill(pen: Pen, state: AppState, now: number): void {
     const { layers } = state.view;
     const house = selectShown(state);
-    drawGround(surface, this.#palette);
+    drawGround(pen);
     const picture = house.map.value;
     if (picture && layers.has('map')) {
-      drawPicture(surface, view, this.#mapPicture(picture, this.#palette), picture.placement);
+      const { placement } = picture;
+      drawPicture(pen, { picture: this.#mapPicture(picture, this.palette), placement });
     }
     const isTold = layers.has('field') && layers.has('unknown');
     const mapped = isTold ? selectMapped(state) : null;
-    if (mapped) this.#drawUnknown(surface, view, mapped, picture);
-    if (layers.has('grid')) drawGridLines(surface, view, this.#palette, this.#textScale);
-    if (layers.has('boxes')) drawBoxes(surface, view, this.scene(state, now).boxes, this.#palette);
+    if (mapped) this.#drawUnknown(pen, mapped, picture);
+    if (layers.has('grid')) drawGridLines(pen);
+    if (layers.has('boxes')) drawBoxes(pen, this.scene(state, now).boxes);
     const heat = selectHeat(state);
     if (heat && layers.has('field')) {
       const detail = layers.has('smooth') ? smoothDetail(heat.field) : 1;
       const coloured = this.#heatPicture(heat, selectSensor(state), detail, isTold);
-      drawPicture(surface, view, coloured, fieldPlacement(heat.field, coloured));
+      drawPicture(pen, placedField(heat.field, coloured));
       if (isTold && !heat.isError) {
-        const unsure = unsureParts(heat.field).map(
-          (picture) => picture && { picture, placement: fieldPlacement(heat.field, picture) },
-        );
-        drawUnsure(surface, view, unsure, this.#hatching, this.#palette);
+        const unsure = unsureParts(heat.field).map((part) => part && placedField(heat.field, part));
+        drawUnsure(pen, unsure, this.#hatching);
       }
       if (isTold && heat.old) {
-        const picture = tooOld(heat.field, heat.old);
-        const inside = { picture, placement: fieldPlacement(heat.field, picture) };
-        this.#hatching.draw(surface, view, inside, null, this.#palette);
+        this.#hatching.draw(pen, placedField(heat.field, tooOld(heat.field, heat.old)), null);
       }
-      const known = holding(heat.field, heat.old);
-      if (isTold) drawEdges(surface, view, edges(known), this.#palette);
+      if (isTold) drawEdges(pen, edges(holding(heat.field, heat.old)));
     }
-    drawAreas(surface, view, selectAreas(state), this.#palette, this.#textScale);
+    drawAreas(pen, selectAreas(state));
   }
 
   /** Inside the house is the floor of its map; without one, as far as the field was asked for. */
-  #drawUnknown(surface: Surface, view: View, field: Field, map: MapPicture | null): void {
-    const known = knownPart(field);
-    const placement = fieldPlacement(field, known);
+  #drawUnknown(pen: Pen, field: Field, map: MapPicture | null): void {
     const inside = map
       ? { picture: floor(map), placement: map.placement }
-      : { picture: whole(field), placement };
-    this.#hatching.draw(surface, view, inside, { picture: known, placement }, this.#palette);
+      : placedField(field, whole(field));
+    this.#hatching.draw(pen, inside, placedField(field, knownPart(field)));
   }
 
   /** `covered`: what stands on the map; null while the map moves, and labels with it. */
@@ -222,28 +210,37 @@ export class Painter {
     isNew: boolean,
     covered: readonly Box[] | null,
   ): void {
-    const surface = this.#surface(this.#canvases.pins);
+    const pen = this.#penOn(this.canvases.pins, view);
     if (covered) {
       const { width, height } = this.#size;
-      this.#room = this.#roomAt(view.x, view.y, view.scale, width, height, covered);
+      // From pixels of the map view to those relative to the map's origin.
+      const moved = ({ left, top, right, bottom }: Box): Box => ({
+        ...{ left: left - view.x, right: right - view.x },
+        ...{ top: top - view.y, bottom: bottom - view.y },
+      });
+      this.#room = this.#keptRoom({
+        scale: view.scale,
+        within: moved({ left: 0, top: 0, right: width, bottom: height }),
+        covered: covered.map(moved),
+      });
     }
     if (isNew) this.#pinBuffer.spoil();
-    this.#pinBuffer.draw(surface, view, (target, seen) => {
-      this.#drawPins(target, seen, state, now);
+    this.#pinBuffer.draw(pen, (target) => {
+      this.#drawPins(target, state, now);
     });
   }
 
-  #drawPins(surface: Surface, view: View, state: AppState, now: number): void {
+  #drawPins(pen: Pen, state: AppState, now: number): void {
     const { layers } = state.view;
     const scene = this.scene(state, now);
     this.#paintedScene = scene;
-    if (layers.has('blooms')) drawBlooms(surface, view, scene.blooms, this.#sprites, this.#palette);
+    if (layers.has('blooms')) drawBlooms(pen, scene.blooms);
     if (!layers.has('pins')) return;
-    drawPins(surface, view, scene.pins, this.#sprites, this.#palette, scene.spacing);
+    drawPins(pen, scene.pins, scene.spacing);
     if (!layers.has('labels')) return;
-    const room = this.#room?.scale === view.scale ? this.#room : null;
-    const labels = this.#labels(scene, view.scale, state.view.selected, this.#widths, room);
-    drawLabels(surface, view, labels, this.#sprites, this.#palette, this.#textScale);
+    const { scale } = pen.view;
+    const room = this.#room?.scale === scale ? this.#room : null;
+    drawLabels(pen, this.#labels(scene, scale, state.view.selected, this.#widths, room));
   }
 
   paintOverlay(
@@ -255,51 +252,39 @@ export class Painter {
       readonly crosshair: boolean;
     },
   ): void {
-    const surface = this.#surface(this.#canvases.overlay);
-    if (state.view.layers.has('pins')) {
-      drawPulses(surface, view, moving.pulses, moving.now, this.#palette);
-    }
+    const pen = this.#penOn(this.canvases.overlay, view);
+    if (state.view.layers.has('pins')) drawPulses(pen, moving.pulses, moving.now);
     const { selected, hovered } = state.view;
     for (const tagId of new Set([hovered, selected])) {
       const at = tagId === null ? null : selectTag(state, tagId)?.at;
-      if (at) drawMark(surface, view, at, tagId === selected, this.#palette);
+      if (at) drawMark(pen, at, tagId === selected);
     }
-    if (moving.crosshair) drawCrosshair(surface, this.#palette);
+    if (moving.crosshair) drawCrosshair(pen);
   }
 
-  /** Whether pins look otherwise by now than they were painted. */
   hasFaded(state: AppState, now: number): boolean {
     return this.scene(state, now) !== this.#paintedScene;
   }
 
-  /** The same object as long as it looks the same. */
   scene(state: AppState, now: number): Scene {
     return this.#scene(
-      selectTags(state),
-      selectShown(state).ageing,
-      selectHealth(state),
-      selectSensor(state),
-      state.settings.unit,
-      selectListed(state),
-      Math.floor(now / FADE_TICK_MS),
+      this.#sceneInput({
+        tags: selectTags(state),
+        ageing: selectShown(state).ageing,
+        health: selectHealth(state),
+        sensor: selectSensor(state),
+        unit: state.settings.unit,
+        listed: selectListed(state),
+        now: Math.floor(now / FADE_TICK_MS) * FADE_TICK_MS,
+      }),
     );
   }
 
-  readonly #scene = memoLast(
-    (
-      tags: readonly Tag[],
-      ageing: Ageing,
-      health: HouseHealth,
-      sensor: Sensor,
-      unit: TemperatureUnit,
-      listed: ReadonlySet<string> | null,
-      tick: number,
-    ) => {
-      const look = { tags, ageing, health, sensor, unit, listed };
-      this.#lastScene = buildScene({ ...look, now: tick * FADE_TICK_MS }, this.#lastScene);
-      return this.#lastScene;
-    },
-  );
+  readonly #sceneInput = keeping<SceneInput>();
+  readonly #scene = memoOne((input: SceneInput) => {
+    this.#lastScene = buildScene(input, this.#lastScene);
+    return this.#lastScene;
+  });
 
   readonly #labels = memoLast(
     (
@@ -314,30 +299,6 @@ export class Painter {
         labelHeight(this.#textScale),
         room,
       ),
-  );
-
-  /** From pixels of the map view to those relative to the map's origin. */
-  readonly #roomAt = memoLast(
-    (
-      x: number,
-      y: number,
-      scale: number,
-      width: number,
-      height: number,
-      covered: readonly Box[],
-    ): Room & { scale: number } => {
-      const moved = ({ left, top, right, bottom }: Box): Box => ({
-        left: left - x,
-        top: top - y,
-        right: right - x,
-        bottom: bottom - y,
-      });
-      return {
-        scale,
-        within: moved({ left: 0, top: 0, right: width, bottom: height }),
-        covered: covered.map(moved),
-      };
-    },
   );
 
   #widthOf(text: string, widths: Map<string, number>): number {

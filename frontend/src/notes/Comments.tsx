@@ -65,8 +65,8 @@ export function CommentList({
   subject: string;
   moment: number | null;
 }): JSX.Element | null {
-  const all = useSelected(standingNotes, (it) => it);
-  const who = useSelected(person, (it) => it);
+  const all = useSelected(standingNotes);
+  const who = useSelected(person);
   const found = all.filter(
     (it) => it.kind === 'comment' && it.subject === subject && (moment === null || it.at <= moment),
   );
@@ -117,10 +117,8 @@ function CommentRow({
   );
 }
 
-/** As the bridge has it. */
 const LONGEST = 500;
 
-/** Where a comment is written. */
 export function CommentField({
   subject,
   moment,

@@ -11,30 +11,19 @@ import { createFetcher } from '../store/fetcher';
 import { LANGUAGE, S } from '../strings';
 import { COMMENTS } from '../words/comments';
 
-export interface StandingNote {
-  readonly id: string;
-  readonly kind: Note['kind'];
-  readonly subject: string;
-  readonly text: string;
-  readonly by: string;
-  /** The moment that it is about, ROS seconds. */
-  readonly at: number;
-  /** Of `shelve` its end, ROS seconds; null: the alarm is not shelved any more. */
-  readonly until: number | null;
-}
+export type StandingNote = ReturnType<typeof standing>[number];
 
 /** What stands, the oldest moment first. */
-export const standingNotes = createStore<readonly StandingNote[], readonly StandingNote[]>(
-  [],
-  (_, next) => next,
-);
+export const standingNotes = createStore<readonly StandingNote[]>([]);
 
-export const standing = (notes: readonly Note[]): StandingNote[] =>
+export const standing = (notes: readonly Note[]) =>
   notes
     .filter(({ withdrawn_by: by }) => by === null)
     .map(({ id, kind, subject, text, by, made_at: made, until }) => ({
       ...{ id, kind, subject, by, text: text.replace(/\s+/g, ' ') },
+      /** The moment that it is about, ROS seconds. */
       at: secondsOf((kind === 'comment' ? until : null) ?? made),
+      /** Of `shelve` its end, ROS seconds; null: the alarm is not shelved any more. */
       until: until && secondsOf(until),
     }))
     .reverse()
@@ -46,7 +35,7 @@ export function startNotes(): () => void {
   const fetcher = createFetcher<readonly Note[]>({
     paceMs: PACE_MS,
     onValue: (notes) => {
-      standingNotes.dispatch(standing(notes));
+      standingNotes.set(standing(notes));
     },
   });
   const update = (): void => {
@@ -63,17 +52,11 @@ export function startNotes(): () => void {
   };
 }
 
-/** So near to each other that one mark stands for them. */
-interface Cluster {
-  readonly at: number;
-  readonly notes: readonly StandingNote[];
-}
-
 /** Nearer than this, as a share of the span, marks would cover each other. */
 const NEAR = 0.02;
 
-/** From the oldest; `found` is in that order. */
-export function clustersOf(found: readonly StandingNote[], { from, to }: Span): Cluster[] {
+/** Those so near to each other that one mark stands for them; from the oldest, as `found` is. */
+export function clustersOf(found: readonly StandingNote[], { from, to }: Span) {
   const clusters: { at: number; notes: StandingNote[] }[] = [];
   for (const one of found) {
     const { at } = one;
@@ -106,7 +89,6 @@ function subjectText(subject: string, alarms: readonly Alarm[]): string {
   return subject.startsWith('alarm:') ? C.alarm(tag) : tag;
 }
 
-/** What was said: a comment's words, or what became of an alarm, and why. */
 function noteText({ kind, text, until }: StandingNote): string {
   if (kind === 'comment') return text;
   const shelved = until === null ? C.unshelved : C.shelved(rosText(until));
@@ -116,7 +98,6 @@ function noteText({ kind, text, until }: StandingNote): string {
 
 /** Notes that the text of one mark holds. */
 const MOST_NOTES = 5;
-/** Characters of each. */
 const LONGEST = 160;
 const NO_ALARMS = [] as const;
 
@@ -129,7 +110,7 @@ export function NoteMarks({
   /** Of these tags and of the greenhouse; none: all. */
   tagIds?: readonly string[];
 }): JSX.Element | null {
-  const all = useSelected(standingNotes, (it) => it);
+  const all = useSelected(standingNotes);
   const alarms = useApp((state) => state.twin.alarms?.alarms ?? NO_ALARMS);
   const { from, to } = span;
   const ids = tagIds?.join('\u0001');
@@ -157,7 +138,7 @@ export function NoteMarks({
             <button
               type="button"
               onClick={() => {
-                act({ type: 'moment', moment: at });
+                act({ moment: at });
               }}
             >
               <svg viewBox="0 0 16 16" width="14" height="14" aria-hidden="true">

@@ -36,8 +36,8 @@ let notes: readonly Note[] = [];
 beforeEach(() => {
   asked = [];
   notes = [];
-  standingNotes.dispatch([]);
-  person.dispatch(null);
+  standingNotes.set([]);
+  person.set(null);
   showTags([]);
   vi.stubGlobal('fetch', (url: URL, { method = 'GET', body }: RequestInit) => {
     asked.push(`${method} ${url.pathname}${url.search} ${typeof body === 'string' ? body : ''}`);
@@ -48,7 +48,7 @@ beforeEach(() => {
 /** A frame: the log has so many notes. */
 const tell = (count: number): void => {
   flush(() => {
-    receive({ type: 'set', part: { alarms: { ...alarms([alarm('cold')]), notes: count } } });
+    receive({ alarms: { ...alarms([alarm('cold')]), notes: count } });
   });
 };
 
@@ -87,8 +87,8 @@ test('what is said is fetched when there is more of it, and shown with name and 
 });
 
 test('who may write does, and withdraws their own words alone', async () => {
-  person.dispatch(ANNA);
-  standingNotes.dispatch(standing([said('mine', 800), said('bert’s', 700, { by: 'bert' })]));
+  person.set(ANNA);
+  standingNotes.set(standing([said('mine', 800), said('bert’s', 700, { by: 'bert' })]));
   render(<Comments subject="tag:7" name="Tag 7" />);
   expect(screen.getAllByRole('button', { name: /^Withdraw/ })).toHaveLength(1);
   fireEvent.click(screen.getByRole('button', { name: 'Withdraw: mine' }));
@@ -105,7 +105,7 @@ test('who may write does, and withdraws their own words alone', async () => {
 });
 
 test('Escape leaves the field, and not what it stands in', () => {
-  person.dispatch(ANNA);
+  person.set(ANNA);
   render(<Comments subject="tag:7" name="Tag 7" />);
   fireEvent.click(screen.getByRole('button', { name: 'Comment: Tag 7' }));
   expect(fireEvent.keyDown(screen.getByLabelText('Comment (now)'), { key: 'Escape' })).toBe(false);
@@ -114,9 +114,9 @@ test('Escape leaves the field, and not what it stands in', () => {
 });
 
 test('who looks back says it about the moment that is shown', async () => {
-  person.dispatch(ANNA);
+  person.set(ANNA);
   flush(() => {
-    act({ type: 'moment', moment: 500 });
+    act({ moment: 500 });
   });
   render(<SiteComment />);
   fireEvent.click(screen.getByRole('button', { name: 'Comment: greenhouse' }));
@@ -132,7 +132,7 @@ test('who looks back says it about the moment that is shown', async () => {
 
 test('a mark tells on its own who said what of which tag', () => {
   const hidden = 'a\u202ecod';
-  standingNotes.dispatch(
+  standingNotes.set(
     standing([said('n', 500, { text: hidden }), said('s', 90, { subject: 'site' })]),
   );
   render(<NoteMarks span={{ from: 0, to: 1_000 }} tagIds={['8']} />);
@@ -146,9 +146,9 @@ test('a mark tells on its own who said what of which tag', () => {
 });
 
 test('a mark tells who acknowledged or shelved an alarm when, and the card lists comments alone', () => {
-  receive({ type: 'set', part: { alarms: alarms([alarm('cold')]) } });
+  receive({ alarms: alarms([alarm('cold')]) });
   const subject = `alarm:${alarm('cold').id}`;
-  standingNotes.dispatch(
+  standingNotes.set(
     standing([
       said('c', 900, { kind: 'shelve', subject, text: '' }),
       said('b', 500, { kind: 'shelve', subject, text: 'vents', until: { sec: 900, nanosec: 0 } }),

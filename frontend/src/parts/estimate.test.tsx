@@ -7,6 +7,7 @@ import { snapshotOf } from '../domain/twin';
 import { mapPoint } from '../geometry/coordinates';
 import { pointedAt } from '../map/commands';
 import { act, moveViewport, prefer, receive, store } from '../store/app';
+import { withPast } from '../store/twin';
 import { selectTag } from '../store/moment';
 import { bodies, estimated, expectedReading, grade } from '../testing/field';
 import { judgement, reason } from '../testing/health';
@@ -54,7 +55,7 @@ beforeEach(() => {
   });
   showTags(tags());
   goLive();
-  act({ type: 'heat', heat: 'estimate' });
+  act({ heat: 'estimate' });
 });
 
 const nearest = (field: Field): Field => {
@@ -67,7 +68,7 @@ const text = (id: string): string => screen.getByTestId(id).textContent;
 describe('readout', () => {
   const point = (x: number): void => {
     flush(() => {
-      pointedAt.dispatch(mapPoint(x, 0.5));
+      pointedAt.set(mapPoint(x, 0.5));
     });
   };
 
@@ -91,7 +92,7 @@ describe('readout', () => {
 
   test('the error alone is told where the value is not known', async () => {
     showField(estimated([22.4, NaN], [0.79, 2]));
-    act({ type: 'heat', heat: 'error' });
+    act({ heat: 'error' });
     render(<Readout />);
     point(1.5);
     await screen.findByTestId('readout-near');
@@ -161,7 +162,7 @@ describe('legend', () => {
   });
 
   test('what is computed has no estimate, and that is said', () => {
-    act({ type: 'sensor', sensor: 'vpd' });
+    act({ sensor: 'vpd' });
     render(<EstimateFacts />);
     expect(text('estimate-missing')).toBe(
       'A computed quantity has no estimate: the nearest readings are shown',
@@ -170,7 +171,7 @@ describe('legend', () => {
 
   test('the error alone has a scale of its own, from none to the most', async () => {
     showField(estimated([22.4, NaN], [0.5, 2]));
-    act({ type: 'heat', heat: 'error' });
+    act({ heat: 'error' });
     render(<Legend kiosk={false} />);
     expect((await screen.findByTestId('error-high')).textContent).toBe(`±${NBSP}3.3${NBSP}°C`);
     expect(text('error-scale')).toContain('Uncertainty of the estimate');
@@ -239,8 +240,8 @@ describe('where another tag would help', () => {
     render(<AdviceMarks />);
     await screen.findByText('No suggestion for another tag');
     flush(() => {
-      receive({ type: 'past', past: { at: 5, house: store.get().twin.latest } });
-      act({ type: 'moment', moment: 5 });
+      receive(withPast({ at: 5, house: store.get().twin.latest }));
+      act({ moment: 5 });
     });
     expect(text('advice-note')).toBe('Suggestions for another tag are shown for the present only');
   });

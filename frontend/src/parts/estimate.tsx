@@ -64,7 +64,6 @@ export function EstimateFacts(): JSX.Element {
   );
 }
 
-/** The nearest readings are shown, and why: once, in plain words. */
 function Missing({ why, grade }: { why: NoEstimate; grade: Grade | null }): JSX.Element {
   const text =
     why.status === NOT_FOUND ? E.noService : grade?.fitted_at === null ? E.noModel : E.noneNow;
@@ -150,16 +149,8 @@ export function EstimateReadout({
   );
 }
 
-/** What an estimate at a point has to go by: the tags near it. Pure. */
-
 /** As far as what is read at one place is usually like what is read at another, metres. */
 export const NEAR_M = 2.5;
-
-interface Near {
-  readonly count: number;
-  /** When the oldest of their readings was made; "never": there is none. */
-  readonly oldest: When;
-}
 
 /** The tags with a reading of the sensor within reach; not those that the estimate leaves out. */
 export function nearTo(
@@ -167,7 +158,7 @@ export function nearTo(
   tags: readonly Tag[],
   sensor: string,
   { byTag }: Pick<HouseHealth, 'byTag'>,
-): Near {
+) {
   const hasChanged = ({ id }: Tag): boolean =>
     byTag.get(id)?.reasons.some((each) => each.kind === 'changed' && each.sensor === sensor) ??
     false;
@@ -181,10 +172,10 @@ export function nearTo(
   const times = near.map(({ readAt }) => readAt.get(sensor) ?? 'unknown');
   const known = times.filter((when) => typeof when === 'number');
   const oldest = known.length < times.length ? 'unknown' : Math.min(...known);
-  return { count: near.length, oldest: near.length === 0 ? 'never' : oldest };
+  const when: When = near.length === 0 ? 'never' : oldest;
+  return { count: near.length, oldest: when };
 }
 
-/** The colours of the error alone. */
 export function ErrorScale(): JSX.Element {
   const sensor = useApp(selectSensor);
   const unit = useApp((state) => state.settings.unit);
@@ -356,5 +347,4 @@ function useAsked<Name extends 'EstimateQualities' | 'ExpectedTags' | 'Advice'>(
   return { ...rest, value: value?.of === sensor ? value.told : null };
 }
 
-/** Every word of the estimate, in the language that the page speaks. */
 const E = await estimateWordsOf(LANGUAGE);

@@ -22,7 +22,7 @@ const robot = {
 };
 
 beforeEach(() => {
-  robotFrame.dispatch(null);
+  robotFrame.set(null);
   showTags([wireTag()]);
   vi.stubGlobal('fetch', () => new Promise(() => undefined));
 });
@@ -38,7 +38,7 @@ test('all of a robot is told in words, each as old as it is', () => {
 test('of a robot that says nothing there is no line', () => {
   const { container } = render(<RobotFact />);
   rendered(() => {
-    robotFrame.dispatch({ type: 'robot', position: null, plan: null, battery: null });
+    robotFrame.set({ type: 'robot', position: null, plan: null, battery: null });
   });
   expect(container.textContent).toBe('');
 });
@@ -47,7 +47,7 @@ test('a robot is marked on the map where it said that it is', () => {
   document.body.innerHTML = '<div id="map-view"></div>';
   render(<RobotLayer />);
   rendered(() => {
-    robotFrame.dispatch({ type: 'robot', ...robot });
+    robotFrame.set({ type: 'robot', ...robot });
   });
   expect(screen.getByTestId('robot-mark')).toBeTruthy();
 });

@@ -9,6 +9,7 @@ import { ageText, percentText, written } from '../domain/format';
 import { ageSeconds, ageStep, secondsOf } from '../domain/time';
 import { mapPoint, toCanvas } from '../geometry/coordinates';
 import { act, type AppState, store, useApp } from '../store/app';
+import { withLayer } from '../store/view';
 import { robotFrame, useSelected } from '../store/create';
 import { createFetcher } from '../store/fetcher';
 import { isHeardNow, rosNow, selectShown } from '../store/moment';
@@ -18,7 +19,6 @@ import { useTicking } from '../widgets/useNow';
 
 /** A position that is older never looks like one of now, s. */
 const LIVE_S = 10;
-/** The trail is looked at anew so often, s. */
 const FADE_S = 10;
 
 /** Where the robot is, has been and will be; to who does not see it, `RobotFact` says so. */
@@ -118,7 +118,6 @@ export function RobotFact(): JSX.Element | null {
   );
 }
 
-/** The layer's entry in the list of layers. */
 export function RobotChoice(): JSX.Element {
   const isOn = useApp((state) => state.view.layers.has('robot'));
   return (
@@ -126,7 +125,7 @@ export function RobotChoice(): JSX.Element {
       label={S.robotLayer}
       isOn={isOn}
       onChange={(on) => {
-        act({ type: 'layer', layer: 'robot', on });
+        act(withLayer('robot', on));
       }}
     />
   );
@@ -134,14 +133,12 @@ export function RobotChoice(): JSX.Element {
 
 const NOTHING: RobotNow = { position: null, plan: null, battery: null };
 
-/** What it says of itself. */
 export const useRobot = (): RobotNow => useSelected(robotFrame, (frame) => frame ?? NOTHING);
 
 /** The twin's time, ROS seconds; null where no age is known. */
 const timeOf = (state: AppState, now: number): number | null =>
   selectShown(state).ageing.kind === 'unknown' ? null : rosNow(state, now);
 
-/** How long ago that was, s; null: nobody knows. */
 export function ageOf(stamp: WireTime, time: number | null): number | null {
   const at = secondsOf(stamp);
   return time === null || at === 0 ? null : ageSeconds(at * 1_000, time * 1_000);
@@ -182,13 +179,6 @@ function useTrail(): readonly TrailPoint[] {
   return trail;
 }
 
-/** Where the robot has been; ROS seconds, metres. */
-export interface TrailPoint {
-  readonly x: number;
-  readonly y: number;
-  readonly at: number;
-}
-
 type Position = NonNullable<RobotNow['position']>;
 
 /** As the bridge keeps them: no closer in place, nor in time. */
@@ -202,7 +192,10 @@ const MOST_POINTS = 2_000;
 const GAP_S = 60;
 const GAP_M = 1;
 
-const trailPoint = ({ x, y, observed_at: at }: Robot['trail'][number]): TrailPoint => ({
+/** ROS seconds, metres. */
+export type TrailPoint = ReturnType<typeof trailPoint>;
+
+const trailPoint = ({ x, y, observed_at: at }: Robot['trail'][number]) => ({
   x,
   y,
   at: secondsOf(at),
@@ -218,16 +211,13 @@ export function extended(trail: readonly TrailPoint[], position: Position): read
   return [...trail.slice(1 - MOST_POINTS), next];
 }
 
-export interface Line {
-  readonly points: readonly (readonly [number, number])[];
-  /** 0: of now, to 5: two minutes ago. */
-  readonly step: number;
-}
-
 export const STEPS = 6;
 
-/** The trail in lines that are alike in age; null: the time is not known, and all is the oldest. */
-export function trailLines(trail: readonly TrailPoint[], now: number | null): readonly Line[] {
+/**
+ * The trail in lines that are alike in age, from step 0, now, to 5, two minutes ago. Null: the time is not
+ * known, and all is the oldest.
+ */
+export function trailLines(trail: readonly TrailPoint[], now: number | null) {
   const lines: { points: [number, number][]; step: number }[] = [];
   let last: TrailPoint | null = null;
   for (const point of trail) {

@@ -2,13 +2,13 @@ import { afterEach, beforeEach, describe, expect, test, vi } from 'vitest';
 
 import { fromFragment, type Linked, startAddress, toFragment } from './address';
 import { act, store } from './app';
-import { DEFAULT_LAYERS, DEFAULT_VIEW, LONGEST_FILTER } from './view';
+import { DEFAULT_LAYERS, DEFAULT_VIEW, LONGEST_FILTER, withLayer, withTag } from './view';
 
 let stop: () => void;
 
 beforeEach(() => {
   vi.useFakeTimers();
-  act({ type: 'look', view: DEFAULT_VIEW });
+  act(DEFAULT_VIEW);
   history.replaceState(null, '', '/?kiosk=1#sensor=co2&tag=7');
   stop = startAddress();
 });
@@ -28,7 +28,7 @@ test('a link that is pasted into the open page is followed too', () => {
 });
 
 test('a link that is opened while the address settles is not written over', () => {
-  act({ type: 'sensor', sensor: 'humidity' });
+  act({ sensor: 'humidity' });
   history.replaceState(null, '', '#sensor=light');
   vi.advanceTimersByTime(500);
   window.dispatchEvent(new HashChangeEvent('hashchange'));
@@ -36,8 +36,8 @@ test('a link that is opened while the address settles is not written over', () =
 });
 
 test('the address follows the view once it has settled, and keeps the rest', () => {
-  act({ type: 'sensor', sensor: 'humidity' });
-  act({ type: 'camera', camera: { x: 1, y: 2, span: 3 } });
+  act({ sensor: 'humidity' });
+  act({ camera: { x: 1, y: 2, span: 3 } });
   expect(location.hash).toBe('#sensor=co2&tag=7');
   vi.advanceTimersByTime(500);
   expect(location.hash).toBe('#sensor=humidity&tag=7&view=1.00,2.00,3.00');
@@ -56,8 +56,8 @@ test('where a round goes through the sensors only the rest comes back to the lin
   stop = startAddress(true, true);
   // No change of the sensor puts the return off.
   for (const sensor of ['light', 'humidity', 'temperature']) {
-    if (sensor === 'humidity') act({ type: 'layer', layer: 'grid', on: false });
-    act({ type: 'sensor', sensor });
+    if (sensor === 'humidity') act(withLayer('grid', false));
+    act({ sensor });
     vi.advanceTimersByTime(60_000);
   }
   expect(store.get().view.layers.has('grid')).toBe(true);
@@ -69,11 +69,11 @@ test('a wall screen chooses no tag, leaves its address alone, and comes back to 
   stop();
   stop = startAddress(true);
   expect(store.get().view).toMatchObject({ sensor: 'co2', selected: null });
-  act({ type: 'sensor', sensor: 'humidity' });
+  act({ sensor: 'humidity' });
   vi.advanceTimersByTime(60_000);
   expect(location.hash).toBe('#sensor=co2&tag=7');
   // Somebody is still there.
-  act({ type: 'sensor', sensor: 'light' });
+  act({ sensor: 'light' });
   vi.advanceTimersByTime(119_000);
   expect(store.get().view.sensor).toBe('light');
   vi.advanceTimersByTime(1_000);
@@ -105,10 +105,10 @@ describe('a card is a step of the browser’s history', () => {
 
   test('Back closes it and undoes nothing else; Forward opens it again', async () => {
     const length = history.length;
-    act({ type: 'select', tagId: '7' });
+    act(withTag('7'));
     expect(location.hash).toBe('#sensor=co2&tag=7');
-    act({ type: 'select', tagId: '8' });
-    act({ type: 'sensor', sensor: 'light' });
+    act(withTag('8'));
+    act({ sensor: 'light' });
     await vi.waitFor(() => {
       expect(location.hash).toBe('#sensor=light&tag=8');
     });
@@ -122,9 +122,9 @@ describe('a card is a step of the browser’s history', () => {
 
   test('one that is closed by hand leaves no step that does nothing', async () => {
     for (const tagId of ['7', '8']) {
-      act({ type: 'select', tagId });
+      act(withTag(tagId));
       const back = arrival();
-      act({ type: 'select', tagId: null });
+      act(withTag(null));
       await back;
       expect(location.hash).toBe('#sensor=co2');
       expect(history.state).toMatchObject({ tag: null });
@@ -132,10 +132,10 @@ describe('a card is a step of the browser’s history', () => {
   });
 
   test('one that is opened while the last is being left has its step', async () => {
-    act({ type: 'select', tagId: '7' });
+    act(withTag('7'));
     const back = arrival();
-    act({ type: 'select', tagId: null });
-    act({ type: 'select', tagId: '8' });
+    act(withTag(null));
+    act(withTag('8'));
     await back;
     expect(location.hash).toBe('#sensor=co2&tag=8');
     await travel(-1);
@@ -143,9 +143,9 @@ describe('a card is a step of the browser’s history', () => {
   });
 
   test('so is a look back, from which Back leads to now, and Forward there again', async () => {
-    act({ type: 'moment', moment: 500 });
+    act({ moment: 500 });
     expect(location.hash).toBe('#at=500&sensor=co2');
-    act({ type: 'moment', moment: 400 });
+    act({ moment: 400 });
     await vi.waitFor(() => {
       expect(location.hash).toBe('#at=400&sensor=co2');
     });
@@ -157,15 +157,15 @@ describe('a card is a step of the browser’s history', () => {
     await travel(1);
     expect(store.get().view.moment).toBe(400);
     const back = arrival();
-    act({ type: 'moment', moment: null });
+    act({ moment: null });
     await back;
     expect(location.hash).toBe('#sensor=co2');
   });
 
   test('a card that opens while it looks back is closed by Back, and the moment stays', async () => {
-    act({ type: 'moment', moment: 500 });
-    act({ type: 'select', tagId: '7' });
-    act({ type: 'moment', moment: 300 });
+    act({ moment: 500 });
+    act(withTag('7'));
+    act({ moment: 300 });
     await travel(-1);
     expect(store.get().view).toMatchObject({ selected: null, moment: 300 });
     await travel(-1);
@@ -173,9 +173,9 @@ describe('a card is a step of the browser’s history', () => {
   });
 
   test('now beside a card that was opened later is no step back', async () => {
-    act({ type: 'moment', moment: 500 });
-    act({ type: 'select', tagId: '7' });
-    act({ type: 'moment', moment: null });
+    act({ moment: 500 });
+    act(withTag('7'));
+    act({ moment: null });
     await vi.waitFor(() => {
       expect(location.hash).toBe('#sensor=co2&tag=7');
     });
@@ -189,7 +189,7 @@ describe('a card is a step of the browser’s history', () => {
     history.replaceState(null, '', '/#at=500');
     stop = startAddress();
     const { length } = history;
-    act({ type: 'moment', moment: null });
+    act({ moment: null });
     await vi.waitFor(() => {
       expect(location.hash).toBe('');
     });
@@ -231,8 +231,9 @@ describe('permalink', () => {
       filter: 'basil & "pest"',
       health: 'unknown',
       list: 'alarms',
+      pane: 'tags',
     };
-    expect(fromFragment(`#${toFragment({ ...view, pane: 'tags' })}`)).toEqual(view);
+    expect(fromFragment(`#${toFragment(view)}`)).toEqual(view);
   });
 
   test('the range of the sensor in view has the short name', () => {

@@ -1,6 +1,6 @@
 /** The part of the view that a link carries, in the URL's fragment: it never reaches a server. */
 import type { Compare } from '../domain/difference';
-import { isPossible } from '../domain/twin';
+import { equal, isPossible } from '../domain/twin';
 import { VERDICTS } from '../domain/health';
 import { type Period, PERIOD_KINDS } from '../domain/time';
 import type { Range } from '../domain/ramp';
@@ -21,27 +21,12 @@ import {
   type ViewState,
 } from './view';
 
-export type Linked = Pick<
-  ViewState,
-  | 'moment'
-  | 'period'
-  | 'compare'
-  | 'chart'
-  | 'sensor'
-  | 'selected'
-  | 'layers'
-  | 'heat'
-  | 'colouring'
-  | 'ranges'
-  | 'camera'
-  | 'sort'
-  | 'filter'
-  | 'health'
-  | 'list'
->;
+/** Which half a narrow screen shows is told by the alarms alone. */
+export type Linked = Omit<ViewState, 'hovered' | 'chartedFrom' | 'pane'> &
+  Partial<Pick<ViewState, 'pane'>>;
 
 /** The fragment, without "#"; what is as by default is left out. */
-export function toFragment(view: Linked & Pick<ViewState, 'pane'>): string {
+export function toFragment(view: Linked): string {
   const parts = new URLSearchParams();
   if (view.moment !== null) parts.set('at', String(view.moment));
   if (view.period.kind === 'own') parts.set('period', `${view.period.from},${view.period.to}`);
@@ -94,7 +79,9 @@ export function fromFragment(fragment: string): Linked {
     sort: sortOf(parts.get('sort')),
     filter: (parts.get('filter') ?? '').slice(0, LONGEST_FILTER),
     health: VERDICTS.find((verdict) => verdict === parts.get('health')) ?? null,
-    list: parts.get('list') === 'alarms' ? 'alarms' : DEFAULT_VIEW.list,
+    ...(parts.get('list') === 'alarms'
+      ? { list: 'alarms', pane: 'tags' }
+      : { list: DEFAULT_VIEW.list }),
   };
 }
 
@@ -188,12 +175,8 @@ const placeOf = (view: Pick<ViewState, 'selected' | 'moment'>): Pick<Entry, 'tag
   moment: view.moment,
 });
 
-function entryNow(): Entry | null {
-  const state: unknown = history.state;
-  return typeof state === 'object' && state !== null && 'link' in state && 'opened' in state
-    ? (state as Entry)
-    : null;
-}
+/** Null: a link was opened just now; nobody else keeps anything there. */
+const entryNow = (): Entry | null => history.state as Entry | null;
 
 /**
  * Keeps the address a link to what is on the screen, and follows a link that is opened. A card
@@ -209,17 +192,14 @@ function keepToLink(isRound: boolean): () => void {
   let timer: ReturnType<typeof setTimeout> | undefined;
   let { view } = store.get();
   const follow = (): void => {
-    act({
-      type: 'look',
-      view: { ...fromFragment(window.location.hash), selected: null, moment: null },
-    });
+    act({ ...fromFragment(window.location.hash), selected: null, moment: null });
     // What the link says needs no return to it.
     clearTimeout(timer);
   };
   const comeBack = (): void => {
     const { sensor } = view;
     follow();
-    if (isRound) act({ type: 'sensor', sensor });
+    if (isRound) act({ sensor });
     clearTimeout(timer);
   };
   const onStore = (): void => {
@@ -254,13 +234,7 @@ function keepLink(): () => void {
   /** Tells the browser's entry what it is for, and keeps its address or gives it another. */
   const mark = (to: string): void => {
     const { pathname, search, hash } = window.location;
-    const now = entryNow();
-    const isSame =
-      to === `${pathname}${search}${hash}` &&
-      now?.tag === entry.tag &&
-      now.moment === entry.moment &&
-      now.link === entry.link &&
-      now.opened === entry.opened;
+    const isSame = to === `${pathname}${search}${hash}` && equal(entryNow(), entry);
     if (!isSame) history.replaceState(entry, '', to);
   };
   const write = (): void => {
@@ -273,7 +247,7 @@ function keepLink(): () => void {
   const follow = (): void => {
     const linked = fromFragment(window.location.hash);
     entry = { ...entry, ...placeOf(linked) };
-    act({ type: 'look', view: linked });
+    act(linked);
     clearTimeout(timer);
     mark(window.location.href.slice(window.location.origin.length));
   };
@@ -305,7 +279,7 @@ function keepLink(): () => void {
     const isOtherTime = (now.moment === null) !== (shown.moment === null);
     if (isOtherTime || now.tag !== shown.selected) {
       const moment = isOtherTime ? now.moment : shown.moment;
-      act({ type: 'look', view: { selected: now.tag, moment } });
+      act({ selected: now.tag, moment });
     }
     write();
   };

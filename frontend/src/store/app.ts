@@ -1,62 +1,46 @@
 import type { Size, View } from '../geometry/coordinates';
-import { createStore, useSelected } from './create';
+import { type Change, changed, createStore, useSelected } from './create';
 import { DEFAULT_SETTINGS, type Settings } from './settings';
-import { NO_TWIN, reduceTwin, type TwinAction, type TwinState } from './twin';
-import { DEFAULT_VIEW, reduceView, type ViewAction, type ViewState } from './view';
+import { NO_TWIN, type TwinState } from './twin';
+import { DEFAULT_VIEW, type ViewState, viewAfter } from './view';
 
 /** What of the map is on the screen just now; what the operator chose is the view's camera. */
-export interface Viewport {
-  /** Where the map is on its canvas. */
-  readonly view: View;
+export type Viewport = typeof NO_VIEWPORT;
+
+export const NO_VIEWPORT = {
+  view: { x: 0, y: 0, scale: 50 } as View,
   /** Of the canvas, CSS pixels; 0 until it is laid out. */
-  readonly size: Size;
-}
-
-export const NO_VIEWPORT: Viewport = {
-  view: { x: 0, y: 0, scale: 50 },
-  size: { width: 0, height: 0 },
+  size: { width: 0, height: 0 } as Size,
 };
 
-export interface AppState {
-  readonly twin: TwinState;
-  readonly view: ViewState;
-  readonly viewport: Viewport;
-  readonly settings: Settings;
-}
+export type AppState = ReturnType<typeof store.get>;
 
-type Change = (state: AppState) => AppState;
+export const store = createStore({
+  twin: NO_TWIN,
+  view: DEFAULT_VIEW,
+  viewport: NO_VIEWPORT,
+  settings: DEFAULT_SETTINGS,
+});
 
-export const store = createStore<AppState, Change>(
-  {
-    twin: NO_TWIN,
-    view: DEFAULT_VIEW,
-    viewport: NO_VIEWPORT,
-    settings: DEFAULT_SETTINGS,
-  },
-  (state, change) => change(state),
-);
-
-export const act = (action: ViewAction): void => {
-  store.dispatch((state) => {
-    const view = reduceView(state.view, action);
-    return view === state.view ? state : { ...state, view };
-  });
+const put = (part: Partial<AppState>): void => {
+  store.set(changed(store.get(), part));
 };
 
-export const receive = (action: TwinAction): void => {
-  store.dispatch((state) => {
-    const twin = reduceTwin(state.twin, action);
-    return twin === state.twin ? state : { ...state, twin };
-  });
+export const act = (change: Change<ViewState>): void => {
+  put({ view: viewAfter(store.get().view, change) });
+};
+
+export const receive = (change: Change<TwinState>): void => {
+  put({ twin: changed(store.get().twin, change) });
 };
 
 /** For the map's camera alone, which keeps it in step with wheel, finger and keys. */
 export const moveViewport = (part: Partial<Viewport>): void => {
-  store.dispatch((state) => ({ ...state, viewport: { ...state.viewport, ...part } }));
+  put({ viewport: { ...store.get().viewport, ...part } });
 };
 
 export const prefer = (part: Partial<Settings>): void => {
-  store.dispatch((state) => ({ ...state, settings: { ...state.settings, ...part } }));
+  put({ settings: { ...store.get().settings, ...part } });
 };
 
 /** Calls back when one of these parts of the state is another; returns the way to stop. */

@@ -3,15 +3,15 @@ import { expect, test, vi } from 'vitest';
 import { createStore } from './create';
 
 test('tells of changes only, and only those who still listen', () => {
-  const store = createStore(1, (_, next: number) => next);
+  const store = createStore(1);
   const listener = vi.fn();
   const stop = store.subscribe(listener);
-  store.dispatch(1);
+  store.set(1);
   expect(listener).not.toHaveBeenCalled();
-  store.dispatch(2);
+  store.set(2);
   expect(listener).toHaveBeenCalledTimes(1);
   stop();
-  store.dispatch(3);
+  store.set(3);
   expect(listener).toHaveBeenCalledTimes(1);
   expect(store.get()).toBe(3);
 });
@@ -25,14 +25,14 @@ test('one listener that fails keeps the news from nobody else, and its failure i
       failures.push(error);
     }
   });
-  const store = createStore(1, (_, next: number) => next);
+  const store = createStore(1);
   const listener = vi.fn();
   const failure = new Error('broken');
   store.subscribe(() => {
     throw failure;
   });
   store.subscribe(listener);
-  store.dispatch(2);
+  store.set(2);
   expect(listener).toHaveBeenCalledTimes(1);
   expect(failures).toEqual([failure]);
 });

@@ -1,24 +1,20 @@
 import { useSyncExternalStore } from 'react';
 
 import type { RobotFrame, Session } from '../contract/types';
+import { withParts } from '../domain/memo';
 
-export interface Store<State, Action> {
+export interface Store<State> {
   readonly get: () => State;
-  readonly dispatch: (action: Action) => void;
-  /** Calls back after every change; returns the way to stop. */
+  readonly set: (next: State) => void;
   readonly subscribe: (listener: () => void) => () => void;
 }
 
-export function createStore<State, Action>(
-  initial: State,
-  reduce: (state: State, action: Action) => State,
-): Store<State, Action> {
+export function createStore<State>(initial: State): Store<State> {
   let state = initial;
   const listeners = new Set<() => void>();
   return {
     get: () => state,
-    dispatch: (action) => {
-      const next = reduce(state, action);
+    set: (next) => {
       if (next === state) return;
       state = next;
       for (const listener of [...listeners]) {
@@ -39,11 +35,20 @@ export function createStore<State, Action>(
   };
 }
 
-/** The part of the state that `select` picks; it must return the same thing for the same state. */
-export function useSelected<State, Action, Part>(
-  store: Store<State, Action>,
-  select: (state: State) => Part,
-): Part {
+/** Parts that are to be others, or what makes them of those that are there. */
+export type Change<State> = Partial<State> | ((state: State) => Partial<State>);
+
+/** The very same state where nothing in it is another. */
+export const changed = <State extends object>(state: State, change: Change<State>): State =>
+  withParts(state, typeof change === 'function' ? change(state) : change);
+
+/** All of a store, or what `select` picks, which must be the same thing for the same state. */
+export function useSelected<State>(store: Store<State>): State;
+export function useSelected<State, Part>(store: Store<State>, select: (state: State) => Part): Part;
+export function useSelected<State>(
+  store: Store<State>,
+  select: (state: State) => unknown = (state) => state,
+): unknown {
   return useSyncExternalStore(store.subscribe, () => select(store.get()));
 }
 
@@ -54,15 +59,14 @@ export interface Announcement {
   readonly key: number;
 }
 
-/** A voice of its own, silent at first. */
-export const createVoice = (): Store<Announcement, string> =>
-  createStore({ text: '', key: 0 }, ({ key }: Announcement, text: string) => ({
-    text,
-    key: key + 1,
-  }));
+export const createVoice = (): Store<Announcement> => createStore({ text: '', key: 0 });
+
+export const announce = (voice: Store<Announcement>, text: string): void => {
+  voice.set({ text, key: voice.get().key + 1 });
+};
 
 /** Who is signed in; null: not known yet. */
-export const person = createStore<Session | null, Session | null>(null, (_, next) => next);
+export const person = createStore<Session | null>(null);
 
 /** Where people sign in, who may write notes acknowledges and shelves; else each browser for itself. */
 export const mayAct = (who: Session | null): boolean => who?.can_write_notes ?? true;
@@ -74,11 +78,7 @@ interface PointedTime {
   readonly by: 'chart' | 'bar';
 }
 
-/** Null: it is on none. */
-export const pointedTime = createStore<PointedTime | null, PointedTime | null>(
-  null,
-  (_, pointed) => pointed,
-);
+export const pointedTime = createStore<PointedTime | null>(null);
 
 /** What the other of the two points at, ROS seconds. */
 export const pointedBy =
@@ -87,7 +87,4 @@ export const pointedBy =
     pointed?.by === by ? pointed.at : null;
 
 /** The newest frame of a robot; null: none has come. */
-export const robotFrame = createStore<RobotFrame | null, RobotFrame | null>(
-  null,
-  (_, frame) => frame,
-);
+export const robotFrame = createStore<RobotFrame | null>(null);

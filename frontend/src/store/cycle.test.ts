@@ -1,17 +1,18 @@
 import { afterEach, beforeEach, describe, expect, test, vi } from 'vitest';
 
 import { showTags } from '../testing/page';
-import { CATALOGUE, sensorNamed } from '../testing/sensors';
+import { CATALOGUE } from '../testing/sensors';
 import { readings, stateFrame, tag, wireTag } from '../testing/tags';
 import { act, receive, store } from './app';
-import { addressOfPage, cycleWish, nextSensor, sensorAfter, sensorsOf, startCycle } from './cycle';
+import { withState } from './twin';
+import { addressOfPage, cycleWish, nextSensor, sensorsOf, startCycle } from './cycle';
 import { DEFAULT_VIEW } from './view';
 
 let stop: () => void;
 
 beforeEach(() => {
   vi.useFakeTimers();
-  act({ type: 'look', view: DEFAULT_VIEW });
+  act(DEFAULT_VIEW);
   showTags([
     wireTag({ readings: readings({ temperature: 20, humidity: 60 }) }),
     wireTag({ tag_id: '2', readings: readings({ co2: 500 }) }),
@@ -44,11 +45,11 @@ test('news do not put it off, a choice by hand does', () => {
   stop = startCycle({ seconds: 30, refused: null });
   pass(20);
   const tags = [wireTag({ readings: readings({ temperature: 21, humidity: 61, light: 900 }) })];
-  receive({ type: 'state', latest: stateFrame(tags, { sec: 9_999 }), now: performance.now() });
+  receive(withState(stateFrame(tags, { sec: 9_999 }), performance.now()));
   pass(10);
   expect(inView()).toBe('humidity');
   pass(20);
-  act({ type: 'sensor', sensor: 'temperature' });
+  act({ sensor: 'temperature' });
   pass(29);
   expect(inView()).toBe('temperature');
   pass(1);
@@ -57,11 +58,11 @@ test('news do not put it off, a choice by hand does', () => {
 
 test('stands still while the page looks back, and goes on with a whole turn', () => {
   stop = startCycle({ seconds: 30, refused: null });
-  act({ type: 'moment', moment: 500 });
+  act({ moment: 500 });
   expect(nextSensor.get()).toBeNull();
   pass(300);
   expect(inView()).toBe('temperature');
-  act({ type: 'moment', moment: null });
+  act({ moment: null });
   pass(29);
   expect(inView()).toBe('temperature');
   pass(1);
@@ -98,31 +99,12 @@ describe('the wish', () => {
   });
 });
 
-describe('the round', () => {
-  const [first, second, third] = ['temperature', 'humidity', 'co2'].map(sensorNamed);
-  const three = [first, second, third].filter((sensor) => sensor !== undefined);
-
-  test('goes through all and begins again', () => {
-    expect(sensorAfter(three, 'temperature')).toBe(second);
-    expect(sensorAfter(three, 'co2')).toBe(first);
-  });
-
-  test('begins with the first where the one in view is not among them', () => {
-    expect(sensorAfter(three, 'light')).toBe(first);
-  });
-
-  test('one sensor, or none, is no round', () => {
-    expect(sensorAfter(three.slice(0, 1), 'temperature')).toBeNull();
-    expect(sensorAfter([], 'temperature')).toBeNull();
-  });
-
-  test('has the sensors that some tag has, in their usual order, failed ones too', () => {
-    const tags = [
-      tag({ readings: readings({ co2: null }) }),
-      tag({ tag_id: '2', readings: readings({ temperature: 20 }) }),
-    ];
-    expect(sensorsOf(tags, CATALOGUE.all).map(({ name }) => name)).toEqual(['temperature', 'co2']);
-  });
+test('a round has the sensors that some tag has, in their usual order, failed ones too', () => {
+  const tags = [
+    tag({ readings: readings({ co2: null }) }),
+    tag({ tag_id: '2', readings: readings({ temperature: 20 }) }),
+  ];
+  expect(sensorsOf(tags, CATALOGUE.all).map(({ name }) => name)).toEqual(['temperature', 'co2']);
 });
 
 test('whoever leaves keeps the rest of the address', () => {

@@ -8,32 +8,23 @@ import { selectSensors } from './derived';
 import { memoLast } from '../domain/memo';
 import { selectTags } from './moment';
 
-/** Seconds that one sensor may be shown. */
 export const CYCLE_LIMITS = { least: 5, most: 3_600 } as const;
 
-export interface CycleWish {
-  /** Seconds a sensor; null: the sensor stays. */
-  readonly seconds: number | null;
-  /** What was asked for and cannot be had, as it was written; null: nothing. */
-  readonly refused: string | null;
-}
+export type CycleWish = ReturnType<typeof cycleWish>;
 
-/** The wish in an address: `?kiosk=1&cycle=30`. A bad one is told and counts as none. */
-export function cycleWish(search: string): CycleWish {
+/** The wish in an address: `?kiosk=1&cycle=30`. A bad one counts as none, and is told as it was written. */
+export function cycleWish(search: string) {
   const text = new URLSearchParams(search).get('cycle');
-  if (text === null) return { seconds: null, refused: null };
-  const seconds = /^\d{1,4}$/.test(text) ? Number(text) : NaN;
-  return seconds >= CYCLE_LIMITS.least && seconds <= CYCLE_LIMITS.most
-    ? { seconds, refused: null }
-    : { seconds: null, refused: text };
+  const seconds = text !== null && /^\d{1,4}$/.test(text) ? Number(text) : NaN;
+  const isAllowed = seconds >= CYCLE_LIMITS.least && seconds <= CYCLE_LIMITS.most;
+  return { seconds: isAllowed ? seconds : null, refused: isAllowed ? null : text };
 }
 
-/** The sensors that some tag has. */
 export const sensorsOf = (tags: readonly Tag[], offered: readonly Sensor[]): readonly Sensor[] =>
   offered.filter(({ name }) => tags.some((tag) => tag.readings.has(name)));
 
 /** The one after `current`, the first after the last; null: there is no other. */
-export function sensorAfter(sensors: readonly Sensor[], current: string): Sensor | null {
+function sensorAfter(sensors: readonly Sensor[], current: string): Sensor | null {
   const index = sensors.findIndex(({ name }) => name === current);
   const next = sensors[(index + 1) % Math.max(1, sensors.length)];
   return next && next.name !== current ? next : null;
@@ -49,16 +40,12 @@ export function addressOfPage(search: string, hash: string): string {
 }
 
 /** What comes next, and when, ms on the page's clock; null: the sensor in view stays. */
-interface Next {
-  readonly sensor: Sensor;
-  readonly at: number;
-}
-
-export const nextSensor = createStore<Next | null, Next | null>(null, (_, next) => next);
+export const nextSensor = createStore<{ readonly sensor: Sensor; readonly at: number } | null>(
+  null,
+);
 
 const round = memoLast(sensorsOf);
 
-/** Begins the round; returns its end. */
 export function startCycle({ seconds }: CycleWish): () => void {
   if (seconds === null) return () => undefined;
   let timer: ReturnType<typeof setTimeout> | undefined;
@@ -74,7 +61,7 @@ export function startCycle({ seconds }: CycleWish): () => void {
     if (sensor === null) {
       clearTimeout(timer);
       shown = null;
-      nextSensor.dispatch(null);
+      nextSensor.set(null);
       return;
     }
     // Whoever chooses a sensor by hand has it for as long as any other.
@@ -82,12 +69,12 @@ export function startCycle({ seconds }: CycleWish): () => void {
     const at = isSame ? before.at : now() + seconds * 1000;
     if (isSame && before.sensor === sensor) return;
     shown = view.sensor;
-    nextSensor.dispatch({ sensor, at });
+    nextSensor.set({ sensor, at });
     clearTimeout(timer);
     timer = setTimeout(
       () => {
         const next = nextSensor.get();
-        if (next) act({ type: 'sensor', sensor: next.sensor.name });
+        if (next) act({ sensor: next.sensor.name });
       },
       Math.max(0, at - now()),
     );
@@ -98,6 +85,6 @@ export function startCycle({ seconds }: CycleWish): () => void {
   return () => {
     clearTimeout(timer);
     stop();
-    nextSensor.dispatch(null);
+    nextSensor.set(null);
   };
 }

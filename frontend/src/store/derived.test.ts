@@ -4,6 +4,7 @@ import { fieldWith } from '../testing/field';
 import { showField, showTags } from '../testing/page';
 import { readings, wireTag } from '../testing/tags';
 import { act, store } from './app';
+import { withRange } from './view';
 import { selectColumns, selectHealth, selectRange, selectSensors, selectZones } from './derived';
 
 beforeEach(() => {
@@ -23,7 +24,7 @@ describe('range in use', () => {
   });
 
   test('is calm while the field’s values come and go at its edge', () => {
-    act({ type: 'sensor', sensor: 'ph' });
+    act({ sensor: 'ph' });
     const seen = [7.9, 8.05, 7.9, 8.05, 7.9].map((valueMax) => {
       showField(fieldWith([[6]], { sensor: 'ph', valueMin: 5.2, valueMax }));
       return selectRange(store.get());
@@ -32,16 +33,16 @@ describe('range in use', () => {
   });
 
   test('a fixed one comes before all', () => {
-    act({ type: 'range', range: { low: 0, high: 50 } });
+    act(withRange({ low: 0, high: 50 }));
     expect(selectRange(store.get())).toEqual({ low: 0, high: 50 });
   });
 
   test('is the field’s where there is one for this sensor', () => {
     showField(fieldWith([[25]], { valueMin: 21, valueMax: 29 }));
     expect(selectRange(store.get())).toEqual({ low: 18, high: 29 });
-    act({ type: 'sensor', sensor: 'ph' });
+    act({ sensor: 'ph' });
     expect(selectRange(store.get())).toEqual({ low: 6.9, high: 7.1 });
-    act({ type: 'sensor', sensor: 'co2' });
+    act({ sensor: 'co2' });
     expect(selectRange(store.get())).toBeNull();
   });
 });

@@ -1,6 +1,6 @@
 /** What follows from the state; each remembers its last answer, so that it is worked out once. */
 import { houseHealth, type HouseHealth } from '../domain/health';
-import type { Field, Judgement } from '../contract/types';
+import type { Field } from '../contract/types';
 import { symmetricRange } from '../domain/difference';
 import { errorField, onExplored } from '../domain/field';
 import { type Range, rangeOf, rounded, toldApart, withIdeal } from '../domain/ramp';
@@ -30,9 +30,9 @@ import {
   sortRows,
   type Row,
 } from '../domain/table';
-import type { Tag } from '../domain/twin';
+import { equal, type Tag } from '../domain/twin';
 import type { AppState } from './app';
-import { memoLast, memoOne } from '../domain/memo';
+import { keeping, memoLast, memoOne } from '../domain/memo';
 import { isHeardNow, selectIsHeard, selectNewest, selectShown, selectTags } from './moment';
 import type { MapPicture } from '../geometry/image';
 import type { Difference } from './twin';
@@ -42,7 +42,6 @@ import { fixedRange, type Sort, type ViewState } from './view';
 const healthShown = memoLast(houseHealth);
 const healthNow = memoLast(houseHealth);
 
-/** As the bridge judged the moment that is shown. */
 export const selectHealth = (state: AppState): HouseHealth =>
   healthShown(selectTags(state), selectShown(state).health, selectIsHeard(state));
 
@@ -52,7 +51,6 @@ export function selectNewestHealth(state: AppState): HouseHealth | null {
   return snapshot && healthNow(snapshot.tags, health, isHeardNow(state));
 }
 
-/** The sensors by day and by night. */
 export const selectCatalogues = (state: AppState): Catalogues =>
   state.twin.sensors.value ?? NO_CATALOGUES;
 
@@ -62,7 +60,6 @@ export function selectCatalogue(state: AppState): Catalogue {
   return (selectShown(state).health?.house.day.is_day ?? true) ? day : night;
 }
 
-/** The one in view. */
 export const selectSensor = (state: AppState): Sensor =>
   selectCatalogue(state).named(state.view.sensor);
 
@@ -73,24 +70,20 @@ export type Source = 'nearest' | 'estimate';
 export const sourceOf = (state: AppState): Source =>
   state.view.heat !== 'nearest' && isMeasured(selectSensor(state)) ? 'estimate' : 'nearest';
 
-const sensorNames = memoLast(
-  // The names as one string: a new snapshot with the same sensors keeps the same list.
-  (catalogue: Catalogue, joined: string): readonly Sensor[] =>
-    catalogue.with(joined === '' ? [] : joined.split('\u0000')),
-);
-
-const namesIn = memoLast((tags: readonly Tag[], chosen: string): string => {
+/** A new snapshot with the same sensors keeps the same list. */
+const keptNames = keeping<readonly string[]>(equal);
+const namesIn = memoLast((tags: readonly Tag[], chosen: string): readonly string[] => {
   const names = new Set(tags.flatMap((tag) => [...tag.readings.keys()]));
   if (chosen) names.add(chosen);
-  return [...names].sort().join('\u0000');
+  return keptNames([...names].sort());
 });
+const offered = memoLast((catalogue: Catalogue, names: readonly string[]) => catalogue.with(names));
 
 export const selectSensors = (state: AppState): readonly Sensor[] =>
-  sensorNames(selectCatalogue(state), namesIn(selectTags(state), state.view.sensor));
+  offered(selectCatalogue(state), namesIn(selectTags(state), state.view.sensor));
 
 const measuredIn = memoOne((sensors: readonly Sensor[]) => sensors.filter(isMeasured));
 
-/** Those that have a column in the table. */
 export const selectColumns = (state: AppState): readonly Sensor[] =>
   measuredIn(selectSensors(state));
 
@@ -98,11 +91,10 @@ const notHidden = memoLast((columns: readonly Sensor[], hidden: readonly string[
   columns.filter(({ name }) => isColumnShown({ hidden }, name)),
 );
 
-/** Those of them that the operator has not hidden. */
 export const selectShownColumns = (state: AppState): readonly Sensor[] =>
   notHidden(selectColumns(state), state.settings.hidden);
 
-const range = memoLast((low: number, high: number): Range => ({ low, high }));
+const keptRange = keeping<Range>();
 
 const rangeOfReadings = memoLast((tags: readonly Tag[], sensor: string): Range | null =>
   rangeOf(tags.map((tag) => tag.readings.get(sensor))),
@@ -119,32 +111,25 @@ export function selectRange(state: AppState): Range | null {
   const needed =
     isMapped && held?.sensor === view.sensor ? held.range : readings && rounded(readings);
   if (!needed) return null;
-  const { low, high } = toldApart(withIdeal(needed, selectSensor(state).ideal));
-  return range(low, high);
+  return keptRange(toldApart(withIdeal(needed, selectSensor(state).ideal)));
 }
 
 const siteOf = ({ at, sureSpecies: species }: Tag): Site[] => (at ? [{ at, species }] : []);
-const sitesIn = memoOne((tags: readonly Tag[]): readonly Site[] => tags.flatMap(siteOf));
-
 /** New tags whose places and plants are those of before keep the list. */
-const sitesKept = memoLast((key: string): readonly Site[] => JSON.parse(key) as Site[]);
-const keyOf = memoOne((sites: readonly Site[]): string => JSON.stringify(sites));
+const keptSites = keeping<readonly Site[]>(equal);
+const sitesIn = memoOne((tags: readonly Tag[]) => keptSites(tags.flatMap(siteOf)));
 
 /** The same for all fields that lie alike. */
-const gridKept = memoLast((key: string) => JSON.parse(key) as CellGrid);
+const keptGrid = keeping<CellGrid>();
 const gridOf = memoOne(({ width, height, originX, originY, resolution }: Field) =>
-  gridKept(JSON.stringify({ width, height, originX, originY, resolution })),
+  keptGrid({ width, height, originX, originY, resolution }),
 );
 
 const zonesBy = memoLast(zonesOf);
 
-/** Which ranges hold where in a field, by the plants of the tags. */
-export function selectZones(state: AppState, field: Field): Zones {
-  const sites = sitesKept(keyOf(sitesIn(selectTags(state))));
-  return zonesBy(gridOf(field), sites, selectSensor(state));
-}
+export const selectZones = (state: AppState, field: Field): Zones =>
+  zonesBy(gridOf(field), sitesIn(selectTags(state)), selectSensor(state));
 
-/** Whether some plant of the house has an ideal of the sensor. */
 export function selectHasIdeal(state: AppState): boolean {
   const sensor = selectSensor(state);
   return (
@@ -158,7 +143,6 @@ export function selectHasIdeal(state: AppState): boolean {
 export const selectColouring = (state: AppState): ViewState['colouring'] =>
   selectHasIdeal(state) ? state.view.colouring : 'value';
 
-/** What the heat map shows, and in which range of colours. */
 export interface Heat {
   readonly field: Field;
   readonly range: Range;
@@ -166,32 +150,17 @@ export interface Heat {
   readonly zones: Zones | null;
   /** What it is the difference of; null: it is the field itself. */
   readonly difference: Difference | null;
-  /** It is the estimate's error alone. */
   readonly isError: boolean;
   /** 1 in each cell whose reading is too old to say, row 0 at the bottom; null: none is. */
   readonly old: Uint8Array | null;
 }
 
-const heat = memoLast(
-  (
-    field: Field,
-    within: Range,
-    zones: Zones | null,
-    difference: Difference | null,
-    isError: boolean,
-    old: Uint8Array | null,
-  ): Heat => ({ field, range: within, zones, difference, isError, old }),
-);
+const keptHeat = keeping<Heat>();
+const PLAIN = { zones: null, difference: null, isError: false, old: null } as const;
 
-const readSitesBy = memoOne(({ tags: said }: Judgement) =>
-  memoLast((tags: readonly Tag[], sensor: Sensor) => readSites(tags, said, sensor)),
-);
-const keyOfRead = memoOne((sites: readonly ReadSite[]): string =>
-  sites.some(({ isOld }) => isOld) ? JSON.stringify(sites) : '[]',
-);
-const oldBy = memoLast((grid: CellGrid, sites: string) =>
-  oldCells(grid, JSON.parse(sites) as readonly ReadSite[]),
-);
+const keptRead = keeping<readonly ReadSite[]>(equal);
+const readBy = memoLast((...given: Parameters<typeof readSites>) => keptRead(readSites(...given)));
+const oldBy = memoLast(oldCells);
 
 /**
  * Where a field of the nearest readings stands for one that is too old to say; what an estimate is
@@ -200,8 +169,7 @@ const oldBy = memoLast((grid: CellGrid, sites: string) =>
 function selectOld(state: AppState, field: Field): Uint8Array | null {
   const { health } = selectShown(state);
   if (!health || field.sensor !== state.view.sensor) return null;
-  const sites = readSitesBy(health)(selectTags(state), selectSensor(state));
-  return oldBy(gridOf(field), keyOfRead(sites));
+  return oldBy(gridOf(field), readBy(selectTags(state), health.tags, selectSensor(state)));
 }
 
 const onMap = memoOne((field: Field) =>
@@ -223,9 +191,7 @@ const errorOf = memoOne((field: Field): Field | null =>
 );
 const errorRange = memoOne(({ valueMax }: Field): Range => ({ low: 0, high: valueMax }));
 
-const differenceRange = memoOne((field: Field) =>
-  memoLast((sensor: Sensor) => symmetricRange(field, sensor)),
-);
+const keptDifference = keeping<Range>();
 
 /** Null: there is none, or the one that is wanted is not here, or nobody knows its colours yet. */
 export function selectHeat(state: AppState): Heat | null {
@@ -236,16 +202,23 @@ export function selectHeat(state: AppState): Heat | null {
     const field = value?.field;
     if (!field || field.sampleCount === 0) return null;
     const old = sourceOf(state) === 'nearest' ? selectOld(state, field) : null;
-    return heat(field, differenceRange(field)(selectSensor(state)), null, value, false, old);
+    const range = keptDifference(symmetricRange(field, selectSensor(state)));
+    return keptHeat({ ...PLAIN, field, range, difference: value, old });
   }
   const field = selectField(state);
   const error = field && state.view.heat === 'error' ? errorOf(field) : null;
-  if (error) return heat(error, errorRange(error), null, null, true, null);
-  const within = selectRange(state);
-  if (!field || !within || field.sampleCount === 0) return null;
+  if (error) return keptHeat({ ...PLAIN, field: error, range: errorRange(error), isError: true });
+  const range = selectRange(state);
+  if (!field || !range || field.sampleCount === 0) return null;
   const isIdeal = selectColouring(state) === 'ideal' && field.sensor === state.view.sensor;
   const old = field.sureness ? null : selectOld(state, field);
-  return heat(field, within, isIdeal ? selectZones(state, field) : null, null, false, old);
+  return keptHeat({
+    ...PLAIN,
+    field,
+    range,
+    old,
+    zones: isIdeal ? selectZones(state, field) : null,
+  });
 }
 
 /** The field whose known part is shown, empty ones too; null: none of the sensor is here. */
@@ -274,7 +247,6 @@ const areasOf = memoLast(areasOnMap);
 
 const NO_AREAS: readonly AreaOnMap[] = [];
 
-/** The areas that the map shows: where the table is grouped by them. */
 export function selectAreas(state: AppState): readonly AreaOnMap[] {
   const areaOf = selectAreaOf(state);
   return areaOf ? areasOf(selectTags(state), areaOf) : NO_AREAS;
@@ -295,7 +267,6 @@ export function selectListed(state: AppState): ReadonlySet<string> | null {
   return filter.trim() === '' && health === null ? null : idsOf(selectRows(state));
 }
 
-/** The table's rows as the operator sees them: filtered, sorted, and together by area. */
 export function selectRows(state: AppState): readonly Row[] {
   const { filter, health, sort } = state.view;
   const catalogue = selectCatalogue(state);

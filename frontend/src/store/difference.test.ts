@@ -21,7 +21,7 @@ beforeEach(() => {
     const isThen = url.searchParams.has('at');
     const value = isThen ? known.then : known.now;
     return Promise.resolve(
-      new Response(npy(1, 2, [value, NaN]), {
+      new Response(npy([1, 2], [value, NaN]), {
         headers: {
           'X-Field-Origin-X': url.searchParams.get('bbox_min_x') ?? '',
           'X-Field-Origin-Y': url.searchParams.get('bbox_min_y') ?? '',
@@ -38,7 +38,7 @@ beforeEach(() => {
 });
 afterEach(() => {
   stop();
-  act({ type: 'compare', compare: null });
+  act({ compare: null });
   vi.useRealTimers();
 });
 
@@ -52,7 +52,7 @@ test('nothing is fetched while nothing is compared', async () => {
 });
 
 test('both fields are asked for on one box, and their difference is the heat map', async () => {
-  act({ type: 'compare', compare: { by: 'moment', at: 500 } });
+  act({ compare: { by: 'moment', at: 500 } });
   // What is shown meanwhile is no difference, and not shown as one.
   expect(selectHeat(store.get())).toBeNull();
   await settled();
@@ -68,34 +68,34 @@ test('both fields are asked for on one box, and their difference is the heat map
 
 test('where memory has nothing of then, there is no heat map and it is told', async () => {
   known.samplesThen = 0;
-  act({ type: 'compare', compare: { by: 'moment', at: 500 } });
+  act({ compare: { by: 'moment', at: 500 } });
   await settled();
   expect(store.get().twin.difference).toMatchObject({ state: 'ready', value: { field: null } });
   expect(selectHeat(store.get())).toBeNull();
 });
 
 test('before all time nothing is asked for', async () => {
-  act({ type: 'compare', compare: { by: 'ago', seconds: 1e12 } });
+  act({ compare: { by: 'ago', seconds: 1e12 } });
   await settled();
   expect(asked).toHaveLength(1);
   expect(store.get().twin.difference.value?.field).toBeNull();
 });
 
 test('no difference of one sensor is shown as that of another, nor after it ends', async () => {
-  act({ type: 'compare', compare: { by: 'moment', at: 500 } });
+  act({ compare: { by: 'moment', at: 500 } });
   await settled();
-  act({ type: 'sensor', sensor: 'co2' });
+  act({ sensor: 'co2' });
   expect(selectHeat(store.get())).toBeNull();
-  act({ type: 'sensor', sensor: 'temperature' });
-  act({ type: 'compare', compare: null });
+  act({ sensor: 'temperature' });
+  act({ compare: null });
   expect(store.get().twin.difference.value).toBeNull();
 });
 
 test('no difference of readings is shown as that of estimates', async () => {
-  act({ type: 'compare', compare: { by: 'moment', at: 500 } });
+  act({ compare: { by: 'moment', at: 500 } });
   await settled();
   expect(store.get().twin.difference.value).not.toBeNull();
-  act({ type: 'heat', heat: 'estimate' });
+  act({ heat: 'estimate' });
   expect(store.get().twin.difference.value).toBeNull();
-  act({ type: 'heat', heat: 'nearest' });
+  act({ heat: 'nearest' });
 });

@@ -5,7 +5,7 @@
 import { now } from '../clock';
 import { differenceOf, otherMoment, type Compare } from '../domain/difference';
 import type { Snapshot } from '../domain/twin';
-import type { Bounds } from '../geometry/coordinates';
+import { type Bounds, widened } from '../geometry/coordinates';
 import { onChange, receive, store, type AppState } from './app';
 import { sourceOf } from './derived';
 import { ASSUMED_MARGIN_M, boundsOfPins, fetchHeat, fieldResolution } from './heat';
@@ -22,10 +22,10 @@ export function startDifference(): () => void {
     paceMs: DRAG_PACE_MS,
     isDragged: true,
     onValue: (value) => {
-      receive({ type: 'set', part: { difference: ready(value) } });
+      receive({ difference: ready(value) });
     },
     onError: (message) => {
-      receive({ type: 'set', part: { difference: failed(message) } });
+      receive({ difference: failed(message) });
     },
   });
   let before: AppState | null = null;
@@ -35,7 +35,7 @@ export function startDifference(): () => void {
     const { difference } = state.twin;
     if (compare === null) {
       fetcher.want(null);
-      if (difference !== NOTHING) receive({ type: 'set', part: { difference: NOTHING } });
+      if (difference !== NOTHING) receive({ difference: NOTHING });
       return;
     }
     // Of another sensor or source, or to another moment, it is none of what is wanted.
@@ -44,7 +44,7 @@ export function startDifference(): () => void {
       before.view.sensor !== sensor ||
       sourceOf(before) !== sourceOf(state);
     before = state;
-    if (isOther && difference !== NOTHING) receive({ type: 'set', part: { difference: NOTHING } });
+    if (isOther && difference !== NOTHING) receive({ difference: NOTHING });
     const wish = wishFor(state, compare);
     if (wish) fetcher.want(wish);
   };
@@ -95,12 +95,8 @@ function boxOf(snapshot: Snapshot | null, resolution: number): Bounds | null {
   if (!bounds) return null;
   const down = (metres: number): number => round(Math.floor(metres / resolution) * resolution);
   const up = (metres: number): number => round(Math.ceil(metres / resolution) * resolution);
-  return {
-    minX: down(bounds.minX - ASSUMED_MARGIN_M),
-    minY: down(bounds.minY - ASSUMED_MARGIN_M),
-    maxX: up(bounds.maxX + ASSUMED_MARGIN_M),
-    maxY: up(bounds.maxY + ASSUMED_MARGIN_M),
-  };
+  const { minX, minY, maxX, maxY } = widened(bounds, ASSUMED_MARGIN_M);
+  return { minX: down(minX), minY: down(minY), maxX: up(maxX), maxY: up(maxY) };
 }
 
 const round = (metres: number): number => Math.round(metres * 1e6) / 1e6;

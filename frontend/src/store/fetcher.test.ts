@@ -2,13 +2,13 @@ import { afterEach, beforeEach, describe, expect, test, vi } from 'vitest';
 
 import { Refusal } from '../contract/api';
 import { S } from '../strings';
-import { createFetcher, DRAG_PACE_MS, type Fetcher, type Wish } from './fetcher';
+import { createFetcher, DRAG_PACE_MS, type Wish } from './fetcher';
 
 let told: string[];
 let errors: { message: string; isLasting: boolean }[];
 let started: string[];
 let fetches: Map<string, { resolve: () => void; reject: (error: Error) => void; over: boolean }>;
-let fetcher: Fetcher<string>;
+let fetcher: ReturnType<typeof createFetcher<string>>;
 
 beforeEach(() => {
   vi.useFakeTimers();
@@ -25,7 +25,7 @@ afterEach(async () => {
   vi.useRealTimers();
 });
 
-const make = (options: { paceMs: number; isDragged?: boolean }): Fetcher<string> =>
+const make = (options: { paceMs: number; isDragged?: boolean }): typeof fetcher =>
   createFetcher<string>({
     ...options,
     onValue: (value) => told.push(value),

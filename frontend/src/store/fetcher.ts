@@ -14,7 +14,6 @@ export const DRAG_PACE_MS = 80;
 const MOST_DRAGGED = 2;
 /** A wish that has stood for so long is what the operator has come to; older fetches then end. */
 const SETTLED_MS = 250;
-/** A fetch that takes longer has failed. */
 const TIMEOUT_MS = 30_000;
 /** While somebody drags, an answer serves again for so long: late readings may still change the past. */
 const KEEP_MS = 30_000;
@@ -30,7 +29,6 @@ const CALM_LONGEST_MS = 60_000;
 export interface Fetched<T> {
   readonly value: T | null;
   readonly state: 'waiting' | 'ready' | 'failed';
-  /** Why it failed, for a person to read. */
   readonly message: string;
 }
 
@@ -42,7 +40,6 @@ export const failed = <T>(message: string, value: T | null = null): Fetched<T> =
   ...{ value, state: 'failed', message },
 });
 
-/** Something to fetch. */
 export interface Wish<T> {
   /** What it depends on; a wish with the key of the one before brings nothing new. */
   readonly key: string;
@@ -64,11 +61,6 @@ interface FetcherOptions<T> {
   readonly onError?: (message: string, isLasting: boolean) => void;
 }
 
-export interface Fetcher<T> {
-  /** Null: nothing any more; all that is under way ends. */
-  readonly want: (wish: Wish<T> | null) => void;
-}
-
 /** A refusal that the same request gets again. */
 const isRefused = (error: unknown): boolean =>
   error instanceof Refusal && (error.status === 400 || error.status === 404);
@@ -78,7 +70,7 @@ export function createFetcher<T>({
   isDragged = false,
   onValue,
   onError,
-}: FetcherOptions<T>): Fetcher<T> {
+}: FetcherOptions<T>) {
   interface Running {
     readonly key: string;
     readonly order: number;
@@ -184,7 +176,8 @@ export function createFetcher<T>({
   };
 
   return {
-    want: (wish) => {
+    /** Null: nothing any more; all that is under way ends. */
+    want: (wish: Wish<T> | null): void => {
       if (wish?.key === wanted?.key && wish?.group === wanted?.group) return;
       const isOther = !wish || wish.group !== wanted?.group;
       wanted = wish;

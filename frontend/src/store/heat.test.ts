@@ -4,6 +4,7 @@ import { npyEstimate, npyField } from '../testing/field';
 import { goLost, showTags } from '../testing/page';
 import { readings, stateFrame, wireTag } from '../testing/tags';
 import { act, receive, store } from './app';
+import { withState } from './twin';
 import { selectHeat } from './derived';
 import { startLoaders } from './loaders';
 
@@ -18,7 +19,7 @@ const field = (): ReturnType<typeof store.get>['twin']['latest']['field'] =>
 /** Another state, and nothing else. */
 const hear = (sec: number): void => {
   const latest = stateFrame(tags, { sec, revision: `heard ${sec}` });
-  receive({ type: 'state', latest, now: performance.now() });
+  receive(withState(latest, performance.now()));
 };
 /** Its code is loaded with the first estimate, which no clock of a test hurries. */
 const until = async (look: () => boolean): Promise<void> => {
@@ -55,12 +56,12 @@ test('the estimate that is chosen takes the place of the nearest readings, with 
   showTags(tags);
   await until(() => field().value !== null);
   expect(count('estimate')).toBe(0);
-  act({ type: 'heat', heat: 'estimate' });
+  act({ heat: 'estimate' });
   // Under the estimate's name nothing else is shown.
   expect(selectHeat(store.get())).toBeNull();
   await until(() => field().value?.sureness !== undefined);
   expect(selectHeat(store.get())).toMatchObject({ isError: false, field: { valueMax: 22 } });
-  act({ type: 'heat', heat: 'error' });
+  act({ heat: 'error' });
   // Both came in one.
   expect(selectHeat(store.get())?.isError).toBe(true);
   const before = count('estimate.npy');
@@ -70,8 +71,8 @@ test('the estimate that is chosen takes the place of the nearest readings, with 
 
 test('what is computed has no estimate: the nearest readings are asked for', async () => {
   showTags(tags);
-  act({ type: 'sensor', sensor: 'vpd' });
-  act({ type: 'heat', heat: 'estimate' });
+  act({ sensor: 'vpd' });
+  act({ heat: 'estimate' });
   await until(() => field().value !== null);
   expect(count('estimate')).toBe(0);
   expect(selectHeat(store.get())?.field.values).toHaveLength(2);
@@ -79,18 +80,18 @@ test('what is computed has no estimate: the nearest readings are asked for', asy
 
 test('it goes on with the time: what nobody reads becomes less sure', async () => {
   showTags(tags);
-  act({ type: 'heat', heat: 'estimate' });
+  act({ heat: 'estimate' });
   await until(() => count('estimate.npy') === 1);
   await vi.advanceTimersByTimeAsync(30_000);
   expect(count('estimate.npy')).toBe(4);
-  act({ type: 'heat', heat: 'nearest' });
+  act({ heat: 'nearest' });
   await vi.advanceTimersByTimeAsync(30_000);
   expect(count('estimate.npy')).toBe(4);
 });
 
 test('a house that changes ten times a second costs one estimate a second', async () => {
   showTags(tags);
-  act({ type: 'heat', heat: 'estimate' });
+  act({ heat: 'estimate' });
   await until(() => count('estimate.npy') === 1);
   for (let change = 0; change < 30; change++) {
     hear(1_000 + change);
@@ -105,12 +106,12 @@ test.each([
 ])('refused with %d, the nearest readings stay, with the reason', async (status, sensor) => {
   refusal = status;
   showTags(tags);
-  act({ type: 'sensor', sensor });
-  act({ type: 'heat', heat: 'estimate' });
+  act({ sensor });
+  act({ heat: 'estimate' });
   await until(() => field().value?.noEstimate !== undefined);
   expect(field().value?.noEstimate).toEqual({ status, message: 'ten scans are needed' });
   expect(selectHeat(store.get())).toMatchObject({ isError: false, field: { sampleCount: 4 } });
-  act({ type: 'heat', heat: 'error' });
+  act({ heat: 'error' });
   expect(selectHeat(store.get())?.isError).toBe(false);
   // Asked again now and then, and not with every reading.
   const before = count('estimate.npy');

@@ -4,7 +4,7 @@ import { fetchEstimate, fetchField, Refusal, type FieldQuery } from '../contract
 import type { Field, NoEstimate } from '../contract/types';
 import { estimatedField, resolutionFor } from '../domain/field';
 import type { Snapshot } from '../domain/twin';
-import { boundsOf, type Bounds } from '../geometry/coordinates';
+import { boundsOf, type Bounds, widened } from '../geometry/coordinates';
 import type { Source } from './derived';
 
 /** A twin that has refused an estimate is asked again after this long, ms. */
@@ -54,13 +54,5 @@ export const boundsOfPins = (snapshot: Snapshot | null): Bounds | null =>
 export function fieldResolution(snapshot: Snapshot | null): number {
   const bounds = boundsOfPins(snapshot);
   if (!bounds) return DEFAULT_RESOLUTION_M;
-  return resolutionFor(
-    {
-      minX: bounds.minX - ASSUMED_MARGIN_M,
-      minY: bounds.minY - ASSUMED_MARGIN_M,
-      maxX: bounds.maxX + ASSUMED_MARGIN_M,
-      maxY: bounds.maxY + ASSUMED_MARGIN_M,
-    },
-    MAX_CELLS,
-  );
+  return resolutionFor(widened(bounds, ASSUMED_MARGIN_M), MAX_CELLS);
 }

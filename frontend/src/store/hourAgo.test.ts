@@ -5,7 +5,7 @@ import { readings, stateFrame, tag, wireTag } from '../testing/tags';
 import { connection, goLive, showTags, status } from '../testing/page';
 import { act, prefer, receive } from './app';
 import { hourAgo, startHourAgo, thenOf } from './hourAgo';
-import { NO_HOUSE } from './twin';
+import { NO_HOUSE, withPast, withState } from './twin';
 
 const NOW_S = 100_000;
 
@@ -15,7 +15,7 @@ let stop: () => void;
 
 const hear = (sec: number): void => {
   const latest = stateFrame([wireTag()], { sec });
-  receive({ type: 'state', latest, now: performance.now() });
+  receive(withState(latest, performance.now()));
 };
 
 beforeEach(() => {
@@ -74,8 +74,8 @@ test('what a reading of now is compared with stays until there is a newer one', 
   expect(thenOf(hourAgo.get(), at(22), 'temperature')).toBe(first);
   expect(thenOf(hourAgo.get(), at(23), 'temperature')).toBe(second);
   // Of a moment in the past it is what was an hour before, however somebody came there.
-  act({ type: 'moment', moment: 50_000 });
-  receive({ type: 'past', past: { at: 50_000, house: NO_HOUSE } });
+  act({ moment: 50_000 });
+  receive(withPast({ at: 50_000, house: NO_HOUSE }));
   await pass(1_000);
   expect(thenOf(hourAgo.get(), at(23), 'temperature')).not.toBe(second);
   expect(thenOf(null, at(23), 'temperature')).toBeNull();
@@ -103,8 +103,8 @@ test('where a day is a short one, so is its hour', async () => {
 
 test('nothing is asked until the bridge has said how long an hour is', async () => {
   connection(performance.now(), { type: 'start', now: performance.now() });
-  act({ type: 'moment', moment: 50_000 });
-  receive({ type: 'past', past: { at: 50_000, house: NO_HOUSE } });
+  act({ moment: 50_000 });
+  receive(withPast({ at: 50_000, house: NO_HOUSE }));
   stop = startHourAgo();
   await pass(1_000);
   expect(asked).toEqual([]);
@@ -118,8 +118,8 @@ test('of the moments that somebody drags through, few are fetched, and the last'
   stop = startHourAgo();
   await pass(10);
   for (const moment of [50_000, 50_100, 50_200]) {
-    act({ type: 'moment', moment });
-    receive({ type: 'past', past: { at: moment, house: NO_HOUSE } });
+    act({ moment });
+    receive(withPast({ at: moment, house: NO_HOUSE }));
     await pass(100);
   }
   await pass(1_000);

@@ -33,7 +33,7 @@ export interface HourAgo {
   readonly tags: ReadonlyMap<string, TagThen>;
 }
 
-export const hourAgo = createStore<HourAgo | null, HourAgo | null>(null, (_, next) => next);
+export const hourAgo = createStore<HourAgo | null>(null);
 
 /** What was known an hour before what is shown, by the state's own stamp; null: not known. */
 export function selectHourAgo(state: AppState, last: HourAgo | null): HourAgo | null {
@@ -74,7 +74,7 @@ export function startHourAgo(): () => void {
   const fetcher = createFetcher<HourAgo>({
     paceMs: PACE_MS,
     // Where there is none, the table and the alarms do without.
-    onValue: hourAgo.dispatch,
+    onValue: hourAgo.set,
   });
   const update = (): void => {
     const state = store.get();
@@ -106,7 +106,7 @@ export function startHourAgo(): () => void {
   return () => {
     stop();
     fetcher.want(null);
-    hourAgo.dispatch(null);
+    hourAgo.set(null);
     compared.clear();
   };
 }

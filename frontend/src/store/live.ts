@@ -1,10 +1,11 @@
 /** The page's one connection, and what its frames do to the store. */
 import { now, onLapse } from '../clock';
 import { latestAfter } from '../contract/frames';
-import { connect, signInIfAsked } from '../connection/socket';
+import { connect, type Link, signInIfAsked } from '../connection/socket';
 import { stateSocketUrl } from '../contract/api';
 import type { Latest } from '../contract/types';
 import { receive } from './app';
+import { withConnection, withState, withUnread } from './twin';
 import { robotFrame } from './create';
 
 /**
@@ -19,11 +20,11 @@ export function pauseMs(tags: number): number {
 /** A message that could not be read is told of for so long after the last one. */
 const TOLD_MS = 60_000;
 
-let retry: (() => void) | null = null;
+let current: Link | null = null;
 
 /** Does not wait for the back-off any longer. */
 export function retryConnection(): void {
-  retry?.();
+  current?.tell('wake');
 }
 
 export function startLive(): () => void {
@@ -46,23 +47,25 @@ export function startLive(): () => void {
     isNew = false;
     takenAt = at;
     try {
-      receive({ type: 'state', latest, now: arrivedAt, stateAgeSeconds });
+      receive(withState(latest, arrivedAt, stateAgeSeconds));
     } catch (error) {
       // The check of frames let something through: the page goes on with what it has.
       tellBad(String(error));
-      link.giveUp();
+      link.tell('broken');
     }
   };
 
   const tellBad = (why: string): void => {
-    receive({ type: 'unread', why });
+    receive(withUnread(why));
     clearTimeout(forget);
-    forget = setTimeout(receive, TOLD_MS, { type: 'unread', why: null });
+    forget = setTimeout(() => {
+      receive({ unread: null });
+    }, TOLD_MS);
   };
 
   const link = connect(stateSocketUrl(), {
     onConnection: (connection) => {
-      receive({ type: 'connection', connection, now: now() });
+      receive(withConnection(connection, now()));
     },
     onRefused: () => void signInIfAsked(),
     onBad: tellBad,
@@ -70,18 +73,18 @@ export function startLive(): () => void {
       const { epoch, status } = connection;
       if (frame.type === 'alarms') {
         // As it is: alarms change seldom, and nobody is to wait for them.
-        receive({ type: 'set', part: { alarms: frame } });
+        receive({ alarms: frame });
         return;
       }
       if (frame.type === 'robot') {
-        robotFrame.dispatch(frame);
+        robotFrame.set(frame);
         return;
       }
       if (frame.type !== 'status') {
         const at = now();
         const next = latestAfter(heardOn === epoch ? latest : null, frame);
         if (!next) {
-          link.giveUp();
+          link.tell('broken');
           return;
         }
         latest = next;
@@ -102,18 +105,18 @@ export function startLive(): () => void {
       else timer ??= setTimeout(take, pause, null);
     },
   });
-  retry = link.retry;
+  current = link;
   const unhear = onLapse(() => {
     latest = null;
     isNew = false;
-    receive({ type: 'lapse' });
-    link.lapse();
+    receive({ isTimeLost: true });
+    link.tell('start');
   });
   return () => {
     unhear();
     clearTimeout(timer);
     clearTimeout(forget);
     link.stop();
-    retry = null;
+    current = null;
   };
 }

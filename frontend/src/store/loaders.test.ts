@@ -47,7 +47,7 @@ describe('loaders', () => {
   test('another sensor lets go of the old field at once and fetches its own', async () => {
     showTags(tags);
     await settle();
-    act({ type: 'sensor', sensor: 'co2' });
+    act({ sensor: 'co2' });
     expect(store.get().twin.latest.field.value).toBeNull();
     await settle();
     expect(store.get().twin.latest.field.value?.sensor).toBe('co2');
@@ -57,7 +57,7 @@ describe('loaders', () => {
     showTags(tags);
     await settle();
     const first = count('field.npy');
-    act({ type: 'hover', tagId: '1' });
+    act({ hovered: '1' });
     await vi.advanceTimersByTimeAsync(5_000);
     expect(count('field.npy')).toBe(first);
     showTags(tags);

@@ -1,9 +1,10 @@
 /** Fetches what the frames do not carry, whenever the twin's revision says that it changed. */
 import { answer, bodyOf, fetchQuality, get } from '../contract/api';
-import type { Field, FieldQuality, OccupancyGrid, SensorsFile } from '../contract/types';
+import type { Field, FieldQuality, SensorsFile } from '../contract/types';
 import { cataloguesOf } from '../domain/sensors';
 import { type MapPicture, mapPlacement, opaqueBox, pixelBoxCorners } from '../geometry/image';
 import { act, type AppState, onChange, receive, store } from './app';
+import { withField, withLatest } from './twin';
 import { sourceOf } from './derived';
 import { createFetcher, failed, NOTHING, ready, type Wish } from './fetcher';
 import { boundsOfPins, fetchHeat, fieldResolution } from './heat';
@@ -21,31 +22,28 @@ export function startLoaders(): () => void {
   const field = createFetcher<Field>({
     paceMs: FIELD_INTERVAL_MS,
     onValue: (value) => {
-      receive({ type: 'field', field: ready(value) });
+      receive(withField(ready(value)));
     },
     onError: (message) => {
-      receive({ type: 'field', field: failed(message, selectNewest(store.get()).field.value) });
+      receive(withField(failed(message, selectNewest(store.get()).field.value)));
     },
   });
   const map = createFetcher<MapPicture>({
     paceMs: MAP_INTERVAL_MS,
     onValue: (value) => {
-      receive({ type: 'latest', part: { map: ready(value) } });
+      receive(withLatest({ map: ready(value) }));
     },
     onError: (message) => {
-      receive({
-        type: 'latest',
-        part: { map: failed(message, selectNewest(store.get()).map.value) },
-      });
+      receive(withLatest({ map: failed(message, selectNewest(store.get()).map.value) }));
     },
   });
   const quality = createFetcher<FieldQuality>({
     paceMs: QUALITY_INTERVAL_MS,
     onValue: (value) => {
-      receive({ type: 'latest', part: { quality: value } });
+      receive(withLatest({ quality: value }));
     },
     onError: () => {
-      receive({ type: 'latest', part: { quality: null } });
+      receive(withLatest({ quality: null }));
     },
   });
 
@@ -82,8 +80,8 @@ export function startLoaders(): () => void {
     // What the page does not show any more goes at once: a restarted twin begins empty.
     const { value } = newest.field;
     if (value && (value.sensor !== sensor || (base !== null && !wanted))) {
-      receive({ type: 'field', field: NOTHING });
-      receive({ type: 'latest', part: { quality: null } });
+      receive(withField(NOTHING));
+      receive(withLatest({ quality: null }));
     }
     field.want(wanted);
     if (base === null) {
@@ -91,7 +89,7 @@ export function startLoaders(): () => void {
       quality.want(null);
       return;
     }
-    if (newest.map.value && !status?.has_map) receive({ type: 'latest', part: { map: NOTHING } });
+    if (newest.map.value && !status?.has_map) receive(withLatest({ map: NOTHING }));
     map.want(status?.has_map ? { key: base, group: 'map', run: loadMap } : null);
     quality.want(
       // Of the nearest readings: an estimate tells its own error.
@@ -138,16 +136,16 @@ export function startSensors(): () => void {
       if (text === known) return;
       known = text;
       const value = cataloguesOf(file);
-      receive({ type: 'set', part: { sensors: ready(value) } });
+      receive({ sensors: ready(value) });
       // A file without what the page opens with: then the first that it has.
       const [first] = value.day.all;
       const { sensor } = store.get().view;
       const isChosen = sensor !== DEFAULT_VIEW.sensor || sensor in file.sensors;
-      if (first && !isChosen) act({ type: 'sensor', sensor: first.name });
+      if (first && !isChosen) act({ sensor: first.name });
     },
     onError: (message) => {
       // What was in force before goes on: a bridge that is away has no other ranges.
-      if (known === '') receive({ type: 'set', part: { sensors: failed(message) } });
+      if (known === '') receive({ sensors: failed(message) });
     },
   });
   const update = (): void => {
@@ -173,14 +171,6 @@ async function loadMap(signal: AbortSignal): Promise<MapPicture> {
     get('api/map.png', signal).then((response) => response.blob()),
   ]);
   const bitmap = await createImageBitmap(blob);
-  try {
-    return decode(grid, bitmap);
-  } finally {
-    bitmap.close();
-  }
-}
-
-function decode(grid: OccupancyGrid, bitmap: ImageBitmap): MapPicture {
   const { width, height } = bitmap;
   const placement = mapPlacement(grid);
   if (width !== placement.width || height !== placement.height) {
@@ -195,6 +185,7 @@ function decode(grid: OccupancyGrid, bitmap: ImageBitmap): MapPicture {
   const context = canvas.getContext('2d', { willReadFrequently: true });
   if (!context) throw new Error('map: this browser has no 2d canvas');
   context.drawImage(bitmap, 0, 0);
+  bitmap.close();
   const pixels = context.getImageData(0, 0, width, height);
   const box = opaqueBox(pixels.data, width, height);
   return { placement, pixels, known: box ? pixelBoxCorners(placement, box) : [] };

@@ -11,7 +11,7 @@ import { readings, stateFrame, wireTag } from '../testing/tags';
 import { act, receive, store } from './app';
 import { selectHealth, selectRange, selectRows, selectSensors } from './derived';
 import { rosNow, selectAwaited, selectShown, selectTag, selectTags, shownAt } from './moment';
-import { NO_HOUSE, NO_TWIN, type House } from './twin';
+import { NO_HOUSE, NO_TWIN, type House, withLatest, withPast } from './twin';
 
 const then = (): House => ({
   ...NO_HOUSE,
@@ -28,7 +28,7 @@ beforeEach(() => {
     [wireTag({ tag_id: 'new', readings: readings({ temperature: 20 }) })],
     judgement({ new: [reason()] }),
   );
-  receive({ type: 'past', past: { at: 77, house: then() } });
+  receive(withPast({ at: 77, house: then() }));
 });
 
 describe('another moment', () => {
@@ -46,7 +46,7 @@ describe('another moment', () => {
     };
     const now = look();
     expect(now).toMatchObject({ tags: ['new'], rows: ['new'], health: ['new'], isThere: false });
-    act({ type: 'look', view: { moment: 77 } });
+    act({ moment: 77 });
     expect(look()).toEqual({
       tags: ['old'],
       rows: ['old'],
@@ -55,7 +55,7 @@ describe('another moment', () => {
       range: { low: 18, high: 40 },
       isThere: true,
     });
-    act({ type: 'look', view: { moment: null } });
+    act({ moment: null });
     expect(look()).toEqual(now);
   });
 
@@ -70,14 +70,14 @@ describe('another moment', () => {
     const { twin } = store.get();
     expect(shownAt(twin, 78)).toBe(shownAt(twin, 77));
     expect(shownAt(twin, 78).moment).toBe(77);
-    act({ type: 'look', view: { moment: 78 } });
+    act({ moment: 78 });
     expect(selectAwaited(store.get())).toBe(78);
-    act({ type: 'look', view: { moment: 77 } });
+    act({ moment: 77 });
     expect(selectAwaited(store.get())).toBeNull();
   });
 
   test('of which nothing has come leaves now, which is called now', () => {
-    receive({ type: 'past', past: null });
+    receive(withPast(null));
     const { twin } = store.get();
     expect(shownAt(twin, 78)).toBe(shownAt(twin, null));
     expect(shownAt(twin, 78).moment).toBeNull();
@@ -86,7 +86,7 @@ describe('another moment', () => {
 
   test('has the map of now, for of maps nobody keeps a past', () => {
     const picture = { value: null, state: 'failed', message: 'x' } as const;
-    receive({ type: 'latest', part: { map: picture } });
+    receive(withLatest({ map: picture }));
     expect(shownAt(store.get().twin, 77).map).toBe(picture);
   });
 

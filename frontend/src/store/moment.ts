@@ -12,12 +12,9 @@ import { S } from '../strings';
 import { act, type AppState, store } from './app';
 import type { House, Past, TwinState } from './twin';
 
-/** The moment to show: null is now, a number a moment in the past, ROS seconds. */
-export type Moment = number | null;
-
-/** The greenhouse at the moment that is shown, and how its ages go on. */
 export interface Shown extends House {
-  readonly moment: Moment;
+  /** Null: now. */
+  readonly moment: number | null;
   readonly ageing: Ageing;
 }
 
@@ -26,7 +23,7 @@ export interface Shown extends House {
  * another one is on its way, the last that came stays, with its own time. Data and moment are told
  * in one, so that nothing can be taken for what it is not.
  */
-export function shownAt(twin: TwinState, moment: Moment): Shown {
+export function shownAt(twin: TwinState, moment: number | null): Shown {
   if (moment === null || twin.past === null) return SHOWN_NOW[clockOf(twin)](twin.latest);
   const { at, house } = twin.past;
   return shownThen(house, twin.latest.map, at);
@@ -69,7 +66,6 @@ export const selectHasTime = ({ twin }: AppState): boolean => clockOf(twin) !== 
 /** The newest there is, whatever is shown: for the connection's word, and for what to fetch. */
 export const selectNewest = ({ twin }: AppState): House => twin.latest;
 
-/** What has come of the past, for its loader. */
 export const selectPast = ({ twin }: AppState): Past | null => twin.past;
 
 /** The moment that is wanted and not shown yet, ROS seconds; null: what is shown is wanted. */
@@ -107,7 +103,6 @@ export const isHeardNow = ({ twin }: AppState): boolean =>
 
 export const selectSnapshot = (state: AppState): Snapshot | null => selectShown(state).snapshot;
 
-/** Whether what is shown has come; before, there is nothing to judge or to count. */
 export const selectIsHere = (state: AppState): boolean => selectSnapshot(state) !== null;
 
 const NO_TAGS: readonly Tag[] = [];
@@ -122,7 +117,6 @@ const byId = memoOne(
 export const selectTag = (state: AppState, tagId: string): Tag | undefined =>
   byId(selectTags(state)).get(tagId);
 
-/** The same tag as it is now, whatever moment is shown. */
 export const selectNewestTag = ({ twin }: AppState, tagId: string): Tag | undefined =>
   byId(twin.latest.snapshot?.tags ?? NO_TAGS).get(tagId);
 
@@ -175,5 +169,5 @@ export const newestWord = (): string => {
 };
 
 export function backToLive(): void {
-  act({ type: 'moment', moment: null });
+  act({ moment: null });
 }

@@ -5,7 +5,7 @@ import { wireStretch, wireTimeline } from '../testing/timeline';
 import { act, receive, store } from './app';
 import { startOpening } from './remembered';
 import { fromFragment, toFragment } from './address';
-import { NOT_ASKED } from './twin';
+import { NOTHING } from './fetcher';
 import { DEFAULT_VIEW } from './view';
 
 const NOW = 1_000_000;
@@ -16,17 +16,17 @@ let stop: () => void;
 const remember = (seconds: number | null): void => {
   const reach = seconds === null ? null : wireStretch(NOW - seconds, NOW);
   const value = timelineOf(wireTimeline({ from: NOW - 86_400, to: NOW, reach }), NOW);
-  receive({ type: 'set', part: { remembered: { value, state: 'ready', message: '' } } });
+  receive({ remembered: { value, state: 'ready', message: '' } });
 };
 const follow = (fragment: string): void => {
-  act({ type: 'look', view: fromFragment(fragment) });
+  act(fromFragment(fragment));
 };
 const period = (): unknown => store.get().view.period;
 const address = (): string => toFragment(store.get().view);
 
 beforeEach(() => {
-  receive({ type: 'set', part: { remembered: NOT_ASKED } });
-  act({ type: 'look', view: DEFAULT_VIEW });
+  receive({ remembered: NOTHING });
+  act(DEFAULT_VIEW);
   stop = startOpening();
 });
 afterEach(() => {
@@ -59,11 +59,11 @@ test('what a link says, it is', () => {
 
 test('what a person chose stays, and is in the link', () => {
   remember(60);
-  act({ type: 'period', period: { kind: 'day' } });
+  act({ period: { kind: 'day' } });
   remember(60);
   expect(period()).toEqual({ kind: 'day' });
   expect(address()).toBe('period=day');
-  act({ type: 'period', period: { kind: 'hour' } });
+  act({ period: { kind: 'hour' } });
   expect(address()).toBe('period=hour');
 });
 

@@ -5,6 +5,7 @@ import { goLive, goLost, showTags } from '../testing/page';
 import { judgement, reason } from '../testing/health';
 import { readings, stateFrame, wireTag } from '../testing/tags';
 import { act, receive, store } from './app';
+import { withConnection, withPast } from './twin';
 import { selectHealth } from './derived';
 import { selectAwaited, selectShown } from './moment';
 import { startPast } from './past';
@@ -58,12 +59,12 @@ beforeEach(() => {
         });
       }),
   );
-  receive({ type: 'past', past: null });
+  receive(withPast(null));
   showTags([wireTag({ readings: readings({ temperature: 1_000 }) })]);
   stop = startPast();
 });
 afterEach(async () => {
-  act({ type: 'moment', moment: null });
+  act({ moment: null });
   stop();
   await pass(0);
   expect(vi.getTimerCount()).toBe(0);
@@ -80,7 +81,7 @@ const shown = (): unknown[] => {
   ];
 };
 const go = (moment: number | null): void => {
-  act({ type: 'moment', moment });
+  act({ moment });
 };
 const answerAll = async (at: number): Promise<void> => {
   for (const each of asked.filter((one) => one.at === at)) await each.answer();
@@ -131,7 +132,7 @@ test('a link that is opened shows nothing before its moment has come', async () 
     ...(await import('./moment')),
     ...(await import('./past')),
   };
-  fresh.act({ type: 'moment', moment: 50 });
+  fresh.act({ moment: 50 });
   const end = fresh.startPast();
   const { moment, snapshot } = fresh.selectShown(fresh.store.get());
   expect([moment, snapshot]).toEqual([50, null]);
@@ -158,7 +159,7 @@ test('back to now is at once, and what comes later is passed over', async () => 
 test('another sensor never has the colours of the one before', async () => {
   go(50);
   await answerAll(50);
-  act({ type: 'sensor', sensor: 'co2' });
+  act({ sensor: 'co2' });
   expect(shown()).toEqual([50, 50, null]);
   expect(selectShown(store.get()).field.state).toBe('waiting');
 });
@@ -211,7 +212,7 @@ test('each connection asks anew, a lost one does not', async () => {
   expect(states()).toBe(0);
   goLive();
   const { connection } = store.get().twin;
-  receive({ type: 'connection', connection: { ...connection, epoch: 9 }, now: performance.now() });
+  receive(withConnection({ ...connection, epoch: 9 }, performance.now()));
   await pass(100);
   expect(states()).toBe(1);
 });
@@ -231,7 +232,7 @@ test('how far off the field is, is asked for once the moment stays', async () =>
 });
 
 test('an estimate that is chosen goes the same way: with its state, the newest first, two at once', async () => {
-  act({ type: 'heat', heat: 'estimate' });
+  act({ heat: 'estimate' });
   for (let at = 10; at < 20; at++) {
     go(at);
     await vi.dynamicImportSettled();

@@ -16,7 +16,7 @@ import {
   ready,
   type Wish,
 } from './fetcher';
-import { NO_HOUSE, type Past } from './twin';
+import { NO_HOUSE, type Past, withPast } from './twin';
 
 /**
  * What was shown stays for so long while the first moment is on its way, with its own label: most
@@ -30,12 +30,11 @@ export function startPast(): () => void {
   let patience: ReturnType<typeof setTimeout> | undefined;
   let calm: ReturnType<typeof setTimeout> | undefined;
   let judging: AbortController | null = null;
-  /** The last connection that was open. */
   let heardOn = 0;
 
   const show = (past: Past): void => {
     clearTimeout(patience);
-    receive({ type: 'past', past });
+    receive(withPast(past));
   };
   const showNothing = (at: number): void => {
     show({ at, house: NO_HOUSE });
@@ -60,7 +59,7 @@ export function startPast(): () => void {
     fetchQuality(field.sensor, signal, past.at).then(
       (quality) => {
         if (signal.aborted) return;
-        receive({ type: 'past', past: { ...past, house: { ...past.house, quality } } });
+        receive(withPast({ ...past, house: { ...past.house, quality } }));
       },
       () => {
         // The legend does without.
@@ -80,7 +79,7 @@ export function startPast(): () => void {
       const { moment } = store.get().view;
       if (moment === null) return;
       if (selectPast(store.get()) === null || isLasting) showNothing(moment);
-      receive({ type: 'set', part: { pastFault: { at: moment, message, isLasting } } });
+      receive({ pastFault: { at: moment, message, isLasting } });
     },
   });
 
@@ -93,18 +92,18 @@ export function startPast(): () => void {
       patience = undefined;
       forgetQuality();
       fetcher.want(null);
-      if (past) receive({ type: 'past', past: null });
+      if (past) receive(withPast(null));
       return;
     }
     const fault = state.twin.pastFault;
-    if (fault && fault.at !== moment) receive({ type: 'set', part: { pastFault: null } });
+    if (fault && fault.at !== moment) receive({ pastFault: null });
     if (!past && !selectNewest(state).snapshot) showNothing(moment);
     else if (!past) patience ??= setTimeout(losePatience, PATIENCE_MS);
     else patience = undefined;
     const { value } = past?.house.field ?? NOTHING;
     if (past && value && value.sensor !== sensor) {
       // No colours of one sensor under the scale of another.
-      receive({ type: 'past', past: withoutField(past) });
+      receive(withPast(withoutField(past)));
     }
     const { epoch, socket } = state.twin.connection;
     // Each connection asks anew: another server may be behind it, or more was heard meanwhile.

@@ -6,7 +6,8 @@ import { wireStretch, wireTimeline } from '../testing/timeline';
 import { act, receive, store } from './app';
 import { fromFragment } from './address';
 import { askedSpan, startOpening, startRemembered, turnOf } from './remembered';
-import { NOT_ASKED } from './twin';
+import { withConnection, withState } from './twin';
+import { NOTHING } from './fetcher';
 
 let asked: URLSearchParams[];
 let answer: () => Response;
@@ -20,7 +21,7 @@ beforeEach(() => {
     asked.push(url.searchParams);
     return Promise.resolve(answer());
   });
-  receive({ type: 'set', part: { remembered: NOT_ASKED } });
+  receive({ remembered: NOTHING });
   showTags([wireTag()]);
   stop = startRemembered();
 });
@@ -66,8 +67,8 @@ test('it is fetched when there is a twin, and again as time goes on', async () =
 test('another period is fetched at once, and nothing of the last is left', async () => {
   await pass(0);
   answer = () => Response.json({ detail: 'busy' }, { status: 503 });
-  act({ type: 'period', period: { kind: 'all' } });
-  expect(store.get().twin.remembered).toEqual(NOT_ASKED);
+  act({ period: { kind: 'all' } });
+  expect(store.get().twin.remembered).toEqual(NOTHING);
   await pass(0);
   expect(asked.at(-1)?.has('from')).toBe(false);
   expect(store.get().twin.remembered).toMatchObject({ state: 'failed', message: 'busy' });
@@ -76,13 +77,13 @@ test('another period is fetched at once, and nothing of the last is left', async
 test('a link that names no period brings back what the page opens on, at once', async () => {
   const stopOpening = startOpening();
   const latest = stateFrame([wireTag()], { sec: 1_000_000, revision: 'r' });
-  receive({ type: 'state', latest, now: performance.now() });
+  receive(withState(latest, performance.now()));
   answer = () => Response.json(wireTimeline({ from: 0, to: 240, reach: wireStretch(0, 240) }));
   await pass(1_100);
   expect(store.get().view.period).toEqual({ kind: 'hour' });
   // Also twice, sooner than anything is fetched again.
   for (const layers of ['map', 'map,pins']) {
-    act({ type: 'look', view: fromFragment(`layers=${layers}`) });
+    act(fromFragment(`layers=${layers}`));
     await pass(100);
   }
   await pass(1_000);
@@ -98,23 +99,19 @@ test('after a reconnect the gap is refilled', async () => {
   goLost();
   await pass(5_000);
   const before = asked.length;
-  receive({
-    type: 'connection',
-    connection: { ...store.get().twin.connection, epoch: 99 },
-    now: performance.now(),
-  });
+  receive(withConnection({ ...store.get().twin.connection, epoch: 99 }, performance.now()));
   await pass(5_000);
   expect(asked).toHaveLength(before);
   goLive();
   const { connection } = store.get().twin;
-  receive({ type: 'connection', connection: { ...connection, epoch: 99 }, now: performance.now() });
+  receive(withConnection({ ...connection, epoch: 99 }, performance.now()));
   await pass(2_000);
   expect(asked.length).toBeGreaterThan(before);
 });
 
 test('a twin that keeps nothing says so, and is not asked again', async () => {
   answer = () => Response.json({ detail: 'no journal is kept' }, { status: 404 });
-  act({ type: 'period', period: { kind: 'week' } });
+  act({ period: { kind: 'week' } });
   await pass(0);
   const count = asked.length;
   expect(store.get().twin.remembered).toEqual({

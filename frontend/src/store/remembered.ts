@@ -7,7 +7,8 @@ import { timelineOf } from '../domain/timeline';
 import { act, onChange, receive, store } from './app';
 import { createFetcher } from './fetcher';
 import { rosNow, selectNewest } from './moment';
-import { NOT_ASKED, type Remembered } from './twin';
+import { type Remembered } from './twin';
+import { NOTHING } from './fetcher';
 import { DEFAULT_VIEW, SHORT_PERIOD } from './view';
 
 /** Enough for the widest bar: a bucket is two or three pixels there. */
@@ -43,11 +44,11 @@ export function startRemembered(): () => void {
   const fetcher = createFetcher<Remembered>({
     paceMs: INTERVAL_MS,
     onValue: (remembered) => {
-      receive({ type: 'set', part: { remembered } });
+      receive({ remembered });
     },
     onError: (message) => {
       const { value } = store.get().twin.remembered;
-      receive({ type: 'set', part: { remembered: { value, state: 'failed', message } } });
+      receive({ remembered: { value, state: 'failed', message } });
     },
   });
 
@@ -63,7 +64,7 @@ export function startRemembered(): () => void {
       group = next;
       // What is known of another period is of no use; how far memory reaches stays true.
       fetcher.want(null);
-      if (value) receive({ type: 'set', part: { remembered: NOT_ASKED } });
+      if (value) receive({ remembered: NOTHING });
       // Which may have led back to the period before.
       if (store.get().view.period !== period) return;
     }
@@ -100,7 +101,6 @@ export function startRemembered(): () => void {
 
 /** In a day's bar, memory that is shorter than this is squeezed into its right end, seconds. */
 const SHORT_S = 10_800;
-/** How long SHORT_PERIOD is, seconds. */
 const HOUR_S = 3_600;
 
 /** Whether the last hour tells more than the last day; a moment to show has to be in it. */
@@ -119,7 +119,7 @@ export function startOpening(): () => void {
     const reach = twin.remembered.value?.reach;
     if (reach) opensShort ??= isShort(reach, view.moment);
     if (opensShort && view.period === DEFAULT_VIEW.period) {
-      act({ type: 'period', period: SHORT_PERIOD });
+      act({ period: SHORT_PERIOD });
     }
   };
   update();

@@ -5,6 +5,7 @@ import { goLive, goLost, showTags } from '../testing/page';
 import { judgement } from '../testing/health';
 import { wireTag } from '../testing/tags';
 import { act, receive, store } from './app';
+import { withConnection } from './twin';
 import { selectCatalogue, selectHeat, selectSensor, selectSensors } from './derived';
 import { startSensors } from './loaders';
 import { NOTHING } from './fetcher';
@@ -23,7 +24,7 @@ beforeEach(() => {
   answer.mockImplementation(() => fileWith(FILE.sensors));
   vi.stubGlobal('fetch', answer);
   showTags([wireTag()]);
-  receive({ type: 'set', part: { sensors: NOTHING } });
+  receive({ sensors: NOTHING });
 });
 
 afterEach(() => {
@@ -49,20 +50,12 @@ test('is asked for again on each new connection, and only another answer changes
   expect(answer).toHaveBeenCalledTimes(1);
   const known = store.get().twin.sensors;
   goLost();
-  receive({
-    type: 'connection',
-    now: performance.now(),
-    connection: { ...store.get().twin.connection, epoch: 2 },
-  });
+  receive(withConnection({ ...store.get().twin.connection, epoch: 2 }, performance.now()));
   await come();
   expect(answer).toHaveBeenCalledTimes(2);
   expect(store.get().twin.sensors).toBe(known);
   answer.mockImplementation(() => fileWith({ temperature: { ...FILE.fallback, ideal: [1, 2] } }));
-  receive({
-    type: 'connection',
-    now: performance.now(),
-    connection: { ...store.get().twin.connection, epoch: 3 },
-  });
+  receive(withConnection({ ...store.get().twin.connection, epoch: 3 }, performance.now()));
   await come();
   expect(selectSensor(store.get()).ideal).toEqual([1, 2]);
 });
@@ -85,15 +78,15 @@ test('a file without the sensor that the page opens with shows its first, unless
   await come();
   expect(store.get().view.sensor).toBe('ph');
   stop();
-  act({ type: 'sensor', sensor: 'humidity' });
-  receive({ type: 'set', part: { sensors: NOTHING } });
+  act({ sensor: 'humidity' });
+  receive({ sensors: NOTHING });
   stop = startSensors();
   await come();
   expect(store.get().view.sensor).toBe('humidity');
 });
 
 test('ranges are of the day or of the night, as the judge says', () => {
-  receive({ type: 'set', part: { sensors: { value: CATALOGUES, state: 'ready', message: '' } } });
+  receive({ sensors: { value: CATALOGUES, state: 'ready', message: '' } });
   expect(selectCatalogue(store.get())).toBe(CATALOGUES.day);
   showTags([wireTag()], judgement({}, { is_day: false, source: 'clock' }));
   expect(selectCatalogue(store.get())).toBe(CATALOGUES.night);

@@ -11,7 +11,6 @@ export interface Settings {
   readonly density: 'usual' | 'compact';
   /** The table's rows are together by area, where there are areas. */
   readonly byArea: boolean;
-  /** Charts show the day before, too. */
   readonly dayBefore: boolean;
 }
 

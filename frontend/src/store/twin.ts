@@ -25,12 +25,7 @@ export interface House {
   readonly map: Fetched<MapPicture>;
   readonly quality: FieldQuality | null;
   /** The range of the field's values, held calm over the fields before it. */
-  readonly held: Held | null;
-}
-
-interface Held {
-  readonly sensor: string;
-  readonly range: Range;
+  readonly held: { readonly sensor: string; readonly range: Range } | null;
 }
 
 export const NO_HOUSE: House = {
@@ -42,7 +37,6 @@ export const NO_HOUSE: House = {
   held: null,
 };
 
-/** What was fetched about a moment in the past. */
 export interface Past {
   /** The moment that the data are of, ROS seconds. */
   readonly at: number;
@@ -50,7 +44,6 @@ export interface Past {
   readonly house: House;
 }
 
-/** Why a moment that was asked for is not here. */
 interface PastFault {
   /** ROS seconds. */
   readonly at: number;
@@ -60,13 +53,10 @@ interface PastFault {
 }
 
 /** What is remembered of the period in view; "off": this twin remembers nothing. */
-export interface Remembered {
-  readonly value: Timeline | null;
-  readonly state: 'waiting' | 'ready' | 'failed' | 'off';
-  readonly message: string;
+export interface Remembered extends Omit<Fetched<Timeline>, 'state'> {
+  readonly state: Fetched<Timeline>['state'] | 'off';
 }
 
-/** The field of one moment less that of another. */
 export interface Difference {
   /** Null: nothing is known of the other moment. */
   readonly field: Field | null;
@@ -74,8 +64,6 @@ export interface Difference {
   readonly at: number;
   readonly against: number;
 }
-
-export const NOT_ASKED: Remembered = { value: null, state: 'waiting', message: '' };
 
 /** Read by `moment.ts` alone, which chooses what the page shows; everyone else asks there. */
 export interface TwinState {
@@ -87,7 +75,6 @@ export interface TwinState {
   readonly isTimeLost: boolean;
   /** Messages of late that were no frames, and what was wrong with the last; null: none. */
   readonly unread: { readonly count: number; readonly why: string } | null;
-  /** As the frames tell it. */
   readonly latest: House;
   /** The alarms of now and of the last day, whatever moment is shown; null: none were told of yet. */
   readonly alarms: Alarms | null;
@@ -95,9 +82,7 @@ export interface TwinState {
   readonly past: Past | null;
   readonly pastFault: PastFault | null;
   readonly remembered: Remembered;
-  /** What the heat map is when it is compared. */
   readonly difference: Fetched<Difference>;
-  /** The file of sensors that is in force. */
   readonly sensors: Fetched<Catalogues>;
 }
 
@@ -111,72 +96,59 @@ export const NO_TWIN: TwinState = {
   alarms: null,
   past: null,
   pastFault: null,
-  remembered: NOT_ASKED,
+  remembered: NOTHING,
   difference: NOTHING,
   sensors: NOTHING,
 };
 
-export type TwinAction =
-  | { readonly type: 'connection'; readonly connection: Connection; readonly now: number }
-  | {
-      readonly type: 'state';
-      readonly latest: Latest;
-      readonly now: number;
-      /** Set on the first frame of a connection: how old the state was when it was sent. */
-      readonly stateAgeSeconds?: number | null;
-    }
-  /** The machine slept, or its clock was set. */
-  | { readonly type: 'lapse' }
-  /** A message was dropped, for this reason; null: that was long ago. */
-  | { readonly type: 'unread'; readonly why: string | null }
-  | { readonly type: 'field'; readonly field: Fetched<Field> }
-  | { readonly type: 'latest'; readonly part: Partial<Pick<House, 'map' | 'quality'>> }
-  | { readonly type: 'past'; readonly past: Past | null }
-  /** What nothing else follows from. */
-  | { readonly type: 'set'; readonly part: Partial<Pick<TwinState, Plain>> };
+type With = (twin: TwinState) => Partial<TwinState>;
 
-type Plain = 'alarms' | 'pastFault' | 'remembered' | 'difference' | 'sensors';
+/** `now`: ms on the monotonic clock. */
+export const withConnection =
+  (connection: Connection, now: number): With =>
+  (twin) => {
+    const phase = phaseOf(connection, now);
+    if (phase === twin.phase && sameToTheEye(connection, twin.connection)) return {};
+    const { status } = connection;
+    const lastStatus = status && status.reason !== 'never_seen' ? status : twin.lastStatus;
+    return { phase, connection, lastStatus };
+  };
 
-export function reduceTwin(state: TwinState, action: TwinAction): TwinState {
-  switch (action.type) {
-    case 'connection': {
-      const phase = phaseOf(action.connection, action.now);
-      if (phase === state.phase && sameToTheEye(action.connection, state.connection)) return state;
-      const { status } = action.connection;
-      const lastStatus = status && status.reason !== 'never_seen' ? status : state.lastStatus;
-      return { ...state, phase, connection: action.connection, lastStatus };
-    }
-    case 'state': {
-      // No comparison of seq: one socket delivers in order, and a restarted server counts anew.
-      const arrivedAt = action.now - (action.stateAgeSeconds ?? 0) * 1000;
-      // What was there before a lapse says nothing about how old a state that is sent again is.
-      const before = state.isTimeLost ? null : state.latest.snapshot;
-      const snapshot = snapshotOf(action.latest, arrivedAt, before);
-      const health = sharedJudgement(state.latest.health, action.latest.health);
-      return withLatest({ ...state, isTimeLost: false }, { snapshot, health });
-    }
-    case 'lapse':
-      return { ...state, isTimeLost: true };
-    case 'unread': {
-      const { why } = action;
-      const count = (state.unread?.count ?? 0) + 1;
-      return { ...state, unread: why === null ? null : { count, why } };
-    }
-    case 'field':
-      return withLatest(state, {
-        field: action.field,
-        held: heldAfter(state.latest.held, action.field.value),
-      });
-    case 'latest':
-      return withLatest(state, action.part);
-    case 'past':
-      return { ...state, past: action.past && heldPast(state, action.past), pastFault: null };
-    case 'set':
-      return { ...state, ...action.part };
-  }
-}
+/** `ageSeconds`: how old the state was when it was sent, of the first one of a connection. */
+export const withState =
+  (latest: Latest, now: number, ageSeconds: number | null = null): With =>
+  ({ isTimeLost, latest: last }) => {
+    // No comparison of seq: one socket delivers in order, and a restarted server counts anew.
+    const arrivedAt = now - (ageSeconds ?? 0) * 1000;
+    // What was there before a lapse says nothing about how old a state that is sent again is.
+    const before = isTimeLost ? null : last.snapshot;
+    const snapshot = snapshotOf(latest, arrivedAt, before);
+    const health = sharedJudgement(last.health, latest.health);
+    return { latest: { ...last, snapshot, health }, isTimeLost: false };
+  };
 
-function heldAfter(before: Held | null, field: Field | null): Held | null {
+/** A message was dropped, for this reason. */
+export const withUnread =
+  (why: string): With =>
+  ({ unread }) => ({ unread: { count: (unread?.count ?? 0) + 1, why } });
+
+export const withLatest =
+  (part: Partial<House>): With =>
+  ({ latest }) => ({ latest: { ...latest, ...part } });
+
+export const withField =
+  (field: Fetched<Field>): With =>
+  ({ latest }) => ({ latest: { ...latest, field, held: heldAfter(latest.held, field.value) } });
+
+/** Whoever drags through time begins with the colours of now. */
+export const withPast =
+  (next: Past | null): With =>
+  ({ past, latest }) => {
+    const held = next && heldAfter(past?.house.held ?? latest.held, next.house.field.value);
+    return { past: next && { at: next.at, house: { ...next.house, held } }, pastFault: null };
+  };
+
+function heldAfter(before: House['held'], field: Field | null): House['held'] {
   // Of an estimate that knows nothing there is no range, however many tags contribute.
   if (!field?.values.some((value) => !Number.isNaN(value))) return before;
   const { sensor, valueMin: low, valueMax: high } = field;
@@ -184,17 +156,6 @@ function heldAfter(before: Held | null, field: Field | null): Held | null {
   const range = heldRange(held, { low, high });
   return before && range === held ? before : { sensor, range };
 }
-
-/** Whoever drags through time begins with the colours of now. */
-function heldPast({ past, latest }: TwinState, { at, house }: Past): Past {
-  const before = past?.house.held ?? latest.held;
-  return { at, house: { ...house, held: heldAfter(before, house.field.value) } };
-}
-
-const withLatest = (state: TwinState, part: Partial<House>): TwinState => ({
-  ...state,
-  latest: { ...state.latest, ...part },
-});
 
 /** Each frame moves the connection's clock; only the rest is worth a render. */
 function sameToTheEye(a: Connection, b: Connection): boolean {

@@ -1,38 +1,41 @@
 import { expect, test } from 'vitest';
 
 import { fromFragment, toFragment } from './address';
-import { DEFAULT_VIEW, fixedRange, reduceView, type ViewState } from './view';
+import {
+  DEFAULT_VIEW,
+  fixedRange,
+  viewAfter,
+  type ViewState,
+  withChart,
+  withList,
+  withRange,
+  withSort,
+  withTag,
+} from './view';
 
 test('each sensor keeps its own fixed range', () => {
   const range = { low: 1, high: 2 };
-  const fixed = reduceView(DEFAULT_VIEW, { type: 'range', range });
-  const other = reduceView(fixed, { type: 'sensor', sensor: 'co2' });
+  const fixed = viewAfter(DEFAULT_VIEW, withRange(range));
+  const other = viewAfter(fixed, { sensor: 'co2' });
   expect(fixedRange(other)).toBeNull();
-  const both = reduceView(other, { type: 'range', range: { low: 400, high: 900 } });
-  const back = reduceView(both, { type: 'sensor', sensor: DEFAULT_VIEW.sensor });
+  const both = viewAfter(other, withRange({ low: 400, high: 900 }));
+  const back = viewAfter(both, { sensor: DEFAULT_VIEW.sensor });
   expect(fixedRange(back)).toEqual(range);
-  const free = reduceView(back, { type: 'range', range: null });
+  const free = viewAfter(back, withRange(null));
   expect([...free.ranges.keys()]).toEqual(['co2']);
   expect(DEFAULT_VIEW.ranges.size).toBe(0);
 });
 
 test('the sensor that is in view already changes nothing', () => {
-  const same = { type: 'sensor', sensor: DEFAULT_VIEW.sensor } as const;
-  expect(reduceView(DEFAULT_VIEW, same)).toBe(DEFAULT_VIEW);
+  const same = { sensor: DEFAULT_VIEW.sensor };
+  expect(viewAfter(DEFAULT_VIEW, same)).toBe(DEFAULT_VIEW);
 });
 
 test('a column sorts upwards first, then downwards, then upwards', () => {
-  const once = reduceView(DEFAULT_VIEW, { type: 'sort', column: 'age' });
-  const twice = reduceView(once, { type: 'sort', column: 'age' });
-  const thrice = reduceView(twice, { type: 'sort', column: 'age' });
+  const once = viewAfter(DEFAULT_VIEW, withSort('age'));
+  const twice = viewAfter(once, withSort('age'));
+  const thrice = viewAfter(twice, withSort('age'));
   expect([once, twice, thrice].map(({ sort }) => sort.descending)).toEqual([false, true, false]);
-});
-
-test('layers go on and off without touching the old set', () => {
-  const off = reduceView(DEFAULT_VIEW, { type: 'layer', layer: 'pins', on: false });
-  expect(off.layers.has('pins')).toBe(false);
-  expect(DEFAULT_VIEW.layers.has('pins')).toBe(true);
-  expect(reduceView(off, { type: 'layer', layer: 'pins', on: true }).layers.has('pins')).toBe(true);
 });
 
 test('smooth is on demand, everything else is on', () => {
@@ -41,47 +44,47 @@ test('smooth is on demand, everything else is on', () => {
 });
 
 test('a moment is held to the millisecond, and the same one changes nothing', () => {
-  const back = reduceView(DEFAULT_VIEW, { type: 'moment', moment: 12.34567 });
+  const back = viewAfter(DEFAULT_VIEW, { moment: 12.34567 });
   expect(back.moment).toBe(12.346);
-  expect(reduceView(back, { type: 'moment', moment: 12.3461 })).toBe(back);
-  expect(reduceView(back, { type: 'moment', moment: -5 }).moment).toBe(0);
-  expect(reduceView(back, { type: 'moment', moment: null }).moment).toBeNull();
+  expect(viewAfter(back, { moment: 12.3461 })).toBe(back);
+  expect(viewAfter(back, { moment: -5 }).moment).toBe(0);
+  expect(viewAfter(back, { moment: null }).moment).toBeNull();
 });
 
 test('charts of a tag follow the tag that is chosen, those of a sensor keep theirs', () => {
-  const one = reduceView(DEFAULT_VIEW, { type: 'chart', chart: { by: 'tag', tagIds: ['5'] } });
-  expect(reduceView(one, { type: 'select', tagId: '7' }).chart?.tagIds).toEqual(['7']);
-  expect(reduceView(one, { type: 'select', tagId: null }).chart?.tagIds).toEqual(['5']);
+  const one = viewAfter(DEFAULT_VIEW, withChart({ by: 'tag', tagIds: ['5'] }));
+  expect(viewAfter(one, withTag('7')).chart?.tagIds).toEqual(['7']);
+  expect(viewAfter(one, withTag(null)).chart?.tagIds).toEqual(['5']);
   const some = { by: 'sensor', tagIds: ['5', '6'] } as const;
-  const several = reduceView(DEFAULT_VIEW, { type: 'chart', chart: some });
-  expect(reduceView(several, { type: 'select', tagId: '7' }).chart).toEqual(some);
-  expect(reduceView(several, { type: 'chart', chart: { by: 'tag', tagIds: [] } }).chart).toBeNull();
+  const several = viewAfter(DEFAULT_VIEW, withChart(some));
+  expect(viewAfter(several, withTag('7')).chart).toEqual(some);
+  expect(viewAfter(several, withChart({ by: 'tag', tagIds: [] })).chart).toBeNull();
 });
 
 test('charts stand where the map is, and lead back to where they were opened', () => {
-  const chart = { type: 'chart', chart: { by: 'tag', tagIds: ['5'] } } as const;
-  const close = { type: 'chart', chart: null } as const;
-  const list = reduceView(DEFAULT_VIEW, { type: 'list', list: 'tags' });
-  const open = reduceView(list, chart);
+  const chart = withChart({ by: 'tag', tagIds: ['5'] });
+  const close = withChart(null);
+  const list = viewAfter(DEFAULT_VIEW, withList('tags'));
+  const open = viewAfter(list, chart);
   expect(open.pane).toBe('map');
-  expect(reduceView(reduceView(open, chart), close).pane).toBe('tags');
-  expect(reduceView(reduceView(DEFAULT_VIEW, chart), close).pane).toBe('map');
+  expect(viewAfter(viewAfter(open, chart), close).pane).toBe('tags');
+  expect(viewAfter(viewAfter(DEFAULT_VIEW, chart), close).pane).toBe('map');
   // Who went on to the map by hand stays there.
-  expect(reduceView(reduceView(open, { type: 'pane', pane: 'map' }), close).pane).toBe('map');
+  expect(viewAfter(viewAfter(open, { pane: 'map', chartedFrom: null }), close).pane).toBe('map');
   // So does who went on to a list.
-  const alarms = reduceView(reduceView(DEFAULT_VIEW, chart), { type: 'list', list: 'alarms' });
-  expect(reduceView(alarms, close).pane).toBe('tags');
+  const alarms = viewAfter(viewAfter(DEFAULT_VIEW, chart), withList('alarms'));
+  expect(viewAfter(alarms, close).pane).toBe('tags');
 });
 
 test('the list beside the map: a narrow screen shows it, and a filter of the table the table', () => {
-  const alarms = reduceView(DEFAULT_VIEW, { type: 'list', list: 'alarms' });
+  const alarms = viewAfter(DEFAULT_VIEW, withList('alarms'));
   expect(alarms).toMatchObject({ list: 'alarms', pane: 'tags' });
-  expect(reduceView(alarms, { type: 'health', verdict: 'critical' }).list).toBe('tags');
-  const map = reduceView(alarms, { type: 'pane', pane: 'map' });
+  expect(viewAfter(alarms, { health: 'critical', list: 'tags' }).list).toBe('tags');
+  const map = viewAfter(alarms, { pane: 'map', chartedFrom: null });
   expect(map.list).toBe('alarms');
   // A link shows what was in sight when it was made.
   const follow = (from: ViewState): ViewState =>
-    reduceView(DEFAULT_VIEW, { type: 'look', view: fromFragment(toFragment(from)) });
+    viewAfter(DEFAULT_VIEW, fromFragment(toFragment(from)));
   expect(follow(alarms)).toMatchObject({ list: 'alarms', pane: 'tags' });
   expect(follow(map)).toMatchObject({ list: 'tags', pane: 'map' });
 });

@@ -1,9 +1,9 @@
-/** What the operator chose to look at. */
 import type { Verdict } from '../contract/types';
 import type { Range } from '../domain/ramp';
 import type { Compare } from '../domain/difference';
 import type { Period } from '../domain/time';
 import type { Camera } from '../geometry/coordinates';
+import { type Change, changed } from './create';
 
 export const LAYERS = [
   'map',
@@ -57,7 +57,6 @@ export interface ViewState {
   readonly heat: HeatKind;
   /** What the heat map is the difference to; null: it is the field itself. */
   readonly compare: Compare | null;
-  /** What the charts show; null: they are closed. */
   readonly chart: Charted | null;
   /** The half that the charts took the place of, and lead back to; null: none that is still wanted. */
   readonly chartedFrom: ViewState['pane'] | null;
@@ -109,7 +108,6 @@ export const SHORT_PERIOD: Period = { kind: 'hour' };
 export const isChosen = (period: Period): boolean =>
   period !== DEFAULT_VIEW.period && period !== SHORT_PERIOD;
 
-/** The fixed colour scale of the sensor in view; null: that of the field itself. */
 export function fixedRange({ ranges, sensor }: ViewState): Range | null {
   return ranges.get(sensor) ?? null;
 }
@@ -118,101 +116,57 @@ export function fixedRange({ ranges, sensor }: ViewState): Range | null {
 export const roundedMoment = (moment: number): number =>
   Math.max(0, Math.round(moment * 1000) / 1000);
 
-export type ViewAction =
-  /** Part of the view set from outside: a permalink. */
-  | { readonly type: 'look'; readonly view: Partial<ViewState> }
-  /** To the millisecond; null: now. */
-  | { readonly type: 'moment'; readonly moment: number | null }
-  | { readonly type: 'period'; readonly period: Period }
-  | { readonly type: 'compare'; readonly compare: Compare | null }
-  | { readonly type: 'chart'; readonly chart: Charted | null }
-  | { readonly type: 'sensor'; readonly sensor: string }
-  | { readonly type: 'select'; readonly tagId: string | null }
-  | { readonly type: 'hover'; readonly tagId: string | null }
-  | { readonly type: 'layer'; readonly layer: Layer; readonly on: boolean }
-  | { readonly type: 'heat'; readonly heat: HeatKind }
-  | { readonly type: 'colouring'; readonly colouring: ViewState['colouring'] }
-  /** Of the sensor in view; null: as its data are. */
-  | { readonly type: 'range'; readonly range: Range | null }
-  | { readonly type: 'camera'; readonly camera: Camera | null }
-  | { readonly type: 'sort'; readonly column: string }
-  | { readonly type: 'filter'; readonly text: string }
-  | { readonly type: 'health'; readonly verdict: Verdict | null }
-  | { readonly type: 'pane'; readonly pane: ViewState['pane'] }
-  /** On a narrow screen it comes into view. */
-  | { readonly type: 'list'; readonly list: ViewState['list'] };
-
-export function reduceView(view: ViewState, action: ViewAction): ViewState {
-  switch (action.type) {
-    case 'look':
-      return { ...view, ...action.view, ...(action.view.list === 'alarms' && { pane: 'tags' }) };
-    case 'moment': {
-      const moment = action.moment === null ? null : roundedMoment(action.moment);
-      return moment === view.moment ? view : { ...view, moment };
-    }
-    case 'period':
-      return { ...view, period: action.period };
-    case 'sensor':
-      return action.sensor === view.sensor ? view : { ...view, sensor: action.sensor };
-    case 'compare':
-      return { ...view, compare: action.compare };
-    case 'chart':
-      return charted(view, chartOf(action.chart));
-    case 'select': {
-      const { chart } = view;
-      const follows = chart?.by === 'tag' && action.tagId !== null;
-      return {
-        ...view,
-        selected: action.tagId,
-        chart: follows ? { by: 'tag', tagIds: [action.tagId] } : chart,
-      };
-    }
-    case 'hover':
-      return action.tagId === view.hovered ? view : { ...view, hovered: action.tagId };
-    case 'layer': {
-      const layers = new Set(view.layers);
-      if (action.on) layers.add(action.layer);
-      else layers.delete(action.layer);
-      return { ...view, layers };
-    }
-    case 'heat':
-      return { ...view, heat: action.heat };
-    case 'colouring':
-      return { ...view, colouring: action.colouring };
-    case 'range': {
-      const ranges = new Map(view.ranges);
-      if (action.range) ranges.set(view.sensor, action.range);
-      else ranges.delete(view.sensor);
-      return { ...view, ranges };
-    }
-    case 'camera':
-      return { ...view, camera: action.camera };
-    case 'sort': {
-      const { column, descending } = view.sort;
-      return {
-        ...view,
-        sort: { column: action.column, descending: action.column === column && !descending },
-      };
-    }
-    case 'filter':
-      return { ...view, filter: action.text };
-    case 'health':
-      // A filter of the table shows the table.
-      return { ...view, health: action.verdict, list: 'tags' };
-    case 'pane':
-      return { ...view, pane: action.pane, chartedFrom: null };
-    case 'list':
-      return { ...view, list: action.list, pane: 'tags', chartedFrom: null };
-  }
+export function viewAfter(view: ViewState, change: Change<ViewState>): ViewState {
+  const next = changed(view, change);
+  return next.moment === null
+    ? next
+    : changed(view, { ...next, moment: roundedMoment(next.moment) });
 }
+
+type With = (view: ViewState) => Partial<ViewState>;
+
+/** Its charts follow a tag that is chosen, if they are a tag's. */
+export const withTag =
+  (tagId: string | null): With =>
+  ({ chart }) => ({
+    selected: tagId,
+    chart: chart?.by === 'tag' && tagId !== null ? { by: 'tag', tagIds: [tagId] } : chart,
+  });
+
+export const withLayer =
+  (layer: Layer, on: boolean): With =>
+  ({ layers }) => ({
+    layers: new Set(LAYERS.filter((each) => (each === layer ? on : layers.has(each)))),
+  });
+
+/** Fixes the colour scale of the sensor in view; null: it is as its data are. */
+export const withRange =
+  (range: Range | null): With =>
+  (view) => {
+    const ranges = new Map(view.ranges);
+    if (range) ranges.set(view.sensor, range);
+    else ranges.delete(view.sensor);
+    return { ranges };
+  };
+
+export const withSort =
+  (column: string): With =>
+  ({ sort }) => ({ sort: { column, descending: column === sort.column && !sort.descending } });
+
+/** On a narrow screen it comes into view. */
+export const withList = (list: ViewState['list']): Partial<ViewState> => ({
+  ...{ list, pane: 'tags', chartedFrom: null },
+});
 
 /** On a narrow screen the charts are where the map is. */
-function charted(view: ViewState, chart: Charted | null): ViewState {
-  const { pane, chartedFrom } = view;
-  return chart
-    ? { ...view, chart, pane: 'map', chartedFrom: view.chart ? chartedFrom : pane }
-    : { ...view, chart, pane: chartedFrom ?? pane, chartedFrom: null };
-}
+export const withChart =
+  (wanted: Charted | null): With =>
+  ({ pane, chartedFrom, chart: before }) => {
+    const chart = chartOf(wanted);
+    return chart
+      ? { chart, pane: 'map', chartedFrom: before ? chartedFrom : pane }
+      : { chart, pane: chartedFrom ?? pane, chartedFrom: null };
+  };
 
 /** As many as a chart may have, none of them twice; without any there is no chart. */
 export function chartOf(chart: Charted | null): Charted | null {

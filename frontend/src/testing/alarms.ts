@@ -30,7 +30,6 @@ export const alarms = (list: readonly Alarm[], over: Partial<Alarms> = {}): Alar
   ...over,
 });
 
-/** A frame of alarms has come. */
 export const tellAlarms = (...list: readonly Alarm[]): void => {
-  receive({ type: 'set', part: { alarms: alarms(list) } });
+  receive({ alarms: alarms(list) });
 };

@@ -2,7 +2,7 @@
  * Test files share one process, and those of the page one window: to make these for each takes
  * longer than most files' tests. So each file leaves everything as it found it.
  */
-import { afterAll, vi } from 'vitest';
+import { vi } from 'vitest';
 
 /** What is set, replaced or removed on `thing` itself is put back by what this returns. */
 function ownAsFound(thing: object): () => void {
@@ -36,21 +36,17 @@ function replacedAsFound(): () => void {
 /** Timers that still run when the file ends would call into the next one's window. */
 function timersEnd(): () => void {
   const stops: (() => void)[] = [];
-  const { setTimeout, setInterval, clearTimeout, clearInterval } = globalThis;
-  globalThis.setTimeout = ((...given: Parameters<typeof setTimeout>) => {
-    const timer = setTimeout(...given);
-    stops.push(() => {
-      clearTimeout(timer);
-    });
-    return timer;
-  }) as typeof setTimeout;
-  globalThis.setInterval = ((...given: Parameters<typeof setInterval>) => {
-    const timer = setInterval(...given);
-    stops.push(() => {
-      clearInterval(timer);
-    });
-    return timer;
-  }) as typeof setInterval;
+  for (const name of ['setTimeout', 'setInterval'] as const) {
+    const start = globalThis[name] as typeof setTimeout;
+    globalThis[name] = ((...given: Parameters<typeof setTimeout>) => {
+      const timer = start(...given);
+      stops.push(() => {
+        // Which ends either.
+        clearTimeout(timer);
+      });
+      return timer;
+    }) as never;
+  }
   return () => {
     for (const stop of stops) stop();
   };
@@ -100,7 +96,6 @@ function pageAsFound(): () => void {
 
 /** Looks round; what it returns puts everything back as it was. */
 export function asFound(): () => Promise<void> {
-  const environment = { ...process.env };
   const globals = ownAsFound(globalThis);
   const page = typeof document === 'undefined' ? () => undefined : pageAsFound();
   const timers = timersEnd();
@@ -108,6 +103,7 @@ export function asFound(): () => Promise<void> {
     vi.useRealTimers();
     vi.restoreAllMocks();
     vi.unstubAllGlobals();
+    vi.unstubAllEnvs();
     timers();
     // One that is half loaded when the modules are forgotten never comes in the next file either.
     await vi.dynamicImportSettled();
@@ -116,14 +112,5 @@ export function asFound(): () => Promise<void> {
     vi.resetModules();
     page();
     globals();
-    for (const name of Object.keys(process.env)) {
-      if (!(name in environment)) Reflect.deleteProperty(process.env, name);
-    }
-    Object.assign(process.env, environment);
   };
-}
-
-/** For each file's set-up. */
-export function leaveAsFound(): void {
-  afterAll(asFound());
 }

@@ -12,7 +12,6 @@ export class FakeContext {
   readonly calls: Call[] = [];
   readonly state: Record<string, unknown> = {};
 
-  /** What was drawn on a canvas of the page. */
   static recordOf(canvas: HTMLCanvasElement): FakeContext | undefined {
     return contexts.get(canvas);
   }

@@ -1,10 +1,9 @@
 /** What the bridge's judge might say. Nothing follows from readings here: verdicts are given. */
 import type { HealthReason, Judgement, Verdict } from '../contract/types';
-
-const ORDER: readonly Verdict[] = ['critical', 'stressed', 'unknown', 'healthy'];
+import { VERDICTS } from '../domain/health';
 
 const worst = (verdicts: readonly Verdict[]): Verdict =>
-  ORDER.find((verdict) => verdicts.includes(verdict)) ?? 'unknown';
+  VERDICTS.find((verdict) => verdicts.includes(verdict)) ?? 'unknown';
 
 export const reason = (over: Partial<HealthReason> = {}): HealthReason => ({
   kind: 'range',
@@ -37,5 +36,4 @@ export function judgement(
   return { house: { verdict, reasons: [], day, patrol }, tags };
 }
 
-/** Nobody was judged. */
 export const NOBODY: Judgement = judgement({});

@@ -3,7 +3,7 @@ import type { Field, Judgement, StatusFrame, TwinTagState } from '../contract/ty
 import { INITIAL, step, type ConnectionEvent } from '../connection/machine';
 import { prefer, receive, act } from '../store/app';
 import { DEFAULT_SETTINGS } from '../store/settings';
-import { NOT_ASKED } from '../store/twin';
+import { withConnection, withField, withLatest, withState } from '../store/twin';
 import { NOTHING } from '../store/fetcher';
 import { DEFAULT_VIEW } from '../store/view';
 import { NOBODY } from './health';
@@ -31,56 +31,44 @@ let stamp = 1;
 
 /** The defaults, and a state with these tags, just received, and judged so. */
 export function showTags(tags: readonly TwinTagState[], health: Judgement = NOBODY): void {
-  act({ type: 'look', view: DEFAULT_VIEW });
+  act(DEFAULT_VIEW);
   prefer(DEFAULT_SETTINGS);
-  receive({ type: 'set', part: { sensors: { value: CATALOGUES, state: 'ready', message: '' } } });
-  receive({ type: 'field', field: NOTHING });
-  receive({ type: 'latest', part: { map: NOTHING } });
-  receive({ type: 'latest', part: { quality: null } });
-  receive({ type: 'unread', why: null });
-  receive({ type: 'past', past: null });
-  receive({ type: 'set', part: { alarms: null } });
-  receive({ type: 'set', part: { remembered: NOT_ASKED } });
+  receive({ sensors: { value: CATALOGUES, state: 'ready', message: '' }, remembered: NOTHING });
+  receive({ unread: null, alarms: null, past: null, pastFault: null });
+  receive(withLatest({ field: NOTHING, map: NOTHING, quality: null }));
   stamp += 1;
   const latest = stateFrame(tags, { sec: stamp, revision: `r${stamp}`, health });
-  receive({ type: 'state', latest, now: performance.now() });
+  receive(withState(latest, performance.now()));
   goLive();
 }
 
 /** ROS seconds of the state that `showTags` shows next. */
 export const nextStamp = (): number => stamp + 1;
 
-/** A heat map that has come. */
 export function showField(value: Field): void {
-  receive({ type: 'field', field: { value, state: 'ready', message: '' } });
+  receive(withField({ value, state: 'ready', message: '' }));
 }
 
 /** Runs a connection through events and hands it to the store as it is at `now`. */
 export function connection(now: number, ...events: readonly ConnectionEvent[]): void {
-  const last = events.reduce((current, event) => step(current, event).connection, INITIAL);
-  receive({ type: 'connection', connection: last, now });
+  const last = events.reduce((current, event) => step(current, event, 1).connection, INITIAL);
+  receive(withConnection(last, now));
 }
+
+const heard = (now: number, bridge: StatusFrame): ConnectionEvent[] => [
+  { type: 'start', now },
+  { type: 'opened', now },
+  { type: 'frame', now, status: bridge },
+  { type: 'frame', now, status: null },
+];
 
 /** Heard of, the last time so long ago. */
 export function goLive(bridge: StatusFrame = status(), silentMs = 0): void {
   const now = performance.now();
-  connection(
-    now + silentMs,
-    { type: 'start', now },
-    { type: 'opened', now },
-    { type: 'frame', now, status: bridge },
-    { type: 'frame', now, status: null },
-  );
+  connection(now + silentMs, ...heard(now, bridge));
 }
 
 export function goLost(): void {
   const now = performance.now();
-  connection(
-    now,
-    { type: 'start', now },
-    { type: 'opened', now },
-    { type: 'frame', now, status: status() },
-    { type: 'frame', now, status: null },
-    { type: 'closed', now, code: 1006, random: 1 },
-  );
+  connection(now, ...heard(now, status()), { type: 'closed', now, code: 1006 });
 }

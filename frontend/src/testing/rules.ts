@@ -1,3 +1,5 @@
-import { leaveAsFound } from './asFound';
+import { afterAll } from 'vitest';
 
-leaveAsFound();
+import { asFound } from './asFound';
+
+afterAll(asFound());

@@ -5,7 +5,6 @@ import { cataloguesOf, type Sensor } from '../domain/sensors';
 
 export const FILE: SensorsFile = file;
 export const CATALOGUES = cataloguesOf(FILE);
-/** As it holds by day. */
 export const CATALOGUE = CATALOGUES.day;
 
 export const sensorNamed = (name: string): Sensor => CATALOGUE.named(name);

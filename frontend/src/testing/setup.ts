@@ -1,11 +1,11 @@
 /** What jsdom lacks of a browser, as far as the page's modules touch it on import or mount. */
 import { cleanup, configure } from '@testing-library/react';
-import { afterEach } from 'vitest';
+import { afterAll, afterEach } from 'vitest';
 
-import { leaveAsFound } from './asFound';
+import { asFound } from './asFound';
 import { FakeContext } from './canvas';
 
-leaveAsFound();
+afterAll(asFound());
 
 // How long a busy machine takes is no matter.
 configure({ asyncUtilTimeout: 20_000 });
@@ -34,14 +34,10 @@ globalThis.ImageData = class {
   ) {}
 } as unknown as typeof ImageData;
 
+// Nothing has a size here.
+const nothing = (): void => undefined;
 globalThis.ResizeObserver = class {
-  observe(): void {
-    // Nothing has a size here.
-  }
-  unobserve(): void {
-    // See above.
-  }
-  disconnect(): void {
-    // See above.
-  }
+  observe = nothing;
+  unobserve = nothing;
+  disconnect = nothing;
 };

@@ -1,4 +1,3 @@
-/** Small builders for tests. */
 import type { StateFrame, TwinTagState } from '../contract/types';
 import { tagOf, type Snapshot, type Tag } from '../domain/twin';
 import { NOBODY } from './health';
@@ -54,7 +53,6 @@ export function stateFrame(
 export const snapshot = (tags: readonly Tag[]): Snapshot => ({
   tags,
   revision: 'r1',
-  stamp: '1000.0',
   at: { sec: 1000, nanosec: 0 },
   takenAt: 0,
   fresh: [],

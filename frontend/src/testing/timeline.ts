@@ -1,4 +1,3 @@
-/** A timeline, as the page has it and as the server writes it. */
 import type { WireTime, Timeline as WireTimeline } from '../contract/types';
 import { type Point, readingAt, type Series } from '../domain/series';
 import type { Timeline } from '../domain/timeline';
@@ -46,8 +45,6 @@ export function wireTimeline({
     ...over,
   };
 }
-
-/** What there is to draw a line of. */
 
 interface Given extends Partial<Series> {
   readonly readings?: readonly { readonly at: number; readonly value: number | null }[];

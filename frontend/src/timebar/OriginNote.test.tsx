@@ -4,7 +4,7 @@ import { beforeEach, expect, test } from 'vitest';
 import type { StatusFrame } from '../contract/types';
 import { act, receive, store } from '../store/app';
 import { selectOrigin } from '../store/moment';
-import { NO_HOUSE } from '../store/twin';
+import { NO_HOUSE, withPast } from '../store/twin';
 import { goLive, goLost, showTags, status } from '../testing/page';
 import { wireTag } from '../testing/tags';
 import { ConnectionBadge } from '../ui/Header';
@@ -88,8 +88,8 @@ test('a recording is never live: header, badge, frame and the way back say so, a
 test('looking back in a recording, the moment is that of the past alone', () => {
   shows('recorded');
   flush(() => {
-    receive({ type: 'past', past: { at: 1, house: NO_HOUSE } });
-    act({ type: 'moment', moment: 1 });
+    receive(withPast({ at: 1, house: NO_HOUSE }));
+    act({ moment: 1 });
   });
   expect(screen.queryByTestId('recorded-frame')).toBeNull();
   expect(screen.getByTestId('past-frame').textContent).toBe('');

@@ -59,7 +59,6 @@ export function LiveButton(): JSX.Element {
   );
 }
 
-/** The newest moment of a recording or a simulation, as a text that goes on. */
 function useOwnTime(): string | null {
   return useTicking((now) => {
     const at = ownTime(store.get(), now);

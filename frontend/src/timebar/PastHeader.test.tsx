@@ -3,7 +3,7 @@ import { afterEach, beforeEach, expect, test, vi } from 'vitest';
 
 import { startTitle } from '../alarms/watch';
 import { act, receive, store } from '../store/app';
-import { NO_HOUSE } from '../store/twin';
+import { NO_HOUSE, withPast, withState } from '../store/twin';
 import { goLive, showTags, status } from '../testing/page';
 import { stateFrame, wireTag } from '../testing/tags';
 import { PastFrame, PastHeader } from './Past';
@@ -13,11 +13,7 @@ let stop: () => void;
 beforeEach(() => {
   vi.spyOn(performance, 'now').mockReturnValue(performance.now());
   showTags([]);
-  receive({
-    type: 'state',
-    latest: stateFrame([wireTag()], { sec: 10_000 }),
-    now: performance.now(),
-  });
+  receive(withState(stateFrame([wireTag()], { sec: 10_000 }), performance.now()));
   stop = startTitle();
 });
 afterEach(() => {
@@ -26,8 +22,8 @@ afterEach(() => {
 
 const look = (at: number | null, came: number | null): void => {
   flush(() => {
-    act({ type: 'moment', moment: at });
-    receive({ type: 'past', past: came === null ? null : { at: came, house: NO_HOUSE } });
+    act({ moment: at });
+    receive(withPast(came === null ? null : { at: came, house: NO_HOUSE }));
   });
 };
 
@@ -58,7 +54,7 @@ test.each([
   [
     'after a sleep',
     () => {
-      receive({ type: 'lapse' });
+      receive({ isTimeLost: true });
     },
   ],
   [

@@ -35,7 +35,6 @@ const TICK_ROOM_PX = 76;
 const FAR = 10;
 const PAGES = 10;
 
-/** The bar itself: a slider whose right end is now. */
 export function Slider({
   span,
   timeline,
@@ -95,7 +94,7 @@ export function Slider({
   const at = (event: PointerEvent): number =>
     event.clientX - (element.current?.getBoundingClientRect().left ?? 0);
   const go = (next: number | null): void => {
-    act({ type: 'moment', moment: next });
+    act({ moment: next });
   };
   const onPointerDown = (event: PointerEvent): void => {
     if (event.button !== 0) return;
@@ -107,13 +106,13 @@ export function Slider({
   const onPointerMove = (event: PointerEvent): void => {
     const x = event.pointerType === 'touch' && !held ? null : at(event);
     setPointed(x);
-    pointedTime.dispatch(x === null ? null : { at: momentAt(axis, x), by: 'bar' });
+    pointedTime.set(x === null ? null : { at: momentAt(axis, x), by: 'bar' });
     if (held) go(chosenAt(axis, at(event), nowS));
   };
   const letGo = (): void => {
     setHeld(null);
     setPointed(null);
-    pointedTime.dispatch(null);
+    pointedTime.set(null);
   };
   const onKeyDown = (event: KeyboardEvent): void => {
     if (event.altKey || event.ctrlKey || event.metaKey) return;
@@ -153,7 +152,7 @@ export function Slider({
       onLostPointerCapture={letGo}
       onPointerLeave={() => {
         setPointed(null);
-        pointedTime.dispatch(null);
+        pointedTime.set(null);
       }}
       onKeyDown={onKeyDown}
     >
@@ -202,7 +201,6 @@ const valueText = (moment: number | null, column: Column | undefined, newest: st
   return column ? `${time}, ${countsText(column)}` : time;
 };
 
-/** Beside the mouse: which moment that is, and what happened about then. */
 function Bubble({
   axis,
   x,

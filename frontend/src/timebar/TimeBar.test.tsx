@@ -4,7 +4,7 @@ import { beforeEach, describe, expect, test, vi } from 'vitest';
 import { timelineOf } from '../domain/timeline';
 import { act, receive, store } from '../store/app';
 import { pointedTime } from '../store/create';
-import { NO_HOUSE, NO_TWIN } from '../store/twin';
+import { NO_HOUSE, NO_TWIN, withPast, withState } from '../store/twin';
 import { goLive, goLost, showTags, status } from '../testing/page';
 import { stateFrame, wireTag } from '../testing/tags';
 import { wireTime, wireTimeline } from '../testing/timeline';
@@ -17,7 +17,7 @@ const remember = (from: number, to: number): void => {
     { start: wireTime(9_000), scans: 3, failures: 1, looks: 0, pests_seen: 1, pests_cleared: 0 },
   ];
   const value = timelineOf(wireTimeline({ from, to, bucket_s: 15, buckets }), NOW);
-  receive({ type: 'set', part: { remembered: { value, state: 'ready', message: '' } } });
+  receive({ remembered: { value, state: 'ready', message: '' } });
 };
 
 beforeEach(() => {
@@ -26,8 +26,8 @@ beforeEach(() => {
   vi.spyOn(HTMLElement.prototype, 'clientWidth', 'get').mockReturnValue(1_000);
   showTags([wireTag()]);
   const latest = stateFrame([wireTag()], { sec: NOW });
-  receive({ type: 'state', latest, now: performance.now() });
-  act({ type: 'period', period: { kind: 'hour' } });
+  receive(withState(latest, performance.now()));
+  act({ period: { kind: 'hour' } });
   remember(9_000, NOW);
   HTMLElement.prototype.setPointerCapture = () => undefined;
 });
@@ -44,11 +44,11 @@ describe('the mouse on a chart and on the bar', () => {
     render(<TimeBar />);
     expect(pointed()).toBeNull();
     flush(() => {
-      pointedTime.dispatch({ at: 9_500, by: 'chart' });
+      pointedTime.set({ at: 9_500, by: 'chart' });
     });
     expect(pointed()?.style.left).toBe('500px');
     flush(() => {
-      pointedTime.dispatch({ at: 8_900, by: 'chart' });
+      pointedTime.set({ at: 8_900, by: 'chart' });
     });
     expect(pointed()).toBeNull();
   });
@@ -82,7 +82,7 @@ test('how fast the past is played is chosen where there is a past to play', () =
   render(<TimeBar />);
   expect(screen.queryByLabelText('Playback speed')).toBeNull();
   flush(() => {
-    act({ type: 'moment', moment: 9_004 });
+    act({ moment: 9_004 });
   });
   expect(screen.getByLabelText('Playback speed')).toBeTruthy();
 });
@@ -95,7 +95,7 @@ describe('the slider', () => {
     expect(slider().getAttribute('aria-valuetext')).toBe('Live');
     expect(slider().getAttribute('aria-valuenow')).toBe(`${NOW}`);
     flush(() => {
-      act({ type: 'moment', moment: 9_004 });
+      act({ moment: 9_004 });
     });
     expect(slider().getAttribute('aria-valuetext')).toBe(
       'sim 02:30:04, 3 scans, 1 failed, 1 pest seen',
@@ -150,19 +150,19 @@ describe('the slider', () => {
   });
 
   test('is hollow while its moment is on the way, and shows what has come', () => {
-    receive({ type: 'past', past: { at: 9_700, house: NO_HOUSE } });
-    act({ type: 'moment', moment: 9_500 });
+    receive(withPast({ at: 9_700, house: NO_HOUSE }));
+    act({ moment: 9_500 });
     render(<TimeBar />);
     expect(cursor()['awaited']).toBe('true');
     expect(document.querySelector<HTMLElement>('.timebar-arrived')?.style.left).toBe('700px');
     flush(() => {
-      receive({ type: 'past', past: { at: 9_500, house: NO_HOUSE } });
+      receive(withPast({ at: 9_500, house: NO_HOUSE }));
     });
     expect(cursor()['awaited']).toBe('false');
   });
 
   test('a moment beyond its ends is marked at the end', () => {
-    act({ type: 'moment', moment: 500 });
+    act({ moment: 500 });
     render(<TimeBar />);
     expect(cursor()['outside']).toBe('true');
     expect(slider().getAttribute('aria-valuetext')).toBe('sim 00:08:20');
@@ -188,24 +188,21 @@ describe('the period', () => {
   });
 
   test('is in its fields the one that a chart or a link has chosen since', () => {
-    act({ type: 'period', period: { kind: 'own', from: 3_600, to: 7_200 } });
+    act({ period: { kind: 'own', from: 3_600, to: 7_200 } });
     render(<TimeBar />);
     const fields = (): string[] =>
       ['From', 'To'].map((name) => screen.getByLabelText<HTMLInputElement>(name).value);
     fireEvent.change(screen.getByLabelText('To'), { target: { value: '1:30' } });
     expect(fields()).toEqual(['1:00:00', '1:30']);
     flush(() => {
-      act({ type: 'period', period: { kind: 'own', from: 4_000, to: 5_000 } });
+      act({ period: { kind: 'own', from: 4_000, to: 5_000 } });
     });
     expect(fields()).toEqual(['1:06:40', '1:23:20']);
   });
 });
 
 test('a twin that remembers nothing says so, and how to change it', () => {
-  receive({
-    type: 'set',
-    part: { remembered: { value: null, state: 'off', message: 'no journal is kept' } },
-  });
+  receive({ remembered: { value: null, state: 'off', message: 'no journal is kept' } });
   render(<TimeBar />);
   const bar = screen.getByTestId('timebar');
   expect(bar.textContent).toContain('this twin records nothing');
@@ -216,10 +213,7 @@ test('a twin that remembers nothing says so, and how to change it', () => {
 
 test('what could not be loaded is told, beside what is known', () => {
   const { remembered } = store.get().twin;
-  receive({
-    type: 'set',
-    part: { remembered: { ...remembered, state: 'failed', message: 'too busy' } },
-  });
+  receive({ remembered: { ...remembered, state: 'failed', message: 'too busy' } });
   render(<TimeBar />);
   expect(screen.getByTestId('timebar').textContent).toContain('too busy');
   expect(slider()).not.toBeNull();
@@ -236,7 +230,7 @@ test('before the twin has told its time there is no bar', () => {
 
 // Half an hour off the full one, and set before any module looks at the clock.
 vi.hoisted(() => {
-  process.env['TZ'] = 'Asia/Kolkata';
+  vi.stubEnv('TZ', 'Asia/Kolkata');
 });
 
 const AT = Date.UTC(2026, 10, 13, 21, 42, 5) / 1000;

@@ -21,7 +21,15 @@ export function TimeBar(): JSX.Element | null {
   const tick = useNow();
   const nowS = rosNow(store.get(), tick);
   if (nowS === null) return null;
-  if (remembered.state === 'off') return <Off />;
+  if (remembered.state === 'off') {
+    return (
+      <section className="timebar" aria-label={S.timebar} data-testid="timebar" data-state="off">
+        <p className="timebar-note">
+          <strong>{S.timebarOff}</strong> {S.timebarOffHint}
+        </p>
+      </section>
+    );
+  }
   const span = barSpan(store.get(), nowS);
   return (
     <section
@@ -50,19 +58,8 @@ export function TimeBar(): JSX.Element | null {
   );
 }
 
-/** A twin that keeps nothing: what is missing, and how to have it. */
-function Off(): JSX.Element {
-  return (
-    <section className="timebar" aria-label={S.timebar} data-testid="timebar" data-state="off">
-      <p className="timebar-note">
-        <strong>{S.timebarOff}</strong> {S.timebarOffHint}
-      </p>
-    </section>
-  );
-}
-
 function Player(): JSX.Element {
-  const { isPlaying, speed } = useSelected(playback, (state) => state);
+  const { isPlaying, speed } = useSelected(playback);
   const isNow = useApp((state) => state.view.moment === null);
   const label = isPlaying ? S.timebarPause : S.timebarPlay;
   return (
@@ -117,13 +114,12 @@ function PeriodChoice({ period, nowS }: { period: Period; nowS: number }): JSX.E
         // An own period begins as what is in view.
         const { from, to } = barSpan(store.get(), nowS);
         const own = { kind: 'own', from: Math.floor(from), to: Math.ceil(to) } as const;
-        act({ type: 'period', period: kind === 'own' ? own : { kind } });
+        act({ period: kind === 'own' ? own : { kind } });
       }}
     />
   );
 }
 
-/** What the marks of the bar mean, in words, each beside its shape. */
 function Marks(): JSX.Element {
   const mark = (name: keyof typeof S.timebarMark, picture: ReactNode): JSX.Element => (
     <li>
@@ -154,10 +150,7 @@ function Marks(): JSX.Element {
 
 type Own = Extract<Period, { kind: 'own' }>;
 
-interface Typed {
-  readonly from: string;
-  readonly to: string;
-}
+type Typed = Readonly<Record<'from' | 'to', string>>;
 
 /** Null: what is typed makes no period. */
 function periodOf(typed: Typed, isSimulated: boolean): Own | null {
@@ -179,7 +172,7 @@ function OwnPeriod({ period, isSimulated }: { period: Own; isSimulated: boolean 
   const take = (next: Typed): void => {
     const own = periodOf(next, isSimulated);
     setTyped({ ...next, of: own ?? period });
-    if (own) act({ type: 'period', period: own });
+    if (own) act({ period: own });
   };
   const input = (name: keyof Typed, label: string): JSX.Element => (
     <label>

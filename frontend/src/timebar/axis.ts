@@ -16,7 +16,6 @@ export const xOf = ({ from, to, width }: Axis, at: number): number =>
 export const momentAt = ({ from, to, width }: Axis, x: number): number =>
   from + (Math.min(width, Math.max(0, x)) / Math.max(1, width)) * (to - from);
 
-/** What a pixel is worth, seconds. */
 export const pixelS = ({ from, to, width }: Axis): number => (to - from) / Math.max(1, width);
 
 /**
@@ -45,20 +44,9 @@ export function stepped(
 const LEAST_COLUMN_PX = 3;
 
 /** What happened within a few pixels. */
-export interface Column extends Happened {
-  readonly end: number;
-  readonly x: number;
-  readonly width: number;
-  /** Of the tallest column, 0 to 1; any scan at all can be seen. */
-  readonly scanHeight: number;
-  readonly failureHeight: number;
-}
+export type Column = ReturnType<typeof columnsOf>[number];
 
-/** A stretch in pixels. */
-export interface Stretch {
-  readonly x: number;
-  readonly width: number;
-}
+export type Stretch = Pick<Column, 'x' | 'width'>;
 
 /**
  * A few scans beside many would vanish; by their root they stay in sight. The smallest is a tenth.
@@ -66,7 +54,7 @@ export interface Stretch {
 const height = (count: number, most: number): number =>
   count === 0 ? 0 : Math.max(0.1, Math.sqrt(count / most));
 
-export function columnsOf({ buckets, bucketS }: Timeline, axis: Axis): readonly Column[] {
+export function columnsOf({ buckets, bucketS }: Timeline, axis: Axis) {
   const bucketPx = (bucketS / (axis.to - axis.from)) * axis.width;
   const together = Math.max(1, Math.ceil(LEAST_COLUMN_PX / Math.max(1e-9, bucketPx)));
   const wide = together * bucketS;
@@ -86,6 +74,7 @@ export function columnsOf({ buckets, bucketS }: Timeline, axis: Axis): readonly 
       end,
       x,
       width: Math.max(1, xOf(axis, end) - x),
+      // Of the tallest column, 0 to 1; any scan at all can be seen.
       scanHeight: height(sum.scans, most),
       failureHeight: height(sum.failures, most),
     };
@@ -125,6 +114,5 @@ export function beforeMemory({ reach }: Timeline, axis: Axis): Stretch | null {
   return until > 0 ? { x: 0, width: until } : null;
 }
 
-/** The column that a point of the bar lies on. */
 export const columnAt = (columns: readonly Column[], x: number): Column | undefined =>
   columns.find((column) => x >= column.x && x < column.x + column.width);

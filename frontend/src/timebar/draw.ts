@@ -11,19 +11,6 @@ import {
   xOf,
 } from './axis';
 
-export interface BarPalette {
-  readonly ink: string;
-  readonly muted: string;
-  readonly line: string;
-  readonly scan: string;
-  readonly failure: string;
-  readonly pest: string;
-  readonly cleared: string;
-  readonly silence: string;
-  readonly surface: string;
-  readonly font: string;
-}
-
 /** Heights from the top, CSS pixels: marks of pests, bars of scans, bars of failures, times. */
 const MARKS_PX = 14;
 const SCANS_PX = 24;
@@ -137,7 +124,6 @@ function drawColumns(
   }
 }
 
-/** A full triangle on its tip. */
 function drawPest(context: CanvasRenderingContext2D, x: number, palette: BarPalette): void {
   context.beginPath();
   context.moveTo(x - 5, 2.5);
@@ -151,7 +137,6 @@ function drawPest(context: CanvasRenderingContext2D, x: number, palette: BarPale
   context.stroke();
 }
 
-/** An empty ring. */
 function drawCleared(context: CanvasRenderingContext2D, x: number, palette: BarPalette): void {
   context.beginPath();
   context.arc(x, MARKS_PX / 2, 4, 0, 2 * Math.PI);
@@ -162,7 +147,6 @@ function drawCleared(context: CanvasRenderingContext2D, x: number, palette: BarP
   context.stroke();
 }
 
-/** A dashed line over the whole height. */
 function drawRunStart(context: CanvasRenderingContext2D, x: number, palette: BarPalette): void {
   context.save();
   context.strokeStyle = palette.ink;
@@ -185,23 +169,32 @@ function line(
   context.stroke();
 }
 
-/** The bar's colours, as the style sheet has them now: light or dark, forced, or for paper. */
+/** The bar's colours: a name in the style sheet, and a system's own where those are forced. */
+const COLOURS = {
+  ink: ['ink', 'CanvasText'],
+  muted: ['muted', 'CanvasText'],
+  line: ['line', 'GrayText'],
+  scan: ['bar-scan', 'CanvasText'],
+  failure: ['critical', 'Highlight'],
+  pest: ['critical', 'Highlight'],
+  cleared: ['healthy', 'CanvasText'],
+  silence: ['line-strong', 'GrayText'],
+  surface: ['surface', 'Canvas'],
+} as const;
+
+export type BarPalette = Readonly<Record<keyof typeof COLOURS | 'font', string>>;
+
+/** As they are now: light or dark, forced, or for paper. */
 export function readBarPalette(): BarPalette {
   const style = getComputedStyle(document.documentElement);
   const isForced = window.matchMedia('(forced-colors: active)').matches;
-  const read = (name: string, forced: string): string =>
-    isForced ? forced : style.getPropertyValue(`--${name}`).trim();
   const textPx = 11 * (parseFloat(style.fontSize) / 16 || 1);
+  const colours = Object.entries(COLOURS).map(([name, [own, forced]]) => [
+    name,
+    isForced ? forced : style.getPropertyValue(`--${own}`).trim(),
+  ]);
   return {
-    ink: read('ink', 'CanvasText'),
-    muted: read('muted', 'CanvasText'),
-    line: read('line', 'GrayText'),
-    scan: read('bar-scan', 'CanvasText'),
-    failure: read('critical', 'Highlight'),
-    pest: read('critical', 'Highlight'),
-    cleared: read('healthy', 'CanvasText'),
-    silence: read('line-strong', 'GrayText'),
-    surface: read('surface', 'Canvas'),
+    ...(Object.fromEntries(colours) as BarPalette),
     font: `${textPx}px ${style.getPropertyValue('--font') || 'sans-serif'}`,
   };
 }

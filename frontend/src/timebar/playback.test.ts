@@ -1,6 +1,7 @@
 import { afterEach, beforeEach, describe, expect, test, vi } from 'vitest';
 
 import { act, receive, store } from '../store/app';
+import { withState } from '../store/twin';
 import { rosNow } from '../store/moment';
 import { showTags } from '../testing/page';
 import { stateFrame, wireTag } from '../testing/tags';
@@ -11,7 +12,7 @@ beforeEach(() => {
   showTags([wireTag()]);
   // Far enough from the beginning of time for an hour to lie before now.
   const latest = stateFrame([], { sec: 100_000 });
-  receive({ type: 'state', latest, now: performance.now() });
+  receive(withState(latest, performance.now()));
   chooseSpeed(300);
 });
 afterEach(() => {
@@ -25,14 +26,14 @@ const moment = (): number | null => store.get().view.moment;
 describe('playback', () => {
   test.each([60, 300, 900, 3_600] as const)('goes on %i seconds a second', (speed) => {
     chooseSpeed(speed);
-    act({ type: 'moment', moment: 90_000 });
+    act({ moment: 90_000 });
     play();
     vi.advanceTimersByTime(1_000);
     expect(moment()).toBeCloseTo(90_000 + speed, 0);
   });
 
   test('has ten moments a second, and does not lag where one comes late', () => {
-    act({ type: 'moment', moment: 90_000 });
+    act({ moment: 90_000 });
     play();
     const moments = new Set<number | null>();
     const stop = store.subscribe(() => moments.add(moment()));
@@ -47,14 +48,14 @@ describe('playback', () => {
   });
 
   test('begins at the beginning of the bar when now is shown', () => {
-    act({ type: 'period', period: { kind: 'hour' } });
+    act({ period: { kind: 'hour' } });
     play();
     const nowS = rosNow(store.get(), performance.now()) ?? 0;
     expect(moment()).toBeCloseTo(nowS - 3_600, 0);
   });
 
   test('ends in now', () => {
-    act({ type: 'moment', moment: 99_900 });
+    act({ moment: 99_900 });
     play();
     vi.advanceTimersByTime(2_000);
     expect(moment()).toBeNull();
@@ -62,21 +63,21 @@ describe('playback', () => {
   });
 
   test('ends where somebody takes the moment elsewhere, and where nothing is remembered', () => {
-    act({ type: 'moment', moment: 90_000 });
+    act({ moment: 90_000 });
     play();
-    act({ type: 'moment', moment: 80_000 });
+    act({ moment: 80_000 });
     expect(playback.get().isPlaying).toBe(false);
     play();
     const fault = { at: 80_000, message: 'no journal is kept', isLasting: true };
-    receive({ type: 'set', part: { pastFault: fault } });
+    receive({ pastFault: fault });
     vi.advanceTimersByTime(200);
     expect(playback.get().isPlaying).toBe(false);
     expect(moment()).toBe(80_000);
-    receive({ type: 'set', part: { pastFault: null } });
+    receive({ pastFault: null });
   });
 
   test('is begun and ended by one key; another speed holds at once', () => {
-    act({ type: 'moment', moment: 90_000 });
+    act({ moment: 90_000 });
     togglePlayback();
     vi.advanceTimersByTime(1_000);
     chooseSpeed(3_600);

@@ -11,18 +11,12 @@ import { barSpan, twinNow } from '../store/moment';
 export const SPEEDS = [60, 300, 900, 3_600] as const;
 type Speed = (typeof SPEEDS)[number];
 
-/** Ten moments a second. */
 const TICK_MS = 100;
 
-interface Playback {
-  readonly isPlaying: boolean;
-  readonly speed: Speed;
-}
-
-export const playback = createStore<Playback, Partial<Playback>>(
-  { isPlaying: false, speed: 300 },
-  (state, change) => ({ ...state, ...change }),
-);
+export const playback = createStore<{ isPlaying: boolean; speed: Speed }>({
+  isPlaying: false,
+  speed: 300,
+});
 
 let timer: ReturnType<typeof setInterval> | undefined;
 let unsubscribe: () => void = () => undefined;
@@ -33,7 +27,7 @@ let since = 0;
 export function pause(): void {
   clearInterval(timer);
   unsubscribe();
-  if (playback.get().isPlaying) playback.dispatch({ isPlaying: false });
+  if (playback.get().isPlaying) playback.set({ ...playback.get(), isPlaying: false });
 }
 
 /** From the moment that is shown; from now, from the beginning of the bar. */
@@ -43,7 +37,7 @@ export function play(): void {
   pause();
   const state = store.get();
   go(state.view.moment ?? barSpan(state, nowS).from);
-  playback.dispatch({ isPlaying: true });
+  playback.set({ ...playback.get(), isPlaying: true });
   timer = setInterval(tick, TICK_MS);
   // Whoever takes the moment elsewhere has taken over.
   unsubscribe = store.subscribe(() => {
@@ -58,13 +52,13 @@ export function togglePlayback(): void {
 }
 
 export function chooseSpeed(speed: Speed): void {
-  playback.dispatch({ speed });
+  playback.set({ ...playback.get(), speed });
 }
 
 function go(moment: number): void {
   at = moment;
   since = now();
-  act({ type: 'moment', moment });
+  act({ moment });
 }
 
 function tick(): void {
@@ -74,7 +68,7 @@ function tick(): void {
     pause();
   } else if (next >= nowS) {
     pause();
-    act({ type: 'moment', moment: null });
+    act({ moment: null });
   } else {
     go(next);
   }

@@ -2,6 +2,7 @@ import { act as settle, fireEvent, render, screen } from '@testing-library/react
 import { afterEach, beforeAll, beforeEach, expect, test } from 'vitest';
 
 import { politeVoice, urgentVoice } from '../alarms/watch';
+import { announce } from '../store/create';
 import { judgement, reason } from '../testing/health';
 import { showTags } from '../testing/page';
 import { readings, wireTag } from '../testing/tags';
@@ -64,7 +65,7 @@ test('only what is critical cuts in: it has a voice of its own', () => {
   expect(screen.getByTestId('said-alarms').getAttribute('role')).toBe('status');
   expect(screen.getByTestId('said-critical').getAttribute('role')).toBe('alert');
   settle(() => {
-    urgentVoice.dispatch('New: Tag 2');
+    announce(urgentVoice, 'New: Tag 2');
   });
   expect(said('said-critical')).toBe('New: Tag 2');
   expect(said('said-alarms')).toBe('');
@@ -72,11 +73,11 @@ test('only what is critical cuts in: it has a voice of its own', () => {
 
 test('the same words said again are another change for a reader to hear', () => {
   settle(() => {
-    politeVoice.dispatch('New: Tag 3');
+    announce(politeVoice, 'New: Tag 3');
   });
   const before = screen.getByTestId('said-alarms').firstChild;
   settle(() => {
-    politeVoice.dispatch('New: Tag 3');
+    announce(politeVoice, 'New: Tag 3');
   });
   expect(said('said-alarms')).toBe('New: Tag 3');
   expect(screen.getByTestId('said-alarms').firstChild).not.toBe(before);

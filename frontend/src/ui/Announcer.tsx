@@ -19,11 +19,11 @@ function Voice({
   testId,
   role = 'status',
 }: {
-  of: Store<Announcement, string>;
+  of: Store<Announcement>;
   testId: string;
   role?: 'status' | 'alert';
 }): JSX.Element {
-  const { text, key } = useSelected(of, (said) => said);
+  const { text, key } = useSelected(of);
   return (
     <div role={role} data-testid={testId}>
       {/* Anew each time, or the same words twice would be no change to tell of. */}

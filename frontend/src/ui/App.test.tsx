@@ -4,7 +4,7 @@ import { beforeAll, beforeEach, describe, expect, test, vi } from 'vitest';
 import { mapPoint } from '../geometry/coordinates';
 import { pointedAt } from '../map/commands';
 import { act, receive, store } from '../store/app';
-import { NO_HOUSE } from '../store/twin';
+import { NO_HOUSE, withPast } from '../store/twin';
 import { S } from '../strings';
 import { judgement, reason } from '../testing/health';
 import { fieldWith } from '../testing/field';
@@ -53,8 +53,8 @@ describe('page', () => {
   test('while a moment loads nothing is counted or judged, and no alarm before it is known', () => {
     render(<App kiosk={false} />);
     flush(() => {
-      act({ type: 'moment', moment: 500 });
-      receive({ type: 'past', past: { at: 500, house: NO_HOUSE } });
+      act({ moment: 500 });
+      receive(withPast({ at: 500, house: NO_HOUSE }));
     });
     expect(screen.getByTestId('row-count').textContent).toBe('');
     expect(screen.getByTestId('sample-count').textContent).toBe(S.legendFetching);
@@ -98,14 +98,14 @@ describe('page', () => {
     render(<App kiosk={false} />);
     const readout = (x: number): string => {
       flush(() => {
-        pointedAt.dispatch(mapPoint(x, 0.5));
+        pointedAt.set(mapPoint(x, 0.5));
       });
       return screen.getByTestId('readout').textContent;
     };
     expect(readout(0.5)).toContain('21.0\u00a0°C');
     expect(readout(1.5)).toContain('unknown');
     flush(() => {
-      pointedAt.dispatch(null);
+      pointedAt.set(null);
     });
     expect(screen.queryByTestId('readout')).toBeNull();
   });

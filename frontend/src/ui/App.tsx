@@ -2,6 +2,7 @@ import type { JSX } from 'react';
 
 import type { CycleWish } from '../store/cycle';
 import { act, useApp } from '../store/app';
+import { withList } from '../store/view';
 import { useSelected } from '../store/create';
 import { selectHealth } from '../store/derived';
 import { selectIsHere, selectIsRecorded, selectShown } from '../store/moment';
@@ -27,7 +28,7 @@ export function App({
   const phase = useApp((state) => state.twin.phase);
   const pane = useApp((state) => state.view.pane);
   const selected = useApp((state) => state.view.selected);
-  const message = useSelected(toast, (text) => text);
+  const message = useSelected(toast);
 
   const moment = useApp((state) => selectShown(state).moment);
   const isPast = moment !== null;
@@ -81,7 +82,7 @@ const NO_WISH: CycleWish = { seconds: null, refused: null };
 /** By hand, because the fragment of the address belongs to the permalink. */
 function skipToTable(event: React.MouseEvent): void {
   event.preventDefault();
-  act({ type: 'list', list: 'tags' });
+  act(withList('tags'));
   requestAnimationFrame(() => document.getElementById('tags')?.focus());
 }
 
@@ -95,7 +96,7 @@ function PaneTabs(): JSX.Element {
       type="button"
       aria-pressed={shown === name}
       onClick={() => {
-        act(name === 'map' ? { type: 'pane', pane: 'map' } : { type: 'list', list: name });
+        act(name === 'map' ? { pane: 'map', chartedFrom: null } : withList(name));
       }}
     >
       <Icon name={name === 'map' ? 'map' : name === 'tags' ? 'list' : 'bell'} />

@@ -127,7 +127,7 @@ const LONGEST_WISH = 12;
 
 /** In the header of a wall screen: the time, which sensor is shown until when, and how to leave. */
 export function KioskNote({ wish }: { wish: CycleWish }): JSX.Element {
-  const next = useSelected(nextSensor, (coming) => coming);
+  const next = useSelected(nextSensor);
   const sensor = useApp(selectSensor);
   const left = useTicking((now) =>
     next ? shortAgeText(Math.max(0, Math.ceil((next.at - now) / 1000))) : null,

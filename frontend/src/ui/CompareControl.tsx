@@ -35,7 +35,7 @@ export function CompareControl(): JSX.Element {
           options={CHOICES}
           text={(choice) => S.compareWith[choice]}
           onChange={(choice) => {
-            act({ type: 'compare', compare: compareFor(choice, dayS) });
+            act({ compare: compareFor(choice, dayS) });
           }}
         />
       </label>
@@ -78,7 +78,7 @@ function OwnMoment({ at }: { at: number }): JSX.Element {
         const text = event.target.value;
         const chosen = momentOf(text, false);
         setTyped({ of: chosen ?? at, text });
-        if (chosen !== null) act({ type: 'compare', compare: { by: 'moment', at: chosen } });
+        if (chosen !== null) act({ compare: { by: 'moment', at: chosen } });
       }}
     />
   );

@@ -11,6 +11,7 @@ import { secondsOf } from '../domain/time';
 import { rowsOf } from '../domain/table';
 import { shown } from '../domain/text';
 import { act, store, useApp } from '../store/app';
+import { withList, withTag } from '../store/view';
 import { useSelected } from '../store/create';
 import { selectHealth } from '../store/derived';
 import { rosNow, selectIsHere, selectNewest, selectShown, selectTags } from '../store/moment';
@@ -40,7 +41,7 @@ export function useUrgent(): readonly Urgent[] {
   const tags = useApp(selectTags);
   const health = useApp(selectHealth);
   const isNow = useApp((state) => selectShown(state).moment === null);
-  const alarms = useSelected(alarmList, (it) => it);
+  const alarms = useSelected(alarmList);
   return useMemo(() => {
     const acknowledged = alarms.active.filter((it) => it.isAcknowledged);
     const has = (items: readonly Item[], tagId: string, reason: HealthReason): boolean =>
@@ -115,7 +116,7 @@ export function DoNow({
               type="button"
               data-tag-id={tagId}
               onClick={() => {
-                act({ type: 'select', tagId });
+                act(withTag(tagId));
               }}
             >
               <HealthMark verdict={reasons[0].verdict} word={false} />
@@ -132,7 +133,7 @@ export function DoNow({
                   type="button"
                   className="do-more"
                   onClick={() => {
-                    act({ type: 'list', list: hasAlarms ? 'alarms' : 'tags' });
+                    act(withList(hasAlarms ? 'alarms' : 'tags'));
                   }}
                 >
                   {/* Each counts what it opens: a tag may have two alarms, or none yet. */}
@@ -259,7 +260,7 @@ export function ShelvedCount({ disabled = false }: { disabled?: boolean }): JSX.
       className="shelved-count"
       disabled={disabled}
       onClick={() => {
-        act({ type: 'list', list: 'alarms' });
+        act(withList('alarms'));
       }}
     >
       {S.alarmGroups.shelved(String(count))}

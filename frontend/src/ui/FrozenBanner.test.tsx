@@ -4,7 +4,7 @@ import { afterEach, beforeEach, expect, test, vi } from 'vitest';
 import { epochOf } from '../clock';
 import { clockText } from '../domain/format';
 import { act, receive, store } from '../store/app';
-import { NO_HOUSE } from '../store/twin';
+import { NO_HOUSE, withPast } from '../store/twin';
 import { goLive, goLost, showTags, status } from '../testing/page';
 import { wireTag } from '../testing/tags';
 import { ConnectionBadge } from './Header';
@@ -70,8 +70,8 @@ test('each state of the connection has a word of its own', () => {
 
 test('behind a look back: live data have stopped, and what is shown stays', () => {
   showTags([wireTag()]);
-  receive({ type: 'past', past: { at: 50, house: NO_HOUSE } });
-  act({ type: 'moment', moment: 50 });
+  receive(withPast({ at: 50, house: NO_HOUSE }));
+  act({ moment: 50 });
   goLost();
   render(
     <>
@@ -87,8 +87,8 @@ test('behind a look back: live data have stopped, and what is shown stays', () =
 
 test('nothing says “Live” while another moment is shown', () => {
   showTags([wireTag()]);
-  receive({ type: 'past', past: { at: 50, house: NO_HOUSE } });
-  act({ type: 'moment', moment: 50 });
+  receive(withPast({ at: 50, house: NO_HOUSE }));
+  act({ moment: 50 });
   render(<ConnectionBadge />);
   expect(screen.getByTestId('connection').textContent).toBe('Connection: Past');
 });

@@ -5,7 +5,7 @@ import { calling } from '../alarms/list';
 import { acknowledgeAlarms, shelveAlarm } from '../alarms/own';
 import { alarmList, startAlarms } from '../alarms/watch';
 import { act as look, receive, store } from '../store/app';
-import { NO_HOUSE } from '../store/twin';
+import { NO_HOUSE, withPast } from '../store/twin';
 import { alarm, alarms, tellAlarms } from '../testing/alarms';
 import { held, judgement, reason } from '../testing/health';
 import { goLost, showTags } from '../testing/page';
@@ -37,7 +37,7 @@ test('says what to do first, and since when', () => {
   const stop = startAlarms();
   render(<HealthSummary kiosk={false} />);
   act(() => {
-    receive({ type: 'set', part: { alarms: alarms([], { source: 'starting' }) } });
+    receive({ alarms: alarms([], { source: 'starting' }) });
   });
   expect(house().textContent).not.toContain('second scan');
   act(() => {
@@ -257,8 +257,8 @@ test('what had to be done stays when the twin is not heard any more, with its ti
 test('while a moment loads nothing is said of it, and nothing is counted', () => {
   showTags(TAGS, judgement({ 1: 'healthy', 5: [reason()] }));
   act(() => {
-    look({ type: 'moment', moment: 500 });
-    receive({ type: 'past', past: { at: 500, house: NO_HOUSE } });
+    look({ moment: 500 });
+    receive(withPast({ at: 500, house: NO_HOUSE }));
   });
   render(
     <>

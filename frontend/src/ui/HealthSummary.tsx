@@ -49,7 +49,7 @@ export function HealthSummary({ kiosk }: { kiosk: boolean }): JSX.Element {
               data-health={verdict}
               data-none={health.counts[verdict] === 0}
               onClick={() => {
-                act({ type: 'health', verdict: filter === verdict ? null : verdict });
+                act({ health: filter === verdict ? null : verdict, list: 'tags' });
               }}
             >
               <HealthShape verdict={verdict} />

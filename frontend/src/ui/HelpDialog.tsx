@@ -3,10 +3,11 @@ import { useEffect, useRef, type JSX } from 'react';
 import { shown } from '../domain/text';
 import { commandMap } from '../map/commands';
 import { act, prefer, store, useApp } from '../store/app';
+import { announce } from '../store/create';
 import { selectRows, selectSensors } from '../store/derived';
 import { backToLive } from '../store/moment';
 import { isDark } from '../store/theme';
-import type { ViewState } from '../store/view';
+import { type ViewState, withChart, withLayer, withList, withTag } from '../store/view';
 import { S } from '../strings';
 import { togglePlayback } from '../timebar/playback';
 import { Check, Icon } from '../widgets/controls';
@@ -107,13 +108,13 @@ function isTyping(target: EventTarget | null): boolean {
 
 function escape(event: KeyboardEvent): void {
   if (event.target instanceof HTMLInputElement && event.target.id === FILTER_ID) {
-    act({ type: 'filter', text: '' });
+    act({ filter: '' });
     return;
   }
   // What lies on top goes first.
   const { chart, selected } = store.get().view;
-  if (chart) act({ type: 'chart', chart: null });
-  else if (selected !== null) act({ type: 'select', tagId: null });
+  if (chart) act(withChart(null));
+  else if (selected !== null) act(withTag(null));
   else backToLive();
 }
 
@@ -128,12 +129,12 @@ function runKey(key: string): boolean {
   const { settings, view } = state;
   if (/^[1-9]$/.test(key)) {
     const sensor = selectSensors(state)[Number(key) - 1];
-    if (sensor) act({ type: 'sensor', sensor: sensor.name });
+    if (sensor) act({ sensor: sensor.name });
     return sensor !== undefined;
   }
   switch (key.toLowerCase()) {
     case '/':
-      act({ type: 'list', list: 'tags' });
+      act(withList('tags'));
       // The pane may only now become visible.
       requestAnimationFrame(() => document.getElementById(FILTER_ID)?.focus());
       return true;
@@ -147,7 +148,7 @@ function runKey(key: string): boolean {
       stepTag(-1);
       return true;
     case 's':
-      act({ type: 'layer', layer: 'smooth', on: !view.layers.has('smooth') });
+      act(withLayer('smooth', !view.layers.has('smooth')));
       return true;
     case 'l':
       if (view.moment === null) return false;
@@ -162,7 +163,7 @@ function runKey(key: string): boolean {
       togglePlayback();
       return true;
     case 'a':
-      act({ type: 'list', list: 'alarms' });
+      act(withList('alarms'));
       requestAnimationFrame(() => document.getElementById(ALARMS_ID)?.focus());
       return true;
     case 'u':
@@ -182,7 +183,7 @@ function runKey(key: string): boolean {
 /** Opens the charts of the chosen tag, or closes them; false: no tag is chosen. */
 function toggleCharts({ chart, selected }: ViewState): boolean {
   if (!chart && selected === null) return false;
-  act({ type: 'chart', chart: chart ? null : { by: 'tag', tagIds: [selected ?? ''] } });
+  act(withChart(chart ? null : { by: 'tag', tagIds: [selected ?? ''] }));
   return true;
 }
 
@@ -197,6 +198,9 @@ function stepTag(by: 1 | -1): void {
   const row = rows[at];
   if (!row) return;
   const { tag, health } = row;
-  act({ type: 'select', tagId: tag.id });
-  chosenTag.dispatch(S.tagChosen(shown(tag.id, 24), S.health[health.verdict], at + 1, rows.length));
+  act(withTag(tag.id));
+  announce(
+    chosenTag,
+    S.tagChosen(shown(tag.id, 24), S.health[health.verdict], at + 1, rows.length),
+  );
 }

@@ -4,7 +4,7 @@ import { expect, test } from 'vitest';
 import type { Judgement } from '../contract/types';
 import { snapshotOf } from '../domain/twin';
 import { act as view, receive } from '../store/app';
-import { NO_HOUSE } from '../store/twin';
+import { NO_HOUSE, withPast, withState } from '../store/twin';
 import { judgement, reason } from '../testing/health';
 import { goLive, goLost, showTags, status } from '../testing/page';
 import { stateFrame, wireTag } from '../testing/tags';
@@ -77,7 +77,7 @@ test.each([
   const latest = stateFrame([wireTag()], { sec: 1 + late, health });
   const show = (bridge = status()): string => {
     act(() => {
-      receive({ type: 'state', latest, now: performance.now() });
+      receive(withState(latest, performance.now()));
       goLive(bridge);
     });
     return screen.getByTestId('house-line').textContent;
@@ -89,8 +89,8 @@ test.each([
   expect(show(status({ reason: 'paused' }))).toMatch(/^no tag overdue/);
   const then = { ...NO_HOUSE, snapshot: snapshotOf(latest, 0, null), health };
   act(() => {
-    view({ type: 'moment', moment: 1 + late });
-    receive({ type: 'past', past: { at: 1 + late, house: then } });
+    view({ moment: 1 + late });
+    receive(withPast({ at: 1 + late, house: then }));
   });
   expect(screen.getByTestId('house-line').textContent).toMatch(/^no tag overdue/);
 });
@@ -102,7 +102,7 @@ test('where the house has a reason of its own, that says what to do', () => {
   const latest = stateFrame([wireTag()], { sec: 601, health });
   showTags([wireTag()]);
   act(() => {
-    receive({ type: 'state', latest, now: performance.now() });
+    receive(withState(latest, performance.now()));
   });
   render(<HouseLine />);
   expect(screen.getByTestId('house-line').textContent).toMatch(/^No scan for .+\)$/);

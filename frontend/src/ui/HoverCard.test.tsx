@@ -1,9 +1,10 @@
 import { act as flush, render, screen } from '@testing-library/react';
-import { beforeEach, describe, expect, test, vi } from 'vitest';
+import { beforeEach, describe, expect, test } from 'vitest';
 
 import { canvasPoint } from '../geometry/coordinates';
 import { pinUnderMouse } from '../map/commands';
 import { act } from '../store/app';
+import { withTag } from '../store/view';
 import { judgement, reason } from '../testing/health';
 import { showTags } from '../testing/page';
 import { readings, wireTag } from '../testing/tags';
@@ -11,7 +12,7 @@ import { HoverCard } from './extras';
 
 const point = (tagId: string | null, x = 100): void => {
   flush(() => {
-    pinUnderMouse.dispatch(
+    pinUnderMouse.set(
       tagId === null
         ? null
         : { tagId, at: canvasPoint(x, 80), reach: 9, within: { width: 600, height: 400 } },
@@ -80,19 +81,8 @@ describe('card of the pin under the mouse', () => {
 
   test('the chosen tag has its own card already', () => {
     render(<HoverCard />);
-    act({ type: 'select', tagId: '7' });
+    act(withTag('7'));
     point('7');
     expect(card()).toBeNull();
-  });
-
-  test('a mouse that moves about on one pin changes nothing', () => {
-    point('7');
-    const listener = vi.fn();
-    const stop = pinUnderMouse.subscribe(listener);
-    point('7');
-    expect(listener).not.toHaveBeenCalled();
-    point('7', 101);
-    expect(listener).toHaveBeenCalledTimes(1);
-    stop();
   });
 });

@@ -9,7 +9,7 @@ import { KioskNote } from './AttentionList';
 const NONE = { seconds: null, refused: null };
 
 afterEach(() => {
-  nextSensor.dispatch(null);
+  nextSensor.set(null);
 });
 
 test('names the key that leads out and says the time, and nothing else without a round', () => {
@@ -21,7 +21,7 @@ test('names the key that leads out and says the time, and nothing else without a
 
 test('says which sensor is shown, which comes next and when', () => {
   showTags([]);
-  nextSensor.dispatch({ sensor: sensorNamed('humidity'), at: performance.now() + 22_500 });
+  nextSensor.set({ sensor: sensorNamed('humidity'), at: performance.now() + 22_500 });
   render(<KioskNote wish={{ seconds: 30, refused: null }} />);
   expect(screen.getByTestId('cycle').textContent).toBe('Temperature next: Humidity in 23\u00a0s');
 });

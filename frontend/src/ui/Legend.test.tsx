@@ -2,7 +2,8 @@ import { act as flush, fireEvent, render, screen, within } from '@testing-librar
 import { beforeAll, beforeEach, describe, expect, test } from 'vitest';
 
 import { act, prefer, receive, store } from '../store/app';
-import { fixedRange } from '../store/view';
+import { withField, withLatest, withPast } from '../store/twin';
+import { fixedRange, withRange } from '../store/view';
 import { fieldWith } from '../testing/field';
 import { judgement, NOBODY, reason } from '../testing/health';
 import { showField, showTags } from '../testing/page';
@@ -14,7 +15,7 @@ beforeAll(() => loadParts());
 
 beforeEach(() => {
   showTags([wireTag({ readings: readings({ temperature: 20 }) })]);
-  act({ type: 'colouring', colouring: 'value' });
+  act({ colouring: 'value' });
   showField(fieldWith([[20]], { valueMin: 12.34, valueMax: 30, sampleCount: 9 }));
 });
 
@@ -33,9 +34,8 @@ describe('legend', () => {
   test('shows the error where the server gives one, and nothing where it does not', () => {
     const { rerender } = render(<Legend kiosk={false} />);
     expect(screen.queryByTestId('rmse')).toBeNull();
-    receive({
-      type: 'latest',
-      part: {
+    receive(
+      withLatest({
         quality: {
           sensor_type: 'temperature',
           unit: '°C',
@@ -46,8 +46,8 @@ describe('legend', () => {
           painted_share: 0.5,
           far_off_tags: [],
         },
-      },
-    });
+      }),
+    );
     prefer({ unit: 'F' });
     rerender(<Legend kiosk={false} />);
     expect(at('rmse')).toBe('Typical error 2.7\u00a0°F');
@@ -60,15 +60,15 @@ describe('legend', () => {
     const old = reason({ kind: 'old', verdict: 'unknown', sensor: '' });
     const wire = wireTag({ readings: readings({ temperature: 20 }) });
     showTags([wire], judgement({ [wire.tag_id]: [old] }));
-    receive({ type: 'field', field });
+    receive(withField(field));
     for (const colouring of ['ideal', 'value'] as const) {
-      act({ type: 'colouring', colouring });
+      act({ colouring });
       rerender(<Legend kiosk={false} />);
       expect(at('legend-old')).toBe(' Faint and hatched: readings too old');
     }
     const { latest } = store.get().twin;
-    receive({ type: 'past', past: { at: 50, house: { ...latest, health: NOBODY } } });
-    act({ type: 'moment', moment: 50 });
+    receive(withPast({ at: 50, house: { ...latest, health: NOBODY } }));
+    act({ moment: 50 });
     rerender(<Legend kiosk={false} />);
     expect(screen.queryByTestId('legend-old')).toBeNull();
   });
@@ -79,7 +79,7 @@ describe('legend', () => {
     [12, 26, 'above 18.0'],
     [18, 26, ''],
   ])('of an ideal range from %d to %d no limit is told twice', (low, high, limits) => {
-    act({ type: 'range', range: { low, high } });
+    act(withRange({ low, high }));
     render(<Legend kiosk={false} />);
     expect(at('legend')).toContain(`daytime ideal${limits && ` ${limits}`}`);
     expect(at('legend').match(/18\.0/g)).toHaveLength(1);
@@ -87,20 +87,20 @@ describe('legend', () => {
   });
 
   test('a field of another sensor does not count', () => {
-    act({ type: 'sensor', sensor: 'humidity' });
+    act({ sensor: 'humidity' });
     render(<Legend kiosk={false} />);
     expect(at('sample-count')).toBe('No tag contributes');
   });
 
   test('a heat map on its way does not deny the tags that it will show', () => {
     showTags([wireTag({ readings: readings({ humidity: 60 }) })]);
-    act({ type: 'sensor', sensor: 'humidity' });
+    act({ sensor: 'humidity' });
     render(<Legend kiosk={false} />);
     expect(at('sample-count')).toBe('Loading the heat map');
   });
 
   test('tells what the colours mean against the ideal, and has one click to either', () => {
-    act({ type: 'colouring', colouring: 'ideal' });
+    act({ colouring: 'ideal' });
     const species = {
       species: 'Tulip',
       species_confidence: 0.8,
@@ -137,8 +137,8 @@ describe('legend', () => {
   });
 
   test('a sensor without an ideal is coloured by value, and says so', () => {
-    act({ type: 'colouring', colouring: 'ideal' });
-    act({ type: 'sensor', sensor: 'dew_point' });
+    act({ colouring: 'ideal' });
+    act({ sensor: 'dew_point' });
     render(<Legend kiosk={false} />);
     expect(at('no-ideal')).toContain('coloured by value');
     expect(screen.queryByRole('radio', { name: 'Ideal' })).toBeNull();
@@ -146,13 +146,13 @@ describe('legend', () => {
   });
 
   test('tells of a difference alone while there is one, and has nothing to choose its colours by', () => {
-    act({ type: 'compare', compare: { by: 'ago', seconds: 86_400 } });
+    act({ compare: { by: 'ago', seconds: 86_400 } });
     render(<Legend kiosk={false} />);
     expect(screen.getByTestId('difference-legend')).toBeTruthy();
     expect(screen.queryByTestId('range-low')).toBeNull();
     expect(screen.queryByRole('radio')).toBeNull();
     flush(() => {
-      act({ type: 'compare', compare: null });
+      act({ compare: null });
     });
     expect(screen.getByTestId('range-low')).toBeTruthy();
   });

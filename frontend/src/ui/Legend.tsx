@@ -271,7 +271,7 @@ export function HeatControl({ place }: { place: 'legend' | 'layers' }): JSX.Elem
       options={HEATS}
       text={(kind) => S.heats[kind]}
       onChange={(chosen) => {
-        act({ type: 'heat', heat: chosen });
+        act({ heat: chosen });
       }}
     />
   );
@@ -290,7 +290,7 @@ function ColouringControl(): JSX.Element {
         label: S.colourings[value],
       }))}
       onChange={(chosen) => {
-        act({ type: 'colouring', colouring: chosen });
+        act({ colouring: chosen });
       }}
     />
   );

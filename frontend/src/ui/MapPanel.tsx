@@ -12,7 +12,7 @@ import { act, useApp } from '../store/app';
 import { useSelected } from '../store/create';
 import { selectHeat, selectSensor, selectZones } from '../store/derived';
 import { selectShown } from '../store/moment';
-import { LAYERS } from '../store/view';
+import { LAYERS, withLayer } from '../store/view';
 import { S } from '../strings';
 import { PastFrame } from '../timebar/Past';
 import { Check, Disclosure, Icon, IconButton, type IconName } from '../widgets/controls';
@@ -92,7 +92,7 @@ function LayerList(): JSX.Element {
             label={S.layers[layer]}
             isOn={on.has(layer)}
             onChange={(isOn) => {
-              act({ type: 'layer', layer, on: isOn });
+              act(withLayer(layer, isOn));
             }}
           />
         ))}
@@ -109,7 +109,7 @@ function LayerList(): JSX.Element {
 
 /** The field's value at the point that mouse or crosshair is on. */
 export function Readout(): JSX.Element | null {
-  const point = useSelected(pointedAt, (at) => at);
+  const point = useSelected(pointedAt);
   const heat = useApp(selectHeat);
   const compare = useApp((state) => state.view.compare);
   const sensor = useApp(selectSensor);

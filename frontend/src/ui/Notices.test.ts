@@ -1,7 +1,7 @@
 import { beforeEach, describe, expect, test } from 'vitest';
 
 import { act, receive, store } from '../store/app';
-import { NO_HOUSE, NO_TWIN, type House } from '../store/twin';
+import { NO_HOUSE, NO_TWIN, type House, withField, withPast } from '../store/twin';
 import { goLive, goLost, showTags, status } from '../testing/page';
 import { timelineOf } from '../domain/timeline';
 import { readings, snapshot, tag, wireTag } from '../testing/tags';
@@ -49,7 +49,7 @@ describe('the most basic lack is told first', () => {
   });
 
   test('no reading of the chosen sensor, which is named', () => {
-    act({ type: 'sensor', sensor: 'co2' });
+    act({ sensor: 'co2' });
     expect(noticeFor(store.get())).toMatchObject({ id: 'no-reading' });
     expect(noticeFor(store.get())?.title).toContain('CO₂');
   });
@@ -60,7 +60,7 @@ describe('the most basic lack is told first', () => {
   });
 
   test('a field that could not be loaded, with the server’s reason', () => {
-    receive({ type: 'field', field: { value: null, state: 'failed', message: 'too many cells' } });
+    receive(withField({ value: null, state: 'failed', message: 'too many cells' }));
     expect(noticeFor(store.get())?.title).toContain('too many cells');
     // Why nothing loads without a connection, the banner says.
     goLost();
@@ -76,8 +76,8 @@ describe('of a moment in the past', () => {
   const at = 5_025;
   const come = (house: House): void => {
     showTags([wireTag({ readings: readings({ temperature: 20 }) })]);
-    act({ type: 'moment', moment: at });
-    receive({ type: 'past', past: { at, house } });
+    act({ moment: at });
+    receive(withPast({ at, house }));
   };
 
   test('that has not come, nothing is there yet, whatever there is now', () => {
@@ -91,10 +91,7 @@ describe('of a moment in the past', () => {
 
   test('that cannot be had, the reason is told', () => {
     come(NO_HOUSE);
-    receive({
-      type: 'set',
-      part: { pastFault: { at, message: 'no journal is kept', isLasting: true } },
-    });
+    receive({ pastFault: { at, message: 'no journal is kept', isLasting: true } });
     expect(noticeFor(store.get())).toMatchObject({ id: 'past-failed', hint: 'no journal is kept' });
   });
 
@@ -105,14 +102,14 @@ describe('of a moment in the past', () => {
       hint: 'Nothing has been recorded yet.',
     });
     const value = timelineOf(wireTimeline({ from: 7_200, to: 9_000 }), 9_000);
-    receive({ type: 'set', part: { remembered: { value, state: 'ready', message: '' } } });
+    receive({ remembered: { value, state: 'ready', message: '' } });
     expect(noticeFor(store.get())?.hint).toBe('Recorded data begins at sim 02:00:00.');
   });
 
   test('that the journal does not have all of is not said to have been empty', () => {
     come({ ...NO_HOUSE, snapshot: { ...snapshot([]), isWhole: false } });
     const value = timelineOf(wireTimeline({ from: 0, to: 9_000 }), 9_000);
-    receive({ type: 'set', part: { remembered: { value, state: 'ready', message: '' } } });
+    receive({ remembered: { value, state: 'ready', message: '' } });
     expect(noticeFor(store.get())?.hint).toBe('This is no longer stored, or was not recorded yet.');
   });
 

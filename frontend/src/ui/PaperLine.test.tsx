@@ -2,6 +2,7 @@ import { act as flush, render, screen } from '@testing-library/react';
 import { afterEach, beforeEach, expect, test, vi } from 'vitest';
 
 import { act, prefer } from '../store/app';
+import { withRange } from '../store/view';
 import { goLive, showTags, status } from '../testing/page';
 import { readings, wireTag } from '../testing/tags';
 import { PaperLine } from './PaperLine';
@@ -28,12 +29,12 @@ test('paper says when it was, when it was printed, and what is on it', () => {
   const line = (): string => screen.getByTestId('paper-line').textContent;
   expect(line()).toBe(`${when} Temperature compared with its ideal range 18.0 – 26.0\u00a0°C`);
   flush(() => {
-    act({ type: 'colouring', colouring: 'value' });
+    act({ colouring: 'value' });
   });
   expect(line()).toBe(`${when} Temperature 18.0 – 30.0\u00a0°C`);
   flush(() => {
     prefer({ unit: 'F' });
-    act({ type: 'range', range: { low: 0, high: 100 } });
+    act(withRange({ low: 0, high: 100 }));
   });
   expect(line()).toMatch(/Temperature 32\.0 – 212\.0\u00a0°F$/);
   // What comes after the print was begun is on it, and not later than it.

@@ -4,7 +4,7 @@ import { fromShown, readingText, toShown, unitOf, type TemperatureUnit } from '.
 import { rounded, type Range } from '../domain/ramp';
 import type { Sensor } from '../domain/sensors';
 import { act, useApp } from '../store/app';
-import { fixedRange } from '../store/view';
+import { fixedRange, withRange } from '../store/view';
 import { S } from '../strings';
 import { Segmented } from '../widgets/controls';
 
@@ -29,7 +29,7 @@ export function RangeControl({
           { value: 'fixed', label: S.rangeFixed },
         ]}
         onChange={(mode) => {
-          act({ type: 'range', range: mode === 'auto' ? null : startingRange(sensor, range) });
+          act(withRange(mode === 'auto' ? null : startingRange(sensor, range)));
         }}
       />
       {fixed && (
@@ -43,7 +43,7 @@ export function RangeControl({
               low < fixed.high ? null : S.rangeNotBelow(readingText(sensor, fixed.high, unit))
             }
             onChange={(low) => {
-              act({ type: 'range', range: { ...fixed, low } });
+              act(withRange({ ...fixed, low }));
             }}
           />
           <Bound
@@ -55,7 +55,7 @@ export function RangeControl({
               high > fixed.low ? null : S.rangeNotAbove(readingText(sensor, fixed.low, unit))
             }
             onChange={(high) => {
-              act({ type: 'range', range: { ...fixed, high } });
+              act(withRange({ ...fixed, high }));
             }}
           />
           {ideal && (
@@ -63,7 +63,7 @@ export function RangeControl({
               type="button"
               className="text-button"
               onClick={() => {
-                act({ type: 'range', range: { low: ideal[0], high: ideal[1] } });
+                act(withRange({ low: ideal[0], high: ideal[1] }));
               }}
             >
               {S.rangeIdeal}

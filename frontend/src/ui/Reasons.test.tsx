@@ -7,6 +7,7 @@ import { beforeEach, expect, test, vi } from 'vitest';
 
 import type { HealthReason, Verdict } from '../contract/types';
 import { act } from '../store/app';
+import { withTag } from '../store/view';
 import { judgement } from '../testing/health';
 import { showTags } from '../testing/page';
 import { readings, wireTag } from '../testing/tags';
@@ -61,7 +62,7 @@ test.each(CASES)('$name', (state) => {
   const judged = judgement({ 7: told.length > 0 ? told : state.verdict });
   expect(judged.tags['7']?.verdict).toBe(state.verdict);
   showTags([wireTag({ tag_id: '7', readings: readings(Object.fromEntries(values)) })], judged);
-  act({ type: 'select', tagId: '7' });
+  act(withTag('7'));
   render(
     <>
       <HealthSummary kiosk={false} />
@@ -95,6 +96,6 @@ test.each(CASES)('$name', (state) => {
   const ranged = told.filter(({ kind, sensor }) => kind === 'range' && state.readings[sensor]);
   expect(row?.querySelectorAll('.beyond')).toHaveLength(ranged.length);
   flush(() => {
-    act({ type: 'select', tagId: null });
+    act(withTag(null));
   });
 });

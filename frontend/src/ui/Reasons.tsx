@@ -62,7 +62,7 @@ export function Reasons({
 
 /** What to do about a reason, and that it has no alarm yet; of what is shelved, nothing. */
 function Todo({ tagId, reason }: { tagId: string; reason: HealthReason }): JSX.Element | null {
-  const { active, shelved } = useSelected(alarmList, (list) => list);
+  const { active, shelved } = useSelected(alarmList);
   const isKnown = useApp(selectAreAlarmsKnown);
   if (alarmOf(shelved, tagId, reason)) return null;
   const isWaiting = isKnown && isAwaited(reason) && !alarmOf(active, tagId, reason);

@@ -62,7 +62,7 @@ export function SensorPicker(): JSX.Element {
           ),
         }))}
         onChange={(name) => {
-          act({ type: 'sensor', sensor: name });
+          act({ sensor: name });
         }}
       />
     </div>

@@ -24,7 +24,7 @@ const SESSION = {
   ...{ name: null, role: 'viewer', can_write_notes: false },
 };
 
-const Toast = (): string => useSelected(toast, (text) => text);
+const Toast = (): string => useSelected(toast);
 
 test('a session can be ended, and the page leaves', async () => {
   const asked = server(SESSION);

@@ -4,7 +4,7 @@ import { beforeEach, expect, test } from 'vitest';
 import type { StatusFrame } from '../contract/types';
 import { rosText } from '../domain/time';
 import { act, receive } from '../store/app';
-import { NO_HOUSE } from '../store/twin';
+import { NO_HOUSE, withPast } from '../store/twin';
 import { goLive, showTags, status } from '../testing/page';
 import { SimulatedNote } from './Header';
 
@@ -19,8 +19,8 @@ const filled = (): StatusFrame => {
 };
 const lookBack = (at: number | null): void => {
   flush(() => {
-    if (at !== null) receive({ type: 'past', past: { at, house: NO_HOUSE } });
-    act({ type: 'moment', moment: at });
+    if (at !== null) receive(withPast({ at, house: NO_HOUSE }));
+    act({ moment: at });
   });
 };
 

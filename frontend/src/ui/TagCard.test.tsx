@@ -2,7 +2,8 @@ import { fireEvent, render, screen } from '@testing-library/react';
 import { beforeEach, describe, expect, test, vi } from 'vitest';
 
 import { act, receive, store } from '../store/app';
-import { NO_HOUSE } from '../store/twin';
+import { withTag } from '../store/view';
+import { NO_HOUSE, withPast, withState } from '../store/twin';
 import { held, judgement, reason } from '../testing/health';
 import { nextStamp, showTags } from '../testing/page';
 import { readings, stateFrame, wireTag } from '../testing/tags';
@@ -29,13 +30,13 @@ beforeEach(() => {
     }),
   ];
   showTags(tags, said);
-  act({ type: 'select', tagId: '7' });
+  act(withTag('7'));
 });
 
 describe('card', () => {
   test('while a moment loads it denies no tag', () => {
-    act({ type: 'moment', moment: 500 });
-    receive({ type: 'past', past: { at: 500, house: NO_HOUSE } });
+    act({ moment: 500 });
+    receive(withPast({ at: 500, house: NO_HOUSE }));
     render(<TagCard tagId="7" />);
     expect(screen.getByTestId('tag-card').textContent).toBe('Tag 7');
   });
@@ -201,14 +202,15 @@ describe('card', () => {
       last_try_detail: 'no tag in the picture',
     });
     showTags([]);
-    receive({
-      type: 'state',
-      latest: {
-        ...stateFrame([failing]),
-        state: { header: { stamp: now, frame_id: '' }, tags: [failing] },
-      },
-      now: performance.now(),
-    });
+    receive(
+      withState(
+        {
+          ...stateFrame([failing]),
+          state: { header: { stamp: now, frame_id: '' }, tags: [failing] },
+        },
+        performance.now(),
+      ),
+    );
     render(<TagCard tagId="7" />);
     const { textContent } = screen.getByTestId('tag-card');
     expect(textContent).toContain('Last attempt3\u00a0min ago · not readable');

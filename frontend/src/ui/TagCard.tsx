@@ -22,6 +22,7 @@ import { whenOf, type Tag } from '../domain/twin';
 import { commandMap } from '../map/commands';
 import { Comments } from '../notes/Comments';
 import { act, useApp } from '../store/app';
+import { withTag } from '../store/view';
 import { selectCatalogue, selectHealth } from '../store/derived';
 import {
   selectIsHere,
@@ -51,7 +52,9 @@ export function TagCard({ tagId }: { tagId: string }): JSX.Element {
   const moment = useApp((state) => selectShown(state).moment);
   const isHere = useApp(selectIsHere);
   // What is newest says whether there is more to fetch, whatever moment is shown.
-  const newest = useApp((state) => selectNewestTag(state, tagId)?.observation);
+  const newest = useApp((state) =>
+    JSON.stringify(selectNewestTag(state, tagId)?.wire.last_observed),
+  );
   const fetched = useHistory(tagId, newest);
   const history = fetched && asOf(fetched, moment);
   const root = useRef<HTMLElement>(null);
@@ -75,7 +78,7 @@ export function TagCard({ tagId }: { tagId: string }): JSX.Element {
           icon="close"
           label={S.cardClose}
           onClick={() => {
-            act({ type: 'select', tagId: null });
+            act(withTag(null));
           }}
         />
       </header>
@@ -188,7 +191,7 @@ function CardBody({
                 className="text-button"
                 title={S.cardShow}
                 onClick={() => {
-                  act({ type: 'pane', pane: 'map' });
+                  act({ pane: 'map', chartedFrom: null });
                   commandMap({ type: 'show', tagId: tag.id });
                 }}
               >

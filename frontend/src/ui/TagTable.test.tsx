@@ -142,7 +142,7 @@ describe('table', () => {
   });
 
   test('a filter that finds nothing offers the way out', () => {
-    act({ type: 'filter', text: 'nobody' });
+    act({ filter: 'nobody' });
     render(<TagTable />);
     expect(order()).toEqual([undefined]);
     fireEvent.click(screen.getByRole('button', { name: 'Clear filter' }));
@@ -182,7 +182,7 @@ describe('table', () => {
     const { at } = store.get().twin.latest.snapshot ?? { at: { sec: 0 } };
     const hourBefore = (): void => {
       flush(() => {
-        hourAgo.dispatch({
+        hourAgo.set({
           of: at.sec,
           isNow: true,
           tags: new Map([['a', { tag: before, health: { verdict: 'healthy', reasons: [] } }]]),
@@ -201,10 +201,10 @@ describe('table', () => {
     goLive(status());
     // An answer of long ago is none.
     flush(() => {
-      hourAgo.dispatch({ of: at.sec - 601, isNow: true, tags: new Map() });
+      hourAgo.set({ of: at.sec - 601, isNow: true, tags: new Map() });
     });
     expect(trends()[0]).toBe('an hour ago: unknown');
-    hourAgo.dispatch(null);
+    hourAgo.set(null);
   });
 
   test('columns that are not wanted are not there, and rows may be close together', () => {

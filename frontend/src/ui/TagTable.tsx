@@ -15,6 +15,7 @@ import { unitOf } from '../domain/format';
 import type { AreaHead } from '../domain/table';
 import { shown } from '../domain/text';
 import { act, store, useApp } from '../store/app';
+import { withSort, withTag } from '../store/view';
 import { selectCatalogue, selectShownColumns } from '../store/derived';
 import { useSelected } from '../store/create';
 import { hourAgo, selectHourAgo } from '../store/hourAgo';
@@ -42,7 +43,7 @@ export function TagTable(): JSX.Element {
   const isByArea = useApp((state) => state.settings.byArea);
   const density = useApp((state) => state.settings.density);
   const hidden = useApp((state) => state.settings.hidden);
-  const last = useSelected(hourAgo, (known) => known);
+  const last = useSelected(hourAgo);
   const then = useApp((state) => selectHourAgo(state, last));
   const has = (id: string): boolean => isColumnShown({ hidden }, id);
   const body = useRef<HTMLTableSectionElement>(null);
@@ -164,8 +165,8 @@ export function TagTable(): JSX.Element {
                   type="button"
                   className="text-button"
                   onClick={() => {
-                    act({ type: 'filter', text: '' });
-                    act({ type: 'health', verdict: null });
+                    act({ filter: '' });
+                    act({ health: null, list: 'tags' });
                   }}
                 >
                   {S.filterClear}
@@ -209,15 +210,15 @@ function rowTag(event: SyntheticEvent): string | null {
 function onClick(event: SyntheticEvent): void {
   const tagId = rowTag(event);
   if (tagId === null) return;
-  act({ type: 'select', tagId: store.get().view.selected === tagId ? null : tagId });
+  act(withTag(store.get().view.selected === tagId ? null : tagId));
 }
 
 function onPointerOver(event: SyntheticEvent): void {
-  act({ type: 'hover', tagId: rowTag(event) });
+  act({ hovered: rowTag(event) });
 }
 
 function onPointerLeave(): void {
-  act({ type: 'hover', tagId: null });
+  act({ hovered: null });
 }
 
 const letters = (count: number): CSSProperties => ({ '--letters': count }) as CSSProperties;
@@ -274,7 +275,7 @@ function ColumnHead({
       <button
         type="button"
         onClick={() => {
-          act({ type: 'sort', column: id });
+          act(withSort(id));
         }}
       >
         <span>{children}</span>

@@ -91,7 +91,7 @@ function FilterBar(): JSX.Element {
           spellCheck={false}
           maxLength={LONGEST_FILTER}
           onChange={(event) => {
-            act({ type: 'filter', text: event.target.value });
+            act({ filter: event.target.value });
           }}
         />
       </label>

@@ -3,7 +3,7 @@ import { beforeEach, expect, test } from 'vitest';
 
 import type { Journal } from '../contract/types';
 import { act, receive } from '../store/app';
-import { NO_HOUSE } from '../store/twin';
+import { NO_HOUSE, withPast, withUnread } from '../store/twin';
 import { goLive, showTags, status } from '../testing/page';
 import { later } from './later';
 import { Troubles } from './Troubles';
@@ -21,17 +21,17 @@ test('messages that could not be read are counted, and the last is named', () =>
   render(<Troubles />);
   expect(lines()).toEqual([]);
   flush(() => {
-    receive({ type: 'unread', why: 'state.seq: is missing' });
+    receive(withUnread('state.seq: is missing'));
   });
   expect(lines()).toEqual([
     'A message from the server could not be read and was dropped. The last: state.seq: is missing',
   ]);
   flush(() => {
-    receive({ type: 'unread', why: 'a message that is no JSON' });
+    receive(withUnread('a message that is no JSON'));
   });
   expect(lines()[0]).toMatch(/^2 messages .* The last: a message that is no JSON$/);
   flush(() => {
-    receive({ type: 'unread', why: null });
+    receive({ unread: null });
   });
   expect(lines()).toEqual([]);
 });
@@ -39,11 +39,11 @@ test('messages that could not be read are counted, and the last is named', () =>
 test('a part of the page that has not arrived is told', () => {
   render(<Troubles />);
   flush(() => {
-    later.dispatch({ parts: null, isLate: true });
+    later.set({ parts: null, isLate: true });
   });
   expect(lines()).toEqual([expect.stringMatching(/^Part of the page has not loaded\. Cards/)]);
   flush(() => {
-    later.dispatch({ parts: null, isLate: false });
+    later.set({ parts: null, isLate: false });
   });
   expect(lines()).toEqual([]);
 });
@@ -176,12 +176,9 @@ test.each([
 });
 
 test('a moment that could not be loaded, and which one is shown instead', () => {
-  receive({ type: 'past', past: { at: 5_025, house: NO_HOUSE } });
-  act({ type: 'moment', moment: 3_600 });
-  receive({
-    type: 'set',
-    part: { pastFault: { at: 3_600, message: 'too busy', isLasting: false } },
-  });
+  receive(withPast({ at: 5_025, house: NO_HOUSE }));
+  act({ moment: 3_600 });
+  receive({ pastFault: { at: 3_600, message: 'too busy', isLasting: false } });
   render(<Troubles />);
   expect(lines()).toEqual([
     'sim 01:00:00 could not be loaded. Showing sim 01:23:45 while the page retries. too busy',

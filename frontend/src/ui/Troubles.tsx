@@ -8,7 +8,7 @@ import { rosText } from '../domain/time';
 import { useApp } from '../store/app';
 import { useSelected } from '../store/create';
 import { retryConnection } from '../store/live';
-import { selectNewest, selectShown, type Moment } from '../store/moment';
+import { selectNewest, selectShown } from '../store/moment';
 import type { TwinState } from '../store/twin';
 import { LANGUAGE_TROUBLE, S } from '../strings';
 import { More } from '../widgets/controls';
@@ -26,7 +26,7 @@ export interface Trouble {
 
 function troublesOf(
   { unread, phase, connection, pastFault }: TwinState,
-  moment: Moment = null,
+  moment: number | null = null,
   isLate = false,
 ): readonly Trouble[] {
   const troubles: Trouble[] = [];

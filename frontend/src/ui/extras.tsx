@@ -63,7 +63,7 @@ const MOST_REASONS = 3;
  * same to everybody, and a mouse on its way to somewhere else is not to be held up.
  */
 export function HoverCard(): JSX.Element | null {
-  const pin = useSelected(pinUnderMouse, (under) => under);
+  const pin = useSelected(pinUnderMouse);
   const selected = useApp((state) => state.view.selected);
   const tag = useApp((state) => (pin ? selectTag(state, pin.tagId) : undefined));
   // The chosen tag's own card is open already.

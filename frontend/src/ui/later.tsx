@@ -14,7 +14,7 @@ export interface Later {
   readonly isLate: boolean;
 }
 
-export const later = createStore<Later, Later>({ parts: null, isLate: false }, (_, next) => next);
+export const later = createStore<Later>({ parts: null, isLate: false });
 
 /** Between two tries, ms: doubled each time, up to the longest. */
 const FIRST_MS = 1_000;
@@ -30,10 +30,10 @@ async function tried(load: () => Promise<Parts>): Promise<Parts> {
   for (let waitMs = FIRST_MS; ; waitMs = Math.min(2 * waitMs, LONGEST_MS)) {
     try {
       const parts = await load();
-      later.dispatch({ parts, isLate: false });
+      later.set({ parts, isLate: false });
       return parts;
     } catch {
-      later.dispatch({ parts: null, isLate: true });
+      later.set({ parts: null, isLate: true });
     }
     await pause(waitMs);
   }

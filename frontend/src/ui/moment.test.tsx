@@ -6,7 +6,7 @@ import { LIGHT } from '../draw/palette';
 import { snapshotOf } from '../domain/twin';
 import { Painter } from '../map/painter';
 import { act, receive, store } from '../store/app';
-import { NO_HOUSE } from '../store/twin';
+import { NO_HOUSE, withPast } from '../store/twin';
 import { nextStamp, showTags } from '../testing/page';
 import { judgement, reason } from '../testing/health';
 import { readings, stateFrame, wireTag } from '../testing/tags';
@@ -32,7 +32,7 @@ const text = (testId: string): string => screen.getByTestId(testId).textContent;
 
 const go = (moment: number | null): void => {
   flush(() => {
-    act({ type: 'look', view: { moment } });
+    act({ moment });
   });
 };
 
@@ -46,22 +46,21 @@ test('table, card, legend, health and map are those of the moment', () => {
     LIGHT,
   );
   const then = stateFrame([tagWith(40, -6_700, 3)], { sec: 500 });
-  receive({
-    type: 'past',
-    past: {
+  receive(
+    withPast({
       at: 500,
       house: {
         ...NO_HOUSE,
         snapshot: snapshotOf(then, 0, null),
         health: judgement({ a: [reason({ value: 40, limit: 35 })] }),
       },
-    },
-  });
+    }),
+  );
   const pin = (): unknown => {
     const [first] = painter.scene(store.get(), performance.now()).pins;
     return [first?.texts[0], first?.at.x, first?.verdict];
   };
-  act({ type: 'colouring', colouring: 'value' });
+  act({ colouring: 'value' });
   render(
     <>
       <TagTable />

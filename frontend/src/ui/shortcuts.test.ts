@@ -76,7 +76,7 @@ describe('keys', () => {
   });
 
   test('l leads back to now, and is nothing while now is shown', () => {
-    act({ type: 'moment', moment: 50 });
+    act({ moment: 50 });
     press('l');
     expect(store.get().view.moment).toBeNull();
     press('l');
@@ -84,7 +84,7 @@ describe('keys', () => {
   });
 
   test('Escape closes the card first, and then leads back to now', () => {
-    act({ type: 'look', view: { moment: 0.5, selected: '2' } });
+    act({ moment: 0.5, selected: '2' });
     press('Escape');
     expect(store.get().view).toMatchObject({ moment: 0.5, selected: null });
     press('Escape');

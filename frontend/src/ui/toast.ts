@@ -1,12 +1,12 @@
 import { createStore } from '../store/create';
 
 /** A short word to the operator after something that shows no other effect. */
-export const toast = createStore('', (_: string, next: string) => next);
+export const toast = createStore('');
 
 let timer: ReturnType<typeof setTimeout> | undefined;
 
 export function say(text: string): void {
-  toast.dispatch(text);
+  toast.set(text);
   clearTimeout(timer);
-  timer = setTimeout(toast.dispatch, 4_000, '');
+  timer = setTimeout(toast.set, 4_000, '');
 }

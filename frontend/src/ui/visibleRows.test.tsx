@@ -3,6 +3,8 @@ import { Profiler } from 'react';
 import { afterEach, beforeEach, describe, expect, test, vi } from 'vitest';
 
 import { act, receive, store } from '../store/app';
+import { withState } from '../store/twin';
+import { withTag } from '../store/view';
 import { nextStamp, showTags } from '../testing/page';
 import { readings, stateFrame, wireTag } from '../testing/tags';
 import { TagTable } from './TagTable';
@@ -71,11 +73,7 @@ describe('a long table', () => {
   };
   const hear = (wires: readonly ReturnType<typeof wireTag>[], sec: number): void => {
     settle(() => {
-      receive({
-        type: 'state',
-        latest: stateFrame(wires, { sec, revision: `r${sec}` }),
-        now: performance.now(),
-      });
+      receive(withState(stateFrame(wires, { sec, revision: `r${sec}` }), performance.now()));
     });
   };
 
@@ -103,13 +101,13 @@ describe('a long table', () => {
   test('has the chosen row wherever it is, and the one with the focus as long as it has it', () => {
     show(10_000);
     settle(() => {
-      act({ type: 'select', tagId: '7777' });
+      act(withTag('7777'));
     });
     expect(indices().at(-1)).toBe(7778);
     const button = rows().at(-1)?.querySelector('button');
     settle(() => button?.focus());
     settle(() => {
-      act({ type: 'select', tagId: null });
+      act(withTag(null));
     });
     // With its neighbours, for the Tab key, past the head of an area.
     expect(indices().slice(-5)).toEqual([7776, 7777, 7778, 7779, 7780]);

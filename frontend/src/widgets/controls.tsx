@@ -65,7 +65,6 @@ interface CheckProps extends Omit<ComponentProps<'input'>, 'type' | 'checked' | 
   readonly onChange: (isOn: boolean) => void;
 }
 
-/** What is on or off. */
 export const Check = ({ label, isOn, onChange, ...rest }: CheckProps): JSX.Element => (
   <label className="check">
     <input
@@ -91,14 +90,9 @@ export function More({ label, text }: { label: string; text: string }): JSX.Elem
   );
 }
 
-interface Option<Value extends string> {
-  readonly value: Value;
-  readonly label: ReactNode;
-}
-
 interface SegmentedProps<Value extends string> {
   readonly legend: string;
-  readonly options: readonly Option<Value>[];
+  readonly options: readonly { readonly value: Value; readonly label: ReactNode }[];
   readonly value: Value;
   readonly onChange: (value: Value) => void;
   readonly className?: string;
@@ -177,7 +171,6 @@ interface DisclosureProps {
   readonly label: string;
   readonly button: ReactNode;
   readonly className: string;
-  /** Of the button. */
   readonly look?: string;
   readonly children: ReactNode;
 }

@@ -76,9 +76,10 @@ def main() -> int:
         from greenhouse_sim.simulator import GreenhouseSimulator  # noqa: PLC0415  # see above
     except ModuleNotFoundError as error:
         # colcon and apt know nothing of it: on a robot, nobody has installed it yet.
-        return _refuse(
+        return process.refuse(
+            "patrol_node: error",
             f"the simulator is missing ({error}): python3 -m pip install mdp-greenhouse, on a "
-            "robot into a virtual environment made with --system-site-packages"
+            "robot into a virtual environment made with --system-site-packages",
         )
     from rclpy.utilities import remove_ros_args  # noqa: PLC0415
 
@@ -89,7 +90,7 @@ def main() -> int:
     try:
         options = parse(remove_ros_args(sys.argv)[1:])
     except RuntimeError as error:  # what rclpy raises for ROS arguments that it cannot parse
-        return _refuse(f"cannot use these ROS arguments: {error}")
+        return process.refuse("patrol_node: error", f"cannot use these ROS arguments: {error}")
     if options.end_with_parent:
         process.end_with_parent()
     begin_s = options.since_morning
@@ -103,13 +104,8 @@ def main() -> int:
             ros_arguments=sys.argv,
         )
     except ParameterError as error:
-        return _refuse(str(error))
+        return process.refuse("patrol_node: error", str(error))
     return 0
-
-
-def _refuse(reason: str) -> int:
-    sys.stderr.write(f"patrol_node: error: {' '.join(reason.split())}\n")
-    return 2
 
 
 def _number(

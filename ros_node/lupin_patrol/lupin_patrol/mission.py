@@ -25,9 +25,17 @@ from lupin_patrol.greenhouse import (
     tour,
     walk,
 )
-from lupin_patrol.perception import Exploration, Grid, Sighting, TagDetector
-from lupin_patrol.plants import SECONDS_PER_DAY, Climate, Plants, stream
-from lupin_twin.core.state import Flower, Pose
+from lupin_patrol.perception import (
+    SECONDS_PER_DAY,
+    Climate,
+    Exploration,
+    Grid,
+    Plants,
+    Sighting,
+    TagDetector,
+    stream,
+)
+from lupin_twin.core.state import Inspection, Pose, Reading, Scan
 
 
 class ScanStatus(IntEnum):
@@ -60,28 +68,17 @@ class TagsDiscovered:
 
 
 @dataclass(frozen=True, slots=True)
-class TagScanned:
-    """One try at a tag's sensors. Without success there are neither readings nor a pose."""
+class Visited:
+    """One try at a tag's sensors, or one inspection of the plants around it; without its times.
+
+    A scan without success has neither readings nor a pose. The footprint of an inspection is the
+    outline of the plants' table.
+    """
 
     at_s: float
     pass_index: int
-    tag_id: str
-    status: ScanStatus
-    status_detail: str
     time_of_day_s: float
-    readings: tuple[tuple[str, float], ...]
-    pose: Pose | None
-
-
-@dataclass(frozen=True, slots=True)
-class FlowersSeen:
-    """One inspection of the plants around a tag; its footprint is the outline of their table."""
-
-    at_s: float
-    pass_index: int
-    tag_id: str
-    pose: Pose
-    flower: Flower
+    write: Scan | Inspection
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,9 +108,7 @@ class RobotMoved:
     battery: float
 
 
-Event = (
-    MapGrown | TagsDiscovered | TagScanned | FlowersSeen | PassCompleted | WayPlanned | RobotMoved
-)
+Event = MapGrown | TagsDiscovered | Visited | PassCompleted | WayPlanned | RobotMoved
 
 
 DOCK: Point = (0.4, 0.4)
@@ -184,11 +179,11 @@ class Mission:
             yield from self._drive(DOCK, pass_index)
             self._battery_m = _BATTERY_M
 
-    def visits(self) -> Iterator[TagScanned | FlowersSeen]:
+    def visits(self) -> Iterator[Visited]:
         """The scans and looks of `events`, a tenth of the work: nobody looks around on the way."""
         self._is_observing = False
         for event in self.events():
-            if isinstance(event, TagScanned | FlowersSeen):
+            if isinstance(event, Visited):
                 yield event
 
     def _patrol(self, pass_index: int) -> Iterator[Event]:
@@ -233,27 +228,20 @@ class Mission:
         self._now_s += _READ_S
         time_of_day_s = (START_OF_DAY_S + self._now_s * self._day_speed) % SECONDS_PER_DAY
         pose: Pose | None = None
-        readings: tuple[tuple[str, float], ...] = ()
+        readings: tuple[Reading, ...] = ()
         if status is ScanStatus.OK:
             chance = stream(self._seed, "scan", tag.tag_id, pass_index, attempt)
             # The first pass builds the map and so defines where the tags are: it is exact. The
             # later ones localise themselves in it.
             pose = _locate(tag, 0.0 if pass_index == self._first_pass else 1.0, chance)
             readings = self._climate.read(tag.sensors, tag.position, time_of_day_s, chance)
-        yield TagScanned(
-            at_s=self._now_s,
-            pass_index=pass_index,
-            tag_id=tag.tag_id,
-            status=status,
-            status_detail=_DETAILS[status],
-            time_of_day_s=time_of_day_s,
-            readings=readings,
-            pose=pose,
-        )
+        scan = Scan(tag.tag_id, 0, readings, pose, status, _DETAILS[status])
+        yield Visited(self._now_s, pass_index, time_of_day_s, scan)
         if pose is not None:
             self._now_s += _PICTURE_S
             flower = self._plants.inspect(tag.tag_id, pass_index, attempt)
-            yield FlowersSeen(self._now_s, pass_index, tag.tag_id, pose, flower)
+            seen = Inspection(tag.tag_id, 0, flower, pose)
+            yield Visited(self._now_s, pass_index, time_of_day_s, seen)
 
     def _drive(self, goal: Point, pass_index: int, short_m: float = 0.0) -> Iterator[Event]:
         """Drive to a goal, or stop a little before it, and look around on the way."""

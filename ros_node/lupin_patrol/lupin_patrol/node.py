@@ -10,58 +10,40 @@ from __future__ import annotations
 
 from array import array
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from dataclasses import replace
 from math import cos, sin
 from threading import Event as Flag
 from threading import Thread
 from time import monotonic
 from typing import Any
 
-import rclpy
 from builtin_interfaces.msg import Time
 from geometry_msgs.msg import Point, Pose, PoseStamped, PoseWithCovarianceStamped, Quaternion
-from lupin_msgs.msg import (
-    DiscoveredTag,
-    DiscoveredTags,
-    Observation,
-    SensorReading,
-)
+from lupin_msgs.msg import DiscoveredTag, DiscoveredTags, Observation
 from nav_msgs.msg import OccupancyGrid, Path
-from rcl_interfaces.msg import ParameterDescriptor
 from rclpy.duration import Duration
-from rclpy.exceptions import (
-    InvalidParameterTypeException,
-)
-from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
-from rclpy.signals import SignalHandlerOptions
 from sensor_msgs.msg import BatteryState
 from std_msgs.msg import Header
 
 from lupin_patrol.mission import (
     Event,
-    FlowersSeen,
     MapGrown,
     PassCompleted,
     RobotMoved,
     ScanStatus,
-    TagScanned,
     TagsDiscovered,
+    Visited,
     WayPlanned,
     pose_of,
 )
 from lupin_patrol.perception import Sighting
 from lupin_twin.core import interfaces
-from lupin_twin.core.parameters import ParameterError
-from lupin_twin.ros.base_node import NodeUtilities, end_spinning, latched, spin_until_shutdown
-from lupin_twin.ros.convert import flower_fields, pose_message
-from lupin_twin.ros.parameters import naming, naming_own_parameters
+from lupin_twin.core.state import STATUS_OK
+from lupin_twin.ros.base_node import NodeUtilities, latched, running_ros, spinning
+from lupin_twin.ros.convert import nanoseconds, observation_message, pose_message
+from lupin_twin.ros.parameters import declare, naming, naming_own_parameters
 from lupin_twin.runtime import process
-from lupin_twin.runtime.process import remove_stale_shared_memory
-
-# The contract's depth. One pass makes more observations than that (two for each of 29 tags), so a
-# twin that starts late misses the oldest ones; the next pass brings them.
-OBSERVATIONS_DEPTH = 50
 
 # A twin that already runs is discovered within this time. Without the wait the first observations
 # of a fast patrol would have left the latch before anyone could hear them.
@@ -78,15 +60,17 @@ class PatrolNode(Node):  # type: ignore[misc]  # rclpy is not typed
         with naming_own_parameters():
             super().__init__("lupin_patrol")
         self.utilities = NodeUtilities(self)
-        self._frame_id = self._name("frame_id", "map")
+        names = ("frame_id", "observations_topic", "discovered_tags_topic", "map_topic")
+        self._parameters = declare(self, names)
+        self._frame_id = self._parameters.frame_id
+        # One pass makes more observations than are latched (two for each of 29 tags), so a twin
+        # that starts late misses the oldest ones; the next pass brings them.
         self.observations = self._latched(
-            Observation, "observations_topic", "floranova/observations", OBSERVATIONS_DEPTH
+            Observation, "observations_topic", interfaces.OBSERVATIONS.depth
         )
         # Each message holds all that came before, so the newest alone is worth keeping.
-        self._discovered_tags = self._latched(
-            DiscoveredTags, "discovered_tags_topic", "perception/discovered_tags", 1
-        )
-        self._map = self._latched(OccupancyGrid, "map_topic", "map", 1)
+        self._discovered_tags = self._latched(DiscoveredTags, "discovered_tags_topic", 1)
+        self._map = self._latched(OccupancyGrid, "map_topic", 1)
         self._pose, self._plan, self._battery = (
             self.create_publisher(kind, topic.name, latched(1))
             for kind, topic in (
@@ -104,14 +88,13 @@ class PatrolNode(Node):  # type: ignore[misc]  # rclpy is not typed
                 self._map.publish(occupancy_grid(event, stamp, self._frame_id))
             case TagsDiscovered():
                 self._discovered_tags.publish(discovered_tags(event, stamp, self._frame_id))
-            case TagScanned():
-                self.observations.publish(tag_reading(event, stamp, self._frame_id))
-                if event.status is not ScanStatus.OK:
+            case Visited():
+                self.observations.publish(observation(event, nanoseconds(stamp), self._frame_id))
+                if event.write.status != STATUS_OK:
                     self.get_logger().info(
-                        f"tag {event.tag_id}: {event.status.name}, {event.status_detail}"
+                        f"tag {event.write.tag_id}: {ScanStatus(event.write.status).name},"
+                        f" {event.write.status_detail}"
                     )
-            case FlowersSeen():
-                self.observations.publish(inspection(event, stamp, self._frame_id))
             case WayPlanned():
                 self._plan.publish(path(event, stamp, self._frame_id))
             case RobotMoved():
@@ -130,21 +113,10 @@ class PatrolNode(Node):  # type: ignore[misc]  # rclpy is not typed
             for publisher in (self.observations, self._discovered_tags, self._map)
         )
 
-    def _latched(self, message: type[Any], parameter: str, default: str, depth: int) -> Any:
-        topic = self._name(parameter, default)
+    def _latched(self, message: type[Any], parameter: str, depth: int) -> Any:
+        topic = getattr(self._parameters, parameter)
         with naming(parameter, topic):
             return self.create_publisher(message, topic, latched(depth))
-
-    def _name(self, parameter: str, default: str) -> str:
-        try:
-            value = self.declare_parameter(
-                parameter, default, ParameterDescriptor(read_only=True)
-            ).value
-        except InvalidParameterTypeException as error:
-            raise ParameterError(f"parameter {parameter}: {error}") from error
-        if not value:
-            raise ParameterError(f"parameter {parameter} is empty, expected a name")
-        return str(value)
 
 
 def play(
@@ -157,42 +129,21 @@ def play(
     Raises ParameterError, before anything was published.
     """
     stop = _stop_flag()
-    with _running_node(ros_arguments) as node:
-        node.get_logger().info(f"patrol starts at speed {speed:g}")
-        subscribers = node.observations.get_subscription_count
-        if _stopped_before(stop, lambda: subscribers() > 0, _SUBSCRIBERS_S):
-            return
-        start = monotonic()
-        for event in events:
-            if stop.wait(max(0.0, start + (event.at_s - begin_s) / speed - monotonic())):
-                return
-            node.publish(event)
-            if once and isinstance(event, PassCompleted):
-                break
-        _stopped_before(stop, lambda: node.wait_for_delivery(0.0), _DELIVERY_S)
-
-
-@contextmanager
-def _running_node(ros_arguments: list[str]) -> Iterator[PatrolNode]:
-    """Start a node that listens (to /clock, to parameter services) in a thread of its own."""
-    rclpy.init(args=ros_arguments, signal_handler_options=SignalHandlerOptions.NO)
-    remove_stale_shared_memory(rclpy.get_default_context().get_domain_id())
-    executor = SingleThreadedExecutor()
-    try:
+    with running_ros(ros_arguments):
         node = PatrolNode()
-        executor.add_node(node)
-        thread = Thread(
-            target=spin_until_shutdown, args=(executor, node.utilities.report), name="ros"
-        )
-        thread.start()
-        try:
-            yield node
-        finally:
-            end_spinning(executor)
-            thread.join()
-            node.destroy_node()
-    finally:
-        rclpy.try_shutdown()
+        with spinning(node):
+            node.get_logger().info(f"patrol starts at speed {speed:g}")
+            subscribers = node.observations.get_subscription_count
+            if _stopped_before(stop, lambda: subscribers() > 0, _SUBSCRIBERS_S):
+                return
+            start = monotonic()
+            for event in events:
+                if stop.wait(max(0.0, start + (event.at_s - begin_s) / speed - monotonic())):
+                    return
+                node.publish(event)
+                if once and isinstance(event, PassCompleted):
+                    break
+            _stopped_before(stop, lambda: node.wait_for_delivery(0.0), _DELIVERY_S)
 
 
 def _stop_flag() -> Flag:
@@ -219,32 +170,12 @@ def _stopped_before(stop: Flag, condition: Callable[[], bool], timeout_s: float)
 SOURCE = "lupin_patrol"
 
 
-def tag_reading(event: TagScanned, stamp: Time, frame_id: str) -> Observation:
-    """Return a KIND_TAG_READING observation; without success it has no readings and no pose."""
-    message = _observation(event, stamp, frame_id)
-    message.kind = Observation.KIND_TAG_READING
-    message.status = int(event.status)
-    message.status_detail = event.status_detail
-    message.tag_reading.tag_id = event.tag_id
-    message.tag_reading.stamp = stamp
+def observation(event: Visited, stamp_ns: int, frame_id: str) -> Observation:
+    """Return a scan or an inspection."""
+    mission = f"patrol-{event.pass_index + 1:04d}"
+    write = replace(event.write, stamp_ns=stamp_ns, source=SOURCE, mission=mission)
+    message = observation_message(write, frame_id)
     message.tag_reading.sim_time_of_day_seconds = float(event.time_of_day_s)
-    message.tag_reading.readings = [
-        SensorReading(name=name, value=float(value)) for name, value in event.readings
-    ]
-    return message
-
-
-def inspection(event: FlowersSeen, stamp: Time, frame_id: str) -> Observation:
-    """Return a KIND_FLOWER observation."""
-    message = _observation(event, stamp, frame_id)
-    message.kind = Observation.KIND_FLOWER
-    message.status = Observation.STATUS_OK
-    seen = message.flower
-    seen.tag_id = event.tag_id
-    seen.pose = PoseStamped(header=message.header, pose=message.tag_pose_in_map)
-    seen.confidence = float(event.flower.confidence)
-    for name, value in flower_fields(event.flower).items():
-        setattr(seen, name, value)
     return message
 
 
@@ -297,15 +228,6 @@ def _on_floor(point: tuple[float, float], yaw: float) -> Pose:
     return Pose(
         position=Point(x=float(point[0]), y=float(point[1]), z=0.0),
         orientation=Quaternion(x=0.0, y=0.0, z=sin(yaw / 2), w=cos(yaw / 2)),
-    )
-
-
-def _observation(event: TagScanned | FlowersSeen, stamp: Time, frame_id: str) -> Observation:
-    return Observation(
-        header=Header(stamp=stamp, frame_id=frame_id),
-        mission_id=f"patrol-{event.pass_index + 1:04d}",
-        source=SOURCE,
-        tag_pose_in_map=pose_message(event.pose),
     )
 
 

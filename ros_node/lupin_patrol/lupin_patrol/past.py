@@ -11,15 +11,16 @@ import argparse
 import sys
 import time
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Final
 
 from greenhouse_sim.simulator import GreenhouseSimulator
 
 from lupin_patrol.cli import parse
-from lupin_patrol.mission import Mission, TagScanned
-from lupin_patrol.plants import SECONDS_PER_DAY
-from lupin_twin.core.state import Inspection, Pin, Reading, Scan, Write
+from lupin_patrol.mission import Mission
+from lupin_patrol.perception import SECONDS_PER_DAY
+from lupin_twin.core.state import Pin, Write
 from lupin_twin.journal.appending import prefill
 from lupin_twin.journal.beside import InUse
 from lupin_twin.journal.schema import FILE_ERRORS, Foreign
@@ -46,33 +47,19 @@ def past(options: argparse.Namespace, now_ns: int) -> Iterator[Write]:
     for event in mission.visits():
         if event.at_s >= 0.0:
             return
-        tag_id, at_ns = event.tag_id, now_ns + round(event.at_s / options.speed * 1e9)
-        if event.pose is not None and tag_id not in pinned:
-            pinned.add(tag_id)
-            yield Pin(tag_id, event.pose, at_ns, at_ns)
-        mission_id = f"past-{event.pass_index - _FIRST_PASS + 1:04d}"
-        if isinstance(event, TagScanned):
-            yield Scan(
-                tag_id,
-                at_ns,
-                tuple(Reading(name, value) for name, value in event.readings),
-                status=int(event.status),
-                status_detail=event.status_detail,
-                source=SOURCE,
-                own_stamp_ns=at_ns,
-                mission=mission_id,
-                arrival_ns=at_ns,
-            )
-        else:
-            yield Inspection(
-                tag_id,
-                at_ns,
-                event.flower,
-                source=SOURCE,
-                own_stamp_ns=at_ns,
-                mission=mission_id,
-                arrival_ns=at_ns,
-            )
+        write, at_ns = event.write, now_ns + round(event.at_s / options.speed * 1e9)
+        if write.pose is not None and write.tag_id not in pinned:
+            pinned.add(write.tag_id)
+            yield Pin(write.tag_id, write.pose, at_ns, at_ns)
+        yield replace(
+            write,
+            stamp_ns=at_ns,
+            pose=None,
+            source=SOURCE,
+            own_stamp_ns=at_ns,
+            mission=f"past-{event.pass_index - _FIRST_PASS + 1:04d}",
+            arrival_ns=at_ns,
+        )
 
 
 def main(arguments: Sequence[str] | None = None) -> None:

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from builtin_interfaces.msg import Time
 from lupin_msgs.msg import Observation
 
 from lupin_patrol.greenhouse import Rect
-from lupin_patrol.mission import ScanStatus, TagScanned
-from lupin_patrol.node import tag_reading
+from lupin_patrol.mission import ScanStatus, Visited
+from lupin_patrol.node import observation
+from lupin_twin.core.state import Scan
 
 
 def test_a_rectangle_does_not_contain_its_edge() -> None:
@@ -17,17 +17,8 @@ def test_a_rectangle_does_not_contain_its_edge() -> None:
 
 
 def test_a_failed_scan_is_an_observation_without_readings() -> None:
-    scan = TagScanned(
-        at_s=3.0,
-        pass_index=0,
-        tag_id="7",
-        status=ScanStatus.UNREACHABLE,
-        status_detail="blocked",
-        time_of_day_s=0.0,
-        readings=(),
-        pose=None,
-    )
-    message = tag_reading(scan, Time(sec=12), "map")
+    scan = Scan("7", 0, status=ScanStatus.UNREACHABLE, status_detail="blocked")
+    message = observation(Visited(3.0, 0, 0.0, scan), 12_000_000_000, "map")
     assert (message.kind, message.status) == (
         Observation.KIND_TAG_READING,
         Observation.STATUS_UNREACHABLE,

@@ -12,7 +12,7 @@ from launch_ros.actions import Node
 from launch_ros.parameter_descriptions import ParameterValue
 
 from launch import LaunchContext, LaunchDescription
-from lupin_twin.ros.launch_arguments import ARGUMENTS, overrides, params_file
+from lupin_twin.core.parameters import ARGUMENTS, overrides, params_file
 
 
 def generate_launch_description() -> LaunchDescription:

@@ -6,7 +6,7 @@ import ast
 import importlib.util
 from pathlib import Path
 
-from lupin_twin.ros.launch_arguments import ARGUMENTS
+from lupin_twin.core.parameters import ARGUMENTS
 
 FILE = Path(__file__).parents[1] / "launch" / "twin.launch.py"
 ROS_HAS_LAUNCH = importlib.util.find_spec("launch_ros") is not None

@@ -14,7 +14,7 @@ from lupin_bridge.feed.source import TwinUnavailableError, TwinUpdate
 from lupin_bridge.judge import alarm_fold
 from lupin_bridge.judge.judging import Criteria
 from lupin_bridge.settings import Settings
-from lupin_twin.core.journal_condition import Condition, JournalState
+from lupin_twin.core.diagnostics import Condition, JournalState
 from lupin_twin.core.past import PastWrite, PastWrites, RunSpan, WritesRequest
 from lupin_twin.core.state import Flower, Inspection, Reading, Scan, Snapshot, TwinStore
 from lupin_twin.runtime.workers import Workers

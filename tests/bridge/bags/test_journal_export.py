@@ -76,7 +76,7 @@ def fed(target: Path) -> tuple[dict[str, str], list[str]]:
             written.append(repr(write))
         elif topic == "/perception/discovered_tags":
             heard = convert.received_tags(deserialize_message(data, DiscoveredTags))
-            for pinned in list(ingest.discoveries(heard, "map", store.is_pinned)):
+            for pinned in list(ingest.discoveries(heard, "", "map", store.is_pinned)):
                 assert not isinstance(pinned, Drop)
                 assert ingest.apply(pinned, store, repeats) is None
     return by_id(store.snapshot(NOW * 2, "map").tags), written

@@ -18,7 +18,7 @@ from lupin_bridge.cli.roles import (
 )
 from lupin_bridge.serving.server import listen
 from lupin_patrol.cli import parse as patrol_options
-from lupin_patrol.plants import SECONDS_PER_DAY
+from lupin_patrol.perception import SECONDS_PER_DAY
 from lupin_twin.core.parameters import World
 from tests.support.journal import CLOCK, NOW, is_whole, kept, select
 from tests.support.journal import scan as row

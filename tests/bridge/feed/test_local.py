@@ -11,7 +11,7 @@ from rclpy.parameter import Parameter
 from lupin_bridge.feed.local import LocalTwin
 from lupin_bridge.feed.query import Itself
 from lupin_bridge.feed.source import TwinTimeoutError
-from lupin_twin.core.journal_condition import JournalState
+from lupin_twin.core.diagnostics import JournalState
 from lupin_twin.core.past import NotRemembered
 from lupin_twin.journal.runs import Clock
 from lupin_twin.ros.node import TwinNode

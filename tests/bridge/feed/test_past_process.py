@@ -17,10 +17,10 @@ from lupin_bridge.feed import past_process
 from lupin_bridge.feed.past_process import MAX_PENDING, PastProcess
 from lupin_bridge.feed.query import NICENESS, ExportStep, Now
 from lupin_bridge.past.plans import Answered
-from lupin_twin.core.journal_condition import Condition, JournalState
+from lupin_twin.core.diagnostics import Condition, JournalState
 from lupin_twin.core.past import NotRemembered, PastRefused
 from lupin_twin.field.explored import OccupancyMap
-from lupin_twin.journal.queries import Export
+from lupin_twin.journal.received import Export
 from tests.support.journal import NOW, SECOND, kept, scan
 from tests.support.looking import Body, Count, Endless, Failing, MapCells, Running
 from tests.support.maps import map_of

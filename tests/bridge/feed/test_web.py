@@ -20,9 +20,9 @@ from lupin_bridge.feed.relay import Sample, TwinNames, topics_of
 from lupin_bridge.feed.source import TwinTimeoutError, TwinUnavailableError
 from lupin_bridge.feed.web import RETAINED_S, FollowedLog, WebTwin
 from lupin_bridge.serving.admission import Limits
-from lupin_twin.adapt.scans import BuiltScan
 from lupin_twin.core.parameters import World
 from lupin_twin.core.past import NotRemembered
+from lupin_twin.core.state import Reading, Scan
 from lupin_twin.field.engine import FieldRefused
 from lupin_twin.journal.follow import Lot, write
 from lupin_twin.runtime.estimates import ReportRequest
@@ -107,8 +107,8 @@ async def test_after_a_silence_all_goes_on_with_a_new_node(domain: int) -> None:
                 peer.publish("/twin/state", state_of(value), depth=1)
                 await until(lambda: received() == relayed() == value, "the state, raw too")
                 await until_answered(place, "the robot", lambda x: x == value)
-                scan = BuiltScan("1", 1, None, (("co2", value),), "")
-                await twin.publish_observation(scan, "program")
+                scan = Scan("1", 1, (Reading("co2", value),), source="program")
+                await twin.publish_observation(scan)
                 await asyncio.to_thread(
                     peer.until,
                     lambda: scans and scans[-1].tag_reading.readings[0].value == value,

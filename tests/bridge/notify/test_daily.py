@@ -20,7 +20,7 @@ from lupin_bridge.notify.webhook import MAX_REFUSALS, Webhook
 from lupin_bridge.past.plans import Answered
 from lupin_bridge.serving.admission import Answer
 from lupin_bridge.settings import Secrets, SettingError, Settings
-from lupin_twin.core.journal_condition import Condition, JournalState
+from lupin_twin.core.diagnostics import Condition, JournalState
 from lupin_twin.core.past import NotRemembered, PastRefused
 from tests.support.mosquitto import Broker, Subscriber, free_port
 from tests.support.receiver import Answer as Reply

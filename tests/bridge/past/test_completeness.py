@@ -5,7 +5,7 @@ from dataclasses import replace
 import pytest
 
 from lupin_bridge.past import bodies
-from lupin_twin.core.journal_condition import UNKNOWN, Condition, JournalState
+from lupin_twin.core.diagnostics import UNKNOWN, Condition, JournalState
 
 NS = 10**9
 # Two runs, of the first of which a part was deleted.

@@ -22,8 +22,8 @@ from lupin_bridge.past.plans import (
     WholeState,
 )
 from lupin_bridge.settings import Settings
+from lupin_twin.core.diagnostics import UNKNOWN
 from lupin_twin.core.history import LatestRequest
-from lupin_twin.core.journal_condition import UNKNOWN
 from lupin_twin.core.past import EVERY_TAG, SeriesPast, SeriesRequest
 from lupin_twin.core.state import Attempt, Reading, TagState
 from lupin_twin.field.idw import never

@@ -15,7 +15,7 @@ import pytest
 from lupin_bridge.judge.judging import Criteria
 from lupin_bridge.past.report_page import ReportPage
 from lupin_bridge.settings import Settings
-from lupin_twin.core.journal_condition import UNKNOWN
+from lupin_twin.core.diagnostics import UNKNOWN
 from lupin_twin.core.state import Flower, Reading, TagState
 from lupin_twin.field.idw import never
 

@@ -6,7 +6,7 @@ import json
 
 from lupin_bridge.stream import followers
 from lupin_bridge.stream.followers import Advice, EstimateQualities, ExpectedTags
-from lupin_twin.estimate import Place
+from lupin_twin.estimate.cholesky import Place
 from lupin_twin.estimate.engine import Record, Tally
 from lupin_twin.runtime.estimates import Report, TagCheck
 

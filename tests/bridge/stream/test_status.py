@@ -8,8 +8,8 @@ from lupin_bridge.bridge import WATCH_PERIOD_S
 from lupin_bridge.feed.source import TwinUpdate
 from lupin_bridge.stream import schema
 from lupin_bridge.stream.frames import STALE_AFTER_S, Liveness, Reason, Status
+from lupin_twin.core.diagnostics import Condition, JournalState
 from lupin_twin.core.drops import Counts, Recent
-from lupin_twin.core.journal_condition import Condition, JournalState
 from lupin_twin.core.parameters import World
 from lupin_twin.core.state import ClockState, Snapshot
 from lupin_twin.ros.convert import map_of

@@ -7,8 +7,9 @@ from typing import Any
 import pytest
 import yaml
 
-from lupin_twin.adapt.config import Place, Robot, Sensor, config_of, read_config
+from lupin_twin.adapt.config import Robot, Sensor, config_of, read_config
 from lupin_twin.adapt.table import ConfigError, Value
+from lupin_twin.core.state import Pose
 from tests.support.docs import block_named
 
 LEAST = """
@@ -26,7 +27,7 @@ def test_the_least_that_has_to_work(tmp_path: Path) -> None:
     path.write_text(LEAST)
     config = read_config(path)
     assert config.robot == Robot("/amcl_pose", "geometry_msgs/msg/PoseWithCovarianceStamped")
-    assert config.tags == {"A": Place(0, 0), "B": Place(3, 0, 0.4), "12": Place(1, 2)}
+    assert config.tags == {"A": Pose.at(0, 0), "B": Pose.at(3, 0, 0.4), "12": Pose.at(1, 2)}
     assert (config.frame_id, config.reach_m) == ("map", 0.8)
     temperature, humidity = config.sensors
     assert temperature == Sensor(
@@ -39,12 +40,12 @@ def test_the_least_that_has_to_work(tmp_path: Path) -> None:
 def test_tags_may_stand_in_a_file_of_their_own(tmp_path: Path) -> None:
     (tmp_path / "tags.yaml").write_text("A: [1.5, 2.5]")
     (tmp_path / "adapt.yaml").write_text(LEAST.replace("{A: [0.0, 0.0],", "tags.yaml #"))
-    assert read_config(tmp_path / "adapt.yaml").tags == {"A": Place(1.5, 2.5)}
+    assert read_config(tmp_path / "adapt.yaml").tags == {"A": Pose.at(1.5, 2.5)}
 
 
 def test_a_tag_may_be_a_frame_of_tf() -> None:
     config = config_of(changed("tags", {"A": [1, 2], "B": "bench_b"}))
-    assert (config.tags, config.frames) == ({"A": Place(1, 2)}, {"B": "bench_b"})
+    assert (config.tags, config.frames) == ({"A": Pose.at(1, 2)}, {"B": "bench_b"})
 
 
 def test_one_quantity_may_have_several_fixed_sensors() -> None:

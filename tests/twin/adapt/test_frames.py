@@ -7,7 +7,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from lupin_twin.adapt.frames import (
+from lupin_twin.adapt.messages import (
     MAX_FRAMES,
     MAX_STEPS,
     WAIT_NS,

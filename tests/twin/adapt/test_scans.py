@@ -7,14 +7,15 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lupin_twin.adapt.config import Config, Place, Robot
-from lupin_twin.adapt.scans import BuiltScan, Scans
+from lupin_twin.adapt.config import Config, Robot
+from lupin_twin.adapt.scans import FIXED_SOURCE, SCAN_FAILED, VISIT_SOURCE, Scans
 from lupin_twin.adapt.table import number_of
 from lupin_twin.core.drops import MAX_SENSORS_PER_TAG, MAX_TAGS, Rejected
+from lupin_twin.core.state import Pose, Reading, Scan
 
 S = 1_000_000_000
 ROBOT = Robot("/pose", "geometry_msgs/msg/PoseStamped", max_age_s=30.0)
-TAGS = {"A": Place(0.0, 0.0), "B": Place(3.0, 0.0, 0.5)}
+TAGS = {"A": Pose.at(0.0, 0.0), "B": Pose.at(3.0, 0.0, 0.5)}
 
 
 def scans_of(**changes: object) -> Scans:
@@ -26,7 +27,7 @@ def read(scans: Scans, at_s: float, value: float = 20.0) -> bool:
     return scans.take("temperature", "", value, int(at_s * S), int(at_s * S))
 
 
-def move(scans: Scans, at_s: float, x: float, y: float = 0.0) -> list[BuiltScan]:
+def move(scans: Scans, at_s: float, x: float, y: float = 0.0) -> list[Scan]:
     return list(scans.move(x, y, int(at_s * S)))
 
 
@@ -36,8 +37,13 @@ def test_a_stop_is_one_scan_of_the_mean_when_the_robot_leaves() -> None:
     assert read(scans, 2, 20.0)
     assert read(scans, 3, 22.0)
     (scan,) = move(scans, 4, 1.5)
-    assert scan == BuiltScan(
-        "A", 3 * S, TAGS["A"], (("temperature", 21.0),), "temperature ±1.4 of 2"
+    assert scan == Scan(
+        "A",
+        3 * S,
+        (Reading("temperature", 21.0),),
+        TAGS["A"],
+        status_detail="temperature ±1.4 of 2",
+        source=VISIT_SOURCE,
     )
     assert scans.tag is None
 
@@ -58,7 +64,7 @@ def test_a_long_stop_is_a_scan_each_window() -> None:
     assert [scan.stamp_ns for scan in scans.due(10 * S)] == [S]
     read(scans, 11, 30.0)
     (scan,) = move(scans, 12, 9.0)
-    assert scan.readings == (("temperature", 30.0),)
+    assert scan.readings == (Reading("temperature", 30.0),)
 
 
 def test_who_stops_and_reads_nothing_has_failed_and_who_passes_by_has_not() -> None:
@@ -67,7 +73,8 @@ def test_who_stops_and_reads_nothing_has_failed_and_who_passes_by_has_not() -> N
     assert move(scans, 1, 1.5) == []
     move(scans, 2, 0.0)
     (scan,) = move(scans, 5, 1.5)
-    assert (scan.tag_id, scan.readings, scan.detail) == ("A", (), "no reading in 3 s here")
+    assert (scan.tag_id, scan.readings, scan.status) == ("A", (), SCAN_FAILED)
+    assert scan.status_detail == "no reading in 3 s here"
 
 
 def test_jitter_at_the_edge_of_reach_makes_one_scan() -> None:
@@ -80,7 +87,7 @@ def test_jitter_at_the_edge_of_reach_makes_one_scan() -> None:
 
 
 def test_of_two_tags_in_reach_the_nearer_counts_once_it_is_clearly_nearer() -> None:
-    scans = scans_of(tags={"A": Place(0, 0), "B": Place(1, 0)})
+    scans = scans_of(tags={"A": Pose.at(0, 0), "B": Pose.at(1, 0)})
     move(scans, 0, 0.4)
     assert scans.tag == "A"
     move(scans, 1, 0.52)
@@ -113,8 +120,9 @@ def test_a_fixed_sensor_needs_no_robot() -> None:
     for at in range(10):
         assert scans.take("co2", "B", 400.0 + at, at * S, at * S)
     (scan,) = scans.due(10 * S)
-    assert (scan.tag_id, scan.place, scan.stamp_ns) == ("B", TAGS["B"], 9 * S)
-    assert scan.readings == (("co2", 404.5),)
+    assert (scan.tag_id, scan.pose, scan.stamp_ns) == ("B", TAGS["B"], 9 * S)
+    assert scan.source == FIXED_SOURCE
+    assert scan.readings == (Reading("co2", 404.5),)
     assert list(scans.due(30 * S)) == []
 
 
@@ -123,7 +131,7 @@ def test_where_no_tag_is_in_reach_a_cell_may_be_one() -> None:
     move(scans, 0, 7.0, -0.5)
     read(scans, 1)
     (scan,) = move(scans, 2, 0.0)
-    assert (scan.tag_id, scan.place) == ("cell 3 -1", Place(7.0, -1.0))
+    assert (scan.tag_id, scan.pose) == ("cell 3 -1", Pose.at(7.0, -1.0))
     assert scans.tag == "A"
 
 
@@ -142,21 +150,21 @@ def test_tags_are_bounded_fixed_and_found_ones() -> None:
     assert taken == [True] * MAX_TAGS + [False]
     taken = [scans.take(f"s{n}", "T0", 1.0, 0, 0) for n in range(MAX_SENSORS_PER_TAG)]
     assert taken == [True] * (MAX_SENSORS_PER_TAG - 1) + [False]  # with co2
-    found = [scans.discover(f"T{n}", Place(0, 0), 0.1, 0.1) for n in range(MAX_TAGS + 1)]
+    found = [scans.discover(f"T{n}", Pose.at(0, 0), 0.1, 0.1) for n in range(MAX_TAGS + 1)]
     assert found == [True] * MAX_TAGS + [False]
 
 
 def test_a_found_tag_is_in_reach_new_and_then_as_a_surveyed_one() -> None:
     scans = scans_of()
     move(scans, 0, 5.0)
-    assert not scans.discover("A", Place(5, 0), 5.0, 0.0)
-    assert not scans.discover("C", Place(6, 0), 5.0, 0.0)
-    assert scans.discover("C", Place(5.5, 0), 5.0, 0.0)
-    assert not scans.discover("C", Place(5.2, 0), 5.0, 0.0)
+    assert not scans.discover("A", Pose.at(5, 0), 5.0, 0.0)
+    assert not scans.discover("C", Pose.at(6, 0), 5.0, 0.0)
+    assert scans.discover("C", Pose.at(5.5, 0), 5.0, 0.0)
+    assert not scans.discover("C", Pose.at(5.2, 0), 5.0, 0.0)
     move(scans, 1, 5.0)
     assert read(scans, 2)
     (scan,) = scans.lose(3 * S)
-    assert (scan.tag_id, scan.place) == ("C", Place(5.5, 0))
+    assert (scan.tag_id, scan.pose) == ("C", Pose.at(5.5, 0))
     assert scans.tag is None
 
 
@@ -167,8 +175,8 @@ def test_mean_and_spread_are_the_definitions(values: list[float]) -> None:
     for value in values:
         read(scans, 1, value)
     (scan,) = move(scans, 2, 9.0)
-    assert scan.readings[0][1] == pytest.approx(statistics.fmean(values), abs=1e-6)
-    spread = float(scan.detail.split("±")[1].split()[0])
+    assert scan.readings[0].value == pytest.approx(statistics.fmean(values), abs=1e-6)
+    spread = float(scan.status_detail.split("±")[1].split()[0])
     assert spread == pytest.approx(statistics.stdev(values), rel=0.06, abs=1e-6)
 
 

@@ -8,10 +8,13 @@ from lupin_twin.core.diagnostics import (
     MAX_SHOWN,
     OK,
     STALE,
+    UNKNOWN,
     WARN,
+    Condition,
     Estimates,
     Finding,
     Health,
+    JournalState,
     Layers,
     Origin,
     SelfReport,
@@ -19,7 +22,6 @@ from lupin_twin.core.diagnostics import (
     self_report,
 )
 from lupin_twin.core.drops import Counts, Recent
-from lupin_twin.core.journal_condition import UNKNOWN, Condition, JournalState
 from lupin_twin.core.state import ClockState
 
 WELL = Health(

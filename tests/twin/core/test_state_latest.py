@@ -11,7 +11,16 @@ from hypothesis import strategies as st
 
 from lupin_twin.core import state
 from lupin_twin.core.drops import Rejected
-from lupin_twin.core.state import Attempt, Flower, Inspection, Reading, Scan, TagState, TwinStore
+from lupin_twin.core.state import (
+    STATUS_OK,
+    Attempt,
+    Flower,
+    Inspection,
+    Reading,
+    Scan,
+    TagState,
+    TwinStore,
+)
 from tests.support.store import SCAN_FAILED, S, at, look, scan
 
 
@@ -94,9 +103,9 @@ def plainest(writes: list[Write]) -> dict[str, TagState]:
 
 
 def brings(write: Write) -> bool:
-    return (
-        write.succeeded or bool(write.readings) if isinstance(write, Scan) else bool(write.flower)
-    )
+    if isinstance(write, Scan):
+        return write.status == STATUS_OK or bool(write.readings)
+    return bool(write.flower)
 
 
 def held(write: Write, now_ns: int) -> Write:

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from hypothesis import given
 
-from lupin_twin.estimate import MAX_EXACT, Model, Readings, fit
-from lupin_twin.estimate.cross_validation import gap_of
-from lupin_twin.estimate.kernel import Hyper, Scale
+from lupin_twin.estimate.cholesky import MAX_EXACT, gap_of
+from lupin_twin.estimate.kernel import Hyper, Readings, Scale
+from lupin_twin.estimate.model import Model, fit
 from lupin_twin.estimate.posterior import INFLATION
 from lupin_twin.field.grid import FloatArray
 from tests.support import textbook_gp

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 
-from lupin_twin.estimate import Readings
-from lupin_twin.estimate.kernel import PRIOR_LOG_SD, PRIOR_MEDIAN, Hyper, Pairs, scale_of
+from lupin_twin.estimate.kernel import PRIOR_LOG_SD, PRIOR_MEDIAN, Hyper, Pairs, Readings, scale_of
 from lupin_twin.estimate.model import FitFailed, hyper_of, minimise, surprise
 from tests.support import textbook_gp
 from tests.support.estimates import DAY_S, hypers, some_readings, spots_of

@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lupin_twin.estimate import FitFailed, Model, Readings, fit
-from lupin_twin.estimate.kernel import Hyper, Scale
+from lupin_twin.estimate.kernel import Hyper, Readings, Scale
+from lupin_twin.estimate.model import FitFailed, Model, fit
 from lupin_twin.estimate.posterior import INFLATION
 from tests.support import textbook_gp
 from tests.support.estimates import DAY_S, a_day, hypers, readings_of, some_readings, spots_of
@@ -65,21 +65,6 @@ def test_the_day_s_course_bridges_an_outage_only_where_the_day_is_as_long_as_tol
     off = wrong.posterior(day, 1.25 * DAY_S).points(day.xy)
     assert np.abs(told[0] - true).mean() < 0.3
     assert np.abs(off[0] - true).mean() > 1.0
-
-
-def test_what_cannot_be_is_refused() -> None:
-    day = a_day()
-    none = day.take(np.array([], dtype=np.int64))
-    with pytest.raises(ValueError, match="there are no readings"):
-        fit(none)
-    with pytest.raises(ValueError, match="there are no readings"):
-        model_of(Hyper(*[1.0] * 10)).posterior(none, 0.0)
-    newest_s = float(day.time_s.max())
-    model_of(Hyper(*[1.0] * 10)).posterior(day, newest_s)
-    with pytest.raises(ValueError, match=r"at_s is .*, the newest reading is of"):
-        model_of(Hyper(*[1.0] * 10)).posterior(day, newest_s - 1.0)
-    with pytest.raises(ValueError, match=r"day_length_s is 0.0, must be greater than 0"):
-        fit(day, day_length_s=0.0)
 
 
 @pytest.mark.parametrize("value", [3e38, -3e38, 1e-300])

@@ -1,7 +1,6 @@
-"""What an estimate is made of: what is refused, which readings count, how they are scaled."""
+"""What an estimate is made of: which readings count, how they are scaled."""
 
 import math
-from typing import Any
 
 import numpy as np
 import pytest
@@ -10,34 +9,6 @@ from hypothesis import strategies as st
 
 from lupin_twin.estimate.kernel import Readings, scale_of
 from tests.support.estimates import DAY_S, readings_of, some_readings
-
-GOOD: dict[str, Any] = {
-    "time_s": [0.0, 1.0],
-    "tag": [0, 1],
-    "value": [20.0, 21.0],
-    "xy": [(0.0, 0.0), (1.0, 2.0)],
-}
-
-
-@pytest.mark.parametrize(
-    ("wrong", "complaint"),
-    [
-        ({"value": [1.0]}, r"value has shape \(1,\), must be \(2,\)"),
-        ({"tag": [0, 2]}, "tag is 2, the limits are 0 and 1"),
-        ({"tag": [-1, 0]}, "tag is -1, the limits are 0 and 1"),
-        ({"time_s": [0.0, math.inf]}, "time_s has numbers that are not finite"),
-        ({"value": [0.0, math.nan]}, "value has numbers that are not finite"),
-        ({"xy": [(0.0, math.nan), (0.0, 0.0)]}, "xy has numbers that are not finite"),
-        ({"xy": [0.0, 1.0]}, r"xy has shape \(2,\), must be \(2, 2\)"),
-        ({"time_s": [[0.0, 1.0]]}, "time_s has shape"),
-    ],
-)
-def test_what_nothing_can_be_made_of_is_refused_by_name(
-    wrong: dict[str, Any], complaint: str
-) -> None:
-    assert len(Readings(**GOOD)) == 2
-    with pytest.raises(ValueError, match=complaint):
-        Readings(**{**GOOD, **wrong})
 
 
 @given(some_readings(), st.floats(0.0, 40.0))

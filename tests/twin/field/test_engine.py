@@ -170,10 +170,9 @@ def test_a_job_that_nobody_waits_for_ends_between_two_parts(store: TwinStore) ->
     [
         (0, {"resolution": 0.01}, {}, 400 * 200 * 20e-9),
         # Each sample reaches a window of 3 m.
-        (10, {"resolution": 0.01}, {}, 400 * 200 * 20e-9 + 10 * 300 * 200 * 5e-9),
-        (10, {"resolution": 0.01}, {"idw_power": 3.0}, 400 * 200 * 20e-9 + 600_000 * 15e-9),
+        (10, {"resolution": 0.01}, {}, 400 * 200 * 20e-9 + 10 * 300 * 200 * 15e-9),
         # And no more than the box.
-        (10, {}, {"max_distance_m": 50.0}, 8 * 20e-9 + 10 * 8 * 5e-9),
+        (10, {}, {"max_distance_m": 50.0}, 8 * 20e-9 + 10 * 8 * 15e-9),
     ],
 )
 def test_cost_follows_cells_and_the_windows_of_the_samples(

@@ -1,5 +1,7 @@
 """The memo of fields: what it keeps, what it drops, what it counts."""
 
+import pytest
+
 from lupin_twin.field.engine import MAX_ENTRIES, FieldCache, FieldKey, FieldRequest, FieldRules
 from lupin_twin.field.grid import FieldGrid
 from lupin_twin.field.idw import compute_idw_field
@@ -29,7 +31,7 @@ def grid(cells: int) -> FieldGrid:
 
 
 def test_64_fields_are_kept_and_the_least_recently_used_goes_first() -> None:
-    cache = FieldCache(max_bytes=1_000_000)
+    cache = FieldCache()
     for number in range(MAX_ENTRIES):
         cache.put(key(number), grid(1))
     assert cache.get(key(0)) is not None
@@ -41,8 +43,11 @@ def test_64_fields_are_kept_and_the_least_recently_used_goes_first() -> None:
     assert cache.get(key(2)) is not None
 
 
-def test_bytes_are_bounded_whatever_the_number() -> None:
-    cache = FieldCache(max_bytes=100)
+def test_bytes_are_bounded_whatever_the_number(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr("lupin_twin.field.engine.MAX_BYTES", 100)
+    cache = FieldCache()
     for number in range(5):
         cache.put(key(number), grid(10))
     assert (cache.bytes, len(cache)) == (80, 2)
@@ -52,8 +57,11 @@ def test_bytes_are_bounded_whatever_the_number() -> None:
     assert (cache.bytes, len(cache)) == (100, 1)
 
 
-def test_field_larger_than_the_whole_bound_is_not_kept_and_drops_nothing() -> None:
-    cache = FieldCache(max_bytes=100)
+def test_field_larger_than_the_whole_bound_is_not_kept_and_drops_nothing(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr("lupin_twin.field.engine.MAX_BYTES", 100)
+    cache = FieldCache()
     cache.put(key(1), grid(10))
     cache.put(key(2), grid(26))
     assert cache.get(key(2)) is None

@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 
 from lupin_twin.core.state import Pose, Reading, TagState
 from lupin_twin.field import idw
+from lupin_twin.field.engine import FieldQuality, leave_one_out, painted_share
 from lupin_twin.field.idw import Abandoned, compute_idw_field
-from lupin_twin.field.quality import FieldQuality, leave_one_out, painted_share
 from tests.oracle_idw import value_at
 
 RULES: dict[str, Any] = {"falloff_radius_m": 1.5, "max_distance_m": 1.5, "power": 2.0}

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from lupin_twin.core.journal_condition import JournalState
+from lupin_twin.core.diagnostics import JournalState
 from lupin_twin.core.state import Reading
 from lupin_twin.journal.retention import Limits
 from lupin_twin.journal.salvage import quarantine

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from lupin_twin.core.journal_condition import JournalState
+from lupin_twin.core.diagnostics import JournalState
 from lupin_twin.core.notes import (
     ACKNOWLEDGE,
     MAX_NOTES,
@@ -20,7 +20,7 @@ from lupin_twin.core.notes import (
     withdrawals,
 )
 from lupin_twin.journal import follow
-from lupin_twin.journal.notes import NoteQueue, notes, number_of
+from lupin_twin.journal.received import NoteQueue, notes, number_of
 from lupin_twin.journal.schema import open_reader, open_writer
 from lupin_twin.journal.writer import Journal
 from tests.support.journal import LIMITS, NOW, opened, recording, scan, select, wait_state

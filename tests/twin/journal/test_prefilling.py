@@ -3,7 +3,7 @@ from pathlib import Path
 
 import pytest
 
-from lupin_twin.core.journal_condition import JournalState
+from lupin_twin.core.diagnostics import JournalState
 from lupin_twin.core.state import Write
 from lupin_twin.journal.appending import Stretch, prefill, simulated
 from lupin_twin.journal.runs import Clock

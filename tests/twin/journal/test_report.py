@@ -19,8 +19,8 @@ from lupin_bridge.judge.day import ClockDay
 from lupin_bridge.judge.judging import Criteria, own_sensors
 from lupin_bridge.judge.verdict import derive
 from lupin_bridge.past.report import Report
+from lupin_twin.core.diagnostics import Condition, JournalState
 from lupin_twin.core.history import kind_of
-from lupin_twin.core.journal_condition import Condition, JournalState
 from lupin_twin.core.past import PastWrite, RunSpan
 from lupin_twin.core.state import Inspection, Pin, Reading
 from lupin_twin.journal.runs import runs, spans

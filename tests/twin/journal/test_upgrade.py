@@ -13,7 +13,7 @@ from typing import Any
 
 import pytest
 
-from lupin_twin.core.journal_condition import JournalState
+from lupin_twin.core.diagnostics import JournalState
 from lupin_twin.journal.checking import find_all_damage
 from lupin_twin.journal.rebuild import is_version3, upgrade
 from lupin_twin.journal.schema import open_reader

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from lupin_twin.core.journal_condition import JournalState
+from lupin_twin.core.diagnostics import JournalState
 from lupin_twin.core.state import Write
 from lupin_twin.journal.file import JournalFile
 from lupin_twin.journal.retention import Limits
@@ -144,9 +144,12 @@ def test_a_file_that_is_removed_is_made_anew(path: Path) -> None:
     assert known(path) == {scan("2")}
 
 
-def test_what_is_too_much_is_lost_oldest_first_and_told(path: Path) -> None:
+def test_what_is_too_much_is_lost_oldest_first_and_told(
+    path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("lupin_twin.journal.writer.MAX_WEIGHT", 20)
     path.mkdir(parents=True)  # a folder cannot be written to
-    with recording(path, max_weight=20) as journal:
+    with recording(path) as journal:
         wait_state(journal, JournalState.FAILING)
         for n in range(15):
             journal.write(scan(str(n)))

@@ -14,7 +14,6 @@ from lupin_msgs.msg import Observation as ObservationMsg
 from rclpy.serialization import deserialize_message, serialize_message
 
 from lupin_twin.core import history, ingest
-from lupin_twin.core.ingest import ReceivedReading
 from lupin_twin.core.state import (
     NANOSECONDS_PER_SECOND,
     STATUS_OK,
@@ -23,6 +22,7 @@ from lupin_twin.core.state import (
     Flower,
     Pose,
     Reading,
+    Scan,
     Snapshot,
     TagState,
 )
@@ -106,10 +106,16 @@ def test_a_tag_reading_is_heard_field_by_field() -> None:
     )
     msg.tag_reading.stamp.sec = 3
     heard = convert.received(msg)
-    assert (heard.kind, heard.status, heard.frame_id) == (0, 3, "map")
-    assert heard.stamp_ns == 4 * S
-    pose = Pose(1.0, 2.0, 0.0, 0.0, 0.0, 0.0, 1.0)
-    assert heard.part == ReceivedReading("1", 3 * S, (Reading("co2", 1.0),), pose)
+    assert (heard.kind, heard.frame_id) == (0, "map")
+    assert heard.sent == Scan(
+        "1", 3 * S, (Reading("co2", 1.0),), Pose.at(1.0, 2.0), 3, "", "test", 4 * S
+    )
+
+
+@pytest.mark.parametrize(("own", "counts"), [("", "odom"), ("camera", "camera")])
+def test_of_flowers_the_frame_of_their_own_pose_comes_first(own: str, counts: str) -> None:
+    msg = messages.look("1", at=(1.0, 2.0), frame_id="odom", pose_frame_id=own)
+    assert convert.received(msg).frame_id == counts
 
 
 def test_the_kinds_and_the_status_are_the_messages() -> None:

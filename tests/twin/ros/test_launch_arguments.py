@@ -9,7 +9,7 @@ from typing import Any
 import ament_index_python.packages
 import pytest
 
-from lupin_twin.ros.launch_arguments import ARGUMENTS, LaunchError, overrides, params_file
+from lupin_twin.core.parameters import ARGUMENTS, LaunchError, overrides, params_file
 
 SHARE = Path("ros_node/lupin_twin")
 NOT_GIVEN = {argument.name: argument.default for argument in ARGUMENTS}

@@ -10,7 +10,7 @@ from hypothesis.extra import numpy as npst
 from rclpy.validate_topic_name import validate_topic_name
 
 from lupin_twin.core.parameters import ParameterError
-from lupin_twin.estimate import EstimateGrid
+from lupin_twin.estimate.posterior import EstimateGrid
 from lupin_twin.field.grid import FieldGrid
 from lupin_twin.ros.layers import ERROR_UNKNOWN, points, topic_of, topics_of
 

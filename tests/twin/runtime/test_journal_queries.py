@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from lupin_twin.core.journal_condition import Condition, JournalState
+from lupin_twin.core.diagnostics import Condition, JournalState
 from lupin_twin.core.past import NotRemembered
 from lupin_twin.runtime.journal_queries import Recall
 from lupin_twin.runtime.workers import ShouldStop

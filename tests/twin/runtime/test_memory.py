@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from lupin_twin.core.journal_condition import JournalState
+from lupin_twin.core.diagnostics import JournalState
 from lupin_twin.core.past import NotRemembered
 from lupin_twin.core.state import Flower, Inspection, Pin, Pose, Reading, Scan, TwinStore, Write
 from lupin_twin.journal.beside import journal_path, state_folder

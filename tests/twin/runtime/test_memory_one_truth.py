@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from lupin_twin.core.journal_condition import JournalState
+from lupin_twin.core.diagnostics import JournalState
 from lupin_twin.core.state import NO_FLOWER, Pin
 from tests.support.journal import select
 from tests.support.memory_life import HERE, NOW, THERE, S, twin

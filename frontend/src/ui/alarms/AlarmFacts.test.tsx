@@ -19,7 +19,7 @@ test('how old the last value is nobody knows after a sleep', () => {
   const now = (): string | undefined => document.querySelector('[data-fact=now]')?.textContent;
   expect(now()).toMatch(/^now unknown, last 8.0\u00a0°C .+ ago$/);
   flush(() => {
-    receive({ type: 'lapse' });
+    receive({ isTimeLost: true });
   });
   expect(now()).toBe('now unknown, last 8.0\u00a0°C');
   stop();

@@ -29,7 +29,7 @@ interface ValuesNow extends Values {
 
 /** An alarm's values as the newest state has them. */
 export function useValues(alarm: Alarm): ValuesNow {
-  const last = useSelected(hourAgo, (known) => known);
+  const last = useSelected(hourAgo);
   const speech = useApp(selectSpeech);
   // As a text: a state that says the same of this tag renders nothing anew.
   const key = useApp((state) => JSON.stringify(selectNow(state, alarm, last)));

@@ -29,7 +29,7 @@ import { whoseWord } from './people';
 /** At how many tags something waits for a second scan; null: none, or nobody knows. */
 export function AlarmsWait(): JSX.Element | null {
   const isKnown = useApp(selectIsKnown);
-  const listed = useSelected(alarmList, (it) => it);
+  const listed = useSelected(alarmList);
   const health = useApp(selectNewestHealth);
   const waiting = useMemo(() => {
     const all = [...listed.active, ...listed.shelved];
@@ -76,13 +76,13 @@ export function AlarmNotes({ isEmpty }: { isEmpty: boolean }): JSX.Element {
 
 /** Below the list: whether what is done here is this browser's own, or everybody's. */
 export function WhoseWord(): JSX.Element {
-  const who = useSelected(person, (it) => it);
+  const who = useSelected(person);
   return <p className="alarms-mine faint">{whoseWord(who)}</p>;
 }
 
 /** Says that an alarm has come while another moment is shown, and leads to now. */
 export function Meanwhile(): JSX.Element | null {
-  const items = useSelected(meanwhile, (it) => it);
+  const items = useSelected(meanwhile);
   const [worst] = items;
   const text = useApp((state) => (worst ? textNow(state, worst.alarm) : ''));
   if (!worst) return null;
@@ -93,7 +93,7 @@ export function Meanwhile(): JSX.Element | null {
       <button
         type="button"
         onClick={() => {
-          act({ type: 'look', view: { moment: null, selected: alarm.tag_id || null } });
+          act({ moment: null, selected: alarm.tag_id || null });
         }}
       >
         {alarm.tag_id === '' ? S.backToLive : S.meanwhileShow(shown(alarm.tag_id, 24))}
@@ -114,7 +114,7 @@ export function DoneLine({
   /** What can be done to the whole list. */
   children: ReactNode;
 }): JSX.Element {
-  const last = useSelected(done, (it) => it);
+  const last = useSelected(done);
   return (
     <div className="alarm-line">
       {children}
@@ -152,9 +152,9 @@ const notifyHint = (state: NotifyState): string =>
 
 /** How alarms come to who is not looking: nothing but what is wished. */
 export function TellMe(): JSX.Element {
-  const kept = useSelected(own, (it) => it);
-  const sound = useSelected(soundState, (it) => it);
-  const notify = useSelected(notifyState, (it) => it);
+  const kept = useSelected(own);
+  const sound = useSelected(soundState);
+  const notify = useSelected(notifyState);
   return (
     <>
       <Way

@@ -7,7 +7,7 @@ import { notifyState } from '../../alarms/notify';
 import type { Alarm, HealthReason } from '../../contract/types';
 import { act as dispatch, receive, store } from '../../store/app';
 import { person } from '../../store/create';
-import { NO_HOUSE } from '../../store/twin';
+import { NO_HOUSE, withPast } from '../../store/twin';
 import { alarm, alarms, tellAlarms } from '../../testing/alarms';
 import { goLost, showTags } from '../../testing/page';
 import { judgement, reason } from '../../testing/health';
@@ -15,9 +15,9 @@ import { readings, wireTag } from '../../testing/tags';
 import { AlarmPanel } from './AlarmPanel';
 
 beforeEach(() => {
-  own.dispatch(NOTHING_KEPT);
-  done.dispatch(null);
-  person.dispatch(null);
+  own.set(NOTHING_KEPT);
+  done.set(null);
+  person.set(null);
   showTags([wireTag()]);
   const stop = startAlarms();
   render(<AlarmPanel />);
@@ -136,7 +136,7 @@ test('who acknowledged it and when, by the clock of the twin', () => {
   const said = { acknowledged_by: 'anna', acknowledged_at: { sec: 1_000, nanosec: 0 } };
   tell(alarm('a', { tag_id: '5', ...said }));
   flush(() => {
-    own.dispatch(acknowledge(NOTHING_KEPT, [{ alarm: alarm('a'), verdict: 'critical' }], 0));
+    own.set(acknowledge(NOTHING_KEPT, [{ alarm: alarm('a'), verdict: 'critical' }], 0));
   });
   expect(status('5')).toBe('acknowledged by anna, sim 00:16:40');
 });
@@ -146,13 +146,13 @@ test('who may not act on what is shared is offered nothing of it', () => {
   tell(alarm('a', { tag_id: '5' }), alarm('b', { tag_id: '6' }));
   expect(screen.getAllByRole('button', { name: /^Acknowledge/ })).toHaveLength(3);
   flush(() => {
-    person.dispatch({ ...session, name: 'vera', can_write_notes: false });
+    person.set({ ...session, name: 'vera', can_write_notes: false });
   });
   expect(screen.queryAllByRole('button', { name: /acknowledge/i })).toEqual([]);
   expect(actions('5')).toEqual(['Go to start']);
   fireEvent.keyDown(document, { key: 'Escape' });
   flush(() => {
-    person.dispatch({ ...session, name: 'anna', role: 'operator', can_write_notes: true });
+    person.set({ ...session, name: 'anna', role: 'operator', can_write_notes: true });
     goLost();
   });
   expect(actions('6')).toEqual(['Go to start', 'Shelve', 'Comment']);
@@ -294,7 +294,7 @@ test('a row leads to its tag', () => {
 test('without an alarm it says so; where that is not known it says that', () => {
   expect(notes()).toEqual(['unknown']);
   flush(() => {
-    receive({ type: 'set', part: { alarms: alarms([], { source: 'starting', since: null }) } });
+    receive({ alarms: alarms([], { source: 'starting', since: null }) });
   });
   expect(notes()).toEqual(['starting', 'unknown']);
   tell();
@@ -325,7 +325,7 @@ test('without an alarm it says so; where that is not known it says that', () => 
   expect(group('shelved')).toHaveLength(1);
   expect(screen.queryByText(wait)).toBeNull();
   flush(() => {
-    receive({ type: 'set', part: { alarms: alarms([], { source: 'heard' }) } });
+    receive({ alarms: alarms([], { source: 'heard' }) });
   });
   expect(notes()).toEqual(['none', 'wait', 'heard']);
   tell();
@@ -337,8 +337,8 @@ test('it is of now, and says so while another moment is shown', () => {
   tell(alarm('a'));
   expect(notes()).toEqual([]);
   flush(() => {
-    dispatch({ type: 'moment', moment: 50 });
-    receive({ type: 'past', past: { at: 50, house: NO_HOUSE } });
+    dispatch({ moment: 50 });
+    receive(withPast({ at: 50, house: NO_HOUSE }));
   });
   expect(notes()).toEqual(['now']);
   expect(screen.getByText(/current alarms.*sim 00:00:50/)).toBeTruthy();
@@ -388,7 +388,7 @@ test('what is filtered away is not acknowledged with all', () => {
 
 test('nothing makes itself heard unless it is wished, and what cannot says why', () => {
   vi.stubGlobal('isSecureContext', false);
-  notifyState.dispatch('insecure');
+  notifyState.set('insecure');
   press('Notify me of alarms');
   const [sound, notify] = screen.getAllByRole<HTMLInputElement>('checkbox');
   expect([sound?.checked, notify?.checked, notify?.disabled]).toEqual([false, false, true]);

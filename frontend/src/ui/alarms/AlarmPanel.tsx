@@ -48,7 +48,7 @@ const isTag = (id: string): boolean => selectNewestTag(store.get(), id) !== unde
 
 /** The alarms of now, beside the map: active, shelved, and resolved. */
 export function AlarmPanel(): JSX.Element {
-  const listed = useSelected(alarmList, (it) => it);
+  const listed = useSelected(alarmList);
   // As a text: what does not change it renders nothing anew.
   const ids = useApp((state) =>
     worstNowFirst(state, listed.active)

@@ -132,7 +132,7 @@ function Actions({ item, name }: { item: Item; name: string }): JSX.Element {
   const [form, setForm] = useState<'shelve' | 'comment' | null>(null);
   const close = useClose();
   const root = useRef<HTMLDivElement>(null);
-  const who = useSelected(person, (it) => it);
+  const who = useSelected(person);
   const isRefused = useIsRefused();
   const canLookBack = useApp((state) => state.twin.remembered.state !== 'off');
   useLayoutEffect(() => {

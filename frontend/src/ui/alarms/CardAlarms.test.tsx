@@ -16,7 +16,7 @@ import { CardAlarms } from './CardAlarms';
 let stop: () => void;
 
 beforeEach(() => {
-  own.dispatch(NOTHING_KEPT);
+  own.set(NOTHING_KEPT);
   showTags([wireTag({ tag_id: '7' })]);
   stop = startAlarms();
   render(<CardAlarms tagId="7" />);
@@ -54,16 +54,16 @@ test('all alarms of a tag are acknowledged where it is looked at, and no others'
   expect(line.textContent).toMatch(/^2 alarms · since sim 00:08:20/);
   const vera = { can_sign_out: true, seconds_left: null, name: 'vera', role: 'viewer' } as const;
   flush(() => {
-    person.dispatch({ ...vera, can_write_notes: false });
+    person.set({ ...vera, can_write_notes: false });
   });
   expect(screen.queryByRole('button')).toBeNull();
   flush(() => {
-    person.dispatch({ ...vera, can_write_notes: true });
+    person.set({ ...vera, can_write_notes: true });
     goLost();
   });
   expect(screen.getByRole<HTMLButtonElement>('button').disabled).toBe(true);
   flush(() => {
-    person.dispatch(null);
+    person.set(null);
   });
   fireEvent.click(screen.getByRole('button', { name: 'Acknowledge all (2)' }));
   expect(line.textContent).toMatch(/^2 alarms acknowledged · since/);
@@ -137,7 +137,7 @@ test('the count of alarms says how many of them are of its sign, where not all a
   });
   expect(count()).toBe('3');
   flush(() => {
-    act({ type: 'look', view: { moment: 10 } });
+    act({ moment: 10 });
   });
   expect(count()).toBe('now 3');
 });

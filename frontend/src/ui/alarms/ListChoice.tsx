@@ -5,7 +5,7 @@ import { countNow, worstNow } from '../../alarms/speech';
 import { alarmList } from '../../alarms/watch';
 import { act, useApp } from '../../store/app';
 import { useSelected } from '../../store/create';
-import type { ViewState } from '../../store/view';
+import { type ViewState, withList } from '../../store/view';
 import { S } from '../../strings';
 import { Segmented } from '../../widgets/controls';
 import { HealthShape } from '../HealthMark';
@@ -30,7 +30,7 @@ export function ListChoice(): JSX.Element {
         { value: 'alarms', label: <AlarmsLabel /> },
       ]}
       onChange={(chosen) => {
-        act({ type: 'list', list: chosen });
+        act(withList(chosen));
       }}
     />
   );
@@ -41,7 +41,7 @@ export function ListChoice(): JSX.Element {
  * all are acknowledged. Who looks back reads that they are those of now.
  */
 export function AlarmsLabel(): JSX.Element {
-  const list = useSelected(alarmList, (it) => it);
+  const list = useSelected(alarmList);
   const unacknowledged = calling(list);
   const { length } = list.active;
   const isKnown = useApp(selectAreAlarmsKnown);

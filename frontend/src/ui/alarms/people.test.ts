@@ -59,7 +59,7 @@ beforeEach(() => {
   status = 201;
   isAway = false;
   role = 'operator';
-  own.dispatch(NOTHING_KEPT);
+  own.set(NOTHING_KEPT);
   const note = {
     ...{ id: 'n1', kind: 'acknowledge', subject: 'alarm:cold', text: '', until: null },
     ...{ made_at: { sec: 1, nanosec: 0 }, by: 'anna', withdrawn_by: null, withdrawn_at: null },
@@ -108,7 +108,7 @@ test('who has signed in is known also where the bridge was away at first', async
 });
 
 test('what a viewer had acknowledged by themselves holds no more', async () => {
-  person.dispatch(null);
+  person.set(null);
   acknowledgeAlarms([{ alarm: COLD, verdict: 'stressed' }]);
   role = 'viewer';
   await signedIn();

@@ -75,7 +75,7 @@ function endOf(alarm: Alarm): number | null {
 
 function take(): void {
   if (person.get() === null || pending > 0 || store.get().twin.alarms === null) return;
-  own.dispatch(merged(own.get(), alarmsNow(), endOf));
+  own.set(merged(own.get(), alarmsNow(), endOf));
 }
 
 /** What has to be said for what was done here. */
@@ -123,7 +123,7 @@ async function tell(before: Kept, next: Kept): Promise<void> {
   pending -= 1;
   if (failure !== null) {
     say(P.failed(failure));
-    done.dispatch(null);
+    done.set(null);
   }
   // The frame that has them may come later than the answer: the one of before would take them back.
   if (failure !== null || store.get().twin.alarms !== alarms) take();
@@ -134,7 +134,7 @@ export function startPeople(): () => void {
   const session = createFetcher<Session>({
     paceMs: PACE_MS,
     onValue: (found) => {
-      person.dispatch(found.name ? found : null);
+      person.set(found.name ? found : null);
       acting.tell = found.can_write_notes ? (before, next) => void tell(before, next) : null;
       take();
     },
@@ -156,7 +156,7 @@ export function startPeople(): () => void {
     for (const stop of stops) stop();
     session.want(null);
     acting.tell = null;
-    person.dispatch(null);
+    person.set(null);
   };
 }
 

@@ -10,11 +10,12 @@ import yaml
 from rclpy.node import Node
 
 from lupin_twin.adapt.config import POSES, STANDARD
-from lupin_twin.adapt.frames import FrameError, Frames
 from lupin_twin.adapt.messages import (
     DETECTIONS_TYPE,
     TF_STATIC,
     TF_TYPE,
+    FrameError,
+    Frames,
     Source,
     message_type,
     transform_of,

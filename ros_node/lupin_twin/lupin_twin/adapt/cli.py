@@ -6,18 +6,16 @@ import argparse
 import signal
 import sys
 import time
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn
 
 from lupin_twin.runtime import process
-from lupin_twin.runtime.process import exit_after, remove_stale_shared_memory
+from lupin_twin.runtime.process import exit_after, refuse
 
 if TYPE_CHECKING:
     from lupin_twin.adapt.config import Config
 
-USAGE_ERROR = 2
 WRONG = 1
 
 
@@ -53,44 +51,28 @@ def run(options: argparse.Namespace, ros_args: Sequence[str]) -> int:
     Returns the exit code: 2 for a wrong configuration, 1 where --check found a fault.
     """
     if options.config is None and not options.check:
-        return _refuse("--config FILE is missing; --check prints one to start from")
+        return refuse("adapt", "--config FILE is missing; --check prints one to start from")
     if not 0.1 <= options.seconds <= 3600.0:
-        return _refuse(f"--seconds is {options.seconds:g}, must be from 0.1 to 3600")
+        return refuse("adapt", f"--seconds is {options.seconds:g}, must be from 0.1 to 3600")
     process.block()  # before anything slow is imported
     from lupin_twin.adapt.config import read_config  # noqa: PLC0415  # see above
-    from lupin_twin.adapt.table import ConfigError  # noqa: PLC0415  # see above
+    from lupin_twin.adapt.table import ConfigError  # noqa: PLC0415
+    from lupin_twin.core.parameters import ParameterError  # noqa: PLC0415
+    from lupin_twin.ros.base_node import running_ros  # noqa: PLC0415
 
     try:
         config = None if options.config is None else read_config(options.config)
-        with _ros(ros_args):
+        with running_ros(["adapt", *ros_args]):
             if config is None:
                 return _suggest(options.seconds)
             return _check(config, options.seconds) if options.check else _run(config)
-    except ConfigError as error:
-        return _refuse(str(error))
+    except (ConfigError, ParameterError) as error:
+        return refuse("adapt", str(error))
 
 
 def command() -> NoReturn:
     """`main` as a process of its own."""
     exit_after(main)
-
-
-@contextmanager
-def _ros(ros_args: Sequence[str]) -> Iterator[None]:
-    import rclpy  # noqa: PLC0415  # see `run`
-    from rclpy.signals import SignalHandlerOptions  # noqa: PLC0415
-
-    from lupin_twin.adapt.table import ConfigError  # noqa: PLC0415
-
-    try:
-        rclpy.init(args=["adapt", *ros_args], signal_handler_options=SignalHandlerOptions.NO)
-    except RuntimeError as error:  # the parent of all that rclpy raises for bad arguments
-        raise ConfigError(f"cannot start ROS: {error}") from None
-    remove_stale_shared_memory(rclpy.get_default_context().get_domain_id())
-    try:
-        yield
-    finally:
-        rclpy.try_shutdown()
 
 
 def _run(config: Config) -> int:
@@ -127,8 +109,8 @@ def _suggest(seconds: float) -> int:
         _say(why, sys.stderr)
     if not any(source.received for source in listener.sources.values()):
         topics = ", ".join(sorted(name for name, _ in listener.get_topic_names_and_types()))
-        return _refuse(
-            f"nothing was received that is a reading or a pose; topics: {topics or 'none'}"
+        return refuse(
+            "adapt", f"nothing was received that is a reading or a pose; topics: {topics or 'none'}"
         )
     _say("# Where each tag is, [x, y] in m, is for you to fill in.", sys.stdout)
     _say(suggestion(listener).rstrip(), sys.stdout)
@@ -151,11 +133,6 @@ def _listen(node: Any, seconds: float) -> None:
 def _say(text: str, to: Any) -> None:
     to.write(f"{text}\n")
     to.flush()
-
-
-def _refuse(reason: str) -> int:
-    sys.stderr.write(f"adapt: {' '.join(reason.split())}\n")
-    return USAGE_ERROR
 
 
 if __name__ == "__main__":

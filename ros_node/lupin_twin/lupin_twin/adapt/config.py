@@ -23,6 +23,7 @@ from lupin_twin.adapt.table import (
     value_of,
 )
 from lupin_twin.core.drops import MAX_SENSORS_PER_TAG, MAX_TAGS
+from lupin_twin.core.state import Pose
 
 MAX_FILE_BYTES: Final = 4_000_000
 # As a place that is posted: nobody's greenhouse is farther from its map's origin.
@@ -48,15 +49,6 @@ POSES: Final[Mapping[str, str]] = {
     "geometry_msgs/msg/PoseStamped": "pose",
     "nav_msgs/msg/Odometry": "pose.pose",
 }
-
-
-@dataclass(frozen=True, slots=True)
-class Place:
-    """Where a tag is, in the frame of the configuration, m."""
-
-    x: float
-    y: float
-    z: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -107,7 +99,7 @@ class Config:
 
     sensors: tuple[Sensor, ...]
     robot: Robot | None = None
-    tags: Mapping[str, Place] = field(default_factory=dict)
+    tags: Mapping[str, Pose] = field(default_factory=dict)
     frames: Mapping[str, str] = field(default_factory=dict)
     detections: Detections | None = None
     frame_id: str = "map"
@@ -136,7 +128,7 @@ def config_of(content: Any, folder: Path = Path()) -> Config:
     config = Config(
         sensors,
         robot,
-        {name: at for name, at in tags.items() if isinstance(at, Place)},
+        {name: at for name, at in tags.items() if isinstance(at, Pose)},
         {name: at for name, at in tags.items() if isinstance(at, str)},
         _detections(Table("detections", table.take("detections")))
         if table.has("detections")
@@ -182,9 +174,7 @@ def _robot(table: Table) -> Robot:
 
 
 def _detections(table: Table) -> Detections:
-    detections = Detections(
-        table.text("topic"), table.text("name") if table.has("name") else TAG_FRAME
-    )
+    detections = Detections(table.text("topic"), table.text("name", TAG_FRAME))
     table.end()
     if "{id}" not in detections.name:
         raise ConfigError(
@@ -193,7 +183,7 @@ def _detections(table: Table) -> Detections:
     return detections
 
 
-def _tags(content: Any, folder: Path) -> Iterator[tuple[str, Place | str]]:
+def _tags(content: Any, folder: Path) -> Iterator[tuple[str, Pose | str]]:
     if isinstance(content, str):
         content = read_yaml(folder / content)
     table = Table("tags", content)
@@ -216,7 +206,7 @@ def _tags(content: Any, folder: Path) -> Iterator[tuple[str, Place | str]]:
                 f"tags.{name} is {shown(at)}, expected [x, y] or [x, y, z] in m up to {MAX_M:.0f}, "
                 "or a frame of TF"
             )
-        yield name, Place(*map(float, at))
+        yield name, Pose.at(*at)
 
 
 def _sensors(table: Table) -> Iterator[Sensor]:

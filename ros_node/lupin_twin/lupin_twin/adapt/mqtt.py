@@ -213,7 +213,7 @@ def _patterns(table: Table) -> Iterator[Pattern]:
         )
     preset = table.one_of("preset", PRESETS) if table.has("preset") else ""
     tag = str(table.take("tag", ""))
-    there = table.text("availability") if table.has("availability") else ""
+    there = table.text("availability", "")
     for each in (topic, there or topic):
         if each.count("{tag}") > 1 or each.count("{sensor}") > 1:
             raise ConfigError(f"{table.name}: {shown(each)} has one of them twice")
@@ -221,7 +221,7 @@ def _patterns(table: Table) -> Iterator[Pattern]:
             raise ConfigError(
                 f"{table.name}: expected {{tag}} in {shown(each)}, or the key tag; one of them"
             )
-    sensor = table.text("sensor") if table.has("sensor") else ""
+    sensor = table.text("sensor", "")
     values = values_of(Table(f"{table.name}.values", table.take("values", {})), "path")
     if preset == "zigbee2mqtt":
         values = {**_ZIGBEE, **values}
@@ -235,7 +235,7 @@ def _patterns(table: Table) -> Iterator[Pattern]:
     if there:
         yield Pattern(there, tag, is_availability=True)
     default = "last_seen" if preset == "zigbee2mqtt" else ""
-    time = table.text("time") if table.has("time") else default
+    time = table.text("time", default)
     yield Pattern(topic, tag, sensor, values, value_of(table), names, time)
     table.end()
 

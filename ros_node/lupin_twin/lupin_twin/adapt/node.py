@@ -20,27 +20,27 @@ from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.serialization import deserialize_message
 from std_msgs.msg import Header
 
-from lupin_twin.adapt.config import POSES, TAG_FRAME, Config, Place, Robot, Sensor
-from lupin_twin.adapt.frames import FrameError, Frames, Sightings
+from lupin_twin.adapt.config import POSES, TAG_FRAME, Config, Robot, Sensor
 from lupin_twin.adapt.messages import (
     DETECTIONS_TYPE,
     MQTT,
     TF,
     TF_STATIC,
     TF_TYPE,
+    FrameError,
+    Frames,
+    Sightings,
     Source,
     message_type,
-    observation,
-    pose_of,
     transform_of,
 )
 from lupin_twin.adapt.mqtt import MqttClient, Pattern, measured
-from lupin_twin.adapt.scans import BuiltScan, Scans
+from lupin_twin.adapt.scans import Scans
 from lupin_twin.adapt.table import ConfigError, number_of
 from lupin_twin.core import interfaces
 from lupin_twin.core.diagnostics import OK, WARN, Finding
 from lupin_twin.core.drops import Drop, Reason, Rejected
-from lupin_twin.core.state import NANOSECONDS_PER_SECOND
+from lupin_twin.core.state import NANOSECONDS_PER_SECOND, Pose, Scan
 from lupin_twin.ros import convert
 from lupin_twin.ros.base_node import NodeUtilities, latched, qos_of, waker
 
@@ -250,7 +250,7 @@ class AdaptNode(Node):  # type: ignore[misc]  # rclpy is not typed
         known = len(self._scans.places)
         for tag_id, frame in self._sightings.come(self._frames):
             try:
-                place = Place(*self._place(frame))
+                place = Pose.at(*self._place(frame))
             except FrameError:  # of another frame in between, which may come too
                 continue
             self._sightings.end(frame)
@@ -258,7 +258,7 @@ class AdaptNode(Node):  # type: ignore[misc]  # rclpy is not typed
                 self._scans.discover(tag_id, place, *self._at)
         for tag_id, frame in self._frames_to_find():
             with suppress(FrameError):
-                self._scans.places[tag_id] = Place(*self._place(frame))
+                self._scans.places[tag_id] = Pose.at(*self._place(frame))
         if len(self._scans.places) > known:
             self._publish_tags()
 
@@ -433,16 +433,16 @@ class AdaptNode(Node):  # type: ignore[misc]  # rclpy is not typed
         if not self._is_check:
             publisher.publish(message)
 
-    def _publish(self, scans: Iterable[BuiltScan]) -> None:
+    def _publish(self, scans: Iterable[Scan]) -> None:
         for scan in scans:
             self._built += 1
-            self._send(self._observations, observation(scan, self._config.frame_id))
+            self._send(self._observations, convert.observation_message(scan, self._config.frame_id))
 
     def _publish_tags(self) -> None:
         if self._scans.places:
             header = Header(stamp=self.get_clock().now().to_msg(), frame_id=self._config.frame_id)
             tags = [
-                DiscoveredTag(tag_id=tag_id, pose_in_map=pose_of(place))
+                DiscoveredTag(tag_id=tag_id, pose_in_map=convert.pose_message(place))
                 for tag_id, place in self._scans.places.items()
             ]
             self._send(self._tags, DiscoveredTags(header=header, tags=tags))

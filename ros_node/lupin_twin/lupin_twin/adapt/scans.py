@@ -1,5 +1,8 @@
 """Readings become scans: which tag a reading belongs to, and the mean over a stop. Pure.
 
+A scan has each sensor's mean, of the moment of the newest reading, and its detail says how far they
+were spread. Without a reading it is a failed attempt, and the detail says why.
+
 All times are ROS time, ns. The robot is at a tag while that is the nearest, within the reach; it
 leaves beyond 1.1 times the reach, or the jitter of a localisation would make many scans of one.
 """
@@ -11,8 +14,9 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import Final
 
-from lupin_twin.adapt.config import Config, Place
-from lupin_twin.core.drops import MAX_SENSORS_PER_TAG, MAX_TAGS
+from lupin_twin.adapt.config import Config
+from lupin_twin.core.drops import MAX_SENSORS_PER_TAG, MAX_TAGS, MAX_TEXT_LENGTH
+from lupin_twin.core.state import STATUS_OK, Pose, Reading, Scan
 
 LEAVES: Final = 1.1
 # Who was at a tag for so long and read nothing has failed; one that passed by has not.
@@ -20,20 +24,11 @@ STAYED_NS: Final = 2_000_000_000
 NS: Final = 1_000_000_000
 
 
-@dataclass(frozen=True, slots=True)
-class BuiltScan:
-    """A scan of a tag: each sensor's mean, of the moment of the newest reading.
-
-    Without a reading it is a failed attempt, and `detail` says why; with, it says how far the
-    readings were spread. `is_fixed`: of a sensor that stands there, not of a robot's visit.
-    """
-
-    tag_id: str
-    stamp_ns: int
-    place: Place | None
-    readings: tuple[tuple[str, float], ...]
-    detail: str
-    is_fixed: bool = False
+# Of a robot's visit, and of a sensor that stands at its tag.
+VISIT_SOURCE: Final = "adapt"
+FIXED_SOURCE: Final = "adapt/fixed"
+# lupin_msgs/Observation
+SCAN_FAILED: Final = 2
 
 
 @dataclass(slots=True)
@@ -78,17 +73,17 @@ class Scans:
     def __init__(self, config: Config) -> None:
         self._config = config
         # Where tags are.
-        self.places: dict[str, Place] = dict(config.tags)
+        self.places: dict[str, Pose] = dict(config.tags)
         # The tag that the robot is at; None: at none, or not known.
         self.tag: str | None = None
         # Where that is, if it is a cell.
-        self._cell: Place | None = None
+        self._cell: Pose | None = None
         self._seen_ns = 0
         self._visit: _Window | None = None
         self._fixed: dict[str, _Window] = {}
         self._now_ns = 0
 
-    def move(self, x: float, y: float, now_ns: int) -> Iterator[BuiltScan]:
+    def move(self, x: float, y: float, now_ns: int) -> Iterator[Scan]:
         """The robot is here, m; yields the scan that ends by it."""
         yield from self.due(now_ns)
         self._seen_ns = now_ns
@@ -96,17 +91,17 @@ class Scans:
         cell_m = self._config.cell_m
         if tag_id is None and cell_m:
             i, j = math.floor(x / cell_m), math.floor(y / cell_m)
-            cell = Place((i + 0.5) * cell_m, (j + 0.5) * cell_m)
+            cell = Pose.at((i + 0.5) * cell_m, (j + 0.5) * cell_m)
             yield from self._be_at(f"cell {i} {j}", now_ns, cell)
         else:
             yield from self._be_at(tag_id, now_ns)
 
-    def lose(self, now_ns: int) -> Iterator[BuiltScan]:
+    def lose(self, now_ns: int) -> Iterator[Scan]:
         """Nobody knows where the robot is; yields the scan that ends by it."""
         yield from self.due(now_ns)
         yield from self._be_at(None, now_ns)
 
-    def discover(self, tag_id: str, place: Place, x: float, y: float) -> bool:
+    def discover(self, tag_id: str, place: Pose, x: float, y: float) -> bool:
         """Whether a tag that is seen from (x, y), m, is new and in reach; if so, it is there.
 
         The first place stays, as in the twin: from then on it is a tag as a surveyed one.
@@ -117,9 +112,9 @@ class Scans:
             return True
         return False
 
-    def failed(self, tag_id: str, detail: str, now_ns: int, *, is_fixed: bool = False) -> BuiltScan:
+    def failed(self, tag_id: str, detail: str, now_ns: int, *, is_fixed: bool = False) -> Scan:
         """A failed attempt at a tag."""
-        return BuiltScan(tag_id, now_ns, self._place(tag_id), (), detail, is_fixed)
+        return self._built(tag_id, now_ns, (), detail, is_fixed=is_fixed)
 
     def take(self, sensor: str, tag: str, value: float, stamp_ns: int, now_ns: int) -> bool:
         """A reading, in the sensor's unit; returns whether it belongs to a tag, and has room there.
@@ -136,7 +131,7 @@ class Scans:
             return False
         return window.add(sensor, value, stamp_ns)
 
-    def due(self, now_ns: int) -> Iterator[BuiltScan]:
+    def due(self, now_ns: int) -> Iterator[Scan]:
         """Scans whose time is over; to be called once a second, and before the robot is moved."""
         if now_ns < self._now_ns:  # the clock has gone back: another world
             self.tag, self._visit, self._fixed = None, None, {}
@@ -153,16 +148,14 @@ class Scans:
             yield from self._ended(now_ns)
             self._visit = _Window(now_ns)
 
-    def _be_at(
-        self, tag_id: str | None, now_ns: int, cell: Place | None = None
-    ) -> Iterator[BuiltScan]:
+    def _be_at(self, tag_id: str | None, now_ns: int, cell: Pose | None = None) -> Iterator[Scan]:
         if tag_id == self.tag:
             return
         yield from self._ended(now_ns)
         self.tag, self._cell = tag_id, cell
         self._visit = None if tag_id is None else _Window(now_ns)
 
-    def _ended(self, now_ns: int) -> Iterator[BuiltScan]:
+    def _ended(self, now_ns: int) -> Iterator[Scan]:
         window, tag_id = self._visit, self.tag
         if window is None or tag_id is None:
             return
@@ -172,15 +165,30 @@ class Scans:
             stayed_s = (now_ns - window.begun_ns) / NS
             yield self.failed(tag_id, f"no reading in {stayed_s:.0f} s here", now_ns)
 
-    def _scan(self, tag_id: str, window: _Window, *, is_fixed: bool = False) -> BuiltScan:
+    def _scan(self, tag_id: str, window: _Window, *, is_fixed: bool = False) -> Scan:
         means = sorted(window.means.items())
         detail = ", ".join(f"{name} ±{mean.spread:.2g} of {mean.number}" for name, mean in means)
-        readings = tuple((name, mean.mean) for name, mean in means)
-        place = self._place(tag_id)
-        return BuiltScan(tag_id, window.newest_ns, place, readings, detail, is_fixed)
+        readings = tuple(Reading(name, mean.mean) for name, mean in means)
+        return self._built(tag_id, window.newest_ns, readings, detail, is_fixed=is_fixed)
 
-    def _place(self, tag_id: str) -> Place | None:
-        return self.places.get(tag_id, self._cell if tag_id == self.tag else None)
+    def _built(
+        self,
+        tag_id: str,
+        stamp_ns: int,
+        readings: tuple[Reading, ...],
+        detail: str,
+        *,
+        is_fixed: bool,
+    ) -> Scan:
+        return Scan(
+            tag_id,
+            stamp_ns,
+            readings,
+            self.places.get(tag_id, self._cell if tag_id == self.tag else None),
+            STATUS_OK if readings else SCAN_FAILED,
+            detail[:MAX_TEXT_LENGTH],
+            FIXED_SOURCE if is_fixed else VISIT_SOURCE,
+        )
 
     def _nearest(self, x: float, y: float) -> str | None:
         reach_m, here = self._config.reach_m, self.tag
@@ -199,5 +207,5 @@ class Scans:
         return here
 
 
-def _distance_m(place: Place | None, x: float, y: float) -> float:
+def _distance_m(place: Pose | None, x: float, y: float) -> float:
     return math.inf if place is None else math.hypot(place.x - x, place.y - y)

@@ -43,9 +43,10 @@ class Table:
         return self.content.pop(key, *default)
 
     def text(self, key: str, default: str | None = None) -> str:
-        """A text that is not empty."""
-        value = self.take(key) if default is None else self.take(key, default)
-        return check_text(self._called(key), value)
+        """A text that is not empty; the default may be."""
+        if not self.has(key) and default is not None:
+            return default
+        return check_text(self._called(key), self.take(key))
 
     def one_of(self, key: str, names: Collection[str]) -> str:
         """One of these."""

@@ -58,20 +58,14 @@ class ClockWatch:
         self.should_subscribe = is_simulated and ros_ns > 0 and standing_s >= SUBSCRIBE_AFTER_S
         if not self.should_subscribe:
             self._message_s = None
-        self.state = self._state(ros_ns, now_s, standing_s, is_simulated=is_simulated)
-        return self.state
-
-    def _state(
-        self, ros_ns: int, now_s: float, standing_s: float, *, is_simulated: bool
-    ) -> ClockState:
-        if not is_simulated:
-            return "running"
-        if ros_ns <= 0:
-            return "none"
-        if standing_s < STANDS_AFTER_S:
-            return "running"
         has_come = self._message_s is not None and now_s - self._message_s < STANDS_AFTER_S
-        return "paused" if has_come else "stopped"
+        if is_simulated and ros_ns <= 0:
+            self.state = "none"
+        elif not is_simulated or standing_s < STANDS_AFTER_S:
+            self.state = "running"
+        else:
+            self.state = "paused" if has_come else "stopped"
+        return self.state
 
 
 class StampWatch:

@@ -7,12 +7,11 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
+from enum import StrEnum
 from types import MappingProxyType
 from typing import Final, Literal, get_args
 
 from lupin_twin.core.drops import LATE, LOST, Counts, Reason, Recent
-from lupin_twin.core.journal_condition import UNKNOWN as UNKNOWN_JOURNAL
-from lupin_twin.core.journal_condition import Condition, JournalState
 from lupin_twin.core.state import ClockState
 
 # What a source calls itself is its own affair, and so is how long that is.
@@ -64,6 +63,66 @@ def origin_of(name: str, *, is_simulated: bool) -> Origin:
     return "sim_time" if is_simulated and origin == "robot" else origin
 
 
+class JournalState(StrEnum):
+    """What the journal is at. Only in `recording` is everything stored as promised."""
+
+    UNKNOWN = "unknown"  # the twin is elsewhere, and does not say
+    OFF = "off"  # recorded into a temporary file, which goes at the end
+    STARTING = "starting"
+    UPGRADING = "upgrading"  # the file is of an older version; nothing is known before it is done
+    RECORDING = "recording"
+    SLOW = "slow"  # the disk does not keep up: what is waiting is not safe yet
+    FAILING = "failing"  # nothing can be written; tried again and again
+    DOUBTING = "doubting"  # the clock contradicts the journal: nothing is written until it agrees
+    IN_USE = "in_use"  # another process writes this file
+    FOREIGN = "foreign"  # the file is somebody else's, or of a newer version
+
+
+@dataclass(frozen=True, slots=True)
+class Condition:
+    """The state, a sentence about it, and counts since the twin started.
+
+    `waiting` rows are handed over and not written yet, the oldest of them for `behind_s`. `lost`
+    rows were given up because too many were waiting, `refused` rows could not be written by
+    their own fault, `repeated` ones were there already. `set_aside` names the last damaged file.
+    `simulated_ns` is the stretch of ROS time, start and end, that a simulation filled in and no
+    robot observed, None if there is none.
+
+    All that was received up to `complete_ns`, ROS time, is written; None: it is not known. Within
+    `kept_ns`, stretches of ROS time in their order, all of that is still there: what lies before
+    was deleted, or nobody recorded. `journal_id` identifies the file, and `inode` which of that
+    `path` is written; 0: none, or it is not known.
+    """
+
+    state: JournalState
+    detail: str = ""
+    path: str = ""
+    written: int = 0
+    repeated: int = 0
+    waiting: int = 0
+    behind_s: float = 0.0
+    lost: int = 0
+    refused: int = 0
+    file_bytes: int = 0
+    set_aside: str = ""
+    simulated_ns: tuple[int, int] | None = None
+    complete_ns: int | None = None
+    kept_ns: tuple[tuple[int, int], ...] = ()
+    journal_id: str = ""
+    inode: int = 0
+
+    @property
+    def is_well(self) -> bool:
+        """Whether nothing has to be reported."""
+        return self.state in _WELL
+
+
+_WELL = frozenset(
+    {JournalState.UNKNOWN, JournalState.OFF, JournalState.STARTING, JournalState.RECORDING}
+)
+UNKNOWN = Condition(JournalState.UNKNOWN, "the twin does not say whether it keeps a journal")
+
+
 @dataclass(frozen=True, slots=True)
 class Estimates:
     """How the estimates do: what is wrong with fits, by sensor, and whose intervals are too narrow.
@@ -107,7 +166,7 @@ class Health:
     fields_computing: int
     fields_computed: int
     slowest_field_s: float
-    journal: Condition = UNKNOWN_JOURNAL
+    journal: Condition = UNKNOWN
     estimates: Estimates = Estimates()
     layers: Layers = Layers()
     origin: Origin = "robot"
@@ -258,7 +317,7 @@ class SelfReport:
 
     clock: ClockState | None = None
     counts: Counts | None = None
-    journal: Condition = UNKNOWN_JOURNAL
+    journal: Condition = UNKNOWN
     origin: Origin = "unknown"
     input_problems: tuple[str, ...] = ()
 
@@ -267,7 +326,7 @@ def self_report(reported: Iterable[Finding]) -> SelfReport:
     """What `findings` reported, as far as it can be read; unknown reasons are left out."""
     by_name = {finding.name: finding for finding in reported}
     values = {name: finding.values for name, finding in by_name.items()}
-    journal = _journal(by_name["journal"]) if "journal" in by_name else UNKNOWN_JOURNAL
+    journal = _journal(by_name["journal"]) if "journal" in by_name else UNKNOWN
     clock = next((state for state in CLOCK if state == values.get("clock", {}).get("state")), None)
     origin = origin_of(values.get("origin", {}).get("origin", ""), is_simulated=False)
     inputs = values.get("inputs", {})
@@ -276,33 +335,26 @@ def self_report(reported: Iterable[Finding]) -> SelfReport:
         for number in range(1, MAX_PROBLEMS + 1)
         if (key := f"{_PROBLEM}{number}") in inputs
     )
-    if "drops" not in values:
-        return SelfReport(clock, journal=journal, origin=origin, input_problems=problems)
-    both = {**values["drops"], **values.get("queues", {})}
+    both = {**values.get("drops", {}), **values.get("queues", {})}
     dropped = {reason: _number(both, reason) for reason in _REASONS}
     recent = tuple(
         Recent(reason, _shown(both.get(_LAST + reason, "")), count)
         for reason in _REASONS
         if (count := _number(both, _RECENTLY + reason))
     )
-    return SelfReport(
-        clock,
-        Counts(
-            MappingProxyType({reason: count for reason, count in dropped.items() if count}),
-            _number(both, _ERRORS),
-            recent,
-        ),
-        journal,
-        origin,
-        problems,
+    counts = Counts(
+        MappingProxyType({reason: count for reason, count in dropped.items() if count}),
+        _number(both, _ERRORS),
+        recent,
     )
+    return SelfReport(clock, counts if "drops" in values else None, journal, origin, problems)
 
 
 def _journal(finding: Finding) -> Condition:
     values = finding.values
     state = next((state for state in JournalState if state == values.get("state")), None)
     if state is None:
-        return UNKNOWN_JOURNAL
+        return UNKNOWN
     simulated = _read_stretches(values.get("simulated", ""))
     complete = values.get("complete to", "")
     return Condition(

@@ -30,10 +30,15 @@ class Rejected(ValueError):
 def check_texts(*texts: str) -> None:
     """Raise `Rejected` for a text longer than `MAX_TEXT_LENGTH` characters."""
     for text in texts:
-        if len(text) > MAX_TEXT_LENGTH:
-            raise Rejected(
-                f"text {text[:24]!r}… has {len(text)} characters, the limit is {MAX_TEXT_LENGTH}"
-            )
+        if why := too_long("text", text):
+            raise Rejected(why)
+
+
+def too_long(what: str, text: str) -> str:
+    """What is wrong with a text that no store takes; empty: nothing."""
+    if len(text) <= MAX_TEXT_LENGTH:
+        return ""
+    return f"{what} {text[:24]!r}… has {len(text)} characters, the limit is {MAX_TEXT_LENGTH}"
 
 
 def check_length(what: str, length: int, limit: int) -> None:

@@ -88,10 +88,6 @@ class Repeats:
                 if retains_keys or stamp_ns <= now_ns
             }
 
-    def clear(self) -> None:
-        """Forget everything."""
-        self._tags.clear()
-
 
 # --- what was observed at a tag -------------------------------------------------------------------
 

@@ -7,7 +7,7 @@ Times are nanoseconds of ROS time, positions metres in the map frame.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
 from typing import Final
 
@@ -15,11 +15,9 @@ from lupin_twin.core.drops import MAX_TEXT_LENGTH, Drop, Reason, Rejected
 from lupin_twin.core.history import Repeats
 from lupin_twin.core.state import (
     STATUS_OK,
-    Flower,
     Inspection,
     Pin,
     Pose,
-    Reading,
     Scan,
     TwinStore,
     Write,
@@ -36,81 +34,46 @@ _QUOTED: Final = 64
 
 
 @dataclass(frozen=True, slots=True)
-class ReceivedReading:
-    """The part of an observation that a tag's sensors fill; `pose` is as it was sent."""
-
-    tag_id: str
-    stamp_ns: int
-    readings: tuple[Reading, ...]
-    pose: Pose
-
-
-@dataclass(frozen=True, slots=True)
-class ReceivedInspection:
-    """The part of an observation that the camera fills; `pose` is as it was sent."""
-
-    tag_id: str
-    frame_id: str
-    flower: Flower
-    pose: Pose
-
-
-@dataclass(frozen=True, slots=True)
 class Received:
-    """An observation as plain values; `part` is that of its kind, None where the kind has none."""
+    """An observation as it was sent: pose and stamps too, of which not all may count.
 
-    kind: int
-    source: str
-    status: int
-    status_detail: str
-    frame_id: str
-    stamp_ns: int
-    part: ReceivedReading | ReceivedInspection | None
-    mission: str = ""
-
-
-@dataclass(frozen=True, slots=True)
-class ReceivedTags:
-    """Discovered tags as plain values; `pose(i)` is that of `tag_ids[i]`, as it was sent.
-
-    A producer publishes all tags again and again: no pose is made before it is needed.
+    `sent` is None where its kind is not a tag's. `stamp_ns` of a scan is when the sensors were
+    read, `own_stamp_ns` what the header says.
     """
 
+    kind: int
     frame_id: str
-    tag_ids: Sequence[str]
-    pose: Callable[[int], Pose]
+    sent: Scan | Inspection | None
+
+
+# Discovered tags, each with what makes its pose, as it was sent: a producer publishes all tags
+# again and again, and no pose is made before it is needed.
+ReceivedTags = Iterable[tuple[str, Callable[[], Pose]]]
 
 
 def observation(received: Received, frame_id: str, now_ns: int) -> Scan | Inspection | Drop:
     """What an observation writes at `now_ns`, where poses have to be in `frame_id`."""
-    part = received.part
-    if part is None:
+    sent = received.sent
+    if sent is None:
         name = "KIND_ANOMALY" if received.kind == KIND_ANOMALY else "an unknown kind"
         why = f"kind {received.kind} ({name}) is not a tag's"
         return Drop(Reason.KIND, why, "an observation", case=str(received.kind))
-    own_frame = part.frame_id if isinstance(part, ReceivedInspection) else ""
-    if dropped := wrong_frame(own_frame or received.frame_id, frame_id) or no_tag_id(part.tag_id):
+    if dropped := wrong_frame(received.frame_id, frame_id) or no_tag_id(sent.tag_id):
         return dropped
     # Without a stamp in the header a scan was made when the sensors were read.
-    own_stamp_ns = received.stamp_ns or (
-        0 if isinstance(part, ReceivedInspection) else part.stamp_ns
-    )
-    succeeded = received.status == STATUS_OK
-    write: Scan | Inspection
-    if isinstance(part, ReceivedInspection):
+    own_stamp_ns = sent.own_stamp_ns or sent.stamp_ns
+    succeeded = sent.status == STATUS_OK
+    if isinstance(sent, Inspection) and not succeeded:
         # The payload of one that failed holds defaults, not a result: it would clear a pest unseen.
-        write = Inspection(part.tag_id, 0, part.flower if succeeded else None)
-    else:
-        write = Scan(part.tag_id, 0, part.readings)
+        sent = replace(sent, flower=None)
     return replace(
-        write,
+        sent,
         stamp_ns=observed_at(own_stamp_ns, now_ns),
-        pose=scanned_pose(part.pose) if succeeded else None,
-        status=received.status,
-        status_detail=_cut(received.status_detail),
-        source=_cut(received.source),
+        pose=scanned_pose(sent.pose) if succeeded and sent.pose else None,
+        status_detail=_cut(sent.status_detail),
+        source=_cut(sent.source),
         own_stamp_ns=own_stamp_ns,
-        mission=received.mission[:MAX_TEXT_LENGTH],
+        mission=sent.mission[:MAX_TEXT_LENGTH],
     )
 
 
@@ -120,17 +83,17 @@ def _cut(text: str) -> str:
 
 
 def discoveries(
-    received: ReceivedTags, frame_id: str, is_pinned: Callable[[str], bool]
+    received: ReceivedTags, own_frame_id: str, frame_id: str, is_pinned: Callable[[str], bool]
 ) -> Iterator[Pin | Drop]:
     """What discovered tags write, one by one: a pin each that `is_pinned` does not know by then."""
-    if dropped := wrong_frame(received.frame_id, frame_id):
+    if dropped := wrong_frame(own_frame_id, frame_id):
         yield dropped
         return
-    for index, tag_id in enumerate(received.tag_ids):
+    for tag_id, sent_pose in received:
         if dropped := no_tag_id(tag_id):
             yield dropped
         elif not is_pinned(tag_id):
-            pose = discovered_pose(received.pose(index))
+            pose = discovered_pose(sent_pose())
             yield (
                 Drop(Reason.POSE, "its pose is not finite", f"tag {tag_id[:_QUOTED]!r}")
                 if pose is None

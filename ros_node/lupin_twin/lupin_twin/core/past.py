@@ -15,7 +15,7 @@ from enum import StrEnum
 from functools import partial
 from typing import Any, Final
 
-from lupin_twin.core.drops import MAX_TEXT_LENGTH
+from lupin_twin.core.drops import too_long
 from lupin_twin.core.state import NANOSECONDS_PER_SECOND, value
 
 # How a message ends of what may be answered a little later, if it is requested again.
@@ -132,12 +132,8 @@ class SeriesRequest:
         if not self.sensor_type:
             raise PastRefused("sensor_type is empty")
         for name in ("tag_id", "sensor_type"):
-            text = getattr(self, name)
-            if len(text) > MAX_TEXT_LENGTH:
-                raise PastRefused(
-                    f"{name} {text[:24]!r}… has {len(text)} characters, "
-                    f"the limit is {MAX_TEXT_LENGTH}"
-                )
+            if why := too_long(name, getattr(self, name)):
+                raise PastRefused(why)
         self._check_event()
         if self.start_ns < 0 or self.end_ns < 0:
             raise PastRefused(f"start or end is {min(self.start_ns, self.end_ns)} ns, before 0")

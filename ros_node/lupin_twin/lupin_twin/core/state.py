@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Container, Iterable
 from dataclasses import dataclass, field, replace
-from typing import Literal, TypeVar, dataclass_transform
+from typing import Literal, Self, TypeVar, dataclass_transform
 
 from lupin_twin.core.drops import (
     MAX_BLOOMS_PER_TAG,
@@ -57,6 +57,11 @@ class Pose:
     qy: float
     qz: float
     qw: float
+
+    @classmethod
+    def at(cls, x: float, y: float, z: float = 0.0) -> Self:
+        """A place, m, turned by nothing."""
+        return cls(float(x), float(y), float(z), 0.0, 0.0, 0.0, 1.0)
 
     @property
     def is_finite(self) -> bool:
@@ -130,11 +135,6 @@ class Scan:
     own_stamp_ns: int = 0
     mission: str = ""
     arrival_ns: int = 0
-
-    @property
-    def succeeded(self) -> bool:
-        """Whether the scan brought all it should."""
-        return self.status == STATUS_OK
 
 
 @value
@@ -282,7 +282,7 @@ class TwinStore:
                 readings[reading.name] = new
         check_length("readings of a tag", len(readings), MAX_SENSORS_PER_TAG)
         tag = replace(tag, readings=tuple(readings.values()), pose=tag.pose or scan.pose)
-        self._store_attempt(tag, scan, brought=scan.succeeded or bool(scan.readings))
+        self._store_attempt(tag, scan, brought=scan.status == STATUS_OK or bool(scan.readings))
 
     def record_inspection(self, inspection: Inspection) -> None:
         """Store an inspection: it replaces an earlier one, unless it failed; readings stay.

@@ -9,11 +9,17 @@ Of more readings, a nearest-neighbour Gaussian process (Vecchia, "Estimation and
 identification for continuous spatial processes", 1988): each place is estimated from the readings
 of the tags nearest to it, and from some of the whole greenhouse, for its course in time. Places
 between the same few tags share their neighbours.
+
+Readings are left out together (Rasmussen and Williams, 2006, 5.12): with A the inverse of all
+readings' covariance and a = A y, those of a block are off by A_bb^-1 a_b, with the covariance
+A_bb^-1. An offset that they have in common is estimated from that by least squares. What another
+reading helps does not depend on its value: at a place p it takes c(t, p)^2 / (c(p, p) + noise) off
+the variance at t, c being the covariance of what is true now.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Final
 
@@ -37,14 +43,6 @@ class Solved:
         result = np.ones((len(places), 1 + len(self.xy)))
         result[:, 1:] = self.nearness(places, self.xy)
         return result
-
-    def near_grid(self, x: FloatArray, y: FloatArray) -> FloatArray:
-        """The same of a grid's places, row by row: a product of one along x and one along y."""
-        along_x = nearness(x, self.xy[:, 0], self.hyper.l)
-        along_y = nearness(y, self.xy[:, 1], self.hyper.l)
-        result = np.ones((len(y), len(x), 1 + len(self.xy)))
-        np.multiply(along_y[:, None, :], along_x[None, :, :], out=result[:, :, 1:])
-        return result.reshape(len(y) * len(x), -1)
 
     def nearness(self, places: FloatArray, others: FloatArray) -> FloatArray:
         """R (k, m) of places (k, 2) and others (m, 2), m."""
@@ -155,3 +153,196 @@ class Neighbours:
     def _of(self, tags: IntArray) -> IntArray:
         rows = [np.arange(self._ends[tag], self._ends[tag + 1]) for tag in tags]
         return np.concatenate(rows)
+
+
+# A tag has changed if its readings since some moment, at least so many, are off by so many sds
+# together, and in multiples of how far the other tags are; and the newest alone by as many.
+LEAST_READINGS: Final = 2
+CHANGE_Z: Final = 3.0
+NEWEST_Z: Final = 2.0
+# Left out of an unchanged tag, to say what was expected of the newest.
+_LAST: Final = 4
+# Of a normal distribution: its sd, as a multiple of the median of what lies off its mean.
+_SD_OF_MEDIAN: Final = 1.4826
+
+
+@dataclass(frozen=True, slots=True)
+class Change:
+    """How far a tag's last readings are off what all the others say of them.
+
+    `z` is in sds; `offset`, and `expected` and `expected_sd` of its newest reading, are in the
+    sensor's unit. `since_s` is the time of the first reading of a changed sensor; None: it has not.
+    """
+
+    z: float
+    offset: float
+    expected: float
+    expected_sd: float
+    since_s: float | None
+
+
+@dataclass(frozen=True, slots=True)
+class Off:
+    """How far a reading is off (`off`), and how far it may be (`variance`, its noise included)."""
+
+    off: float
+    variance: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LeftOut:
+    """Readings by tag, for any of them to be left out.
+
+    `wider` is the inflation of sds; `precision` (n, n) and `alpha` (n,) are A and a.
+    """
+
+    readings: Readings
+    wider: float
+    precision: FloatArray
+    alpha: FloatArray
+
+    @classmethod
+    def of(cls, factor: Factor, wider: float) -> LeftOut:
+        """Of readings that were solved."""
+        return cls(factor.readings, wider, factor.root.T @ factor.root, factor.alpha)
+
+    def changed(self) -> dict[int, tuple[float, float, float | None]]:
+        """Of each tag: z, offset, and since when it has changed, s.
+
+        The clearest first; those that are left are judged without what it has read since then.
+        Where most are off, by their median none has changed: it is the model that does not fit.
+        """
+        result: dict[int, tuple[float, float, float | None]] = {}
+        rest, left = self, np.unique(self.readings.tag).tolist()
+        while left:
+            found = {tag: rest._onset(tag) for tag in left}
+            worst = max(left, key=lambda tag: abs(found[tag][0]))
+            others = [abs(found[tag][0]) for tag in left if tag != worst]
+            limit = CHANGE_Z * max(1.0, _SD_OF_MEDIAN * float(np.median(others or [0.0])))
+            z, offset, first = found[worst]
+            if first is None or abs(z) <= limit:
+                return result | {tag: (*found[tag][:2], None) for tag in left}
+            own = rest._own(worst)[first:]
+            result[worst] = z, offset, float(rest.readings.time_s[own[0]])
+            rest = rest._without(own)
+            left.remove(worst)
+        return result
+
+    def newest(self, tag: int, *, without: FloatArray | IntArray) -> Off:
+        """A tag's newest reading, with all readings of the tags `without` left out: its own too."""
+        block = np.flatnonzero(np.isin(self.readings.tag, without))
+        return self._off(block, self._own(tag)[-1])
+
+    def last(self, tag: int, since_s: float | None) -> Off:
+        """A tag's newest reading, its last ones left out: all since it has changed, or four."""
+        own = self._own(tag)
+        if since_s is None:
+            return self._off(own[-_LAST:], own[-1])
+        return self._off(own[self.readings.time_s[own] >= since_s], own[-1])
+
+    def _own(self, tag: int) -> IntArray:
+        return np.flatnonzero(self.readings.tag == tag)
+
+    def _off(self, block: IntArray, row: int) -> Off:
+        covariance = np.linalg.inv(self.precision[np.ix_(block, block)])
+        at = int(np.searchsorted(block, row))
+        return Off(float(covariance[at] @ self.alpha[block]), float(covariance[at, at]))
+
+    def _onset(self, tag: int) -> tuple[float, float, int | None]:
+        """z, offset and the first of a tag's last readings that are farthest off, in sds."""
+        own = self._own(tag)
+        # Sums over the last one, the last two, ..: those before them count, those after are off.
+        a = self.alpha[own][::-1].cumsum()
+        weight = np.diagonal(self.precision[np.ix_(own, own)][::-1, ::-1].cumsum(0).cumsum(1))
+        z = a / np.sqrt(weight) / self.wider
+        # Before a change it was another: not all of them are off.
+        best = 1 + int(np.argmax(np.abs(z[: max(len(own) - 1, 1)])))
+        first: int | None = len(own) - best
+        newest = self._off(own[first:], own[-1])
+        is_still = newest.off * z[best - 1] > NEWEST_Z * abs(z[best - 1]) * newest.variance**0.5
+        if best < LEAST_READINGS or not is_still:
+            first = None
+        return float(z[best - 1]), float(a[best - 1] / weight[best - 1]), first
+
+    def _without(self, block: IntArray) -> LeftOut:
+        """The other readings, as if these had never been."""
+        rest = np.setdiff1d(np.arange(len(self.readings)), block)
+        across = self.precision[np.ix_(rest, block)]
+        lost = np.linalg.solve(self.precision[np.ix_(block, block)], across.T)
+        return LeftOut(
+            self.readings.take(rest),
+            self.wider,
+            self.precision[np.ix_(rest, rest)] - across @ lost,
+            self.alpha[rest] - lost.T @ self.alpha[block],
+        )
+
+
+def gap_of(xy: FloatArray) -> float:
+    """How far from the nearest tag (T, 2) half of the floor between them lies, m."""
+    low, high = xy.min(axis=0), xy.max(axis=0)
+    x, y = (np.linspace(*ends, 12) for ends in zip(low, high, strict=True))
+    floor = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
+    some = xy[np.linspace(0, len(xy) - 1, min(len(xy), 1_024)).astype(int)]
+    apart = np.sqrt(((floor[:, None] - some[None]) ** 2).sum(axis=2)).min(axis=1)
+    return float(np.median(apart) * (len(some) / len(xy)) ** 0.5)
+
+
+@dataclass(frozen=True, slots=True)
+class Place:
+    """Where another tag helps: m, map frame.
+
+    `error_ratio` is the error with it, and with those before it, as a share of that without any.
+    """
+
+    x: float
+    y: float
+    error_ratio: float
+
+
+class Gain:
+    """What readings that were solved together say of candidates (k, 2) and targets (m, 2), m."""
+
+    def __init__(self, solved: Solved, candidates: FloatArray, targets: FloatArray) -> None:
+        near, near_targets = solved.near(candidates), solved.near(targets)
+        self.candidates = candidates
+        self._noise = solved.hyper.noise
+        self._own = solved.shared(near, near, solved.nearness(candidates, candidates))
+        self._reach = solved.shared(near, near_targets, solved.nearness(candidates, targets))
+        # The sum of the variances at the targets.
+        self.error = float(solved.moments(near_targets)[1].sum())
+
+    def helps(self) -> FloatArray:
+        """(k,): by how much a reading at each candidate lessens `error`."""
+        spread = np.maximum(np.diagonal(self._own), 0.0) + self._noise
+        result: FloatArray = np.square(self._reach).sum(axis=1) / spread
+        return result
+
+    def take(self, chosen: int) -> None:
+        """There is a reading at a candidate from now on."""
+        self.error = max(self.error - float(self.helps()[chosen]), 0.0)
+        own, reach = self._own[chosen].copy(), self._reach[chosen].copy()
+        spread = max(float(own[chosen]), 0.0) + self._noise
+        self._own -= np.outer(own, own / spread)
+        self._reach -= np.outer(own, reach / spread)
+
+
+def best_places(gains: Sequence[Gain], count: int) -> list[Place]:
+    """The `count` candidates that leave the least error at all targets, the best first.
+
+    One after the other, each with those before it. The error is the root of the mean variance.
+    """
+    at_first = sum(gain.error for gain in gains)
+    free = [np.ones(len(gain.candidates), dtype=bool) for gain in gains]
+    result: list[Place] = []
+    for _ in range(min(count, sum(map(len, free)))):
+        helps = [
+            np.where(is_free, gain.helps(), -1.0) for gain, is_free in zip(gains, free, strict=True)
+        ]
+        of = max(range(len(gains)), key=lambda one: helps[one].max(initial=-1.0))
+        best = int(np.argmax(helps[of]))
+        free[of][best] = False
+        gains[of].take(best)
+        ratio = (sum(gain.error for gain in gains) / at_first) ** 0.5 if at_first else 1.0
+        x, y = gains[of].candidates[best]
+        result.append(Place(float(x), float(y), ratio))
+    return result

@@ -7,20 +7,17 @@ of ROS time.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Final
 
 import numpy as np
 
 from lupin_twin.core.state import FLOAT32_MAX, NANOSECONDS_PER_SECOND
-from lupin_twin.estimate import (
-    MAX_EXACT,
-    MAX_PER_TAG,
-    PER_TAG,
-    EstimateGrid,
-    Readings,
-)
+from lupin_twin.estimate.cholesky import MAX_EXACT, PER_TAG
+from lupin_twin.estimate.kernel import MAX_PER_TAG, Readings
+from lupin_twin.estimate.posterior import EstimateGrid
 from lupin_twin.field.engine import FieldRefused, FieldRequest, check_request
 
 MAX_TAGS: Final = 10_000
@@ -125,13 +122,11 @@ def thinned(readings: Readings, at_s: float, day_length_s: float) -> Readings:
 def unchanged(tags: Sequence[TagPast], changed: Mapping[str, int]) -> list[TagPast]:
     """The same tags without what was read since their sensor has changed, ns."""
     return [
-        tag
-        if tag.tag_id not in changed
-        else TagPast(
-            tag.tag_id,
-            tag.x,
-            tag.y,
-            tuple(one for one in tag.readings if one[0] < changed[tag.tag_id]),
+        replace(
+            tag,
+            readings=tuple(
+                one for one in tag.readings if one[0] < changed.get(tag.tag_id, math.inf)
+            ),
         )
         for tag in tags
     ]

@@ -37,36 +37,16 @@ _MAX_WEIGHT: Final = 20.0
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Readings:
-    """Finite readings of one sensor, in any order; the arrays are copied and read-only.
+    """Finite readings of one sensor, in any order.
 
     `time_s` and `value` are (n,), `tag` (n,) is the row of `xy` (T, 2) at which each was taken.
     Two may be of the same tag and time.
-
-    Raises:
-        ValueError: shapes that do not fit together, a number that is not finite, a tag out of
-            range; names which.
-
     """
 
     time_s: FloatArray
     tag: IntArray
     value: FloatArray
     xy: FloatArray
-
-    def __post_init__(self) -> None:
-        """Refuse what nothing can be made of."""
-        for name in ("time_s", "tag", "value", "xy"):
-            array = np.array(getattr(self, name), dtype=np.int64 if name == "tag" else np.float64)
-            array.setflags(write=False)
-            object.__setattr__(self, name, array)
-            shape = (len(array), 2) if name == "xy" else self.time_s.shape[:1]
-            if array.shape != shape:
-                raise ValueError(f"{name} has shape {array.shape}, must be {shape}")
-            if not np.isfinite(array).all():
-                raise ValueError(f"{name} has numbers that are not finite")
-        wrong = self.tag[(self.tag < 0) | (self.tag >= len(self.xy))]
-        if len(wrong):
-            raise ValueError(f"tag is {wrong[0]}, the limits are 0 and {len(self.xy) - 1}")
 
     def __len__(self) -> int:
         """How many readings there are."""
@@ -129,13 +109,7 @@ def scale_of(values: FloatArray) -> Scale:
 
     Few readings spread by chance, so what is thought counts as much as four of them do: a tenth of
     the median.
-
-    Raises:
-        ValueError: no readings.
-
     """
-    if not len(values):
-        raise ValueError("there are no readings")
     centre = float(np.median(values))
     thought = abs(centre) / 10.0
     weight = min(float(len(values)), _MAX_WEIGHT)

@@ -145,14 +145,8 @@ class Model:
         Its methods raise `numpy.linalg.LinAlgError` if the readings' covariance is
         singular, as far as floats can tell.
 
-        Raises:
-            ValueError: there are no readings, or some are later than `at_s`.
-
+        There are some, and none is later.
         """
-        if not len(readings):
-            raise ValueError("there are no readings")
-        if not at_s >= readings.time_s.max():
-            raise ValueError(f"at_s is {at_s}, the newest reading is of {readings.time_s.max()}")
         return Posterior(
             self.scale, self.hyper, self.sd_known, self.day_length_s, readings, at_s, should_stop
         )
@@ -170,13 +164,10 @@ def fit(
     takes `day_length_s` of ROS time.
 
     Raises:
-        ValueError: no readings, a day that is not longer than 0.
         FitFailed: the readings do not let themselves be fitted.
         lupin_twin.field.idw.Abandoned: `should_stop`, called at each step, was true.
 
     """
-    if not day_length_s > 0.0:
-        raise ValueError(f"day_length_s is {day_length_s}, must be greater than 0")
     scale = scale_of(readings.value)
     some = _some(readings, day_length_s)
     pairs = Pairs(some, day_length_s)

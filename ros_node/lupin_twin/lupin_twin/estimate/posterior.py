@@ -15,8 +15,20 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
-from lupin_twin.estimate.cholesky import MAX_EXACT, Factor, Neighbours, Solved, shared_out
-from lupin_twin.estimate.cross_validation import Change, Gain, LeftOut, Place, best_places, gap_of
+from lupin_twin.estimate.cholesky import (
+    MAX_EXACT,
+    Change,
+    Factor,
+    Gain,
+    LeftOut,
+    Neighbours,
+    Off,
+    Place,
+    Solved,
+    best_places,
+    gap_of,
+    shared_out,
+)
 from lupin_twin.estimate.kernel import Hyper, IntArray, Readings, Scale
 from lupin_twin.field.grid import BoolArray, CellGrid, FloatArray, cell_centres, grid_dimensions
 from lupin_twin.field.idw import Abandoned, never
@@ -188,15 +200,7 @@ class Posterior:
         """
         cells = Cells.of(bbox_min_x, bbox_min_y, bbox_max_x, bbox_max_y, resolution)
         x, y = cells.lattice(self.hyper.l)
-        if self._is_exact:
-            solved, parts = self._whole, []
-            for rows in _split(np.arange(len(y)), len(x) * len(solved.xy)):
-                self._go_on()
-                parts.append(solved.moments(solved.near_grid(x, y[rows])))
-            mean, variance = (np.concatenate(one) for one in zip(*parts, strict=True))
-            mean, sd = self._in_unit(mean, variance)
-        else:
-            mean, sd = self.points(np.stack(np.meshgrid(x, y), axis=-1))
+        mean, sd = self.points(np.stack(np.meshgrid(x, y), axis=-1))
         self._go_on()
         mean, sd = (cells.spread(x, y, one.reshape(len(y), len(x))) for one in (mean, sd))
         return cells.filled(mean, sd, self.sd_known)
@@ -204,20 +208,13 @@ class Posterior:
     def changes(self) -> tuple[Change | None, ...]:
         """For each tag, how far its last readings are off; None for a tag without any."""
         result: list[Change | None] = [None] * len(self.readings.xy)
-        of, spread = self._present, self.scale.spread
         for left_out, tags, judged in self._left_out():
             found = left_out.changed()
             for row in judged.tolist():
                 z, offset, since_s = found[row]
-                off = left_out.last(row, since_s)
-                newest = of.value[of.tag == tags[row]][-1]
-                result[self._tags[tags[row]]] = Change(
-                    z,
-                    offset * spread,
-                    float(newest - off.off * spread),
-                    self._sd(off.variance),
-                    since_s,
-                )
+                _, expected, sd = self._said_of(tags[row], left_out.last(row, since_s))
+                change = Change(z, offset * self.scale.spread, expected, sd, since_s)
+                result[self._tags[tags[row]]] = change
         return tuple(result)
 
     def left_out(self, tags: IntArray) -> list[tuple[float, float, float]]:
@@ -237,10 +234,7 @@ class Posterior:
                 near = np.union1d(near, [row])
                 if len(xy) - len(near) < _LEAST_OTHERS:
                     continue
-                off = left_out.newest(row, without=near)
-                newest = float(of.value[of.tag == numbers[row]][-1])
-                predicted = newest - off.off * self.scale.spread
-                result.append((newest, predicted, self._sd(off.variance)))
+                result.append(self._said_of(numbers[row], left_out.newest(row, without=near)))
         return result
 
     def advice(self, places: FloatArray, count: int, *, over: FloatArray) -> list[Place]:
@@ -248,14 +242,8 @@ class Posterior:
 
         Each is the one where a single reading now, with those at the places before it, leaves the
         least error: the root of the mean variance at `over` (m, 2), m. It takes 8 k (k + m) bytes.
-
-        Raises:
-            ValueError: `over` is empty.
-
         """
         candidates, targets = (np.asarray(one, float).reshape(-1, 2) for one in (places, over))
-        if not len(targets):
-            raise ValueError("there is nowhere that a tag is to help")
         gains = []
         for solved, rows in self._around(np.vstack((candidates, targets))):
             of_candidates = candidates[rows[rows < len(candidates)]]
@@ -322,11 +310,15 @@ class Posterior:
                 rows = np.searchsorted(numbers, judged)
                 yield LeftOut.of(self._factor(near), INFLATION), numbers, rows
 
-    def _sd(self, variance: float) -> float:
-        """Of a reading, in the sensor's unit: what is true is less sure, its noise as it is."""
-        noise = self.hyper.noise
-        true = max(variance - noise, 0.0)
-        return float((INFLATION**2 * true + noise) ** 0.5 * self.scale.spread)
+    def _said_of(self, tag: int, off: Off) -> tuple[float, float, float]:
+        """A tag's newest reading, and mean and sd of what the others say of it.
+
+        What is true is less sure, the noise of a reading is as it is.
+        """
+        newest = float(self._present.value[self._present.tag == tag][-1])
+        noise, spread = self.hyper.noise, self.scale.spread
+        true = max(off.variance - noise, 0.0)
+        return newest, newest - off.off * spread, (INFLATION**2 * true + noise) ** 0.5 * spread
 
     def _in_unit(self, mean: FloatArray, variance: FloatArray) -> tuple[FloatArray, FloatArray]:
         scale = self.scale

@@ -1,4 +1,8 @@
-"""GetField without ROS: its checks, the clipping to explored ground, and the cache.
+"""GetField without ROS: its checks, the clipping to explored ground, the cache; and its quality.
+
+The error of a map is the leave-one-out error (cross-validation as in Davis, "Contouring
+algorithms", 1975): each tag's reading is predicted from the other tags' by the field's own rules,
+and compared with what was measured. Errors are in the sensor's own unit.
 
 Pure. Metres in the map frame throughout.
 """
@@ -13,11 +17,21 @@ from typing import Final, NamedTuple, Self
 
 import numpy as np
 
-from lupin_twin.core.drops import MAX_TEXT_LENGTH
+from lupin_twin.core.drops import too_long
 from lupin_twin.core.parameters import TwinParameters
+from lupin_twin.core.state import TagState, samples_of
 from lupin_twin.field.explored import OccupancyMap, explored_mask
-from lupin_twin.field.grid import FieldGrid, grid_dimensions, reach_of
-from lupin_twin.field.idw import compute_idw_field, never
+from lupin_twin.field.grid import FieldGrid, FloatArray, grid_dimensions, reach_of
+from lupin_twin.field.idw import (
+    Abandoned,
+    IndexArray,
+    PairwiseIdw,
+    compute_idw_field,
+    fits,
+    gap_squares,
+    never,
+    sample_columns,
+)
 
 MAX_ENTRIES: Final = 64
 MAX_BYTES: Final = 64_000_000
@@ -27,10 +41,9 @@ MAX_BYTES: Final = 64_000_000
 DEFAULT_RESOLUTION_M: Final = 0.1
 
 # What computing takes, roughly and at worst: for each cell, and for each pair of a cell and a
-# sample that reaches it, at power 2 or any other.
+# sample that reaches it.
 _CELL_S: Final = 20e-9
-_PAIR_S: Final = 5e-9
-_POWER_PAIR_S: Final = 15e-9
+_PAIR_S: Final = 15e-9
 
 
 class FieldRefused(ValueError):
@@ -108,13 +121,15 @@ class FieldKey(NamedTuple):
 
 
 class FieldCache:
-    """An LRU of at most `max_entries` fields whose values take at most `max_bytes` together."""
+    """An LRU of at most `MAX_ENTRIES` fields whose values take at most `MAX_BYTES` together."""
 
-    def __init__(self, max_bytes: int = MAX_BYTES, max_entries: int = MAX_ENTRIES) -> None:
-        self.max_bytes = max_bytes
-        self.max_entries = max_entries
-        self.bytes = 0
+    def __init__(self) -> None:
         self._grids: OrderedDict[FieldKey, FieldGrid] = OrderedDict()
+
+    @property
+    def bytes(self) -> int:
+        """What the values take."""
+        return sum(grid.values.nbytes for grid in self._grids.values())
 
     def __len__(self) -> int:
         return len(self._grids)
@@ -128,16 +143,12 @@ class FieldCache:
 
     def put(self, key: FieldKey, grid: FieldGrid) -> None:
         """Cache `grid`, dropping the least recently used; not one past the whole bound."""
-        if grid.values.nbytes > self.max_bytes:
+        if grid.values.nbytes > MAX_BYTES:
             return
-        replaced = self._grids.pop(key, None)
-        if replaced is not None:
-            self.bytes -= replaced.values.nbytes
         self._grids[key] = grid
-        self.bytes += grid.values.nbytes
-        while len(self._grids) > self.max_entries or self.bytes > self.max_bytes:
-            _, dropped = self._grids.popitem(last=False)
-            self.bytes -= dropped.values.nbytes
+        self._grids.move_to_end(key)
+        while len(self._grids) > MAX_ENTRIES or self.bytes > MAX_BYTES:
+            self._grids.popitem(last=False)
 
 
 def cost_s(request: FieldRequest, samples: int, rules: FieldRules) -> float:
@@ -148,8 +159,7 @@ def cost_s(request: FieldRequest, samples: int, rules: FieldRules) -> float:
     width, height = check_request(request, rules.max_grid_cells)
     reach = 2.0 * max(rules.falloff_radius_m, rules.max_distance_m) / request.resolution
     pairs = samples * min(width, reach) * min(height, reach)
-    pair_s = _PAIR_S if rules.idw_power == 2.0 else _POWER_PAIR_S
-    return width * height * _CELL_S + pairs * pair_s
+    return width * height * _CELL_S + pairs * _PAIR_S
 
 
 def check_sensor_type(name: str) -> None:
@@ -161,10 +171,8 @@ def check_sensor_type(name: str) -> None:
     """
     if not name:
         raise FieldRefused("sensor_type is empty, must name a sensor")
-    if len(name) > MAX_TEXT_LENGTH:
-        raise FieldRefused(
-            f"sensor_type {name[:24]!r}… has {len(name)} characters, the limit is {MAX_TEXT_LENGTH}"
-        )
+    if why := too_long("sensor_type", name):
+        raise FieldRefused(why)
 
 
 def check_request(request: FieldRequest, max_grid_cells: int) -> tuple[int, int]:
@@ -262,3 +270,123 @@ def default_request(
         if width * height <= max_cells:
             return request
         resolution *= 2.0
+
+
+@dataclass(frozen=True, slots=True)
+class TagError:
+    """One tag's reading against what the others say; `error` is `predicted - measured`."""
+
+    tag_id: str
+    measured: float
+    predicted: float
+    error: float
+
+
+@dataclass(frozen=True, slots=True)
+class FieldQuality:
+    """The leave-one-out error of a sensor's current readings.
+
+    `judged` tags have another one in reach of the gate; `unjudged` have none, so nothing can be
+    said about them. `rmse` and `worst` are None where no tag is judged; of equally bad tags the
+    worst is the first.
+    """
+
+    sensor_type: str
+    judged: int
+    unjudged: int
+    rmse: float | None
+    worst: TagError | None
+
+
+def leave_one_out(
+    tags: Iterable[TagState],
+    sensor_type: str,
+    *,
+    falloff_radius_m: float,
+    max_distance_m: float,
+    power: float,
+    should_stop: Callable[[], bool] = never,
+) -> FieldQuality:
+    """The quality of the field of `sensor_type` made of `tags` (a snapshot's) by these rules.
+
+    Only tags with a pose and a finite reading take part, as in the field. The cost follows the
+    pairs of tags in reach of each other. `should_stop()` is called every millisecond or so.
+
+    Raises:
+        ValueError: a rule out of its range, named with its value and the limit.
+        Abandoned: `should_stop` was true.
+
+    """
+    named = [(tag.tag_id, sample) for tag in tags for sample in samples_of((tag,), sensor_type)]
+    samples = [sample for _, sample in named]
+    x, y, measured = sample_columns(samples)
+    idw = PairwiseIdw(falloff_radius_m=falloff_radius_m, max_distance_m=max_distance_m, power=power)
+    predicted = _predictions(x, y, measured, idw, should_stop)
+    judged = np.flatnonzero(~np.isnan(predicted))
+    if judged.size == 0:
+        return FieldQuality(sensor_type, judged=0, unjudged=len(samples), rmse=None, worst=None)
+    errors = predicted[judged] - measured[judged]
+    worst = int(np.abs(errors).argmax())
+    index = int(judged[worst])
+    return FieldQuality(
+        sensor_type=sensor_type,
+        judged=judged.size,
+        unjudged=len(samples) - judged.size,
+        rmse=math.hypot(*errors.tolist()) / math.sqrt(judged.size),
+        worst=TagError(
+            tag_id=named[index][0],
+            measured=float(measured[index]),
+            predicted=float(predicted[index]),
+            error=float(errors[worst]),
+        ),
+    )
+
+
+def painted_share(grid: FieldGrid) -> float:
+    """The share of the grid's cells, 0 to 1, of which something is known."""
+    return float(np.count_nonzero(~np.isnan(grid.values)) / grid.values.size)
+
+
+def _predictions(
+    x: FloatArray,
+    y: FloatArray,
+    value: FloatArray,
+    idw: PairwiseIdw,
+    should_stop: Callable[[], bool],
+) -> FloatArray:
+    """Each sample's value from the others, NaN where none is in reach of the gate.
+
+    The samples are halved along the longer side of their box, again and again, until those of a
+    part and those that reach it make few enough pairs.
+    """
+    predicted = np.full(value.size, np.nan)
+    everyone = np.arange(value.size)
+    parts = [(everyone, everyone)] if value.size else []
+    with np.errstate(all="ignore"):
+        while parts:
+            if should_stop():
+                raise Abandoned
+            part, near = parts.pop()
+            gap = gap_squares(x[near], x[part]) + gap_squares(y[near], y[part])
+            near = near[gap <= idw.reach_square]
+            if fits(near.size, part.size):
+                predicted[part] = _predict_part(part, near, (x, y, value), idw)
+                continue
+            along = x[part] if np.ptp(x[part]) > np.ptp(y[part]) else y[part]
+            order = part[np.argsort(along, kind="stable")]
+            parts.append((order[: part.size // 2], near))
+            parts.append((order[part.size // 2 :], near))
+    return predicted
+
+
+def _predict_part(
+    part: IndexArray,
+    near: IndexArray,
+    samples: tuple[FloatArray, FloatArray, FloatArray],
+    idw: PairwiseIdw,
+) -> FloatArray:
+    x, y, value = samples
+    square = np.square(x[near][:, None] - x[part]) + np.square(y[near][:, None] - y[part])
+    # A sample has no say about itself. `near` is in recorded order and holds all of `part`.
+    square[np.searchsorted(near, part), np.arange(part.size)] = np.inf
+    return idw.evaluate(square, value[near])

@@ -10,7 +10,7 @@ import json
 import math
 import zlib
 from dataclasses import dataclass
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 import numpy.typing as npt
@@ -30,6 +30,11 @@ _EDGE_NOISE_CELLS: Final = 1e-4
 
 # Cells of the field that a turned map is looked up for at once; bounds the memory it takes.
 _CELLS_AT_ONCE: Final = 16_384
+
+# Where a map lies.
+_PLACE: Final = (
+    *("frame_id", "width", "height", "resolution", "origin_x", "origin_y", "origin_yaw"),
+)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -82,17 +87,9 @@ class OccupancyMap:
         object.__setattr__(self, "cells", cells)
 
     @property
-    def place(self) -> tuple[str, int, int, float, float, float, float]:
+    def place(self) -> tuple[Any, ...]:
         """Frame, cells in x and y, side of a cell (m), origin (m) and its yaw (rad)."""
-        return (
-            self.frame_id,
-            self.width,
-            self.height,
-            self.resolution,
-            self.origin_x,
-            self.origin_y,
-            self.origin_yaw,
-        )
+        return tuple(getattr(self, name) for name in _PLACE)
 
     def shows_the_same_as(self, other: OccupancyMap) -> bool:
         """Whether place and cells are the same, whenever and however often it was published."""
@@ -228,16 +225,7 @@ def text_of(floor: OccupancyMap) -> str:
     """JSON of a map, its cells deflated and in base64; empty: it is too large for a row."""
     if floor.cells.size > MAX_PACKED_CELLS:
         return ""
-    about = {
-        "frame_id": floor.frame_id,
-        "stamp_ns": floor.stamp_ns,
-        "width": floor.width,
-        "height": floor.height,
-        "resolution": floor.resolution,
-        "origin_x": floor.origin_x,
-        "origin_y": floor.origin_y,
-        "origin_yaw": floor.origin_yaw,
-    }
+    about = {name: getattr(floor, name) for name in (*_PLACE, "stamp_ns")}
     cells = base64.b64encode(zlib.compress(floor.cells.tobytes(), 1)).decode()
     text = json.dumps({**about, "cells": cells})
     return text if len(text) <= MAX_TEXT else ""

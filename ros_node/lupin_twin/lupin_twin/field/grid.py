@@ -78,13 +78,8 @@ def grid_dimensions(
 
     """
     # numpy's scalars would compute, and warn, in their own precision.
-    low_x, low_y, high_x, high_y = (
-        float(bbox_min_x),
-        float(bbox_min_y),
-        float(bbox_max_x),
-        float(bbox_max_y),
-    )
-    resolution = float(resolution)
+    box = (bbox_min_x, bbox_min_y, bbox_max_x, bbox_max_y, resolution)
+    low_x, low_y, high_x, high_y, resolution = map(float, box)
     check_finite("resolution", resolution)
     if resolution <= 0.0:
         raise ValueError(f"resolution is {resolution} m, must be greater than 0")

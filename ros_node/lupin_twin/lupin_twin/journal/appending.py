@@ -7,12 +7,11 @@ part of the same scan.
 
 from __future__ import annotations
 
-import json
 import math
 import sqlite3
 from collections.abc import Iterable, Sequence
 from contextlib import closing
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Final, NamedTuple
 
@@ -20,7 +19,7 @@ from lupin_twin.core.history import KNOWN_BY_NOTHING, kind_of
 from lupin_twin.core.state import Flower, Inspection, Pin, Scan, Write
 from lupin_twin.journal.beside import Lock
 from lupin_twin.journal.hours import WrittenInspection, WrittenScan, count
-from lupin_twin.journal.notes import last_number
+from lupin_twin.journal.received import last_number
 from lupin_twin.journal.rows import (
     KIND_FLOWER,
     sensor_names,
@@ -31,6 +30,7 @@ from lupin_twin.journal.schema import (
     LOCAL_SITE,
     SiteLog,
     get_meta,
+    json_text,
     open_writer,
     set_meta,
     transaction,
@@ -64,14 +64,12 @@ _KNOWN_INSPECTION: Final = (
 )
 
 
+@dataclass(slots=True)
 class _Group:
     """The series of one tag and kind in a run, and the latest stamp that anything is known by."""
 
-    __slots__ = ("newest_ns", "series")
-
-    def __init__(self, series: dict[tuple[str, ...], int], newest_ns: int) -> None:
-        self.series = series
-        self.newest_ns = newest_ns
+    series: dict[tuple[str, ...], int]
+    newest_ns: int
 
 
 class Appender:
@@ -143,24 +141,18 @@ class Appender:
     def _put_scan(self, run: int, tag: str, scan: Scan | Inspection, is_copy: int) -> bool:
         """A scan, or an attempt of either kind that failed."""
         kind = kind_of(scan)
-        group = self._group(run, tag, kind)
         sent = scan.readings if isinstance(scan, Scan) else ()
         readings = {_unicode(reading.name): reading.value for reading in sent}
         stamp_ns, own_ns, source = scan.stamp_ns, _own_ns(scan), _unicode(scan.source)
-        key = own_ns or stamp_ns
-        if is_copy or key > group.newest_ns:
-            group.newest_ns = max(group.newest_ns, key)
-        else:
-            self.flush()
-            known = self._known((run, tag, kind), key, source)
-            if known is not None:
-                known_ns, own_ns, sensors = known
-                stamp_ns = min(stamp_ns, known_ns)
-                readings = {name: value for name, value in readings.items() if name not in sensors}
-                if not readings:
-                    return False
+        known = self._known((run, tag, kind), own_ns or stamp_ns, source, is_copy)
+        if known is not None:
+            known_ns, own_ns, sensors = known
+            stamp_ns = min(stamp_ns, known_ns)
+            readings = {name: value for name, value in readings.items() if name not in sensors}
+            if not readings:
+                return False
         self.last_seq += 1
-        series = self._series(group, run, tag, kind, tuple(readings))
+        series = self._series((run, tag, kind), tuple(readings))
         values = list(readings.values())
         self._waiting["scan"].append(
             (
@@ -184,16 +176,12 @@ class Appender:
     def _put_inspection(
         self, run: int, tag: str, inspection: Inspection, flower: Flower, is_copy: int
     ) -> bool:
-        group = self._group(run, tag, KIND_FLOWER)
+        at = (run, tag, KIND_FLOWER)
         source, key = _unicode(inspection.source), inspection.own_stamp_ns or inspection.stamp_ns
-        if is_copy or key > group.newest_ns:
-            group.newest_ns = max(group.newest_ns, key)
-        else:
-            self.flush()
-            if self._known((run, tag, KIND_FLOWER), key, source) is not None:
-                return False
+        if self._known(at, key, source, is_copy) is not None:
+            return False
         self.last_seq += 1
-        self._series(group, run, tag, KIND_FLOWER, ())
+        self._series(at, ())
         self._waiting["look"].append(
             (
                 self.last_seq,
@@ -225,10 +213,14 @@ class Appender:
     # --- what is there already ----------------------------------------------------------------
 
     def _known(
-        self, at: tuple[int, str, int], key: int, source: str
+        self, at: tuple[int, str, int], key: int, source: str, is_copy: int
     ) -> tuple[int, int | None, set[str]] | None:
         """The stamps of the write that is known by `key`, and its sensors; None: there is none."""
-        run, tag, kind = at
+        (run, tag, kind), group = at, self._group(at)
+        if is_copy or key > group.newest_ns:
+            group.newest_ns = max(group.newest_ns, key)
+            return None
+        self.flush()
         query = {
             "site": LOCAL_SITE, "run": run, "tag": tag, "key": key, "source": source, "series": 0,
         }  # fmt: skip
@@ -237,7 +229,7 @@ class Appender:
             return 0, None, set()
         stamps: tuple[int, int | None] | None = None
         sensors: set[str] = set()
-        for names, series in self._group(run, tag, kind).series.items():
+        for names, series in group.series.items():
             query["series"] = series
             found = execute(_KNOWN_SCAN, query).fetchone()
             if found is not None:
@@ -245,13 +237,13 @@ class Appender:
                 sensors.update(names)
         return None if stamps is None else (*stamps, sensors)
 
-    def _group(self, run: int, tag: str, kind: int) -> _Group:
-        group = self._groups.get((run, tag, kind))
+    def _group(self, at: tuple[int, str, int]) -> _Group:
+        group = self._groups.get(at)
         if group is None:
             if len(self._groups) >= _MAX_AT_HAND:
                 self.flush()
                 self._groups.clear()
-            group = self._groups[run, tag, kind] = self._look_up(run, tag, kind)
+            group = self._groups[at] = self._look_up(*at)
         return group
 
     def _look_up(self, run: int, tag: str, kind: int) -> _Group:
@@ -280,14 +272,15 @@ class Appender:
             max(stamp_ns for stamp_ns in newest if stamp_ns is not None),
         )
 
-    def _series(self, group: _Group, run: int, tag: str, kind: int, names: tuple[str, ...]) -> int:
+    def _series(self, at: tuple[int, str, int], names: tuple[str, ...]) -> int:
         """The series of a write, the newest one, which is its first if there is none."""
-        series = group.series.get(names)
+        of_group = self._group(at).series
+        series = of_group.get(names)
         if series is None:
-            series = group.series[names] = self.last_seq
+            series = of_group[names] = self.last_seq
             self._connection.execute(
                 "INSERT INTO series VALUES (?, ?, ?, ?, ?, ?)",
-                (LOCAL_SITE, series, run, tag, kind, json.dumps(names, separators=(",", ":"))),
+                (LOCAL_SITE, series, *at, json_text(names)),
             )
         return series
 
@@ -300,25 +293,25 @@ def _own_ns(write: Scan | Inspection) -> int | None:
 def _numbers(values: Iterable[float]) -> str:
     """A JSON list; what is not finite is null."""
     text = ",".join(map(repr, values))
-    if "n" in text:  # nan, inf
-        finite = (float(value) if math.isfinite(value) else None for value in values)
-        return json.dumps(list(finite), separators=(",", ":"))
-    return f"[{text}]"
+    return json_text(list(map(_finite, values))) if "n" in text else f"[{text}]"  # nan, inf
+
+
+def _finite(value: float) -> float | None:
+    return value if math.isfinite(value) else None
 
 
 def _blooms(flower: Flower) -> str:
     """A JSON list of lists: x, y, z, height, species, confidence, anomaly."""
-    return json.dumps(
+    return json_text(
         [
             [
-                *json.loads(_numbers((bloom.x, bloom.y, bloom.z, bloom.height_m))),
+                *map(_finite, (bloom.x, bloom.y, bloom.z, bloom.height_m)),
                 bloom.species,
-                *json.loads(_numbers((bloom.confidence,))),
+                _finite(bloom.confidence),
                 int(bloom.anomaly),
             ]
             for bloom in flower.blooms
-        ],
-        separators=(",", ":"),
+        ]
     )
 
 

@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Final, Self
 
-from lupin_twin.journal.schema import sync_folder
+from lupin_twin.journal.schema import sync
 
 NO_JOURNAL: Final = "off"
 
@@ -177,7 +177,7 @@ class Syncing:
         self._stop = threading.Event()
         self._error: OSError | None = None
         # The name of a new log has to last too.
-        sync_folder(journal.parent)
+        sync(journal.parent)
         self._thread = threading.Thread(target=self._run, name="journal sync", daemon=True)
         self._thread.start()
 

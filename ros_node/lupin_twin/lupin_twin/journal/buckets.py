@@ -6,11 +6,14 @@ deleted, or are too many. Shorter ones are read off the rows.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from typing import Final, Protocol
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Final
 
 from lupin_twin.core.past import HOUR_NS, Grid, SeriesPast, grid
+from lupin_twin.journal.hours import deleted_ns, is_counted
 from lupin_twin.journal.runs import Span
+from lupin_twin.journal.schema import SiteLog
 
 # Rows that are read for one answer: a quarter of a second. Of more, the hours are reported.
 MAX_ROWS: Final = 50_000
@@ -19,20 +22,91 @@ MAX_ROWS: Final = 50_000
 Entry = tuple[int, int, float]
 
 
-class Part(Protocol):
-    """What is requested, within one span."""
+def bounds(span: Span) -> dict[str, Any]:
+    """A span, and the hours that it touches, as the SQL names them."""
+    hours = {"first": span.start_ns // HOUR_NS, "last": -(-span.end_ns // HOUR_NS)}
+    return {"start": span.start_ns, "end": span.end_ns, **hours}
+
+
+@dataclass(frozen=True, slots=True)
+class Table:
+    """Where something stands, as SQL: `rows`, and of what is counted by the hour the `hours`.
+
+    `read` makes numbers of the rows' `value`; `sums` are the columns of an hour: how many, their
+    sum, least and largest.
+    """
+
+    rows: str
+    value: str
+    read: Callable[[list[Any]], list[float]]
+    hours: str = ""
+    sums: tuple[str, ...] = ("n", "total", "low", "high")
+
+
+class Part:
+    """What is requested, within one span; `of` are the values that the table's SQL names."""
+
+    def __init__(self, log: SiteLog, span: Span, table: Table, of: Mapping[str, Any]) -> None:
+        self.span = span
+        self._log = log
+        self._table = table
+        self._of = of
+        self._deleted_ns = deleted_ns(log, span.run.id) if table.hours else -1
+
+    def ask(self, sql: str, span: Span | None = None, /, **more: int) -> list[tuple[Any, ...]]:
+        """Rows within a part of the span, or all of it."""
+        query = {**bounds(span or self.span), **self._of, **more}
+        return list(self._log.execute(sql, query).fetchall())
 
     def is_deleted(self) -> bool:
         """Whether only hours are left of some of it."""
+        if self.span.start_ns > self._deleted_ns:
+            return False
+        last = min(self.span.end_ns - 1, self._deleted_ns) // HOUR_NS + 1
+        return bool(self.ask(f"SELECT 1 {self._table.hours} LIMIT 1", last=last))
 
     def hourly(self) -> int:
         """How many there are, by the hours."""
+        if not self._table.hours:
+            return 0
+        n, *_ = self._table.sums
+        return int(self.ask(f"SELECT coalesce(sum({n}), 0) {self._table.hours}")[0][0])
 
-    def entries(self, limit: int) -> list[Entry]:
-        """Some of them, at most `limit`."""
+    def oldest(self) -> list[int]:
+        """The first stamp, or the beginning of the first hour where rows were deleted."""
+        found = [at_ns for (at_ns,) in self.ask(f"SELECT min(stamp_ns) {self._table.rows}")]
+        if self.span.start_ns <= self._deleted_ns:
+            for (hour,) in self.ask(f"SELECT min(hour) {self._table.hours}"):
+                found.append(hour if hour is None else max(hour * HOUR_NS, self.span.start_ns))
+        return [at_ns for at_ns in found if at_ns is not None]
+
+    def entries(self, limit: str, span: Span | None = None) -> list[Entry]:
+        """Those within a part of the span, or all of it; `limit` is SQL's, or empty."""
+        table = self._table
+        rows = self.ask(f"SELECT stamp_ns, seq, {table.value} {table.rows}{limit}", span)
+        values = table.read([value for *_, value in rows])
+        return [(at_ns, seq, value) for (at_ns, seq, _), value in zip(rows, values, strict=True)]
 
     def fill(self, buckets: Buckets) -> None:
         """Add them to buckets."""
+        steps, rest = buckets.grid, [self.span]
+        if self._table.hours and buckets.are_hours():
+            hours, rest = whole_hours(self.span, self._deleted_ns)
+            n, total, low, high = self._table.sums
+            for index, count, *numbers in self.ask(
+                f"SELECT (hour - :origin) / :width AS bucket, sum({n}), sum({total}), min({low}),"
+                f" max({high}) {self._table.hours} GROUP BY bucket",
+                first=hours[0],
+                last=hours[1],
+                origin=steps.start_ns // HOUR_NS,
+                width=steps.bucket_ns // HOUR_NS,
+            ):
+                if count:
+                    buckets.add(index, int(count), *map(float, numbers))
+        for span in rest:
+            for stamp_ns, _, value in self.entries("", span):
+                if is_counted(value):
+                    buckets.add_value(stamp_ns, value)
 
 
 def answer(
@@ -44,7 +118,7 @@ def answer(
     if not are_deleted:
         found: list[Entry] = []
         for part in parts:
-            found += part.entries(max_points + 1 - len(found))
+            found += part.entries(f" LIMIT {max_points + 1 - len(found)}")
             if len(found) > max_points:
                 break
         else:
@@ -76,10 +150,7 @@ class Buckets:
 
     def add(self, index: int, n: int, total: float, low: float, high: float) -> None:
         """Add some to a bucket."""
-        bucket = self._found.get(index)
-        if bucket is None:
-            self._found[index] = [n, total, low, high]
-            return
+        bucket = self._found.setdefault(index, [0, 0.0, low, high])
         bucket[0] += n
         bucket[1] += total
         bucket[2], bucket[3] = min(bucket[2], low), max(bucket[3], high)

@@ -15,7 +15,7 @@ from functools import partial
 from pathlib import Path
 from typing import Final
 
-from lupin_twin.journal.retention import RETENTION_BYTES, RETENTION_NS, records
+from lupin_twin.journal.retention import RETENTION_BYTES, RETENTION_NS, pages_of, records
 from lupin_twin.journal.rows import sensor_names
 from lupin_twin.journal.runs import Run, runs
 from lupin_twin.journal.schema import (
@@ -31,32 +31,31 @@ from lupin_twin.journal.schema import (
 # A lot is one short read of the file: a check that takes minutes must not keep the log growing.
 _ROWS: Final = 5_000
 _MAX_STRUCTURE: Final = 100
-WRITTEN: Final = ("scan", "look")
+_NO_STAMP: Final = "typeof(stamp_ns) != 'integer' OR stamp_ns NOT BETWEEN 0 AND 4611686018427387904"
+_BEHIND: Final = "r.seq > :after AND r.seq <= :until AND r.site = :site"
 # What is wrong with rows behind :after up to :until, as (seq, tag).
 _WRONG: Final = {
     "scan": (
         "SELECT seq, tag FROM scan AS r LEFT JOIN series AS s"
         " ON s.site = r.site AND s.series = r.series"
-        " WHERE r.seq > :after AND r.seq <= :until AND r.site = :site AND (tag IS NULL"
+        f" WHERE {_BEHIND} AND (tag IS NULL"
         " OR CASE WHEN json_valid(sensors) AND json_valid(readings)"
         " THEN json_array_length(sensors) != json_array_length(readings)"
         " OR EXISTS (SELECT 1 FROM json_each(readings) WHERE type IN ('text', 'array', 'object'))"
-        " ELSE 1 END OR typeof(stamp_ns) != 'integer' OR typeof(status) != 'integer'"
-        " OR stamp_ns NOT BETWEEN 0 AND 4611686018427387904)"
+        f" ELSE 1 END OR typeof(status) != 'integer' OR {_NO_STAMP})"
     ),
     "look": (
         "SELECT seq, tag FROM look AS r LEFT JOIN run ON run.site = r.site AND run.run = r.run"
-        " WHERE r.seq > :after AND r.seq <= :until AND r.site = :site AND (run.run IS NULL"
+        f" WHERE {_BEHIND} AND (run.run IS NULL"
         " OR CASE WHEN json_valid(blooms) AND json_valid(box)"
         " THEN EXISTS (SELECT 1 FROM json_each(blooms) WHERE json_array_length(value) != 7)"
         " OR EXISTS (SELECT 1 FROM json_each(box) WHERE json_array_length(value) != 3)"
-        " ELSE 1 END OR typeof(stamp_ns) != 'integer' OR typeof(bug_count) != 'integer'"
-        " OR stamp_ns NOT BETWEEN 0 AND 4611686018427387904)"
+        f" ELSE 1 END OR typeof(bug_count) != 'integer' OR {_NO_STAMP})"
     ),
     "place": (
         "SELECT seq, tag FROM place AS r LEFT JOIN run ON run.site = r.site AND run.run = r.run"
-        " WHERE r.seq > :after AND r.seq <= :until AND r.site = :site"
-        " AND (run.run IS NULL OR typeof(stamp_ns) != 'integer' OR typeof(x + y + qw) != 'real')"
+        f" WHERE {_BEHIND} AND (run.run IS NULL OR typeof(x + y + qw) != 'real'"
+        f" OR {_NO_STAMP})"
     ),
 }
 
@@ -186,10 +185,7 @@ def overview(connection: sqlite3.Connection, path: Path) -> Overview:
         sqlite3.Error: it cannot be read.
 
     """
-    pages, free, size = (
-        int(connection.execute(f"PRAGMA {name}").fetchone()[0])
-        for name in ("page_count", "freelist_count", "page_size")
-    )
+    pages, free, size = pages_of(connection)
     rows = {
         table: int(connection.execute(f"SELECT count(*) FROM {table}").fetchone()[0])
         for table in _COUNTED
@@ -204,7 +200,7 @@ def overview(connection: sqlite3.Connection, path: Path) -> Overview:
     return Overview(
         file_bytes=pages * size,
         free_bytes=free * size,
-        log_bytes=_size(path.with_name(path.name + "-wal")),
+        log_bytes=size_of(path.with_name(path.name + "-wal")),
         rows=rows,
         failures=int(failures),
         sensors=_sensors(connection),
@@ -220,7 +216,7 @@ def quarantined_beside(path: Path) -> tuple[tuple[str, int], ...]:
     """(name, bytes) of the damaged journals that were quarantined, the newest last."""
     prefix = f"{path.name}.damaged-"
     return tuple(
-        (file.name, _size(file))
+        (file.name, size_of(file))
         for file in sorted(path.parent.iterdir())
         if file.name.startswith(prefix) and not file.name.endswith(("-wal", "-shm"))
     )
@@ -253,7 +249,8 @@ def _extents(connection: sqlite3.Connection) -> tuple[RunExtent, ...]:
     )
 
 
-def _size(path: Path) -> int:
+def size_of(path: Path) -> int:
+    """Bytes of a file; 0: there is none."""
     try:
         return path.stat().st_size
     except FileNotFoundError:

@@ -16,9 +16,9 @@ from lupin_twin.core.parameters import World
 from lupin_twin.core.state import Write
 from lupin_twin.journal.appending import Appender, Stretch, copy_known, simulated
 from lupin_twin.journal.beside import Syncing, forwarded_seq
-from lupin_twin.journal.checking import find_damage
+from lupin_twin.journal.checking import find_damage, size_of
 from lupin_twin.journal.fold import Restored, copies, fold
-from lupin_twin.journal.notes import put_note
+from lupin_twin.journal.received import put_note
 from lupin_twin.journal.retention import (
     Limits,
     Stretches,
@@ -120,9 +120,7 @@ class JournalFile:
     # --- opening ------------------------------------------------------------------------------
 
     def _is_damaged(self) -> bool:
-        if not self._path.exists() or not 0 < self._path.stat().st_size <= _CHECKED_BYTES:
-            return False
-        return find_damage(self._path) is not None
+        return 0 < size_of(self._path) <= _CHECKED_BYTES and find_damage(self._path) is not None
 
     def _quarantine(self) -> None:
         # Wall time, as whoever looks for the file reads it.
@@ -146,7 +144,6 @@ class JournalFile:
             self._purged_s = self._polled_s = 0.0
             self._purges_before_ns: int | None = None
             self._is_shrinking = False
-            self._kept: Stretches | None = None
             self._syncing = Syncing(self._path)
         except BaseException:  # whatever it was: nobody has this object, and could close it
             self._connection.close()
@@ -269,7 +266,6 @@ class JournalFile:
     def retain_run(self, run: Run) -> None:
         """Have the run in the file, as it was in another one that is gone."""
         if all(known.id != run.root for known in self._runs()):
-            self._kept = None
             with self._transaction():
                 begun_seq = self._appender.last_seq + 1
                 put_run(self._connection, Run(run.root, run.begun, begun_seq))
@@ -291,7 +287,6 @@ class JournalFile:
 
     def _go_on_with(self, run: int) -> None:
         """One run goes on; another, whose end nobody saw, ended with the last received in it."""
-        self._kept = None
         execute = self._connection.execute
         execute("UPDATE run SET ended_stamp_ns = NULL WHERE run = ?", (run,))
         for other in self._runs():
@@ -329,9 +324,6 @@ class JournalFile:
             for root, of_run in groupby(rows, lambda entry: entry[0].root):
                 written += self._appender.append(root, [row for _, row in of_run])
             self._appender.flush()
-        # What comes late may be of before the log.
-        if self._kept and any(row.stamp_ns < self._kept[0][0] for _, row in rows):
-            self._kept = None
         return written
 
     def put_note(self, note: Note) -> Note:
@@ -347,15 +339,12 @@ class JournalFile:
 
     def note_lost(self, run: Run, at_ns: int) -> None:
         """Have it in the file that some of what was received up to a moment never came here."""
-        self._kept = None
         with self._transaction():
             note_lost(self._connection, run.root, at_ns)
 
     def kept(self) -> Stretches:
         """Of which stretches of ROS time all is here."""
-        if self._kept is None:
-            self._kept = kept(self._connection)
-        return self._kept
+        return kept(self._connection)
 
     def size(self) -> int:
         """Bytes on the disk, the log included."""
@@ -396,17 +385,13 @@ class JournalFile:
                 if not purge_step(self._connection, self._limits, before_ns, forwarded):
                     self.unmet_limit = unmet_limit(self._connection, self._limits, before_ns)
                     self._purges_before_ns = None
-                self._kept = None
             self._is_shrinking = True
         else:
             self._is_shrinking = shrink_step(self._connection)
         return self._purges_before_ns is not None or self._is_shrinking
 
     def _log_bytes(self) -> int:
-        try:
-            return self._path.with_name(self._path.name + "-wal").stat().st_size
-        except FileNotFoundError:
-            return 0
+        return size_of(self._path.with_name(self._path.name + "-wal"))
 
     @contextmanager
     def _transaction(self) -> Iterator[None]:

@@ -21,15 +21,22 @@ from typing import Any, Final, NamedTuple
 from lupin_twin.core.parameters import World
 from lupin_twin.core.past import HOUR_NS, Event
 from lupin_twin.journal.appending import PURGED_SEQ, Stretch, simulated
-from lupin_twin.journal.checking import WRITTEN
 from lupin_twin.journal.hours import DELETED, FORGOTTEN, TALLIED, count_rows
-from lupin_twin.journal.notes import id_behind, number_of
-from lupin_twin.journal.retention import RECORD, Stretches, delete_recorded, kept, records
-from lupin_twin.journal.runs import world_of
+from lupin_twin.journal.received import id_behind, number_of
+from lupin_twin.journal.retention import (
+    RECORD,
+    Stretches,
+    delete_recorded,
+    kept,
+    outermost,
+    records,
+)
+from lupin_twin.journal.runs import FOREVER_NS, world_of
 from lupin_twin.journal.schema import (
     DAY_LENGTH,
     LOCAL_SITE,
     ORIGIN,
+    WRITTEN,
     DamagedFile,
     SiteLog,
     get_meta,
@@ -51,7 +58,6 @@ _COMPLETE: Final = "followed_to_ns"
 _UP_TO: Final = "followed_row"
 # The last number of the journal when the first lot was read.
 _BEGUN: Final = "followed_from_seq"
-_NO_END: Final = 2**63 - 1
 _COLUMNS: Final = {
     "run": 7, "meta": 2, "series": 5, "scan": 11, "look": 16, "place": 13, "note": 7,
     "hour": 6, "tally": 9, "event": 6,
@@ -169,7 +175,7 @@ def read(connection: sqlite3.Connection, after: int, most: int = MAX_ROWS) -> Lo
         for table, sql in _COUNTED.items():
             rows = log.execute(sql, {"after": after, "last": last}).fetchall()
             texts += [_text(table, row) for row in rows]
-    return Lot(_journal_id(log), tuple(texts), last, is_all)
+    return Lot(log.journal_id, tuple(texts), last, is_all)
 
 
 def write(path: Path, lot: Lot, complete_ns: int | None, behind: int = 0) -> Followed:
@@ -233,7 +239,7 @@ def followed(path: Path) -> Followed:
 def _followed(connection: sqlite3.Connection) -> Followed:
     log = SiteLog(connection)
     return Followed(
-        _journal_id(log),
+        log.journal_id,
         _last(connection),
         world_of(log),
         int(log.meta(_COMPLETE) or 0) or _newest(connection)[1],
@@ -246,18 +252,9 @@ def _last(connection: sqlite3.Connection) -> int:
     return int(get_meta(connection, _FOLLOWED) or 0)
 
 
-def _newest(connection: sqlite3.Connection, upto: int = _NO_END) -> tuple[int, int, int]:
+def _newest(connection: sqlite3.Connection, upto: int = FOREVER_NS) -> tuple[int, int, int]:
     """The number, stamp and arrival of what was received last, up to a number; 0: nothing."""
-    found = [
-        row
-        for table in WRITTEN
-        for row in connection.execute(
-            f"SELECT seq, stamp_ns, arrival_ns FROM {table} WHERE site = ? AND seq <= ?"
-            " ORDER BY seq DESC LIMIT 1",
-            (LOCAL_SITE, upto),
-        )
-    ]
-    return max(found, default=(0, 0, 0))
+    return max(outermost(connection, "DESC", upto), default=(0, 0, 0))
 
 
 # --- out of a log ---------------------------------------------------------------------------------
@@ -287,11 +284,6 @@ def _up_to(connection: sqlite3.Connection, after: int) -> str:
 def _text(table: str, row: Iterable[Any]) -> str:
     _, *columns = row
     return json.dumps([table, *columns], separators=(",", ":"), ensure_ascii=False)
-
-
-def _journal_id(log: SiteLog) -> str:
-    """One log's name among logs: what was quarantined has another in its place."""
-    return log.meta("journal_id") or ""
 
 
 # --- into a file ----------------------------------------------------------------------------------

@@ -15,7 +15,7 @@ from typing import Any, Final, NamedTuple
 
 from lupin_twin.core.past import HOUR_NS, Event
 from lupin_twin.journal.rows import KIND_READING, STATUS_OK, numbers_of
-from lupin_twin.journal.schema import DamagedFile, SiteLog
+from lupin_twin.journal.schema import DamagedFile, SiteLog, json_text
 
 # Shorter stretches without an attempt are no silence, whatever is usual.
 SILENCE_NS: Final = 600 * 1_000_000_000
@@ -96,7 +96,7 @@ def count(
         scans = [scan for scan in scans if scan.stamp_ns > counted_ns.get(scan.run, -1)]
         inspections = [row for row in inspections if row.stamp_ns > counted_ns.get(row.run, -1)]
     hours: dict[tuple[int, int], list[Sequence[float]]] = {}
-    tallies: dict[tuple[int, str, int], list[int]] = {}
+    tallies: dict[tuple[int, str, int], tuple[int, ...]] = {}
     stamps: dict[int, list[int]] = {}
     for run, series, kind, stamp_ns, status, values in scans:
         stamps.setdefault(run, []).append(stamp_ns)
@@ -187,19 +187,16 @@ def _upsert_hours(log: SiteLog, hours: dict[tuple[int, int], list[Sequence[float
             for sensor, value in enumerate(values):
                 if not -_LARGEST < value < _LARGEST:  # nor NaN, see `is_counted`
                     continue
-                if n[sensor]:
-                    n[sensor] += 1
-                    total[sensor] += value
-                    if value < low[sensor]:
-                        low[sensor] = value
-                    elif value > high[sensor]:
-                        high[sensor] = value
-                else:
-                    n[sensor], total[sensor] = 1, value
+                if not n[sensor]:
                     low[sensor] = high[sensor] = value
+                n[sensor] += 1
+                total[sensor] += value
+                low[sensor] = min(low[sensor], value)
+                high[sensor] = max(high[sensor], value)
         # What a sum has beyond 15 digits is noise, and takes room.
         sums = ",".join([f"{number:.15g}" for number in total])
-        rows.append((log.site, series, hour, _json(n), f"[{sums}]", _json(low), _json(high)))
+        texts = json_text(n), f"[{sums}]", json_text(low), json_text(high)
+        rows.append((log.site, series, hour, *texts))
     log.execute_many(_HOUR, rows)
 
 
@@ -226,30 +223,19 @@ def _no_hour(width: int) -> tuple[list[int], list[float], list[Any], list[Any]]:
     return [0] * width, [0.0] * width, [None] * width, [None] * width
 
 
-def _json(numbers: list[Any]) -> str:
-    return f"[{','.join(map(repr, numbers))}]".replace("None", "null")
-
-
 def _tally(
-    tallies: dict[tuple[int, str, int], list[int]],
+    tallies: dict[tuple[int, str, int], tuple[int, ...]],
     key: tuple[int, str, int],
     value: int,
     stamp_ns: int,
 ) -> None:
-    entry = tallies.get(key)
-    if entry is None:
-        tallies[key] = [1, value, value, value, stamp_ns, stamp_ns]
-        return
-    entry[0] += 1
-    entry[1] += value
-    if value < entry[2]:
-        entry[2] = value
-    elif value > entry[3]:
-        entry[3] = value
-    if stamp_ns > entry[5]:
-        entry[5] = stamp_ns
-    elif stamp_ns < entry[4]:
-        entry[4] = stamp_ns
+    n, total, low, high, first_ns, last_ns = tallies.get(
+        key, (0, 0, value, value, stamp_ns, stamp_ns)
+    )
+    tallies[key] = (
+        *(n + 1, total + value, min(low, value), max(high, value)),
+        *(min(first_ns, stamp_ns), max(last_ns, stamp_ns)),
+    )
 
 
 # --- one by one -----------------------------------------------------------------------------------

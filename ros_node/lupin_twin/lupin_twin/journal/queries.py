@@ -1,24 +1,41 @@
-"""One sensor of one tag over a period, its readings or buckets of them; or all readings, in order.
+# ruff: noqa: S608  # SQL is put together of constants
+"""A period: one sensor of one tag, or what happened at one tag or at the whole site.
 
-An export reads a stretch of time in one short transaction, so that a reader that takes an hour over
-ten million rows keeps the log from being put into the file for no longer than that.
+Each reading or event, or buckets of them, as in GetHistory.srv. Everything goes by spans: what a
+run has said of moments that another one holds is left out. At a tag all is read off its rows. Of
+the site scans, failures and inspections come by the hour where they are many, or deleted; what is
+rare is kept one by one.
 """
 
 from __future__ import annotations
 
-import math
-from collections import deque
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from functools import partial
+from itertools import pairwise
+from statistics import median
 from typing import Any, Final
 
-from lupin_twin.core.past import HOUR_NS, NotRemembered, PastRow, SeriesPast, SeriesRequest
-from lupin_twin.journal.buckets import Buckets, Entry, answer, whole_hours
-from lupin_twin.journal.events import FROM_SCAN, events
-from lupin_twin.journal.hours import deleted_ns, is_counted
+from lupin_twin.core.past import (
+    EVERY_TAG,
+    HOUR_NS,
+    MAX_POINTS,
+    Event,
+    SeriesPast,
+    SeriesRequest,
+    grid,
+)
+from lupin_twin.journal.buckets import Buckets, Entry, Part, Table, answer, bounds, individually
+from lupin_twin.journal.hours import (
+    SILENCE_NS,
+    TALLIED,
+    deleted_ns,
+    extent,
+    is_counted,
+    silence_over,
+)
 from lupin_twin.journal.rows import KIND_READING, named_numbers, sensor_names
-from lupin_twin.journal.runs import Run, Span, runs, spans_within
-from lupin_twin.journal.schema import SiteLog, one_view
+from lupin_twin.journal.runs import FOREVER_NS, Run, Span, cut, runs, spans, spans_within
+from lupin_twin.journal.schema import SiteLog
 
 # What an answer costs, about, s; the second for events of the whole site, each tag.
 SERIES_S: Final = 0.01
@@ -34,81 +51,15 @@ _HOURS_WITHIN: Final = (
     "FROM hour WHERE site = :site AND series = :series AND hour >= :first AND hour < :last"
 )
 # Of a JSON list on both engines.
-_ENTRY: Final = "CAST({0} ->> CAST(:place AS INTEGER) AS {1})"
-_N: Final = _ENTRY.format("n", "BIGINT")
-_BUCKETS: Final = (
-    "SELECT (hour - :origin) / :width AS bucket,"  # constants
-    f" sum({_N}), sum({_ENTRY.format('total', 'DOUBLE PRECISION')}),"
-    f" min({_ENTRY.format('low', 'DOUBLE PRECISION')}),"
-    f" max({_ENTRY.format('high', 'DOUBLE PRECISION')}) {_HOURS_WITHIN} GROUP BY bucket"
+_IN_HOUR: Final = tuple(
+    f"CAST({name} ->> CAST(:place AS INTEGER) AS {kind})"
+    for name, kind in (
+        ("n", "BIGINT"),
+        ("total", "DOUBLE PRECISION"),
+        ("low", "DOUBLE PRECISION"),
+        ("high", "DOUBLE PRECISION"),
+    )
 )
-
-
-class _Part:
-    """A sensor's readings in a series within a span; `place` is where it stands in `sensors`."""
-
-    def __init__(self, log: SiteLog, span: Span, series: int, place: int, sensors: str) -> None:
-        self.span = span
-        self._log = log
-        self._series = {"series": series, "place": place}
-        self._place = place
-        self._sensors = sensors
-        self._deleted_ns = deleted_ns(log, span.run.id)
-
-    def ask(self, sql: str, span: Span | None = None, /, **more: int) -> list[tuple[Any, ...]]:
-        """Rows of the series within a part of the span, or all of it."""
-        span = span or self.span
-        hours = {"first": span.start_ns // HOUR_NS, "last": -(-span.end_ns // HOUR_NS)}
-        within = {"start": span.start_ns, "end": span.end_ns} | hours | self._series
-        return list(self._log.execute(sql, within | more).fetchall())
-
-    def is_deleted(self) -> bool:
-        if self.span.start_ns > self._deleted_ns:
-            return False
-        last = min(self.span.end_ns - 1, self._deleted_ns) // HOUR_NS + 1
-        return bool(self.ask(f"SELECT 1 {_HOURS_WITHIN} LIMIT 1", last=last))
-
-    def hourly(self) -> int:
-        return int(self.ask(f"SELECT coalesce(sum({_N}), 0) {_HOURS_WITHIN}")[0][0])
-
-    def entries(self, limit: int) -> list[Entry]:
-        rows = self.ask(f"SELECT stamp_ns, seq, readings {_WITHIN} LIMIT :limit", limit=limit)
-        return self._read(rows)
-
-    def oldest(self) -> list[int]:
-        """The first stamp, or the beginning of the first hour where rows were deleted."""
-        found = [at_ns for (at_ns,) in self.ask(f"SELECT min(stamp_ns) {_WITHIN}")]
-        if self.span.start_ns <= self._deleted_ns:
-            for (hour,) in self.ask(f"SELECT min(hour) {_HOURS_WITHIN}"):
-                found.append(hour if hour is None else max(hour * HOUR_NS, self.span.start_ns))
-        return [at_ns for at_ns in found if at_ns is not None]
-
-    def fill(self, buckets: Buckets) -> None:
-        rest = [self.span]
-        if buckets.are_hours():
-            hours, rest = whole_hours(self.span, self._deleted_ns)
-            for index, n, *numbers in self.ask(
-                _BUCKETS,
-                first=hours[0],
-                last=hours[1],
-                origin=buckets.grid.start_ns // HOUR_NS,
-                width=buckets.grid.bucket_ns // HOUR_NS,
-            ):
-                if n:
-                    buckets.add(index, int(n), *numbers)
-        for span in rest:
-            for stamp_ns, _, value in self._read(
-                self.ask(f"SELECT stamp_ns, seq, readings {_WITHIN}", span)
-            ):
-                if is_counted(value):
-                    buckets.add_value(stamp_ns, value)
-
-    def _read(self, rows: Sequence[tuple[int, int, str]]) -> list[Entry]:
-        every = named_numbers([self._sensors] * len(rows), [text for *_, text in rows])
-        return [
-            (stamp_ns, seq, values[self._place])
-            for (stamp_ns, seq, _), (_, values) in zip(rows, every, strict=True)
-        ]
 
 
 def series(connection: Any, request: SeriesRequest, now_ns: int) -> SeriesPast:
@@ -118,7 +69,7 @@ def series(connection: Any, request: SeriesRequest, now_ns: int) -> SeriesPast:
     """
     log = SiteLog(connection)
     if request.event is not None:
-        return events(log, request, now_ns)
+        return _events(log, request, now_ns)
     # A reading of this very moment counts as one of the past.
     end_ns = max(request.end_ns or now_ns + 1, request.start_ns)
     start_ns = request.start_ns
@@ -168,7 +119,7 @@ def newest(
     }
 
 
-def _parts(log: SiteLog, request: SeriesRequest, start_ns: int, end_ns: int) -> list[_Part]:
+def _parts(log: SiteLog, request: SeriesRequest, start_ns: int, end_ns: int) -> list[Part]:
     found = []
     for span in spans_within(runs(log.execute), start_ns, end_ns):
         of_run = {"run": span.run.id, "tag": request.tag_id, "kind": KIND_READING}
@@ -180,135 +131,268 @@ def _parts(log: SiteLog, request: SeriesRequest, start_ns: int, end_ns: int) -> 
             names = sensor_names(text)
             if request.sensor_type in names:
                 place = names.index(request.sensor_type)
-                found.append(_Part(log, span, number, place, text))
+                read = partial(_at, text, place)
+                table = Table(_WITHIN, "readings", read, _HOURS_WITHIN, _IN_HOUR)
+                found.append(Part(log, span, table, {"series": number, "place": place}))
     return found
 
 
-LOT: Final = 1_000
-# Readings that are read in one go, about, and what that costs, s.
-_STRETCH: Final = 40_000
-STRETCH_S: Final = 0.1
-_FIRST_STRETCH_NS: Final = 60 * 1_000_000_000
-_NOWHERE: Final = (math.nan, math.nan)
-_NO_READING: Final = (("", math.nan),)
-
-_SCANS: Final = f"SELECT stamp_ns, seq, tag, sensors, status, source, readings {FROM_SCAN}"
-_NEXT: Final = f"SELECT min(stamp_ns) {FROM_SCAN}"  # constants
+def _at(sensors: str, place: int, texts: list[str]) -> list[float]:
+    return [values[place] for _, values in named_numbers([sensors] * len(texts), texts)]
 
 
-def rows(
-    connection: Any,
-    start_ns: int,
-    end_ns: int,
-    tag_id: str | None = None,
-    sensor_type: str | None = None,
-) -> Iterator[list[PastRow]]:
-    """Lots of at most `LOT` rows, see `Export`."""
-    export = Export(start_ns, end_ns, tag_id, sensor_type)
-    while True:
-        with one_view(connection):
-            found = export.step(connection)
-        if found is None:
-            return
-        yield from lots(found)
+# --- what happened -------------------------------------------------------------------------------
+
+# A silence is longer than so many median intervals between the attempts of the period.
+INTERVALS: Final = 3
+
+# The first and the last attempt of a stretch in which no gap matters.
+Extent = tuple[int, int]
+
+# What is no copy, of all tags or of one.
+FROM_SCAN: Final = (
+    "FROM series CROSS JOIN scan WHERE series.site = :site AND run = :run{tag}"
+    " AND scan.site = :site AND scan.series = series.series"
+    " AND stamp_ns >= :start AND stamp_ns < :end AND is_copy = 0"
+)
+_FROM_INSPECTION: Final = (
+    "FROM look WHERE site = :site AND run = :run{tag}"
+    " AND stamp_ns >= :start AND stamp_ns < :end AND is_copy = 0"
+)
+_FROM_EVENT: Final = (
+    "FROM event WHERE site = :site AND run = :run AND event = :event{tag}"
+    " AND stamp_ns >= :start AND stamp_ns < :end"
+)
+# What has the value of an event, and where the rows are.
+_ROWS: Final = {
+    Event.SCANS: ("sensors", f"{FROM_SCAN} AND kind = 0 AND status = 0"),
+    Event.FAILURES: ("status", f"{FROM_SCAN} AND status != 0"),
+    Event.INSPECTIONS: ("bug_count", _FROM_INSPECTION),
+    Event.PESTS_SEEN: ("value", _FROM_EVENT),
+    Event.PESTS_CLEARED: ("value", _FROM_EVENT),
+}
+_STAMPS: Final = f"SELECT stamp_ns {FROM_SCAN} UNION ALL SELECT stamp_ns {_FROM_INSPECTION}"
+# A few steps in the index for each series.
+_IN_SERIES: Final = (
+    "(SELECT {0}(stamp_ns) FROM scan WHERE site = s.site AND series = s.series"
+    " AND stamp_ns >= :start AND stamp_ns < :end AND is_copy = 0)"
+)
+_ENDS: Final = (
+    f"SELECT min({_IN_SERIES.format('min')}), max({_IN_SERIES.format('max')})"
+    " FROM series AS s WHERE site = :site AND run = :run{tag}"
+    f" UNION ALL SELECT min(stamp_ns), max(stamp_ns) {_FROM_INSPECTION}"
+)
+_FROM_TALLY: Final = (
+    "FROM tally WHERE site = :site AND run = :run AND hour >= :first AND hour < :last"
+)
+_SILENCES: Final = (
+    "SELECT stamp_ns, stamp_ns + value FROM event WHERE site = :site AND run = :run"
+    " AND event = :event AND value > :longest AND stamp_ns < :end AND stamp_ns + value > :start"
+    " AND stamp_ns >= :least AND stamp_ns + value <= :most ORDER BY stamp_ns"
+)
 
 
-def lots(found: list[PastRow]) -> Iterator[list[PastRow]]:
-    """Rows, `LOT` at a time."""
-    for first in range(0, len(found), LOT):
-        yield found[first : first + LOT]
+def _events(log: SiteLog, request: SeriesRequest, now_ns: int) -> SeriesPast:
+    """The events that are requested, see GetHistory.srv."""
+    source = _Source(log, None if request.tag_id == EVERY_TAG else request.tag_id)
+    axis = spans(runs(log.execute))
+    # What is of this very moment counts as past.
+    end_ns = max(request.end_ns or now_ns + 1, request.start_ns)
+    start_ns = request.start_ns
+    if not start_ns:
+        oldest_ns = _outermost(source, axis, 0)
+        start_ns = end_ns if oldest_ns is None else min(oldest_ns, end_ns)
+    period = start_ns, end_ns
+    match request.event:
+        case Event.RUNS:
+            return _runs(cut(axis, *period), *period)
+        case Event.SILENCES:
+            found = list(_silences(source, axis, period, now_ns))
+            if len(found) <= request.max_points:
+                return individually(found, *period)
+            buckets = Buckets(grid(*period, request.max_points))
+            for at_ns, length_s in found:
+                buckets.add_value(at_ns, length_s)
+            return buckets.past()
+    assert request.event is not None
+    parts_of = partial(source.parts, request.event, axis)
+    return answer(parts_of, start_ns, end_ns, request.max_points)
 
 
-class Export:
-    """The rows of a period; None: of all tags; of all sensors, and of attempts without a reading.
+def _runs(found: Sequence[Span], start_ns: int, end_ns: int) -> SeriesPast:
+    found = found[-MAX_POINTS:]
+    simulated = tuple(float(span.run.begun.is_simulated) for span in found)
+    return SeriesPast(
+        start_ns,
+        end_ns,
+        None,
+        tuple(span.start_ns for span in found),
+        (1,) * len(found),
+        tuple((span.end_ns - span.start_ns) / 1e9 for span in found),
+        simulated,
+        simulated,
+    )
 
-    Each step may be over another connection. An export that deleting has overtaken is not whole,
-    and does not look so.
+
+# --- silences -------------------------------------------------------------------------------------
+
+
+def _silences(
+    source: _Source, axis: Sequence[Span], period: Extent, now_ns: int
+) -> Iterator[tuple[int, float]]:
+    """(start, seconds) of each, cut to the period; the last one lasts until now.
+
+    Before the first attempt that is known there is no silence.
+    """
+    start_ns, end_ns = period
+    within = cut(axis, start_ns, end_ns)
+    longest_ns = max(SILENCE_NS, int(INTERVALS * _usual_ns(source, within, end_ns - start_ns)))
+    earlier = [span for span in axis if span.end_ns <= start_ns]
+    held = [span for span in axis if span.end_ns > start_ns and span.start_ns < end_ns]
+    later = [span for span in axis if span.start_ns >= end_ns]
+    found = [extent for span in held for extent in source.stretches(span, longest_ns, period)]
+    before_ns = _outermost(source, reversed(earlier), 1)
+    if before_ns is not None:
+        found.insert(0, (before_ns, before_ns))
+    if not found:
+        return
+    after_ns = _outermost(source, later, 0)
+    last_ns = max(now_ns, *(last for _, last in found)) if after_ns is None else after_ns
+    found.append((last_ns, last_ns))
+    for (_, silent_ns), (until_ns, _) in pairwise(found):
+        if until_ns - silent_ns > longest_ns:
+            begun_ns, ended_ns = max(silent_ns, start_ns), min(until_ns, end_ns)
+            if begun_ns < ended_ns:
+                yield begun_ns, (ended_ns - begun_ns) / 1e9
+
+
+def _usual_ns(source: _Source, within: Sequence[Span], period_ns: int) -> float:
+    """The median interval; 0 where it is too short to matter."""
+    # Half of the intervals would have to be longer than that, and there is no room for so many.
+    most = 1 + 2 * INTERVALS * period_ns / SILENCE_NS
+    if sum(source.attempts(span) for span in within) > most:
+        return 0.0
+    stamps = sorted(stamp_ns for span in within for stamp_ns in source.stamps(span))
+    return median(b - a for a, b in pairwise(stamps)) if len(stamps) > 1 else 0.0
+
+
+def _outermost(source: _Source, axis: Iterable[Span], which: int) -> int | None:
+    """The first (0) or last (1) attempt of the first span with any."""
+    found = (ends[which] for span in axis if (ends := source.ends(span)) is not None)
+    return next(found, None)
+
+
+# --- where it stands ------------------------------------------------------------------------------
+
+
+class _Source:
+    """The attempts and events of a tag, or of the site (`tag` None), span by span.
+
+    Rows are there as far back as they are kept, what is rare for good; of the site the hours
+    of all attempts too.
     """
 
-    def __init__(
-        self, start_ns: int, end_ns: int, tag_id: str | None, sensor_type: str | None
-    ) -> None:
-        self._period = (start_ns, end_ns)
-        self._tag_id = tag_id
-        self._sensor_type = sensor_type
-        self._spans: deque[Span] | None = None
-        self._at_ns = 0
-        self._length_ns = _FIRST_STRETCH_NS
-        self._run: Run | None = None
-        self._places: dict[str, tuple[float, float]] = {}
-        # The last stamp of each run that was deleted when the first row was given.
-        self._deleted_ns: dict[int, int] = {}
-        self._has_begun = False
+    def __init__(self, log: SiteLog, tag: str | None) -> None:
+        self._log = log
+        self.tag = tag
 
-    def step(self, connection: Any) -> list[PastRow] | None:
-        """The rows of the next stretch of time, maybe none; None: that was all.
+    def parts(self, event: Event, axis: Sequence[Span], start_ns: int, end_ns: int) -> list[Part]:
+        """The events of a period, by spans."""
+        value, rows = _ROWS[event]
+        is_tallied = self.tag is None and event in TALLIED
+        hours = f"{_FROM_TALLY} AND event = :event" if is_tallied else ""
+        table = Table(self._of_tag(rows), value, _numbers, hours)
+        of = {"tag": self.tag, "event": event}
+        return [
+            Part(self._log, span, table, of | {"run": span.run.id})
+            for span in cut(axis, start_ns, end_ns)
+        ]
 
-        Raises:
-            NotRemembered: behind rows that were given, some are deleted since.
+    def attempts(self, span: Span) -> int:
+        """How many there were, at least."""
+        if self.tag is not None:
+            return 0
+        first, last = -(-span.start_ns // HOUR_NS), span.end_ns // HOUR_NS
+        sql = f"SELECT coalesce(sum(n), 0) {_FROM_TALLY}"
+        return int(self.ask(sql, span, first=first, last=last)[0][0])
 
+    def stamps(self, span: Span) -> Iterator[int]:
+        """Of each attempt; what was deleted of the site is spread over its hour."""
+        kept_ns = 0
+        if self.tag is None:
+            kept_ns = (deleted_ns(self._log, span.run.id) // HOUR_NS + 1) * HOUR_NS
+        for part in cut([span], kept_ns, FOREVER_NS):
+            for (stamp_ns,) in self.ask(_STAMPS, part):
+                yield stamp_ns
+        for part in cut([span], 0, kept_ns):
+            sql = f"SELECT n, first_ns, last_ns {_FROM_TALLY}"
+            for n, first_ns, last_ns in self.ask(sql, part):
+                for number in range(n):
+                    stamp_ns = first_ns + (last_ns - first_ns) * number // max(1, n - 1)
+                    if part.start_ns <= stamp_ns < part.end_ns:
+                        yield stamp_ns
+
+    def stretches(self, span: Span, longest_ns: int, period: Extent) -> Iterable[Extent]:
+        """The attempts of a period and the next ones on both sides, in order.
+
+        Such as follow each other within `longest_ns` may be in one.
         """
-        log = SiteLog(connection)
-        if self._spans is None:
-            self._spans = deque(spans_within(runs(log.execute), *self._period))
-        if not self._has_begun:
-            self._deleted_ns = {s.run.id: deleted_ns(log, s.run.id) for s in self._spans}
-        while self._spans and self._spans[0].end_ns <= self._at_ns:
-            self._spans.popleft()
-        return self._stretch(log, self._spans[0]) if self._spans else None
+        if self.tag is not None:
+            found = [stamp_ns for part in cut([span], *period) for stamp_ns in self.stamps(part)]
+            for part in cut([span], 0, period[0]):
+                found += (self.ends(part) or ())[1:]
+            for part in cut([span], period[1], FOREVER_NS):
+                found += (self.ends(part) or ())[:1]
+            return [(stamp_ns, stamp_ns) for stamp_ns in sorted(found)]
+        ends = self.ends(span)
+        if ends is None:
+            return []
+        query = {"run": span.run.id, "event": Event.SILENCES, "longest": longest_ns}
+        query |= {"start": period[0], "end": period[1], "least": ends[0], "most": ends[1]}
+        silences = self._log.execute(_SILENCES, query).fetchall()
+        edges = [ends[0], *(at_ns for silence in silences for at_ns in silence), ends[1]]
+        return list(zip(edges[::2], edges[1::2], strict=True))
 
-    def _stretch(self, log: SiteLog, span: Span) -> list[PastRow]:
-        if self._run != span.run:
-            self._run, self._places = span.run, _places(log, span.run)
-        start_ns = max(self._at_ns, span.start_ns)
-        horizon_ns = deleted_ns(log, span.run.id)
-        if horizon_ns >= start_ns and horizon_ns > self._deleted_ns[span.run.id]:
-            why = "scans that come next were deleted while others were taken: begin again"
-            raise NotRemembered(why, is_lasting=False)
-        while True:
-            until_ns = min(start_ns + self._length_ns, span.end_ns)
-            # Of one stamp there are as many scans as there are.
-            limit = "" if self._length_ns == 1 else f" LIMIT {_STRETCH}"
-            scans = self._ask(log, _SCANS + limit, start_ns, until_ns)
-            read = sum(1 + scan[-1].count(",") for scan in scans)
-            if self._length_ns == 1 or read < _STRETCH:
-                break
-            self._length_ns = max(1, self._length_ns // 8)
-        self._at_ns = until_ns
-        if not scans:
-            ((next_ns,),) = self._ask(log, _NEXT, until_ns, span.end_ns)
-            self._at_ns = span.end_ns if next_ns is None else next_ns
-        more = _STRETCH / 4 / max(read, _STRETCH // 32)
-        self._length_ns = max(1, int(self._length_ns * more))
-        self._has_begun |= bool(scans)
-        return self._read(sorted(scans))
+    def ends(self, span: Span) -> Extent | None:
+        """The first and the last attempt; None if there was none."""
+        if self.tag is not None:
+            found = [row for row in self.ask(_ENDS, span) if row[0] is not None]
+            return (min(found)[0], max(last for _, last in found)) if found else None
+        every = extent(self._log, span.run.id)
+        if every is None or every[1] < span.start_ns or every[0] >= span.end_ns:
+            return None
+        first_ns, last_ns = every
+        if span.start_ns > first_ns:
+            first_ns = self._near(span.run, span.start_ns, 1)
+        if span.end_ns <= last_ns:
+            last_ns = self._near(span.run, span.end_ns - 1, 0)
+        return (first_ns, last_ns) if first_ns <= last_ns else None
 
-    def _ask(self, log: SiteLog, sql: str, start_ns: int, end_ns: int) -> list[tuple[Any, ...]]:
-        assert self._run is not None
-        of_tag = "" if self._tag_id is None else " AND tag = :tag"
-        query = {"run": self._run.id, "tag": self._tag_id, "start": start_ns, "end": end_ns}
-        return list(log.execute(sql.replace("{tag}", of_tag), query).fetchall())
+    def _near(self, run: Run, at_ns: int, which: int) -> int:
+        """The last attempt up to a moment (0) or the first from then on (1).
 
-    def _read(self, scans: list[tuple[Any, ...]]) -> list[PastRow]:
-        found: list[PastRow] = []
-        every = named_numbers((scan[3] for scan in scans), [scan[-1] for scan in scans])
-        for (stamp_ns, _, tag, _, status, source, _), (names, values) in zip(
-            scans, every, strict=True
-        ):
-            x, y = self._places.get(tag, _NOWHERE)
-            readings = zip(names, values, strict=True) if values else _NO_READING
-            found += [
-                PastRow(stamp_ns, tag, x, y, sensor, value, status, source)
-                for sensor, value in readings
-                if self._sensor_type in (None, sensor)
-            ]
-        return found
+        There are earlier ones and later ones.
+        """
+        over = silence_over(self._log, run.id, at_ns if which else at_ns + 1)
+        if over is not None:
+            return over[which]
+        start_ns = at_ns if which else at_ns - SILENCE_NS
+        rows = self.ask(_ENDS, Span(run, start_ns, start_ns + SILENCE_NS + 1))
+        found: list[int] = [row[1 - which] for row in rows if row[0] is not None]
+        if not found:  # it is deleted
+            return at_ns
+        return min(found) if which else max(found)
+
+    def ask(self, sql: str, span: Span, **more: int) -> list[tuple[Any, ...]]:
+        query = bounds(span) | {"run": span.run.id, "tag": self.tag} | more
+        return list(self._log.execute(self._of_tag(sql), query).fetchall())
+
+    def _of_tag(self, sql: str) -> str:
+        return sql.replace("{tag}", "" if self.tag is None else " AND tag = :tag")
 
 
-def _places(log: SiteLog, run: Run) -> dict[str, tuple[float, float]]:
-    """Where tags are: what was known first holds, what was carried into the run before all."""
-    found = log.execute(
-        "SELECT tag, x, y FROM place WHERE site = :site AND run = :run ORDER BY seq DESC",
-        {"run": run.id},
-    )
-    return {tag: (x, y) for tag, x, y in found.fetchall()}
+def _numbers(values: list[int | str]) -> list[float]:
+    """Of a scan the number of its sensors."""
+    return [
+        float(len(sensor_names(value)) if isinstance(value, str) else value) for value in values
+    ]

@@ -7,11 +7,10 @@ one whole. The old one of an upgrade stays beside it as `NAME.v3`.
 
 from __future__ import annotations
 
-import json
 import os
 import shutil
 import sqlite3
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable
 from contextlib import closing
 from itertools import islice
 from pathlib import Path
@@ -25,14 +24,16 @@ from lupin_twin.journal.fold import copies
 from lupin_twin.journal.hours import DELETED
 from lupin_twin.journal.retention import RETENTION_BYTES, RETENTION_NS
 from lupin_twin.journal.runs import Carries, Run, put_run
+from lupin_twin.journal.salvage import numbered
 from lupin_twin.journal.schema import (
     APPLICATION_ID,
     LOCAL_SITE,
     DamagedFile,
+    json_text,
     open_named,
     open_writer,
     set_meta,
-    sync_folder,
+    sync,
     transaction,
 )
 from lupin_twin.journal.version3 import VERSION, Bucket, OldRun, Version3
@@ -80,7 +81,7 @@ def upgrade(path: Path, report: Callable[[float], None]) -> str:
                 target.execute("PRAGMA journal_mode = MEMORY")
                 target.execute("PRAGMA synchronous = OFF")
                 damaged = _Upgrade(Version3(connection), target, report).run()
-        _sync(new)
+        sync(new)
         kept = _keep(path)
     except BaseException as error:
         _remove(new)
@@ -92,7 +93,7 @@ def upgrade(path: Path, report: Callable[[float], None]) -> str:
         path.with_name(path.name + end).unlink(missing_ok=True)
     new.chmod(path.stat().st_mode & 0o777)
     new.replace(path)
-    sync_folder(path.parent)
+    sync(path.parent)
     return f"{damaged:,} rows of {kept} are damaged and left out" if damaged else ""
 
 
@@ -110,35 +111,24 @@ def _remove(new: Path) -> None:
 
 def _keep(path: Path) -> Path:
     """Give the old file a second name, and return it; nothing that has one is overwritten."""
-    number = 0
-    while True:
-        kept = path.with_name(f"{path.name}.v{VERSION}" + (f"-{number}" if number else ""))
+    for kept in numbered(path, f".v{VERSION}"):
         if not kept.exists():
             break
         if kept.samefile(path):  # killed between this and the end
             return kept
-        number += 1
     try:
         os.link(path, kept)
     except OSError:  # a file system without links
         part = path.with_name(path.name + ".upgrade-copy")
         try:
             shutil.copyfile(path, part)
-            _sync(part)
+            sync(part)
         except OSError:  # the disk is full: what is there of it would keep it so
             part.unlink(missing_ok=True)
             raise
         part.rename(kept)
-    sync_folder(path.parent)
+    sync(path.parent)
     return kept
-
-
-def _sync(path: Path) -> None:
-    descriptor = os.open(path, os.O_RDONLY)
-    try:
-        os.fsync(descriptor)
-    finally:
-        os.close(descriptor)
 
 
 class _Upgrade:
@@ -215,12 +205,12 @@ class _Upgrade:
             if key not in numbers:
                 self._appender.last_seq += 1
                 numbers[key] = self._appender.last_seq
-                row = (LOCAL_SITE, numbers[key], run, tag_id, kind, _json(sensors))
+                row = (LOCAL_SITE, numbers[key], run, tag_id, kind, json_text(sensors))
                 self._add("series", 6, [row])
             at = (numbers[key], hour)
             found[at] = list(map(_joined, found[at], buckets)) if at in found else buckets
         return [
-            (LOCAL_SITE, *at, *map(_json, zip(*map(_finite, buckets), strict=True)))
+            (LOCAL_SITE, *at, *map(json_text, zip(*map(_finite, buckets), strict=True)))
             for at, buckets in sorted(found.items())
             if any(n for n, *_ in buckets)
         ]
@@ -235,10 +225,6 @@ def _joined(one: Bucket, other: Bucket) -> Bucket:
 def _finite(bucket: Bucket) -> tuple[float | None, ...]:
     """As it stands in `hour`: without a reading there is no least and no largest."""
     return bucket if bucket[0] else (0, 0.0, None, None)
-
-
-def _json(values: Sequence[object]) -> str:
-    return json.dumps(values, separators=(",", ":"))
 
 
 _INSTRUCTIONS: Final = 100_000

@@ -1,15 +1,29 @@
 # ruff: noqa: S608  # SQL is put together of constants
-"""What was received, write by write: behind a number, recently, in a period; copies left out."""
+"""What was received, write by write, and notes: behind a number, recently, in a period.
+
+An export reads a stretch of time in one short transaction, so that a reader that takes an hour over
+ten million rows keeps the log from being put into the file for no longer than that. Notes have one
+number each as every write, so that whoever follows the log has them.
+"""
 
 from __future__ import annotations
 
+import math
+import re
+import secrets
 import time
-from collections.abc import Iterable, Iterator
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import Future
+from dataclasses import asdict, replace
 from typing import Any, Final
 
+from lupin_twin.core.notes import MAX_NOTES, Note, NotesRequest, NotesUnwritable, PastNotes
 from lupin_twin.core.past import (
     MAX_SCANS,
     RECENT_COUNT,
+    NotRemembered,
+    PastRow,
     PastWrite,
     PastWrites,
     PeriodRequest,
@@ -20,11 +34,11 @@ from lupin_twin.core.past import (
     recent_of,
 )
 from lupin_twin.core.state import sure_species
-from lupin_twin.journal.checking import WRITTEN
-from lupin_twin.journal.events import FROM_SCAN
+from lupin_twin.journal.hours import deleted_ns
+from lupin_twin.journal.queries import FROM_SCAN
 from lupin_twin.journal.rows import KIND_FLOWER, STATUS_OK, named_numbers, sensor_names
-from lupin_twin.journal.runs import Span, cut, runs, span_at, spans
-from lupin_twin.journal.schema import SiteLog
+from lupin_twin.journal.runs import Run, Span, cut, runs, span_at, spans, spans_within
+from lupin_twin.journal.schema import WRITTEN, SiteLog, one_view
 
 # What an answer of so many writes takes, about, s.
 WRITES_S: Final = 0.05
@@ -33,14 +47,17 @@ _NEWEST: Final = "SELECT max(seq) FROM {} WHERE site = :site"
 _ARRIVAL: Final = (
     "SELECT seq, arrival_ns FROM scan WHERE site = :site AND seq > :after ORDER BY seq LIMIT 1"
 )
+_SCAN: Final = "SELECT seq, run, tag, stamp_ns, kind, status, sensors, readings"
+_INSPECTION: Final = (
+    "SELECT seq, run, tag, stamp_ns, species, confidence, anomaly, bug_count FROM look"
+)
 _SCANS: Final = (
-    "SELECT seq, run, tag, stamp_ns, kind, status, sensors, readings FROM scan JOIN series"
+    f"{_SCAN} FROM scan JOIN series"
     " ON series.site = scan.site AND series.series = scan.series"
     " WHERE scan.site = :site AND seq > :after AND is_copy = 0 ORDER BY seq LIMIT :count"
 )
 _INSPECTIONS: Final = (
-    "SELECT seq, run, tag, stamp_ns, species, confidence, anomaly, bug_count FROM look"
-    " WHERE site = :site AND seq > :after AND is_copy = 0 ORDER BY seq LIMIT :count"
+    f"{_INSPECTION} WHERE site = :site AND seq > :after AND is_copy = 0 ORDER BY seq LIMIT :count"
 )
 # Of each series, or tag, from the stamp on of the last that is recent. With a limit neither engine
 # makes the search part of the join, where PostgreSQL would do it again for each row.
@@ -58,21 +75,17 @@ _FIRST_INSPECTION: Final = _FIRST_RECENT.format(
 )
 _IN_TIME: Final = "r.is_copy = 0 AND r.stamp_ns <= :at AND r.stamp_ns >= s.first_ns"
 _RECENT_SCANS: Final = (
-    "SELECT r.seq, s.run, s.tag, r.stamp_ns, s.kind,"
-    f" r.status, s.sensors, r.readings FROM {_FIRST_SCAN}"
-    f" WHERE r.site = s.site AND r.series = s.series AND {_IN_TIME}"
+    f"{_SCAN} FROM {_FIRST_SCAN} WHERE r.site = s.site AND r.series = s.series AND {_IN_TIME}"
 )
 _RECENT_INSPECTIONS: Final = (
     "SELECT r.seq, r.run, r.tag, r.stamp_ns, r.species, r.confidence,"
     f" r.anomaly, r.bug_count FROM {_FIRST_INSPECTION}"
     f" WHERE r.site = s.site AND r.run = s.run AND r.tag = s.tag AND {_IN_TIME}"
 )
-_SCANS_BETWEEN: Final = (
-    "SELECT seq, run, tag, stamp_ns, kind, status, sensors, readings " + FROM_SCAN.format(tag="")
-)
+_SCANS_BETWEEN: Final = f"{_SCAN} {FROM_SCAN.format(tag='')}"
 _INSPECTIONS_BETWEEN: Final = (
-    "SELECT seq, run, tag, stamp_ns, species, confidence, anomaly, bug_count FROM look"
-    " WHERE site = :site AND run = :run AND stamp_ns >= :start AND stamp_ns < :end AND is_copy = 0"
+    f"{_INSPECTION} WHERE site = :site AND run = :run"
+    " AND stamp_ns >= :start AND stamp_ns < :end AND is_copy = 0"
 )
 
 
@@ -86,15 +99,7 @@ def observed(connection: Any, request: PeriodRequest) -> PastWrites:
         found += _of_scans(log.execute(_SCANS_BETWEEN, query).fetchall())
         found += _of_inspections(log.execute(_INSPECTIONS_BETWEEN, query).fetchall())
     found.sort(key=lambda write: (write.stamp_ns, write.number))
-    return PastWrites(log.meta("journal_id") or "", _axis(axis), tuple(found), 0, is_all=True)
-
-
-_SCANS_UP_TO: Final = (
-    "SELECT seq, run, tag, stamp_ns, kind, status, sensors, readings"
-    " FROM series AS s CROSS JOIN scan AS r WHERE s.site = :site AND run = :run AND kind = 0"
-    " AND r.site = s.site AND r.series = s.series AND stamp_ns >= :since AND stamp_ns <= :at"
-    " AND is_copy = 0 LIMIT :most"
-)
+    return PastWrites(log.journal_id, _axis(axis), tuple(found), 0, is_all=True)
 
 
 def recent(connection: Any, request: RecentRequest) -> tuple[PastWrite, ...]:
@@ -103,11 +108,7 @@ def recent(connection: Any, request: RecentRequest) -> tuple[PastWrite, ...]:
     span = span_at(runs(log.execute), request.at_ns)
     if span is None:
         return ()
-    query = {
-        "run": span.run.id,
-        "at": request.at_ns,
-        "more": RECENT_COUNT - 1,
-    }
+    query = {"run": span.run.id, "at": request.at_ns, "more": RECENT_COUNT - 1}
     scans = log.execute(_RECENT_SCANS, query).fetchall()
     inspections = log.execute(_RECENT_INSPECTIONS, query).fetchall()
     return recent_of([*_of_scans(scans), *_of_inspections(inspections)], request.at_ns)
@@ -119,8 +120,9 @@ def scans(connection: Any, request: ScansRequest) -> tuple[PastWrite, ...]:
     span = span_at(runs(log.execute), request.at_ns)
     if span is None:
         return ()
-    query = {"run": span.run.id, "since": request.since_ns, "at": request.at_ns}
-    rows = log.execute(_SCANS_UP_TO, query | {"most": MAX_SCANS + 1}).fetchall()
+    query = {"run": span.run.id, "start": request.since_ns, "end": request.at_ns + 1}
+    sql = f"{_SCANS_BETWEEN} AND kind = 0 LIMIT {MAX_SCANS + 1}"
+    rows = log.execute(sql, query).fetchall()
     if len(rows) > MAX_SCANS:
         return ()
     wanted = {
@@ -146,7 +148,7 @@ def writes(connection: Any, request: WritesRequest) -> PastWrites:
     found = found[: request.max_count]
     last = max(newest, after) if is_all else found[-1].number
     axis = _axis(spans(runs(log.execute)))
-    return PastWrites(log.meta("journal_id") or "", axis, tuple(found), last, is_all)
+    return PastWrites(log.journal_id, axis, tuple(found), last, is_all)
 
 
 def _axis(found: Iterable[Span]) -> tuple[RunSpan, ...]:
@@ -182,3 +184,243 @@ def _of_inspections(rows: list[tuple[Any, ...]]) -> Iterator[PastWrite]:
     for seq, run, tag, stamp_ns, species, confidence, anomaly, bug_count in rows:
         seen = (sure_species(species, confidence), bool(anomaly), bug_count)
         yield PastWrite(seq, run, tag, stamp_ns, KIND_FLOWER, STATUS_OK, (), (), True, *seen)
+
+
+# --- an export -----------------------------------------------------------------------------------
+
+LOT: Final = 1_000
+# Readings that are read in one go, about, and what that costs, s.
+_STRETCH: Final = 40_000
+STRETCH_S: Final = 0.1
+_FIRST_STRETCH_NS: Final = 60 * 1_000_000_000
+_NOWHERE: Final = (math.nan, math.nan)
+_NO_READING: Final = (("", math.nan),)
+
+_EXPORTED: Final = f"SELECT stamp_ns, seq, tag, sensors, status, source, readings {FROM_SCAN}"
+_NEXT: Final = f"SELECT min(stamp_ns) {FROM_SCAN}"  # constants
+
+
+def rows(
+    connection: Any,
+    start_ns: int,
+    end_ns: int,
+    tag_id: str | None = None,
+    sensor_type: str | None = None,
+) -> Iterator[list[PastRow]]:
+    """Lots of at most `LOT` rows, see `Export`."""
+    export = Export(start_ns, end_ns, tag_id, sensor_type)
+    while True:
+        with one_view(connection):
+            found = export.step(connection)
+        if found is None:
+            return
+        yield from lots(found)
+
+
+def lots(found: list[PastRow]) -> Iterator[list[PastRow]]:
+    """Rows, `LOT` at a time."""
+    for first in range(0, len(found), LOT):
+        yield found[first : first + LOT]
+
+
+class Export:
+    """The rows of a period; None: of all tags; of all sensors, and of attempts without a reading.
+
+    Each step may be over another connection. An export that deleting has overtaken is not whole,
+    and does not look so.
+    """
+
+    def __init__(
+        self, start_ns: int, end_ns: int, tag_id: str | None, sensor_type: str | None
+    ) -> None:
+        self._period = (start_ns, end_ns)
+        self._tag_id = tag_id
+        self._sensor_type = sensor_type
+        self._spans: deque[Span] | None = None
+        self._at_ns = 0
+        self._length_ns = _FIRST_STRETCH_NS
+        self._run: Run | None = None
+        self._places: dict[str, tuple[float, float]] = {}
+        # The last stamp of each run that was deleted when the first row was given.
+        self._deleted_ns: dict[int, int] = {}
+        self._has_begun = False
+
+    def step(self, connection: Any) -> list[PastRow] | None:
+        """The rows of the next stretch of time, maybe none; None: that was all.
+
+        Raises:
+            NotRemembered: behind rows that were given, some are deleted since.
+
+        """
+        log = SiteLog(connection)
+        if self._spans is None:
+            self._spans = deque(spans_within(runs(log.execute), *self._period))
+        if not self._has_begun:
+            self._deleted_ns = {s.run.id: deleted_ns(log, s.run.id) for s in self._spans}
+        while self._spans and self._spans[0].end_ns <= self._at_ns:
+            self._spans.popleft()
+        return self._stretch(log, self._spans[0]) if self._spans else None
+
+    def _stretch(self, log: SiteLog, span: Span) -> list[PastRow]:
+        if self._run != span.run:
+            self._run, self._places = span.run, _places(log, span.run)
+        start_ns = max(self._at_ns, span.start_ns)
+        horizon_ns = deleted_ns(log, span.run.id)
+        if horizon_ns >= start_ns and horizon_ns > self._deleted_ns[span.run.id]:
+            why = "scans that come next were deleted while others were taken: begin again"
+            raise NotRemembered(why, is_lasting=False)
+        while True:
+            until_ns = min(start_ns + self._length_ns, span.end_ns)
+            # Of one stamp there are as many scans as there are.
+            limit = "" if self._length_ns == 1 else f" LIMIT {_STRETCH}"
+            scans = self._ask(log, _EXPORTED + limit, start_ns, until_ns)
+            read = sum(1 + scan[-1].count(",") for scan in scans)
+            if self._length_ns == 1 or read < _STRETCH:
+                break
+            self._length_ns = max(1, self._length_ns // 8)
+        self._at_ns = until_ns
+        if not scans:
+            ((next_ns,),) = self._ask(log, _NEXT, until_ns, span.end_ns)
+            self._at_ns = span.end_ns if next_ns is None else next_ns
+        more = _STRETCH / 4 / max(read, _STRETCH // 32)
+        self._length_ns = max(1, int(self._length_ns * more))
+        self._has_begun |= bool(scans)
+        return self._read(sorted(scans))
+
+    def _ask(self, log: SiteLog, sql: str, start_ns: int, end_ns: int) -> list[tuple[Any, ...]]:
+        assert self._run is not None
+        of_tag = "" if self._tag_id is None else " AND tag = :tag"
+        query = {"run": self._run.id, "tag": self._tag_id, "start": start_ns, "end": end_ns}
+        return list(log.execute(sql.replace("{tag}", of_tag), query).fetchall())
+
+    def _read(self, scans: list[tuple[Any, ...]]) -> list[PastRow]:
+        found: list[PastRow] = []
+        every = named_numbers((scan[3] for scan in scans), [scan[-1] for scan in scans])
+        for (stamp_ns, _, tag, _, status, source, _), (names, values) in zip(
+            scans, every, strict=True
+        ):
+            x, y = self._places.get(tag, _NOWHERE)
+            readings = zip(names, values, strict=True) if values else _NO_READING
+            found += [
+                PastRow(stamp_ns, tag, x, y, sensor, value, status, source)
+                for sensor, value in readings
+                if self._sensor_type in (None, sensor)
+            ]
+        return found
+
+
+def _places(log: SiteLog, run: Run) -> dict[str, tuple[float, float]]:
+    """Where tags are: what was known first holds, what was carried into the run before all."""
+    found = log.execute(
+        "SELECT tag, x, y FROM place WHERE site = :site AND run = :run ORDER BY seq DESC",
+        {"run": run.id},
+    )
+    return {tag: (x, y) for tag, x, y in found.fetchall()}
+
+
+# An id is the number of the write, in hexadecimal digits that sort as it does, and digits of
+# chance: an archive has the notes of several journals of one site, whose numbers are the same.
+_DIGITS: Final = 16
+_OURS: Final = re.compile(rf"[0-9a-f]{{{_DIGITS}}}", re.ASCII)
+# No log counts so far; SQLite counts to twice that.
+_MOST: Final = 2**62
+_COUNT: Final = "SELECT count(*) FROM note WHERE site = :site"
+_NEWEST_NOTES: Final = (
+    "SELECT id, made_at_ns, made_by, kind, subject, text, until_ns FROM note WHERE site = :site"
+    " ORDER BY made_at_ns DESC, id DESC LIMIT :most"
+)
+# What looking for notes takes, about, s of one core.
+NOTES_S: Final = 0.02
+
+
+def id_behind(number: int) -> str:
+    """A text that sorts behind every id up to that number, and before those past it."""
+    return f"{number + 1:0{_DIGITS}x}"
+
+
+def number_of(note_id: str) -> int:
+    """The number of the write; 0: somebody else has given the id."""
+    if _OURS.match(note_id) is None:
+        return 0
+    number = int(note_id[:_DIGITS], 16)
+    return number if number < _MOST else 0
+
+
+def last_number(log: SiteLog) -> int:
+    """The number of the log's last note; 0: there is none."""
+    # Downwards, past those of somebody else.
+    found = log.execute("SELECT id FROM note WHERE site = :site ORDER BY id DESC")
+    return next((number for (text,) in found if (number := number_of(text))), 0)
+
+
+def put_note(log: SiteLog, number: int, note: Note) -> Note:
+    """Write a note under a number; returns it with its id."""
+    note = replace(note, id=f"{number:0{_DIGITS}x}{secrets.token_hex(4)}")
+    log.execute(
+        "INSERT INTO note VALUES (:site, :id, :made_at_ns, :by, :kind, :subject, :text, :until_ns)",
+        asdict(note),
+    )
+    return note
+
+
+def notes(connection: Any, request: NotesRequest) -> PastNotes:
+    """What a log has of notes."""
+    log = SiteLog(connection)
+    journal = log.journal_id
+    (count,) = log.execute(_COUNT).fetchone()
+    if (journal, count) == (request.journal, request.count):
+        return PastNotes(journal, count, None)
+    rows = log.execute(_NEWEST_NOTES, {"most": MAX_NOTES}).fetchall()
+    found = sorted((Note(*row) for row in rows), key=lambda note: note.id)
+    return PastNotes(journal, count, tuple(found))
+
+
+# People write none faster than a disk.
+_MAX_WAITING: Final = 100
+
+
+class NoteQueue:
+    """Notes on their way from whoever says them to the thread that writes; for any thread.
+
+    Whoever gives up waiting cancels the future, and the note is not written.
+    """
+
+    def __init__(self) -> None:
+        self._waiting: deque[tuple[Note, Future[Note]]] = deque()
+
+    def put(self, note: Note) -> Future[Note]:
+        """Hand a note over; the future gets it with its id."""
+        written: Future[Note] = Future()
+        if len(self._waiting) >= _MAX_WAITING:
+            written.set_exception(NotesUnwritable(f"{_MAX_WAITING} notes wait for the disk"))
+        else:
+            self._waiting.append((note, written))
+        return written
+
+    def write(self, put: Callable[[Note], Note]) -> None:
+        """Have all that wait written.
+
+        Raises:
+            Exception: what `put` raised, once the note's future has it.
+
+        """
+        for note, written in self._taken():
+            try:
+                written.set_result(put(note))
+            except BaseException as error:
+                written.set_exception(NotesUnwritable(f"the note was not written: {error}"))
+                raise
+
+    def refuse(self, why: str) -> None:
+        """Let none wait any longer."""
+        for _, written in self._taken():
+            written.set_exception(NotesUnwritable(f"no note can be written now: {why}"))
+
+    def _taken(self) -> Iterator[tuple[Note, Future[Note]]]:
+        while True:
+            try:
+                note, written = self._waiting.popleft()
+            except IndexError:
+                return
+            if written.set_running_or_notify_cancel():
+                yield note, written

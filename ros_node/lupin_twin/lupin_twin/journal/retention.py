@@ -18,9 +18,10 @@ from lupin_twin.core.past import HOUR_NS
 from lupin_twin.journal.appending import LAST_SEQ, PURGED_SEQ, Appender
 from lupin_twin.journal.beside import InUse, Lock
 from lupin_twin.journal.hours import DELETED, FORGOTTEN, deleted_ns, extent
-from lupin_twin.journal.runs import runs, spans
+from lupin_twin.journal.runs import FOREVER_NS, runs, spans
 from lupin_twin.journal.schema import (
     LOCAL_SITE,
+    WRITTEN,
     SiteLog,
     get_meta,
     open_named,
@@ -65,7 +66,7 @@ def note_limits(connection: sqlite3.Connection, limits: Limits) -> None:
 
 def used_bytes(connection: sqlite3.Connection) -> int:
     """What is in use of the file."""
-    pages, free, size = _pages(connection)
+    pages, free, size = pages_of(connection)
     return (pages - free) * size
 
 
@@ -103,8 +104,8 @@ def horizon_ns(connection: sqlite3.Connection, limits: Limits, now_ns: int) -> i
     That clock may be ahead. So what was received last limits it, and one round, each minute,
     deletes an hour of data at most: a wrong clock that is soon corrected costs little.
     """
-    first = min(_arrivals(connection, "ASC"), default=now_ns)
-    last = max(_arrivals(connection, "DESC"), default=now_ns)
+    first = min((row[2] for row in outermost(connection, "ASC")), default=now_ns)
+    last = max((row[2] for row in outermost(connection, "DESC")), default=now_ns)
     return min(min(now_ns, last) - int(limits.days * DAY_NS), first + HOUR_NS)
 
 
@@ -120,7 +121,7 @@ def purge_step(
     """
     oldest = sorted(
         row
-        for table in ("scan", "look")
+        for table in WRITTEN
         for row in connection.execute(
             f"SELECT seq, arrival_ns FROM {table} WHERE site = ? ORDER BY seq LIMIT ?",  # noqa: S608
             (LOCAL_SITE, _ROWS),
@@ -136,7 +137,7 @@ def purge_step(
     if not last:
         return False
     _write_horizons(connection, last)
-    for table in ("scan", "look"):
+    for table in WRITTEN:
         connection.execute(
             f"DELETE FROM {table} WHERE site = ? AND seq <= ?",  # noqa: S608  # constants
             (LOCAL_SITE, last),
@@ -150,19 +151,25 @@ def unmet_limit(connection: sqlite3.Connection, limits: Limits, before_ns: int) 
     """Which limit is exceeded though nothing more can be deleted, in words; empty: none."""
     if used_bytes(connection) > limits.max_bytes:
         return "no scans are kept: hours, which stay, are larger than journal_max_mb"
-    if any(arrival_ns < before_ns for arrival_ns in _arrivals(connection, "ASC")):
+    if any(row[2] < before_ns for row in outermost(connection, "ASC")):
         return "what is older than journal_days is kept until it is forwarded"
     return ""
 
 
-def _arrivals(connection: sqlite3.Connection, way: str) -> list[int]:
-    """When the first (ASC) or last (DESC) scan and inspection were received that are there."""
+def outermost(
+    connection: sqlite3.Connection, way: str, upto: int = FOREVER_NS
+) -> list[tuple[int, int, int]]:
+    """Number, stamp and arrival of the first (ASC) or last (DESC) scan and inspection there is.
+
+    Of those up to a number, if one is given.
+    """
     return [
-        row[0]
-        for table in ("scan", "look")
+        row
+        for table in WRITTEN
         for row in connection.execute(
-            f"SELECT arrival_ns FROM {table} WHERE site = ? ORDER BY seq {way} LIMIT 1",  # noqa: S608
-            (LOCAL_SITE,),
+            f"SELECT seq, stamp_ns, arrival_ns FROM {table} WHERE site = ? AND seq <= ?"  # noqa: S608
+            f" ORDER BY seq {way} LIMIT 1",
+            (LOCAL_SITE, upto),
         )
     ]
 
@@ -181,7 +188,7 @@ def _write_horizons(connection: sqlite3.Connection, last: int) -> None:
 
 def shrink_step(connection: sqlite3.Connection) -> bool:
     """Give some free pages back to the disk; returns whether there are more."""
-    pages, free, _ = _pages(connection)
+    pages, free, _ = pages_of(connection)
     spare = free - max(_FREE_PAGES, pages // 100)
     if spare <= 0:
         return False
@@ -190,7 +197,8 @@ def shrink_step(connection: sqlite3.Connection) -> bool:
     return spare > _PAGES
 
 
-def _pages(connection: sqlite3.Connection) -> tuple[int, int, int]:
+def pages_of(connection: sqlite3.Connection) -> tuple[int, int, int]:
+    """How many pages a file has, how many of them are free, and their size."""
     pages, free, size = (
         int(connection.execute(f"PRAGMA {name}").fetchone()[0])
         for name in ("page_count", "freelist_count", "page_size")

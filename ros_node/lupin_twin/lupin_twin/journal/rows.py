@@ -211,13 +211,10 @@ def flower_of(row: Sequence[Any]) -> Flower:
         raise DamagedFile("blooms or a box in the journal are none") from None
 
 
-def _bloom(  # noqa: PLR0917  # as it stands in the list
-    x: Any, y: Any, z: Any, height_m: Any, species: str, confidence: Any, anomaly: int
-) -> Bloom:
-    sure = _number(confidence)
-    return Bloom(
-        _number(x), _number(y), _number(z), _number(height_m), species, sure, bool(anomaly)
-    )
+def _bloom(*of: Any) -> Bloom:
+    *at, species, confidence, anomaly = of
+    x, y, z, height_m = map(_number, at)
+    return Bloom(x, y, z, height_m, species, _number(confidence), bool(anomaly))
 
 
 def _point(x: Any, y: Any, z: Any) -> tuple[float, float, float]:

@@ -12,6 +12,7 @@ import shutil
 import sqlite3
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import closing, suppress
+from itertools import count
 from pathlib import Path
 from types import NoneType
 from typing import Any, Final
@@ -19,12 +20,13 @@ from urllib.parse import quote
 
 from lupin_twin.core.past import HOUR_NS
 from lupin_twin.journal.appending import LAST_SEQ, PURGED_SEQ
-from lupin_twin.journal.checking import WRITTEN, delete_wrong
+from lupin_twin.journal.checking import delete_wrong
 from lupin_twin.journal.hours import DELETED, count_rows
 from lupin_twin.journal.schema import (
     FILE_ERRORS,
     LOCAL_SITE,
     PAGE_SIZE,
+    WRITTEN,
     SiteLog,
     empty_file,
     is_damage_error,
@@ -77,14 +79,15 @@ _NOT_DELETED: Final = (
 Record = tuple[Any, ...]
 
 
+def numbered(path: Path, end: str) -> Iterator[Path]:
+    """Names of files beside one, to find one that is not taken."""
+    for number in count():
+        yield path.with_name(f"{path.name}{end}" + (f"-{number}" if number else ""))
+
+
 def quarantine(path: Path, when: str) -> Path:
     """Rename a file and its log; returns the new name. Nothing is ever deleted or overwritten."""
-    number = 0
-    while True:
-        aside = path.with_name(f"{path.name}.damaged-{when}" + (f"-{number}" if number else ""))
-        if not aside.exists():
-            break
-        number += 1
+    aside = next(name for name in numbered(path, f".damaged-{when}") if not name.exists())
     log = path.with_name(path.name + "-wal")
     if log.exists():
         log.rename(aside.with_name(aside.name + "-wal"))

@@ -22,6 +22,7 @@ of bugs, and stretches of more than ten minutes without an attempt, in ns.
 
 from __future__ import annotations
 
+import json
 import os
 import re
 import sqlite3
@@ -36,6 +37,8 @@ from urllib.parse import quote
 APPLICATION_ID: Final = 0x4C55504A  # "LUPJ"
 VERSION: Final = 4
 LOCAL_SITE: Final = "local"
+# The tables of what was received.
+WRITTEN: Final = ("scan", "look")
 
 # A commit writes whole pages, and a commit is a few scans: measured, fewest bytes to the disk.
 PAGE_SIZE: Final = 1024
@@ -193,7 +196,7 @@ def _create(connection: sqlite3.Connection, path: Path) -> None:
     connection.execute("PRAGMA synchronous = FULL")
     connection.executescript(_NEW)
     connection.execute("PRAGMA journal_mode = WAL")
-    sync_folder(path.parent)
+    sync(path.parent)
 
 
 def empty_file() -> tuple[bytes, frozenset[int]]:
@@ -227,9 +230,9 @@ def one_view(connection: sqlite3.Connection) -> Iterator[None]:
         connection.rollback()  # does nothing where an interrupted statement has ended it
 
 
-def sync_folder(folder: Path) -> None:
-    """Make the names in a folder last."""
-    descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
+def sync(path: Path) -> None:
+    """Make a file last, or the names in a folder."""
+    descriptor = os.open(path, os.O_RDONLY)
     try:
         os.fsync(descriptor)
     finally:
@@ -371,6 +374,11 @@ class SiteLog:
         found = self.execute(_META, {"key": key}).fetchone()
         return None if found is None else str(found[0])
 
+    @property
+    def journal_id(self) -> str:
+        """One log's name among logs: what was quarantined has another in its place."""
+        return self.meta("journal_id") or ""
+
     def _of_engine(self, sql: str) -> str:
         return sql if isinstance(self.connection, sqlite3.Connection) else _for_psycopg(sql)
 
@@ -378,6 +386,11 @@ class SiteLog:
 @cache
 def _for_psycopg(sql: str) -> str:
     return _NAME.sub(r"%(\1)s", sql).replace("?", "%s")
+
+
+def json_text(values: Sequence[object]) -> str:
+    """A JSON list as the tables have it."""
+    return json.dumps(values, separators=(",", ":"))
 
 
 def get_meta(connection: sqlite3.Connection, key: str) -> str | None:

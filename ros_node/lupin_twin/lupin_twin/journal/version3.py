@@ -14,7 +14,6 @@ import struct
 import zlib
 from collections.abc import Iterator
 from contextlib import suppress
-from functools import lru_cache
 from typing import Any, Final, NamedTuple
 
 from lupin_twin.core.past import HOUR_NS, SLOT_NS, Event
@@ -62,14 +61,8 @@ class OldRun(NamedTuple):
     ended_ns: int | None
 
 
-class OldHour(NamedTuple):
-    """An hour of a set of sensors at a tag, for each of them count, sum, least and largest."""
-
-    tag_id: str
-    kind: int
-    sensors: tuple[str, ...]
-    hour: int
-    buckets: list[Bucket]
+# An hour of a set of sensors at a tag, for each of them count, sum, least and largest.
+OldHour = tuple[str, int, tuple[str, ...], int, list[Bucket]]
 
 
 class _Series(NamedTuple):
@@ -143,7 +136,7 @@ class Version3:
                 except _BadRow:
                     self.damaged += 1
                 else:
-                    yield OldHour(series.tag_id, series.kind, series.sensors, hour, buckets)
+                    yield series.tag_id, series.kind, series.sensors, hour, buckets
 
     def tally(self, run: int, until: int) -> Iterator[tuple[object, ...]]:
         """Attempts up to an hour: the event, hour, count, sum, least, largest, first and last."""
@@ -297,16 +290,11 @@ def _unsealed(columns: tuple[Any, ...], sealed: object) -> bytes:
     return sealed[:-2]
 
 
-@lru_cache(maxsize=256)
-def _layout(count: int, letter: str) -> struct.Struct:
-    return struct.Struct(f"<{count}{letter}")
-
-
 def _numbers(packed: bytes, count: int) -> tuple[float, ...]:
     for letter in "df":
-        layout = _layout(count, letter)
-        if layout.size == len(packed):
-            return layout.unpack(packed)
+        layout = f"<{count}{letter}"
+        if struct.calcsize(layout) == len(packed):
+            return struct.unpack(layout, packed)
     raise _BadRow
 
 

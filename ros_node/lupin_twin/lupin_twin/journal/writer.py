@@ -19,7 +19,7 @@ from itertools import islice
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
-from lupin_twin.core.journal_condition import Condition, JournalState
+from lupin_twin.core.diagnostics import Condition, JournalState
 from lupin_twin.core.notes import Note
 from lupin_twin.core.parameters import World
 from lupin_twin.core.state import Write
@@ -27,8 +27,8 @@ from lupin_twin.field.explored import OccupancyMap, text_of
 from lupin_twin.journal.beside import InUse, Lock
 from lupin_twin.journal.file import JournalFile
 from lupin_twin.journal.fold import Restored
-from lupin_twin.journal.notes import NoteQueue
 from lupin_twin.journal.rebuild import is_version3, upgrade
+from lupin_twin.journal.received import NoteQueue
 from lupin_twin.journal.retention import Limits
 from lupin_twin.journal.rows import weight
 from lupin_twin.journal.runs import Carries, Clock, Run, Turn
@@ -53,9 +53,8 @@ class Pending:
     What is newest is what a twin that starts again needs.
     """
 
-    def __init__(self, max_weight: int = MAX_WEIGHT) -> None:
+    def __init__(self) -> None:
         self.arrived = threading.Event()
-        self._max_weight = max_weight
         self._lock = threading.Lock()
         self._entries: deque[Entry] = deque()
         self._weight = 0
@@ -68,8 +67,7 @@ class Pending:
         with self._lock:
             self._entries.append(entry)
             self._weight += weight(entry.row)
-            if self._weight > self._max_weight:
-                self._shed()
+            self._shed()
         if not self.arrived.is_set():
             self.arrived.set()
 
@@ -90,11 +88,10 @@ class Pending:
             self._taken = []
             self._entries.extendleft(reversed(entries))
             self._weight += sum(weight(entry.row) for entry in entries)
-            if self._weight > self._max_weight:
-                self._shed()
+            self._shed()
 
     def _shed(self) -> None:
-        while self._weight > self._max_weight and len(self._entries) > 1:
+        while self._weight > MAX_WEIGHT and len(self._entries) > 1:
             lost = self._entries.popleft()
             self._weight -= weight(lost.row)
             self._lost += 1
@@ -154,7 +151,6 @@ class Journal:
         path: Path,
         holder: str,
         limits: Limits,
-        max_weight: int = MAX_WEIGHT,
         *,
         world: World = World(),
         is_temporary: bool = False,
@@ -164,7 +160,7 @@ class Journal:
         self._world = world
         self._limits = limits
         self._is_temporary = is_temporary
-        self._pending = Pending(max_weight)
+        self._pending = Pending()
         self._notes = NoteQueue()
         self._map: OccupancyMap | None = None
         self._eras: list[_Era] = []

@@ -10,12 +10,13 @@ import math
 import signal
 import time
 import traceback
-from collections.abc import Callable
-from contextlib import suppress
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, suppress
 from threading import Event, Thread, main_thread
 from time import sleep
 from typing import Any, Final
 
+import rclpy
 from rclpy.clock import Clock, ClockType
 from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.exceptions import InvalidHandle
@@ -23,12 +24,14 @@ from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.serialization import deserialize_message
+from rclpy.signals import SignalHandlerOptions
 
 from lupin_twin.core import ingest
 from lupin_twin.core.clock import Late
 from lupin_twin.core.diagnostics import MAX_PROBLEMS
 from lupin_twin.core.drops import LATE, LOST, Counts, Drop, Reason, Tally, Throttle
 from lupin_twin.core.interfaces import SERVICE_DEPTH, Topic
+from lupin_twin.core.parameters import ParameterError
 from lupin_twin.field.explored import OccupancyMap
 from lupin_twin.ros import convert
 from lupin_twin.ros.inputs import Input, TwinCount
@@ -377,27 +380,58 @@ def end_spinning(executor: Any) -> None:
     executor.create_task(executor.shutdown)
 
 
-def run_until_signal(node: Any) -> int:
-    """Spin a node in a thread of its own until a stop signal comes; `process.block` was called.
+@contextmanager
+def running_ros(args: Sequence[str] | None) -> Iterator[None]:
+    """ROS until the end of this; whoever calls it has blocked the signals.
 
-    Returns the exit code: 1 if its thread has died.
+    Raises:
+        ParameterError: arguments that ROS cannot take.
+
     """
+    try:
+        rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
+    except RuntimeError as error:  # the parent of all that rclpy raises for bad arguments
+        raise ParameterError(f"cannot start ROS: {error}") from error
+    process.remove_stale_shared_memory(rclpy.get_default_context().get_domain_id())
+    try:
+        yield
+    finally:
+        rclpy.try_shutdown()
+
+
+@contextmanager
+def spinning(node: Any, at_end: Callable[[], None] = lambda: None) -> Iterator[None]:
+    """Spin a node in a thread of its own until the end of this; `at_end` is called there."""
     executor = SingleThreadedExecutor()
     executor.add_node(node)
-    ended = Event()
 
     def spin() -> None:
         try:
             spin_until_shutdown(executor, node.utilities.report)
         finally:
-            ended.set()
-            signal.pthread_kill(main_thread().ident or 0, signal.SIGTERM)  # it waits, see below
+            at_end()
 
     thread = Thread(target=spin, name="ros")
     thread.start()
-    process.wait()
-    exit_code = 1 if ended.is_set() else 0
-    end_spinning(executor)
-    thread.join()
-    node.destroy_node()
-    return exit_code
+    try:
+        yield
+    finally:
+        end_spinning(executor)
+        thread.join()
+        node.destroy_node()
+
+
+def run_until_signal(node: Any) -> int:
+    """Spin a node until a stop signal comes; `process.block` was called.
+
+    Returns the exit code: 1 if its thread has died.
+    """
+    ended = Event()
+
+    def end() -> None:
+        ended.set()
+        signal.pthread_kill(main_thread().ident or 0, signal.SIGTERM)  # it waits, see below
+
+    with spinning(node, end):
+        process.wait()
+        return 1 if ended.is_set() else 0

@@ -13,17 +13,22 @@ from __future__ import annotations
 import math
 from array import array
 from collections.abc import Iterable, Iterator
+from dataclasses import replace
+from functools import partial
 from typing import Any, Final
 
 import numpy as np
 import numpy.typing as npt
 from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
-from geometry_msgs.msg import Point, Point32, Polygon, Quaternion
+from geometry_msgs.msg import Point, Point32, Polygon, PoseStamped, Quaternion
 from geometry_msgs.msg import Pose as PoseMsg
 from lupin_msgs.msg import (
+    FlowerObservation,
     FlowerPoint,
+    Observation,
     SensorReading,
+    TagReading,
     TagTimes,
     TwinState,
     TwinTagState,
@@ -32,21 +37,18 @@ from lupin_msgs.msg import (
 from std_msgs.msg import Header
 
 from lupin_twin.core.diagnostics import STATE_TOPIC, Finding
-from lupin_twin.core.history import KIND_FLOWER, KIND_TAG_READING
-from lupin_twin.core.ingest import (
-    Received,
-    ReceivedInspection,
-    ReceivedReading,
-    ReceivedTags,
-    scanned_pose,
-)
+from lupin_twin.core.history import KIND_FLOWER, KIND_TAG_READING, kind_of
+from lupin_twin.core.ingest import Received, ReceivedTags, scanned_pose
 from lupin_twin.core.state import (
     NANOSECONDS_PER_SECOND,
+    NO_FLOWER,
     Attempt,
     Bloom,
     Flower,
+    Inspection,
     Pose,
     Reading,
+    Scan,
     Snapshot,
     TagState,
 )
@@ -152,47 +154,33 @@ def pose_of(pose: Any) -> Pose:
 
 
 def received(msg: Any) -> Received:
-    """lupin_msgs/Observation as values, with the part that its kind fills."""
-    return Received(
-        kind=int(msg.kind),
-        source=msg.source,
-        status=int(msg.status),
-        status_detail=msg.status_detail,
-        frame_id=msg.header.frame_id,
-        stamp_ns=nanoseconds(msg.header.stamp),
-        part=_part(msg),
-        mission=msg.mission_id,
-    )
-
-
-def _part(msg: Any) -> ReceivedReading | ReceivedInspection | None:
+    """lupin_msgs/Observation as it was sent; of a flower's pose its own frame counts, if it has."""
+    frame_id, pose = msg.header.frame_id, msg.tag_pose_in_map
+    sent: Scan | Inspection | None = None
     if msg.kind == KIND_TAG_READING:
         reading = msg.tag_reading
-        return ReceivedReading(
-            tag_id=reading.tag_id,
-            stamp_ns=nanoseconds(reading.stamp),
-            readings=tuple(Reading(r.name, float(r.value)) for r in reading.readings),
-            pose=pose_of(msg.tag_pose_in_map),
-        )
-    if msg.kind == KIND_FLOWER:
+        readings = tuple(Reading(r.name, float(r.value)) for r in reading.readings)
+        sent = Scan(reading.tag_id, nanoseconds(reading.stamp), readings)
+    elif msg.kind == KIND_FLOWER:
         flower = msg.flower
-        return ReceivedInspection(
-            tag_id=flower.tag_id,
-            frame_id=flower.pose.header.frame_id,
-            flower=_flower(flower, shortest(flower.confidence)),
-            pose=pose_of(flower.pose.pose),
+        frame_id, pose = flower.pose.header.frame_id or frame_id, flower.pose.pose
+        sent = Inspection(flower.tag_id, 0, _flower(flower, shortest(flower.confidence)))
+    if sent is not None:
+        sent = replace(
+            sent,
+            pose=pose_of(pose),
+            status=int(msg.status),
+            status_detail=msg.status_detail,
+            source=msg.source,
+            own_stamp_ns=nanoseconds(msg.header.stamp),
+            mission=msg.mission_id,
         )
-    return None
+    return Received(int(msg.kind), frame_id, sent)
 
 
 def received_tags(msg: Any) -> ReceivedTags:
-    """lupin_msgs/DiscoveredTags as values."""
-    tags = msg.tags
-    return ReceivedTags(
-        frame_id=msg.header.frame_id,
-        tag_ids=[tag.tag_id for tag in tags],
-        pose=lambda index: pose_of(tags[index].pose_in_map),
-    )
+    """The tags of lupin_msgs/DiscoveredTags as values."""
+    return ((tag.tag_id, partial(pose_of, tag.pose_in_map)) for tag in msg.tags)
 
 
 def _flower(msg: Any, confidence: float) -> Flower:
@@ -306,6 +294,40 @@ def _moment(stamp: Any) -> int | None:
 # --- what goes out --------------------------------------------------------------------------
 
 
+def observation_message(write: Scan | Inspection, frame_id: str) -> Any:
+    """A scan, an inspection, or an attempt that failed, as lupin_msgs/Observation."""
+    header, pose = (
+        Header(stamp=time_msg(write.stamp_ns), frame_id=frame_id),
+        pose_message(write.pose),
+    )
+    message = Observation(
+        header=header,
+        mission_id=write.mission,
+        source=write.source,
+        kind=kind_of(write),
+        status=int(write.status),
+        status_detail=write.status_detail,
+        tag_pose_in_map=pose,
+    )
+    if isinstance(write, Scan):
+        message.tag_reading = TagReading(
+            tag_id=write.tag_id, stamp=header.stamp, readings=_readings_message(write.readings)
+        )
+    else:
+        flower = write.flower or NO_FLOWER
+        message.flower = FlowerObservation(
+            tag_id=write.tag_id,
+            pose=PoseStamped(header=header, pose=pose),
+            confidence=float(flower.confidence),
+            **flower_fields(flower),
+        )
+    return message
+
+
+def _readings_message(readings: Iterable[Reading]) -> list[Any]:
+    return [SensorReading(name=r.name, value=float(r.value)) for r in readings]
+
+
 class StateMessages:
     """Builds TwinState and TwinTimes of snapshots; caches each tag's parts until the tag changes.
 
@@ -359,7 +381,7 @@ def tag_message(tag: TagState) -> Any:
     return TwinTagState(
         tag_id=tag.tag_id,
         pose=pose_message(tag.pose),
-        readings=[SensorReading(name=r.name, value=float(r.value)) for r in tag.readings],
+        readings=_readings_message(tag.readings),
         last_observed=time_msg(tag.last_observed_ns or 0),
         species_confidence=float(tag.flower.confidence),
         **flower_fields(tag.flower),

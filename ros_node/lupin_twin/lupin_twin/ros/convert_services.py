@@ -11,7 +11,14 @@ from array import array
 from typing import Any, Final
 
 from lupin_msgs.msg import TwinState, TwinTimes
-from lupin_msgs.srv import GetEstimate, GetEstimateReport, GetHistory, GetStateAt, GetWrites
+from lupin_msgs.srv import (
+    GetEstimate,
+    GetEstimateReport,
+    GetField,
+    GetHistory,
+    GetStateAt,
+    GetWrites,
+)
 from std_msgs.msg import Header
 
 from lupin_twin.core.drops import MAX_TAGS
@@ -28,7 +35,7 @@ from lupin_twin.core.past import (
     error_of,
 )
 from lupin_twin.core.state import Snapshot
-from lupin_twin.estimate import Place
+from lupin_twin.estimate.cholesky import Place
 from lupin_twin.estimate.engine import Estimate, EstimateRequest, Record, Tally
 from lupin_twin.field.engine import NUMBERS, FieldRequest
 from lupin_twin.field.grid import FieldGrid
@@ -54,14 +61,14 @@ def field_request_of(msg: Any) -> FieldRequest:
     return FieldRequest(msg.sensor_type, **{name: float(getattr(msg, name)) for name in NUMBERS})
 
 
-def fill_response(response: Any, grid: FieldGrid) -> Any:
-    """Fill a GetField.Response from a grid, whose values are copied."""
-    response.ok = True
-    response.values = convert.floats(grid.values)
-    response.resolution_used = grid.resolution
-    for name in _SHARED:
-        setattr(response, name, getattr(grid, name))
-    return response
+def field_response(grid: FieldGrid) -> Any:
+    """A field as GetField.Response; its values are copied."""
+    return GetField.Response(
+        ok=True,
+        values=convert.floats(grid.values),
+        **{name: getattr(grid, name) for name in _SHARED},
+        resolution_used=grid.resolution,
+    )
 
 
 def estimate_request_of(msg: Any) -> EstimateRequest:
@@ -98,6 +105,10 @@ def report_request_message(request: ReportRequest) -> Any:
     )
 
 
+# Of a `TagCheck` and of the response.
+_NUMBERS: Final = ("measured", "expected", "expected_sd", "z", "offset")
+
+
 def report_response(report: Report) -> Any:
     """A report as GetEstimateReport.Response."""
     record, tags, places = report.record, report.tags, report.places
@@ -112,12 +123,8 @@ def report_response(report: Report) -> Any:
         week_scans=record.week.scans,
         week_inside=record.week.inside,
         tag_ids=[tag.tag_id for tag in tags],
-        measured=[tag.measured for tag in tags],
+        **{name: [getattr(tag, name) for tag in tags] for name in _NUMBERS},
         observed_at=[convert.time_msg(tag.observed_at_ns) for tag in tags],
-        expected=[tag.expected for tag in tags],
-        expected_sd=[tag.expected_sd for tag in tags],
-        z=[tag.z for tag in tags],
-        offset=[tag.offset for tag in tags],
         left_out=[tag.changed_since_ns is not None for tag in tags],
         changed_since=[convert.time_msg(tag.changed_since_ns or 0) for tag in tags],
         place_x=[place.x for place in places],

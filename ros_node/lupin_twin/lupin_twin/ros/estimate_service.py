@@ -26,8 +26,8 @@ from lupin_twin.field.idw import never
 from lupin_twin.journal.fold import STATE_S_PER_TAG
 from lupin_twin.journal.queries import NEWEST_S_PER_TAG
 from lupin_twin.ros import convert_services
-from lupin_twin.ros.base_node import SERVICE_QOS, NodeUtilities
-from lupin_twin.ros.services import answer_later
+from lupin_twin.ros.base_node import NodeUtilities
+from lupin_twin.ros.services import offer
 from lupin_twin.runtime.estimates import (
     AS_OF,
     Known,
@@ -85,11 +85,11 @@ class EstimateService:
 
     def offer(self, node: Any, group: Any) -> None:
         """Have `node` offer the services, by names relative to its namespace; some answer later."""
-        for kind, name, callback in (
-            (GetEstimate, GET_ESTIMATE.name, self._on_get_estimate),
-            (GetEstimateReport, GET_ESTIMATE_REPORT.name, self._on_get_report),
-        ):
-            node.create_service(kind, name, callback, qos_profile=SERVICE_QOS, callback_group=group)
+        plans = (
+            (GetEstimate, GET_ESTIMATE.name, self._estimate),
+            (GetEstimateReport, GET_ESTIMATE_REPORT.name, self._report),
+        )
+        offer(node, group, plans, self.queue, self.utilities.report)
 
     def prepare(self, request: EstimateRequest) -> Task:
         """What is to be done for an estimate.
@@ -195,24 +195,18 @@ class EstimateService:
             sum(known.failed for known in self._known.values()),
         )
 
-    def _on_get_estimate(self, request: Any, response: Any) -> Any:
-        def prepare(reply: Callable[[Any], None]) -> Query:
-            task = self.prepare(convert_services.estimate_request_of(request))
-            return Query(
-                task.look_up,
-                reply,
-                lambda found: convert_services.response_of(task.make(found, never)),
-                task.cost_s,
-            )
+    def _estimate(self, request: Any, reply: Callable[[Any], None]) -> Query:
+        task = self.prepare(convert_services.estimate_request_of(request))
+        return Query(
+            task.look_up,
+            reply,
+            lambda found: convert_services.response_of(task.make(found, never)),
+            task.cost_s,
+        )
 
-        return answer_later(self.queue, prepare, response, self.utilities.report)
-
-    def _on_get_report(self, request: Any, response: Any) -> Any:
-        def prepare(reply: Callable[[Any], None]) -> Query:
-            wanted = convert_services.report_request_of(request)
-            return self._query(wanted, reply, convert_services.report_response)
-
-        return answer_later(self.queue, prepare, response, self.utilities.report)
+    def _report(self, request: Any, reply: Callable[[Any], None]) -> Query:
+        wanted = convert_services.report_request_of(request)
+        return self._query(wanted, reply, convert_services.report_response)
 
     def _from_journal(self, sensor: str, at_ns: int) -> Callable[[], Future[Sequence[TagPast]]]:
         return lambda: self.recall.query(

@@ -26,7 +26,7 @@ from visualization_msgs.msg import Marker, MarkerArray
 from lupin_twin.core.interfaces import LAYERS_BELOW
 from lupin_twin.core.parameters import ParameterError
 from lupin_twin.core.state import STATUS_OK, Snapshot, TagState
-from lupin_twin.estimate import EstimateGrid
+from lupin_twin.estimate.posterior import EstimateGrid
 from lupin_twin.field.grid import FieldGrid, cell_centres
 from lupin_twin.ros.convert import time_msg
 from lupin_twin.runtime.workers import in_turns

@@ -222,7 +222,7 @@ def _text(path: str, limit: int | None) -> _Part:
 
 
 def _sequence(path: str, element: _Part, limit: int | None, is_counted: bool) -> _Part:
-    min_bytes, steps, walk_element = element.min_bytes, element.steps, element.walk
+    min_bytes, walk_element = element.min_bytes, element.walk
 
     def walk(reader: _Reader, at: int) -> int:
         at += -at % 4
@@ -239,27 +239,14 @@ def _sequence(path: str, element: _Part, limit: int | None, is_counted: bool) ->
             reader.elements_left -= count
             if reader.elements_left < 0:
                 raise TooManyError(f"{path}: more elements in all sequences than the limit")
-        if steps is not None:
-            return at + _total(steps, at, count)
+        if not is_counted:  # plain numbers, aligned to their own size
+            padding = (_HEADER_BYTES - at) % min_bytes if count else 0
+            return at + padding + count * min_bytes
         for _ in range(count):
             at = walk_element(reader, at)
         return at
 
     return _Part(walk, 4)
-
-
-def _total(steps: tuple[int, ...], begin: int, count: int) -> int:
-    """The bytes of `count` values of fixed size, the first of which begins at `begin`.
-
-    By doubling: one, two, four... values at once, so that a map of a billion cells takes 30 turns.
-    """
-    total = 0
-    while count:
-        if count % 2:
-            total += steps[(begin + total) % _ALIGNMENTS]
-        count //= 2
-        steps = tuple(step + steps[(at + step) % _ALIGNMENTS] for at, step in enumerate(steps))
-    return total
 
 
 MAX_STATUSES: Final = 1_000

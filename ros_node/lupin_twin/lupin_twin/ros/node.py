@@ -252,7 +252,10 @@ class TwinNode(AdjustableNode):
         topic = self._topics["discovered_tags_topic"]
         before = self.store.observation_count
         for write in ingest.discoveries(
-            convert.received_tags(msg), self.parameters.frame_id, self.store.is_pinned
+            convert.received_tags(msg),
+            msg.header.frame_id,
+            self.parameters.frame_id,
+            self.store.is_pinned,
         ):
             self._apply(write, topic)
         if self.store.observation_count != before:

@@ -15,7 +15,8 @@ import sqlite3
 import time
 import warnings
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
+from concurrent.futures import Future
 from dataclasses import dataclass
 from functools import partial
 from typing import Any, Final, NamedTuple
@@ -45,6 +46,8 @@ from lupin_twin.ros.parameters import naming
 from lupin_twin.runtime.journal_queries import Recall
 from lupin_twin.runtime.workers import SMALL_S, JobQueue, Query, Workers
 
+Report = Callable[[str, Exception], None]
+
 
 @dataclass(frozen=True, slots=True)
 class FieldService:
@@ -66,36 +69,29 @@ class FieldService:
 
         """
         with naming("field_service_name", name):
-            node.create_service(
-                GetField, name, self._on_get_field, qos_profile=SERVICE_QOS, callback_group=group
-            )
+            plans = ((GetField, name, self._field),)
+            offer(node, group, plans, self.queue, self.utilities.report)
 
-    def _on_get_field(self, request: Any, response: Any) -> Any:
-        report = self.utilities.report
-        try:
-            wanted = convert_services.field_request_of(request)
-            rules, occupancy = self.rules(), self.occupancy()
-            check_request(wanted, rules.max_grid_cells)
-        except Exception as error:  # noqa: BLE001  # no client waits for ever
-            return refusal(response, error, report)
+    def _field(self, request: Any, reply: Callable[[Any], None]) -> Query | None:
+        wanted = convert_services.field_request_of(request)
+        rules, occupancy = self.rules(), self.occupancy()
+        check_request(wanted, rules.max_grid_cells)
         revision = None if occupancy is None else occupancy.revision
         key = FieldKey(wanted, self.store.observation_count, revision, rules)
         if (found := self.cache.get(key)) is not None:
-            return convert_services.fill_response(response, found)
+            reply(convert_services.field_response(found))
+            return None
         samples = self.store.samples_for_sensor(wanted.sensor_type)
         compute = partial(compute_field, wanted, samples, occupancy, rules)
         cost = cost_s(wanted, len(samples), rules)
 
-        def prepare(reply: Callable[[Any], None]) -> Query:
-            def keep(grid: Any) -> None:
-                if not isinstance(grid, Exception):
-                    self.cache.put(key, grid)
-                    grid = convert_services.fill_response(response, grid)
-                reply(grid)
+        def keep(grid: Any) -> None:
+            if not isinstance(grid, Exception):
+                self.cache.put(key, grid)
+                grid = convert_services.field_response(grid)
+            reply(grid)
 
-            return Query(partial(self.workers.submit, compute, cost), keep, cost_s=cost)
-
-        return answer_later(self.queue, prepare, response, report)
+        return Query(partial(self.workers.submit, compute, cost), keep, cost_s=cost)
 
 
 # What the message of a series takes at worst, s of one core; and that of all tags.
@@ -120,68 +116,79 @@ class PastService:
 
     def offer(self, node: Any, group: Any) -> None:
         """Have `node` offer the services, by names relative to its namespace; some answer later."""
-        for kind, name, callback in (
-            (GetStateAt, GET_STATE_AT.name, self._on_get_state_at),
-            (GetHistory, GET_HISTORY.name, self._on_get_history),
-            (GetWrites, GET_WRITES.name, self._on_get_writes),
-        ):
-            node.create_service(kind, name, callback, qos_profile=SERVICE_QOS, callback_group=group)
+        plans = (
+            (GetStateAt, GET_STATE_AT.name, self._state_at),
+            (GetHistory, GET_HISTORY.name, self._history),
+            (GetWrites, GET_WRITES.name, self._writes),
+        )
+        offer(node, group, plans, self.queue, self.utilities.report)
 
-    def _on_get_state_at(self, request: Any, response: Any) -> Any:
-        def check() -> Callable[[sqlite3.Connection], Any]:
-            at_ns = convert.nanoseconds(request.at)
-            check_moment(at_ns, self.now_ns())
-            return lambda connection: state_at(connection, at_ns, self.frame_id)
-
+    def _state_at(self, request: Any, reply: Callable[[Any], None]) -> Query:
+        at_ns = convert.nanoseconds(request.at)
+        check_moment(at_ns, self.now_ns())
         tags, items = self.store.size
-        return self._ask(
-            response,
-            check,
-            tags * STATE_S_PER_TAG,
+        return Query(
+            self._search(lambda log: state_at(log, at_ns, self.frame_id), tags * STATE_S_PER_TAG),
+            reply,
             convert_services.state_response,
             tags * convert_services.TAG_S + items * convert_services.ITEM_S,
         )
 
-    def _on_get_history(self, request: Any, response: Any) -> Any:
-        def check() -> Callable[[sqlite3.Connection], Any]:
-            query, now_ns = convert_services.series_request(request), self.now_ns()
-            return lambda connection: series(connection, query, now_ns)
-
-        tags = self.store.size[0] if request.tag_id == EVERY_TAG else 0
-        search_s = SERIES_S + tags * SERIES_S_PER_TAG
-        make_s = EVERY_TAG_S if request.tag_id == EVERY_TAG else MESSAGE_S
-        return self._ask(response, check, search_s, convert_services.series_response, make_s)
-
-    def _on_get_writes(self, request: Any, response: Any) -> Any:
-        def check() -> Callable[[sqlite3.Connection], Any]:
-            query = convert_services.writes_request(request)
-            if request.as_rows:
-                return lambda connection: follow.read(connection, query.after, query.max_count)
-            return lambda connection: writes(connection, query)
-
-        make = (
-            convert_services.rows_response if request.as_rows else convert_services.writes_response
+    def _history(self, request: Any, reply: Callable[[Any], None]) -> Query:
+        query, now_ns = convert_services.series_request(request), self.now_ns()
+        is_of_all = query.tag_id == EVERY_TAG
+        search_s = SERIES_S + (self.store.size[0] * SERIES_S_PER_TAG if is_of_all else 0.0)
+        return Query(
+            self._search(lambda log: series(log, query, now_ns), search_s),
+            reply,
+            convert_services.series_response,
+            EVERY_TAG_S if is_of_all else MESSAGE_S,
         )
-        return self._ask(response, check, WRITES_S, make, MESSAGE_S)
 
-    def _ask(
-        self,
-        response: Any,
-        check: Callable[[], Callable[[sqlite3.Connection], Any]],
-        search_s: float,
-        make: Callable[[Any], Any],
-        make_s: float,
-    ) -> Any:
-        def prepare(reply: Callable[[Any], None]) -> Query:
-            search = check()
-            return Query(
-                lambda: self.recall.query(lambda connection, _: search(connection), search_s),
-                reply,
-                make,
-                make_s,
+    def _writes(self, request: Any, reply: Callable[[Any], None]) -> Query:
+        query = convert_services.writes_request(request)
+        if request.as_rows:
+            search = self._search(
+                lambda log: follow.read(log, query.after, query.max_count), WRITES_S
             )
+            return Query(search, reply, convert_services.rows_response, MESSAGE_S)
+        search = self._search(lambda log: writes(log, query), WRITES_S)
+        return Query(search, reply, convert_services.writes_response, MESSAGE_S)
 
-        return answer_later(self.queue, prepare, response, self.utilities.report)
+    def _search(
+        self, search: Callable[[sqlite3.Connection], Any], cost_s: float
+    ) -> Callable[[], Future[Any]]:
+        return lambda: self.recall.query(lambda log, _: search(log), cost_s)
+
+
+def offer(
+    node: Any,
+    group: Any,
+    services: Iterable[tuple[Any, str, Callable[[Any, Callable[[Any], None]], Query | None]]],
+    queue: JobQueue,
+    report: Report,
+) -> None:
+    """Have `node` offer services: type, name, and what makes the query of `request` and `reply`.
+
+    None: there is none, for it has replied already.
+    """
+    for kind, name, plan in services:
+
+        def answer(request: Any, _: Any, kind: Any = kind, plan: Any = plan) -> Any:
+            later = Later()
+
+            def reply(found: Any) -> None:
+                is_error = isinstance(found, Exception)
+                later.answer(refusal(kind, found, report) if is_error else found)
+
+            try:
+                if (query := plan(request, reply)) is not None:
+                    queue.ask(query)
+            except Exception as error:  # noqa: BLE001  # no client waits for ever
+                return refusal(kind, error, report)
+            return later
+
+        node.create_service(kind, name, answer, qos_profile=SERVICE_QOS, callback_group=group)
 
 
 # How rclpy's warning begins (7.1.6), that the middleware has dropped a response.
@@ -195,7 +202,6 @@ MAX_UNSENT: Final = 8
 MAX_ATTEMPT_S: Final = 0.5
 
 Send = Callable[[Any, Any], None]
-Report = Callable[[str, Exception], None]
 
 
 class Later:
@@ -219,36 +225,13 @@ class Later:
             send(self._response)
 
 
-def answer_later(
-    queue: JobQueue,
-    prepare: Callable[[Callable[[Any], None]], Query],
-    response: Any,
-    report: Report,
-) -> Any:
-    """What a service's callback returns: the response to come of a query, or a `refusal`.
-
-    `prepare(reply)` makes the query, or raises.
-    """
-    later = Later()
-
-    def reply(answer: Any) -> None:
-        is_error = isinstance(answer, Exception)
-        later.answer(refusal(response, answer, report) if is_error else answer)
-
-    try:
-        queue.ask(prepare(reply))
-    except Exception as error:  # noqa: BLE001  # no client waits for ever
-        return refusal(response, error, report)
-    return later
-
-
-def refusal(response: Any, error: Exception, report: Report) -> Any:
-    """A fresh response of the same type, empty but for why; what nobody expected is reported."""
+def refusal(kind: Any, error: Exception, report: Report) -> Any:
+    """A response of a service that is empty but for why; what nobody expected is reported."""
     if isinstance(error, FieldRefused):
-        return type(response)(error_message=str(error))
+        return kind.Response(error_message=str(error))
     if not isinstance(error, PastRefused | NotRemembered):
-        report(type(response).__qualname__, error)
-    return type(response)(error_message=message_of(error))
+        report(kind.__qualname__, error)
+    return kind.Response(error_message=message_of(error))
 
 
 class _Unsent(NamedTuple):

@@ -16,16 +16,7 @@ from typing import Final
 import numpy as np
 
 from lupin_twin.core.state import NANOSECONDS_PER_SECOND
-from lupin_twin.estimate import (
-    MAX_PER_TAG,
-    Change,
-    FitFailed,
-    Model,
-    Place,
-    Posterior,
-    Readings,
-    fit,
-)
+from lupin_twin.estimate.cholesky import Change, Place
 from lupin_twin.estimate.engine import (
     HALF_WIDTH_SDS,
     Estimate,
@@ -38,6 +29,9 @@ from lupin_twin.estimate.engine import (
     readings_of,
     unchanged,
 )
+from lupin_twin.estimate.kernel import MAX_PER_TAG, Readings
+from lupin_twin.estimate.model import FitFailed, Model, fit
+from lupin_twin.estimate.posterior import Posterior
 from lupin_twin.field.engine import FieldRefused, check_sensor_type
 from lupin_twin.field.explored import OccupancyMap, floor, free_of
 from lupin_twin.field.idw import never
@@ -72,7 +66,7 @@ def are_enough(pasts: Sequence[TagPast]) -> bool:
 
 @dataclass(frozen=True, slots=True)
 class TagCheck:
-    """A tag's newest reading beside what is expected of it; see `estimate.Change`."""
+    """A tag's newest reading beside what is expected of it; see `cholesky.Change`."""
 
     tag_id: str
     measured: float
@@ -116,7 +110,7 @@ def load(
 
     Raises:
         lupin_twin.field.idw.Abandoned: `should_stop`, called every few milliseconds, was true.
-        lupin_twin.estimate.FitFailed: no model can be fitted.
+        lupin_twin.estimate.model.FitFailed: no model can be fitted.
         lupin_twin.field.engine.FieldRefused: see `readings_of`.
         numpy.linalg.LinAlgError: numbers that nothing can be made of.
 

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final, TypeVar
 
-from lupin_twin.core.journal_condition import Condition, JournalState
+from lupin_twin.core.diagnostics import Condition, JournalState
 from lupin_twin.core.past import NotRemembered
 from lupin_twin.journal.schema import FILE_ERRORS, Foreign, is_damage_error, open_reader
 from lupin_twin.runtime.workers import ShouldStop, Workers

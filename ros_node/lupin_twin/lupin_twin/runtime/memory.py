@@ -19,9 +19,9 @@ from pathlib import Path
 from typing import Final, NamedTuple
 
 from lupin_twin.core import ingest
+from lupin_twin.core.diagnostics import Condition
 from lupin_twin.core.drops import Drop
 from lupin_twin.core.history import Repeats
-from lupin_twin.core.journal_condition import Condition
 from lupin_twin.core.parameters import World
 from lupin_twin.core.state import Pin, TwinStore, Write
 from lupin_twin.journal.fold import Restored
@@ -201,7 +201,7 @@ class Memory:
     def _restore(self, restored: Restored) -> None:
         count = self._store.observation_count
         self._store.restore(restored.known.tags, restored.known.observed)
-        self.repeats.clear()
+        self.repeats = Repeats()
         for row in restored.rows:
             self.repeats.add(row)
         # From before what was handed over meanwhile, if it was earlier.

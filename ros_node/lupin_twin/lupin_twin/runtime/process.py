@@ -32,6 +32,8 @@ IDLE_WORKERS_END_S: Final = 0.1
 INTERRUPTED: Final = 130
 # What Python says where the last of the standard output could not be written.
 NOT_WRITTEN: Final = 120
+# Of arguments that cannot be taken.
+USAGE_ERROR: Final = 2
 
 
 def exit_after(main: Callable[[], int]) -> NoReturn:
@@ -54,6 +56,12 @@ def exit_after(main: Callable[[], int]) -> NoReturn:
         sys.excepthook(type(error), error, error.__traceback__)
         code = 1
     exit_process(code)
+
+
+def refuse(command: str, reason: str) -> int:
+    """Say in a line why a command does not start; the exit code then."""
+    sys.stderr.write(f"{command}: {' '.join(reason.split())}\n")
+    return USAGE_ERROR
 
 
 def open_standard_files() -> None:

@@ -212,7 +212,7 @@ class Query:
 
     `look_up` begins the search; `make`, if there is one, is called on a worker with its result, as
     `cost_s` estimates, s of one core. `reply` gets the answer, or the exception. What is no longer
-    wanted when its turn comes is dropped.
+    wanted when its turn comes is dropped. `since_s` is when it was made, by the steady clock.
     """
 
     look_up: Callable[[], Future[Any]]
@@ -220,6 +220,7 @@ class Query:
     make: Callable[[Any], Any] | None = None
     cost_s: float = 0.0
     is_wanted: Callable[[], bool] = lambda: True
+    since_s: float = field(default_factory=time.monotonic)
 
 
 class JobQueue:
@@ -248,7 +249,7 @@ class JobQueue:
         self._is_behind = is_behind
         self._clock = clock
         self._lanes = (_Lane(SMALL_AT_ONCE), _Lane(large_at_once))
-        self._done: SimpleQueue[tuple[_Waiting, Any]] = SimpleQueue()
+        self._done: SimpleQueue[tuple[Query, Any]] = SimpleQueue()
 
     @property
     def waiting(self) -> int:
@@ -263,12 +264,12 @@ class JobQueue:
 
         """
         lane = self._lane(query)
-        lane.waiting = deque(it for it in lane.waiting if it.query.is_wanted())
+        lane.waiting = deque(it for it in lane.waiting if it.is_wanted())
         if lane.count >= MAX_QUERIES:
             raise NotRemembered(
                 f"{MAX_QUERIES} requests wait, which is the limit", is_lasting=False
             )
-        lane.waiting.append(_Waiting(query, time.monotonic()))
+        lane.waiting.append(query)
         self._begin(lane)
 
     def go_on(self) -> None:
@@ -282,18 +283,18 @@ class JobQueue:
         Sending a large one takes a while, and what else waits for this thread comes in between.
         """
         try:
-            waiting, answer = self._done.get_nowait()
+            query, answer = self._done.get_nowait()
         except Empty:
             return
         if not self._done.empty():
             self._wake()
         if not isinstance(answer, Exception):
             self.answered += 1
-            self.slowest_s = max(self.slowest_s, time.monotonic() - waiting.since_s)
+            self.slowest_s = max(self.slowest_s, time.monotonic() - query.since_s)
         try:
-            waiting.query.reply(answer)
+            query.reply(answer)
         finally:
-            lane = self._lane(waiting.query)
+            lane = self._lane(query)
             lane.under_way -= 1
             self._begin(lane)
 
@@ -305,17 +306,15 @@ class JobQueue:
             now_s = self._clock()
             if self._is_behind() and now_s - lane.begun_s < PACE_S:
                 return
-            waiting = lane.waiting.popleft()
-            if waiting.query.is_wanted():
+            query = lane.waiting.popleft()
+            if query.is_wanted():
                 lane.begun_s = now_s
                 lane.under_way += 1
-                self._look_up(waiting)
+                self._look_up(query)
 
-    def _look_up(self, waiting: _Waiting) -> None:
-        query = waiting.query
-
+    def _look_up(self, query: Query) -> None:
         def put(answer: Any) -> None:
-            self._done.put((waiting, answer))
+            self._done.put((query, answer))
             self._wake()
 
         def put_result(future: Future[Any]) -> None:
@@ -344,12 +343,6 @@ class JobQueue:
             search.add_done_callback(put_result if query.make is None else make)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _Waiting:
-    query: Query
-    since_s: float
-
-
 @dataclass(slots=True)
 class _Lane:
     """Queries of a sort, how many are dealt with at once, and when the last was begun."""
@@ -357,7 +350,7 @@ class _Lane:
     at_once: int
     under_way: int = 0
     begun_s: float = -math.inf
-    waiting: deque[_Waiting] = field(default_factory=deque)
+    waiting: deque[Query] = field(default_factory=deque)
 
     @property
     def count(self) -> int:

@@ -223,6 +223,6 @@ export const HEALTH: In<typeof EN.HEALTH> = {
   tooLow: (by) => (by === null ? 'por debajo del límite' : `${by} por debajo del ideal`),
   tooHigh: (by) => (by === null ? 'por encima del límite' : `${by} por encima del ideal`),
   side: { below: 'bajo', above: 'alto' },
-  below: 'por debajo del ideal',
-  above: 'por encima del ideal',
+  below: 'bajo el ideal',
+  above: 'sobre el ideal',
 };

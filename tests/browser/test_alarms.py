@@ -13,7 +13,7 @@ import pytest
 from playwright.sync_api import Locator, expect
 
 from tests.browser.hmi import PHONE, SERVER_GONE, WIDE, Hmi, OpenPage
-from tests.browser.places import expect_in_reach, place, places
+from tests.browser.places import out_of_reach, place, places
 from tests.support.messages import scan
 from tests.support.waiting import wait_for
 from tests.support.web import Bridge, bridge
@@ -97,7 +97,7 @@ def test_an_alarm_comes_is_acknowledged_shelved_and_resolved(
         # On a phone below no heading, not even that of an open menu, and over no row's words.
         hmi.resize(**PHONE)
         hmi.page.get_by_role("button", name="Actions: Tag a").click()
-        expect_in_reach(hmi, "[data-line=done] button")
+        assert out_of_reach(hmi, "[data-line=done] button") == []
         line, words = places(hmi, "[data-line=done]", ".alarm-times .health-mark")
         assert line.bottom <= words.top + 2
         hmi.resize(**WIDE)

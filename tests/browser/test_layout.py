@@ -437,7 +437,7 @@ def test_every_language_has_room_on_a_phone(house: Bridge, open_page: OpenPage) 
             ".pane-tabs .alarm-count",
         )
         # As far off one edge as off the other.
-        assert abs(sign.left + count.right - tab.left - tab.right) < 32
+        assert abs(sign.left + count.right - tab.left - tab.right) < 20
         hmi.page.locator(".pane-tabs button").nth(1).click()
         expect(hmi.cell("1", "temperature")).to_contain_text(reading)
         assert hmi.page.evaluate(_TOO_LONG) == []

@@ -332,6 +332,13 @@ def test_nothing_moves_while_a_pointer_rests_on_the_list(
         assert where(hmi) == ["c", order[1]]
         open_resolved(hmi, 1)
         expect(rows(hmi, "resolved")).to_have_attribute("data-where", order[0])
+        # Many of one cause: their heading has the columns of its rows.
+        leave(hmi)
+        robot.observe(*[warm(f"d{at}", 27.0) for at in range(3)] * 2)
+        hmi.page.locator("[data-group=active] .alarm-cause .alarm-go").click()
+        worst = fact(hmi.page.locator("[data-group=active]"), "worst")
+        expect(worst).to_have_count(6)
+        assert len({place(each).left for each in worst.all()}) == 1
 
 
 def where(hmi: Hmi) -> list[str]:

@@ -11,10 +11,11 @@ import pytest
 from websockets.exceptions import InvalidStatus
 from websockets.sync.client import connect
 
-from tests.support.access import served
 from tests.support.docs import block_named
+from tests.support.domains import own_domain
 from tests.support.nginx import CONFIGURATION, nginx
 from tests.support.people import OWN, changing
+from tests.support.processes import lupin_twin
 from tests.support.waiting import PATIENCE_S, wait_for
 
 COOKIE = {"Cookie": "sso=of-anna"}
@@ -54,15 +55,20 @@ def url(tmp_path: Path) -> Iterator[str]:
     path = tmp_path / "accounts.sqlite"
     with changing(path) as accounts:
         accounts.add("anna@example.org", "account", "operator", "", by="a test", now_s=1)
-    options = ("--path-prefix", "/gh1", "--trusted-proxy", "127.0.0.1")
-    named = ("--proxy-user-header", "Remote-User", "--accounts", str(path))
-    with served(*options, *named) as running, sign_in_service() as port:
+    inner = tmp_path / "http.sock"
+    options = ("--host", f"unix:{inner}", "--path-prefix", "/gh1", "--accounts", str(path))
+    named = ("--proxy-user-header", "Remote-User", "--ros-args", "-p", "journal:=off")
+    with (
+        own_domain() as domain,
+        lupin_twin(domain, "serve", *options, *named) as running,
+        sign_in_service() as port,
+    ):
+        running.wait_for_output(f"lupin-twin: unix:{inner}")
         block = block_named("auth-request").text.replace(":9091", f":{port}")
         shipped = CONFIGURATION.read_text(encoding="utf-8")
         assert shipped.count("location /gh1/ {") == 1
         text = shipped.replace("location /gh1/ {", block)
-        ports = [int(running.url.rpartition(":")[2])] * 3
-        with nginx(tmp_path, ports, text) as address:
+        with nginx(tmp_path, [inner] * 3, text) as address:
             yield f"{address}/gh1"
 
 

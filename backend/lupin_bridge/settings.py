@@ -27,6 +27,14 @@ class SettingError(ValueError):
     """A setting that cannot be; the message names it, its value and the limit."""
 
 
+UNIX: Final = "unix:"
+
+
+def unix_path(host: str) -> Path | None:
+    """The file of a Unix socket, if `host` names one: `unix:PATH`."""
+    return Path(host.removeprefix(UNIX)) if host.startswith(UNIX) else None
+
+
 def _setting(default: Any, group: str, help_text: str, *, is_private: bool = False) -> Any:
     """A line of the table; `is_private`: a password may be in it, so no message repeats it."""
     metadata = {"group": group, "help": help_text, "is_private": is_private}
@@ -38,7 +46,10 @@ class Settings:
     """How the bridge serves, as `settings_from` found it right. Times are seconds."""
 
     host: Annotated[str, MinLen(1)] = _setting(
-        "127.0.0.1", "listening", "address to listen on; other machines need 0.0.0.0 or ::"
+        "127.0.0.1",
+        "listening",
+        "address to listen on; other machines need 0.0.0.0 or ::, and a reverse proxy of this "
+        "machine a Unix socket, such as unix:/run/lupin-twin/http.sock",
     )
     port: Annotated[int, Interval(ge=0, le=65_535)] = _setting(
         8000, "listening", "port to listen on; 0: any free one"

@@ -14,11 +14,12 @@ CONFIGURATION = Path(__file__).parents[2] / "backend" / "deploy" / "nginx.conf"
 _SHIPPED_PORTS = (8001, 8002, 8003)
 
 
-def configured(text: str, folder: Path, port: int, upstreams: Sequence[int]) -> str:
+def configured(text: str, folder: Path, port: int, upstreams: Sequence[int | Path]) -> str:
     """A configuration with other ports, and with places to write in that are ours."""
     changes = {"listen 80;": f"listen 127.0.0.1:{port};", "http {": f"http {{\n{_scratch(folder)}"}
     for shipped, ours in zip(_SHIPPED_PORTS, upstreams, strict=True):
-        changes[f"server 127.0.0.1:{shipped} "] = f"server 127.0.0.1:{ours} "
+        address = f"unix:{ours}" if isinstance(ours, Path) else f"127.0.0.1:{ours}"
+        changes[f"server 127.0.0.1:{shipped} "] = f"server {address} "
     for old, new in changes.items():
         assert text.count(old) == 1, old
         text = text.replace(old, new)
@@ -31,8 +32,10 @@ def _scratch(folder: Path) -> str:
 
 
 @contextmanager
-def nginx(folder: Path, upstreams: Sequence[int], text: str = "") -> Iterator[str]:
-    """nginx in front of three bridges on these ports of loopback; gives its address.
+def nginx(folder: Path, upstreams: Sequence[int | Path], text: str = "") -> Iterator[str]:
+    """nginx in front of three bridges, on these ports of loopback or Unix sockets.
+
+    It gives its own address.
 
     `text` is its configuration, that which we ship if there is none.
     """
@@ -42,7 +45,9 @@ def nginx(folder: Path, upstreams: Sequence[int], text: str = "") -> Iterator[st
         port = free.getsockname()[1]
     file = folder / "nginx.conf"
     file.write_text(configured(text, folder, port, upstreams), encoding="utf-8")
-    own = f"daemon off; pid {folder / 'pid'}; error_log stderr warn;"
+    # Root's nginx would become somebody else, who may not into the test's folder.
+    user = "user root; " if os.geteuid() == 0 else ""
+    own = f"{user}daemon off; pid {folder / 'pid'}; error_log stderr warn;"
     command = [program("nginx"), "-p", str(folder), "-e", "stderr", "-c", str(file), "-g", own]
     with Process(command, os.environ) as process:
 

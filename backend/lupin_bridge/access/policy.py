@@ -36,7 +36,7 @@ from typing import Final, Self
 from starlette.datastructures import Headers
 from starlette.types import ASGIApp, Receive, Scope, Send
 
-from lupin_bridge.settings import SettingError, Settings
+from lupin_bridge.settings import SettingError, Settings, unix_path
 
 # RFC 3986: a path of plain segments, none of which is "." or "..", without a slash at its end.
 _PATH_PREFIX: Final = re.compile(r"(?:/(?!\.{1,2}(?:/|$))[A-Za-z0-9._~-]+)+")
@@ -51,10 +51,12 @@ _WITH_PORT: Final = re.compile(r"\[(?P<v6>[^\]]+)\](?::\d+)?|(?P<v4>[\d.]+):\d+"
 class Proxies:
     """The proxies whose headers count, and the path that the bridge is below ("": none).
 
-    `user_header` is the one in which they name the person ("": none).
+    `user_header` is the one in which they name the person ("": none). Whoever reaches a Unix socket
+    is such a proxy.
     """
 
     proxies: tuple[IPv4Network | IPv6Network, ...] = ()
+    has_unix_socket: bool = False
     path_prefix: str = ""
     user_header: str = ""
 
@@ -78,17 +80,20 @@ class Proxies:
                 f"{settings.called('proxy_user_header')} is {header[:128]!r}, must be a header's "
                 "name, such as Remote-User"
             )
-        if header and not settings.trusted_proxy:
+        has_unix_socket = unix_path(settings.host) is not None
+        if header and not (settings.trusted_proxy or has_unix_socket):
             raise SettingError(
-                f"{settings.called('proxy_user_header')} is given without --trusted-proxy: nobody "
-                "is believed"
+                f"{settings.called('proxy_user_header')} is given without --host unix:PATH or "
+                "--trusted-proxy: nobody is believed"
             )
         called = settings.called("trusted_proxy")
         proxies = tuple(_network(text, called) for text in settings.trusted_proxy)
-        return cls(proxies, prefix, header)
+        return cls(proxies, has_unix_socket, prefix, header)
 
     def trusts(self, address: str) -> bool:
         """Whether this is a proxy whose headers count."""
+        if not address:  # TCP's peers have one, and it listens on nothing else
+            return self.has_unix_socket
         ip = _address(address)
         return ip is not None and any(ip in network for network in self.proxies)
 

@@ -29,7 +29,7 @@ from lupin_bridge.serving.server import (
     check_pair,
     listen,
 )
-from lupin_bridge.settings import Secrets, SettingError, Settings, option, variable
+from lupin_bridge.settings import Secrets, SettingError, Settings, option, unix_path, variable
 
 log = logging.getLogger("lupin_bridge")
 
@@ -107,12 +107,16 @@ def open_listener(settings: Settings, access: Access) -> socket.socket:
     """
     if settings.tls_cert:
         check_pair(settings.tls_cert, settings.tls_key)
+    path = unix_path(settings.host)
     try:
         listener = listen(settings.host, settings.port)
     except OSError as error:
+        where = "" if path else f" port {settings.port}"
         raise SettingError(
-            f"cannot listen on {settings.host} port {settings.port}: {error.strerror}"
+            f"cannot listen on {settings.host}{where}: {error.strerror or error}"
         ) from error
+    if path:  # none but its owner and group reach it
+        return listener
     for warning in exposure(
         listener.getsockname()[0], has_token=access.is_closed, has_tls=bool(settings.tls_cert)
     ):

@@ -72,7 +72,8 @@ CLOSE_GRACE_S: Final = 1.0
 def bound_unsent(transport: asyncio.BaseTransport) -> None:
     """Let a connection's socket take no more than `UNSENT_BYTES` ahead of the network."""
     connection: socket.socket = transport.get_extra_info("socket")
-    connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NOTSENT_LOWAT, UNSENT_BYTES)
+    if connection.family != socket.AF_UNIX:  # which holds 0.2 MB
+        connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NOTSENT_LOWAT, UNSENT_BYTES)
 
 
 def tear_down(transport: asyncio.WriteTransport) -> None:
@@ -302,6 +303,7 @@ class Acceptor:
 
 def _address_of(connection: socket.socket) -> str:
     try:
-        return client_key(connection.getpeername()[0])
+        peer = connection.getpeername()
     except OSError:
         return ""  # it has gone already
+    return client_key(peer[0]) if peer else ""  # of a Unix socket

@@ -11,7 +11,8 @@ import signal
 import socket
 import ssl
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
+from pathlib import Path
 from types import FrameType
 from typing import Any, Final, NoReturn
 
@@ -23,7 +24,7 @@ from lupin_bridge.serving.admission import Limits
 from lupin_bridge.serving.connections import Acceptor, room_for_connections, tear_down
 from lupin_bridge.serving.http_protocol import HttpConnection
 from lupin_bridge.serving.ws_protocol import Connection
-from lupin_bridge.settings import SettingError, Settings
+from lupin_bridge.settings import UNIX, SettingError, Settings, unix_path
 from lupin_twin.runtime import process
 
 log = logging.getLogger(__name__)
@@ -242,25 +243,45 @@ def listen(host: str, port: int) -> socket.socket:
     """A listening socket, so that an address in use is known before anything else starts.
 
     It listens from here on, not from when the server takes over: a client in between waits
-    for a moment instead of being refused.
+    for a moment instead of being refused. A Unix socket is for its owner and group alone.
 
     Raises:
         OSError: the address cannot be had.
 
     """
-    family = socket.AF_INET6 if ":" in host else socket.AF_INET
-    # asyncio turns Nagle's algorithm off only where it knows that this is TCP. With it, the
-    # second write to a client (a body after its headers, a state after the status) waits 40 ms.
-    listener = socket.socket(family, socket.SOCK_STREAM, socket.IPPROTO_TCP)
-    listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+    path = unix_path(host)
+    if path is not None:
+        _remove_left(path)
+        listener = socket.socket(socket.AF_UNIX)
+    else:
+        family = socket.AF_INET6 if ":" in host else socket.AF_INET
+        # asyncio turns Nagle's algorithm off only where it knows that this is TCP. With it, the
+        # second write to a client (a body after its headers, a state after the status) waits 40 ms.
+        listener = socket.socket(family, socket.SOCK_STREAM, socket.IPPROTO_TCP)
+        listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
     try:
-        listener.bind((host, port))
+        if path is not None:
+            listener.bind(str(path))
+            path.chmod(0o660)  # nobody can connect before it listens
+        else:
+            listener.bind((host, port))
         listener.listen(BACKLOG)
     except OSError:
         listener.close()
         raise
     listener.setblocking(False)
     return listener
+
+
+def _remove_left(path: Path) -> None:
+    """Remove the socket of a process that has ended: nobody could listen there again."""
+    with socket.socket(socket.AF_UNIX) as probe, suppress(OSError):
+        probe.settimeout(1.0)
+        try:
+            probe.connect(str(path))
+        except ConnectionRefusedError:
+            if path.is_socket():  # a file refuses, too
+                path.unlink()
 
 
 def allow_connections(number: int) -> int:
@@ -293,5 +314,7 @@ def allow_connections(number: int) -> int:
 
 def address_of(listener: socket.socket, scheme: str = "http") -> str:
     """The URL of a listening socket, for a person to open."""
+    if listener.family == socket.AF_UNIX:
+        return f"{UNIX}{listener.getsockname()}"
     host, port = listener.getsockname()[:2]
     return f"{scheme}://[{host}]:{port}" if ":" in host else f"{scheme}://{host}:{port}"

@@ -398,14 +398,22 @@ _HEADS_TOO_CLOSE = """() => {
 }"""
 
 
-def test_two_heads_of_the_table_do_not_read_as_one(house: Bridge, open_page: OpenPage) -> None:
+def test_in_each_language_sensors_have_one_row_and_heads_do_not_read_as_one(
+    house: Bridge, open_page: OpenPage
+) -> None:
     hmi = open_page(house.url, go=False)
-    for language in ("en", "es"):
+    for language in ("en", "de", "nl", "es"):
         hmi.go(query=f"?lang={language}")
-        for width in (1100, 1280, 1440):
+        for width in (1440, 1100, 1280):
             hmi.resize(width, 800)
             expect(hmi.row("1")).to_be_visible()
             assert hmi.page.evaluate(_HEADS_TOO_CLOSE) == [], (language, width)
+            sensors, head = places(hmi, ".sensor-picker", "thead")
+            assert width == 1100 or sensors.bottom - sensors.top < 60, (language, width)
+            assert head.bottom - head.top < 50, (language, width)
+        hmi.page.keyboard.press("a")
+        alarm = place(hmi.page.locator("[data-group=active] [data-alarm]").first)
+        assert alarm.bottom - alarm.top < 64, language
 
 
 def test_a_head_breaks_no_word_and_the_chosen_sensor_moves_no_age(

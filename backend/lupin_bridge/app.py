@@ -62,9 +62,7 @@ def create_app(
         version=__version__,
         summary="Digital twin of a greenhouse: every tag's state, and fields of every sensor.",
         description=_DESCRIPTION,
-        docs_url=None,  # FastAPI's own page loads its scripts from the internet
-        redoc_url=None,
-        openapi_url=None,
+        openapi_url=None,  # nor FastAPI's page of it, which loads its scripts from the internet
     )
     app.state.bridge = bridge
     app.state.access = access

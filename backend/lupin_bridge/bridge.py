@@ -14,8 +14,7 @@ from lupin_bridge.alarms.board import AlarmBoard, Change, NoteBoard
 from lupin_bridge.alarms.feed import AlarmFeed, learn_recent
 from lupin_bridge.feed.shared_work import Periodic, Shared, end
 from lupin_bridge.feed.source import TwinSource, TwinUpdate
-from lupin_bridge.judge.judging import NOTHING_JUDGED, Judge, Judged, silenced, unjudged
-from lupin_bridge.judge.options import Criteria
+from lupin_bridge.judge.judging import NOTHING_JUDGED, Criteria, Judge, Judged, silenced, unjudged
 from lupin_bridge.metrics import Metrics, Sample, route_class
 from lupin_bridge.notify.channels import Channels
 from lupin_bridge.notify.messages import GreenhouseState
@@ -30,7 +29,6 @@ from lupin_bridge.viewers.rosbridge_session import Writer
 from lupin_twin.core.diagnostics import Origin
 from lupin_twin.core.drops import LATE, LOST, Reason
 from lupin_twin.core.state import NANOSECONDS_PER_SECOND, Snapshot
-from lupin_twin.runtime.workers import Workers
 
 log = logging.getLogger(__name__)
 
@@ -75,6 +73,7 @@ class Bridge:
     ) -> None:
         self._clock = clock
         self.source = source
+        self.workers = source.workers
         self.site = settings.site
         self.limits = limits
         self.liveness = Liveness(lambda: source.world)
@@ -160,11 +159,6 @@ class Bridge:
         self._publish_status()
 
     # --- for the routes -----------------------------------------------------------------------
-
-    @property
-    def workers(self) -> Workers:
-        """Where the source computes."""
-        return self.source.workers
 
     @property
     def latest(self) -> TwinUpdate | None:

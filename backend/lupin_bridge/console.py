@@ -8,6 +8,8 @@ And what commands share: their actions, and where they write.
 from __future__ import annotations
 
 import argparse
+import getpass
+import os
 import sqlite3
 import sys
 import time
@@ -92,6 +94,14 @@ def add_actions(
     )
     for action, what in actions.items():
         yield action, add_role(added, action, what)
+
+
+def user() -> str:
+    """Who runs the command."""
+    try:
+        return getpass.getuser()
+    except (KeyError, OSError):  # a user without a name
+        return f"user {os.getuid()}"
 
 
 # Of these two, only the copy is written.

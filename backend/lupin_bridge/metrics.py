@@ -100,6 +100,8 @@ HISTOGRAMS: Final = {
         "from a change in the ROS thread until every ready client has been written its frame"
     ),
     "lupin_field_seconds": "until a field is computed and written",
+    "lupin_http_seconds": "from a request until its answer began",
+    "lupin_past_seconds": "until a request about the past is answered, by its kind",
 }
 
 # From a millisecond to the time-out of a field.
@@ -114,22 +116,10 @@ class Metrics(Collector):
         self._registry = CollectorRegistry()
         self._registry.register(self)
         ProcessCollector(registry=self._registry)
-        self.push_seconds = self._histogram("lupin_push_seconds")
-        self.field_seconds = self._histogram("lupin_field_seconds")
-        self.http_seconds = Histogram(
-            "lupin_http_seconds",
-            "from a request until its answer began",
-            ["route"],
-            buckets=_SECONDS,
-            registry=self._registry,
-        )
-        self.past_seconds = Histogram(
-            "lupin_past_seconds",
-            "until a request about the past is answered, by its kind",
-            ["question"],
-            buckets=_SECONDS,
-            registry=self._registry,
-        )
+        self.push_seconds = self._histogram("push")
+        self.field_seconds = self._histogram("field")
+        self.http_seconds = self._histogram("http", "route")
+        self.past_seconds = self._histogram("past", "question")
 
     def describe(self) -> Iterable[Metric]:
         """Nothing: the registry would scrape at once, before there is anything to read."""
@@ -152,8 +142,9 @@ class Metrics(Collector):
         """Everything in Prometheus' text format, version 0.0.4."""
         return generate_latest(self._registry)
 
-    def _histogram(self, name: str) -> Histogram:
-        return Histogram(name, HISTOGRAMS[name], buckets=_SECONDS, registry=self._registry)
+    def _histogram(self, what: str, *labels: str) -> Histogram:
+        name = f"lupin_{what}_seconds"
+        return Histogram(name, HISTOGRAMS[name], labels, buckets=_SECONDS, registry=self._registry)
 
 
 # --- answers over HTTP ----------------------------------------------------------------------------

@@ -14,6 +14,7 @@ from typing import Annotated, Any, Final, TypeVar
 from annotated_types import Len
 
 from lupin_twin.core.drops import MAX_TEXT_LENGTH
+from lupin_twin.core.past import PastRefused
 
 QueryT = TypeVar("QueryT")
 MOMENT: Final = "ROS seconds as a decimal number, or ISO 8601 with an offset"
@@ -33,14 +34,14 @@ def needed(description: str) -> Any:
     return field(metadata={"description": description})
 
 
-def read(kind: type[QueryT], given: Sequence[tuple[str, str]], refused: type[Exception]) -> QueryT:
+def read(kind: type[QueryT], given: Sequence[tuple[str, str]]) -> QueryT:
     """A query string's (name, value) pairs as a query.
 
     A query is refused, never guessed at: an unknown or repeated parameter is a typing error that
     would otherwise go unseen.
 
     Raises:
-        Exception: `refused`: an unknown or repeated parameter, or a value that cannot be.
+        PastRefused: an unknown or repeated parameter, or a value that cannot be.
 
     """
     from pydantic import ValidationError  # noqa: PLC0415  # see above
@@ -49,9 +50,9 @@ def read(kind: type[QueryT], given: Sequence[tuple[str, str]], refused: type[Exc
     values: dict[str, str] = {}
     for name, value in given:
         if name not in names:
-            raise refused(f"parameter {name[:64]!r} is unknown, expected {', '.join(names)}")
+            raise PastRefused(f"parameter {name[:64]!r} is unknown, expected {', '.join(names)}")
         if names[name] in values:
-            raise refused(f"{name} is given more than once, expected one value")
+            raise PastRefused(f"{name} is given more than once, expected one value")
         values[names[name]] = value
     try:
         query: QueryT = _adapter(kind).validate_python(values)  # type: ignore[arg-type]  # hashable
@@ -59,7 +60,7 @@ def read(kind: type[QueryT], given: Sequence[tuple[str, str]], refused: type[Exc
         first = error.errors(include_url=False)[0]
         name, why = str(first["loc"][0]).rstrip("_"), first["msg"]
         shown = f" is {first['input'][:64]!r}" if isinstance(first["input"], str) else ""
-        raise refused(f"{name}{shown}: {why[0].lower()}{why[1:]}") from None
+        raise PastRefused(f"{name}{shown}: {why[0].lower()}{why[1:]}") from None
     return query
 
 

@@ -35,9 +35,17 @@ def unix_path(host: str) -> Path | None:
     return Path(host.removeprefix(UNIX)) if host.startswith(UNIX) else None
 
 
-def _setting(default: Any, group: str, help_text: str, *, is_private: bool = False) -> Any:
-    """A line of the table; `is_private`: a password may be in it, so no message repeats it."""
-    metadata = {"group": group, "help": help_text, "is_private": is_private}
+_groups: list[str] = []
+
+
+def _setting(default: Any, help_text: str, *, group: str = "", is_private: bool = False) -> Any:
+    """A line of the table; a `group` goes on until the next one.
+
+    `is_private`: a password may be in it, so no message repeats it.
+    """
+    if group:
+        _groups.append(group)
+    metadata = {"group": _groups[-1], "help": help_text, "is_private": is_private}
     return field(default=default, metadata=metadata)
 
 
@@ -47,145 +55,119 @@ class Settings:
 
     host: Annotated[str, MinLen(1)] = _setting(
         "127.0.0.1",
-        "listening",
         "address to listen on; other machines need 0.0.0.0 or ::, and a reverse proxy of this "
         "machine a Unix socket, such as unix:/run/lupin-twin/http.sock",
+        group="listening",
     )
     port: Annotated[int, Interval(ge=0, le=65_535)] = _setting(
-        8000, "listening", "port to listen on; 0: any free one"
+        8000, "port to listen on; 0: any free one"
     )
-    tls_cert: str = _setting(
-        "", "listening", "PEM file with the certificate chain: serve https and wss"
-    )
-    tls_key: str = _setting(
-        "", "listening", "PEM file with the certificate's private key, not encrypted"
-    )
+    tls_cert: str = _setting("", "PEM file with the certificate chain: serve https and wss")
+    tls_key: str = _setting("", "PEM file with the certificate's private key, not encrypted")
     max_clients: Annotated[int, Interval(ge=1, le=100_000)] = _setting(
-        5_000, "listening", "WebSocket clients at most"
+        5_000, "WebSocket clients at most"
     )
     token_file: str = _setting(
-        "", "access", "file with the token that readers have to know, a line of text"
+        "", "file with the token that readers have to know, a line of text", group="access"
     )
     accounts: str = _setting(
         "",
-        "access",
         "file of accounts and API tokens, which `lupin-twin user` and `token` make; empty: "
         "accounts.sqlite in the folder of this user's journals",
     )
     http_observations: Literal["off", "on"] = _setting(
         "off",
-        "access",
         "on: programs with a token of the role writer post readings to /api/observations, and the "
         "bridge publishes them over ROS",
     )
     allow_host: tuple[str, ...] = _setting(
-        (),
-        "access",
-        "another name of the bridge, such as twin.example; may be given more than once",
+        (), "another name of the bridge, such as twin.example; may be given more than once"
     )
     allow_origin: tuple[str, ...] = _setting(
         (),
-        "access",
         "origin whose pages may read the bridge too, and whose host is a name of the bridge, such "
         "as https://panel.example; may be given more than once",
     )
     trusted_proxy: tuple[str, ...] = _setting(
         (),
-        "behind a proxy",
         "address or network of a reverse proxy whose X-Forwarded-For and X-Forwarded-Proto are "
         "believed, such as 127.0.0.1 or 10.0.0.0/24; may be given more than once",
+        group="behind a proxy",
     )
     proxy_user_header: str = _setting(
-        "",
-        "behind a proxy",
-        "header in which such a proxy names who has signed in there, such as Remote-User",
+        "", "header in which such a proxy names who has signed in there, such as Remote-User"
     )
-    path_prefix: str = _setting(
-        "", "behind a proxy", "path that a proxy serves the bridge below, such as /gh1"
-    )
+    path_prefix: str = _setting("", "path that a proxy serves the bridge below, such as /gh1")
     sensors: str = _setting(
         "",
-        "judgement",
         "JSON file with every sensor's label, unit, colour and ranges, instead of our own",
+        group="judgement",
     )
     reading_validity_s: Annotated[float, Interval(ge=0.0, le=604_800.0)] = _setting(
-        0.0,
-        "judgement",
-        "how long a reading is valid, s; 0: three times the tag's own usual interval",
+        0.0, "how long a reading is valid, s; 0: three times the tag's own usual interval"
     )
     day_hours: str = _setting(
-        "06:00-20:00",
-        "judgement",
-        "from when to when it is day where no light is measured; 00:00-00:00: always",
+        "06:00-20:00", "from when to when it is day where no light is measured; 00:00-00:00: always"
     )
     time_zone: str = _setting(
-        "",
-        "judgement",
-        "such as Europe/Amsterdam: for the hours of the day; empty: this machine's",
+        "", "such as Europe/Amsterdam: for the hours of the day; empty: this machine's"
     )
     mqtt_url: str = _setting(
         "",
-        "MQTT",
         "MQTT broker, such as mqtt://broker.lan or mqtts://broker.lan:8883: readings, verdicts and "
         "alarms go there",
+        group="MQTT",
         is_private=True,
     )
-    mqtt_user: str = _setting("", "MQTT", "who the bridge is to the broker")
-    mqtt_password_file: str = _setting("", "MQTT", "file with that user's password, a line of text")
-    mqtt_ca: str = _setting("", "MQTT", "PEM file with who signs the broker's certificate")
-    mqtt_prefix: str = _setting(
-        "lupin-twin", "MQTT", "what the topics begin with, such as farm/gh1"
-    )
+    mqtt_user: str = _setting("", "who the bridge is to the broker")
+    mqtt_password_file: str = _setting("", "file with that user's password, a line of text")
+    mqtt_ca: str = _setting("", "PEM file with who signs the broker's certificate")
+    mqtt_prefix: str = _setting("lupin-twin", "what the topics begin with, such as farm/gh1")
     mqtt_discovery_prefix: str = _setting(
-        "homeassistant",
-        "MQTT",
-        "where Home Assistant looks for devices; empty: they are not announced",
+        "homeassistant", "where Home Assistant looks for devices; empty: they are not announced"
     )
     webhook_url: str = _setting(
         "",
-        "webhook",
         "http or https address that changes of alarms are posted to",
+        group="webhook",
         is_private=True,
     )
-    webhook_secret_file: str = _setting(
-        "", "webhook", "file with the secret that signs them, a line of text"
-    )
-    webhook_ca: str = _setting("", "webhook", "PEM file with who signs the receiver's certificate")
+    webhook_secret_file: str = _setting("", "file with the secret that signs them, a line of text")
+    webhook_ca: str = _setting("", "PEM file with who signs the receiver's certificate")
     push_contact: str = _setting(
         "",
-        "push",
         "turns on Web Push, and is whom push services write to if it goes wrong, such as "
         "mailto:grower@example.org",
+        group="push",
     )
     push_private_host: tuple[str, ...] = _setting(
-        (), "push", "a push service of your own, which may be in a private network, may be repeated"
+        (), "a push service of your own, which may be in a private network, may be repeated"
     )
     report_at: str = _setting(
         "",
-        "report",
         "when the report of the last day is sent, by MQTT and webhook, such as 06:00 in the time "
         "zone of the hours of the day; empty: never",
+        group="report",
     )
     journal: str = _setting(
         "",
-        "past",
         "for web: the file of its twin's journal, where this machine knows it by another path",
+        group="past",
     )
     site: str = _setting(
-        "", "archive", "the greenhouse's name in the archive, and its user's, such as gh1"
+        "", "the greenhouse's name in the archive, and its user's, such as gh1", group="archive"
     )
     archive_url: str = _setting(
         "",
-        "archive",
         "PostgreSQL that the journal is forwarded to, or that fleet shows, such as "
         "postgresql://gh1@db.example/lupin; its password: PGPASSWORD or PGPASSFILE",
         is_private=True,
     )
     log_format: Literal["text", "json"] = _setting(
-        "text", "log", "lines for people, or JSON for a collector"
+        "text", "lines for people, or JSON for a collector", group="log"
     )
     log_level: Literal["debug", "info", "warning", "error"] = _setting(
-        "info", "log", "the least that is logged"
+        "info", "the least that is logged"
     )
     # What the operator called a setting: the option, a variable, a file's line.
     given_as: Mapping[str, str] = field(
@@ -195,6 +177,10 @@ class Settings:
     def called(self, name: str) -> str:
         """What a message should call a setting: as its operator gave it."""
         return self.given_as.get(name, option(name))
+
+    def wrong(self, name: str, why: str) -> SettingError:
+        """That a setting cannot be, by what its operator called it."""
+        return SettingError(f"{self.called(name)} {why}")
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -312,12 +298,11 @@ def _checked(name: str, called: str, value: Any, *, is_text: bool) -> Any:
         )
     except ValidationError as error:
         why = error.errors(include_url=False)[0]["msg"]
-        shown = _shown(name, value)
-        raise SettingError(f"{called} is {shown}: {why[0].lower()}{why[1:]}") from None
+        why = f"{why[0].lower()}{why[1:]}"
+        raise SettingError(f"{called} is {_shown(name, value)}: {why}") from None
     texts = found if isinstance(found, tuple) else (found,)
     if any(isinstance(text, str) and _CONTROL.search(text) for text in texts):
-        shown = _shown(name, value)
-        raise SettingError(f"{called} is {shown}: there is a control character in it")
+        raise SettingError(f"{called} is {_shown(name, value)}: there is a control character in it")
     return found
 
 
@@ -328,10 +313,7 @@ def _shown(name: str, value: Any) -> str:
             type(value).__name__, "a number or date"
         )
         return f"{kind} that may hold a password, and is not shown"
-    try:
-        return repr(str(value)[:128])
-    except ValueError:  # Python writes no number of so many digits
-        return "a number of thousands of digits"
+    return repr(str(value)[:128])
 
 
 def _of_environment(environment: Mapping[str, str]) -> Iterator[_Given]:
@@ -395,8 +377,7 @@ def _of_file(path: str, called: str) -> Iterator[_Given]:
     text = read_text(path, called)
     try:
         content = tomllib.loads(text)
-    # It lets through what Python says of a number of thousands of digits, and of [[[[[...
-    except (ValueError, RecursionError) as error:
+    except ValueError as error:
         raise SettingError(f"{path} is not TOML: {error}") from None
     names = [spec.name for spec in table()]
     for key, value in content.items():

@@ -18,10 +18,9 @@ from lupin_bridge.alarms.board import AlarmBoard, change_between, page_of
 from lupin_bridge.alarms.feed import LOT, REACH_COUNT
 from lupin_bridge.feed.source import TwinUpdate
 from lupin_bridge.judge.alarm_fold import Follower
-from lupin_bridge.judge.judging import Judge
-from lupin_bridge.judge.options import own_sensors
+from lupin_bridge.judge.judging import Judge, own_sensors
 from lupin_bridge.notify.messages import GreenhouseState, Topics
-from lupin_bridge.notify.mirror import Mirror
+from lupin_bridge.notify.mqtt import Mirror
 from lupin_bridge.stream.frames import Status
 from lupin_twin.core.past import PastWrite, RunSpan
 from lupin_twin.core.state import Reading, Snapshot, TagState

@@ -16,10 +16,10 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from websockets.asyncio.client import connect
 
+from lupin_bridge import field as field_formats
 from lupin_bridge.bridge import Bridge
 from lupin_bridge.feed.relay import Relay
 from lupin_bridge.feed.source import ThreadState, TwinUnavailableError, TwinUpdate
-from lupin_bridge.field import formats as field_formats
 from lupin_bridge.serving.admission import Limits
 from lupin_bridge.settings import Settings
 from lupin_bridge.stream.hub import Client

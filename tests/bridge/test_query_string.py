@@ -11,16 +11,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from lupin_bridge.app import document
-from lupin_bridge.field.query import EstimateQuery, FieldQuery
+from lupin_bridge.field import EstimateQuery, FieldQuery
 from lupin_bridge.past import query
 from lupin_bridge.query_string import Name, needed, parameter, parameters_of, read
 from lupin_bridge.routes.state import ListenQuery
+from lupin_twin.core.past import PastRefused
 
 PATHS: dict[str, Any] = json.loads(document())["paths"]
-
-
-class Refused(Exception):
-    pass
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,14 +28,14 @@ class Some:
 
 
 def refusal(*pairs: tuple[str, str]) -> str:
-    with pytest.raises(Refused) as refused:
-        read(Some, pairs, Refused)
+    with pytest.raises(PastRefused) as refused:
+        read(Some, pairs)
     return str(refused.value)
 
 
 def test_each_name_has_its_value() -> None:
-    assert read(Some, [("from", "5"), ("a", "7")], Refused) == Some("7", 5)
-    assert read(Some, [("a", "7"), ("c", "y")], Refused) == Some("7", 2, "y")
+    assert read(Some, [("from", "5"), ("a", "7")]) == Some("7", 5)
+    assert read(Some, [("a", "7"), ("c", "y")]) == Some("7", 2, "y")
 
 
 @pytest.mark.parametrize(
@@ -64,8 +61,8 @@ def test_what_cannot_be_is_refused_in_the_callers_way_by_name(
 
 @given(st.lists(st.tuples(st.sampled_from(["a", "from", "c"]) | st.text(), st.text()), max_size=3))
 def test_any_query_string_is_read_or_refused(pairs: list[tuple[str, str]]) -> None:
-    with suppress(Refused):
-        read(Some, pairs, Refused)
+    with suppress(PastRefused):
+        read(Some, pairs)
 
 
 def test_parameters_are_told_as_openapi_has_them() -> None:
@@ -115,13 +112,13 @@ def test_what_is_read_is_described_and_nothing_else(path: str, kind: Any) -> Non
 
 
 def test_who_asks_for_nothing_gets_every_state_whole() -> None:
-    asked = read(ListenQuery, [], ValueError)
+    asked = read(ListenQuery, [])
     assert (asked.delta, asked.min_interval_s) == (False, 0.0)
 
 
 def test_the_lowest_rate_is_one_and_anything_lower_is_not() -> None:
-    asked = read(ListenQuery, [("delta", "1"), ("max_rate_hz", "0.01")], ValueError)
+    asked = read(ListenQuery, [("delta", "1"), ("max_rate_hz", "0.01")])
     assert (asked.delta, asked.min_interval_s) == (True, 100.0)
     for value in ("0.0099", "0", "-1", "nan", "fast", ""):
         with pytest.raises(ValueError, match=f"max_rate_hz is '{value}': input should be"):
-            read(ListenQuery, [("max_rate_hz", value)], ValueError)
+            read(ListenQuery, [("max_rate_hz", value)])

@@ -78,7 +78,7 @@ async def running(
     limits = limits or Limits(answer_timeout_s=PATIENCE_S)
     twin = LocalTwin(ros_args=ros_args, timeout_s=limits.answer_timeout_s)
     bridge = Bridge(twin, settings, limits=limits)
-    server = BridgeServer(create_app(bridge), settings, bridge.announce_shutdown, limits)
+    server = BridgeServer(create_app(bridge), settings, [bridge.announce_shutdown], limits)
     listener = listen("127.0.0.1", 0)
     url = address_of(listener)
     await bridge.start()

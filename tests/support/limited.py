@@ -35,10 +35,6 @@ def command() -> None:
 
     limits = partial(Limits, **_values(options.limit))
     vars(roles).update(Limits=limits, World=partial(World, **_values(options.world)))
-    if "fleet" in rest[:1]:
-        from lupin_bridge.cli import serving
-
-        vars(serving).update(Limits=limits)
     for place, value in _values(options.constant).items():
         module, _, name = place.partition(":")
         vars(import_module(module))[name] = value

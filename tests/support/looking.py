@@ -93,16 +93,7 @@ class Failing:
             raise PastRefused("x is 7, the limit is 6")
         if self.how == "fault":
             raise ZeroDivisionError("a fault")
-        if self.how == "local":
-            raise _local_error()
-        if self.how == "unreadable":
-            return _Unreadable()
-        return lambda: None
-
-
-class _Unreadable:
-    def __reduce__(self) -> tuple[Any, ...]:
-        return int, ("no number",)
+        raise _local_error()
 
 
 def _local_error() -> Exception:

@@ -7,8 +7,7 @@ from lupin_bridge.alarms.board import AlarmBoard, AlarmSource, Board, change_bet
 from lupin_bridge.feed.source import TwinUpdate
 from lupin_bridge.judge.day import ClockDay, Day, judge_day
 from lupin_bridge.judge.episodes import Alarm, alarm_id
-from lupin_bridge.judge.judging import judge_once
-from lupin_bridge.judge.options import Criteria, own_sensors
+from lupin_bridge.judge.judging import Criteria, judge_once, own_sensors
 from lupin_bridge.judge.verdict import Kind, Reason, Verdict
 from lupin_bridge.notify.messages import GreenhouseState
 from lupin_bridge.stream.frames import Status

@@ -11,7 +11,7 @@ import os
 import secrets
 import sqlite3
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import closing, contextmanager
+from contextlib import ExitStack, closing, contextmanager
 from hashlib import sha256
 from pathlib import Path
 from typing import Final, NamedTuple
@@ -43,7 +43,7 @@ BEGIN;
 CREATE TABLE meta (key TEXT PRIMARY KEY, value TEXT NOT NULL) STRICT;
 CREATE TABLE person (
     name TEXT PRIMARY KEY, kind TEXT NOT NULL, role TEXT NOT NULL, secret TEXT NOT NULL,
-    made_at_s INTEGER NOT NULL
+    made_at_s INTEGER NOT NULL, sites TEXT NOT NULL -- the names, a line each; none: all sites
 ) STRICT;
 CREATE UNIQUE INDEX person_of ON person (secret) WHERE kind = 'token';
 CREATE TABLE session (
@@ -51,24 +51,18 @@ CREATE TABLE session (
     ends_at_s INTEGER NOT NULL
 ) STRICT;
 CREATE INDEX session_of ON session (name);
+CREATE TABLE device (
+    endpoint TEXT PRIMARY KEY, name TEXT NOT NULL REFERENCES person ON DELETE CASCADE,
+    public_key TEXT NOT NULL, secret TEXT NOT NULL, language TEXT NOT NULL,
+    made_at_s INTEGER NOT NULL
+) STRICT;
+CREATE INDEX device_of ON device (name);
 CREATE TABLE audit (
     number INTEGER PRIMARY KEY AUTOINCREMENT, at_s INTEGER NOT NULL, who TEXT NOT NULL,
     what TEXT NOT NULL, subject TEXT NOT NULL, address TEXT NOT NULL
 ) STRICT;
 INSERT INTO meta VALUES ('id', lower(hex(randomblob(8))));
 """
-# From each version to the next. `sites`: the names, a line each; none: all sites.
-_MIGRATIONS: Final = (
-    """
-    ALTER TABLE person ADD COLUMN sites TEXT NOT NULL DEFAULT '';
-    CREATE TABLE device (
-        endpoint TEXT PRIMARY KEY, name TEXT NOT NULL REFERENCES person ON DELETE CASCADE,
-        public_key TEXT NOT NULL, secret TEXT NOT NULL, language TEXT NOT NULL,
-        made_at_s INTEGER NOT NULL
-    ) STRICT;
-    CREATE INDEX device_of ON device (name);
-    """,
-)
 _OF_SESSION: Final = (
     "SELECT person.name, role, sites, ends_at_s FROM session JOIN person USING (name)"
     " WHERE id = ? AND ends_at_s > ?"
@@ -127,7 +121,7 @@ def make_file(path: Path) -> None:
             if connection.execute("PRAGMA page_count").fetchone() == (0,):
                 connection.execute("PRAGMA journal_mode = WAL")
                 connection.executescript(
-                    f"{_TABLES} PRAGMA user_version = 1;"
+                    f"{_TABLES} PRAGMA user_version = {_VERSION};"
                     f" PRAGMA application_id = {_APPLICATION_ID}; COMMIT;"
                 )
     except (OSError, sqlite3.Error) as error:
@@ -143,47 +137,29 @@ class Accounts:
     """
 
     def __init__(self, path: Path, *, is_writer: bool = False) -> None:
-        # A reader too is opened for writing: it may be the first, and the log needs its index.
-        try:
-            self._connection = sqlite3.connect(
-                f"file:{quote(os.fsencode(path))}?mode=rw", uri=True, isolation_level=None
-            )
-        except sqlite3.Error as error:
-            raise AccountError(f"the file of accounts {path} cannot be opened: {error}") from error
-        try:
-            execute = self._connection.execute
-            self._check_identity(path)
-            execute("PRAGMA foreign_keys = ON")
-            execute("PRAGMA synchronous = FULL")
-            execute("PRAGMA secure_delete = ON")
-            execute(f"PRAGMA query_only = {int(not is_writer)}")
-            (self.id,) = execute("SELECT value FROM meta WHERE key = 'id'").fetchone()
-        except sqlite3.Error as error:
-            self._connection.close()
-            raise AccountError(f"the file of accounts cannot be read: {error}") from error
-        except AccountError:
-            self._connection.close()
-            raise
-
-    def _check_identity(self, path: Path) -> None:
-        execute = self._connection.execute
-        if execute("PRAGMA application_id").fetchone() != (_APPLICATION_ID,):
-            raise AccountError(f"{path} is no file of accounts")
-        (version,) = execute("PRAGMA user_version").fetchone()
-        if version > _VERSION:
-            raise AccountError(f"{path} is of version {version}, this is {_VERSION}")
-        if version < _VERSION:
-            self._migrate()
-
-    def _migrate(self) -> None:
-        connection = self._connection
-        connection.execute("BEGIN EXCLUSIVE")
-        with connection:
-            # Another bridge may have been quicker.
-            (version,) = connection.execute("PRAGMA user_version").fetchone()
-            for statement in ";".join(_MIGRATIONS[version - 1 :]).split(";"):
-                connection.execute(statement)
-            connection.execute(f"PRAGMA user_version = {_VERSION}")
+        with ExitStack() as if_unusable:
+            try:
+                # A reader too is opened for writing: it may be the first, and the log needs its
+                # index.
+                self._connection = sqlite3.connect(
+                    f"file:{quote(os.fsencode(path))}?mode=rw", uri=True, isolation_level=None
+                )
+                if_unusable.callback(self._connection.close)
+                execute = self._connection.execute
+                if execute("PRAGMA application_id").fetchone() != (_APPLICATION_ID,):
+                    raise AccountError(f"{path} is no file of accounts")
+                (version,) = execute("PRAGMA user_version").fetchone()
+                if version != _VERSION:
+                    raise AccountError(f"{path} is of version {version}, this is {_VERSION}")
+                execute("PRAGMA foreign_keys = ON")
+                execute("PRAGMA synchronous = FULL")
+                execute("PRAGMA secure_delete = ON")
+                execute(f"PRAGMA query_only = {int(not is_writer)}")
+                (self.id,) = execute("SELECT value FROM meta WHERE key = 'id'").fetchone()
+            except sqlite3.Error as error:
+                why = f"the file of accounts {path} cannot be read: {error}"
+                raise AccountError(why) from error
+            if_unusable.pop_all()
 
     def close(self) -> None:
         """Let go of it."""

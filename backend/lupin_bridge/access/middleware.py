@@ -94,7 +94,7 @@ class ReadOnly:
 
         send = with_security_headers(send)
         method, path = scope["method"], path_of(scope)
-        methods = _methods_of(path)
+        methods = ("DELETE",) if path.startswith(f"{NOTES}/") else _METHODS.get(path, _READS)
         if method not in methods:
             detail = f"method {method[:16]} is not allowed here, use {' or '.join(methods)}"
             await _Refusal(405, detail, {"allow": ", ".join(methods)}).send(scope, receive, send)
@@ -105,10 +105,6 @@ class ReadOnly:
             await _Refusal(403, detail).send(scope, receive, send)
         else:
             await self._app(scope, receive, send)
-
-
-def _methods_of(path: str) -> tuple[str, ...]:
-    return ("DELETE",) if path.startswith(f"{NOTES}/") else _METHODS.get(path, _READS)
 
 
 def with_security_headers(send: Send) -> Send:
@@ -148,8 +144,6 @@ MAX_TARGET_BYTES: Final = 4_096
 # Wrong tokens an address may send at once, and a minute from then on.
 GUESS_BURST: Final = 10
 GUESSES_PER_MINUTE: Final = 10
-
-_PREFLIGHT_MAX_AGE_S: Final = "600"
 
 
 @dataclass(frozen=True, slots=True)
@@ -269,7 +263,8 @@ class AccessControl:
     async def _pass_on(
         self, person: Person | None, scope: Scope, receive: Receive, send: Send
     ) -> None:
-        scope = _without_cookies(scope)
+        # FastAPI takes the cookies of every request apart, wanted or not.
+        scope = {**scope, "headers": [line for line in scope["headers"] if line[0] != b"cookie"]}
         if person is not None:
             scope["state"] = {**scope.get("state", {}), PERSON_KEY: person}
         if person is None or person == SHARED or scope["type"] == "http":
@@ -329,11 +324,6 @@ class AccessControl:
         return _unauthorized("this is not the bridge's token, expected Authorization: Bearer")
 
 
-def _without_cookies(scope: Scope) -> Scope:
-    """What the routes get: FastAPI takes the cookies of every request apart, wanted or not."""
-    return {**scope, "headers": [line for line in scope["headers"] if line[0] != b"cookie"]}
-
-
 def client_of(request: HTTPConnection) -> str:
     """The client that limits are counted for: who is connected, or whom a trusted proxy names."""
     return client_key(request.client.host if request.client is not None else "")
@@ -365,7 +355,7 @@ async def deny(response: Response, scope: Scope, receive: Receive, send: Send) -
 _PREFLIGHT_HEADERS: Final = {
     "access-control-allow-methods": "GET, HEAD",
     "access-control-allow-headers": "Authorization, If-None-Match",
-    "access-control-max-age": _PREFLIGHT_MAX_AGE_S,
+    "access-control-max-age": "600",
 }
 
 

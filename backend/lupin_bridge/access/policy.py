@@ -70,21 +70,21 @@ class Proxies:
         """
         prefix = settings.path_prefix
         if prefix and _PATH_PREFIX.fullmatch(prefix) is None:
-            raise SettingError(
-                f"{settings.called('path_prefix')} is {prefix[:128]!r}, must be a path such as "
-                "/gh1, without a slash at its end"
+            raise settings.wrong(
+                "path_prefix",
+                f"is {prefix[:128]!r}, must be a path such as /gh1, without a slash at its end",
             )
         header = settings.proxy_user_header
         if header and _HEADER.fullmatch(header) is None:
-            raise SettingError(
-                f"{settings.called('proxy_user_header')} is {header[:128]!r}, must be a header's "
-                "name, such as Remote-User"
+            raise settings.wrong(
+                "proxy_user_header",
+                f"is {header[:128]!r}, must be a header's name, such as Remote-User",
             )
         has_unix_socket = unix_path(settings.host) is not None
         if header and not (settings.trusted_proxy or has_unix_socket):
-            raise SettingError(
-                f"{settings.called('proxy_user_header')} is given without --host unix:PATH or "
-                "--trusted-proxy: nobody is believed"
+            raise settings.wrong(
+                "proxy_user_header",
+                "is given without --host unix:PATH or --trusted-proxy: nobody is believed",
             )
         called = settings.called("trusted_proxy")
         proxies = tuple(_network(text, called) for text in settings.trusted_proxy)
@@ -299,21 +299,14 @@ class AccessPolicy:
         host = host_of(hosts[0])
         if host is None:
             return f"Host is {hosts[0][:128]!r}, expected a host and a port"
-        if not self._is_own_name(host):
+        # RFC 6761, section 6.3: localhost and what is below it never leave the machine.
+        is_local = host == "localhost" or host.endswith(".localhost") or _is_ip(host)
+        if not is_local and host not in self._hosts:
             return (
                 f"this bridge is not known by the name {host[:128]!r}: use its IP address, or "
                 f"start it with --allow-host {host[:128]}"
             )
         return None
-
-    def _is_own_name(self, host: str) -> bool:
-        # RFC 6761, section 6.3: localhost and what is below it never leave the machine.
-        return (
-            host in self._hosts
-            or host == "localhost"
-            or host.endswith(".localhost")
-            or _is_ip(host)
-        )
 
     def _judge_origin(self, named: str, own: str) -> Decision:
         try:

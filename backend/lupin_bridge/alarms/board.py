@@ -20,7 +20,7 @@ from typing import Final, Literal
 from lupin_bridge.feed.shared_work import Periodic
 from lupin_bridge.feed.source import TwinSource, TwinUnavailableError
 from lupin_bridge.judge.episodes import MAX_EPISODES, Alarm
-from lupin_bridge.judge.verdict import Verdict
+from lupin_bridge.judge.verdict import ORDER, Verdict
 from lupin_bridge.serving.admission import RateLimit
 from lupin_twin.core.notes import ACKNOWLEDGE, SHELVE, Note, NotesRequest, PastNotes, standing
 from lupin_twin.core.past import NotRemembered, PastRefused
@@ -30,7 +30,6 @@ log = logging.getLogger(__name__)
 # Of the active ones, so many are told to who has room for few: Home Assistant keeps no attributes
 # past 16 kB.
 MAX_WORST: Final = 20
-_ORDER: Final = {verdict: index for index, verdict in enumerate(Verdict)}
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,7 +57,8 @@ class Page:
 
 def page_of(alarms: Iterable[Alarm], since_ns: int = 0) -> Page:
     """Alarms in their order, without what was over before `since_ns`."""
-    known = sorted((alarm for alarm in alarms if not _is_over(alarm, since_ns)), key=_newest_first)
+    kept = (alarm for alarm in alarms if not _is_over(alarm, since_ns))
+    known = sorted(kept, key=lambda alarm: (-alarm.raised_at_ns, alarm.id))
     active = tuple(alarm for alarm in known if alarm.is_active)
     tags: dict[str, list[Alarm]] = {}
     for alarm in active:
@@ -101,13 +101,9 @@ def _is_over(alarm: Alarm, since_ns: int) -> bool:
     return alarm.cleared_at_ns is not None and alarm.cleared_at_ns < since_ns
 
 
-def _newest_first(alarm: Alarm) -> tuple[int, str]:
-    return -alarm.raised_at_ns, alarm.id
-
-
 def worst_first(alarm: Alarm) -> tuple[int, int, str]:
     """An order: by verdict, and then the newest."""
-    return _ORDER[alarm.reason.verdict], -alarm.raised_at_ns, alarm.id
+    return ORDER[alarm.reason.verdict], -alarm.raised_at_ns, alarm.id
 
 
 def active_first(alarm: Alarm) -> tuple[bool, tuple[int, int, str]]:
@@ -149,13 +145,8 @@ class AlarmBoard:
     """Holds the newest `Board`; each change of it is told to all who subscribed, on the loop."""
 
     def __init__(self) -> None:
-        self._now = Board()
+        self.now = Board()
         self._listeners: dict[Listener, None] = {}
-
-    @property
-    def now(self) -> Board:
-        """The alarms as they stand."""
-        return self._now
 
     def subscribe(self, listener: Listener) -> Callable[[], None]:
         """Tell `listener` of every change from now on; what comes back ends that.
@@ -168,10 +159,10 @@ class AlarmBoard:
 
     def put(self, page: Page, change: Change, source: AlarmSource, since_ns: int | None) -> bool:
         """Take these for the alarms as they stand; returns whether anything is as it was not."""
-        before = self._now
+        before = self.now
         if page is before.page and (source, since_ns) == (before.source, before.since_ns):
             return False
-        self._now = Board(page, source, since_ns, before.number + 1)
+        self.now = Board(page, source, since_ns, before.number + 1)
         for listener in tuple(self._listeners):
             try:
                 listener(change)
@@ -232,11 +223,11 @@ def _shelved(alarms: Sequence[Alarm], shelves: Mapping[str, Note]) -> Mapping[st
         note = shelves.get(alarm.id)
         known = held.get(_what(alarm))
         if note is not None and (known is None or known[0].id < note.id):
-            held[_what(alarm)] = note, _ORDER[_verdict_at(alarm, note.made_at_ns)]
+            held[_what(alarm)] = note, ORDER[_verdict_at(alarm, note.made_at_ns)]
     return {
         alarm.id: shelf[0]
         for alarm in alarms
-        if (shelf := held.get(_what(alarm))) and _ORDER[alarm.reason.verdict] >= shelf[1]
+        if (shelf := held.get(_what(alarm))) and ORDER[alarm.reason.verdict] >= shelf[1]
     }
 
 

@@ -18,8 +18,7 @@ from lupin_bridge.feed.shared_work import end
 from lupin_bridge.feed.source import TwinSource, TwinUnavailableError, TwinUpdate
 from lupin_bridge.judge.alarm_fold import FORGET_EVERY_NS, Follower, Found
 from lupin_bridge.judge.episodes import Alarm, silence
-from lupin_bridge.judge.judging import Judge
-from lupin_bridge.judge.options import Criteria
+from lupin_bridge.judge.judging import Criteria, Judge
 from lupin_twin.core.history import KIND_FLOWER, KIND_TAG_READING
 from lupin_twin.core.journal_condition import JournalState
 from lupin_twin.core.past import (
@@ -323,16 +322,13 @@ class AlarmFeed:
         oldest_ns = min(write.stamp_ns for write in lot)
         if self._since_ns is None or oldest_ns < self._since_ns:
             self._since_ns = oldest_ns
-        missed = follower.missed
+        missed = self.missed - follower.missed
         await self._on_worker(lambda _: follower.take(lot))
-        self._missed(follower.missed - missed)
-
-    def _missed(self, count: int) -> None:
-        if count and not self.missed:
+        if follower.missed and not self.missed:
             log.warning(
                 "an observation came too late for its alarms: lupin_alarms_missed counts them"
             )
-        self.missed += count
+        self.missed = missed + follower.missed
 
     async def _publish(self) -> None:
         follower, now_ns = self._follower, self._now_ns()

@@ -14,7 +14,7 @@ import re
 from importlib.resources import files
 from typing import TYPE_CHECKING, Any, Final
 
-from lupin_bridge.settings import variable
+from lupin_bridge.settings import SettingError, variable
 from lupin_twin.journal.schema import POSTGRESQL_TABLES
 
 if TYPE_CHECKING:
@@ -64,7 +64,7 @@ class ArchiveError(Exception):
     """What cannot be done with the archive; the message is the one line that says why."""
 
 
-class UsageError(ArchiveError):
+class UsageError(ArchiveError, SettingError):
     """Asked for in a way that can never work: no later try helps."""
 
 
@@ -146,7 +146,7 @@ def archive_url() -> str:
     return os.environ[variable("archive_url")]
 
 
-def open_archive(url: str, name: str) -> Any:
+def open_archive(url: str) -> Any:
     """A connection that cannot write, to the primary or to a standby.
 
     Raises:
@@ -155,7 +155,7 @@ def open_archive(url: str, name: str) -> Any:
     """
     import psycopg  # noqa: PLC0415  # the extra `fleet`
 
-    connection = connect(url, name, session="any")
+    connection = connect(url, "lupin-twin fleet", session="any")
     try:
         connection.read_only = True
         # All that is read in one transaction is of one moment.
@@ -210,18 +210,13 @@ def check_version(connection: psycopg.Connection[Any]) -> None:
         psycopg.Error: it is none, see `explained`.
 
     """
-    version = version_of(connection)
+    found = connection.execute("SELECT version FROM archive").fetchone()
+    version = 0 if found is None else int(found[0])
     if version != VERSION:
         raise ArchiveError(
             f"the archive is of version {version}, expected {VERSION}:"
             + (" lupin-twin archive migrate" if version < VERSION else " update lupin-twin here")
         )
-
-
-def version_of(connection: psycopg.Connection[Any]) -> int:
-    """Its tables' version."""
-    found = connection.execute("SELECT version FROM archive").fetchone()
-    return 0 if found is None else int(found[0])
 
 
 def init(connection: psycopg.Connection[Any]) -> None:

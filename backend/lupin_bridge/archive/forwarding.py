@@ -91,7 +91,6 @@ class Sink:
     """
 
     def __init__(self, url: str, site: str) -> None:
-        check_site(site)
         self._site = site
         self._connection: Any = connect(url, f"lupin-twin forward {site}")
         self._months: set[int] = set()
@@ -332,11 +331,8 @@ def check(settings: Settings, role: str) -> None:
     if len(given) == 1:
         (other,) = {"site", "archive_url"} - {*given}
         raise SettingError(f"{called} is given without {option(other)}, an archive needs both")
-    try:
-        check_site(settings.site)
-        check_url(settings.archive_url)
-    except UsageError as error:
-        raise SettingError(str(error)) from None
+    check_site(settings.site)
+    check_url(settings.archive_url)
 
 
 class Forwarding:

@@ -11,7 +11,6 @@ import os
 import sqlite3
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import ExitStack
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
@@ -206,18 +205,12 @@ def clock(now_ns: int) -> bytes:
 _OBSERVATIONS, _TAGS, _CLOCK = range(3)
 
 
-@dataclass(frozen=True, slots=True)
-class Exported:
-    """How many messages of each kind."""
-
-    observations: int
-    tags: int
-
-
 def export(
     connection: sqlite3.Connection, path: Path, start_ns: int, end_ns: int, namespace: str = ""
-) -> Exported:
+) -> tuple[int, int]:
     """Write what was received with `start_ns <= stamp < end_ns` into a new file.
+
+    Returns how many observations, and messages of discovered tags.
 
     A message is logged when it arrived, by the wall clock, as a recorder would have. Places that
     tags had before come first. Where time was simulated, `/clock` comes before each message.
@@ -253,7 +246,7 @@ def export(
         writer.finish()  # type: ignore[no-untyped-call]
         file.flush()
         os.fdatasync(file.fileno())
-        if written.observations + written.tags:
+        if any(written):
             if_not_kept.pop_all()
     return written
 
@@ -269,7 +262,7 @@ def _topics(namespace: str, *, has_clock: bool) -> list[Topic]:
     return topics if has_clock else topics[:_CLOCK]
 
 
-def _write(writer: Writer, channels: Sequence[int], rows: JournalRows) -> Exported:
+def _write(writer: Writer, channels: Sequence[int], rows: JournalRows) -> tuple[int, int]:
     counts = [0, 0]
 
     def write(topic: int, at_ns: int, data: bytes) -> None:
@@ -290,5 +283,4 @@ def _write(writer: Writer, channels: Sequence[int], rows: JournalRows) -> Export
             topic, data = _OBSERVATIONS, observation(row)
         write(topic, at_ns, data)
         counts[topic] += 1
-    observations, tags = counts
-    return Exported(observations, tags)
+    return counts[_OBSERVATIONS], counts[_TAGS]

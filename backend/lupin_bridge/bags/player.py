@@ -11,9 +11,8 @@ import math
 import signal
 import sys
 import time
-from collections import deque
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from itertools import islice
+from itertools import chain, islice
 from pathlib import Path
 from typing import Any, Final
 
@@ -21,7 +20,6 @@ import rclpy
 from lupin_msgs.msg import DiscoveredTags, Observation
 from nav_msgs.msg import OccupancyGrid
 from rclpy.node import Node
-from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.signals import SignalHandlerOptions
 from rosgraph_msgs.msg import Clock
 
@@ -36,18 +34,18 @@ from lupin_bridge.bags.recording import (
     clock_ns,
 )
 from lupin_bridge.console import say
+from lupin_twin.ros.base_node import latched
 from lupin_twin.ros.convert import time_msg
 from lupin_twin.runtime import process
 from lupin_twin.runtime.process import remove_stale_shared_memory
 
 NODE_NAME: Final = "lupin_player"
-_TYPES: Final[Mapping[str, Any]] = {
-    OBSERVATION_TYPE: Observation,
-    TAGS_TYPE: DiscoveredTags,
-    MAP_TYPE: OccupancyGrid,
+# With its depth, as a twin subscribes to it (lupin_twin.core.interfaces).
+_TYPES: Final[Mapping[str, tuple[Any, int]]] = {
+    OBSERVATION_TYPE: (Observation, 50),
+    TAGS_TYPE: (DiscoveredTags, 50),
+    MAP_TYPE: (OccupancyGrid, 1),
 }
-# As a twin subscribes to them (lupin_twin.core.interfaces).
-_DEPTHS: Final = {OBSERVATION_TYPE: 50, TAGS_TYPE: 50, MAP_TYPE: 1}
 _STATE_TYPE: Final = "lupin_msgs/msg/TwinState"
 _BEAT_S: Final = 0.02
 # So many a beat, 100 a second: of the 50 that may wait at a twin none is lost while its thread is
@@ -65,10 +63,6 @@ _TWIN_S: Final = 30.0
 _POLL_S: Final = 1.0
 # Before a loop begins again, DDS delivers what was published.
 _DELIVERY_S: Final = 0.5
-
-
-class Refused(Exception):
-    """A recording that must not be played here; the message says why and what to do."""
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -94,7 +88,7 @@ def main(argv: Sequence[str] | None = None) -> int:
                     node.destroy_node()
             finally:
                 rclpy.try_shutdown()
-    except (RecordingError, Refused) as error:
+    except RecordingError as error:
         say(str(error))
         return 1
     return 0
@@ -125,18 +119,10 @@ class PlayerNode(Node):  # type: ignore[misc]  # rclpy is not typed
         """Publish by new publishers: a late subscriber gets nothing of an earlier loop."""
         for publisher in self._publishers_by_topic.values():
             self.destroy_publisher(publisher)
-        self._publishers_by_topic = {
-            topic: self.create_publisher(
-                _TYPES[kind],
-                topic,
-                QoSProfile(
-                    depth=_DEPTHS[kind],
-                    reliability=ReliabilityPolicy.RELIABLE,
-                    durability=DurabilityPolicy.TRANSIENT_LOCAL,
-                ),
-            )
-            for topic, kind in self._inputs.items()
-        }
+        for topic, kind in self._inputs.items():
+            message_type, depth = _TYPES[kind]
+            publisher = self.create_publisher(message_type, topic, latched(depth))
+            self._publishers_by_topic[topic] = publisher
 
     def publish_time(self, now_ns: int) -> None:
         """Publish `/clock`."""
@@ -160,7 +146,7 @@ class PlayerNode(Node):  # type: ignore[misc]  # rclpy is not typed
         """Refuse a second twin in this ROS domain: its journal would keep what is played.
 
         Raises:
-            Refused: see above.
+            RecordingError: see above.
 
         """
         twins = [
@@ -170,7 +156,7 @@ class PlayerNode(Node):  # type: ignore[misc]  # rclpy is not typed
             for info in self.get_publishers_info_by_topic(topic)
         ]
         if len(twins) > 1:
-            raise Refused(
+            raise RecordingError(
                 f"several twins run in ROS domain {self.context.get_domain_id()} "
                 f"({', '.join(sorted(twins))}), and a journal would keep what is played: choose "
                 "another ROS_DOMAIN_ID for this demo"
@@ -202,16 +188,15 @@ class Player:
             newest = recording.messages([CLOCK_TOPIC], before_ns=self._start_ns, newest_first=True)
             for message in islice(newest, 1):
                 self._time_ns = clock_ns(message.data)
-        self._before = deque[Recorded]()
+        self._earlier: Iterator[Recorded] = iter(())
         if self._start_ns > recording.start_ns:
             maps = [topic for topic, kind in inputs.items() if kind == MAP_TYPE]
-            for topic in maps:
-                last = recording.messages([topic], before_ns=self._start_ns, newest_first=True)
-                self._before.extend(islice(last, 1))
-            rest = inputs.keys() - set(maps)
-            self._earlier: Iterator[Recorded] = recording.messages(rest, before_ns=self._start_ns)
-        else:
-            self._earlier = iter(())
+            last = [
+                recording.messages([topic], before_ns=self._start_ns, newest_first=True)
+                for topic in maps
+            ]
+            rest = recording.messages(inputs.keys() - {*maps}, before_ns=self._start_ns)
+            self._earlier = chain(*(islice(of_map, 1) for of_map in last), rest)
         topics = [*inputs, *([CLOCK_TOPIC] if recording.has_clock else [])]
         self._rest = recording.messages(topics, from_ns=self._start_ns)
         self._next = next(self._rest, None)
@@ -231,7 +216,7 @@ class Player:
 
         """
         left = _MAX_A_BEAT
-        while left and (earlier := self._take_earlier()) is not None:
+        for earlier in islice(self._earlier, left):
             self._publish(earlier)
             left -= 1
         if not left:
@@ -272,9 +257,6 @@ class Player:
         if not self._recording.has_clock:
             self._time_ns = min(self._position_ns, self._recording.end_ns)
 
-    def _take_earlier(self) -> Recorded | None:
-        return self._before.popleft() if self._before else next(self._earlier, None)
-
     def _publish(self, message: Recorded) -> None:
         self._node.publish(message)
         self.published += 1
@@ -293,7 +275,7 @@ def _play(
     until_s = time.monotonic() + _TWIN_S
     while not node.has_subscribers and not stopped():
         if time.monotonic() > until_s:
-            raise Refused(f"no twin has subscribed within {_TWIN_S:g} s")
+            raise RecordingError(f"no twin has subscribed within {_TWIN_S:g} s")
         time.sleep(_BEAT_S)
     say(f"playing {recording.name}")
     player = Player(recording, node, options)

@@ -21,7 +21,7 @@ from datetime import UTC, datetime
 from typing import Final, NoReturn
 
 from lupin_bridge import __version__
-from lupin_bridge.cli import archive, import_csv, journal, people
+from lupin_bridge.cli import administration, import_csv, journal
 from lupin_bridge.serving.admission import RateLimit
 from lupin_bridge.settings import (
     CONFIG_VARIABLE,
@@ -135,11 +135,11 @@ USAGE_ERROR = 2
 _WITHOUT_ROS = {
     "journal": journal.run,
     "import": import_csv.run,
-    "archive": archive.run,
-    "forward": archive.run,
-    "user": people.run,
-    "token": people.run,
-    "audit": people.run,
+    "archive": administration.run_archive,
+    "forward": administration.run_archive,
+    "user": administration.run_people,
+    "token": administration.run_people,
+    "audit": administration.run_people,
 }
 
 
@@ -168,14 +168,12 @@ def main(argv: Sequence[str] | None = None) -> int:
         for warning in strange_variables(os.environ):
             log.warning("%s", warning)
         secrets = take_secrets(settings, os.environ)
+        from lupin_bridge.cli import roles  # noqa: PLC0415  # see above
+
         if options.role == "fleet":
-            from lupin_bridge.cli.serving import run_fleet  # noqa: PLC0415  # without ROS
-
-            run_fleet(settings, secrets, ros_args)
+            roles.run_fleet(settings, secrets, ros_args)
             return 0
-        from lupin_bridge.cli.roles import run  # noqa: PLC0415  # see above
-
-        run(
+        roles.run(
             options.role,
             settings,
             secrets,
@@ -331,12 +329,12 @@ def parser() -> argparse.ArgumentParser:
                 help="jump over its silences of more than so many seconds (default: wait)",
             )
     journal.add_parser(roles)
-    archive.add_parsers(roles)
+    administration.add_archive(roles)
     import_csv.add_parser(roles)
     adapt.add_options(
         roles.add_parser("adapt", help=adapt.HELP, description=adapt.HELP, allow_abbrev=False)
     )
-    people.add_parsers(roles)
+    administration.add_people(roles)
     return made
 
 

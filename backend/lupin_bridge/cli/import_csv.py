@@ -22,7 +22,7 @@ from zoneinfo import ZoneInfo
 
 from lupin_bridge.cli.journal import SHOWN, JournalError, add_which, fail, path_of
 from lupin_bridge.console import Progress, Roles, add_role, say, tell
-from lupin_bridge.judge.options import zone_of
+from lupin_bridge.judge.judging import zone_of
 from lupin_twin.adapt.config import read_yaml
 from lupin_twin.adapt.table import (
     AS_IT_IS,
@@ -85,7 +85,7 @@ class Summary:
     scans: int = 0
     repeated: int = 0
     tags: set[str] = field(default_factory=set)
-    sensors: dict[str, list[float]] = field(default_factory=dict)
+    sensors: dict[str, tuple[int, float, float]] = field(default_factory=dict)
     first_ns: int = 0
     last_ns: int = 0
     refused: dict[str, list[int]] = field(default_factory=dict)
@@ -109,16 +109,10 @@ class Summary:
             check_length("tags", len(self.tags) + 1, MAX_TAGS)
             self.tags.add(tag_id)
         for name, value in zip(names, values, strict=True):
-            sensor = self.sensors.get(name)
-            if sensor is None:
+            if name not in self.sensors:
                 check_length("sensors", len(self.sensors) + 1, MAX_SENSORS_PER_TAG)
-                self.sensors[name] = [1, value, value]
-                continue
-            sensor[0] += 1
-            if value < sensor[1]:
-                sensor[1] = value
-            elif value > sensor[2]:
-                sensor[2] = value
+            count, low, high = self.sensors.get(name, (0, value, value))
+            self.sensors[name] = count + 1, min(low, value), max(high, value)
         self.scans += 1
 
     def lines(self) -> Iterator[str]:
@@ -131,7 +125,7 @@ class Summary:
             )
             yield f"from {first} to {last}"
         for name, (count, low, high) in sorted(self.sensors.items()):
-            yield f"{name}: {count:.0f} readings from {low:.6g} to {high:.6g}"
+            yield f"{name}: {count} readings from {low:.6g} to {high:.6g}"
         for reason, (count, *examples) in self.refused.items():
             yield f"refused: {count}: {reason} (line {', '.join(map(str, examples))})"
         if self.repeated:

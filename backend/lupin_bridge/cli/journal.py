@@ -6,13 +6,11 @@ Everything but `forget` and `vacuum` reads, also while a twin writes.
 from __future__ import annotations
 
 import argparse
-import getpass
-import os
 import sqlite3
 import time
 from collections.abc import Mapping
 from contextlib import closing
-from datetime import UTC, datetime, timedelta
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any, Final
 
@@ -26,8 +24,9 @@ from lupin_bridge.console import (
     backup,
     say,
     standard,
+    user,
 )
-from lupin_bridge.judge.options import Criteria
+from lupin_bridge.judge.judging import Criteria
 from lupin_bridge.past import bodies
 from lupin_bridge.past.query import MAX_SECONDS, moment
 from lupin_bridge.settings import SettingError, settings_from, variable
@@ -52,7 +51,6 @@ _MAX_SHOWN: Final = 20
 _RUNS_SHOWN: Final = 10
 _MAX_DOMAIN: Final = 232  # ROS has ports for no more
 _END_NS: Final = (MAX_SECONDS + 1) * 10**9  # past every stamp
-_EPOCH: Final = datetime(1970, 1, 1, tzinfo=UTC)
 # Where a systemd service keeps it: backend/deploy/lupin-twin.service.
 SERVICE_FOLDER: Final = Path("/var/lib/lupin-twin")
 
@@ -261,7 +259,7 @@ def _reach(extents: list[RunExtent]) -> str:
         return "simulated clocks alone, see runs" if extents else "nothing"
     first = min(extent.first_ns or 0 for extent in of_wall)
     last = max(extent.last_ns or 0 for extent in of_wall)
-    return f"{_iso(first)} to {_iso(last)}"
+    return f"{iso(first)} to {iso(last)}"
 
 
 def _retention(found: Overview) -> str:
@@ -277,14 +275,14 @@ def _run_line(extent: RunExtent) -> str:
     elif begun.is_simulated:
         stretch = f"second {extent.first_ns / 1e9:.3f} to {extent.last_ns / 1e9:.3f}"
     else:
-        stretch = f"{_iso(extent.first_ns)} to {_iso(extent.last_ns)}"
+        stretch = f"{iso(extent.first_ns)} to {iso(extent.last_ns)}"
     clock = "simulated clock" if begun.is_simulated else "wall clock"
-    return f"{extent.run.id}: {clock}, begun {_iso(begun.arrival_ns)}: {stretch}"
+    return f"{extent.run.id}: {clock}, begun {iso(begun.arrival_ns)}: {stretch}"
 
 
 def _forgotten_line(record: Mapping[str, Any]) -> str:
     what = "the pose of tag" if record["what"] == "pose" else "all of tag"
-    return f"{what} {record['tag']!r}, by {record['by']}, {_iso(record['at'])}"
+    return f"{what} {record['tag']!r}, by {record['by']}, {iso(record['at'])}"
 
 
 # --- check ---------------------------------------------------------------------------------------
@@ -338,18 +336,15 @@ def _record(path: Path, options: argparse.Namespace, start_ns: int, end_ns: int)
         from lupin_bridge.bags.journal_export import export  # noqa: PLC0415
 
         with closing(_reader(path)) as connection:
-            made = export(connection, target, start_ns, end_ns, options.namespace)
+            observations, tags = export(connection, target, start_ns, end_ns, options.namespace)
     except FileExistsError as error:
         raise JournalError(f"{target} is there already, and nothing is overwritten") from error
     except (OSError, LookupError) as error:
         why = getattr(error, "strerror", None) or str(error)
         raise JournalError(f"cannot make {target}: {why}") from error
-    if not made.observations + made.tags:
+    if not observations + tags:
         raise JournalError(f"the journal {path} holds nothing of that period")
-    _say(
-        f"{made.observations:,} observations and {made.tags:,} messages of discovered tags are in"
-        f" {target}"
-    )
+    _say(f"{observations:,} observations and {tags:,} messages of discovered tags are in {target}")
     return 0
 
 
@@ -369,7 +364,7 @@ def _backup(path: Path, target: Path) -> int:
 
 
 def _forget(path: Path, options: argparse.Namespace) -> int:
-    gone = forget(path, options.tag, pose_only=options.pose, by=_user(), at_ns=time.time_ns())
+    gone = forget(path, options.tag, pose_only=options.pose, by=user(), at_ns=time.time_ns())
     if options.pose:
         _say(f"{path}: the pose of tag {options.tag!r} is forgotten; the next twin pins it anew")
     else:
@@ -379,13 +374,6 @@ def _forget(path: Path, options: argparse.Namespace) -> int:
             " counts of the timeline still have them"
         )
     return 0
-
-
-def _user() -> str:
-    try:
-        return getpass.getuser()
-    except (KeyError, OSError):
-        return f"user {os.getuid()}"
 
 
 # --- vacuum --------------------------------------------------------------------------------------
@@ -411,12 +399,9 @@ def _mb(count: int) -> str:
     return f"{count / 1e6:,.1f} MB"
 
 
-def _iso(stamp_ns: int) -> str:
-    try:
-        moment = _EPOCH + timedelta(microseconds=stamp_ns // 1000)
-    except OverflowError:
-        return f"second {stamp_ns // 10**9}"
-    return moment.isoformat(timespec="seconds").replace("+00:00", "Z")
+def iso(stamp_ns: int) -> str:
+    """A moment as ISO 8601 in UTC, to the second."""
+    return f"{datetime.fromtimestamp(stamp_ns // 10**9, UTC):%Y-%m-%dT%H:%M:%SZ}"
 
 
 def fail(message: str) -> int:

@@ -1,4 +1,4 @@
-"""What `serve`, `demo` and `web` run: a source, a bridge and a server around one event loop.
+"""What `serve`, `demo`, `web` and `fleet` run: a source, a bridge and a server around one loop.
 
 What the demo has and no robot needs: who feeds its twin, a journal of its own, and a past.
 """
@@ -10,6 +10,7 @@ import json
 import logging
 import math
 import os
+import socket
 import subprocess
 import sys
 import tempfile
@@ -22,24 +23,28 @@ from typing import Final
 
 from lupin_bridge.access.accounts import accounts_path
 from lupin_bridge.access.middleware import Access
-from lupin_bridge.access.policy import Proxies
+from lupin_bridge.access.policy import Proxies, exposure
 from lupin_bridge.app import create_app, has_page
 from lupin_bridge.archive import forwarding as archive
+from lupin_bridge.archive.database import ArchiveError, check_url, open_archive
 from lupin_bridge.bags.recording import INPUTS, Recording, RecordingError
 from lupin_bridge.bridge import Bridge
-from lupin_bridge.cli.serving import Supervisor, open_listener, serve
-from lupin_bridge.feed.local import LocalTwin
-from lupin_bridge.feed.ros_thread import RosStartError
-from lupin_bridge.feed.source import ailment
-from lupin_bridge.feed.web import WebTwin
-from lupin_bridge.judge.options import Criteria
+from lupin_bridge.feed.source import TwinSource, ailment
+from lupin_bridge.judge.judging import Criteria
 from lupin_bridge.notify.channels import Channels
 from lupin_bridge.notify.destinations import Targets
 from lupin_bridge.notify.push import Push
 from lupin_bridge.routes.pages import HOW_TO_BUILD
 from lupin_bridge.serving.admission import Limits
-from lupin_bridge.serving.server import BridgeServer, allow_connections
-from lupin_bridge.settings import Secrets, SettingError, Settings
+from lupin_bridge.serving.server import (
+    BridgeServer,
+    Supervisor,
+    allow_connections,
+    check_pair,
+    listen,
+    serve,
+)
+from lupin_bridge.settings import Secrets, SettingError, Settings, option, unix_path, variable
 from lupin_bridge.stream.frames import STALE_AFTER_S
 from lupin_twin.core.parameters import ParameterError, World
 from lupin_twin.journal.appending import is_empty, simulated
@@ -234,8 +239,34 @@ def run(
             elif role == "demo":
                 feed = patrolled(os.environ, patrol_args, ros_args)
             asyncio.run(_run(role, settings, secrets, ros_args, feed))
-        except (ParameterError, RosStartError, RecordingError) as error:
+        except (ParameterError, RecordingError) as error:
             raise SettingError(str(error)) from error
+
+
+def _open_listener(settings: Settings, access: Access) -> socket.socket:
+    """Listen, and warn of who may read.
+
+    Raises:
+        SettingError: it cannot listen there, or the certificate cannot be.
+
+    """
+    if settings.tls_cert:
+        check_pair(settings.tls_cert, settings.tls_key)
+    path = unix_path(settings.host)
+    try:
+        listener = listen(settings.host, settings.port)
+    except OSError as error:
+        where = "" if path else f" port {settings.port}"
+        raise SettingError(
+            f"cannot listen on {settings.host}{where}: {error.strerror or error}"
+        ) from error
+    if path:  # none but its owner and group reach it
+        return listener
+    for warning in exposure(
+        listener.getsockname()[0], has_token=access.is_closed, has_tls=bool(settings.tls_cert)
+    ):
+        log.warning("%s", warning)
+    return listener
 
 
 async def _run(
@@ -251,20 +282,18 @@ async def _run(
     targets = Targets.of(settings, secrets)
     archive.check(settings, role)
     if settings.journal and role != "web":
-        raise SettingError(
-            f"{settings.called('journal')} is for web; a twin's own file is its parameter journal"
-        )
+        raise settings.wrong("journal", "is for web; a twin's own file is its parameter journal")
     if "://" in settings.journal:
-        raise SettingError(
-            f"{settings.called('journal')} is {settings.journal!r}, expected a file; an archive is "
-            "shown by lupin-twin fleet"
+        raise settings.wrong(
+            "journal",
+            f"is {settings.journal!r}, expected a file; an archive is shown by lupin-twin fleet",
         )
     if settings.journal and not Path(settings.journal).exists():
         log.warning(
             "%s: there is no file %s; until there is, the twin's log is copied over ROS",
             *(settings.called("journal"), settings.journal),
         )
-    listener = open_listener(settings, access)
+    listener = _open_listener(settings, access)
     if not has_page():
         log.warning("the page was not built, / says so: %s", HOW_TO_BUILD)
     settings = replace(settings, max_clients=allow_connections(settings.max_clients))
@@ -280,12 +309,8 @@ async def _run(
     outward = Channels(targets, accounts_path(settings).parent, push)
     bridge = Bridge(source, settings, criteria=criteria, outward=outward, limits=limits)
     app = create_app(bridge, access=access, proxies=proxies)
-
-    def announce_shutdown() -> None:
-        supervisor.stopping()
-        bridge.announce_shutdown()
-
-    server = BridgeServer(app, settings, announce_shutdown, limits)
+    announcements = (supervisor.stopping, bridge.announce_shutdown)
+    server = BridgeServer(app, settings, announcements, limits)
     await bridge.start()
     feeder = None if feed is None else Feeder(feed, lambda: server.should_exit)
     forwarding = archive.Forwarding(settings, lambda: source.journal().path)
@@ -302,7 +327,10 @@ def _source_of(
     ros_args: Sequence[str],
     feed: Feed | None,
     limits: Limits,
-) -> LocalTwin | WebTwin:
+) -> TwinSource:
+    from lupin_bridge.feed.local import LocalTwin  # noqa: PLC0415  # a fleet has no ROS
+    from lupin_bridge.feed.web import WebTwin  # noqa: PLC0415
+
     timeout_s = limits.answer_timeout_s
     if role == "web":
         return WebTwin(
@@ -346,3 +374,64 @@ class Feeder:
             log.error(
                 "the %s has ended with code %d; the twin goes on without it", self._what, code
             )
+
+
+# --- the page over all greenhouses, until a signal ends it ----------------------------------------
+
+# Of the twin's own: a fleet has none.
+_NOT_HERE = ("site", "journal", "mqtt_url", "webhook_url", "http_observations")
+
+
+def run_fleet(settings: Settings, secrets: Secrets, ros_args: Sequence[str]) -> None:
+    """Serve until a signal ends it.
+
+    Raises:
+        SettingError: a setting with which it cannot run.
+
+    """
+    # What is wrong is said once, here.
+    logging.getLogger("psycopg").setLevel(logging.CRITICAL)
+    if ros_args:
+        raise SettingError("fleet takes no arguments of ROS")
+    if not settings.archive_url:
+        raise SettingError(f"{option('archive_url')} is missing, or {variable('archive_url')}")
+    for name in _NOT_HERE:
+        if getattr(settings, name) not in ("", "off"):
+            raise settings.wrong(name, "is for a twin, not for lupin-twin fleet")
+    check_url(settings.archive_url)
+    access = Access.of(settings, secrets.token, is_fleet=True)
+    proxies = Proxies.of(settings)
+    criteria = Criteria.of(settings)
+    asyncio.run(_run_fleet(settings, access, proxies, criteria))
+
+
+async def _run_fleet(
+    settings: Settings, access: Access, proxies: Proxies, criteria: Criteria
+) -> None:
+    from lupin_bridge.fleet.app import Fleet, create_fleet_app  # noqa: PLC0415  # not for a twin
+
+    listener = _open_listener(settings, access)
+    await asyncio.to_thread(_report_error, settings.archive_url)
+    settings = replace(settings, max_clients=allow_connections(settings.max_clients))
+    # For the process that reads; not on its command line, which others can read.
+    os.environ[variable("archive_url")] = settings.archive_url
+    supervisor = Supervisor(os.environ)
+    limits = Limits()
+    fleet = Fleet(settings, criteria, access, limits)
+    app = create_fleet_app(fleet, access, proxies)
+    announcements = (supervisor.stopping, fleet.announce_shutdown)
+    server = BridgeServer(app, settings, announcements, limits)
+    await fleet.start()
+    try:
+        await serve(server, listener, settings, supervisor, lambda: None)
+    finally:
+        await fleet.stop()
+
+
+def _report_error(url: str) -> None:
+    """At once, in one line; it may pass, so the page is served all the same, and says so."""
+    try:
+        with closing(open_archive(url)):
+            pass
+    except ArchiveError as error:
+        log.error("%s; it will be retried", error)  # noqa: TRY400  # one line

@@ -50,7 +50,7 @@ class LocalTwin(RosSource[TwinNode]):
                 post(
                     TwinUpdate(
                         snapshot,
-                        self._revision_of(node),
+                        "-".join((self.identity, *map(str, node.revision))),
                         node.twins.value,
                         node.occupancy_map,
                         node.utilities.counts(),
@@ -98,7 +98,3 @@ class LocalTwin(RosSource[TwinNode]):
         if damage:
             await self.thread.call(lambda node: node.memory.journal.heal(damage))
         return error
-
-    def _revision_of(self, node: TwinNode) -> str:
-        """The process's identity, the observation count, and the map's and the rules' revision."""
-        return "-".join((self.identity, *map(str, node.revision)))

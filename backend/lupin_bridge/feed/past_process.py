@@ -153,10 +153,7 @@ class PastProcess:
         answer = self.asked.get(number)
         if answer is None or answer.done():
             return  # nobody waits any more
-        try:
-            is_error, value = pickle.loads(text)  # noqa: S301  # our own
-        except Exception as error:  # noqa: BLE001  # goes to the caller
-            is_error, value = True, error
+        is_error, value = pickle.loads(text)  # noqa: S301  # our own
         if is_error:
             answer.set_exception(value)
         else:

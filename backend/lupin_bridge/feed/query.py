@@ -101,25 +101,19 @@ class Itself:
 
 @dataclass(frozen=True, slots=True)
 class ExportStep(Generic[ResultT]):
-    """The next lots of an export, each through `write`, and the export behind them; None: its end.
+    """The next lots of an export, through `write`, and the export from there; None: its end."""
 
-    `export` is pickled: nobody looks at it between two steps.
-    """
-
-    export: bytes
+    export: Export
     write: Callable[[Sequence[PastRow]], ResultT]
 
     def answer(
         self,
         find: Find,
         should_stop: ShouldStop,  # noqa: ARG002
-    ) -> tuple[bytes | None, list[ResultT]]:
+    ) -> tuple[Export | None, list[ResultT]]:
         """See `PastQuery`."""
-        export: Export = pickle.loads(self.export)  # noqa: S301  # our own
-        rows: list[PastRow] | None = find(export)
-        if rows is None:
-            return None, []
-        return pickle.dumps(export, 5), [self.write(lot) for lot in lots(rows)]
+        rows: list[PastRow] | None = find(self.export)
+        return (None, []) if rows is None else (self.export, [self.write(it) for it in lots(rows)])
 
 
 # --- the process that reads the past --------------------------------------------------------------
@@ -194,10 +188,7 @@ class Child:
             self._send(number, error is not None, error or done.result())
 
     def _send(self, number: int, is_error: bool, value: Any) -> None:
-        try:
-            answer = pickle.dumps((is_error, _portable(value) if is_error else value), 5)
-        except Exception as unfit:  # noqa: BLE001  # an answer of any kind may not be for pickling
-            answer = pickle.dumps((True, _portable(unfit)))
+        answer = pickle.dumps((is_error, _portable(value) if is_error else value), 5)
         # Whoever sends waits until the parent has taken it: so much is kept for it, and no more.
         with self._sending:
             self._out.writelines((HEAD.pack(number, len(answer)), answer))

@@ -1,8 +1,8 @@
 """ROS topics as they are on the wire, for whoever in the bridge asks for one: raw CDR, on demand.
 
-    listening = await source.relay.listen(topic, on_sample)
+    close = await source.relay.listen(topic, on_sample)
     ...
-    listening.close()
+    close()
 
 `topic` is one of `topics_of(source.names)`, or a `Topic` of one's own. `on_sample(sample)`
 is called on the event loop for each sample, and must not wait. Of a latched topic the newest ones
@@ -145,31 +145,6 @@ class Bounded:
         return sample
 
 
-class Listening:
-    """Somebody's ear on a topic, until it is closed."""
-
-    def __init__(
-        self, on_sample: Callable[[Sample], None], leave: Callable[[Listening], None]
-    ) -> None:
-        self._on_sample = on_sample
-        self._leave = leave
-        self._is_open = True
-
-    def close(self) -> None:
-        """Hear no more; harmless if it is closed already."""
-        if self._is_open:
-            self._is_open = False
-            self._leave(self)
-
-    def receive(self, sample: Sample) -> None:
-        """Pass a sample on; an error is the listener's, and the others' ears are spared it."""
-        if self._is_open:
-            try:
-                self._on_sample(sample)
-            except Exception:  # whatever it is: the other listeners hear it all the same
-                log.exception("a listener met an error")
-
-
 class _Relayed:
     """One topic: what has come of it, and who listens."""
 
@@ -179,7 +154,7 @@ class _Relayed:
         self.incoming: deque[Sample] = deque(maxlen=topic.depth)
         self.latched = Bounded(topic)
         self.opening: asyncio.Task[Callable[[], None]]
-        self.listeners: list[Listening] = []
+        self.listeners: list[Callable[[Sample], None]] = []
 
     def hand_out(self) -> None:
         """Give all that has come to all who listen."""
@@ -187,8 +162,15 @@ class _Relayed:
             sample = self.incoming.popleft()
             if self.topic.latched:
                 self.latched.put(sample)
-            for listening in list(self.listeners):
-                listening.receive(sample)
+            for on_sample in list(self.listeners):
+                _pass_on(sample, on_sample)
+
+
+def _pass_on(sample: Sample, on_sample: Callable[[Sample], None]) -> None:
+    try:
+        on_sample(sample)
+    except Exception:  # whatever it is: the other listeners hear it all the same
+        log.exception("a listener met an error")
 
 
 class Relay:
@@ -211,8 +193,8 @@ class Relay:
         """How many topics are relayed."""
         return len(self._topics)
 
-    async def listen(self, topic: Topic, on_sample: Callable[[Sample], None]) -> Listening:
-        """Listen to a topic; whether anybody publishes it is another matter.
+    async def listen(self, topic: Topic, on_sample: Callable[[Sample], None]) -> Callable[[], None]:
+        """Listen to a topic, whoever publishes it; returns what ends that, however often called.
 
         Raises:
             NotRelayedError: its type is not installed here, or ROS takes no such name.
@@ -223,16 +205,16 @@ class Relay:
         if relayed is None:
             relayed = self._topics[topic] = _Relayed(topic)
             self._open(relayed)
-        listening = Listening(on_sample, partial(self._leave, relayed))
         for sample in list(relayed.latched.samples):
-            listening.receive(sample)
-        relayed.listeners.append(listening)
+            _pass_on(sample, on_sample)
+        relayed.listeners.append(on_sample)
+        close = partial(self._leave, relayed, on_sample)
         with ExitStack() as undo:
-            undo.callback(listening.close)
+            undo.callback(close)
             # Not ended with who asked first: others may wait for it by now.
             await asyncio.shield(relayed.opening)
             undo.pop_all()
-        return listening
+        return close
 
     def renew(self) -> None:
         """Subscribe to all topics again: there is another node."""
@@ -301,10 +283,11 @@ class Relay:
         if self._topics.get(relayed.topic) is relayed:
             del self._topics[relayed.topic]
 
-    def _leave(self, relayed: _Relayed, listening: Listening) -> None:
-        relayed.listeners.remove(listening)
-        if not relayed.listeners:
-            asyncio.get_running_loop().call_later(self.linger_s, self._end, relayed)
+    def _leave(self, relayed: _Relayed, on_sample: Callable[[Sample], None]) -> None:
+        if on_sample in relayed.listeners:
+            relayed.listeners.remove(on_sample)
+            if not relayed.listeners:
+                asyncio.get_running_loop().call_later(self.linger_s, self._end, relayed)
 
     def _end(self, relayed: _Relayed) -> None:
         if relayed.listeners or self._topics.get(relayed.topic) is not relayed:

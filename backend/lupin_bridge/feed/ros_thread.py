@@ -20,6 +20,7 @@ from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.signals import SignalHandlerOptions
 
 from lupin_bridge.feed.source import TwinUnavailableError
+from lupin_bridge.settings import SettingError
 from lupin_twin.core.parameters import TwinParameters
 from lupin_twin.ros.base_node import NodeUtilities, end_spinning, spin_until_shutdown
 from lupin_twin.runtime.process import remove_stale_shared_memory
@@ -54,10 +55,6 @@ STOP_TIMEOUT_S = 0.9
 # How long after one heartbeat came back the next one is sent.
 BEAT_PERIOD_S = 1.0
 _NOT_RUNNING: Final = "the ROS thread is not running"
-
-
-class RosStartError(RuntimeError):
-    """ROS cannot be started with these arguments; the message is rcl's own, in one line."""
 
 
 class BridgedNode(Protocol):
@@ -121,7 +118,7 @@ class RosThread(Generic[NodeT, EventT]):
         """Start the thread; returns when the node is there.
 
         Raises:
-            RosStartError: ROS does not understand its arguments.
+            SettingError: ROS does not understand its arguments; the message is rcl's own.
             Exception: whatever `make_node` raised, such as a `ParameterError`.
 
         """
@@ -288,7 +285,7 @@ class RosThread(Generic[NodeT, EventT]):
                 signal_handler_options=SignalHandlerOptions.NO,
             )
         except Exception as error:  # rclpy raises several kinds
-            raise RosStartError(" ".join(str(error).split())) from error
+            raise SettingError(" ".join(str(error).split())) from error
         remove_stale_shared_memory(self._context.get_domain_id())
 
     def _end(self, error: BaseException | None) -> None:

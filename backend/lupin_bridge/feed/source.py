@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import asyncio
 import math
-import pickle
 import time
 from abc import ABC, abstractmethod
 from collections.abc import AsyncGenerator, Awaitable, Callable, Sequence
@@ -103,7 +102,8 @@ class RobotLog:
         before = self.now
         future_ns = _FOREVER_NS if now_ns is None else now_ns + MAX_AHEAD_NS
         if now_ns is not None:
-            self._cut_trail(now_ns - TRAIL_NS, future_ns)
+            past_ns = now_ns - TRAIL_NS
+            self.trail = [it for it in self.trail if past_ns <= it.at_ns <= future_ns]
         position = _newest(before.position, heard.position, future_ns)
         if position is not None and position is heard.position:
             self._extend(position)
@@ -115,15 +115,11 @@ class RobotLog:
         self.now = Robot(position, self._pending(plan, position, now_ns), battery)
         return self.now != before
 
-    def _cut_trail(self, past_ns: int, future_ns: int) -> None:
-        trail = self.trail
-        if trail and (trail[0].at_ns < past_ns or trail[-1].at_ns > future_ns):
-            self.trail = [it for it in trail if past_ns <= it.at_ns <= future_ns]
-
     def _extend(self, position: Position) -> None:
         if self.trail:
             last = self.trail[-1]
-            if position.at_ns < last.at_ns + TRAIL_STEP_NS or _apart(last, position) < TRAIL_STEP_M:
+            apart_m = math.hypot(position.x - last.x, position.y - last.y)
+            if position.at_ns < last.at_ns + TRAIL_STEP_NS or apart_m < TRAIL_STEP_M:
                 return
         self.trail.append(position)
         if len(self.trail) > TRAIL_POINTS:
@@ -142,10 +138,6 @@ class RobotLog:
         is_away = math.hypot(position.x - x, position.y - y) > ARRIVED_M
         self._was_away |= is_away
         return None if self._was_away and not is_away else plan
-
-
-def _apart(a: Position, b: Position) -> float:
-    return math.hypot(a.x - b.x, a.y - b.y)
 
 
 def _same_end(a: Plan, b: Plan) -> bool:
@@ -392,7 +384,7 @@ def ailment(thread: Any) -> str | None:
 
 
 async def exported(
-    ask: Callable[[ExportStep[ResultT]], Awaitable[tuple[bytes | None, Sequence[ResultT]]]],
+    ask: Callable[[ExportStep[ResultT]], Awaitable[tuple[Export | None, Sequence[ResultT]]]],
     period: Export,
     write: Callable[[Sequence[PastRow]], ResultT],
 ) -> AsyncGenerator[ResultT]:
@@ -400,7 +392,7 @@ async def exported(
 
     `ask` asks the process that reads the past.
     """
-    export: bytes | None = pickle.dumps(period)
+    export: Export | None = period
     while export is not None:
         export, lots = await ask(ExportStep(export, write))
         for lot in lots:

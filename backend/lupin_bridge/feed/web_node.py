@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from hashlib import blake2b
 from typing import Any, Final
@@ -68,12 +68,6 @@ def _digest_of_map(occupancy: OccupancyMap) -> int:
     digest = blake2b(repr(occupancy.place).encode("utf-8", "surrogatepass"), digest_size=6)
     digest.update(occupancy.cells.data)
     return int.from_bytes(digest.digest())
-
-
-def _digest_of_publishers(publishers: Iterable[Any]) -> str:
-    """The same in all replicas: DDS gives a publisher one id for all who see it."""
-    ids = sorted(bytes(info.endpoint_gid) for info in publishers)
-    return blake2b(b"".join(ids), digest_size=6).hexdigest()
 
 
 class WebNode(AdjustableNode):
@@ -239,7 +233,9 @@ class WebNode(AdjustableNode):
     def _show(self, msg: Any, times: Any) -> None:
         self._patience.cancel()
         topic = self._topics["state_topic"]
-        self.publishers_digest = _digest_of_publishers(self.get_publishers_info_by_topic(topic))
+        # The same in all replicas: DDS gives a publisher one id for all who see it.
+        ids = sorted(bytes(it.endpoint_gid) for it in self.get_publishers_info_by_topic(topic))
+        self.publishers_digest = blake2b(b"".join(ids), digest_size=6).hexdigest()
         self.utilities.check_twins(self.twins, topic, "what is shown is a mixture")
         before = self._newest
         snapshot = convert.snapshot_of(msg, before, times)

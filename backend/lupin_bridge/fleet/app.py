@@ -48,10 +48,10 @@ from lupin_bridge.fleet.overview import (
 )
 from lupin_bridge.fleet.pages import Opened, SitePage, SitePages, Sites
 from lupin_bridge.fleet.source import SiteTwin, Watching
-from lupin_bridge.judge.options import Criteria
+from lupin_bridge.judge.judging import Criteria
 from lupin_bridge.metrics import CONTENT_TYPE
 from lupin_bridge.past.bodies import COMPLETE_TO
-from lupin_bridge.past.export import CSV, PARQUET, ExportFormat
+from lupin_bridge.past.export import Csv, Parquet
 from lupin_bridge.past.query import OfExport
 from lupin_bridge.query_string import parameter, read
 from lupin_bridge.routes import pages, status
@@ -65,7 +65,7 @@ from lupin_bridge.routes.answers import (
     person_of,
     respond,
 )
-from lupin_bridge.routes.export import respond_export, span_of
+from lupin_bridge.routes.export import Format, respond_export, span_of
 from lupin_bridge.routes.sockets import listen
 from lupin_bridge.serving.admission import (
     REVALIDATE,
@@ -80,7 +80,7 @@ from lupin_bridge.settings import Settings
 from lupin_bridge.stream.frames import Status
 from lupin_bridge.stream.hub import Client, Hub
 from lupin_twin.core.journal_condition import UNKNOWN, Condition, JournalState
-from lupin_twin.core.past import PastRefused, seconds
+from lupin_twin.core.past import seconds
 from lupin_twin.journal.queries import STRETCH_S, Export
 from lupin_twin.runtime.workers import Workers
 
@@ -228,7 +228,7 @@ class Fleet:
         yield "lupin_fleet_sites_live", "sites that are live", live if is_reachable else 0
         yield "lupin_fleet_archive_reachable", "1 while the archive answers", is_reachable
         yield "lupin_fleet_looks", "queries of the archive for changes", watching.looks
-        starts = watching.starts
+        starts = watching.process.starts
         yield "lupin_fleet_watcher_starts", "starts of the process that makes these queries", starts
         starts = self.past.starts
         yield "lupin_fleet_reader_starts", "starts of the process that reads sites", starts
@@ -245,9 +245,9 @@ class OfSitesExport(OfExport):
     sites: str | None = parameter("names of sites, with a comma between; default: all")
 
 
-async def respond_sites(fleet: Fleet, kind: ExportFormat, request: Request) -> Response:
+async def respond_sites(fleet: Fleet, kind: Format, request: Request) -> Response:
     """Every row of a period of the sites that are named, or of all."""
-    given = read(OfSitesExport, request.query_params.multi_items(), PastRefused)
+    given = read(OfSitesExport, request.query_params.multi_items())
     known = fleet.sites_for(request)
     named = [known[name] for name in chosen(given.sites, known)]
     start_ns, end_ns = span_of(given, None)
@@ -259,7 +259,6 @@ async def respond_sites(fleet: Fleet, kind: ExportFormat, request: Request) -> R
         lambda pack: _rows(fleet, [site.site for site in named], query, pack),
         kind,
         given,
-        sensors=fleet.criteria.sensors,
         now_ns=fleet.watching.now_ns,
         known={COMPLETE_TO: seconds(min(heard_ns, end_ns))},
         has_site=True,
@@ -289,13 +288,7 @@ def create_fleet_app(
     static_folder: Path = STATIC_FOLDER,
 ) -> FastAPI:
     """The application around a fleet that its caller starts and stops."""
-    app = FastAPI(
-        title="lupin-twin fleet",
-        version=__version__,
-        docs_url=None,
-        redoc_url=None,
-        openapi_url=None,
-    )
+    app = FastAPI(title="lupin-twin fleet", version=__version__, openapi_url=None)
     app.state.access = access
     app.state.bridge = fleet
     add_refusals(app)
@@ -381,14 +374,14 @@ def _add_overview(app: FastAPI, fleet: Fleet) -> None:
 
 def _add_answers(app: FastAPI, fleet: Fleet) -> None:
     """Routes over several sites at once."""
-    for kind in (CSV, PARQUET):
+    for kind in (Csv, Parquet):
         path = f"/api/export.{kind.name}"
         app.api_route(path, methods=["GET", "HEAD"])(partial(respond_sites, fleet, kind))
 
     @app.api_route("/api/alarms", methods=["GET", "HEAD"])
     async def alarms(request: Request) -> Response:
         """Active alarms of all sites, the worst first."""
-        given = read(OfSites, request.query_params.multi_items(), PastRefused)
+        given = read(OfSites, request.query_params.multi_items())
         watching = fleet.watching
         names = chosen(given.sites, fleet.sites_for(request))
         key = ("alarms", watching.looks, watching.archive.is_reachable, *names)

@@ -83,8 +83,8 @@ class Compare:
     steps: Grid
     unit: str
 
-    def read(self, connection: Any) -> Sequence[tuple[str, int, int, float]]:
-        """The count and sum of readings, by site and bucket."""
+    def answer(self, connection: Any) -> Answer:
+        """The answer, of the count and sum of readings by site and bucket."""
         steps = self.steps
         query = {
             "sensor": self.sensor_type,
@@ -93,11 +93,7 @@ class Compare:
             "last": steps.end_ns // HOUR_NS,
             "width": steps.bucket_ns // HOUR_NS,
         }
-        found: Sequence[tuple[str, int, int, float]] = connection.execute(_HOURS, query).fetchall()
-        return found
-
-    def answer(self, found: Sequence[tuple[str, int, int, float]]) -> Answer:
-        """The answer of what was read."""
+        found = connection.execute(_HOURS, query).fetchall()
         return json_answer(orjson.dumps(self._body(_means(self, found))))
 
     def _body(self, means: Mapping[str, np.ndarray[Any, np.dtype[np.float64]]]) -> dict[str, Any]:
@@ -145,7 +141,7 @@ def compare(
         PastRefused: see `OfPeriod.span`; too many sites, too long a period, a derived quantity.
 
     """
-    given = read(OfCompare, parameters, PastRefused)
+    given = read(OfCompare, parameters)
     start_ns, end_ns = given.span(now_ns)
     if given.sensor_type in DERIVED or given.sensor_type in DAILY:
         raise PastRefused(
@@ -252,8 +248,8 @@ class SitesReport:
     start_ns: int
     end_ns: int
 
-    def read(self, connection: Any) -> tuple[Sequence[Any], Sequence[Any]]:
-        """What was counted, by site and event, and the newest notes."""
+    def answer(self, connection: Any) -> Answer:
+        """The answer, of what was counted by site and event, and the newest notes."""
         query = {
             "sites": [site for site, *_ in self.sites],
             "first": self.start_ns // HOUR_NS,
@@ -264,11 +260,8 @@ class SitesReport:
             "withdrawn": WITHDRAWN,
             "most": MAX_LISTED,
         }
-        return tuple(connection.execute(text, query).fetchall() for text in (_COUNTS, _NOTES))
-
-    def answer(self, found: tuple[Sequence[Any], Sequence[Any]]) -> Answer:
-        """The answer of what was read."""
-        counts = Counter({(site, event): int(n) for site, event, n in found[0]})
+        counted = connection.execute(_COUNTS, query).fetchall()
+        counts = Counter({(site, event): int(n) for site, event, n in counted})
         asked = f"from={seconds(self.start_ns)}&to={seconds(self.end_ns)}"
         rows = [
             {
@@ -283,8 +276,15 @@ class SitesReport:
         ]
         names = {site: name for site, name, *_ in self.sites}
         notes = [
-            {"site": site, "name": names[site], **_note_json(Note(*note), by, at_ns)}
-            for site, *note, by, at_ns in found[1]
+            {
+                "site": site,
+                "name": names[site],
+                # Who took it back, if anybody did, and when.
+                **note_json(
+                    Note(*note), {note[0]: Note("", at_ns, by, WITHDRAW, "")} if by else {}
+                ),
+            }
+            for site, *note, by, at_ns in connection.execute(_NOTES, query).fetchall()
         ]
         body = {
             "from": stamp(self.start_ns),
@@ -295,12 +295,6 @@ class SitesReport:
         return json_answer(orjson.dumps(body))
 
 
-def _note_json(note: Note, gone_by: str | None, gone_ns: int) -> dict[str, Any]:
-    """`routes_schema.Note`; who took it back, if anybody did, and when."""
-    gone = {} if gone_by is None else {note.id: Note("", gone_ns, gone_by, WITHDRAW, "")}
-    return note_json(note, gone)
-
-
 def sites_report(parameters: Parameters, known: Mapping[str, Any], now_ns: int) -> SitesReport:
     """The query of `/api/report`; `known` has all sites.
 
@@ -309,7 +303,7 @@ def sites_report(parameters: Parameters, known: Mapping[str, Any], now_ns: int) 
         PastRefused: see `past.query.report`.
 
     """
-    given = read(OfSitesReport, parameters, PastRefused)
+    given = read(OfSitesReport, parameters)
     start_ns, end_ns = past_query.report(given, now_ns)
     sites = [known[name] for name in chosen(given.sites, known)]
     return SitesReport(

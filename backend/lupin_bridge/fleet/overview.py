@@ -14,11 +14,11 @@ from typing import Any, Final
 
 import orjson
 
-from lupin_bridge.judge.verdict import Health, Verdict, worst
+from lupin_bridge.judge.verdict import ORDER, Health, Verdict, worst
 from lupin_bridge.stream.frames import text_frame
-from lupin_bridge.stream.state_json import stamp
+from lupin_bridge.stream.state_json import moment, stamp
 from lupin_twin.core.diagnostics import Origin
-from lupin_twin.core.state import TagState
+from lupin_twin.core.state import Snapshot, TagState
 from lupin_twin.field.grid import reach_of
 
 # Places along each side. Of tags at the same place the worst is drawn, so that no map is larger
@@ -64,6 +64,15 @@ def dots(tags: Iterable[TagState], healths: Mapping[str, Health]) -> str:
         if path:
             paths.append(f'<path class="{verdict}" d="{path}"/>')
     return "".join(paths)
+
+
+def same_tags(before: Snapshot | None, now: Snapshot) -> tuple[TagState, ...]:
+    """The tags of now, the very same values as before where nothing has changed."""
+    known = {} if before is None else {tag.tag_id: tag for tag in before.tags}
+    return tuple(
+        old if (old := known.get(tag.tag_id)) is not None and old == tag else tag
+        for tag in now.tags
+    )
 
 
 def map_svg(paths: str) -> bytes:
@@ -127,7 +136,7 @@ def site_json(site: Site, archive: Archive, now_ns: int) -> dict[str, Any]:
         "verdict": (site.verdict or Verdict.UNKNOWN) if is_live else Verdict.UNKNOWN,
         "last_verdict": site.verdict,
         "active_alarms": site.active_alarms,
-        "last_received": None if site.last_received_ns is None else stamp(site.last_received_ns),
+        "last_received": moment(site.last_received_ns),
         "lag_s": None if not site.heard_ns else round(max(0, now_ns - site.heard_ns) / 1e9, 1),
         "is_live": is_live,
         "origin": site.origin,
@@ -149,14 +158,8 @@ def _lasting(site: Site) -> tuple[object, ...]:
     )
 
 
-def is_news(before: Site | None, now: Site) -> bool:
-    """Whether browsers have to be told of a site; that it still lives is none."""
-    return before is None or _lasting(before) != _lasting(now)
-
-
 # Of an answer; who has more to look at begins with the worst.
 MAX_LISTED: Final = 200
-_ORDER: Final = {verdict: index for index, verdict in enumerate(Verdict)}
 
 
 def alarms_json(sites: Iterable[Site], archive: Archive) -> dict[str, Any]:
@@ -181,7 +184,7 @@ def alarms_json(sites: Iterable[Site], archive: Archive) -> dict[str, Any]:
 
 def _worst_first(alarm: Mapping[str, Any]) -> tuple[Any, ...]:
     raised = alarm["raised_at"]
-    verdict = _ORDER[Verdict(alarm["reason"]["verdict"])]
+    verdict = ORDER[Verdict(alarm["reason"]["verdict"])]
     return verdict, -raised["sec"], -raised["nanosec"], alarm["site"], alarm["id"]
 
 
@@ -211,14 +214,15 @@ class SitesFrame:
     def delta(self, only: tuple[str, ...] = ()) -> bytes:
         """What is not as in the frame before; all of it, where the archive comes or goes."""
         assert self.base is not None  # the hub asks only then
-        before = self.base
+        known, archive = self.base._sites, self.base._archive  # noqa: SLF001  # its own
+        is_all = self._archive.is_reachable != archive.is_reachable
+        # That a site still lives is no news.
         changed = [
             site
             for name, site in self._sites.items()
-            if self._archive.is_reachable != before._archive.is_reachable  # noqa: SLF001  # its own
-            or is_news(before._sites.get(name), site)  # noqa: SLF001
+            if is_all or name not in known or _lasting(known[name]) != _lasting(site)
         ]
-        gone = [name for name in before._sites if name not in self._sites]  # noqa: SLF001
+        gone = [name for name in known if name not in self._sites]
         return self._wire(changed, gone, only, is_whole=False)
 
     def _wire(

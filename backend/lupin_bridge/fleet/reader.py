@@ -100,7 +100,7 @@ class ArchiveChild(Child):
         if isinstance(question, Note):
             return lambda _, stop: _write_note(site, question, stop)
         if isinstance(question, Compare | SitesReport):
-            return lambda connection, _: _compared(question, connection)
+            return lambda connection, _: question.answer(connection)
         found = super()._search(question, now)
         return lambda connection, stop: found(SiteLog(connection, site), stop)
 
@@ -127,11 +127,6 @@ def _write_note(site: str, note: Note, should_stop: ShouldStop) -> Note:
         if should_stop():
             raise CancelledError
         return written
-
-
-def _compared(query: Compare | SitesReport, connection: Any) -> Any:
-    found: Any = query.read(connection)
-    return query.answer(found)
 
 
 def _latest(log: SiteLog, asked: Latest) -> Reported:
@@ -205,7 +200,7 @@ class ArchiveRecall(Recall):
                 if connection.closed or not _is_alive(connection):
                     continue
                 return connection
-            return open_archive(archive_url(), "lupin-twin fleet")
+            return open_archive(archive_url())
 
 
 def _is_alive(connection: Any) -> bool:

@@ -18,7 +18,7 @@ from lupin_bridge.feed.query import Now
 from lupin_bridge.feed.relay import Relay, TwinNames
 from lupin_bridge.feed.shared_work import end
 from lupin_bridge.feed.source import TwinSource, TwinUnavailableError, TwinUpdate
-from lupin_bridge.fleet.overview import Archive, Site
+from lupin_bridge.fleet.overview import Archive, Site, same_tags
 from lupin_bridge.fleet.reader import Latest, Reported
 from lupin_bridge.fleet.watcher import News
 from lupin_bridge.settings import Settings
@@ -40,7 +40,6 @@ STUCK_S: Final = 6.0
 _START_S: Final = 15.0
 _RETRY_S: Final = 1.0
 _POLL_S: Final = 0.5
-_MAX_SITES: Final = 20_000
 
 
 class Watching:
@@ -57,7 +56,7 @@ class Watching:
         # What an archive's clock is ahead of this process's steady one.
         self._ahead_ns = time.time_ns() - time.monotonic_ns()
         self._answered_s = time.monotonic()
-        self._process = PastProcess("lupin_bridge.fleet.watcher")
+        self.process = PastProcess("lupin_bridge.fleet.watcher")
         self._settings = settings
         self._tasks: list[asyncio.Task[None]] = []
 
@@ -77,17 +76,12 @@ class Watching:
     async def stop(self) -> None:
         """End."""
         await end(*self._tasks)
-        await self._process.stop()
-
-    @property
-    def starts(self) -> int:
-        """How often the process was started."""
-        return self._process.starts
+        await self.process.stop()
 
     async def _keep(self) -> None:
         while True:
             try:
-                self._take(await self._process.ask(self._settings, Now(0, "", UNKNOWN), 0.0))  # type: ignore[arg-type]  # see `WatchChild`
+                self._take(await self.process.ask(self._settings, Now(0, "", UNKNOWN), 0.0))  # type: ignore[arg-type]  # see `WatchChild`
                 continue
             except NotRemembered as error:
                 self._answered_s = time.monotonic()
@@ -116,7 +110,7 @@ class Watching:
         known = {} if news.is_whole else self.sites
         sites = {name: site for name, site in known.items() if name not in news.gone}
         sites |= {site.site: site for site in news.sites}
-        self.sites = dict(sorted(sites.items())[:_MAX_SITES])
+        self.sites = dict(sorted(sites.items()))
         self.archive = Archive(is_reachable=True)
         self._on_news()
 
@@ -261,8 +255,11 @@ class SiteTwin(TwinSource):
         if not is_live:
             # As of when it was last heard: who shows it adds for how long that was ago.
             stamp_ns = site.heard_ns if reported.is_walls else _newest_ns(reported)
+        before = None if self.update is None else self.update.snapshot
         self.update = TwinUpdate(
-            replace(reported.snapshot, stamp_ns=stamp_ns, tags=self._tags(reported)),
+            replace(
+                reported.snapshot, stamp_ns=stamp_ns, tags=same_tags(before, reported.snapshot)
+            ),
             # Of what was read: the same in all replicas.
             f"{self.site}-{self._seq}-{self._map_hash}",
             occupancy_map=self._map,
@@ -273,15 +270,6 @@ class SiteTwin(TwinSource):
             silent_s=0.0 if is_live else ago_s,
         )
         on_state(self.update)
-
-    def _tags(self, reported: Reported) -> tuple[Any, ...]:
-        """The very same values as before where nothing has changed."""
-        before = () if self.update is None else self.update.snapshot.tags
-        known = {tag.tag_id: tag for tag in before}
-        return tuple(
-            known[tag.tag_id] if known.get(tag.tag_id) == tag else tag
-            for tag in reported.snapshot.tags
-        )
 
     def _now_ns(self, reported: Reported) -> int:
         """The site's ROS time now; that of a simulation goes on only while it is live."""

@@ -25,18 +25,17 @@ from lupin_bridge.archive.database import (
 )
 from lupin_bridge.feed import query
 from lupin_bridge.feed.query import Child, Now, Search
-from lupin_bridge.fleet.overview import LIVE_S, Site, dots
+from lupin_bridge.fleet.overview import LIVE_S, Site, dots, same_tags
 from lupin_bridge.judge.alarm_fold import Follower
 from lupin_bridge.judge.episodes import Alarm, silence
-from lupin_bridge.judge.judging import Judge
-from lupin_bridge.judge.options import Criteria
+from lupin_bridge.judge.judging import Criteria, Judge
 from lupin_bridge.serving.admission import Limits
 from lupin_bridge.settings import Settings
 from lupin_bridge.stream.state_json import alarm_json
 from lupin_twin.core.diagnostics import Origin, origin_of
 from lupin_twin.core.notes import Note, NotesRequest
 from lupin_twin.core.past import NotRemembered, RecentRequest, WritesRequest
-from lupin_twin.core.state import Snapshot, TagState
+from lupin_twin.core.state import Snapshot
 from lupin_twin.journal.fold import state_at
 from lupin_twin.journal.notes import notes
 from lupin_twin.journal.received import recent, writes
@@ -283,9 +282,8 @@ class Watcher:
         judged.is_simulated = span is not None and span.run.begun.is_simulated
         found = state_at(log, FOREVER_NS, "")
         before = judged.snapshot
-        known = {} if before is None else {tag.tag_id: tag for tag in before.tags}
-        # The very same value where nothing has changed: that is judged no second time.
-        tags = tuple(_same(known.get(tag.tag_id), tag) for tag in found.tags)
+        # What has not changed is judged no second time.
+        tags = same_tags(before, found)
         newest_ns = max((tag.last_observed_ns or 0 for tag in tags), default=0)
         judged.snapshot = replace(found, stamp_ns=newest_ns, tags=tags)
         if before is None and tags:
@@ -320,10 +318,6 @@ def _alarms(site: Site, judged: _Judged, moment_ns: int) -> list[Alarm]:
     return found
 
 
-def _same(before: TagState | None, now: TagState) -> TagState:
-    return before if before is not None and before == now else now
-
-
 # --- the process ----------------------------------------------------------------------------------
 
 
@@ -352,7 +346,7 @@ class WatchChild(Child):
 
         try:
             if self._watcher is None:
-                connection = open_archive(archive_url(), "lupin-twin fleet")
+                connection = open_archive(archive_url())
                 self._watcher = Watcher(connection, Criteria.of(settings))
             return self._watcher.news()
         except (ArchiveError, psycopg.Error) as error:

@@ -14,7 +14,7 @@ from typing import Final
 
 from lupin_bridge.judge.day import DayLine, TagDays
 from lupin_bridge.judge.episodes import MAX_EPISODES, SITE, Alarm, TagEpisodes, alarm_id
-from lupin_bridge.judge.options import Criteria
+from lupin_bridge.judge.judging import Criteria
 from lupin_bridge.judge.scans import LONGEST_NS, SHORTEST_NS, Stretches
 from lupin_bridge.judge.tag_log import Gap, TagPast, is_long
 from lupin_bridge.judge.verdict import Kind, Reason, Verdict
@@ -98,7 +98,9 @@ class Follower:
             if write.stamp_ns < self._forgotten_ns:
                 self.missed += 1
                 continue
-            if not self._is_notified(write):
+            # Where two runs overlap, the newer one is told.
+            spans = self._spans_of.get(write.run, ())
+            if not any(span.start_ns <= write.stamp_ns < span.end_ns for span in spans):
                 continue
             run = self._runs.get(write.run)
             if run is None:
@@ -180,11 +182,6 @@ class Follower:
             self._forgotten_ns = max(self._forgotten_ns, known_ns)
             run.days.forget(before_ns, {name: tag.trail.turns for name, tag in run.tags.items()})
             run.limits = {at: ns for at, ns in run.limits.items() if at >= known_ns}
-
-    def _is_notified(self, write: PastWrite) -> bool:
-        """Whether its moment is that of its run: where two overlap, the newer one is told."""
-        spans = self._spans_of.get(write.run, ())
-        return any(span.start_ns <= write.stamp_ns < span.end_ns for span in spans)
 
     def _is_day(self, run: _Run) -> Callable[[int], bool]:
         return lambda at_ns: self._criteria.day(run.days.is_day(at_ns), at_ns).is_day

@@ -16,6 +16,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from datetime import datetime, time, timedelta, tzinfo
 from functools import cache
+from operator import itemgetter
 from typing import Final, Literal, TypeVar
 
 from lupin_bridge.judge.quantities import DAILY, DAY_NS, Course, IsDay, Sensors
@@ -154,8 +155,9 @@ class DayLine:
         before = self._line()
         self._says, self._counts, self._newest_ns = {}, Counter(), -1
         self._at, self._is_day = [], []
-        for turn, tag_id in merged(self._turns):
-            self._turn(tag_id, turn)
+        every = [(at_ns, tag_id, says) for tag_id, of in self._turns.items() for at_ns, says in of]
+        for at_ns, tag_id, says in sorted(every, key=itemgetter(0, 1)):
+            self._turn(tag_id, (at_ns, says))
         now = self._line()
         same = next(
             (n for n, (one, other) in enumerate(zip(before, now, strict=False)) if one != other),
@@ -185,12 +187,6 @@ class DayLine:
         if (self._is_day[-1] if self._is_day else None) is not is_day:
             self._at.append(at_ns)
             self._is_day.append(is_day)
-
-
-def merged(turns: Mapping[str, Sequence[Turn]]) -> list[tuple[Turn, str]]:
-    """The turns of all tags, in the order of time."""
-    every = [(turn, tag_id) for tag_id, of_tag in turns.items() for turn in of_tag]
-    return sorted(every, key=lambda each: (each[0][0], each[1]))
 
 
 # --- quantities of a day --------------------------------------------------------------------------

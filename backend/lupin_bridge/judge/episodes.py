@@ -23,7 +23,7 @@ from hashlib import blake2b
 from typing import Final
 
 from lupin_bridge.judge.day import LIGHT, TagDays
-from lupin_bridge.judge.options import Criteria
+from lupin_bridge.judge.judging import Criteria
 from lupin_bridge.judge.quantities import DAILY, DERIVED, IsDay
 from lupin_bridge.judge.scans import INTERVALS, holds_ns, interval_ns
 from lupin_bridge.judge.verdict import (

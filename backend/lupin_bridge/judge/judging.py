@@ -1,23 +1,35 @@
-"""Snapshot by snapshot: who has changed is judged again, and who was right only until now.
+"""By what the operator wants it judged, snapshot by snapshot: who has changed, or grown old.
 
-Pure. What is kept from one snapshot to the next is each tag's recent scans and its last verdict,
-and since when each of its reasons holds.
+Pure. Kept from one snapshot to the next are each tag's recent scans and its last verdict, and since
+when each of its reasons holds.
 """
 
 from __future__ import annotations
 
 import logging
 import math
+import re
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from datetime import time
+from importlib.resources import files
 from itertools import islice
 from types import MappingProxyType
 from typing import Final
+from zoneinfo import ZoneInfo
 
-from lupin_bridge.judge.day import COUNTS_NS, Day
-from lupin_bridge.judge.options import Criteria
-from lupin_bridge.judge.scans import NO_PATROL, SHORTEST_NS, Patrol, RecentScans, Scans
+from lupin_bridge.judge.day import COUNTS_NS, ClockDay, Day, judge_day
+from lupin_bridge.judge.quantities import DAY_NS, Sensors
+from lupin_bridge.judge.scans import (
+    NO_PATROL,
+    SHORTEST_NS,
+    Patrol,
+    RecentScans,
+    Scans,
+    holds_ns,
+    interval_ns,
+)
 from lupin_bridge.judge.verdict import (
     FORGOTTEN_NS,
     NOTHING_CHANGED,
@@ -29,10 +41,111 @@ from lupin_bridge.judge.verdict import (
     judge_tag,
     stopped,
 )
+from lupin_bridge.settings import SettingError, Settings, read_text
 from lupin_twin.core.past import PastWrite
 from lupin_twin.core.state import Reading, Snapshot, TagState
 
 log = logging.getLogger(__name__)
+
+# Nobody writes this much.
+MAX_FILE_BYTES: Final = 1_000_000
+_HOUR: Final = r"((?:[01]\d|2[0-3]):[0-5]\d)"
+_HOURS: Final = re.compile(f"{_HOUR}-{_HOUR}")
+# Nights of a longer period are narrower than a line.
+_LONGEST_S: Final = 400 * 86_400
+# No robot drove before; simulations begin at 0.
+_OLDEST_S: Final = 1.4e9
+
+
+@dataclass(frozen=True, slots=True)
+class Criteria:
+    """What readings are judged by."""
+
+    sensors: Sensors
+    recent_s: float | None
+    clock: ClockDay
+
+    @classmethod
+    def of(cls, settings: Settings) -> Criteria:
+        """As the settings have it, or a `SettingError`: of the file, the zone or the hours."""
+        return cls(_sensors(settings), settings.reading_validity_s or None, _clock(settings))
+
+    def holds_ns(self, scans_ns: Sequence[int]) -> int:
+        """How long readings hold after scans, oldest first; a fixed time goes before that."""
+        if self.recent_s is not None:
+            return int(self.recent_s * 1e9)
+        return holds_ns(interval_ns(scans_ns))
+
+    def day(self, light: bool | None, stamp_ns: int) -> Day:
+        """Whether it was day at a moment of ROS time at which the light said so, or None."""
+        return judge_day(light, self.clock, unix_s(stamp_ns))
+
+    def is_day(self, stamp_ns: int) -> bool:
+        """Whether it was day by the clock alone."""
+        return self.day(None, stamp_ns).is_day
+
+    def nights(self, start_ns: int, end_ns: int) -> Sequence[tuple[int, int]] | None:
+        """The nights by the clock that meet a period; None: simulated, or very long."""
+        from_s, to_s = unix_s(start_ns), unix_s(end_ns)
+        if from_s is None or to_s is None or to_s - from_s > _LONGEST_S:
+            return None
+        nights = self.clock.nights(from_s, to_s)
+        return [(round(dusk_s * 1e9), round(dawn_s * 1e9)) for dusk_s, dawn_s in nights]
+
+    def day_number(self, stamp_ns: int) -> int:
+        """Which day it was by the clock, from dawn to dawn; a simulation's are of 24 hours."""
+        now_s = unix_s(stamp_ns)
+        return stamp_ns // DAY_NS if now_s is None else self.clock.number(now_s)
+
+
+def own_sensors() -> Sensors:
+    """The file that comes with the bridge."""
+    from lupin_bridge.judge.sensors_file import parse  # noqa: PLC0415  # nothing of the past needs it
+
+    return parse(files("lupin_bridge").joinpath("sensors.json").read_text(encoding="utf-8"))
+
+
+def _sensors(settings: Settings) -> Sensors:
+    if not settings.sensors:
+        return own_sensors()
+    from lupin_bridge.judge.sensors_file import SensorsError, parse  # noqa: PLC0415  # as above
+
+    called = settings.called("sensors")
+    try:
+        return parse(read_text(settings.sensors, called, MAX_FILE_BYTES))
+    except SensorsError as error:
+        raise SettingError(f"{called} {settings.sensors}: {error}") from error
+
+
+def _clock(settings: Settings) -> ClockDay:
+    hours = _HOURS.fullmatch(settings.day_hours)
+    if hours is None:
+        raise settings.wrong("day_hours", f"is {settings.day_hours!r}, not such as 06:00-20:00")
+    begins, ends = (time.fromisoformat(hour) for hour in hours.groups())
+    # None: this machine's, which changes with summer and winter.
+    zone = zone_of(settings.time_zone) if settings.time_zone else None
+    if settings.time_zone and zone is None:
+        raise settings.wrong(
+            "time_zone", f"is {settings.time_zone!r}, which this machine does not know"
+        )
+    return ClockDay(zone, begins, ends)
+
+
+def zone_of(name: str) -> ZoneInfo | None:
+    """The time zone of a name; None: this machine does not know it."""
+    try:
+        return ZoneInfo(name)
+    except (KeyError, OSError, ValueError):
+        return None
+
+
+def unix_s(stamp_ns: int) -> float | None:
+    """The wall's time of a moment in ROS time; None: that is simulated, and has no such hours."""
+    seconds = stamp_ns / 1e9
+    return seconds if seconds > _OLDEST_S else None
+
+
+# --- snapshot by snapshot -------------------------------------------------------------------------
 
 _NEVER: Final = 2**63 - 1
 # Readings that are judged at once, a tag counting as one more: some 20 ms.
@@ -77,8 +190,6 @@ def judge_once(
 ) -> Judged:
     """What is to be said of one snapshot, given what was recent in the log then.
 
-    `days` are the values of quantities of a day, by tag.
-
     Nobody knows since when a reason holds: told is the observation that says so.
     """
     judge = Judge(criteria, max_at_once=math.inf)
@@ -89,24 +200,20 @@ def judge_once(
 
 @dataclass(slots=True)
 class _Tag:
-    """A tag; for how long its readings hold, and until when what was said of it does.
-
-    `is_once`: it was scanned once, and nothing says how long that holds.
-    """
+    """A tag; for how long its readings hold, and until when what was said of it does."""
 
     state: TagState
     holds_ns: int = SHORTEST_NS
     until_ns: int = _NEVER
+    # It was scanned once, and nothing says how long that holds.
     is_once: bool = False
     is_failing: bool = False
 
 
 class Judge:
-    """Belongs to one thread.
+    """Belongs to one thread. Of many, so many are judged at once as nobody has to wait for.
 
-    Where many are judged anew, it is so many at once as nobody has to wait for, and the others with
-    the next snapshots. A tag that raises an error is unknown until it is judged again, and counted
-    in `errors`; the others are judged all the same.
+    A tag that raises an error is unknown until it is judged again, and counted in `errors`.
 
     While `knows_recent` is false, the robot counts as moving: until `learn`, every tag looks as if
     it had one scan only.
@@ -169,10 +276,7 @@ class Judge:
         return judged
 
     def learn(self, writes: Iterable[PastWrite], first: Snapshot | None = None) -> None:
-        """What was recent at the first snapshot, as far as the log has it.
-
-        `first` is that snapshot, where it has not been seen.
-        """
+        """What was recent at the first snapshot: `first`, where it has not been seen."""
         tags = [kept.state for kept in self._tags.values()] if first is None else first.tags
         self._recent = RecentScans.of(tags, writes, self._criteria.day)
         # With what is known already: of the last scan of each tag alone, no interval can be told.
@@ -181,15 +285,12 @@ class Judge:
         self._waiting |= dict.fromkeys(self._tags)
 
     def note_changed(self, changed: Mapping[str, Mapping[str, int]]) -> None:
-        """By tag, the sensors that do not read as everything else predicts, and since when.
-
-        The next snapshot is judged by it.
-        """
+        """By tag, the sensors that do not read as predicted, and since when: for the next time."""
         self._waiting |= _others(self._changed, changed)
         self._changed = changed
 
     def note_days(self, days: Mapping[str, Sequence[Reading]]) -> None:
-        """By tag, the values of quantities of a day; the next snapshot is judged by them."""
+        """By tag, the values of quantities of a day: for the next time."""
         if days is not self._days:
             self._waiting |= _others(self._days, days)
             self._days = days

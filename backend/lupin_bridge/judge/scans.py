@@ -328,7 +328,8 @@ class RecentScans:
     def take(self, scans: Sequence[TakenScan]) -> set[str]:
         """Take scans in; the tags with one that is judged by another light than before."""
         others: set[str] = set()
-        for at_ns, group in groupby(sorted(scans, key=_in_time), key=itemgetter(0)):
+        in_time = sorted(scans, key=lambda scan: (scan[0], scan[1].tag_id))
+        for at_ns, group in groupby(in_time, key=itemgetter(0)):
             taken = list(group)
             before = self._light.is_day
             for _, tag, values in taken:
@@ -374,10 +375,6 @@ class RecentScans:
 
 # When, of which tag, and what it read.
 TakenScan = tuple[int, TagState, Mapping[str, float]]
-
-
-def _in_time(scan: TakenScan) -> tuple[int, str]:
-    return scan[0], scan[1].tag_id
 
 
 def _inspection_of(tag: TagState) -> Sequence[tuple[int, str]]:

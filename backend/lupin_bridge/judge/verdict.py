@@ -37,12 +37,12 @@ class Verdict(StrEnum):
 
 
 NOTHING_CHANGED: Final[Mapping[str, int]] = MappingProxyType({})
-_ORDER: Final = {verdict: index for index, verdict in enumerate(Verdict)}
+ORDER: Final = {verdict: index for index, verdict in enumerate(Verdict)}
 
 
 def worst(verdicts: Iterable[Verdict]) -> Verdict | None:
     """The worst of them, None of none."""
-    return min(verdicts, key=_ORDER.__getitem__, default=None)
+    return min(verdicts, key=ORDER.__getitem__, default=None)
 
 
 class Kind(StrEnum):
@@ -132,7 +132,7 @@ def judge_tag(
     reasons += _of_attempts(tag)
     reasons += _of_age(tag, now_ns, holds_ns)
     reasons += _of_flowers(tag)
-    reasons.sort(key=lambda reason: _ORDER[reason.verdict])
+    reasons.sort(key=lambda reason: ORDER[reason.verdict])
     verdict = worst(reason.verdict for reason in reasons)
     if verdict is None:
         verdict = Verdict.HEALTHY if was_judged else Verdict.UNKNOWN

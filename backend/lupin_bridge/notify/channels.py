@@ -22,12 +22,11 @@ import orjson
 
 from lupin_bridge.feed.shared_work import Periodic
 from lupin_bridge.feed.source import TwinUnavailableError
-from lupin_bridge.judge.options import unix_s
+from lupin_bridge.judge.judging import unix_s
 from lupin_bridge.judge.quantities import Sensors
 from lupin_bridge.notify.destinations import Targets
 from lupin_bridge.notify.messages import Source
-from lupin_bridge.notify.mirror import Mirror
-from lupin_bridge.notify.mqtt import Mqtt
+from lupin_bridge.notify.mqtt import Mirror, Mqtt
 from lupin_bridge.notify.push import Push
 from lupin_bridge.notify.webhook import Webhook
 from lupin_bridge.past.plans import ConditionalQuery

@@ -126,9 +126,8 @@ def _mqtt(settings: Settings, password: str | None) -> MqttTarget | None:
         return None
     url, port = _address(settings, "mqtt_url", _MQTT_PORTS)
     if url.path not in ("", "/") or url.query:
-        raise SettingError(
-            f"{settings.called('mqtt_url')} has a path: topics go below "
-            f"{settings.called('mqtt_prefix')}"
+        raise settings.wrong(
+            "mqtt_url", f"has a path: topics go below {settings.called('mqtt_prefix')}"
         )
     if password is not None and not settings.mqtt_user:
         raise SettingError(
@@ -139,9 +138,9 @@ def _mqtt(settings: Settings, password: str | None) -> MqttTarget | None:
     if discovery:
         discovery = _prefix(settings, "mqtt_discovery_prefix")
     if discovery == prefix:
-        raise SettingError(
-            f"{settings.called('mqtt_prefix')} and {settings.called('mqtt_discovery_prefix')} are "
-            f"both {prefix!r}, must differ"
+        raise settings.wrong(
+            "mqtt_prefix",
+            f"and {settings.called('mqtt_discovery_prefix')} are both {prefix!r}, must differ",
         )
     tls = _tls(settings, "mqtt_ca", is_wanted=url.scheme == "mqtts", url="mqtt_url")
     if password is not None and tls is None:
@@ -165,12 +164,12 @@ def _webhook(settings: Settings, secrets: Secrets) -> WebhookTarget | None:
         return None
     url, port = _address(settings, "webhook_url", _HTTP_PORTS)
     if url.fragment:
-        raise SettingError(f"{settings.called('webhook_url')} has a fragment (#), must have none")
+        raise settings.wrong("webhook_url", "has a fragment (#), must have none")
     secret = secrets.webhook_secret
     if secret is None:
-        raise SettingError(
-            f"{settings.called('webhook_url')} is given without a secret to sign with: name its "
-            "file with --webhook-secret-file"
+        raise settings.wrong(
+            "webhook_url",
+            "is given without a secret to sign with: name its file with --webhook-secret-file",
         )
     if len(secret) < MIN_SECRET_LENGTH:
         raise SettingError(
@@ -193,9 +192,9 @@ def _push(settings: Settings) -> PushTarget | None:
         _needs(settings, "push_contact", "push_private_host")
         return None
     if not _CONTACT.fullmatch(contact):
-        raise SettingError(
-            f"{settings.called('push_contact')} is {contact[:128]!r}, must be mailto: and an "
-            "address, or https:// and a page"
+        raise settings.wrong(
+            "push_contact",
+            f"is {contact[:128]!r}, must be mailto: and an address, or https:// and a page",
         )
     hosts = frozenset(host.lower() for host in settings.push_private_host)
     return PushTarget(contact, hosts, ssl.create_default_context())
@@ -232,9 +231,10 @@ def _address(settings: Settings, name: str, ports: dict[str, int]) -> tuple[Spli
 def _prefix(settings: Settings, name: str) -> str:
     prefix: str = getattr(settings, name)
     if len(prefix) > MAX_PREFIX or not _PREFIX.fullmatch(prefix):
-        raise SettingError(
-            f"{settings.called(name)} is {prefix[:MAX_PREFIX]!r}, must be 1 to {MAX_PREFIX} "
-            "characters without + and #, that begin and end with no /, and begin with no $"
+        raise settings.wrong(
+            name,
+            f"is {prefix[:MAX_PREFIX]!r}, must be 1 to {MAX_PREFIX} "
+            "characters without + and #, that begin and end with no /, and begin with no $",
         )
     return prefix
 
@@ -243,24 +243,20 @@ def _tls(settings: Settings, ca: str, *, is_wanted: bool, url: str) -> ssl.SSLCo
     file = getattr(settings, ca)
     if not is_wanted:
         if file:
-            raise SettingError(
-                f"{settings.called(ca)} is given, but {settings.called(url)} is without TLS"
-            )
+            raise settings.wrong(ca, f"is given, but {settings.called(url)} is without TLS")
         return None
     try:
         return ssl.create_default_context(cafile=file or None)
     except ssl.SSLError:  # before OSError, which it is
-        raise SettingError(f"{settings.called(ca)} {file} holds no PEM certificate") from None
+        raise settings.wrong(ca, f"{file} holds no PEM certificate") from None
     except OSError as error:
-        raise SettingError(f"{settings.called(ca)} {file}: {error.strerror}") from None
+        raise settings.wrong(ca, f"{file}: {error.strerror}") from None
 
 
 def _needs(settings: Settings, url: str, *names: str) -> None:
     for name in names:
         if getattr(settings, name):
-            raise SettingError(
-                f"{settings.called(name)} is given without {settings.called(url)}, and has no use"
-            )
+            raise settings.wrong(name, f"is given without {settings.called(url)}, and has no use")
 
 
 def _authority(host: str, port: int) -> str:

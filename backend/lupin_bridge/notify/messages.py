@@ -1,4 +1,4 @@
-"""What is published at a broker: topics, payloads, and Home Assistant's discovery. Pure.
+"""What channels have in common; and topics, payloads, and Home Assistant's discovery. Pure.
 
 A part of a topic is letters, digits, `-` and `_` alone: `/`, `+` and `#` mean something to a
 broker, and Home Assistant takes no other characters in what it discovers. A payload does not change
@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import hashlib
 import math
+import random
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -20,8 +21,7 @@ from typing import Any, Final, Protocol
 from lupin_bridge.alarms.board import AlarmBoard, Board, NoteBoard
 from lupin_bridge.feed.source import TwinSource
 from lupin_bridge.judge.episodes import Alarm
-from lupin_bridge.judge.judging import NOTHING_JUDGED, Judged
-from lupin_bridge.judge.options import Criteria
+from lupin_bridge.judge.judging import NOTHING_JUDGED, Criteria, Judged
 from lupin_bridge.judge.quantities import Sensor
 from lupin_bridge.judge.verdict import Health, Verdict
 from lupin_bridge.past.query import iso
@@ -299,3 +299,58 @@ def _config(
         "origin": {"name": "lupin-twin"},
         **own,
     }
+
+
+# --- how each channel does, and how long it waits -------------------------------------------------
+
+# What the page and the log say of a failure is one short line, whatever a library has to say.
+MAX_DETAIL: Final = 200
+
+
+@dataclass(slots=True)
+class Condition:
+    """Counts since the start, and what is wrong: `detail` is empty where nothing is.
+
+    `sent` was taken by the other side, `failed` are tries that were not, `dropped` was given up or
+    gave way to something newer. `is_connected`: the last try was taken, or is about to be.
+    """
+
+    is_connected: bool = False
+    detail: str = ""
+    sent: int = 0
+    failed: int = 0
+    waiting: int = 0
+    dropped: int = 0
+
+    def taken(self, number: int = 1) -> None:
+        """So many were taken by the other side."""
+        self.is_connected, self.detail = True, ""
+        self.sent += number
+
+    def failing(self, why: str) -> None:
+        """A try failed."""
+        self.is_connected = False
+        self.detail = " ".join(why.split())[:MAX_DETAIL] or "it failed without a reason"
+        self.failed += 1
+
+
+class Backoff:
+    """Twice as long after each failure, from `first_s` up to `most_s`; a half of it by chance.
+
+    Chance keeps those that lost the same broker at the same time from coming back as one.
+    """
+
+    def __init__(self, first_s: float, most_s: float) -> None:
+        self._first_s, self.most_s = first_s, most_s
+        self._failures = 0
+
+    def wait_s(self) -> float:
+        """How long to wait after one more failure."""
+        # The exponent is bounded, or days of failures would make a number that no float holds.
+        whole_s = min(self.most_s, self._first_s * 2.0 ** min(self._failures, 32))
+        self._failures += 1
+        return whole_s * random.uniform(0.5, 1.0)  # noqa: S311
+
+    def succeeded(self) -> None:
+        """The next failure is the first again."""
+        self._failures = 0

@@ -9,33 +9,219 @@ else: anybody may write to a topic, so what is received is small, and its effect
 from __future__ import annotations
 
 import asyncio
+import hashlib
+import heapq
 import logging
 import math
 import secrets
 import time
 from collections import deque
-from collections.abc import Callable
-from itertools import islice
-from typing import Final
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass, field
+from itertools import chain, islice
+from typing import Any, Final
 
 import orjson
 from aiomqtt import Client, MqttError, ProtocolVersion, Will
 from paho.mqtt.packettypes import PacketTypes
 from paho.mqtt.properties import Properties
 
+from lupin_bridge.alarms.board import MAX_WORST, worst_first
+from lupin_bridge.judge.episodes import SITE
+from lupin_bridge.judge.quantities import Sensors
+from lupin_bridge.judge.scans import SHORTEST_NS
+from lupin_bridge.judge.verdict import Health, Verdict, derive
 from lupin_bridge.notify.destinations import MqttTarget
-from lupin_bridge.notify.messages import GreenhouseState
-from lupin_bridge.notify.mirror import Mirror
-from lupin_bridge.notify.sending import Backoff, Condition
+from lupin_bridge.notify.messages import (
+    Backoff,
+    Condition,
+    GreenhouseState,
+    Topics,
+    alarms_payload,
+    expire_after_s,
+    greenhouse_configs,
+    greenhouse_payload,
+    health_payload,
+    holds,
+    reading_payload,
+    tag_configs,
+    twin_payload,
+)
+from lupin_twin.core.state import TagState
 
 log = logging.getLogger(__name__)
+
+_NEVER: Final = 2**63 - 1
+_UNKNOWN: Final = Health(Verdict.UNKNOWN)
+# Topic and payload.
+Message = tuple[str, bytes]
+# Home Assistant takes an empty announcement for the end of the entity.
+_GONE: Final = b""
+
+
+@dataclass(slots=True)
+class _Published:
+    """What was published of a tag or the greenhouse: a digest a topic."""
+
+    digests: dict[str, bytes] = field(default_factory=dict)
+    # What its announcements were made of.
+    announced: object = None
+    configs: frozenset[str] = frozenset()
+    # When the first of its readings ceases to hold.
+    until_ns: int = _NEVER
+
+
+class Mirror:
+    """What a broker has, and what it needs next: the newest of each topic.
+
+    Tags wait for their turn, not payloads: one is written of what is known by then.
+    """
+
+    def __init__(self, topics: Topics, sensors: Sensors) -> None:
+        self._topics = topics
+        self._sensors = sensors
+        self._seen = GreenhouseState()
+        self._tags: dict[str, TagState] = {}
+        self._published: dict[str, _Published] = {}
+        # Tags in their turn, each with the state with which it came to wait; HOUSE: the greenhouse.
+        self._waiting: dict[str, TagState | None] = {SITE: None}
+        # Before that, no published reading ceases to hold.
+        self._first_until_ns = _NEVER
+        self.dropped = 0
+
+    @property
+    def waiting(self) -> int:
+        """How many tags wait, the greenhouse included."""
+        return len(self._waiting)
+
+    def forget(self) -> None:
+        """The broker knows nothing any more: publish everything again."""
+        self._published = {
+            tag_id: _Published(configs=published.configs)
+            for tag_id, published in self._published.items()
+        }
+        every = (SITE, *self._tags, *self._published)
+        self._waiting = {tag_id: self._tags.get(tag_id) for tag_id in every}
+
+    def see(self, seen: GreenhouseState) -> None:
+        """Take the state of now; tags that have changed wait for their turn."""
+        before, self._seen = self._seen, seen
+        changed: dict[str, None] = {}
+        if seen.tags != before.tags:
+            known, self._tags = self._tags, {tag.tag_id: tag for tag in seen.tags}
+            changed |= dict.fromkeys(t for t, tag in self._tags.items() if known.get(t) is not tag)
+            changed |= dict.fromkeys(known.keys() - self._tags.keys())
+        old, new = before.judged.tags, seen.judged.tags
+        if new is not old:
+            changed |= dict.fromkeys(t for t, health in new.items() if old.get(t) is not health)
+        if seen.knows_alarms is not before.knows_alarms:
+            changed |= dict.fromkeys(self._tags)
+        elif seen.board is not before.board:
+            was, now = before.board.page.by_tag, seen.board.page.by_tag
+            changed |= dict.fromkeys(t for t in {**was, **now} if was.get(t) != now.get(t))
+        if (seen.now_ns is None, seen.origin) != (before.now_ns is None, before.origin):
+            changed |= dict.fromkeys(self._tags)
+        now_ns = seen.now_ns
+        if now_ns is not None and self._first_until_ns < now_ns:
+            changed |= dict.fromkeys(t for t, it in self._published.items() if it.until_ns < now_ns)
+            self._first_until_ns = min(
+                (it.until_ns for it in self._published.values() if it.until_ns >= now_ns),
+                default=_NEVER,
+            )
+        for tag_id in changed:
+            if tag_id in self._tags or tag_id in self._published:
+                self._wait(tag_id, self._tags.get(tag_id))
+        self._waiting.setdefault(SITE, None)
+
+    def messages(self) -> Iterator[Message]:
+        """The messages of all that wait."""
+        while self._waiting:
+            tag_id = next(iter(self._waiting))
+            del self._waiting[tag_id]
+            yield from self._turn_of(tag_id)
+
+    def _wait(self, tag_id: str, tag: TagState | None) -> None:
+        if self._waiting.get(tag_id, tag) is not tag:
+            self.dropped += 1
+        self._waiting[tag_id] = tag
+
+    def _turn_of(self, tag_id: str) -> Iterator[Message]:
+        published = self._published.setdefault(tag_id, _Published())
+        tag = self._tags.get(tag_id)
+        if tag_id != SITE and tag is None:
+            del self._published[tag_id]
+            yield from ((topic, _GONE) for topic in sorted(published.configs))
+            return
+        said = self._of_greenhouse() if tag is None else self._of_tag(tag, published)
+        # With the origin of its data: nobody is called for a simulation.
+        states = ((topic, {**it, "origin": self._seen.origin}) for topic, it in said)
+        for topic, payload in chain(self._announced(tag, published), states):
+            text = orjson.dumps(payload)
+            digest = hashlib.blake2b(text, digest_size=16).digest()
+            if published.digests.get(topic) != digest:
+                published.digests[topic] = digest
+                yield topic, text
+
+    def _of_greenhouse(self) -> Iterator[tuple[str, dict[str, Any]]]:
+        seen, topics, page = self._seen, self._topics, self._seen.board.page
+        yield topics.twin, twin_payload(seen.status)
+        yield topics.of(None, "health"), greenhouse_payload(seen.judged)
+        alarms = alarms_payload(len(page.active), page.worst, is_known=seen.knows_alarms)
+        yield topics.of(None, "alarms"), alarms
+
+    def _of_tag(self, tag: TagState, published: _Published) -> Iterator[tuple[str, dict[str, Any]]]:
+        seen, topics, tag_id = self._seen, self._topics, tag.tag_id
+        readings, holds_ns = (*tag.readings, *derive(tag.readings)), self._holds_ns(tag_id)
+        published.until_ns = min(
+            (
+                reading.observed_at_ns + holds_ns
+                for reading in readings
+                if reading.observed_at_ns is not None and holds(reading, holds_ns, seen.now_ns)
+            ),
+            default=_NEVER,
+        )
+        self._first_until_ns = min(self._first_until_ns, published.until_ns)
+        for reading in readings:
+            sensor = self._sensors.named(reading.name)
+            payload = reading_payload(reading, sensor, holds_ns, seen.now_ns)
+            yield topics.reading(tag_id, reading.name), payload
+        yield topics.of(tag_id, "health"), health_payload(seen.judged.tags.get(tag_id, _UNKNOWN))
+        active = seen.board.page.by_tag.get(tag_id, ())
+        worst = heapq.nsmallest(MAX_WORST, active, key=worst_first)
+        alarms = alarms_payload(len(active), worst, is_known=seen.knows_alarms)
+        yield topics.of(tag_id, "alarms"), alarms
+
+    def _holds_ns(self, tag_id: str) -> int:
+        return self._seen.holds_ns.get(tag_id, SHORTEST_NS)
+
+    def _announced(
+        self, tag: TagState | None, published: _Published
+    ) -> Iterable[tuple[str, dict[str, Any]]]:
+        """The announcements, where they are of something else than before."""
+        if not self._topics.discovery:
+            return ()
+        readings = () if tag is None else (*tag.readings, *derive(tag.readings))
+        names = tuple(reading.name for reading in readings)
+        holds_ns = 0 if tag is None else self._holds_ns(tag.tag_id)
+        if published.announced == (names, expire_after_s(holds_ns)):
+            return ()
+        published.announced = names, expire_after_s(holds_ns)
+        if tag is None:
+            configs = dict(greenhouse_configs(self._topics))
+        else:
+            sensors = [self._sensors.named(name) for name in names]
+            configs = dict(tag_configs(self._topics, tag.tag_id, sensors, holds_ns))
+        published.configs = frozenset(configs)
+        return configs.items()
+
+
+# --- the connection -------------------------------------------------------------------------------
 
 FIRST_WAIT_S: Final = 1.0
 MOST_WAIT_S: Final = 60.0
 # A broker that answers nothing for so long is tried anew.
 ANSWER_S: Final = 10.0
 KEEPALIVE_S: Final = 15
-# How often the state is looked at, s.
 POLL_S: Final = 1.0
 # Messages without an acknowledgement, and in a second: to publish ten thousand tags for the first
 # time (18 messages each) takes some minutes, and does not block the loop.
@@ -78,8 +264,7 @@ class Mqtt:
         self._is_stopping = self._is_connecting = False
         self._seen_s = 0.0
         self._look: Callable[[], GreenhouseState] = GreenhouseState
-        # One that was never let in is tried again, and closes what is left of its last try; one
-        # that was may hold what the broker had not acknowledged, and is not.
+        # One that was never let in is tried again; one that was may hold what was not acknowledged.
         self._fresh: Client | None = None
 
     def start(self, look: Callable[[], GreenhouseState]) -> None:
@@ -127,12 +312,7 @@ class Mqtt:
             await asyncio.sleep(self._backoff.wait_s())
 
     async def _one_connection(self) -> None:
-        """Connect, and publish until the connection ends.
-
-        Raises:
-            MqttError: it could not be made, or has ended.
-
-        """
+        """Connect, and publish until the connection ends, with an `MqttError`."""
         client = self._fresh = self._fresh or self._client()
         self._is_connecting = True
         async with client:
@@ -258,10 +438,7 @@ class Mqtt:
 
 
 def _take_no_more_than(client: Client, most: int) -> None:
-    """End the connection at a larger packet before it is read: not every broker heeds the limit.
-
-    paho has no limit, and asks the socket for all that is left of a packet.
-    """
+    """End the connection at a larger packet: paho has no limit, nor does every broker heed one."""
     paho = client._client  # noqa: SLF001
     receive = paho._sock_recv  # noqa: SLF001
 

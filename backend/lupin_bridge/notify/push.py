@@ -31,9 +31,8 @@ from lupin_bridge.feed.shared_work import end
 from lupin_bridge.judge.episodes import Alarm
 from lupin_bridge.judge.verdict import Verdict
 from lupin_bridge.notify.destinations import Endpoint, PushTarget
-from lupin_bridge.notify.messages import Source
-from lupin_bridge.notify.sending import Backoff, Condition, PostError, post, until_taken
-from lupin_bridge.notify.webhook import AlarmNews
+from lupin_bridge.notify.messages import Backoff, Condition, Source
+from lupin_bridge.notify.webhook import AlarmNews, PostError, post, until_taken
 from lupin_bridge.past.report_page import push_text
 from lupin_bridge.serving.admission import AdmissionError
 from lupin_bridge.stream.state_json import alarm_json

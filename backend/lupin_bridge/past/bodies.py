@@ -18,7 +18,7 @@ from typing import Any, Final
 from lupin_bridge.judge.quantities import DAILY, Sensors
 from lupin_bridge.past.query import OfExport, compact, iso
 from lupin_bridge.query_string import safe_name
-from lupin_bridge.stream.state_json import stamp
+from lupin_bridge.stream.state_json import moment, stamp
 from lupin_twin.core.journal_condition import UNKNOWN, Condition
 from lupin_twin.core.past import Event, Grid, PastRow, SeriesPast, SeriesRequest, grid, seconds
 from lupin_twin.core.state import NANOSECONDS_PER_SECOND
@@ -64,10 +64,7 @@ def period_headers(journal: Condition, start_ns: int, end_ns: int) -> dict[str, 
 def period_fields(journal: Condition, start_ns: int, end_ns: int) -> dict[str, Any]:
     """`of_period` as fields of a body."""
     until_ns, since_ns = of_period(journal, start_ns, end_ns)
-    return {
-        "complete_to": None if until_ns is None else stamp(until_ns),
-        "kept_from": None if since_ns is None else stamp(since_ns),
-    }
+    return {"complete_to": moment(until_ns), "kept_from": moment(since_ns)}
 
 
 def why_not(journal: Condition, at_ns: int) -> str:
@@ -288,11 +285,6 @@ def _nanoseconds(length_s: float) -> int:
 
 CSV_TYPE: Final = "text/csv; charset=utf-8; header=present"
 CSV_HEADER: Final = b"time_iso,stamp,tag_id,x_m,y_m,sensor,unit,value,status,source\r\n"
-
-
-def csv_header(*, has_site: bool) -> bytes:
-    """The names of the columns; those of many sites have one more, at the end."""
-    return CSV_HEADER.replace(b"\r", b",site\r") if has_site else CSV_HEADER
 
 
 # Names come again and again: so many are kept as they are written, some 100 bytes each.

@@ -9,9 +9,8 @@ from __future__ import annotations
 import io
 import json
 import pickle
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
-from typing import Any, Final, Protocol
+from collections.abc import Mapping, Sequence
+from typing import Any, Final
 
 from lupin_bridge.judge.quantities import Sensors
 from lupin_bridge.past import bodies
@@ -25,49 +24,30 @@ class MissingPackageError(RuntimeError):
     """A format needs a package that is not installed; the message says how to have it."""
 
 
-class Writer(Protocol):
-    """What is sent: `begin`, then `add` for each packed lot, then `end`. Each gives bytes."""
+class Csv:
+    """CSV is sent as it was packed: `begin`, then `add` for each packed lot, then `end`."""
 
-    def begin(self) -> bytes:
-        """What comes first."""
+    name = "csv"
+    media_type = bodies.CSV_TYPE
+    # Can be pickled.
+    pack = staticmethod(bodies.csv_lines)
 
-    def add(self, packed: bytes) -> bytes:
-        """What there is to send once a lot is known, maybe nothing."""
-
-    def end(self) -> bytes:
-        """What comes last."""
-
-
-@dataclass(frozen=True, slots=True)
-class ExportFormat:
-    """A format: how rows are packed, and how that is written.
-
-    `pack(rows, sensors, site)` can be pickled. `open(sensors, facts, sensor, has_site)` may take as
-    long as an import, and raises `MissingPackageError`.
-    """
-
-    name: str
-    media_type: str
-    pack: Callable[..., bytes]
-    open: Callable[[Sensors, Mapping[str, str], str | None, bool], Writer]
-
-
-# --- CSV ------------------------------------------------------------------------------------------
-
-
-class _Csv:
     def __init__(
         self, _sensors: Sensors, _facts: Mapping[str, str], _sensor: str | None, has_site: bool
     ) -> None:
         self._has_site = has_site
 
     def begin(self) -> bytes:
-        return bodies.csv_header(has_site=self._has_site)
+        """What comes first."""
+        header = bodies.CSV_HEADER
+        return header.replace(b"\r", b",site\r") if self._has_site else header
 
     def add(self, packed: bytes) -> bytes:
+        """What there is to send once a lot is known, maybe nothing."""
         return packed
 
     def end(self) -> bytes:
+        """What comes last."""
         return b""
 
 
@@ -143,7 +123,18 @@ class _Sink(io.RawIOBase):
         return taken
 
 
-class _Parquet:
+class Parquet:
+    """A group of rows is written at once; made, it may take as long as an import.
+
+    Raises:
+        MissingPackageError: pyarrow is not installed.
+
+    """
+
+    name = "parquet"
+    media_type = "application/vnd.apache.parquet"
+    pack = staticmethod(_pack_columns)
+
     def __init__(
         self, sensors: Sensors, facts: Mapping[str, str], sensor: str | None, has_site: bool
     ) -> None:
@@ -175,9 +166,11 @@ class _Parquet:
         self._rows = 0
 
     def begin(self) -> bytes:
+        """See `Csv`."""
         return self._sink.take()
 
     def add(self, packed: bytes) -> bytes:
+        """See `Csv`."""
         columns = pickle.loads(packed)  # noqa: S301  # of `_pack_columns`
         self._waiting.append(
             self._arrow.record_batch(
@@ -194,6 +187,7 @@ class _Parquet:
         return self._sink.take()
 
     def end(self) -> bytes:
+        """See `Csv`."""
         self._write()
         self._writer.close()
         return self._sink.take()
@@ -209,7 +203,3 @@ def _described(sensors: Sensors, sensor: str | None) -> dict[str, Mapping[str, s
     """The columns' attributes; those of one sensor alone have one unit."""
     units = sensors.named(sensor).unit if sensor else _OF_VALUES
     return {**_COLUMNS, "value": {**_COLUMNS["value"], "units": units}}
-
-
-CSV: Final = ExportFormat("csv", bodies.CSV_TYPE, bodies.csv_lines, _Csv)
-PARQUET: Final = ExportFormat("parquet", "application/vnd.apache.parquet", _pack_columns, _Parquet)

@@ -7,25 +7,24 @@ from __future__ import annotations
 
 import math
 import sqlite3
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from hashlib import blake2b
 from typing import Final
 
+import orjson
+
+from lupin_bridge import field as formats
 from lupin_bridge.feed.query import Find
-from lupin_bridge.field import formats
-from lupin_bridge.field import query as field_query
-from lupin_bridge.field.formats import JSON, FieldFormat
-from lupin_bridge.field.query import EstimateQuery, FieldQuery
-from lupin_bridge.judge.options import Criteria
+from lupin_bridge.field import JSON, EstimateQuery, FieldFormat, FieldQuery
+from lupin_bridge.judge.judging import Criteria
 from lupin_bridge.judge.quantities import DAILY, Sensor
 from lupin_bridge.judge.verdict import plausible, with_derived
-from lupin_bridge.past import derived
-from lupin_bridge.past.plans import Plan, StateQuery, etag_of, plan_of, series_s
+from lupin_bridge.past.plans import Plan, StateQuery, etag_of, plan_of, series_s, with_daily
 from lupin_bridge.serving.admission import REVALIDATE, Answer
 from lupin_twin.core.past import MAX_POINTS
-from lupin_twin.core.state import NANOSECONDS_PER_SECOND, Snapshot, samples_of
+from lupin_twin.core.state import NANOSECONDS_PER_SECOND, Snapshot, TagState, samples_of
 from lupin_twin.estimate.engine import MINUTES_A_DAY, EstimateRequest, TagPast, moment_of
 from lupin_twin.estimate.engine import cost_s as estimate_cost_s
 from lupin_twin.field.engine import (
@@ -38,7 +37,8 @@ from lupin_twin.field.engine import (
     default_box,
 )
 from lupin_twin.field.explored import OccupancyMap
-from lupin_twin.field.grid import far_off_tags
+from lupin_twin.field.grid import FieldGrid, far_off_tags
+from lupin_twin.field.quality import leave_one_out, painted_share
 from lupin_twin.journal.queries import NEWEST_S_PER_TAG
 from lupin_twin.runtime.estimates import AS_OF, estimate_at, readings_at
 from lupin_twin.runtime.workers import ShouldStop
@@ -100,7 +100,7 @@ class Field(StateQuery):
         daily = DAILY.get(self.query.sensor_type)
         if daily is not None:
             by = self.criteria
-            tags = derived.with_daily(
+            tags = with_daily(
                 snapshot.tags, daily, at_ns, sensors=by.sensors, is_day=by.is_day, find=find
             )
             snapshot = replace(snapshot, tags=tuple(tags))
@@ -127,7 +127,7 @@ class Field(StateQuery):
 
         def quality(should_stop: ShouldStop) -> bytes:
             grid = compute_field(request, samples, self.occupancy, self.rules, should_stop)
-            return formats.write_quality(grid, tags, sensor, self.rules, should_stop)
+            return _quality(grid, tags, sensor, self.rules, should_stop)
 
         if self.field_format is None:
             of = [tag.tag_id for tag in tags if samples_of((tag,), request.sensor_type)]
@@ -138,10 +138,9 @@ class Field(StateQuery):
 
         def write(should_stop: ShouldStop) -> Answer:
             grid = compute_field(request, samples, self.occupancy, self.rules, should_stop)
-            metadata = {**formats.metadata(grid, sensor), **formats.far_off(far_off)}
-            headers = field_query.headers(metadata, f"{request.sensor_type}.{field_format.name}")
             body = formats.write(grid, field_format, request.sensor_type, sensors, scale)
-            return Answer(body, field_format.media_type, {**headers, "ETag": etag, **REVALIDATE})
+            metadata = formats.metadata(grid, sensor)
+            return _answer(body, field_format, sensor, etag, metadata=metadata, far_off=far_off)
 
         return Plan(etag, write)
 
@@ -155,8 +154,54 @@ class Field(StateQuery):
 
     def _check(self, request: FieldRequest) -> None:
         width, height = check_request(request, self.rules.max_grid_cells)
-        field_format = self.field_format or formats.JSON
-        field_query.check_scale(self.query, field_format, width * height, self.rules.max_grid_cells)
+        field_format = self.field_format or JSON
+        formats.check_scale(self.query, field_format, width * height, self.rules.max_grid_cells)
+
+
+def _answer(
+    body: bytes,
+    field_format: FieldFormat,
+    sensor: Sensor,
+    etag: str,
+    *,
+    metadata: Mapping[str, str],
+    far_off: Sequence[str],
+    kind: str = "Field",
+) -> Answer:
+    """With headers for what a picture or an array cannot say, and how many tags are left out."""
+    known = {**metadata, "Far-Off-Count": str(len(far_off))}
+    headers = formats.headers(known, f"{sensor.name}.{field_format.name}", kind)
+    return Answer(body, field_format.media_type, {**headers, "ETag": etag, **REVALIDATE})
+
+
+def _quality(
+    grid: FieldGrid,
+    tags: Sequence[TagState],
+    sensor: Sensor,
+    rules: FieldRules,
+    should_stop: ShouldStop,
+) -> bytes:
+    """`schema.FieldQuality` of a field and of the tags that it was made from."""
+    quality = leave_one_out(
+        tags,
+        sensor.name,
+        falloff_radius_m=rules.falloff_radius_m,
+        max_distance_m=rules.max_distance_m,
+        power=rules.idw_power,
+        should_stop=should_stop,
+    )
+    return orjson.dumps(
+        {
+            "sensor_type": sensor.name,
+            "unit": sensor.unit,
+            "sample_count": quality.judged + quality.unjudged,
+            "judged_count": quality.judged,
+            "rmse": quality.rmse,
+            "worst": quality.worst,
+            "painted_share": painted_share(grid),
+            "far_off_tags": far_off_tags(tags),
+        }
+    )
 
 
 @lru_cache(maxsize=1)
@@ -229,21 +274,14 @@ class Estimated(Field):
         def write(should_stop: ShouldStop) -> Answer:
             made = estimate_at(request, pasts, self.day_length_s, should_stop)
             estimate = formats.within_ideal(made, sensor)
-            metadata = {
-                **formats.estimate_metadata(estimate, sensor),
-                **formats.far_off(far_off),
-            }
-            name = f"{box.sensor_type}.{field_format.name}"
-            headers = field_query.headers(metadata, name, "Estimate")
-            body = formats.write_estimate(
-                estimate,
-                field_format,
-                box.sensor_type,
-                sensors,
-                layer=query.layer,
-                scale=query.scale,
+            body = formats.write_estimate(estimate, field_format, query, sensors)
+            metadata = formats.estimate_metadata(estimate, sensor)
+            return _answer(
+                *(body, field_format, sensor, etag),
+                metadata=metadata,
+                far_off=far_off,
+                kind="Estimate",
             )
-            return Answer(body, field_format.media_type, {**headers, "ETag": etag, **REVALIDATE})
 
         return Plan(etag, write)
 

@@ -7,20 +7,21 @@ of content: it is the same in every replica and after a restart, until a late wr
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import partial
 from hashlib import blake2b
 from typing import Any, Final, Protocol
 
 import orjson
 
 from lupin_bridge.feed.query import Find
-from lupin_bridge.field import query as field_query
+from lupin_bridge.field import matches
 from lupin_bridge.judge.day import SINCE_NS, days_of
-from lupin_bridge.judge.judging import judge_once
-from lupin_bridge.judge.options import Criteria
-from lupin_bridge.judge.quantities import DAILY, DERIVED
-from lupin_bridge.past import bodies, derived
+from lupin_bridge.judge.judging import Criteria, judge_once
+from lupin_bridge.judge.quantities import DAILY, DAY_NS, DERIVED, Daily, Derived, IsDay, Sensors
+from lupin_bridge.past import bodies
 from lupin_bridge.serving.admission import REVALIDATE, Answer, json_answer
 from lupin_bridge.stream.state_json import StateJson, history, judgement
 from lupin_twin.core.history import LatestRequest, tag_history
@@ -28,22 +29,35 @@ from lupin_twin.core.journal_condition import Condition
 from lupin_twin.core.past import (
     DEFAULT_POINTS,
     EVERY_TAG,
+    HOUR_NS,
     MAX_POINTS,
+    MAX_READINGS,
     Event,
+    PastRefused,
     PastWrite,
     RecentRequest,
     ScansRequest,
     SeriesPast,
     SeriesRequest,
+    grid,
+    seconds,
 )
-from lupin_twin.core.state import Inspection, Scan, Snapshot, TagState
+from lupin_twin.core.state import (
+    NANOSECONDS_PER_SECOND,
+    Inspection,
+    Reading,
+    Scan,
+    Snapshot,
+    TagState,
+)
+from lupin_twin.journal.buckets import Buckets, individually
 from lupin_twin.journal.fold import STATE_S_PER_TAG
 from lupin_twin.journal.queries import SERIES_S, SERIES_S_PER_TAG
 from lupin_twin.runtime.workers import ShouldStop
 
 JSON_TYPE: Final = "application/json"
-# Costs, s of one core, at worst: to plan an answer and to write it, for each tag; to judge a tag
-# with its scans of three days; to write a reading or a bucket.
+# Costs, s of one core, at worst: to plan an answer and to write it, for each tag or scan; to judge
+# a tag with its scans of three days; to write a reading or a bucket.
 PLAN_TAG_S: Final = 10e-6
 _WRITE_TAG_S: Final = 20e-6
 _HEALTH_TAG_S: Final = 1e-3
@@ -51,14 +65,15 @@ _WRITE_ENTRY_S: Final = 5e-6
 
 
 class NoSuchTag(LookupError):
-    """The tag was not known then; `known` others were."""
+    """The tag was not known then."""
 
-    def __init__(self, tag_id: str, known: int) -> None:
-        super().__init__(tag_id, known)
-        self.tag_id, self.known = tag_id, known
 
-    def __str__(self) -> str:
-        return f"no tag {self.tag_id[:64]!r} is known ({self.known} others are)"
+def tag_of(snapshot: Snapshot, tag_id: str) -> TagState:
+    """One tag of a snapshot, which may raise `NoSuchTag`."""
+    for tag in snapshot.tags:
+        if tag.tag_id == tag_id:
+            return tag
+    raise NoSuchTag(f"no tag {tag_id[:64]!r} is known ({len(snapshot.tags)} others are)")
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,7 +112,7 @@ class ConditionalQuery:
     def answer(self, find: Find, should_stop: ShouldStop) -> Answered:
         """See `feed.query.Question`."""
         plan = self.query.look(find)
-        has_it = field_query.matches(self.if_none_match, plan.etag)
+        has_it = matches(self.if_none_match, plan.etag)
         return Answered(plan.etag, None if has_it else plan.write(should_stop))
 
 
@@ -135,7 +150,7 @@ class WholeState(StateQuery):
     def plan(self, snapshot: Snapshot) -> Plan:
         """See `StateQuery`."""
         etag = etag_of("state", (snapshot.stamp_ns, snapshot.frame_id, snapshot.tags))
-        return plan_of(etag, lambda _: StateJson().state(snapshot))
+        return plan_of(etag, lambda _: StateJson().state(snapshot, snapshot.now_ns))
 
 
 @dataclass(frozen=True, slots=True)
@@ -149,15 +164,8 @@ class OneTag(StateQuery):
         return _WRITE_TAG_S
 
     def plan(self, snapshot: Snapshot) -> Plan:
-        """See `StateQuery`.
-
-        Raises:
-            NoSuchTag: it was not known then.
-
-        """
-        found = next((tag for tag in snapshot.tags if tag.tag_id == self.tag_id), None)
-        if found is None:
-            raise NoSuchTag(self.tag_id, len(snapshot.tags))
+        """See `StateQuery`, and `tag_of`."""
+        found = tag_of(snapshot, self.tag_id)
         etag = etag_of("tag", (snapshot.stamp_ns, found))
         return plan_of(etag, lambda _: StateJson().tag(found, snapshot.now_ns))
 
@@ -214,7 +222,7 @@ class History:
     def look(self, find: Find) -> Plan:
         """See `Query`."""
         sensors = self.criteria.sensors
-        past = derived.series(self.request, sensors, self.criteria.is_day, find)
+        past = derived_series(self.request, sensors, self.criteria.is_day, find)
         nights = self.criteria.nights(past.start_ns, past.end_ns) if self.has_nights else None
         return of_content(
             bodies.history_body(
@@ -230,14 +238,14 @@ class Timeline:
     start_ns: int
     end_ns: int
     points: int
-    tag_id: str | None
+    tag_id: str
     journal: Condition = field(compare=False)
 
     def cost_s(self, tags: int) -> float:
         """See `Query`: as if every event had to be counted twice."""
-        counted_s = series_s(self._tag_id, self.points, tags)
+        counted_s = series_s(self.tag_id, self.points, tags)
         runs_s = series_s(EVERY_TAG, DEFAULT_POINTS, tags)
-        silences_s = series_s(self._tag_id, MAX_POINTS, tags)
+        silences_s = series_s(self.tag_id, MAX_POINTS, tags)
         return runs_s + 2 * len(bodies.COUNTED) * counted_s + silences_s
 
     def look(self, find: Find) -> Plan:
@@ -254,24 +262,16 @@ class Timeline:
         until_ns = bodies.complete_to(self.journal, period.end_ns)
         until_ns = max(period.start_ns, period.end_ns if until_ns is None else until_ns)
         silences: SeriesPast = find(
-            SeriesRequest(self._tag_id, Event.SILENCES, period.start_ns, until_ns, MAX_POINTS)
+            SeriesRequest(self.tag_id, Event.SILENCES, period.start_ns, until_ns, MAX_POINTS)
         )
         return of_content(bodies.timeline_body(runs, period, counted, silences, self.journal))
 
     def _counted(self, find: Find, start_ns: int, end_ns: int) -> dict[Event, SeriesPast]:
         points = self.points
         return {
-            event: find(SeriesRequest(self._tag_id, event, start_ns, end_ns, points))
+            event: find(SeriesRequest(self.tag_id, event, start_ns, end_ns, points))
             for event in bodies.COUNTED.values()
         }
-
-    @property
-    def _tag_id(self) -> str:
-        return self.tag_id or EVERY_TAG
-
-
-# What writing a scan takes, roughly and at worst, s of one core.
-_WRITE_SCAN_S: Final = 20e-6
 
 
 @dataclass(frozen=True, slots=True)
@@ -287,7 +287,7 @@ class LatestOfTag:
 
     def cost_s(self, tags: int) -> float:  # noqa: ARG002
         """See `Query`."""
-        return SERIES_S + self.count * _WRITE_SCAN_S
+        return SERIES_S + self.count * _WRITE_TAG_S
 
     def look(self, find: Find) -> Plan:
         """See `Query`."""
@@ -318,3 +318,132 @@ def etag_of(kind: str, content: object) -> str:
     digest = blake2b(kind.encode(), digest_size=12)
     digest.update(orjson.dumps(content))
     return f'"{digest.hexdigest()}"'
+
+
+# --- what is derived, made of its parts: of readings, or of buckets of an hour at most ------------
+
+# Buckets of a day are of a minute at least.
+_POINTS_A_DAY: Final = DAY_NS // (60 * NANOSECONDS_PER_SECOND)
+# (ns of ROS time, value), oldest first; and with the period that they are of.
+Readings = list[tuple[int, float]]
+OfPeriod = tuple[tuple[int, int], Readings]
+FindSeries = Callable[[SeriesRequest], SeriesPast]
+
+
+def derived_series(
+    request: SeriesRequest, sensors: Sensors, is_day: IsDay, find: FindSeries
+) -> SeriesPast:
+    """The series of a request; a derived one, unless a sensor has its name, of its parts."""
+    measured = find(request)
+    derived, daily = DERIVED.get(request.sensor_type), DAILY.get(request.sensor_type)
+    if measured.stamps_ns:
+        return measured
+    # Now is the same for all parts.
+    request = replace(request, end_ns=measured.end_ns)
+    if derived is not None:
+        read = partial(_readings, derived, find)
+    elif daily is not None:
+        read = partial(_of_days, daily, sensors, is_day, find)
+    else:
+        return measured
+    period, readings = read(request)
+    if len(readings) <= request.max_points:
+        return individually(readings, *period)
+    wide = grid(*period, request.max_points)
+    _, readings = read(replace(request, start_ns=wide.start_ns, end_ns=wide.end_ns))
+    buckets = Buckets(wide)
+    for stamp_ns, value in readings:
+        buckets.add_value(stamp_ns, value)
+    return buckets.past()
+
+
+def with_daily(
+    tags: Sequence[TagState],
+    daily: Daily,
+    at_ns: int,
+    *,
+    sensors: Sensors,
+    is_day: IsDay,
+    find: FindSeries,
+) -> list[TagState]:
+    """The tags as of a moment, those of which it is known with a reading of the quantity too."""
+    found = []
+    for tag in tags:
+        names = {reading.name for reading in tag.readings}
+        if daily.sensor in names and daily.name not in names:
+            span = max(1, at_ns - DAY_NS), at_ns + 1
+            part = find(SeriesRequest(tag.tag_id, daily.sensor, *span, _POINTS_A_DAY))
+            value = daily.at(at_ns, _readings_of(daily, sensors, part, at_ns), is_day)
+            if math.isfinite(value):
+                readings = (*tag.readings, Reading(daily.name, value, at_ns))
+                tag = replace(tag, readings=readings)  # noqa: PLW2901
+        found.append(tag)
+    return found
+
+
+def _of_days(
+    daily: Daily, sensors: Sensors, is_day: IsDay, find: FindSeries, request: SeriesRequest
+) -> OfPeriod:
+    """A value at the last reading of each hour."""
+    first_ns = max(1, request.start_ns - DAY_NS) if request.start_ns else 0
+    part = find(
+        replace(request, sensor_type=daily.sensor, start_ns=first_ns, max_points=MAX_POINTS)
+    )
+    start_ns = request.start_ns or part.start_ns
+    every = _readings_of(daily, sensors, part, request.end_ns)
+    last = {at_ns // HOUR_NS: at_ns for at_ns, _ in every if at_ns >= start_ns}
+    readings = []
+    for at_ns in last.values():
+        value = daily.at(at_ns, every, is_day)
+        if math.isfinite(value):
+            readings.append((at_ns, value))
+    return (start_ns, part.end_ns), readings
+
+
+def _readings_of(daily: Daily, sensors: Sensors, part: SeriesPast, until_ns: int) -> Readings:
+    """The readings of a series that count, of one stamp the last.
+
+    A bucket that has ended counts as its minimum and maximum at its start, and its mean throughout.
+    """
+    is_plausible = sensors.named(daily.sensor).is_plausible
+    if part.bucket_ns is None:
+        latest = dict(zip(part.stamps_ns, part.means, strict=True))
+        return [(at_ns, value) for at_ns, value in latest.items() if is_plausible(value)]
+    if part.bucket_ns > HOUR_NS:
+        raise PastRefused(
+            f"{daily.name} is made of {daily.sensor} by the hour or shorter, and from"
+            f" {seconds(part.start_ns)} s to {seconds(part.end_ns)} s there are more than"
+            f" {MAX_POINTS} hours, the limit: ask for a shorter period"
+        )
+    readings = []
+    for at_ns, low, high, mean in zip(
+        part.stamps_ns, part.minima, part.maxima, part.means, strict=True
+    ):
+        last_ns = at_ns + part.bucket_ns - 1
+        if last_ns <= until_ns and is_plausible(low) and is_plausible(high):
+            readings += [(at_ns, low), (at_ns, high), (at_ns, mean), (last_ns, mean)]
+    return readings
+
+
+def _readings(derived: Derived, find: FindSeries, request: SeriesRequest) -> OfPeriod:
+    """What can be derived: of readings of one moment, one scan."""
+    parts: list[SeriesPast] = []
+    for name in derived.sources:
+        part = find(replace(request, sensor_type=name, max_points=MAX_READINGS))
+        if part.is_bucketed:
+            raise PastRefused(
+                f"{derived.name} is derived of {' and '.join(derived.sources)}, reading by reading:"
+                f" from {seconds(part.start_ns)} s to {seconds(part.end_ns)} s {name} has more than"
+                f" {MAX_READINGS} of them, the limit, or hours alone: ask for a shorter period"
+            )
+        parts.append(part)
+    first, second = parts
+    # Of equal stamps, what was received last.
+    ones = dict(zip(first.stamps_ns, first.means, strict=True))
+    others = dict(zip(second.stamps_ns, second.means, strict=True))
+    readings = [
+        (stamp_ns, value)
+        for stamp_ns, one in ones.items()
+        if stamp_ns in others and math.isfinite(value := derived.formula(one, others[stamp_ns]))
+    ]
+    return (min(first.start_ns, second.start_ns), first.end_ns), readings

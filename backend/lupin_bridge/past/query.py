@@ -195,7 +195,7 @@ def at(parameters: Parameters, now_ns: int | None) -> int | None:
         PastRefused: anything but one `at`, or a moment that has not come.
 
     """
-    return at_of(read(OfMoment, parameters, PastRefused).at, now_ns)
+    return at_of(read(OfMoment, parameters).at, now_ns)
 
 
 def at_of(text: str | None, now_ns: int | None) -> int | None:

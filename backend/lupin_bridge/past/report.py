@@ -23,7 +23,7 @@ from lupin_bridge.alarms.board import active_first, notes_of_alarms
 from lupin_bridge.feed.query import Find
 from lupin_bridge.judge.alarm_fold import Follower
 from lupin_bridge.judge.episodes import SITE, Alarm, readings_of
-from lupin_bridge.judge.options import Criteria
+from lupin_bridge.judge.judging import Criteria
 from lupin_bridge.judge.scans import SHORTEST_NS, TIMES_MEDIAN
 from lupin_bridge.judge.verdict import Verdict, derive
 from lupin_bridge.past import bodies

@@ -1,6 +1,7 @@
 """The shift report on paper: one page of HTML, A4, without scripts or anything from elsewhere.
 
-Its words are in `report_words.json`, by language; sensors have theirs in the file of sensors.
+Its words by language are in `report_words.json`, its style in `report.css`, the names of sensors in
+the file of sensors.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ from typing import Any, Final
 import orjson
 
 from lupin_bridge.judge.episodes import SITE
-from lupin_bridge.judge.options import Criteria, unix_s
+from lupin_bridge.judge.judging import Criteria, unix_s
 from lupin_bridge.judge.quantities import Span
 from lupin_bridge.judge.verdict import derive
 from lupin_bridge.past.plans import Plan
@@ -30,30 +31,6 @@ _POLICY: Final = (
     "base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
 )
 PAGE_HEADERS: Final = {"Content-Security-Policy": _POLICY}
-# A browser repeats a table's head on each sheet, and leaves a row whole.
-_STYLE: Final = """
-@font-face { font-family: 'Inter Variable'; font-weight: 100 900;
-  src: url('../font.woff2') format('woff2') }
-@page { size: A4; margin: 14mm 12mm }
-body { font: 10pt/1.35 'Inter Variable', system-ui, -apple-system, 'Segoe UI', 'Liberation Sans',
-  sans-serif; color: #111; background: #fff; max-width: 186mm; margin: 0 auto; padding: 4mm }
-h1 { font-size: 18pt; margin: 0 } h1 img { width: 8mm; height: 8mm; vertical-align: -1.5mm }
- h2 { font-size: 12pt; margin: 7mm 0 1mm; break-after: avoid }
-p { margin: 1mm 0 } .note { color: #444; font-size: 9pt }
-table { border-collapse: collapse; width: 100%; font-size: 8.5pt }
-thead { display: table-header-group } tr { break-inside: avoid }
-th, td { text-align: left; vertical-align: top; padding: 1mm;
-  border-bottom: .2mm solid #bbb; overflow-wrap: anywhere; min-width: 22mm }
-th { border-bottom: .4mm solid #444; overflow-wrap: normal }
-.number { text-align: right; font-variant-numeric: tabular-nums; overflow-wrap: normal;
-  min-width: 0 }
-dl { display: grid; grid-template-columns: repeat(4, 1fr); gap: 2mm; margin: 4mm .3mm }
-dl div { border: .2mm solid #bbb; padding: 1.5mm } dt { color: #444; font-size: 8.5pt }
-dd { margin: 0; font-size: 13pt } .critical td:first-child { font-weight: 700 }
-td:first-child { hyphens: auto }
-.alarms td:first-child { width: 45mm } .alarms :nth-child(2) { min-width: 0 }
-@media print { body { padding: 0; max-width: none } }
-"""
 # Of all languages but English.
 _COMMA: Final = str.maketrans(".,", ",.")
 # Alarms in one notification.
@@ -64,9 +41,13 @@ Entry = Mapping[str, Any]
 
 
 @cache
+def _file(name: str) -> str:
+    return files("lupin_bridge.past").joinpath(name).read_text(encoding="utf-8")
+
+
+@cache
 def _words() -> Mapping[str, Words]:
-    text = files("lupin_bridge.past").joinpath("report_words.json").read_text(encoding="utf-8")
-    found: Mapping[str, Words] = orjson.loads(text)
+    found: Mapping[str, Words] = orjson.loads(_file("report_words.json"))
     return found
 
 
@@ -125,7 +106,7 @@ def _head(lang: str, title: str, period: str = "") -> str:
         f'<!doctype html><html lang="{lang}"><head><meta charset="utf-8">'
         '<meta name="viewport" content="width=device-width">'
         '<link rel="icon" href="../lupin.svg">'
-        f"<title>{escape(name)}</title><style>{_STYLE}</style></head><body>"
+        f"<title>{escape(name)}</title><style>{_file('report.css')}</style></head><body>"
         f'<h1><img src="../lupin.svg" alt=""> {escape(title)}</h1>'
     )
 

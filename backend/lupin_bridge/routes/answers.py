@@ -22,7 +22,7 @@ from lupin_bridge.access.credentials import AccountError, Person
 from lupin_bridge.access.middleware import PERSON_KEY, client_of
 from lupin_bridge.bridge import Bridge
 from lupin_bridge.feed.source import TwinTimeoutError, TwinUnavailableError
-from lupin_bridge.field import query as field_query
+from lupin_bridge.field import matches
 from lupin_bridge.past import bodies
 from lupin_bridge.past.fields import Field
 from lupin_bridge.past.plans import PLAN_TAG_S, Answered, ConditionalQuery, NoSuchTag, Query
@@ -263,7 +263,7 @@ async def admitted(request: Request, work: Callable[[], Awaitable[Answer | Respo
 
 def has_etag(request: Request, etag: str) -> bool:
     """Whether the client says that it has the answer of this ETag."""
-    return field_query.matches(list_header(request, "if-none-match"), etag)
+    return matches(list_header(request, "if-none-match"), etag)
 
 
 def not_modified(etag: str) -> Response:

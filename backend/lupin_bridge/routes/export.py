@@ -14,9 +14,9 @@ from fastapi import APIRouter, Request, Response
 from starlette.types import Message, Receive, Scope, Send
 
 from lupin_bridge.access.middleware import client_of
-from lupin_bridge.judge.quantities import Sensors
+from lupin_bridge.judge.judging import Criteria
 from lupin_bridge.past import bodies, query
-from lupin_bridge.past.export import CSV, PARQUET, ExportFormat, MissingPackageError, Writer
+from lupin_bridge.past.export import Csv, MissingPackageError, Parquet
 from lupin_bridge.past.query import MAX_SECONDS, OfExport
 from lupin_bridge.query_string import parameters_of, read
 from lupin_bridge.routes.answers import (
@@ -33,7 +33,7 @@ from lupin_bridge.routes.answers import (
 )
 from lupin_bridge.serving.admission import Admission, Export, Limits
 from lupin_bridge.serving.http_protocol import CONNECTION_KEY, HttpConnection
-from lupin_twin.core.past import PastRefused, PastRow
+from lupin_twin.core.past import PastRow
 from lupin_twin.core.state import NANOSECONDS_PER_SECOND
 from lupin_twin.runtime.workers import Workers
 
@@ -47,6 +47,7 @@ _WRITE_S = 0.5
 # An export's rows as they were packed, in lots.
 Lots = AsyncIterator[bytes]
 Pack = Callable[[Sequence[PastRow]], bytes]
+Format = type[Csv] | type[Parquet]
 ResultT = TypeVar("ResultT")
 
 
@@ -55,10 +56,8 @@ class Exporting(Protocol):
 
     limits: Limits
     admission: Admission
-
-    @property
-    def workers(self) -> Workers:
-        """Where a file is written."""
+    criteria: Criteria
+    workers: Workers
 
 
 def _content(media_type: str) -> dict[str, Any]:
@@ -69,7 +68,7 @@ def _content(media_type: str) -> dict[str, Any]:
     router,
     "/api/export.csv",
     summary="Every reading and failed attempt of a period, as CSV",
-    responses={200: _content(CSV.media_type), **_ANSWERS},
+    responses={200: _content(Csv.media_type), **_ANSWERS},
     openapi_extra={"parameters": parameters_of(query.OfExport)},
 )
 async def csv_route(request: Request) -> Response:
@@ -77,7 +76,7 @@ async def csv_route(request: Request) -> Response:
 
     It is streamed: one without HTTP's last chunk is not whole.
     """
-    return await _of_site(request, CSV)
+    return await _of_site(request, Csv)
 
 
 @read_route(
@@ -85,7 +84,7 @@ async def csv_route(request: Request) -> Response:
     "/api/export.parquet",
     summary="The same as Parquet, with units and coordinates",
     responses={
-        200: _content(PARQUET.media_type),
+        200: _content(Parquet.media_type),
         **_ANSWERS,
         **refusing({501: "the extra `science` is not installed"}),
     },
@@ -93,23 +92,20 @@ async def csv_route(request: Request) -> Response:
 )
 async def parquet_route(request: Request) -> Response:
     """The columns of the CSV; `time` is a timestamp. Fields and file have attributes."""
-    return await _of_site(request, PARQUET)
+    return await _of_site(request, Parquet)
 
 
-async def _of_site(request: Request, kind: ExportFormat) -> Response:
+async def _of_site(request: Request, kind: Format) -> Response:
     bridge = bridge_of(request)
     now_ns = bridge.ros_time_ns
-    given = read(query.OfExport, request.query_params.multi_items(), PastRefused)
+    given = read(query.OfExport, request.query_params.multi_items())
     start_ns, end_ns = span_of(given, now_ns)
     known = bodies.period_headers(bridge.source.journal(), start_ns, end_ns)
 
     def rows(pack: Pack) -> Lots:
         return bridge.source.rows(start_ns, end_ns, given.tag_id, given.sensor_type, pack)
 
-    return await respond_export(
-        request, bridge, rows, kind, given, sensors=bridge.criteria.sensors, now_ns=now_ns,
-        known=known,
-    )  # fmt: skip
+    return await respond_export(request, bridge, rows, kind, given, now_ns=now_ns, known=known)
 
 
 def span_of(given: OfExport, now_ns: int | None) -> tuple[int, int]:
@@ -122,10 +118,9 @@ async def respond_export(
     request: Request,
     of: Exporting,
     rows: Callable[[Pack], Lots],
-    kind: ExportFormat,
+    kind: Format,
     given: OfExport,
     *,
-    sensors: Sensors,
     now_ns: int | None,
     known: Mapping[str, str],
     has_site: bool = False,
@@ -143,6 +138,7 @@ async def respond_export(
     }  # fmt: skip
     if request.method == "HEAD":
         return Response(headers=headers, media_type=kind.media_type)
+    sensors = of.criteria.sensors
     client, connection = client_of(request), request.scope["state"][CONNECTION_KEY]
 
     def evict() -> None:
@@ -151,8 +147,10 @@ async def respond_export(
 
     facts = {"title": "lupin-twin: readings and failed attempts", **_facts(known, given, now_ns)}
 
-    async def begin() -> tuple[Writer, Lots, bytes | None]:
-        opened = partial(kind.open, sensors, facts, given.sensor_type, has_site)
+    async def begin() -> tuple[Csv | Parquet, Lots, bytes | None]:
+        def opened() -> Csv | Parquet:
+            return kind(sensors, facts, given.sensor_type, has_site)
+
         writer = await _written(of, kind, opened)
         lots = rows(partial(kind.pack, sensors=sensors))
         return writer, lots, await anext(lots, None)
@@ -181,9 +179,9 @@ def _facts(known: Mapping[str, str], given: OfExport, now_ns: int | None) -> dic
     return {**facts, "to": query.iso(end_ns)}
 
 
-async def _written(of: Exporting, kind: ExportFormat, write: Callable[[], ResultT]) -> ResultT:
+async def _written(of: Exporting, kind: Format, write: Callable[[], ResultT]) -> ResultT:
     """What is written, on a worker; CSV is passed on as it came, and takes no time."""
-    if kind is CSV:
+    if kind is Csv:
         return write()
     return await asyncio.wrap_future(of.workers.submit(lambda _: write(), _WRITE_S))
 
@@ -195,12 +193,12 @@ class ExportResponse(Response):
         self,
         of: Exporting,
         export: Export,
-        writer: Writer,
+        writer: Csv | Parquet,
         lots: Lots,
         first: bytes | None,
         *,
         headers: dict[str, str],
-        kind: ExportFormat,
+        kind: Format,
         release: Callable[[], None],
     ) -> None:
         super().__init__(headers=headers, media_type=kind.media_type)

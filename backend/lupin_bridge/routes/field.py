@@ -10,13 +10,11 @@ from annotated_types import Interval
 from fastapi import APIRouter, Request, Response
 from pydantic import BaseModel
 
+from lupin_bridge import field as formats
 from lupin_bridge.access.middleware import client_of
 from lupin_bridge.bridge import Bridge
 from lupin_bridge.feed.source import TwinUnavailableError
-from lupin_bridge.field import formats
-from lupin_bridge.field import query as field_query
-from lupin_bridge.field.formats import FORMATS, JSON, PNG, FieldFormat
-from lupin_bridge.field.query import EstimateQuery, FieldQuery
+from lupin_bridge.field import FORMATS, JSON, PNG, EstimateQuery, FieldFormat, FieldQuery
 from lupin_bridge.judge.quantities import DAILY
 from lupin_bridge.past import query as past_query
 from lupin_bridge.past.fields import Estimated, Field
@@ -113,7 +111,7 @@ class InFormats:
             **documented,
         )
         async def in_accepted_format(request: Request) -> Response:
-            field_format = field_query.negotiate(list_header(request, "accept"))
+            field_format = formats.negotiate(list_header(request, "accept"))
             if field_format is None:
                 types = ", ".join(known.media_type for known in FORMATS)
                 return error_response(f"Accept allows none of {types}", 406, {"Vary": "Accept"})
@@ -159,7 +157,7 @@ async def _answer(request: Request, field_format: FieldFormat | None) -> Respons
     """The field in a format; None: its quality."""
     bridge = bridge_of(request)
     source, now_ns = bridge.source, bridge.ros_time_ns
-    query = read(FieldQuery, request.query_params.multi_items(), FieldRefused)
+    query = read(FieldQuery, request.query_params.multi_items())
     at_ns = past_query.at_of(query.at, now_ns)
     if at_ns is None and query.sensor_type in DAILY and now_ns is not None:
         at_ns = now_ns - now_ns % _MINUTE_NS
@@ -202,7 +200,7 @@ or the last whole minute of the day, whichever is later: until then its ETag hol
 
 async def _estimate(request: Request, field_format: FieldFormat) -> Response:
     bridge = bridge_of(request)
-    query = read(EstimateQuery, request.query_params.multi_items(), FieldRefused)
+    query = read(EstimateQuery, request.query_params.multi_items())
     if query.layer != "mean" and field_format != PNG:
         raise FieldRefused(f"layer is {query.layer!r}, but only a PNG has one")
     now_ns, source = bridge.ros_time_ns, bridge.source
@@ -318,10 +316,7 @@ Body = Callable[[Bridge, QueryT], Awaitable[bytes]]
 
 async def _report(request: Request, kind: type[QueryT], body: Body[QueryT]) -> Response:
     bridge = bridge_of(request)
-    try:
-        query = read(kind, request.query_params.multi_items(), FieldRefused)
-    except FieldRefused as error:
-        return error_response(str(error), 400)
+    query = read(kind, request.query_params.multi_items())
 
     async def compute() -> Answer:
         with bridge.admission.computing(client_of(request), is_large=True):

@@ -7,7 +7,7 @@ from collections.abc import Callable, Collection
 from functools import cache
 from html import escape
 from pathlib import Path
-from typing import Any, Final, Literal, TypedDict
+from typing import Any, Final
 
 import orjson
 from fastapi import APIRouter, FastAPI, Request, Response
@@ -19,7 +19,7 @@ from lupin_bridge.access.credentials import SHARED
 from lupin_bridge.access.middleware import CONTENT_POLICY, Access, client_of
 from lupin_bridge.bridge import Bridge
 from lupin_bridge.feed.source import TwinSource
-from lupin_bridge.field.query import weighted
+from lupin_bridge.field import weighted
 from lupin_bridge.routes.answers import (
     CLIENT_DISCONNECTED,
     NEVER_STORE,
@@ -217,15 +217,16 @@ async def no_page() -> Response:
     return Response(_NO_PAGE, 503, NEVER_STORE, "text/html; charset=utf-8")
 
 
-def language_of(wanted: str | None, accepted: str, known: Collection[str]) -> str:
+def language_of(request: Request, known: Collection[str]) -> str:
     """One of `known`: what `?lang=` asks for, else the best of `Accept-Language`, else English.
 
     As in the HMI, "de-AT" and "DE" are German, and an unknown language is English.
     """
+    wanted = request.query_params.get("lang")
     if wanted is not None:
         return _known_language(wanted, known) or "en"
     found = "en", 0.0
-    for tag, weight in weighted(accepted):
+    for tag, weight in weighted(list_header(request, "accept-language")):
         language = _known_language(tag, known)
         if language is not None and weight > found[1]:  # of equals the first
             found = language, weight
@@ -271,7 +272,7 @@ async def sign_in(request: Request) -> Response:
         return Response(status_code=CLIENT_DISCONNECTED)
     name, cookie, lasts_s = begun
     response = Response(status_code=204, headers=NEVER_STORE)
-    response.set_cookie(name, cookie, max_age=lasts_s, **_place_of(request))
+    _set_cookie(request, response, name, cookie, lasts_s)
     return response
 
 
@@ -283,9 +284,8 @@ async def sign_out(request: Request) -> Response:
         return error_response("this bridge needs no token: there is nothing to sign out of", 404)
     response = Response(status_code=204, headers=NEVER_STORE)
     if person.session:
-        response.delete_cookie(
-            await people.sign_out(person, client_of(request)), **_place_of(request)
-        )
+        name = await people.sign_out(person, client_of(request))
+        _set_cookie(request, response, name, "", 0)
     return response
 
 
@@ -318,9 +318,7 @@ async def page(request: Request) -> Response:
     access = _access_of(request)
     if not access.is_closed:
         return Response(status_code=303, headers={"Location": "./", **NEVER_STORE})
-    language = language_of(
-        request.query_params.get("lang"), list_header(request, "accept-language"), _words()
-    )
+    language = language_of(request, _words())
     headers = {**REVALIDATE, "Content-Language": language, "Vary": "Accept-Language"}
     has_accounts = access.people is not None and access.people.has_file
     page = _page_in(language, has_accounts=has_accounts)
@@ -348,21 +346,17 @@ async def font() -> Response:
     return Response(found, headers={"Cache-Control": "max-age=604800"}, media_type="font/woff2")
 
 
-class _Place(TypedDict):
-    path: str
-    secure: bool
-    httponly: bool
-    samesite: Literal["strict"]
-
-
-def _place_of(request: Request) -> _Place:
-    """Where a browser keeps the cookie, and when it sends it along."""
-    return {
-        "path": f"{request.scope.get('root_path', '')}/",
-        "secure": request.scope["scheme"] == "https",
-        "httponly": True,
-        "samesite": "strict",
-    }
+def _set_cookie(request: Request, response: Response, name: str, value: str, lasts_s: int) -> None:
+    """Have a browser keep a cookie; 0 s: not any more."""
+    response.set_cookie(
+        name,
+        value,
+        max_age=lasts_s,
+        path=f"{request.scope.get('root_path', '')}/",
+        secure=request.scope["scheme"] == "https",
+        httponly=True,
+        samesite="strict",
+    )
 
 
 def _access_of(request: Request) -> Access:

@@ -18,6 +18,7 @@ import asyncio
 import logging
 import time
 from collections import deque
+from collections.abc import Callable
 from contextlib import ExitStack
 from functools import partial
 from typing import Any, Final, Protocol
@@ -26,11 +27,9 @@ from fastapi import APIRouter, WebSocket
 
 from lupin_bridge.access.middleware import client_of
 from lupin_bridge.bridge import Bridge
-from lupin_bridge.feed.relay import Listening, NotRelayedError, Sample
+from lupin_bridge.feed.relay import NotRelayedError, Sample
 from lupin_bridge.feed.source import TwinUnavailableError
-from lupin_bridge.field import formats as field_formats
-from lupin_bridge.field.formats import JSON
-from lupin_bridge.field.query import FieldQuery
+from lupin_bridge.field import JSON, FieldQuery, refusal_json
 from lupin_bridge.past.fields import Field
 from lupin_bridge.routes.answers import error_response, newest_field
 from lupin_bridge.serving.admission import AdmissionError
@@ -185,7 +184,8 @@ class _FoxgloveConversation(_Conversation):
         super().__init__(websocket, bridge)
         self._offer = bridge.offer
         self._session = Session(bridge.offer.counts)
-        self._listening: dict[int, Listening] = {}
+        # What ends each subscription.
+        self._close: dict[int, Callable[[], None]] = {}
         # Messages that answer nothing, such as notes and advertisements.
         self._due: deque[bytes] = deque()
         self._offer_is_due = False
@@ -199,8 +199,8 @@ class _FoxgloveConversation(_Conversation):
             await self._receive_all()
 
     def _end(self) -> None:
-        for listening in self._listening.values():
-            listening.close()
+        for close in self._close.values():
+            close()
 
     async def _receive_all(self) -> None:
         while (message := await next_message(self._websocket)) is not None:
@@ -216,23 +216,23 @@ class _FoxgloveConversation(_Conversation):
     async def _begin(self, key: int, channel: Channel) -> None:
         try:
             async with asyncio.timeout(self._bridge.limits.answer_timeout_s):
-                listening = await self._bridge.source.relay.listen(
+                close = await self._bridge.source.relay.listen(
                     channel.topic, partial(self._on_sample, key)
                 )
         except (NotRelayedError, TwinUnavailableError, TimeoutError) as error:
-            self._session.give_up(key)
+            self._session.end(key)
             text = f"channel {channel.id} cannot be served now: {str(error) or 'ROS is busy'}"
             await self._send(status(ERROR, text))
             return
         if self._session.has(key, channel):
-            self._listening[key] = listening
+            self._close[key] = close
         else:
-            listening.close()  # the channel has gone meanwhile
+            close()  # the channel has gone meanwhile
 
     def _stop_listening(self, reaction: Reaction) -> None:
         for key in reaction.ended:
-            if (listening := self._listening.pop(key, None)) is not None:
-                listening.close()
+            if (close := self._close.pop(key, None)) is not None:
+                close()
 
     # --- what is written ------------------------------------------------------------------------
 
@@ -376,7 +376,7 @@ class _RosbridgeConversation(_Conversation):
             response = service_failure(call.id, call.service, text)
         except FieldRefused as error:
             # The service has answered, and the answer is no: as over ROS, `ok` says so.
-            values = field_formats.refusal_json(str(error))
+            values = refusal_json(str(error))
             response = service_response(call.id, call.service, values, result=True)
         except (AdmissionError, TwinUnavailableError) as error:
             response = service_failure(call.id, call.service, str(error))

@@ -12,10 +12,18 @@ from annotated_types import Ge
 from fastapi import APIRouter, Request, Response, WebSocket
 
 from lupin_bridge.bridge import Bridge
-from lupin_bridge.judge.options import zone_of
+from lupin_bridge.judge.judging import zone_of
 from lupin_bridge.past import bodies
 from lupin_bridge.past import query as past_query
-from lupin_bridge.past.plans import History, LatestOfTag, NoSuchTag, OneTag, Timeline, WholeState
+from lupin_bridge.past.plans import (
+    History,
+    LatestOfTag,
+    NoSuchTag,
+    OneTag,
+    Timeline,
+    WholeState,
+    tag_of,
+)
 from lupin_bridge.past.report import Report
 from lupin_bridge.past.report_page import (
     HTML_TYPE,
@@ -46,8 +54,7 @@ from lupin_bridge.routes.sockets import listen
 from lupin_bridge.serving.admission import Answer
 from lupin_bridge.stream import routes_schema, schema
 from lupin_bridge.stream.hub import CLOSE_POLICY
-from lupin_twin.core.past import PastRefused, SeriesRequest
-from lupin_twin.core.state import Snapshot, TagState
+from lupin_twin.core.past import EVERY_TAG, SeriesRequest
 
 # Of the reason in a close frame (RFC 6455, section 5.5).
 MAX_REASON_BYTES: Final = 123
@@ -80,7 +87,7 @@ async def ws_state(websocket: WebSocket) -> None:
     bridge: Bridge = websocket.app.state.bridge
     await websocket.accept()
     try:
-        query = read(ListenQuery, websocket.query_params.multi_items(), ValueError)
+        query = read(ListenQuery, websocket.query_params.multi_items())
     except ValueError as error:
         reason = str(error).encode("ascii", "backslashreplace")[:MAX_REASON_BYTES].decode()
         await websocket.close(CLOSE_POLICY, reason)
@@ -132,7 +139,7 @@ async def state(request: Request) -> Response:
 async def history(request: Request, tag_id: str) -> Response:
     """The tag's last scans that brought readings, sensor by sensor, and its last attempts."""
     bridge = bridge_of(request)
-    newest = None if bridge.latest is None else _tag_of(bridge.latest.snapshot, tag_id)
+    newest = None if bridge.latest is None else tag_of(bridge.latest.snapshot, tag_id)
     query = LatestOfTag(tag_id, newest, bridge.source.buffer_len)
     return await respond_past(request, query, "latest")
 
@@ -152,15 +159,8 @@ async def tag(request: Request, tag_id: str) -> Response:
         return await _tag_as_of(request, tag_id, at_ns)
     if bridge.latest is None:
         return error_response(NO_TWIN, 503)
-    found = _tag_of(bridge.latest.snapshot, tag_id)
+    found = tag_of(bridge.latest.snapshot, tag_id)
     return json_response(bridge.frames.json.tag(found, bridge.ros_time_ns))
-
-
-def _tag_of(snapshot: Snapshot, tag_id: str) -> TagState:
-    for found in snapshot.tags:
-        if found.tag_id == tag_id:
-            return found
-    raise NoSuchTag(tag_id, len(snapshot.tags))
 
 
 async def _tag_as_of(request: Request, tag_id: str, at_ns: int) -> Response:
@@ -187,7 +187,7 @@ async def history_route(request: Request) -> Response:
     """Readings, or equal buckets if there are more than `points`; `gaps`: where nothing came."""
     bridge = bridge_of(request)
     now_ns = bridge.ros_time_ns
-    given = read(past_query.OfHistory, request.query_params.multi_items(), PastRefused)
+    given = read(past_query.OfHistory, request.query_params.multi_items())
     series = SeriesRequest(given.tag_id, given.sensor_type, *given.span(now_ns), given.points)
     journal, has_nights = bridge.source.journal(), bridge.origin != "simulated"
     history = History(series, now_ns, bridge.criteria, journal, has_nights)
@@ -204,9 +204,10 @@ async def history_route(request: Request) -> Response:
 async def timeline_route(request: Request) -> Response:
     """Events counted in buckets of equal length, and how far back anything is remembered."""
     bridge = bridge_of(request)
-    given = read(past_query.OfTimeline, request.query_params.multi_items(), PastRefused)
+    given = read(past_query.OfTimeline, request.query_params.multi_items())
     start_ns, end_ns = given.span(bridge.ros_time_ns)
-    timeline = Timeline(start_ns, end_ns, given.points, given.tag_id, bridge.source.journal())
+    tag_id = given.tag_id or EVERY_TAG
+    timeline = Timeline(start_ns, end_ns, given.points, tag_id, bridge.source.journal())
     return await respond_past(request, timeline, "timeline")
 
 
@@ -219,7 +220,7 @@ async def timeline_route(request: Request) -> Response:
 )
 async def report_route(request: Request) -> Response:
     """At most 31 days and 100,000 scans and inspections; 500 entries of each list."""
-    given = read(past_query.OfReport, request.query_params.multi_items(), PastRefused)
+    given = read(past_query.OfReport, request.query_params.multi_items())
     return await respond_past(request, _report(request, given), "report")
 
 
@@ -237,12 +238,7 @@ async def report_page_route(request: Request) -> Response:
     except REFUSALS as error:
         refused = refusal(error)
         if "text/html" in list_header(request, "accept"):
-            lang = language_of(
-                request.query_params.get("lang"),
-                list_header(request, "accept-language"),
-                languages(),
-            )
-            page = refused_page(str(error), lang)
+            page = refused_page(str(error), language_of(request, languages()))
             headers = {**refused.headers, **PAGE_HEADERS}
             del headers["content-length"], headers["content-type"]
             return Response(page, refused.status_code, headers, HTML_TYPE)
@@ -250,7 +246,7 @@ async def report_page_route(request: Request) -> Response:
 
 
 async def _report_page(request: Request) -> Response:
-    given = read(past_query.OfReportPage, request.query_params.multi_items(), PastRefused)
+    given = read(past_query.OfReportPage, request.query_params.multi_items())
     found = _report(request, given)
     name = given.time_zone or ""
     zone = zone_of(name) if name else None

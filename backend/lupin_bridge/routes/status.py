@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import io
 import math
-from collections.abc import Callable
-from hashlib import blake2b
 from itertools import islice
 from typing import Final
 
@@ -37,11 +35,10 @@ from lupin_bridge.routes.answers import (
     respond,
     respond_as_of,
 )
-from lupin_bridge.serving.admission import REVALIDATE, Answer
+from lupin_bridge.serving.admission import REVALIDATE, Answer, json_answer
 from lupin_bridge.stream import routes_schema, schema
 from lupin_bridge.stream.followers import robot_body
 from lupin_bridge.stream.state_json import alarms_body, header, judgement, stamp
-from lupin_twin.core.past import PastRefused
 from lupin_twin.field.explored import OccupancyMap
 
 # Grey of a free and of an occupied cell; unknown is transparent. The page decides what is below.
@@ -224,11 +221,10 @@ async def health(request: Request) -> Response:
 )
 async def sensors(request: Request) -> Response:
     """`sensors.json`, or the file that the operator gave instead, as it stands."""
-    body = bridge_of(request).criteria.sensors.text.encode()
-    etag = f'"{blake2b(body, digest_size=12).hexdigest()}"'
-    if has_etag(request, etag):
+    answer = json_answer(bridge_of(request).criteria.sensors.text.encode())
+    if has_etag(request, etag := answer.headers["ETag"]):
         return not_modified(etag)
-    return json_response(body, headers={"ETag": etag, **REVALIDATE})
+    return json_response(answer.body, headers=answer.headers)
 
 
 @read_route(
@@ -244,7 +240,7 @@ async def alarms_route(request: Request) -> Response:
     They follow from what was observed and the ranges of now, the same in every replica.
     """
     bridge = bridge_of(request)
-    given = read(past_query.OfAlarms, request.query_params.multi_items(), PastRefused)
+    given = read(past_query.OfAlarms, request.query_params.multi_items())
     span, active = given.span(bridge.ros_time_ns), given.active
     board = bridge.alarms.now
     alarms = board.active if active == "1" else board.alarms
@@ -252,7 +248,7 @@ async def alarms_route(request: Request) -> Response:
     notes, now_ns = bridge.notes.notes or (), bridge.ros_time_ns
 
     def body() -> bytes:
-        found = list(islice(filter(_is_in(*span, active), alarms), MAX_ALARMS))
+        found = list(islice((it for it in alarms if _is_in(it, *span, active)), MAX_ALARMS))
         said = notes_of_alarms(board.alarms, notes, now_ns)
         return orjson.dumps(alarms_body(found, board.source, board.since_ns, said))
 
@@ -264,18 +260,13 @@ async def alarms_route(request: Request) -> Response:
     return await respond(request, ("alarms", board.number, bridge.notes.number, given), compute)
 
 
-def _is_in(start_ns: int, end_ns: int, active: str | None = None) -> Callable[[Alarm], bool]:
+def _is_in(alarm: Alarm, start_ns: int, end_ns: int, active: str | None) -> bool:
     """`active` as in the query, `end_ns` 0: now."""
-
-    def is_in(alarm: Alarm) -> bool:
-        if active is not None and alarm.is_active != (active == "1"):
-            return False
-        if end_ns and alarm.raised_at_ns >= end_ns:
-            return False
-        cleared_ns = alarm.cleared_at_ns
-        return cleared_ns is None or cleared_ns >= start_ns
-
-    return is_in
+    if active is not None and alarm.is_active != (active == "1"):
+        return False
+    if end_ns and alarm.raised_at_ns >= end_ns:
+        return False
+    return alarm.cleared_at_ns is None or alarm.cleared_at_ns >= start_ns
 
 
 @read_route(

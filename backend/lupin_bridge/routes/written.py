@@ -35,7 +35,6 @@ from lupin_bridge.routes.answers import (
     bridge_of,
     error_response,
     json_response,
-    list_header,
     person_of,
     read_body,
     read_route,
@@ -55,7 +54,7 @@ from lupin_twin.core.state import NANOSECONDS_PER_SECOND
 
 log = logging.getLogger(__name__)
 
-router = APIRouter()
+router = APIRouter(default_response_class=Response)
 
 MAX_LISTED: Final = 2_000
 MAX_AUDITED: Final = 2_000
@@ -87,7 +86,7 @@ _WRITE_ANSWERS: Final = refusing(
 async def notes_route(request: Request) -> Response:
     """The newest first and 2,000 at most, withdrawn ones too; the same in every replica."""
     bridge = bridge_of(request)
-    given = read(past_query.OfNotes, request.query_params.multi_items(), PastRefused)
+    given = read(past_query.OfNotes, request.query_params.multi_items())
     start_ns, end_ns = given.span(bridge.ros_time_ns)
     notes = _known(bridge)
 
@@ -112,7 +111,6 @@ async def notes_route(request: Request) -> Response:
     "/api/notes",
     summary="Acknowledge or shelve an alarm, or comment on something",
     status_code=201,
-    response_class=Response,
     responses={201: {"model": routes_schema.Note}, **_WRITE_ANSWERS},
     openapi_extra=taking(routes_schema.NoteDraft),
 )
@@ -134,7 +132,6 @@ async def write_note(request: Request) -> Response:
 @router.delete(
     "/api/notes/{note_id}",
     summary="Withdraw a note: it is kept, with who withdrew it and when",
-    response_class=Response,
     responses={200: {"model": routes_schema.Note}, **_WRITE_ANSWERS},
 )
 async def withdraw_note(request: Request, note_id: str) -> Response:
@@ -298,7 +295,6 @@ MAX_AHEAD_S: Final = 10
     OBSERVATIONS,
     summary="Post the readings of one tag: they reach the twin over ROS, as a robot's do",
     status_code=202,
-    response_class=Response,
     responses={
         202: {"model": routes_schema.PublishedObservation, "description": "published over ROS"},
         **refusing(
@@ -388,7 +384,6 @@ async def key_route(request: Request) -> Response:
     PUSH,
     summary="Have a browser notified of critical alarms, or not any more",
     status_code=204,
-    response_class=Response,
     responses={
         204: {"description": "done"},
         **refusing(
@@ -415,7 +410,7 @@ async def subscribe(request: Request) -> Response:
     if given.keys is None:
         await access.people.write(lambda it, _: it.remove_device(given.endpoint, person.name))
         return Response(status_code=204, headers=NEVER_STORE)
-    language = language_of(None, list_header(request, "accept-language"), languages())
+    language = language_of(request, languages())
     device = Device(given.endpoint, given.keys.p256dh, given.keys.auth, language)
     try:
         check_device(device, push.target)

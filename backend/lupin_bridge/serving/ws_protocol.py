@@ -88,7 +88,8 @@ def pieces(frame: bytes, rest: bytes = b"") -> Iterator[Piece]:
     if len(frame) + len(rest) <= PIECE_BYTES:
         yield frame, rest
         return
-    parts = [part for part in (memoryview(frame)[_head_bytes(frame) :], memoryview(rest)) if part]
+    head_bytes = {126: 4, 127: 10}.get(frame[1], 2)
+    parts = [part for part in (memoryview(frame)[head_bytes:], memoryview(rest)) if part]
     opcode = frame[0] & _OPCODE
     for part in parts:
         for start in range(0, len(part), PIECE_BYTES):
@@ -96,10 +97,6 @@ def pieces(frame: bytes, rest: bytes = b"") -> Iterator[Piece]:
             is_last = part is parts[-1] and start + PIECE_BYTES >= len(part)
             yield frame_head(opcode | (_FIN if is_last else 0), len(payload)), payload
             opcode = _CONTINUATION
-
-
-def _head_bytes(frame: bytes) -> int:
-    return {126: 4, 127: 10}.get(frame[1], 2)
 
 
 def frame_head(first: int, length: int) -> bytes:
@@ -145,8 +142,9 @@ class Connection(WebSocketsSansIOProtocol, asyncio.BufferedProtocol):
         self.address = ""
         # uvicorn's own, which is for the client's answer to a close: ten seconds.
         self.close_timeout = CLOSE_GRACE_S
-        # Since when it is being closed, with time left for its client to read why, s.
-        self._closing_since_s: float | None = None
+        # Since when it is being closed, with time left for its client to read why, s; an open one
+        # is not evicted for others.
+        self.waiting_since_s: float | None = None
         self.on_writable: Callable[[], None] | None = None
         self._pace = RateLimit(FRAMES_PER_S, FRAMES_AT_ONCE)
         # What is left of large messages, for as long as the socket does not take it.
@@ -174,11 +172,6 @@ class Connection(WebSocketsSansIOProtocol, asyncio.BufferedProtocol):
         """Forget the connection."""
         self._pieces.clear()
         super().connection_lost(exc)
-
-    @property
-    def waiting_since_s(self) -> float | None:
-        """Since when it is being closed; None: an open one is not evicted for others."""
-        return self._closing_since_s
 
     def abort(self) -> None:
         """Tear the connection down and forget what was still to be sent."""
@@ -302,8 +295,8 @@ class Connection(WebSocketsSansIOProtocol, asyncio.BufferedProtocol):
             self.loop.call_later(CLOSE_GRACE_S, tear_down, self.transport)
 
     def _note_closing(self) -> None:
-        if self._closing_since_s is None:
-            self._closing_since_s = self.loop.time()
+        if self.waiting_since_s is None:
+            self.waiting_since_s = self.loop.time()
 
     def _send_close(self) -> None:
         """Write the close frame that the protocol has ready, and end after the grace."""

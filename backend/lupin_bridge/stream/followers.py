@@ -244,11 +244,6 @@ def changed_of(known: Mapping[str, Report]) -> Changed:
 # --- what the robot says of itself ----------------------------------------------------------------
 
 
-def robot_frame(now: Robot) -> bytes:
-    """`routes_schema.RobotFrame` as a WebSocket frame."""
-    return text_frame(orjson.dumps({"type": "robot", **_now(now)}))
-
-
 def robot_body(known: RobotLog) -> bytes:
     """`routes_schema.Robot`."""
     return orjson.dumps({**_now(known.now), "trail": [_point(it) for it in known.trail]})
@@ -308,4 +303,5 @@ class RobotFollower(Periodic):
         except TwinUnavailableError:  # its thread has ended, which others tell
             return
         if heard is not None and self.log.take(heard, now_ns):
-            self._hub.publish_robot(robot_frame(self.log.now), self._clock())
+            frame = orjson.dumps({"type": "robot", **_now(self.log.now)})
+            self._hub.publish_robot(text_frame(frame), self._clock())

@@ -247,12 +247,14 @@ class StateFrame:
     @property
     def json(self) -> bytes:
         """The state as JSON of `schema.TwinState`; 10 ms of work for 10,000 tags, if asked for."""
-        return self._once("json", lambda: self._writer.json.state(self.snapshot))
+        snapshot, writer = self.snapshot, self._writer.json
+        return self._once("json", lambda: writer.state(snapshot, snapshot.now_ns))
 
     @property
     def message_json(self) -> bytes:
         """The state as JSON of lupin_msgs/TwinState, for who reads the message itself."""
-        return self._once("message", lambda: self._writer.message_json.state(self.snapshot))
+        snapshot, writer = self.snapshot, self._writer.message_json
+        return self._once("message", lambda: writer.state(snapshot, snapshot.now_ns))
 
     def let_go(self) -> None:
         """Keep only what a delta needs: or every frame ever made would stay in memory."""

@@ -31,12 +31,7 @@ if TYPE_CHECKING:  # who only wants a moment as JSON does without
     from lupin_bridge.alarms.board import AlarmNotes, Page
     from lupin_bridge.judge.episodes import Alarm
     from lupin_bridge.judge.judging import Judged
-    from lupin_bridge.judge.scans import Patrol
     from lupin_bridge.judge.verdict import Health, Reason
-
-# In place of a moment: that of the snapshot itself.
-OWN_TIME: Final = -1
-
 
 # It cannot occur inside a string: there the quotes of the key would be escaped.
 _NO_AGE: Final = b'"stale_seconds":null'
@@ -54,13 +49,8 @@ class StateJson:
         # What stands before a tag's age and behind it.
         self._cache: dict[str, tuple[TagState, bytes, bytes]] = {}
 
-    def state(self, snapshot: Snapshot, now_ns: int | None = OWN_TIME) -> bytes:
-        """The snapshot as JSON of `schema.TwinState`, ages as of `now_ns`, or of its own time.
-
-        None: now is not known, and no age is.
-        """
-        if now_ns == OWN_TIME:
-            now_ns = snapshot.now_ns
+    def state(self, snapshot: Snapshot, now_ns: int | None) -> bytes:
+        """The snapshot as JSON of `schema.TwinState`, its ages as of `now_ns`; None: not known."""
         return b'{"header":%b,"tags":[%b]}' % (
             orjson.dumps(header(snapshot.stamp_ns, snapshot.frame_id)),
             b",".join([self.tag(tag, now_ns) for tag in snapshot.tags]),
@@ -207,7 +197,7 @@ def alarm_json(alarm: Alarm, said: AlarmNotes | None = None) -> dict[str, Any]:
         "reason": reason_json(alarm.reason),
         "tag_id": alarm.tag_id,
         "raised_at": stamp(alarm.raised_at_ns),
-        "cleared_at": None if alarm.cleared_at_ns is None else stamp(alarm.cleared_at_ns),
+        "cleared_at": moment(alarm.cleared_at_ns),
         "worst": alarm.worst,
     }
     if said is not None and said.acknowledged is not None:
@@ -228,7 +218,7 @@ def note_json(note: Note, gone: Mapping[str, Note]) -> dict[str, Any]:
         "kind": note.kind,
         "subject": note.subject,
         "text": note.text,
-        "until": None if note.until_ns is None else stamp(note.until_ns),
+        "until": moment(note.until_ns),
         "made_at": stamp(note.made_at_ns),
         "by": note.by,
         "withdrawn_by": None if by is None else by.by,
@@ -249,7 +239,7 @@ def alarms_body(
     return {
         "alarms": [alarm_json(alarm, said.get(alarm.id)) for alarm in alarms],
         "source": source,
-        "since": None if since_ns is None else stamp(since_ns),
+        "since": moment(since_ns),
     }
 
 
@@ -290,16 +280,15 @@ def _text(judged: Judged, tag_ids: Iterable[str]) -> bytes:
 
 
 def _house(judged: Judged) -> dict[str, Any]:
-    day = {"is_day": judged.day.is_day, "source": judged.day.source}
-    return {**_health(judged.house), "day": day, "patrol": _patrol(judged.patrol)}
-
-
-def _patrol(patrol: Patrol) -> dict[str, Any]:
-    interval_ns, last_ns = patrol.interval_ns, patrol.last_scan_ns
+    patrol = judged.patrol
     return {
-        "interval_s": None if interval_ns is None else interval_ns / 1e9,
-        "last_scan": None if last_ns is None else stamp(last_ns),
-        "overdue": patrol.overdue,
+        **_health(judged.house),
+        "day": {"is_day": judged.day.is_day, "source": judged.day.source},
+        "patrol": {
+            "interval_s": None if patrol.interval_ns is None else patrol.interval_ns / 1e9,
+            "last_scan": moment(patrol.last_scan_ns),
+            "overdue": patrol.overdue,
+        },
     }
 
 
@@ -318,7 +307,7 @@ def reason_json(reason: Reason) -> dict[str, Any]:
         "sensor": reason.sensor,
         "value": reason.value,
         "limit": reason.limit,
-        "since": None if reason.since_ns is None else stamp(reason.since_ns),
+        "since": moment(reason.since_ns),
     }
     if reason.release is not None:
         found["release"] = reason.release

@@ -61,18 +61,6 @@ class Channel:
     topic: Topic
     schema: str
 
-    @property
-    def json(self) -> dict[str, Any]:
-        """As in `advertise`."""
-        return {
-            "id": self.id,
-            "topic": self.topic.name,
-            "encoding": "cdr",
-            "schemaName": self.topic.type_name,
-            "schemaEncoding": "ros2msg",
-            "schema": self.schema,
-        }
-
 
 def chosen(offered: Iterable[str]) -> str | None:
     """The first of the subprotocols that a client offers that is served here."""
@@ -150,22 +138,23 @@ def status(level: int, text: str) -> bytes:
 
 def advertise(channels: Iterable[Channel]) -> bytes:
     """Channels that are offered now."""
-    return orjson.dumps({"op": "advertise", "channels": [channel.json for channel in channels]})
+    entries = [
+        {
+            "id": channel.id,
+            "topic": channel.topic.name,
+            "encoding": "cdr",
+            "schemaName": channel.topic.type_name,
+            "schemaEncoding": "ros2msg",
+            "schema": channel.schema,
+        }
+        for channel in channels
+    ]
+    return orjson.dumps({"op": "advertise", "channels": entries})
 
 
 def unadvertise(ids: Iterable[int]) -> bytes:
     """Channels that are offered no more."""
     return orjson.dumps({"op": "unadvertise", "channelIds": sorted(ids)})
-
-
-def message_head(subscription_id: int, stamp_ns: int) -> bytes:
-    """What stands before the payload of a message; the payload follows in the same frame."""
-    return struct.pack("<BIQ", _MESSAGE_DATA, subscription_id, max(0, stamp_ns))
-
-
-def time(stamp_ns: int) -> bytes:
-    """Simulated time."""
-    return struct.pack("<BQ", _TIME, max(0, stamp_ns))
 
 
 # --- one client's session -------------------------------------------------------------------------
@@ -228,17 +217,17 @@ class Session:
         self._advertised = dict(channels)
         ended = [key for key, channel in self._subscriptions.items() if channel.id in gone]
         for key in ended:
-            self._end(key)
+            self.end(key)
         return Reaction(tuple(replies), ended=tuple(ended))
 
     def has(self, subscription_id: int, channel: Channel) -> bool:
         """Whether this subscription is open."""
         return self._subscriptions.get(subscription_id) is channel
 
-    def give_up(self, subscription_id: int) -> None:
-        """A subscription cannot be served after all."""
-        if subscription_id in self._subscriptions:
-            self._end(subscription_id)
+    def end(self, subscription_id: int) -> None:
+        """It is served no more; harmless if there is none."""
+        self._subscriptions.pop(subscription_id, None)
+        self._waiting.pop(subscription_id, None)
 
     def put(self, subscription_id: int, sample: Sample) -> bytes | None:
         """A message has come for a subscription; returns a reply, if there is something to say."""
@@ -246,7 +235,14 @@ class Session:
         if channel is None:
             return None
         if len(sample.data) > MAX_MESSAGE_BYTES:
-            return self._leave_out(channel, len(sample.data))
+            if channel.id in self._too_large:
+                return None  # said once
+            self._too_large.add(channel.id)
+            return status(
+                WARNING,
+                f"messages on {shown(channel.topic.name)} are left out while they are larger than "
+                f"{MAX_MESSAGE_BYTES} bytes: this one has {len(sample.data)}",
+            )
         self._counts.skipped += subscription_id in self._waiting
         # Behind the others that wait: one fast channel must not keep them from their turn.
         self._waiting.pop(subscription_id, None)
@@ -260,7 +256,7 @@ class Session:
     def next(self) -> tuple[bytes, bytes] | None:
         """What is to be written next, as a binary message in two parts; None: nothing waits."""
         if self._time_ns is not None:
-            head = time(self._time_ns)
+            head = struct.pack("<BQ", _TIME, max(0, self._time_ns))
             self._time_ns = None
             return head, b""
         if not self._waiting:
@@ -268,7 +264,8 @@ class Session:
         subscription_id = next(iter(self._waiting))
         sample = self._waiting.pop(subscription_id)
         self._counts.sent += 1
-        return message_head(subscription_id, sample.stamp_ns), sample.data
+        stamp_ns = max(0, sample.stamp_ns)
+        return struct.pack("<BIQ", _MESSAGE_DATA, subscription_id, stamp_ns), sample.data
 
     def _subscribe(self, subscriptions: Iterable[tuple[int, int]]) -> Reaction:
         begun: list[tuple[int, Channel]] = []
@@ -291,23 +288,9 @@ class Session:
     def _unsubscribe(self, ids: Sequence[int]) -> Reaction:
         ended = [key for key in dict.fromkeys(ids) if key in self._subscriptions]
         for key in ended:
-            self._end(key)
+            self.end(key)
         errors = [f"there is no subscription {key}" for key in ids if key not in ended]
         return Reaction(_errors(errors), ended=tuple(ended))
-
-    def _end(self, subscription_id: int) -> None:
-        del self._subscriptions[subscription_id]
-        self._waiting.pop(subscription_id, None)
-
-    def _leave_out(self, channel: Channel, size: int) -> bytes | None:
-        if channel.id in self._too_large:
-            return None  # said once
-        self._too_large.add(channel.id)
-        return status(
-            WARNING,
-            f"messages on {shown(channel.topic.name)} are left out while they are larger than "
-            f"{MAX_MESSAGE_BYTES} bytes: this one has {size}",
-        )
 
 
 def _errors(errors: list[str]) -> tuple[bytes, ...]:

@@ -39,7 +39,7 @@ import orjson
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from lupin_bridge.feed.relay import TwinNames, absolute, topics_of
-from lupin_bridge.field.query import BOX_NAMES, FieldQuery
+from lupin_bridge.field import BOX_NAMES, FieldQuery
 from lupin_bridge.serving.ws_protocol import members_of, shown
 
 MAX_NAME_LENGTH: Final = 256
@@ -191,10 +191,6 @@ def json_of(message: Any) -> bytes:
     return orjson.dumps(_message(message))
 
 
-def _base64(values: Any) -> str:
-    return b2a_base64(bytes(values), newline=False).decode("ascii")
-
-
 def _array(values: Any) -> orjson.Fragment:
     # Not by a list, of which a map of millions of cells would make as many objects; and in parts,
     # for while orjson writes no other thread runs.
@@ -229,7 +225,7 @@ def _converter(kind: str) -> Converter:
         return _one(kind)
     of = found["kind"] or found["of"]
     if of in _BYTES:
-        return _base64
+        return lambda values: b2a_base64(bytes(values), newline=False).decode("ascii")
     if of in _NUMBERS:
         return _array
     one = _one(of)
@@ -310,7 +306,8 @@ def _arguments(args: dict[str, Any], defaults: Mapping[str, str | float]) -> dic
     values: dict[str, Any] = dict(defaults)
     for name, value in args.items():
         if name not in defaults:
-            raise Refused(f"args.{name[:64]} is unknown, expected {_listed(defaults)}")
+            known = ", ".join(defaults) or "no arguments"
+            raise Refused(f"args.{name[:64]} is unknown, expected {known}")
         values[name] = _checked(name, value, defaults[name])
     return values
 
@@ -323,10 +320,6 @@ def _checked(name: str, value: Any, default: str | float) -> str | float:
     if type(value) in (int, float):
         return float(value)
     raise Refused(f"args.{name} is {shown(value)}, expected a number")
-
-
-def _listed(defaults: Mapping[str, object]) -> str:
-    return ", ".join(defaults) or "no arguments"
 
 
 def _rosapi(service: str, args: Mapping[str, Any], names: TwinNames) -> dict[str, Any]:

@@ -12,7 +12,6 @@ import asyncio
 import logging
 from collections.abc import Awaitable, Callable
 from dataclasses import dataclass, replace
-from functools import partial
 from typing import Final
 
 from lupin_bridge.feed.relay import (
@@ -98,16 +97,13 @@ class Session:
     def feeds(self) -> dict[str, Feed]:
         """Its other topics, which come from the relay, by their spelling."""
         return {
-            name: Feed(self._topic(name), name, self._interval_s(name))
+            name: Feed(self._topics[absolute(name)], name, self._interval_s(name))
             for name, _ in self._subscriptions
             if not self._is_state(name)
         }
 
-    def _topic(self, name: str) -> Topic:
-        return self._topics[absolute(name)]
-
     def _is_state(self, name: str) -> bool:
-        return self._topic(name).name == self._names.state_topic
+        return absolute(name) == self._names.state_topic
 
     def _interval_s(self, name: str) -> float:
         rates = [
@@ -131,17 +127,20 @@ class Session:
                 case CallService():
                     return self._call_service(request)
         except Refused as refused:
-            return Reaction(self._refusal(refused))
+            if refused.service is not None:
+                reply = service_failure(refused.id, refused.service, str(refused))
+            else:
+                reply = status("error", str(refused), refused.id)
+            return Reaction((reply,))
 
     def wire(self, frame: StateFrame) -> bytes:
         """A state as this client reads it: once under each spelling of the topic it subscribed to.
 
         Written once for all clients that spell it alike.
         """
-        spellings = self._states()
         return b"".join(
-            frame.wire(f"rosbridge {topic}", partial(_published, topic, frame))
-            for topic in spellings
+            frame.wire(f"rosbridge {topic}", lambda of=topic: publish(of, frame.message_json))  # type: ignore[misc]
+            for topic in self._states()
         )
 
     def _subscribe(self, request: Subscribe) -> Reaction:
@@ -181,15 +180,6 @@ class Session:
         if isinstance(reply, FieldCall):
             return Reaction(field_call=reply)
         return Reaction((service_response(request.id, request.service, reply, result=True),))
-
-    def _refusal(self, refused: Refused) -> tuple[bytes, ...]:
-        if refused.service is not None:
-            return (service_failure(refused.id, refused.service, str(refused)),)
-        return (status("error", str(refused), refused.id),)
-
-
-def _published(topic: str, frame: StateFrame) -> bytes:
-    return publish(topic, frame.message_json)
 
 
 # The largest message that is sent, bytes of CDR: twice as much in JSON, and more.
@@ -264,7 +254,7 @@ class Feeds:
             has_come.set()
 
         try:
-            listening = await self._writer.relay.listen(feed.topic, take)
+            close = await self._writer.relay.listen(feed.topic, take)
         except (NotRelayedError, TwinUnavailableError) as error:
             await self._report(feed, str(error))
             return
@@ -277,7 +267,7 @@ class Feeds:
                     if feed.min_interval_s:
                         await asyncio.sleep(feed.min_interval_s)
         finally:
-            listening.close()
+            close()
 
     async def _send_sample(self, feed: Feed, sample: Sample) -> None:
         if len(sample.data) > MAX_MESSAGE_BYTES:

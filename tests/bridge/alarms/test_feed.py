@@ -11,7 +11,7 @@ from lupin_bridge.alarms.board import AlarmBoard, Change
 from lupin_bridge.alarms.feed import AlarmFeed
 from lupin_bridge.feed.source import TwinUnavailableError, TwinUpdate
 from lupin_bridge.judge import alarm_fold
-from lupin_bridge.judge.options import Criteria
+from lupin_bridge.judge.judging import Criteria
 from lupin_bridge.settings import Settings
 from lupin_twin.core.journal_condition import Condition, JournalState
 from lupin_twin.core.past import PastWrite, PastWrites, RunSpan, WritesRequest

@@ -8,7 +8,7 @@ from mcap.reader import make_reader
 from rclpy.serialization import deserialize_message
 from rosgraph_msgs.msg import Clock as ClockMessage
 
-from lupin_bridge.bags.journal_export import LOT, Exported, export, offered_qos
+from lupin_bridge.bags.journal_export import LOT, export, offered_qos
 from lupin_bridge.feed.relay import Topic
 from lupin_twin.core import ingest
 from lupin_twin.core.drops import Drop
@@ -39,7 +39,7 @@ ROWS: list[Write] = [
 
 def exported(
     path: Path, target: Path, start_ns: int = 0, end_ns: int = 2**62, namespace: str = ""
-) -> Exported:
+) -> tuple[int, int]:
     with closing(open_reader(path)) as connection:
         return export(connection, target, start_ns, end_ns, namespace)
 
@@ -74,11 +74,11 @@ def test_who_hears_it_knows_what_the_journal_says_of_its_end(tmp_path: Path, unt
     path, target = tmp_path / "j.sqlite", tmp_path / "a.mcap"
     kept(path, ROWS)
     end_ns = NOW + until_s * SECOND
-    made = exported(path, target, 0, end_ns + 1)
+    observations, tags = exported(path, target, 0, end_ns + 1)
     with closing(open_reader(path)) as connection:
         assert fed(target) == by_id(state_at(connection, end_ns, "map").tags)
     messages = [row for row in ROWS if row.stamp_ns <= end_ns]
-    assert made.observations + made.tags == len(messages) == len(read(target))
+    assert observations + tags == len(messages) == len(read(target))
     assert [entry[1] for entry in read(target)] == [row.arrival_ns for row in messages]
 
 
@@ -102,14 +102,14 @@ def test_a_period_begins_with_the_places_of_before(tmp_path: Path) -> None:
     path, target = tmp_path / "j.sqlite", tmp_path / "a.mcap"
     kept(path, ROWS)
     made = exported(path, target, NOW + 4 * SECOND, NOW + 6 * SECOND, namespace="/house/")
-    assert made == Exported(observations=1, tags=2)
+    assert made == (1, 2)
     first, *_ = read(target)
     assert first[:2] == ("/house/perception/discovered_tags", NOW + 4 * SECOND + 2000)
     tags = deserialize_message(first[3], DiscoveredTags).tags
     assert [(tag.tag_id, tag.pose_in_map.position.x) for tag in tags] == [("7", 1.5), ("8", 8.5)]
     target.unlink()
     made = exported(path, target, NOW + 5 * SECOND, NOW + 6 * SECOND + 1)
-    assert made == Exported(observations=1, tags=2)
+    assert made == (1, 2)
 
 
 def test_simulated_time_is_told_by_the_clock(tmp_path: Path) -> None:
@@ -130,7 +130,7 @@ def test_simulated_time_is_told_by_the_clock(tmp_path: Path) -> None:
 def test_of_nothing_or_a_part_no_file_is_left_and_none_is_overwritten(tmp_path: Path) -> None:
     path, target = tmp_path / "j.sqlite", tmp_path / "a.mcap"
     kept(path, ROWS)
-    assert exported(path, target, 0, NOW) == Exported(0, 0)
+    assert exported(path, target, 0, NOW) == (0, 0)
     assert not target.exists()
     target.write_bytes(b"mine")
     with pytest.raises(FileExistsError):

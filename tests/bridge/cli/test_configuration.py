@@ -139,8 +139,6 @@ def test_a_mistake_in_a_variable_is_named(name: str, value: str, named: str) -> 
         ("mqtt_password = 'x'", " line 1: mqtt_password is no setting: put the password into a f"),
         ("port = ", " is not TOML: Invalid value (at end of document)"),
         (f"port = {'9' * 5_000}", " is not TOML: Exceeds the limit (4300 digits) for integer"),
-        (f"port = 0x{'f' * 5_000}", " line 1: port is a number of thousands of digits: "),
-        (f"allow_host = {'[' * 20_000}", " is not TOML: maximum recursion depth exceeded"),
         (r'sensors = "a\u0000b"', " line 1: sensors is 'a\\x00b': there is a co"),
         (
             r'allow_host = ["a\nb"]',

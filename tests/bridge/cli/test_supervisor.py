@@ -11,7 +11,7 @@ from pathlib import Path
 import httpx
 import pytest
 
-from lupin_bridge.cli.serving import Supervisor
+from lupin_bridge.serving.server import Supervisor
 from tests.support.messages import scan
 from tests.support.processes import constants, lupin_twin, patrols_of, url_of
 from tests.support.ros import Peer

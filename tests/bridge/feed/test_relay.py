@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from lupin_bridge.feed.relay import Listening, NotRelayedError, Relay, RosTime, Sample, Topic
+from lupin_bridge.feed.relay import NotRelayedError, Relay, RosTime, Sample, Topic
 from lupin_bridge.feed.source import TwinUnavailableError
 from tests.support.waiting import until
 
@@ -97,7 +97,7 @@ def relay(ros: Ros) -> Relay:
 
 async def all_has_ended(ros: Ros, relay: Relay) -> None:
     """Until what nobody listens to any more has ended: the last to be closed ends last."""
-    (await relay.listen(LIVE, Ear())).close()
+    (await relay.listen(LIVE, Ear()))()
     await until(lambda: LIVE.name not in ros.takes, "the end of the last that was closed")
 
 
@@ -159,12 +159,12 @@ async def test_a_topic_is_heard_until_the_last_has_closed(ros: Ros, relay: Relay
     ear = Ear()
     first = await relay.listen(STATE, Ear())
     second = await relay.listen(STATE, ear)
-    first.close()
-    first.close()
+    first()
+    first()
     await all_has_ended(ros, relay)
     await ros.publish(b"1")
     assert ear.heard == [b"1"], "however often the first one closes"
-    second.close()
+    second()
     await ros.publish(b"2")
     await until(lambda: not ros.takes, "the end of the subscription")
     assert (ear.heard, len(relay)) == ([b"1"], 0)
@@ -173,12 +173,12 @@ async def test_a_topic_is_heard_until_the_last_has_closed(ros: Ros, relay: Relay
 
 
 async def test_who_comes_and_goes_makes_no_work_for_ros(ros: Ros, relay: Relay) -> None:
-    gone: list[weakref.ref[Listening]] = []
+    gone: list[weakref.ref[Callable[[], None]]] = []
     for _ in range(100):
-        listening = await relay.listen(STATE, Ear())
-        listening.close()
-        gone.append(weakref.ref(listening))
-    del listening
+        close = await relay.listen(STATE, Ear())
+        close()
+        gone.append(weakref.ref(close))
+    del close
     await ros.publish(b"1")
     assert not any(ref() for ref in gone), "nothing is kept of them"
     ear = Ear()
@@ -189,7 +189,7 @@ async def test_who_comes_and_goes_makes_no_work_for_ros(ros: Ros, relay: Relay) 
 
 async def test_who_comes_just_in_time_keeps_it(ros: Ros, relay: Relay) -> None:
     relay.linger_s = 0.0
-    (await relay.listen(STATE, Ear())).close()
+    (await relay.listen(STATE, Ear()))()
     ear = Ear()
     await relay.listen(STATE, ear)
     await all_has_ended(ros, relay)
@@ -240,9 +240,9 @@ async def test_without_its_thread_nothing_is_heard_and_nothing_breaks(
     ros: Ros, relay: Relay
 ) -> None:
     relay.linger_s = 0.0
-    listening = await relay.listen(STATE, Ear())
+    close = await relay.listen(STATE, Ear())
     ros.has_ended = True
-    listening.close()
+    close()
     await until(lambda: len(relay) == 0, "its end")
     with pytest.raises(TwinUnavailableError):
         await relay.listen(LIVE, Ear())

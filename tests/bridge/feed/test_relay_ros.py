@@ -79,7 +79,7 @@ async def test_a_twins_topics_come_as_they_are_on_the_wire(domain: int, source_t
         thread: Any = relay._thread()
         before = await thread.call(count)
         for each in listening:
-            each.close()
+            each()
         left = before - len(listening)
         await until_answered(lambda: thread.call(count), "its leaving", lambda it: it == left)
         assert (len(relay), stage.source.thread.callback_errors) == (0, 0)

@@ -2,7 +2,7 @@
 
 import pytest
 
-from lupin_bridge.field import formats as colour
+from lupin_bridge import field as colour
 
 
 @pytest.mark.parametrize(

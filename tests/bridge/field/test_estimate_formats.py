@@ -3,14 +3,15 @@
 import io
 import json
 from dataclasses import replace
+from typing import Literal
 
 import numpy as np
 import pytest
 from PIL import Image
 
-from lupin_bridge.field import formats
-from lupin_bridge.field.formats import JSON, NPY, PNG, FieldFormat
-from lupin_bridge.judge.options import Criteria
+from lupin_bridge import field as formats
+from lupin_bridge.field import JSON, NPY, PNG, EstimateQuery, FieldFormat
+from lupin_bridge.judge.judging import Criteria
 from lupin_bridge.judge.quantities import Ranges, Span
 from lupin_bridge.settings import Settings
 from lupin_bridge.stream.followers import GetEstimateResponse
@@ -21,8 +22,10 @@ SENSORS = Criteria.of(Settings()).sensors
 ESTIMATE = an_estimate(width=3, height=2)
 
 
-def written(field_format: FieldFormat, layer: str = "mean") -> bytes:
-    return formats.write_estimate(ESTIMATE, field_format, "co2", SENSORS, layer=layer)
+def written(field_format: FieldFormat, layer: Literal["mean", "sd"] = "mean") -> bytes:
+    return formats.write_estimate(
+        ESTIMATE, field_format, EstimateQuery("co2", layer=layer), SENSORS
+    )
 
 
 def test_json_is_the_service_s_response() -> None:
@@ -55,7 +58,9 @@ def test_npy_is_mean_and_sd() -> None:
 
 
 @pytest.mark.parametrize(("layer", "highest"), [("mean", 24.0), ("sd", 2.0)])
-def test_a_picture_is_transparent_where_it_is_not_known(layer: str, highest: float) -> None:
+def test_a_picture_is_transparent_where_it_is_not_known(
+    layer: Literal["mean", "sd"], highest: float
+) -> None:
     field = formats.estimate_picture(ESTIMATE, layer)
     assert field.value_max == highest
     assert np.isnan(field.values).tolist() == [False] * 5 + [True]

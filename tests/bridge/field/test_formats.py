@@ -12,9 +12,9 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from PIL import Image
 
-from lupin_bridge.field import formats as field_formats
-from lupin_bridge.field.formats import FORMATS, JSON, NPY, PNG, rgb
-from lupin_bridge.judge.options import own_sensors
+from lupin_bridge import field as field_formats
+from lupin_bridge.field import FORMATS, JSON, NPY, PNG, rgb
+from lupin_bridge.judge.judging import own_sensors
 from lupin_bridge.stream import schema
 from lupin_twin.field.grid import FieldGrid
 

@@ -8,11 +8,11 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from lupin_bridge.field import query as field_query
-from lupin_bridge.field.formats import FORMATS, JSON, NPY, PNG, FieldFormat
-from lupin_bridge.field.query import FieldQuery
+from lupin_bridge import field as field_query
+from lupin_bridge.field import FORMATS, JSON, NPY, PNG, FieldFormat, FieldQuery
 from lupin_bridge.query_string import read
-from lupin_twin.field.engine import FieldRefused, FieldRequest
+from lupin_twin.core.past import PastRefused
+from lupin_twin.field.engine import FieldRequest
 
 BOX = {"bbox_min_x": "-1", "bbox_min_y": "0.5", "bbox_max_x": "2e1", "bbox_max_y": "3"}
 
@@ -20,7 +20,7 @@ BOX = {"bbox_min_x": "-1", "bbox_min_y": "0.5", "bbox_max_x": "2e1", "bbox_max_y
 def parse(pairs: Sequence[tuple[str, str]]) -> FieldQuery:
     names = [name for name, _ in pairs]
     own = [] if "sensor_type" in names else [("sensor_type", "co2")]
-    return read(FieldQuery, [*own, *pairs], FieldRefused)
+    return read(FieldQuery, [*own, *pairs])
 
 
 # --- parsing ------------------------------------------------------------------------------------
@@ -49,7 +49,7 @@ def test_cells_of_a_default_box_are_wide_enough_unless_the_query_says_how_wide()
 
 @pytest.mark.parametrize("text", ["0", "-1", "1001", "1.5", "", "²", "٣", "1e2", "9" * 5_000, "x"])
 def test_a_scale_out_of_its_range_is_refused(text: str) -> None:
-    with pytest.raises(FieldRefused, match=f"^scale is '{text[:64]}': "):
+    with pytest.raises(PastRefused, match=f"^scale is '{text[:64]}': "):
         parse([("scale", text)])
 
 

@@ -12,7 +12,7 @@ from lupin_bridge.access.policy import Proxies
 from lupin_bridge.fleet import source
 from lupin_bridge.fleet.app import Fleet, create_fleet_app
 from lupin_bridge.fleet.source import Watching
-from lupin_bridge.judge.options import Criteria
+from lupin_bridge.judge.judging import Criteria
 from lupin_bridge.serving.admission import Limits
 from lupin_bridge.settings import Settings
 from tests.support.archive import Archive, run
@@ -117,6 +117,6 @@ def test_the_overviews_routes_are_those_of_the_docs() -> None:
 
 
 def test_a_fleet_is_shown_without_ros() -> None:
-    code = "import sys, lupin_bridge.cli.serving; print('rclpy' in sys.modules)"
+    code = "import sys, lupin_bridge.cli.roles; print('rclpy' in sys.modules)"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout == "False\n"

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from lupin_bridge.judge.day import ClockDay
-from lupin_bridge.judge.options import Criteria, own_sensors
+from lupin_bridge.judge.judging import Criteria, own_sensors
 from lupin_bridge.past.report import Report
 from lupin_twin.core.journal_condition import Condition, JournalState
 from lupin_twin.core.state import Scan, Write

@@ -14,7 +14,7 @@ from lupin_bridge.judge import alarm_fold, tag_log
 from lupin_bridge.judge.alarm_fold import Follower
 from lupin_bridge.judge.day import ClockDay, Day
 from lupin_bridge.judge.episodes import Alarm
-from lupin_bridge.judge.options import Criteria, own_sensors
+from lupin_bridge.judge.judging import Criteria, own_sensors
 from lupin_bridge.judge.verdict import Kind
 from lupin_twin.core.past import PastWrite, RunSpan
 from tests.support.alarms_reference import Plain, S, alarms

@@ -11,7 +11,7 @@ import pytest
 from lupin_bridge.judge.alarm_fold import Follower
 from lupin_bridge.judge.day import COUNTS_NS, SINCE_NS, ClockDay, Day, days_of
 from lupin_bridge.judge.episodes import Alarm
-from lupin_bridge.judge.options import Criteria, own_sensors
+from lupin_bridge.judge.judging import Criteria, own_sensors
 from lupin_bridge.judge.quantities import DAILY, DAY_NS
 from lupin_bridge.judge.verdict import Verdict
 from lupin_twin.core.past import PastWrite, RunSpan

@@ -21,8 +21,7 @@ from lupin_bridge.alarms.board import AlarmBoard
 from lupin_bridge.alarms.feed import AlarmFeed
 from lupin_bridge.feed.source import TwinUpdate
 from lupin_bridge.judge.day import ClockDay
-from lupin_bridge.judge.judging import Judge, Judged, silenced
-from lupin_bridge.judge.options import Criteria, own_sensors
+from lupin_bridge.judge.judging import Criteria, Judge, Judged, own_sensors, silenced
 from lupin_bridge.judge.verdict import Health, Kind
 from lupin_twin.core.past import PastWrite
 from lupin_twin.core.state import Flower, Inspection, Pose, Reading, Scan, TwinStore

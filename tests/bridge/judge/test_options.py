@@ -5,7 +5,7 @@ from typing import Any
 
 import pytest
 
-from lupin_bridge.judge.options import MAX_FILE_BYTES, Criteria, own_sensors, unix_s
+from lupin_bridge.judge.judging import MAX_FILE_BYTES, Criteria, own_sensors, unix_s
 from lupin_bridge.settings import SettingError, Settings
 
 

@@ -8,7 +8,7 @@ import pytest
 
 from lupin_bridge.judge.day import ClockDay, TagDays
 from lupin_bridge.judge.episodes import TagEpisodes
-from lupin_bridge.judge.options import Criteria
+from lupin_bridge.judge.judging import Criteria
 from lupin_bridge.judge.quantities import Ranges, Span
 from lupin_bridge.judge.sensors_file import MAX_TEXT, Language, SensorsError, parse
 from lupin_twin.core.past import PastWrite

@@ -1,6 +1,6 @@
 from lupin_bridge.judge.day import ClockDay, TagDays
 from lupin_bridge.judge.episodes import TagEpisodes
-from lupin_bridge.judge.options import Criteria, own_sensors
+from lupin_bridge.judge.judging import Criteria, own_sensors
 from lupin_bridge.judge.quantities import IsDay
 from lupin_bridge.judge.tag_log import MARK, TagPast, is_long
 from lupin_twin.core.past import PastWrite

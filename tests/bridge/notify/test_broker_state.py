@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from lupin_bridge.alarms.board import Board
 from lupin_bridge.judge.verdict import Health, Verdict
 from lupin_bridge.notify.messages import GreenhouseState, Topics
-from lupin_bridge.notify.mirror import Mirror
+from lupin_bridge.notify.mqtt import Mirror
 from tests.support.seen import HOLDS_NS, NOW_NS, SENSORS, S, alarm, seen, tag
 
 

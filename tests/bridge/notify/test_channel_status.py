@@ -1,6 +1,6 @@
 """How long a channel waits."""
 
-from lupin_bridge.notify.sending import Backoff
+from lupin_bridge.notify.messages import Backoff
 
 
 def test_each_failure_waits_twice_as_long_up_to_the_most_a_half_of_it_by_chance() -> None:

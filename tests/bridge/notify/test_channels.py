@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from lupin_bridge.alarms.board import AlarmBoard, NoteBoard
-from lupin_bridge.judge.options import Criteria
+from lupin_bridge.judge.judging import Criteria
 from lupin_bridge.notify.channels import Channels
 from lupin_bridge.notify.destinations import Targets
 from lupin_bridge.notify.messages import GreenhouseState

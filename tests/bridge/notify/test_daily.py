@@ -12,13 +12,11 @@ from zoneinfo import ZoneInfo
 import orjson
 import pytest
 
-from lupin_bridge.judge.options import Criteria
+from lupin_bridge.judge.judging import Criteria
 from lupin_bridge.notify.channels import MOST_DAYS, DailyReport, DailyTarget
 from lupin_bridge.notify.destinations import Targets
-from lupin_bridge.notify.mirror import Mirror
-from lupin_bridge.notify.mqtt import Mqtt
-from lupin_bridge.notify.sending import MAX_REFUSALS
-from lupin_bridge.notify.webhook import Webhook
+from lupin_bridge.notify.mqtt import Mirror, Mqtt
+from lupin_bridge.notify.webhook import MAX_REFUSALS, Webhook
 from lupin_bridge.past.plans import Answered
 from lupin_bridge.serving.admission import Answer
 from lupin_bridge.settings import Secrets, SettingError, Settings

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from lupin_bridge.notify.destinations import Targets, WebhookTarget
-from lupin_bridge.notify.sending import MAX_HEAD_BYTES, PostError, post
+from lupin_bridge.notify.webhook import MAX_HEAD_BYTES, PostError, post
 from lupin_bridge.settings import Secrets, Settings
 from tests.support.mosquitto import free_port
 from tests.support.receiver import Posted, receiver, silence, status

@@ -13,8 +13,7 @@ import pytest
 from lupin_bridge.notify import mqtt
 from lupin_bridge.notify.destinations import Targets
 from lupin_bridge.notify.messages import GreenhouseState
-from lupin_bridge.notify.mirror import Mirror
-from lupin_bridge.notify.mqtt import Mqtt
+from lupin_bridge.notify.mqtt import Mirror, Mqtt
 from lupin_bridge.settings import Secrets, Settings
 from tests.support.mosquitto import PASSWORD, USER, Broker, Subscriber
 from tests.support.seen import NOW_NS, SENSORS, S, alarm, seen, tag

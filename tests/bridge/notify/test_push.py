@@ -24,8 +24,9 @@ from py_vapid import Vapid02
 from lupin_bridge.alarms.board import AlarmBoard, Change, page_of
 from lupin_bridge.judge.episodes import Alarm
 from lupin_bridge.notify.destinations import PushTarget
+from lupin_bridge.notify.messages import Backoff, Condition
 from lupin_bridge.notify.push import FIRST_WAIT_S, MOST_WAIT_S, TRIES, Push, encoded
-from lupin_bridge.notify.sending import Backoff, Condition, PostError, until_taken
+from lupin_bridge.notify.webhook import PostError, until_taken
 from tests.support.access import refused_start
 from tests.support.messages import look
 from tests.support.people import OWN, TOKEN, add, changing, remove, signed_in
@@ -231,7 +232,7 @@ def test_without_internet_for_half_an_hour_nothing_is_lost(monkeypatch: pytest.M
         if now_s < 1800.0:
             raise PostError("its host is not known")
 
-    monkeypatch.setattr("lupin_bridge.notify.sending.asyncio.sleep", sleep)
+    monkeypatch.setattr("lupin_bridge.notify.webhook.asyncio.sleep", sleep)
     backoff, condition = Backoff(FIRST_WAIT_S, MOST_WAIT_S), Condition()
     sent = until_taken(attempt, condition, backoff, "an alarm", "push.example", most_tries=TRIES)
     assert asyncio.run(sent)

@@ -12,8 +12,7 @@ import pytest
 
 from lupin_bridge.notify import webhook as webhook_module
 from lupin_bridge.notify.destinations import Targets
-from lupin_bridge.notify.sending import MAX_REFUSALS, post
-from lupin_bridge.notify.webhook import MAX_WAITING, ORIGIN_S, Delivery, Webhook
+from lupin_bridge.notify.webhook import MAX_REFUSALS, MAX_WAITING, ORIGIN_S, Delivery, Webhook, post
 from lupin_bridge.settings import Secrets, Settings
 from lupin_twin.core.diagnostics import Origin
 from tests.support.docs import block_named

@@ -9,10 +9,9 @@ from typing import Any
 
 import pytest
 
-from lupin_bridge.field.formats import FORMATS, JSON, PNG, FieldFormat
-from lupin_bridge.field.query import EstimateQuery, FieldQuery
+from lupin_bridge.field import FORMATS, JSON, PNG, EstimateQuery, FieldFormat, FieldQuery
 from lupin_bridge.judge.day import ClockDay
-from lupin_bridge.judge.options import Criteria, own_sensors
+from lupin_bridge.judge.judging import Criteria, own_sensors
 from lupin_bridge.judge.quantities import vapour_pressure_deficit_kpa
 from lupin_bridge.past.fields import Estimated, Field
 from lupin_bridge.past.plans import Health, OneTag, Plan, WholeState
@@ -47,7 +46,7 @@ def asked(
     rules: FieldRules = RULES, occupancy: OccupancyMap | None = None, **parameters: Any
 ) -> Field:
     values = {"sensor_type": "co2", **parameters}
-    query = read(FieldQuery, [(name, str(value)) for name, value in values.items()], FieldRefused)
+    query = read(FieldQuery, [(name, str(value)) for name, value in values.items()])
     return Field(None, query, None, rules, occupancy, CRITERIA)
 
 
@@ -81,7 +80,7 @@ def test_a_broken_sensor_is_no_part_of_a_field() -> None:
 
 
 def test_a_broken_sensor_is_no_part_of_an_estimate() -> None:
-    query = read(EstimateQuery, [("sensor_type", "co2")], FieldRefused)
+    query = read(EstimateQuery, [("sensor_type", "co2")])
     estimated = Estimated(5 * NS, query, JSON, RULES, None, CRITERIA, 86_400.0)
 
     def made_of(*readings: tuple[int, float]) -> str:

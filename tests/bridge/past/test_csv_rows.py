@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lupin_bridge.judge.options import own_sensors
+from lupin_bridge.judge.judging import own_sensors
 from lupin_bridge.past import bodies
 from lupin_bridge.past.query import OfExport
 from lupin_twin.core.past import PastRow

@@ -5,10 +5,10 @@ from dataclasses import replace
 
 import pytest
 
-from lupin_bridge.judge.options import own_sensors
+from lupin_bridge.judge.judging import own_sensors
 from lupin_bridge.judge.quantities import DAILY, DAY_NS
 from lupin_bridge.judge.quantities import vapour_pressure_deficit_kpa as vpd
-from lupin_bridge.past import derived
+from lupin_bridge.past import plans as derived
 from lupin_twin.core.past import (
     MAX_POINTS,
     MAX_READINGS,
@@ -57,7 +57,7 @@ def answer(request: SeriesRequest, known: Known) -> tuple[SeriesPast, list[Serie
         asked.append(need)
         return found_in(need, known, NOW_NS + len(asked))  # time goes on
 
-    return derived.series(request, own_sensors(), is_day, find), asked
+    return derived.derived_series(request, own_sensors(), is_day, find), asked
 
 
 def test_only_what_was_read_in_one_scan_and_can_be_is_paired() -> None:
@@ -221,5 +221,5 @@ def test_a_broken_sensor_is_no_part_of_a_day_and_of_one_moment_the_last_reading_
 
     for name, value in (("temperature_24h_mean", 20.0), ("temperature_night_minimum", 20.0)):
         request = SeriesRequest("a", name, 25 * HOUR_NS, 25 * HOUR_NS + 1, 100)
-        past = derived.series(request, own_sensors(), is_day, find)
+        past = derived.derived_series(request, own_sensors(), is_day, find)
         assert past.means == (value,)

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lupin_bridge.judge.options import own_sensors
+from lupin_bridge.judge.judging import own_sensors
 from lupin_bridge.past.bodies import gaps, history_body
 from lupin_bridge.stream import routes_schema
 from lupin_twin.core.past import SeriesPast, SeriesRequest

@@ -7,8 +7,8 @@ from typing import Any
 
 import pytest
 
-from lupin_bridge.field.formats import PNG
-from lupin_bridge.judge.options import Criteria
+from lupin_bridge.field import PNG
+from lupin_bridge.judge.judging import Criteria
 from lupin_bridge.past.plans import (
     Answered,
     ConditionalQuery,
@@ -24,7 +24,7 @@ from lupin_bridge.past.plans import (
 from lupin_bridge.settings import Settings
 from lupin_twin.core.history import LatestRequest
 from lupin_twin.core.journal_condition import UNKNOWN
-from lupin_twin.core.past import Event, SeriesPast, SeriesRequest
+from lupin_twin.core.past import EVERY_TAG, Event, SeriesPast, SeriesRequest
 from lupin_twin.core.state import Attempt, Reading, TagState
 from lupin_twin.field.idw import never
 from lupin_twin.runtime.workers import SMALL_S
@@ -39,7 +39,7 @@ QUESTIONS: tuple[Query, ...] = (
     replace(asked(), at_ns=5 * NS, field_format=PNG),
     replace(asked(), at_ns=5 * NS),
     History(SeriesRequest("a", "co2"), 9 * NS, CRITERIA, UNKNOWN),
-    Timeline(0, 9 * NS, 5, None, UNKNOWN),
+    Timeline(0, 9 * NS, 5, EVERY_TAG, UNKNOWN),
 )
 
 
@@ -73,7 +73,7 @@ def test_a_timeline_asks_for_its_parts_one_by_one() -> None:
         needs.append(need)
         return found(need)
 
-    Timeline(0, 9 * NS, 5, None, UNKNOWN).look(find)
+    Timeline(0, 9 * NS, 5, EVERY_TAG, UNKNOWN).look(find)
     assert {need.sensor_type for need in needs if isinstance(need, SeriesRequest)} == set(Event)
 
 
@@ -81,7 +81,7 @@ def test_a_tag_that_was_not_known_is_told_with_how_many_were() -> None:
     with pytest.raises(NoSuchTag) as caught:
         answer(OneTag(5 * NS, "c"))
     there = pickle.loads(pickle.dumps(caught.value))
-    assert (there.tag_id, there.known) == ("c", 2)
+    assert str(there) == "no tag 'c' is known (2 others are)"
 
 
 def test_a_large_house_and_a_large_field_cost_more_than_small_ones() -> None:

@@ -17,7 +17,7 @@ NEEDED: dict[Any, dict[str, str]] = {HISTORY: {"tag_id": "7", "sensor_type": "co
 
 def ask(kind: type[query.OfPeriod], **given: str) -> Any:
     values = NEEDED.get(kind, {}) | {name.rstrip("_"): value for name, value in given.items()}
-    return read(kind, list(values.items()), PastRefused)
+    return read(kind, list(values.items()))
 
 
 def span(kind: type[query.OfPeriod], **given: str) -> tuple[int, int]:
@@ -102,7 +102,7 @@ def test_an_empty_name_is_refused_and_so_is_one_that_nothing_can_have(
 
 def test_a_history_is_of_one_sensor_or_of_an_event() -> None:
     with pytest.raises(PastRefused, match="sensor_type: field required"):
-        read(HISTORY, [("tag_id", "7")], PastRefused)
+        read(HISTORY, [("tag_id", "7")])
     with pytest.raises(PastRefused, match="'~dances' is none of ~scans"):
         SeriesRequest("7", "~dances")
     assert SeriesRequest("7", "~looks").event == "~looks"

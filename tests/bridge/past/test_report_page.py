@@ -12,7 +12,7 @@ from zoneinfo import ZoneInfo
 
 import pytest
 
-from lupin_bridge.judge.options import Criteria
+from lupin_bridge.judge.judging import Criteria
 from lupin_bridge.past.report_page import ReportPage
 from lupin_bridge.settings import Settings
 from lupin_twin.core.journal_condition import UNKNOWN

@@ -75,8 +75,7 @@ def test_a_period_has_what_was_active_at_any_time_of_it() -> None:
     over, still = Alarm("1", reason, "a", 20, 30), Alarm("2", reason, "a", 40)
 
     def found(start: int, end: int, active: str | None = None) -> list[str]:
-        is_asked = _is_in(start, end, active)
-        return [alarm.id for alarm in (over, still) if is_asked(alarm)]
+        return [alarm.id for alarm in (over, still) if _is_in(alarm, start, end, active)]
 
     assert found(0, 0) == found(30, 41) == ["1", "2"]
     assert found(31, 41) == found(31, 0) == found(0, 0, active="1") == ["2"]

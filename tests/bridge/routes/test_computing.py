@@ -13,8 +13,7 @@ import numpy as np
 import pytest
 
 from lupin_bridge.feed.source import TwinTimeoutError
-from lupin_bridge.field.formats import PNG
-from lupin_bridge.field.query import FieldQuery
+from lupin_bridge.field import PNG, FieldQuery
 from lupin_bridge.past import fields
 from lupin_bridge.routes import status
 from lupin_bridge.routes.answers import within_time

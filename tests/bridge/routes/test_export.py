@@ -13,7 +13,7 @@ import pyarrow
 import pytest
 from pyarrow import parquet
 
-from lupin_bridge.judge.options import own_sensors
+from lupin_bridge.judge.judging import own_sensors
 from lupin_bridge.past import bodies
 from lupin_bridge.past.export import GROUP_ROWS
 from lupin_bridge.serving.admission import EXPORTS, Limits

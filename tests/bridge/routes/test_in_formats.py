@@ -7,9 +7,9 @@ import httpx
 import pytest
 from fastapi import APIRouter, FastAPI, Request, Response
 
+from lupin_bridge import field as formats
 from lupin_bridge.feed.source import TwinTimeoutError
-from lupin_bridge.field import formats
-from lupin_bridge.field.formats import FieldFormat
+from lupin_bridge.field import FieldFormat
 from lupin_bridge.routes.answers import add_refusals
 from lupin_bridge.routes.field import InFormats
 from lupin_bridge.serving.admission import BusyError, ClientLimitError

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 from PIL import Image
 
-from lupin_bridge.judge.options import own_sensors
+from lupin_bridge.judge.judging import own_sensors
 from lupin_bridge.judge.quantities import vapour_pressure_deficit_kpa
 from lupin_bridge.stream import schema
 from tests.support.messages import scan

@@ -1,4 +1,5 @@
 import pytest
+from fastapi import Request
 
 from lupin_bridge.routes.pages import language_of
 
@@ -8,21 +9,23 @@ SPOKEN = ("en", "de", "nl", "es")
 @pytest.mark.parametrize(
     ("asked", "accepted", "language"),
     [
-        (None, "", "en"),
-        (None, "de-AT,de;q=0.9,en;q=0.8", "de"),
-        (None, "fr-FR, nl;q=0.7, en;q=0.6", "nl"),
-        (None, "en;q=0.5,es;q=0.501", "es"),
-        (None, "es , de", "es"),
-        (None, "de;q=0", "en"),
-        (None, "*", "en"),
-        (None, "fr,pl;q=0.9", "en"),
-        (None, ";q=1,,de;q=0.1", "de"),
-        ("nl", "de", "nl"),
-        ("DE-ch", "", "de"),
+        ("", "", "en"),
+        ("", "de-AT,de;q=0.9,en;q=0.8", "de"),
+        ("", "fr-FR, nl;q=0.7, en;q=0.6", "nl"),
+        ("", "en;q=0.5,es;q=0.501", "es"),
+        ("", "es , de", "es"),
+        ("", "de;q=0", "en"),
+        ("", "*", "en"),
+        ("", "fr,pl;q=0.9", "en"),
+        ("", ";q=1,,de;q=0.1", "de"),
+        ("lang=nl", "de", "nl"),
+        ("lang=DE-ch", "", "de"),
         # What is not spoken is not the browser's own language either.
-        ("xx", "de", "en"),
-        ("", "de", "en"),
+        ("lang=xx", "de", "en"),
+        ("lang=", "de", "en"),
     ],
 )
-def test_the_language_of_who_asks(asked: str | None, accepted: str, language: str) -> None:
-    assert language_of(asked, accepted, SPOKEN) == language
+def test_the_language_of_who_asks(asked: str, accepted: str, language: str) -> None:
+    headers = [(b"accept-language", accepted.encode())]
+    request = Request({"type": "http", "query_string": asked.encode(), "headers": headers})
+    assert language_of(request, SPOKEN) == language

@@ -244,7 +244,7 @@ def test_clients_that_do_not_read_do_not_hold_up_the_end_nor_does_a_second_signa
 # hangs for a sensor of its own, which is asked for by that path.
 HANGS = (
     ("lupin_bridge.past.fields:compute_field:co2", MILLION_CELLS),
-    ("lupin_bridge.field.formats:write:light", MILLION_CELLS),
+    ("lupin_bridge.field:write:light", MILLION_CELLS),
     ("lupin_twin.ros.estimate_service:EstimateService.report:humidity", REPORT),
 )
 
@@ -293,7 +293,7 @@ def test_nor_does_a_twin_elsewhere_that_does_not_answer(domain: int) -> None:
 
 
 def test_from_a_signal_on_it_has_to_end_whatever_hangs() -> None:
-    server = BridgeServer(FastAPI(), Settings(), lambda: None)
+    server = BridgeServer(FastAPI(), Settings(), [])
     server.handle_exit(signal.SIGTERM, None)
     left_s = signal.alarm(0)
     faulthandler.cancel_dump_traceback_later()

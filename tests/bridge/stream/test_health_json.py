@@ -6,8 +6,7 @@ from typing import Any
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lupin_bridge.judge.judging import NOTHING_JUDGED, Judge, Judged, silenced
-from lupin_bridge.judge.options import own_sensors
+from lupin_bridge.judge.judging import NOTHING_JUDGED, Judge, Judged, own_sensors, silenced
 from lupin_bridge.stream import schema
 from lupin_bridge.stream.state_json import judgement, judgement_since
 from lupin_twin.core.state import Reading, Snapshot, TagState

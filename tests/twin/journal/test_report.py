@@ -16,7 +16,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from lupin_bridge.judge.day import ClockDay
-from lupin_bridge.judge.options import Criteria, own_sensors
+from lupin_bridge.judge.judging import Criteria, own_sensors
 from lupin_bridge.judge.verdict import derive
 from lupin_bridge.past.report import Report
 from lupin_twin.core.history import kind_of

@@ -131,7 +131,7 @@ def test_channels_that_come_and_go_are_told_and_their_subscriptions_end(stage: S
 
 def test_a_subscription_that_cannot_be_served_is_given_up(stage: Stage) -> None:
     stage.subscribe((1, 10))
-    stage.session.give_up(1)
-    stage.session.give_up(1)
+    stage.session.end(1)
+    stage.session.end(1)
     assert not stage.session.has(1, CHANNELS[10])
     assert stage.subscribe((1, 10)).begun

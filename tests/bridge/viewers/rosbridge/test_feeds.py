@@ -3,7 +3,6 @@
 import asyncio
 from collections.abc import Callable, Iterator
 from dataclasses import replace
-from types import SimpleNamespace
 from typing import Any
 
 import orjson
@@ -31,7 +30,7 @@ class Relay:
         if self.refuses:
             raise NotRelayedError("no such type")
         self.ears.append(take)
-        return SimpleNamespace(close=lambda: self.ears.remove(take))
+        return lambda: self.ears.remove(take)
 
     def read(self, topic: Topic, sample: Sample) -> Any:
         self.read_count += 1

@@ -1,4 +1,7 @@
-"""`lupin-twin user`, `token` and `audit`: who may, also while bridges run; they see it at once."""
+"""What an administrator runs: `archive` and `forward`; `user`, `token` and `audit`.
+
+Who may is told to a file that bridges read, also while they run: they see it at once.
+"""
 
 from __future__ import annotations
 
@@ -6,14 +9,16 @@ import argparse
 import csv
 import getpass
 import io
+import logging
+import os
 import secrets
 import sys
+import threading
 import time
 from collections.abc import Mapping
 from contextlib import closing
-from datetime import UTC, datetime
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 from lupin_bridge.access.accounts import Accounts, accounts_path, digest, make_file
 from lupin_bridge.access.credentials import (
@@ -26,6 +31,21 @@ from lupin_bridge.access.credentials import (
     check_site,
 )
 from lupin_bridge.access.people import hashed
+from lupin_bridge.archive.database import (
+    ArchiveError,
+    UsageError,
+    check,
+    check_version,
+    connect,
+    explained,
+    init,
+    migrate,
+    overview,
+    place_of,
+    retain,
+)
+from lupin_bridge.archive.forwarding import Forwarder
+from lupin_bridge.cli import journal
 from lupin_bridge.console import (
     FAILED,
     CannotWrite,
@@ -35,6 +55,7 @@ from lupin_bridge.console import (
     say,
     standard,
     tell,
+    user,
 )
 from lupin_bridge.settings import (
     CONFIG_VARIABLE,
@@ -44,7 +65,141 @@ from lupin_bridge.settings import (
     settings_from,
     variable,
 )
+from lupin_twin.core.parameters import MAX_JOURNAL_DAYS
 from lupin_twin.runtime.process import INTERRUPTED
+
+ARCHIVE_ACTIONS: Final[Mapping[str, str]] = {
+    "init": "make its tables and roles, in a database that has none of them",
+    "migrate": "bring its tables and roles up to date",
+    "info": "its sites: how much of each, received until when, and who forwards it",
+    "check": "read all of it for rows that fit no other; exit code 1 if there are any",
+    "retain": "delete scans and inspections that are older than some days",
+}
+_USAGE_ERROR: Final = 2
+# Beside a busy twin it gets a tenth of the core that they share.
+_NICENESS: Final = 10
+_URL: Final = "archive_url"
+
+
+def add_archive(roles: Roles) -> None:
+    """Add `archive` and `forward`, with their options."""
+    text = "the archive of many greenhouses, in PostgreSQL: init, migrate, info, check, retain"
+    for action, own in add_actions(roles, "archive", text, ARCHIVE_ACTIONS):
+        _add_url(own)
+        if action == "retain":
+            own.add_argument(
+                "--days", type=float, required=True, help="what is younger stays, more than 0"
+            )
+            own.add_argument("--site", metavar="NAME", help="of this one alone (default: of all)")
+    text = "send what a twin's journal receives to the archive, as serve --archive-url does"
+    forward = add_role(roles, "forward", text)
+    forward.add_argument(
+        "--site", metavar="NAME", help=f"the greenhouse's name (default: {variable('site')})"
+    )
+    _add_url(forward)
+    journal.add_which(forward)
+    forward.add_argument("--once", action="store_true", help="send what is there, and end")
+    # As `serve` starts it: it ends with that, however that ends.
+    forward.add_argument("--end-with-input", action="store_true", help=argparse.SUPPRESS)
+
+
+def _add_url(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        option(_URL),
+        metavar="URL",
+        help="such as postgresql://gh1@db.example/lupin; its password: PGPASSWORD or PGPASSFILE"
+        f" (default: {variable(_URL)})",
+    )
+
+
+def run_archive(options: argparse.Namespace, environ: Mapping[str, str]) -> int:
+    """Run the action; returns the process's exit code."""
+    # Errors are reported once, here.
+    logging.getLogger("psycopg").setLevel(logging.CRITICAL)
+    try:
+        url = _given(options, environ, _URL)
+        if options.role == "forward":
+            return _forward(options, environ, url)
+        return _archive(options, url)
+    except KeyboardInterrupt:
+        return INTERRUPTED
+    except UsageError as error:
+        say(str(error))
+        return _USAGE_ERROR
+    except ArchiveError as error:
+        say(str(error))
+        return FAILED
+
+
+def _given(options: argparse.Namespace, environ: Mapping[str, str], name: str) -> str:
+    found = getattr(options, name)
+    if found is None:
+        found = environ.get(variable(name))
+    if not found:
+        raise UsageError(f"{option(name)} is missing, or {variable(name)}")
+    return str(found)
+
+
+def _archive(options: argparse.Namespace, url: str) -> int:
+    with closing(connect(url, f"lupin-twin archive {options.action}")) as connection:
+        import psycopg  # noqa: PLC0415  # see `database`
+
+        try:
+            return _act(options, connection, place_of(url))
+        except psycopg.Error as error:
+            raise explained(error) from error
+
+
+def _act(options: argparse.Namespace, connection: Any, place: str) -> int:
+    action = options.action
+    if action == "init":
+        init(connection)
+        tell(f"{place}: the archive is made")
+        return 0
+    if action == "migrate":
+        migrate(connection)
+        tell(f"{place}: the archive is up to date")
+        return 0
+    check_version(connection)
+    if action == "info":
+        tell(*overview(connection))
+        return 0
+    if action == "retain":
+        if not 0 < options.days <= MAX_JOURNAL_DAYS:
+            raise UsageError(
+                f"--days is {options.days:g}, expected more than 0, {MAX_JOURNAL_DAYS:g} at most"
+            )
+        gone = list(retain(connection, options.days, options.site))
+        tell(*(f"deleted {line}" for line in gone or ["nothing"]))
+        return 0
+    wrong = check(connection)
+    tell(*wrong, f"{place} is {'wrong as stated above' if wrong else 'whole'}")
+    return FAILED if wrong else 0
+
+
+def _forward(options: argparse.Namespace, environ: Mapping[str, str], url: str) -> int:
+    if options.end_with_input:
+        os.nice(_NICENESS)
+        threading.Thread(target=_end_with_input, name="end", daemon=True).start()
+
+    def path() -> Path:
+        # It may be about to be made.
+        try:
+            return journal.path_of(options, environ)
+        except journal.JournalError as error:
+            raise ArchiveError(str(error)) from error
+
+    forwarder = Forwarder(url, _given(options, environ, "site"), path, say)
+    return 0 if forwarder.run(once=options.once) else FAILED
+
+
+def _end_with_input() -> None:
+    sys.stdin.buffer.read()
+    # Killed at any moment, it goes on from there.
+    os._exit(0)
+
+
+# --- who may --------------------------------------------------------------------------------------
 
 USER_ACTIONS: Final[Mapping[str, str]] = {
     "add": "add an account; the command prompts for the password, or reads it from a file",
@@ -59,8 +214,8 @@ TOKEN_ACTIONS: Final[Mapping[str, str]] = {
 _WHAT: Final[Mapping[str, Kind]] = {"user": "account", "token": "token"}
 
 
-def add_parsers(roles: Roles) -> None:
-    """Add the three, with their options."""
+def add_people(roles: Roles) -> None:
+    """Add `user`, `token` and `audit`, with their options."""
     users = "accounts of people: add, list, remove"
     tokens = "tokens of programs: add, list, revoke"
     for role, text, actions in (("user", users, USER_ACTIONS), ("token", tokens, TOKEN_ACTIONS)):
@@ -104,7 +259,7 @@ def _add_file(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def run(options: argparse.Namespace, environ: Mapping[str, str]) -> int:
+def run_people(options: argparse.Namespace, environ: Mapping[str, str]) -> int:
     """Run the action; returns the process's exit code."""
     try:
         given = {} if options.accounts is None else {"accounts": options.accounts}
@@ -141,7 +296,7 @@ def _add(path: Path, options: argparse.Namespace) -> int:
             kind,
             options.given_role,
             secret,
-            by=_who(),
+            by=f"{user()} on this machine",
             now_s=int(time.time()),
             sites=options.for_site,
         )
@@ -167,7 +322,7 @@ def _password(options: argparse.Namespace) -> str:
 def _remove(path: Path, options: argparse.Namespace) -> int:
     kind = _WHAT[options.role]
     with closing(Accounts(path, is_writer=True)) as accounts:
-        accounts.remove(options.name, kind, by=_who(), now_s=int(time.time()))
+        accounts.remove(options.name, kind, by=f"{user()} on this machine", now_s=int(time.time()))
         is_last = not accounts.listed("account") and not accounts.listed("token")
     tell(f"{kind} {options.name} is removed")
     if is_last:
@@ -181,12 +336,9 @@ def _remove(path: Path, options: argparse.Namespace) -> int:
 def _list(path: Path, options: argparse.Namespace) -> int:
     with closing(Accounts(path)) as accounts:
         listed = accounts.listed(_WHAT[options.role])
-    tell(
-        *(
-            f"{it.name}  {it.role}  {_iso(it.made_at_s)}  {it.sites.replace(chr(10), ' ')}".rstrip()
-            for it in listed
-        )
-    )
+    for it in listed:
+        made_at, sites = journal.iso(it.made_at_s * 10**9), it.sites.replace("\n", " ")
+        tell(f"{it.name}  {it.role}  {made_at}  {sites}".rstrip())
     return 0
 
 
@@ -196,18 +348,6 @@ def _audit(path: Path) -> int:
     writer.writerow(("time", "who", "what", "subject", "address"))
     with closing(Accounts(path)) as accounts:
         for row in accounts.audited():
-            writer.writerow((_iso(row.at_s), *row[1:]))
+            writer.writerow((journal.iso(row.at_s * 10**9), *row[1:]))
     standard(text.getvalue().encode())
     return 0
-
-
-def _iso(at_s: int) -> str:
-    return f"{datetime.fromtimestamp(at_s, UTC):%Y-%m-%dT%H:%M:%SZ}"
-
-
-def _who() -> str:
-    """Who runs the command, as the audit trail names them."""
-    try:
-        return f"{getpass.getuser()} on this machine"
-    except (KeyError, OSError):  # a user without a name
-        return "somebody on this machine"

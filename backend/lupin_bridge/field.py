@@ -1,0 +1,444 @@
+"""Fields and estimates: how they are asked for, and written as JSON, PNG or NPY. Pure.
+
+On a worker: large ones take a while.
+"""
+
+from __future__ import annotations
+
+import colorsys
+import io
+import math
+import re
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, replace
+from typing import Annotated, Any, Final, Literal
+from urllib.parse import quote
+
+import numpy as np
+import numpy.typing as npt
+import orjson
+from annotated_types import Gt, Interval
+
+from lupin_bridge.judge.quantities import Sensor, Sensors
+from lupin_bridge.query_string import AT, Name, needed, parameter, safe_name
+from lupin_twin.estimate import EstimateGrid
+from lupin_twin.estimate.engine import Estimate
+from lupin_twin.field.engine import (
+    DEFAULT_RESOLUTION_M,
+    FieldRefused,
+    FieldRequest,
+    default_request,
+)
+from lupin_twin.field.grid import FieldGrid
+
+
+@dataclass(frozen=True, slots=True)
+class FieldFormat:
+    """One way to write a field: its route's suffix and its media type."""
+
+    name: str
+    media_type: str
+
+
+JSON: Final = FieldFormat("json", "application/json")
+PNG: Final = FieldFormat("png", "image/png")
+NPY: Final = FieldFormat("npy", "application/x-npy")
+FORMATS: Final = (JSON, PNG, NPY)
+
+
+BOX_NAMES: Final = ("bbox_min_x", "bbox_min_y", "bbox_max_x", "bbox_max_y")
+_BOX: Final = "m, map frame; without a box: all pinned tags but those far off, and their reach"
+
+Box = tuple[float, float, float, float]
+
+
+@dataclass(frozen=True, slots=True)
+class FieldQuery:
+    """The parameters of a field; `resolution` and the box are None where left to the server."""
+
+    sensor_type: Name = needed("name of a sensor, as in a reading")
+    resolution: Annotated[float, Gt(0)] | None = parameter(
+        "m, side of a square cell; without a box either: doubled until the field is small enough; "
+        f"default: {DEFAULT_RESOLUTION_M}"
+    )
+    bbox_min_x: float | None = parameter(_BOX)
+    bbox_min_y: float | None = parameter(_BOX)
+    bbox_max_x: float | None = parameter(_BOX)
+    bbox_max_y: float | None = parameter(_BOX)
+    scale: Annotated[int, Interval(ge=1, le=1000)] = parameter(
+        "PNG only: pixels a cell along each side", 1
+    )
+    at: str | None = parameter(AT)
+
+    @property
+    def box(self) -> Box | None:
+        """The box, where one is given.
+
+        Raises:
+            FieldRefused: not all of it is.
+
+        """
+        box = self.bbox_min_x, self.bbox_min_y, self.bbox_max_x, self.bbox_max_y
+        missing = [name for name, value in zip(BOX_NAMES, box, strict=True) if value is None]
+        if missing and len(missing) < len(box):
+            raise FieldRefused(f"the box is incomplete: {', '.join(missing)} is missing")
+        return None if missing else box  # type: ignore[return-value]  # all of it is there
+
+    def request(self, default_box: Box, max_cells: int) -> FieldRequest:
+        """The request for GetField; one with neither box nor resolution has `max_cells` at most.
+
+        Raises:
+            FieldRefused: see `box`.
+
+        """
+        box = self.box
+        if box is None and self.resolution is None:
+            return default_request(self.sensor_type, default_box, max_cells)
+        resolution = DEFAULT_RESOLUTION_M if self.resolution is None else self.resolution
+        return FieldRequest(self.sensor_type, resolution, *(box or default_box))
+
+
+@dataclass(frozen=True, slots=True)
+class EstimateQuery(FieldQuery):
+    """Those of an estimate: it is two numbers a cell, and a picture shows one of them."""
+
+    layer: Literal["mean", "sd"] = parameter(
+        "PNG only: which of the two numbers; transparent where the estimate is not known", "mean"
+    )
+
+
+def check_scale(query: FieldQuery, field_format: FieldFormat, cells: int, max_cells: int) -> None:
+    """Refuse a scale for anything but a picture, and a picture past the cell limit.
+
+    Raises:
+        FieldRefused: either of the two.
+
+    """
+    if query.scale == 1:
+        return
+    if field_format != PNG:
+        raise FieldRefused(f"scale is {query.scale}, but only a PNG can be scaled")
+    pixels = cells * query.scale**2
+    if pixels > max_cells:
+        raise FieldRefused(
+            f"scale {query.scale} makes a picture of {pixels} pixels, the limit is {max_cells}"
+        )
+
+
+def negotiate(accept: str | None) -> FieldFormat | None:
+    """The format that an Accept header prefers, JSON where it is open; None: none will do.
+
+    RFC 9110, section 12.5.1: the most specific range that matches a format gives its weight.
+    """
+    if not accept or not accept.strip():
+        return JSON
+    ranges = weighted(accept)
+    best, best_weight = None, 0.0
+    for candidate in FORMATS:
+        weight = _weight(candidate.media_type, ranges)
+        if weight > best_weight:
+            best, best_weight = candidate, weight
+    return best
+
+
+def weighted(header: str) -> list[tuple[str, float]]:
+    """What a header accepts, in lower case, and each one's weight (RFC 9110, section 12.4.2).
+
+    What is no weight counts as 0.
+    """
+    found = []
+    for part in header.lower().split(","):
+        name, *options = (piece.strip() for piece in part.split(";"))
+        weight = 1.0
+        for option in options:
+            key, _, value = option.partition("=")
+            if key.strip() == "q":
+                try:
+                    weight = min(1.0, max(0.0, float(value)))
+                except ValueError:
+                    weight = 0.0
+        found.append((name, weight if weight == weight else 0.0))  # noqa: PLR0124  # NaN
+    return found
+
+
+def _weight(media_type: str, ranges: Iterable[tuple[str, float]]) -> float:
+    main_type = media_type.partition("/")[0]
+    by_specificity = {media_type: 3, f"{main_type}/*": 2, "*/*": 1}
+    found = [(by_specificity[name], weight) for name, weight in ranges if name in by_specificity]
+    return max(found)[1] if found else 0.0
+
+
+def matches(if_none_match: str | None, tag: str) -> bool:
+    """Whether an If-None-Match header names this ETag (RFC 9110, section 13.1.2: weakly)."""
+    if not if_none_match:
+        return False
+    candidates = [part.strip() for part in if_none_match.split(",")]
+    return "*" in candidates or tag in [part.removeprefix("W/") for part in candidates]
+
+
+def headers(metadata: Mapping[str, str], file_name: str, kind: str = "Field") -> dict[str, str]:
+    """A field's metadata as `X-Field-…` headers, and a name for who saves it.
+
+    Values are ASCII and neither begin nor end with a space; what is not so is percent-encoded.
+    """
+    result = {f"X-{kind}-{name}": _header_value(value) for name, value in metadata.items()}
+    result["Content-Disposition"] = f'inline; filename="{safe_name(file_name)}"'
+    return result
+
+
+def _header_value(text: str) -> str:
+    value = quote(text, safe=_SAFE)
+    return _OUTER_SPACES.sub(lambda spaces: "%20" * len(spaces[0]), value)
+
+
+_OUTER_SPACES: Final = re.compile(r"^ +| +$")
+_SAFE: Final = " !#$&'()*+,-./:;<=>?@[]^_`{|}~"
+
+
+# --- as bytes -------------------------------------------------------------------------------------
+
+
+def rgb(hue: float, saturation: float, lightness: float) -> tuple[int, int, int]:
+    """A colour of degrees, percent, percent as 0 to 255 a channel (CSS Color 4, section 7)."""
+    channels = colorsys.hls_to_rgb(hue / 360, lightness / 100, saturation / 100)
+    red, green, blue = (round(channel * 255) for channel in channels)
+    return red, green, blue
+
+
+# Palette index 0 is "not known"; the ramp has the other 255.
+_RAMP_STEPS: Final = 255
+# Numbers that are written at once: for this millisecond, no other thread of this process runs.
+_AT_ONCE: Final = 16_384
+
+
+def extent(grid: FieldGrid | EstimateGrid, sensor: Sensor) -> dict[str, str]:
+    """Of which sensor the cells are, how many, and where they lie."""
+    return {
+        "Sensor": sensor.name,
+        "Unit": sensor.unit,
+        "Width": str(grid.width),
+        "Height": str(grid.height),
+        "Origin-X": str(np.float32(grid.origin_x)),
+        "Origin-Y": str(np.float32(grid.origin_y)),
+        "Resolution": str(np.float32(grid.resolution)),
+    }
+
+
+def metadata(grid: FieldGrid, sensor: Sensor) -> dict[str, str]:
+    """What a picture or a bare array cannot say of itself: extent, range, unit, sensor."""
+    return {
+        **extent(grid, sensor),
+        "Value-Min": str(np.float32(grid.value_min)),
+        "Value-Max": str(np.float32(grid.value_max)),
+        "Sample-Count": str(grid.sample_count),
+    }
+
+
+def write(
+    grid: FieldGrid, field_format: FieldFormat, sensor_type: str, sensors: Sensors, scale: int = 1
+) -> bytes:
+    """The field in a format. `scale` (PNG only) is the side of a cell in pixels."""
+    if field_format == PNG:
+        return write_png(grid, sensor_type, sensors, scale)
+    return write_npy(grid) if field_format == NPY else write_json(grid)
+
+
+def write_json(grid: FieldGrid) -> bytes:
+    """`schema.GetFieldResponse`."""
+    return _json(
+        grid,
+        {"values": grid.values},
+        value_min=np.float32(grid.value_min),
+        value_max=np.float32(grid.value_max),
+        sample_count=grid.sample_count,
+    )
+
+
+def _json(
+    grid: FieldGrid | EstimateGrid, arrays: Mapping[str, npt.NDArray[np.float32]], **rest: Any
+) -> bytes:
+    """A service's response, its arrays flat and row-major, NaN as null."""
+    # As in the services' float32, and so the shortest decimals that are the same one: 0.1.
+    fields = {
+        "width": grid.width,
+        "height": grid.height,
+        "origin_x": np.float32(grid.origin_x),
+        "origin_y": np.float32(grid.origin_y),
+        "resolution_used": np.float32(grid.resolution),
+        **rest,
+    }
+    parts = [b'{"ok":true,"error_message":""']
+    for name, cells in arrays.items():
+        parts += (b',"%b":[' % name.encode(), *numbers(cells), b"]")
+    parts += (b",", orjson.dumps(fields, option=orjson.OPT_SERIALIZE_NUMPY)[1:])
+    # Put together once: to copy thirty megabytes takes a while too.
+    return b"".join(parts)
+
+
+def numbers(cells: npt.NDArray[np.float32]) -> Iterator[bytes]:
+    """The numbers of an array as JSON, row-major, without the brackets, in parts; NaN as null."""
+    flat = np.ascontiguousarray(cells).ravel()
+    for start in range(0, flat.size, _AT_ONCE):
+        part = flat[start : start + _AT_ONCE]
+        if start:
+            yield b","
+        yield orjson.dumps(part, option=orjson.OPT_SERIALIZE_NUMPY)[1:-1]
+
+
+def refusal_json(reason: str) -> bytes:
+    """GetField's failure body: the reason, and every other field zeroed."""
+    return _refusal(reason, ("values",), ("value_min", "value_max"), ("sample_count",))
+
+
+def _refusal(
+    reason: str, cells: Iterable[str], numbers: Iterable[str], counts: Iterable[str]
+) -> bytes:
+    return orjson.dumps(
+        {
+            "ok": False,
+            "error_message": reason,
+            **{name: [] for name in cells},
+            **dict.fromkeys(("width", "height"), 0),
+            **dict.fromkeys(("origin_x", "origin_y", "resolution_used", *numbers), 0.0),
+            **dict.fromkeys(counts, 0),
+        }
+    )
+
+
+def write_npy(grid: FieldGrid) -> bytes:
+    """NumPy's own format, float32 (height, width), row 0 at `bbox_min_y`, NaN as it is."""
+    return _npy(_rows(grid))
+
+
+def _npy(array: npt.NDArray[np.float32]) -> bytes:
+    buffer = io.BytesIO()
+    np.lib.format.write_array(buffer, array, allow_pickle=False)
+    return buffer.getvalue()
+
+
+def write_png(grid: FieldGrid, sensor_type: str, sensors: Sensors, scale: int = 1) -> bytes:
+    """A picture of `scale` pixels a cell, its top row at `bbox_max_y`; NaN is transparent.
+
+    One hue, alpha rising from 0 at `value_min` to `max_alpha` at `value_max`: a palette and its
+    transparency lose nothing of that, and take a fifth of RGBA's time (PNG, third edition, 11.3.2).
+    """
+    # What only looks back, in a process of its own, makes no pictures, and need not hold Pillow.
+    from PIL import Image  # noqa: PLC0415
+    from PIL.PngImagePlugin import PngInfo  # noqa: PLC0415
+
+    indices = np.flipud(_palette_indices(grid))
+    if scale > 1:
+        indices = indices.repeat(scale, axis=0).repeat(scale, axis=1)
+    image = Image.fromarray(np.ascontiguousarray(indices), mode="P")
+    sensor = sensors.named(sensor_type)
+    colour = rgb(sensor.hue, sensors.saturation, sensor.lightness)
+    image.putpalette(list(colour) * (_RAMP_STEPS + 1))
+    alphas = np.rint(np.linspace(0.0, sensors.max_alpha * 255, _RAMP_STEPS)).astype(np.uint8)
+    text = PngInfo()
+    for name, value in metadata(grid, sensor).items():
+        text.add_itxt(name, value)
+    buffer = io.BytesIO()
+    image.save(
+        buffer,
+        format="PNG",
+        transparency=b"\x00" + alphas.tobytes(),
+        pnginfo=text,
+        compress_level=1,  # a third of the time of the default for a tenth more bytes
+    )
+    return buffer.getvalue()
+
+
+def _rows(grid: FieldGrid) -> npt.NDArray[np.float32]:
+    return grid.values.reshape(grid.height, grid.width)
+
+
+def _palette_indices(grid: FieldGrid) -> npt.NDArray[np.uint8]:
+    """0 where the value is not finite, else 1 (value_min) to 255 (value_max)."""
+    values = _rows(grid)
+    span = grid.value_max - grid.value_min
+    if span > 0.0:
+        # In float64: the span of two float32, or the inverse of it, may be past float32.
+        steps = np.subtract(values, grid.value_min, dtype=np.float64)
+        steps *= (_RAMP_STEPS - 1) / span
+        np.rint(steps, out=steps)
+    else:
+        # One value everywhere is the maximum as much as the minimum: show it.
+        steps = np.full(values.shape, _RAMP_STEPS - 1.0)
+    steps += 1
+    return np.where(np.isfinite(values), steps, 0).astype(np.uint8)
+
+
+def estimate_metadata(estimate: Estimate, sensor: Sensor) -> dict[str, str]:
+    """What a picture or a bare array cannot say of itself: extent, unit, the limit of known."""
+    grid = estimate.grid
+    return {
+        **extent(grid, sensor),
+        "Sd-Known": str(np.float32(grid.sd_known)),
+        "Sample-Count": str(estimate.sample_count),
+        "Reading-Count": str(estimate.reading_count),
+    }
+
+
+# The ideal range is so many sds wide where a place is known: an interval of 9 in 10 is half of it.
+_SDS_OF_IDEAL: Final = 6.0
+
+
+def within_ideal(estimate: Estimate, sensor: Sensor) -> Estimate:
+    """The estimate, known only where its interval for 9 of 10 is about half of the ideal range."""
+    spans = [ranges.ideal for ranges in (sensor.day, sensor.night) if ranges.ideal is not None]
+    limit = min((span.width for span in spans), default=math.inf) / _SDS_OF_IDEAL
+    grid = estimate.grid
+    if not limit < grid.sd_known:
+        return estimate
+    return replace(estimate, grid=replace(grid, sd_known=limit, known=grid.sd < limit))
+
+
+def write_estimate(
+    estimate: Estimate, field_format: FieldFormat, query: EstimateQuery, sensors: Sensors
+) -> bytes:
+    """The estimate in a format."""
+    if field_format == PNG:
+        picture = estimate_picture(estimate, query.layer)
+        return write_png(picture, query.sensor_type, sensors, query.scale)
+    return write_estimate_npy(estimate) if field_format == NPY else write_estimate_json(estimate)
+
+
+def write_estimate_json(estimate: Estimate) -> bytes:
+    """`followers.GetEstimateResponse`."""
+    grid = estimate.grid
+    return _json(
+        grid,
+        {"mean": grid.mean, "sd": grid.sd},
+        sd_known=np.float32(grid.sd_known),
+        sample_count=estimate.sample_count,
+        reading_count=estimate.reading_count,
+    )
+
+
+def estimate_refusal_json(reason: str) -> bytes:
+    """GetEstimate's failure body: the reason, and every other field zeroed."""
+    return _refusal(reason, ("mean", "sd"), ("sd_known",), ("sample_count", "reading_count"))
+
+
+def write_estimate_npy(estimate: Estimate) -> bytes:
+    """NumPy's own format, float32 (2, height, width): mean and sd, row 0 at `bbox_min_y`."""
+    return _npy(np.stack((estimate.grid.mean, estimate.grid.sd)))
+
+
+def estimate_picture(estimate: Estimate, layer: str) -> FieldGrid:
+    """One of the two numbers as a field, NaN where the estimate is not known."""
+    grid = estimate.grid
+    cells = grid.mean if layer == "mean" else grid.sd
+    values = np.where(grid.known, cells, np.float32(np.nan)).ravel()
+    known = cells[grid.known]
+    return FieldGrid(
+        width=grid.width,
+        height=grid.height,
+        origin_x=grid.origin_x,
+        origin_y=grid.origin_y,
+        resolution=grid.resolution,
+        values=values,
+        value_min=float(known.min()) if known.size else 0.0,
+        value_max=float(known.max()) if known.size else 0.0,
+        sample_count=estimate.sample_count,
+    )

@@ -1,1 +1,0 @@
-"""Fields: their queries, formats and colours."""

@@ -386,7 +386,12 @@ def _predict_part(
     idw: PairwiseIdw,
 ) -> FloatArray:
     x, y, value = samples
-    square = np.square(x[near][:, None] - x[part]) + np.square(y[near][:, None] - y[part])
+    square = idw.squares(near.size, part.size)
+    gap = x[near][:, None] - x[part]
+    np.square(gap, out=square)
+    np.subtract(y[near][:, None], y[part], out=gap)
+    np.square(gap, out=gap)
+    np.add(square, gap, out=square)
     # A sample has no say about itself. `near` is in recorded order and holds all of `part`.
     square[np.searchsorted(near, part), np.arange(part.size)] = np.inf
     return idw.evaluate(square, value[near])

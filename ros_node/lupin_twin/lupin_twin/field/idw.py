@@ -26,6 +26,8 @@ follows the painted cells, and memory beyond the grid's own is that of one part.
 
 from __future__ import annotations
 
+import math
+import sys
 from collections.abc import Callable, Iterator, Sequence
 from itertools import chain
 from typing import Final, NamedTuple
@@ -51,12 +53,33 @@ MAX_PAIRS: Final = 65_536
 # MAX_PAIRS only where more than a thousand samples reach one part.
 _MIN_POINTS: Final = 32
 
+# 1/d² is used as it is up to here; past it (and for any power but 2) the weights are scaled by
+# the nearest distance of the cell, so that none overflows and the largest is exactly 1.
+_MAX_PLAIN_REACH_M: Final = 1e6
+
 # Larger readings count as this one: far past float32 both, and Σ(v/dᵖ) cannot overflow.
 _LARGEST_VALUE: Final = 1e280
-# More than what a squared distance is off by rounding.
-_ROUNDED_OFF: Final = 1.0 + 1e-12
+
+# What a sample closer than COINCIDENT_EPS_M weighs at least, at power 2, a rounding apart.
+_COINCIDENT_WEIGHT: Final = 0.999 / COINCIDENT_EPS_M**2
 
 IndexArray = npt.NDArray[np.intp]
+
+
+def _largest_square_within(radius: float) -> float:
+    """The largest float64 whose square root is not greater than `radius`.
+
+    `sqrt(square) <= radius` and `square <= _largest_square_within(radius)` are the same then, to
+    the bit, and the root need not be taken for every pair.
+    """
+    square = min(radius * radius, sys.float_info.max)
+    while math.sqrt(following := math.nextafter(square, math.inf)) <= radius:
+        square = following
+    return square
+
+
+# The largest squared distance that is closer than COINCIDENT_EPS_M, which itself is not.
+_COINCIDENT_SQUARE: Final = _largest_square_within(math.nextafter(COINCIDENT_EPS_M, 0.0))
 
 
 class Abandoned(Exception):
@@ -121,7 +144,8 @@ def compute_idw_field(
             dx = np.square(x[near][:, None] - cell_x[columns])
             dy = np.square(y[near][:, None] - cell_y[rows])
             shape = dy.shape[1], dx.shape[1]
-            square = (dy[:, :, None] + dx[:, None, :]).reshape(near.size, -1)
+            square = idw.squares(near.size, shape[0] * shape[1])
+            np.add(dy[:, :, None], dx[:, None, :], out=square.reshape(-1, *shape))
             values[rows, columns] = idw.evaluate(square, value[near]).reshape(shape)
         if explored_mask is not None:
             values[~explored_mask] = np.nan
@@ -176,6 +200,8 @@ def _finite_range(values: npt.NDArray[np.float32]) -> tuple[float, float]:
 class PairwiseIdw:
     """The definition's rules 2 to 5 for any points, given their squared distances to the samples.
 
+    Not to be shared between threads: the intermediate arrays are reused by the next evaluation.
+
     Raises:
         ValueError: a rule out of its range, named with its value and the limit.
 
@@ -193,25 +219,74 @@ class PairwiseIdw:
         self.power = power
         self.falloff_radius = falloff_radius_m
         self.max_distance = max_distance_m
-        # Of a part's samples some more are looked at, for what is rounded off.
-        reach_m = max(falloff_radius_m, max_distance_m)
-        self.max_square = max_distance_m * max_distance_m * _ROUNDED_OFF
-        self.reach_square = reach_m * reach_m * _ROUNDED_OFF
+        self.falloff_square = _largest_square_within(falloff_radius_m)
+        self.max_square = _largest_square_within(max_distance_m)
+        self.reach_square = max(self.falloff_square, self.max_square)
+        self._equal_radii = falloff_radius_m == max_distance_m
+        self._plain_weights = power == 2.0 and falloff_radius_m <= _MAX_PLAIN_REACH_M
+        self._allocate(MAX_PAIRS)
+
+    def _allocate(self, pairs: int) -> None:
+        # In one block: the allocator gives it back to the next field instead of to the system,
+        # and a fifth of a small field's time, page faults, is saved.
+        self._square, self._weight = np.empty((2, pairs))
+        self._within = np.empty(pairs, dtype=np.bool_)
+
+    def squares(self, samples: int, points: int) -> FloatArray:
+        """An array (samples, points) to put the squared distances (m²) into, for `evaluate`."""
+        pairs = samples * points
+        if pairs > self._square.size:
+            self._allocate(pairs)
+        return self._square[:pairs].reshape(samples, points)
 
     def evaluate(self, square: FloatArray, value: FloatArray) -> FloatArray:
-        """The points' values, NaN behind the gate; `square` (samples, points), m², is spent.
+        """The points' values, NaN behind the gate; `square` is `squares()`, filled, and is spent.
 
         A sample that does not count for a point has an infinite squared distance to it. Call it
         with numpy's floating point warnings off: 0/0 is a point that nothing reaches, 1/0 a sample
         on a point.
         """
+        weight = self._weight[: square.size].reshape(square.shape)
+        within = self._within[: square.size].reshape(square.shape)
+        np.less_equal(square, self.falloff_square, out=within)
+        weight.fill(0.0)
+        if self._plain_weights:
+            return self._evaluate_plain(square, value, weight, within)
+        return self._evaluate_normalised(square, value, weight, within)
+
+    def _evaluate_plain(
+        self, square: FloatArray, value: FloatArray, weight: FloatArray, within: BoolArray
+    ) -> FloatArray:
+        """Power 2: 1/d² needs no root, and the nearest sample is seldom needed."""
+        np.divide(1.0, square, out=weight, where=within)
+        total = np.ones(value.size).dot(weight)
+        points: FloatArray = value.dot(weight)
+        points /= total
+        # With equal radii a point out of reach is 0/0 by now, and the nearest sample matters only
+        # where the weights are so large that one may be coincident.
+        if self._equal_radii and np.maximum.reduce(total) < _COINCIDENT_WEIGHT:
+            return points
+        shortest = np.minimum.reduce(square, axis=0)
+        special = np.flatnonzero((shortest <= _COINCIDENT_SQUARE) | (total == 0.0))
+        if special.size:
+            # Of the root: two squares a rounding apart can be the same distance, and of equally
+            # near samples the first one counts.
+            distance = square[:, special]
+            np.sqrt(distance, out=distance)
+            points[special] = value[distance.argmin(axis=0)]
+        points[shortest > self.max_square] = np.nan
+        return points
+
+    def _evaluate_normalised(
+        self, square: FloatArray, value: FloatArray, weight: FloatArray, within: BoolArray
+    ) -> FloatArray:
+        """Any power: the weights are (nearest/d)ᵖ, so that the largest is 1 and none overflows."""
         distance = np.sqrt(square, out=square)
-        shortest = distance.min(axis=0)
-        # (nearest/d)ᵖ: so the largest is 1, and none overflows.
-        weight = shortest / distance
-        weight **= self.power
-        weight[distance > self.falloff_radius] = 0.0
-        points: FloatArray = value @ weight / weight.sum(axis=0)
+        shortest = np.minimum.reduce(distance, axis=0)
+        np.divide(shortest, distance, out=weight, where=within)
+        np.power(weight, self.power, out=weight, where=within)
+        points: FloatArray = value.dot(weight)
+        points /= np.ones(value.size).dot(weight)
         special = np.flatnonzero((shortest < COINCIDENT_EPS_M) | (shortest > self.falloff_radius))
         if special.size:
             points[special] = value[distance[:, special].argmin(axis=0)]

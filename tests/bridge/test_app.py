@@ -6,10 +6,10 @@ from typing import Any
 
 import httpx
 import pytest
+from fastapi import FastAPI
 
-from lupin_bridge.app import STATIC_FOLDER, create_app
+from lupin_bridge.app import create_app
 from lupin_bridge.stream import schema
-from tests.support.web import ROUTES
 
 PAGE = '<!doctype html><title>HMI</title><script type="module" src="/assets/a.js"></script>'
 
@@ -25,26 +25,29 @@ def static(tmp_path: Path) -> Path:
     return folder
 
 
-def ask(static_folder: Path, method: str, path: str) -> httpx.Response:
-    """One request to an application without a twin, answered in this process."""
+def request(app: FastAPI, method: str, path: str, prefix: str = "") -> httpx.Response:
+    """One request to an application, answered in this process."""
 
-    async def request() -> httpx.Response:
-        transport = httpx.ASGITransport(create_app(None, static_folder))
+    async def answer() -> httpx.Response:
+        transport = httpx.ASGITransport(app, root_path=prefix)
         async with httpx.AsyncClient(transport=transport, base_url="http://localhost") as client:
             return await client.request(method, path)
 
-    return asyncio.run(request())
+    return asyncio.run(answer())
 
 
-@pytest.mark.parametrize("path", ["/docs", "/openapi.json"])
-def test_it_describes_itself_without_a_twin(tmp_path: Path, path: str) -> None:
-    assert path in ROUTES
-    assert ask(tmp_path, "GET", path).status_code == 200
+def ask(static_folder: Path, method: str, path: str) -> httpx.Response:
+    """Of one without a twin."""
+    return request(create_app(None, static_folder), method, path)
 
 
-@pytest.mark.parametrize("path", ["/redoc", "/docs/oauth2-redirect"])
-def test_the_frameworks_own_pages_are_off(tmp_path: Path, path: str) -> None:
-    assert ask(tmp_path, "GET", path).status_code == 404
+def test_it_describes_itself_without_a_twin_and_the_frameworks_own_pages_are_off(
+    tmp_path: Path,
+) -> None:
+    for path in ("/docs", "/openapi.json"):
+        assert ask(tmp_path, "GET", path).status_code == 200
+    for path in ("/redoc", "/docs/oauth2-redirect"):
+        assert ask(tmp_path, "GET", path).status_code == 404
 
 
 def test_the_page_and_its_files_are_served_from_the_same_origin(static: Path) -> None:
@@ -67,21 +70,14 @@ def test_the_page_does_not_hide_a_route(static: Path) -> None:
     "path",
     [
         "/../secret.txt",
-        "/..%2fsecret.txt",
-        "/%2e%2e/secret.txt",
         "/%2e%2e%2fsecret.txt",
         "/%252e%252e%252fsecret.txt",
-        "/..%5csecret.txt",
         "/assets/..%2f..%2fsecret.txt",
-        "/assets/../../secret.txt",
         "/link.txt",
         "/folder/secret.txt",
         "//etc/passwd",
         "/%2fetc%2fpasswd",
-        "/etc/passwd",
-        "/file:///etc/passwd",
         "/assets/a.js%00.txt",
-        "/%00",
         "/" + "x/" * 2_000,
     ],
 )
@@ -131,7 +127,3 @@ def test_a_websocket_that_is_not_there_is_refused_in_json(static: Path, built: b
 
 def test_a_long_path_is_cut_in_the_answer(tmp_path: Path) -> None:
     assert len(ask(tmp_path, "GET", "/" + "x" * 4_000).text) < 300
-
-
-def test_the_page_is_looked_for_where_the_build_puts_it() -> None:
-    assert STATIC_FOLDER.parts[-3:] == ("backend", "lupin_bridge", "static")

@@ -6,7 +6,7 @@ import json
 import math
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, Self, cast
@@ -16,8 +16,8 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from websockets.asyncio.client import connect
 
-from lupin_bridge import field as field_formats
-from lupin_bridge.bridge import Bridge
+from lupin_bridge.alarms.board import Change, page_of
+from lupin_bridge.bridge import ALARMS_REST_S, Bridge
 from lupin_bridge.feed.relay import Relay
 from lupin_bridge.feed.source import ThreadState, TwinUnavailableError, TwinUpdate
 from lupin_bridge.serving.admission import Limits
@@ -27,13 +27,10 @@ from lupin_twin.core.diagnostics import UNKNOWN, Condition
 from lupin_twin.core.parameters import World
 from lupin_twin.core.past import NotRemembered, PastWrite
 from lupin_twin.core.state import Snapshot, TagState
-from lupin_twin.field.grid import FieldGrid
-from lupin_twin.field.idw import compute_idw_field
 from lupin_twin.runtime.workers import Workers
 from tests.bridge.stream.test_frames import received
-from tests.support.inprocess import Running, run, running
-from tests.support.messages import scan
-from tests.support.ros import Peer
+from tests.support.inprocess import run, running
+from tests.support.seen import alarm
 from tests.support.waiting import PATIENCE_S, until, wait_for
 from tests.support.web import ws_url
 
@@ -75,7 +72,7 @@ class Ear:
         self.heard: list[dict[str, Any]] = []
 
     def write(self, wire: bytes) -> None:
-        self.heard.append(json.loads(bytes(received(wire).data)))
+        self.heard.append(json.loads(received(wire)))
 
     def dismiss(self, code: int, reason: str) -> None:
         raise AssertionError(f"dismissed: {code} {reason}")
@@ -146,17 +143,6 @@ class Beat:
             self.now_s += self.waits_s.pop()
             self.stage.bridge._push_when_due()
         return self.now_s - at_s
-
-
-async def test_two_changes_go_out_at_once_and_the_next_by_the_rate(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    beat = Beat(monkeypatch)
-    async with Stage(clock=lambda: beat.now_s, frames_per_s=20.0) as stage:
-        beat.hold(stage)
-        waits = [beat.change(at_s) for at_s in (100.0, 100.01, 100.02, 100.08, 200.0, 200.01)]
-        assert waits == pytest.approx([0.0, 0.0, 0.03, 0.02, 0.0, 0.0])
-        assert beat.change(200.02) == pytest.approx(0.03), "a pause is made up for by one"
 
 
 async def test_of_a_producer_that_keeps_to_the_rate_no_change_waits(
@@ -310,66 +296,102 @@ async def test_who_asked_for_a_low_rate_gets_the_newest_although_nothing_more_ha
         assert [frame["revision"] for frame in rare.states] == ["r1", "r5"]
 
 
+# --- alarms -------------------------------------------------------------------------------------
+
+
+async def test_alarms_are_told_at_once_and_those_right_behind_once_a_second() -> None:
+    async with Stage() as stage:
+        await stage.bridge._alarm_feed.stop()  # these are the test's alone
+
+        def put(tag_ids: Sequence[str]) -> None:
+            page = page_of(map(alarm, tag_ids))
+            stage.bridge.alarms.put(page, Change(()), "heard", 1)
+
+        def told() -> list[int]:
+            frames = [frame for frame in stage.ear.heard if frame["type"] == "alarms"]
+            return [len(frame["alarms"]) for frame in frames if frame["alarms"]]
+
+        stage.script.tell(state(1))
+        loop = asyncio.get_running_loop()
+        put("a")
+        await until(lambda: told() == [1], "the first")
+        first_s = loop.time()
+        for count in range(2, 6):
+            put("abcde"[:count])
+            for _ in range(5):  # as a frame of its own would, were it written now
+                await asyncio.wrap_future(stage.script.workers.submit(lambda _: None))
+        await until(lambda: told()[-1] == 5, "the newest")
+        assert told() == [1, 5]
+        assert loop.time() - first_s > 0.8 * ALARMS_REST_S
+
+
+# --- a silent twin ------------------------------------------------------------------------------
+
+SECOND = 1_000_000_000
+
+
+async def test_while_the_twin_is_silent_its_status_comes_again_and_again() -> None:
+    now_s = 100.0
+
+    def a_second_later(reason: str) -> bool:
+        nonlocal now_s
+        now_s += 1.0
+        return stage.ear.reasons.count(reason) >= 3
+
+    async with Stage(lambda: now_s) as stage:
+        await until(lambda: a_second_later("never_seen"), "the status, again and again")
+        stage.script.tell(state(1))
+        await until(lambda: a_second_later("stale"), "the silence, again and again")
+        told = [frame for frame in stage.ear.heard if frame["type"] == "status"]
+        ages_s = [frame["state_age_seconds"] for frame in told if frame["reason"] == "stale"]
+        assert ages_s == sorted(set(ages_s)), "each as of then"
+
+
+async def test_a_twin_without_a_clock_has_not_been_silent_since_the_year_1970() -> None:
+    async with Stage() as stage:
+        stage.bridge.liveness.stale_after_s = 0.3
+        clockless = replace(state(0).snapshot, clock="none")
+        stage.script.tell(replace(state(0), snapshot=clockless))
+        await until(lambda: "no_clock" in stage.ear.reasons, "that to be told")
+        stage.script.tell(state(7))
+        await until(lambda: stage.ear.reasons[-1] == "stale", "the silence to be noticed")
+        await until(lambda: stage.bridge.alarms.now.alarms, "its alarm")
+    (silent,) = stage.bridge.alarms.now.alarms
+    assert (silent.reason.kind, silent.raised_at_ns) == ("silent", 7)
+
+
+async def test_a_twin_whose_clock_stops_is_silent_since_its_last_time() -> None:
+    async with Stage() as stage:
+        stage.script.tell(state(7))
+        for clock in ("stopped", "doubted"):
+            without = replace(state(8).snapshot, clock=clock)
+            stage.script.tell(replace(state(8), snapshot=without))
+        await until(lambda: stage.bridge.alarms.now.page.active, "its alarm")
+        (silent,) = stage.bridge.alarms.now.page.active
+        assert (silent.reason.kind, silent.raised_at_ns) == ("silent", 7)
+        stage.script.tell(state(9))
+        await until(lambda: not stage.bridge.alarms.now.page.active, "its end")
+
+
+async def test_a_clock_that_goes_back_withdraws_the_silences_of_what_has_not_been_yet() -> None:
+    async with Stage() as stage:
+        board = stage.bridge.alarms
+
+        def raised_ns() -> list[int]:
+            return [alarm.raised_at_ns for alarm in board.now.alarms]
+
+        for last, back in ((7 * SECOND, 9 * SECOND), (3 * SECOND, None)):
+            stage.script.tell(state(last))
+            stopped = replace(state(last).snapshot, clock="stopped")
+            stage.script.tell(replace(state(last), snapshot=stopped))
+            await until(lambda: board.now.page.active, "its alarm")
+            if back is not None:
+                stage.script.tell(state(back))
+                await until(lambda: not board.now.page.active, "its end")
+        assert raised_ns() == [3 * SECOND]
+
+
 # --- with a real twin ---------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("stage", ["compute", "encode"])
-def test_while_a_field_is_made_states_are_answered_and_frames_keep_coming(
-    domain: int, monkeypatch: pytest.MonkeyPatch, stage: str
-) -> None:
-    gate, reached = threading.Event(), threading.Event()
-
-    def hold() -> None:
-        reached.set()
-        gate.wait(PATIENCE_S)
-
-    compute, write = compute_idw_field, field_formats.write
-
-    def held_compute(*args: Any, **kwargs: Any) -> FieldGrid:
-        hold()
-        return compute(*args, **kwargs)
-
-    def held_write(*args: Any) -> bytes:
-        hold()
-        return write(*args)
-
-    if stage == "compute":
-        monkeypatch.setattr("lupin_twin.field.engine.compute_idw_field", held_compute)
-    else:
-        monkeypatch.setattr(field_formats, "write", held_write)
-
-    async def test(served: Running, peer: Peer) -> None:
-        heavy = asyncio.create_task(served.http.get(MILLION_CELLS))
-        await until(reached.is_set, "the heavy request to be at work")
-        async with connect(
-            ws_url(served.url), proxy=None, max_size=None, open_timeout=PATIENCE_S
-        ) as listener:
-            for number in range(3):
-                peer.observe(scan(f"meanwhile {number}", {"co2": 1.0}))
-                while f"meanwhile {number}" not in str(await listener.recv()):
-                    pass
-                answer = await served.http.get("/api/state")
-                assert f"meanwhile {number}" in answer.text
-        assert not heavy.done()
-        gate.set()
-        answer = await heavy
-        assert (answer.status_code, answer.headers["x-field-width"]) == (200, "1000")
-
-    async def with_twin() -> None:
-        async with running() as served:
-            with Peer(domain) as peer:
-                try:
-                    await test(served, peer)
-                finally:
-                    gate.set()
-
-    run(domain, with_twin())
-
-
-MILLION_CELLS = (
-    "/api/field.npy?sensor_type=co2&resolution=0.001"
-    "&bbox_min_x=0&bbox_min_y=0&bbox_max_x=1&bbox_max_y=1"
-)
 
 
 def test_no_thread_and_no_descriptor_is_left_behind(domain: int) -> None:

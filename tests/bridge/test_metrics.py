@@ -87,18 +87,3 @@ def test_estimates_that_are_wrong_are_told_by_sensor() -> None:
         ("fit_failing", "light", 0.0),
     ):
         assert f'\nlupin_estimate_{name}{{sensor="{sensor}"}} {value}\n' in text
-
-
-def test_samples_are_read_at_the_scrape_and_not_before() -> None:
-    reads: list[int] = []
-
-    def read() -> list[tuple[str, float]]:
-        reads.append(1)
-        return [("lupin_clients", 7.0), ("lupin_frames_sent", 9.0)]
-
-    metrics = Metrics(read)
-    assert reads == []
-    text = metrics.text().decode()
-    assert "\nlupin_clients 7.0\n" in text
-    assert "\nlupin_frames_sent_total 9.0\n" in text
-    assert len(reads) == 1

@@ -1,23 +1,17 @@
 """The values of a query string, read by a dataclass; and OpenAPI is told of just these."""
 
-import json
 from contextlib import suppress
-from dataclasses import dataclass, fields
-from typing import Annotated, Any, Literal
+from dataclasses import dataclass
+from typing import Annotated, Literal
 
 import pytest
 from annotated_types import Interval
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lupin_bridge.app import document
-from lupin_bridge.field import EstimateQuery, FieldQuery
-from lupin_bridge.past import query
-from lupin_bridge.query_string import Name, needed, parameter, parameters_of, read
+from lupin_bridge.query_string import Name, needed, parameter, read
 from lupin_bridge.routes.state import ListenQuery
 from lupin_twin.core.past import PastRefused
-
-PATHS: dict[str, Any] = json.loads(document())["paths"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,49 +57,6 @@ def test_what_cannot_be_is_refused_in_the_callers_way_by_name(
 def test_any_query_string_is_read_or_refused(pairs: list[tuple[str, str]]) -> None:
     with suppress(PastRefused):
         read(Some, pairs)
-
-
-def test_parameters_are_told_as_openapi_has_them() -> None:
-    assert parameters_of(Some) == [
-        {
-            "name": "a",
-            "in": "query",
-            "required": True,
-            "schema": {"type": "string", "minLength": 1, "maxLength": 256},
-            "description": "one",
-        },
-        {
-            "name": "from",
-            "in": "query",
-            "required": False,
-            "schema": {"type": "integer", "minimum": 1, "maximum": 5, "default": 2},
-            "description": "another",
-        },
-        {
-            "name": "c",
-            "in": "query",
-            "required": False,
-            "schema": {"type": "string", "enum": ["x", "y"]},
-            "description": "a third",
-        },
-    ]
-
-
-@pytest.mark.parametrize(
-    ("path", "kind"),
-    [
-        ("/api/field", FieldQuery),
-        ("/api/estimate", EstimateQuery),
-        ("/api/history", query.OfHistory),
-        ("/api/timeline", query.OfTimeline),
-        ("/api/alarms", query.OfAlarms),
-        ("/api/export.csv", query.OfExport),
-        ("/api/state", query.OfMoment),
-    ],
-)
-def test_what_is_read_is_described_and_nothing_else(path: str, kind: Any) -> None:
-    described = {told["name"] for told in PATHS[path]["get"]["parameters"]}
-    assert described == {spec.name.rstrip("_") for spec in fields(kind)}
 
 
 # --- what a WebSocket client may ask for ----------------------------------------------------------

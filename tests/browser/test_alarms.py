@@ -11,7 +11,7 @@ from typing import Any
 from playwright.sync_api import Locator, expect
 
 from tests.browser.hmi import PHONE, WIDE, Hmi, OpenPage
-from tests.browser.places import place
+from tests.browser.places import out_of_reach, place, places
 from tests.support.messages import scan
 from tests.support.waiting import wait_for
 from tests.support.web import Bridge, bridge
@@ -92,6 +92,14 @@ def test_an_alarm_comes_is_acknowledged_shelved_and_resolved(
         # Acknowledged, and undone; then for good, in this browser, after a reload as well.
         hmi.page.get_by_role("button", name="Acknowledge: Tag a").click()
         expect(row).to_have_attribute("data-acknowledged", "true")
+        # On a phone below no heading, not even that of an open menu, and over no row's words.
+        hmi.resize(**PHONE)
+        hmi.page.get_by_role("button", name="Actions: Tag a").click()
+        assert out_of_reach(hmi, "[data-line=done] button") == []
+        line, words = places(hmi, "[data-line=done]", ".alarm-times .health-mark")
+        assert line.bottom <= words.top + 2
+        hmi.resize(**WIDE)
+        hmi.page.keyboard.press("Escape")
         hmi.page.get_by_role("button", name="Undo").click()
         expect(row).to_have_attribute("data-acknowledged", "false")
         hmi.page.get_by_role("button", name="Acknowledge: Tag a").click()
@@ -285,6 +293,13 @@ def test_nothing_moves_while_a_finger_rests_on_the_list(domain: int, open_page: 
         assert where(hmi) == ["c", order[1]]
         open_resolved(hmi, 1)
         expect(rows(hmi, "resolved")).to_have_attribute("data-where", order[0])
+        # Many of one cause: their heading has the columns of its rows.
+        leave(hmi)
+        robot.observe(*[warm(f"d{at}", 27.0) for at in range(3)] * 2)
+        hmi.page.locator("[data-group=active] .alarm-cause .alarm-go").click()
+        worst = fact(hmi.page.locator("[data-group=active]"), "worst")
+        expect(worst).to_have_count(6)
+        assert len({place(each).left for each in worst.all()}) == 1
 
 
 def where(hmi: Hmi) -> list[str]:

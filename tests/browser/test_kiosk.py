@@ -57,6 +57,8 @@ def test_a_wall_screen_goes_round_and_is_left_by_the_key_that_it_names(
     # Too low for the whole list: it says how many are left, and cuts none in two.
     wall.page.set_viewport_size({"width": 1100, "height": 500})
     listed = wall.page.locator("li[data-fits=true]")
+    row, since = places(wall, ".attention > ul > li", ".attention-do small:not(:empty)")
+    assert since.right == row.right
     all_of_it = wall.page.locator("li[data-fits]")
 
     def says_how_many_are_left() -> bool:

@@ -1,21 +1,30 @@
 """Accounts and tokens for tests, and people who have signed in."""
 
+from __future__ import annotations
+
 import time
 from collections.abc import Iterator
 from contextlib import closing, contextmanager
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import httpx
 from argon2 import PasswordHasher
+from websockets.exceptions import ConnectionClosed
+from websockets.sync.client import ClientConnection
 
 from lupin_bridge.access.accounts import Accounts, digest, make_file
 from lupin_bridge.access.credentials import Kind, Role
+from lupin_bridge.stream.routes_schema import Note, Notes
 from tests.support.waiting import PATIENCE_S
+
+if TYPE_CHECKING:
+    from tests.support.web import Bridge  # has ROS
 
 OWN = {"X-Lupin-Twin": "1"}
 PASSWORD = "correct horse battery staple"
 TOKEN = "a-token-of-43-characters-0123456789-abcdefg"
+BEARER = {"Authorization": f"Bearer {TOKEN}"}
 # As cheap as argon2id can be: what a hash costs to verify is written in it.
 _HASH = PasswordHasher(time_cost=1, memory_cost=8, parallelism=1).hash(PASSWORD)
 
@@ -59,3 +68,24 @@ def signed_in(url: str, name: str) -> Iterator[httpx.Client]:
 def write(browser: httpx.Client, **note: Any) -> httpx.Response:
     """A note."""
     return browser.post("/api/notes", json=note)
+
+
+def notes(live: Bridge, **query: str) -> list[Note]:
+    """What people have said, the newest first."""
+    answer = live.get("/api/notes", BEARER, **query)
+    return Notes.model_validate_json(answer.content).notes
+
+
+def in_s(live: Bridge, seconds: float) -> str:
+    """A moment of the twin's time."""
+    now = live.get("/api/state", BEARER).json()["header"]["stamp"]
+    return f"{now['sec'] + seconds:.0f}"
+
+
+def end_of(connection: ClientConnection) -> str:
+    """Why a WebSocket ended."""
+    try:
+        while True:
+            connection.recv(timeout=PATIENCE_S)
+    except ConnectionClosed as ended:
+        return "" if ended.rcvd is None else ended.rcvd.reason

@@ -58,12 +58,6 @@ class Ros:
         """Whether nothing came before the answer to a question asked now."""
         return self.call("/rosapi/topics", "quiet?").get("id") == "quiet?"
 
-    def drain(self) -> None:
-        """Read on to the answer to a question asked now."""
-        message = self.call("/rosapi/topics", "drained")
-        while message.get("id") != "drained":
-            message = self.next()
-
     def first(self, op: str) -> Message:
         """Read on to the first message of a kind."""
         message = self.next()

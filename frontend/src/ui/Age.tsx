@@ -1,4 +1,4 @@
-import type { JSX } from 'react';
+import type { JSX, ReactNode } from 'react';
 
 import { ageSeconds, ageStep, type When } from '../domain/time';
 import { ageText } from '../domain/format';
@@ -49,16 +49,18 @@ export function Age({ when, format = agoText }: { when: When; format?: Format })
 }
 
 /** One entry of a `dl`. */
-export function AgeFact({ label, when }: { label: string; when: When }): JSX.Element {
-  return (
-    <div>
-      <dt>{label}</dt>
-      <dd>
-        <Age when={when} />
-      </dd>
-    </div>
-  );
-}
+export const Fact = ({ label, children }: { label: string; children: ReactNode }): JSX.Element => (
+  <div>
+    <dt>{label}</dt>
+    <dd>{children}</dd>
+  </div>
+);
+
+export const AgeFact = ({ label, when }: { label: string; when: When }): JSX.Element => (
+  <Fact label={label}>
+    <Age when={when} />
+  </Fact>
+);
 
 /** A try that came to nothing: when, and why. */
 export function Tried({ failed }: { failed: FailedTry }): JSX.Element {

@@ -70,7 +70,7 @@ test('of what ails many as well, since when it is active where it is worst', () 
   });
   show(Object.fromEntries(Array.from({ length: 13 }, (_, at) => [`${at + 1}`, [cold(at + 1)]])));
   const [cause] = document.querySelectorAll('li[data-cause]');
-  expect(cause?.textContent).toMatch(/Tag 13: Temperature [^·]* · since [^·]* · Tags 13/);
+  expect(cause?.textContent).toMatch(/Tag 13: Temperature [^·]*· since [^·]*· Tags 13/);
   stop();
 });
 

@@ -102,7 +102,7 @@ function Row({ cause, tags, fits }: Omit<Line, 'key'> & { fits: boolean }): JSX.
         )}
         <span className="attention-do">
           <Todo reasons={all} />{' '}
-          <small className="faint">{facts.filter(Boolean).join(' · ')}</small>
+          <small className="faint">{facts.filter(Boolean).join('\u00a0· ')}</small>
         </span>
       </span>
     </li>

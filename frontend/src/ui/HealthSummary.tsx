@@ -1,7 +1,7 @@
 import type { JSX } from 'react';
 
 import { ageText, intervalText } from '../domain/format';
-import { isSilent, VERDICTS, type HouseHealth } from '../domain/health';
+import { isBad, isSilent, VERDICTS, type HouseHealth } from '../domain/health';
 import { ageSeconds } from '../domain/time';
 import { whenOf } from '../domain/twin';
 import { act, useApp } from '../store/app';
@@ -17,6 +17,7 @@ export function HealthSummary({ kiosk }: { kiosk: boolean }): JSX.Element {
   const health = useApp(selectHealth);
   const filter = useApp((state) => state.view.health);
   const isHere = useApp(selectIsHere);
+  const count = health.counts[health.verdict];
   return (
     <section
       className="health"
@@ -32,6 +33,9 @@ export function HealthSummary({ kiosk }: { kiosk: boolean }): JSX.Element {
               verdict={health.verdict}
               text={isSilent(health) ? S.healthNotCurrent : undefined}
             />
+          )}
+          {isHere && isBad(health.verdict) && count > 0 && !isSilent(health) && (
+            <span> {S.shownOf(count, count)}</span>
           )}
         </h2>
         <ShelvedCount disabled={kiosk} />

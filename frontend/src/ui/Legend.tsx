@@ -67,7 +67,7 @@ export function Legend({ kiosk }: { kiosk: boolean }): JSX.Element {
         <>
           <div className="legend-title">
             <strong>
-              <SensorLabel sensor={sensor} />
+              <SensorLabel sensor={sensor} most={20} />
             </strong>{' '}
             <span>{unitOf(sensor, unit)}</span>
           </div>

@@ -1,4 +1,4 @@
-import { useEffect, useState, type JSX } from 'react';
+import { useEffect, useState, type JSX, type ReactNode } from 'react';
 
 import { route } from '../contract/api';
 import { fetchSession, signOut } from '../contract/people';
@@ -17,10 +17,19 @@ import { say } from './toast';
 export function Menu(): JSX.Element {
   const close = useClose();
   const { theme, unit } = useApp((state) => state.settings);
-  const then = (action: () => void) => () => {
-    close();
-    action();
-  };
+  const entry = (label: ReactNode, action: () => void): JSX.Element => (
+    <li>
+      <button
+        type="button"
+        onClick={() => {
+          close();
+          action();
+        }}
+      >
+        {label}
+      </button>
+    </li>
+  );
   return (
     <>
       <Segmented<Settings['theme']>
@@ -48,31 +57,12 @@ export function Menu(): JSX.Element {
       />
       <LanguageChoice />
       <ul className="menu-list">
-        <li>
-          <button type="button" onClick={then(() => void copyAndSay())}>
-            {S.copyLink}
-          </button>
-        </li>
-        <li>
-          <button type="button" onClick={then(() => void saveMapOrSay())}>
-            {S.savePng}
-          </button>
-        </li>
-        <li>
-          <button type="button" onClick={then(saveTable)}>
-            {S.saveCsv}
-          </button>
-        </li>
-        <li>
-          <button
-            type="button"
-            onClick={then(() => {
-              window.print();
-            })}
-          >
-            {S.print}
-          </button>
-        </li>
+        {entry(S.copyLink, () => void copyAndSay())}
+        {entry(S.savePng, () => void saveMapOrSay())}
+        {entry(S.saveCsv, saveTable)}
+        {entry(S.print, () => {
+          window.print();
+        })}
         <li>
           <a href={reportLink()} target="_blank" rel="noopener" onClick={close}>
             {S.report}
@@ -81,11 +71,12 @@ export function Menu(): JSX.Element {
         <li>
           <a href={kioskLink()}>{S.kiosk}</a>
         </li>
-        <li>
-          <button type="button" onClick={then(openHelp)}>
+        {entry(
+          <>
             {S.help} <kbd>?</kbd>
-          </button>
-        </li>
+          </>,
+          openHelp,
+        )}
         <SignOut close={close} />
       </ul>
     </>

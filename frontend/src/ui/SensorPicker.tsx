@@ -70,11 +70,17 @@ export function SensorPicker(): JSX.Element {
 }
 
 /** In short where the name is long: the full one to be heard, and to be had by pointing at it. */
-export function SensorLabel({ sensor }: { sensor: Sensor }): JSX.Element {
-  const names: Partial<Record<string, string>> = S.sensorShort;
-  const short = Object.hasOwn(names, sensor.name) ? names[sensor.name] : undefined;
+export function SensorLabel({
+  sensor,
+  most = 0,
+}: {
+  sensor: Sensor;
+  /** A name of so many letters is none of the long ones. */
+  most?: number;
+}): JSX.Element {
   const label = shown(sensor.label, 32);
-  if (short === undefined) return <span>{label}</span>;
+  const short = shown(label.length > most ? S.sensorShort(label) : label, 24);
+  if (short === label) return <span>{label}</span>;
   return (
     <span title={label}>
       <span aria-hidden="true">{short}</span>

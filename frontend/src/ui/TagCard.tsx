@@ -34,7 +34,7 @@ import {
 import { useFetched } from '../store/fetcher';
 import { S } from '../strings';
 import { IconButton, useFocusBack } from '../widgets/controls';
-import { Age, AgeFact, useAgeStep } from './Age';
+import { Age, AgeFact, Fact, useAgeStep } from './Age';
 import { CardAlarms } from './alarms/CardAlarms';
 import { HealthMark } from './HealthMark';
 import { Sparkline } from './Sparkline';
@@ -140,68 +140,50 @@ function CardBody({
       <Comments subject={`tag:${tag.id}`} name={S.card(shown(tag.id, 24))} />
       <dl className="card-facts">
         {area !== '' && (
-          <div>
-            <dt>{S.cardArea}</dt>
-            <dd>
-              <bdi>{shown(area, 40)}</bdi>
-            </dd>
-          </div>
+          <Fact label={S.cardArea}>
+            <bdi>{shown(area, 40)}</bdi>
+          </Fact>
         )}
         <AgeFact label={S.cardScanned} when={tag.scannedAt} />
         {tag.lookedAt !== 'never' && <AgeFact label={S.cardLooked} when={tag.lookedAt} />}
         {history?.source && (
-          <div>
-            <dt>{S.cardSource}</dt>
-            <dd>
-              <bdi>{sourceText(history.source)}</bdi>
-            </dd>
-          </div>
+          <Fact label={S.cardSource}>
+            <bdi>{sourceText(history.source)}</bdi>
+          </Fact>
         )}
         {tag.failedTry && (
-          <div className="card-try">
-            <dt>{S.cardTry}</dt>
-            <dd>
-              <Age when={tag.failedTry.at} /> · {S.tried[tryKind(tag.failedTry.status)]}
-              {tag.failedTry.detail && (
-                <span className="faint"> {shown(tag.failedTry.detail, 160)}</span>
-              )}
-            </dd>
-          </div>
+          <Fact label={S.cardTry}>
+            <Age when={tag.failedTry.at} /> · {S.tried[tryKind(tag.failedTry.status)]}
+            {tag.failedTry.detail && (
+              <span className="faint"> {shown(tag.failedTry.detail, 160)}</span>
+            )}
+          </Fact>
         )}
-        <div>
-          <dt>{S.columns.species}</dt>
-          <dd>
-            {tag.species ? <bdi>{speciesText(tag.species, 40)}</bdi> : S.unclassified}
-            {tag.species && tag.speciesConfidence !== null && (
-              <span className="faint"> {S.confidence(percentText(tag.speciesConfidence))}</span>
-            )}
-            {tag.species && !tag.sureSpecies && ` (${S.notSure})`}
-          </dd>
-        </div>
-        <div>
-          <dt>{S.cardBlooms}</dt>
-          <dd>{tag.flowerCount}</dd>
-        </div>
-        <div>
-          <dt>{S.cardPosition}</dt>
-          <dd>
-            {at ? (
-              <button
-                type="button"
-                className="text-button"
-                title={S.cardShow}
-                onClick={() => {
-                  act({ pane: 'map', chartedFrom: null });
-                  commandMap({ type: 'show', tagId: tag.id });
-                }}
-              >
-                {S.position(metresText(at.x), metresText(at.y))}
-              </button>
-            ) : (
-              <span>{tag.farOff ? farOffText(tag.farOff) : S.notOnMapLong}</span>
-            )}
-          </dd>
-        </div>
+        <Fact label={S.columns.species}>
+          {tag.species ? <bdi>{speciesText(tag.species, 40)}</bdi> : S.unclassified}
+          {tag.species && tag.speciesConfidence !== null && (
+            <span className="faint"> {S.confidence(percentText(tag.speciesConfidence))}</span>
+          )}
+          {tag.species && !tag.sureSpecies && ` (${S.notSure})`}
+        </Fact>
+        <Fact label={S.cardBlooms}>{tag.flowerCount}</Fact>
+        <Fact label={S.cardPosition}>
+          {at ? (
+            <button
+              type="button"
+              className="text-button"
+              title={S.cardShow}
+              onClick={() => {
+                act({ pane: 'map', chartedFrom: null });
+                commandMap({ type: 'show', tagId: tag.id });
+              }}
+            >
+              {S.position(metresText(at.x), metresText(at.y))}
+            </button>
+          ) : (
+            <span>{tag.farOff ? farOffText(tag.farOff) : S.notOnMapLong}</span>
+          )}
+        </Fact>
       </dl>
       {history && <Tries tries={history.tries} />}
     </div>

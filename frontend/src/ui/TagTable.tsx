@@ -24,6 +24,7 @@ import { isColumnShown } from '../store/settings';
 import { S } from '../strings';
 import { Icon } from '../widgets/controls';
 import { HealthMark } from './HealthMark';
+import { SensorLabel } from './SensorPicker';
 import { TagRow } from './TagRow';
 import { partsOf, SHORT_TABLE, useChosenInSight, useHeldRows, useVisibleRows } from './visibleRows';
 
@@ -91,7 +92,7 @@ export function TagTable(): JSX.Element {
           <col
             key={sensor.name}
             className={sensor.name === chosen ? 'col-sensor' : 'col-sensor other'}
-            style={letters(longestWord(sensor.label))}
+            style={letters(longestWord(S.sensorShort(sensor.label)))}
           />
         ))}
         {has('species') && <col className="col-species" />}
@@ -246,7 +247,7 @@ const SensorHead = memo(function SensorHead({
       className={chosen ? 'number sensor chosen' : 'number sensor other'}
       style={{ '--sensor': rgbText(sensorColour(sensor)) } as CSSProperties}
     >
-      {shown(sensor.label, 24)} <span className="head-unit">{unit}</span>
+      <SensorLabel sensor={sensor} /> <span className="head-unit">{unit}</span>
     </ColumnHead>
   );
 });

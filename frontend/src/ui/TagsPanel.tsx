@@ -102,16 +102,9 @@ function FilterBar(): JSX.Element {
       <button type="button" className="text-button" title={S.saveCsv} onClick={saveTable}>
         <Icon name="download" size={18} /> <span className="csv-word">{S.saveCsvShort}</span>
       </button>
-      <TableSettings />
+      <Disclosure label={S.tableButton} button={<Icon name="columns" />} className="table-settings">
+        <WithParts>{(parts) => <parts.TableChoices />}</WithParts>
+      </Disclosure>
     </div>
-  );
-}
-
-/** Which columns the table has, and how high its rows are: kept in this browser. */
-function TableSettings(): JSX.Element {
-  return (
-    <Disclosure label={S.tableButton} button={<Icon name="columns" />} className="table-settings">
-      <WithParts>{(parts) => <parts.TableChoices />}</WithParts>
-    </Disclosure>
   );
 }

@@ -165,9 +165,7 @@ export function FrozenBanner(): JSX.Element | null {
           {S.agoSuffix(ageText(Math.max(0, now - takenAt) / 1000))}
         </span>
       )}
-      <span className="frozen-why">
-        {phase === 'offline' ? offlineReason(connection.status) : S.frozenWhy[phase]}
-      </span>
+      <span>{phase === 'offline' ? offlineReason(connection.status) : S.frozenWhy[phase]}</span>
       {phase === 'offline' && <More label={S.more} text={offlineMore(connection.status)} />}
       {isPast && <span>{S.frozenPastStays}</span>}
       {phase === 'reconnecting' && (

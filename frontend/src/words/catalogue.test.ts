@@ -111,7 +111,7 @@ const english = saidBy({ ...ENGLISH, ...ESTIMATE }, parameters);
 const SAME: Readonly<Record<string, readonly string[]>> = {
   de: [
     ...['phase.live', 'timebarLive', 'keys.time.3.1', 'themes.system', 'tried.ok', 'sensors'],
-    ...['cardPosition', 'rangeAuto', 'saveCsvShort', 'legendMore', 'sensorShort.vpd'],
+    ...['cardPosition', 'rangeAuto', 'saveCsvShort', 'legendMore'],
     ...['keys.global.12.0', 'idealParts.any', 'colourings.ideal', 'differenceTimes'],
     'densities.usual',
   ],
@@ -119,7 +119,7 @@ const SAME: Readonly<Record<string, readonly string[]>> = {
     ...['phase.live', 'timebarLive', 'keys.time.3.1', 'menu', 'tried.ok', 'sensors', 'alarmCount'],
     ...['rangeAuto', 'saveCsvShort', 'trend', 'legendMore', 'robotLayer', 'robotAt'],
     ...['keys.global.12.0', 'keys.map.3.0', 'keys.time.1.0', 'keys.time.2.0', 'keys.time.3.0'],
-    ...['speciesNames.gerbera', 'densities.compact', 'phase.offline', 'sensorShort.vpd'],
+    ...['speciesNames.gerbera', 'densities.compact', 'phase.offline'],
   ],
   es: [
     ...['robotLayer', 'robotAt', 'tried.ok', 'sensors', 'rangeAuto', 'saveCsvShort'],
@@ -207,6 +207,10 @@ describe.each([
     // Of whatever sensor: a word that agrees with one noun disagrees with another.
     const tooMuch = [words.tooLow, words.tooHigh].map((text) => text(null));
     expect(tooMuch.filter((text) => /(baj|alt)[oa]$/.test(text))).toEqual([]);
+  });
+
+  test('shortens no name that a site has given a sensor', () => {
+    for (const own of ['Leaf temperature', 'constructor']) expect(words.sensorShort(own)).toBe(own);
   });
 
   test('comes when it is asked for, and asks the page for nothing', async () => {

@@ -5,7 +5,6 @@ from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from unittest.mock import patch
 
-import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -194,6 +193,7 @@ def test_nothing_grows_with_the_days() -> None:
     assert (len(trail.gaps), len(trail.turns)) == (7, 15)
     assert len([*run.stretches.pauses()]) == 7
     assert len(run.limits) == 7
+    assert len(run.tags["a"]._log) <= 16
     assert [run.days.is_day(stamp_ns - at) for at in (0, MINUTE)] == [False, True]
 
 
@@ -214,6 +214,7 @@ def test_two_scans_raise_and_two_clear() -> None:
     (alarm,) = told(scans([22, 17, 16, 22, 16.5, 22, 22, 17]))
     at = [(at_ns - START) // MINUTE for at_ns in (alarm.raised_at_ns, alarm.cleared_at_ns or 0)]
     assert at == [2, 6]
+    assert alarm.id == "512f1a86ed4ca811ba00eed7", "the same in every process and version"
     reason = alarm.reason
     assert (reason.value, reason.limit, reason.verdict) == (16, 18, "stressed")
     assert reason.since_ns == START + MINUTE
@@ -259,33 +260,6 @@ def test_whatever_a_verdict_can_be_of_becomes_an_alarm_but_what_the_estimate_say
         ("", "stopped", ""),
     }
     assert {kind for _, kind, _ in found} == set(Kind) - {Kind.CHANGED, Kind.SILENT}
-
-
-@given(st.lists(st.floats(17.61, 18.39), min_size=2, max_size=40))
-def test_what_wobbles_about_a_limit_is_one_episode(values: list[float]) -> None:
-    assert len(told(scans([17.0, 17.0, *values]))) == 1
-
-
-@pytest.mark.parametrize(("holds_minutes", "is_overdue"), [(9, True), (10, False), (11, False)])
-def test_in_a_pause_time_stands_from_its_first_moment_on(
-    holds_minutes: int, is_overdue: bool
-) -> None:
-    """A tag whose limit runs out exactly as a pause begins is not overdue if it ends the pause."""
-    mine = scans([22])
-    other = [replace(one, number=50 + one.number) for one in scans([22] * 11, tag="b")]
-    first = START + 40 * MINUTE
-    again = replace(mine[0], number=99, stamp_ns=first)
-    heard = [*mine, *other, again]
-    follower = Follower(replace(BY, recent_s=holds_minutes * 60.0), SPANS[0])
-    follower.take(heard)
-    found = [one for one in follower.found(first).alarms if one.tag_id == "a"]
-    assert [one.reason.kind for one in found] == ["old"] * is_overdue
-    # Another tag ends the pause: from then on time passes.
-    follower = Follower(replace(BY, recent_s=600.0), SPANS[0])
-    follower.take([*mine, *other, *(replace(again, number=99 + n, tag_id="b", stamp_ns=first + n)
-                                    for n in (0, 1))])  # fmt: skip
-    (late,) = (one for one in follower.found(first + 1).alarms if one.tag_id == "a")
-    assert late.raised_at_ns == first + 1
 
 
 def test_it_says_when_it_will_be_another_by_itself() -> None:
@@ -347,35 +321,3 @@ def test_ordinary_days_raise_less_than_an_alarm_in_ten_minutes_and_none_is_false
     # Tries that failed twice in one round are not told, those that failed in two rounds are.
     (lost,) = (one for one in raised if one.reason.kind == "scan_failed")
     assert lost.raised_at_ns - (lost.reason.since_ns or 0) > 48 * MINUTE
-
-
-def test_a_second_try_in_one_round_says_no_more_than_the_first() -> None:
-    def fails(number: int, minute: float) -> PastWrite:
-        return PastWrite(number, 1, "a", START + int(minute * MINUTE), SCAN, 2)
-
-    rounds = [
-        replace(one, stamp_ns=START + 30 * index * MINUTE)
-        for index, one in enumerate(scans([22, 22, 22]))
-    ]
-    twice = [fails(10, 90), fails(11, 119.9)]
-    assert told([*rounds, *twice]) == []
-    (lost,) = told([*rounds, *twice, fails(12, 120)])
-    assert (lost.reason.kind, lost.reason.since_ns) == ("scan_failed", START + 90 * MINUTE)
-    assert lost.raised_at_ns == START + 120 * MINUTE
-    # Of what has been scanned once, and never.
-    first = replace(rounds[0], stamp_ns=START + 60 * MINUTE)
-    assert told([first, *twice]) == []
-    assert told([first, *twice, fails(12, 120)]) == [lost]
-    assert told([*twice])[0].raised_at_ns == twice[1].stamp_ns
-
-
-def test_a_tag_scanned_once_is_overdue_after_a_day() -> None:
-    others = [
-        replace(one, stamp_ns=START + 9 * index * MINUTE)
-        for index, one in enumerate(scans([22] * 162, tag="b"))
-    ]
-    once = [replace(one, number=1_000) for one in scans([22])]
-    (alarm,) = told([*once, *others])
-    assert (alarm.tag_id, alarm.reason.limit) == ("a", 86_400.0)
-    assert alarm.raised_at_ns == START + DAY_NS + 1
-    assert told([*once, *others[:-1]]) == []

@@ -9,15 +9,11 @@ MIDNIGHT_S = datetime(2026, 6, 1, tzinfo=UTC).timestamp()
 CLOCK = ClockDay(UTC)
 
 
-def lights(*readings_lx: float) -> Light:
+def light_of(*readings_lx: float) -> bool | None:
     light = Light()
     for number, reading in enumerate(readings_lx):
         light.put(f"tag_{number}", reading)
-    return light
-
-
-def light_of(*readings_lx: float) -> bool | None:
-    return lights(*readings_lx).is_day
+    return light.is_day
 
 
 def test_light_goes_before_the_clock() -> None:
@@ -38,11 +34,6 @@ def test_a_broken_sensor_does_not_decide() -> None:
 def test_the_limit_itself_is_day() -> None:
     assert judge_day(light_of(DAY_FROM_LX), None, None).is_day
     assert not judge_day(light_of(DAY_FROM_LX - 0.1), None, None).is_day
-
-
-def test_with_nothing_to_go_by_it_is_day_and_that_is_said() -> None:
-    assert judge_day(light_of(), None, NOON_S) == Day(True, "assumed")
-    assert judge_day(light_of(), CLOCK, None) == Day(True, "assumed")
 
 
 @pytest.mark.parametrize(
@@ -94,12 +85,3 @@ def test_the_nights_of_a_period(
     for hour in range(from_h, to_h):
         is_night = any(dusk <= hour < dawn for dusk, dawn in nights)
         assert clock.is_day(MIDNIGHT_S + hour * 3600) is not is_night
-
-
-def test_a_tag_has_one_say_its_last() -> None:
-    light = lights(0.0, 900.0, 0.0)
-    told = [light.is_day]
-    for tag_id, reading in (("tag_0", 900.0), ("tag_0", None), ("tag_1", None), ("tag_2", None)):
-        light.put(tag_id, reading)
-        told.append(light.is_day)
-    assert told == [False, True, True, False, None]

@@ -48,12 +48,6 @@ def test_dry_air_has_no_dew_point(humidity: float) -> None:
     assert math.isnan(dew_point_c(20.0, humidity))
 
 
-@given(st.floats(), st.floats())
-def test_every_pair_of_numbers_has_an_answer(temperature_c: float, humidity: float) -> None:
-    for derived in DERIVED.values():
-        assert isinstance(derived.formula(temperature_c, humidity), float)
-
-
 def test_a_sensor_that_reads_a_little_high_in_saturated_air_is_taken_for_saturated() -> None:
     assert vapour_pressure_deficit_kpa(20.0, 100.4) == 0.0
     assert dew_point_c(20.0, 105.0) == pytest.approx(20.0)

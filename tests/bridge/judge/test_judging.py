@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from lupin_bridge.judge.day import Day
-from lupin_bridge.judge.judging import MAX_AT_ONCE, Judge, Judged, judge_once, silenced
+from lupin_bridge.judge.judging import MAX_AT_ONCE, Judge, Judged, judge_once
 from lupin_bridge.judge.scans import Patrol
 from lupin_bridge.judge.sensors_file import parse
 from lupin_bridge.judge.verdict import Health, Kind, Reason, Verdict, judge_tag
@@ -22,20 +22,12 @@ from lupin_twin.core.state import (
     TwinStore,
     sure_species,
 )
-from tests.support.seen import BY_LIGHT
+from tests.support.seen import BY_LIGHT, tag
 
 SENSORS = parse(files("lupin_bridge").joinpath("sensors.json").read_text(encoding="utf-8"))
 S = 1_000_000_000
 MINUTE = 60 * S
 START = 1_000_000 * S
-
-
-def tag(tag_id: str, at_ns: int, **values: float) -> TagState:
-    return TagState(
-        tag_id,
-        readings=tuple(Reading(name, value, at_ns) for name, value in values.items()),
-        last_observed_ns=at_ns,
-    )
 
 
 def snapshot(now_ns: int, *tags: TagState) -> Snapshot:
@@ -62,15 +54,6 @@ def test_nothing_that_stays_is_told_again() -> None:
     assert judge.see(snapshot(START + S, GOOD, COLD)) is first
 
 
-def test_only_who_has_changed_is_told() -> None:
-    judge = Judge(BY_LIGHT)
-    first = judge.see(snapshot(START, GOOD, COLD))
-    warm = tag("b", START + MINUTE, temperature=20.0)
-    then = judge.see(snapshot(START + MINUTE, GOOD, warm))
-    assert others(first, then) == {"b"}
-    assert then.house.verdict is Verdict.HEALTHY
-
-
 def test_time_alone_makes_readings_old() -> None:
     judge = Judge(BY_LIGHT)
     judge.learn([scan("a", START - MINUTE, temperature=22.0)])
@@ -85,6 +68,10 @@ def test_time_alone_makes_readings_old() -> None:
 
 def test_scanned_once_a_tag_has_a_day_as_it_has_for_alarms() -> None:
     judge, day = Judge(BY_LIGHT), 24 * 60 * MINUTE
+    judge.see(snapshot(START, GOOD, COLD))
+    judge.learn([scan("b", START - day, temperature=6.0)])  # and no interval makes it longer
+    judge.see(snapshot(START, GOOD, COLD))
+    assert judge.holds_ns() == {"a": day, "b": day}
     judge.see(snapshot(START, GOOD))
     assert judge.see(snapshot(START + day, GOOD)).tags["a"].verdict is Verdict.HEALTHY
     assert judge.see(snapshot(START + day + 1, GOOD)).tags["a"].verdict is Verdict.UNKNOWN
@@ -139,18 +126,6 @@ def test_the_patrols_rhythm_says_how_long_readings_hold() -> None:
 def scan(tag_id: str, at_ns: int, **values: float) -> PastWrite:
     names, numbers = tuple(values), tuple(values.values())
     return PastWrite(at_ns, 1, tag_id, at_ns, 0, 0, names, numbers)
-
-
-def test_what_was_scanned_before_makes_a_rhythm_too() -> None:
-    judge = Judge(BY_LIGHT)
-    old = tag("a", START, temperature=22.0)
-    hours = 3600 * S
-    before = [scan(name, START - back * hours, temperature=9.0) for name in ("a", "gone")
-              for back in (2, 1)]  # fmt: skip
-    judge.see(snapshot(START, old))
-    judge.learn(before)
-    judge.see(snapshot(START, old))
-    assert judge.holds_ns() == {"a": 3 * hours}
 
 
 def test_after_a_restart_the_patrol_has_the_interval_that_it_had_before() -> None:
@@ -222,15 +197,6 @@ def test_a_reason_that_lasts_keeps_its_beginning() -> None:
     assert (reason.value, reason.since_ns) == (6.5, START)
 
 
-def test_silence_makes_the_house_unknown_and_leaves_the_tags() -> None:
-    judged = Judge(BY_LIGHT).see(snapshot(START, GOOD))
-    assert judged.house.verdict is Verdict.HEALTHY
-    silent = silenced(judged)
-    assert silent.house.verdict is Verdict.UNKNOWN
-    assert [reason.kind for reason in silent.house.reasons] == [Kind.SILENT]
-    assert silent.tags == judged.tags
-
-
 def test_as_of_a_moment_a_tag_that_cannot_be_judged_is_unknown_and_the_others_are_judged(
     monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
@@ -276,15 +242,6 @@ def test_what_the_house_is_doing_is_told_beside_its_verdict() -> None:
     # A clock that goes back has nothing of what is still to come.
     begun = tag("b", START, temperature=22.0)
     assert judge.see(snapshot(START, begun)).patrol == Patrol(None, START, 0)
-
-
-def test_a_tag_that_is_gone_is_forgotten() -> None:
-    judge = Judge(BY_LIGHT)
-    judge.see(snapshot(START, GOOD, COLD))
-    gone = judge.see(snapshot(START + S, GOOD))
-    assert gone.tags.keys() == {"a"}
-    assert gone.tags.keys() == {"a"}
-    assert gone.house.verdict is Verdict.HEALTHY
 
 
 VALUES = st.dictionaries(
@@ -417,15 +374,14 @@ def test_a_first_round_that_stops_is_not_healthy_for_a_day() -> None:
 def writes_of(*tags: TagState) -> list[PastWrite]:
     """The scans of these states, as the log has them."""
     return [
-        PastWrite(
-            number,
-            1,
-            one.tag_id,
-            one.last_observed_ns or 0,
-            0,
-            0,
-            tuple(reading.name for reading in one.readings),
-            tuple(reading.value for reading in one.readings),
-        )
-        for number, one in enumerate(tags, start=1)
+        scan(one.tag_id, one.last_observed_ns or 0, **{it.name: it.value for it in one.readings})
+        for one in tags
     ]
+
+
+def test_a_tag_that_is_gone_is_forgotten() -> None:
+    judge = Judge(BY_LIGHT)
+    judge.see(snapshot(START, GOOD, COLD))
+    gone = judge.see(snapshot(START + S, GOOD))
+    assert gone.tags.keys() == {"a"}
+    assert gone.house.verdict is Verdict.HEALTHY

@@ -13,6 +13,7 @@ from lupin_bridge.judge.quantities import Ranges, Span
 from lupin_bridge.judge.sensors_file import MAX_TEXT, Language, SensorsError, parse
 from lupin_twin.core.past import PastWrite
 
+OURS = files("lupin_bridge").joinpath("sensors.json").read_text(encoding="utf-8")
 GOOD: dict[str, Any] = {
     "ramp": {"saturation": 72, "max_alpha": 0.6},
     "fallback": {"label": "", "unit": "", "hue": 265, "lightness": 50, "ideal": None},
@@ -31,6 +32,9 @@ GOOD: dict[str, Any] = {
 }
 
 
+PLAIN = json.dumps(GOOD)
+
+
 def text_with(path: str, value: Any) -> str:
     """The good file, indented, with one value replaced."""
     table = json.loads(json.dumps(GOOD))
@@ -46,40 +50,25 @@ def text_with(path: str, value: Any) -> str:
 
 
 def test_the_file_that_comes_with_the_bridge_is_good() -> None:
-    text = files("lupin_bridge").joinpath("sensors.json").read_text(encoding="utf-8")
-    sensors = parse(text)
-    assert sensors.text == text
+    sensors = parse(OURS)
+    assert (sensors.text, sensors.max_alpha) == (OURS, 0.6)
     assert sensors.named("temperature").unit == "°C"
     assert sensors.named("light").night == Ranges(None, None)
     assert {"vpd", "dew_point"} <= sensors.by_name.keys()
 
 
 def test_every_judged_sensor_of_it_has_a_source_and_what_is_measured_can_be_plausible() -> None:
-    text = files("lupin_bridge").joinpath("sensors.json").read_text(encoding="utf-8")
-    for name, entry in json.loads(text)["sensors"].items():
+    for name, entry in json.loads(OURS)["sensors"].items():
         assert re.search(r"(19|20)\d\d", entry["source"]), name
         assert ("plausible" in entry) is not ("derived" in entry), name
-    temperature = parse(text).named("temperature")
+    temperature = parse(OURS).named("temperature")
     assert [temperature.is_plausible(value) for value in (-300.0, -40.0, 80.0, 80.1)] == (
         [False, True, True, False]
     )
-    nobody = parse(text).named("ph")
+    nobody = parse(OURS).named("ph")
     assert [nobody.is_plausible(value) for value in (1e9, float("nan"), float("-inf"))] == (
         [True, False, False]
     )
-
-
-@pytest.mark.parametrize(
-    ("path", "value", "why"),
-    [
-        ("plausible", [80, -40], "low must be less than high"),
-        ("plausible", "any", "plausible: Input should be a valid array"),
-        ("source", 5, "source: Input should be a valid string"),
-    ],
-)
-def test_what_is_wrong_with_limits_and_sources_is_told(path: str, value: Any, why: str) -> None:
-    with pytest.raises(SensorsError, match=re.escape(why)):
-        parse(text_with(f"sensors/temperature/{path}", value))
 
 
 def test_the_file_says_what_is_derived() -> None:
@@ -102,15 +91,9 @@ def test_the_file_says_what_is_derived() -> None:
 
 
 def test_every_sensor_has_a_hue_of_its_own() -> None:
-    text = files("lupin_bridge").joinpath("sensors.json").read_text(encoding="utf-8")
-    hues = [sensor.hue for sensor in parse(text).by_name.values()]
+    hues = [sensor.hue for sensor in parse(OURS).by_name.values()]
     # 20 degrees apart, around the circle: colours that a person can tell from one another.
     assert all(20 <= abs(a - b) <= 340 for a, b in itertools.combinations(hues, 2))
-
-
-def test_the_ramp_ends_at_60_percent() -> None:
-    text = files("lupin_bridge").joinpath("sensors.json").read_text(encoding="utf-8")
-    assert parse(text).max_alpha == 0.6
 
 
 def test_day_night_and_species_have_their_own_ranges() -> None:
@@ -147,12 +130,9 @@ def test_a_sensor_that_nobody_declared_is_never_judged() -> None:
         ("sensors/temperature/label", ..., "temperature.label: Field required"),
         ("sensors/temperature/label", "x" * (MAX_TEXT + 1), "should have at most 64 characters"),
         ("sensors/temperature/unit", 5, "unit: Input should be a valid string, not 5"),
-        ("sensors/temperature/ideal", [26, 18], "ideal is [26.0, 18.0], and low must be less than"),
         ("sensors/temperature/ideal", [18, 18], "ideal is [18.0, 18.0], and low must be less than"),
         ("sensors/temperature/ideal", [18], "temperature.ideal.1: Field required"),
-        ("sensors/temperature/ideal", "warm", "temperature.ideal: Input should be a valid array"),
         ("sensors/temperature/critical", [19, 35], "is [19.0, 35.0], inside ideal [18.0, 26.0]"),
-        ("sensors/temperature/critical", [10, 25], "is [10.0, 25.0], inside ideal [18.0, 26.0]"),
         ("sensors/temperature/ideal", None, "critical is given, but no ideal range"),
         ("sensors/temperature/night", [1, 2], "night: Input should be an object, not [1, 2]"),
         ("sensors/temperature/night", {}, "night.ideal: Field required"),
@@ -166,14 +146,11 @@ def test_a_sensor_that_nobody_declared_is_never_judged() -> None:
         ("sensors/temperature/ideal", [-1e9, 1.1e9], "less than or equal to 1000000000, not 11000"),
         ("sensors/temperature/labels", ["Kas"], "labels: Input should be an object, not ['Kas']"),
         ("sensors/temperature/labels", {"xx": "?"}, "Input should be 'de', 'es' or 'nl'"),
-        (
-            "sensors/temperature/labels",
-            {"de": 7},
-            "labels.de: Input should be a valid string, not 7",
-        ),
-        ("sensors/temperature/labels", {"de": "x" * (MAX_TEXT + 1)}, "at most 64 characters"),
         ("sensors/temperature/labels", {"nl": ""}, "labels.nl: String should have at least 1 char"),
         ("sensors", [], "sensors: Input should be an object, not []"),
+        ("sensors/temperature/plausible", [80, -40], "low must be less than high"),
+        ("sensors/temperature/source", 5, "source: Input should be a valid string"),
+        ("areas", {"North bay": "1"}, "areas.North bay"),
         (
             "sensors/temperature/unit",
             "\ud83c",
@@ -200,14 +177,8 @@ def test_the_widest_and_the_narrowest_ranges_are_judged_by(ideal: list[float]) -
     assert {alarm.worst for alarm in episodes.alarms()} == {-1e300, 1e308}
 
 
-@pytest.mark.parametrize("labels", [{}, {"nl": "Warmte"}, {"de": "x" * MAX_TEXT, "es": "a"}])
-def test_labels_in_other_languages_may_be_given(labels: dict[str, str]) -> None:
-    assert parse(text_with("sensors/temperature/labels", labels)).named("temperature").label
-
-
 def test_the_file_that_comes_with_the_bridge_speaks_all_languages() -> None:
-    text = files("lupin_bridge").joinpath("sensors.json").read_text(encoding="utf-8")
-    sensors = json.loads(text)["sensors"]
+    sensors = json.loads(OURS)["sensors"]
     silent = {
         name
         for name, told in sensors.items()
@@ -216,28 +187,23 @@ def test_the_file_that_comes_with_the_bridge_speaks_all_languages() -> None:
     assert silent == {"co2"}  # a formula
 
 
-@pytest.mark.parametrize("text", ["", "{", '{"ramp": }', "[", "\ufeff{}"])
-def test_what_is_no_json_is_refused_with_its_line(text: str) -> None:
-    with pytest.raises(SensorsError, match=r"Invalid JSON: .* at line 1 column"):
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ("", r"Invalid JSON: .* at line 1 column"),
+        ("\ufeff{}", r"Invalid JSON: .* at line 1 column"),
+        (PLAIN.replace("265", "NaN"), r"fallback\.hue: Input should be a finite number"),
+        (
+            json.dumps(GOOD).replace("265", "9" * 5_000),
+            r"Invalid JSON: number out of range at line",
+        ),
+        ('{"ramp":' * 100_000, "recursion limit exceeded"),
+    ],
+    ids=["nothing", "a mark", "no number", "a long number", "nested"],
+)
+def test_what_is_no_json_is_refused_with_its_line(text: str, says: str) -> None:
+    with pytest.raises(SensorsError, match=says):
         parse(text)
-
-
-@pytest.mark.parametrize("number", ["NaN", "Infinity", "-Infinity"])
-def test_numbers_are_those_of_json(number: str) -> None:
-    with pytest.raises(SensorsError, match=r"fallback\.hue: Input should be a finite number"):
-        parse(json.dumps(GOOD).replace("265", number))
-
-
-def test_a_number_of_any_length_is_refused_by_name() -> None:
-    text = json.dumps(GOOD, indent=1).replace("265", "9" * 5_000)
-    with pytest.raises(SensorsError, match=r"Invalid JSON: number out of range at line \d+"):
-        parse(text)
-
-
-@pytest.mark.parametrize("opening", ["[", '{"ramp":'])
-def test_what_is_nested_without_end_is_refused(opening: str) -> None:
-    with pytest.raises(SensorsError, match="recursion limit exceeded"):
-        parse(opening * 100_000)
 
 
 def test_what_is_wrong_is_one_line_whatever_a_name_has_in_it() -> None:
@@ -246,7 +212,6 @@ def test_what_is_wrong_is_one_line_whatever_a_name_has_in_it() -> None:
     assert str(refused.value) == "sensors.a\\n\\x1b[2Jb.ideal: Field required"
 
 
-def test_areas_are_lists_of_tags() -> None:
+def test_areas_are_lists_of_tags_and_labels_may_be_in_other_languages() -> None:
     assert parse(text_with("areas", {"North bay": ["1", "A*"]})).by_name
-    with pytest.raises(SensorsError, match=r"areas\.North bay"):
-        parse(text_with("areas", {"North bay": "1"}))
+    assert parse(text_with("sensors/temperature/labels", {"de": "x" * MAX_TEXT})).by_name

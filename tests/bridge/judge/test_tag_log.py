@@ -41,16 +41,3 @@ def test_what_comes_in_order_is_gone_through_once_and_what_is_late_from_a_mark_o
     past.judge_anew(60 * S)
     assert list(past.episodes.alarms()) == []
     assert len(asked) == 5 * MARK + 2
-
-
-def test_what_is_over_is_forgotten() -> None:
-    past = tag()
-    for number, at_s in enumerate((0, 2_000, 4_000, 6_000)):
-        past.add(write(number, at_s, light=900.0 * (number % 2)))
-    assert past.forget(4_000 * S) == 2_000 * S
-    assert [gap.start_ns // S for gap in past.gaps] == [2_000, 4_000, 6_000]
-    assert past.trail.turns == ((4_000 * S, False), (6_000 * S, True))
-    assert past.forget(9_000 * S) == 6_000 * S
-    left = past.trail
-    assert (left.gaps, len(left.turns)) == ((), 1)
-    assert not past.add(write(9, 6_000))

@@ -12,7 +12,7 @@ import pytest
 from lupin_bridge.judge.day import Day
 from lupin_bridge.judge.scans import RecentScans
 from lupin_bridge.judge.sensors_file import parse
-from lupin_bridge.judge.verdict import Health, Kind, Verdict, judge_site, judge_tag, worst
+from lupin_bridge.judge.verdict import Health, Kind, Verdict, judge_site, judge_tag
 from lupin_twin.core.state import NO_FLOWER, Attempt, Flower, Reading, TagState
 
 CASES = json.loads(Path(__file__).with_name("verdicts.json").read_text(encoding="utf-8"))
@@ -103,15 +103,3 @@ def test_a_house_is_its_worst_tag_and_unknown_where_most_tags_are(
     tags: list[str], house: str
 ) -> None:
     assert judge_site(Counter(map(Verdict, tags)), is_silent=False).verdict == house
-
-
-def test_of_a_silent_twin_nothing_is_known() -> None:
-    judged = judge_site({Verdict.HEALTHY: 1}, is_silent=True)
-    assert judged.verdict is Verdict.UNKNOWN
-    assert [reason.kind for reason in judged.reasons] == [Kind.SILENT]
-
-
-def test_critical_is_the_worst_and_healthy_the_best() -> None:
-    assert worst(Verdict) is Verdict.CRITICAL
-    assert worst([Verdict.HEALTHY, Verdict.UNKNOWN]) is Verdict.UNKNOWN
-    assert worst([]) is None

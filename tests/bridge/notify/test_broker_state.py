@@ -1,17 +1,20 @@
 """What a broker has to be told: what is new, once, and the newest of it."""
 
 import json
+import math
 from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from lupin_bridge.alarms.board import Board
 from lupin_bridge.judge.verdict import Health, Verdict
-from lupin_bridge.notify.messages import GreenhouseState, Topics
+from lupin_bridge.notify.messages import GreenhouseState, Topics, reading_payload
 from lupin_bridge.notify.mqtt import Mirror
+from lupin_twin.core.state import Reading
 from tests.support.seen import HOLDS_NS, NOW_NS, SENSORS, S, alarm, seen, tag
 
 
@@ -198,3 +201,21 @@ def test_however_it_comes_the_broker_knows_the_newest(
     assert {topic: payload for topic, payload in knows.items() if topic in fresh} == fresh
     rest = {topic for topic in knows if topic not in fresh and knows[topic] is not None}
     assert not {topic for topic in rest if topic.startswith("homeassistant/")}
+
+
+@pytest.mark.parametrize(
+    ("reading", "now_ns", "value"),
+    [
+        (Reading("temperature", 21.5, NOW_NS - HOLDS_NS), NOW_NS, 21.5),
+        (Reading("temperature", 21.5, NOW_NS - HOLDS_NS - 1), NOW_NS, None),
+        (Reading("temperature", 21.5, NOW_NS + S), NOW_NS, 21.5),
+        (Reading("temperature", 21.5, None), NOW_NS, None),
+        (Reading("temperature", math.nan, NOW_NS), NOW_NS, None),
+        (Reading("temperature", math.inf, NOW_NS), NOW_NS, None),
+    ],
+)
+def test_what_failed_or_does_not_hold_any_more_is_not_known(
+    reading: Reading, now_ns: int | None, value: float | None
+) -> None:
+    sensor = SENSORS.named("temperature")
+    assert reading_payload(reading, sensor, HOLDS_NS, now_ns)["value"] == value

@@ -12,7 +12,7 @@ from lupin_bridge.notify.destinations import Targets
 from lupin_bridge.notify.messages import GreenhouseState
 from lupin_bridge.settings import Secrets, Settings
 from lupin_twin.core.diagnostics import Origin
-from tests.support.mosquitto import Broker, free_port
+from tests.support.mosquitto import Broker
 from tests.support.receiver import receiver, status
 from tests.support.seen import NOW_NS, SENSORS, Alarms, alarm, seen, tag
 from tests.support.waiting import until
@@ -36,56 +36,38 @@ class House:
         return seen(tag("a", temperature=20.0))
 
 
-def test_where_nobody_wants_to_be_told_nothing_is_started() -> None:
-    async def run() -> None:
-        channels = Channels()
-        before = len(asyncio.all_tasks())
-        channels.start(House(), SENSORS)
-        assert len(asyncio.all_tasks()) == before
-        assert channels.status() == {}
-        assert {name: dict(counts) for name, counts in channels.counts()} == {
-            f"lupin_outward_{what}": {}
-            for what in ("connected", "waiting", "sent", "failed", "dropped")
-        }
-        await channels.stop()
-
-    asyncio.run(run())
+async def test_where_nobody_wants_to_be_told_nothing_is_started() -> None:
+    channels = Channels()
+    before = len(asyncio.all_tasks())
+    channels.start(House(), SENSORS)
+    assert len(asyncio.all_tasks()) == before
+    assert channels.status() == {}
+    assert {name: dict(counts) for name, counts in channels.counts()} == {
+        f"lupin_outward_{what}": {}
+        for what in ("connected", "waiting", "sent", "failed", "dropped")
+    }
+    await channels.stop()
 
 
-def test_one_that_fails_is_told_and_the_other_goes_on(tmp_path: Path) -> None:
-    async def run(webhook_port: int) -> None:
-        broker = Broker(tmp_path)
-        settings = Settings(
-            mqtt_url=broker.url, webhook_url=f"http://127.0.0.1:{webhook_port}/hook"
-        )
-        channels = Channels(Targets.of(settings, Secrets(webhook_secret="s" * 16)))
-        channels.start(House(), SENSORS)
-        try:
-            await until(lambda: channels.status()["mqtt"], "the broker's absence")
-            await until(lambda: dict(channels.counts())["lupin_outward_sent"]["webhook"], "a post")
-            assert channels.status() == {
-                "mqtt": f"[Errno 111] Connection refused ({broker.url})",
-                "webhook": "",
-            }
-            counts = dict(channels.counts())
-            assert counts["lupin_outward_connected"] == {"mqtt": 0, "webhook": 1}
-            assert counts["lupin_outward_failed"]["mqtt"] >= 1
-            assert counts["lupin_outward_waiting"]["mqtt"] == 2
-        finally:
-            await channels.stop()
-
+async def test_one_that_fails_is_told_and_the_other_goes_on(tmp_path: Path) -> None:
+    broker = Broker(tmp_path)
     with receiver(status(200)) as server:
-        asyncio.run(run(server.port))
-    assert server.posted[0].json["origin"] == House.origin
-
-
-def test_a_name_that_is_looked_up_does_not_hold_up_the_end() -> None:
-    async def run() -> None:
-        settings = Settings(webhook_url=f"http://127.0.0.1:{free_port()}")
+        hook = f"http://127.0.0.1:{server.port}/hook"
+        settings = Settings(mqtt_url=broker.url, webhook_url=hook)
         channels = Channels(Targets.of(settings, Secrets(webhook_secret="s" * 16)))
         channels.start(House(), SENSORS)
+        # A name that is looked up does not hold up the end.
         pool = asyncio.get_running_loop()._default_executor  # type: ignore[attr-defined]
         assert type(pool) is not ThreadPoolExecutor
+        await until(lambda: channels.status()["mqtt"], "the broker's absence")
+        await until(lambda: dict(channels.counts())["lupin_outward_sent"]["webhook"], "a post")
+        assert channels.status() == {
+            "mqtt": f"[Errno 111] Connection refused ({broker.url})",
+            "webhook": "",
+        }
+        counts = dict(channels.counts())
+        assert counts["lupin_outward_connected"] == {"mqtt": 0, "webhook": 1}
+        assert counts["lupin_outward_failed"]["mqtt"] >= 1
+        assert counts["lupin_outward_waiting"]["mqtt"] == 2
         await channels.stop()
-
-    asyncio.run(run())
+    assert server.posted[0].json["origin"] == House.origin

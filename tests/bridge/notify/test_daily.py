@@ -311,8 +311,5 @@ def test_an_hour_that_is_none_is_refused(text: str) -> None:
     settings = Settings(report_at=text, webhook_url=f"http://127.0.0.1:{free_port()}/")
     with pytest.raises(SettingError, match="must be from 00:00 to 23:59"):
         Targets.of(settings, SECRETS)
-
-
-def test_an_hour_without_a_channel_is_refused() -> None:
     with pytest.raises(SettingError, match="has no use"):
         Targets.of(Settings(report_at="06:00"), Secrets())

@@ -13,8 +13,8 @@ from lupin_bridge.notify.destinations import Targets, WebhookTarget
 from lupin_bridge.notify.webhook import MAX_HEAD_BYTES, PostError, post
 from lupin_bridge.settings import Secrets, Settings
 from tests.support.mosquitto import free_port
-from tests.support.receiver import Posted, receiver, silence, status
-from tests.support.tls import Certificate, certificate
+from tests.support.receiver import Posted, receiver, status
+from tests.support.tls import certificate
 
 
 def target(url: str, ca: str = "") -> WebhookTarget:
@@ -62,19 +62,12 @@ def test_any_other_status_is_none_and_a_redirect_is_not_followed(code: int) -> N
 
 def test_nobody_there_is_told_in_the_systems_words() -> None:
     assert refusal(f"http://127.0.0.1:{free_port()}/") == "Connection refused"
+    assert refusal("http://a..b/") == "its host is no name that can be looked up"
 
 
-def test_no_answer_in_time_is_none() -> None:
-    with receiver(silence) as server:
-        assert refusal(f"http://127.0.0.1:{server.port}/", 0.05) == "no answer within 0.05 s"
-
-
-def test_an_answer_that_trickles_has_the_same_time() -> None:
-    def trickle(_: Posted) -> Iterator[bytes | None]:
-        yield b"HTTP/1.1 200 OK\r\nX: "
-        yield None
-
-    with receiver(trickle) as server:
+@pytest.mark.parametrize("begin", [b"", b"HTTP/1.1 200 OK\r\nX: "])
+def test_no_answer_in_time_is_none_and_nor_is_a_part_of_one(begin: bytes) -> None:
+    with receiver(lambda _: iter([begin, None])) as server:
         assert refusal(f"http://127.0.0.1:{server.port}/", 0.05) == "no answer within 0.05 s"
 
 
@@ -126,29 +119,20 @@ def test_what_is_said_before_the_answer_is_none() -> None:
         sent(f"http://127.0.0.1:{server.port}/")
 
 
-def test_a_wish_to_be_left_alone_that_is_no_number_is_none() -> None:
-    with receiver(status(503, "Retry-After: Wed, 21 Oct 2026 07:28:00 GMT")) as server:
-        assert said(server.port) == (503, 0)
-
-
-def test_one_of_thousands_of_digits_is_a_long_one() -> None:
-    with receiver(status(503, "Retry-After: " + "9" * 5_000)) as server:
-        assert said(server.port) == (503, 999_999_999)
-
-
-def test_a_host_that_is_no_name_is_told() -> None:
-    assert refusal("http://a..b/") == "its host is no name that can be looked up"
-
-
-def served(made: Certificate) -> ssl.SSLContext:
-    context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
-    context.load_cert_chain(made.cert, made.key)
-    return context
+@pytest.mark.parametrize(
+    ("wish", "told_s"),
+    [("Wed, 21 Oct 2026 07:28:00 GMT", 0), ("9" * 5_000, 999_999_999)],
+)
+def test_a_wish_to_be_left_alone_is_a_number(wish: str, told_s: int) -> None:
+    with receiver(status(503, f"Retry-After: {wish}")) as server:
+        assert said(server.port) == (503, told_s)
 
 
 def test_https_is_trusted_by_its_authority_alone(tmp_path: Path) -> None:
     made = certificate(tmp_path)
-    with receiver(status(200), tls=served(made)) as server:
+    context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
+    context.load_cert_chain(made.cert, made.key)
+    with receiver(status(200), tls=context) as server:
         url = f"https://127.0.0.1:{server.port}/"
         assert "certificate verify failed" in refusal(url)
         ca = tmp_path / "ca.pem"
@@ -157,19 +141,14 @@ def test_https_is_trusted_by_its_authority_alone(tmp_path: Path) -> None:
     assert len(server.posted) == 1
 
 
-def test_a_connection_that_is_reset_is_told() -> None:
+async def test_a_connection_that_is_reset_is_told() -> None:
     with socket.create_server(("127.0.0.1", 0)) as listener:
+        listener.setblocking(False)
         url = f"http://127.0.0.1:{listener.getsockname()[1]}/"
-
-        async def reset() -> None:
-            loop = asyncio.get_running_loop()
-            listener.setblocking(False)
-            sending = asyncio.create_task(post(target(url), {}, b"{}", 60.0, 60.0))
-            client, _ = await loop.sock_accept(listener)
-            # Closed with a time of 0, it is reset (socket(7)).
-            client.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
-            client.close()
-            with pytest.raises(PostError):
-                await sending
-
-        asyncio.run(reset())
+        sending = asyncio.create_task(post(target(url), {}, b"{}", 60.0, 60.0))
+        client, _ = await asyncio.get_running_loop().sock_accept(listener)
+        # Closed with a time of 0, it is reset (socket(7)).
+        client.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
+        client.close()
+        with pytest.raises(PostError):
+            await sending

@@ -2,7 +2,6 @@
 
 import asyncio
 import socket
-import threading
 from collections.abc import AsyncIterator, Iterator
 from contextlib import asynccontextmanager, suppress
 from pathlib import Path
@@ -75,23 +74,17 @@ def shared(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Broker]:
         yield broker
 
 
-def test_a_broker_is_told_of_the_house_and_of_what_is_new(shared: Broker) -> None:
-    async def run(heard: Subscriber) -> None:
-        house = House()
-        house.now = seen(tag("a", temperature=20.0), alarms=(alarm("a"),))
+async def test_a_broker_is_told_of_the_house_and_of_what_is_new(shared: Broker) -> None:
+    house = House()
+    house.now = seen(tag("a", temperature=20.0), alarms=(alarm("a"),))
+    with Subscriber(shared) as heard:
         async with telling(shared, house) as channel:
             await told(heard, 20.0)
             await until(lambda: heard.last("lt/tags/a/alarms"), "the alarm")
             await told(heard, house.scan())
             await until(lambda: channel.condition.waiting == 0, "the rest")
-            assert channel.condition.is_connected
-            assert channel.condition.sent > 10
-            assert channel.condition.failed == 0
-        # Its good-bye.
+            assert (channel.condition.is_connected, channel.condition.failed) == (True, 0)
         await until(lambda: heard.of("lt/status")[-1:] == [b"offline"], "the good-bye")
-
-    with Subscriber(shared) as heard:
-        asyncio.run(run(heard))
     assert heard.last(READING)["observed_at"] == "2026-11-21T14:15:01.000000000Z"
     assert heard.last(CONFIG)["state_topic"] == READING
     assert heard.last("lt/tags/a/alarms")["state"] == "OFF"
@@ -100,77 +93,48 @@ def test_a_broker_is_told_of_the_house_and_of_what_is_new(shared: Broker) -> Non
     assert {message.qos for message in heard.heard} == {1}
 
 
-def test_nothing_is_retained_but_the_status_of_tags_that_are_gone_neither(shared: Broker) -> None:
-    async def run() -> None:
-        house = House()
-        house.now = seen(tag("a", temperature=20.0), tag("gone", temperature=20.0))
-        async with telling(shared, house) as channel:
-            await until(lambda: channel.condition.sent > 14, "all of it")
-            await until(lambda: channel.condition.waiting == 0, "all of it")
-            with Subscriber(shared) as heard:
-                house.now = seen(tag("a", temperature=20.0))
-                gone = CONFIG.replace("tag_a_", "tag_gone_")
-                await until(lambda: heard.of(gone) == [b""], "the end of its entity")
-            with Subscriber(shared) as late:
-                # Told in order: who has this has all that was retained.
-                late.say("marker", "x")
-                await until(lambda: late.of("marker"), "the marker")
-                assert {it.topic: it.payload for it in late.heard if it.retain} == {
-                    "lt/status": b"online"
-                }
-
-    asyncio.run(run())
+async def test_nothing_is_retained_but_the_status_of_tags_that_are_gone_neither(
+    shared: Broker,
+) -> None:
+    house = House()
+    house.now = seen(tag("a", temperature=20.0), tag("gone", temperature=20.0))
+    async with telling(shared, house) as channel:
+        await until(lambda: channel.condition.sent > 14, "all of it")
+        await until(lambda: channel.condition.waiting == 0, "all of it")
+        with Subscriber(shared) as heard:
+            house.now = seen(tag("a", temperature=20.0))
+            gone = CONFIG.replace("tag_a_", "tag_gone_")
+            await until(lambda: heard.of(gone) == [b""], "the end of its entity")
+        with Subscriber(shared) as late:
+            # Told in order: who has this has all that was retained.
+            late.say("marker", "x")
+            await until(lambda: late.of("marker"), "the marker")
+            retained = {it.topic: it.payload for it in late.heard if it.retain}
+            assert retained == {"lt/status": b"online"}
 
 
-def test_at_home_assistants_birth_everything_is_told_again(
+async def test_at_home_assistants_birth_everything_is_told_again(
     shared: Broker, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(mqtt, "REPEAT_S", 0.1)
-
-    async def run() -> None:
-        house = House()
-        async with telling(shared, house) as channel:
-            await until(lambda: channel.condition.sent > 1, "the first time")
-            await until(lambda: channel.condition.waiting == 0, "the first time")
-            with Subscriber(shared) as later:
-                later.say("homeassistant/status", "offline")
-                later.say("homeassistant/status", "online")
-                await told(later, 20.0)
-                await until(lambda: later.last("lt/tags/a/health"), "the verdict")
-                assert later.last(CONFIG)["expire_after"] == 600
-
-    asyncio.run(run())
+    async with telling(shared, House()) as channel:
+        await until(lambda: channel.condition.sent > 1, "the first time")
+        await until(lambda: channel.condition.waiting == 0, "the first time")
+        with Subscriber(shared) as later:
+            later.say("homeassistant/status", "offline")
+            later.say("homeassistant/status", "online")
+            await told(later, 20.0)
+            await until(lambda: later.last("lt/tags/a/health"), "the verdict")
+            assert later.last(CONFIG)["expire_after"] == 600
 
 
-def test_who_says_that_it_is_gone_is_contradicted(
+async def test_a_flood_of_good_byes_and_births_is_answered_once_in_a_while(
     shared: Broker, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The will of the process before, or the good-bye of another one, may come late."""
-    monkeypatch.setattr(mqtt, "STATUS_S", 0.1)
-
-    async def run(heard: Subscriber) -> None:
-        async with telling(shared, House()) as channel:
-            await until(lambda: channel.condition.sent > 1, "the connection")
-            await until(lambda: heard.of("lt/status")[-1:] == [b"online"], "that it is there")
-            # The test before has left a good-bye that was followed by the same.
-            before = len(heard.of("lt/status"))
-            heard.say("lt/status", "offline", retain=True)
-            await until(
-                lambda: heard.of("lt/status")[before:][-2:] == [b"offline", b"online"],
-                "that it is there",
-            )
-
-    with Subscriber(shared) as heard:
-        asyncio.run(run(heard))
-
-
-def test_a_flood_of_good_byes_and_births_is_answered_once_in_a_while(
-    shared: Broker, monkeypatch: pytest.MonkeyPatch
-) -> None:
     for name in ("STATUS_S", "REPEAT_S"):
         monkeypatch.setattr(mqtt, name, 2.0)
-
-    async def run(heard: Subscriber) -> None:
+    with Subscriber(shared) as heard:
         async with telling(shared, House()) as channel:
             await until(lambda: channel.condition.sent > 10, "the first time")
             await until(lambda: heard.of("lt/status")[-1:] == [b"online"], "that it has come")
@@ -186,11 +150,8 @@ def test_a_flood_of_good_byes_and_births_is_answered_once_in_a_while(
             assert said.count(b"online") <= 3
             assert channel.condition.sent <= 3 * sent
 
-    with Subscriber(shared) as heard:
-        asyncio.run(run(heard))
 
-
-def test_a_broker_that_sends_a_packet_of_256_mb_is_left_before_it_is_read() -> None:
+async def test_a_broker_that_sends_a_packet_of_256_mb_is_left_before_it_is_read() -> None:
     """As none does that was asked for less; before the connection is over, it is in no memory."""
     taken: list[int] = []
 
@@ -204,105 +165,81 @@ def test_a_broker_that_sends_a_packet_of_256_mb_is_left_before_it_is_read() -> N
             while taken[0] < 256_000_000:
                 taken[0] += client.send(bytes(1 << 20))
 
-    async def run(port: int) -> None:
-        target = Targets.of(Settings(mqtt_url=f"mqtt://127.0.0.1:{port}"), Secrets()).mqtt
-        assert target is not None
-        channel = Mqtt(target, Mirror(target.topics, SENSORS), PATIENCE_S, answer_s=2.0)
-        channel.start(House().look)
-        await until(lambda: channel.condition.failed, "the end of the connection")
-        await channel.stop()
-
     with socket.create_server(("127.0.0.1", 0)) as listener:
-        thread = threading.Thread(target=serve, args=(listener,))
-        thread.start()
-        asyncio.run(run(listener.getsockname()[1]))
-        thread.join()
+        serving = asyncio.create_task(asyncio.to_thread(serve, listener))
+        broker = Broker(Path(), listener.getsockname()[1])
+        async with telling(broker, House(), answer_s=2.0) as channel:
+            await until(lambda: channel.condition.failed, "the end of the connection")
+        await serving
     assert taken[0] < 32_000_000, "what the sockets of the two hold, and no more"
 
 
-def test_two_bridges_of_one_prefix_do_not_throw_each_other_out(shared: Broker) -> None:
-    async def run() -> None:
-        async with telling(shared, House()) as one, telling(shared, House()) as two:
-            await until(lambda: one.condition.sent > 10, "what the one tells")
-            await until(lambda: two.condition.sent > 10, "what the other tells")
-            assert (one.condition.failed, two.condition.failed) == (0, 0)
-
-    asyncio.run(run())
+async def test_two_bridges_of_one_prefix_do_not_throw_each_other_out(shared: Broker) -> None:
+    async with telling(shared, House()) as one, telling(shared, House()) as two:
+        await until(lambda: one.condition.sent > 10, "what the one tells")
+        await until(lambda: two.condition.sent > 10, "what the other tells")
+        assert (one.condition.failed, two.condition.failed) == (0, 0)
 
 
-def test_a_broker_that_is_absent_comes_and_is_killed_knows_the_newest(tmp_path: Path) -> None:
-    broker = Broker(tmp_path)
-
-    async def run() -> None:
-        house = House()
-        async with telling(broker, house) as channel:
-            await until(lambda: channel.condition.failed > 2, "some tries")
-            assert channel.condition.detail == f"[Errno 111] Connection refused ({broker.url})"
-            for _ in range(2):
-                with broker.running() as process, Subscriber(broker) as heard:
-                    house.scan()
-                    await told(heard, house.scan())
-                    assert channel.condition.detail == ""
-                    process.kill()
-                await until(lambda: not channel.condition.is_connected, "the end of the broker")
+async def test_a_broker_that_is_absent_comes_and_is_killed_knows_the_newest(
+    tmp_path: Path,
+) -> None:
+    broker, house = Broker(tmp_path), House()
+    async with telling(broker, house) as channel:
+        await until(lambda: channel.condition.failed > 2, "some tries")
+        assert channel.condition.detail == f"[Errno 111] Connection refused ({broker.url})"
+        for _ in range(2):
+            with broker.running() as process, Subscriber(broker) as heard:
                 house.scan()
-            await until(lambda: channel.condition.waiting == 2, "the tag and the house")
+                await told(heard, house.scan())
+                assert channel.condition.detail == ""
+                process.kill()
+            await until(lambda: not channel.condition.is_connected, "the end of the broker")
+            house.scan()
+        await until(lambda: channel.condition.waiting == 2, "the tag and the house")
 
-    asyncio.run(run())
+
+async def test_a_broker_that_hangs_is_tried_anew_and_told_the_newest(tmp_path: Path) -> None:
+    broker, house = Broker(tmp_path), House()
+    with broker.running() as process:
+        async with telling(broker, house, answer_s=0.3) as channel:
+            with Subscriber(broker) as heard:
+                await told(heard, 20.0)
+            process.freeze()
+            house.scan()
+            failed = channel.condition.failed
+            # Once in what it was told, and then without being let in at all.
+            await until(lambda: channel.condition.failed > failed + 2, "some tries")
+            assert not channel.condition.is_connected
+            last = house.scan()
+            process.thaw()
+            with Subscriber(broker) as heard:
+                await told(heard, last)
+                await until(lambda: channel.condition.is_connected, "the connection")
 
 
-def test_a_broker_that_hangs_is_tried_anew_and_told_the_newest(tmp_path: Path) -> None:
+async def test_it_ends_at_once_while_a_broker_hangs(tmp_path: Path) -> None:
     broker = Broker(tmp_path)
-
-    async def run() -> None:
-        house = House()
-        with broker.running() as process:
-            async with telling(broker, house, answer_s=0.3) as channel:
-                with Subscriber(broker) as heard:
-                    await told(heard, 20.0)
-                process.freeze()
-                house.scan()
-                failed = channel.condition.failed
-                # Once in what it was told, and then without being let in at all.
-                await until(lambda: channel.condition.failed > failed + 2, "some tries")
-                assert not channel.condition.is_connected
-                last = house.scan()
-                process.thaw()
-                with Subscriber(broker) as heard:
-                    await told(heard, last)
-                    await until(lambda: channel.condition.is_connected, "the connection")
-
-    asyncio.run(run())
-
-
-def test_it_ends_at_once_while_a_broker_hangs(tmp_path: Path) -> None:
-    broker = Broker(tmp_path)
-
-    async def run(process: Any) -> None:
+    with broker.running() as process:
         async with telling(broker, House()) as channel:
             await until(lambda: channel.condition.sent > 10, "the connection")
             process.freeze()
             async with asyncio.timeout(PATIENCE_S / 4):  # what it waits for may take a minute
                 await channel.stop()
 
-    with broker.running() as process:
-        asyncio.run(run(process))
-
 
 # What of a handshake that fails, paho leaves its socket to be collected.
 @pytest.mark.filterwarnings("ignore:.*ssl.SSLSocket:pytest.PytestUnraisableExceptionWarning")
-def test_a_password_and_an_authority_are_what_a_broker_asks_for(tmp_path: Path) -> None:
+async def test_a_password_and_an_authority_are_what_a_broker_asks_for(tmp_path: Path) -> None:
     made = certificate(tmp_path)
     ca = tmp_path / "ca.pem"
     made.authority.cert_pem.write_to_path(str(ca))
     broker = Broker(tmp_path, certificate=made, wants_password=True)
-    known = Secrets(mqtt_password=PASSWORD)
-
-    async def run() -> None:
-        given: dict[str, Any] = {"mqtt_user": USER, "mqtt_ca": str(ca)}
+    known, wrong = Secrets(mqtt_password=PASSWORD), Secrets(mqtt_password="wrong")
+    given: dict[str, Any] = {"mqtt_user": USER, "mqtt_ca": str(ca)}
+    with broker.running():
         async with telling(broker, House(), secrets=known, **given) as channel:
             await until(lambda: channel.condition.sent > 10, "all of it")
-        wrong = Secrets(mqtt_password="wrong")
         async with telling(broker, House(), secrets=wrong, **given) as channel:
             await until(lambda: channel.condition.failed > 0, "the refusal")
             assert "Not authorized" in channel.condition.detail
@@ -310,6 +247,3 @@ def test_a_password_and_an_authority_are_what_a_broker_asks_for(tmp_path: Path) 
         async with telling(broker, House(), secrets=known, mqtt_user=USER) as channel:
             await until(lambda: channel.condition.failed > 0, "the refusal")
             assert "certificate verify failed" in channel.condition.detail
-
-    with broker.running():
-        asyncio.run(run())

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import asyncio
 import json
 import re
 import ssl
 import stat
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import AsyncIterator, Iterator, Sequence
+from contextlib import asynccontextmanager, contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import SimpleNamespace
@@ -21,19 +20,24 @@ from cryptography.hazmat.primitives.asymmetric import ec
 from cryptography.hazmat.primitives.serialization import Encoding, PublicFormat
 from py_vapid import Vapid02
 
+from lupin_bridge.access.accounts import Device
+from lupin_bridge.access.people import People
 from lupin_bridge.alarms.board import AlarmBoard, Change, page_of
 from lupin_bridge.judge.episodes import Alarm
+from lupin_bridge.judge.judging import Criteria
+from lupin_bridge.notify import push as push_module
 from lupin_bridge.notify.destinations import PushTarget
 from lupin_bridge.notify.messages import Backoff, Condition
 from lupin_bridge.notify.push import FIRST_WAIT_S, MOST_WAIT_S, TRIES, Push, encoded
 from lupin_bridge.notify.webhook import PostError, until_taken
+from lupin_bridge.settings import Settings
 from tests.support.access import refused_start
 from tests.support.messages import look
 from tests.support.people import OWN, TOKEN, add, changing, remove, signed_in
 from tests.support.processes import constants
 from tests.support.receiver import Answer, Posted, Receiver, receiver, status
-from tests.support.seen import NOW_NS, S, alarm
-from tests.support.tls import certificate
+from tests.support.seen import NOW_NS, Alarms, S, alarm
+from tests.support.tls import Certificate, certificate
 from tests.support.waiting import PATIENCE_S, until, wait_for
 from tests.support.web import Bridge, bridge
 
@@ -71,9 +75,8 @@ class Phone:
 
 @dataclass
 class Stage:
-    """A bridge with people, and a push service."""
+    """A push service, and the accounts whose browsers are notified by it."""
 
-    live: Bridge
     service: Receiver
     accounts: Path
 
@@ -84,144 +87,136 @@ class Stage:
         path = phone.endpoint.partition(str(self.service.port))[2]
         return [it for it in self.service.posted if it.path == path]
 
+    def devices(self) -> list[Device]:
+        with changing(self.accounts) as accounts:
+            return accounts.devices("")
+
 
 @contextmanager
-def stage(folder: Path, *answers: Answer) -> Iterator[Stage]:
-    ours = certificate(folder)
-    authority = folder / "ca.pem"
-    ours.authority.cert_pem.write_to_path(str(authority))
-    accounts = folder / "accounts.sqlite"
+def push_service(folder: Path, *answers: Answer) -> Iterator[tuple[Stage, Certificate]]:
+    ours, accounts = certificate(folder), folder / "accounts.sqlite"
     add(accounts, anna="operator", bert="viewer")
-    add(accounts, "token", scada="admin")
     context = ssl.create_default_context(ssl.Purpose.CLIENT_AUTH)
     context.load_cert_chain(ours.cert, ours.key)
-    options = ("--accounts", str(accounts), "--push-contact", CONTACT)
-    private = ("--push-private-host", "localhost", "--ros-args", "-p", "journal:=off")
-    with (
-        receiver(*(answers or (status(201),)), tls=context) as service,
-        bridge(
-            *SOON, *options, *private, SSL_CERT_FILE=str(authority), LUPIN_TOKEN=f"shared-{TOKEN}"
-        ) as live,
-    ):
-        live.peer.wait_for_twin()
-        bearer = {"Authorization": f"Bearer {TOKEN}"}
-        # What is active at the start is nothing new.
-        wait_for(
-            lambda: live.get("/api/alarms", bearer).json()["source"] != "starting", "the alarms"
-        )
-        yield Stage(live, service, accounts)
+    with receiver(*(answers or (status(201),)), tls=context) as service:
+        yield Stage(service, accounts), ours
 
 
-def subscribe(browser: httpx.Client, phone: Phone, language: str = "en") -> None:
-    headers = {"Accept-Language": language}
-    answer = browser.post("/api/push", json=phone.subscription, headers=headers)
-    assert answer.status_code == 204, answer.text
+# --- Push alone ---------------------------------------------------------------------------------
 
 
-def test_a_critical_alarm_reaches_those_phones_alone_that_may_have_it_and_until_they_may_not(
-    tmp_path: Path,
-) -> None:
-    with stage(tmp_path) as on:
-        annas, berts, gones = on.phone("anna"), on.phone("bert"), on.phone("gone")
-        add(on.accounts, gone="viewer")
-        with signed_in(on.live.url, "anna") as anna, signed_in(on.live.url, "bert") as bert:
-            key = anna.get("/api/push").json()["public_key"]
-            subscribe(anna, annas)
-            subscribe(bert, berts, "de-AT, en;q=0.5")
-            with signed_in(on.live.url, "gone") as gone:
-                subscribe(gone, gones)
-            remove(on.accounts, "gone")
-            on.live.peer.observe(look("7", anomaly=True, bug_count=2))
-            wait_for(lambda: on.posted_to(annas) and on.posted_to(berts), "both messages")
-            [to_anna], [to_bert] = on.posted_to(annas), on.posted_to(berts)
-            assert annas.read(to_anna) == {"title": "Alarm", "body": "Tag 7: Pest seen (critical)"}
-            assert berts.read(to_bert)["body"] == "Messpunkt 7: Schädlinge festgestellt (kritisch)"
-            assert (to_anna.headers["ttl"], to_anna.headers["content-encoding"]) == (
-                *("3600", "aes128gcm"),
-            )
-            authorization = to_anna.headers["authorization"]
-            assert authorization.endswith(f"k={key}")
-            assert Vapid02.verify(authorization)
-            bert.post("/api/push", json={"endpoint": berts.endpoint})
-            on.live.peer.observe(look("8", anomaly=True, bug_count=1))
-            wait_for(lambda: len(on.posted_to(annas)) == 2, "the next one")
-            assert annas.read(on.posted_to(annas)[1])["body"].startswith("Tag 8:")
-        assert len(on.posted_to(berts)) == 1
-        assert not on.posted_to(gones), "their account has gone"
-        modes = {stat.S_IMODE(it.stat().st_mode) for it in tmp_path.glob("accounts.sqlite*")}
-        assert modes == {0o600}, "the key is in it"
+@dataclass
+class Pushing(Stage):
+    """Push without a bridge: what it does with each answer, in a hurry."""
+
+    push: Push
+    board: Alarms
+
+    def subscribe(self, phone: Phone) -> None:
+        keys = phone.subscription["keys"]
+        device = Device(phone.endpoint, keys["p256dh"], keys["auth"], "en")
+        with changing(self.accounts) as accounts:
+            accounts.add_device("anna", device, "", 0)
 
 
-def test_a_phone_that_the_push_service_knows_no_more_is_forgotten_and_a_busy_one_is_tried_again(
+@asynccontextmanager
+async def pushing(folder: Path, *answers: Answer) -> AsyncIterator[Pushing]:
+    with push_service(folder, *answers) as (on, ours), pytest.MonkeyPatch.context() as patch:
+        patch.setattr(push_module, "TOGETHER_S", 0.0)
+        patch.setattr(push_module, "FIRST_WAIT_S", 0.05)
+        target = PushTarget(CONTACT, frozenset({"localhost"}), ours.trust)
+        push, board = Push(target, People(on.accounts), ""), Alarms()
+        push.start(source_of(board))
+        try:
+            yield Pushing(on.service, on.accounts, push, board)
+        finally:
+            await push.stop()
+
+
+def source_of(board: AlarmBoard) -> Any:
+    return SimpleNamespace(
+        alarms=board,
+        notes=SimpleNamespace(notes=()),
+        origin="robot",
+        ros_time_ns=NOW_NS,
+        criteria=Criteria.of(Settings()),
+    )
+
+
+async def test_a_phone_that_is_known_no_more_is_forgotten_and_a_busy_one_is_tried_again(
     tmp_path: Path,
 ) -> None:
     elsewhere = "Location: https://localhost/"
     answers = (status(503), status(410), status(302, elsewhere), status(201))
-    with stage(tmp_path, *answers) as on, signed_in(on.live.url, "anna") as anna:
+    async with pushing(tmp_path, *answers) as on:
         phone = on.phone("one")
-        subscribe(anna, phone)
-        on.live.peer.observe(look("7", anomaly=True, bug_count=2))
-
-        def is_forgotten() -> bool:
-            with changing(on.accounts) as accounts:
-                return not accounts.devices("")
-
-        wait_for(is_forgotten, "410")
+        on.subscribe(phone)
+        on.board.show([alarm("7")])
+        await until(lambda: not on.devices(), "410")
         assert len(on.service.posted) == 2
-        subscribe(anna, phone)
-        on.live.peer.observe(look("8", anomaly=True, bug_count=2))
-        wait_for(lambda: len(on.service.posted) == 4, "the one that is sent elsewhere, again")
+        on.subscribe(phone)
+        on.board.show([alarm("7"), alarm("8")])
+        await until(lambda: len(on.service.posted) == 4, "the one that is sent elsewhere, again")
         assert phone.read(on.service.posted[3])["body"].startswith("Tag 8:")
 
 
-def test_while_the_accounts_cannot_be_read_a_message_waits(tmp_path: Path) -> None:
-    with stage(tmp_path, status(503), status(201)) as on, signed_in(on.live.url, "anna") as anna:
-        subscribe(anna, on.phone("one"))
-        aside = on.accounts.with_name("aside")
-        on.accounts.rename(aside)
-        on.live.peer.observe(look("7", anomaly=True, bug_count=2))
-        on.live.process.wait_for_output("was not taken: the file of accounts")
-        aside.rename(on.accounts)
-        wait_for(lambda: on.service.posted, "the first attempt")
-        on.accounts.rename(aside)
-        on.live.process.wait_for_output("will be retried: the file of accounts")
-        aside.rename(on.accounts)
-        wait_for(lambda: len(on.service.posted) == 2, "the next attempt")
+async def test_while_the_accounts_cannot_be_read_a_message_waits(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    accounts, aside = tmp_path / "accounts.sqlite", tmp_path / "aside"
+
+    def busy(posted: Posted) -> Iterator[bytes | None]:
+        accounts.rename(aside)
+        yield from status(503)(posted)
+
+    async with pushing(tmp_path, busy, status(201)) as on:
+        on.subscribe(on.phone("one"))
+        accounts.rename(aside)
+        on.board.show([alarm("7")])
+        await until(lambda: "was not taken: the file of accounts" in caplog.text, "why")
+        aside.rename(accounts)
+        await until(lambda: on.service.posted, "the first attempt")
+        await until(lambda: "will be retried: the file of accounts" in caplog.text, "why")
+        aside.rename(accounts)
+        await until(lambda: len(on.service.posted) == 2, "the next attempt")
 
 
-def test_a_phone_that_is_switched_off_meanwhile_is_not_tried_again(tmp_path: Path) -> None:
-    answers = (status(503, "Retry-After: 3"), status(201))
-    bearer = {"Authorization": f"Bearer {TOKEN}"}
-    with stage(tmp_path, *answers) as on, signed_in(on.live.url, "anna") as anna:
-        one, other = on.phone("one"), on.phone("other")
-        subscribe(anna, one)
-        on.live.peer.observe(look("7", anomaly=True, bug_count=2))
-        wait_for(lambda: on.service.posted, "the first try")
-        with changing(on.accounts) as accounts:
+async def test_a_phone_that_is_switched_off_meanwhile_is_not_tried_again(tmp_path: Path) -> None:
+    def switched_off(posted: Posted) -> Iterator[bytes | None]:
+        with changing(tmp_path / "accounts.sqlite") as accounts:
             accounts.remove_device(one.endpoint)
-        nobody = 'lupin_outward_waiting{channel="push"} 0.0'
-        wait_for(lambda: nobody in on.live.get("/metrics", bearer).text, "the end of its tries")
-        subscribe(anna, other)
-        on.live.peer.observe(look("8", anomaly=True, bug_count=2))
-        wait_for(lambda: on.posted_to(other), "the next alarm")
+        yield from status(503)(posted)
+
+    async with pushing(tmp_path, switched_off, status(201)) as on:
+        one, other = on.phone("one"), on.phone("other")
+        on.subscribe(one)
+        on.board.show([alarm("7")])
+        await until(lambda: on.service.posted, "the first try")
+        await until(lambda: on.push.condition.waiting == 0, "the end of its tries")
+        on.subscribe(other)
+        on.board.show([alarm("7"), alarm("8")])
+        await until(lambda: on.posted_to(other), "the next alarm")
         assert len(on.posted_to(one)) == 1
 
 
-def test_a_push_service_that_wants_to_be_left_alone_holds_up_no_other_phone(tmp_path: Path) -> None:
-    answers = (status(503, "Retry-After: 60"), status(201))
-    with stage(tmp_path, *answers) as on, signed_in(on.live.url, "anna") as anna:
+async def test_a_push_service_that_wants_to_be_left_alone_holds_up_no_other_phone(
+    tmp_path: Path,
+) -> None:
+    async with pushing(tmp_path, status(503, "Retry-After: 60"), status(201)) as on:
         phones = [on.phone("one"), on.phone("two")]
         for phone in phones:
-            subscribe(anna, phone)
-        on.live.peer.observe(look("7", anomaly=True, bug_count=2))
-        wait_for(lambda: len(on.service.posted) == 2, "a try of each")
-        on.live.peer.observe(look("8", anomaly=True, bug_count=2))
-        wait_for(lambda: len(on.service.posted) == 3, "the next alarm")
+            on.subscribe(phone)
+        on.board.show([alarm("7")])
+        await until(lambda: len(on.service.posted) == 2, "a try of each")
+        on.board.show([alarm("7"), alarm("8")])
+        await until(lambda: len(on.service.posted) == 3, "the next alarm")
         [both] = [phone for phone in phones if len(on.posted_to(phone)) == 2]
         assert both.read(on.posted_to(both)[1])["body"].startswith("Tag 8:")
 
 
-def test_without_internet_for_half_an_hour_nothing_is_lost(monkeypatch: pytest.MonkeyPatch) -> None:
+async def test_without_internet_for_half_an_hour_nothing_is_lost(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     now_s = 0.0
 
     async def sleep(for_s: float) -> None:
@@ -234,11 +229,12 @@ def test_without_internet_for_half_an_hour_nothing_is_lost(monkeypatch: pytest.M
 
     monkeypatch.setattr("lupin_bridge.notify.webhook.asyncio.sleep", sleep)
     backoff, condition = Backoff(FIRST_WAIT_S, MOST_WAIT_S), Condition()
-    sent = until_taken(attempt, condition, backoff, "an alarm", "push.example", most_tries=TRIES)
-    assert asyncio.run(sent)
+    assert await until_taken(
+        attempt, condition, backoff, "an alarm", "push.example", most_tries=TRIES
+    )
 
 
-def test_an_alarm_that_is_raised_while_the_log_is_read_at_the_start_is_new(
+async def test_an_alarm_that_is_raised_while_the_log_is_read_at_the_start_is_new(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     notified: list[str] = []
@@ -246,36 +242,96 @@ def test_an_alarm_that_is_raised_while_the_log_is_read_at_the_start_is_new(
     async def notify(_: Push, alarms: Sequence[Alarm], __: Any) -> None:
         notified.extend(it.tag_id for it in alarms)
 
-    async def test() -> None:
-        board = AlarmBoard()
-        source: Any = SimpleNamespace(
-            alarms=board, notes=SimpleNamespace(notes=()), origin="robot", ros_time_ns=None
-        )
-        push = Push(PushTarget(CONTACT, frozenset(), ssl.create_default_context()), None, "")  # type: ignore[arg-type]
-        push.start(source)
-        source.ros_time_ns = NOW_NS + 1
-
-        def put(change: Change) -> None:
-            board.put(page_of(change.changed), change, "journal", 0)
-
-        before, meanwhile = alarm("before", raised_ns=NOW_NS - 9 * S), alarm("meanwhile")
-        put(Change((before, meanwhile), is_past=True))
-        await until(lambda: notified == ["meanwhile"], "what is new")
-        # The log is read again, as another journal is begun.
-        put(Change((before, meanwhile, alarm("again")), is_past=True))
-        put(Change((alarm("later"),)))
-        await until(lambda: notified == ["meanwhile", "later"], "the next one")
-        await push.stop()
-
     monkeypatch.setattr(Push, "_notify", notify)
-    monkeypatch.setattr("lupin_bridge.notify.push.TOGETHER_S", 0.0)
-    asyncio.run(test())
+    monkeypatch.setattr(push_module, "TOGETHER_S", 0.0)
+    board = AlarmBoard()
+    source = source_of(board)
+    source.ros_time_ns = None
+    push = Push(PushTarget(CONTACT, frozenset(), ssl.create_default_context()), None, "")  # type: ignore[arg-type]
+    push.start(source)
+    source.ros_time_ns = NOW_NS + 1
+
+    def put(change: Change) -> None:
+        board.put(page_of(change.changed), change, "journal", 0)
+
+    before, meanwhile = alarm("before", raised_ns=NOW_NS - 9 * S), alarm("meanwhile")
+    put(Change((before, meanwhile), is_past=True))
+    await until(lambda: notified == ["meanwhile"], "what is new")
+    # The log is read again, as another journal is begun.
+    put(Change((before, meanwhile, alarm("again")), is_past=True))
+    put(Change((alarm("later"),)))
+    await until(lambda: notified == ["meanwhile", "later"], "the next one")
+    await push.stop()
+
+
+# --- a bridge -----------------------------------------------------------------------------------
+
+
+@dataclass
+class Live(Stage):
+    """A bridge with people."""
+
+    live: Bridge
 
 
 @pytest.fixture(scope="module")
-def open_to(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Stage]:
-    with stage(tmp_path_factory.mktemp("push")) as on:
-        yield on
+def open_to(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Live]:
+    folder = tmp_path_factory.mktemp("push")
+    with push_service(folder) as (on, ours):
+        authority = folder / "ca.pem"
+        ours.authority.cert_pem.write_to_path(str(authority))
+        add(on.accounts, "token", scada="admin")
+        options = ("--accounts", str(on.accounts), "--push-contact", CONTACT)
+        private = ("--push-private-host", "localhost", "--ros-args", "-p", "journal:=off")
+        trusts: Any = {"SSL_CERT_FILE": str(authority), "LUPIN_TOKEN": f"shared-{TOKEN}"}
+        with bridge(*SOON, *options, *private, **trusts) as live:
+            live.peer.wait_for_twin()
+            bearer = {"Authorization": f"Bearer {TOKEN}"}
+            # What is active at the start is nothing new.
+            wait_for(
+                lambda: live.get("/api/alarms", bearer).json()["source"] != "starting", "the alarms"
+            )
+            yield Live(on.service, on.accounts, live)
+
+
+def subscribe(browser: httpx.Client, phone: Phone, language: str = "en") -> None:
+    headers = {"Accept-Language": language}
+    answer = browser.post("/api/push", json=phone.subscription, headers=headers)
+    assert answer.status_code == 204, answer.text
+
+
+def test_a_critical_alarm_reaches_those_phones_alone_that_may_have_it_and_until_they_may_not(
+    open_to: Live,
+) -> None:
+    on = open_to
+    annas, berts, gones = on.phone("anna"), on.phone("bert"), on.phone("gone")
+    add(on.accounts, gone="viewer")
+    with signed_in(on.live.url, "anna") as anna, signed_in(on.live.url, "bert") as bert:
+        key = anna.get("/api/push").json()["public_key"]
+        subscribe(anna, annas)
+        subscribe(bert, berts, "de-AT, en;q=0.5")
+        with signed_in(on.live.url, "gone") as gone:
+            subscribe(gone, gones)
+        remove(on.accounts, "gone")
+        on.live.peer.observe(look("7", anomaly=True, bug_count=2))
+        wait_for(lambda: on.posted_to(annas) and on.posted_to(berts), "both messages")
+        [to_anna], [to_bert] = on.posted_to(annas), on.posted_to(berts)
+        assert annas.read(to_anna) == {"title": "Alarm", "body": "Tag 7: Pest seen (critical)"}
+        assert berts.read(to_bert)["body"] == "Messpunkt 7: Schädlinge festgestellt (kritisch)"
+        assert to_anna.headers["ttl"] == "3600"
+        assert to_anna.headers["content-encoding"] == "aes128gcm"
+        authorization = to_anna.headers["authorization"]
+        assert authorization.endswith(f"k={key}")
+        assert Vapid02.verify(authorization)
+        bert.post("/api/push", json={"endpoint": berts.endpoint})
+        on.live.peer.observe(look("8", anomaly=True, bug_count=1))
+        wait_for(lambda: len(on.posted_to(annas)) == 2, "the next one")
+        assert annas.read(on.posted_to(annas)[1])["body"].startswith("Tag 8:")
+        anna.post("/api/push", json={"endpoint": annas.endpoint})
+    assert len(on.posted_to(berts)) == 1
+    assert not on.posted_to(gones), "their account has gone"
+    modes = {stat.S_IMODE(it.stat().st_mode) for it in on.accounts.parent.glob("accounts.sqlite*")}
+    assert modes == {0o600}, "the key is in it"
 
 
 @pytest.mark.parametrize(
@@ -283,9 +339,7 @@ def open_to(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Stage]:
     [
         "http://push.example/x",
         "https://127.0.0.1/x",
-        "https://[::1]/x",
         "https://[::ffff:10.0.0.1]/x",
-        "https://10.0.0.1/x",
         "https://169.254.169.254/latest/meta-data",
         "https://intranet/x",
         "https://push.example:22/x",
@@ -295,11 +349,10 @@ def open_to(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Stage]:
         "https://push.example/\r\nX: y",
         f"https://push.example/{'x' * 1_000}",
         "https://localhost:99999/x",
-        "file:///etc/passwd",
         "",
     ],
 )
-def test_an_address_that_no_push_service_has_is_refused(open_to: Stage, endpoint: str) -> None:
+def test_an_address_that_no_push_service_has_is_refused(open_to: Live, endpoint: str) -> None:
     with signed_in_once(open_to) as anna:
         answer = anna.post("/api/push", json=Phone(endpoint).subscription)
     assert (answer.status_code, "endpoint" in answer.json()["detail"]) == (400, True), answer.text
@@ -308,7 +361,7 @@ def test_an_address_that_no_push_service_has_is_refused(open_to: Stage, endpoint
 _anna: list[httpx.Cookies] = []
 
 
-def signed_in_once(on: Stage) -> httpx.Client:
+def signed_in_once(on: Live) -> httpx.Client:
     if not _anna:
         with signed_in(on.live.url, "anna") as browser:
             _anna.append(browser.cookies)
@@ -320,7 +373,7 @@ def signed_in_once(on: Stage) -> httpx.Client:
 @pytest.mark.parametrize(
     ("name", "value"), [("p256dh", "BAAA"), ("p256dh", "*"), ("auth", "AAAA"), ("auth", "ä")]
 )
-def test_a_key_that_is_none_is_refused(open_to: Stage, name: str, value: str) -> None:
+def test_a_key_that_is_none_is_refused(open_to: Live, name: str, value: str) -> None:
     given = open_to.phone("x").subscription
     given["keys"][name] = value
     with signed_in_once(open_to) as anna:
@@ -330,18 +383,18 @@ def test_a_key_that_is_none_is_refused(open_to: Stage, name: str, value: str) ->
 
 @pytest.mark.parametrize("host", ["127.1", "0x7f.0.0.1"])
 def test_a_name_that_leads_into_a_private_network_is_posted_nothing(
-    open_to: Stage, host: str
+    open_to: Live, host: str
 ) -> None:
     """What it leads to is looked at before each post, and connected to."""
     phone = Phone(f"https://{host}/x")
     with signed_in_once(open_to) as anna:
-        before = count(anna, "dropped")
+        before, posted = count(anna, "dropped"), len(open_to.service.posted)
         subscribe(anna, phone)
         open_to.live.peer.observe(look(f"at {host}", anomaly=True, bug_count=2))
         wait_for(lambda: count(anna, "dropped") == before + 1, "that it is given up")
         assert "is no public address" in anna.get("/readyz").text + open_to.live.process.output
         anna.post("/api/push", json={"endpoint": phone.endpoint})
-    assert open_to.service.posted == []
+    assert len(open_to.service.posted) == posted
 
 
 def count(client: httpx.Client, what: str) -> int:
@@ -354,7 +407,7 @@ def count(client: httpx.Client, what: str) -> int:
     return int(float(found[1]))
 
 
-def test_who_has_no_account_is_notified_of_nothing(open_to: Stage) -> None:
+def test_who_has_no_account_is_notified_of_nothing(open_to: Live) -> None:
     given = open_to.phone("x").subscription
     for token in (TOKEN, f"shared-{TOKEN}"):
         headers = {**OWN, "Authorization": f"Bearer {token}"}
@@ -365,7 +418,7 @@ def test_who_has_no_account_is_notified_of_nothing(open_to: Stage) -> None:
 
 
 def test_of_one_person_so_many_browsers_are_notified_and_the_trail_has_each_once(
-    open_to: Stage,
+    open_to: Live,
 ) -> None:
     def added() -> int:
         with changing(open_to.accounts) as accounts:
@@ -376,8 +429,7 @@ def test_of_one_person_so_many_browsers_are_notified_and_the_trail_has_each_once
         for number in range(12):
             subscribe(anna, open_to.phone(f"many{number}"))
             subscribe(anna, open_to.phone(f"many{number}"))
-    with changing(open_to.accounts) as accounts:
-        assert len(accounts.devices("")) == 10
+    assert len(open_to.devices()) == 10
     assert added() == before + 12
 
 

@@ -1,23 +1,22 @@
-"""The webhook and a real receiver: refusing, hanging, slow, failing, and then taking all of it."""
+"""The webhook and a real receiver: refusing, slow, failing, and then taking all of it."""
 
 import asyncio
 from collections.abc import AsyncIterator, Callable, Iterator
 from contextlib import asynccontextmanager
 from dataclasses import replace
-from functools import partial
 from types import SimpleNamespace
 from typing import Any
 
 import pytest
 
-from lupin_bridge.notify import webhook as webhook_module
+from lupin_bridge.judge.episodes import Alarm
 from lupin_bridge.notify.destinations import Targets
-from lupin_bridge.notify.webhook import MAX_REFUSALS, MAX_WAITING, ORIGIN_S, Delivery, Webhook, post
+from lupin_bridge.notify.webhook import MAX_REFUSALS, MAX_WAITING, ORIGIN_S, Delivery, Webhook
 from lupin_bridge.settings import Secrets, Settings
 from lupin_twin.core.diagnostics import Origin
 from tests.support.docs import block_named
 from tests.support.mosquitto import free_port
-from tests.support.receiver import Answer, Posted, Receiver, receiver, silence, status
+from tests.support.receiver import Answer, Posted, receiver, silence, status
 from tests.support.seen import NOW_NS, Alarms, S, alarm
 from tests.support.waiting import PATIENCE_S, until
 
@@ -28,16 +27,17 @@ A, B = alarm("a"), alarm("b", raised_ns=NOW_NS + S)
 @asynccontextmanager
 async def telling(
     port: int,
-    board: Alarms,
+    *alarms: Alarm,
     origin: Callable[[], Origin] = lambda: "simulated",
     origin_s: float = ORIGIN_S,
     first_wait_s: float = 0.001,
-) -> AsyncIterator[Webhook]:
-    """A webhook that is in a hurry."""
+) -> AsyncIterator[tuple[Webhook, Alarms]]:
+    """A webhook that is in a hurry, and the board of alarms that it looks at."""
     settings = Settings(webhook_url=f"http://127.0.0.1:{port}/hook")
     target = Targets.of(settings, Secrets(webhook_secret=SECRET)).webhook
     assert target is not None
-    hook = Webhook(target, first_wait_s, origin_s)
+    hook, board = Webhook(target, first_wait_s, origin_s), Alarms()
+    board.show(alarms)
 
     class House:
         alarms, ros_time_ns = board, NOW_NS
@@ -48,7 +48,7 @@ async def telling(
 
     hook.start(House())  # type: ignore[arg-type]  # what it needs of one
     try:
-        yield hook
+        yield hook, board
     finally:
         await hook.stop()
 
@@ -61,52 +61,34 @@ def verified(posted: Posted, secret: str, now_s: float) -> bool:
     return bool(shown["is_genuine"](posted.headers, posted.body, secret))
 
 
-def test_past_the_limit_the_oldest_is_given_up_counted_and_told() -> None:
+async def test_past_the_limit_the_oldest_is_given_up_counted_and_told() -> None:
     many = [alarm(str(number), raised_ns=NOW_NS + number) for number in range(MAX_WAITING + 2)]
-
-    async def run(server: Receiver) -> None:
-        board = Alarms()
-        board.show(many)
-        async with telling(server.port, board) as hook:
+    with receiver(status(200)) as server:
+        async with telling(server.port, *many) as (hook, _):
             assert (hook.condition.waiting, hook.condition.dropped) == (MAX_WAITING, 2)
             await until(lambda: hook.condition.sent >= 2, "two of them")
-
-    with receiver(status(200)) as server:
-        asyncio.run(run(server))
     said = [(it.json["alarm"]["tag_id"], it.json["lost"]) for it in server.posted[:2]]
     assert said == [("2", 2), ("3", 0)]
 
 
-def test_what_was_lost_while_one_was_sent_is_told_with_the_next() -> None:
+async def test_what_was_lost_while_one_was_sent_is_told_with_the_next() -> None:
     many = [alarm(str(number), raised_ns=NOW_NS + 1 + number) for number in range(MAX_WAITING + 1)]
-
-    async def run(server: Receiver) -> None:
-        board = Alarms()
-        board.show([A])
-        async with telling(server.port, board) as hook:
+    with receiver(status(500), status(500), status(200)) as server:
+        async with telling(server.port, A) as (hook, board):
             await until(lambda: server.posted, "the first on its way")
             board.show([A, *many])
             await until(lambda: hook.condition.sent >= 2, "the next")
-
-    with receiver(status(500), status(500), status(200)) as server:
-        asyncio.run(run(server))
     said = {it.json["alarm"]["tag_id"]: it.json["lost"] for it in server.posted[:4]}
     assert said == {"a": 0, "1": 1}
 
 
-def test_changes_are_posted_in_order_and_signed() -> None:
-    async def run(server: Receiver) -> None:
-        board = Alarms()
-        board.show([A])
-        async with telling(server.port, board) as hook:
+async def test_changes_are_posted_in_order_and_signed() -> None:
+    with receiver(status(200)) as server:
+        async with telling(server.port, A) as (hook, board):
             await until(lambda: len(server.posted) == 1, "what is active at the start")
             board.show([replace(A, cleared_at_ns=NOW_NS + 2 * S), B])
             await until(lambda: hook.condition.sent == 3, "the changes")
-            assert hook.condition.waiting == 0
-            assert hook.condition.detail == ""
-
-    with receiver(status(200)) as server:
-        asyncio.run(run(server))
+            assert (hook.condition.waiting, hook.condition.detail) == (0, "")
     changes = [(it.json["change"], it.json["alarm"]["tag_id"]) for it in server.posted]
     assert changes == [("raised", "a"), ("raised", "b"), ("cleared", "a")]
     assert {it.json["origin"] for it in server.posted} == {"simulated"}
@@ -128,25 +110,21 @@ def cut(_: Posted) -> Iterator[bytes | None]:
 
 
 @pytest.mark.parametrize("bad", [status(500), status(302), status(429, "Retry-After: 0"), cut])
-def test_what_is_not_taken_comes_again_with_the_same_id_and_the_rest_behind_it(bad: Answer) -> None:
-    async def run(server: Receiver) -> None:
-        board = Alarms()
-        board.show([A, B])
-        origins: list[Origin] = ["robot"]
-        async with telling(server.port, board, lambda: origins[-1]) as hook:
+async def test_what_is_not_taken_comes_again_with_the_same_id_and_the_rest_behind_it(
+    bad: Answer,
+) -> None:
+    origins: list[Origin] = ["robot"]
+    with receiver(bad, bad, slowly, status(200)) as server:
+        async with telling(server.port, A, B, origin=lambda: origins[-1]) as (hook, _):
             assert hook.condition.waiting == 2
             origins.append("recorded")
             await until(lambda: hook.condition.sent == 2, "both")
-            assert hook.condition.failed == 2
-            assert hook.condition.is_connected
-
-    with receiver(bad, bad, slowly, status(200)) as server:
-        asyncio.run(run(server))
+            assert (hook.condition.failed, hook.condition.is_connected) == (2, True)
     assert server.ids == [f"{A.id}.raised"] * 3 + [f"{B.id}.raised"]
     assert {it.json["origin"] for it in server.posted} == {"robot"}, "what it was as it was heard"
 
 
-def test_nothing_is_posted_before_it_is_known_where_it_comes_from() -> None:
+async def test_nothing_is_posted_before_it_is_known_where_it_comes_from() -> None:
     asked: list[int] = []
     origins: list[Origin] = ["unknown"]
 
@@ -154,134 +132,68 @@ def test_nothing_is_posted_before_it_is_known_where_it_comes_from() -> None:
         asked.append(1)
         return origins[-1]
 
-    async def run(server: Receiver) -> None:
-        board = Alarms()
-        board.show([A, B])
-        async with telling(server.port, board, origin, origin_s=PATIENCE_S) as hook:
+    with receiver(status(200)) as server:
+        async with telling(server.port, A, B, origin=origin, origin_s=PATIENCE_S) as (hook, _):
             await until(lambda: len(asked) > 4, "it to be looked for, again and again")
             assert (hook.condition.waiting, server.posted) == (2, [])
             origins.append("robot")
             await until(lambda: hook.condition.sent == 2, "both")
-
-    with receiver(status(200)) as server:
-        asyncio.run(run(server))
     assert [it.json["origin"] for it in server.posted] == ["robot", "robot"]
 
 
-def test_of_a_twin_that_never_says_where_it_comes_from_alarms_are_posted_all_the_same() -> None:
-    async def run(server: Receiver) -> None:
-        board = Alarms()
-        board.show([A, B])
-        async with telling(server.port, board, lambda: "unknown", origin_s=0.5) as hook:
-            await until(lambda: hook.condition.sent == 2, "both")
-
+async def test_of_a_twin_that_never_says_where_it_comes_from_alarms_are_posted_all_the_same() -> (
+    None
+):
     with receiver(status(200)) as server:
-        asyncio.run(run(server))
-    assert [it.json["origin"] for it in server.posted] == ["unknown", "unknown"]
+        async with telling(server.port, A, origin=lambda: "unknown", origin_s=0.5) as (hook, _):
+            await until(lambda: hook.condition.sent == 1, "it")
+    assert [it.json["origin"] for it in server.posted] == ["unknown"]
 
 
-def test_one_that_refuses_and_comes_later_gets_all_of_it() -> None:
+async def test_one_that_refuses_and_comes_later_gets_all_of_it() -> None:
     port = free_port()
-
-    async def run() -> None:
-        board = Alarms()
-        async with telling(port, board) as hook:
-            board.show([A])
-            await until(lambda: hook.condition.failed > 3, "some tries")
-            assert hook.condition.waiting == 1
-            assert not hook.condition.is_connected
-            assert hook.condition.detail == f"Connection refused (http://127.0.0.1:{port})"
-            assert "hook" not in hook.condition.detail
-            with receiver(status(200), port=port) as server:
-                await until(lambda: hook.condition.sent == 1, "the alarm")
-            assert server.ids == [f"{A.id}.raised"]
-
-    asyncio.run(run())
-
-
-def test_one_that_hangs_is_tried_again(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(webhook_module, "post", partial(post, answer_s=0.2))
-
-    async def run(server: Receiver) -> None:
-        board = Alarms()
-        board.show([A])
-        async with telling(server.port, board) as hook:
+    async with telling(port, A) as (hook, _):
+        await until(lambda: hook.condition.failed > 3, "some tries")
+        assert (hook.condition.waiting, hook.condition.is_connected) == (1, False)
+        assert hook.condition.detail == f"Connection refused (http://127.0.0.1:{port})"
+        with receiver(status(200), port=port) as server:
             await until(lambda: hook.condition.sent == 1, "the alarm")
-
-    with receiver(silence, status(200)) as server:
-        asyncio.run(run(server))
-    # On a busy machine the answer may be late once more.
-    assert len(server.ids) >= 2
-    assert set(server.ids) == {f"{A.id}.raised"}
+        assert server.ids == [f"{A.id}.raised"]
 
 
-def test_a_message_that_the_receiver_will_not_have_does_not_hold_up_the_others() -> None:
-    async def run(server: Receiver) -> None:
-        board = Alarms()
-        board.show([A, B])
-        async with telling(server.port, board) as hook:
+async def test_a_message_that_the_receiver_will_not_have_does_not_hold_up_the_others() -> None:
+    with receiver(*[status(422)] * MAX_REFUSALS, status(200)) as server:
+        async with telling(server.port, A, B) as (hook, _):
             await until(lambda: hook.condition.sent == 1, "the second")
             assert (hook.condition.dropped, hook.condition.waiting) == (1, 0)
-
-    with receiver(*[status(422)] * MAX_REFUSALS, status(200)) as server:
-        asyncio.run(run(server))
     assert server.ids == [f"{A.id}.raised"] * MAX_REFUSALS + [f"{B.id}.raised"]
     assert server.posted[-1].json["lost"] == 1
 
 
-def test_words_of_any_length_are_said_once_and_cut(caplog: pytest.LogCaptureFixture) -> None:
-    async def run(server: Receiver) -> None:
-        board = Alarms()
-        board.show([A])
-        async with telling(server.port, board) as hook:
-            await until(lambda: hook.condition.failed > 2, "some tries")
-
+async def test_words_of_any_length_are_said_once_and_cut(caplog: pytest.LogCaptureFixture) -> None:
     with receiver(lambda _: iter([b"x" * 3_000 + b"\r\n\r\n"])) as server:
-        asyncio.run(run(server))
+        async with telling(server.port, A) as (hook, _):
+            await until(lambda: hook.condition.failed > 2, "some tries")
     (said,) = [r.getMessage() for r in caplog.records if "was not taken" in r.getMessage()]
     assert len(said) < 300
 
 
-def test_what_cannot_even_be_sent_is_a_failure_and_the_next_one_waits(
+async def test_what_cannot_even_be_sent_is_a_failure_and_the_next_one_waits(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     def broken(*_: object) -> bytes:
         raise TypeError("no such thing")
 
-    async def run() -> None:
-        board = Alarms()
-        board.show([A, B])
-        async with telling(free_port(), board, first_wait_s=60.0) as hook:
-            await until(lambda: hook.condition.failed, "the try")
-            assert hook.condition.failed == 1
-            assert not hook.condition.is_connected
-            assert hook.condition.detail.startswith("TypeError (http://")
-
     monkeypatch.setattr(Delivery, "body", broken)
-    asyncio.run(run())
+    async with telling(free_port(), A, B, first_wait_s=60.0) as (hook, _):
+        await until(lambda: hook.condition.failed, "the try")
+        assert (hook.condition.failed, hook.condition.is_connected) == (1, False)
+        assert hook.condition.detail.startswith("TypeError (http://")
 
 
-def test_it_ends_at_once_while_somebody_hangs() -> None:
-    async def run(server: Receiver) -> None:
-        board = Alarms()
-        board.show([A])
-        async with telling(server.port, board) as hook:
+async def test_it_ends_at_once_while_somebody_hangs() -> None:
+    with receiver(silence) as server:
+        async with telling(server.port, A) as (hook, _):
             await until(lambda: len(server.posted) == 1, "the post")
             async with asyncio.timeout(5.0):  # the answer may take 10 s
                 await hook.stop()
-
-    with receiver(silence) as server:
-        asyncio.run(run(server))
-
-
-def test_after_a_restart_the_same_is_told_with_the_same_ids() -> None:
-    async def run(server: Receiver) -> None:
-        board = Alarms()
-        board.show([A])
-        for number in (1, 2):
-            async with telling(server.port, board) as hook:
-                await until(lambda: hook.condition.sent == 1, f"start {number}")
-
-    with receiver(status(200)) as server:
-        asyncio.run(run(server))
-    assert server.ids == [f"{A.id}.raised"] * 2

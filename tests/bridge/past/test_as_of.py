@@ -260,3 +260,4 @@ def test_what_takes_long_says_so(field_format: FieldFormat) -> None:
 
     assert cost_s(len(SITE.tags), asked()) < SMALL_S < cost_s(2_000, asked(large, resolution=1))
     assert cost_s(len(SITE.tags), asked(large, resolution=0.004)) > SMALL_S
+    assert cost_s(2, asked(scale=9)) > cost_s(2, asked()), "of a picture each pixel"

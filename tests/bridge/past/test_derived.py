@@ -184,13 +184,10 @@ def test_tags_as_of_a_moment_get_the_quantity_of_the_day_up_to_then() -> None:
     other = TagState("b", readings=(Reading("co2", 1.0, at_ns),))
     own = TagState("c", readings=(Reading("light", 1.0, 1), Reading("daily_light_integral", 7.0)))
     needs: list[SeriesRequest] = []
-    points = [it for it in COURSE["light"].items() if 36 * HOUR_NS <= it[0] <= at_ns]
 
     def find(need: SeriesRequest) -> SeriesPast:
         needs.append(need)
-        stamps, values = zip(*points, strict=True)
-        ones = (1,) * len(points)
-        return SeriesPast(need.start_ns, need.end_ns, None, stamps, ones, values, values, values)
+        return found_in(need, COURSE)
 
     daily = DAILY["daily_light_integral"]
     found = derived.with_daily(
@@ -200,7 +197,7 @@ def test_tags_as_of_a_moment_get_the_quantity_of_the_day_up_to_then() -> None:
     assert (need.tag_id, need.sensor_type, need.start_ns) == ("a", "light", 36 * HOUR_NS)
     assert found[1:] == [other, own]
     reading = found[0].readings[-1]
-    expected = DAILY["daily_light_integral"].at(at_ns, points, is_day)
+    expected = daily.at(at_ns, list(COURSE["light"].items()), is_day)
     assert reading == Reading("daily_light_integral", expected, at_ns)
 
 

@@ -24,7 +24,7 @@ from lupin_bridge.past.plans import (
 from lupin_bridge.settings import Settings
 from lupin_twin.core.diagnostics import UNKNOWN
 from lupin_twin.core.history import LatestRequest
-from lupin_twin.core.past import EVERY_TAG, Event, SeriesPast, SeriesRequest
+from lupin_twin.core.past import EVERY_TAG, SeriesPast, SeriesRequest
 from lupin_twin.core.state import Attempt, Reading, TagState
 from lupin_twin.field.idw import never
 from lupin_twin.runtime.workers import SMALL_S
@@ -64,17 +64,6 @@ def test_it_crosses_and_its_answer_is_the_same_there(question: Query) -> None:
     assert pickle.loads(pickle.dumps(told, 5)) == told
     # Who has it is told so: the ETag is the same, and nothing is written.
     assert answer(there, f'"other", W/{told.etag}') == Answered(told.etag, None)
-
-
-def test_a_timeline_asks_for_its_parts_one_by_one() -> None:
-    needs: list[Any] = []
-
-    def find(need: Any) -> Any:
-        needs.append(need)
-        return found(need)
-
-    Timeline(0, 9 * NS, 5, EVERY_TAG, UNKNOWN).look(find)
-    assert {need.sensor_type for need in needs if isinstance(need, SeriesRequest)} == set(Event)
 
 
 def test_a_tag_that_was_not_known_is_told_with_how_many_were() -> None:

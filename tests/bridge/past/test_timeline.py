@@ -88,14 +88,11 @@ def test_nothing_at_all_is_told_as_that() -> None:
     assert (found["buckets"], found["silences"], found["runs"]) == ([], [], [])
 
 
-def test_silences_are_stretches() -> None:
+def test_silences_are_stretches_and_of_too_many_the_longest_of_each_bucket_is_told() -> None:
     silences = SeriesPast(0, 100 * NS, None, (NS,), (1,), (2.5,), (2.5,), (2.5,))
     assert written(parts(silences=silences))["silences"] == [
         {"from": at(1), "to": {"sec": 3, "nanosec": 500_000_000}}
     ]
-
-
-def test_of_too_many_silences_the_longest_of_each_bucket_is_told() -> None:
     silences = SeriesPast(0, 100 * NS, 10 * NS, (20 * NS,), (7,), (1.0,), (0.5,), (4.0,))
     assert written(parts(silences=silences))["silences"] == [{"from": at(20), "to": at(24)}]
 

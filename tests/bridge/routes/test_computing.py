@@ -4,7 +4,6 @@ import asyncio
 import threading
 from collections.abc import AsyncIterator, Callable
 from contextlib import ExitStack, asynccontextmanager
-from types import SimpleNamespace
 from typing import Any
 from urllib.parse import urlencode
 
@@ -12,21 +11,18 @@ import httpx
 import numpy as np
 import pytest
 
-from lupin_bridge.feed.source import TwinTimeoutError
-from lupin_bridge.field import PNG, FieldQuery
 from lupin_bridge.past import fields
 from lupin_bridge.routes import status
-from lupin_bridge.routes.answers import within_time
 from lupin_bridge.routes.state import AGES_HOLD_S
 from lupin_bridge.serving.admission import Limits
 from lupin_bridge.serving.http_protocol import PIECE_BYTES
 from lupin_bridge.stream.state_json import StateJson
 from lupin_twin.core.state import Pose, Reading, Scan
-from lupin_twin.field.engine import FieldRequest, compute_field, cost_s
+from lupin_twin.field.engine import FieldRequest, compute_field
 from lupin_twin.field.explored import OccupancyMap
 from lupin_twin.field.grid import FieldGrid
 from lupin_twin.ros.node import TwinNode
-from lupin_twin.runtime.workers import LARGE_THREADS, SMALL_S, ShouldStop, Workers
+from lupin_twin.runtime.workers import LARGE_THREADS, ShouldStop, Workers
 from tests.support.inprocess import Running, running
 from tests.support.maps import map_of
 from tests.support.waiting import PATIENCE_S, until
@@ -130,21 +126,6 @@ async def test_a_flood_of_the_dearest_fields_does_not_hold_up_a_tiny_one(
         assert sorted([(await task).status_code for task in flood]) == [200] * 12 + [503] * 28
 
 
-@pytest.mark.parametrize(
-    ("cells", "scale", "large"), [(300, 1, False), (500, 1, True), (300, 3, True)]
-)
-async def test_what_is_written_counts_for_what_is_large(
-    domain: int, cells: int, scale: int, large: bool
-) -> None:
-    async with house() as it:
-        source = it.bridge.source
-        asked = FieldRequest("co2", 4.0 / cells, 0.0, 0.0, 4.0, 4.0)
-        assert cost_s(asked, 20, source.rules) < SMALL_S, "the field alone is not"
-        query = FieldQuery("co2", 4.0 / cells, 0.0, 0.0, 4.0, 4.0, scale)
-        field = fields.Field(None, query, PNG, source.rules, None, it.bridge.criteria)
-        assert (field.write_s(20) > SMALL_S) is large
-
-
 # --- only while somebody waits --------------------------------------------------------------------
 
 
@@ -165,15 +146,6 @@ async def test_a_client_that_leaves_takes_its_work_along(domain: int, held: Held
         held.gate.set()
         assert (await staying).status_code == 200
         assert held.begun == at_work, "computed once, for who stayed"
-
-
-async def test_work_that_asks_no_twin_has_as_long_and_is_given_up() -> None:
-    bridge: Any = SimpleNamespace(limits=Limits(answer_timeout_s=0.1))
-    work = asyncio.create_task(asyncio.Event().wait())
-    text = r"the answer was not there within 0\.1 s"
-    with pytest.raises(TwinTimeoutError, match=text):
-        await within_time(bridge.limits, work)
-    assert work.cancelled()
 
 
 async def test_a_time_out_ends_the_work_too(domain: int, held: Held) -> None:

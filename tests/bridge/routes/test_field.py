@@ -82,48 +82,25 @@ def test_the_service_and_both_formats_give_the_definitions_numbers(live: Bridge)
         assert as_sent == getattr(service, name), name
 
 
-def test_a_sensor_that_nobody_has_reported_is_all_unknown_and_no_error(live: Bridge) -> None:
-    body = live.json("/api/field.json", **{**QUERY, "sensor_type": "nobody's"})
-    assert (body["ok"], body["sample_count"]) == (True, 0)
-    assert set(body["values"]) == {None}
-    assert (body["value_min"], body["value_max"]) == (0, 0)
-
-
-def test_without_a_box_it_is_that_of_all_pinned_tags_and_their_reach(changing: Bridge) -> None:
-    empty = changing.json("/api/field", sensor_type="co2")
-    assert (empty["origin_x"], empty["origin_y"], empty["width"]) == (-1.5, -1.5, 30)
-    changing.peer.observe(
-        scan("1", {"co2": 400.0}, at=(-2.0, 3.0)),
-        scan("2", {"light": 1.0}, at=(4.0, 5.0)),
-        scan("no pose", {"co2": 1.0}),
-    )
-    changing.tag("no pose")
-    body = changing.json("/api/field", sensor_type="co2", resolution=0.5)
-    assert (body["origin_x"], body["origin_y"]) == (-3.5, 1.5)
-    assert (body["width"], body["height"]) == (18, 10), "to 5.5 and 6.5"
-
-
 # --- formats ------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(
-    ("accept", "media_type"),
+    ("accept", "media_type", "suffix"),
     [
-        (None, "application/json"),
-        ("*/*", "application/json"),
-        ("image/png", "image/png"),
-        ("application/x-npy", "application/x-npy"),
-        ("image/webp,image/png;q=0.9,*/*;q=0.1", "image/png"),
+        (None, "application/json", "json"),
+        ("image/webp,image/png;q=0.9,*/*;q=0.1", "image/png", "png"),
     ],
 )
 def test_accept_decides_the_format_and_caches_are_told(
-    live: Bridge, accept: str | None, media_type: str
+    live: Bridge, accept: str | None, media_type: str, suffix: str
 ) -> None:
     answer = live.get("/api/field", {} if accept is None else {"Accept": accept}, **QUERY)
     assert answer.headers["content-type"] == media_type
     assert answer.headers["vary"] == "Accept"
-    suffix = {"image/png": "png", "application/json": "json"}.get(media_type, "npy")
-    assert answer.content == live.get(f"/api/field.{suffix}", **QUERY).content
+    by_suffix = live.get(f"/api/field.{suffix}", {"Accept": "text/html"}, **QUERY)
+    assert answer.content == by_suffix.content
+    assert "vary" not in by_suffix.headers
 
 
 def test_a_format_that_there_is_none_of_is_406(live: Bridge) -> None:
@@ -131,13 +108,6 @@ def test_a_format_that_there_is_none_of_is_406(live: Bridge) -> None:
     assert (answer.status_code, answer.headers["vary"]) == (406, "Accept")
     message = schema.ErrorMessage.model_validate_json(answer.content)
     assert "application/json, image/png, application/x-npy" in message.detail
-
-
-@pytest.mark.parametrize("suffix", FORMATS)
-def test_a_suffix_wins_over_accept_and_needs_no_vary(live: Bridge, suffix: str) -> None:
-    answer = live.get(f"/api/field.{suffix}", {"Accept": "text/html"}, **QUERY)
-    assert answer.status_code == 200
-    assert "vary" not in answer.headers
 
 
 @pytest.mark.parametrize("suffix", FORMATS)
@@ -159,30 +129,6 @@ def test_every_format_says_in_its_headers_what_it_shows(live: Bridge, suffix: st
     }
     assert headers["content-disposition"] == f'inline; filename="temperature.{suffix}"'
     assert headers["cache-control"] == "no-cache"
-
-
-def test_a_picture_is_the_array_turned_over(live: Bridge) -> None:
-    array = npy(live, **QUERY)
-    answer = live.get("/api/field.png", **QUERY, scale=3)
-    with Image.open(io.BytesIO(answer.content)) as image:
-        image.load()
-        assert image.size == (24 * 3, 14 * 3)
-        assert image.text["Sample-Count"] == "3"  # type: ignore[attr-defined]
-        alpha = np.asarray(image.convert("RGBA"))[:, :, 3]
-    cells = np.flipud(alpha[1::3, 1::3]).astype(float)
-    span = np.nanmax(array) - np.nanmin(array)
-    expected = np.nan_to_num((array - np.nanmin(array)) / span * 153)
-    np.testing.assert_allclose(cells, expected, atol=0.81)
-
-
-def test_a_sensor_with_an_odd_name_is_served_under_a_plain_one(live: Bridge) -> None:
-    name = 'CO₂ "in" ../air\r\n'
-    for suffix in FORMATS:
-        headers = live.get(f"/api/field.{suffix}", **{**QUERY, "sensor_type": name}).headers
-        assert headers["content-disposition"] == (
-            f'inline; filename="CO___in__..\\_air__.{suffix}"'.replace("\\", "")
-        )
-        assert headers["x-field-sensor"] == "CO%E2%82%82 %22in%22 ../air%0D%0A"
 
 
 # --- refusals -----------------------------------------------------------------------------------
@@ -218,9 +164,7 @@ def test_a_bad_request_gets_get_fields_failure_body(
         assert answer.headers["cache-control"] == "no-store"
 
 
-@pytest.mark.parametrize(
-    ("resolution", "far"), [(1e-9, 1_000.0), (1e-38, 1e38), (1e-45, 3.4e38), (0.001, 1_001.0)]
-)
+@pytest.mark.parametrize(("resolution", "far"), [(1e-45, 3.4e38), (0.001, 1_001.0)])
 def test_a_grid_bomb_is_refused_over_http_as_over_ros(
     live: Bridge, resolution: float, far: float
 ) -> None:
@@ -231,20 +175,6 @@ def test_a_grid_bomb_is_refused_over_http_as_over_ros(
     assert (service.ok, answer.status_code) == (False, 400)
     assert answer.json()["error_message"] == service.error_message
     assert "the limit is 1000000" in service.error_message
-
-
-def test_as_many_cells_as_the_limit_allows_and_not_one_more() -> None:
-    with bridge(*EAGER, "--ros-args", "-p", "max_grid_cells:=12") as small:
-        query: dict[str, Any] = {"sensor_type": "co2", "resolution": 1}
-        query |= {"bbox_min_x": 0, "bbox_min_y": 0}
-        fits = {**query, "bbox_max_x": 4, "bbox_max_y": 3}
-        assert small.get("/api/field", **fits).status_code == 200
-        refused = small.get("/api/field", **{**fits, "bbox_max_x": 5})
-        assert "5 x 3 cells, the limit is 12" in refused.json()["error_message"]
-        scaled = {**query, "bbox_max_x": 1, "bbox_max_y": 3, "scale": 2}
-        assert small.get("/api/field.png", **scaled).status_code == 200
-        refused = small.get("/api/field.png", **{**scaled, "bbox_max_y": 4})
-        assert "16 pixels, the limit is 12" in refused.json()["error_message"]
 
 
 # --- ETag ---------------------------------------------------------------------------------------
@@ -285,17 +215,6 @@ def test_all_lines_of_a_header_count(live: Bridge) -> None:
     tag = etag(live, "/api/field.json")
     two_tags = ask(("If-None-Match", '"other"'), ("If-None-Match", tag), ("Accept", "*/*"))
     assert two_tags.status_code == 304
-
-
-def test_each_query_and_each_format_has_a_tag_of_its_own(live: Bridge) -> None:
-    tags = [
-        etag(live, path, **query)
-        for path in ("/api/field.json", "/api/field.png", "/api/field.npy")
-        for query in (QUERY, {**QUERY, "resolution": 0.5}, {**QUERY, "sensor_type": "co2"})
-    ]
-    tags += [etag(live, "/api/field.png", **QUERY, scale=2), etag(live, "/api/field/quality")]
-    assert len(set(tags)) == len(tags)
-    assert etag(live, "/api/field") == etag(live, "/api/field.json"), "the same thing"
 
 
 def test_a_tag_holds_until_the_field_could_have_changed(changing: Bridge) -> None:
@@ -344,3 +263,17 @@ def test_readings_past_float32_do_not_break_the_answer(changing: Bridge) -> None
     text = changing.get("/api/field.json", **QUERY).text
     json.loads(text, parse_constant=pytest.fail)
     schema.GetFieldResponse.model_validate_json(text, strict=True)
+
+
+def test_a_picture_is_the_array_turned_over(live: Bridge) -> None:
+    array = npy(live, **QUERY)
+    answer = live.get("/api/field.png", **QUERY, scale=3)
+    with Image.open(io.BytesIO(answer.content)) as image:
+        image.load()
+        assert image.size == (24 * 3, 14 * 3)
+        assert image.text["Sample-Count"] == "3"  # type: ignore[attr-defined]
+        alpha = np.asarray(image.convert("RGBA"))[:, :, 3]
+    cells = np.flipud(alpha[1::3, 1::3]).astype(float)
+    span = np.nanmax(array) - np.nanmin(array)
+    expected = np.nan_to_num((array - np.nanmin(array)) / span * 153)
+    np.testing.assert_allclose(cells, expected, atol=0.81)

@@ -2,15 +2,12 @@
 
 import io
 import json
-import time
 from pathlib import Path
 from typing import Any
 
-import pytest
 from PIL import Image
 
 from lupin_bridge.judge.judging import own_sensors
-from lupin_bridge.judge.quantities import vapour_pressure_deficit_kpa
 from lupin_bridge.stream import schema
 from tests.support.messages import scan
 from tests.support.waiting import wait_for
@@ -67,33 +64,3 @@ def test_the_operators_own_ranges_hold_and_are_asked_for_once(tmp_path: Path) ->
         assert answer.json() == json.loads(text)
         again = live.get("/api/sensors", {"If-None-Match": answer.headers["etag"]})
         assert (again.status_code, again.content) == (304, b"")
-
-
-def test_what_is_derived_has_a_field_of_its_own() -> None:
-    with bridge() as live:
-        readings = {"temperature": 25.0, "humidity": 60.0}
-        live.peer.observe(scan("tag_1", readings, at=(0.25, 0.25)))
-        live.tag("tag_1", lambda tag: len(tag["readings"]) == 2)
-        box = {"bbox_min_x": 0, "bbox_min_y": 0, "bbox_max_x": 0.5, "bbox_max_y": 0.5}
-        asked: dict[str, Any] = {"sensor_type": "vpd", "resolution": 0.5, **box}
-        field = live.json("/api/field", **asked)
-        deficit = vapour_pressure_deficit_kpa(25.0, 60.0)
-        assert field["values"] == [pytest.approx(deficit, rel=1e-6)]
-        answer = live.get("/api/field.png", **asked)
-        assert answer.headers["x-field-unit"] == "kPa"
-        etag = {"If-None-Match": answer.headers["etag"]}
-        assert live.get("/api/field.png", etag, **asked).status_code == 304
-
-
-def test_a_bridge_that_starts_learns_the_rhythm_from_the_journal(tmp_path: Path) -> None:
-    options = ("--ros-args", "-p", f"journal:={tmp_path / 'j.sqlite'}")
-    now_s = time.time()
-    with bridge(*options) as live:
-        for hours in (4, 3, 2, 1):
-            live.peer.observe(scan("tag_1", {"temperature": 22.0}, stamp_s=now_s - 3600 * hours))
-        newest = int(now_s - 3600)
-        live.tag("tag_1", lambda tag: tag["last_observed"]["sec"] == newest)
-        # The end of `with` kills it: what its journal has not written yet would be lost.
-        assert live.process.stop() == 0
-    with bridge(*options) as again:
-        wait_for(lambda: verdicts(again) == {"tag_1": "healthy"}, "an hourly rhythm to be known")

@@ -1,12 +1,11 @@
 """The map: none before one has come, then where it is and how it looks, pixel by pixel."""
 
-import math
 from collections.abc import Iterator
 from itertools import count
 
 import httpx
 import pytest
-from geometry_msgs.msg import Point, Pose, Quaternion
+from geometry_msgs.msg import Point, Pose
 
 from lupin_bridge.stream import schema
 from tests.support.messages import occupancy_grid, scan
@@ -36,18 +35,6 @@ def put_map(running: Bridge, rows: list[list[int]], origin: Pose | None = None) 
         return tag if tag != before else None
 
     return str(running.peer.until(look, "the new map"))
-
-
-def test_the_map_is_where_the_message_has_it(mapped: Bridge) -> None:
-    turn = Quaternion(z=math.sin(0.25), w=math.cos(0.25))
-    put_map(mapped, ROWS, Pose(position=Point(x=-4.0, y=1.5), orientation=turn))
-    grid = schema.OccupancyGrid.model_validate(mapped.json("/api/map"))
-    assert (grid.header.frame_id, grid.info.resolution) == ("map", 0.05)
-    assert (grid.info.width, grid.info.height) == (3, 2)
-    position, orientation = grid.info.origin.position, grid.info.origin.orientation
-    assert (position.x, position.y) == (-4.0, 1.5)
-    assert orientation.z == pytest.approx(math.sin(0.25))
-    assert orientation.w == pytest.approx(math.cos(0.25))
 
 
 def test_a_map_is_fetched_again_only_when_it_is_a_new_one(mapped: Bridge) -> None:

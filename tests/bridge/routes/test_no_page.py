@@ -21,17 +21,6 @@ def test_the_root_says_how_to_build_the_page(tmp_path: Path, method: str) -> Non
         assert (escape(HOW_TO_BUILD) in answer.text) == (method == "GET")
 
 
-def test_everything_else_is_where_it_is(tmp_path: Path) -> None:
-    assert ask(tmp_path, "GET", "/docs").status_code == 200
-    assert ask(tmp_path, "GET", "/nowhere").status_code == 404
-    assert ask(tmp_path, "POST", "/").status_code == 405
-
-
-def test_with_the_page_the_root_is_the_page(tmp_path: Path) -> None:
-    (tmp_path / "index.html").write_text("the page", encoding="utf-8")
-    assert ask(tmp_path, "GET", "/").text == "the page"
-
-
 def test_the_font_is_the_pages(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(pages, "_font", lambda: b"wOF2")
     answer = ask(tmp_path, "GET", "/font.woff2")

@@ -1,7 +1,6 @@
 """Readings that programs post: over a real socket, over DDS, into the twin's state and journal."""
 
 import json
-import tempfile
 import time
 from collections.abc import Iterator
 from datetime import UTC, datetime
@@ -28,15 +27,14 @@ ON = ("--http-observations", "on")
 
 
 @pytest.fixture(scope="module")
-def folder() -> Iterator[Path]:
-    with tempfile.TemporaryDirectory() as name:
-        path = Path(name)
-        file = path / "accounts.sqlite"
-        add(file, anna="operator", boss="admin")
-        add(file, "token", scada="admin")
-        add(file, "token", digest(TOKENS["esp"]), esp="writer")
-        add(file, "token", digest(TOKENS["flood"]), flood="writer")
-        yield path
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("people")
+    file = path / "accounts.sqlite"
+    add(file, anna="operator", boss="admin")
+    add(file, "token", scada="admin")
+    add(file, "token", digest(TOKENS["esp"]), esp="writer")
+    add(file, "token", digest(TOKENS["flood"]), flood="writer")
+    return path
 
 
 @pytest.fixture(scope="module")
@@ -129,26 +127,20 @@ GOOD = {"tag_id": "bad", "readings": {"t": 1.0}}
     ("body", "complaint"),
     [
         (b"", "the body is no JSON"),
-        (b"[" * 8_000, "the body is no JSON"),
         (b'{"tag_id": "bad", "readings": {"t": NaN}}', "the body is no JSON"),
         (b'{"tag_id": "bad", "readings": {"t": 1e999}}', ""),
         ([], "the body: input should be"),
         ({**GOOD, "readings": {}}, "readings: dictionary should have at least 1"),
         ({**GOOD, "readings": {f"s{n}": 1 for n in range(65)}}, "readings: dictionary should hav"),
         ({**GOOD, "readings": {"t": "21"}}, "readings.t: input should be a valid number"),
-        ({**GOOD, "readings": {"t": True}}, "readings.t: input should be a valid number"),
-        ({**GOOD, "readings": {"": 1}}, "string should have at least 1 character"),
-        ({**GOOD, "tag_id": ""}, "tag_id: string should have at least 1 character"),
         ({**GOOD, "tag_id": "x" * 257}, "tag_id: string should have at most 256 characters"),
         ({**GOOD, "tag_id": "a\0b"}, "tag_id: string should match pattern"),
         ({**GOOD, "place": [1]}, "place: list should have at least 2 items"),
         ({**GOOD, "place": [1, 2e6]}, "place.1: input should be less than or equal to 1000000"),
         ({**GOOD, "source": "robot"}, "source: extra inputs are not permitted"),
         ({**GOOD, "observed_at": time.time() + 3600}, "s ahead of ROS time, the limit is 10 s"),
-        ({**GOOD, "observed_at": "2037-01-01T00:00:00Z"}, "s ahead of ROS time"),
         ({**GOOD, "observed_at": "yesterday"}, "observed_at is 'yesterday', expected"),
         ({**GOOD, "observed_at": -5}, "observed_at is '-5.000000000'"),
-        ({**GOOD, "observed_at": 1e30}, "observed_at is"),
         ({**GOOD, "observed_at": 0}, "observed_at is 0, which is no moment"),
     ],
 )
@@ -245,19 +237,19 @@ def test_web_publishes_too_and_only_while_it_hears_a_twin(domain: int, folder: P
             assert peer.tag("far", lambda tag: tag.readings).readings[0].value == 20.0
 
 
-def test_without_the_setting_nobody_writes(domain: int, folder: Path) -> None:
-    with lupin_twin(domain, "serve", "--accounts", str(folder / "accounts.sqlite")) as serve:
+@pytest.mark.parametrize(
+    ("file", "options", "why"),
+    [
+        ("accounts.sqlite", (), "start serve or web with --http-observations on"),
+        ("none.sqlite", ON, "lupin-twin token add NAME --role writer"),
+    ],
+)
+def test_without_the_setting_and_without_accounts_nobody_writes(
+    domain: int, folder: Path, file: str, options: tuple[str, ...], why: str
+) -> None:
+    with lupin_twin(domain, "serve", "--accounts", str(folder / file), *options) as serve:
         answer = post(url_of(serve), {"tag_id": "off", "readings": {"t": 1}})
-        assert answer.status_code == 403
-        assert "start serve or web with --http-observations on" in answer.json()["detail"]
-
-
-def test_without_accounts_nobody_is_a_writer(domain: int, tmp_path: Path) -> None:
-    options = ("--accounts", str(tmp_path / "none.sqlite"), *ON)
-    with lupin_twin(domain, "serve", *options) as serve:
-        answer = post(url_of(serve), {"tag_id": "open", "readings": {"t": 1}})
-        assert answer.status_code == 403
-        assert "lupin-twin token add NAME --role writer" in answer.json()["detail"]
+        assert (answer.status_code, why in answer.json()["detail"]) == (403, True)
 
 
 def test_a_fleet_takes_none(capsys: pytest.CaptureFixture[str]) -> None:

@@ -112,22 +112,6 @@ async def test_events_that_come_in_five_minutes_share_one_grid_with_those_that_c
         ]
 
 
-async def test_who_has_the_answer_is_not_sent_it_again(domain: int) -> None:
-    past = MadeUp(points={("7", "co2"): [(NS, 1.0)]})
-    async with remembering(past) as it:
-        for path in (f"{HISTORY}&to=9", "/api/timeline?to=9"):
-            first = await it.http.get(path)
-            assert first.headers["cache-control"] == "no-cache"
-            has = {"If-None-Match": first.headers["etag"]}
-            again = await it.http.get(path, headers=has)
-            assert (again.status_code, again.content) == (304, b"")
-            assert again.headers["etag"] == first.headers["etag"]
-        path = f"{HISTORY}&to=9"
-        has = {"If-None-Match": (await it.http.get(path)).headers["etag"]}
-        past.points["7", "co2"].append((2 * NS, 2.0))  # heard late
-        assert (await it.http.get(path, headers=has)).status_code == 200
-
-
 @pytest.mark.parametrize(
     ("error", "status", "retry_after"),
     [

@@ -4,7 +4,6 @@ import json
 import signal
 import socket
 import sqlite3
-import tempfile
 import time
 from collections.abc import Iterator
 from contextlib import closing
@@ -13,32 +12,38 @@ from urllib.parse import urlsplit
 
 import httpx
 import pytest
-from websockets.exceptions import ConnectionClosed
-from websockets.sync.client import ClientConnection
 
 from lupin_bridge.access.accounts import digest
 from lupin_bridge.routes.written import MAX_LISTED
-from lupin_bridge.stream import routes_schema
 from lupin_twin.core.notes import COMMENT
 from tests.support import raw_http
 from tests.support.journal import kept
 from tests.support.messages import look
-from tests.support.people import TOKEN, add, remove, signed_in, write
+from tests.support.people import (
+    BEARER,
+    OWN,
+    TOKEN,
+    add,
+    end_of,
+    in_s,
+    notes,
+    remove,
+    signed_in,
+    write,
+)
 from tests.support.waiting import PATIENCE_S, wait_for
 from tests.support.web import Bridge, bridge
 from tests.support.ws_client import open_websocket
 
-BEARER = {"Authorization": f"Bearer {TOKEN}"}
 COMMENT_NOW = {"kind": "comment", "subject": "site", "text": "x"}
 
 
 @pytest.fixture(scope="module")
-def accounts() -> Iterator[Path]:
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / "accounts.sqlite"
-        add(path, anna="operator")
-        add(path, "token", scada="viewer")
-        yield path
+def accounts(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("people") / "accounts.sqlite"
+    add(path, anna="operator")
+    add(path, "token", scada="viewer")
+    return path
 
 
 @pytest.fixture(scope="module")
@@ -54,17 +59,6 @@ def live(accounts: Path) -> Iterator[Bridge]:
 def anna(live: Bridge) -> Iterator[httpx.Client]:
     with signed_in(live.url, "anna") as browser:
         yield browser
-
-
-def notes(live: Bridge, **query: str) -> list[routes_schema.Note]:
-    answer = live.get("/api/notes", BEARER, **query)
-    return routes_schema.Notes.model_validate_json(answer.content).notes
-
-
-def in_s(live: Bridge, seconds: float) -> str:
-    """A moment of the twin's time."""
-    now = live.get("/api/state", BEARER).json()["header"]["stamp"]
-    return f"{now['sec'] + seconds:.0f}"
 
 
 def test_a_comment_is_about_a_moment_of_the_past_or_now(live: Bridge, anna: httpx.Client) -> None:
@@ -83,30 +77,25 @@ def test_a_comment_is_about_a_moment_of_the_past_or_now(live: Bridge, anna: http
     assert "'withdraw'" in live.get("/api/notes", BEARER, kind="withdraw").text
 
 
-def end_of(connection: ClientConnection) -> str:
-    """Why it has ended; "": it has not."""
-    try:
-        connection.recv(timeout=PATIENCE_S)
-    except ConnectionClosed as ended:
-        return "" if ended.rcvd is None else ended.rcvd.reason
-    return ""
-
-
-def test_another_token_of_the_same_name_keeps_nothing_open_that_the_old_one_had(
+def test_a_revoked_token_opens_nothing_also_where_another_has_its_name(
     live: Bridge, accounts: Path
 ) -> None:
-    leaked, fresh = f"leaked-{TOKEN}", f"fresh-{TOKEN}"
-    add(accounts, "token", digest(leaked), plc="viewer")
+    leaked, fresh = (f"{name}-{TOKEN}" for name in ("leaked", "fresh"))
+    add(accounts, "token", digest(leaked), plc="operator")
+    theirs, ours = ({"Authorization": f"Bearer {token}"} for token in (leaked, fresh))
     ws = f"{live.url.replace('http', 'ws', 1)}/ws/state"
-    headers = {"Authorization": f"Bearer {leaked}"}
-    with open_websocket(ws, additional_headers=headers) as thief:
+    with (
+        httpx.Client(base_url=live.url, timeout=PATIENCE_S, headers=OWN) as program,
+        open_websocket(ws, additional_headers=theirs) as thief,
+    ):
+        assert program.post("/api/signin", headers=theirs).status_code == 204
+        assert program.get("/api/session").json()["name"] == "plc"
         assert thief.recv(timeout=PATIENCE_S)
         remove(accounts, "plc", "token")
         add(accounts, "token", digest(fresh), plc="viewer")
-        wait_for(
-            lambda: "the session has ended" in end_of(thief), "its end", meanwhile=lambda _: None
-        )
-    ours = {"Authorization": f"Bearer {fresh}"}
+        assert program.get("/api/state").status_code == 401
+        assert program.get("/api/state", headers=theirs).status_code == 401
+        assert "the session has ended" in end_of(thief)
     assert live.get("/api/session", ours).json()["name"] == "plc"
 
 
@@ -139,7 +128,6 @@ def test_who_is_removed_while_they_write_writes_nothing(live: Bridge, accounts: 
     [
         b'{"kind": "comment", "subject": "site", "text": "\\ud800"}',
         b'{"kind": "comment", "subject": "site", "text": "\xff"}',
-        b'{"kind": "comment", "subject": "site", "text": "\\u0085"}',
         b'{"kind": "comment", "subject": "site", "text": NaN}',
         b"[" * 8_000,
         b"",
@@ -153,7 +141,7 @@ def test_what_is_no_text_is_refused(anna: httpx.Client, body: bytes) -> None:
 
 @pytest.mark.parametrize(
     "text",
-    ["<script>alert(1)</script>", "a\u202ecod.exe", "'; DROP TABLE note; --", "=1+1", "\U0001f33f"],
+    ["<script>alert(1)</script>", "a\u202ecod.exe", "'; DROP TABLE note; --"],
 )
 def test_any_text_comes_back_as_it_was_said_and_as_nothing_but_json(
     live: Bridge, anna: httpx.Client, text: str

@@ -1,7 +1,6 @@
 """`/rosbridge` in the test's own process, with a twin that can be held up: what bounds a client."""
 
 import asyncio
-import json
 from collections.abc import Callable
 from typing import Any
 
@@ -16,21 +15,28 @@ from lupin_bridge.stream.frames import StateFrame
 from lupin_bridge.viewers.rosbridge_session import Reaction, Session
 from tests.support import inprocess
 from tests.support.raw_ws import deaf
-from tests.support.rosbridge import FIELD, FIELD_ARGS, LARGE_CALL, TOPIC, Ros, masked, ros_at
+from tests.support.rosbridge import (
+    FIELD,
+    FIELD_ARGS,
+    LARGE_CALL,
+    TOPIC,
+    Message,
+    Ros,
+    masked,
+    ros_at,
+)
 from tests.support.waiting import until
 
 
-def calls(count: int) -> list[str]:
+def calls(count: int) -> list[Message]:
     """Calls for as many fields: the same one would be asked of the twin once."""
     return [
-        json.dumps(
-            {
-                "op": "call_service",
-                "service": FIELD,
-                "id": f"{n}",
-                "args": {**FIELD_ARGS, "sensor_type": f"sensor {n}"},
-            }
-        )
+        {
+            "op": "call_service",
+            "service": FIELD,
+            "id": f"{n}",
+            "args": {**FIELD_ARGS, "sensor_type": f"sensor {n}"},
+        }
         for n in range(count)
     ]
 
@@ -64,7 +70,7 @@ async def test_open_calls_are_bounded_and_the_rest_is_answered(
 
         def talk(ros: Ros) -> None:
             for call in calls(MAX_OPEN_CALLS + 3):
-                ros.connection.send(call)
+                ros.send(**call)
             refused = [ros.next() for _ in range(3)]
             assert {reply["id"] for reply in refused} == {"32", "33", "34"}
             for reply in refused:
@@ -79,20 +85,6 @@ async def test_open_calls_are_bounded_and_the_rest_is_answered(
     assert most_at_once == 2
 
 
-async def test_an_answer_that_takes_too_long_ends_a_call(
-    domain: int, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    async with inprocess.running(Limits(answer_timeout_s=0.1)) as here:
-
-        async def no_field(*_: Any) -> Any:
-            await asyncio.Event().wait()
-
-        monkeypatch.setattr(sockets, "newest_field", no_field)
-        response = await in_thread(here.url, lambda ros: ros.call(FIELD, args=FIELD_ARGS))
-        assert response["result"] is False
-        assert response["values"] == f"{FIELD} did not answer within 0.1 s"
-
-
 @pytest.mark.parametrize(
     ("error", "text"),
     [
@@ -101,15 +93,18 @@ async def test_an_answer_that_takes_too_long_ends_a_call(
             "nothing has been received from a twin yet",
         ),
         (RuntimeError("a bug"), "the bridge met an error of its own, see its log"),
+        (None, f"{FIELD} did not answer within 0.1 s"),
     ],
 )
 async def test_an_error_on_the_way_ends_the_call_and_nothing_else(
-    domain: int, monkeypatch: pytest.MonkeyPatch, error: Exception, text: str
+    domain: int, monkeypatch: pytest.MonkeyPatch, error: Exception | None, text: str
 ) -> None:
-    async with inprocess.running() as here:
+    async with inprocess.running(Limits(answer_timeout_s=0.1)) as here:
 
         async def no_field(*_: Any) -> Any:
-            raise error
+            if error is not None:
+                raise error
+            await asyncio.Event().wait()
 
         def talk(ros: Ros) -> None:
             response = ros.call(FIELD, args=FIELD_ARGS)
@@ -201,22 +196,11 @@ async def test_a_client_that_leaves_takes_its_calls_along(
                 ended += 1
 
         monkeypatch.setattr(sockets, "newest_field", no_field)
-        gone = asyncio.Event()
-
-        async def leave() -> None:
-            def talk(ros: Ros) -> None:
-                for call in calls(5):
-                    ros.connection.send(call)
-                asyncio.run_coroutine_threadsafe(
-                    until(lambda: began == 2, "two calls with the twin"), loop
-                ).result()
-
-            await in_thread(here.url, talk)
-            gone.set()
-
-        loop = asyncio.get_running_loop()
-        await leave()
-        assert gone.is_set()
+        _reader, writer = await deaf(here.url, "/rosbridge")
+        for call in calls(5):
+            writer.write(masked(call))
+        await until(lambda: began == 2, "two calls with the twin")
+        writer.transport.abort()
         await until(lambda: ended == 2, "the end of both")
         await until(lambda: len(here.bridge.hub) == 0, "a hub without clients")
         assert began == 2, "those that waited were never begun"

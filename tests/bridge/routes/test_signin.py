@@ -46,11 +46,6 @@ def test_the_page_and_its_parts_need_no_token(closed: Served, path: str, media_t
     assert closed.get(path, method="POST").status_code == 405
 
 
-def test_its_font_needs_no_token(closed: Served) -> None:
-    font = closed.get("/font.woff2")
-    assert font.status_code == 200 or "the page was not built" in font.text
-
-
 def test_the_page_has_nothing_inline_and_nothing_from_elsewhere(closed: Served) -> None:
     page = closed.get("/signin").text
     assert not re.search(r"<script(?![^>]*\ssrc=)|<style|\sstyle=|\son\w+=", page)
@@ -107,11 +102,6 @@ def test_the_token_is_traded_for_a_strict_cookie(closed: Served) -> None:
     assert int(cookie["max-age"]) == SHARED_SESSION_S
     assert not cookie["secure"], "a browser would not send it back over plain http"
     assert TOKEN not in answer.headers["set-cookie"]
-
-
-def test_the_cookie_ends_on_the_bridges_clock_too(closed: Served) -> None:
-    expires = int(cookie_of(closed.post("/api/signin", BEARER)).value.partition(".")[0])
-    assert abs(expires - time.time() - SHARED_SESSION_S) < 600
 
 
 def test_the_cookie_opens_everything(closed: Served) -> None:
@@ -246,16 +236,8 @@ def test_a_session_that_ends_by_itself_closes_what_it_has_open(closed: Served) -
     "headers",
     [
         {"Sec-Fetch-Site": "cross-site", "Sec-Fetch-Mode": "no-cors", "Sec-Fetch-Dest": "image"},
-        {"Sec-Fetch-Site": "same-site", "Sec-Fetch-Mode": "no-cors", "Sec-Fetch-Dest": "image"},
         {"Sec-Fetch-Site": "same-site", "Sec-Fetch-Mode": "navigate", "Sec-Fetch-Dest": "document"},
-        {
-            "Sec-Fetch-Site": "cross-site",
-            "Sec-Fetch-Mode": "navigate",
-            "Sec-Fetch-Dest": "document",
-        },
-        {"Origin": "http://evil.example"},
         {"Origin": "http://127.0.0.1:1"},  # the cookie comes along: to a browser, it is one site
-        {"Referer": "http://127.0.0.1:1/page"},
         {},
     ],
 )

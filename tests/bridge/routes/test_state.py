@@ -1,6 +1,5 @@
 """The state over WebSocket and HTTP, from a real twin that a real peer feeds."""
 
-import re
 from collections.abc import Iterator
 from typing import Any
 from urllib.parse import quote
@@ -12,7 +11,7 @@ from websockets.exceptions import ConnectionClosedError
 from lupin_bridge.stream import schema
 from tests.support.messages import discovered, look, pose, scan
 from tests.support.waiting import wait_for
-from tests.support.web import Bridge, bridge, filled, tag_ids
+from tests.support.web import Bridge, bridge, filled
 
 # The twin itself publishes once in 100 s: what comes earlier was caused by a change, or is the
 # bridge's own heartbeat, which changes no revision.
@@ -29,89 +28,17 @@ def live() -> Iterator[Bridge]:
 # --- WebSocket ----------------------------------------------------------------------------------
 
 
-def test_a_late_joiner_gets_the_status_and_then_the_state_while_the_twin_is_silent(
-    live: Bridge,
-) -> None:
-    with live.listen() as listener:
-        live.peer.observe(scan("early", {"co2": 400.0}, at=(1, 2)))
-        listener.until_tag("early")
-    with live.listen() as late:
-        status, state = late.next(), late.next()
-    assert (status["type"], status["twin"], status["reason"]) == ("status", "live", "live")
-    assert state["type"] == "state"
-    assert "early" in tag_ids(state["state"])
-
-
 def test_a_change_is_pushed_without_waiting_for_the_twins_next_publication(live: Bridge) -> None:
-    with live.listen() as listener:
+    with live.listen() as listener, live.listen(max_rate_hz=0.01) as rare:
         listener.until("state")
+        rare.until("state")
         live.peer.observe(scan("pushed", {"co2": 500.0}, at=(1, 2)))
         listener.until_tag("pushed")
         live.peer.discover(discovered({"seen": pose(3, 3)}))
         listener.until_tag("seen")
         live.peer.observe(look("looked at", anomaly=True))
         listener.until_tag("looked at")
-
-
-def test_seq_grows_and_the_revision_changes_with_what_could_change_a_field(live: Bridge) -> None:
-    with live.listen() as listener:
-        frames = [listener.until("state")]
-        for number in range(3):
-            live.peer.observe(scan(f"counted {number}", {"co2": 1.0}))
-            frames.append(listener.until_tag(f"counted {number}"))
-        heartbeat = listener.until("state", lambda frame: frame["seq"] > frames[-1]["seq"])
-    numbers = [frame["seq"] for frame in frames]
-    assert numbers == sorted(set(numbers))
-    assert len({frame["revision"] for frame in frames}) == 4
-    assert heartbeat["revision"] == frames[-1]["revision"]
-
-
-def test_who_connects_again_goes_on_with_the_same_numbers(live: Bridge) -> None:
-    with live.listen() as listener:
-        first = listener.until("state")["seq"]
-    with live.listen() as listener:
-        assert listener.until("state")["seq"] >= first
-
-
-def test_a_heartbeat_comes_although_nothing_changes_and_ages_grow(live: Bridge) -> None:
-    live.peer.observe(scan("ageing", {"co2": 1.0}))
-    live.tag("ageing")
-    with live.listen() as listener:
-        ages = []
-        for _ in range(2):
-            state = listener.until_tag("ageing")["state"]
-            tag = next(tag for tag in state["tags"] if tag["tag_id"] == "ageing")
-            ages.append(tag["stale_seconds"])
-    assert ages == sorted(set(ages))
-
-
-def test_who_asks_for_deltas_gets_the_state_once_and_then_what_changes(live: Bridge) -> None:
-    with live.listen(delta=1) as listener:
-        last = listener.until("state")["seq"]
-        # What other tests have told may still be on its way when the first of them comes.
-        for tag_id in ("ready", "changed"):
-            live.peer.observe(scan(tag_id, {"co2": 1.0}))
-            changed: list[str] = []
-            while tag_id not in changed:
-                delta = listener.next()
-                if delta["type"] in ("alarms", "status"):
-                    continue
-                assert (delta["type"], delta["base"]) == ("delta", last)
-                schema.DeltaFrame.model_validate(delta)
-                last = delta["seq"]
-                changed = [tag["tag_id"] for tag in delta["changed"]]
-        assert changed == ["changed"]
-
-
-def test_who_asks_for_fewer_frames_is_sent_fewer(live: Bridge) -> None:
-    with live.listen(max_rate_hz=0.01) as rare, live.listen() as frequent:
-        numbers = [rare.until("state")["seq"]]
-        for number in range(4):
-            live.peer.observe(scan(f"often {number}", {"co2": 1.0}))
-            frequent.until_tag(f"often {number}")
-        # The next is due in 100 s.
-        numbers += [frame["seq"] for frame in rare.rest() if frame["type"] == "state"]
-        assert len(numbers) == 1
+        assert not [frame for frame in rare.rest() if frame["type"] == "state"], "due in 100 s"
 
 
 def test_what_cannot_be_served_is_refused_with_the_reason(live: Bridge) -> None:
@@ -126,14 +53,17 @@ def test_what_cannot_be_served_is_refused_with_the_reason(live: Bridge) -> None:
             )
 
 
-# --- /api/state ---------------------------------------------------------------------------------
-
-
-def test_the_state_is_kept_by_nobody(live: Bridge) -> None:
-    assert live.get("/api/state").headers["cache-control"] == "no-store"
-
-
 # --- one tag ------------------------------------------------------------------------------------
+
+
+def test_a_live_bridge_is_healthy_and_ready(live: Bridge) -> None:
+    health = schema.Health.model_validate(live.json("/healthz"))
+    assert (health.ok, health.callback_errors) == (True, 0)
+    ready = schema.StatusFrame.model_validate(live.json("/readyz"))
+    assert (ready.twin, ready.reason) == ("live", "live")
+    assert ready.state_age_seconds is not None
+    for path in ("/healthz", "/readyz", "/api/state"):
+        assert live.get(path).headers["cache-control"] == "no-store"
 
 
 @pytest.mark.parametrize("path", ["/api/tags/nobody", "/api/tags/nobody/history"])
@@ -147,21 +77,7 @@ def test_a_tag_that_is_not_there_is_named_with_404(live: Bridge, path: str) -> N
 
 @pytest.mark.parametrize(
     "tag_id",
-    [
-        "ä ö",
-        "100%",
-        "a?b=c#d",
-        "<b>&amp;",
-        "..",
-        "日本",
-        '"',
-        "a\\b",
-        "%2F",
-        " ",
-        "/",
-        "../x",
-        "x/1",
-    ],
+    ["ä 日本", "100%", "a?b=c#d", "..", '"a\\b', "%2F", " ", "/", "../x"],
 )
 def test_any_tag_id_is_found_by_its_percent_encoded_name(live: Bridge, tag_id: str) -> None:
     live.peer.observe(scan(tag_id, {"co2": 1.0}))
@@ -173,7 +89,7 @@ def test_any_tag_id_is_found_by_its_percent_encoded_name(live: Bridge, tag_id: s
 
 @pytest.mark.parametrize(
     "tag_id",
-    ["%00", "%FF%FE", "%0d%0aSet-Cookie:x=1", "%3Cscript%3E", "x" * 4_000, "%F0%9F%8C%B7", "a%2Fb"],
+    ["%00", "%FF%FE", "%0d%0aSet-Cookie:x=1", "x" * 4_000, "a%2Fb"],
 )
 def test_a_hostile_tag_id_is_a_plain_404(live: Bridge, tag_id: str) -> None:
     for path in (f"/api/tags/{tag_id}", f"/api/tags/{tag_id}/history"):
@@ -227,30 +143,3 @@ def test_what_was_tried_and_when_what_was_observed_is_told(live: Bridge) -> None
         (3610, 0, 1), (7210, 0, 0), (7300, 2, 0),
     ]  # fmt: skip
     assert past["tries"][-1]["status_detail"] == "not decoded"
-
-
-def test_a_producer_whose_stamps_stay_behind_is_told_in_the_status_and_counted(
-    live: Bridge,
-) -> None:
-    messages = [scan("late", {"co2": 1.0}, stamp_s=2000.0)]
-    messages += [scan("late", {"co2": 2.0}, stamp_s=1400.0 + i) for i in range(8)]
-    for message in messages:
-        message.source = "stepped back"
-    live.peer.observe(*messages)
-
-    def late() -> int:
-        drops = live.json("/readyz")["drops"]
-        return sum(each["count"] for each in drops if "'stepped back'" in each["message"])
-
-    # Other tests' robots go back in time too.
-    wait_for(lambda: late() >= 8, "the late stamps")
-    [counted] = re.findall(
-        r'lupin_dropped\w*{reason="late_stamp"} (\S+)', live.get("/metrics").text
-    )
-    assert float(counted) >= 8
-
-
-def test_a_tag_that_was_never_scanned_has_an_empty_history(live: Bridge) -> None:
-    live.peer.discover(discovered({"unscanned": pose(1, 1)}))
-    live.tag("unscanned")
-    assert history(live, "unscanned") == {}

@@ -12,18 +12,12 @@ from tests.support.processes import limits
     [
         ("/api/state", "state"),
         ("/api/tags/1/history", "tags"),
-        ("/api/field", "field"),
         ("/api/field.npy", "field"),
         ("/api/field/quality", "field"),
-        ("/api/map.png", "map"),
-        ("/api/history", "history"),
-        ("/api/timeline", "timeline"),
-        ("/api/export.csv", "export"),
         ("/api/anything", "other"),
         ("/api", "page"),
         ("/metrics", "health"),
         ("/docs", "docs"),
-        ("/", "page"),
         ("/assets/x.js", "page"),
     ],
 )

@@ -21,9 +21,23 @@ def wire(frame: bytes, rest: bytes = b"") -> bytes:
     return b"".join(bytes(block) for piece in pieces(frame, rest) for block in piece)
 
 
-@pytest.mark.parametrize("more", [-1, 0, 1, 2 * PIECE_BYTES, 2 * PIECE_BYTES + 1])
-def test_a_message_stays_the_same_and_no_piece_is_larger_than_the_limit(more: int) -> None:
-    message = bytes(n % 251 for n in range(PIECE_BYTES + more))
+# RFC 6455, section 5.2: the lengths change at 126 and 65,536.
+@pytest.mark.parametrize(
+    "length",
+    [
+        0,
+        125,
+        126,
+        65_535,
+        65_536,
+        PIECE_BYTES,
+        PIECE_BYTES + 1,
+        3 * PIECE_BYTES,
+        3 * PIECE_BYTES + 1,
+    ],
+)
+def test_a_message_stays_the_same_and_no_piece_is_larger_than_the_limit(length: int) -> None:
+    message = bytes(n % 251 for n in range(length))
     for given, rest, opcode in (
         (text_frame(message), b"", Opcode.TEXT),
         (frame_head(BINARY, len(message)) + message[:13], message[13:], Opcode.BINARY),

@@ -7,11 +7,12 @@ import ssl
 import struct
 import termios
 from collections.abc import AsyncIterator, Callable
-from contextlib import asynccontextmanager
+from contextlib import ExitStack, asynccontextmanager
+from functools import partial
 from pathlib import Path
 
 from lupin_bridge.serving.connections import UNSENT_BYTES, bound_unsent, reset, tear_down
-from tests.support.tls import certificate
+from tests.support.tls import Certificate, certificate
 from tests.support.waiting import until
 
 # More than any socket takes by itself.
@@ -19,19 +20,35 @@ MUCH = bytes(64_000_000)
 
 
 @asynccontextmanager
-async def connection() -> AsyncIterator[tuple[asyncio.WriteTransport, socket.socket]]:
-    """Our transport, and the socket at its other end, which nobody reads."""
+async def connection(
+    ours: Certificate | None = None,
+) -> AsyncIterator[tuple[asyncio.WriteTransport, socket.socket, list[str]]]:
+    """Our transport, the socket at its other end, which nobody reads, and whether it has ended."""
     made: list[asyncio.WriteTransport] = []
+    ended: list[str] = []
 
     class Ours(asyncio.Protocol):
         def connection_made(self, transport: asyncio.BaseTransport) -> None:
             assert isinstance(transport, asyncio.WriteTransport)
             made.append(transport)
 
-    server = await asyncio.get_running_loop().create_server(Ours, "127.0.0.1", 0)
-    with socket.create_connection(server.sockets[0].getsockname()) as theirs:
+        def connection_lost(self, _: Exception | None) -> None:
+            made[0].close()  # as uvicorn does
+            ended.append("it")
+
+    context = None
+    if ours is not None:
+        context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
+        context.load_cert_chain(ours.cert, ours.key)
+    server = await asyncio.get_running_loop().create_server(Ours, "127.0.0.1", 0, ssl=context)
+    with ExitStack() as stack:
+        theirs = socket.create_connection(server.sockets[0].getsockname())
+        if ours is not None:
+            wrap = partial(ours.trust.wrap_socket, theirs, server_hostname="127.0.0.1")
+            theirs = await asyncio.to_thread(wrap)
+        stack.enter_context(theirs)
         await until(lambda: made, "the connection")
-        yield made[0], theirs
+        yield made[0], theirs, ended
     made[0].abort()
     server.close()
     await server.wait_closed()
@@ -47,7 +64,7 @@ def hoarded(prepare: Callable[[asyncio.BaseTransport], None], at_least: int) -> 
     """What the kernel takes of much that nobody reads, once it is so much."""
 
     async def test() -> int:
-        async with connection() as (transport, _):
+        async with connection() as (transport, *_):
             prepare(transport)
             transport.write(MUCH)
             await until(lambda: held_by_the_kernel(transport) >= at_least, "the kernel to take it")
@@ -62,14 +79,14 @@ def test_the_kernel_hoards_little_for_who_does_not_read() -> None:
 
 
 async def test_who_does_not_read_is_reset() -> None:
-    async with connection() as (transport, theirs):
+    async with connection() as (transport, theirs, _):
         transport.write(MUCH)
         tear_down(transport)
         await until(lambda: theirs.getsockopt(socket.SOL_SOCKET, socket.SO_ERROR), "a reset")
 
 
 async def test_who_has_read_all_is_closed() -> None:
-    async with connection() as (transport, theirs):
+    async with connection() as (transport, theirs, _):
         transport.write(b"the end")
         tear_down(transport)
         loop = asyncio.get_running_loop()
@@ -78,38 +95,8 @@ async def test_who_has_read_all_is_closed() -> None:
         assert await loop.sock_recv(theirs, 100) == b""
 
 
-@asynccontextmanager
-async def tls_connection(folder: Path) -> AsyncIterator[tuple[asyncio.WriteTransport, list[str]]]:
-    """Our transport to a client that says nothing more, and whether it has ended."""
-    ours = certificate(folder)
-    context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
-    context.load_cert_chain(ours.cert, ours.key)
-    made: list[asyncio.WriteTransport] = []
-    ended: list[str] = []
-
-    class Ours(asyncio.Protocol):
-        def connection_made(self, transport: asyncio.BaseTransport) -> None:
-            assert isinstance(transport, asyncio.WriteTransport)
-            made.append(transport)
-
-        def connection_lost(self, _: Exception | None) -> None:
-            made[0].close()  # as uvicorn does
-            ended.append("it")
-
-    server = await asyncio.get_running_loop().create_server(Ours, "127.0.0.1", 0, ssl=context)
-    with socket.create_connection(server.sockets[0].getsockname()) as theirs:
-        secret = await asyncio.to_thread(
-            ours.trust.wrap_socket, theirs, server_hostname="127.0.0.1"
-        )
-        with secret:
-            await until(lambda: made, "the connection")
-            yield made[0], ended
-    server.close()
-    await server.wait_closed()
-
-
 async def test_over_tls_what_is_being_closed_can_be_ended_and_again(tmp_path: Path) -> None:
-    async with tls_connection(tmp_path) as (transport, ended):
+    async with connection(certificate(tmp_path)) as (transport, _, ended):
         for _ in range(2):
             transport.close()
         tear_down(transport)

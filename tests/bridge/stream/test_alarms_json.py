@@ -21,7 +21,7 @@ COLD = Alarm(
 
 def test_a_frame_is_of_the_contracts_type_to_the_last_field_and_in_its_order() -> None:
     wire = alarms_message(Board(page_of([COLD]), "journal", NIGHT_NS), None, (), 0)
-    text = bytes(received(wire).data)
+    text = received(wire)
     schema.AlarmsFrame.model_validate_json(text, strict=True)
     frame = json.loads(text)
     assert list(frame) == ["type", "notes", "alarms", "source", "since"]

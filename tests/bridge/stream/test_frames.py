@@ -7,36 +7,25 @@ from typing import Any
 
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from websockets.frames import Frame, Opcode
-from websockets.streams import StreamReader
 
 from lupin_bridge.judge.judging import Judge
-from lupin_bridge.serving.ws_protocol import BINARY, frame_head
 from lupin_bridge.stream import schema
-from lupin_bridge.stream.frames import FrameWriter, StateFrame, text_frame
+from lupin_bridge.stream.frames import FrameWriter, StateFrame
 from lupin_twin.core.state import Attempt, Pose, Reading, Snapshot, TagState
+from tests.support.raw_ws import TEXT, frames_of
 from tests.support.seen import BY_LIGHT
 
 
-def received(wire: bytes) -> Frame:
-    """What a client makes of the bytes: one whole unmasked frame."""
-    reader = StreamReader()
-    reader.feed_data(wire)
-    parsing = Frame.parse(reader.read_exact, mask=False)
-    try:
-        while True:
-            next(parsing)
-    except StopIteration as end:
-        frame: Frame = end.value
-    assert not reader.buffer
-    return frame
+def received(wire: bytes) -> bytes:
+    """What a client makes of the bytes: the text of one whole frame."""
+    [(opcode, data)] = frames_of(wire)
+    assert (opcode, wire[0] >> 7) == (TEXT, 1)
+    return data
 
 
 def content(wire: bytes) -> dict[str, Any]:
     """What a frame says."""
-    frame = received(wire)
-    assert frame.opcode is Opcode.TEXT
-    decoded: dict[str, Any] = json.loads(bytes(frame.data))
+    decoded: dict[str, Any] = json.loads(received(wire))
     return decoded
 
 
@@ -48,27 +37,6 @@ def tag(tag_id: str, value: float = 1.0, age_s: float = 1.0) -> TagState:
 
 def snapshot(*tags: TagState, stamp_ns: int = 10**10) -> Snapshot:
     return Snapshot(stamp_ns, "map", tags)
-
-
-# --- the wire -----------------------------------------------------------------------------------
-
-
-def test_a_frame_is_whole_and_unmasked() -> None:
-    for size in (0, 125, 126, 65_535, 65_536):  # RFC 6455, section 5.2: the lengths change there
-        body = b"x" * size
-        for wire, opcode in (
-            (text_frame(body), Opcode.TEXT),
-            (frame_head(BINARY, size) + body, Opcode.BINARY),
-        ):
-            frame = received(wire)
-            assert (frame.opcode, frame.fin, bytes(frame.data)) == (opcode, True, body)
-
-
-def test_a_state_frame_is_the_contracts_and_carries_its_revision() -> None:
-    frame = FrameWriter().state(snapshot(tag("7", 412.5)), 'a"b-7')
-    state = schema.StateFrame.model_validate(content(frame.full()))
-    assert (state.seq, state.revision) == (frame.seq, frame.revision) == (1, 'a"b-7')
-    assert state.state.tags[0].readings[0].value == 412.5
 
 
 def test_a_delta_frame_is_the_contracts() -> None:
@@ -84,14 +52,6 @@ def test_a_delta_frame_is_the_contracts() -> None:
 
 
 # --- made once, kept no longer than needed ------------------------------------------------------
-
-
-def test_a_frame_is_written_once_for_all_clients() -> None:
-    writer = FrameWriter()
-    writer.state(snapshot(), "r")
-    frame = writer.state(snapshot(tag("7")), "r")
-    assert frame.full() is frame.full()
-    assert frame.delta() is frame.delta()
 
 
 def test_no_more_than_two_frames_are_kept() -> None:
@@ -148,18 +108,6 @@ def test_who_applies_the_deltas_has_the_state(steps: list[dict[str, int]]) -> No
         assert len(delta["changed"]) <= len(step)
         mine = apply(mine, delta)
         assert ageless(mine) == ageless(whole)
-
-
-def test_a_delta_leaves_out_what_did_not_change_and_appends_what_is_new_in_order() -> None:
-    writer = FrameWriter()
-    tags = [tag("a"), tag("b")]
-    first = writer.state(snapshot(*tags), "r")
-    tags = [tags[0], replace(tags[1], readings=()), tag("z"), tag("c")]
-    second = writer.state(snapshot(*tags), "r")
-    delta = content(second.delta())
-    assert [changed["tag_id"] for changed in delta["changed"]] == ["b", "z", "c"]
-    whole = content(second.full())["state"]
-    assert apply(content(first.full())["state"], delta)["tags"] == whole["tags"]
 
 
 # --- weight -------------------------------------------------------------------------------------

@@ -38,7 +38,7 @@ class Socket:
     @property
     def got(self) -> list[Any]:
         """What came, in short: a status's reason, a state's number, a delta's two."""
-        return [in_short(json.loads(bytes(received(wire).data))) for wire in self.wires]
+        return [in_short(json.loads(received(wire))) for wire in self.wires]
 
 
 def in_short(frame: dict[str, Any]) -> Any:
@@ -105,24 +105,9 @@ def test_a_status_tells_the_age_of_the_moment_at_which_a_client_gets_it(stage: S
     clients = [stage.join(socket, 3_600.0) for socket in sockets]
     sockets[2].room = 1
     stage.hub.serve(clients[2], 3_700.0)
-    ages = [
-        json.loads(bytes(received(socket.wires[0]).data))["state_age_seconds"] for socket in sockets
-    ]
+    ages = [json.loads(received(socket.wires[0]))["state_age_seconds"] for socket in sockets]
     assert ages == [3_600.0, 3_600.0, 3_700.0]
     assert sockets[0].wires[0] is sockets[1].wires[0], "one serialisation serves all"
-
-
-def test_everyone_gets_every_frame_and_every_status_once(stage: Stage) -> None:
-    sockets = [Socket(), Socket()]
-    for socket in sockets:
-        stage.join(socket)
-    stage.publish()
-    stage.publish(0.1)
-    stage.announce("stale", 4.0)
-    stage.hub.serve_all(5.0)
-    for socket in sockets:
-        assert socket.got == ["live", 1, 2, "stale"]
-    assert sockets[0].wires[1] is sockets[1].wires[1], "one serialisation serves all"
 
 
 def test_who_is_told_nothing_for_a_second_is_told_the_status_again(stage: Stage) -> None:
@@ -215,20 +200,6 @@ def test_a_slow_client_is_never_queued_for_and_gets_the_newest(stage: Stage) -> 
     assert (stage.hub.blocked, stage.hub.frames_sent, stage.hub.frames_skipped) == (0, 10, 6)
 
 
-def test_a_slow_client_is_told_the_newest_status_before_the_newest_state(stage: Stage) -> None:
-    slow = Socket(room=0)
-    client = stage.join(slow)
-    stage.announce("live")
-    stage.publish()
-    stage.announce("stale", 4.0)
-    slow.room = 1
-    stage.hub.serve(client, 5.0)
-    assert slow.got == ["stale"]
-    slow.room = 1
-    stage.hub.serve(client, 5.0)
-    assert slow.got == ["stale", 1]
-
-
 def test_a_client_that_takes_nothing_for_too_long_is_closed_and_forgotten(stage: Stage) -> None:
     stuck, quick = Socket(room=0), Socket()
     stage.join(stuck, wants_status=False)
@@ -241,20 +212,6 @@ def test_a_client_that_takes_nothing_for_too_long_is_closed_and_forgotten(stage:
     assert (quick.dismissed, len(stage.hub)) == (None, 1)
     assert stage.hub.dismiss_stuck(1_000.0) == 0
     assert stage.hub.clients_dismissed == 1
-
-
-def test_the_time_counts_from_the_first_frame_that_was_not_taken(stage: Stage) -> None:
-    slow = Socket(room=1)
-    client = stage.join(slow, wants_status=False)
-    stage.publish(1.0)
-    assert stage.hub.dismiss_stuck(500.0) == 0, "a silent twin makes nobody stuck"
-    stage.publish(500.0)
-    stage.publish(520.0)
-    slow.room = 1
-    stage.hub.serve(client, 525.0)
-    assert stage.hub.dismiss_stuck(531.0) == 0, "it has taken a frame since"
-    stage.publish(540.0)
-    assert stage.hub.dismiss_stuck(540.0 + TIMEOUT_S) == 1
 
 
 # --- what a client asked for --------------------------------------------------------------------
@@ -306,34 +263,6 @@ def test_a_late_frame_does_not_delay_those_after_it_unless_the_interval_is_stric
     assert strict.got == [1, 2, 4, 6]
 
 
-@pytest.mark.parametrize("late_s", [0.0, 0.05, 0.099])
-def test_of_a_source_that_keeps_to_the_rate_nothing_is_missed(stage: Stage, late_s: float) -> None:
-    socket = Socket()
-    stage.join(socket, min_interval_s=1.0, wants_status=False)
-    for second in range(100):
-        stage.publish(second + (late_s if second % 3 == 0 else 0.0))
-    assert len(socket.got) == 100
-
-
-def test_a_pause_is_not_made_up_for_by_a_burst(stage: Stage) -> None:
-    socket = Socket()
-    stage.join(socket, min_interval_s=1.0, wants_status=False)
-    stage.publish(0.0)
-    for now_s in (100.0, 100.1, 100.85, 100.95, 101.85, 101.95):
-        stage.publish(now_s)
-    # One as soon as there is something, and the next a beat later, a tenth of it forgiven.
-    assert socket.got == [1, 2, 5, 7]
-
-
-def test_nor_is_the_time_before_a_client_came(stage: Stage) -> None:
-    socket = Socket()
-    stage.publish(100.0)
-    stage.join(socket, 100.3, min_interval_s=1.0, wants_status=False)
-    for now_s in (100.5, 101.1, 101.25, 102.15, 102.25):
-        stage.publish(now_s)
-    assert socket.got == [1, 4, 6]
-
-
 # --- alarms -------------------------------------------------------------------------------------
 
 
@@ -364,49 +293,6 @@ def test_who_joins_gets_the_alarms_behind_the_first_state_and_not_before(stage: 
     assert late.got == ["live", 1, {"b"}]
 
 
-def test_a_blocked_client_gets_only_the_newest_alarms(stage: Stage) -> None:
-    socket = Socket()
-    stage.publish()
-    client = stage.join(socket, wants_status=False)
-    socket.room = 0
-    stage.alarms("a")
-    stage.publish(1.0)
-    stage.alarms("b")
-    stage.alarms("c")
-    assert client.blocked_since_s is not None
-    socket.room = 1
-    stage.hub.serve(client, 2.0)
-    assert socket.got == [1, 2], "room for the state alone"
-    socket.room = 9
-    stage.hub.serve(client, 2.0)
-    stage.hub.serve(client, 2.0)
-    assert socket.got == [1, 2, {"c"}]
-    assert client.blocked_since_s is None
-
-
-def test_a_rate_for_states_does_not_hold_up_alarms(stage: Stage) -> None:
-    socket = Socket()
-    stage.publish()
-    stage.join(socket, min_interval_s=100.0, wants_status=False)
-    stage.publish(1.0)
-    stage.alarms("a", now_s=1.0)
-    assert socket.got == [1, {"a"}]
-
-
-def test_who_does_not_want_alarms_gets_none_and_is_not_taken_for_stuck(stage: Stage) -> None:
-    socket = Socket()
-    stage.publish()
-    client = stage.join(socket, wants_alarms=False, wants_status=False)
-    stage.alarms("a")
-    socket.room = 0
-    stage.alarms("b")
-    stage.publish(1.0)
-    assert socket.got == [1]
-    socket.room = 9
-    stage.hub.serve(client, 2.0)
-    assert socket.got == [1, 2]
-
-
 def test_the_robot_comes_behind_a_state_once_and_no_oftener_than_states_are_wanted(
     stage: Stage,
 ) -> None:
@@ -427,3 +313,13 @@ def test_the_robot_comes_behind_a_state_once_and_no_oftener_than_states_are_want
     stage.hub.serve_all(10.0)
     assert seldom.wires[-1] == b"robot 3"
     assert none.robot_due
+
+
+def test_a_pause_is_not_made_up_for_by_a_burst(stage: Stage) -> None:
+    socket = Socket()
+    stage.join(socket, min_interval_s=1.0, wants_status=False)
+    stage.publish(0.0)
+    for now_s in (100.0, 100.1, 100.85, 100.95, 101.85, 101.95):
+        stage.publish(now_s)
+    # One as soon as there is something, and the next a beat later, a tenth of it forgiven.
+    assert socket.got == [1, 2, 5, 7]

@@ -40,12 +40,6 @@ def decoded(png: bytes) -> npt.NDArray[np.uint8]:
         return np.asarray(image.convert("RGBA"))
 
 
-def test_the_grids_last_row_is_on_top() -> None:
-    picture = decoded(map_png(map_of([[0, 100, -1], [-1, -1, 0]])))
-    light, dark, none = [FREE] * 3 + [255], [OCCUPIED] * 3 + [255], [0, 0, 0, 0]
-    assert picture.tolist() == [[none, none, light], [light, dark, none]]
-
-
 ROWS = st.tuples(st.integers(1, 5), st.integers(1, 5)).flatmap(
     lambda shape: st.lists(
         st.lists(st.integers(-128, 127), min_size=shape[0], max_size=shape[0]),

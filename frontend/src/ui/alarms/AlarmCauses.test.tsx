@@ -48,5 +48,6 @@ test('many of one cause that are resolved have nothing to do, and no time in com
   fireEvent.click(screen.getByText('Resolved in the last 24 h (5)'));
   const heading = screen.getByRole('button', { name: /Temperature too low · 5 alarms/ });
   expect(heading.querySelector('.alarm-do, [data-fact=since]')).toBeNull();
-  expect(heading.parentElement?.querySelector('.alarm-tools')).toBeNull();
+  // The place of what is to press is kept, for the columns.
+  expect(heading.parentElement?.querySelector('.alarm-tools')?.children).toHaveLength(0);
 });

@@ -314,8 +314,9 @@ function CauseHeading({
         <span data-fact="now">{current}</span>
         <span data-fact="worst">{worst}</span>
       </button>
-      {group === 'active' && (
-        <div className="alarm-tools">
+      {/* Also where there is nothing to press: the columns are those of the rows. */}
+      <div className="alarm-tools">
+        {group === 'active' && (
           <Acknowledge
             label={S.alarmAcknowledgeOf(cause)}
             text={S.alarmAcknowledgeAll(waiting.length)}
@@ -326,8 +327,8 @@ function CauseHeading({
               acknowledgeAlarms(waiting);
             }}
           />
-        </div>
-      )}
+        )}
+      </div>
     </div>
   );
 }

@@ -99,7 +99,13 @@ export const AlarmRow = memo(function AlarmRow({
             acknowledgeAlarms([item]);
           }}
         />
-        <RowMenu item={item} name={name} />
+        <Disclosure
+          label={S.alarmActionsOf(name)}
+          button={<Icon name="dots" />}
+          className="row-menu"
+        >
+          <Actions item={item} name={name} />
+        </Disclosure>
       </div>
       <CommentList subject={`alarm:${alarm.id}`} moment={null} />
     </li>
@@ -119,14 +125,6 @@ function useStatus(item: Item, group: keyof AlarmList): string | null {
 }
 
 /** What else can be done to an alarm. */
-function RowMenu({ item, name }: { item: Item; name: string }): JSX.Element {
-  return (
-    <Disclosure label={S.alarmActionsOf(name)} button={<Icon name="dots" />} className="row-menu">
-      <Actions item={item} name={name} />
-    </Disclosure>
-  );
-}
-
 function Actions({ item, name }: { item: Item; name: string }): JSX.Element {
   const { alarm, isAcknowledged, shelf } = item;
   const [form, setForm] = useState<'shelve' | 'comment' | null>(null);

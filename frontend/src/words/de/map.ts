@@ -3,6 +3,14 @@ import type * as EN from '../en/map';
 import type { In } from '../shape';
 import { counted, whole } from './counted';
 
+const SHORT = new Map([
+  ['Temperatur', 'Temp.'],
+  ['Luftfeuchte', 'Feuchte'],
+  ['Bodenfeuchte', 'Boden'],
+  ['Dampfdruckdefizit (VPD)', 'VPD'],
+  ['Taupunktabstand', 'TP-Abstand'],
+]);
+
 export const MAP: In<typeof EN.MAP> = {
   sensors: 'Sensor',
   mapRegion: 'Karte',
@@ -54,7 +62,7 @@ export const MAP: In<typeof EN.MAP> = {
   colouring: 'Farben nach',
   colourings: { ideal: 'Ideal', value: 'Wert' },
   legendNoIdeal: 'Zurzeit kein Idealbereich: Farben nach dem Wert',
-  sensorShort: { vpd: 'VPD' },
+  sensorShort: (label) => SHORT.get(label) ?? label,
   legendBelow: (value) => `unter ${value}`,
   legendAbove: (value) => `über ${value}`,
   legendAgainst: (sensor) => `${sensor} im Vergleich zum Idealbereich`,
@@ -171,7 +179,7 @@ export const TAGS: In<typeof EN.TAGS> = {
     `${sensor}: Änderung seit einer ${hour ? `Gewächshausstunde (${hour})` : 'Stunde'}`,
   trendNone: 'vor einer Stunde kein Messwert',
   trendSame: 'kein neuer Wert',
-  trendLevel: 'unverändert',
+  trendLevel: 'stabil',
   trendUnknown: 'vor einer Stunde: unbekannt',
   density: 'Zeilen',
   densities: { usual: 'Normal', compact: 'Kompakt' },

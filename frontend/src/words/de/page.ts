@@ -86,11 +86,11 @@ export const PAGE: In<typeof EN.PAGE> = {
     },
     failing: {
       title: 'Die Aufzeichnung schlägt fehl.',
-      hint: 'Der Zwilling läuft weiter und versucht es immer wieder. Bitte Platz schaffen oder den Datenträger prüfen.',
+      hint: 'Der Zwilling läuft und versucht es weiter. Bitte Platz schaffen oder den Datenträger prüfen.',
     },
     upgrading: {
       title: 'Die Aufzeichnung einer älteren Version wird umgestellt.',
-      hint: 'Neue Daten werden angezeigt, aber noch nicht aufgezeichnet. Frühere Daten sind nach der Umstellung wieder da; das kann Minuten dauern.',
+      hint: 'Neue Daten werden angezeigt, aber noch nicht aufgezeichnet. Frühere Daten sind danach wieder da; das kann Minuten dauern.',
     },
     doubting: {
       title: 'Es wird nichts aufgezeichnet: Die Uhr passt nicht zur Aufzeichnung.',

@@ -1,6 +1,12 @@
 /** The map: its controls, legend, colour range, and what is compared on it. */
 import { counted, whole } from './counted';
 
+const SHORT = new Map([
+  ['Temperature', 'Temp.'],
+  ['Soil moisture', 'Soil'],
+  ['Vapour pressure deficit', 'VPD'],
+]);
+
 export const MAP = {
   sensors: 'Sensor',
   mapRegion: 'Map',
@@ -50,8 +56,8 @@ export const MAP = {
   colouring: 'Colours by',
   colourings: { ideal: 'Ideal', value: 'Value' },
   legendNoIdeal: 'No ideal range for now: coloured by value',
-  /** In the bar of sensors, in place of a long name. */
-  sensorShort: { vpd: 'VPD' },
+  /** In the bar of sensors and the heads of the table; a site's own name stays as it is. */
+  sensorShort: (label: string): string => SHORT.get(label) ?? label,
   legendBelow: (value: string): string => `below ${value}`,
   legendAbove: (value: string): string => `above ${value}`,
   legendAgainst: (sensor: string): string => `${sensor} compared with its ideal range`,

@@ -32,7 +32,7 @@ export const ALARMS: In<typeof EN.ALARMS> = {
   },
   alarmFirst: (reading) => `al inicio ${reading}`,
   alarmStatus: { critical: 'crítico', healthy: 'dentro del rango' },
-  alarmBack: 'Ya sin anomalía',
+  alarmBack: 'Sin anomalía',
   alarmShow: 'Mostrar este punto ahora',
   alarmStart: 'Ir al inicio',
   alarmActionsOf: (what) => `Acciones: ${what}`,
@@ -223,6 +223,6 @@ export const HEALTH: In<typeof EN.HEALTH> = {
   tooLow: (by) => (by === null ? 'por debajo del límite' : `${by} por debajo del ideal`),
   tooHigh: (by) => (by === null ? 'por encima del límite' : `${by} por encima del ideal`),
   side: { below: 'bajo', above: 'alto' },
-  below: 'por debajo del ideal',
-  above: 'por encima del ideal',
+  below: 'bajo el ideal',
+  above: 'sobre el ideal',
 };

@@ -3,6 +3,14 @@ import type * as EN from '../en/map';
 import type { In } from '../shape';
 import { counted, whole } from './counted';
 
+const SHORT = new Map([
+  ['Temperatura', 'Temp.'],
+  ['Humedad relativa', 'HR'],
+  ['Humedad del sustrato', 'Sustrato'],
+  ['Déficit de presión de vapor', 'DPV'],
+  ['Punto de rocío', 'P. de rocío'],
+]);
+
 export const MAP: In<typeof EN.MAP> = {
   sensors: 'Sensor',
   mapRegion: 'Mapa',
@@ -52,7 +60,7 @@ export const MAP: In<typeof EN.MAP> = {
   colouring: 'Colores según',
   colourings: { ideal: 'Ideal', value: 'Valor' },
   legendNoIdeal: 'Ahora sin rango ideal: colores según el valor',
-  sensorShort: { vpd: 'DPV' },
+  sensorShort: (label) => SHORT.get(label) ?? label,
   legendBelow: (value) => `menos de ${value}`,
   legendAbove: (value) => `más de ${value}`,
   legendAgainst: (sensor) => `${sensor} frente a su rango ideal`,

@@ -3,6 +3,13 @@ import type * as EN from '../en/map';
 import type { In } from '../shape';
 import { counted, whole } from './counted';
 
+const SHORT = new Map([
+  ['Temperatuur', 'Temp.'],
+  ['Luchtvochtigheid', 'RV'],
+  ['Bodemvocht', 'Bodem'],
+  ['Dampdrukdeficit', 'VPD'],
+]);
+
 export const MAP: In<typeof EN.MAP> = {
   sensors: 'Sensor',
   mapRegion: 'Kaart',
@@ -53,7 +60,7 @@ export const MAP: In<typeof EN.MAP> = {
   colouring: 'Kleuren naar',
   colourings: { ideal: 'Ideaal', value: 'Waarde' },
   legendNoIdeal: 'Nu geen ideaal bereik: gekleurd naar waarde',
-  sensorShort: { vpd: 'VPD' },
+  sensorShort: (label) => SHORT.get(label) ?? label,
   legendBelow: (value) => `onder ${value}`,
   legendAbove: (value) => `boven ${value}`,
   legendAgainst: (sensor) => `${sensor} vergeleken met het ideale bereik`,

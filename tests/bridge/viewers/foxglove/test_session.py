@@ -127,11 +127,3 @@ def test_channels_that_come_and_go_are_told_and_their_subscriptions_end(stage: S
     assert stage.session.has(1, now[300])
     assert not stage.session.has(1, CHANNELS[10]), "the id is another channel's now"
     assert stage.session.offer(now) == Reaction()
-
-
-def test_a_subscription_that_cannot_be_served_is_given_up(stage: Stage) -> None:
-    stage.subscribe((1, 10))
-    stage.session.end(1)
-    stage.session.end(1)
-    assert not stage.session.has(1, CHANNELS[10])
-    assert stage.subscribe((1, 10)).begun

@@ -1,7 +1,7 @@
 """Feeds over a script of a relay: what is written once, what gives way, and how one ends."""
 
 import asyncio
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -106,34 +106,26 @@ async def test_a_message_is_written_once_for_all_who_want_it_alike(
     await until(lambda: not relay.ears, "nobody to listen")
 
 
-async def test_of_what_waits_for_a_slow_client_the_topics_depth_is_kept(
-    relay: Relay, writer: Writer
+@pytest.mark.parametrize(
+    ("topic", "meanwhile", "told"),
+    [
+        (INPUT, ("1", "2", "3", "4"), ("2", "3", "4")),
+        (replace(INPUT, max_bytes=10), ("11111", "22222", "33333"), ("22222", "33333")),
+    ],
+)
+async def test_of_what_waits_for_a_slow_client_the_topics_depth_and_bytes_are_kept(
+    relay: Relay, writer: Writer, topic: Topic, meanwhile: Sequence[str], told: Sequence[str]
 ) -> None:
     slow = Client(writer)
     slow.gate.clear()
-    slow.feeding.follow({"in": feed()}, "in")
+    slow.feeding.follow({"in": feed(topic=topic)}, "in")
     await until(lambda: bool(relay.ears), "it to listen")
     relay.publish("0")
     await until(lambda: bool(slow.frames), "the first")
-    relay.publish("1", "2", "3", "4")
+    relay.publish(*meanwhile)
     slow.gate.set()
-    await until(lambda: len(slow.frames) == 4, "the rest")
-    assert slow.frames == [json_frame(text) for text in "0234"]
-
-
-async def test_what_waits_for_a_slow_client_is_no_more_than_the_topics_bytes(
-    relay: Relay, writer: Writer
-) -> None:
-    slow = Client(writer)
-    slow.gate.clear()
-    slow.feeding.follow({"in": feed(topic=replace(INPUT, max_bytes=10))}, "in")
-    await until(lambda: bool(relay.ears), "it to listen")
-    relay.publish("0")
-    await until(lambda: bool(slow.frames), "the first")
-    relay.publish("11111", "22222", "33333")
-    slow.gate.set()
-    await until(lambda: json_frame("33333") in slow.frames, "the last")
-    assert slow.frames == [json_frame(text) for text in ("0", "22222", "33333")]
+    await until(lambda: len(slow.frames) == 1 + len(told), "the rest")
+    assert slow.frames == [json_frame(text) for text in ("0", *told)]
 
 
 @pytest.mark.parametrize(("size", "is_told"), [(20, True), (21, False)])
@@ -170,36 +162,25 @@ async def test_who_is_throttled_gets_the_newest_and_not_before_its_time(
     assert rare.frames == [json_frame("0")]
 
 
-async def test_what_cannot_be_told_is_an_error_for_the_client_and_the_next_one_comes(
-    relay: Relay, writer: Writer
-) -> None:
-    client = Client(writer)
-    client.feeding.follow({"in": feed()}, "in")
-    await until(lambda: bool(relay.ears), "it to listen")
-    relay.publish("bad", "half", "good")
-    await until(lambda: len(client.frames) == 3, "all of them")
-    assert b"a message of topic 'in' is none: not a message" in client.frames[0]
-    assert b"a message of topic 'in' is none: " in client.frames[1]
-    assert client.frames[2] == json_frame("good")
-    relay.refuses = True
-    client.feeding.follow({"in": feed()}, "in")
-    await until(lambda: len(client.frames) == 4, "the refusal")
-    assert b"no such type" in client.frames[3]
-
-
-async def test_whatever_the_error_the_feed_goes_on_and_the_log_has_each_kind_once(
+async def test_what_cannot_be_told_is_an_error_for_the_client_and_the_log_has_each_kind_once(
     relay: Relay, writer: Writer, caplog: pytest.LogCaptureFixture
 ) -> None:
     client = Client(writer)
     client.feeding.follow({"in": feed()}, "in")
     await until(lambda: bool(relay.ears), "it to listen")
-    relay.publish("odd", "bad", "good")
-    await until(lambda: len(client.frames) == 3, "all three")
-    relay.publish("odd", "bad", "good")
-    await until(lambda: len(client.frames) == 6, "and again")
-    for odd, bad, good in (client.frames[:3], client.frames[3:]):
+    for frames in (4, 8):
+        relay.publish("odd", "bad", "half")
+        await until(lambda: len(client.frames) == frames - 1, "all of them")  # noqa: B023
+        relay.publish("good")
+        await until(lambda: len(client.frames) == frames, "the next one")  # noqa: B023
+        odd, bad, half, good = client.frames[-4:]
         assert b"the bridge met an error of its own" in odd
-        assert b"not a message" in bad
+        assert b"a message of topic 'in' is none: not a message" in bad
+        assert b"a message of topic 'in' is none: " in half
         assert good == json_frame("good")
     assert caplog.text.count("Traceback") == 1
     assert caplog.text.count("not a message") == 1
+    relay.refuses = True
+    client.feeding.follow({"in": feed()}, "in")
+    await until(lambda: len(client.frames) == 9, "the refusal")
+    assert b"no such type" in client.frames[-1]

@@ -5,14 +5,12 @@ from dataclasses import replace
 from typing import Any
 
 import pytest
-from websockets.client import ClientProtocol
-from websockets.protocol import State
-from websockets.uri import parse_uri
 
 from lupin_bridge.feed.relay import TwinNames
 from lupin_bridge.stream.frames import FrameWriter, StateFrame
 from lupin_bridge.viewers.rosbridge_session import MAX_SUBSCRIPTIONS, Reaction, Session
 from lupin_twin.core.state import Snapshot, TagState
+from tests.support.raw_ws import frames_of
 
 TOPIC = "/twin/state"
 NAMES = TwinNames(TOPIC, "/twin/get_field")
@@ -42,9 +40,7 @@ def unsubscribe(session: Session, message_id: object = None, topic: str = TOPIC)
 
 def texts_of(wire: bytes) -> list[Any]:
     """The JSON of every text frame on the wire."""
-    client = ClientProtocol(parse_uri("ws://twin"), state=State.OPEN)
-    client.receive_data(wire)
-    return [json.loads(bytes(event.data)) for event in client.events_received()]  # type: ignore[union-attr]
+    return [json.loads(data) for _, data in frames_of(wire)]
 
 
 def frame(*tag_ids: str) -> StateFrame:

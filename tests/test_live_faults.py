@@ -5,7 +5,7 @@ from typing import Any
 
 import pytest
 
-from lupin_bridge.feed.source import STALE_AFTER_S
+from lupin_bridge.stream.frames import STALE_AFTER_S
 from tests.support.domains import own_domain
 from tests.support.live import attached, field_of, wait_until_ready
 from tests.support.messages import discovered, look, occupancy_grid, pose, scan

@@ -292,12 +292,36 @@ class Roadmap:
 
 
 def tour(roadmap: Roadmap, start: Point, stops: Sequence[Point]) -> list[int]:
-    """Order the stops into a short trip from `start`, the nearest next; returns their indices."""
-    order: list[int] = []
-    here, left = start, set(range(len(stops)))
+    """Order the stops into a short round trip from `start`; returns their indices.
+
+    Nearest neighbour, then 2-opt until nothing gets shorter: for some dozens of stops that is
+    within a few percent of the best and takes milliseconds.
+    """
+    places = [start, *stops]
+    length = np.array([[length_of(roadmap.way(a, b)) for b in places] for a in places])
+    order, left = [0], set(range(1, len(places)))
     while left:
-        nearest = min(left, key=lambda stop: (length_of(roadmap.way(here, stops[stop])), stop))
+        nearest = min(left, key=lambda place: (length[order[-1], place], place))
         order.append(nearest)
         left.remove(nearest)
-        here = stops[nearest]
-    return order
+    order.append(0)
+    while _untangle(order, length):
+        pass
+    return [place - 1 for place in order[1:-1]]
+
+
+def _untangle(order: list[int], length: NDArray[np.float64]) -> bool:
+    """Reverse the first stretch of the round trip whose reversal makes it shorter."""
+    for i in range(1, len(order) - 2):
+        for j in range(i + 1, len(order) - 1):
+            before, first, last, after = order[i - 1], order[i], order[j], order[j + 1]
+            gain = (
+                length[before, first]
+                + length[last, after]
+                - length[before, last]
+                - length[first, after]
+            )
+            if gain > 1e-9:
+                order[i : j + 1] = order[i : j + 1][::-1]
+                return True
+    return False

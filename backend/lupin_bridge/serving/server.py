@@ -218,10 +218,11 @@ class BridgeServer(uvicorn.Server):
                 signal.pthread_sigmask(signal.SIG_SETMASK, held_back)
                 self._captured_signals.clear()
 
-    def handle_exit(self, sig: int, frame: FrameType | None) -> None:
+    def handle_exit(self, sig: int, frame: FrameType | None) -> None:  # noqa: ARG002
         """A stop signal has come: end, soon, and whatever hangs, a stuck loop included."""
         process.must_end()
-        super().handle_exit(sig, frame)
+        # At a second SIGINT uvicorn would cancel all that goes on, each with a trace in the log.
+        super().handle_exit(signal.SIGTERM, frame)
 
     async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
         """Tell the clients, then close.

@@ -145,7 +145,8 @@ async def test_a_client_that_leaves_takes_its_work_along(domain: int, held: Held
         assert workers.abandoned == 5
         held.gate.set()
         assert (await staying).status_code == 200
-        assert held.begun == at_work, "computed once, for who stayed"
+        # A thread that was set free may have begun another before that, too, was given up.
+        assert held.begun.count(at_work[0]) == 1, "computed once, for who stayed"
 
 
 async def test_a_time_out_ends_the_work_too(domain: int, held: Held) -> None:

@@ -31,7 +31,7 @@ SETTLES_SOON = constants(**{"lupin_twin.ros.inputs:SETTLED_S": SETTLED_S})
 # --- publishers that the contract's QoS does not match --------------------------------------------
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture
 def running() -> Iterator[Bridge]:
     with bridge(*OFTEN) as live:
         yield live
@@ -51,13 +51,12 @@ def running() -> Iterator[Bridge]:
 def test_a_publisher_of_another_qos_is_heard_and_told_of(
     running: Bridge, qos: QoSProfile, remedy: str
 ) -> None:
-    foreign, ours, last = (f"{name} {remedy[-8:]}" for name in ("foreign", "ours", "last"))
     peer = running.peer
     publisher = peer.node.create_publisher(Observation, TOPIC, qos)
 
     def is_heard() -> bool:
-        publisher.publish(scan(foreign, {"co2": 1.0}))
-        return running.get(f"/api/tags/{foreign}").status_code == 200
+        publisher.publish(scan("foreign", {"co2": 1.0}))
+        return running.get("/api/tags/foreign").status_code == 200
 
     wait_for(is_heard, "what it says")
     (said,) = wait_for(lambda: running.json("/readyz")["input_problems"], "the problem")
@@ -67,11 +66,11 @@ def test_a_publisher_of_another_qos_is_heard_and_told_of(
     assert diagnosed(peer, lambda values: said in values.get("inputs", {}).values())
     # Who keeps to the contract is heard by both subscriptions, and counts once; it gives no stamp.
     for value in range(20):
-        peer.observe(scan(ours, {"co2": float(value)}))
-    running.tag(ours, lambda tag: tag["readings"][0]["value"] == 19.0)
-    publisher.publish(scan(last, {"co2": 1.0}))
-    running.tag(last)
-    assert len(running.json(f"/api/tags/{ours}/history")["tries"]) == 20
+        peer.observe(scan("ours", {"co2": float(value)}))
+    running.tag("ours", lambda tag: tag["readings"][0]["value"] == 19.0)
+    publisher.publish(scan("the last", {"co2": 1.0}))
+    running.tag("the last")
+    assert len(running.json("/api/tags/ours/history")["tries"]) == 20
     assert running.json("/readyz")["drops"] == []
     peer.node.destroy_publisher(publisher)
     wait_for(lambda: not running.json("/readyz")["input_problems"], "nothing to be wrong")

@@ -111,8 +111,9 @@ def test_the_bridge_is_ready_when_it_serves_and_says_when_it_stops(
         for _ in range(3):
             assert listening.next() == {"WATCHDOG": "1"}
         (patrol,) = wait_for(lambda: patrols_of(process.pid), "the patrol")
-        inherited = Path(f"/proc/{patrol}/environ").read_bytes()
-        assert b"ROS_DOMAIN_ID" in inherited
+        environment = Path(f"/proc/{patrol}/environ")  # empty for a moment, as it starts
+        wait_for(lambda: b"ROS_DOMAIN_ID" in environment.read_bytes(), "what it inherits")
+        inherited = environment.read_bytes()
         assert b"NOTIFY_SOCKET" not in inherited
         assert TOKEN.encode() not in inherited
         listening.rest()  # of words that nobody takes, the socket holds ten, and no more

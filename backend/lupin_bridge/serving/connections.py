@@ -306,4 +306,4 @@ def _address_of(connection: socket.socket) -> str:
         peer = connection.getpeername()
     except OSError:
         return ""  # it has gone already
-    return client_key(peer[0]) if peer else ""  # of a Unix socket
+    return client_key(peer[0]) if isinstance(peer, tuple) else ""  # a Unix socket's has a path

@@ -43,6 +43,11 @@ def test_it_is_its_owners_and_their_groups_and_a_state_comes_through(path: Path)
         left.bind(str(path))  # and its process has ended
     with asking(path) as client:
         assert path.stat().st_mode & 0o777 == 0o660
+        with socket.socket(socket.AF_UNIX) as named:
+            named.bind(f"\0{path}")  # in Linux's abstract namespace: its name is bytes
+            named.connect(str(path))
+            named.sendall(b"GET /healthz HTTP/1.0\r\nHost: localhost\r\n\r\n")
+            assert named.recv(15) == b"HTTP/1.1 200 OK"
         assert client.get("/api/state").status_code in (200, 503)
         with unix_connect(str(path), "ws://localhost/ws/state") as connection:
             assert '"status"' in str(connection.recv(timeout=PATIENCE_S))

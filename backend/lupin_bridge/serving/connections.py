@@ -91,7 +91,7 @@ def reset(transport: asyncio.WriteTransport) -> None:
     """End a connection now, and so that its other side takes it for no proper end."""
     no_lingering = struct.pack("ii", 1, 0)
     connection: socket.socket | None = transport.get_extra_info("socket")
-    if connection is not None:  # of TLS that has ended there is none
+    if connection is not None and connection.fileno() >= 0:  # else it has ended already
         connection.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, no_lingering)
     transport.abort()
 
@@ -306,4 +306,4 @@ def _address_of(connection: socket.socket) -> str:
         peer = connection.getpeername()
     except OSError:
         return ""  # it has gone already
-    return client_key(peer[0]) if peer else ""  # of a Unix socket
+    return client_key(peer[0]) if isinstance(peer, tuple) else ""  # a Unix socket's has a path

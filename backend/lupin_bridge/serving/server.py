@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import fcntl
 import gc
 import logging
 import math
@@ -12,7 +13,7 @@ import signal
 import socket
 import ssl
 from collections.abc import Callable, Iterator, MutableMapping, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager, nullcontext, suppress
 from pathlib import Path
 from types import FrameType
 from typing import Any, Final, NoReturn
@@ -255,7 +256,6 @@ def listen(host: str, port: int) -> socket.socket:
     """
     path = unix_path(host)
     if path is not None:
-        _remove_left(path)
         listener = socket.socket(socket.AF_UNIX)
     else:
         family = socket.AF_INET6 if ":" in host else socket.AF_INET
@@ -264,17 +264,30 @@ def listen(host: str, port: int) -> socket.socket:
         listener = socket.socket(family, socket.SOCK_STREAM, socket.IPPROTO_TCP)
         listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
     try:
-        if path is not None:
-            listener.bind(str(path))
-            path.chmod(0o660)  # nobody can connect before it listens
-        else:
-            listener.bind((host, port))
-        listener.listen(BACKLOG)
+        with nullcontext() if path is None else _locked(path.parent):
+            if path is not None:
+                _remove_left(path)
+                listener.bind(str(path))
+                path.chmod(0o660)  # nobody can connect before it listens
+            else:
+                listener.bind((host, port))
+            listener.listen(BACKLOG)
     except OSError:
         listener.close()
         raise
     listener.setblocking(False)
     return listener
+
+
+@contextmanager
+def _locked(folder: Path) -> Iterator[None]:
+    """Of two who start at once, the second would take the first's new socket for one left over."""
+    file = os.open(folder, os.O_RDONLY)
+    try:
+        fcntl.flock(file, fcntl.LOCK_EX)
+        yield
+    finally:
+        os.close(file)
 
 
 def _remove_left(path: Path) -> None:

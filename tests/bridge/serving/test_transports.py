@@ -11,6 +11,8 @@ from contextlib import ExitStack, asynccontextmanager
 from functools import partial
 from pathlib import Path
 
+import pytest
+
 from lupin_bridge.serving.connections import UNSENT_BYTES, bound_unsent, reset, tear_down
 from tests.support.tls import Certificate, certificate
 from tests.support.waiting import until
@@ -95,8 +97,9 @@ async def test_who_has_read_all_is_closed() -> None:
         assert await loop.sock_recv(theirs, 100) == b""
 
 
-async def test_over_tls_what_is_being_closed_can_be_ended_and_again(tmp_path: Path) -> None:
-    async with connection(certificate(tmp_path)) as (transport, _, ended):
+@pytest.mark.parametrize("has_tls", [False, True])
+async def test_what_is_being_closed_can_be_ended_and_again(tmp_path: Path, has_tls: bool) -> None:
+    async with connection(certificate(tmp_path) if has_tls else None) as (transport, _, ended):
         for _ in range(2):
             transport.close()
         tear_down(transport)

@@ -1,7 +1,9 @@
 """A bridge that a reverse proxy of the same machine reaches through a Unix socket."""
 
 import socket
+import threading
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -9,6 +11,7 @@ import httpx
 import pytest
 from websockets.sync.client import unix_connect
 
+from lupin_bridge.serving.server import listen
 from tests.support.access import refused_start
 from tests.support.domains import own_domain
 from tests.support.people import add
@@ -43,6 +46,11 @@ def test_it_is_its_owners_and_their_groups_and_a_state_comes_through(path: Path)
         left.bind(str(path))  # and its process has ended
     with asking(path) as client:
         assert path.stat().st_mode & 0o777 == 0o660
+        with socket.socket(socket.AF_UNIX) as named:
+            named.bind(f"\0{path}")  # in Linux's abstract namespace: its name is bytes
+            named.connect(str(path))
+            named.sendall(b"GET /healthz HTTP/1.0\r\nHost: localhost\r\n\r\n")
+            assert named.recv(15) == b"HTTP/1.1 200 OK"
         assert client.get("/api/state").status_code in (200, 503)
         with unix_connect(str(path), "ws://localhost/ws/state") as connection:
             assert '"status"' in str(connection.recv(timeout=PATIENCE_S))
@@ -56,6 +64,25 @@ def test_who_reaches_it_is_the_proxy_and_names_the_person(path: Path, tmp_path: 
     with asking(path, *accounts, "--proxy-user-header", "Remote-User") as client:
         assert client.get("/api/session").status_code == 401
         assert client.get("/api/session", headers={"Remote-User": "anna"}).json()["name"] == "anna"
+
+
+def test_of_those_that_start_at_once_one_has_it(path: Path) -> None:
+    """A second one must not take the first's new socket for one that was left."""
+    together = threading.Barrier(4)
+
+    def start(_: int) -> socket.socket | None:
+        together.wait(PATIENCE_S)
+        try:
+            return listen(f"unix:{path}", 0)
+        except OSError:
+            return None
+
+    with ThreadPoolExecutor(4) as starting:
+        for _ in range(100):
+            listeners = [it for it in starting.map(start, range(4)) if it is not None]
+            for listener in listeners:
+                listener.close()  # its path is left, as of a process that has ended
+            assert len(listeners) == 1
 
 
 @pytest.mark.parametrize("name", ["file", "no-such-folder/http.sock", "long" * 40])

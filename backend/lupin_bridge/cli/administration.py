@@ -1,6 +1,6 @@
 """What an administrator runs: `archive` and `forward`; `user`, `token` and `audit`.
 
-Who may is told to a file that bridges read, also while they run: they see it at once.
+Accounts and tokens are in a file that bridges read: a change counts at once while they run.
 """
 
 from __future__ import annotations

@@ -73,7 +73,7 @@ def test_each_tag_gets_its_exact_place_before_anything_else(rows: list[Write]) -
 
 def test_its_time_of_day_is_that_of_the_patrol(scans: list[Scan]) -> None:
     """Readings follow the climate's own curve, at the time of day that leads up to the start."""
-    greenhouse = read_greenhouse(GreenhouseSimulator())
+    tags = {tag.tag_id: tag for tag in read_greenhouse(GreenhouseSimulator()).tags}
     truth = Truth(GreenhouseSimulator())
 
     def off_by(hours: float) -> float:
@@ -82,7 +82,7 @@ def test_its_time_of_day_is_that_of_the_patrol(scans: list[Scan]) -> None:
                 reading.value
                 - truth.of(
                     "temperature",
-                    greenhouse.tag(row.tag_id).position,
+                    tags[row.tag_id].position,
                     START_OF_DAY_S + at_s(row) * DAY_SPEED + hours * 3600,
                 )
             )

@@ -48,8 +48,9 @@ def test_every_tag_of_the_greenhouse_is_seen_from_its_stop_in_the_order_of_the_l
         assert detector.observe_from(tag.stop, 0)
         assert tag in [sighting.tag for sighting in detector.sightings()]
     detector = TagDetector(greenhouse, plants, 0)
-    detector.observe_from(greenhouse.tag("2").stop, 0)
-    detector.observe_from(greenhouse.tag("21").stop, 0)
+    stops = {tag.tag_id: tag.stop for tag in greenhouse.tags}
+    for tag_id in ("2", "21"):
+        detector.observe_from(stops[tag_id], 0)
     found = [sighting.tag.tag_id for sighting in detector.sightings()]
     assert found.index("2") < found.index("21")
 

@@ -81,9 +81,9 @@ class Alarms(AlarmBoard):
         since_ns: int | None = 1,
         *,
         is_past: bool = False,
-    ) -> bool:
+    ) -> None:
         """Take these for the alarms as they stand."""
         before, page = self.now.page, page_of(alarms)
         change = change_between(before, page)
         page = before if page == before else page
-        return self.put(page, replace(change, is_past=is_past), source, since_ns)
+        self.put(page, replace(change, is_past=is_past), source, since_ns)

@@ -157,18 +157,17 @@ class AlarmBoard:
         self._listeners[listener] = None
         return lambda: self._listeners.pop(listener, None)
 
-    def put(self, page: Page, change: Change, source: AlarmSource, since_ns: int | None) -> bool:
-        """Take these for the alarms as they stand; returns whether anything is as it was not."""
+    def put(self, page: Page, change: Change, source: AlarmSource, since_ns: int | None) -> None:
+        """Take these for the alarms as they stand; it is no change where nothing is new."""
         before = self.now
         if page is before.page and (source, since_ns) == (before.source, before.since_ns):
-            return False
+            return
         self.now = Board(page, source, since_ns, before.number + 1)
         for listener in tuple(self._listeners):
             try:
                 listener(change)
             except Exception:  # whatever it is: the other listeners are told all the same
                 log.exception("a listener to alarms met an error")
-        return True
 
 
 # --- what people said of alarms -------------------------------------------------------------------

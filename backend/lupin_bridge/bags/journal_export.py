@@ -14,13 +14,7 @@ from contextlib import ExitStack
 from pathlib import Path
 from typing import Any, Final
 
-from lupin_msgs.msg import (
-    DiscoveredTag,
-    DiscoveredTags,
-    FlowerObservation,
-    Observation,
-    SensorReading,
-)
+from lupin_msgs.msg import DiscoveredTag, DiscoveredTags
 from mcap.writer import CompressionType, Writer
 from rclpy.serialization import serialize_message
 from rosgraph_msgs.msg import Clock
@@ -33,13 +27,12 @@ from lupin_bridge.bags.recording import (
     TAGS_TYPE,
 )
 from lupin_bridge.feed.relay import ENCODING, Topic, schema_text
-from lupin_twin.core.history import kind_of
 from lupin_twin.core.parameters import TwinParameters
-from lupin_twin.core.state import NO_FLOWER, Inspection, Pin, Pose, Scan, Write
+from lupin_twin.core.state import Inspection, Pin, Pose, Scan, Write
 from lupin_twin.journal.rows import listed_rows
 from lupin_twin.journal.runs import Run, runs, spans_within
 from lupin_twin.journal.schema import LOCAL_SITE, one_view
-from lupin_twin.ros.convert import flower_fields, pose_message, time_msg
+from lupin_twin.ros.convert import observation_message, pose_message, time_msg
 
 # What rosbag2 calls it in a channel's metadata; without it rosbag2 plays everything as volatile.
 QOS_KEY: Final = "offered_qos_profiles"
@@ -168,22 +161,7 @@ class JournalRows:
 
 def observation(row: Scan | Inspection) -> bytes:
     """lupin_msgs/Observation."""
-    stamp = time_msg(row.stamp_ns)
-    msg = Observation(mission_id=row.mission, source=row.source, tag_pose_in_map=pose_message(None))
-    msg.header.stamp = stamp
-    flower = row.flower if isinstance(row, Inspection) and row.flower else NO_FLOWER
-    msg.flower = FlowerObservation(confidence=float(flower.confidence), **flower_fields(flower))
-    msg.flower.pose.pose = pose_message(None)
-    msg.kind, msg.status, msg.status_detail = kind_of(row), row.status, row.status_detail
-    if isinstance(row, Scan):
-        msg.tag_reading.tag_id = row.tag_id
-        msg.tag_reading.stamp = stamp
-        msg.tag_reading.readings = [
-            SensorReading(name=reading.name, value=float(reading.value)) for reading in row.readings
-        ]
-    else:
-        msg.flower.tag_id = row.tag_id
-    return bytes(serialize_message(msg))
+    return bytes(serialize_message(observation_message(row, "")))
 
 
 def discovered(pins: Iterable[Pin]) -> bytes:

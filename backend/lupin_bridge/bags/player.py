@@ -146,7 +146,7 @@ class PlayerNode(Node):  # type: ignore[misc]  # rclpy is not typed
         """Refuse a second twin in this ROS domain: its journal would keep what is played.
 
         Raises:
-            RecordingError: see above.
+            RecordingError: several twins run; the message says what to do.
 
         """
         twins = [

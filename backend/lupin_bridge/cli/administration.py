@@ -1,6 +1,6 @@
 """What an administrator runs: `archive` and `forward`; `user`, `token` and `audit`.
 
-Who may is told to a file that bridges read, also while they run: they see it at once.
+Accounts and tokens are in a file that bridges read: a change counts at once while they run.
 """
 
 from __future__ import annotations
@@ -66,7 +66,7 @@ from lupin_bridge.settings import (
     variable,
 )
 from lupin_twin.core.parameters import MAX_JOURNAL_DAYS
-from lupin_twin.runtime.process import INTERRUPTED
+from lupin_twin.runtime.process import INTERRUPTED, USAGE_ERROR
 
 ARCHIVE_ACTIONS: Final[Mapping[str, str]] = {
     "init": "make its tables and roles, in a database that has none of them",
@@ -75,7 +75,6 @@ ARCHIVE_ACTIONS: Final[Mapping[str, str]] = {
     "check": "read all of it for rows that fit no other; exit code 1 if there are any",
     "retain": "delete scans and inspections that are older than some days",
 }
-_USAGE_ERROR: Final = 2
 # Beside a busy twin it gets a tenth of the core that they share.
 _NICENESS: Final = 10
 _URL: Final = "archive_url"
@@ -125,7 +124,7 @@ def run_archive(options: argparse.Namespace, environ: Mapping[str, str]) -> int:
         return INTERRUPTED
     except UsageError as error:
         say(str(error))
-        return _USAGE_ERROR
+        return USAGE_ERROR
     except ArchiveError as error:
         say(str(error))
         return FAILED

@@ -35,7 +35,12 @@ from lupin_bridge.settings import (
     take_secrets,
 )
 from lupin_twin.adapt import cli as adapt
-from lupin_twin.runtime.process import exit_after, limit_blas_threads, return_large_blocks
+from lupin_twin.runtime.process import (
+    USAGE_ERROR,
+    exit_after,
+    limit_blas_threads,
+    return_large_blocks,
+)
 
 # Of a repeated message: so many at once of our own, and one a period from then on.
 AT_ONCE: Final = 20
@@ -130,7 +135,6 @@ def set_up_log(log_format: str, level: str = "info") -> None:
 
 log = logging.getLogger(__name__)
 
-USAGE_ERROR = 2
 
 _WITHOUT_ROS = {
     "journal": journal.run,

@@ -1,7 +1,7 @@
-"""By what the operator wants it judged, snapshot by snapshot: who has changed, or grown old.
+"""What the operator wants readings judged by, and tags judged by that, snapshot by snapshot.
 
-Pure. Kept from one snapshot to the next are each tag's recent scans and its last verdict, and since
-when each of its reasons holds.
+Pure, but for the file of sensors. Kept between snapshots are each tag's recent scans and its last
+verdict, and since when each of its reasons holds.
 """
 
 from __future__ import annotations

@@ -311,8 +311,8 @@ MAX_DETAIL: Final = 200
 class Condition:
     """Counts since the start, and what is wrong: `detail` is empty where nothing is.
 
-    `sent` was taken by the other side, `failed` are tries that were not, `dropped` was given up or
-    gave way to something newer. `is_connected`: the last try was taken, or is about to be.
+    `sent` was taken by the other side, `failed` are attempts that were not, `dropped` was given up
+    or gave way to something newer. `is_connected`: the last one was taken, or is about to be.
     """
 
     is_connected: bool = False
@@ -328,7 +328,7 @@ class Condition:
         self.sent += number
 
     def failing(self, why: str) -> None:
-        """A try failed."""
+        """An attempt failed."""
         self.is_connected = False
         self.detail = " ".join(why.split())[:MAX_DETAIL] or "it failed without a reason"
         self.failed += 1

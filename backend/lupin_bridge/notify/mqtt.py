@@ -83,7 +83,7 @@ class Mirror:
         self._seen = GreenhouseState()
         self._tags: dict[str, TagState] = {}
         self._published: dict[str, _Published] = {}
-        # Tags in their turn, each with the state with which it came to wait; HOUSE: the greenhouse.
+        # Tags in their turn, each with the state with which it came to wait; SITE: the greenhouse.
         self._waiting: dict[str, TagState | None] = {SITE: None}
         # Before that, no published reading ceases to hold.
         self._first_until_ns = _NEVER

@@ -1,4 +1,4 @@
-"""Queries of the past: each looks up what it needs of the log, and plans its answer.
+"""Queries of the past: each looks up what it needs of the log, derives, and plans its answer.
 
 Queries are values: they are pickled and sent to the process that reads the log. Back come the ETag
 and the body, for clients without it. A moment that has passed does not change, and its ETag is made
@@ -110,7 +110,7 @@ class ConditionalQuery:
     if_none_match: str = ""
 
     def answer(self, find: Find, should_stop: ShouldStop) -> Answered:
-        """See `feed.query.Question`."""
+        """See `feed.query.PastQuery`."""
         plan = self.query.look(find)
         has_it = matches(self.if_none_match, plan.etag)
         return Answered(plan.etag, None if has_it else plan.write(should_stop))
@@ -333,7 +333,7 @@ FindSeries = Callable[[SeriesRequest], SeriesPast]
 def derived_series(
     request: SeriesRequest, sensors: Sensors, is_day: IsDay, find: FindSeries
 ) -> SeriesPast:
-    """The series of a request; a derived one, unless a sensor has its name, of its parts."""
+    """Measured under that name, else derived of its parts; `PastRefused`: those are too many."""
     measured = find(request)
     derived, daily = DERIVED.get(request.sensor_type), DAILY.get(request.sensor_type)
     if measured.stamps_ns:

@@ -6,7 +6,7 @@ never read would fill the memory, and some thousand that never finish a request 
 The times hold for the connection, and so for whatever is sent: answers of routes, and refusals of
 access control, of the framework and of this protocol alike.
 
-The parser gets one whole head at a time, of bounded size and number of lines. Three routes want a
+The parser gets one whole head at a time, of bounded size and number of lines. Few routes want a
 body, of bounded size and of a length that is said before; a request with any other body is refused
 before any of that is read.
 """

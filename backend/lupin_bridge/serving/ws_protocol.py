@@ -1,7 +1,7 @@
-"""WebSocket connections as the fan-out needs them: write at once, or know that one is full.
+"""WebSocket: what a client may send as JSON, and connections as the fan-out needs them.
 
 uvicorn gives an application `send()` alone, which waits for a slow client. The fan-out must not
-wait: it asks, and keeps the newest frame for the moment at which the client is ready again.
+wait: it asks whether one is full, and keeps the newest frame for the moment at which it is not.
 """
 
 from __future__ import annotations
@@ -19,6 +19,8 @@ from websockets.protocol import State
 
 from lupin_bridge.serving.admission import RateLimit, client_key
 from lupin_bridge.serving.connections import CLOSE_GRACE_S, refusal, tear_down
+
+# --- a client's JSON ------------------------------------------------------------------------------
 
 # No message that we serve has more than some hundred bytes.
 MAX_MESSAGE_LENGTH: Final = 16_384
@@ -60,14 +62,12 @@ def shown(value: object) -> str:
     return text if len(text) <= 64 else text[:63] + "…"
 
 
-# A large WebSocket message as a row of small frames, whose payloads are views of it. Pure.
-#
+# --- a large message as a row of small frames, whose payloads are views of it ---------------------
+
 # asyncio copies what a socket does not take. Of a map for a hundred clients that do not read,
 # that would be a hundred copies; so each gets the next piece when it has taken the one before,
 # and all of them share the message. A ping, its answer and a close may come between two pieces
 # (RFC 6455, section 5.4).
-
-
 PIECE_BYTES: Final = 131_072
 
 # A frame's head, perhaps with the beginning of its payload, and what follows it.
@@ -107,6 +107,8 @@ def frame_head(first: int, length: int) -> bytes:
         return struct.pack("!BBH", first, 126, length)
     return struct.pack("!BBQ", first, 127, length)
 
+
+# --- a connection ---------------------------------------------------------------------------------
 
 CONNECTION_KEY = "connection"
 

@@ -168,10 +168,6 @@ class Greenhouse:
         """Whether the robot's centre may be there."""
         return _is_free(point, self.interior, self.tables)
 
-    def tag(self, tag_id: str) -> Tag:
-        """Return the tag of that id."""
-        return next(tag for tag in self.tags if tag.tag_id == tag_id)
-
 
 def read_greenhouse(simulator: Any) -> Greenhouse:
     """Read the layout of a `greenhouse_sim.simulator.GreenhouseSimulator`.

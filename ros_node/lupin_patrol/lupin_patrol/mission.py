@@ -69,7 +69,7 @@ class TagsDiscovered:
 
 @dataclass(frozen=True, slots=True)
 class Visited:
-    """One try at a tag's sensors, or one inspection of the plants around it; without its times.
+    """One attempt at a tag's sensors, or one inspection of the plants around it; without its times.
 
     A scan without success has neither readings nor a pose. The footprint of an inspection is the
     outline of the plants' table.
@@ -180,7 +180,7 @@ class Mission:
             self._battery_m = _BATTERY_M
 
     def visits(self) -> Iterator[Visited]:
-        """The scans and looks of `events`, a tenth of the work: nobody looks around on the way."""
+        """The visits of `events`, a tenth of the work: nobody looks around on the way."""
         self._is_observing = False
         for event in self.events():
             if isinstance(event, Visited):

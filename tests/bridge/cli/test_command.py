@@ -108,6 +108,14 @@ def untouched_root(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
         logging.getLogger(name).setLevel(logging.NOTSET)
 
 
+@pytest.fixture
+def now_s(monkeypatch: pytest.MonkeyPatch) -> list[float]:
+    """The steady clock, to be set."""
+    now_s = [100.0]
+    monkeypatch.setattr(time, "monotonic", lambda: now_s[0])
+    return now_s
+
+
 def test_json_is_one_object_a_line_with_the_error(capsys: pytest.CaptureFixture[str]) -> None:
     command.set_up_log("json")
     log = logging.getLogger("lupin_bridge.test")
@@ -161,10 +169,8 @@ def said_by(name: str, capsys: pytest.CaptureFixture[str]) -> list[str]:
 
 @pytest.mark.parametrize("name", ["lupin_bridge.access", "lupin_twin", "lupin_web"])
 def test_of_our_own_some_are_said_at_once(
-    name: str, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+    name: str, now_s: list[float], capsys: pytest.CaptureFixture[str]
 ) -> None:
-    now_s = [100.0]
-    monkeypatch.setattr(time, "monotonic", lambda: now_s[0])
     command.set_up_log("text")
     log = logging.getLogger(name)
     for number in range(command.AT_ONCE + 7):
@@ -179,10 +185,8 @@ def test_of_our_own_some_are_said_at_once(
 
 @pytest.mark.parametrize("name", ["asyncio", "uvicorn.error", "websockets.server", "nobodys"])
 def test_every_librarys_words_are_rationed_whatever_numbers_stand_in_them(
-    name: str, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+    name: str, now_s: list[float], capsys: pytest.CaptureFixture[str]
 ) -> None:
-    now_s = [100.0]
-    monkeypatch.setattr(time, "monotonic", lambda: now_s[0])
     command.set_up_log("text")
     log = logging.getLogger(name)
     for number in range(1_000):
@@ -197,10 +201,8 @@ def test_every_librarys_words_are_rationed_whatever_numbers_stand_in_them(
     assert "<Transport fd=7 at 0x7> (999 more since the last time)" in capsys.readouterr().err
 
 
-def test_one_logger_has_an_end_whatever_it_thinks_of(
-    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(time, "monotonic", lambda: 100.0)
+@pytest.mark.usefixtures("now_s")
+def test_one_logger_has_an_end_whatever_it_thinks_of(capsys: pytest.CaptureFixture[str]) -> None:
     command.set_up_log("text")
     for number in range(10 * command.LOGGER_AT_ONCE):
         logging.getLogger("lupin_twin").warning("%s", "x" * number)

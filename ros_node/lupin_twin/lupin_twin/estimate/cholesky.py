@@ -1,4 +1,4 @@
-"""Readings solved exactly, by one Cholesky factor; of too many, the neighbours of each place.
+"""Readings solved, by one Cholesky factor or neighbours; left out in turn; where a tag helps.
 
 Pure, standardised units. Of a place, phi = [1, R(x, tag_1 .. T)]: mean = phi w, variance = prior -
 phi Q phi', with w = B K^-1 y, Q = B K^-1 B', and B what a reading has in common with now, summed by

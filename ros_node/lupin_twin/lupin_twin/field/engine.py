@@ -272,6 +272,9 @@ def default_request(
         resolution *= 2.0
 
 
+# --- how far off it is, and how much of it is known -----------------------------------------------
+
+
 @dataclass(frozen=True, slots=True)
 class TagError:
     """One tag's reading against what the others say; `error` is `predicted - measured`."""

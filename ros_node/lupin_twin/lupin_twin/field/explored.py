@@ -32,9 +32,7 @@ _EDGE_NOISE_CELLS: Final = 1e-4
 _CELLS_AT_ONCE: Final = 16_384
 
 # Where a map lies.
-_PLACE: Final = (
-    *("frame_id", "width", "height", "resolution", "origin_x", "origin_y", "origin_yaw"),
-)
+_PLACE: Final = "frame_id", "width", "height", "resolution", "origin_x", "origin_y", "origin_yaw"
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -318,6 +318,8 @@ def _places(log: SiteLog, run: Run) -> dict[str, tuple[float, float]]:
     return {tag: (x, y) for tag, x, y in found.fetchall()}
 
 
+# --- notes ----------------------------------------------------------------------------------------
+
 # An id is the number of the write, in hexadecimal digits that sort as it does, and digits of
 # chance: an archive has the notes of several journals of one site, whose numbers are the same.
 _DIGITS: Final = 16

@@ -296,10 +296,8 @@ def _moment(stamp: Any) -> int | None:
 
 def observation_message(write: Scan | Inspection, frame_id: str) -> Any:
     """A scan, an inspection, or an attempt that failed, as lupin_msgs/Observation."""
-    header, pose = (
-        Header(stamp=time_msg(write.stamp_ns), frame_id=frame_id),
-        pose_message(write.pose),
-    )
+    header = Header(stamp=time_msg(write.stamp_ns), frame_id=frame_id)
+    pose = pose_message(write.pose)
     message = Observation(
         header=header,
         mission_id=write.mission,

@@ -251,9 +251,17 @@ export const isStroked = (marker: Marker): boolean =>
 
 /** The colours of charts beside those of the lines, by their names in the style sheet. */
 const COLOURS = [
-  ...(['ink', 'text', 'grid', 'surface', 'ideal', 'ideal-line'] as const),
-  ...(['gap', 'failure', 'look', 'moment'] as const),
-];
+  'ink',
+  'text',
+  'grid',
+  'surface',
+  'ideal',
+  'ideal-line',
+  'gap',
+  'failure',
+  'look',
+  'moment',
+] as const;
 
 type Colours = Readonly<Record<(typeof COLOURS)[number], string>>;
 type ChartPalette = ReturnType<typeof readPalette>;

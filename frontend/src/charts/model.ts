@@ -2,8 +2,17 @@
 import { fetchSeries, fetchTimeline } from '../contract/past';
 import { type Catalogue, type Catalogues, type Ranges, rangesFor } from '../domain/sensors';
 import { type TemperatureUnit, toShown } from '../domain/format';
+import type { Shared } from '../domain/memo';
 import { rangeOf } from '../domain/ramp';
-import { laterBy, marksOf, middleOf, type Point, type Series, seriesOf } from '../domain/series';
+import {
+  laterBy,
+  type Mark,
+  marksOf,
+  middleOf,
+  type Point,
+  type Series,
+  seriesOf,
+} from '../domain/series';
 import { shown } from '../domain/text';
 import type { Span } from '../domain/time';
 import type { Charted } from '../store/view';
@@ -44,7 +53,7 @@ export function bandsOf(
   return bands;
 }
 
-export type PlotModel = ReturnType<typeof modelOf>;
+export type PlotModel = Shared<ReturnType<typeof modelOf>>;
 
 /** A point of a line in the unit that is shown; null breaks the line. */
 type Drawn = Pick<Point, 'at' | 'value'>;
@@ -251,9 +260,17 @@ export function modelOf(
     const key = pairKey({ tagId, sensor });
     const own = series.get(key);
     if (!own) return [];
-    const ofDayBefore = before.get(key) ?? null;
-    const label = tagLabel(tagId);
-    return [{ series: own, before: ofDayBefore, look, label, marks: marks.get(tagId) ?? [] }];
+    return [
+      {
+        series: own,
+        /** The day before, a day later than it was; null: it is not shown. */
+        before: before.get(key) ?? null,
+        /** Place among the looks. */
+        look,
+        label: tagLabel(tagId),
+        marks: (marks.get(tagId) ?? []) as readonly Mark[],
+      },
+    ];
   });
   const now = catalogue.named(sensor);
   const isMixed = new Set(tagIds.map((_, index) => rangesFor(now, species[index] ?? ''))).size > 1;
@@ -263,5 +280,16 @@ export function modelOf(
   const bands = isMixed
     ? []
     : bandsOf(span, lines[0]?.series.nights ?? null, ranges, moment ?? nowS);
-  return { sensor: now, unit, span, moment, lines, bands, isMixed };
+  return {
+    sensor: now,
+    unit,
+    span,
+    /** That the page shows, ROS seconds; null: now. */
+    moment,
+    lines,
+    /** By their time, over all of the span. */
+    bands,
+    /** The lines' plants have ranges of their own, and no band is that of all. */
+    isMixed,
+  };
 }

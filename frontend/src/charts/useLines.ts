@@ -61,6 +61,7 @@ export function useLines(pairs: readonly Pair[], points: number, hasDayBefore = 
     lines: fetched.value ?? NO_LINES,
     /** Null while nobody knows what time it is. */
     span,
+    /** The time of the twin, ROS seconds. */
     nowS,
     /** "missing": this twin keeps no past. While it is fetched again, what was there stays. */
     state: isOff ? ('missing' as const) : fetched.state,

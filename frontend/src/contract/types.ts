@@ -116,6 +116,7 @@ export interface NoEstimate {
 
 export interface Field {
   readonly sensor: string;
+  /** Cells. */
   readonly width: number;
   readonly height: number;
   /** Lower left corner of cell (0, 0), metres in the map frame. */
@@ -130,6 +131,7 @@ export interface Field {
   readonly sampleCount: number;
   /** Row-major, row 0 at the bottom (lowest y); not-a-number: not known. */
   readonly values: Float32Array;
+  /** Of an estimate alone. */
   readonly sureness?: Sureness;
   /** Of the nearest readings in place of an estimate. */
   readonly noEstimate?: NoEstimate;

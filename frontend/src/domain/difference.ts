@@ -13,6 +13,7 @@ export type Compare =
 export const DAY_S = 86_400;
 export const WEEK_S = 7 * DAY_S;
 
+/** ROS seconds. */
 export const otherMoment = (compare: Compare, shownAt: number): number =>
   compare.by === 'moment' ? compare.at : shownAt - compare.seconds;
 
@@ -101,7 +102,10 @@ export interface TagThen {
   readonly health: TagHealth;
 }
 
-/** Null: there is no reading now that holds, and nothing to compare. */
+/**
+ * Null: there is no reading now that holds, and nothing to compare. `by`: what is now less what was then, in
+ * the sensor's unit; none: there was no reading, or none that held then; same: it is the reading of then.
+ */
 export function trendOf(sensor: string, now: TagThen, then: TagThen | null) {
   const value = held(sensor, now);
   if (value === null) return null;

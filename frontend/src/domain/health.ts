@@ -9,6 +9,7 @@ import {
   type TemperatureUnit,
   valueText,
 } from './format';
+import type { Shared } from './memo';
 import type { Catalogue } from './sensors';
 import { shown } from './text';
 import type { Tag } from './twin';
@@ -23,7 +24,7 @@ export const VERDICTS = [
 
 export const NOT_JUDGED: TagHealth = { verdict: 'unknown', reasons: [] };
 
-export type HouseHealth = ReturnType<typeof houseHealth>;
+export type HouseHealth = Shared<ReturnType<typeof houseHealth>>;
 
 const SILENT: HealthReason = {
   kind: 'silent',
@@ -52,8 +53,9 @@ export function houseHealth(tags: readonly Tag[], judgement: Judgement | null, i
     reasons,
     /** Whose ranges hold, and what says so; null: nobody was asked. */
     day: judgement?.house.day ?? null,
+    /** What it is doing; null: nobody was asked. */
     patrol: judgement?.house.patrol ?? null,
-    counts,
+    counts: counts as Readonly<Record<Verdict, number>>,
     byTag,
   };
 }

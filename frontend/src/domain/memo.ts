@@ -1,3 +1,13 @@
+type Frozen<Part> =
+  Part extends Map<infer Key, infer Value>
+    ? ReadonlyMap<Key, Value>
+    : Part extends (infer Item)[]
+      ? readonly Item[]
+      : Part;
+
+/** Of what several places hold at once: nobody changes its fields, nor its lists and maps. */
+export type Shared<Whole> = { readonly [Key in keyof Whole]: Frozen<Whole[Key]> };
+
 /** The same function, but the same arguments as last time give the same object back. */
 export function memoLast<Args extends readonly unknown[], Result>(
   compute: (...args: Args) => Result,

@@ -1,6 +1,7 @@
 /** What the page knows about kinds of sensors: the file that is in force, as the bridge tells it. */
 import type { SensorEntry, SensorRanges, SensorsFile } from '../contract/types';
 import { LANGUAGE } from '../strings';
+import type { Shared } from './memo';
 
 /** From low to high, both included, in the sensor's unit. */
 export type Span = readonly [low: number, high: number];
@@ -13,7 +14,7 @@ export interface Ranges {
 }
 
 /** A kind of sensor, with the ranges of the day or of the night, whichever it is. */
-export type Sensor = ReturnType<typeof sensorOf>;
+export type Sensor = Shared<ReturnType<typeof sensorOf>>;
 export type Catalogue = ReturnType<typeof catalogueOf>;
 /** By day and by night. */
 export type Catalogues = ReturnType<typeof cataloguesOf>;
@@ -116,6 +117,7 @@ function sensorOf(
     dataLabel: entry.label || name,
     /** Empty when unknown. */
     unit,
+    /** Degrees and percents of the ramp's colour. */
     hue,
     lightness,
     saturation: file.ramp.saturation,

@@ -4,6 +4,7 @@
  */
 import type { History, Timeline } from '../contract/types';
 import { type Cell, csv } from './text';
+import type { Shared } from './memo';
 import { hasDate, secondsOf, type Span } from './time';
 import type { Catalogue } from './sensors';
 import { type TemperatureUnit, toShown, unitOf } from './format';
@@ -22,8 +23,8 @@ export interface Point {
 }
 
 /** Tries that came to nothing, or looks at the flowers, somewhere in `widthS` seconds from `at` on. */
-export type Mark = ReturnType<typeof marksOf>[number];
-export type Series = ReturnType<typeof seriesOf>;
+export type Mark = Shared<ReturnType<typeof marksOf>[number]>;
+export type Series = Shared<ReturnType<typeof seriesOf>>;
 
 export const readingAt = (at: number, value: number | null): Point => ({
   ...{ at, value, min: value, max: value },
@@ -37,6 +38,7 @@ export const seriesOf = (wire: History, nowS: number) => ({
   sensor: wire.sensor_type,
   /** Width of a bucket, seconds; null: these are readings. */
   bucketS: wire.bucket_s,
+  /** By their time. */
   points: [
     ...wire.readings.map(({ stamp, value }) => readingAt(secondsOf(stamp), value)),
     ...wire.buckets.map(({ start, mean, ...rest }) => ({

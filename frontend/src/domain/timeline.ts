@@ -1,12 +1,13 @@
 /** What happened when, and how far back anything is remembered. Times are ROS seconds. */
 import type { Timeline as WireTimeline } from '../contract/types';
 import { LOCALE } from '../strings';
+import type { Shared } from './memo';
 import { dayFormat, secondsOf, type Span, two } from './time';
 
 /** What happened in one bucket, from when it begins, ROS seconds. */
 export type Happened = Timeline['buckets'][number];
 
-export type Timeline = ReturnType<typeof timelineOf>;
+export type Timeline = Shared<ReturnType<typeof timelineOf>>;
 
 export const spanOfWire = ({ from, to }: WireTimeline['silences'][number]): Span => ({
   from: secondsOf(from),
@@ -23,6 +24,7 @@ export function timelineOf(wire: WireTimeline, nowS: number) {
     /** By their time; one in which nothing happened is left out. */
     buckets: wire.buckets.map((bucket) => ({ ...bucket, start: secondsOf(bucket.start) })),
     silences: wire.silences.map(spanOfWire),
+    /** Of the clock. */
     runs: wire.runs.map(spanOfWire),
     missing: missingOf(wire, nowS),
   };

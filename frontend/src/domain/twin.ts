@@ -1,5 +1,6 @@
 import type { Latest, TwinTagState, WirePoint, WireTime } from '../contract/types';
 import { mapPoint, type MapPoint } from '../geometry/coordinates';
+import type { Shared } from './memo';
 import type { When } from './time';
 
 export interface FailedTry {
@@ -10,7 +11,7 @@ export interface FailedTry {
 }
 
 /** One tag as the page uses it. Strings are as they came: show them through `domain/text`. */
-export type Tag = ReturnType<typeof tagOf>;
+export type Tag = Shared<ReturnType<typeof tagOf>>;
 
 export interface Snapshot {
   /** By their ids; the same list as before if nothing but the time went on. */
@@ -55,7 +56,7 @@ export function tagOf(wire: TwinTagState, state: TakenState) {
   const { looked_at: looked, last_try: tried, last_try_status: status } = wire;
   return {
     id: wire.tag_id,
-    // Metres; null: the tag has no pose, or one that is far off, and gets no pin.
+    /** Metres; null: the tag has no pose, or one that is far off, and gets no pin. */
     // w is exactly 0 where the twin has no pose; every rotation about z by less than half a
     // turn has another w, and ROS itself defaults it to 1.
     at: orientation.w === 0 || orientation.w === null ? null : pointOf(position),
@@ -65,8 +66,9 @@ export function tagOf(wire: TwinTagState, state: TakenState) {
     readings: new Map(wire.readings.map(({ name, value }) => [name, value])),
     /** When each reading was made: a look at the flowers makes none younger. */
     readAt,
+    /** When the newest reading was made. */
     scannedAt: newest(readAt.values()),
-    /** "never" also where the twin does not tell. */
+    /** When the flowers were last looked at; "never" also where the twin does not tell. */
     lookedAt: looked === null ? 'never' : whenOf(looked, state),
     /** The last scan or look, if it brought nothing. */
     failedTry:
@@ -86,6 +88,7 @@ export function tagOf(wire: TwinTagState, state: TakenState) {
       const at = pointOf(flower.position);
       return at ? [{ at, species: flower.species, anomaly: flower.anomaly }] : [];
     }),
+    /** Outline of the planter box. */
     footprint: wire.box_footprint.points.flatMap((point) => pointOf(point) ?? []),
     wire,
   };

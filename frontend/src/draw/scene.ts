@@ -3,7 +3,7 @@ import type { Verdict } from '../contract/types';
 import { ageSeconds, freshness, type Ageing } from '../domain/time';
 import { readingText, type TemperatureUnit } from '../domain/format';
 import { isBad, type HouseHealth } from '../domain/health';
-import { memoLast, memoOne } from '../domain/memo';
+import { memoLast, memoOne, type Shared } from '../domain/memo';
 import { partsOf, type Sensor } from '../domain/sensors';
 import { speciesLooks, UNKNOWN_SPECIES, type BloomLook } from '../domain/marks';
 import { shown } from '../domain/text';
@@ -17,7 +17,7 @@ const FAINTEST_WARNING = 5 / 6;
 /** What the filter leaves out stays in its place, and is not looked at. */
 const LEFT_OUT = 1 / 6;
 
-export type Pin = ReturnType<typeof pinOf>;
+export type Pin = Shared<ReturnType<typeof pinOf>>;
 
 export interface Scene {
   readonly pins: readonly Pin[];

@@ -86,6 +86,7 @@ export interface LabelRequest {
   readonly texts: readonly { readonly text: string; readonly width: number }[];
 }
 
+/** `x` and `y`: its top left corner, pixels. */
 export type PlacedLabel = ReturnType<typeof placeLabels>[number];
 
 /** Where labels may be seen: boxes in pixels relative to the map's origin. */

@@ -26,6 +26,7 @@ export interface Size {
   readonly height: number;
 }
 
+/** Metres in the map frame. */
 export interface Bounds {
   readonly minX: number;
   readonly minY: number;

@@ -152,7 +152,10 @@ export function EstimateReadout({
 /** As far as what is read at one place is usually like what is read at another, metres. */
 export const NEAR_M = 2.5;
 
-/** The tags with a reading of the sensor within reach; not those that the estimate leaves out. */
+/**
+ * The tags with a reading of the sensor within reach, and when the oldest of these was made; "never": there is none.
+ * Not those that the estimate leaves out.
+ */
 export function nearTo(
   point: MapPoint,
   tags: readonly Tag[],

@@ -139,6 +139,7 @@ export const useRobot = (): RobotNow => useSelected(robotFrame, (frame) => frame
 const timeOf = (state: AppState, now: number): number | null =>
   selectShown(state).ageing.kind === 'unknown' ? null : rosNow(state, now);
 
+/** Seconds; null: nobody knows. */
 export function ageOf(stamp: WireTime, time: number | null): number | null {
   const at = secondsOf(stamp);
   return time === null || at === 0 ? null : ageSeconds(at * 1_000, time * 1_000);

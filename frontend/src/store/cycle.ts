@@ -12,7 +12,7 @@ export const CYCLE_LIMITS = { least: 5, most: 3_600 } as const;
 
 export type CycleWish = ReturnType<typeof cycleWish>;
 
-/** The wish in an address: `?kiosk=1&cycle=30`. A bad one counts as none, and is told as it was written. */
+/** The wish in an address: `?kiosk=1&cycle=30`. `seconds` a sensor; null: it stays. A bad one is `refused`, as written. */
 export function cycleWish(search: string) {
   const text = new URLSearchParams(search).get('cycle');
   const seconds = text !== null && /^\d{1,4}$/.test(text) ? Number(text) : NaN;

@@ -5,10 +5,9 @@ import { fetchTimeline } from '../contract/past';
 import { endsNow, type Period, type Span, spanOf } from '../domain/time';
 import { timelineOf } from '../domain/timeline';
 import { act, onChange, receive, store } from './app';
-import { createFetcher } from './fetcher';
+import { createFetcher, NOTHING } from './fetcher';
 import { rosNow, selectNewest } from './moment';
-import { type Remembered } from './twin';
-import { NOTHING } from './fetcher';
+import type { Remembered } from './twin';
 import { DEFAULT_VIEW, SHORT_PERIOD } from './view';
 
 /** Enough for the widest bar: a bucket is two or three pixels there. */

@@ -88,6 +88,9 @@ test('says so when nobody does, and when that is not known', () => {
   document.body.replaceChildren();
   show({ well: 'healthy', far: 'unknown' });
   expect(screen.getByRole('heading').textContent).toMatch(/no data for 1 tag$/);
+  document.body.replaceChildren();
+  show({});
+  expect(screen.queryByRole('heading')).toBeNull();
 });
 
 test('where all is shelved, or the robot stands still, nobody says that nothing needs attention', () => {

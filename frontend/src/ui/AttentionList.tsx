@@ -115,11 +115,12 @@ function Todo({ reasons }: { reasons: readonly HealthReason[] }): JSX.Element | 
   return texts.length > 0 ? <strong>{texts.join(' · ')}</strong> : null;
 }
 
-/** Null: all of it is shelved, or the greenhouse's own reason says more. */
+/** Null: all of it is shelved, there is no tag yet, or the greenhouse's own reason says more. */
 function noneText({ verdict, reasons, counts: { unknown } }: HouseHealth): string | null {
   if (isBad(verdict) || reasons.length > 0) return null;
   // Of whom nothing is known, nobody knows that he needs nothing.
-  return unknown > 0 ? S.attentionNoneKnown(unknown) : S.attentionNone;
+  if (unknown > 0) return S.attentionNoneKnown(unknown);
+  return verdict === 'healthy' ? S.attentionNone : null;
 }
 
 /** Longest part of a wish that is told back. */

@@ -200,6 +200,8 @@ test('a critical alarm takes a reason, and is shelved for no more than an hour',
   // As long as the focus is in the list, no row moves.
   fireEvent.blur(screen.getByTestId('alarms'));
   expect(first('shelved').textContent).toMatch(/shelved until [\d:]+: fan is being mended/);
+  // Somebody has decided that nothing is to be done for now.
+  expect(document.querySelector('.alarm-do')).toBeNull();
   tell(alarm('a', { tag_id: '5', shelved_by: 'anna' }));
   expect(first('shelved').textContent).toMatch(/shelved by anna until [\d:]+: fan is being mended/);
 });

@@ -307,7 +307,7 @@ function CauseHeading({
               {S.alarmCount(own.length)} <Icon name="chevron" />
             </span>
           </span>
-          {group !== 'resolved' && <span className="alarm-do">{todo}</span>}
+          {group === 'active' && <span className="alarm-do">{todo}</span>}
           <span className="alarm-facts">{counts}</span>
           <span className="alarm-facts faint">{tagsText(tags)}</span>
         </span>

@@ -38,8 +38,6 @@ export const AlarmRow = memo(function AlarmRow({
   const current = lastKnown(values.state)?.verdict ?? verdict;
   const name = useApp((state) => nameText(alarm, selectSpeech(state)));
   const status = useStatus(item, group);
-  // While the order is held, it has no line for that: nothing is to be done meanwhile.
-  const shelf = group === 'active' ? item.shelf : null;
   return (
     <li
       data-alarm={alarm.id}
@@ -72,8 +70,11 @@ export const AlarmRow = memo(function AlarmRow({
             {': '}
             {values.what}
           </span>
-          {shelf?.reason && <q className="faint">{shelf.reason}</q>}
-          {!shelf && group !== 'resolved' && (
+          {/* While the order is held, it has no other line for that. */}
+          {group === 'active' && item.shelf?.reason && (
+            <q className="faint">{item.shelf.reason}</q>
+          )}
+          {group === 'active' && !item.shelf && (
             <span className="alarm-do" data-again={current === 'healthy' || undefined}>
               {values.todo}
             </span>

@@ -120,7 +120,7 @@ test('what is shelved says until when and why, has its way back, and is no order
   expect(order()).toBe('Heat, or close the vents');
 });
 
-test('the count of alarms says how many of them are of its sign, where not all are', () => {
+test('the count of alarms says how many of them are of its sign, and none of now where that is not known', () => {
   render(<AlarmsLabel />);
   const count = (): string => screen.getByTestId('alarm-count').textContent;
   const bad = ['8', '9'].map((id) => alarm(id, { tag_id: id, reason: { verdict: 'stressed' } }));
@@ -140,4 +140,6 @@ test('the count of alarms says how many of them are of its sign, where not all a
     act({ moment: 10 });
   });
   expect(count()).toBe('now 3');
+  flush(goLost);
+  expect(screen.queryByTestId('alarm-count')).toBeNull();
 });

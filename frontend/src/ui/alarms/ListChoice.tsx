@@ -5,6 +5,7 @@ import { countNow, worstNow } from '../../alarms/speech';
 import { alarmList } from '../../alarms/watch';
 import { act, useApp } from '../../store/app';
 import { useSelected } from '../../store/create';
+import { selectIsCut } from '../../store/moment';
 import { type ViewState, withList } from '../../store/view';
 import { S } from '../../strings';
 import { Segmented } from '../../widgets/controls';
@@ -38,7 +39,7 @@ export function ListChoice(): JSX.Element {
 
 /**
  * "Alarms" and how many are active; with the sign of the worst now and how many of them are so, until
- * all are acknowledged. Who looks back reads that they are those of now.
+ * all are acknowledged. Who looks back reads that they are those of now, as long as that is known.
  */
 export function AlarmsLabel(): JSX.Element {
   const list = useSelected(alarmList);
@@ -46,10 +47,12 @@ export function AlarmsLabel(): JSX.Element {
   const { length } = list.active;
   const isKnown = useApp(selectAreAlarmsKnown);
   const isNow = useApp((state) => state.view.moment === null);
+  const isCut = useApp(selectIsCut);
   const worst = useApp((state) =>
     unacknowledged.length === 0 ? null : worstNow(state, list.active),
   );
   const worstCount = useApp((state) => (worst ? countNow(state, list.active, worst) : length));
+  if (isCut && !isNow) return <>{S.alarms}</>;
   return (
     <>
       {S.alarms}

@@ -4,15 +4,7 @@ import { type Catalogue, type Catalogues, type Ranges, rangesFor } from '../doma
 import { type TemperatureUnit, toShown } from '../domain/format';
 import type { Shared } from '../domain/memo';
 import { rangeOf } from '../domain/ramp';
-import {
-  laterBy,
-  type Mark,
-  marksOf,
-  middleOf,
-  type Point,
-  type Series,
-  seriesOf,
-} from '../domain/series';
+import { laterBy, marksOf, middleOf, type Point, type Series, seriesOf } from '../domain/series';
 import { shown } from '../domain/text';
 import type { Span } from '../domain/time';
 import type { Charted } from '../store/view';
@@ -268,7 +260,7 @@ export function modelOf(
         /** Place among the looks. */
         look,
         label: tagLabel(tagId),
-        marks: (marks.get(tagId) ?? []) as readonly Mark[],
+        marks: marks.get(tagId) ?? [],
       },
     ];
   });

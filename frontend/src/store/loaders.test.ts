@@ -3,8 +3,10 @@ import { afterEach, beforeEach, describe, expect, test, vi } from 'vitest';
 import { npyField } from '../testing/field';
 import { goLive, goLost, showTags, status } from '../testing/page';
 import { readings, wireTag } from '../testing/tags';
-import { act, store } from './app';
+import { act, receive, store } from './app';
+import { ready } from './fetcher';
 import { startLoaders } from './loaders';
+import { withLatest } from './twin';
 
 let asked: string[];
 let stop: () => void;
@@ -82,6 +84,17 @@ describe('loaders', () => {
     goLive(status({ has_map: false }));
     await vi.advanceTimersByTimeAsync(40_000);
     expect(count('/api/map')).toBeLessThanOrEqual(2);
+  });
+
+  test('of a restarted bridge that has no twin yet, the map that is shown stays', () => {
+    showTags(tags);
+    const placement = { originX: 0, originY: 0, yaw: 0, resolution: 1, width: 1, height: 1 };
+    const value = { placement, pixels: new ImageData(1, 1), known: [] };
+    receive(withLatest({ map: ready(value) }));
+    goLive(status({ twin: 'offline', reason: 'never_seen', has_map: false }));
+    expect(store.get().twin.latest.map.value).toBe(value);
+    goLive(status({ has_map: false }));
+    expect(store.get().twin.latest.map.value).toBeNull();
   });
 
   test('a refusal is kept with its reason', async () => {

@@ -89,7 +89,7 @@ export function startLoaders(): () => void {
       quality.want(null);
       return;
     }
-    if (newest.map.value && !status?.has_map) receive(withLatest({ map: NOTHING }));
+    if (newest.map.value && !state.twin.lastStatus?.has_map) receive(withLatest({ map: NOTHING }));
     map.want(status?.has_map ? { key: base, group: 'map', run: loadMap } : null);
     quality.want(
       // Of the nearest readings: an estimate tells its own error.

@@ -71,9 +71,7 @@ export const AlarmRow = memo(function AlarmRow({
             {values.what}
           </span>
           {/* While the order is held, it has no other line for that. */}
-          {group === 'active' && item.shelf?.reason && (
-            <q className="faint">{item.shelf.reason}</q>
-          )}
+          {group === 'active' && item.shelf?.reason && <q className="faint">{item.shelf.reason}</q>}
           {group === 'active' && !item.shelf && (
             <span className="alarm-do" data-again={current === 'healthy' || undefined}>
               {values.todo}

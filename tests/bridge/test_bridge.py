@@ -23,7 +23,7 @@ from lupin_bridge.feed.source import ThreadState, TwinUnavailableError, TwinUpda
 from lupin_bridge.serving.admission import Limits
 from lupin_bridge.settings import Settings
 from lupin_bridge.stream.hub import Client
-from lupin_twin.core.diagnostics import UNKNOWN, Condition
+from lupin_twin.core.diagnostics import UNKNOWN_JOURNAL, Condition
 from lupin_twin.core.parameters import World
 from lupin_twin.core.past import NotRemembered, PastWrite
 from lupin_twin.core.state import Snapshot, TagState
@@ -60,7 +60,7 @@ class Script:
         raise NotRemembered("nothing", is_lasting=True)
 
     def journal(self) -> Condition:
-        return UNKNOWN
+        return UNKNOWN_JOURNAL
 
 
 class Ear:

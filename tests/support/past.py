@@ -10,7 +10,7 @@ from typing import Any, TypeVar
 
 from lupin_bridge.feed.query import Now, PastQuery, _found
 from lupin_bridge.past.plans import ConditionalQuery, Query
-from lupin_twin.core.diagnostics import UNKNOWN
+from lupin_twin.core.diagnostics import UNKNOWN_JOURNAL
 from lupin_twin.core.notes import NotesRequest, PastNotes
 from lupin_twin.core.past import (
     Event,
@@ -132,7 +132,7 @@ class MadeUp:
 
 def answered_by(log: Any, query: Query, now_ns: int = 2**62) -> bytes:
     """The body of a query's answer over a log, as the process that looks back makes it."""
-    now = Now(now_ns, "map", UNKNOWN)
+    now = Now(now_ns, "map", UNKNOWN_JOURNAL)
     answer = (
         ConditionalQuery(query).answer(lambda need: _found(need, now, log), lambda: False).answer
     )

@@ -23,7 +23,7 @@ from dataclasses import dataclass
 from functools import partial
 from typing import IO, Any, Final, Generic, Protocol, TypeVar
 
-from lupin_twin.core.diagnostics import UNKNOWN, Condition
+from lupin_twin.core.diagnostics import UNKNOWN_JOURNAL, Condition
 from lupin_twin.core.history import LatestRequest
 from lupin_twin.core.notes import NotesRequest
 from lupin_twin.core.past import (
@@ -133,7 +133,7 @@ class Child:
     """
 
     def __init__(self, recall: type[Recall] = Recall) -> None:
-        self._condition = UNKNOWN
+        self._condition = UNKNOWN_JOURNAL
         self._recall = recall(lambda: self._condition)
         self._running: dict[int, Future[Any]] = {}
         # Of its type nothing is imported before one comes.

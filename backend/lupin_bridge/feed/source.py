@@ -17,7 +17,7 @@ from typing import Any, Final, TypeVar
 from lupin_bridge.feed.past_process import PastProcess
 from lupin_bridge.feed.query import ExportStep, Itself, Now, PastQuery
 from lupin_bridge.feed.relay import Relay, TwinNames
-from lupin_twin.core.diagnostics import UNKNOWN, Condition, Origin
+from lupin_twin.core.diagnostics import UNKNOWN_JOURNAL, Condition, Origin
 from lupin_twin.core.drops import Counts, Recent
 from lupin_twin.core.notes import Note, NotesRequest, NotesUnwritable, PastNotes
 from lupin_twin.core.parameters import World
@@ -189,7 +189,7 @@ class TwinUpdate:
     occupancy_map: OccupancyMap | None = None
     counts: Counts | None = None
     own_counts: Counts | None = None
-    journal: Condition = UNKNOWN
+    journal: Condition = UNKNOWN_JOURNAL
     rules: FieldRules | None = None
     origin: Origin = "unknown"
     input_problems: tuple[str, ...] = ()

@@ -28,7 +28,7 @@ from lupin_bridge.feed.ros_source import Post, RosSource, now_ns_of
 from lupin_bridge.feed.shared_work import Periodic, end
 from lupin_bridge.feed.source import TwinUnavailableError, TwinUpdate
 from lupin_bridge.feed.web_node import WebNode, check_ok
-from lupin_twin.core.diagnostics import UNKNOWN, Condition, JournalState
+from lupin_twin.core.diagnostics import UNKNOWN_JOURNAL, Condition, JournalState
 from lupin_twin.core.parameters import World
 from lupin_twin.core.past import NotRemembered, PastRefused
 from lupin_twin.core.state import Snapshot
@@ -79,7 +79,7 @@ class FollowedLog:
         self._workers = workers
         self._folder: Path | None = None
         self.world = World("unknown")
-        self._reported = UNKNOWN
+        self._reported = UNKNOWN_JOURNAL
         self._is_heard = False
         self._own: Path | None = None
         self._followed: Followed | None = None
@@ -366,7 +366,9 @@ class WebTwin(RosSource[WebNode]):
 
     def journal(self) -> Condition:
         """The twin's, as far as it is read here; before that, what is said on `/diagnostics`."""
-        return self._log.condition or (UNKNOWN if self.update is None else self.update.journal)
+        return self._log.condition or (
+            UNKNOWN_JOURNAL if self.update is None else self.update.journal
+        )
 
     async def estimate_report(self, request: ReportRequest) -> Report:
         """What the twin's service says."""

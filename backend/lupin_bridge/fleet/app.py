@@ -79,7 +79,7 @@ from lupin_bridge.serving.http_protocol import PieceByPiece
 from lupin_bridge.settings import Settings
 from lupin_bridge.stream.frames import Status
 from lupin_bridge.stream.hub import Client, Hub
-from lupin_twin.core.diagnostics import UNKNOWN, Condition, JournalState
+from lupin_twin.core.diagnostics import UNKNOWN_JOURNAL, Condition, JournalState
 from lupin_twin.core.past import seconds
 from lupin_twin.journal.received import STRETCH_S, Export
 from lupin_twin.runtime.workers import Workers
@@ -209,7 +209,7 @@ class Fleet:
 
     async def compare(self, query: Compare | SitesReport) -> Answer:
         """The answer of `/api/compare` or `/api/report`."""
-        answer: Answer = await self.past.ask(query, Now(0, "", UNKNOWN), COMPARE_S)  # type: ignore[arg-type]  # see `reader`
+        answer: Answer = await self.past.ask(query, Now(0, "", UNKNOWN_JOURNAL), COMPARE_S)  # type: ignore[arg-type]  # see `reader`
         return answer
 
     async def _tidy(self) -> None:

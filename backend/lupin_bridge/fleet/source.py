@@ -22,7 +22,7 @@ from lupin_bridge.fleet.overview import Archive, Site, same_tags
 from lupin_bridge.fleet.reader import Latest, Reported
 from lupin_bridge.fleet.watcher import News
 from lupin_bridge.settings import Settings
-from lupin_twin.core.diagnostics import UNKNOWN, Condition, JournalState
+from lupin_twin.core.diagnostics import UNKNOWN_JOURNAL, Condition, JournalState
 from lupin_twin.core.notes import Note, NotesUnwritable
 from lupin_twin.core.parameters import TwinParameters, World
 from lupin_twin.core.past import NotRemembered
@@ -81,7 +81,7 @@ class Watching:
     async def _keep(self) -> None:
         while True:
             try:
-                self._take(await self.process.ask(self._settings, Now(0, "", UNKNOWN), 0.0))  # type: ignore[arg-type]  # see `WatchChild`
+                self._take(await self.process.ask(self._settings, Now(0, "", UNKNOWN_JOURNAL), 0.0))  # type: ignore[arg-type]  # see `WatchChild`
                 continue
             except NotRemembered as error:
                 self._answered_s = time.monotonic()

@@ -19,7 +19,7 @@ from lupin_bridge.judge.quantities import DAILY, Sensors
 from lupin_bridge.past.query import OfExport, compact, iso
 from lupin_bridge.query_string import safe_name
 from lupin_bridge.stream.state_json import moment, stamp
-from lupin_twin.core.diagnostics import UNKNOWN, Condition
+from lupin_twin.core.diagnostics import UNKNOWN_JOURNAL, Condition
 from lupin_twin.core.past import Event, Grid, PastRow, SeriesPast, SeriesRequest, grid, seconds
 from lupin_twin.core.state import NANOSECONDS_PER_SECOND
 
@@ -93,7 +93,7 @@ def history_body(
     past: SeriesPast,
     now_ns: int | None,
     sensors: Sensors,
-    journal: Condition = UNKNOWN,
+    journal: Condition = UNKNOWN_JOURNAL,
     *,
     nights: Stretches | None = None,
 ) -> dict[str, Any]:
@@ -228,7 +228,7 @@ def timeline_body(
     period: Grid,
     counted: Mapping[Event, SeriesPast],
     silences: SeriesPast,
-    journal: Condition = UNKNOWN,
+    journal: Condition = UNKNOWN_JOURNAL,
 ) -> dict[str, Any]:
     """`routes_schema.Timeline` in the buckets of `period`, which is the `coarsest`.
 

@@ -5,7 +5,7 @@ from dataclasses import replace
 import pytest
 
 from lupin_bridge.past import bodies
-from lupin_twin.core.diagnostics import UNKNOWN, Condition, JournalState
+from lupin_twin.core.diagnostics import UNKNOWN_JOURNAL, Condition, JournalState
 
 NS = 10**9
 # Two runs, of the first of which a part was deleted.
@@ -49,10 +49,10 @@ def test_of_a_period_both_lie_within_it(period: tuple[int, int], expected: tuple
 
 
 def test_where_nobody_knows_nothing_is_said() -> None:
-    assert bodies.moment_headers(UNKNOWN, NS) == {}
-    assert bodies.period_headers(UNKNOWN, 0, NS) == {}
-    assert bodies.period_fields(UNKNOWN, 0, NS) == {"complete_to": None, "kept_from": None}
-    assert bodies.why_not(UNKNOWN, NS) == ""
+    assert bodies.moment_headers(UNKNOWN_JOURNAL, NS) == {}
+    assert bodies.period_headers(UNKNOWN_JOURNAL, 0, NS) == {}
+    assert bodies.period_fields(UNKNOWN_JOURNAL, 0, NS) == {"complete_to": None, "kept_from": None}
+    assert bodies.why_not(UNKNOWN_JOURNAL, NS) == ""
 
 
 def test_a_journal_that_vouches_for_nothing_does_so_from_now_on() -> None:

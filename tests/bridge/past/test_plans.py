@@ -22,7 +22,7 @@ from lupin_bridge.past.plans import (
     WholeState,
 )
 from lupin_bridge.settings import Settings
-from lupin_twin.core.diagnostics import UNKNOWN
+from lupin_twin.core.diagnostics import UNKNOWN_JOURNAL
 from lupin_twin.core.history import LatestRequest
 from lupin_twin.core.past import EVERY_TAG, SeriesPast, SeriesRequest
 from lupin_twin.core.state import Attempt, Reading, TagState
@@ -38,8 +38,8 @@ QUESTIONS: tuple[Query, ...] = (
     replace(asked(sensor_type="co2_dose"), at_ns=5 * NS, field_format=PNG),
     replace(asked(), at_ns=5 * NS, field_format=PNG),
     replace(asked(), at_ns=5 * NS),
-    History(SeriesRequest("a", "co2"), 9 * NS, CRITERIA, UNKNOWN),
-    Timeline(0, 9 * NS, 5, EVERY_TAG, UNKNOWN),
+    History(SeriesRequest("a", "co2"), 9 * NS, CRITERIA, UNKNOWN_JOURNAL),
+    Timeline(0, 9 * NS, 5, EVERY_TAG, UNKNOWN_JOURNAL),
 )
 
 
@@ -80,9 +80,9 @@ def test_a_large_house_and_a_large_field_cost_more_than_small_ones() -> None:
     fine = replace(asked(resolution=0.001), at_ns=0, field_format=PNG)
     assert fine.cost_s(30) > SMALL_S, "one that will be refused is no small one"
     # All that is looked up counts, and not the first of it alone.
-    history = History(SeriesRequest("a", "co2"), None, CRITERIA, UNKNOWN)
+    history = History(SeriesRequest("a", "co2"), None, CRITERIA, UNKNOWN_JOURNAL)
     assert history.cost_s(30) < SMALL_S
-    assert Timeline(0, 0, 1, "a", UNKNOWN).cost_s(30) > SMALL_S
+    assert Timeline(0, 0, 1, "a", UNKNOWN_JOURNAL).cost_s(30) > SMALL_S
     for question in QUESTIONS[:5]:
         assert json.dumps(question.cost_s(0))
 

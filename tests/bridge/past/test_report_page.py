@@ -15,7 +15,7 @@ import pytest
 from lupin_bridge.judge.judging import Criteria
 from lupin_bridge.past.report_page import ReportPage
 from lupin_bridge.settings import Settings
-from lupin_twin.core.diagnostics import UNKNOWN
+from lupin_twin.core.diagnostics import UNKNOWN_JOURNAL
 from lupin_twin.core.state import Flower, Reading, TagState
 from lupin_twin.field.idw import never
 
@@ -82,7 +82,7 @@ def page_of(
 ) -> str:
     """The report's text, with spaces between its elements."""
     end_s = BEGUN_S + hours * HOUR_S
-    page = ReportPage(BEGUN_S * 10**9, end_s * 10**9, GREENHOUSE, UNKNOWN, lang, zone)
+    page = ReportPage(BEGUN_S * 10**9, end_s * 10**9, GREENHOUSE, UNKNOWN_JOURNAL, lang, zone)
     return text_of(page, hours, tags, **fields)
 
 
@@ -132,8 +132,8 @@ def test_times_are_of_the_greenhouse_or_of_the_zone_that_the_reader_is_in() -> N
 
 
 def test_a_zone_that_this_machine_does_not_know_is_said() -> None:
-    end_ns = (BEGUN_S + HOUR_S) * 10**9
-    page = ReportPage(BEGUN_S * 10**9, end_ns, GREENHOUSE, UNKNOWN, "en", UTC, "Mars/<North>")
+    period_ns = BEGUN_S * 10**9, (BEGUN_S + HOUR_S) * 10**9
+    page = ReportPage(*period_ns, GREENHOUSE, UNKNOWN_JOURNAL, "en", UTC, "Mars/<North>")
     told = (
         "Times: UTC (UTC+00:00) This server does not know the time zone Mars/<North>: times are in"
     )
@@ -156,7 +156,7 @@ def test_no_data_before_is_said_only_where_the_log_begins_after_the_period() -> 
 
 def test_it_says_of_which_greenhouse_it_is_and_that_none_was_there() -> None:
     end_ns = (BEGUN_S + HOUR_S) * 10**9
-    page = ReportPage(BEGUN_S * 10**9, end_ns, GREENHOUSE, UNKNOWN, "de")
+    page = ReportPage(BEGUN_S * 10**9, end_ns, GREENHOUSE, UNKNOWN_JOURNAL, "de")
     assert "Simuliert" not in text_of(page, 1)
     told = text_of(replace(page, origin="simulated", site="gh<1>"), 1)
     assert "Schichtbericht: gh<1> Simuliert. Kein echter Roboter: Gewächshaus" in told

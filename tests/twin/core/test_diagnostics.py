@@ -8,7 +8,7 @@ from lupin_twin.core.diagnostics import (
     MAX_SHOWN,
     OK,
     STALE,
-    UNKNOWN,
+    UNKNOWN_JOURNAL,
     WARN,
     Condition,
     Estimates,
@@ -110,7 +110,7 @@ def test_what_is_said_is_read_again(clock: ClockState) -> None:
     recent = (FRAME, Recent("lost", "lost messages", 2), Recent("late_stamp", "late", 1))
     counts = Counts({"frame": 40, "lost": 5, "late_stamp": 1}, 3, recent)
     assert self_report(findings(replace(WELL, clock=clock, counts=counts))) == SelfReport(
-        clock, counts, UNKNOWN, "robot"
+        clock, counts, UNKNOWN_JOURNAL, "robot"
     )
 
 
@@ -140,7 +140,7 @@ def test_what_is_said_of_the_journal_is_read_again() -> None:
     for journal in (told, replace(told, **none)):
         assert self_report(findings(replace(WELL, journal=journal))).journal == journal
     for values in ({}, {"state": "constructor"}):
-        assert self_report([Finding("journal", OK, "", values)]).journal == UNKNOWN
+        assert self_report([Finding("journal", OK, "", values)]).journal == UNKNOWN_JOURNAL
     for stretch in ("1", "1 x", "x 1", " ", "1 " + 20 * "9"):
         values = {"state": "recording", "simulated": stretch}
         assert self_report([Finding("journal", OK, "", values)]).journal.simulated_ns is None

@@ -120,7 +120,9 @@ class Condition:
 _WELL = frozenset(
     {JournalState.UNKNOWN, JournalState.OFF, JournalState.STARTING, JournalState.RECORDING}
 )
-UNKNOWN = Condition(JournalState.UNKNOWN, "the twin does not say whether it keeps a journal")
+UNKNOWN_JOURNAL = Condition(
+    JournalState.UNKNOWN, "the twin does not say whether it keeps a journal"
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -166,7 +168,7 @@ class Health:
     fields_computing: int
     fields_computed: int
     slowest_field_s: float
-    journal: Condition = UNKNOWN
+    journal: Condition = UNKNOWN_JOURNAL
     estimates: Estimates = Estimates()
     layers: Layers = Layers()
     origin: Origin = "robot"
@@ -317,7 +319,7 @@ class SelfReport:
 
     clock: ClockState | None = None
     counts: Counts | None = None
-    journal: Condition = UNKNOWN
+    journal: Condition = UNKNOWN_JOURNAL
     origin: Origin = "unknown"
     input_problems: tuple[str, ...] = ()
 
@@ -326,7 +328,7 @@ def self_report(reported: Iterable[Finding]) -> SelfReport:
     """What `findings` reported, as far as it can be read; unknown reasons are left out."""
     by_name = {finding.name: finding for finding in reported}
     values = {name: finding.values for name, finding in by_name.items()}
-    journal = _journal(by_name["journal"]) if "journal" in by_name else UNKNOWN
+    journal = _journal(by_name["journal"]) if "journal" in by_name else UNKNOWN_JOURNAL
     clock = next((state for state in CLOCK if state == values.get("clock", {}).get("state")), None)
     origin = origin_of(values.get("origin", {}).get("origin", ""), is_simulated=False)
     inputs = values.get("inputs", {})
@@ -354,7 +356,7 @@ def _journal(finding: Finding) -> Condition:
     values = finding.values
     state = next((state for state in JournalState if state == values.get("state")), None)
     if state is None:
-        return UNKNOWN
+        return UNKNOWN_JOURNAL
     simulated = _read_stretches(values.get("simulated", ""))
     complete = values.get("complete to", "")
     return Condition(

@@ -1,22 +1,35 @@
-"""A query string, read by the dataclass of its parameters, which also describes it to OpenAPI.
+"""Query strings: how each is read, its moments, and what it requests of the past. Pure.
 
-pydantic reads, and is imported as it does: what looks back knows queries, and has no use for it.
+One is read by the dataclass of its parameters, which also describes it to OpenAPI. pydantic reads,
+and is imported as it does: what looks back knows queries, and has no use for it. Moments are exact
+to the nanosecond.
 """
 
 from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from dataclasses import MISSING, field, fields
+from dataclasses import MISSING, dataclass, field, fields
+from datetime import UTC, datetime, timedelta
 from functools import cache
-from typing import Annotated, Any, Final, TypeVar
+from typing import Annotated, Any, Final, Literal, TypeVar
 
-from annotated_types import Len
+from annotated_types import Interval, Len
 
 from lupin_twin.core.drops import MAX_TEXT_LENGTH
-from lupin_twin.core.past import PastRefused
+from lupin_twin.core.past import (
+    DEFAULT_POINTS,
+    MAX_POINTS,
+    Event,
+    PastRefused,
+    check_moment,
+    seconds,
+)
+from lupin_twin.core.state import NANOSECONDS_PER_SECOND
 
 QueryT = TypeVar("QueryT")
+# (name, value) of each.
+Parameters = Sequence[tuple[str, str]]
 MOMENT: Final = "ROS seconds as a decimal number, or ISO 8601 with an offset"
 AT: Final = f"as of this moment: {MOMENT}; default: now"
 _UNSAFE_IN_NAME: Final = re.compile(r"[^A-Za-z0-9._-]")
@@ -34,8 +47,8 @@ def needed(description: str) -> Any:
     return field(metadata={"description": description})
 
 
-def read(kind: type[QueryT], given: Sequence[tuple[str, str]]) -> QueryT:
-    """A query string's (name, value) pairs as a query.
+def read(kind: type[QueryT], given: Parameters) -> QueryT:
+    """A query string's parameters as a query.
 
     A query is refused, never guessed at: an unknown or repeated parameter is a typing error that
     would otherwise go unseen.
@@ -98,3 +111,219 @@ def _adapter(kind: type[Any]) -> Any:
     from pydantic import TypeAdapter  # noqa: PLC0415  # as above
 
     return TypeAdapter(kind)
+
+
+# --- moments --------------------------------------------------------------------------------------
+
+# builtin_interfaces/Time has its seconds as int32.
+MAX_SECONDS: Final = 2**31 - 1
+
+_SECONDS: Final = re.compile(r"([0-9]+)(?:\.([0-9]+))?", re.ASCII)
+# In a query string, `+01:00` reads ` 01:00`.
+_ISO: Final = re.compile(
+    r"(\d{4}-\d\d-\d\d[Tt](?:[01]\d|2[0-3]):\d\d(?::\d\d(?:\.(\d+))?)?)"
+    r"([Zz]|[+ -]\d\d:?[0-5]\d)",
+    re.ASCII,
+)
+_EPOCH: Final = datetime(1970, 1, 1, tzinfo=UTC)
+_SECONDS_A_DAY: Final = 86_400
+
+
+def moment(name: str, text: str) -> int:
+    """A moment in a query string, ns of ROS time; what is finer than a nanosecond is cut off.
+
+    Raises:
+        PastRefused: no moment, one before 0, or past what ROS time holds.
+
+    """
+    text = text.strip(" ")
+    if plain := _SECONDS.fullmatch(text):
+        whole, fraction = plain.groups()
+        # As text: int() takes its time for a thousand digits.
+        seconds = int(whole) if len(whole.lstrip("0")) <= len(str(MAX_SECONDS)) else None
+    elif iso := _ISO.fullmatch(text):
+        shown, fraction, offset = iso.groups()
+        shown = shown.partition(".")[0] + offset.replace(" ", "+")
+        try:
+            seconds = (datetime.fromisoformat(shown.upper()) - _EPOCH) // timedelta(seconds=1)
+        except ValueError as error:
+            raise PastRefused(f"{name} is {text[:64]!r}: {error}") from None
+    else:
+        raise PastRefused(f"{name} is {text[:64]!r}, expected {MOMENT}")
+    if seconds is None or seconds > MAX_SECONDS:
+        raise PastRefused(f"{name} is {text[:64]!r}, the limit is {MAX_SECONDS} s of ROS time")
+    if seconds < 0:
+        raise PastRefused(f"{name} is {text[:64]!r}, which is before 0 s of ROS time")
+    return seconds * NANOSECONDS_PER_SECOND + int(f"{fraction or '':<09.9}")
+
+
+def iso(stamp_ns: int) -> str:
+    """A moment as ISO 8601 in UTC, to the nanosecond: `2026-11-21T14:15:00.000000000Z`."""
+    whole, rest = divmod(stamp_ns, NANOSECONDS_PER_SECOND)
+    return f"{datetime.fromtimestamp(whole, UTC):%Y-%m-%dT%H:%M:%S}.{rest:09d}Z"
+
+
+def compact(stamp_ns: int) -> str:
+    """A moment for a file's name, to the second: `20261121T141500Z`."""
+    whole = stamp_ns // NANOSECONDS_PER_SECOND
+    return f"{datetime.fromtimestamp(whole, UTC):%Y%m%dT%H%M%SZ}"
+
+
+# --- what is requested of the past ----------------------------------------------------------------
+
+_FROM: Final = f"{MOMENT}; default: the oldest in the journal"
+_TO: Final = "as `from`; this moment itself is not in the period; default: now"
+_POINTS: Final = "at most so many readings or buckets"
+_ONE_TAG: Final = "one tag alone; default: all"
+Points = Annotated[int, Interval(ge=1, le=MAX_POINTS)]
+
+
+@dataclass(frozen=True, slots=True)
+class OfMoment:
+    """A query string that has a moment alone."""
+
+    at: str | None = parameter(AT)
+
+
+@dataclass(frozen=True, slots=True)
+class OfPeriod:
+    """The parameters of a period."""
+
+    from_: str | None = parameter(_FROM)
+    to: str | None = parameter(_TO)
+
+    def span(self, now_ns: int | None) -> tuple[int, int]:
+        """From when to when, ns; 0: from the oldest, to now. `now_ns` is None: it is not known.
+
+        Raises:
+            PastRefused: no moment, or a period that cannot be.
+
+        """
+        start_ns = 0 if self.from_ is None else moment("from", self.from_)
+        if self.to is not None:
+            end_ns = moment("to", self.to)
+            if end_ns == 0:
+                raise PastRefused("to is 0 s of ROS time, must be later")
+            if end_ns < start_ns:
+                raise PastRefused(f"to is {seconds(end_ns)} s, before from, {seconds(start_ns)} s")
+            return start_ns, end_ns
+        if now_ns is not None and start_ns > now_ns:
+            raise PastRefused(f"from is {seconds(start_ns)} s, later than now, {seconds(now_ns)} s")
+        return start_ns, 0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class OfHistory(OfPeriod):
+    """The parameters of `/api/history`."""
+
+    tag_id: Name = needed("one tag; for events, `*` is the whole greenhouse")
+    sensor_type: Name = needed(
+        f"name of a sensor, as in a reading; or an event: {', '.join(Event)}"
+    )
+    points: Points = parameter(_POINTS, DEFAULT_POINTS)
+
+
+@dataclass(frozen=True, slots=True)
+class OfTimeline(OfPeriod):
+    """The parameters of `/api/timeline`."""
+
+    points: Points = parameter(_POINTS, DEFAULT_POINTS)
+    tag_id: Name | None = parameter(_ONE_TAG)
+
+
+@dataclass(frozen=True, slots=True)
+class OfAlarms(OfPeriod):
+    """The parameters of `/api/alarms`."""
+
+    active: Literal["0", "1"] | None = parameter(
+        "1: only those that have not been cleared, 0: only the others; default: all"
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class OfNotes(OfPeriod):
+    """The parameters of `/api/notes`."""
+
+    subject: str | None = parameter("of this alone: `alarm:ID`, `tag:ID` or `site`; default: all")
+    kind: Literal["acknowledge", "shelve", "comment"] | None = parameter(
+        "this kind alone; default: all"
+    )
+
+
+# A shift, where nobody says from when on.
+SHIFT_S: Final = 8 * 3_600
+MAX_REPORT_DAYS: Final = 31
+
+
+@dataclass(frozen=True, slots=True)
+class OfReport:
+    """The parameters of `/api/report`."""
+
+    from_: str | None = parameter(f"{MOMENT}; default: eight hours before `to`")
+    to: str | None = parameter(_TO)
+
+
+@dataclass(frozen=True, slots=True)
+class OfReportPage(OfReport):
+    """The parameters of `/api/report.html`."""
+
+    lang: Literal["en", "de", "nl", "es"] = parameter("language", "en")
+    time_zone: str | None = parameter(
+        "of its times, such as Europe/Amsterdam; default: that of the setting `time_zone`; UTC in "
+        "place of one that this machine does not know"
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class OfExport(OfPeriod):
+    """The parameters of an export."""
+
+    tag_id: Name | None = parameter(_ONE_TAG)
+    sensor_type: Name | None = parameter("one sensor alone; default: all")
+
+
+def at(parameters: Parameters, now_ns: int | None) -> int | None:
+    """The moment of `at`, ns; None: now. `now_ns` is None where it is not known.
+
+    Raises:
+        PastRefused: anything but one `at`, or a moment that has not come.
+
+    """
+    return at_of(read(OfMoment, parameters).at, now_ns)
+
+
+def at_of(text: str | None, now_ns: int | None) -> int | None:
+    """`at`, where the other parameters are read elsewhere.
+
+    Raises:
+        PastRefused: no moment, or one that has not come.
+
+    """
+    if text is None:
+        return None
+    at_ns = moment("at", text)
+    if now_ns is not None:
+        check_moment(at_ns, now_ns)
+    return at_ns
+
+
+def report(given: OfReport, now_ns: int | None) -> tuple[int, int]:
+    """The period of a report, ns of ROS time; it ends now at the latest.
+
+    Raises:
+        PastRefused: a period with nothing in it, or too long a one; now is not known.
+
+    """
+    to_ns = None if given.to is None else moment("to", given.to)
+    if now_ns is None:
+        to = "missing" if to_ns is None else f"{seconds(to_ns)} s"
+        raise PastRefused(f"to is {to}, and what time it is now is not known here")
+    end_ns = now_ns if to_ns is None else min(to_ns, now_ns)
+    shift_ns = SHIFT_S * NANOSECONDS_PER_SECOND
+    start_ns = max(0, end_ns - shift_ns) if given.from_ is None else moment("from", given.from_)
+    if start_ns >= end_ns:
+        raise PastRefused(f"from is {seconds(start_ns)} s, must be before to, {seconds(end_ns)} s")
+    days = (end_ns - start_ns) / (_SECONDS_A_DAY * NANOSECONDS_PER_SECOND)
+    if days > MAX_REPORT_DAYS:
+        raise PastRefused(f"from and to are {days:.1f} days apart, the limit is {MAX_REPORT_DAYS}")
+    return start_ns, end_ns

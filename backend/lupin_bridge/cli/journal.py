@@ -28,7 +28,7 @@ from lupin_bridge.console import (
 )
 from lupin_bridge.judge.judging import Criteria
 from lupin_bridge.past import bodies
-from lupin_bridge.past.query import MAX_SECONDS, moment
+from lupin_bridge.query_string import MAX_SECONDS, moment
 from lupin_bridge.settings import SettingError, settings_from, variable
 from lupin_twin.core.past import NotRemembered, PastRefused, seconds
 from lupin_twin.journal.beside import InUse, demo_journal_path, holder_of, journal_path

@@ -52,8 +52,7 @@ from lupin_bridge.judge.judging import Criteria
 from lupin_bridge.metrics import CONTENT_TYPE
 from lupin_bridge.past.bodies import COMPLETE_TO
 from lupin_bridge.past.export import Csv, Parquet
-from lupin_bridge.past.query import OfExport
-from lupin_bridge.query_string import parameter, read
+from lupin_bridge.query_string import OfExport, parameter, read
 from lupin_bridge.routes import pages, status
 from lupin_bridge.routes.answers import (
     NEVER_STORE,

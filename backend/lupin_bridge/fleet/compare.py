@@ -20,11 +20,10 @@ import numpy as np
 import orjson
 from annotated_types import Interval
 
+from lupin_bridge import query_string
 from lupin_bridge.fleet.overview import MAX_LISTED
 from lupin_bridge.judge.quantities import DAILY, DERIVED, Sensors
-from lupin_bridge.past import query as past_query
-from lupin_bridge.past.query import OfPeriod, OfReport, Parameters
-from lupin_bridge.query_string import Name, needed, parameter, read
+from lupin_bridge.query_string import Name, OfPeriod, OfReport, Parameters, needed, parameter, read
 from lupin_bridge.serving.admission import Answer, json_answer
 from lupin_bridge.stream.state_json import note_json, stamp
 from lupin_twin.core.notes import WITHDRAW, WITHDRAWN, Note
@@ -300,11 +299,11 @@ def sites_report(parameters: Parameters, known: Mapping[str, Any], now_ns: int) 
 
     Raises:
         NotRemembered: see `chosen`.
-        PastRefused: see `past.query.report`.
+        PastRefused: see `query_string.report`.
 
     """
     given = read(OfSitesReport, parameters)
-    start_ns, end_ns = past_query.report(given, now_ns)
+    start_ns, end_ns = query_string.report(given, now_ns)
     sites = [known[name] for name in chosen(given.sites, known)]
     return SitesReport(
         tuple((it.site, it.name or it.site, it.active_alarms, it.heard_ns) for it in sites),

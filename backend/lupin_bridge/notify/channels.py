@@ -30,8 +30,8 @@ from lupin_bridge.notify.mqtt import Mirror, Mqtt
 from lupin_bridge.notify.push import Push
 from lupin_bridge.notify.webhook import Webhook
 from lupin_bridge.past.plans import ConditionalQuery
-from lupin_bridge.past.query import compact
 from lupin_bridge.past.report import REPORT_S, Report
+from lupin_bridge.query_string import compact
 from lupin_twin.core.past import NotRemembered, PastRefused
 
 log = logging.getLogger(__name__)

@@ -24,7 +24,7 @@ from lupin_bridge.judge.episodes import Alarm
 from lupin_bridge.judge.judging import NOTHING_JUDGED, Criteria, Judged
 from lupin_bridge.judge.quantities import Sensor
 from lupin_bridge.judge.verdict import Health, Verdict
-from lupin_bridge.past.query import iso
+from lupin_bridge.query_string import iso
 from lupin_bridge.stream.frames import NEVER_SEEN, Status
 from lupin_bridge.stream.state_json import alarm_json, moment, reason_json
 from lupin_twin.core.diagnostics import Origin

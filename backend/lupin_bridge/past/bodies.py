@@ -16,8 +16,7 @@ from itertools import accumulate, pairwise
 from typing import Any, Final
 
 from lupin_bridge.judge.quantities import DAILY, Sensors
-from lupin_bridge.past.query import OfExport, compact, iso
-from lupin_bridge.query_string import safe_name
+from lupin_bridge.query_string import OfExport, compact, iso, safe_name
 from lupin_bridge.stream.state_json import moment, stamp
 from lupin_twin.core.diagnostics import UNKNOWN_JOURNAL, Condition
 from lupin_twin.core.past import Event, Grid, PastRow, SeriesPast, SeriesRequest, grid, seconds

@@ -15,10 +15,9 @@ from starlette.types import Message, Receive, Scope, Send
 
 from lupin_bridge.access.middleware import client_of
 from lupin_bridge.judge.judging import Criteria
-from lupin_bridge.past import bodies, query
+from lupin_bridge.past import bodies
 from lupin_bridge.past.export import Csv, MissingPackageError, Parquet
-from lupin_bridge.past.query import MAX_SECONDS, OfExport
-from lupin_bridge.query_string import parameters_of, read
+from lupin_bridge.query_string import MAX_SECONDS, OfExport, iso, parameters_of, read
 from lupin_bridge.routes.answers import (
     CLIENT_DISCONNECTED,
     NEVER_STORE,
@@ -69,7 +68,7 @@ def _content(media_type: str) -> dict[str, Any]:
     "/api/export.csv",
     summary="Every reading and failed attempt of a period, as CSV",
     responses={200: _content(Csv.media_type), **_ANSWERS},
-    openapi_extra={"parameters": parameters_of(query.OfExport)},
+    openapi_extra={"parameters": parameters_of(OfExport)},
 )
 async def csv_route(request: Request) -> Response:
     """A row for each reading, and one without a sensor for each attempt that brought none.
@@ -88,7 +87,7 @@ async def csv_route(request: Request) -> Response:
         **_ANSWERS,
         **refusing({501: "the extra `science` is not installed"}),
     },
-    openapi_extra={"parameters": parameters_of(query.OfExport)},
+    openapi_extra={"parameters": parameters_of(OfExport)},
 )
 async def parquet_route(request: Request) -> Response:
     """The columns of the CSV; `time` is a timestamp. Fields and file have attributes."""
@@ -98,7 +97,7 @@ async def parquet_route(request: Request) -> Response:
 async def _of_site(request: Request, kind: Format) -> Response:
     bridge = bridge_of(request)
     now_ns = bridge.ros_time_ns
-    given = read(query.OfExport, request.query_params.multi_items())
+    given = read(OfExport, request.query_params.multi_items())
     start_ns, end_ns = span_of(given, now_ns)
     known = bodies.period_headers(bridge.source.journal(), start_ns, end_ns)
 
@@ -175,8 +174,8 @@ def _facts(known: Mapping[str, str], given: OfExport, now_ns: int | None) -> dic
     facts = {name.removeprefix("X-").lower().replace("-", "_"): it for name, it in known.items()}
     start_ns, end_ns = span_of(given, now_ns)
     if start_ns:
-        facts["from"] = query.iso(start_ns)
-    return {**facts, "to": query.iso(end_ns)}
+        facts["from"] = iso(start_ns)
+    return {**facts, "to": iso(end_ns)}
 
 
 async def _written(of: Exporting, kind: Format, write: Callable[[], ResultT]) -> ResultT:

@@ -11,12 +11,12 @@ from fastapi import APIRouter, Request, Response
 from pydantic import BaseModel
 
 from lupin_bridge import field as formats
+from lupin_bridge import query_string
 from lupin_bridge.access.middleware import client_of
 from lupin_bridge.bridge import Bridge
 from lupin_bridge.feed.source import TwinUnavailableError
 from lupin_bridge.field import FORMATS, JSON, PNG, EstimateQuery, FieldFormat, FieldQuery
 from lupin_bridge.judge.quantities import DAILY
-from lupin_bridge.past import query as past_query
 from lupin_bridge.past.fields import Estimated, Field
 from lupin_bridge.query_string import Name, needed, parameter, parameters_of, read
 from lupin_bridge.routes.answers import (
@@ -158,7 +158,7 @@ async def _answer(request: Request, field_format: FieldFormat | None) -> Respons
     bridge = bridge_of(request)
     source, now_ns = bridge.source, bridge.ros_time_ns
     query = read(FieldQuery, request.query_params.multi_items())
-    at_ns = past_query.at_of(query.at, now_ns)
+    at_ns = query_string.at_of(query.at, now_ns)
     if at_ns is None and query.sensor_type in DAILY and now_ns is not None:
         at_ns = now_ns - now_ns % _MINUTE_NS
     field = Field(at_ns, query, field_format, source.rules, source.occupancy_map(), bridge.criteria)
@@ -204,7 +204,7 @@ async def _estimate(request: Request, field_format: FieldFormat) -> Response:
     if query.layer != "mean" and field_format != PNG:
         raise FieldRefused(f"layer is {query.layer!r}, but only a PNG has one")
     now_ns, source = bridge.ros_time_ns, bridge.source
-    at_ns = past_query.at_of(query.at, now_ns)
+    at_ns = query_string.at_of(query.at, now_ns)
     estimated = Estimated(
         *(at_ns, query, field_format, source.rules, None, bridge.criteria),
         day_length_s=source.world.day_length_s,

@@ -11,10 +11,10 @@ from typing import Annotated, Final
 from annotated_types import Ge
 from fastapi import APIRouter, Request, Response, WebSocket
 
+from lupin_bridge import query_string
 from lupin_bridge.bridge import Bridge
 from lupin_bridge.judge.judging import zone_of
 from lupin_bridge.past import bodies
-from lupin_bridge.past import query as past_query
 from lupin_bridge.past.plans import (
     History,
     LatestOfTag,
@@ -100,7 +100,7 @@ async def ws_state(websocket: WebSocket) -> None:
     "/api/state",
     summary="The current state of every tag",
     responses={200: {"model": schema.TwinState}, **NOT_REMEMBERED},
-    openapi_extra={"parameters": parameters_of(past_query.OfMoment)},
+    openapi_extra={"parameters": parameters_of(query_string.OfMoment)},
 )
 async def state(request: Request) -> Response:
     """TwinState with the message's own field names; the newest, with ages as of this answer.
@@ -108,7 +108,7 @@ async def state(request: Request) -> Response:
     As of a moment that has passed, `header.stamp` is that moment, and ages are those of then.
     """
     bridge = bridge_of(request)
-    at_ns = past_query.at(request.query_params.multi_items(), bridge.ros_time_ns)
+    at_ns = query_string.at(request.query_params.multi_items(), bridge.ros_time_ns)
     if at_ns is not None:
         return await respond_as_of(request, WholeState(at_ns), at_ns)
     latest = bridge.latest
@@ -149,12 +149,12 @@ async def history(request: Request, tag_id: str) -> Response:
     "/api/tags/{tag_id:path}",
     summary="One tag",
     responses={200: {"model": schema.TwinTagState}, **NOT_REMEMBERED, **_NO_TAG},
-    openapi_extra={"parameters": parameters_of(past_query.OfMoment)},
+    openapi_extra={"parameters": parameters_of(query_string.OfMoment)},
 )
 async def tag(request: Request, tag_id: str) -> Response:
     """Everything that the twin knows about one tag, or knew at a moment."""
     bridge = bridge_of(request)
-    at_ns = past_query.at(request.query_params.multi_items(), bridge.ros_time_ns)
+    at_ns = query_string.at(request.query_params.multi_items(), bridge.ros_time_ns)
     if at_ns is not None:
         return await _tag_as_of(request, tag_id, at_ns)
     if bridge.latest is None:
@@ -181,13 +181,13 @@ async def _tag_as_of(request: Request, tag_id: str, at_ns: int) -> Response:
     "/api/history",
     summary="The readings of one sensor of one tag over a period",
     responses={200: {"model": routes_schema.History}, **NOT_REMEMBERED},
-    openapi_extra={"parameters": parameters_of(past_query.OfHistory)},
+    openapi_extra={"parameters": parameters_of(query_string.OfHistory)},
 )
 async def history_route(request: Request) -> Response:
     """Readings, or equal buckets if there are more than `points`; `gaps`: where nothing came."""
     bridge = bridge_of(request)
     now_ns = bridge.ros_time_ns
-    given = read(past_query.OfHistory, request.query_params.multi_items())
+    given = read(query_string.OfHistory, request.query_params.multi_items())
     series = SeriesRequest(given.tag_id, given.sensor_type, *given.span(now_ns), given.points)
     journal, has_nights = bridge.source.journal(), bridge.origin != "simulated"
     history = History(series, now_ns, bridge.criteria, journal, has_nights)
@@ -199,12 +199,12 @@ async def history_route(request: Request) -> Response:
     "/api/timeline",
     summary="What happened when: scans, failures, inspections, pests, silences, runs of the clock",
     responses={200: {"model": routes_schema.Timeline}, **NOT_REMEMBERED},
-    openapi_extra={"parameters": parameters_of(past_query.OfTimeline)},
+    openapi_extra={"parameters": parameters_of(query_string.OfTimeline)},
 )
 async def timeline_route(request: Request) -> Response:
     """Events counted in buckets of equal length, and how far back anything is remembered."""
     bridge = bridge_of(request)
-    given = read(past_query.OfTimeline, request.query_params.multi_items())
+    given = read(query_string.OfTimeline, request.query_params.multi_items())
     start_ns, end_ns = given.span(bridge.ros_time_ns)
     tag_id = given.tag_id or EVERY_TAG
     timeline = Timeline(start_ns, end_ns, given.points, tag_id, bridge.source.journal())
@@ -216,11 +216,11 @@ async def timeline_route(request: Request) -> Response:
     "/api/report",
     summary="What happened between two moments: alarms, notes, silences, extremes, scans",
     responses={200: {"model": routes_schema.ShiftReport}, **NOT_REMEMBERED},
-    openapi_extra={"parameters": parameters_of(past_query.OfReport)},
+    openapi_extra={"parameters": parameters_of(query_string.OfReport)},
 )
 async def report_route(request: Request) -> Response:
     """At most 31 days and 100,000 scans and inspections; 500 entries of each list."""
-    given = read(past_query.OfReport, request.query_params.multi_items())
+    given = read(query_string.OfReport, request.query_params.multi_items())
     return await respond_past(request, _report(request, given), "report")
 
 
@@ -229,7 +229,7 @@ async def report_route(request: Request) -> Response:
     "/api/report.html",
     summary="The same as a page for paper, A4",
     responses={200: {"content": {"text/html": {"schema": {"type": "string"}}}}, **NOT_REMEMBERED},
-    openapi_extra={"parameters": parameters_of(past_query.OfReportPage)},
+    openapi_extra={"parameters": parameters_of(query_string.OfReportPage)},
 )
 async def report_page_route(request: Request) -> Response:
     """Without scripts. A browser gets a refusal as a page too."""
@@ -246,7 +246,7 @@ async def report_page_route(request: Request) -> Response:
 
 
 async def _report_page(request: Request) -> Response:
-    given = read(past_query.OfReportPage, request.query_params.multi_items())
+    given = read(query_string.OfReportPage, request.query_params.multi_items())
     found = _report(request, given)
     name = given.time_zone or ""
     zone = zone_of(name) if name else None
@@ -265,12 +265,12 @@ async def _report_page(request: Request) -> Response:
     return await respond_past(request, page, "report")
 
 
-def _report(request: Request, given: past_query.OfReport) -> Report:
+def _report(request: Request, given: query_string.OfReport) -> Report:
     bridge = bridge_of(request)
     journal = bridge.source.journal()
     now_ns = bridge.ros_time_ns
     return Report(
-        *past_query.report(given, journal.complete_ns if now_ns is None else now_ns),
+        *query_string.report(given, journal.complete_ns if now_ns is None else now_ns),
         bridge.criteria,
         journal,
     )

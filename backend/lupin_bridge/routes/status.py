@@ -11,12 +11,12 @@ import numpy as np
 import orjson
 from fastapi import APIRouter, Request, Response
 
+from lupin_bridge import query_string
 from lupin_bridge.access.middleware import client_of
 from lupin_bridge.alarms.board import notes_of_alarms
 from lupin_bridge.feed.source import ailment
 from lupin_bridge.judge.episodes import Alarm
 from lupin_bridge.metrics import CONTENT_TYPE
-from lupin_bridge.past import query as past_query
 from lupin_bridge.past.plans import Health
 from lupin_bridge.query_string import parameters_of, read
 from lupin_bridge.routes.answers import (
@@ -190,7 +190,7 @@ _WRITE_ALARM_S: Final = 10e-6
         200: {"model": schema.Judgement},
         **refusing({503: "no twin was found yet, or it is busy"}),
     },
-    openapi_extra={"parameters": parameters_of(past_query.OfMoment)},
+    openapi_extra={"parameters": parameters_of(query_string.OfMoment)},
 )
 async def health(request: Request) -> Response:
     """The verdicts that stand in the frames of `/ws/state`, with the reasons for each.
@@ -199,7 +199,7 @@ async def health(request: Request) -> Response:
     scans of each tag up to then; a reason's `since` is the first observation with it.
     """
     bridge = bridge_of(request)
-    at_ns = past_query.at(request.query_params.multi_items(), bridge.ros_time_ns)
+    at_ns = query_string.at(request.query_params.multi_items(), bridge.ros_time_ns)
     if at_ns is not None:
         return await respond_as_of(request, Health(at_ns, bridge.criteria), at_ns)
     if bridge.latest is None:
@@ -232,7 +232,7 @@ async def sensors(request: Request) -> Response:
     "/api/alarms",
     summary="What was wrong, where, from when to when, and how bad at worst",
     responses={200: {"model": schema.Alarms}, **NOT_REMEMBERED},
-    openapi_extra={"parameters": parameters_of(past_query.OfAlarms)},
+    openapi_extra={"parameters": parameters_of(query_string.OfAlarms)},
 )
 async def alarms_route(request: Request) -> Response:
     """Alarms that were active at any time of the period, the newest first and 2,000 at most.
@@ -240,7 +240,7 @@ async def alarms_route(request: Request) -> Response:
     They follow from what was observed and the ranges of now, the same in every replica.
     """
     bridge = bridge_of(request)
-    given = read(past_query.OfAlarms, request.query_params.multi_items())
+    given = read(query_string.OfAlarms, request.query_params.multi_items())
     span, active = given.span(bridge.ros_time_ns), given.active
     board = bridge.alarms.now
     alarms = board.active if active == "1" else board.alarms

@@ -23,10 +23,8 @@ from lupin_bridge.bridge import Bridge
 from lupin_bridge.feed.source import ELSEWHERE, TwinUnavailableError
 from lupin_bridge.judge.verdict import Verdict
 from lupin_bridge.notify.push import DeviceRefused, check_device
-from lupin_bridge.past import query as past_query
-from lupin_bridge.past.query import moment
 from lupin_bridge.past.report_page import languages
-from lupin_bridge.query_string import parameters_of, read
+from lupin_bridge.query_string import OfNotes, moment, parameters_of, read
 from lupin_bridge.routes.answers import (
     NEVER_STORE,
     NO_TWIN,
@@ -79,12 +77,12 @@ _WRITE_ANSWERS: Final = refusing(
     "/api/notes",
     summary="Notes of people about alarms, tags and the greenhouse",
     responses={200: {"model": routes_schema.Notes}, **NOT_REMEMBERED},
-    openapi_extra={"parameters": parameters_of(past_query.OfNotes)},
+    openapi_extra={"parameters": parameters_of(OfNotes)},
 )
 async def notes_route(request: Request) -> Response:
     """The newest first and 2,000 at most, withdrawn ones too; the same in every replica."""
     bridge = bridge_of(request)
-    given = read(past_query.OfNotes, request.query_params.multi_items())
+    given = read(OfNotes, request.query_params.multi_items())
     start_ns, end_ns = given.span(bridge.ros_time_ns)
     notes = _known(bridge)
 

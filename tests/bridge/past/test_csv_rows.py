@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from lupin_bridge.judge.judging import own_sensors
 from lupin_bridge.past import bodies
-from lupin_bridge.past.query import OfExport
+from lupin_bridge.query_string import OfExport
 from lupin_twin.core.past import PastRow
 
 NS = 10**9

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lupin_bridge.past.query import MAX_SECONDS, compact, iso, moment
+from lupin_bridge.query_string import MAX_SECONDS, compact, iso, moment
 from lupin_twin.core.past import PastRefused, seconds
 
 NS = 10**9

@@ -4,29 +4,29 @@ from typing import Any
 
 import pytest
 
-from lupin_bridge.past import query
+from lupin_bridge import query_string
 from lupin_bridge.query_string import read
 from lupin_twin.core.drops import MAX_TEXT_LENGTH
 from lupin_twin.core.past import DEFAULT_POINTS, PastRefused, SeriesRequest
 
 NS = 10**9
 NOW_NS = 1_000 * NS
-HISTORY, TIMELINE, EXPORT = query.OfHistory, query.OfTimeline, query.OfExport
+HISTORY, TIMELINE, EXPORT = query_string.OfHistory, query_string.OfTimeline, query_string.OfExport
 NEEDED: dict[Any, dict[str, str]] = {HISTORY: {"tag_id": "7", "sensor_type": "co2"}}
 
 
-def ask(kind: type[query.OfPeriod], **given: str) -> Any:
+def ask(kind: type[query_string.OfPeriod], **given: str) -> Any:
     values = NEEDED.get(kind, {}) | {name.rstrip("_"): value for name, value in given.items()}
     return read(kind, list(values.items()))
 
 
-def span(kind: type[query.OfPeriod], **given: str) -> tuple[int, int]:
+def span(kind: type[query_string.OfPeriod], **given: str) -> tuple[int, int]:
     start_ns, end_ns = ask(kind, **given).span(NOW_NS)
     return start_ns, end_ns
 
 
 def test_what_is_left_out_is_all_that_is_kept() -> None:
-    assert query.at([], NOW_NS) is None
+    assert query_string.at([], NOW_NS) is None
     for kind in (HISTORY, TIMELINE, EXPORT):
         assert span(kind) == (0, 0)
     assert ask(HISTORY).points == ask(TIMELINE).points == DEFAULT_POINTS
@@ -36,16 +36,16 @@ def test_what_is_left_out_is_all_that_is_kept() -> None:
 @pytest.mark.parametrize(("to", "what"), [(None, "missing"), ("100", r"100\.000000000 s")])
 def test_before_the_time_is_known_the_end_of_a_report_is_refused(to: str | None, what: str) -> None:
     with pytest.raises(PastRefused, match=f"^to is {what}, and what time it is now is not known"):
-        query.report(query.OfReport(to=to), None)
+        query_string.report(query_string.OfReport(to=to), None)
 
 
 def test_a_report_of_the_first_hours_begins_at_0() -> None:
-    assert query.report(query.OfReport(), NOW_NS) == (0, NOW_NS)
+    assert query_string.report(query_string.OfReport(), NOW_NS) == (0, NOW_NS)
 
 
 def test_what_is_given_is_what_is_asked() -> None:
     period = {"from_": "1.5", "to": "1970-01-01T00:00:09Z"}
-    assert query.at([("at", "8.000000001")], NOW_NS) == 8 * NS + 1
+    assert query_string.at([("at", "8.000000001")], NOW_NS) == 8 * NS + 1
     for kind in (HISTORY, TIMELINE, EXPORT):
         assert span(kind, **period) == (3 * NS // 2, 9 * NS)
     assert ask(HISTORY, points="7").points == 7
@@ -59,18 +59,18 @@ def test_what_is_given_is_what_is_asked() -> None:
 
 
 def test_now_can_be_asked_for_and_what_has_not_come_is_refused() -> None:
-    assert query.at([("at", "1000")], NOW_NS) == NOW_NS
+    assert query_string.at([("at", "1000")], NOW_NS) == NOW_NS
     assert span(HISTORY, from_="1000") == (NOW_NS, 0)
     later = "1000.000000001"
     with pytest.raises(PastRefused) as refused:
-        query.at([("at", later)], NOW_NS)
+        query_string.at([("at", later)], NOW_NS)
     assert str(refused.value) == f"at is {later} s, later than now, 1000.000000000 s"
     with pytest.raises(PastRefused, match=r"^from is 1000\.000000001 s, later than now"):
         span(HISTORY, from_=later)
 
 
 def test_where_nobody_knows_when_now_is_nothing_is_later() -> None:
-    assert query.at([("at", "2000000000")], None) == 2 * 10**9 * NS
+    assert query_string.at([("at", "2000000000")], None) == 2 * 10**9 * NS
 
 
 def test_a_period_may_end_after_now_and_be_empty_but_not_be_inverted() -> None:
@@ -81,7 +81,7 @@ def test_a_period_may_end_after_now_and_be_empty_but_not_be_inverted() -> None:
 
 
 @pytest.mark.parametrize("kind", [HISTORY, TIMELINE, EXPORT])
-def test_an_end_at_0_is_not_taken_for_now(kind: type[query.OfPeriod]) -> None:
+def test_an_end_at_0_is_not_taken_for_now(kind: type[query_string.OfPeriod]) -> None:
     with pytest.raises(PastRefused, match=r"^to is 0 s"):
         span(kind, to="0")
 
@@ -91,7 +91,7 @@ def test_an_end_at_0_is_not_taken_for_now(kind: type[query.OfPeriod]) -> None:
 
 @pytest.mark.parametrize("kind", [HISTORY, TIMELINE, EXPORT])
 def test_an_empty_name_is_refused_and_so_is_one_that_nothing_can_have(
-    kind: type[query.OfPeriod],
+    kind: type[query_string.OfPeriod],
 ) -> None:
     with pytest.raises(PastRefused, match=r"^tag_id is '': string should have at least 1 char"):
         ask(kind, tag_id="")

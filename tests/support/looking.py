@@ -22,7 +22,7 @@ class Count:
 
     at_ns: int
 
-    def answer(self, find: Find, should_stop: ShouldStop) -> int:
+    def __call__(self, find: Find, should_stop: ShouldStop) -> int:
         """See `PastQuery`."""
         snapshot: Snapshot = find(self.at_ns)
         return len(snapshot.tags)
@@ -32,7 +32,7 @@ class Count:
 class Endless:
     """Work that ends when nobody waits for it any more, and not before."""
 
-    def answer(self, find: Find, should_stop: ShouldStop) -> None:
+    def __call__(self, find: Find, should_stop: ShouldStop) -> None:
         """See `PastQuery`."""
         _until_told(should_stop)
 
@@ -46,7 +46,7 @@ def _until_told(should_stop: ShouldStop) -> None:
 class Running:
     """How many are at work for `Endless` in that process, and how nice it is."""
 
-    def answer(self, find: Find, should_stop: ShouldStop) -> tuple[int, int]:
+    def __call__(self, find: Find, should_stop: ShouldStop) -> tuple[int, int]:
         """See `PastQuery`."""
         return (_endless(), os.getpriority(os.PRIO_PROCESS, 0))
 
@@ -62,7 +62,7 @@ class Body:
 
     count: int
 
-    def answer(self, find: Find, should_stop: ShouldStop) -> Answered:
+    def __call__(self, find: Find, should_stop: ShouldStop) -> Answered:
         """See `PastQuery`."""
         return Answered("x", Answer(b"7" * self.count, "text/plain", {}))
 
@@ -73,7 +73,7 @@ class MapCells:
 
     occupancy: OccupancyMap
 
-    def answer(self, find: Find, should_stop: ShouldStop) -> tuple[int, int]:
+    def __call__(self, find: Find, should_stop: ShouldStop) -> tuple[int, int]:
         """See `PastQuery`."""
         return (self.occupancy.cells.size, id(self.occupancy))
 
@@ -84,7 +84,7 @@ class Failing:
 
     how: str
 
-    def answer(self, find: Find, should_stop: ShouldStop) -> Any:
+    def __call__(self, find: Find, should_stop: ShouldStop) -> Any:
         """See `PastQuery`."""
         return self._fail()
 

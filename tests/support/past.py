@@ -9,7 +9,7 @@ from statistics import fmean
 from typing import Any, TypeVar
 
 from lupin_bridge.feed.query import Now, PastQuery, _found
-from lupin_bridge.past.plans import ConditionalQuery, Query
+from lupin_bridge.past.plans import Query, answered
 from lupin_twin.core.diagnostics import UNKNOWN_JOURNAL
 from lupin_twin.core.notes import NotesRequest, PastNotes
 from lupin_twin.core.past import (
@@ -32,9 +32,7 @@ ResultT = TypeVar("ResultT")
 
 async def look_up(question: PastQuery[ResultT], past: MadeUp, workers: Workers) -> ResultT:
     """Answer a question on a worker here."""
-    return await asyncio.wrap_future(
-        workers.submit(lambda stop: question.answer(past.find, stop), 0.0)
-    )
+    return await asyncio.wrap_future(workers.submit(lambda stop: question(past.find, stop), 0.0))
 
 
 @dataclass
@@ -133,8 +131,6 @@ class MadeUp:
 def answered_by(log: Any, query: Query, now_ns: int = 2**62) -> bytes:
     """The body of a query's answer over a log, as the process that looks back makes it."""
     now = Now(now_ns, "map", UNKNOWN_JOURNAL)
-    answer = (
-        ConditionalQuery(query).answer(lambda need: _found(need, now, log), lambda: False).answer
-    )
+    answer = answered(query, "", lambda need: _found(need, now, log), lambda: False).answer
     assert answer is not None
     return answer.body

@@ -10,10 +10,11 @@ import asyncio
 import logging
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import Final, TypeVar
 
 from lupin_bridge.alarms.board import AlarmBoard, AlarmSource, Change, Page, change_between, page_of
-from lupin_bridge.feed.query import Itself
+from lupin_bridge.feed.query import as_found
 from lupin_bridge.feed.shared_work import end
 from lupin_bridge.feed.source import TwinSource, TwinUnavailableError, TwinUpdate
 from lupin_bridge.judge.alarm_fold import FORGET_EVERY_NS, Follower, Found
@@ -391,7 +392,7 @@ async def learn_recent(source: TwinSource, judge: Judge, first: Snapshot) -> Non
 
     It is asked again while the log cannot be read; until then the judge goes by what is heard.
     """
-    recent = Itself(RecentRequest(first.stamp_ns))
+    recent = partial(as_found, RecentRequest(first.stamp_ns))
     while True:
         try:
             judge.learn(await source.ask(recent, len(first.tags) * RECENT_S_PER_TAG))

@@ -21,7 +21,7 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import Future
 from dataclasses import dataclass
 from functools import partial
-from typing import IO, Any, Final, Generic, Protocol, TypeVar
+from typing import IO, Any, Final, TypeVar
 
 from lupin_twin.core.diagnostics import UNKNOWN_JOURNAL, Condition
 from lupin_twin.core.history import LatestRequest
@@ -42,20 +42,11 @@ from lupin_twin.runtime.journal_queries import Recall
 from lupin_twin.runtime.workers import ShouldStop
 
 ResultT = TypeVar("ResultT")
-ResultT_co = TypeVar("ResultT_co", covariant=True)
-
-
-class Step(Protocol):
-    """What reads the log by itself, such as an export."""
-
-    def step(self, log: sqlite3.Connection) -> Any:
-        """What was found."""
-
 
 # A moment, ns of ROS time, which `Snapshot` answers; a series, which `SeriesPast` does; what was
 # recent at a moment, or scanned up to one, which a tuple of `PastWrite` does; what was received, or
 # observed in a period, which `PastWrites` does; what people said, which `PastNotes` does; a tag's
-# last scans, which a `History` does; or any other step.
+# last scans, which a `History` does; or what reads the log by itself, such as an export.
 Need = (
     int
     | SeriesRequest
@@ -65,10 +56,13 @@ Need = (
     | PeriodRequest
     | NotesRequest
     | LatestRequest
-    | Step
+    | Callable[[sqlite3.Connection], Any]
 )
 # Looks up what is needed of the log, as of one moment of its writing.
 Find = Callable[[Need], Any]
+# What makes the answer of what is found; it ends early where `should_stop` says that nobody waits
+# for it. Both can be pickled.
+PastQuery = Callable[[Find, ShouldStop], ResultT]
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,39 +74,20 @@ class Now:
     condition: Condition
 
 
-class PastQuery(Protocol[ResultT_co]):
-    """A value that can be pickled, and so can its answer."""
-
-    def answer(self, find: Find, should_stop: ShouldStop) -> ResultT_co:
-        """The answer; it ends early where `should_stop` says that nobody waits for it."""
+def as_found(need: Need, find: Find, _should_stop: ShouldStop) -> Any:
+    """A `PastQuery`: what was found, as it is."""
+    return find(need)
 
 
-@dataclass(frozen=True, slots=True)
-class Itself:
-    """The question whose answer is what was found, as it is."""
-
-    need: Need
-
-    def answer(self, find: Find, should_stop: ShouldStop) -> Any:  # noqa: ARG002
-        """See `PastQuery`."""
-        return find(self.need)
-
-
-@dataclass(frozen=True, slots=True)
-class ExportStep(Generic[ResultT]):
-    """The next lots of an export, through `write`, and the export from there; None: its end."""
-
-    export: Export
-    write: Callable[[Sequence[PastRow]], ResultT]
-
-    def answer(
-        self,
-        find: Find,
-        should_stop: ShouldStop,  # noqa: ARG002
-    ) -> tuple[Export | None, list[ResultT]]:
-        """See `PastQuery`."""
-        rows: list[PastRow] | None = find(self.export)
-        return (None, []) if rows is None else (self.export, [self.write(it) for it in lots(rows)])
+def export_step(
+    export: Export,
+    write: Callable[[Sequence[PastRow]], ResultT],
+    find: Find,
+    _should_stop: ShouldStop,
+) -> tuple[Export | None, list[ResultT]]:
+    """A `PastQuery`: the next lots through `write`, and the export from there; None: its end."""
+    rows: list[PastRow] | None = find(export.step)
+    return (None, []) if rows is None else (export, [write(lot) for lot in lots(rows)])
 
 
 # --- the process that reads the past --------------------------------------------------------------
@@ -175,7 +150,7 @@ class Child:
                     raise sqlite3.OperationalError("interrupted")
                 return _found(need, now, log)
 
-            return question.answer(find, should_stop)
+            return question(find, should_stop)
 
         return search
 
@@ -226,7 +201,7 @@ def _found(need: Any, now: Now, log: sqlite3.Connection) -> Any:
             return state_at(log, need, now.frame_id)
         case _:
             look = _OF_LOG.get(type(need))
-            return need.step(log) if look is None else look(log, need)
+            return need(log) if look is None else look(log, need)
 
 
 def _portable(error: BaseException) -> BaseException:

@@ -12,10 +12,11 @@ import time
 from abc import ABC, abstractmethod
 from collections.abc import AsyncGenerator, Awaitable, Callable, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import Any, Final, TypeVar
 
 from lupin_bridge.feed.past_process import PastProcess
-from lupin_bridge.feed.query import ExportStep, Itself, Now, PastQuery
+from lupin_bridge.feed.query import Now, PastQuery, as_found, export_step
 from lupin_bridge.feed.relay import Relay, TwinNames
 from lupin_twin.core.diagnostics import UNKNOWN_JOURNAL, Condition, Origin
 from lupin_twin.core.drops import Counts, Recent
@@ -313,11 +314,11 @@ class TwinSource(ABC):
 
     async def writes(self, request: WritesRequest) -> PastWrites:
         """What was heard, scan by scan and look by look, in the order of hearing."""
-        return await self.ask(Itself(request), WRITES_S)
+        return await self.ask(partial(as_found, request), WRITES_S)
 
     async def notes(self, request: NotesRequest) -> PastNotes:
         """What people said."""
-        return await self.ask(Itself(request), NOTES_S)
+        return await self.ask(partial(as_found, request), NOTES_S)
 
     # Only the process that keeps the journal writes it.
     writes_notes = False
@@ -380,7 +381,10 @@ def ailment(thread: Any) -> str | None:
 
 
 async def exported(
-    ask: Callable[[ExportStep[ResultT]], Awaitable[tuple[Export | None, Sequence[ResultT]]]],
+    ask: Callable[
+        [PastQuery[tuple[Export | None, list[ResultT]]]],
+        Awaitable[tuple[Export | None, list[ResultT]]],
+    ],
     period: Export,
     write: Callable[[Sequence[PastRow]], ResultT],
 ) -> AsyncGenerator[ResultT]:
@@ -390,6 +394,6 @@ async def exported(
     """
     export: Export | None = period
     while export is not None:
-        export, lots = await ask(ExportStep(export, write))
+        export, lots = await ask(partial(export_step, export, write))
         for lot in lots:
             yield lot

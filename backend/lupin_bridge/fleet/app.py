@@ -24,7 +24,7 @@ from lupin_bridge.access.policy import BehindProxies, Proxies
 from lupin_bridge.app import STATIC_FOLDER, create_app
 from lupin_bridge.bridge import Bridge
 from lupin_bridge.feed.past_process import PastProcess
-from lupin_bridge.feed.query import ExportStep, Now
+from lupin_bridge.feed.query import Now, PastQuery
 from lupin_bridge.feed.shared_work import Periodic, Shared
 from lupin_bridge.feed.source import exported
 from lupin_bridge.fleet.compare import (
@@ -272,7 +272,7 @@ async def _rows(
         log = Condition(JournalState.RECORDING, path=site, journal_id=site)
         now = Now(fleet.watching.now_ns, "", log)
 
-        def ask(step: ExportStep[bytes], now: Now = now) -> Awaitable[Any]:
+        def ask(step: PastQuery[Any], now: Now = now) -> Awaitable[Any]:
             return fleet.past.ask(step, now, STRETCH_S)
 
         async with aclosing(exported(ask, period, partial(pack, site=site))) as lots:

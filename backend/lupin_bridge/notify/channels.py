@@ -14,6 +14,7 @@ from collections.abc import Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from datetime import datetime, time, timedelta, tzinfo
+from functools import partial
 from hashlib import blake2b
 from pathlib import Path
 from typing import Final
@@ -29,7 +30,7 @@ from lupin_bridge.notify.messages import Source
 from lupin_bridge.notify.mqtt import Mirror, Mqtt
 from lupin_bridge.notify.push import Push
 from lupin_bridge.notify.webhook import Webhook
-from lupin_bridge.past.plans import ConditionalQuery
+from lupin_bridge.past.plans import answered
 from lupin_bridge.past.report import REPORT_S, Report
 from lupin_bridge.query_string import compact
 from lupin_twin.core.past import NotRemembered, PastRefused
@@ -120,9 +121,9 @@ class DailyReport(Periodic):
         return ""
 
     async def _send(self, report: Report) -> None:
-        answered = await self._of.source.ask(ConditionalQuery(report), REPORT_S)
-        assert answered.answer is not None  # no ETag was given
-        body, until = orjson.Fragment(answered.answer.body), compact(report.end_ns)
+        found = await self._of.source.ask(partial(answered, report, ""), REPORT_S)
+        assert found.answer is not None  # no ETag was given
+        body, until = orjson.Fragment(found.answer.body), compact(report.end_ns)
         if not await self._channel.deliver(f"report.{until}", body):
             log.error("the report up to %s was given up by %s", until, self._channel.name)
 

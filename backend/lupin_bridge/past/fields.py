@@ -6,7 +6,6 @@ An estimate is of what the log has up to a moment, and of nothing else.
 from __future__ import annotations
 
 import math
-import sqlite3
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
@@ -214,19 +213,6 @@ def _digest_of_map(occupancy: OccupancyMap) -> str:
 
 
 @dataclass(frozen=True, slots=True)
-class ReadingsAt:
-    """What the log has of a sensor on the day up to a moment; a list of `TagPast`."""
-
-    sensor_type: str
-    at_ns: int
-    day_length_s: float
-
-    def step(self, log: sqlite3.Connection) -> list[TagPast]:
-        """See `Step`."""
-        return readings_at(log, self.sensor_type, self.at_ns, self.day_length_s)
-
-
-@dataclass(frozen=True, slots=True)
 class Estimated(Field):
     """An estimate in a format; a day takes `day_length_s` of ROS time.
 
@@ -258,7 +244,10 @@ class Estimated(Field):
         box = self.request(snapshot)
         # A minute more than a day: so none is missing for as long as this estimate is the same.
         reach_s = self.day_length_s * (1.0 + 1.0 / MINUTES_A_DAY)
-        pasts: list[TagPast] = find(ReadingsAt(box.sensor_type, at_ns, reach_s))
+        up_to_ns = at_ns
+        pasts: list[TagPast] = find(
+            lambda log: readings_at(log, box.sensor_type, up_to_ns, reach_s)
+        )
         if self.at_ns is None:
             at_ns = moment_of(pasts, at_ns, self.day_length_s)
         sensor = self.criteria.sensors.named(box.sensor_type)

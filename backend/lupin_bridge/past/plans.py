@@ -102,18 +102,11 @@ class Answered:
     answer: Answer | None
 
 
-@dataclass(frozen=True, slots=True)
-class ConditionalQuery:
-    """A query of a client that has the answers of these ETags (a value of If-None-Match)."""
-
-    query: Query
-    if_none_match: str = ""
-
-    def answer(self, find: Find, should_stop: ShouldStop) -> Answered:
-        """See `feed.query.PastQuery`."""
-        plan = self.query.look(find)
-        has_it = matches(self.if_none_match, plan.etag)
-        return Answered(plan.etag, None if has_it else plan.write(should_stop))
+def answered(query: Query, if_none_match: str, find: Find, should_stop: ShouldStop) -> Answered:
+    """A `PastQuery`, of a client that has the answers of these ETags (see If-None-Match)."""
+    plan = query.look(find)
+    has_it = matches(if_none_match, plan.etag)
+    return Answered(plan.etag, None if has_it else plan.write(should_stop))
 
 
 # --- as of a moment -------------------------------------------------------------------------------

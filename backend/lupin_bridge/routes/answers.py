@@ -10,6 +10,7 @@ import asyncio
 import time
 from collections.abc import Awaitable, Callable, Coroutine, Hashable, Mapping
 from contextlib import ExitStack
+from functools import partial
 from typing import Any, Final, TypeVar, cast
 
 import orjson
@@ -25,7 +26,7 @@ from lupin_bridge.feed.source import TwinTimeoutError, TwinUnavailableError
 from lupin_bridge.field import matches
 from lupin_bridge.past import bodies
 from lupin_bridge.past.fields import Field
-from lupin_bridge.past.plans import PLAN_TAG_S, Answered, ConditionalQuery, NoSuchTag, Query
+from lupin_bridge.past.plans import PLAN_TAG_S, Answered, NoSuchTag, Query, answered
 from lupin_bridge.serving.admission import REVALIDATE, AdmissionError, Answer, BusyError, Limits
 from lupin_bridge.stream import schema
 from lupin_twin.core.notes import NotesUnwritable
@@ -415,10 +416,10 @@ async def respond_past(request: Request, query: Query, kind: str) -> Response:
             bridge.admission.computing(client_of(request), is_large=cost_s > SMALL_S),
             bridge.metrics.past_seconds.labels(kind).time(),
         ):
-            answered = await bridge.source.ask(ConditionalQuery(query, has), cost_s)
-        if answered.answer is not None:
-            bridge.cache.put(answered.etag, answered.answer)
-        return answered
+            found = await bridge.source.ask(partial(answered, query, has), cost_s)
+        if found.answer is not None:
+            bridge.cache.put(found.etag, found.answer)
+        return found
 
     async def work() -> Answer | Response:
         # The other process need not write what is cached here. If that is dropped meanwhile, the
@@ -426,13 +427,13 @@ async def respond_past(request: Request, query: Query, kind: str) -> Response:
         while True:
             has = ", ".join((header, *bridge.cache.newest_tags()))
             key = (kind, query, header, bridge.state_number)
-            answered = await bridge.looking_back.get(key, lambda has=has: ask(has))  # type: ignore[misc]
-            if has_etag(request, answered.etag):
-                return not_modified(answered.etag)
-            response = cached(bridge, answered.etag)
+            found = await bridge.looking_back.get(key, lambda has=has: ask(has))  # type: ignore[misc]
+            if has_etag(request, found.etag):
+                return not_modified(found.etag)
+            response = cached(bridge, found.etag)
             if response is not None:
                 return response
-            if answered.answer is not None:
-                return answered.answer
+            if found.answer is not None:
+                return found.answer
 
     return await admitted(request, work)

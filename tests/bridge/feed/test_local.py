@@ -3,13 +3,14 @@
 import asyncio
 import threading
 import time
+from functools import partial
 from pathlib import Path
 
 import pytest
 from rclpy.parameter import Parameter
 
 from lupin_bridge.feed.local import LocalTwin
-from lupin_bridge.feed.query import Itself
+from lupin_bridge.feed.query import as_found
 from lupin_bridge.feed.source import TwinTimeoutError
 from lupin_twin.core.diagnostics import JournalState
 from lupin_twin.core.past import NotRemembered
@@ -92,7 +93,7 @@ async def test_damage_that_is_met_looking_back_has_the_file_set_aside(
 async def test_an_answer_that_takes_too_long_ends_and_delays_no_observation(domain: int) -> None:
     async with started(LocalTwin) as (twin, _):
         await until(lambda: twin.journal().state == "recording", "the journal")
-        await twin.past.ask(Itself(0), await twin.now(), 0.0)
+        await twin.past.ask(partial(as_found, 0), await twin.now(), 0.0)
         waiting = asyncio.create_task(twin.ask(Endless(), 0.0))
         await until(lambda: len(twin.past.asked) == 1, "the question")
         # Meanwhile the ROS thread answers as ever.

@@ -7,6 +7,7 @@ import signal
 import sys
 from collections.abc import AsyncIterator, Callable, Coroutine, Iterator
 from contextlib import asynccontextmanager
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +16,7 @@ import pytest
 
 from lupin_bridge.feed import past_process
 from lupin_bridge.feed.past_process import MAX_PENDING, PastProcess
-from lupin_bridge.feed.query import NICENESS, ExportStep, Now
+from lupin_bridge.feed.query import NICENESS, Now, export_step
 from lupin_bridge.past.plans import Answered
 from lupin_twin.core.diagnostics import Condition, JournalState
 from lupin_twin.core.past import NotRemembered, PastRefused
@@ -140,7 +141,7 @@ async def test_an_export_goes_on_where_it_was_in_another_process_too(
         export: Export | None = Export(0, NOW_NS, None, None)
         found: list[int] = []
         while export is not None:
-            export, lots = await past.ask(ExportStep(export, len), now(path), 0.0)
+            export, lots = await past.ask(partial(export_step, export, len), now(path), 0.0)
             found += lots
             if past.starts == 1:
                 assert past.pid is not None

@@ -63,7 +63,7 @@ class House:
     async def ask(self, question: Any, _cost_s: float) -> Answered:
         if self.error is not None:
             raise self.error
-        of = question.query
+        of = question.args[0]
         return Answered('"x"', Answer(orjson.dumps([of.start_ns, of.end_ns]), "", {}))
 
 

@@ -11,7 +11,6 @@ from lupin_bridge.field import PNG
 from lupin_bridge.judge.judging import Criteria
 from lupin_bridge.past.plans import (
     Answered,
-    ConditionalQuery,
     Health,
     History,
     LatestOfTag,
@@ -20,6 +19,7 @@ from lupin_bridge.past.plans import (
     Query,
     Timeline,
     WholeState,
+    answered,
 )
 from lupin_bridge.settings import Settings
 from lupin_twin.core.diagnostics import UNKNOWN_JOURNAL
@@ -45,7 +45,7 @@ QUESTIONS: tuple[Query, ...] = (
 
 def answer(question: Query, has: str = "") -> Answered:
     """What is made of the house, and of series without an entry."""
-    return ConditionalQuery(question, has).answer(found, never)
+    return answered(question, has, found, never)
 
 
 def found(need: Any) -> Any:

@@ -95,8 +95,7 @@ class Bridge:
             lambda: None if self.latest is None else self.latest.snapshot,
             self._judge.note_changed,
         )
-        self.alarms = AlarmBoard()
-        self.alarms.subscribe(self._on_alarms)
+        self.alarms = AlarmBoard(self._on_alarms)
         self._alarm_feed = AlarmFeed(
             source,
             self.criteria,
@@ -341,6 +340,7 @@ class Bridge:
     def _on_alarms(self, change: Change) -> None:
         if not change.is_past:
             self.alarms_raised += sum(alarm.is_active for alarm in change.changed)
+        self.outward.on_alarms(change)
         self._has_alarms.set()
 
     async def _publish_alarms(self) -> None:

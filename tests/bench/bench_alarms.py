@@ -14,7 +14,7 @@ from collections.abc import Iterator
 from dataclasses import replace
 from random import Random
 
-from lupin_bridge.alarms.board import AlarmBoard, change_between, page_of
+from lupin_bridge.alarms.board import AlarmBoard, board_of, change_between
 from lupin_bridge.alarms.feed import LOT, REACH_COUNT
 from lupin_bridge.feed.source import TwinUpdate
 from lupin_bridge.judge.alarm_fold import Follower
@@ -105,21 +105,21 @@ def loop_of(tags: int) -> None:
     ]
     board = AlarmBoard()
     start = time.thread_time()
-    page = page_of(many)
-    change = change_between(board.now.page, page)
+    found = board_of(many)
+    change = change_between(board.now, found)
     row(tags, f"{ALARMS:,} alarms: put in order", ms_since(start))
     start = time.thread_time()
-    board.put(page, change, "journal", 1)
+    board.put(found, change, "journal", 1)
     row(tags, "loop: to take them over", ms_since(start))
     ordered, taken = [], []
     for number in range(CHANGES):
         many[number] = replace(many[number], worst=99.0 + number)
         start = time.thread_time()
-        page = page_of(many)
-        change = change_between(board.now.page, page)
+        found = board_of(many)
+        change = change_between(board.now, found)
         ordered.append(ms_since(start))
         start = time.thread_time()
-        board.put(page, change, "journal", 1)
+        board.put(found, change, "journal", 1)
         taken.append(ms_since(start))
     row(tags, "one of them worse: put in its place", statistics.median(ordered), max(ordered))
     row(tags, "loop: one of them worse", statistics.median(taken), max(taken))

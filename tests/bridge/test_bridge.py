@@ -16,7 +16,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from websockets.asyncio.client import connect
 
-from lupin_bridge.alarms.board import Change, page_of
+from lupin_bridge.alarms.board import Change, board_of
 from lupin_bridge.bridge import ALARMS_REST_S, Bridge
 from lupin_bridge.feed.relay import Relay
 from lupin_bridge.feed.source import ThreadState, TwinUnavailableError, TwinUpdate
@@ -304,8 +304,8 @@ async def test_alarms_are_told_at_once_and_those_right_behind_once_a_second() ->
         await stage.bridge._alarm_feed.stop()  # these are the test's alone
 
         def put(tag_ids: Sequence[str]) -> None:
-            page = page_of(map(alarm, tag_ids))
-            stage.bridge.alarms.put(page, Change(()), "heard", 1)
+            found = board_of(map(alarm, tag_ids))
+            stage.bridge.alarms.put(found, Change(()), "heard", 1)
 
         def told() -> list[int]:
             frames = [frame for frame in stage.ear.heard if frame["type"] == "alarms"]
@@ -366,11 +366,11 @@ async def test_a_twin_whose_clock_stops_is_silent_since_its_last_time() -> None:
         for clock in ("stopped", "doubted"):
             without = replace(state(8).snapshot, clock=clock)
             stage.script.tell(replace(state(8), snapshot=without))
-        await until(lambda: stage.bridge.alarms.now.page.active, "its alarm")
-        (silent,) = stage.bridge.alarms.now.page.active
+        await until(lambda: stage.bridge.alarms.now.active, "its alarm")
+        (silent,) = stage.bridge.alarms.now.active
         assert (silent.reason.kind, silent.raised_at_ns) == ("silent", 7)
         stage.script.tell(state(9))
-        await until(lambda: not stage.bridge.alarms.now.page.active, "its end")
+        await until(lambda: not stage.bridge.alarms.now.active, "its end")
 
 
 async def test_a_clock_that_goes_back_withdraws_the_silences_of_what_has_not_been_yet() -> None:
@@ -384,10 +384,10 @@ async def test_a_clock_that_goes_back_withdraws_the_silences_of_what_has_not_bee
             stage.script.tell(state(last))
             stopped = replace(state(last).snapshot, clock="stopped")
             stage.script.tell(replace(state(last), snapshot=stopped))
-            await until(lambda: board.now.page.active, "its alarm")
+            await until(lambda: board.now.active, "its alarm")
             if back is not None:
                 stage.script.tell(state(back))
-                await until(lambda: not board.now.page.active, "its end")
+                await until(lambda: not board.now.active, "its end")
         assert raised_ns() == [3 * SECOND]
 
 

@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
 
-from lupin_bridge.alarms.board import AlarmBoard, AlarmSource, Board, change_between, page_of
+from lupin_bridge.alarms.board import AlarmBoard, AlarmSource, board_of, change_between
 from lupin_bridge.feed.source import TwinUpdate
 from lupin_bridge.judge.day import ClockDay, Day, judge_day
 from lupin_bridge.judge.episodes import Alarm, alarm_id
@@ -53,7 +53,7 @@ def seen(
     return GreenhouseState(
         Status("live" if is_live else "stale", 0.0, TwinUpdate(snapshot, "r", origin=origin)),
         judged=judge_once(snapshot, (), replace(BY_LIGHT, recent_s=HOLDS_NS / 1e9)),
-        board=Board(page_of(alarms), "heard", NOW_NS, 1),
+        board=replace(board_of(alarms), source="heard", since_ns=NOW_NS, number=1),
         holds_ns=holds,
         now_ns=now_ns,
     )
@@ -83,7 +83,7 @@ class Alarms(AlarmBoard):
         is_past: bool = False,
     ) -> None:
         """Take these for the alarms as they stand."""
-        before, page = self.now.page, page_of(alarms)
-        change = change_between(before, page)
-        page = before if page == before else page
-        self.put(page, replace(change, is_past=is_past), source, since_ns)
+        before, found = self.now, board_of(alarms)
+        change = change_between(before, found)
+        found = before if found.alarms == before.alarms else found
+        self.put(found, replace(change, is_past=is_past), source, since_ns)

@@ -1,4 +1,4 @@
-"""All alarms that are known, in their order, and who wants to hear of changes.
+"""All alarms that are known, in their order.
 
 A hundred thousand alarms cost the loop nothing: a worker puts them in order, and the loop takes
 over what that hands out. An `AlarmBoard` belongs to the event loop; the rest is pure.
@@ -45,17 +45,28 @@ class Change:
     is_past: bool = False
 
 
+# Where the alarms are from: nowhere yet, from a journal, or from what was heard since the start.
+AlarmSource = Literal["starting", "journal", "heard"]
+
+
 @dataclass(frozen=True, slots=True)
-class Page:
-    """All alarms and the active ones, newest first; the worst of these; and these by tag."""
+class Board:
+    """All alarms and the active ones, newest first; the worst of these; and these by tag.
+
+    `number` grows with every change. `since_ns` is the moment of ROS time from which on alarms are
+    known; None: not yet.
+    """
 
     alarms: tuple[Alarm, ...] = ()
     active: tuple[Alarm, ...] = ()
     worst: tuple[Alarm, ...] = ()
     by_tag: Mapping[str, tuple[Alarm, ...]] = field(default_factory=dict)
+    source: AlarmSource = "starting"
+    since_ns: int | None = None
+    number: int = 0
 
 
-def page_of(alarms: Iterable[Alarm], since_ns: int = 0) -> Page:
+def board_of(alarms: Iterable[Alarm], since_ns: int = 0) -> Board:
     """Alarms in their order, without what was over before `since_ns`."""
     kept = (alarm for alarm in alarms if not _is_over(alarm, since_ns))
     known = sorted(kept, key=lambda alarm: (-alarm.raised_at_ns, alarm.id))
@@ -63,7 +74,7 @@ def page_of(alarms: Iterable[Alarm], since_ns: int = 0) -> Page:
     tags: dict[str, list[Alarm]] = {}
     for alarm in active:
         tags.setdefault(alarm.tag_id, []).append(alarm)
-    return Page(
+    return Board(
         tuple(known),
         active,
         tuple(heapq.nsmallest(MAX_WORST, active, key=worst_first)),
@@ -71,8 +82,8 @@ def page_of(alarms: Iterable[Alarm], since_ns: int = 0) -> Page:
     )
 
 
-def change_between(before: Page, now: Page, since_ns: int = 0) -> Change:
-    """What has changed from one page to the next; what is gone because it is old has not."""
+def change_between(before: Board, now: Board, since_ns: int = 0) -> Change:
+    """What has changed from one board to the next; what is gone because it is old has not."""
     gone = {alarm.id: alarm for alarm in before.alarms}
     changed = [alarm for alarm in now.alarms if gone.pop(alarm.id, None) != alarm]
     withdrawn = [
@@ -83,7 +94,7 @@ def change_between(before: Page, now: Page, since_ns: int = 0) -> Change:
     return Change(tuple(sorted(changed, key=happened_ns)), tuple(withdrawn))
 
 
-def _is_dropped(alarm: Alarm, now: Page) -> bool:
+def _is_dropped(alarm: Alarm, now: Board) -> bool:
     """Whether its tag has had so many since that it is not kept."""
     if alarm.cleared_at_ns is None:
         return False
@@ -111,63 +122,22 @@ def active_first(alarm: Alarm) -> tuple[bool, tuple[int, int, str]]:
     return not alarm.is_active, worst_first(alarm)
 
 
-# Where the alarms are from: nowhere yet, from a journal, or from what was heard since the start.
-AlarmSource = Literal["starting", "journal", "heard"]
-
-
-@dataclass(frozen=True, slots=True)
-class Board:
-    """Every alarm that is known; `number` grows with every change.
-
-    `since_ns` is the moment of ROS time from which on alarms are known; None: not yet.
-    """
-
-    page: Page = field(default_factory=Page)
-    source: AlarmSource = "starting"
-    since_ns: int | None = None
-    number: int = 0
-
-    @property
-    def alarms(self) -> tuple[Alarm, ...]:
-        """All of them, newest first."""
-        return self.page.alarms
-
-    @property
-    def active(self) -> tuple[Alarm, ...]:
-        """Those that have not been cleared, newest first."""
-        return self.page.active
-
-
-Listener = Callable[[Change], None]
-
-
 class AlarmBoard:
-    """Holds the newest `Board`; each change of it is told to all who subscribed, on the loop."""
+    """Holds the newest `Board`; `on_change` is told each change of it, and must not wait."""
 
-    def __init__(self) -> None:
+    def __init__(self, on_change: Callable[[Change], None] = lambda _: None) -> None:
         self.now = Board()
-        self._listeners: dict[Listener, None] = {}
+        self.on_change = on_change
 
-    def subscribe(self, listener: Listener) -> Callable[[], None]:
-        """Tell `listener` of every change from now on; what comes back ends that.
-
-        It is called on the event loop and must not wait. One that raises is logged, and the others
-        are told all the same.
-        """
-        self._listeners[listener] = None
-        return lambda: self._listeners.pop(listener, None)
-
-    def put(self, page: Page, change: Change, source: AlarmSource, since_ns: int | None) -> None:
+    def put(self, found: Board, change: Change, source: AlarmSource, since_ns: int | None) -> None:
         """Take these for the alarms as they stand; it is no change where nothing is new."""
         before = self.now
-        if page is before.page and (source, since_ns) == (before.source, before.since_ns):
+        is_same = found.alarms is before.alarms
+        if is_same and (source, since_ns) == (before.source, before.since_ns):
             return
-        self.now = Board(page, source, since_ns, before.number + 1)
-        for listener in tuple(self._listeners):
-            try:
-                listener(change)
-            except Exception:  # whatever it is: the other listeners are told all the same
-                log.exception("a listener to alarms met an error")
+        number = before.number + 1
+        self.now = replace(found, source=source, since_ns=since_ns, number=number)
+        self.on_change(change)
 
 
 # --- what people said of alarms -------------------------------------------------------------------

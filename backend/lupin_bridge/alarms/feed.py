@@ -13,7 +13,14 @@ from dataclasses import replace
 from functools import partial
 from typing import Final, TypeVar
 
-from lupin_bridge.alarms.board import AlarmBoard, AlarmSource, Change, Page, change_between, page_of
+from lupin_bridge.alarms.board import (
+    AlarmBoard,
+    AlarmSource,
+    Board,
+    Change,
+    board_of,
+    change_between,
+)
 from lupin_bridge.feed.query import as_found
 from lupin_bridge.feed.shared_work import end
 from lupin_bridge.feed.source import TwinSource, TwinUnavailableError, TwinUpdate
@@ -112,8 +119,8 @@ _FIRST_RECEIVED: Final = 2**62
 _ALL_TIME: Final = (RunSpan(RUN, 0, 2**63 - 1),)
 _SILENCES: Final = 100
 
-# What a page is of: alarms of the log, those beside them, and the moment from which they are kept.
-_NO_PAGE: Final[tuple[tuple[Alarm, ...], tuple[Alarm, ...], int]] = ((), (), 0)
+# What a board is of: alarms of the log, those beside them, and the moment from which they are kept.
+_NOTHING: Final[tuple[tuple[Alarm, ...], tuple[Alarm, ...], int]] = ((), (), 0)
 
 ResultT = TypeVar("ResultT")
 
@@ -159,7 +166,7 @@ class AlarmFeed:
         # The twin's last time that was known.
         self._last_ns: int | None = None
         self._alarms: tuple[Alarm, ...] = ()
-        self._page, self._page_of = Page(), _NO_PAGE
+        self._newest_board, self._board_of = Board(), _NOTHING
         self._again: asyncio.TimerHandle | None = None
         self._task: asyncio.Task[None] | None = None
 
@@ -339,17 +346,17 @@ class AlarmFeed:
         moment_ns, since_ns = now_ns, max(0, now_ns - self._reach_ns)
         beside = tuple(self._silences)
 
-        def find(_: object) -> tuple[Page, Change, Found]:
+        def find(_: object) -> tuple[Board, Change, Found]:
             found = follower.found(moment_ns, since_ns)
             self._alarms = found.alarms
             return *self._newest(beside, since_ns), found
 
-        page, change, found = await self._on_worker(find)
+        board, change, found = await self._on_worker(find)
         self._due_ns = found.due_ns
         self._note_days(found.days)
         is_past, self._is_caught_up = not self._is_caught_up, True
         begins_ns = moment_ns if self._since_ns is None else self._since_ns
-        self._board.put(page, replace(change, is_past=is_past), self._origin, begins_ns)
+        self._board.put(board, replace(change, is_past=is_past), self._origin, begins_ns)
 
     async def _publish_silence(self, unanswered_s: float) -> None:
         """The rest is as it was: of a twin that is gone nobody else says anything.
@@ -358,23 +365,24 @@ class AlarmFeed:
         is.
         """
         now, beside = self._board.now, tuple(self._silences)
-        page, change = await self._on_worker(lambda _: self._newest(beside, self._page_of[2]))
+        since_ns = self._board_of[2]
+        board, change = await self._on_worker(lambda _: self._newest(beside, since_ns))
         is_removed = any(alarm.is_active for alarm in beside)
         is_old = unanswered_s >= UNANSWERED_S and not is_removed
         source: AlarmSource = "starting" if is_old else now.source
-        self._board.put(page, change, source, now.since_ns)
+        self._board.put(board, change, source, now.since_ns)
 
-    def _newest(self, beside: tuple[Alarm, ...], since_ns: int) -> tuple[Page, Change]:
-        """The page as it is now, the very same where nothing is another; on a worker."""
-        alarms, before = self._alarms, self._page
-        known, known_beside, known_ns = self._page_of
+    def _newest(self, beside: tuple[Alarm, ...], since_ns: int) -> tuple[Board, Change]:
+        """The board as it is now, the very same where nothing is another; on a worker."""
+        alarms, before = self._alarms, self._newest_board
+        known, known_beside, known_ns = self._board_of
         # What falls out for its age does so by the hour.
         since_ns -= since_ns % FORGET_EVERY_NS
         if alarms is known and (beside, since_ns) == (known_beside, known_ns):
             return before, Change(())
-        self._page = page_of((*alarms, *beside), since_ns)
-        self._page_of = alarms, beside, since_ns
-        return self._page, change_between(before, self._page, since_ns)
+        self._newest_board = now = board_of((*alarms, *beside), since_ns)
+        self._board_of = alarms, beside, since_ns
+        return now, change_between(before, now, since_ns)
 
     async def _on_worker(self, work: Callable[[object], ResultT]) -> ResultT:
         """Done where it holds up nobody; the loop only takes over what comes of it."""

@@ -21,6 +21,7 @@ from typing import Final
 
 import orjson
 
+from lupin_bridge.alarms.board import Change
 from lupin_bridge.feed.shared_work import Periodic
 from lupin_bridge.feed.source import TwinUnavailableError
 from lupin_bridge.judge.judging import unix_s
@@ -209,6 +210,12 @@ class Channels:
             ]
         for report in self._reports:
             report.start()
+
+    def on_alarms(self, change: Change) -> None:
+        """Alarms have changed: those that notify of each change do."""
+        for channel in (self._webhook, self.push):
+            if channel is not None:
+                channel.on_alarms(change)
 
     async def stop(self) -> None:
         """Stop all at once."""

@@ -117,7 +117,7 @@ class Mirror:
         if seen.knows_alarms is not before.knows_alarms:
             changed |= dict.fromkeys(self._tags)
         elif seen.board is not before.board:
-            was, now = before.board.page.by_tag, seen.board.page.by_tag
+            was, now = before.board.by_tag, seen.board.by_tag
             changed |= dict.fromkeys(t for t in {**was, **now} if was.get(t) != now.get(t))
         if (seen.now_ns is None, seen.origin) != (before.now_ns is None, before.origin):
             changed |= dict.fromkeys(self._tags)
@@ -163,10 +163,10 @@ class Mirror:
                 yield topic, text
 
     def _of_greenhouse(self) -> Iterator[tuple[str, dict[str, Any]]]:
-        seen, topics, page = self._seen, self._topics, self._seen.board.page
+        seen, topics, board = self._seen, self._topics, self._seen.board
         yield topics.twin, twin_payload(seen.status)
         yield topics.of(None, "health"), greenhouse_payload(seen.judged)
-        alarms = alarms_payload(len(page.active), page.worst, is_known=seen.knows_alarms)
+        alarms = alarms_payload(len(board.active), board.worst, is_known=seen.knows_alarms)
         yield topics.of(None, "alarms"), alarms
 
     def _of_tag(self, tag: TagState, published: _Published) -> Iterator[tuple[str, dict[str, Any]]]:
@@ -186,7 +186,7 @@ class Mirror:
             payload = reading_payload(reading, sensor, holds_ns, seen.now_ns)
             yield topics.reading(tag_id, reading.name), payload
         yield topics.of(tag_id, "health"), health_payload(seen.judged.tags.get(tag_id, _UNKNOWN))
-        active = seen.board.page.by_tag.get(tag_id, ())
+        active = seen.board.by_tag.get(tag_id, ())
         worst = heapq.nsmallest(MAX_WORST, active, key=worst_first)
         alarms = alarms_payload(len(active), worst, is_known=seen.knows_alarms)
         yield topics.of(tag_id, "alarms"), alarms

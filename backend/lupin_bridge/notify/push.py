@@ -15,7 +15,7 @@ import logging
 import math
 import socket
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from ipaddress import ip_address
 from typing import TYPE_CHECKING, Final
@@ -84,7 +84,8 @@ class Push:
         self._owed: dict[str, dict[str, Alarm]] = {}
         self._sending: dict[str, asyncio.Task[None]] = {}
         self._at_once = asyncio.Semaphore(AT_ONCE)
-        self._unsubscribe: Callable[[], None] = lambda: None
+        self._source: Source
+        self._started_s = 0.0
 
     async def public_key(self) -> str:
         """The key that a browser subscribes with, base64url; made with the first.
@@ -113,32 +114,31 @@ class Push:
 
     def start(self, source: Source) -> None:
         """Notify of critical alarms from now on."""
-        started_s = time.monotonic()
-
-        def receive(change: Change) -> None:
-            now_ns, since_ns = source.ros_time_ns, 0.0
-            if change.is_past:
-                # Alarms of the log are not new, except those raised while it is read at the start.
-                if self._has_read or now_ns is None:
-                    since_ns = math.inf
-                else:
-                    since_ns = now_ns - (time.monotonic() - started_s) * 1e9
-                self._has_read = True
-            for news in self._news.of(change, now_ns, source.origin):
-                alarm = news.alarm
-                if alarm is None or news.change not in ("raised", "worse"):
-                    continue
-                at_ns = alarm.worse_at_ns or alarm.raised_at_ns
-                if at_ns >= since_ns and alarm.reason.verdict is Verdict.CRITICAL:
-                    self._new[alarm.id] = alarm
-                    self._is_news.set()
-
-        self._unsubscribe = source.alarms.subscribe(receive)
+        self._source, self._started_s = source, time.monotonic()
         self._task = asyncio.create_task(self._run(source), name="push")
+
+    def on_alarms(self, change: Change) -> None:
+        """Alarms have changed."""
+        source, since_ns = self._source, 0.0
+        now_ns = source.ros_time_ns
+        if change.is_past:
+            # Alarms of the log are not new, except those raised while it is read at the start.
+            if self._has_read or now_ns is None:
+                since_ns = math.inf
+            else:
+                since_ns = now_ns - (time.monotonic() - self._started_s) * 1e9
+            self._has_read = True
+        for news in self._news.of(change, now_ns, source.origin):
+            alarm = news.alarm
+            if alarm is None or news.change not in ("raised", "worse"):
+                continue
+            at_ns = alarm.worse_at_ns or alarm.raised_at_ns
+            if at_ns >= since_ns and alarm.reason.verdict is Verdict.CRITICAL:
+                self._new[alarm.id] = alarm
+                self._is_news.set()
 
     async def stop(self) -> None:
         """End at once."""
-        self._unsubscribe()
         for task in (self._task, *self._sending.values()):
             await end(task)
 

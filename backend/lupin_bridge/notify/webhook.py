@@ -167,21 +167,20 @@ class Webhook:
         self._lost = 0
         self._backoff = Backoff(first_wait_s, MOST_WAIT_S)
         self._task: asyncio.Task[None] | None = None
-        self._unsubscribe: Callable[[], None] = lambda: None
-        self._origin: Callable[[], Origin] = lambda: "unknown"
+        self._source: Source
         self._origin_s = origin_s
 
     def start(self, source: Source) -> None:
         """Notify of every change from now on, and of what is active already."""
-        self._origin = lambda: source.origin
-
-        def receive(change: Change) -> None:
-            for delivery in self._news.of(change, source.ros_time_ns, source.origin):
-                self._wait(delivery)
-
-        self._unsubscribe = source.alarms.subscribe(receive)
-        receive(Change(source.alarms.now.alarms, is_past=True))
+        self._source = source
+        self.on_alarms(Change(source.alarms.now.alarms, is_past=True))
         self._task = asyncio.create_task(self._run(), name="webhook")
+
+    def on_alarms(self, change: Change) -> None:
+        """Alarms have changed."""
+        source = self._source
+        for delivery in self._news.of(change, source.ros_time_ns, source.origin):
+            self._wait(delivery)
 
     @property
     def called(self) -> str:
@@ -191,12 +190,11 @@ class Webhook:
     async def deliver(self, report_id: str, report: orjson.Fragment) -> bool:
         """Send a report until it is taken; False: it was given up, which is logged."""
         end: asyncio.Future[bool] = asyncio.get_running_loop().create_future()
-        self._wait(Delivery(report_id, "report", None, self._origin(), report, end))
+        self._wait(Delivery(report_id, "report", None, self._source.origin, report, end))
         return await end
 
     async def stop(self) -> None:
         """End at once; what was not taken is sent after the next start."""
-        self._unsubscribe()
         await end(self._task)
 
     def _wait(self, delivery: Delivery) -> None:
@@ -231,7 +229,7 @@ class Webhook:
             self.condition.waiting -= 1
 
     async def _send(self, delivery: Delivery, lost: int) -> bool:
-        body = delivery.body(lost, self._origin())
+        body = delivery.body(lost, self._source.origin)
 
         async def attempt() -> None:
             headers = signed(self._target.secret, delivery.id, int(time.time()), body)
@@ -243,7 +241,7 @@ class Webhook:
     async def _wait_for_origin(self) -> None:
         """Until it is known; one that was not in its time is waited for no more."""
         until_s = time.monotonic() + self._origin_s
-        while self._origin() == "unknown":
+        while self._source.origin == "unknown":
             if time.monotonic() >= until_s:
                 self._origin_s = 0.0
                 return

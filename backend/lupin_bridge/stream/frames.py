@@ -220,7 +220,7 @@ def text_frame(payload: bytes) -> bytes:
 def alarms_message(now: Board, now_ns: int | None, notes: tuple[Note, ...], count: int) -> bytes:
     """`schema.AlarmsFrame`: the alarms, and what people said of them; `count` notes in all."""
     said = notes_of_alarms(now.alarms, notes, now_ns)
-    body = alarms_body(alarms_in_frame(now.page, now_ns), now.source, now.since_ns, said)
+    body = alarms_body(alarms_in_frame(now, now_ns), now.source, now.since_ns, said)
     return text_frame(orjson.dumps({"type": "alarms", "notes": count, **body}))
 
 

@@ -28,7 +28,7 @@ from lupin_twin.core.state import (
 )
 
 if TYPE_CHECKING:  # who only wants a moment as JSON does without
-    from lupin_bridge.alarms.board import AlarmNotes, Page
+    from lupin_bridge.alarms.board import AlarmNotes, Board
     from lupin_bridge.judge.episodes import Alarm
     from lupin_bridge.judge.judging import Judged
     from lupin_bridge.judge.verdict import Health, Reason
@@ -248,14 +248,14 @@ MAX_IN_FRAME: Final = 1_000
 RECENT_NS: Final = 86_400 * NANOSECONDS_PER_SECOND
 
 
-def alarms_in_frame(page: Page, now_ns: int | None) -> list[Alarm]:
+def alarms_in_frame(board: Board, now_ns: int | None) -> list[Alarm]:
     """What a frame tells of all alarms: those active now or within 24 h, newest first as they."""
     since_ns = 0 if now_ns is None else now_ns - RECENT_NS
-    active = page.active[:MAX_IN_FRAME]
+    active = board.active[:MAX_IN_FRAME]
     over = islice(
         (
             alarm
-            for alarm in page.alarms
+            for alarm in board.alarms
             if alarm.cleared_at_ns is not None and alarm.cleared_at_ns >= since_ns
         ),
         MAX_IN_FRAME - len(active),

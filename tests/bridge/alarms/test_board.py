@@ -3,19 +3,17 @@
 import random
 from dataclasses import replace
 
-import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from lupin_bridge.alarms.board import (
     MAX_WORST,
-    AlarmBoard,
+    Board,
     Change,
-    Page,
     active_first,
+    board_of,
     change_between,
     notes_of_alarms,
-    page_of,
 )
 from lupin_bridge.judge.episodes import MAX_EPISODES, Alarm
 from lupin_bridge.judge.verdict import Kind, Reason, Verdict
@@ -26,52 +24,24 @@ from tests.support.seen import Alarms, alarm
 A, B = alarm("a"), alarm("b", raised_ns=2)
 
 
-def listening(board: AlarmBoard) -> list[Change]:
-    heard: list[Change] = []
-    board.subscribe(heard.append)
-    return heard
-
-
-def test_listeners_hear_of_a_change_and_find_it_made() -> None:
-    board = Alarms()
+def test_a_change_is_told_once_it_is_made() -> None:
+    board, told = Alarms(), list[tuple[Change, int]]()
     board.show([A], is_past=True)
-    numbers: list[int] = []
-    board.subscribe(lambda _: numbers.append(board.now.number))
-    heard = listening(board)
+    board.on_change = lambda change: told.append((change, board.now.number))
     cleared = replace(A, cleared_at_ns=A.raised_at_ns + 1)
     board.show([cleared, B])
-    assert heard == [Change((B, cleared))]
-    assert numbers == [board.now.number]
+    assert told == [(Change((B, cleared)), board.now.number)]
     assert (board.now.alarms, board.now.active) == ((cleared, B), (B,))
 
 
 def test_the_same_again_is_no_change_and_another_source_is() -> None:
-    board = Alarms()
+    board, heard = Alarms(), list[Change]()
     board.show([A])
-    heard, number = listening(board), board.now.number
+    board.on_change, number = heard.append, board.now.number
     board.show([A])
     assert (heard, board.now.number) == ([], number)
     board.show([A], "starting")
     assert (heard, board.now.number) == ([Change(())], number + 1)
-
-
-def test_who_no_longer_listens_is_not_told_and_one_that_fails_harms_nobody(
-    caplog: pytest.LogCaptureFixture,
-) -> None:
-    board = Alarms()
-    gone: list[Change] = []
-    end = board.subscribe(gone.append)
-    end()
-    end()
-
-    def fail(_: Change) -> None:
-        raise RuntimeError("no network")
-
-    board.subscribe(fail)
-    heard = listening(board)
-    board.show([A], "heard")
-    assert (len(heard), gone) == (1, [])
-    assert "no network" in caplog.text
 
 
 def test_those_that_are_active_come_before_worse_ones_that_are_over() -> None:
@@ -92,18 +62,18 @@ def some_alarm(chance: random.Random) -> Alarm:
     return replace(made, id=name, cleared_at_ns=over)
 
 
-def plain(alarms: dict[str, Alarm]) -> Page:
+def plain(alarms: dict[str, Alarm]) -> Board:
     order = sorted(alarms.values(), key=lambda it: (-it.raised_at_ns, it.id))
     active = [it for it in order if it.is_active]
     worst = sorted(active, key=lambda it: VERDICTS.index(it.reason.verdict))
     tags = {tag_id: tuple(it for it in active if it.tag_id == tag_id) for tag_id in alarms}
     by_tag = {tag_id: mine for tag_id, mine in tags.items() if mine}
-    return Page(tuple(order), tuple(active), tuple(worst), by_tag)
+    return Board(tuple(order), tuple(active), tuple(worst), by_tag)
 
 
 @given(st.integers(0, 2**32))
 def test_a_page_has_all_in_their_order_and_a_change_is_what_differs(seed: int) -> None:
-    chance, since_ns, before = random.Random(seed), 0, Page()
+    chance, since_ns, before = random.Random(seed), 0, Board()
     for _ in range(12):
         every = {it.id: it for it in (some_alarm(chance) for _ in range(chance.randint(0, 9)))}
         since_ns += chance.randint(0, 2)
@@ -112,7 +82,7 @@ def test_a_page_has_all_in_their_order_and_a_change_is_what_differs(seed: int) -
             for name, it in every.items()
             if it.cleared_at_ns is None or it.cleared_at_ns >= since_ns
         }
-        page = page_of(every.values(), since_ns)
+        page = board_of(every.values(), since_ns)
         assert page == plain(known)
         was, change = {it.id: it for it in before.alarms}, change_between(before, page, since_ns)
         assert {it.id for it in change.changed} == {
@@ -129,10 +99,10 @@ def test_a_page_has_all_in_their_order_and_a_change_is_what_differs(seed: int) -
 
 def test_changes_are_told_in_the_order_in_which_they_happened_and_what_stays_is_not() -> None:
     first, second = alarm("a", raised_ns=3), alarm("b", raised_ns=5)
-    before = page_of([second, first])
-    assert change_between(before, page_of([first, second])) == Change(())
+    before = board_of([second, first])
+    assert change_between(before, board_of([first, second])) == Change(())
     third, cleared = alarm("c", raised_ns=7), replace(second, cleared_at_ns=9)
-    page = page_of([cleared, first, third])
+    page = board_of([cleared, first, third])
     assert change_between(before, page) == Change((third, cleared))
     assert page.alarms == (third, cleared, first)
 
@@ -142,9 +112,9 @@ def test_what_its_tag_has_had_too_many_since_was_all_the_same() -> None:
         replace(alarm("a", raised_ns=number), id=str(number), cleared_at_ns=number + 1)
         for number in range(MAX_EPISODES + 1)
     ]
-    before, now = page_of(many[:-1]), page_of(many[1:])
+    before, now = board_of(many[:-1]), board_of(many[1:])
     assert change_between(before, now) == Change((many[-1],))
-    assert change_between(page_of(many[:2]), page_of(many[1:2])) == Change((), (many[0],))
+    assert change_between(board_of(many[:2]), board_of(many[1:2])) == Change((), (many[0],))
 
 
 def test_the_worst_come_first() -> None:
@@ -152,7 +122,7 @@ def test_the_worst_come_first() -> None:
         replace(alarm(str(number), raised_ns=number), id=str(number))
         for number in range(MAX_WORST + 1)
     ]
-    assert page_of(many).worst == tuple(reversed(many))[:MAX_WORST]
+    assert board_of(many).worst == tuple(reversed(many))[:MAX_WORST]
 
 
 # --- what people said of alarms -------------------------------------------------------------------

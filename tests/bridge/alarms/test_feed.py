@@ -18,7 +18,7 @@ from lupin_twin.core.diagnostics import Condition, JournalState
 from lupin_twin.core.past import PastWrite, PastWrites, RunSpan, WritesRequest
 from lupin_twin.core.state import Flower, Inspection, Reading, Scan, Snapshot, TwinStore
 from lupin_twin.runtime.workers import Workers
-from tests.support.waiting import PATIENCE_S, until
+from tests.support.waiting import until
 
 NOW = 10**15
 
@@ -84,11 +84,8 @@ async def following() -> AsyncIterator[tuple[AlarmFeed, AlarmBoard, Journal]]:
 
 async def changed(board: AlarmBoard) -> None:
     """The next change of the board."""
-    told_of = asyncio.Event()
-    end = board.subscribe(lambda _: told_of.set())
-    async with asyncio.timeout(PATIENCE_S):
-        await told_of.wait()
-    end()
+    number = board.now.number
+    await until(lambda: board.now.number > number, "the next change")
 
 
 async def test_it_reads_the_past_once_then_what_is_new_and_another_journal_from_its_beginning() -> (
@@ -97,7 +94,7 @@ async def test_it_reads_the_past_once_then_what_is_new_and_another_journal_from_
     async with following() as (feed, board, source):
         source.writes_now = [pest(number, number % 2) for number in range(1, 1_200)]
         heard: list[Change] = []
-        board.subscribe(heard.append)
+        board.on_change = heard.append
         feed.on_state(told(1))
         await changed(board)
         assert (board.now.source, board.now.since_ns, heard[0].is_past) == (

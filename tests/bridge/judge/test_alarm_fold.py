@@ -8,7 +8,7 @@ from unittest.mock import patch
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from lupin_bridge.alarms.board import page_of
+from lupin_bridge.alarms.board import board_of
 from lupin_bridge.judge import alarm_fold, tag_log
 from lupin_bridge.judge.alarm_fold import Follower
 from lupin_bridge.judge.day import ClockDay, Day
@@ -102,7 +102,7 @@ def follow(
         follower.take(lot)
         follower.found(now_ns)
     assert follower.missed == 0
-    return page_of(follower.found(now_ns).alarms).alarms
+    return board_of(follower.found(now_ns).alarms).alarms
 
 
 @settings(max_examples=150)
@@ -155,7 +155,7 @@ def test_what_is_old_is_forgotten_and_changes_nothing_of_what_is_told(seed: int)
             follower.found(now_ns, since_ns)
         since_ns = max(since_ns, lot[0].stamp_ns - chance.randint(0, 60) * MINUTE)
         since_ns = min(since_ns, heard[0].stamp_ns) if heard else since_ns
-    page = page_of(follower.found(now_ns, since_ns).alarms, since_ns)
+    page = board_of(follower.found(now_ns, since_ns).alarms, since_ns)
     if follower.missed:
         return
     expected = {one for one in expected if one.cleared_ns is None or one.cleared_ns >= since_ns}

@@ -22,7 +22,7 @@ from py_vapid import Vapid02
 
 from lupin_bridge.access.accounts import Device
 from lupin_bridge.access.people import People
-from lupin_bridge.alarms.board import AlarmBoard, Change, page_of
+from lupin_bridge.alarms.board import AlarmBoard, Change, board_of
 from lupin_bridge.judge.episodes import Alarm
 from lupin_bridge.judge.judging import Criteria
 from lupin_bridge.notify import push as push_module
@@ -127,6 +127,7 @@ async def pushing(folder: Path, *answers: Answer) -> AsyncIterator[Pushing]:
         target = PushTarget(CONTACT, frozenset({"localhost"}), ours.trust)
         push, board = Push(target, People(on.accounts), ""), Alarms()
         push.start(source_of(board))
+        board.on_change = push.on_alarms
         try:
             yield Pushing(on.service, on.accounts, push, board)
         finally:
@@ -249,10 +250,11 @@ async def test_an_alarm_that_is_raised_while_the_log_is_read_at_the_start_is_new
     source.ros_time_ns = None
     push = Push(PushTarget(CONTACT, frozenset(), ssl.create_default_context()), None, "")  # type: ignore[arg-type]
     push.start(source)
+    board.on_change = push.on_alarms
     source.ros_time_ns = NOW_NS + 1
 
     def put(change: Change) -> None:
-        board.put(page_of(change.changed), change, "journal", 0)
+        board.put(board_of(change.changed), change, "journal", 0)
 
     before, meanwhile = alarm("before", raised_ns=NOW_NS - 9 * S), alarm("meanwhile")
     put(Change((before, meanwhile), is_past=True))

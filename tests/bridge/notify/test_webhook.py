@@ -47,6 +47,7 @@ async def telling(
             return origin()
 
     hook.start(House())  # type: ignore[arg-type]  # what it needs of one
+    board.on_change = hook.on_alarms
     try:
         yield hook, board
     finally:

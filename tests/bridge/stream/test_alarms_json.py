@@ -1,6 +1,7 @@
 import json
+from dataclasses import replace
 
-from lupin_bridge.alarms.board import Board, page_of
+from lupin_bridge.alarms.board import board_of
 from lupin_bridge.judge.episodes import Alarm
 from lupin_bridge.judge.verdict import Kind, Reason, Verdict
 from lupin_bridge.stream import schema
@@ -20,7 +21,9 @@ COLD = Alarm(
 
 
 def test_a_frame_is_of_the_contracts_type_to_the_last_field_and_in_its_order() -> None:
-    wire = alarms_message(Board(page_of([COLD]), "journal", NIGHT_NS), None, (), 0)
+    wire = alarms_message(
+        replace(board_of([COLD]), source="journal", since_ns=NIGHT_NS), None, (), 0
+    )
     text = received(wire)
     schema.AlarmsFrame.model_validate_json(text, strict=True)
     frame = json.loads(text)

@@ -1,11 +1,12 @@
 """The hub's policy, with connections whose room is the test's to give."""
 
 import json
+from dataclasses import replace
 from typing import Any
 
 import pytest
 
-from lupin_bridge.alarms.board import Board, page_of
+from lupin_bridge.alarms.board import board_of
 from lupin_bridge.stream.frames import FrameWriter, Reason, Status, alarms_message
 from lupin_bridge.stream.hub import CLOSE_POLICY, Client, Hub
 from lupin_twin.core.state import Snapshot, TagState
@@ -73,7 +74,7 @@ class Stage:
 
     def alarms(self, *tag_ids: str, now_s: float = 0.0) -> None:
         """Tell of active alarms at these tags."""
-        board = Board(page_of(alarm(tag_id) for tag_id in tag_ids), "journal", 0)
+        board = replace(board_of(alarm(tag_id) for tag_id in tag_ids), source="journal", since_ns=0)
         self.hub.publish_alarms(alarms_message(board, None, (), 0), now_s)
 
     def join(self, socket: Socket, now_s: float = 0.0, **asked: Any) -> Client:

@@ -285,26 +285,6 @@ def numbers(cells: npt.NDArray[np.float32]) -> Iterator[bytes]:
         yield orjson.dumps(part, option=orjson.OPT_SERIALIZE_NUMPY)[1:-1]
 
 
-def refusal_json(reason: str) -> bytes:
-    """GetField's failure body: the reason, and every other field zeroed."""
-    return _refusal(reason, ("values",), ("value_min", "value_max"), ("sample_count",))
-
-
-def _refusal(
-    reason: str, cells: Iterable[str], numbers: Iterable[str], counts: Iterable[str]
-) -> bytes:
-    return orjson.dumps(
-        {
-            "ok": False,
-            "error_message": reason,
-            **{name: [] for name in cells},
-            **dict.fromkeys(("width", "height"), 0),
-            **dict.fromkeys(("origin_x", "origin_y", "resolution_used", *numbers), 0.0),
-            **dict.fromkeys(counts, 0),
-        }
-    )
-
-
 def write_npy(grid: FieldGrid) -> bytes:
     """NumPy's own format, float32 (height, width), row 0 at `bbox_min_y`, NaN as it is."""
     return _npy(_rows(grid))
@@ -413,11 +393,6 @@ def write_estimate_json(estimate: Estimate) -> bytes:
         sample_count=estimate.sample_count,
         reading_count=estimate.reading_count,
     )
-
-
-def estimate_refusal_json(reason: str) -> bytes:
-    """GetEstimate's failure body: the reason, and every other field zeroed."""
-    return _refusal(reason, ("mean", "sd"), ("sd_known",), ("sample_count", "reading_count"))
 
 
 def write_estimate_npy(estimate: Estimate) -> bytes:

@@ -163,14 +163,7 @@ class _Relayed:
             if self.topic.latched:
                 self.latched.put(sample)
             for on_sample in list(self.listeners):
-                _pass_on(sample, on_sample)
-
-
-def _pass_on(sample: Sample, on_sample: Callable[[Sample], None]) -> None:
-    try:
-        on_sample(sample)
-    except Exception:  # whatever it is: the other listeners hear it all the same
-        log.exception("a listener met an error")
+                on_sample(sample)
 
 
 class Relay:
@@ -206,7 +199,7 @@ class Relay:
             relayed = self._topics[topic] = _Relayed(topic)
             self._open(relayed)
         for sample in list(relayed.latched.samples):
-            _pass_on(sample, on_sample)
+            on_sample(sample)
         relayed.listeners.append(on_sample)
         close = partial(self._leave, relayed, on_sample)
         with ExitStack() as undo:

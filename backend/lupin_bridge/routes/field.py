@@ -8,7 +8,6 @@ from typing import Annotated, Any, Final, TypeVar
 
 from annotated_types import Interval
 from fastapi import APIRouter, Request, Response
-from pydantic import BaseModel
 
 from lupin_bridge import field as formats
 from lupin_bridge import query_string
@@ -54,15 +53,14 @@ class InFormats:
     """An answer in every format: a route for each, and one where Accept chooses.
 
     It is refused as the ROS service refuses it. So `parameters` are read by hand, and a refusal has
-    the service's own body (`refusal_json`); `model` is that body's type.
+    the service's own body, of the type `model`.
     """
 
     name: str
     summary: str
     description: str
     parameters: Sequence[Any]
-    model: type[BaseModel]
-    refusal_json: Callable[[str], bytes]
+    model: type[schema.Contract]
 
     def refusals(self) -> dict[int | str, dict[str, Any]]:
         """What stands in the way of an answer, for the OpenAPI document."""
@@ -81,9 +79,9 @@ class InFormats:
         try:
             return await answer
         except (FieldRefused, PastRefused) as error:
-            return json_response(self.refusal_json(str(error)), 400)
+            return json_response(schema.refused(self.model, str(error)), 400)
         except ClientLimitError as error:
-            return json_response(self.refusal_json(str(error)), 429, error.headers)
+            return json_response(schema.refused(self.model, str(error)), 429, error.headers)
         except REFUSALS as error:
             return refusal(error)
 
@@ -149,7 +147,6 @@ As of a moment that has passed: of the tags as they were then, by the rules and 
 now.""",
     parameters=parameters_of(FieldQuery),
     model=schema.GetFieldResponse,
-    refusal_json=formats.refusal_json,
 )
 
 
@@ -194,7 +191,6 @@ Made of what the log has up to a moment, the model too. That of now is made for 
 or the last whole minute of the day, whichever is later: until then its ETag holds.""",
     parameters=parameters_of(EstimateQuery),
     model=followers.GetEstimateResponse,
-    refusal_json=formats.estimate_refusal_json,
 )
 
 

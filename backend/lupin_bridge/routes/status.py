@@ -38,7 +38,8 @@ from lupin_bridge.routes.answers import (
 from lupin_bridge.serving.admission import REVALIDATE, Answer, json_answer
 from lupin_bridge.stream import routes_schema, schema
 from lupin_bridge.stream.followers import robot_body
-from lupin_bridge.stream.state_json import alarms_body, header, judgement, stamp
+from lupin_bridge.stream.state_json import alarms_body, header, judgement, pose, stamp
+from lupin_twin.core.state import Pose
 from lupin_twin.field.explored import OccupancyMap
 
 # Grey of a free and of an occupied cell; unknown is transparent. The page decides what is below.
@@ -50,6 +51,7 @@ _UNKNOWN_INDEX = 101
 def map_json(occupancy: OccupancyMap) -> bytes:
     """`schema.OccupancyGrid`: where the map is and how large, without its cells."""
     half_yaw = occupancy.origin_yaw / 2
+    turned = (0.0, 0.0, math.sin(half_yaw), math.cos(half_yaw))
     return orjson.dumps(
         {
             "header": header(occupancy.stamp_ns, occupancy.frame_id),
@@ -58,15 +60,7 @@ def map_json(occupancy: OccupancyMap) -> bytes:
                 "resolution": occupancy.resolution,
                 "width": occupancy.width,
                 "height": occupancy.height,
-                "origin": {
-                    "position": {"x": occupancy.origin_x, "y": occupancy.origin_y, "z": 0.0},
-                    "orientation": {
-                        "x": 0.0,
-                        "y": 0.0,
-                        "z": math.sin(half_yaw),
-                        "w": math.cos(half_yaw),
-                    },
-                },
+                "origin": pose(Pose(occupancy.origin_x, occupancy.origin_y, 0.0, *turned)),
             },
         }
     )

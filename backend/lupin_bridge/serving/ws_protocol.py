@@ -24,9 +24,6 @@ from lupin_bridge.serving.connections import CLOSE_GRACE_S, refusal, tear_down
 
 # No message that we serve has more than some hundred bytes.
 MAX_MESSAGE_LENGTH: Final = 16_384
-# orjson reads nested values by recursion and has no limit of its own: 60,000 levels end the
-# process. What we serve has three.
-MAX_BRACKETS: Final = 1_000
 
 
 def members_of(message: str | bytes) -> dict[str, Any]:
@@ -42,9 +39,6 @@ def members_of(message: str | bytes) -> dict[str, Any]:
         raise ValueError(
             f"the message has {len(message)} characters, the limit is {MAX_MESSAGE_LENGTH}"
         )
-    brackets = message.count("[") + message.count("{")
-    if brackets > MAX_BRACKETS:
-        raise ValueError(f"the message opens {brackets} brackets, the limit is {MAX_BRACKETS}")
     try:
         members = orjson.loads(message)
     except ValueError as error:

@@ -181,8 +181,7 @@ Changed = Mapping[str, Mapping[str, int]]
 class EstimateFollower(Periodic):
     """Fetches reports from `start` to `stop`. Belongs to the event loop.
 
-    `snapshot` gives the newest state; `on_changed` gets the tags that have changed, each time that
-    they are others than before.
+    `snapshot` gives the newest state; `on_changed` gets the tags that have changed.
     """
 
     def __init__(
@@ -197,7 +196,6 @@ class EstimateFollower(Periodic):
         self._source = source
         self._snapshot = snapshot
         self._on_changed = on_changed
-        self._changed: Changed = {}
 
     async def update(self) -> None:
         """Fetch the report of each sensor, one after the other."""
@@ -213,10 +211,7 @@ class EstimateFollower(Periodic):
                 if sensor in self.known:
                     known[sensor] = self.known[sensor]
         self.known = known
-        changed = changed_of(known)
-        if changed != self._changed:
-            self._changed = changed
-            self._on_changed(changed)
+        self._on_changed(changed_of(known))
 
 
 def sensors_of(snapshot: Snapshot) -> list[str]:

@@ -245,12 +245,6 @@ class StateFrame:
     _written: dict[str, bytes] = field(default_factory=dict)
 
     @property
-    def json(self) -> bytes:
-        """The state as JSON of `schema.TwinState`; 10 ms of work for 10,000 tags, if asked for."""
-        snapshot, writer = self.snapshot, self._writer.json
-        return self._once("json", lambda: writer.state(snapshot, snapshot.now_ns))
-
-    @property
     def message_json(self) -> bytes:
         """The state as JSON of lupin_msgs/TwinState, for who reads the message itself."""
         snapshot, writer = self.snapshot, self._writer.message_json
@@ -282,7 +276,7 @@ class StateFrame:
         return b'{"type":"state","seq":%d,"revision":%b,"state":%b,"health":%b}' % (
             self.seq,
             orjson.dumps(self.revision),
-            self.json,
+            self._writer.json.state(self.snapshot, self.snapshot.now_ns),
             judgement(self.judged),
         )
 

@@ -405,10 +405,7 @@ class Offer:
 
     def _notify(self, time_ns: int | None) -> None:
         for on_news in list(self._followers):
-            try:
-                on_news(time_ns)
-            except Exception:  # whatever it is: the other followers are notified all the same
-                log.exception("a viewer met an error")
+            on_news(time_ns)
 
 
 def _is_layer(names: TwinNames, topic: str, type_name: str) -> bool:

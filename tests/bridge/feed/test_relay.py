@@ -186,20 +186,6 @@ async def test_one_who_leaves_while_it_opens_spoils_it_for_nobody(ros: Ros, rela
     assert ear.heard == [b"1"]
 
 
-async def test_a_listener_that_fails_costs_the_others_nothing(
-    ros: Ros, relay: Relay, caplog: pytest.LogCaptureFixture
-) -> None:
-    def fail(_: Sample) -> None:
-        raise ZeroDivisionError
-
-    ear = Ear()
-    await relay.listen(STATE, fail)
-    await relay.listen(STATE, ear)
-    await ros.publish(b"1")
-    assert ear.heard == [b"1"]
-    assert "a listener met an error" in caplog.text
-
-
 async def test_without_its_thread_nothing_is_heard_and_nothing_breaks(
     ros: Ros, relay: Relay
 ) -> None:

@@ -2,7 +2,7 @@
 
 import pytest
 
-from lupin_bridge.serving.ws_protocol import MAX_BRACKETS, MAX_MESSAGE_LENGTH, members_of
+from lupin_bridge.serving.ws_protocol import MAX_MESSAGE_LENGTH, members_of
 
 
 def refusal(message: str | bytes) -> str:
@@ -27,11 +27,9 @@ def test_a_long_message_is_not_even_read() -> None:
 
 
 @pytest.mark.parametrize(("opening", "closing"), [("[", "]"), ('{"a":', "}")])
-def test_deep_nesting_is_not_even_read(opening: str, closing: str) -> None:
-    def nested(levels: int) -> str:
-        return f'{{"x":{opening * levels}0{closing * levels}}}'
-
-    assert "x" in members_of(nested(MAX_BRACKETS - 1))
-    text = refusal(nested(MAX_BRACKETS))
-    assert text == "the message opens 1001 brackets, the limit is 1000"
-    assert "brackets" in refusal("[" * MAX_MESSAGE_LENGTH)
+def test_what_is_nested_deep_ends_in_a_refusal(opening: str, closing: str) -> None:
+    # orjson has a limit of its own; without, thousands of levels would end the process.
+    levels = (MAX_MESSAGE_LENGTH - 8) // len(opening + closing)
+    for end in ("", f"0{closing * levels}}}"):
+        text = refusal(f'{{"x":{opening * levels}{end}')
+        assert text.startswith("the message is not JSON: ")

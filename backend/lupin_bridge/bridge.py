@@ -238,7 +238,7 @@ class Bridge:
         )
         yield "lupin_tags", len(tags)
         yield "lupin_tags_pinned", sum(tag.pose is not None for tag in tags)
-        yield "lupin_judge_errors", self._judge.errors + self._states_unjudged
+        yield "lupin_judge_errors", self._states_unjudged
         yield "lupin_alarms_known", self.alarms.now.source != "starting"
         yield "lupin_alarms_active", len(self.alarms.now.active)
         yield "lupin_alarms_missed", self._alarm_feed.missed

@@ -77,7 +77,7 @@ METRICS: Final = {
     ),
     "lupin_ros_callback_errors": counter("errors met by ROS callbacks"),
     "lupin_judge_errors": counter(
-        "errors met in judging a tag or a state, whose status is then unknown"
+        "states that could not be judged, so that every status is unknown"
     ),
     "lupin_work_abandoned": counter("computations that were ended because nobody waited any more"),
     "lupin_journal_rows": counter("observations written to the journal"),

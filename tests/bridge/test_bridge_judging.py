@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 
 from lupin_bridge.feed.source import TwinUnavailableError, TwinUpdate
-from lupin_bridge.judge.verdict import Health, judge_site, judge_tag
+from lupin_bridge.judge.verdict import Health, judge_site
 from lupin_bridge.stream.hub import Client
 from lupin_twin.core.past import PastWrite
 from lupin_twin.core.state import Reading, Snapshot, TagState
@@ -22,33 +22,6 @@ def judged_state(number: int) -> TwinUpdate:
         TagState(tag_id, readings=readings, last_observed_ns=stamp_ns) for tag_id in ("bad", "good")
     )
     return TwinUpdate(Snapshot(stamp_ns, "map", tags), f"r{number}")
-
-
-async def test_a_tag_that_cannot_be_judged_is_unknown_and_the_frames_go_on(
-    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
-) -> None:
-    is_broken = True
-
-    def judge(tag: TagState, *args: Any, **more: Any) -> Health:
-        if tag.tag_id == "bad" and is_broken:
-            raise ZeroDivisionError("a defect")
-        return judge_tag(tag, *args, **more)
-
-    monkeypatch.setattr("lupin_bridge.judge.judging.judge_tag", judge)
-    async with Stage(frames_per_s=1000.0) as stage:
-        for number in range(1, 6):
-            stage.script.tell(judged_state(number))
-            await until(lambda: len(stage.ear.states) == number, "the frame")  # noqa: B023
-            health = stage.ear.states[-1]["health"]["tags"]
-            assert health["bad"] == {"verdict": "unknown"}
-            assert health["good"]["verdict"] == "healthy"
-        assert caplog.text.count("bad could not be judged") == 1
-        assert caplog.text.count("ZeroDivisionError: a defect") == 1
-        assert b"lupin_judge_errors_total 5.0" in stage.bridge.metrics.text()
-        is_broken = False
-        stage.script.tell(judged_state(6))
-        await until(lambda: len(stage.ear.states) == 6, "the frame")
-        assert stage.ear.states[-1]["health"]["tags"]["bad"]["verdict"] == "healthy"
 
 
 @pytest.mark.parametrize("error", [None, TwinUnavailableError("not yet")])

@@ -6,7 +6,6 @@ verdict, and since when each of its reasons holds.
 
 from __future__ import annotations
 
-import logging
 import math
 import re
 from collections import Counter
@@ -44,8 +43,6 @@ from lupin_bridge.judge.verdict import (
 from lupin_bridge.settings import SettingError, Settings, read_text
 from lupin_twin.core.past import PastWrite
 from lupin_twin.core.state import Reading, Snapshot, TagState
-
-log = logging.getLogger(__name__)
 
 # Nobody writes this much.
 MAX_FILE_BYTES: Final = 1_000_000
@@ -207,13 +204,10 @@ class _Tag:
     until_ns: int = _NEVER
     # It was scanned once, and nothing says how long that holds.
     is_once: bool = False
-    is_failing: bool = False
 
 
 class Judge:
     """Belongs to one thread. Of many, so many are judged at once as nobody has to wait for.
-
-    A tag that raises an error is unknown until it is judged again, and counted in `errors`.
 
     While `knows_recent` is false, the robot counts as moving: until `learn`, every tag looks as if
     it had one scan only.
@@ -244,7 +238,6 @@ class Judge:
         self._judged = NOTHING_JUDGED
         self._changed: Mapping[str, Mapping[str, int]] = {}
         self._days: Mapping[str, Sequence[Reading]] = {}
-        self.errors = 0
         self.knows_recent = knows_recent
 
     def see(self, snapshot: Snapshot) -> Judged:
@@ -265,7 +258,7 @@ class Judge:
             news = dict.fromkeys(self._tags)
         self._now_ns = None  # after an error, all are judged again
         self._waiting |= news | self._grown_old(now_ns)
-        healths = {tag_id: self._judge_safely(tag_id, now_ns) for tag_id in self._turn()}
+        healths = {tag_id: self._judge(tag_id, now_ns) for tag_id in self._turn()}
         changed = {
             tag_id: health
             for tag_id, health in healths.items()
@@ -349,19 +342,6 @@ class Judge:
         untils = [(kept.until_ns, tag_id) for tag_id, kept in self._tags.items()]
         self._first_until_ns = min((it for it, _ in untils if it > now_ns), default=_NEVER)
         return {tag_id: None for until_ns, tag_id in untils if until_ns <= now_ns}
-
-    def _judge_safely(self, tag_id: str, now_ns: int | None) -> Health:
-        try:
-            health = self._judge(tag_id, now_ns)
-        except Exception:  # whatever it is: the other tags, and the state itself, go out
-            self.errors += 1
-            # Once, and not for each of ten thousand tags at each scan.
-            if not any(kept.is_failing for kept in self._tags.values()):
-                log.exception("%s could not be judged: its status is unknown", tag_id)
-            self._tags[tag_id].is_failing = True
-            return _UNKNOWN
-        self._tags[tag_id].is_failing = False
-        return health
 
     def _judge(self, tag_id: str, now_ns: int | None) -> Health:
         kept = self._tags[tag_id]

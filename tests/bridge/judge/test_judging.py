@@ -1,6 +1,5 @@
 from dataclasses import replace
 from importlib.resources import files
-from typing import Any
 
 import pytest
 from hypothesis import given, settings
@@ -10,7 +9,7 @@ from lupin_bridge.judge.day import Day
 from lupin_bridge.judge.judging import MAX_AT_ONCE, Judge, Judged, judge_once
 from lupin_bridge.judge.scans import Patrol
 from lupin_bridge.judge.sensors_file import parse
-from lupin_bridge.judge.verdict import Health, Kind, Reason, Verdict, judge_tag
+from lupin_bridge.judge.verdict import Health, Kind, Reason, Verdict
 from lupin_twin.core.past import PastWrite, recent_of
 from lupin_twin.core.state import (
     Flower,
@@ -195,23 +194,6 @@ def test_a_reason_that_lasts_keeps_its_beginning() -> None:
     still = tag("b", START + MINUTE, temperature=6.5)
     (reason,) = judge.see(snapshot(START + MINUTE, still)).tags["b"].reasons
     assert (reason.value, reason.since_ns) == (6.5, START)
-
-
-def test_as_of_a_moment_a_tag_that_cannot_be_judged_is_unknown_and_the_others_are_judged(
-    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
-) -> None:
-    def fail_at_b(state: TagState, *args: Any, **more: Any) -> Health:
-        if state.tag_id == "b":
-            raise ZeroDivisionError("a defect")
-        return judge_tag(state, *args, **more)
-
-    monkeypatch.setattr("lupin_bridge.judge.judging.judge_tag", fail_at_b)
-    judged = judge_once(snapshot(START, GOOD, COLD), (), BY_LIGHT)
-    assert {tag_id: health.verdict for tag_id, health in judged.tags.items()} == {
-        "a": "healthy",
-        "b": "unknown",
-    }
-    assert "b could not be judged: its status is unknown" in caplog.text
 
 
 def test_without_a_clock_nothing_is_known() -> None:

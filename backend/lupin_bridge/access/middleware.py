@@ -10,6 +10,7 @@ import logging
 import math
 import re
 import time
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Final, Self
 
@@ -97,12 +98,13 @@ class ReadOnly:
         methods = ("DELETE",) if path.startswith(f"{NOTES}/") else _METHODS.get(path, _READS)
         if method not in methods:
             detail = f"method {method[:16]} is not allowed here, use {' or '.join(methods)}"
-            await _Refusal(405, detail, {"allow": ", ".join(methods)}).send(scope, receive, send)
+            refusal = _refusal(405, detail, {"allow": ", ".join(methods)})
+            await deny(refusal, scope, receive, send)
         elif (
             method not in _READS and path != OBSERVATIONS and OWN_HEADER not in Headers(scope=scope)
         ):
             detail = f"{method} without the header {OWN_HEADER}, expected any value"
-            await _Refusal(403, detail).send(scope, receive, send)
+            await deny(_refusal(403, detail), scope, receive, send)
         else:
             await self._app(scope, receive, send)
 
@@ -218,7 +220,7 @@ class AccessControl:
         length = len(scope.get("raw_path") or b"") + len(scope["query_string"])
         if length > MAX_TARGET_BYTES:
             detail = f"the address has {length} bytes, the limit is {MAX_TARGET_BYTES}"
-            await _Refusal(414, detail).send(scope, receive, send)
+            await deny(_refusal(414, detail), scope, receive, send)
             return
         request = HTTPConnection(scope)
         scheme = "https" if scope["scheme"] in ("https", "wss") else "http"
@@ -228,36 +230,36 @@ class AccessControl:
         if self._access.policy.origins:
             send = _with_cors(send, decision.foreign)
         if decision.refusal is not None:
-            refusal = _Refusal(403, decision.refusal)
+            refusal = _refusal(403, decision.refusal)
         elif decision.foreign is not None and _is_preflight(request):
-            refusal = _Refusal(204, "", _PREFLIGHT_HEADERS)
+            refusal = _refusal(204, "", _PREFLIGHT_HEADERS)
         elif decision.foreign is not None and scope.get("method", "GET") not in _READS:
-            refusal = _Refusal(403, "pages of another origin may read here, and no more")
+            refusal = _refusal(403, "pages of another origin may read here, and no more")
         else:
             try:
                 checked = self._check_credentials(request)
             except AccountError as error:
                 log.warning("%s: nobody is let in", error)
-                checked = _Refusal(503, "the accounts cannot be read", {"retry-after": "5"})
-            if not isinstance(checked, _Refusal):
+                checked = _refusal(503, "the accounts cannot be read", {"retry-after": "5"})
+            if not isinstance(checked, Response):
                 checked = self._check_reach(checked, path_of(scope))
-            if not isinstance(checked, _Refusal):
+            if not isinstance(checked, Response):
                 await self._pass_on(checked, scope, receive, send)
                 return
             refusal = checked
-        await refusal.send(scope, receive, send)
+        await deny(refusal, scope, receive, send)
 
-    def _check_reach(self, person: Person | None, path: str) -> _Refusal | Person | None:
+    def _check_reach(self, person: Person | None, path: str) -> Response | Person | None:
         """Whether somebody who is known may be here."""
         if person is None:
             return None
         if person.role == WRITER and path != OBSERVATIONS:
             detail = f"{person.name} is a writer: it posts to {OBSERVATIONS}, and no more"
-            return _Refusal(403, detail)
+            return _refusal(403, detail)
         site = self._access.site_of(path)
         if site is not None and not person.reads(site):
             here = f"this is the site {site[:64]!r}" if site else "this bridge has no --site"
-            return _Refusal(403, f"{person.name} is for {', '.join(person.sites)}: {here}")
+            return _refusal(403, f"{person.name} is for {', '.join(person.sites)}: {here}")
         return person
 
     async def _pass_on(
@@ -285,7 +287,7 @@ class AccessControl:
             log.warning("%s: what %s had open is closed", error, person.name)
         connection.dismiss(CloseCode.POLICY_VIOLATION, "the session has ended: sign in again")
 
-    def _check_credentials(self, request: HTTPConnection) -> _Refusal | Person | None:
+    def _check_credentials(self, request: HTTPConnection) -> Response | Person | None:
         """Who makes the request, None: nobody has to say so here, or why it is not let in."""
         path, people = path_of(request.scope), self._access.people
         if people is None or path in OPEN_PATHS or not people.is_on:
@@ -302,14 +304,14 @@ class AccessControl:
         try:
             person = people.by_cookies(request.scope["headers"])
         except CookieTooLong as error:
-            return _Refusal(431, str(error))
+            return _refusal(431, str(error))
         return person or _sign_in_first(request)
 
-    def _check_header(self, people: People, header: str, client: str) -> _Refusal | Person:
+    def _check_header(self, people: People, header: str, client: str) -> Response | Person:
         now_s = time.monotonic()
         wait_s = self._guesses.wait_s(client, now_s)
         if wait_s > 0.0:
-            return _Refusal(
+            return _refusal(
                 429,
                 f"{client} has sent more than {GUESS_BURST} wrong tokens and {GUESSES_PER_MINUTE} "
                 "a minute: no token is checked until Retry-After",
@@ -329,23 +331,16 @@ def client_of(request: HTTPConnection) -> str:
     return client_key(request.client.host if request.client is not None else "")
 
 
-@dataclass(frozen=True, slots=True)
-class _Refusal:
+def _refusal(status: int, detail: str, headers: Mapping[str, str] | None = None) -> Response:
     """An answer in the application's stead, to a request or a WebSocket handshake."""
-
-    status: int
-    detail: str
-    headers: dict[str, str] = field(default_factory=dict)
-
-    async def send(self, scope: Scope, receive: Receive, send: Send) -> None:
-        body = orjson.dumps({"detail": self.detail}) if self.detail else b""
-        headers = {"cache-control": "no-store", **self.headers}
-        response = Response(body, self.status, headers, "application/json" if body else None)
-        await deny(response, scope, receive, with_security_headers(send))
+    body = orjson.dumps({"detail": detail}) if detail else b""
+    known = {"cache-control": "no-store", **(headers or {})}
+    return Response(body, status, known, "application/json" if body else None)
 
 
 async def deny(response: Response, scope: Scope, receive: Receive, send: Send) -> None:
     """Answer in the application's stead."""
+    send = with_security_headers(send)
     if scope["type"] == "websocket":
         await WebSocket(scope, receive, send).send_denial_response(response)
     else:
@@ -359,18 +354,18 @@ _PREFLIGHT_HEADERS: Final = {
 }
 
 
-def _unauthorized(detail: str) -> _Refusal:
-    return _Refusal(401, detail, {"www-authenticate": 'Bearer realm="lupin-twin"'})
+def _unauthorized(detail: str) -> Response:
+    return _refusal(401, detail, {"www-authenticate": 'Bearer realm="lupin-twin"'})
 
 
-def _sign_in_first(request: HTTPConnection) -> _Refusal:
+def _sign_in_first(request: HTTPConnection) -> Response:
     if _wants_page(request):
         # Relative, for a bridge behind a path prefix.
         location = "../" * (path_of(request.scope).count("/") - 1) + "signin"
         language = request.query_params.get("lang", "")
         if _LANGUAGE.fullmatch(language):
             location += f"?lang={language}"
-        return _Refusal(303, "sign in first", {"location": location})
+        return _refusal(303, "sign in first", {"location": location})
     return _unauthorized(
         "a token is needed: send it as Authorization: Bearer, or sign in at /signin"
     )

@@ -98,41 +98,41 @@ def person_of(request: HTTPConnection) -> Person | None:
     return found
 
 
-class BodyRefused(Exception):
-    """A body that is not what the route takes; the message names field, value and limit."""
+class Refused(Exception):
+    """A request that the route does not take; the message names field, value and limit."""
 
-    def __init__(self, message: str, status: int = 400) -> None:
+    def __init__(
+        self, message: str, status: int = 400, headers: Mapping[str, str] | None = None
+    ) -> None:
         super().__init__(message)
-        self.status = status
+        self.status, self.headers = status, headers
 
 
 async def read_body(request: Request, model: type[ModelT]) -> ModelT:
     """A request's JSON body, which the server holds to a few kB.
 
     Raises:
-        BodyRefused: no JSON, not the model's, or not there within `BODY_S`.
+        Refused: no JSON, not the model's, or not there within `BODY_S`.
 
     """
     media_type = request.headers.get("content-type", "").partition(";")[0].strip().lower()
     if media_type != "application/json":
-        raise BodyRefused(f"Content-Type is {media_type[:64]!r}, expected application/json", 415)
+        raise Refused(f"Content-Type is {media_type[:64]!r}, expected application/json", 415)
     try:
         async with asyncio.timeout(BODY_S):
             body = await request.body()
     except TimeoutError:
-        raise BodyRefused(f"the body was not there within {BODY_S:g} s", 408) from None
+        raise Refused(f"the body was not there within {BODY_S:g} s", 408) from None
     except ClientDisconnect:
-        raise BodyRefused(
-            "the client left before its body was there", CLIENT_DISCONNECTED
-        ) from None
+        raise Refused("the client left before its body was there", CLIENT_DISCONNECTED) from None
     try:
         return model.model_validate(orjson.loads(body))
     except orjson.JSONDecodeError as error:
-        raise BodyRefused(f"the body is no JSON: {error}") from None
+        raise Refused(f"the body is no JSON: {error}") from None
     except ValidationError as error:
         first = error.errors(include_url=False, include_input=False, include_context=False)[0]
         name, why = ".".join(map(str, first["loc"])) or "the body", first["msg"]
-        raise BodyRefused(f"{name[:64]}: {why[0].lower()}{why[1:]}") from None
+        raise Refused(f"{name[:64]}: {why[0].lower()}{why[1:]}") from None
 
 
 def list_header(request: Request, name: str) -> str:
@@ -156,7 +156,7 @@ def error_response(
 
 REFUSALS: Final = (
     *(AdmissionError, NotRemembered, NoSuchTag, PastRefused, TwinUnavailableError),
-    *(AccountError, BodyRefused, NotesUnwritable),
+    *(AccountError, Refused, NotesUnwritable),
 )
 
 
@@ -181,8 +181,8 @@ def refusal(error: Exception) -> Response:
             status, headers = (404, None) if error.is_lasting else (503, retry)
         case NoSuchTag():
             status = 404
-        case BodyRefused():
-            status = error.status
+        case Refused():
+            status, headers = error.status, error.headers
         case AccountError() | NotesUnwritable():
             status, headers = 503, retry
         case TwinTimeoutError():

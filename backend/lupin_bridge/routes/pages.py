@@ -325,16 +325,14 @@ async def page(request: Request) -> Response:
     return Response(page, headers=headers, media_type="text/html; charset=utf-8")
 
 
-@read_route(router, "/signin.css", include_in_schema=False)
-async def style() -> Response:
-    """The page's style."""
-    return _file("signin.css", "text/css; charset=utf-8")
+def _add_file(name: str, media_type: str) -> None:
+    @read_route(router, f"/{name}", include_in_schema=False)
+    async def of_page() -> Response:
+        return Response(_read_file(name), headers=REVALIDATE, media_type=media_type)
 
 
-@read_route(router, "/signin.js", include_in_schema=False)
-async def script() -> Response:
-    """The page's script."""
-    return _file("signin.js", "text/javascript; charset=utf-8")
+_add_file("signin.css", "text/css; charset=utf-8")
+_add_file("signin.js", "text/javascript; charset=utf-8")
 
 
 @read_route(router, "/font.woff2", include_in_schema=False)
@@ -362,10 +360,6 @@ def _set_cookie(request: Request, response: Response, name: str, value: str, las
 def _access_of(request: Request) -> Access:
     access: Access = request.app.state.access
     return access
-
-
-def _file(name: str, media_type: str) -> Response:
-    return Response(_read_file(name), headers=REVALIDATE, media_type=media_type)
 
 
 @cache

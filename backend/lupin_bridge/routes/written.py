@@ -29,9 +29,8 @@ from lupin_bridge.routes.answers import (
     NEVER_STORE,
     NO_TWIN,
     NOT_REMEMBERED,
-    BodyRefused,
+    Refused,
     bridge_of,
-    error_response,
     json_response,
     person_of,
     read_body,
@@ -41,7 +40,7 @@ from lupin_bridge.routes.answers import (
     taking,
 )
 from lupin_bridge.routes.pages import language_of
-from lupin_bridge.serving.admission import AdmissionError, Answer, ClientLimitError
+from lupin_bridge.serving.admission import AdmissionError, Answer, ClientLimitError, RateLimit
 from lupin_bridge.stream import routes_schema
 from lupin_bridge.stream.state_json import note_json, stamp
 from lupin_twin.core.notes import COMMENT, SHELVE, WITHDRAW, WITHDRAWN, Note, withdrawals
@@ -54,6 +53,7 @@ router = APIRouter(default_response_class=Response)
 
 MAX_LISTED: Final = 2_000
 MAX_AUDITED: Final = 2_000
+_TOO_MANY_NOTES: Final = f"written more than {NOTE_BURST} notes and {NOTES_PER_MINUTE} a minute"
 # For how long at most an alarm is shelved, a critical one and others.
 CRITICAL_SHELF_S: Final = 3_600
 SHELF_S: Final = 8 * 3_600
@@ -114,13 +114,11 @@ async def write_note(request: Request) -> Response:
     """By an account with the role operator. Of two words on one alarm the later one stands."""
     bridge = bridge_of(request)
     person = _writer(request, bridge)
-    if isinstance(person, Response):
-        return person
     draft = await read_body(request, routes_schema.NoteDraft)
     # They may have taken their time with it.
     people = request.app.state.access.people
     if people is not None and not people.still(person):
-        return error_response("the session has ended: sign in again", 401)
+        raise Refused("the session has ended: sign in again", 401)
     note = await _write(request, bridge, _checked(draft, person, bridge))
     return json_response(orjson.dumps(note_json(note, {})), 201)
 
@@ -134,14 +132,12 @@ async def withdraw_note(request: Request, note_id: str) -> Response:
     """By its author or an admin."""
     bridge = bridge_of(request)
     person = _writer(request, bridge)
-    if isinstance(person, Response):
-        return person
     notes = _known(bridge)
     note = next((note for note in notes if note.id == note_id), None)
     if note is None or note.kind == WITHDRAW:
-        return error_response(f"there is no note {note_id[:64]!r}", 404)
+        raise Refused(f"there is no note {note_id[:64]!r}", 404)
     if note.by != person.name and not person.may("admin"):
-        return error_response(f"the note is by {note.by}: they withdraw it, or an admin", 403)
+        raise Refused(f"the note is by {note.by}: they withdraw it, or an admin", 403)
     gone = withdrawals(notes)
     if note.id not in gone:
         draft = Note("", _now_ns(bridge), person.name, WITHDRAW, f"{WITHDRAWN}{note.id}")
@@ -152,19 +148,19 @@ async def withdraw_note(request: Request, note_id: str) -> Response:
 # --- who may, and what ------------------------------------------------------------------------
 
 
-def _writer(request: Request, bridge: Bridge) -> Person | Response:
-    """Who writes, or why they do not."""
+def _writer(request: Request, bridge: Bridge) -> Person:
+    """Who writes."""
     person = person_of(request)
     if person is None or not person.name:
-        return error_response(
+        raise Refused(
             "notes are written by people: sign in with an account of the role operator "
             "(`lupin-twin user add`)",
             403,
         )
     if not person.may("operator"):
-        return error_response(f"{person.name} is a {person.role}, notes take an operator", 403)
+        raise Refused(f"{person.name} is a {person.role}, notes take an operator", 403)
     if not bridge.source.writes_notes:
-        return error_response(ELSEWHERE, 405, {"Allow": "GET, HEAD", **NEVER_STORE})
+        raise Refused(ELSEWHERE, 405, {"Allow": "GET, HEAD", **NEVER_STORE})
     return person
 
 
@@ -190,18 +186,18 @@ def _checked(draft: routes_schema.NoteDraft, person: Person, bridge: Bridge) -> 
     if kind == "alarm":
         alarm = next((it for it in bridge.alarms.now.alarms if it.id == name), None)
         if alarm is None:
-            raise BodyRefused(f"subject: there is no alarm {name[:64]!r}", 404)
+            raise Refused(f"subject: there is no alarm {name[:64]!r}", 404)
         is_critical = alarm.reason.verdict is Verdict.CRITICAL
     elif kind == "tag":
         latest = bridge.latest
         if latest is None or all(tag.tag_id != name for tag in latest.snapshot.tags):
-            raise BodyRefused(f"subject: there is no tag {name[:64]!r}", 404)
+            raise Refused(f"subject: there is no tag {name[:64]!r}", 404)
     elif draft.subject != "site":
-        raise BodyRefused(f"subject is {draft.subject[:64]!r}, expected alarm:ID, tag:ID or site")
+        raise Refused(f"subject is {draft.subject[:64]!r}, expected alarm:ID, tag:ID or site")
     if draft.kind != COMMENT and kind != "alarm":
-        raise BodyRefused(f"kind is {draft.kind!r}, which is for alarms: expected comment")
+        raise Refused(f"kind is {draft.kind!r}, which is for alarms: expected comment")
     if draft.kind == COMMENT and not draft.text:
-        raise BodyRefused("text is empty, a comment has one")
+        raise Refused("text is empty, a comment has one")
     until_ns = _until(draft, now_ns, is_critical=is_critical)
     return Note("", now_ns, person.name, draft.kind, draft.subject, draft.text, until_ns)
 
@@ -209,46 +205,43 @@ def _checked(draft: routes_schema.NoteDraft, person: Person, bridge: Bridge) -> 
 def _until(draft: routes_schema.NoteDraft, now_ns: int, *, is_critical: bool) -> int | None:
     """When a shelf ends, or what a comment is about; None: it ends now, or is about now."""
     if draft.kind == SHELVE and "until" not in draft.model_fields_set:
-        raise BodyRefused("until is missing: a moment, or null where it is not shelved any more")
+        raise Refused("until is missing: a moment, or null where it is not shelved any more")
     if draft.until is None:
         return None
     until_ns = moment("until", draft.until)
     left_s = (until_ns - now_ns) / NANOSECONDS_PER_SECOND
     if draft.kind == COMMENT:
         if left_s > _SLACK_S:
-            raise BodyRefused(f"until is in {left_s:.0f} s, a comment is about a moment until now")
+            raise Refused(f"until is in {left_s:.0f} s, a comment is about a moment until now")
         return until_ns
     if draft.kind != SHELVE:
-        raise BodyRefused("until is for the kinds shelve and comment")
+        raise Refused("until is for the kinds shelve and comment")
     if is_critical and not draft.text:
-        raise BodyRefused("text is empty: to shelve a critical alarm takes a reason")
+        raise Refused("text is empty: to shelve a critical alarm takes a reason")
     longest_s = CRITICAL_SHELF_S if is_critical else SHELF_S
     if not 0.0 < left_s <= longest_s + _SLACK_S:
         what = "a critical alarm" if is_critical else "an alarm"
-        raise BodyRefused(
+        raise Refused(
             f"until is in {left_s:.0f} s, {what} is shelved for more than 0 and at most "
             f"{longest_s} s"
         )
     return min(until_ns, now_ns + longest_s * NANOSECONDS_PER_SECOND)
 
 
-def pace_note(bridge: Bridge, name: str) -> None:
+def _paced(pace: RateLimit, name: str, most: str) -> None:
     """Refuse what comes too fast from one name.
 
     Raises:
         ClientLimitError: it has written too much.
 
     """
-    wait_s = bridge.notes.pace.take(name, time.monotonic())
+    wait_s = pace.take(name, time.monotonic())
     if wait_s > 0.0:
-        raise ClientLimitError(
-            f"{name} has written more than {NOTE_BURST} notes and {NOTES_PER_MINUTE} a minute",
-            wait_s,
-        )
+        raise ClientLimitError(f"{name} has {most}", wait_s)
 
 
 async def _write(request: Request, bridge: Bridge, note: Note) -> Note:
-    pace_note(bridge, note.by)
+    _paced(bridge.notes.pace, note.by, _TOO_MANY_NOTES)
     access: Access = request.app.state.access
     written = await bridge.source.write_note(note)
     # It is in the log: whatever becomes of the rest, nobody is told that it is not.
@@ -276,7 +269,7 @@ async def audit_route(request: Request) -> Response:
     """The newest first and 2,000 at most; all of it: `lupin-twin audit`."""
     access, person = request.app.state.access, person_of(request)
     if person is None or not person.may("admin") or access.people is None:
-        return error_response("the audit trail is for the role admin", 403)
+        raise Refused("the audit trail is for the role admin", 403)
     found = await access.people.write(lambda it, _: it.audited(MAX_AUDITED))
     return json_response(orjson.dumps({"audit": [row._asdict() for row in found]}))
 
@@ -312,23 +305,18 @@ async def post_observation(request: Request) -> Response:
     """
     bridge, person = bridge_of(request), person_of(request)
     if person is None or person.role != WRITER:
-        return error_response(
+        raise Refused(
             f"observations take a token of the role {WRITER} "
             f"(`lupin-twin token add NAME --role {WRITER}`), as Authorization: Bearer",
             403,
         )
     if not bridge.takes_observations:
-        return error_response(
+        raise Refused(
             "this bridge takes no observations: start serve or web with --http-observations on", 403
         )
     limits = bridge.limits
-    wait_s = bridge.observations_pace.take(person.name, time.monotonic())
-    if wait_s > 0.0:
-        raise ClientLimitError(
-            f"{person.name} has posted more than {limits.observation_burst} observations and "
-            f"{limits.observations_per_s:g} a second",
-            wait_s,
-        )
+    most = f"{limits.observation_burst} observations and {limits.observations_per_s:g} a second"
+    _paced(bridge.observations_pace, person.name, f"posted more than {most}")
     draft = await read_body(request, routes_schema.ObservationDraft)
     now_ns = bridge.ros_time_ns
     if now_ns is None or not bridge.status.is_live:
@@ -351,12 +339,12 @@ def _stamp_ns(observed_at: str | float | None, now_ns: int) -> int:
     stamp_ns = moment("observed_at", text)
     ahead_s = (stamp_ns - now_ns) / NANOSECONDS_PER_SECOND
     if ahead_s > MAX_AHEAD_S:
-        raise BodyRefused(
+        raise Refused(
             f"observed_at is {math.ceil(ahead_s)} s ahead of ROS time, the limit is "
             f"{MAX_AHEAD_S} s: is a clock wrong?"
         )
     if not stamp_ns:
-        raise BodyRefused("observed_at is 0, which is no moment: leave it out for now")
+        raise Refused("observed_at is 0, which is no moment: leave it out for now")
     return min(stamp_ns, now_ns)
 
 
@@ -400,10 +388,10 @@ async def subscribe(request: Request) -> Response:
     push, person = bridge_of(request).outward.push, person_of(request)
     access: Access = request.app.state.access
     if push is None or access.people is None:
-        return error_response("this bridge has no Web Push: start it with --push-contact", 404)
+        raise Refused("this bridge has no Web Push: start it with --push-contact", 404)
     if person is None or not _has_account(request, person):
-        return error_response("notifications take an account: sign in by name", 403)
-    pace_note(bridge_of(request), person.name)
+        raise Refused("notifications take an account: sign in by name", 403)
+    _paced(bridge_of(request).notes.pace, person.name, _TOO_MANY_NOTES)
     given = await read_body(request, routes_schema.PushSubscription)
     if given.keys is None:
         await access.people.write(lambda it, _: it.remove_device(given.endpoint, person.name))
@@ -413,7 +401,7 @@ async def subscribe(request: Request) -> Response:
     try:
         check_device(device, push.target)
     except DeviceRefused as error:
-        raise BodyRefused(str(error)) from None
+        raise Refused(str(error)) from None
     address = client_of(request)
     await access.people.write(lambda it, now_s: it.add_device(person.name, device, address, now_s))
     return Response(status_code=204, headers=NEVER_STORE)

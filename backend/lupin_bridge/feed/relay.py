@@ -173,10 +173,10 @@ class Relay:
     `ros_source.RelayRos`: what ROS does for the relay, in its thread.
     """
 
-    def __init__(self, thread: Callable[[], Any], ros: Any, linger_s: float = LINGER_S) -> None:
+    def __init__(self, thread: Callable[[], Any], ros: Any) -> None:
         self._thread = thread
         self._ros = ros
-        self.linger_s = linger_s
+        self.linger_s = LINGER_S
         # Samples that were too large, or gave way before the loop had taken them.
         self.skipped = 0
         self._topics: dict[Topic, _Relayed] = {}

@@ -66,10 +66,8 @@ class DailyTarget:
 class DailyReport(Periodic):
     """Sends by one channel; what was not taken at its end is sent after the next start."""
 
-    def __init__(
-        self, target: DailyTarget, channel: Mqtt | Webhook, of: Source, poll_s: float = POLL_S
-    ) -> None:
-        super().__init__(self._try, poll_s, "the report of the day", first_s=0.0)
+    def __init__(self, target: DailyTarget, channel: Mqtt | Webhook, of: Source) -> None:
+        super().__init__(self._try, POLL_S, "the report of the day", first_s=0.0)
         self._target, self._channel, self._of = target, channel, of
         self._why = ""
         # What was sent last: where that cannot be noted, it is not sent again and again.

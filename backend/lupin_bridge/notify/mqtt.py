@@ -244,18 +244,11 @@ class Mqtt:
 
     name: Final = "mqtt"
 
-    def __init__(
-        self,
-        target: MqttTarget,
-        mirror: Mirror,
-        first_wait_s: float = FIRST_WAIT_S,
-        answer_s: float = ANSWER_S,
-    ) -> None:
+    def __init__(self, target: MqttTarget, mirror: Mirror) -> None:
         self.condition = Condition()
         self._target, self._topics = target, target.topics
         self._mirror = mirror
-        self._backoff = Backoff(first_wait_s, MOST_WAIT_S)
-        self._answer_s = answer_s
+        self._backoff = Backoff(FIRST_WAIT_S, MOST_WAIT_S)
         # Of its own: two bridges with one name would throw each other out, for ever.
         self._identifier = f"lupin-twin-{secrets.token_hex(6)}"
         self._has_to_repeat: bool
@@ -410,7 +403,7 @@ class Mqtt:
             password=target.password,
             tls_context=target.tls,
             will=Will(self._topics.status, OFFLINE, qos=AT_LEAST_ONCE, retain=True),
-            timeout=self._answer_s,
+            timeout=ANSWER_S,
             keepalive=KEEPALIVE_S,
             max_queued_incoming_messages=WINDOW,
         )

@@ -151,12 +151,7 @@ class Webhook:
 
     name: Final = "webhook"
 
-    def __init__(
-        self,
-        target: WebhookTarget,
-        first_wait_s: float = FIRST_WAIT_S,
-        origin_s: float = ORIGIN_S,
-    ) -> None:
+    def __init__(self, target: WebhookTarget) -> None:
         self.condition = Condition(is_connected=True)
         self._target = target
         self._news = AlarmNews()
@@ -165,10 +160,10 @@ class Webhook:
         self._has_more = asyncio.Event()
         # Given up since the last one that was taken.
         self._lost = 0
-        self._backoff = Backoff(first_wait_s, MOST_WAIT_S)
+        self._backoff = Backoff(FIRST_WAIT_S, MOST_WAIT_S)
         self._task: asyncio.Task[None] | None = None
         self._source: Source
-        self._origin_s = origin_s
+        self._origin_s = ORIGIN_S
 
     def start(self, source: Source) -> None:
         """Notify of every change from now on, and of what is active already."""
@@ -268,13 +263,7 @@ class PostError(RuntimeError):
         self.status, self.retry_after_s = status, retry_after_s
 
 
-async def post(
-    target: Endpoint,
-    headers: Mapping[str, str],
-    body: bytes,
-    connect_s: float = CONNECT_S,
-    answer_s: float = ANSWER_S,
-) -> None:
+async def post(target: Endpoint, headers: Mapping[str, str], body: bytes) -> None:
     """Send it, and wait for the answer's head. Redirects are not followed.
 
     Raises:
@@ -282,7 +271,7 @@ async def post(
 
     """
     try:
-        async with asyncio.timeout(connect_s):
+        async with asyncio.timeout(CONNECT_S):
             reader, writer = await asyncio.open_connection(
                 target.address or target.host,
                 target.port,
@@ -291,17 +280,17 @@ async def post(
                 limit=MAX_HEAD_BYTES,
             )
     except TimeoutError:
-        raise PostError(f"no connection within {connect_s:g} s") from None
+        raise PostError(f"no connection within {CONNECT_S:g} s") from None
     except OSError as error:
         raise PostError(_words_of(error)) from None
     except UnicodeError:  # of a label that is empty or too long
         raise PostError("its host is no name that can be looked up") from None
     try:
-        async with asyncio.timeout(answer_s):
+        async with asyncio.timeout(ANSWER_S):
             all_headers = {"Content-Type": "application/json", **headers}
             answer = await _exchange(target, all_headers, body, reader, writer)
     except TimeoutError:
-        raise PostError(f"no answer within {answer_s:g} s") from None
+        raise PostError(f"no answer within {ANSWER_S:g} s") from None
     except OSError as error:
         raise PostError(_words_of(error)) from None
     except h11.RemoteProtocolError as error:

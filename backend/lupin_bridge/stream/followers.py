@@ -189,9 +189,8 @@ class EstimateFollower(Periodic):
         source: TwinSource,
         snapshot: Callable[[], Snapshot | None],
         on_changed: Callable[[Changed], None],
-        period_s: float = PERIOD_S,
     ) -> None:
-        super().__init__(self.update, period_s, "what estimates are worth")
+        super().__init__(self.update, PERIOD_S, "what estimates are worth")
         self.known: dict[str, Report] = {}
         self._source = source
         self._snapshot = snapshot

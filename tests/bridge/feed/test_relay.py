@@ -80,7 +80,9 @@ def ros() -> Ros:
 
 @pytest.fixture
 def relay(ros: Ros) -> Relay:
-    return Relay(lambda: ros, ros, linger_s=3600.0)
+    found = Relay(lambda: ros, ros)
+    found.linger_s = 3600.0
+    return found
 
 
 async def all_has_ended(ros: Ros, relay: Relay) -> None:

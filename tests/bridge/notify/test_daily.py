@@ -13,6 +13,7 @@ import orjson
 import pytest
 
 from lupin_bridge.judge.judging import Criteria
+from lupin_bridge.notify import channels, mqtt, webhook
 from lupin_bridge.notify.channels import MOST_DAYS, DailyReport, DailyTarget
 from lupin_bridge.notify.destinations import Targets
 from lupin_bridge.notify.mqtt import Mirror, Mqtt
@@ -67,16 +68,23 @@ class House:
         return Answered('"x"', Answer(orjson.dumps([of.start_ns, of.end_ns]), "", {}))
 
 
+@pytest.fixture(autouse=True)
+def in_a_hurry(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(channels, "POLL_S", 0.005)
+    for module in (mqtt, webhook):
+        monkeypatch.setattr(module, "FIRST_WAIT_S", 0.001)
+
+
 @asynccontextmanager
 async def sending(
     house: House, folder: Path, port: int, zone: tzinfo | None = UTC
 ) -> AsyncIterator[Webhook]:
     target = Targets.of(Settings(webhook_url=f"http://127.0.0.1:{port}/"), SECRETS).webhook
     assert target is not None
-    hook = Webhook(target, first_wait_s=0.001)
+    hook = Webhook(target)
     of: Any = house
     hook.start(of)
-    report = DailyReport(DailyTarget(SIX, zone, folder), hook, of, poll_s=0.005)
+    report = DailyReport(DailyTarget(SIX, zone, folder), hook, of)
     report.start()
     try:
         yield hook
@@ -285,10 +293,10 @@ async def test_a_broker_gets_it_once_it_is_there_and_keeps_it(tmp_path: Path) ->
     target = Targets.of(Settings(mqtt_url=broker.url, mqtt_prefix="lt"), Secrets()).mqtt
     assert target is not None
     house = House(ns("2026-05-01T07:00Z"))
-    channel = Mqtt(target, Mirror(target.topics, SENSORS), first_wait_s=0.001)
+    channel = Mqtt(target, Mirror(target.topics, SENSORS))
     channel.start(lambda: seen(tag("a", temperature=20.0)))
     of: Any = house
-    report = DailyReport(DailyTarget(SIX, UTC, tmp_path), channel, of, poll_s=0.005)
+    report = DailyReport(DailyTarget(SIX, UTC, tmp_path), channel, of)
     report.start()
     try:
         await noted(tmp_path)

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 
+from lupin_bridge.notify import webhook
 from lupin_bridge.notify.destinations import Targets, WebhookTarget
 from lupin_bridge.notify.webhook import MAX_HEAD_BYTES, PostError, post
 from lupin_bridge.settings import Secrets, Settings
@@ -25,7 +26,10 @@ def target(url: str, ca: str = "") -> WebhookTarget:
 
 
 def sent(url: str, answer_s: float = 60.0, ca: str = "") -> None:
-    asyncio.run(post(target(url, ca), {"webhook-id": "1"}, b'{"a":1}', 60.0, answer_s))
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(webhook, "CONNECT_S", 60.0)
+        patch.setattr(webhook, "ANSWER_S", answer_s)
+        asyncio.run(post(target(url, ca), {"webhook-id": "1"}, b'{"a":1}'))
 
 
 def refusal(url: str, answer_s: float = 60.0, ca: str = "") -> str:
@@ -145,7 +149,7 @@ async def test_a_connection_that_is_reset_is_told() -> None:
     with socket.create_server(("127.0.0.1", 0)) as listener:
         listener.setblocking(False)
         url = f"http://127.0.0.1:{listener.getsockname()[1]}/"
-        sending = asyncio.create_task(post(target(url), {}, b"{}", 60.0, 60.0))
+        sending = asyncio.create_task(post(target(url), {}, b"{}"))
         client, _ = await asyncio.get_running_loop().sock_accept(listener)
         # Closed with a time of 0, it is reset (socket(7)).
         client.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))

@@ -53,12 +53,15 @@ async def telling(
     chosen = Settings(mqtt_url=broker.url, mqtt_prefix="lt", **settings)
     target = Targets.of(chosen, secrets or Secrets()).mqtt
     assert target is not None
-    channel = Mqtt(target, Mirror(target.topics, SENSORS), first_wait_s=0.001, answer_s=answer_s)
-    channel.start(house.look)
-    try:
-        yield channel
-    finally:
-        await channel.stop()
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(mqtt, "FIRST_WAIT_S", 0.001)
+        patch.setattr(mqtt, "ANSWER_S", answer_s)
+        channel = Mqtt(target, Mirror(target.topics, SENSORS))
+        channel.start(house.look)
+        try:
+            yield channel
+        finally:
+            await channel.stop()
 
 
 async def told(heard: Subscriber, value: float) -> None:

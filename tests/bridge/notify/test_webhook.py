@@ -10,6 +10,7 @@ from typing import Any
 import pytest
 
 from lupin_bridge.judge.episodes import Alarm
+from lupin_bridge.notify import webhook
 from lupin_bridge.notify.destinations import Targets
 from lupin_bridge.notify.webhook import MAX_REFUSALS, MAX_WAITING, ORIGIN_S, Delivery, Webhook
 from lupin_bridge.settings import Secrets, Settings
@@ -36,7 +37,10 @@ async def telling(
     settings = Settings(webhook_url=f"http://127.0.0.1:{port}/hook")
     target = Targets.of(settings, Secrets(webhook_secret=SECRET)).webhook
     assert target is not None
-    hook, board = Webhook(target, first_wait_s, origin_s), Alarms()
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(webhook, "FIRST_WAIT_S", first_wait_s)
+        patch.setattr(webhook, "ORIGIN_S", origin_s)
+        hook, board = Webhook(target), Alarms()
     board.show(alarms)
 
     class House:

@@ -4,7 +4,10 @@ import asyncio
 import math
 from typing import Any
 
+import pytest
+
 from lupin_bridge.feed.source import TwinUnavailableError
+from lupin_bridge.stream import followers
 from lupin_bridge.stream.followers import (
     MAX_SENSORS,
     Changed,
@@ -52,13 +55,13 @@ def test_changed_tags_are_told_by_tag_and_sensor() -> None:
 class Stage:
     """What a follower asks, and tells."""
 
-    def __init__(self, period_s: float = 60.0) -> None:
+    def __init__(self) -> None:
         self.asked: list[str] = []
         self.told: list[Changed] = []
         self.snapshot: Snapshot | None = None
         self.answers: dict[str, Report] = {}
         stage: Any = self
-        self.follower = EstimateFollower(stage, lambda: self.snapshot, self.told.append, period_s)
+        self.follower = EstimateFollower(stage, lambda: self.snapshot, self.told.append)
 
     async def estimate_report(self, request: ReportRequest) -> Report:
         self.asked.append(request.sensor_type)
@@ -103,8 +106,9 @@ def test_of_many_sensors_so_many_are_asked_after() -> None:
     assert stage.asked == names[:-1]
 
 
-async def test_what_cannot_be_answered_ends_nothing() -> None:
-    stage = Stage(period_s=0.0)
+async def test_what_cannot_be_answered_ends_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(followers, "PERIOD_S", 0.0)
+    stage = Stage()
     stage.snapshot = snapshot(co2=1)
     stage.follower.start()
     await until(lambda: len(stage.asked) > 1, "it to be asked again")
